@@ -1,0 +1,108 @@
+"""State-space algebra of linear time-invariant systems: polynomials to modal form, discretisation, responses."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
+
+
+@dataclass(frozen=True, slots=True)
+class StateSpace:
+    """x' = A x + B u, y = C x + D u (or the same with x[k+1] where a function says discrete)."""
+
+    A: Floats
+    B: Floats
+    C: Floats
+    D: Floats
+
+    @property
+    def order(self) -> int:
+        """Number of states."""
+        return int(self.A.shape[0])
+
+
+def modal_from_polynomials(numerator: tuple[float, ...], denominator: tuple[float, ...]) -> StateSpace:
+    """Real modal (block-diagonal) realisation of a strictly proper transfer function with distinct poles.
+
+    Coefficients are in powers of s (rad/s), highest first. Coefficient form is ill-conditioned when poles span
+    decades, so only the roots are taken from it and each mode is built from its residue.
+
+    Raises ValueError when the function is not strictly proper or two poles coincide (no modal form exists).
+    """
+    num = np.trim_zeros(np.asarray(numerator, dtype=float), "f")
+    den = np.trim_zeros(np.asarray(denominator, dtype=float), "f")
+    if num.size >= den.size:
+        raise ValueError(f"numerator of order {num.size - 1} over denominator of order {den.size - 1}: not strictly proper")
+    poles = np.asarray(np.roots(den), dtype=complex)
+    distance = np.abs(poles[:, None] - poles[None, :]) + np.diag(np.full(poles.size, np.inf))
+    if poles.size > 1 and np.min(distance / np.abs(poles)[:, None].clip(1e-300)) < 1e-6:
+        raise ValueError("two poles coincide: the transfer function has no modal form")
+    residues = [
+        np.polyval(num, p) / den[0] / np.prod(p - np.delete(poles, i)) for i, p in enumerate(poles)
+    ]
+    return _modal(poles, np.asarray(residues))
+
+
+def _modal(poles: Complexes, residues: Complexes) -> StateSpace:
+    """Sum of residue/(s - pole), conjugate pairs as real 2x2 blocks."""
+    order = poles.size
+    A, B, C = np.zeros((order, order)), np.zeros((order, 1)), np.zeros((1, order))
+    row = 0
+    for p, r in sorted(zip(poles, residues, strict=True), key=lambda mode: -abs(mode[0])):
+        if abs(p.imag) <= 1e-12 * abs(p):
+            A[row, row], B[row, 0], C[0, row] = p.real, 1.0, r.real
+            row += 1
+        elif p.imag > 0:
+            A[row : row + 2, row : row + 2] = [[p.real, p.imag], [-p.imag, p.real]]
+            B[row, 0] = 1.0
+            C[0, row : row + 2] = 2 * r.real, 2 * r.imag
+            row += 2
+    return StateSpace(A, B, C, np.zeros((1, 1)))
+
+
+def frequency_response(system: StateSpace, freq_hz: Floats, step_s: float | None = None) -> Complexes:
+    """Response C (s - A)^-1 B + D, shape (frequencies, outputs, inputs).
+
+    s = 2 pi i f for a continuous system; exp(2 pi i f step) for a discrete one, when ``step_s`` is given.
+    """
+    s = 2j * np.pi * np.atleast_1d(freq_hz)
+    points = s if step_s is None else np.exp(s * step_s)
+    resolvent = points[:, None, None] * np.eye(system.order) - system.A
+    return np.asarray(system.C @ np.linalg.solve(resolvent, np.broadcast_to(system.B, (s.size, *system.B.shape))) + system.D)
+
+
+def first_order_hold(A: Floats, B: Floats, step_s: float) -> tuple[Floats, Floats, Floats]:
+    """Exact step for an input linear over it: x[k+1] = Ad x[k] + B0 u[k] + B1 u[k+1]; returns Ad, B0, B1."""
+    from scipy.linalg import expm  # slow to import, not needed to show help
+
+    n, m = A.shape[0], B.shape[1]
+    block = np.zeros((n + 2 * m, n + 2 * m))
+    block[:n, :n], block[:n, n : n + m] = A * step_s, B * step_s
+    block[n : n + m, n + m :] = np.eye(m)
+    e = expm(block)
+    ramp = e[:n, n + m :]
+    return e[:n, :n], e[:n, n : n + m] - ramp, ramp
+
+
+def zero_order_hold(A: Floats, B: Floats, step_s: float) -> tuple[Floats, Floats]:
+    """Exact step for an input held over it: x[k+1] = Ad x[k] + Bd u[k]."""
+    Ad, B0, B1 = first_order_hold(A, B, step_s)
+    return Ad, B0 + B1
+
+
+def series(first: StateSpace, second: StateSpace) -> StateSpace:
+    """The two systems one behind the other, the first one nearest the input."""
+    n1, n2 = first.order, second.order
+    A = np.block([[first.A, np.zeros((n1, n2))], [second.B @ first.C, second.A]])
+    B = np.vstack([first.B, second.B @ first.D])
+    C = np.hstack([second.D @ first.C, second.C])
+    return StateSpace(A, B, C, second.D @ first.D)
+
+
+def feedback_poles(loop: StateSpace) -> Complexes:
+    """Poles of the loop closed with unit negative feedback around ``loop`` (square)."""
+    closing = np.linalg.inv(np.eye(loop.D.shape[0]) + loop.D)
+    return np.asarray(np.linalg.eigvals(loop.A - loop.B @ closing @ loop.C))
