@@ -8,7 +8,7 @@ All quantities are deviations from the operating point (drive bias, output at re
 """
 
 from collections.abc import Callable
-from math import exp, expm1, floor, log
+from math import exp, floor, log
 from typing import Any, NamedTuple
 
 import numba
@@ -17,9 +17,16 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
+Indices = NDArray[np.uint64]  # unsigned: no test for a negative index in the innermost loop
 
-_compile: Callable[[Any], Any] = numba.njit(cache=True, nogil=True, error_model="numpy")
-_inline: Callable[[Any], Any] = numba.njit(cache=True, nogil=True, error_model="numpy", inline="always")
+# Without run-time reference counts: they cost more than the arithmetic, and these loops allocate nothing. Contraction
+# (fused multiply-add) is what a C compiler does by default and, unlike full fast-math, keeps nan and inf.
+_compile: Callable[[Any], Any] = numba.njit(
+    cache=True, nogil=True, error_model="numpy", fastmath={"contract"}, _nrt=False
+)
+_inline: Callable[[Any], Any] = numba.njit(
+    cache=True, nogil=True, error_model="numpy", fastmath={"contract"}, _nrt=False, inline="always"
+)
 
 # Columns of a Bouc-Wen parameter row (Eq. 3 of SPIE 11852, 118523B).
 D1, D2, EPSILON, DELTA, ALPHA, BETA, RATE_LIMIT, BIAS = range(8)
@@ -28,64 +35,65 @@ D1, D2, EPSILON, DELTA, ALPHA, BETA, RATE_LIMIT, BIAS = range(8)
 SATURATED, SLEW_LIMITED = range(2)
 
 
+class Rows(NamedTuple):
+    """A matrix by rows without its zeros: row i is value[start[i]:start[i + 1]] at those columns."""
+
+    start: Indices
+    column: Indices
+    value: Floats
+
+
 class Plant(NamedTuple):
     """A linear system in feedback with a bank of hysteresis operators, discretised for a fixed step.
 
     x[k+1] = Ad x[k] + B0 u[k] + B1 u[k+1] + E0 z[k] + E1 z[k+1],  q = F x + G u,  z = H[q],  y = C x + D u + K z.
 
-    Bouc-Wen elements come first in the rows of F and G and the columns of E and K, play operators after them.
-    Ad is stored by rows (``row_start``, ``column``, ``value``), so a modal form costs what its blocks cost.
+    The signals stand in one vector w = (x, u, u at the step's end, z). ``transition`` predicts x with z held, rows
+    (Ad, B0, B1, E0 + E1); ``correction`` is E1, dense; ``drive`` holds the rows (F, 0, G, 0) and ``output`` (C, 0, D, K).
+    Bouc-Wen elements come first in q and z, play operators after them. A modal Ad costs what its blocks cost.
     """
 
     step_s: float
-    row_start: Integers
-    column: Integers
-    value: Floats
-    B0: Floats
-    B1: Floats
-    E0: Floats
-    E1: Floats
-    F: Floats
-    G: Floats
-    C: Floats
-    D: Floats
-    K: Floats
+    states: int
+    actuators: int
+    transition: Rows
+    correction: Floats
+    drive: Rows
+    output: Rows
     bouc_wen: Floats
     play_threshold: Floats
     play_weight: Floats
-    feedback: bool
 
 
 class PlantState(NamedTuple):
-    """The memory of a plant; the kernels write into these arrays. ``clamped`` counts rate-clamped steps by element."""
+    """The memory of a plant; the kernels write into these arrays. ``clamped`` counts rate-clamped steps by element.
 
-    x: Floats
-    x_next: Floats
-    u: Floats
+    ``w`` as in Plant, ``q`` by element, ``h`` by Bouc-Wen element, ``p`` by play operator; ``scratch`` has no meaning
+    between steps.
+    """
+
+    w: Floats
     q: Floats
     h: Floats
     p: Floats
-    z: Floats
-    z_next: Floats
-    y: Floats
+    scratch: Floats
     clamped: Integers
 
 
 class Loop(NamedTuple):
     """Controller, inverse feedforward, converters and amplifier of a sampled loop, as arrays.
 
-    Controller: xc[k+1] = Ac xc + Bc e + L (clip(v) - v),  v = Cc xc + Dc e + feedforward,  e = r - y sampled.
+    Controller: xc[k+1] = Ac xc + Bc e + L (clip(v) - v),  v = Cc xc + Dc e + feedforward,  e = r - y sampled, with the
+    rows of (Ac, Bc) in ``update`` and of (Cc, Dc) in ``command``, both acting on (xc, e); L is ``anti_windup``.
     Amplifier: first order, ``amplifier_factor`` = 1 - exp(-2 pi bandwidth step) (1 is ideal), slew per plant step.
-    A resolution of 0 is an ideal converter.
+    A resolution of 0 is an ideal converter. ``allocation`` (actuators, axes) turns references into targets of actuators.
     """
 
     steps_per_sample: int
     delay_steps: int
-    Ac: Floats
-    Bc: Floats
-    Cc: Floats
-    Dc: Floats
-    L: Floats
+    update: Rows
+    command: Rows
+    anti_windup: Floats
     command_min: Floats
     command_max: Floats
     drive_resolution: Floats
@@ -95,27 +103,25 @@ class Loop(NamedTuple):
     allocation: Floats
     inverse_direct: Floats
     inverse_bouc_wen: Floats
-    inverse_bouc_wen_actuator: Integers
+    inverse_bouc_wen_actuator: Indices
     inverse_play_threshold: Floats
     inverse_play_weight: Floats
-    inverse_play_actuator: Integers
+    inverse_play_actuator: Indices
 
 
 class LoopState(NamedTuple):
     """The memory of a sampled loop; the kernels write into these arrays.
 
-    ``pending`` holds the commands on their way through the computation delay, ``position`` its write index.
-    ``counts`` has one row per actuator: saturated samples, slew-limited plant steps.
-    ``inverse_clamped`` counts rate-clamped samples of the feedforward's own elements.
+    ``w`` is (xc, e). ``pending`` holds the commands on their way through the computation delay, ``position`` its write
+    index. ``counts`` has one row per actuator: saturated samples, slew-limited plant steps. ``inverse_clamped`` counts
+    rate-clamped samples of the feedforward's own elements. ``scratch`` has no meaning between samples.
     """
 
-    xc: Floats
-    xc_next: Floats
-    error: Floats
+    w: Floats
+    scratch: Floats
     command: Floats
-    feedforward: Floats
     target: Floats
-    reference: Floats
+    feedforward: Floats
     inverse_h: Floats
     inverse_p: Floats
     pending: Floats
@@ -126,13 +132,21 @@ class LoopState(NamedTuple):
 
 @_inline
 def _relaxed(h, forcing, decay):  # type: ignore[no-untyped-def]
-    """h after unit time of h' = forcing - decay h; a series where decay vanishes."""
-    if abs(decay) < 1e-5:
-        return h + (forcing - decay * h) * (1.0 - decay * (0.5 - decay / 6.0))
-    return h - (forcing - decay * h) * expm1(-decay) / decay
+    """h after unit time of h' = forcing - decay h, that is h + (forcing - decay h) (1 - exp(-decay)) / decay.
+
+    The last factor is its Taylor series where the difference would cancel: 12 terms, 1e-16 at 0.3 (expm1 costs twice).
+    """
+    if abs(decay) < 0.3:
+        d, d2 = decay, decay * decay
+        d4 = d2 * d2
+        low = (1.0 - d * (1.0 / 2.0)) + d2 * (1.0 / 6.0 - d * (1.0 / 24.0))
+        middle = (1.0 / 120.0 - d * (1.0 / 720.0)) + d2 * (1.0 / 5040.0 - d * (1.0 / 40320.0))
+        high = (1.0 / 362880.0 - d * (1.0 / 3628800.0)) + d2 * (1.0 / 39916800.0 - d * (1.0 / 479001600.0))
+        return h + (forcing - decay * h) * (low + d4 * (middle + d4 * high))
+    return h + (forcing - decay * h) * (1.0 - exp(-decay)) / decay
 
 
-@_compile
+@_inline
 def bouc_wen_step(h, travel, epsilon_rate, alpha, beta):  # type: ignore[no-untyped-def]
     """Exact h after a drive that moves by ``travel`` at constant rate; ``epsilon_rate`` = epsilon exp(delta |rate|).
 
@@ -155,7 +169,7 @@ def bouc_wen_step(h, travel, epsilon_rate, alpha, beta):  # type: ignore[no-unty
 
 @_inline
 def _clamp(value, limit):  # type: ignore[no-untyped-def]
-    return min(max(value, -limit), limit)
+    return limit if value > limit else (-limit if value < -limit else value)
 
 
 @_inline
@@ -163,19 +177,25 @@ def _play(p, q, threshold):  # type: ignore[no-untyped-def]
     return max(q - threshold, min(q + threshold, p))
 
 
-@_compile
-def bouc_wen_response(drive, step_s, parameters, hysteresis0):  # type: ignore[no-untyped-def]
-    """Static Eq. 3 for a sampled drive, linear between samples.
+@_inline
+def _row(matrix, i, w):  # type: ignore[no-untyped-def]
+    """Row i of the matrix times the vector w."""
+    total = 0.0
+    for j in range(matrix.start[i], matrix.start[i + 1]):
+        total += matrix.value[j] * w[matrix.column[j]]
+    return total
 
-    Returns (output, hysteresis, number of rate-clamped samples); the rate is the backward difference, zero at first.
+
+@_compile
+def bouc_wen_kernel(drive, step_s, parameters, hysteresis0, output, hysteresis):  # type: ignore[no-untyped-def]
+    """Static Eq. 3 for a sampled drive, linear between samples; fills ``output`` and ``hysteresis``.
+
+    Returns the number of rate-clamped samples. The rate is the backward difference, zero at the first sample.
     """
-    n = drive.size
-    output = np.empty(n)
-    hysteresis = np.empty(n)
     h = hysteresis0
     clamped = 0
     previous = drive[0]
-    for k in range(n):
+    for k in range(drive.size):
         travel = drive[k] - previous
         rate = travel / step_s
         if abs(rate) > parameters[RATE_LIMIT]:
@@ -188,88 +208,74 @@ def bouc_wen_response(drive, step_s, parameters, hysteresis0):  # type: ignore[n
         output[k] = linear - parameters[D1] * parameters[BIAS] + h
         hysteresis[k] = h
         previous = drive[k]
-    return output, hysteresis, clamped
+    return clamped
+
+
+def bouc_wen_response(
+    drive: Floats, step_s: float, parameters: Floats, hysteresis0: float
+) -> tuple[Floats, Floats, int]:
+    """Static Eq. 3 for a sampled drive: (output, hysteresis, number of rate-clamped samples), see bouc_wen_kernel."""
+    output, hysteresis = np.empty(drive.size), np.empty(drive.size)
+    clamped = bouc_wen_kernel(drive, step_s, parameters, hysteresis0, output, hysteresis)
+    return output, hysteresis, int(clamped)
 
 
 @_compile
-def play_response(drive, thresholds, state0):  # type: ignore[no-untyped-def]
-    """States of play operators, shape (samples, operators): p <- max(u - r, min(u + r, p))."""
-    states = np.empty((drive.size, thresholds.size))
+def play_kernel(drive, thresholds, state0, states):  # type: ignore[no-untyped-def]
+    """States of play operators, p <- max(u - r, min(u + r, p)); fills ``states`` (samples, operators)."""
     for j in range(thresholds.size):
         p = state0[j]
         for k in range(drive.size):
             p = _play(p, drive[k], thresholds[j])
             states[k, j] = p
+
+
+def play_response(drive: Floats, thresholds: Floats, state0: Floats) -> Floats:
+    """States of play operators, shape (samples, operators), see play_kernel."""
+    states = np.empty((drive.size, thresholds.size))
+    play_kernel(drive, thresholds, state0, states)
     return states
 
 
-@_compile
-def _advance_bank(plant, state):  # type: ignore[no-untyped-def]
-    """Advance every element exactly from its stored q to the q at the end of the step; fills z_next."""
-    F, G = plant.F, plant.G
+@_inline
+def _plant_step(plant, state):  # type: ignore[no-untyped-def]
+    """One step to the u at the step's end that stands in w, with u and z linear over the step.
+
+    Predict x with z held, advance every element exactly from its stored q to the predicted q, and correct x once for
+    the change of z: second order, and nothing is iterated.
+    """
+    w, n, m = state.w, plant.states, plant.actuators
+    for i in range(n):
+        state.scratch[i] = _row(plant.transition, i, w)
+    for i in range(n):
+        w[i] = state.scratch[i]
     elements = plant.bouc_wen.shape[0]
-    for i in range(F.shape[0]):
-        q = 0.0
-        if plant.feedback:
-            for j in range(F.shape[1]):
-                q += F[i, j] * state.x_next[j]
-        for j in range(G.shape[1]):
-            q += G[i, j] * state.u[j]
+    for i in range(state.q.size):
+        q = _row(plant.drive, i, w)
         if i < elements:
-            row = plant.bouc_wen[i]
+            row = plant.bouc_wen
             travel = q - state.q[i]
             rate = travel / plant.step_s
-            if abs(rate) > row[RATE_LIMIT]:
+            if abs(rate) > row[i, RATE_LIMIT]:
                 state.clamped[i] += 1
-                rate = _clamp(rate, row[RATE_LIMIT])
-            h = state.h[i]
-            if travel != 0.0 and row[EPSILON] != 0.0:
-                h = bouc_wen_step(h, travel, row[EPSILON] * exp(row[DELTA] * abs(rate)), row[ALPHA], row[BETA])
-                state.h[i] = h
-            state.z_next[i] = row[D1] * exp(-row[D2] * rate) * (q + row[BIAS]) - row[D1] * row[BIAS] + h
+                rate = _clamp(rate, row[i, RATE_LIMIT])
+            grown = row[i, EPSILON] * exp(row[i, DELTA] * abs(rate))
+            h = bouc_wen_step(state.h[i], travel, grown, row[i, ALPHA], row[i, BETA])
+            state.h[i] = h
+            z = row[i, D1] * (exp(-row[i, D2] * rate) * (q + row[i, BIAS]) - row[i, BIAS]) + h
         else:
             p = _play(state.p[i - elements], q, plant.play_threshold[i - elements])
             state.p[i - elements] = p
-            state.z_next[i] = plant.play_weight[i - elements] * p
+            z = plant.play_weight[i - elements] * p
         state.q[i] = q
-
-
-@_compile
-def _plant_step(plant, state, u_next):  # type: ignore[no-untyped-def]
-    """One step with u and z linear over it: predict with z held, advance the bank, correct once (second order)."""
-    x, x_next, u = state.x, state.x_next, state.u
-    for i in range(x.size):
-        total = 0.0
-        for j in range(plant.row_start[i], plant.row_start[i + 1]):
-            total += plant.value[j] * x[plant.column[j]]
-        for j in range(u.size):
-            total += plant.B0[i, j] * u[j] + plant.B1[i, j] * u_next[j]
-        for j in range(state.z.size):
-            total += (plant.E0[i, j] + plant.E1[i, j]) * state.z[j]
-        x_next[i] = total
-    for j in range(u.size):
-        u[j] = u_next[j]
-    _advance_bank(plant, state)
-    for i in range(x.size):
-        total = x_next[i]
-        for j in range(state.z.size):
-            total += plant.E1[i, j] * (state.z_next[j] - state.z[j])
-        x[i] = total
-    for j in range(state.z.size):
-        state.z[j] = state.z_next[j]
-
-
-@_compile
-def _plant_output(plant, state):  # type: ignore[no-untyped-def]
-    for i in range(state.y.size):
-        total = 0.0
-        for j in range(state.x.size):
-            total += plant.C[i, j] * state.x[j]
-        for j in range(state.u.size):
-            total += plant.D[i, j] * state.u[j]
-        for j in range(state.z.size):
-            total += plant.K[i, j] * state.z[j]
-        state.y[i] = total
+        state.scratch[n + i] = z - w[n + 2 * m + i]
+    for j in range(state.q.size):
+        change = state.scratch[n + j]
+        for i in range(n):
+            w[i] += plant.correction[i, j] * change
+        w[n + 2 * m + j] += change
+    for j in range(m):
+        w[n + j] = w[n + m + j]
 
 
 @_compile
@@ -279,46 +285,48 @@ def open_loop(plant, state, drive, output, bank):  # type: ignore[no-untyped-def
     Fills ``output`` (samples, outputs) and ``bank`` (samples, elements; z) and leaves ``state`` at the last sample,
     so that a following call continues. The first sample is reached from the stored state in one step.
     """
+    n, m = plant.states, plant.actuators
     for k in range(drive.shape[0]):
-        _plant_step(plant, state, drive[k])
-        _plant_output(plant, state)
-        output[k] = state.y
-        bank[k] = state.z
+        for j in range(m):
+            state.w[n + m + j] = drive[k, j]
+        _plant_step(plant, state)
+        for i in range(output.shape[1]):
+            output[k, i] = _row(plant.output, i, state.w)
+        for i in range(bank.shape[1]):
+            bank[k, i] = state.w[n + 2 * m + i]
 
 
-@_compile
-def _inverse(loop, state, reference, sample_s):  # type: ignore[no-untyped-def]
+@_inline
+def _inverse(loop, state, reference, k, sample_s):  # type: ignore[no-untyped-def]
     """Causal inverse-multiplicative feedforward (Eq. 4), and the closed-form inverse of play operators.
 
     u = (r - h + d1 bias) / (d1 exp(-d2 q')) - bias, with h and q' driven by the reference, q = r / d1: taking the rate
     from the feedforward's own last sample makes it chatter at the sample rate.
     """
-    for j in range(state.feedforward.size):
+    for a in range(state.target.size):
         target = 0.0
-        for i in range(reference.size):
-            target += loop.allocation[j, i] * reference[i]
-        previous = state.target[j]
-        u = loop.inverse_direct[j] * target
-        for e in range(loop.inverse_bouc_wen_actuator.size):
-            if loop.inverse_bouc_wen_actuator[e] == j:
-                row = loop.inverse_bouc_wen[e]
-                travel = (target - previous) / row[D1]
-                rate = travel / sample_s
-                if abs(rate) > row[RATE_LIMIT]:
-                    state.inverse_clamped[e] += 1
-                    rate = _clamp(rate, row[RATE_LIMIT])
-                h = bouc_wen_step(
-                    state.inverse_h[e], travel, row[EPSILON] * exp(row[DELTA] * abs(rate)), row[ALPHA], row[BETA]
-                )
-                state.inverse_h[e] = h
-                u += (target - h + row[D1] * row[BIAS]) / (row[D1] * exp(-row[D2] * rate)) - row[BIAS]
-        for e in range(loop.inverse_play_actuator.size):
-            if loop.inverse_play_actuator[e] == j:
-                p = _play(state.inverse_p[e], target, loop.inverse_play_threshold[e])
-                state.inverse_p[e] = p
-                u += loop.inverse_play_weight[e] * p
-        state.feedforward[j] = u
-        state.target[j] = target
+        for i in range(reference.shape[1]):
+            target += loop.allocation[a, i] * reference[k, i]
+        state.scratch[a] = target - state.target[a]
+        state.target[a] = target
+        state.feedforward[a] = loop.inverse_direct[a] * target
+    for e in range(loop.inverse_bouc_wen_actuator.size):
+        row, a = loop.inverse_bouc_wen, loop.inverse_bouc_wen_actuator[e]
+        travel = state.scratch[a] / row[e, D1]
+        rate = travel / sample_s
+        if abs(rate) > row[e, RATE_LIMIT]:
+            state.inverse_clamped[e] += 1
+            rate = _clamp(rate, row[e, RATE_LIMIT])
+        grown = row[e, EPSILON] * exp(row[e, DELTA] * abs(rate))
+        h = bouc_wen_step(state.inverse_h[e], travel, grown, row[e, ALPHA], row[e, BETA])
+        state.inverse_h[e] = h
+        gain = row[e, D1] * exp(-row[e, D2] * rate)
+        state.feedforward[a] += (state.target[a] - h + row[e, D1] * row[e, BIAS]) / gain - row[e, BIAS]
+    for e in range(loop.inverse_play_actuator.size):
+        a = loop.inverse_play_actuator[e]
+        p = _play(state.inverse_p[e], state.target[a], loop.inverse_play_threshold[e])
+        state.inverse_p[e] = p
+        state.feedforward[a] += loop.inverse_play_weight[e] * p
 
 
 @_inline
@@ -326,45 +334,36 @@ def _quantised(value, resolution):  # type: ignore[no-untyped-def]
     return floor(value / resolution + 0.5) * resolution if resolution > 0.0 else value
 
 
-@_compile
-def _control_sample(loop, state, reference, y, sample_s):  # type: ignore[no-untyped-def]
+@_inline
+def _control_sample(loop, state, reference, output, k, sample_s):  # type: ignore[no-untyped-def]
     """One sample of the controller: error, feedforward, output, clip with anti-windup, converter."""
-    for i in range(y.size):
-        state.error[i] = reference[i] - _quantised(y[i], loop.sensor_resolution[i])
-    _inverse(loop, state, reference, sample_s)
-    xc, xc_next, error = state.xc, state.xc_next, state.error
-    for i in range(xc.size):
-        total = 0.0
-        for j in range(xc.size):
-            total += loop.Ac[i, j] * xc[j]
-        for j in range(error.size):
-            total += loop.Bc[i, j] * error[j]
-        xc_next[i] = total
+    w, states = state.w, state.w.size - reference.shape[1]
+    for i in range(reference.shape[1]):
+        w[states + i] = reference[k, i] - _quantised(output[k, i], loop.sensor_resolution[i])
+    _inverse(loop, state, reference, k, sample_s)
+    for i in range(states):
+        state.scratch[i] = _row(loop.update, i, w)
     for a in range(state.command.size):
-        v = state.feedforward[a]
-        for j in range(xc.size):
-            v += loop.Cc[a, j] * xc[j]
-        for j in range(error.size):
-            v += loop.Dc[a, j] * error[j]
+        v = state.feedforward[a] + _row(loop.command, a, w)
         clipped = min(max(v, loop.command_min[a]), loop.command_max[a])
         if clipped != v:
             state.counts[a, SATURATED] += 1
-            for i in range(xc.size):
-                xc_next[i] += loop.L[i, a] * (clipped - v)
+            for i in range(states):
+                state.scratch[i] += loop.anti_windup[i, a] * (clipped - v)
         state.command[a] = _quantised(clipped, loop.drive_resolution[a])
-    for i in range(xc.size):
-        xc[i] = xc_next[i]
+    for i in range(states):
+        w[i] = state.scratch[i]
 
 
-@_compile
-def _amplifier_step(loop, state, u, target, u_next):  # type: ignore[no-untyped-def]
-    for a in range(u.size):
-        move = (target[a] - u[a]) * loop.amplifier_factor[a]
-        limit = loop.slew_step[a]
-        if abs(move) > limit:
+@_inline
+def _amplifier_step(loop, state, pending, w, n, m):  # type: ignore[no-untyped-def]
+    """The drive at the end of the plant step, towards the command that is due."""
+    for a in range(m):
+        move = (pending[a] - w[n + a]) * loop.amplifier_factor[a]
+        if abs(move) > loop.slew_step[a]:
             state.counts[a, SLEW_LIMITED] += 1
-            move = _clamp(move, limit)
-        u_next[a] = u[a] + move
+            move = _clamp(move, loop.slew_step[a])
+        w[n + m + a] = w[n + a] + move
 
 
 @_compile
@@ -376,28 +375,38 @@ def closed_loop(plant, plant_state, loop, loop_state, reference, output, command
     the sample instants, ``output`` (samples, axes), ``command`` and ``drive`` (samples, actuators; before and behind
     the amplifier). The states are left at the end, so that a following call continues.
     """
+    n, m, w = plant.states, plant.actuators, plant_state.w
     sample_s = plant.step_s * loop.steps_per_sample
-    u_next = np.empty(plant_state.u.size)
     ring = loop_state.pending
     length = ring.shape[0]
     position = loop_state.position[0]
     for k in range(reference.shape[0]):
-        _plant_output(plant, plant_state)
-        _control_sample(loop, loop_state, reference[k], plant_state.y, sample_s)
-        for i in range(plant_state.y.size):
-            output[k, i] = plant_state.y[i]
-        for a in range(u_next.size):
+        for i in range(reference.shape[1]):
+            output[k, i] = _row(plant.output, i, w)
+        _control_sample(loop, loop_state, reference, output, k, sample_s)
+        for a in range(m):
             command[k, a] = loop_state.command[a]
-            drive[k, a] = plant_state.u[a]
+            drive[k, a] = w[n + a]
         for _ in range(loop.steps_per_sample):
-            for a in range(u_next.size):
+            for a in range(m):
                 ring[position, a] = loop_state.command[a]
             due = position - loop.delay_steps
             if due < 0:
                 due += length
-            _amplifier_step(loop, loop_state, plant_state.u, ring[due], u_next)
-            _plant_step(plant, plant_state, u_next)
+            _amplifier_step(loop, loop_state, ring[due], w, n, m)
+            _plant_step(plant, plant_state)
             position += 1
             if position == length:
                 position = 0
     loop_state.position[0] = position
+
+
+def rows(*blocks: Floats) -> Rows:
+    """Dense blocks side by side, as rows without their zeros."""
+    matrix = np.hstack(blocks)
+    places = [np.flatnonzero(row) for row in matrix]
+    return Rows(
+        start=np.cumsum([0] + [p.size for p in places]).astype(np.uint64),
+        column=np.concatenate([*places, np.zeros(0, dtype=np.int64)]).astype(np.uint64),
+        value=np.concatenate([*(row[p] for row, p in zip(matrix, places, strict=True)), np.zeros(0)]),
+    )

@@ -371,17 +371,16 @@ def _scan(path: Path, layout: _Layout) -> tuple[str, bool]:
 
 def _blocks(path: Path) -> Iterator[bytes]:
     """Blocks of the file that end with a line."""
-    rest = b""
+    parts: list[bytes] = []
     with path.open("rb") as file:
         while chunk := file.read(_CHUNK_BYTES):
             head, newline, tail = chunk.rpartition(b"\n")
             if newline:
-                yield rest + head + newline
-                rest = tail
-            else:
-                rest += tail
-    if rest:
-        yield rest
+                yield b"".join([*parts, head, newline])
+                parts = []
+            parts.append(tail)
+    if any(parts):
+        yield b"".join(parts)
 
 
 def _is_regular(text: bytes, layout: _Layout) -> bool:

@@ -1,0 +1,283 @@
+"""Controllers: from gains to matrices, the inverse of a hysteresis model, and the margins of the loop as it is sampled.
+
+Every controller is one discrete state-space form, xc[k+1] = A xc + B e, v = C xc + D e, so a loop is data.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from microrad import lti, mission
+from microrad.mirror import BoucWen, Mirror, Play
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Drive:
+    """Amplifier and converters between controller and mirror, seen at the amplifier's input (volts, about the bias).
+
+    ``bandwidth_hz`` and ``slew_v_s`` may be infinite: the ideal amplifier, behind which rate-dependent hysteresis depends
+    on the numerical step. A resolution of 0 is an ideal converter.
+    """
+
+    minimum_v: float
+    maximum_v: float
+    bandwidth_hz: float
+    slew_v_s: float
+    drive_resolution_v: float
+    sensor_resolution_rad: float
+
+
+IDEAL_DRIVE = Drive(-math.inf, math.inf, math.inf, math.inf, 0.0, 0.0)
+
+
+def drive_from_mission(m: mission.Mission) -> Drive:
+    """The mission's amplifier and converters, referred to the amplifier's input and counted from the mirror's bias."""
+    a = m.amplifier
+    return Drive(
+        minimum_v=a.output_min_v / a.gain - m.mirror.bias_v,
+        maximum_v=a.output_max_v / a.gain - m.mirror.bias_v,
+        bandwidth_hz=a.bandwidth_hz,
+        slew_v_s=a.slew_v_s / a.gain,
+        drive_resolution_v=m.control.drive_resolution_v,
+        sensor_resolution_rad=m.control.sensor_resolution_rad,
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Timing:
+    """The sampled loop's clock: control period, plant steps in it, and computation delay in plant steps."""
+
+    period_s: float
+    steps_per_sample: int
+    delay_steps: int
+
+    @property
+    def step_s(self) -> float:
+        """The plant's step."""
+        return self.period_s / self.steps_per_sample
+
+
+def timing_from_mission(control: mission.Control) -> Timing:
+    """Whole numbers of plant steps; the mission file has already refused anything else."""
+    period = 1.0 / control.rate_hz
+    return Timing(period, round(period / control.plant_step_s), round(control.delay_s / control.plant_step_s))
+
+
+@dataclass(frozen=True, slots=True)
+class Gains:
+    """PID gains: volts per radian, volts per radian second, volt seconds per radian, and the derivative's filter."""
+
+    proportional: float
+    integral: float
+    derivative: float
+    derivative_filter_s: float
+
+
+def gains_from_mission(control: mission.Control, mirror_gain_rad_v: float) -> Gains:
+    """The mission's gains, scaled so that the loop gain is the same for a mirror of another gain than they are given for."""
+    scale = control.for_mirror_gain_rad_v / mirror_gain_rad_v
+    return Gains(
+        control.proportional_v_rad * scale,
+        control.integral_v_rad_s * scale,
+        control.derivative_v_s_rad * scale,
+        control.derivative_filter_s,
+    )
+
+
+def pid(gains: Gains, period_s: float) -> lti.StateSpace:
+    """Digital PID of one axis: v = Kp e + Ki T sum(e) + Kd filtered difference, all by backward differences.
+
+    States: the integral part in volts, and e behind the derivative's first-order filter.
+    """
+    step = gains.integral * period_s
+    keep = gains.derivative_filter_s / (gains.derivative_filter_s + period_s)
+    edge = gains.derivative / (gains.derivative_filter_s + period_s)
+    return lti.StateSpace(
+        A=np.array([[1.0, 0.0], [0.0, keep]]),
+        B=np.array([[step], [1.0 - keep]]),
+        C=np.array([[1.0, -edge]]),
+        D=np.array([[gains.proportional + step + edge]]),
+    )
+
+
+def side_by_side(*controllers: lti.StateSpace) -> lti.StateSpace:
+    """One controller an axis, without coupling."""
+    from scipy.linalg import block_diag  # slow to import, not needed to show help
+
+    return lti.StateSpace(*(block_diag(*(getattr(c, key) for c in controllers)) for key in "ABCD"))
+
+
+def anti_windup(controller: lti.StateSpace) -> Floats:
+    """Conditioning gain L = B D^-1: the states follow the error that would just have reached the limit.
+
+    Source: Hanus, Kinnaert and Henrotte, Automatica 23 (1987) 729. Zero where the controller has no direct path.
+    """
+    return np.asarray(controller.B @ np.linalg.pinv(controller.D))
+
+
+@dataclass(frozen=True, slots=True)
+class Inverse:
+    """Feedforward by actuator: a direct gain (V/rad), Bouc-Wen models for Eq. 4, and play operators on the reference.
+
+    Play thresholds are in radians and weights in V/rad; ``*_actuator`` says which drive an element belongs to.
+    """
+
+    direct: tuple[float, ...]
+    bouc_wen: tuple[BoucWen, ...] = ()
+    bouc_wen_actuator: tuple[int, ...] = ()
+    play_thresholds: tuple[float, ...] = ()
+    play_weights: tuple[float, ...] = ()
+    play_actuator: tuple[int, ...] = ()
+
+
+def no_feedforward(mirror: Mirror) -> Inverse:
+    """Feedback alone."""
+    return Inverse(direct=(0.0,) * mirror.actuators)
+
+
+def inverse(mirror: Mirror) -> Inverse:
+    """Inverse of the mirror's hysteresis: Eq. 4 for Bouc-Wen, the closed form for Prandtl-Ishlinskii.
+
+    Raises ValueError for a Prandtl-Ishlinskii model without weight at threshold 0, which does not move after a reversal.
+    """
+    direct = [0.0] * mirror.actuators
+    bouc_wen, plays = [], []
+    for j, model in enumerate(mirror.inverse):
+        if isinstance(model, BoucWen):
+            bouc_wen.append((model, j))
+        else:
+            direct[j], thresholds, weights = play_inverse(model)
+            plays += [(r, w, j) for r, w in zip(thresholds, weights, strict=True)]
+    return Inverse(
+        tuple(direct),
+        tuple(b for b, _ in bouc_wen),
+        tuple(j for _, j in bouc_wen),
+        tuple(r for r, _, _ in plays),
+        tuple(w for _, w, _ in plays),
+        tuple(j for _, _, j in plays),
+    )
+
+
+def play_inverse(model: Play) -> tuple[float, tuple[float, ...], tuple[float, ...]]:
+    """Inverse of a Prandtl-Ishlinskii model as (direct gain, thresholds in rad, weights in V/rad).
+
+    Source: Kuhnen, European Journal of Control 9 (2003) 407: r'_j = sum_{i<j} w_i (r_j - r_i), and w' from the
+    differences of the reciprocals of the cumulated weights. Raises ValueError without weight at threshold 0.
+    """
+    r, w = np.array(model.thresholds_v), np.array(model.weights_rad_v)
+    slope = np.cumsum(w)
+    if slope[0] <= 0.0:
+        raise ValueError(
+            "the Prandtl-Ishlinskii model has no weight at threshold 0: it stands still after each reversal and has no "
+            "inverse; identify it again with more samples near the reversals"
+        )
+    thresholds = np.array([np.sum(w[:j] * (r[j] - r[:j])) for j in range(1, r.size)])
+    weights = np.diff(1.0 / slope)
+    return float(1.0 / slope[0]), tuple(map(float, thresholds)), tuple(map(float, weights))
+
+
+def sampled_plant(mirror: Mirror, drive: Drive, timing: Timing) -> lti.StateSpace:
+    """Delay, amplifier and linear mirror of one axis as the controller sees them: discrete, at the control period.
+
+    The same recursion as the simulation's, at the plant's step, with the hysteresis replaced by its slow gain.
+    States: mirror, amplifier output, commands on their way.
+    """
+    linear = mirror.linear_loop
+    n, d = linear.order, timing.delay_steps
+    Ad, B0, B1 = lti.first_order_hold(linear.A, linear.B, timing.step_s)
+    follow = amplifier_factor(drive, timing.step_s)
+    A, B = np.zeros((n + 1 + d, n + 1 + d)), np.zeros((n + 1 + d, 1))
+    A[:n, :n], A[:n, n] = Ad, (B0 + B1 * (1.0 - follow))[:, 0]
+    A[n, n] = 1.0 - follow
+    source = A[:, -1] if d else B[:, 0]  # what the amplifier follows: the oldest command, or the new one
+    source[:n] += B1[:, 0] * follow
+    source[n] += follow
+    if d:
+        B[n + 1, 0] = 1.0
+        A[n + 2 :, n + 1 : -1] += np.eye(d - 1)
+    power, held = np.eye(n + 1 + d), np.zeros_like(B)
+    for _ in range(timing.steps_per_sample):
+        held = A @ held + B
+        power = A @ power
+    return lti.StateSpace(power, held, np.hstack([linear.C, linear.D, np.zeros((1, d))]), np.zeros((1, 1)))
+
+
+def amplifier_factor(drive: Drive, step_s: float) -> float:
+    """Share of the way to its target that a first-order amplifier covers in one step; 1 when ideal."""
+    return 1.0 if math.isinf(drive.bandwidth_hz) else -math.expm1(-2.0 * math.pi * drive.bandwidth_hz * step_s)
+
+
+@dataclass(frozen=True, slots=True)
+class Margins:
+    """Margins of one sampled loop: gain as a ratio, phase in radians, delay in seconds, modulus = min |1 + L|.
+
+    ``crossover_hz`` is the highest frequency at which |L| falls through 1; nan, with infinite margins, where there is none.
+    """
+
+    gain: float
+    phase_rad: float
+    delay_s: float
+    modulus: float
+    crossover_hz: float
+    slowest_pole: float
+
+
+def margins(controller: lti.StateSpace, plant: lti.StateSpace, period_s: float) -> Margins:
+    """Margins of controller and sampled plant (one axis, both discrete) under unit negative feedback.
+
+    Raises ValueError with the offending pole when the closed loop is unstable.
+    """
+    loop = lti.series(controller, plant)
+    worst = slowest_pole(loop)
+    if worst >= 1.0:
+        raise ValueError(
+            f"the closed loop is unstable: a pole at |z| = {worst:.6f} (the limit is 1) for a control period of "
+            f"{period_s:g} s; lower the gains in [control], or shorten its delay"
+        )
+    f = np.geomspace(1e-5, 0.5, 3000) / period_s
+    response = lti.frequency_response(loop, f, period_s)[:, 0, 0]
+    crossover, phase = _crossover(f, response)
+    return Margins(
+        gain=_gain_margin(response),
+        phase_rad=phase,
+        delay_s=math.inf if math.isnan(crossover) else phase / (2 * math.pi * crossover),
+        modulus=float(np.min(np.abs(1.0 + response))),
+        crossover_hz=crossover,
+        slowest_pole=worst,
+    )
+
+
+def slowest_pole(loop: lti.StateSpace) -> float:
+    """Largest |z| among the poles of the discrete ``loop`` closed with unit negative feedback; unstable from 1 up."""
+    return float(np.max(np.abs(lti.feedback_poles(loop)), initial=0.0))
+
+
+def sensitivity(loop: lti.StateSpace, freq_hz: float, period_s: float) -> complex:
+    """Error over reference, 1 / (1 + L), of the closed discrete ``loop`` (one axis) at one frequency."""
+    return complex(1.0 / (1.0 + lti.frequency_response(loop, np.array([freq_hz]), period_s)[0, 0, 0]))
+
+
+def _crossover(f: Floats, response: NDArray[np.complex128]) -> tuple[float, float]:
+    """Highest gain crossover and the smallest phase margin over all crossovers."""
+    size = np.abs(response)
+    down = np.flatnonzero((size[:-1] >= 1.0) & (size[1:] < 1.0))
+    if not down.size:
+        return math.nan, math.inf
+    share = (np.log(size[down])) / (np.log(size[down]) - np.log(size[down + 1]))
+    crossing = f[down] * (f[down + 1] / f[down]) ** share
+    phase = np.pi + np.unwrap(np.angle(response))
+    at = phase[down] + share * (phase[down + 1] - phase[down])
+    wrapped = np.abs((at + np.pi) % (2 * np.pi) - np.pi)
+    return float(crossing[-1]), float(np.min(wrapped))
+
+
+def _gain_margin(response: NDArray[np.complex128]) -> float:
+    """Smallest factor above 1 that brings the loop to -1."""
+    sign = np.flatnonzero((response.imag[:-1] * response.imag[1:] <= 0) & (response.real[:-1] < 0))
+    crossing = -response.real[sign]
+    below = crossing[(crossing > 0) & (crossing < 1)]
+    return float(1.0 / below.max()) if below.size else math.inf

@@ -1,0 +1,143 @@
+"""What a key of the mission file may hold: a quantity with a unit and bounds, or a list of them.
+
+Both plug into pydantic as annotations, `Annotated[float, Quantity("W", above=0.0)]`, and report in the user's words.
+"""
+
+import math
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any, NamedTuple
+
+from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
+from pydantic_core import CoreSchema, core_schema
+
+from microrad.units import UnitError, format_quantity, kind_of, parse_quantity
+
+_PATTERN = r"^[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]{1,3})? ?[A-Za-zµμ1].*$"
+
+
+class Problem(NamedTuple):
+    """What is wrong with a key (dotted, seen from the table that reports it) and what is expected of it."""
+
+    key: str
+    reason: str
+    expected: str
+
+
+class ProblemsError(ValueError):
+    """Values that do not fit, each as one `Problem`."""
+
+    def __init__(self, *problems: Problem) -> None:
+        """Join the problems to one message."""
+        super().__init__("; ".join(f"{p.key} {p.reason}: expected {p.expected}".strip() for p in problems))
+        self.problems = problems
+
+
+@dataclass(frozen=True, slots=True)
+class Quantity:
+    """A value in `unit` (SI; "" is a plain number), above or at least or at most a bound in that unit.
+
+    `typical` is the unit in which an example of it is written.
+    """
+
+    unit: str
+    typical: str = ""
+    above: float | None = None
+    least: float | None = None
+    most: float | None = None
+
+    def read(self, value: object) -> float:
+        """SI value of the text; raises `UnitError`."""
+        number = parse_quantity(value, self.unit, self.typical) if self.unit else _plain_number(value)
+        if fault := self._out_of_bounds(number):
+            raise UnitError(value, fault, self.wanted, self.example)
+        return number
+
+    @property
+    def example(self) -> str:
+        """A value that can be read; whether it is a good one is the mission's affair."""
+        return f"5 {self.typical or kind_of(self.unit)[1]}" if self.unit else "1.0"
+
+    @property
+    def wanted(self) -> str:
+        """What the key expects, in words."""
+        noun = f"{kind_of(self.unit)[0]} with its unit" if self.unit else "a number without quotes"
+        bounds = [("above", self.above), ("at least", self.least), ("at most", self.most)]
+        return ", ".join([noun, *(f"{word} {self._show(bound)}" for word, bound in bounds if bound is not None)])
+
+    def _out_of_bounds(self, number: float) -> str:
+        if self.above is not None and not number > self.above:
+            return f"is not above {self._show(self.above)}"
+        if self.least is not None and not number >= self.least:
+            return f"is below {self._show(self.least)}"
+        if self.most is not None and not number <= self.most:
+            return f"is above {self._show(self.most)}"
+        return ""
+
+    def _show(self, number: float) -> str:
+        return format_quantity(number, self.unit) if self.unit else f"{number:g}"
+
+    def __get_pydantic_core_schema__(self, source: object, handler: GetCoreSchemaHandler) -> CoreSchema:
+        """Read the text in place of pydantic's own number."""
+        return core_schema.no_info_plain_validator_function(self.read)
+
+    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        """Text with a unit for an editor; bounds only where the number stands without one."""
+        if self.unit:
+            return {"type": "string", "pattern": _PATTERN, "x-si-unit": self.unit, "examples": [self.example]}
+        bounds = {"exclusiveMinimum": self.above, "minimum": self.least, "maximum": self.most}
+        return {"type": "number", **{key: bound for key, bound in bounds.items() if bound is not None}}
+
+
+@dataclass(frozen=True, slots=True)
+class Several:
+    """A list of at least one quantity; rising lists are strictly increasing."""
+
+    each: Quantity
+    rising: bool = False
+
+    def read(self, value: object) -> tuple[float, ...]:
+        """SI values of the list; raises `ProblemsError` with every item that does not fit."""
+        if not isinstance(value, list | tuple) or not value:
+            raise ProblemsError(Problem("", "is not a list with something in it", self.wanted))
+        numbers, problems = [], []
+        for place, item in enumerate(value, 1):
+            try:
+                numbers.append(self.each.read(item))
+            except UnitError as error:
+                problems.append(Problem("", f"item {place}: {error}", self.wanted))
+        if not problems and self.rising and any(b <= a for a, b in pairwise(numbers)):
+            problems.append(Problem("", "does not rise from item to item", self.wanted))
+        if problems:
+            raise ProblemsError(*problems)
+        return tuple(numbers)
+
+    @property
+    def wanted(self) -> str:
+        """What the key expects, in words."""
+        return f"a list, {'rising, ' if self.rising else ''}each item {self.each.wanted}"
+
+    @property
+    def example(self) -> str:
+        """A list of one item."""
+        return f'["{self.each.example}"]' if self.each.unit else f"[{self.each.example}]"
+
+    def __get_pydantic_core_schema__(self, source: object, handler: GetCoreSchemaHandler) -> CoreSchema:
+        """Read the list in place of pydantic's own tuple."""
+        return core_schema.no_info_plain_validator_function(self.read)
+
+    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        """An array of what each item is."""
+        return {"type": "array", "minItems": 1, "items": self.each.__get_pydantic_json_schema__(schema, handler)}
+
+
+def _plain_number(value: object) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise UnitError(value, "is not a plain number", "a number without quotes", "1.0")
+    try:
+        number = float(value)
+    except OverflowError:
+        number = math.inf
+    if not math.isfinite(number):
+        raise UnitError(value, "is not a finite number", "a finite number", "1.0")
+    return number

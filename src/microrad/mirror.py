@@ -1,0 +1,424 @@
+"""The fast steering mirror: one plant form for every mirror, a linear system with a bank of hysteresis operators.
+
+    x' = A x + B u + E z        q = F x + G u        z = H[q, q']        y = C x + D u + K z
+
+Drive u in volts at the amplifier's input, output y in radians. All are deviations from rest at the bias voltage.
+"""
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from microrad import kernels, lti, mission
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class BoucWen:
+    """Parameters of Eq. 3 of SPIE 11852, 118523B, in radians, volts and seconds.
+
+    y = d1 exp(-d2 q') q + h,  h' = epsilon exp(delta |q'|) q' - beta q' |h| - alpha |q'| h.
+    Beyond ``rate_limit_v_s`` the exponents are held and each such sample is counted; ``bias_v`` is the resting drive.
+    """
+
+    d1_rad_v: float
+    d2_s_v: float
+    epsilon_rad_v: float
+    delta_s_v: float
+    alpha_1_v: float
+    beta_1_v: float
+    rate_limit_v_s: float = math.inf
+    bias_v: float = 0.0
+
+    @property
+    def row(self) -> tuple[float, ...]:
+        """The parameters in the order of the kernel's columns."""
+        return (
+            self.d1_rad_v,
+            self.d2_s_v,
+            self.epsilon_rad_v,
+            self.delta_s_v,
+            self.alpha_1_v,
+            self.beta_1_v,
+            self.rate_limit_v_s,
+            self.bias_v,
+        )
+
+    @property
+    def settled_rad(self) -> float:
+        """Magnitude at which |h| settles on a slow, long ramp: |epsilon| / (alpha -+ beta) for epsilon below or above 0."""
+        return abs(self.epsilon_rad_v) / (self.alpha_1_v + math.copysign(self.beta_1_v, self.epsilon_rad_v))
+
+    def reversal_slope_rad_v(self, rate_v_s: float = 0.0) -> float:
+        """Local slope dy/du just after a reversal from a settled branch at ``rate_v_s``; below 0 the model is not physical.
+
+        A settled branch has epsilon e = k h; behind the reversal the drive term keeps its slope and the decay changes
+        side: dh/du = 2 alpha epsilon e / (alpha + beta sign(epsilon)), with e = exp(delta |rate|).
+        """
+        growth = math.exp(self.delta_s_v * min(abs(rate_v_s), self.rate_limit_v_s))
+        side = self.alpha_1_v + math.copysign(self.beta_1_v, self.epsilon_rad_v)
+        return self.d1_rad_v + 2.0 * self.alpha_1_v * self.epsilon_rad_v * growth / side
+
+    @property
+    def admissible_rate_v_s(self) -> float:
+        """Fastest rate at which the slope after a reversal is not negative; 0 if there is none, inf if it never is."""
+        swing = self.d1_rad_v - self.reversal_slope_rad_v()
+        if swing <= 0.0:
+            return math.inf
+        if swing > self.d1_rad_v:
+            return 0.0
+        return math.inf if self.delta_s_v <= 0.0 else math.log(self.d1_rad_v / swing) / self.delta_s_v
+
+    @property
+    def wrong_way_rad(self) -> float:
+        """How far the slow model moves the wrong way after a reversal (0 when admissible).
+
+        Behind a reversal from h = -s the branch is h' = epsilon + k h in the direction of travel, with k = alpha + beta
+        side; the output turns where dh/du = -d1.
+        """
+        slope = self.reversal_slope_rad_v()
+        if slope >= 0.0:
+            return 0.0
+        k = self.alpha_1_v - math.copysign(self.beta_1_v, self.epsilon_rad_v)
+        travel = math.log((self.d1_rad_v - slope) / self.d1_rad_v) / k
+        return (self.d1_rad_v - slope) * -math.expm1(-k * travel) / k - self.d1_rad_v * travel
+
+
+@dataclass(frozen=True, slots=True)
+class Play:
+    """Play (backlash) operators of a Prandtl-Ishlinskii model: z = sum of weight x play(threshold)."""
+
+    thresholds_v: tuple[float, ...]
+    weights_rad_v: tuple[float, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Mirror:
+    """A mirror in the plant form of this module, continuous in time, with its arrays named as there.
+
+    Bouc-Wen elements come first in the rows of F and G and the columns of E and K, play operators after them. ``gain_rad_v``
+    is the gain for slow, large drives, by actuator. ``inverse`` names the hysteresis per actuator that a feedforward inverts.
+    """
+
+    name: str
+    A: Floats
+    B: Floats
+    E: Floats
+    F: Floats
+    G: Floats
+    C: Floats
+    D: Floats
+    K: Floats
+    bouc_wen: tuple[BoucWen, ...]
+    play: Play
+    gain_rad_v: tuple[float, ...]
+    inverse: tuple[BoucWen | Play, ...]
+
+    @property
+    def actuators(self) -> int:
+        """Number of drives."""
+        return int(self.B.shape[1])
+
+    @property
+    def axes(self) -> int:
+        """Number of outputs."""
+        return int(self.C.shape[0])
+
+    @property
+    def linear_loop(self) -> lti.StateSpace:
+        """The mirror with each element replaced by its slow gain, for design and margins (Bouc-Wen: d1, play: weight)."""
+        slopes = np.array([b.d1_rad_v for b in self.bouc_wen] + list(self.play.weights_rad_v))
+        through = slopes[:, None]
+        return lti.StateSpace(
+            self.A + self.E @ (through * self.F),
+            self.B + self.E @ (through * self.G),
+            self.C + self.K @ (through * self.F),
+            self.D + self.K @ (through * self.G),
+        )
+
+
+def linear_part(table: mission.LinearPart) -> tuple[lti.StateSpace, float]:
+    """Linear part divided by its magnitude at the normalising frequency, and that magnitude.
+
+    The gain of the mirror belongs to its hysteresis model; cascading two models with a gain each squares it.
+    """
+    system = lti.modal_from_polynomials(table.numerator, table.denominator)
+    magnitude = float(np.abs(lti.frequency_response(system, np.array([table.normalise_at_hz]))[0, 0, 0]))
+    return replace(system, C=system.C / magnitude), magnitude
+
+
+def hysteresis_model(table: mission.Mirror | mission.Comparison, rate_limit_v_s: float, bias_v: float) -> BoucWen | Play:
+    """The hysteresis model of a mirror table, as this module's record."""
+    if table.bouc_wen is not None:
+        b = table.bouc_wen
+        return BoucWen(
+            b.d1_rad_v, b.d2_s_v, b.epsilon_rad_v, b.delta_s_v, b.alpha_1_v, b.beta_1_v, rate_limit_v_s, bias_v
+        )
+    assert table.prandtl_ishlinskii is not None  # the mission's own check
+    return Play(table.prandtl_ishlinskii.thresholds_v, table.prandtl_ishlinskii.weights_rad_v)
+
+
+def line_of_sight(model: BoucWen | Play, convention: str) -> BoucWen | Play:
+    """The model with its output as an angle of the line of sight.
+
+    "mechanical" is doubled (reflection, per axis at normal incidence); "line-of-sight" is as it stands.
+    """
+    if convention == "line-of-sight":
+        return model
+    if isinstance(model, Play):
+        return replace(model, weights_rad_v=tuple(2.0 * w for w in model.weights_rad_v))
+    return replace(model, d1_rad_v=2.0 * model.d1_rad_v, epsilon_rad_v=2.0 * model.epsilon_rad_v)
+
+
+def from_mission(table: mission.Mirror, model: BoucWen | Play, composition: str | None = None) -> Mirror:
+    """Assemble one axis of the mission's linear part and a hysteresis model, in the mission's composition or another.
+
+    cascade: the hysteresis drives the linear part (q = u, B = 0). additive: the linear gain drives the linear part and
+    the hysteresis is added behind it through K. static: no linear part.
+    """
+    system = None if table.linear is None else linear_part(table.linear)[0]
+    return assemble(table.name, composition or table.composition, system, model)
+
+
+def assemble(name: str, composition: str, system: lti.StateSpace | None, model: BoucWen | Play) -> Mirror:
+    """One axis from a linear part of unit gain (none for "static") and a hysteresis model.
+
+    Raises ValueError for a composition that lacks its linear part.
+    """
+    if composition != "static" and system is None:
+        raise ValueError(f'composition "{composition}" needs a linear part; give one or choose "static"')
+    if system is None or composition == "static":
+        system = lti.StateSpace(np.zeros((0, 0)), np.zeros((0, 1)), np.zeros((1, 0)), np.zeros((1, 1)))
+    bouc_wen, play = _elements(model, split=composition == "additive")
+    through_linear, direct = _routes(composition, len(bouc_wen) + len(play.thresholds_v))
+    n, elements = system.order, through_linear.size
+    return Mirror(
+        name=name,
+        A=system.A,
+        B=np.zeros((n, 1)),
+        E=system.B @ through_linear[None, :],
+        F=np.zeros((elements, n)),
+        G=np.ones((elements, 1)),
+        C=system.C,
+        D=np.zeros((1, 1)),
+        K=direct[None, :],
+        bouc_wen=bouc_wen,
+        play=play,
+        gain_rad_v=(_gain(model),),
+        inverse=(model,),
+    )
+
+
+def _gain(model: BoucWen | Play) -> float:
+    return model.d1_rad_v if isinstance(model, BoucWen) else math.fsum(model.weights_rad_v)
+
+
+def _elements(model: BoucWen | Play, split: bool) -> tuple[tuple[BoucWen, ...], Play]:
+    """Bank of one model; split into its linear gain first and its hysteresis after it."""
+    if isinstance(model, Play):
+        return (), model
+    if not split:
+        return (model,), Play((), ())
+    return (replace(model, epsilon_rad_v=0.0), replace(model, d1_rad_v=0.0)), Play((), ())
+
+
+def _routes(composition: str, elements: int) -> tuple[Floats, Floats]:
+    """Which elements drive the linear part, and which are added to the output."""
+    ones, first = np.ones(elements), np.eye(elements)[0]
+    if composition == "cascade":
+        return ones, 0.0 * ones
+    return (first, ones - first) if composition == "additive" else (0.0 * ones, ones)
+
+
+def gain_only(model: BoucWen | Play) -> Play:
+    """The model without hysteresis: its gain for slow, large drives and nothing else."""
+    return Play((0.0,), (_gain(model),))
+
+
+def combine(*mirrors: Mirror) -> Mirror:
+    """Independent mirrors side by side: the axes, actuators and elements of the first, then of the next."""
+    from scipy.linalg import block_diag  # slow to import, not needed to show help
+
+    bw = [len(m.bouc_wen) for m in mirrors]
+    total = np.cumsum([0] + [len(m.bouc_wen) + len(m.play.thresholds_v) for m in mirrors])
+    order = [int(t) + i for t, n in zip(total, bw, strict=False) for i in range(n)]
+    order += [i for i in range(int(total[-1])) if i not in order]  # Bouc-Wen elements first
+    blocks = {key: block_diag(*(getattr(m, key) for m in mirrors)) for key in "ABEFGCDK"}
+    return Mirror(
+        name=" + ".join(m.name for m in mirrors),
+        A=blocks["A"],
+        B=blocks["B"],
+        E=blocks["E"][:, order],
+        F=blocks["F"][order],
+        G=blocks["G"][order],
+        C=blocks["C"],
+        D=blocks["D"],
+        K=blocks["K"][:, order],
+        bouc_wen=sum((m.bouc_wen for m in mirrors), ()),
+        play=Play(
+            sum((m.play.thresholds_v for m in mirrors), ()),
+            sum((m.play.weights_rad_v for m in mirrors), ()),
+        ),
+        gain_rad_v=sum((m.gain_rad_v for m in mirrors), ()),
+        inverse=sum((m.inverse for m in mirrors), ()),
+    )
+
+
+def discretise(mirror: Mirror, step_s: float) -> kernels.Plant:
+    """The mirror for a fixed step with u and z linear over it.
+
+    Raises ValueError, naming a step that would do, when q = F x closes a loop through one step that is no contraction.
+    """
+    inputs = np.hstack([mirror.B, mirror.E])
+    Ad, start, end = lti.first_order_hold(mirror.A, inputs, step_s)
+    m = mirror.actuators
+    if contraction(mirror, step_s) >= 1.0:
+        usable = step_s
+        while contraction(mirror, usable) >= 0.5:
+            usable /= 2.0
+        raise ValueError(
+            f"mirror {mirror.name!r}: the loop through F is no contraction at a step of {step_s:g} s; "
+            f"use a step of at most {usable:.3g} s, or move the mean slope of the hysteresis into A"
+        )
+    B0, E0, B1, E1 = start[:, :m], start[:, m:], end[:, :m], end[:, m:]
+    no_u, no_z = np.zeros((E0.shape[1], m)), np.zeros((E0.shape[1], E0.shape[1]))
+    return kernels.Plant(
+        step_s=float(step_s),
+        states=int(Ad.shape[0]),
+        actuators=m,
+        transition=kernels.rows(Ad, B0, B1, E0 + E1),
+        correction=E1.copy(),
+        drive=kernels.rows(mirror.F, no_u, mirror.G, no_z),
+        output=kernels.rows(mirror.C, np.zeros_like(mirror.D), mirror.D, mirror.K),
+        bouc_wen=np.array([b.row for b in mirror.bouc_wen], dtype=float).reshape(-1, 8),
+        play_threshold=np.array(mirror.play.thresholds_v, dtype=float),
+        play_weight=np.array(mirror.play.weights_rad_v, dtype=float),
+    )
+
+
+def contraction(mirror: Mirror, step_s: float) -> float:
+    """Bound on how much of an error in z at the end of a step returns through F and the steepest slope of the bank."""
+    if not np.any(mirror.F):
+        return 0.0
+    end = lti.first_order_hold(mirror.A, mirror.E, step_s)[2]
+    steepest = [_steepest(b) for b in mirror.bouc_wen] + [abs(w) for w in mirror.play.weights_rad_v]
+    return float(np.linalg.norm((mirror.F @ end) * np.array(steepest)[None, :], np.inf))
+
+
+def _steepest(b: BoucWen) -> float:
+    rate = 0.0 if math.isinf(b.rate_limit_v_s) else b.rate_limit_v_s
+    slope = abs(b.epsilon_rad_v) * math.exp(b.delta_s_v * rate) * 2.0 * b.alpha_1_v / max(b.alpha_1_v - abs(b.beta_1_v), 1e-12)
+    return abs(b.d1_rad_v) * math.exp(abs(b.d2_s_v) * rate) + abs(slope)
+
+
+def at_rest(plant: kernels.Plant) -> kernels.PlantState:
+    """A fresh state of the plant: everything zero, which is rest at the bias."""
+    n, m, bouc_wen = plant.states, plant.actuators, plant.bouc_wen.shape[0]
+    elements = bouc_wen + plant.play_threshold.size
+    return kernels.PlantState(
+        w=np.zeros(n + 2 * m + elements),
+        q=np.zeros(elements),
+        h=np.zeros(bouc_wen),
+        p=np.zeros(elements - bouc_wen),
+        scratch=np.zeros(n + elements),
+        clamped=np.zeros(bouc_wen, dtype=np.int64),
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Root:
+    """A pole or zero: natural frequency, damping ratio (1 or -1 when real), and whether the excited band contains it."""
+
+    kind: str
+    frequency_hz: float
+    damping: float
+    in_band: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Summary:
+    """What a user must know before believing a mirror model. Gains are those of the linear part before normalising."""
+
+    name: str
+    composition: str
+    model: BoucWen | Play
+    roots: tuple[Root, ...]
+    dc_gain: float
+    in_band_gain: tuple[float, float]
+    normalise_at_hz: float
+    normalised_by: float
+    rate_limit_v_s: float
+    warnings: tuple[str, ...]
+
+    def __str__(self) -> str:
+        """The summary as text, one fact a line."""
+        lines = [f"{self.name}: {self.composition}, {type(self.model).__name__} hysteresis"]
+        if self.roots:
+            lines += [
+                f"  linear part divided by {self.normalised_by:.5f}, its magnitude at {self.normalise_at_hz:g} Hz",
+                f"  gain at DC {self.dc_gain:.5f}, in the band {self.in_band_gain[0]:.5f} to {self.in_band_gain[1]:.5f}",
+            ]
+            lines += [f"  {r.kind} at {r.frequency_hz:.4g} Hz, damping {r.damping:.3f}" for r in self.roots]
+        lines += [f"  exponent's rate held at {self.rate_limit_v_s:g} V/s; clamped samples are counted"]
+        return "\n".join(lines + [f"  warning: {w}" for w in self.warnings])
+
+
+def _roots(table: mission.LinearPart) -> tuple[Root, ...]:
+    def root(kind: str, r: complex) -> Root:
+        f = abs(r) / (2 * math.pi)
+        damping = -r.real / abs(r) if r else 1.0
+        return Root(kind, f, damping, table.excited_from_hz <= f <= table.excited_to_hz)
+
+    named = [("pole", r) for r in np.roots(table.denominator)] + [("zero", r) for r in np.roots(table.numerator)]
+    return tuple(root(kind, complex(r)) for kind, r in named if r.imag >= 0)
+
+
+def _in_band_gain(table: mission.LinearPart) -> tuple[float, tuple[float, float]]:
+    """Gain at DC, and the smallest and largest gain of the flat part of the band: excited, and up to a tenth of resonance."""
+    system = lti.modal_from_polynomials(table.numerator, table.denominator)
+    resonant = [r.frequency_hz for r in _roots(table) if r.kind == "pole" and r.damping < 1.0]
+    top = min([table.excited_to_hz, *(f / 10.0 for f in resonant)])
+    band = np.geomspace(table.excited_from_hz, max(top, table.excited_from_hz), 100)
+    gain = np.abs(lti.frequency_response(system, band)[:, 0, 0])
+    return float(np.abs(lti.frequency_response(system, np.zeros(1))[0, 0, 0])), (float(gain.min()), float(gain.max()))
+
+
+def summarise(table: mission.Mirror) -> Summary:
+    """Facts and warnings about the mission's mirror: gains, poles and zeros outside the excited band, admissibility."""
+    model = hysteresis_model(table, table.rate_limit_v_s, table.bias_v)
+    warnings = list(_admissibility(model))
+    roots: tuple[Root, ...] = ()
+    dc, band, by, at = math.nan, (math.nan, math.nan), 1.0, math.nan
+    if table.linear is not None:
+        roots, by, at = _roots(table.linear), linear_part(table.linear)[1], table.linear.normalise_at_hz
+        dc, band = _in_band_gain(table.linear)
+        warnings += [
+            f"{r.kind} at {r.frequency_hz:.3g} Hz lies outside the excited band "
+            f"({table.linear.excited_from_hz:g} to {table.linear.excited_to_hz:g} Hz): drift fitted as dynamics"
+            for r in roots
+            if not r.in_band
+        ]
+        if not 0.9 * band[0] <= dc <= 1.1 * band[1]:
+            warnings.append(f"gain at DC {dc:.5f} is not the gain in the band, {band[0]:.5f} to {band[1]:.5f}")
+    return Summary(
+        table.name, table.composition, model, roots, dc, band, at, by, table.rate_limit_v_s, tuple(warnings)
+    )
+
+
+def _admissibility(model: BoucWen | Play) -> tuple[str, ...]:
+    """The warning for a model whose local slope turns negative after a reversal, or none."""
+    if isinstance(model, Play):
+        return ()
+    slope, rate = model.reversal_slope_rad_v(), model.admissible_rate_v_s
+    if slope < 0.0:
+        return (
+            f"not physical at reversals: the local slope falls to {slope * 1e3:.3f} mrad/V against d1 = "
+            f"{model.d1_rad_v * 1e3:.3f} mrad/V, so the modelled mirror first moves the wrong way, "
+            f"by {model.wrong_way_rad * 1e6:.1f} µrad on a slow drive",
+        )
+    if rate < model.rate_limit_v_s:
+        return (f"the slope after a reversal stays positive only up to {rate:.0f} V/s before the reversal",)
+    return ()

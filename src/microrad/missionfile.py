@@ -1,0 +1,298 @@
+"""Mission and mirror files: read, checked against the mission's tables, and every fault reported at once."""
+
+import contextlib
+import difflib
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal, TypeVar, cast, get_args, get_origin
+
+from pydantic import ValidationError
+from pydantic.fields import FieldInfo
+
+from microrad.document import Document, Fault, MissionError, UnreadableError, clipped, shown
+from microrad.fields import Problem, ProblemsError, Quantity, Several
+from microrad.mission import RELATIONS, Mirror, Mission, Source, Table
+from microrad.units import UnitError
+
+__all__ = ["Fault", "MirrorFile", "MissionError", "MissionFile", "assumptions", "load_mirror", "load_mission"]
+
+_MOST_UNKNOWN = 100  # unknown keys of one file for which a near one is looked up
+_Location = tuple[int | str, ...]
+_T = TypeVar("_T", bound=Table)
+
+
+@dataclass(frozen=True, slots=True)
+class MirrorFile:
+    """A mirror with the path, text and SHA-256 of its file; the keys of `sources` begin with "mirror."."""
+
+    mirror: Mirror
+    path: Path
+    text: str
+    sha256: str
+    sources: Mapping[str, Source]
+
+
+@dataclass(frozen=True, slots=True)
+class MissionFile:
+    """A mission with the path, text and SHA-256 of its file, and the source of each key, "communication.distance".
+
+    `mirror_file` is the file that the mirror came from, when it has one of its own.
+    """
+
+    mission: Mission
+    path: Path
+    text: str
+    sha256: str
+    sources: Mapping[str, Source]
+    mirror_file: MirrorFile | None = None
+
+
+def load_mission(path: str | Path, mirror_path: str | Path | None = None) -> MissionFile:
+    """Read a mission file; `mirror_path` names a mirror file that replaces what the mission says about its mirror.
+
+    Without it, `[mirror]` may hold the single key `file`, the path of a mirror file as seen from the mission file.
+    Raises `MissionError` with every fault of both files.
+    """
+    document = _open(Path(path), "mission file", "")
+    _take_in_mirror(document, None if mirror_path is None else Path(mirror_path))
+    mission = _check(document, Mission, document.data)
+    if mission is None or document.all_faults():
+        raise MissionError(document.path, document.all_faults())
+    inner = document.inner.get("mirror")
+    mirror_file = _mirror_file(inner, mission.mirror) if inner else None
+    sources = _sources(document)
+    return MissionFile(mission, document.path, document.text, document.sha256, sources, mirror_file)
+
+
+def load_mirror(path: str | Path) -> MirrorFile:
+    """Read a mirror file: the keys of a mission's `[mirror]` table at the root of a file of their own.
+
+    Raises `MissionError` with every fault of it.
+    """
+    document = _open(Path(path), "mirror file", "mirror")
+    mirror = _check(document, Mirror, document.data)
+    if mirror is None or document.faults:
+        raise MissionError(document.path, document.faults)
+    return _mirror_file(document, mirror)
+
+
+def assumptions(mission_file: MissionFile) -> tuple[tuple[str, str, str], ...]:
+    """Key, raw value and comment of every value whose comment calls it an assumption."""
+    items = mission_file.sources.items()
+    return tuple((key, source.value, source.comment) for key, source in items if source.kind == "assumption")
+
+
+# --------------------------------------------------------------------------------------------------------------- files
+def _open(path: Path, label: str, prefix: str) -> Document:
+    try:
+        return Document.read(path, label, prefix)
+    except UnreadableError as error:
+        fault = Fault("", "", 0, f"the {label} {error.reason}", error.expected, file=clipped(str(path)))
+        raise MissionError(path, [fault]) from None
+
+
+def _take_in_mirror(document: Document, given: Path | None) -> None:
+    """Put the mirror file's data where the mission has its mirror, if one is named here or in the mission."""
+    table = document.data.get("mirror")
+    path = given or _named_file(document, table)
+    if path is None:
+        return
+    try:
+        inner = _open(path, "mirror file", "mirror")
+    except MissionError as error:
+        document.faults.extend(error.faults)
+        document.damaged.add("mirror")
+        document.data.pop("mirror", None)
+        return
+    document.inner["mirror"] = inner
+    document.data["mirror"] = inner.data
+
+
+def _named_file(document: Document, table: object) -> Path | None:
+    """Path of the mirror file that `[mirror]` names, or None; a `file` that names none is noted and taken out."""
+    if not isinstance(table, dict) or "file" not in table:
+        return None
+    file = table["file"]
+    if len(table) == 1 and isinstance(file, str) and file:
+        return document.path.parent / file
+    reason = "is no path" if len(table) == 1 else "stands beside other keys of the mirror"
+    document.fault(
+        "mirror.file", shown(file), reason, 'file = "mirror.toml" alone in [mirror], or all of its other keys'
+    )
+    document.damaged.add("mirror")
+    document.data.pop("mirror")
+    return None
+
+
+def _mirror_file(document: Document, mirror: Mirror) -> MirrorFile:
+    return MirrorFile(mirror, document.path, document.text, document.sha256, _sources(document))
+
+
+def _sources(document: Document) -> dict[str, Source]:
+    """Source of each key that holds a value; a key in an inline table has the source of that table."""
+    sources = {}
+    for key in _leaves(document.data, document.prefix):
+        holder = document.holder(key)
+        found = holder.statement(key)
+        value, line, comment = (" ".join(found.value.split()), found.line, found.comment) if found else ("", 0, "")
+        sources[key] = Source(line, comment, value, holder.label)
+    return sources
+
+
+def _leaves(data: Mapping[str, Any], table: str) -> Iterator[str]:
+    for name, value in data.items():
+        key = _dotted(table, (name,))
+        if isinstance(value, dict):
+            yield from _leaves(value, key)
+        else:
+            yield key
+
+
+# --------------------------------------------------------------------------------------------------------- validating
+def _check(document: Document, model: type[_T], data: Mapping[str, Any]) -> _T | None:
+    """The data as a record, or None with every fault in it noted."""
+    try:
+        return model.model_validate(data)
+    except ValidationError as error:
+        details = error.errors(include_url=False)
+    _Report(document, model).note(details)
+    if model is Mission:
+        _check_relations(document, data)
+    return None
+
+
+def _check_relations(document: Document, data: Mapping[str, Any]) -> None:
+    """Note what does not fit between those tables that are in order each by itself."""
+    tables: dict[str, Table] = {}
+    for name in {name for names, _ in RELATIONS for name in names} & data.keys():
+        kind = cast("type[Table]", Mission.model_fields[name].annotation)
+        with contextlib.suppress(ValidationError):
+            tables[name] = kind.model_validate(data[name])
+    for names, check in RELATIONS:
+        if all(name in tables for name in names):
+            for problem in check(*(tables[name] for name in names)):
+                _note_problem(document, problem.key, problem, "")
+
+
+def _note_problem(document: Document, key: str, problem: Problem, value: str) -> None:
+    found = document.holder(key).statements.get(key)
+    raw = clipped(found.value) if found and found.kind == "key" else value
+    document.fault(key, raw, problem.reason, problem.expected)
+
+
+class _Report:
+    """Turns what pydantic finds in a table into faults in the user's words."""
+
+    def __init__(self, document: Document, model: type[Table]) -> None:
+        self.document = document
+        self.model = model
+
+    def note(self, details: Iterable[Any]) -> None:
+        """Note a fault for each detail; a missing key that a misspelled one resembles is said once."""
+        by_kind: dict[str, list[Any]] = {"missing": [], "extra_forbidden": []}
+        for detail in details:
+            by_kind.setdefault(detail["type"], []).append(detail)
+        missing = {self._key(detail["loc"]): detail["loc"] for detail in by_kind.pop("missing")}
+        missing = {key: place for key, place in missing.items() if not self._is_damaged(key)}
+        for detail in by_kind.pop("extra_forbidden")[:_MOST_UNKNOWN]:
+            missing.pop(self._note_unknown(detail["loc"], detail["input"], missing), None)
+        for key, location in missing.items():
+            self.document.fault(key, "", "is missing", _expected(self._table(location), str(location[-1])))
+        for detail in (detail for details in by_kind.values() for detail in details):
+            self._note_value(detail)
+
+    def _key(self, location: _Location) -> str:
+        return _dotted(self.document.prefix, location)
+
+    def _table(self, location: _Location) -> type[Table]:
+        return _table_at(self.model, location[:-1])
+
+    def _is_damaged(self, key: str) -> bool:
+        damaged = self.document.holder(key).damaged | self.document.damaged
+        return any(key == other or key.startswith(f"{other}.") for other in damaged if other)
+
+    def _note_unknown(self, location: _Location, value: object, missing: Iterable[str]) -> str:
+        """Note an unknown key; returns the missing key that it probably stands for, or ""."""
+        table, name = self._key(location[:-1]), str(location[-1])
+        keys = _keys_of(self._table(location))
+        # a key that is still missing is the likelier one to have been meant
+        absent = [key for key in keys if _dotted(table, (key,)) in missing]
+        nearest = _nearest(name, absent) or _nearest(name, keys)
+        where = f"[{table}]" if table else "the mission file"
+        expected = f"one of {', '.join(keys)}"
+        self.document.fault(self._key(location), shown(value), f"is no key of {where}", expected, nearest=nearest)
+        return _dotted(table, (nearest,)) if nearest in absent else ""
+
+    def _note_value(self, detail: Any) -> None:
+        """Note a value that pydantic, or a check of ours within it, refuses."""
+        location, value = detail["loc"], detail["input"]
+        key, cause = self._key(location), detail.get("ctx", {}).get("error")
+        if isinstance(cause, ProblemsError):
+            if location:  # those of the whole mission are found by _check_relations
+                for problem in cause.problems:
+                    _note_problem(
+                        self.document, _dotted(key, (problem.key,)), problem, "" if problem.key else shown(value)
+                    )
+        elif isinstance(cause, UnitError):
+            line = _line(location[-1], cause.example)
+            self.document.fault(key, shown(value), cause.reason, f"{cause.expected}; for example {line}")
+        else:
+            self._note_kind(key, location, value)
+
+    def _note_kind(self, key: str, location: _Location, value: object) -> None:
+        table, name = self._table(location), str(location[-1])
+        choices = _choices(table, name)
+        nearest = _nearest(value, choices) if isinstance(value, str) else ""
+        reason = "is none of the choices" if choices else "is of the wrong kind"
+        self.document.fault(key, shown(value), reason, _expected(table, name), nearest=nearest and f'"{nearest}"')
+
+
+def _line(name: object, example: str) -> str:
+    """A line that could stand in the file; lists and plain numbers have no quotes."""
+    bare = example.startswith("[") or " " not in example
+    return f"{name} = {example}" if bare else f'{name} = "{example}"'
+
+
+def _nearest(name: str, names: Iterable[str]) -> str:
+    return next(iter(difflib.get_close_matches(name[:60], list(names), n=1)), "")
+
+
+def _keys_of(table: type[Table]) -> list[str]:
+    return [info.alias or name for name, info in table.model_fields.items()]
+
+
+def _info(table: type[Table], key: str) -> FieldInfo | None:
+    return next((info for name, info in table.model_fields.items() if (info.alias or name) == key), None)
+
+
+def _table_at(table: type[Table], location: _Location) -> type[Table]:
+    """The table that a location inside `table` names."""
+    for part in location:
+        info = _info(table, str(part))
+        kinds = (info.annotation, *get_args(info.annotation)) if info else ()
+        table = next((kind for kind in kinds if isinstance(kind, type) and issubclass(kind, Table)), table)
+    return table
+
+
+def _choices(table: type[Table], key: str) -> tuple[str, ...]:
+    info = _info(table, key)
+    return get_args(info.annotation) if info and get_origin(info.annotation) is Literal else ()
+
+
+def _expected(table: type[Table], key: str) -> str:
+    """What a key of a table may hold, with a line that could stand there."""
+    info = _info(table, key)
+    rules = [rule for rule in (info.metadata if info else ()) if isinstance(rule, Quantity | Several)]
+    if rules:
+        return f"{rules[0].wanted}; for example {_line(key, rules[0].example)}"
+    if choices := _choices(table, key):
+        return " or ".join(f'{key} = "{choice}"' for choice in choices)
+    inner = _table_at(table, (key,))
+    if inner is not table:
+        return f"a table with the keys {', '.join(_keys_of(inner))}"
+    return f'text in quotes, for example {key} = "a name"'
+
+
+def _dotted(table: str, location: Iterable[object]) -> str:
+    return ".".join(str(part) for part in (table, *location) if part != "")

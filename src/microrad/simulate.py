@@ -1,0 +1,240 @@
+"""Assemble one sampled loop, run the kernel, and keep what came out with its counters."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from microrad import control, kernels, lti, mirror, mission
+from microrad.control import Drive, Inverse, Timing, amplifier_factor, anti_windup
+
+Floats = NDArray[np.float64]
+
+# Plant steps between two returns from the kernel, about 0.1 s, so that an interrupt is answered promptly.
+SLICE_STEPS = 1_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class Counts:
+    """What a result must be read with; each over the whole run, all actuators together.
+
+    clamped: plant steps beyond the identified rate. inverse_clamped: the same in the feedforward. saturated: samples at
+    the drive's limits. slew_limited: plant steps at the amplifier's slew limit. alternating: samples in a zigzag of the
+    command, three increments of alternating sign in a row, each larger than two steps of the converter.
+    """
+
+    clamped: int
+    inverse_clamped: int
+    saturated: int
+    slew_limited: int
+    alternating: int
+
+
+@dataclass(frozen=True, slots=True)
+class Trace:
+    """One run of the sampled loop, at the control samples.
+
+    ``reference_rad``, ``output_rad``: (samples, axes). ``command_v``, ``drive_v``: (samples, actuators), before and behind
+    the amplifier, about the bias. ``steady`` is the part that statistics are taken of.
+    """
+
+    name: str
+    time_s: Floats
+    reference_rad: Floats
+    output_rad: Floats
+    command_v: Floats
+    drive_v: Floats
+    steady: slice
+    counts: Counts
+
+    @property
+    def error_rad(self) -> Floats:
+        """Reference minus output, (samples, axes)."""
+        return self.reference_rad - self.output_rad
+
+    @property
+    def peak_rad(self) -> float:
+        """Largest magnitude of the error in the steady part, over all axes."""
+        return float(np.max(np.abs(self.error_rad[self.steady])))
+
+    @property
+    def rms_rad(self) -> float:
+        """Root mean square of the error in the steady part, over all axes."""
+        return float(np.sqrt(np.mean(self.error_rad[self.steady] ** 2)))
+
+
+@dataclass(frozen=True, slots=True)
+class Setup:
+    """What stands around a mirror: amplifier and converters, the clock, and the controller (one axis each)."""
+
+    drive: Drive
+    timing: Timing
+    controller: lti.StateSpace
+
+
+def setup_from_mission(m: mission.Mission, mirror_gain_rad_v: float) -> Setup:
+    """The mission's loop around a mirror of this gain."""
+    timing = control.timing_from_mission(m.control)
+    gains = control.gains_from_mission(m.control, mirror_gain_rad_v)
+    return Setup(control.drive_from_mission(m), timing, control.pid(gains, timing.period_s))
+
+
+def sampled_loop(m: mirror.Mirror, setup: Setup) -> lti.StateSpace:
+    """Controller and sampled mirror in series, with each hysteresis element replaced by its slow gain."""
+    return lti.series(setup.controller, control.sampled_plant(m, setup.drive, setup.timing))
+
+
+def margins(m: mirror.Mirror, setup: Setup) -> control.Margins:
+    """Margins of the loop as it is sampled; raises ValueError when it is unstable."""
+    plant = control.sampled_plant(m, setup.drive, setup.timing)
+    return control.margins(setup.controller, plant, setup.timing.period_s)
+
+
+def assemble(m: mirror.Mirror, setup: Setup, inverse: Inverse) -> kernels.Loop:
+    """The loop around a mirror as the kernel's arrays. Axis i commands actuator i."""
+    drive, timing, controller = setup.drive, setup.timing, setup.controller
+    actuators = m.actuators
+
+    def each(value: float) -> Floats:
+        return np.full(actuators, float(value))
+
+    return kernels.Loop(
+        steps_per_sample=timing.steps_per_sample,
+        delay_steps=timing.delay_steps,
+        update=kernels.rows(controller.A, controller.B),
+        command=kernels.rows(controller.C, controller.D),
+        anti_windup=anti_windup(controller),
+        command_min=each(drive.minimum_v),
+        command_max=each(drive.maximum_v),
+        drive_resolution=each(drive.drive_resolution_v),
+        sensor_resolution=np.full(m.axes, drive.sensor_resolution_rad),
+        amplifier_factor=each(amplifier_factor(drive, timing.step_s)),
+        slew_step=each(drive.slew_v_s * timing.step_s),
+        allocation=np.eye(actuators, m.axes),
+        inverse_direct=np.array(inverse.direct),
+        inverse_bouc_wen=np.array([b.row for b in inverse.bouc_wen], dtype=float).reshape(-1, 8),
+        inverse_bouc_wen_actuator=np.array(inverse.bouc_wen_actuator, dtype=np.uint64),
+        inverse_play_threshold=np.array(inverse.play_thresholds, dtype=float),
+        inverse_play_weight=np.array(inverse.play_weights, dtype=float),
+        inverse_play_actuator=np.array(inverse.play_actuator, dtype=np.uint64),
+    )
+
+
+def at_rest(loop: kernels.Loop) -> kernels.LoopState:
+    """A fresh state of the loop: everything zero."""
+    states, actuators = loop.anti_windup.shape
+    axes = loop.sensor_resolution.size
+    return kernels.LoopState(
+        w=np.zeros(states + axes),
+        scratch=np.zeros(max(states, actuators)),
+        command=np.zeros(actuators),
+        target=np.zeros(actuators),
+        feedforward=np.zeros(actuators),
+        inverse_h=np.zeros(loop.inverse_bouc_wen.shape[0]),
+        inverse_p=np.zeros(loop.inverse_play_threshold.size),
+        pending=np.zeros((loop.delay_steps + 1, actuators)),
+        position=np.zeros(1, dtype=np.int64),
+        counts=np.zeros((actuators, 2), dtype=np.int64),
+        inverse_clamped=np.zeros(loop.inverse_bouc_wen.shape[0], dtype=np.int64),
+    )
+
+
+def track(
+    name: str, m: mirror.Mirror, setup: Setup, inverse: Inverse, reference_rad: Floats, steady: slice
+) -> Trace:
+    """Run the sampled loop from rest over ``reference_rad`` (samples, axes) at the control period."""
+    drive, timing = setup.drive, setup.timing
+    plant = mirror.discretise(m, timing.step_s)
+    loop = assemble(m, setup, inverse)
+    plant_state, loop_state = mirror.at_rest(plant), at_rest(loop)
+    samples = reference_rad.shape[0]
+    output = np.empty((samples, m.axes))
+    command, applied = np.empty((samples, m.actuators)), np.empty((samples, m.actuators))
+    block = max(1, SLICE_STEPS // timing.steps_per_sample)
+    for start in range(0, samples, block):
+        part = slice(start, start + block)
+        kernels.closed_loop(
+            plant, plant_state, loop, loop_state, reference_rad[part], output[part], command[part], applied[part]
+        )
+    counts = Counts(
+        clamped=int(plant_state.clamped.sum()),
+        inverse_clamped=int(loop_state.inverse_clamped.sum()),
+        saturated=int(loop_state.counts[:, kernels.SATURATED].sum()),
+        slew_limited=int(loop_state.counts[:, kernels.SLEW_LIMITED].sum()),
+        alternating=alternations(command, 2.0 * drive.drive_resolution_v),
+    )
+    time = np.arange(samples) * timing.period_s
+    return Trace(name, time, reference_rad, output, command, applied, steady, counts)
+
+
+def alternations(command: Floats, threshold: float) -> int:
+    """Samples in a zigzag: three increments in a row of alternating sign, each larger in size than ``threshold``.
+
+    A reversal of a smooth signal changes sign once and is not counted.
+    """
+    step = np.diff(command, axis=0)
+    sign = np.where(np.abs(step) > threshold, np.sign(step), 0.0)
+    turns = sign[1:] * sign[:-1] < 0
+    return int(np.count_nonzero(turns[1:] & turns[:-1]))
+
+
+def track_sine(
+    name: str, m: mirror.Mirror, setup: Setup, inverse: Inverse, amplitude_rad: float, freq_hz: float
+) -> Trace:
+    """Track a sine on one axis, with statistics over the last period."""
+    return track(name, m, setup, inverse, *sine(amplitude_rad, freq_hz, setup.timing.period_s))
+
+
+def sine(amplitude_rad: float, freq_hz: float, period_s: float, settle_s: float = 0.2) -> tuple[Floats, slice]:
+    """A sine reference of one axis, shape (samples, 1), and its steady part.
+
+    The steady part is the last whole period; before it come whole periods, one at least and ``settle_s`` at least.
+    """
+    periods = 1 + max(1, math.ceil(settle_s * freq_hz))
+    samples = round(periods / freq_hz / period_s)
+    steady = slice(samples - round(1 / freq_hz / period_s), samples)
+    time = np.arange(samples) * period_s
+    return amplitude_rad * np.sin(2 * np.pi * freq_hz * time)[:, None], steady
+
+
+@dataclass(frozen=True, slots=True)
+class HysteresisLoop:
+    """One settled period of a hysteresis model under a sine drive: drive and output about the bias, and its size.
+
+    ``width`` is max h - min h over max y - min y. For a Prandtl-Ishlinskii model h is the output less its slow gain x drive.
+    """
+
+    freq_hz: float
+    drive_v: Floats
+    output_rad: Floats
+    hysteresis_rad: Floats
+    clamped: int
+
+    @property
+    def width(self) -> float:
+        """Share of the output's peak-to-peak that is hysteresis."""
+        return float(np.ptp(self.hysteresis_rad) / np.ptp(self.output_rad))
+
+
+def hysteresis_loop(model: mirror.BoucWen | mirror.Play, freq_hz: float, amplitude_v: float, step_s: float) -> HysteresisLoop:
+    """The static hysteresis model (no linear part) under a sine of ``amplitude_v`` about its bias: the third period."""
+    static = mirror.assemble("static", "static", None, model)
+    samples = round(1 / freq_hz / step_s)
+    step_s = 1 / freq_hz / samples  # a whole number of samples a period
+    plant = mirror.discretise(static, step_s)
+    drive = amplitude_v * np.sin(2 * np.pi * np.arange(3 * samples) / samples)[:, None]
+    state = mirror.at_rest(plant)
+    output, bank = np.empty((drive.shape[0], 1)), np.empty((drive.shape[0], state.q.size))
+    kernels.open_loop(plant, state, drive, output, bank)
+    u, y = drive[-samples:, 0], output[-samples:, 0]
+    return HysteresisLoop(freq_hz, u, y, y - _linear_output(model, u, step_s), int(state.clamped.sum()))
+
+
+def _linear_output(model: mirror.BoucWen | mirror.Play, u: Floats, step_s: float) -> Floats:
+    """The part of the output that is not hysteresis: d1 exp(-d2 u') u for Bouc-Wen, slow gain x u otherwise."""
+    if isinstance(model, mirror.Play):
+        return math.fsum(model.weights_rad_v) * u
+    rate = np.diff(u, prepend=u[-1]) / step_s
+    rate = np.clip(rate, -model.rate_limit_v_s, model.rate_limit_v_s)
+    return model.d1_rad_v * (np.exp(-model.d2_s_v * rate) * (u + model.bias_v) - model.bias_v)

@@ -1,0 +1,290 @@
+"""Recordings: what is read, and each refusal with its message."""
+
+import hashlib
+import time
+
+import numpy as np
+import pytest
+
+from microrad import recording
+from microrad.recording import MIN_SAMPLES, RecordingError, read_recording, recording_from_arrays
+
+N = 400
+TIME = np.arange(N) / 100.0
+DRIVE = 6 + 6 * np.sin(TIME)
+OUTPUT = 0.089 * DRIVE + 0.01 * np.cos(TIME)
+ROWS = [f"{t:.2f},{u!r},{y!r}" for t, u, y in zip(TIME.tolist(), DRIVE.tolist(), OUTPUT.tolist(), strict=True)]
+
+
+def write(path, rows, header="time,drive,output"):
+    text = "\n".join(([header] if header else []) + rows) + "\n"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def refusal(path, input_column=1, output_column=2, rate_hz=100.0):
+    with pytest.raises(RecordingError) as caught:
+        read_recording(path, input_column, output_column, rate_hz)
+    message = str(caught.value)
+    assert str(path) in message
+    assert "\n" not in message
+    return message
+
+
+@pytest.mark.parametrize("delimiter", [",", ";", "\t", " ", "   ", ", "])
+@pytest.mark.parametrize(
+    "header", [None, "time,drive,output", "# time,drive,output", "% remark\n\ntime,drive,output\ns,V,mrad"]
+)
+def test_reads_delimiters_and_headers(tmp_path, delimiter, header):
+    head = header.replace(",", delimiter) if header else None
+    path = write(tmp_path / "a.txt", [row.replace(",", delimiter) for row in ROWS], head)
+    read = read_recording(path, "drive" if header else 1, 2, 100.0)
+    np.testing.assert_array_equal(read.drive, DRIVE)
+    np.testing.assert_array_equal(read.output, OUTPUT)
+    assert (read.input_name, read.output_name) == (("drive", "output") if header else ("1", "2"))
+    assert (read.samples, read.rate_hz, read.step_s) == (N, 100.0, 0.01)
+    assert read.sha256 == hashlib.sha256(path.read_bytes()).hexdigest()
+    assert read.path == str(path)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda text: text.replace("\n", "\r\n"),
+        lambda text: text.replace("\n", "\r"),
+        lambda text: "\ufeff" + text,
+        lambda text: text + "\n  \n",
+        lambda text: text.replace(ROWS[7], ROWS[7] + "\n# remark in between"),
+        lambda text: text.replace(ROWS[7], '"' + '","'.join(ROWS[7].split(",")) + '"'),
+        lambda text: text.replace("time", "Zeit µs"),
+        lambda text: text[:-1],
+    ],
+    ids=["crlf", "cr", "bom", "blank-end", "remark", "quotes", "latin", "no-newline"],
+)
+def test_reads_variants_of_text(tmp_path, change):
+    path = tmp_path / "a.csv"
+    text = change("time,drive,output\n" + "\n".join(ROWS) + "\n")
+    path.write_bytes(text.encode("latin-1" if "µ" in text else "utf-8"))
+    read = read_recording(path, "drive", "output", 100.0)
+    np.testing.assert_array_equal(read.drive, DRIVE)
+    np.testing.assert_array_equal(read.output, OUTPUT)
+
+
+def test_faults_in_unused_columns_do_not_matter(tmp_path):
+    rows = ["ok," + row.partition(",")[2] for row in ROWS]
+    read = read_recording(write(tmp_path / "a.csv", rows), 1, "output", 100.0)
+    np.testing.assert_array_equal(read.drive, DRIVE)
+
+
+def test_recording_is_frozen(tmp_path):
+    read = read_recording(write(tmp_path / "a.csv", ROWS), 1, 2, 100.0)
+    with pytest.raises(AttributeError):
+        read.rate_hz = 1.0
+    with pytest.raises(ValueError, match="read-only"):
+        read.drive[0] = 1.0
+
+
+def test_missing_file_offers_nearest_name(tmp_path):
+    write(tmp_path / "record.csv", ROWS)
+    message = refusal(tmp_path / "recrod.csv")
+    assert "no such file" in message
+    assert "'record.csv'" in message
+
+
+def test_directory(tmp_path):
+    assert "directory" in refusal(tmp_path)
+
+
+def test_empty_file(tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_bytes(b"")
+    assert "empty" in refusal(path)
+
+
+@pytest.mark.parametrize("content", [b"\n\n \n", b"# only\n# remarks\n"])
+def test_no_content(tmp_path, content):
+    path = tmp_path / "a.csv"
+    path.write_bytes(content)
+    assert "rows of numbers" in refusal(path)
+
+
+@pytest.mark.parametrize("content", [b"1,2\n\x00\x00\n", bytes(range(256)) * 20, b"\x89PNG\r\n\x1a\n\x00"])
+def test_binary_file(tmp_path, content):
+    path = tmp_path / "a.csv"
+    path.write_bytes(content)
+    assert "binary" in refusal(path)
+
+
+def test_utf16_is_named(tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_text("\n".join(ROWS), encoding="utf-16")
+    assert "UTF-16" in refusal(path)
+
+
+def test_nul_far_behind_the_head(tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_bytes(("\n".join(ROWS * 100) + "\n").encode() + b"1,2,\x00\n")
+    assert path.stat().st_size > 1_000_000
+    assert "binary" in refusal(path)
+
+
+def test_no_line_break(tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_bytes(b"1," * 600_000)
+    assert "no line break" in refusal(path)
+
+
+def test_words_only(tmp_path):
+    message = refusal(write(tmp_path / "a.csv", ["dear diary, today"] * 300, None))
+    assert "no row of numbers" in message
+    assert "dear diary" in message
+
+
+def test_one_column(tmp_path):
+    message = refusal(write(tmp_path / "a.csv", [repr(u) for u in DRIVE.tolist()], "drive"), 0, 1)
+    assert "only one column" in message
+    assert "line 2" in message
+
+
+def test_unknown_name_offers_nearest(tmp_path):
+    message = refusal(write(tmp_path / "a.csv", ROWS), "Driev", 2)
+    assert "no input column is named 'Driev'" in message
+    assert "nearest is 'drive'" in message
+
+
+def test_name_without_header(tmp_path):
+    message = refusal(write(tmp_path / "a.csv", ROWS, None), "drive", 2)
+    assert "no header line" in message
+    assert "0 to 2" in message
+
+
+def test_name_given_twice(tmp_path):
+    message = refusal(write(tmp_path / "a.csv", ROWS, "t,x,x"), "t", "x")
+    assert "columns 1, 2 are all named 'x'" in message
+
+
+@pytest.mark.parametrize("column", [3, -1, "7", True])
+def test_number_out_of_range(tmp_path, column):
+    message = refusal(write(tmp_path / "a.csv", ROWS), 1, column)
+    assert f"no output column {column}" in message
+    assert "numbered from 0 to 2" in message
+
+
+def test_digits_name_a_column_by_number(tmp_path):
+    read = read_recording(write(tmp_path / "a.csv", ROWS), "1", "2", 100.0)
+    np.testing.assert_array_equal(read.output, OUTPUT)
+
+
+def test_same_column_twice(tmp_path):
+    assert "input and output are both column 1 ('drive')" in refusal(write(tmp_path / "a.csv", ROWS), "drive", 1)
+
+
+@pytest.mark.parametrize(
+    ("cell", "words"),
+    [
+        ("nan", "'nan' is not a finite number"),
+        ("-inf", "'-inf' is not a finite number"),
+        ("1e999", "'1e999' is not a finite number"),
+        ("", "the cell is empty"),
+        ("abc", "'abc' is not a number"),
+        ("1_000", "'1_000' is not a number"),
+        ("1.2.3", "'1.2.3' is not a number"),
+    ],
+)
+@pytest.mark.parametrize("row", [0, 250, N - 1])
+def test_bad_cell_is_found(tmp_path, cell, words, row):
+    rows = list(ROWS)
+    rows[row] = ",".join([*rows[row].split(",")[:2], cell])
+    message = refusal(write(tmp_path / "a.csv", rows))
+    assert f"line {row + 2}, column 2 ('output')" in message
+    assert words in message
+
+
+def test_bad_cell_without_header_has_number_only(tmp_path):
+    rows = list(ROWS)
+    rows[10] = rows[10].replace(",", ",x", 1)
+    message = refusal(write(tmp_path / "a.csv", rows, None))
+    assert "line 11, column 1: " in message
+
+
+@pytest.mark.parametrize("delimiter", [";", "\t", " "])
+def test_decimal_commas_are_named(tmp_path, delimiter):
+    rows = [row.replace(",", delimiter).replace(".", ",") for row in ROWS]
+    message = refusal(write(tmp_path / "a.csv", rows, None))
+    assert "decimal comma" in message
+    assert "line 1, column 1" in message
+    assert f"reads '{DRIVE[0]!r}'".replace("np.float64(", "").replace(")", "") in message
+
+
+def test_decimal_commas_beside_separating_commas(tmp_path):
+    rows = [f"{u:.3f},{y:.3f}".replace(".", ",") for u, y in zip(DRIVE, OUTPUT, strict=True)]
+    assert "decimal commas" in refusal(write(tmp_path / "a.csv", rows, "drive,output"), 0, 1)
+
+
+@pytest.mark.parametrize(("bad", "cells"), [("1.0,2.0", 2), ("1,2,3,4", 4)])
+@pytest.mark.parametrize("row", [0, 250, N - 1])
+def test_ragged_rows(tmp_path, bad, cells, row):
+    rows = list(ROWS)
+    rows[row] = bad
+    message = refusal(write(tmp_path / "a.csv", rows))
+    assert f"line {row + 2} has {cells} cells where 3 are expected" in message
+
+
+def test_ragged_rows_of_white_space(tmp_path):
+    rows = [row.replace(",", "  ") for row in ROWS]
+    rows[99] += " 5"
+    assert "line 100 has 4 cells" in refusal(write(tmp_path / "a.txt", rows, None))
+
+
+@pytest.mark.parametrize(("column", "role"), [(1, "input"), (2, "output")])
+def test_constant_column(tmp_path, column, role):
+    rows = [",".join(["3.5" if i == column else cell for i, cell in enumerate(row.split(","))]) for row in ROWS]
+    message = refusal(write(tmp_path / "a.csv", rows))
+    assert f"the {role}, column {column}" in message
+    assert "constant at 3.5" in message
+
+
+def test_too_few_samples(tmp_path):
+    message = refusal(write(tmp_path / "a.csv", ROWS[: MIN_SAMPLES - 1]))
+    assert f"{MIN_SAMPLES - 1} samples; at least {MIN_SAMPLES}" in message
+    assert read_recording(write(tmp_path / "b.csv", ROWS[:MIN_SAMPLES]), 1, 2, 100.0).samples == MIN_SAMPLES
+
+
+@pytest.mark.parametrize("rate_hz", [0, -1.0, float("nan"), float("inf"), True, "50"])
+def test_bad_rate(tmp_path, rate_hz):
+    message = refusal(write(tmp_path / "a.csv", ROWS), rate_hz=rate_hz)
+    assert f"the sample rate is {rate_hz!r}" in message
+
+
+def test_file_too_large(tmp_path, monkeypatch):
+    path = write(tmp_path / "a.csv", ROWS)
+    size = path.stat().st_size
+    monkeypatch.setattr(recording, "MAX_BYTES", size - 1)
+    assert "held in memory" in refusal(path)
+    monkeypatch.setattr(recording, "MAX_BYTES", size)
+    assert read_recording(path, 1, 2, 100.0).samples == N
+
+
+def test_big_file_is_fast(tmp_path):
+    path = tmp_path / "big.csv"
+    path.write_text("a,b\n" + "\n".join(f"{k % 977}.25,{k % 983}.125" for k in range(300_000)) + "\n")
+    begin = time.perf_counter()
+    read = read_recording(path, "a", "b", 1e4)
+    assert time.perf_counter() - begin < 2.0
+    assert read.samples == 300_000
+    np.testing.assert_array_equal(read.drive, np.arange(300_000) % 977 + 0.25)
+
+
+def test_arrays_under_the_same_checks():
+    made = recording_from_arrays(DRIVE, OUTPUT, 100.0, "bench")
+    assert (made.path, made.samples, len(made.sha256)) == ("bench", N, 64)
+    faults = {
+        "shape": (DRIVE[:-1], OUTPUT, 100.0),
+        "sample 3 of the output is nan": (DRIVE, np.where(np.arange(N) == 3, np.nan, OUTPUT), 100.0),
+        "constant": (np.ones(N), OUTPUT, 100.0),
+        "sample rate": (DRIVE, OUTPUT, 0.0),
+        "at least 200": (DRIVE[:50], OUTPUT[:50], 100.0),
+    }
+    for words, (drive, output, rate_hz) in faults.items():
+        with pytest.raises(RecordingError, match=words):
+            recording_from_arrays(drive, output, rate_hz)
