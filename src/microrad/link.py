@@ -28,6 +28,14 @@ _TRANSMITTING = (
     "uniformly lit, unobscured, diffraction-limited: an upper bound, of which a Gaussian beam cut by the aperture "
     "reaches 0.81 at best (Klein and Degnan 1974)"
 )
+_AS_LINES = "where every line holds"
+_POINTING_BASIS = {
+    "gaussian": (
+        "exp(-2 (error / theta)^2), theta = 2 lambda / (pi D)",
+        "Gaussian beam of 1/e2 radius D/2 at the aperture",
+    ),
+    "gain": ("exp(-G error^2), G = (pi D / lambda)^2", "beam that falls off as a Gaussian set by its own gain"),
+}
 _RECEIVING = "unobscured area pi D^2 / 4, all of its light on the detector"
 
 
@@ -128,150 +136,145 @@ def communication_budget(
     Raises `ValueError` for a negative pointing error or a data rate that is not above zero.
     """
     beam = mission.communication
-    error, error_source = _given(beam.pointing_error_rad, pointing_error_rad, sources, "communication.pointing_error")
-    rate, rate_source = _given(beam.data_rate_bit_s, data_rate_bit_s, sources, "communication.data_rate")
+    write = _Writer("communication", beam, mission, sources)
+    error, error_source = _given(beam.pointing_error_rad, pointing_error_rad, write.source("pointing_error"))
+    rate, rate_source = _given(beam.data_rate_bit_s, data_rate_bit_s, write.source("data_rate"))
     _check_grid(np.asarray(rate), np.asarray(error))
-    transmit, receive = mission.terminals.leo_aperture_m, mission.terminals.geo_aperture_m
-    gain = _gain_line("LEO aperture gain", transmit, beam.wavelength_m, source_text(sources, "terminals.leo_aperture"))
-    pointing = _pointing_line(mission, error, error_source)
-    lines = (
-        *_transmit_lines("communication", beam, mission, sources, gain, pointing),
-        _gain_line("GEO aperture gain", receive, beam.wavelength_m, source_text(sources, "terminals.geo_aperture")),
-        _loss_line("Receive optics loss", "communication.receive_optics_loss", beam.receive_optics_loss_db, sources),
-        _loss_line("Tracking split loss", "communication.tracking_split_loss", beam.tracking_split_loss_db, sources),
-        _loss_line("Implementation loss", "communication.implementation_loss", beam.implementation_loss_db, sources),
+    transmit = write.transmit(
+        write.gain("LEO aperture gain", "leo_aperture", _TRANSMITTING), _pointing_line(mission, error, error_source)
     )
-    required = Line(
-        "Required power",
-        _required_dbm(beam, rate),
-        "dBm",
-        f"n h c / lambda times data rate, n = {format_quantity(beam.receiver_sensitivity_photon_bit, 'photon/bit')}, "
-        f"{format_quantity(rate, 'bit/s')}",
-        f"{source_text(sources, 'communication.receiver_sensitivity')}; {rate_source}",
-        "sensitivity independent of data rate",
+    receive = (
+        write.gain("GEO aperture gain", "geo_aperture", _RECEIVING),
+        write.loss("Receive optics loss", "receive_optics_loss"),
+        write.loss("Tracking split loss", "tracking_split_loss"),
+        write.loss("Implementation loss", "implementation_loss"),
     )
-    return _budget("Communication", lines, required, beam, receive)
+    return _budget("Communication", transmit, receive, _required_line(beam, rate, write, rate_source), beam)
 
 
 def beacon_budget(mission: Mission, sources: Mapping[str, Source]) -> LinkBudget:
     """Budget of the wide beacon from LEO to GEO: a Gaussian beam with the mission's divergence convention."""
-    return _gaussian_budget(
-        "beacon", mission, sources, mission.beacon, "geo_aperture", mission.terminals.geo_aperture_m
-    )
+    return _gaussian_budget(_Writer("beacon", mission.beacon, mission, sources), mission.beacon, "geo_aperture")
 
 
 def answer_budget(mission: Mission, sources: Mapping[str, Source]) -> LinkBudget:
     """Budget of the narrow beam with which GEO answers the beacon: a Gaussian beam, received by the LEO aperture."""
-    return _gaussian_budget(
-        "answer", mission, sources, mission.answer, "leo_aperture", mission.terminals.leo_aperture_m
-    )
+    return _gaussian_budget(_Writer("answer", mission.answer, mission, sources), mission.answer, "leo_aperture")
 
 
-def _gaussian_budget(
-    name: str, mission: Mission, sources: Mapping[str, Source], beam: Beacon, receiver: str, aperture_m: float
-) -> LinkBudget:
-    half = half_angle_rad(beam.divergence_rad, mission.conventions.divergence)
+def _gaussian_budget(write: "_Writer", beam: Beacon, receiver: str) -> LinkBudget:
+    half, error = half_angle_rad(beam.divergence_rad, write.mission.conventions.divergence), beam.pointing_error_rad
     theta = f"theta = {format_quantity(half, 'rad')} half angle at 1/e2"
     far = "Gaussian beam, far field, not cut by its aperture"
-    shape_source = source_text(sources, f"{name}.divergence", "conventions.divergence")
-    gain = Line("Beam gain", gaussian_beam_gain_db(half), "dB", f"8 / theta^2, {theta}", shape_source, far)
-    error = beam.pointing_error_rad
+    shape = source_text(write.sources, f"{write.table}.divergence", "conventions.divergence")
+    gain = Line("Beam gain", gaussian_beam_gain_db(half), "dB", f"8 / theta^2, {theta}", shape, far)
     basis = f"exp(-2 (error / theta)^2), error = {format_quantity(error, 'rad')}, {theta}"
-    loss = float(gaussian_pointing_loss_db(error, half))
-    pointing = Line(
-        "Pointing loss", -loss, "dB", basis, source_text(sources, f"{name}.pointing_error"), f"{far}, static error"
+    loss = 0.0 - float(gaussian_pointing_loss_db(error, half))
+    pointing = Line("Pointing loss", loss, "dB", basis, write.source("pointing_error"), f"{far}; static error")
+    receive = (
+        write.gain(f"{receiver[:3].upper()} aperture gain", receiver, _RECEIVING),
+        write.loss("Receive optics loss", "receive_optics_loss"),
     )
-    receive_source = source_text(sources, f"terminals.{receiver}")
-    lines = (
-        *_transmit_lines(name, beam, mission, sources, gain, pointing),
-        _gain_line("Receiving aperture gain", aperture_m, beam.wavelength_m, receive_source),
-        _loss_line("Receive optics loss", f"{name}.receive_optics_loss", beam.receive_optics_loss_db, sources),
-    )
-    required_source = source_text(sources, f"{name}.required_power")
-    required = Line("Required power", _dbm(beam.required_power_w), "dBm", "as given", required_source, _GIVEN)
-    return _budget(name.capitalize(), lines, required, beam, aperture_m)
+    level = _dbm(beam.required_power_w)
+    required = Line("Required power", level, "dBm", "as given", write.source("required_power"), _GIVEN)
+    return _budget(write.table.capitalize(), write.transmit(gain, pointing), receive, required, beam)
 
 
-def _given(own: float, given: float | None, sources: Mapping[str, Source], key: str) -> tuple[float, str]:
-    return (own, source_text(sources, key)) if given is None else (float(given), _CHOSEN)
+def _given(own: float, given: float | None, source: str) -> tuple[float, str]:
+    """The value in force and its source: the one given, else the mission's own."""
+    return (own, source) if given is None else (float(given), _CHOSEN)
 
 
-def _transmit_lines(
-    name: str,
-    beam: Beacon | Communication,
-    mission: Mission,
-    sources: Mapping[str, Source],
-    gain: Line,
-    pointing: Line,
-) -> tuple[Line, ...]:
-    """Everything up to the receiving aperture."""
-    convention = mission.conventions.strehl
-    strehl = "as given in dB" if convention == "decibel" else f"10 lg S, S = {beam.strehl:g}"
-    small = "on axis; small wavefront error (Marechal)"
-    distance = f"(lambda / (4 pi R))^2, R = {format_quantity(beam.distance_m, 'm')}"
-    distance_source = source_text(sources, f"{name}.distance")
-    power_source = source_text(sources, f"{name}.transmit_power")
-    strehl_source = source_text(sources, f"{name}.strehl", "conventions.strehl")
-    loss = strehl_loss_db(beam.strehl, convention)
-    power = format_quantity(beam.transmit_power_w, "W")
-    return (
-        Line("Transmit power", _dbm(beam.transmit_power_w), "dBm", f"P = {power}", power_source, _GIVEN),
-        gain,
-        _loss_line("Transmit optics loss", f"{name}.transmit_optics_loss", beam.transmit_optics_loss_db, sources),
-        Line("Strehl loss", 0.0 - loss, "dB", strehl, strehl_source, small),
-        pointing,
-        Line(
-            "Free-space loss",
-            -free_space_loss_db(beam.distance_m, beam.wavelength_m),
-            "dB",
-            distance,
-            distance_source,
-            "vacuum, far field",
-        ),
-    )
+@dataclass(frozen=True, slots=True)
+class _Writer:
+    """Writes the lines of one link, the table `table` of the mission."""
 
+    table: str
+    beam: Beacon | Communication
+    mission: Mission
+    sources: Mapping[str, Source]
 
-def _gain_line(name: str, diameter_m: float, wavelength_m: float, source: str, regime: str) -> Line:
-    shown = f"D = {format_quantity(diameter_m, 'm')}, lambda = {format_quantity(wavelength_m, 'm')}"
-    return Line(name, aperture_gain_db(diameter_m, wavelength_m), "dB", f"(pi D / lambda)^2, {shown}", source, regime)
+    def source(self, key: str) -> str:
+        return source_text(self.sources, f"{self.table}.{key}")
 
+    def loss(self, name: str, key: str) -> Line:
+        """A loss that the mission gives in dB; 0 dB is a line like any other."""
+        return Line(name, 0.0 - getattr(self.beam, f"{key}_db"), "dB", "as given", self.source(key), _GIVEN)
 
-def _loss_line(name: str, key: str, loss_db: float, sources: Mapping[str, Source]) -> Line:
-    return Line(name, 0.0 - loss_db, "dB", "as given", source_text(sources, key), _GIVEN)
+    def gain(self, name: str, aperture: str, regime: str) -> Line:
+        diameter, wavelength = getattr(self.mission.terminals, f"{aperture}_m"), self.beam.wavelength_m
+        shown = f"D = {format_quantity(diameter, 'm')}, lambda = {format_quantity(wavelength, 'm')}"
+        source = source_text(self.sources, f"terminals.{aperture}", f"{self.table}.wavelength")
+        return Line(name, aperture_gain_db(diameter, wavelength), "dB", f"(pi D / lambda)^2, {shown}", source, regime)
+
+    def transmit(self, gain: Line, pointing: Line) -> tuple[Line, ...]:
+        """Everything up to the receiving aperture."""
+        beam = self.beam
+        power = f"P = {format_quantity(beam.transmit_power_w, 'W')}"
+        distance = f"(lambda / (4 pi R))^2, R = {format_quantity(beam.distance_m, 'm')}"
+        space = -free_space_loss_db(beam.distance_m, beam.wavelength_m)
+        return (
+            Line("Transmit power", _dbm(beam.transmit_power_w), "dBm", power, self.source("transmit_power"), _GIVEN),
+            gain,
+            self.loss("Transmit optics loss", "transmit_optics_loss"),
+            self._strehl(),
+            pointing,
+            Line("Free-space loss", space, "dB", distance, self.source("distance"), "vacuum, far field"),
+        )
+
+    def _strehl(self) -> Line:
+        strehl, convention = self.beam.strehl, self.mission.conventions.strehl
+        basis = "as given in dB" if convention == "decibel" else f"Strehl ratio {strehl:g}"
+        source = source_text(self.sources, f"{self.table}.strehl", "conventions.strehl")
+        value = 0.0 - strehl_loss_db(strehl, convention)
+        return Line("Strehl loss", value, "dB", basis, source, "on axis, small wavefront error (Marechal)")
 
 
 def _pointing_line(mission: Mission, error_rad: float, source: str) -> Line:
     convention, diameter = mission.conventions.pointing_loss, mission.terminals.leo_aperture_m
-    loss = float(pointing_loss_db(error_rad, diameter, mission.communication.wavelength_m, convention))
-    formula, regime = {
-        "gaussian": (
-            "exp(-2 (error / theta)^2), theta = 2 lambda / (pi D)",
-            "Gaussian beam of 1/e2 radius D/2 at the aperture",
-        ),
-        "gain": ("exp(-G error^2), G = (pi D / lambda)^2", "beam whose gain falls as a Gaussian with its own gain"),
-    }[convention]
+    loss = 0.0 - float(pointing_loss_db(error_rad, diameter, mission.communication.wavelength_m, convention))
+    formula, regime = _POINTING_BASIS[convention]
     basis = f"{formula}, error = {format_quantity(error_rad, 'rad')}"
-    return Line("Pointing loss", 0.0 - loss, "dB", basis, source, f"{regime}; static error")
+    return Line("Pointing loss", loss, "dB", basis, source, f"{regime}; static error")
+
+
+def _required_line(beam: Communication, rate_bit_s: float, write: _Writer, rate_source: str) -> Line:
+    sensitivity = format_quantity(beam.receiver_sensitivity_photon_bit, "photon/bit")
+    basis = f"n (h c / lambda) R, n = {sensitivity}, R = {format_quantity(rate_bit_s, 'bit/s')}"
+    source = f"{write.source('receiver_sensitivity')}; {rate_source}"
+    return Line(
+        "Required power",
+        _required_dbm(beam, rate_bit_s),
+        "dBm",
+        basis,
+        source,
+        "sensitivity the same at every data rate",
+    )
 
 
 def _budget(
-    name: str, lines: tuple[Line, ...], required: Line, beam: Beacon | Communication, receiving_aperture_m: float
+    name: str,
+    transmit: tuple[Line, ...],
+    receive: tuple[Line, ...],
+    required: Line,
+    beam: Beacon | Communication,
 ) -> LinkBudget:
-    received_dbm = total_db(lines)
+    received_dbm = total_db(transmit + receive)
     margin = received_dbm - required.value
-    received = Line("Received power", received_dbm, "dBm", "sum of the lines above", "computed", "as its lines")
-    margin_line = Line("Margin", margin, "dB", "received power less required power", "computed", "as its lines")
-    at_aperture = lines[:6]  # what the transmitter and the distance do, before the receiver
-    before = [line for line in at_aperture if line.name not in ("Strehl loss", "Pointing loss")]
+    on_axis = [line for line in transmit if line.name not in ("Strehl loss", "Pointing loss")]
     return LinkBudget(
         name=name,
-        lines=lines,
-        totals=(received, required, margin_line),
+        lines=transmit + receive,
+        totals=(
+            Line("Received power", received_dbm, "dBm", "sum of the lines above", "computed", _AS_LINES),
+            required,
+            Line("Margin", margin, "dB", "received power less required power", "computed", _AS_LINES),
+        ),
         received_power_w=_watt(received_dbm),
         required_power_w=_watt(required.value),
         margin_db=margin,
-        irradiance_w_m2=_irradiance(total_db(at_aperture), beam.wavelength_m),
-        irradiance_on_axis_w_m2=_irradiance(total_db(before), beam.wavelength_m),
+        irradiance_w_m2=_irradiance(total_db(transmit), beam.wavelength_m),
+        irradiance_on_axis_w_m2=_irradiance(total_db(on_axis), beam.wavelength_m),
     )
 
 
@@ -351,7 +354,8 @@ def largest_pointing_error(mission: Mission, margin_db: float, data_rate_bit_s: 
         possible = format_quantity(largest_data_rate(mission, margin_db, 0.0), "bit/s")
         raise LinkError(
             f"at {format_quantity(data_rate_bit_s, 'bit/s')} a margin of {margin_db:g} dB is missed by "
-            f"{-excess_db:.2f} dB even without pointing error; up to {possible} it would be there, or with that much more power or gain"
+            f"{-excess_db:.2f} dB even without pointing error; up to {possible} it would be there, "
+            "or with that much more power or gain"
         )
     return math.sqrt(excess_db / _pointing_slope(mission))
 
@@ -404,7 +408,9 @@ def ideal_receivers(
     keying averaged over marks and spaces.
     """
     beam = mission.communication
-    error, error_source = _given(beam.pointing_error_rad, pointing_error_rad, sources, "communication.pointing_error")
+    error, error_source = _given(
+        beam.pointing_error_rad, pointing_error_rad, source_text(sources, "communication.pointing_error")
+    )
     margin = float(margin_of_error(mission, error))
     source = f"{source_text(sources, 'communication.data_rate')}; {error_source}"
     natural = math.log(1.0 / (2.0 * BIT_ERROR_RATIO))

@@ -35,14 +35,14 @@ def modal_from_polynomials(numerator: tuple[float, ...], denominator: tuple[floa
     num = np.trim_zeros(np.asarray(numerator, dtype=float), "f")
     den = np.trim_zeros(np.asarray(denominator, dtype=float), "f")
     if num.size >= den.size:
-        raise ValueError(f"numerator of order {num.size - 1} over denominator of order {den.size - 1}: not strictly proper")
+        raise ValueError(
+            f"numerator of order {num.size - 1} over denominator of order {den.size - 1}: not strictly proper"
+        )
     poles = np.asarray(np.roots(den), dtype=complex)
     distance = np.abs(poles[:, None] - poles[None, :]) + np.diag(np.full(poles.size, np.inf))
     if poles.size > 1 and np.min(distance / np.abs(poles)[:, None].clip(1e-300)) < 1e-6:
         raise ValueError("two poles coincide: the transfer function has no modal form")
-    residues = [
-        np.polyval(num, p) / den[0] / np.prod(p - np.delete(poles, i)) for i, p in enumerate(poles)
-    ]
+    residues = [np.polyval(num, p) / den[0] / np.prod(p - np.delete(poles, i)) for i, p in enumerate(poles)]
     return _modal(poles, np.asarray(residues))
 
 
@@ -71,7 +71,9 @@ def frequency_response(system: StateSpace, freq_hz: Floats, step_s: float | None
     s = 2j * np.pi * np.atleast_1d(freq_hz)
     points = s if step_s is None else np.exp(s * step_s)
     resolvent = points[:, None, None] * np.eye(system.order) - system.A
-    return np.asarray(system.C @ np.linalg.solve(resolvent, np.broadcast_to(system.B, (s.size, *system.B.shape))) + system.D)
+    return np.asarray(
+        system.C @ np.linalg.solve(resolvent, np.broadcast_to(system.B, (s.size, *system.B.shape))) + system.D
+    )
 
 
 def first_order_hold(A: Floats, B: Floats, step_s: float) -> tuple[Floats, Floats, Floats]:

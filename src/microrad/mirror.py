@@ -150,7 +150,9 @@ def linear_part(table: mission.LinearPart) -> tuple[lti.StateSpace, float]:
     return replace(system, C=system.C / magnitude), magnitude
 
 
-def hysteresis_model(table: mission.Mirror | mission.Comparison, rate_limit_v_s: float, bias_v: float) -> BoucWen | Play:
+def hysteresis_model(
+    table: mission.Mirror | mission.Comparison, rate_limit_v_s: float, bias_v: float
+) -> BoucWen | Play:
     """The hysteresis model of a mirror table, as this module's record."""
     if table.bouc_wen is not None:
         b = table.bouc_wen
@@ -207,12 +209,12 @@ def assemble(name: str, composition: str, system: lti.StateSpace | None, model: 
         K=direct[None, :],
         bouc_wen=bouc_wen,
         play=play,
-        gain_rad_v=(_gain(model),),
+        gain_rad_v=(slow_gain(model),),
         inverse=(model,),
     )
 
 
-def _gain(model: BoucWen | Play) -> float:
+def slow_gain(model: BoucWen | Play) -> float:
     return model.d1_rad_v if isinstance(model, BoucWen) else math.fsum(model.weights_rad_v)
 
 
@@ -235,7 +237,7 @@ def _routes(composition: str, elements: int) -> tuple[Floats, Floats]:
 
 def gain_only(model: BoucWen | Play) -> Play:
     """The model without hysteresis: its gain for slow, large drives and nothing else."""
-    return Play((0.0,), (_gain(model),))
+    return Play((0.0,), (slow_gain(model),))
 
 
 def combine(*mirrors: Mirror) -> Mirror:
@@ -310,7 +312,13 @@ def contraction(mirror: Mirror, step_s: float) -> float:
 
 def _steepest(b: BoucWen) -> float:
     rate = 0.0 if math.isinf(b.rate_limit_v_s) else b.rate_limit_v_s
-    slope = abs(b.epsilon_rad_v) * math.exp(b.delta_s_v * rate) * 2.0 * b.alpha_1_v / max(b.alpha_1_v - abs(b.beta_1_v), 1e-12)
+    slope = (
+        abs(b.epsilon_rad_v)
+        * math.exp(b.delta_s_v * rate)
+        * 2.0
+        * b.alpha_1_v
+        / max(b.alpha_1_v - abs(b.beta_1_v), 1e-12)
+    )
     return abs(b.d1_rad_v) * math.exp(abs(b.d2_s_v) * rate) + abs(slope)
 
 
@@ -403,9 +411,7 @@ def summarise(table: mission.Mirror) -> Summary:
         ]
         if not 0.9 * band[0] <= dc <= 1.1 * band[1]:
             warnings.append(f"gain at DC {dc:.5f} is not the gain in the band, {band[0]:.5f} to {band[1]:.5f}")
-    return Summary(
-        table.name, table.composition, model, roots, dc, band, at, by, table.rate_limit_v_s, tuple(warnings)
-    )
+    return Summary(table.name, table.composition, model, roots, dc, band, at, by, table.rate_limit_v_s, tuple(warnings))
 
 
 def _admissibility(model: BoucWen | Play) -> tuple[str, ...]:

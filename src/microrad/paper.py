@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from microrad import control, mirror, mission, simulate
+from microrad.tracking import hysteresis
 
 Floats = NDArray[np.float64]
 Progress = Callable[[int, int, str], None]
@@ -98,11 +99,17 @@ class Scan:
         return names, self.holding(names) if names else ()
 
 
-def scan(m: mission.Mission, model: mirror.BoucWen | mirror.Play, on_progress: Progress | None = None) -> Scan:
+def applies(m: mission.Mission) -> bool:
+    """Whether the mission's mirror is of the paper's kind, a linear part and a Bouc-Wen model: else nothing to scan."""
+    return m.mirror.linear is not None and m.mirror.bouc_wen is not None
+
+
+def scan(m: mission.Mission, on_progress: Progress | None = None) -> Scan:
     """Errors over both compositions and the grid of gains, for the claims of Fig. 6 and 8.
 
     The plant takes one step a control period here: the errors compared are tens of µrad.
     """
+    model = hysteresis(m, m.mirror)
     timing = control.timing_from_mission(m.control)
     delay = round(timing.delay_steps / timing.steps_per_sample)
     coarse = replace(timing, steps_per_sample=1, delay_steps=delay)

@@ -140,9 +140,7 @@ def at_rest(loop: kernels.Loop) -> kernels.LoopState:
     )
 
 
-def track(
-    name: str, m: mirror.Mirror, setup: Setup, inverse: Inverse, reference_rad: Floats, steady: slice
-) -> Trace:
+def track(name: str, m: mirror.Mirror, setup: Setup, inverse: Inverse, reference_rad: Floats, steady: slice) -> Trace:
     """Run the sampled loop from rest over ``reference_rad`` (samples, axes) at the control period."""
     drive, timing = setup.drive, setup.timing
     plant = mirror.discretise(m, timing.step_s)
@@ -217,7 +215,9 @@ class HysteresisLoop:
         return float(np.ptp(self.hysteresis_rad) / np.ptp(self.output_rad))
 
 
-def hysteresis_loop(model: mirror.BoucWen | mirror.Play, freq_hz: float, amplitude_v: float, step_s: float) -> HysteresisLoop:
+def hysteresis_loop(
+    model: mirror.BoucWen | mirror.Play, freq_hz: float, amplitude_v: float, step_s: float
+) -> HysteresisLoop:
     """The static hysteresis model (no linear part) under a sine of ``amplitude_v`` about its bias: the third period."""
     static = mirror.assemble("static", "static", None, model)
     samples = round(1 / freq_hz / step_s)

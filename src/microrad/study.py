@@ -1,0 +1,111 @@
+"""One study: from a mission file to a verdict. The story, and the only place where the parts meet."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from microrad import control, link, mirror, paper, pointing, simulate, tracking, verdict
+from microrad.missionfile import MissionFile
+
+Floats = NDArray[np.float64]
+Progress = Callable[[int, int, str], None]
+
+MAP_RATES_BIT_S = np.geomspace(1e7, 1e10, 181)
+MAP_ERRORS_RAD = np.linspace(0.0, 30e-6, 121)
+
+
+@dataclass(frozen=True, slots=True)
+class MarginMap:
+    """Fig. 2: margin in dB, shape (rates, errors), and the requirement solved in both directions, not read off it."""
+
+    data_rate_bit_s: Floats
+    pointing_error_rad: Floats
+    margin_db: Floats
+    largest_rate_bit_s: float
+    largest_error_rad: float
+    readings: tuple[link.SensitivityReading, ...]
+    ideal: tuple[link.IdealReceiver, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Study:
+    """Everything that a report shows, computed. ``achieved`` is the communication budget at the simulated residual."""
+
+    file: MissionFile
+    open_loop: pointing.OpenLoopPointing
+    beacon: link.LinkBudget
+    answer: link.LinkBudget
+    communication: link.LinkBudget
+    achieved: link.LinkBudget
+    margin_map: MarginMap
+    summary: mirror.Summary
+    loops: tuple[simulate.HysteresisLoop, ...]
+    margins: control.Margins
+    runs: tuple[tracking.Run, ...]
+    residual: tracking.Run
+    scan: paper.Scan | None
+    requirements: tuple[verdict.Requirement, ...]
+    claims: tuple[verdict.Claim, ...]
+
+    @property
+    def closes(self) -> bool:
+        """Whether each of the three links has a margin of at least 0 dB, communication at the simulated residual."""
+        return min(self.beacon.margin_db, self.answer.margin_db, self.achieved.margin_db) >= 0.0
+
+
+def run(file: MissionFile, on_progress: Progress = lambda done, total, what: None) -> Study:
+    """The whole study of a mission: budgets, mirror, loops, and the link at the residual that the loop leaves.
+
+    Raises ValueError with the reason when the loop is unstable or the mirror has no inverse.
+    """
+    m, sources = file.mission, file.sources
+    on_progress(0, 3, "budgets")
+    open_loop = pointing.open_loop_budget(m, sources)
+    beacon, answer = link.beacon_budget(m, sources), link.answer_budget(m, sources)
+    communication, fig2 = link.communication_budget(m, sources), margin_map(file)
+
+    on_progress(1, 3, "mirror and tracking")
+    summary, loops = mirror.summarise(m.mirror), tracking.hysteresis_loops(m)
+    margins, runs = tracking.loop_margins(m), tracking.tracking_runs(m)
+    residual = tracking.worst(m, runs)
+    left_rad = tracking.residual_rad(m, residual.trace)
+    achieved = link.communication_budget(m, sources, pointing_error_rad=left_rad)
+
+    on_progress(2, 3, "claims of the paper")
+    scan = paper.scan(m, on_progress) if paper.applies(m) else None
+    evidence = verdict.Evidence(
+        m, open_loop, beacon, communication, fig2.readings, fig2.ideal, loops, summary, runs, scan
+    )
+    return Study(
+        file=file,
+        open_loop=open_loop,
+        beacon=beacon,
+        answer=answer,
+        communication=communication,
+        achieved=achieved,
+        margin_map=fig2,
+        summary=summary,
+        loops=loops,
+        margins=margins,
+        runs=runs,
+        residual=residual,
+        scan=scan,
+        requirements=verdict.requirements(m, open_loop, beacon, answer, achieved, residual, runs),
+        claims=verdict.against_paper(evidence),
+    )
+
+
+def margin_map(file: MissionFile) -> MarginMap:
+    """Margin over data rate and pointing error, with the receivers that the requirement implies."""
+    m, q = file.mission, file.mission.requirement
+    return MarginMap(
+        MAP_RATES_BIT_S,
+        MAP_ERRORS_RAD,
+        link.margin_map(m, MAP_RATES_BIT_S, MAP_ERRORS_RAD),
+        link.largest_data_rate(m, q.margin_db, q.pointing_error_rad),
+        link.largest_pointing_error(m, q.margin_db, m.communication.data_rate_bit_s),
+        link.implied_sensitivity(m),
+        link.ideal_receivers(m, file.sources),
+    )

@@ -1,0 +1,79 @@
+"""The paper's tracking cases on the mission's mirror: Fig. 5, 6 and 8, and the residual that a link has to live with."""
+
+from dataclasses import dataclass
+
+from microrad import control, mirror, simulate
+from microrad.mission import Comparison, Mission
+from microrad.mission import Mirror as MirrorTable
+
+Model = mirror.BoucWen | mirror.Play
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """One tracked sine: which mirror, which controller, and what came out, at the line of sight."""
+
+    mirror: str  # "given", "comparison" or "no hysteresis"
+    controller: str  # "PID" or "PID + inverse"
+    freq_hz: float
+    trace: simulate.Trace
+
+
+def hysteresis(m: Mission, table: MirrorTable | Comparison) -> Model:
+    """The hysteresis of the mission's mirror, or of its comparison, with its output at the line of sight."""
+    model = mirror.hysteresis_model(table, m.mirror.rate_limit_v_s, m.mirror.bias_v)
+    return mirror.line_of_sight(model, m.conventions.mirror_angle)
+
+
+def hysteresis_loops(m: Mission) -> tuple[simulate.HysteresisLoop, ...]:
+    """Fig. 5: settled loops of the static model at the mission's frequencies, in the mirror's own angle."""
+    model = mirror.hysteresis_model(m.mirror, m.mirror.rate_limit_v_s, m.mirror.bias_v)
+    s = m.scenario
+    return tuple(
+        simulate.hysteresis_loop(model, f, s.loop_amplitude_v, 1.0 / m.control.rate_hz) for f in s.loop_frequencies_hz
+    )
+
+
+def loop_margins(m: Mission) -> control.Margins:
+    """Margins of the mission's loop as it is sampled; raises ValueError when it is unstable."""
+    model = hysteresis(m, m.mirror)
+    setup = simulate.setup_from_mission(m, mirror.slow_gain(model))
+    return simulate.margins(mirror.from_mission(m.mirror, model), setup)
+
+
+def tracking_runs(m: Mission) -> tuple[Run, ...]:
+    """Fig. 6 and 8: the sines of the scenario under PID and PID + inverse, on each variant of the mirror.
+
+    Raises ValueError when the mirror has no inverse.
+    """
+    model = hysteresis(m, m.mirror)
+    setup = simulate.setup_from_mission(m, mirror.slow_gain(model))
+    models = {"given": model, "no hysteresis": mirror.gain_only(model)}
+    if m.mirror.comparison is not None:
+        models["comparison"] = hysteresis(m, m.mirror.comparison)
+    runs = []
+    for which, variant in models.items():
+        plant = mirror.from_mission(m.mirror, variant)
+        controllers = {"PID": control.no_feedforward(plant), "PID + inverse": control.inverse(plant)}
+        for controller, f in _cases(m):
+            trace = simulate.track_sine(
+                f"{which}, {controller}, {f:g} Hz", plant, setup, controllers[controller], m.scenario.amplitude_rad, f
+            )
+            runs.append(Run(which, controller, f, trace))
+    return tuple(runs)
+
+
+def _cases(m: Mission) -> list[tuple[str, float]]:
+    both = sorted({*m.scenario.pid_frequencies_hz, *m.scenario.inverse_frequencies_hz})
+    return [("PID", f) for f in both] + [("PID + inverse", f) for f in m.scenario.inverse_frequencies_hz]
+
+
+def worst(m: Mission, runs: tuple[Run, ...]) -> Run:
+    """The run of PID + inverse on the mission's mirror that leaves the largest residual."""
+    candidates = [r for r in runs if (r.mirror, r.controller) == ("given", "PID + inverse")]
+    return max(candidates, key=lambda r: residual_rad(m, r.trace))
+
+
+def residual_rad(m: Mission, trace: simulate.Trace) -> float:
+    """The residual in the statistic that the mission asks for."""
+    return trace.peak_rad if m.requirement.residual_statistic == "peak" else trace.rms_rad

@@ -1,0 +1,213 @@
+"""Units at the door: the table against astropy.units, every refusal with its message, and the way back."""
+
+import math
+import re
+import time
+
+import pytest
+from astropy import units as au
+from astropy.constants import c, h
+from hypothesis import example, given
+from hypothesis import strategies as st
+
+from microrad import units
+from microrad.units import PLANCK_J_S, SPEED_OF_LIGHT_M_S, UnitError, format_quantity, parse_quantity
+
+# our symbol: astropy's name for it; photon, bit and cycle are base dimensions in both
+ASTROPY = {"B": "byte", "min": "minute", "h": "hour", "deg": "degree"}
+SI = {
+    "m": "m", "g": "kg", "s": "s", "min": "s", "h": "s", "A": "A", "K": "K", "V": "V", "W": "W", "J": "J", "N": "N",
+    "Hz": "Hz", "rad": "rad", "deg": "rad", "arcsec": "rad", "bit": "bit", "B": "bit", "byte": "bit", "photon": "photon",
+}  # fmt: skip
+PREFIXES = {"": 1.0} | {p: float(getattr(au.si, "m").to(au.m)) * f for p, f in {
+    "p": 1e-12, "n": 1e-9, "u": 1e-6, "µ": 1e-6, "μ": 1e-6, "m": 1e-3, "c": 1e-2, "k": 1e3, "M": 1e6, "G": 1e9, "T": 1e12,
+}.items()}  # fmt: skip
+SYMBOLS = [(p, s) for s, (_, _, allowed) in units._UNITS.items() for p in ("", *allowed)]
+COMPOUNDS = [
+    ("mrad/V", "rad/V", "mrad/V"), ("s/V", "s/V", "s/V"), ("1/V", "1/V", "1/V"), ("V/s", "V/s", "V/s"),
+    ("V/us", "V/s", "V/us"), ("Mbit/s", "bit/s", "Mbit/s"), ("kB/s", "bit/s", "kbyte/s"),
+    ("photon/bit", "photon/bit", "photon/bit"), ("V/(mrad s)", "V/(rad s)", "V/(mrad s)"),
+    ("V s/mrad", "V s/rad", "V s/mrad"), ("W/m^2", "W/m^2", "W/m2"), ("nW/cm2", "W/m^2", "nW/cm2"),
+    ("deg/h", "rad/s", "deg/h"), ("V·s/mrad", "V s/rad", "V s/mrad"), ("V / us", "V/s", "V/us"),
+]  # fmt: skip
+KEYS = sorted({unit for _, unit, _ in COMPOUNDS} | set(SI.values()) | {"dB"})
+
+
+def test_constants_are_those_of_the_si():
+    assert SPEED_OF_LIGHT_M_S == c.si.value
+    assert PLANCK_J_S == h.si.value
+
+
+@pytest.mark.parametrize(("prefix", "symbol"), SYMBOLS)
+def test_every_symbol_agrees_with_astropy(prefix, symbol):
+    ours = parse_quantity(f"2.5 {prefix}{symbol}", SI[symbol])
+    theirs = 2.5 * PREFIXES[prefix] * au.Unit(ASTROPY.get(symbol, symbol)).to(au.Unit(SI[symbol]))
+    assert ours == pytest.approx(theirs, rel=1e-14)
+
+
+def test_no_prefixed_unit_hides_another():
+    written = [prefix + symbol for prefix, symbol in SYMBOLS]
+    assert len(written) == len(set(written))
+
+
+@pytest.mark.parametrize(("text", "unit", "theirs"), COMPOUNDS)
+def test_compound_units_agree_with_astropy(text, unit, theirs):
+    expected = 3.25 * au.Unit(theirs).to(au.Unit(unit))
+    assert parse_quantity(f"3.25 {text}", unit) == pytest.approx(expected, rel=1e-14)
+
+
+@given(st.decimals("-1e9", "1e9", places=4), st.sampled_from(COMPOUNDS))
+def test_numbers_pass_through(number, compound):
+    text, unit, theirs = compound
+    expected = float(number) * au.Unit(theirs).to(au.Unit(unit))
+    assert parse_quantity(f"{number} {text}", unit) == pytest.approx(expected, rel=1e-13, abs=0.0)
+
+
+@pytest.mark.parametrize(
+    ("text", "unit", "value"),
+    [
+        ("780 urad", "rad", 780e-6),  # to the last bit, as if written in SI
+        ("9.99 µrad", "rad", 9.99e-6),
+        ("5cm", "m", 0.05),
+        ("+1.5e3 m", "m", 1500.0),
+        (".5 W", "W", 0.5),
+        ("-2.96e-7 s/V", "s/V", -2.96e-7),
+        ("38.421 1/V", "1/V", 38.421),
+        ("0 V", "V", 0.0),
+        ("3 dB", "dB", 3.0),
+        ("-0.4 dB", "dB", -0.4),
+        ("30 dBm", "W", 1.0),
+        ("7 dBW", "W", 10**0.7),
+    ],
+)
+def test_what_is_read(text, unit, value):
+    assert parse_quantity(text, unit) == value
+
+
+@pytest.mark.parametrize(
+    ("text", "unit", "reason", "advice"),
+    [
+        (5, "m", "number without a unit", '"5 m"'),
+        (0.25, "W", "number without a unit", '"0.25 W"'),
+        ("5", "m", "number without a unit", '"5 m"'),
+        ("5 ", "rad", "number without a unit", '"5 urad"'),
+        ("1,5 W", "W", "comma", '"1.5 W"'),
+        ("nan W", "W", "plain number", '"5 W"'),
+        ("inf W", "W", "plain number", '"5 W"'),
+        ("-inf W", "W", "plain number", '"5 W"'),
+        (math.nan, "W", "nan is a number without a unit", '"5 W"'),
+        ("0x10 m", "m", '"x10 m"', '"5 m"'),
+        ("1_000 m", "m", '"_000 m"', '"5 m"'),
+        ("9**9**9 m", "m", '"**9**9"', '"5 m"'),
+        ("2*3 m", "m", '"*3"', '"5 m"'),
+        ("(1+1) m", "m", "plain number", '"5 m"'),
+        ("1e400 m", "m", "too large", '"5 m"'),
+        ("1e9999999999 m", "m", "where a unit should stand", '"5 m"'),
+        ("5  m", "m", "missing beside a space", '"5 m"'),
+        (" 5 m", "m", "plain number", '"5 m"'),
+        ("", "m", "plain number", '"5 m"'),
+        ("m", "m", "plain number", '"5 m"'),
+        ("٥ m", "m", "plain number", '"5 m"'),  # a digit to Python's int, not to us
+        ("5 m/", "m", "missing beside", '"5 m"'),
+        ("5 /m", "1/m", "missing beside", '"5 1/m"'),
+        ("5 V/mrad s", "V/(rad s)", "brackets, as in V/(mrad s)", '"5 V/(mrad s)"'),
+        ("5 m/s/s", "m/s^2", '"s/s"', "m/s^2"),
+        ("5 watt", "W", 'no unit is called "watt"', '"5 W"'),
+        ("5 kmin", "s", 'no unit is called "kmin"', '"5 s"'),
+        ("5 m^0", "m", 'no unit is called "m^0"', '"5 m"'),
+        ("5 W\x1b[31m", "W", "\\u001b", '"5 W"'),
+        ("1 Hz", "rad/s", 'in "Hz", another kind', "rad/s"),
+        ("1 rad/s", "Hz", 'in "rad/s", another kind', '"5 Hz"'),
+        ("1 1/s", "Hz", 'in "1/s", another kind', '"5 Hz"'),
+        ("1 1/s", "rad/s", "another kind", "rad/s"),
+        ("1 Mbit", "bit/s", "another kind", '"5 Mbit/s"'),
+        ("1 1/bit", "photon/bit", "another kind", '"5 photon/bit"'),
+        ("1 m", "rad", "another kind", '"5 urad"'),
+        ("1 dB", "W", "in dB, another kind", '"5 W"'),
+        ("1 dBm", "dB", "in dBm, another kind", '"5 dB"'),
+        ("1 dBm", "rad", "in dBm, another kind", '"5 urad"'),
+        ("1 W", "dB", 'in "W", another kind', '"5 dB"'),
+        ("1 dBm/s", "W", "no unit is called", '"5 W"'),
+        ("1e6 dBm", "W", "beyond 1000 dBm", '"5 W"'),
+        (True, "W", "not a quantity", '"5 W"'),
+        (None, "W", "not a quantity", '"5 W"'),
+        (["5 W"], "W", "not a quantity", '"5 W"'),
+        (10**5000, "W", "number without a unit", '"5 W"'),
+        ("9" * 100_000 + " m", "m", "100002 characters", '"5 m"'),
+    ],
+)
+def test_what_is_refused_and_how(text, unit, reason, advice):
+    before = time.perf_counter()
+    with pytest.raises(UnitError) as refused:
+        parse_quantity(text, unit)
+    assert time.perf_counter() - before < 0.2
+    message = str(refused.value)
+    assert reason in message
+    assert "for example" in message
+    assert advice in message
+    assert refused.value.example in message
+    assert len(message) < 400
+    assert message.isprintable()
+
+
+def test_the_example_takes_the_typical_unit_and_is_itself_accepted():
+    with pytest.raises(UnitError, match='for example "5 cm"') as refused:
+        parse_quantity(5, "m", "cm")
+    assert parse_quantity(refused.value.example, "m") == 0.05
+
+
+@pytest.mark.parametrize("unit", KEYS)
+def test_every_example_can_be_written(unit):
+    with pytest.raises(UnitError) as refused:
+        parse_quantity(3, unit)
+    assert parse_quantity(refused.value.example, unit) != 0.0
+
+
+@given(st.text(max_size=70), st.sampled_from(KEYS))
+@example("9**9**9 m", "m")
+@example("1" + "0" * 58 + "m", "m")
+def test_any_text_is_a_finite_number_or_a_unit_error(text, unit):
+    try:
+        value = parse_quantity(text, unit)
+    except UnitError:
+        return
+    assert math.isfinite(value)
+
+
+@pytest.mark.parametrize(
+    ("value", "unit", "text"),
+    [
+        (9.99e-6, "rad", "9.99 µrad"),
+        (3e8, "bit/s", "300 Mbit/s"),
+        (4.2e7, "m", "42000 km"),
+        (0.05, "m", "50 mm"),
+        (0.99999999e-3, "rad", "1 mrad"),  # rounds up into the next prefix
+        (-3.2e-5, "rad", "-32 µrad"),
+        (2.415e-9, "W/m^2", "2.415 nW/m^2"),
+        (8.9e-5, "rad/V", "89 µrad/V"),
+        (38.421, "1/V", "38.42 1/V"),
+        (1e-6, "m^2", "1e-06 m^2"),  # a prefix would be squared
+        (0.4, "dB", "0.4 dB"),
+        (290.6, "photon/bit", "290.6 photon/bit"),
+        (0.0, "V", "0 V"),
+        (1e-5, "s", "10 µs"),
+        (math.nan, "m", "nan m"),
+        (math.inf, "m", "inf m"),
+    ],
+)
+def test_a_readable_prefix_is_chosen(value, unit, text):
+    assert format_quantity(value, unit) == text
+
+
+def test_digits_are_kept_as_asked():
+    assert format_quantity(1 / 3, "W", 2) == "330 mW"
+    assert format_quantity(1 / 3, "W", 7) == "333.3333 mW"
+
+
+@given(
+    st.floats(1e-15, 1e15) | st.floats(-1e15, -1e-15), st.sampled_from([k for k in KEYS if k not in ("dB", "K", "kg")])
+)
+def test_what_is_written_can_be_read_back(value, unit):
+    text = format_quantity(value, unit, 6)
+    assert parse_quantity(text, unit) == pytest.approx(value, rel=5.1e-6)
+    assert re.fullmatch(r"\S+ \S.*", text)
