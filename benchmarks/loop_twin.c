@@ -42,8 +42,7 @@ static inline double hysteresis_step(double h, double travel, double epsilon_rat
     double end = relaxed(h, forcing, decay);
     if (h * forcing >= 0.0 || h * end > 0.0)
         return end;
-    double ratio = decay * h / forcing;
-    double fraction = fabs(ratio) < 1e-9 ? -h / forcing : log(1.0 - ratio) / decay;
+    double fraction = decay == 0.0 ? -h / forcing : log1p(-decay * h / forcing) / decay;
     double rest = fmax(0.0, 1.0 - fraction);
     double other = alpha * fabs(travel) - side * beta * travel;
     return relaxed(0.0, forcing * rest, other * rest);

@@ -65,9 +65,11 @@ CASES = {
 
 @pytest.mark.parametrize("case", CASES.values(), ids=CASES.keys())
 def test_the_step_is_of_second_order(case):
-    """Where q turns back within a step the step misses the tip: an error of second order too, but of a size that depends
-    on where in the step the tip falls. From one step to the next the order then scatters between about -1 and 5, and
-    only the fit over many steps is firm; without a reversal it is 2.00 from each step to the next.
+    """Two, by a fit over many steps.
+
+    Where q turns back within a step the step misses the tip: an error of second order too, but of a size that depends
+    on where in the step the tip falls, so that from one step to the next the order scatters between about -1 and 5.
+    Without a reversal it is 2.00 from each step to the next.
     """
     mirror, (drive, drive_rate), coarse_step_s, intervals, (least, most) = case
     shares = errors(mirror, drive, drive_rate, coarse_step_s, intervals)

@@ -602,6 +602,14 @@ def test_hostile_names_stay_inside_their_line():
         mirror_file_text(result, "m", model="bouc_wen")
 
 
+def test_threshold_zero_stays_first_without_weight():
+    result = identify([play_record([0.0, 0.05, 0.02], [0.0, 0.5, 2.0])], models=("prandtl_ishlinskii",))
+    fit = replace(result.fit(), weights_rad_per_v=np.where(np.arange(15) < 2, 0.0, 1e-5))
+    table = tomllib.loads(mirror_file_text(replace(result, fits=(fit,)), "m"))["prandtl_ishlinskii"]
+    assert (table["thresholds"][0], table["weights"][0]) == ("0.0 V", "0.0 mrad/V")
+    assert len(table["thresholds"]) == len(table["weights"]) == 14
+
+
 def test_a_mirror_that_does_not_move_is_refused():
     r = play_record([0.05], [0.0])
     result = identify([r], models=("prandtl_ishlinskii",))

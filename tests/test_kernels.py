@@ -707,6 +707,51 @@ def test_the_inverse_of_a_play_bank_is_exact():
     assert np.max(np.abs(alone.output[1:, 0] - reference[:-1])) > 0.01
 
 
+# ------------------------------------------------------------------------------------------------ the loop of the paper
+
+NUMERATOR = [1.979e11, 7.051e13, 2.973e13]  # Eq. 2, powers of s
+DENOMINATOR = [1, 2.15e4, 3.737e8, 2.615e12, 8.489e14, 1.829e14]
+
+
+def papers_mirror(row):
+    """Eq. 3 before Eq. 2, the latter by partial fractions and divided by its in-band gain of 0.0831 mrad/V."""
+    poles = np.roots(DENOMINATOR)
+    residues = np.polyval(NUMERATOR, poles) / np.polyval(np.polyder(DENOMINATOR), poles) / 0.0831
+    blocks, inputs, outputs = [], [], []
+    for pole, residue in zip(poles, residues, strict=True):
+        if pole.imag == 0:
+            blocks.append([[pole.real]])
+            inputs += [1.0]
+            outputs += [residue.real]
+        elif pole.imag > 0:
+            blocks.append([[pole.real, pole.imag], [-pole.imag, pole.real]])
+            inputs += [2.0, 0.0]
+            outputs += [residue.real, residue.imag]
+    E = np.array(inputs)[:, None]
+    return compose(states=5, A=block_diag(*blocks), E=E, G=1.0, C=[outputs], bouc_wen=(row,))
+
+
+@pytest.mark.parametrize(
+    ("freq_hz", "peak_urad", "rms_urad", "straight_urad"),
+    [(1, 8.8, 1.012, 1.32), (15, 19.94, 14.35, 19.92), (25, 33.36, 24.04, 33.3)],
+)
+def test_the_papers_loop_under_pi_control(freq_hz, peak_urad, rms_urad, straight_urad):
+    """0.3 mrad sine, PI of 1 V/mrad and 16 000 V/(mrad s), ideal amplifier; steady errors by adaptive solvers."""
+    sample_s = STEP / 2
+    period = round(1 / (freq_hz * sample_s))
+    reference = 0.3 * np.sin(2 * np.pi * freq_hz * sample_s * np.arange(3 * period))
+    controller = {"Ac": 1.0, "Bc": 16_000 * sample_s, "Cc": 1.0, "Dc": 1.0 + 16_000 * sample_s / 2, "allocation": 0.0}
+    error = {}
+    for name, row in {"paper": PAPER._replace(bias=0.0), "straight": PAPER._replace(epsilon=0.0, bias=0.0)}.items():
+        run = run_direct(reference, papers_mirror(row), sample_s, **controller)
+        error[name] = 1e3 * (reference - run.output[:, 0])[-period:]
+    peak, rms, straight = np.max(np.abs(error["paper"])), np.std(error["paper"]), np.max(np.abs(error["straight"]))
+    print(f"{freq_hz} Hz: peak {peak:.2f}, rms {rms:.3f}, without hysteresis {straight:.2f} urad")
+    assert_allclose(peak, peak_urad, rtol=0.01)
+    assert_allclose(rms, rms_urad, rtol=0.01)
+    assert_allclose(straight, straight_urad, rtol=0.01)
+
+
 # ------------------------------------------------------------------------------------------------ without the compiler
 
 

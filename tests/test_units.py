@@ -7,7 +7,7 @@ import time
 import pytest
 from astropy import units as au
 from astropy.constants import c, h
-from hypothesis import example, given
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from microrad import units
@@ -17,11 +17,11 @@ from microrad.units import PLANCK_J_S, SPEED_OF_LIGHT_M_S, UnitError, format_qua
 ASTROPY = {"B": "byte", "min": "minute", "h": "hour", "deg": "degree"}
 SI = {
     "m": "m", "g": "kg", "s": "s", "min": "s", "h": "s", "A": "A", "K": "K", "V": "V", "W": "W", "J": "J", "N": "N",
-    "Hz": "Hz", "rad": "rad", "deg": "rad", "arcsec": "rad", "bit": "bit", "B": "bit", "byte": "bit", "photon": "photon",
+    "Hz": "Hz", "rad": "rad", "deg": "rad", "arcsec": "rad",
+    "bit": "bit", "B": "bit", "byte": "bit", "photon": "photon",
 }  # fmt: skip
-PREFIXES = {"": 1.0} | {p: float(getattr(au.si, "m").to(au.m)) * f for p, f in {
-    "p": 1e-12, "n": 1e-9, "u": 1e-6, "µ": 1e-6, "μ": 1e-6, "m": 1e-3, "c": 1e-2, "k": 1e3, "M": 1e6, "G": 1e9, "T": 1e12,
-}.items()}  # fmt: skip
+PREFIXES = {"": 1.0} | {p: au.Unit(f"{p}m").to(au.m) for p in "pnumckMGT"}
+PREFIXES |= {"µ": PREFIXES["u"], "μ": PREFIXES["u"]}
 SYMBOLS = [(p, s) for s, (_, _, allowed) in units._UNITS.items() for p in ("", *allowed)]
 COMPOUNDS = [
     ("mrad/V", "rad/V", "mrad/V"), ("s/V", "s/V", "s/V"), ("1/V", "1/V", "1/V"), ("V/s", "V/s", "V/s"),
@@ -34,8 +34,8 @@ KEYS = sorted({unit for _, unit, _ in COMPOUNDS} | set(SI.values()) | {"dB"})
 
 
 def test_constants_are_those_of_the_si():
-    assert SPEED_OF_LIGHT_M_S == c.si.value
-    assert PLANCK_J_S == h.si.value
+    assert c.si.value == SPEED_OF_LIGHT_M_S
+    assert h.si.value == PLANCK_J_S
 
 
 @pytest.mark.parametrize(("prefix", "symbol"), SYMBOLS)
@@ -56,6 +56,7 @@ def test_compound_units_agree_with_astropy(text, unit, theirs):
     assert parse_quantity(f"3.25 {text}", unit) == pytest.approx(expected, rel=1e-14)
 
 
+@settings(deadline=None)  # the machine may be busy
 @given(st.decimals("-1e9", "1e9", places=4), st.sampled_from(COMPOUNDS))
 def test_numbers_pass_through(number, compound):
     text, unit, theirs = compound
@@ -132,8 +133,6 @@ def test_what_is_read(text, unit, value):
         (True, "W", "not a quantity", '"5 W"'),
         (None, "W", "not a quantity", '"5 W"'),
         (["5 W"], "W", "not a quantity", '"5 W"'),
-        (10**5000, "W", "number without a unit", '"5 W"'),
-        ("9" * 100_000 + " m", "m", "100002 characters", '"5 m"'),
     ],
 )
 def test_what_is_refused_and_how(text, unit, reason, advice):
@@ -150,6 +149,13 @@ def test_what_is_refused_and_how(text, unit, reason, advice):
     assert message.isprintable()
 
 
+def test_enormous_values_are_refused_in_a_short_message():
+    for value, reason in (("9" * 100_000 + " m", "100002 characters"), (1 << 20_000, "without a unit")):
+        with pytest.raises(UnitError, match=reason) as refused:
+            parse_quantity(value, "m")
+        assert len(str(refused.value)) < 250
+
+
 def test_the_example_takes_the_typical_unit_and_is_itself_accepted():
     with pytest.raises(UnitError, match='for example "5 cm"') as refused:
         parse_quantity(5, "m", "cm")
@@ -163,7 +169,8 @@ def test_every_example_can_be_written(unit):
     assert parse_quantity(refused.value.example, unit) != 0.0
 
 
-@given(st.text(max_size=70), st.sampled_from(KEYS))
+@settings(deadline=None)  # the machine may be busy
+@given(st.text("0123456789.,eE+-*_ /()^·µmradVsWBHzdbit∞", max_size=20), st.sampled_from(KEYS))
 @example("9**9**9 m", "m")
 @example("1" + "0" * 58 + "m", "m")
 def test_any_text_is_a_finite_number_or_a_unit_error(text, unit):
@@ -204,6 +211,7 @@ def test_digits_are_kept_as_asked():
     assert format_quantity(1 / 3, "W", 7) == "333.3333 mW"
 
 
+@settings(deadline=None)  # the machine may be busy
 @given(
     st.floats(1e-15, 1e15) | st.floats(-1e15, -1e-15), st.sampled_from([k for k in KEYS if k not in ("dB", "K", "kg")])
 )

@@ -8,7 +8,7 @@ All quantities are deviations from the operating point (drive bias, output at re
 """
 
 from collections.abc import Callable
-from math import exp, floor, log
+from math import exp, floor, log1p
 from typing import Any, NamedTuple
 
 import numba
@@ -160,8 +160,7 @@ def bouc_wen_step(h, travel, epsilon_rate, alpha, beta):  # type: ignore[no-unty
     if h * forcing >= 0.0 or h * end > 0.0:
         return end
     # The sign changes inside the step: reach zero, then leave it on the other side with that side's decay.
-    ratio = decay * h / forcing
-    fraction = -h / forcing if abs(ratio) < 1e-9 else log(1.0 - ratio) / decay
+    fraction = -h / forcing if decay == 0.0 else log1p(-decay * h / forcing) / decay
     rest = max(0.0, 1.0 - fraction)
     other = alpha * abs(travel) - side * beta * travel
     return _relaxed(0.0, forcing * rest, other * rest)

@@ -229,7 +229,7 @@ class _Report:
         location, value = detail["loc"], detail["input"]
         key, cause = self._key(location), detail.get("ctx", {}).get("error")
         if isinstance(cause, ProblemsError):
-            if location:  # those of the whole mission are found by _check_relations
+            if location or self.model is not Mission:  # those of the whole mission are left to _check_relations
                 for problem in cause.problems:
                     _note_problem(
                         self.document, _dotted(key, (problem.key,)), problem, "" if problem.key else shown(value)

@@ -30,6 +30,14 @@ class MarginMap:
 
 
 @dataclass(frozen=True, slots=True)
+class Comparison:
+    """The largest residual on the mission's comparison model, and the margin of the communication link at it."""
+
+    residual: tracking.Run
+    margin_db: float
+
+
+@dataclass(frozen=True, slots=True)
 class Study:
     """Everything that a report shows, computed. ``achieved`` is the communication budget at the simulated residual."""
 
@@ -45,6 +53,7 @@ class Study:
     margins: control.Margins
     runs: tuple[tracking.Run, ...]
     residual: tracking.Run
+    comparison: Comparison | None
     scan: paper.Scan | None
     requirements: tuple[verdict.Requirement, ...]
     claims: tuple[verdict.Claim, ...]
@@ -91,10 +100,20 @@ def run(file: MissionFile, on_progress: Progress = lambda done, total, what: Non
         margins=margins,
         runs=runs,
         residual=residual,
+        comparison=compare(file, runs),
         scan=scan,
         requirements=verdict.requirements(m, open_loop, beacon, answer, achieved, residual, runs),
         claims=verdict.against_paper(evidence),
     )
+
+
+def compare(file: MissionFile, runs: tuple[tracking.Run, ...]) -> Comparison | None:
+    """The link on the comparison model, when the mission has one."""
+    m = file.mission
+    if m.mirror.comparison is None:
+        return None
+    run = tracking.worst(m, runs, "comparison")
+    return Comparison(run, float(link.margin_of_error(m, np.array([tracking.residual_rad(m, run.trace)]))[0]))
 
 
 def margin_map(file: MissionFile) -> MarginMap:

@@ -68,9 +68,9 @@ def _cases(m: Mission) -> list[tuple[str, float]]:
     return [("PID", f) for f in both] + [("PID + inverse", f) for f in m.scenario.inverse_frequencies_hz]
 
 
-def worst(m: Mission, runs: tuple[Run, ...]) -> Run:
-    """The run of PID + inverse on the mission's mirror that leaves the largest residual."""
-    candidates = [r for r in runs if (r.mirror, r.controller) == ("given", "PID + inverse")]
+def worst(m: Mission, runs: tuple[Run, ...], which: str = "given") -> Run:
+    """The run of PID + inverse on one variant of the mirror that leaves the largest residual."""
+    candidates = [r for r in runs if (r.mirror, r.controller) == (which, "PID + inverse")]
     return max(candidates, key=lambda r: residual_rad(m, r.trace))
 
 

@@ -133,7 +133,7 @@ def _thresholds(records: Sequence[Prepared], given: ArrayLike | None, operators:
 
 def _solve(states: FloatArray, output: FloatArray) -> FloatArray:
     """Non-negative weights; the triangle of a QR decomposition holds the same problem in a few rows."""
-    from scipy.optimize import nnls  # noqa: PLC0415  heavy import, needed here only
+    from scipy.optimize import nnls  # here, to keep start-up cheap
 
     triangle = np.asarray(np.linalg.qr(np.column_stack((states, output)), mode="r"))
     size = float(np.abs(triangle).max())

@@ -147,7 +147,7 @@ def _scattered(centre: FloatArray, scatter: FloatArray) -> FloatArray:
 
 
 def _search(problem: Problem, start: FloatArray) -> Any:
-    from scipy.optimize import least_squares  # noqa: PLC0415  heavy import, needed here only
+    from scipy.optimize import least_squares  # here, to keep start-up cheap
 
     return least_squares(
         problem.residual,

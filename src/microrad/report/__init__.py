@@ -1,0 +1,53 @@
+"""The report of a study: one page that opens offline, the results as files, and the verdict in words."""
+
+import csv
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from microrad.report.folder import MANIFEST, FolderError, check_folder, whole_folder
+from microrad.report.words import summary, verdict_text
+from microrad.study import Study
+
+__all__ = ["FolderError", "check_folder", "summary", "verdict_text", "write"]
+
+Progress = Callable[[int, int, str], None]
+
+
+def write(
+    study: Study, folder: Path, *, overwrite: bool = False, on_progress: Progress = lambda done, total, what: None
+) -> Path:
+    """Write report.html, results.nc, manifest.json and figures/ into ``folder``, all of them or none.
+
+    Raises FolderError when the folder holds something that must not be replaced. Returns the page's path.
+    """
+    # Drawing and writing libraries load here, not with the package: they take longer than help should.
+    from microrad.report import figures, page, results
+
+    with whole_folder(folder, overwrite) as draft:
+        on_progress(0, 3, "figures")
+        drawn = figures.draw(study)
+        (draft / "figures").mkdir()
+        for figure in drawn:
+            (draft / "figures" / f"{figure.name}.svg").write_text(figure.svg, encoding="utf-8")
+            write_columns(figure.columns, draft / "figures" / f"{figure.name}.csv")
+        on_progress(1, 3, "page")
+        (draft / "report.html").write_text(page.render(study, drawn), encoding="utf-8")
+        on_progress(2, 3, "results")
+        results.write_results(study, draft / "results.nc")
+        results.write_manifest(study, draft, MANIFEST)
+        on_progress(3, 3, "done")
+    return folder / "report.html"
+
+
+def write_columns(columns: dict[str, Any], path: Path) -> None:
+    """Columns of numbers as CSV with a heading; shorter columns end early."""
+    longest = max(np.size(c) for c in columns.values())
+    padded = [[*map(float, c), *[math.nan] * (longest - np.size(c))] for c in columns.values()]
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow(columns)
+        writer.writerows(["" if math.isnan(v) else f"{v:.9g}" for v in row] for row in zip(*padded, strict=True))

@@ -1,0 +1,299 @@
+"""The figures of a study: each an SVG, with the data it shows as a table of columns."""
+
+import io
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib import rc_context
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure as Canvas
+from numpy.typing import NDArray
+
+from microrad import paper, simulate
+from microrad.mission import Mission
+from microrad.study import Study
+from microrad.tracking import Run
+
+Floats = NDArray[np.float64]
+
+# Okabe and Ito's palette: told apart by colour-blind readers. Line styles differ too, for print in grey.
+BLACK, ORANGE, SKY, GREEN, BLUE, VERMILION = "#000000", "#E69F00", "#56B4E9", "#009E73", "#0072B2", "#D55E00"
+STYLE = {
+    "svg.fonttype": "none",
+    "svg.hashsalt": "microrad",
+    "font.family": "sans-serif",
+    "font.size": 9.0,
+    "axes.grid": True,
+    "grid.color": "#dddddd",
+    "grid.linewidth": 0.6,
+    "axes.axisbelow": True,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "legend.frameon": False,
+    "lines.linewidth": 1.3,
+}
+MOST_POINTS = 1200  # of a drawn line; peaks are kept
+
+
+@dataclass(frozen=True, slots=True)
+class Figure:
+    """One figure: file name without ending, title, caption, SVG text, and columns of data by heading with unit."""
+
+    name: str
+    title: str
+    caption: str
+    svg: str
+    columns: dict[str, Floats]
+
+
+def draw(study: Study) -> tuple[Figure, ...]:
+    """All figures of the study, in the order of the report."""
+    with rc_context(STYLE):
+        figures = [margin_map(study), hysteresis_loops(study), tracking_errors(study), inverse(study)]
+        if any(r.mirror == "comparison" for r in study.runs):
+            figures.append(comparison(study))
+        if study.scan is not None:
+            figures.append(scan(study.scan))
+    return tuple(figures)
+
+
+def _svg(canvas: Canvas) -> str:
+    buffer = io.StringIO()
+    canvas.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
+    text = buffer.getvalue()
+    return text[text.index("<svg") :]
+
+
+def thin(x: Floats, y: Floats) -> tuple[Floats, Floats]:
+    """Fewer points for drawing: the lowest and highest of each stretch, so that no peak is lost."""
+    stretch = 2 * y.size // MOST_POINTS
+    if stretch < 4:
+        return x, y
+    whole = y.size // stretch * stretch
+    blocks = y[:whole].reshape(-1, stretch)
+    first = np.arange(blocks.shape[0]) * stretch
+    picks = np.sort(np.stack([first + blocks.argmin(axis=1), first + blocks.argmax(axis=1)], axis=1), axis=1).ravel()
+    return x[picks], y[picks]
+
+
+def margin_map(study: Study) -> Figure:
+    """Fig. 2: link margin over data rate and pointing error."""
+    f, m = study.margin_map, study.file.mission
+    canvas = Canvas(figsize=(6.4, 4.2), layout="constrained")
+    axes = canvas.subplots()
+    rate, error = f.data_rate_bit_s * 1e-6, f.pointing_error_rad * 1e6
+    levels = np.arange(-12.0, 19.0, 3.0)
+    filled = axes.contourf(rate, error, f.margin_db.T, levels=levels, cmap="cividis", extend="both")
+    lines = axes.contour(rate, error, f.margin_db.T, levels=[0.0, m.requirement.margin_db], colors="white")
+    axes.clabel(lines, fmt=lambda level: f"{level:g} dB", fontsize=8)
+    axes.plot(
+        [m.communication.data_rate_bit_s * 1e-6],
+        [m.communication.pointing_error_rad * 1e6],
+        "o",
+        color=VERMILION,
+        markeredgecolor="white",
+        markersize=8,
+        label="budget: {:g} Mbit/s at {:g} µrad".format(
+            m.communication.data_rate_bit_s * 1e-6, m.communication.pointing_error_rad * 1e6
+        ),
+    )
+    left = residual_urad(study)
+    axes.plot(
+        [m.communication.data_rate_bit_s * 1e-6],
+        [min(left, error[-1])],
+        "D",
+        color=SKY,
+        markeredgecolor="white",
+        markersize=7,
+        label=f"simulated residual: {left:.1f} µrad ({m.requirement.residual_statistic})",
+    )
+    axes.set(xscale="log", xlabel="data rate (Mbit/s)", ylabel="pointing error (µrad)")
+    axes.grid(visible=False)
+    axes.legend(loc="upper right", labelcolor="white", fontsize=8)
+    canvas.colorbar(filled, ax=axes, label="link margin (dB)")
+    counts = [r.photons_per_bit for r in f.readings]
+    convention = f"{m.conventions.pointing_loss} pointing loss, Strehl as {m.conventions.strehl}"
+    caption = (
+        f"Margin of the communication link ({convention}). For {m.requirement.margin_db:g} dB: at most "
+        f"{f.largest_rate_bit_s * 1e-6:.1f} Mbit/s at {m.requirement.pointing_error_rad * 1e6:g} µrad, or at most "
+        f"{f.largest_error_rad * 1e6:.2f} µrad at {m.communication.data_rate_bit_s * 1e-6:g} Mbit/s (both solved). "
+        f"Over the four readings of the paper's table the same point implies a receiver of {min(counts):.0f} to "
+        f"{max(counts):.0f} photons per bit: the map would shift by {10 * np.log10(max(counts) / min(counts)):.1f} dB."
+    )
+    grid = np.meshgrid(f.data_rate_bit_s, f.pointing_error_rad, indexing="ij")
+    columns = {"data_rate (bit/s)": grid[0].ravel(), "pointing_error (rad)": grid[1].ravel()}
+    columns["margin (dB)"] = f.margin_db.ravel()
+    return Figure("fig2-margin-map", "Fig. 2  Link margin", caption, _svg(canvas), columns)
+
+
+def residual_urad(study: Study) -> float:
+    """The residual in the mission's statistic, in µrad."""
+    trace = study.residual.trace
+    peak = study.file.mission.requirement.residual_statistic == "peak"
+    return (trace.peak_rad if peak else trace.rms_rad) * 1e6
+
+
+def hysteresis_loops(study: Study) -> Figure:
+    """Fig. 5: output and hysteresis over drive, settled, by frequency."""
+    canvas = Canvas(figsize=(7.4, 3.6), layout="constrained")
+    left, right = canvas.subplots(1, 2)
+    styles = ["-", "--", "-.", ":"]
+    colours = [BLACK, BLUE, GREEN, VERMILION, ORANGE, SKY]
+    columns: dict[str, Floats] = {}
+    bias = study.file.mission.mirror.bias_v
+    for i, loop in enumerate(study.loops):
+        style = {"color": colours[i % 6], "linestyle": styles[i % 4]}
+        label = f"{loop.freq_hz:g} Hz: {100 * loop.width:.2f} %"
+        x, y = thin(loop.drive_v + bias, loop.output_rad)
+        left.plot(x, y * 1e3, label=f"{loop.freq_hz:g} Hz", **style)
+        x, y = thin(loop.drive_v + bias, loop.hysteresis_rad)
+        right.plot(x, y * 1e6, label=label, **style)
+        columns[f"drive at {loop.freq_hz:g} Hz (V)"] = loop.drive_v + bias
+        columns[f"output at {loop.freq_hz:g} Hz (rad)"] = loop.output_rad
+        columns[f"hysteresis at {loop.freq_hz:g} Hz (rad)"] = loop.hysteresis_rad
+    left.set(xlabel="drive (V)", ylabel="output about the bias (mrad)")
+    right.set(xlabel="drive (V)", ylabel="hysteresis h (µrad)")
+    left.legend(title="drive", fontsize=8)
+    right.legend(title="loop width", fontsize=8, loc="upper left", bbox_to_anchor=(0.0, -0.18), ncols=2)
+    caption = (
+        "Settled loops of the hysteresis model alone (Eq. 3), without the linear part. Width: peak-to-peak of h over "
+        "peak-to-peak of the output. The paper shows 60, 80 and 100 Hz against measurements that it does not publish."
+    )
+    return Figure("fig5-hysteresis-loops", "Fig. 5  Rate-dependent hysteresis", caption, _svg(canvas), columns)
+
+
+def _errors(axes: Axes, runs: Iterable[tuple[str, Run, dict[str, str]]], columns: dict[str, Floats]) -> None:
+    """Error over one steady period for each run, with its peak and rms in the legend."""
+    for label, run, style in runs:
+        steady = run.trace.steady
+        time = run.trace.time_s[steady] - run.trace.time_s[steady.start]
+        error = run.trace.error_rad[steady, 0]
+        peak, rms = run.trace.peak_rad * 1e6, run.trace.rms_rad * 1e6
+        axes.plot(*thin(time * 1e3, error * 1e6), label=f"{label}: peak {peak:.1f}, rms {rms:.1f} µrad", **style)
+        columns[f"time, {label}, {run.freq_hz:g} Hz (s)"] = time
+        columns[f"error, {label}, {run.freq_hz:g} Hz (rad)"] = error
+    axes.set(xlabel="time in the last period (ms)", ylabel="pointing error (µrad)")
+    axes.legend(fontsize=7.5, loc="lower center", bbox_to_anchor=(0.5, 1.08))
+
+
+def _panels(frequencies: tuple[float, ...]) -> tuple[Canvas, list[Axes]]:
+    canvas = Canvas(figsize=(3.9 * len(frequencies), 3.5), layout="constrained")
+    panels = canvas.subplots(1, len(frequencies), squeeze=False)[0]
+    for axes, f in zip(panels, frequencies, strict=True):
+        axes.set_title(f"{f:g} Hz", fontsize=9, loc="left")
+    return canvas, list(panels)
+
+
+def _pick(study: Study, mirror: str, controller: str, freq_hz: float) -> Run:
+    return next(r for r in study.runs if (r.mirror, r.controller, r.freq_hz) == (mirror, controller, freq_hz))
+
+
+def tracking_errors(study: Study) -> Figure:
+    """Fig. 6: PID with and without hysteresis."""
+    m = study.file.mission
+    canvas, panels = _panels(m.scenario.pid_frequencies_hz)
+    columns: dict[str, Floats] = {}
+    for axes, f in zip(panels, m.scenario.pid_frequencies_hz, strict=True):
+        lines = [
+            ("without hysteresis", _pick(study, "no hysteresis", "PID", f), {"color": BLUE, "linestyle": "--"}),
+            ("with hysteresis", _pick(study, "given", "PID", f), {"color": VERMILION, "linestyle": "-"}),
+        ]
+        _errors(axes, lines, columns)
+    caption = (
+        f"Tracking error of a {_amplitude(m)} sine under PID. The error that hysteresis adds grows with frequency; the "
+        "lag of the loop, larger still, hides it in the total."
+    )
+    return Figure("fig6-pid", "Fig. 6  PID with and without hysteresis", caption, _svg(canvas), columns)
+
+
+def inverse(study: Study) -> Figure:
+    """Fig. 8: PID against PID with inverse feedforward."""
+    m = study.file.mission
+    canvas, panels = _panels(m.scenario.inverse_frequencies_hz)
+    columns: dict[str, Floats] = {}
+    for axes, f in zip(panels, m.scenario.inverse_frequencies_hz, strict=True):
+        lines = [
+            ("PID", _pick(study, "given", "PID", f), {"color": VERMILION, "linestyle": "--"}),
+            ("PID + inverse", _pick(study, "given", "PID + inverse", f), {"color": BLUE, "linestyle": "-"}),
+        ]
+        _errors(axes, lines, columns)
+        _limit(axes, m)
+    counts = "; ".join(_counts(r) for r in study.runs if (r.mirror, r.controller) == ("given", "PID + inverse"))
+    caption = (
+        f"Tracking error of a {_amplitude(m)} sine. The feedforward (Eq. 4) takes its rate from the reference. Dotted: "
+        f"the required {m.requirement.pointing_error_rad * 1e6:g} µrad. Counts of PID + inverse: {counts}."
+    )
+    return Figure("fig8-inverse", "Fig. 8  PID against PID + inverse", caption, _svg(canvas), columns)
+
+
+def _amplitude(m: Mission) -> str:
+    return f"{m.scenario.amplitude_rad * 1e6:g} µrad"
+
+
+def _limit(axes: Axes, m: Mission) -> None:
+    for sign in (-1.0, 1.0):
+        axes.axhline(sign * m.requirement.pointing_error_rad * 1e6, color=BLACK, linestyle=":", linewidth=0.9)
+
+
+def _counts(run: Run) -> str:
+    c: simulate.Counts = run.trace.counts
+    return (
+        f"{run.freq_hz:g} Hz {c.clamped + c.inverse_clamped} rate-clamped, {c.saturated} saturated, "
+        f"{c.slew_limited} slew-limited, {c.alternating} alternating"
+    )
+
+
+def comparison(study: Study) -> Figure:
+    """PID + inverse on the mission's hysteresis model and on its comparison model."""
+    m = study.file.mission
+    canvas, panels = _panels(m.scenario.inverse_frequencies_hz)
+    columns: dict[str, Floats] = {}
+    for axes, f in zip(panels, m.scenario.inverse_frequencies_hz, strict=True):
+        lines = [
+            ("mirror's model", _pick(study, "given", "PID + inverse", f), {"color": VERMILION, "linestyle": "--"}),
+            ("comparison model", _pick(study, "comparison", "PID + inverse", f), {"color": BLUE, "linestyle": "-"}),
+        ]
+        _errors(axes, lines, columns)
+        _limit(axes, m)
+    caption = (
+        "PID + inverse on the mirror as given and on the comparison model of the mission file, each with its own "
+        "inverse. The spikes on the former are its reversals, where the model first moves the wrong way."
+    )
+    return Figure("comparison", "Hysteresis models compared", caption, _svg(canvas), columns)
+
+
+def scan(found: paper.Scan) -> Figure:
+    """Which of the paper's closed-loop claims hold over gains and compositions."""
+    canvas = Canvas(figsize=(7.6, 3.3), layout="constrained")
+    panels = canvas.subplots(1, len(paper.COMPOSITIONS), sharey=True)
+    most = len(paper.CLAIMS)
+    shown = None
+    for axes, composition in zip(panels, paper.COMPOSITIONS, strict=True):
+        here = [p for p in found.points if p.composition == composition]
+        ki = sorted({p.integral_v_rad_s * 1e-6 for p in here})
+        kp = sorted({p.proportional_v_rad * 1e-3 for p in here})
+        held = np.zeros((len(kp), len(ki)))
+        for p in here:
+            held[kp.index(p.proportional_v_rad * 1e-3), ki.index(p.integral_v_rad_s * 1e-6)] = sum(p.holds().values())
+        shown = axes.imshow(held, cmap="cividis", vmin=0, vmax=most, aspect="auto", origin="lower")
+        for (row, column), value in np.ndenumerate(held):
+            colour = "white" if value < most / 2 else "black"
+            axes.text(column, row, f"{value:.0f}", ha="center", va="center", color=colour, fontsize=8)
+        axes.set_xticks(range(len(ki)), [f"{v:g}" for v in ki])
+        axes.set_yticks(range(len(kp)), [f"{v:g}" for v in kp])
+        axes.set_title(composition, fontsize=9, loc="left")
+        axes.set_xlabel("integral gain (V/(mrad ms))")
+        axes.grid(visible=False)
+    panels[0].set_ylabel("proportional gain (V/mrad)")
+    canvas.colorbar(shown, ax=panels, label=f"claims that hold (of {most})", ticks=range(most + 1))
+    points = found.points
+    columns = {
+        "additive (1) or cascade (0)": np.array([float(p.composition == "additive") for p in points]),
+        "proportional (V/rad)": np.array([p.proportional_v_rad for p in points]),
+        "integral (V/(rad s))": np.array([p.integral_v_rad_s for p in points]),
+    }
+    for name in paper.CLAIMS:
+        columns[name] = np.array([float(p.holds()[name]) for p in points])
+    caption = "How many of these hold at each pair of gains: " + "; ".join(paper.CLAIMS) + "."
+    return Figure("claims-scan", "Where the paper's closed-loop claims hold", caption, _svg(canvas), columns)

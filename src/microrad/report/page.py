@@ -1,0 +1,59 @@
+"""The report as one self-contained page."""
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+
+from microrad.mission import Source
+from microrad.missionfile import assumptions
+from microrad.report import words
+from microrad.report.figures import Figure
+from microrad.report.results import versions
+from microrad.study import Study
+from microrad.units import format_quantity
+
+
+def render(study: Study, figures: Sequence[Figure]) -> str:
+    """The page's HTML; every text of the mission is escaped, and nothing is loaded from anywhere."""
+    environment = Environment(
+        loader=PackageLoader("microrad.report", "."), autoescape=True, undefined=StrictUndefined, trim_blocks=True
+    )
+    environment.filters["quantity"] = lambda pair: words.quantity(*pair)
+    template = environment.get_template("page.html")
+    m = study.file.mission
+    context: dict[str, Any] = {
+        "study": study,
+        "mission": m,
+        "headline": words.headline(study),
+        "explanation": words.explanation(study),
+        "warnings": words.warnings(study),
+        "requirements": study.requirements,
+        "budgets": (study.communication, study.achieved, study.beacon, study.answer),
+        "quantity": words.quantity,
+        "angle": lambda value: format_quantity(value, "rad"),
+        "mirror_lines": str(study.summary).splitlines(),
+        "margins": _margins(study),
+        "assumptions": assumptions(study.file),
+        "inputs": _inputs(study.file.sources),
+        "figures": figures,
+        "versions": versions(),
+    }
+    return template.render(context)
+
+
+def _inputs(sources: Any) -> list[tuple[str, Source]]:
+    return [(key, source) for key, source in sources.items() if source.kind != "assumption"]
+
+
+def _margins(study: Study) -> list[tuple[str, str]]:
+    s = study.margins
+    gain = "none needed" if math.isinf(s.gain) else f"{20 * math.log10(s.gain):.1f} dB"
+    return [
+        ("gain margin", gain),
+        ("phase margin", f"{math.degrees(s.phase_rad):.0f}°"),
+        ("delay margin", format_quantity(s.delay_s, "s", 3)),
+        ("modulus margin, min |1 + L|", f"{s.modulus:.3f}"),
+        ("crossover", "none" if math.isnan(s.crossover_hz) else format_quantity(s.crossover_hz, "Hz", 3)),
+    ]

@@ -1,0 +1,133 @@
+"""What a study found, in words and as plain data."""
+
+from typing import Any
+
+from microrad.study import Study
+from microrad.tracking import residual_rad
+from microrad.units import format_quantity
+
+
+def quantity(value: float, unit: str) -> str:
+    """A value with its unit as it stands in tables: decibels with two decimals, the rest in four digits."""
+    return f"{value:.2f} {unit}" if unit.startswith("dB") else format_quantity(value, unit)
+
+
+def headline(study: Study) -> str:
+    """The verdict in one sentence."""
+    m, margin = study.file.mission, study.achieved.margin_db
+    left, rate = residual_rad(m, study.residual.trace), m.communication.data_rate_bit_s
+    at = f"at {format_quantity(rate, 'bit/s')} and a simulated residual of {format_quantity(left, 'rad', 3)}"
+    if not study.closes:
+        return f"The link does not close: margin {margin:+.2f} dB {at}."
+    met = all(r.met for r in study.requirements)
+    tail = "and every requirement is met" if met else "but not every requirement is met"
+    return f"The link closes, with a margin of {margin:+.2f} dB {at}, {tail}."
+
+
+def explanation(study: Study) -> list[str]:
+    """What the headline rests on, a sentence each."""
+    m, run = study.file.mission, study.residual
+    budget, trace = study.communication, run.trace
+    sentences = [
+        f"As budgeted, at {format_quantity(m.communication.pointing_error_rad, 'rad', 3)}, the margin is "
+        f"{budget.margin_db:+.2f} dB; required are {m.requirement.margin_db:g} dB.",
+        f"The loop ({run.controller}, {run.freq_hz:g} Hz) leaves {format_quantity(trace.peak_rad, 'rad', 3)} at its peaks "
+        f"and {format_quantity(trace.rms_rad, 'rad', 3)} rms; allowed are "
+        f"{format_quantity(m.requirement.pointing_error_rad, 'rad', 3)} ({m.requirement.residual_statistic}).",
+    ]
+    failed = [r for r in study.requirements if not r.met]
+    if failed:
+        sentences.append("What limits it: " + "; ".join(dict.fromkeys(r.limited_by for r in failed)) + ".")
+    if study.comparison is not None:
+        left = residual_rad(m, study.comparison.residual.trace)
+        sentences.append(
+            f"On the mission's comparison model of the mirror the residual is {format_quantity(left, 'rad', 3)} and the "
+            f"margin {study.comparison.margin_db:+.2f} dB."
+        )
+    return sentences
+
+
+def verdict_text(study: Study) -> str:
+    """The verdict as plain text: headline, reasons, and one line a requirement."""
+    lines = [headline(study), *explanation(study), ""]
+    for r in study.requirements:
+        mark = "PASS" if r.met else "FAIL"
+        lines.append(f"{mark}  {r.name}: {quantity(r.actual, r.unit)} (required {quantity(r.required, r.unit)})")
+    return "\n".join(lines)
+
+
+def warnings(study: Study) -> list[str]:
+    """What a reader must not overlook: the mirror's own warnings, and runs outside their range."""
+    found = list(study.summary.warnings)
+    for run in study.runs:
+        c = run.trace.counts
+        counts = {
+            "steps beyond the identified rate": c.clamped + c.inverse_clamped,
+            "saturated samples": c.saturated,
+            "slew-limited steps": c.slew_limited,
+            "samples alternating at the sample rate": c.alternating,
+        }
+        found += [f"{run.trace.name}: {count} {what}" for what, count in counts.items() if count]
+    found += [
+        f"hysteresis loop at {loop.freq_hz:g} Hz: {loop.clamped} samples beyond the identified rate"
+        for loop in study.loops
+        if loop.clamped
+    ]
+    return found
+
+
+def summary(study: Study) -> dict[str, Any]:
+    """The study as plain data, in SI units with the unit in each key."""
+    m = study.file.mission
+    return {
+        "mission": m.name,
+        "mission_sha256": study.file.sha256,
+        "closes": study.closes,
+        "verdict": headline(study),
+        "margin_db": {
+            "beacon": study.beacon.margin_db,
+            "answer": study.answer.margin_db,
+            "communication_as_budgeted": study.communication.margin_db,
+            "communication_at_residual": study.achieved.margin_db,
+        },
+        "residual": {
+            "controller": study.residual.controller,
+            "frequency_hz": study.residual.freq_hz,
+            "peak_rad": study.residual.trace.peak_rad,
+            "rms_rad": study.residual.trace.rms_rad,
+            "statistic": m.requirement.residual_statistic,
+        },
+        "largest_data_rate_bit_s": study.margin_map.largest_rate_bit_s,
+        "largest_pointing_error_rad": study.margin_map.largest_error_rad,
+        "implied_sensitivity_photon_bit": [r.photons_per_bit for r in study.margin_map.readings],
+        "requirements": [
+            {
+                "name": r.name,
+                "unit": r.unit,
+                "required": r.required,
+                "actual": r.actual,
+                "margin": r.margin,
+                "met": r.met,
+                "limited_by": r.limited_by,
+            }
+            for r in study.requirements
+        ],
+        "runs": [
+            {
+                "mirror": r.mirror,
+                "controller": r.controller,
+                "frequency_hz": r.freq_hz,
+                "peak_rad": r.trace.peak_rad,
+                "rms_rad": r.trace.rms_rad,
+                "rate_clamped": r.trace.counts.clamped + r.trace.counts.inverse_clamped,
+                "saturated": r.trace.counts.saturated,
+                "slew_limited": r.trace.counts.slew_limited,
+                "alternating": r.trace.counts.alternating,
+            }
+            for r in study.runs
+        ],
+        "paper": [
+            {"where": c.where, "claim": c.claim, "ours": c.ours, "agrees": c.agrees, "why": c.why} for c in study.claims
+        ],
+        "warnings": warnings(study),
+    }
