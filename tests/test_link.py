@@ -246,8 +246,8 @@ def test_a_link_that_cannot_close_on_axis_says_by_how_much():
         link.largest_pointing_error(MISSION, 3.0, 30e9)
     missing = 3.0 - float(link.margin_map(MISSION, 30e9, 0.0)[0, 0])
     assert f"missed by {missing:.2f} dB" in str(refused.value)
-    assert "up to 502.4 Mbit/s" in str(refused.value)
     rate = link.largest_data_rate(MISSION, 3.0, 0.0)
+    assert f"up to {rate / 1e6:.1f} Mbit/s" in str(refused.value)
     assert link.largest_pointing_error(MISSION, 3.0, rate * (1 - 1e-12)) == pytest.approx(0.0, abs=1e-9)
 
 

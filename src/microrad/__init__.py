@@ -1,1 +1,55 @@
-"""microrad."""
+"""The pointing chain of a small-satellite laser terminal: link budget, piezo mirror with hysteresis, sampled control.
+
+Every public name stands in the table below once, with the module it lives in. Importing `microrad` loads none of them:
+a name brings its module in when it is first used.
+"""
+
+from importlib import import_module
+from typing import Any
+
+_PUBLIC = {
+    "load_mission": "missionfile.load_mission",
+    "load_mirror": "missionfile.load_mirror",
+    "mission_schema": "mission.mission_schema",
+    "MissionFile": "missionfile.MissionFile",
+    "MissionError": "missionfile.MissionError",
+    "run_study": "study.run",
+    "Study": "study.Study",
+    "write_report": "report.write",
+    "verdict_text": "report.verdict_text",
+    "summary": "report.summary",
+    "FolderError": "report.FolderError",
+    "LinkError": "link.LinkError",
+    "read_recording": "recording.read_recording",
+    "recording_from_arrays": "recording.recording_from_arrays",
+    "Recording": "recording.Recording",
+    "RecordingError": "recording.RecordingError",
+    "identify_mirror": "identify.identify",  # `microrad.identify` is the package that it lives in
+    "mirror_file_text": "identify.mirror_file_text",
+    "Identification": "identify.Identification",
+    "IdentificationError": "identify.IdentificationError",
+    "parse_quantity": "units.parse_quantity",
+    "format_quantity": "units.format_quantity",
+    "UnitError": "units.UnitError",
+}
+
+
+def __getattr__(name: str) -> Any:
+    """A public name, from its module; the version, from the installed package."""
+    if name == "__version__":
+        from importlib.metadata import version  # slow to load, and rarely asked for
+
+        return version("microrad")
+    if name == "__all__":
+        return [*_PUBLIC, "__version__"]
+    if name not in _PUBLIC:
+        raise AttributeError(f"microrad has no public name '{name}'; it has {', '.join(_PUBLIC)}")
+    module, _, attribute = _PUBLIC[name].rpartition(".")
+    value = getattr(import_module(f"microrad.{module}"), attribute)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    """The public names."""
+    return [*_PUBLIC, "__version__"]

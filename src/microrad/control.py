@@ -19,8 +19,8 @@ Floats = NDArray[np.float64]
 class Drive:
     """Amplifier and converters between controller and mirror, seen at the amplifier's input (volts, about the bias).
 
-    ``bandwidth_hz`` and ``slew_v_s`` may be infinite: the ideal amplifier, behind which rate-dependent hysteresis depends
-    on the numerical step. A resolution of 0 is an ideal converter.
+    ``bandwidth_hz`` and ``slew_v_s`` may be infinite: the ideal amplifier, behind which rate-dependent hysteresis
+    depends on the numerical step. A resolution of 0 is an ideal converter.
     """
 
     minimum_v: float
@@ -78,7 +78,7 @@ class Gains:
 
 
 def gains_from_mission(control: mission.Control, mirror_gain_rad_v: float) -> Gains:
-    """The mission's gains, scaled so that the loop gain is the same for a mirror of another gain than they are given for."""
+    """The mission's gains, scaled to keep the loop gain for a mirror of another gain than they are given for."""
     scale = control.for_mirror_gain_rad_v / mirror_gain_rad_v
     return Gains(
         control.proportional_v_rad * scale,
@@ -142,7 +142,7 @@ def no_feedforward(mirror: Mirror) -> Inverse:
 def inverse(mirror: Mirror) -> Inverse:
     """Inverse of the mirror's hysteresis: Eq. 4 for Bouc-Wen, the closed form for Prandtl-Ishlinskii.
 
-    Raises ValueError for a Prandtl-Ishlinskii model without weight at threshold 0, which does not move after a reversal.
+    Raises ValueError for a Prandtl-Ishlinskii model without weight at threshold 0: it stands still after a reversal.
     """
     direct = [0.0] * mirror.actuators
     bouc_wen, plays = [], []
@@ -215,7 +215,7 @@ def amplifier_factor(drive: Drive, step_s: float) -> float:
 class Margins:
     """Margins of one sampled loop: gain as a ratio, phase in radians, delay in seconds, modulus = min |1 + L|.
 
-    ``crossover_hz`` is the highest frequency at which |L| falls through 1; nan, with infinite margins, where there is none.
+    ``crossover_hz`` is the highest frequency at which |L| falls through 1; nan, with infinite margins, without one.
     """
 
     gain: float

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any, Literal, Self
 
 MAX_BYTES = 1_000_000
+MAX_LINES = 10_000
 _MAX_FAULTS_SHOWN = 50
 _MAX_FAULTS = 500  # a file with more is no mission file
 _MAX_VALUE_SHOWN = 60
@@ -285,6 +286,8 @@ def _decoded(content: bytes) -> str:
     except UnicodeDecodeError as error:
         line = content.count(b"\n", 0, error.start) + 1
         raise UnreadableError(f"is not UTF-8 text (line {line})", "the file saved again as UTF-8") from None
+    if content.count(b"\n") > MAX_LINES:
+        raise UnreadableError(f"has more than {MAX_LINES} lines", "a TOML file of a few hundred lines")
     if not text.strip():
         raise UnreadableError("is empty", "a TOML file; `microrad init` writes a mission to start from")
     return text.replace("\r\n", "\n")

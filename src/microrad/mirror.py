@@ -49,11 +49,11 @@ class BoucWen:
 
     @property
     def settled_rad(self) -> float:
-        """Magnitude at which |h| settles on a slow, long ramp: |epsilon| / (alpha -+ beta) for epsilon below or above 0."""
+        """Magnitude at which |h| settles on a slow, long ramp: |epsilon| / (alpha + beta sign(epsilon))."""
         return abs(self.epsilon_rad_v) / (self.alpha_1_v + math.copysign(self.beta_1_v, self.epsilon_rad_v))
 
     def reversal_slope_rad_v(self, rate_v_s: float = 0.0) -> float:
-        """Local slope dy/du just after a reversal from a settled branch at ``rate_v_s``; below 0 the model is not physical.
+        """Local slope dy/du just after a reversal from a settled branch at ``rate_v_s``; not physical below 0.
 
         A settled branch has epsilon e = k h; behind the reversal the drive term keeps its slope and the decay changes
         side: dh/du = 2 alpha epsilon e / (alpha + beta sign(epsilon)), with e = exp(delta |rate|).
@@ -99,8 +99,8 @@ class Play:
 class Mirror:
     """A mirror in the plant form of this module, continuous in time, with its arrays named as there.
 
-    Bouc-Wen elements come first in the rows of F and G and the columns of E and K, play operators after them. ``gain_rad_v``
-    is the gain for slow, large drives, by actuator. ``inverse`` names the hysteresis per actuator that a feedforward inverts.
+    Bouc-Wen elements come first in the rows of F and G and the columns of E and K, play operators after them. By
+    actuator: ``gain_rad_v`` is the gain for slow, large drives, ``inverse`` the hysteresis that a feedforward inverts.
     """
 
     name: str
@@ -129,7 +129,7 @@ class Mirror:
 
     @property
     def linear_loop(self) -> lti.StateSpace:
-        """The mirror with each element replaced by its slow gain, for design and margins (Bouc-Wen: d1, play: weight)."""
+        """The mirror with each element replaced by its slow gain, for margins (Bouc-Wen: d1, play: weight)."""
         slopes = np.array([b.d1_rad_v for b in self.bouc_wen] + list(self.play.weights_rad_v))
         through = slopes[:, None]
         return lti.StateSpace(
@@ -215,6 +215,7 @@ def assemble(name: str, composition: str, system: lti.StateSpace | None, model: 
 
 
 def slow_gain(model: BoucWen | Play) -> float:
+    """Gain for slow, large drives (rad/V): d1, or the sum of the weights."""
     return model.d1_rad_v if isinstance(model, BoucWen) else math.fsum(model.weights_rad_v)
 
 
@@ -338,7 +339,7 @@ def at_rest(plant: kernels.Plant) -> kernels.PlantState:
 
 @dataclass(frozen=True, slots=True)
 class Root:
-    """A pole or zero: natural frequency, damping ratio (1 or -1 when real), and whether the excited band contains it."""
+    """A pole or zero: natural frequency, damping ratio (1 or -1 when real), whether it lies in the excited band."""
 
     kind: str
     frequency_hz: float
@@ -355,6 +356,7 @@ class Summary:
     model: BoucWen | Play
     roots: tuple[Root, ...]
     dc_gain: float
+    flat_band_hz: tuple[float, float]
     in_band_gain: tuple[float, float]
     normalise_at_hz: float
     normalised_by: float
@@ -367,7 +369,8 @@ class Summary:
         if self.roots:
             lines += [
                 f"  linear part divided by {self.normalised_by:.5f}, its magnitude at {self.normalise_at_hz:g} Hz",
-                f"  gain at DC {self.dc_gain:.5f}, in the band {self.in_band_gain[0]:.5f} to {self.in_band_gain[1]:.5f}",
+                f"  gain at DC {self.dc_gain:.5f}, in the flat band from {self.flat_band_hz[0]:g} to "
+                f"{self.flat_band_hz[1]:.0f} Hz {self.in_band_gain[0]:.5f} to {self.in_band_gain[1]:.5f}",
             ]
             lines += [f"  {r.kind} at {r.frequency_hz:.4g} Hz, damping {r.damping:.3f}" for r in self.roots]
         lines += [f"  exponent's rate held at {self.rate_limit_v_s:g} V/s; clamped samples are counted"]
@@ -384,14 +387,11 @@ def _roots(table: mission.LinearPart) -> tuple[Root, ...]:
     return tuple(root(kind, complex(r)) for kind, r in named if r.imag >= 0)
 
 
-def _in_band_gain(table: mission.LinearPart) -> tuple[float, tuple[float, float]]:
-    """Gain at DC, and the smallest and largest gain of the flat part of the band: excited, and up to a tenth of resonance."""
-    system = lti.modal_from_polynomials(table.numerator, table.denominator)
+def _flat_band(table: mission.LinearPart) -> tuple[float, float]:
+    """Where the gain should be flat: excited, and at most a tenth of the lowest resonance."""
     resonant = [r.frequency_hz for r in _roots(table) if r.kind == "pole" and r.damping < 1.0]
     top = min([table.excited_to_hz, *(f / 10.0 for f in resonant)])
-    band = np.geomspace(table.excited_from_hz, max(top, table.excited_from_hz), 100)
-    gain = np.abs(lti.frequency_response(system, band)[:, 0, 0])
-    return float(np.abs(lti.frequency_response(system, np.zeros(1))[0, 0, 0])), (float(gain.min()), float(gain.max()))
+    return table.excited_from_hz, max(top, table.excited_from_hz)
 
 
 def summarise(table: mission.Mirror) -> Summary:
@@ -399,10 +399,13 @@ def summarise(table: mission.Mirror) -> Summary:
     model = hysteresis_model(table, table.rate_limit_v_s, table.bias_v)
     warnings = list(_admissibility(model))
     roots: tuple[Root, ...] = ()
-    dc, band, by, at = math.nan, (math.nan, math.nan), 1.0, math.nan
+    dc, flat, band, by, at = math.nan, (math.nan, math.nan), (math.nan, math.nan), 1.0, math.nan
     if table.linear is not None:
+        system = lti.modal_from_polynomials(table.linear.numerator, table.linear.denominator)
         roots, by, at = _roots(table.linear), linear_part(table.linear)[1], table.linear.normalise_at_hz
-        dc, band = _in_band_gain(table.linear)
+        flat = _flat_band(table.linear)
+        gain = np.abs(lti.frequency_response(system, np.array([0.0, *np.geomspace(*flat, 100)]))[:, 0, 0])
+        dc, band = float(gain[0]), (float(gain[1:].min()), float(gain[1:].max()))
         warnings += [
             f"{r.kind} at {r.frequency_hz:.3g} Hz lies outside the excited band "
             f"({table.linear.excited_from_hz:g} to {table.linear.excited_to_hz:g} Hz): drift fitted as dynamics"
@@ -411,7 +414,9 @@ def summarise(table: mission.Mirror) -> Summary:
         ]
         if not 0.9 * band[0] <= dc <= 1.1 * band[1]:
             warnings.append(f"gain at DC {dc:.5f} is not the gain in the band, {band[0]:.5f} to {band[1]:.5f}")
-    return Summary(table.name, table.composition, model, roots, dc, band, at, by, table.rate_limit_v_s, tuple(warnings))
+    return Summary(
+        table.name, table.composition, model, roots, dc, flat, band, at, by, table.rate_limit_v_s, tuple(warnings)
+    )
 
 
 def _admissibility(model: BoucWen | Play) -> tuple[str, ...]:

@@ -35,8 +35,8 @@ class Counts:
 class Trace:
     """One run of the sampled loop, at the control samples.
 
-    ``reference_rad``, ``output_rad``: (samples, axes). ``command_v``, ``drive_v``: (samples, actuators), before and behind
-    the amplifier, about the bias. ``steady`` is the part that statistics are taken of.
+    ``reference_rad``, ``output_rad``: (samples, axes). ``command_v``, ``drive_v``: (samples, actuators), before and
+    behind the amplifier, about the bias. ``steady`` is the part that statistics are taken of.
     """
 
     name: str
@@ -162,7 +162,7 @@ def track(name: str, m: mirror.Mirror, setup: Setup, inverse: Inverse, reference
         slew_limited=int(loop_state.counts[:, kernels.SLEW_LIMITED].sum()),
         alternating=alternations(command, 2.0 * drive.drive_resolution_v),
     )
-    time = np.arange(samples) * timing.period_s
+    time: Floats = np.arange(samples, dtype=float) * timing.period_s
     return Trace(name, time, reference_rad, output, command, applied, steady, counts)
 
 
@@ -200,7 +200,7 @@ def sine(amplitude_rad: float, freq_hz: float, period_s: float, settle_s: float 
 class HysteresisLoop:
     """One settled period of a hysteresis model under a sine drive: drive and output about the bias, and its size.
 
-    ``width`` is max h - min h over max y - min y. For a Prandtl-Ishlinskii model h is the output less its slow gain x drive.
+    ``width`` is max h - min h over max y - min y. For a Prandtl-Ishlinskii model h is the output less gain x drive.
     """
 
     freq_hz: float

@@ -1,4 +1,4 @@
-"""The paper's tracking cases on the mission's mirror: Fig. 5, 6 and 8, and the residual that a link has to live with."""
+"""The paper's tracking cases on the mission's mirror (Fig. 5, 6 and 8), and the residual that the link lives with."""
 
 from dataclasses import dataclass
 

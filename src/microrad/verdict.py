@@ -1,6 +1,7 @@
 """The verdict: each requirement with its margin and what limits it, and each claim of the paper beside our value."""
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,7 +47,9 @@ def requirements(
 
     def power(budget: link.LinkBudget, required_db: float = 0.0, by: str = "") -> Requirement:
         limit = by or min((line for line in budget.lines if line.unit == "dB"), key=lambda line: line.value).name
-        return Requirement(budget.name, "dB", required_db, budget.margin_db, budget.margin_db - required_db, limit)
+        return Requirement(
+            f"{budget.name.lower()} margin", "dB", required_db, budget.margin_db, budget.margin_db - required_db, limit
+        )
 
     return (
         Requirement(
@@ -57,7 +60,7 @@ def requirements(
         Requirement(
             "residual pointing error", "rad", q.pointing_error_rad, residual, q.pointing_error_rad - residual, cause
         ),
-        power(achieved, q.margin_db, "residual pointing error: " + cause),
+        power(achieved, q.margin_db, "the residual: " + cause),
     )
 
 
@@ -78,8 +81,8 @@ def residual_cause(m: Mission, worst: Run, runs: tuple[Run, ...]) -> str:
 class Claim:
     """A printed claim of the paper, our value for it, whether they agree, and why.
 
-    ``agrees`` is "yes", "no", "partly", or "inferred" where our input was chosen from the claim itself, so that agreeing
-    proves nothing.
+    ``agrees`` is "yes", "no", "partly", or "inferred" where our input was chosen from the claim itself, so that
+    agreeing proves nothing.
     """
 
     where: str
@@ -123,7 +126,8 @@ def _beacon_claim(e: Evidence) -> Claim:
     why = "two of the three errors are not printed; ours are chosen so that 780 µrad follows, read as the full angle"
     other = e.open_loop.other_reading
     if other.convention == "half-1/e2":
-        why += f"; read as the half angle, 780 µrad would cover {other.half_angle_rad / e.open_loop.rss_rad:.1f} times our errors"
+        times = other.half_angle_rad / e.open_loop.rss_rad
+        why += f"; read as the half angle, 780 µrad would cover {times:.1f} times our errors"
     ours = f"{needed * 1e6:.0f} µrad needed for {e.open_loop.rss_rad * 1e6:.0f} µrad (half width)"
     return Claim("section 2.1", claim, ours, "inferred" if e.open_loop.covers else "no", why)
 
@@ -139,9 +143,9 @@ def _margin_claim(e: Evidence) -> Claim:
     c, counts = e.mission.communication, [r.photons_per_bit for r in e.readings]
     ideal = ", ".join(f"{r.name} {r.margin_db:.1f} dB" for r in e.ideal)
     why = (
-        f"inferred, hence circular: 3 dB there implies a receiver of {min(counts):.0f} to {max(counts):.0f} photons per bit "
-        f"over the four readings of Table 2, and ours ({c.receiver_sensitivity_photon_bit:.0f}) is taken from that. With "
-        f"ideal receivers (1e-9) the margin would be: {ideal}"
+        f"inferred, hence circular: 3 dB there implies a receiver of {min(counts):.0f} to {max(counts):.0f} photons "
+        f"per bit over the four readings of Table 2, and ours ({c.receiver_sensitivity_photon_bit:.0f}) is taken from "
+        f"that. With ideal receivers (1e-9) the margin would be: {ideal}"
     )
     agree = abs(e.communication.margin_db - 3.0) <= 0.05
     rate, error = c.data_rate_bit_s / 1e6, c.pointing_error_rad * 1e6
@@ -153,7 +157,9 @@ def _travel_claim(e: Evidence) -> Claim:
     m = e.mission
     span = (m.amplifier.output_max_v - m.amplifier.output_min_v) / m.amplifier.gain
     reach = span * mirror.slow_gain(e.summary.model)
-    why = f"the gain of the hysteresis model over the drive range of {span:g} V; the missing part is drive or gain not printed"
+    why = (
+        f"gain of the hysteresis model over a drive range of {span:g} V; the rest is drive or gain that is not printed"
+    )
     agrees = "yes" if reach >= m.mirror.travel_rad else "no"
     return Claim(
         "section 3.2", "travel of 2.5 mrad", f"{reach * 1e3:.2f} mrad within the amplifier's range", agrees, why
@@ -174,8 +180,8 @@ def _linear_claim(s: mirror.Summary) -> Claim:
 
 def _loops_claim(loops: tuple[simulate.HysteresisLoop, ...]) -> Claim:
     ours = ", ".join(f"{100 * loop.width:.2f} % at {loop.freq_hz:g} Hz" for loop in loops)
-    grows = all(a.width < b.width for a, b in zip(loops, loops[1:], strict=False))
-    why = "width of h over the output's peak-to-peak; part of the width at 100 Hz is linear phase lag that Eq. 2 holds too"
+    grows = all(a.width < b.width for a, b in pairwise(loops))
+    why = "width of h over the output's peak-to-peak; some of it at 100 Hz is linear phase lag that Eq. 2 holds too"
     return Claim("Fig. 5", "the loop widens from 60 to 100 Hz", ours, "yes" if grows else "no", why)
 
 
@@ -195,7 +201,7 @@ def _worse_claim(e: Evidence) -> Claim:
         for (a, b), d in zip(pairs, added, strict=True)
     )
     worse = all(a.trace.rms_rad > b.trace.rms_rad for a, b in pairs)
-    grows = all(x < y for x, y in zip(added, added[1:], strict=False))
+    grows = all(x < y for x, y in pairwise(added))
     why = "the error that hysteresis adds does grow with frequency, but in the total peak the lag of the loop hides it"
     agrees = "yes" if worse and grows else "no"
     return Claim("Fig. 6", "hysteresis makes the errors worse, more so at higher frequency", ours, agrees, why)
@@ -228,7 +234,8 @@ def _drop_claims(e: Evidence) -> list[Claim]:
 def _together_claim(scan: paper.Scan) -> Claim:
     names, points = scan.together()
     missing = [n for n in paper.CLAIMS if n not in names]
-    ours = f"{len(names)} of {len(paper.CLAIMS)} claims hold together at {len(points)} of {len(scan.points)} scanned points"
+    held = f"{len(names)} of {len(paper.CLAIMS)} claims"
+    ours = f"{held} hold together at {len(points)} of {len(scan.points)} scanned points"
     regions = "; ".join(filter(None, (_region(c, points) for c in paper.COMPOSITIONS)))
     why = regions + ("" if not missing else f". Held nowhere with them: {'; '.join(missing)}")
     return Claim("section 3.1, Fig. 6 and 8", "all closed-loop claims at once", ours, "no" if missing else "yes", why)

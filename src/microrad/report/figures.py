@@ -3,6 +3,7 @@
 import io
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from matplotlib import rc_context
@@ -19,7 +20,7 @@ Floats = NDArray[np.float64]
 
 # Okabe and Ito's palette: told apart by colour-blind readers. Line styles differ too, for print in grey.
 BLACK, ORANGE, SKY, GREEN, BLUE, VERMILION = "#000000", "#E69F00", "#56B4E9", "#009E73", "#0072B2", "#D55E00"
-STYLE = {
+STYLE: dict[Any, Any] = {
     "svg.fonttype": "none",
     "svg.hashsalt": "microrad",
     "font.family": "sans-serif",
@@ -87,20 +88,19 @@ def margin_map(study: Study) -> Figure:
     filled = axes.contourf(rate, error, f.margin_db.T, levels=levels, cmap="cividis", extend="both")
     lines = axes.contour(rate, error, f.margin_db.T, levels=[0.0, m.requirement.margin_db], colors="white")
     axes.clabel(lines, fmt=lambda level: f"{level:g} dB", fontsize=8)
+    rate_mbit = m.communication.data_rate_bit_s * 1e-6
     axes.plot(
-        [m.communication.data_rate_bit_s * 1e-6],
+        [rate_mbit],
         [m.communication.pointing_error_rad * 1e6],
         "o",
         color=VERMILION,
         markeredgecolor="white",
         markersize=8,
-        label="budget: {:g} Mbit/s at {:g} µrad".format(
-            m.communication.data_rate_bit_s * 1e-6, m.communication.pointing_error_rad * 1e6
-        ),
+        label=f"budget: {rate_mbit:g} Mbit/s at {m.communication.pointing_error_rad * 1e6:g} µrad",
     )
     left = residual_urad(study)
     axes.plot(
-        [m.communication.data_rate_bit_s * 1e-6],
+        [rate_mbit],
         [min(left, error[-1])],
         "D",
         color=SKY,
@@ -143,7 +143,7 @@ def hysteresis_loops(study: Study) -> Figure:
     columns: dict[str, Floats] = {}
     bias = study.file.mission.mirror.bias_v
     for i, loop in enumerate(study.loops):
-        style = {"color": colours[i % 6], "linestyle": styles[i % 4]}
+        style: dict[str, Any] = {"color": colours[i % 6], "linestyle": styles[i % 4]}
         label = f"{loop.freq_hz:g} Hz: {100 * loop.width:.2f} %"
         x, y = thin(loop.drive_v + bias, loop.output_rad)
         left.plot(x, y * 1e3, label=f"{loop.freq_hz:g} Hz", **style)
@@ -163,7 +163,7 @@ def hysteresis_loops(study: Study) -> Figure:
     return Figure("fig5-hysteresis-loops", "Fig. 5  Rate-dependent hysteresis", caption, _svg(canvas), columns)
 
 
-def _errors(axes: Axes, runs: Iterable[tuple[str, Run, dict[str, str]]], columns: dict[str, Floats]) -> None:
+def _errors(axes: Axes, runs: Iterable[tuple[str, Run, dict[str, Any]]], columns: dict[str, Floats]) -> None:
     """Error over one steady period for each run, with its peak and rms in the legend."""
     for label, run, style in runs:
         steady = run.trace.steady
@@ -268,7 +268,6 @@ def scan(found: paper.Scan) -> Figure:
     canvas = Canvas(figsize=(7.6, 3.3), layout="constrained")
     panels = canvas.subplots(1, len(paper.COMPOSITIONS), sharey=True)
     most = len(paper.CLAIMS)
-    shown = None
     for axes, composition in zip(panels, paper.COMPOSITIONS, strict=True):
         here = [p for p in found.points if p.composition == composition]
         ki = sorted({p.integral_v_rad_s * 1e-6 for p in here})
@@ -276,7 +275,7 @@ def scan(found: paper.Scan) -> Figure:
         held = np.zeros((len(kp), len(ki)))
         for p in here:
             held[kp.index(p.proportional_v_rad * 1e-3), ki.index(p.integral_v_rad_s * 1e-6)] = sum(p.holds().values())
-        shown = axes.imshow(held, cmap="cividis", vmin=0, vmax=most, aspect="auto", origin="lower")
+        image = axes.imshow(held, cmap="cividis", vmin=0, vmax=most, aspect="auto", origin="lower")
         for (row, column), value in np.ndenumerate(held):
             colour = "white" if value < most / 2 else "black"
             axes.text(column, row, f"{value:.0f}", ha="center", va="center", color=colour, fontsize=8)
@@ -286,7 +285,7 @@ def scan(found: paper.Scan) -> Figure:
         axes.set_xlabel("integral gain (V/(mrad ms))")
         axes.grid(visible=False)
     panels[0].set_ylabel("proportional gain (V/mrad)")
-    canvas.colorbar(shown, ax=panels, label=f"claims that hold (of {most})", ticks=range(most + 1))
+    canvas.colorbar(image, ax=panels, label=f"claims that hold (of {most})", ticks=range(most + 1))
     points = found.points
     columns = {
         "additive (1) or cascade (0)": np.array([float(p.composition == "additive") for p in points]),

@@ -29,7 +29,7 @@ def check_folder(folder: Path, overwrite: bool) -> None:
 
 @contextmanager
 def whole_folder(folder: Path, overwrite: bool) -> Iterator[Path]:
-    """A folder beside ``folder`` to write into; it takes the place of ``folder`` at the end, or vanishes on any error."""
+    """A folder beside ``folder`` to write into; it becomes ``folder`` at the end, or vanishes on any error."""
     check_folder(folder, overwrite)
     folder.parent.mkdir(parents=True, exist_ok=True)
     draft = Path(tempfile.mkdtemp(prefix=f".{folder.name}-", suffix=".part", dir=folder.parent))

@@ -8,8 +8,9 @@ from microrad.units import format_quantity
 
 
 def quantity(value: float, unit: str) -> str:
-    """A value with its unit as it stands in tables: decibels with two decimals, the rest in four digits."""
-    return f"{value:.2f} {unit}" if unit.startswith("dB") else format_quantity(value, unit)
+    """A value with its unit as it stands in tables: decibels with two decimals, the rest in three digits."""
+    text = f"{value:.2f} {unit}" if unit.startswith("dB") else format_quantity(value, unit, 3)
+    return text.replace("-", "\u2212", 1) if value < 0 else text  # a minus sign, not a hyphen
 
 
 def headline(study: Study) -> str:
@@ -31,18 +32,19 @@ def explanation(study: Study) -> list[str]:
     sentences = [
         f"As budgeted, at {format_quantity(m.communication.pointing_error_rad, 'rad', 3)}, the margin is "
         f"{budget.margin_db:+.2f} dB; required are {m.requirement.margin_db:g} dB.",
-        f"The loop ({run.controller}, {run.freq_hz:g} Hz) leaves {format_quantity(trace.peak_rad, 'rad', 3)} at its peaks "
-        f"and {format_quantity(trace.rms_rad, 'rad', 3)} rms; allowed are "
+        f"The loop ({run.controller}, {run.freq_hz:g} Hz) leaves {format_quantity(trace.peak_rad, 'rad', 3)} at its "
+        f"peaks and {format_quantity(trace.rms_rad, 'rad', 3)} rms; allowed are "
         f"{format_quantity(m.requirement.pointing_error_rad, 'rad', 3)} ({m.requirement.residual_statistic}).",
     ]
     failed = [r for r in study.requirements if not r.met]
     if failed:
-        sentences.append("What limits it: " + "; ".join(dict.fromkeys(r.limited_by for r in failed)) + ".")
+        causes = dict.fromkeys(r.limited_by.removeprefix("the residual: ") for r in failed)
+        sentences.append(f"What limits it: {'; '.join(causes)}.")
     if study.comparison is not None:
         left = residual_rad(m, study.comparison.residual.trace)
         sentences.append(
-            f"On the mission's comparison model of the mirror the residual is {format_quantity(left, 'rad', 3)} and the "
-            f"margin {study.comparison.margin_db:+.2f} dB."
+            f"On the mission's comparison model of the mirror the residual is {format_quantity(left, 'rad', 3)} and "
+            f"the margin {study.comparison.margin_db:+.2f} dB."
         )
     return sentences
 

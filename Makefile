@@ -1,0 +1,46 @@
+# `make demo` runs the paper's mission, `make test` checks everything; each sets up what it needs in .venv first.
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+DEMO := demo
+
+.PHONY: demo test unit lint types contract benchmark clean
+.DELETE_ON_ERROR:
+
+demo: $(VENV)/.run
+	$(BIN)/microrad run missions/leo-geo.toml --output $(DEMO) --overwrite
+
+test: contract lint types unit
+
+contract: $(VENV)/.test
+	$(BIN)/lint-imports
+
+lint: $(VENV)/.test
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+
+types: $(VENV)/.test
+	$(BIN)/mypy
+
+unit: $(VENV)/.test
+	$(BIN)/python -m pytest
+
+benchmark: $(VENV)/.test
+	$(BIN)/python benchmarks/loop.py
+
+clean:
+	rm -rf $(VENV) $(DEMO)
+
+# Debian ships python3 without venv; where that is so it is installed, or the command to do so is shown.
+$(VENV)/bin/python:
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
+	  { echo "microrad needs Python 3.11 or newer: $(PYTHON) is $$($(PYTHON) --version 2>&1); try make PYTHON=python3.12 $(MAKECMDGOALS)"; exit 1; }
+	@$(PYTHON) -m venv $(VENV) >/dev/null 2>&1 || { rm -rf $(VENV); sh scripts/install-venv "$(PYTHON)" && $(PYTHON) -m venv $(VENV); }
+
+$(VENV)/.run: $(VENV)/bin/python pyproject.toml constraints.txt
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable .
+	@touch $@
+
+$(VENV)/.test: $(VENV)/.run
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[test]'
+	@touch $@
