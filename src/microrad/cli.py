@@ -86,7 +86,7 @@ def _command(body: Callable[_Arguments, Outcome]) -> Callable[_Arguments, NoRetu
     def command(*args: _Arguments.args, **kwargs: _Arguments.kwargs) -> NoReturn:
         try:
             outcome = body(*args, **kwargs)
-        except BaseException as error:
+        except (Exception, KeyboardInterrupt) as error:
             raise typer.Exit(_failed(error)) from None
         raise typer.Exit(_printed(outcome))
 
@@ -133,13 +133,8 @@ def _failed(error: BaseException) -> int:
     if _meant_for_users(error):
         _say(str(error) or "not enough memory")
         return REFUSED
-    if not isinstance(error, Exception):
-        raise error
     traceback.print_exception(error)
-    _say(
-        "this is a fault of microrad or of its installation. `microrad doctor` checks the installation; "
-        "if that is in order, please report the lines above."
-    )
+    _say("a fault of microrad or of its installation: run microrad doctor; if all is well, report the lines above.")
     return BUG
 
 
@@ -177,10 +172,9 @@ def _progress() -> Iterator[_Progress]:
         yield lambda done, total, what: None
         return
     from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+    from rich.progress import Progress
 
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+    with Progress(console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task("reading", total=None)
         yield lambda done, total, what: bar.update(task, completed=done, total=total, description=what)
 
@@ -189,8 +183,6 @@ def _check_target(path: Path, advice: str, replace_if_begins: str = "") -> None:
     """Refuse a file that must not be written: one that exists, unless it begins with a text that may be replaced."""
     if not path.parent.is_dir():
         raise Refusal(f"{path}: there is no folder {path.parent}; create it first.")
-    if path.is_dir():
-        raise Refusal(f"{path}: this is a folder; name a file.")
     if not os.path.lexists(path):
         return
     if not replace_if_begins:

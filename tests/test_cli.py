@@ -1,0 +1,488 @@
+"""The command line: exit codes, what is printed and where, each refusal's message, and that a refusal writes nothing."""
+
+import errno
+import importlib
+import json
+import math
+import pkgutil
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+
+import microrad
+from microrad import cli, doctor, report, study
+
+ROOT = Path(__file__).parents[1]
+PAPER = ROOT / "src" / "microrad" / "missions" / "leo-geo.toml"
+COMMANDS = ("init", "run", "identify", "doctor", "schema")
+MICRORAD = (sys.executable, "-m", "microrad")
+COLUMNS = ("--input", "drive", "--output", "angle", "--rate", "1000")
+
+
+class Result(NamedTuple):
+    code: int
+    out: str
+    err: str
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """An empty current folder."""
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.fixture
+def call(capsys):
+    """Run a command in this process."""
+
+    def run(*args):
+        with pytest.raises(SystemExit) as stop:
+            cli.app(args=[str(a) for a in args], prog_name="microrad")
+        out, err = capsys.readouterr()
+        return Result(int(stop.value.code or 0), out, err)
+
+    return run
+
+
+def listing(folder):
+    """Every file below a folder with its content."""
+    return {str(p.relative_to(folder)): p.read_bytes() if p.is_file() else b"" for p in sorted(folder.rglob("*"))}
+
+
+@pytest.fixture
+def refused(call, folder):
+    """Run a command that must be refused: exit 2, nothing on stdout, no traceback, nothing written; its message."""
+
+    def run(*args):
+        before = listing(folder)
+        result = call(*args)
+        assert (result.code, result.out) == (2, ""), result
+        assert "Traceback" not in result.err
+        assert listing(folder) == before
+        return result.err
+
+    return run
+
+
+def write_recording(path, reverse=False):
+    """One second and a half of a loop with hysteresis, 1500 samples at 1 kHz, a header and three columns."""
+    time_s = np.arange(1500) / 1000.0
+    drive = 6.0 - 6.0 * np.cos(2 * np.pi * 4.0 * time_s)
+    play, angle = 0.0, []
+    for u in drive:
+        play = max(u - 1.0, min(u + 1.0, play))
+        angle.append(0.06 * u + 0.03 * play)
+    sign = -1.0 if reverse else 1.0
+    noise = 1e-3 * np.random.default_rng(1).standard_normal(time_s.size)
+    table = np.column_stack((time_s, drive, sign * (np.array(angle) + noise)))
+    np.savetxt(path, table, delimiter=",", header="time,drive,angle", comments="", fmt="%.9g")
+    return path
+
+
+@pytest.fixture(scope="module")
+def loop_mirror(tmp_path_factory):
+    """A recording, and the mirror file that `identify` made of it."""
+    home = tmp_path_factory.mktemp("identified")
+    recording, mirror = write_recording(home / "loop.csv"), home / "loop-mirror.toml"
+    with pytest.raises(SystemExit) as stop:
+        cli.app(args=["identify", str(recording), *COLUMNS, "--mirror-file", str(mirror)], prog_name="microrad")
+    assert not stop.value.code
+    return mirror
+
+
+def mission(path, *changes):
+    """The paper's mission with texts replaced."""
+    text = PAPER.read_text(encoding="utf-8")
+    for old, new in changes:
+        assert text.count(old) == 1, old
+        text = text.replace(old, new)
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+# --------------------------------------------------------------------------------------------------------------- help
+@pytest.mark.parametrize("command", COMMANDS)
+def test_help_of_each_command_shows_a_worked_example(call, command):
+    result = call(command, "--help")
+    assert result.code == 0
+    assert "Examples:" in result.out
+    assert f"  microrad {command}" in result.out.partition("Examples:")[2]
+    assert "--help" in result.out
+
+
+def test_help_lists_every_command_and_completion(call):
+    result = call("--help")
+    assert result.code == 0
+    listed = {line.split()[0] for line in result.out.partition("Commands:")[2].splitlines() if line.startswith("  ")}
+    assert set(COMMANDS) <= listed
+    assert {c.name or c.callback.__name__ for c in cli.app.registered_commands} == set(COMMANDS)
+    for text in ("--install-completion", "--show-completion", "--version", "Examples:", "Exit code"):
+        assert text in result.out
+
+
+def test_identify_says_how_columns_are_counted(call):
+    assert "counted from 0" in " ".join(call("identify", "--help").out.split())
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_readme_names_every_command(command):
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    if not text.strip():
+        pytest.skip("README.md has no content yet")
+    assert f"microrad {command}" in text
+
+
+def test_help_is_quick_and_loads_nothing_heavy():
+    heavy = "numpy scipy numba pydantic xarray matplotlib h5py rich jinja2".split()
+    code = f"import sys, microrad, microrad.cli; print([m for m in {heavy} if m in sys.modules])"
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "[]\n"
+    best = math.inf
+    for _ in range(5):
+        start = time.perf_counter()
+        subprocess.run([*MICRORAD, "--help"], capture_output=True, check=True)
+        best = min(best, time.perf_counter() - start)
+        if best <= 0.3:
+            break
+    assert best <= 0.3
+
+
+def test_version(call):
+    assert call("--version") == (0, f"microrad {microrad.__version__}\n", "")
+
+
+@pytest.mark.parametrize(
+    ("args", "words"),
+    [
+        (["simulat"], "No such command"),
+        (["idenfity"], "identify"),
+        (["run"], "Missing argument"),
+        (["run", "a.toml", "--ouput", "x"], "--output"),
+        (["identify", "a.csv", "--input", "0"], "--output"),
+    ],
+)
+def test_bad_usage_is_refused(refused, args, words):
+    assert words in refused(*args)
+
+
+# --------------------------------------------------------------------------------------------------------------- init
+def test_init_writes_the_packaged_mission_and_the_next_command(call, folder):
+    assert call("init") == (0, "leo-geo.toml written. Next: microrad run leo-geo.toml\n", "")
+    assert listing(folder) == {"leo-geo.toml": PAPER.read_bytes()}
+    assert "microrad run 'my mission.toml'" in call("init", "my mission.toml").out
+
+
+def test_init_never_overwrites(refused, folder):
+    (folder / "leo-geo.toml").write_text("mine")
+    message = refused("init")
+    for words in ("leo-geo.toml exists and is left as it is", "microrad init other.toml", "microrad run leo-geo.toml"):
+        assert words in message
+
+
+def test_init_refuses_a_folder_that_is_not_there_or_is_one(refused, folder):
+    assert "there is no folder nowhere; create it first" in refused("init", "nowhere/a.toml")
+    (folder / "here").mkdir()
+    assert "here exists and is left as it is" in refused("init", "here")
+
+
+def test_a_full_disk_leaves_no_part_of_a_file(refused, monkeypatch):
+    def full(self, target):
+        raise OSError(errno.ENOSPC, "No space left on device", str(target))
+
+    monkeypatch.setattr(Path, "replace", full)
+    message = refused("init")
+    assert "leo-geo.toml: No space left on device; nothing was written" in message
+
+
+# ---------------------------------------------------------------------------------------------------------------- run
+def test_init_then_run(call, folder):
+    call("init")
+    result = call("run", "leo-geo.toml")
+    assert (result.code, result.err) == (0, "")
+    assert result.out.startswith("The link closes")
+    for name in ("report.html", "results.nc", "manifest.json"):
+        path = Path("leo-geo-study") / name
+        assert str(path) in result.out
+        assert path.stat().st_size > 0
+    assert sorted(p.name for p in folder.iterdir()) == ["leo-geo-study", "leo-geo.toml"]
+
+
+def test_identify_then_run_on_the_mirror_it_wrote(call, refused, folder, loop_mirror):
+    args = ("run", PAPER, "--mirror", loop_mirror, "--json")
+    result = call(*args)
+    assert (result.code, result.err) == (0, "")
+    summary = json.loads(result.out)
+    assert summary["closes"] is True
+    assert summary["folder"] == "leo-geo-study"
+    assert loop_mirror.name in (folder / "leo-geo-study" / "manifest.json").read_text(encoding="utf-8")
+
+    assert "replace them with --overwrite" in refused(*args)
+    (folder / "leo-geo-study" / "report.html").write_text("old")
+    assert call(*args, "--overwrite").code == 0
+    assert (folder / "leo-geo-study" / "report.html").stat().st_size > 1000
+
+
+def test_a_link_that_does_not_close_is_exit_1_and_has_its_report(call, folder, loop_mirror):
+    greedy = mission(folder / "greedy.toml", ('data_rate = "300 Mbit/s"', 'data_rate = "30 Gbit/s"'))
+    result = call("run", greedy, "--mirror", loop_mirror, "--output", "results/first")
+    assert result.code == 1
+    assert "does not close" in result.out
+    assert (folder / "results" / "first" / "report.html").is_file()
+
+
+def test_run_refuses_missing_and_faulty_files(refused, folder):
+    assert "no-such.toml" in refused("run", "no-such.toml")
+    faulty = mission(folder / "faulty.toml", ('body_pointing = "300 urad"', "body_pointing = 300"))
+    message = refused("run", faulty)
+    for words in ("pointing.body_pointing", "line ", "without a unit"):
+        assert words in message
+    assert "no-mirror.toml" in refused("run", PAPER, "--mirror", "no-mirror.toml")
+
+
+def test_run_never_replaces_what_it_did_not_write(refused, folder):
+    (folder / "photos").mkdir()
+    (folder / "photos" / "a.jpg").write_text("mine")
+    for extra in ([], ["--overwrite"]):
+        assert "photos holds files that are not results of microrad" in refused(
+            "run", PAPER, "--output", "photos", *extra
+        )
+    assert "a.jpg is a file, not a folder" in refused("run", PAPER, "--output", "photos/a.jpg")
+
+
+def test_run_refuses_an_unstable_loop_and_a_mirror_without_inverse(refused, folder):
+    unstable = mission(folder / "wild.toml", ('integral = "16000 V/(mrad s)"', 'integral = "1600000 V/(mrad s)"'))
+    message = refused("run", unstable)
+    assert "wild.toml: the closed loop is unstable" in message
+    assert "lower the gains" in message
+    stuck = folder / "stuck.toml"
+    stuck.write_text(
+        'name = "stuck"\ntravel = "1 mrad"\ncomposition = "static"\nrate_limit = "100 V/s"\nbias = "6 V"\n'
+        '[prandtl_ishlinskii]\nthresholds = ["0 V", "1 V"]\nweights = ["0 mrad/V", "0.089 mrad/V"]\n'
+    )
+    assert "has no inverse" in refused("run", PAPER, "--mirror", stuck)
+
+
+def test_a_full_disk_during_run_leaves_nothing(refused, monkeypatch, loop_mirror):
+    def full(*args, **kwargs):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(shutil, "rmtree", shutil.rmtree)  # the report's own cleaning stays as it is
+    monkeypatch.setattr(report, "write_columns", full)
+    assert "No space left on device; nothing was written" in refused("run", PAPER, "--mirror", loop_mirror)
+
+
+def test_an_unexpected_exception_asks_for_a_report(call, folder, monkeypatch):
+    def broken(*args):
+        raise RuntimeError("a bolt fell off")
+
+    monkeypatch.setattr(study, "run", broken)
+    result = call("run", PAPER)
+    assert (result.code, result.out) == (70, "")
+    for words in ("Traceback", "a bolt fell off", "microrad doctor", "report the lines above"):
+        assert words in result.err
+    assert listing(folder) == {}
+
+
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM"])
+def test_an_interrupt_during_run_leaves_nothing(folder, name):
+    process = subprocess.Popen(
+        [*MICRORAD, "run", str(PAPER)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+    time.sleep(1.3)  # computing by now
+    process.send_signal(getattr(signal, name))
+    out, err = process.communicate(timeout=30)
+    assert (process.returncode, out, err) == (130, "", "microrad: interrupted, nothing was written\n")
+    assert listing(folder) == {}
+
+
+def test_an_interrupt_behind_another_error_is_an_interrupt(call, folder, monkeypatch):
+    def interrupted(*args):
+        try:
+            raise KeyboardInterrupt
+        except KeyboardInterrupt:
+            raise ImportError("half a module") from None
+
+    monkeypatch.setattr(study, "run", interrupted)
+    assert call("run", PAPER) == (130, "", "microrad: interrupted, nothing was written\n")
+
+
+# ----------------------------------------------------------------------------------------------------------- identify
+def test_identify_prints_both_models_and_writes_the_mirror(call, folder):
+    result = call("identify", write_recording(folder / "loop.csv"), *COLUMNS)
+    assert (result.code, result.err) == (0, "")
+    for words in ("prandtl_ishlinskii (written)", "bouc_wen", "straight line", "held-out", "±", "d1", "warning: Valid"):
+        assert words in result.out
+    assert "loop-mirror.toml written" in result.out
+    text = (folder / "loop-mirror.toml").read_text(encoding="utf-8")
+    assert text.startswith(cli._MIRROR_FILE_BEGINS)
+    assert 'name = "loop"' in text
+    assert sorted(p.name for p in folder.iterdir()) == ["loop-mirror.toml", "loop.csv"]
+
+
+def test_identify_json_names_and_models(call, folder):
+    path = write_recording(folder / "loop.csv", reverse=True)
+    options = ("--model", "bouc-wen", "--admissible", "--name", "lab mirror", "--mirror-file", "lab.toml", "--json")
+    result = call("identify", path, "--input", 1, "--output", 2, "--rate", "1 kHz", "--output-unit", "um",
+                  "--lever-arm", "50 mm", *options)  # fmt: skip
+    assert (result.code, result.err) == (0, "")
+    found = json.loads(result.out)
+    assert (found["model"], found["mirror_file"]) == ("bouc_wen_admissible", "lab.toml")
+    assert [score["model"] for score in found["scores"]] == [
+        "prandtl_ishlinskii",
+        "bouc_wen_admissible",
+        "straight line",
+    ]
+    parameters = found["parameters"]["bouc_wen_admissible"]
+    # about 0.09 um/V over 50 mm, falling with the drive
+    assert -2.1e-6 < parameters["d1"]["value"] < -1.5e-6
+    assert parameters["d1"]["unit"] == "rad/V"
+    assert parameters["admissible"] is True
+    assert 'name = "lab mirror"' in (folder / "lab.toml").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("text", "rate_hz"), [("200", 200.0), ("200 Hz", 200.0), ("50 kHz", 50e3), ("1e3", 1e3), ("0.5MHz", 5e5)]
+)
+def test_rates_with_and_without_unit(text, rate_hz):
+    assert cli._rate(text) == rate_hz
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (["--rate", "5 m"], ["--rate", "another kind of quantity"]),
+        (["--rate", "fast"], ["--rate", "plain number"]),
+        (["--rate", "-5"], ["sample rate is -5.0"]),
+        (["--rate", "nan"], ["--rate", "plain number"]),
+        (["--input", "drvie"], ["no input column is named 'drvie'", "nearest is 'drive'"]),
+        (["--output", "7"], ["no output column 7", "numbered from 0 to 2"]),
+        (["--output", "drive"], ["input and output are both"]),
+        (["--output-unit", "um"], ["lever"]),
+        (["--output-unit", "grad"], ["output unit 'grad' is not known"]),
+        (["--lever-arm", "50"], ["--lever-arm", "without a unit", "50 m"]),
+        (["--lever-arm", "50 mm"], ["already an angle"]),
+        (["--hold-out", "1.5"], ["hold_out is 1.5", "between 0 and 1"]),
+        (["--model", "magic"], ["magic", "bouc-wen"]),
+        (["--seed", "-1"], ["-1"]),
+        (["--name", " "], ["has no name"]),
+        (["--mirror-file", "nowhere/m.toml"], ["there is no folder nowhere"]),
+    ],
+)
+def test_identify_refusals(refused, folder, change, words):
+    message = " ".join(refused("identify", write_recording(folder / "loop.csv"), *COLUMNS, *change).split())
+    for word in words:
+        assert word in message
+
+
+def test_identify_refuses_files_that_are_no_recordings(refused, folder):
+    assert "there is no such file" in refused("identify", "lost.csv", *COLUMNS)
+    path = write_recording(folder / "loop.csv")
+    lines = path.read_text().splitlines()
+    lines[9] = "0.008,nan,0.1"
+    path.write_text("\n".join(lines))
+    assert "line 10" in refused("identify", path, *COLUMNS)
+
+
+def test_identify_replaces_only_mirror_files_and_only_when_told(call, refused, folder):
+    path = write_recording(folder / "loop.csv")
+    mine = folder / "loop-mirror.toml"
+    mine.write_text("# written by hand\n")
+    assert "replace it with --overwrite" in refused("identify", path, *COLUMNS)
+    assert "was not written by microrad" in refused("identify", path, *COLUMNS, "--overwrite")
+    assert "was not written by microrad" in refused("identify", path, *COLUMNS, "--overwrite", "--mirror-file", path)
+    mine.write_text(f"{cli._MIRROR_FILE_BEGINS} an older recording\n")
+    assert call("identify", path, *COLUMNS, "--overwrite").code == 0
+    assert "loop.csv" in mine.read_text(encoding="utf-8")
+
+
+def test_progress_goes_to_a_terminal_and_never_to_stdout(call, folder, monkeypatch):
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+    monkeypatch.setenv("TERM", "xterm")
+    result = call("identify", write_recording(folder / "loop.csv"), *COLUMNS, "--json")
+    assert result.code == 0
+    assert json.loads(result.out)["model"]
+    assert "Bouc-Wen starts" in result.err
+
+
+# --------------------------------------------------------------------------------------------------- doctor and schema
+def test_doctor_finds_this_installation_in_order(call):
+    result = call("doctor")
+    assert (result.code, result.err) == (0, ""), result.out
+    assert all(line.startswith("ok ") for line in result.out.splitlines())
+    for words in ("python", "numba", "loop width 14.05 %", "74.44 µrad", "is writable", "leo-geo.toml"):
+        assert words in result.out
+
+
+def test_doctor_names_what_is_wrong_and_what_to_do(call, monkeypatch):
+    def gone():
+        raise ImportError("no module named yesterday")
+
+    monkeypatch.setattr(doctor, "LOOP_WIDTH_PERCENT", 14.0)
+    monkeypatch.setattr(doctor, "_mission", gone)
+    result = call("doctor", "--json")
+    assert (result.code, result.err) == (1, "")
+    found = json.loads(result.out)
+    assert found["ok"] is False
+    wrong = {check["name"]: check for check in found["checks"] if not check["ok"]}
+    assert set(wrong) == {"kernels", "packaged mission"}
+    assert "NUMBA_CACHE_DIR" in wrong["kernels"]["advice"]
+    assert wrong["packaged mission"]["found"] == "ImportError: no module named yesterday"
+    assert "problem  kernels" in call("doctor").out
+
+
+def test_doctor_finds_an_old_library(monkeypatch):
+    monkeypatch.setattr(
+        doctor.metadata, "requires", lambda name: ["numpy>=99.1", "notthere>=1", 'ruff>=1; extra == "test"']
+    )
+    old, absent = list(doctor._libraries())[1:]
+    assert (old.ok, absent.ok) == (False, False)
+    assert "wanted 99.1" in old.found
+    assert old.advice == "python -m pip install 'numpy>=99.1'"
+    assert "notthere" in absent.found
+
+
+def test_schema_is_one_json_document(call):
+    result = call("schema")
+    assert (result.code, result.err) == (0, "")
+    assert "data_rate" in json.loads(result.out)["$defs"]["Communication"]["properties"]
+
+
+def test_a_closed_pipe_is_silent_and_a_full_one_is_not():
+    closed = subprocess.run(
+        ["/bin/sh", "-c", f"{sys.executable} -m microrad schema | head -c 1"],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert (closed.stdout, closed.stderr) == ("{", "")
+    if not Path("/dev/full").exists():
+        return
+    with Path("/dev/full").open("w") as full:
+        result = subprocess.run([*MICRORAD, "schema"], stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+    assert (result.returncode, result.stderr) == (
+        2,
+        "microrad: the output cannot be written: No space left on device\n",
+    )
+
+
+# ------------------------------------------------------------------------------------------------------- public screen
+def test_every_public_name_exists_once():
+    modules = {module.name for module in pkgutil.iter_modules(microrad.__path__)}
+    assert not modules & set(microrad._PUBLIC), "a public name would hide the module of that name"
+    assert len(set(microrad._PUBLIC.values())) == len(microrad._PUBLIC)
+    for name, place in microrad._PUBLIC.items():
+        module, _, attribute = place.rpartition(".")
+        assert getattr(microrad, name) is getattr(importlib.import_module(f"microrad.{module}"), attribute)
+    assert dir(microrad) == sorted([*microrad._PUBLIC, "__version__"])
+
+
+def test_an_unknown_public_name_says_what_there_is():
+    with pytest.raises(AttributeError, match=r"no public name 'launch'; it has load_mission"):
+        microrad.launch  # noqa: B018

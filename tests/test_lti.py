@@ -1,0 +1,237 @@
+"""State-space algebra against exact rational arithmetic, scipy and python-control."""
+
+from fractions import Fraction
+from math import pi
+
+import control
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.linalg import block_diag
+from scipy.signal import cont2discrete, dlsim, lsim
+
+from microrad import lti
+
+NUMERATOR = (1.979e11, 7.051e13, 2.973e13)  # Eq. 2 of the paper, powers of s in rad/s
+DENOMINATOR = (1.0, 2.15e4, 3.737e8, 2.615e12, 8.489e14, 1.829e14)
+STEP = 20e-6
+
+
+def exact_polynomial(coefficients, w):
+    """(real, imaginary) part at s = i w, all rational."""
+    real, imaginary = Fraction(0), Fraction(0)
+    for c in coefficients:  # Horner: (re + i im) i w + c
+        real, imaginary = -imaginary * w + Fraction(c), real * w
+    return real, imaginary
+
+
+def exact_response(freq_hz):
+    """Eq. 2 at i w without rounding, but for the last conversion; w is the double nearest 2 pi f."""
+    w = Fraction(float(2 * np.pi * freq_hz))
+    a, b = exact_polynomial(NUMERATOR, w)
+    c, d = exact_polynomial(DENOMINATOR, w)
+    size = c * c + d * d
+    return complex(float((a * c + b * d) / size), float((b * c - a * d) / size))
+
+
+@pytest.mark.parametrize("freq_hz", [0, 1e-3, 0.0343, 0.0672, 1, 2, 15, 54.22, 56.64, 100, 1000, 1552.7, 2542.7, 5000])
+def test_the_modal_form_is_eq_2(freq_hz):
+    system = lti.modal_from_polynomials(NUMERATOR, DENOMINATOR)
+    response = lti.frequency_response(system, np.array([freq_hz]))[0, 0, 0]
+    expected = exact_response(freq_hz)
+    error = abs(response - expected) / abs(expected)
+    print(f"{freq_hz:g} Hz: relative error {error:.1e}")
+    assert error < 1e-11
+
+
+def test_the_modal_form_is_block_diagonal():
+    A = lti.modal_from_polynomials(NUMERATOR, DENOMINATOR).A
+    sizes = [2, 1, 1, 1]  # fastest first: the complex pair, then three real poles
+    mask = block_diag(*(np.ones((n, n)) for n in sizes)).astype(bool)
+    assert np.all(A[~mask] == 0.0)
+    assert np.all(A[mask] != 0.0)
+    assert A[0, 1] == -A[1, 0]
+
+
+def test_poles_and_zeros_of_eq_2():
+    poles = np.linalg.eigvals(lti.modal_from_polynomials(NUMERATOR, DENOMINATOR).A)
+    found = sorted((abs(p) / (2 * pi), -p.real / abs(p)) for p in poles if p.imag >= 0)
+    expected = [(0.0343, 1.0), (54.22, 1.0), (1552.7, 1.0), (2542.7, 0.357)]
+    for (freq_hz, damping), (expected_hz, expected_damping) in zip(found, expected, strict=True):
+        assert_allclose(freq_hz, expected_hz, rtol=5e-4)
+        assert_allclose(damping, expected_damping, rtol=2e-3)
+
+
+@pytest.mark.parametrize("zero_hz", [0.0672, 56.64])
+def test_the_response_vanishes_at_the_zeros(zero_hz):
+    """The zeros are real: at s = -2 pi f the response passes through nought, within the printed digits."""
+    system = lti.modal_from_polynomials(NUMERATOR, DENOMINATOR)
+
+    def on_the_real_axis(freq_hz):
+        resolvent = -2 * pi * freq_hz * np.eye(system.order) - system.A
+        return (system.C @ np.linalg.solve(resolvent, system.B))[0, 0]
+
+    assert on_the_real_axis(zero_hz * 0.999) * on_the_real_axis(zero_hz * 1.001) < 0
+
+
+def test_gains_of_eq_2():
+    system = lti.modal_from_polynomials(NUMERATOR, DENOMINATOR)
+    assert_allclose(abs(lti.frequency_response(system, np.zeros(1))), 0.16255, atol=5e-6)
+    band = np.abs(lti.frequency_response(system, np.geomspace(1, 100, 200)))[:, 0, 0]
+    assert_allclose([band.max(), band.min()], [0.08315, 0.08022], atol=5e-6)
+    assert np.all(np.diff(band) < 0)
+
+
+# ------------------------------------------------------------------------------------------------ holds
+
+
+def make_system(seed, states=3, inputs=2, outputs=2):
+    """A stable system with a fast oscillating pair and a slow pole, and a direct path."""
+    rng = np.random.default_rng(seed)
+    w, damping = 2 * pi * 1300, 0.2
+    pair = w * np.array([[-damping, 1.0], [-1.0, -damping]])
+    A = block_diag(pair, -2 * pi * 5.0 * np.eye(states - 2))
+    turn = rng.normal(size=(states, states))
+    A = np.linalg.solve(turn, A @ turn)
+    return lti.StateSpace(
+        A,
+        rng.normal(size=(states, inputs)) * w,
+        rng.normal(size=(outputs, states)),
+        rng.normal(size=(outputs, inputs)),
+    )
+
+
+def ramps(seed, samples=120, inputs=2):
+    """Inputs that begin at zero, linear between samples."""
+    u = np.random.default_rng(seed).normal(size=(samples, inputs))
+    u[0] = 0.0
+    return u
+
+
+def first_order_response(system, u, step_s):
+    Ad, B0, B1 = lti.first_order_hold(system.A, system.B, step_s)
+    x, y = np.zeros(system.order), [system.D @ u[0]]
+    for start, end in zip(u, u[1:], strict=False):
+        x = Ad @ x + B0 @ start + B1 @ end
+        y.append(system.C @ x + system.D @ end)
+    return np.array(y)
+
+
+@pytest.mark.parametrize("step_s", [STEP, 4e-4])
+def test_first_order_hold_against_scipy_and_python_control(step_s):
+    """The three name their states differently, so the responses to an input of ramps are compared."""
+    system, u = make_system(5), ramps(6)
+    ours = first_order_response(system, u, step_s)
+    time = step_s * np.arange(len(u))
+    matrices = (system.A, system.B, system.C, system.D)
+    discrete = cont2discrete(matrices, step_s, method="foh")
+    by_matrices = dlsim(discrete, u)[1]
+    by_lsim = lsim(matrices, u, time, interp=True)[1]
+    by_control = control.forced_response(control.ss(*matrices), time, u.T).outputs.T
+    size = np.max(np.abs(ours))
+    for theirs in (by_matrices, by_lsim, by_control):
+        assert_allclose(ours, theirs, rtol=0, atol=1e-10 * size)
+    held = lsim(matrices, u, time, interp=False)[1]
+    assert np.max(np.abs(ours - held)) > 1e-3 * size
+
+
+@pytest.mark.parametrize("step_s", [STEP, 4e-4])
+def test_zero_order_hold_against_scipy_and_python_control(step_s):
+    system = make_system(7)
+    Ad, Bd = lti.zero_order_hold(system.A, system.B, step_s)
+    expected = cont2discrete((system.A, system.B, system.C, system.D), step_s, method="zoh")
+    theirs = control.sample_system(control.ss(system.A, system.B, system.C, system.D), step_s, method="zoh")
+    for A, B in (expected[:2], (theirs.A, theirs.B)):
+        assert_allclose(Ad, A, rtol=0, atol=1e-12 * np.max(np.abs(A)))
+        assert_allclose(Bd, B, rtol=0, atol=1e-12 * np.max(np.abs(B)))
+
+
+def test_the_holds_of_an_integrator_by_hand():
+    Ad, B0, B1 = lti.first_order_hold(np.zeros((1, 1)), np.ones((1, 1)), 0.5)
+    assert_allclose([Ad[0, 0], B0[0, 0], B1[0, 0]], [1.0, 0.25, 0.25], rtol=1e-15)
+    assert_allclose(lti.zero_order_hold(np.zeros((1, 1)), np.ones((1, 1)), 0.5)[1], 0.5, rtol=1e-15)
+
+
+# ------------------------------------------------------------------------------------------------ responses and algebra
+
+
+@pytest.mark.parametrize("step_s", [None, 1e-4], ids=["continuous", "discrete"])
+def test_frequency_response_against_python_control(step_s):
+    system = make_system(8)
+    if step_s is not None:
+        Ad, Bd = lti.zero_order_hold(system.A, system.B, step_s)
+        system = lti.StateSpace(Ad, Bd, system.C, system.D)
+    theirs = control.ss(system.A, system.B, system.C, system.D, 0 if step_s is None else step_s)
+    freq_hz = np.geomspace(0.1, 4900, 40)
+    s = 2j * pi * freq_hz
+    expected = np.moveaxis(theirs(s if step_s is None else np.exp(s * step_s)), 2, 0)
+    ours = lti.frequency_response(system, freq_hz, step_s)
+    assert ours.shape == (40, 2, 2)
+    assert_allclose(ours, expected, rtol=0, atol=1e-11 * np.max(np.abs(expected)))
+
+
+def test_a_system_without_states_responds_with_its_direct_path():
+    gain = lti.StateSpace(np.zeros((0, 0)), np.zeros((0, 2)), np.zeros((1, 0)), np.array([[2.0, -3.0]]))
+    assert_allclose(lti.frequency_response(gain, np.array([1.0, 10.0])), np.full((2, 1, 2), [2.0, -3.0]))
+
+
+def test_series_against_python_control():
+    first, second = make_system(9, inputs=1, outputs=2), make_system(10, states=4, inputs=2, outputs=3)
+    ours = lti.series(first, second)
+    theirs = control.series(*(control.ss(s.A, s.B, s.C, s.D) for s in (first, second)))
+    assert ours.order == 7
+    freq_hz = np.geomspace(1, 5000, 20)
+    expected = np.moveaxis(theirs(2j * pi * freq_hz, squeeze=False), 2, 0)
+    assert_allclose(lti.frequency_response(ours, freq_hz), expected, rtol=0, atol=1e-10 * np.max(np.abs(expected)))
+
+
+@pytest.mark.parametrize("seed", [11, 12])
+def test_feedback_poles_against_python_control(seed):
+    system = make_system(seed)
+    closed = control.feedback(control.ss(system.A, system.B, system.C, system.D), np.eye(2))
+    ours, theirs = (np.sort_complex(p) for p in (lti.feedback_poles(system), closed.poles()))
+    assert_allclose(ours, theirs, rtol=1e-9)
+    assert np.max(np.abs(ours - np.sort_complex(np.linalg.eigvals(system.A)))) > 1.0
+
+
+# ------------------------------------------------------------------------------------------------ refusals
+
+
+@pytest.mark.parametrize(
+    "poles",
+    [
+        (-1000.0, -1000.0),
+        (-1000.0, -1000.0, -5.0),
+        (0.0, 0.0, -5.0),
+        (-100 + 900j, -100 + 900j, -100 - 900j, -100 - 900j),
+    ],
+    ids=["double", "double and single", "double integrator", "double pair"],
+)
+def test_repeated_poles_are_refused(poles):
+    with pytest.raises(ValueError, match="two poles coincide"):
+        lti.modal_from_polynomials((1.0,), tuple(np.poly(poles).real))
+
+
+@pytest.mark.parametrize("distance", [1e-2, 1e-4])
+def test_close_poles_are_taken_apart(distance):
+    a, b = 1000.0, 1000.0 * (1 + distance)
+    system = lti.modal_from_polynomials((a * b,), (1.0, a + b, a * b))
+    freq_hz = np.array([0.0, 10.0, 159.0, 1000.0])
+    s = 2j * pi * freq_hz
+    assert_allclose(lti.frequency_response(system, freq_hz)[:, 0, 0], a * b / ((s + a) * (s + b)), rtol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("numerator", "denominator", "orders"),
+    [((1.0, 2.0), (1.0, 3.0), (1, 1)), ((1.0, 0.0, 2.0), (1.0, 3.0), (2, 1)), ((5.0,), (0.0, 3.0), (0, 0))],
+)
+def test_improper_fractions_are_refused(numerator, denominator, orders):
+    message = f"numerator of order {orders[0]} over denominator of order {orders[1]}: not strictly proper"
+    with pytest.raises(ValueError, match=message):
+        lti.modal_from_polynomials(numerator, denominator)
+
+
+def test_leading_zeros_do_not_count():
+    padded = lti.modal_from_polynomials((0.0, 0.0, 4.0), (0.0, 2.0, 6.0))
+    assert padded.order == 1
+    assert_allclose(lti.frequency_response(padded, np.zeros(1)), 4.0 / 6.0, rtol=1e-15)
