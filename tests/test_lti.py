@@ -1,6 +1,7 @@
 """State-space algebra against exact rational arithmetic, scipy and python-control."""
 
 from fractions import Fraction
+from itertools import pairwise
 from math import pi
 
 import control
@@ -41,7 +42,7 @@ def test_the_modal_form_is_eq_2(freq_hz):
     expected = exact_response(freq_hz)
     error = abs(response - expected) / abs(expected)
     print(f"{freq_hz:g} Hz: relative error {error:.1e}")
-    assert error < 1e-11
+    assert error < 1e-13
 
 
 def test_the_modal_form_is_block_diagonal():
@@ -111,7 +112,7 @@ def ramps(seed, samples=120, inputs=2):
 def first_order_response(system, u, step_s):
     Ad, B0, B1 = lti.first_order_hold(system.A, system.B, step_s)
     x, y = np.zeros(system.order), [system.D @ u[0]]
-    for start, end in zip(u, u[1:], strict=False):
+    for start, end in pairwise(u):
         x = Ad @ x + B0 @ start + B1 @ end
         y.append(system.C @ x + system.D @ end)
     return np.array(y)
@@ -210,6 +211,15 @@ def test_feedback_poles_against_python_control(seed):
 def test_repeated_poles_are_refused(poles):
     with pytest.raises(ValueError, match="two poles coincide"):
         lti.modal_from_polynomials((1.0,), tuple(np.poly(poles).real))
+
+
+@pytest.mark.xfail(
+    strict=True, reason="rounding parts the roots of a triple pole by more than the test for equal poles"
+)
+@pytest.mark.parametrize("order", [3, 5])
+def test_poles_repeated_more_often_are_refused(order):
+    with pytest.raises(ValueError, match="two poles coincide"):
+        lti.modal_from_polynomials((1.0,), tuple(np.poly([-1000.0] * order)))
 
 
 @pytest.mark.parametrize("distance", [1e-2, 1e-4])

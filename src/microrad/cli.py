@@ -69,9 +69,8 @@ app = typer.Typer(
 
 def main() -> None:
     """Run the command line and exit; a request to terminate is taken as Ctrl-C is."""
-    for name in ("SIGTERM", "SIGHUP"):
-        number = getattr(signal, name, None)
-        if number is not None and signal.getsignal(number) is not signal.SIG_IGN:
+    for number in (signal.SIGTERM, getattr(signal, "SIGHUP", signal.SIGTERM)):
+        if signal.getsignal(number) is not signal.SIG_IGN:
             signal.signal(number, signal.default_int_handler)
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, TextIOWrapper):
@@ -127,8 +126,8 @@ def _failed(error: BaseException) -> int:
         _say("interrupted, nothing was written")
         return INTERRUPTED
     if isinstance(error, OSError):
-        where = f"{error.filename}: " if error.filename else ""
-        _say(f"{where}{error.strerror or error}; nothing was written. Check free space and permissions.")
+        where = f"{error.filename}: {error.strerror}" if error.filename else str(error.strerror or error)
+        _say(f"{where}; nothing was written. Check free space and permissions.")
         return REFUSED
     if _meant_for_users(error):
         _say(str(error) or "not enough memory")
@@ -168,7 +167,7 @@ def _finite(data: Any) -> Any:
 @contextlib.contextmanager
 def _progress() -> Iterator[_Progress]:
     """A bar on stderr while something is computed, where stderr is a terminal."""
-    if not sys.stderr.isatty():
+    if not (sys.stderr and sys.stderr.isatty()):
         yield lambda done, total, what: None
         return
     from rich.console import Console
@@ -207,6 +206,7 @@ def _write_whole(path: Path, text: str) -> None:
 
 # ----------------------------------------------------------------------------------------------------------- commands
 _Json = Annotated[bool, typer.Option("--json", help="Print one JSON document and nothing else.")]
+_Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace what an earlier run wrote.")]
 
 
 def _option(flag: str, metavar: str, text: str, **settings: Any) -> Any:
@@ -260,7 +260,7 @@ def run(
     file: Annotated[Path, typer.Argument(help="Mission file; microrad init writes one.", metavar="FILE")],
     output: Annotated[Path | None, _option("--output", "FOLDER", _FOLDER)] = None,
     mirror: Annotated[Path | None, _option("--mirror", "FILE", "Mirror file in place of the mission's mirror.")] = None,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the results of an earlier run.")] = False,
+    overwrite: _Overwrite = False,
     as_json: _Json = False,
 ) -> Outcome:
     """Run the whole study of a mission.
@@ -305,8 +305,8 @@ class Model(StrEnum):
     """Which model the mirror file holds."""
 
     BEST = "best"
-    BOUC_WEN = "bouc-wen"
     PRANDTL_ISHLINSKII = "prandtl-ishlinskii"
+    BOUC_WEN = "bouc-wen"
 
 
 def _quantity(unit: str) -> Callable[[str], float]:
@@ -342,7 +342,7 @@ _MIRROR_FILE = "File to write [default: <name of the recording>-mirror.toml in t
         "microrad identify loop.csv --input drive --output angle --rate 200",
         "microrad identify 60Hz.csv 80Hz.csv 100Hz.csv --input 1 --output 2 --rate '50 kHz'",
         "microrad identify piezo.dat --input 0 --output 4 --rate '200 Hz' --output-unit um --lever-arm '50 mm'",
-        "microrad run leo-geo.toml --mirror loop-mirror.toml",
+        "microrad run leo-geo.toml --mirror loop-mirror.toml --output loop-mirror-study",
     )
 )
 @_command
@@ -361,7 +361,7 @@ def identify(  # noqa: PLR0913  every argument is a named option
     seed: Annotated[int, typer.Option(min=0, help="Seed of the scattered starts of the Bouc-Wen fit.")] = 0,
     name: Annotated[str | None, _option("--name", "TEXT", "Name of the mirror [default: the recording's].")] = None,
     mirror_file: Annotated[Path | None, _option("--mirror-file", "FILE", _MIRROR_FILE)] = None,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace an earlier mirror file.")] = False,
+    overwrite: _Overwrite = False,
     as_json: _Json = False,
 ) -> Outcome:
     """Fit a mirror model to recordings.
@@ -377,13 +377,12 @@ def identify(  # noqa: PLR0913  every argument is a named option
     check = functools.partial(_check_target, target, advice, _MIRROR_FILE_BEGINS if overwrite else "")
     check()
     records = [read_recording(file, input_column, output_column, rate) for file in files]
-    bouc_wen = "bouc_wen_admissible" if admissible else "bouc_wen"
-    models = ("prandtl_ishlinskii", bouc_wen)
+    models = ("prandtl_ishlinskii", "bouc_wen_admissible" if admissible else "bouc_wen")
     with _progress() as bar:
         found = identification.identify(
             records, hold_out, seed, models, bar, output_unit=output_unit, lever_arm_m=lever_arm, input_unit=input_unit
         )
-    written = {Model.BEST: found.chosen, Model.BOUC_WEN: bouc_wen}.get(model, "prandtl_ishlinskii")
+    written = dict(zip(Model, (found.chosen, *models), strict=True))[model]
     text = identification.mirror_file_text(found, files[0].stem[:200] if name is None else name, model=written)
     outcome = Outcome(_json(_fit_data(found, written, target)) if as_json else _fit_text(found, written, target))
     check()  # the file may have appeared meanwhile
@@ -406,8 +405,8 @@ def _fit_text(found: "Identification", written: str, target: Path) -> str:
     for score, fit in zip(found.scores, found.fits, strict=True):
         lines += ["", score.model, *_parameter_lines(fit)]
     lines += ["", *(f"warning: {text}" for text in _warnings(found, written))]
-    next_step = f"microrad run leo-geo.toml --mirror {shlex.quote(str(target))}"
-    return "\n".join([*lines, "", f"{target} written ({written}). Next: {next_step}"])
+    run_it = ["microrad", "run", "leo-geo.toml", "--mirror", str(target), "--output", f"{target.stem}-study"]
+    return "\n".join([*lines, "", f"{target} written ({written}). Next: {shlex.join(run_it)}"])
 
 
 def _score_line(score: "Score", written: str) -> str:
@@ -482,7 +481,7 @@ def doctor(as_json: _Json = False) -> Outcome:
     found = checks.run()
     ok = all(check.ok for check in found)
     if as_json:
-        return Outcome(_json({"ok": ok, "checks": [asdict(check) for check in found]}), int(not ok))
+        return Outcome(_json({"ok": ok, "checks": [asdict(c) for c in found]}), int(not ok))
     lines = [
         f"{'ok' if c.ok else 'problem':8} {c.name:17} {'; '.join(filter(None, (c.found, c.advice)))}" for c in found
     ]

@@ -287,14 +287,17 @@ def discretise(mirror: Mirror, step_s: float) -> kernels.Plant:
             f"use a step of at most {usable:.3g} s, or move the mean slope of the hysteresis into A"
         )
     B0, E0, B1, E1 = start[:, :m], start[:, m:], end[:, :m], end[:, m:]
-    no_u, no_z = np.zeros((E0.shape[1], m)), np.zeros((E0.shape[1], E0.shape[1]))
+    elements = E0.shape[1]
+    no_x, no_u, no_z = np.zeros((elements, Ad.shape[0])), np.zeros((elements, m)), np.zeros((elements, elements))
     return kernels.Plant(
         step_s=float(step_s),
         states=int(Ad.shape[0]),
-        actuators=m,
+        actuators=tuple(range(m)),
+        outputs=tuple(range(mirror.axes)),
         transition=kernels.rows(Ad, B0, B1, E0 + E1),
         correction=E1.copy(),
-        drive=kernels.rows(mirror.F, no_u, mirror.G, no_z),
+        from_state=kernels.rows(mirror.F),
+        from_drive=kernels.rows(no_x, no_u, mirror.G, no_z),
         output=kernels.rows(mirror.C, np.zeros_like(mirror.D), mirror.D, mirror.K),
         bouc_wen=np.array([b.row for b in mirror.bouc_wen], dtype=float).reshape(-1, 8),
         play_threshold=np.array(mirror.play.thresholds_v, dtype=float),
@@ -325,7 +328,7 @@ def _steepest(b: BoucWen) -> float:
 
 def at_rest(plant: kernels.Plant) -> kernels.PlantState:
     """A fresh state of the plant: everything zero, which is rest at the bias."""
-    n, m, bouc_wen = plant.states, plant.actuators, plant.bouc_wen.shape[0]
+    n, m, bouc_wen = plant.states, len(plant.actuators), plant.bouc_wen.shape[0]
     elements = bouc_wen + plant.play_threshold.size
     return kernels.PlantState(
         w=np.zeros(n + 2 * m + elements),

@@ -100,6 +100,8 @@ def assemble(m: mirror.Mirror, setup: Setup, inverse: Inverse) -> kernels.Loop:
         return np.full(actuators, float(value))
 
     return kernels.Loop(
+        actuators=tuple(range(actuators)),
+        axes=tuple(range(m.axes)),
         steps_per_sample=timing.steps_per_sample,
         delay_steps=timing.delay_steps,
         update=kernels.rows(controller.A, controller.B),
