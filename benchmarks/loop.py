@@ -3,8 +3,9 @@
     python benchmarks/loop.py
 
 The trajectory is the paper's 15 Hz sine of 300 µrad on its mirror (Eq. 2 and 3) at 50 kHz, under PI and under PI +
-inverse, with the shipped mission's amplifier, converters and delay. The peers integrate the mirror alone under the drive
-that the loop produced, linear between samples, which spares them the controller; errors are against SciPy at 1e-12.
+inverse, with the shipped mission's amplifier, converters and delay. The twin does the same arithmetic, with the C
+library's exponential. The peers integrate the mirror alone under the drive that the loop produced, linear between
+samples, which spares them the controller; errors are against SciPy at 1e-12.
 """
 
 import ctypes
@@ -20,8 +21,8 @@ import control as python_control
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from microrad import kernels, mirror, missionfile, simulate, tracking
 from microrad import control as microrad_control
+from microrad import kernels, mirror, missionfile, simulate, tracking
 
 HERE = Path(__file__).resolve().parent
 REPEATS = 15
@@ -32,23 +33,33 @@ class Parameters(ctypes.Structure):
     """The C twin's parameters, in its order."""
 
     _fields_ = (
-        [(n, DOUBLE) for n in "step_s d1 d2 epsilon delta alpha beta rate_limit bias".split()]
-        + [(n, DOUBLE * 5) for n in "diagonal coupling held end output".split()]
+        [(n, DOUBLE) for n in ["step_s", "d1", "d2", "epsilon", "delta", "alpha", "beta", "rate_limit", "bias"]]
+        + [(n, DOUBLE * 5) for n in ["diagonal", "coupling", "held", "end", "output"]]
         + [
             (n, DOUBLE)
             for n in (
-                "proportional_step integral_step derivative_gain filter_keep windup_integral windup_filter command_min "
-                "command_max drive_resolution sensor_resolution amplifier_factor slew_step"
-            ).split()
+                "proportional_step",
+                "integral_step",
+                "derivative_gain",
+                "filter_keep",
+                "windup_integral",
+                "windup_filter",
+                "command_min",
+                "command_max",
+                "drive_resolution",
+                "sensor_resolution",
+                "amplifier_factor",
+                "slew_step",
+            )
         ]
-        + [(n, INTEGER) for n in "steps_per_sample delay_steps feedforward".split()]
+        + [(n, INTEGER) for n in ["steps_per_sample", "delay_steps", "feedforward"]]
     )
 
 
 class Counters(ctypes.Structure):
     """The C twin's counters."""
 
-    _fields_ = [(n, INTEGER) for n in "clamped saturated slew_limited inverse_clamped".split()]
+    _fields_ = [(n, INTEGER) for n in ["clamped", "saturated", "slew_limited", "inverse_clamped"]]
 
 
 def compiled_twin(folder: str) -> ctypes.CDLL:
@@ -59,41 +70,25 @@ def compiled_twin(folder: str) -> ctypes.CDLL:
     return ctypes.CDLL(str(library))
 
 
-def dense(matrix: kernels.Rows, columns: int) -> np.ndarray:
-    """A matrix by rows, written out."""
-    full = np.zeros((matrix.start.size - 1, columns))
-    for i in range(full.shape[0]):
-        part = slice(int(matrix.start[i]), int(matrix.start[i + 1]))
-        full[i, matrix.column[part]] = matrix.value[part]
-    return full
-
-
 def twin_parameters(plant: kernels.Plant, loop: kernels.Loop) -> Parameters:
     """The kernel's own arrays, picked apart for the twin: modes 0 and 1 are the complex pair."""
-    transition = dense(plant.transition, 8)
-    update, command = dense(loop.update, 3), dense(loop.command, 3)
-    partner = [1, 0, 2, 3, 4]
-    coupling = [transition[i, partner[i]] if partner[i] != i else 0.0 for i in range(5)]
     five = DOUBLE * 5
     return Parameters(
         plant.step_s,
         *plant.bouc_wen[0],
-        five(*np.diag(transition)),
-        five(*coupling),
-        five(*transition[:, 7]),
-        five(*plant.correction[:, 0]),
-        five(*dense(plant.output, 8)[0, :5]),
-        command[0, 2],
-        update[0, 2],
-        -command[0, 1],
-        update[1, 1],
-        *loop.anti_windup[:, 0],
-        loop.command_min[0],
-        loop.command_max[0],
-        loop.drive_resolution[0],
+        five(*plant.diagonal[:5]),
+        five(*plant.coupling[:2], 0.0, 0.0, 0.0),
+        five(*plant.E_held[:5, 0]),
+        five(*plant.E1[:5, 0]),
+        five(*plant.C[0, :5]),
+        loop.Dc[0, 0],
+        loop.Bc[0, 0],
+        -loop.Cc[0, 1],
+        loop.Ac[1, 1],
+        *loop.L[:, 0],
+        *loop.actuator[0, :3],
         loop.sensor_resolution[0],
-        loop.amplifier_factor[0],
-        loop.slew_step[0],
+        *loop.actuator[0, 3:],
         loop.steps_per_sample,
         loop.delay_steps,
         int(loop.inverse_bouc_wen.shape[0] > 0),
@@ -197,7 +192,7 @@ def main() -> None:
     reference, _ = simulate.sine(mission.scenario.amplitude_rad, 15.0, period, settle_s=2.0)
 
     print(
-        f"one axis, one plant step a control sample of {period * 1e6:g} µs, {reference.shape[0]} steps, best of {REPEATS}"
+        f"one axis, one plant step a control sample of {period * 1e6:g} µs, {reference.size} steps, best of {REPEATS}"
     )
     with tempfile.TemporaryDirectory() as folder:
         twin = compiled_twin(folder)
@@ -208,9 +203,8 @@ def main() -> None:
             times, output, drive = loop_against_twin(twin, m, setup, inverse, reference)
             ratio = times["kernel"] / times["C twin"]
             print(f"\n{name}")
-            print(
-                f"  kernel {times['kernel'] * 1e9:6.1f} ns a step, C twin {times['C twin'] * 1e9:6.1f} ns: ratio {ratio:.2f}"
-            )
+            kernel_ns, twin_ns = (times[name] * 1e9 for name in ("kernel", "C twin"))
+            print(f"  kernel {kernel_ns:6.1f} ns a step, C twin {twin_ns:6.1f} ns: ratio {ratio:.2f}")
             print(f"  {period / times['kernel']:.0f} times real time at {1 / period / 1e3:g} kHz on one core")
 
     short = slice(0, round(0.2 / period))

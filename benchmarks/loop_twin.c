@@ -24,12 +24,11 @@ typedef struct {
 
 static inline double relaxed(double h, double forcing, double decay)
 {
-    if (fabs(decay) < 0.3) { /* (1 - exp(-d)) / d as its Taylor series: expm1 costs twice */
-        double d = decay, d2 = d * d, d4 = d2 * d2;
+    if (fabs(decay) < 0.05) { /* (1 - exp(-d)) / d as its Taylor series: expm1 costs twice */
+        double d = decay, d2 = d * d;
         double low = (1.0 - d * (1.0 / 2.0)) + d2 * (1.0 / 6.0 - d * (1.0 / 24.0));
-        double middle = (1.0 / 120.0 - d * (1.0 / 720.0)) + d2 * (1.0 / 5040.0 - d * (1.0 / 40320.0));
-        double high = (1.0 / 362880.0 - d * (1.0 / 3628800.0)) + d2 * (1.0 / 39916800.0 - d * (1.0 / 479001600.0));
-        return h + (forcing - decay * h) * (low + d4 * (middle + d4 * high));
+        double high = (1.0 / 120.0 - d * (1.0 / 720.0)) + d2 * (1.0 / 5040.0 - d * (1.0 / 40320.0));
+        return h + (forcing - decay * h) * (low + d2 * d2 * high);
     }
     return h + (forcing - decay * h) * (1.0 - exp(-decay)) / decay;
 }

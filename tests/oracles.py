@@ -412,9 +412,8 @@ def first_order_hold(A, B, step_s):
     return whole[:n, :n], whole[:n, n : n + m] - B1, B1
 
 
-def by_rows(*blocks):
-    """Dense blocks side by side, stored by rows without their zeros."""
-    matrix = np.hstack(blocks)
+def by_rows(matrix):
+    """A dense matrix, stored by rows without its zeros."""
     row, column = np.nonzero(matrix)
     start = np.searchsorted(row, np.arange(len(matrix) + 1))
     return kernels.Rows(start.astype(np.uint64), column.astype(np.uint64), matrix[row, column])
@@ -426,24 +425,47 @@ def build_plant(mirror, step_s):
     nb, nz, ny = len(mirror.bouc_wen), mirror.E.shape[1], len(mirror.C)
     Ad, B0, B1 = first_order_hold(mirror.A, mirror.B, step_s)
     _, E0, E1 = first_order_hold(mirror.A, mirror.E, step_s)
+    even = n + n % 2
+    diagonal, coupling, rest = np.zeros(even), np.zeros(even), np.zeros((even, even))
+    for i, j in np.ndindex(n, n):
+        if i == j:
+            diagonal[i] = Ad[i, j]
+        elif i // 2 == j // 2:
+            coupling[i] = Ad[i, j]
+        else:
+            rest[i, j] = Ad[i, j]
     plant = kernels.Plant(
         step_s=float(step_s),
-        states=n,
-        actuators=nu,
-        transition=by_rows(Ad, B0, B1, E0 + E1),
-        correction=np.ascontiguousarray(E1),
-        drive=by_rows(mirror.F, np.zeros((nz, nu)), mirror.G, np.zeros((nz, nz))),
-        output=by_rows(mirror.C, np.zeros((ny, nu)), mirror.D, mirror.K),
+        states=(0,) * n,
+        actuators=(0,) * nu,
+        outputs=(0,) * ny,
+        elements=(0,) * nb,
+        feedback=bool(np.any(mirror.F)),
+        direct=bool(np.any(mirror.B) or np.any(mirror.D)),
+        diagonal=diagonal,
+        coupling=coupling,
+        rest=by_rows(rest),
+        B0=np.ascontiguousarray(B0),
+        B1=np.ascontiguousarray(B1),
+        E_held=E0 + E1,
+        E1=np.ascontiguousarray(E1),
+        F=mirror.F,
+        G=mirror.G,
+        C=mirror.C,
+        D=mirror.D,
+        CE1=mirror.C @ E1,
+        K=mirror.K,
         bouc_wen=np.array(mirror.bouc_wen, dtype=float).reshape(nb, 8),
         play_threshold=np.array(mirror.play_threshold, dtype=float),
         play_weight=np.array(mirror.play_weight, dtype=float),
     )
     state = kernels.PlantState(
-        w=np.zeros(n + 2 * nu + nz),
-        q=np.zeros(nz),
-        h=np.zeros(nb),
-        p=np.zeros(nz - nb),
-        scratch=np.zeros(n + nz),
+        x=np.zeros(even),
+        x_next=np.zeros(even),
+        u=np.zeros(nu),
+        u_next=np.zeros(nu),
+        y=np.zeros(ny),
+        bank=np.zeros((nz, 4)),
         clamped=np.zeros(nb, dtype=np.int64),
     )
     return plant, state
@@ -453,13 +475,24 @@ def build_loop(loop):
     """The kernels' loop, and its state at rest."""
     actuators, axes = loop.allocation.shape
     controllers, elements = len(loop.Ac), len(loop.inverse_bouc_wen)
+    feedforward = elements > 0 or len(loop.inverse_play_threshold) > 0 or bool(np.any(loop.inverse_direct))
+    columns = (loop.command_min, loop.command_max, loop.drive_resolution, loop.amplifier_factor, loop.slew_step)
     record = kernels.Loop(
+        actuators=(0,) * actuators,
+        axes=(0,) * axes,
+        states=(0,) * controllers,
+        inverse_elements=(0,) * elements,
+        feedforward=feedforward,
         steps_per_sample=loop.steps_per_sample,
         delay_steps=loop.delay_steps,
-        update=by_rows(loop.Ac, loop.Bc),
-        command=by_rows(loop.Cc, loop.Dc),
-        anti_windup=loop.L,
-        **{name: getattr(loop, name) for name in kernels.Loop._fields[5:12]},
+        Ac=loop.Ac,
+        Bc=loop.Bc,
+        Cc=loop.Cc,
+        Dc=loop.Dc,
+        L=loop.L,
+        actuator=np.column_stack(columns).astype(float),
+        sensor_resolution=loop.sensor_resolution,
+        allocation=loop.allocation,
         inverse_direct=loop.inverse_direct,
         inverse_bouc_wen=np.array(loop.inverse_bouc_wen, dtype=float).reshape(elements, 8),
         inverse_bouc_wen_actuator=np.array(loop.inverse_bouc_wen_actuator, dtype=np.uint64),
@@ -468,10 +501,12 @@ def build_loop(loop):
         inverse_play_actuator=np.array(loop.inverse_play_actuator, dtype=np.uint64),
     )
     state = kernels.LoopState(
-        w=np.zeros(controllers + axes),
-        scratch=np.zeros(max(controllers, actuators)),
+        x=np.zeros(controllers),
+        x_next=np.zeros(controllers),
+        error=np.zeros(axes),
+        output=np.zeros(actuators),
         command=np.zeros(actuators),
-        target=np.zeros(actuators),
+        target=np.zeros((actuators, 2)),
         feedforward=np.zeros(actuators),
         inverse_h=np.zeros(elements),
         inverse_p=np.zeros(len(loop.inverse_play_threshold)),

@@ -378,9 +378,11 @@ def test_open_loop_is_its_twin(mirror):
     y_twin, z_twin, twin = oracles.open_loop(mirror, STEP, drive)
     close(y, y_twin)
     close(z, z_twin)
-    close(state.w, np.concatenate([twin.x, twin.u, twin.u, twin.z]))
-    for name in ("q", "h", "p"):
-        close(getattr(state, name), np.array(getattr(twin, name)))
+    close(state.x[: len(twin.x)], twin.x)
+    close(state.u, twin.u)
+    close(state.bank[:, kernels.Z], twin.z)
+    close(state.bank[:, kernels.Q], np.array(twin.q))
+    close(state.bank[:, kernels.H], np.array([*twin.h, *twin.p]))
     assert_array_equal(state.clamped, twin.clamped)
     if mirror.bouc_wen and np.isfinite(mirror.bouc_wen[0].rate_limit):
         assert np.min(state.clamped) > 0
@@ -406,13 +408,14 @@ def test_a_mirror_at_rest_stays_at_rest():
         y, z, state = oracles.run_open_loop(mirror, STEP, np.zeros((5, mirror.B.shape[1])))
         assert not y.any()
         assert not z.any()
-        assert not state.w.any()
+        assert not state.x.any()
+        assert not state.bank.any()
 
 
 @by_mirror
 def test_rows_keeps_the_matrix_without_its_zeros(mirror):
-    blocks = (mirror.A, mirror.B, mirror.E)
-    for ours, expected in zip(kernels.rows(*blocks), oracles.by_rows(*blocks), strict=True):
+    matrix = np.hstack([mirror.A, mirror.B, mirror.E])
+    for ours, expected in zip(kernels.rows(matrix), oracles.by_rows(matrix), strict=True):
         assert_array_equal(ours, expected)
         assert ours.dtype == expected.dtype
 
@@ -423,7 +426,7 @@ def test_static_composition_is_eq_3():
     y, _, state = oracles.run_open_loop(mirror, STEP, drive)
     z, h, clamped = kernels.bouc_wen_response(np.concatenate([[0.0], drive[:, 0]]), STEP, np.array(PAPER), 0.0)
     close(y[:, 0], z[1:])
-    close(state.h, h[-1:])
+    close(state.bank[:, kernels.H], h[-1:])
     assert state.clamped[0] == clamped
 
 
@@ -435,7 +438,7 @@ def test_a_step_is_the_convolution_integral():
     integral, _ = quad_vec(
         lambda s: expm(mirror.A * (step_s - s)) @ (mirror.B @ u + mirror.E @ z[0]) * s / step_s, 0, step_s, epsrel=1e-13
     )
-    close(state.w[: len(mirror.A)], integral)
+    close(state.x[: len(mirror.A)], integral)
 
 
 @pytest.mark.parametrize("reference", ["scipy", "python-control"])
@@ -520,8 +523,8 @@ def make_reference(mirror, samples, sample_s):
 
 
 KINDS = ["plain", "delayed", "everything"]
-PLANT_MEMORY = ("w", "q", "h", "p", "clamped")
-LOOP_MEMORY = ("w", "target", "inverse_h", "inverse_p", "pending", "position", "counts", "inverse_clamped")
+PLANT_MEMORY = ("x", "u", "y", "bank", "clamped")
+LOOP_MEMORY = ("x", "target", "inverse_h", "inverse_p", "pending", "position", "counts", "inverse_clamped")
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -57,7 +57,7 @@ def run(m, drive, step_s=STEP):
     plant = mirror.discretise(m, step_s)
     state = mirror.at_rest(plant)
     drive = np.ascontiguousarray(np.reshape(drive, (len(drive), -1)))
-    output, bank = np.empty((len(drive), m.axes)), np.empty((len(drive), state.q.size))
+    output, bank = np.empty((len(drive), m.axes)), np.empty((len(drive), len(state.bank)))
     kernels.open_loop(plant, state, drive, output, bank)
     return output, state.clamped
 
@@ -168,7 +168,6 @@ def stiffening(weight=0.4):
         K=np.zeros((1, 2)),
         bouc_wen=(),
         play=Play((20e-6, 60e-6), (weight, weight / 2)),
-        gain_rad_v=(0.05e-3,),
         inverse=(Play((0.0,), (0.05e-3,)),),
     )
 
@@ -184,7 +183,6 @@ def test_mirrors_side_by_side_run_as_they_run_apart():
     both = mirror.combine(*parts)
     assert (both.actuators, both.axes) == (4, 4)
     assert both.name == "plays + printed + stiffening + static"
-    assert both.gain_rad_v == (sum(PLAYS.weights_rad_v), 0.089e-3, 0.05e-3, 0.089e-3)
     drives = np.column_stack([zigzag(seed, 400, scale=5.0) for seed in (21, 22, 23, 24)])
     together, clamped = run(both, drives)
     apart = [run(part, drives[:, j]) for j, part in enumerate(parts)]
@@ -261,7 +259,7 @@ def test_the_line_of_sight_moves_by_twice_the_mechanical_angle(model):
         for c in ("line-of-sight", "mechanical")
     )
     assert_allclose(optical, 2 * mechanical, rtol=1e-13, atol=one_femtoradian)
-    assert mirror.line_of_sight(model, "line-of-sight") is model
+    assert mirror.line_of_sight(model, "line-of-sight") == model
     assert mirror.slow_gain(mirror.line_of_sight(model, "mechanical")) == 2 * mirror.slow_gain(model)
 
 
@@ -335,7 +333,6 @@ def test_the_printed_mirror_first_moves_the_wrong_way():
     assert output[-1] < output[0]
 
 
-@pytest.mark.xfail(strict=True, reason="the decay changes side when h passes zero, before the output turns")
 def test_how_far_a_mirror_moves_the_wrong_way_when_its_drive_term_outweighs_its_gain():
     """|epsilon| > d1: the output turns only behind the zero of h."""
     model = replace(PRINTED, epsilon_rad_v=-0.2e-3, alpha_1_v=38.0, beta_1_v=30.0, d2_s_v=0.0)

@@ -162,9 +162,6 @@ def test_the_scan_applies_to_a_linear_part_with_bouc_wen(tmp_path, mission):
     assert not paper.applies(edited(tmp_path, (linear, ""), ('composition = "cascade"', 'composition = "static"')))
 
 
-@pytest.mark.xfail(
-    strict=True, reason="the gains of the grid are for 0.089 mrad/V and are not scaled to another mirror"
-)
 def test_the_scan_keeps_its_loop_gain_on_a_mirror_of_another_gain(monkeypatch, tmp_path, mission):
     monkeypatch.setattr(paper, "PROPORTIONAL_V_MRAD", (1.0,))
     monkeypatch.setattr(paper, "INTEGRAL_V_MRAD_S", (16e3,))

@@ -94,8 +94,8 @@ def test_the_lines_of_the_verdict(shipped):
     cause = "hysteresis at the non-physical reversals at 25 Hz"
     assert found == [
         ("rad", True, "Body pointing"),
-        ("dB", True, "Free-space loss"),
-        ("dB", True, "Free-space loss"),
+        ("dB", True, "Pointing loss"),
+        ("dB", True, "Pointing loss"),
         ("rad", False, cause),
         ("dB", False, found[4][2]),
     ]
@@ -156,6 +156,7 @@ def test_progress_grows(shipped):
         (0, 3, "budgets"),
         (1, 3, "mirror and tracking"),
         (2, 3, "claims of the paper"),
+        (3, 3, "verdict"),
     ]
     scan = [(done, total) for done, total, what in said if what == "scan of gains and compositions"]
     assert scan == [(1, 4), (2, 4), (3, 4), (4, 4)]
@@ -261,9 +262,6 @@ def test_without_comparison_there_is_none(variant):
     assert len(result.runs) == 10
 
 
-@pytest.mark.xfail(
-    strict=True, reason="the idle integrator of a controller without integral gain counts as a pole at 1"
-)
 def test_a_proportional_loop_is_stable(variant):
     result = variant(('integral = "16000 V/(mrad s)"', 'integral = "0 V/(mrad s)"'))
     assert isinstance(result.runs[0].trace, simulate.Trace)

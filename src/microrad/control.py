@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from microrad import lti, mission
+from microrad import lti, mirror, mission
 from microrad.mirror import BoucWen, Mirror, Play
 
 Floats = NDArray[np.float64]
@@ -43,7 +43,7 @@ def drive_from_mission(m: mission.Mission) -> Drive:
         bandwidth_hz=a.bandwidth_hz,
         slew_v_s=a.slew_v_s / a.gain,
         drive_resolution_v=m.control.drive_resolution_v,
-        sensor_resolution_rad=m.control.sensor_resolution_rad,
+        sensor_resolution_rad=m.control.sensor_resolution_rad * mirror.LINE_OF_SIGHT[m.conventions.mirror_angle],
     )
 
 
@@ -91,15 +91,16 @@ def gains_from_mission(control: mission.Control, mirror_gain_rad_v: float) -> Ga
 def pid(gains: Gains, period_s: float) -> lti.StateSpace:
     """Digital PID of one axis: v = Kp e + Ki T sum(e) + Kd filtered difference, all by backward differences.
 
-    States: the integral part in volts, and e behind the derivative's first-order filter.
+    States, where their gains are not 0: the integral part in volts, and e behind the derivative's first-order filter.
     """
     step = gains.integral * period_s
     keep = gains.derivative_filter_s / (gains.derivative_filter_s + period_s)
     edge = gains.derivative / (gains.derivative_filter_s + period_s)
+    used = np.array([step != 0.0, edge != 0.0])
     return lti.StateSpace(
-        A=np.array([[1.0, 0.0], [0.0, keep]]),
-        B=np.array([[step], [1.0 - keep]]),
-        C=np.array([[1.0, -edge]]),
+        A=np.diag([1.0, keep])[np.ix_(used, used)],
+        B=np.array([[step], [1.0 - keep]])[used],
+        C=np.array([[1.0, -edge]])[:, used],
         D=np.array([[gains.proportional + step + edge]]),
     )
 
@@ -134,19 +135,19 @@ class Inverse:
     play_actuator: tuple[int, ...] = ()
 
 
-def no_feedforward(mirror: Mirror) -> Inverse:
+def no_feedforward(m: Mirror) -> Inverse:
     """Feedback alone."""
-    return Inverse(direct=(0.0,) * mirror.actuators)
+    return Inverse(direct=(0.0,) * m.actuators)
 
 
-def inverse(mirror: Mirror) -> Inverse:
+def inverse(m: Mirror) -> Inverse:
     """Inverse of the mirror's hysteresis: Eq. 4 for Bouc-Wen, the closed form for Prandtl-Ishlinskii.
 
     Raises ValueError for a Prandtl-Ishlinskii model without weight at threshold 0: it stands still after a reversal.
     """
-    direct = [0.0] * mirror.actuators
+    direct = [0.0] * m.actuators
     bouc_wen, plays = [], []
-    for j, model in enumerate(mirror.inverse):
+    for j, model in enumerate(m.inverse):
         if isinstance(model, BoucWen):
             bouc_wen.append((model, j))
         else:
@@ -170,7 +171,7 @@ def play_inverse(model: Play) -> tuple[float, tuple[float, ...], tuple[float, ..
     """
     r, w = np.array(model.thresholds_v), np.array(model.weights_rad_v)
     slope = np.cumsum(w)
-    if slope[0] <= 0.0:
+    if r[0] != 0.0 or np.min(slope) <= 0.0:
         raise ValueError(
             "the Prandtl-Ishlinskii model has no weight at threshold 0: it stands still after each reversal and has no "
             "inverse; identify it again with more samples near the reversals"
@@ -180,13 +181,15 @@ def play_inverse(model: Play) -> tuple[float, tuple[float, ...], tuple[float, ..
     return float(1.0 / slope[0]), tuple(map(float, thresholds)), tuple(map(float, weights))
 
 
-def sampled_plant(mirror: Mirror, drive: Drive, timing: Timing) -> lti.StateSpace:
+def sampled_plant(m: Mirror, drive: Drive, timing: Timing) -> lti.StateSpace:
     """Delay, amplifier and linear mirror of one axis as the controller sees them: discrete, at the control period.
 
     The same recursion as the simulation's, at the plant's step, with the hysteresis replaced by its slow gain.
-    States: mirror, amplifier output, commands on their way.
+    States: mirror, amplifier output, commands on their way. Raises ValueError for more than one axis.
     """
-    linear = mirror.linear_loop
+    if (m.actuators, m.axes) != (1, 1):
+        raise ValueError(f"mirror {m.name!r} has {m.actuators} actuators and {m.axes} axes: give one axis at a time")
+    linear = m.linear_loop
     n, d = linear.order, timing.delay_steps
     Ad, B0, B1 = lti.first_order_hold(linear.A, linear.B, timing.step_s)
     follow = amplifier_factor(drive, timing.step_s)
@@ -215,7 +218,8 @@ def amplifier_factor(drive: Drive, step_s: float) -> float:
 class Margins:
     """Margins of one sampled loop: gain as a ratio, phase in radians, delay in seconds, modulus = min |1 + L|.
 
-    ``crossover_hz`` is the highest frequency at which |L| falls through 1; nan, with infinite margins, without one.
+    ``crossover_hz`` is the highest frequency at which |L| is 1; nan, with infinite margins, without one. ``delay_s`` is
+    the smallest phase margin at that frequency: a bound where there are several crossovers.
     """
 
     gain: float
@@ -238,8 +242,9 @@ def margins(controller: lti.StateSpace, plant: lti.StateSpace, period_s: float) 
             f"the closed loop is unstable: a pole at |z| = {worst:.6f} (the limit is 1) for a control period of "
             f"{period_s:g} s; lower the gains in [control], or shorten its delay"
         )
-    f = np.geomspace(1e-5, 0.5, 3000) / period_s
+    f = np.geomspace(1e-6, 0.5, 4000) / period_s
     response = lti.frequency_response(loop, f, period_s)[:, 0, 0]
+    response[-1] = response[-1].real  # at half the sample rate
     crossover, phase = _crossover(f, response)
     return Margins(
         gain=_gain_margin(response),
@@ -262,22 +267,24 @@ def sensitivity(loop: lti.StateSpace, freq_hz: float, period_s: float) -> comple
 
 
 def _crossover(f: Floats, response: NDArray[np.complex128]) -> tuple[float, float]:
-    """Highest gain crossover and the smallest phase margin over all crossovers."""
-    size = np.abs(response)
-    down = np.flatnonzero((size[:-1] >= 1.0) & (size[1:] < 1.0))
-    if not down.size:
+    """Highest gain crossover, up or down, and the smallest phase margin over all crossovers."""
+    size = np.log(np.abs(response))
+    at_unity = np.flatnonzero((size[:-1] >= 0.0) != (size[1:] >= 0.0))
+    if not at_unity.size:
         return math.nan, math.inf
-    share = (np.log(size[down])) / (np.log(size[down]) - np.log(size[down + 1]))
-    crossing = f[down] * (f[down + 1] / f[down]) ** share
+    share = size[at_unity] / (size[at_unity] - size[at_unity + 1])
+    crossing = f[at_unity] * (f[at_unity + 1] / f[at_unity]) ** share
     phase = np.pi + np.unwrap(np.angle(response))
-    at = phase[down] + share * (phase[down + 1] - phase[down])
+    at = phase[at_unity] + share * (phase[at_unity + 1] - phase[at_unity])
     wrapped = np.abs((at + np.pi) % (2 * np.pi) - np.pi)
     return float(crossing[-1]), float(np.min(wrapped))
 
 
 def _gain_margin(response: NDArray[np.complex128]) -> float:
-    """Smallest factor above 1 that brings the loop to -1."""
-    sign = np.flatnonzero((response.imag[:-1] * response.imag[1:] <= 0) & (response.real[:-1] < 0))
-    crossing = -response.real[sign]
+    """Smallest factor above 1 that brings the loop to -1, interpolated where it crosses the negative real axis."""
+    imag, real = response.imag, response.real
+    at = np.flatnonzero((imag[:-1] * imag[1:] <= 0.0) & (imag[:-1] != imag[1:]))
+    share = imag[at] / (imag[at] - imag[at + 1])
+    crossing = -(real[at] + share * (real[at + 1] - real[at]))
     below = crossing[(crossing > 0) & (crossing < 1)]
     return float(1.0 / below.max()) if below.size else math.inf

@@ -35,12 +35,15 @@ _inline: Callable[[Any], Any] = numba.njit(inline="always", **_OPTIONS)
 # Columns of a Bouc-Wen parameter row (Eq. 3 of SPIE 11852, 118523B).
 D1, D2, EPSILON, DELTA, ALPHA, BETA, RATE_LIMIT, BIAS = range(8)
 
-# Columns of the counters of a closed loop, one row per actuator.
+# Columns of a row of the bank's state, of an actuator's parameters, and of its counters.
+Q, H, Z, CHANGE = range(4)
+COMMAND_MIN, COMMAND_MAX, RESOLUTION, FOLLOW, SLEW_STEP = range(5)
 SATURATED, SLEW_LIMITED = range(2)
+BEFORE, NOW = range(2)  # of an actuator's target
 
 
-# A tuple whose length is a count: the length is part of the compiled type, so that loops over it have no overhead (they
-# took a third of the time of a one-axis step). Its items mean nothing.
+# A tuple whose length is a count: the length is part of the compiled type, so that short loops over it are unrolled.
+# (Their overhead took half the time of a one-axis step.) Its items mean nothing. A new set of counts compiles once.
 Count = tuple[int, ...]
 
 
@@ -57,21 +60,37 @@ class Plant(NamedTuple):
 
     x[k+1] = Ad x[k] + B0 u[k] + B1 u[k+1] + E0 z[k] + E1 z[k+1],  q = F x + G u,  z = H[q],  y = C x + D u + K z.
 
-    The signals stand in one vector w = (x, u, u at the step's end, z). ``transition`` predicts x with z held, rows
-    (Ad, B0, B1, E0 + E1); ``correction`` is E1, dense; ``from_state`` holds the rows of F, acting on the predicted x,
-    ``from_drive`` the rows (0, 0, G, 0) and ``output`` (C, 0, D, K), acting on w. Bouc-Wen elements come first in q and z,
-    play operators after them. A modal Ad costs what its blocks cost.
+    A step predicts x with z held, advances the bank, and corrects x and y for the change of z, so that most of the
+    arithmetic does not wait for the bank:
+
+        predicted x = Ad x + B0 u[k] + B1 u[k+1] + (E0 + E1) z[k],     q = F (predicted x) + G u[k+1],
+        x[k+1] = predicted x + E1 (change of z),     y = C (predicted x) + D u[k+1] + (C E1) (change of z) + K z[k+1].
+
+    Ad is stored as its diagonal, its coupling of each state with its neighbour (0 with 1, 2 with 3, ...), and the rest
+    by rows: a real modal form has no rest, so it costs O(n). Bouc-Wen elements come first in q and z, play operators
+    after them. Without ``feedback`` F is zero, and without ``direct`` B and D are: they are not looked at.
     """
 
     step_s: float
-    states: int
+    states: Count
     actuators: Count
     outputs: Count
-    transition: Rows
-    correction: Floats
-    from_state: Rows
-    from_drive: Rows
-    output: Rows
+    elements: Count  # Bouc-Wen only
+    feedback: bool
+    direct: bool
+    diagonal: Floats
+    coupling: Floats
+    rest: Rows
+    B0: Floats
+    B1: Floats
+    E_held: Floats
+    E1: Floats
+    F: Floats
+    G: Floats
+    C: Floats
+    D: Floats
+    CE1: Floats
+    K: Floats
     bouc_wen: Floats
     play_threshold: Floats
     play_weight: Floats
@@ -80,40 +99,43 @@ class Plant(NamedTuple):
 class PlantState(NamedTuple):
     """The memory of a plant; the kernels write into these arrays. ``clamped`` counts rate-clamped steps by element.
 
-    ``w`` as in Plant, ``q`` by element, ``h`` by Bouc-Wen element, ``p`` by play operator; ``scratch`` has no meaning
-    between steps.
+    ``u_next`` is the drive at the end of the step to come and ``y`` the last output. ``bank`` has a row an element:
+    drive q, memory (h, or a play operator's state), output z and its last change. ``x`` and ``x_next`` have an even
+    length.
     """
 
-    w: Floats
-    q: Floats
-    h: Floats
-    p: Floats
-    scratch: Floats
+    x: Floats
+    x_next: Floats
+    u: Floats
+    u_next: Floats
+    y: Floats
+    bank: Floats
     clamped: Integers
 
 
 class Loop(NamedTuple):
     """Controller, inverse feedforward, converters and amplifier of a sampled loop, as arrays.
 
-    Controller: xc[k+1] = Ac xc + Bc e + L (clip(v) - v),  v = Cc xc + Dc e + feedforward,  e = r - y sampled, with the
-    rows of (Ac, Bc) in ``update`` and of (Cc, Dc) in ``command``, both acting on (xc, e); L is ``anti_windup``.
-    Amplifier: first order, ``amplifier_factor`` = 1 - exp(-2 pi bandwidth step) (1 is ideal), slew per plant step.
-    A resolution of 0 is an ideal converter. ``allocation`` (actuators, axes) turns references into actuator targets.
+    Controller: xc[k+1] = Ac xc + Bc e + L (clip(v) - v),  v = Cc xc + Dc e + feedforward,  e = r - y sampled; L is the
+    anti-windup gain. ``actuator`` has a row each: limits of the command, resolution of its converter (0 is ideal),
+    FOLLOW of the first-order amplifier, 1 - exp(-2 pi bandwidth step) (1 is ideal), and its slew limit a plant step.
+    ``sensor_resolution`` goes by axis; ``allocation`` (actuators, axes) turns references into actuator targets.
     """
 
     actuators: Count
     axes: Count
+    states: Count
+    inverse_elements: Count  # Bouc-Wen only
+    feedforward: bool
     steps_per_sample: int
     delay_steps: int
-    update: Rows
-    command: Rows
-    anti_windup: Floats
-    command_min: Floats
-    command_max: Floats
-    drive_resolution: Floats
+    Ac: Floats
+    Bc: Floats
+    Cc: Floats
+    Dc: Floats
+    L: Floats
+    actuator: Floats
     sensor_resolution: Floats
-    amplifier_factor: Floats
-    slew_step: Floats
     allocation: Floats
     inverse_direct: Floats
     inverse_bouc_wen: Floats
@@ -126,13 +148,16 @@ class Loop(NamedTuple):
 class LoopState(NamedTuple):
     """The memory of a sampled loop; the kernels write into these arrays.
 
-    ``w`` is (xc, e). ``pending`` holds the commands on their way through the computation delay, ``position`` its write
-    index. ``counts`` has one row per actuator: saturated samples, slew-limited plant steps. ``inverse_clamped`` counts
-    rate-clamped samples of the feedforward's own elements. ``scratch`` has no meaning between samples.
+    ``x`` is xc, ``error`` e, ``output`` v and then what the clip took off it. ``pending`` holds the commands on their
+    way through the computation delay, ``position`` its write index. ``counts`` has one row per actuator: saturated
+    samples, slew-limited plant steps. ``inverse_clamped`` counts rate-clamped samples of the feedforward's own
+    elements; ``x_next`` has no meaning between samples.
     """
 
-    w: Floats
-    scratch: Floats
+    x: Floats
+    x_next: Floats
+    error: Floats
+    output: Floats
     command: Floats
     target: Floats
     feedforward: Floats
@@ -145,18 +170,31 @@ class LoopState(NamedTuple):
 
 
 @_inline
+def _near_exp(x):  # type: ignore[no-untyped-def]
+    """exp(x), near 0 by its Taylor series to rounding error: a call would cost more than the rest of the element."""
+    if abs(x) < 0.002:
+        return 1.0 + x * (1.0 + x * (1.0 / 2.0 + x * (1.0 / 6.0 + x * (1.0 / 24.0))))
+    if abs(x) < 0.25:
+        x2 = x * x
+        x4 = x2 * x2
+        low = (1.0 + x) + x2 * (1.0 / 2.0 + x * (1.0 / 6.0))
+        middle = (1.0 / 24.0 + x * (1.0 / 120.0)) + x2 * (1.0 / 720.0 + x * (1.0 / 5040.0))
+        high = (1.0 / 40320.0 + x * (1.0 / 362880.0)) + x2 * (1.0 / 3628800.0 + x * (1.0 / 39916800.0))
+        return low + x4 * (middle + x4 * high)
+    return exp(x)
+
+
+@_inline
 def _relaxed(h, forcing, decay):  # type: ignore[no-untyped-def]
     """h after unit time of h' = forcing - decay h, that is h + (forcing - decay h) (1 - exp(-decay)) / decay.
 
-    The last factor is its Taylor series where the difference would cancel: 12 terms, 1e-16 at 0.3 (expm1 costs twice).
+    The last factor is its Taylor series where the difference would cancel: 8 terms, 1e-16 at 0.05 (expm1 costs twice).
     """
-    if abs(decay) < 0.3:
+    if abs(decay) < 0.05:
         d, d2 = decay, decay * decay
-        d4 = d2 * d2
         low = (1.0 - d * (1.0 / 2.0)) + d2 * (1.0 / 6.0 - d * (1.0 / 24.0))
-        middle = (1.0 / 120.0 - d * (1.0 / 720.0)) + d2 * (1.0 / 5040.0 - d * (1.0 / 40320.0))
-        high = (1.0 / 362880.0 - d * (1.0 / 3628800.0)) + d2 * (1.0 / 39916800.0 - d * (1.0 / 479001600.0))
-        return h + (forcing - decay * h) * (low + d4 * (middle + d4 * high))
+        high = (1.0 / 120.0 - d * (1.0 / 720.0)) + d2 * (1.0 / 5040.0 - d * (1.0 / 40320.0))
+        return h + (forcing - decay * h) * (low + d2 * d2 * high)
     return h + (forcing - decay * h) * (1.0 - exp(-decay)) / decay
 
 
@@ -215,9 +253,13 @@ def bouc_wen_kernel(drive, step_s, parameters, hysteresis0, output, hysteresis):
             clamped += 1
             rate = _clamp(rate, parameters[RATE_LIMIT])
         h = bouc_wen_step(
-            h, travel, parameters[EPSILON] * exp(parameters[DELTA] * abs(rate)), parameters[ALPHA], parameters[BETA]
+            h,
+            travel,
+            parameters[EPSILON] * _near_exp(parameters[DELTA] * abs(rate)),
+            parameters[ALPHA],
+            parameters[BETA],
         )
-        linear = parameters[D1] * exp(-parameters[D2] * rate) * (drive[k] + parameters[BIAS])
+        linear = parameters[D1] * _near_exp(-parameters[D2] * rate) * (drive[k] + parameters[BIAS])
         output[k] = linear - parameters[D1] * parameters[BIAS] + h
         hysteresis[k] = h
         previous = drive[k]
@@ -251,46 +293,98 @@ def play_response(drive: Floats, thresholds: Floats, state0: Floats) -> Floats:
 
 
 @_inline
-def _plant_step(plant, state):  # type: ignore[no-untyped-def]
-    """One step to the u at the step's end that stands in w, with u and z linear over the step.
+def _predict(plant, state):  # type: ignore[no-untyped-def]
+    """The part of the predicted x that needs nothing from the end of the step."""
+    x, x_next, first_play = state.x, state.x_next, len(plant.elements)
+    for i in range(len(plant.states)):
+        total = plant.diagonal[i] * x[i] + plant.coupling[i] * x[i ^ 1]
+        if plant.direct:
+            for a in range(len(plant.actuators)):
+                total += plant.B0[i, a] * state.u[a]
+        for e in range(len(plant.elements)):
+            total += plant.E_held[i, e] * state.bank[e, Z]
+        x_next[i] = total
+    for e in range(first_play, state.bank.shape[0]):
+        for i in range(len(plant.states)):
+            x_next[i] += plant.E_held[i, e] * state.bank[e, Z]
+    if plant.rest.value.size > 0:
+        for i in range(len(plant.states)):
+            x_next[i] += _row(plant.rest, i, x)
 
-    Predict x with z held, advance every element exactly from its stored q to the predicted q, and correct x once for
-    the change of z: second order, and nothing is iterated.
-    """
-    w, x, n, m = state.w, state.scratch, plant.states, len(plant.actuators)
-    for i in range(n):
-        x[i] = _row(plant.transition, i, w)
-    elements = plant.bouc_wen.shape[0]
-    for e in range(elements):
-        row = plant.bouc_wen
-        q = _row(plant.from_state, e, x) + _row(plant.from_drive, e, w)
-        travel = q - state.q[e]
-        rate = travel / plant.step_s
-        if abs(rate) > row[e, RATE_LIMIT]:
-            state.clamped[e] += 1
-            rate = _clamp(rate, row[e, RATE_LIMIT])
-        grown = row[e, EPSILON] * exp(row[e, DELTA] * abs(rate))
-        h = bouc_wen_step(state.h[e], travel, grown, row[e, ALPHA], row[e, BETA])
-        z = row[e, D1] * (exp(-row[e, D2] * rate) * (q + row[e, BIAS]) - row[e, BIAS]) + h
-        state.h[e] = h
-        state.q[e] = q
-        x[n + e] = z - w[n + 2 * m + e]
-        w[n + 2 * m + e] = z
-    for e in range(elements, state.q.size):
-        q = _row(plant.from_state, e, x) + _row(plant.from_drive, e, w)
-        p = _play(state.p[e - elements], q, plant.play_threshold[e - elements])
-        z = plant.play_weight[e - elements] * p
-        state.p[e - elements] = p
-        state.q[e] = q
-        x[n + e] = z - w[n + 2 * m + e]
-        w[n + 2 * m + e] = z
-    for i in range(n):
-        total = x[i]
-        for e in range(state.q.size):
-            total += plant.correction[i, e] * x[n + e]
-        w[i] = total
-    for j in range(m):
-        w[n + j] = w[n + m + j]
+
+@_inline
+def _element_drive(plant, state, e):  # type: ignore[no-untyped-def]
+    """q of element e at the end of the step, from the predicted x."""
+    q = 0.0
+    for a in range(len(plant.actuators)):
+        q += plant.G[e, a] * state.u_next[a]
+    if plant.feedback:
+        for i in range(len(plant.states)):
+            q += plant.F[e, i] * state.x_next[i]
+    return q
+
+
+@_inline
+def _plant_step(plant, state):  # type: ignore[no-untyped-def]
+    """One step to ``u_next``, behind _predict: second order, and nothing is iterated."""
+    x, x_next, y, bank, first_play = state.x, state.x_next, state.y, state.bank, len(plant.elements)
+    if plant.direct:
+        for i in range(len(plant.states)):
+            for a in range(len(plant.actuators)):
+                x_next[i] += plant.B1[i, a] * state.u_next[a]
+    for i in range(len(plant.outputs)):
+        total = 0.0
+        for j in range(len(plant.states)):
+            total += plant.C[i, j] * x_next[j]
+        if plant.direct:
+            for a in range(len(plant.actuators)):
+                total += plant.D[i, a] * state.u_next[a]
+        y[i] = total
+    for e in range(len(plant.elements)):
+        _finish_element(bank, e, _bouc_wen_element(plant, state, e, _element_drive(plant, state, e)))
+    for e in range(first_play, bank.shape[0]):
+        q = _element_drive(plant, state, e)
+        p = _play(bank[e, H], q, plant.play_threshold[e - first_play])
+        bank[e, H] = p
+        bank[e, Q] = q
+        _finish_element(bank, e, plant.play_weight[e - first_play] * p)
+    for i in range(len(plant.states)):
+        total = x_next[i]
+        for e in range(len(plant.elements)):
+            total += plant.E1[i, e] * bank[e, CHANGE]
+        x[i] = total
+    for i in range(len(plant.outputs)):
+        for e in range(len(plant.elements)):
+            y[i] += plant.CE1[i, e] * bank[e, CHANGE] + plant.K[i, e] * bank[e, Z]
+    for e in range(first_play, bank.shape[0]):
+        for i in range(len(plant.states)):
+            x[i] += plant.E1[i, e] * bank[e, CHANGE]
+        for i in range(len(plant.outputs)):
+            y[i] += plant.CE1[i, e] * bank[e, CHANGE] + plant.K[i, e] * bank[e, Z]
+    for a in range(len(plant.actuators)):
+        state.u[a] = state.u_next[a]
+
+
+@_inline
+def _finish_element(bank, e, z):  # type: ignore[no-untyped-def]
+    bank[e, CHANGE] = z - bank[e, Z]
+    bank[e, Z] = z
+
+
+@_inline
+def _bouc_wen_element(plant, state, e, q):  # type: ignore[no-untyped-def]
+    """z of Bouc-Wen element e, advanced exactly from its stored q to ``q``."""
+    row = plant.bouc_wen
+    travel = q - state.bank[e, Q]
+    rate = travel / plant.step_s
+    if abs(rate) > row[e, RATE_LIMIT]:
+        state.clamped[e] += 1
+        rate = _clamp(rate, row[e, RATE_LIMIT])
+    grown = row[e, EPSILON] * _near_exp(row[e, DELTA] * abs(rate))
+    h = bouc_wen_step(state.bank[e, H], travel, grown, row[e, ALPHA], row[e, BETA])
+    state.bank[e, H] = h
+    state.bank[e, Q] = q
+    return row[e, D1] * (_near_exp(-row[e, D2] * rate) * (q + row[e, BIAS]) - row[e, BIAS]) + h
 
 
 @_compile
@@ -300,15 +394,15 @@ def open_loop(plant, state, drive, output, bank):  # type: ignore[no-untyped-def
     Fills ``output`` (samples, outputs) and ``bank`` (samples, elements; z) and leaves ``state`` at the last sample,
     so that a following call continues. The first sample is reached from the stored state in one step.
     """
-    n, m = plant.states, len(plant.actuators)
     for k in range(drive.shape[0]):
-        for j in range(m):
-            state.w[n + m + j] = drive[k, j]
+        for a in range(len(plant.actuators)):
+            state.u_next[a] = drive[k, a]
+        _predict(plant, state)
         _plant_step(plant, state)
         for i in range(len(plant.outputs)):
-            output[k, i] = _row(plant.output, i, state.w)
+            output[k, i] = state.y[i]
         for i in range(bank.shape[1]):
-            bank[k, i] = state.w[n + 2 * m + i]
+            bank[k, i] = state.bank[i, Z]
 
 
 @_inline
@@ -322,24 +416,24 @@ def _inverse(loop, state, reference, k, sample_s):  # type: ignore[no-untyped-de
         target = 0.0
         for i in range(len(loop.axes)):
             target += loop.allocation[a, i] * reference[k, i]
-        state.scratch[a] = target - state.target[a]
-        state.target[a] = target
+        state.target[a, BEFORE] = state.target[a, NOW]
+        state.target[a, NOW] = target
         state.feedforward[a] = loop.inverse_direct[a] * target
-    for e in range(loop.inverse_bouc_wen_actuator.size):
+    for e in range(len(loop.inverse_elements)):
         row, a = loop.inverse_bouc_wen, loop.inverse_bouc_wen_actuator[e]
-        travel = state.scratch[a] / row[e, D1]
+        travel = (state.target[a, NOW] - state.target[a, BEFORE]) / row[e, D1]
         rate = travel / sample_s
         if abs(rate) > row[e, RATE_LIMIT]:
             state.inverse_clamped[e] += 1
             rate = _clamp(rate, row[e, RATE_LIMIT])
-        grown = row[e, EPSILON] * exp(row[e, DELTA] * abs(rate))
+        grown = row[e, EPSILON] * _near_exp(row[e, DELTA] * abs(rate))
         h = bouc_wen_step(state.inverse_h[e], travel, grown, row[e, ALPHA], row[e, BETA])
         state.inverse_h[e] = h
-        gain = row[e, D1] * exp(-row[e, D2] * rate)
-        state.feedforward[a] += (state.target[a] - h + row[e, D1] * row[e, BIAS]) / gain - row[e, BIAS]
+        gain = row[e, D1] * _near_exp(-row[e, D2] * rate)
+        state.feedforward[a] += (state.target[a, NOW] - h + row[e, D1] * row[e, BIAS]) / gain - row[e, BIAS]
     for e in range(loop.inverse_play_actuator.size):
         a = loop.inverse_play_actuator[e]
-        p = _play(state.inverse_p[e], state.target[a], loop.inverse_play_threshold[e])
+        p = _play(state.inverse_p[e], state.target[a, NOW], loop.inverse_play_threshold[e])
         state.inverse_p[e] = p
         state.feedforward[a] += loop.inverse_play_weight[e] * p
 
@@ -350,35 +444,49 @@ def _quantised(value, resolution):  # type: ignore[no-untyped-def]
 
 
 @_inline
-def _control_sample(loop, state, reference, output, k, sample_s):  # type: ignore[no-untyped-def]
-    """One sample of the controller: error, feedforward, output, clip with anti-windup, converter."""
-    w, states = state.w, state.w.size - len(loop.axes)
-    for i in range(len(loop.axes)):
-        w[states + i] = reference[k, i] - _quantised(output[k, i], loop.sensor_resolution[i])
-    _inverse(loop, state, reference, k, sample_s)
-    for i in range(states):
-        state.scratch[i] = _row(loop.update, i, w)
+def _control_sample(loop, state, reference, k, y, sample_s):  # type: ignore[no-untyped-def]
+    """One sample of the controller: feedforward, error, output, clip with anti-windup, converter."""
+    if loop.feedforward:
+        _inverse(loop, state, reference, k, sample_s)
     for a in range(len(loop.actuators)):
-        v = state.feedforward[a] + _row(loop.command, a, w)
-        clipped = min(max(v, loop.command_min[a]), loop.command_max[a])
+        total = state.feedforward[a]
+        for j in range(len(loop.states)):
+            total += loop.Cc[a, j] * state.x[j]
+        state.output[a] = total
+    for i in range(len(loop.states)):
+        total = 0.0
+        for j in range(len(loop.states)):
+            total += loop.Ac[i, j] * state.x[j]
+        state.x_next[i] = total
+    for i in range(len(loop.axes)):
+        state.error[i] = reference[k, i] - _quantised(y[i], loop.sensor_resolution[i])
+    for a in range(len(loop.actuators)):
+        v = state.output[a]
+        for i in range(len(loop.axes)):
+            v += loop.Dc[a, i] * state.error[i]
+        clipped = min(max(v, loop.actuator[a, COMMAND_MIN]), loop.actuator[a, COMMAND_MAX])
         if clipped != v:
             state.counts[a, SATURATED] += 1
-            for i in range(states):
-                state.scratch[i] += loop.anti_windup[i, a] * (clipped - v)
-        state.command[a] = _quantised(clipped, loop.drive_resolution[a])
-    for i in range(states):
-        w[i] = state.scratch[i]
+        state.output[a] = clipped - v
+        state.command[a] = _quantised(clipped, loop.actuator[a, RESOLUTION])
+    for i in range(len(loop.states)):
+        total = state.x_next[i]
+        for j in range(len(loop.axes)):
+            total += loop.Bc[i, j] * state.error[j]
+        for a in range(len(loop.actuators)):
+            total += loop.L[i, a] * state.output[a]
+        state.x[i] = total
 
 
 @_inline
-def _amplifier_step(loop, state, due, w, n, m):  # type: ignore[no-untyped-def]
-    """The drive at the end of the plant step, towards the command that is due."""
-    for a in range(m):
-        move = (state.pending[due, a] - w[n + a]) * loop.amplifier_factor[a]
-        if abs(move) > loop.slew_step[a]:
+def _amplifier_step(loop, state, due, u, u_next):  # type: ignore[no-untyped-def]
+    """The drive at the end of the plant step, from u towards the command that is due."""
+    for a in range(len(loop.actuators)):
+        move = (state.pending[due, a] - u[a]) * loop.actuator[a, FOLLOW]
+        if abs(move) > loop.actuator[a, SLEW_STEP]:
             state.counts[a, SLEW_LIMITED] += 1
-            move = _clamp(move, loop.slew_step[a])
-        w[n + m + a] = w[n + a] + move
+            move = _clamp(move, loop.actuator[a, SLEW_STEP])
+        u_next[a] = u[a] + move
 
 
 @_compile
@@ -390,25 +498,25 @@ def closed_loop(plant, plant_state, loop, loop_state, reference, output, command
     the sample instants, ``output`` (samples, axes), ``command`` and ``drive`` (samples, actuators; before and behind
     the amplifier). The states are left at the end, so that a following call continues.
     """
-    n, m, w = plant.states, len(plant.actuators), plant_state.w
     sample_s = plant.step_s * loop.steps_per_sample
     ring = loop_state.pending
     length = ring.shape[0]
     position = loop_state.position[0]
     for k in range(reference.shape[0]):
+        _control_sample(loop, loop_state, reference, k, plant_state.y, sample_s)
         for i in range(len(plant.outputs)):
-            output[k, i] = _row(plant.output, i, w)
-        _control_sample(loop, loop_state, reference, output, k, sample_s)
-        for a in range(m):
+            output[k, i] = plant_state.y[i]
+        for a in range(len(plant.actuators)):
             command[k, a] = loop_state.command[a]
-            drive[k, a] = w[n + a]
+            drive[k, a] = plant_state.u[a]
         for _ in range(loop.steps_per_sample):
-            for a in range(m):
+            for a in range(len(plant.actuators)):
                 ring[position, a] = loop_state.command[a]
             due = position - loop.delay_steps
             if due < 0:
                 due += length
-            _amplifier_step(loop, loop_state, due, w, n, m)
+            _predict(plant, plant_state)
+            _amplifier_step(loop, loop_state, due, plant_state.u, plant_state.u_next)
             _plant_step(plant, plant_state)
             position += 1
             if position == length:
@@ -416,9 +524,8 @@ def closed_loop(plant, plant_state, loop, loop_state, reference, output, command
     loop_state.position[0] = position
 
 
-def rows(*blocks: Floats) -> Rows:
-    """Dense blocks side by side, as rows without their zeros."""
-    matrix = np.hstack(blocks)
+def rows(matrix: Floats) -> Rows:
+    """A dense matrix as rows without its zeros."""
     places = [np.flatnonzero(row) for row in matrix]
     return Rows(
         start=np.cumsum([0] + [p.size for p in places]).astype(np.uint64),

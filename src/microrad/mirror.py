@@ -76,15 +76,19 @@ class BoucWen:
     def wrong_way_rad(self) -> float:
         """How far the slow model moves the wrong way after a reversal (0 when admissible).
 
-        Behind a reversal from h = -s the branch is h' = epsilon + k h in the direction of travel, with k = alpha + beta
-        side; the output turns where dh/du = -d1.
+        With s the travel behind the reversal, h starts at its settled size against it: dh/ds = -e - k h down to 0, with
+        e = |epsilon| and k = alpha + beta (epsilon < 0), then -e + k' |h|, with k' = alpha - beta. The output turns
+        where dh/ds = -d1.
         """
-        slope = self.reversal_slope_rad_v()
-        if slope >= 0.0:
+        if self.reversal_slope_rad_v() >= 0.0:
             return 0.0
-        k = self.alpha_1_v - math.copysign(self.beta_1_v, self.epsilon_rad_v)
-        travel = math.log((self.d1_rad_v - slope) / self.d1_rad_v) / k
-        return (self.d1_rad_v - slope) * -math.expm1(-k * travel) / k - self.d1_rad_v * travel
+        e, d1, h0 = -self.epsilon_rad_v, self.d1_rad_v, self.settled_rad
+        k, beyond = self.alpha_1_v + self.beta_1_v, self.alpha_1_v - self.beta_1_v
+        if e <= d1:
+            travel = math.log((e + k * h0) / d1) / k
+            return (h0 + e / k) * -math.expm1(-k * travel) - d1 * travel
+        to_zero, after = math.log1p(k * h0 / e) / k, math.log(e / d1) / beyond
+        return h0 - d1 * to_zero + e * -math.expm1(-beyond * after) / beyond - d1 * after
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,8 +103,8 @@ class Play:
 class Mirror:
     """A mirror in the plant form of this module, continuous in time, with its arrays named as there.
 
-    Bouc-Wen elements come first in the rows of F and G and the columns of E and K, play operators after them. By
-    actuator: ``gain_rad_v`` is the gain for slow, large drives, ``inverse`` the hysteresis that a feedforward inverts.
+    Bouc-Wen elements come first in the rows of F and G and the columns of E and K, play operators after them.
+    ``inverse`` names, by actuator, the hysteresis that a feedforward inverts.
     """
 
     name: str
@@ -114,7 +118,6 @@ class Mirror:
     K: Floats
     bouc_wen: tuple[BoucWen, ...]
     play: Play
-    gain_rad_v: tuple[float, ...]
     inverse: tuple[BoucWen | Play, ...]
 
     @property
@@ -141,13 +144,14 @@ class Mirror:
 
 
 def linear_part(table: mission.LinearPart) -> tuple[lti.StateSpace, float]:
-    """Linear part divided by its magnitude at the normalising frequency, and that magnitude.
+    """Linear part divided by its gain at the normalising frequency, and that gain: magnitude, with the sign of Re.
 
     The gain of the mirror belongs to its hysteresis model; cascading two models with a gain each squares it.
     """
     system = lti.modal_from_polynomials(table.numerator, table.denominator)
-    magnitude = float(np.abs(lti.frequency_response(system, np.array([table.normalise_at_hz]))[0, 0, 0]))
-    return replace(system, C=system.C / magnitude), magnitude
+    response = complex(lti.frequency_response(system, np.array([table.normalise_at_hz]))[0, 0, 0])
+    gain = math.copysign(abs(response), response.real)
+    return replace(system, C=system.C / gain), gain
 
 
 def hysteresis_model(
@@ -163,16 +167,19 @@ def hysteresis_model(
     return Play(table.prandtl_ishlinskii.thresholds_v, table.prandtl_ishlinskii.weights_rad_v)
 
 
+LINE_OF_SIGHT = {"line-of-sight": 1.0, "mechanical": 2.0}
+"""Angle of the line of sight by the convention of a mirror's output: reflection doubles a tilt, per axis."""
+
+
 def line_of_sight(model: BoucWen | Play, convention: str) -> BoucWen | Play:
     """The model with its output as an angle of the line of sight.
 
     "mechanical" is doubled (reflection, per axis at normal incidence); "line-of-sight" is as it stands.
     """
-    if convention == "line-of-sight":
-        return model
+    times = LINE_OF_SIGHT[convention]
     if isinstance(model, Play):
-        return replace(model, weights_rad_v=tuple(2.0 * w for w in model.weights_rad_v))
-    return replace(model, d1_rad_v=2.0 * model.d1_rad_v, epsilon_rad_v=2.0 * model.epsilon_rad_v)
+        return replace(model, weights_rad_v=tuple(times * w for w in model.weights_rad_v))
+    return replace(model, d1_rad_v=times * model.d1_rad_v, epsilon_rad_v=times * model.epsilon_rad_v)
 
 
 def from_mission(table: mission.Mirror, model: BoucWen | Play, composition: str | None = None) -> Mirror:
@@ -209,7 +216,6 @@ def assemble(name: str, composition: str, system: lti.StateSpace | None, model: 
         K=direct[None, :],
         bouc_wen=bouc_wen,
         play=play,
-        gain_rad_v=(slow_gain(model),),
         inverse=(model,),
     )
 
@@ -236,9 +242,9 @@ def _routes(composition: str, elements: int) -> tuple[Floats, Floats]:
     return (first, ones - first) if composition == "additive" else (0.0 * ones, ones)
 
 
-def gain_only(model: BoucWen | Play) -> Play:
+def gain_only(model: BoucWen | Play) -> BoucWen:
     """The model without hysteresis: its gain for slow, large drives and nothing else."""
-    return Play((0.0,), (slow_gain(model),))
+    return BoucWen(slow_gain(model), 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 def combine(*mirrors: Mirror) -> Mirror:
@@ -265,7 +271,6 @@ def combine(*mirrors: Mirror) -> Mirror:
             sum((m.play.thresholds_v for m in mirrors), ()),
             sum((m.play.weights_rad_v for m in mirrors), ()),
         ),
-        gain_rad_v=sum((m.gain_rad_v for m in mirrors), ()),
         inverse=sum((m.inverse for m in mirrors), ()),
     )
 
@@ -287,18 +292,47 @@ def discretise(mirror: Mirror, step_s: float) -> kernels.Plant:
             f"use a step of at most {usable:.3g} s, or move the mean slope of the hysteresis into A"
         )
     B0, E0, B1, E1 = start[:, :m], start[:, m:], end[:, :m], end[:, m:]
-    elements = E0.shape[1]
-    no_x, no_u, no_z = np.zeros((elements, Ad.shape[0])), np.zeros((elements, m)), np.zeros((elements, elements))
+    return plant_arrays(step_s, (Ad, B0, B1, E0, E1), mirror)
+
+
+def plant_arrays(step_s: float, discrete: tuple[Floats, ...], mirror: Mirror) -> kernels.Plant:
+    """The kernel's arrays from the discrete matrices Ad, B0, B1, E0, E1 and the mirror's F, G, C, D, K and bank."""
+    Ad, B0, B1, E0, E1 = discrete
+    n, odd = Ad.shape[0], Ad.shape[0] % 2  # the kernel pairs the states: an odd one gets an idle partner
+    Ad = np.pad(Ad, (0, odd))
+    neighbour = np.arange(n + odd) ^ 1
+    near = np.eye(n + odd, dtype=bool) | (np.arange(n + odd)[:, None] == neighbour)
+
+    def count(size: int) -> kernels.Count:
+        return (0,) * size
+
+    def below(matrix: Floats) -> Floats:
+        return np.pad(matrix.astype(float), ((0, odd), (0, 0)))
+
+    def beside(matrix: Floats) -> Floats:
+        return np.pad(matrix.astype(float), ((0, 0), (0, odd)))
+
     return kernels.Plant(
         step_s=float(step_s),
-        states=int(Ad.shape[0]),
-        actuators=tuple(range(m)),
-        outputs=tuple(range(mirror.axes)),
-        transition=kernels.rows(Ad, B0, B1, E0 + E1),
-        correction=E1.copy(),
-        from_state=kernels.rows(mirror.F),
-        from_drive=kernels.rows(no_x, no_u, mirror.G, no_z),
-        output=kernels.rows(mirror.C, np.zeros_like(mirror.D), mirror.D, mirror.K),
+        states=count(n),
+        actuators=count(mirror.actuators),
+        outputs=count(mirror.axes),
+        elements=count(len(mirror.bouc_wen)),
+        feedback=bool(np.any(mirror.F)),
+        direct=bool(np.any(mirror.B) or np.any(mirror.D)),
+        diagonal=np.diag(Ad).copy(),
+        coupling=Ad[np.arange(n + odd), neighbour],
+        rest=kernels.rows(np.where(near, 0.0, Ad)),
+        B0=below(B0),
+        B1=below(B1),
+        E_held=below(E0 + E1),
+        E1=below(E1),
+        F=beside(mirror.F),
+        G=mirror.G.astype(float),
+        C=beside(mirror.C),
+        D=mirror.D.astype(float),
+        CE1=mirror.C @ E1,
+        K=mirror.K.astype(float),
         bouc_wen=np.array([b.row for b in mirror.bouc_wen], dtype=float).reshape(-1, 8),
         play_threshold=np.array(mirror.play.thresholds_v, dtype=float),
         play_weight=np.array(mirror.play.weights_rad_v, dtype=float),
@@ -315,7 +349,9 @@ def contraction(mirror: Mirror, step_s: float) -> float:
 
 
 def _steepest(b: BoucWen) -> float:
-    rate = 0.0 if math.isinf(b.rate_limit_v_s) else b.rate_limit_v_s
+    if math.isinf(b.rate_limit_v_s) and (b.delta_s_v or b.d2_s_v):
+        raise ValueError("a Bouc-Wen element that is fed back and depends on rate needs a finite rate limit")
+    rate = b.rate_limit_v_s if b.delta_s_v or b.d2_s_v else 0.0
     slope = (
         abs(b.epsilon_rad_v)
         * math.exp(b.delta_s_v * rate)
@@ -328,14 +364,14 @@ def _steepest(b: BoucWen) -> float:
 
 def at_rest(plant: kernels.Plant) -> kernels.PlantState:
     """A fresh state of the plant: everything zero, which is rest at the bias."""
-    n, m, bouc_wen = plant.states, len(plant.actuators), plant.bouc_wen.shape[0]
-    elements = bouc_wen + plant.play_threshold.size
+    m, bouc_wen = len(plant.actuators), len(plant.elements)
     return kernels.PlantState(
-        w=np.zeros(n + 2 * m + elements),
-        q=np.zeros(elements),
-        h=np.zeros(bouc_wen),
-        p=np.zeros(elements - bouc_wen),
-        scratch=np.zeros(n + elements),
+        x=np.zeros(plant.diagonal.size),
+        x_next=np.zeros(plant.diagonal.size),
+        u=np.zeros(m),
+        u_next=np.zeros(m),
+        y=np.zeros(len(plant.outputs)),
+        bank=np.zeros((bouc_wen + plant.play_threshold.size, 4)),
         clamped=np.zeros(bouc_wen, dtype=np.int64),
     )
 
@@ -411,10 +447,12 @@ def summarise(table: mission.Mirror) -> Summary:
         dc, band = float(gain[0]), (float(gain[1:].min()), float(gain[1:].max()))
         warnings += [
             f"{r.kind} at {r.frequency_hz:.3g} Hz lies outside the excited band "
-            f"({table.linear.excited_from_hz:g} to {table.linear.excited_to_hz:g} Hz): drift fitted as dynamics"
+            f"({table.linear.excited_from_hz:g} to {table.linear.excited_to_hz:g} Hz)"
+            + (": drift fitted as dynamics" if r.frequency_hz < table.linear.excited_from_hz else ": extrapolated")
             for r in roots
             if not r.in_band
         ]
+        warnings += [f"unstable pole at {r.frequency_hz:.3g} Hz" for r in roots if r.kind == "pole" and r.damping < 0.0]
         if not 0.9 * band[0] <= dc <= 1.1 * band[1]:
             warnings.append(f"gain at DC {dc:.5f} is not the gain in the band, {band[0]:.5f} to {band[1]:.5f}")
     return Summary(
@@ -434,5 +472,5 @@ def _admissibility(model: BoucWen | Play) -> tuple[str, ...]:
             f"by {model.wrong_way_rad * 1e6:.1f} µrad on a slow drive",
         )
     if rate < model.rate_limit_v_s:
-        return (f"the slope after a reversal stays positive only up to {rate:.0f} V/s before the reversal",)
+        return (f"the slope after a reversal stays positive only up to {math.floor(rate)} V/s before the reversal",)
     return ()

@@ -20,6 +20,9 @@ STEP_TOLERANCE = 1e-9
 MOST_STEPS = 1_000_000
 """Plant steps in a control period or a delay beyond which a step is taken for a slip of the pen."""
 
+MOST_SAMPLES = 2_000_000
+"""Control samples in a period of the scenario's sines beyond which a run would not fit into memory."""
+
 _KINDS = ("paper", "assumption", "standard", "measured", "identified")
 
 
@@ -113,6 +116,9 @@ class Conventions(Table):
     )
     strehl: Literal["decibel", "ratio"] = Field(description="decibel: a loss in dB; ratio: a number up to 1")
     divergence: Literal["full-1/e2", "half-1/e2"] = Field(description="which angle a beam's divergence is")
+    residual: Literal["per-axis", "radial"] = Field(
+        description="per-axis: the simulated axis is the pointing error; radial: two equal axes, sqrt 2 more"
+    )
     mirror_angle: Literal["line-of-sight", "mechanical"] = Field(description="mechanical is doubled by reflection")
 
 
@@ -166,6 +172,9 @@ class LinearPart(Table):
     def problems(self) -> Iterator[Problem]:
         """A proper fraction, normalised inside its band."""
         zeros = [place for place, value in enumerate(self.numerator) if value != 0.0]
+        if self.denominator[-1] == 0.0:
+            advice = "a last coefficient other than 0; model drift apart from the mirror"
+            yield Problem("denominator", "ends with 0, which makes the linear part an integrator", advice)
         if self.denominator[0] == 0.0:
             yield Problem("denominator", "begins with 0", "the highest power of s first, with a factor other than 0")
         if not zeros:
@@ -190,6 +199,14 @@ class BoucWenTable(Table):
     delta_s_v: Annotated[float, Quantity("s/V")] = Field(alias="delta")
     alpha_1_v: Annotated[float, Quantity("1/V")] = Field(alias="alpha")
     beta_1_v: Annotated[float, Quantity("1/V")] = Field(alias="beta")
+
+    def problems(self) -> Iterator[Problem]:
+        """Hysteresis that stays bounded."""
+        if not self.alpha_1_v > abs(self.beta_1_v):
+            size = format_quantity(abs(self.beta_1_v), "1/V")
+            yield Problem(
+                "alpha", f"is not above the size of beta ({size}), so h would grow without bound", f"above {size}"
+            )
 
 
 class PrandtlIshlinskiiTable(Table):
@@ -337,7 +354,11 @@ def _bias_fits(mirror: Mirror, amplifier: Amplifier) -> Iterator[Problem]:
 def _frequencies_fit(control: Control, scenario: Scenario) -> Iterator[Problem]:
     half = format_quantity(control.rate_hz / 2, "Hz")
     for name in ("pid_frequencies", "inverse_frequencies", "loop_frequencies"):
-        highest = getattr(scenario, f"{name}_hz")[-1]
+        lowest, highest = getattr(scenario, f"{name}_hz")[0], getattr(scenario, f"{name}_hz")[-1]
+        slowest = control.rate_hz / MOST_SAMPLES
+        if lowest < slowest:
+            reason = f"begins at {format_quantity(lowest, 'Hz')}, a period of over {MOST_SAMPLES} control samples"
+            yield Problem(f"scenario.{name}", reason, f"frequencies of at least {format_quantity(slowest, 'Hz')}")
         if highest >= control.rate_hz / 2:
             reason = f"reaches {format_quantity(highest, 'Hz')}, but half of control.rate is {half}"
             yield Problem(f"scenario.{name}", reason, f"frequencies below {half}")

@@ -5,6 +5,8 @@ makes the tracking errors worse at 1 and 15 Hz, and more so at the higher freque
 and 25 µrad off the error at 15 and 25 Hz (Fig. 8); and the control reaches 10 µrad (section 3.1).
 """
 
+import math
+import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
@@ -24,7 +26,8 @@ CLAIMED_DROP_RAD = {15.0: 10e-6, 25.0: 25e-6}  # Fig. 8, by frequency in Hz
 DROP_TOLERANCE = 0.25  # "about", as a share of the claimed drop
 CLAIMED_ACCURACY_RAD = 10e-6  # section 3.1
 COMPOSITIONS = ("cascade", "additive")
-# Proportional gains in V/mrad and integral gains in V/(mrad s), for the paper's mirror of 0.089 mrad/V.
+# Proportional gains in V/mrad and integral gains in V/(mrad s), for the paper's mirror.
+GAINS_FOR_RAD_V = 0.089e-3
 PROPORTIONAL_V_MRAD = (0.0, 1.0, 4.0)
 INTEGRAL_V_MRAD_S = (4e3, 8e3, 1.1e4, 1.3e4, 1.4e4, 1.5e4, 1.6e4, 1.8e4, 2.5e4, 4e4)
 
@@ -111,12 +114,12 @@ def scan(m: mission.Mission, on_progress: Progress | None = None) -> Scan:
     """
     model = hysteresis(m, m.mirror)
     timing = control.timing_from_mission(m.control)
-    delay = round(timing.delay_steps / timing.steps_per_sample)
+    delay = math.ceil(timing.delay_steps / timing.steps_per_sample)
     coarse = replace(timing, steps_per_sample=1, delay_steps=delay)
     jobs = list(product(COMPOSITIONS, PROPORTIONAL_V_MRAD, INTEGRAL_V_MRAD_S))
     points = []
     # Threads suffice: the kernel runs without the interpreter lock.
-    with ThreadPoolExecutor(max_workers=2) as pool:
+    with ThreadPoolExecutor(max_workers=os.cpu_count()) as pool:
         for done, point in enumerate(pool.map(lambda job: _point(m, model, coarse, *job), jobs), 1):
             points.append(point)
             if on_progress:
@@ -132,10 +135,12 @@ def _point(
     proportional_v_mrad: float,
     integral_v_mrad_s: float,
 ) -> Point:
-    gains = control.Gains(proportional_v_mrad * 1e3, integral_v_mrad_s * 1e3, 0.0, m.control.derivative_filter_s)
+    printed = control.Gains(proportional_v_mrad * 1e3, integral_v_mrad_s * 1e3, 0.0, m.control.derivative_filter_s)
+    scale = GAINS_FOR_RAD_V / mirror.slow_gain(model)  # the same loop gain for a mirror of another gain
+    gains = replace(printed, proportional=printed.proportional * scale, integral=printed.integral * scale)
     setup = simulate.Setup(control.drive_from_mission(m), timing, control.pid(gains, timing.period_s))
     loop = simulate.sampled_loop(mirror.from_mission(m.mirror, mirror.gain_only(model), "cascade"), setup)
-    blank = Point(composition, gains.proportional, gains.integral, False, {}, {}, {}, {}, {})
+    blank = Point(composition, printed.proportional, printed.integral, False, {}, {}, {}, {}, {})
     if control.slowest_pole(loop) >= 1.0:
         return blank
     hysteretic = mirror.from_mission(m.mirror, model, composition)

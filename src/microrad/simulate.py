@@ -20,8 +20,8 @@ class Counts:
     """What a result must be read with; each over the whole run, all actuators together.
 
     clamped: plant steps beyond the identified rate. inverse_clamped: the same in the feedforward. saturated: samples at
-    the drive's limits. slew_limited: plant steps at the amplifier's slew limit. alternating: samples in a zigzag of the
-    command, three increments of alternating sign in a row, each larger than two steps of the converter.
+    the drive's limits. slew_limited: plant steps at the amplifier's slew limit. alternating: reversals of the command
+    within 10 samples of the last one, in moves larger than two steps of the converter.
     """
 
     clamped: int
@@ -96,23 +96,23 @@ def assemble(m: mirror.Mirror, setup: Setup, inverse: Inverse) -> kernels.Loop:
     drive, timing, controller = setup.drive, setup.timing, setup.controller
     actuators = m.actuators
 
-    def each(value: float) -> Floats:
-        return np.full(actuators, float(value))
-
+    follow, slew = amplifier_factor(drive, timing.step_s), drive.slew_v_s * timing.step_s
+    row = np.array([drive.minimum_v, drive.maximum_v, drive.drive_resolution_v, follow, slew])
     return kernels.Loop(
-        actuators=tuple(range(actuators)),
-        axes=tuple(range(m.axes)),
+        actuators=(0,) * actuators,
+        axes=(0,) * m.axes,
+        states=(0,) * controller.order,
+        inverse_elements=(0,) * len(inverse.bouc_wen),
+        feedforward=bool(any(inverse.direct) or inverse.bouc_wen),
         steps_per_sample=timing.steps_per_sample,
         delay_steps=timing.delay_steps,
-        update=kernels.rows(controller.A, controller.B),
-        command=kernels.rows(controller.C, controller.D),
-        anti_windup=anti_windup(controller),
-        command_min=each(drive.minimum_v),
-        command_max=each(drive.maximum_v),
-        drive_resolution=each(drive.drive_resolution_v),
+        Ac=controller.A.copy(),
+        Bc=controller.B.copy(),
+        Cc=controller.C.copy(),
+        Dc=controller.D.copy(),
+        L=anti_windup(controller),
+        actuator=np.tile(row, (actuators, 1)),
         sensor_resolution=np.full(m.axes, drive.sensor_resolution_rad),
-        amplifier_factor=each(amplifier_factor(drive, timing.step_s)),
-        slew_step=each(drive.slew_v_s * timing.step_s),
         allocation=np.eye(actuators, m.axes),
         inverse_direct=np.array(inverse.direct),
         inverse_bouc_wen=np.array([b.row for b in inverse.bouc_wen], dtype=float).reshape(-1, 8),
@@ -125,13 +125,15 @@ def assemble(m: mirror.Mirror, setup: Setup, inverse: Inverse) -> kernels.Loop:
 
 def at_rest(loop: kernels.Loop) -> kernels.LoopState:
     """A fresh state of the loop: everything zero."""
-    states, actuators = loop.anti_windup.shape
+    states, actuators = loop.L.shape
     axes = loop.sensor_resolution.size
     return kernels.LoopState(
-        w=np.zeros(states + axes),
-        scratch=np.zeros(max(states, actuators)),
+        x=np.zeros(states),
+        x_next=np.zeros(states),
+        error=np.zeros(axes),
+        output=np.zeros(actuators),
         command=np.zeros(actuators),
-        target=np.zeros(actuators),
+        target=np.zeros((actuators, 2)),
         feedforward=np.zeros(actuators),
         inverse_h=np.zeros(loop.inverse_bouc_wen.shape[0]),
         inverse_p=np.zeros(loop.inverse_play_threshold.size),
@@ -168,15 +170,22 @@ def track(name: str, m: mirror.Mirror, setup: Setup, inverse: Inverse, reference
     return Trace(name, time, reference_rad, output, command, applied, steady, counts)
 
 
-def alternations(command: Floats, threshold: float) -> int:
-    """Samples in a zigzag: three increments in a row of alternating sign, each larger in size than ``threshold``.
+CHATTER_SAMPLES = 10  # reversals nearer to each other than this are chatter, not the reference
 
-    A reversal of a smooth signal changes sign once and is not counted.
+
+def alternations(command: Floats, threshold: float) -> int:
+    """Reversals of the command that follow the last one within 10 samples; moves up to ``threshold`` are not looked at.
+
+    A zigzag from sample to sample counts at every sample, a limit cycle of a few samples twice a cycle, and a reversal
+    of a smooth reference not at all. ``command`` is (samples, actuators).
     """
-    step = np.diff(command, axis=0)
-    sign = np.where(np.abs(step) > threshold, np.sign(step), 0.0)
-    turns = sign[1:] * sign[:-1] < 0
-    return int(np.count_nonzero(turns[1:] & turns[:-1]))
+    count = 0
+    for column in command.T:
+        step = np.diff(column)
+        moves = np.flatnonzero(np.abs(step) > threshold)
+        turns = moves[1:][step[moves[1:]] * step[moves[:-1]] < 0.0]
+        count += int(np.count_nonzero(np.diff(turns) <= CHATTER_SAMPLES))
+    return count
 
 
 def track_sine(
@@ -189,11 +198,13 @@ def track_sine(
 def sine(amplitude_rad: float, freq_hz: float, period_s: float, settle_s: float = 0.2) -> tuple[Floats, slice]:
     """A sine reference of one axis, shape (samples, 1), and its steady part.
 
-    The steady part is the last whole period; before it come whole periods, one at least and ``settle_s`` at least.
+    The steady part is whole periods, as many as make 200 samples; before it come whole periods, one at least and
+    ``settle_s`` at least.
     """
-    periods = 1 + max(1, math.ceil(settle_s * freq_hz))
+    shown = math.ceil(200 * freq_hz * period_s)
+    periods = shown + max(1, math.ceil(settle_s * freq_hz))
     samples = round(periods / freq_hz / period_s)
-    steady = slice(samples - round(1 / freq_hz / period_s), samples)
+    steady = slice(samples - round(shown / freq_hz / period_s), samples)
     time = np.arange(samples) * period_s
     return amplitude_rad * np.sin(2 * np.pi * freq_hz * time)[:, None], steady
 
@@ -220,16 +231,25 @@ class HysteresisLoop:
 def hysteresis_loop(
     model: mirror.BoucWen | mirror.Play, freq_hz: float, amplitude_v: float, step_s: float
 ) -> HysteresisLoop:
-    """The static hysteresis model (no linear part) under a sine of ``amplitude_v`` about its bias: the third period."""
+    """The static hysteresis model (no linear part) under a sine of ``amplitude_v`` about its bias, once it repeats
+    itself.
+
+    Repeating: the loop of h moves by at most 1e-6 of its size from one period to the next, or 1000 periods have passed.
+    """
     static = mirror.assemble("static", "static", None, model)
     samples = round(1 / freq_hz / step_s)
     step_s = 1 / freq_hz / samples  # a whole number of samples a period
     plant = mirror.discretise(static, step_s)
-    drive = amplitude_v * np.sin(2 * np.pi * np.arange(3 * samples) / samples)[:, None]
     state = mirror.at_rest(plant)
-    output, bank = np.empty((drive.shape[0], 1)), np.empty((drive.shape[0], state.q.size))
-    kernels.open_loop(plant, state, drive, output, bank)
-    u, y = drive[-samples:, 0], output[-samples:, 0]
+    drive = amplitude_v * np.sin(2 * np.pi * np.arange(1, samples + 1) / samples)[:, None]
+    output, bank, last = np.empty((samples, 1)), np.empty((samples, state.bank.shape[0])), np.full(samples, np.inf)
+    for _ in range(1000):
+        state.clamped[:] = 0
+        kernels.open_loop(plant, state, drive, output, bank)
+        if np.max(np.abs(output[:, 0] - last)) <= 1e-6 * np.ptp(output):
+            break
+        last = output[:, 0].copy()
+    u, y = drive[:, 0], output[:, 0]
     return HysteresisLoop(freq_hz, u, y, y - _linear_output(model, u, step_s), int(state.clamped.sum()))
 
 

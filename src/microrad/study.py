@@ -1,5 +1,6 @@
 """One study: from a mission file to a verdict. The story, and the only place where the parts meet."""
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -7,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from microrad import control, link, mirror, paper, pointing, simulate, tracking, verdict
+from microrad.mission import Mission
 from microrad.missionfile import MissionFile
 
 Floats = NDArray[np.float64]
@@ -84,6 +86,7 @@ def run(file: MissionFile, on_progress: Progress = lambda done, total, what: Non
 
     on_progress(2, 3, "claims of the paper")
     scan = paper.scan(m, on_progress) if paper.applies(m) else None
+    on_progress(3, 3, "verdict")
     evidence = verdict.Evidence(
         m, open_loop, beacon, communication, fig2.readings, fig2.ideal, loops, summary, runs, scan
     )
@@ -116,6 +119,14 @@ def compare(file: MissionFile, runs: tuple[tracking.Run, ...]) -> Comparison | N
     return Comparison(run, float(link.margin_of_error(m, np.array([tracking.residual_rad(m, run.trace)]))[0]))
 
 
+def largest_error(m: Mission, margin_db: float) -> float:
+    """Largest pointing error (rad) for a margin at the mission's rate; nan when the link has not even that on axis."""
+    try:
+        return link.largest_pointing_error(m, margin_db, m.communication.data_rate_bit_s)
+    except link.LinkError:
+        return math.nan
+
+
 def margin_map(file: MissionFile) -> MarginMap:
     """Margin over data rate and pointing error, with the receivers that the requirement implies."""
     m, q = file.mission, file.mission.requirement
@@ -124,7 +135,7 @@ def margin_map(file: MissionFile) -> MarginMap:
         MAP_ERRORS_RAD,
         link.margin_map(m, MAP_RATES_BIT_S, MAP_ERRORS_RAD),
         link.largest_data_rate(m, q.margin_db, q.pointing_error_rad),
-        link.largest_pointing_error(m, q.margin_db, m.communication.data_rate_bit_s),
+        largest_error(m, q.margin_db),
         link.implied_sensitivity(m),
         link.ideal_receivers(m, file.sources),
     )

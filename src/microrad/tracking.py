@@ -1,6 +1,9 @@
 """The paper's tracking cases on the mission's mirror (Fig. 5, 6 and 8), and the residual that the link lives with."""
 
+import math
 from dataclasses import dataclass
+
+import numpy as np
 
 from microrad import control, mirror, simulate
 from microrad.mission import Comparison, Mission
@@ -17,6 +20,12 @@ class Run:
     controller: str  # "PID" or "PID + inverse"
     freq_hz: float
     trace: simulate.Trace
+
+    @property
+    def fastest_drive_v_s(self) -> float:
+        """Largest rate of the drive behind the amplifier, from sample to sample (V/s)."""
+        period = self.trace.time_s[1] - self.trace.time_s[0]
+        return float(np.max(np.abs(np.diff(self.trace.drive_v, axis=0))) / period)
 
 
 def hysteresis(m: Mission, table: MirrorTable | Comparison) -> Model:
@@ -75,5 +84,6 @@ def worst(m: Mission, runs: tuple[Run, ...], which: str = "given") -> Run:
 
 
 def residual_rad(m: Mission, trace: simulate.Trace) -> float:
-    """The residual in the statistic that the mission asks for."""
-    return trace.peak_rad if m.requirement.residual_statistic == "peak" else trace.rms_rad
+    """The residual that the link sees, in the mission's statistic and convention (per axis, or radial)."""
+    one_axis = trace.peak_rad if m.requirement.residual_statistic == "peak" else trace.rms_rad
+    return one_axis * math.sqrt(2.0) if m.conventions.residual == "radial" else one_axis

@@ -411,7 +411,7 @@ def _drift(
             largest = trend
         if abs(trend) > max(3 * error, _DRIFT_PERCENT / 100 * span_rad):
             warnings.append(
-                f"{recording.path}: the residual drifts by {1e6 * trend:.3g} ± {1e6 * error:.1g} urad "
+                f"{recording.path}: the residual drifts by {1e6 * trend:.3g} ± {1e6 * error:.2g} urad "
                 f"({100 * trend / span_rad:.2g} % of the peak-to-peak output) in "
                 f"{residual.size * recording.step_s:.3g} s: creep or a warming sensor; no model here describes it."
             )

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from microrad import paper, simulate
 from microrad.mission import Mission
 from microrad.study import Study
-from microrad.tracking import Run
+from microrad.tracking import Run, residual_rad
 
 Floats = NDArray[np.float64]
 
@@ -114,10 +114,11 @@ def margin_map(study: Study) -> Figure:
     canvas.colorbar(filled, ax=axes, label="link margin (dB)")
     counts = [r.photons_per_bit for r in f.readings]
     convention = f"{m.conventions.pointing_loss} pointing loss, Strehl as {m.conventions.strehl}"
+    largest = f"at most {f.largest_error_rad * 1e6:.2f} µrad" if f.largest_error_rad > 0 else "not even on axis"
     caption = (
         f"Margin of the communication link ({convention}). For {m.requirement.margin_db:g} dB: at most "
-        f"{f.largest_rate_bit_s * 1e-6:.1f} Mbit/s at {m.requirement.pointing_error_rad * 1e6:g} µrad, or at most "
-        f"{f.largest_error_rad * 1e6:.2f} µrad at {m.communication.data_rate_bit_s * 1e-6:g} Mbit/s (both solved). "
+        f"{f.largest_rate_bit_s * 1e-6:.1f} Mbit/s at {m.requirement.pointing_error_rad * 1e6:g} µrad, or {largest} "
+        f"at {m.communication.data_rate_bit_s * 1e-6:g} Mbit/s (both solved). "
         f"Over the four readings of the paper's table the same point implies a receiver of {min(counts):.0f} to "
         f"{max(counts):.0f} photons per bit: the map would shift by {10 * np.log10(max(counts) / min(counts)):.1f} dB."
     )
@@ -129,9 +130,7 @@ def margin_map(study: Study) -> Figure:
 
 def residual_urad(study: Study) -> float:
     """The residual in the mission's statistic, in µrad."""
-    trace = study.residual.trace
-    peak = study.file.mission.requirement.residual_statistic == "peak"
-    return (trace.peak_rad if peak else trace.rms_rad) * 1e6
+    return residual_rad(study.file.mission, study.residual.trace) * 1e6
 
 
 def hysteresis_loops(study: Study) -> Figure:

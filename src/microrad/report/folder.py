@@ -1,5 +1,6 @@
 """A folder of results appears whole or not at all, and never replaces what microrad did not write."""
 
+import json
 import shutil
 import tempfile
 from collections.abc import Iterator
@@ -21,10 +22,18 @@ def check_folder(folder: Path, overwrite: bool) -> None:
         raise FolderError(f"{folder} is a file, not a folder: choose another --output")
     if not any(folder.iterdir()):
         return
-    if not (folder / MANIFEST).is_file():
+    if not _ours(folder / MANIFEST):
         raise FolderError(f"{folder} holds files that are not results of microrad: choose another --output")
     if not overwrite:
         raise FolderError(f"{folder} already holds results: choose another --output, or replace them with --overwrite")
+
+
+def _ours(manifest: Path) -> bool:
+    """Whether this is a manifest that microrad wrote."""
+    try:
+        return "microrad" in json.loads(manifest.read_text(encoding="utf-8"))["versions"]
+    except (OSError, ValueError, KeyError, TypeError):
+        return False
 
 
 @contextmanager

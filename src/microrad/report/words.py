@@ -3,7 +3,7 @@
 from typing import Any
 
 from microrad.study import Study
-from microrad.tracking import residual_rad
+from microrad.tracking import Run, residual_rad
 from microrad.units import format_quantity
 
 
@@ -36,6 +36,8 @@ def explanation(study: Study) -> list[str]:
         f"peaks and {format_quantity(trace.rms_rad, 'rad', 3)} rms; allowed are "
         f"{format_quantity(m.requirement.pointing_error_rad, 'rad', 3)} ({m.requirement.residual_statistic}).",
     ]
+    if extrapolated := beyond_identified(study, run):
+        sentences.append(f"Not to be relied on: {extrapolated}.")
     failed = [r for r in study.requirements if not r.met]
     if failed:
         causes = dict.fromkeys(r.limited_by.removeprefix("the residual: ") for r in failed)
@@ -58,9 +60,21 @@ def verdict_text(study: Study) -> str:
     return "\n".join(lines)
 
 
+def beyond_identified(study: Study, run: Run) -> str:
+    """The warning that a run drives the mirror faster than its model was identified for, or nothing."""
+    limit = study.file.mission.mirror.rate_limit_v_s
+    if run.mirror == "no hysteresis" or run.fastest_drive_v_s <= limit:
+        return ""
+    return (
+        f"{run.trace.name}: drive of up to {run.fastest_drive_v_s:.3g} V/s, but the mirror model was identified up to "
+        f"{limit:.3g} V/s: what it says there is extrapolated"
+    )
+
+
 def warnings(study: Study) -> list[str]:
     """What a reader must not overlook: the mirror's own warnings, and runs outside their range."""
     found = list(study.summary.warnings)
+    found += filter(None, (beyond_identified(study, run) for run in study.runs))
     for run in study.runs:
         c = run.trace.counts
         counts = {
