@@ -2,7 +2,7 @@
 
     python benchmarks/loop.py
 
-The trajectory is the paper's 15 Hz sine of 300 µrad on its mirror (Eq. 2 and 3) at 50 kHz, under PI and under PI +
+The trajectory is the paper's 15 Hz sine of 300 µrad on its mirror (Eq. 2 and 3) at 50 kHz, under PID and PID +
 inverse, with the shipped mission's amplifier, converters and delay. The twin does the same arithmetic, with the C
 library's exponential. The peers integrate the mirror alone under the drive that the loop produced, linear between
 samples, which spares them the controller; errors are against SciPy at 1e-12.
@@ -26,6 +26,7 @@ from microrad import kernels, mirror, missionfile, simulate, tracking
 
 HERE = Path(__file__).resolve().parent
 REPEATS = 15
+DERIVATIVE_V_S_RAD = 0.01  # small, but there, so that both carry all states of a PID
 DOUBLE, INTEGER = ctypes.c_double, ctypes.c_int64
 
 
@@ -187,8 +188,10 @@ def main() -> None:
     model = tracking.hysteresis(mission, mission.mirror)
     m = mirror.from_mission(mission.mirror, model)
     setup = simulate.setup_from_mission(mission, mirror.slow_gain(model))
-    setup = replace(setup, timing=microrad_control.Timing(setup.timing.period_s, 1, 1))
     period = setup.timing.period_s
+    gains = microrad_control.gains_from_mission(mission.control, mirror.slow_gain(model))
+    controller = microrad_control.pid(replace(gains, derivative=DERIVATIVE_V_S_RAD), period)
+    setup = replace(setup, timing=microrad_control.Timing(period, 1, 1), controller=controller)
     reference, _ = simulate.sine(mission.scenario.amplitude_rad, 15.0, period, settle_s=2.0)
 
     print(
@@ -197,8 +200,8 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         twin = compiled_twin(folder)
         for name, inverse in (
-            ("PI + inverse", microrad_control.inverse(m)),
-            ("PI", microrad_control.no_feedforward(m)),
+            ("PID + inverse", microrad_control.inverse(m)),
+            ("PID", microrad_control.no_feedforward(m)),
         ):
             times, output, drive = loop_against_twin(twin, m, setup, inverse, reference)
             ratio = times["kernel"] / times["C twin"]
