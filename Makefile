@@ -27,6 +27,7 @@ unit: $(VENV)/.test
 
 benchmark: $(VENV)/.test
 	$(BIN)/python benchmarks/loop.py
+	$(BIN)/python benchmarks/start.py
 
 clean:
 	rm -rf $(VENV) $(DEMO)

@@ -3,7 +3,6 @@
 import errno
 import importlib
 import json
-import math
 import os
 import pkgutil
 import shlex
@@ -151,18 +150,10 @@ def test_readme_names_every_command(command):
     assert f"microrad {command}" in text
 
 
-def test_help_is_quick_and_loads_nothing_heavy():
+def test_help_loads_nothing_heavy():
     heavy = ["numpy", "scipy", "numba", "pydantic", "xarray", "matplotlib", "h5py", "rich", "jinja2"]
     code = f"import sys, microrad, microrad.cli; print([m for m in {heavy} if m in sys.modules])"
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "[]\n"
-    best = math.inf
-    for _ in range(5):
-        start = time.perf_counter()
-        subprocess.run([*MICRORAD, "--help"], capture_output=True, check=True)
-        best = min(best, time.perf_counter() - start)
-        if best <= 0.3:
-            break
-    assert best <= 0.3
 
 
 def test_version(call):

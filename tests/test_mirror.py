@@ -3,7 +3,6 @@
 import re
 from dataclasses import replace
 from math import exp, inf, pi
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,8 +13,8 @@ import oracles
 from microrad import control, kernels, lti, mirror, simulate
 from microrad.mirror import BoucWen, Mirror, Play
 from microrad.missionfile import load_mission
+from shipped import SHIPPED, edited
 
-SHIPPED = Path(__file__).parent.parent / "missions" / "leo-geo.toml"
 STEP = 20e-6
 PRINTED = BoucWen(0.089e-3, -2.96e-7, -0.048e-3, 4.7e-4, 38.421, 34.635, 3770.0, 6.0)  # section 3.3 of the paper
 ADMISSIBLE = replace(PRINTED, epsilon_rad_v=-0.022e-3, alpha_1_v=2.4, beta_1_v=0.6)
@@ -34,17 +33,6 @@ RESONANT = (  # the same transfer function in modal form, for the package, and i
         np.zeros((1, 1)),
     ),
 )
-
-
-def edited(folder, *changes):
-    """The mission of the shipped file with pieces of its text replaced, each of which occurs once."""
-    text = SHIPPED.read_text()
-    for old, new in changes:
-        assert text.count(old) == 1, old
-        text = text.replace(old, new)
-    path = folder / "mission.toml"
-    path.write_text(text)
-    return load_mission(path).mission
 
 
 @pytest.fixture(scope="module")

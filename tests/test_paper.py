@@ -1,7 +1,6 @@
 """The search for gains with which the paper's closed-loop claims hold, against single runs of the loop."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,20 +8,9 @@ from numpy.testing import assert_allclose
 
 from microrad import control, mirror, paper, simulate, tracking
 from microrad.missionfile import load_mission
+from shipped import SHIPPED, edited
 
-SHIPPED = Path(__file__).parent.parent / "missions" / "leo-geo.toml"
 ACCURATE = "PID + inverse stays within 10 µrad at its peaks"
-
-
-def edited(folder, *changes):
-    """The mission of the shipped file with pieces of its text replaced, each of which occurs once."""
-    text = SHIPPED.read_text()
-    for old, new in changes:
-        assert text.count(old) == 1, old
-        text = text.replace(old, new)
-    path = folder / "mission.toml"
-    path.write_text(text)
-    return load_mission(path).mission
 
 
 @pytest.fixture(scope="module")

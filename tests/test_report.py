@@ -6,7 +6,6 @@ import json
 import math
 import re
 from html.parser import HTMLParser
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,13 +13,12 @@ import xarray as xr
 
 from microrad import missionfile, report, study
 from microrad.report import figures, folder
-
-MISSION = Path(__file__).parents[1] / "missions" / "leo-geo.toml"
+from shipped import SHIPPED, edited_file
 
 
 @pytest.fixture(scope="module")
 def paper():
-    return study.run(missionfile.load_mission(MISSION))
+    return study.run(missionfile.load_mission(SHIPPED))
 
 
 @pytest.fixture(scope="module")
@@ -29,16 +27,6 @@ def written(paper, tmp_path_factory):
     page = report.write(paper, target)
     assert page == target / "report.html"
     return target
-
-
-def edited(tmp_path, *changes):
-    text = MISSION.read_text(encoding="utf-8")
-    for old, new in changes:
-        assert text.count(old) == 1, old
-        text = text.replace(old, new)
-    path = tmp_path / "edited.toml"
-    path.write_text(text, encoding="utf-8")
-    return missionfile.load_mission(path)
 
 
 class Links(HTMLParser):
@@ -112,15 +100,15 @@ def test_results_carry_units_and_the_numbers_of_the_study(written, paper):
         assert run.attrs["peak_error_rad"] == paper.residual.trace.peak_rad
         error = (run["reference"] - run["output"]).values[run.attrs["steady_from_sample"] :]
         assert np.max(np.abs(error)) == pytest.approx(paper.residual.trace.peak_rad, rel=1e-12)
-        assert tree.attrs["mission_sha256"] == hashlib.sha256(MISSION.read_bytes()).hexdigest()
+        assert tree.attrs["mission_sha256"] == hashlib.sha256(SHIPPED.read_bytes()).hexdigest()
     finally:
         tree.close()
 
 
 def test_the_manifest_names_mission_versions_and_every_file(written):
     manifest = json.loads((written / "manifest.json").read_text(encoding="utf-8"))
-    assert manifest["mission"]["text"] == MISSION.read_text(encoding="utf-8")
-    assert manifest["mission"]["sha256"] == hashlib.sha256(MISSION.read_bytes()).hexdigest()
+    assert manifest["mission"]["text"] == SHIPPED.read_text(encoding="utf-8")
+    assert manifest["mission"]["sha256"] == hashlib.sha256(SHIPPED.read_bytes()).hexdigest()
     assert {"python", "microrad", "numpy", "numba"} <= set(manifest["versions"])
     files = {str(p.relative_to(written)): p for p in written.rglob("*") if p.is_file() and p.name != "manifest.json"}
     assert set(manifest["files_sha256"]) == set(files)
@@ -178,14 +166,16 @@ def test_an_interrupted_write_leaves_nothing_and_keeps_the_old(tmp_path, error):
 
 
 def test_text_of_the_mission_is_escaped(tmp_path):
-    file = edited(tmp_path, ('name = "LEO-to-GEO relay of a 100 kg satellite"', 'name = "<script>alert(1)</script>"'))
+    file = edited_file(
+        tmp_path, ('name = "LEO-to-GEO relay of a 100 kg satellite"', 'name = "<script>alert(1)</script>"')
+    )
     page = report.write(study.run(file), tmp_path / "out").read_text(encoding="utf-8")
     assert "<script" not in page
     assert "&lt;script&gt;alert(1)&lt;/script&gt;" in page
 
 
 def test_a_hopeless_link_is_reported_not_refused(tmp_path):
-    file = edited(tmp_path, ('data_rate = "300 Mbit/s"', 'data_rate = "30 Gbit/s"'))
+    file = edited_file(tmp_path, ('data_rate = "300 Mbit/s"', 'data_rate = "30 Gbit/s"'))
     hopeless = study.run(file)
     assert not hopeless.closes
     assert hopeless.communication.margin_db == pytest.approx(3.0 - 20.0, abs=0.02)
@@ -206,10 +196,10 @@ def test_verdict_and_summary_say_the_same(paper):
 
 
 def test_a_drive_beyond_the_identified_rate_is_the_first_thing_said(tmp_path):
-    slow = study.run(edited(tmp_path, ('rate_limit = "3770 V/s"', 'rate_limit = "100 V/s"')))
+    slow = study.run(edited_file(tmp_path, ('rate_limit = "3770 V/s"', 'rate_limit = "100 V/s"')))
     assert "Not to be relied on" in report.verdict_text(slow)
     assert any("identified up to 100 V/s" in w for w in report.summary(slow)["warnings"])
-    assert "Not to be relied on" not in report.verdict_text(study.run(missionfile.load_mission(MISSION)))
+    assert "Not to be relied on" not in report.verdict_text(study.run(missionfile.load_mission(SHIPPED)))
 
 
 def test_thinning_keeps_every_peak():

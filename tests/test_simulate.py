@@ -1,9 +1,7 @@
 """The sampled loop's numbers, counters and slices, against an adaptive solver and the paper's mirror by hand."""
 
-import time
 from dataclasses import replace
 from math import exp, pi
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,8 +12,8 @@ import oracles
 from microrad import control, kernels, lti, mirror, simulate, tracking
 from microrad.mirror import BoucWen, Play
 from microrad.missionfile import load_mission
+from shipped import SHIPPED, edited
 
-SHIPPED = Path(__file__).parent.parent / "missions" / "leo-geo.toml"
 PRINTED = BoucWen(0.089e-3, -2.96e-7, -0.048e-3, 4.7e-4, 38.421, 34.635, 3770.0, 6.0)
 STRAIGHT = mirror.gain_only(PRINTED)
 NUMERATOR = (1.979e11, 7.051e13, 2.973e13)  # Eq. 2 of the paper
@@ -26,17 +24,6 @@ AMPLITUDE = 0.3e-3
 IDEAL = simulate.Setup(
     control.IDEAL_DRIVE, control.Timing(PERIOD, 1, 0), control.pid(control.Gains(KP, KI, 0.0, 1e-4), PERIOD)
 )
-
-
-def edited(folder, *changes):
-    """The mission of the shipped file with pieces of its text replaced, each of which occurs once."""
-    text = SHIPPED.read_text()
-    for old, new in changes:
-        assert text.count(old) == 1, old
-        text = text.replace(old, new)
-    path = folder / "mission.toml"
-    path.write_text(text)
-    return load_mission(path).mission
 
 
 @pytest.fixture(scope="module")
@@ -398,23 +385,6 @@ def test_slices_make_one_run(monkeypatch, mission):
         for name in ("output_rad", "command_v", "drive_v", "time_s"):
             assert_array_equal(getattr(sliced, name), getattr(whole, name))
         assert (sliced.counts, sliced.steady) == (whole.counts, whole.steady)
-
-
-def test_one_slice_is_short_enough_to_be_interrupted(mission):
-    """Processor time of one return from the kernel, the best of three against what else the machine does."""
-    m, setup = mission_setup(mission)
-    samples = simulate.SLICE_STEPS // setup.timing.steps_per_sample
-    reference, _ = simulate.sine(AMPLITUDE, 25.0, PERIOD)
-    reference = np.resize(reference, (samples, 1))
-    inverse = control.inverse(m)
-    simulate.track("warm", m, setup, inverse, reference[:10], slice(None))
-    spent = []
-    for _ in range(3):
-        start = time.thread_time()
-        simulate.track("", m, setup, inverse, reference, slice(None))
-        spent.append(time.thread_time() - start)
-    print(f"{simulate.SLICE_STEPS} plant steps in {min(spent):.3f} s")
-    assert 0.01 < min(spent) < 0.3
 
 
 def test_statistics_are_of_the_steady_part():

@@ -2,7 +2,6 @@
 
 import re
 from math import log10, pi
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,19 +9,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from microrad import paper, simulate, study
 from microrad.missionfile import load_mission
-
-SHIPPED = Path(__file__).parent.parent / "missions" / "leo-geo.toml"
-
-
-def edited(folder, *changes):
-    """The shipped file with pieces of its text replaced, each of which occurs once."""
-    text = SHIPPED.read_text()
-    for old, new in changes:
-        assert text.count(old) == 1, old
-        text = text.replace(old, new)
-    path = folder / "mission.toml"
-    path.write_text(text)
-    return load_mission(path)
+from shipped import SHIPPED, edited_file
 
 
 @pytest.fixture(scope="module")
@@ -45,7 +32,7 @@ def shipped(coarse):
 def variant(coarse, monkeypatch, tmp_path):
     """The study of the shipped mission with pieces of its text replaced, without a scan."""
     monkeypatch.setattr(paper, "applies", lambda mission: False)
-    return lambda *changes: study.run(edited(tmp_path, *changes))
+    return lambda *changes: study.run(edited_file(tmp_path, *changes))
 
 
 def requirement(result, name):
@@ -217,7 +204,7 @@ def plays(weights='"60 urad/V", "20 urad/V", "9 urad/V"'):
 
 
 def test_a_static_mirror_of_plays_runs_through(coarse, tmp_path):
-    result = study.run(edited(tmp_path, *plays()))
+    result = study.run(edited_file(tmp_path, *plays()))
     assert result.scan is None
     assert result.comparison is None
     claims = [(c.where, c.claim) for c in result.claims]
@@ -235,7 +222,7 @@ def test_a_static_mirror_of_plays_runs_through(coarse, tmp_path):
 
 def test_a_mirror_without_inverse_is_refused(coarse, tmp_path):
     with pytest.raises(ValueError, match="no weight at threshold 0"):
-        study.run(edited(tmp_path, *plays('"0 urad/V", "80 urad/V", "9 urad/V"')))
+        study.run(edited_file(tmp_path, *plays('"0 urad/V", "80 urad/V", "9 urad/V"')))
 
 
 def test_a_mechanical_angle_is_doubled_and_the_loop_stays(shipped, variant):

@@ -1,7 +1,6 @@
 """The figures of a study: each an SVG, with the data it shows as a table of columns."""
 
 import io
-from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -162,26 +161,44 @@ def hysteresis_loops(study: Study) -> Figure:
     return Figure("fig5-hysteresis-loops", "Fig. 5  Rate-dependent hysteresis", caption, _svg(canvas), columns)
 
 
-def _errors(axes: Axes, runs: Iterable[tuple[str, Run, dict[str, Any]]], columns: dict[str, Floats]) -> None:
-    """Error over one steady period for each run, with its peak and rms in the legend."""
-    for label, run, style in runs:
-        steady = run.trace.steady
-        time = run.trace.time_s[steady] - run.trace.time_s[steady.start]
-        error = run.trace.error_rad[steady, 0]
-        peak, rms = run.trace.peak_rad * 1e6, run.trace.rms_rad * 1e6
-        axes.plot(*thin(time * 1e3, error * 1e6), label=f"{label}: peak {peak:.1f}, rms {rms:.1f} µrad", **style)
-        columns[f"time, {label}, {run.freq_hz:g} Hz (s)"] = time
-        columns[f"error, {label}, {run.freq_hz:g} Hz (rad)"] = error
-    axes.set(xlabel="time in the last period (ms)", ylabel="pointing error (µrad)")
-    axes.legend(fontsize=7.5, loc="lower center", bbox_to_anchor=(0.5, 1.08))
+@dataclass(frozen=True, slots=True)
+class Curve:
+    """One line of a panel of tracking errors: its label, and which run it shows."""
+
+    label: str
+    mirror: str
+    controller: str
 
 
-def _panels(frequencies: tuple[float, ...]) -> tuple[Canvas, list[Axes]]:
+def _tracking(
+    study: Study, frequencies: tuple[float, ...], curves: tuple[Curve, Curve], limit: bool
+) -> tuple[str, dict[str, Floats]]:
+    """SVG and data of the steady error of two runs, a panel a frequency, with peak and rms in the legend."""
     canvas = Canvas(figsize=(3.9 * len(frequencies), 3.5), layout="constrained")
-    panels = canvas.subplots(1, len(frequencies), squeeze=False)[0]
-    for axes, f in zip(panels, frequencies, strict=True):
+    columns: dict[str, Floats] = {}
+    styles: tuple[dict[str, Any], ...] = (
+        {"color": VERMILION, "linestyle": "--", "linewidth": 1.6},
+        {"color": BLUE, "linestyle": "-"},
+    )
+    for axes, f in zip(canvas.subplots(1, len(frequencies), squeeze=False)[0], frequencies, strict=True):
+        for curve, style in zip(curves, styles, strict=True):
+            _error_line(axes, curve.label, _pick(study, curve.mirror, curve.controller, f), style, columns)
+        if limit:
+            _limit(axes, study.file.mission)
         axes.set_title(f"{f:g} Hz", fontsize=9, loc="left")
-    return canvas, list(panels)
+        axes.set(xlabel="time, steady state (ms)", ylabel="pointing error (µrad)")
+        axes.legend(fontsize=7.5, loc="lower center", bbox_to_anchor=(0.5, 1.08))
+    return _svg(canvas), columns
+
+
+def _error_line(axes: Axes, label: str, run: Run, style: dict[str, Any], columns: dict[str, Floats]) -> None:
+    steady = run.trace.steady
+    time = run.trace.time_s[steady] - run.trace.time_s[steady.start]
+    error = run.trace.error_rad[steady, 0]
+    peak, rms = run.trace.peak_rad * 1e6, run.trace.rms_rad * 1e6
+    axes.plot(*thin(time * 1e3, error * 1e6), label=f"{label}: peak {peak:.1f}, rms {rms:.1f} µrad", **style)
+    columns[f"time, {label}, {run.freq_hz:g} Hz (s)"] = time
+    columns[f"error, {label}, {run.freq_hz:g} Hz (rad)"] = error
 
 
 def _pick(study: Study, mirror: str, controller: str, freq_hz: float) -> Run:
@@ -191,39 +208,38 @@ def _pick(study: Study, mirror: str, controller: str, freq_hz: float) -> Run:
 def tracking_errors(study: Study) -> Figure:
     """Fig. 6: PID with and without hysteresis."""
     m = study.file.mission
-    canvas, panels = _panels(m.scenario.pid_frequencies_hz)
-    columns: dict[str, Floats] = {}
-    for axes, f in zip(panels, m.scenario.pid_frequencies_hz, strict=True):
-        lines = [
-            ("without hysteresis", _pick(study, "no hysteresis", "PID", f), {"color": BLUE, "linestyle": "--"}),
-            ("with hysteresis", _pick(study, "given", "PID", f), {"color": VERMILION, "linestyle": "-"}),
-        ]
-        _errors(axes, lines, columns)
+    curves = (Curve("with hysteresis", "given", "PID"), Curve("without", "no hysteresis", "PID"))
+    svg, columns = _tracking(study, m.scenario.pid_frequencies_hz, curves, limit=False)
     caption = (
-        f"Tracking error of a {_amplitude(m)} sine under PID. The error that hysteresis adds grows with frequency; the "
-        "lag of the loop, larger still, hides it in the total."
+        f"Tracking error of a {_amplitude(m)} sine under PID, on the mirror and on one of the same gain without "
+        "hysteresis."
     )
-    return Figure("fig6-pid", "Fig. 6  PID with and without hysteresis", caption, _svg(canvas), columns)
+    return Figure("fig6-pid", "Fig. 6  PID with and without hysteresis", caption, svg, columns)
 
 
 def inverse(study: Study) -> Figure:
     """Fig. 8: PID against PID with inverse feedforward."""
     m = study.file.mission
-    canvas, panels = _panels(m.scenario.inverse_frequencies_hz)
-    columns: dict[str, Floats] = {}
-    for axes, f in zip(panels, m.scenario.inverse_frequencies_hz, strict=True):
-        lines = [
-            ("PID", _pick(study, "given", "PID", f), {"color": VERMILION, "linestyle": "--"}),
-            ("PID + inverse", _pick(study, "given", "PID + inverse", f), {"color": BLUE, "linestyle": "-"}),
-        ]
-        _errors(axes, lines, columns)
-        _limit(axes, m)
+    curves = (Curve("PID", "given", "PID"), Curve("PID + inverse", "given", "PID + inverse"))
+    svg, columns = _tracking(study, m.scenario.inverse_frequencies_hz, curves, limit=True)
     counts = "; ".join(_counts(r) for r in study.runs if (r.mirror, r.controller) == ("given", "PID + inverse"))
     caption = (
-        f"Tracking error of a {_amplitude(m)} sine. The feedforward (Eq. 4) takes its rate from the reference. Dotted: "
-        f"the required {m.requirement.pointing_error_rad * 1e6:g} µrad. Counts of PID + inverse: {counts}."
+        f"Tracking error of a {_amplitude(m)} sine. The feedforward inverts the hysteresis model, driven by the "
+        f"reference and its rate. Dotted: the required {m.requirement.pointing_error_rad * 1e6:g} µrad. "
+        f"Counts of PID + inverse: {counts}."
     )
-    return Figure("fig8-inverse", "Fig. 8  PID against PID + inverse", caption, _svg(canvas), columns)
+    return Figure("fig8-inverse", "Fig. 8  PID against PID + inverse", caption, svg, columns)
+
+
+def comparison(study: Study) -> Figure:
+    """PID + inverse on the mission's hysteresis model and on its comparison model."""
+    curves = (
+        Curve("mirror's model", "given", "PID + inverse"),
+        Curve("comparison model", "comparison", "PID + inverse"),
+    )
+    svg, columns = _tracking(study, study.file.mission.scenario.inverse_frequencies_hz, curves, limit=True)
+    caption = "PID + inverse on the mirror as given and on the mission's comparison model, each with its own inverse."
+    return Figure("comparison", "Hysteresis models compared", caption, svg, columns)
 
 
 def _amplitude(m: Mission) -> str:
@@ -241,25 +257,6 @@ def _counts(run: Run) -> str:
         f"{run.freq_hz:g} Hz {c.clamped + c.inverse_clamped} rate-clamped, {c.saturated} saturated, "
         f"{c.slew_limited} slew-limited, {c.alternating} alternating"
     )
-
-
-def comparison(study: Study) -> Figure:
-    """PID + inverse on the mission's hysteresis model and on its comparison model."""
-    m = study.file.mission
-    canvas, panels = _panels(m.scenario.inverse_frequencies_hz)
-    columns: dict[str, Floats] = {}
-    for axes, f in zip(panels, m.scenario.inverse_frequencies_hz, strict=True):
-        lines = [
-            ("mirror's model", _pick(study, "given", "PID + inverse", f), {"color": VERMILION, "linestyle": "--"}),
-            ("comparison model", _pick(study, "comparison", "PID + inverse", f), {"color": BLUE, "linestyle": "-"}),
-        ]
-        _errors(axes, lines, columns)
-        _limit(axes, m)
-    caption = (
-        "PID + inverse on the mirror as given and on the comparison model of the mission file, each with its own "
-        "inverse. The spikes on the former are its reversals, where the model first moves the wrong way."
-    )
-    return Figure("comparison", "Hysteresis models compared", caption, _svg(canvas), columns)
 
 
 def scan(found: paper.Scan) -> Figure:
