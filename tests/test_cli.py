@@ -389,7 +389,7 @@ def test_rates_with_and_without_unit(text, rate_hz):
         (["--output-unit", "grad"], ["output unit 'grad' is not known"]),
         (["--lever-arm", "50"], ["--lever-arm", "without a unit", "50 m"]),
         (["--lever-arm", "50 mm"], ["already an angle"]),
-        (["--hold-out", "1.5"], ["hold_out is 1.5", "between 0 and 1"]),
+        (["--hold-out", "1.5"], ["--hold-out (hold_out) is 1.5", "between 0 and 1"]),
         (["--model", "magic"], ["magic", "bouc-wen"]),
         (["--seed", "-1"], ["--seed", "0"]),
         (["--name", " "], ["has no name"]),

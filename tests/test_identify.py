@@ -374,7 +374,7 @@ def test_output_units(fit_100hz, unit, factor):
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        ({"output_unit": "um"}, "give lever_arm_m"),
+        ({"output_unit": "um"}, "--lever-arm, lever_arm_m"),
         ({"output_unit": "um", "lever_arm_m": 0.0}, "positive length"),
         ({"output_unit": "um", "lever_arm_m": math.nan}, "positive length"),
         ({"output_unit": "mrad", "lever_arm_m": 0.1}, "already an angle"),
@@ -391,8 +391,8 @@ def test_units_are_refused(words, message):
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        ({"hold_out": 0.0}, "hold_out is 0.0"),
-        ({"hold_out": 1.0}, "hold_out is 1.0"),
+        ({"hold_out": 0.0}, "hold_out\\) is 0.0"),
+        ({"hold_out": 1.0}, "hold_out\\) is 1.0"),
         ({"hold_out": 0.999}, "5 samples to fit and 4995 to check"),
         ({"models": ("preisach",)}, "preisach"),
         ({"models": ()}, "cannot be used"),

@@ -413,3 +413,28 @@ def test_the_summary_of_a_static_mirror_has_no_linear_part(tmp_path):
     assert summary.roots == ()
     assert len(summary.warnings) == 1
     assert "gain at DC" not in str(summary)
+
+
+@pytest.mark.parametrize("beta", [-2.0, 0.0, 2.0])
+@pytest.mark.parametrize("epsilon", [-0.02e-3, 0.02e-3])
+def test_the_settled_size_and_the_slope_behind_a_reversal_follow_both_signs(epsilon, beta):
+    model = mirror.BoucWen(0.089e-3, 0.0, epsilon, 0.0, 5.0, beta)
+    drive = np.concatenate([np.linspace(0.0, 20.0, 40_001), [20.0 - 1e-6]])
+    output, hysteresis, _ = kernels.bouc_wen_response(drive, 1.0, np.array(model.row), 0.0)
+    assert_allclose(abs(hysteresis[-2]), model.settled_rad, rtol=1e-9)
+    assert_allclose((output[-2] - output[-1]) / 1e-6, model.reversal_slope_rad_v(), rtol=1e-4)
+
+
+def test_a_softer_mirror_for_small_drives():
+    """Two plays, by hand: 0.1 of the drive, and 0.3 of what is beyond 2 V."""
+    model = mirror.Play((0.0, 2.0), (0.1e-3, 0.3e-3))
+    assert mirror.output_amplitude(model, 1.0) == pytest.approx(0.1e-3)
+    assert mirror.output_amplitude(model, 4.0) == pytest.approx(1.0e-3)
+    assert mirror.secant_gain(model, 0.1e-3) == pytest.approx(0.1e-3)
+    assert mirror.secant_gain(model, 1.0e-3) == pytest.approx(0.25e-3)
+    assert mirror.secant_gain(model, np.inf) == mirror.slow_gain(model) == pytest.approx(0.4e-3)
+    assert mirror.gain_only(model, 1.0e-3).d1_rad_v == pytest.approx(0.25e-3)
+    # the kernel's own settled response to a sine of 4 V has that amplitude
+    turns = 4.0 * np.sin(2 * np.pi * np.arange(3000) / 1000)
+    states = kernels.play_response(turns, np.array(model.thresholds_v), np.zeros(2))
+    assert np.max((states @ np.array(model.weights_rad_v))[1000:]) == pytest.approx(1.0e-3, rel=1e-9)

@@ -211,3 +211,41 @@ def test_thinning_keeps_every_peak():
     assert set(thin_y) >= {3.0, -2.0}
     np.testing.assert_array_equal(thin_y, y[thin_x.astype(int)])
     assert np.all(np.diff(thin_x) >= 0)
+
+
+@pytest.fixture
+def no_scan(monkeypatch):
+    """The scan has tests of its own and takes the longest."""
+    monkeypatch.setattr(study.paper, "applies", lambda mission: False)
+
+
+def test_the_headline_names_the_link_that_does_not_close(no_scan, tmp_path):
+    file = edited_file(tmp_path, ('required_power = "10 pW"', 'required_power = "1 nW"'))
+    text = report.verdict_text(study.run(file))
+    assert text.startswith("The link does not close: beacon -13.70 dB, at 300 Mbit/s")
+    assert "communication" not in text.splitlines()[0]
+
+
+def test_an_amplifier_at_its_limits_is_named_as_the_cause_and_claims_are_not_judged(no_scan, tmp_path):
+    weak = study.run(edited_file(tmp_path, ('output_max = "180 V"', 'output_max = "100 V"')))
+    assert "What limits it: the amplifier's limits (" in report.verdict_text(weak)
+    assert {c.agrees for c in weak.claims if c.where in ("Fig. 6", "Fig. 8")} == {"not judged"}
+    assert any("beyond the amplifier's range" in w for w in report.summary(weak)["warnings"])
+
+
+def test_a_changed_value_does_not_keep_the_papers_name(no_scan, paper, tmp_path):
+    assert missionfile.changed_from_shipped(paper.file) == ()
+    file = edited_file(tmp_path, ('leo_aperture = "5 cm"', 'leo_aperture = "6 cm"'))
+    assert missionfile.changed_from_shipped(file) == (("terminals.leo_aperture", '"6 cm"', '"5 cm"'),)
+    changed = study.run(file)
+    assert any("names the paper as its source" in w for w in report.summary(changed)["warnings"])
+    page = report.write(changed, tmp_path / "out").read_text(encoding="utf-8")
+    assert "This mission is not the paper" in page
+
+
+def test_a_radial_residual_is_two_axes(no_scan, paper, tmp_path):
+    radial = study.run(edited_file(tmp_path, ('residual = "per-axis"', 'residual = "radial"')))
+    used, one_axis = report.summary(radial)["residual"]["used_rad"], report.summary(paper)["residual"]["used_rad"]
+    assert used == pytest.approx(math.sqrt(2.0) * one_axis, rel=1e-12)
+    assert "times √2 for two equal axes" in report.verdict_text(radial)
+    assert radial.achieved.margin_db < paper.achieved.margin_db - 2.0

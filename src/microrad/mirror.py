@@ -50,7 +50,7 @@ class BoucWen:
     @property
     def settled_rad(self) -> float:
         """Magnitude at which |h| settles on a slow, long ramp: |epsilon| / (alpha + beta sign(epsilon))."""
-        return abs(self.epsilon_rad_v) / (self.alpha_1_v + math.copysign(self.beta_1_v, self.epsilon_rad_v))
+        return abs(self.epsilon_rad_v) / (self.alpha_1_v + math.copysign(1.0, self.epsilon_rad_v) * self.beta_1_v)
 
     def reversal_slope_rad_v(self, rate_v_s: float = 0.0) -> float:
         """Local slope dy/du just after a reversal from a settled branch at ``rate_v_s``; not physical below 0.
@@ -59,7 +59,7 @@ class BoucWen:
         side: dh/du = 2 alpha epsilon e / (alpha + beta sign(epsilon)), with e = exp(delta |rate|).
         """
         growth = math.exp(self.delta_s_v * min(abs(rate_v_s), self.rate_limit_v_s))
-        side = self.alpha_1_v + math.copysign(self.beta_1_v, self.epsilon_rad_v)
+        side = self.alpha_1_v + math.copysign(1.0, self.epsilon_rad_v) * self.beta_1_v
         return self.d1_rad_v + 2.0 * self.alpha_1_v * self.epsilon_rad_v * growth / side
 
     @property
@@ -225,6 +225,29 @@ def slow_gain(model: BoucWen | Play) -> float:
     return model.d1_rad_v if isinstance(model, BoucWen) else math.fsum(model.weights_rad_v)
 
 
+def output_amplitude(model: BoucWen | Play, drive_v: float) -> float:
+    """Amplitude of the settled output (rad) under a slow drive of amplitude ``drive_v``, Bouc-Wen's h left out."""
+    if isinstance(model, BoucWen):
+        return model.d1_rad_v * drive_v
+    pairs = zip(model.thresholds_v, model.weights_rad_v, strict=True)
+    return math.fsum(w * max(0.0, drive_v - r) for r, w in pairs)
+
+
+def secant_gain(model: BoucWen | Play, output_rad: float) -> float:
+    """Output amplitude over the drive amplitude that gives it (rad/V), for slow sines of amplitude ``output_rad``.
+
+    A Prandtl-Ishlinskii model is softer for small drives; without amplitude (inf) this is its slow gain.
+    """
+    if isinstance(model, BoucWen) or math.isinf(output_rad):
+        return slow_gain(model)
+    knots = [output_amplitude(model, r) for r in model.thresholds_v]
+    slopes = np.cumsum(model.weights_rad_v)
+    last = max(i for i, y in enumerate(knots) if y <= output_rad)
+    if slopes[last] <= 0.0:
+        return slow_gain(model)
+    return output_rad / (model.thresholds_v[last] + (output_rad - knots[last]) / float(slopes[last]))
+
+
 def _elements(model: BoucWen | Play, split: bool) -> tuple[tuple[BoucWen, ...], Play]:
     """Bank of one model; split into its linear gain first and its hysteresis after it."""
     if isinstance(model, Play):
@@ -242,9 +265,9 @@ def _routes(composition: str, elements: int) -> tuple[Floats, Floats]:
     return (first, ones - first) if composition == "additive" else (0.0 * ones, ones)
 
 
-def gain_only(model: BoucWen | Play) -> BoucWen:
-    """The model without hysteresis: its gain for slow, large drives and nothing else."""
-    return BoucWen(slow_gain(model), 0.0, 0.0, 0.0, 0.0, 0.0)
+def gain_only(model: BoucWen | Play, output_rad: float = math.inf) -> BoucWen:
+    """The model without hysteresis: its secant gain at an output amplitude, or its slow gain, and nothing else."""
+    return BoucWen(secant_gain(model, output_rad), 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 def combine(*mirrors: Mirror) -> Mirror:
@@ -404,7 +427,9 @@ class Summary:
 
     def __str__(self) -> str:
         """The summary as text, one fact a line."""
-        lines = [f"{self.name}: {self.composition}, {type(self.model).__name__} hysteresis"]
+        bouc_wen = isinstance(self.model, BoucWen)
+        kind = "Bouc-Wen" if bouc_wen else "Prandtl-Ishlinskii"
+        lines = [f"{self.name}: {self.composition}, {kind} hysteresis"]
         if self.roots:
             lines += [
                 f"  linear part divided by {self.normalised_by:.5f}, its magnitude at {self.normalise_at_hz:g} Hz",
@@ -412,7 +437,10 @@ class Summary:
                 f"{self.flat_band_hz[1]:.0f} Hz {self.in_band_gain[0]:.5f} to {self.in_band_gain[1]:.5f}",
             ]
             lines += [f"  {r.kind} at {r.frequency_hz:.4g} Hz, damping {r.damping:.3f}" for r in self.roots]
-        lines += [f"  exponent's rate held at {self.rate_limit_v_s:g} V/s; clamped samples are counted"]
+        limit = f"{self.rate_limit_v_s:.4g} V/s"
+        lines += [
+            f"  exponent's rate held at {limit}; clamped samples are counted" if bouc_wen else f"  valid to {limit}"
+        ]
         return "\n".join(lines + [f"  warning: {w}" for w in self.warnings])
 
 

@@ -4,6 +4,7 @@ import contextlib
 import difflib
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from importlib import resources
 from pathlib import Path
 from typing import Any, Literal, TypeVar, cast, get_args, get_origin
 
@@ -15,7 +16,16 @@ from microrad.fields import Problem, ProblemsError, Quantity, Several
 from microrad.mission import RELATIONS, Mirror, Mission, Source, Table
 from microrad.units import UnitError
 
-__all__ = ["Fault", "MirrorFile", "MissionError", "MissionFile", "assumptions", "load_mirror", "load_mission"]
+__all__ = [
+    "Fault",
+    "MirrorFile",
+    "MissionError",
+    "MissionFile",
+    "assumptions",
+    "changed_from_shipped",
+    "load_mirror",
+    "load_mission",
+]
 
 _MOST_UNKNOWN = 100  # unknown keys of one file for which a near one is looked up
 _Location = tuple[int | str, ...]
@@ -296,3 +306,11 @@ def _expected(table: type[Table], key: str) -> str:
 
 def _dotted(table: str, location: Iterable[object]) -> str:
     return ".".join(str(part) for part in (table, *location) if part != "")
+
+
+def changed_from_shipped(file: MissionFile) -> tuple[tuple[str, str, str], ...]:
+    """Keys that name the paper as their source but differ from the paper's mission: (key, value, value there)."""
+    with resources.as_file(resources.files("microrad") / "missions" / "leo-geo.toml") as path:
+        shipped = load_mission(path).sources
+    named = {key: source.value for key, source in file.sources.items() if source.kind == "paper"}
+    return tuple((k, v, shipped[k].value) for k, v in named.items() if k in shipped and shipped[k].value != v)

@@ -14,9 +14,6 @@ from microrad.missionfile import MissionFile
 Floats = NDArray[np.float64]
 Progress = Callable[[int, int, str], None]
 
-MAP_RATES_BIT_S = np.geomspace(1e7, 1e10, 181)
-MAP_ERRORS_RAD = np.linspace(0.0, 30e-6, 121)
-
 
 @dataclass(frozen=True, slots=True)
 class MarginMap:
@@ -77,7 +74,7 @@ def run(file: MissionFile, on_progress: Progress = lambda done, total, what: Non
     beacon, answer = link.beacon_budget(m, sources), link.answer_budget(m, sources)
     communication, fig2 = link.communication_budget(m, sources), margin_map(file)
 
-    on_progress(1, 3, "mirror and tracking")
+    on_progress(1, 3, "mirror and tracking (the first run compiles for half a minute)")
     summary, loops = mirror.summarise(m.mirror), tracking.hysteresis_loops(m)
     margins, runs = tracking.loop_margins(m), tracking.tracking_runs(m)
     residual = tracking.worst(m, runs)
@@ -128,12 +125,14 @@ def largest_error(m: Mission, margin_db: float) -> float:
 
 
 def margin_map(file: MissionFile) -> MarginMap:
-    """Margin over data rate and pointing error, with the receivers that the requirement implies."""
+    """Margin over data rate and pointing error around the requirement, with the receivers that it implies."""
     m, q = file.mission, file.mission.requirement
+    rates = m.communication.data_rate_bit_s * np.geomspace(1 / 30, 30, 181)
+    errors = 3.0 * max(q.pointing_error_rad, m.communication.pointing_error_rad) * np.linspace(0.0, 1.0, 121)
     return MarginMap(
-        MAP_RATES_BIT_S,
-        MAP_ERRORS_RAD,
-        link.margin_map(m, MAP_RATES_BIT_S, MAP_ERRORS_RAD),
+        rates,
+        errors,
+        link.margin_map(m, rates, errors),
         link.largest_data_rate(m, q.margin_db, q.pointing_error_rad),
         largest_error(m, q.margin_db),
         link.implied_sensitivity(m),

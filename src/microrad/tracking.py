@@ -22,6 +22,14 @@ class Run:
     trace: simulate.Trace
 
     @property
+    def at_limits(self) -> str:
+        """In words, what the amplifier held back during the run, or nothing."""
+        c, samples = self.trace.counts, self.trace.time_s.size
+        if c.saturated:
+            return f"the amplifier's limits ({100 * c.saturated / samples:.0f} % of the samples)"
+        return "the amplifier's slew limit" if c.slew_limited else ""
+
+    @property
     def fastest_drive_v_s(self) -> float:
         """Largest rate of the drive behind the amplifier, from sample to sample (V/s)."""
         period = self.trace.time_s[1] - self.trace.time_s[0]
@@ -46,7 +54,7 @@ def hysteresis_loops(m: Mission) -> tuple[simulate.HysteresisLoop, ...]:
 def loop_margins(m: Mission) -> control.Margins:
     """Margins of the mission's loop as it is sampled; raises ValueError when it is unstable."""
     model = hysteresis(m, m.mirror)
-    setup = simulate.setup_from_mission(m, mirror.slow_gain(model))
+    setup = simulate.setup_from_mission(m, mirror.secant_gain(model, m.scenario.amplitude_rad))
     return simulate.margins(mirror.from_mission(m.mirror, model), setup)
 
 
@@ -56,8 +64,9 @@ def tracking_runs(m: Mission) -> tuple[Run, ...]:
     Raises ValueError when the mirror has no inverse.
     """
     model = hysteresis(m, m.mirror)
-    setup = simulate.setup_from_mission(m, mirror.slow_gain(model))
-    models = {"given": model, "no hysteresis": mirror.gain_only(model)}
+    amplitude = m.scenario.amplitude_rad
+    setup = simulate.setup_from_mission(m, mirror.secant_gain(model, amplitude))
+    models = {"given": model, "no hysteresis": mirror.gain_only(model, amplitude)}
     if m.mirror.comparison is not None:
         models["comparison"] = hysteresis(m, m.mirror.comparison)
     runs = []

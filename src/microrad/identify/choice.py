@@ -202,7 +202,8 @@ def identify(
 def _splits(recordings: Sequence[Recording], hold_out: float) -> list[int]:
     if not 0 < hold_out < 1:
         raise IdentificationError(
-            f"hold_out is {hold_out}; give the share of each recording kept for the check, between 0 and 1, e.g. 0.5."
+            f"--hold-out (hold_out) is {hold_out}; give the share of each recording kept for the check, between 0 "
+            "and 1, e.g. 0.5."
         )
     splits = [round(r.samples * (1 - hold_out)) for r in recordings]
     for recording, split in zip(recordings, splits, strict=True):

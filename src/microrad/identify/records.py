@@ -45,8 +45,9 @@ class Units:
         arm = self.lever_arm_m
         if self.output in _METRES and arm is None:
             raise IdentificationError(
-                f"the output is a length ({self.output}) and a mirror model needs an angle: give lever_arm_m, the "
-                "distance in metres from the axis of rotation to the point measured (tilt = displacement / lever arm)."
+                f"the output is a length ({self.output}) and a mirror model needs an angle: give the lever arm "
+                "(--lever-arm, lever_arm_m), the distance in metres from the axis of rotation to the point measured "
+                "(tilt = displacement / lever arm)."
             )
         if arm is not None and not 0 < arm < math.inf:
             raise IdentificationError(f"the lever arm is {arm!r} m; give a positive length in metres.")

@@ -7,7 +7,7 @@ from typing import Any
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from microrad.mission import Source
-from microrad.missionfile import assumptions
+from microrad.missionfile import assumptions, changed_from_shipped
 from microrad.report import words
 from microrad.report.figures import Figure
 from microrad.report.results import versions
@@ -33,7 +33,9 @@ def render(study: Study, figures: Sequence[Figure]) -> str:
         "budgets": (study.communication, study.achieved, study.beacon, study.answer),
         "quantity": words.quantity,
         "angle": lambda value: format_quantity(value, "rad"),
-        "mirror_lines": str(study.summary).splitlines(),
+        "mirror_lines": [line for line in str(study.summary).splitlines() if not line.startswith("  warning")],
+        "sound": all(r.met for r in study.requirements) and not words.beyond_identified(study, study.residual),
+        "changed": changed_from_shipped(study.file),
         "margins": _margins(study),
         "assumptions": assumptions(study.file),
         "inputs": _inputs(study.file.sources),

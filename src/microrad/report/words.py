@@ -2,6 +2,8 @@
 
 from typing import Any
 
+from microrad.mission import Mission
+from microrad.missionfile import changed_from_shipped
 from microrad.study import Study
 from microrad.tracking import Run, residual_rad
 from microrad.units import format_quantity
@@ -17,24 +19,28 @@ def headline(study: Study) -> str:
     """The verdict in one sentence."""
     m, margin = study.file.mission, study.achieved.margin_db
     left, rate = residual_rad(m, study.residual.trace), m.communication.data_rate_bit_s
-    at = f"at {format_quantity(rate, 'bit/s')} and a simulated residual of {format_quantity(left, 'rad', 3)}"
+    statistic = m.requirement.residual_statistic
+    at = f"{format_quantity(rate, 'bit/s')} and a simulated residual of {format_quantity(left, 'rad', 3)} ({statistic})"
     if not study.closes:
-        return f"The link does not close: margin {margin:+.2f} dB {at}."
+        links = {"beacon": study.beacon, "answer": study.answer, "communication": study.achieved}
+        failing = [f"{name} {b.margin_db:+.2f} dB" for name, b in links.items() if b.margin_db < 0.0]
+        return f"The link does not close: {', '.join(failing)}, at {at}."
     met = all(r.met for r in study.requirements)
     tail = "and every requirement is met" if met else "but not every requirement is met"
-    return f"The link closes, with a margin of {margin:+.2f} dB {at}, {tail}."
+    text = f"The link closes, with a margin of {margin:+.2f} dB at {at}, {tail}."
+    return f"{text} The mirror model is extrapolated." if beyond_identified(study, study.residual) else text
 
 
 def explanation(study: Study) -> list[str]:
     """What the headline rests on, a sentence each."""
     m, run = study.file.mission, study.residual
-    budget, trace = study.communication, run.trace
+    budget, trace, q = study.communication, run.trace, m.requirement
     sentences = [
         f"As budgeted, at {format_quantity(m.communication.pointing_error_rad, 'rad', 3)}, the margin is "
-        f"{budget.margin_db:+.2f} dB; required are {m.requirement.margin_db:g} dB.",
+        f"{budget.margin_db:+.2f} dB; {m.requirement.margin_db:g} dB is required.",
         f"The loop ({run.controller}, {run.freq_hz:g} Hz) leaves {format_quantity(trace.peak_rad, 'rad', 3)} at its "
-        f"peaks and {format_quantity(trace.rms_rad, 'rad', 3)} rms; allowed are "
-        f"{format_quantity(m.requirement.pointing_error_rad, 'rad', 3)} ({m.requirement.residual_statistic}).",
+        f"peaks and {format_quantity(trace.rms_rad, 'rad', 3)} rms on its axis{_two_axes(m)}; "
+        f"{format_quantity(q.pointing_error_rad, 'rad', 3)} ({q.residual_statistic}) is allowed.",
     ]
     if extrapolated := beyond_identified(study, run):
         sentences.append(f"Not to be relied on: {extrapolated}.")
@@ -49,6 +55,10 @@ def explanation(study: Study) -> list[str]:
             f"the margin {study.comparison.margin_db:+.2f} dB."
         )
     return sentences
+
+
+def _two_axes(m: Mission) -> str:
+    return ", times √2 for two equal axes" if m.conventions.residual == "radial" else ""
 
 
 def verdict_text(study: Study) -> str:
@@ -73,7 +83,20 @@ def beyond_identified(study: Study, run: Run) -> str:
 
 def warnings(study: Study) -> list[str]:
     """What a reader must not overlook: the mirror's own warnings, and runs outside their range."""
-    found = list(study.summary.warnings)
+    found = [
+        f"{key} = {value} names the paper as its source, but the paper's mission has {shipped}"
+        for key, value, shipped in changed_from_shipped(study.file)
+    ]
+    found += study.summary.warnings
+    m = study.file.mission
+    low, high = m.amplifier.output_min_v / m.amplifier.gain, m.amplifier.output_max_v / m.amplifier.gain
+    if (
+        not low
+        <= m.mirror.bias_v - m.scenario.loop_amplitude_v
+        <= m.mirror.bias_v + m.scenario.loop_amplitude_v
+        <= high
+    ):
+        found.append("the hysteresis loops are drawn for a drive beyond the amplifier's range")
     found += filter(None, (beyond_identified(study, run) for run in study.runs))
     for run in study.runs:
         c = run.trace.counts
@@ -81,7 +104,7 @@ def warnings(study: Study) -> list[str]:
             "steps beyond the identified rate": c.clamped + c.inverse_clamped,
             "saturated samples": c.saturated,
             "slew-limited steps": c.slew_limited,
-            "samples alternating at the sample rate": c.alternating,
+            "reversals of the command within 10 samples of the last": c.alternating,
         }
         found += [f"{run.trace.name}: {count} {what}" for what, count in counts.items() if count]
     found += [
@@ -112,6 +135,8 @@ def summary(study: Study) -> dict[str, Any]:
             "peak_rad": study.residual.trace.peak_rad,
             "rms_rad": study.residual.trace.rms_rad,
             "statistic": m.requirement.residual_statistic,
+            "convention": m.conventions.residual,
+            "used_rad": residual_rad(m, study.residual.trace),
         },
         "largest_data_rate_bit_s": study.margin_map.largest_rate_bit_s,
         "largest_pointing_error_rad": study.margin_map.largest_error_rad,
