@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.signal import lsim
 
 import oracles
-from microrad import control, kernels, lti, mirror, simulate
+from microrad import control, kernels, lti, mirror, mirror_summary, simulate
 from microrad.mirror import BoucWen, Mirror, Play
 from microrad.missionfile import load_mission
 from shipped import SHIPPED, edited
@@ -374,7 +374,7 @@ ADMISSIBLE_TABLE = (
 
 
 def test_the_summary_warns_of_the_papers_mirror(table):
-    summary = mirror.summarise(table)
+    summary = mirror_summary.summarise(table)
     reversal, pole, zero, gain = summary.warnings
     assert "not physical at reversals" in reversal
     assert "-0.885 mrad/V against d1 = 0.089 mrad/V" in reversal
@@ -391,7 +391,7 @@ def test_the_summary_warns_of_the_papers_mirror(table):
 
 def test_the_summary_warns_of_nothing_when_there_is_nothing(tmp_path):
     slow = ('rate_limit = "3770 V/s"', 'rate_limit = "800 V/s"')
-    summary = mirror.summarise(edited(tmp_path, *ONE_RESONANCE, *ADMISSIBLE_TABLE, slow).mirror)
+    summary = mirror_summary.summarise(edited(tmp_path, *ONE_RESONANCE, *ADMISSIBLE_TABLE, slow).mirror)
     assert summary.warnings == ()
     assert "warning" not in str(summary)
     assert_allclose(summary.dc_gain, 1.0, rtol=1e-12)
@@ -401,7 +401,7 @@ def test_the_summary_warns_of_nothing_when_there_is_nothing(tmp_path):
 
 
 def test_the_summary_says_up_to_which_rate_a_mirror_is_admissible(tmp_path):
-    (warning,) = mirror.summarise(edited(tmp_path, *ONE_RESONANCE, *ADMISSIBLE_TABLE).mirror).warnings
+    (warning,) = mirror_summary.summarise(edited(tmp_path, *ONE_RESONANCE, *ADMISSIBLE_TABLE).mirror).warnings
     assert re.search("stays positive only up to 88[67] V/s", warning)
 
 
@@ -409,7 +409,7 @@ def test_the_summary_of_a_static_mirror_has_no_linear_part(tmp_path):
     text = SHIPPED.read_text()
     linear = text[text.index("[mirror.linear]") : text.index("[mirror.bouc_wen]")]
     m = edited(tmp_path, (linear, ""), ('composition = "cascade"', 'composition = "static"'))
-    summary = mirror.summarise(m.mirror)
+    summary = mirror_summary.summarise(m.mirror)
     assert summary.roots == ()
     assert len(summary.warnings) == 1
     assert "gain at DC" not in str(summary)

@@ -69,8 +69,7 @@ app = typer.Typer(
 
 def main() -> None:
     """Run the command line and exit; a request to terminate is taken as Ctrl-C is."""
-    # The matrices here are small: threads of the linear algebra library would only get in the way of our own.
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # small matrices: its threads would get in the way of ours
     for number in (signal.SIGTERM, getattr(signal, "SIGHUP", signal.SIGTERM)):
         if signal.getsignal(number) is not signal.SIG_IGN:
             signal.signal(number, signal.default_int_handler)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from microrad import control, link, mirror, paper, pointing, simulate, tracking, verdict
+from microrad import control, link, mirror_summary, paper, pointing, simulate, tracking, verdict
 from microrad.mission import Mission
 from microrad.missionfile import MissionFile
 
@@ -47,7 +47,7 @@ class Study:
     communication: link.LinkBudget
     achieved: link.LinkBudget
     margin_map: MarginMap
-    summary: mirror.Summary
+    summary: mirror_summary.Summary
     loops: tuple[simulate.HysteresisLoop, ...]
     margins: control.Margins
     runs: tuple[tracking.Run, ...]
@@ -75,7 +75,7 @@ def run(file: MissionFile, on_progress: Progress = lambda done, total, what: Non
     communication, fig2 = link.communication_budget(m, sources), margin_map(file)
 
     on_progress(1, 3, "mirror and tracking (the first run compiles for half a minute)")
-    summary, loops = mirror.summarise(m.mirror), tracking.hysteresis_loops(m)
+    summary, loops = mirror_summary.summarise(m.mirror), tracking.hysteresis_loops(m)
     margins, runs = tracking.loop_margins(m), tracking.tracking_runs(m)
     residual = tracking.worst(m, runs)
     left_rad = tracking.residual_rad(m, residual.trace)

@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from microrad import link, mirror, paper, pointing, simulate
+from microrad import link, mirror, mirror_summary, paper, pointing, simulate
 from microrad.mission import Mission
 from microrad.tracking import Run, hysteresis, residual_rad
 
@@ -109,7 +109,7 @@ class Evidence:
     readings: tuple[link.SensitivityReading, ...]
     ideal: tuple[link.IdealReceiver, ...]
     loops: tuple[simulate.HysteresisLoop, ...]
-    summary: mirror.Summary
+    summary: mirror_summary.Summary
     runs: tuple[Run, ...]
     scan: paper.Scan | None
 
@@ -171,7 +171,7 @@ def _travel_claim(e: Evidence) -> Claim:
     )
 
 
-def _linear_claim(s: mirror.Summary) -> Claim:
+def _linear_claim(s: mirror_summary.Summary) -> Claim:
     outside = [r for r in s.roots if not r.in_band]
     ours = f"gain {s.dc_gain:.4f} at DC, {s.in_band_gain[0]:.4f} to {s.in_band_gain[1]:.4f} in the band"
     why = "Eq. 2 has a gain of its own beside d1 of Eq. 3: cascading both would square it, so Eq. 2 is normalised"
