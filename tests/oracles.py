@@ -507,7 +507,6 @@ def build_loop(loop):
         output=np.zeros(actuators),
         command=np.zeros(actuators),
         target=np.zeros((actuators, 2)),
-        feedforward=np.zeros(actuators),
         inverse_h=np.zeros(elements),
         inverse_p=np.zeros(len(loop.inverse_play_threshold)),
         pending=np.zeros((loop.delay_steps + 1, actuators)),

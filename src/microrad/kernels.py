@@ -160,7 +160,6 @@ class LoopState(NamedTuple):
     output: Floats
     command: Floats
     target: Floats
-    feedforward: Floats
     inverse_h: Floats
     inverse_p: Floats
     pending: Floats
@@ -405,37 +404,39 @@ def open_loop(plant, state, drive, output, bank):  # type: ignore[no-untyped-def
             bank[k, i] = state.bank[i, Z]
 
 
-@_inline
-def _inverse(loop, state, reference, k, sample_s):  # type: ignore[no-untyped-def]
+@_compile
+def _inverse(loop, state, reference, sample_s, feedforward):  # type: ignore[no-untyped-def]
     """Causal inverse-multiplicative feedforward (Eq. 4), and the closed-form inverse of play operators.
 
     u = (r - h + d1 bias) / (d1 exp(-d2 q')) - bias, with h and q' driven by the reference, q = r / d1: taking the rate
-    from the feedforward's own last sample makes it chatter at the sample rate.
+    from the feedforward's own last sample makes it chatter at the sample rate. It needs nothing from the loop, so it
+    runs ahead of it, over all of ``reference``, into ``feedforward`` (samples, actuators).
     """
-    for a in range(len(loop.actuators)):
-        target = 0.0
-        for i in range(len(loop.axes)):
-            target += loop.allocation[a, i] * reference[k, i]
-        state.target[a, BEFORE] = state.target[a, NOW]
-        state.target[a, NOW] = target
-        state.feedforward[a] = loop.inverse_direct[a] * target
-    for e in range(len(loop.inverse_elements)):
-        row, a = loop.inverse_bouc_wen, loop.inverse_bouc_wen_actuator[e]
-        travel = (state.target[a, NOW] - state.target[a, BEFORE]) / row[e, D1]
-        rate = travel / sample_s
-        if abs(rate) > row[e, RATE_LIMIT]:
-            state.inverse_clamped[e] += 1
-            rate = _clamp(rate, row[e, RATE_LIMIT])
-        grown = row[e, EPSILON] * _near_exp(row[e, DELTA] * abs(rate))
-        h = bouc_wen_step(state.inverse_h[e], travel, grown, row[e, ALPHA], row[e, BETA])
-        state.inverse_h[e] = h
-        gain = row[e, D1] * _near_exp(-row[e, D2] * rate)
-        state.feedforward[a] += (state.target[a, NOW] - h + row[e, D1] * row[e, BIAS]) / gain - row[e, BIAS]
-    for e in range(loop.inverse_play_actuator.size):
-        a = loop.inverse_play_actuator[e]
-        p = _play(state.inverse_p[e], state.target[a, NOW], loop.inverse_play_threshold[e])
-        state.inverse_p[e] = p
-        state.feedforward[a] += loop.inverse_play_weight[e] * p
+    for k in range(reference.shape[0]):
+        for a in range(len(loop.actuators)):
+            target = 0.0
+            for i in range(len(loop.axes)):
+                target += loop.allocation[a, i] * reference[k, i]
+            state.target[a, BEFORE] = state.target[a, NOW]
+            state.target[a, NOW] = target
+            feedforward[k, a] = loop.inverse_direct[a] * target
+        for e in range(len(loop.inverse_elements)):
+            row, a = loop.inverse_bouc_wen, loop.inverse_bouc_wen_actuator[e]
+            travel = (state.target[a, NOW] - state.target[a, BEFORE]) / row[e, D1]
+            rate = travel / sample_s
+            if abs(rate) > row[e, RATE_LIMIT]:
+                state.inverse_clamped[e] += 1
+                rate = _clamp(rate, row[e, RATE_LIMIT])
+            grown = row[e, EPSILON] * _near_exp(row[e, DELTA] * abs(rate))
+            h = bouc_wen_step(state.inverse_h[e], travel, grown, row[e, ALPHA], row[e, BETA])
+            state.inverse_h[e] = h
+            gain = row[e, D1] * _near_exp(-row[e, D2] * rate)
+            feedforward[k, a] += (state.target[a, NOW] - h + row[e, D1] * row[e, BIAS]) / gain - row[e, BIAS]
+        for e in range(loop.inverse_play_actuator.size):
+            a = loop.inverse_play_actuator[e]
+            p = _play(state.inverse_p[e], state.target[a, NOW], loop.inverse_play_threshold[e])
+            state.inverse_p[e] = p
+            feedforward[k, a] += loop.inverse_play_weight[e] * p
 
 
 @_inline
@@ -444,12 +445,10 @@ def _quantised(value, resolution):  # type: ignore[no-untyped-def]
 
 
 @_inline
-def _control_sample(loop, state, reference, k, y, sample_s):  # type: ignore[no-untyped-def]
-    """One sample of the controller: feedforward, error, output, clip with anti-windup, converter."""
-    if loop.feedforward:
-        _inverse(loop, state, reference, k, sample_s)
+def _control_sample(loop, state, reference, feedforward, k, y):  # type: ignore[no-untyped-def]
+    """One sample of the controller: error, output, clip with anti-windup, converter."""
     for a in range(len(loop.actuators)):
-        total = state.feedforward[a]
+        total = feedforward[k, a]
         for j in range(len(loop.states)):
             total += loop.Cc[a, j] * state.x[j]
         state.output[a] = total
@@ -498,12 +497,14 @@ def closed_loop(plant, plant_state, loop, loop_state, reference, output, command
     the sample instants, ``output`` (samples, axes), ``command`` and ``drive`` (samples, actuators; before and behind
     the amplifier). The states are left at the end, so that a following call continues.
     """
-    sample_s = plant.step_s * loop.steps_per_sample
+    command[:, :] = 0.0
+    if loop.feedforward:  # command holds it until the sample's own command takes its place
+        _inverse(loop, loop_state, reference, plant.step_s * loop.steps_per_sample, command)
     ring = loop_state.pending
     length = ring.shape[0]
     position = loop_state.position[0]
     for k in range(reference.shape[0]):
-        _control_sample(loop, loop_state, reference, k, plant_state.y, sample_s)
+        _control_sample(loop, loop_state, reference, command, k, plant_state.y)
         for i in range(len(plant.outputs)):
             output[k, i] = plant_state.y[i]
         for a in range(len(plant.actuators)):

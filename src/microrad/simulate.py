@@ -134,7 +134,6 @@ def at_rest(loop: kernels.Loop) -> kernels.LoopState:
         output=np.zeros(actuators),
         command=np.zeros(actuators),
         target=np.zeros((actuators, 2)),
-        feedforward=np.zeros(actuators),
         inverse_h=np.zeros(loop.inverse_bouc_wen.shape[0]),
         inverse_p=np.zeros(loop.inverse_play_threshold.size),
         pending=np.zeros((loop.delay_steps + 1, actuators)),
