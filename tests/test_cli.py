@@ -266,7 +266,8 @@ def test_run_refuses_an_unstable_loop_and_a_mirror_without_inverse(refused, fold
     assert "lower the gains" in message
     stuck = folder / "stuck.toml"
     stuck.write_text(
-        'name = "stuck"\ntravel = "1 mrad"\ncomposition = "static"\nrate_limit = "100 V/s"\nbias = "6 V"\n'
+        'name = "stuck"\ntravel = "1 mrad"\ncomposition = "static"\nrate_limit = "100 V/s"\n'
+        'bias = "6 V"\ndrive_min = "0 V"\ndrive_max = "12 V"\n'
         '[prandtl_ishlinskii]\nthresholds = ["0 V", "1 V"]\nweights = ["0 mrad/V", "0.089 mrad/V"]\n'
     )
     assert "has no inverse" in refused("run", PAPER, "--mirror", stuck)

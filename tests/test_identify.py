@@ -554,12 +554,16 @@ def test_mirror_file_reads_back(identification, model):
     text = mirror_file_text(identification, 'A "mirror" \\ µ', model=model)
     table = tomllib.loads(text)
     family = "prandtl_ishlinskii" if model == "prandtl_ishlinskii" else "bouc_wen"
-    assert set(table) == {"name", "travel", "composition", "rate_limit", "bias", family}
+    assert set(table) == {"name", "travel", "composition", "rate_limit", "bias", "drive_min", "drive_max", family}
     assert (table["name"], table["composition"]) == ('A "mirror" \\ µ', "static")
     assert number(table["travel"], "mrad") == pytest.approx(1e3 * identification.travel_rad, rel=1e-3)
     fit = identification.fit(model)
     assert number(table["rate_limit"], "V/s") == fit.rate_limit_v_per_s
     assert number(table["bias"], "V") == identification.bias_v
+    assert (number(table["drive_min"], "V"), number(table["drive_max"], "V")) == (
+        identification.drive_min_v,
+        identification.drive_max_v,
+    )
     if family == "bouc_wen":
         units = {"d1": "mrad/V", "d2": "s/V", "epsilon": "mrad/V", "delta": "s/V", "alpha": "1/V", "beta": "1/V"}
         read = [number(table[family][key], unit) for key, unit in units.items()]
@@ -595,7 +599,8 @@ def test_hostile_names_stay_inside_their_line():
     result = identify([replace(original, path='a\n[x]\ny = 1 # "\u2028.csv')], models=("prandtl_ishlinskii",))
     table = tomllib.loads(mirror_file_text(result, "name\nwith \x7f break"))
     assert table["name"] == "name\nwith \x7f break"
-    assert set(table) == {"name", "travel", "composition", "rate_limit", "bias", "prandtl_ishlinskii"}
+    general = {"name", "travel", "composition", "rate_limit", "bias", "drive_min", "drive_max"}
+    assert set(table) == general | {"prandtl_ishlinskii"}
     with pytest.raises(IdentificationError, match="no name"):
         mirror_file_text(result, "  ")
     with pytest.raises(IdentificationError, match="no model 'bouc_wen'"):

@@ -273,11 +273,25 @@ def test_a_static_mirror_has_no_linear_part(refuse):
 
 
 def test_a_bias_outside_the_amplifier_names_both(refuse):
-    text = edited("mirror.bias", '"13 V"')
+    text = edited("mirror.bias", '"11 V"', edited("amplifier.output_max", '"150 V"'))
     fault = the_fault(refuse(text))
-    assert (fault.key, fault.value, fault.line) == ("mirror.bias", '"13 V"', line_of("mirror.bias", text))
+    assert (fault.key, fault.value, fault.line) == ("mirror.bias", '"11 V"', line_of("mirror.bias", text))
     assert "amplifier.output_min to amplifier.output_max divided by amplifier.gain" in fault.reason
-    assert fault.expected == "0 V to 12 V"
+    assert fault.expected == "0 V to 10 V"
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "fault_key", "reason"),
+    [
+        ("mirror.bias", '"13 V"', "mirror.bias", "is outside drive_min to drive_max (0 V to 12 V)"),
+        ("mirror.drive_max", '"-1 V"', "mirror.drive_max", "is not above drive_min (0 V)"),
+        ("mirror.bouc_wen.alpha", '"34 1/V"', "mirror.bouc_wen.alpha", "h would grow without bound"),
+    ],
+)
+def test_what_a_mirror_was_identified_for_fits_together(refuse, key, value, fault_key, reason):
+    fault = the_fault(refuse(edited(key, value)))
+    assert fault.key == fault_key
+    assert reason in fault.reason
 
 
 @pytest.mark.parametrize("value", ["0", "1.2"])

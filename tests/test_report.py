@@ -198,7 +198,7 @@ def test_verdict_and_summary_say_the_same(paper):
 def test_a_drive_beyond_the_identified_rate_is_the_first_thing_said(tmp_path):
     slow = study.run(edited_file(tmp_path, ('rate_limit = "3770 V/s"', 'rate_limit = "100 V/s"')))
     assert "Not to be relied on" in report.verdict_text(slow)
-    assert any("identified up to 100 V/s" in w for w in report.summary(slow)["warnings"])
+    assert any("(identified up to 100 V/s)" in w for w in report.summary(slow)["warnings"])
     assert "Not to be relied on" not in report.verdict_text(study.run(missionfile.load_mission(SHIPPED)))
 
 
@@ -249,3 +249,11 @@ def test_a_radial_residual_is_two_axes(no_scan, paper, tmp_path):
     assert used == pytest.approx(math.sqrt(2.0) * one_axis, rel=1e-12)
     assert "times √2 for two equal axes" in report.verdict_text(radial)
     assert radial.achieved.margin_db < paper.achieved.margin_db - 2.0
+
+
+def test_a_drive_beyond_the_identified_range_is_said(no_scan, tmp_path):
+    narrow = study.run(edited_file(tmp_path, ('drive_max = "12 V"', 'drive_max = "8 V"')))
+    text = report.verdict_text(narrow)
+    assert "The mirror model is extrapolated." in text.splitlines()[0]
+    assert "(identified from 0 to 8 V)" in text
+    assert any("beyond the range that the mirror was identified for" in w for w in report.summary(narrow)["warnings"])

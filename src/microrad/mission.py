@@ -258,14 +258,22 @@ class Mirror(Table):
     )
     rate_limit_v_s: Rate = Field(alias="rate_limit", description="fastest drive that the hysteresis was identified for")
     bias_v: Voltage = Field(alias="bias", description="drive about which the mirror works")
+    drive_min_v: Voltage = Field(alias="drive_min", description="lowest drive that the hysteresis was identified for")
+    drive_max_v: Voltage = Field(alias="drive_max", description="highest drive that the hysteresis was identified for")
     linear: LinearPart | None = None
     bouc_wen: BoucWenTable | None = None
     prandtl_ishlinskii: PrandtlIshlinskiiTable | None = None
     comparison: Comparison | None = None
 
     def problems(self) -> Iterator[Problem]:
-        """Exactly one model, and a linear part exactly where the composition has one."""
+        """Exactly one model, a linear part exactly where the composition has one, and a bias inside the drive range."""
         yield from _one_model(self)
+        if not self.drive_min_v < self.drive_max_v:
+            low = format_quantity(self.drive_min_v, "V")
+            yield Problem("drive_max", f"is not above drive_min ({low})", f"a voltage above {low}")
+        elif not self.drive_min_v <= self.bias_v <= self.drive_max_v:
+            span = f"{format_quantity(self.drive_min_v, 'V')} to {format_quantity(self.drive_max_v, 'V')}"
+            yield Problem("bias", f"is outside drive_min to drive_max ({span})", span)
         if self.composition == "static" and self.linear is not None:
             advice = 'the table linear removed, or composition = "cascade"'
             yield Problem("linear", 'does not belong to composition = "static"', advice)

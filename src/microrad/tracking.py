@@ -30,6 +30,11 @@ class Run:
         return "the amplifier's slew limit" if c.slew_limited else ""
 
     @property
+    def drive_span_v(self) -> tuple[float, float]:
+        """Lowest and highest drive behind the amplifier, about the bias (V)."""
+        return float(np.min(self.trace.drive_v)), float(np.max(self.trace.drive_v))
+
+    @property
     def fastest_drive_v_s(self) -> float:
         """Largest rate of the drive behind the amplifier, from sample to sample (V/s)."""
         period = self.trace.time_s[1] - self.trace.time_s[0]

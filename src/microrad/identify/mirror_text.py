@@ -37,6 +37,8 @@ def mirror_file_text(identification: Identification, name: str, *, model: str | 
         _line("composition", "static", "the linear dynamics of the mirror were not identified"),
         _line("rate_limit", _text(fit.rate_limit_v_per_s, "V/s"), f"fastest rate of the drive, from {source}"),
         _line("bias", _text(identification.bias_v, "V"), f"middle of the drive range, from {source}"),
+        _line("drive_min", _text(identification.drive_min_v, "V"), f"lowest drive, from {source}"),
+        _line("drive_max", _text(identification.drive_max_v, "V"), f"highest drive, from {source}"),
         "",
         *(_bouc_wen(fit, source) if isinstance(fit, BoucWenFit) else _prandtl_ishlinskii(fit, source)),
     ]

@@ -71,14 +71,17 @@ def verdict_text(study: Study) -> str:
 
 
 def beyond_identified(study: Study, run: Run) -> str:
-    """The warning that a run drives the mirror faster than its model was identified for, or nothing."""
-    limit = study.file.mission.mirror.rate_limit_v_s
-    if run.mirror == "no hysteresis" or run.fastest_drive_v_s <= limit:
+    """The warning that a run drives the mirror faster or further than its model was identified for, or nothing."""
+    table, (low, high) = study.file.mission.mirror, run.drive_span_v
+    beyond = []
+    if run.fastest_drive_v_s > table.rate_limit_v_s:
+        beyond.append(f"{run.fastest_drive_v_s:.3g} V/s (identified up to {table.rate_limit_v_s:.3g} V/s)")
+    if low + table.bias_v < table.drive_min_v or high + table.bias_v > table.drive_max_v:
+        known = f"identified from {table.drive_min_v:.3g} to {table.drive_max_v:.3g} V"
+        beyond.append(f"{low + table.bias_v:.3g} to {high + table.bias_v:.3g} V ({known})")
+    if run.mirror == "no hysteresis" or not beyond:
         return ""
-    return (
-        f"{run.trace.name}: drive of up to {run.fastest_drive_v_s:.3g} V/s, but the mirror model was identified up to "
-        f"{limit:.3g} V/s: what it says there is extrapolated"
-    )
+    return f"{run.trace.name}: the mirror model is extrapolated to a drive of {' and of '.join(beyond)}"
 
 
 def warnings(study: Study) -> list[str]:
@@ -89,12 +92,14 @@ def warnings(study: Study) -> list[str]:
     ]
     found += study.summary.warnings
     m = study.file.mission
-    low, high = m.amplifier.output_min_v / m.amplifier.gain, m.amplifier.output_max_v / m.amplifier.gain
+    half, bias = m.scenario.loop_amplitude_v, m.mirror.bias_v
+    if not m.mirror.drive_min_v <= bias - half <= bias + half <= m.mirror.drive_max_v:
+        found.append("the hysteresis loops are drawn for a drive beyond the range that the mirror was identified for")
     if (
-        not low
-        <= m.mirror.bias_v - m.scenario.loop_amplitude_v
-        <= m.mirror.bias_v + m.scenario.loop_amplitude_v
-        <= high
+        not m.amplifier.output_min_v
+        <= m.amplifier.gain * (bias - half)
+        <= m.amplifier.gain * (bias + half)
+        <= (m.amplifier.output_max_v)
     ):
         found.append("the hysteresis loops are drawn for a drive beyond the amplifier's range")
     found += filter(None, (beyond_identified(study, run) for run in study.runs))
