@@ -252,3 +252,9 @@ def test_without_comparison_there_is_none(variant):
 def test_a_proportional_loop_is_stable(variant):
     result = variant(('integral = "16000 V/(mrad s)"', 'integral = "0 V/(mrad s)"'))
     assert isinstance(result.runs[0].trace, simulate.Trace)
+
+
+def test_the_residual_in_the_budget_says_which_run_it_is_from(shipped):
+    found, _ = shipped
+    (line,) = [line for line in found.achieved.lines if line.name == "Pointing loss"]
+    assert line.source == "simulated: given, PID + inverse, 25 Hz, peak (per-axis)"

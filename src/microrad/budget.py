@@ -23,14 +23,6 @@ class Line:
     regime: str
 
 
-@dataclass(frozen=True, slots=True)
-class Budget:
-    """Named lines in the order in which they are read."""
-
-    name: str
-    lines: tuple[Line, ...]
-
-
 def total_db(lines: Iterable[Line]) -> float:
     """Sum of the lines: in dB, or in dBm (dBW) when one of them is a level in dBm (dBW).
 

@@ -23,7 +23,6 @@ BIT_ERROR_RATIO = 1e-9
 
 _DB_PER_NEPER = 10.0 / math.log(10.0)
 _GIVEN = "whatever the pointing error and the data rate"
-_CHOSEN = "chosen for this evaluation"
 _TRANSMITTING = (
     "uniformly lit, unobscured, diffraction-limited: an upper bound, of which a Gaussian beam cut by the aperture "
     "reaches 0.81 at best (Klein and Degnan 1974)"
@@ -37,6 +36,7 @@ _POINTING_BASIS = {
     "gain": ("exp(-G error^2), G = (pi D / lambda)^2", "beam that falls off as a Gaussian set by its own gain"),
 }
 _RECEIVING = "unobscured area pi D^2 / 4, all of its light on the detector"
+_CHOSEN = "chosen for this evaluation"
 
 
 class LinkError(ValueError):
@@ -130,15 +130,20 @@ def communication_budget(
     sources: Mapping[str, Source],
     pointing_error_rad: float | None = None,
     data_rate_bit_s: float | None = None,
+    given_source: str = _CHOSEN,
 ) -> LinkBudget:
     """Budget of the data link from LEO to GEO, at the mission's pointing error and data rate or at those given.
+
+    ``given_source`` says where a given value comes from, and stands as the source of its line.
 
     Raises `ValueError` for a negative pointing error or a data rate that is not above zero.
     """
     beam = mission.communication
     write = _Writer("communication", beam, mission, sources)
-    error, error_source = _given(beam.pointing_error_rad, pointing_error_rad, write.source("pointing_error"))
-    rate, rate_source = _given(beam.data_rate_bit_s, data_rate_bit_s, write.source("data_rate"))
+    error, error_source = _given(
+        beam.pointing_error_rad, pointing_error_rad, write.source("pointing_error"), given_source
+    )
+    rate, rate_source = _given(beam.data_rate_bit_s, data_rate_bit_s, write.source("data_rate"), given_source)
     _check_grid(np.asarray(rate), np.asarray(error))
     transmit = write.transmit(
         write.gain("LEO aperture gain", "leo_aperture", _TRANSMITTING), _pointing_line(mission, error, error_source)
@@ -180,9 +185,9 @@ def _gaussian_budget(write: "_Writer", beam: Beacon, receiver: str) -> LinkBudge
     return _budget(write.table.capitalize(), write.transmit(gain, pointing), receive, required, beam)
 
 
-def _given(own: float, given: float | None, source: str) -> tuple[float, str]:
+def _given(own: float, given: float | None, source: str, given_source: str) -> tuple[float, str]:
     """The value in force and its source: the one given, else the mission's own."""
-    return (own, source) if given is None else (float(given), _CHOSEN)
+    return (own, source) if given is None else (float(given), given_source)
 
 
 @dataclass(frozen=True, slots=True)
@@ -409,7 +414,7 @@ def ideal_receivers(
     """
     beam = mission.communication
     error, error_source = _given(
-        beam.pointing_error_rad, pointing_error_rad, source_text(sources, "communication.pointing_error")
+        beam.pointing_error_rad, pointing_error_rad, source_text(sources, "communication.pointing_error"), _CHOSEN
     )
     margin = float(margin_of_error(mission, error))
     source = f"{source_text(sources, 'communication.data_rate')}; {error_source}"

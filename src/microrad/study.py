@@ -79,7 +79,8 @@ def run(file: MissionFile, on_progress: Progress = lambda done, total, what: Non
     margins, runs = tracking.loop_margins(m), tracking.tracking_runs(m)
     residual = tracking.worst(m, runs)
     left_rad = tracking.residual_rad(m, residual.trace)
-    achieved = link.communication_budget(m, sources, pointing_error_rad=left_rad)
+    simulated = f"simulated: {residual.trace.name}, {m.requirement.residual_statistic} ({m.conventions.residual})"
+    achieved = link.communication_budget(m, sources, pointing_error_rad=left_rad, given_source=simulated)
 
     on_progress(2, 3, "claims of the paper")
     scan = paper.scan(m, on_progress) if paper.applies(m) else None
