@@ -22,7 +22,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from microrad import control as microrad_control
-from microrad import kernels, mirror, missionfile, simulate, tracking
+from microrad import hysteresis, kernels, mirror, missionfile, simulate, tracking
 
 HERE = Path(__file__).resolve().parent
 REPEATS = 15
@@ -34,7 +34,22 @@ class Parameters(ctypes.Structure):
     """The C twin's parameters, in its order."""
 
     _fields_ = (
-        [(n, DOUBLE) for n in ["step_s", "d1", "d2", "epsilon", "delta", "alpha", "beta", "rate_limit", "bias"]]
+        [
+            (n, DOUBLE)
+            for n in (
+                "step_s",
+                "d1",
+                "d2",
+                "epsilon",
+                "delta",
+                "alpha",
+                "beta",
+                "rate_limit",
+                "bias",
+                "gamma",
+                "eta",
+            )
+        ]
         + [(n, DOUBLE * 5) for n in ["diagonal", "coupling", "held", "end", "output"]]
         + [
             (n, DOUBLE)
@@ -76,7 +91,7 @@ def twin_parameters(plant: kernels.Plant, loop: kernels.Loop) -> Parameters:
     five = DOUBLE * 5
     return Parameters(
         plant.step_s,
-        *plant.bouc_wen[0],
+        *plant.bouc_wen[0, : kernels.POWER],
         five(*plant.diagonal[:5]),
         five(*plant.coupling[:2], 0.0, 0.0, 0.0),
         five(*plant.E_held[:5, 0]),
@@ -185,11 +200,11 @@ def peers(m: mirror.Mirror, time_s: np.ndarray, drive: np.ndarray) -> dict[str, 
 
 def main() -> None:
     mission = missionfile.load_mission(HERE.parent / "missions" / "leo-geo.toml").mission
-    model = tracking.hysteresis(mission, mission.mirror)
+    model = tracking.mirror_model(mission, mission.mirror)
     m = mirror.from_mission(mission.mirror, model)
-    setup = simulate.setup_from_mission(mission, mirror.slow_gain(model))
+    setup = simulate.setup_from_mission(mission, hysteresis.slow_gain(model))
     period = setup.timing.period_s
-    gains = microrad_control.gains_from_mission(mission.control, mirror.slow_gain(model))
+    gains = microrad_control.gains_from_mission(mission.control, hysteresis.slow_gain(model))
     controller = microrad_control.pid(replace(gains, derivative=DERIVATIVE_V_S_RAD), period)
     setup = replace(setup, timing=microrad_control.Timing(period, 1, 1), controller=controller)
     reference, _ = simulate.sine(mission.scenario.amplitude_rad, 15.0, period, settle_s=2.0)

@@ -10,7 +10,7 @@
 #define MODES 5
 
 typedef struct {
-    double step_s, d1, d2, epsilon, delta, alpha, beta, rate_limit, bias;
+    double step_s, d1, d2, epsilon, delta, alpha, beta, rate_limit, bias, gamma, eta;
     double diagonal[MODES], coupling[MODES], held[MODES], end[MODES], output[MODES];
     double proportional_step, integral_step, derivative_gain, filter_keep, windup_integral, windup_filter;
     double command_min, command_max, drive_resolution, sensor_resolution;
@@ -33,17 +33,17 @@ static inline double relaxed(double h, double forcing, double decay)
     return h + (forcing - decay * h) * (1.0 - exp(-decay)) / decay;
 }
 
-static inline double hysteresis_step(double h, double travel, double epsilon_rate, double alpha, double beta)
+static inline double hysteresis_step(const parameters *p, double h, double travel, double rate)
 {
-    double forcing = epsilon_rate * travel;
+    double forcing = p->epsilon * exp(p->delta * fabs(rate)) * travel;
     double side = (h > 0.0 || (h == 0.0 && forcing > 0.0)) ? 1.0 : -1.0;
-    double decay = alpha * fabs(travel) + side * beta * travel;
+    double decay = (p->alpha + side * p->gamma) * fabs(travel) + (side * p->beta + p->eta) * travel;
     double end = relaxed(h, forcing, decay);
     if (h * forcing >= 0.0 || h * end > 0.0)
         return end;
     double fraction = decay == 0.0 ? -h / forcing : log1p(-decay * h / forcing) / decay;
     double rest = fmax(0.0, 1.0 - fraction);
-    double other = alpha * fabs(travel) - side * beta * travel;
+    double other = (p->alpha - side * p->gamma) * fabs(travel) + (p->eta - side * p->beta) * travel;
     return relaxed(0.0, forcing * rest, other * rest);
 }
 
@@ -76,7 +76,7 @@ void closed_loop(const parameters *p, int64_t samples, const double *reference, 
                 count->inverse_clamped++;
                 rate = clamp(rate, p->rate_limit);
             }
-            inverse_h = hysteresis_step(inverse_h, travel, p->epsilon * exp(p->delta * fabs(rate)), p->alpha, p->beta);
+            inverse_h = hysteresis_step(p, inverse_h, travel, rate);
             feedforward = (reference[k] - inverse_h + p->d1 * p->bias) / (p->d1 * exp(-p->d2 * rate)) - p->bias;
             target = reference[k];
         }
@@ -109,7 +109,7 @@ void closed_loop(const parameters *p, int64_t samples, const double *reference, 
                 count->clamped++;
                 rate = clamp(rate, p->rate_limit);
             }
-            h = hysteresis_step(h, travel, p->epsilon * exp(p->delta * fabs(rate)), p->alpha, p->beta);
+            h = hysteresis_step(p, h, travel, rate);
             double z_next = p->d1 * exp(-p->d2 * rate) * (u + p->bias) - p->d1 * p->bias + h;
             double next[MODES];
             for (int i = 0; i < MODES; i++) {

@@ -18,7 +18,11 @@ from microrad import kernels
 
 
 class BoucWen(NamedTuple):
-    """Parameters of h' = epsilon e^(delta |c|) q' - beta q' |h| - alpha |q'| h and z = d1 e^(-d2 c) q + h."""
+    """Parameters of z = d1 e^(-d2 c) q + h and, with s = sign h, r = sign q' and the clamped rate c, of
+
+    h' = epsilon e^(delta |c|) q' - |q'| |h| (alpha s + beta r + gamma + eta r s) w,
+    where w = (|h| alpha / |epsilon|)^(exponent - 1).
+    """
 
     d1: float
     d2: float
@@ -28,10 +32,22 @@ class BoucWen(NamedTuple):
     beta: float
     rate_limit: float
     bias: float
+    gamma: float = 0.0
+    eta: float = 0.0
+    exponent: float = 1.0
+
+
+class Operator(NamedTuple):
+    """z = sum of weight x play; the thresholds above 0 grow by widening |q'|, up to the rate limit."""
+
+    thresholds: tuple[float, ...]
+    weights: tuple[float, ...]
+    widening: float = 0.0
+    rate_limit: float = np.inf
 
 
 class Mirror(NamedTuple):
-    """A continuous plant with its bank: Bouc-Wen elements first, then play operators."""
+    """A continuous plant with its bank: Bouc-Wen elements first, then operators of plays."""
 
     A: np.ndarray
     B: np.ndarray
@@ -42,13 +58,12 @@ class Mirror(NamedTuple):
     D: np.ndarray
     K: np.ndarray
     bouc_wen: tuple[BoucWen, ...] = ()
-    play_threshold: tuple[float, ...] = ()
-    play_weight: tuple[float, ...] = ()
+    operators: tuple[Operator, ...] = ()
 
 
-def compose(*, states=0, actuators=1, outputs=1, bouc_wen=(), play_threshold=(), play_weight=(), **matrices):
+def compose(*, states=0, actuators=1, outputs=1, bouc_wen=(), operators=(), **matrices):
     """A mirror from the matrices that are given; the others are zero."""
-    elements = len(bouc_wen) + len(play_threshold)
+    elements = len(bouc_wen) + len(operators)
     rows = {
         "A": states,
         "B": states,
@@ -63,9 +78,7 @@ def compose(*, states=0, actuators=1, outputs=1, bouc_wen=(), play_threshold=(),
     filled = {name: np.zeros((rows[name], columns.get(name, elements))) for name in rows}
     for name, matrix in matrices.items():
         filled[name][...] = matrix
-    return Mirror(
-        **filled, bouc_wen=tuple(bouc_wen), play_threshold=tuple(play_threshold), play_weight=tuple(play_weight)
-    )
+    return Mirror(**filled, bouc_wen=tuple(bouc_wen), operators=tuple(operators))
 
 
 # ------------------------------------------------------------------------------------------------ one element
@@ -93,17 +106,17 @@ def taylor(h, forcing, decay, time):
     return total
 
 
-def bouc_wen_step(h, travel, epsilon_rate, alpha, beta):
-    """h after a drive that moves by ``travel`` at constant rate; floats or Decimals.
+def bouc_wen_step(h, travel, epsilon_rate, alpha, beta, gamma=0, eta=0):
+    """h after a drive that moves by ``travel`` at constant rate, for exponent 1; floats or Decimals.
 
-    h' = epsilon_rate q' - beta q' |h| - alpha |q'| h is summed as a Taylor series over pieces of the step; a piece
-    over which h changes sign is cut at the sign change, found by bisection.
+    On the side s of zero, h' = epsilon_rate q' - |q'| (alpha + beta r s + gamma s + eta r) h. It is summed as a Taylor
+    series over pieces of the step; a piece over which h changes sign is cut at the sign change, found by bisection.
     """
     one = type(h)(1)
     forcing, remaining = epsilon_rate * travel, one
     while remaining > 0:
         side = (h > 0) - (h < 0) or (forcing > 0) - (forcing < 0)
-        decay = beta * travel * side + alpha * abs(travel)
+        decay = alpha * abs(travel) + beta * travel * side + gamma * abs(travel) * side + eta * travel
         piece = min(remaining, 1 / (4 * abs(decay) + one))
         end = taylor(h, forcing, decay, piece)
         if end * side < 0:
@@ -115,17 +128,40 @@ def bouc_wen_step(h, travel, epsilon_rate, alpha, beta):
     return h
 
 
+def hysteresis_slope(row, rate, c, h):
+    """h' at the drive's rate, of which c is the clamped one."""
+    r, s = np.sign(rate), np.sign(h)
+    decay = row.alpha * s + row.beta * r + row.gamma + row.eta * r * s
+    weight = 1.0
+    if row.exponent != 1.0:
+        weight = (abs(h) * row.alpha / abs(row.epsilon)) ** (row.exponent - 1.0) if row.epsilon else 0.0
+    return row.epsilon * exp(row.delta * abs(c)) * rate - abs(rate) * abs(h) * decay * weight
+
+
 def bouc_wen_step_solved(h, q, q_next, step_s, row, method="DOP853"):
-    """The same step by an adaptive solver, in time."""
+    """The same step by an adaptive solver, in time, for any exponent."""
     rate = (q_next - q) / step_s
     c, _ = clamped_rate(rate, row.rate_limit)
-
-    def slope(_, h):
-        return row.epsilon * exp(row.delta * abs(c)) * rate - row.beta * rate * abs(h) - row.alpha * abs(rate) * h
-
-    solution = solve_ivp(slope, (0, step_s), [h], method=method, rtol=1e-12, atol=1e-15)
+    options = {"rtol": 1e-12, "atol": 1e-15}
+    if row.exponent != 1.0:
+        options["atol"] *= max(abs(row.epsilon), 1e-9) / row.alpha
+        if method == "DOP853":  # whose first trial would overflow far outside
+            options["max_step"] = step_s / (1.0 + abs(q_next - q) * row.alpha * row.exponent)
+    solution = solve_ivp(
+        lambda _, h: [hysteresis_slope(row, rate, c, h[0])], (0, step_s), [h], method=method, **options
+    )
     assert solution.success, solution.message
     return float(solution.y[0, -1])
+
+
+def bouc_wen_advance(row, h, q, q_next, step_s):
+    """h of an element whose drive moves from q to q_next, and whether its rate was clamped: the step of the twins."""
+    travel = float(q_next - q)
+    c, beyond = clamped_rate(travel / step_s, row.rate_limit)
+    if row.exponent != 1.0:
+        return bouc_wen_step_solved(h, 0.0, travel, step_s, row), c, beyond
+    growth = row.epsilon * exp(row.delta * abs(c))
+    return bouc_wen_step(h, travel, growth, row.alpha, row.beta, row.gamma, row.eta), c, beyond
 
 
 def bouc_wen_response(drive, step_s, row, h0=0.0, method="DOP853"):
@@ -145,13 +181,42 @@ def play(p, q, threshold):
     return max(q - threshold, min(q + threshold, p))
 
 
+def widened(threshold, widening, rate):
+    """A threshold at a (clamped) rate: only those above 0 grow."""
+    return threshold + widening * abs(rate) if threshold > 0 else threshold
+
+
 def play_response(drive, thresholds, state0):
     """States of a bank of play operators, shape (samples, operators)."""
-    rows, p = [], list(state0)
+    return widening_play_response(drive, 1.0, thresholds, 0.0, np.inf, state0)[0]
+
+
+def widening_play_response(drive, step_s, thresholds, widening, rate_limit, state0):
+    """States of rate-dependent plays, shape (samples, operators), and clamped samples; at rest before the first."""
+    rows, p, clamped, last = [], list(state0), 0, drive[0]
     for q in drive:
-        p = [play(state, q, threshold) for state, threshold in zip(p, thresholds, strict=True)]
+        c, beyond = clamped_rate((q - last) / step_s, rate_limit)
+        clamped += beyond
+        p = [play(state, q, widened(r, widening, c)) for state, r in zip(p, thresholds, strict=True)]
         rows.append(p)
-    return np.array(rows).reshape(len(drive), len(p))
+        last = q
+    return np.array(rows).reshape(len(drive), len(p)), clamped
+
+
+def lag_response(drive, step_s, time_constants, state0):
+    """States of x' = (u - x) / tau for a drive linear between samples, shape (samples, lags), by an adaptive solver."""
+    tau, x = np.array(time_constants), np.array(state0, dtype=float)
+    rows = [x]
+    for u, u_next in pairwise(drive):
+
+        def slope(t, x, u=u, rate=(u_next - u) / step_s):
+            return (u + rate * t - x) / tau
+
+        solution = solve_ivp(slope, (0, step_s), x, method="DOP853", rtol=1e-13, atol=1e-15)
+        assert solution.success, solution.message
+        x = solution.y[:, -1]
+        rows.append(x)
+    return np.array(rows)
 
 
 # ------------------------------------------------------------------------------------------------ the plant
@@ -172,8 +237,8 @@ class MirrorTwin:
         self.transition = expm(generator * step_s)
         self.x, self.u, self.z, self.q = np.zeros(n), np.zeros(nu), np.zeros(nz), np.zeros(nz)
         self.h = [0.0] * len(mirror.bouc_wen)
-        self.p = [0.0] * len(mirror.play_threshold)
-        self.clamped = [0] * len(mirror.bouc_wen)
+        self.p = [[0.0] * len(operator.thresholds) for operator in mirror.operators]
+        self.clamped = [0] * nz
 
     def linear(self, u_next, z_next):
         """x at the end of a step over which u and z are linear in time."""
@@ -184,14 +249,18 @@ class MirrorTwin:
     def advance_bank(self, q_next):
         z = []
         for i, row in enumerate(self.mirror.bouc_wen):
-            travel = float(q_next[i] - self.q[i])
-            c, beyond = clamped_rate(travel / self.step_s, row.rate_limit)
+            self.h[i], c, beyond = bouc_wen_advance(row, self.h[i], self.q[i], q_next[i], self.step_s)
             self.clamped[i] += beyond
-            self.h[i] = bouc_wen_step(self.h[i], travel, row.epsilon * exp(row.delta * abs(c)), row.alpha, row.beta)
             z.append(output(row, q_next[i], c, self.h[i]))
-        for i, (threshold, weight) in enumerate(zip(self.mirror.play_threshold, self.mirror.play_weight, strict=True)):
-            self.p[i] = play(self.p[i], q_next[len(self.h) + i], threshold)
-            z.append(weight * self.p[i])
+        for o, operator in enumerate(self.mirror.operators):
+            i = len(self.h) + o
+            c, beyond = clamped_rate((q_next[i] - self.q[i]) / self.step_s, operator.rate_limit)
+            self.clamped[i] += beyond
+            self.p[o] = [
+                play(p, q_next[i], widened(r, operator.widening, c))
+                for p, r in zip(self.p[o], operator.thresholds, strict=True)
+            ]
+            z.append(sum(w * p for w, p in zip(operator.weights, self.p[o], strict=True)))
         self.q = q_next
         return np.array(z)
 
@@ -221,7 +290,7 @@ def reference_solution(mirror, drive, drive_rate, times, rtol=1e-11, atol=1e-13)
 
     Where z depends on q' and q' on z (d2 and F E both non-zero) the pair is iterated to its fixed point.
     """
-    assert not mirror.play_threshold
+    assert not mirror.operators
     n = len(mirror.A)
 
     def bank(x, h, t):
@@ -246,8 +315,7 @@ def reference_solution(mirror, drive, drive_rate, times, rtol=1e-11, atol=1e-13)
         h_slope = []
         for i, row in enumerate(mirror.bouc_wen):
             c, _ = clamped_rate(rate[i], row.rate_limit)
-            push = row.epsilon * exp(row.delta * abs(c)) * rate[i]
-            h_slope.append(push - row.beta * rate[i] * abs(h[i]) - row.alpha * abs(rate[i]) * h[i])
+            h_slope.append(hysteresis_slope(row, rate[i], c, h[i]))
         return np.concatenate([mirror.A @ x + mirror.B @ drive(t) + mirror.E @ z, h_slope])
 
     rest = np.zeros(n + len(mirror.bouc_wen))
@@ -289,6 +357,8 @@ class Loop(NamedTuple):
     inverse_play_threshold: tuple[float, ...]
     inverse_play_weight: tuple[float, ...]
     inverse_play_actuator: tuple[int, ...]
+    inverse_widening: tuple[tuple[float, float], ...]  # by actuator: growth of the thresholds in s, and rate limit
+    inverse_creep: tuple[tuple[float, float, int], ...]  # weight, time constant in s, actuator
 
 
 def idle_loop(actuators, axes, controllers=0):
@@ -318,11 +388,16 @@ def idle_loop(actuators, axes, controllers=0):
         inverse_play_threshold=(),
         inverse_play_weight=(),
         inverse_play_actuator=(),
+        inverse_widening=((0.0, np.inf),) * actuators,
+        inverse_creep=(),
     )
 
 
 class InverseTwin:
-    """Feedforward u = (r - h + d1 bias) / (d1 e^(-d2 q')) - bias (Eq. 4) with q = r / d1, plus inverse plays."""
+    """Feedforward u = (r - h + d1 bias) / (d1 e^(-d2 q')) - bias (Eq. 4) with q = r / d1, plus inverse plays.
+
+    Creep first: what the lags add at the sample is taken off r. They then see u, held over the sample.
+    """
 
     def __init__(self, loop, sample_s):
         self.loop, self.sample_s = loop, sample_s
@@ -330,23 +405,35 @@ class InverseTwin:
         self.target = np.zeros(len(loop.allocation))
         self.h = [0.0] * len(self.rows)
         self.p = [0.0] * len(loop.inverse_play_threshold)
-        self.clamped = [0] * len(self.rows)
+        self.lag = [0.0] * len(loop.inverse_creep)
+        self.clamped = [0] * (len(self.rows) + len(loop.allocation))
 
     def sample(self, reference):
         loop = self.loop
         target = loop.allocation @ reference
+        for x, (weight, _, actuator) in zip(self.lag, loop.inverse_creep, strict=True):
+            target[actuator] -= weight * x
         u = loop.inverse_direct * target
         for i, row in enumerate(self.rows):
             actuator = loop.inverse_bouc_wen_actuator[i]
-            travel = float(target[actuator] - self.target[actuator]) / row.d1
-            c, beyond = clamped_rate(travel / self.sample_s, row.rate_limit)
+            q, q_next = self.target[actuator] / row.d1, target[actuator] / row.d1
+            self.h[i], c, beyond = bouc_wen_advance(row, self.h[i], q, q_next, self.sample_s)
             self.clamped[i] += beyond
-            self.h[i] = bouc_wen_step(self.h[i], travel, row.epsilon * exp(row.delta * abs(c)), row.alpha, row.beta)
             static = target[actuator] - self.h[i] + row.d1 * row.bias
             u[actuator] += static / (row.d1 * exp(-row.d2 * c)) - row.bias
+        rates = (target - self.target) / self.sample_s
+        for a, (_, limit) in enumerate(loop.inverse_widening):
+            rates[a], beyond = clamped_rate(rates[a], limit)
+            self.clamped[len(self.rows) + a] += beyond
         for i, actuator in enumerate(loop.inverse_play_actuator):
-            self.p[i] = play(self.p[i], target[actuator], loop.inverse_play_threshold[i])
+            growth = loop.inverse_widening[actuator][0]
+            threshold = widened(loop.inverse_play_threshold[i], growth, rates[actuator])
+            self.p[i] = play(self.p[i], target[actuator], threshold)
             u[actuator] += loop.inverse_play_weight[i] * self.p[i]
+        self.lag = [
+            taylor(x, u[actuator] / tau, 1 / tau, self.sample_s)
+            for x, (_, tau, actuator) in zip(self.lag, loop.inverse_creep, strict=True)
+        ]
         self.target = target
         return u
 
@@ -419,6 +506,15 @@ def by_rows(matrix):
     return kernels.Rows(start.astype(np.uint64), column.astype(np.uint64), matrix[row, column])
 
 
+def kernel_rows(bouc_wen):
+    """The kernels' rows, with all columns."""
+    rows = []
+    for b in bouc_wen:
+        per_size = b.alpha / abs(b.epsilon) if b.exponent != 1.0 and b.epsilon else 0.0
+        rows.append([*b[:8], b.gamma, b.eta, b.exponent - 1.0, per_size])
+    return np.array(rows, dtype=float).reshape(-1, 12)
+
+
 def build_plant(mirror, step_s):
     """The kernels' plant, and its state at rest."""
     n, nu = mirror.B.shape
@@ -440,6 +536,7 @@ def build_plant(mirror, step_s):
         actuators=(0,) * nu,
         outputs=(0,) * ny,
         elements=(0,) * nb,
+        operators=(0,) * len(mirror.operators),
         feedback=bool(np.any(mirror.F)),
         direct=bool(np.any(mirror.B) or np.any(mirror.D)),
         diagonal=diagonal,
@@ -455,9 +552,11 @@ def build_plant(mirror, step_s):
         D=mirror.D,
         CE1=mirror.C @ E1,
         K=mirror.K,
-        bouc_wen=np.array(mirror.bouc_wen, dtype=float).reshape(nb, 8),
-        play_threshold=np.array(mirror.play_threshold, dtype=float),
-        play_weight=np.array(mirror.play_weight, dtype=float),
+        bouc_wen=kernel_rows(mirror.bouc_wen),
+        operator=np.array([(o.widening, o.rate_limit) for o in mirror.operators], dtype=float).reshape(-1, 2),
+        play_start=np.cumsum([0, *(len(o.thresholds) for o in mirror.operators)]).astype(np.uint64),
+        play_threshold=np.array([r for o in mirror.operators for r in o.thresholds], dtype=float),
+        play_weight=np.array([w for o in mirror.operators for w in o.weights], dtype=float),
     )
     state = kernels.PlantState(
         x=np.zeros(even),
@@ -466,12 +565,13 @@ def build_plant(mirror, step_s):
         u_next=np.zeros(nu),
         y=np.zeros(ny),
         bank=np.zeros((nz, 4)),
-        clamped=np.zeros(nb, dtype=np.int64),
+        play=np.zeros(plant.play_threshold.size),
+        clamped=np.zeros(nz, dtype=np.int64),
     )
     return plant, state
 
 
-def build_loop(loop):
+def build_loop(loop, step_s):
     """The kernels' loop, and its state at rest."""
     actuators, axes = loop.allocation.shape
     controllers, elements = len(loop.Ac), len(loop.inverse_bouc_wen)
@@ -494,11 +594,15 @@ def build_loop(loop):
         sensor_resolution=loop.sensor_resolution,
         allocation=loop.allocation,
         inverse_direct=loop.inverse_direct,
-        inverse_bouc_wen=np.array(loop.inverse_bouc_wen, dtype=float).reshape(elements, 8),
+        inverse_bouc_wen=kernel_rows(loop.inverse_bouc_wen),
         inverse_bouc_wen_actuator=np.array(loop.inverse_bouc_wen_actuator, dtype=np.uint64),
         inverse_play_threshold=np.array(loop.inverse_play_threshold, dtype=float),
         inverse_play_weight=np.array(loop.inverse_play_weight, dtype=float),
         inverse_play_actuator=np.array(loop.inverse_play_actuator, dtype=np.uint64),
+        inverse_widening=np.array(loop.inverse_widening, dtype=float),
+        inverse_lag_keep=np.array([exp(-step_s * loop.steps_per_sample / tau) for _, tau, _ in loop.inverse_creep]),
+        inverse_lag_weight=np.array([weight for weight, _, _ in loop.inverse_creep], dtype=float),
+        inverse_lag_actuator=np.array([actuator for _, _, actuator in loop.inverse_creep], dtype=np.uint64),
     )
     state = kernels.LoopState(
         x=np.zeros(controllers),
@@ -509,10 +613,11 @@ def build_loop(loop):
         target=np.zeros((actuators, 2)),
         inverse_h=np.zeros(elements),
         inverse_p=np.zeros(len(loop.inverse_play_threshold)),
+        inverse_lag=np.zeros(len(loop.inverse_creep)),
         pending=np.zeros((loop.delay_steps + 1, actuators)),
         position=np.zeros(1, dtype=np.int64),
         counts=np.zeros((actuators, 2), dtype=np.int64),
-        inverse_clamped=np.zeros(elements, dtype=np.int64),
+        inverse_clamped=np.zeros(elements + actuators, dtype=np.int64),
     )
     return record, state
 
@@ -530,7 +635,7 @@ def run_open_loop(mirror, step_s, drive, state=None):
 def run_closed_loop(mirror, step_s, loop, reference, states=(None, None)):
     """The compiled ``closed_loop`` from rest or from ``states``: the run, and both states."""
     plant, plant_rest = build_plant(mirror, step_s)
-    record, loop_rest = build_loop(loop)
+    record, loop_rest = build_loop(loop, step_s)
     plant_state, loop_state = states if states[0] is not None else (plant_rest, loop_rest)
     reference = np.ascontiguousarray(reference, dtype=float)
     actuators, axes = loop.allocation.shape

@@ -19,12 +19,13 @@ import typer
 
 import microrad
 from microrad import cli, doctor, identify, report, study
+from microrad.cli import lab
 
 ROOT = Path(__file__).parents[1]
 PAPER = ROOT / "src" / "microrad" / "missions" / "leo-geo.toml"
 COMMANDS = ("init", "run", "identify", "doctor", "schema")
 MICRORAD = (sys.executable, "-m", "microrad")
-COLUMNS = ("--input", "drive", "--output", "angle", "--rate", "1000")
+COLUMNS = ("--input", "drive", "--output", "angle", "--rate", "1000", "--static")
 
 
 class Result(NamedTuple):
@@ -343,14 +344,24 @@ def test_identify_prints_both_models_and_writes_the_mirror(call, folder):
     assert "loop-mirror.toml written (prandtl_ishlinskii)" in result.out
     assert "microrad run leo-geo.toml --mirror loop-mirror.toml --output loop-mirror-study" in result.out
     text = (folder / "loop-mirror.toml").read_text(encoding="utf-8")
-    assert text.startswith(cli._MIRROR_FILE_BEGINS)
+    assert text.startswith(lab.MIRROR_FILE_BEGINS)
     assert 'name = "loop"' in text
-    assert sorted(p.name for p in folder.iterdir()) == ["loop-mirror.toml", "loop.csv"]
+    assert sorted(p.name for p in folder.iterdir()) == ["loop-mirror.html", "loop-mirror.toml", "loop.csv"]
 
 
 def test_identify_json_names_and_models(call, folder):
     path = write_recording(folder / "loop.csv", reverse=True)
-    options = ("--model", "bouc-wen", "--admissible", "--name", "lab mirror", "--mirror-file", "lab.toml", "--json")
+    options = (
+        "--static",
+        "--model",
+        "bouc-wen",
+        "--admissible",
+        "--name",
+        "lab mirror",
+        "--mirror-file",
+        "lab.toml",
+        "--json",
+    )
     result = call("identify", path, "--input", 1, "--output", 2, "--rate", "1 kHz", "--output-unit", "um",
                   "--lever-arm", "50 mm", *options)  # fmt: skip
     assert (result.code, result.err) == (0, "")
@@ -373,7 +384,7 @@ def test_identify_json_names_and_models(call, folder):
     ("text", "rate_hz"), [("200", 200.0), ("200 Hz", 200.0), ("50 kHz", 50e3), ("1e3", 1e3), ("0.5MHz", 5e5)]
 )
 def test_rates_with_and_without_unit(text, rate_hz):
-    assert cli._rate(text) == rate_hz
+    assert lab._rate(text) == rate_hz
 
 
 @pytest.mark.parametrize(
@@ -419,7 +430,7 @@ def test_identify_replaces_only_mirror_files_and_only_when_told(call, refused, f
     assert "replace it with --overwrite" in refused("identify", path, *COLUMNS)
     assert "was not written by microrad" in refused("identify", path, *COLUMNS, "--overwrite")
     assert "was not written by microrad" in refused("identify", path, *COLUMNS, "--overwrite", "--mirror-file", path)
-    mine.write_text(f"{cli._MIRROR_FILE_BEGINS} an older recording\n")
+    mine.write_text(f"{lab.MIRROR_FILE_BEGINS} an older recording\n")
     assert call("identify", path, *COLUMNS, "--overwrite").code == 0
     assert "loop.csv" in mine.read_text(encoding="utf-8")
 

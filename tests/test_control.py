@@ -11,9 +11,9 @@ import pytest
 from numpy.testing import assert_allclose
 
 import oracles
-from microrad import control, lti, mirror, simulate
+from microrad import control, hysteresis, lti, mirror, simulate
 from microrad.control import IDEAL_DRIVE, Drive, Gains, Inverse, Timing
-from microrad.mirror import BoucWen, Play
+from microrad.hysteresis import BoucWen, Play
 from microrad.missionfile import load_mission
 
 SHIPPED = Path(__file__).parent.parent / "missions" / "leo-geo.toml"
@@ -31,7 +31,7 @@ def mission():
 @pytest.fixture(scope="module")
 def straight(mission):
     """The mission's mirror without hysteresis."""
-    return mirror.from_mission(mission.mirror, mirror.gain_only(PAPER))
+    return mirror.from_mission(mission.mirror, hysteresis.gain_only(PAPER))
 
 
 def respond(system, inputs):
@@ -179,7 +179,7 @@ def test_the_sampled_plant_is_what_the_compiled_loop_does(mission, composition, 
     The additive plant has a direct path too: an output that follows the amplifier at once.
     """
     drive, timing = Drive(-inf, inf, bandwidth_hz, inf, 0.0, 0.0), Timing(4 * PERIOD, steps, delay)
-    model = Play((0.0, 0.0), (0.06e-3, 0.029e-3)) if composition == "additive" else mirror.gain_only(PAPER)
+    model = Play((0.0, 0.0), (0.06e-3, 0.029e-3)) if composition == "additive" else hysteresis.gain_only(PAPER)
     m = mirror.assemble("axis", composition, mirror.linear_part(mission.mirror.linear)[0], model)
     volts = np.random.default_rng(4).normal(size=150)
     setup = simulate.Setup(drive, timing, SILENT)
@@ -205,8 +205,8 @@ def test_the_sampled_plant_of_a_static_mirror_by_hand():
 def loops(mission):
     """Controller, sampled plant and period of loops that differ in what limits them."""
     linear = mirror.linear_part(mission.mirror.linear)[0]
-    paper = mirror.assemble("paper", "cascade", linear, mirror.gain_only(PAPER))
-    static = mirror.assemble("static", "static", None, mirror.gain_only(PAPER))
+    paper = mirror.assemble("paper", "cascade", linear, hysteresis.gain_only(PAPER))
+    static = mirror.assemble("static", "static", None, hysteresis.gain_only(PAPER))
     w = 2 * pi * 300
     light = lti.modal_from_polynomials((w * w,), (1.0, 0.04 * w, w * w))
     resonant = mirror.assemble("resonant", "cascade", light, Play((0.0,), (1.0,)))

@@ -22,6 +22,8 @@ PAPER = BoucWen(0.089, 0.0, -0.048, 4.7e-4, 38.421, 34.635, np.inf, 6.0)
 W, DAMPING = 2 * np.pi * 900, 0.2
 RESONANCE = {"states": 2, "A": [[0.0, 1.0], [-(W**2), -2 * DAMPING * W]], "C": [[1.0, 0.0]], "bouc_wen": [PAPER]}
 CASCADE = compose(**RESONANCE, E=[[0.0], [W**2]], G=1.0)
+GENERAL = BoucWen(0.089, 0.0, -0.022, 4.7e-4, 2.4, 0.6, np.inf, 6.0, 0.5, -0.7, 2.0)  # asymmetric, exponent 2
+POWERED = CASCADE._replace(bouc_wen=(GENERAL,))
 FED_BACK = compose(**RESONANCE, B=[[0.0], [0.05 * W**2]], E=[[0.0], [0.3 * W**2]], F=[[2.0, 0.0]], G=0.7)
 
 
@@ -58,6 +60,7 @@ with_reversals, without_reversals = (1.8, 2.3), (1.95, 2.05)
 CASES = {
     "oscillator": (OSCILLATOR, SLOW, 1 / 1500, 150, with_reversals),
     "cascade": (CASCADE, FAST, 1 / 25_000, 400, with_reversals),
+    "cascade, exponent 2": (POWERED, FAST, 1 / 25_000, 400, with_reversals),
     "fed back": (FED_BACK, FAST, 1 / 25_000, 400, with_reversals),
     "cascade, rising drive": (CASCADE, HALF_SINE, 1 / 25_000, 240, without_reversals),
 }

@@ -285,11 +285,12 @@ def test_admissible_fit_never_turns_against_the_drive(freqs):
     assert bound.constrained
     assert bound.residual_rms_percent > free.residual_rms_percent
     for r in recordings:
-        start = transient(r.drive)
+        drive = r.drive[:, 0]
+        start = transient(drive)
         lowest = []
         for fit in (free, bound):
-            model, _ = replace(fit, d2_s_per_v=0.0).response(r.drive, r.step_s)  # d2 is a lag, not a wrong way
-            travel = np.diff(r.drive[start:])
+            model, _ = replace(fit, d2_s_per_v=0.0).response(drive, r.step_s)  # d2 is a lag, not a wrong way
+            travel = np.diff(drive[start:])
             moving = np.abs(travel) > 1e-9
             lowest.append(np.min(np.diff(model[start:])[moving] / travel[moving]))
         assert lowest[0] < -2 * D1
@@ -354,9 +355,9 @@ def test_transient_is_one_sweep_of_the_range():
 def test_fastest_rate_ignores_spikes_and_noise():
     exact = 6 * 2 * np.pi * 100
     clean = record(100)
-    drive = clean.drive + 0.003 * philox(2).standard_normal(clean.samples)
+    drive = clean.drive[:, 0] + 0.003 * philox(2).standard_normal(clean.samples)
     drive[1000] += 2.0
-    for r in (clean, replace(clean, drive=drive)):
+    for r in (clean, replace(clean, drive=drive[:, None])):
         assert fastest_rate(prepare([r], Units())) == pytest.approx(exact, rel=0.02)
     assert np.max(np.abs(np.diff(drive))) * RATE_HZ > 10 * exact
 
@@ -441,10 +442,11 @@ def test_choice_on_held_out_samples(identification):
 def test_straight_line_is_the_least_squares_line():
     r = play_record([0.05, 0.03], [0.0, 1.0])
     result = identify([r], models=("prandtl_ishlinskii",))
-    start = transient(r.drive[:2000])
-    line = np.polyfit(r.drive[start:2000], r.output[start:2000], 1)
-    residual = r.output - np.polyval(line, r.drive)
-    span = np.ptp(r.output[:2000])
+    drive, output = r.drive[:, 0], r.output[:, 0]
+    start = transient(drive[:2000])
+    line = np.polyfit(drive[start:2000], output[start:2000], 1)
+    residual = output - np.polyval(line, drive)
+    span = np.ptp(output[:2000])
     assert result.straight_line.fit_rms_percent == pytest.approx(100 * np.std(residual[start:2000]) / span, rel=1e-9)
     held_out = 100 * np.sqrt(np.mean(residual[2000:] ** 2)) / span
     assert result.straight_line.held_out_rms_percent == pytest.approx(held_out, rel=1e-9)
@@ -454,7 +456,7 @@ def test_held_out_samples_are_not_seen_by_the_fit():
     original = record(100, 5, seconds=0.2)
     drive, output = original.drive.copy(), original.output.copy()
     drive[5000:] = 3 * drive[5000:][::-1]
-    output[5000:] = 7 + philox(9).standard_normal(5000)
+    output[5000:] = 7 + philox(9).standard_normal((5000, 1))
     changed = replace(original, drive=drive, output=output)
     a, b = (identify([r]) for r in (original, changed))
     for x, y in zip(a.fits, b.fits, strict=True):
@@ -473,7 +475,8 @@ def test_states_are_carried_into_the_held_out_part():
     fit = fit_prandtl_ishlinskii([r], [0.0, 2.0])
     whole = predict(fit, r, 1700)
     assert np.max(np.abs(whole.residual_rad[whole.start :])) < 1e-12
-    fresh = fit.response(r.drive[1700:], r.step_s)[0] - fit.response(r.drive, r.step_s)[0][1700:]
+    drive = r.drive[:, 0]
+    fresh = fit.response(drive[1700:], r.step_s)[0] - fit.response(drive, r.step_s)[0][1700:]
     assert np.max(np.abs(fresh)) > 1e-6
 
 
@@ -491,8 +494,8 @@ def test_warnings_of_two_rates(identification):
 
 def test_warnings_of_one_rate_drift_and_noise():
     r = record(100, 3, seconds=0.2)
-    trend = 0.05 * np.ptp(r.output) * np.linspace(0, 1, r.samples)
-    drive = r.drive + 0.03 * philox(8).standard_normal(r.samples)
+    trend = 0.05 * np.ptp(r.output) * np.linspace(0, 1, r.samples)[:, None]
+    drive = r.drive + 0.03 * philox(8).standard_normal((r.samples, 1))
     result = identify([replace(r, output=r.output + trend, drive=drive)])
     text = "\n".join(result.warnings)
     assert "One loop rate only" in text

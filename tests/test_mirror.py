@@ -1,7 +1,7 @@
 """Mirrors against hand-written simulations, numerical slopes and the plants that they are made of."""
 
 import re
-from dataclasses import replace
+from dataclasses import astuple, replace
 from math import exp, inf, pi
 
 import numpy as np
@@ -10,8 +10,9 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.signal import lsim
 
 import oracles
-from microrad import control, kernels, lti, mirror, mirror_summary, simulate
-from microrad.mirror import BoucWen, Mirror, Play
+from microrad import control, hysteresis, kernels, lti, mirror, mirror_summary, simulate
+from microrad.hysteresis import BoucWen, Creep, Play
+from microrad.mirror import Mirror
 from microrad.missionfile import load_mission
 from shipped import SHIPPED, edited
 
@@ -20,6 +21,9 @@ PRINTED = BoucWen(0.089e-3, -2.96e-7, -0.048e-3, 4.7e-4, 38.421, 34.635, 3770.0,
 ADMISSIBLE = replace(PRINTED, epsilon_rad_v=-0.022e-3, alpha_1_v=2.4, beta_1_v=0.6)
 RISING = replace(ADMISSIBLE, epsilon_rad_v=0.03e-3)  # the drive term helps: no wrong way at all
 PLAYS = Play((0.0, 0.4, 1.5), (0.06e-3, 0.02e-3, 0.009e-3))
+WIDENING = replace(PLAYS, widening_s=1e-4, rate_limit_v_s=3000.0)
+POWERED = replace(ADMISSIBLE, gamma_1_v=0.5, eta_1_v=-0.7, exponent=2.0)
+CREEP = Creep((0.004e-3, 0.003e-3, -0.001e-3), (2e-4, 2e-3, 0.5))
 one_femtoradian = 1e-15  # two routes through the same arithmetic
 twenty_femtoradians = 2e-14  # agreement with an adaptive solver
 
@@ -67,10 +71,18 @@ def by_hand(composition, model, drive):
         return lsim(RESONANT[1], signal, STEP * np.arange(len(signal)), interp=True)[1]
 
     if isinstance(model, Play):
-        states = oracles.play_response(drive, model.thresholds_v, [0.0] * len(model.thresholds_v))
+        rest = [0.0] * len(model.thresholds_v)
+        states, _ = oracles.widening_play_response(
+            drive, STEP, model.thresholds_v, model.widening_s, model.rate_limit_v_s, rest
+        )
         whole = states @ np.array(model.weights_rad_v)
-        return {"static": whole, "cascade": linear(whole)}[composition]
-    whole, h, _ = oracles.bouc_wen_response(drive, STEP, oracles.BoucWen(*model.row))
+        first = model.weights_rad_v[0] * states[:, 0]
+        return {
+            "static": lambda: whole,
+            "cascade": lambda: linear(whole),
+            "additive": lambda: linear(first) + whole - first,
+        }[composition]()
+    whole, h, _ = oracles.bouc_wen_response(drive, STEP, oracles.BoucWen(*astuple(model)))
     return {
         "static": lambda: whole,
         "cascade": lambda: linear(whole),
@@ -85,10 +97,25 @@ def by_hand(composition, model, drive):
         ("cascade", PRINTED),
         ("additive", PRINTED),
         ("additive", ADMISSIBLE),
+        ("additive", POWERED),
         ("static", PLAYS),
         ("cascade", PLAYS),
+        ("additive", PLAYS),
+        ("cascade", WIDENING),
+        ("additive", WIDENING),
     ],
-    ids=["static", "cascade", "additive", "additive, admissible", "static plays", "cascade of plays"],
+    ids=[
+        "static",
+        "cascade",
+        "additive",
+        "additive, admissible",
+        "additive, exponent 2, asymmetric",
+        "static plays",
+        "cascade of plays",
+        "additive plays",
+        "cascade of widening plays",
+        "additive widening plays",
+    ],
 )
 def test_a_composition_is_its_block_diagram(composition, model):
     drive = zigzag(3)
@@ -99,6 +126,49 @@ def test_a_composition_is_its_block_diagram(composition, model):
     print(f"within {error:.1e} rad of the block diagram, output up to {np.max(np.abs(expected)):.1e} rad")
     assert error < twenty_femtoradians
     assert np.max(np.abs(expected)) > 10e-6
+
+
+@pytest.mark.parametrize("composition", ["static", "cascade", "additive"])
+@pytest.mark.parametrize("model", [PRINTED, WIDENING], ids=["Bouc-Wen", "widening plays"])
+def test_creep_is_added_to_every_composition(composition, model):
+    """The drive behind each lag, by scipy, on top of the mirror without creep."""
+    drive = zigzag(3)
+    system = None if composition == "static" else RESONANT[0]
+    m = mirror.assemble("axis", composition, system, model, CREEP)
+    with_creep, clamped = run(m, drive)
+    without, clamped_without = run(mirror.assemble("axis", composition, system, model), drive)
+    time = STEP * np.arange(len(drive))
+    crept = sum(
+        lsim(([-1 / tau], [1 / tau], [weight], [0.0]), drive, time, interp=True)[1]
+        for weight, tau in zip(CREEP.weights_rad_v, CREEP.time_constants_s, strict=True)
+    )
+    assert_allclose(with_creep[:, 0], without[:, 0] + crept, rtol=0, atol=one_femtoradian)
+    assert np.max(np.abs(crept)) > 1e-7
+    assert_array_equal(clamped, clamped_without)
+    assert clamped.sum() > 0
+    assert m.inverse_creep == (CREEP,)
+
+
+def test_creep_follows_the_convention_of_the_angle(tmp_path):
+    """Line of sight: model and creep are doubled alike, so the whole output is."""
+    table = '[mirror.creep]\ntime_constants = ["0.1 s", "1 s"]\nweights = ["2 urad/V", "1 urad/V"]\n\n[amplifier]\n'
+    m = edited(tmp_path, ("[amplifier]\n", table)).mirror
+    assert mirror.creep_model(m) == Creep((2e-6, 1e-6), (0.1, 1.0))
+    drive = zigzag(3)
+    once, twice = (
+        run(mirror.from_mission(m, hysteresis.scaled(PRINTED, times), times=times), drive)[0] for times in (1.0, 2.0)
+    )
+    assert_allclose(twice, 2 * once, rtol=0, atol=one_femtoradian)
+    assert_array_equal(mirror.from_mission(m, PRINTED, times=2.0).C[0, -2:], [4e-6, 2e-6])
+
+
+def test_slow_lags_are_kept_in_the_linear_loop():
+    """At rest a lag adds its whole weight, at a frequency far above 1 / tau none of it."""
+    m = mirror.assemble("axis", "cascade", RESONANT[0], PRINTED, CREEP)
+    loop = m.linear_loop
+    slow, fast = (float(np.abs(lti.frequency_response(loop, np.array([f]))[0, 0, 0])) for f in (1e-6, 60.0))
+    assert_allclose(slow, 0.089e-3 + sum(CREEP.weights_rad_v), rtol=1e-6)
+    assert_allclose(fast, 0.089e-3 + CREEP.weights_rad_v[0], rtol=0.03)
 
 
 def test_the_compositions_differ():
@@ -155,7 +225,7 @@ def stiffening(weight=0.4):
         D=np.zeros((1, 1)),
         K=np.zeros((1, 2)),
         bouc_wen=(),
-        play=Play((20e-6, 60e-6), (weight, weight / 2)),
+        plays=(Play((20e-6, 40e-6), (weight / 2, weight / 2)), Play((60e-6,), (weight / 2,))),
         inverse=(Play((0.0,), (0.05e-3,)),),
     )
 
@@ -163,10 +233,10 @@ def stiffening(weight=0.4):
 def test_mirrors_side_by_side_run_as_they_run_apart():
     """Plays before Bouc-Wen on purpose: the combined bank has to be put into the kernel's order."""
     parts = [
-        mirror.assemble("plays", "cascade", RESONANT[0], PLAYS),
+        mirror.assemble("plays", "cascade", RESONANT[0], WIDENING),
         mirror.assemble("printed", "additive", RESONANT[0], PRINTED),
         stiffening(),
-        mirror.assemble("static", "static", None, ADMISSIBLE),
+        mirror.assemble("static", "static", None, replace(ADMISSIBLE, gamma_1_v=0.5, eta_1_v=-0.3), CREEP),
     ]
     both = mirror.combine(*parts)
     assert (both.actuators, both.axes) == (4, 4)
@@ -177,7 +247,10 @@ def test_mirrors_side_by_side_run_as_they_run_apart():
     for j, (alone, _) in enumerate(apart):
         assert_allclose(together[:, j], alone[:, 0], rtol=0, atol=one_femtoradian)
         assert np.ptp(alone) > 10e-6
-    assert_array_equal(clamped, np.concatenate([count for _, count in apart]))
+    bouc_wen_first = [*(count[: len(m.bouc_wen)] for m, (_, count) in zip(parts, apart, strict=True))]
+    then_plays = [*(count[len(m.bouc_wen) :] for m, (_, count) in zip(parts, apart, strict=True))]
+    assert_array_equal(clamped, np.concatenate(bouc_wen_first + then_plays))
+    assert then_plays[0] > 0
     assert clamped.sum() > 0
 
 
@@ -186,7 +259,9 @@ def test_two_axes_track_in_one_loop_as_in_two():
     timing = control.Timing(2 * STEP, 2, 1)
     drive = control.Drive(-4.0, 4.0, 5e3, 2000.0, 0.3e-3, 0.03e-6)
     parts = [
-        mirror.assemble("plays", "cascade", RESONANT[0], PLAYS),
+        mirror.assemble(
+            "plays", "cascade", RESONANT[0], replace(WIDENING, rate_limit_v_s=600.0), Creep((0.002e-3,), (0.01,))
+        ),
         mirror.assemble("printed", "cascade", RESONANT[0], PRINTED),
     ]
     pids = [control.pid(control.Gains(1e3, ki, 1e-2, 1e-4), timing.period_s) for ki in (16e6, 9e6)]
@@ -203,6 +278,8 @@ def test_two_axes_track_in_one_loop_as_in_two():
         assert_allclose(together.output_rad[:, j], alone.output_rad[:, 0], rtol=0, atol=one_femtoradian)
         assert_array_equal(together.command_v[:, j], alone.command_v[:, 0])
         counts.append(alone.counts)
+    assert together.counts.clamped == sum(c.clamped for c in counts) > 0
+    assert together.counts.inverse_clamped == sum(c.inverse_clamped for c in counts) > 0
     assert together.counts.saturated == sum(c.saturated for c in counts) > 0
     assert together.counts.slew_limited == sum(c.slew_limited for c in counts) > 0
     assert together.counts.alternating == sum(c.alternating for c in counts)
@@ -225,7 +302,7 @@ def test_a_mirror_driven_by_its_input_alone_has_no_loop_through_the_step():
 
 
 def test_the_linear_loop_of_a_fed_back_bank_is_its_response_without_thresholds():
-    m = replace(stiffening(), play=Play((0.0, 0.0), (0.4, 0.2)))
+    m = replace(stiffening(), plays=(Play((0.0, 0.0), (0.3, 0.1)), Play((0.0,), (0.2,))))
     loop = m.linear_loop
     drive = np.sin(2 * pi * 250 * 2e-6 * np.arange(4000))
     expected = lsim((loop.A, loop.B, loop.C, loop.D), drive, 2e-6 * np.arange(4000), interp=True)[1]
@@ -248,17 +325,17 @@ def test_the_line_of_sight_moves_by_twice_the_mechanical_angle(model):
     )
     assert_allclose(optical, 2 * mechanical, rtol=1e-13, atol=one_femtoradian)
     assert mirror.line_of_sight(model, "line-of-sight") == model
-    assert mirror.slow_gain(mirror.line_of_sight(model, "mechanical")) == 2 * mirror.slow_gain(model)
+    assert hysteresis.slow_gain(mirror.line_of_sight(model, "mechanical")) == 2 * hysteresis.slow_gain(model)
 
 
 @pytest.mark.parametrize("model", [PRINTED, PLAYS], ids=["Bouc-Wen", "plays"])
 def test_gain_only_is_a_straight_line(model):
     drive = zigzag(9, 300)
-    straight = mirror.gain_only(model)
+    straight = hysteresis.gain_only(model)
     output, _ = run(mirror.assemble("axis", "static", None, straight), drive)
     slope = {PRINTED: 0.089e-3, PLAYS: 0.089e-3}[model]
     assert_allclose(output[:, 0], slope * drive, rtol=1e-13)
-    assert mirror.slow_gain(straight) == pytest.approx(slope, rel=1e-14)
+    assert hysteresis.slow_gain(straight) == pytest.approx(slope, rel=1e-14)
 
 
 def test_hysteresis_model_takes_limit_and_bias_from_the_mission(table):
@@ -418,22 +495,22 @@ def test_the_summary_of_a_static_mirror_has_no_linear_part(tmp_path):
 @pytest.mark.parametrize("beta", [-2.0, 0.0, 2.0])
 @pytest.mark.parametrize("epsilon", [-0.02e-3, 0.02e-3])
 def test_the_settled_size_and_the_slope_behind_a_reversal_follow_both_signs(epsilon, beta):
-    model = mirror.BoucWen(0.089e-3, 0.0, epsilon, 0.0, 5.0, beta)
+    model = hysteresis.BoucWen(0.089e-3, 0.0, epsilon, 0.0, 5.0, beta)
     drive = np.concatenate([np.linspace(0.0, 20.0, 40_001), [20.0 - 1e-6]])
-    output, hysteresis, _ = kernels.bouc_wen_response(drive, 1.0, np.array(model.row), 0.0)
-    assert_allclose(abs(hysteresis[-2]), model.settled_rad, rtol=1e-9)
+    output, h, _ = kernels.bouc_wen_response(drive, 1.0, np.array(model.row), 0.0)
+    assert_allclose(abs(h[-2]), model.settled_rad, rtol=1e-9)
     assert_allclose((output[-2] - output[-1]) / 1e-6, model.reversal_slope_rad_v(), rtol=1e-4)
 
 
 def test_a_softer_mirror_for_small_drives():
     """Two plays, by hand: 0.1 of the drive, and 0.3 of what is beyond 2 V."""
-    model = mirror.Play((0.0, 2.0), (0.1e-3, 0.3e-3))
-    assert mirror.output_amplitude(model, 1.0) == pytest.approx(0.1e-3)
-    assert mirror.output_amplitude(model, 4.0) == pytest.approx(1.0e-3)
-    assert mirror.secant_gain(model, 0.1e-3) == pytest.approx(0.1e-3)
-    assert mirror.secant_gain(model, 1.0e-3) == pytest.approx(0.25e-3)
-    assert mirror.secant_gain(model, np.inf) == mirror.slow_gain(model) == pytest.approx(0.4e-3)
-    assert mirror.gain_only(model, 1.0e-3).d1_rad_v == pytest.approx(0.25e-3)
+    model = hysteresis.Play((0.0, 2.0), (0.1e-3, 0.3e-3))
+    assert hysteresis.output_amplitude(model, 1.0) == pytest.approx(0.1e-3)
+    assert hysteresis.output_amplitude(model, 4.0) == pytest.approx(1.0e-3)
+    assert hysteresis.secant_gain(model, 0.1e-3) == pytest.approx(0.1e-3)
+    assert hysteresis.secant_gain(model, 1.0e-3) == pytest.approx(0.25e-3)
+    assert hysteresis.secant_gain(model, np.inf) == hysteresis.slow_gain(model) == pytest.approx(0.4e-3)
+    assert hysteresis.gain_only(model, 1.0e-3).d1_rad_v == pytest.approx(0.25e-3)
     # the kernel's own settled response to a sine of 4 V has that amplitude
     turns = 4.0 * np.sin(2 * np.pi * np.arange(3000) / 1000)
     states = kernels.play_response(turns, np.array(model.thresholds_v), np.zeros(2))

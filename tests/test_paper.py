@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from microrad import control, mirror, paper, simulate, tracking
+from microrad import control, hysteresis, mirror, paper, simulate, tracking
 from microrad.missionfile import load_mission
 from shipped import SHIPPED, edited
 
@@ -66,9 +66,9 @@ def test_points_of_the_scan_against_runs_with_the_fine_step(mission, scanned, co
     assert timing.steps_per_sample == 2
     pid = control.pid(control.Gains(proportional, integral, 0.0, 1e-4), timing.period_s)
     setup = simulate.Setup(control.drive_from_mission(mission), timing, pid)
-    model = tracking.hysteresis(mission, mission.mirror)
+    model = tracking.mirror_model(mission, mission.mirror)
     hysteretic = mirror.from_mission(mission.mirror, model, composition)
-    straight = mirror.from_mission(mission.mirror, mirror.gain_only(model), composition)
+    straight = mirror.from_mission(mission.mirror, hysteresis.gain_only(model), composition)
 
     def run(m, freq_hz, inverse=control.no_feedforward):
         return simulate.track_sine("", m, setup, inverse(m), 300e-6, freq_hz)

@@ -5,8 +5,7 @@ import hashlib
 import numpy as np
 import pytest
 
-from microrad import recording
-from microrad.recording import MIN_SAMPLES, RecordingError, read_recording, recording_from_arrays
+from microrad.recording import MIN_SAMPLES, RecordingError, files, read_recording, recording_from_arrays
 
 N = 400
 TIME = np.arange(N) / 100.0
@@ -38,9 +37,9 @@ def test_reads_delimiters_and_headers(tmp_path, delimiter, header):
     head = header.replace(",", delimiter) if header else None
     path = write(tmp_path / "a.txt", [row.replace(",", delimiter) for row in ROWS], head)
     read = read_recording(path, "drive" if header else 1, 2, 100.0)
-    np.testing.assert_array_equal(read.drive, DRIVE)
-    np.testing.assert_array_equal(read.output, OUTPUT)
-    assert (read.input_name, read.output_name) == (("drive", "output") if header else ("1", "2"))
+    np.testing.assert_array_equal(read.drive[:, 0], DRIVE)
+    np.testing.assert_array_equal(read.output[:, 0], OUTPUT)
+    assert (read.input_names, read.output_names) == ((("drive",), ("output",)) if header else (("1",), ("2",)))
     assert (read.samples, read.rate_hz, read.step_s) == (N, 100.0, 0.01)
     assert read.sha256 == hashlib.sha256(path.read_bytes()).hexdigest()
     assert read.path == str(path)
@@ -65,14 +64,14 @@ def test_reads_variants_of_text(tmp_path, change):
     text = change("time,drive,output\n" + "\n".join(ROWS) + "\n")
     path.write_bytes(text.encode("latin-1" if "µ" in text else "utf-8"))
     read = read_recording(path, "drive", "output", 100.0)
-    np.testing.assert_array_equal(read.drive, DRIVE)
-    np.testing.assert_array_equal(read.output, OUTPUT)
+    np.testing.assert_array_equal(read.drive[:, 0], DRIVE)
+    np.testing.assert_array_equal(read.output[:, 0], OUTPUT)
 
 
 def test_faults_in_unused_columns_do_not_matter(tmp_path):
     rows = ["ok," + row.partition(",")[2] for row in ROWS]
     read = read_recording(write(tmp_path / "a.csv", rows), 1, "output", 100.0)
-    np.testing.assert_array_equal(read.drive, DRIVE)
+    np.testing.assert_array_equal(read.drive[:, 0], DRIVE)
 
 
 def test_recording_is_frozen(tmp_path):
@@ -171,7 +170,7 @@ def test_number_out_of_range(tmp_path, column):
 
 def test_digits_name_a_column_by_number(tmp_path):
     read = read_recording(write(tmp_path / "a.csv", ROWS), "1", "2", 100.0)
-    np.testing.assert_array_equal(read.output, OUTPUT)
+    np.testing.assert_array_equal(read.output[:, 0], OUTPUT)
 
 
 def test_same_column_twice(tmp_path):
@@ -258,9 +257,9 @@ def test_bad_rate(tmp_path, rate_hz):
 def test_file_too_large(tmp_path, monkeypatch):
     path = write(tmp_path / "a.csv", ROWS)
     size = path.stat().st_size
-    monkeypatch.setattr(recording, "MAX_BYTES", size - 1)
+    monkeypatch.setattr(files, "MAX_BYTES", size - 1)
     assert "held in memory" in refusal(path)
-    monkeypatch.setattr(recording, "MAX_BYTES", size)
+    monkeypatch.setattr(files, "MAX_BYTES", size)
     assert read_recording(path, 1, 2, 100.0).samples == N
 
 
@@ -269,7 +268,7 @@ def test_a_big_file_is_read_whole(tmp_path):
     path.write_text("a,b\n" + "\n".join(f"{k % 977}.25,{k % 983}.125" for k in range(300_000)) + "\n")
     read = read_recording(path, "a", "b", 1e4)
     assert read.samples == 300_000
-    np.testing.assert_array_equal(read.drive, np.arange(300_000) % 977 + 0.25)
+    np.testing.assert_array_equal(read.drive[:, 0], np.arange(300_000) % 977 + 0.25)
 
 
 def test_arrays_under_the_same_checks():

@@ -12,7 +12,8 @@ import pytest
 import xarray as xr
 
 from microrad import missionfile, report, study
-from microrad.report import figures, folder
+from microrad import folder
+from microrad.report import figures
 from shipped import SHIPPED, edited_file
 
 
@@ -156,7 +157,7 @@ def test_a_file_in_the_place_of_the_folder_is_refused(tmp_path):
 def test_an_interrupted_write_leaves_nothing_and_keeps_the_old(tmp_path, error):
     target = tmp_path / "out"
     with folder.whole_folder(target, overwrite=False) as draft:
-        (draft / "manifest.json").write_text('{"versions": {"microrad": "0"}}')
+        (draft / "manifest.json").write_text('{"mission": {}, "versions": {"microrad": "0"}}')
     with pytest.raises(BaseException) as caught, folder.whole_folder(target, overwrite=True) as draft:
         (draft / "half").write_text("written")
         raise error

@@ -1,6 +1,6 @@
 """The sampled loop's numbers, counters and slices, against an adaptive solver and the paper's mirror by hand."""
 
-from dataclasses import replace
+from dataclasses import astuple, replace
 from math import exp, pi
 
 import numpy as np
@@ -9,13 +9,13 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.integrate import solve_ivp
 
 import oracles
-from microrad import control, kernels, lti, mirror, simulate, tracking
-from microrad.mirror import BoucWen, Play
+from microrad import control, hysteresis, kernels, lti, mirror, simulate, tracking
+from microrad.hysteresis import BoucWen, Play
 from microrad.missionfile import load_mission
 from shipped import SHIPPED, edited
 
 PRINTED = BoucWen(0.089e-3, -2.96e-7, -0.048e-3, 4.7e-4, 38.421, 34.635, 3770.0, 6.0)
-STRAIGHT = mirror.gain_only(PRINTED)
+STRAIGHT = hysteresis.gain_only(PRINTED)
 NUMERATOR = (1.979e11, 7.051e13, 2.973e13)  # Eq. 2 of the paper
 DENOMINATOR = (1.0, 2.15e4, 3.737e8, 2.615e12, 8.489e14, 1.829e14)
 PERIOD = 20e-6
@@ -49,8 +49,8 @@ def track(model, freq_hz, setup=IDEAL):
 
 def mission_setup(mission):
     """The given mirror of a mission, and what stands around it."""
-    model = tracking.hysteresis(mission, mission.mirror)
-    return mirror.from_mission(mission.mirror, model), simulate.setup_from_mission(mission, mirror.slow_gain(model))
+    model = tracking.mirror_model(mission, mission.mirror)
+    return mirror.from_mission(mission.mirror, model), simulate.setup_from_mission(mission, hysteresis.slow_gain(model))
 
 
 # ------------------------------------------------------------------------------------------------ the paper's loop
@@ -245,7 +245,7 @@ def chattering():
     The loop of the paper at 15 Hz with an ideal amplifier at 50 kHz, sample by sample.
     """
     m = papers_mirror(PRINTED)
-    row = oracles.BoucWen(*PRINTED.row)
+    row = oracles.BoucWen(*astuple(PRINTED))
     Ad, B0, B1 = (matrix.squeeze() for matrix in lti.first_order_hold(m.A, m.E, PERIOD))
     x, integral, u, z, h = np.zeros(5), 0.0, 0.0, 0.0, 0.0
     own_u = own_rate = own_h = 0.0
@@ -254,7 +254,7 @@ def chattering():
     def advance(h, travel):
         rate, clamped = oracles.clamped_rate(travel / PERIOD, row.rate_limit)
         growth = row.epsilon * exp(row.delta * abs(rate))
-        return kernels.bouc_wen_step(h, travel, growth, row.alpha, row.beta), rate, clamped
+        return kernels.bouc_wen_step(h, travel, growth, row.alpha, row.beta, 0.0, 0.0), rate, clamped
 
     for k in range(6667):
         wanted = AMPLITUDE * np.sin(2 * pi * 15.0 * PERIOD * k)

@@ -18,7 +18,7 @@ _PUBLIC = {
     "write_report": "report.write",
     "verdict_text": "report.verdict_text",
     "summary": "report.summary",
-    "FolderError": "report.FolderError",
+    "FolderError": "folder.FolderError",
     "LinkError": "link.LinkError",
     "read_recording": "recording.read_recording",
     "recording_from_arrays": "recording.recording_from_arrays",

@@ -9,8 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from microrad import lti, mirror, mission
-from microrad.mirror import BoucWen, Mirror, Play
+from microrad import lti, mission
+from microrad.hysteresis import LINE_OF_SIGHT, BoucWen, Creep, Play, slow_gain
+from microrad.mirror import Mirror
 
 Floats = NDArray[np.float64]
 
@@ -43,7 +44,7 @@ def drive_from_mission(m: mission.Mission) -> Drive:
         bandwidth_hz=a.bandwidth_hz,
         slew_v_s=a.slew_v_s / a.gain,
         drive_resolution_v=m.control.drive_resolution_v,
-        sensor_resolution_rad=m.control.sensor_resolution_rad * mirror.LINE_OF_SIGHT[m.conventions.mirror_angle],
+        sensor_resolution_rad=m.control.sensor_resolution_rad * LINE_OF_SIGHT[m.conventions.mirror_angle],
     )
 
 
@@ -125,6 +126,8 @@ class Inverse:
     """Feedforward by actuator: a direct gain (V/rad), Bouc-Wen models for Eq. 4, and play operators on the reference.
 
     Play thresholds are in radians and weights in V/rad; ``*_actuator`` says which drive an element belongs to.
+    ``widening`` holds, by actuator, the growth of the thresholds with the reference's rate (s) and the rate in rad/s
+    where it ends; none where it is empty. ``creep`` is taken off the reference, by actuator.
     """
 
     direct: tuple[float, ...]
@@ -133,6 +136,8 @@ class Inverse:
     play_thresholds: tuple[float, ...] = ()
     play_weights: tuple[float, ...] = ()
     play_actuator: tuple[int, ...] = ()
+    widening: tuple[tuple[float, float], ...] = ()
+    creep: tuple[Creep, ...] = ()
 
 
 def no_feedforward(m: Mirror) -> Inverse:
@@ -141,17 +146,21 @@ def no_feedforward(m: Mirror) -> Inverse:
 
 
 def inverse(m: Mirror) -> Inverse:
-    """Inverse of the mirror's hysteresis: Eq. 4 for Bouc-Wen, the closed form for Prandtl-Ishlinskii.
+    """Inverse of the mirror's hysteresis and creep: Eq. 4 for Bouc-Wen, the closed form for Prandtl-Ishlinskii.
 
-    Raises ValueError for a Prandtl-Ishlinskii model without weight at threshold 0: it stands still after a reversal.
+    The rate that widens a rate-dependent operator is that of the reference over the slow gain. Raises ValueError for a
+    Prandtl-Ishlinskii model without weight at threshold 0: it stands still after a reversal.
     """
     direct = [0.0] * m.actuators
     bouc_wen, plays = [], []
+    widening = [(0.0, math.inf)] * m.actuators
     for j, model in enumerate(m.inverse):
         if isinstance(model, BoucWen):
             bouc_wen.append((model, j))
         else:
             direct[j], thresholds, weights = play_inverse(model)
+            slow = slow_gain(model)
+            widening[j] = (model.weights_rad_v[0] * model.widening_s / slow, model.rate_limit_v_s * slow)
             plays += [(r, w, j) for r, w in zip(thresholds, weights, strict=True)]
     return Inverse(
         tuple(direct),
@@ -160,6 +169,8 @@ def inverse(m: Mirror) -> Inverse:
         tuple(r for r, _, _ in plays),
         tuple(w for _, w, _ in plays),
         tuple(j for _, _, j in plays),
+        tuple(widening),
+        m.inverse_creep,
     )
 
 
@@ -167,7 +178,8 @@ def play_inverse(model: Play) -> tuple[float, tuple[float, ...], tuple[float, ..
     """Inverse of a Prandtl-Ishlinskii model as (direct gain, thresholds in rad, weights in V/rad).
 
     Source: Kuhnen, European Journal of Control 9 (2003) 407: r'_j = sum_{i<j} w_i (r_j - r_i), and w' from the
-    differences of the reciprocals of the cumulated weights. Raises ValueError without weight at threshold 0.
+    differences of the reciprocals of the cumulated weights. Thresholds above 0 that widen by s widen the inverse's by
+    w_0 s (Al Janaideh and Krejci 2013), which `inverse` looks after. Raises ValueError without weight at threshold 0.
     """
     r, w = np.array(model.thresholds_v), np.array(model.weights_rad_v)
     slope = np.cumsum(w)

@@ -4,11 +4,12 @@ Both plug into pydantic as annotations, `Annotated[float, Quantity("W", above=0.
 """
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
-from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
+from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler, GetJsonSchemaHandler, model_validator
 from pydantic_core import CoreSchema, core_schema
 
 from microrad.units import UnitError, format_quantity, kind_of, parse_quantity
@@ -146,3 +147,20 @@ def _plain_number(value: object) -> float:
     if not math.isfinite(number):
         raise UnitError(value, "is not a finite number", "a finite number", "1.0")
     return number
+
+
+class Table(BaseModel):
+    """A table of a mission or plan file: frozen, strict, no key beyond the named ones."""
+
+    model_config = ConfigDict(strict=True, frozen=True, extra="forbid", allow_inf_nan=False)
+
+    def problems(self) -> Iterator[Problem]:
+        """What does not fit together in a table whose keys are each in order."""
+        return iter(())
+
+    @model_validator(mode="after")
+    def _fits_together(self) -> Self:
+        problems = tuple(self.problems())
+        if problems:
+            raise ProblemsError(*problems)
+        return self

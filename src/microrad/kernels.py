@@ -7,8 +7,8 @@ Every kernel has a slow, obvious twin in ``tests/oracles.py`` and runs unchanged
 All quantities are deviations from the operating point (drive bias, output at rest), so zero states are at rest.
 """
 
-from collections.abc import Callable
-from math import exp, log1p
+from collections.abc import Callable, Sequence
+from math import exp, expm1, log1p
 from typing import Any, NamedTuple
 
 import numba
@@ -32,8 +32,12 @@ _OPTIONS: dict[str, Any] = {
 _compile: Callable[[Any], Any] = numba.njit(**_OPTIONS)
 _inline: Callable[[Any], Any] = numba.njit(inline="always", **_OPTIONS)
 
-# Columns of a Bouc-Wen parameter row (Eq. 3 of SPIE 11852, 118523B).
-D1, D2, EPSILON, DELTA, ALPHA, BETA, RATE_LIMIT, BIAS = range(8)
+# Columns of a Bouc-Wen parameter row: Eq. 3 of SPIE 11852, 118523B, then the asymmetry between the signs of h and
+# between rising and falling drive, the exponent less 1, and 1 / size of h at which the exponent has no effect.
+D1, D2, EPSILON, DELTA, ALPHA, BETA, RATE_LIMIT, BIAS, GAMMA, ETA, POWER, PER_SIZE = range(12)
+
+# Columns of a Prandtl-Ishlinskii operator's row: growth of its thresholds with the rate, and the rate where that ends.
+WIDENING, WIDENING_LIMIT = range(2)
 
 # Columns of a row of the bank's state, of an actuator's parameters, and of its counters.
 Q, H, Z, CHANGE = range(4)
@@ -67,8 +71,10 @@ class Plant(NamedTuple):
         x[k+1] = predicted x + E1 (change of z),     y = C (predicted x) + D u[k+1] + (C E1) (change of z) + K z[k+1].
 
     Ad is stored as its diagonal, its coupling of each state with its neighbour (0 with 1, 2 with 3, ...), and the rest
-    by rows: a real modal form has no rest, so it costs O(n). Bouc-Wen elements come first in q and z, play operators
-    after them. Without ``feedback`` F is zero, and without ``direct`` B and D are: they are not looked at.
+    by rows: a real modal form has no rest, so it costs O(n). Each element has one drive q and one output z: Bouc-Wen
+    elements come first, Prandtl-Ishlinskii operators (``operator``) after them, and those of operator i have the plays
+    from ``play_start[i]`` to ``play_start[i + 1]``. Without ``feedback`` F is zero, and without ``direct`` B and D are:
+    they are not looked at.
     """
 
     step_s: float
@@ -76,6 +82,7 @@ class Plant(NamedTuple):
     actuators: Count
     outputs: Count
     elements: Count  # Bouc-Wen only
+    operators: Count  # Prandtl-Ishlinskii only
     feedback: bool
     direct: bool
     diagonal: Floats
@@ -92,6 +99,8 @@ class Plant(NamedTuple):
     CE1: Floats
     K: Floats
     bouc_wen: Floats
+    operator: Floats
+    play_start: Indices
     play_threshold: Floats
     play_weight: Floats
 
@@ -100,8 +109,8 @@ class PlantState(NamedTuple):
     """The memory of a plant; the kernels write into these arrays. ``clamped`` counts rate-clamped steps by element.
 
     ``u_next`` is the drive at the end of the step to come and ``y`` the last output. ``bank`` has a row an element:
-    drive q, memory (h, or a play operator's state), output z and its last change. ``x`` and ``x_next`` have an even
-    length.
+    drive q, memory h (Bouc-Wen only), output z and its last change; ``play`` holds the states of all plays. ``x`` and
+    ``x_next`` have an even length.
     """
 
     x: Floats
@@ -110,6 +119,7 @@ class PlantState(NamedTuple):
     u_next: Floats
     y: Floats
     bank: Floats
+    play: Floats
     clamped: Integers
 
 
@@ -120,6 +130,10 @@ class Loop(NamedTuple):
     anti-windup gain. ``actuator`` has a row each: limits of the command, resolution of its converter (0 is ideal),
     FOLLOW of the first-order amplifier, 1 - exp(-2 pi bandwidth step) (1 is ideal), and its slew limit a plant step.
     ``sensor_resolution`` goes by axis; ``allocation`` (actuators, axes) turns references into actuator targets.
+
+    The inverse, see `_inverse`: ``inverse_bouc_wen`` and ``inverse_play_*`` belong to one actuator each, as do the lags
+    of creep, which keep ``inverse_lag_keep`` of themselves over a sample. ``inverse_widening`` (actuators; WIDENING in
+    s, WIDENING_LIMIT in output units per second) is the growth of the inverse thresholds with the target's rate.
     """
 
     actuators: Count
@@ -143,6 +157,10 @@ class Loop(NamedTuple):
     inverse_play_threshold: Floats
     inverse_play_weight: Floats
     inverse_play_actuator: Indices
+    inverse_widening: Floats
+    inverse_lag_keep: Floats
+    inverse_lag_weight: Floats
+    inverse_lag_actuator: Indices
 
 
 class LoopState(NamedTuple):
@@ -150,8 +168,8 @@ class LoopState(NamedTuple):
 
     ``x`` is xc, ``error`` e, ``output`` v and then what the clip took off it. ``pending`` holds the commands on their
     way through the computation delay, ``position`` its write index. ``counts`` has one row per actuator: saturated
-    samples, slew-limited plant steps. ``inverse_clamped`` counts rate-clamped samples of the feedforward's own
-    elements; ``x_next`` has no meaning between samples.
+    samples, slew-limited plant steps. ``inverse_clamped`` counts rate-clamped samples of the feedforward's own Bouc-Wen
+    elements, then of each actuator's plays; ``x_next`` has no meaning between samples.
     """
 
     x: Floats
@@ -162,6 +180,7 @@ class LoopState(NamedTuple):
     target: Floats
     inverse_h: Floats
     inverse_p: Floats
+    inverse_lag: Floats
     pending: Floats
     position: Integers
     counts: Integers
@@ -198,28 +217,89 @@ def _relaxed(h, forcing, decay):  # type: ignore[no-untyped-def]
 
 
 @_inline
-def bouc_wen_step(h, travel, epsilon_rate, alpha, beta):  # type: ignore[no-untyped-def]
+def bouc_wen_step(h, travel, epsilon_rate, alpha, beta, gamma, eta):  # type: ignore[no-untyped-def]
     """Exact h after a drive that moves by ``travel`` at constant rate; ``epsilon_rate`` = epsilon exp(delta |rate|).
 
-    h' = epsilon_rate q' - beta q' |h| - alpha |q'| h  is linear in h on each side of zero, with forcing F and decay k:
-    h <- h exp(-k) + F (1 - exp(-k)) / k. It crosses zero at most once, at the fraction ln(1 - k h / F) / k of the step.
+    h' = epsilon_rate q' - alpha |q'| h - beta q' |h| - gamma |q'| |h| - eta q' h  is linear in h on each side of zero,
+    with forcing F and decay k: h <- h exp(-k) + F (1 - exp(-k)) / k. It crosses zero at most once, at the fraction
+    ln(1 - k h / F) / k of the step. gamma = eta = 0 is Eq. 3.
     """
     forcing = epsilon_rate * travel
     side = 1.0 if h > 0.0 or (h == 0.0 and forcing > 0.0) else -1.0
-    decay = alpha * abs(travel) + side * beta * travel
+    decay = (alpha + side * gamma) * abs(travel) + (side * beta + eta) * travel
     end = _relaxed(h, forcing, decay)
     if h * forcing >= 0.0 or h * end > 0.0:
         return end
     # The sign changes inside the step: reach zero, then leave it on the other side with that side's decay.
     fraction = -h / forcing if decay == 0.0 else log1p(-decay * h / forcing) / decay
     rest = max(0.0, 1.0 - fraction)
-    other = alpha * abs(travel) - side * beta * travel
+    other = (alpha - side * gamma) * abs(travel) + (eta - side * beta) * travel
     return _relaxed(0.0, forcing * rest, other * rest)
+
+
+@_inline
+def _power_slope(h, forcing, positive, negative, power, per_size):  # type: ignore[no-untyped-def]
+    return forcing - (positive if h > 0.0 else negative) * h * (abs(h) * per_size) ** power
+
+
+@_compile
+def bouc_wen_power_step(h, travel, epsilon_rate, rows, e):  # type: ignore[no-untyped-def]
+    """h after a drive that moves by ``travel`` at constant rate, for an exponent n other than 1.
+
+    As `bouc_wen_step` with each |h| of the decay times (|h| / size)^(n - 1); n - 1 and 1 / size are the columns POWER
+    and PER_SIZE of row ``e``. Runge-Kutta of order 5 with the embedded order 4 (Dormand and Prince, J. Comp. Appl.
+    Math. 6 (1980) 19) to an error of 1e-11 of the size a step of its own, in at most a million steps. What is no finite
+    number, or grows beyond all bounds on the way, comes out as nan.
+    """
+    power, per_size = rows[e, POWER], rows[e, PER_SIZE]
+    forcing = epsilon_rate * travel
+    positive = (rows[e, ALPHA] + rows[e, GAMMA]) * abs(travel) + (rows[e, BETA] + rows[e, ETA]) * travel
+    negative = (rows[e, ALPHA] - rows[e, GAMMA]) * abs(travel) + (rows[e, ETA] - rows[e, BETA]) * travel
+    done, step = 0.0, 1.0 / (1.0 + max(abs(positive), abs(negative)) * (power + 1.0) * max(1.0, abs(h) * per_size))
+    if not (h - h == 0.0 and forcing - forcing == 0.0 and positive + negative < 1e300):
+        return np.nan
+    for _ in range(1_000_000):
+        if done >= 1.0:
+            return h
+        step = min(step, 1.0 - done)
+        k1 = _power_slope(h, forcing, positive, negative, power, per_size)
+        k2 = _power_slope(h + step * k1 / 5.0, forcing, positive, negative, power, per_size)
+        k3 = _power_slope(h + step * (3.0 * k1 + 9.0 * k2) / 40.0, forcing, positive, negative, power, per_size)
+        at = h + step * (44.0 / 45.0 * k1 - 56.0 / 15.0 * k2 + 32.0 / 9.0 * k3)
+        k4 = _power_slope(at, forcing, positive, negative, power, per_size)
+        at = 19372.0 / 6561.0 * k1 - 25360.0 / 2187.0 * k2 + 64448.0 / 6561.0 * k3 - 212.0 / 729.0 * k4
+        k5 = _power_slope(h + step * at, forcing, positive, negative, power, per_size)
+        at = 9017.0 / 3168.0 * k1 - 355.0 / 33.0 * k2 + 46732.0 / 5247.0 * k3 + 49.0 / 176.0 * k4
+        k6 = _power_slope(h + step * (at - 5103.0 / 18656.0 * k5), forcing, positive, negative, power, per_size)
+        move = 35.0 / 384.0 * k1 + 500.0 / 1113.0 * k3 + 125.0 / 192.0 * k4 - 2187.0 / 6784.0 * k5 + 11.0 / 84.0 * k6
+        end = h + step * move
+        k7 = _power_slope(end, forcing, positive, negative, power, per_size)
+        error = 71.0 / 57600.0 * k1 - 71.0 / 16695.0 * k3 + 71.0 / 1920.0 * k4 - 17253.0 / 339200.0 * k5
+        error = abs(step * (error + 22.0 / 525.0 * k6 - k7 / 40.0)) * per_size * 1e11
+        if error <= 1.0:
+            done += step
+            h = end
+        step *= min(5.0, max(0.2, 0.9 * (error + 1e-12) ** -0.2)) if error < 1e300 else 0.2
+    return np.nan
+
+
+@_inline
+def _bouc_wen_advance(h, travel, rate, rows, e):  # type: ignore[no-untyped-def]
+    """h of Bouc-Wen element e after its drive has moved by ``travel``; the rate is the clamped one."""
+    grown = rows[e, EPSILON] * _near_exp(rows[e, DELTA] * abs(rate))
+    if rows[e, POWER] != 0.0:
+        return bouc_wen_power_step(h, travel, grown, rows, e)
+    return bouc_wen_step(h, travel, grown, rows[e, ALPHA], rows[e, BETA], rows[e, GAMMA], rows[e, ETA])
 
 
 @_inline
 def _clamp(value, limit):  # type: ignore[no-untyped-def]
     return limit if value > limit else (-limit if value < -limit else value)
+
+
+@_inline
+def _widened(threshold, widening):  # type: ignore[no-untyped-def]
+    return threshold + widening if threshold > 0.0 else 0.0
 
 
 @_inline
@@ -237,8 +317,8 @@ def _row(matrix, i, w):  # type: ignore[no-untyped-def]
 
 
 @_compile
-def bouc_wen_kernel(drive, step_s, parameters, hysteresis0, output, hysteresis):  # type: ignore[no-untyped-def]
-    """Static Eq. 3 for a sampled drive, linear between samples; fills ``output`` and ``hysteresis``.
+def bouc_wen_kernel(drive, step_s, rows, hysteresis0, output, hysteresis):  # type: ignore[no-untyped-def]
+    """Static Eq. 3 (one row) for a sampled drive, linear between samples; fills ``output`` and ``hysteresis``.
 
     Returns the number of rate-clamped samples. The rate is the backward difference, zero at the first sample.
     """
@@ -248,18 +328,12 @@ def bouc_wen_kernel(drive, step_s, parameters, hysteresis0, output, hysteresis):
     for k in range(drive.size):
         travel = drive[k] - previous
         rate = travel / step_s
-        if abs(rate) > parameters[RATE_LIMIT]:
+        if abs(rate) > rows[0, RATE_LIMIT]:
             clamped += 1
-            rate = _clamp(rate, parameters[RATE_LIMIT])
-        h = bouc_wen_step(
-            h,
-            travel,
-            parameters[EPSILON] * _near_exp(parameters[DELTA] * abs(rate)),
-            parameters[ALPHA],
-            parameters[BETA],
-        )
-        linear = parameters[D1] * _near_exp(-parameters[D2] * rate) * (drive[k] + parameters[BIAS])
-        output[k] = linear - parameters[D1] * parameters[BIAS] + h
+            rate = _clamp(rate, rows[0, RATE_LIMIT])
+        h = _bouc_wen_advance(h, travel, rate, rows, 0)
+        linear = rows[0, D1] * _near_exp(-rows[0, D2] * rate) * (drive[k] + rows[0, BIAS])
+        output[k] = linear - rows[0, D1] * rows[0, BIAS] + h
         hysteresis[k] = h
         previous = drive[k]
     return clamped
@@ -268,33 +342,79 @@ def bouc_wen_kernel(drive, step_s, parameters, hysteresis0, output, hysteresis):
 def bouc_wen_response(
     drive: Floats, step_s: float, parameters: Floats, hysteresis0: float
 ) -> tuple[Floats, Floats, int]:
-    """Static Eq. 3 for a sampled drive: (output, hysteresis, number of rate-clamped samples), see bouc_wen_kernel."""
+    """Static Eq. 3 for a sampled drive: (output, hysteresis, number of rate-clamped samples).
+
+    See bouc_wen_kernel; ``parameters`` is a row of `bouc_wen_rows`.
+    """
     output, hysteresis = np.empty(drive.size), np.empty(drive.size)
-    clamped = bouc_wen_kernel(drive, step_s, parameters, hysteresis0, output, hysteresis)
+    clamped = bouc_wen_kernel(drive, step_s, bouc_wen_rows([parameters.tolist()]), hysteresis0, output, hysteresis)
     return output, hysteresis, int(clamped)
 
 
 @_compile
-def play_kernel(drive, thresholds, state0, states):  # type: ignore[no-untyped-def]
-    """States of play operators, p <- max(u - r, min(u + r, p)); fills ``states`` (samples, operators)."""
+def play_kernel(drive, step_s, thresholds, operator, state0, states):  # type: ignore[no-untyped-def]
+    """States of play operators, p <- max(u - r, min(u + r, p)); fills ``states`` (samples, operators).
+
+    A threshold above 0 grows with the rate, r + WIDENING |u'|; ``operator`` is one row. Returns the clamped samples.
+    """
+    clamped = 0
     for j in range(thresholds.size):
         p = state0[j]
+        previous = drive[0]
+        clamped = 0
         for k in range(drive.size):
-            p = _play(p, drive[k], thresholds[j])
+            rate = abs(drive[k] - previous) / step_s
+            if rate > operator[WIDENING_LIMIT]:
+                clamped += 1
+                rate = operator[WIDENING_LIMIT]
+            p = _play(p, drive[k], _widened(thresholds[j], operator[WIDENING] * rate))
             states[k, j] = p
+            previous = drive[k]
+    return clamped
 
 
 def play_response(drive: Floats, thresholds: Floats, state0: Floats) -> Floats:
-    """States of play operators, shape (samples, operators), see play_kernel."""
+    """States of play operators that do not depend on the rate, shape (samples, operators), see play_kernel."""
+    return widening_play_response(drive, 1.0, thresholds, np.array([0.0, np.inf]), state0)[0]
+
+
+def widening_play_response(
+    drive: Floats, step_s: float, thresholds: Floats, operator: Floats, state0: Floats
+) -> tuple[Floats, int]:
+    """States of play operators, shape (samples, operators), and the number of rate-clamped samples, see play_kernel."""
     states = np.empty((drive.size, thresholds.size))
-    play_kernel(drive, thresholds, state0, states)
+    clamped = play_kernel(drive, step_s, thresholds, operator, state0, states)
+    return states, int(clamped)
+
+
+@_compile
+def lag_kernel(drive, step_s, time_constants, state0, states):  # type: ignore[no-untyped-def]
+    """First-order lags x' = (u - x) / tau of a drive linear between samples; fills ``states`` (samples, lags)."""
+    for j in range(time_constants.size):
+        part = step_s / time_constants[j]
+        gain = -expm1(-part)
+        keep = 1.0 - gain
+        ramp = 1.0 - gain / part  # what the drive's end adds; the rest comes from its begin
+        if part < 0.02:  # its series, where the difference would cancel
+            ramp = part * (1.0 / 2.0 - part * (1.0 / 6.0 - part * (1.0 / 24.0 - part * (1.0 / 120.0 - part / 720.0))))
+        x = state0[j]
+        states[0, j] = x
+        for k in range(1, drive.size):
+            x = keep * x + (gain - ramp) * drive[k - 1] + ramp * drive[k]
+            states[k, j] = x
+
+
+def lag_response(drive: Floats, step_s: float, time_constants: Floats, state0: Floats) -> Floats:
+    """States of first-order lags, shape (samples, lags), from ``state0`` at the first sample, see lag_kernel."""
+    states = np.empty((drive.size, time_constants.size))
+    lag_kernel(drive, step_s, time_constants, state0, states)
     return states
 
 
 @_inline
 def _predict(plant, state):  # type: ignore[no-untyped-def]
     """The part of the predicted x that needs nothing from the end of the step."""
-    x, x_next, first_play = state.x, state.x_next, len(plant.elements)
+    x, x_next, first_operator = state.x, state.x_next, len(plant.elements)
     for i in range(len(plant.states)):
         total = plant.diagonal[i] * x[i] + plant.coupling[i] * x[i ^ 1]
         if plant.direct:
@@ -302,10 +422,9 @@ def _predict(plant, state):  # type: ignore[no-untyped-def]
                 total += plant.B0[i, a] * state.u[a]
         for e in range(len(plant.elements)):
             total += plant.E_held[i, e] * state.bank[e, Z]
+        for o in range(len(plant.operators)):
+            total += plant.E_held[i, first_operator + o] * state.bank[first_operator + o, Z]
         x_next[i] = total
-    for e in range(first_play, state.bank.shape[0]):
-        for i in range(len(plant.states)):
-            x_next[i] += plant.E_held[i, e] * state.bank[e, Z]
     if plant.rest.value.size > 0:
         for i in range(len(plant.states)):
             x_next[i] += _row(plant.rest, i, x)
@@ -326,7 +445,7 @@ def _element_drive(plant, state, e):  # type: ignore[no-untyped-def]
 @_inline
 def _plant_step(plant, state):  # type: ignore[no-untyped-def]
     """One step to ``u_next``, behind _predict: second order, and nothing is iterated."""
-    x, x_next, y, bank, first_play = state.x, state.x_next, state.y, state.bank, len(plant.elements)
+    x, x_next, y, bank, first_operator = state.x, state.x_next, state.y, state.bank, len(plant.elements)
     if plant.direct:
         for i in range(len(plant.states)):
             for a in range(len(plant.actuators)):
@@ -341,24 +460,21 @@ def _plant_step(plant, state):  # type: ignore[no-untyped-def]
         y[i] = total
     for e in range(len(plant.elements)):
         _finish_element(bank, e, _bouc_wen_element(plant, state, e, _element_drive(plant, state, e)))
-    for e in range(first_play, bank.shape[0]):
-        q = _element_drive(plant, state, e)
-        p = _play(bank[e, H], q, plant.play_threshold[e - first_play])
-        bank[e, H] = p
-        bank[e, Q] = q
-        _finish_element(bank, e, plant.play_weight[e - first_play] * p)
+    for o in range(len(plant.operators)):
+        e = first_operator + o
+        _finish_element(bank, e, _play_operator(plant, state, e, o, _element_drive(plant, state, e)))
     for i in range(len(plant.states)):
         total = x_next[i]
         for e in range(len(plant.elements)):
             total += plant.E1[i, e] * bank[e, CHANGE]
+        for o in range(len(plant.operators)):
+            total += plant.E1[i, first_operator + o] * bank[first_operator + o, CHANGE]
         x[i] = total
     for i in range(len(plant.outputs)):
         for e in range(len(plant.elements)):
             y[i] += plant.CE1[i, e] * bank[e, CHANGE] + plant.K[i, e] * bank[e, Z]
-    for e in range(first_play, bank.shape[0]):
-        for i in range(len(plant.states)):
-            x[i] += plant.E1[i, e] * bank[e, CHANGE]
-        for i in range(len(plant.outputs)):
+        for o in range(len(plant.operators)):
+            e = first_operator + o
             y[i] += plant.CE1[i, e] * bank[e, CHANGE] + plant.K[i, e] * bank[e, Z]
     for a in range(len(plant.actuators)):
         state.u[a] = state.u_next[a]
@@ -379,11 +495,29 @@ def _bouc_wen_element(plant, state, e, q):  # type: ignore[no-untyped-def]
     if abs(rate) > row[e, RATE_LIMIT]:
         state.clamped[e] += 1
         rate = _clamp(rate, row[e, RATE_LIMIT])
-    grown = row[e, EPSILON] * _near_exp(row[e, DELTA] * abs(rate))
-    h = bouc_wen_step(state.bank[e, H], travel, grown, row[e, ALPHA], row[e, BETA])
+    h = _bouc_wen_advance(state.bank[e, H], travel, rate, row, e)
     state.bank[e, H] = h
     state.bank[e, Q] = q
     return row[e, D1] * (_near_exp(-row[e, D2] * rate) * (q + row[e, BIAS]) - row[e, BIAS]) + h
+
+
+@_inline
+def _play_operator(plant, state, e, o, q):  # type: ignore[no-untyped-def]
+    """z of Prandtl-Ishlinskii operator o, which is element e, with its plays taken to the drive ``q``."""
+    widening = 0.0
+    if plant.operator[o, WIDENING] != 0.0:
+        rate = abs(q - state.bank[e, Q]) / plant.step_s
+        if rate > plant.operator[o, WIDENING_LIMIT]:
+            state.clamped[e] += 1
+            rate = plant.operator[o, WIDENING_LIMIT]
+        widening = plant.operator[o, WIDENING] * rate
+    total = 0.0
+    for j in range(plant.play_start[o], plant.play_start[o + 1]):
+        p = _play(state.play[j], q, _widened(plant.play_threshold[j], widening))
+        state.play[j] = p
+        total += plant.play_weight[j] * p
+    state.bank[e, Q] = q
+    return total
 
 
 @_compile
@@ -409,7 +543,8 @@ def _inverse(loop, state, reference, sample_s, feedforward):  # type: ignore[no-
     """Causal inverse-multiplicative feedforward (Eq. 4), and the closed-form inverse of play operators.
 
     u = (r - h + d1 bias) / (d1 exp(-d2 q')) - bias, with h and q' driven by the reference, q = r / d1: taking the rate
-    from the feedforward's own last sample makes it chatter at the sample rate. It needs nothing from the loop, so it
+    from the feedforward's own last sample makes it chatter at the sample rate. What creep will add is taken off the
+    reference first: it lags, so it is known from the samples before. The inverse needs nothing from the loop, so it
     runs ahead of it, over all of ``reference``, into ``feedforward`` (samples, actuators).
     """
     for k in range(reference.shape[0]):
@@ -417,6 +552,9 @@ def _inverse(loop, state, reference, sample_s, feedforward):  # type: ignore[no-
             target = 0.0
             for i in range(len(loop.axes)):
                 target += loop.allocation[a, i] * reference[k, i]
+            for j in range(loop.inverse_lag_keep.size):
+                if loop.inverse_lag_actuator[j] == a:
+                    target -= loop.inverse_lag_weight[j] * state.inverse_lag[j]
             state.target[a, BEFORE] = state.target[a, NOW]
             state.target[a, NOW] = target
             feedforward[k, a] = loop.inverse_direct[a] * target
@@ -427,16 +565,28 @@ def _inverse(loop, state, reference, sample_s, feedforward):  # type: ignore[no-
             if abs(rate) > row[e, RATE_LIMIT]:
                 state.inverse_clamped[e] += 1
                 rate = _clamp(rate, row[e, RATE_LIMIT])
-            grown = row[e, EPSILON] * _near_exp(row[e, DELTA] * abs(rate))
-            h = bouc_wen_step(state.inverse_h[e], travel, grown, row[e, ALPHA], row[e, BETA])
+            h = _bouc_wen_advance(state.inverse_h[e], travel, rate, row, e)
             state.inverse_h[e] = h
             gain = row[e, D1] * _near_exp(-row[e, D2] * rate)
             feedforward[k, a] += (state.target[a, NOW] - h + row[e, D1] * row[e, BIAS]) / gain - row[e, BIAS]
-        for e in range(loop.inverse_play_actuator.size):
-            a = loop.inverse_play_actuator[e]
-            p = _play(state.inverse_p[e], state.target[a, NOW], loop.inverse_play_threshold[e])
-            state.inverse_p[e] = p
-            feedforward[k, a] += loop.inverse_play_weight[e] * p
+        for a in range(len(loop.actuators)):
+            widening = 0.0
+            if loop.inverse_widening[a, WIDENING] != 0.0:
+                rate = abs(state.target[a, NOW] - state.target[a, BEFORE]) / sample_s
+                if rate > loop.inverse_widening[a, WIDENING_LIMIT]:
+                    state.inverse_clamped[len(loop.inverse_elements) + a] += 1
+                    rate = loop.inverse_widening[a, WIDENING_LIMIT]
+                widening = loop.inverse_widening[a, WIDENING] * rate
+            for e in range(loop.inverse_play_actuator.size):
+                if loop.inverse_play_actuator[e] == a:
+                    threshold = _widened(loop.inverse_play_threshold[e], widening)
+                    p = _play(state.inverse_p[e], state.target[a, NOW], threshold)
+                    state.inverse_p[e] = p
+                    feedforward[k, a] += loop.inverse_play_weight[e] * p
+        for j in range(loop.inverse_lag_keep.size):
+            keep = loop.inverse_lag_keep[j]
+            drive = feedforward[k, loop.inverse_lag_actuator[j]]
+            state.inverse_lag[j] = keep * state.inverse_lag[j] + (1.0 - keep) * drive
 
 
 @_inline
@@ -533,3 +683,11 @@ def rows(matrix: Floats) -> Rows:
         column=np.concatenate([*places, np.zeros(0, dtype=np.int64)]).astype(np.uint64),
         value=np.concatenate([*(row[p] for row, p in zip(matrix, places, strict=True)), np.zeros(0)]),
     )
+
+
+def bouc_wen_rows(parameters: Sequence[Sequence[float]]) -> Floats:
+    """Parameter rows as an array; a row that ends early (at BIAS or before) is Eq. 3, without what generalises it."""
+    rows_array = np.zeros((len(parameters), PER_SIZE + 1))
+    for row, values in zip(rows_array, parameters, strict=True):
+        row[: len(values)] = values
+    return rows_array

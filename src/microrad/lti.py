@@ -52,6 +52,30 @@ def modal_from_polynomials(numerator: tuple[float, ...], denominator: tuple[floa
     return system
 
 
+def modal_from_roots(zeros: Complexes, poles: Complexes, unit_at_hz: float) -> StateSpace:
+    """Real modal form of a strictly proper function with these zeros and distinct poles (rad/s).
+
+    Its magnitude is 1 at ``unit_at_hz``, and its real part there is positive. Raises ValueError where it is not
+    strictly proper, two poles coincide, or it vanishes at that frequency.
+    """
+    if zeros.size >= poles.size:
+        raise ValueError(f"{zeros.size} zeros over {poles.size} poles: not strictly proper")
+    distance = np.abs(poles[:, None] - poles[None, :]) + np.diag(np.full(poles.size, np.inf))
+    if poles.size > 1 and np.min(distance / np.abs(poles)[:, None].clip(1e-300)) < 1e-9:
+        raise ValueError("two poles coincide: the transfer function has no modal form")
+    at = 2j * np.pi * unit_at_hz
+    scale = float(np.exp(np.mean(np.log(np.abs(poles)))))  # keeps the products within range
+    there = np.prod((at - zeros) / scale) / np.prod((at - poles) / scale)
+    if there == 0.0:
+        raise ValueError(f"the transfer function vanishes at {unit_at_hz:g} Hz and cannot be divided by its gain there")
+    gain = np.copysign(1.0, there.real) / np.abs(there)
+    residues = [
+        scale * gain * np.prod((p - zeros) / scale) / np.prod((p - np.delete(poles, i)) / scale)
+        for i, p in enumerate(poles)
+    ]
+    return _modal(poles, np.asarray(residues))
+
+
 def _modal(poles: Complexes, residues: Complexes) -> StateSpace:
     """Sum of residue/(s - pole), conjugate pairs as real 2x2 blocks."""
     order = poles.size
@@ -80,6 +104,20 @@ def frequency_response(system: StateSpace, freq_hz: Floats, step_s: float | None
     return np.asarray(
         system.C @ np.linalg.solve(resolvent, np.broadcast_to(system.B, (s.size, *system.B.shape))) + system.D
     )
+
+
+def zeros(system: StateSpace) -> Complexes:
+    """Finite invariant zeros of a square system: where [[A - s, B], [C, D]] loses rank."""
+    from scipy.linalg import eig  # slow to import, not needed to show help
+
+    n = system.order
+    pencil = np.block([[system.A, system.B], [system.C, system.D]])
+    mass = np.zeros_like(pencil)
+    mass[:n, :n] = np.eye(n)
+    scale = max(float(np.max(np.abs(system.A), initial=0.0)), 1e-300)
+    above, below = eig(pencil, scale * mass, right=False, homogeneous_eigvals=True)
+    finite = np.abs(below) > 1e-10 * np.abs(above)
+    return np.asarray(scale * above[finite] / below[finite])
 
 
 def first_order_hold(A: Floats, B: Floats, step_s: float) -> tuple[Floats, Floats, Floats]:

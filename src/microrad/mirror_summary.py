@@ -5,8 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from microrad import lti, mission
-from microrad.mirror import BoucWen, Play, hysteresis_model, linear_part
+from microrad import lti, mirror_table
+from microrad.hysteresis import BoucWen, Play
+from microrad.mirror import hysteresis_model, linear_part
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,34 +55,35 @@ class Summary:
         return "\n".join(lines + [f"  warning: {w}" for w in self.warnings])
 
 
-def _roots(table: mission.LinearPart) -> tuple[Root, ...]:
+def _roots(table: mirror_table.LinearPart) -> tuple[Root, ...]:
     def root(kind: str, r: complex) -> Root:
         f = abs(r) / (2 * math.pi)
         damping = -r.real / abs(r) if r else 1.0
         return Root(kind, f, damping, table.excited_from_hz <= f <= table.excited_to_hz)
 
-    named = [("pole", r) for r in np.roots(table.denominator)] + [("zero", r) for r in np.roots(table.numerator)]
-    return tuple(root(kind, complex(r)) for kind, r in named if r.imag >= 0)
+    zeros, poles = table.roots
+    named = [("pole", r) for r in poles] + [("zero", r) for r in zeros]
+    return tuple(root(kind, r) for kind, r in named if r.imag >= 0)
 
 
-def _flat_band(table: mission.LinearPart) -> tuple[float, float]:
+def _flat_band(table: mirror_table.LinearPart) -> tuple[float, float]:
     """Where the gain should be flat: excited, and at most a tenth of the lowest resonance."""
     resonant = [r.frequency_hz for r in _roots(table) if r.kind == "pole" and r.damping < 1.0]
     top = min([table.excited_to_hz, *(f / 10.0 for f in resonant)])
     return table.excited_from_hz, max(top, table.excited_from_hz)
 
 
-def summarise(table: mission.Mirror) -> Summary:
+def summarise(table: mirror_table.Mirror) -> Summary:
     """Facts and warnings about the mission's mirror: gains, poles and zeros outside the excited band, admissibility."""
     model = hysteresis_model(table, table.rate_limit_v_s, table.bias_v)
     warnings = list(_admissibility(model))
     roots: tuple[Root, ...] = ()
     dc, flat, band, by, at = math.nan, (math.nan, math.nan), (math.nan, math.nan), 1.0, math.nan
     if table.linear is not None:
-        system = lti.modal_from_polynomials(table.linear.numerator, table.linear.denominator)
-        roots, by, at = _roots(table.linear), linear_part(table.linear)[1], table.linear.normalise_at_hz
+        system, by = linear_part(table.linear)
+        roots, at = _roots(table.linear), table.linear.normalise_at_hz
         flat = _flat_band(table.linear)
-        gain = np.abs(lti.frequency_response(system, np.array([0.0, *np.geomspace(*flat, 100)]))[:, 0, 0])
+        gain = np.abs(lti.frequency_response(system, np.array([0.0, *np.geomspace(*flat, 100)]))[:, 0, 0]) * abs(by)
         dc, band = float(gain[0]), (float(gain[1:].min()), float(gain[1:].max()))
         warnings += [
             f"{r.kind} at {r.frequency_hz:.3g} Hz lies outside the excited band "

@@ -4,14 +4,14 @@ Every quantity is text with a unit in the file (`transmit_power = "5 W"`) and an
 (`transmit_power_w`). No quantity of the mission has a default. `missionfile` reads the file and reports the faults.
 """
 
-import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field
 
-from microrad.fields import Problem, ProblemsError, Quantity, Several
+from microrad.fields import Problem, Quantity, Several, Table
+from microrad.mirror_table import ANGLE_MOST, Angle, DurationOrZero, Frequency, Mirror, MirrorGain, Name, Rate, Voltage
 from microrad.units import format_quantity
 
 STEP_TOLERANCE = 1e-9
@@ -53,10 +53,7 @@ def source_text(sources: Mapping[str, Source], *keys: str) -> str:
     return "; ".join(dict.fromkeys(texts))
 
 
-_ANGLE_MOST = math.pi / 2  # beyond a quarter turn no pointing error, beam or mirror angle has a meaning here
-Name = Annotated[str, Field(min_length=1, max_length=200)]
-Angle = Annotated[float, Quantity("rad", above=0.0, most=_ANGLE_MOST)]
-AngleOrZero = Annotated[float, Quantity("rad", least=0.0, most=_ANGLE_MOST)]
+AngleOrZero = Annotated[float, Quantity("rad", least=0.0, most=ANGLE_MOST)]
 # the upper bounds are no limits of technology: they catch a wrong prefix, "5 km" for an aperture of 5 cm
 Power = Annotated[float, Quantity("W", above=0.0, most=1e6)]
 Threshold = Annotated[float, Quantity("W", "pW", above=0.0, most=1e6)]
@@ -65,32 +62,9 @@ Wavelength = Annotated[float, Quantity("m", "um", least=1e-8, most=1e-2)]
 Distance = Annotated[float, Quantity("m", "km", above=0.0, most=1e13)]
 Loss = Annotated[float, Quantity("dB", least=0.0)]
 Strehl = Annotated[float, Quantity("", least=0.0)]
-Frequency = Annotated[float, Quantity("Hz", above=0.0, most=1e12)]
 Duration = Annotated[float, Quantity("s", "us", above=0.0)]
-DurationOrZero = Annotated[float, Quantity("s", "us", least=0.0)]
-Voltage = Annotated[float, Quantity("V")]
 Step = Annotated[float, Quantity("V", "mV", least=0.0)]
-Rate = Annotated[float, Quantity("V/s", "V/us", above=0.0)]
-MirrorGain = Annotated[float, Quantity("rad/V", "mrad/V", above=0.0)]
-Coefficients = Annotated[tuple[float, ...], Several(Quantity(""))]
 Frequencies = Annotated[tuple[float, ...], Several(Quantity("Hz", above=0.0, most=1e12), rising=True)]
-
-
-class Table(BaseModel):
-    """A table of the mission file: frozen, strict, no key beyond the named ones."""
-
-    model_config = ConfigDict(strict=True, frozen=True, extra="forbid", allow_inf_nan=False)
-
-    def problems(self) -> Iterator[Problem]:
-        """What does not fit together in a table whose keys are each in order."""
-        return iter(())
-
-    @model_validator(mode="after")
-    def _fits_together(self) -> Self:
-        problems = tuple(self.problems())
-        if problems:
-            raise ProblemsError(*problems)
-        return self
 
 
 class Pointing(Table):
@@ -158,128 +132,6 @@ class Requirement(Table):
     margin_db: Loss = Field(alias="margin", description="margin of the communication link")
     pointing_error_rad: Angle = Field(alias="pointing_error", description="residual that the fine pointing may leave")
     residual_statistic: Literal["peak", "rms"] = Field(description="which number of the residual has to meet it")
-
-
-class LinearPart(Table):
-    """Transfer function in powers of s (rad/s), highest first, and the band in which it was identified."""
-
-    numerator: Coefficients
-    denominator: Coefficients
-    normalise_at_hz: Frequency = Field(alias="normalise_at", description="where its magnitude is divided out")
-    excited_from_hz: Frequency = Field(alias="excited_from")
-    excited_to_hz: Frequency = Field(alias="excited_to")
-
-    def problems(self) -> Iterator[Problem]:
-        """A proper fraction, normalised inside its band."""
-        zeros = [place for place, value in enumerate(self.numerator) if value != 0.0]
-        if self.denominator[-1] == 0.0:
-            advice = "a last coefficient other than 0; model drift apart from the mirror"
-            yield Problem("denominator", "ends with 0, which makes the linear part an integrator", advice)
-        if self.denominator[0] == 0.0:
-            yield Problem("denominator", "begins with 0", "the highest power of s first, with a factor other than 0")
-        if not zeros:
-            yield Problem("numerator", "is zero throughout", "at least one coefficient other than 0")
-        elif len(self.numerator) - zeros[0] >= len(self.denominator):
-            yield Problem("numerator", "has no lower order than denominator", "fewer coefficients than denominator has")
-        if not self.excited_from_hz < self.excited_to_hz:
-            yield Problem("excited_to", "is not above excited_from", "a band that goes up")
-        elif not self.excited_from_hz <= self.normalise_at_hz <= self.excited_to_hz:
-            low, high = format_quantity(self.excited_from_hz, "Hz"), format_quantity(self.excited_to_hz, "Hz")
-            yield Problem(
-                "normalise_at", f"is outside excited_from to excited_to ({low} to {high})", f"{low} to {high}"
-            )
-
-
-class BoucWenTable(Table):
-    """Parameters of the rate-dependent Bouc-Wen model, exponent 1, with angle in rad and drive in V (paper, Eq. 3)."""
-
-    d1_rad_v: MirrorGain = Field(alias="d1")
-    d2_s_v: Annotated[float, Quantity("s/V")] = Field(alias="d2")
-    epsilon_rad_v: Annotated[float, Quantity("rad/V", "mrad/V")] = Field(alias="epsilon")
-    delta_s_v: Annotated[float, Quantity("s/V")] = Field(alias="delta")
-    alpha_1_v: Annotated[float, Quantity("1/V")] = Field(alias="alpha")
-    beta_1_v: Annotated[float, Quantity("1/V")] = Field(alias="beta")
-
-    def problems(self) -> Iterator[Problem]:
-        """Hysteresis that stays bounded."""
-        if not self.alpha_1_v > abs(self.beta_1_v):
-            size = format_quantity(abs(self.beta_1_v), "1/V")
-            yield Problem(
-                "alpha", f"is not above the size of beta ({size}), so h would grow without bound", f"above {size}"
-            )
-
-
-class PrandtlIshlinskiiTable(Table):
-    """Play operators: half widths in V, rising from 0 V, and a weight in rad/V for each."""
-
-    thresholds_v: Annotated[tuple[float, ...], Several(Quantity("V", least=0.0), rising=True)] = Field(
-        alias="thresholds"
-    )
-    weights_rad_v: Annotated[tuple[float, ...], Several(Quantity("rad/V", "urad/V", least=0.0))] = Field(
-        alias="weights"
-    )
-
-    def problems(self) -> Iterator[Problem]:
-        """A weight for each threshold, one of them doing something."""
-        if self.thresholds_v[0] != 0.0:
-            yield Problem("thresholds", "does not begin at 0 V", 'a first threshold of "0 V"')
-        if len(self.weights_rad_v) != len(self.thresholds_v):
-            counts = f"has {len(self.weights_rad_v)} items where thresholds has {len(self.thresholds_v)}"
-            yield Problem("weights", counts, "one weight for each threshold")
-        if not any(self.weights_rad_v):
-            yield Problem("weights", "is zero throughout", "at least one weight above 0")
-
-
-def _one_model(table: "Mirror | Comparison") -> Iterator[Problem]:
-    given = (table.bouc_wen is not None) + (table.prandtl_ishlinskii is not None)
-    if given != 1:
-        found = "two hysteresis models" if given else "no hysteresis model"
-        yield Problem("", f"has {found}", "exactly one of the tables bouc_wen and prandtl_ishlinskii")
-
-
-class Comparison(Table):
-    """A second hysteresis model of the same mirror, run beside the first."""
-
-    bouc_wen: BoucWenTable | None = None
-    prandtl_ishlinskii: PrandtlIshlinskiiTable | None = None
-
-    def problems(self) -> Iterator[Problem]:
-        """Exactly one model."""
-        return _one_model(self)
-
-
-class Mirror(Table):
-    """The fast steering mirror: one hysteresis model, and the linear part that its composition asks for."""
-
-    name: Name
-    travel_rad: Angle = Field(alias="travel", description="from stop to stop")
-    composition: Literal["cascade", "additive", "static"] = Field(
-        description="cascade: hysteresis drives the linear part; additive: it is added behind; static: no linear part"
-    )
-    rate_limit_v_s: Rate = Field(alias="rate_limit", description="fastest drive that the hysteresis was identified for")
-    bias_v: Voltage = Field(alias="bias", description="drive about which the mirror works")
-    drive_min_v: Voltage = Field(alias="drive_min", description="lowest drive that the hysteresis was identified for")
-    drive_max_v: Voltage = Field(alias="drive_max", description="highest drive that the hysteresis was identified for")
-    linear: LinearPart | None = None
-    bouc_wen: BoucWenTable | None = None
-    prandtl_ishlinskii: PrandtlIshlinskiiTable | None = None
-    comparison: Comparison | None = None
-
-    def problems(self) -> Iterator[Problem]:
-        """Exactly one model, a linear part exactly where the composition has one, and a bias inside the drive range."""
-        yield from _one_model(self)
-        if not self.drive_min_v < self.drive_max_v:
-            low = format_quantity(self.drive_min_v, "V")
-            yield Problem("drive_max", f"is not above drive_min ({low})", f"a voltage above {low}")
-        elif not self.drive_min_v <= self.bias_v <= self.drive_max_v:
-            span = f"{format_quantity(self.drive_min_v, 'V')} to {format_quantity(self.drive_max_v, 'V')}"
-            yield Problem("bias", f"is outside drive_min to drive_max ({span})", span)
-        if self.composition == "static" and self.linear is not None:
-            advice = 'the table linear removed, or composition = "cascade"'
-            yield Problem("linear", 'does not belong to composition = "static"', advice)
-        if self.composition != "static" and self.linear is None:
-            advice = 'a table linear, or composition = "static"'
-            yield Problem("composition", f'is "{self.composition}" but the table linear is missing', advice)
 
 
 class Amplifier(Table):

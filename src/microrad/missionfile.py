@@ -12,8 +12,9 @@ from pydantic import ValidationError
 from pydantic.fields import FieldInfo
 
 from microrad.document import Document, Fault, MissionError, UnreadableError, clipped, shown
-from microrad.fields import Problem, ProblemsError, Quantity, Several
-from microrad.mission import RELATIONS, Mirror, Mission, Source, Table
+from microrad.fields import Problem, ProblemsError, Quantity, Several, Table
+from microrad.mirror_table import Mirror
+from microrad.mission import RELATIONS, Mission, Source
 from microrad.units import UnitError
 
 __all__ = [
@@ -66,7 +67,7 @@ def load_mission(path: str | Path, mirror_path: str | Path | None = None) -> Mis
     """
     document = _open(Path(path), "mission file", "")
     _take_in_mirror(document, None if mirror_path is None else Path(mirror_path))
-    mission = _check(document, Mission, document.data)
+    mission = check_table(document, Mission, document.data)
     if mission is None or document.all_faults():
         raise MissionError(document.path, document.all_faults())
     inner = document.inner.get("mirror")
@@ -81,7 +82,7 @@ def load_mirror(path: str | Path) -> MirrorFile:
     Raises `MissionError` with every fault of it.
     """
     document = _open(Path(path), "mirror file", "mirror")
-    mirror = _check(document, Mirror, document.data)
+    mirror = check_table(document, Mirror, document.data)
     if mirror is None or document.faults:
         raise MissionError(document.path, document.faults)
     return _mirror_file(document, mirror)
@@ -160,7 +161,7 @@ def _leaves(data: Mapping[str, Any], table: str) -> Iterator[str]:
 
 
 # --------------------------------------------------------------------------------------------------------- validating
-def _check(document: Document, model: type[_T], data: Mapping[str, Any]) -> _T | None:
+def check_table(document: Document, model: type[_T], data: Mapping[str, Any]) -> _T | None:
     """The data as a record, or None with every fault in it noted."""
     try:
         return model.model_validate(data)
@@ -229,7 +230,7 @@ class _Report:
         # a key that is still missing is the likelier one to have been meant
         absent = [key for key in keys if _dotted(table, (key,)) in missing]
         nearest = _nearest(name, absent) or _nearest(name, keys)
-        where = f"[{table}]" if table else "the mission file"
+        where = f"[{table}]" if table else f"the {self.document.label}"
         expected = f"one of {', '.join(keys)}"
         self.document.fault(self._key(location), shown(value), f"is no key of {where}", expected, nearest=nearest)
         return _dotted(table, (nearest,)) if nearest in absent else ""

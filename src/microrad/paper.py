@@ -15,8 +15,8 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from microrad import control, mirror, mission, simulate
-from microrad.tracking import hysteresis
+from microrad import control, hysteresis, mirror, mission, simulate
+from microrad.tracking import mirror_model
 
 Floats = NDArray[np.float64]
 Progress = Callable[[int, int, str], None]
@@ -112,7 +112,7 @@ def scan(m: mission.Mission, on_progress: Progress | None = None) -> Scan:
 
     The plant takes one step a control period here: the errors compared are tens of µrad.
     """
-    model = hysteresis(m, m.mirror)
+    model = mirror_model(m, m.mirror)
     timing = control.timing_from_mission(m.control)
     delay = math.ceil(timing.delay_steps / timing.steps_per_sample)
     coarse = replace(timing, steps_per_sample=1, delay_steps=delay)
@@ -129,17 +129,17 @@ def scan(m: mission.Mission, on_progress: Progress | None = None) -> Scan:
 
 def _point(
     m: mission.Mission,
-    model: mirror.BoucWen | mirror.Play,
+    model: hysteresis.BoucWen | hysteresis.Play,
     timing: control.Timing,
     composition: str,
     proportional_v_mrad: float,
     integral_v_mrad_s: float,
 ) -> Point:
     printed = control.Gains(proportional_v_mrad * 1e3, integral_v_mrad_s * 1e3, 0.0, m.control.derivative_filter_s)
-    scale = GAINS_FOR_RAD_V / mirror.slow_gain(model)  # the same loop gain for a mirror of another gain
+    scale = GAINS_FOR_RAD_V / hysteresis.slow_gain(model)  # the same loop gain for a mirror of another gain
     gains = replace(printed, proportional=printed.proportional * scale, integral=printed.integral * scale)
     setup = simulate.Setup(control.drive_from_mission(m), timing, control.pid(gains, timing.period_s))
-    loop = simulate.sampled_loop(mirror.from_mission(m.mirror, mirror.gain_only(model), "cascade"), setup)
+    loop = simulate.sampled_loop(mirror.from_mission(m.mirror, hysteresis.gain_only(model), "cascade"), setup)
     blank = Point(composition, printed.proportional, printed.integral, False, {}, {}, {}, {}, {})
     if control.slowest_pole(loop) >= 1.0:
         return blank

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from microrad import control, kernels, lti, mirror, mission
+from microrad import control, hysteresis, kernels, lti, mirror, mission
 from microrad.control import Drive, Inverse, Timing, amplifier_factor, anti_windup
 
 Floats = NDArray[np.float64]
@@ -97,6 +97,11 @@ def assemble(m: mirror.Mirror, setup: Setup, inverse: Inverse) -> kernels.Loop:
     actuators = m.actuators
 
     follow, slew = amplifier_factor(drive, timing.step_s), drive.slew_v_s * timing.step_s
+    lags = [
+        (weight, tau, a)
+        for a, creep in enumerate(inverse.creep)
+        for weight, tau in zip(creep.weights_rad_v, creep.time_constants_s, strict=True)
+    ]
     row = np.array([drive.minimum_v, drive.maximum_v, drive.drive_resolution_v, follow, slew])
     return kernels.Loop(
         actuators=(0,) * actuators,
@@ -115,11 +120,15 @@ def assemble(m: mirror.Mirror, setup: Setup, inverse: Inverse) -> kernels.Loop:
         sensor_resolution=np.full(m.axes, drive.sensor_resolution_rad),
         allocation=np.eye(actuators, m.axes),
         inverse_direct=np.array(inverse.direct),
-        inverse_bouc_wen=np.array([b.row for b in inverse.bouc_wen], dtype=float).reshape(-1, 8),
+        inverse_bouc_wen=kernels.bouc_wen_rows([b.row for b in inverse.bouc_wen]),
         inverse_bouc_wen_actuator=np.array(inverse.bouc_wen_actuator, dtype=np.uint64),
         inverse_play_threshold=np.array(inverse.play_thresholds, dtype=float),
         inverse_play_weight=np.array(inverse.play_weights, dtype=float),
         inverse_play_actuator=np.array(inverse.play_actuator, dtype=np.uint64),
+        inverse_widening=np.array(inverse.widening or [(0.0, math.inf)] * actuators),
+        inverse_lag_keep=np.array([math.exp(-timing.period_s / tau) for _, tau, _ in lags]),
+        inverse_lag_weight=np.array([weight for weight, _, _ in lags]),
+        inverse_lag_actuator=np.array([a for _, _, a in lags], dtype=np.uint64),
     )
 
 
@@ -136,10 +145,11 @@ def at_rest(loop: kernels.Loop) -> kernels.LoopState:
         target=np.zeros((actuators, 2)),
         inverse_h=np.zeros(loop.inverse_bouc_wen.shape[0]),
         inverse_p=np.zeros(loop.inverse_play_threshold.size),
+        inverse_lag=np.zeros(loop.inverse_lag_keep.size),
         pending=np.zeros((loop.delay_steps + 1, actuators)),
         position=np.zeros(1, dtype=np.int64),
         counts=np.zeros((actuators, 2), dtype=np.int64),
-        inverse_clamped=np.zeros(loop.inverse_bouc_wen.shape[0], dtype=np.int64),
+        inverse_clamped=np.zeros(loop.inverse_bouc_wen.shape[0] + actuators, dtype=np.int64),
     )
 
 
@@ -228,7 +238,7 @@ class HysteresisLoop:
 
 
 def hysteresis_loop(
-    model: mirror.BoucWen | mirror.Play, freq_hz: float, amplitude_v: float, step_s: float
+    model: hysteresis.BoucWen | hysteresis.Play, freq_hz: float, amplitude_v: float, step_s: float
 ) -> HysteresisLoop:
     """The static hysteresis model (no linear part) under a sine of ``amplitude_v`` about its bias, once it repeats
     itself.
@@ -252,9 +262,9 @@ def hysteresis_loop(
     return HysteresisLoop(freq_hz, u, y, y - _linear_output(model, u, step_s), int(state.clamped.sum()))
 
 
-def _linear_output(model: mirror.BoucWen | mirror.Play, u: Floats, step_s: float) -> Floats:
+def _linear_output(model: hysteresis.BoucWen | hysteresis.Play, u: Floats, step_s: float) -> Floats:
     """The part of the output that is not hysteresis: d1 exp(-d2 u') u for Bouc-Wen, slow gain x u otherwise."""
-    if isinstance(model, mirror.Play):
+    if isinstance(model, hysteresis.Play):
         return math.fsum(model.weights_rad_v) * u
     rate = np.diff(u, prepend=u[-1]) / step_s
     rate = np.clip(rate, -model.rate_limit_v_s, model.rate_limit_v_s)

@@ -5,11 +5,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from microrad import control, mirror, simulate
-from microrad.mission import Comparison, Mission
-from microrad.mission import Mirror as MirrorTable
+from microrad import control, hysteresis, mirror, simulate
+from microrad.mirror_table import Comparison
+from microrad.mirror_table import Mirror as MirrorTable
+from microrad.mission import Mission
 
-Model = mirror.BoucWen | mirror.Play
+Model = hysteresis.BoucWen | hysteresis.Play
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,10 +42,15 @@ class Run:
         return float(np.max(np.abs(np.diff(self.trace.drive_v, axis=0))) / period)
 
 
-def hysteresis(m: Mission, table: MirrorTable | Comparison) -> Model:
+def mirror_model(m: Mission, table: MirrorTable | Comparison) -> Model:
     """The hysteresis of the mission's mirror, or of its comparison, with its output at the line of sight."""
     model = mirror.hysteresis_model(table, m.mirror.rate_limit_v_s, m.mirror.bias_v)
     return mirror.line_of_sight(model, m.conventions.mirror_angle)
+
+
+def _times(m: Mission) -> float:
+    """What turns the angle of the mirror table into the line of sight's."""
+    return hysteresis.LINE_OF_SIGHT[m.conventions.mirror_angle]
 
 
 def hysteresis_loops(m: Mission) -> tuple[simulate.HysteresisLoop, ...]:
@@ -58,9 +64,9 @@ def hysteresis_loops(m: Mission) -> tuple[simulate.HysteresisLoop, ...]:
 
 def loop_margins(m: Mission) -> control.Margins:
     """Margins of the mission's loop as it is sampled; raises ValueError when it is unstable."""
-    model = hysteresis(m, m.mirror)
-    setup = simulate.setup_from_mission(m, mirror.secant_gain(model, m.scenario.amplitude_rad))
-    return simulate.margins(mirror.from_mission(m.mirror, model), setup)
+    model = mirror_model(m, m.mirror)
+    setup = simulate.setup_from_mission(m, hysteresis.secant_gain(model, m.scenario.amplitude_rad))
+    return simulate.margins(mirror.from_mission(m.mirror, model, times=_times(m)), setup)
 
 
 def tracking_runs(m: Mission) -> tuple[Run, ...]:
@@ -68,15 +74,15 @@ def tracking_runs(m: Mission) -> tuple[Run, ...]:
 
     Raises ValueError when the mirror has no inverse.
     """
-    model = hysteresis(m, m.mirror)
+    model = mirror_model(m, m.mirror)
     amplitude = m.scenario.amplitude_rad
-    setup = simulate.setup_from_mission(m, mirror.secant_gain(model, amplitude))
-    models = {"given": model, "no hysteresis": mirror.gain_only(model, amplitude)}
+    setup = simulate.setup_from_mission(m, hysteresis.secant_gain(model, amplitude))
+    models = {"given": model, "no hysteresis": hysteresis.gain_only(model, amplitude)}
     if m.mirror.comparison is not None:
-        models["comparison"] = hysteresis(m, m.mirror.comparison)
+        models["comparison"] = mirror_model(m, m.mirror.comparison)
     runs = []
     for which, variant in models.items():
-        plant = mirror.from_mission(m.mirror, variant)
+        plant = mirror.from_mission(m.mirror, variant, times=_times(m))
         controllers = {"PID": control.no_feedforward(plant), "PID + inverse": control.inverse(plant)}
         for controller, f in _cases(m):
             trace = simulate.track_sine(

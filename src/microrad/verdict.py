@@ -6,9 +6,9 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from microrad import link, mirror, mirror_summary, paper, pointing, simulate
+from microrad import hysteresis, link, mirror_summary, paper, pointing, simulate
 from microrad.mission import Mission
-from microrad.tracking import Run, hysteresis, residual_rad
+from microrad.tracking import Run, mirror_model, residual_rad
 
 Floats = NDArray[np.float64]
 
@@ -78,8 +78,8 @@ def residual_cause(m: Mission, worst: Run, runs: tuple[Run, ...]) -> str:
     share = 1.0 - residual_rad(m, linear.trace) / residual_rad(m, worst.trace)
     if share < 0.5:
         return f"lag of the loop at {worst.freq_hz:g} Hz"
-    model = hysteresis(m, m.mirror)
-    wrong_way = isinstance(model, mirror.BoucWen) and model.reversal_slope_rad_v() < 0.0
+    model = mirror_model(m, m.mirror)
+    wrong_way = isinstance(model, hysteresis.BoucWen) and model.reversal_slope_rad_v() < 0.0
     return f"hysteresis {'at the non-physical reversals ' if wrong_way else ''}at {worst.freq_hz:g} Hz"
 
 
@@ -163,7 +163,7 @@ def _margin_claim(e: Evidence) -> Claim:
 def _travel_claim(e: Evidence) -> Claim:
     m = e.mission
     span = (m.amplifier.output_max_v - m.amplifier.output_min_v) / m.amplifier.gain
-    reach = 2.0 * mirror.output_amplitude(e.summary.model, span / 2.0)
+    reach = 2.0 * hysteresis.output_amplitude(e.summary.model, span / 2.0)
     why = f"what the hysteresis model gives over a drive range of {span:.4g} V; the rest is drive or gain not printed"
     agrees = "yes" if reach >= CLAIMED_TRAVEL_RAD else "no"
     return Claim(

@@ -1,31 +1,61 @@
 """Recordings of a mirror to a mirror model with its uncertainty.
 
-`identify` fits both hysteresis families and judges them on held-out samples; `fit_bouc_wen` and
-`fit_prandtl_ishlinskii` do one each; `mirror_file_text` writes the result for a mission. Inside, drives are in volts
-and outputs in radians.
+`identify` runs the whole ladder: frequency response, linear part, hysteresis and creep, alone and together, judged on
+samples that no fit has seen; `mirror_file_text` writes the result for a mission. Inside, drives are in volts and
+outputs in radians. Its steps stand alone too, for any number of inputs and outputs and in any units:
+`response_from_records` and `response_from_periods`, `vector_fit`, `fit_linear`, and `fit_plant` for a `Structure` of
+your own.
 """
 
+from microrad.identify.amplitude import AmplitudeDependence, amplitude_dependence
 from microrad.identify.bouc_wen import PARAMETERS, BoucWenFit, NotIdentified, fit_bouc_wen
-from microrad.identify.choice import MODELS, Identification, Prediction, Score, Source, identify, predict
+from microrad.identify.choice import MODELS, STATIC, Identification, Refused, Source, identify
+from microrad.identify.joint import FORMS, JointFit, fit_joint
+from microrad.identify.linear import LinearFit, OrderScore, fit_linear, output_error
 from microrad.identify.mirror_text import mirror_file_text
+from microrad.identify.plant_fit import Parameter, PlantFit, Structure, fit_plant, runs
 from microrad.identify.prandtl_ishlinskii import PrandtlIshlinskiiFit, fit_prandtl_ishlinskii
+from microrad.identify.predictions import Prediction, Score, predict
 from microrad.identify.records import IdentificationError, Units
+from microrad.identify.response import FrequencyResponse, response_from_periods, response_from_records
+from microrad.identify.vector_fitting import VectorFit, vector_fit
 
 __all__ = [
+    "FORMS",
     "MODELS",
     "PARAMETERS",
+    "STATIC",
+    "AmplitudeDependence",
     "BoucWenFit",
+    "FrequencyResponse",
     "Identification",
     "IdentificationError",
+    "JointFit",
+    "LinearFit",
     "NotIdentified",
+    "OrderScore",
+    "Parameter",
+    "PlantFit",
     "PrandtlIshlinskiiFit",
     "Prediction",
+    "Refused",
     "Score",
     "Source",
+    "Structure",
     "Units",
+    "VectorFit",
+    "amplitude_dependence",
     "fit_bouc_wen",
+    "fit_joint",
+    "fit_linear",
+    "fit_plant",
     "fit_prandtl_ishlinskii",
     "identify",
     "mirror_file_text",
+    "output_error",
     "predict",
+    "response_from_periods",
+    "response_from_records",
+    "runs",
+    "vector_fit",
 ]

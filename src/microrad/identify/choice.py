@@ -1,4 +1,4 @@
-"""Two models on the same recordings, judged on samples that neither has seen."""
+"""Many models on the same recordings, judged on samples that none of them has seen."""
 
 from __future__ import annotations
 
@@ -8,8 +8,23 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from microrad.identify.bouc_wen import BoucWenFit, fit_bouc_wen
+from microrad.identify.bouc_wen import fit_bouc_wen
+from microrad.identify.doubts import (
+    ResidualTest,
+    drift,
+    fit_warnings,
+    held_out_warnings,
+    range_warnings,
+    rate_warnings,
+    residual_test,
+    residual_warnings,
+    score_warnings,
+)
+from microrad.identify.joint import FORMS, JointFit, fit_joint, time_constants
+from microrad.identify.linear import LinearFit, fit_linear
+from microrad.identify.plant_structures import LinearPoles, poles_of
 from microrad.identify.prandtl_ishlinskii import PrandtlIshlinskiiFit, fit_prandtl_ishlinskii
+from microrad.identify.predictions import Fit, Prediction, Score, predict, straight_line
 from microrad.identify.records import (
     FloatArray,
     IdentificationError,
@@ -17,72 +32,56 @@ from microrad.identify.records import (
     Progress,
     Units,
     colour_inflation,
-    loop_rates,
-    noisiness,
-    one_rate_only,
     percent,
     prepare,
     span,
-    transient,
 )
+from microrad.identify.roles import roles
 from microrad.recording import Recording
 
-Fit = BoucWenFit | PrandtlIshlinskiiFit
+STATIC = ("prandtl_ishlinskii", "bouc_wen", "bouc_wen_admissible")
+"""Models of the hysteresis alone; bouc_wen is the paper's Eq. 3."""
 
-MODELS = ("prandtl_ishlinskii", "bouc_wen", "bouc_wen_admissible")
+MODELS = (*STATIC, *FORMS)
 _STARTS = 12
 _MIN_PART = 100
-_DRIFT_PERCENT = 0.2
-_NOISY_RATE = 0.2
-
-
-@dataclass(frozen=True, eq=False)
-class Prediction:
-    """Model against measurement over one record, offset included (rad); samples before `start` are the transient.
-
-    The offset is the mean difference over the samples from `start` to `split`; behind `split` the record is unseen.
-    """
-
-    model_rad: FloatArray
-    measured_rad: FloatArray
-    start: int
-    split: int
-    clamped: int
-
-    @property
-    def residual_rad(self) -> FloatArray:
-        """Measured less modelled."""
-        return self.measured_rad - self.model_rad
-
-
-@dataclass(frozen=True)
-class Score:
-    """Residuals of one model in per cent of the peak-to-peak output, on the fitted and on the held-out samples."""
-
-    model: str
-    fit_rms_percent: float
-    fit_peak_percent: float
-    held_out_rms_percent: float
-    held_out_peak_percent: float
+_EXPLAINED = 0.5
+_CREEP_S = 1.0
+_POLISH = "linear part, hysteresis and creep together"
 
 
 @dataclass(frozen=True)
 class Source:
-    """One recording: path, digest of the file, samples fitted and samples held out."""
+    """One recording: path, digest of the file, samples fitted and held out, and what it served for.
+
+    `role` is "loops", "broadband" (for the linear part) or "validation" (for the scores alone).
+    """
 
     path: str
     sha256: str
     fitted: int
     held_out: int
+    role: str = "loops"
+
+
+@dataclass(frozen=True)
+class Refused:
+    """A model that the recordings cannot support, and why."""
+
+    model: str
+    reason: str
 
 
 @dataclass(frozen=True, eq=False)
 class Identification:
     """The fits, their scores, the choice with its reason, and the limits within which it holds.
 
-    `fits` are made on the first part of each recording alone; `scores` has the same order, and `straight_line` is the
-    best line through the same samples. `span_rad` is the peak-to-peak output that the percentages refer to, and
-    `travel_rad` the range of the chosen model's output over the fitted drive from `drive_min_v` to `drive_max_v`.
+    `fits` see the first part of each recording alone; `scores` has the same order, as has `predictions` (models, then
+    recordings in the order of `recordings`: loops, then validation), and `straight_line` is the best line through the
+    same samples. `refused` names the models that were not fitted. `linear` is the linear part of the broadband
+    recordings in the units of the recordings (volts and radians), where there are any. `span_rad` is the peak-to-peak
+    output that the percentages refer to, and `travel_rad` the range of the chosen model's output over the fitted drive
+    from `drive_min_v` to `drive_max_v`. `residual` tests the chosen model's residual on the held-out samples.
     """
 
     fits: tuple[Fit, ...]
@@ -91,7 +90,12 @@ class Identification:
     chosen: str
     reason: str
     warnings: tuple[str, ...]
+    refused: tuple[Refused, ...]
     sources: tuple[Source, ...]
+    recordings: tuple[Recording, ...]
+    predictions: tuple[tuple[Prediction, ...], ...]
+    linear: LinearFit | None
+    residual: ResidualTest
     units: Units
     span_rad: float
     travel_rad: float
@@ -120,94 +124,62 @@ class Identification:
         return names.index(model or self.chosen)
 
 
-def predict(fit: Fit, recording: Recording, split: int | None = None) -> Prediction:
-    """Run a fitted model over a recording with the units of the fit, states carried through from the first sample.
-
-    A sensor's zero is not part of the model: the offset is taken from the samples before `split` (default: all), or is
-    zero where the fit was made without one. Raises `IdentificationError` for a split outside the recording.
-    """
-    drive, measured = recording.drive * fit.units.volts, recording.output * fit.units.radians
-    split = recording.samples if split is None else split
-    if not 2 <= split <= recording.samples:
-        raise IdentificationError(
-            f"split {split} does not lie within the {recording.samples} samples of {recording.path}; give a number "
-            "from 2 to that."
-        )
-    start = transient(drive[:split])
-    model, clamped = fit.response(drive, recording.step_s)
-    offset = float(np.mean(measured[start:split] - model[start:split])) if fit.free_offset else 0.0
-    return Prediction(model + offset, measured, start, split, clamped)
-
-
-def identify(
+def identify(  # noqa: PLR0913  all but the first are named options in practice
     recordings: Sequence[Recording],
-    hold_out: float = 0.5,
+    hold_out: float | None = None,
     seed: int = 0,
-    models: Sequence[str] = MODELS[:2],
+    models: Sequence[str] = STATIC[:2],
     on_progress: Progress | None = None,
     *,
+    validation: Sequence[Recording] = (),
+    admissible: bool = False,
     output_unit: str = "mrad",
     lever_arm_m: float | None = None,
     input_unit: str = "V",
 ) -> Identification:
     """Fit the models on the first part of each recording and choose the one that is better on the rest.
 
-    `hold_out` is the share of each recording, at its end, that no fit sees; states are carried through into it.
-    "bouc_wen_admissible" is the Bouc-Wen fit whose local slope never turns against its gain. The lowest residual rms
-    over all held-out samples wins; where the difference may be chance an admissible model goes before one that is not.
-    `on_progress(done, total, what)` counts the starts of all fits. Raises `IdentificationError`.
+    Broadband recordings (chirps, multisines; see `roles.roles`) give the linear part, which the joint models have in
+    cascade; they are not split. Of the others `hold_out` is the share, at the end, that no fit sees (default 0.5; 0
+    where there are `validation` recordings, which no fit sees at all); states are carried through into it. The lowest
+    residual rms over all held-out samples wins; where the difference may be chance an admissible model goes before one
+    that is not, and fewer parameters before more. A winner with a linear part is fitted once more with everything free.
+    `admissible` keeps the slope of each Bouc-Wen model behind a reversal from turning against its gain.
+    `on_progress(done, total, what)` counts fits. Raises `IdentificationError`, also where not even the best model
+    follows the output.
     """
     units = Units(input_unit, output_unit, lever_arm_m)
-    splits = _splits(recordings, hold_out)
     _check_models(models)
-    pairs = list(zip(recordings, splits, strict=True))
-    heads = [replace(r, drive=r.drive[:k], output=r.output[:k]) for r, k in pairs]
+    if admissible:
+        models = tuple(dict.fromkeys("bouc_wen_admissible" if m == "bouc_wen" else m for m in models))
+    if not recordings:
+        raise IdentificationError("no recording was given; name at least one.")
+    response, broadband, loops = roles(recordings)
+    splits = _splits(loops, hold_out, bool(validation))
+    heads = [replace(r, drive=r.drive[:k], output=r.output[:k]) for r, k in zip(loops, splits, strict=True)]
     prepared = prepare(heads, units)
-    span_rad = span(prepared)
-    fits = _fit_all(heads, models, seed, on_progress, units)
-    predictions = [[predict(fit, recording, split) for recording, split in pairs] for fit in fits]
-    scores = tuple(_score(m, p, span_rad) for m, p in zip(models, predictions, strict=True))
-    line = _score("straight line", _straight_line(prepared, recordings, splits, units), span_rad)
-    best = _best(fits, [[p.residual_rad[p.split :] for p in each] for each in predictions])
-    fit, chosen = fits[best], predictions[best]
-    low, high = min(float(r.drive_v.min()) for r in prepared), max(float(r.drive_v.max()) for r in prepared)
-    drift_rad, drift_warnings = _drift(chosen, recordings, span_rad)
-    warnings = [
-        *_range_warnings((low, high), fit.rate_limit_v_per_s),
-        *_rate_warnings(prepared, fit),
-        *_held_out_warnings(recordings, units, (low, high), chosen),
-        *_score_warnings(scores[best], line),
-        *fit_warnings(fit),
-        *drift_warnings,
-    ]
-    return Identification(
-        fits=fits,
-        scores=scores,
-        straight_line=line,
-        chosen=models[best],
-        reason=_reason(scores, line, best),
-        warnings=tuple(warnings),
-        sources=tuple(Source(r.path, r.sha256, k, r.samples - k) for r, k in pairs),
-        units=units,
-        span_rad=span_rad,
-        travel_rad=max(float(np.ptp(p.model_rad[p.start : p.split])) for p in chosen),
-        drive_min_v=low,
-        drive_max_v=high,
-        rate_limit_v_per_s=fit.rate_limit_v_per_s,
-        drift_rad=drift_rad,
-    )
+    linear = _linear(response, units, models, on_progress)
+    names, refused = _supported(models, prepared, linear)
+    fitter = _Fitter(heads, response[:1], linear, units, seed, admissible)
+    judge = _Judge(loops, splits, tuple(validation), units, span(prepared))
+    fits, failed = fitter.all(names, on_progress)
+    predictions = [judge.predictions(fit) for fit in fits]
+    best = _best(fits, [[r for p in each if (r := p.residual_rad[p.split :]).size] for each in predictions])
+    fits, predictions = _polished(fitter, judge, fits, predictions, best, on_progress)
+    return _identification(judge, prepared, fits, predictions, best, [*refused, *failed], linear, broadband)
 
 
-# --------------------------------------------------------------------------------------------------- fitting, scoring
-def _splits(recordings: Sequence[Recording], hold_out: float) -> list[int]:
-    if not 0 < hold_out < 1:
+# ---------------------------------------------------------------------------------------------------------- fitting
+def _splits(recordings: Sequence[Recording], hold_out: float | None, validated: bool) -> list[int]:
+    share = (0.0 if validated else 0.5) if hold_out is None else hold_out
+    if not (0 < share < 1 or (share == 0 and validated)):
         raise IdentificationError(
-            f"--hold-out (hold_out) is {hold_out}; give the share of each recording kept for the check, between 0 "
-            "and 1, e.g. 0.5."
+            f"--hold-out (hold_out) is {share}; give the share of each recording kept for the check, between 0 "
+            "and 1, e.g. 0.5, or 0 with recordings for validation."
         )
-    splits = [round(r.samples * (1 - hold_out)) for r in recordings]
+    splits = [round(r.samples * (1 - share)) for r in recordings]
     for recording, split in zip(recordings, splits, strict=True):
-        if min(split, recording.samples - split) < _MIN_PART:
+        if split < _MIN_PART or (share > 0 and recording.samples - split < _MIN_PART):
             raise IdentificationError(
                 f"{recording.path}: {split} samples to fit and {recording.samples - split} to check; each part needs "
                 f"at least {_MIN_PART}; record longer or choose hold_out nearer to 0.5."
@@ -221,34 +193,102 @@ def _check_models(models: Sequence[str]) -> None:
         raise IdentificationError(f"models {tuple(models)} cannot be used; name each once, out of {', '.join(MODELS)}.")
 
 
-def _fit_all(
-    heads: Sequence[Recording], models: Sequence[str], seed: int, on_progress: Progress | None, units: Units
-) -> tuple[Fit, ...]:
-    efforts = [1 if model == "prandtl_ishlinskii" else _STARTS for model in models]
-    fits = []
-    for i, model in enumerate(models):
-        progress = _shifted(on_progress, sum(efforts[:i]), sum(efforts))
-        fits.append(_fit_one(heads, model, seed, progress, units))
-    return tuple(fits)
+def _linear(
+    response: Sequence[Recording], units: Units, models: Sequence[str], on_progress: Progress | None
+) -> LinearFit | None:
+    """The linear part of the broadband recordings, in volts and radians, where a model asks for it."""
+    if not response or not set(models) & set(FORMS):
+        return None
+    scaled = [  # about the first drive value, where the mirror rests
+        replace(r, drive=(r.drive - r.drive[:1]) * units.volts, output=r.output * units.radians) for r in response
+    ]
+    return fit_linear(scaled, strictly_proper=True, on_progress=on_progress)
 
 
-def _fit_one(heads: Sequence[Recording], model: str, seed: int, progress: Progress, units: Units) -> Fit:
-    if model == "prandtl_ishlinskii":
-        plays = fit_prandtl_ishlinskii(
-            heads, output_unit=units.output, lever_arm_m=units.lever_arm_m, input_unit=units.drive
+def _supported(
+    models: Sequence[str], records: Sequence[Prepared], linear: LinearFit | None
+) -> tuple[list[str], list[Refused]]:
+    """Models that the recordings can support, and the others with the number that speaks against each."""
+    names, refused = [], []
+    longest = max(r.drive_v.size * r.step_s for r in records)
+    for model in models:
+        form = FORMS.get(model)
+        if form is not None and form.creep and (longest < _CREEP_S or len(time_constants(records)) < 2):
+            why = (
+                f"the longest recording lasts {longest:.3g} s, and creep shows over seconds; record a staircase of 10 s"
+            )
+            refused.append(Refused(model, why))
+        elif form is not None and form.needs_linear and linear is None:
+            why = "no recording is broadband, so there is no linear part; record a small chirp or multisine as well"
+            refused.append(Refused(model, why))
+        else:
+            names.append(model)
+    return names or [models[0]], refused if names else refused[1:]
+
+
+@dataclass(frozen=True, eq=False)
+class _Fitter:
+    heads: Sequence[Recording]
+    broadband: Sequence[Recording]
+    linear: LinearFit | None
+    units: Units
+    seed: int
+    admissible: bool
+
+    def all(self, models: Sequence[str], on_progress: Progress | None) -> tuple[list[Fit], list[Refused]]:
+        """One fit a model; a joint fit that fails is refused with its reason, a static one raises."""
+        efforts = [1 if model not in ("bouc_wen", "bouc_wen_admissible") else _STARTS for model in models]
+        fits: list[Fit] = []
+        failed = []
+        for i, model in enumerate(models):
+            progress = _shifted(on_progress, sum(efforts[:i]), sum(efforts))
+            if model in STATIC:
+                fits.append(self.static(model, progress))
+                continue
+            try:
+                fits.append(self.joint(model, self._poles(), free_linear=False))
+            except IdentificationError as error:
+                failed.append(Refused(model, str(error)))
+            progress(1, 1, model)
+        if not fits:
+            raise IdentificationError(failed[0].reason)
+        return fits, failed
+
+    def static(self, model: str, progress: Progress) -> Fit:
+        u = self.units
+        if model == "prandtl_ishlinskii":
+            plays = fit_prandtl_ishlinskii(
+                self.heads, output_unit=u.output, lever_arm_m=u.lever_arm_m, input_unit=u.drive
+            )
+            progress(1, 1, "play operators")
+            return plays
+        return fit_bouc_wen(
+            self.heads,
+            starts=_STARTS,
+            seed=self.seed,
+            admissible=model == "bouc_wen_admissible",
+            on_progress=progress,
+            output_unit=u.output,
+            lever_arm_m=u.lever_arm_m,
+            input_unit=u.drive,
         )
-        progress(1, 1, "play operators")
-        return plays
-    return fit_bouc_wen(
-        heads,
-        starts=_STARTS,
-        seed=seed,
-        admissible=model == "bouc_wen_admissible",
-        on_progress=progress,
-        output_unit=units.output,
-        lever_arm_m=units.lever_arm_m,
-        input_unit=units.drive,
-    )
+
+    def joint(self, model: str, poles: LinearPoles | None, *, free_linear: bool) -> JointFit:
+        return fit_joint(
+            self.heads,
+            model,
+            self.units,
+            linear=poles,
+            free_linear=free_linear,
+            admissible=self.admissible,
+            broadband=self.broadband if free_linear else (),
+            seed=self.seed,
+        )
+
+    def _poles(self) -> LinearPoles | None:
+        return (
+            None if self.linear is None else poles_of(self.linear.system, self.linear.excited_hz, self.linear.rate_hz)
+        )
 
 
 def _shifted(on_progress: Progress | None, before: int, total: int) -> Progress:
@@ -259,13 +299,156 @@ def _shifted(on_progress: Progress | None, before: int, total: int) -> Progress:
     return progress
 
 
+def _polished(
+    fitter: _Fitter,
+    judge: _Judge,
+    fits: list[Fit],
+    predictions: list[tuple[Prediction, ...]],
+    best: int,
+    on_progress: Progress | None,
+) -> tuple[list[Fit], list[tuple[Prediction, ...]]]:
+    """The winner with all its numbers free, its linear part among them, where that is no worse on the held-out part."""
+    winner = fits[best]
+    if not isinstance(winner, JointFit) or winner.linear is None:
+        return fits, predictions
+    if on_progress is not None:
+        on_progress(0, 1, _POLISH)
+    free = fitter.joint(winner.name, winner.linear, free_linear=True)
+    seen = judge.predictions(free)
+    if _held_out(seen) > _held_out(predictions[best]):
+        return fits, predictions
+    return [*fits[:best], free, *fits[best + 1 :]], [*predictions[:best], seen, *predictions[best + 1 :]]
+
+
+def _held_out(predictions: Sequence[Prediction]) -> float:
+    return float(sum(np.sum(p.residual_rad[p.split :] ** 2) for p in predictions))
+
+
+# ---------------------------------------------------------------------------------------------------------- judging
+@dataclass(frozen=True, eq=False)
+class _Judge:
+    loops: Sequence[Recording]
+    splits: Sequence[int]
+    validation: tuple[Recording, ...]
+    units: Units
+    span_rad: float
+
+    @property
+    def recordings(self) -> tuple[Recording, ...]:
+        return (*self.loops, *self.validation)
+
+    @property
+    def all_splits(self) -> list[int]:
+        return [*self.splits, *(0 for _ in self.validation)]
+
+    def predictions(self, fit: Fit) -> tuple[Prediction, ...]:
+        pairs = zip(self.recordings, self.all_splits, strict=True)
+        return tuple(predict(fit, recording, split) for recording, split in pairs)
+
+    def score(self, model: str, predictions: Sequence[Prediction]) -> Score:
+        fitted = [p.residual_rad[p.start : p.split] for p in predictions[: len(self.loops)]]
+        unseen = [p.residual_rad[p.split :] for p in predictions]
+        return Score(
+            model,
+            *percent(np.concatenate(fitted), self.span_rad),
+            *percent(np.concatenate(unseen), self.span_rad),
+        )
+
+
+def _identification(
+    judge: _Judge,
+    prepared: tuple[Prepared, ...],
+    fits: Sequence[Fit],
+    predictions: Sequence[tuple[Prediction, ...]],
+    best: int,
+    refused: Sequence[Refused],
+    linear: LinearFit | None,
+    broadband: Sequence[Recording],
+) -> Identification:
+    scores = tuple(judge.score(fit_name(f), p) for f, p in zip(fits, predictions, strict=True))
+    straight = straight_line(prepared, judge.recordings, judge.all_splits, judge.units)
+    line = judge.score("straight line", straight)
+    fit, chosen = fits[best], predictions[best]
+    _check_explained(scores[best], chosen[: len(judge.loops)])
+    low, high = min(float(r.drive_v.min()) for r in prepared), max(float(r.drive_v.max()) for r in prepared)
+    drift_rad, drift_warnings = drift(chosen, judge.recordings, judge.span_rad)
+    test = _residual_test(judge, chosen)
+    warnings = [
+        *range_warnings((low, high), fit.rate_limit_v_per_s),
+        *rate_warnings(prepared, fit),
+        *held_out_warnings(judge.recordings, judge.units, (low, high), chosen),
+        *score_warnings(scores[best], line),
+        *fit_warnings(fit),
+        *drift_warnings,
+        *residual_warnings(test),
+        *(linear.warnings if linear is not None else ()),
+    ]
+    return Identification(
+        fits=tuple(fits),
+        scores=scores,
+        straight_line=line,
+        chosen=fit_name(fit),
+        reason=_reason(scores, line, best),
+        warnings=tuple(warnings),
+        refused=tuple(refused),
+        sources=_sources(judge, broadband),
+        recordings=judge.recordings,
+        predictions=tuple(predictions),
+        linear=linear,
+        residual=test,
+        units=judge.units,
+        span_rad=judge.span_rad,
+        travel_rad=max(float(np.ptp(p.model_rad[p.start : p.split])) for p in chosen[: len(judge.loops)]),
+        drive_min_v=low,
+        drive_max_v=high,
+        rate_limit_v_per_s=fit.rate_limit_v_per_s,
+        drift_rad=drift_rad,
+    )
+
+
+def fit_name(fit: Fit) -> str:
+    """The name of a fit's model, as in `MODELS`."""
+    return "bouc_wen_admissible" if getattr(fit, "constrained", False) else fit.name
+
+
+def _sources(judge: _Judge, broadband: Sequence[Recording]) -> tuple[Source, ...]:
+    loops = [Source(r.path, r.sha256, k, r.samples - k) for r, k in zip(judge.loops, judge.splits, strict=True)]
+    named = {source.path for source in loops}
+    wide = [Source(r.path, r.sha256, r.samples, 0, "broadband") for r in broadband if r.path not in named]
+    return (*loops, *wide, *(Source(r.path, r.sha256, 0, r.samples, "validation") for r in judge.validation))
+
+
+def _residual_test(judge: _Judge, predictions: Sequence[Prediction]) -> ResidualTest:
+    """Of the longest held-out part: correlations across the joint of two records would mean nothing."""
+    pairs = zip(judge.recordings, predictions, strict=True)
+    recording, longest = max(pairs, key=lambda pair: pair[1].residual_rad.size - pair[1].split)
+    return residual_test(longest.residual_rad[longest.split :], recording.drive[longest.split :, 0])
+
+
+def _check_explained(score: Score, predictions: Sequence[Prediction]) -> None:
+    """Refuse recordings whose output even the best model does not follow."""
+    measured = [p.measured_rad[p.start : p.split] for p in predictions]
+    spread = math.sqrt(float(np.mean(np.concatenate([each - each.mean() for each in measured]) ** 2)))
+    left = math.sqrt(float(np.mean(np.concatenate([p.residual_rad[p.start : p.split] for p in predictions]) ** 2)))
+    if left > _EXPLAINED * spread:
+        raise IdentificationError(
+            f"the recordings do not support a model: the best one, {score.model}, leaves {left:.3g} rad rms of "
+            f"{spread:.3g} rad on the very samples it was fitted to ({100 * left / spread:.0f} %, at most "
+            f"{100 * _EXPLAINED:.0f} % is a model). The output hardly follows the drive: check that the channels "
+            "belong together, and record a larger drive or with less noise."
+        )
+
+
 def _best(fits: Sequence[Fit], residuals: Sequence[Sequence[FloatArray]]) -> int:
-    """Lowest residual on the held-out samples; an admissible model goes first where the difference may be chance."""
+    """Lowest residual on the held-out samples.
+
+    Where the difference may be chance an admissible model goes first, then the one with fewer parameters.
+    """
     losses = [[residual**2 for residual in each] for each in residuals]
     sums = [float(sum(np.sum(loss) for loss in each)) for each in losses]
     lowest = int(np.argmin(sums))
     ties = [i for i, each in enumerate(losses) if _may_be_chance(each, losses[lowest])]
-    return min(ties, key=lambda i: (not _admissible(fits[i]), sums[i]))
+    return min(ties, key=lambda i: (not _admissible(fits[i]), _parameters(fits[i]), sums[i]))
 
 
 def _may_be_chance(losses: Sequence[FloatArray], best: Sequence[FloatArray]) -> bool:
@@ -285,26 +468,10 @@ def _admissible(fit: Fit) -> bool:
     return isinstance(fit, PrandtlIshlinskiiFit) or fit.admissible
 
 
-def _straight_line(
-    prepared: Sequence[Prepared], recordings: Sequence[Recording], splits: Sequence[int], units: Units
-) -> list[Prediction]:
-    """One slope for all recordings and one offset for each, from the fitted samples."""
-    above = [(p.drive_v[p.start :], p.output_rad[p.start :]) for p in prepared]
-    slope = sum(float((u - u.mean()) @ (y - y.mean())) for u, y in above) / sum(
-        float((u - u.mean()) @ (u - u.mean())) for u, _ in above
-    )
-    lines = []
-    for recording, split, p in zip(recordings, splits, prepared, strict=True):
-        model, measured = slope * recording.drive * units.volts, recording.output * units.radians
-        offset = float(np.mean((measured - model)[p.start : split]))
-        lines.append(Prediction(model + offset, measured, p.start, split, 0))
-    return lines
-
-
-def _score(model: str, predictions: Sequence[Prediction], span_rad: float) -> Score:
-    fitted = np.concatenate([p.residual_rad[p.start : p.split] for p in predictions])
-    held_out = np.concatenate([p.residual_rad[p.split :] for p in predictions])
-    return Score(model, *percent(fitted, span_rad), *percent(held_out, span_rad))
+def _parameters(fit: Fit) -> int:
+    if isinstance(fit, JointFit):
+        return len(fit.fit.structure.parameters)
+    return int(np.sum(fit.weights_rad_per_v > 0)) if isinstance(fit, PrandtlIshlinskiiFit) else 6
 
 
 # ------------------------------------------------------------------------------------------------------------- words
@@ -322,98 +489,3 @@ def _reason(scores: Sequence[Score], line: Score, best: int) -> str:
             "way after reversals is not preferred for that."
         )
     return reason
-
-
-def _range_warnings(drive_range: tuple[float, float], rate: float) -> list[str]:
-    low, high = drive_range
-    freq_hz = rate / (math.pi * (high - low))
-    return [
-        f"Valid for drives from {low:.4g} V to {high:.4g} V; outside that range the model is an extrapolation.",
-        f"Not valid above {rate:.4g} V/s, the fastest rate of the recordings: a sine over the whole drive range "
-        f"reaches it at {freq_hz:.4g} Hz.",
-    ]
-
-
-def _rate_warnings(records: Sequence[Prepared], fit: Fit) -> list[str]:
-    warnings = []
-    slowest, fastest = loop_rates(records)
-    if one_rate_only(records):
-        warnings.append(
-            f"One loop rate only (peaks from {slowest:.4g} V/s to {fastest:.4g} V/s): how the hysteresis changes with "
-            "frequency is not known from these recordings, and delta and d2 only describe the shape of this loop; "
-            "record the same loop at two more frequencies."
-        )
-    elif isinstance(fit, PrandtlIshlinskiiFit):
-        warnings.append(
-            f"The loops have peak rates from {slowest:.4g} V/s to {fastest:.4g} V/s, and play operators do not depend "
-            "on rate: one average loop stands for all."
-        )
-    if noisiness(records) > _NOISY_RATE:
-        warnings.append(
-            f"The drive is noisy: its rate from sample to sample scatters by {100 * noisiness(records):.0f} % of the "
-            "fastest rate; use the commanded drive, or filter it, before trusting rate-dependent parameters."
-        )
-    return warnings
-
-
-def _held_out_warnings(
-    recordings: Sequence[Recording], units: Units, drive_range: tuple[float, float], predictions: Sequence[Prediction]
-) -> list[str]:
-    low, high = drive_range
-    margin = 0.02 * (high - low)
-    outside = 0
-    for recording, prediction in zip(recordings, predictions, strict=True):
-        held_out = recording.drive[prediction.split :] * units.volts
-        outside += int(np.sum((held_out < low - margin) | (held_out > high + margin)))
-    if not outside:
-        return []
-    return [f"{outside} held-out samples lie outside the fitted drive range; the held-out residual judges them too."]
-
-
-def _score_warnings(score: Score, line: Score) -> list[str]:
-    warnings = []
-    if score.held_out_rms_percent >= line.held_out_rms_percent:
-        warnings.append("No model is better than a straight line on the held-out samples: do not use the hysteresis.")
-    if score.held_out_rms_percent > 1.5 * score.fit_rms_percent:
-        warnings.append(
-            f"The residual grows from {score.fit_rms_percent:.2f} % on the fitted samples to "
-            f"{score.held_out_rms_percent:.2f} % on the held-out ones: drift, another regime, or too short a record."
-        )
-    return warnings
-
-
-def fit_warnings(fit: Fit) -> list[str]:
-    """Warnings that belong to one fit, whichever model is chosen."""
-    if isinstance(fit, PrandtlIshlinskiiFit) or fit.admissible:
-        return []
-    lowest = min(fit.slope_after_reversal_rad_per_v, fit.lowest_slope_rad_per_v)
-    return [
-        "Not admissible: just after a reversal the modelled mirror first moves the wrong way "
-        f"({1e3 * lowest:.3g} mrad/V against d1 = {1e3 * abs(fit.d1_rad_per_v):.3g} mrad/V); "
-        "the model bouc_wen_admissible excludes it."
-    ]
-
-
-def _drift(
-    predictions: Sequence[Prediction], recordings: Sequence[Recording], span_rad: float
-) -> tuple[float, list[str]]:
-    """Largest linear trend of a record's residual over its length (rad), and a warning where it stands out.
-
-    It stands out above three standard errors (noise colour counted) and above 0.2 % of the peak-to-peak output.
-    """
-    largest, warnings = 0.0, []
-    for prediction, recording in zip(predictions, recordings, strict=True):
-        residual = prediction.residual_rad[prediction.start :]
-        time = np.linspace(-0.5, 0.5, residual.size)
-        trend = float(time @ residual) / float(time @ time)
-        rest = residual - residual.mean() - trend * time
-        error = math.sqrt(colour_inflation([rest]) * float(rest @ rest) / rest.size / float(time @ time))
-        if abs(trend) > abs(largest):
-            largest = trend
-        if abs(trend) > max(3 * error, _DRIFT_PERCENT / 100 * span_rad):
-            warnings.append(
-                f"{recording.path}: the residual drifts by {1e6 * trend:.3g} ± {1e6 * error:.2g} urad "
-                f"({100 * trend / span_rad:.2g} % of the peak-to-peak output) in "
-                f"{residual.size * recording.step_s:.3g} s: creep or a warming sensor; no model here describes it."
-            )
-    return largest, warnings

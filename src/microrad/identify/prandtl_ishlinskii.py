@@ -115,12 +115,17 @@ def _states(drive_v: FloatArray, thresholds_v: FloatArray) -> FloatArray:
     return np.asarray(play_response(drive_v, thresholds_v, np.full(thresholds_v.size, drive_v[0])))
 
 
+def threshold_grid(drive_span: float, operators: int) -> FloatArray:
+    """Thresholds spread evenly from 0 to 0.47 of the peak-to-peak drive."""
+    return np.linspace(0.0, _LARGEST_THRESHOLD * drive_span, operators)
+
+
 def _thresholds(records: Sequence[Prepared], given: ArrayLike | None, operators: int) -> FloatArray:
     drive_span = max(float(np.ptp(r.drive_v)) for r in records)
     if given is None:
         if operators < 1:
             raise IdentificationError(f"{operators} play operators were asked for; give at least 1, better 10 or more.")
-        return np.linspace(0.0, _LARGEST_THRESHOLD * drive_span, operators)
+        return threshold_grid(drive_span, operators)
     thresholds = np.array(given, dtype=np.float64, ndmin=1)
     valid = thresholds.ndim == 1 and thresholds.size > 0 and np.isfinite(thresholds).all() and thresholds[0] == 0
     if not valid or np.any(np.diff(thresholds) <= 0) or thresholds[-1] >= drive_span / 2:

@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 
+from microrad.hysteresis import BoucWen
 from microrad.identify.records import FloatArray, Prepared, Progress, centred, fastest_rate, span
 from microrad.kernels import bouc_wen_response
-from microrad.mirror import BoucWen
 
 SLOPE_TOLERANCE = 1e-3
 _LOWER = np.array([-1.0, -3.0, math.log(0.05), math.log(0.05)])
@@ -191,7 +191,7 @@ def k_settled(values: FloatArray) -> float:
 
 
 def slope_after_reversal(values: FloatArray) -> float:
-    """dy/du just after a slow reversal of a settled loop, positive in the direction of d1 (see mirror.BoucWen)."""
+    """dy/du just after a slow reversal of a settled loop, positive in the direction of d1 (see hysteresis.BoucWen)."""
     d1, d2, epsilon, delta, alpha, beta = (float(v) for v in values)
     falling = math.copysign(1.0, d1)
     return BoucWen(falling * d1, d2, falling * epsilon, delta, alpha, falling * beta).reversal_slope_rad_v()

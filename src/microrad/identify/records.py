@@ -93,7 +93,7 @@ def prepare(recordings: Sequence[Recording], units: Units) -> tuple[Prepared, ..
 
 
 def _prepare(recording: Recording, units: Units) -> Prepared:
-    drive = recording.drive * units.volts
+    drive = recording.drive[:, 0] * units.volts
     if np.ptp(drive) == 0 or np.ptp(recording.output) == 0:
         raise IdentificationError(f"{recording.path}: drive or output is constant in the part that is fitted.")
     if len(_sweeps(drive, recording.step_s)) < 2:
@@ -101,7 +101,7 @@ def _prepare(recording: Recording, units: Units) -> Prepared:
             f"{recording.path}: the drive never reverses in the part that is fitted, and hysteresis shows only "
             "behind a reversal; record at least one full period of the drive."
         )
-    output = recording.output * units.radians
+    output = recording.output[:, 0] * units.radians
     return Prepared(recording.path, recording.sha256, drive, output, recording.step_s, transient(drive))
 
 

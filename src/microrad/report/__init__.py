@@ -1,4 +1,4 @@
-"""The report of a study: one page that opens offline, the results as files, and the verdict in words."""
+"""Reports of a study and of an identification: a page that opens offline, the verdict in words, plain data."""
 
 import csv
 import math
@@ -8,11 +8,24 @@ from typing import Any
 
 import numpy as np
 
-from microrad.report.folder import MANIFEST, FolderError, check_folder, whole_folder
+from microrad.folder import MANIFEST, FolderError, check_folder, whole_folder
+from microrad.report.identification import ReportError, check_identification, write_identification
+from microrad.report.identification_words import identification_data, identification_text
 from microrad.report.words import summary, verdict_text
 from microrad.study import Study
 
-__all__ = ["FolderError", "check_folder", "summary", "verdict_text", "write"]
+__all__ = [
+    "FolderError",
+    "ReportError",
+    "check_folder",
+    "check_identification",
+    "identification_data",
+    "identification_text",
+    "summary",
+    "verdict_text",
+    "write",
+    "write_identification",
+]
 
 Progress = Callable[[int, int, str], None]
 

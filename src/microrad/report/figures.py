@@ -2,6 +2,7 @@
 
 import io
 import math
+import re
 from dataclasses import dataclass
 from typing import Any
 
@@ -35,6 +36,8 @@ STYLE: dict[Any, Any] = {
     "lines.linewidth": 1.3,
 }
 MOST_POINTS = 1200  # of a drawn line; peaks are kept
+_PATH = re.compile(r' d="[^"]*"')
+_DECIMALS = re.compile(r"(\.\d\d)\d+")
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,16 +62,17 @@ def draw(study: Study) -> tuple[Figure, ...]:
     return tuple(figures)
 
 
-def _svg(canvas: Canvas) -> str:
+def svg_of(canvas: Canvas) -> str:
+    """The canvas as the text of an <svg> element, its coordinates to a hundredth of a point."""
     buffer = io.StringIO()
     canvas.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
     text = buffer.getvalue()
-    return text[text.index("<svg") :]
+    return _PATH.sub(lambda path: _DECIMALS.sub(r"\1", path.group()), text[text.index("<svg") :])
 
 
-def thin(x: Floats, y: Floats) -> tuple[Floats, Floats]:
+def thin(x: Floats, y: Floats, most: int = MOST_POINTS) -> tuple[Floats, Floats]:
     """Fewer points for drawing: the lowest and highest of each stretch, so that no peak is lost."""
-    stretch = 2 * y.size // MOST_POINTS
+    stretch = 2 * y.size // most
     if stretch < 4:
         return x, y
     whole = y.size // stretch * stretch
@@ -126,7 +130,7 @@ def margin_map(study: Study) -> Figure:
     grid = np.meshgrid(f.data_rate_bit_s, f.pointing_error_rad, indexing="ij")
     columns = {"data_rate (bit/s)": grid[0].ravel(), "pointing_error (rad)": grid[1].ravel()}
     columns["margin (dB)"] = f.margin_db.ravel()
-    return Figure("fig2-margin-map", "Fig. 2  Link margin", caption, _svg(canvas), columns)
+    return Figure("fig2-margin-map", "Fig. 2  Link margin", caption, svg_of(canvas), columns)
 
 
 def residual_urad(study: Study) -> float:
@@ -160,7 +164,7 @@ def hysteresis_loops(study: Study) -> Figure:
         "Settled loops of the hysteresis model alone, without the linear part. Width: peak-to-peak of h over "
         "peak-to-peak of the output. The paper's figure sets its model against measurements that it does not publish."
     )
-    return Figure("fig5-hysteresis-loops", "Fig. 5  Rate-dependent hysteresis", caption, _svg(canvas), columns)
+    return Figure("fig5-hysteresis-loops", "Fig. 5  Rate-dependent hysteresis", caption, svg_of(canvas), columns)
 
 
 @dataclass(frozen=True, slots=True)
@@ -190,7 +194,7 @@ def _tracking(
         axes.set_title(f"{f:g} Hz", fontsize=9, loc="left")
         axes.set(xlabel="time, steady state (ms)", ylabel="pointing error (µrad)")
         axes.legend(fontsize=7.5, loc="lower center", bbox_to_anchor=(0.5, 1.08))
-    return _svg(canvas), columns
+    return svg_of(canvas), columns
 
 
 def _error_line(axes: Axes, label: str, run: Run, style: dict[str, Any], columns: dict[str, Floats]) -> None:
@@ -295,4 +299,4 @@ def scan(found: paper.Scan) -> Figure:
     for name in paper.CLAIMS:
         columns[name] = np.array([float(p.holds()[name]) for p in points])
     caption = "How many of these hold at each pair of gains: " + "; ".join(paper.CLAIMS) + "."
-    return Figure("claims-scan", "Where the paper's closed-loop claims hold", caption, _svg(canvas), columns)
+    return Figure("claims-scan", "Where the paper's closed-loop claims hold", caption, svg_of(canvas), columns)

@@ -15,13 +15,16 @@ from microrad.study import Study
 from microrad.units import format_quantity
 
 
-def render(study: Study, figures: Sequence[Figure]) -> str:
-    """The page's HTML; every text of the mission is escaped, and nothing is loaded from anywhere."""
-    environment = Environment(
+def pages() -> Environment:
+    """The package's templates, with every text escaped and a missing one an error."""
+    return Environment(
         loader=PackageLoader("microrad.report", "."), autoescape=True, undefined=StrictUndefined, trim_blocks=True
     )
-    environment.filters["quantity"] = lambda pair: words.quantity(*pair)
-    template = environment.get_template("page.html")
+
+
+def render(study: Study, figures: Sequence[Figure]) -> str:
+    """The page's HTML; every text of the mission is escaped, and nothing is loaded from anywhere."""
+    template = pages().get_template("page.html")
     m = study.file.mission
     context: dict[str, Any] = {
         "study": study,

@@ -1,4 +1,4 @@
-"""A folder of results appears whole or not at all, and never replaces what microrad did not write."""
+"""A folder or file of results appears whole or not at all, and never replaces what microrad did not write."""
 
 import json
 import shutil
@@ -14,32 +14,36 @@ class FolderError(ValueError):
     """The output folder cannot be used; the message says why and what to do."""
 
 
-def check_folder(folder: Path, overwrite: bool) -> None:
-    """Raise FolderError when ``folder`` holds something that must not be replaced."""
+def check_folder(folder: Path, overwrite: bool, kind: str = "mission", what: str = "results") -> None:
+    """Raise FolderError when ``folder`` holds something that must not be replaced.
+
+    What may be has a manifest of microrad with the key ``kind``; ``what`` it holds is said in the message.
+    """
     if not folder.exists():
         return
     if not folder.is_dir():
         raise FolderError(f"{folder} is a file, not a folder: choose another --output")
     if not any(folder.iterdir()):
         return
-    if not _ours(folder / MANIFEST):
-        raise FolderError(f"{folder} holds files that are not results of microrad: choose another --output")
+    if not _ours(folder / MANIFEST, kind):
+        raise FolderError(f"{folder} holds files that are not {what} of microrad: choose another --output")
     if not overwrite:
-        raise FolderError(f"{folder} already holds results: choose another --output, or replace them with --overwrite")
+        raise FolderError(f"{folder} already holds {what}: choose another --output, or replace them with --overwrite")
 
 
-def _ours(manifest: Path) -> bool:
-    """Whether this is a manifest that microrad wrote."""
+def _ours(manifest: Path, kind: str) -> bool:
+    """Whether this is a manifest that microrad wrote for this kind of folder."""
     try:
-        return "microrad" in json.loads(manifest.read_text(encoding="utf-8"))["versions"]
+        data = json.loads(manifest.read_text(encoding="utf-8"))
+        return "microrad" in data["versions"] and kind in data
     except (OSError, ValueError, KeyError, TypeError):
         return False
 
 
 @contextmanager
-def whole_folder(folder: Path, overwrite: bool) -> Iterator[Path]:
+def whole_folder(folder: Path, overwrite: bool, kind: str = "mission", what: str = "results") -> Iterator[Path]:
     """A folder beside ``folder`` to write into; it becomes ``folder`` at the end, or vanishes on any error."""
-    check_folder(folder, overwrite)
+    check_folder(folder, overwrite, kind, what)
     folder.parent.mkdir(parents=True, exist_ok=True)
     draft = Path(tempfile.mkdtemp(prefix=f".{folder.name}-", suffix=".part", dir=folder.parent))
     try:

@@ -1,0 +1,379 @@
+"""Excitation design: chirps, multisines, sines of growing amplitude and staircases, within the limits of the bench.
+
+A design is refused when it leaves a limit, with the number and with what would fit.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from microrad.fields import Problem, ProblemsError
+from microrad.units import format_quantity
+
+Floats = NDArray[np.float64]
+
+MOST_SAMPLES = 20_000_000
+"""Samples of one record, all drives together, beyond which a duration is taken for a slip of the pen."""
+
+_WHOLE = 1e-6  # how far, in samples, a whole number of them may be off
+_ROUNDING = 1e-9  # how far, relatively, a limit may be passed by rounding
+_DETECTION_GROUP = 4  # odd lines of which one is left out
+
+
+class DesignError(ProblemsError):
+    """An excitation that leaves the limits of the bench or contradicts itself; each fault is one of `problems`."""
+
+    def __init__(self, name: str, *problems: Problem) -> None:
+        """Write the message: the excitation, then each parameter with what is wrong and what would fit."""
+        super().__init__(*problems)
+        self.args = (f"{name}: " + "; ".join(f"{p.key} {p.reason}; would fit: {p.expected}" for p in problems),)
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """What the function generator and the mirror allow, for each of `inputs` drives, in volts before the amplifier.
+
+    The slew is that between samples. The highest frequency of a design has at least `samples_per_period` samples a
+    period, above 2.
+    """
+
+    rate_hz: float
+    drive_min_v: float
+    drive_max_v: float
+    slew_v_s: float
+    samples_per_period: float
+    inputs: int = 1
+
+
+@dataclass(frozen=True, eq=False)
+class Excitation:
+    """A designed drive, read-only, shape (samples, inputs), in volts.
+
+    The mirror rests at `rest_v` on every input before the first sample. `period_samples` is set where the drive is
+    periodic. `lines` are the excited harmonics of a multisine, in cycles a period; `step_samples` the first samples at
+    each new level of a staircase, from which creep is counted.
+    """
+
+    name: str
+    drive: Floats
+    rate_hz: float
+    rest_v: float
+    period_samples: int | None = None
+    lines: tuple[int, ...] = ()
+    step_samples: tuple[int, ...] = ()
+
+    @property
+    def samples(self) -> int:
+        """Number of samples."""
+        return int(self.drive.shape[0])
+
+    @property
+    def crest_factor(self) -> tuple[float, ...]:
+        """Peak over rms of each input about its rest; nan for an input that rests throughout."""
+        moved = self.drive - self.rest_v
+        rms = np.sqrt(np.mean(moved**2, axis=0))
+        return tuple(float(p / r) if r > 0.0 else math.nan for p, r in zip(np.abs(moved).max(axis=0), rms, strict=True))
+
+
+@dataclass(frozen=True, slots=True)
+class Lines:
+    """The harmonics of a multisine: those of 1 / `period_s` from `start_hz` to `stop_hz`, and which of them.
+
+    "all"; "odd": odd harmonics, so that even distortion shows at the even ones; "odd-random": of each four neighbouring
+    odd harmonics one at random is left out too, where odd distortion shows (random odd multisine: R. Pintelon and
+    J. Schoukens, System Identification: A Frequency Domain Approach, 2012, chapter 4).
+    """
+
+    period_s: float
+    start_hz: float
+    stop_hz: float
+    choice: Literal["all", "odd", "odd-random"] = "all"
+
+
+# -------------------------------------------------------------------------------------------------------------- designs
+def logarithmic_chirp(
+    limits: Limits,
+    *,
+    start_hz: float,
+    stop_hz: float,
+    duration_s: float,
+    amplitude_v: float,
+    offset_v: float,
+    axis: int = 0,
+    name: str = "chirp",
+) -> Excitation:
+    """u = offset + amplitude sin(phase), its frequency growing exponentially in time from `start_hz` to `stop_hz`.
+
+    Drives input `axis` (from 0); the others rest at the offset. Raises `DesignError`.
+    """
+    samples = _samples(limits, name, "duration", duration_s)
+    if not start_hz < stop_hz:
+        raise DesignError(
+            name, Problem("stop", "is not above start", f"a frequency above {format_quantity(start_hz, 'Hz')}")
+        )
+    growth = math.log(stop_hz / start_hz) / duration_s
+    phase = 2 * math.pi * start_hz * np.expm1(growth * np.arange(samples) / limits.rate_hz) / growth
+    problems = _too_fast(limits, "stop", stop_hz)
+    drive = _fitted(limits, name, ("amplitude", amplitude_v), np.sin(phase)[:, None], offset_v, problems)
+    return Excitation(name, _on_axis(limits, name, drive, offset_v, axis), limits.rate_hz, offset_v)
+
+
+def multisine(
+    limits: Limits,
+    lines: Lines,
+    *,
+    rms_v: float,
+    offset_v: float,
+    periods: int,
+    realisations: int,
+    seed: int,
+    name: str = "multisine",
+) -> tuple[Excitation, ...]:
+    """Flat multisines with random phases, one record a realisation; each input has `rms_v` about the offset.
+
+    With n inputs the realisations come in groups of n, orthogonal at every line: input i has the phase
+    phi_i(line) + 2 pi e i / n in realisation e of its group, a column of the unitary discrete Fourier matrix
+    (T. Dobrowiecki, J. Schoukens and P. Guillaume, IEEE Trans. Instrum. Meas. 55, 2006). Each record begins where its
+    inputs are nearest to rest: a common delay changes neither spectrum nor orthogonality. Raises `DesignError`.
+    """
+    length = _whole_period(limits, name, lines.period_s)
+    _samples(limits, name, "periods", periods * lines.period_s)
+    if realisations % limits.inputs:
+        counts = f"is {realisations}, no multiple of the {limits.inputs} inputs, so no orthogonal set"
+        raise DesignError(name, Problem("realisations", counts, f"a multiple of {limits.inputs}"))
+    rng = np.random.Generator(np.random.Philox(seed))
+    harmonics = _harmonics(lines, name, rng)
+    problems = _too_fast(limits, "stop", harmonics[-1] / lines.period_s)
+    if harmonics[-1] >= length / 2:
+        raise DesignError(name, *problems)
+    shape = np.concatenate(_orthogonal_set(harmonics, length, limits.inputs, realisations, rng), axis=1)
+    closed = np.concatenate([shape, shape[:1]])  # the step from period to period has its slew too
+    drives = _fitted(limits, name, ("rms", rms_v), closed, offset_v, problems)[:-1]
+    names = [name] if realisations == 1 else [f"{name}-{r + 1}" for r in range(realisations)]
+    columns = [slice(r * limits.inputs, (r + 1) * limits.inputs) for r in range(realisations)]
+    return tuple(
+        Excitation(
+            each,
+            _frozen(np.tile(drives[:, part], (periods, 1))),
+            limits.rate_hz,
+            offset_v,
+            length,
+            tuple(int(k) for k in harmonics),
+        )
+        for each, part in zip(names, columns, strict=True)
+    )
+
+
+def growing_sines(
+    limits: Limits,
+    *,
+    freq_hz: float,
+    amplitudes_v: Sequence[float],
+    periods: int,
+    offset_v: float,
+    axis: int = 0,
+    name: str = "sines",
+) -> Excitation:
+    """u = offset + amplitude sin(2 pi f t), `periods` whole periods at each amplitude, one behind the other.
+
+    The periods at an amplitude must fill a whole number of samples. Raises `DesignError`.
+    """
+    block = _whole_block(limits, name, freq_hz, periods)
+    _samples(limits, name, "periods", block * len(amplitudes_v) / limits.rate_hz)
+    sine = np.sin(2 * math.pi * freq_hz * np.arange(block) / limits.rate_hz)
+    largest = max(amplitudes_v)
+    shape = np.concatenate([sine * (amplitude / largest) for amplitude in amplitudes_v])
+    problems = _too_fast(limits, "frequencies", freq_hz)
+    drive = _fitted(limits, name, ("amplitudes", largest), shape[:, None], offset_v, problems)
+    drive = _on_axis(limits, name, drive, offset_v, axis)
+    repeat = Fraction(limits.rate_hz / freq_hz).limit_denominator(periods).numerator  # samples until it repeats itself
+    period = repeat if len(amplitudes_v) == 1 and 2 * repeat <= block else None
+    return Excitation(name, drive, limits.rate_hz, offset_v, period)
+
+
+def staircase(
+    limits: Limits,
+    *,
+    levels_v: Sequence[float],
+    dwell_s: float,
+    rise_s: float,
+    axis: int = 0,
+    name: str = "staircase",
+) -> Excitation:
+    """Levels held for `dwell_s` each, joined by straight ramps of `rise_s`; the mirror rests at the first one.
+
+    A single step is two levels. Raises `DesignError`.
+    """
+    if len(levels_v) < 2:
+        raise DesignError(name, Problem("levels", "has one item, which is no step", "at least two levels"))
+    dwell, rise = round(dwell_s * limits.rate_hz), max(round(rise_s * limits.rate_hz), 1)
+    _samples(limits, name, "dwell", (dwell + rise) * len(levels_v) / limits.rate_hz)
+    if dwell < 1:
+        step = format_quantity(1.0 / limits.rate_hz, "s")
+        raise DesignError(name, Problem("dwell", "is shorter than half a sample", f"at least {step}"))
+    levels = np.asarray(levels_v, dtype=float)
+    problems = [*_outside(limits, "levels", levels), *_too_steep(limits, rise, levels)]
+    if problems:
+        raise DesignError(name, *problems)
+    corners = np.arange(levels.size) * (dwell + rise)
+    times = np.stack([corners, corners + dwell], axis=1).ravel()
+    drive = np.interp(np.arange(times[-1] + 1), times, np.repeat(levels, 2))[:, None]
+    rest = float(levels[0])
+    steps = tuple(int(c) for c in corners[1:])
+    return Excitation(name, _on_axis(limits, name, drive, rest, axis), limits.rate_hz, rest, step_samples=steps)
+
+
+def log_spaced(samples: int, per_decade: int) -> NDArray[np.int64]:
+    """Distinct sample numbers from 0 to `samples` - 1, about `per_decade` in each decade: where creep is observed."""
+    count = max(2, math.ceil(per_decade * math.log10(max(samples, 2))) + 1)
+    return np.unique(np.round(np.geomspace(1, samples, count)).astype(np.int64) - 1)
+
+
+# --------------------------------------------------------------------------------------------------------------- limits
+def _frozen(values: Floats) -> Floats:
+    values = np.ascontiguousarray(values)
+    values.flags.writeable = False
+    return values
+
+
+def _samples(limits: Limits, name: str, key: str, seconds: float) -> int:
+    """Number of samples in a time, refused before anything of that size is allocated."""
+    most = MOST_SAMPLES / limits.inputs / limits.rate_hz
+    if seconds > most:
+        reason = f"makes a record of {format_quantity(seconds, 's')} at {format_quantity(limits.rate_hz, 'Hz')}"
+        expected = f"at most {format_quantity(most, 's')} ({MOST_SAMPLES / 1e6:g} million samples), or a lower rate"
+        raise DesignError(name, Problem(key, reason, expected))
+    return max(round(seconds * limits.rate_hz), 1)
+
+
+def _too_fast(limits: Limits, key: str, highest_hz: float) -> list[Problem]:
+    fewest = limits.samples_per_period
+    if highest_hz * fewest <= limits.rate_hz * (1 + _ROUNDING):
+        return []
+    reason = (
+        f"reaches {format_quantity(highest_hz, 'Hz')}, {limits.rate_hz / highest_hz:.3g} samples a period at "
+        f"{format_quantity(limits.rate_hz, 'Hz')} where limits.samples_per_period asks for {fewest:g}"
+    )
+    most, rate = format_quantity(limits.rate_hz / fewest, "Hz"), format_quantity(highest_hz * fewest, "Hz")
+    return [Problem(key, reason, f"at most {most}, or a rate of at least {rate}")]
+
+
+def _fitted(
+    limits: Limits, name: str, scale: tuple[str, float], shape: Floats, offset_v: float, problems: Sequence[Problem]
+) -> Floats:
+    """offset + size x shape where that is within voltage and slew; `scale` is the key of the size, and the size (V)."""
+    key, size = scale
+    high, low = max(float(shape.max()), 0.0), max(float(-shape.min()), 0.0)
+    slew = float(np.abs(np.diff(shape, axis=0, prepend=0.0)).max()) * limits.rate_hz
+    room = {
+        "limits.drive_max": (limits.drive_max_v - offset_v, high, "V", offset_v),
+        "limits.drive_min": (offset_v - limits.drive_min_v, low, "V", offset_v),
+        "limits.slew": (limits.slew_v_s, slew, "V/s", 0.0),
+    }
+    found = [*problems, *_outside(limits, "offset", np.array([offset_v]))]
+    most = min((space / part for space, part, _, _ in room.values() if part > 0.0), default=math.inf)
+    for limit, (space, part, unit, base) in room.items():
+        if size * part > space * (1 + _ROUNDING) and space >= 0.0:
+            reached = base - size * part if limit.endswith("min") else base + size * part
+            allowed = base - space if limit.endswith("min") else base + space
+            reason = f"takes the drive to {format_quantity(reached, unit)}, {limit} is {format_quantity(allowed, unit)}"
+            found.append(Problem(key, reason, f"at most {_rounded_down(most)}"))
+    if found:
+        raise DesignError(name, *found)
+    return offset_v + size * shape
+
+
+def _rounded_down(volts: float) -> str:
+    digits = 10.0 ** (3 - math.floor(math.log10(volts))) if volts > 0.0 else 1.0
+    return format_quantity(math.floor(volts * digits * (1 + _ROUNDING)) / digits, "V")
+
+
+def _outside(limits: Limits, key: str, levels: Floats) -> list[Problem]:
+    slack = _ROUNDING * (limits.drive_max_v - limits.drive_min_v)
+    bad = levels[(levels < limits.drive_min_v - slack) | (levels > limits.drive_max_v + slack)]
+    span = f"{format_quantity(limits.drive_min_v, 'V')} to {format_quantity(limits.drive_max_v, 'V')}"
+    reason = (
+        f"has {format_quantity(float(bad[0]), 'V')}, outside limits.drive_min to limits.drive_max" if bad.size else ""
+    )
+    return [Problem(key, reason, span)] if bad.size else []
+
+
+def _too_steep(limits: Limits, rise: int, levels: Floats) -> list[Problem]:
+    largest = float(np.abs(np.diff(levels)).max())
+    slew = largest / rise * limits.rate_hz
+    if slew <= limits.slew_v_s * (1 + _ROUNDING):
+        return []
+    needed = format_quantity(math.ceil(largest / limits.slew_v_s * limits.rate_hz - _WHOLE) / limits.rate_hz, "s", 6)
+    shown, most = format_quantity(slew, "V/s"), format_quantity(limits.slew_v_s, "V/s")
+    return [Problem("rise", f"makes the largest step one of {shown}, limits.slew is {most}", f"at least {needed}")]
+
+
+def _on_axis(limits: Limits, name: str, column: Floats, rest_v: float, axis: int) -> Floats:
+    if not 0 <= axis < limits.inputs:
+        reason = f"is {axis + 1}, but the bench has {limits.inputs} input{'s' if limits.inputs > 1 else ''}"
+        raise DesignError(name, Problem("axis", reason, f"1 to {limits.inputs}"))
+    drive = np.full((column.shape[0], limits.inputs), rest_v)
+    drive[:, axis] = column[:, 0]
+    return _frozen(drive)
+
+
+# -------------------------------------------------------------------------------------------------------- whole periods
+def _whole_block(limits: Limits, name: str, freq_hz: float, periods: int) -> int:
+    """Samples in `periods` periods of a sine, refused where that is no whole number."""
+    exact = periods * limits.rate_hz / freq_hz
+    block = round(exact)
+    if block >= 1 and abs(exact - block) <= _WHOLE:
+        return block
+    ratio = Fraction(limits.rate_hz / freq_hz).limit_denominator(1000)
+    fits = abs(ratio.denominator * limits.rate_hz / freq_hz - ratio.numerator) <= _WHOLE
+    near = format_quantity(periods * limits.rate_hz / max(block, 1), "Hz", 9)
+    reason = f"of {format_quantity(freq_hz, 'Hz')}: {periods} of them fill {exact:.6g} samples, no whole number"
+    expected = f"a multiple of {ratio.denominator}, or a frequency of {near}" if fits else f"a frequency of {near}"
+    raise DesignError(name, Problem("periods", reason, expected))
+
+
+def _whole_period(limits: Limits, name: str, period_s: float) -> int:
+    exact = period_s * limits.rate_hz
+    length = round(exact)
+    if length >= 2 and abs(exact - length) <= _WHOLE:
+        return _samples(limits, name, "period", length / limits.rate_hz)
+    near = format_quantity(max(length, 2) / limits.rate_hz, "s", 9)
+    raise DesignError(name, Problem("period", f"is {exact:.6g} samples, no whole number of at least 2", near))
+
+
+def _harmonics(lines: Lines, name: str, rng: np.random.Generator) -> NDArray[np.int64]:
+    first = max(math.ceil(lines.start_hz * lines.period_s - _WHOLE), 1)
+    last = math.floor(lines.stop_hz * lines.period_s + _WHOLE)
+    harmonics = np.arange(first, last + 1, dtype=np.int64)
+    if lines.choice != "all":
+        harmonics = harmonics[harmonics % 2 == 1]
+    if lines.choice == "odd-random":
+        whole = harmonics.size // _DETECTION_GROUP
+        left_out = np.arange(whole) * _DETECTION_GROUP + rng.integers(0, _DETECTION_GROUP, whole)
+        harmonics = np.delete(harmonics, left_out)
+    if harmonics.size == 0:
+        spacing = format_quantity(1.0 / lines.period_s, "Hz")
+        reason = f"leaves no {lines.choice} line of a multisine with one every {spacing}"
+        raise DesignError(name, Problem("stop", reason, "a wider band, or a longer period"))
+    return harmonics
+
+
+def _orthogonal_set(
+    harmonics: NDArray[np.int64], length: int, inputs: int, realisations: int, rng: np.random.Generator
+) -> list[Floats]:
+    """One period of each realisation, shape (samples, inputs), each input with an rms of 1."""
+    turns = np.exp(2j * np.pi * np.outer(np.arange(inputs), np.arange(inputs)) / inputs)  # (realisation, input)
+    shapes = []
+    for _ in range(realisations // inputs):
+        phases = np.exp(2j * np.pi * rng.random((inputs, harmonics.size)))
+        for turn in turns:
+            spectrum = np.zeros((inputs, length // 2 + 1), dtype=complex)
+            spectrum[:, harmonics] = turn[:, None] * phases * (length / 2 * math.sqrt(2.0 / harmonics.size))
+            shape = np.fft.irfft(spectrum, length, axis=1).T
+            shapes.append(np.roll(shape, -int(np.argmin(np.abs(shape).max(axis=1))), axis=0))
+    return shapes

@@ -1,0 +1,140 @@
+"""The command line: parse, call one function below, render; `frame` has what all commands share, `lab` the bench's."""
+
+import shlex
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from microrad.cli.frame import (
+    CLOSES,
+    DOES_NOT_CLOSE,
+    Json,
+    OnProgress,
+    Outcome,
+    Overwrite,
+    Refusal,
+    app,
+    check_target,
+    command,
+    examples,
+    json_text,
+    main,
+    option,
+    progress_bar,
+    write_whole,
+)
+
+# Everything else is imported inside the commands: numpy, numba and pydantic take longer to load than help may take.
+if TYPE_CHECKING:
+    from microrad.study import Study
+
+__all__ = ["app", "main"]
+
+
+@app.command(epilog=examples("microrad init", "microrad init my-mission.toml"))
+@command
+def init(file: Annotated[Path, typer.Argument(help="File to write.")] = Path("leo-geo.toml")) -> Outcome:
+    """Write the paper's mission, ready to run.
+
+    Each value carries its unit and a comment that says where it comes from. No file is ever overwritten.
+    """
+    from importlib import resources
+
+    run_it = f"microrad run {shlex.quote(str(file))}"
+    check_target(file, f"name another one (microrad init other.toml) or go on with: {run_it}")
+    write_whole(file, resources.files("microrad").joinpath("missions", "leo-geo.toml").read_text("utf-8"))
+    return Outcome(f"{file} written. Next: {run_it}")
+
+
+_FOLDER = "Folder to write [default: <name of the mission file>-study in the current folder]."
+
+
+@app.command(
+    epilog=examples(
+        "microrad run leo-geo.toml",
+        "microrad run leo-geo.toml --output results/first --overwrite",
+        "microrad run leo-geo.toml --mirror lab-mirror.toml --output with-lab-mirror",
+        "microrad run leo-geo.toml --json > verdict.json",
+    )
+)
+@command
+def run(
+    file: Annotated[Path, typer.Argument(help="Mission file; microrad init writes one.", metavar="FILE")],
+    output: Annotated[Path | None, option("--output", "FOLDER", _FOLDER)] = None,
+    mirror: Annotated[Path | None, option("--mirror", "FILE", "Mirror file in place of the mission's mirror.")] = None,
+    overwrite: Overwrite = False,
+    as_json: Json = False,
+) -> Outcome:
+    """Run the whole study of a mission.
+
+    Writes report.html, results.nc, manifest.json and figures/ into a folder, and prints the verdict. The exit code is 0
+    when the link closes and 1 when it does not.
+    """
+    from microrad import report
+    from microrad.missionfile import load_mission
+
+    mission = load_mission(file, mirror)
+    folder = output or Path(f"{file.stem}-study")
+    report.check_folder(folder, overwrite)
+    with progress_bar() as progress:
+        study = _study(mission, progress)
+        outcome = _study_outcome(study, folder, as_json)
+        report.write(study, folder, overwrite=overwrite, on_progress=progress)
+    return outcome
+
+
+def _study(mission: Any, progress: OnProgress) -> "Study":
+    from microrad import study
+
+    try:
+        return study.run(mission, progress)
+    except ValueError as error:  # an unstable loop, or a mirror without inverse
+        raise Refusal(f"{mission.path}: {error}") from error
+
+
+def _study_outcome(study: "Study", folder: Path, as_json: bool) -> Outcome:
+    from microrad import report
+
+    code = CLOSES if study.closes else DOES_NOT_CLOSE
+    if as_json:
+        return Outcome(json_text({**report.summary(study), "folder": str(folder)}), code)
+    files = "\n".join(str(folder / name) for name in ("report.html", "results.nc", "manifest.json"))
+    return Outcome(f"{report.verdict_text(study)}\n\n{files}", code)
+
+
+# ------------------------------------------------------------------------------------------------------- installation
+@app.command(epilog=examples("microrad doctor", "microrad doctor --json"))
+@command
+def doctor(as_json: Json = False) -> Outcome:
+    """Check the installation.
+
+    Versions, the compiled kernels against a known number, their cache, the packaged mission. The exit code is 1 when
+    something is wrong.
+    """
+    from microrad import doctor as checks
+
+    found = checks.run()
+    ok = all(check.ok for check in found)
+    if as_json:
+        return Outcome(json_text({"ok": ok, "checks": [asdict(c) for c in found]}), int(not ok))
+    lines = [
+        f"{'ok' if c.ok else 'problem':8} {c.name:17} {'; '.join(filter(None, (c.found, c.advice)))}" for c in found
+    ]
+    return Outcome("\n".join(lines), int(not ok))
+
+
+@app.command(epilog=examples("microrad schema > mission.schema.json"))
+@command
+def schema() -> Outcome:
+    """Print the JSON schema of a mission file.
+
+    Editors check and complete a mission file by it as you type.
+    """
+    from microrad.mission import mission_schema
+
+    return Outcome(json_text(mission_schema()))
+
+
+from microrad.cli import lab  # noqa: E402, F401  its commands stand behind these in the help

@@ -1,0 +1,225 @@
+"""The frame of every command: the application, failures in words, exit codes, output, files written whole.
+
+Data goes to stdout, progress and refusals to stderr. Exit codes: 0 done, 1 a study that does not close or an
+installation with a problem, 2 bad usage or a bad file, 70 a fault of microrad, 130 interrupted, 141 nobody read the
+output.
+"""
+
+import contextlib
+import functools
+import json
+import math
+import os
+import signal
+import sys
+import traceback
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from io import TextIOWrapper
+from pathlib import Path
+from typing import Annotated, Any, NoReturn, ParamSpec
+
+import typer
+
+CLOSES, DOES_NOT_CLOSE, REFUSED, BUG, INTERRUPTED, UNREAD = 0, 1, 2, 70, 130, 141
+
+_Arguments = ParamSpec("_Arguments")
+OnProgress = Callable[[int, int, str], None]
+
+
+class Refusal(ValueError):  # noqa: N818  a refusal is no error of the program
+    """Something that cannot be done as asked; the message says why and what to do."""
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """What a command found: the text for stdout and the exit code. It is printed when the work is done."""
+
+    text: str
+    code: int = 0
+
+
+# ------------------------------------------------------------------------------------------------------------ the app
+def examples(*lines: str) -> str:
+    """The end of a command's help: lines to copy."""
+    return "\n".join(["\b", "Examples:", *(f"  {line}" for line in lines)])
+
+
+app = typer.Typer(
+    name="microrad",
+    help="Design, identify and simulate the pointing chain of a small-satellite laser terminal.",
+    epilog=examples(
+        "microrad init                    write the paper's mission, ready to run",
+        "microrad run leo-geo.toml        the whole study: a verdict and a report",
+        "microrad identify --help         a mirror model from your own recordings",
+    )
+    + "\n\nExit code: 0 done, 1 the study does not close, 2 bad usage or a bad file.",
+    context_settings={"help_option_names": ["-h", "--help"]},
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,  # plain help: quick, and lines that can be searched and copied
+)
+
+
+def main() -> None:
+    """Run the command line and exit; a request to terminate is taken as Ctrl-C is."""
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # small matrices: its threads would get in the way of ours
+    for number in (signal.SIGTERM, getattr(signal, "SIGHUP", signal.SIGTERM)):
+        if signal.getsignal(number) is not signal.SIG_IGN:
+            signal.signal(number, signal.default_int_handler)
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, TextIOWrapper):
+            stream.reconfigure(errors="replace")  # a terminal without µ is no reason to fail
+    app(prog_name="microrad")
+
+
+def command(body: Callable[_Arguments, Outcome]) -> Callable[_Arguments, NoReturn]:
+    """A command for typer: do the work, print what came out, and turn whatever went wrong into words and a code."""
+
+    @functools.wraps(body)
+    def wrapped(*args: _Arguments.args, **kwargs: _Arguments.kwargs) -> NoReturn:
+        try:
+            outcome = body(*args, **kwargs)
+        except (Exception, KeyboardInterrupt) as error:
+            raise typer.Exit(_failed(error)) from None
+        raise typer.Exit(_printed(outcome))
+
+    return wrapped
+
+
+def _printed(outcome: Outcome) -> int:
+    """Print the outcome and return its exit code, or the code for an output that nobody takes."""
+    try:
+        print(outcome.text, flush=True)
+    except BrokenPipeError:
+        _close_stdout()
+        return UNREAD
+    except OSError as error:
+        _close_stdout()
+        _say(f"the output cannot be written: {error.strerror}")
+        return REFUSED
+    except KeyboardInterrupt:
+        _close_stdout()
+        _say("interrupted while printing")
+        return INTERRUPTED
+    return outcome.code
+
+
+def _close_stdout() -> None:
+    """Let what is still buffered go nowhere, so that the interpreter's own flush at the end stays silent."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+# ------------------------------------------------------------------------------------------------------------ failures
+def _say(message: str) -> None:
+    print(f"microrad: {message}", file=sys.stderr)
+
+
+def _failed(error: BaseException) -> int:
+    """Say what went wrong, on stderr; returns the exit code."""
+    if _interrupted(error):
+        _say("interrupted, nothing was written")
+        return INTERRUPTED
+    if isinstance(error, OSError):
+        where = f"{error.filename}: {error.strerror}" if error.filename else str(error.strerror or error)
+        _say(f"{where}; nothing was written. Check free space and permissions.")
+        return REFUSED
+    if _meant_for_users(error):
+        _say(str(error) or "not enough memory")
+        return REFUSED
+    traceback.print_exception(error)
+    _say("a fault of microrad or of its installation: run microrad doctor; if all is well, report the lines above.")
+    return BUG
+
+
+def _interrupted(error: BaseException | None) -> bool:
+    """Whether an interrupt is behind an error: one that falls into an import comes out as another error."""
+    while error is not None and not isinstance(error, KeyboardInterrupt):
+        error = error.__cause__ or error.__context__
+    return error is not None
+
+
+def _meant_for_users(error: BaseException) -> bool:
+    """Whether the message is an answer: each ValueError that microrad defines is written for its user."""
+    ours = isinstance(error, ValueError) and type(error).__module__.startswith("microrad.")
+    return ours or isinstance(error, MemoryError)
+
+
+# ------------------------------------------------------------------------------------------------------------- output
+def json_text(data: Any) -> str:
+    """One JSON document; what is no finite number becomes null, which JSON can say."""
+    return json.dumps(_finite(data), indent=2, allow_nan=False)
+
+
+def _finite(data: Any) -> Any:
+    if isinstance(data, dict):
+        return {key: _finite(value) for key, value in data.items()}
+    if isinstance(data, list | tuple):
+        return [_finite(value) for value in data]
+    return None if isinstance(data, float) and not math.isfinite(data) else data
+
+
+@contextlib.contextmanager
+def progress_bar() -> Iterator[OnProgress]:
+    """A bar on stderr while something is computed, where stderr is a terminal."""
+    if not (sys.stderr and sys.stderr.isatty()):
+        yield lambda done, total, what: None
+        return
+    from rich.console import Console
+    from rich.progress import Progress
+
+    with Progress(console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task("reading", total=None)
+        yield lambda done, total, what: bar.update(task, completed=done, total=total, description=what)
+
+
+def check_target(path: Path, advice: str, replace_if_begins: str = "") -> None:
+    """Refuse a file that must not be written: one that exists, unless it begins with a text that may be replaced."""
+    if not path.parent.is_dir():
+        raise Refusal(f"{path}: there is no folder {path.parent}; create it first.")
+    if not os.path.lexists(path):
+        return
+    if not replace_if_begins:
+        raise Refusal(f"{path} exists and is left as it is; {advice}.")
+    with path.open("rb") as file:
+        if file.read(len(replace_if_begins)) != replace_if_begins.encode():
+            raise Refusal(f"{path} was not written by microrad and is left as it is; {advice}.")
+
+
+def write_whole(path: Path, text: str) -> None:
+    """Write a file whole or not at all: beside its place first."""
+    part = path.with_name(f".microrad-{os.getpid()}.part")
+    try:
+        with part.open("x", encoding="utf-8", newline="\n") as file:
+            file.write(text)
+            file.flush()
+            os.fsync(file.fileno())
+        part.replace(path)
+    finally:
+        part.unlink(missing_ok=True)
+
+
+# ----------------------------------------------------------------------------------------------------------- commands
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON document and nothing else.")]
+Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace what an earlier run wrote.")]
+
+
+def option(flag: str, metavar: str, text: str, **settings: Any) -> Any:
+    """An option with the name of its value and its help."""
+    return typer.Option(flag, metavar=metavar, help=text, **settings)
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        from microrad import __version__
+
+        print(f"microrad {__version__}")
+        raise typer.Exit
+
+
+_Version = Annotated[bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version.")]
+
+
+@app.callback()
+def _options(version: _Version = False) -> None:
+    pass

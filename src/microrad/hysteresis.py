@@ -1,0 +1,245 @@
+"""Hysteresis models as records: Bouc-Wen, Prandtl-Ishlinskii, and the creep that goes with either.
+
+Drive in volts, output in radians; the names hold for any pair of units (a hysteretic spring: metres and newtons).
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+
+@dataclass(frozen=True, slots=True)
+class BoucWen:
+    """Parameters of Eq. 3 of SPIE 11852, 118523B, in radians, volts and seconds, and what generalises it.
+
+    y = d1 exp(-d2 q') q + h,  h' = epsilon exp(delta |q'|) q' - |q'| |h| (alpha s + beta r + gamma + eta r s) w,
+    with s the sign of h, r that of q', and w = (|h| alpha / |epsilon|)^(exponent - 1), which is 1 for Eq. 3 and leaves
+    alpha and beta their unit (1/V). gamma tells the two signs of h apart and eta rising from falling drive (generalised
+    model of Song and Der Kiureghian, J. Eng. Mech. 132 (2006) 610); epsilon, alpha and beta alone with delta = 0 are
+    the classical model (Wen, J. Eng. Mech. Div. 102 (1976) 249).
+    Beyond ``rate_limit_v_s`` the exponentials are held and each such sample is counted; ``bias_v`` is the resting
+    drive.
+    """
+
+    d1_rad_v: float
+    d2_s_v: float
+    epsilon_rad_v: float
+    delta_s_v: float
+    alpha_1_v: float
+    beta_1_v: float
+    rate_limit_v_s: float = math.inf
+    bias_v: float = 0.0
+    gamma_1_v: float = 0.0
+    eta_1_v: float = 0.0
+    exponent: float = 1.0
+
+    @property
+    def row(self) -> tuple[float, ...]:
+        """The parameters in the order of the kernel's columns."""
+        per_size = self.alpha_1_v / abs(self.epsilon_rad_v) if self.exponent != 1.0 and self.epsilon_rad_v else 0.0
+        return (
+            self.d1_rad_v,
+            self.d2_s_v,
+            self.epsilon_rad_v,
+            self.delta_s_v,
+            self.alpha_1_v,
+            self.beta_1_v,
+            self.rate_limit_v_s,
+            self.bias_v,
+            self.gamma_1_v,
+            self.eta_1_v,
+            self.exponent - 1.0,
+            per_size,
+        )
+
+    def decay_1_v(self, rising: float, sign: float) -> float:
+        """Decay of |h| per volt of travel for a sign of the drive's rate and a sign of h, at exponent 1."""
+        return self.alpha_1_v + self.beta_1_v * rising * sign + self.gamma_1_v * sign + self.eta_1_v * rising
+
+    def settled_branch_rad(self, rising: float) -> float:
+        """Where h settles on a slow, long ramp of one direction (1 up, -1 down)."""
+        sign = rising * math.copysign(1.0, self.epsilon_rad_v)
+        decay = self.decay_1_v(rising, sign)
+        if self.epsilon_rad_v == 0.0:
+            return 0.0
+        if self.exponent == 1.0:
+            return sign * abs(self.epsilon_rad_v) / decay
+        share = math.pow(self.alpha_1_v / decay, 1.0 / self.exponent)
+        return sign * abs(self.epsilon_rad_v) / self.alpha_1_v * share
+
+    @property
+    def settled_rad(self) -> float:
+        """Magnitude at which |h| settles on a slow, long ramp: |epsilon| / (alpha + beta sign(epsilon)) in Eq. 3.
+
+        The larger one of the two directions where they differ.
+        """
+        return max(abs(self.settled_branch_rad(rising)) for rising in (1.0, -1.0))
+
+    def reversal_slope_rad_v(self, rate_v_s: float = 0.0) -> float:
+        """Local slope dy/du just after a reversal from a settled branch at ``rate_v_s``; not physical below 0.
+
+        A settled branch has epsilon e = k h; behind the reversal the drive term keeps its slope and the decay changes
+        side: for Eq. 3 dh/du = 2 alpha epsilon e / (alpha + beta sign(epsilon)), with e = exp(delta |rate|). The lower
+        one of the two directions where they differ.
+        """
+        growth = math.exp(self.delta_s_v * min(abs(rate_v_s), self.rate_limit_v_s))
+        return self.d1_rad_v + self.epsilon_rad_v * growth * self._swing(min if self.epsilon_rad_v > 0.0 else max)
+
+    @property
+    def reversal_swing(self) -> float:
+        """Slope dh/du just after a reversal from a settled branch over epsilon, the larger of the two directions."""
+        return self._swing(max)
+
+    def _swing(self, choose: Callable[..., float]) -> float:
+        sign = math.copysign(1.0, self.epsilon_rad_v)
+        return choose(
+            1.0 + self.decay_1_v(-rising, rising * sign) / self.decay_1_v(rising, rising * sign)
+            for rising in (1.0, -1.0)
+        )
+
+    @property
+    def admissible_rate_v_s(self) -> float:
+        """Fastest rate at which the slope after a reversal is not negative; 0 if there is none, inf if it never is."""
+        swing = self.d1_rad_v - self.reversal_slope_rad_v()
+        if swing <= 0.0:
+            return math.inf
+        if swing > self.d1_rad_v:
+            return 0.0
+        return math.inf if self.delta_s_v <= 0.0 else math.log(self.d1_rad_v / swing) / self.delta_s_v
+
+    @property
+    def wrong_way_rad(self) -> float:
+        """How far the slow model moves the wrong way after a reversal (0 when admissible); the worse direction's.
+
+        With s the travel behind the reversal, h starts at its settled size against it: dh/ds = -e - k |h| w down to 0,
+        with e = |epsilon|, then -e + k' |h| w; k and k' are the decays on the two sides of zero (alpha + beta and
+        alpha - beta in Eq. 3). The output turns where dh/ds = -d1, and went d1 ds less far than h.
+        """
+        if self.reversal_slope_rad_v() >= 0.0:
+            return 0.0
+        return max(self._wrong_way(rising) for rising in (1.0, -1.0))
+
+    def _wrong_way(self, rising: float) -> float:
+        """The distance behind a branch that ran in the direction ``rising``; epsilon < 0, so h lies against it."""
+        e, d1, h0, n = -self.epsilon_rad_v, self.d1_rad_v, abs(self.settled_branch_rad(rising)), self.exponent
+        size = e / self.alpha_1_v
+        k, beyond = (self.decay_1_v(-rising, -rising), self.decay_1_v(-rising, rising))
+        if e + k * size * (h0 / size) ** n <= d1:
+            return 0.0
+        turned = 0.0 if e >= d1 else size * ((d1 - e) / (k * size)) ** (1.0 / n)
+        before = _moved(lambda h: e + k * size * (h / size) ** n, d1, turned, h0)
+        if e <= d1:
+            return before
+        return before + _moved(
+            lambda h: e - beyond * size * (h / size) ** n, d1, 0.0, size * ((e - d1) / (beyond * size)) ** (1.0 / n)
+        )
+
+
+def _moved(slope: Callable[[float], float], d1: float, low: float, high: float) -> float:
+    """Integral of 1 - d1 / slope over h: how far the output goes while h goes from one size to another."""
+    nodes, weights = np.polynomial.legendre.leggauss(60)
+    half = (high - low) / 2.0
+    return half * sum(
+        float(w) * (1.0 - d1 / slope(low + half * (1.0 + float(x)))) for x, w in zip(nodes, weights, strict=True)
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Play:
+    """A Prandtl-Ishlinskii operator: z = sum of weight x play(threshold), p <- max(q - r, min(q + r, p)).
+
+    With ``widening_s`` each threshold above 0 grows with the drive's rate, r + widening |q'|, up to ``rate_limit_v_s``
+    (rate-dependent operator of Al Janaideh and Krejci, IEEE/ASME Trans. Mechatronics 18 (2013) 1498).
+    """
+
+    thresholds_v: tuple[float, ...]
+    weights_rad_v: tuple[float, ...]
+    widening_s: float = 0.0
+    rate_limit_v_s: float = math.inf
+
+
+@dataclass(frozen=True, slots=True)
+class Creep:
+    """Linear creep beside a hysteresis model: weight x drive behind a first-order lag, summed over the lags.
+
+    Equal weights at time constants in geometric steps creep with the logarithm of time (Kuhnen, European Journal of
+    Control 9 (2003) 407).
+    """
+
+    weights_rad_v: tuple[float, ...] = ()
+    time_constants_s: tuple[float, ...] = ()
+
+
+NO_CREEP = Creep()
+
+LINE_OF_SIGHT = {"line-of-sight": 1.0, "mechanical": 2.0}
+"""Angle of the line of sight by the convention of a mirror's output: reflection doubles a tilt, per axis."""
+
+
+def scaled(model: BoucWen | Play, times: float) -> BoucWen | Play:
+    """The model with its output times a factor."""
+    if isinstance(model, Play):
+        return replace(model, weights_rad_v=tuple(times * w for w in model.weights_rad_v))
+    return replace(model, d1_rad_v=times * model.d1_rad_v, epsilon_rad_v=times * model.epsilon_rad_v)
+
+
+def slow_gain(model: BoucWen | Play) -> float:
+    """Gain for slow, large drives (rad/V): d1, or the sum of the weights."""
+    return model.d1_rad_v if isinstance(model, BoucWen) else math.fsum(model.weights_rad_v)
+
+
+def output_amplitude(model: BoucWen | Play, drive_v: float) -> float:
+    """Amplitude of the settled output (rad) under a slow drive of amplitude ``drive_v``, Bouc-Wen's h left out."""
+    if isinstance(model, BoucWen):
+        return model.d1_rad_v * drive_v
+    pairs = zip(model.thresholds_v, model.weights_rad_v, strict=True)
+    return math.fsum(w * max(0.0, drive_v - r) for r, w in pairs)
+
+
+def secant_gain(model: BoucWen | Play, output_rad: float) -> float:
+    """Output amplitude over the drive amplitude that gives it (rad/V), for slow sines of amplitude ``output_rad``.
+
+    A Prandtl-Ishlinskii model is softer for small drives; without amplitude (inf) this is its slow gain.
+    """
+    if isinstance(model, BoucWen) or math.isinf(output_rad):
+        return slow_gain(model)
+    knots = [output_amplitude(model, r) for r in model.thresholds_v]
+    slopes = np.cumsum(model.weights_rad_v)
+    last = max(i for i, y in enumerate(knots) if y <= output_rad)
+    if slopes[last] <= 0.0:
+        return slow_gain(model)
+    return output_rad / (model.thresholds_v[last] + (output_rad - knots[last]) / float(slopes[last]))
+
+
+def gain_only(model: BoucWen | Play, output_rad: float = math.inf) -> BoucWen:
+    """The model without hysteresis: its secant gain at an output amplitude, or its slow gain, and nothing else."""
+    return BoucWen(secant_gain(model, output_rad), 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+def steepest_slope(model: BoucWen | Play) -> float:
+    """Bound on |dz/dq| of a model, anywhere in its loops.
+
+    A Bouc-Wen element whose |h| grows along a branch (a decay below 0: a hardening spring) has no bound; it is taken
+    within the travel over which that branch steepens by a factor e. Raises ValueError where there is none: for a
+    Bouc-Wen model that depends on the rate without a limit, and for plays that depend on it.
+    """
+    if isinstance(model, Play):
+        if model.widening_s:
+            raise ValueError(
+                "a play operator that is fed back cannot depend on the rate: within a step it has no slope"
+            )
+        return math.fsum(abs(w) for w in model.weights_rad_v)
+    depends = bool(model.delta_s_v or model.d2_s_v)
+    if math.isinf(model.rate_limit_v_s) and depends:
+        raise ValueError("a Bouc-Wen element that is fed back and depends on rate needs a finite rate limit")
+    rate = model.rate_limit_v_s if depends else 0.0
+    decays = [model.decay_1_v(rising, sign) for rising in (1.0, -1.0) for sign in (1.0, -1.0)]
+    slope = abs(model.epsilon_rad_v) * math.exp(max(model.delta_s_v, 0.0) * rate)
+    if min(decays) > 0.0:
+        slope *= 1.0 + max(decays) / min(decays)
+    elif any(decays):
+        steepened = (math.e - 1.0) * max(decays) / max(-min(decays), 1e-300)
+        slope *= max(math.e, 1.0 + steepened) if min(decays) < 0.0 else 1.0 + max(decays)
+    return abs(model.d1_rad_v) * math.exp(abs(model.d2_s_v) * rate) + slope

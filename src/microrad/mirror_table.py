@@ -1,0 +1,251 @@
+"""The [mirror] table of a mission, which a mirror file holds by itself: linear part, hysteresis, creep, ranges."""
+
+import math
+from collections.abc import Iterator
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from microrad.fields import Problem, Quantity, Several, Table
+from microrad.units import format_quantity
+
+ANGLE_MOST = math.pi / 2  # beyond a quarter turn no pointing error, beam or mirror angle has a meaning here
+Name = Annotated[str, Field(min_length=1, max_length=200)]
+Angle = Annotated[float, Quantity("rad", above=0.0, most=ANGLE_MOST)]
+Frequency = Annotated[float, Quantity("Hz", above=0.0, most=1e12)]
+DurationOrZero = Annotated[float, Quantity("s", "us", least=0.0)]
+Voltage = Annotated[float, Quantity("V")]
+Rate = Annotated[float, Quantity("V/s", "V/us", above=0.0)]
+MirrorGain = Annotated[float, Quantity("rad/V", "mrad/V", above=0.0)]
+Coefficients = Annotated[tuple[float, ...], Several(Quantity(""))]
+Roots = Annotated[tuple[float, ...], Several(Quantity("Hz", above=0.0, most=1e12))]
+Dampings = Annotated[tuple[float, ...], Several(Quantity("", least=-1.0, most=1.0))]
+
+
+class LinearPart(Table):
+    """Transfer function and the band it was identified in: in powers of s (rad/s), highest first, or by its roots.
+
+    Roots are natural frequencies with a damping ratio each: below 1 a conjugate pair, at 1 (or -1) one real root; a
+    positive damping lies in the left half plane. A pole may not have a negative one.
+    """
+
+    numerator: Coefficients | None = None
+    denominator: Coefficients | None = None
+    poles_hz: Roots | None = Field(alias="poles", default=None, description="natural frequencies, rising")
+    pole_dampings: Dampings | None = Field(default=None, description="1 for a real pole")
+    zeros_hz: Roots | None = Field(alias="zeros", default=None, description="natural frequencies, rising; or none")
+    zero_dampings: Dampings | None = Field(default=None, description="1 for a real zero, -1 in the right half plane")
+    normalise_at_hz: Frequency = Field(alias="normalise_at", description="where its magnitude is divided out")
+    excited_from_hz: Frequency = Field(alias="excited_from")
+    excited_to_hz: Frequency = Field(alias="excited_to")
+
+    def problems(self) -> Iterator[Problem]:
+        """A proper fraction, normalised inside its band."""
+        if self.poles_hz is None:
+            yield from self._coefficient_problems()
+        else:
+            yield from self._root_problems()
+        if not self.excited_from_hz < self.excited_to_hz:
+            yield Problem("excited_to", "is not above excited_from", "a band that goes up")
+        elif not self.excited_from_hz <= self.normalise_at_hz <= self.excited_to_hz:
+            low, high = format_quantity(self.excited_from_hz, "Hz"), format_quantity(self.excited_to_hz, "Hz")
+            yield Problem(
+                "normalise_at", f"is outside excited_from to excited_to ({low} to {high})", f"{low} to {high}"
+            )
+
+    def _coefficient_problems(self) -> Iterator[Problem]:
+        for key in ("zeros", "pole_dampings", "zero_dampings"):
+            if getattr(self, "zeros_hz" if key == "zeros" else key) is not None:
+                yield Problem(key, "stands without poles", 'the key poles, or this one removed: poles = ["5 kHz"]')
+        if self.numerator is None or self.denominator is None:
+            found = "neither poles nor numerator and denominator" if self.denominator is None else "no numerator"
+            yield Problem("", f"has {found}", "poles and pole_dampings, or numerator and denominator")
+            return
+        zeros = [place for place, value in enumerate(self.numerator) if value != 0.0]
+        if self.denominator[-1] == 0.0:
+            advice = "a last coefficient other than 0; model drift apart from the mirror"
+            yield Problem("denominator", "ends with 0, which makes the linear part an integrator", advice)
+        if self.denominator[0] == 0.0:
+            yield Problem("denominator", "begins with 0", "the highest power of s first, with a factor other than 0")
+        if not zeros:
+            yield Problem("numerator", "is zero throughout", "at least one coefficient other than 0")
+        elif len(self.numerator) - zeros[0] >= len(self.denominator):
+            yield Problem("numerator", "has no lower order than denominator", "fewer coefficients than denominator has")
+
+    def _root_problems(self) -> Iterator[Problem]:
+        for key in ("numerator", "denominator"):
+            if getattr(self, key) is not None:
+                yield Problem(key, "stands beside poles", "the transfer function in one form only")
+        poles, zeros = self.poles_hz or (), self.zeros_hz or ()
+        for key, roots, dampings in (
+            ("pole_dampings", poles, self.pole_dampings or ()),
+            ("zero_dampings", zeros, self.zero_dampings or ()),
+        ):
+            if len(dampings) != len(roots):
+                counts = f"has {len(dampings)} items where {key[:4]}s has {len(roots)}"
+                yield Problem(key, counts, f"one damping for each of {key[:4]}s")
+        if any(d <= 0.0 for d in self.pole_dampings or ()):
+            yield Problem("pole_dampings", "has an unstable pole", "dampings above 0")
+        orders = [
+            sum(2 if abs(d) < 1.0 else 1 for d in each or ()) for each in (self.pole_dampings, self.zero_dampings)
+        ]
+        if orders[1] >= orders[0]:
+            counts = f"makes {orders[1]} zeros over {orders[0]} poles"
+            yield Problem("zeros", counts, "fewer zeros than poles, pairs counted twice")
+
+    @property
+    def roots(self) -> tuple[tuple[complex, ...], tuple[complex, ...]]:
+        """Zeros and poles in rad/s, conjugates included."""
+        if self.poles_hz is None:
+            import numpy as np  # here, to keep the schema quick to load
+
+            found = (np.roots(each or ()) for each in (self.numerator, self.denominator))
+            zeros, poles = (tuple(complex(r) for r in roots) for roots in found)
+            return zeros, poles
+        return (
+            roots_from_damping(self.zeros_hz or (), self.zero_dampings or ()),
+            roots_from_damping(self.poles_hz, self.pole_dampings or ()),
+        )
+
+
+def roots_from_damping(frequencies_hz: tuple[float, ...], dampings: tuple[float, ...]) -> tuple[complex, ...]:
+    """Roots (rad/s) from natural frequencies and damping ratios: a pair below 1, one real root at 1 or -1.
+
+    A positive damping is a root in the left half plane.
+    """
+    roots: list[complex] = []
+    for frequency, damping in zip(frequencies_hz, dampings, strict=True):
+        natural = 2.0 * math.pi * frequency
+        if abs(damping) >= 1.0:
+            roots.append(complex(-math.copysign(natural, damping)))
+        else:
+            root = natural * complex(-damping, math.sqrt(1.0 - damping**2))
+            roots += [root, root.conjugate()]
+    return tuple(roots)
+
+
+class BoucWenTable(Table):
+    """Parameters of the rate-dependent Bouc-Wen model, with angle in rad and drive in V (paper, Eq. 3).
+
+    gamma, eta and exponent generalise Eq. 3, which is what stands when they are left out (see `hysteresis.BoucWen`).
+    """
+
+    d1_rad_v: MirrorGain = Field(alias="d1")
+    d2_s_v: Annotated[float, Quantity("s/V")] = Field(alias="d2")
+    epsilon_rad_v: Annotated[float, Quantity("rad/V", "mrad/V")] = Field(alias="epsilon")
+    delta_s_v: Annotated[float, Quantity("s/V")] = Field(alias="delta")
+    alpha_1_v: Annotated[float, Quantity("1/V")] = Field(alias="alpha")
+    beta_1_v: Annotated[float, Quantity("1/V")] = Field(alias="beta")
+    gamma_1_v: Annotated[float, Quantity("1/V")] = Field(
+        alias="gamma", default=0.0, description="tells the signs of h apart; left out, they are alike"
+    )
+    eta_1_v: Annotated[float, Quantity("1/V")] = Field(
+        alias="eta", default=0.0, description="tells rising from falling drive; left out, they are alike"
+    )
+    exponent: Annotated[float, Quantity("", least=1.0, most=100.0)] = Field(
+        default=1.0, description="of h in the decay; left out, 1 as in Eq. 3"
+    )
+
+    def problems(self) -> Iterator[Problem]:
+        """Hysteresis that stays bounded."""
+        least = max(
+            abs(self.beta_1_v + self.eta_1_v * s) - s * self.gamma_1_v for s in (1.0, -1.0)
+        )  # of alpha, with the decay of each sign of h above 0 in both directions
+        if not self.alpha_1_v > least:
+            size = format_quantity(least, "1/V")
+            names = "beta" if self.gamma_1_v == self.eta_1_v == 0.0 else "what beta, gamma and eta take off it"
+            yield Problem(
+                "alpha", f"is not above the size of {names} ({size}), so h would grow without bound", f"above {size}"
+            )
+
+
+class PrandtlIshlinskiiTable(Table):
+    """Play operators: half widths in V, rising from 0 V, and a weight in rad/V for each."""
+
+    thresholds_v: Annotated[tuple[float, ...], Several(Quantity("V", least=0.0), rising=True)] = Field(
+        alias="thresholds"
+    )
+    weights_rad_v: Annotated[tuple[float, ...], Several(Quantity("rad/V", "urad/V", least=0.0))] = Field(
+        alias="weights"
+    )
+    widening_s: DurationOrZero = Field(
+        alias="widening", default=0.0, description="growth of the thresholds above 0 with the drive's rate; or none"
+    )
+
+    def problems(self) -> Iterator[Problem]:
+        """A weight for each threshold, one of them doing something."""
+        if self.thresholds_v[0] != 0.0:
+            yield Problem("thresholds", "does not begin at 0 V", 'a first threshold of "0 V"')
+        if len(self.weights_rad_v) != len(self.thresholds_v):
+            counts = f"has {len(self.weights_rad_v)} items where thresholds has {len(self.thresholds_v)}"
+            yield Problem("weights", counts, "one weight for each threshold")
+        if not any(self.weights_rad_v):
+            yield Problem("weights", "is zero throughout", "at least one weight above 0")
+
+
+class CreepTable(Table):
+    """Creep beside the hysteresis: drive behind first-order lags, with a weight in rad/V for each time constant."""
+
+    time_constants_s: Annotated[tuple[float, ...], Several(Quantity("s", above=0.0), rising=True)] = Field(
+        alias="time_constants"
+    )
+    weights_rad_v: Annotated[tuple[float, ...], Several(Quantity("rad/V", "urad/V"))] = Field(alias="weights")
+
+    def problems(self) -> Iterator[Problem]:
+        """A weight for each lag."""
+        if len(self.weights_rad_v) != len(self.time_constants_s):
+            counts = f"has {len(self.weights_rad_v)} items where time_constants has {len(self.time_constants_s)}"
+            yield Problem("weights", counts, "one weight for each time constant")
+
+
+def _one_model(table: "Mirror | Comparison") -> Iterator[Problem]:
+    given = (table.bouc_wen is not None) + (table.prandtl_ishlinskii is not None)
+    if given != 1:
+        found = "two hysteresis models" if given else "no hysteresis model"
+        yield Problem("", f"has {found}", "exactly one of the tables bouc_wen and prandtl_ishlinskii")
+
+
+class Comparison(Table):
+    """A second hysteresis model of the same mirror, run beside the first."""
+
+    bouc_wen: BoucWenTable | None = None
+    prandtl_ishlinskii: PrandtlIshlinskiiTable | None = None
+
+    def problems(self) -> Iterator[Problem]:
+        """Exactly one model."""
+        return _one_model(self)
+
+
+class Mirror(Table):
+    """The fast steering mirror: one hysteresis model, and the linear part that its composition asks for."""
+
+    name: Name
+    travel_rad: Angle = Field(alias="travel", description="from stop to stop")
+    composition: Literal["cascade", "additive", "static"] = Field(
+        description="cascade: hysteresis drives the linear part; additive: it is added behind; static: no linear part"
+    )
+    rate_limit_v_s: Rate = Field(alias="rate_limit", description="fastest drive that the hysteresis was identified for")
+    bias_v: Voltage = Field(alias="bias", description="drive about which the mirror works")
+    drive_min_v: Voltage = Field(alias="drive_min", description="lowest drive that the hysteresis was identified for")
+    drive_max_v: Voltage = Field(alias="drive_max", description="highest drive that the hysteresis was identified for")
+    linear: LinearPart | None = None
+    bouc_wen: BoucWenTable | None = None
+    prandtl_ishlinskii: PrandtlIshlinskiiTable | None = None
+    creep: CreepTable | None = None
+    comparison: Comparison | None = None
+
+    def problems(self) -> Iterator[Problem]:
+        """Exactly one model, a linear part exactly where the composition has one, and a bias inside the drive range."""
+        yield from _one_model(self)
+        if not self.drive_min_v < self.drive_max_v:
+            low = format_quantity(self.drive_min_v, "V")
+            yield Problem("drive_max", f"is not above drive_min ({low})", f"a voltage above {low}")
+        elif not self.drive_min_v <= self.bias_v <= self.drive_max_v:
+            span = f"{format_quantity(self.drive_min_v, 'V')} to {format_quantity(self.drive_max_v, 'V')}"
+            yield Problem("bias", f"is outside drive_min to drive_max ({span})", span)
+        if self.composition == "static" and self.linear is not None:
+            advice = 'the table linear removed, or composition = "cascade"'
+            yield Problem("linear", 'does not belong to composition = "static"', advice)
+        if self.composition != "static" and self.linear is None:
+            advice = 'a table linear, or composition = "static"'
+            yield Problem("composition", f'is "{self.composition}" but the table linear is missing', advice)

@@ -1,0 +1,96 @@
+"""NumPy arrays (.npy) and archives of them (.npz); pickled objects are never loaded."""
+
+from __future__ import annotations
+
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import IO, Any
+
+import numpy as np
+
+from microrad.recording.arrays import ArraySource, Variable, channels_of, stated_rate
+from microrad.recording.files import sha256_of
+from microrad.recording.records import RecordingError
+from microrad.recording.sources import StatedRate, damaged
+
+_NO_OBJECTS = "holds Python objects, which would have to be unpickled and could run code; save plain numbers"
+
+
+class NumpySource(ArraySource):
+    """An .npy file, whose array is called `data`, or an .npz archive."""
+
+    def __init__(self, path: Path, archive: bool) -> None:
+        """Read the headers of the arrays, and the scalars that state a rate."""
+        unusable: dict[str, str] = {}
+        try:
+            self.variables = _of_archive(path, unusable) if archive else [_of_file(path)]
+        except RecordingError:
+            raise
+        except Exception as error:  # zipfile and numpy raise many kinds for a damaged file
+            raise damaged(path, "a NumPy file", error) from None
+        self.variables = [v for v in self.variables if not _refused(v, unusable)]
+        kind = "NumPy"
+        channels = channels_of(self.variables, unusable)
+        super().__init__(path, kind, channels, sha256_of(path), unusable, {"": _rates(self.variables)})
+
+    def rates(self, indices: Any) -> list[StatedRate]:
+        """The rate stated by a scalar of the archive."""
+        return list(self.stated[""])
+
+
+def _refused(variable: Variable, unusable: dict[str, str]) -> bool:
+    if variable.dtype.hasobject:
+        unusable[variable.name] = _NO_OBJECTS
+    return variable.dtype.hasobject
+
+
+def _rates(variables: list[Variable]) -> tuple[StatedRate, ...]:
+    scalars = [v for v in variables if all(n == 1 for n in v.shape)]
+    found = (stated_rate(v.name, v.load((0,) * len(v.shape))) for v in scalars if v.dtype.kind in "iuf")
+    return tuple(rate for rate in found if rate is not None)
+
+
+def _header(file: IO[bytes]) -> tuple[tuple[int, ...], np.dtype[Any]]:
+    version = np.lib.format.read_magic(file)
+    read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
+    shape, _, dtype = read(file)
+    return shape, dtype
+
+
+def _of_file(path: Path) -> Variable:
+    with path.open("rb") as file:
+        shape, dtype = _header(file)
+        needed = int(np.prod(shape, dtype=object)) * dtype.itemsize
+        present = path.stat().st_size - file.tell()
+    if needed > present and not dtype.hasobject:
+        raise RecordingError(
+            f"{path}: the array of shape {shape} needs {needed} bytes and {present} are there; the file is truncated: "
+            "copy it again from its source."
+        )
+    return Variable("data", shape, dtype, lambda key: np.load(path, mmap_mode="r", allow_pickle=False)[key])
+
+
+def _of_archive(path: Path, unusable: dict[str, str]) -> list[Variable]:
+    variables = []
+    with zipfile.ZipFile(path) as archive:
+        for member in archive.infolist():
+            name = member.filename.removesuffix(".npy")
+            if name == member.filename:
+                unusable[name] = "is no NumPy array"
+                continue
+            with archive.open(member) as file:
+                shape, dtype = _header(file)
+            if int(np.prod(shape, dtype=object)) * dtype.itemsize > member.file_size:
+                unusable[name] = f"is truncated: an array of shape {shape} does not fit into {member.file_size} bytes"
+                continue
+            variables.append(Variable(name, shape, dtype, _loader(path, name)))
+    return variables
+
+
+def _loader(path: Path, name: str) -> Callable[[tuple[int | slice, ...]], Any]:
+    def load(key: tuple[int | slice, ...]) -> Any:
+        with np.load(path, allow_pickle=False) as archive:
+            return archive[name][key]
+
+    return load

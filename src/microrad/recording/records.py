@@ -1,0 +1,92 @@
+"""What a recording is, what a check found in it, and the error that refuses it."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+MIN_SAMPLES = 200
+
+ACCEPTABLE = ("jitter", "clipping", "dead", "quantisation", "drift", "unexcited", "lead")
+
+
+@dataclass(frozen=True)
+class Finding:
+    """The evidence of one check on one channel.
+
+    `kind` is the check (`drift`, `clipping`, ...), `channel` the name of the channel, `row` the first sample concerned
+    counted from 0 (None where the whole record is meant), `message` the numbers and the remedy. `refused` is true
+    where the finding is grounds for refusal; a recording that carries such a finding was taken on by `accept`.
+    """
+
+    kind: str
+    channel: str
+    row: int | None
+    message: str
+    refused: bool
+
+
+class RecordingError(ValueError):
+    """A recording that cannot be used: the message names the file, the place, the fault and the remedy.
+
+    `findings` holds the evidence where the checks of the values refused it.
+    """
+
+    def __init__(self, message: str, findings: Sequence[Finding] = ()) -> None:
+        """Keep the message and the findings behind it."""
+        super().__init__(message)
+        self.findings = tuple(findings)
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """Drives and outputs sampled together at a constant rate; the arrays are read-only.
+
+    `drive` has the shape (samples, inputs) and `output` (samples, outputs), in the units of their source. `sha256` is
+    the digest of the file's bytes, or of the arrays where there was no file. `period_samples` is the length of one
+    period where the excitation is periodic. `input_units` and `output_units` are the texts that the file states, ''
+    where it states none, and empty tuples where nothing is known. `findings` is what the checks noticed and let pass.
+    """
+
+    path: str
+    sha256: str
+    drive: FloatArray
+    output: FloatArray
+    rate_hz: float
+    input_names: tuple[str, ...]
+    output_names: tuple[str, ...]
+    period_samples: int | None = None
+    input_units: tuple[str, ...] = ()
+    output_units: tuple[str, ...] = ()
+    findings: tuple[Finding, ...] = ()
+
+    @property
+    def step_s(self) -> float:
+        """Time between two samples."""
+        return 1.0 / self.rate_hz
+
+    @property
+    def samples(self) -> int:
+        """Number of samples."""
+        return int(self.drive.shape[0])
+
+
+def frozen(values: FloatArray) -> FloatArray:
+    """The same values, contiguous and read-only."""
+    values = np.ascontiguousarray(values)
+    values.flags.writeable = False
+    return values
+
+
+def digest_of(*arrays: FloatArray) -> str:
+    """SHA-256 of the bytes of arrays, one behind the other, without copying contiguous ones."""
+    digest = hashlib.sha256()
+    for array in arrays:
+        digest.update(np.ascontiguousarray(array).data)
+    return digest.hexdigest()

@@ -1,0 +1,260 @@
+"""Excitation design: spectra, orthogonality and whole periods as asked for, and refusals that say what would fit."""
+
+import math
+
+import numpy as np
+import pytest
+
+from microrad.bench import (
+    DesignError,
+    Limits,
+    Lines,
+    growing_sines,
+    log_spaced,
+    logarithmic_chirp,
+    multisine,
+    staircase,
+)
+
+LIMITS = Limits(rate_hz=10e3, drive_min_v=0.0, drive_max_v=12.0, slew_v_s=20e3, samples_per_period=10.0)
+SMALL = {"rms_v": 0.5, "offset_v": 6.0, "periods": 2, "realisations": 1, "seed": 3}
+
+
+def two_inputs(**changes):
+    values = {"rate_hz": 10e3, "drive_min_v": 0.0, "drive_max_v": 12.0, "slew_v_s": 20e3, "samples_per_period": 10.0}
+    return Limits(**{**values, "inputs": 2, **changes})
+
+
+def spectrum(excitation, column=0, start=0):
+    """Amplitude and phase of each harmonic of one period, complex."""
+    period = excitation.drive[start : start + excitation.period_samples, column]
+    return np.fft.rfft(period)[1:] * 2 / period.size
+
+
+def slew(excitation):
+    return np.abs(np.diff(excitation.drive, axis=0, prepend=excitation.rest_v)).max() * excitation.rate_hz
+
+
+# ---- chirp
+def test_a_logarithmic_chirp_has_its_limits_amplitude_and_offset():
+    chirp = logarithmic_chirp(
+        LIMITS, start_hz=1.0, stop_hz=1000.0, duration_s=4.0, amplitude_v=0.5, offset_v=6.0, name="small"
+    )
+    assert (chirp.name, chirp.rate_hz, chirp.rest_v, chirp.period_samples) == ("small", 10e3, 6.0, None)
+    assert chirp.drive.shape == (40_000, 1)
+    moved = chirp.drive[:, 0] - 6.0
+    assert moved[0] == 0.0
+    assert 0.499 < moved.max() <= 0.5 + 1e-12
+    assert -0.5 - 1e-12 <= moved.min() < -0.499
+    crossings = np.flatnonzero(np.diff(np.signbit(moved))) / 10e3
+    # in time equal shares of the record pass equal ratios of frequency: 10, 100 Hz after a third and two thirds
+    for share, freq_hz in ((1 / 3, 10.0), (2 / 3, 100.0)):
+        near = crossings[np.abs(crossings - share * 4.0) < 0.1]
+        assert 0.5 / np.diff(near).mean() == pytest.approx(freq_hz, rel=0.1)
+    assert 0.5 / np.diff(crossings[-20:]).mean() == pytest.approx(1000.0, rel=0.02)
+
+
+def test_a_drive_is_read_only():
+    with pytest.raises(ValueError, match="read-only"):
+        staircase(LIMITS, levels_v=[0, 1], dwell_s=0.1, rise_s=0.01).drive[0, 0] = 1.0
+
+
+# ---- multisine
+@pytest.mark.parametrize("choice", ["all", "odd", "odd-random"])
+def test_a_multisine_has_the_lines_asked_for_and_no_others(choice):
+    (sines,) = multisine(LIMITS, Lines(0.2, 10.0, 1000.0, choice), **SMALL)
+    size = np.abs(spectrum(sines))
+    excited = np.flatnonzero(size > 1e-9) + 1
+    assert tuple(excited) == sines.lines
+    expected = np.arange(2, 201)
+    if choice == "all":
+        assert np.array_equal(excited, expected)
+    odd = expected[expected % 2 == 1]
+    if choice == "odd":
+        assert np.array_equal(excited, odd)
+    if choice == "odd-random":
+        assert excited.size == odd.size - odd.size // 4
+        assert set(excited) < set(odd)
+        groups = np.reshape(np.isin(odd[: odd.size // 4 * 4], excited), (-1, 4))
+        assert np.all(groups.sum(axis=1) == 3)
+        assert np.all(groups.sum(axis=0) < groups.shape[0])  # each place of the four is left out somewhere
+    assert np.allclose(size[excited - 1], 0.5 * math.sqrt(2 / excited.size), rtol=1e-9)
+    assert np.std(sines.drive[:, 0]) == pytest.approx(0.5, rel=1e-9)
+    assert np.mean(sines.drive) == pytest.approx(6.0, abs=1e-9)
+
+
+def test_a_multisine_repeats_itself_and_begins_near_its_rest():
+    (sines,) = multisine(LIMITS, Lines(0.2, 10.0, 400.0), **{**SMALL, "periods": 3})
+    assert sines.period_samples == 2000
+    assert sines.samples == 6000
+    assert np.array_equal(sines.drive[:2000], sines.drive[4000:])
+    assert abs(sines.drive[0, 0] - 6.0) < 0.02 * sines.crest_factor[0]
+    (crest,) = sines.crest_factor
+    assert crest == pytest.approx(np.abs(sines.drive - 6).max() / 0.5, rel=1e-9)
+    assert 2.0 < crest < 5.0
+
+
+def test_phases_are_random_over_the_circle_and_told_by_the_seed():
+    (one,) = multisine(LIMITS, Lines(1.0, 1.0, 1000.0), **SMALL)
+    (same,) = multisine(LIMITS, Lines(1.0, 1.0, 1000.0), **SMALL)
+    (other,) = multisine(LIMITS, Lines(1.0, 1.0, 1000.0), **{**SMALL, "seed": 4})
+    assert np.array_equal(one.drive, same.drive)
+    assert not np.allclose(one.drive, other.drive)
+    turns = np.exp(1j * np.angle(spectrum(one)[:1000]))
+    assert abs(turns.mean()) < 4 / math.sqrt(1000)
+    assert abs((turns[1:] / turns[:-1]).mean()) < 1.0 - 1e-3
+
+
+@pytest.mark.parametrize("inputs", [2, 3])
+def test_realisations_are_orthogonal_at_every_line(inputs):
+    limits = two_inputs(inputs=inputs)
+    sets = multisine(limits, Lines(0.2, 10.0, 400.0), **{**SMALL, "realisations": 2 * inputs})
+    assert [s.name for s in sets] == [f"multisine-{k + 1}" for k in range(2 * inputs)]
+    assert all(s.drive.shape == (4000, inputs) for s in sets)
+    lines = np.array(sets[0].lines) - 1
+    for group in (sets[:inputs], sets[inputs:]):
+        U = np.array([[spectrum(s, i)[lines] for i in range(inputs)] for s in group])  # (realisation, input, line)
+        products = np.einsum("eif,ejf->ijf", U, U.conj())
+        size = 0.25 * 2 / lines.size * inputs
+        off = products * (1 - np.eye(inputs))[:, :, None]
+        assert np.abs(off).max() < 1e-12 * inputs + 1e-9 * size
+        assert np.allclose(products[range(inputs), range(inputs)], size)
+    first, second = (np.array([spectrum(s)[lines] for s in part]) for part in (sets[:inputs], sets[inputs:]))
+    assert not np.allclose(first, second)
+
+
+# ---- sines and staircases
+def test_sines_grow_in_whole_periods():
+    sines = growing_sines(LIMITS, freq_hz=40.0, amplitudes_v=[1.0, 2.0, 6.0], periods=3, offset_v=6.0)
+    assert sines.samples == 3 * 750
+    assert sines.period_samples is None
+    for k, amplitude in enumerate([1.0, 2.0, 6.0]):
+        part = sines.drive[750 * k : 750 * (k + 1), 0] - 6.0
+        harmonics = np.abs(np.fft.rfft(part)) * 2 / 750
+        assert harmonics[3] == pytest.approx(amplitude, rel=1e-9)
+        assert np.delete(harmonics, 3).max() < 1e-9
+
+
+def test_a_sine_that_fills_samples_in_threes_has_three_periods_as_its_period():
+    sines = growing_sines(LIMITS, freq_hz=60.0, amplitudes_v=[6.0], periods=6, offset_v=6.0)
+    assert (sines.samples, sines.period_samples) == (1000, 500)
+    assert np.allclose(sines.drive[:500], sines.drive[500:], atol=1e-9)
+    assert growing_sines(LIMITS, freq_hz=60.0, amplitudes_v=[6.0], periods=3, offset_v=6.0).period_samples is None
+
+
+def test_a_staircase_holds_its_levels_and_ramps_between_them():
+    steps = staircase(LIMITS, levels_v=[6.0, 9.0, 3.0], dwell_s=0.1, rise_s=0.005)
+    assert steps.rest_v == 6.0
+    assert steps.step_samples == (1050, 2100)
+    drive = steps.drive[:, 0]
+    assert np.all(drive[:1001] == 6.0)
+    assert np.all(drive[1050:2051] == 9.0)
+    assert np.all(drive[2100:] == 3.0)
+    assert np.allclose(np.diff(drive[1000:1051]), 3.0 / 50)
+    assert slew(steps) == pytest.approx(6.0 / 0.005)
+
+
+def test_creep_is_observed_evenly_in_the_logarithm_of_time():
+    picked = log_spaced(100_000, 10)
+    assert picked[0] == 0
+    assert picked[-1] == 99_999
+    assert np.all(np.diff(picked) > 0)
+    assert 8 <= np.count_nonzero((picked >= 1000) & (picked < 10_000)) <= 12
+
+
+def test_only_the_chosen_axis_moves():
+    drive = growing_sines(two_inputs(), freq_hz=50.0, amplitudes_v=[2.0], periods=2, offset_v=5.0, axis=1).drive
+    assert np.ptp(drive[:, 0]) == 0.0
+    assert drive[0, 0] == 5.0
+    assert np.ptp(drive[:, 1]) == pytest.approx(4.0, rel=1e-3)
+
+
+# ---- limits: what is refused would fit with the number that the message gives
+def chirp(limits=LIMITS, **changes):
+    values = {"start_hz": 1.0, "stop_hz": 500.0, "duration_s": 1.0, "amplitude_v": 1.0, "offset_v": 6.0}
+    return logarithmic_chirp(limits, **{**values, **changes})
+
+
+def sines(limits=LIMITS, **changes):
+    values = {"freq_hz": 50.0, "amplitudes_v": [1.0, 2.0], "periods": 2, "offset_v": 6.0}
+    return growing_sines(limits, **{**values, **changes})
+
+
+def steps(limits=LIMITS, **changes):
+    return staircase(limits, **{"levels_v": [0.0, 12.0], "dwell_s": 0.1, "rise_s": 0.001, **changes})
+
+
+def tones(limits=LIMITS, *, lines=None, **changes):
+    return multisine(limits, lines or Lines(0.2, 10.0, 400.0), **{**SMALL, **changes})
+
+
+@pytest.mark.parametrize(
+    ("design", "message"),
+    [
+        (lambda: chirp(amplitude_v=7.0), r"chirp: amplitude takes the drive to 13 V, limits.drive_max is 12 V; .* 6 V"),
+        (lambda: chirp(amplitude_v=7.0), r"amplitude takes the drive to -1 V, limits.drive_min is 0 V; .* at most 6 V"),
+        (lambda: chirp(stop_hz=900.0, amplitude_v=5.5), r"takes the drive to 3\d\.\d+ kV/s, limits.slew is 20 kV/s"),
+        (lambda: chirp(stop_hz=1500.0), r"stop reaches 1.5 kHz, 6.67 samples a period at 10 kHz where .* asks for 10"),
+        (lambda: chirp(stop_hz=1500.0), r"at most 1 kHz, or a rate of at least 15 kHz"),
+        (lambda: chirp(start_hz=500.0), r"stop is not above start; would fit: a frequency above 500 Hz"),
+        (lambda: chirp(offset_v=13.0), r"offset has 13 V, outside .*; would fit: 0 V to 12 V"),
+        (lambda: chirp(duration_s=1e5), r"duration makes a record of 100000 s at 10 kHz; would fit: at most 2000 s"),
+        (lambda: chirp(axis=1), r"axis is 2, but the bench has 1 input; would fit: 1 to 1"),
+        (lambda: sines(amplitudes_v=[1.0, 6.5]), r"amplitudes takes the drive to 12.5 V, .*at most 6 V"),
+        (lambda: sines(freq_hz=70.0), r"periods of 70 Hz: 2 of them fill 285.714 samples, no .*: a multiple of 7, or"),
+        (lambda: sines(freq_hz=70.0), r"or a frequency of 69.93006\d+ Hz"),
+        (lambda: sines(freq_hz=2000.0, periods=1), r"frequencies reaches 2 kHz, 5 samples a period"),
+        (lambda: steps(rise_s=1e-4), r"rise makes the largest step one of 120 kV/s, limits.slew is 20 kV/s; .* 600 µs"),
+        (lambda: steps(levels_v=[0.0, 13.0]), r"levels has 13 V, outside limits.drive_min to limits.drive_max"),
+        (lambda: steps(levels_v=[1.0]), r"levels has one item, which is no step; would fit: at least two levels"),
+        (lambda: steps(dwell_s=1e-6), r"dwell is shorter than half a sample; would fit: at least 100 µs"),
+        (lambda: tones(rms_v=4.0), r"rms takes the drive to 1\d\.?\d* V, limits.drive_max is 12 V; would fit: at most"),
+        (lambda: tones(lines=Lines(0.20003, 10, 400)), r"period is 2000.3 samples, no whole number .*: 200 ms"),
+        (lambda: tones(lines=Lines(0.2, 11, 14)), r"stop leaves no all line of a multisine with one every 5 Hz"),
+        (lambda: tones(lines=Lines(0.2, 10, 5000)), r"stop reaches 5 kHz, 2 samples a period"),
+        (lambda: tones(two_inputs(), realisations=3), r"realisations is 3, no multiple of the 2 inputs, .* of 2"),
+    ],
+)
+def test_a_design_beyond_a_limit_is_refused_with_what_would_fit(design, message):
+    with pytest.raises(DesignError, match=message):
+        design()
+
+
+def test_every_limit_that_is_broken_is_named_at_once():
+    with pytest.raises(DesignError) as refused:
+        chirp(amplitude_v=7.0, stop_hz=1500.0)
+    assert [p.key for p in refused.value.problems] == ["stop", "amplitude", "amplitude", "amplitude"]
+
+
+def test_the_advice_fits():
+    tight = two_inputs(inputs=1, slew_v_s=2e3)
+    with pytest.raises(DesignError, match=r"limits.slew is 2 kV/s; would fit: at most (\S+ m?V)") as refused:
+        chirp(tight)
+    volts = {"m": 1e-3, "V": 1.0}[refused.value.problems[0].expected.split()[-1][0]]
+    most = float(refused.value.problems[0].expected.split()[-2]) * volts
+    fitting = chirp(tight, amplitude_v=most)
+    assert 0.99 * 2e3 < slew(fitting) <= 2e3 * (1 + 1e-9)
+    with pytest.raises(DesignError):
+        chirp(tight, amplitude_v=most * 1.01)
+    assert slew(steps(rise_s=600e-6)) <= 20e3 * (1 + 1e-9)
+
+
+def test_slew_counts_the_jump_from_rest():
+    """Two inputs cannot both begin at rest; what one line of 10 Hz needs within itself is 60 V/s."""
+    line, limits = Lines(0.1, 10.0, 10.0), two_inputs(slew_v_s=1e3)
+    tones(two_inputs(inputs=1, slew_v_s=1e3), lines=line)
+    with pytest.raises(DesignError, match=r"limits\.slew is 1 kV/s"):
+        tones(limits, lines=line, realisations=2)
+
+
+def test_slew_counts_the_step_from_period_to_period():
+    line, at_the_seam = Lines(0.01, 100.0, 200.0), 0
+    for seed in range(40):
+        (made,) = tones(lines=line, seed=seed)
+        steps_v = np.abs(np.diff(made.drive[:101, 0]))
+        steepest = steps_v.max() * made.rate_hz
+        at_the_seam += int(np.argmax(steps_v)) == 99
+        with pytest.raises(DesignError, match=r"limits\.slew"):
+            tones(two_inputs(inputs=1, slew_v_s=steepest * 0.9999), lines=line, seed=seed)
+        tones(two_inputs(inputs=1, slew_v_s=steepest * 1.0001), lines=line, seed=seed)
+    assert at_the_seam > 0

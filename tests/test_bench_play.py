@@ -1,0 +1,310 @@
+"""Playing a plan: noise, converters and sensor as the plan says, and its files as libraries read them."""
+
+import hashlib
+import json
+import math
+from dataclasses import replace
+
+import h5py
+import lvm_read
+import numpy as np
+import pytest
+import scipy.io
+from nptdms import TdmsFile
+
+from microrad import bench
+from microrad.bench import BenchError, load_plan, only, play, true_output, write
+from microrad.folder import FolderError
+
+SEED = 5
+
+
+@pytest.fixture(scope="module")
+def paper():
+    return load_plan("paper-experiment")
+
+
+@pytest.fixture(scope="module")
+def short(paper):
+    """One quick record of the paper's experiment."""
+    return only(paper, ["loop-100hz"])
+
+
+def with_sensor(plan, **changes):
+    """The plan with other keys of its bench; those of the sensor and the converters by prefix."""
+    sensor = {k[7:]: v for k, v in changes.items() if k.startswith("sensor_")}
+    converters = {k[11:]: v for k, v in changes.items() if k.startswith("converters_")}
+    parts = {
+        "sensor": plan.bench.sensor.model_copy(update=sensor),
+        "converters": plan.bench.converters.model_copy(update=converters),
+    }
+    return replace(plan, bench=plan.bench.model_copy(update=parts))
+
+
+def quiet(plan):
+    return with_sensor(plan, sensor_noise_rad=0.0, sensor_mains_rad=0.0, sensor_drift_rad_s=0.0)
+
+
+# ---- what a recording holds
+def test_a_recording_is_in_volts_and_mrad_with_its_names(short):
+    (recording,) = play(short, SEED)
+    assert (recording.path, recording.input_names, recording.output_names) == ("loop-100hz", ("drive",), ("angle",))
+    assert (recording.rate_hz, recording.samples, recording.period_samples) == (50e3, 6000, 500)
+    assert recording.drive.shape == recording.output.shape == (6000, 1)
+    assert not recording.drive.flags.writeable
+    assert not recording.output.flags.writeable
+    assert 0.95 < recording.output[1000:].max() < 1.15
+    digest = hashlib.sha256(recording.drive.tobytes() + recording.output.tobytes()).hexdigest()
+    assert recording.sha256 == digest
+
+
+def test_the_same_seed_gives_the_same_samples_and_another_one_others(paper):
+    plan = only(paper, ["loop-60hz", "loop-100hz"])
+    one, again, other = play(plan, 1), play(plan, 1), play(plan, 2)
+    for a, b, c in zip(one, again, other, strict=True):
+        assert np.array_equal(a.drive, b.drive)
+        assert np.array_equal(a.output, b.output)
+        assert np.array_equal(a.drive, c.drive)
+        assert not np.array_equal(a.output, c.output)
+    (alone,) = play(only(paper, ["loop-100hz"]), 1)
+    assert np.array_equal(alone.output, one[1].output)  # a record's noise does not depend on the others
+    noise = [r.output[:6000] - true_output(plan, p)[1][:6000] for r, p in zip(one, plan.records, strict=True)]
+    assert abs(np.corrcoef(noise[0][:, 0], noise[1][:, 0])[0, 1]) < 0.1
+    with pytest.raises(BenchError, match="the seed is -1; give a whole number of at least 0"):
+        play(plan, -1)
+
+
+# ---- sensor and converters
+def test_noise_is_a_share_of_the_outputs_rms_about_its_mean(paper):
+    plan = only(paper, ["chirp"])
+    (recording,) = play(plan, SEED)
+    truth = true_output(plan, plan.records[0])[1]
+    share = np.std(recording.output - truth) / np.std(truth)
+    assert 0.0298 < share < 0.0302
+    assert abs(np.mean(recording.output - truth)) < 4 * 0.03 * np.std(truth) / math.sqrt(truth.size)
+    spectrum = np.abs(np.fft.rfft((recording.output - truth)[:, 0])[1:]) ** 2
+    low, high = spectrum[: spectrum.size // 2].mean(), spectrum[spectrum.size // 2 :].mean()
+    assert 0.97 < low / high < 1.03  # white
+
+
+def test_noise_is_absolute_where_the_plan_says_so(short):
+    for rms_rad in (1e-6, 5e-6):
+        plan = with_sensor(short, sensor_noise_rad=rms_rad)
+        (recording,) = play(plan, SEED)
+        noise = recording.output - true_output(plan, plan.records[0])[1]
+        assert 0.96 < np.std(noise) / (rms_rad * 1e3) < 1.04
+
+
+def test_both_converters_have_the_bits_and_ranges_of_the_plan(short):
+    plan = quiet(with_sensor(short, converters_bits=10))
+    (recording,) = play(plan, SEED)
+    for values, low, span in ((recording.drive, -4.0, 20.0), (recording.output, -1.0, 3.0)):
+        codes = (values - low) / (span / 1024)
+        assert np.allclose(codes, np.round(codes), atol=1e-9)
+        assert np.unique(codes).size > 100
+    asked = plan.records[0].excitation.drive
+    error = np.abs(recording.drive - asked).max()
+    assert 0.9 * 10 / 1024 < error <= 10 / 1024 * (1 + 1e-9)
+    error = np.abs(recording.output - true_output(plan, plan.records[0])[1]).max()
+    assert 0.9 * 1.5 / 1024 < error <= 1.5 / 1024 * (1 + 1e-9)
+    fine = play(quiet(with_sensor(short, converters_bits=24)), SEED)[0]
+    assert 0.0 < np.abs(fine.drive - asked).max() < 1e-6
+
+
+def test_mains_and_drift_are_seen_in_the_output(short):
+    plain = play(with_sensor(quiet(short), converters_bits=24), SEED)[0].output
+    hum = play(with_sensor(quiet(short), converters_bits=24, sensor_mains_rad=2e-6), SEED)[0].output - plain
+    line = np.abs(np.fft.rfft(hum[:, 0])) * 2 / hum.size
+    assert line[6] * 1e3 == pytest.approx(2.0, rel=1e-3)  # 50 Hz in 0.12 s
+    assert np.delete(line, 6).max() < 1e-6
+    drifted = play(with_sensor(quiet(short), converters_bits=24, sensor_drift_rad_s=1e-6), SEED)[0].output - plain
+    assert drifted[-1, 0] * 1e3 == pytest.approx(0.12, rel=1e-2)
+
+
+def test_an_output_beyond_its_converter_is_refused(short):
+    plan = with_sensor(short, converters_output_max_rad=1e-3)
+    with pytest.raises(
+        BenchError, match=r"'loop-100hz' moves the mirror over .* mrad, but .*take in -1 mrad to 1 mrad; w"
+    ):
+        play(plan, SEED)
+
+
+def test_axes_answer_their_own_drive_and_some_of_the_others(tmp_path, paper):
+    text = paper.text.replace('truth = "bench"', 'axes = 2\ncrosstalk = 0.05\ntruth = "bench"', 1)
+    text = text.partition("[excitation.chirp]")[0] + (
+        '[excitation.m]\nkind = "multisine"\nlines = "odd"\nstart = "10 Hz"\nstop = "1 kHz"\nperiod = "0.1 s"\n'
+        'rms = "0.2 V"\noffset = "6 V"\nperiods = 2\nrealisations = 2\nseed = 1\n'
+        '[excitation.s]\nkind = "sines"\nfrequencies = ["100 Hz"]\namplitudes = ["3 V"]\nperiods = 4\noffset = "6 V"\n'
+        "axis = 2\n"
+    )
+    path = tmp_path / "two.toml"
+    path.write_text(text, encoding="utf-8")
+    plan = load_plan(path)
+    assert [r.excitation.name for r in plan.records] == ["m-1", "m-2", "s"]
+    recordings = play(plan, SEED)
+    assert recordings[0].input_names == ("drive1", "drive2")
+    assert recordings[0].output_names == ("angle1", "angle2")
+    moved = np.ptp(recordings[2].output, axis=0)
+    assert moved[0] / moved[1] == pytest.approx(0.05, rel=0.3)
+    assert np.ptp(recordings[2].drive, axis=0)[0] == 0.0
+    clean = true_output(plan, plan.records[2])[1]
+    assert np.allclose(clean[:, 0] - clean[0, 0], 0.05 * (clean[:, 1] - clean[0, 1]))
+    (tmp_path / "three.toml").write_text(text.replace("axis = 2", "axis = 3"), encoding="utf-8")
+    with pytest.raises(bench.PlanError, match=r"(?s)excitation.s.axis = 3.*bench has 2 inputs"):
+        load_plan(tmp_path / "three.toml")
+
+
+def test_progress_names_each_record(paper):
+    seen = []
+    play(only(paper, ["loop-60hz", "loop-80hz"]), SEED, lambda *told: seen.append(told))
+    assert seen == [(0, 2, "loop-60hz"), (1, 2, "loop-80hz"), (2, 2, paper.name)]
+
+
+# ---- files
+def from_csv(path):
+    first, second, *_ = path.read_text(encoding="utf-8").split("\n")
+    assert (first, second) == ("time,drive,angle", "s,V,mrad")
+    table = np.loadtxt(path, delimiter=",", skiprows=2)
+    assert np.allclose(np.diff(table[:, 0]), 2e-5, rtol=1e-6)
+    return table[:, 1], table[:, 2]
+
+
+def from_lvm(path):
+    data = lvm_read.read(str(path), read_from_pickle=False, dump_file=False)
+    segment = data[0]
+    assert data["Segments"] == 1
+    assert segment["Delta_X"] == [2e-5, 2e-5]
+    assert segment["Samples"] == [6000, 6000]
+    assert segment["Y_Unit_Label"] == ["V", "mrad"]
+    assert segment["Channel names"] == ["X_Value", "drive", "angle"]
+    assert np.allclose(np.diff(segment["data"][:, 0]), 2e-5, rtol=1e-6)
+    return segment["data"][:, 1], segment["data"][:, 2]
+
+
+def from_tdms(path):
+    group = TdmsFile.read(path)["bench"]
+    assert group.properties["rate_hz"] == 50e3
+    for channel, unit in (("drive", "V"), ("angle", "mrad")):
+        assert group[channel].properties["unit_string"] == unit
+        assert group[channel].properties["wf_increment"] == 2e-5
+        assert group[channel].time_track()[-1] == pytest.approx(5999 * 2e-5)
+    return group["drive"][:], group["angle"][:]
+
+
+def from_mat(path):
+    data = scipy.io.loadmat(path)
+    assert data["drive"].shape == (6000, 1)
+    assert data["rate_hz"] == 50e3
+    assert data["period_samples"] == 500
+    return data["drive"][:, 0], data["angle"][:, 0]
+
+
+def from_mat73(path):
+    head = path.read_bytes()[:128]
+    assert head.startswith(b"MATLAB 7.3 MAT-file")
+    assert head[116:] == bytes(8) + b"\x00\x02IM"
+    with pytest.raises(NotImplementedError):  # SciPy knows it for what it is
+        scipy.io.loadmat(path)
+    with h5py.File(path) as file:
+        assert file["drive"].attrs["MATLAB_class"] == b"double"
+        assert file["rate_hz"][:] == 50e3
+        return file["drive"][0], file["angle"][0]
+
+
+def from_npz(path):
+    with np.load(path, allow_pickle=False) as data:
+        assert data["rate_hz"] == 50e3
+        assert data["period_samples"] == 500
+        return data["drive"], data["angle"]
+
+
+def from_hdf5(path):
+    with h5py.File(path) as file:
+        assert file.attrs["rate_hz"] == 50e3
+        assert file["angle"].attrs["units"] == "mrad"
+        return file["drive"][:], file["angle"][:]
+
+
+READERS = {
+    "csv": ("loop-100hz.csv", from_csv),
+    "lvm": ("loop-100hz.lvm", from_lvm),
+    "tdms": ("loop-100hz.tdms", from_tdms),
+    "mat": ("loop-100hz.mat", from_mat),
+    "mat73": ("loop-100hz-v73.mat", from_mat73),
+    "npz": ("loop-100hz.npz", from_npz),
+    "hdf5": ("loop-100hz.h5", from_hdf5),
+}
+
+
+@pytest.fixture(scope="module")
+def folder(short, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("bench") / "records"
+    files = write(replace(short, formats=bench.FORMATS), folder, SEED)
+    assert [path.name for path in files] == [READERS[form][0] for form in bench.FORMATS]
+    return folder
+
+
+@pytest.mark.parametrize("form", bench.FORMATS)
+def test_a_file_holds_what_was_played(folder, short, form):
+    name, read = READERS[form]
+    drive, angle = read(folder / name)
+    (recording,) = play(short, SEED)
+    exact = form not in ("csv", "lvm")
+    for found, expected in ((drive, recording.drive[:, 0]), (angle, recording.output[:, 0])):
+        assert np.array_equal(found, expected) if exact else np.allclose(found, expected, rtol=1e-8, atol=1e-9)
+
+
+def test_the_folder_holds_plan_and_manifest(folder, short):
+    assert (folder / "plan.toml").read_text(encoding="utf-8") == short.text
+    manifest = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
+    (record,) = manifest["records"]
+    assert (manifest["seed"], manifest["plan"]["sha256"]) == (SEED, short.sha256)
+    assert (record["use"], record["kind"], record["truth"]) == ("identification", "sines", "bouc-wen")
+    assert (record["rate_hz"], record["period_samples"], record["rest_v"]) == (50e3, 500, 6.0)
+    assert record["files"] == [name for name, _ in READERS.values()]
+    for name, digest in manifest["files_sha256"].items():
+        assert hashlib.sha256((folder / name).read_bytes()).hexdigest() == digest
+    assert set(manifest["files_sha256"]) == {*record["files"], "plan.toml"}
+    assert not [path for path in folder.parent.iterdir() if path != folder]
+
+
+def test_a_folder_is_not_replaced_unless_asked_and_ours(short, tmp_path):
+    folder = tmp_path / "out"
+    (first,) = write(short, folder, 1)
+    before = first.read_bytes()
+    with pytest.raises(FolderError, match="already holds recordings: choose another --output, or replace them with"):
+        write(short, folder, 2)
+    assert first.read_bytes() == before
+    write(short, folder, 2, overwrite=True)
+    assert first.read_bytes() != before
+    write(short, folder, 1, overwrite=True)
+    assert first.read_bytes() == before
+    foreign = tmp_path / "foreign"
+    foreign.mkdir()
+    (foreign / "thesis.tex").write_text("years of work", encoding="utf-8")
+    with pytest.raises(FolderError, match="holds files that are not recordings of microrad"):
+        write(short, foreign, 1, overwrite=True)
+    with pytest.raises(FolderError, match="is a file, not a folder"):
+        write(short, first, 1, overwrite=True)
+    assert (foreign / "thesis.tex").exists()
+
+
+def test_a_folder_is_never_half_written(short, tmp_path):
+    folder = tmp_path / "out"
+    bad = with_sensor(short, converters_output_max_rad=1e-3)
+    with pytest.raises(BenchError, match="widen output_min"):
+        write(bad, folder, SEED)
+    assert list(tmp_path.iterdir()) == []
+    write(short, folder, SEED)
+    names = sorted(path.name for path in folder.iterdir())
+    with pytest.raises(BenchError, match="widen output_min"):
+        write(bad, folder, SEED, overwrite=True)
+    assert sorted(path.name for path in folder.iterdir()) == names
+    assert list(tmp_path.iterdir()) == [folder]
+
+
+def test_a_format_without_its_library_says_what_to_install(short, tmp_path, monkeypatch):
+    monkeypatch.setitem(__import__("sys").modules, "nptdms", None)
+    with pytest.raises(BenchError, match=r"needs npTDMS, which is not installed: pip install 'microrad\[lab\]'"):
+        write(short, tmp_path / "out", SEED)
+    assert list(tmp_path.iterdir()) == []

@@ -1,0 +1,385 @@
+"""The models as records: what their scalars say against simulations of them, and what their inverses leave over."""
+
+from dataclasses import replace
+from itertools import product
+from math import exp, inf, log, pi
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from microrad import control, hysteresis, kernels, mirror, simulate
+from microrad.hysteresis import NO_CREEP, BoucWen, Creep, Play
+
+PRINTED = BoucWen(0.089e-3, -2.96e-7, -0.048e-3, 4.7e-4, 38.421, 34.635, 3770.0, 6.0)  # section 3.3 of the paper
+ADMISSIBLE = replace(PRINTED, epsilon_rad_v=-0.022e-3, alpha_1_v=2.4, beta_1_v=0.6)
+PLAYS = Play((0.0, 0.4, 1.5), (0.06e-3, 0.02e-3, 0.009e-3))
+WIDENING = replace(PLAYS, widening_s=1e-3)
+SYMMETRIC, ASYMMETRIES = (0.0, 0.0), [(0.5, -0.7), (-0.6, 0.4), (0.9, 0.0), (0.0, 0.9)]
+EXPONENTS = [1.0, 1.5, 2.0, 3.0]
+PERIOD = 20e-6
+SIGNS = (1.0, -1.0)
+
+
+def asymmetric(model, gamma_eta, exponent=1.0):
+    return replace(model, gamma_1_v=gamma_eta[0], eta_1_v=gamma_eta[1], exponent=exponent)
+
+
+def respond(model, drive, step_s, h0=0.0):
+    """Output and hysteresis of the compiled model; without d2, which is a lag, and about a bias of 0."""
+    row = np.array(replace(model, d2_s_v=0.0, bias_v=0.0).row)
+    return kernels.bouc_wen_response(np.asarray(drive, dtype=float), step_s, row, h0)[:2]
+
+
+def slowest_decay(model):
+    return min(model.decay_1_v(rising, sign) for rising, sign in product(SIGNS, SIGNS))
+
+
+def branch(model, rising, rate_v_s=1e-3):
+    """h at the end of a ramp that is long enough for every model here."""
+    ramp = rising * np.linspace(0.0, 40.0 / slowest_decay(model), 4001)
+    return respond(model, ramp, abs(ramp[1]) / rate_v_s)[1][-1]
+
+
+def numerical_reversal_slope(model, rising, rate_v_s=1e-3):
+    travel = 1e-7
+    y, _ = respond(model, [0.0, -rising * travel], travel / rate_v_s, branch(model, rising, rate_v_s))
+    return (y[1] - y[0]) / (-rising * travel)
+
+
+by_exponent = pytest.mark.parametrize("exponent", EXPONENTS)
+by_asymmetry = pytest.mark.parametrize("gamma_eta", [SYMMETRIC, *ASYMMETRIES], ids=str)
+by_epsilon = pytest.mark.parametrize("epsilon", [-0.022e-3, 0.022e-3])
+
+
+# ------------------------------------------------------------------------------------------------ branches and slopes
+
+
+@by_exponent
+@by_asymmetry
+@by_epsilon
+def test_both_branches_settle_where_the_record_says(epsilon, gamma_eta, exponent):
+    model = asymmetric(replace(ADMISSIBLE, epsilon_rad_v=epsilon), gamma_eta, exponent)
+    found = [branch(model, rising) for rising in SIGNS]
+    assert_allclose([model.settled_branch_rad(rising) for rising in SIGNS], found, rtol=1e-6)
+    assert_allclose(model.settled_rad, np.max(np.abs(found)), rtol=1e-6)
+    assert (abs(found[0] + found[1]) > 1e-7) == (gamma_eta != SYMMETRIC)
+
+
+@by_exponent
+@by_asymmetry
+@by_epsilon
+@pytest.mark.parametrize("rate_v_s", [1e-3, 900.0, 9000.0])
+def test_the_slope_behind_a_reversal_is_the_lower_of_both_directions(epsilon, gamma_eta, exponent, rate_v_s):
+    model = asymmetric(replace(ADMISSIBLE, epsilon_rad_v=epsilon), gamma_eta, exponent)
+    found = [numerical_reversal_slope(model, rising, rate_v_s) for rising in SIGNS]
+    assert_allclose(model.reversal_slope_rad_v(rate_v_s), min(found), rtol=1e-4, atol=1e-9)
+    assert (abs(found[0] - found[1]) > 1e-6) == (gamma_eta != SYMMETRIC)
+
+
+@by_exponent
+@pytest.mark.parametrize("gamma_eta", ASYMMETRIES, ids=str)
+def test_the_fastest_admissible_reversal_of_an_asymmetric_model(gamma_eta, exponent):
+    """In one of the two directions the slope passes through 0 at that rate; in the other it is still positive."""
+    model = asymmetric(ADMISSIBLE, gamma_eta, exponent)
+    swing = model.d1_rad_v - model.reversal_slope_rad_v()
+    model = replace(model, epsilon_rad_v=0.5 * model.d1_rad_v / swing * model.epsilon_rad_v)
+    rate = model.admissible_rate_v_s
+    assert_allclose(rate, log(2) / 4.7e-4, rtol=1e-12)  # where the growth doubles a swing of half d1
+    below, above = (min(numerical_reversal_slope(model, r, share * rate) for r in SIGNS) for share in (0.99, 1.01))
+    assert below > 1e-8
+    assert above < -1e-8
+    assert max(numerical_reversal_slope(model, r, rate) for r in SIGNS) > 1e-7
+
+
+def test_a_model_that_is_admissible_in_one_direction_only_is_not():
+    model = asymmetric(replace(ADMISSIBLE, epsilon_rad_v=-0.03e-3), (0.5, -0.7))
+    slopes = [numerical_reversal_slope(model, rising) for rising in SIGNS]
+    assert min(slopes) < -1e-6
+    assert max(slopes) > 1e-6
+    assert model.admissible_rate_v_s == 0.0
+    assert model.wrong_way_rad > 0.0
+
+
+# ------------------------------------------------------------------------------------------------ the wrong way
+
+
+def wrong_way(model):
+    """How far the output moves against a slow drive behind a settled branch, the worse of both, by simulation."""
+    found = []
+    for rising in SIGNS:
+        back = np.linspace(0.0, 12.0 / slowest_decay(model), 100_001)
+        y, _ = respond(replace(model, delta_s_v=0.0), -rising * back, 1e3, branch(model, rising))
+        found.append(np.max(rising * (y - y[0])))
+    return max(found)
+
+
+def random_models(exponent, count=25):
+    """Models of any asymmetry that stay bounded, the drive term from a twentieth of d1 to seven times it."""
+    rng = np.random.default_rng(7)
+    while count:
+        alpha = 10 ** rng.uniform(0, 1.5)
+        beta, gamma, eta = rng.uniform(-1, 1, 3) * alpha
+        model = BoucWen(0.089e-3, 0.0, -(10 ** rng.uniform(-5.3, -3.2)), 0.0, alpha, beta)
+        model = asymmetric(model, (gamma, eta), exponent)
+        if slowest_decay(model) > 0.05 * alpha:
+            count -= 1
+            yield model
+
+
+@pytest.mark.parametrize(
+    "exponent",
+    EXPONENTS,
+)
+def test_how_far_an_asymmetric_model_moves_the_wrong_way(exponent):
+    found, wrong = [], []
+    for model in random_models(exponent):
+        found.append(model.wrong_way_rad / model.settled_rad)
+        wrong.append(wrong_way(model) / model.settled_rad)
+        assert (found[-1] > 0.0) == (model.reversal_slope_rad_v() < 0.0)
+    print(f"wrong way over settled size: {min(wrong):.3f} to {max(wrong):.3f}")
+    assert_allclose(found, wrong, rtol=0, atol=1e-5)
+    assert min(wrong) < 1e-9
+    assert max(wrong) > 0.5
+
+
+# ------------------------------------------------------------------------------------------------ the steepest slope
+
+
+def steepest_found(model, rng, trials=400):
+    """Largest |dz/dq| at constant rate met by a random walk of rates within the limit, settled branches included."""
+    row, little = np.array(model.row), 1e-6
+    h, steepest = 0.0, 0.0
+    for _ in range(trials):
+        rates = model.rate_limit_v_s * np.array([rng.choice([1.0, rng.uniform(), 1e-4]) for _ in range(2)])
+        travel = rng.choice(SIGNS) * 10 ** rng.uniform(-3, 1.5)
+        h = kernels.bouc_wen_response(np.array([0.0, travel]), abs(travel) / rates[0], row, h)[1][-1]
+        drive = rng.choice(SIGNS) * little * np.arange(3)
+        z, _, _ = kernels.bouc_wen_response(drive, little / rates[1], row, h)
+        steepest = max(steepest, abs(z[2] - z[1]) / little)
+    return steepest
+
+
+@pytest.mark.parametrize("delta", [4.7e-4, 0.0, -4.7e-4])
+def test_no_slope_in_any_loop_is_above_the_steepest(delta):
+    rng, shares = np.random.default_rng(17), []
+    for exponent in EXPONENTS:
+        for model in random_models(exponent, 8):
+            fast = replace(model, delta_s_v=delta, d2_s_v=-1e-5, rate_limit_v_s=3000.0)
+            shares.append(steepest_found(fast, rng) / hysteresis.steepest_slope(fast))
+    print(f"steepest slope found: {min(shares):.3f} to {max(shares):.3f} of the bound")
+    assert max(shares) <= 1.0 + 1e-6
+    assert max(shares) > 0.7  # a bound, and not far off
+
+
+def test_the_steepest_slope_of_plays_is_met_when_all_move():
+    """Positive weights: all plays engaged. A negative weight counts by its size."""
+    drive = np.linspace(0.0, 5.0, 501)
+    z = kernels.play_response(drive, np.array(PLAYS.thresholds_v), np.zeros(3)) @ np.array(PLAYS.weights_rad_v)
+    assert_allclose(np.max(np.diff(z)) / drive[1], hysteresis.steepest_slope(PLAYS), rtol=1e-9)
+    mixed = replace(PLAYS, weights_rad_v=(0.06e-3, -0.02e-3, 0.009e-3))
+    assert hysteresis.steepest_slope(mixed) == pytest.approx(0.089e-3)
+
+
+def test_without_rate_limit_a_rate_dependent_model_has_no_steepest_slope():
+    with pytest.raises(ValueError, match="depends on rate needs a finite rate limit"):
+        hysteresis.steepest_slope(replace(PRINTED, rate_limit_v_s=inf))
+    assert hysteresis.steepest_slope(replace(PRINTED, rate_limit_v_s=inf, delta_s_v=0.0, d2_s_v=0.0)) < 2e-3
+
+
+# ------------------------------------------------------------------------------------------------ records
+
+
+@by_exponent
+def test_a_scaled_model_has_its_output_scaled(exponent):
+    model = asymmetric(ADMISSIBLE, (0.5, -0.7), exponent)
+    drive = 6 * np.sin(2 * pi * 80 * PERIOD * np.arange(2000))
+    output, twice = (respond(m, drive, PERIOD)[0] for m in (model, hysteresis.scaled(model, 2.0)))
+    assert_allclose(twice, 2 * output, rtol=1e-9, atol=1e-15)
+    assert np.ptp(output) > 1e-4
+
+
+def test_a_row_is_in_the_order_of_the_kernels_columns():
+    model = asymmetric(PRINTED, (2.0, -1.0), 2.5)
+    row = np.array(model.row)
+    for column, value in {
+        kernels.D1: 0.089e-3, kernels.D2: -2.96e-7, kernels.EPSILON: -0.048e-3, kernels.DELTA: 4.7e-4,
+        kernels.ALPHA: 38.421, kernels.BETA: 34.635, kernels.RATE_LIMIT: 3770.0, kernels.BIAS: 6.0,
+        kernels.GAMMA: 2.0, kernels.ETA: -1.0, kernels.POWER: 1.5, kernels.PER_SIZE: 38.421 / 0.048e-3,
+    }.items():  # fmt: skip
+        assert row[column] == pytest.approx(value, rel=1e-15)
+    assert row.size == 12
+    assert replace(model, epsilon_rad_v=0.0).row[kernels.PER_SIZE] == 0.0
+
+
+# ------------------------------------------------------------------------------------------------ inverses
+
+
+def feedforward_alone(model, reference, inverse=True, creep=NO_CREEP, invert_creep=True):
+    """A static mirror under a feedforward without feedback, behind an ideal amplifier: error of each sample, trace.
+
+    ``inverse`` False divides by the slow gain, and a model in its place inverts that model.
+    """
+    m = mirror.assemble("static", "static", None, model, creep)
+    if inverse is False:
+        feedforward = control.Inverse(direct=(1.0 / hysteresis.slow_gain(model),))
+    else:
+        inverted = model if inverse is True else inverse
+        kept = creep if invert_creep else NO_CREEP
+        feedforward = control.inverse(replace(m, inverse=(inverted,), inverse_creep=(kept,)))
+    setup = simulate.Setup(
+        control.IDEAL_DRIVE, control.Timing(PERIOD, 1, 0), control.pid(control.Gains(0.0, 0.0, 0.0, 1e-4), PERIOD)
+    )
+    trace = simulate.track("alone", m, setup, feedforward, np.asarray(reference)[:, None], slice(None))
+    return trace.output_rad[1:, 0] - trace.reference_rad[:-1, 0], trace
+
+
+def triangle(amplitude, samples, periods=3.25):
+    """From 0 up, with turns at the amplitude; ``samples`` a period."""
+    phase = np.arange(round(periods * samples)) / samples
+    return amplitude * (4 * np.abs((phase + 0.75) % 1 - 0.5) - 1)
+
+
+def test_the_inverse_of_widening_plays_is_exact_at_a_constant_rate():
+    """A triangle: exact on each flank once all plays move, where drive and reference over slow gain have one rate.
+
+    Behind a turn the first plays alone move, so that the drive is faster than the inverse takes it to be.
+    """
+    samples, amplitude = 2000, 6 * hysteresis.slow_gain(WIDENING)
+    reference = triangle(amplitude, samples)
+    rate = 4 * 6 / (samples * PERIOD)  # V/s on a flank
+    # a play of threshold r moves again after 2 (r + widening rate) of drive; the mean slope until then is at least w0
+    travelled = 2 * (1.5 + WIDENING.widening_s * rate)
+    engaged = travelled / 24 + 0.02  # share of a period
+    since_turn = ((np.arange(reference.size) / samples + 0.25) % 0.5)[:-1]
+    late = (since_turn > engaged) & (np.arange(reference.size - 1) > samples)
+    residual = {
+        name: np.abs(feedforward_alone(WIDENING, reference, inverse)[0]) / amplitude
+        for name, inverse in {"with": True, "without widening": PLAYS, "without": False}.items()
+    }
+    turned = ~late & (np.arange(reference.size - 1) > samples)
+    for name, error in residual.items():
+        print(f"{name}: {np.max(error[late]):.1e} on the flanks, {np.max(error[turned]):.1e} behind the turns")
+    assert np.mean(late) > 0.2
+    assert np.max(residual["with"][late]) < 1e-12
+    assert np.min(residual["without widening"][late]) > 0.01
+    assert np.min(residual["without"][late]) > 0.05
+    assert 1e-3 < np.max(residual["with"][turned]) < 0.5 * np.max(residual["without widening"][turned])
+
+
+def test_the_inverse_of_widening_plays_is_exact_where_both_rates_are_clamped():
+    """Beyond the limit the thresholds stand at r + widening limit in model and inverse: exact on any reference."""
+    model = replace(WIDENING, rate_limit_v_s=300.0)
+    rng = np.random.default_rng(3)
+    moves = rng.uniform(0.02, 0.2, 400) * rng.choice(SIGNS, 400) * hysteresis.slow_gain(model)
+    error, trace = feedforward_alone(model, np.cumsum(moves))
+    assert np.max(np.abs(error)) < 1e-17
+    assert trace.counts.clamped == trace.counts.inverse_clamped == 400
+    other, _ = feedforward_alone(model, np.cumsum(moves), PLAYS)
+    assert np.max(np.abs(other)) > 1e-6
+
+
+def test_the_inverse_of_widening_plays_on_a_sine():
+    """The rate of a sine changes all the time: most of the hysteresis is gone, and not all of it."""
+    reference = 0.3e-3 * np.sin(2 * pi * 25 * PERIOD * np.arange(4000))
+    left = {
+        name: np.max(np.abs(feedforward_alone(WIDENING, reference, inverse)[0][2000:])) / 0.3e-3
+        for name, inverse in {"with": True, "without widening": PLAYS, "without": False}.items()
+    }
+    print({name: f"{100 * share:.2f} %" for name, share in left.items()})
+    assert left["without"] > 0.1
+    assert left["without widening"] > 0.3 * left["without"]
+    assert 1e-3 < left["with"] < 0.1 * left["without widening"]
+
+
+@pytest.mark.parametrize(
+    ("gamma_eta", "exponent", "percents"),
+    [
+        ((0.3, 0.2), 1.0, (1.10, 1.29, 4.97)),
+        ((0.3, 0.2), 2.0, (1.05, 1.34, 3.89)),
+        ((0.5, -0.7), 1.0, (4.64, 8.97, 13.43)),
+        ((0.5, -0.7), 2.0, (1.53, 2.28, 6.56)),
+    ],
+)
+def test_the_inverse_undoes_an_asymmetric_model(gamma_eta, exponent, percents):
+    """Eq. 4 drives its h by r / d1, not by u, so that it leaves about the square of the hysteresis's share."""
+    model = asymmetric(ADMISSIBLE, gamma_eta, exponent)
+    reference = 0.3e-3 * np.sin(2 * pi * 15 * PERIOD * np.arange(10_000))
+    eq_3 = replace(model, gamma_1_v=0.0, eta_1_v=0.0, exponent=1.0)
+    left = {}
+    for name, inverse in {"with": True, "as Eq. 3": eq_3, "without": False}.items():
+        error, trace = feedforward_alone(model, reference, inverse)
+        left[name] = 100 * np.max(np.abs(error[5000:])) / 0.3e-3
+        assert (trace.counts.clamped, trace.counts.inverse_clamped) == (0, 0)
+    print({name: f"{share:.3f} %" for name, share in left.items()})
+    assert_allclose(list(left.values()), percents, rtol=0.01)
+    assert left["with"] < 0.36 * left["without"]
+    assert left["with"] < 0.9 * left["as Eq. 3"]
+
+
+CREEP = Creep((0.004e-3, 0.003e-3, 0.002e-3), (0.02, 0.1, 0.5))
+STAIRS = np.repeat([0.1e-3, 0.3e-3, 0.2e-3, -0.1e-3, 0.0], 10_000)  # of 0.2 s
+
+
+def test_creep_is_taken_off_a_staircase():
+    """What is left is half a sample of the lags: the amplifier ramps over the sample that the inverse holds."""
+    left, late = {}, np.arange(STAIRS.size - 1) % 10_000 > 9_000  # before the next stair
+    for name, invert in {"with": True, "without": False}.items():
+        error, _ = feedforward_alone(PLAYS, STAIRS, creep=CREEP, invert_creep=invert)
+        left[name] = np.abs(error) / 0.3e-3
+    print({name: f"{100 * np.max(e):.4f} %, late {100 * np.max(e[late]):.5f} %" for name, e in left.items()})
+    assert_allclose(np.max(left["without"]), 0.0909, rtol=0.01)
+    assert 1e-6 < np.max(left["with"]) < 5e-5
+    assert np.max(left["without"][late]) > 0.08
+    assert np.max(left["with"][late]) < 2e-5
+
+
+def test_creep_is_taken_off_beside_a_bouc_wen_model():
+    """Here it is the hysteresis's own residual that is left; no growth with the rate, which stairs would meet."""
+    model = asymmetric(replace(ADMISSIBLE, delta_s_v=0.0), (0.2, -0.3))
+    left = {
+        name: np.max(np.abs(feedforward_alone(model, STAIRS, creep=creep, invert_creep=invert)[0])) / 0.3e-3
+        for name, creep, invert in (("with", CREEP, True), ("without", CREEP, False), ("no creep", NO_CREEP, True))
+    }
+    print({name: f"{100 * share:.3f} %" for name, share in left.items()})
+    assert left["without"] > 0.09
+    assert left["no creep"] < left["with"] < 0.15 * left["without"]
+
+
+def test_creep_approaches_its_weight_with_its_time_constants():
+    """A step held for long, without any inverse: drive x (gain + sum of weight (1 - exp(-t / tau)))."""
+    straight = hysteresis.gain_only(PLAYS)
+    step = np.full(40_000, 0.2e-3)
+    error, trace = feedforward_alone(straight, step, creep=CREEP, invert_creep=False)
+    volts = 0.2e-3 / straight.d1_rad_v
+    time = PERIOD * (np.arange(step.size - 1) + 0.5)  # the drive ramps over its first sample
+    expected = volts * sum(
+        w * (1.0 - np.exp(-time / tau)) for w, tau in zip(CREEP.weights_rad_v, CREEP.time_constants_s, strict=True)
+    )
+    assert_allclose(error, expected, rtol=1e-6, atol=1e-12)
+    assert error[-1] > 0.9 * volts * sum(CREEP.weights_rad_v[:2])
+    assert_allclose(trace.command_v, volts, rtol=1e-12)
+
+
+def test_the_inverse_of_a_mirror_carries_creep_and_widening_by_actuator():
+    parts = [
+        mirror.assemble("plays", "static", None, replace(WIDENING, rate_limit_v_s=500.0), CREEP),
+        mirror.assemble("Bouc-Wen", "static", None, ADMISSIBLE),
+        mirror.assemble("plays", "static", None, PLAYS, Creep((1e-6,), (1.0,))),
+    ]
+    inverse = control.inverse(mirror.combine(*parts))
+    slow = hysteresis.slow_gain(WIDENING)
+    assert_allclose(inverse.widening, [(0.06e-3 * 1e-3 / slow, 500.0 * slow), (0.0, inf), (0.0, inf)])
+    assert inverse.creep == (CREEP, NO_CREEP, Creep((1e-6,), (1.0,)))
+    loop = simulate.assemble(
+        mirror.combine(*parts),
+        simulate.Setup(
+            control.IDEAL_DRIVE,
+            control.Timing(PERIOD, 1, 0),
+            control.side_by_side(*[control.pid(control.Gains(0.0, 1.0, 0.0, 1e-4), PERIOD)] * 3),
+        ),
+        inverse,
+    )
+    assert loop.inverse_lag_actuator.tolist() == [0, 0, 0, 2]
+    assert_allclose(loop.inverse_lag_keep, [exp(-PERIOD / tau) for tau in (0.02, 0.1, 0.5, 1.0)], rtol=1e-14)
+    assert simulate.at_rest(loop).inverse_clamped.size == 1 + 3

@@ -1,0 +1,502 @@
+"""The report of an identification: whole or absent, self-contained, its numbers those of the record."""
+
+import html
+import json
+import math
+import os
+import re
+from dataclasses import replace
+from html.parser import HTMLParser
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.signal import cont2discrete, lfilter
+
+from microrad import report
+from microrad.identify import Refused, identify, mirror_file_text
+from microrad.kernels import play_response
+from microrad.recording import Finding, recording_from_arrays
+from microrad.report import identification_figures as figures
+from microrad.report import identification_words as words
+from microrad.report.figures import MOST_POINTS
+from microrad.report.identification import BEGINS
+from microrad.report.identification_parameters import (
+    ParameterRow,
+    not_identified,
+    parameter_rows,
+    starts_text,
+    two_digits,
+)
+
+RATE_HZ = 2000.0
+HOSTILE = "<script>alert(1)</script> $x_^2$ .csv"
+SECTIONS = (
+    "Warnings and refusals",
+    "Recordings",
+    "Linear part",
+    "Loops",
+    "Time response",
+    "Residuals",
+    "Parameters",
+    "All models",
+    "Mirror file and origin",
+)
+
+
+def philox(seed):
+    return np.random.Generator(np.random.Philox(seed))
+
+
+def behind_resonance(drive):
+    """A second-order system of gain 1 at 150 Hz, damping 0.3, behind a zero-order hold, from rest at the start."""
+    w = 2 * np.pi * 150.0
+    b, a, _ = cont2discrete(([w * w], [1.0, 2 * 0.3 * w, w * w]), 1 / RATE_HZ)
+    return lfilter(b.ravel(), a, drive - drive[0])
+
+
+def loop(freq_hz, seed, name, seconds=0.3):
+    """Two play operators behind the resonance, mrad over V, noise of 0.2 % of the peak-to-peak."""
+    drive = 6 - 6 * np.cos(2 * np.pi * freq_hz * np.arange(round(seconds * RATE_HZ)) / RATE_HZ)
+    play = play_response(drive, np.array([0.0, 1.0]), np.full(2, drive[0])) @ np.array([0.06, 0.03])
+    output = behind_resonance(play)
+    output = output + 0.002 * np.ptp(output) * philox(seed).standard_normal(output.size)
+    return recording_from_arrays(drive, output, RATE_HZ, name)
+
+
+def chirp(seed=9, seconds=4.0):
+    """A small logarithmic chirp from 1 Hz to 600 Hz behind the same resonance."""
+    t = np.arange(round(seconds * RATE_HZ)) / RATE_HZ
+    drive = 0.2 * np.sin(2 * np.pi * seconds / math.log(600.0) * (600.0 ** (t / seconds) - 1))
+    output = 0.07 * behind_resonance(drive)
+    output = output + 0.01 * np.std(output) * philox(seed).standard_normal(output.size)
+    return recording_from_arrays(drive, output, RATE_HZ, "chirp.csv")
+
+
+@pytest.fixture(scope="module")
+def static():
+    """One loop and the static play operators alone."""
+    return identify([loop(4.0, 1, HOSTILE, 1.0)], models=("prandtl_ishlinskii",))
+
+
+@pytest.fixture(scope="module")
+def recordings():
+    return [loop(60.0, 1, "60.csv"), loop(80.0, 2, "80.csv"), loop(100.0, 3, "100.csv"), chirp()]
+
+
+@pytest.fixture(scope="module")
+def full(recordings):
+    """Loops and a chirp: a linear part, a joint model, refusals, and a recording for validation."""
+    models = ("prandtl_ishlinskii", "bouc_wen", "linear")
+    found = identify(recordings, 0.5, models=models, validation=[loop(70.0, 4, "70.csv")])
+    return replace(found, refused=(Refused("prandtl_ishlinskii_creep", "the longest recording lasts <1 s"),))
+
+
+@pytest.fixture(scope="module")
+def page(full, recordings, tmp_path_factory):
+    return write(full, tmp_path_factory.mktemp("report") / "found.html", recordings=recordings)
+
+
+def write(found, target, **options):
+    given = {"mirror_file": Path("lab-mirror.toml"), "mirror_text": mirror_file_text(found, "lab"), "title": "A mirror"}
+    return report.write_identification(found, target, **given | options)
+
+
+@pytest.fixture
+def no_figures(monkeypatch):
+    """Drawing has tests of its own and takes the longest."""
+    monkeypatch.setattr(figures, "draw", lambda *args, **kwargs: {})
+
+
+def text_of(path):
+    return path.read_text(encoding="utf-8")
+
+
+def rows_of(text):
+    """The cells of each table row of a page, as plain text."""
+    found = []
+    for row in re.findall(r"<tr[^>]*>(.*?)</tr>", text, re.DOTALL):
+        cells = re.findall(r"<t[dh][^>]*>(.*?)</t[dh]>", row, re.DOTALL)
+        found.append([html.unescape(re.sub(r"<[^>]*>", "", cell)).strip() for cell in cells])
+    return found
+
+
+def row_of(text, first):
+    rows = [row for row in rows_of(text) if row and row[0] == first]
+    assert len(rows) == 1, (first, rows)
+    return rows[0]
+
+
+# --------------------------------------------------------------------------------------------------------- the page
+class Links(HTMLParser):
+    """Everything a page would load or link to."""
+
+    def __init__(self):
+        super().__init__()
+        self.found, self.scripts = [], 0
+
+    def handle_starttag(self, tag, attrs):
+        self.scripts += tag == "script"
+        names = {"src", "href", "xlink:href", "data", "action", "poster", "srcset"}
+        self.found += [value for name, value in attrs if name in names]
+
+
+def test_the_page_loads_nothing_and_has_its_sections_in_order(page, full):
+    text = text_of(page)
+    links = Links()
+    links.feed(text)
+    assert [link for link in links.found if not link.startswith("#")] == []
+    assert links.scripts == 0
+    assert "@import" not in text
+    assert not re.search(r"url\((?!#)", text)
+    assert re.findall(r"<h2>(.*?)</h2>", text) == list(SECTIONS)
+    assert 0 < text.index(words.verdict(full)[0]) < text.index("<h2>")
+    assert "nan" not in re.sub(r"<[^>]*>", " ", text).split()
+    assert page.stat().st_size < 3e6
+
+
+def test_every_figure_stands_in_its_section(page):
+    text = text_of(page)
+    parts = dict(zip(SECTIONS, re.split(r"<h2>.*?</h2>", text)[1:], strict=True))
+    counted = {name: part.count("<figure") for name, part in parts.items() if "<figure" in part}
+    assert counted == {"Recordings": 1, "Linear part": 2, "Loops": 1, "Time response": 1, "Residuals": 2}
+
+
+def test_the_ranking_holds_the_numbers_of_the_scores(page, full):
+    text = text_of(page)
+    for score in (*full.scores, full.straight_line):
+        chosen = " (chosen)" if score.model == full.chosen else ""
+        row = row_of(text, score.model + chosen)
+        assert [float(cell) for cell in row[1:5]] == [
+            pytest.approx(score.fit_rms_percent, abs=5.1e-4),
+            pytest.approx(score.fit_peak_percent, abs=5.1e-3),
+            pytest.approx(score.held_out_rms_percent, abs=5.1e-4),
+            pytest.approx(score.held_out_peak_percent, abs=5.1e-3),
+        ]
+        rms_urad = 1e6 * score.held_out_rms_percent / 100 * full.span_rad
+        assert row[5] == f"{rms_urad:.3g} µrad"
+    listed = [
+        row[0].removesuffix(" (chosen)") for row in rows_of(text) if len(row) == 7 and row[6] in ("yes", "no", "")
+    ]
+    listed = [name for name in listed if name in {s.model for s in full.scores} | {"straight line"}]
+    assert listed == [s.model for s in sorted((*full.scores, full.straight_line), key=lambda s: s.held_out_rms_percent)]
+
+
+def test_the_parameter_table_holds_value_and_error_of_every_model(page, full):
+    text = text_of(page)
+    for score, fit in zip(full.scores, full.fits, strict=True):
+        part = text[text.index(f"<summary>{score.model}") :]
+        rows = rows_of(part[: part.index("</table>")])[1:]
+        expected = parameter_rows(fit)
+        assert len(rows) == len(expected) > 0
+        for cells, row in zip(rows, expected, strict=True):
+            value, error, unit = row.shown
+            assert cells[:4] == [row.name, f"{value:.5g}", two_digits(error), unit]
+        for name, why in not_identified(fit):
+            assert any(cells[0] == name and why in cells[4] for cells in rows)
+        below = part[part.index("</table>") : part.index("</details>")]
+        assert starts_text(fit)[1:] in below
+
+
+def test_parameters_are_shown_in_their_units(page, full):
+    fit, part = full.fit("bouc_wen"), text_of(page)
+    rows = rows_of(part[part.index("<summary>bouc_wen") :])
+    d1, alpha = (next(row for row in rows if row[0] == name) for name in ("d1", "alpha"))
+    errors = fit.standard_errors
+    assert d1[1:4] == [f"{1e3 * fit.d1_rad_per_v:.5g}", f"{float(f'{1e3 * errors[0]:.2g}'):g}", "mrad/V"]
+    assert alpha[1:4] == [f"{fit.alpha_per_v:.5g}", f"{float(f'{errors[4]:.2g}'):g}", "1/V"]
+
+
+def test_poles_order_and_gains_are_those_of_the_linear_fit(page, full):
+    text, linear = text_of(page), full.linear
+    upper = linear.poles_rad_s[np.argmax(linear.poles_rad_s.imag)]
+    assert abs(upper) / (2 * np.pi) == pytest.approx(150.0, rel=0.01)
+    assert row_of(text, "pole pair")[1] == f"{abs(upper) / (2 * np.pi):.5g} Hz"
+    assert row_of(text, "pole pair")[3] == f"{-upper.real / abs(upper):.4g}"
+    assert row_of(text, "gain at zero frequency")[1] == f"{1e3 * linear.dc_gain[0, 0]:.5g} mrad/V"
+    edge = row_of(text, f"gain at {linear.excited_hz[0]:.3g} Hz")
+    assert edge[1:3] == [
+        f"{1e3 * linear.edge_gain[0, 0]:.5g} mrad/V",
+        f"{1e3 * linear.edge_gain_error[0, 0]:.2g} mrad/V",
+    ]
+    for score in linear.scan:
+        row = next(r for r in rows_of(text) if len(r) == 6 and r[:2] == [str(score.order), str(score.parameters)])
+        assert row[5] == ("chosen" if score.order == linear.order else "")
+    assert html.unescape(text).count(linear.reason[1:]) == 1
+
+
+def test_recordings_have_their_roles_hashes_and_findings(full, recordings, no_figures, tmp_path):
+    noticed = replace(recordings[0], findings=(Finding("drift", "angle", None, "it drifts by <1 %", True),))
+    found = replace(full, recordings=(noticed, *full.recordings[1:]))
+    text = text_of(write(found, tmp_path / "r.html", recordings=recordings))
+    files = {row[0]: row[1:] for row in rows_of(text) if len(row) == 7 and row[0].endswith(".csv")}
+    assert {name: cells[0] for name, cells in files.items()} == {
+        "60.csv": "loops",
+        "80.csv": "loops",
+        "100.csv": "loops",
+        "chirp.csv": "broadband",
+        "70.csv": "validation",
+    }
+    assert files["60.csv"][1:] == ["60 Hz, ± 6 V about 6 V", "2 kHz", "300", "300", "300 ms"]
+    assert files["chirp.csv"][1:] == ["many frequencies, ± 0.2 V about 0 V", "2 kHz", "8000", "0", "4 s"]
+    for source in full.sources:
+        assert source.sha256 in text
+    assert "drift (accepted): it drifts by &lt;1 %" in text
+    assert "noticed nothing" not in text
+    clean = replace(full, recordings=tuple(replace(r, findings=()) for r in full.recordings))
+    assert "noticed nothing" in text_of(write(clean, tmp_path / "s.html"))
+
+
+def test_refused_models_and_warnings_stand_before_the_numbers(page, full):
+    text = html.unescape(text_of(page))
+    assert [r.model for r in full.refused] == ["prandtl_ishlinskii_creep"]
+    for said in (*full.warnings, full.refused[0].reason):
+        assert text.index("Warnings and refusals") < text.index(said) < text.index("<h2>Recordings")
+
+
+def test_a_page_without_linear_part_says_why(static, tmp_path):
+    text = text_of(write(static, tmp_path / "r.html"))
+    assert re.findall(r"<h2>(.*?)</h2>", text) == list(SECTIONS)
+    assert "No recording is broadband" in text
+    assert text.count("<figure") == 4
+
+
+# ------------------------------------------------------------------------------------------------------ the figures
+def test_every_axis_has_a_label_with_its_unit(full, recordings):
+    shown = figures.shown(full, recordings)
+    drawings = [
+        figures.excitation(shown, full),
+        figures.response(full.linear),
+        figures.poles(full.linear),
+        figures.loops(shown, full),
+        figures.time_response(full, recordings),
+        figures.residuals(shown),
+        figures.residual_tests(full),
+    ]
+    for drawing in drawings:
+        shared = drawing.title.startswith("Frequency response")
+        for axes in drawing.canvas.axes:
+            assert re.fullmatch(r"[a-z ]+ \([^()]+\)", axes.get_ylabel()), (drawing.title, axes.get_ylabel())
+            if not shared or axes is drawing.canvas.axes[-1]:
+                assert re.fullmatch(r"[a-z ]+ \([^()]+\)", axes.get_xlabel()), drawing.title
+            assert axes.lines or axes.collections, drawing.title
+    assert len(drawings[0].canvas.axes) == 2 * len(shown) == 10
+
+
+def test_loops_show_measured_and_modelled_output_and_the_hysteresis(full, recordings):
+    shown = figures.shown(full, recordings)
+    drawing = figures.loops(shown, full)
+    left, right = drawing.canvas.axes[:2]
+    p = words.chosen_predictions(full)[0]
+    measured, unseen, model = left.lines[0], left.lines[1], left.lines[-1]
+    assert [line.get_color() for line in (measured, unseen, model)] == [figures.SKY, figures.BLUE, figures.VERMILION]
+    period = math.ceil(RATE_HZ / 60.0) + 1
+    assert unseen.get_xdata().size == pytest.approx(period, abs=1)
+    np.testing.assert_array_equal(unseen.get_xdata(), full.recordings[0].drive[-unseen.get_xdata().size :, 0])
+    moved = 1e3 * (p.measured_rad - p.model_rad)[-period:]
+    np.testing.assert_allclose(unseen.get_ydata() - model.get_ydata(), moved, atol=1e-12)
+    assert np.ptp(right.lines[1].get_ydata()) / 1e3 < 0.5 * np.ptp(unseen.get_ydata())
+    assert "60 Hz, ± 6 V" in right.get_title(loc="left")
+    assert "unseen" in right.get_title(loc="left")
+
+
+def test_the_papers_figures_are_named_only_where_they_are_shown(full, recordings):
+    drawn = figures.draw(full, recordings)
+    assert list(drawn) == ["excitation", "response", "poles", "loops", "time", "residuals", "tests"]
+    assert drawn["loops"].title.startswith("Fig. 5")
+    assert drawn["time"].title.startswith("Fig. 4")
+    assert f"fit {full.linear.fit_percent[0]:.2f} %" in drawn["time"].title
+    assert "measured less modelled" in drawn["time"].svg
+    assert all("virtual bench" not in figure.title + figure.svg for figure in drawn.values())
+    other = replace(full, recordings=full.recordings[:1], predictions=tuple(p[:1] for p in full.predictions))
+    assert figures.loops(figures.shown(other, []), other).title.startswith("Loops")
+    assert figures.time_response(full, []) is None
+
+
+def test_the_virtual_bench_is_named_on_the_page_and_in_each_figure(static, tmp_path):
+    text = text_of(write(static, tmp_path / "virtual.html", virtual=True))
+    for part in re.findall(r"<figure.*?</figure>", text, re.DOTALL):
+        assert "(virtual bench)</title>" not in part
+        assert part.count("virtual bench") >= 3  # label of the group, the picture itself, its caption
+    assert '<span class="badge">virtual bench</span>' in text
+    assert "virtual bench" not in text_of(write(static, tmp_path / "real.html"))
+
+
+def test_long_records_are_drawn_small_and_keep_their_peaks(static):
+    shown = figures.shown(static, [])[0]
+    n = 400_000
+    residual = np.zeros(n)
+    residual[123_457] = 5e-6
+    prediction = replace(shown.prediction, measured_rad=residual, model_rad=np.zeros(n), start=10, split=n // 2)
+    drawing = figures.residuals([replace(shown, drive_v=np.arange(n) / n, prediction=prediction)])
+    lines = drawing.canvas.axes[0].lines[:2]
+    assert all(0 < line.get_xdata().size <= 2 * MOST_POINTS for line in lines)
+    assert np.max(lines[0].get_ydata()) == pytest.approx(5.0)
+    assert np.max(lines[1].get_ydata()) == 0.0
+
+
+def test_only_some_of_many_recordings_are_drawn_and_the_caption_says_so(static):
+    shown = figures.shown(static, [])[0]
+    many = figures.residuals([shown] * (figures.MOST_RECORDINGS + 3))
+    assert len(many.canvas.axes) == figures.MOST_RECORDINGS
+    assert "3 more recordings are not drawn" in many.caption
+    assert "not drawn" not in figures.residuals([shown] * 3).caption
+
+
+def test_the_spectrum_shows_amplitudes_and_a_chirp_is_told_from_noise():
+    t = np.arange(2000) / 1000.0
+    freq, amplitude = figures.amplitude_spectrum(3 + 2 * np.sin(2 * np.pi * 50 * t), 1000.0)
+    assert freq[np.argmax(amplitude)] == pytest.approx(50.0)
+    assert amplitude.max() == pytest.approx(2.0, rel=1e-9)
+    assert figures.is_chirp(chirp())
+    noise = philox(0).standard_normal(4000)
+    assert not figures.is_chirp(recording_from_arrays(noise, noise, RATE_HZ, "noise"))
+
+
+def test_the_frequency_of_a_drive():
+    t = np.arange(5000) / 5000.0
+    plain, growing = words.sine_of(6 + 3 * np.sin(2 * np.pi * 40 * t), 5000.0), None
+    growing = words.sine_of(6 + np.ceil(3 * t) * np.sin(2 * np.pi * 42 * t), 5000.0)
+    assert (plain.freq_hz, plain.amplitude_v) == (pytest.approx(40, rel=1e-3), pytest.approx(3, rel=1e-3))
+    assert (growing.freq_hz, growing.amplitude_v) == (pytest.approx(42, rel=1e-2), pytest.approx(3, rel=1e-2))
+    assert words.sine_of(philox(1).standard_normal(5000), 5000.0) is None
+    assert words.sine_of(np.repeat([0.0, 6.0, 12.0, 6.0, 0.0], 1000), 5000.0) is None
+
+
+# ------------------------------------------------------------------------------------------------ hostile and broken
+def test_names_and_titles_are_escaped(static, tmp_path):
+    text = text_of(write(static, tmp_path / "r.html", title=HOSTILE, mirror_file=Path(HOSTILE)))
+    assert "<script" not in text
+    assert text.count("&lt;script&gt;") >= 4
+    assert "$x_^2$" in text
+
+
+def test_a_file_of_another_is_left_alone(static, no_figures, tmp_path):
+    mine = tmp_path / "notes.html"
+    mine.write_text("<!DOCTYPE html>\n<html lang='en'>mine", encoding="utf-8")
+    for overwrite in (False, True):
+        with pytest.raises(report.ReportError, match=r"notes\.html is not a report that microrad identify wrote"):
+            write(static, mine, overwrite=overwrite)
+    assert text_of(mine).endswith("mine")
+    with pytest.raises(report.ReportError, match="is not a report that microrad"):
+        write(static, tmp_path, overwrite=True)
+    with pytest.raises(report.ReportError, match=r"there is no folder .*nowhere; create it first"):
+        write(static, tmp_path / "nowhere" / "r.html")
+    assert [p.name for p in tmp_path.iterdir()] == ["notes.html"]
+
+
+def test_an_older_report_is_replaced_only_when_told(static, no_figures, tmp_path):
+    target = tmp_path / "r.html"
+    target.write_text(BEGINS + "old", encoding="utf-8")
+    with pytest.raises(report.ReportError, match="replace it with --overwrite"):
+        write(static, target)
+    assert text_of(target).endswith("old")
+    assert write(static, target, overwrite=True) == target
+    assert text_of(target).startswith(BEGINS)
+    assert text_of(target).rstrip().endswith("</html>")
+    assert [p.name for p in tmp_path.iterdir()] == ["r.html"]
+
+
+@pytest.mark.parametrize("error", [KeyboardInterrupt, OSError(28, "No space left on device"), MemoryError])
+def test_an_interrupted_write_leaves_nothing_and_keeps_the_old(static, no_figures, tmp_path, monkeypatch, error):
+    target = tmp_path / "r.html"
+    target.write_text(BEGINS + "old", encoding="utf-8")
+
+    def fails(descriptor):
+        raise error
+
+    monkeypatch.setattr(os, "fsync", fails)
+    with pytest.raises(BaseException) as caught:
+        write(static, target, overwrite=True)
+    assert not isinstance(caught.value, report.ReportError)
+    assert text_of(target).endswith("old")
+    assert [p.name for p in tmp_path.iterdir()] == ["r.html"]
+
+
+# --------------------------------------------------------------------------------------------------- text and data
+def test_the_text_holds_scores_parameters_roles_and_what_to_do_next(full):
+    text = report.identification_text(full, "linear", mirror_file=Path("a b.toml"), report_file=Path("r.html"))
+    assert full.chosen == "bouc_wen"
+    assert "linear (written)" in text
+    assert "bouc_wen (written)" not in text
+    for needed in ("straight line", "held-out samples", "±", "refused: prandtl_ishlinskii_creep", "warning: Valid"):
+        assert needed in text
+    for role in ("loops", "broadband", "validation"):
+        assert re.search(rf"^  {role} +\d+ fitted +\d+ held out  \S+\.csv$", text, re.MULTILINE)
+    score = full.score("linear")
+    assert f"{score.held_out_rms_percent:10.3f}{score.held_out_peak_percent:10.2f}" in text
+    assert f"linear part, excited from {full.linear.excited_hz[0]:.4g} Hz" in text
+    assert "The mirror file holds linear as asked" in text
+    assert text.endswith(
+        "r.html written: what was found, with pictures.\n"
+        "a b.toml written (linear). Next: microrad run leo-geo.toml --mirror 'a b.toml' --output 'a b-study'"
+    )
+    assert "as asked" not in report.identification_text(full, full.chosen)
+
+
+def test_the_verdict_compares_with_the_papers_model_and_the_line(full, static):
+    said = " ".join(words.verdict(full))
+    own = full.score().held_out_rms_percent
+    line = full.straight_line.held_out_rms_percent
+    assert f"a straight line leaves {line * full.span_rad * 1e4:.3g} µrad rms ({line:.3g} %)" in said
+    assert f", {line / own:.3g} times as much" in said
+    assert "It is the paper's model (Eq. 3)" in said
+    other = replace(full, chosen="linear")
+    paper = full.score("bouc_wen")
+    ratio = paper.held_out_rms_percent / full.score("linear").held_out_rms_percent
+    beside = f"The paper's model (bouc_wen) leaves {paper.held_out_rms_percent * full.span_rad * 1e4:.3g} µrad rms"
+    assert beside in " ".join(words.verdict(other))
+    assert f", {ratio:.3g} times as much, a straight" in " ".join(words.verdict(other))
+    assert f"rates up to {full.rate_limit_v_per_s / 1e3:.4g} kV/s" in said
+    freq = full.rate_limit_v_per_s / (math.pi * (full.drive_max_v - full.drive_min_v))
+    assert f"reaches at {freq:.4g} Hz" in said
+    assert "from 0 V to 12 V" in said
+    assert "was not fitted" in " ".join(words.verdict(static))
+    assert "There is no linear part" in " ".join(words.verdict(static))
+
+
+def test_the_data_are_json_with_finite_numbers_or_null(full):
+    data = report.identification_data(full, full.chosen, mirror_file=Path("m.toml"))
+    assert json.loads(json.dumps(data, allow_nan=False)) == data
+    assert (data["mirror_file"], data["report_file"]) == ("m.toml", None)
+    assert [s["model"] for s in data["scores"]] == [*(s.model for s in full.scores), "straight line"]
+    assert data["scores"][0]["held_out_rms_rad"] == full.scores[0].held_out_rms_percent / 100 * full.span_rad
+    plays, bouc_wen = data["parameters"]["prandtl_ishlinskii"], data["parameters"]["bouc_wen"]
+    assert plays["weights_rad_v"] == full.fit("prandtl_ishlinskii").weights_rad_per_v.tolist()
+    held = [e is None for e in plays["standard_errors_rad_v"]]
+    assert held == [w == 0 for w in plays["weights_rad_v"]]
+    assert any(held)
+    assert bouc_wen["d1"] == {
+        "value": full.fit("bouc_wen").d1_rad_per_v,
+        "standard_error": float(full.fit("bouc_wen").standard_errors[0]),
+        "unit": "rad/V",
+    }
+    assert bouc_wen["starts"] == 12
+    assert plays["starts"] is None
+    assert data["linear"]["order"] == full.linear.order
+    assert data["residual"]["white"] == full.residual.white
+    assert data["refused"].keys() == {"prandtl_ishlinskii_creep"}
+
+
+def test_a_held_number_has_no_error_and_says_why(full):
+    rows = {row.name: row for row in parameter_rows(full.fit("linear"))}
+    lone = ParameterRow("gain", 2e-3, 1e-4, "rad/V")
+    assert lone.shown == (2.0, pytest.approx(0.1), "mrad/V")
+    assert math.isfinite(rows["weight at 0 V"].standard_error)
+    if full.chosen != "linear":
+        assert math.isnan(rows["pole 1"].standard_error)
+        assert rows["pole 1"].note == "held, from the frequency response"
+
+
+def test_an_error_has_two_digits_and_no_needless_exponent():
+    assert [two_digits(x) for x in (904.2, 0.01234, 1.0, 3.04e-7)] == ["900", "0.012", "1", "3e-07"]
+    assert two_digits(math.nan) == ""
+
+
+def test_the_report_package_stays_light_to_import():
+    import subprocess
+    import sys
+
+    code = "import sys, microrad.report; print([m for m in ('matplotlib', 'jinja2', 'xarray') if m in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"

@@ -1,0 +1,416 @@
+"""Recordings from binary and LabVIEW files: what is read, and each refusal of a damaged or contradictory file."""
+
+import io
+import pickle
+import struct
+import sys
+import zipfile
+
+import h5py
+import lvm_read
+import numpy as np
+import pytest
+from nptdms import ChannelObject, TdmsWriter
+from scipy.io import savemat
+
+from microrad.recording import RecordingError, multisine_recordings, read_recording
+
+N, RATE_HZ = 1000, 2000.0
+TIME_S = np.arange(N) / RATE_HZ
+DRIVE = 6 + 6 * np.sin(2 * np.pi * 7.3 * TIME_S)
+OUTPUT = 0.08 * np.sin(2 * np.pi * 7.3 * TIME_S - 0.1)
+
+
+def refusal(path, *args, **kwargs):
+    with pytest.raises(RecordingError) as caught:
+        read_recording(path, *args, **kwargs)
+    message = str(caught.value)
+    assert str(path) in message
+    return message
+
+
+def check(read, names=("drive", "output"), rate_hz=RATE_HZ):
+    np.testing.assert_allclose(read.drive[:, 0], DRIVE, atol=1e-12)
+    np.testing.assert_allclose(read.output[:, 0], OUTPUT, atol=1e-12)
+    assert read.rate_hz == pytest.approx(rate_hz, rel=1e-9)
+    assert (*read.input_names, *read.output_names) == names
+    assert len(read.sha256) == 64
+
+
+# ---------------------------------------------------------------------------------------------------------------- TDMS
+def tdms(path, *, step=1 / RATE_HZ, drive=DRIVE, output=OUTPUT, more=None):
+    with TdmsWriter(path) as file:
+        for name, values in (("drive", drive), ("output", output)):
+            properties = {"wf_increment": step, "unit_string": "V", **(more or {}).get(name, {})}
+            file.write_segment([ChannelObject("bench", name, values, properties)])
+    return path
+
+
+def test_tdms(tmp_path):
+    path = tdms(tmp_path / "a.tdms")
+    read = read_recording(path, "bench/drive", "output")
+    check(read, ("bench/drive", "bench/output"))
+    assert read.input_units == ("V",)
+    check(read_recording(path, 0, 1, RATE_HZ), ("bench/drive", "bench/output"))
+
+
+def test_tdms_ignores_a_stale_index(tmp_path):
+    path = tdms(tmp_path / "a.tdms")
+    tdms(tmp_path / "b.tdms", drive=DRIVE[:300], output=OUTPUT[:300])
+    (tmp_path / "a.tdms_index").write_bytes(b"TDSh" + (tmp_path / "b.tdms").read_bytes()[4:])
+    assert read_recording(path, "drive", "output").samples == N
+    assert "index" in refusal(tmp_path / "a.tdms_index", 0, 1)
+
+
+def test_tdms_rate_disagrees(tmp_path):
+    message = refusal(tdms(tmp_path / "a.tdms"), "drive", "output", 2003.0)
+    assert "2003 Hz (given) and 2000 Hz (wf_increment = 0.0005 s of 'bench/drive')" in message
+    assert read_recording(tmp_path / "a.tdms", "drive", "output", 2001.0).rate_hz == 2001.0
+
+
+def test_tdms_two_increments(tmp_path):
+    path = tdms(tmp_path / "a.tdms", more={"output": {"wf_increment": 0.001}})
+    assert "2000 Hz" in refusal(path, "drive", "output")
+    assert "1000 Hz" in refusal(path, "drive", "output")
+
+
+def test_tdms_lengths_differ(tmp_path):
+    message = refusal(tdms(tmp_path / "a.tdms", output=OUTPUT[:-5]), "drive", "output")
+    assert "has 1000 samples and channel 1 ('bench/output') 995" in message
+
+
+def test_tdms_starts_differ(tmp_path):
+    start = np.datetime64("2026-01-01T00:00:00")
+    late = start + np.timedelta64(10, "ms")
+    path = tmp_path / "a.tdms"
+    with TdmsWriter(path) as file:
+        for name, values, begin in (("drive", DRIVE, start), ("output", OUTPUT, late)):
+            properties = {"wf_increment": 1 / RATE_HZ, "wf_start_time": begin}
+            file.write_segment([ChannelObject("bench", name, values, properties)])
+    assert "'bench/output' starts 0.01 s apart from 'bench/drive'" in refusal(path, "drive", "output")
+
+
+def test_tdms_without_increment_needs_a_rate(tmp_path):
+    path = tdms(tmp_path / "a.tdms", step=0.0)
+    assert "give the rate (--rate, rate_hz) in Hz" in refusal(path, "drive", "output")
+    check(read_recording(path, "drive", "output", RATE_HZ), ("bench/drive", "bench/output"))
+
+
+@pytest.mark.parametrize(
+    ("damage", "words"),
+    [
+        (lambda b: b[:-100], "is truncated: 100 of its"),
+        (lambda b: b[:20], "has 20 of the 28 bytes of its lead-in"),
+        (lambda b: b + b"TDSm12", "has 6 of the 28 bytes"),
+        (lambda b: b + b"garbage" * 5, "should begin with 'TDSm' and begins with b'garb'"),
+        (lambda b: b[:12] + b"\xff" * 8 + b[20:], "was never completed"),
+        (lambda b: b[:8] + struct.pack("<l", 17) + b[12:], "states version 17"),
+        (lambda b: b[:20] + struct.pack("<Q", 1 << 40) + b[28:], "places its data at byte"),
+        (lambda b: b[:28] + b"\xff" * 40 + b[68:], "cannot be read as a TDMS file"),
+    ],
+)
+def test_damaged_tdms(tmp_path, damage, words):
+    path = tdms(tmp_path / "a.tdms")
+    path.write_bytes(damage(path.read_bytes()))
+    message = refusal(path, "drive", "output")
+    assert words in message
+    assert "again" in message
+
+
+def test_empty_tdms(tmp_path):
+    path = tmp_path / "a.tdms"
+    path.write_bytes(b"")
+    assert "the file is empty" in refusal(path, 0, 1)
+    path.write_bytes(b"TDSm" + struct.pack("<llQQlL", 2, 4713, 4, 4, 0, 0)[:28])
+    assert "holds no channel of numbers" in refusal(path, 0, 1)
+    with TdmsWriter(path) as file:
+        file.write_segment([ChannelObject("g", "words", ["a", "b"]), ChannelObject("g", "none", np.array([]))])
+    message = refusal(path, "words", 1)
+    assert "'g/words' holds" in message
+    assert "'g/none' holds no samples" in message
+
+
+def test_renamed_files(tmp_path):
+    path = tmp_path / "a.tdms"
+    path.write_text("drive,output\n" + "1,2\n" * 300)
+    message = refusal(path, 0, 1)
+    assert "the name says a LabVIEW TDMS file" in message
+    assert "the first bytes are 'drive,output'; if it is text, rename it to 'a.csv'" in message
+    binary = tdms(tmp_path / "b.csv")
+    assert "the content is a LabVIEW TDMS file; rename the file to 'b.tdms'" in refusal(binary, 0, 1)
+    for suffix in ("mat", "npy", "npz", "h5"):
+        path = tmp_path / f"c.{suffix}"
+        path.write_text("drive,output\n" + "1,2\n" * 300)
+        assert "rename it to 'c.csv'" in refusal(path, 0, 1)
+    packed = tmp_path / "d.csv"
+    packed.write_bytes(b"\x1f\x8b\x08" + bytes(100))
+    assert "unpack it first" in refusal(packed, 0, 1)
+    old = tmp_path / "e.mat"
+    old.write_bytes(struct.pack("<5i", 0, N, 1, 0, 6) + b"drive\x00" + DRIVE.tobytes())
+    assert "save it with -v7" in refusal(old, 0, 1)
+
+
+@pytest.mark.parametrize(("library", "suffix"), [("nptdms", "tdms"), ("h5py", "h5")])
+def test_missing_library(tmp_path, monkeypatch, library, suffix):
+    path = tmp_path / f"a.{suffix}"
+    tdms(path) if suffix == "tdms" else hdf5(path)
+    monkeypatch.setitem(sys.modules, library, None)
+    assert "pip install 'microrad[lab]'" in refusal(path, 0, 1)
+
+
+# ----------------------------------------------------------------------------------------------------------------- LVM
+def lvm(path, *, x_columns="No", comma=False, segments=1, gap_s=0.0, comment="", rows=None):
+    separator = "\t"
+    head = ["LabVIEW Measurement", "Writer_Version\t2", "Reader_Version\t2", "Separator\tTab"]
+    head += [f"Decimal_Separator\t{',' if comma else '.'}", "Multi_Headings\tYes", f"X_Columns\t{x_columns}"]
+    text = "\n".join([*head, "Time_Pref\tAbsolute", "***End_of_Header***", ""]) + "\n"
+    cut = np.array_split(np.arange(N), segments)
+    for k, part in enumerate(cut):
+        clock = f"12:00:{TIME_S[part[0]] + k * gap_s:010.7f}"
+        names = {"No": "X_Value\tdrive\toutput", "One": "X_Value\tdrive\toutput"}.get(
+            x_columns, "X_Value\tdrive\tX_Value\toutput"
+        )
+        tags = ["Channels\t2", f"Samples\t{part.size}\t{part.size}", "Date\t2026/01/01\t2026/01/01"]
+        tags += [f"Time\t{clock}\t{clock}", "Y_Unit_Label\tVolts\tum", "X0\t0.0\t0.0", "Delta_X\t5.0E-4\t5.0E-4"]
+        body = []
+        for i in part:
+            u, y, t = (
+                f"{DRIVE[i]:.15g}",
+                f"{OUTPUT[i]:.15g}",
+                f"{(i - part[0]) / RATE_HZ:.6f}",
+            )
+            row = {"No": ["", u, y], "One": [t, u, y], "Multi": [t, u, t, y]}[x_columns]
+            body.append(separator.join(row))
+        if rows is not None:
+            rows(body)
+        if comment:
+            body[0] += separator + comment
+            names += separator + "Comment"
+        block = "\n".join([*tags, "***End_of_Header***", names, *body]) + "\n\n"
+        text += block.replace(".", ",") if comma else block
+    path.write_bytes(text.replace("\n", "\r\n").encode("latin-1"))
+    return path
+
+
+@pytest.mark.parametrize("x_columns", ["No", "One", "Multi"])
+@pytest.mark.parametrize("comma", [False, True])
+@pytest.mark.parametrize("comment", ["", "started"])
+def test_lvm(tmp_path, x_columns, comma, comment):
+    path = lvm(tmp_path / "a.lvm", x_columns=x_columns, comma=comma, comment=comment)
+    read = read_recording(path, "drive", "output")
+    check(read)
+    assert (read.input_units, read.output_units) == (("Volts",), ("um",))
+    if not comment and x_columns != "Multi":
+        other = lvm_read.read(str(path), read_from_pickle=False, dump_file=False)[0]["data"]
+        np.testing.assert_array_equal(other[:, -2:], np.column_stack((read.drive, read.output)))
+
+
+def test_lvm_segments(tmp_path):
+    path = lvm(tmp_path / "a.lvm", segments=3)
+    check(read_recording(path, "drive", "output"))
+    path = lvm(tmp_path / "b.lvm", segments=3, gap_s=0.1)
+    assert "The channels are '0/drive', '0/output', '1/drive'" in refusal(path, "drove", "output")
+    assert "'drive' may be '0/drive', '1/drive', '2/drive'" in refusal(path, "drive", "output")
+    read = read_recording(path, "1/drive", "1/output")
+    np.testing.assert_allclose(read.drive[:, 0], DRIVE[334:667], atol=1e-12)
+
+
+@pytest.mark.parametrize(("bad", "words"), [("x", "'x' is not a finite number"), ("", "the cell is empty")])
+def test_lvm_bad_cell(tmp_path, bad, words):
+    def spoil(body):
+        body[400] = f"\t1.0\t{bad}"
+
+    path = lvm(tmp_path / "a.lvm", rows=spoil)
+    line = path.read_bytes().decode("latin-1").split("\r\n").index(f"\t1.0\t{bad}") + 1
+    message = refusal(path, "drive", "output")
+    assert f"line {line}, channel 1 ('output'): {words}" in message
+
+
+def test_damaged_lvm(tmp_path):
+    path = lvm(tmp_path / "a.lvm")
+    text = path.read_bytes()
+    path.write_bytes(text[:60])
+    assert "no '***End_of_Header***'" in refusal(path, 0, 1)
+    path.write_bytes(text[: text.index(b"Channels")])
+    assert "no segment with a header" in refusal(path, 0, 1)
+    path.write_bytes(text.replace(b"Separator\tTab", b"Separator\tPipe", 1))
+    assert "names the separator 'Pipe'" in refusal(path, 0, 1)
+    path.write_bytes(text.replace(b"X_Value\t", b"1.0\t", 1))
+    assert "should name the columns, beginning with 'X_Value'" in refusal(path, 0, 1)
+
+
+# -------------------------------------------------------------------------------------------------------------- MATLAB
+def matlab73(path, **variables):
+    with h5py.File(path, "w", userblock_size=512) as file:
+        for name, values in variables.items():
+            file[name] = np.atleast_2d(values).T
+    with path.open("r+b") as file:
+        file.write(b"MATLAB 7.3 MAT-file".ljust(124) + b"\x00\x02IM")
+    return path
+
+
+def test_matlab_v5(tmp_path):
+    path = tmp_path / "a.mat"
+    savemat(path, {"drive": DRIVE, "x": np.column_stack((DRIVE, OUTPUT)), "fs": RATE_HZ, "note": "hello"})
+    check(read_recording(path, "drive", "x[1]"), ("drive", "x[1]"))
+    check(read_recording(path, 0, 2), ("drive", "x[1]"))
+    assert "'note' holds text" in refusal(path, "note", "x[1]")
+    assert "2500 Hz (given) and 2000 Hz (fs = 2000 Hz)" in refusal(path, "drive", "x[1]", 2500.0)
+
+
+def test_matlab_structure(tmp_path):
+    path = tmp_path / "a.mat"
+    savemat(path, {"run": {"drive": DRIVE, "output": OUTPUT, "dt": 1 / RATE_HZ, "in": {"t": TIME_S}}})
+    check(read_recording(path, "run/drive", "output"), ("run/drive", "run/output"))
+    check(read_recording(path, "run/drive", "output", time="t"), ("run/drive", "run/output"))
+
+
+def test_matlab_v73(tmp_path):
+    both = np.column_stack((DRIVE, OUTPUT))
+    path = matlab73(tmp_path / "a.mat", both=both, dt=1 / RATE_HZ)
+    check(read_recording(path, "both[0]", "both[1]"), ("both[0]", "both[1]"))
+    assert "nearest is 'both[1]'" in refusal(path, "both[0]", "both[2]")
+
+
+@pytest.mark.parametrize("kept", [200, 1000, 9000])
+def test_truncated_matlab(tmp_path, kept):
+    path = tmp_path / "a.mat"
+    savemat(path, {"drive": DRIVE, "output": OUTPUT})
+    path.write_bytes(path.read_bytes()[:kept])
+    assert "damaged or truncated" in refusal(path, "drive", "output", RATE_HZ)
+
+
+def test_complex_matlab(tmp_path):
+    path = tmp_path / "a.mat"
+    savemat(path, {"drive": DRIVE + 1j, "output": OUTPUT})
+    assert "complex numbers" in refusal(path, "drive", "output", RATE_HZ)
+
+
+# --------------------------------------------------------------------------------------------------------------- NumPy
+def test_numpy_archive(tmp_path):
+    path = tmp_path / "a.npz"
+    np.savez(path, drive=DRIVE, output=OUTPUT[:, None], sample_rate=RATE_HZ)
+    check(read_recording(path, "drive", "output"))
+    np.savez_compressed(path, drive=DRIVE.astype(np.float32), output=OUTPUT, time=TIME_S)
+    read = read_recording(path, "drive", "output")
+    np.testing.assert_allclose(read.drive[:, 0], DRIVE, rtol=1e-6)
+    assert read.rate_hz == RATE_HZ
+
+
+def test_numpy_array(tmp_path):
+    path = tmp_path / "a.npy"
+    np.save(path, np.column_stack((DRIVE, OUTPUT)))
+    check(read_recording(path, 0, 1, RATE_HZ), ("data[0]", "data[1]"))
+    np.save(path, np.vstack((DRIVE, OUTPUT)))
+    check(read_recording(path, "data[0]", "data[1]", RATE_HZ), ("data[0]", "data[1]"))
+    assert "give the rate" in refusal(path, 0, 1)
+
+
+def test_many_axes(tmp_path):
+    path = tmp_path / "a.npy"
+    np.save(path, np.stack((DRIVE, OUTPUT), axis=1)[:, :, None, None] * np.ones((1, 1, 3, 2)))
+    check(read_recording(path, "data[0, 2, 1]", "data[1,2,1]", RATE_HZ), ("data[0, 2, 1]", "data[1, 2, 1]"))
+    message = refusal(path, 0, 1, RATE_HZ)
+    assert "shape (1000, 2, 3, 2)" in message
+    assert "multisine_recordings" in message
+    assert "'data[2, 0, 0]' is no channel" in refusal(path, "data[2, 0, 0]", "data[0, 0, 0]", RATE_HZ)
+
+
+class Trap:
+    def __reduce__(self):
+        return (pytest.fail, ("unpickled",))
+
+
+def test_pickles_are_never_loaded(tmp_path):
+    path = tmp_path / "a.npz"
+    header = io.BytesIO()
+    np.lib.format.write_array_header_1_0(header, {"descr": "|O", "fortran_order": False, "shape": (1,)})
+    evil = header.getvalue() + pickle.dumps(Trap())
+    np.savez(path, drive=DRIVE)
+    with zipfile.ZipFile(path, "a") as archive:
+        archive.writestr("output.npy", evil)
+    assert "'output' holds Python objects" in refusal(path, "drive", "output", RATE_HZ)
+    (tmp_path / "a.npy").write_bytes(evil)
+    assert "holds Python objects" in refusal(tmp_path / "a.npy", 0, 1, RATE_HZ)
+
+
+def test_truncated_numpy(tmp_path):
+    path = tmp_path / "a.npy"
+    np.save(path, np.column_stack((DRIVE, OUTPUT)))
+    path.write_bytes(path.read_bytes()[:-8])
+    assert "needs 16000 bytes and 15992 are there" in refusal(path, 0, 1, RATE_HZ)
+    path = tmp_path / "a.npz"
+    np.savez(path, drive=DRIVE, output=OUTPUT)
+    path.write_bytes(path.read_bytes()[:-50])
+    assert "damaged or truncated" in refusal(path, "drive", "output", RATE_HZ)
+
+
+def test_nan_in_an_array(tmp_path):
+    path = tmp_path / "a.npz"
+    np.savez(path, drive=DRIVE, output=np.where(np.arange(N) == 77, np.nan, OUTPUT))
+    message = refusal(path, "drive", "output", RATE_HZ)
+    assert "sample 77 of the output, channel 1 ('output') is nan, 1 such samples" in message
+
+
+# ---------------------------------------------------------------------------------------------------------------- HDF5
+def hdf5(path):
+    with h5py.File(path, "w") as file:
+        group = file.create_group("run")
+        group["drive"], group["output"], group["words"] = DRIVE, OUTPUT[:, None], "hello"
+        group["drive"].attrs["units"] = "V"
+        group.attrs["fs"] = RATE_HZ
+        file["other/output"] = OUTPUT
+    return path
+
+
+def test_hdf5(tmp_path):
+    path = hdf5(tmp_path / "a.h5")
+    read = read_recording(path, "drive", "run/output")
+    check(read, ("run/drive", "run/output"))
+    assert (read.input_units, read.output_units) == (("V",), ("",))
+    assert "'output' may be 'other/output', 'run/output'" in refusal(path, "drive", "output")
+    assert "'run/words' holds Python objects or cells" in refusal(path, "words", "run/output")
+    assert "there is no input channel 9: the HDF5 file has 3 channels" in refusal(path, 9, 0)
+
+
+def test_truncated_hdf5(tmp_path):
+    path = hdf5(tmp_path / "a.h5")
+    path.write_bytes(path.read_bytes()[:3000])
+    assert "damaged or truncated" in refusal(path, 0, 1)
+
+
+# ----------------------------------------------------------------------------------------------------- several channels
+def test_several_channels(tmp_path):
+    rng = np.random.Generator(np.random.Philox(3))
+    u = rng.standard_normal((N, 2))
+    y = u @ np.array([[1.0, 0.2, 0.1], [0.1, 0.8, 0.3]]) + 0.01 * rng.standard_normal((N, 3))
+    path = tmp_path / "a.npz"
+    np.savez(path, u=u, y=y, fs=RATE_HZ)
+    read = read_recording(path, ["u[0]", "u[1]"], (2, 3, 4), period_samples=500)
+    np.testing.assert_array_equal(read.drive, u)
+    np.testing.assert_array_equal(read.output, y)
+    assert (read.output_names, read.period_samples) == (("y[0]", "y[1]", "y[2]"), 500)
+    assert "is given twice as input" in refusal(path, [0, 0], 2)
+    assert "no output channel was given" in refusal(path, 0, [])
+    for period in (1, N + 1, 2.5):
+        assert "period" in refusal(path, 0, 2, period_samples=period)
+
+
+def test_copies_are_refused(tmp_path):
+    path = tmp_path / "a.npz"
+    np.savez(path, a=DRIVE, b=3 - 2 * DRIVE, y=OUTPUT, fs=RATE_HZ)
+    message = refusal(path, ["a", "b"], "y")
+    assert "the input, channel 1 ('b') is a copy of the input, channel 0 ('a')" in message
+    assert "drive the inputs independently" in message
+
+
+def test_multisine_recordings():
+    rng = np.random.Generator(np.random.Philox(4))
+    u = np.repeat(rng.standard_normal((512, 2, 3, 1)), 2, axis=3)
+    y = u[:, ::-1] + 0.3 * u
+    read = multisine_recordings(u, y, RATE_HZ, "bench")
+    assert [r.path for r in read] == ["bench realisation 0", "bench realisation 1", "bench realisation 2"]
+    assert all((r.drive.shape, r.period_samples) == ((1024, 2), 512) for r in read)
+    np.testing.assert_array_equal(read[1].output[512:], y[:, :, 1, 1])
+    with pytest.raises(RecordingError, match="the same samples, realisations and periods"):
+        multisine_recordings(u, y[:, :, :2], RATE_HZ)
