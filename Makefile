@@ -28,6 +28,11 @@ unit: $(VENV)/.test
 benchmark: $(VENV)/.test
 	$(BIN)/python benchmarks/loop.py
 	$(BIN)/python benchmarks/start.py
+	$(BIN)/python benchmarks/recording.py
+	$(BIN)/python benchmarks/vector_fitting.py
+	$(BIN)/python benchmarks/hysteresis_fit.py
+	$(BIN)/python benchmarks/cubespec_linear.py
+	$(BIN)/python benchmarks/cubespec_one_model.py
 
 clean:
 	rm -rf $(VENV) $(DEMO)

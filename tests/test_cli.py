@@ -23,7 +23,7 @@ from microrad.cli import lab
 
 ROOT = Path(__file__).parents[1]
 PAPER = ROOT / "src" / "microrad" / "missions" / "leo-geo.toml"
-COMMANDS = ("init", "run", "identify", "doctor", "schema")
+COMMANDS = ("init", "run", "identify", "bench", "doctor", "schema")
 MICRORAD = (sys.executable, "-m", "microrad")
 COLUMNS = ("--input", "drive", "--output", "angle", "--rate", "1000", "--static")
 

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from microrad import lti, mirror_table
-from microrad.hysteresis import BoucWen, Play
-from microrad.mirror import hysteresis_model, linear_part
+from microrad.hysteresis import BoucWen, Creep, Play, slow_gain
+from microrad.mirror import creep_model, hysteresis_model, linear_part
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,6 +27,7 @@ class Summary:
     name: str
     composition: str
     model: BoucWen | Play
+    creep: Creep
     roots: tuple[Root, ...]
     dc_gain: float
     flat_band_hz: tuple[float, float]
@@ -48,9 +49,17 @@ class Summary:
                 f"{self.flat_band_hz[1]:.0f} Hz {self.in_band_gain[0]:.5f} to {self.in_band_gain[1]:.5f}",
             ]
             lines += [f"  {r.kind} at {r.frequency_hz:.4g} Hz, damping {r.damping:.3f}" for r in self.roots]
+        if self.creep.weights_rad_v:
+            share = 100.0 * math.fsum(self.creep.weights_rad_v) / slow_gain(self.model)
+            first, last = self.creep.time_constants_s[0], self.creep.time_constants_s[-1]
+            lines.append(
+                f"  creep adds {share:.3g} % of the gain in the long run, with lags from {first:g} s to {last:g} s"
+            )
         limit = f"{self.rate_limit_v_s:.4g} V/s"
         lines += [
-            f"  exponent's rate held at {limit}; clamped samples are counted" if bouc_wen else f"  valid to {limit}"
+            f"  rate in the hysteresis held at {limit}; clamped samples are counted"
+            if bouc_wen or (isinstance(self.model, Play) and self.model.widening_s)
+            else f"  valid to {limit}"
         ]
         return "\n".join(lines + [f"  warning: {w}" for w in self.warnings])
 
@@ -96,7 +105,18 @@ def summarise(table: mirror_table.Mirror) -> Summary:
         if not 0.9 * band[0] <= dc <= 1.1 * band[1]:
             warnings.append(f"gain at DC {dc:.5f} is not the gain in the band, {band[0]:.5f} to {band[1]:.5f}")
     return Summary(
-        table.name, table.composition, model, roots, dc, flat, band, at, by, table.rate_limit_v_s, tuple(warnings)
+        table.name,
+        table.composition,
+        model,
+        creep_model(table),
+        roots,
+        dc,
+        flat,
+        band,
+        at,
+        by,
+        table.rate_limit_v_s,
+        tuple(warnings),
     )
 
 

@@ -36,7 +36,7 @@ from microrad.identify.records import (
     prepare,
     span,
 )
-from microrad.identify.roles import roles
+from microrad.identify.roles import roles, whole_periods
 from microrad.recording import Recording
 
 STATIC = ("prandtl_ishlinskii", "bouc_wen", "bouc_wen_admissible")
@@ -158,6 +158,8 @@ def identify(  # noqa: PLR0913  all but the first are named options in practice
     splits = _splits(loops, hold_out, bool(validation))
     heads = [replace(r, drive=r.drive[:k], output=r.output[:k]) for r, k in zip(loops, splits, strict=True)]
     prepared = prepare(heads, units)
+    seen = {id(r): head for r, head in zip(loops, heads, strict=True)}
+    response = [whole_periods(seen[id(r)]) if id(r) in seen else r for r in response]
     linear = _linear(response, units, models, on_progress)
     names, refused = _supported(models, prepared, linear)
     fitter = _Fitter(heads, response[:1], linear, units, seed, admissible)
@@ -166,7 +168,8 @@ def identify(  # noqa: PLR0913  all but the first are named options in practice
     predictions = [judge.predictions(fit) for fit in fits]
     best = _best(fits, [[r for p in each if (r := p.residual_rad[p.split :]).size] for each in predictions])
     fits, predictions = _polished(fitter, judge, fits, predictions, best, on_progress)
-    return _identification(judge, prepared, fits, predictions, best, [*refused, *failed], linear, broadband)
+    sources = _sources(judge, broadband, response if linear is not None else ())
+    return _identification(judge, prepared, fits, predictions, best, [*refused, *failed], linear, sources)
 
 
 # ---------------------------------------------------------------------------------------------------------- fitting
@@ -223,7 +226,9 @@ def _supported(
             refused.append(Refused(model, why))
         else:
             names.append(model)
-    return names or [models[0]], refused if names else refused[1:]
+    if not names:
+        raise IdentificationError(f"the recordings do not support {refused[0].model}: {refused[0].reason}.")
+    return names, refused
 
 
 @dataclass(frozen=True, eq=False)
@@ -363,7 +368,7 @@ def _identification(
     best: int,
     refused: Sequence[Refused],
     linear: LinearFit | None,
-    broadband: Sequence[Recording],
+    sources: tuple[Source, ...],
 ) -> Identification:
     scores = tuple(judge.score(fit_name(f), p) for f, p in zip(fits, predictions, strict=True))
     straight = straight_line(prepared, judge.recordings, judge.all_splits, judge.units)
@@ -381,7 +386,7 @@ def _identification(
         *fit_warnings(fit),
         *drift_warnings,
         *residual_warnings(test),
-        *(linear.warnings if linear is not None else ()),
+        *(f"Linear part (in rad/V): {text}" for text in (linear.warnings if linear is not None else ())),
     ]
     return Identification(
         fits=tuple(fits),
@@ -391,7 +396,7 @@ def _identification(
         reason=_reason(scores, line, best),
         warnings=tuple(warnings),
         refused=tuple(refused),
-        sources=_sources(judge, broadband),
+        sources=sources,
         recordings=judge.recordings,
         predictions=tuple(predictions),
         linear=linear,
@@ -411,10 +416,12 @@ def fit_name(fit: Fit) -> str:
     return "bouc_wen_admissible" if getattr(fit, "constrained", False) else fit.name
 
 
-def _sources(judge: _Judge, broadband: Sequence[Recording]) -> tuple[Source, ...]:
+def _sources(judge: _Judge, broadband: Sequence[Recording], response: Sequence[Recording]) -> tuple[Source, ...]:
+    """What each recording served for; a broadband one counts where the linear part was fitted to it."""
     loops = [Source(r.path, r.sha256, k, r.samples - k) for r, k in zip(judge.loops, judge.splits, strict=True)]
-    named = {source.path for source in loops}
-    wide = [Source(r.path, r.sha256, r.samples, 0, "broadband") for r in broadband if r.path not in named]
+    both, used = {id(r) for r in judge.loops}, {id(r) for r in response}
+    others = [r for r in broadband if id(r) not in both]
+    wide = [Source(r.path, r.sha256, r.samples * (id(r) in used), 0, "broadband") for r in others]
     return (*loops, *wide, *(Source(r.path, r.sha256, 0, r.samples, "validation") for r in judge.validation))
 
 

@@ -32,8 +32,10 @@ def range_warnings(drive_range: tuple[float, float], rate: float) -> list[str]:
     """The drives and rates that the fit has seen."""
     low, high = drive_range
     freq_hz = rate / (math.pi * (high - low))
+    digits = max(0, 3 - math.floor(math.log10(high - low)))  # to a thousandth of the range
     return [
-        f"Valid for drives from {low:.4g} V to {high:.4g} V; outside that range the model is an extrapolation.",
+        f"Valid for drives from {round(low, digits) + 0.0:g} V to {round(high, digits) + 0.0:g} V; outside that range "
+        "the model is an extrapolation.",
         f"Not valid above {rate:.4g} V/s, the fastest rate of the recordings: a sine over the whole drive range "
         f"reaches it at {freq_hz:.4g} Hz.",
     ]
@@ -56,7 +58,7 @@ def rate_warnings(records: Sequence[Prepared], fit: Fit) -> list[str]:
         )
     elif isinstance(fit, PrandtlIshlinskiiFit) or (isinstance(fit, JointFit) and not depends_on_rate(fit)):
         warnings.append(
-            f"The loops have peak rates from {slowest:.4g} V/s to {fastest:.4g} V/s, and play operators do not depend "
+            f"The loops have peak rates from {slowest:.4g} V/s to {fastest:.4g} V/s, and the model does not depend "
             "on rate: one average loop stands for all."
         )
     if noisiness(records) > _NOISY_RATE:
@@ -97,6 +99,19 @@ def score_warnings(score: Score, line: Score) -> list[str]:
 
 def fit_warnings(fit: Fit) -> list[str]:
     """Warnings that belong to one fit, whichever model is chosen."""
+    return [*_convergence_warnings(fit), *_slope_warnings(fit)]
+
+
+def _convergence_warnings(fit: Fit) -> list[str]:
+    if not isinstance(fit, JointFit) or fit.fit.converged:
+        return []
+    return [
+        f"The search for the parameters stopped after {fit.fit.evaluations} evaluations, before it had settled: the "
+        "model is what the scores say, but its standard errors are those of a point that is no minimum."
+    ]
+
+
+def _slope_warnings(fit: Fit) -> list[str]:
     if isinstance(fit, PrandtlIshlinskiiFit) or fit.admissible:
         return []
     if isinstance(fit, JointFit):
@@ -135,7 +150,7 @@ def drift(
             warnings.append(
                 f"{recording.path}: the residual drifts by {1e6 * trend:.3g} ± {1e6 * error:.2g} urad "
                 f"({100 * trend / span_rad:.2g} % of the peak-to-peak output) in "
-                f"{residual.size * recording.step_s:.3g} s: creep or a warming sensor; no model here describes it."
+                f"{residual.size * recording.step_s:.3g} s: creep beyond what the model holds, or a warming sensor."
             )
     return largest, warnings
 

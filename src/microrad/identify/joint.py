@@ -26,6 +26,7 @@ OPERATORS = 15
 _MOST_SAMPLES = 20_000
 _BENT = 2e-3
 _SCATTER = 0.3
+_EVALUATIONS = 200
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,7 +148,14 @@ def fit_joint(  # noqa: PLR0913  all but the first three are named options
         else run_list
     )
     tolerance = 1e-9 if free_linear else 1e-6  # a candidate is only compared
-    fit = fit_plant(structure, both, starts=scattered, tolerance=tolerance, on_progress=on_progress)
+    fit = fit_plant(
+        structure,
+        both,
+        starts=scattered,
+        tolerance=tolerance,
+        most_evaluations=_EVALUATIONS,
+        on_progress=on_progress,
+    )
     return _joint_fit(structure, form, fit, records, units)
 
 
@@ -329,7 +337,7 @@ def _joint_fit(
     structure: AxisStructure, form: Form, fit: PlantFit, records: tuple[Prepared, ...], units: Units
 ) -> JointFit:
     axis = structure.parts(fit.values)
-    residual = np.concatenate([r[:, 0] for r in fit.residuals])
+    residual = np.concatenate([r[:, 0] for r in fit.residuals[: len(records)]])  # the broadband ones come behind
     rms = float(np.sqrt(np.mean(residual**2)))
     return JointFit(
         name=structure.name,
@@ -340,7 +348,7 @@ def _joint_fit(
         model=axis.model,
         creep=axis.creep,
         linear=axis.linear,
-        rate_limit_v_per_s=fastest_rate(records),
+        rate_limit_v_per_s=axis.model.rate_limit_v_s,
         units=units,
         residual_rms_rad=rms,
         residual_rms_percent=100 * rms / span(records),

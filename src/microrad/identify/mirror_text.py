@@ -35,7 +35,7 @@ def mirror_file_text(identification: Identification, name: str, *, model: str | 
             "every play operator has weight 0: the output does not follow the drive; check that the columns belong "
             "together before writing a mirror file."
         )
-    source = _names([s.path for s in identification.sources if s.fitted])
+    source = _names([s.path for s in identification.sources if s.role == "loops"])
     lines = [
         *_header(identification, fit, model or identification.chosen),
         f"name = {_quoted(name)}",
@@ -169,7 +169,8 @@ def _joint_plays(fit: JointFit, turned: float, source: str) -> list[str]:
 def _linear(fit: JointFit, linear: LinearPoles, identification: Identification) -> list[str]:
     """Poles and zeros; with their standard errors where they were fitted with the rest."""
     of = {p.name: e for p, e in zip(fit.structure.parameters, fit.fit.standard_errors, strict=True)}
-    wide = _names([s.path for s in identification.sources if s.role == "broadband"])
+    sources = [s for s in identification.sources if s.fitted]  # a loop may be broadband itself
+    wide = _names([s.path for s in sources if s.role == "broadband"] or [s.path for s in sources])
     lines = ["[linear]"]
     for kind, roots in (("pole", linear.poles), ("zero", linear.zeros)):
         if not roots.frequencies_hz:

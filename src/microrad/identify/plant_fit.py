@@ -211,7 +211,8 @@ class PlantFit:
     (J'J)^-1 J'VJ (J'J)^-1), inflated by their colour (`records.colour_inflation`, the largest one is kept).
     `residual_rms` has the shape (runs, outputs), in the units of the recordings, without the weights. `start_costs` are
     the costs reached from each start, `agreeing_starts` how many came to within 0.1 % of the best. `not_identified`
-    names each parameter that the records do not fix, with the reason.
+    names each parameter that the records do not fix, with the reason. Where the search was not `converged` it stopped
+    at its last evaluation on the way down, and the standard errors are those of a point that is no minimum.
     """
 
     structure: Structure
@@ -225,6 +226,7 @@ class PlantFit:
     start_costs: tuple[float, ...]
     agreeing_starts: int
     evaluations: int
+    converged: bool
 
     @property
     def mirror(self) -> Mirror:
@@ -365,6 +367,7 @@ def _report(problem: Problem, best: Any, costs: list[float]) -> PlantFit:
         start_costs=tuple(costs),
         agreeing_starts=int(np.sum(np.array(costs) <= min(costs) * (1 + _AGREE))),
         evaluations=int(best.nfev),
+        converged=best.status > 0,
     )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -39,6 +40,15 @@ def roles(recordings: Sequence[Recording]) -> Roles:
     best = max(((r.rate_hz, r.period_samples or 0) for r in broadband), default=(0.0, 0))
     response = [r for r in broadband if (r.rate_hz, r.period_samples or 0) == best]
     return Roles(response, broadband, loops)
+
+
+def whole_periods(head: Recording) -> Recording:
+    """The first part of a periodic recording cut to whole periods; with fewer than two of them it has no period."""
+    period = head.period_samples
+    if period is None or head.samples < 2 * period:
+        return replace(head, period_samples=None)
+    whole = head.samples // period * period
+    return replace(head, drive=head.drive[:whole], output=head.output[:whole])
 
 
 def is_broadband(recording: Recording) -> bool:

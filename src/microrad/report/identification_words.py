@@ -190,7 +190,10 @@ _MOST_REASONS = 6  # one a line; of more only the names are printed
 def identification_text(
     found: Identification, written: str, *, mirror_file: Path | None = None, report_file: Path | None = None
 ) -> str:
-    """The identification as text to read; the files that were written, and what to do next, stand at its end."""
+    """The identification as text to read; the files that were written, and what to do next, stand at its end.
+
+    Parameters are those of the model written and of the paper's; the report and the plain data have all.
+    """
     lines = [f"{'residual in % of the peak-to-peak':{_WIDTH}}{'fitted samples':>20}{'held-out samples':>20}"]
     lines += [" " * _WIDTH + 2 * f"{'rms':>10}{'peak':>10}"]
     lines += [_score_line(score, written) for score in (*found.scores, found.straight_line)]
@@ -198,7 +201,8 @@ def identification_text(
     lines += [_source_line(source) for source in found.sources]
     lines += ["", *_linear_lines(found.linear)] if found.linear is not None else []
     for score, fit in zip(found.scores, found.fits, strict=True):
-        lines += ["", score.model, *_parameter_lines(fit)]
+        if score.model in (written, "bouc_wen"):
+            lines += ["", score.model, *_parameter_lines(fit)]
     lines += ["", " ".join(residual_sentences(found))]
     if found.refused:
         lines += ["", *(f"refused: {refused.model}, {refused.reason}" for refused in found.refused)]
