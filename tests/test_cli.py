@@ -537,3 +537,90 @@ def test_every_public_name_exists_once():
 def test_an_unknown_public_name_says_what_there_is():
     with pytest.raises(AttributeError, match=r"no public name 'launch'; it has load_mission"):
         microrad.launch  # noqa: B018
+
+
+# -------------------------------------------------------------------------------------------------------------- bench
+PLAN = """name = "two loops"
+formats = ["npz"]
+
+[limits]
+rate = "5 kHz"
+drive_min = "0 V"
+drive_max = "12 V"
+slew = "20 V/ms"
+samples_per_period = 10
+
+[bench]
+truth = "bouc-wen"
+
+[bench.amplifier]
+gain = 15
+output_min = "0 V"
+output_max = "180 V"
+bandwidth = "5 kHz"
+slew = "1 V/us"
+
+[bench.converters]
+bits = 16
+drive_min = "-4 V"
+drive_max = "16 V"
+output_min = "-1 mrad"
+output_max = "2 mrad"
+
+[bench.sensor]
+noise = "1 urad"
+mains = "0 urad"
+mains_frequency = "50 Hz"
+drift = "0 nrad/s"
+
+[excitation.loop]
+kind = "sines"
+frequencies = ["60 Hz", "80 Hz"]
+amplitudes = ["6 V"]
+periods = 12
+offset = "6 V"
+
+[excitation.unseen]
+kind = "sines"
+use = "validation"
+frequencies = ["70 Hz"]
+amplitudes = ["5 V"]
+periods = 14
+offset = "6 V"
+"""
+
+
+def test_bench_writes_recordings_that_identify_takes_as_a_folder(call, folder):
+    (folder / "plan.toml").write_text(PLAN)
+    made = call("bench", "plan.toml", "--seed", "3")
+    assert (made.code, made.err) == (0, "")
+    assert "3 files written. Next: microrad identify plan-bench" in made.out
+    found = call("identify", "plan-bench", "--static", "--json")
+    assert (found.code, found.err) == (0, "")
+    data = json.loads(found.out)
+    roles = {Path(r["path"]).stem: r["role"] for r in data["recordings"]}
+    assert roles == {"loop-60hz": "loops", "loop-80hz": "loops", "unseen-70hz": "validation"}
+    assert data["best_model"] == "bouc_wen"
+    assert "virtual bench" in (folder / "plan-bench-mirror.html").read_text(encoding="utf-8")
+    listed = json.loads(call("bench", "plan.toml", "--seed", "3", "--overwrite", "--json").out)
+    assert [Path(f).name for f in listed["files"]] == ["loop-60hz.npz", "loop-80hz.npz", "unseen-70hz.npz"]
+
+
+def test_bench_refusals(refused, folder):
+    (folder / "plan.toml").write_text(PLAN)
+    assert "or one of mirror-characterisation, paper-experiment" in refused("bench", "paper-experimnt")
+    (folder / "bad.toml").write_text(PLAN.replace('amplitudes = ["6 V"]', 'amplitudes = ["9 V"]'))
+    message = refused("bench", "bad.toml")
+    assert "loop" in message
+    assert "12 V" in message
+    (folder / "plan-bench").mkdir()
+    (folder / "plan-bench" / "mine.txt").write_text("mine")
+    assert "holds files that are not recordings of microrad" in refused("bench", "plan.toml", "--overwrite")
+    assert "no manifest.json of microrad bench in it" in refused("identify", "plan-bench")
+    assert "--input is missing" in refused("identify", "plan.toml")
+
+
+def test_the_models_of_the_command_are_those_of_the_ladder():
+    from microrad.identify import MODELS
+
+    assert {m.value.replace("-", "_") for m in lab.Model} == {"best", *MODELS}

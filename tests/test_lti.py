@@ -242,3 +242,46 @@ def test_leading_zeros_do_not_count():
     padded = lti.modal_from_polynomials((0.0, 0.0, 4.0), (0.0, 2.0, 6.0))
     assert padded.order == 1
     assert_allclose(lti.frequency_response(padded, np.zeros(1)), 4.0 / 6.0, rtol=1e-15)
+
+
+# ------------------------------------------------------------------------------------------------- roots in, roots out
+def test_a_modal_form_from_roots_is_the_product_over_them_with_unit_magnitude_where_it_is_asked():
+    zeros, poles = (np.roots(each).astype(complex) for each in (NUMERATOR, DENOMINATOR))
+    system = lti.modal_from_roots(zeros, poles, 2.0)
+    assert_allclose(np.sort_complex(np.linalg.eigvals(system.A)), np.sort_complex(poles), rtol=1e-10)
+    here = lti.frequency_response(system, np.array([2.0]))[0, 0, 0]
+    assert abs(here) == pytest.approx(1.0, rel=1e-12)
+    assert here.real > 0.0
+    for freq_hz in (0.01, 54.0, 2543.0, 1e4):
+        ratio = lti.frequency_response(system, np.array([freq_hz]))[0, 0, 0] / here
+        expected = exact_response(freq_hz) / exact_response(2.0)
+        assert ratio == pytest.approx(expected, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("zeros", "poles", "words"),
+    [
+        ([-1.0], [-2.0], "1 zeros over 1 poles: not strictly proper"),
+        ([], [-2.0, -2.0], "two poles coincide"),
+        ([2j * pi, -2j * pi], [-1.0, -2.0, -3.0], "vanishes at 1 Hz"),
+    ],
+)
+def test_roots_without_a_modal_form_are_refused(zeros, poles, words):
+    with pytest.raises(ValueError, match=words):
+        lti.modal_from_roots(np.array(zeros, dtype=complex), np.array(poles, dtype=complex), 1.0)
+
+
+def test_zeros_of_a_system_are_where_python_control_finds_them():
+    system = lti.modal_from_polynomials(NUMERATOR, DENOMINATOR)
+    found = np.sort_complex(lti.zeros(system))
+    assert_allclose(found[np.abs(found) < 1e6], np.sort_complex(np.roots(NUMERATOR)), rtol=1e-7)
+    rng = np.random.default_rng(3)
+    square = lti.StateSpace(
+        rng.standard_normal((4, 4)),
+        rng.standard_normal((4, 2)),
+        rng.standard_normal((2, 4)),
+        rng.standard_normal((2, 2)),
+    )
+    expected = control.zeros(control.ss(square.A, square.B, square.C, square.D))
+    assert_allclose(np.sort_complex(lti.zeros(square)), np.sort_complex(expected), rtol=1e-8)
+    assert lti.zeros(square).size == 4

@@ -17,6 +17,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from microrad import lti, mirror
 from microrad.document import scan
 from microrad.mirror_table import BoucWenTable
 from microrad.mission import Mission, Source, half_angle_rad, mission_schema, source_text
@@ -831,3 +832,62 @@ def test_importing_the_mission_loads_no_numerics():
     code = "import sys, microrad.missionfile; print([m for m in ('numpy', 'scipy', 'numba') if m in sys.modules])"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
+
+
+# --------------------------------------------------------------------------------------- a linear part by its roots
+ROOTS = """[mirror.linear]
+poles = ["0.0343 Hz", "54.22 Hz", "1552.7 Hz", "2542.7 Hz"]
+pole_dampings = [1, 1, 1, 0.357]
+zeros = ["0.0672 Hz", "56.64 Hz"]
+zero_dampings = [1, 1]
+normalise_at = "2 Hz"
+excited_from = "1 Hz"
+excited_to = "5 kHz"
+
+"""
+
+
+def with_roots(*changes):
+    """The paper's mission with its linear part by roots, and texts in it replaced."""
+    table = ROOTS
+    for old, new in changes:
+        assert table.count(old) == 1, old
+        table = table.replace(old, new)
+    start, end = TEXT.index("[mirror.linear]"), TEXT.index("[mirror.bouc_wen]")
+    return TEXT[:start] + table + TEXT[end:]
+
+
+def test_a_linear_part_by_roots_is_the_one_by_coefficients(tmp_path):
+    path = tmp_path / "roots.toml"
+    path.write_text(with_roots(), encoding="utf-8")
+    by_roots, by_coefficients = (load_mission(p).mission.mirror.linear for p in (path, PAPER))
+    for ours, printed in zip(by_roots.roots, by_coefficients.roots, strict=True):
+        size = np.sort(np.abs(ours)), np.sort(np.abs(printed))
+        np.testing.assert_allclose(*size, rtol=2e-3)
+        assert len(ours) == len(printed)
+    freq = np.geomspace(1.0, 5e3, 20)
+    responses = [lti.frequency_response(mirror.linear_part(each)[0], freq) for each in (by_roots, by_coefficients)]
+    np.testing.assert_allclose(responses[0], responses[1], rtol=5e-3)
+
+
+@pytest.mark.parametrize(
+    ("changes", "key", "reason"),
+    [
+        ([('poles = ["0.0343 Hz", ', "poles = [")], "pole_dampings", "has 4 items where poles has 3"),
+        ([("pole_dampings = [1, 1, 1, 0.357]", "pole_dampings = [1, 1, 1, -0.357]")], "pole_dampings", "unstable pole"),
+        ([("zero_dampings = [1, 1]", "zero_dampings = [1, 2]")], "zero_dampings", "is above 1"),
+        (
+            [
+                ('zeros = ["0.0672 Hz", "56.64 Hz"]', 'zeros = ["1 Hz", "2 Hz", "3 Hz"]'),
+                ("zero_dampings = [1, 1]", "zero_dampings = [0.5, 0.5, 0.5]"),
+            ],
+            "zeros",
+            "makes 6 zeros over 5 poles",
+        ),
+        ([("zeros = [", "numerator = [1]\nzeros = [")], "numerator", "stands beside poles"),
+        ([('poles = ["0.0343 Hz", "54.22 Hz", "1552.7 Hz", "2542.7 Hz"]\n', "")], "zeros", "stands without poles"),
+    ],
+)
+def test_roots_that_do_not_fit_are_told(refuse, changes, key, reason):
+    faults = refuse(with_roots(*changes)).faults
+    assert any(f.key == f"mirror.linear.{key}" and reason in f.reason for f in faults), faults

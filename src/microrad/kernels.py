@@ -538,6 +538,202 @@ def open_loop(plant, state, drive, output, bank):  # type: ignore[no-untyped-def
             bank[k, i] = state.bank[i, Z]
 
 
+class Path(NamedTuple):
+    """What a plant went through, one row a step: `open_loop_path` fills it, `tangent_kernel` runs along it.
+
+    ``x`` is the predicted state (see `Plant`), ``z`` and ``play`` the outputs and the plays of the bank. ``moved`` counts
+    for each Prandtl-Ishlinskii operator the plays that the drive carries along: with ascending thresholds always the first
+    ones, for the memories of an operator at rest before are nested.
+    """
+
+    output: Floats
+    x: Floats
+    z: Floats
+    play: Floats
+    moved: Integers
+
+
+@_compile
+def open_loop_path(plant, state, drive, path):  # type: ignore[no-untyped-def]
+    """`open_loop` that keeps the whole path; thresholds ascend in each operator and do not depend on the rate."""
+    for k in range(drive.shape[0]):
+        for a in range(len(plant.actuators)):
+            state.u_next[a] = drive[k, a]
+        _predict(plant, state)
+        _plant_step(plant, state)
+        for i in range(len(plant.outputs)):
+            path.output[k, i] = state.y[i]
+        for i in range(len(plant.states)):
+            path.x[k, i] = state.x_next[i]
+        for e in range(path.z.shape[1]):
+            path.z[k, e] = state.bank[e, Z]
+        for o in range(len(plant.operators)):
+            q, count = state.bank[len(plant.elements) + o, Q], 0
+            for j in range(plant.play_start[o], plant.play_start[o + 1]):
+                p, threshold = state.play[j], plant.play_threshold[j]
+                path.play[k, j] = p
+                if p == q - threshold or p == q + threshold:
+                    count += 1
+            path.moved[k, o] = count
+
+
+STATE, DRIVE, BANK = range(3)  # where a parameter enters
+
+
+class Tangents(NamedTuple):
+    """Parameters, where each enters the plant along a `Path`, and the working memory of their tangents.
+
+    A parameter enters through ``place``. STATE: row of ``before`` adds to the predicted state, and of ``after`` to the state
+    once the bank has moved; both have the shape (steps, sources, 2) for states ``row`` and its neighbour, and with ``turned``
+    the pair (a, b) is (-b, a). DRIVE: column ``source`` of ``signal`` (steps, columns) adds to the drive of operator ``row``.
+    BANK: column ``source`` of the path's plays adds to the output of operator ``row``.
+
+    The matrices are those of a `Plant` without Bouc-Wen elements. They, the signals and the working memory share one
+    precision; single precision is twice as fast, and enough for a search. The working memory has the tangents of all
+    parameters in a row, and rows by state, operator or play; it is zero at the begin of a path.
+    """
+
+    diagonal: NDArray[Any]
+    coupling: NDArray[Any]
+    E_held: NDArray[Any]
+    E1: NDArray[Any]
+    F: NDArray[Any]
+    C: NDArray[Any]
+    K: NDArray[Any]
+    weight: NDArray[Any]
+    play_start: Integers
+    place: Integers
+    row: Integers
+    source: Integers
+    turned: Integers
+    before: NDArray[Any]
+    after: NDArray[Any]
+    signal: NDArray[Any]
+    plays: NDArray[Any]
+    x: NDArray[Any]
+    q: NDArray[Any]
+    q_before: NDArray[Any]
+    z: NDArray[Any]
+    change: NDArray[Any]
+    play: NDArray[Any]
+    still: NDArray[Any]
+    slope: NDArray[Any]
+    moved: Integers
+
+
+@_inline
+def _inject(t, signals, k):  # type: ignore[no-untyped-def]
+    """Add what the parameters of the state contribute by themselves at step k."""
+    for p in range(t.place.size):
+        if t.place[p] == STATE:
+            i, s = t.row[p], t.source[p]
+            if t.turned[p] == 1:
+                t.x[i, p] -= signals[k, s, 1]
+                t.x[i + 1, p] += signals[k, s, 0]
+            else:
+                t.x[i, p] += signals[k, s, 0]
+                if signals[k, s, 1] != 0.0:  # a real pole has no neighbour
+                    t.x[i + 1, p] += signals[k, s, 1]
+
+
+@_inline
+def _tangent_predict(t):  # type: ignore[no-untyped-def]
+    count = t.place.size
+    for i in range(0, t.x.shape[0], 2):
+        keep0, keep1, cross0, cross1 = t.diagonal[i], t.diagonal[i + 1], t.coupling[i], t.coupling[i + 1]
+        for p in range(count):
+            a, b = t.x[i, p], t.x[i + 1, p]
+            t.x[i, p] = keep0 * a + cross0 * b
+            t.x[i + 1, p] = keep1 * b + cross1 * a
+    for i in range(t.x.shape[0]):
+        for e in range(t.z.shape[0]):
+            held = t.E_held[i, e]
+            for p in range(count):
+                t.x[i, p] += held * t.z[e, p]
+
+
+@_inline
+def _tangent_drive(t, k):  # type: ignore[no-untyped-def]
+    count = t.place.size
+    for e in range(t.q.shape[0]):
+        for p in range(count):
+            t.q_before[e, p] = t.q[e, p]
+            t.q[e, p] = 0.0
+        for i in range(t.x.shape[0]):
+            gain = t.F[e, i]
+            for p in range(count):
+                t.q[e, p] += gain * t.x[i, p]
+    for p in range(count):
+        if t.place[p] == DRIVE:
+            t.q[t.row[p], p] += t.signal[k, t.source[p]]
+
+
+@_inline
+def _tangent_bank(t, path_moved, k):  # type: ignore[no-untyped-def]
+    """Plays that move follow the tangent of the drive; the others keep theirs, and their sum is kept too."""
+    count = t.place.size
+    for e in range(t.q.shape[0]):
+        begin, end, now, before = t.play_start[e], t.play_start[e + 1], path_moved[k, e], t.moved[e]
+        if now != before:
+            for j in range(begin + now, begin + before):  # those that have just stopped
+                for p in range(count):
+                    t.play[j, p] = t.q_before[e, p]
+            for p in range(count):
+                t.still[e, p] = 0.0
+            t.slope[e] = 0.0
+            for j in range(begin, begin + now):
+                t.slope[e] += t.weight[j]
+            for j in range(begin + now, end):
+                weight = t.weight[j]
+                for p in range(count):
+                    t.still[e, p] += weight * t.play[j, p]
+            t.moved[e] = now
+        slope = t.slope[e]
+        for p in range(count):
+            t.change[e, p] = -t.z[e, p]
+            t.z[e, p] = t.still[e, p] + slope * t.q[e, p]
+    for p in range(count):
+        if t.place[p] == BANK:
+            t.z[t.row[p], p] += t.plays[k, t.source[p]]
+    for e in range(t.q.shape[0]):
+        for p in range(count):
+            t.change[e, p] += t.z[e, p]
+
+
+@_compile
+def tangent_kernel(t, path_moved, begin, first, stride, output):  # type: ignore[no-untyped-def]
+    """Derivative of a plant's output by parameters, along its path (forward sensitivities of the plays' exact steps).
+
+    Starts with no tangent at step ``begin``, runs to the end of the path and fills ``output`` (rows, outputs, parameters)
+    from step ``first`` on, every ``stride`` steps. What enters the output itself (C, D, K) is not a parameter here.
+    """
+    count, row = t.place.size, 0
+    for k in range(begin, path_moved.shape[0]):
+        _tangent_predict(t)
+        _inject(t, t.before, k)
+        _tangent_drive(t, k)
+        _tangent_bank(t, path_moved, k)
+        for i in range(t.x.shape[0]):
+            for e in range(t.z.shape[0]):
+                gain = t.E1[i, e]
+                for p in range(count):
+                    t.x[i, p] += gain * t.change[e, p]
+        _inject(t, t.after, k)
+        if k >= first and (k - first) % stride == 0:
+            for o in range(output.shape[1]):
+                for p in range(count):
+                    output[row, o, p] = 0.0
+                for i in range(t.x.shape[0]):
+                    gain = t.C[o, i]
+                    for p in range(count):
+                        output[row, o, p] += gain * t.x[i, p]
+                for e in range(t.z.shape[0]):
+                    gain = t.K[o, e]
+                    for p in range(count):
+                        output[row, o, p] += gain * t.z[e, p]
+            row += 1
+
+
 @_compile
 def _inverse(loop, state, reference, sample_s, feedforward):  # type: ignore[no-untyped-def]
     """Causal inverse-multiplicative feedforward (Eq. 4), and the closed-form inverse of play operators.

@@ -87,6 +87,11 @@ class JointFit:
         assert isinstance(turned, BoucWen)
         return turned.reversal_slope_rad_v() >= -1e-3 * turned.d1_rad_v
 
+    @property
+    def not_identified(self) -> tuple[tuple[str, str], ...]:
+        """Parameters that the recordings do not fix: name, and the number that says so with what would help."""
+        return tuple((name, f"{fact}; {_why(name)}") for name, fact in self.fit.not_identified)
+
     def response(self, drive_v: FloatArray, step_s: float) -> tuple[FloatArray, int]:
         """Output (rad) without offset for a drive (V), at rest at the first drive value, and the clamped samples."""
         plant = mirror.discretise(self.mirror, step_s)
@@ -99,6 +104,24 @@ class JointFit:
     def nuisance(self, samples: int, step_s: float) -> FloatArray:
         """What a record may add by itself (samples, columns): an offset, and the tail of a creep begun before it."""
         return _nuisance(samples, step_s, self.creep.time_constants_s)
+
+
+_WHY = {
+    "weight": "neighbouring thresholds do nearly the same; loops of more amplitudes tell them apart",
+    "widening": "the loops widen too little with the rate to tell; record faster loops",
+    "creep": "over a short record creep looks like gain; record a staircase with long dwells",
+    "d1": "a large hysteresis or creep looks like gain; larger loops or longer records tell them apart",
+    "d2": "its effect on the output is below what is left; faster loops would show it",
+    "delta": "the loops widen too little with the rate to tell; record faster loops",
+    "exponent": "only the shape of the branches fixes it; record loops of several amplitudes",
+    "pole": "a pole and a zero side by side nearly cancel, and one beyond the band is a flank only",
+    "zero": "a pole and a zero side by side nearly cancel, and one beyond the band is a flank only",
+}
+
+
+def _why(name: str) -> str:
+    reversals = "loops fix the settled hysteresis, only the samples behind a reversal its parts; record small loops"
+    return _WHY.get(name.partition(" ")[0], reversals)
 
 
 def turned_over(model: BoucWen) -> BoucWen:

@@ -72,7 +72,7 @@ def _header(identification: Identification, fit: Fit, model: str) -> list[str]:
     if isinstance(fit, BoucWenFit):
         lines += [f"Not identified: {item.name}, {item.reason}" for item in fit.not_identified]
     if isinstance(fit, JointFit):
-        lines += [f"Not identified: {parameter}, {why}" for parameter, why in fit.fit.not_identified]
+        lines += [f"Not identified: {parameter}, {why}" for parameter, why in fit.not_identified]
     if _falling(fit):
         lines.append("The sensor's sign was flipped: its reading falls with the drive, and a mirror's angle rises.")
     return [f"# {_one_line(text)}" for text in lines]

@@ -71,7 +71,7 @@ def not_identified(fit: Fit) -> list[tuple[str, str]]:
     """Parameters that the recordings do not fix, each with the reason."""
     if isinstance(fit, BoucWenFit):
         return [(item.name, item.reason) for item in fit.not_identified]
-    return list(fit.fit.not_identified) if isinstance(fit, JointFit) else []
+    return list(fit.not_identified) if isinstance(fit, JointFit) else []
 
 
 def starts(fit: Fit) -> tuple[int, int] | None:
