@@ -599,11 +599,11 @@ def test_bench_writes_recordings_that_identify_takes_as_a_folder(call, folder):
     assert (found.code, found.err) == (0, "")
     data = json.loads(found.out)
     roles = {Path(r["path"]).stem: r["role"] for r in data["recordings"]}
-    assert roles == {"loop-60hz": "loops", "loop-80hz": "loops", "unseen-70hz": "validation"}
+    assert roles == {"loop-60hz": "loops", "loop-80hz": "loops", "unseen": "validation"}
     assert data["best_model"] == "bouc_wen"
     assert "virtual bench" in (folder / "plan-bench-mirror.html").read_text(encoding="utf-8")
     listed = json.loads(call("bench", "plan.toml", "--seed", "3", "--overwrite", "--json").out)
-    assert [Path(f).name for f in listed["files"]] == ["loop-60hz.npz", "loop-80hz.npz", "unseen-70hz.npz"]
+    assert [Path(f).name for f in listed["files"]] == ["loop-60hz.npz", "loop-80hz.npz", "unseen.npz"]
 
 
 def test_bench_refusals(refused, folder):
