@@ -184,16 +184,15 @@ def test_creep_is_recovered_whatever_went_before_the_record():
 
 
 def test_without_its_tail_an_older_creep_would_bias_the_weights():
-    fit = fit_joint([crept(9.0)], "prandtl_ishlinskii_creep", UNITS)
-    first = prepare([crept(9.0)], UNITS)[0].start
-    in_radians = replace(crept(9.0), output=1e-3 * crept(9.0).output)
-    offset_only = fit_plant(fit.structure, runs([in_radians], drop=first))
-    found = dict(zip([p.name for p in fit.structure.parameters], offset_only.values, strict=True))
-    assert abs(found["creep"] - CREEP) > 8 * fitted(fit)["creep"][1]
-    rested = replace(crept(None), output=1e-3 * crept(None).output)
-    alone = fit_plant(fit.structure, runs([rested], drop=first))
-    at_rest = dict(zip([p.name for p in fit.structure.parameters], alone.values, strict=True))
-    assert abs(at_rest["creep"] - CREEP) < 4 * fitted(fit)["creep"][1]
+    """With an offset alone beside it, the same structure leaves twice the noise and moves a weight by many errors."""
+    record = crept(0.0)
+    fit = fit_joint([record], "prandtl_ishlinskii_creep", UNITS)
+    (prepared,) = prepare([record], UNITS)
+    offset_only = runs([replace(record, output=1e-3 * record.output)], drop=prepared.start)
+    without = fit_plant(fit.structure, offset_only)
+    assert without.residual_rms[0, 0] > 2 * fit.residual_rms_rad
+    assert np.max(np.abs(without.values - fit.fit.values) / fit.fit.standard_errors) > 10
+    assert_plays_recovered(fit)
 
 
 def test_creep_beside_a_resonance():
@@ -289,7 +288,7 @@ def test_the_classical_exponent_is_recovered():
 def paper_loops():
     plan = bench.load_plan("paper-experiment")
     whole = bench.play(bench.only(plan, ["loop-60hz", "loop-100hz"]), seed=1)
-    return [replace(r, drive=r.drive[:2500], output=r.output[:2500]) for r in whole]
+    return [replace(r, drive=r.drive[:2000], output=r.output[:2000]) for r in whole]
 
 
 def lowest_slope(fit, drive, step_s):
@@ -301,7 +300,9 @@ def lowest_slope(fit, drive, step_s):
     return float(np.min((np.diff(output)[moving] / travel[moving])[drive.size // 4 :]))
 
 
-def test_an_admissible_fit_never_moves_the_wrong_way(paper_loops):
+def test_an_admissible_fit_never_moves_the_wrong_way(paper_loops, monkeypatch):
+    """Behind a slow reversal; at 100 Hz delta steepens h again, which the bound does not count."""
+    monkeypatch.setattr(joint, "_EVALUATIONS", 25)  # the bound holds on the way, too
     free, bound = (
         fit_joint(paper_loops, "bouc_wen_asymmetric", UNITS, admissible=admissible, starts=1)
         for admissible in (False, True)
@@ -404,7 +405,7 @@ def test_creep_is_what_a_real_record_needs():
     span = np.ptp(head.output) * units.radians
 
     def unseen_percent(name, admissible=False):
-        fit = fit_joint([head], name, units, admissible=admissible)
+        fit = fit_joint([head], name, units, admissible=admissible, starts=1)
         residual = predict(fit, record, 4014).residual_rad[4014:]
         return 100 * float(np.sqrt(np.mean(residual**2))) / span, fit.admissible
 
@@ -447,7 +448,7 @@ def test_errors_are_propagated():
 
 
 def test_standard_errors_match_the_scatter():
-    fits = [fit_joint([crept(9.0, seed=s)], "prandtl_ishlinskii_creep", UNITS) for s in range(20)]
+    fits = [fit_joint([crept(9.0, seed=s)], "prandtl_ishlinskii_creep", UNITS) for s in range(12)]
     scatter = np.std([f.creep.weights_rad_v[0] for f in fits], ddof=1)
     reported = np.median([fitted(f)["creep"][1] for f in fits])
     assert 0.5 < scatter / reported < 2.0

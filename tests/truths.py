@@ -58,11 +58,12 @@ def bouc_wen(drive, rate_hz, parameters, *, gamma=0.0, eta=0.0, exponent=1.0, pi
     return np.array(found)
 
 
-def behind_resonance(signal, rate_hz, resonance=RESONANCE):
-    """A signal, straight between its samples, behind a second-order low-pass of unit gain."""
+def behind_resonance(signal, rate_hz, resonance=RESONANCE, *, held=False):
+    """A signal, straight between its samples or held, behind a second-order low-pass of unit gain."""
     natural, damping = 2 * np.pi * resonance[0], resonance[1]
     time = np.arange(signal.size) / rate_hz
-    return lsim(([natural**2], [1.0, 2 * damping * natural, natural**2]), signal - signal[0], time)[1]
+    system = ([natural**2], [1.0, 2 * damping * natural, natural**2])
+    return lsim(system, signal - signal[0], time, interp=not held)[1]
 
 
 def creep(drive, rate_hz, times, weight, before=None):
@@ -81,9 +82,9 @@ def recorded(drive, output_rad, rate_hz=1000.0, noise=1e-3, seed=0, name="record
     return recording_from_arrays(drive, 1e3 * scattered + 0.2, rate_hz, name, period)
 
 
-def small_multisine(rate_hz=1000.0, period=1000, periods=3, rms=0.05, seed=5):
-    """A small random-phase multisine about 5 V, a line every hertz from 1 Hz to 0.4 of the sample rate."""
+def small_multisine(rate_hz=1000.0, period=1000, periods=3, rms=0.05, highest=0.4, seed=5):
+    """A small random-phase multisine about 5 V, a line every hertz from 1 Hz to a share of the sample rate."""
     f = np.fft.rfftfreq(period, 1 / rate_hz)
-    lines = np.where((f >= 1) & (f <= 0.4 * rate_hz), np.exp(2j * np.pi * philox(seed).random(f.size)), 0.0)
+    lines = np.where((f >= 1) & (f <= highest * rate_hz), np.exp(2j * np.pi * philox(seed).random(f.size)), 0.0)
     one = np.fft.irfft(lines)
     return 5.0 + rms * np.tile(one, periods) / one.std()

@@ -538,71 +538,113 @@ def open_loop(plant, state, drive, output, bank):  # type: ignore[no-untyped-def
             bank[k, i] = state.bank[i, Z]
 
 
-class Path(NamedTuple):
-    """What a plant went through, one row a step: `open_loop_path` fills it, `tangent_kernel` runs along it.
+class PlayPlant(NamedTuple):
+    """The arrays of a `Plant` with Prandtl-Ishlinskii operators only and an Ad without rest.
 
-    ``x`` is the predicted state (see `Plant`), ``z`` and ``play`` the outputs and the plays of the bank. ``moved`` counts
-    for each Prandtl-Ishlinskii operator the plays that the drive carries along: with ascending thresholds always the first
-    ones, for the memories of an operator at rest before are nested.
+    The thresholds of each operator ascend and do not depend on the rate.
+
+    Without the counts, for a search: it compiles once for all sizes, where a `Plant` compiles for each.
+    """
+
+    diagonal: NDArray[Any]
+    coupling: NDArray[Any]
+    B0: NDArray[Any]
+    B1: NDArray[Any]
+    E_held: NDArray[Any]
+    E1: NDArray[Any]
+    F: NDArray[Any]
+    G: NDArray[Any]
+    C: NDArray[Any]
+    D: NDArray[Any]
+    K: NDArray[Any]
+    play_start: Integers
+    play_threshold: NDArray[Any]
+    play_weight: NDArray[Any]
+
+
+class Path(NamedTuple):
+    """What a `PlayPlant` went through, one row a step: `play_path` fills it, `tangent_kernel` runs along it.
+
+    ``x`` is the predicted state (see `Plant`), ``state`` the one with the change of z in it, ``z`` and ``play`` the
+    outputs and the plays of the operators. ``moved`` counts for each operator the plays that its drive carries along:
+    always the first ones, for the memories of an operator that began at rest are nested.
     """
 
     output: Floats
     x: Floats
+    state: Floats
     z: Floats
     play: Floats
     moved: Integers
 
 
 @_compile
-def open_loop_path(plant, state, drive, path):  # type: ignore[no-untyped-def]
-    """`open_loop` that keeps the whole path; thresholds ascend in each operator and do not depend on the rate."""
+def play_path(plant, drive, path):  # type: ignore[no-untyped-def]
+    """`open_loop` from rest with the whole path kept; the same arithmetic, see `Plant`, in loops of any length."""
+    states, inputs, operators = plant.diagonal.size, drive.shape[1], path.z.shape[1]
     for k in range(drive.shape[0]):
-        for a in range(len(plant.actuators)):
-            state.u_next[a] = drive[k, a]
-        _predict(plant, state)
-        _plant_step(plant, state)
-        for i in range(len(plant.outputs)):
-            path.output[k, i] = state.y[i]
-        for i in range(len(plant.states)):
-            path.x[k, i] = state.x_next[i]
-        for e in range(path.z.shape[1]):
-            path.z[k, e] = state.bank[e, Z]
-        for o in range(len(plant.operators)):
-            q, count = state.bank[len(plant.elements) + o, Q], 0
-            for j in range(plant.play_start[o], plant.play_start[o + 1]):
-                p, threshold = state.play[j], plant.play_threshold[j]
+        for i in range(states):
+            total = 0.0
+            for a in range(inputs):
+                total += plant.B1[i, a] * drive[k, a]
+            if k > 0:
+                total += plant.diagonal[i] * path.state[k - 1, i] + plant.coupling[i] * path.state[k - 1, i ^ 1]
+                for a in range(inputs):
+                    total += plant.B0[i, a] * drive[k - 1, a]
+                for e in range(operators):
+                    total += plant.E_held[i, e] * path.z[k - 1, e]
+            path.x[k, i] = total
+        for e in range(operators):
+            q = 0.0
+            for a in range(inputs):
+                q += plant.G[e, a] * drive[k, a]
+            for i in range(states):
+                q += plant.F[e, i] * path.x[k, i]
+            total, count = 0.0, 0
+            for j in range(plant.play_start[e], plant.play_start[e + 1]):
+                threshold = plant.play_threshold[j]
+                p = _play(path.play[k - 1, j] if k > 0 else 0.0, q, threshold)
                 path.play[k, j] = p
+                total += plant.play_weight[j] * p
                 if p == q - threshold or p == q + threshold:
                     count += 1
-            path.moved[k, o] = count
+            path.z[k, e] = total
+            path.moved[k, e] = count
+        for i in range(states):
+            total = path.x[k, i]
+            for e in range(operators):
+                total += plant.E1[i, e] * (path.z[k, e] - (path.z[k - 1, e] if k > 0 else 0.0))
+            path.state[k, i] = total
+        for o in range(path.output.shape[1]):
+            total = 0.0
+            for i in range(states):
+                total += plant.C[o, i] * path.state[k, i]
+            for a in range(inputs):
+                total += plant.D[o, a] * drive[k, a]
+            for e in range(operators):
+                total += plant.K[o, e] * path.z[k, e]
+            path.output[k, o] = total
 
 
-STATE, DRIVE, BANK = range(3)  # where a parameter enters
+DRIVE_FROM, BANK_FROM = range(2)  # of a parameter's place
 
 
 class Tangents(NamedTuple):
-    """Parameters, where each enters the plant along a `Path`, and the working memory of their tangents.
+    """Parameters, where each enters a `PlayPlant` along a `Path`, and the working memory of their tangents.
 
-    A parameter enters through ``place``. STATE: row of ``before`` adds to the predicted state, and of ``after`` to the state
-    once the bank has moved; both have the shape (steps, sources, 2) for states ``row`` and its neighbour, and with ``turned``
-    the pair (a, b) is (-b, a). DRIVE: column ``source`` of ``signal`` (steps, columns) adds to the drive of operator ``row``.
-    BANK: column ``source`` of the path's plays adds to the output of operator ``row``.
+    The first ``places[DRIVE_FROM]`` parameters enter the state: row ``source`` of ``before`` adds to the predicted
+    state, and of ``after`` to the state once the operators have moved. Both have the shape (steps, sources, 2), for the
+    state ``row`` and its neighbour; with ``turned`` the pair (a, b) is (-b, a). Those up to ``places[BANK_FROM]`` enter
+    the drive of operator ``row``, by column ``source`` of ``signal`` (steps, columns), and the others its output, by
+    column ``source`` of ``plays``.
 
-    The matrices are those of a `Plant` without Bouc-Wen elements. They, the signals and the working memory share one
-    precision; single precision is twice as fast, and enough for a search. The working memory has the tangents of all
-    parameters in a row, and rows by state, operator or play; it is zero at the begin of a path.
+    The plant, the signals and the working memory share one precision; single precision is twice as fast, and enough for
+    a search. The working memory has the tangents of all parameters in a row, and rows by state, operator or play; it is
+    zero at the begin of a path.
     """
 
-    diagonal: NDArray[Any]
-    coupling: NDArray[Any]
-    E_held: NDArray[Any]
-    E1: NDArray[Any]
-    F: NDArray[Any]
-    C: NDArray[Any]
-    K: NDArray[Any]
-    weight: NDArray[Any]
-    play_start: Integers
-    place: Integers
+    plant: PlayPlant
+    places: Integers
     row: Integers
     source: Integers
     turned: Integers
@@ -622,115 +664,122 @@ class Tangents(NamedTuple):
 
 
 @_inline
+def _add(total, gain, row):  # type: ignore[no-untyped-def]
+    """total += gain row. Rows are taken out of their matrices before the loop: only then is it vectorised."""
+    for p in range(total.size):
+        total[p] += gain * row[p]
+
+
+@_inline
 def _inject(t, signals, k):  # type: ignore[no-untyped-def]
     """Add what the parameters of the state contribute by themselves at step k."""
-    for p in range(t.place.size):
-        if t.place[p] == STATE:
-            i, s = t.row[p], t.source[p]
-            if t.turned[p] == 1:
-                t.x[i, p] -= signals[k, s, 1]
-                t.x[i + 1, p] += signals[k, s, 0]
-            else:
-                t.x[i, p] += signals[k, s, 0]
-                if signals[k, s, 1] != 0.0:  # a real pole has no neighbour
-                    t.x[i + 1, p] += signals[k, s, 1]
+    for p in range(t.places[DRIVE_FROM]):
+        i, s = t.row[p], t.source[p]
+        if t.turned[p] == 1:
+            t.x[i, p] -= signals[k, s, 1]
+            t.x[i + 1, p] += signals[k, s, 0]
+        else:
+            t.x[i, p] += signals[k, s, 0]
+            if signals[k, s, 1] != 0.0:  # a real pole has no neighbour
+                t.x[i + 1, p] += signals[k, s, 1]
 
 
 @_inline
 def _tangent_predict(t):  # type: ignore[no-untyped-def]
-    count = t.place.size
     for i in range(0, t.x.shape[0], 2):
-        keep0, keep1, cross0, cross1 = t.diagonal[i], t.diagonal[i + 1], t.coupling[i], t.coupling[i + 1]
-        for p in range(count):
-            a, b = t.x[i, p], t.x[i + 1, p]
-            t.x[i, p] = keep0 * a + cross0 * b
-            t.x[i + 1, p] = keep1 * b + cross1 * a
+        keep0, keep1, cross0, cross1 = (
+            t.plant.diagonal[i],
+            t.plant.diagonal[i + 1],
+            t.plant.coupling[i],
+            t.plant.coupling[i + 1],
+        )
+        x0, x1 = t.x[i], t.x[i + 1]
+        for p in range(x0.size):
+            a, b = x0[p], x1[p]
+            x0[p] = keep0 * a + cross0 * b
+            x1[p] = keep1 * b + cross1 * a
     for i in range(t.x.shape[0]):
         for e in range(t.z.shape[0]):
-            held = t.E_held[i, e]
-            for p in range(count):
-                t.x[i, p] += held * t.z[e, p]
+            _add(t.x[i], t.plant.E_held[i, e], t.z[e])
 
 
 @_inline
 def _tangent_drive(t, k):  # type: ignore[no-untyped-def]
-    count = t.place.size
     for e in range(t.q.shape[0]):
-        for p in range(count):
-            t.q_before[e, p] = t.q[e, p]
-            t.q[e, p] = 0.0
+        q, q_before = t.q[e], t.q_before[e]
+        for p in range(q.size):
+            q_before[p] = q[p]
+            q[p] = 0.0
         for i in range(t.x.shape[0]):
-            gain = t.F[e, i]
-            for p in range(count):
-                t.q[e, p] += gain * t.x[i, p]
-    for p in range(count):
-        if t.place[p] == DRIVE:
-            t.q[t.row[p], p] += t.signal[k, t.source[p]]
+            _add(q, t.plant.F[e, i], t.x[i])
+    for p in range(t.places[DRIVE_FROM], t.places[BANK_FROM]):
+        t.q[t.row[p], p] += t.signal[k, t.source[p]]
 
 
 @_inline
-def _tangent_bank(t, path_moved, k):  # type: ignore[no-untyped-def]
+def _regroup(t, e, now):  # type: ignore[no-untyped-def]
+    """The first ``now`` plays of operator e move from here on: those that stop keep the drive's last tangent."""
+    begin, end = t.plant.play_start[e], t.plant.play_start[e + 1]
+    still, q_before = t.still[e], t.q_before[e]
+    for j in range(begin + now, begin + t.moved[e]):
+        play = t.play[j]
+        for p in range(play.size):
+            play[p] = q_before[p]
+    for p in range(still.size):
+        still[p] = 0.0
+    for j in range(begin + now, end):
+        _add(still, t.plant.play_weight[j], t.play[j])
+    t.slope[e] = 0.0
+    for j in range(begin, begin + now):
+        t.slope[e] += t.plant.play_weight[j]
+    t.moved[e] = now
+
+
+@_inline
+def _tangent_bank(t, moved, k):  # type: ignore[no-untyped-def]
     """Plays that move follow the tangent of the drive; the others keep theirs, and their sum is kept too."""
-    count = t.place.size
     for e in range(t.q.shape[0]):
-        begin, end, now, before = t.play_start[e], t.play_start[e + 1], path_moved[k, e], t.moved[e]
-        if now != before:
-            for j in range(begin + now, begin + before):  # those that have just stopped
-                for p in range(count):
-                    t.play[j, p] = t.q_before[e, p]
-            for p in range(count):
-                t.still[e, p] = 0.0
-            t.slope[e] = 0.0
-            for j in range(begin, begin + now):
-                t.slope[e] += t.weight[j]
-            for j in range(begin + now, end):
-                weight = t.weight[j]
-                for p in range(count):
-                    t.still[e, p] += weight * t.play[j, p]
-            t.moved[e] = now
-        slope = t.slope[e]
-        for p in range(count):
-            t.change[e, p] = -t.z[e, p]
-            t.z[e, p] = t.still[e, p] + slope * t.q[e, p]
-    for p in range(count):
-        if t.place[p] == BANK:
-            t.z[t.row[p], p] += t.plays[k, t.source[p]]
-    for e in range(t.q.shape[0]):
-        for p in range(count):
-            t.change[e, p] += t.z[e, p]
+        if moved[k, e] != t.moved[e]:
+            _regroup(t, e, moved[k, e])
+        slope, z, change, still, q = t.slope[e], t.z[e], t.change[e], t.still[e], t.q[e]
+        for p in range(z.size):
+            now = still[p] + slope * q[p]
+            change[p] = now - z[p]
+            z[p] = now
+    # What a weight adds by itself is in z and its change now, and is taken off both before the next step's sum.
+    for p in range(t.places[BANK_FROM], t.row.size):
+        value = t.plays[k, t.source[p]]
+        t.z[t.row[p], p] += value
+        t.change[t.row[p], p] += value
 
 
 @_compile
-def tangent_kernel(t, path_moved, begin, first, stride, output):  # type: ignore[no-untyped-def]
+def tangent_kernel(t, moved, begin, first, stride, output):  # type: ignore[no-untyped-def]
     """Derivative of a plant's output by parameters, along its path (forward sensitivities of the plays' exact steps).
 
-    Starts with no tangent at step ``begin``, runs to the end of the path and fills ``output`` (rows, outputs, parameters)
-    from step ``first`` on, every ``stride`` steps. What enters the output itself (C, D, K) is not a parameter here.
+    Starts with no tangent at step ``begin``, runs to the end of the path, whose ``moved`` is given, and fills
+    ``output`` (rows, outputs, parameters) from step ``first`` on, every ``stride`` steps. What enters the output itself
+    (C, D, K) is not a parameter here.
     """
-    count, row = t.place.size, 0
-    for k in range(begin, path_moved.shape[0]):
+    row = 0
+    for k in range(begin, moved.shape[0]):
         _tangent_predict(t)
         _inject(t, t.before, k)
         _tangent_drive(t, k)
-        _tangent_bank(t, path_moved, k)
+        _tangent_bank(t, moved, k)
         for i in range(t.x.shape[0]):
             for e in range(t.z.shape[0]):
-                gain = t.E1[i, e]
-                for p in range(count):
-                    t.x[i, p] += gain * t.change[e, p]
+                _add(t.x[i], t.plant.E1[i, e], t.change[e])
         _inject(t, t.after, k)
         if k >= first and (k - first) % stride == 0:
             for o in range(output.shape[1]):
-                for p in range(count):
-                    output[row, o, p] = 0.0
+                total = output[row, o]
+                for p in range(total.size):
+                    total[p] = 0.0
                 for i in range(t.x.shape[0]):
-                    gain = t.C[o, i]
-                    for p in range(count):
-                        output[row, o, p] += gain * t.x[i, p]
+                    _add(total, t.plant.C[o, i], t.x[i])
                 for e in range(t.z.shape[0]):
-                    gain = t.K[o, e]
-                    for p in range(count):
-                        output[row, o, p] += gain * t.z[e, p]
+                    _add(total, t.plant.K[o, e], t.z[e])
             row += 1
 
 

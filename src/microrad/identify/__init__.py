@@ -18,6 +18,13 @@ from microrad.identify.prandtl_ishlinskii import PrandtlIshlinskiiFit, fit_prand
 from microrad.identify.predictions import Prediction, Score, predict
 from microrad.identify.records import IdentificationError, Units
 from microrad.identify.response import FrequencyResponse, response_from_periods, response_from_records
+from microrad.identify.stiffness import (
+    HystereticStiffnessFit,
+    StiffnessOptions,
+    fit_hysteretic_stiffness,
+    predicted_error,
+    simulate_hysteretic_stiffness,
+)
 from microrad.identify.vector_fitting import VectorFit, vector_fit
 
 __all__ = [
@@ -28,6 +35,7 @@ __all__ = [
     "AmplitudeDependence",
     "BoucWenFit",
     "FrequencyResponse",
+    "HystereticStiffnessFit",
     "Identification",
     "IdentificationError",
     "JointFit",
@@ -41,11 +49,13 @@ __all__ = [
     "Refused",
     "Score",
     "Source",
+    "StiffnessOptions",
     "Structure",
     "Units",
     "VectorFit",
     "amplitude_dependence",
     "fit_bouc_wen",
+    "fit_hysteretic_stiffness",
     "fit_joint",
     "fit_linear",
     "fit_plant",
@@ -54,8 +64,10 @@ __all__ = [
     "mirror_file_text",
     "output_error",
     "predict",
+    "predicted_error",
     "response_from_periods",
     "response_from_records",
     "runs",
+    "simulate_hysteretic_stiffness",
     "vector_fit",
 ]

@@ -27,6 +27,7 @@ _MOST_SAMPLES = 20_000
 _BENT = 2e-3
 _SCATTER = 0.3
 _EVALUATIONS = 200
+_POLISHING = 40  # each is long: the broadband recordings belong to it
 
 
 @dataclass(frozen=True, slots=True)
@@ -176,7 +177,7 @@ def fit_joint(  # noqa: PLR0913  all but the first three are named options
         both,
         starts=scattered,
         tolerance=tolerance,
-        most_evaluations=_EVALUATIONS,
+        most_evaluations=_POLISHING if free_linear else _EVALUATIONS,
         on_progress=on_progress,
     )
     return _joint_fit(structure, form, fit, records, units)

@@ -378,11 +378,9 @@ def _covariance(jacobian: FloatArray, variance: FloatArray, scale: FloatArray) -
     values, vectors = np.linalg.eigh(gram)
     values = np.maximum(values, 1e-15)
     bread = (vectors / values) @ vectors.T
-    unit = jacobian / length
-    meat = unit.T @ (variance[:, None] * unit)
+    half = bread @ (jacobian / length * np.sqrt(variance)[:, None]).T  # a square cannot come out negative
     size = scale / length
-    covariance = size[:, None] * (bread @ meat @ bread) * size
-    return np.asarray(covariance), float(math.sqrt(values[-1] / values[0]))
+    return np.asarray(size[:, None] * (half @ half.T) * size), float(math.sqrt(values[-1] / values[0]))
 
 
 def _correlation(covariance: FloatArray) -> FloatArray:

@@ -68,7 +68,7 @@ class Numbers:
     @property
     def redundant(self) -> int:
         """Numbers that change nothing: scale and phase of the state of each pair, scale of the others, scale of z."""
-        return self.frequency.size + self.decay.size + self.weights.shape[0]
+        return int(self.frequency.size + self.decay.size + self.weights.shape[0])
 
     def vector(self) -> Floats:
         """All free numbers in the order of `FIELDS`, and the delay."""
@@ -132,7 +132,7 @@ def balanced(numbers: Numbers) -> Numbers:
 
 
 def delayed(drive: Floats, rate_hz: float, delay_s: float, factor: int) -> Floats:
-    """Whole periods of a drive (samples, inputs), late by ``delay_s`` and at ``factor`` times the rate, band-limited."""
+    """Whole periods of a drive (samples, inputs), ``delay_s`` later and at ``factor`` times the rate, band-limited."""
     spectrum = np.fft.rfft(drive, axis=0)
     turn = np.exp(-2j * np.pi * np.fft.rfftfreq(drive.shape[0], 1 / rate_hz) * delay_s)
     late = np.fft.irfft(spectrum * turn[:, None], drive.shape[0], axis=0)
