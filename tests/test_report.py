@@ -11,8 +11,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from microrad import missionfile, report, study
-from microrad import folder
+from microrad import folder, missionfile, report, study
 from microrad.report import figures
 from shipped import SHIPPED, edited_file
 

@@ -27,7 +27,7 @@ _MOST_SAMPLES = 20_000
 _BENT = 2e-3
 _SCATTER = 0.3
 _EVALUATIONS = 200
-_POLISHING = 40  # each is long: the broadband recordings belong to it
+_POLISHING = 60  # each is long: the broadband recordings belong to it
 
 
 @dataclass(frozen=True, slots=True)

@@ -158,9 +158,9 @@ def fit_hysteretic_stiffness(
     records of each amplitude than inputs, and else over its mean-square output. ``iterations`` is the most that are
     done; `StiffnessOptions` has the rest.
 
-    Records are worked on in parallel, one a processor. Each in work takes 12 bytes x samples of a period x outputs x
-    numbers / 3 and about twice that for what enters the states: 200 MB for two of 8192 samples, 3 outputs and 613
-    numbers.
+    Records are worked on in parallel, one a processor, each with a Jacobian in single precision: 4 bytes x samples of a
+    period x outputs x numbers, and about as much for what it is made from. With two processors, 15 records of 8192
+    samples, 3 outputs and 613 numbers the whole process has been seen to take 640 MB.
 
     Raises `IdentificationError` for records of one amplitude (they cannot tell hysteresis from linear stiffness), of
     different rates or channels, without a period, and for thresholds that do not ascend from 0.
