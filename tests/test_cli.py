@@ -624,3 +624,57 @@ def test_the_models_of_the_command_are_those_of_the_ladder():
     from microrad.identify import MODELS
 
     assert {m.value.replace("-", "_") for m in lab.Model} == {"best", *MODELS}
+
+
+# ---------------------------------------------------------------------------------- what the files say of themselves
+def with_units(folder, header):
+    path = write_recording(folder / "units.csv")
+    path.write_text(path.read_text().replace("time,drive,angle", header))
+    return path
+
+
+def test_units_in_the_header_are_taken_and_said(call, folder):
+    path = with_units(folder, "time,Drive (mV),Tilt (urad)")
+    result = call("identify", path, "--input", 1, "--output", 2, "--rate", 1000, "--static")
+    assert (result.code, result.err) == (0, "")
+    assert "drive in mV (stated in the files), output in urad (stated in the files)" in result.out
+    assert 'drive_max = "0.012 V"' in (folder / "units-mirror.toml").read_text(encoding="utf-8")
+
+
+def test_units_that_nobody_states_are_assumed_and_said(call, folder):
+    result = call("identify", write_recording(folder / "loop.csv"), *COLUMNS)
+    assert "drive in V (assumed, --input-unit says otherwise)" in result.out
+    assert "output in mrad (assumed, --output-unit says otherwise)" in result.out
+
+
+def test_units_that_contradict_each_other_are_refused(refused, folder):
+    path = with_units(folder, "time,Drive (mV),Tilt (urad)")
+    message = refused(
+        "identify", path, "--input", 1, "--output", 2, "--rate", 1000, "--static", "--output-unit", "mrad"
+    )
+    assert "--output-unit is mrad and the files say urad" in message
+
+
+def test_one_recording_for_fit_and_validation_is_refused(refused, folder):
+    path = write_recording(folder / "loop.csv")
+    message = refused("identify", path, *COLUMNS, "--validate", path)
+    assert "the same data as" in message
+    assert "one that is not fitted" in message
+
+
+def test_one_file_for_mirror_and_report_is_refused(refused, folder):
+    path = write_recording(folder / "loop.csv")
+    assert "both the mirror file and the report" in refused(
+        "identify", path, *COLUMNS, "--mirror-file", "x.toml", "--report", "x.toml"
+    )
+
+
+def test_a_model_that_explains_nothing_unseen_is_refused(refused, folder):
+    path = write_recording(folder / "loop.csv")
+    rows = path.read_text().splitlines()
+    noise = np.random.default_rng(5).standard_normal(len(rows))
+    rows[751:] = [f"{r.rpartition(',')[0]},{n:.6g}" for r, n in zip(rows[751:], noise[751:], strict=True)]
+    path.write_text("\n".join(rows))
+    message = refused("identify", path, *COLUMNS)
+    assert "do not support a model" in message
+    assert "at most 50 % is a model" in message

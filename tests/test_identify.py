@@ -466,6 +466,8 @@ def test_held_out_samples_are_not_seen_by_the_fit():
         assert x.rate_limit_v_per_s == y.rate_limit_v_per_s
     assert [s.fit_rms_percent for s in a.scores] == [s.fit_rms_percent for s in b.scores]
     assert b.scores[0].held_out_rms_percent > 50 * a.scores[0].held_out_rms_percent
+    assert a.unsupported == ""
+    assert "on the held-out samples, where a straight line does as well" in b.unsupported
     assert any("held-out samples lie outside" in w for w in b.warnings)
     assert any("The residual grows" in w for w in b.warnings)
 
@@ -538,7 +540,7 @@ def test_real_recording():
     assert 6.5 < result.straight_line.held_out_rms_percent < 7.5
     assert not result.fit("bouc_wen").admissible
     assert result.fit().name == "prandtl_ishlinskii" or result.fit().admissible
-    assert "is not preferred for that" in result.reason
+    assert "then those with fewer parameters" in result.reason
     text = "\n".join(result.warnings)
     assert "One loop rate only" in text
     assert "the residual drifts by" in text

@@ -96,11 +96,11 @@ def _printed(outcome: Outcome) -> int:
         return UNREAD
     except OSError as error:
         _close_stdout()
-        _say(f"the output cannot be written: {error.strerror}")
+        say(f"the output cannot be written: {error.strerror}")
         return REFUSED
     except KeyboardInterrupt:
         _close_stdout()
-        _say("interrupted while printing")
+        say("interrupted while printing")
         return INTERRUPTED
     return outcome.code
 
@@ -111,24 +111,25 @@ def _close_stdout() -> None:
 
 
 # ------------------------------------------------------------------------------------------------------------ failures
-def _say(message: str) -> None:
+def say(message: str) -> None:
+    """One line to the user, on stderr."""
     print(f"microrad: {message}", file=sys.stderr)
 
 
 def _failed(error: BaseException) -> int:
     """Say what went wrong, on stderr; returns the exit code."""
     if _interrupted(error):
-        _say("interrupted, nothing was written")
+        say("interrupted, nothing was written")
         return INTERRUPTED
     if isinstance(error, OSError):
         where = f"{error.filename}: {error.strerror}" if error.filename else str(error.strerror or error)
-        _say(f"{where}; nothing was written. Check free space and permissions.")
+        say(f"{where}; nothing was written. Check free space and permissions.")
         return REFUSED
     if _meant_for_users(error):
-        _say(str(error) or "not enough memory")
+        say(str(error) or "not enough memory")
         return REFUSED
     traceback.print_exception(error)
-    _say("a fault of microrad or of its installation: run microrad doctor; if all is well, report the lines above.")
+    say("a fault of microrad or of its installation: run microrad doctor; if all is well, report the lines above.")
     return BUG
 
 

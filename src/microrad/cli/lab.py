@@ -1,6 +1,7 @@
 """Commands for the laboratory: a mirror from recordings, and recordings from the virtual bench."""
 
 import functools
+import re
 import shlex
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -75,7 +76,8 @@ def _rate(text: str) -> float:
 
 
 _FILES = "Recordings (CSV, text, LVM, TDMS, MAT, NPY, NPZ, HDF5), or one folder that microrad bench wrote."
-_OUTPUT_UNITS = "rad, mrad or urad; with --lever-arm also m, mm or um."
+_OUTPUT_UNITS = "rad, mrad or urad; with --lever-arm also m, mm or um [default: what the file says, else mrad]."
+_INPUT_UNITS = "V or mV [default: what the file says, else V]."
 _LEVER_ARM = "From the axis of rotation to the point measured: '50 mm'."
 _MIRROR_FILE = "File to write [default: <name of the recording>-mirror.toml in the current folder]."
 _REPORT_FILE = "Report to write [default: <name of the mirror file>.html beside it]."
@@ -106,8 +108,8 @@ def identify(  # noqa: PLR0913  every argument is a named option
     period: Annotated[int | None, option("--period", "SAMPLES", "Length of a period of a periodic drive.")] = None,
     accept: Annotated[list[str] | None, option("--accept", "FINDING", _ACCEPT)] = None,
     validate: Annotated[list[Path] | None, option("--validate", "FILE", _VALIDATE)] = None,
-    output_unit: Annotated[str, option("--output-unit", "UNIT", _OUTPUT_UNITS)] = "mrad",
-    input_unit: Annotated[str, option("--input-unit", "UNIT", "V or mV.")] = "V",
+    output_unit: Annotated[str | None, option("--output-unit", "UNIT", _OUTPUT_UNITS)] = None,
+    input_unit: Annotated[str | None, option("--input-unit", "UNIT", _INPUT_UNITS)] = None,
     lever_arm: Annotated[float | None, option("--lever-arm", "LENGTH", _LEVER_ARM, parser=_quantity("m"))] = None,
     hold_out: Annotated[float | None, option("--hold-out", "SHARE", _HOLD_OUT)] = None,
     static: Annotated[bool, typer.Option("--static", help=_STATIC)] = False,
@@ -132,11 +134,18 @@ def identify(  # noqa: PLR0913  every argument is a named option
     target = mirror_file or Path(f"{files[0].stem}-mirror.toml")
     page = report_file or target.with_suffix(".html")
     advice = "name another one with --mirror-file" + ("" if overwrite else " or replace it with --overwrite")
+    if page.resolve() == target.resolve():
+        raise Refusal(f"{page} cannot be both the mirror file and the report; name another one with --report.")
     check = functools.partial(check_target, target, advice, MIRROR_FILE_BEGINS if overwrite else "")
     check()
     report.check_identification(page, overwrite)
     columns = _Columns(input_column, output_column, rate, time, period, tuple(accept or ()))
     records, validation, virtual = _recordings(files, validate or [], columns)
+    everything = [*records, *validation]
+    drive_said = set().union(*(_stated(r.input_units, r.input_names) for r in everything))
+    output_said = set().union(*(_stated(r.output_units, r.output_names) for r in everything))
+    input_unit, drive_by = _unit(input_unit, drive_said, "--input-unit", "V")
+    output_unit, output_by = _unit(output_unit, output_said, "--output-unit", "mrad")
     models = identification.STATIC[:2] if static else identification.MODELS
     with progress_bar() as bar:
         found = identification.identify(
@@ -151,6 +160,8 @@ def identify(  # noqa: PLR0913  every argument is a named option
             lever_arm_m=lever_arm,
             input_unit=input_unit,
         )
+    if found.unsupported:
+        raise Refusal(found.unsupported)
     written = _written(found, model, admissible)
     title = files[0].stem[:200] if name is None else name
     text = identification.mirror_file_text(found, title, model=written)
@@ -158,7 +169,8 @@ def identify(  # noqa: PLR0913  every argument is a named option
     outcome = Outcome(
         json_text(report.identification_data(found, written, **data))
         if as_json
-        else report.identification_text(found, written, **data)
+        else f"drive in {input_unit} ({drive_by}), output in {output_unit} ({output_by})\n\n"
+        + report.identification_text(found, written, **data)
     )
     check()  # the file may have appeared meanwhile
     report.write_identification(
@@ -216,6 +228,32 @@ def _recordings(
         )
 
     return [read(path) for path in files], [read(path) for path in validate], False
+
+
+_SPELLINGS = {"µrad": "urad", "μrad": "urad", "microrad": "urad", "µm": "um", "μm": "um", "volt": "V", "volts": "V"}
+_KNOWN = ("V", "mV", "rad", "mrad", "urad", "m", "mm", "um")
+_BRACKETS = re.compile(r"[(\[]\s*([^)\]]*?)\s*[)\]]\s*$")
+
+
+def _stated(units: tuple[str, ...], names: tuple[str, ...]) -> set[str]:
+    """Units that a file states for its channels, by itself or in brackets behind a name it knows the unit of."""
+    said = {unit.strip() for unit in units if unit.strip()}
+    if not said:
+        behind = [found[1] for name in names if (found := _BRACKETS.search(name))]
+        said = {unit for unit in behind if _SPELLINGS.get(unit, unit) in _KNOWN}
+    return {_SPELLINGS.get(unit, unit) for unit in said}
+
+
+def _unit(given: str | None, said: set[str], flag: str, assumed: str) -> tuple[str, str]:
+    """The unit of a channel, and where it comes from: the option or the files, which must agree, else an assumption."""
+    listed = ", ".join(sorted(said))
+    if given is not None:
+        if said and said != {given}:
+            raise Refusal(f"{flag} is {given} and the files say {listed}: give what the files say, or neither.")
+        return given, "given"
+    if len(said) > 1:
+        raise Refusal(f"the files say different units, {listed}: identify them apart, or convert them.")
+    return (said.pop(), "stated in the files") if said else (assumed, f"assumed, {flag} says otherwise")
 
 
 def _wanted(models: tuple[str, ...], model: Model, admissible: bool) -> tuple[str, ...]:

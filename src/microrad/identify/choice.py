@@ -46,6 +46,7 @@ MODELS = (*STATIC, *FORMS)
 _STARTS = 12
 _MIN_PART = 100
 _EXPLAINED = 0.5
+_BETTER = 0.9
 _CREEP_S = 1.0
 _POLISH = "linear part, hysteresis and creep together"
 
@@ -78,10 +79,11 @@ class Identification:
 
     `fits` see the first part of each recording alone; `scores` has the same order, as has `predictions` (models, then
     recordings in the order of `recordings`: loops, then validation), and `straight_line` is the best line through the
-    same samples. `refused` names the models that were not fitted. `linear` is the linear part of the broadband
-    recordings in the units of the recordings (volts and radians), where there are any. `span_rad` is the peak-to-peak
-    output that the percentages refer to, and `travel_rad` the range of the chosen model's output over the fitted drive
-    from `drive_min_v` to `drive_max_v`. `residual` tests the chosen model's residual on the held-out samples.
+    same samples. `refused` names the models that were not fitted, and `unsupported` says, where it is not empty, why
+    not even the chosen one should be used. `linear` is the linear part of the broadband recordings (volts and radians),
+    where there are any. `span_rad` is the peak-to-peak output that the percentages refer to, and `travel_rad` the range
+    of the chosen model's output over the fitted drive from `drive_min_v` to `drive_max_v`. `residual` tests the chosen
+    model's residual on the held-out samples.
     """
 
     fits: tuple[Fit, ...]
@@ -91,6 +93,7 @@ class Identification:
     reason: str
     warnings: tuple[str, ...]
     refused: tuple[Refused, ...]
+    unsupported: str
     sources: tuple[Source, ...]
     recordings: tuple[Recording, ...]
     predictions: tuple[tuple[Prediction, ...], ...]
@@ -154,6 +157,7 @@ def identify(  # noqa: PLR0913  all but the first are named options in practice
         models = tuple(dict.fromkeys("bouc_wen_admissible" if m == "bouc_wen" else m for m in models))
     if not recordings:
         raise IdentificationError("no recording was given; name at least one.")
+    _check_distinct(recordings, validation)
     response, broadband, loops = roles(recordings)
     splits = _splits(loops, hold_out, bool(validation))
     heads = [replace(r, drive=r.drive[:k], output=r.output[:k]) for r, k in zip(loops, splits, strict=True)]
@@ -188,6 +192,19 @@ def _splits(recordings: Sequence[Recording], hold_out: float | None, validated: 
                 f"at least {_MIN_PART}; record longer or choose hold_out nearer to 0.5."
             )
     return splits
+
+
+def _check_distinct(recordings: Sequence[Recording], validation: Sequence[Recording]) -> None:
+    """A recording given twice would count twice, and one that is fitted and validated would praise itself."""
+    seen: dict[str, str] = {}
+    for recording in (*recordings, *validation):
+        key = f"{recording.sha256} {recording.rate_hz}"
+        if recording.sha256 and key in seen:
+            raise IdentificationError(
+                f"{recording.path}: the same data as {seen[key]}; give each recording once, and for validation one "
+                "that is not fitted."
+            )
+        seen[key] = recording.path
 
 
 def _check_models(models: Sequence[str]) -> None:
@@ -396,6 +413,7 @@ def _identification(
         reason=_reason(scores, line, best),
         warnings=tuple(warnings),
         refused=tuple(refused),
+        unsupported=_unsupported(scores[best], line, chosen),
         sources=sources,
         recordings=judge.recordings,
         predictions=tuple(predictions),
@@ -433,17 +451,32 @@ def _residual_test(judge: _Judge, predictions: Sequence[Prediction]) -> Residual
 
 
 def _check_explained(score: Score, predictions: Sequence[Prediction]) -> None:
-    """Refuse recordings whose output even the best model does not follow."""
-    measured = [p.measured_rad[p.start : p.split] for p in predictions]
-    spread = math.sqrt(float(np.mean(np.concatenate([each - each.mean() for each in measured]) ** 2)))
-    left = math.sqrt(float(np.mean(np.concatenate([p.residual_rad[p.start : p.split] for p in predictions]) ** 2)))
-    if left > _EXPLAINED * spread:
-        raise IdentificationError(
-            f"the recordings do not support a model: the best one, {score.model}, leaves {left:.3g} rad rms of "
-            f"{spread:.3g} rad on the very samples it was fitted to ({100 * left / spread:.0f} %, at most "
-            f"{100 * _EXPLAINED:.0f} % is a model). The output hardly follows the drive: check that the channels "
-            "belong together, and record a larger drive or with less noise."
-        )
+    """Refuse recordings whose output even the best model does not follow where it was fitted."""
+    fitted = [(p.measured_rad[p.start : p.split], p.residual_rad[p.start : p.split]) for p in predictions]
+    if text := _unexplained(score, fitted, "on the very samples it was fitted to"):
+        raise IdentificationError(text)
+
+
+def _unsupported(score: Score, line: Score, predictions: Sequence[Prediction]) -> str:
+    """Why the chosen model should not be used at all, judged by the held-out samples; nothing where it may be."""
+    if score.held_out_rms_percent <= _BETTER * line.held_out_rms_percent:
+        return ""
+    unseen = [(p.measured_rad[p.split :], p.residual_rad[p.split :]) for p in predictions]
+    return _unexplained(score, unseen, "on the held-out samples, where a straight line does as well")
+
+
+def _unexplained(score: Score, parts: Sequence[tuple[FloatArray, FloatArray]], where: str) -> str:
+    filled = [(measured, residual) for measured, residual in parts if measured.size]
+    spread = math.sqrt(float(np.mean(np.concatenate([m - m.mean() for m, _ in filled]) ** 2)))
+    left = math.sqrt(float(np.mean(np.concatenate([r for _, r in filled]) ** 2)))
+    if left <= _EXPLAINED * spread:
+        return ""
+    return (
+        f"the recordings do not support a model: the best one, {score.model}, leaves {left:.3g} rad rms of "
+        f"{spread:.3g} rad {where} ({100 * left / spread:.0f} %, at most {100 * _EXPLAINED:.0f} % is a model). The "
+        "output hardly follows the drive: check that the channels belong together, and record a larger drive, or with "
+        "less noise and drift."
+    )
 
 
 def _best(fits: Sequence[Fit], residuals: Sequence[Sequence[FloatArray]]) -> int:
@@ -492,7 +525,7 @@ def _reason(scores: Sequence[Score], line: Score, best: int) -> str:
     lower = [s.model for s in scores if s.held_out_rms_percent < scores[best].held_out_rms_percent]
     if lower:
         reason += (
-            f" The difference to {' and '.join(lower)} is below two standard errors, and a model that moves the wrong "
-            "way after reversals is not preferred for that."
+            f" The difference to {' and '.join(lower)} is below two standard errors; among such models those that "
+            "never move the wrong way after a reversal go first, then those with fewer parameters."
         )
     return reason

@@ -191,7 +191,8 @@ def output_error(
     """Measured less modelled output (samples, outputs) of a record, without its mean, the first `drop` samples left
     out.
 
-    From rest at the first sample; with `steady`, each period in the steady state of its own drive (`period_samples`).
+    From rest at the first sample's drive; with `steady`, each period in the steady state of its own drive
+    (`period_samples`).
     """
     if steady:
         period = record.period_samples or record.samples
@@ -201,7 +202,7 @@ def output_error(
         ]
         modelled = np.concatenate(parts)
     else:
-        modelled = simulate(modes, record.drive, record.rate_hz, hold)
+        modelled = simulate(modes, record.drive - record.drive[:1], record.rate_hz, hold)
     error = (record.output[: len(modelled)] - modelled)[drop:]
     return np.asarray(error - error.mean(axis=0))
 

@@ -40,7 +40,7 @@ def mirror_file_text(identification: Identification, name: str, *, model: str | 
         *_header(identification, fit, model or identification.chosen),
         f"name = {_quoted(name)}",
         _line("travel", _text(float(f"{1e3 * identification.travel_rad:.4g}"), "mrad"), f"fitted range, from {source}"),
-        *_composition(fit),
+        *_composition(fit, identification),
         _line("rate_limit", _text(fit.rate_limit_v_per_s, "V/s"), f"fastest rate of the drive, from {source}"),
         _line("bias", _text(identification.bias_v, "V"), f"middle of the drive range, from {source}"),
         _line("drive_min", _text(identification.drive_min_v, "V"), f"lowest drive, from {source}"),
@@ -90,10 +90,11 @@ def _falling(fit: Fit) -> bool:
     return fit.d1_rad_per_v < 0 if isinstance(fit, BoucWenFit) else fit.sign < 0
 
 
-def _composition(fit: Fit) -> list[str]:
+def _composition(fit: Fit, identification: Identification) -> list[str]:
     if isinstance(fit, JointFit) and fit.linear is not None:
         return [_line("composition", "cascade", "hysteresis drives the linear part below; both were fitted together")]
-    return [_line("composition", "static", "the linear dynamics of the mirror were not identified")]
+    why = "were not identified" if identification.linear is None else "are not used by this model"
+    return [_line("composition", "static", f"the linear dynamics of the mirror {why}")]
 
 
 def _tables(fit: Fit, identification: Identification, source: str) -> list[str]:
@@ -152,7 +153,8 @@ def _joint_plays(fit: JointFit, turned: float, source: str) -> list[str]:
     assert isinstance(model, Play)
     errors = fit.fit.standard_errors[: len(model.thresholds_v)]
     thresholds = [_quoted(_text(r, "V")) for r in model.thresholds_v]
-    weights = [_quoted(_text(1e3 * max(w, 0.0), "mrad/V")) for w in model.weights_rad_v]
+    least = 1e-9 * slow_gain(model)  # what the search leaves of a weight at its bound
+    weights = [_quoted(_text(1e3 * w if w > least else 0.0, "mrad/V")) for w in model.weights_rad_v]
     shown = ", ".join(f"{1e3 * e:.2g}" for e in errors)
     lines = [
         "[prandtl_ishlinskii]",

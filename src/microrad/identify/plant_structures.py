@@ -62,10 +62,16 @@ def poles_of(system: lti.StateSpace, excited_hz: tuple[float, float], rate_hz: f
     """Poles and zeros of a strictly proper system with one input and output.
 
     It is normalised at the geometric middle between the lowest excited frequency and a tenth of the lowest resonance,
-    where its gain should be flat. Zeros above the sample rate do nothing that it could show, and are left out.
+    where its gain should be flat. Zeros above the sample rate do nothing that it could show, and are left out; so are
+    as many poles as zeros below the excited band, a flank fitted as dynamics that would only move the gain at rest.
     """
     poles = [complex(p) for p in np.linalg.eigvals(system.A)]
     zeros = [complex(z) for z in lti.zeros(system) if abs(z) < 2.0 * math.pi * rate_hz]
+    slow = 2.0 * math.pi * excited_hz[0]
+    below = [sorted((r for r in roots if abs(r) < slow), key=abs) for roots in (poles, zeros)]
+    if len(below[0]) == len(below[1]):
+        poles = [p for p in poles if p not in below[0]]
+        zeros = [z for z in zeros if z not in below[1]]
     resonant = [abs(p) / (2 * math.pi) for p in poles if p.imag > 0.0]
     top = max(min([excited_hz[1], *(f / 10.0 for f in resonant)]), excited_hz[0])
     return LinearPoles(Roots.of(poles), Roots.of(zeros), math.sqrt(excited_hz[0] * top))

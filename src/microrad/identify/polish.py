@@ -117,7 +117,9 @@ class TimeEquations:
     def __init__(self, records: Sequence[Recording], hold: Hold, drop: int = 0, *, direct: bool = True) -> None:
         """Without `direct` the fit is strictly proper."""
         self.hold, self.drop, self.direct = hold, drop, direct
-        self.records = [(r.drive, r.output[drop:] - r.output[drop:].mean(axis=0), r.rate_hz) for r in records]
+        self.records = [
+            (r.drive - r.drive[:1], r.output[drop:] - r.output[drop:].mean(axis=0), r.rate_hz) for r in records
+        ]
         self.power = sum(float(np.sum(y**2)) for _, y, _ in self.records)
         self.rows = sum(y.size for _, y, _ in self.records)
         self.decay_rad_s = _LOWEST_DECAY * 2 * np.pi * min(rate / len(y) for _, y, rate in self.records)

@@ -93,6 +93,11 @@ def prepare(recordings: Sequence[Recording], units: Units) -> tuple[Prepared, ..
 
 
 def _prepare(recording: Recording, units: Units) -> Prepared:
+    if recording.drive.shape[1] != 1 or recording.output.shape[1] != 1:
+        raise IdentificationError(
+            f"{recording.path}: {recording.drive.shape[1]} drives and {recording.output.shape[1]} outputs; a mirror "
+            "file holds one of each: choose one column, or fit several with fit_linear or fit_hysteretic_stiffness."
+        )
     drive = recording.drive[:, 0] * units.volts
     if np.ptp(drive) == 0 or np.ptp(recording.output) == 0:
         raise IdentificationError(f"{recording.path}: drive or output is constant in the part that is fitted.")
