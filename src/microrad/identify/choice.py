@@ -19,6 +19,7 @@ from microrad.identify.doubts import (
     residual_test,
     residual_warnings,
     score_warnings,
+    set_aside_warnings,
 )
 from microrad.identify.joint import FORMS, JointFit, fit_joint, time_constants
 from microrad.identify.linear import LinearFit, fit_linear
@@ -398,6 +399,7 @@ def _identification(
     warnings = [
         *range_warnings((low, high), fit.rate_limit_v_per_s),
         *rate_warnings(prepared, fit),
+        *set_aside_warnings(judge.loops, chosen[: len(judge.loops)]),
         *held_out_warnings(judge.recordings, judge.units, (low, high), chosen),
         *score_warnings(scores[best], line),
         *fit_warnings(fit),

@@ -26,6 +26,7 @@ from microrad.recording import Recording
 _DRIFT_PERCENT = 0.2
 _NOISY_RATE = 0.2
 _LAGS = 50
+_SET_ASIDE = 0.2
 
 
 def range_warnings(drive_range: tuple[float, float], rate: float) -> list[str]:
@@ -38,6 +39,16 @@ def range_warnings(drive_range: tuple[float, float], rate: float) -> list[str]:
         "the model is an extrapolation.",
         f"Not valid above {rate:.4g} V/s, the fastest rate of the recordings: a sine over the whole drive range "
         f"reaches it at {freq_hz:.4g} Hz.",
+    ]
+
+
+def set_aside_warnings(recordings: Sequence[Recording], predictions: Sequence[Prediction]) -> list[str]:
+    """Records of which more than a fifth is not fitted, because the drive takes that long to sweep its range once."""
+    return [
+        f"{recording.path}: the first {p.start} of {p.split} samples are set aside, until the drive has swept its "
+        "range once, because what the mirror remembers from before is not known; begin a record with its largest sweep."
+        for recording, p in zip(recordings, predictions, strict=True)
+        if p.start > _SET_ASIDE * p.split
     ]
 
 
