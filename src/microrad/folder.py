@@ -1,6 +1,7 @@
 """A folder or file of results appears whole or not at all, and never replaces what microrad did not write."""
 
 import json
+import os
 import shutil
 import tempfile
 from collections.abc import Iterator
@@ -68,3 +69,16 @@ def _replace(draft: Path, folder: Path) -> None:
         raise
     finally:
         shutil.rmtree(old, ignore_errors=True)
+
+
+def write_whole(path: Path, text: str) -> None:
+    """Write a file whole or not at all: beside its place first."""
+    part = path.with_name(f".microrad-{os.getpid()}.part")
+    try:
+        with part.open("x", encoding="utf-8", newline="\n") as file:
+            file.write(text)
+            file.flush()
+            os.fsync(file.fileno())
+        part.replace(path)
+    finally:
+        part.unlink(missing_ok=True)

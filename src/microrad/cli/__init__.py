@@ -23,8 +23,8 @@ from microrad.cli.frame import (
     main,
     option,
     progress_bar,
-    write_whole,
 )
+from microrad.folder import write_whole
 
 # Everything else is imported inside the commands: numpy, numba and pydantic take longer to load than help may take.
 if TYPE_CHECKING:

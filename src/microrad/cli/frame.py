@@ -187,19 +187,6 @@ def check_target(path: Path, advice: str, replace_if_begins: str = "") -> None:
             raise Refusal(f"{path} was not written by microrad and is left as it is; {advice}.")
 
 
-def write_whole(path: Path, text: str) -> None:
-    """Write a file whole or not at all: beside its place first."""
-    part = path.with_name(f".microrad-{os.getpid()}.part")
-    try:
-        with part.open("x", encoding="utf-8", newline="\n") as file:
-            file.write(text)
-            file.flush()
-            os.fsync(file.fileno())
-        part.replace(path)
-    finally:
-        part.unlink(missing_ok=True)
-
-
 # ----------------------------------------------------------------------------------------------------------- commands
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON document and nothing else.")]
 Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace what an earlier run wrote.")]

@@ -23,8 +23,8 @@ from microrad.cli.frame import (
     json_text,
     option,
     progress_bar,
-    write_whole,
 )
+from microrad.folder import write_whole
 
 # Everything else is imported inside the commands: it takes longer to load than help may take.
 if TYPE_CHECKING:
@@ -152,7 +152,7 @@ def identify(  # noqa: PLR0913  every argument is a named option
             records,
             hold_out,
             seed,
-            _wanted(models, model, admissible),
+            _wanted(models, model),
             bar,
             validation=validation,
             admissible=admissible,
@@ -256,7 +256,7 @@ def _unit(given: str | None, said: set[str], flag: str, assumed: str) -> tuple[s
     return (said.pop(), "stated in the files") if said else (assumed, f"assumed, {flag} says otherwise")
 
 
-def _wanted(models: tuple[str, ...], model: Model, admissible: bool) -> tuple[str, ...]:
+def _wanted(models: tuple[str, ...], model: Model) -> tuple[str, ...]:
     """The models to fit: those of the ladder, and the one that the mirror file is to hold."""
     chosen = model.replace("-", "_")
     return models if model is Model.BEST or chosen in models else (*models, chosen)

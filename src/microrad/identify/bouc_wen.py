@@ -39,6 +39,7 @@ from microrad.identify.records import (
     Progress,
     Units,
     colour_inflation,
+    correlation,
     one_rate_only,
     percent,
     prepare,
@@ -130,7 +131,7 @@ class BoucWenFit:
     @property
     def correlation(self) -> FloatArray:
         """Correlation matrix of the parameters."""
-        return _correlation(self.covariance)
+        return correlation(self.covariance)
 
     @property
     def settled_hysteresis_rad(self) -> tuple[float, float]:
@@ -271,23 +272,18 @@ def _bound_gradient(values: FloatArray) -> FloatArray:
     return np.array([-share / d1, 0, share / epsilon, 0, share / alpha - share / settled, -sign * share / settled])
 
 
-def _correlation(covariance: FloatArray) -> FloatArray:
-    deviation = np.sqrt(np.diag(covariance)) + 1e-300
-    return np.asarray(covariance / np.outer(deviation, deviation))
-
-
 def _not_identified(problem: Problem, values: FloatArray, uncertainty: _Uncertainty) -> tuple[NotIdentified, ...]:
     """Parameters with a relative standard error above 0.5 or a correlation above 0.95, each with its reason."""
     error = np.sqrt(np.diag(uncertainty.covariance)) / np.maximum(np.abs(values), 1e-300)
-    correlation = np.abs(_correlation(uncertainty.covariance)) - np.eye(6)
+    between = np.abs(correlation(uncertainty.covariance)) - np.eye(6)
     one_rate = one_rate_only(problem.records)
     found = []
     for i, name in enumerate(PARAMETERS):
-        partner = int(np.argmax(correlation[i]))
+        partner = int(np.argmax(between[i]))
         if error[i] > _NOT_IDENTIFIED_ERROR:
             fact = f"relative standard error {100 * error[i]:.0f} %"
-        elif correlation[i, partner] > _NOT_IDENTIFIED_CORRELATION:
-            fact = f"correlation {correlation[i, partner]:.3f} with {PARAMETERS[partner]}"
+        elif between[i, partner] > _NOT_IDENTIFIED_CORRELATION:
+            fact = f"correlation {between[i, partner]:.3f} with {PARAMETERS[partner]}"
         else:
             continue
         found.append(NotIdentified(name, f"{fact}: {_reason(name, one_rate, uncertainty.at_bound)}"))

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from microrad import kernels, mirror
-from microrad.hysteresis import NO_CREEP, BoucWen, Creep, Play, scaled, slow_gain
+from microrad.hysteresis import NO_CREEP, BoucWen, Creep, Play, slow_gain
 from microrad.identify.bouc_wen import fit_bouc_wen
 from microrad.identify.plant_fit import PlantFit, Run, fit_plant, without
 from microrad.identify.plant_structures import AxisStructure, LinearPoles, one_axis
@@ -84,8 +84,7 @@ class JointFit:
         if isinstance(self.model, Play):
             return all(w * slow_gain(self.model) >= 0.0 for w in self.model.weights_rad_v)
         rising = math.copysign(1.0, self.model.d1_rad_v)
-        turned = scaled(self.model, 1.0) if rising > 0.0 else turned_over(self.model)
-        assert isinstance(turned, BoucWen)
+        turned = self.model if rising > 0.0 else turned_over(self.model)
         return turned.reversal_slope_rad_v() >= -1e-3 * turned.d1_rad_v
 
     @property

@@ -17,7 +17,7 @@ from typing import Any, Literal
 import numpy as np
 
 from microrad import kernels, mirror
-from microrad.identify.records import FloatArray, IdentificationError, Progress, colour_inflation
+from microrad.identify.records import FloatArray, IdentificationError, Progress, colour_inflation, correlation
 from microrad.mirror import Mirror
 from microrad.recording import Recording
 
@@ -241,7 +241,7 @@ class PlantFit:
     @property
     def correlation(self) -> FloatArray:
         """Correlation matrix of the parameters."""
-        return _correlation(self.covariance)
+        return correlation(self.covariance)
 
 
 class Problem:
@@ -383,25 +383,20 @@ def _covariance(jacobian: FloatArray, variance: FloatArray, scale: FloatArray) -
     return np.asarray(size[:, None] * (half @ half.T) * size), float(math.sqrt(values[-1] / values[0]))
 
 
-def _correlation(covariance: FloatArray) -> FloatArray:
-    deviation = np.sqrt(np.diag(covariance)) + 1e-300
-    return np.asarray(covariance / np.outer(deviation, deviation))
-
-
 def _not_identified(structure: Structure, values: FloatArray, covariance: FloatArray) -> list[tuple[str, str]]:
     """Parameters with a relative standard error above 0.5, or a correlation above 0.95 with another, and why."""
     errors = np.sqrt(np.diag(covariance))
-    correlation = np.abs(_correlation(covariance)) - np.eye(values.size)
+    between = np.abs(correlation(covariance)) - np.eye(values.size)
     found = []
     for i, p in enumerate(structure.parameters):
-        partner = int(np.argmax(correlation[i])) if values.size > 1 else i
+        partner = int(np.argmax(between[i])) if values.size > 1 else i
         if values[i] <= p.lower or values[i] >= p.upper:
             found.append((p.name, f"at its bound, {values[i]:g} {p.unit}".rstrip()))
         elif errors[i] > abs(values[i]):
             found.append((p.name, f"not told from 0: standard error {errors[i]:.2g} {p.unit}".rstrip()))
         elif errors[i] > _NOT_IDENTIFIED_ERROR * abs(values[i]):
             found.append((p.name, f"relative standard error {100 * errors[i] / abs(values[i]):.0f} %"))
-        elif correlation[i, partner] > _NOT_IDENTIFIED_CORRELATION:
+        elif between[i, partner] > _NOT_IDENTIFIED_CORRELATION:
             other = structure.parameters[partner].name
-            found.append((p.name, f"correlation {correlation[i, partner]:.3f} with {other}"))
+            found.append((p.name, f"correlation {between[i, partner]:.3f} with {other}"))
     return found

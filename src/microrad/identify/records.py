@@ -195,6 +195,12 @@ def _inflation(residual: FloatArray) -> float:
     return max(1.0, float(2 * pairs[:last].sum() - 1))
 
 
+def correlation(covariance: FloatArray) -> FloatArray:
+    """Correlation matrix of a covariance."""
+    deviation = np.sqrt(np.diag(covariance)) + 1e-300
+    return np.asarray(covariance / np.outer(deviation, deviation))
+
+
 def percent(residual: FloatArray, span_rad: float) -> tuple[float, float]:
     """Rms and peak of a residual in per cent of a peak-to-peak span."""
     return 100 * float(np.sqrt(np.mean(residual**2))) / span_rad, 100 * float(np.max(np.abs(residual))) / span_rad

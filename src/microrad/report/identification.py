@@ -3,11 +3,11 @@
 import hashlib
 import math
 import os
-import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from microrad.folder import write_whole
 from microrad.identify import Identification
 from microrad.identify.predictions import Fit
 from microrad.recording import Finding, Recording
@@ -74,22 +74,8 @@ def write_identification(  # noqa: PLR0913  all but the first two are named opti
         virtual=virtual,
     )
     check_identification(target, overwrite)  # it may have appeared meanwhile
-    _write_whole(target, text)
+    write_whole(target, text)
     return target
-
-
-def _write_whole(target: Path, text: str) -> None:
-    handle, name = tempfile.mkstemp(prefix=f".{target.name[:40]}-", suffix=".part", dir=target.parent)
-    part = Path(name)
-    try:
-        with open(handle, "w", encoding="utf-8", newline="\n") as file:  # noqa: PTH123  mkstemp gives a descriptor
-            file.write(text)
-            file.flush()
-            os.fsync(file.fileno())
-        part.chmod(0o644)  # mkstemp's 0600 is for secrets
-        part.replace(target)
-    finally:
-        part.unlink(missing_ok=True)
 
 
 def render(
