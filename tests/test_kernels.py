@@ -1040,3 +1040,15 @@ def test_the_kernels_run_as_they_are_without_the_compiler(tmp_path):
     with np.load(path) as uncompiled:
         for name, values in battery().items():
             close(uncompiled[name.replace(" ", "_")], values, 1e-12)
+
+
+def test_machine_code_of_two_processes_never_shares_a_file(tmp_path, monkeypatch):
+    """Each process saves with the index it has read before the other wrote: a count of files would name both alike."""
+    first, second = (kernels._CacheFile(str(tmp_path), "kernel-1.py3", "stamp") for _ in range(2))
+    monkeypatch.setattr(kernels._CacheFile, "_load_index", lambda self: {})
+    first.save("one signature", "code of one")
+    second.save("another signature", "code of another")
+    monkeypatch.undo()
+    assert second.load("another signature") == "code of another"
+    assert first.load("one signature") is None  # lost from the index, so it is compiled again
+    assert len(list(tmp_path.glob("*.nbc"))) == 2

@@ -8,11 +8,13 @@ All quantities are deviations from the operating point (drive bias, output at re
 """
 
 from collections.abc import Callable, Sequence
+from hashlib import sha256
 from math import exp, expm1, log1p
 from typing import Any, NamedTuple
 
 import numba
 import numpy as np
+from numba.core.caching import IndexDataCacheFile
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
@@ -29,8 +31,28 @@ _OPTIONS: dict[str, Any] = {
     "fastmath": {"contract"},
     "_nrt": False,
 }
-_compile: Callable[[Any], Any] = numba.njit(**_OPTIONS)
 _inline: Callable[[Any], Any] = numba.njit(inline="always", **_OPTIONS)
+
+
+class _CacheFile(IndexDataCacheFile):
+    """Machine code in files named by what they hold, written before the index names them.
+
+    Numba counts its files: two processes that compile at once write different code under one number, and a later one
+    loads the wrong one (seen: an IndexError in half the runs behind a cold parallel start).
+    """
+
+    def save(self, key: Any, data: Any) -> None:
+        name = f"{self._index_name.removesuffix('.nbi')}.{sha256(repr(key).encode()).hexdigest()[:16]}.nbc"
+        self._save_data(name, data)  # type: ignore[no-untyped-call]
+        self._save_index({**self._load_index(), key: name})  # type: ignore[no-untyped-call]
+
+
+def _compile(function: Callable[..., Any]) -> Any:
+    """The function compiled, with its machine code kept in a cache that several processes may share."""
+    compiled = numba.njit(**_OPTIONS)(function)
+    if cache := getattr(compiled, "_cache", None):  # none under NUMBA_DISABLE_JIT
+        cache._cache_file.__class__ = _CacheFile
+    return compiled
 
 # Columns of a Bouc-Wen parameter row: Eq. 3 of SPIE 11852, 118523B, then the asymmetry between the signs of h and
 # between rising and falling drive, the exponent less 1, and 1 / size of h at which the exponent has no effect.

@@ -1,4 +1,4 @@
-"""Controllers: from gains to matrices, the inverse of a hysteresis model, and the margins of the loop as it is sampled.
+"""The sampled loop: amplifier, clock, PID, the inverse of a hysteresis model, and margins of one axis.
 
 Every controller is one discrete state-space form, xc[k+1] = A xc + B e, v = C xc + D e, so a loop is data.
 """

@@ -1,0 +1,88 @@
+"""What a controller of one axis is designed for, and what a design is: plants and controllers as discrete matrices."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from microrad import lti
+
+Floats = NDArray[np.float64]
+
+RESIDUAL, OPTICAL, GAUGE = range(3)
+"""Outputs of a design plant; a controller's inputs are the last two, in this order."""
+
+
+@dataclass(frozen=True, slots=True)
+class DesignPlant:
+    """One axis as its controller sees it: discrete at the control period, with every delay inside.
+
+    ``system`` has the inputs command (V), then independent white sequences of unit variance: first ``disturbances`` of
+    them that drive the disturbance, then the optical sensor's noise, then the gauge's. Its outputs are the residual
+    d - y (rad), the same as the optical sensor delivers it (late and noisy), and the gauge's reading of y (noisy). No
+    output depends on the command of its own sample. ``gain_rad_v`` is the slow gain from command to y; a plant without
+    a gauge (or without an optical sensor) has a zero row there, and ``has_gauge`` (``has_optical``) is false.
+    """
+
+    period_s: float
+    system: lti.StateSpace
+    disturbances: int
+    gain_rad_v: float
+    has_optical: bool = True
+    has_gauge: bool = True
+
+    @property
+    def from_command(self) -> lti.StateSpace:
+        """Command (V) to optical and gauge readings, without noise: what the loop gain is made of."""
+        s = self.system
+        return lti.StateSpace(s.A, s.B[:, :1], s.C[OPTICAL:], s.D[OPTICAL:, :1])
+
+
+@dataclass(frozen=True, slots=True)
+class AxisController:
+    """A controller of one axis: x[k+1] = A x + B m + L (clip(v) - v), v = C x + D m.
+
+    ``system`` has the inputs m: line-of-sight error from the optical sensor (rad; the command rises with it), and the
+    gauge's reading of the mirror (rad), a zero column where a design does not use it. Output: command (V).
+    ``anti_windup`` is L, shape (states, 1).
+    """
+
+    name: str
+    system: lti.StateSpace
+    anti_windup: Floats
+
+
+@dataclass(frozen=True, slots=True)
+class Specification:
+    """What a design has to respect: least modulus margin min |1 + L|, and least bandwidth (Hz; 0 asks for none).
+
+    The bandwidth is the lowest frequency at which the sensitivity |S| reaches 1 (0 dB).
+    """
+
+    modulus_margin: float
+    bandwidth_hz: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """One number that a design is tuned by: bounds in SI units, searched on a logarithmic scale where ``log``."""
+
+    name: str
+    unit: str
+    least: float
+    most: float
+    log: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class Family:
+    """A kind of controller: the parameters it is tuned by for a plant, and how it is built from their values.
+
+    ``parameters`` and ``build`` may raise ValueError with the reason when the plant has no such controller (no gauge to
+    damp with, no wheel line to filter).
+    """
+
+    name: str
+    parameters: Callable[[DesignPlant], tuple[Parameter, ...]]
+    build: Callable[[DesignPlant, Floats], AxisController]
