@@ -14,7 +14,9 @@ from typing import Any, NamedTuple
 
 import numba
 import numpy as np
+from numba.core import config, types
 from numba.core.caching import IndexDataCacheFile
+from numba.extending import intrinsic
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
@@ -53,6 +55,7 @@ def _compile(function: Callable[..., Any]) -> Any:
     if cache := getattr(compiled, "_cache", None):  # none under NUMBA_DISABLE_JIT
         cache._cache_file.__class__ = _CacheFile
     return compiled
+
 
 # Columns of a Bouc-Wen parameter row: Eq. 3 of SPIE 11852, 118523B, then the asymmetry between the signs of h and
 # between rising and falling drive, the exponent less 1, and 1 / size of h at which the exponent has no effect.
@@ -940,6 +943,831 @@ def closed_loop(plant, plant_state, loop, loop_state, reference, output, command
             if position == length:
                 position = 0
     loop_state.position[0] = position
+
+
+# ------------------------------------------------------------------------------------------- many runs side by side
+# Runs in a row of memory: a count that the compiler knows, so that it works on several of them with one instruction.
+LANES = 64
+
+# Bins of the radial error's histogram: sixteen to an octave of its square, from 2^-66 rad^2 (0.1 nrad) to 1 rad^2.
+BINS_OCTAVE_BITS = 4
+BINS_LOWEST_OCTAVE = -66
+BINS = -BINS_LOWEST_OCTAVE << BINS_OCTAVE_BITS
+_BIN_SHIFT = np.int64(52 - BINS_OCTAVE_BITS)
+_BIN_OFFSET = np.int64((1023 + BINS_LOWEST_OCTAVE) << BINS_OCTAVE_BITS)
+
+# Fields of a bank element's rows, of an actuator's drive, and of the counters of a run.
+BANK_Q, BANK_H, BANK_Z, BANK_Z_BEFORE, BANK_Q_NEXT, BANK_TRAVEL, BANK_FORCING, BANK_H_BEFORE, BANK_FIELDS = range(9)
+DRIVE_BEFORE, DRIVE_NOW, DRIVE_FIELDS = range(3)
+(
+    COUNT_SATURATED,
+    COUNT_SLEW,
+    COUNT_CLAMPED,
+    COUNT_INVERSE_CLAMPED,
+    COUNT_OUTSIDE,
+    COUNT_LOST,
+    COUNT_FIELDS,
+) = range(7)
+
+# Columns of an actuator's parameters beyond those of a Loop: the drive's identified range.
+DRIVE_LOW, DRIVE_HIGH = SLEW_STEP + 1, SLEW_STEP + 2
+
+# Streams of random numbers: a disturbance's purposes lie below these; a sensor's word c has SENSOR_PURPOSE + c // 4.
+SENSOR_PURPOSE = 1 << 28
+START_PURPOSE = 1 << 29
+
+
+class Ensemble(NamedTuple):
+    """A sampled pointing loop for many runs side by side, as arrays.
+
+    The plant is that of `Plant`, without its counts in the type: one compiled kernel serves every mirror. ``optics``
+    (axes, outputs) turns its outputs into line-of-sight angles y. ``E_held`` is E0 + E1, ``E_back`` what takes it back,
+    -E1. Line-of-sight error e = reference + disturbance - y.
+
+    Disturbance: s[k+1] = As s + Bs g with independent standard normal g (one a source and plant step; ``purpose`` names
+    each source's stream), d = Cs s; As by diagonal and neighbour coupling, no rest. Sensors: the optical one delivers e
+    of ``sensor_delay_steps`` plant steps ago every ``sensor_every`` samples, with ``optical_noise`` (rms, by axis) and
+    ``optical_resolution``, and holds its last reading while the radial error is beyond ``field_of_view``; the gauge
+    delivers the plant's outputs with ``gauge_noise`` and ``gauge_resolution``.
+
+    Controller: m = (optical by axis, gauge by output, reference by axis); x[k+1] = A x + B m + L (clip(v) - v), and
+    C x + D m = (v by actuator, then, with ``feedforward``, the inverse's target and its rate by actuator); what the
+    inverse makes of the target is added to v ahead of the clip. Rows of ``actuator`` as in `Loop`, then DRIVE_LOW and
+    DRIVE_HIGH, the drive range that the mirror was identified in. Inverse as in `Loop`.
+    """
+
+    step_s: float
+    feedback: bool
+    diagonal: Floats
+    coupling: Floats
+    rest: Rows
+    B0: Floats
+    B1: Floats
+    E0: Floats
+    E1: Floats
+    E_held: Floats
+    E_back: Floats
+    F: Floats
+    G: Floats
+    Cy: Floats
+    Dy: Floats
+    Ky: Floats
+    bouc_wen: Floats
+    operator: Floats
+    play_start: Indices
+    play_threshold: Floats
+    play_weight: Floats
+    optics: Floats
+    shaping_diagonal: Floats
+    shaping_coupling: Floats
+    shaping_noise: Floats
+    shaping_output: Floats
+    purpose: Indices
+    seed: Indices
+    steps_per_sample: int
+    delay_steps: int
+    sensor_delay_steps: int
+    sensor_every: int
+    optical_noise: Floats
+    optical_resolution: float
+    field_of_view: float
+    gauge_noise: float
+    gauge_resolution: float
+    feedforward: bool
+    A: Floats
+    B: Floats
+    C: Floats
+    D: Floats
+    L: Floats
+    actuator: Floats
+    inverse_direct: Floats
+    inverse_bouc_wen: Floats
+    inverse_bouc_wen_actuator: Indices
+    inverse_play_threshold: Floats
+    inverse_play_weight: Floats
+    inverse_play_actuator: Indices
+    inverse_widening: Floats
+    inverse_lag_keep: Floats
+    inverse_lag_weight: Floats
+    inverse_lag_actuator: Indices
+
+
+class EnsembleState(NamedTuple):
+    """The memory of `LANES` runs; the kernel writes into these arrays. A row of LANES numbers for each quantity.
+
+    ``place``: control sample, plant step, and 1 where statistics are taken. ``sum_square`` (axes), ``sum`` (axes),
+    ``largest`` (radial error squared), ``counts`` (COUNT_*) are rows too; ``histogram`` (LANES, BINS) counts the radial
+    error at the control samples.
+    """
+
+    first_run: Indices
+    place: Integers
+    x: Floats
+    x_next: Floats
+    drive: Floats
+    bank: Floats
+    play: Floats
+    y: Floats
+    shaping: Floats
+    disturbance: Floats
+    gauss: Floats
+    sensor_gauss: Floats
+    error: Floats
+    error_ring: Floats
+    measured: Floats
+    xc: Floats
+    xc_next: Floats
+    output: Floats
+    command: Floats
+    target: Floats
+    inverse: Floats
+    inverse_play: Floats
+    inverse_lag: Floats
+    work: Floats
+    sum: Floats
+    sum_square: Floats
+    largest: Floats
+    counts: Floats
+    histogram: NDArray[np.int32]
+
+
+SAMPLE, STEP, COUNTING = range(3)  # of ``place``
+INVERSE_H, INVERSE_SCRATCH = range(2)  # of a Bouc-Wen element of the inverse
+
+# A Taylor series about 0 of (exp(r) - 1) / r up to r^11, and of log as in the C library fdlibm, for |r| <= ln 2 / 2.
+_ROUND = 6755399441055744.0  # 1.5 x 2^52: adding it leaves the nearest whole number in the low bits
+_LOG2_E = 1.4426950408889634
+_LN2_HIGH, _LN2_LOW = 6.93147180369123816490e-01, 1.90821492927058770002e-10
+_ONE_BITS = np.int64(0x3FF0000000000000)
+_ROOT_HALF_BITS = np.int64(0x3FE6A09E667F3BCD)
+_ROUND_BITS = np.int64(0x4338000000000000)
+_MANTISSA = np.int64(52)
+
+if getattr(config, "DISABLE_JIT", False):  # set when numba is loaded
+
+    def _bits(x: Any) -> Any:
+        return np.float64(x).view(np.int64)
+
+    def _number(bits: Any) -> Any:
+        return np.int64(bits).view(np.float64)
+
+else:
+
+    @intrinsic
+    def _bits(typingctx: Any, x: Any) -> Any:
+        """The 64 bits of a float as a whole number: no instruction at all, where a union would go through memory."""
+
+        def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+            return builder.bitcast(arguments[0], context.get_value_type(signature.return_type))
+
+        return types.int64(types.float64), generate
+
+    @intrinsic
+    def _number(typingctx: Any, bits: Any) -> Any:
+        """The float of 64 bits."""
+
+        def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+            return builder.bitcast(arguments[0], context.get_value_type(signature.return_type))
+
+        return types.float64(types.int64), generate
+
+
+@_inline
+def _grown(r):  # type: ignore[no-untyped-def]
+    """exp(r) - 1 for |r| <= ln 2 / 2, to rounding error."""
+    r2 = r * r
+    r4 = r2 * r2
+    low = (1.0 + r * (1.0 / 2.0)) + r2 * (1.0 / 6.0 + r * (1.0 / 24.0))
+    middle = (1.0 / 120.0 + r * (1.0 / 720.0)) + r2 * (1.0 / 5040.0 + r * (1.0 / 40320.0))
+    high = (1.0 / 362880.0 + r * (1.0 / 3628800.0)) + r2 * (1.0 / 39916800.0 + r * (1.0 / 479001600.0))
+    return r * (low + r4 * (middle + r4 * high))
+
+
+@_inline
+def _row_exp(x):  # type: ignore[no-untyped-def]
+    """exp(x) without a branch or a call, held outside -700 to 700: 2^n exp(r) with r = x - n ln 2."""
+    x = min(max(x, -700.0), 700.0)
+    shifted = x * _LOG2_E + _ROUND
+    n = shifted - _ROUND
+    r = (x - n * _LN2_HIGH) - n * _LN2_LOW
+    return _number(_bits(1.0 + _grown(r)) + (_bits(shifted) << _MANTISSA))
+
+
+@_inline
+def _row_relaxation(k):  # type: ignore[no-untyped-def]
+    """(1 - exp(-k)) / k without a branch or a call, 1 at 0: exp(x) - 1 = 2^n (exp(r) - 1) + (2^n - 1)."""
+    x = min(max(-k, -700.0), 700.0)
+    shifted = x * _LOG2_E + _ROUND
+    n = shifted - _ROUND
+    r = (x - n * _LN2_HIGH) - n * _LN2_LOW
+    scale = _number(_ONE_BITS + (_bits(shifted) << _MANTISSA))
+    grown = scale * _grown(r) + (scale - 1.0)
+    return 1.0 if x == 0.0 else grown / x
+
+
+@_inline
+def _row_log(x):  # type: ignore[no-untyped-def]
+    """ln(x) for normal x > 0 without a branch or a call."""
+    bits = _bits(x)
+    octave = (bits - _ROOT_HALF_BITS) >> _MANTISSA
+    n = _number(octave + _ROUND_BITS) - _ROUND
+    f = _number(bits - (octave << _MANTISSA)) - 1.0
+    s = f / (2.0 + f)
+    z = s * s
+    w = z * z
+    even = w * (0.3999999999940941908 + w * (0.2222219843214978396 + w * 0.1531383769920937332))
+    odd = 0.6666666666666735130 + w * (0.2857142874366239149 + w * (0.1818357216161805012 + w * 0.1479819860511658591))
+    half = 0.5 * f * f
+    return n * _LN2_HIGH - ((half - (s * (half + even + z * odd) + n * _LN2_LOW)) - f)
+
+
+_ROW = np.uint64(LANES)  # unsigned, as every place in a row of runs: no test for a negative index in the loops
+
+
+@_inline
+def _at(row):  # type: ignore[no-untyped-def]
+    """Where a row of runs begins."""
+    return np.uint64(row) * _ROW
+
+
+@_compile
+def _copy(source, target, first, count):  # type: ignore[no-untyped-def]
+    """The first rows of one array to the rows from ``first`` on of another."""
+    at = _at(first)
+    for r in range(_at(count)):
+        target[at + r] = source[r]
+
+
+# Philox 4x32 with ten rounds (Salmon et al., SC11): numbers by counter and key, so that no run waits for another.
+_LOW32 = np.uint64(0xFFFFFFFF)
+_HALF_WORD = np.uint64(32)
+_MULTIPLY0, _MULTIPLY1 = np.uint64(0xD2511F53), np.uint64(0xCD9E8D57)
+_WEYL0, _WEYL1 = np.uint64(0x9E3779B9), np.uint64(0xBB67AE85)
+_TWO_52_BITS = np.int64(0x4330000000000000)
+_TWO_52 = 4503599627370496.0
+
+
+@_inline
+def _philox(c0, c1, c2, c3, k0, k1):  # type: ignore[no-untyped-def]
+    """Four random words of 32 bits from four words of counter and two of key, each in 64 bits."""
+    for _ in range(10):
+        first, second = _MULTIPLY0 * c0, _MULTIPLY1 * c2
+        c0, c2 = (second >> _HALF_WORD) ^ c1 ^ k0, (first >> _HALF_WORD) ^ c3 ^ k1
+        c1, c3 = second & _LOW32, first & _LOW32
+        k0, k1 = (k0 + _WEYL0) & _LOW32, (k1 + _WEYL1) & _LOW32
+    return c0, c1, c2, c3
+
+
+@_inline
+def _uniform(word):  # type: ignore[no-untyped-def]
+    """A word of 32 bits as a number inside (0, 1): (word + 1/2) / 2^32."""
+    return (_number(np.int64(word) | _TWO_52_BITS) - _TWO_52 + 0.5) * (1.0 / 4294967296.0)
+
+
+@_inline
+def _cosine_sine(turns):  # type: ignore[no-untyped-def]
+    """cos and sin of 2 pi turns, 0 <= turns <= 1, without a branch or a call, to 2e-14."""
+    shifted = 4.0 * turns + _ROUND
+    quarter = _bits(shifted)
+    x = (4.0 * turns - (shifted - _ROUND)) * 1.5707963267948966
+    x2 = x * x
+    sine = x * (
+        1.0
+        + x2
+        * (
+            -1.0 / 6.0
+            + x2
+            * (
+                1.0 / 120.0
+                + x2 * (-1.0 / 5040.0 + x2 * (1.0 / 362880.0 + x2 * (-1.0 / 39916800.0 + x2 / 6227020800.0)))
+            )
+        )
+    )
+    cosine = 1.0 + x2 * (
+        -1.0 / 2.0
+        + x2
+        * (
+            1.0 / 24.0
+            + x2
+            * (
+                -1.0 / 720.0
+                + x2 * (1.0 / 40320.0 + x2 * (-1.0 / 3628800.0 + x2 * (1.0 / 479001600.0 - x2 / 87178291200.0)))
+            )
+        )
+    )
+    odd = (quarter & np.int64(1)) != 0
+    c = -sine if odd else cosine
+    s = cosine if odd else sine
+    turned = (quarter & np.int64(2)) != 0
+    return -c if turned else c, -s if turned else s
+
+
+@_compile
+def _gaussians(seed, first_run, purpose, block, rows, at):  # type: ignore[no-untyped-def]
+    """Four standard normal numbers a run, by Box and Muller, into the four rows that begin at ``at``.
+
+    Counter: block (64 bits), run (its low 32 bits), purpose; key: seed. The largest magnitude is 6.8.
+    """
+    low, high = np.uint64(block) & _LOW32, np.uint64(block) >> _HALF_WORD
+    for r in range(_ROW):
+        run = (first_run + r) & _LOW32
+        a, b, c, d = _philox(low, high, run, purpose, seed[0], seed[1])
+        near, far = np.sqrt(-2.0 * _row_log(_uniform(a))), np.sqrt(-2.0 * _row_log(_uniform(c)))
+        cosine, sine = _cosine_sine(_uniform(b))
+        rows[at + r] = near * cosine
+        rows[at + _at(1) + r] = near * sine
+        cosine, sine = _cosine_sine(_uniform(d))
+        rows[at + _at(2) + r] = far * cosine
+        rows[at + _at(3) + r] = far * sine
+
+
+@_compile
+def gaussian_kernel(seed, first_run, purpose, first_block, numbers):  # type: ignore[no-untyped-def]
+    """Standard normal numbers of LANES runs from one stream: fills ``numbers``, flat (4 x blocks, LANES)."""
+    for block in range(numbers.size // (4 * LANES)):
+        _gaussians(seed, first_run[0], purpose, first_block + block, numbers, _at(4 * block))
+
+
+@_inline
+def _clear(rows, at):  # type: ignore[no-untyped-def]
+    for r in range(_ROW):
+        rows[at + r] = 0.0
+
+
+@_compile
+def _weigh(weights, rows, first, stride, total, at, fresh):  # type: ignore[no-untyped-def]
+    """total row = (or, if it is not fresh, +=) sum of weights[j] x row first + stride j; a weight of 0 costs nothing.
+
+    Returns whether the total is still to be written. The total must lie in another array than the rows.
+    """
+    j = 0
+    while j < weights.size:
+        gain, source = weights[j], _at(first + stride * j)
+        j += 1
+        if gain == 0.0:
+            continue
+        if j < weights.size and weights[j] != 0.0:  # two at a time
+            other, second = weights[j], _at(first + stride * j)
+            j += 1
+            if fresh:
+                for r in range(_ROW):
+                    total[at + r] = gain * rows[source + r] + other * rows[second + r]
+            else:
+                for r in range(_ROW):
+                    total[at + r] += gain * rows[source + r] + other * rows[second + r]
+        elif fresh:
+            for r in range(_ROW):
+                total[at + r] = gain * rows[source + r]
+        else:
+            for r in range(_ROW):
+                total[at + r] += gain * rows[source + r]
+        fresh = False
+    return fresh
+
+
+@_compile
+def _sum_rows(weights, rows, first, stride, total, row):  # type: ignore[no-untyped-def]
+    """total row = sum of weights[j] x row first + stride j, as `_weigh` takes it."""
+    if _weigh(weights, rows, first, stride, total, _at(row), True):
+        _clear(total, _at(row))
+
+
+@_compile
+def _modal_step(diagonal, coupling, x):  # type: ignore[no-untyped-def]
+    """x = Ad x in place, for Ad of neighbouring pairs."""
+    for i in range(0, diagonal.size, 2):
+        keep0, cross0, keep1, cross1 = diagonal[i], coupling[i], diagonal[i + 1], coupling[i + 1]
+        at = _at(i)
+        for r in range(_ROW):
+            a, b = x[at + r], x[at + _at(1) + r]
+            x[at + r] = keep0 * a + cross0 * b
+            x[at + _at(1) + r] = keep1 * b + cross1 * a
+
+
+@_compile
+def _add_element(before, now, bank, e, x):  # type: ignore[no-untyped-def]
+    """x += before z_before + now z of element e, for columns of neighbouring pairs of states."""
+    z, z_before = _at(e * BANK_FIELDS + BANK_Z), _at(e * BANK_FIELDS + BANK_Z_BEFORE)
+    for i in range(0, before.shape[0], 2):
+        a, b, c, d = before[i, e], now[i, e], before[i + 1, e], now[i + 1, e]
+        if (a != 0.0) | (b != 0.0) | (c != 0.0) | (d != 0.0):
+            at = _at(i)
+            for r in range(_ROW):
+                first, last = bank[z_before + r], bank[z + r]
+                x[at + r] += a * first + b * last
+                x[at + _at(1) + r] += c * first + d * last
+
+
+@_compile
+def _modal_element(diagonal, coupling, before, now, bank, x):  # type: ignore[no-untyped-def]
+    """x = Ad x + before z_before + now z of the first element, in place: both in one pass over the memory."""
+    z, z_before = _at(BANK_Z), _at(BANK_Z_BEFORE)
+    for i in range(0, diagonal.size, 2):
+        keep0, cross0, keep1, cross1 = diagonal[i], coupling[i], diagonal[i + 1], coupling[i + 1]
+        before0, now0, before1, now1 = before[i, 0], now[i, 0], before[i + 1, 0], now[i + 1, 0]
+        at = _at(i)
+        for r in range(_ROW):
+            a, b, first, last = x[at + r], x[at + _at(1) + r], bank[z_before + r], bank[z + r]
+            x[at + r] = keep0 * a + cross0 * b + before0 * first + now0 * last
+            x[at + _at(1) + r] = keep1 * b + cross1 * a + before1 * first + now1 * last
+
+
+@_inline
+def _small_exp(x):  # type: ignore[no-untyped-def]
+    """exp(x) for |x| <= 0.02, to rounding error."""
+    return 1.0 + x * (1.0 + x * (1.0 / 2.0 + x * (1.0 / 6.0 + x * (1.0 / 24.0 + x * (1.0 / 120.0 + x / 720.0)))))
+
+
+@_compile
+def _mend(rows, e, bank, at, rate_gain, power):  # type: ignore[no-untyped-def]
+    """h and z of those runs whose h changes sign inside the step, which few do; of all for another exponent than 1."""
+    for r in range(_ROW):
+        h, end, travel = bank[at + _at(BANK_H_BEFORE) + r], bank[at + _at(BANK_H) + r], bank[at + _at(BANK_TRAVEL) + r]
+        if power or (h * end <= 0.0 and h * rows[e, EPSILON] * travel < 0.0):
+            rate = _clamp(travel * rate_gain, rows[e, RATE_LIMIT])
+            mended = _bouc_wen_advance(h, travel, rate, rows, e)
+            bank[at + _at(BANK_H) + r] = mended
+            bank[at + _at(BANK_Z) + r] += mended - end
+
+
+@_compile
+def _advance_bouc_wen(rows, e, bank, at, rate_gain, counts):  # type: ignore[no-untyped-def]
+    """BANK_Q to BANK_Q_NEXT, exactly, for a row of runs: as `bouc_wen_step`, with a zero crossing mended by itself.
+
+    Leaves h, and z = d1 exp(-d2 rate) (q + bias) - d1 bias + h, each with what it was before.
+    """
+    limit, delta, d2 = rows[e, RATE_LIMIT], rows[e, DELTA], -rows[e, D2]
+    d1, bias, epsilon = rows[e, D1], rows[e, BIAS], rows[e, EPSILON]
+    alpha, beta, gamma, eta = rows[e, ALPHA], rows[e, BETA], rows[e, GAMMA], rows[e, ETA]
+    crossing, small = 0, abs(d2) * limit <= 0.02
+    # Two loops: their chains of arithmetic are long, and shorter ones overlap better from run to run.
+    for r in range(_ROW):
+        q = bank[at + _at(BANK_Q_NEXT) + r]
+        travel = q - bank[at + _at(BANK_Q) + r]
+        free = travel * rate_gain
+        rate = min(max(free, -limit), limit)
+        counts[_at(COUNT_CLAMPED) + r] += 0.0 if free == rate else 1.0
+        bank[at + _at(BANK_FORCING) + r] = epsilon * _row_exp(delta * abs(rate)) * travel
+        bank[at + _at(BANK_TRAVEL) + r] = travel
+        bank[at + _at(BANK_Z_BEFORE) + r] = bank[at + _at(BANK_Z) + r]
+        grown = _small_exp(d2 * rate) if small else _row_exp(d2 * rate)
+        bank[at + _at(BANK_Z) + r] = d1 * grown * (q + bias) - d1 * bias
+        bank[at + _at(BANK_Q) + r] = q
+    for r in range(_ROW):
+        h, forcing, travel = (
+            bank[at + _at(BANK_H) + r],
+            bank[at + _at(BANK_FORCING) + r],
+            bank[at + _at(BANK_TRAVEL) + r],
+        )
+        common, split = alpha * abs(travel) + eta * travel, gamma * abs(travel) + beta * travel
+        decay = common + split if (h if h != 0.0 else forcing) > 0.0 else common - split
+        end = h + (forcing - decay * h) * _row_relaxation(decay)
+        crossing += 1 if (h * forcing < 0.0) & (h * end <= 0.0) else 0
+        bank[at + _at(BANK_H_BEFORE) + r] = h
+        bank[at + _at(BANK_H) + r] = end
+        bank[at + _at(BANK_Z) + r] += end
+    power = rows[e, POWER] != 0.0
+    if crossing > 0 or power:
+        _mend(rows, e, bank, at, rate_gain, power)
+
+
+@_inline
+def _advance_operator(p, s, o, at):  # type: ignore[no-untyped-def]
+    """BANK_Q to BANK_Q_NEXT for the plays of operator o; leaves z. BANK_TRAVEL holds what widens the thresholds."""
+    bank, counts, play = s.bank, s.counts, s.play
+    widening, limit = p.operator[o, WIDENING], p.operator[o, WIDENING_LIMIT]
+    for r in range(_ROW):
+        q = bank[at + _at(BANK_Q_NEXT) + r]
+        free = abs(q - bank[at + _at(BANK_Q) + r]) / p.step_s
+        bank[at + _at(BANK_TRAVEL) + r] = widening * min(free, limit) if widening != 0.0 else 0.0
+        counts[_at(COUNT_CLAMPED) + r] += 1.0 if (widening != 0.0) & (free > limit) else 0.0
+        bank[at + _at(BANK_Z_BEFORE) + r] = bank[at + _at(BANK_Z) + r]
+        bank[at + _at(BANK_Z) + r] = 0.0
+        bank[at + _at(BANK_Q) + r] = q
+    for j in range(p.play_start[o], p.play_start[o + 1]):
+        threshold, weight = p.play_threshold[j], p.play_weight[j]
+        wide = 1.0 if threshold > 0.0 else 0.0
+        row = _at(j)
+        for r in range(_ROW):
+            q, half = bank[at + _at(BANK_Q) + r], threshold + wide * bank[at + _at(BANK_TRAVEL) + r]
+            value = max(q - half, min(q + half, play[row + r]))
+            play[row + r] = value
+            bank[at + _at(BANK_Z) + r] += weight * value
+
+
+@_inline
+def _advance_bank(p, s):  # type: ignore[no-untyped-def]
+    """Drive of each element at the end of the step, its operator, and its output before and now."""
+    first_operator = p.bouc_wen.shape[0]
+    for e in range(p.G.shape[0]):
+        at, row = _at(e * BANK_FIELDS), e * BANK_FIELDS + BANK_Q_NEXT
+        _sum_rows(p.G[e], s.drive, DRIVE_NOW, DRIVE_FIELDS, s.bank, row)
+        if p.feedback:
+            _weigh(p.F[e], s.x, 0, 1, s.bank, _at(row), False)
+        if e < first_operator:
+            _advance_bouc_wen(p.bouc_wen, e, s.bank, at, 1.0 / p.step_s, s.counts)
+        else:
+            _advance_operator(p, s, e - first_operator, at)
+
+
+@_inline
+def _ensemble_plant(p, s):  # type: ignore[no-untyped-def]
+    """One plant step behind the amplifier's: as `_predict` and `_plant_step`, for a row of runs."""
+    states, elements, several = p.diagonal.size, p.G.shape[0], p.rest.value.size > 0
+    if several:  # before x moves
+        for i in range(states):
+            _clear(s.x_next, _at(i))
+            for j in range(p.rest.start[i], p.rest.start[i + 1]):
+                gain, source, target = p.rest.value[j], _at(p.rest.column[j]), _at(i)
+                for r in range(_ROW):
+                    s.x_next[target + r] += gain * s.x[source + r]
+    if not p.feedback:  # else the drive of an element is that of the predicted x: with z held
+        _advance_bank(p, s)
+    if elements > 0 and not p.feedback:
+        _modal_element(p.diagonal, p.coupling, p.E0, p.E1, s.bank, s.x)
+        for e in range(1, elements):
+            _add_element(p.E0, p.E1, s.bank, e, s.x)
+    else:
+        _modal_step(p.diagonal, p.coupling, s.x)
+    for i in range(states):
+        _weigh(p.B0[i], s.drive, DRIVE_BEFORE, DRIVE_FIELDS, s.x, _at(i), False)
+        _weigh(p.B1[i], s.drive, DRIVE_NOW, DRIVE_FIELDS, s.x, _at(i), False)
+        if several:
+            for r in range(_ROW):
+                s.x[_at(i) + r] += s.x_next[_at(i) + r]
+    if p.feedback:
+        for i in range(states):
+            _weigh(p.E_held[i], s.bank, BANK_Z, BANK_FIELDS, s.x, _at(i), False)
+        _advance_bank(p, s)
+        for e in range(elements):
+            _add_element(p.E_back, p.E1, s.bank, e, s.x)
+    for o in range(p.Cy.shape[0]):
+        fresh = _weigh(p.Cy[o], s.x, 0, 1, s.y, _at(o), True)
+        fresh = _weigh(p.Dy[o], s.drive, DRIVE_NOW, DRIVE_FIELDS, s.y, _at(o), fresh)
+        if _weigh(p.Ky[o], s.bank, BANK_Z, BANK_FIELDS, s.y, _at(o), fresh):
+            _clear(s.y, _at(o))
+
+
+@_inline
+def _ensemble_amplifier(p, s, due):  # type: ignore[no-untyped-def]
+    """The drive at the end of the plant step; ``due`` is the row of commands that it moves towards."""
+    actuators = p.actuator.shape[0]
+    for a in range(actuators):
+        follow, slew = p.actuator[a, FOLLOW], p.actuator[a, SLEW_STEP]
+        low, high = p.actuator[a, DRIVE_LOW], p.actuator[a, DRIVE_HIGH]
+        at, source = _at(a * DRIVE_FIELDS), _at(due * actuators + a)
+        drive, command, counts = s.drive, s.command, s.counts
+        for r in range(_ROW):
+            before = drive[at + _at(DRIVE_NOW) + r]
+            free = (command[source + r] - before) * follow
+            move = min(max(free, -slew), slew)
+            now = before + move
+            drive[at + _at(DRIVE_BEFORE) + r] = before
+            drive[at + _at(DRIVE_NOW) + r] = now
+            counts[_at(COUNT_SLEW) + r] += 0.0 if move == free else 1.0
+            counts[_at(COUNT_OUTSIDE) + r] += 1.0 if (now < low) | (now > high) else 0.0
+
+
+@_inline
+def _ensemble_disturbance(p, s):  # type: ignore[no-untyped-def]
+    """The disturbance one plant step on, from four steps' worth of random numbers at a time."""
+    step = s.place[STEP]
+    if step % 4 == 0:
+        for w in range(p.purpose.size):
+            _gaussians(p.seed, s.first_run[0], p.purpose[w], step // 4, s.gauss, _at(4 * w))
+    _modal_step(p.shaping_diagonal, p.shaping_coupling, s.shaping)
+    for i in range(p.shaping_diagonal.size):
+        _weigh(p.shaping_noise[i], s.gauss, step % 4, 4, s.shaping, _at(i), False)
+    for i in range(p.shaping_output.shape[0]):
+        _sum_rows(p.shaping_output[i], s.shaping, 0, 1, s.disturbance, i)
+
+
+@_inline
+def _line_of_sight_error(p, s, i, reference):  # type: ignore[no-untyped-def]
+    """e = reference + disturbance - y of axis i."""
+    at, error, disturbance, y = _at(i), s.error, s.disturbance, s.y
+    for o in range(p.optics.shape[1]):
+        gain, source = -p.optics[i, o], _at(o)
+        if o == 0:
+            for r in range(_ROW):
+                error[at + r] = reference + disturbance[at + r] + gain * y[source + r]
+        elif gain != 0.0:
+            for r in range(_ROW):
+                error[at + r] += gain * y[source + r]
+
+
+@_inline
+def _statistics(p, s):  # type: ignore[no-untyped-def]
+    """What a plant step adds to the sums and the largest radial error; ``work`` is left with its square."""
+    work, error, total, square, largest = s.work, s.error, s.sum, s.sum_square, s.largest
+    for i in range(p.optics.shape[0]):
+        at = _at(i)
+        for r in range(_ROW):
+            e = error[at + r]
+            total[at + r] += e
+            square[at + r] += e * e
+            work[r] = e * e + (work[r] if i > 0 else 0.0)
+    for r in range(_ROW):
+        largest[r] = max(largest[r], work[r])
+
+
+@_compile
+def _count_radial(s):  # type: ignore[no-untyped-def]
+    for r in range(_ROW):
+        place = (_bits(s.work[r]) >> _BIN_SHIFT) - _BIN_OFFSET
+        s.histogram[r, min(max(place, 0), BINS - 1)] += np.int32(1)
+
+
+@_inline
+def _measure(p, s, reference):  # type: ignore[no-untyped-def]
+    """The readings m of a control sample: optical, gauge, reference."""
+    axes, outputs, sample = p.optics.shape[0], p.optics.shape[1], s.place[SAMPLE]
+    noisy = p.gauge_noise > 0.0
+    for i in range(axes):
+        noisy = noisy or p.optical_noise[i] > 0.0
+    for word in range(0, axes + outputs if noisy else 0, 4):
+        purpose = np.uint64(SENSOR_PURPOSE + word // 4)
+        _gaussians(p.seed, s.first_run[0], purpose, sample, s.sensor_gauss, _at(word))
+    if sample % p.sensor_every == 0:
+        _measure_optical(p, s)
+    for o in range(outputs):
+        at, y, gauss, measured = _at(axes + o), s.y, s.sensor_gauss, s.measured
+        for r in range(_ROW):
+            measured[at + r] = y[_at(o) + r] + p.gauge_noise * gauss[at + r]
+        if p.gauge_resolution > 0.0:
+            for r in range(_ROW):
+                measured[at + r] = _quantised(measured[at + r], p.gauge_resolution)
+    for i in range(axes):
+        for r in range(_ROW):
+            s.measured[_at(axes + outputs + i) + r] = reference[i]
+
+
+@_inline
+def _measure_optical(p, s):  # type: ignore[no-untyped-def]
+    """A new reading of the delayed error where the spot is inside the field of view; elsewhere the last one stays."""
+    axes, measured, work, ring, gauss = p.optics.shape[0], s.measured, s.work, s.error_ring, s.sensor_gauss
+    length = p.sensor_delay_steps + 1
+    due = _at((s.place[STEP] + 1) % length * axes)
+    _clear(work, 0)
+    for i in range(axes):
+        for r in range(_ROW):
+            e = ring[due + _at(i) + r]
+            work[r] += e * e
+    seen = p.field_of_view * p.field_of_view
+    for i in range(axes):
+        noise = p.optical_noise[i]
+        for r in range(_ROW):
+            new = ring[due + _at(i) + r] + noise * gauss[_at(i) + r]
+            measured[_at(i) + r] = new if work[r] <= seen else measured[_at(i) + r]
+        if p.optical_resolution > 0.0:
+            for r in range(_ROW):
+                measured[_at(i) + r] = _quantised(measured[_at(i) + r], p.optical_resolution)
+    for r in range(_ROW):
+        s.counts[_at(COUNT_LOST) + r] += 0.0 if work[r] <= seen else 1.0
+
+
+@_inline
+def _ensemble_inverse(p, s):  # type: ignore[no-untyped-def]
+    """Adds to each actuator's output what the inverse makes of its target: as `_inverse`, with the rate as given."""
+    actuators, output, target = p.actuator.shape[0], s.output, s.target
+    for a in range(actuators):
+        now = _at(2 * a + 1)
+        for r in range(_ROW):
+            target[_at(2 * a) + r] = target[now + r]
+            target[now + r] = output[_at(actuators + a) + r]
+        for j in range(p.inverse_lag_keep.size):
+            if p.inverse_lag_actuator[j] == a:
+                for r in range(_ROW):
+                    target[now + r] -= p.inverse_lag_weight[j] * s.inverse_lag[_at(j) + r]
+        for r in range(_ROW):
+            s.work[_at(a) + r] = p.inverse_direct[a] * target[now + r]
+    for e in range(p.inverse_bouc_wen.shape[0]):
+        _inverse_bouc_wen(p, s, e, np.int64(p.inverse_bouc_wen_actuator[e]))
+    for a in range(actuators):
+        _inverse_plays(p, s, a)
+        for r in range(_ROW):
+            output[_at(a) + r] += s.work[_at(a) + r]
+    for j in range(p.inverse_lag_keep.size):
+        keep, drive, lag = p.inverse_lag_keep[j], _at(p.inverse_lag_actuator[j]), s.inverse_lag
+        for r in range(_ROW):
+            lag[_at(j) + r] = keep * lag[_at(j) + r] + (1.0 - keep) * s.work[drive + r]
+
+
+@_inline
+def _inverse_bouc_wen(p, s, e, a):  # type: ignore[no-untyped-def]
+    rows, actuators = p.inverse_bouc_wen, p.actuator.shape[0]
+    d1, d2, bias, limit = rows[e, D1], rows[e, D2], rows[e, BIAS], rows[e, RATE_LIMIT]
+    for r in range(_ROW):
+        before, now = s.target[_at(2 * a) + r], s.target[_at(2 * a + 1) + r]
+        free = s.output[_at(2 * actuators + a) + r] / d1
+        rate = min(max(free, -limit), limit)
+        s.counts[_at(COUNT_INVERSE_CLAMPED) + r] += 0.0 if rate == free else 1.0
+        h = _bouc_wen_advance(s.inverse[_at(e) + r], (now - before) / d1, rate, rows, e)
+        s.inverse[_at(e) + r] = h
+        s.work[_at(a) + r] += (now - h + d1 * bias) / (d1 * _row_exp(-d2 * rate)) - bias
+
+
+@_inline
+def _inverse_plays(p, s, a):  # type: ignore[no-untyped-def]
+    widening, limit = p.inverse_widening[a, WIDENING], p.inverse_widening[a, WIDENING_LIMIT]
+    actuators, now = p.actuator.shape[0], _at(2 * a + 1)
+    for j in range(p.inverse_play_threshold.size):
+        if p.inverse_play_actuator[j] == a:
+            threshold, weight = p.inverse_play_threshold[j], p.inverse_play_weight[j]
+            wide = widening if threshold > 0.0 else 0.0
+            for r in range(_ROW):
+                half = threshold + (wide * min(abs(s.output[_at(2 * actuators + a) + r]), limit) if wide else 0.0)
+                q = s.target[now + r]
+                value = max(q - half, min(q + half, s.inverse_play[_at(j) + r]))
+                s.inverse_play[_at(j) + r] = value
+                s.work[_at(a) + r] += weight * value
+    if widening != 0.0:
+        for r in range(_ROW):
+            beyond = abs(s.output[_at(2 * actuators + a) + r]) > limit
+            s.counts[_at(COUNT_INVERSE_CLAMPED) + r] += 1.0 if beyond else 0.0
+
+
+@_inline
+def _control(p, s, length):  # type: ignore[no-untyped-def]
+    """One sample of the controller: readings to commands, with inverse, clip and anti-windup."""
+    states, actuators = p.A.shape[0], p.actuator.shape[0]
+    for i in range(p.C.shape[0]):
+        fresh = _weigh(p.C[i], s.xc, 0, 1, s.output, _at(i), True)
+        if _weigh(p.D[i], s.measured, 0, 1, s.output, _at(i), fresh):
+            _clear(s.output, _at(i))
+    if p.feedforward:
+        _ensemble_inverse(p, s)
+    for i in range(states):
+        fresh = _weigh(p.A[i], s.xc, 0, 1, s.xc_next, _at(i), True)
+        if _weigh(p.B[i], s.measured, 0, 1, s.xc_next, _at(i), fresh):
+            _clear(s.xc_next, _at(i))
+    row = s.place[SAMPLE] % length
+    for a in range(actuators):
+        low, high = p.actuator[a, COMMAND_MIN], p.actuator[a, COMMAND_MAX]
+        resolution, at = p.actuator[a, RESOLUTION], _at(row * actuators + a)
+        command, output, counts = s.command, s.output, s.counts
+        for r in range(_ROW):
+            v = output[_at(a) + r]
+            clipped = min(max(v, low), high)
+            output[_at(a) + r] = clipped - v
+            command[at + r] = clipped
+            counts[_at(COUNT_SATURATED) + r] += 0.0 if clipped == v else 1.0
+        if resolution > 0.0:
+            for r in range(_ROW):
+                command[at + r] = _quantised(command[at + r], resolution)
+    for i in range(states):
+        _weigh(p.L[i], s.output, 0, 1, s.xc_next, _at(i), False)
+    _copy(s.xc_next, s.xc, 0, states)
+
+
+@_compile
+def _record(k, rows, width, trace, channel):  # type: ignore[no-untyped-def]
+    """Rows into the channels of a trace from ``channel`` on; returns the channel behind them."""
+    for row in range(width):
+        for r in range(_ROW):
+            trace[k, channel + row, r] = rows[_at(row) + r]
+    return channel + width
+
+
+@_compile
+def ensemble_loop(p, s, reference, residual, trace):  # type: ignore[no-untyped-def]
+    """Advance LANES runs over the control samples of ``reference`` (samples + 1, axes), linear between them.
+
+    Fills ``residual`` (samples, axes, LANES) with the line-of-sight error at the begin of each sample, if it has rows,
+    and ``trace`` (samples, channels, LANES) likewise: disturbance by axis, drive before and now by actuator, the
+    plant's outputs, readings. Statistics are taken where ``place`` says so: sums and the largest error at every plant
+    step, the histogram at the control samples. The states are left at the end, so that a following call continues.
+    """
+    axes, steps, actuators = p.optics.shape[0], p.steps_per_sample, p.actuator.shape[0]
+    length = s.command.size // (actuators * LANES)
+    ring_length = p.sensor_delay_steps + 1
+    for k in range(reference.shape[0] - 1):
+        _measure(p, s, reference[k])
+        _control(p, s, length)
+        if residual.shape[0] > 0:
+            _record(k, s.error, axes, residual, 0)
+        if trace.shape[0] > 0:
+            channel = _record(k, s.disturbance, axes, trace, 0)
+            channel = _record(k, s.drive, DRIVE_FIELDS * actuators, trace, channel)
+            channel = _record(k, s.y, p.optics.shape[1], trace, channel)
+            _record(k, s.measured, p.B.shape[1], trace, channel)
+        for j in range(steps):
+            due = (s.place[SAMPLE] + length + (j - p.delay_steps) // steps) % length
+            _ensemble_amplifier(p, s, due)
+            _ensemble_plant(p, s)
+            if p.shaping_diagonal.size > 0:
+                _ensemble_disturbance(p, s)
+            s.place[STEP] += 1
+            share = (j + 1) / steps
+            for i in range(axes):
+                _line_of_sight_error(p, s, i, reference[k, i] + share * (reference[k + 1, i] - reference[k, i]))
+            if p.sensor_delay_steps > 0 or j == steps - 1:
+                _copy(s.error, s.error_ring, s.place[STEP] % ring_length * axes, axes)
+            if s.place[COUNTING] == 1:
+                _statistics(p, s)
+        s.place[SAMPLE] += 1
+        if s.place[COUNTING] == 1:
+            _count_radial(s)
 
 
 def rows(matrix: Floats) -> Rows:

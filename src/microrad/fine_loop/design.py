@@ -1,0 +1,97 @@
+"""The plant that a controller of one axis is designed for, and the spectrum that a loop leaves."""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from microrad import lti
+from microrad.control import AxisController, DesignPlant
+from microrad.fine_loop.linear import ClosedLoop, close, gauge_noise_rad, open_loop
+from microrad.fine_loop.loop import PointingLoop, assemble, nominal_axis_gain
+
+Floats = NDArray[np.float64]
+
+
+def residual_spectrum(closed: ClosedLoop, freq_hz: Floats) -> Floats:
+    """One-sided spectrum of the residual at the control samples, (frequencies, axes), lines left out."""
+    o, loop = closed.open, closed.open.loop
+    whole = closed.step_noise.shape[0]
+    if loop.optical.every != 1:
+        raise ValueError("a residual spectrum needs an optical reading at every control sample")
+    monodromy = closed.monodromy
+    factor = _noise_factor(closed)
+    reading = np.zeros((loop.axes, whole))
+    reading[:, : o.at.order] = o.error
+    keep = np.ones(whole, dtype=bool)
+    keep[o.lines] = False
+    system = lti.StateSpace(
+        monodromy[np.ix_(keep, keep)], factor[keep], reading[:, keep], np.zeros((loop.axes, factor.shape[1]))
+    )
+    response = lti.frequency_response(system, freq_hz, loop.timing.period_s)
+    return np.asarray(2.0 * loop.timing.period_s * np.sum(np.abs(response) ** 2, axis=2))
+
+
+def _noise_factor(closed: ClosedLoop) -> Floats:
+    """A square root of the covariance that one control period adds to the state at its end."""
+    (sample_noise,) = closed.sample_noise
+    P = sample_noise @ sample_noise.T
+    for step in closed.steps:
+        P = step @ P @ step.T + closed.step_noise @ closed.step_noise.T
+    values, vectors = np.linalg.eigh(0.5 * (P + P.T))
+    kept = values > 1e-18 * max(float(values[-1]), 1e-300)
+    return np.asarray(vectors[:, kept] * np.sqrt(values[kept]))
+
+
+def design_plant(loop: PointingLoop) -> DesignPlant:
+    """What a controller of one axis of this loop is designed for. ``loop`` has one axis.
+
+    A sensor slower than the control is taken as one that delivers every sample, later by half of what its hold adds.
+    """
+    if loop.axes != 1 or loop.mirror.actuators != 1:
+        raise ValueError(f"a design needs a loop of one axis, not of {loop.axes}: design each axis by itself")
+    extra = round(0.5 * (loop.optical.every - 1) * loop.timing.steps_per_sample)
+    optical = replace(loop.optical, every=1, delay_steps=loop.optical.delay_steps + extra)
+    loop = replace(loop, optical=optical)
+    o = open_loop(loop)
+    keep = np.ones(o.at.order, dtype=bool)
+    keep[o.at.held] = False
+    shift = o.shift.copy()
+    shift[o.newest] = 0.0
+    period, command, factor = np.eye(o.at.order), np.zeros((o.at.order, 1)), np.zeros((o.at.order, o.at.order))
+    for step in o.steps:
+        period = step @ period
+        factor = step @ factor @ step.T + o.noise @ o.noise.T
+    command[o.newest] = 1.0
+    values, vectors = np.linalg.eigh(0.5 * (factor + factor.T))
+    kept = values > 1e-16 * max(float(values[-1]), 1e-300)
+    noises = vectors[:, kept] * np.sqrt(values[kept])
+    B = np.hstack([(period @ command), noises, np.zeros((o.at.order, 2))])[keep]
+    A = (period @ shift)[np.ix_(keep, keep)]
+    rows = np.vstack([o.error, o.reading, loop.optics @ o.mirror])[:, keep]
+    gauge = gauge_noise_rad(loop) * abs(float(loop.optics[0, 0]))
+    D = np.zeros((3, B.shape[1]))
+    D[1, -2], D[2, -1] = loop.optical.noise_rad, gauge
+    has_gauge = loop.gauge is not None
+    if not has_gauge:
+        rows[2] = 0.0
+    system = lti.StateSpace(A, B, rows, D)
+    return DesignPlant(loop.timing.period_s, system, int(kept.sum()), nominal_axis_gain(loop), True, has_gauge)
+
+
+def close_axis(loop: PointingLoop, controller: AxisController) -> ClosedLoop:
+    """The linear loop of one axis under an axis controller."""
+    return close(loop, assemble(controller.name, loop, controller))
+
+
+def behind_filter(plant: DesignPlant, low_pass: lti.StateSpace) -> DesignPlant:
+    """The plant with a filter in its command path, of which the first output counts: for an inverse in series."""
+    s, f = plant.system, low_pass
+    first = lti.StateSpace(f.A, f.B, f.C[:1], f.D[:1])
+    n, k = s.order, f.order
+    through = s.B[:, :1] @ first.C
+    A = np.block([[s.A, through], [np.zeros((k, n)), f.A]])
+    B = np.vstack([s.B, np.zeros((k, s.B.shape[1]))])
+    B[:n, :1], B[n:, :1] = s.B[:, :1] @ first.D, f.B
+    C = np.hstack([s.C, np.zeros((s.C.shape[0], k))])
+    return replace(plant, system=lti.StateSpace(A, B, C, s.D))

@@ -1,0 +1,348 @@
+"""The chain from mirror to line of sight against reflected rays and planes through points; stroke budgets by hand."""
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+
+from microrad import geometry
+from microrad.geometry import Geometry, StrokeDemand, stroke_budget
+
+small_tilt_rad = 1e-5
+second_order = 1e-9  # a few times the square of that tilt
+
+THIRDS = 2.0 * np.pi / 3.0 * np.arange(3)
+
+
+def random_cases(seed, count=40):
+    return np.random.Generator(np.random.Philox(seed)), range(count)
+
+
+def reflected_angles(normal, incidence_rad):
+    """Angles of the reflected ray from the ray off the untilted mirror, along x' (in the plane of incidence) and y'."""
+    ray = np.array([math.sin(incidence_rad), 0.0, -math.cos(incidence_rad)])
+    out = ray - 2.0 * (ray @ normal) * normal / (normal @ normal)
+    in_plane = np.array([math.cos(incidence_rad), 0.0, -math.sin(incidence_rad)])
+    across = np.array([0.0, 1.0, 0.0])
+    ahead = np.array([math.sin(incidence_rad), 0.0, math.cos(incidence_rad)])
+    return np.array([math.atan2(out @ in_plane, out @ ahead), math.atan2(out @ across, out @ ahead)])
+
+
+# ---------------------------------------------------------------------------------------------- reflection
+@pytest.mark.parametrize("incidence_deg", [0.0, 22.5, 45.0, 70.0])
+def test_a_reflected_ray_turns_by_twice_the_tilt_in_the_plane_and_by_two_cosines_across(incidence_deg):
+    incidence = math.radians(incidence_deg)
+    matrix = geometry.line_of_sight_matrix(Geometry("mechanical", incidence_rad=incidence))
+    for tilt in np.array([[1.0, 0.0], [0.0, 1.0], [-0.6, 0.8]]) * small_tilt_rad:
+        seen = reflected_angles(np.array([*tilt, 1.0]), incidence)
+        np.testing.assert_allclose(matrix @ tilt, seen, atol=second_order)
+    np.testing.assert_allclose(matrix, np.diag([2.0, 2.0 * math.cos(incidence)]), rtol=1e-15)
+
+
+def test_an_optical_output_is_already_the_beam_at_normal_incidence():
+    np.testing.assert_array_equal(geometry.line_of_sight_matrix(Geometry("optical")), np.eye(2))
+    oblique = geometry.line_of_sight_matrix(Geometry("optical", incidence_rad=math.pi / 4))
+    np.testing.assert_allclose(oblique, np.diag([1.0, math.sqrt(0.5)]), rtol=1e-15)
+
+
+def test_a_telescope_divides_the_angle_and_a_rotation_turns_x_towards_y():
+    seen = geometry.line_of_sight_matrix(Geometry("mechanical", magnification=10.0, rotation_rad=math.pi / 2))
+    np.testing.assert_allclose(seen @ [1.0, 0.0], [0.0, 0.2], atol=1e-16)
+    np.testing.assert_allclose(seen @ [0.0, 1.0], [-0.2, 0.0], atol=1e-16)
+    inverted = geometry.line_of_sight_matrix(Geometry("optical", magnification=4.0, rotation_rad=math.pi))
+    np.testing.assert_allclose(inverted, -np.eye(2) / 4.0, atol=1e-16)
+
+
+def test_coupling_says_what_the_drive_of_one_axis_moves_on_the_other():
+    seen = geometry.line_of_sight_matrix(Geometry("optical", coupling=((1.0, 0.02), (-0.03, 1.0))))
+    np.testing.assert_allclose(seen @ [1.0, 0.0], [1.0, -0.03], rtol=1e-15)  # the x drive on y
+    np.testing.assert_allclose(seen @ [0.0, 1.0], [0.02, 1.0], rtol=1e-15)
+
+
+# -------------------------------------------------------------------------------------------------- tripod
+def test_pushed_actuators_lean_the_plate_through_their_three_ends():
+    rng, cases = random_cases(seed=1)
+    radius, incidence, magnification = 0.01, math.radians(30.0), 5.0
+    tripod = Geometry("mechanical", incidence, magnification, layout="tripod", actuator_radius_m=radius)
+    for _ in cases:
+        strokes = rng.uniform(-1e-7, 1e-7, 3)
+        ends = np.column_stack([radius * np.cos(THIRDS), radius * np.sin(THIRDS), strokes])
+        normal = np.cross(ends[1] - ends[0], ends[2] - ends[0])
+        seen = reflected_angles(normal, incidence) / magnification
+        predicted = geometry.line_of_sight_matrix(tripod) @ (strokes / radius)
+        np.testing.assert_allclose(predicted, seen, atol=second_order)
+        assert np.max(np.abs(seen)) > 10 * second_order
+
+
+def test_a_pushed_actuator_sends_the_beam_away_from_it_and_piston_moves_nothing():
+    seen = geometry.line_of_sight_matrix(Geometry("mechanical", layout="tripod", actuator_radius_m=0.01))
+    np.testing.assert_allclose(seen @ [1.0, 0.0, 0.0], [-4.0 / 3.0, 0.0], atol=1e-15)
+    np.testing.assert_allclose(seen @ [1.0, 1.0, 1.0], 0.0, atol=1e-15)
+    optical = geometry.line_of_sight_matrix(Geometry("optical", layout="tripod", actuator_radius_m=0.01))
+    np.testing.assert_allclose(optical, seen / 2.0, rtol=1e-15)
+
+
+@pytest.mark.parametrize("angle", ["mechanical", "optical"])
+def test_the_strokes_for_a_line_of_sight_in_metres_make_it_and_sum_to_zero(angle):
+    tripod = Geometry(angle, magnification=10.0, layout="tripod", actuator_radius_m=0.02)
+    wanted = np.array([[100e-6, 0.0], [0.0, -50e-6]])
+    strokes = geometry.tripod_strokes_m(tripod, wanted)
+    # 100 µrad outside is 1 mrad of beam, 0.5 mrad of tilt: actuator 1, 20 mm out, draws back by 10 µm
+    np.testing.assert_allclose(strokes[0], [-10e-6, 5e-6, 5e-6], rtol=1e-12)
+    np.testing.assert_allclose(strokes.sum(axis=1), 0.0, atol=1e-20)
+    outputs = strokes / 0.02 * {"mechanical": 1.0, "optical": 2.0}[angle]
+    np.testing.assert_allclose(outputs @ geometry.line_of_sight_matrix(tripod).T, wanted, atol=1e-18)
+    with pytest.raises(ValueError, match='layout "two-axis" has no strokes; only a "tripod" has actuators to extend'):
+        geometry.tripod_strokes_m(Geometry("optical"), wanted)
+
+
+# ---------------------------------------------------------------------------------------------- decoupling
+def random_geometry(rng, layout):
+    return Geometry(
+        angle=("optical", "mechanical")[rng.integers(2)],
+        incidence_rad=rng.uniform(0.0, 1.2),
+        magnification=rng.uniform(0.5, 40.0),
+        rotation_rad=rng.uniform(-np.pi, np.pi),
+        coupling=((rng.uniform(0.8, 1.2), rng.uniform(-0.4, 0.4)), (rng.uniform(-0.4, 0.4), rng.uniform(0.8, 1.2))),
+        layout=layout,
+        actuator_radius_m=0.01 if layout == "tripod" else None,
+    )
+
+
+@pytest.mark.parametrize("layout", ["two-axis", "tripod"])
+def test_random_coupled_geometries_are_decoupled_to_two_equal_gains(layout):
+    rng, cases = random_cases(seed=2)
+    for _ in cases:
+        g = random_geometry(rng, layout)
+        gains = rng.uniform(0.5e-4, 2e-4, g.outputs) * rng.choice([-1.0, 1.0], g.outputs)
+        seen = geometry.line_of_sight_matrix(g) * gains
+        gain = geometry.decoupled_gain_rad_v(g, gains)
+        commands = geometry.decoupling(g, gains)
+        np.testing.assert_allclose(seen @ commands, gain * np.eye(2), atol=1e-12 * gain)
+        assert gain > 0.0
+        assert np.linalg.det(commands.T @ commands) == pytest.approx(1.0, rel=1e-9)  # neither grows nor shrinks
+        chosen = geometry.decoupling(g, gains, axis_gain_rad_v=1e-4)
+        # independent of the closed form: solve for the commands with the absence of piston as a third equation
+        conditions, wanted = seen, 1e-4 * np.eye(2)
+        if layout == "tripod":
+            conditions, wanted = np.vstack([seen, gains]), np.vstack([wanted, np.zeros(2)])
+        np.testing.assert_allclose(chosen, np.linalg.solve(conditions, wanted), rtol=1e-9, atol=1e-9)
+
+
+def test_an_ideal_two_axis_mirror_needs_no_decoupling_and_keeps_its_gain():
+    gains = (0.089e-3, 0.089e-3)
+    np.testing.assert_allclose(geometry.decoupling(Geometry("optical"), gains), np.eye(2), atol=1e-15)
+    assert geometry.decoupled_gain_rad_v(Geometry("optical"), gains) == pytest.approx(0.089e-3, rel=1e-12)
+    turned = Geometry("mechanical", magnification=8.0, rotation_rad=0.3)
+    c, s = math.cos(0.3), math.sin(0.3)
+    np.testing.assert_allclose(geometry.decoupling(turned, gains), [[c, s], [-s, c]], atol=1e-15)
+    assert geometry.decoupled_gain_rad_v(turned, gains) == pytest.approx(0.089e-3 / 4.0, rel=1e-12)
+
+
+def test_an_ideal_tripod_has_orthonormal_commands_without_piston():
+    tripod = Geometry("mechanical", layout="tripod", actuator_radius_m=0.01)
+    commands = geometry.decoupling(tripod, (1e-4, 1e-4, 1e-4))
+    np.testing.assert_allclose(commands.T @ commands, np.eye(2), atol=1e-15)
+    np.testing.assert_allclose(np.ones(3) @ commands, 0.0, atol=1e-15)
+    root = math.sqrt(2.0 / 3.0)
+    np.testing.assert_allclose(commands, -root * np.column_stack([np.cos(THIRDS), np.sin(THIRDS)]), atol=1e-15)
+    # strokes of sqrt(2/3) cos x 0.1 mrad tilt the plate by sqrt(2/3) x 0.1 mrad, and the beam by twice that
+    assert geometry.decoupled_gain_rad_v(tripod, (1e-4, 1e-4, 1e-4)) == pytest.approx(2 * root * 1e-4, rel=1e-12)
+
+
+def test_unlike_actuators_of_a_tripod_share_strokes_and_not_volts():
+    gains = np.array([1e-4, 2e-4, 0.5e-4])
+    tripod = Geometry("mechanical", layout="tripod", actuator_radius_m=0.01)
+    commands = geometry.decoupling(tripod, gains)
+    np.testing.assert_allclose(gains @ commands, 0.0, atol=1e-18)
+    assert np.max(np.abs(np.ones(3) @ commands)) > 0.1
+
+
+# ------------------------------------------------------------------------------------------------ refusals
+def test_a_singular_coupling_is_refused_with_the_direction_that_is_not_driven():
+    both_move_the_diagonal = Geometry("optical", coupling=((1.0, 1.0), (1.0, 1.0 + 1e-6)))
+    with pytest.raises(
+        ValueError,
+        match=r"two-axis mirror is singular: at 135\.0 degrees from x towards y it moves the line of sight "
+        r"4e\+06 times less .*at most 10000.* check coupling and incidence_rad",
+    ):
+        geometry.decoupling(both_move_the_diagonal, (1e-4, 1e-4))
+    with pytest.raises(ValueError, match=r"tripod mirror is singular: at 90\.0 degrees .* inf times less"):
+        geometry.outputs_matrix(
+            Geometry("optical", coupling=((1.0, 0.0), (0.0, 0.0)), layout="tripod", actuator_radius_m=0.01)
+        )
+    nearly = Geometry("optical", coupling=((1.0, 0.0), (0.0, 2e-4)))  # 5000 times, still invertible
+    assert geometry.outputs_matrix(nearly)[1, 1] == pytest.approx(5000.0, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("gains", "message"),
+    [
+        ((1e-4, 0.0), r"gains_rad_v is \(0.0001, 0.0\); give one finite gain other than 0 rad/V for each of the 2"),
+        ((1e-4, math.nan), "gains_rad_v is .*nan"),
+        ((1e-4, 1e-4, 1e-4), "each of the 2 actuators of the two-axis mirror"),
+        ((1e-4, 1e-9), r"actuator 2 moves the mirror 1e\+05 times less per volt than the strongest"),
+    ],
+)
+def test_gains_that_leave_an_axis_without_drive_are_refused(gains, message):
+    with pytest.raises(ValueError, match=message):
+        geometry.decoupling(Geometry("optical"), gains)
+
+
+@pytest.mark.parametrize("gain", [0.0, math.nan, math.inf])
+def test_no_gain_cannot_be_asked_for(gain):
+    with pytest.raises(ValueError, match=f"axis_gain_rad_v is {gain:g}; give a finite gain other than 0 rad/V"):
+        geometry.decoupling(Geometry("optical"), (1e-4, 1e-4), gain)
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ({"angle": "line of sight"}, 'angle is \'line of sight\'; choose "optical" or "mechanical"'),
+        ({"layout": "hexapod"}, 'layout is \'hexapod\'; choose "two-axis" or "tripod"'),
+        ({"incidence_rad": math.pi / 2}, r"incidence_rad is 1\.5708; .* below pi/2, where the beam would graze"),
+        ({"incidence_rad": -0.1}, "incidence_rad is -0.1"),
+        ({"incidence_rad": math.nan}, "incidence_rad is nan"),
+        ({"magnification": 0.0}, r"magnification is 0; give .* above 0 \(1 without a telescope; an inverted image is"),
+        ({"magnification": math.nan}, "magnification is nan"),
+        ({"rotation_rad": math.inf}, "rotation_rad is inf; give a finite angle"),
+        ({"coupling": ((1.0, 0.0), (0.0, math.nan))}, "coupling is .*nan.*; give two rows of two finite numbers"),
+        ({"coupling": ((1.0, 0.0),)}, "coupling is .* for none"),
+        ({"layout": "tripod"}, "actuator_radius_m is None; give the radius of the circle on which the tripod's three"),
+        ({"layout": "tripod", "actuator_radius_m": 0.0}, "actuator_radius_m is 0.0"),
+    ],
+)
+def test_what_is_no_geometry_is_refused(values, message):
+    with pytest.raises(ValueError, match=f"^geometry: {message}"):
+        Geometry(**({"angle": "optical"} | values))
+
+
+# ------------------------------------------------------------------------------------------- stroke budget
+def demand(body=(300e-6, 300e-6), ahead=(71e-6, 0.0), bias=(0.0, 0.0), lag=(0.0, 0.0), on_mirror=False):
+    return StrokeDemand(body, ahead, bias, lag, point_ahead_on_mirror=on_mirror)
+
+
+PAPER = {"travel_rad": 2.5e-3, "travel_angle": "optical"}
+
+
+def test_the_papers_mirror_covers_300_urad_only_up_to_a_magnification_of_four():
+    x, y = stroke_budget(Geometry("optical"), demand(), **PAPER)
+    assert (x.name, y.name) == ("x", "y")
+    assert [line.name for line in x.lines] == [
+        "Body pointing",
+        "Point-ahead",
+        "Bias and alignment",
+        "Line-of-sight rate lag",
+    ]
+    assert x.total_rad == pytest.approx(300e-6, rel=1e-12)
+    assert x.available_rad == pytest.approx(1.25e-3, rel=1e-12)
+    assert x.margin_rad == pytest.approx(950e-6, rel=1e-12)
+    assert x.ratio == pytest.approx(1250 / 300, rel=1e-12)
+    assert x.largest_magnification == pytest.approx(4.1667, rel=1e-4)
+    assert x.fits
+    assert not stroke_budget(Geometry("optical", magnification=4.2), demand(), **PAPER)[0].fits
+    assert stroke_budget(Geometry("optical", magnification=4.16), demand(), **PAPER)[0].fits
+
+
+def test_point_ahead_on_the_mirror_takes_its_share_on_its_axis_alone():
+    x, y = stroke_budget(Geometry("optical"), demand(on_mirror=True), **PAPER)
+    assert x.total_rad == pytest.approx(371e-6, rel=1e-12)
+    assert x.total_rss_rad == pytest.approx(math.sqrt(300**2 + 71**2) * 1e-6, rel=1e-12)
+    assert x.largest_magnification == pytest.approx(1250 / 371, rel=1e-12)
+    assert y.total_rad == pytest.approx(300e-6, rel=1e-12)
+    elsewhere = stroke_budget(Geometry("optical"), demand(on_mirror=False), **PAPER)[0].lines[1]
+    assert elsewhere.value == 0.0  # a term made elsewhere is still a line
+    assert "made by another mirror" in elsewhere.basis
+    assert "71 µrad" in elsewhere.basis
+
+
+def test_magnification_multiplies_and_a_mechanical_angle_halves():
+    wanted = demand(bias=(50e-6, 20e-6), lag=(25.5e-6, 0.0), on_mirror=True)  # sums to 446.5 and 320 µrad
+    telescope = Geometry("optical", magnification=6.0)
+    optical = stroke_budget(telescope, wanted, **PAPER)
+    mechanical = stroke_budget(telescope, wanted, travel_rad=2.5e-3, travel_angle="mechanical")
+    assert [b.needed_rad for b in optical] == pytest.approx([2679e-6, 1920e-6], rel=1e-12)
+    assert [b.needed_rad for b in mechanical] == pytest.approx([1339.5e-6, 960e-6], rel=1e-12)
+    assert [b.fits for b in optical] == [False, False]
+    assert [b.fits for b in mechanical] == [False, True]
+    assert mechanical[0].margin_rad == pytest.approx(-89.5e-6, rel=1e-9)
+    rss = math.sqrt(300**2 + 71**2 + 50**2 + 25.5**2) * 1e-6
+    assert mechanical[0].needed_rss_rad == pytest.approx(3.0 * rss, rel=1e-12)
+    assert mechanical[0].fits_rss  # the worst case does not, the root sum square does
+    assert mechanical[0].margin_rss_rad == pytest.approx(1.25e-3 - 3.0 * rss, rel=1e-12)
+    assert mechanical[0].largest_magnification == pytest.approx(1.25e-3 / (446.5e-6 / 2.0), rel=1e-12)
+    assert mechanical[0].largest_magnification_rss == pytest.approx(1.25e-3 / (rss / 2.0), rel=1e-12)
+    assert mechanical[0].ratio_rss == pytest.approx(1.25e-3 / (3.0 * rss), rel=1e-12)
+
+
+def test_the_travel_is_counted_by_its_own_convention_whatever_the_model_counts():
+    as_optical, as_mechanical = (
+        stroke_budget(Geometry(angle, magnification=3.0), demand(), **PAPER) for angle in ("optical", "mechanical")
+    )
+    assert as_optical[0].needed_rad == pytest.approx(as_mechanical[0].needed_rad, rel=1e-12)
+
+
+def test_a_limited_drive_leaves_a_share_of_the_travel():
+    # the paper's drive: 12 V at 0.089 mrad/V reach 1.068 of the 2.5 mrad
+    x = stroke_budget(Geometry("optical"), demand(), **PAPER, usable_travel_rad=1.068e-3)[0]
+    assert x.usable_share == pytest.approx(0.4272, rel=1e-12)
+    assert x.available_rad == pytest.approx(534e-6, rel=1e-12)
+    assert x.margin_rad == pytest.approx(234e-6, rel=1e-12)
+    assert x.largest_magnification == pytest.approx(1.78, rel=1e-12)
+    assert stroke_budget(Geometry("optical"), demand(), **PAPER)[0].usable_share == 1.0
+
+
+@pytest.mark.parametrize("layout", ["two-axis", "tripod"])
+def test_no_corner_of_the_demand_needs_more_than_the_budget_and_one_needs_all_of_it(layout):
+    rng, cases = random_cases(seed=3)
+    for _ in cases:
+        g = random_geometry(rng, layout)
+        pairs = rng.uniform(0.0, 1e-4, (4, 2))
+        wanted = StrokeDemand(*(tuple(pair) for pair in pairs.tolist()), point_ahead_on_mirror=True)
+        budgets = stroke_budget(g, wanted, travel_rad=1e-2, travel_angle=g.angle)
+        corners = np.array(list(itertools.product([-1.0, 1.0], repeat=2))) * pairs.sum(axis=0)
+        # least strokes for a line of sight, found by a general solver: without piston for a tripod of equal actuators
+        outputs = np.linalg.lstsq(geometry.line_of_sight_matrix(g), corners.T, rcond=None)[0]
+        np.testing.assert_allclose([b.needed_rad for b in budgets], np.max(np.abs(outputs), axis=1), rtol=1e-9)
+
+
+def test_a_mirror_turned_by_45_degrees_needs_more_for_the_same_box():
+    square = stroke_budget(Geometry("optical", rotation_rad=math.pi / 4), demand(), **PAPER)
+    assert [b.total_rad for b in square] == pytest.approx([300e-6 * math.sqrt(2.0)] * 2, rel=1e-12)
+    assert "along (0.707, 0.707)" in square[0].lines[0].basis
+
+
+def test_oblique_incidence_costs_stroke_on_the_axis_across():
+    x, y = stroke_budget(Geometry("optical", incidence_rad=math.pi / 3), demand(), **PAPER)
+    assert (x.needed_rad, y.needed_rad) == pytest.approx((300e-6, 600e-6), rel=1e-12)
+
+
+def test_lines_carry_their_sources_and_no_demand_leaves_any_magnification():
+    nothing = demand(body=(0.0, 0.0), ahead=(0.0, 0.0))
+    x = stroke_budget(Geometry("optical"), nothing, **PAPER, sources={"body_pointing_rad": "paper: section 2.1"})[0]
+    assert (x.ratio, x.ratio_rss, x.largest_magnification) == (math.inf, math.inf, math.inf)
+    assert x.fits
+    assert [line.source for line in x.lines[:2]] == ["paper: section 2.1", "not stated"]
+    assert all(line.unit == "rad" and line.basis and line.regime for line in x.lines)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"travel_rad": 0.0}, "travel_rad is 0; give the range from stop to stop, above 0 rad"),
+        ({"travel_rad": math.nan}, "travel_rad is nan"),
+        ({"usable_travel_rad": 3e-3}, r"usable_travel_rad is 0\.003, of a travel of 2\.5 mrad .* not beyond it"),
+        ({"usable_travel_rad": math.nan}, "usable_travel_rad is nan"),
+        ({"travel_angle": "line-of-sight"}, 'travel_angle is \'line-of-sight\'; choose "optical" or "mechanical"'),
+    ],
+)
+def test_a_travel_without_meaning_is_refused(changes, message):
+    with pytest.raises(ValueError, match=f"^stroke budget: {message}"):
+        stroke_budget(Geometry("optical"), demand(), **(PAPER | changes))
+
+
+@pytest.mark.parametrize("pair", [(-1e-6, 0.0), (math.nan, 0.0), (0.0, math.inf), (1e-6,)])
+def test_a_half_range_without_meaning_is_refused(pair):
+    with pytest.raises(ValueError, match=r"^stroke budget: bias_rad is .*; give two half ranges \(x, y\) in rad"):
+        demand(bias=pair)
