@@ -49,9 +49,9 @@ class _CacheFile(IndexDataCacheFile):
         self._save_index({**self._load_index(), key: name})  # type: ignore[no-untyped-call]
 
 
-def _compile(function: Callable[..., Any]) -> Any:
+def _compile(function: Callable[..., Any], **options: Any) -> Any:
     """The function compiled, with its machine code kept in a cache that several processes may share."""
-    compiled = numba.njit(**_OPTIONS)(function)
+    compiled = numba.njit(**_OPTIONS, **options)(function)
     if cache := getattr(compiled, "_cache", None):  # none under NUMBA_DISABLE_JIT
         cache._cache_file.__class__ = _CacheFile
     return compiled
@@ -69,6 +69,11 @@ Q, H, Z, CHANGE = range(4)
 COMMAND_MIN, COMMAND_MAX, RESOLUTION, FOLLOW, SLEW_STEP = range(5)
 SATURATED, SLEW_LIMITED = range(2)
 BEFORE, NOW = range(2)  # of an actuator's target
+
+
+def _merge(function: Callable[..., Any]) -> Any:
+    """Compiled by itself, and merged into its caller by the machine-code compiler: quick to compile and to call."""
+    return _compile(function, forceinline=True)
 
 
 # A tuple whose length is a count: the length is part of the compiled type, so that short loops over it are unrolled.
@@ -1055,9 +1060,9 @@ class Ensemble(NamedTuple):
 class EnsembleState(NamedTuple):
     """The memory of `LANES` runs; the kernel writes into these arrays. A row of LANES numbers for each quantity.
 
-    ``place``: control sample, plant step, and 1 where statistics are taken. ``sum_square`` (axes), ``sum`` (axes),
-    ``largest`` (radial error squared), ``counts`` (COUNT_*) are rows too; ``histogram`` (LANES, BINS) counts the radial
-    error at the control samples.
+    ``place``: control sample, plant step, and 1 where statistics are taken. Rows too: ``sum_square`` (axes) and
+    ``largest`` (radial error squared) of every plant step, ``sum`` (axes) of the control samples, ``counts`` (COUNT_*).
+    ``histogram`` (LANES, BINS) counts the radial error at the end of each control sample.
     """
 
     first_run: Indices
@@ -1294,7 +1299,7 @@ def _clear(rows, at):  # type: ignore[no-untyped-def]
         rows[at + r] = 0.0
 
 
-@_compile
+@_merge
 def _weigh(weights, rows, first, stride, total, at, fresh):  # type: ignore[no-untyped-def]
     """total row = (or, if it is not fresh, +=) sum of weights[j] x row first + stride j; a weight of 0 costs nothing.
 
@@ -1325,7 +1330,16 @@ def _weigh(weights, rows, first, stride, total, at, fresh):  # type: ignore[no-u
     return fresh
 
 
-@_compile
+@_inline
+def _weigh_some(weights, rows, first, stride, total, at, fresh):  # type: ignore[no-untyped-def]
+    """As `_weigh`, without the call where all weights are 0, as most are."""
+    some = False
+    for j in range(weights.size):
+        some = some or weights[j] != 0.0
+    return _weigh(weights, rows, first, stride, total, at, fresh) if some else fresh
+
+
+@_merge
 def _sum_rows(weights, rows, first, stride, total, row):  # type: ignore[no-untyped-def]
     """total row = sum of weights[j] x row first + stride j, as `_weigh` takes it."""
     if _weigh(weights, rows, first, stride, total, _at(row), True):
@@ -1358,7 +1372,7 @@ def _add_element(before, now, bank, e, x):  # type: ignore[no-untyped-def]
                 x[at + _at(1) + r] += c * first + d * last
 
 
-@_compile
+@_merge
 def _modal_element(diagonal, coupling, before, now, bank, x):  # type: ignore[no-untyped-def]
     """x = Ad x + before z_before + now z of the first element, in place: both in one pass over the memory."""
     z, z_before = _at(BANK_Z), _at(BANK_Z_BEFORE)
@@ -1390,7 +1404,7 @@ def _mend(rows, e, bank, at, rate_gain, power):  # type: ignore[no-untyped-def]
             bank[at + _at(BANK_Z) + r] += mended - end
 
 
-@_compile
+@_merge
 def _advance_bouc_wen(rows, e, bank, at, rate_gain, counts):  # type: ignore[no-untyped-def]
     """BANK_Q to BANK_Q_NEXT, exactly, for a row of runs: as `bouc_wen_step`, with a zero crossing mended by itself.
 
@@ -1490,21 +1504,21 @@ def _ensemble_plant(p, s):  # type: ignore[no-untyped-def]
     else:
         _modal_step(p.diagonal, p.coupling, s.x)
     for i in range(states):
-        _weigh(p.B0[i], s.drive, DRIVE_BEFORE, DRIVE_FIELDS, s.x, _at(i), False)
-        _weigh(p.B1[i], s.drive, DRIVE_NOW, DRIVE_FIELDS, s.x, _at(i), False)
+        _weigh_some(p.B0[i], s.drive, DRIVE_BEFORE, DRIVE_FIELDS, s.x, _at(i), False)
+        _weigh_some(p.B1[i], s.drive, DRIVE_NOW, DRIVE_FIELDS, s.x, _at(i), False)
         if several:
             for r in range(_ROW):
                 s.x[_at(i) + r] += s.x_next[_at(i) + r]
     if p.feedback:
         for i in range(states):
-            _weigh(p.E_held[i], s.bank, BANK_Z, BANK_FIELDS, s.x, _at(i), False)
+            _weigh_some(p.E_held[i], s.bank, BANK_Z, BANK_FIELDS, s.x, _at(i), False)
         _advance_bank(p, s)
         for e in range(elements):
             _add_element(p.E_back, p.E1, s.bank, e, s.x)
     for o in range(p.Cy.shape[0]):
         fresh = _weigh(p.Cy[o], s.x, 0, 1, s.y, _at(o), True)
-        fresh = _weigh(p.Dy[o], s.drive, DRIVE_NOW, DRIVE_FIELDS, s.y, _at(o), fresh)
-        if _weigh(p.Ky[o], s.bank, BANK_Z, BANK_FIELDS, s.y, _at(o), fresh):
+        fresh = _weigh_some(p.Dy[o], s.drive, DRIVE_NOW, DRIVE_FIELDS, s.y, _at(o), fresh)
+        if _weigh_some(p.Ky[o], s.bank, BANK_Z, BANK_FIELDS, s.y, _at(o), fresh):
             _clear(s.y, _at(o))
 
 
@@ -1537,7 +1551,7 @@ def _ensemble_disturbance(p, s):  # type: ignore[no-untyped-def]
             _gaussians(p.seed, s.first_run[0], p.purpose[w], step // 4, s.gauss, _at(4 * w))
     _modal_step(p.shaping_diagonal, p.shaping_coupling, s.shaping)
     for i in range(p.shaping_diagonal.size):
-        _weigh(p.shaping_noise[i], s.gauss, step % 4, 4, s.shaping, _at(i), False)
+        _weigh_some(p.shaping_noise[i], s.gauss, step % 4, 4, s.shaping, _at(i), False)
     for i in range(p.shaping_output.shape[0]):
         _sum_rows(p.shaping_output[i], s.shaping, 0, 1, s.disturbance, i)
 
@@ -1558,24 +1572,26 @@ def _line_of_sight_error(p, s, i, reference):  # type: ignore[no-untyped-def]
 
 @_inline
 def _statistics(p, s):  # type: ignore[no-untyped-def]
-    """What a plant step adds to the sums and the largest radial error; ``work`` is left with its square."""
-    work, error, total, square, largest = s.work, s.error, s.sum, s.sum_square, s.largest
+    """What a plant step adds to the squares and the largest radial error; ``work`` is left with its square."""
+    work, error, square, largest = s.work, s.error, s.sum_square, s.largest
     for i in range(p.optics.shape[0]):
         at = _at(i)
         for r in range(_ROW):
             e = error[at + r]
-            total[at + r] += e
             square[at + r] += e * e
             work[r] = e * e + (work[r] if i > 0 else 0.0)
     for r in range(_ROW):
         largest[r] = max(largest[r], work[r])
 
 
-@_compile
-def _count_radial(s):  # type: ignore[no-untyped-def]
+@_merge
+def _count_radial(error, axes, work, total, histogram):  # type: ignore[no-untyped-def]
+    """What a control sample adds to the sums and to the histogram of the radial error, whose square is in ``work``."""
+    for r in range(_at(axes)):
+        total[r] += error[r]
     for r in range(_ROW):
-        place = (_bits(s.work[r]) >> _BIN_SHIFT) - _BIN_OFFSET
-        s.histogram[r, min(max(place, 0), BINS - 1)] += np.int32(1)
+        place = (_bits(work[r]) >> _BIN_SHIFT) - _BIN_OFFSET
+        histogram[r, min(max(place, 0), BINS - 1)] += np.int32(1)
 
 
 @_inline
@@ -1735,8 +1751,9 @@ def ensemble_loop(p, s, reference, residual, trace):  # type: ignore[no-untyped-
 
     Fills ``residual`` (samples, axes, LANES) with the line-of-sight error at the begin of each sample, if it has rows,
     and ``trace`` (samples, channels, LANES) likewise: disturbance by axis, drive before and now by actuator, the
-    plant's outputs, readings. Statistics are taken where ``place`` says so: sums and the largest error at every plant
-    step, the histogram at the control samples. The states are left at the end, so that a following call continues.
+    plant's outputs, readings. Statistics are taken where ``place`` says so: squares and the largest error at every
+    plant step, sums and the histogram at the control samples. The states are left at the end, so that a following call
+    continues.
     """
     axes, steps, actuators = p.optics.shape[0], p.steps_per_sample, p.actuator.shape[0]
     length = s.command.size // (actuators * LANES)
@@ -1767,7 +1784,7 @@ def ensemble_loop(p, s, reference, residual, trace):  # type: ignore[no-untyped-
                 _statistics(p, s)
         s.place[SAMPLE] += 1
         if s.place[COUNTING] == 1:
-            _count_radial(s)
+            _count_radial(s.error, axes, s.work, s.sum, s.histogram)
 
 
 def rows(matrix: Floats) -> Rows:

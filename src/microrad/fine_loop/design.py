@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from microrad import lti
 from microrad.control import AxisController, DesignPlant
+from microrad.disturbance import Disturbance
 from microrad.fine_loop.linear import ClosedLoop, close, gauge_noise_rad, open_loop
 from microrad.fine_loop.loop import PointingLoop, assemble, nominal_axis_gain
 
@@ -46,13 +47,15 @@ def _noise_factor(closed: ClosedLoop) -> Floats:
 def design_plant(loop: PointingLoop) -> DesignPlant:
     """What a controller of one axis of this loop is designed for. ``loop`` has one axis.
 
-    A sensor slower than the control is taken as one that delivers every sample, later by half of what its hold adds.
+    A sensor slower than the control is taken as one that delivers every sample, later by half of what its hold adds,
+    and disturbance lines as narrow bands of noise.
     """
     if loop.axes != 1 or loop.mirror.actuators != 1:
         raise ValueError(f"a design needs a loop of one axis, not of {loop.axes}: design each axis by itself")
     extra = round(0.5 * (loop.optical.every - 1) * loop.timing.steps_per_sample)
     optical = replace(loop.optical, every=1, delay_steps=loop.optical.delay_steps + extra)
-    loop = replace(loop, optical=optical)
+    random = tuple(tuple(narrow_band(each) for each in several) for several in loop.disturbances)
+    loop = replace(loop, optical=optical, disturbances=random)
     o = open_loop(loop)
     keep = np.ones(o.at.order, dtype=bool)
     keep[o.at.held] = False
@@ -82,6 +85,25 @@ def design_plant(loop: PointingLoop) -> DesignPlant:
 def close_axis(loop: PointingLoop, controller: AxisController) -> ClosedLoop:
     """The linear loop of one axis under an axis controller."""
     return close(loop, assemble(controller.name, loop, controller))
+
+
+LINE_DAMPING = 1e-3
+"""Damping ratio of the narrow band that stands for a line in a design: a wheel's speed is known to about that."""
+
+
+def narrow_band(each: Disturbance) -> Disturbance:
+    """The disturbance with each line replaced by noise of the same power in a narrow band about its frequency."""
+    size = each.A.shape[0] + 2 * len(each.lines)
+    A, B = np.zeros((size, size)), np.zeros((size, each.B.shape[1] + 2 * len(each.lines)))
+    C = np.zeros((1, size))
+    n, w = each.B.shape
+    A[:n, :n], B[:n, :w], C[:, :n] = each.A, each.B, each.C
+    for i, line in enumerate(each.lines):
+        here, natural = slice(n + 2 * i, n + 2 * i + 2), 2.0 * np.pi * line.freq_hz
+        A[here, here] = natural * np.array([[-LINE_DAMPING, 1.0], [-1.0, -LINE_DAMPING]])
+        B[here, w + 2 * i : w + 2 * i + 2] = line.amplitude_rad * np.sqrt(LINE_DAMPING * natural) * np.eye(2)
+        C[0, n + 2 * i] = 1.0
+    return replace(each, A=A, B=B, C=C, lines=())
 
 
 def behind_filter(plant: DesignPlant, low_pass: lti.StateSpace) -> DesignPlant:

@@ -18,7 +18,7 @@ from microrad.sensor import StrainGauge
 Floats = NDArray[np.float64]
 Progress = Callable[[int, int, str], None]
 
-SLICE_SAMPLES = 2048  # control samples between two returns from the kernel, and of a segment of the spectrum
+SLICE_SAMPLES = 2048  # control samples between two returns from the kernel, and at most in a segment of the spectrum
 LANES = kernels.LANES
 """Runs that the kernel advances side by side; a batch is never smaller."""
 
@@ -359,6 +359,12 @@ def _samples(loop: PointingLoop, span: Span) -> tuple[int, int]:
     return total, settle
 
 
+def _segment(loop: PointingLoop, span: Span) -> int:
+    """Samples in a segment of the spectrum: a power of 2 that fits behind the settling time."""
+    total, settle = _samples(loop, span)
+    return min(SLICE_SAMPLES, 1 << (total - settle).bit_length() - 1)
+
+
 def _reference(loop: PointingLoop, begin: int, end: int) -> Floats:
     """Reference at the control samples ``begin`` to ``end``, both included: (samples, axes)."""
     time: Floats = np.arange(begin, end + 1, dtype=float) * loop.timing.period_s
@@ -369,16 +375,17 @@ def _batch(loop: PointingLoop, p: kernels.Ensemble, span: Span, first_run: int) 
     state = start(loop, p, first_run)
     total, settle = _samples(loop, span)
     nothing = np.empty((0, 0, 0))
-    spectrum, segments = np.zeros((SLICE_SAMPLES // 2 + 1, loop.axes)), 0
-    residual = np.empty((SLICE_SAMPLES, loop.axes, LANES)) if first_run == 0 else nothing
+    segment = _segment(loop, span)
+    spectrum, segments = np.zeros((segment // 2 + 1, loop.axes)), 0
+    residual = np.empty((segment, loop.axes, LANES)) if first_run == 0 else nothing
     at = 0
     while at < total:
         counting = at >= settle
-        end = min(at + SLICE_SAMPLES, total if counting else settle)
+        end = min(at + segment, total if counting else settle)
         if counting and not state.place[kernels.COUNTING]:
             state.place[kernels.COUNTING] = 1
             state.counts[:] = 0.0
-        whole = counting and residual.size > 0 and end - at == SLICE_SAMPLES
+        whole = counting and residual.size > 0 and end - at == segment
         kernels.ensemble_loop(p, state, _reference(loop, at, end), residual if whole else nothing, nothing)
         if whole:
             spectrum += _periodogram(residual, loop.timing.period_s)
@@ -411,11 +418,11 @@ def _joined(name: str, loop: PointingLoop, span: Span, parts: list[_Batch], runs
         name=name,
         seconds=samples * loop.timing.period_s,
         rms_rad=np.sqrt(by_run("sum_square")[:, : loop.axes] / steps),
-        mean_rad=by_run("sum")[:, : loop.axes] / steps,
+        mean_rad=by_run("sum")[:, : loop.axes] / samples,
         largest_rad=np.sqrt(by_run("largest")[:, 0]),
         histogram=np.concatenate([b.state.histogram for b in parts])[:runs],
         counts=by_run("counts"),
-        freq_hz=np.asarray(np.fft.rfftfreq(SLICE_SAMPLES, loop.timing.period_s), dtype=float),
+        freq_hz=np.asarray(np.fft.rfftfreq(_segment(loop, span), loop.timing.period_s), dtype=float),
         psd_rad2_hz=parts[0].psd,
         samples=samples,
         steps=steps,

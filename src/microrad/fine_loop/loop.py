@@ -42,8 +42,14 @@ class PointingLoop:
 
 
 def in_band_gain(m: Mirror) -> Floats:
-    """Slow gain from drives to outputs without what creep adds, shape (outputs, actuators)."""
-    return np.diag([slow_gain(model) for model in m.inverse])
+    """Slow gain from drives to outputs without what creep adds, shape (outputs, actuators).
+
+    A mirror whose hysteresis lies in a stiffness names no model to invert: its gain at rest counts.
+    """
+    if m.inverse:
+        return np.diag([slow_gain(model) for model in m.inverse])
+    linear = m.linear_loop
+    return np.asarray(linear.D - linear.C @ np.linalg.solve(linear.A, linear.B))
 
 
 def without_hysteresis(loop: PointingLoop) -> PointingLoop:
@@ -107,9 +113,16 @@ def with_inverse(
 ) -> LoopController:
     """The controller with an inverse of the mirror's hysteresis, driven through the reference filter.
 
+    Raises ValueError for an inverse that inverts nothing (a mirror whose hysteresis lies in a stiffness has none).
+
     Without ``in_series`` the reference alone drives it (feedforward, as in the paper). With it, the controller's own
     command goes through it too, as an angle: the inverse then straightens the mirror inside the loop.
     """
+    if not any(inverse.direct) and not inverse.bouc_wen:
+        raise ValueError(
+            f"controller {name!r}: mirror {loop.mirror.name!r} has no inverse: its hysteresis lies in a stiffness, "
+            "inside the resonance, and not ahead of it; use feedback alone"
+        )
     feedback = assemble(name, loop, axis)
     f, m, axes = feedback.system, loop.mirror.actuators, loop.axes
     to_mirror, share = np.linalg.pinv(loop.optics), 1.0 if in_series else 0.0
