@@ -29,6 +29,10 @@ COMPOUNDS = [
     ("photon/bit", "photon/bit", "photon/bit"), ("V/(mrad s)", "V/(rad s)", "V/(mrad s)"),
     ("V s/mrad", "V s/rad", "V s/mrad"), ("W/m^2", "W/m^2", "W/m2"), ("nW/cm2", "W/m^2", "nW/cm2"),
     ("deg/h", "rad/s", "deg/h"), ("V·s/mrad", "V s/rad", "V s/mrad"), ("V / us", "V/s", "V/us"),
+    ("urad/s", "rad/s", "urad/s"), ("urad^2/Hz", "rad^2/Hz", "urad2/Hz"), ("urad2/kHz", "rad^2/Hz", "urad2/kHz"),
+    ("nrad/Hz^2", "rad/Hz^2", "nrad/Hz2"), ("mA/W", "A/W", "mA/W"), ("A/mW", "A/W", "A/mW"),
+    ("pA/sqrt(Hz)", "A/sqrt(Hz)", "pA/sqrt(Hz)"), ("pA/√kHz", "A/sqrt(Hz)", "pA/sqrt(kHz)"),
+    ("nV/(sqrt(MHz) K)", "V/(sqrt(Hz) K)", "nV/(sqrt(MHz) K)"), ("sqrt(kHz)", "sqrt(Hz)", "sqrt(kHz)"),
 ]  # fmt: skip
 KEYS = sorted({unit for _, unit, _ in COMPOUNDS} | set(SI.values()) | {"dB"})
 
@@ -79,6 +83,8 @@ def test_numbers_pass_through(number, compound):
         ("-0.4 dB", "dB", -0.4),
         ("30 dBm", "W", 1.0),
         ("7 dBW", "W", 10**0.7),
+        ("160 urad^2/Hz", "rad^2/Hz", 160e-12),
+        ("0.05 pA/√Hz", "A/sqrt(Hz)", 0.05e-12),
     ],
 )
 def test_what_is_read(text, unit, value):
@@ -124,6 +130,15 @@ def test_what_is_read(text, unit, value):
         ("1 Mbit", "bit/s", "another kind", '"5 Mbit/s"'),
         ("1 1/bit", "photon/bit", "another kind", '"5 photon/bit"'),
         ("1 m", "rad", "another kind", '"5 urad"'),
+        ("1 urad/Hz", "rad^2/Hz", "another kind", '"5 urad^2/Hz"'),
+        ("1 urad^2 s", "rad^2/Hz", "another kind", '"5 urad^2/Hz"'),
+        ("1 pA^2/Hz", "A/sqrt(Hz)", "another kind", '"5 pA/sqrt(Hz)"'),
+        ("1 pA/Hz", "A/sqrt(Hz)", "another kind", '"5 pA/sqrt(Hz)"'),
+        ("1 pA/sqrt(s)", "A/sqrt(Hz)", "another kind", '"5 pA/sqrt(Hz)"'),
+        ("1 pA/sqrt(Hz", "A/sqrt(Hz)", 'no unit is called "sqrt(Hz"', '"5 pA/sqrt(Hz)"'),
+        ("1 pA/sqrt()", "A/sqrt(Hz)", 'no unit is called "sqrt()"', '"5 pA/sqrt(Hz)"'),
+        ("1 pA/sqrt(Hertz)", "A/sqrt(Hz)", 'no unit is called "Hertz"', '"5 pA/sqrt(Hz)"'),
+        ("1 pA/√√Hz", "A/sqrt(Hz)", 'no unit is called "√√Hz"', '"5 pA/sqrt(Hz)"'),
         ("1 dB", "W", "in dB, another kind", '"5 W"'),
         ("1 dBm", "dB", "in dBm, another kind", '"5 dB"'),
         ("1 dBm", "rad", "in dBm, another kind", '"5 urad"'),
@@ -192,6 +207,7 @@ def test_any_text_is_a_finite_number_or_a_unit_error(text, unit):
         (-3.2e-5, "rad", "-32 µrad"),
         (2.415e-9, "W/m^2", "2.415 nW/m^2"),
         (8.9e-5, "rad/V", "89 µrad/V"),
+        (5e-14, "A/sqrt(Hz)", "0.05 pA/sqrt(Hz)"),
         (38.421, "1/V", "38.42 1/V"),
         (1e-6, "m^2", "1e-06 m^2"),  # a prefix would be squared
         (0.4, "dB", "0.4 dB"),

@@ -174,7 +174,7 @@ class Creep:
 
 NO_CREEP = Creep()
 
-LINE_OF_SIGHT = {"line-of-sight": 1.0, "mechanical": 2.0}
+LINE_OF_SIGHT = {"line-of-sight": 1.0, "optical": 1.0, "mechanical": 2.0}
 """Angle of the line of sight by the convention of a mirror's output: reflection doubles a tilt, per axis."""
 
 

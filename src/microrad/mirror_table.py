@@ -2,11 +2,13 @@
 
 import math
 from collections.abc import Iterator
-from typing import Annotated, Literal
+from dataclasses import dataclass
+from typing import Annotated, Any, Literal, NamedTuple
 
-from pydantic import Field
+from pydantic import Field, GetJsonSchemaHandler
+from pydantic_core import CoreSchema
 
-from microrad.fields import Problem, Quantity, Several, Table
+from microrad.fields import MOST_ITEMS, Problem, ProblemsError, Quantity, Several, Table
 from microrad.units import format_quantity
 
 ANGLE_MOST = math.pi / 2  # beyond a quarter turn no pointing error, beam or mirror angle has a meaning here
@@ -20,6 +22,9 @@ MirrorGain = Annotated[float, Quantity("rad/V", "mrad/V", above=0.0)]
 Coefficients = Annotated[tuple[float, ...], Several(Quantity(""))]
 Roots = Annotated[tuple[float, ...], Several(Quantity("Hz", above=0.0, most=1e12))]
 Dampings = Annotated[tuple[float, ...], Several(Quantity("", least=-1.0, most=1.0))]
+
+INDEFINITE = 1e-2
+"""How far below 0 the smallest eigenvalue of a correlation matrix may lie: two decimals leave so much."""
 
 
 class LinearPart(Table):
@@ -216,6 +221,161 @@ class Comparison(Table):
         return _one_model(self)
 
 
+# --------------------------------------------------------------------------------------------------------- uncertainty
+@dataclass(frozen=True, slots=True)
+class _Keys(Several):
+    """A list of keys as text."""
+
+    def read(self, value: object) -> Any:
+        if not isinstance(value, list | tuple) or not value or not all(isinstance(v, str) for v in value):
+            raise ProblemsError(Problem("", "is not a list of keys in quotes", f"{self.wanted}: {self.example}"))
+        if len(value) > MOST_ITEMS:
+            raise ProblemsError(Problem("", f"is a list of {len(value)} items", f"at most {MOST_ITEMS} items"))
+        return tuple(value)
+
+    @property
+    def wanted(self) -> str:
+        return "a list of keys inside the mirror, items of lists counted from 1"
+
+    @property
+    def example(self) -> str:
+        return '["bouc_wen.d1", "linear.poles.1"]'
+
+    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        return {"type": "array", "minItems": 1, "items": {"type": "string"}}
+
+
+@dataclass(frozen=True, slots=True)
+class _SeveralOrNone(Several):
+    """A list that may be empty."""
+
+    def read(self, value: object) -> tuple[float, ...]:
+        return () if value in ([], ()) else Several.read(self, value)
+
+    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        return {"type": "array", "items": self.each.__get_pydantic_json_schema__(schema, handler)}
+
+
+class Uncertainty(Table):
+    """How well the identification knows its parameters: standard errors relative to the values, and correlation.
+
+    `parameters` are keys inside the mirror, "bouc_wen.d1" or "linear.poles.1" (items count from 1); a list without a
+    number is one parameter, its items scale together. `correlation` is that of the values, the lower triangle without
+    the diagonal row by row; of a list that scales together its first item other than 0 counts.
+    """
+
+    parameters: Annotated[tuple[str, ...], _Keys(Quantity(""))] = Field(
+        description="keys inside the mirror, items counted from 1"
+    )
+    standard_errors: Annotated[tuple[float, ...], Several(Quantity("", least=0.0, most=1.0))] = Field(
+        description="relative to the values"
+    )
+    correlation: Annotated[tuple[float, ...], _SeveralOrNone(Quantity("", least=-1.0, most=1.0))] = Field(
+        default=(), description="lower triangle without the diagonal, row by row; left out, there is none"
+    )
+
+    def problems(self) -> Iterator[Problem]:
+        """Counts that fit, and correlations that can be together."""
+        count = len(self.parameters)
+        pairs = count * (count - 1) // 2
+        if len(self.standard_errors) != count:
+            found = f"has {len(self.standard_errors)} items where parameters has {count}"
+            yield Problem("standard_errors", found, "one standard error for each parameter")
+        if len(self.correlation) not in (0, pairs):
+            found = f"has {len(self.correlation)} items where {count} parameters have {pairs} pairs"
+            yield Problem("correlation", found, f"{pairs} numbers, the lower triangle without the diagonal, or none")
+        elif (least := self._least_eigenvalue()) < -INDEFINITE:
+            found = f"is not positive semidefinite: its smallest eigenvalue is {least:.3g}"
+            yield Problem("correlation", found, "correlations that can be together, as the fit gave them")
+
+    @property
+    def correlation_rows(self) -> list[list[float]]:
+        """The whole correlation matrix."""
+        size = range(len(self.parameters))
+        below = iter(self.correlation or (0.0,) * (len(size) * (len(size) - 1) // 2))
+        lower = [[next(below) for _ in range(i)] for i in size]
+        return [[1.0 if i == j else lower[max(i, j)][min(i, j)] for j in size] for i in size]
+
+    def _least_eigenvalue(self) -> float:
+        if not self.correlation:
+            return 1.0
+        import numpy as np  # here, to keep the schema quick to load
+
+        return float(np.linalg.eigvalsh(np.array(self.correlation_rows))[0])
+
+
+class Place(NamedTuple):
+    """Where a parameter stands: table and field of the record, and the item of a list (from 0) or None for all."""
+
+    table: str
+    field: str
+    item: int | None
+
+
+_UNCERTAIN = {
+    "linear": ("numerator", "denominator", "poles", "pole_dampings", "zeros", "zero_dampings"),
+    "bouc_wen": tuple(info.alias or name for name, info in BoucWenTable.model_fields.items()),
+    "prandtl_ishlinskii": ("thresholds", "weights", "widening"),
+    "creep": ("time_constants", "weights"),
+}
+
+
+def place(mirror: "Mirror", key: str) -> Place:
+    """Where the parameter of a dotted key stands in a mirror.
+
+    Raises `ProblemsError` for a key that is no parameter of this mirror, and for a value that has no relative error: 0,
+    and the damping 1 of a real root.
+    """
+    name, _, rest = key.partition(".")
+    alias, _, number = rest.partition(".")
+    tables = [each for each in _UNCERTAIN if getattr(mirror, each) is not None]
+    if name not in tables:
+        raise _refusal(key, "is in no table of this mirror", f"a key of {', '.join(tables)}")
+    table = getattr(mirror, name)
+    fields = {info.alias or field: field for field, info in type(table).model_fields.items()}
+    given = [each for each in _UNCERTAIN[name] if getattr(table, fields[each]) is not None]
+    if alias not in given:
+        raise _refusal(key, f"is no parameter of this mirror's {name}", f"one of {', '.join(given)}")
+    value = getattr(table, fields[alias])
+    values = value if isinstance(value, tuple) else (value,)
+    item = _item(key, number, len(value) if isinstance(value, tuple) else 0)
+    chosen = values if item is None else values[item : item + 1]
+    if not any(chosen):
+        raise _refusal(key, "is 0 in this mirror, and nothing is relative to 0", "a parameter that is not held at 0")
+    if alias.endswith("dampings") and any(abs(damping) == 1.0 for damping in chosen):
+        raise _refusal(key, "is the damping of a real root, 1 by definition", "the damping of a pair of roots")
+    return Place(name, fields[alias], item)
+
+
+def _item(key: str, number: str, items: int) -> int | None:
+    if not number:
+        return None
+    if not items:
+        raise _refusal(key, "counts the items of a single value", "the key without a number")
+    if not (number.isascii() and number.isdigit() and 1 <= int(number[:6]) <= items):
+        raise _refusal(key, f"names no item of a list of {items}", f"a number from 1 to {items}")
+    return int(number) - 1
+
+
+def _refusal(key: str, reason: str, expected: str) -> ProblemsError:
+    return ProblemsError(Problem("uncertainty.parameters", f'has "{key[:60]}", which {reason}', expected))
+
+
+def _uncertainty_problems(mirror: "Mirror", uncertainty: Uncertainty) -> Iterator[Problem]:
+    """Parameters that this mirror does not have, and values named twice."""
+    taken: dict[tuple[str, str], set[int | None]] = {}
+    for key in uncertainty.parameters:
+        try:
+            found = place(mirror, key)
+        except ProblemsError as error:
+            yield from error.problems
+            continue
+        items = taken.setdefault(found[:2], set())
+        if found.item in items or (items and None in (found.item, *items)):
+            yield from _refusal(key, "stands twice, or beside its whole list", "each value once").problems
+        items.add(found.item)
+
+
 class Mirror(Table):
     """The fast steering mirror: one hysteresis model, and the linear part that its composition asks for."""
 
@@ -233,9 +393,10 @@ class Mirror(Table):
     prandtl_ishlinskii: PrandtlIshlinskiiTable | None = None
     creep: CreepTable | None = None
     comparison: Comparison | None = None
+    uncertainty: Uncertainty | None = None
 
     def problems(self) -> Iterator[Problem]:
-        """Exactly one model, a linear part exactly where the composition has one, and a bias inside the drive range."""
+        """One model, a linear part where the composition has one, a bias within the drive range, known parameters."""
         yield from _one_model(self)
         if not self.drive_min_v < self.drive_max_v:
             low = format_quantity(self.drive_min_v, "V")
@@ -249,3 +410,5 @@ class Mirror(Table):
         if self.composition != "static" and self.linear is None:
             advice = 'a table linear, or composition = "static"'
             yield Problem("composition", f'is "{self.composition}" but the table linear is missing', advice)
+        if self.uncertainty is not None:
+            yield from _uncertainty_problems(self, self.uncertainty)

@@ -11,14 +11,9 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 
 from microrad.fields import Problem, Quantity, Several, Table
+from microrad.fine_pointing_table import FinePointing, clock_problems
 from microrad.mirror_table import ANGLE_MOST, Angle, DurationOrZero, Frequency, Mirror, MirrorGain, Name, Rate, Voltage
 from microrad.units import format_quantity
-
-STEP_TOLERANCE = 1e-9
-"""How far, relatively, a control period or a delay may lie from a whole number of plant steps."""
-
-MOST_STEPS = 1_000_000
-"""Plant steps in a control period or a delay beyond which a step is taken for a slip of the pen."""
 
 MOST_SAMPLES = 2_000_000
 """Control samples in a period of the scenario's sines beyond which a run would not fit into memory."""
@@ -93,7 +88,9 @@ class Conventions(Table):
     residual: Literal["per-axis", "radial"] = Field(
         description="per-axis: the simulated axis is the pointing error; radial: two equal axes, sqrt 2 more"
     )
-    mirror_angle: Literal["line-of-sight", "mechanical"] = Field(description="mechanical is doubled by reflection")
+    mirror_angle: Literal["line-of-sight", "optical", "mechanical"] = Field(
+        description="optical: the beam's angle at the mirror, ahead of a telescope; mechanical is doubled by reflection"
+    )
 
 
 class Beam(Table):
@@ -169,19 +166,7 @@ class Control(Table):
 
     def problems(self) -> Iterator[Problem]:
         """Control period and delay in whole plant steps."""
-        step, period = self.plant_step_s, 1.0 / self.rate_hz
-        if not max(period, self.delay_s) <= MOST_STEPS * step:
-            reason = f"goes more than {MOST_STEPS} times into the control period or the delay"
-            yield Problem("plant_step", reason, "a step nearer to 1 / control.rate")
-            return
-        steps, delays = max(round(period / step), 1), round(self.delay_s / step)
-        if abs(steps * step - period) > STEP_TOLERANCE * period:
-            shown, better = format_quantity(period, "s", 9), format_quantity(period / steps, "s", 12)
-            reason = f"does not divide the control period 1 / control.rate ({shown})"
-            yield Problem("plant_step", reason, f'a whole fraction of it: plant_step = "{better}" would do')
-        elif abs(delays * step - self.delay_s) > STEP_TOLERANCE * self.delay_s:
-            better = format_quantity(delays * step, "s", 12)
-            yield Problem("delay", "is no whole number of plant_step", f'delay = "{better}" would do')
+        return clock_problems("control", self.rate_hz, self.delay_s, self.plant_step_s)
 
 
 class Scenario(Table):
@@ -247,6 +232,7 @@ class Mission(Table):
     amplifier: Amplifier
     control: Control
     scenario: Scenario
+    fine_pointing: FinePointing | None = None
 
     def problems(self) -> Iterator[Problem]:
         """What does not fit between tables."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from microrad import control, link, mirror_summary, paper, pointing, simulate, tracking, verdict
+from microrad import control, fine_pointing, link, mirror_summary, paper, pointing, simulate, tracking, verdict
 from microrad.mission import Mission
 from microrad.missionfile import MissionFile
 
@@ -54,6 +54,7 @@ class Study:
     residual: tracking.Run
     comparison: Comparison | None
     scan: paper.Scan | None
+    fine_pointing: fine_pointing.FinePointingStudy | None
     requirements: tuple[verdict.Requirement, ...]
     claims: tuple[verdict.Claim, ...]
 
@@ -84,6 +85,7 @@ def run(file: MissionFile, on_progress: Progress = lambda done, total, what: Non
 
     on_progress(2, 3, "claims of the paper")
     scan = paper.scan(m, on_progress) if paper.applies(m) else None
+    fine = fine_pointing.run(file, on_progress) if m.fine_pointing is not None else None
     on_progress(3, 3, "verdict")
     evidence = verdict.Evidence(
         m, open_loop, beacon, communication, fig2.readings, fig2.ideal, loops, summary, runs, scan
@@ -103,8 +105,20 @@ def run(file: MissionFile, on_progress: Progress = lambda done, total, what: Non
         residual=residual,
         comparison=compare(file, runs),
         scan=scan,
-        requirements=verdict.requirements(m, open_loop, beacon, answer, achieved, residual, runs),
+        fine_pointing=fine,
+        requirements=(
+            *verdict.requirements(m, open_loop, beacon, answer, achieved, residual, runs),
+            *([] if fine is None else [fine_requirement(m, fine)]),
+        ),
         claims=verdict.against_paper(evidence),
+    )
+
+
+def fine_requirement(m: Mission, fine: fine_pointing.FinePointingStudy) -> verdict.Requirement:
+    """The best controller's radial error on the mission's mirror, with what makes up most of it."""
+    left = fine.best.simulated["given"]
+    return verdict.fine_pointing_requirement(
+        m, left.quantile_rad, fine.quantile, fine.best.design.name, fine.budget.dominant
     )
 
 

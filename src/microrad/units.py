@@ -7,6 +7,7 @@ Decibels are kinds of their own: a ratio stays in dB, a level (dBm, dBW) becomes
 import math
 import re
 from decimal import Decimal
+from fractions import Fraction
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -19,7 +20,7 @@ _MAX_CHARACTERS = 60
 _MAX_DECIBEL = 1000.0  # beyond it the linear value leaves the range of a float
 
 _BASE = ("kg", "m", "s", "A", "K", "rad", "bit", "photon", "cycle")
-_Dimension = tuple[int, ...]
+_Dimension = tuple[int | Fraction, ...]  # powers of the base dimensions
 
 
 class _Scale(NamedTuple):
@@ -94,11 +95,18 @@ _KINDS = {
     "V/rad": ("a voltage per angle", "V/mrad"),
     "V/(rad s)": ("a voltage per angle and time", "V/(mrad s)"),
     "V s/rad": ("a voltage per angular rate", "V s/mrad"),
+    "rad/s": ("an angular rate", "urad/s"),
+    "rad^2/Hz": ("a spectral density of an angle", "urad^2/Hz"),
+    "rad/Hz^2": ("an angle per squared frequency", "nrad/Hz^2"),
+    "A": ("a current", "nA"),
+    "A/W": ("a responsivity", "A/W"),
+    "A/sqrt(Hz)": ("a noise density of a current", "pA/sqrt(Hz)"),
 }
 
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]{1,3})?")
 _COMMA_NUMBER = re.compile(r"[+-]?[0-9]+,[0-9]+")
 _FACTOR = re.compile(r"([A-Za-zµμ]+)(?:\^?([1-9]))?")
+_ROOT = re.compile(r"sqrt\(([A-Za-zµμ]+)\)|√([A-Za-zµμ]+)")
 
 
 class UnitError(ValueError):
@@ -128,7 +136,8 @@ def parse_quantity(text: object, unit: str, typical: str = "") -> float:
     """Value of `text` in the SI unit `unit`.
 
     The text is one plain number, at most one space and a unit: "5 cm", "300 Mbit/s", "16000 V/(mrad s)", "-3 dBm".
-    Units are multiplied by a space; more than one unit below the stroke needs brackets; powers are "m^2" or "m2".
+    Units are multiplied by a space; more than one unit below the stroke needs brackets; powers are "m^2" or "m2",
+    a square root is "pA/sqrt(Hz)" or "pA/√Hz".
     A key in W also takes dBm and dBW, a key in dB takes dB alone. `typical` is the unit in which an error message
     writes its example.
 
@@ -228,6 +237,9 @@ def _factor(symbol: str) -> tuple[_Scale, int]:
     """Scale and power of one factor of a unit expression, "m^2"."""
     if not symbol:
         raise ValueError("a unit is missing beside a space or a stroke")
+    if root := _ROOT.fullmatch(symbol):
+        scale, _ = _factor(root[1] or root[2])
+        return _Scale(scale.factor.sqrt(), tuple(Fraction(power) / 2 for power in scale.dimension)), 1
     match = _FACTOR.fullmatch(symbol)
     if match is None or match[1] not in _SYMBOLS:
         raise ValueError(f"no unit is called {_quoted(symbol)}")

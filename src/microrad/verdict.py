@@ -68,6 +68,15 @@ def requirements(
     )
 
 
+def fine_pointing_requirement(
+    m: Mission, quantile_rad: float, quantile: float, controller: str, cause: str
+) -> Requirement:
+    """The radial error of the fine-pointing loop, at its share of the time, against the same requirement."""
+    allowed = m.requirement.pointing_error_rad
+    name = f"fine pointing at {100 * quantile:g} % ({controller})"
+    return Requirement(name, "rad", allowed, quantile_rad, allowed - quantile_rad, cause)
+
+
 def residual_cause(m: Mission, worst: Run, runs: tuple[Run, ...]) -> str:
     """What the residual is made of: an amplifier at its limits, else the lag of the loop, else hysteresis."""
     if worst.at_limits:

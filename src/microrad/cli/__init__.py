@@ -137,4 +137,4 @@ def schema() -> Outcome:
     return Outcome(json_text(mission_schema()))
 
 
-from microrad.cli import lab  # noqa: E402, F401  its commands stand behind these in the help
+from microrad.cli import lab, pointing  # noqa: E402, F401  their commands stand behind these in the help

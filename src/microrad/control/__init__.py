@@ -1,5 +1,16 @@
 """Controllers: from gains or a specification to matrices, inverses of hysteresis, margins of the sampled loop."""
 
+from microrad.control.analysis import LoopMargins, MultiloopMargin, by_source, loop_margins, multiloop_disk_margin
+from microrad.control.classical import (
+    DISTURBANCE_OBSERVER,
+    FAMILIES,
+    PI,
+    PI_NOTCH,
+    PID,
+    RESONANT_DAMPING,
+    peak_family,
+)
+from microrad.control.lqg import LQG, Weights, lqg_controller
 from microrad.control.problem import (
     GAUGE,
     OPTICAL,
@@ -32,29 +43,47 @@ from microrad.control.sampled import (
     slowest_pole,
     timing_from_mission,
 )
+from microrad.control.tuning import Tuned, grid_best, tune
 
 __all__ = [
+    "DISTURBANCE_OBSERVER",
+    "FAMILIES",
     "GAUGE",
     "IDEAL_DRIVE",
+    "LQG",
     "OPTICAL",
+    "PI",
+    "PID",
+    "PI_NOTCH",
     "RESIDUAL",
+    "RESONANT_DAMPING",
     "AxisController",
     "DesignPlant",
     "Drive",
     "Family",
     "Gains",
     "Inverse",
+    "LoopMargins",
     "Margins",
+    "MultiloopMargin",
     "Parameter",
     "Specification",
     "Timing",
+    "Tuned",
+    "Weights",
     "amplifier_factor",
     "anti_windup",
+    "by_source",
     "drive_from_mission",
     "gains_from_mission",
+    "grid_best",
     "inverse",
+    "loop_margins",
+    "lqg_controller",
     "margins",
+    "multiloop_disk_margin",
     "no_feedforward",
+    "peak_family",
     "pid",
     "play_inverse",
     "sampled_plant",
@@ -62,4 +91,5 @@ __all__ = [
     "side_by_side",
     "slowest_pole",
     "timing_from_mission",
+    "tune",
 ]

@@ -49,8 +49,8 @@ def fit_bands(
 ) -> Fit:
     """Filter whose rms in each band between the edges is the given one within 5 %.
 
-    Bands leave open the shape within them and what lies above the last edge. The broadest terms that fit are taken, and
-    about a tenth of the last band's variance may lie above it. The first edge may be 0 Hz. Raises ValueError for edges
+    Bands leave open the shape within them and what lies outside. The broadest terms that fit are taken, with little
+    power outside: about a tenth of the last band's above it. The first edge may be 0 Hz. Raises ValueError for edges
     that do not rise, an rms that is not above zero, and where no sum of a few terms comes within 5 %.
     """
     edges, wanted = rising(np.asarray(edges_hz), f'"{name}": edges of the bands'), np.asarray(rms_rad, dtype=float)

@@ -134,11 +134,10 @@ def band_rms(disturbance: Disturbance, edges_hz: Floats) -> Floats:
     weights = (disturbance.C @ modes)[0] * np.linalg.solve(modes, spread)[:, 0]
     finite = np.where(np.isinf(edges), 0.0, edges)
     up_to = (2.0 / np.pi) * (np.log(2j * np.pi * finite[:, None] - poles) @ weights).imag
-    everything = (2.0 / np.pi) * float((np.log(-poles.astype(complex)) @ weights).imag) + float(np.sum(weights).real)
-    variance = np.diff(np.where(np.isinf(edges), everything, up_to))
+    variance = np.diff(np.where(np.isinf(edges), np.sum(weights).real, up_to))
     for line in disturbance.lines:
         variance += 0.5 * line.amplitude_rad**2 * ((edges[:-1] <= line.freq_hz) & (line.freq_hz < edges[1:]))
-    return np.sqrt(np.maximum(variance, 0.0))
+    return np.asarray(np.sqrt(np.maximum(variance, 0.0)))
 
 
 def combine(*disturbances: Disturbance) -> Disturbance:

@@ -5,6 +5,7 @@ sum of terms with non-negative variances is the spectrum of a stable filter, whi
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import pairwise, product
 from typing import Literal
@@ -62,8 +63,9 @@ def term_filter(term: Term) -> tuple[Floats, Floats, Floats]:
 class Samples:
     """What a sum of terms is compared with: row i is the weighted sum of the density at its nodes.
 
-    The nodes of a row run from ``starts[i]`` to the next start. ``wanted`` is the row's value; a row that is ``ceiling``
-    may fall below it. ``trust`` is 1 for what was given and less for what lies between. ``centre_hz`` is where a row is.
+    The nodes of a row run from ``starts[i]`` to the next start. ``wanted`` is the row's value; a row that is
+    ``ceiling`` may fall below it. ``trust`` is 1 for what was given and less for what lies between; ``centre_hz`` is
+    where the row lies.
     """
 
     nodes_hz: Floats
@@ -102,15 +104,26 @@ def _logarithmic_nodes(low_hz: float, high_hz: float) -> tuple[Floats, Floats]:
 
 
 def band_samples(edges_hz: Floats, variance_rad2: Floats) -> Samples:
-    """Rows that are the variances in bands, and one that keeps what leaks above them below a tenth of the last band."""
-    first = float(edges_hz[0]) if edges_hz[0] > 0.0 else 1e-4 * float(edges_hz[1])
-    edges = [first, *edges_hz[1:].tolist(), 100.0 * float(edges_hz[-1])]
-    parts = [_logarithmic_nodes(low, high) for low, high in pairwise(edges)]
-    if edges_hz[0] == 0.0:  # flat below the lowest node
-        nodes, weights = parts[0]
-        parts[0] = np.append(0.5 * first, nodes), np.append(first, weights)
+    """Rows that are the variances in bands, and ceilings on what lies outside them.
+
+    Above: a tenth of the last band's variance. Below a first edge that is not 0 Hz: a tenth of the first band's, or
+    what its mean density would have there.
+    """
+    first, last = float(edges_hz[0]), float(edges_hz[-1])
+    lowest = 1e-4 * float(edges_hz[1])
+    parts = [_logarithmic_nodes(low or lowest, high) for low, high in pairwise([*edges_hz.tolist(), 100.0 * last])]
     wanted = np.append(variance_rad2, 0.1 * variance_rad2[-1])
-    return _samples(parts, wanted, np.arange(wanted.size) == wanted.size - 1, np.ones(wanted.size))
+    if first == 0.0:
+        parts[0] = _and_below(parts[0], lowest)
+    else:
+        parts.append(_and_below(_logarithmic_nodes(1e-3 * first, first), 1e-3 * first))
+        wanted = np.append(wanted, variance_rad2[0] * max(0.1, first / (float(edges_hz[1]) - first)))
+    return _samples(parts, wanted, np.arange(wanted.size) >= variance_rad2.size, np.ones(wanted.size))
+
+
+def _and_below(part: tuple[Floats, Floats], lowest_hz: float) -> tuple[Floats, Floats]:
+    """The nodes and weights of an integral from 0 Hz, the density flat below the lowest frequency of this one."""
+    return np.append(0.5 * lowest_hz, part[0]), np.append(lowest_hz, part[1])
 
 
 def table_samples(freq_hz: Floats, psd_rad2_hz: Floats) -> Samples:
@@ -209,11 +222,8 @@ def _fewer(samples: Samples, terms: list[Term], limits: tuple[float, float, floa
 
 def _polished(samples: Samples, terms: list[Term], limits: tuple[float, float, float]) -> list[Term]:
     """The terms with variances, frequencies and dampings of the least squared misfit nearby."""
-    from scipy.optimize import least_squares  # slow to import, not needed to show help
-
     low_hz, high_hz, least_damping = limits
     scale = float(np.max(samples.wanted))
-    start = np.log([[t.variance_rad2 / scale, t.freq_hz, t.damping] for t in terms])
     low = np.tile([-_WIDE, math.log(low_hz), math.log(least_damping)], len(terms))
     high = np.tile([_WIDE, math.log(high_hz), math.log(_BROADEST)], len(terms))
 
@@ -221,16 +231,40 @@ def _polished(samples: Samples, terms: list[Term], limits: tuple[float, float, f
         values = np.exp(x.reshape(-1, 3)).tolist()
         return [Term(t.kind, scale * v, f, z) for t, (v, f, z) in zip(terms, values, strict=True)]
 
-    best = least_squares(
-        lambda x: samples.misfit(built(x)),
-        np.clip(start.ravel(), low + 1e-6, high - 1e-6),
-        jac=lambda x: _slopes(samples, built(x)),
-        bounds=(low, high),
-        ftol=1e-5,
-        xtol=1e-5,
-        max_nfev=40,
+    start = np.log([[t.variance_rad2 / scale, t.freq_hz, t.damping] for t in terms]).ravel()
+    bounds = np.stack([low, high])
+    return built(
+        _least_squares(lambda x: samples.misfit(built(x)), lambda x: _slopes(samples, built(x)), start, bounds)
     )
-    return built(best.x)
+
+
+def _least_squares(
+    misfit: Callable[[Floats], Floats], slopes: Callable[[Floats], Floats], start: Floats, bounds: Floats
+) -> Floats:
+    """Minimum of the squared misfit between bounds (2, unknowns), by Levenberg and Marquardt's steps, forty at most.
+
+    On normal equations: for these few columns a singular value decomposition at each step costs thirty times as much.
+    """
+    x = np.clip(start, *bounds)
+    error, caution = misfit(x), 1e-3
+    for _ in range(40):
+        before, gradient = float(error @ error), slopes(x)
+        downhill = -gradient.T @ error
+        free = ~(((x <= bounds[0]) & (downhill < 0.0)) | ((x >= bounds[1]) & (downhill > 0.0)))
+        curvature = gradient[:, free].T @ gradient[:, free]
+        while caution < 1e6:
+            trial = x.copy()
+            damped = curvature + np.diag(caution * np.diag(curvature) + 1e-12)
+            trial[free] += np.linalg.solve(damped, downhill[free])
+            trial = np.clip(trial, *bounds)
+            found = misfit(trial)
+            if found @ found < before:
+                x, error, caution = trial, found, 0.2 * caution
+                break
+            caution *= 4.0
+        if float(error @ error) > (1.0 - 1e-4) * before:
+            break
+    return x
 
 
 def _slopes(samples: Samples, terms: list[Term]) -> Floats:

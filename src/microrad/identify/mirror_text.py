@@ -1,22 +1,33 @@
-"""The text of a mirror file: the keys of a mission's [mirror] table, each value with its uncertainty and source."""
+"""The text of a mirror file: the keys of a mission's [mirror] table, each value with its uncertainty and source.
+
+Behind the values stands the table `uncertainty`, their covariance in a form that `mirror_spread` draws mirrors from.
+"""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
+from microrad import kernels
 from microrad.hysteresis import BoucWen, Play, scaled, slow_gain
-from microrad.identify.bouc_wen import BoucWenFit
+from microrad.identify.bouc_wen import PARAMETERS, BoucWenFit
 from microrad.identify.choice import Identification
 from microrad.identify.doubts import fit_warnings
 from microrad.identify.joint import JointFit, turned_over
 from microrad.identify.plant_structures import LinearPoles, propagated
 from microrad.identify.prandtl_ishlinskii import PrandtlIshlinskiiFit
 from microrad.identify.predictions import Fit
-from microrad.identify.records import FloatArray, IdentificationError
+from microrad.identify.records import FloatArray, IdentificationError, centred, correlation, prepare
+
+_LOST = 100.0  # relative standard error of a value that is as good as held
+_LOOSEST = 1.0  # relative standard error that the file gives to a combination of parameters at most
+_STIFFEST = 1e-6  # the same, at least: what is known better keeps no more digits
+_BOUND = 1e-6  # distance from its bound, over its size, at which the search leaves a parameter
 
 
 def mirror_file_text(identification: Identification, name: str, *, model: str | None = None) -> str:
@@ -47,6 +58,7 @@ def mirror_file_text(identification: Identification, name: str, *, model: str | 
         _line("drive_max", _text(identification.drive_max_v, "V"), f"highest drive, from {source}"),
         "",
         *_tables(fit, identification, source),
+        *_uncertainty(fit, identification, source),
     ]
     return "\n".join(lines) + "\n"
 
@@ -108,7 +120,7 @@ def _tables(fit: Fit, identification: Identification, source: str) -> list[str]:
 # ----------------------------------------------------------------------------------------------------- joint models
 def _joint(fit: JointFit, identification: Identification, source: str) -> list[str]:
     turned = -1.0 if _falling(fit) else 1.0
-    lines = _joint_bouc_wen(fit, source) if isinstance(fit.model, BoucWen) else _joint_plays(fit, turned, source)
+    lines = _joint_bouc_wen(fit, source) if isinstance(fit.model, BoucWen) else _joint_plays(fit, source)
     if fit.creep.weights_rad_v:
         error = fit.fit.standard_errors[[p.name for p in fit.structure.parameters].index("creep")]
         weights = [_quoted(_text(turned * 1e3 * w, "mrad/V")) for w in fit.creep.weights_rad_v]
@@ -126,20 +138,17 @@ def _joint(fit: JointFit, identification: Identification, source: str) -> list[s
 
 
 def _joint_bouc_wen(fit: JointFit, source: str) -> list[str]:
-    keys = ("d1", "d2", "epsilon", "delta", "alpha", "beta", "gamma", "eta", "exponent")
     units = ("mrad/V", "s/V", "mrad/V", "s/V", "1/V", "1/V", "1/V", "1/V", "")
     scales = np.array([1e3, 1.0, 1e3, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0])
 
     def values(at: FloatArray) -> FloatArray:
-        model = fit.structure.parts(at).model
+        model = _upright(fit, fit.structure.parts(at).model)
         assert isinstance(model, BoucWen)
-        m = turned_over(model) if _falling(fit) else model
-        linear = (m.d1_rad_v, m.d2_s_v, m.epsilon_rad_v, m.delta_s_v)
-        return np.asarray(scales * np.array([*linear, m.alpha_1_v, m.beta_1_v, m.gamma_1_v, m.eta_1_v, m.exponent]))
+        return scales * _bouc_wen_numbers(model)
 
     errors = propagated(values, fit.fit.values, fit.fit.covariance)
     lines = ["[bouc_wen]"]
-    for key, unit, value, error in zip(keys, units, values(fit.fit.values), errors, strict=True):
+    for key, unit, value, error in zip(_BOUC_WEN_KEYS, units, values(fit.fit.values), errors, strict=True):
         if key in ("gamma", "eta", "exponent") and key not in fit.form.free:
             continue
         given = f"± standard error {error:.2g} {unit}".rstrip() if error > 0.0 else "held, not fitted"
@@ -148,8 +157,23 @@ def _joint_bouc_wen(fit: JointFit, source: str) -> list[str]:
     return lines
 
 
-def _joint_plays(fit: JointFit, turned: float, source: str) -> list[str]:
-    model = scaled(fit.model, turned)
+_BOUC_WEN_KEYS = (*PARAMETERS, "gamma", "eta", "exponent")
+
+
+def _bouc_wen_numbers(m: BoucWen) -> FloatArray:
+    linear = (m.d1_rad_v, m.d2_s_v, m.epsilon_rad_v, m.delta_s_v)
+    return np.array([*linear, m.alpha_1_v, m.beta_1_v, m.gamma_1_v, m.eta_1_v, m.exponent])
+
+
+def _upright(fit: JointFit, model: BoucWen | Play) -> BoucWen | Play:
+    """The model with its output counted as the mirror file counts it: rising with the drive."""
+    if not _falling(fit):
+        return model
+    return turned_over(model) if isinstance(model, BoucWen) else scaled(model, -1.0)
+
+
+def _joint_plays(fit: JointFit, source: str) -> list[str]:
+    model = _upright(fit, fit.model)
     assert isinstance(model, Play)
     errors = fit.fit.standard_errors[: len(model.thresholds_v)]
     thresholds = [_quoted(_text(r, "V")) for r in model.thresholds_v]
@@ -195,23 +219,25 @@ def _linear(fit: JointFit, linear: LinearPoles, identification: Identification) 
 
 def _bouc_wen(fit: BoucWenFit, source: str) -> list[str]:
     """Turning the output over turns d1, epsilon and beta: h' of -h has the terms of h with -epsilon and -beta."""
-    signs = np.array([-1, 1, -1, 1, 1, -1]) if _falling(fit) else np.ones(6)
-    keys = ("d1", "d2", "epsilon", "delta", "alpha", "beta")
+    signs = _signs(fit)
     units = ("mrad/V", "s/V", "mrad/V", "s/V", "1/V", "1/V")
     scales = (1e3, 1.0, 1e3, 1.0, 1.0, 1.0)
     lines = ["[bouc_wen]"]
     for key, unit, scale, value, error in zip(
-        keys, units, scales, signs * fit.values, fit.standard_errors, strict=True
+        PARAMETERS, units, scales, signs * fit.values, fit.standard_errors, strict=True
     ):
         comment = f"± standard error {scale * error:.2g} {unit}, from {source}"
         lines.append(_line(key, _text(scale * float(value), unit), comment))
     return lines
 
 
+def _signs(fit: BoucWenFit) -> FloatArray:
+    return np.array([-1.0, 1.0, -1.0, 1.0, 1.0, -1.0]) if _falling(fit) else np.ones(6)
+
+
 def _prandtl_ishlinskii(fit: PrandtlIshlinskiiFit, source: str) -> list[str]:
     """Operators without weight are left out, but the threshold 0 stays first, as a mirror file wants it."""
-    keep = fit.weights_rad_per_v > 0
-    keep[0] = True
+    keep = _kept(fit)
     thresholds = [_quoted(_text(float(v), "V")) for v in fit.thresholds_v[keep]]
     weights = [_quoted(_text(1e3 * float(w), "mrad/V")) for w in fit.weights_rad_per_v[keep]]
     errors = ", ".join(f"{1e3 * e:.2g}" if np.isfinite(e) else "at 0" for e in fit.standard_errors_rad_per_v[keep])
@@ -220,6 +246,130 @@ def _prandtl_ishlinskii(fit: PrandtlIshlinskiiFit, source: str) -> list[str]:
         f"thresholds = [{', '.join(thresholds)}] # identified: chosen, not fitted; from {source}",
         f"weights = [{', '.join(weights)}] # identified: ± standard error {errors} mrad/V, from {source}",
     ]
+
+
+def _kept(fit: PrandtlIshlinskiiFit) -> NDArray[np.bool_]:
+    return np.asarray((fit.weights_rad_per_v > 0) | (np.arange(fit.thresholds_v.size) == 0))
+
+
+# ------------------------------------------------------------------------------------------------------- uncertainty
+def _uncertainty(fit: Fit, identification: Identification, source: str) -> list[str]:
+    """The table `uncertainty`: standard errors and correlation with as many digits as the covariance needs."""
+    if isinstance(fit, JointFit):
+        numbers, covariance = _joint_covariance(fit)
+    elif isinstance(fit, BoucWenFit):
+        signs = _signs(fit)
+        numbers = dict(zip([f"bouc_wen.{key}" for key in PARAMETERS], (signs * fit.values).tolist(), strict=True))
+        covariance = signs[:, None] * fit.covariance * signs
+    else:
+        numbers, covariance = _play_covariance(fit, identification)
+    keys, relative = _relative(numbers, covariance)
+    if not keys:
+        return []
+    errors, correlations = _rounded(relative)
+    rows = [f"  {', '.join(correlations[i][:i])}," for i in range(1, len(keys))]
+    return [
+        "",
+        "[uncertainty]",
+        f"parameters = [{', '.join(_quoted(key) for key in keys)}] # identified: those not held or at a bound",
+        f"standard_errors = [{', '.join(errors)}] # identified: relative to the values, at most {_LOOSEST:g} in any "
+        f"combination, from {source}",
+        "correlation = [ # identified: lower triangle, row by row; sums of parameters are known better than each",
+        *rows,
+        "]",
+    ]
+
+
+def _joint_covariance(fit: JointFit) -> tuple[dict[str, float], FloatArray]:
+    """Numbers of the mirror file (SI) by their keys, and their covariance, parameters at a bound being held."""
+    parameters, at = fit.structure.parameters, fit.fit.values
+    bounds = [(p.lower, p.upper) for p in parameters]
+    distance = np.abs(np.array(bounds) - at[:, None]).min(axis=1)
+    scale = np.array([p.scale for p in parameters])
+
+    def values(where: FloatArray) -> FloatArray:
+        return np.array(list(_numbers(fit, where).values()))
+
+    steps = np.diag(1e-6 * scale)
+    jacobian = np.column_stack([(values(at + step) - values(at - step)) / (2.0 * step.sum()) for step in steps])
+    covariance = _holding(fit.fit.covariance, distance <= _BOUND * scale)
+    return _numbers(fit, at), np.asarray(jacobian @ covariance @ jacobian.T)
+
+
+def _numbers(fit: JointFit, at: FloatArray) -> dict[str, float]:
+    axis = fit.structure.parts(at)
+    model = _upright(fit, axis.model)
+    found: dict[str, float] = {}
+    if isinstance(model, BoucWen):
+        found |= {f"bouc_wen.{k}": v for k, v in zip(_BOUC_WEN_KEYS, _bouc_wen_numbers(model).tolist(), strict=True)}
+    else:
+        found |= {f"prandtl_ishlinskii.weights.{i}": w for i, w in enumerate(model.weights_rad_v, 1)}
+        found["prandtl_ishlinskii.widening"] = model.widening_s
+    if axis.creep.weights_rad_v:
+        found["creep.weights"] = (-1.0 if _falling(fit) else 1.0) * axis.creep.weights_rad_v[0]
+    if axis.linear is not None:
+        for kind, roots in (("pole", axis.linear.poles), ("zero", axis.linear.zeros)):
+            found |= {f"linear.{kind}s.{i}": f for i, f in enumerate(roots.frequencies_hz, 1)}
+            found |= {f"linear.{kind}_dampings.{i}": d for i, d in enumerate(roots.dampings, 1)}
+    return found
+
+
+def _play_covariance(fit: PrandtlIshlinskiiFit, identification: Identification) -> tuple[dict[str, float], FloatArray]:
+    """The standard errors with the correlation that the play states have over the fitted samples."""
+    pairs = zip(identification.recordings, identification.predictions[0], strict=True)
+    heads = [replace(r, drive=r.drive[: p.split], output=r.output[: p.split]) for r, p in pairs if p.split > p.start]
+    records = prepare(heads, fit.units)
+    used = np.isfinite(fit.standard_errors_rad_per_v) & (fit.weights_rad_per_v > 0)
+    thresholds = fit.thresholds_v[used]
+    states = [kernels.play_response(r.drive_v, thresholds, np.full(thresholds.size, r.drive_v[0])) for r in records]
+    stacked = centred(np.concatenate([s[r.start :] for s, r in zip(states, records, strict=True)]), records)
+    errors = fit.standard_errors_rad_per_v[used]
+    gram = np.asarray(np.linalg.pinv(stacked.T @ stacked, hermitian=True), dtype=float)
+    covariance = errors[:, None] * correlation(gram) * errors
+    places = np.cumsum(_kept(fit))[used]
+    keys = [f"prandtl_ishlinskii.weights.{place}" for place in places]
+    return dict(zip(keys, fit.weights_rad_per_v[used].tolist(), strict=True)), np.asarray(covariance)
+
+
+def _holding(covariance: FloatArray, held: NDArray[np.bool_]) -> FloatArray:
+    """The covariance of the other parameters where some are held."""
+    size = np.sqrt(np.diag(covariance))
+    size[size == 0.0] = 1.0
+    between = covariance / np.outer(size, size)
+    known = between[:, held] @ np.linalg.pinv(between[np.ix_(held, held)], hermitian=True) @ between[held]
+    left = size[:, None] * (between - known) * size
+    return np.where(held[:, None] | held, 0.0, left)
+
+
+def _relative(numbers: dict[str, float], covariance: FloatArray) -> tuple[list[str], FloatArray]:
+    """Keys of the numbers that are known but for an error, and the covariance relative to their sizes.
+
+    A number that is lost is held. Combinations of the others that the recordings leave open are cut off: a draw that
+    moves by more than its own size is no mirror, and says nothing of the combinations that are known.
+    """
+    values = np.array(list(numbers.values()))
+    covariance = _holding(covariance, np.sqrt(np.diag(covariance)) > _LOST * np.abs(values))
+    kept = np.sqrt(np.abs(np.diag(covariance))) > 1e-12 * np.abs(values)
+    size = np.abs(values[kept])
+    relative = covariance[np.ix_(kept, kept)] / np.outer(size, size)
+    variances, directions = np.linalg.eigh(relative)
+    cut = (directions * np.clip(variances, 0.0, _LOOSEST**2)) @ directions.T
+    return [key for key, keep in zip(numbers, kept, strict=True) if keep], np.asarray(cut)
+
+
+def _rounded(covariance: FloatArray) -> tuple[list[str], list[list[str]]]:
+    """Standard errors and correlation as text, with digits enough for the variance of each combination to a tenth."""
+    variances, directions = np.linalg.eigh(covariance)
+    whiten = directions / np.sqrt(np.maximum(variances, _STIFFEST**2))
+    size = np.sqrt(np.diag(covariance))
+    for digits in range(3, 8):
+        errors = [f"{e:.{digits}g}" for e in size]
+        between = [[f"{r:.{2 * digits}f}" for r in row] for row in correlation(covariance)]
+        read = np.array(errors, dtype=float)
+        back = read[:, None] * np.array(between, dtype=float) * read
+        if np.abs(np.linalg.eigvalsh(whiten.T @ (back - covariance) @ whiten)).max() < 0.1:
+            break
+    return errors, between
 
 
 def _line(key: str, text: str, comment: str) -> str:

@@ -1,0 +1,96 @@
+"""The fine-pointing study of a mission: its loop, controllers tuned for it, and what they leave under disturbances."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from microrad import disturbance
+from microrad.fine_pointing.designs import BASELINE, Design, design, optimum_rms_rad
+from microrad.fine_pointing.results import (
+    COUNTERS,
+    Difference,
+    ErrorBudget,
+    Part,
+    Residual,
+    Sine,
+    Verified,
+    best,
+    error_budget,
+    sines,
+    verify,
+)
+from microrad.fine_pointing.scenario import Scene, scene, table
+from microrad.missionfile import MissionFile
+
+__all__ = [
+    "BASELINE",
+    "COUNTERS",
+    "Design",
+    "Difference",
+    "ErrorBudget",
+    "FinePointingStudy",
+    "Part",
+    "Residual",
+    "Scene",
+    "Sine",
+    "Verified",
+    "best",
+    "design",
+    "optimum_rms_rad",
+    "error_budget",
+    "run",
+    "scene",
+    "sines",
+    "verify",
+]
+
+Floats = NDArray[np.float64]
+Progress = Callable[[int, int, str], None]
+
+
+@dataclass(frozen=True, slots=True)
+class FinePointingStudy:
+    """Everything that a report shows of the fine-pointing loop.
+
+    ``disturbed_rad2_hz`` is the spectrum of an axis before the loop, at ``freq_hz``; the first of ``verified`` is the
+    baseline and ``best`` one of the others. ``quantile`` is the share of the time that errors are judged at, and
+    ``optimum_rad`` the radial rms below which no linear controller comes on the nominal mirror, whatever its margins.
+    """
+
+    scene: Scene
+    verified: tuple[Verified, ...]
+    best: Verified
+    budget: ErrorBudget
+    sines: tuple[Sine, ...]
+    freq_hz: Floats
+    disturbed_rad2_hz: Floats
+    quantile: float
+    optimum_rad: float
+
+
+def run(file: MissionFile, on_progress: Progress = lambda done, total, what: None) -> FinePointingStudy:
+    """Design, tune and simulate the mission's fine-pointing loop; seeded by the mission.
+
+    Raises ValueError with the reason for a loop that cannot be built and a controller that cannot meet its margin.
+    """
+    m, built = file.mission, scene(file)
+    designs = design(built, m, on_progress)
+    verified = verify(built, m, designs, on_progress)
+    chosen = best(verified)
+    segment = 2 * (verified[0].spectrum_rad2_hz.shape[0] - 1)
+    freq = np.asarray(np.fft.rfftfreq(segment, built.loop.timing.period_s), dtype=float)
+    before = np.sum([disturbance.psd(each, freq) for each in built.loop.disturbances[0]], axis=0)
+    return FinePointingStudy(
+        built,
+        verified,
+        chosen,
+        error_budget(built, m, chosen, on_progress),
+        sines(built, m, designs, on_progress),
+        freq,
+        before,
+        table(m).quantile,
+        math.sqrt(built.loop.axes) * optimum_rms_rad(built.axis),
+    )

@@ -1,0 +1,166 @@
+"""Mirrors that an identification leaves possible: drawn from the covariance that its mirror file gives."""
+
+from collections import Counter
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic.fields import FieldInfo
+
+from microrad.fields import ProblemsError, Quantity, Several, Table
+from microrad.mirror_table import Mirror, Place, Uncertainty, place
+from microrad.units import UnitError
+
+Floats = NDArray[np.float64]
+
+TRIES = 10_000
+"""Times that one mirror is drawn again before its uncertainty is taken for one that no mirror has."""
+
+
+def draws(table: Mirror, count: int, seed: int) -> tuple[Mirror, ...]:
+    """`count` mirrors drawn from the normal distribution that the table's `uncertainty` describes.
+
+    A draw in which a value would change its sign, or that the table's own checks would refuse in a file, is drawn
+    again: the distribution is cut off there. Each has a Philox stream of its own, so the first ones are the same for
+    a larger count. What is drawn is a mirror and no estimate: it has no `uncertainty`. Raises ValueError without an
+    `uncertainty`, and where `TRIES` draws in a row are no mirror.
+    """
+    uncertainty = _uncertainty(table)
+    places = [place(table, key) for key in uncertainty.parameters]
+    root = _root(relative_covariance(table))
+    streams = (np.random.SeedSequence(seed, spawn_key=(index,)) for index in range(count))
+    return tuple(_drawn(table, places, root, np.random.Generator(np.random.Philox(stream))) for stream in streams)
+
+
+def relative_covariance(table: Mirror) -> Floats:
+    """Covariance (n, n) of the factors, 1 on average, that a draw multiplies the n parameters with.
+
+    A correlation matrix that rounding left indefinite is repaired: eigenvalues below 0 become 0. Raises ValueError
+    without an `uncertainty`.
+    """
+    uncertainty = _uncertainty(table)
+    values, vectors = np.linalg.eigh(np.array(uncertainty.correlation_rows))
+    repaired = (vectors * np.maximum(values, 0.0)) @ vectors.T
+    # the correlation is that of the values, the covariance that of their factors: a negative value turns the sign
+    errors = np.array(uncertainty.standard_errors) * np.sign([_first(table, key) for key in uncertainty.parameters])
+    errors /= np.sqrt(np.diag(repaired))
+    return np.asarray(errors[:, None] * repaired * errors)
+
+
+def relative_spread(table: Mirror) -> float:
+    """Relative standard error of the slow gain (see `hysteresis.slow_gain`), to first order.
+
+    Raises ValueError without an `uncertainty`.
+    """
+    shares = np.array([_share_of_gain(table, place(table, key)) for key in _uncertainty(table).parameters])
+    return float(np.sqrt(shares @ relative_covariance(table) @ shares))
+
+
+def _uncertainty(table: Mirror) -> Uncertainty:
+    if table.uncertainty is None:
+        raise ValueError(
+            f'the mirror "{table.name}" has no table uncertainty, so nothing can be drawn; `microrad identify` writes '
+            "one into its mirror file"
+        )
+    return table.uncertainty
+
+
+def _values(table: Mirror, at: Place) -> tuple[float, ...]:
+    """The value at a place, or all items of its list."""
+    value = getattr(getattr(table, at.table), at.field)
+    return value if isinstance(value, tuple) else (value,)
+
+
+def _first(table: Mirror, key: str) -> float:
+    """The value of a parameter; of a list that scales together the first that is not 0."""
+    at = place(table, key)
+    values = _values(table, at)
+    return next(v for v in values if v) if at.item is None else values[at.item]
+
+
+def _share_of_gain(table: Mirror, at: Place) -> float:
+    """Relative change of the slow gain over that of a parameter."""
+    if at[:2] == ("bouc_wen", "d1_rad_v"):
+        return 1.0
+    if at[:2] != ("prandtl_ishlinskii", "weights_rad_v"):
+        return 0.0
+    weights = _values(table, at)
+    return 1.0 if at.item is None else weights[at.item] / sum(weights)
+
+
+# -------------------------------------------------------------------------------------------------------------- drawing
+def _root(covariance: Floats) -> Floats:
+    """A square root: covariance = root root'."""
+    values, vectors = np.linalg.eigh(covariance)
+    return np.asarray(vectors * np.sqrt(np.maximum(values, 0.0)))
+
+
+def _drawn(table: Mirror, places: list[Place], root: Floats, rng: np.random.Generator) -> Mirror:
+    refused: Counter[str] = Counter()
+    why: dict[str, str] = {}
+    for _ in range(TRIES):
+        factors = 1.0 + root @ rng.standard_normal(len(places))
+        faults = dict(_turned(table, factors))
+        if not faults:
+            moved = _moved(table, places, factors)
+            faults = dict(_faults(moved, places))
+            if not faults:
+                return moved
+        refused.update(faults.keys())
+        why = faults | why
+    key, times = refused.most_common(1)[0]
+    raise ValueError(
+        f'the uncertainty of the mirror "{table.name}" leaves no mirror: none of {TRIES} draws is one, {times} times '
+        f"because {key} {why[key]}; give smaller standard errors, or leave such a parameter out"
+    )
+
+
+def _moved(table: Mirror, places: list[Place], factors: Floats) -> Mirror:
+    """The mirror with its parameters multiplied, unchecked."""
+    values: dict[tuple[str, str], list[float]] = {}
+    for at, factor in zip(places, factors.tolist(), strict=True):
+        items = values.setdefault(at[:2], list(_values(table, at)))
+        for i in range(len(items)) if at.item is None else (at.item,):
+            items[i] *= factor
+    updates: dict[str, Table] = {}
+    for (name, field), items in values.items():
+        part = updates.get(name, getattr(table, name))
+        several = isinstance(getattr(part, field), tuple)
+        updates[name] = part.model_copy(update={field: tuple(items) if several else items[0]})
+    return table.model_copy(update={**updates, "uncertainty": None})
+
+
+def _turned(table: Mirror, factors: Floats) -> Iterator[tuple[str, str]]:
+    """Keys of values that would change their sign."""
+    keys = _uncertainty(table).parameters
+    return ((key, "would change its sign") for key, factor in zip(keys, factors, strict=True) if factor <= 0.0)
+
+
+def _faults(moved: Mirror, places: list[Place]) -> Iterator[tuple[str, str]]:
+    """What the checks of a mirror file would say of the tables that moved: key and reason."""
+    for name in dict.fromkeys(at.table for at in places):
+        part = getattr(moved, name)
+        for field, info in type(part).model_fields.items():
+            yield from ((f"{name}.{info.alias or field}", why) for why in _out_of_range(getattr(part, field), info))
+        yield from ((f"{name}.{problem.key}".rstrip("."), problem.reason) for problem in part.problems())
+
+
+def _out_of_range(value: float | tuple[float, ...] | None, info: FieldInfo) -> Iterator[str]:
+    """Why a value, written into a file, would be refused."""
+    rule = _rule(info)
+    if value is None or rule is None:
+        return
+    unit = rule.unit if isinstance(rule, Quantity) else rule.each.unit
+    items = [f"{v!r} {unit}" if unit else v for v in (value if isinstance(value, tuple) else (value,))]
+    try:
+        rule.read(items[0] if isinstance(rule, Quantity) else items)
+    except UnitError as error:
+        yield error.reason
+    except ProblemsError as error:
+        yield from (problem.reason for problem in error.problems)
+
+
+def _rule(info: FieldInfo) -> Quantity | Several | None:
+    """What a key may hold; of a key that may be left out it stands inside the annotation."""
+    inner = [m for kind in getattr(info.annotation, "__args__", ()) for m in getattr(kind, "__metadata__", ())]
+    return next((rule for rule in (*info.metadata, *inner) if isinstance(rule, Quantity | Several)), None)

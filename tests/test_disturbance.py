@@ -1,0 +1,593 @@
+"""Disturbances against closed forms, quadrature, folded spectra, seeded runs; and every refusal read."""
+
+from dataclasses import replace
+from functools import lru_cache
+from itertools import pairwise
+from math import inf, nan, pi, sqrt
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.integrate import quad, quad_vec, solve_ivp
+from scipy.linalg import expm
+from scipy.signal import welch
+
+from microrad import disturbance, lti
+from microrad.disturbance import (
+    MICIUS_EDGES_HZ,
+    MICIUS_RMS_RAD,
+    Disturbance,
+    Reference,
+    SpectralLine,
+    band_rms,
+    bands,
+    body_pointing,
+    combine,
+    discrete_psd,
+    discretise,
+    first_order,
+    fit_bands,
+    fit_table,
+    initial_state,
+    olympus,
+    one_input,
+    psd,
+    read_table,
+    table,
+    wheels,
+)
+
+URAD = 1e-6
+STEP_S = 5e-3
+
+
+def philox(seed):
+    return np.random.Generator(np.random.Philox(seed))
+
+
+def integral(function, low, high, points=()):
+    """Integral over frequency, split where the function turns."""
+    edges = [low, *sorted(p for p in points if low < p < high), high]
+    return sum(quad(function, a, b, epsabs=0.0, epsrel=1e-10, limit=400)[0] for a, b in pairwise(edges))
+
+
+def density(d):
+    return lambda f: psd(d, np.array([f]))[0]
+
+
+def resonance(freq_hz=7.0, damping=0.02, rms_rad=3 * URAD, name="resonance"):
+    """x'' + 2 z w x' + w^2 x driven by white noise, in real modal form, from its poles."""
+    w = 2 * pi * freq_hz
+    turn = w * sqrt(1 - damping**2)
+    A = np.array([[-damping * w, turn], [-turn, -damping * w]])
+    gain = sqrt(4 * damping * w**3) * rms_rad  # so that the variance gain^2 / (4 z w^3) is rms^2
+    return Disturbance(name, A, np.array([[1.0], [0.0]]), np.array([[0.0, -gain / turn]]), (), "test", "test")
+
+
+@lru_cache
+def micius():
+    return bands(MICIUS_EDGES_HZ, MICIUS_RMS_RAD, convention="per-axis", name="Micius", source="test")
+
+
+def mixture():
+    return combine(olympus(), micius(), resonance(), wheels(25.0, (1.0, 2.5), (1e-9, 4e-10), convention="per-axis"))
+
+
+# closed forms
+
+
+def test_olympus_has_15_853_urad_radial_and_half_its_power_on_each_axis():
+    axis = olympus()
+    assert_allclose(sqrt(2) * axis.rms_rad, sqrt(80 * pi) * URAD, rtol=1e-12)
+    assert_allclose(sqrt(2) * axis.rms_rad, 15.853 * URAD, rtol=5e-5)
+    f = np.array([0.0, 0.5, 1.0, 30.0])
+    assert_allclose(psd(axis, f), 80e-12 / (1 + f**2), rtol=1e-12)
+    assert_allclose(psd(olympus(convention="per-axis"), f), 160e-12 / (1 + f**2), rtol=1e-12)
+
+
+@pytest.mark.parametrize(("bandwidth_hz", "radial_urad"), [(10, 4.780), (100, 1.577), (500, 0.708)])
+def test_olympus_behind_a_first_order_loop_leaves_80_pi_over_1_plus_bandwidth(bandwidth_hz, radial_urad):
+    axis = density(olympus())
+    left = 2 * integral(lambda f: axis(f) * f**2 / (f**2 + bandwidth_hz**2), 0, inf, (1, bandwidth_hz))
+    assert_allclose(left, 80 * pi / (1 + bandwidth_hz) * URAD**2, rtol=1e-6)
+    assert_allclose(sqrt(left), radial_urad * URAD, rtol=5e-4)
+
+
+def test_body_pointing_is_maximally_flat_with_half_power_at_its_bandwidth():
+    body = body_pointing(300 * URAD, 3, 0.2)
+    f = np.array([0.0, 0.05, 0.2, 2.0])
+    flat = psd(body, f[:1])[0]
+    assert_allclose(psd(body, f), flat / (1 + (f / 0.2) ** 4), rtol=1e-9)
+    assert_allclose(body.rms_rad, 100 * URAD, rtol=1e-12)
+    assert_allclose(integral(density(body), 0, inf, (0.2, 2.0)), (100 * URAD) ** 2, rtol=1e-6)
+    radial = body_pointing(300 * URAD, 3, 0.2, convention="radial")
+    assert_allclose(radial.rms_rad, 100 * URAD / sqrt(2), rtol=1e-12)
+
+
+def test_the_variance_is_the_integral_of_the_density_and_half_the_squared_amplitudes():
+    d = mixture()
+    noise = integral(density(d), 0, inf, (0.5, 1, 5, 6.5, 7, 7.5, 10, 40, 100, 1000))
+    assert_allclose(d.variance_rad2, noise + 0.5 * sum(line.amplitude_rad**2 for line in d.lines), rtol=1e-7)
+    assert_allclose(resonance().rms_rad, 3 * URAD, rtol=1e-12)
+
+
+def test_the_rms_by_band_is_the_integral_over_the_band_with_its_lines():
+    edges = [0.0, 0.3, 6.9, 7.1, 25.0, 60.0, inf]
+    d = mixture()
+    squares = [integral(density(d), a, b, (1, 6, 8, 10, 40, 200)) for a, b in pairwise(edges)]
+    squares[4] += 0.5 * (25.0**2 * 1e-9) ** 2  # on the edge: in the band above it
+    squares[5] += 0.5 * (25.0**2 * 4e-10) ** 2
+    assert_allclose(band_rms(d, edges) ** 2, squares, rtol=1e-6)
+    lines_only = wheels(25.0, (1.0,), (1e-9,), convention="per-axis")
+    assert_allclose(band_rms(lines_only, [20.0, 30.0, 40.0]), [25.0**2 * 1e-9 / sqrt(2), 0.0], rtol=1e-12)
+
+
+def test_wheel_lines_grow_with_the_square_of_the_speed_at_multiples_of_it():
+    slow, fast = (wheels(speed, (1, 2.8), (1e-9, 2e-10), convention="per-axis") for speed in (20.0, 40.0))
+    assert [line.freq_hz for line in fast.lines] == [40.0, 112.0]
+    assert_allclose([line.amplitude_rad for line in fast.lines], [1600e-9, 320e-9], rtol=1e-12)
+    assert_allclose(fast.rms_rad, 4 * slow.rms_rad, rtol=1e-12)
+    radial = wheels(20.0, (1, 2.8), (1e-9, 2e-10), convention="radial")
+    assert_allclose(radial.variance_rad2, slow.variance_rad2 / 2, rtol=1e-12)
+
+
+# combination and spectral factor
+
+
+def test_combined_disturbances_add_their_densities_and_keep_their_lines_and_names():
+    parts = olympus(), resonance(), wheels(25.0, (1.0,), (1e-9,), convention="per-axis"), body_pointing(1e-4, 3, 0.1)
+    whole = combine(*parts)
+    f = np.geomspace(0.01, 300, 60)
+    assert_allclose(psd(whole, f), sum(psd(p, f) for p in parts), rtol=1e-10)
+    assert whole.lines == parts[2].lines
+    assert whole.name == "OLYMPUS + resonance + reaction wheel + body pointing"
+
+
+def test_pairs_of_states_begin_at_even_rows_whatever_the_order_of_the_parts():
+    parts = [
+        olympus(),
+        resonance(),
+        first_order(1e-12, 9.0, convention="radial"),
+        micius(),
+        body_pointing(1e-4, 3, 0.1),
+    ]
+    parts.append(first_order(1e-12, 3.0, convention="radial"))
+    parts.append(wheels(25.0, (1.0, 2.0, 3.0), (1e-9,) * 3, convention="per-axis"))
+    for order in (parts, parts[::-1]):
+        for Ad in (combine(*order).A, discretise(combine(*order), 2e-5).Ad):
+            i = np.arange(Ad.shape[0])
+            assert np.all(Ad[(i[:, None] != i) & (i[:, None] != i ^ 1)] == 0.0)
+            assert np.count_nonzero(Ad[i[:-1:2], i[1::2]]) >= 4
+
+
+def test_one_white_input_gives_the_same_spectrum_as_several():
+    several = combine(
+        olympus(), resonance(), body_pointing(1e-5, 3, 0.1), first_order(1e-13, 300.0, convention="radial")
+    )
+    one = one_input(replace(several, lines=(SpectralLine(1e-6, 5.0),)))
+    assert (several.B.shape[1], one.B.shape[1]) == (4, 1)
+    assert one.A.shape == several.A.shape
+    assert_allclose(psd(one, np.geomspace(1e-3, 1e4, 300)), psd(several, np.geomspace(1e-3, 1e4, 300)), rtol=1e-6)
+    assert_allclose(one.variance_rad2 - 0.5e-12, several.variance_rad2, rtol=1e-6)
+    assert one.lines == (SpectralLine(1e-6, 5.0),)
+    system = lti.StateSpace(one.A, one.B, one.C, np.zeros((1, 1)))
+    assert np.all(lti.zeros(system).real < 0.0)  # so that the filter has a stable inverse
+
+
+def test_a_spectrum_with_coinciding_poles_keeps_its_several_inputs():
+    twice = combine(olympus(), olympus())
+    assert one_input(twice) is twice
+    assert one_input(olympus()).B.shape == (1, 1)
+
+
+# sampled
+
+
+def folded(d, freq_hz, step_s, aliases=4000):
+    """Density of the samples: the continuous one folded about every multiple of half the sample rate."""
+    rate, k = 1 / step_s, np.arange(1, aliases)
+    total = psd(d, freq_hz)
+    for i, f in enumerate(freq_hz):
+        total[i] += np.sum(psd(d, k * rate - f)) + np.sum(psd(d, k * rate + f))
+    return total
+
+
+@pytest.mark.parametrize("step_s", [5e-3, 2e-2])
+def test_the_density_of_the_samples_is_the_folded_continuous_one(step_s):
+    for d in (olympus(), combine(olympus(), resonance(), micius())):
+        f = np.array([0.01, 0.1, 0.3, 0.45]) / step_s
+        sampled = discrete_psd(discretise(d, step_s), f, step_s)
+        assert_allclose(sampled, folded(d, f, step_s), rtol=2e-3)
+        assert sampled[-1] > 1.5 * psd(d, f[-1:])[0]  # most of it is folded near half the rate
+
+
+def test_noise_over_a_step_is_the_integral_of_the_impulse_responses():
+    d, step_s = combine(olympus(), resonance(40.0, 0.3), first_order(1e-12, 55.0, convention="radial")), 2e-2
+    discrete = discretise(d, step_s)
+
+    def rate(s):
+        shape = expm(d.A * s) @ d.B
+        return shape @ shape.T
+
+    expected = quad_vec(rate, 0, step_s, epsrel=1e-12)[0]
+    assert discrete.Bd.shape[1] == 4  # the resonance turns by five radians within a step and keeps both its directions
+    assert_allclose(discrete.Bd @ discrete.Bd.T, expected, rtol=1e-9, atol=1e-12 * np.max(expected))
+    assert_allclose(discrete.Ad, expm(d.A * step_s), rtol=1e-12)
+
+
+def test_a_filter_far_faster_than_the_step_is_white_at_the_samples():
+    d = combine(first_order(1e-12, 3e4, convention="radial"), resonance(2e4, 0.5))
+    discrete = discretise(d, 1e-2)  # exp(-A step) would be 1e818
+    assert_allclose((discrete.C @ discrete.Bd @ discrete.Bd.T @ discrete.C.T).item(), d.variance_rad2, rtol=1e-12)
+    assert np.max(np.abs(discrete.Ad)) < 1e-100
+
+
+@pytest.mark.parametrize("step_s", [2e-5, 2e-4, 5e-3])
+def test_the_variance_of_the_samples_is_exact_after_directions_of_noise_are_dropped(step_s):
+    for d in (olympus(), micius(), body_pointing(300 * URAD, 3, 0.05), combine(olympus(), micius(), resonance())):
+        discrete = discretise(d, step_s)
+        covariance = discrete.initial @ discrete.initial.T
+        assert_allclose((discrete.C @ covariance @ discrete.C.T).item(), d.variance_rad2, rtol=1e-9)
+        stays = discrete.Ad @ covariance @ discrete.Ad.T + discrete.Bd @ discrete.Bd.T
+        assert_allclose(stays, covariance, rtol=1e-7, atol=1e-9 * np.max(covariance))
+
+
+@pytest.mark.parametrize("step_s", [2e-5, 2e-4])
+def test_body_pointing_takes_one_random_number_a_step_and_keeps_its_density_below_a_tenth_of_the_rate(step_s):
+    body = body_pointing(300 * URAD, 3, 0.1)
+    discrete = discretise(body, step_s)
+    assert discrete.Bd.shape == (2, 1)
+    f = np.geomspace(1e-3, 0.1 / step_s, 50)
+    ratio = discrete_psd(discrete, f, step_s) / psd(body, f)
+    # what is lost of the noise within a step is (2 pi f step)^2 / 12 of the density: 3.3 % at a tenth of the rate
+    assert_allclose(1 - ratio, (2 * pi * f * step_s) ** 2 / 12, atol=1e-3)
+    assert 0.96 < ratio[-1] < 0.97
+
+
+def test_a_weak_fast_disturbance_survives_beside_a_strong_slow_one():
+    weak = resonance(200.0, 0.05, 0.02 * URAD)
+    discrete = discretise(combine(body_pointing(300 * URAD, 3, 0.1), weak), 2e-4)  # 4e-8 of the variance
+    f = np.array([190.0, 200.0, 210.0])
+    assert_allclose(discrete_psd(discrete, f, 2e-4), psd(weak, f), rtol=1e-2)
+
+
+def runs_of(discrete, runs, samples, seed):
+    """Outputs (runs, samples) of a seeded ensemble that begins stationary."""
+    rng = philox(seed)
+    states = discrete.Ad.shape[0]
+    phases = 2 * pi * rng.random((discrete.line_amplitude_rad.size, runs))
+    x = initial_state(discrete, rng.standard_normal((states, runs)), phases)
+    output = np.empty((samples, runs))
+    for k in range(samples):
+        output[k] = discrete.C[0] @ x
+        x = discrete.Ad @ x + discrete.Bd @ rng.standard_normal((discrete.Bd.shape[1], runs))
+    return output.T
+
+
+def test_the_spectrum_of_a_seeded_run_is_the_requested_one_within_its_statistical_interval():
+    d = combine(olympus(), micius(), resonance())
+    runs = 400
+    output = runs_of(discretise(d, STEP_S), runs, 2048, seed=3)
+    f, measured = welch(output, 1 / STEP_S, "hann", nperseg=2048, detrend=False)
+    measured = measured.mean(axis=0)
+    rows = np.searchsorted(f, [1.0, 2.0, 4.0, 10.0, 20.0, 40.0, 60.0, 80.0, 95.0])
+    ratio = measured[rows] / folded(d, f[rows], STEP_S)
+    assert np.all(np.abs(ratio - 1) < 4 / sqrt(runs))  # a bin of one run is exponentially distributed
+    many = np.arange(12, 1000, 6)  # far enough apart to be independent under a Hann window
+    mean = np.mean(measured[many] / discrete_psd(discretise(d, STEP_S), f[many], STEP_S))
+    assert abs(mean - 1) < 4 / sqrt(runs * many.size)
+
+
+def test_a_run_begins_and_stays_stationary():
+    d = combine(olympus(), resonance(), wheels(25.0, (1.0,), (5e-9,), convention="per-axis"))
+    runs = 4000
+    output = runs_of(discretise(d, STEP_S), runs, 41, seed=4)
+    for moment in (0, 1, 40):  # half of the 1.41 / sqrt(runs) of a variance would be the 1 sigma of an rms
+        assert abs(np.var(output[:, moment]) / d.variance_rad2 - 1) < 4 * sqrt(2 / runs)
+        assert abs(np.mean(output[:, moment])) < 4 * d.rms_rad / sqrt(runs)
+
+
+def test_sampled_wheel_lines_have_their_amplitude_and_frequency_at_any_length():
+    d = combine(olympus(), wheels(25.0, (1.0, 2.5), (1e-9, 4e-10), convention="per-axis"))
+    discrete = discretise(d, STEP_S)
+    x = initial_state(discrete, np.zeros(5), np.array([0.3, 2.0]))
+    x = np.linalg.matrix_power(discrete.Ad, 10**7) @ x
+    output = []
+    for _ in range(400):
+        output.append((discrete.C @ x).item())
+        x = discrete.Ad @ x
+    spectrum = 2 / 400 * np.abs(np.fft.rfft(output))
+    f = np.fft.rfftfreq(400, STEP_S)
+    assert f[spectrum > 1e-8].tolist() == [25.0, 62.5]
+    assert_allclose(spectrum[spectrum > 1e-8], [25.0**2 * 1e-9, 25.0**2 * 4e-10], rtol=1e-6)
+    assert discrete.Bd.shape == (5, 1)
+    assert np.all(discrete.Bd[:4] == 0.0)
+
+
+def test_a_line_begins_at_its_phase_and_lines_alone_need_no_noise():
+    discrete = discretise(wheels(10.0, (1.0,), (1e-8,), convention="per-axis"), STEP_S)
+    phases = np.array([[0.0, pi / 2, 1.0], [9.0, 9.0, 9.0]])  # the second row is not used
+    x = initial_state(discrete, np.zeros((2, 3)), phases)
+    assert_allclose((discrete.C @ x)[0], 1e-6 * np.sin(phases[0]), atol=1e-18)
+    after = (discrete.C @ discrete.Ad @ x)[0]
+    assert_allclose(after, 1e-6 * np.sin(2 * pi * 10 * STEP_S + phases[0]), atol=1e-18)
+    assert discrete.Bd.shape == (2, 0)
+
+
+def test_a_level_of_zero_is_a_disturbance_that_does_nothing():
+    nothing = first_order(0.0, 1.0, convention="radial")
+    assert nothing.variance_rad2 == 0.0
+    discrete = discretise(nothing, STEP_S)
+    assert discrete.Bd.shape == (1, 0)
+    assert np.all(discrete.initial == 0.0)
+
+
+# fits
+
+
+@pytest.mark.parametrize(("convention", "part"), [("per-axis", 1.0), ("radial", sqrt(0.5))])
+def test_the_micius_bands_are_met_with_one_white_input(convention, part):
+    fit = fit_bands(MICIUS_EDGES_HZ, MICIUS_RMS_RAD, convention=convention, name="Micius")
+    points = (0.1, 0.5, 2, 5, 20, 30, 70)
+    achieved = [sqrt(integral(density(fit.disturbance), a, b, points)) for a, b in pairwise(MICIUS_EDGES_HZ)]
+    assert_allclose(achieved, part * np.array(MICIUS_RMS_RAD), rtol=0.01)
+    assert_allclose(fit.achieved_rms_rad, achieved, rtol=1e-6)
+    assert_allclose(fit.requested_rms_rad, part * np.array(MICIUS_RMS_RAD), rtol=1e-12)
+    above = sqrt(integral(density(fit.disturbance), 100, inf, (300, 1000)))
+    assert_allclose(fit.outside_rms_rad, above, rtol=1e-4)
+    assert 0.0 < above < 0.35 * part * 0.6 * URAD
+    assert fit.disturbance.B.shape[1] == 1
+    assert "8.6 µrad for 8.6 µrad" in fit.disturbance.basis or convention == "radial"
+
+
+@pytest.mark.parametrize(
+    ("edges_hz", "rms_urad"),
+    [
+        ((0, 1, 10, 50, 100), (0.16, 0.26, 0.25, 0.28)),
+        ((1, 10, 100), (1, 1)),
+        ((0.1, 1, 5, 20, 100, 500, 2000), (5, 3, 4, 1, 2, 0.1)),
+    ],
+)
+def test_bands_that_rise_and_fall_are_met_within_5_percent(edges_hz, rms_urad):
+    d = bands(edges_hz, URAD * np.array(rms_urad), convention="per-axis")
+    assert_allclose(band_rms(d, edges_hz), URAD * np.array(rms_urad), rtol=0.05)
+
+
+def test_bands_that_no_filter_can_have_are_refused_with_the_band():
+    with pytest.raises(ValueError, match=r"times the given rms between 1 and 2 Hz, and 5 % is allowed"):
+        bands((0, 1, 2, 3), (1e-5, 1e-7, 1e-5), convention="radial")
+
+
+def peak(f, freq_hz, damping, height):
+    r = f / freq_hz
+    return height * (2 * damping) ** 2 / ((1 - r**2) ** 2 + (2 * damping * r) ** 2)
+
+
+def measured_spectrum(f):
+    """What an accelerometer might give: a slow floor, a lightly damped panel, white sensor noise."""
+    return 80e-12 / (1 + f**2) + peak(f, 37.0, 0.01, 3e-12) + 1e-14
+
+
+def test_a_table_of_a_first_order_spectrum_is_fitted_by_one_pole():
+    f = np.geomspace(0.01, 100, 60)
+    fit = fit_table(f, 160e-12 / (1 + f**2), convention="radial")
+    assert_allclose(np.linalg.eigvals(fit.disturbance.A), [-2 * pi], rtol=1e-2)
+    assert_allclose(fit.disturbance.rms_rad, olympus().rms_rad, rtol=1e-3)
+    assert_allclose(fit.edges_hz, [0.01, 0.1, 1, 10, 100], rtol=0.2)  # the rows nearest to the decades
+    assert_allclose(fit.requested_rms_rad, np.sqrt(80e-12 * np.diff(np.arctan(fit.edges_hz))), rtol=1e-2)
+
+
+def test_a_measured_spectrum_with_a_resonance_is_fitted_within_its_scatter():
+    f = np.arange(0.0, 400.0, 0.1)
+    scatter = philox(5).gamma(60, 1 / 60, f.size)  # a Welch estimate from 60 segments
+    rows = measured_spectrum(f) * scatter
+    rows[0] = 0.0  # the mean was taken off
+    fit = fit_table(f, rows, convention="per-axis", name="bench", source="accelerometer")
+    probe = np.array([0.3, 1.0, 5.0, 20.0, 36.0, 37.0, 38.0, 60.0, 200.0])
+    assert np.max(np.abs(10 * np.log10(psd(fit.disturbance, probe) / measured_spectrum(probe)))) < 1.0
+    assert_allclose(fit.achieved_rms_rad, fit.requested_rms_rad, rtol=0.05)
+    assert 0.0 < abs(fit.worst_db) < 2.0
+    poles = np.linalg.eigvals(fit.disturbance.A)
+    panel = poles[np.argmin(np.abs(np.abs(poles) / (2 * pi) - 37.0))]
+    assert_allclose(abs(panel) / (2 * pi), 37.0, rtol=5e-3)
+    assert_allclose(-panel.real / abs(panel), 0.01, rtol=0.2)
+    assert fit.disturbance.source == "accelerometer"
+    assert fit.disturbance.B.shape[1] == 1
+
+
+@pytest.mark.parametrize("rows", [9, 30])
+def test_no_resonance_hides_between_the_rows_of_a_coarse_table(rows):
+    f = np.geomspace(1, 100, rows)
+    step = np.where(f > 20, 1e-12 / 4, 1e-12)
+    fit = fit_table(f, step, convention="per-axis")
+    between = np.geomspace(1, 100, 2000)
+    assert np.max(np.abs(10 * np.log10(psd(fit.disturbance, between) / np.interp(between, f, step)))) < 3.0
+    given = sqrt(np.sum(np.diff(f) * (step[1:] + step[:-1]) / 2))
+    assert_allclose(np.linalg.norm(fit.achieved_rms_rad), given, rtol=0.05)
+
+
+def test_a_table_whose_rms_the_fit_misses_is_refused():
+    with pytest.raises(
+        ValueError, match=r"has 0\.8\d* times the rms of the table, and 10 % is allowed; give the table more"
+    ):
+        table(np.geomspace(1, 100, 4), [1e-14, 1e-14, 1e-14, 1e-12], convention="radial")
+
+
+def test_a_table_with_a_narrow_line_is_refused_with_its_frequency():
+    f = np.arange(0.1, 200, 0.1)
+    rows = measured_spectrum(f)
+    rows[829] *= 1e5
+    with pytest.raises(ValueError, match=r"dB below the table near 8\d\.?\d* Hz.*give narrow lines as spectral lines"):
+        table(f, rows, convention="radial")
+
+
+def test_a_table_that_falls_too_steeply_is_refused():
+    f = np.geomspace(0.1, 2000, 100)
+    with pytest.raises(ValueError, match=r"above the table near .*end the table where it falls faster than 1/f\^4"):
+        table(f, 1e-12 / (1 + (f / 30) ** 8), convention="radial")
+
+
+# tables
+
+
+def write(tmp_path, text, name="spectrum.csv"):
+    path = tmp_path / name
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+@pytest.mark.parametrize(
+    ("text", "scale"),
+    [
+        ("freq (Hz), psd (urad^2/Hz)\n1, 4\n2, 3\n5, 1e-1\n", 1e-12),
+        ("\ufefff_hz;S_µrad²/Hz\n1;4\n2;3\n5;0.1\n", 1e-12),
+        ("# base motion\n# Hz rad^2/Hz\n\n1 4\n2 3\n# end of the first day\n5 0.1\n", 1.0),
+        ("freq_hz\tpsd_nrad2_hz\n1\t4\n2\t3\n5\t.1\n", 1e-18),
+        ("Hz,mrad**2/Hz\r\n1,4\r\n2,3\r\n5,0.1\r\n", 1e-6),
+    ],
+)
+def test_a_table_is_read_in_the_unit_of_its_heading(tmp_path, text, scale):
+    f, rows = read_table(write(tmp_path, text))
+    assert f.tolist() == [1, 2, 5]
+    assert_allclose(rows, scale * np.array([4, 3, 0.1]), rtol=1e-12)
+
+
+def test_a_table_without_heading_is_read_in_the_given_unit(tmp_path):
+    f, rows = read_table(write(tmp_path, "0,4\n2,3\n5,0.1\n"), "urad^2/Hz")
+    assert f.tolist() == [0, 2, 5]
+    assert_allclose(rows, [4e-12, 3e-12, 1e-13], rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("text", "unit", "message"),
+    [
+        ("1,4\n2,3\n5,1\n", None, "no unit of the density is named; write one heading line"),
+        ("Hz, urad/sqrt(Hz)\n1,4\n2,3\n5,1\n", None, "no unit of the density is named"),
+        ("Hz, urad^2/Hz\n1,4\n2,3\n5,1\n", "rad^2/Hz", r"the units rad\^2/Hz and urad\^2/Hz are named"),
+        ("1,4\n2,3\n5,1\n", "urad", '"urad" is no unit of a density; say one of rad'),
+        ("kHz, urad^2/Hz\n1,4\n2,3\n5,1\n", None, 'the heading says "kHz"; give frequencies in Hz'),
+        ("rad/s, urad^2/Hz\n1,4\n2,3\n5,1\n", None, 'the heading says "rad/s"; give frequencies in Hz'),
+        ("Hz, urad^2/Hz\n1,4\n2,3,9\n5,1\n", None, "line 3: 3 columns; give two"),
+        ("Hz, urad^2/Hz\n1,4\n2\n5,1\n", None, "line 3: 1 columns; give two"),
+        ("Hz; urad^2/Hz\n1,5;4\n2;3\n5;1\n", None, 'line 2: "1,5;4" is not two numbers; decimals take a point'),
+        ("Hz, urad^2/Hz\n1,4\n\n2,nan\n5,1\n", None, "line 4: .* not finite; remove the row"),
+        ("Hz, urad^2/Hz\n1,4\n5,3\n5,1\n", None, "line 4: .* does not rise in frequency"),
+        ("Hz, urad^2/Hz\n1,4\n2,-3\n5,1\n", None, "line 3: .* has a negative density; give rad.*not decibels"),
+        ("Hz, urad^2/Hz\n-1,4\n2,3\n5,1\n", None, "line 2: .* has a negative frequency; give a one-sided"),
+        ("Hz, urad^2/Hz\n1,4\n2,3\n", None, "2 frequencies and 2 densities; give as many of both, three or more"),
+        ("Hz, urad^2/Hz\n", None, "0 frequencies and 0 densities"),
+    ],
+)
+def test_a_table_that_is_no_spectrum_is_refused_with_its_line(tmp_path, text, unit, message):
+    with pytest.raises(ValueError, match=rf"spectrum\.csv(, |: ){message}"):
+        read_table(write(tmp_path, text), unit)
+
+
+def test_a_table_that_cannot_be_read_is_refused(tmp_path):
+    with pytest.raises(ValueError, match=r"nowhere\.csv: there is no such file; check the path"):
+        read_table(tmp_path / "nowhere.csv")
+    (tmp_path / "image.csv").write_bytes(b"\x89PNG\xff\xfe\x00")
+    with pytest.raises(ValueError, match=r"image\.csv: the table cannot be read as text"):
+        read_table(tmp_path / "image.csv")
+
+
+def test_a_table_goes_from_file_to_fit(tmp_path):
+    f = np.geomspace(0.01, 100, 60)
+    lines = "\n".join(f"{x:.6e},{160 / (1 + x * x):.6e}" for x in f)
+    fit = fit_table(*read_table(write(tmp_path, "Hz,urad^2/Hz\n" + lines)), convention="radial")
+    assert_allclose(fit.disturbance.rms_rad, sqrt(40 * pi) * URAD, rtol=1e-3)
+
+
+# references
+
+
+def test_a_reference_is_point_ahead_the_lag_of_a_first_order_body_loop_and_a_sine():
+    reference = Reference(50 * URAD, 1e-3, 0.05, 10 * URAD, 2.0)
+    time = np.linspace(0, 12, 25)
+    body = solve_ivp(lambda t, e: 1e-3 - 2 * pi * 0.05 * e, (0, 12), [0.0], t_eval=time, rtol=1e-10, atol=1e-15)
+    assert_allclose(reference.at(time), 50e-6 + body.y[0] + 10e-6 * np.sin(4 * pi * time), rtol=1e-7)
+    assert reference.at(np.array([0.0]))[0] == 50 * URAD
+    steady = Reference(0.0, 1e-3, 0.05).at(np.array([1e3]))
+    assert_allclose(steady, 1e-3 / (2 * pi * 0.05), rtol=1e-12)
+
+
+# refusals
+
+FILTER = Disturbance("given", -np.eye(2), np.ones((2, 1)), np.ones((1, 2)), (), "test", "test")
+
+
+@pytest.mark.parametrize(
+    ("build", "message"),
+    [
+        (
+            lambda: first_order(-1e-12, 1, convention="radial"),
+            'level of "first order" is -1e-12 rad^2/Hz; give a finite',
+        ),
+        (lambda: first_order(nan, 1, convention="radial"), "is nan rad^2/Hz"),
+        (
+            lambda: first_order(1e-12, 0, convention="radial"),
+            'corner frequency of "first order" is 0 Hz; .* above zero',
+        ),
+        (lambda: first_order(1e-12, inf, convention="radial"), "is inf Hz"),
+        (
+            lambda: olympus(convention="both"),
+            'convention "both" of a spectrum is not known; say "radial" or "per-axis"',
+        ),
+        (lambda: body_pointing(-1e-4, 3, 1), "body pointing error is -0.0001 rad"),
+        (lambda: body_pointing(1e-4, 0, 1), "number of sigmas of the body pointing error is 0"),
+        (lambda: body_pointing(1e-4, 3, nan), "bandwidth of the body pointing error is nan Hz"),
+        (lambda: wheels(0, (1,), (1e-9,), convention="radial"), "speed of the wheel is 0 Hz"),
+        (lambda: wheels(9, (1, 2), (1e-9,), convention="radial"), "2 harmonics and 1 coefficients; give one of each"),
+        (lambda: wheels(9, (), (), convention="radial"), "0 harmonics and 0 coefficients"),
+        (lambda: wheels(9, (-1,), (1e-9,), convention="radial"), "harmonic of the wheel is -1 times the speed"),
+        (lambda: wheels(9, (2,), (-1,), convention="radial"), "coefficient of the wheel's harmonic 2 is -1 rad/Hz^2"),
+        (lambda: SpectralLine(nan, 1), "amplitude of a spectral line is nan rad"),
+        (lambda: SpectralLine(1e-6, 0), "frequency of a spectral line is 0 Hz"),
+        (
+            lambda: bands((0, 2, 1), (1, 1), convention="radial"),
+            "edges of the bands are .*; give two or more that rise",
+        ),
+        (lambda: bands((0, nan), (1,), convention="radial"), "edges of the bands are .*nan"),
+        (lambda: bands((-1, 2), (1,), convention="radial"), r"edges of the bands are \[-1.0, 2.0\] Hz"),
+        (lambda: bands((0, 1, 2), (1,), convention="radial"), "3 edges and 1 rms values; give finite edges, one more"),
+        (lambda: bands((0, 1, inf), (1, 1), convention="radial"), "3 edges and 2 rms values; give finite edges"),
+        (lambda: bands((0, 1, 2), (1, 0), convention="radial"), '"bands": rms between 1 and 2 Hz is 0 rad'),
+        (lambda: table([1, 2, 3], [1, -1, 1], convention="radial"), 'table", row 2: .* has a negative density'),
+        (lambda: table([1, 2, 3], [1, 0, 1], convention="radial"), "the density at 2 Hz is zero, which no filter has"),
+        (lambda: table([1, 2, 3], [1, 1], convention="radial"), "3 frequencies and 2 densities"),
+        (lambda: band_rms(olympus(), [1]), r"edges of the bands are \[1.0\] Hz"),
+        (lambda: band_rms(replace(FILTER, A=np.array([[-1.0, 1], [0, -1]])), [0, 1]), '"given": poles coincide'),
+        (combine, "no disturbance to combine; give one or more"),
+        (lambda: replace(FILTER, A=np.eye(2)), 'filter of "given": a pole has the real part 1 rad/s'),
+        (
+            lambda: replace(FILTER, A=np.zeros((2, 2))),
+            "a pole has the real part 0 rad/s, so its motion has no variance",
+        ),
+        (lambda: replace(FILTER, C=np.ones((2, 1))), r"A \(2, 2\), B \(2, 1\) and C \(2, 1\) do not fit together"),
+        (lambda: replace(FILTER, B=np.full((2, 1), nan)), "A, B or C holds a number that is not finite"),
+        (lambda: discretise(olympus(), 0.0), "step of a sampled disturbance is 0 s; give a finite number above zero"),
+        (lambda: discretise(olympus(), nan), "step of a sampled disturbance is nan s"),
+        (
+            lambda: discretise(replace(FILTER, lines=(SpectralLine(1, 50),)), 0.01),
+            "a line at 50 Hz cannot be sampled every",
+        ),
+        (
+            lambda: discrete_psd(discretise(olympus(), 0.01), np.array([51.0]), 0.01),
+            "has a density from 0 to 50 Hz only",
+        ),
+        (
+            lambda: initial_state(discretise(FILTER, 1.0), np.zeros(1), np.zeros(0)),
+            "needs 2 rows of normal numbers and 0",
+        ),
+        (lambda: Reference(nan, 0, 1), "point_ahead_rad of a pointing reference is nan; give a finite number"),
+        (lambda: Reference(0, 0, 0), "bandwidth of the body's loop in a pointing reference is 0 Hz"),
+        (lambda: Reference(0, 0, 1, 1e-6, -1), "frequency of the sine in a pointing reference is -1 Hz"),
+    ],
+)
+def test_what_makes_no_sense_is_refused_with_the_reason(build, message):
+    with pytest.raises(ValueError, match=message.replace("^", r"\^")):
+        build()
+
+
+def test_every_public_name_exists():
+    assert all(hasattr(disturbance, name) for name in disturbance.__all__)

@@ -1,0 +1,504 @@
+"""Closed loop, variances and margins against closed forms, simulation, scipy and python-control."""
+
+import math
+import re
+from dataclasses import replace
+from functools import partial
+
+import control as python_control
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.linalg import solve_discrete_lyapunov
+
+from design_plants import axis_plant
+from microrad import lti
+from microrad.control import analysis
+from microrad.control.problem import GAUGE, OPTICAL, RESIDUAL, AxisController, DesignPlant
+
+PERIOD = 2e-4
+near = partial(pytest.approx, abs=0.0, rel=1e-6)  # variances are far below the default of 1e-12
+
+
+def controller_of(A, B, C, D, name="test"):
+    """From plain lists; columns of B and D: optical, gauge."""
+    A, B, C, D = (np.array(m, dtype=float) for m in (A, B, C, D))
+    return AxisController(name, lti.StateSpace(A, B, C, D), np.zeros((A.shape[0], 1)))
+
+
+def integrator(step):
+    """v[k] = v[k-1] + step e[k]."""
+    return controller_of([[1.0]], [[step, 0.0]], [[1.0]], [[step, 0.0]], "integral")
+
+
+def pi(proportional, integral, period_s=PERIOD):
+    """Backward differences, on the optical sensor."""
+    step = integral * period_s
+    return controller_of([[1.0]], [[step, 0.0]], [[1.0]], [[proportional + step, 0.0]], "PI")
+
+
+def proportional(gain):
+    return controller_of(np.zeros((0, 0)), np.zeros((0, 2)), np.zeros((1, 0)), [[gain, 0.0]], "proportional")
+
+
+def both_sensors(plant, damping=-0.3):
+    """PI on the optical sensor and a high-passed gauge that damps."""
+    k = 1.0 / plant.gain_rad_v
+    step = 500.0 * PERIOD * k
+    return controller_of(
+        [[1.0, 0.0], [0.0, 0.6]],
+        [[step, 0.0], [0.0, 0.4]],
+        [[1.0, damping * k]],
+        [[0.1 * k + step, -damping * k]],
+        "dual",
+    )
+
+
+def pure_gain(period_s, rms_rad=1e-6, noise_rad=0.0):
+    """y[k+1] = gain v[k], nothing else."""
+    return axis_plant(
+        delay=0,
+        amplifier_hz=math.inf,
+        gauge=False,
+        noise_rad=noise_rad,
+        disturbance_rad=rms_rad,
+        corner_hz=1.0,
+        period_s=period_s,
+    )
+
+
+def simulate(plant, controller, white, burn):
+    """Difference equations of plant and controller, run by run: residual and command, shape (steps, runs)."""
+    p, c = plant.system, controller.system
+    x, xc = np.zeros((p.order, white.shape[2])), np.zeros((c.order, white.shape[2]))
+    residual, command = [], []
+    for w in white:
+        out = p.C @ x + p.D[:, 1:] @ w
+        m = out[[OPTICAL, GAUGE]]
+        v = c.C @ xc + c.D @ m
+        residual.append(out[RESIDUAL])
+        command.append(v[0])
+        x = p.A @ x + p.B[:, :1] @ v + p.B[:, 1:] @ w
+        xc = c.A @ xc + c.B @ m
+    return np.array(residual)[burn:], np.array(command)[burn:]
+
+
+def radius(plant, controller):
+    """Largest |z|, from the difference equations written out as one matrix."""
+    p, c = plant.system, controller.system
+    n = p.order
+    step = np.zeros((n + c.order, n + c.order))
+    for j in range(n + c.order):
+        x = np.eye(n + c.order)[j]
+        m = p.C[[OPTICAL, GAUGE]] @ x[:n]
+        v = c.C @ x[n:] + c.D @ m
+        step[:, j] = np.concatenate([p.A @ x[:n] + p.B[:, 0] * v, c.A @ x[n:] + c.B @ m])
+    return np.max(np.abs(np.linalg.eigvals(step)))
+
+
+def scaled(controller, factor):
+    s = controller.system
+    return replace(controller, system=lti.StateSpace(s.A, s.B, factor * s.C, factor * s.D))
+
+
+# ------------------------------------------------------------------------------------------------ variances
+
+
+@pytest.mark.parametrize("bandwidth_hz", [10.0, 100.0, 500.0])
+def test_a_first_order_loop_leaves_80_pi_over_1_plus_fb_of_olympus(bandwidth_hz):
+    period_s = 1e-6
+    plant = pure_gain(period_s, rms_rad=math.sqrt(80 * math.pi) * 1e-6)  # the radial spectrum 160/(1 + f^2) urad^2/Hz
+    share = 2 * math.pi * bandwidth_hz * period_s
+    found = analysis.h2(analysis.close(plant, integrator(share / plant.gain_rad_v)))[RESIDUAL].sum()
+    assert found == near(80 * math.pi / (1 + bandwidth_hz) * 1e-12, rel=0.6 * share + 1e-5)
+    a, b = math.exp(-2 * math.pi * period_s), 1 - share  # and the sampled loop in closed form
+    exact = 2 * 80 * math.pi * 1e-12 * (1 - a) / ((1 + b) * (1 - a * b))
+    assert found == near(exact, rel=1e-8)
+
+
+@pytest.mark.parametrize("share", [0.01, 0.3, 1.0, 1.9])
+def test_white_sensor_noise_through_a_first_order_loop(share):
+    plant = pure_gain(PERIOD, rms_rad=0.0, noise_rad=2e-6)
+    variance = analysis.h2(analysis.close(plant, integrator(share / plant.gain_rad_v)))
+    assert variance[RESIDUAL].sum() == near(4e-12 * share / (2 - share), rel=1e-12)
+    assert variance[OPTICAL].sum() == near(4e-12 * (share / (2 - share) + 1), rel=1e-12)
+    assert variance[analysis.COMMAND].sum() * plant.gain_rad_v**2 == near(variance[RESIDUAL].sum(), rel=1e-12)
+
+
+def test_variances_are_those_of_a_long_simulation():
+    plant = axis_plant(resonance=(900.0, 0.05), corner_hz=50.0)
+    controller = both_sensors(plant)
+    runs, steps, burn = 300, 900, 400
+    white = np.random.Generator(np.random.Philox(5)).standard_normal((steps, plant.disturbances + 2, runs))
+    residual, command = simulate(plant, controller, white, burn)
+    closed = analysis.h2(analysis.close(plant, controller))
+    for trace, output in ((residual, RESIDUAL), (command, analysis.COMMAND)):
+        squares = np.mean(trace**2, axis=0)  # one independent number a run
+        expected, error = closed[output].sum(), np.std(squares, ddof=1) / math.sqrt(runs)
+        print(f"simulated {np.mean(squares):.4e}, stationary {expected:.4e}, standard error {error:.1e}")
+        assert error < 0.03 * expected
+        assert abs(np.mean(squares) - expected) < 4 * error
+
+
+@pytest.mark.parametrize("corner_hz", [1e-3, 0.01, 0.1])
+def test_variances_are_those_of_scipy_even_for_time_constants_of_a_million_samples(corner_hz):
+    plant = axis_plant(resonance=(900.0, 0.005), corner_hz=corner_hz, disturbance_rad=1e-4)
+    closed = analysis.close(plant, both_sensors(plant))
+    slowest = np.max(np.abs(np.linalg.eigvals(closed.A)))
+    assert 1.0 - slowest == near(2 * math.pi * corner_hz * PERIOD, rel=1e-3)
+    covariance = solve_discrete_lyapunov(closed.A, closed.B @ closed.B.T)
+    expected = np.diag(closed.C @ covariance @ closed.C.T + closed.D @ closed.D.T)
+    assert_allclose(analysis.h2(closed).sum(axis=1), expected, rtol=1e-6)
+
+
+def test_a_gramian_sees_what_is_observed_only_after_many_samples():
+    n = 20
+    A = np.diag(np.ones(n - 1), -1) * 1.5 + 0.3 * np.eye(n)
+    Q = np.zeros((n, n))
+    Q[0, 0], Q[-1, -1] = 1.0, 1e-3
+    expected = solve_discrete_lyapunov(A.T, Q)
+    assert_allclose(analysis.gramian(A, Q), expected, rtol=1e-9, atol=1e-9 * np.max(expected))
+
+
+def test_variances_by_source_add_up_and_name_the_right_one():
+    plant = axis_plant(gauge_noise_rad=0.5e-6)
+    parts = analysis.by_source(plant, both_sensors(plant))
+    assert sum(parts.values()) == near(analysis.h2(analysis.close(plant, both_sensors(plant)))[RESIDUAL].sum())
+    louder = analysis.by_source(axis_plant(gauge_noise_rad=1e-6), both_sensors(plant))
+    assert louder["gauge noise"] == near(4 * parts["gauge noise"])
+    assert louder["optical noise"] == near(parts["optical noise"])
+    assert parts["gauge noise"] > 0.0
+    assert analysis.by_source(plant, pi(1e3, 5e6))["gauge noise"] == 0.0
+
+
+def test_an_undamped_disturbance_has_no_variance():
+    plant = pure_gain(PERIOD)
+    A = plant.system.A.copy()
+    A[-1, -1] = 1.0
+    drifting = replace(plant, system=replace(plant.system, A=A))
+    controller = integrator(0.1 / plant.gain_rad_v)
+    analysis.refuse_unstable(drifting, controller)  # the loop itself is stable
+    with pytest.raises(
+        ValueError, match=r"no stationary variance: a pole at \|z\| = 1\.0.*give the disturbance some damp"
+    ):
+        analysis.h2(analysis.close(drifting, controller))
+
+
+# ------------------------------------------------------------------------------------------------ the loop
+
+
+@pytest.mark.parametrize("resonance", [None, (900.0, 0.01)])
+def test_poles_are_those_of_the_difference_equations(resonance):
+    plant = axis_plant(resonance=resonance, lines=((87.0, 1e-6),), delay=2)
+    controller = both_sensors(plant)
+    found = analysis.loop_poles(plant, controller)
+    whole = np.linalg.eigvals(analysis.close(plant, controller).A)
+    assert radius(plant, controller) == near(np.max(np.abs(whole)), rel=1e-12)
+    assert whole.size - found.size == 3  # drift and line are not the loop's
+    for pole in found:
+        assert np.min(np.abs(whole - pole)) < 1e-6
+
+
+def test_the_loop_cut_at_the_command_is_what_comes_back_from_it():
+    plant = axis_plant(resonance=(900.0, 0.01))
+    controller = both_sensors(plant)
+    freq_hz = np.array([0.5, 30.0, 400.0, 899.0, 2400.0])
+    L = -lti.frequency_response(lti.series(plant.from_command, controller.system), freq_hz, PERIOD)[:, 0, 0]
+    assert_allclose(analysis.loop_response(plant, controller, freq_hz), L, rtol=1e-9)
+
+
+def test_the_loop_cut_at_the_optical_sensor_keeps_the_gauges_loop_closed():
+    plant = axis_plant(resonance=(900.0, 0.01))
+    controller = both_sensors(plant)
+    p, c = plant.system, controller.system
+    b, gauge = p.B[:, :1], p.C[GAUGE : GAUGE + 1]
+    cut = lti.StateSpace(
+        np.block([[p.A + b @ c.D[:, 1:] @ gauge, b @ c.C], [c.B[:, 1:] @ gauge, c.A]]),
+        np.vstack([b @ c.D[:, :1], c.B[:, :1]]),
+        -np.hstack([p.C[OPTICAL : OPTICAL + 1], np.zeros((1, c.order))]),
+        np.zeros((1, 1)),
+    )
+    freq_hz = np.array([0.5, 30.0, 400.0, 899.0, 2400.0])
+    expected = lti.frequency_response(cut, freq_hz, PERIOD)[:, 0, 0]
+    assert_allclose(analysis.loop_response(plant, controller, freq_hz, "optical"), expected, rtol=1e-8)
+    whole = analysis.loop_response(plant, controller, freq_hz)
+    assert np.all(np.abs(whole - expected)[2:] > 0.1 * np.abs(expected)[2:])
+
+
+def test_a_plant_that_is_not_in_blocks_has_the_same_loop():
+    plant = axis_plant(resonance=(900.0, 0.02))
+    s = plant.system
+    T = np.eye(s.order) + 0.1 * np.random.Generator(np.random.Philox(2)).normal(size=(s.order, s.order))
+    mixed = replace(plant, system=lti.StateSpace(np.linalg.solve(T, s.A @ T), np.linalg.solve(T, s.B), s.C @ T, s.D))
+    assert (analysis.moved(mixed).system.order, analysis.moved(plant).system.order) == (s.order, s.order - 1)
+    ours, theirs = (analysis.loop_margins(p, both_sensors(plant)) for p in (mixed, plant))
+    assert ours.modulus == near(theirs.modulus, rel=1e-6)
+    assert ours.disk == near(theirs.disk, rel=1e-6)
+    assert ours.bandwidth_hz == near(theirs.bandwidth_hz, rel=1e-3)
+
+
+def test_a_frequency_above_half_the_control_rate_is_refused():
+    plant = pure_gain(PERIOD)
+    assert analysis.loop_response(plant, integrator(1.0), np.array([2500.0])).shape == (1,)
+    with pytest.raises(ValueError, match=r"2600 Hz lies above half the control rate, 2500 Hz"):
+        analysis.loop_response(plant, integrator(1.0), np.array([100.0, 2600.0]))
+
+
+# ------------------------------------------------------------------------------------------------ margins
+
+
+PLAIN = axis_plant(gauge=False)
+LOOPS = {
+    "integral": (PLAIN, pi(0.0, 4e6)),
+    "PI": (PLAIN, pi(2e3, 9e6)),
+    "PI, three samples late": (axis_plant(gauge=False, delay=3), pi(500.0, 4e6)),
+    "resonance": (axis_plant(resonance=(900.0, 0.05)), pi(0.0, 5e6)),
+    "sharp resonance": (axis_plant(resonance=(700.0, 0.003)), pi(0.0, 3e5)),
+    "proportional": (PLAIN, proportional(1.3e4)),
+}
+
+
+def python_loop(plant, controller):
+    """The loop gain as python-control's own system, its numerator and denominator from roots."""
+    K = controller.system
+    K = lti.StateSpace(K.A, K.B[:, :1], K.C, K.D[:, :1])
+    s = analysis.moved(plant).from_command
+    G = lti.StateSpace(s.A, s.B, -s.C[:1], -s.D[:1])
+    return python_control.ss(*(getattr(lti.series(G, K), key) for key in "ABCD"), plant.period_s)
+
+
+@pytest.mark.parametrize("name", LOOPS)
+def test_margins_are_those_of_python_control(name):
+    plant, controller = LOOPS[name]
+    dense = analysis.around_poles(analysis.loop_poles(plant, controller), PERIOD, 1.02)
+    omega = 2 * math.pi * np.unique(np.concatenate([np.geomspace(0.1, 2499.999, 4000), dense]))
+    response = python_control.frd(python_loop(plant, controller), omega, smooth=True)
+    gain, phase, modulus, _, crossover, _ = python_control.stability_margins(response)
+    ours = analysis.loop_margins(plant, controller)
+    assert ours.gain_up == near(gain, rel=1e-3)
+    assert ours.gain_down == 0.0
+    assert ours.modulus == near(modulus, rel=1e-3)
+    assert ours.peak == near(1 / modulus, rel=1e-3)
+    assert math.degrees(ours.phase_rad) == near(phase, rel=1e-3)
+    assert ours.crossover_hz == near(crossover / (2 * math.pi), rel=1e-3)
+
+
+@pytest.mark.parametrize("name", LOOPS)
+def test_disk_margins_are_those_of_python_control(name):
+    plant, controller = LOOPS[name]
+    ours = analysis.loop_margins(plant, controller)
+    dense = analysis.around_poles(analysis.loop_poles(plant, controller), PERIOD, 1.05)
+    omega = 2 * math.pi * np.unique(np.concatenate([np.geomspace(0.1, 2499.9, 6000), dense]))
+    disk, gain_db, phase_deg = python_control.disk_margins(python_loop(plant, controller), omega)
+    assert ours.disk == near(disk, rel=1e-3)
+    assert 20 * math.log10(ours.disk_gain[1]) == near(gain_db, rel=1e-3)
+    assert ours.disk_gain[0] * ours.disk_gain[1] == near(1.0)
+    assert math.degrees(ours.disk_phase_rad) == near(phase_deg, rel=1e-3)
+
+
+@pytest.mark.parametrize("name", LOOPS)
+def test_gain_margins_are_where_the_loop_turns_unstable(name):
+    plant, controller = LOOPS[name]
+    limit = analysis.loop_margins(plant, controller).gain_up
+    assert radius(plant, scaled(controller, 0.999 * limit)) < 1.0 < radius(plant, scaled(controller, 1.001 * limit))
+
+
+def test_a_conditionally_stable_loop_has_a_gain_margin_downwards():
+    plant = axis_plant(gauge=False, amplifier_hz=math.inf, delay=0)
+    one = lti.StateSpace(np.eye(1), np.ones((1, 1)), np.array([[0.1]]), np.ones((1, 1)))  # 1 + 0.1 / (z - 1)
+    third = lti.StateSpace(np.eye(1), np.ones((1, 1)), np.array([[0.5]]), np.array([[0.5]]))  # 0.5 z / (z - 1)
+    s = lti.series(lti.series(one, one), third)
+    cubic = controller_of(
+        s.A, np.pad(s.B, ((0, 0), (0, 1))), s.C / plant.gain_rad_v, np.pad(s.D, ((0, 0), (0, 1))) / plant.gain_rad_v
+    )
+    found = analysis.loop_margins(plant, cubic)
+    assert 0.0 < found.gain_down < 1.0 < found.gain_up < math.inf
+    for limit, inside, outside in ((found.gain_down, 1.002, 0.998), (found.gain_up, 0.998, 1.002)):
+        assert radius(plant, scaled(cubic, inside * limit)) < 1.0 < radius(plant, scaled(cubic, outside * limit))
+
+
+def test_the_delay_margin_is_the_number_of_samples_that_the_loop_bears():
+    controller = pi(0.0, 2.5e6)
+    bears = analysis.loop_margins(axis_plant(gauge=False), controller).delay_s / PERIOD
+    print(f"delay margin {bears:.3f} samples")
+    assert 2.0 < bears < 40.0
+    later = [radius(axis_plant(gauge=False, delay=1 + n), controller) for n in (int(bears), int(bears) + 1)]
+    assert later[0] < 1.0 < later[1]
+
+
+def test_bandwidth_and_crossover_of_a_first_order_loop_in_closed_form():
+    share = 0.4
+    plant = pure_gain(PERIOD)
+    found = analysis.loop_margins(plant, integrator(share / plant.gain_rad_v))
+    angle = 2 * math.pi * PERIOD
+    assert found.bandwidth_hz == near(math.acos(1 - share / 2) / angle, rel=1e-3)
+    assert found.crossover_hz == near(math.acos(1 - share**2 / 2) / angle, rel=1e-3)
+    assert found.gain_up == near(2 / share, rel=1e-9)
+    assert found.peak == near(1 / (1 - share / 2), rel=1e-9)
+    assert found.peak_hz == near(2500.0, rel=1e-6)
+    assert found.phase_rad == near(math.pi / 2 - found.crossover_hz * angle / 2, rel=1e-3)
+
+
+def test_a_loop_without_gain_has_every_margin_and_no_reach():
+    plant = pure_gain(PERIOD)
+    found = analysis.loop_margins(plant, proportional(0.0))
+    assert (found.gain_up, found.phase_rad, found.delay_s) == (math.inf, math.inf, math.inf)
+    assert (found.modulus, found.disk, found.bandwidth_hz) == (1.0, 2.0, 0.0)
+    assert math.isnan(found.crossover_hz)
+    assert found.disk_gain == (0.0, math.inf)
+    assert found.disk_phase_rad == near(math.pi / 2)
+
+
+def test_two_sensors_report_the_worse_of_both_cuts():
+    plant = axis_plant(resonance=(900.0, 0.02))
+    controller = both_sensors(plant)
+    whole, optical = (analysis.margins_at(plant, controller, cut) for cut in analysis.BREAKS)
+    found = analysis.loop_margins(plant, controller)
+    assert abs(whole.modulus - optical.modulus) > 0.01
+    assert found.modulus == min(whole.modulus, optical.modulus)
+    assert found.disk == min(whole.disk, optical.disk)
+    assert found.delay_s == min(whole.delay_s, optical.delay_s)
+    assert found.bandwidth_hz == optical.bandwidth_hz != whole.bandwidth_hz
+    single = pi(0.0, 2e6)
+    assert analysis.loop_margins(plant, single) == analysis.margins_at(plant, single)
+
+
+def test_the_peak_is_the_largest_rejection_of_the_disturbance():
+    """A sine on the line of sight, against the closed loop's own response from it to the residual."""
+    plant = axis_plant(resonance=(900.0, 0.02))
+    controller = both_sensors(plant)
+    found = analysis.loop_margins(plant, controller)
+    closed = analysis.close(plant, controller)
+    freq_hz = np.linspace(1.0, 2499.0, 20000)
+    shaped = lti.frequency_response(closed, freq_hz, PERIOD)[:, RESIDUAL, 0]
+    own = lti.frequency_response(plant.system, freq_hz, PERIOD)[:, RESIDUAL, 1]
+    rejection = np.abs(shaped / own)
+    assert found.peak == near(np.max(rejection), rel=1e-3)
+    assert found.peak_hz == near(freq_hz[np.argmax(rejection)], abs=2.0)
+    assert found.bandwidth_hz == near(freq_hz[np.argmax(rejection >= 1.0)], rel=2e-3)
+
+
+# ------------------------------------------------------------------------------------------------ two axes
+
+
+SATELLITE = lti.StateSpace(
+    np.array([[0.0, 10], [-10, 0]]), np.eye(2), np.array([[1.0, 10], [-10, 1]]), np.zeros((2, 2))
+)
+"""The spinning satellite of Seiler, Packard and Gahinet, under the feedback [[1, -2], [0, 1]]."""
+
+
+def test_the_spinning_satellite_has_its_published_multiloop_margin():
+    freq_hz = np.concatenate([[1e-6], np.geomspace(1e-3, 1e3, 4001)])
+    L = lti.frequency_response(SATELLITE, freq_hz) @ np.array([[1.0, -2.0], [0.0, 1.0]])
+    found = analysis.multiloop_disk_margin(freq_hz, L)
+    assert found.disk == near(0.3754, rel=3e-3)  # published from bounds 0.2 % apart
+    assert math.degrees(found.disk_phase_rad) == near(21.26, rel=3e-3)
+    assert 20 * math.log10(found.disk_gain[1]) == near(3.30, rel=3e-3)
+    assert found.freq_hz < 1e-3
+
+
+def test_loops_that_do_not_know_each_other_have_the_margin_of_the_worse_one():
+    freq_hz = np.geomspace(1.0, 2500.0, 4000)
+    controllers = [pi(0.0, 4e6), pi(2e3, 9e6)]
+    loops = [analysis.loop_response(PLAIN, c, freq_hz) for c in controllers]
+    L = np.zeros((freq_hz.size, 2, 2), dtype=complex)
+    L[:, 0, 0], L[:, 1, 1] = loops
+    worse = min(analysis.loop_margins(PLAIN, c).disk for c in controllers)
+    assert analysis.multiloop_disk_margin(freq_hz, L).disk == near(worse, rel=1e-4)
+    L[:, 0, 1] = 5.0 * loops[0]  # a triangular coupling does not change what each loop bears
+    assert analysis.multiloop_disk_margin(freq_hz, L).disk == near(worse, rel=1e-4)
+    L[:, 1, 0] = 0.1 * loops[1]
+    assert analysis.multiloop_disk_margin(freq_hz, L).disk < 0.95 * worse
+
+
+def test_the_multiloop_margin_is_the_least_pair_of_changes_that_makes_the_loop_singular():
+    """Both changes (1 + a u/2) / (1 - a u/2) with |u| = 1, by brute force over their phases, at one frequency."""
+    rng = np.random.Generator(np.random.Philox(3))
+    for _ in range(20):
+        L = rng.normal(size=(2, 2)) + 1j * rng.normal(size=(2, 2))
+        found = analysis.multiloop_disk_margin(np.array([1.0]), L[None]).disk
+        M = np.linalg.inv(np.eye(2) + L) - 0.5 * np.eye(2)
+        phases = np.exp(1j * np.linspace(0, 2 * math.pi, 4001))
+        sizes = [np.max(np.abs(np.linalg.eigvals(np.diag([1.0, u]) @ M))) for u in phases]
+        assert found == near(1.0 / max(sizes), rel=1e-5)
+        at = np.diag([1.0, phases[np.argmax(sizes)]]) @ M
+        u = np.array([1.0, phases[np.argmax(sizes)]]) * np.exp(-1j * np.angle(_largest(np.linalg.eigvals(at))))
+        for factor, singular in ((1.0, True), (0.8, False)):
+            change = (1 + 0.5 * factor * found * u) / (1 - 0.5 * factor * found * u)
+            smallest = np.min(np.abs(np.linalg.eigvals(np.eye(2) + L @ np.diag(change))))
+            assert (smallest < 2e-3) == singular
+
+
+def _largest(values):
+    return values[np.argmax(np.abs(values))]
+
+
+def test_a_loop_of_another_shape_is_refused():
+    with pytest.raises(ValueError, match=r"shape \(5, 3, 3\) is not two loops at 5 frequencies"):
+        analysis.multiloop_disk_margin(np.arange(5.0), np.zeros((5, 3, 3), dtype=complex))
+
+
+# ------------------------------------------------------------------------------------------------ refusals
+
+
+def test_an_unstable_loop_is_refused_with_pole_frequency_and_modulus():
+    plant = pure_gain(PERIOD)
+    controller = integrator(2.5 / plant.gain_rad_v)  # pole at 1 - 2.5, L = -1.25 at half the rate
+    with pytest.raises(
+        ValueError, match=r"'integral'.*unstable: a pole at \|z\| = 1\.500000 \(the limit is 1\)"
+    ) as read:
+        analysis.loop_margins(plant, controller)
+    assert "2500 Hz, at a control period of 0.0002 s" in str(read.value)
+    assert "modulus min |1 + L| of 0.25; lower its gains" in str(read.value)
+    analysis.refuse_unstable(plant, integrator(1.99 / plant.gain_rad_v))
+
+
+@pytest.mark.parametrize(
+    ("change", "reason"),
+    [
+        ({"D": np.array([[math.nan, 0.0]])}, "D holds a number that is not finite; look for a gain"),
+        ({"A": np.array([[math.inf]])}, "A holds a number that is not finite"),
+        ({"B": np.ones((1, 1))}, "B has shape (1, 1), not (1, 2): a controller of one axis has the inputs optical and"),
+        ({"C": np.ones((2, 1))}, "C has shape (2, 1), not (1, 1)"),
+        ({"D": np.ones((2, 2))}, "D has shape (2, 2), not (1, 2)"),
+    ],
+)
+def test_a_controller_that_does_not_fit_is_refused(change, reason):
+    controller = integrator(1.0)
+    wrong = replace(controller, system=replace(controller.system, **change))
+    with pytest.raises(ValueError, match=re.escape(f"controller 'integral': {reason}")):
+        analysis.close(pure_gain(PERIOD), wrong)
+
+
+def test_an_anti_windup_column_that_does_not_fit_is_refused():
+    for column, reason in ((np.zeros((2, 1)), "shape (2, 1), not (1, 1)"), (np.full((1, 1), math.nan), "not finite")):
+        with pytest.raises(ValueError, match="anti-windup .*" + re.escape(reason)):
+            analysis.refuse_misfit(pure_gain(PERIOD), replace(integrator(1.0), anti_windup=column))
+
+
+def test_a_controller_of_another_rate_is_refused():
+    analysis.refuse_misfit(pure_gain(PERIOD), integrator(1.0), period_s=PERIOD)
+    with pytest.raises(
+        ValueError, match=r"made for a period of 0\.0001 s, the plant is sampled every 0\.0002 s: design"
+    ):
+        analysis.refuse_misfit(pure_gain(PERIOD), integrator(1.0), period_s=1e-4)
+
+
+def test_a_plant_without_delay_is_refused():
+    plant = pure_gain(PERIOD)
+    D = plant.system.D.copy()
+    D[OPTICAL, 0] = 1e-4
+    quick = DesignPlant(PERIOD, replace(plant.system, D=D), 1, 1e-4)
+    with pytest.raises(ValueError, match="answers the command of its own sample: give it its delay"):
+        analysis.close(quick, integrator(1.0))
+
+
+def test_a_transfer_function_that_needs_the_future_is_refused():
+    analysis.refuse_improper((1.0, 2.0), (3.0, 1.0), "lead")
+    analysis.refuse_improper((0.0, 1.0, 2.0), (3.0, 1.0), "leading zeros do not count")
+    with pytest.raises(
+        ValueError, match=r"lead is not causal: a numerator of order 3 over .* order 1 .* add 2 or more"
+    ):
+        analysis.refuse_improper((1.0, 0.0, 0.0, 2.0), (3.0, 1.0), "lead")
+    with pytest.raises(ValueError, match="lead: the denominator is zero"):
+        analysis.refuse_improper((1.0,), (0.0, 0.0), "lead")

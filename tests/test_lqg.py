@@ -1,0 +1,320 @@
+"""LQG against scalar Riccati equations by hand, scipy's solvers, the separation principle and clipped simulation."""
+
+import math
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.linalg import block_diag, solve_discrete_are, solve_discrete_lyapunov
+
+from design_plants import axis_plant
+from microrad import lti
+from microrad.control import analysis, lqg
+from microrad.control.lqg import LQG, Weights
+from microrad.control.problem import GAUGE, OPTICAL, RESIDUAL, AxisController
+
+PERIOD = 2e-4
+near = partial(pytest.approx, abs=0.0, rel=1e-6)  # variances are far below the default of 1e-12
+EXACT = Weights(command=1e-9, sensor_noise=1.0, command_noise_v=0.0, walk=0.0)
+PLAIN = Weights(command=1e-2, sensor_noise=1.0, command_noise_v=1e-3)
+FULL = axis_plant(resonance=(900.0, 0.02), lines=((87.0, 2e-6),))
+
+
+def residual_variance(plant, controller):
+    return analysis.h2(analysis.close(plant, controller))[RESIDUAL].sum()
+
+
+def augmented(plant):
+    """States and last command, driven by increments of the command."""
+    s, n = plant.system, plant.system.order
+    A = np.block([[s.A, s.B[:, :1]], [np.zeros((1, n)), np.ones((1, 1))]])
+    return A, np.vstack([s.B[:, :1], [[1.0]]]), np.append(s.C[RESIDUAL], 0.0)[None]
+
+
+def in_microradians(plant):
+    """The same plant with its outputs in urad."""
+    s = plant.system
+    return replace(plant, system=replace(s, C=1e6 * s.C, D=1e6 * s.D), gain_rad_v=1e6 * plant.gain_rad_v)
+
+
+def simulate(plant, controller, white, disturbance, limit=math.inf, windup=True):
+    """Difference equations with a clipped command and an added error: residual, command, innovation of the observer."""
+    p, c = plant.system, controller.system
+    L = controller.anti_windup[:, 0] if windup else np.zeros(c.order)
+    x, xc, residual, command, states = np.zeros(p.order), np.zeros(c.order), [], [], []
+    for w, d in zip(white, disturbance, strict=True):
+        out = p.C @ x + p.D[:, 1:] @ w + d * np.array([1.0, 1.0, 0.0])
+        m = out[[OPTICAL, GAUGE]]
+        asked = float((c.C @ xc + c.D @ m)[0])
+        v = min(max(asked, -limit), limit)
+        residual.append(out[RESIDUAL])
+        command.append(v)
+        states.append(m - p.C[[OPTICAL, GAUGE]] @ xc[: p.order])
+        x = p.A @ x + p.B[:, 0] * v + p.B[:, 1:] @ w
+        xc = c.A @ xc + c.B @ m + L * (v - asked)
+    return np.array(residual), np.array(command), np.array(states)
+
+
+# ------------------------------------------------------------------------------------------------ the optimum
+
+
+@pytest.mark.parametrize("noise_rad", [0.1e-6, 1e-6, 20e-6])
+@pytest.mark.parametrize("corner_hz", [1.0, 100.0])
+def test_a_scalar_loop_reaches_the_prediction_error_of_its_riccati_equation(noise_rad, corner_hz):
+    """y[k+1] = g v[k]: what is left is the error of predicting d one sample ahead, p = a^2 p r / (p + r) + q."""
+    plant = axis_plant(delay=0, amplifier_hz=math.inf, gauge=False, noise_rad=noise_rad, corner_hz=corner_hz)
+    a, r = math.exp(-2 * math.pi * corner_hz * PERIOD), noise_rad**2
+    q = 11.2e-6**2 * (1 - a**2)
+    half = 0.5 * (r * (1 - a**2) - q)
+    p = -half + math.sqrt(half**2 + q * r)
+    assert p == near(a**2 * p * r / (p + r) + q)
+    controller = lqg.lqg_controller(plant, EXACT)
+    assert residual_variance(plant, controller) == near(p, rel=1e-4)
+    weighted = lqg.lqg_controller(plant, replace(EXACT, command=0.3))
+    assert residual_variance(plant, weighted) > 1.0005 * p
+    misled = lqg.lqg_controller(plant, replace(EXACT, sensor_noise=4.0))
+    assert residual_variance(plant, misled) > 1.00001 * p
+
+
+@pytest.mark.parametrize("weight", [1e-4, 1e-2, 1.0])
+@pytest.mark.parametrize("gauge", [True, False])
+def test_the_cost_is_that_of_the_separation_principle(weight, gauge):
+    """tr(M W) + G' P G (b' X b + weight), X and P from scipy, M = X - X b (b' X b + weight)^-1 b' X."""
+    plant = axis_plant(resonance=(900.0, 0.02), gauge=gauge, corner_hz=20.0, lines=((87.0, 2e-6),))
+    plant = in_microradians(plant)  # scipy's solution loses the optimum's digits when it is given radians
+    s, rho = plant.system, weight * plant.gain_rad_v**2
+    A, b, c = augmented(plant)
+    X = solve_discrete_are(A, b, c.T @ c, np.array([[rho]]))
+    seen = [OPTICAL, GAUGE] if gauge else [OPTICAL]
+    W = s.B[:, 1:] @ s.B[:, 1:].T
+    P = solve_discrete_are(s.A.T, s.C[seen].T, W, s.D[seen, 1:] @ s.D[seen, 1:].T)
+    W, P = block_diag(W, 0.0), block_diag(P, 0.0)
+    size = (b.T @ X @ b)[0, 0] + rho
+    G = b.T @ X / size
+    optimum = np.trace((X - X @ b @ G) @ W) + size * (G @ P @ G.T)[0, 0]
+    controller = lqg.lqg_controller(plant, replace(EXACT, command=weight))
+    assert cost(plant, controller, rho) == near(optimum, rel=2e-4)
+    for other in (0.5 * weight, 2.0 * weight):
+        assert cost(plant, lqg.lqg_controller(plant, replace(EXACT, command=other)), rho) > optimum * (1 + 1e-6)
+
+
+def cost(plant, controller, rho):
+    """Variance of the residual plus rho times that of the command's increments."""
+    closed = analysis.close(plant, controller)
+    P = solve_discrete_lyapunov(closed.A, closed.B @ closed.B.T)
+    c, d = closed.C[analysis.COMMAND], closed.D[analysis.COMMAND]
+    size, next_one = c @ P @ c + d @ d, c @ (closed.A @ P @ c + closed.B @ d)
+    return closed.C[RESIDUAL] @ P @ closed.C[RESIDUAL] + rho * 2.0 * (size - next_one)
+
+
+def test_no_pi_on_a_fine_grid_beats_it():
+    plant = axis_plant(gauge=False)
+    best = math.inf
+    for integral in np.geomspace(1e6, 2e7, 25):
+        for proportional in np.geomspace(1e2, 1e4, 15):
+            step = integral * PERIOD
+            s = lti.StateSpace(
+                np.ones((1, 1)), np.array([[step, 0.0]]), np.ones((1, 1)), np.array([[proportional + step, 0.0]])
+            )
+            pi = AxisController("PI", s, np.zeros((1, 1)))
+            if abs(analysis.loop_poles(plant, pi)[0]) < 1.0:
+                best = min(best, residual_variance(plant, pi))
+    ours = residual_variance(plant, lqg.lqg_controller(plant, EXACT))
+    print(f"PI {1e6 * math.sqrt(best):.3f} urad, LQG {1e6 * math.sqrt(ours):.3f} urad")
+    assert 0.3 * best < ours < best
+
+
+def test_the_gauge_helps_where_the_command_is_noisy():
+    s = FULL.system
+    B = np.hstack([s.B[:, :2], 0.02 * s.B[:, :1], s.B[:, 2:]])  # one more disturbance, on the command
+    shaken = replace(FULL, system=replace(s, B=B, D=np.insert(s.D, 2, 0.0, axis=1)), disturbances=FULL.disturbances + 1)
+    blind = replace(shaken, has_gauge=False)
+    with_gauge, without = (lqg.lqg_controller(p, EXACT) for p in (shaken, blind))
+    assert np.all(without.system.D[:, 1] == 0.0)
+    assert np.all(without.system.B[:, 1] == 0.0)
+    assert with_gauge.system.D[0, 1] != 0.0
+    assert residual_variance(shaken, with_gauge) < 0.95 * residual_variance(shaken, without)
+
+
+def test_noise_that_comes_late_is_noise_all_the_same():
+    """The optical sensor's reading one sample late, noise included: nothing of it is in the sample itself."""
+    plain = axis_plant(gauge=False)
+    s, n = plain.system, plain.system.order
+    A, B = np.pad(s.A, ((0, 1), (0, 1))), np.vstack([s.B, s.D[OPTICAL]])
+    A[n, :n] = s.C[OPTICAL]
+    C, D = np.pad(s.C, ((0, 0), (0, 1))), s.D.copy()
+    C[OPTICAL], D[OPTICAL] = np.eye(n + 1)[n], 0.0
+    late = replace(plain, system=lti.StateSpace(A, B, C, D))
+    later = axis_plant(gauge=False, delay=2)  # a sample of delay is the same wherever it is
+    ours, theirs = (residual_variance(p, lqg.lqg_controller(p, EXACT)) for p in (late, later))
+    assert ours == near(theirs, rel=1e-3)
+    assert ours > 1.05 * residual_variance(plain, lqg.lqg_controller(plain, EXACT))
+    for ours, theirs in zip(LQG.parameters(late), LQG.parameters(plain), strict=True):
+        assert (ours.least, ours.most) == near((theirs.least, theirs.most))
+
+
+# ------------------------------------------------------------------------------------------------ equations
+
+
+def test_riccati_solutions_are_those_of_scipy():
+    rng = np.random.Generator(np.random.Philox(4))
+    for n, m in ((1, 1), (4, 1), (9, 2), (16, 2)):
+        A = rng.normal(size=(n, n)) * 1.2 / math.sqrt(n)
+        B, C = rng.normal(size=(n, m)), rng.normal(size=(2, n))
+        R = np.diag(rng.uniform(0.01, 2.0, m))
+        expected = solve_discrete_are(A, B, C.T @ C, R)
+        assert_allclose(lqg.riccati(A, B, C.T @ C, R, ""), expected, rtol=1e-7, atol=1e-8 * np.max(expected))
+
+
+def test_the_filter_gain_takes_noise_that_sensor_and_states_share():
+    rng = np.random.Generator(np.random.Philox(6))
+    A, C = 0.4 * rng.normal(size=(5, 5)), rng.normal(size=(2, 5))
+    noise, seen_noise = rng.normal(size=(5, 4)), rng.normal(size=(2, 4))
+    Q, N, R = noise @ noise.T, noise @ seen_noise.T, seen_noise @ seen_noise.T
+    P = solve_discrete_are(A.T, C.T, Q, R, s=N)
+    expected = (A @ P @ C.T + N) @ np.linalg.inv(C @ P @ C.T + R)
+    assert_allclose(lqg.filter_gain(A, noise, C, seen_noise), expected, rtol=1e-8, atol=1e-10)
+
+
+def test_the_regulator_is_that_of_scipy_on_the_whole_system():
+    model = lqg.observed(FULL, replace(EXACT, command=0.1))
+    A, b, c = augmented(FULL)
+    rho = 0.1 * FULL.gain_rad_v**2
+    X = solve_discrete_are(A, b, 1e12 * c.T @ c, np.array([[1e12 * rho]])) / 1e12
+    expected = b.T @ X / (b.T @ X @ b + rho)
+    assert_allclose(lqg.regulator_gain(model, rho), expected, rtol=1e-5, atol=1e-7)
+
+
+def test_an_undamped_line_needs_no_damping():
+    """No pole of the disturbance has to be moved: the limit of ever less damping, where the Riccati equation ends."""
+    s = FULL.system
+    line = slice(s.order - 2, s.order)
+
+    def damped(radius):
+        A = s.A.copy()
+        A[line, line] *= radius / math.sqrt(np.linalg.det(A[line, line]))
+        return replace(FULL, system=replace(s, A=A))
+
+    undamped = lqg.lqg_controller(damped(1.0), PLAIN)
+    near = lqg.lqg_controller(damped(1.0 - 1e-7), PLAIN)
+    far = lqg.lqg_controller(damped(1.0 - 1e-2), PLAIN)
+    freq_hz = np.array([10.0, 86.0, 300.0])
+    there, close, away = (lti.frequency_response(c.system, freq_hz, PERIOD) for c in (undamped, near, far))
+    assert_allclose(there, close, rtol=1e-4)
+    assert np.max(np.abs(away / there - 1)) > 0.05
+    analysis.refuse_unstable(FULL, undamped)
+    w = np.exp(2j * math.pi * 87.0 * PERIOD * math.sqrt(1 - 1e-6))
+    assert np.min(np.abs(np.linalg.eigvals(s.A[line, line]) / 1.0 - 0.99989 * w)) < 1e-3  # that is where the line is
+    deep = np.abs(1 + analysis.loop_response(FULL, undamped, np.array([80.0, 87.0]), "optical"))
+    assert deep[1] > 3.0 * deep[0]
+
+
+def test_equations_without_a_solution_are_refused():
+    unseen = np.diag([1.1, 0.5])
+    with pytest.raises(
+        ValueError, match="no stabilising solution: the sensors do not see every state that drifts; add"
+    ):
+        lqg.filter_gain(unseen, np.eye(2, 3), np.array([[0.0, 1.0]]), np.array([[0.0, 0.0, 1.0]]))
+    with pytest.raises(ValueError, match="the disturbance grows faster than the loop settles"):
+        lqg.stein(np.array([[0.5]]), np.array([[2.1]]), np.ones((1, 1)))
+    assert lqg.stein(np.array([[0.5]]), np.array([[1.5]]), np.ones((1, 1)))[0, 0] == near(4.0)
+
+
+def test_a_plant_without_optical_sensor_is_refused():
+    with pytest.raises(ValueError, match=r"LQG needs the optical sensor: .*; add one, or close the loop on the gauge"):
+        LQG.parameters(replace(FULL, has_optical=False))
+
+
+@pytest.mark.parametrize("change", [{"command": 0.0}, {"sensor_noise": -1.0}, {"command": math.nan}])
+def test_weights_without_an_optimum_are_refused(change):
+    with pytest.raises(ValueError, match=r"LQG: a command weight of .* have no optimum: both have to be above 0"):
+        lqg.lqg_controller(FULL, replace(PLAIN, **change))
+
+
+# ------------------------------------------------------------------------------------------------ as a controller
+
+
+@pytest.mark.parametrize("plant", [FULL, axis_plant(gauge=False, delay=3), axis_plant(corner_hz=1e-2, noise_rad=0.0)])
+def test_it_is_stable_and_drives_a_constant_error_to_zero(plant):
+    controller = lqg.lqg_controller(plant, PLAIN)
+    margins = analysis.loop_margins(plant, controller)
+    assert margins.modulus > 0.3
+    low = np.abs(1 + analysis.loop_response(plant, controller, np.array([1e-3, 1e-4]), "optical"))
+    assert low[1] / low[0] == near(10.0, rel=0.05)
+    without = lqg.lqg_controller(plant, replace(PLAIN, walk=0.0))
+    low = np.abs(1 + analysis.loop_response(plant, without, np.array([1e-3, 1e-5]), "optical"))
+    assert low[1] / low[0] < 20.0
+
+
+def test_the_walk_for_integral_action_costs_next_to_nothing():
+    plain, walking = (lqg.lqg_controller(FULL, replace(EXACT, walk=walk)) for walk in (0.0, 1.0))
+    ratio = residual_variance(FULL, walking) / residual_variance(FULL, plain)
+    assert 1.0 < ratio < 1.005
+
+
+def test_a_disturbance_that_already_walks_gets_no_second_walk():
+    s = FULL.system
+    A = s.A.copy()
+    A[-3, -3] = 1.0
+    walking = replace(FULL, system=replace(s, A=A))
+    assert lqg.lqg_controller(walking, PLAIN).system.order == lqg.lqg_controller(FULL, PLAIN).system.order - 1
+
+
+def test_noise_on_the_command_makes_it_bear_a_resonance_that_is_not_where_the_model_has_it():
+    model, elsewhere = (axis_plant(resonance=(freq_hz, 0.02)) for freq_hz in (900.0, 1000.0))
+    trusting, careful = (
+        lqg.lqg_controller(model, replace(PLAIN, command=1e-3, command_noise_v=noise)) for noise in (0.0, 1e-3)
+    )
+    assert analysis.loop_margins(model, trusting).modulus > 0.6
+    with pytest.raises(ValueError, match="unstable"):
+        analysis.loop_margins(elsewhere, trusting)
+    assert analysis.loop_margins(elsewhere, careful).modulus > 0.5
+    price = residual_variance(model, careful) / residual_variance(model, trusting)
+    assert 1.0 < price < 1.02
+
+
+def test_the_family_builds_every_corner_of_its_parameters():
+    for plant in (FULL, axis_plant(gauge=False), axis_plant(corner_hz=1e-2, disturbance_rad=1e-4)):
+        parameters = LQG.parameters(plant)
+        assert [p.name for p in parameters] == ["command weight", "sensor noise factor", "command noise"]
+        for corner in np.ndindex(2, 2, 2):
+            values = np.array([(p.least, p.most)[i] for p, i in zip(parameters, corner, strict=True)])
+            analysis.refuse_unstable(plant, LQG.build(plant, values))
+
+
+# ------------------------------------------------------------------------------------------------ saturation
+
+
+def test_the_observer_knows_what_was_clipped():
+    """Its innovation is that of the plant's noise alone: the same with and without a limit that is hit."""
+    controller = lqg.lqg_controller(FULL, replace(EXACT, command=1e-2))
+    white = np.random.Generator(np.random.Philox(8)).standard_normal((1500, FULL.disturbances + 2))
+    still = np.zeros(1500)
+    _, command, free = simulate(FULL, controller, white, still)
+    limit = 0.3 * np.max(np.abs(command))
+    _, clipped, bound = simulate(FULL, controller, white, still, limit)
+    assert np.mean(np.abs(clipped) >= limit) > 0.2
+    assert_allclose(bound, free, rtol=0, atol=1e-9 * np.max(np.abs(free)))
+    _, _, wrong = simulate(FULL, controller, white, still, limit, windup=False)
+    assert np.max(np.abs(wrong - free)) > 0.5 * np.max(np.abs(free))
+
+
+def test_it_comes_back_from_the_limit_without_winding_up():
+    plant = axis_plant(resonance=(900.0, 0.02))
+    controller = lqg.lqg_controller(plant, PLAIN)
+    n, start, end = 1500, 200, 700
+    white = np.zeros((n, plant.disturbances + 2))
+    push = np.zeros(n)
+    push[start:end] = 300e-6  # twice what the limit reaches
+    limit = 150e-6 / plant.gain_rad_v
+    residual, command, _ = simulate(plant, controller, white, push, limit)
+    assert np.all(command[start + 20 : end] == limit)
+    assert residual[end - 1] == near(150e-6, rel=1e-4)
+    free, _, _ = simulate(plant, controller, white, push)
+    wound, _, _ = simulate(plant, controller, white, push, limit, windup=False)
+    after = [np.sum(np.abs(r[end + 4 : end + 20])) for r in (residual, free, wound)]  # the first the loop can act on
+    print(f"left behind: {after[0]:.2e} rad samples, without a limit {after[1]:.2e}, wound up {after[2]:.2e}")
+    assert after[0] == near(after[1], rel=0.1)
+    assert after[2] > 1.4 * after[0]

@@ -1,0 +1,326 @@
+"""Tuning against brute force over exact variances and margins, and what it says when it cannot."""
+
+import math
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+import pytest
+from scipy.optimize import minimize_scalar
+
+from design_plants import axis_plant
+from microrad import lti
+from microrad.control import analysis, judge, lqg, tuning
+from microrad.control.lqg import LQG
+from microrad.control.problem import RESIDUAL, AxisController, Family, Parameter, Specification
+
+PERIOD = 2e-4
+HALF = Specification(modulus_margin=0.5)
+ANY = Specification(modulus_margin=1e-3)
+near = partial(pytest.approx, abs=0.0, rel=1e-6)
+
+PLAIN = axis_plant(gauge=False)
+QUIET = axis_plant(gauge=False, noise_rad=0.1e-6)
+NOISY = axis_plant(gauge=False, noise_rad=20e-6)
+RESONANT = axis_plant(resonance=(900.0, 0.02), lines=((87.0, 2e-6),))
+
+
+def pi(plant, values):
+    """Integral and proportional gain, both times the slow gain of the mirror: rad/s and 1."""
+    step, proportional = values[0] * PERIOD / plant.gain_rad_v, values[1] / plant.gain_rad_v
+    s = lti.StateSpace(
+        np.ones((1, 1)), np.array([[step, 0.0]]), np.ones((1, 1)), np.array([[step + proportional, 0.0]])
+    )
+    return AxisController("PI", s, np.zeros((1, 1)))
+
+
+def family(most=5e3, least=1.0):
+    integral = Parameter("integral", "rad/s", least, most)
+    return Family("PI", lambda plant: (integral, Parameter("proportional", "", 1e-4, 3.0)), pi)
+
+
+PI = family()
+INTEGRAL = Family(
+    "integral", lambda plant: (Parameter("integral", "rad/s", 1.0, 5e3),), lambda plant, v: pi(plant, [v[0], 0.0])
+)
+
+
+def rms(plant, controller):
+    return math.sqrt(analysis.h2(analysis.close(plant, controller))[RESIDUAL].sum())
+
+
+def modulus(plant, controller):
+    """By plain evaluation on a dense grid, without the margins' own refinement."""
+    freq_hz = np.concatenate([np.geomspace(0.1, 50, 100), np.linspace(50, 2500, 8000)])
+    return np.min(np.abs(1 + analysis.loop_response(plant, controller, freq_hz)))
+
+
+def stable(plant, controller):
+    return abs(analysis.loop_poles(plant, controller)[0]) < 1.0
+
+
+# ------------------------------------------------------------------------------------------------ the judge
+
+
+def dual(plant, values):
+    """PI with a high-passed gauge that damps."""
+    plain, k = pi(plant, values).system, 0.3 / plant.gain_rad_v
+    return AxisController(
+        "dual",
+        lti.StateSpace(
+            np.diag([1.0, 0.6]),
+            np.array([[plain.B[0, 0], 0.0], [0.0, 0.4]]),
+            np.array([[1.0, -k]]),
+            np.array([[plain.D[0, 0], k]]),
+        ),
+        np.zeros((2, 1)),
+    )
+
+
+CASES = {
+    "PI": (PLAIN, pi(PLAIN, [400.0, 0.1])),
+    "slow body": (axis_plant(corner_hz=0.01, disturbance_rad=1e-4), pi(PLAIN, [300.0, 0.01])),
+    "resonance and line": (RESONANT, pi(RESONANT, [300.0, 0.0])),
+    "sharp resonance": (axis_plant(resonance=(700.0, 0.003)), pi(PLAIN, [20.0, 0.0])),
+    "two sensors": (RESONANT, dual(RESONANT, [500.0, 0.1])),
+    "LQG": (RESONANT, lqg.lqg_controller(RESONANT, lqg.Weights(1e-3, 1.0, 1e-3))),
+}
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_the_judge_agrees_with_variance_and_margins_within_a_per_cent(name):
+    plant, controller = CASES[name]
+    found = judge.Judge([plant])(controller)
+    margins = analysis.loop_margins(plant, controller)
+    assert found.mean_rad2 == near(rms(plant, controller) ** 2, rel=0.01)
+    assert np.min(found.moduli) == near(margins.modulus, rel=0.01)
+    assert found.bandwidths_hz[0] == near(margins.bandwidth_hz, rel=0.01)
+    assert found.pole == near(abs(analysis.loop_poles(plant, controller)[0]), rel=1e-9)
+
+
+def test_the_judge_means_variances_and_takes_the_worst_margins_of_all_plants():
+    plants = [PLAIN, axis_plant(gauge=False, gain=0.11e-3, resonance=(1200.0, 0.1))]
+    controller = pi(PLAIN, [400.0, 0.1])
+    both, alone = judge.Judge(plants)(controller), [judge.Judge([p])(controller) for p in plants]
+    assert both.mean_rad2 == near(np.mean([a.mean_rad2 for a in alone]))
+    assert np.min(both.moduli) == near(min(np.min(a.moduli) for a in alone), rel=1e-12)
+    assert np.min(alone[0].moduli) > 1.1 * np.min(alone[1].moduli)
+    assert list(both.bandwidths_hz) == [a.bandwidths_hz[0] for a in alone]
+
+
+def test_the_judge_calls_an_unstable_plant_of_several_unstable():
+    plants = [PLAIN, axis_plant(gauge=False, gain=0.3e-3)]
+    controller = pi(PLAIN, [1200.0, 0.5])
+    assert stable(plants[0], controller)
+    assert judge.Judge(plants)(controller).pole == near(abs(analysis.loop_poles(plants[1], controller)[0]))
+    assert judge.Judge(plants)(controller).pole > 1.0
+
+
+def test_responses_of_controllers_whose_modes_coincide():
+    A = np.array([[0.5, 1.0, 0.0], [0.0, 0.5, 1.0], [0.0, 0.0, 0.5]])
+    s = lti.StateSpace(A, np.eye(3, 2), np.array([[1.0, -2.0, 3.0]]), np.array([[0.3, -0.1]]))
+    freq_hz = np.array([1.0, 100.0, 2400.0])
+    expected = lti.frequency_response(s, freq_hz, PERIOD)[:, 0, :]
+    found = judge.response(s, np.exp(2j * np.pi * freq_hz * PERIOD))
+    np.testing.assert_allclose(found, expected, rtol=1e-12)
+
+
+# ------------------------------------------------------------------------------------------------ the optimum
+
+
+def test_the_free_optimum_of_one_gain_is_that_of_a_scalar_minimiser():
+    exact = minimize_scalar(
+        lambda x: rms(NOISY, pi(NOISY, [math.exp(x), 0.0])), bounds=(math.log(5), math.log(500)), method="bounded"
+    )
+    found = tuning.tune(INTEGRAL, [NOISY], ANY, seed=1, evaluations=120)
+    assert found.residual_rms_rad == near(exact.fun, rel=1e-4)
+    assert found.values["integral"] == near(math.exp(exact.x), rel=0.02)
+    assert found.bound_by == ()
+
+
+def test_a_tuned_pi_is_the_best_of_a_fine_grid_with_exact_variances_and_margins():
+    best = (math.inf, None)
+    for integral in np.geomspace(100.0, 2e3, 35):
+        for proportional in [1e-4, *np.geomspace(0.01, 1.0, 25)]:
+            controller = pi(PLAIN, [integral, proportional])
+            if stable(PLAIN, controller):
+                left = rms(PLAIN, controller)
+                if left < best[0] and modulus(PLAIN, controller) >= 0.5:
+                    best = (left, (integral, proportional))
+    found = tuning.tune(PI, [PLAIN], HALF, seed=1, evaluations=300)
+    print(f"grid {1e6 * best[0]:.4f} urad at {best[1]}, tuned {1e6 * found.residual_rms_rad:.4f} at {found.values}")
+    assert 0.98 * best[0] < found.residual_rms_rad < 1.002 * best[0]
+
+
+@pytest.mark.parametrize("plant", [QUIET, RESONANT], ids=["quiet", "resonant"])
+def test_the_margin_is_respected_and_named_where_it_binds(plant):
+    found = tuning.tune(PI, [plant], Specification(0.7), seed=1, evaluations=300)
+    assert 0.7 <= found.least_modulus < 0.705
+    assert modulus(plant, found.controller) == near(found.least_modulus, rel=1e-3)
+    assert found.margins == analysis.loop_margins(plant, found.controller)
+    assert tuning.MARGIN in found.bound_by
+    assert found.residual_rms_rad == near(rms(plant, found.controller))
+    freer = tuning.tune(PI, [plant], HALF, seed=1, evaluations=300)
+    assert freer.residual_rms_rad < 0.98 * found.residual_rms_rad
+
+
+def test_a_narrow_dip_beside_the_grid_does_not_cost_the_margin():
+    sharp = axis_plant(resonance=(700.0, 0.003), gauge=False)
+    found = tuning.tune(INTEGRAL, [sharp], HALF, seed=2, evaluations=150)
+    assert 0.5 <= found.least_modulus < 0.502
+    freq_hz = np.linspace(690.0, 710.0, 20001)
+    assert np.min(np.abs(1 + analysis.loop_response(sharp, found.controller, freq_hz))) >= 0.5
+
+
+def test_a_bandwidth_that_is_asked_for_is_reached_at_a_price():
+    free = tuning.tune(PI, [NOISY], HALF, seed=1, evaluations=200)
+    asked = 3.0 * free.margins.bandwidth_hz
+    found = tuning.tune(PI, [NOISY], Specification(0.5, bandwidth_hz=asked), seed=1, evaluations=200)
+    assert asked <= found.least_bandwidth_hz < 1.01 * asked
+    assert found.bound_by[0] == tuning.BANDWIDTH
+    assert found.residual_rms_rad > 1.01 * free.residual_rms_rad
+    assert tuning.BANDWIDTH not in free.bound_by
+
+
+def test_a_bound_is_named_where_it_costs():
+    narrow = Family("PI", lambda plant: (Parameter("integral", "rad/s", 1.0, 100.0),), INTEGRAL.build)
+    found = tuning.tune(narrow, [PLAIN], HALF, seed=1, evaluations=200)
+    assert found.values["integral"] == near(100.0, rel=1e-3)
+    assert "integral at its most" in found.bound_by
+    assert tuning.MARGIN not in found.bound_by
+    high = tuning.tune(family(least=1e3), [NOISY], HALF, seed=1, evaluations=200)
+    assert "integral at its least" in high.bound_by
+
+
+def test_lqg_beats_the_tuned_pi_under_the_same_margin():
+    ours, theirs = (tuning.tune(f, [RESONANT], HALF, seed=1, evaluations=150) for f in (LQG, PI))
+    print(f"LQG {1e6 * ours.residual_rms_rad:.3f} urad, PI {1e6 * theirs.residual_rms_rad:.3f} urad")
+    assert ours.residual_rms_rad < 0.8 * theirs.residual_rms_rad
+    assert ours.least_modulus >= 0.5
+
+
+# ------------------------------------------------------------------------------------------------ the search
+
+
+def test_a_seed_gives_the_same_numbers_and_seeds_agree():
+    once, again, *others = (tuning.tune(PI, [RESONANT], HALF, seed=s, evaluations=250) for s in (7, 7, 8, 9))
+    assert once.values == again.values
+    assert once.evaluations == again.evaluations
+    for other in others:
+        assert other.residual_rms_rad == near(once.residual_rms_rad, rel=0.01)
+        assert other.values != once.values
+
+
+def test_progress_is_reported_up_to_its_total():
+    told = []
+    tuning.tune(PI, [PLAIN], HALF, seed=1, evaluations=100, on_progress=lambda *args: told.append(args))
+    done = [t[0] for t in told]
+    assert done[0] == 1
+    assert done == sorted(done)
+    assert done[-1] == 100
+    assert {t[1:] for t in told} == {(100, "tune PI")}
+
+
+def test_robust_tuning_keeps_the_margin_where_nominal_tuning_loses_it():
+    plants = [axis_plant(gauge=False, gain=0.089e-3 * g, noise_rad=0.1e-6) for g in (1.0, 0.8, 1.2)]
+    nominal = tuning.tune(PI, plants[:1], HALF, seed=1, evaluations=300)
+    robust = tuning.tune(PI, plants, HALF, seed=1, evaluations=300)
+    assert min(modulus(p, nominal.controller) for p in plants) < 0.45
+    least = min(modulus(p, robust.controller) for p in plants)
+    assert 0.4999 <= least < 0.505
+    assert robust.least_modulus == near(least, rel=1e-3)
+    assert robust.margins.modulus > 1.05 * least
+    each = [rms(p, robust.controller) for p in plants]
+    assert robust.residual_rms_rad == near(each[0])
+    assert robust.worst_rms_rad == near(max(each))
+    assert robust.mean_rms_rad == near(math.sqrt(np.mean(np.square(each))))
+    assert robust.residual_rms_rad > nominal.residual_rms_rad
+
+
+def test_the_best_of_a_grid_is_one_of_its_points():
+    grid = ([200.0, 400.0, 800.0, 1600.0, 3200.0], [1e-4, 0.1, 0.4])
+    found = tuning.grid_best(PI, [PLAIN], HALF, grid)
+    best = (math.inf, None)
+    for i in grid[0]:
+        for p in grid[1]:
+            c = pi(PLAIN, [i, p])
+            if stable(PLAIN, c) and modulus(PLAIN, c) >= 0.5:
+                best = min(best, (rms(PLAIN, c), (i, p)))
+    assert tuple(found.values.values()) == best[1]
+    assert found.residual_rms_rad == near(best[0])
+    assert found.evaluations == 15
+
+
+def test_a_family_without_parameters_is_judged_as_it_is():
+    fixed = Family("fixed", lambda plant: (), lambda plant, v: pi(plant, [400.0, 0.1]))
+    found = tuning.tune(fixed, [PLAIN], HALF, seed=1, evaluations=5)
+    assert found.residual_rms_rad == near(rms(PLAIN, pi(PLAIN, [400.0, 0.1])))
+    assert found.values == {}
+
+
+# ------------------------------------------------------------------------------------------------ refusals
+
+
+def test_a_family_without_a_stable_member_is_refused():
+    with pytest.raises(ValueError, match=r"no PI of 54 tried is stable: the nearest has a pole at \|z\| = ") as read:
+        tuning.tune(family(least=4e3, most=9e3), [axis_plant(gauge=False, delay=4)], HALF, seed=1, evaluations=60)
+    assert "(the limit is 1) with integral 4000 rad/s, proportional" in str(read.value)
+    assert str(read.value).endswith(
+        "shorten the delay, narrow what is unknown of the plant, or take another controller"
+    )
+
+
+def test_a_specification_out_of_reach_is_refused_with_what_was_reached():
+    asked = Specification(0.9, bandwidth_hz=900.0)
+    with pytest.raises(
+        ValueError,
+        match=r"on all 2 plants: a modulus margin of 0\.9 and a bandwidth of 900 Hz is asked for",
+    ) as read:
+        tuning.tune(PI, [PLAIN, QUIET], asked, seed=1, evaluations=200)
+    reached = str(read.value).split("the nearest reaches ")[1].split(" Hz")[0].split(" and ")
+    margin, bandwidth = (float(r) for r in reached)
+    assert 0.4 < margin < 0.91
+    assert 150.0 < bandwidth < 901.0
+    assert margin < 0.9 or bandwidth < 900.0
+    with pytest.raises(ValueError, match=r"a modulus margin of 0\.999 is asked for, the nearest reaches 0\.9"):
+        tuning.tune(family(least=300.0), [PLAIN], Specification(0.999), seed=1, evaluations=60)
+
+
+def test_plants_that_do_not_belong_together_are_refused():
+    with pytest.raises(ValueError, match="nothing to tune for: give at least the nominal plant"):
+        tuning.tune(PI, [], HALF, seed=1)
+    with pytest.raises(ValueError, match=r"different control periods, 0\.0001 to 0\.0002 s: a controller has one rate"):
+        tuning.tune(PI, [PLAIN, axis_plant(period_s=1e-4)], HALF, seed=1)
+    with pytest.raises(ValueError, match=r"the plant has no disturbance: .*; give it one to reject"):
+        tuning.tune(PI, [axis_plant(disturbance_rad=0.0)], HALF, seed=1)
+    A = PLAIN.system.A.copy()
+    A[-1, -1] = 1.0
+    with pytest.raises(
+        ValueError, match=r"a pole at \|z\| = 1\.0+ \(the limit is 1\).* give the disturbance some damp"
+    ):
+        tuning.tune(PI, [PLAIN, replace(PLAIN, system=replace(PLAIN.system, A=A))], HALF, seed=1)
+
+
+def test_what_a_family_refuses_is_handed_on():
+    def refuse(plant, values=None):
+        raise ValueError("no gauge to damp with")
+
+    with pytest.raises(ValueError, match=r"^no gauge to damp with$"):
+        tuning.tune(Family("damping", refuse, pi), [PLAIN], HALF, seed=1)
+    broken = Family("damping", PI.parameters, refuse)
+    with pytest.raises(ValueError, match=r"no damping could be built in 18 tries; the first was refused: no gauge to"):
+        tuning.tune(broken, [PLAIN], HALF, seed=1, evaluations=20)
+
+
+def test_candidates_that_cannot_be_built_are_left_out():
+    def partly(plant, values):
+        return pi(plant, [math.nan if values[0] > 600.0 else values[0], values[1]])
+
+    found = tuning.tune(Family("PI", PI.parameters, partly), [PLAIN], HALF, seed=1, evaluations=200)
+    assert 300.0 < found.values["integral"] <= 600.0
+    assert found.least_modulus >= 0.5
+
+
+def test_a_grid_of_the_wrong_shape_is_refused():
+    with pytest.raises(ValueError, match=r"1 rows of values for the parameters of PI \(integral, proportional\): give"):
+        tuning.grid_best(PI, [PLAIN], HALF, [[1.0, 2.0]])
