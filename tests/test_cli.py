@@ -20,10 +20,11 @@ import typer
 import microrad
 from microrad import cli, doctor, identify, report, study
 from microrad.cli import lab
+from shipped import without_fine_pointing
 
 ROOT = Path(__file__).parents[1]
 PAPER = ROOT / "src" / "microrad" / "missions" / "leo-geo.toml"
-COMMANDS = ("init", "run", "identify", "bench", "doctor", "schema")
+COMMANDS = ("init", "run", "design", "identify", "bench", "doctor", "schema")
 MICRORAD = (sys.executable, "-m", "microrad")
 COLUMNS = ("--input", "drive", "--output", "angle", "--rate", "1000", "--static")
 
@@ -100,9 +101,15 @@ def loop_mirror(tmp_path_factory):
     return mirror
 
 
+@pytest.fixture(scope="module")
+def plain(tmp_path_factory):
+    """The paper's mission without its fine-pointing loop, which takes most of a study's time."""
+    return mission(tmp_path_factory.mktemp("plain") / "leo-geo.toml")
+
+
 def mission(path, *changes):
-    """The paper's mission with texts replaced."""
-    text = PAPER.read_text(encoding="utf-8")
+    """The paper's mission with texts replaced, without its fine-pointing loop."""
+    text = without_fine_pointing(PAPER.read_text(encoding="utf-8"))
     for old, new in changes:
         assert text.count(old) == 1, old
         text = text.replace(old, new)
@@ -217,8 +224,8 @@ def test_init_then_run(call, folder):
     assert sorted(p.name for p in folder.iterdir()) == ["leo-geo-study", "leo-geo.toml"]
 
 
-def test_identify_then_run_on_the_mirror_it_wrote(call, refused, folder, loop_mirror):
-    args = ("run", PAPER, "--mirror", loop_mirror, "--json")
+def test_identify_then_run_on_the_mirror_it_wrote(call, refused, folder, loop_mirror, plain):
+    args = ("run", plain, "--mirror", loop_mirror, "--json")
     result = call(*args)
     assert (result.code, result.err) == (0, "")
     summary = json.loads(result.out)
@@ -238,6 +245,25 @@ def test_a_link_that_does_not_close_is_exit_1_and_has_its_report(call, folder, l
     assert result.code == 1
     assert "does not close" in result.out
     assert (folder / "results" / "first" / "report.html").is_file()
+
+
+def test_design_prints_each_controller_with_its_margins(call, folder):
+    call("init")
+    result = call("design", "leo-geo.toml")
+    assert (result.code, result.err) == (0, "")
+    for words in ("PI, best of a gain grid", "LQG", "PI + inverse in series", "modulus", "integral frequency"):
+        assert words in result.out
+    data = json.loads(call("design", "leo-geo.toml", "--json").out)
+    assert all(c["margins"]["modulus"] >= 0.5 for c in data["controllers"])
+    assert len(data["controllers"][0]["matrices"]["A"]) == 2  # an integrator an axis
+
+
+def test_design_refuses_what_it_cannot_design(refused, folder, plain):
+    assert "no table [fine_pointing]: microrad init writes one" in refused("design", plain)
+    text = PAPER.read_text(encoding="utf-8").replace("modulus_margin = 0.5 ", "modulus_margin = 0.99 ")
+    (folder / "hard.toml").write_text(text, encoding="utf-8")
+    message = refused("design", "hard.toml")
+    assert "hard.toml" in message and "modulus margin" in message
 
 
 def test_run_refuses_missing_and_faulty_files(refused, folder):
@@ -260,7 +286,7 @@ def test_run_never_replaces_what_it_did_not_write_and_says_so_before_computing(r
     assert "a.jpg is a file, not a folder" in refused("run", PAPER, "--output", "photos/a.jpg")
 
 
-def test_run_refuses_an_unstable_loop_and_a_mirror_without_inverse(refused, folder):
+def test_run_refuses_an_unstable_loop_and_a_mirror_without_inverse(refused, folder, plain):
     unstable = mission(folder / "wild.toml", ('integral = "16000 V/(mrad s)"', 'integral = "1600000 V/(mrad s)"'))
     message = refused("run", unstable)
     assert "wild.toml: the closed loop is unstable" in message
@@ -271,15 +297,15 @@ def test_run_refuses_an_unstable_loop_and_a_mirror_without_inverse(refused, fold
         'bias = "6 V"\ndrive_min = "0 V"\ndrive_max = "12 V"\n'
         '[prandtl_ishlinskii]\nthresholds = ["0 V", "1 V"]\nweights = ["0 mrad/V", "0.089 mrad/V"]\n'
     )
-    assert "has no inverse" in refused("run", PAPER, "--mirror", stuck)
+    assert "has no inverse" in refused("run", plain, "--mirror", stuck)
 
 
-def test_a_full_disk_during_run_leaves_nothing(refused, monkeypatch, loop_mirror):
+def test_a_full_disk_during_run_leaves_nothing(refused, monkeypatch, loop_mirror, plain):
     def full(*args, **kwargs):
         raise OSError(errno.ENOSPC, "No space left on device")
 
     monkeypatch.setattr(report, "write_columns", full)
-    assert "No space left on device; nothing was written" in refused("run", PAPER, "--mirror", loop_mirror)
+    assert "No space left on device; nothing was written" in refused("run", plain, "--mirror", loop_mirror)
 
 
 def test_an_unexpected_exception_asks_for_a_report(call, folder, monkeypatch):
@@ -310,9 +336,9 @@ cli.main()
 @pytest.mark.parametrize(
     ("name", "module", "function"), [("SIGINT", "study", "run"), ("SIGTERM", "report", "write_columns")]
 )
-def test_an_interrupt_during_run_leaves_nothing(folder, loop_mirror, name, module, function):
+def test_an_interrupt_during_run_leaves_nothing(folder, loop_mirror, plain, name, module, function):
     code = MARKED.format(module=module, function=function)
-    args = [sys.executable, "-c", code, "run", str(PAPER)]
+    args = [sys.executable, "-c", code, "run", str(plain)]
     args += ["--mirror", str(loop_mirror)] if module == "report" else []
     process = subprocess.Popen(args, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     assert process.stderr.readline() == "here\n"

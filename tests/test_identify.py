@@ -559,7 +559,9 @@ def test_mirror_file_reads_back(identification, model):
     text = mirror_file_text(identification, 'A "mirror" \\ µ', model=model)
     table = tomllib.loads(text)
     family = "prandtl_ishlinskii" if model == "prandtl_ishlinskii" else "bouc_wen"
-    assert set(table) == {"name", "travel", "composition", "rate_limit", "bias", "drive_min", "drive_max", family}
+    general = {"name", "travel", "composition", "rate_limit", "bias", "drive_min", "drive_max"}
+    assert set(table) == general | {family, "uncertainty"}
+    assert all(key.startswith(f"{family}.") for key in table["uncertainty"]["parameters"])
     assert (table["name"], table["composition"]) == ('A "mirror" \\ µ', "static")
     assert number(table["travel"], "mrad") == pytest.approx(1e3 * identification.travel_rad, rel=1e-3)
     fit = identification.fit(model)
@@ -595,7 +597,7 @@ def test_mirror_file_carries_its_origin(identification):
     error = 1e3 * identification.fit().standard_errors[0]
     assert f"# identified: ± standard error {error:.2g} mrad/V, from 100Hz, 60Hz" in text
     for line in text.splitlines():
-        assert line.startswith(("#", "[", "name")) or not line or "# identified: " in line
+        assert re.match(r"#|\[|name|parameters|correlation|  -?[01]\.", line) or not line or "# identified: " in line
     assert "Not admissible" not in mirror_file_text(identification, "m", model="bouc_wen_admissible")
 
 
@@ -605,7 +607,7 @@ def test_hostile_names_stay_inside_their_line():
     table = tomllib.loads(mirror_file_text(result, "name\nwith \x7f break"))
     assert table["name"] == "name\nwith \x7f break"
     general = {"name", "travel", "composition", "rate_limit", "bias", "drive_min", "drive_max"}
-    assert set(table) == general | {"prandtl_ishlinskii"}
+    assert set(table) == general | {"prandtl_ishlinskii", "uncertainty"}
     with pytest.raises(IdentificationError, match="no name"):
         mirror_file_text(result, "  ")
     with pytest.raises(IdentificationError, match="no model 'bouc_wen'"):

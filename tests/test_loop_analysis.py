@@ -254,6 +254,7 @@ LOOPS = {
     "PI, three samples late": (axis_plant(gauge=False, delay=3), pi(500.0, 4e6)),
     "resonance": (axis_plant(resonance=(900.0, 0.05)), pi(0.0, 5e6)),
     "sharp resonance": (axis_plant(resonance=(700.0, 0.003)), pi(0.0, 3e5)),
+    "resonance beyond half a turn": (axis_plant(gauge=False, resonance=(700.0, 0.003), delay=2), pi(0.0, 2e6)),
     "proportional": (PLAIN, proportional(1.3e4)),
 }
 
@@ -279,8 +280,11 @@ def test_margins_are_those_of_python_control(name):
     assert ours.gain_down == 0.0
     assert ours.modulus == near(modulus, rel=1e-3)
     assert ours.peak == near(1 / modulus, rel=1e-3)
-    assert math.degrees(ours.phase_rad) == near(phase, rel=1e-3)
-    assert ours.crossover_hz == near(crossover / (2 * math.pi), rel=1e-3)
+    assert math.degrees(ours.phase_rad) == near(abs(phase), rel=1e-3)
+    if phase < 0.0:  # theirs is the crossover of the smallest phase margin, ours the highest
+        assert ours.crossover_hz > crossover / (2 * math.pi)
+    else:
+        assert ours.crossover_hz == near(crossover / (2 * math.pi), rel=1e-3)
 
 
 @pytest.mark.parametrize("name", LOOPS)
@@ -317,26 +321,41 @@ def test_a_conditionally_stable_loop_has_a_gain_margin_downwards():
         assert radius(plant, scaled(cubic, inside * limit)) < 1.0 < radius(plant, scaled(cubic, outside * limit))
 
 
-def test_the_delay_margin_is_the_number_of_samples_that_the_loop_bears():
-    controller = pi(0.0, 2.5e6)
-    bears = analysis.loop_margins(axis_plant(gauge=False), controller).delay_s / PERIOD
-    print(f"delay margin {bears:.3f} samples")
-    assert 2.0 < bears < 40.0
-    later = [radius(axis_plant(gauge=False, delay=1 + n), controller) for n in (int(bears), int(bears) + 1)]
+@pytest.mark.parametrize("resonance", [None, (700.0, 0.003)])
+def test_the_delay_margin_is_the_number_of_samples_that_the_loop_bears(resonance):
+    plants = [axis_plant(gauge=False, resonance=resonance, delay=2 + n) for n in range(45)]
+    controller = pi(0.0, 2e6)
+    found = analysis.loop_margins(plants[0], controller)
+    bears = found.delay_s / PERIOD
+    print(f"delay margin {bears:.3f} samples, phase margin {math.degrees(found.phase_rad):.2f} degrees")
+    assert 2.0 < bears < 43.0
+    later = [radius(plants[int(bears) + more], controller) for more in (0, 1)]
     assert later[0] < 1.0 < later[1]
+    if resonance:  # the phase margin is a lead here, the delay margin all of a turn but that
+        turn = found.phase_rad + 2 * math.pi * found.crossover_hz * found.delay_s
+        assert math.degrees(turn) < 270.0
+        assert math.degrees(found.phase_rad) < 60.0 < 360.0 * found.crossover_hz * found.delay_s
 
 
-def test_bandwidth_and_crossover_of_a_first_order_loop_in_closed_form():
-    share = 0.4
-    plant = pure_gain(PERIOD)
+@pytest.mark.parametrize("period_s", [PERIOD, 2e-5, 1 / 7000])
+@pytest.mark.parametrize("share", [0.03, 0.4, 0.9])
+def test_bandwidth_and_crossover_of_a_first_order_loop_in_closed_form(share, period_s):
+    plant = pure_gain(period_s)
     found = analysis.loop_margins(plant, integrator(share / plant.gain_rad_v))
-    angle = 2 * math.pi * PERIOD
+    angle = 2 * math.pi * period_s
     assert found.bandwidth_hz == near(math.acos(1 - share / 2) / angle, rel=1e-3)
     assert found.crossover_hz == near(math.acos(1 - share**2 / 2) / angle, rel=1e-3)
     assert found.gain_up == near(2 / share, rel=1e-9)
     assert found.peak == near(1 / (1 - share / 2), rel=1e-9)
-    assert found.peak_hz == near(2500.0, rel=1e-6)
+    assert found.peak_hz == near(0.5 / period_s, rel=1e-6)
     assert found.phase_rad == near(math.pi / 2 - found.crossover_hz * angle / 2, rel=1e-3)
+
+
+def test_a_positive_feedback_is_limited_at_rest():
+    plant = pure_gain(PERIOD)
+    controller = proportional(-0.5 / plant.gain_rad_v)
+    assert analysis.loop_margins(plant, controller).gain_up == near(2.0, rel=1e-6)
+    assert radius(plant, scaled(controller, 1.999)) < 1.0 < radius(plant, scaled(controller, 2.001))
 
 
 def test_a_loop_without_gain_has_every_margin_and_no_reach():

@@ -16,6 +16,14 @@ from microrad.report import figures
 from shipped import SHIPPED, edited_file
 
 
+@pytest.fixture(scope="module", autouse=True)
+def no_fine_pointing():
+    """The fine-pointing loop has tests of its own and takes the longest."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(study.fine_pointing, "run", lambda *args: None)
+        yield
+
+
 @pytest.fixture(scope="module")
 def paper():
     return study.run(missionfile.load_mission(SHIPPED))

@@ -85,12 +85,13 @@ def test_the_lines_of_the_verdict(shipped):
         ("dB", True, "Pointing loss"),
         ("rad", False, cause),
         ("dB", False, found[4][2]),
+        ("rad", True, "OLYMPUS"),
     ]
     assert found[4][2].endswith(": " + cause)
-    words = ("beacon cone", "beacon", "answer", "residual pointing error", "communication")
+    words = ("beacon cone", "beacon", "answer", "residual pointing error", "communication", "fine pointing")
     assert all(r.name.lower().startswith(word) for r, word in zip(result.requirements, words, strict=True))
     for line in result.requirements:
-        sign = -1 if line.name == "residual pointing error" else 1
+        sign = -1 if line.name.startswith(("residual pointing error", "fine pointing")) else 1
         assert_allclose(line.margin, sign * (line.actual - line.required), rtol=1e-9)
         assert line.met == (line.margin >= 0)
     cone = requirement(result, "beacon cone over pointing uncertainty")

@@ -6,16 +6,16 @@ and 25 µrad off the error at 15 and 25 Hz (Fig. 8); and the control reaches 10 
 """
 
 import math
-import os
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
 
 from microrad import control, hysteresis, mirror, mission, simulate
+from microrad.threads import in_threads
 from microrad.tracking import mirror_model
 
 Floats = NDArray[np.float64]
@@ -116,14 +116,10 @@ def scan(m: mission.Mission, on_progress: Progress | None = None) -> Scan:
     timing = control.timing_from_mission(m.control)
     delay = math.ceil(timing.delay_steps / timing.steps_per_sample)
     coarse = replace(timing, steps_per_sample=1, delay_steps=delay)
-    jobs = list(product(COMPOSITIONS, PROPORTIONAL_V_MRAD, INTEGRAL_V_MRAD_S))
-    points = []
-    # Threads suffice: the kernel runs without the interpreter lock.
-    with ThreadPoolExecutor(max_workers=os.cpu_count()) as pool:
-        for done, point in enumerate(pool.map(lambda job: _point(m, model, coarse, *job), jobs), 1):
-            points.append(point)
-            if on_progress:
-                on_progress(done, len(jobs), "scan of gains and compositions")
+    grid = product(COMPOSITIONS, PROPORTIONAL_V_MRAD, INTEGRAL_V_MRAD_S)
+    jobs = [partial(_point, m, model, coarse, *at) for at in grid]
+    said = on_progress or (lambda done, total, what: None)
+    points = in_threads(jobs, lambda done: said(done, len(jobs), "scan of gains and compositions"))
     return Scan(tuple(points))
 
 

@@ -135,10 +135,10 @@ def gramian(A: Floats, Q: Floats) -> Floats:
     samples takes some 22 of them. Source: Smith, SIAM Journal on Applied Mathematics 16 (1968) 198.
     """
     X, power = Q, A
-    for k in range(64):
+    for _ in range(64):
         more = power.T @ X @ power
         X = X + more
-        if k > 4 and not np.any(_diagonal(more) > 1e-15 * _diagonal(X)):  # the first 32 terms may miss what is delayed
+        if not np.any(_diagonal(more) > 1e-15 * _diagonal(X)):
             break
         power = power @ power
     return X
@@ -257,7 +257,7 @@ def _respond(plant: DesignPlant, controller: AxisController, broken_at: str) -> 
         K = lti.frequency_response(controller.system, freq_hz, plant.period_s)[:, 0, :]
         G = lti.frequency_response(mirror, freq_hz, plant.period_s)[:, :, 0]
         L = cut(K, G, broken_at)
-        return np.asarray(np.where(freq_hz * plant.period_s >= 0.5, L.real, L))  # at half the rate L is real
+        return np.asarray(np.where(freq_hz * plant.period_s > 0.5 - 1e-9, L.real, L))  # at half the rate L is real
 
     return response
 

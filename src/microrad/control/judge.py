@@ -59,7 +59,7 @@ class Judge:
     def __call__(self, controller: AxisController) -> Verdict:
         """Judge one controller; its margins are those of the worst place to cut its loop, on the worst plant."""
         pole = max(_spectral_radius(p, controller) for p in self._plants)
-        if not pole < 1.0:
+        if not pole < 1.0 - 1e-9:  # nearer than rounding can tell
             return self.unstable(pole)
         K = response(controller.system, self._points)
         whole = np.abs(1.0 + cut(K, self._to_sensors, "command"))
@@ -124,7 +124,7 @@ def _grid(plant: DesignPlant) -> Floats:
 def _bands(grids: Sequence[Floats], period_s: float) -> NDArray[np.intp]:
     """First index of each band, plant by plant: below a thousandth of the rate, then ten on a logarithmic scale."""
     edges = np.geomspace(1e-3, 0.5, 11)[:-1] / period_s
-    number = [1000 * i + np.searchsorted(edges, f, side="right") for i, f in enumerate(grids)]
+    number = [np.searchsorted(edges, f, side="right") for f in grids]
     return np.flatnonzero(np.diff(np.concatenate(number), prepend=-1))
 
 

@@ -181,7 +181,7 @@ def riccati(A: Floats, B: Floats, Q: Floats, R: Floats, otherwise: str) -> Float
     """
     power, G, X = A, B @ np.linalg.solve(R, B.T), Q
     identity = np.eye(A.shape[0])
-    for k in range(60):
+    for _ in range(60):
         middle = np.linalg.solve(identity + G @ X, np.hstack([power, G]))
         first, second = middle[:, : A.shape[0]], middle[:, A.shape[0] :]
         more = power.T @ X @ first
@@ -190,7 +190,7 @@ def riccati(A: Floats, B: Floats, Q: Floats, R: Floats, otherwise: str) -> Float
         G = 0.5 * (G + G.T)
         if not np.max(np.abs(X)) < 1e150:
             break
-        if k > 4 and not np.any(np.abs(np.diagonal(more)) > 1e-14 * np.diagonal(X)):
+        if not np.any(np.abs(np.diagonal(more)) > 1e-14 * np.diagonal(X)):
             return X
     raise ValueError(f"LQG: the Riccati equation has no stabilising solution: {otherwise}; add damping or a sensor")
 

@@ -1,11 +1,10 @@
 """Many runs of a fine-pointing loop, or one with its trace: assembles the kernel's arrays and keeps its statistics."""
 
 import math
-import os
 import zlib
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +13,7 @@ from microrad import disturbance, kernels, mirror
 from microrad.control import Inverse, amplifier_factor, no_feedforward
 from microrad.fine_loop.loop import LoopController, PointingLoop
 from microrad.sensor import StrainGauge
+from microrad.threads import in_threads
 
 Floats = NDArray[np.float64]
 Progress = Callable[[int, int, str], None]
@@ -331,13 +331,8 @@ def run(
     Memory does not grow with the length of the runs, and by 5 kB a run. Raises ValueError for what does not fit.
     """
     p = arrays(loop, controller, span.seed)
-    batches = range(0, runs, LANES)
-    parts, done = [], 0
-    with ThreadPoolExecutor(max_workers=threads or os.cpu_count()) as pool:
-        for part in pool.map(lambda first: _batch(loop, p, span, first), batches):
-            parts.append(part)
-            done = min(done + LANES, runs)
-            on_progress(done, runs, controller.name)
+    jobs = [partial(_batch, loop, p, span, first) for first in range(0, runs, LANES)]
+    parts = in_threads(jobs, lambda done: on_progress(min(done * LANES, runs), runs, controller.name), threads)
     return _joined(controller.name, loop, span, parts, runs)
 
 

@@ -69,7 +69,10 @@ def without(loop: PointingLoop, *names: str) -> PointingLoop:
 
 
 def sources(loop: PointingLoop) -> tuple[str, ...]:
-    """What brings error into the loop by itself: its disturbances, noises, quantisation and reference."""
+    """What brings error into the loop by itself: its disturbances, noises and reference.
+
+    Quantisation is none: in a loop at rest it does nothing.
+    """
     names = dict.fromkeys(each.name for several in loop.disturbances for each in several)
     gauge = () if loop.gauge is None else (GAUGE_NOISE,)
-    return (*names, OPTICAL_NOISE, *gauge, QUANTISATION, REFERENCE)
+    return (*names, OPTICAL_NOISE, *gauge, REFERENCE)

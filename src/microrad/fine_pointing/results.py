@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,6 +17,7 @@ from microrad.fine_pointing import parts
 from microrad.fine_pointing.designs import BASELINE, Design
 from microrad.fine_pointing.scenario import BODY_POINTING, Scene, table, variants, with_mirror
 from microrad.mission import Mission
+from microrad.threads import in_threads
 
 Floats = NDArray[np.float64]
 Progress = Callable[[int, int, str], None]
@@ -168,13 +168,7 @@ def for_mirror(controller: LoopController, loop: PointingLoop) -> LoopController
 def _several(
     jobs: Sequence[Callable[[], ensemble.Ensemble]], on_progress: Progress, what: str
 ) -> list[ensemble.Ensemble]:
-    """Run jobs on all cores; threads suffice, the kernel runs without the interpreter lock."""
-    done = []
-    with ThreadPoolExecutor() as pool:
-        for result in pool.map(lambda job: job(), jobs):
-            done.append(result)
-            on_progress(len(done), len(jobs), what)
-    return done
+    return in_threads(jobs, lambda done: on_progress(done, len(jobs), what))
 
 
 def _verified(scene: Scene, m: Mission, design: Design, runs: dict[str, ensemble.Ensemble]) -> Verified:
@@ -218,8 +212,9 @@ def error_budget(
     """Each source of error alone, together, and what is not a source left out of the whole; all with the same seeds."""
     straight = parts.without(scene.loop, parts.HYSTERESIS)
     names = parts.sources(straight)
-    changing = (parts.HYSTERESIS, parts.LIMITS, parts.DELAY)
-    alone = [parts.without(straight, *(other for other in names if other != name)) for name in names]
+    changing = (parts.HYSTERESIS, parts.LIMITS, parts.QUANTISATION, parts.DELAY)
+    fine = parts.without(straight, parts.QUANTISATION)
+    alone = [parts.without(fine, *(other for other in names if other != name)) for name in names]
     fewer = [parts.without(scene.loop, name) for name in changing]
     loops = [*alone, straight, scene.loop, *fewer]
     controller = of.design.controller

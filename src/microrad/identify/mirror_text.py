@@ -274,9 +274,9 @@ def _uncertainty(fit: Fit, identification: Identification, source: str) -> list[
         f"parameters = [{', '.join(_quoted(key) for key in keys)}] # identified: those not held or at a bound",
         f"standard_errors = [{', '.join(errors)}] # identified: relative to the values, at most {_LOOSEST:g} in any "
         f"combination, from {source}",
-        "correlation = [ # identified: lower triangle, row by row; sums of parameters are known better than each",
+        "correlation = [",
         *rows,
-        "]",
+        "] # identified: of the values, lower triangle row by row; a sum may be known far better than its parts",
     ]
 
 
@@ -333,7 +333,7 @@ def _play_covariance(fit: PrandtlIshlinskiiFit, identification: Identification) 
 
 def _holding(covariance: FloatArray, held: NDArray[np.bool_]) -> FloatArray:
     """The covariance of the other parameters where some are held."""
-    size = np.sqrt(np.diag(covariance))
+    size = _deviation(covariance)
     size[size == 0.0] = 1.0
     between = covariance / np.outer(size, size)
     known = between[:, held] @ np.linalg.pinv(between[np.ix_(held, held)], hermitian=True) @ between[held]
@@ -341,15 +341,20 @@ def _holding(covariance: FloatArray, held: NDArray[np.bool_]) -> FloatArray:
     return np.where(held[:, None] | held, 0.0, left)
 
 
+def _deviation(covariance: FloatArray) -> FloatArray:
+    """Standard errors; rounding may leave a variance of 0 below it."""
+    return np.asarray(np.sqrt(np.maximum(np.diag(covariance), 0.0)))
+
+
 def _relative(numbers: dict[str, float], covariance: FloatArray) -> tuple[list[str], FloatArray]:
     """Keys of the numbers that are known but for an error, and the covariance relative to their sizes.
 
-    A number that is lost is held. Combinations of the others that the recordings leave open are cut off: a draw that
-    moves by more than its own size is no mirror, and says nothing of the combinations that are known.
+    A number that is lost in its error is held. Combinations that the recordings leave open (eigenvectors) are cut off
+    at the size of the values themselves, beyond which their signs would turn; those that are known keep their variance.
     """
     values = np.array(list(numbers.values()))
-    covariance = _holding(covariance, np.sqrt(np.diag(covariance)) > _LOST * np.abs(values))
-    kept = np.sqrt(np.abs(np.diag(covariance))) > 1e-12 * np.abs(values)
+    covariance = _holding(covariance, _deviation(covariance) > _LOST * np.abs(values))
+    kept = _deviation(covariance) > 1e-12 * np.abs(values)
     size = np.abs(values[kept])
     relative = covariance[np.ix_(kept, kept)] / np.outer(size, size)
     variances, directions = np.linalg.eigh(relative)
@@ -361,7 +366,7 @@ def _rounded(covariance: FloatArray) -> tuple[list[str], list[list[str]]]:
     """Standard errors and correlation as text, with digits enough for the variance of each combination to a tenth."""
     variances, directions = np.linalg.eigh(covariance)
     whiten = directions / np.sqrt(np.maximum(variances, _STIFFEST**2))
-    size = np.sqrt(np.diag(covariance))
+    size = _deviation(covariance)
     for digits in range(3, 8):
         errors = [f"{e:.{digits}g}" for e in size]
         between = [[f"{r:.{2 * digits}f}" for r in row] for row in correlation(covariance)]
