@@ -97,11 +97,6 @@ def assemble(m: mirror.Mirror, setup: Setup, inverse: Inverse) -> kernels.Loop:
     actuators = m.actuators
 
     follow, slew = amplifier_factor(drive, timing.step_s), drive.slew_v_s * timing.step_s
-    lags = [
-        (weight, tau, a)
-        for a, creep in enumerate(inverse.creep)
-        for weight, tau in zip(creep.weights_rad_v, creep.time_constants_s, strict=True)
-    ]
     row = np.array([drive.minimum_v, drive.maximum_v, drive.drive_resolution_v, follow, slew])
     return kernels.Loop(
         actuators=(0,) * actuators,
@@ -119,16 +114,7 @@ def assemble(m: mirror.Mirror, setup: Setup, inverse: Inverse) -> kernels.Loop:
         actuator=np.tile(row, (actuators, 1)),
         sensor_resolution=np.full(m.axes, drive.sensor_resolution_rad),
         allocation=np.eye(actuators, m.axes),
-        inverse_direct=np.array(inverse.direct),
-        inverse_bouc_wen=kernels.bouc_wen_rows([b.row for b in inverse.bouc_wen]),
-        inverse_bouc_wen_actuator=np.array(inverse.bouc_wen_actuator, dtype=np.uint64),
-        inverse_play_threshold=np.array(inverse.play_thresholds, dtype=float),
-        inverse_play_weight=np.array(inverse.play_weights, dtype=float),
-        inverse_play_actuator=np.array(inverse.play_actuator, dtype=np.uint64),
-        inverse_widening=np.array(inverse.widening or [(0.0, math.inf)] * actuators),
-        inverse_lag_keep=np.array([math.exp(-timing.period_s / tau) for _, tau, _ in lags]),
-        inverse_lag_weight=np.array([weight for weight, _, _ in lags]),
-        inverse_lag_actuator=np.array([a for _, _, a in lags], dtype=np.uint64),
+        **control.inverse_arrays(inverse, timing.period_s),
     )
 
 

@@ -1,6 +1,13 @@
 """Controllers: from gains or a specification to matrices, inverses of hysteresis, margins of the sampled loop."""
 
-from microrad.control.analysis import LoopMargins, MultiloopMargin, by_source, loop_margins, multiloop_disk_margin
+from microrad.control.analysis import (
+    LoopMargins,
+    MultiloopMargin,
+    by_source,
+    gramian,
+    loop_margins,
+    multiloop_disk_margin,
+)
 from microrad.control.classical import (
     DISTURBANCE_OBSERVER,
     FAMILIES,
@@ -33,6 +40,7 @@ from microrad.control.sampled import (
     drive_from_mission,
     gains_from_mission,
     inverse,
+    inverse_arrays,
     margins,
     no_feedforward,
     pid,
@@ -76,8 +84,10 @@ __all__ = [
     "by_source",
     "drive_from_mission",
     "gains_from_mission",
+    "gramian",
     "grid_best",
     "inverse",
+    "inverse_arrays",
     "loop_margins",
     "lqg_controller",
     "margins",

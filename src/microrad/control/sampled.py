@@ -5,11 +5,12 @@ Every controller is one discrete state-space form, xc[k+1] = A xc + B e, v = C x
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from microrad import lti, mission
+from microrad import kernels, lti, mission
 from microrad.hysteresis import LINE_OF_SIGHT, BoucWen, Creep, Play, slow_gain
 from microrad.mirror import Mirror
 
@@ -172,6 +173,27 @@ def inverse(m: Mirror) -> Inverse:
         tuple(widening),
         m.inverse_creep,
     )
+
+
+def inverse_arrays(of: Inverse, period_s: float) -> dict[str, Any]:
+    """The inverse as the kernels' arrays, by field of `kernels.Loop` and `kernels.Ensemble`, for a control period."""
+    lags = [
+        (weight, tau, a)
+        for a, creep in enumerate(of.creep)
+        for weight, tau in zip(creep.weights_rad_v, creep.time_constants_s, strict=True)
+    ]
+    return {
+        "inverse_direct": np.array(of.direct),
+        "inverse_bouc_wen": kernels.bouc_wen_rows([b.row for b in of.bouc_wen]),
+        "inverse_bouc_wen_actuator": np.array(of.bouc_wen_actuator, dtype=np.uint64),
+        "inverse_play_threshold": np.array(of.play_thresholds, dtype=float),
+        "inverse_play_weight": np.array(of.play_weights, dtype=float),
+        "inverse_play_actuator": np.array(of.play_actuator, dtype=np.uint64),
+        "inverse_widening": np.array(of.widening or [(0.0, math.inf)] * len(of.direct)),
+        "inverse_lag_keep": np.array([math.exp(-period_s / tau) for _, tau, _ in lags]),
+        "inverse_lag_weight": np.array([weight for weight, _, _ in lags]),
+        "inverse_lag_actuator": np.array([a for _, _, a in lags], dtype=np.uint64),
+    }
 
 
 def play_inverse(model: Play) -> tuple[float, tuple[float, ...], tuple[float, ...]]:

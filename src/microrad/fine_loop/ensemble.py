@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from microrad import disturbance, kernels, mirror
-from microrad.control import Inverse, amplifier_factor, no_feedforward
+from microrad.control import amplifier_factor, inverse_arrays, no_feedforward
 from microrad.fine_loop.loop import LoopController, PointingLoop
 from microrad.sensor import StrainGauge
 from microrad.threads import in_threads
@@ -97,7 +97,6 @@ def arrays(loop: PointingLoop, controller: LoopController, seed: int) -> kernels
     plant = mirror.discretise(loop.mirror, timing.step_s)
     shaping = combined_shaping(loop)
     inverse = controller.inverse or no_feedforward(loop.mirror)
-    lags = inverse_lags(inverse)
     row = [drive.minimum_v, drive.maximum_v, drive.drive_resolution_v, amplifier_factor(drive, timing.step_s)]
     row += [drive.slew_v_s * timing.step_s, *loop.drive_range_v]
     actuators = loop.mirror.actuators
@@ -147,26 +146,8 @@ def arrays(loop: PointingLoop, controller: LoopController, seed: int) -> kernels
         D=np.ascontiguousarray(controller.system.D, dtype=float),
         L=np.ascontiguousarray(controller.anti_windup, dtype=float),
         actuator=np.tile(np.array(row), (actuators, 1)),
-        inverse_direct=np.array(inverse.direct),
-        inverse_bouc_wen=kernels.bouc_wen_rows([b.row for b in inverse.bouc_wen]),
-        inverse_bouc_wen_actuator=np.array(inverse.bouc_wen_actuator, dtype=np.uint64),
-        inverse_play_threshold=np.array(inverse.play_thresholds, dtype=float),
-        inverse_play_weight=np.array(inverse.play_weights, dtype=float),
-        inverse_play_actuator=np.array(inverse.play_actuator, dtype=np.uint64),
-        inverse_widening=np.array(inverse.widening or [(0.0, math.inf)] * actuators),
-        inverse_lag_keep=np.array([math.exp(-timing.period_s / tau) for _, tau, _ in lags]),
-        inverse_lag_weight=np.array([weight for weight, _, _ in lags]),
-        inverse_lag_actuator=np.array([a for _, _, a in lags], dtype=np.uint64),
+        **inverse_arrays(inverse, timing.period_s),
     )
-
-
-def inverse_lags(inverse: Inverse) -> list[tuple[float, float, int]]:
-    """Weight, time constant and actuator of each lag of creep that the inverse takes off."""
-    return [
-        (weight, tau, a)
-        for a, creep in enumerate(inverse.creep)
-        for weight, tau in zip(creep.weights_rad_v, creep.time_constants_s, strict=True)
-    ]
 
 
 def check_controller(loop: PointingLoop, controller: LoopController) -> None:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from microrad import disturbance, lti
-from microrad.control import amplifier_factor
+from microrad.control import amplifier_factor, gramian
 from microrad.fine_loop.loop import LoopController, PointingLoop, in_band_gain
 
 Floats = NDArray[np.float64]
@@ -337,20 +337,8 @@ def _variances(closed: ClosedLoop, monodromy: Floats, source: Source) -> tuple[F
         return P, errors / count, drives / count
 
     gathered, _, _ = over_period(np.zeros((whole, whole)))
-    _, errors, drives = over_period(lyapunov(monodromy, gathered))
+    _, errors, drives = over_period(gramian(monodromy.T, gathered))
     return errors, drives
-
-
-def lyapunov(A: Floats, Q: Floats) -> Floats:
-    """P = A P A' + Q by doubling: P <- P + A P A', A <- A A. For a stable A; what Q does not reach may be undamped."""
-    P = Q
-    for _ in range(60):
-        more = A @ P @ A.T
-        P = P + more
-        if np.max(np.abs(more)) <= 1e-14 * np.max(np.abs(P)):
-            break
-        A = A @ A
-    return 0.5 * (P + P.T)
 
 
 def _line_variances(closed: ClosedLoop) -> dict[str, Floats]:
