@@ -1097,7 +1097,6 @@ class EnsembleState(NamedTuple):
 
 
 SAMPLE, STEP, COUNTING = range(3)  # of ``place``
-INVERSE_H, INVERSE_SCRATCH = range(2)  # of a Bouc-Wen element of the inverse
 
 # A Taylor series about 0 of (exp(r) - 1) / r up to r^11, and of log as in the C library fdlibm, for |r| <= ln 2 / 2.
 _ROUND = 6755399441055744.0  # 1.5 x 2^52: adding it leaves the nearest whole number in the low bits
@@ -1231,7 +1230,7 @@ def _uniform(word):  # type: ignore[no-untyped-def]
 
 @_inline
 def _cosine_sine(turns):  # type: ignore[no-untyped-def]
-    """cos and sin of 2 pi turns, 0 <= turns <= 1, without a branch or a call, to 2e-14."""
+    """cos and sin of 2 pi turns, 0 <= turns <= 1, without a branch or a call, to 2.1e-14."""
     shifted = 4.0 * turns + _ROUND
     quarter = _bits(shifted)
     x = (4.0 * turns - (shifted - _ROUND)) * 1.5707963267948966
@@ -1750,10 +1749,10 @@ def ensemble_loop(p, s, reference, residual, trace):  # type: ignore[no-untyped-
     """Advance LANES runs over the control samples of ``reference`` (samples + 1, axes), linear between them.
 
     Fills ``residual`` (samples, axes, LANES) with the line-of-sight error at the begin of each sample, if it has rows,
-    and ``trace`` (samples, channels, LANES) likewise: disturbance by axis, drive before and now by actuator, the
-    plant's outputs, readings. Statistics are taken where ``place`` says so: squares and the largest error at every
-    plant step, sums and the histogram at the control samples. The states are left at the end, so that a following call
-    continues.
+    and ``trace`` (samples, channels, LANES) likewise, once the sample has measured: disturbance by axis, drive before
+    and now actuator by actuator, the plant's outputs, readings. Statistics are taken where ``place`` says so: squares
+    and the largest error at the end of every plant step, sums and the histogram at the end of each control sample; the
+    counters go on all the time. The states are left at the end, so that a following call continues.
     """
     axes, steps, actuators = p.optics.shape[0], p.steps_per_sample, p.actuator.shape[0]
     length = s.command.size // (actuators * LANES)

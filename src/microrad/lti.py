@@ -152,3 +152,12 @@ def feedback_poles(loop: StateSpace) -> Complexes:
     """Poles of the loop closed with unit negative feedback around ``loop`` (square)."""
     closing = np.linalg.inv(np.eye(loop.D.shape[0]) + loop.D)
     return np.asarray(np.linalg.eigvals(loop.A - loop.B @ closing @ loop.C))
+
+
+def covariance_root(matrix: Floats) -> Floats:
+    """R with R R' the positive semidefinite matrix, its scale removed first so that small states keep their digits."""
+    scale = np.sqrt(np.maximum(np.diag(matrix), 0.0))
+    product = np.outer(scale, scale)
+    unit = np.where(product > 0.0, matrix, 0.0) / np.where(product > 0.0, product, 1.0)
+    values, vectors = np.linalg.eigh(0.5 * (unit + unit.T))
+    return np.asarray(scale[:, None] * vectors * np.sqrt(np.maximum(values, 0.0)))

@@ -25,7 +25,7 @@ class OpticalSensor:
 
     ``noise_rad`` is the noise-equivalent angle: white from sample to sample, independent between the axes. The spot is
     lost where the radial error exceeds ``field_of_view_rad``, a half angle (infinite: never). ``resolution_rad`` is one
-    count, 0 ideal. It exposes at each ``every``-th control sample and delivers ``delay_steps`` plant steps later.
+    count, 0 ideal. At each ``every``-th control sample it delivers the error of ``delay_steps`` plant steps ago.
 
     Raises ValueError for a value without meaning.
     """

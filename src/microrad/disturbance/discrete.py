@@ -54,7 +54,7 @@ def discretise(disturbance: Disturbance, step_s: float) -> Discrete:
         cos, sin = math.cos(angle), math.sin(angle)
         Ad[2 * i : 2 * i + 2, 2 * i : 2 * i + 2] = [[cos, sin], [-sin, cos]]
     Ad[turning:, turning:] = filter_Ad
-    initial[turning:, turning:] = _root(_discrete_gramian(filter_Ad, filter_Bd @ filter_Bd.T))
+    initial[turning:, turning:] = lti.covariance_root(_discrete_gramian(filter_Ad, filter_Bd @ filter_Bd.T))
     return Discrete(
         Ad,
         np.vstack([np.zeros((turning, filter_Bd.shape[1])), filter_Bd]),
@@ -75,7 +75,7 @@ def _sampled_filter(disturbance: Disturbance, step_s: float) -> tuple[Floats, Fl
     seen = _discrete_gramian(Ad.T, C.T @ C)  # what a unit of noise on each state adds to the output's variance
     columns = [np.zeros((A.shape[0], 0))]
     for b in B.T[:, :, None]:
-        root = _root(_noise_covariance(A, b, step_s))
+        root = lti.covariance_root(_noise_covariance(A, b, step_s))
         parts, directions = np.linalg.eigh(root.T @ seen @ root)
         kept = parts > _DROPPED * np.sum(parts)
         variance = float((C @ covariance(A, b) @ C.T).item())
@@ -108,15 +108,6 @@ def _discrete_gramian(A: Floats, noise: Floats) -> Floats:
     from scipy.linalg import solve_discrete_lyapunov  # slow to import, not needed to show help
 
     return noise if A.size == 0 else np.asarray(solve_discrete_lyapunov(A, noise))
-
-
-def _root(matrix: Floats) -> Floats:
-    """R with R R' the positive semidefinite matrix, its scale removed first so that small states keep their digits."""
-    scale = np.sqrt(np.maximum(np.diag(matrix), 0.0))
-    product = np.outer(scale, scale)
-    unit = np.where(product > 0.0, matrix, 0.0) / np.where(product > 0.0, product, 1.0)
-    values, vectors = np.linalg.eigh(0.5 * (unit + unit.T))
-    return np.asarray(scale[:, None] * vectors * np.sqrt(np.maximum(values, 0.0)))
 
 
 def initial_state(discrete: Discrete, gaussians: Floats, phases: Floats) -> Floats:

@@ -9,7 +9,7 @@ from microrad import lti
 from microrad.control import AxisController, DesignPlant
 from microrad.disturbance import Disturbance
 from microrad.fine_loop.linear import ClosedLoop, close, gauge_noise_rad, open_loop
-from microrad.fine_loop.loop import PointingLoop, assemble, nominal_axis_gain
+from microrad.fine_loop.loop import PointingLoop, assemble, decoupling, nominal_axis_gain
 
 Floats = NDArray[np.float64]
 
@@ -21,38 +21,40 @@ def residual_spectrum(closed: ClosedLoop, freq_hz: Floats) -> Floats:
     if loop.optical.every != 1:
         raise ValueError("a residual spectrum needs an optical reading at every control sample")
     monodromy = closed.monodromy
-    factor = _noise_factor(closed)
     reading = np.zeros((loop.axes, whole))
     reading[:, : o.at.order] = o.error
     keep = np.ones(whole, dtype=bool)
     keep[o.lines] = False
+    # From every state to the error, then the covariance: its factor would lose what is small in other units.
+    every = np.eye(int(keep.sum()))
     system = lti.StateSpace(
-        monodromy[np.ix_(keep, keep)], factor[keep], reading[:, keep], np.zeros((loop.axes, factor.shape[1]))
+        monodromy[np.ix_(keep, keep)], every, reading[:, keep], np.zeros((loop.axes, every.shape[0]))
     )
     response = lti.frequency_response(system, freq_hz, loop.timing.period_s)
-    return np.asarray(2.0 * loop.timing.period_s * np.sum(np.abs(response) ** 2, axis=2))
+    added = _added_in_a_period(closed)[np.ix_(keep, keep)]
+    power = np.einsum("fai,ij,faj->fa", response, added, response.conj()).real
+    return np.asarray(2.0 * loop.timing.period_s * power)
 
 
-def _noise_factor(closed: ClosedLoop) -> Floats:
-    """A square root of the covariance that one control period adds to the state at its end."""
+def _added_in_a_period(closed: ClosedLoop) -> Floats:
+    """Covariance that the noises of one control period add to the state at its end."""
     (sample_noise,) = closed.sample_noise
     P = sample_noise @ sample_noise.T
     for step in closed.steps:
         P = step @ P @ step.T + closed.step_noise @ closed.step_noise.T
-    values, vectors = np.linalg.eigh(0.5 * (P + P.T))
-    kept = values > 1e-18 * max(float(values[-1]), 1e-300)
-    return np.asarray(vectors[:, kept] * np.sqrt(values[kept]))
+    return P
 
 
 def design_plant(loop: PointingLoop) -> DesignPlant:
     """What a controller of one axis of this loop is designed for. ``loop`` has one axis.
 
-    A sensor slower than the control is taken as one that delivers every sample, later by half of what its hold adds,
-    and disturbance lines as narrow bands of noise.
+    A sensor slower than the control is taken as one that delivers every sample, later by half of what its hold adds and
+    with the noise that it spreads to low frequencies; disturbance lines are taken as narrow bands of noise.
     """
     if loop.axes != 1 or loop.mirror.actuators != 1:
         raise ValueError(f"a design needs a loop of one axis, not of {loop.axes}: design each axis by itself")
-    extra = round(0.5 * (loop.optical.every - 1) * loop.timing.steps_per_sample)
+    held = loop.optical.every
+    extra = round(0.5 * (held - 1) * loop.timing.steps_per_sample)
     optical = replace(loop.optical, every=1, delay_steps=loop.optical.delay_steps + extra)
     random = tuple(tuple(narrow_band(each) for each in several) for several in loop.disturbances)
     loop = replace(loop, optical=optical, disturbances=random)
@@ -65,21 +67,20 @@ def design_plant(loop: PointingLoop) -> DesignPlant:
     for step in o.steps:
         period = step @ period
         factor = step @ factor @ step.T + o.noise @ o.noise.T
-    command[o.newest] = 1.0
-    values, vectors = np.linalg.eigh(0.5 * (factor + factor.T))
-    kept = values > 1e-16 * max(float(values[-1]), 1e-300)
-    noises = vectors[:, kept] * np.sqrt(values[kept])
+    command[o.newest] = decoupling(loop)
+    root = lti.covariance_root(factor)
+    noises = root[:, np.any(root != 0.0, axis=0)]
     B = np.hstack([(period @ command), noises, np.zeros((o.at.order, 2))])[keep]
     A = (period @ shift)[np.ix_(keep, keep)]
     rows = np.vstack([o.error, o.reading, loop.optics @ o.mirror])[:, keep]
     gauge = gauge_noise_rad(loop) * abs(float(loop.optics[0, 0]))
     D = np.zeros((3, B.shape[1]))
-    D[1, -2], D[2, -1] = loop.optical.noise_rad, gauge
+    D[1, -2], D[2, -1] = loop.optical.noise_rad * np.sqrt(held), gauge
     has_gauge = loop.gauge is not None
     if not has_gauge:
         rows[2] = 0.0
     system = lti.StateSpace(A, B, rows, D)
-    return DesignPlant(loop.timing.period_s, system, int(kept.sum()), nominal_axis_gain(loop), True, has_gauge)
+    return DesignPlant(loop.timing.period_s, system, noises.shape[1], nominal_axis_gain(loop), True, has_gauge)
 
 
 def close_axis(loop: PointingLoop, controller: AxisController) -> ClosedLoop:

@@ -43,6 +43,7 @@ class Ensemble:
     psd_rad2_hz: Floats
     samples: int
     steps: int
+    readings: int
 
     @property
     def axis_rms_rad(self) -> Floats:
@@ -65,9 +66,13 @@ class Ensemble:
         return histogram_quantile(self.histogram.sum(axis=0), share)
 
     def share(self, counter: int) -> float:
-        """How often a counter counted: per control sample for saturation and lost spots, per plant step otherwise."""
-        sampled = counter in (kernels.COUNT_SATURATED, kernels.COUNT_LOST, kernels.COUNT_INVERSE_CLAMPED)
-        return float(np.mean(self.counts[:, counter])) / (self.samples if sampled else self.steps)
+        """How often a counter counted, of all actuators or elements together, so that it may exceed 1.
+
+        Lost spots per optical reading, saturation and the inverse's rate per control sample, the others per plant step.
+        """
+        sampled = counter in (kernels.COUNT_SATURATED, kernels.COUNT_INVERSE_CLAMPED)
+        times = self.readings if counter == kernels.COUNT_LOST else self.samples if sampled else self.steps
+        return float(np.mean(self.counts[:, counter])) / times
 
 
 def bin_edges_rad() -> Floats:
@@ -84,6 +89,7 @@ def histogram_quantile(counts: NDArray[np.integer], share: float) -> float:
         return math.nan
     wanted = share * float(total[-1])
     at = int(np.searchsorted(total, wanted))
+    at = max(at, int(np.flatnonzero(counts)[0]))  # a share of 0 is the lower edge of the first bin in use
     below = float(total[at - 1]) if at else 0.0
     inside = (wanted - below) / float(counts[at])
     low, high = bin_edges_rad()[at : at + 2] ** 2
@@ -155,15 +161,17 @@ def check_controller(loop: PointingLoop, controller: LoopController) -> None:
     s, m = controller.system, loop.mirror
     inputs = loop.axes + m.axes + loop.axes
     outputs = m.actuators * (3 if controller.inverse else 1)
-    wanted = {"B": (s.order, inputs), "C": (outputs, s.order), "D": (outputs, inputs)}
-    for key, shape in wanted.items():
-        found = getattr(s, key).shape
+    order = s.A.shape[0]
+    wanted = {"A": (order, order), "B": (order, inputs), "C": (outputs, order), "D": (outputs, inputs)}
+    matrices = {**{key: getattr(s, key) for key in "ABCD"}, "L": controller.anti_windup}
+    for key, shape in {**wanted, "L": (order, m.actuators)}.items():
+        found = matrices[key].shape
         if found != shape:
             raise ValueError(
                 f"controller {controller.name!r}: matrix {key} has the shape {found}, the loop needs {shape} "
                 f"({loop.axes} optical, {m.axes} gauge and {loop.axes} reference inputs; {outputs} outputs)"
             )
-    for key, matrix in (*((k, getattr(s, k)) for k in "ABCD"), ("L", controller.anti_windup)):
+    for key, matrix in matrices.items():
         if not np.all(np.isfinite(matrix)):
             raise ValueError(f"controller {controller.name!r}: matrix {key} holds a number that is not finite")
 
@@ -180,12 +188,12 @@ class Shaping:
     parts: tuple[tuple[int, disturbance.Discrete, int], ...]  # first state, model, first purpose
 
 
-PURPOSES_OF_ONE = 16  # streams set aside for each disturbance of an axis
+PURPOSES_OF_ONE = 256  # streams set aside for each disturbance of an axis
 
 
 def purpose_of(name: str, axis: int) -> int:
     """First stream of a disturbance of an axis: it goes by its name, so leaving another out does not change it."""
-    return (zlib.crc32(name.encode()) % (1 << 20) * 4 + axis) * PURPOSES_OF_ONE
+    return (zlib.crc32(name.encode()) % (1 << 16) * 4 + axis) * PURPOSES_OF_ONE
 
 
 def combined_shaping(loop: PointingLoop) -> Shaping:
@@ -377,7 +385,7 @@ def _periodogram(residual: Floats, period_s: float) -> Floats:
     for axis in range(residual.shape[1]):
         transformed = np.fft.rfft(residual[:, axis, :] * window[:, None], axis=0)
         found[:, axis] = np.mean(np.abs(transformed) ** 2, axis=1)
-    found *= 2.0 * period_s / np.sum(window**2)
+    found *= 2.0 * period_s / max(float(np.sum(window**2)), 1e-300)  # a window of one sample is empty
     found[[0, -1]] /= 2.0
     return found
 
@@ -402,6 +410,7 @@ def _joined(name: str, loop: PointingLoop, span: Span, parts: list[_Batch], runs
         psd_rad2_hz=parts[0].psd,
         samples=samples,
         steps=steps,
+        readings=-(-samples // loop.optical.every),
     )
 
 

@@ -58,7 +58,7 @@ def optics(m: Mission) -> geometry.Geometry:
     g = table(m).geometry
     if m.conventions.mirror_angle == "line-of-sight" and g.magnification != 1.0:
         raise ValueError(
-            f'fine_pointing.geometry.magnification = {g.magnification:g}, but conventions.mirror_angle = '
+            f"fine_pointing.geometry.magnification = {g.magnification:g}, but conventions.mirror_angle = "
             '"line-of-sight" says that the output is the line of sight already: say "optical" or "mechanical" there'
         )
     return geometry.Geometry(

@@ -8,7 +8,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from microrad.mission import Source
 from microrad.missionfile import assumptions, changed_from_shipped
-from microrad.report import words
+from microrad.report import fine_pointing, words
 from microrad.report.figures import Figure
 from microrad.report.results import versions
 from microrad.study import Study
@@ -22,10 +22,13 @@ def pages() -> Environment:
     )
 
 
-def render(study: Study, figures: Sequence[Figure]) -> str:
-    """The page's HTML; every text of the mission is escaped, and nothing is loaded from anywhere."""
+def render(study: Study, figures: Sequence[Figure], fine_figures: Sequence[Figure] = ()) -> str:
+    """The page's HTML; every text of the mission is escaped, and nothing is loaded from anywhere.
+
+    ``fine_figures`` go to the section on the fine-pointing loop, which a study without that loop does not have.
+    """
     template = pages().get_template("page.html")
-    m = study.file.mission
+    m, fine = study.file.mission, study.fine_pointing
     context: dict[str, Any] = {
         "study": study,
         "mission": m,
@@ -43,13 +46,16 @@ def render(study: Study, figures: Sequence[Figure]) -> str:
         "assumptions": assumptions(study.file),
         "inputs": _inputs(study.file.sources),
         "figures": figures,
+        "fine": None if fine is None else fine_pointing.context(fine, m, fine_figures),
         "versions": versions(),
     }
     return template.render(context)
 
 
 def _inputs(sources: Any) -> list[tuple[str, Source]]:
-    return [(key, source) for key, source in sources.items() if source.kind != "assumption"]
+    """What was given, but for the hundreds of numbers of a correlation, which stand in the mirror file."""
+    shown = (item for item in sources.items() if item[0] != "mirror.uncertainty.correlation")
+    return [(key, source) for key, source in shown if source.kind != "assumption"]
 
 
 def _margins(study: Study) -> list[tuple[str, str]]:

@@ -2,18 +2,23 @@
 
 import hashlib
 import json
+import math
 import platform
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 
+from microrad.fine_pointing import COUNTERS, FinePointingStudy, Residual
+from microrad.report.fine_pointing_data import margins, rms_by_source, sources
 from microrad.study import Study
 from microrad.tracking import Run
 
+Floats = NDArray[np.float64]
 LIBRARIES = ("microrad", "numpy", "scipy", "numba", "xarray", "h5netcdf", "matplotlib", "pydantic")
 
 
@@ -71,12 +76,146 @@ def _loops(study: Study) -> dict[str, xr.Dataset]:
     }
 
 
+def _names(dimension: str, values: Sequence[str], long_name: str) -> dict[str, xr.Variable]:
+    """A coordinate of names."""
+    return {dimension: _variable((dimension,), np.asarray(values, dtype=object), "1", long_name)}
+
+
+def _fine_pointing(fine: FinePointingStudy) -> dict[str, xr.Dataset]:
+    """Spectra, residuals, theory by source, margins, error budget and sines of the fine-pointing loop."""
+    groups = {
+        "spectra": _spectra(fine),
+        "residuals": _residuals(fine),
+        "theory": _theory(fine),
+        "margins": _loop_margins(fine),
+        "error_budget": _error_budget(fine),
+        "sines": _sines(fine),
+    }
+    return {f"fine_pointing/{name}": group for name, group in groups.items()}
+
+
+def _controllers(fine: FinePointingStudy) -> dict[str, xr.Variable]:
+    return _names("controller", [v.design.name for v in fine.verified], "controller")
+
+
+def _spectra(fine: FinePointingStudy) -> xr.Dataset:
+    dims, unit = ("controller", "frequency", "axis"), "rad^2/Hz"
+    after = np.stack([v.spectrum_rad2_hz for v in fine.verified])
+    predicted = np.stack([v.predicted_rad2_hz for v in fine.verified])
+    before = "one-sided spectrum of the disturbances of an axis before the loop, lines left out"
+    data = {
+        "before": _variable(("frequency",), fine.disturbed_rad2_hz, unit, before),
+        "residual": _variable(dims, after, unit, "one-sided spectrum of the simulated residual, mission's mirror"),
+        "predicted": _variable(dims, predicted, unit, "one-sided spectrum of the residual in linear theory"),
+    }
+    freq = {"frequency": _variable(("frequency",), fine.freq_hz, "Hz", "frequency")}
+    axes = _names("axis", _axes(fine), "axis of the line of sight")
+    return xr.Dataset(data, {**_controllers(fine), **freq, **axes})
+
+
+def _axes(fine: FinePointingStudy) -> tuple[str, ...]:
+    return ("x", "y")[: fine.scene.loop.axes]
+
+
+def _residuals(fine: FinePointingStudy) -> xr.Dataset:
+    variants = tuple(dict.fromkeys(name for v in fine.verified for name in v.simulated))
+    limits = tuple(COUNTERS)
+    table = [[v.simulated.get(name) for name in variants] for v in fine.verified]
+
+    def gathered(pick: Callable[[Residual], Any], missing: Any = math.nan) -> Floats:
+        return np.array([[missing if r is None else pick(r) for r in row] for row in table], dtype=float)
+
+    dims, no_axes = ("controller", "mirror"), [math.nan] * fine.scene.loop.axes
+    shares = gathered(lambda r: [r.shares.get(name, 0.0) for name in limits], [math.nan] * len(limits))
+    axis_rms = gathered(lambda r: r.axis_rms_rad, no_axes)
+    at = f"radial error that {fine.quantile:g} of the time stays below"
+    interval = "half width of the 99 % interval of the radial rms over the runs"
+    data = {
+        "rms": _variable(dims, gathered(lambda r: r.rms_rad), "rad", "radial rms"),
+        "rms_interval": _variable(dims, gathered(lambda r: r.rms_interval_rad), "rad", interval),
+        "axis_rms": _variable((*dims, "axis"), axis_rms, "rad", "rms by axis"),
+        "quantile": _variable(dims, gathered(lambda r: r.quantile_rad), "rad", at),
+        "largest": _variable(dims, gathered(lambda r: r.largest_rad), "rad", "largest radial error"),
+        "share": _variable((*dims, "limit"), shares, "1", "share of samples or plant steps at which a limit was met"),
+    }
+    names = {**_controllers(fine), **_names("mirror", variants, "variant of the mirror")}
+    names |= _names("axis", _axes(fine), "axis of the line of sight") | _names("limit", limits, "limit")
+    return xr.Dataset(data, names, {"quantile": fine.quantile, "best": fine.best.design.name})
+
+
+def _theory(fine: FinePointingStudy) -> xr.Dataset:
+    names = sources(fine.verified)
+    parts = [rms_by_source(v) for v in fine.verified]
+    by_source = np.array([[part.get(name, math.nan) for name in names] for part in parts])
+    total = np.array([v.theory.radial_rms_rad for v in fine.verified])
+    data = {
+        "rms_by_source": _variable(("controller", "source"), by_source, "rad", "radial rms that one source leaves"),
+        "rms": _variable(("controller",), total, "rad", "radial rms of all sources"),
+        "bound": _variable((), fine.optimum_rad, "rad", "radial rms below which no linear controller comes"),
+    }
+    return xr.Dataset(data, {**_controllers(fine), **_names("source", names, "source of error")})
+
+
+_MARGINS = {
+    "modulus": ("1", "modulus margin, min |1 + L|"),
+    "gain_up_db": ("dB", "gain margin upwards"),
+    "phase_rad": ("rad", "phase margin"),
+    "delay_s": ("s", "delay margin"),
+    "disk": ("1", "symmetric disk margin, 2 / max |S - T|"),
+    "bandwidth_hz": ("Hz", "lowest frequency with |S| = 1"),
+    "crossover_hz": ("Hz", "highest frequency with |L| = 1"),
+}
+
+
+def _loop_margins(fine: FinePointingStudy) -> xr.Dataset:
+    found = [margins(v.design) for v in fine.verified]
+    data = {
+        key: _variable(("controller",), np.array([each[key] for each in found]), unit, long_name)
+        for key, (unit, long_name) in _MARGINS.items()
+    }
+    return xr.Dataset(data, _controllers(fine))
+
+
+def _error_budget(fine: FinePointingStudy) -> xr.Dataset:
+    b = fine.budget
+    alone, theory = ([getattr(p, key) for p in b.parts] for key in ("rms_rad", "theory_rad"))
+    with_it, without = ([getattr(d, key) for d in b.differences] for key in ("with_rad", "without_rad"))
+    data = {
+        "rms": _variable(("part",), alone, "rad", "radial rms of one part alone, simulated without hysteresis"),
+        "theory": _variable(("part",), theory, "rad", "radial rms of one part alone in linear theory"),
+        "combined": _variable((), b.combined_rad, "rad", "root sum square of the parts"),
+        "together": _variable((), b.together_rad, "rad", "radial rms of all parts together, without hysteresis"),
+        "full": _variable((), b.full_rad, "rad", "radial rms of the full loop"),
+        "with": _variable(("left_out",), with_it, "rad", "radial rms of the full loop"),
+        "without": _variable(("left_out",), without, "rad", "radial rms of the full loop but for what is left out"),
+    }
+    names = _names("part", [p.name for p in b.parts], "part of the error")
+    names |= _names("left_out", [d.name for d in b.differences], "part that is left out")
+    return xr.Dataset(data, names, {"controller": b.controller})
+
+
+def _sines(fine: FinePointingStudy) -> xr.Dataset:
+    """One entry a run: not every controller need have run on every mirror."""
+    s, run = fine.sines, ("run",)
+    at = f"radial error that {fine.quantile:g} of the time stays below"
+    data = {
+        "controller": _variable(run, np.array([each.controller for each in s], dtype=object), "1", "controller"),
+        "mirror": _variable(run, np.array([each.variant for each in s], dtype=object), "1", "variant of the mirror"),
+        "frequency": _variable(run, np.array([each.freq_hz for each in s]), "Hz", "frequency of the sine on axis x"),
+        "rms": _variable(run, np.array([each.rms_rad for each in s]), "rad", "radial rms"),
+        "quantile": _variable(run, np.array([each.quantile_rad for each in s]), "rad", at),
+    }
+    return xr.Dataset(data)
+
+
 def write_results(study: Study, path: Path) -> None:
-    """results.nc: the margin map, the hysteresis loops and every trace, each variable with its unit."""
+    """results.nc: margin map, hysteresis loops, every trace, the fine-pointing loop; each variable with its unit."""
     groups = {"margin_map": _map(study), **_loops(study)}
     for run in study.runs:
         name = f"{run.mirror} {run.controller} {run.freq_hz:g}_hz".replace(" + ", "_").replace(" ", "_").lower()
         groups[f"tracking/{name}"] = _trace(run)
+    if study.fine_pointing is not None:
+        groups |= _fine_pointing(study.fine_pointing)
     tree = xr.DataTree.from_dict({f"/{name}": group for name, group in groups.items()})
     tree.attrs = {"title": study.file.mission.name, "mission_sha256": study.file.sha256}
     tree.to_netcdf(path, engine="h5netcdf")
@@ -85,7 +224,7 @@ def write_results(study: Study, path: Path) -> None:
 def manifest(study: Study, folder: Path) -> dict[str, Any]:
     """What made the results: the mission's text and hash, versions, and a hash of each file written so far.
 
-    A study draws no random number; there is no seed to keep.
+    Random numbers are drawn for the fine-pointing loop alone, from the mission's seed.
     """
     mission: dict[str, Any] = {"file": study.file.path.name, "sha256": study.file.sha256, "text": study.file.text}
     files: Mapping[str, Any] = {
@@ -93,13 +232,13 @@ def manifest(study: Study, folder: Path) -> dict[str, Any]:
         for p in sorted(folder.rglob("*"))
         if p.is_file()
     }
-    mirror = study.file.mirror_file
+    mirror, fine = study.file.mirror_file, study.file.mission.fine_pointing
     return {
         "mission": mission,
         "mirror": None if mirror is None else {"file": mirror.path.name, "sha256": mirror.sha256, "text": mirror.text},
         "versions": versions(),
         "machine": platform.machine(),
-        "randomness": "none",
+        "randomness": "none" if fine is None else f"seed {fine.seed} of [fine_pointing], {fine.runs} runs",
         "files_sha256": files,
     }
 

@@ -4,6 +4,8 @@ from typing import Any
 
 from microrad.mission import Mission
 from microrad.missionfile import changed_from_shipped
+from microrad.report import fine_pointing_words
+from microrad.report.fine_pointing_data import data as fine_pointing_data
 from microrad.study import Study
 from microrad.tracking import Run, residual_rad
 from microrad.units import format_quantity
@@ -54,6 +56,8 @@ def explanation(study: Study) -> list[str]:
             f"On the mission's comparison model of the mirror the residual is {format_quantity(left, 'rad', 3)} and "
             f"the margin {study.comparison.margin_db:+.2f} dB."
         )
+    if study.fine_pointing is not None:
+        sentences += fine_pointing_words.short(study.fine_pointing, m)
     return sentences
 
 
@@ -117,12 +121,14 @@ def warnings(study: Study) -> list[str]:
         for loop in study.loops
         if loop.clamped
     ]
+    if study.fine_pointing is not None:
+        found += fine_pointing_words.warnings(study.fine_pointing, m)
     return found
 
 
 def summary(study: Study) -> dict[str, Any]:
     """The study as plain data, in SI units with the unit in each key."""
-    m = study.file.mission
+    m, fine = study.file.mission, study.fine_pointing
     return {
         "mission": m.name,
         "mission_sha256": study.file.sha256,
@@ -175,5 +181,6 @@ def summary(study: Study) -> dict[str, Any]:
         "paper": [
             {"where": c.where, "claim": c.claim, "ours": c.ours, "agrees": c.agrees, "why": c.why} for c in study.claims
         ],
+        "fine_pointing": None if fine is None else fine_pointing_data(fine, m),
         "warnings": warnings(study),
     }

@@ -1,0 +1,617 @@
+"""The fine-pointing loop in the report: its numbers on the page, in words, as data and in results.nc; its warnings."""
+
+import csv
+import json
+import math
+from dataclasses import replace
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+import xarray as xr
+from numpy.testing import assert_allclose, assert_array_equal
+
+from microrad import control, fine_pointing, missionfile, paper, report, study
+from microrad.control.tuning import MARGIN
+from microrad.fine_loop.design import design_plant, residual_spectrum
+from microrad.fine_loop.linear import close, stationary
+from microrad.fine_loop.loop import ReferenceFilter, assemble, with_inverse
+from microrad.fine_pointing import Difference, ErrorBudget, FinePointingStudy, Part, Residual, Sine, Verified
+from microrad.report import fine_pointing as section
+from microrad.report import fine_pointing_figures as figures
+from microrad.report import fine_pointing_words as words
+from microrad.report import page as report_page
+from microrad.report import results
+from shipped import SHIPPED
+
+HEADING = "Fine pointing under vibration and noise"
+VARIANTS = ("given", "comparison", "no hysteresis")
+SECOND, THIRD = "PI + inverse in series", "quick PI"
+
+
+@pytest.fixture(scope="module")
+def file():
+    return missionfile.load_mission(SHIPPED)
+
+
+@pytest.fixture(scope="module")
+def mission(file):
+    return file.mission
+
+
+@pytest.fixture(scope="module")
+def plain(file):
+    """The study of the shipped mission but for its fine-pointing loop."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(study.fine_pointing, "run", lambda *args: None)
+        patch.setattr(paper, "applies", lambda mission: False)
+        return study.run(file)
+
+
+@pytest.fixture(scope="module")
+def fine(file):
+    """A study of three controllers in the mission's own loop; what they leave is made up, each number unlike others."""
+    scene = fine_pointing.scene(file)
+    freq = np.linspace(0.0, 0.5 / scene.loop.timing.period_s, 129)
+    plant, path, made = design_plant(scene.axis), ReferenceFilter(1000.0), []
+    for name, gains in ((fine_pointing.BASELINE, (150.0, 400.0)), (SECOND, (120.0, 300.0)), (THIRD, (190.0, 500.0))):
+        axis = control.PI.build(plant, np.array(gains))
+        values, margins = (
+            dict(zip(("integral frequency", "zero"), gains, strict=True)),
+            control.loop_margins(plant, axis),
+        )
+        tuned = control.Tuned(axis, values, 1e-6, 1e-6, 1e-6, margins, margins.modulus, margins.bandwidth_hz, 1, ())
+        if name == SECOND:
+            loop = with_inverse(name, scene.loop, axis, control.inverse(scene.loop.mirror), path, True)
+        else:
+            loop = assemble(name, scene.loop, axis)
+        made.append(fine_pointing.Design(name, tuned, loop, "in series" if name == SECOND else ""))
+    verified = tuple(verified_of(scene, design, i, freq) for i, design in enumerate(made))
+    budget = ErrorBudget(
+        SECOND,
+        (Part("OLYMPUS", 3.0e-6, 3.1e-6), Part("body pointing", 0.4e-6, 0.41e-6), Part("quantisation", 0.0, math.nan)),
+        3.03e-6,
+        3.05e-6,
+        (Difference("hysteresis", 3.05e-6, 3.03e-6), Difference("computation delay", 3.05e-6, 2.0e-6)),
+    )
+    sines = tuple(
+        Sine(design.name, variant, freq_hz, (2.0 + i) * 1e-6, (7.13 + i + freq_hz / 10) * 1e-6)
+        for variant in ("given", "comparison")
+        for i, design in enumerate(made)
+        for freq_hz in (1.0, 25.0)
+    )
+    disturbed = 80e-12 / (1.0 + freq**2)
+    bound = 0.97 * min(v.theory.radial_rms_rad for v in verified)
+    return FinePointingStudy(scene, verified, verified[1], budget, sines, freq, disturbed, 0.997, bound)
+
+
+def verified_of(scene, design, i, freq):
+    """Made-up residuals: 4.x, 5.x and 6.x µrad at 99.7 %, the second controller's the smallest."""
+    closed = close(scene.loop, design.controller)
+    theory = stationary(closed)
+    simulated = {}
+    for place, variant in enumerate(VARIANTS):
+        rms = (
+            theory.radial_rms_rad * (1.0 + 0.01 * i)
+            if variant == "no hysteresis"
+            else (2.11 + i / 7 + place / 9) * 1e-6
+        )
+        quantile = ((5.17, 4.23, 6.41)[i] + place / 20) * 1e-6
+        simulated[variant] = Residual(rms, 0.012e-6, (rms / 1.4, rms / 1.5), quantile, quantile + 2.22e-6, {})
+    predicted = np.full((freq.size, 2), np.nan)
+    predicted[1:-1] = residual_spectrum(closed, freq[1:-1])
+    return Verified(design, theory, simulated, np.nan_to_num(1.1 * predicted, nan=1e-18), predicted)
+
+
+def with_fine(plain, fine):
+    """The study with this fine-pointing loop in it, and its requirement."""
+    requirement = study.fine_requirement(plain.file.mission, fine)
+    return replace(plain, fine_pointing=fine, requirements=(*plain.requirements, requirement))
+
+
+def changed(fine, name, **to):
+    """The study with fields of one controller's record replaced, the best among them."""
+    verified = tuple(replace(v, **to) if v.design.name == name else v for v in fine.verified)
+    best = next(v for v in verified if v.design.name == fine.best.design.name)
+    return replace(fine, verified=verified, best=best)
+
+
+def with_residual(fine, name, variant="given", **to):
+    """The study with numbers of one residual replaced."""
+    simulated = next(v for v in fine.verified if v.design.name == name).simulated
+    return changed(fine, name, simulated={**simulated, variant: replace(simulated[variant], **to)})
+
+
+@pytest.fixture(scope="module")
+def written(plain, fine, tmp_path_factory):
+    target = tmp_path_factory.mktemp("report") / "study"
+    report.write(with_fine(plain, fine), target)
+    return target
+
+
+def render(of, drawn=()):
+    """The page without its other figures, which take most of the time."""
+    return report_page.render(of, (), drawn)
+
+
+def results_of(of, folder):
+    """What results.nc holds, with one trace."""
+    results.write_results(replace(of, runs=of.runs[:1]), folder / "results.nc")
+    return xr.open_datatree(folder / "results.nc", engine="h5netcdf")
+
+
+class Tables(HTMLParser):
+    """The tables of a page, rows of cells of text, by the heading above them; and all its text."""
+
+    def __init__(self):
+        super().__init__()
+        self.found, self.text, self.heading, self.inside = {}, [], "", None
+
+    def handle_starttag(self, tag, attrs):
+        self.inside = tag if tag in ("h2", "h3", "td", "th", "svg") else self.inside
+        if tag in ("h2", "h3"):
+            self.heading = ""
+        if tag == "tr":
+            self.found.setdefault(self.heading, []).append([])
+        if tag in ("td", "th"):
+            self.found[self.heading][-1].append("")
+
+    def handle_endtag(self, tag):
+        self.inside = None if tag == self.inside else self.inside
+
+    def handle_data(self, data):
+        if self.inside in ("h2", "h3"):
+            self.heading += data
+        elif self.inside in ("td", "th"):
+            self.found[self.heading][-1][-1] += " ".join(data.split()) + " "
+        if self.inside != "svg":
+            self.text.append(data)
+
+
+def read(page):
+    tables = Tables()
+    tables.feed(page)
+    rows = {heading: [[cell.strip() for cell in row] for row in several] for heading, several in tables.found.items()}
+    return rows, " ".join(" ".join(tables.text).split())
+
+
+@pytest.fixture(scope="module")
+def page(written):
+    return read((written / "report.html").read_text(encoding="utf-8"))
+
+
+def row(page, heading, name):
+    (found,) = [cells for cells in page[0][heading] if cells[0] == name]
+    return found
+
+
+def micro(value_rad):
+    """Three digits of a number from 1 to 100."""
+    value = 1e6 * value_rad
+    assert 1.0 <= value < 100.0
+    return f"{value:.2f}" if value < 9.995 else f"{value:.1f}"
+
+
+# ------------------------------------------------------------------------------------------------ the page
+
+
+def test_each_controller_stands_with_what_it_leaves_on_each_mirror(page, fine):
+    for v in fine.verified:
+        cells = row(page, "What each controller leaves", v.design.name)
+        assert cells[1] == micro(v.theory.radial_rms_rad)
+        for place, variant in enumerate(VARIANTS):
+            r = v.simulated[variant]
+            wanted = [f"{1e6 * r.rms_rad:.2f} ± 0.01", micro(r.quantile_rad) + " PASS", micro(r.largest_rad)]
+            assert cells[2 + 3 * place : 5 + 3 * place] == wanted
+    assert "No controller met a limit" in page[1]
+
+
+def test_margins_and_parameters_are_the_designs(page, fine):
+    for v in fine.verified:
+        m = v.design.tuned.margins
+        cells = row(page, "What each controller was tuned to, and its margins", v.design.name)
+        low, high = (f"{name} {v.design.tuned.values[name]:g} Hz" for name in ("integral frequency", "zero"))
+        assert cells[1] == f"{low}, {high}" + ("; inverse in series" if v.design.name == SECOND else "")
+        assert cells[2:9] == [
+            f"{m.modulus:.2f}",
+            f"{20 * math.log10(m.gain_up):.1f}",
+            f"{math.degrees(m.phase_rad):.0f}",
+            f"{m.delay_s * 1e6:.0f}",
+            f"{m.disk:.2f}",
+            f"{m.bandwidth_hz:.3g}",
+            f"{m.crossover_hz:.3g}",
+        ]
+        assert cells[9] == "nothing"
+
+
+def test_controllers_stand_against_disturbances_and_the_open_loop(page, fine):
+    heading = "Controllers against disturbances"
+    assert page[0][heading][0] == [
+        "Controller",
+        "vibration (OLYMPUS)",
+        "body pointing",
+        "optical sensor noise",
+        "gauge noise",
+        "all",
+    ]
+    assert row(page, heading, "before the loop")[1:3] == ["15.9", "141"]  # sqrt(80 pi) radial, sqrt(2) 100 µrad
+    for v in fine.verified:
+        cells = row(page, heading, v.design.name)
+        assert cells[1] == micro(math.sqrt(np.sum(v.theory.error_by_source["OLYMPUS"])))
+        assert cells[5] == micro(v.theory.radial_rms_rad)
+
+
+def test_the_error_budget_adds_up_on_the_page(page):
+    heading = f"Error budget of {SECOND}"
+    assert row(page, heading, "vibration (OLYMPUS)")[1:] == ["3.00", "3.10", "98.3 %"]
+    assert row(page, heading, "body pointing")[1:] == ["0.400", "0.410", "1.7 %"]
+    assert row(page, heading, "quantisation")[1:] == ["0", "", "0 %"]
+    both, expected = (math.hypot(*pair) for pair in ((3.0, 0.4), (3.1, 0.41)))
+    assert row(page, heading, "Root sum square of the parts")[1:3] == [f"{both:.2f}", f"{expected:.2f}"]
+    assert row(page, heading, "All together, the mission's mirror")[1] == "3.05"
+    added = math.sqrt(3.05**2 - 3.03**2)
+    assert row(page, heading, "hysteresis")[1:] == ["3.05", "3.03", f"{added:.3f}"]
+    assert "the loop counts as linear" in page[1]
+
+
+def test_the_stroke_stands_with_and_without_point_ahead(page, fine):
+    axes = (*fine.scene.stroke, *fine.scene.stroke_without_point_ahead)
+    assert page[0]["Stroke"][0][1:] == ["Point-ahead on the mirror (this mission)", "Point-ahead elsewhere"]
+    assert row(page, "Stroke", "Point-ahead")[1:] == ["71.0", "0", "0", "0"]
+    pairs = [f"{1e6 * axis.needed_rad:.0f} / {1e6 * axis.needed_rss_rad:.0f}" for axis in axes]
+    assert row(page, "Stroke", "Needed at the mirror, optical angle")[1:] == pairs
+    assert row(page, "Stroke", "Available there: half of the usable travel")[1:] == ["534"] * 4
+    assert row(page, "Stroke", "Fits")[1:] == ["no / yes"] * 4
+    assert 'travel of 2.5 mrad would "fully cover"' in page[1]
+    assert "is 1.25 mrad to either side" in page[1] and "the travel covers both" in page[1]
+    assert "reaches 43 % of the travel, 534 µrad" in page[1]
+    assert "the claim holds for the travel, and not for the drive" in page[1]
+
+
+def test_sines_are_held_against_the_requirement(page, fine):
+    heading = "The paper's sines under vibration and noise"
+    assert page[0][heading][1] == ["Controller", "1 Hz", "25 Hz", "1 Hz", "25 Hz"]
+    for v in fine.verified:
+        here = [s for s in fine.sines if s.controller == v.design.name]
+        marks = ["PASS" if s.quantile_rad <= 10e-6 else "FAIL" for s in here]
+        assert row(page, heading, v.design.name)[1:] == [
+            f"{micro(s.rms_rad)} / {micro(s.quantile_rad)} {mark}" for s, mark in zip(here, marks, strict=True)
+        ]
+    first = fine.verified[0].design.name
+    assert f"is met at 1 Hz by all controllers; at 25 Hz by {first}." in page[1]
+
+
+def test_the_section_opens_with_the_verdict_and_its_distance_from_theory(page, fine):
+    text, best, baseline = page[1], fine.best, fine.verified[0]
+    r, reference = best.simulated["given"], baseline.simulated["given"]
+    assert f"{SECOND} is the best of 3 controllers" in text
+    assert f"stays within {micro(r.quantile_rad)} µrad for 99.7 % of the time" in text
+    assert "The 10 µrad required are met" in text
+    assert "Vibration (OLYMPUS) makes up most of it: 3.00 µrad of 3.05 µrad rms" in text
+    others = [micro(best.simulated[v].quantile_rad) for v in VARIANTS[1:]]
+    assert f"leaves {others[0]} µrad on the comparison model and {others[1]} µrad without hysteresis" in text
+    worse = r.rms_rad / reference.rms_rad - 1.0
+    assert f"the rms of {SECOND} is {100 * worse:.2g} % higher" in text
+    assert f"no linear controller comes below {micro(fine.optimum_rad)} µrad rms" in text
+    left = 1.0 - fine.optimum_rad / baseline.theory.radial_rms_rad
+    assert f"at most {100 * left:.2g} % are to be gained over it" in text
+    assert (
+        "Theory does not allow 20 % there. The question of a better linear controller is settled: at most 3 %" in text
+    )
+
+
+def test_a_study_without_the_loop_has_no_section(plain, tmp_path):
+    drawn = figures.draw(plain)
+    text = render(plain, drawn)
+    assert HEADING not in text and "Atmosphere; contact times" not in text
+    assert "Vibration, sensor noise and atmosphere" in text
+    assert drawn == ()
+    assert report.summary(plain)["fine_pointing"] is None
+    assert "ine pointing" not in report.verdict_text(plain)
+    assert not [w for w in report.words.warnings(plain) if "fine pointing" in w]
+    with results_of(plain, tmp_path) as tree:
+        assert "fine_pointing" not in tree.children and "tracking" in tree.children
+
+
+def test_a_study_with_the_loop_does_not_say_that_it_leaves_out_vibration(page):
+    assert HEADING in page[1]
+    assert "Vibration, sensor noise and atmosphere" not in page[1]
+    assert "Atmosphere; contact times" in page[1]
+
+
+# ------------------------------------------------------------------------------------------------ words
+
+
+def test_the_verdict_says_it_in_three_lines(plain, fine):
+    whole = with_fine(plain, fine)
+    added = [line for line in report.verdict_text(whole).splitlines() if line not in report.verdict_text(plain)]
+    assert added[0].startswith(f"{HEADING}: {SECOND} leaves 4.23 µrad radial at 99.7 %")
+    assert "10 µrad is allowed" in added[0]
+    assert "better (rms) than the best PI of the gain grid" in added[1]
+    assert "axis x needs 623 µrad to either side and has 534 µrad" in added[2]
+    assert added[3].startswith(f"PASS  fine pointing at 99.7 % ({SECOND}): 4.23 µrad")
+    assert len(added) == 4
+
+
+def test_a_missed_requirement_is_said_everywhere(plain, fine, mission):
+    missed = with_residual(fine, SECOND, quantile_rad=11.7e-6, largest_rad=13.9e-6)
+    assert "The 10 µrad required are missed." in words.result(missed, mission)[0]
+    assert row(read(render(with_fine(plain, missed))), "What each controller leaves", SECOND)[3] == "11.7 FAIL"
+    assert report.summary(with_fine(plain, missed))["fine_pointing"]["met"] is False
+    other = with_residual(fine, THIRD, quantile_rad=11.7e-6)
+    assert f"The requirement is missed by {THIRD}." in words.result(other, mission)
+    on_comparison = with_residual(fine, SECOND, "comparison", quantile_rad=11.7e-6)
+    assert "11.7 µrad on the comparison model (missed)" in " ".join(words.result(on_comparison, mission))
+
+
+def test_a_distant_bound_leaves_the_question_open_and_a_bound_above_theory_is_none(fine, mission):
+    lowest = min(v.theory.radial_rms_rad for v in fine.verified)
+    near, far, wrong = (replace(fine, optimum_rad=share * lowest) for share in (0.99, 0.6, 1.1))
+    assert "settled" in " ".join(words.theory(near))
+    assert "settled" not in " ".join(words.theory(far)) and "does not allow" not in " ".join(words.theory(far))
+    assert words.theory(wrong)[0].startswith("No bound can be given")
+    assert len(words.short(wrong, mission)) == len(words.short(near, mission)) - 1
+    assert any("so it is none" in w for w in words.warnings(wrong, mission))
+    assert not any("so it is none" in w for w in words.warnings(near, mission))
+
+
+def test_the_missions_own_stroke_counts(fine, mission):
+    table = mission.fine_pointing
+    elsewhere = table.reference.model_copy(update={"point_ahead_on_mirror": False})
+    m = mission.model_copy(update={"fine_pointing": table.model_copy(update={"reference": elsewhere})})
+    assert words.mission_stroke(fine, mission) is fine.scene.stroke
+    assert words.mission_stroke(fine, m) is fine.scene.stroke_without_point_ahead
+    assert section.stroke(fine, m)["groups"] == [
+        ("Point-ahead on the mirror", 2),
+        ("Point-ahead elsewhere (this mission)", 2),
+    ]
+    assert any("needs 552 µrad to either side" in line for line in words.short(fine, m))
+
+
+def test_a_stroke_that_fits_is_said_to_fit(fine, mission):
+    roomy = [replace(axis, usable_travel_rad=axis.travel_rad) for axis in fine.scene.stroke]
+    scene = replace(fine.scene, stroke=tuple(roomy), stroke_without_point_ahead=tuple(roomy))
+    text = " ".join(words.stroke(replace(fine, scene=scene), mission))
+    assert "the worst case fits, with 627 µrad to spare on axis x" in text
+    assert "the drive that the mirror was identified with" not in text and "reaches" not in text
+    assert not any("stroke" in w for w in words.warnings(replace(fine, scene=scene), mission))
+    assert len(words.short(replace(fine, scene=scene), mission)) == 2
+
+
+@pytest.mark.parametrize(
+    ("value_rad", "text"),
+    [
+        (1.866e-6, "1.87"),
+        (0.8739e-6, "0.874"),
+        (0.0612e-6, "0.061"),
+        (0.7e-9, "< 0.001"),
+        (0.0, "0"),
+        (71e-6, "71.0"),
+        (623.06e-6, "623"),
+        (99.96e-6, "100"),
+        (-14.04e-6, "\u221214.0"),
+        (math.nan, ""),
+    ],
+)
+def test_angles_have_three_digits_and_at_most_three_decimals(value_rad, text):
+    assert words.micro(value_rad) == text
+
+
+@pytest.mark.parametrize(
+    ("share", "text"), [(0.0196, "2 %"), (0.2074, "21 %"), (1.0, "100 %"), (3e-7, "< 0.001 %"), (0.0, "0 %")]
+)
+def test_shares_have_two_digits(share, text):
+    assert words.percent(share) == text
+
+
+def test_an_interval_sets_the_decimals_and_none_is_left_out(fine):
+    r = fine.best.simulated["given"]
+    assert section.with_interval(replace(r, rms_rad=1.8664e-6, rms_interval_rad=0.0059e-6)) == "1.866 ± 0.006"
+    assert section.with_interval(replace(r, rms_rad=1.8664e-6, rms_interval_rad=0.21e-6)) == "1.9 ± 0.2"
+    assert section.with_interval(replace(r, rms_rad=1.8664e-6, rms_interval_rad=math.nan)) == "1.87"
+
+
+# ------------------------------------------------------------------------------------------------ warnings
+
+LIMITS = {
+    "saturated samples": 0.003,
+    "slew-limited steps": 0.02,
+    "steps beyond the identified rate": 0.001,
+    "inverse beyond the identified rate": 0.004,
+    "steps outside the identified drive range": 0.25,
+    "samples without the spot": 1e-6,
+}
+
+
+@pytest.mark.parametrize("limit", LIMITS)
+def test_a_limit_that_a_controller_met_is_a_warning_and_on_the_page(fine, mission, limit):
+    assert set(LIMITS) == set(fine_pointing.COUNTERS)
+    met = with_residual(fine, THIRD, "comparison", shares={limit: LIMITS[limit]})
+    percent = "< 0.001 %" if LIMITS[limit] == 1e-6 else f"{100 * LIMITS[limit]:g} %"
+    assert f"fine pointing: {THIRD} on the comparison model: {percent} {limit}" in words.warnings(met, mission)
+    assert not any(limit in w for w in words.warnings(fine, mission))
+    assert section.limits(met) == [f"{THIRD}, comparison model: {percent} {limit}"]
+
+
+def test_a_stroke_that_does_not_fit_is_a_warning_for_each_axis(fine, mission):
+    x = replace(fine.scene.stroke[0], name="actuator 1")
+    tripod = replace(fine, scene=replace(fine.scene, stroke=(x, x, x)))
+    assert "worst case on actuator 1: 623 µrad" in words.warnings(tripod, mission)[0]
+    found = [w for w in words.warnings(fine, mission) if "stroke" in w]
+    assert found[0].startswith("fine pointing: the stroke does not cover the worst case on axis x: 623 µrad needed")
+    assert len(found) == 2
+
+
+def test_warnings_reach_the_page_and_the_summary(page, plain, fine, mission):
+    found = words.warnings(fine, mission)
+    assert found == [w for w in report.summary(with_fine(plain, fine))["warnings"] if w.startswith("fine pointing: ")]
+    assert all(w in page[1] for w in found)
+
+
+def test_a_design_pressed_against_a_bound_is_a_warning(fine, mission):
+    assert not any("bound by" in w for w in words.warnings(fine, mission))
+    design = fine.verified[2].design
+    tuned = replace(design.tuned, bound_by=(MARGIN, "zero at its most"))
+    bound = changed(fine, THIRD, design=replace(design, tuned=tuned))
+    found = words.warnings(bound, mission)
+    assert f"fine pointing: bound by the modulus margin asked for: {THIRD}" in found
+    assert f"fine pointing: bound by zero at its most: {THIRD}" in found
+
+
+def test_a_budget_that_is_not_linear_is_a_warning_and_says_where(fine, mission):
+    assert not any("not linear" in w for w in words.warnings(fine, mission))
+    differences = (Difference("hysteresis", 4.0e-6, 3.03e-6), Difference("limits", 4.0e-6, 4.0e-6))
+    bent = replace(fine, budget=replace(fine.budget, full_rad=4.0e-6, differences=differences))
+    (found,) = [w for w in words.warnings(bent, mission) if "not linear" in w]
+    assert "its parts combine to 3.03 µrad, the whole is 4.00 µrad rms" in found
+    sentence = section.budget_sentences(bent)[-1]
+    assert "leaves 32 % more than the parts combine to" in sentence
+    assert sentence.endswith(f"hysteresis adds {math.sqrt(4.0**2 - 3.03**2):.2f} µrad.")
+
+
+def test_theory_that_the_simulation_contradicts_is_a_warning(fine, mission):
+    assert not any("in theory" in w for w in words.warnings(fine, mission))
+    linear = fine.verified[2].theory.radial_rms_rad
+    off = with_residual(fine, THIRD, "no hysteresis", rms_rad=1.2 * linear)
+    assert any(
+        f"{THIRD} leaves {micro(1.2 * linear)} µrad rms without hysteresis" in w for w in words.warnings(off, mission)
+    )
+
+
+# ------------------------------------------------------------------------------------------------ data and files
+
+
+def test_the_summary_survives_json_and_holds_the_record(plain, fine):
+    data = report.summary(with_fine(plain, fine))["fine_pointing"]
+    assert json.loads(json.dumps(data, allow_nan=False)) == data
+    assert (data["best"], data["baseline"], data["quantile"]) == (SECOND, fine_pointing.BASELINE, 0.997)
+    for v, entry in zip(fine.verified, data["controllers"], strict=True):
+        assert entry["name"] == v.design.name
+        assert entry["theory_rms_rad"] == v.theory.radial_rms_rad
+        assert entry["parameters"][0] == {
+            "name": "integral frequency",
+            "unit": "Hz",
+            "value": v.design.tuned.values["integral frequency"],
+        }
+        for variant, r in v.simulated.items():
+            assert entry["simulated"][variant]["quantile_rad"] == r.quantile_rad
+            assert entry["simulated"][variant]["axis_rms_rad"] == list(r.axis_rms_rad)
+        assert entry["margins"]["phase_rad"] == v.design.tuned.margins.phase_rad
+    assert data["error_budget"]["parts"][2] == {"name": "quantisation", "rms_rad": 0.0, "theory_rms_rad": None}
+    x = data["stroke"]["without_point_ahead"][0]
+    assert x["needed_rad"] == pytest.approx(552e-6, abs=0.1e-6) and x["fits"] is False
+    assert len(data["sines"]) == 12 and data["sines"][0]["rms_rad"] == fine.sines[0].rms_rad
+
+
+def test_every_number_of_the_summary_has_its_unit_in_its_key(plain, fine):
+    without = {"quantile", "modulus", "disk", "mirror_per_line_of_sight", "value"}
+    units = ("_rad", "_hz", "_db", "_s")
+
+    def check(key, value):
+        if isinstance(value, dict):
+            inherits = key.endswith(units)
+            for name, each in value.items():
+                check(key if inherits else name, each)
+        elif isinstance(value, list):
+            for each in value:
+                check(key, each)
+        elif isinstance(value, float):
+            shares = key.startswith(("largest_magnification", "rms_gained", "linear_at", "baseline_with"))
+            assert key.endswith(units) or key in without or shares, key
+
+    check("", report.summary(with_fine(plain, fine))["fine_pointing"])
+
+
+def test_results_hold_the_loop_with_units(written, fine):
+    with xr.open_datatree(written / "results.nc", engine="h5netcdf") as tree:
+        for node in tree["fine_pointing"].subtree:
+            for variable in node.to_dataset(inherit=False).variables.values():
+                assert variable.attrs["units"] and variable.attrs["long_name"]
+        spectra, residuals = tree["fine_pointing/spectra"], tree["fine_pointing/residuals"]
+        assert spectra["residual"].attrs["units"] == spectra["before"].attrs["units"] == "rad^2/Hz"
+        assert_array_equal(spectra["before"].values, fine.disturbed_rad2_hz)
+        for v in fine.verified:
+            name = v.design.name
+            assert_array_equal(spectra["residual"].sel(controller=name).values, v.spectrum_rad2_hz)
+            assert_array_equal(spectra["predicted"].sel(controller=name).values, v.predicted_rad2_hz)
+            for variant, r in v.simulated.items():
+                here = residuals.sel(controller=name, mirror=variant)
+                assert (float(here["rms"]), float(here["quantile"])) == (r.rms_rad, r.quantile_rad)
+                assert_array_equal(here["axis_rms"].values, r.axis_rms_rad)
+            noise = tree["fine_pointing/theory"]["rms_by_source"].sel(controller=name, source="optical sensor noise")
+            assert_allclose(
+                float(noise), math.sqrt(np.sum(v.theory.error_by_source["optical sensor noise"])), rtol=1e-12
+            )
+        assert float(tree["fine_pointing/error_budget"]["full"]) == fine.budget.full_rad
+        assert_array_equal(tree["fine_pointing/sines"]["quantile"].values, [s.quantile_rad for s in fine.sines])
+        assert tree["fine_pointing/margins"]["delay_s"].attrs["units"] == "s"
+
+
+def test_limits_and_a_variant_that_is_missing_reach_results(plain, fine, tmp_path):
+    fewer = {"given": replace(fine.verified[2].simulated["given"], shares={"saturated samples": 0.125})}
+    whole = with_fine(plain, replace(changed(fine, THIRD, simulated=fewer), sines=()))
+    text = render(whole)
+    assert row(read(text), "What each controller leaves", THIRD)[5:] == ["", "", ""] * 2
+    assert "sines under vibration" not in text
+    with results_of(whole, tmp_path) as tree:
+        here = tree["fine_pointing/residuals"].sel(controller=THIRD)
+        assert float(here["share"].sel(mirror="given", limit="saturated samples")) == 0.125
+        assert float(here["share"].sel(mirror="given", limit="slew-limited steps")) == 0.0
+        assert math.isnan(float(here["rms"].sel(mirror="comparison")))
+
+
+@pytest.fixture(scope="module")
+def drawn(plain, fine):
+    return figures.draw(with_fine(plain, fine))
+
+
+def test_each_figure_is_an_svg_with_its_data_and_units(written, drawn, fine):
+    names = [f"fine-pointing-{name}" for name in ("spectrum", "errors", "budget", "sensitivity")]
+    assert [f.name for f in drawn] == names
+    for figure in drawn:
+        assert (written / "figures" / f"{figure.name}.svg").read_text(encoding="utf-8") == figure.svg
+        with (written / "figures" / f"{figure.name}.csv").open(newline="", encoding="utf-8") as lines:
+            header, *rows = list(csv.reader(lines))
+        assert header == list(figure.columns)
+        kept = [np.array([r[i] for r in rows if r[i]], dtype=float) for i in range(len(header))]
+        for column, values in zip(figure.columns.values(), kept, strict=True):
+            assert_allclose(values, column, rtol=1e-8)
+    spectrum, errors, budget, sensitivity = drawn
+    for text in ("µrad²/Hz", "frequency (Hz)", "before the loop", SECOND):
+        assert text in spectrum.svg
+    assert "required: 10 µrad" in errors.svg and "radial error at 99.7 % of the time (µrad)" in errors.svg
+    assert "added by hysteresis" in budget.svg and "radial rms (µrad)" in budget.svg
+    assert "1 / modulus margin asked for (0.5)" in sensitivity.svg
+    assert errors.columns[f"{SECOND}, mission's mirror (rad)"] == [fine.best.simulated["given"].quantile_rad]
+
+
+def test_the_sensitivity_drawn_peaks_at_the_inverse_of_the_modulus_margin(drawn, fine):
+    sensitivity = drawn[-1]
+    for name in (fine_pointing.BASELINE, THIRD):
+        margin = next(v for v in fine.verified if v.design.name == name).design.tuned.margins.modulus
+        assert np.max(sensitivity.columns[name]) == pytest.approx(1.0 / margin, rel=2e-3)
+
+
+def test_cumulative_rms_of_a_flat_spectrum_grows_with_the_root_of_the_band():
+    freq = np.arange(1.0, 101.0)
+    assert_allclose(figures.cumulative_rms(freq, np.full(100, 4e-12)), 2e-6 * np.sqrt(freq), rtol=1e-12)
+
+
+def test_a_part_that_helps_is_drawn_as_taken_off(fine):
+    helps = Difference("limits", 3.0e-6, 5.0e-6)
+    drawn = figures.error_budget(replace(fine.budget, differences=(helps,)))
+    assert drawn.columns["taken off by limits (rad)"] == pytest.approx([4e-6], rel=1e-12)
+    assert "added by" not in drawn.svg and "taken off by limits" in drawn.svg
+
+
+def test_three_different_controllers_are_drawn_the_baseline_first(fine):
+    assert [each.name for each in figures.shown(fine)] == [fine_pointing.BASELINE, SECOND, THIRD]
+    assert len({each.colour for each in figures.shown(fine)} | {each.marker for each in figures.shown(fine)}) == 6
+    best = replace(fine, best=fine.verified[2])
+    assert [each.name for each in figures.shown(best)] == [fine_pointing.BASELINE, THIRD, SECOND]
+
+
+def test_a_sensor_slower_than_the_control_has_no_sensitivity_drawn(plain, fine):
+    optical = replace(fine.scene.loop.optical, every=2)
+    slow = replace(fine, scene=replace(fine.scene, loop=replace(fine.scene.loop, optical=optical)))
+    assert [f.name[14:] for f in figures.draw(with_fine(plain, slow))] == ["spectrum", "errors", "budget"]
