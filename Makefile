@@ -27,6 +27,8 @@ unit: $(VENV)/.test
 
 benchmark: $(VENV)/.test
 	$(BIN)/python benchmarks/loop.py
+	$(BIN)/python benchmarks/ensemble.py
+	$(BIN)/python benchmarks/controllers.py
 	$(BIN)/python benchmarks/start.py
 	$(BIN)/python benchmarks/recording.py
 	$(BIN)/python benchmarks/vector_fitting.py
