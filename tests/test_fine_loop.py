@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.linalg import expm, solve_discrete_lyapunov
+from scipy.stats import kstest
 
 from microrad import control, disturbance, kernels, lti, mirror
 from microrad.control import AxisController, Drive, Timing
@@ -26,7 +27,7 @@ from microrad.fine_loop.design import (
 from microrad.fine_loop.ensemble import Span
 from microrad.fine_loop.loop import LoopController, PointingLoop
 from microrad.geometry import Geometry, line_of_sight_matrix
-from microrad.hysteresis import BoucWen
+from microrad.hysteresis import BoucWen, Play
 from microrad.missionfile import load_mission
 from microrad.sensor import OpticalSensor, StrainGauge
 from shipped import SHIPPED
@@ -145,9 +146,7 @@ def test_a_first_order_loop_on_olympus_leaves_80_pi_over_1_plus_bandwidth(bandwi
     settle = 5 / (2 * pi * bandwidth_hz)
     found = ensemble.run(loop, controller, Span(settle + 2.5e5 * period, settle, 1), 64)
     half = found.radial_rms_interval_rad()
-    print(
-        f"{bandwidth_hz:g} Hz: {found.radial_rms_rad / URAD:.4f} +- {half / URAD:.4f}, theory {sqrt(theory) / URAD:.4f}"
-    )
+    print(f"{bandwidth_hz:g} Hz: {found.radial_rms_rad / URAD:.4f} +- {half / URAD:.4f} urad radial")
     assert abs(found.radial_rms_rad - sqrt(theory)) < half
     assert half < 0.013 * found.radial_rms_rad
 
@@ -905,6 +904,37 @@ def test_a_disturbance_of_many_inputs_shares_no_random_numbers_with_the_next_axi
     assert np.unique(purposes).size == purposes.size
 
 
+def test_a_disturbance_line_starts_at_another_phase_in_each_run_and_axis():
+    line = disturbance.wheels(250.0, (1.0,), (URAD / 250.0**2,), convention="per-axis")
+    loop = quiet(scenario(2))
+    loop = replace(loop, disturbances=((line,), (line,)))
+    runs = [ensemble.trace(loop, pi_for(loop), Span(0.004, 0.0, 1), run).disturbance_rad for run in range(40)]
+    turned = np.mean(np.array(runs) * np.exp(-0.1j * pi * np.arange(20))[:, None], axis=1)  # 250 Hz: one turn
+    assert_allclose(np.abs(turned), 0.5 * URAD, rtol=1e-9)
+    phases = np.angle(turned).ravel() / (2 * pi) + 0.5
+    assert kstest(phases, "uniform").pvalue > 0.01
+    assert np.min(np.diff(np.sort(phases))) > 1e-6
+
+
+def test_a_late_sensor_reads_the_error_at_the_begin_until_it_has_others():
+    loop = replace(scenario(optical=OpticalSensor(0.0, inf, 0.0, 1, 23)), references=(Reference(7 * URAD, 0, 1),))
+    traced = ensemble.trace(loop, pi_for(loop, 60.0), Span(0.01, 0.0, 1))
+    assert_array_equal(traced.measured_rad[:3], np.broadcast_to(traced.error_rad[0], (3, 1)))
+    assert abs(traced.error_rad[0, 0] - 7 * URAD) > URAD  # OLYMPUS is in it
+    assert traced.measured_rad[4, 0] != traced.error_rad[0, 0]
+
+
+def test_without_hysteresis_each_element_keeps_its_own_slow_gain():
+    """Bouc-Wen elements and plays in one mirror, in either order."""
+    plays = mirror.assemble("plays", "static", None, Play((0.0, 1.0), (30e-6, 12e-6)))
+    for both in (mirror.combine(paper_mirror(), plays), mirror.combine(plays, paper_mirror())):
+        straightened = fine.without_hysteresis(scenario(2, static_mirror(), mirror=both)).mirror
+        assert not straightened.plays
+        for key in "ABCD":
+            assert_allclose(getattr(straightened.linear_loop, key), getattr(both.linear_loop, key), rtol=1e-12)
+        assert_allclose(fine.in_band_gain(straightened), fine.in_band_gain(both), rtol=1e-12)
+
+
 def test_leaving_a_disturbance_out_changes_nothing_of_the_others():
     """In a linear loop the traces of its parts add up to that of the whole, to rounding."""
     lines = disturbance.wheels(40.0, (1.0, 2.5), (1e-9, 4e-10), convention="per-axis")
@@ -1024,6 +1054,14 @@ def test_within_its_stroke_nothing_is_counted():
     found = ensemble.run(loop, controller, Span(0.6, 0.0, 1), 1)
     assert_array_equal(found.counts, 0.0)
     assert np.all(np.abs(ensemble.trace(loop, controller, Span(0.4, 0.0, 1)).error_rad[1600:]) < 0.05 * URAD)
+
+
+def test_what_happens_while_the_loop_settles_is_not_counted():
+    loop, controller = excursion(3.0)
+    found = ensemble.run(loop, controller, Span(0.6, 0.45, 1), 1)
+    assert_array_equal(found.counts, 0.0)
+    assert found.largest_rad[0] < URAD
+    assert found.histogram.sum() == found.samples == 750
 
 
 def test_an_axis_beyond_its_stroke_leaves_the_other_as_it_is():

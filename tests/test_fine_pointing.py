@@ -172,7 +172,7 @@ def test_the_printed_hysteresis_costs_more_than_the_admissible_one(best):
     for verified in best.values():
         given, other = verified.simulated["given"], verified.simulated["comparison"]
         assert given.rms_rad > 1.1 * verified.theory.radial_rms_rad
-        assert 0.98 < other.rms_rad / verified.theory.radial_rms_rad < 1.05
+        assert 0.97 < other.rms_rad / verified.theory.radial_rms_rad < 1.08
         assert verified.meets(10e-6) and not verified.meets(given.quantile_rad * 0.999)
 
 

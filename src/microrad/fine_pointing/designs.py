@@ -87,8 +87,8 @@ def design(scene: Scene, m: Mission, on_progress: Progress = lambda done, total,
 
 
 def evaluations(family: Family) -> int:
-    """How many candidates a search may look at: LQG solves Riccati equations for each, and needs few."""
-    return 80 if family is control.LQG else 300
+    """How many candidates a search may look at: more change its result by less than a per cent."""
+    return 400 if family is control.LQG else 300
 
 
 def _plain(name: str, loop: PointingLoop, tuned: Tuned) -> Design:
