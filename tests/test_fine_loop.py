@@ -870,6 +870,15 @@ def test_a_trace_is_the_run_of_its_number(run):
     assert found.seconds == 1500 * 2e-4
 
 
+def test_the_mean_is_that_of_the_control_samples_and_the_rms_that_of_all_plant_steps():
+    loop, controller = noisy(1)
+    found = ensemble.run(loop, controller, Span(0.2, 0.1, 1), 1)
+    errors = ensemble.trace(loop, controller, Span(0.2002, 0.1, 1)).error_rad[501:]
+    assert_allclose(found.mean_rad[0], np.mean(errors, axis=0), rtol=1e-9)
+    assert_allclose(found.rms_rad[0], np.sqrt(np.mean(errors**2, axis=0)), rtol=0.01)
+    assert not np.allclose(found.rms_rad[0], np.sqrt(np.mean(errors**2, axis=0)), rtol=1e-9, atol=0)
+
+
 def test_a_trace_adds_up():
     """Reference and disturbance less the mirror is the error; the sensor reads it with its noise, one sample late."""
     loop, controller = VARIANTS["two coupled axes"]()
@@ -1062,6 +1071,14 @@ def test_what_happens_while_the_loop_settles_is_not_counted():
     assert_array_equal(found.counts, 0.0)
     assert found.largest_rad[0] < URAD
     assert found.histogram.sum() == found.samples == 750
+
+
+@pytest.mark.parametrize("every", [1, 3])
+def test_a_sensor_that_never_sees_its_spot_loses_each_of_its_readings(every):
+    loop = scenario(optical=OpticalSensor(URAD, 1e-12, 0.0, every, 0))
+    found = ensemble.run(loop, pi_for(loop, 50.0), Span(0.3, 0.12, 1), 2)
+    assert_array_equal(found.counts[:, kernels.COUNT_LOST], 900 / every)
+    assert found.share(kernels.COUNT_LOST) == 1.0
 
 
 def test_an_axis_beyond_its_stroke_leaves_the_other_as_it_is():
