@@ -286,12 +286,18 @@ def damped():
 
 
 def damped_coupled():
-    """Two such mirrors behind optics that turn, couple and magnify."""
+    """Two such mirrors behind optics that turn, couple and magnify; a part of the gauges' reading acts at once."""
     loop = coupled(of=resonant_mirror(400.0, 0.03), gauge=StrainGauge(URAD, 0.0))
-    scale = fine.nominal_axis_gain(loop) / fine.in_band_gain(loop.mirror)[0, 0]
-    one = scenario(1, resonant_mirror(400.0, 0.03), optics=np.array([[scale]]))
+    return loop, fine.assemble("resonant damping", loop, axis_like(loop, resonant_mirror(400.0, 0.03))[1])
+
+
+def axis_like(loop, of):
+    """One axis with the gain that the axes of the loop have, and a controller of it that reads its gauge."""
+    gain = fine.nominal_axis_gain(loop)
+    one = scenario(1, of, optics=np.array([[gain / fine.in_band_gain(of)[0, 0]]]))
     axis = control.RESONANT_DAMPING.build(design_plant(one), np.array([150.0, 800.0, 1.0, 0.4]))
-    return loop, fine.assemble(axis.name, loop, axis)
+    at_once = replace(axis.system, D=axis.system.D + np.array([[0.0, 0.1 / gain]]))
+    return one, replace(axis, system=at_once)
 
 
 def with_pi(loop, *frequencies_hz):
@@ -440,6 +446,26 @@ def test_without_hysteresis_the_simulated_residual_is_the_lyapunov_value(variant
     assert_allclose(found.axis_rms_rad, np.sqrt(theory.error), rtol=0.01)
     assert abs(found.radial_rms_rad - theory.radial_rms_rad) < found.radial_rms_interval_rad()
     assert found.radial_rms_interval_rad() < 0.01 * found.radial_rms_rad
+
+
+DECOUPLED = {
+    "two axes": lambda: (coupled(of=resonant_mirror(400.0, 0.03)), resonant_mirror(400.0, 0.03)),
+    "tripod": lambda: (tripod(), paper_mirror()),
+}
+
+
+@pytest.mark.parametrize("layout", DECOUPLED)
+def test_coupled_axes_are_decoupled_and_each_is_the_loop_of_one_axis(layout):
+    """With a controller that reads the gauges: the optics turn commands and readings, and no axis moves another."""
+    loop, of = DECOUPLED[layout]()
+    one, axis = axis_like(loop, of)
+    freq = np.array(LINES_HZ)
+    both = linear.sensitivity(linear.close(loop, fine.assemble(axis.name, loop, axis)), freq)
+    alone = linear.sensitivity(close_axis(one, axis), freq)[:, 0, 0]
+    assert_allclose(both, alone[:, None, None] * np.eye(2), rtol=0, atol=1e-8 * np.max(np.abs(alone)))
+    assert not np.allclose(loop.optics[:, :2], loop.optics[:, :2].T, rtol=0.05)
+    blind = replace(axis, system=replace(axis.system, D=axis.system.D * np.array([[1.0, 0.0]])))
+    assert np.max(np.abs(linear.sensitivity(close_axis(one, blind), freq)[:, 0, 0] / alone - 1)) > 0.02
 
 
 @pytest.mark.parametrize("late", [3, 5, 7, 10, 13])
