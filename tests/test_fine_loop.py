@@ -483,19 +483,59 @@ def test_the_sensitivity_of_a_late_sensor_is_the_error_that_sines_leave(late):
     assert_allclose(found, designed, rtol=0, atol=(1e-6 if late == 10 else 0.004) * np.max(np.abs(designed)))
 
 
-@pytest.mark.parametrize("freq_hz", [50.0, 900.0])
-def test_a_disturbance_line_leaves_half_the_square_of_what_the_loop_makes_of_its_amplitude(freq_hz):
-    """In theory at the control samples and simulated at all plant steps: 0.2 % apart at a fifth of the rate."""
+def on_a_line(freq_hz, every=1, **changes):
+    """A wheel's line of 1 urad alone, a sensor that delivers every so many samples, and a PI."""
     line = disturbance.wheels(freq_hz, (1.0,), (URAD / freq_hz**2,), convention="per-axis")
-    loop = scenario(disturbances=((line,),), optical=OpticalSensor(0.0, inf, 0.0, 1, 0), gauge=None)
-    controller = pi_for(loop, 100.0)
-    closed = linear.close(loop, controller)
-    theory = linear.stationary(closed)
+    sensor = OpticalSensor(0.0, inf, 0.0, every, 0)
+    loop = scenario(disturbances=((line,),), optical=sensor, gauge=None, **changes)
+    return loop, pi_for(loop, 100.0)
+
+
+@pytest.mark.parametrize("freq_hz", [50.0, 900.0, 1700.0])
+def test_a_line_leaves_half_the_square_of_what_the_sensitivity_makes_of_its_amplitude(freq_hz):
+    """With one plant step a sample; with ten the mean over them is another, as the mirror's path between is no sine."""
+    closed = linear.close(*on_a_line(freq_hz, timing=Timing(2e-4, 1, 1)))
     gain = abs(linear.sensitivity(closed, np.array([freq_hz]))[0, 0, 0])
+    theory = linear.stationary(closed)
     assert_allclose(theory.error_by_source["reaction wheel"], 0.5 * (URAD * gain) ** 2, rtol=1e-9)
     assert_allclose(theory.error, 0.5 * (URAD * gain) ** 2, rtol=1e-9)
+    between = linear.close(*on_a_line(freq_hz))
+    gain = abs(linear.sensitivity(between, np.array([freq_hz]))[0, 0, 0])
+    assert 1e-3 < abs(linear.stationary(between).error[0] / (0.5 * (URAD * gain) ** 2) - 1) < 6e-3
+
+
+@pytest.mark.parametrize("every", [1, 2, 3])
+@pytest.mark.parametrize("freq_hz", [50.0, 900.0, 1700.0])
+def test_a_line_leaves_in_theory_what_it_leaves_simulated_whatever_the_rate_of_the_sensor(freq_hz, every):
+    """Also above half the sensor's rate, where the loop answers at other frequencies than the line's."""
+    loop, controller = on_a_line(freq_hz, every)
+    theory = linear.stationary(linear.close(loop, controller))
     found = ensemble.run(loop, controller, Span(2.0, 1.0, 1), 64)
-    assert_allclose(found.radial_rms_rad, theory.radial_rms_rad, rtol=2e-3)
+    assert_allclose(found.radial_rms_rad, theory.radial_rms_rad, rtol=1e-4)
+    assert found.radial_rms_rad > 0.2 * URAD
+
+
+@pytest.mark.parametrize("every", [1, 2])
+def test_a_line_drives_the_mirror_in_theory_as_it_does_simulated(every):
+    loop, controller = on_a_line(300.0, every, timing=Timing(2e-4, 1, 1))
+    traced = ensemble.trace(loop, controller, Span(2.0, 0.0, 1))
+    theory = linear.stationary(linear.close(loop, controller))
+    assert_allclose(np.mean(traced.drive_v[5000:] ** 2, axis=0), theory.drive, rtol=1e-4)
+    assert_allclose(np.mean(traced.error_rad[5000:] ** 2, axis=0), theory.error, rtol=1e-4)
+
+
+def test_lines_and_noise_of_several_disturbances_add_up_on_two_axes_behind_a_slow_sensor():
+    """Against an ensemble, and each line's part against that of the line alone."""
+    lines = disturbance.wheels(80.0, (1.0, 2.0), (0.7e-9, 0.2e-9), convention="per-axis")
+    shaking = (disturbance.olympus(), lines, disturbance.body_pointing(300 * URAD, 3, 0.5))
+    loop = coupled(disturbances=(shaking, shaking), optical=OpticalSensor(URAD, inf, 0.0, 2, 0))
+    controller = pi_for(loop, 100.0)
+    theory = linear.stationary(linear.close(loop, controller))
+    found = ensemble.run(loop, controller, Span(1.3, 0.3, 4), 64)
+    assert_allclose(found.axis_rms_rad, np.sqrt(theory.error), rtol=0.01)
+    alone = linear.stationary(linear.close(replace(quiet(loop), disturbances=((lines,), (lines,))), controller))
+    assert_allclose(theory.error_by_source["reaction wheel"], alone.error, rtol=1e-9)
+    assert np.all(alone.error > 0.1 * theory.error)
 
 
 # ------------------------------------------------------------------------------------------------ 5. spectrum
@@ -790,6 +830,13 @@ def test_a_run_without_anything_behind_its_settling_time_is_refused():
         ensemble.trace(loop, controller, Span(0.1, -0.1, 1))
 
 
+@pytest.mark.parametrize("runs", [0, -3])
+def test_an_ensemble_without_a_run_is_refused(runs):
+    loop, controller = VARIANTS["one axis"]()
+    with pytest.raises(ValueError, match=f"an ensemble of {runs} runs has no statistics: ask for 1 run or more"):
+        ensemble.run(loop, controller, Span(0.1, 0.0, 1), runs)
+
+
 @pytest.mark.parametrize("samples", [1, 2, 3])
 def test_a_run_of_a_few_samples_has_finite_statistics(samples):
     loop, controller = VARIANTS["one axis"]()
@@ -806,6 +853,17 @@ def test_two_disturbances_of_one_name_on_an_axis_are_refused():
         ensemble.run(twice, controller, Span(0.1, 0.0, 1), 1)
     with pytest.raises(ValueError, match="share a name"):
         ensemble.trace(twice, controller, Span(0.1, 0.0, 1))
+
+
+def test_two_disturbances_whose_names_come_to_the_same_random_numbers_are_refused():
+    loop, controller = VARIANTS["one axis"]()
+    one, other = (replace(disturbance.olympus(), name=name) for name in ("drive x", "gyro x"))
+    assert ensemble.purpose_of(one.name, 0) == ensemble.purpose_of(other.name, 0)
+    message = "'drive x' and 'gyro x' of one axis would take the same random numbers.*change one of the names"
+    with pytest.raises(ValueError, match=message):
+        ensemble.run(replace(loop, disturbances=((one, other),)), controller, Span(0.1, 0.0, 1), 1)
+    two = replace(scenario(2), disturbances=((one,), (other,)))  # an axis has its own
+    assert np.unique(ensemble.combined_shaping(two).purpose).size == 2
 
 
 def test_a_disturbance_out_of_modal_form_is_refused():
@@ -860,7 +918,7 @@ def test_results_are_those_of_the_run_whatever_the_threads_and_the_number_of_run
     many = ensemble.run(loop, controller, span, 150, threads=1, on_progress=lambda *a: told.append(a))
     assert told == [(64, 150, "PI"), (128, 150, "PI"), (150, 150, "PI")]
     assert many.rms_rad.shape == (150, 2)
-    assert many.samples, many.steps == (750, 1500)
+    assert (many.samples, many.steps) == (750, 1500)
     for runs, threads in ((150, 2), (70, 2), (3, 1)):
         other = ensemble.run(loop, controller, span, runs, threads=threads)
         for field in FIELDS:
@@ -1021,6 +1079,13 @@ def test_the_ends_of_a_histogram_have_quantiles_too():
     assert_allclose([ensemble.histogram_quantile(counts, 0.0), ensemble.histogram_quantile(counts, 1.0)], [low, high])
 
 
+def test_one_run_has_an_infinite_interval_and_two_have_a_finite_one():
+    loop, controller = VARIANTS["one axis"]()
+    one, two = (ensemble.run(loop, controller, Span(0.1, 0.05, 1), runs) for runs in (1, 2))
+    assert one.radial_rms_interval_rad() == inf
+    assert 0.0 < two.radial_rms_interval_rad() < inf
+
+
 def test_the_interval_of_the_rms_is_the_spread_of_other_ensembles():
     """99 % intervals of 20 seeds cover the Lyapunov value as they should, and are as wide as the seeds differ."""
     loop, controller = VARIANTS["two and a half samples of delay"]()
@@ -1099,12 +1164,24 @@ def test_what_happens_while_the_loop_settles_is_not_counted():
     assert found.histogram.sum() == found.samples == 750
 
 
-@pytest.mark.parametrize("every", [1, 3])
-def test_a_sensor_that_never_sees_its_spot_loses_each_of_its_readings(every):
+@pytest.mark.parametrize(
+    ("every", "settle", "samples", "readings"),
+    [
+        (1, 600, 900, 900),
+        (3, 600, 900, 300),
+        (3, 601, 899, 299),
+        (3, 602, 899, 300),
+        (3, 599, 900, 300),
+        (3, 601, 2, 0),
+    ],
+)
+def test_a_sensor_that_never_sees_its_spot_loses_each_of_its_readings(every, settle, samples, readings):
+    """Readings fall on multiples of the sensor's period, wherever the settling ends."""
     loop = scenario(optical=OpticalSensor(URAD, 1e-12, 0.0, every, 0))
-    found = ensemble.run(loop, pi_for(loop, 50.0), Span(0.3, 0.12, 1), 2)
-    assert_array_equal(found.counts[:, kernels.COUNT_LOST], 900 / every)
-    assert found.share(kernels.COUNT_LOST) == 1.0
+    found = ensemble.run(loop, pi_for(loop, 50.0), Span((settle + samples) * 2e-4, settle * 2e-4, 1), 2)
+    assert found.readings == readings
+    assert_array_equal(found.counts[:, kernels.COUNT_LOST], readings)
+    assert found.share(kernels.COUNT_LOST) == (1.0 if readings else 0.0)
 
 
 def test_an_axis_beyond_its_stroke_leaves_the_other_as_it_is():

@@ -160,6 +160,25 @@ def test_with_wheel_lines_the_tuned_loop_beats_the_best_pi_by_20_percent(tmp_pat
     assert rms["peaks"] < 0.8 * rms["PI"]
 
 
+def test_wheels_and_a_sensor_at_half_the_rate_of_the_control_are_verified_also_with_one_run(tmp_path):
+    changed = edited_file(
+        tmp_path,
+        ("\n[fine_pointing.body]", WHEELS),
+        ('rate = "5 kHz"                        # assumption: one reading', 'rate = "2.5 kHz" # one reading'),
+        ("runs = 64 ", "runs = 1 "),
+    )
+    scene, m = fine_pointing.scene(changed), changed.mission
+    assert scene.loop.optical.every == 2
+    tuned = designs.grid_baseline([design_plant(scene.axis)], control.Specification(0.5))
+    design = designs.Design("PI", tuned, assemble("PI", scene.loop, tuned.controller))
+    (found,) = fine_pointing.verify(scene, m, [design])
+    straight = found.simulated["no hysteresis"]
+    assert straight.rms_interval_rad == math.inf
+    assert_allclose(straight.rms_rad, found.theory.radial_rms_rad, rtol=0.1)  # one run
+    assert np.all(found.theory.error_by_source["reaction wheel"] > 0.1 * found.theory.error)
+    assert np.all(np.isnan(found.predicted_rad2_hz))
+
+
 def test_simulated_without_hysteresis_as_the_lyapunov_equation_says(best):
     for verified in best.values():
         straight = verified.simulated["no hysteresis"]
@@ -198,6 +217,53 @@ def test_the_parts_of_the_error_budget_combine_where_the_loop_is_linear(scene, f
     assert budget.dominant == "OLYMPUS"
     as_linear = replace(budget, full_rad=budget.together_rad)
     assert as_linear.linear
+
+
+@pytest.mark.parametrize("name", [fine_pointing.BASELINE, "PI + inverse"])
+def test_the_budget_takes_the_whole_from_what_is_simulated_already(scene, file, tuned, monkeypatch, name):
+    """To the bit the rms that the whole loop and the one without hysteresis leave when they are simulated again."""
+    (verified,) = fine_pointing.verify(scene, file.mission, [by_name(tuned[0])[name]])
+    simulate, simulated = ensemble.run, []
+
+    def counted(loop, *rest, **options):
+        simulated.append(loop)
+        return simulate(loop, *rest, **options)
+
+    monkeypatch.setattr(ensemble, "run", counted)
+    budget = fine_pointing.error_budget(scene, file.mission, verified)
+    assert len(simulated) == len(budget.parts) + len(budget.differences) - 1
+    span, runs = results.span(file.mission), file.mission.fine_pointing.runs
+    straight = parts.without(scene.loop, parts.HYSTERESIS)
+    full, together = (
+        simulate(loop, results.for_mirror(verified.design.controller, loop), span, runs).radial_rms_rad
+        for loop in (scene.loop, straight)
+    )
+    assert (budget.full_rad, budget.together_rad) == (full, together)
+    names = (parts.HYSTERESIS, parts.LIMITS, parts.QUANTISATION, parts.DELAY)
+    assert tuple(d.name for d in budget.differences) == names
+    assert (budget.differences[0].with_rad, budget.differences[0].without_rad) == (full, together)
+
+
+PLAYS = """[mirror.prandtl_ishlinskii]
+thresholds = ["0 V", "1 V"]
+weights = ["59 urad/V", "30 urad/V"]
+"""
+
+
+def test_without_hysteresis_each_play_of_an_additive_mirror_keeps_its_own_route(tmp_path):
+    """The first play drives the linear part and the second is added behind it: so in theory, and so simulated."""
+    text = SHIPPED.read_text(encoding="utf-8")
+    (composition,) = (line for line in text.splitlines() if line.startswith("composition ="))
+    begin = text.index("[mirror.bouc_wen]")
+    model = text[begin : text.index("# A set with the same slow loop", begin)]
+    changed = edited_file(tmp_path, (composition, 'composition = "additive"'), (model, PLAYS))
+    scene, m = fine_pointing.scene(changed), changed.mission
+    tuned = designs.grid_baseline([design_plant(scene.axis)], control.Specification(0.5))
+    controller = assemble("PI", scene.loop, tuned.controller)
+    (found,) = fine_pointing.verify(scene, m, [designs.Design("PI", tuned, controller)])
+    straight = ensemble.run(parts.without(scene.loop, parts.HYSTERESIS), controller, results.span(m), 64)
+    assert found.simulated["no hysteresis"].rms_rad == straight.radial_rms_rad
+    assert_allclose(straight.radial_rms_rad, found.theory.radial_rms_rad, rtol=0.01)
 
 
 def test_a_part_that_is_left_out_leaves_the_others_as_they_were(scene, tuned):

@@ -151,15 +151,6 @@ def test_variances_are_those_of_scipy_even_for_time_constants_of_a_million_sampl
     assert_allclose(analysis.h2(closed).sum(axis=1), expected, rtol=1e-6)
 
 
-def test_a_gramian_sees_what_is_observed_only_after_many_samples():
-    n = 20
-    A = np.diag(np.ones(n - 1), -1) * 1.5 + 0.3 * np.eye(n)
-    Q = np.zeros((n, n))
-    Q[0, 0], Q[-1, -1] = 1.0, 1e-3
-    expected = solve_discrete_lyapunov(A.T, Q)
-    assert_allclose(analysis.gramian(A, Q), expected, rtol=1e-9, atol=1e-9 * np.max(expected))
-
-
 def test_variances_by_source_add_up_and_name_the_right_one():
     plant = axis_plant(gauge_noise_rad=0.5e-6)
     parts = analysis.by_source(plant, both_sensors(plant))

@@ -8,7 +8,7 @@ import control
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from scipy.linalg import block_diag
+from scipy.linalg import block_diag, solve_discrete_lyapunov
 from scipy.signal import cont2discrete, dlsim, lsim
 
 from microrad import lti
@@ -285,3 +285,35 @@ def test_zeros_of_a_system_are_where_python_control_finds_them():
     expected = control.zeros(control.ss(square.A, square.B, square.C, square.D))
     assert_allclose(np.sort_complex(lti.zeros(square)), np.sort_complex(expected), rtol=1e-8)
     assert lti.zeros(square).size == 4
+
+
+# ------------------------------------------------------------------------------------------------- covariances
+def test_a_gramian_sees_what_is_observed_only_after_many_samples():
+    n = 20
+    A = np.diag(np.ones(n - 1), -1) * 1.5 + 0.3 * np.eye(n)
+    Q = np.zeros((n, n))
+    Q[0, 0], Q[-1, -1] = 1.0, 1e-3
+    expected = solve_discrete_lyapunov(A.T, Q)
+    assert_allclose(lti.gramian(A, Q), expected, rtol=1e-9, atol=1e-9 * np.max(expected))
+
+
+def test_a_gramian_ends_where_rounding_left_a_variance_below_zero_beside_a_state_that_turns_for_ever():
+    """A turn that is longer than 1 by rounding overflows when it is taken 2^64 times."""
+    turn = np.array([[np.cos(0.3), np.sin(0.3)], [-np.sin(0.3), np.cos(0.3)]]) * (1 + 1e-15)
+    A, Q = block_diag(0.5, 0.2, turn), np.diag([1.0, -1e-31, 0.0, 0.0])
+    assert_allclose(np.diag(lti.gramian(A, Q)), [4 / 3, -1e-31 / 0.96, 0.0, 0.0], rtol=1e-12)
+
+
+def test_a_gramian_of_a_stack_is_that_of_each_and_of_the_transpose_a_covariance():
+    rng = np.random.default_rng(5)
+    A = 0.3 * rng.standard_normal((5, 5))
+    A *= 0.999 / np.max(np.abs(np.linalg.eigvals(A)))
+    roots = rng.standard_normal((3, 5, 2))
+    noises = roots @ np.swapaxes(roots, 1, 2)
+    found = lti.gramian(A.T, noises)
+    assert found.shape == (3, 5, 5)
+    for X, noise in zip(found, noises, strict=True):
+        assert_allclose(X, A @ X @ A.T + noise, rtol=1e-10, atol=1e-10 * np.max(X))
+        assert_allclose(X, lti.gramian(A.T, noise), rtol=1e-12)
+    nothing = np.zeros((0, 0))
+    assert lti.gramian(nothing, nothing).shape == (0, 0)

@@ -204,6 +204,15 @@ def test_the_draws_have_the_covariance_of_the_table(read):
         assert m.model_dump(exclude=kept) == mirror.model_dump(exclude=kept)
 
 
+def test_a_parameter_known_to_ten_digits_keeps_its_own_spread_beside_others_known_to_one(read):
+    """Relative errors of 0.3, 1e-10 and 0.2: the variance of the second is 1e-19 of the covariance's size."""
+    drawn = mirror_spread.draws(read(BOUC_WEN + table(THREE, [0.3, 1e-10, 0.2], [0.9, 0.1, -0.3])), 1000, seed=2)
+    values = [(m.bouc_wen.d1_rad_v / 80e-6, m.bouc_wen.alpha_1_v / 1.5, m.bouc_wen.beta_1_v / 0.4) for m in drawn]
+    factors = np.array(values) - 1.0
+    assert_allclose(np.std(factors, axis=0), [0.3, 1e-10, 0.2], rtol=0.1)
+    assert_allclose(np.corrcoef(factors.T)[np.tril_indices(3, -1)], [0.9, 0.1, -0.3], atol=0.1)
+
+
 def test_the_first_draws_are_the_same_for_a_larger_count(read):
     mirror = read(BOUC_WEN + table(NAMES, ERRORS, CORRELATION))
     few, many = (mirror_spread.draws(mirror, count, seed=7) for count in (3, 10))

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic.fields import FieldInfo
 
+from microrad import lti
 from microrad.fields import ProblemsError, Quantity, Several, Table
 from microrad.mirror_table import Mirror, Place, Uncertainty, place
 from microrad.units import UnitError
@@ -27,7 +28,7 @@ def draws(table: Mirror, count: int, seed: int) -> tuple[Mirror, ...]:
     """
     uncertainty = _uncertainty(table)
     places = [place(table, key) for key in uncertainty.parameters]
-    root = _root(relative_covariance(table))
+    root = lti.covariance_root(relative_covariance(table))
     streams = (np.random.SeedSequence(seed, spawn_key=(index,)) for index in range(count))
     return tuple(_drawn(table, places, root, np.random.Generator(np.random.Philox(stream))) for stream in streams)
 
@@ -89,12 +90,6 @@ def _share_of_gain(table: Mirror, at: Place) -> float:
 
 
 # -------------------------------------------------------------------------------------------------------------- drawing
-def _root(covariance: Floats) -> Floats:
-    """A square root: covariance = root root'."""
-    values, vectors = np.linalg.eigh(covariance)
-    return np.asarray(vectors * np.sqrt(np.maximum(values, 0.0)))
-
-
 def _drawn(table: Mirror, places: list[Place], root: Floats, rng: np.random.Generator) -> Mirror:
     refused: Counter[str] = Counter()
     why: dict[str, str] = {}

@@ -4,7 +4,6 @@ from microrad.control.analysis import (
     LoopMargins,
     MultiloopMargin,
     by_source,
-    gramian,
     loop_margins,
     multiloop_disk_margin,
 )
@@ -84,7 +83,6 @@ __all__ = [
     "by_source",
     "drive_from_mission",
     "gains_from_mission",
-    "gramian",
     "grid_best",
     "inverse",
     "inverse_arrays",

@@ -128,26 +128,6 @@ def refuse_unstable(plant: DesignPlant, controller: AxisController) -> None:
 # ------------------------------------------------------------------------------------------------ variances
 
 
-def gramian(A: Floats, Q: Floats) -> Floats:
-    """Solution X = A' X A + Q of the discrete Lyapunov equation for one Q or a stack of them, A stable.
-
-    Doubling: X is the sum of A'^k Q A^k, and each iteration doubles the number of its terms, so a time constant of 1e5
-    samples takes some 22 of them. Source: Smith, SIAM Journal on Applied Mathematics 16 (1968) 198.
-    """
-    X, power = Q, A
-    for _ in range(64):
-        more = power.T @ X @ power
-        X = X + more
-        if not np.any(_diagonal(more) > 1e-15 * _diagonal(X)):
-            break
-        power = power @ power
-    return X
-
-
-def _diagonal(X: Floats) -> Floats:
-    return np.diagonal(X, axis1=-2, axis2=-1)
-
-
 def h2(closed: lti.StateSpace) -> Floats:
     """Stationary variance of each output (row) that each white sequence of unit variance (column) causes.
 
@@ -160,7 +140,7 @@ def h2(closed: lti.StateSpace) -> Floats:
             f"no stationary variance: a pole at |z| = {worst:.9f} (the limit is 1); give the disturbance some damping "
             "where it is the disturbance's own, else lower the controller's gains"
         )
-    X = gramian(closed.A, closed.C[:, :, None] * closed.C[:, None, :])
+    X = lti.gramian(closed.A, closed.C[:, :, None] * closed.C[:, None, :])
     return np.asarray(np.einsum("ij,oik,kj->oj", closed.B, X, closed.B) + closed.D**2)
 
 

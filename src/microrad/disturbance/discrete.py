@@ -54,7 +54,7 @@ def discretise(disturbance: Disturbance, step_s: float) -> Discrete:
         cos, sin = math.cos(angle), math.sin(angle)
         Ad[2 * i : 2 * i + 2, 2 * i : 2 * i + 2] = [[cos, sin], [-sin, cos]]
     Ad[turning:, turning:] = filter_Ad
-    initial[turning:, turning:] = lti.covariance_root(_discrete_gramian(filter_Ad, filter_Bd @ filter_Bd.T))
+    initial[turning:, turning:] = lti.covariance_root(lti.gramian(filter_Ad.T, filter_Bd @ filter_Bd.T))
     return Discrete(
         Ad,
         np.vstack([np.zeros((turning, filter_Bd.shape[1])), filter_Bd]),
@@ -72,7 +72,7 @@ def _sampled_filter(disturbance: Disturbance, step_s: float) -> tuple[Floats, Fl
     if A.size == 0:
         return np.zeros((0, 0)), np.zeros((0, 0))
     Ad = np.asarray(expm(A * step_s))
-    seen = _discrete_gramian(Ad.T, C.T @ C)  # what a unit of noise on each state adds to the output's variance
+    seen = lti.gramian(Ad, C.T @ C)  # what a unit of noise on each state adds to the output's variance
     columns = [np.zeros((A.shape[0], 0))]
     for b in B.T[:, :, None]:
         root = lti.covariance_root(_noise_covariance(A, b, step_s))
@@ -101,13 +101,6 @@ def _noise_covariance(A: Floats, b: Floats, step_s: float) -> Floats:
         result = result + over @ result @ over.T
         over = over @ over
     return np.asarray(0.5 * (result + result.T))
-
-
-def _discrete_gramian(A: Floats, noise: Floats) -> Floats:
-    """Stationary covariance of x[k+1] = A x[k] + noise of this covariance."""
-    from scipy.linalg import solve_discrete_lyapunov  # slow to import, not needed to show help
-
-    return noise if A.size == 0 else np.asarray(solve_discrete_lyapunov(A, noise))
 
 
 def initial_state(discrete: Discrete, gaussians: Floats, phases: Floats) -> Floats:

@@ -24,7 +24,8 @@ def residual_spectrum(closed: ClosedLoop, freq_hz: Floats) -> Floats:
     reading = np.zeros((loop.axes, whole))
     reading[:, : o.at.order] = o.error
     keep = np.ones(whole, dtype=bool)
-    keep[o.lines] = False
+    for line in o.lines:
+        keep[line.states] = False
     # From every state to the error, then the covariance: its factor would lose what is small in other units.
     every = np.eye(int(keep.sum()))
     system = lti.StateSpace(

@@ -56,8 +56,10 @@ class Ensemble:
         return float(np.sqrt(np.mean(np.sum(self.rms_rad**2, axis=1))))
 
     def radial_rms_interval_rad(self, sigmas: float = 2.576) -> float:
-        """Half width of the interval of the radial rms from run to run (99 % by default)."""
+        """Half width of the interval of the radial rms from run to run (99 % by default); infinite for one run."""
         squares = np.sum(self.rms_rad**2, axis=1)
+        if squares.size < 2:
+            return math.inf
         spread = float(np.std(squares, ddof=1)) / math.sqrt(squares.size)
         return sigmas * spread / (2.0 * self.radial_rms_rad)
 
@@ -72,7 +74,7 @@ class Ensemble:
         """
         sampled = counter in (kernels.COUNT_SATURATED, kernels.COUNT_INVERSE_CLAMPED)
         times = self.readings if counter == kernels.COUNT_LOST else self.samples if sampled else self.steps
-        return float(np.mean(self.counts[:, counter])) / times
+        return float(np.mean(self.counts[:, counter])) / max(times, 1)  # no reading in a short run: none lost
 
 
 def bin_edges_rad() -> Floats:
@@ -196,16 +198,30 @@ def purpose_of(name: str, axis: int) -> int:
     return (zlib.crc32(name.encode()) % (1 << 16) * 4 + axis) * PURPOSES_OF_ONE
 
 
-def combined_shaping(loop: PointingLoop) -> Shaping:
-    """Disturbances side by side, each at an even state so that pairs stay pairs.
-
-    Raises ValueError for two of one name on an axis, which would share their random numbers.
-    """
-    parts, states, sources = [], 0, 0
-    for i, several in enumerate(loop.disturbances):
+def _refuse_shared(loop: PointingLoop) -> None:
+    """Raise ValueError for two disturbances with the same streams: of one name on an axis, or of names that collide."""
+    for axis, several in enumerate(loop.disturbances):
         names = [each.name for each in several]
         if len(set(names)) < len(names):
             raise ValueError(f"two disturbances of one axis share a name: {', '.join(names)}; give each its own")
+        taken: dict[int, str] = {}
+        for name in names:
+            other = taken.setdefault(purpose_of(name, axis), name)
+            if other != name:
+                raise ValueError(
+                    f"the disturbances {other!r} and {name!r} of one axis would take the same random numbers, which go "
+                    "by a short code of the name, and these two have the same; change one of the names"
+                )
+
+
+def combined_shaping(loop: PointingLoop) -> Shaping:
+    """Disturbances side by side, each at an even state so that pairs stay pairs.
+
+    Raises ValueError for two that would share their random numbers, see `_refuse_shared`.
+    """
+    _refuse_shared(loop)
+    parts, states, sources = [], 0, 0
+    for i, several in enumerate(loop.disturbances):
         for each in several:
             model = disturbance.discretise(each, loop.timing.step_s)
             parts.append((i, states, sources, purpose_of(each.name, i), model))
@@ -317,8 +333,11 @@ def run(
 ) -> Ensemble:
     """Statistics of ``runs`` runs. They depend on the seed and the run's number alone, not on ``threads``.
 
-    Memory does not grow with the length of the runs, and by 5 kB a run. Raises ValueError for what does not fit.
+    Memory does not grow with the length of the runs, and by 5 kB a run. Raises ValueError for what does not fit and for
+    less than one run.
     """
+    if runs < 1:
+        raise ValueError(f"an ensemble of {runs} runs has no statistics: ask for 1 run or more")
     p = arrays(loop, controller, span.seed)
     jobs = [partial(_batch, loop, p, span, first) for first in range(0, runs, LANES)]
     parts = in_threads(jobs, lambda done: on_progress(min(done * LANES, runs), runs, controller.name), threads)
@@ -410,7 +429,7 @@ def _joined(name: str, loop: PointingLoop, span: Span, parts: list[_Batch], runs
         psd_rad2_hz=parts[0].psd,
         samples=samples,
         steps=steps,
-        readings=-(-samples // loop.optical.every),
+        readings=-(-total // loop.optical.every) - -(-settle // loop.optical.every),
     )
 
 

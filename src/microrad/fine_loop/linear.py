@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from microrad import disturbance, lti
-from microrad.control import amplifier_factor, gramian
+from microrad.control import amplifier_factor
 from microrad.fine_loop.loop import LoopController, PointingLoop, in_band_gain
 
 Floats = NDArray[np.float64]
@@ -26,6 +26,15 @@ class Source:
     name: str
     columns: slice
     sampled: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """A disturbance line: the name of its disturbance, its two states, which turn for ever, and its amplitude (rad)."""
+
+    name: str
+    states: slice
+    amplitude_rad: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,8 +63,7 @@ class OpenLoop:
 
     A plant step j of a sample is s <- steps[j] s + noise g with unit white g. ``error`` (axes), ``mirror`` (outputs)
     and ``drive`` (actuators) read the state, ``reading`` takes what the optical sensor sees from it. ``shift`` ages the
-    commands by a sample, and a new one goes to the rows ``newest``. ``lines`` are the states of disturbance lines,
-    which turn for ever, reached by no noise.
+    commands by a sample, and a new one goes to the rows ``newest``. No noise reaches the states of the ``lines``.
     """
 
     loop: PointingLoop
@@ -69,13 +77,14 @@ class OpenLoop:
     reading: Floats
     shift: Floats
     newest: slice
-    lines: NDArray[np.intp]
+    lines: tuple[Line, ...]
 
 
 def open_loop(loop: PointingLoop) -> OpenLoop:
     """The matrices of the loop without controller; the reference is left out (zero)."""
     linear, m, axes = loop.mirror.linear_loop, loop.mirror.actuators, loop.axes
-    parts = [(i, each.name, disturbance.discretise(each, loop.timing.step_s)) for i, each in each_disturbance(loop)]
+    each_axis = [(i, each) for i, several in enumerate(loop.disturbances) for each in several]
+    parts = [(i, each.name, disturbance.discretise(each, loop.timing.step_s)) for i, each in each_axis]
     at = _layout(loop, sum(d.Ad.shape[0] for _, _, d in parts))
     mirror, drive, error = (np.zeros((rows, at.order)) for rows in (loop.mirror.axes, m, axes))
     mirror[:, at.mirror], mirror[:, at.drive], drive[:, at.drive] = linear.C, linear.D, np.eye(m)
@@ -107,7 +116,7 @@ def open_loop(loop: PointingLoop) -> OpenLoop:
         reading=reading,
         shift=_shift(at, m),
         newest=slice(at.commands.start, at.commands.start + m),
-        lines=np.concatenate([np.zeros(0, dtype=np.intp), *shaping.lines]),
+        lines=tuple(shaping.lines),
     )
 
 
@@ -128,7 +137,7 @@ class _Shaping:
         self.output = np.zeros((axes, at.order))
         self.noise: list[Floats] = []
         self.sources: list[Source] = []
-        self.lines: list[NDArray[np.intp]] = []
+        self.lines: list[Line] = []
         self._next, self._columns = at.shaping.start, 0
 
     def add(self, axis: int, name: str, model: disturbance.Discrete) -> None:
@@ -140,7 +149,8 @@ class _Shaping:
         block[here] = model.Bd
         self.noise.append(block)
         self.sources.append(Source(name, columns, sampled=False))
-        self.lines.append(here.start + np.arange(2 * model.line_amplitude_rad.size))
+        for i, amplitude in enumerate(model.line_amplitude_rad.tolist()):
+            self.lines.append(Line(name, slice(here.start + 2 * i, here.start + 2 * i + 2), amplitude))
         self._next, self._columns = here.stop, columns.stop
 
 
@@ -167,11 +177,6 @@ def _shift(at: Layout, m: int) -> Floats:
         A[row : row + m] = 0.0
         A[row : row + m, row - m : row] = np.eye(m)
     return A
-
-
-def each_disturbance(loop: PointingLoop) -> list[tuple[int, disturbance.Disturbance]]:
-    """Every disturbance with the axis that it acts on."""
-    return [(i, each) for i, several in enumerate(loop.disturbances) for each in several]
 
 
 @dataclass(frozen=True, slots=True)
@@ -202,18 +207,19 @@ class ClosedLoop:
 
     def worst_pole(self) -> tuple[float, float]:
         """Largest |z| over a control sample among the poles, disturbances left out, and its frequency in Hz."""
-        poles = np.linalg.eigvals(_without_disturbances(self))
+        keep = _without_disturbances(self)
+        poles = np.linalg.eigvals(self.monodromy[np.ix_(keep, keep)])
         period = self.open.loop.timing.period_s * len(self.samples)
         at = int(np.argmax(np.abs(poles)))
         size = float(np.abs(poles[at])) ** (1.0 / len(self.samples))
         return size, float(abs(np.angle(poles[at])) / (2.0 * math.pi * period))
 
 
-def _without_disturbances(closed: ClosedLoop) -> Floats:
-    """The monodromy without the disturbances' own states, whose lines lie on the unit circle whatever the loop does."""
+def _without_disturbances(closed: ClosedLoop) -> NDArray[np.bool_]:
+    """All states but the disturbances' own, whose lines lie on the unit circle whatever the loop does."""
     keep = np.ones(closed.step_noise.shape[0], dtype=bool)
     keep[closed.open.at.shaping] = False
-    return np.asarray(closed.monodromy[np.ix_(keep, keep)])
+    return keep
 
 
 def straightened(controller: LoopController, loop: PointingLoop) -> LoopController:
@@ -303,19 +309,19 @@ class Stationary:
 def stationary(closed: ClosedLoop) -> Stationary:
     """Stationary variances by the discrete Lyapunov equation (H2), one solution a source.
 
-    Lines have no white source and are added by their gain. Raises ValueError for an unstable loop.
+    Lines have no white source: what the loop makes of each is added, at a random phase. Raises ValueError for an
+    unstable loop.
     """
     refuse_unstable(closed)
     o, axes = closed.open, closed.open.loop.axes
     monodromy = closed.monodromy
     by_name: dict[str, Floats] = {}
     drive = np.zeros(o.drive.shape[0])
-    for source in closed.sources:
-        errors, drives = _variances(closed, monodromy, source)
-        by_name[source.name] = by_name.get(source.name, np.zeros(axes)) + errors
-        drive = drive + drives
-    for name, errors in _line_variances(closed).items():
+    found = [(source.name, *_variances(closed, monodromy, source)) for source in closed.sources]
+    found += [(line.name, *_line_variances(closed, monodromy, line)) for line in o.lines]
+    for name, errors, drives in found:
         by_name[name] = by_name.get(name, np.zeros(axes)) + errors
+        drive = drive + drives
     return Stationary(np.sum([np.zeros(axes), *by_name.values()], axis=0), drive, by_name)
 
 
@@ -337,20 +343,30 @@ def _variances(closed: ClosedLoop, monodromy: Floats, source: Source) -> tuple[F
         return P, errors / count, drives / count
 
     gathered, _, _ = over_period(np.zeros((whole, whole)))
-    _, errors, drives = over_period(gramian(monodromy.T, gathered))
+    _, errors, drives = over_period(lti.gramian(monodromy.T, gathered))
     return errors, drives
 
 
-def _line_variances(closed: ClosedLoop) -> dict[str, Floats]:
-    """Half the squared amplitude of each disturbance line behind the loop, by the name of its disturbance, by axis."""
-    loop = closed.open.loop
-    found: dict[str, Floats] = {}
-    for i, each in each_disturbance(loop):
-        for line in each.lines:
-            gain = sensitivity(closed, np.array([line.freq_hz]))[0, :, i]
-            size = 0.5 * (line.amplitude_rad * np.abs(gain)) ** 2
-            found[each.name] = found.get(each.name, np.zeros(loop.axes)) + size
-    return found
+def _line_variances(closed: ClosedLoop, monodromy: Floats, line: Line) -> tuple[Floats, Floats]:
+    """Variances that a line leaves, over its phase: half the squared size of what turns at each plant step.
+
+    Over a sensor period the line's states turn by a factor z on the unit circle, and so does the whole loop once it has
+    settled: its turning state x is the eigenvector of the monodromy for z that has the line's own states in it.
+    """
+    o, keep = closed.open, _without_disturbances(closed)
+    turning = np.array([1.0, 1.0j])
+    z = complex((monodromy[line.states, line.states] @ turning)[0])
+    x = np.zeros(monodromy.shape[0], dtype=complex)
+    x[line.states] = line.amplitude_rad * turning
+    x[keep] = np.linalg.solve(z * np.eye(int(keep.sum())) - monodromy[np.ix_(keep, keep)], monodromy[keep] @ x)
+    errors, drives = [], []
+    for sample in closed.samples:
+        x = sample @ x
+        for step in closed.steps:
+            x = step @ x
+            errors.append(0.5 * np.abs(o.error @ x[: o.at.order]) ** 2)
+            drives.append(0.5 * np.abs(o.drive @ x[: o.at.order]) ** 2)
+    return np.mean(errors, axis=0), np.mean(drives, axis=0)
 
 
 def sensitivity(closed: ClosedLoop, freq_hz: Floats) -> Complexes:

@@ -22,7 +22,6 @@ from microrad.threads import in_threads
 Floats = NDArray[np.float64]
 Progress = Callable[[int, int, str], None]
 
-TOGETHER = "all together"
 COUNTERS = {
     "saturated samples": kernels.COUNT_SATURATED,
     "slew-limited steps": kernels.COUNT_SLEW,
@@ -37,6 +36,7 @@ COUNTERS = {
 class Residual:
     """What one controller leaves on one variant of the mirror: radial, at the line of sight.
 
+    ``rms_interval_rad`` is the half width of the 99 % interval over the runs, infinite where there is but one.
     ``quantile_rad`` is the error that the mission's share of the time stays below; ``shares`` say how often each limit
     was met, by name, where it was.
     """
@@ -155,8 +155,13 @@ def verify(
 
 
 def _job(scene: Scene, m: Mission, design: Design, variant: str) -> Callable[[], ensemble.Ensemble]:
-    loop = with_mirror(scene.loop, m, variant)
-    controller = for_mirror(design.controller, loop)
+    straight = variant == "no hysteresis"  # each element its slow gain, as in theory and in the error budget
+    loop = parts.without(scene.loop, parts.HYSTERESIS) if straight else with_mirror(scene.loop, m, variant)
+    return _run(loop, design.controller, m)
+
+
+def _run(loop: PointingLoop, controller: LoopController, m: Mission) -> Callable[[], ensemble.Ensemble]:
+    controller = for_mirror(controller, loop)
     return lambda: ensemble.run(loop, controller, span(m), table(m).runs, threads=1)
 
 
@@ -209,30 +214,26 @@ def best(verified: Sequence[Verified]) -> Verified:
 def error_budget(
     scene: Scene, m: Mission, of: Verified, on_progress: Progress = lambda done, total, what: None
 ) -> ErrorBudget:
-    """Each source of error alone, together, and what is not a source left out of the whole; all with the same seeds."""
-    straight = parts.without(scene.loop, parts.HYSTERESIS)
-    names = parts.sources(straight)
-    changing = (parts.HYSTERESIS, parts.LIMITS, parts.QUANTISATION, parts.DELAY)
-    fine = parts.without(straight, parts.QUANTISATION)
+    """Each source of error alone, together, and what is not a source left out of the whole; all with the same seeds.
+
+    The whole, with hysteresis and without, is what `verify` has simulated.
+    """
+    fine = parts.without(scene.loop, parts.HYSTERESIS, parts.QUANTISATION)
+    names = parts.sources(fine)
+    left_out = (parts.LIMITS, parts.QUANTISATION, parts.DELAY)
     alone = [parts.without(fine, *(other for other in names if other != name)) for name in names]
-    fewer = [parts.without(scene.loop, name) for name in changing]
-    loops = [*alone, straight, scene.loop, *fewer]
-    controller = of.design.controller
-    runs = _several([_run(loop, for_mirror(controller, loop), m) for loop in loops], on_progress, "error budget")
+    fewer = [parts.without(scene.loop, name) for name in left_out]
+    runs = _several([_run(loop, of.design.controller, m) for loop in (*alone, *fewer)], on_progress, "error budget")
     rms = [run.radial_rms_rad for run in runs]
     theory = of.theory.error_by_source
     lines = tuple(
         Part(name, value, math.sqrt(float(np.sum(theory[name]))) if name in theory else math.nan)
-        for name, value in zip(names, rms, strict=False)
+        for name, value in zip(names, rms[: len(names)], strict=True)
     )
-    together, full = rms[len(names)], rms[len(names) + 1]
-    rest = rms[len(names) + 2 :]
-    differences = tuple(Difference(name, full, value) for name, value in zip(changing, rest, strict=True))
+    full, together = of.simulated["given"].rms_rad, of.simulated["no hysteresis"].rms_rad
+    without = {parts.HYSTERESIS: together, **dict(zip(left_out, rms[len(names) :], strict=True))}
+    differences = tuple(Difference(name, full, value) for name, value in without.items())
     return ErrorBudget(of.design.name, lines, together, full, differences)
-
-
-def _run(loop: PointingLoop, controller: LoopController, m: Mission) -> Callable[[], ensemble.Ensemble]:
-    return lambda: ensemble.run(loop, controller, span(m), table(m).runs, threads=1)
 
 
 def _tracking(loop: PointingLoop, amplitude_rad: float, freq_hz: float) -> PointingLoop:
