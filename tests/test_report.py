@@ -12,7 +12,7 @@ import pytest
 import xarray as xr
 
 from microrad import folder, missionfile, report, study
-from microrad.report import figures
+from microrad.report import figures, link_figures
 from shipped import SHIPPED, edited_file
 
 
@@ -72,7 +72,7 @@ def test_the_page_holds_what_the_paper_is_judged_by(written):
 
 
 def test_each_figure_is_an_svg_with_its_data(written, paper):
-    drawn = figures.draw(paper)
+    drawn = (*figures.draw(paper), *link_figures.draw(paper.links))
     assert [f.name for f in drawn] == [
         "fig2-margin-map",
         "fig5-hysteresis-loops",
@@ -80,6 +80,8 @@ def test_each_figure_is_an_svg_with_its_data(written, paper):
         "fig8-inverse",
         "comparison",
         "claims-scan",
+        "tornado",
+        "wide-beam-or-scan",
     ]
     names = {p.name for p in (written / "figures").iterdir()}
     assert names == {f.name + ending for f in drawn for ending in (".svg", ".csv")}

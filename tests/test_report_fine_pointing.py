@@ -11,9 +11,10 @@ import pytest
 import xarray as xr
 from numpy.testing import assert_allclose, assert_array_equal
 
-from microrad import control, fine_pointing, missionfile, paper, report, study
+from microrad import control, fine_pointing, missionfile, paper, performance, report, study
 from microrad.control.tuning import MARGIN
 from microrad.fine_loop.design import design_plant, residual_spectrum
+from microrad.fine_loop.ensemble import bin_edges_rad
 from microrad.fine_loop.linear import close, stationary
 from microrad.fine_loop.loop import ReferenceFilter, assemble, with_inverse
 from microrad.fine_pointing import Difference, ErrorBudget, FinePointingStudy, Part, Residual, Sine, Verified
@@ -97,16 +98,27 @@ def verified_of(scene, design, i, freq):
             else (2.11 + i / 7 + place / 9) * 1e-6
         )
         quantile = ((5.17, 4.23, 6.41)[i] + place / 20) * 1e-6
-        simulated[variant] = Residual(rms, 0.012e-6, (rms / 1.4, rms / 1.5), quantile, quantile + 2.22e-6, {})
+        counts = np.diff(-(0.003 ** ((bin_edges_rad() / quantile) ** 2)))  # a Rayleigh distribution with this quantile
+        simulated[variant] = Residual(
+            rms,
+            0.012e-6,
+            (rms / 1.4, rms / 1.5),
+            (1e-9, -2e-9),
+            np.round(1e9 * counts).astype(np.int64),
+            quantile,
+            quantile + 2.22e-6,
+            {},
+        )
     predicted = np.full((freq.size, 2), np.nan)
     predicted[1:-1] = residual_spectrum(closed, freq[1:-1])
     return Verified(design, theory, simulated, np.nan_to_num(1.1 * predicted, nan=1e-18), predicted)
 
 
 def with_fine(plain, fine):
-    """The study with this fine-pointing loop in it, and its requirement."""
-    requirement = study.fine_requirement(plain.file.mission, fine)
-    return replace(plain, fine_pointing=fine, requirements=(*plain.requirements, requirement))
+    """The study with this fine-pointing loop in it, and its requirements."""
+    found = performance.run(plain.file.mission, plain.runs, fine)
+    requirements = study.fine_requirements(plain.file.mission, fine, found)
+    return replace(plain, fine_pointing=fine, performance=found, requirements=(*plain.requirements, *requirements))
 
 
 def changed(fine, name, **to):
@@ -303,8 +315,8 @@ def test_the_section_opens_with_the_verdict_and_its_distance_from_theory(page, f
 def test_a_study_without_the_loop_has_no_section(plain, tmp_path):
     drawn = figures.draw(plain)
     text = render(plain, drawn)
-    assert HEADING not in text and "Atmosphere; contact times" not in text
-    assert "Vibration, sensor noise and atmosphere" in text
+    assert HEADING not in text and "Turbulence; contact times" not in text
+    assert "Vibration, sensor noise and turbulence" in text
     assert drawn == ()
     assert report.summary(plain)["fine_pointing"] is None
     assert "ine pointing" not in report.verdict_text(plain)
@@ -315,14 +327,14 @@ def test_a_study_without_the_loop_has_no_section(plain, tmp_path):
 
 def test_a_study_with_the_loop_does_not_say_that_it_leaves_out_vibration(page):
     assert HEADING in page[1]
-    assert "Vibration, sensor noise and atmosphere" not in page[1]
-    assert "Atmosphere; contact times" in page[1]
+    assert "Vibration, sensor noise and turbulence" not in page[1]
+    assert "Turbulence; contact times" in page[1]
 
 
 # ------------------------------------------------------------------------------------------------ words
 
 
-def test_the_verdict_says_it_in_three_lines(plain, fine):
+def test_the_verdict_says_it_in_five_lines(plain, fine):
     whole = with_fine(plain, fine)
     added = [line for line in report.verdict_text(whole).splitlines() if line not in report.verdict_text(plain)]
     assert added[0].startswith(f"{HEADING}: {SECOND} leaves 4.23 µrad radial at 99.7 %")
@@ -330,7 +342,8 @@ def test_the_verdict_says_it_in_three_lines(plain, fine):
     assert "better (rms) than the best PI of the gain grid" in added[1]
     assert "axis x needs 623 µrad to either side and has 534 µrad" in added[2]
     assert added[3].startswith(f"PASS  fine pointing at 99.7 % ({SECOND}): 4.23 µrad")
-    assert len(added) == 4
+    assert added[4].startswith(f"PASS  communication margin but for 0.3 % of the time ({SECOND}): 4.8")
+    assert len(added) == 5
 
 
 def test_a_missed_requirement_is_said_everywhere(plain, fine, mission):

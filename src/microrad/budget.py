@@ -12,7 +12,8 @@ class Line:
     """One term of a budget.
 
     `value` is in `unit`; in decibels a gain is positive and a loss negative, so that a total is a sum. `basis` is the
-    formula or measurement, `source` says who gave the inputs, `regime` says where the formula holds.
+    formula or measurement, `source` says who gave the inputs, `regime` says where the formula holds. `warning` says
+    that it does not hold here, or that nothing was given for it; "" when there is nothing to say.
     """
 
     name: str
@@ -21,6 +22,7 @@ class Line:
     basis: str
     source: str
     regime: str
+    warning: str = ""
 
 
 def total_db(lines: Iterable[Line]) -> float:
@@ -41,7 +43,7 @@ def total_db(lines: Iterable[Line]) -> float:
 def root_sum_square(lines: Iterable[Line]) -> float:
     """Root of the sum of the squared lines, in their common unit.
 
-    Right for independent terms of one class only: ECSS-E-ST-60-10C does not authorise it across bias, random and drift.
+    Right for standard deviations of uncorrelated terms: ECSS-E-ST-60-10C, 4.2.3, does not add means or bounds so.
     Raises `ValueError` when there is no line, when units differ and for decibels.
     """
     lines = tuple(lines)

@@ -17,6 +17,10 @@ from microrad.units import UnitError, format_quantity, kind_of, parse_quantity
 MOST_ITEMS = 1000
 """Items of a list beyond which it is taken for a mistake."""
 
+UNKNOWN = "unknown"
+"""What a preset holds where no source prints a value."""
+NOT_PUBLISHED = "is in no source that the preset names, and has to be given"
+
 _PATTERN = r"^[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]{1,3})? ?[A-Za-zµμ1].*$"
 
 
@@ -52,6 +56,8 @@ class Quantity:
 
     def read(self, value: object) -> float:
         """SI value of the text; raises `UnitError`."""
+        if value == UNKNOWN:
+            raise UnitError(value, NOT_PUBLISHED, self.wanted, self.example)
         number = parse_quantity(value, self.unit, self.typical) if self.unit else _plain_number(value)
         if fault := self._out_of_bounds(number):
             raise UnitError(value, fault, self.wanted, self.example)
@@ -94,6 +100,94 @@ class Quantity:
 
 
 @dataclass(frozen=True, slots=True)
+class Whole(Quantity):
+    """A whole number from `least` to `most`, compared as it stands: a seed has more digits than a float."""
+
+    def read(self, value: object) -> int:
+        """The number; raises `UnitError`."""
+        if value == UNKNOWN:
+            raise UnitError(value, NOT_PUBLISHED, self.wanted, self.example)
+        if isinstance(value, bool) or not isinstance(value, int):
+            raise UnitError(value, "is not a whole number", self.wanted, self.example)
+        if fault := self._out_of_bounds(value):
+            raise UnitError(value, fault, self.wanted, self.example)
+        return value
+
+    @property
+    def example(self) -> str:
+        """A number within the bounds."""
+        return f"{max(int(self.least or 0), 2)}"
+
+    @property
+    def wanted(self) -> str:
+        """What the key expects, in words."""
+        return f"a whole number without quotes, from {self._show(self.least or 0)} to {self._show(self.most or 0)}"
+
+    def _show(self, number: float) -> str:
+        return str(int(number))
+
+    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        """A whole number with its bounds."""
+        return {"type": "integer", "minimum": self.least, "maximum": self.most}
+
+
+@dataclass(frozen=True, slots=True)
+class Share(Quantity):
+    """A number above 0 (or at least `least`) and below `below`."""
+
+    below: float = 1.0
+
+    def read(self, value: object) -> float:
+        """The number; raises `UnitError`."""
+        number = Quantity.read(self, value)
+        if not 0.0 < number < self.below:
+            raise UnitError(value, f"is not above 0 and below {self.below:g}", self.wanted, self.example)
+        return number
+
+    @property
+    def example(self) -> str:
+        """A number between the bounds."""
+        return f"{self.below / 2:g}"
+
+    @property
+    def wanted(self) -> str:
+        """What the key expects, in words."""
+        lowest = "above 0" if self.least is None else f"at least {self.least:g}"
+        return f"a number without quotes, {lowest} and below {self.below:g}"
+
+    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        """A number with its bounds."""
+        return {"type": "number", "exclusiveMinimum": 0.0, "exclusiveMaximum": self.below}
+
+
+@dataclass(frozen=True, slots=True)
+class Switch(Quantity):
+    """True or false."""
+
+    def read(self, value: object) -> bool:
+        """The value; raises `UnitError`."""
+        if value == UNKNOWN:
+            raise UnitError(value, NOT_PUBLISHED, self.wanted, self.example)
+        if not isinstance(value, bool):
+            raise UnitError(value, "is neither true nor false", self.wanted, self.example)
+        return value
+
+    @property
+    def example(self) -> str:
+        """One of the two."""
+        return "true"
+
+    @property
+    def wanted(self) -> str:
+        """What the key expects, in words."""
+        return "true or false, without quotes"
+
+    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        """A boolean."""
+        return {"type": "boolean"}
+
+
+@dataclass(frozen=True, slots=True)
 class Several:
     """A list of at least one quantity; rising lists are strictly increasing."""
 
@@ -102,6 +196,8 @@ class Several:
 
     def read(self, value: object) -> tuple[float, ...]:
         """SI values of the list; raises `ProblemsError` with every item that does not fit."""
+        if value == UNKNOWN:
+            raise ProblemsError(Problem("", NOT_PUBLISHED, self.wanted))
         if not isinstance(value, list | tuple) or not value:
             raise ProblemsError(Problem("", "is not a list with something in it", self.wanted))
         if len(value) > MOST_ITEMS:
@@ -153,6 +249,15 @@ class Table(BaseModel):
     """A table of a mission or plan file: frozen, strict, no key beyond the named ones."""
 
     model_config = ConfigDict(strict=True, frozen=True, extra="forbid", allow_inf_nan=False)
+
+    @classmethod
+    def rule_of(cls, key: str) -> tuple[str, "Quantity"]:
+        """Name and rule of the quantity that a file calls `key`; a missing one is a KeyError."""
+        for name, info in cls.model_fields.items():
+            rules = [rule for rule in info.metadata if isinstance(rule, Quantity)]
+            if rules and (info.alias or name) == key:
+                return name, rules[0]
+        raise KeyError(key)
 
     def problems(self) -> Iterator[Problem]:
         """What does not fit together in a table whose keys are each in order."""

@@ -5,15 +5,13 @@ All angles are of the line of sight outside the telescope, per axis, but for the
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
-from pydantic import Field, GetJsonSchemaHandler
-from pydantic_core import CoreSchema
+from pydantic import Field
 
-from microrad.fields import Problem, Quantity, Several, Table
+from microrad.fields import Problem, Quantity, Several, Share, Switch, Table, Whole
 from microrad.mirror_table import ANGLE_MOST, Angle, DurationOrZero, Frequency, Name
-from microrad.units import UnitError, format_quantity
+from microrad.units import format_quantity
 
 STEP_TOLERANCE = 1e-9
 """How far, relatively, a period or a delay may lie from a whole number of plant steps or control samples."""
@@ -29,75 +27,6 @@ WORST_CONDITION = 1e4
 
 
 # --------------------------------------------------------------------------------------------------- kinds of values
-@dataclass(frozen=True, slots=True)
-class _Whole(Quantity):
-    """A whole number from `least` to `most`, compared as it stands: a seed has more digits than a float."""
-
-    def read(self, value: object) -> int:
-        if isinstance(value, bool) or not isinstance(value, int):
-            raise UnitError(value, "is not a whole number", self.wanted, self.example)
-        if fault := self._out_of_bounds(value):
-            raise UnitError(value, fault, self.wanted, self.example)
-        return value
-
-    @property
-    def example(self) -> str:
-        return f"{max(int(self.least or 0), 2)}"
-
-    @property
-    def wanted(self) -> str:
-        return f"a whole number without quotes, from {self._show(self.least or 0)} to {self._show(self.most or 0)}"
-
-    def _show(self, number: float) -> str:
-        return str(int(number))
-
-    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
-        return {"type": "integer", "minimum": self.least, "maximum": self.most}
-
-
-@dataclass(frozen=True, slots=True)
-class _Share(Quantity):
-    """A number above 0 and below 1."""
-
-    def read(self, value: object) -> float:
-        number = Quantity.read(self, value)
-        if not 0.0 < number < 1.0:
-            raise UnitError(value, "is not above 0 and below 1", self.wanted, self.example)
-        return number
-
-    @property
-    def example(self) -> str:
-        return "0.5"
-
-    @property
-    def wanted(self) -> str:
-        return "a number without quotes, above 0 and below 1"
-
-    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
-        return {"type": "number", "exclusiveMinimum": 0.0, "exclusiveMaximum": 1.0}
-
-
-@dataclass(frozen=True, slots=True)
-class _Switch(Quantity):
-    """True or false."""
-
-    def read(self, value: object) -> bool:
-        if not isinstance(value, bool):
-            raise UnitError(value, "is neither true nor false", self.wanted, self.example)
-        return value
-
-    @property
-    def example(self) -> str:
-        return "true"
-
-    @property
-    def wanted(self) -> str:
-        return "true or false, without quotes"
-
-    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
-        return {"type": "boolean"}
-
-
 # the upper bounds are no limits of technology: they catch a wrong prefix
 AngleOrZero = Annotated[float, Quantity("rad", "urad", least=0.0, most=ANGLE_MOST)]
 Seconds = Annotated[float, Quantity("s", above=0.0, most=1e9)]
@@ -306,7 +235,7 @@ class ReferenceTable(Table):
     """The known part of the pointing error: point-ahead, and the orbital motion that the body leaves."""
 
     point_ahead_rad: AngleOrZero = Field(alias="point_ahead", description="largest, on axis x")
-    point_ahead_on_mirror: Annotated[bool, _Switch("")] = Field(description="false: another mirror makes it")
+    point_ahead_on_mirror: Annotated[bool, Switch("")] = Field(description="false: another mirror makes it")
     line_of_sight_rate_rad_s: Annotated[float, Quantity("rad/s", "urad/s", least=0.0, most=ANGLE_MOST)] = Field(
         alias="line_of_sight_rate", description="largest, on axis x"
     )
@@ -328,14 +257,14 @@ class FinePointing(Table):
     reference_filter_hz: Frequency = Field(
         alias="reference_filter", description="bandwidth of the filter that the inverse's target and rate come from"
     )
-    modulus_margin: Annotated[float, _Share("")] = Field(description="least distance of the loop from -1")
-    quantile: Annotated[float, _Share("")] = Field(description="share of the time that the radial error is judged at")
-    runs: Annotated[int, _Whole("", least=1, most=100_000)]
+    modulus_margin: Annotated[float, Share("")] = Field(description="least distance of the loop from -1")
+    quantile: Annotated[float, Share("")] = Field(description="share of the time that the radial error is judged at")
+    runs: Annotated[int, Whole("", least=1, most=100_000)]
     duration_s: Seconds = Field(alias="duration", description="of a run, settling included")
     settle_s: Annotated[float, Quantity("s", least=0.0, most=1e9)] = Field(
         alias="settle", description="left out at the begin of a run"
     )
-    seed: Annotated[int, _Whole("", least=0, most=2**63 - 1)]
+    seed: Annotated[int, Whole("", least=0, most=2**63 - 1)]
     geometry: GeometryTable
     vibration: VibrationTable
     wheels: WheelsTable | None = None

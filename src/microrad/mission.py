@@ -10,15 +10,29 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
+from microrad.acquisition_table import Acquisition
 from microrad.fields import Problem, Quantity, Several, Table
 from microrad.fine_pointing_table import FinePointing, clock_problems
+from microrad.link_table import (
+    Beacon,
+    Channel,
+    Communication,
+    LinkConventions,
+    LinkRequirement,
+    Terminals,
+    divergence_fits,
+    obscuration_fits,
+    pattern_fits,
+    strehl_fits,
+)
 from microrad.mirror_table import ANGLE_MOST, Angle, DurationOrZero, Frequency, Mirror, MirrorGain, Name, Rate, Voltage
-from microrad.units import format_quantity
+from microrad.pointing_table import JitterTable, PointAhead, Pointing
+from microrad.units import SPEED_OF_LIGHT_M_S, format_quantity
 
 MOST_SAMPLES = 2_000_000
 """Control samples in a period of the scenario's sines beyond which a run would not fit into memory."""
 
-_KINDS = ("paper", "assumption", "standard", "measured", "identified")
+_KINDS = ("paper", "assumption", "standard", "measured", "identified", "literature", "unknown")
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,43 +62,15 @@ def source_text(sources: Mapping[str, Source], *keys: str) -> str:
     return "; ".join(dict.fromkeys(texts))
 
 
-AngleOrZero = Annotated[float, Quantity("rad", least=0.0, most=ANGLE_MOST)]
-# the upper bounds are no limits of technology: they catch a wrong prefix, "5 km" for an aperture of 5 cm
-Power = Annotated[float, Quantity("W", above=0.0, most=1e6)]
-Threshold = Annotated[float, Quantity("W", "pW", above=0.0, most=1e6)]
-Aperture = Annotated[float, Quantity("m", "cm", above=0.0, most=100.0)]
-Wavelength = Annotated[float, Quantity("m", "um", least=1e-8, most=1e-2)]
-Distance = Annotated[float, Quantity("m", "km", above=0.0, most=1e13)]
-Loss = Annotated[float, Quantity("dB", least=0.0)]
-Strehl = Annotated[float, Quantity("", least=0.0)]
+AngleOrZero = Annotated[float, Quantity("rad", "urad", least=0.0, most=ANGLE_MOST)]
 Duration = Annotated[float, Quantity("s", "us", above=0.0)]
 Step = Annotated[float, Quantity("V", "mV", least=0.0)]
 Frequencies = Annotated[tuple[float, ...], Several(Quantity("Hz", above=0.0, most=1e12), rising=True)]
 
 
-class Pointing(Table):
-    """Open-loop pointing: the errors that the beacon has to cover, each as a half width about the line of sight."""
-
-    body_pointing_rad: AngleOrZero = Field(alias="body_pointing", description="attitude control error of the body")
-    orbit_knowledge_rad: AngleOrZero = Field(alias="orbit_knowledge", description="direction error from the two orbits")
-    misalignment_rad: AngleOrZero = Field(alias="misalignment", description="calibration and environmental alignment")
-
-
-class Terminals(Table):
-    """Diameters of the two optical terminals."""
-
-    leo_aperture_m: Aperture = Field(alias="leo_aperture")
-    geo_aperture_m: Aperture = Field(alias="geo_aperture")
-
-
-class Conventions(Table):
+class Conventions(LinkConventions):
     """How numbers are read that a source leaves ambiguous."""
 
-    pointing_loss: Literal["gaussian", "gain"] = Field(
-        description="gaussian: beam with 1/e2 radius D/2 at the aperture; gain: exp(-G theta^2)"
-    )
-    strehl: Literal["decibel", "ratio"] = Field(description="decibel: a loss in dB; ratio: a number up to 1")
-    divergence: Literal["full-1/e2", "half-1/e2"] = Field(description="which angle a beam's divergence is")
     residual: Literal["per-axis", "radial"] = Field(
         description="per-axis: the simulated axis is the pointing error; radial: two equal axes, sqrt 2 more"
     )
@@ -93,41 +79,9 @@ class Conventions(Table):
     )
 
 
-class Beam(Table):
-    """What a link has whatever its beam: power, wavelength, quality, distance and losses (all losses positive)."""
-
-    transmit_power_w: Power = Field(alias="transmit_power", description="optical power before the optics")
-    wavelength_m: Wavelength = Field(alias="wavelength")
-    strehl: Strehl = Field(description="decibel or ratio as conventions.strehl says")
-    pointing_error_rad: AngleOrZero = Field(alias="pointing_error", description="off the line of sight, radial")
-    distance_m: Distance = Field(alias="distance")
-    transmit_optics_loss_db: Loss = Field(alias="transmit_optics_loss")
-    receive_optics_loss_db: Loss = Field(alias="receive_optics_loss")
-
-
-class Beacon(Beam):
-    """A wide Gaussian beam to be found by: the beacon, and the answer to it."""
-
-    divergence_rad: Angle = Field(alias="divergence", description="full or half angle as conventions.divergence says")
-    required_power_w: Threshold = Field(alias="required_power", description="power that the sensor needs")
-
-
-class Communication(Beam):
-    """The data link, diffraction-limited by its aperture."""
-
-    data_rate_bit_s: Annotated[float, Quantity("bit/s", above=0.0)] = Field(alias="data_rate")
-    tracking_split_loss_db: Loss = Field(alias="tracking_split_loss", description="light for the tracking sensor")
-    implementation_loss_db: Loss = Field(alias="implementation_loss", description="receiver against its sensitivity")
-    receiver_sensitivity_photon_bit: Annotated[float, Quantity("photon/bit", above=0.0)] = Field(
-        alias="receiver_sensitivity"
-    )
-
-
-class Requirement(Table):
+class Requirement(LinkRequirement):
     """What has to be met."""
 
-    margin_db: Loss = Field(alias="margin", description="margin of the communication link")
-    pointing_error_rad: Angle = Field(alias="pointing_error", description="residual that the fine pointing may leave")
     residual_statistic: Literal["peak", "rms"] = Field(description="which number of the residual has to meet it")
 
 
@@ -179,15 +133,6 @@ class Scenario(Table):
     loop_amplitude_v: Annotated[float, Quantity("V", above=0.0)] = Field(alias="loop_amplitude")
 
 
-def _strehl_fits(name: str) -> Callable[..., Iterator[Problem]]:
-    def check(conventions: Conventions, beam: Beam) -> Iterator[Problem]:
-        if conventions.strehl == "ratio" and not 0.0 < beam.strehl <= 1.0:
-            reason = f'is no ratio, but conventions.strehl = "ratio" ({beam.strehl:g})'
-            yield Problem(f"{name}.strehl", reason, 'above 0 and at most 1, or conventions.strehl = "decibel"')
-
-    return check
-
-
 def _bias_fits(mirror: Mirror, amplifier: Amplifier) -> Iterator[Problem]:
     low, high = amplifier.output_min_v / amplifier.gain, amplifier.output_max_v / amplifier.gain
     if not low <= mirror.bias_v <= high:
@@ -209,24 +154,70 @@ def _frequencies_fit(control: Control, scenario: Scenario) -> Iterator[Problem]:
             yield Problem(f"scenario.{name}", reason, f"frequencies below {half}")
 
 
-RELATIONS: tuple[tuple[tuple[str, ...], Callable[..., Iterator[Problem]]], ...] = (
-    *((("conventions", name), _strehl_fits(name)) for name in ("beacon", "answer", "communication")),
+def _point_ahead_fits(point_ahead: PointAhead | None, fine: FinePointing | None) -> Iterator[Problem]:
+    """One point-ahead: the mirror's largest is that of the largest velocity."""
+    if point_ahead is None or fine is None:
+        return
+    angle = 2.0 * point_ahead.transverse_velocity_m_s / SPEED_OF_LIGHT_M_S
+    if abs(fine.reference.point_ahead_rad - angle) > 0.02 * angle:
+        shown = format_quantity(angle, "rad", 3)
+        reason = f"is not 2 v / c of point_ahead.transverse_velocity ({shown})"
+        yield Problem("fine_pointing.reference.point_ahead", reason, f'point_ahead = "{shown}" would do')
+
+
+Relation = tuple[tuple[str, ...], Callable[..., Iterator[Problem]]]
+
+LINK_RELATIONS: tuple[Relation, ...] = (
+    *((("conventions", name), strehl_fits(name)) for name in ("beacon", "answer", "communication")),
+    (("conventions", "terminals", "beacon"), divergence_fits("beacon", "leo")),
+    (("conventions", "terminals", "answer"), divergence_fits("answer", "geo")),
+    (("conventions", "communication"), pattern_fits),
+    (("terminals", "communication"), obscuration_fits),
+)
+"""What has to fit between tables of the link: their names, and a check that takes them and yields what does not."""
+
+RELATIONS: tuple[Relation, ...] = (
+    *LINK_RELATIONS,
     (("mirror", "amplifier"), _bias_fits),
     (("control", "scenario"), _frequencies_fit),
+    (("point_ahead", "fine_pointing"), _point_ahead_fits),
 )
-"""What has to fit between tables: their names, and a check that takes them and yields what does not."""
+"""What has to fit between tables of a whole mission."""
 
 
-class Mission(Table):
-    """Everything that a study needs."""
+class LinkMission(Table):
+    """What a link budget needs; a mission whose tables on mirror and loop are left out."""
 
     name: Name
     pointing: Pointing
     terminals: Terminals
+    conventions: LinkConventions
+    beacon: Beacon | None = None
+    answer: Beacon | None = None
+    communication: Communication
+    requirement: LinkRequirement
+    channel: Channel | None = None
+    jitter: JitterTable | None = None
+    point_ahead: PointAhead | None = None
+    acquisition: Acquisition | None = None
+
+    @classmethod
+    def relations(cls) -> tuple[Relation, ...]:
+        """What has to fit between its tables."""
+        return LINK_RELATIONS
+
+    def problems(self) -> Iterator[Problem]:
+        """What does not fit between tables."""
+        for names, check in self.relations():
+            yield from check(*(getattr(self, name) for name in names))
+
+
+class Mission(LinkMission):
+    """Everything that a study needs."""
+
     conventions: Conventions
     beacon: Beacon
     answer: Beacon
-    communication: Communication
     requirement: Requirement
     mirror: Mirror
     amplifier: Amplifier
@@ -234,15 +225,10 @@ class Mission(Table):
     scenario: Scenario
     fine_pointing: FinePointing | None = None
 
-    def problems(self) -> Iterator[Problem]:
-        """What does not fit between tables."""
-        for names, check in RELATIONS:
-            yield from check(*(getattr(self, name) for name in names))
-
-
-def half_angle_rad(divergence_rad: float, convention: str) -> float:
-    """Half angle at 1/e2 of intensity of a beam whose divergence is given as "full-1/e2" or "half-1/e2"."""
-    return divergence_rad / 2 if convention == "full-1/e2" else divergence_rad
+    @classmethod
+    def relations(cls) -> tuple[Relation, ...]:
+        """What has to fit between its tables."""
+        return RELATIONS
 
 
 def mission_schema() -> dict[str, Any]:

@@ -6,28 +6,31 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
-from typing import Any, Literal, TypeVar, cast, get_args, get_origin
+from typing import Any, Literal, TypeVar, get_args, get_origin
 
 from pydantic import ValidationError
 from pydantic.fields import FieldInfo
 
 from microrad.document import Document, Fault, MissionError, UnreadableError, clipped, shown
-from microrad.fields import Problem, ProblemsError, Quantity, Several, Table
+from microrad.fields import NOT_PUBLISHED, UNKNOWN, Problem, ProblemsError, Quantity, Several, Table
 from microrad.mirror_table import Mirror
-from microrad.mission import RELATIONS, Mission, Source
+from microrad.mission import LinkMission, Mission, Source
 from microrad.units import UnitError
 
 __all__ = [
     "Fault",
+    "LinkFile",
     "MirrorFile",
     "MissionError",
     "MissionFile",
     "assumptions",
     "changed_from_shipped",
+    "load_link",
     "load_mirror",
     "load_mission",
 ]
 
+_BEYOND_LINK = Mission.model_fields.keys() - LinkMission.model_fields.keys()
 _MOST_UNKNOWN = 100  # unknown keys of one file for which a near one is looked up
 _Location = tuple[int | str, ...]
 _T = TypeVar("_T", bound=Table)
@@ -38,6 +41,17 @@ class MirrorFile:
     """A mirror with the path, text and SHA-256 of its file; the keys of `sources` begin with "mirror."."""
 
     mirror: Mirror
+    path: Path
+    text: str
+    sha256: str
+    sources: Mapping[str, Source]
+
+
+@dataclass(frozen=True, slots=True)
+class LinkFile:
+    """What a link budget needs, with the path, text and SHA-256 of its file and the source of each key."""
+
+    mission: LinkMission
     path: Path
     text: str
     sha256: str
@@ -76,6 +90,21 @@ def load_mission(path: str | Path, mirror_path: str | Path | None = None) -> Mis
     return MissionFile(mission, document.path, document.text, document.sha256, sources, mirror_file)
 
 
+def load_link(path: str | Path) -> LinkFile:
+    """Read a file for its links alone: a whole mission, or one without the tables on mirror, loop and scenario.
+
+    Raises `MissionError` with every fault of it.
+    """
+    document = _open(Path(path), "mission file", "")
+    if _BEYOND_LINK & document.data.keys():
+        file = load_mission(path)
+        return LinkFile(file.mission, file.path, file.text, file.sha256, file.sources)
+    mission = check_table(document, LinkMission, document.data)
+    if mission is None or document.faults:
+        raise MissionError(document.path, document.faults)
+    return LinkFile(mission, document.path, document.text, document.sha256, _sources(document))
+
+
 def load_mirror(path: str | Path) -> MirrorFile:
     """Read a mirror file: the keys of a mission's `[mirror]` table at the root of a file of their own.
 
@@ -88,7 +117,7 @@ def load_mirror(path: str | Path) -> MirrorFile:
     return _mirror_file(document, mirror)
 
 
-def assumptions(mission_file: MissionFile) -> tuple[tuple[str, str, str], ...]:
+def assumptions(mission_file: MissionFile | LinkFile) -> tuple[tuple[str, str, str], ...]:
     """Key, raw value and comment of every value whose comment calls it an assumption."""
     items = mission_file.sources.items()
     return tuple((key, source.value, source.comment) for key, source in items if source.kind == "assumption")
@@ -168,19 +197,18 @@ def check_table(document: Document, model: type[_T], data: Mapping[str, Any]) ->
     except ValidationError as error:
         details = error.errors(include_url=False)
     _Report(document, model).note(details)
-    if model is Mission:
-        _check_relations(document, data)
+    if issubclass(model, LinkMission):
+        _check_relations(document, model, data)
     return None
 
 
-def _check_relations(document: Document, data: Mapping[str, Any]) -> None:
+def _check_relations(document: Document, model: type[LinkMission], data: Mapping[str, Any]) -> None:
     """Note what does not fit between those tables that are in order each by itself."""
     tables: dict[str, Table] = {}
-    for name in {name for names, _ in RELATIONS for name in names} & data.keys():
-        kind = cast("type[Table]", Mission.model_fields[name].annotation)
+    for name in {name for names, _ in model.relations() for name in names} & data.keys():
         with contextlib.suppress(ValidationError):
-            tables[name] = kind.model_validate(data[name])
-    for names, check in RELATIONS:
+            tables[name] = _table_at(model, (name,)).model_validate(data[name])
+    for names, check in model.relations():
         if all(name in tables for name in names):
             for problem in check(*(tables[name] for name in names)):
                 _note_problem(document, problem.key, problem, "")
@@ -240,7 +268,9 @@ class _Report:
         location, value = detail["loc"], detail["input"]
         key, cause = self._key(location), detail.get("ctx", {}).get("error")
         if isinstance(cause, ProblemsError):
-            if location or self.model is not Mission:  # those of the whole mission are left to _check_relations
+            if location or not issubclass(
+                self.model, LinkMission
+            ):  # those of the whole mission are left to _check_relations
                 for problem in cause.problems:
                     _note_problem(
                         self.document, _dotted(key, (problem.key,)), problem, "" if problem.key else shown(value)
@@ -256,6 +286,8 @@ class _Report:
         choices = _choices(table, name)
         nearest = _nearest(value, choices) if isinstance(value, str) else ""
         reason = "is none of the choices" if choices else "is of the wrong kind"
+        if value == UNKNOWN:
+            reason = NOT_PUBLISHED
         self.document.fault(key, shown(value), reason, _expected(table, name), nearest=nearest and f'"{nearest}"')
 
 
@@ -280,7 +312,7 @@ def _info(table: type[Table], key: str) -> FieldInfo | None:
 def _table_at(table: type[Table], location: _Location) -> type[Table]:
     """The table that a location inside `table` names."""
     for part in location:
-        info = _info(table, str(part))
+        info = _info(table, str(part))  # None for the name of a table among others of its kind
         kinds = (info.annotation, *get_args(info.annotation)) if info else ()
         table = next((kind for kind in kinds if isinstance(kind, type) and issubclass(kind, Table)), table)
     return table

@@ -7,10 +7,7 @@ import math
 from dataclasses import dataclass
 
 from microrad.budget import Line, root_sum_square
-from microrad.units import format_quantity
-
-ELEMENTARY_CHARGE_C = 1.602_176_634e-19
-"""Charge of one electron, exact by the definition of the ampere (SI brochure, 9th edition)."""
+from microrad.units import ELEMENTARY_CHARGE_C, format_quantity
 
 RATE_TOLERANCE = 1e-9
 """How far, relatively, a sensor's period or delay may lie from a whole number of control samples or plant steps."""

@@ -2,14 +2,26 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from microrad import control, fine_pointing, link, mirror_summary, paper, pointing, simulate, tracking, verdict
+from microrad import (
+    control,
+    fine_pointing,
+    link,
+    link_study,
+    mirror_summary,
+    paper,
+    performance,
+    pointing,
+    simulate,
+    tracking,
+    verdict,
+)
 from microrad.mission import Mission
-from microrad.missionfile import MissionFile
+from microrad.missionfile import LinkFile, MissionFile
 
 Floats = NDArray[np.float64]
 Progress = Callable[[int, int, str], None]
@@ -17,11 +29,15 @@ Progress = Callable[[int, int, str], None]
 
 @dataclass(frozen=True, slots=True)
 class MarginMap:
-    """Fig. 2: margin in dB, shape (rates, errors), and the requirement solved in both directions, not read off it."""
+    """Fig. 2: margin in dB, shape (rates, errors), and the requirement solved in both directions, not read off it.
+
+    ``by_reading`` are the maps under each reading of pointing loss and Strehl, which the paper leaves open.
+    """
 
     data_rate_bit_s: Floats
     pointing_error_rad: Floats
     margin_db: Floats
+    by_reading: dict[tuple[str, str], Floats]
     largest_rate_bit_s: float
     largest_error_rad: float
     readings: tuple[link.SensitivityReading, ...]
@@ -38,13 +54,13 @@ class Comparison:
 
 @dataclass(frozen=True, slots=True)
 class Study:
-    """Everything that a report shows, computed. ``achieved`` is the communication budget at the simulated residual."""
+    """Everything that a report shows, computed. ``achieved`` is the communication budget at the simulated residual.
+
+    ``links`` holds what follows from the links' tables alone, ``performance`` what the simulated residuals cost them.
+    """
 
     file: MissionFile
-    open_loop: pointing.OpenLoopPointing
-    beacon: link.LinkBudget
-    answer: link.LinkBudget
-    communication: link.LinkBudget
+    links: link_study.LinkStudy
     achieved: link.LinkBudget
     margin_map: MarginMap
     summary: mirror_summary.Summary
@@ -55,8 +71,29 @@ class Study:
     comparison: Comparison | None
     scan: paper.Scan | None
     fine_pointing: fine_pointing.FinePointingStudy | None
+    performance: performance.LinkPerformance
     requirements: tuple[verdict.Requirement, ...]
     claims: tuple[verdict.Claim, ...]
+
+    @property
+    def open_loop(self) -> pointing.OpenLoopPointing:
+        """The open-loop pointing budget."""
+        return self.links.open_loop
+
+    @property
+    def communication(self) -> link.LinkBudget:
+        """The communication link as budgeted."""
+        return self.links.communication
+
+    @property
+    def beacon(self) -> link.LinkBudget:
+        """The beacon's budget."""
+        return _present(self.links.beacon)
+
+    @property
+    def answer(self) -> link.LinkBudget:
+        """The answer's budget."""
+        return _present(self.links.answer)
 
     @property
     def closes(self) -> bool:
@@ -64,16 +101,21 @@ class Study:
         return min(self.beacon.margin_db, self.answer.margin_db, self.achieved.margin_db) >= 0.0
 
 
+def _present(budget: link.LinkBudget | None) -> link.LinkBudget:
+    assert budget is not None  # a whole mission has all three
+    return budget
+
+
 def run(file: MissionFile, on_progress: Progress = lambda done, total, what: None) -> Study:
     """The whole study of a mission: budgets, mirror, loops, and the link at the residual that the loop leaves.
 
-    Raises ValueError with the reason when the loop is unstable or the mirror has no inverse.
+    Raises ValueError with the reason when the loop is unstable, the mirror has no inverse or the receiver does not take
+    the data rate.
     """
+    file = solve_rate(file)
     m, sources = file.mission, file.sources
-    on_progress(0, 3, "budgets")
-    open_loop = pointing.open_loop_budget(m, sources)
-    beacon, answer = link.beacon_budget(m, sources), link.answer_budget(m, sources)
-    communication, fig2 = link.communication_budget(m, sources), margin_map(file)
+    on_progress(0, 3, "budgets and acquisition")
+    links, fig2 = link_study.run(_links_of(file)), margin_map(file)
 
     on_progress(1, 3, "mirror and tracking (the first run compiles for half a minute)")
     summary, loops = mirror_summary.summarise(m.mirror), tracking.hysteresis_loops(m)
@@ -87,15 +129,14 @@ def run(file: MissionFile, on_progress: Progress = lambda done, total, what: Non
     scan = paper.scan(m, on_progress) if paper.applies(m) else None
     fine = fine_pointing.run(file, on_progress) if m.fine_pointing is not None else None
     on_progress(3, 3, "verdict")
+    beacon, answer = _present(links.beacon), _present(links.answer)
     evidence = verdict.Evidence(
-        m, open_loop, beacon, communication, fig2.readings, fig2.ideal, loops, summary, runs, scan
+        m, links.open_loop, beacon, links.communication, fig2.readings, fig2.ideal, loops, summary, runs, scan
     )
+    found = performance.run(m, runs, fine)
     return Study(
         file=file,
-        open_loop=open_loop,
-        beacon=beacon,
-        answer=answer,
-        communication=communication,
+        links=links,
         achieved=achieved,
         margin_map=fig2,
         summary=summary,
@@ -106,20 +147,34 @@ def run(file: MissionFile, on_progress: Progress = lambda done, total, what: Non
         comparison=compare(file, runs),
         scan=scan,
         fine_pointing=fine,
+        performance=found,
         requirements=(
-            *verdict.requirements(m, open_loop, beacon, answer, achieved, residual, runs),
-            *([] if fine is None else [fine_requirement(m, fine)]),
+            *verdict.requirements(m, links.open_loop, beacon, answer, achieved, residual, runs),
+            *([] if fine is None else fine_requirements(m, fine, found)),
         ),
         claims=verdict.against_paper(evidence),
     )
 
 
-def fine_requirement(m: Mission, fine: fine_pointing.FinePointingStudy) -> verdict.Requirement:
-    """The best controller's radial error on the mission's mirror, with what makes up most of it."""
-    left = fine.best.simulated["given"]
-    return verdict.fine_pointing_requirement(
-        m, left.quantile_rad, fine.quantile, fine.best.design.name, fine.budget.dominant
-    )
+def solve_rate(file: MissionFile) -> MissionFile:
+    """The file with a data rate of "largest" replaced by what it stands for; raises `LinkError` without one."""
+    solved = link_study.solve_rate(_links_of(file))
+    mission = file.mission.model_copy(update={"communication": solved.mission.communication})
+    return replace(file, mission=mission, sources=solved.sources)
+
+
+def _links_of(file: MissionFile) -> LinkFile:
+    return LinkFile(file.mission, file.path, file.text, file.sha256, file.sources)
+
+
+def fine_requirements(
+    m: Mission, fine: fine_pointing.FinePointingStudy, found: performance.LinkPerformance
+) -> list[verdict.Requirement]:
+    """The best controller's radial error on the mission's mirror and the margin that it leaves the link."""
+    left, name, cause = fine.best.simulated["given"], fine.best.design.name, fine.budget.dominant
+    error = verdict.fine_pointing_requirement(m, left.quantile_rad, fine.quantile, name, cause)
+    case = found.case(performance.FINE, name, "given")
+    return [error] if case is None else [error, verdict.outage_requirement(m, case.margin_db, name, cause)]
 
 
 def compare(file: MissionFile, runs: tuple[tracking.Run, ...]) -> Comparison | None:
@@ -142,13 +197,17 @@ def largest_error(m: Mission, margin_db: float) -> float:
 def margin_map(file: MissionFile) -> MarginMap:
     """Margin over data rate and pointing error around the requirement, with the receivers that it implies."""
     m, q = file.mission, file.mission.requirement
-    rates = m.communication.data_rate_bit_s * np.geomspace(1 / 30, 30, 181)
+    built = link.receiver(m)
+    highest = math.inf if built is None else built.highest_data_rate_bit_s
+    rate = m.communication.data_rate_bit_s
+    rates = rate * np.geomspace(1 / 30, min(30.0, highest / rate), 181)
     errors = 3.0 * max(q.pointing_error_rad, m.communication.pointing_error_rad) * np.linspace(0.0, 1.0, 121)
     return MarginMap(
         rates,
         errors,
         link.margin_map(m, rates, errors),
-        link.largest_data_rate(m, q.margin_db, q.pointing_error_rad),
+        link.convention_maps(m, rates, errors),
+        link_study.largest_rate(m),
         largest_error(m, q.margin_db),
         link.implied_sensitivity(m),
         link.ideal_receivers(m, file.sources),

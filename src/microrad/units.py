@@ -16,6 +16,9 @@ SPEED_OF_LIGHT_M_S = 299_792_458.0
 PLANCK_J_S = 6.626_070_15e-34
 """Planck constant, exact by the definition of the kilogram (SI brochure, 9th edition)."""
 
+ELEMENTARY_CHARGE_C = 1.602_176_634e-19
+"""Charge of one electron, exact by the definition of the ampere (SI brochure, 9th edition)."""
+
 _MAX_CHARACTERS = 60
 _MAX_DECIBEL = 1000.0  # beyond it the linear value leaves the range of a float
 
@@ -63,6 +66,7 @@ _UNITS: dict[str, tuple[Decimal, _Dimension, str]] = {
     "Hz": (Decimal(1), _dimension(cycle=1, s=-1), "mkMGT"),
     "rad": (Decimal(1), _dimension(rad=1), _SMALL),
     "deg": (_DEGREE, _dimension(rad=1), "m"),
+    "sr": (Decimal(1), _dimension(rad=2), ""),
     "arcsec": (_DEGREE / 3600, _dimension(rad=1), "uµμm"),
     "bit": (Decimal(1), _dimension(bit=1), "kMGT"),
     "B": (Decimal(8), _dimension(bit=1), "kMGT"),
@@ -90,6 +94,9 @@ _KINDS = {
     "bit/s": ("a data rate", "Mbit/s"),
     "photon/bit": ("a receiver sensitivity", "photon/bit"),
     "W/m^2": ("an irradiance", "W/m^2"),
+    "W/(m^3 sr)": ("a spectral radiance", "W/(m^2 sr um)"),
+    "1/s": ("a rate of counts", "1/s"),
+    "m/s": ("a velocity", "km/s"),
     "V/s": ("a voltage rate", "V/s"),
     "rad/V": ("an angle per voltage", "mrad/V"),
     "V/rad": ("a voltage per angle", "V/mrad"),

@@ -22,7 +22,7 @@ from microrad.bench.excitation import (
     multisine,
     staircase,
 )
-from microrad.fields import Problem, Quantity, Several, Table
+from microrad.fields import Problem, Quantity, Several, Table, Whole
 from microrad.mirror_table import Frequency, Name, Rate, Voltage
 from microrad.mission import Amplifier as AmplifierTable
 from microrad.mission import AngleOrZero, Duration, Frequencies
@@ -38,20 +38,6 @@ Truth = Literal["bench", "linear", "bouc-wen"]
 
 MOST_AXES = 4
 """Axes of a bench; a mirror has two."""
-
-
-@dataclass(frozen=True, slots=True)
-class _Whole(Quantity):
-    """A whole number within its bounds."""
-
-    def read(self, value: object) -> int:
-        if isinstance(value, bool) or not isinstance(value, int):
-            raise UnitError(value, "is not a whole number", self.wanted, self.example)
-        return int(Quantity.read(self, value))
-
-    @property
-    def example(self) -> str:
-        return f"{max(int(self.least or 0), 2)}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,7 +63,7 @@ class _Choices(Quantity):
         return core_schema.no_info_plain_validator_function(self.read)
 
 
-Count = Annotated[int, _Whole("", least=1, most=1_000_000)]
+Count = Annotated[int, Whole("", least=1, most=1_000_000)]
 Share = Annotated[float, Quantity("", least=0.0, most=10.0)]
 Amplitude = Annotated[float, Quantity("V", "V", above=0.0)]
 Amplitudes = Annotated[tuple[float, ...], Several(Quantity("V", above=0.0), rising=True)]
@@ -103,7 +89,7 @@ class LimitsTable(Table):
 class ConvertersTable(Table):
     """Converters both ways: `bits` over each range, drive in volts and sensor in angle; both are sampled together."""
 
-    bits: Annotated[int, _Whole("", least=4, most=32)]
+    bits: Annotated[int, Whole("", least=4, most=32)]
     drive_min_v: Voltage = Field(alias="drive_min")
     drive_max_v: Voltage = Field(alias="drive_max")
     output_min_rad: Annotated[float, Quantity("rad", "mrad")] = Field(alias="output_min")
@@ -142,7 +128,7 @@ class BenchTable(Table):
     """
 
     truth: Truth
-    axes: Annotated[int, _Whole("", least=1, most=MOST_AXES)] = 1
+    axes: Annotated[int, Whole("", least=1, most=MOST_AXES)] = 1
     crosstalk: Annotated[float, Quantity("", least=-0.5, most=0.5)] = 0.0
     amplifier: AmplifierTable
     converters: ConvertersTable
@@ -204,7 +190,7 @@ class MultisineTable(ExcitationTable):
     offset_v: Voltage = Field(alias="offset")
     periods: Count
     realisations: Count
-    seed: Annotated[int, _Whole("", least=0, most=2**63 - 1)]
+    seed: Annotated[int, Whole("", least=0, most=2**63 - 1)]
 
     def design(self, name: str, limits: Limits) -> tuple[Excitation, ...]:
         """One record for each realisation."""

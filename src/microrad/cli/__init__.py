@@ -33,19 +33,40 @@ if TYPE_CHECKING:
 __all__ = ["app", "main"]
 
 
-@app.command(epilog=examples("microrad init", "microrad init my-mission.toml"))
+@app.command(
+    epilog=examples("microrad init", "microrad init my-mission.toml", "microrad init --preset click click.toml")
+)
 @command
-def init(file: Annotated[Path, typer.Argument(help="File to write.")] = Path("leo-geo.toml")) -> Outcome:
+def init(
+    file: Annotated[Path, typer.Argument(help="File to write.")] = Path("leo-geo.toml"),
+    preset: Annotated[
+        str | None, option("--preset", "NAME", "A link from the literature; see microrad presets.")
+    ] = None,
+) -> Outcome:
     """Write the paper's mission, ready to run.
 
     Each value carries its unit and a comment that says where it comes from. No file is ever overwritten.
     """
     from importlib import resources
 
+    if preset is not None:
+        return _init_preset(file, preset)
     run_it = f"microrad run {shlex.quote(str(file))}"
     check_target(file, f"name another one (microrad init other.toml) or go on with: {run_it}")
     write_whole(file, resources.files("microrad").joinpath("missions", "leo-geo.toml").read_text("utf-8"))
     return Outcome(f"{file} written. Next: {run_it}")
+
+
+def _init_preset(file: Path, name: str) -> Outcome:
+    from microrad import presets
+
+    text = presets.preset_text(name)
+    chosen = next(each for each in presets.presets() if each.name == name)
+    run_it = f"microrad budget {shlex.quote(str(file))}"
+    check_target(file, f"name another one (microrad init --preset {name} other.toml)")
+    write_whole(file, text)
+    first = f"{file} written. " + (f"To be given first: {', '.join(chosen.unknown)}. " if chosen.unknown else "")
+    return Outcome(f"{first}Next: {run_it}")
 
 
 _FOLDER = "Folder to write [default: <name of the mission file>-study in the current folder]."
@@ -137,4 +158,4 @@ def schema() -> Outcome:
     return Outcome(json_text(mission_schema()))
 
 
-from microrad.cli import lab, pointing  # noqa: E402, F401  their commands stand behind these in the help
+from microrad.cli import lab, link, pointing  # noqa: E402, F401  their commands stand behind these in the help

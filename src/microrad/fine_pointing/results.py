@@ -38,12 +38,15 @@ class Residual:
 
     ``rms_interval_rad`` is the half width of the 99 % interval over the runs, infinite where there is but one.
     ``quantile_rad`` is the error that the mission's share of the time stays below; ``shares`` say how often each limit
-    was met, by name, where it was.
+    was met, by name, where it was. ``axis_rms_rad`` is about zero; ``radial_counts`` counts the control samples by
+    radial error, in the bins of `fine_loop.ensemble.bin_edges_rad`.
     """
 
     rms_rad: float
     rms_interval_rad: float
     axis_rms_rad: tuple[float, ...]
+    axis_mean_rad: tuple[float, ...]
+    radial_counts: NDArray[np.int64]
     quantile_rad: float
     largest_rad: float
     shares: dict[str, float]
@@ -199,6 +202,8 @@ def residual(run: ensemble.Ensemble, quantile: float) -> Residual:
         run.radial_rms_rad,
         run.radial_rms_interval_rad(),
         tuple(float(v) for v in run.axis_rms_rad),
+        tuple(float(v) for v in np.mean(run.mean_rad, axis=0)),
+        run.histogram.sum(axis=0, dtype=np.int64),
         run.quantile_rad(quantile),
         float(np.max(run.largest_rad)),
         {name: share for name, share in shares.items() if share},

@@ -190,7 +190,7 @@ def stroke(file: MissionFile, chain: geometry.Geometry, on_mirror: bool) -> tupl
     demand = geometry.StrokeDemand(
         body_pointing_rad=(body, body),
         point_ahead_rad=(r.point_ahead_rad, 0.0),
-        bias_rad=(m.pointing.misalignment_rad, m.pointing.misalignment_rad),
+        bias_rad=(m.pointing.bias_rad, m.pointing.bias_rad),
         rate_lag_rad=(lag, 0.0),
         point_ahead_on_mirror=on_mirror,
     )
@@ -201,7 +201,9 @@ def stroke(file: MissionFile, chain: geometry.Geometry, on_mirror: bool) -> tupl
     named = {
         "body_pointing_rad": ("fine_pointing.body.error",),
         "point_ahead_rad": ("fine_pointing.reference.point_ahead",),
-        "bias_rad": ("pointing.misalignment",),
+        "bias_rad": tuple(
+            f"pointing.lines.{name}.error" for name, line in m.pointing.lines.items() if line.kind == "bias"
+        ),
         "rate_lag_rad": ("fine_pointing.reference.line_of_sight_rate", "fine_pointing.reference.rate_feedforward"),
     }
     return geometry.stroke_budget(

@@ -38,17 +38,17 @@ def write(
     Raises FolderError when the folder holds something that must not be replaced. Returns the page's path.
     """
     # Drawing and writing libraries load here, not with the package: they take longer than help should.
-    from microrad.report import figures, fine_pointing_figures, page, results
+    from microrad.report import figures, fine_pointing_figures, link_figures, page, results
 
     with whole_folder(folder, overwrite) as draft:
         on_progress(0, 3, "figures")
-        drawn, fine = figures.draw(study), fine_pointing_figures.draw(study)
+        drawn, fine, links = figures.draw(study), fine_pointing_figures.draw(study), link_figures.draw(study.links)
         (draft / "figures").mkdir()
-        for figure in (*drawn, *fine):
+        for figure in (*drawn, *fine, *links):
             (draft / "figures" / f"{figure.name}.svg").write_text(figure.svg, encoding="utf-8")
             write_columns(figure.columns, draft / "figures" / f"{figure.name}.csv")
         on_progress(1, 3, "page")
-        (draft / "report.html").write_text(page.render(study, drawn, fine), encoding="utf-8")
+        (draft / "report.html").write_text(page.render(study, drawn, fine, links), encoding="utf-8")
         on_progress(2, 3, "results")
         results.write_results(study, draft / "results.nc")
         results.write_manifest(study, draft, MANIFEST)

@@ -90,6 +90,7 @@ def margin_map(study: Study) -> Figure:
     rate, error = f.data_rate_bit_s * 1e-6, f.pointing_error_rad * 1e6
     levels = np.arange(-12.0, 19.0, 3.0)
     filled = axes.contourf(rate, error, f.margin_db.T, levels=levels, cmap="cividis", extend="both")
+    _band(axes, rate, error, np.stack(list(f.by_reading.values())), m.requirement.margin_db)
     lines = axes.contour(rate, error, f.margin_db.T, levels=[0.0, m.requirement.margin_db], colors="white")
     axes.clabel(lines, fmt=lambda level: f"{level:g} dB", fontsize=8)
     rate_mbit = m.communication.data_rate_bit_s * 1e-6
@@ -124,13 +125,27 @@ def margin_map(study: Study) -> Figure:
         f"Margin of the communication link ({convention}). For {m.requirement.margin_db:g} dB: at most "
         f"{f.largest_rate_bit_s * 1e-6:.1f} Mbit/s at {m.requirement.pointing_error_rad * 1e6:g} µrad, or {largest} "
         f"at {m.communication.data_rate_bit_s * 1e-6:g} Mbit/s (both solved). "
-        f"Over the four readings of the paper's table the same point implies a receiver of {min(counts):.0f} to "
-        f"{max(counts):.0f} photons per bit: the map would shift by {10 * np.log10(max(counts) / min(counts)):.1f} dB."
+        f"Hatched between dotted lines: the band in which the {m.requirement.margin_db:g} dB contour lies over the "
+        f"{len(counts)} readings of pointing loss and Strehl, the receiver unchanged. The same point implies a "
+        f"receiver of {min(counts):.0f} to {max(counts):.0f} photons per bit over them, "
+        f"{10 * np.log10(max(counts) / min(counts)):.1f} dB apart."
     )
     grid = np.meshgrid(f.data_rate_bit_s, f.pointing_error_rad, indexing="ij")
     columns = {"data_rate (bit/s)": grid[0].ravel(), "pointing_error (rad)": grid[1].ravel()}
     columns["margin (dB)"] = f.margin_db.ravel()
+    for (loss, strehl), values in f.by_reading.items():
+        columns[f"margin, {loss} pointing loss, Strehl as {strehl} (dB)"] = values.ravel()
     return Figure("fig2-margin-map", "Fig. 2  Link margin", caption, svg_of(canvas), columns)
+
+
+def _band(axes: Axes, rate: Floats, error: Floats, maps: Floats, required_db: float) -> None:
+    """Hatch where some readings of the conventions have the required margin and others have not."""
+    lowest, highest = maps.min(axis=0), maps.max(axis=0)
+    between = ((lowest < required_db) & (highest >= required_db)).astype(float).T
+    if between.any() and not between.all():
+        axes.contourf(rate, error, between, levels=[0.5, 1.5], colors="none", hatches=["////"], zorder=1.5)
+    for edge in (lowest, highest):
+        axes.contour(rate, error, edge.T, levels=[required_db], colors="white", linestyles=":", linewidths=1.0)
 
 
 def residual_urad(study: Study) -> float:

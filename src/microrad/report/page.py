@@ -8,8 +8,9 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from microrad.mission import Source
 from microrad.missionfile import assumptions, changed_from_shipped
-from microrad.report import fine_pointing, words
+from microrad.report import fine_pointing, links, words
 from microrad.report.figures import Figure
+from microrad.report.quantities import quantity
 from microrad.report.results import versions
 from microrad.study import Study
 from microrad.units import format_quantity
@@ -22,10 +23,21 @@ def pages() -> Environment:
     )
 
 
-def render(study: Study, figures: Sequence[Figure], fine_figures: Sequence[Figure] = ()) -> str:
+def angle(value_rad: float) -> str:
+    """An angle as it stands in the page's tables."""
+    return format_quantity(value_rad, "rad")
+
+
+def render(
+    study: Study,
+    figures: Sequence[Figure],
+    fine_figures: Sequence[Figure] = (),
+    link_figures: Sequence[Figure] = (),
+) -> str:
     """The page's HTML; every text of the mission is escaped, and nothing is loaded from anywhere.
 
-    ``fine_figures`` go to the section on the fine-pointing loop, which a study without that loop does not have.
+    ``fine_figures`` go to the section on the fine-pointing loop, which a study without that loop does not have,
+    ``link_figures`` to those on the links.
     """
     template = pages().get_template("page.html")
     m, fine = study.file.mission, study.fine_pointing
@@ -36,9 +48,9 @@ def render(study: Study, figures: Sequence[Figure], fine_figures: Sequence[Figur
         "explanation": words.explanation(study),
         "warnings": words.warnings(study),
         "requirements": study.requirements,
-        "budgets": (study.communication, study.achieved, study.beacon, study.answer),
-        "quantity": words.quantity,
-        "angle": lambda value: format_quantity(value, "rad"),
+        "links": _links(study, link_figures),
+        "quantity": quantity,
+        "angle": angle,
         "mirror_lines": [line for line in str(study.summary).splitlines() if not line.startswith("  warning")],
         "sound": all(r.met for r in study.requirements) and not words.beyond_identified(study, study.residual),
         "changed": changed_from_shipped(study.file),
@@ -50,6 +62,22 @@ def render(study: Study, figures: Sequence[Figure], fine_figures: Sequence[Figur
         "versions": versions(),
     }
     return template.render(context)
+
+
+def _links(study: Study, figures: Sequence[Figure]) -> dict[str, Any]:
+    budgets = (
+        (study.communication, ", as budgeted"),
+        (study.achieved, ", at the simulated residual"),
+        (study.beacon, ""),
+        (study.answer, ""),
+    )
+    best = "" if study.fine_pointing is None else study.fine_pointing.best.design.name
+    return {
+        **links.context(study.links, budgets=budgets, figures=figures, files=True),
+        **links.performance(study.performance, best),
+        "readings": study.margin_map.readings,
+        "ideal": study.margin_map.ideal,
+    }
 
 
 def _inputs(sources: Any) -> list[tuple[str, Source]]:

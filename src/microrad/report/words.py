@@ -4,17 +4,13 @@ from typing import Any
 
 from microrad.mission import Mission
 from microrad.missionfile import changed_from_shipped
-from microrad.report import fine_pointing_words
+from microrad.performance import FINE
+from microrad.report import budget_views, fine_pointing_words
 from microrad.report.fine_pointing_data import data as fine_pointing_data
+from microrad.report.quantities import quantity
 from microrad.study import Study
 from microrad.tracking import Run, residual_rad
 from microrad.units import format_quantity
-
-
-def quantity(value: float, unit: str) -> str:
-    """A value with its unit as it stands in tables: decibels with two decimals, the rest in three digits."""
-    text = f"{value:.2f} {unit}" if unit.startswith("dB") else format_quantity(value, unit, 3)
-    return text.replace("-", "\u2212", 1) if value < 0 else text  # a minus sign, not a hyphen
 
 
 def headline(study: Study) -> str:
@@ -58,7 +54,40 @@ def explanation(study: Study) -> list[str]:
         )
     if study.fine_pointing is not None:
         sentences += fine_pointing_words.short(study.fine_pointing, m)
+    sentences += filter(None, (hysteresis_cost(study), found(study)))
     return sentences
+
+
+def hysteresis_cost(study: Study) -> str:
+    """What hysteresis costs the link with the controllers that the verdict names, or nothing."""
+    run = study.residual
+    named = [(f"sine of {run.freq_hz:g} Hz", run.controller)]
+    if study.fine_pointing is not None:
+        named.append((FINE, study.fine_pointing.best.design.name))
+    said = [
+        f"{-c.margin_db:.2f} dB or {-c.data_rate_bit_s * 1e-6:.0f} Mbit/s with {c.controller} ({c.source})"
+        for c in study.performance.costs
+        if c.mirror == "given" and (c.source, c.controller) in named and c.margin_db < 0.0
+    ]
+    outage = f"{100 * study.performance.outage:g} %"
+    return (
+        f"Hysteresis costs the link, at the loss exceeded {outage} of the time, {' and '.join(said)}." if said else ""
+    )
+
+
+def found(study: Study) -> str:
+    """How the partner is found, or nothing."""
+    f, p = study.links.finding, study.open_loop.reading
+    if f is None or p is None:
+        return ""
+    ways = [f.wide] if f.scan is None else [f.wide, f.scan]
+    said = "; ".join(
+        f"{w.name} {w.outcome.success_probability:.4f} in {quantity(w.outcome.mean_time_s, 's')}" for w in ways
+    )
+    return (
+        f"Acquisition, with its retries: {said} (mean). The beacon's cone at 1/e2 covers its partner with a "
+        f"probability of {p.coverage:.2f}, biases at their bounds about both axes."
+    )
 
 
 def _two_axes(m: Mission) -> str:
@@ -95,6 +124,7 @@ def warnings(study: Study) -> list[str]:
         for key, value, shipped in changed_from_shipped(study.file)
     ]
     found += study.summary.warnings
+    found += study.links.warnings
     m = study.file.mission
     half, bias = m.scenario.loop_amplitude_v, m.mirror.bias_v
     if not m.mirror.drive_min_v <= bias - half <= bias + half <= m.mirror.drive_max_v:
@@ -180,6 +210,18 @@ def summary(study: Study) -> dict[str, Any]:
         ],
         "paper": [
             {"where": c.where, "claim": c.claim, "ours": c.ours, "agrees": c.agrees, "why": c.why} for c in study.claims
+        ],
+        "links": budget_views.data(study.links),
+        "performance": [budget_views.performance_data(each) for each in study.performance.cases],
+        "hysteresis_costs": [
+            {
+                "source": c.source,
+                "controller": c.controller,
+                "mirror": c.mirror,
+                "margin_db": c.margin_db,
+                "data_rate_bit_s": c.data_rate_bit_s,
+            }
+            for c in study.performance.costs
         ],
         "fine_pointing": None if fine is None else fine_pointing_data(fine, m),
         "warnings": warnings(study),

@@ -1,0 +1,115 @@
+"""Commands of the links: their budgets as tables, and presets of flown terminals to start from."""
+
+import shutil
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from microrad.cli.frame import (
+    CLOSES,
+    DOES_NOT_CLOSE,
+    Json,
+    Outcome,
+    Refusal,
+    app,
+    command,
+    examples,
+    json_text,
+    option,
+)
+
+# Everything else is imported inside the commands: it takes longer to load than help may take.
+if TYPE_CHECKING:
+    from microrad.missionfile import LinkFile
+
+_WIDE = 160  # columns of a table that goes to a file
+
+
+@app.command(
+    epilog=examples(
+        "microrad budget leo-geo.toml",
+        'microrad budget leo-geo.toml --data-rate "1 Gbit/s" --pointing-error "5 urad"',
+        "microrad budget leo-geo.toml --solve-rate",
+        "microrad budget leo-geo.toml --csv > budget.csv",
+        "microrad budget leo-geo.toml --html > budget.html",
+    )
+)
+@command
+def budget(
+    file: Annotated[Path, typer.Argument(help="Mission file, or one with the tables of its links.", metavar="FILE")],
+    data_rate: Annotated[str | None, option("--data-rate", "RATE", "In place of the mission's.")] = None,
+    pointing_error: Annotated[str | None, option("--pointing-error", "ANGLE", "In place of the mission's.")] = None,
+    solve_rate: Annotated[bool, typer.Option("--solve-rate", help="The largest data rate in its place.")] = False,
+    as_csv: Annotated[bool, typer.Option("--csv", help="Print one line a row, for a spreadsheet.")] = False,
+    as_html: Annotated[bool, typer.Option("--html", help="Print one page that loads nothing.")] = False,
+    as_json: Json = False,
+) -> Outcome:
+    """Print the link budgets of a mission.
+
+    Communication, beacon and answer line by line with basis, source and where each line holds; the pointing budget, the
+    light on the tracking sensor, acquisition, and what moves the margin most. No loop is simulated. The exit code is 0
+    when each link has a margin of at least 0 dB and 1 when one has not.
+    """
+    if sum((as_csv, as_html, as_json)) > 1:
+        raise Refusal("--csv, --html and --json exclude each other; give one of them.")
+    if solve_rate and data_rate is not None:
+        raise Refusal("--solve-rate finds the data rate that --data-rate gives; give one of them.")
+    from microrad import link_study
+    from microrad.missionfile import load_link
+    from microrad.report import budget_views
+
+    given = _changed(load_link(file), data_rate, pointing_error, solve_rate)
+    try:
+        study = link_study.run(given)
+    except ValueError as error:  # a rate that the receiver does not take, a scan without time to detect
+        raise Refusal(f"{file}: {error}") from error
+    code = CLOSES if study.closes else DOES_NOT_CLOSE
+    if as_json:
+        return Outcome(json_text(budget_views.data(study)), code)
+    if as_csv:
+        return Outcome(budget_views.csv_text(study), code)
+    if as_html:
+        return Outcome(budget_views.html(study), code)
+    width = shutil.get_terminal_size((_WIDE, 24)).columns if sys.stdout.isatty() else _WIDE
+    return Outcome(budget_views.text(study, max(width, 80)), code)
+
+
+def _changed(file: "LinkFile", data_rate: str | None, pointing_error: str | None, solve_rate: bool) -> "LinkFile":
+    """The file with what the command line says in place of two of its values."""
+    from microrad.link_table import Communication
+    from microrad.mission import Source
+
+    raw = {"data_rate": "largest" if solve_rate else data_rate, "pointing_error": pointing_error}
+    values, sources = {}, dict(file.sources)
+    for key, text in raw.items():
+        if text is None:
+            continue
+        name, rule = Communication.rule_of(key)
+        try:
+            values[name] = rule.read(text)
+        except ValueError as error:
+            raise Refusal(f"--{key.replace('_', '-')}: {error}") from error
+        sources[f"communication.{key}"] = Source(0, "command line", text)
+    beam = file.mission.communication.model_copy(update=values)
+    return replace(file, mission=file.mission.model_copy(update={"communication": beam}), sources=sources)
+
+
+@app.command(epilog=examples("microrad presets", "microrad init --preset click click.toml"))
+@command
+def presets(as_json: Json = False) -> Outcome:
+    """List links from the literature to start from.
+
+    Each is a file of link tables in which every value names its source; what no source prints is "unknown" and has to
+    be given before a budget is made of it.
+    """
+    from microrad.presets import presets as all_presets
+
+    found = all_presets()
+    if as_json:
+        return Outcome(json_text([{"name": p.name, "title": p.title, "unknown": list(p.unknown)} for p in found]))
+    widest = max(len(p.name) for p in found)
+    lines = [f"{p.name:{widest}}  {p.title} ({len(p.unknown)} to be given)" for p in found]
+    return Outcome("\n".join([*lines, "", "microrad init --preset NAME writes one."]))

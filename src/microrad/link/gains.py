@@ -1,0 +1,145 @@
+"""Gains and losses of a link in decibels; a function called `..._loss_db` returns a positive number."""
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from microrad.units import PLANCK_J_S, SPEED_OF_LIGHT_M_S, format_quantity
+
+Floats = NDArray[np.float64]
+
+DB_PER_NEPER = 10.0 / math.log(10.0)
+
+
+def aperture_gain_db(diameter_m: float, wavelength_m: float) -> float:
+    """On-axis gain of a uniformly lit circular aperture, (pi D / lambda)^2."""
+    return 20.0 * math.log10(math.pi * diameter_m / wavelength_m)
+
+
+def gaussian_beam_gain_db(half_angle_rad: float) -> float:
+    """On-axis gain of an untruncated Gaussian beam, 8 / theta^2, with theta the half angle at 1/e2 of intensity."""
+    return 10.0 * math.log10(8.0 / half_angle_rad**2)
+
+
+def peak_radiant_intensity_w_sr(power_w: float, half_angle_rad: float) -> float:
+    """Radiant intensity on the axis of a lossless Gaussian beam, 2 P / (pi theta^2): its gain times P / (4 pi)."""
+    return 2.0 * power_w / (math.pi * half_angle_rad**2)
+
+
+def implied_transmission_db(measured_w_sr: float, power_w: float, half_angle_rad: float) -> float:
+    """What lies between a measured peak radiant intensity and that of a lossless beam, in dB: negative for a loss.
+
+    Transmission of the optics, wavefront error and truncation together. Raises ValueError for an intensity that is
+    not above zero, or above the lossless beam's.
+    """
+    ideal = peak_radiant_intensity_w_sr(power_w, half_angle_rad)
+    if not 0.0 < measured_w_sr <= ideal * (1.0 + 1e-9):
+        raise ValueError(
+            f"a peak of {measured_w_sr:.4g} W/sr is not above 0 and at most {ideal:.4g} W/sr, which "
+            f"{format_quantity(power_w, 'W')} in a half angle of {format_quantity(half_angle_rad, 'rad')} at 1/e2 "
+            "reach without loss; check the convention of the divergence"
+        )
+    return 10.0 * math.log10(measured_w_sr / ideal)
+
+
+def free_space_loss_db(distance_m: float, wavelength_m: float) -> float:
+    """Loss between isotropic antennas, (4 pi R / lambda)^2 (Friis 1946)."""
+    return 20.0 * math.log10(4.0 * math.pi * distance_m / wavelength_m)
+
+
+def far_field_m(aperture_m: float, wavelength_m: float) -> float:
+    """Distance from which on an aperture's far field holds, 2 D^2 / lambda (Fraunhofer)."""
+    return 2.0 * aperture_m**2 / wavelength_m
+
+
+def gaussian_pointing_loss_db(error_rad: ArrayLike, half_angle_rad: float) -> Floats:
+    """Loss of a Gaussian beam off its axis, exp(-2 (error / theta)^2): 8.686 (error / theta)^2 dB."""
+    return 2.0 * DB_PER_NEPER * (np.asarray(error_rad, dtype=np.float64) / half_angle_rad) ** 2
+
+
+def pointing_loss_db(error_rad: ArrayLike, aperture_m: float, wavelength_m: float, convention: str) -> Floats:
+    """Loss of a diffraction-limited beam off its axis.
+
+    "gaussian": a Gaussian beam of 1/e2 radius D/2 at the aperture, theta = 2 lambda / (pi D). "gain": exp(-G error^2)
+    with G = (pi D / lambda)^2, twice as many decibels.
+    """
+    error = np.asarray(error_rad, dtype=np.float64)
+    return pointing_db_per_rad2(aperture_m, wavelength_m, convention) * error**2
+
+
+def pointing_db_per_rad2(aperture_m: float, wavelength_m: float, convention: str) -> float:
+    """Both conventions are a number of decibels times the square of the error."""
+    gain = (math.pi * aperture_m / wavelength_m) ** 2
+    if convention == "gain":
+        return DB_PER_NEPER * gain
+    if convention == "gaussian":
+        return DB_PER_NEPER * gain / 2.0
+    raise ValueError(f'pointing-loss convention "{convention}" is neither "gaussian" nor "gain"')
+
+
+def strehl_loss_db(strehl: float, convention: str) -> float:
+    """Loss by wavefront error: "decibel" takes `strehl` as it is, "ratio" as -10 lg of it.
+
+    Raises ValueError for a ratio that is not above 0 and at most 1, and for a negative loss.
+    """
+    if convention == "decibel":
+        if not strehl >= 0.0:
+            raise ValueError(f"a Strehl loss of {strehl:g} dB is a gain; give at least 0 dB")
+        return strehl
+    if convention == "ratio":
+        if not 0.0 < strehl <= 1.0:
+            raise ValueError(f"a Strehl ratio of {strehl:g} is not above 0 and at most 1; 1 is a perfect wavefront")
+        return -10.0 * math.log10(strehl)
+    raise ValueError(f'Strehl convention "{convention}" is neither "decibel" nor "ratio"')
+
+
+def strehl_ratio(wavefront_error_m: float, wavelength_m: float) -> float:
+    """Strehl ratio of an rms wavefront error, exp(-(2 pi sigma / lambda)^2) (Marechal, as extended by Mahajan)."""
+    return math.exp(-((2.0 * math.pi * wavefront_error_m / wavelength_m) ** 2))
+
+
+def obscuration_loss_db(obscuration: float) -> float:
+    """Area that a central obscuration takes from an aperture: -10 lg(1 - e^2), e the ratio of the diameters.
+
+    Raises ValueError for a ratio that is not at least 0 and below 1.
+    """
+    if not 0.0 <= obscuration < 1.0:
+        raise ValueError(f"an obscuration of {obscuration:g} is not at least 0 and below 1, the whole aperture")
+    return 0.0 - 10.0 * math.log10(1.0 - obscuration**2)
+
+
+def air_mass(elevation_rad: float) -> float:
+    """Length of the path through the atmosphere over that to the zenith (Kasten and Young 1989, Eq. 3).
+
+    Raises ValueError below 0 and above 90 degrees of elevation.
+    """
+    degrees = math.degrees(elevation_rad)
+    if not 0.0 <= degrees <= 90.0 + 1e-9:
+        raise ValueError(f"an elevation of {degrees:g} deg is not between 0 and 90 deg, horizon and zenith")
+    return float(1.0 / (math.sin(elevation_rad) + 0.50572 * (degrees + 6.07995) ** -1.6364))
+
+
+def clear_sky_loss_db(zenith_transmission: float, elevation_rad: float) -> float:
+    """Absorption and scattering of a clear atmosphere: the zenith's loss times the air mass (Beer and Lambert).
+
+    Raises ValueError for a transmission that is not above 0 and at most 1, and as `air_mass`.
+    """
+    if not 0.0 < zenith_transmission <= 1.0:
+        raise ValueError(f"a transmission of {zenith_transmission:g} is not above 0 and at most 1; 1 is vacuum")
+    return 0.0 - 10.0 * math.log10(zenith_transmission) * air_mass(elevation_rad)
+
+
+def photon_energy_j(wavelength_m: float) -> float:
+    """Energy of one photon, h c / lambda."""
+    return PLANCK_J_S * SPEED_OF_LIGHT_M_S / wavelength_m
+
+
+def dbm(power_w: float) -> float:
+    """A power as a level in dBm."""
+    return 10.0 * math.log10(power_w) + 30.0
+
+
+def watt(level_dbm: float) -> float:
+    """A level in dBm as a power."""
+    return float(10.0 ** ((level_dbm - 30.0) / 10.0))

@@ -1,0 +1,197 @@
+"""From the tables of a mission to the physics of its links: beams, receivers, losses by convention."""
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from microrad.link import gains, receivers
+from microrad.link.beams import GaussianFall, LitAperture, OffAxis
+from microrad.link_table import Beam, Communication
+from microrad.link_table import Receiver as ReceiverTable
+from microrad.mission import LinkMission
+from microrad.units import SPEED_OF_LIGHT_M_S
+
+Floats = NDArray[np.float64]
+
+
+class LinkError(ValueError):
+    """A question to which this link has no answer; the message says by how many decibels."""
+
+
+@dataclass(frozen=True, slots=True)
+class TransmittedBeam:
+    """What leaves an aperture: gain on the axis, relative to an isotropic antenna, and how it falls off."""
+
+    gain_db: float
+    fall: OffAxis
+
+
+def communication_beam(mission: LinkMission) -> TransmittedBeam:
+    """The beam of the communication link, by the mission's convention for its pointing loss."""
+    aperture, beam = mission.terminals.leo_aperture_m, mission.communication
+    convention = mission.conventions.pointing_loss
+    if convention == "pattern":
+        lit = lit_aperture(mission)
+        return TransmittedBeam(lit.gain_db, lit)
+    per_rad2 = gains.pointing_db_per_rad2(aperture, beam.wavelength_m, convention)
+    half = math.sqrt(2.0 * gains.DB_PER_NEPER / per_rad2)
+    return TransmittedBeam(gains.aperture_gain_db(aperture, beam.wavelength_m), GaussianFall(half))
+
+
+def lit_aperture(mission: LinkMission) -> LitAperture:
+    """The aperture of the communication link as the mission says that it is lit.
+
+    Raises ValueError when the mission does not say it.
+    """
+    beam, terminals = mission.communication, mission.terminals
+    if beam.beam is None:
+        raise ValueError('pointing loss "pattern" needs the table [communication.beam]: how the aperture is lit')
+    radius = beam.beam.radius_m
+    truncation = 0.0 if radius is None else terminals.leo_aperture_m / 2.0 / radius
+    hole = terminals.leo_obscuration or 0.0
+    return LitAperture(terminals.leo_aperture_m, beam.wavelength_m, truncation, hole, beam.beam.m_squared or 1.0)
+
+
+def strehl_db(beam: Beam, convention: str) -> float:
+    """Loss by wavefront error of a link, from its Strehl or from the rms wavefront error."""
+    if beam.strehl is not None:
+        return gains.strehl_loss_db(beam.strehl, convention)
+    ratio = gains.strehl_ratio(beam.wavefront_error_m or 0.0, beam.wavelength_m)
+    return gains.strehl_loss_db(ratio, "ratio")
+
+
+def point_ahead_rad(mission: LinkMission) -> float:
+    """Point-ahead angle 2 v / c that is left in the pointing error: 0 when it is corrected or not given."""
+    ahead = mission.point_ahead
+    if ahead is None or ahead.corrected:
+        return 0.0
+    return 2.0 * ahead.transverse_velocity_m_s / SPEED_OF_LIGHT_M_S
+
+
+def clear_sky_db(mission: LinkMission) -> float:
+    """Loss of a clear atmosphere on the path; 0 in vacuum."""
+    channel = mission.channel
+    return 0.0 if channel is None else gains.clear_sky_loss_db(channel.zenith_transmission, channel.elevation_rad)
+
+
+def receiver(mission: LinkMission) -> receivers.Receiver | None:
+    """The receiver of the communication link, or None where its sensitivity is given as measured."""
+    table = mission.communication.receiver
+    if table is None:
+        return None
+    common: dict[str, Any] = {
+        "wavelength_m": mission.communication.wavelength_m,
+        "bit_error_ratio": table.bit_error_ratio,
+        "bandwidth_hz": table.bandwidth_hz,
+        "code_gain_db": table.code_gain_db,
+        "code_rate": table.code_rate,
+    }
+    if table.detector == "homodyne":
+        per_mode = _per_mode(mission)
+        return receivers.BpskHomodyne(
+            **common, quantum_efficiency=table.efficiency or 1.0, background_photons_per_mode=per_mode
+        )
+    if table.detector == "preamplified":
+        return _preamplified(mission, table, common)
+    if table.detector == "photon-counting":
+        return _counting(mission, table, common)
+    return _photodiode(mission, table, common)
+
+
+def _extinction(table: ReceiverTable) -> float:
+    return math.inf if table.extinction_ratio_db is None else float(10.0 ** (table.extinction_ratio_db / 10.0))
+
+
+def _preamplified(mission: LinkMission, table: ReceiverTable, common: dict[str, Any]) -> receivers.Receiver:
+    amplified: dict[str, Any] = {
+        "noise_figure_db": table.noise_figure_db,
+        "background_photons_per_mode": _per_mode(mission),
+    }
+    if table.modulation == "dpsk":
+        return receivers.DpskPreamplified(**common, **amplified)
+    filtered: dict[str, Any] = {"gain_db": table.amplifier_gain_db, "optical_bandwidth_hz": table.optical_bandwidth_hz}
+    return receivers.OokPreamplified(**common, **amplified, **filtered, extinction_ratio=_extinction(table))
+
+
+def _counting(mission: LinkMission, table: ReceiverTable, common: dict[str, Any]) -> receivers.Receiver:
+    counting: dict[str, Any] = {
+        "detection_efficiency": table.efficiency,
+        "dark_count_rate_hz": table.dark_count_rate_1_s,
+        "background_power_w": _background_w(mission),
+    }
+    if table.modulation == "ppm":
+        return receivers.PpmCounting(**common, **counting, order=table.order or 2)
+    return receivers.OokCounting(**common, **counting, extinction_ratio=_extinction(table))
+
+
+def _photodiode(mission: LinkMission, table: ReceiverTable, common: dict[str, Any]) -> receivers.Receiver:
+    diode: dict[str, Any] = {
+        "quantum_efficiency": table.efficiency,
+        "thermal_noise_a_sqrt_hz": table.thermal_noise_a_sqrt_hz,
+        "dark_current_a": table.dark_current_a,
+        "background_power_w": _background_w(mission),
+        "extinction_ratio": _extinction(table),
+    }
+    if table.detector == "pin":
+        return receivers.OokPin(**common, **diode)
+    return receivers.OokApd(
+        **common, **diode, gain=table.avalanche_gain or 1.0, ionisation_ratio=table.ionisation_ratio or 0.0
+    )
+
+
+def _per_mode(mission: LinkMission) -> float:
+    table = mission.communication.receiver
+    if table is None or table.background is None:
+        return 0.0
+    radiance = table.background.spectral_radiance_w_m3_sr
+    sky = receivers.background_photons_per_mode(radiance, mission.communication.wavelength_m)
+    return sky * _receiving_transmission(mission)
+
+
+def _receiving_transmission(mission: LinkMission) -> float:
+    """What the receiving optics leave, of signal and background alike."""
+    lost = mission.communication.receive_optics_loss_db + mission.communication.tracking_split_loss_db
+    return float(10.0 ** (-lost / 10.0))
+
+
+def _background_w(mission: LinkMission) -> float:
+    """Background on the detector, behind the losses of the receiving optics."""
+    table, terminals = mission.communication.receiver, mission.terminals
+    assert table is not None
+    if table.background is None:
+        return table.background_power_w or 0.0
+    b = table.background
+    area = math.pi / 4.0 * terminals.geo_aperture_m**2 * (1.0 - (terminals.geo_obscuration or 0.0) ** 2)
+    sky = receivers.background_power_w(b.spectral_radiance_w_m3_sr, area, b.field_of_view_rad, b.filter_bandwidth_m)
+    return sky * _receiving_transmission(mission)
+
+
+def required_dbm(mission: LinkMission, data_rate_bit_s: ArrayLike) -> Floats:
+    """Power at the receiver that each data rate needs, in dBm.
+
+    Raises ValueError for a rate that the receiver does not take, with the highest that it does.
+    """
+    rate = np.asarray(data_rate_bit_s, dtype=np.float64)
+    beam, built = mission.communication, receiver(mission)
+    if built is not None:
+        level: Floats = 10.0 * np.log10(built.required_power_w(rate)) + 30.0
+        return level
+    return _measured_dbm(beam, rate)
+
+
+def _measured_dbm(beam: Communication, rate: Floats) -> Floats:
+    photons = beam.receiver_sensitivity_photon_bit
+    assert photons is not None
+    level: Floats = 10.0 * np.log10(photons * gains.photon_energy_j(beam.wavelength_m) * rate) + 30.0
+    return level
+
+
+def check_grid(data_rate_bit_s: Floats, pointing_error_rad: Floats) -> None:
+    """Refuse data rates that are not above zero, pointing errors below it, and either without end."""
+    if not np.all((data_rate_bit_s > 0.0) & (data_rate_bit_s < np.inf)):
+        raise ValueError('data rates must be finite and above 0 bit/s; "largest" has to be solved for first')
+    if not np.all((pointing_error_rad >= 0.0) & (pointing_error_rad < np.inf)):
+        raise ValueError("pointing errors must be finite and at least 0 rad: they are radial")

@@ -1,0 +1,145 @@
+"""What every receiver of a laser link has: bit error ratio from optical power, and the power that a data rate needs.
+
+Powers are averages over marks and spaces (or slots) at the detector; rates are information bits per second.
+"""
+
+import math
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from microrad.budget import Line
+from microrad.link.gains import photon_energy_j
+from microrad.link.receivers.checks import (
+    LEAST_RATIO,
+    checked_powers,
+    require,
+    require_above_zero,
+    require_zero_or_more,
+    shown,
+)
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Receiver(ABC):
+    """What every receiver has.
+
+    `bit_error_ratio` is the target, at the decoder's output if there is a code. `bandwidth_hz` is the highest rate of
+    symbols that the receiver takes (slots for PPM); the line carries data rate / `code_rate` bits per second.
+
+    `code_gain_db` is the net gain: by how much less optical power per *information* bit the coded link needs than the
+    uncoded one, both at the same information rate and at the target ratio after the decoder. The check bits are
+    already paid for: a gross gain, stated at equal line rate, is not it, and a gain stated in electrical decibels
+    (20 log10 Q) counts half in optical power for a receiver limited by thermal noise. The gain is one number: at
+    another ratio than the target, `bit_error_ratio_at` takes it as unchanged.
+
+    Raises `ValueError` for a value without meaning.
+    """
+
+    wavelength_m: float
+    bit_error_ratio: float
+    bandwidth_hz: float
+    code_gain_db: float = 0.0
+    code_rate: float = 1.0
+
+    def __post_init__(self) -> None:
+        """Refuse what is no receiver."""
+        require_above_zero("the wavelength", self.wavelength_m, "m")
+        require(
+            LEAST_RATIO <= self.bit_error_ratio < 0.5,
+            "the target bit error ratio",
+            self.bit_error_ratio,
+            "",
+            f"it must be at least {LEAST_RATIO:g} and below 0.5, which is a guess",
+        )
+        require_above_zero("the receiver's bandwidth", self.bandwidth_hz, "Hz")
+        require_zero_or_more(
+            "the net code gain", self.code_gain_db, "dB", "; a code that costs power is better left out"
+        )
+        require(0.0 < self.code_rate <= 1.0, "the code rate", self.code_rate, "", "it must lie above 0, up to 1")
+
+    def bit_error_ratio_at(self, power_w: ArrayLike, data_rate_bit_s: ArrayLike) -> Floats:
+        """Bit error ratio (after the decoder) at the average power `power_w` and the data rate; the two broadcast.
+
+        Raises `ValueError` for a negative power, and a rate that is not positive or above the bandwidth.
+        """
+        powers = checked_powers(power_w)
+        power, rate = np.broadcast_arrays(powers * self._code_gain, self._rates(data_rate_bit_s))
+        return np.asarray(self._ratio(power, rate), dtype=np.float64)
+
+    def required_power_w(self, data_rate_bit_s: ArrayLike) -> Floats:
+        """Average power that reaches the target bit error ratio at each data rate.
+
+        Raises `ValueError` for a rate that is not positive or above the bandwidth.
+        """
+        rate = self._rates(data_rate_bit_s)
+        return np.asarray(self._power_w(rate) / self._code_gain, dtype=np.float64)
+
+    def photons_per_bit(self, data_rate_bit_s: ArrayLike) -> Floats:
+        """Photons at the detector for each information bit, at the required power. Raises as `required_power_w`."""
+        rate = np.asarray(data_rate_bit_s, dtype=np.float64)
+        return np.asarray(self.required_power_w(rate) / (rate * self._photon_j), dtype=np.float64)
+
+    def symbol_rate_hz(self, data_rate_bit_s: ArrayLike) -> Floats:
+        """Symbols (for PPM: slots) per second on the line at each data rate."""
+        line_rate = np.asarray(data_rate_bit_s, dtype=np.float64) / self.code_rate
+        return np.asarray(line_rate * self._symbols_per_bit, dtype=np.float64)
+
+    @property
+    def highest_data_rate_bit_s(self) -> float:
+        """Highest data rate that the receiver takes."""
+        return self._symbol_rate_limit_hz * self.code_rate / self._symbols_per_bit
+
+    def noise_lines(self, power_w: float, data_rate_bit_s: float) -> tuple[Line, ...]:
+        """The independent terms of the noise at this power, each a standard deviation in one symbol of the line.
+
+        The symbols are those on the line, code included. Raises as `bit_error_ratio_at`.
+        """
+        power, rate = float(checked_powers(power_w)), float(self._rates(data_rate_bit_s))
+        return self._noise(power, float(self.symbol_rate_hz(rate)))
+
+    @property
+    def _photon_j(self) -> float:
+        return photon_energy_j(self.wavelength_m)
+
+    @property
+    def _code_gain(self) -> float:
+        return float(10.0 ** (self.code_gain_db / 10.0))
+
+    @property
+    def _symbols_per_bit(self) -> float:
+        return 1.0
+
+    @property
+    def _symbol_rate_limit_hz(self) -> float:
+        return self.bandwidth_hz
+
+    def _rates(self, data_rate_bit_s: ArrayLike) -> Floats:
+        rates = np.asarray(data_rate_bit_s, dtype=np.float64)
+        for rate in rates[~((rates > 0.0) & (rates < math.inf))].flat[:1]:
+            require_above_zero("the data rate", rate, "bit/s")
+        symbols, limit = self.symbol_rate_hz(rates), self._symbol_rate_limit_hz
+        if np.any(symbols > limit * (1.0 + 1e-12)):
+            highest = float(rates.max())
+            raise ValueError(
+                f"the data rate is {shown(highest, 'bit/s')}, which is {shown(float(symbols.max()), 'Hz')} of "
+                f"symbols or slots on the line: the receiver takes {shown(limit, 'Hz')}, "
+                f"so at most {shown(highest * limit / float(symbols.max()), 'bit/s')} of data"
+            )
+        return rates
+
+    @abstractmethod
+    def _ratio(self, power: Floats, rate: Floats) -> Floats:
+        """Uncoded bit error ratio."""
+
+    @abstractmethod
+    def _power_w(self, rate: Floats) -> Floats:
+        """Power that the uncoded receiver needs."""
+
+    @abstractmethod
+    def _noise(self, power: float, symbol_rate: float) -> tuple[Line, ...]:
+        """Terms at this power and rate of symbols on the line."""

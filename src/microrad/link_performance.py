@@ -1,0 +1,177 @@
+"""A communication link under a distribution of pointing errors: margin, outage, fades, best divergence."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from microrad import link, pointing
+from microrad.mission import LinkMission
+
+Floats = NDArray[np.float64]
+
+_STEPS = 4000  # of the radial error, for a distribution that is known and not sampled
+
+
+@dataclass(frozen=True, slots=True)
+class Spread:
+    """Radial pointing errors with the share of the time that each stands for; together 1."""
+
+    radius_rad: Floats
+    share: Floats
+
+    def quantile_rad(self, probability: float) -> float:
+        """Error that a share of the time stays below."""
+        order = np.argsort(self.radius_rad, kind="stable")
+        total = np.cumsum(self.share[order])
+        place = min(int(np.searchsorted(total, probability * total[-1])), total.size - 1)
+        return float(self.radius_rad[order][place])
+
+    def beyond(self, radius_rad: float) -> float:
+        """Share of the time with a larger error."""
+        return float(np.sum(self.share[self.radius_rad > radius_rad]))
+
+
+@dataclass(frozen=True, slots=True)
+class Performance:
+    """The communication link under the pointing errors of one source, of one controller on one variant of the mirror.
+
+    Everything comes from the errors' own distribution, but for the fades and the penalty, which take each axis for a
+    Gaussian process of their bias, rms and spectrum, the penalty in a Gaussian beam. ``outage_loss_db`` is the pointing
+    loss that is not exceeded but for the mission's ``outage``, and ``margin_db`` what it leaves; ``outage`` is the
+    share of the time with less than 0 dB, ``short`` that with less than the required margin. ``data_rate_bit_s`` keeps
+    the required margin at the outage loss. ``best`` is the Gaussian divergence with the most power at it.
+    ``fades_per_s`` and ``fade_s`` are of the fades below the required margin; nan without a spectrum.
+    """
+
+    source: str
+    controller: str
+    mirror: str
+    jitter: pointing.Jitter
+    mean_loss_db: float
+    outage_loss_db: float
+    margin_db: float
+    outage: float
+    short: float
+    data_rate_bit_s: float
+    best: pointing.BestDivergence
+    uncoded_penalty_db: float
+    fades_per_s: float
+    fade_s: float
+    fade_warning: str
+
+
+def of_jitter(m: LinkMission) -> Performance | None:
+    """The link under the mission's own jitter, or None where it gives none."""
+    if m.jitter is None:
+        return None
+    (bias_x, bias_y), (rms_x, rms_y) = m.jitter.bias_rad, m.jitter.rms_rad
+    jitter = pointing.Jitter((bias_x, bias_y), (rms_x, rms_y))
+    speed = 2.0 * math.pi * m.jitter.bandwidth_hz
+    motion = pointing.SpectralMotion((rms_x, rms_y), (speed * rms_x, speed * rms_y), (0.0, 0.0), m.jitter.bandwidth_hz)
+    return performance(m, "jitter as given", "", "", _known(jitter), jitter, motion)
+
+
+def _known(jitter: pointing.Jitter) -> Spread:
+    """A known distribution in radial steps that are small against it."""
+    reach = jitter.static_rad + 12.0 * max(jitter.rms_rad)
+    if reach == jitter.static_rad:
+        return Spread(np.array([reach]), np.ones(1))
+    edges = np.linspace(0.0, reach, _STEPS + 1)
+    share = np.maximum(-np.diff(pointing.radial_survival(jitter, edges)), 0.0)
+    return Spread(edges[1:], share / np.sum(share))  # the upper edge: no error is made smaller
+
+
+def performance(
+    m: LinkMission,
+    source: str,
+    controller: str,
+    mirror: str,
+    spread: Spread,
+    jitter: pointing.Jitter,
+    motion: pointing.SpectralMotion | None,
+) -> Performance:
+    """The link under these errors; ``motion`` is what their spectrum says, None where it is not known."""
+    q, fall = m.requirement, link.communication_beam(m).fall
+    on_axis = link.received_on_axis_dbm(m) - float(link.required_dbm(m, m.communication.data_rate_bit_s))
+    ahead = link.point_ahead_rad(m)
+    loss = fall.loss_db(spread.radius_rad + ahead)
+    outage_loss = float(fall.loss_db(spread.quantile_rad(1.0 - q.outage) + ahead))
+    half, aside = fall.half_angle_rad, _aside(jitter, ahead)
+    fades_per_s, fade_s, warning = _fades(aside, motion, fall, on_axis - q.margin_db)
+    return Performance(
+        source=source,
+        controller=controller,
+        mirror=mirror,
+        jitter=jitter,
+        mean_loss_db=_mean_loss_db(spread, loss),
+        outage_loss_db=outage_loss,
+        margin_db=on_axis - outage_loss,
+        outage=float(np.sum(spread.share[loss > on_axis])),
+        short=float(np.sum(spread.share[loss > on_axis - q.margin_db])),
+        data_rate_bit_s=_rate(m, outage_loss),
+        best=_best(spread, 1.0 - q.outage, half, ahead),
+        uncoded_penalty_db=_uncoded(m, aside, half),
+        fades_per_s=fades_per_s,
+        fade_s=fade_s,
+        fade_warning=warning,
+    )
+
+
+def _aside(jitter: pointing.Jitter, ahead_rad: float) -> pointing.Jitter:
+    """The jitter with its bias longer by an uncorrected point-ahead, which is the worst direction of it."""
+    (x, y), static = jitter.bias_rad, jitter.static_rad
+    along = (x / static, y / static) if static else (1.0, 0.0)
+    return pointing.Jitter((x + along[0] * ahead_rad, y + along[1] * ahead_rad), jitter.rms_rad)
+
+
+def _mean_loss_db(spread: Spread, loss_db: Floats) -> float:
+    """Loss of the mean power, counted from the least loss so that no power is too small for a number."""
+    there = spread.share > 0.0
+    share, loss = spread.share[there], loss_db[there]
+    least = float(np.min(loss))
+    return least - 10.0 * math.log10(float(np.sum(share * 10.0 ** ((least - loss) / 10.0))))
+
+
+def _best(spread: Spread, probability: float, half_angle_rad: float, ahead_rad: float) -> pointing.BestDivergence:
+    radius = max(spread.quantile_rad(probability) + ahead_rad, 1e-12)
+    return pointing.best_divergence_for_static_error(radius, current_half_angle_rad=half_angle_rad)
+
+
+def _rate(m: LinkMission, loss_db: float) -> float:
+    try:
+        return link.rate_at_loss(m, m.requirement.margin_db, loss_db)
+    except link.LinkError:
+        return math.nan
+
+
+def _fades(
+    jitter: pointing.Jitter, motion: pointing.SpectralMotion | None, fall: link.OffAxis, margin_db: float
+) -> tuple[float, float, str]:
+    """How often the loss exceeds the margin, for how long, and what to doubt of it."""
+    if motion is None or margin_db < 0.0:
+        return math.nan, math.nan, ""
+    half = fall.half_angle_rad
+    # the margin that a Gaussian beam has where this one has its own
+    like = link.GaussianFall(half).loss_db(fall.error_rad(margin_db))
+    found = pointing.fades(jitter, motion.velocity_rms_rad_s, half, like)
+    return float(found.per_second), float(found.mean_duration_s), motion.warning
+
+
+def _uncoded(m: LinkMission, jitter: pointing.Jitter, half_angle_rad: float) -> float:
+    """Extra power that brings the mean bit error ratio back to the target, with the curve of the mission's receiver.
+
+    nan for a receiver of which only the measured sensitivity is known.
+    """
+    receiver = link.receiver(m)
+    if receiver is None:
+        return math.nan
+    rate = m.communication.data_rate_bit_s
+    needed = float(receiver.required_power_w(rate))
+    try:
+        return pointing.uncoded_penalty_db(
+            jitter, half_angle_rad, lambda power: receiver.bit_error_ratio_at(needed * power, rate)
+        )
+    except ValueError:  # more than any power makes good
+        return math.inf

@@ -1,0 +1,350 @@
+"""The tables of a mission about its links: terminals, conventions, beams, receivers, channel, what is required."""
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, GetJsonSchemaHandler
+from pydantic_core import CoreSchema
+
+from microrad.fields import Problem, Quantity, Share, Table, Whole
+from microrad.mirror_table import ANGLE_MOST, Angle, Name
+from microrad.units import format_quantity
+
+LOWEST_ELEVATION_RAD = math.radians(10.0)
+"""Elevation below which a plane-parallel atmosphere is no model of the path."""
+
+# the upper bounds are no limits of technology: they catch a wrong prefix, "5 km" for an aperture of 5 cm
+AngleOrZero = Annotated[float, Quantity("rad", "urad", least=0.0, most=ANGLE_MOST)]
+Power = Annotated[float, Quantity("W", above=0.0, most=1e6)]
+PowerOrZero = Annotated[float, Quantity("W", "pW", least=0.0, most=1e6)]
+Threshold = Annotated[float, Quantity("W", "pW", above=0.0, most=1e6)]
+Aperture = Annotated[float, Quantity("m", "cm", above=0.0, most=100.0)]
+Wavelength = Annotated[float, Quantity("m", "um", least=1e-8, most=1e-2)]
+Distance = Annotated[float, Quantity("m", "km", above=0.0, most=1e13)]
+Loss = Annotated[float, Quantity("dB", least=0.0)]
+Strehl = Annotated[float, Quantity("", least=0.0)]
+Obscuration = Annotated[float, Quantity("", least=0.0, most=0.95)]
+Efficiency = Annotated[float, Quantity("", above=0.0, most=1.0)]
+Bandwidth = Annotated[float, Quantity("Hz", "GHz", above=0.0, most=1e15)]
+Current = Annotated[float, Quantity("A", "nA", least=0.0, most=1.0)]
+NoiseDensity = Annotated[float, Quantity("A/sqrt(Hz)", "pA/sqrt(Hz)", least=0.0, most=1e-3)]
+
+LARGEST = "largest"
+"""What a mission writes for the data rate that is to be solved for."""
+
+
+@dataclass(frozen=True, slots=True)
+class _DataRate(Quantity):
+    """A data rate, or the word for one that is solved for; the latter is nan until then."""
+
+    def read(self, value: object) -> float:
+        return math.nan if value == LARGEST else Quantity.read(self, value)
+
+    @property
+    def wanted(self) -> str:
+        return f'{Quantity.wanted.fget(self)}, or "{LARGEST}" for what the required margin leaves'  # type: ignore[attr-defined]
+
+    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        rate = Quantity.__get_pydantic_json_schema__(self, schema, handler)
+        return {"anyOf": [rate, {"const": LARGEST}]}
+
+
+class Terminals(Table):
+    """The two optical terminals: the satellite's own in low orbit ("leo") and its partner ("geo")."""
+
+    leo_aperture_m: Aperture = Field(alias="leo_aperture")
+    geo_aperture_m: Aperture = Field(alias="geo_aperture")
+    leo_obscuration: Obscuration | None = Field(
+        default=None, description="diameter of the central obscuration over that of the aperture"
+    )
+    geo_obscuration: Obscuration | None = Field(
+        default=None, description="diameter of the central obscuration over that of the aperture"
+    )
+    leo_name: Name | None = Field(default=None, description='what budgets call it in place of "LEO"')
+    geo_name: Name | None = Field(default=None, description='what budgets call it in place of "GEO"')
+
+    def called(self, end: str) -> str:
+        """What budgets call the terminal "leo" or "geo"."""
+        return (self.leo_name if end == "leo" else self.geo_name) or end.upper()
+
+
+class LinkConventions(Table):
+    """How numbers of a link are read that a source leaves ambiguous."""
+
+    pointing_loss: Literal["gaussian", "gain", "pattern"] = Field(
+        description="gaussian: beam with 1/e2 radius D/2 at the aperture; gain: exp(-G theta^2); "
+        "pattern: the far field of communication.beam"
+    )
+    strehl: Literal["decibel", "ratio"] = Field(description="decibel: a loss in dB; ratio: a number up to 1")
+    divergence: Literal["full-1/e2", "half-1/e2"] = Field(description="which angle a beam's divergence is")
+
+
+class Channel(Table):
+    """A path through a clear sky. Turbulence, clouds and scattering into the receiver are outside; absent: vacuum."""
+
+    zenith_transmission: Efficiency = Field(description="of the clear atmosphere straight up, at the links' wavelength")
+    elevation_rad: Annotated[float, Quantity("rad", "deg", least=LOWEST_ELEVATION_RAD, most=ANGLE_MOST)] = Field(
+        alias="elevation", description="of the satellite above the horizon"
+    )
+
+
+class BeamShape(Table):
+    """How a beam lights the aperture that it leaves."""
+
+    profile: Literal["uniform", "gaussian"] = Field(description="gaussian: cut by the aperture and its obscuration")
+    radius_m: Aperture | None = Field(
+        alias="radius", default=None, description="gaussian: at 1/e2 of intensity, in the aperture"
+    )
+    m_squared: Annotated[float, Quantity("", least=1.0, most=1e3)] | None = Field(
+        default=None, description="beam quality, divergence over that of an ideal beam"
+    )
+
+    def problems(self) -> Iterator[Problem]:
+        """A radius and a beam quality exactly for a Gaussian."""
+        for key, value, example in (("radius", self.radius_m, '"2 cm"'), ("m_squared", self.m_squared, "1.1")):
+            if self.profile == "gaussian" and value is None:
+                reason = 'is missing, and profile = "gaussian" needs it'
+                yield Problem(key, reason, f"{key} = {example} would do")
+            if self.profile == "uniform" and value is not None:
+                yield Problem(key, 'does not belong to profile = "uniform"', 'this line removed, or "gaussian"')
+
+
+class Beam(Table):
+    """What a link has whatever its beam: power, wavelength, quality, distance and losses (all losses positive)."""
+
+    transmit_power_w: Power = Field(alias="transmit_power", description="optical power before the optics")
+    wavelength_m: Wavelength = Field(alias="wavelength")
+    strehl: Strehl | None = Field(default=None, description="decibel or ratio as conventions.strehl says")
+    wavefront_error_m: Annotated[float, Quantity("m", "nm", least=0.0, most=1e-3)] | None = Field(
+        alias="wavefront_error", default=None, description="rms, in place of strehl"
+    )
+    pointing_error_rad: AngleOrZero = Field(alias="pointing_error", description="off the line of sight, radial")
+    distance_m: Distance = Field(alias="distance")
+    transmit_optics_loss_db: Loss = Field(alias="transmit_optics_loss")
+    receive_optics_loss_db: Loss = Field(alias="receive_optics_loss")
+
+    def problems(self) -> Iterator[Problem]:
+        """Quality said once, and within the wavefront errors for which it means something."""
+        if self.strehl is None and self.wavefront_error_m is None:
+            yield Problem("strehl", "is missing, and so is wavefront_error", "strehl = 0.4 would do")
+        if self.strehl is not None and self.wavefront_error_m is not None:
+            yield Problem("strehl", "stands beside wavefront_error", "one of the two removed")
+        if self.wavefront_error_m is not None and self.wavefront_error_m > self.wavelength_m / 4:
+            limit = format_quantity(self.wavelength_m / 4, "m")
+            reason = f"is above a quarter of the wavelength ({limit}): such a beam has no core to point"
+            yield Problem("wavefront_error", reason, f"at most {limit}")
+
+
+class Beacon(Beam):
+    """A wide Gaussian beam to be found by: the beacon, and the answer to it."""
+
+    divergence_rad: Angle = Field(alias="divergence", description="full or half angle as conventions.divergence says")
+    required_power_w: Threshold = Field(alias="required_power", description="power that the sensor needs")
+
+
+_DETECTORS: dict[str, tuple[str, ...]] = {
+    "ook": ("photon-counting", "pin", "apd", "preamplified"),
+    "dpsk": ("preamplified",),
+    "bpsk": ("homodyne",),
+    "ppm": ("photon-counting",),
+}
+"""The detectors that each modulation is received with."""
+
+_NEEDS: dict[str, dict[str, str]] = {
+    "photon-counting": {"efficiency": "0.5", "dark_count_rate": '"1000 1/s"'},
+    "pin": {"efficiency": "0.8", "dark_current": '"1 nA"', "thermal_noise": '"2 pA/sqrt(Hz)"'},
+    "apd": {
+        "efficiency": "0.8",
+        "dark_current": '"1 nA"',
+        "thermal_noise": '"2 pA/sqrt(Hz)"',
+        "avalanche_gain": "20.0",
+        "ionisation_ratio": "0.2",
+    },
+    "preamplified": {"noise_figure": '"4 dB"'},
+    "homodyne": {"efficiency": "0.8"},
+}
+"""The keys that each detector needs, with a value that could stand there."""
+
+
+class Background(Table):
+    """Light of a sky or a bright body that fills the receiver's field of view."""
+
+    spectral_radiance_w_m3_sr: Annotated[float, Quantity("W/(m^3 sr)", "W/(m^2 sr um)", least=0.0)] = Field(
+        alias="spectral_radiance", description="both polarisations"
+    )
+    field_of_view_rad: Angle = Field(alias="field_of_view", description="full angle of the field stop, on the sky")
+    filter_bandwidth_m: Annotated[float, Quantity("m", "nm", above=0.0, most=1e-5)] = Field(
+        alias="filter_bandwidth", description="full width of the optical filter"
+    )
+
+
+class Receiver(Table):
+    """A receiver by what it is made of, in place of a measured sensitivity."""
+
+    modulation: Literal["ook", "dpsk", "bpsk", "ppm"]
+    detector: Literal["photon-counting", "pin", "apd", "preamplified", "homodyne"]
+    bit_error_ratio: Annotated[float, Share("", least=1e-18, below=0.5)] = Field(
+        description="at which the link is judged"
+    )
+    code_gain_db: Loss = Field(alias="code_gain", description="net, in power per information bit")
+    code_rate: Efficiency = Field(description="information bits per bit sent")
+    bandwidth_hz: Bandwidth = Field(alias="bandwidth", description="highest symbol rate, slot rate for ppm")
+    background_power_w: PowerOrZero | None = Field(
+        alias="background_power", default=None, description="behind the filter, on the detector"
+    )
+    background: Background | None = Field(default=None, description="in place of background_power")
+    order: Annotated[int, Whole("", least=2, most=2**20)] | None = Field(
+        default=None, description="ppm: slots in a symbol, a power of two"
+    )
+    extinction_ratio_db: Annotated[float, Quantity("dB", above=0.0)] | None = Field(
+        alias="extinction_ratio", default=None, description="ook: power of a mark over that of a space"
+    )
+    efficiency: Efficiency | None = Field(default=None, description="electrons per photon, all detectors but amplified")
+    dark_count_rate_1_s: Annotated[float, Quantity("1/s", least=0.0, most=1e12)] | None = Field(
+        alias="dark_count_rate", default=None
+    )
+    dark_current_a: Current | None = Field(alias="dark_current", default=None, description="before avalanche gain")
+    thermal_noise_a_sqrt_hz: NoiseDensity | None = Field(
+        alias="thermal_noise", default=None, description="one-sided, referred to the amplifier's input"
+    )
+    avalanche_gain: Annotated[float, Quantity("", least=1.0, most=1e6)] | None = Field(default=None)
+    ionisation_ratio: Annotated[float, Quantity("", least=0.0, most=1.0)] | None = Field(default=None)
+    noise_figure_db: Annotated[float, Quantity("dB", least=3.0)] | None = Field(
+        alias="noise_figure", default=None, description="of the optical amplifier; 3 dB is the quantum limit"
+    )
+    amplifier_gain_db: Annotated[float, Quantity("dB", least=10.0)] | None = Field(
+        alias="amplifier_gain", default=None, description="of the optical amplifier"
+    )
+    optical_bandwidth_hz: Bandwidth | None = Field(
+        alias="optical_bandwidth", default=None, description="of the filter behind the amplifier"
+    )
+
+    def problems(self) -> Iterator[Problem]:
+        """A detector that receives the modulation, and the keys of both and no others."""
+        fitting = _DETECTORS[self.modulation]
+        if self.detector not in fitting:
+            choices = " or ".join(f'detector = "{each}"' for each in fitting)
+            yield Problem("detector", f'does not receive modulation = "{self.modulation}"', choices)
+            return
+        wanted, what = dict(_NEEDS[self.detector]), f'modulation = "{self.modulation}", detector = "{self.detector}"'
+        if self.modulation == "ppm":
+            wanted["order"] = "16"
+        if self.modulation == "ook":
+            wanted["extinction_ratio"] = '"20 dB"'
+            if self.detector == "preamplified":
+                wanted |= {"optical_bandwidth": '"20 GHz"', "amplifier_gain": '"35 dB"'}
+        if self.background is None and self.detector not in ("homodyne", "preamplified"):
+            wanted["background_power"] = '"0 pW"'
+        for name, info in type(self).model_fields.items():
+            key, present = info.alias or name, getattr(self, name) is not None
+            if key in wanted and not present:
+                yield Problem(key, f"is missing, and {what} needs it", f"{key} = {wanted[key]} would do")
+            if key == "background_power" and present and self.background is not None:
+                yield Problem(key, "stands beside the table background", "one of the two removed")
+            elif not info.is_required() and present and key not in (*wanted, "background"):
+                yield Problem(key, f"does not belong to {what}", "this line removed")
+        if self.order is not None and self.order & (self.order - 1):
+            yield Problem("order", "is no power of two", "order = 16 would do")
+
+
+class Communication(Beam):
+    """The data link, diffraction-limited by its aperture."""
+
+    data_rate_bit_s: Annotated[float, _DataRate("bit/s", above=0.0)] = Field(
+        alias="data_rate", description=f'"{LARGEST}" solves for it'
+    )
+    tracking_split_loss_db: Loss = Field(alias="tracking_split_loss", description="light for the tracking sensor")
+    implementation_loss_db: Loss = Field(alias="implementation_loss", description="receiver against its sensitivity")
+    receiver_sensitivity_photon_bit: Annotated[float, Quantity("photon/bit", above=0.0)] | None = Field(
+        alias="receiver_sensitivity", default=None, description="as measured, at its bit error ratio"
+    )
+    receiver: Receiver | None = Field(default=None, description="in place of receiver_sensitivity")
+    beam: BeamShape | None = Field(default=None, description="absent: uniform, unobscured")
+
+    def problems(self) -> Iterator[Problem]:
+        """One receiver."""
+        yield from Beam.problems(self)
+        if self.receiver_sensitivity_photon_bit is None and self.receiver is None:
+            advice = 'receiver_sensitivity = "100 photon/bit" would do, or a table receiver'
+            yield Problem("receiver_sensitivity", "is missing, and so is the table receiver", advice)
+        if self.receiver_sensitivity_photon_bit is not None and self.receiver is not None:
+            yield Problem("receiver_sensitivity", "stands beside the table receiver", "one of the two removed")
+
+
+class LinkRequirement(Table):
+    """What a link has to meet."""
+
+    margin_db: Loss = Field(alias="margin", description="margin of the communication link")
+    pointing_error_rad: Angle = Field(alias="pointing_error", description="residual that the fine pointing may leave")
+    outage: Annotated[float, Share("")] = Field(description="share of the time that the margin may be below 0 dB")
+
+
+def half_angle_rad(divergence_rad: float, convention: str) -> float:
+    """Half angle at 1/e2 of intensity of a beam whose divergence is given as "full-1/e2" or "half-1/e2"."""
+    return divergence_rad / 2 if convention == "full-1/e2" else divergence_rad
+
+
+def narrowest_half_angle_rad(aperture_m: float, wavelength_m: float) -> float:
+    """Half angle at 1/e2 of the Gaussian beam with the gain of the whole aperture, sqrt(8) lambda / (pi D).
+
+    Nothing that leaves the aperture has more gain than light that fills it evenly, so no Gaussian beam is narrower.
+    """
+    return math.sqrt(8.0) * wavelength_m / (math.pi * aperture_m)
+
+
+def narrowest_radius(obscuration: float) -> float:
+    """1/e2 radius, over that of the aperture, of the Gaussian beam of which a central obscuration stops 99 %."""
+    return obscuration * math.sqrt(2.0 / math.log(100.0))
+
+
+def strehl_fits(name: str) -> Callable[..., Iterator[Problem]]:
+    """Check that the Strehl of a beam is a ratio when it is read as one."""
+
+    def check(conventions: LinkConventions, beam: Beam | None) -> Iterator[Problem]:
+        if beam and beam.strehl is not None and conventions.strehl == "ratio" and not 0.0 < beam.strehl <= 1.0:
+            reason = f'is no ratio, but conventions.strehl = "ratio" ({beam.strehl:g})'
+            yield Problem(f"{name}.strehl", reason, 'above 0 and at most 1, or conventions.strehl = "decibel"')
+
+    return check
+
+
+def divergence_fits(name: str, end: str) -> Callable[..., Iterator[Problem]]:
+    """Check that a beam is not narrower than diffraction at the aperture that it leaves."""
+
+    def check(conventions: LinkConventions, terminals: Terminals, beam: Beacon | None) -> Iterator[Problem]:
+        if beam is None:
+            return
+        aperture = terminals.leo_aperture_m if end == "leo" else terminals.geo_aperture_m
+        least = narrowest_half_angle_rad(aperture, beam.wavelength_m)
+        half = half_angle_rad(beam.divergence_rad, conventions.divergence)
+        if half < least * (1.0 - 1e-9):
+            limit = format_quantity(beam.divergence_rad / half * least * (1.0 + 1e-3), "rad")
+            size = format_quantity(aperture, "m")
+            reason = f"is below diffraction at {end}_aperture = {size}, which leaves no less than {limit}"
+            yield Problem(f"{name}.divergence", reason, f'at least "{limit}", or a larger aperture')
+
+    return check
+
+
+def pattern_fits(conventions: LinkConventions, communication: Communication) -> Iterator[Problem]:
+    """A far-field pattern needs to know how the aperture is lit, and the other readings do not take it into account."""
+    if conventions.pointing_loss == "pattern" and communication.beam is None:
+        advice = 'pointing_loss = "gaussian", or a table [communication.beam]'
+        yield Problem("conventions.pointing_loss", "needs the table communication.beam, which is missing", advice)
+    if conventions.pointing_loss != "pattern" and communication.beam is not None:
+        reason = f'does not take communication.beam into account ("{conventions.pointing_loss}")'
+        yield Problem("conventions.pointing_loss", reason, 'pointing_loss = "pattern"')
+
+
+def obscuration_fits(terminals: Terminals, communication: Communication) -> Iterator[Problem]:
+    """A beam that its own terminal's obscuration does not stop."""
+    beam, hole = communication.beam, terminals.leo_obscuration or 0.0
+    if beam is None or beam.radius_m is None:
+        return
+    least = narrowest_radius(hole) * terminals.leo_aperture_m / 2.0
+    if beam.radius_m < least:
+        limit = format_quantity(least * (1.0 + 1e-3), "m")
+        reason = f"leaves less than 1 % of the beam beside leo_obscuration = {hole:g}"
+        yield Problem("communication.beam.radius", reason, f'at least "{limit}", or a smaller obscuration')

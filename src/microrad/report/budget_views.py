@@ -1,0 +1,301 @@
+"""The budgets of a mission's links: as a table in a terminal, as CSV, as plain data, and as a page."""
+
+import csv
+import io
+import math
+from typing import Any
+
+from microrad.budget import Line
+from microrad.link_performance import Performance
+from microrad.link_study import Finding, LinkStudy
+from microrad.pointing import OpenLoopPointing
+from microrad.report.quantities import quantity
+
+COLUMNS = ("budget", "line", "value", "unit", "basis", "source", "holds for", "warning")
+
+
+def lines(study: LinkStudy) -> list[tuple[str, Line]]:
+    """Every line of every budget with the name of its budget, totals included, in the order of the page."""
+    found = [(b.name, line) for b in study.budgets for line in (*b.lines, *b.totals)]
+    found += [("Open-loop pointing", line) for line in study.open_loop.lines]
+    if study.tracking is not None:
+        found += [("Tracking sensor", line) for line in study.tracking.noise_lines]
+        found.append(("Tracking sensor", study.tracking.noise_equivalent_angle))
+    return found
+
+
+def csv_text(study: LinkStudy) -> str:
+    """Every line with its value in full, for a spreadsheet."""
+    buffer = io.StringIO()
+    writer = csv.writer(buffer, lineterminator="\n")
+    writer.writerow(COLUMNS)
+    for name, line in lines(study):
+        value = f"{line.value:.12g}"
+        writer.writerow([name, line.name, value, line.unit, line.basis, line.source, line.regime, line.warning])
+    return buffer.getvalue().rstrip("\n")
+
+
+def text(study: LinkStudy, width: int) -> str:
+    """The budgets as tables of at most ``width`` columns, what follows from them, and the warnings."""
+    from rich import box
+    from rich.console import Console
+    from rich.table import Table
+
+    console = Console(file=io.StringIO(), width=width, color_system=None, highlight=False, markup=False)
+    groups: dict[str, list[Line]] = {}
+    for name, line in lines(study):
+        groups.setdefault(name, []).append(line)
+    for name, members in groups.items():
+        table = Table(title=name, title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False, expand=True)
+        table.add_column("line", ratio=3)
+        table.add_column("value", justify="right", no_wrap=True, min_width=12)
+        table.add_column("basis", ratio=5)
+        table.add_column("source", ratio=5)
+        table.add_column("holds for", ratio=4)
+        for line in members:
+            mark = " !" if line.warning else ""
+            table.add_row(line.name + mark, quantity(line.value, line.unit), line.basis, line.source, line.regime)
+        console.print(table)
+    for sentence in sentences(study):
+        console.print(sentence, soft_wrap=True)
+    if study.warnings:
+        console.print("\nWarnings (! in the tables)", soft_wrap=True)
+        for warning in study.warnings:
+            console.print(f"  {warning}", soft_wrap=True)
+    written = console.file
+    assert isinstance(written, io.StringIO)
+    return "\n".join(line.rstrip() for line in written.getvalue().splitlines())
+
+
+def sentences(study: LinkStudy) -> list[str]:
+    """What follows from the budgets, a sentence each."""
+    m = study.file.mission
+    q = m.requirement
+    found = [verdict(study)]
+    if math.isnan(study.largest_rate_bit_s):
+        found.append(f"No data rate has the required {q.margin_db:g} dB at {quantity(q.pointing_error_rad, 'rad')}.")
+    else:
+        found.append(
+            f"Largest data rate with the required {q.margin_db:g} dB at {quantity(q.pointing_error_rad, 'rad')}: "
+            f"{quantity(study.largest_rate_bit_s, 'bit/s')}."
+        )
+    top = study.tornado[:3]
+    if top:
+        moved = "; ".join(f"{s.key} {quantity(s.swing_db, 'dB')}" for s in top)
+        found.append(f"What moves the margin most, each input by 10 % (0.5 dB) both ways: {moved}.")
+    if study.beacon is not None:
+        found.append(
+            f"Beacon at its partner: {quantity(study.beacon.irradiance_w_m2, 'W/m^2')} at the pointing error, "
+            f"{quantity(study.beacon.irradiance_on_axis_w_m2, 'W/m^2')} on axis; its sensor needs "
+            f"{quantity(study.beacon.required_irradiance_w_m2, 'W/m^2')}."
+        )
+    if study.tracking is not None:
+        nea = study.tracking.noise_equivalent_angle
+        found.append(
+            f"The answer brings {quantity(study.tracking.power_w, 'W')} to the tracking sensor: noise-equivalent angle "
+            f"{quantity(nea.value, 'rad')} rms per axis and reading."
+        )
+    if study.point_ahead is not None:
+        found.append(point_ahead(study))
+    found += pointing_sentences(study.open_loop)
+    if study.under_jitter is not None:
+        found.append(performance(study.under_jitter, study))
+    if study.finding is not None:
+        found += acquisition(study.finding)
+    return found
+
+
+def verdict(study: LinkStudy) -> str:
+    """Whether the links close, with each margin."""
+    margins = ", ".join(f"{b.name.lower()} {b.margin_db:+.2f} dB" for b in study.budgets)
+    return f"The links {'close' if study.closes else 'do not close'}: {margins}."
+
+
+def point_ahead(study: LinkStudy) -> str:
+    """Point-ahead as an angle of the beam, a range of the mirror and a loss."""
+    p = study.point_ahead
+    assert p is not None
+    state = "corrected here" if p.corrected else "NOT corrected here"
+    return (
+        f"Point-ahead: up to {quantity(p.angle_rad, 'rad')}, {p.beam_half_angles:.1f} half angles of the communication "
+        f"beam; left out, it would cost {p.loss_db:.1f} dB; a mirror that makes it needs "
+        f"{quantity(p.mirror_range_rad, 'rad')} of range at the line of sight; {state}."
+    )
+
+
+def pointing_sentences(p: OpenLoopPointing) -> list[str]:
+    """The totals of the pointing budget side by side, and what the beacon covers."""
+    sums = "; ".join(f"{each.name} {quantity(each.total_rad, 'rad')}" for each in p.summations)
+    found = [f"Open-loop pointing at {100 * p.confidence:g} %: {sums}."]
+    if p.reading is not None:
+        found.append(
+            f"The beacon's cone of {quantity(p.reading.half_angle_rad, 'rad')} half angle at 1/e2 covers its partner "
+            f"with a probability of {p.reading.coverage:.4g}."
+        )
+    return found
+
+
+def performance(p: Performance, study: LinkStudy) -> str:
+    """The link under its jitter, in a sentence."""
+    q = study.file.mission.requirement
+    return (
+        f"Under the jitter: mean pointing loss {p.mean_loss_db:.2f} dB; {p.outage_loss_db:.2f} dB but for "
+        f"{100 * q.outage:g} % of the time, which leaves a margin of {p.margin_db:+.2f} dB; below 0 dB for a share "
+        f"of {p.outage:.3g} of the time; best half angle {quantity(p.best.half_angle_rad, 'rad')}."
+    )
+
+
+def acquisition(f: Finding) -> list[str]:
+    """Time and probability of each way to find the partner."""
+    ways = [f.wide] if f.scan is None else [f.wide, f.scan]
+    return [
+        f"Acquisition by {w.name}: lock with a probability of {w.outcome.success_probability:.4f} "
+        f"(simulated {w.simulated_probability:.4f}), {quantity(w.outcome.mean_time_s, 's')} in the mean "
+        f"(simulated {quantity(w.simulated_mean_s, 's')})."
+        for w in ways
+    ]
+
+
+def html(study: LinkStudy) -> str:
+    """The budgets as one page that loads nothing, with their figures."""
+    # drawing takes longer to load than a table needs
+    from microrad.report import link_figures, links, page
+
+    figures = link_figures.draw(study)
+    budgets = [(budget, "") for budget in study.budgets]
+    context = {
+        "study": study,
+        "mission": study.file.mission,
+        "verdict": verdict(study),
+        "links": links.context(study, budgets=budgets, figures=figures, files=False),
+        "quantity": quantity,
+        "angle": page.angle,
+        "inputs": list(study.file.sources.items()),
+    }
+    return page.pages().get_template("budget.html").render(context)
+
+
+def data(study: LinkStudy) -> dict[str, Any]:
+    """The budgets and what follows from them as plain data, SI units in the keys."""
+    p = study.open_loop
+    return {
+        "mission": study.file.mission.name,
+        "mission_sha256": study.file.sha256,
+        "closes": study.closes,
+        "budgets": [
+            {
+                "name": b.name,
+                "margin_db": b.margin_db,
+                "received_power_w": b.received_power_w,
+                "required_power_w": b.required_power_w,
+                "irradiance_w_m2": b.irradiance_w_m2,
+                "irradiance_on_axis_w_m2": b.irradiance_on_axis_w_m2,
+                "required_irradiance_w_m2": b.required_irradiance_w_m2,
+                "lines": [line_data(line) for line in b.lines],
+                "totals": [line_data(line) for line in b.totals],
+                "warnings": list(b.warnings),
+            }
+            for b in study.budgets
+        ],
+        "largest_data_rate_bit_s": study.largest_rate_bit_s,
+        "tornado": [
+            {
+                "input": s.key,
+                "unit": s.unit,
+                "value": s.value,
+                "low": s.low,
+                "high": s.high,
+                "margin_low_db": s.margin_low_db,
+                "margin_high_db": s.margin_high_db,
+                "source": s.source,
+            }
+            for s in study.tornado
+        ],
+        "pointing": {
+            "lines": [line_data(line) for line in p.lines],
+            "confidence": p.confidence,
+            "totals": [
+                {"rule": s.rule, "of": s.of, "total_rad": s.total_rad, "authority": s.authority, "caveat": s.caveat}
+                for s in p.summations
+            ],
+            "beacon_coverage": None if p.reading is None else p.reading.coverage,
+        },
+        "tracking": None if study.tracking is None else _tracking(study),
+        "acquisition": None if study.finding is None else finding_data(study.finding),
+        "under_jitter": None if study.under_jitter is None else performance_data(study.under_jitter),
+        "warnings": list(study.warnings),
+    }
+
+
+def line_data(line: Line) -> dict[str, Any]:
+    """A line as plain data."""
+    return {
+        "name": line.name,
+        "value": line.value,
+        "unit": line.unit,
+        "basis": line.basis,
+        "source": line.source,
+        "holds_for": line.regime,
+        "warning": line.warning,
+    }
+
+
+def _tracking(study: LinkStudy) -> dict[str, Any]:
+    t = study.tracking
+    assert t is not None
+    return {
+        "power_w": t.power_w,
+        "signal_to_noise": t.signal_to_noise,
+        "noise_equivalent_angle_rad": t.noise_equivalent_angle.value,
+        "lines": [line_data(line) for line in t.noise_lines],
+    }
+
+
+def performance_data(p: Performance) -> dict[str, Any]:
+    """The link under one distribution of pointing errors as plain data."""
+    return {
+        "source": p.source,
+        "controller": p.controller,
+        "mirror": p.mirror,
+        "bias_rad": list(p.jitter.bias_rad),
+        "rms_rad": list(p.jitter.rms_rad),
+        "mean_loss_db": p.mean_loss_db,
+        "outage_loss_db": p.outage_loss_db,
+        "margin_db": p.margin_db,
+        "outage": p.outage,
+        "below_required_margin": p.short,
+        "data_rate_bit_s": p.data_rate_bit_s,
+        "best_half_angle_rad": p.best.half_angle_rad,
+        "lost_against_best_db": p.best.current_excess_db,
+        "uncoded_penalty_db": p.uncoded_penalty_db,
+        "fades_per_s": p.fades_per_s,
+        "mean_fade_s": p.fade_s,
+    }
+
+
+def finding_data(f: Finding) -> dict[str, Any]:
+    """Acquisition as plain data."""
+    return {
+        "uncertainty_per_axis_rad": f.sigma_rad,
+        "beacon_coverage": f.chances.beacon_coverage,
+        "answer_coverage": f.chances.answer_coverage,
+        "answer_detection": f.chances.answer_detection,
+        "return_coverage": f.chances.return_coverage,
+        "scan_s": f.scan_s,
+        "scan_radius_rad": f.scan_radius_rad,
+        "ways": [
+            {
+                "name": w.name,
+                "success_probability": w.outcome.success_probability,
+                "mean_time_s": w.outcome.mean_time_s,
+                "simulated_success_probability": w.simulated_probability,
+                "simulated_mean_time_s": w.simulated_mean_s,
+                "runs": int(w.simulated.locked.size),
+                "stages": [
+                    {"name": s.name, "longest_s": s.longest_s, "success_probability": s.success_probability}
+                    for s in w.stages
+                ],
+            }
+            for w in ((f.wide,) if f.scan is None else (f.wide, f.scan))
+        ],
+    }

@@ -1,0 +1,102 @@
+"""Figures of the links: what moves the margin most, and the wide beacon against the scan."""
+
+import numpy as np
+from matplotlib import rc_context
+from matplotlib.figure import Figure as Canvas
+
+from microrad.acquisition import Trade
+from microrad.link import Swing
+from microrad.link_study import Finding, LinkStudy
+from microrad.report.figures import BLUE, ORANGE, STYLE, VERMILION, Figure, svg_of
+from microrad.units import format_quantity
+
+MOST_BARS = 14
+
+
+def draw(study: LinkStudy) -> tuple[Figure, ...]:
+    """The figures of the links, in the order of the page."""
+    with rc_context(STYLE):
+        figures = [tornado(study)] if study.tornado else []
+        if study.finding is not None and study.finding.trade is not None:
+            figures.append(trade(study, study.finding, study.finding.trade))
+    return tuple(figures)
+
+
+def tornado(study: LinkStudy) -> Figure:
+    """The margin over each input, one at a time."""
+    shown, margin = study.tornado[:MOST_BARS], study.communication.margin_db
+    canvas = Canvas(figsize=(6.4, 0.9 + 0.27 * len(shown)), layout="constrained")
+    axes = canvas.subplots()
+    for row, swing in enumerate(shown):
+        axes.barh(row, swing.margin_low_db - margin, left=margin, color=ORANGE, height=0.7, label="input lower")
+        axes.barh(row, swing.margin_high_db - margin, left=margin, color=BLUE, height=0.7, label="input higher")
+    axes.axvline(margin, color="black", linewidth=0.8)
+    required = study.file.mission.requirement.margin_db
+    low, high = axes.get_xlim()
+    if low < required < high:
+        axes.axvline(required, color=VERMILION, linestyle="--", linewidth=1.0)
+        axes.text(required, -0.55, " required", color=VERMILION, fontsize=8, va="bottom")
+    axes.set_yticks(range(len(shown)), [_label(s) for s in shown], fontsize=8)
+    axes.set_ylim(len(shown) - 0.4, -0.6)
+    axes.set(xlabel="margin of the communication link (dB)")
+    axes.grid(visible=False, axis="y")
+    handles, labels = axes.get_legend_handles_labels()
+    axes.legend(handles[:2], labels[:2], loc="lower right", fontsize=8)
+    assumed = [s.key for s in shown if s.kind == "assumption"]
+    caption = (
+        "Margin with one input at a time 10 % lower and higher (0.5 dB for those in decibels, a factor of ten for a "
+        "bit error ratio), never beyond its bounds; all others as they are."
+    )
+    if assumed:
+        caption += f" Assumptions among them: {', '.join(assumed)}."
+    columns = {
+        "margin lower (dB)": np.array([s.margin_low_db for s in study.tornado]),
+        "margin higher (dB)": np.array([s.margin_high_db for s in study.tornado]),
+        "value (SI)": np.array([s.value for s in study.tornado]),
+        "lower (SI)": np.array([s.low for s in study.tornado]),
+        "higher (SI)": np.array([s.high for s in study.tornado]),
+    }
+    return Figure("tornado", "What moves the margin", caption, svg_of(canvas), columns)
+
+
+def _label(swing: Swing) -> str:
+    key = swing.key.removeprefix("communication.")
+    return f"{key} = {format_quantity(swing.value, swing.unit, 3)}".rstrip()
+
+
+def trade(study: LinkStudy, found: Finding, t: Trade) -> Figure:
+    """Section 2.1 of the paper as a picture: a wide beacon, or a scan with a narrow beam."""
+    canvas = Canvas(figsize=(6.4, 3.6), layout="constrained")
+    axes = canvas.subplots()
+    sigma = t.sigma_rad * 1e6
+    axes.loglog(sigma, t.wide_time_s, color=BLUE, label="wide beacon: detection at the edge of its cone")
+    axes.loglog(sigma, t.scan_time_s, color=ORANGE, linestyle="--", label="spiral scan: whole area")
+    axes.loglog(sigma, t.scan_mean_time_s, color=ORANGE, linestyle=":", label="spiral scan: mean until found")
+    axes.axvline(found.sigma_rad * 1e6, color=VERMILION, linewidth=1.0)
+    axes.text(found.sigma_rad * 1e6, t.scan_time_s[-1], " this mission", color=VERMILION, fontsize=8, va="top")
+    axes.set(xlabel="pointing uncertainty, rms per axis (µrad)", ylabel="time (s)")
+    axes.grid(visible=True, which="both", linewidth=0.3)
+    axes.set_xticks([30, 100, 300, 1000], ["30", "100", "300", "1000"])
+    axes.minorticks_off()
+    axes.legend(loc="upper left", fontsize=8)
+    m = study.file.mission
+    assert m.acquisition is not None
+    assert m.acquisition.scan is not None
+    scan = m.acquisition.scan
+    caption = (
+        f"Time to be found at {100 * scan.coverage:g} % coverage, without settling and light time. The beacon's "
+        "power, spread over a cone that covers the uncertainty, makes the partner's sensor integrate with the fourth "
+        f"power of it (noise that does not depend on the light; at least {format_quantity(scan.detection_s, 's')}); "
+        f"the same power in a beam of {format_quantity(scan.beam_radius_rad, 'rad')} half angle, led over it with an "
+        f"overlap of {scan.overlap:g} under {format_quantity(scan.jitter_rms_rad, 'rad')} of jitter per axis, takes a "
+        f"time that grows with its square and finds {100 * float(np.min(t.scan_probability)):.1f} % or more."
+    )
+    columns = {
+        "uncertainty per axis (rad)": t.sigma_rad,
+        "wide beacon, time (s)": t.wide_time_s,
+        "wide beacon, probability": t.wide_probability,
+        "scan, whole time (s)": t.scan_time_s,
+        "scan, mean time (s)": t.scan_mean_time_s,
+        "scan, probability": t.scan_probability,
+    }
+    return Figure("wide-beam-or-scan", "Wide beacon or scan", caption, svg_of(canvas), columns)

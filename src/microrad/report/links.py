@@ -1,0 +1,247 @@
+"""What the page shows of the links: pointing, budgets, light, performance, acquisition; each as rows of text."""
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+from microrad.link_performance import Performance
+from microrad.link_study import Finding, Found, LinkStudy
+from microrad.performance import Cost, LinkPerformance
+from microrad.pointing import OpenLoopPointing
+from microrad.report import budget_views
+from microrad.report.figures import Figure
+from microrad.report.quantities import quantity
+from microrad.units import format_quantity
+
+Row = dict[str, Any]
+EARLY = 0.9
+"""Share of the acquisitions that end in lock by the time that the table states."""
+
+RAREST_FADE_HZ = 1.0 / (365.25 * 86400.0)
+"""Fades rarer than one in a year are not counted."""
+
+
+def context(
+    links: LinkStudy, *, budgets: Sequence[tuple[Any, str]], figures: Sequence[Figure], files: bool
+) -> dict[str, Any]:
+    """What the template needs of the links alone; ``files`` says whether the figures' data stand beside the page."""
+    under = links.under_jitter
+    cases = () if under is None else (under,)
+    outage = links.file.mission.requirement.outage
+    return {
+        "pointing": pointing(links.open_loop),
+        "budgets": budgets,
+        "warnings": links.warnings,
+        "sentences": _sentences(links),
+        "readings": (),
+        "ideal": (),
+        "light": _light(links),
+        "performance": performance_rows(cases, ""),
+        "performance_words": [budget_views.performance(each, links) for each in cases],
+        "performance_note": note(),
+        "outage": f"{100 * outage:g} %",
+        "costs": [],
+        "fades": fades(cases),
+        "acquisition": None if links.finding is None else acquisition(links.finding),
+        "figures": figures,
+        "files": files,
+    }
+
+
+def pointing(p: OpenLoopPointing) -> Row:
+    """Lines of the pointing budget with what is left for each, and its totals by every rule."""
+    allocated = None if p.reading is None else p.allocation(p.reading.half_angle_rad, "rss")
+    rows = []
+    for place, line in enumerate(p.lines):
+        left = "" if allocated is None else format_quantity(allocated[place].largest_rad, "rad", 3)
+        rows.append({"line": line, "share": f"{100 * p.variance_shares[place]:.1f} %", "left": left})
+    left_for = ""
+    if p.reading is not None:
+        half = format_quantity(p.reading.half_angle_rad, "rad", 3)
+        left_for = f"the largest half width with which the root sum square equals the beacon's half angle ({half})."
+    return {
+        "rows": rows,
+        "left_for": left_for,
+        "confidence": f"{100 * p.confidence:g} %",
+        "totals": p.summations,
+        "sentences": coverage(p),
+    }
+
+
+def coverage(p: OpenLoopPointing) -> list[str]:
+    """What the beacon's cone covers, by each reading of its divergence."""
+    if p.reading is None or p.counter_reading is None:
+        return []
+    own, other = p.reading, p.counter_reading
+    needed = format_quantity(own.confident_divergence_rad, "rad", 3)
+    return [
+        f"Read as {own.convention}, the beacon's half angle is {format_quantity(own.half_angle_rad, 'rad', 3)}, "
+        f"{'at least' if own.covers else 'less than'} the root sum square, which is one axis. Its partner is inside "
+        f"with a probability of {own.coverage:.4f}, both axes and their biases counted; {100 * p.confidence:g} % would "
+        f"take a divergence of {needed}. Read as {other.convention}, the cone is "
+        f"{format_quantity(other.half_angle_rad, 'rad', 3)} and the probability {other.coverage:.4f}."
+    ]
+
+
+def _sentences(links: LinkStudy) -> list[str]:
+    """What follows from the budgets that no table says."""
+    skipped = {budget_views.verdict(links), *budget_views.pointing_sentences(links.open_loop)}
+    if links.under_jitter is not None:
+        skipped.add(budget_views.performance(links.under_jitter, links))
+    if links.finding is not None:
+        skipped |= set(budget_views.acquisition(links.finding))
+    return [sentence for sentence in budget_views.sentences(links) if sentence not in skipped]
+
+
+def _light(links: LinkStudy) -> tuple[Any, ...]:
+    t = links.tracking
+    return () if t is None else (*t.noise_lines, t.noise_equivalent_angle)
+
+
+# --------------------------------------------------------------------------------------------------------- performance
+def performance_rows(cases: Sequence[Performance], best: str, costs: Sequence[Cost] = ()) -> list[Row]:
+    """The link under each distribution of pointing errors, a row each; ``best`` names the controller to mark.
+
+    ``costs`` says what hysteresis takes from some of them.
+    """
+    of = {(c.source, c.controller, c.mirror): cost_cells(c) for c in costs}
+    none = ["", ""] if costs else []
+    return [
+        {
+            "source": c.source,
+            "controller": c.controller,
+            "mirror": c.mirror,
+            "best": bool(best) and c.controller == best and c.mirror == "given",
+            "cells": cells(c) + of.get((c.source, c.controller, c.mirror), none),
+        }
+        for c in cases
+    ]
+
+
+def cells(c: Performance) -> list[str]:
+    """The numbers of one row."""
+    return [
+        f"{math.hypot(*c.jitter.bias_rad, *c.jitter.rms_rad) * 1e6:.2f}",
+        f"{c.mean_loss_db:.2f}",
+        f"{c.outage_loss_db:.2f}",
+        f"{c.margin_db:+.2f}".replace("-", "\u2212"),
+        share(c.outage),
+        share(c.short),
+        f"{c.best.half_angle_rad * 1e6:.1f}",
+        f"{c.best.current_excess_db:.2f}",
+        "none" if math.isnan(c.data_rate_bit_s) else f"{c.data_rate_bit_s * 1e-6:.0f}",
+    ]
+
+
+def share(value: float) -> str:
+    """A share of the time; nothing was seen of what is none."""
+    return "none" if value == 0.0 else f"{value:.1e}" if value < 1e-3 else f"{100 * value:.2g} %"
+
+
+def note() -> str:
+    """How the columns are to be read."""
+    return (
+        "Rms: radial, about zero. Outage: share of the time with a margin below 0 dB. Best half angle: of a Gaussian "
+        "beam, at 1/e2, with the most power at the loss of that column; narrower than the present one, it takes a "
+        "larger aperture. Data rate: the largest with the required margin at that loss. What hysteresis costs: against "
+        "the same controller and the same errors on a mirror without it."
+    )
+
+
+def performance(found: LinkPerformance, best: str) -> dict[str, Any]:
+    """What the template needs of the link under the simulated residuals."""
+    shown = [c for c in found.cases if c.controller != "" and c.mirror != "no hysteresis"]
+    return {
+        "performance": performance_rows(shown, best, found.costs),
+        "performance_words": [in_words(found)],
+        "outage": f"{100 * found.outage:g} %",
+        "costs": found.costs,
+        "fades": fades(found.cases),
+    }
+
+
+def in_words(found: LinkPerformance) -> str:
+    """How the residuals enter the link."""
+    half = format_quantity(found.half_angle_rad, "rad", 3)
+    return (
+        "The communication link under every simulated residual, by its own distribution and not by one static number: "
+        f"the loss that is exceeded for {100 * found.outage:g} % of the time, against a beam of {half} half angle at "
+        "1/e2. Clean sines first (one axis, as in the paper), then the loop under vibration and noise."
+    )
+
+
+def cost_cells(c: Cost) -> list[str]:
+    """What hysteresis takes from one controller, as text: dB of margin, Mbit/s."""
+    rate = "" if math.isnan(c.data_rate_bit_s) else f"{max(-c.data_rate_bit_s * 1e-6, 0.0):.0f}"
+    return [f"{max(-c.margin_db, 0.0):.2f}", rate]
+
+
+def fades(cases: Sequence[Performance]) -> list[str]:
+    """Fades below the required margin, a sentence for each case whose spectrum is known, and what to doubt."""
+    known = [c for c in cases if not math.isnan(c.fades_per_s)]
+    if not known:
+        return []
+    if all(c.fades_per_s < RAREST_FADE_HZ for c in known):
+        return ["Fades below the required margin: none in a year, for Gaussian errors of the simulated spectra."]
+    said = "; ".join(
+        f"{c.controller or c.source}: "
+        + (
+            f"{c.fades_per_s:.3g} a second of {format_quantity(c.fade_s, 's', 3)} each"
+            if c.fades_per_s >= RAREST_FADE_HZ
+            else "none in a year"
+        )
+        for c in known
+    )
+    found = [f"Fades below the required margin, for Gaussian errors of the simulated rms and spectrum: {said}."]
+    penalties = [c for c in known if not math.isnan(c.uncoded_penalty_db)]
+    if penalties:
+        said = "; ".join(f"{c.controller or c.source} {c.uncoded_penalty_db:.2f} dB" for c in penalties)
+        found.append(
+            f"Power that brings an uncoded link's mean bit error ratio back to its target: {said}. A coded link pays "
+            "the mean loss when its interleaver spans many fades, and the loss of the outage column when it spans none."
+        )
+    return found + [c.fade_warning.capitalize() + "." for c in known if c.fade_warning][:1]
+
+
+# --------------------------------------------------------------------------------------------------------- acquisition
+def acquisition(f: Finding) -> Row:
+    """Each way to find the partner, with its stages and one run."""
+    ways = [f.wide] if f.scan is None else [f.wide, f.scan]
+    return {"sentences": acquisition_words(f), "ways": [way(w) for w in ways]}
+
+
+def way(w: Found) -> Row:
+    """One way as text: exact beside simulated."""
+    o = w.outcome
+    late = o.locked.given_success().quantile(EARLY)
+    return {
+        "name": w.name,
+        "cells": [
+            f"{o.success_probability:.4f}",
+            f"{w.simulated_probability:.4f}",
+            quantity(o.mean_time_s, "s"),
+            quantity(w.simulated_mean_s, "s"),
+            quantity(late, "s"),
+        ],
+        "stages": w.stages,
+        "log": w.log,
+    }
+
+
+def acquisition_words(f: Finding) -> list[str]:
+    """What makes up the probability, and how the scan is laid out."""
+    c = f.chances
+    found = [
+        "Exact sums over all orders of failures beside a seeded simulation of the same process. The wide beacon covers "
+        f"its partner with a probability of {c.beacon_coverage:.4f} (its power suffices out to "
+        f"{format_quantity(f.beacon_radius_rad, 'rad', 3)} off axis), the answer lands with {c.answer_coverage:.4f} "
+        f"and is seen with {c.answer_detection:.4f}, the narrow beam back lands with {c.return_coverage:.4f}. The "
+        "random part of the pointing error is drawn anew at each attempt; biases stand at their bounds."
+    ]
+    if f.scan is not None:
+        found.append(
+            f"The scan covers {format_quantity(f.scan_radius_rad, 'rad', 3)} about the predicted direction, for an "
+            f"uncertainty of {format_quantity(f.sigma_rad, 'rad', 3)} rms per axis with biases, in "
+            f"{quantity(f.scan_s, 's')} at most."
+        )
+    return found

@@ -1,0 +1,361 @@
+"""Coverage, the sequence of beacon, answer and lock with its retries, and the wide beacon against the scan."""
+
+import itertools
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from microrad.acquisition import (
+    LOCKED,
+    LOST,
+    Beams,
+    Chances,
+    Detector,
+    PointingError,
+    Receiver,
+    Search,
+    Spiral,
+    Stage,
+    TimeDistribution,
+    Timing,
+    answer_stages,
+    beacon_stages,
+    coverage_probability,
+    coverage_radius,
+    detection_times,
+    frame_detection_probability,
+    frames_detection_probability,
+    paper_sequence,
+    scan_stages,
+    simulate,
+    simulate_log,
+    solve,
+    wide_against_scan,
+)
+
+URAD = 1e-6
+NORMAL_99 = 2.5758  # one seed in a hundred misses it; larger studies of each pair show no bias
+TIMING = Timing(
+    range_m=44_000e3,
+    body_settling_s=20.0,
+    frame_time_s=0.1,
+    frames=5,
+    geo_response_s=3.0,
+    leo_detection_s=0.5,
+    mirror_settling_s=0.01,
+    lock_time_s=1.0,
+)
+CHANCES = Chances(0.57, 0.9, 0.95, 0.99, 0.97, 0.98)
+
+
+def by_polar_quadrature(radius, error):
+    node, weight = np.polynomial.legendre.leggauss(200)
+    r = radius * (1 + node)[:, None] / 2
+    angle = np.linspace(0, 2 * math.pi, 400, endpoint=False)
+    density = stats.norm.pdf(r * np.cos(angle), error.bias_rad, error.sigma_rad) * stats.norm.pdf(
+        r * np.sin(angle), error.bias_cross_rad, error.cross_rad
+    )
+    return float(np.sum(density.mean(axis=1) * 2 * math.pi * r[:, 0] * weight) * radius / 2)
+
+
+@pytest.mark.parametrize(
+    "error",
+    [
+        PointingError(300e-3),
+        PointingError(300e-3, bias_rad=100e-3, bias_cross_rad=-250e-3),
+        PointingError(300e-3, 120e-3),
+        PointingError(80e-3, 300e-3, 150e-3, 90e-3),
+    ],
+)
+def test_coverage_is_the_integral_of_the_density_over_the_disc(error):
+    for radius in (0.05, 0.39, 0.9):
+        assert coverage_probability(radius, error) == pytest.approx(by_polar_quadrature(radius, error), rel=1e-11)
+
+
+def test_coverage_of_the_papers_beacon_is_the_rayleigh_law():
+    assert coverage_probability(390 * URAD, PointingError(300 * URAD)) == pytest.approx(
+        1 - math.exp(-(390**2) / (2 * 300**2)), rel=1e-13
+    )
+    assert coverage_radius(0.995, PointingError(300 * URAD)) / URAD == pytest.approx(976.6, abs=0.05)
+
+
+def test_nearly_equal_axes_join_the_equal_ones_and_a_thin_axis_leaves_a_line():
+    equal = coverage_probability(400 * URAD, PointingError(300 * URAD, None, 90 * URAD, 20 * URAD))
+    nearly = coverage_probability(400 * URAD, PointingError(300 * URAD, 300.0001 * URAD, 90 * URAD, 20 * URAD))
+    assert nearly == pytest.approx(equal, rel=1e-6)
+    thin = coverage_probability(400 * URAD, PointingError(300 * URAD, 1e-3 * URAD))
+    assert thin == pytest.approx(math.erf(400 / 300 / math.sqrt(2)), rel=1e-8)
+    beside = coverage_probability(400 * URAD, PointingError(300 * URAD, 1e-3 * URAD, 0.0, 250 * URAD))
+    assert beside == pytest.approx(math.erf(math.sqrt(400**2 - 250**2) / 300 / math.sqrt(2)), rel=1e-8)
+
+
+@pytest.mark.parametrize(
+    "error", [PointingError(3e-4, 1e-4), PointingError(3e-4, None, 5e-4), PointingError(1e-4, 3e-4, 9e-4)]
+)
+def test_the_coverage_radius_covers_what_was_asked(error):
+    for probability in (0.01, 0.5, 0.995):
+        assert coverage_probability(coverage_radius(probability, error), error) == pytest.approx(probability, rel=1e-9)
+
+
+def test_a_time_distribution_keeps_its_books():
+    times = TimeDistribution(np.array([1.0, 3.0, 4.0]), np.array([0.2, 0.3, 0.1]))
+    assert times.probability == pytest.approx(0.6)
+    assert times.mean_s == pytest.approx((0.2 + 0.9 + 0.4) / 0.6)
+    assert times.std_s == pytest.approx(math.sqrt((0.2 + 2.7 + 1.6) / 0.6 - (1.5 / 0.6) ** 2))
+    assert [times.cumulative(t) for t in (0.9, 1.0, 3.5, 9.0)] == pytest.approx([0.0, 0.2, 0.5, 0.6])
+    assert [times.quantile(p) for p in (0.01, 0.2, 0.21, 0.5, 0.6)] == [1.0, 1.0, 3.0, 3.0, 4.0]
+    both = times.followed_by(TimeDistribution(np.array([10.0, 12.0]), np.array([0.5, 0.25])))
+    assert both.time_s == pytest.approx([11, 13, 14, 15, 16])
+    assert both.weight == pytest.approx([0.1, 0.15 + 0.05, 0.05, 0.075, 0.025])
+
+
+def test_convolving_long_lists_keeps_probability_and_mean():
+    draw = np.random.Generator(np.random.Philox(key=1))
+    one = TimeDistribution(np.sort(draw.random(3000)), np.full(3000, 1 / 4000))
+    two = TimeDistribution(np.sort(draw.random(2500) * 5.0), np.full(2500, 1 / 2500))
+    both = one.followed_by(two)
+    assert both.probability == pytest.approx(0.75, rel=1e-9)
+    assert both.mean_s == pytest.approx(one.mean_s + two.mean_s, rel=1e-9)
+    assert both.std_s == pytest.approx(math.hypot(one.std_s, two.std_s), rel=1e-5)
+    assert both.time_s.size <= 4096
+
+
+def test_frames_detect_by_the_gaussian_tail():
+    assert frame_detection_probability(6.0, 4.0) == pytest.approx(stats.norm.sf(4.0 - 6.0), rel=1e-12)
+    assert frame_detection_probability(0.0, 4.0) == pytest.approx(stats.norm.sf(4.0), rel=1e-12)
+    assert frames_detection_probability(0.9, 3) == pytest.approx(0.999, rel=1e-12)
+
+
+def test_the_papers_sequence_has_its_order_and_its_light_times():
+    stages = paper_sequence(TIMING, CHANCES)
+    assert [stage.name for stage in stages] == [
+        "LEO points the beacon",
+        "beacon travels",
+        "GEO detects",
+        "GEO turns and answers",
+        "answer travels",
+        "LEO detects the answer",
+        "LEO's mirror turns",
+        "narrow beam travels",
+        "GEO locks",
+        "GEO's beam travels",
+        "LEO locks",
+    ]
+    light = 44e6 / 299_792_458
+    assert TIMING.light_time_s == pytest.approx(light, rel=1e-14)
+    sure = solve(paper_sequence(TIMING, Chances(1, 1, 1, 1, 1, 1)), 1)
+    assert sure.success_probability == 1.0 and sure.failure_probability == 0.0
+    assert sure.locked.time_s == pytest.approx([20 + 0.5 + 3 + 0.5 + 0.01 + 2 * 1.0 + 4 * light], rel=1e-12)
+    assert stages[2].success_probability == pytest.approx(0.57 * (1 - 0.1**5), rel=1e-12)
+
+
+def test_frames_do_not_help_a_beacon_that_does_not_land():
+    many = replace(TIMING, frames=1000)
+    assert beacon_stages(many, CHANCES)[-1].success_probability == pytest.approx(0.57, rel=1e-12)
+
+
+def by_matrix(stages, attempts):
+    """Probability and mean time of lock from the fundamental matrix of the absorbing chain."""
+    names, size = [s.name for s in stages], len(stages)
+    states = size * attempts
+    move, time, lock = np.zeros((states, states)), np.zeros((states, states)), np.zeros(states)
+    lock_time = np.zeros(states)
+    for used in range(attempts):
+        for k, stage in enumerate(stages):
+            here, p = used * size + k, stage.success_probability
+            if k + 1 < size:
+                move[here, here + 1], time[here, here + 1] = p, stage.duration_s
+            else:
+                lock[here], lock_time[here] = p, stage.duration_s
+            if used + 1 < attempts:
+                to = (used + 1) * size + (names.index(stage.on_failure) if stage.on_failure else k)
+                move[here, to], time[here, to] = 1 - p, stage.failure_s
+    fundamental = np.linalg.inv(np.eye(states) - move)
+    reach = fundamental @ lock
+    moment = fundamental @ ((move * time) @ reach + lock * lock_time)
+    visits = fundamental[0].reshape(attempts, size).sum(axis=0)
+    return reach[0], moment[0] / reach[0], visits
+
+
+@pytest.mark.parametrize("attempts", [1, 2, 5])
+def test_the_solution_is_that_of_the_absorbing_chain(attempts):
+    stages = paper_sequence(TIMING, CHANCES)
+    outcome = solve(stages, attempts)
+    probability, mean, visits = by_matrix(stages, attempts)
+    assert outcome.success_probability == pytest.approx(probability, rel=1e-12)
+    assert outcome.mean_time_s == pytest.approx(mean, rel=1e-10)
+    assert outcome.visits == pytest.approx(visits, rel=1e-12)
+    assert outcome.success_probability + outcome.failure_probability == pytest.approx(1.0, rel=1e-12)
+
+
+def test_times_are_exact_for_one_stage_that_is_repeated():
+    outcome = solve([Stage("try", 2.0, 0.25, 5.0)], 4)
+    assert outcome.locked.time_s == pytest.approx([2, 7, 12, 17], rel=1e-14)
+    assert outcome.locked.weight == pytest.approx([0.25 * 0.75**k for k in range(4)], rel=1e-14)
+    assert outcome.lost.time_s == pytest.approx([20.0]) and outcome.lost.weight == pytest.approx([0.75**4])
+
+
+def test_the_sequence_and_its_simulation_agree():
+    stages, attempts, runs = paper_sequence(TIMING, CHANCES), 4, 20_000
+    outcome, drawn = solve(stages, attempts), simulate(stages, attempts, runs, seed=100)
+    p = outcome.success_probability
+    assert abs(drawn.locked.mean() - p) <= NORMAL_99 * math.sqrt(p * (1 - p) / runs)
+    locked, lost = drawn.time_s[drawn.locked], drawn.time_s[~drawn.locked]
+    assert abs(locked.mean() - outcome.mean_time_s) <= NORMAL_99 * locked.std() / math.sqrt(locked.size)
+    assert abs(lost.mean() - outcome.lost.mean_s) <= NORMAL_99 * lost.std() / math.sqrt(lost.size)
+    assert locked.std() == pytest.approx(outcome.locked.std_s, rel=0.05)
+    for time in (30.0, 60.0, 80.0):
+        q = outcome.locked.cumulative(time)
+        assert abs(np.mean(drawn.locked & (drawn.time_s <= time + 1e-6)) - q) <= NORMAL_99 * math.sqrt(
+            q * (1 - q) / runs
+        )
+    assert np.all(drawn.failures[~drawn.locked] == attempts) and np.all(drawn.failures[drawn.locked] < attempts)
+
+
+def test_a_scan_takes_the_place_of_the_beacon():
+    scan = Spiral(Search(300 * URAD, 20 * URAD, 0.25, 0.9), Detector(2e-3, 0.9), 8e-3)
+    times = detection_times(scan)
+    stages = (*scan_stages(TIMING, times, scan.duration_s), *answer_stages(TIMING, CHANCES))
+    outcome, runs = solve(stages, 3), 8000
+    drawn = simulate(stages, 3, runs, seed=9)
+    p = outcome.success_probability
+    assert abs(drawn.locked.mean() - p) <= NORMAL_99 * math.sqrt(p * (1 - p) / runs)
+    locked = drawn.time_s[drawn.locked]
+    assert abs(locked.mean() - outcome.mean_time_s) <= NORMAL_99 * locked.std() / math.sqrt(locked.size)
+    first = solve(stages, 1)
+    rest = 20 + 3 + 0.5 + 0.01 + 2.0 + 4 * TIMING.light_time_s
+    assert first.mean_time_s == pytest.approx(times.mean_s + rest, rel=1e-9)
+    assert first.success_probability == pytest.approx(times.probability * 0.95 * 0.99 * 0.97 * 0.98**2, rel=1e-9)
+
+
+def test_a_log_tells_each_step_and_its_cause():
+    stages = paper_sequence(TIMING, CHANCES)
+    drawn = simulate(stages, 2, 1, seed=3)
+    log = simulate_log(stages, 2, seed=3)
+    assert log[0].stage == stages[0].name and log[0].time_s == 20.0 and log[0].cause == "done"
+    assert log[-1].to == (LOCKED if drawn.locked[0] else LOST) and log[-1].time_s == drawn.time_s[0]
+    for event, following in itertools.pairwise(log):
+        assert event.to == following.stage and event.time_s <= following.time_s
+    failing = simulate_log([Stage("point", 1.0), Stage("see", 2.0, 1e-9, 4.0, "point")], 2, seed=1)
+    assert [(e.time_s, e.stage, e.to, e.cause) for e in failing] == [
+        (1.0, "point", "see", "done"),
+        (5.0, "see", "point", "time-out, failure 1 of 2"),
+        (6.0, "point", "see", "done"),
+        (10.0, "see", LOST, "time-out, failure 2 of 2"),
+    ]
+
+
+BEAMS = Beams(4.0, 44_000e3, 25 * URAD, 20 * URAD, 0.25)
+THERMAL = Receiver(math.pi / 4 * 0.15**2, 6.0, 1e-10, 0.0)
+SHOT = Receiver(math.pi / 4 * 0.15**2, 6.0, 0.0, 2e-19)
+
+
+def test_irradiance_is_that_of_a_gaussian_beam_and_holds_its_power():
+    # 4 W, 780 urad full angle at 1/e2, 44 000 km, and 0.4 dB of Strehl ratio 300 urad off the axis
+    on_axis, off_axis = BEAMS.irradiance_w_m2(390 * URAD, [0.0, 300 * URAD]) * 1e9
+    assert on_axis == pytest.approx(8.65, abs=0.005)
+    assert off_axis * 10**-0.04 == pytest.approx(2.42, abs=0.006)
+    radius = np.linspace(0.0, 2e-3, 20_001) * 44_000e3
+    ring = BEAMS.irradiance_w_m2(390 * URAD, radius / 44_000e3) * 2 * math.pi * radius
+    assert np.trapezoid(ring, radius) == pytest.approx(4.0, rel=1e-6)
+
+
+def test_detection_time_follows_the_noise():
+    power = np.array([1e-10, 2e-10])
+    thermal, shot = THERMAL.detection_time_s(power), SHOT.detection_time_s(power)
+    assert power * np.sqrt(thermal) / 1e-10 == pytest.approx([6.0, 6.0])
+    assert np.sqrt(power * shot / 2e-19) == pytest.approx([6.0, 6.0])
+    both = replace(THERMAL, shot_j=2e-19).detection_time_s(power)
+    assert both == pytest.approx(thermal + shot, rel=1e-12)
+    assert replace(THERMAL, shortest_s=40.0).detection_time_s(power) == pytest.approx([40.0, 40.0])
+
+
+def test_the_wide_beacon_grows_with_the_fourth_power_under_thermal_noise_and_the_second_under_shot_noise():
+    sigma = np.array([100.0, 200.0, 400.0]) * URAD
+    thermal = wide_against_scan(sigma, 0.99, BEAMS, THERMAL)
+    shot = wide_against_scan(sigma, 0.99, BEAMS, SHOT)
+    assert thermal.wide_time_s[1:] / thermal.wide_time_s[:-1] == pytest.approx([16.0, 16.0], rel=1e-9)
+    assert shot.wide_time_s[1:] / shot.wide_time_s[:-1] == pytest.approx([4.0, 4.0], rel=1e-9)
+    for trade in (thermal, shot):
+        assert trade.scan_time_s[1:] / trade.scan_time_s[:-1] == pytest.approx([4.0, 4.0], rel=1e-9)
+        assert np.all(trade.scan_mean_time_s < trade.scan_time_s / 3)
+        assert trade.scan_probability == pytest.approx(trade.wide_probability, abs=2e-3)
+        assert trade.radius_rad == pytest.approx(sigma * math.sqrt(-2 * math.log(0.01)), rel=1e-12)
+        assert trade.wide_full_angle_rad == pytest.approx(2 * math.sqrt(2) * trade.radius_rad, rel=1e-12)
+    assert np.all(np.diff(thermal.wide_time_s / thermal.scan_time_s) > 0)  # the wider, the more the scan pays
+
+
+def test_the_scan_is_as_fast_as_its_worst_covered_target_allows():
+    trade = wide_against_scan(300 * URAD, 0.99, BEAMS, THERMAL)
+    edge = math.pi / 4 * 0.15**2 * 2 * 4.0 / (math.pi * (25e-6 * 44e6) ** 2) * math.exp(-2 * (20 / 25) ** 2)
+    detection = (6.0 * 1e-10 / edge) ** 2
+    assert trade.speed_rad_s == pytest.approx(2 * math.sqrt(20**2 - 15**2) * URAD / detection, rel=1e-12)
+    slow = wide_against_scan(300 * URAD, 0.99, BEAMS, THERMAL, fastest_rad_s=1e-3)
+    assert slow.speed_rad_s == 1e-3
+    assert slow.scan_time_s[0] == pytest.approx(math.pi * slow.radius_rad[0] ** 2 / (30 * URAD * 1e-3), rel=1e-12)
+    shaken = wide_against_scan(300 * URAD, 0.99, BEAMS, THERMAL, jitter_rms_rad=8 * URAD)
+    assert shaken.scan_probability[0] < trade.scan_probability[0] - 0.02
+
+
+def test_the_wide_beams_edge_is_brightest_at_the_root_of_two():
+    def edge_time(ratio):
+        return wide_against_scan(300 * URAD, 0.99, replace(BEAMS, wide_per_radius=ratio), THERMAL).wide_time_s[0]
+
+    assert edge_time(math.sqrt(2)) < min(edge_time(1.3), edge_time(1.55), edge_time(1.0))
+
+
+ONE = TimeDistribution(np.array([1.0]), np.array([0.5]))
+STAGE = Stage("see", 1.0, 0.5)
+REFUSALS = [
+    (lambda: PointingError(0.0), r"standard deviation of the pointing error is 0 rad: it must be above 0 rad"),
+    (lambda: PointingError(1e-6, 0.0), r"the standard deviation across is 0 rad"),
+    (lambda: PointingError(1e-6, bias_rad=math.nan), r"bias of the pointing error is not finite"),
+    (lambda: coverage_probability(0.0, PointingError(1e-6)), r"the coverage radius is 0 rad: it must lie above 0 rad"),
+    (lambda: coverage_probability(math.pi / 2, PointingError(1e-6)), r"coverage radius is 1\.571 rad: .*below pi/2"),
+    (lambda: coverage_radius(0.0, PointingError(1e-6)), r"probability is 0: it must lie above 0 and below 1"),
+    (lambda: coverage_radius(1.0, PointingError(1e-6)), r"probability is 1: it must lie above 0 and below 1"),
+    (lambda: ONE.quantile(0.51), r"no time has the probability 0\.51: .*at most 0\.5"),
+    (lambda: ONE.quantile(0.0), r"no time has the probability 0: it must lie above 0"),
+    (lambda: ONE.before(0.5).mean_s, r"no time of success: its probability is 0"),
+    (lambda: frame_detection_probability(-1.0, 3.0), r"signal-to-noise ratio is -1: it must be 0 or more"),
+    (lambda: frame_detection_probability(1.0, math.inf), r"the threshold is inf times the noise: it must be finite"),
+    (lambda: frames_detection_probability(0.0, 3), r"detection in a frame is 0: it must lie above 0"),
+    (lambda: frames_detection_probability(0.5, 0), r"the number of frames is 0: it must be 1 or more"),
+    (lambda: Stage("see", -1.0), r'the duration of the stage "see" is -1 s: it must be 0 s or more'),
+    (lambda: Stage("see", 1.0, 0.0), r'success of the stage "see" is 0: it must lie above 0 and be 1 or less'),
+    (lambda: Stage("see", 1.0, 1.1), r'success of the stage "see" is 1\.1'),
+    (lambda: Stage("see", 2.0, 0.5, 1.5), r'"see" lasts 2 s and its time-out is 1\.5 s: .* must not be shorter'),
+    (lambda: Stage("see", 2.0, 0.5, math.inf), r'the time-out of the stage "see" is inf s'),
+    (lambda: replace(TIMING, range_m=0.0), r"the range is 0 m: it must be above 0 m"),
+    (lambda: replace(TIMING, frames=0), r"the number of frames is 0"),
+    (lambda: replace(TIMING, frame_time_s=0.0), r"the time of a frame is 0 s"),
+    (lambda: replace(TIMING, geo_response_s=-1.0), r"geo_response_s is -1 s: it must be 0 s or more"),
+    (lambda: replace(CHANCES, return_coverage=1.2), r"return_coverage is 1\.2: it must lie above 0 and be 1 or less"),
+    (lambda: solve([STAGE], 0), r"the number of attempts is 0: it must be 1 or more"),
+    (lambda: solve([], 1), r"the sequence has no stage"),
+    (lambda: solve([STAGE, STAGE], 1), r"two stages have the same name among see, see"),
+    (
+        lambda: solve([replace(STAGE, on_failure="lock"), Stage("lock", 1.0)], 1),
+        r'"see" goes back to "lock" on failure: it must be itself or an earlier stage, one of see',
+    ),
+    (lambda: simulate([STAGE], 1, 0, 1), r"the number of runs is 0"),
+    (lambda: simulate([STAGE], 0, 1, 1), r"the number of attempts is 0"),
+    (lambda: replace(BEAMS, power_w=0.0), r"the transmitted power is 0 W"),
+    (lambda: replace(BEAMS, overlap=0.0), r"the overlap is 0: it must lie above 0 and below 1"),
+    (lambda: replace(BEAMS, beam_radius_rad=0.0), r"the beam's radius is 0 rad"),
+    (lambda: replace(BEAMS, narrow_half_angle_rad=2.0), r"narrow beam's half angle is 2 rad: .*below pi/2"),
+    (lambda: replace(THERMAL, needed_snr=0.0), r"needed signal-to-noise ratio is 0"),
+    (lambda: replace(THERMAL, thermal_w_root_s=0.0), r"the receiver has no noise"),
+    (lambda: replace(THERMAL, shot_j=-1e-19), r"the energy of the shot noise is -1e-07 pJ"),
+    (lambda: wide_against_scan(3e-4, 0.99, BEAMS, THERMAL, 0.0), r"the fastest scan is 0 rad/s"),
+    (lambda: wide_against_scan(3e-4, 1.0, BEAMS, THERMAL), r"coverage probability is 1"),
+]
+
+
+@pytest.mark.parametrize(("call", "message"), REFUSALS)
+def test_what_no_acquisition_has_is_refused_with_the_limit(call, message):
+    with pytest.raises(ValueError, match=message):
+        call()

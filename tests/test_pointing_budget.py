@@ -1,0 +1,429 @@
+"""The rules that sum pointing errors: the standard's worked example, draws, closed forms, and the refusals."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.stats import ncx2
+
+from microrad import pointing
+from microrad.pointing import ErrorTerm, Jitter, StatedError, error_term, radial_cdf
+
+URAD = 1e-6
+ARCSEC = math.radians(1.0) / 3600.0
+THREE_SIGMA = 0.9973002039367398
+KINDS, STATISTICS = ("bias", "random", "drift", "transient"), ("1-sigma", "2-sigma", "3-sigma", "bound")
+COUNT = 200_000
+
+
+def term(mean=(0.0, 0.0), sigma=(0.0, 0.0), kind="random", stated=1.0, **more):
+    return ErrorTerm("term", kind, stated, mean, sigma, **more)
+
+
+def stated(kind, statistic="3-sigma", axes="per-axis", error=60.0 * URAD, name="line"):
+    return StatedError(name, error, kind, statistic, axes)
+
+
+def by_rule(terms, confidence):
+    return {each.rule: each for each in pointing.summations(terms, confidence)}
+
+
+# ---- numbers from outside
+# ECSS-E-ST-60-10C, Annex C: standard deviations about x, y, z (arcsec), and the totals as printed
+ANNEX_C = {
+    "star tracker noise": (10.0, 5.0, 5.0),
+    "attitude-dependent bias": (6.67, 3.33, 3.33),
+    "controller": (3.16, 3.16, 3.16),
+    "thermoelastic": (1.63, 1.63, 1.63),
+    "misalignment": (2.89, 2.89, 2.89),
+    "targeting": (3.54, 0.71, 3.54),
+    "flexible modes": (2.12, 3.54, 2.12),
+}
+RELATIVE = ("star tracker noise", "controller", "flexible modes")
+
+
+@pytest.mark.parametrize(
+    ("names", "printed", "printed_twice"),
+    [
+        (tuple(ANNEX_C), (13.51, 8.37, 8.61), (27.01, 16.75, 17.21)),
+        (RELATIVE, (10.70, 6.89, 6.28), (21.40, 13.78, 12.57)),
+    ],
+)
+def test_the_standards_worked_example_comes_out(names, printed, printed_twice):
+    last_digit = 0.0101
+    for axes in ((0, 1), (1, 2)):
+        terms = [term(sigma=tuple(ANNEX_C[name][axis] * ARCSEC for axis in axes)) for name in names]
+        total = pointing.mean_and_sigma(terms)
+        # the example multiplies by 2 for "95 %"
+        limits = pointing.axis_totals_rad(terms, 0.954499736103642)
+        for index, axis in enumerate(axes):
+            assert total.rms_rad[index] / ARCSEC == pytest.approx(printed[axis], abs=last_digit)
+            assert limits[index] / ARCSEC == pytest.approx(printed_twice[axis], abs=last_digit)
+
+
+@pytest.mark.parametrize(("count", "percent"), [(1, 68.27), (2, 95.45), (3, 99.73)])
+def test_the_multiple_of_sigma_is_that_of_a_gaussian(count, percent):
+    assert pointing.sigma_multiple(percent / 100) == pytest.approx(count, abs=2e-3)
+
+
+# ECSS-E-ST-60-10C, A.2.4, in standard deviations of one axis
+@pytest.mark.parametrize(("confidence", "printed"), [(0.95, 2.45), (THREE_SIGMA, 3.44)])
+def test_two_like_axes_have_the_rayleigh_totals_that_the_standard_prints(confidence, printed):
+    terms = [term(sigma=(1.0, 1.0))]
+    assert pointing.rayleigh_total_rad(terms, confidence) == pytest.approx(printed, abs=5e-3)
+    assert pointing.exact_total_rad(terms, confidence) == pytest.approx(printed, abs=5e-3)
+
+
+@pytest.mark.parametrize(("confidence", "printed"), [(0.954499736103642, 2.83), (THREE_SIGMA, 4.24)])
+def test_two_like_axes_have_the_general_totals_that_the_standard_prints(confidence, printed):
+    assert pointing.radial_total_rad([term(sigma=(1.0, 1.0))], confidence) == pytest.approx(printed, abs=5e-3)
+
+
+def test_the_rayleigh_total_is_the_radius_of_a_spiral_scan():
+    terms = [term(sigma=(300 * URAD, 300 * URAD))]
+    assert pointing.rayleigh_total_rad(terms, 0.995) == pytest.approx(976.6 * URAD, abs=0.05 * URAD)
+
+
+def test_a_radial_rms_is_shared_by_two_axes():
+    # OLYMPUS base motion, 160 / (1 + f^2) urad^2/Hz radial: sqrt(80 pi) urad rms, 11.21 about each axis
+    olympus = error_term(stated("random", "1-sigma", "radial", math.sqrt(80 * math.pi) * URAD))
+    assert olympus.sigma_rad == pytest.approx((11.21 * URAD, 11.21 * URAD), rel=1e-3)
+
+
+def test_point_ahead_from_a_500_km_orbit_is_71_microradians():
+    assert pointing.point_ahead_rad(10_650.0) == pytest.approx(71e-6, rel=2e-3)
+    assert pointing.point_ahead_rad(0.0) == 0.0
+
+
+# ---- classes against draws
+def sigmas_of(statistic):
+    return {"1-sigma": 1, "2-sigma": 2, "3-sigma": 3}.get(statistic)
+
+
+def spread(draw, statistic, axes, error):
+    """A value for each satellite (or time), about x: Gaussian, or evenly within the bound."""
+    if statistic != "bound":
+        sigma = error / sigmas_of(statistic)
+        return sigma * draw.standard_normal(COUNT) / (math.sqrt(2) if axes == "radial" else 1.0)
+    if axes == "radial":
+        return error * np.sqrt(draw.random(COUNT)) * np.cos(2 * math.pi * draw.random(COUNT))
+    return error * (2 * draw.random(COUNT) - 1)
+
+
+def drawn(draw, line, interpretation):
+    """The error about x at random times, of the satellites that the interpretation takes."""
+    if line.kind == "random" or interpretation == "mixed":
+        values = spread(draw, line.statistic, line.axes, line.error_rad)
+    else:
+        out = {"1-sigma": 3.0, "2-sigma": 1.5}.get(line.statistic, 1.0) * line.error_rad
+        values = np.full(COUNT, out * (math.cos(math.pi / 4) if line.axes == "radial" else 1.0))
+    return values * draw.random(COUNT) if line.kind == "drift" else values
+
+
+def assert_mean_and_sigma(values, mean, sigma):
+    if np.ptp(values) == 0.0:
+        assert (mean, sigma) == (pytest.approx(values[0]), 0.0)
+        return
+    assert abs(values.mean() - mean) < 2.576 * values.std() / math.sqrt(COUNT)
+    squares = (values - values.mean()) ** 2
+    assert abs(values.var() - sigma**2) < 2.576 * squares.std() / math.sqrt(COUNT)
+
+
+@pytest.mark.parametrize("interpretation", ["temporal", "mixed"])
+@pytest.mark.parametrize("axes", ["per-axis", "radial"])
+@pytest.mark.parametrize("statistic", ["2-sigma", "3-sigma", "bound"])
+@pytest.mark.parametrize("kind", KINDS)
+def test_mean_and_deviation_of_a_class_are_those_of_draws(kind, statistic, axes, interpretation):
+    line = stated(kind, statistic, axes)
+    values = drawn(np.random.Generator(np.random.Philox(key=3)), line, interpretation)
+    found = error_term(line, interpretation)
+    assert_mean_and_sigma(values, found.mean_rad[0], found.sigma_rad[0])
+    assert (found.mean_rad[1], found.sigma_rad[1]) == (found.mean_rad[0], found.sigma_rad[0])
+
+
+@pytest.mark.parametrize("interpretation", ["temporal", "mixed"])
+def test_a_mixture_has_the_mean_and_deviation_of_draws(interpretation):
+    lines = (
+        stated("random", "3-sigma", error=90 * URAD),
+        stated("random", "bound", "radial", error=40 * URAD),
+        stated("drift", "2-sigma", error=50 * URAD),
+        stated("drift", "bound", "radial", error=70 * URAD),
+        stated("bias", "1-sigma", error=20 * URAD),
+        stated("transient", "bound", error=30 * URAD),
+    )
+    draw = np.random.Generator(np.random.Philox(key=8))
+    values = sum(drawn(draw, line, interpretation) for line in lines)
+    total = pointing.mean_and_sigma([error_term(line, interpretation) for line in lines])
+    assert_mean_and_sigma(values, total.bias_rad[0], total.rms_rad[0])
+
+
+def test_an_error_about_one_axis_leaves_the_other_alone():
+    for interpretation in ("temporal", "mixed"):
+        one, each = (error_term(stated("drift", "bound", axes), interpretation) for axes in ("x", "per-axis"))
+        assert (one.mean_rad[0], one.sigma_rad[0]) == (each.mean_rad[0], each.sigma_rad[0])
+        assert (one.mean_rad[1], one.sigma_rad[1]) == (0.0, 0.0)
+
+
+@pytest.mark.parametrize("last", [0.1, 0.5, 1.0, 4.0])
+def test_a_transient_that_comes_and_goes_is_covered_more_often_than_budgeted(last):
+    line, radius = error_term(stated("transient", "bound", error=40 * URAD)), 90 * URAD
+    others = Jitter((15 * URAD, 5 * URAD), (20 * URAD, 30 * URAD))
+
+    def covered(part):
+        mean = tuple(bias + part * own for bias, own in zip(others.bias_rad, line.mean_rad, strict=True))
+        return float(radial_cdf(Jitter(mean, others.rms_rad), radius))
+
+    budgeted = covered(1.0)
+    assert line.sigma_rad == (0.0, 0.0)
+    decaying = np.mean([covered(math.exp(-time)) for time in np.linspace(0.0, last, 50)])
+    switched = min(last, 1.0) * covered(1.0) + (1.0 - min(last, 1.0)) * covered(0.0)
+    assert decaying > budgeted
+    assert switched >= budgeted
+
+
+def test_the_words_of_a_line_say_what_was_calculated():
+    temporal = pointing.basis(stated("bias", "2-sigma", "radial"))
+    assert temporal == (
+        "bias, 2-sigma, radial: mean 1.5 error / sqrt(2) about each axis, constant; worst-case satellite (temporal)"
+    )
+    assert "error / sqrt(3), evenly up to the bound" in pointing.basis(stated("random", "bound"))
+    assert "error / 2, evenly over a disc" in pointing.basis(stated("random", "bound", "radial"))
+    assert "error / (2 sqrt(2))" in pointing.basis(stated("random", "2-sigma", "radial"))
+    mixed = pointing.basis(stated("drift", "2-sigma"), "mixed")
+    assert mixed.endswith("error / 2 / sqrt(3), ramp from zero; random satellite at a random time (mixed)")
+    assert "counted as always present" in pointing.basis(stated("transient", axes="x"))
+
+
+# ---- rules
+def test_correlated_terms_add_linearly_and_groups_in_squares():
+    terms = [
+        term(sigma=(3.0, 1.0), group="thermal"),
+        term(sigma=(1.0, 1.0), group="thermal"),
+        term(sigma=(3.0, 0.0)),
+        term(mean=(2.0, -5.0)),
+        term(mean=(-7.0, 1.0)),
+    ]
+    total = pointing.mean_and_sigma(terms)
+    assert total.bias_rad == (-5.0, -4.0)
+    assert total.rms_rad == (5.0, 2.0)
+    assert pointing.axis_totals_rad(terms, THREE_SIGMA) == pytest.approx((20.0, 10.0))
+    assert pointing.radial_total_rad(terms, THREE_SIGMA) == pytest.approx(math.hypot(5, 4) + 3 * math.hypot(5, 2))
+    assert pointing.rayleigh_total_rad(terms, 0.9) == pytest.approx(5.0 * math.sqrt(2 * math.log(10)))
+
+
+def test_the_exact_total_is_that_of_the_noncentral_chi_square():
+    terms = [term(mean=(3.0, 0.0)), term(sigma=(2.0, 2.0)), term(mean=(0.0, -4.0))]
+    for confidence in (0.5, 0.95, 0.997, 1 - 1e-9):
+        expected = 2.0 * math.sqrt(ncx2.isf(1 - confidence, 2, 25.0 / 4.0))
+        assert pointing.exact_total_rad(terms, confidence) == pytest.approx(expected, rel=1e-8)
+
+
+def test_old_practice_adds_classes_linearly():
+    terms = [term(stated=3.0), term(stated=4.0), term(stated=5.0, kind="bias"), term(stated=12.0, kind="bias")]
+    assert pointing.esa_1993_rad(terms) == pytest.approx(5.0 + 13.0)
+    assert pointing.rss_rad(terms) == pytest.approx(math.sqrt(9 + 16 + 25 + 144))
+    assert by_rule(terms, 0.9)["esa-1993"].authority.endswith("ESA-NCR-502 (1993)")
+
+
+def test_the_root_sum_square_is_the_standards_total_exactly_where_it_is_authorised():
+    like = [error_term(stated("random", error=error * URAD)) for error in (30.0, 40.0)]
+    rules = by_rule(like, THREE_SIGMA)
+    assert rules["rss"].caveat == ""
+    assert rules["rss"].total_rad == pytest.approx(rules["ecss-axis"].total_rad, rel=1e-9)
+    biased = [*like, error_term(stated("bias", name="Alignment"))]
+    assert pointing.rss_caveat(biased) == "not authorised: Alignment has a mean, and means add linearly"
+    mixed = [*like, error_term(stated("random", "1-sigma"))]
+    assert "not the same number of standard deviations" in pointing.rss_caveat(mixed)
+    correlated = [term(sigma=(1.0, 1.0), group="a"), term(sigma=(1.0, 1.0), group="a")]
+    assert "some terms are correlated" in pointing.rss_caveat(correlated)
+    assert pointing.rss_caveat([term(sigma=(1.0, 1.0), group="a"), term(sigma=(1.0, 1.0), group="b")]) == ""
+
+
+def test_the_rayleigh_rule_applies_to_small_means_and_like_axes():
+    for mean, sigmas, words in (
+        (0.0999, (1.0, 0.901), ""),
+        (0.101, (1.0, 1.0), "the mean is not 10 times below"),
+        (0.0, (1.0, 0.899), "differ by more than 10 %"),
+    ):
+        terms = [term(mean=(-mean * sigmas[1], 0.0), sigma=sigmas)]
+        caveat = pointing.rayleigh_caveat(terms)
+        assert words in caveat and bool(words) == bool(caveat)
+        if not words:
+            exact = pointing.exact_total_rad(terms, 0.997)
+            assert exact * 0.995 < pointing.rayleigh_total_rad(terms, 0.997) < exact * 1.05
+
+
+def test_the_general_rule_for_two_axes_is_too_low_at_low_confidence_and_says_so():
+    terms = [term(sigma=(1.0, 1.0))]
+    low, high = by_rule(terms, 0.78)["ecss-radial"], by_rule(terms, 0.79)["ecss-radial"]
+    assert low.total_rad < pointing.exact_total_rad(terms, 0.78)
+    assert "below the exact radial error" in low.caveat
+    assert high.total_rad > pointing.exact_total_rad(terms, 0.79)
+    assert high.caveat == ""
+
+
+def test_a_sum_that_is_mostly_of_another_shape_is_called_approximate():
+    other, random = error_term(stated("random", "bound", name="Backlash")), error_term(stated("random"))
+    wide = error_term(stated("random", error=200 * URAD))
+    for rule in ("exact", "ecss-axis", "ecss-radial"):
+        assert "Backlash is not Gaussian" in by_rule([other, random], 0.997)[rule].caveat
+        assert by_rule([other, wide], 0.997)[rule].caveat == ""
+    assert not error_term(stated("drift")).gaussian
+    assert error_term(stated("bias", "bound")).gaussian
+    assert not error_term(stated("bias", "bound"), "mixed").gaussian
+
+
+def test_a_negligible_deviation_is_left_out_and_a_small_one_is_not():
+    bias, uniform = term(mean=(1e-4, 0.0)), {"kind": "random", "stated": 1e-13, "gaussian": False}
+    small, negligible = ([bias, term(sigma=(sigma,) * 2, **uniform)] for sigma in (1.01e-13, 0.99e-13))
+    assert pointing.mean_and_sigma(small).rms_rad == (1.01e-13, 1.01e-13)
+    assert "not Gaussian" in pointing.shape_caveat(small)
+    assert pointing.mean_and_sigma(negligible).rms_rad == (0.0, 0.0)
+    assert pointing.shape_caveat(negligible) == ""
+    assert pointing.exact_total_rad(negligible, 0.997) == 1e-4
+    assert pointing.exact_total_rad(small, 0.997) == pytest.approx(1e-4, rel=1e-8)
+    assert pointing.mean_and_sigma([term(sigma=(1e-31, 2e-309))]).rms_rad == (0.0, 0.0)
+
+
+@settings(deadline=None, max_examples=40)
+@given(
+    st.lists(st.tuples(*[st.floats(0.0, 1.0)] * 4), min_size=1, max_size=4),
+    st.floats(0.8, 0.99999),
+)
+def test_at_usual_confidences_the_general_rule_is_never_below_the_exact_total(rows, confidence):
+    terms = [term(mean=row[:2], sigma=row[2:]) for row in rows]
+    exact, general = (rule(terms, confidence) for rule in (pointing.exact_total_rad, pointing.radial_total_rad))
+    assert exact <= general * (1 + 1e-9)
+    worse_axis = max(pointing.axis_totals_rad(terms, confidence))
+    assert worse_axis <= general * (1 + 1e-9)
+
+
+def test_shares_are_what_the_total_grows_by_with_each_term():
+    rows = [((0.3, -1.0), (0.5, 0.7), ""), ((-0.1, 0.2), (0.4, 0.3), "a"), ((0.0, -0.5), (0.2, 0.1), "a")]
+
+    def terms(grown=-1, by=0.0):
+        scales = [1.0 + by * (index == grown) for index in range(len(rows))]
+        return [
+            term(tuple(scale * m for m in mean), tuple(scale * s for s in sigma), group=group)
+            for scale, (mean, sigma, group) in zip(scales, rows, strict=True)
+        ]
+
+    shares = pointing.axis_shares(terms(), 0.997)
+    assert math.fsum(shares) == pytest.approx(1.0)
+    total = max(pointing.axis_totals_rad(terms(), 0.997))
+    for index, share in enumerate(shares):
+        step = 1e-6
+        up, down = (max(pointing.axis_totals_rad(terms(index, by), 0.997)) for by in (step, -step))
+        assert share == pytest.approx((up - down) / (2 * step * total), rel=1e-6)
+
+
+# ---- allocation
+LINES = (
+    stated("random", error=30 * URAD, name="Body"),
+    stated("bias", "bound", error=20 * URAD, name="Alignment"),
+    stated("drift", "bound", error=12 * URAD, name="Orbit"),
+)
+
+
+def test_what_the_root_sum_square_leaves_is_a_difference_of_squares():
+    left = {each.name: each for each in pointing.allocate(LINES, 60 * URAD, rule="rss", confidence=0.997)}
+    assert left["Body"].largest_rad == pytest.approx(math.sqrt(60**2 - 20**2 - 12**2) * URAD, rel=1e-8)
+    assert left["Orbit"].largest_rad == pytest.approx(math.sqrt(60**2 - 20**2 - 30**2) * URAD, rel=1e-8)
+    assert left["Orbit"].stated_rad == 12 * URAD
+
+
+def test_what_the_standard_leaves_about_an_axis_is_in_closed_form():
+    left = pointing.allocate(LINES, 60 * URAD, rule="ecss-axis", confidence=THREE_SIGMA)
+    body, alignment, orbit = (each.largest_rad / URAD for each in left)
+    ramp = 12 / math.sqrt(12)
+    assert body == pytest.approx(3 * math.sqrt(((60 - 20 - 6) / 3) ** 2 - ramp**2), rel=1e-8)
+    assert alignment == pytest.approx(60 - 6 - 3 * math.hypot(10, ramp), rel=1e-8)
+    # (40 - D / 2)^2 = 9 (100 + D^2 / 12)
+    a, b, c = 0.25 - 0.75, -40.0, 1600.0 - 900.0
+    assert orbit == pytest.approx((-b - math.sqrt(b * b - 4 * a * c)) / (2 * a), rel=1e-7)
+
+
+def test_where_nothing_is_left_it_says_how_much_is_missing():
+    ramp = 12 / math.sqrt(12)
+    body, alignment, orbit = pointing.allocate(LINES, 45 * URAD, rule="ecss-axis", confidence=THREE_SIGMA)
+    assert body.largest_rad > 0.0 and body.missing_rad == 0.0 and body.note == ""
+    assert alignment.largest_rad > 0.0
+    assert orbit.largest_rad == 0.0
+    assert orbit.missing_rad == pytest.approx(5 * URAD)
+    assert orbit.note == "nothing is left: the other lines alone exceed the total by 5 µrad"
+    lost = pointing.allocate(LINES, 26 * URAD, rule="ecss-axis", confidence=THREE_SIGMA)
+    missing = (26 - 26 + 3 * ramp, 6 + 3 * math.hypot(10, ramp) - 26, 50 - 26)
+    assert [each.missing_rad / URAD for each in lost] == pytest.approx(missing)
+    assert [each.largest_rad for each in lost] == [0.0, 0.0, 0.0]
+    # the others alone just meet it
+    (just, _) = pointing.allocate(LINES[:2], 20 * URAD, rule="ecss-axis", confidence=THREE_SIGMA)
+    assert (just.missing_rad, just.note) == (0.0, "")
+    assert just.largest_rad == pytest.approx(0.0, abs=1e-9 * URAD)
+
+
+@pytest.mark.parametrize("rule", list(pointing.TOTALS))
+@pytest.mark.parametrize("interpretation", ["temporal", "mixed"])
+def test_a_line_alone_gets_the_whole_total(rule, interpretation):
+    for kind in KINDS:
+        line = stated(kind, "2-sigma", "radial", error=0.0)
+        settings_ = {"rule": rule, "confidence": 0.95, "interpretation": interpretation}
+        (left,) = pointing.allocate([line], 50 * URAD, **settings_)
+        reached = pointing.TOTALS[rule]([error_term(line.with_error(left.largest_rad), interpretation)], 0.95)
+        assert reached == pytest.approx(50 * URAD, rel=1e-7)
+
+
+# ---- refusals
+@pytest.mark.parametrize("confidence", [0.0, 1.0, -0.1, 1.2, math.nan])
+def test_no_confidence_is_refused(confidence):
+    terms = [term(sigma=(1.0, 1.0))]
+    rules = (pointing.axis_totals_rad, pointing.radial_total_rad, pointing.rayleigh_total_rad, pointing.exact_total_rad)
+    for rule in (*rules, pointing.summations, pointing.axis_shares):
+        with pytest.raises(ValueError, match="is not possible; give a share above 0 and below 1"):
+            rule(terms, confidence)
+
+
+def test_a_budget_without_terms_is_refused():
+    with pytest.raises(ValueError, match="has 0 terms; give at least 1"):
+        pointing.summations([], 0.997)
+
+
+@pytest.mark.parametrize("error", [-1e-6, math.nan, math.inf])
+def test_no_half_width_is_refused(error):
+    with pytest.raises(ValueError, match=r"line: an error of .* is no half width; give at least 0 rad"):
+        stated("bias", error=error)
+
+
+def test_words_without_a_meaning_are_refused():
+    with pytest.raises(ValueError, match='no kind "jump"; give one of bias, random, drift, transient'):
+        stated("jump")
+    with pytest.raises(ValueError, match='no statistic "4-sigma"; give one of 1-sigma'):
+        stated("bias", "4-sigma")
+    with pytest.raises(ValueError, match='no axes "z"; give one of per-axis, radial, x'):
+        stated("bias", "bound", "z")
+    with pytest.raises(ValueError, match='no interpretation "ensemble"; give one of temporal, mixed'):
+        error_term(stated("bias"), "ensemble")
+
+
+def test_no_mean_and_no_deviation_are_refused():
+    with pytest.raises(ValueError, match=r"a mean of \(nan, 0.0\) rad; give two finite values"):
+        term(mean=(math.nan, 0.0))
+    with pytest.raises(ValueError, match=r"a standard deviation of .* rad; give two finite values"):
+        term(sigma=(1.0,))
+    with pytest.raises(ValueError, match="a standard deviation of -1 µrad is not possible; give at least 0 rad"):
+        term(sigma=(0.0, -1e-6))
+
+
+@pytest.mark.parametrize("velocity", [-1.0, 0.0101 * 299_792_458.0, math.nan])
+def test_no_velocity_is_refused(velocity):
+    with pytest.raises(ValueError, match="is out of range; give 0 m/s to 2998 km/s"):
+        pointing.point_ahead_rad(velocity)
+
+
+def test_totals_that_leave_nothing_to_allocate_are_refused():
+    for total in (0.0, -1e-6, math.nan, math.inf):
+        with pytest.raises(ValueError, match="leaves nothing to allocate; give an angle above 0 rad"):
+            pointing.allocate(LINES, total, rule="rss", confidence=0.997)
+    with pytest.raises(ValueError, match='no rule "rayleigh" to allocate by; give one of rss, esa-1993'):
+        pointing.allocate(LINES, 1e-4, rule="rayleigh", confidence=0.997)

@@ -1,0 +1,510 @@
+"""Bias and jitter against closed forms, other quadrature, a million draws and simulated motion; and the refusals."""
+
+import math
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+from scipy.optimize import minimize_scalar
+from scipy.special import erfc, gammainc
+from scipy.stats import ncx2, norm
+from scipy.stats import t as student
+
+from microrad.pointing import fading as pf
+from microrad.pointing import statistics as ps
+from microrad.pointing.statistics import Jitter
+
+URAD = 1e-6
+THETA = 10.0 * URAD
+EQUAL = Jitter((0.0, 0.0), (3.0 * URAD, 3.0 * URAD))
+UNEQUAL = Jitter((0.0, 0.0), (1.0 * URAD, 4.0 * URAD))
+BIASED = Jitter((-3.0 * URAD, 5.0 * URAD), (2.5 * URAD, 1.0 * URAD))
+ONE_AXIS = Jitter((2.0 * URAD, 1.0 * URAD), (0.0, 3.0 * URAD))
+STILL = Jitter((3.0 * URAD, -4.0 * URAD), (0.0, 0.0))
+KINDS = {"equal": EQUAL, "unequal": UNEQUAL, "biased": BIASED, "one axis": ONE_AXIS}
+each_kind = pytest.mark.parametrize("jitter", KINDS.values(), ids=KINDS.keys())
+one_in_a_billion = 1e-9  # relative
+db_per_square = 8.685889638065036
+
+
+def swapped(jitter):
+    return Jitter(jitter.bias_rad[::-1], jitter.rms_rad[::-1])
+
+
+def random(key):
+    return np.random.Generator(np.random.Philox(key=key))
+
+
+# ---- numbers from outside
+def test_the_mean_of_equal_axes_is_one_over_one_plus_four_squared_ratios():
+    theta = np.array([0.1, 2.0, 10.0, 300.0]) * URAD
+    wanted = 1.0 / (1.0 + 4.0 * (3.0 * URAD / theta) ** 2)
+    np.testing.assert_allclose(ps.mean_transmission(EQUAL, theta), wanted, rtol=1e-13)
+
+
+def test_the_mean_comes_out_as_checked_by_hand():
+    small = Jitter((0.0, 0.0), (0.7206 * URAD, 0.7206 * URAD))
+    assert round(float(ps.mean_transmission(small, THETA)), 5) == 0.97965
+
+
+def test_equal_axes_follow_the_power_law_of_toyoshima():
+    h = np.array([1e-6, 1e-3, 0.1, 0.5, 0.9, 0.999])
+    beta = THETA**2 / (4.0 * (3.0 * URAD) ** 2)
+    np.testing.assert_allclose(ps.outage_probability(EQUAL, THETA, -10.0 * np.log10(h)), h**beta, rtol=1e-12)
+    np.testing.assert_allclose(ps.loss_cdf(EQUAL, THETA, -10.0 * np.log10(h)), 1.0 - h**beta, rtol=1e-11)
+
+
+@pytest.mark.parametrize("p", [1e-12, 1e-3, 0.3])
+def test_the_best_divergence_for_an_outage_is_two_rms_times_a_root_and_loses_4_343_db(p):
+    best = ps.best_divergence_for_outage(EQUAL, p)
+    assert best.half_angle_rad == pytest.approx(2.0 * 3.0 * URAD * math.sqrt(math.log(1.0 / p)), rel=one_in_a_billion)
+    assert round(best.loss_db, 3) == 4.343
+    assert float(ps.outage_loss_db(EQUAL, best.half_angle_rad, p)) == pytest.approx(best.loss_db, rel=one_in_a_billion)
+    assert not best.at_limit and best.current_excess_db is None
+
+
+def test_the_best_divergence_for_a_static_error_is_root_two_times_it():
+    best = ps.best_divergence_for_static_error(7.0 * URAD)
+    assert best.half_angle_rad == pytest.approx(math.sqrt(2.0) * 7.0 * URAD, rel=1e-14)
+    assert round(best.loss_db, 3) == 4.343
+
+
+def test_a_static_error_loses_8_686_db_times_its_square():
+    assert float(ps.mean_loss_db(STILL, THETA)) == pytest.approx(8.686 * 0.25, rel=2e-5)
+    assert float(ps.outage_loss_db(STILL, THETA, 0.01)) == pytest.approx(8.686 * 0.25, rel=2e-5)
+    assert float(-10.0 * np.log10(ps.transmission(THETA / 2, THETA))) == pytest.approx(8.686 * 0.25, rel=2e-5)
+
+
+# ---- a million draws
+@each_kind
+def test_a_million_draws_agree_within_the_99_percent_interval(jitter):
+    draws = 1_000_000
+    error = jitter.bias_rad + random(7).standard_normal((draws, 2)) * jitter.rms_rad
+    radius = np.hypot(error[:, 0], error[:, 1])
+    h = np.exp(-2.0 * (radius / THETA) ** 2)
+    loss = -10.0 * np.log10(h)
+    # the interval covers the 10 figures of a case together
+    wide = norm.isf(0.005 / 10)
+
+    def near(measured, wanted, variance):
+        assert np.all(np.abs(measured - wanted) <= wide * np.sqrt(variance / draws))
+
+    mean = ps.mean_transmission(jitter, THETA)
+    near(np.mean(h), mean, ps.transmission_variance(jitter, THETA))
+    near(np.var(h), ps.transmission_variance(jitter, THETA), np.var((h - mean) ** 2))
+    points = ps.radial_quantile(jitter, [0.99, 0.9, 0.5, 0.1, 0.01])
+    p = ps.radial_cdf(jitter, points)
+    near(np.mean(radius[:, None] < points, axis=0), p, p * (1.0 - p))
+    for margin in (1.0, 3.0, 6.0):
+        p = ps.outage_probability(jitter, THETA, margin)
+        near(np.mean(loss > margin), p, p * (1.0 - p))
+
+
+# ---- other quadrature
+@pytest.mark.parametrize("bias_in_rms", [0.0, 0.3, 3.0, 12.0])
+def test_equal_axes_with_bias_follow_the_noncentral_chi_squared_into_the_tails(bias_in_rms):
+    rms = 2.0 * URAD
+    jitter = Jitter((0.6 * bias_in_rms * rms, -0.8 * bias_in_rms * rms), (rms, rms))
+    radius = (bias_in_rms + np.array([0.05, 0.5, 1.0, 2.0, 4.0, 7.0])) * rms
+    chi = ncx2(2, bias_in_rms**2)
+    wanted = chi.sf((radius / rms) ** 2)
+    survival = ps.radial_survival(jitter, radius)
+    np.testing.assert_allclose(survival, wanted, atol=1e-10)
+    sure = wanted > 1e-9  # scipy's own digits end below
+    np.testing.assert_allclose(survival[sure], wanted[sure], rtol=1e-6)
+    np.testing.assert_allclose(ps.radial_cdf(jitter, radius), chi.cdf((radius / rms) ** 2), atol=1e-10)
+
+
+def survival_by_quad(jitter, radius):
+    """P(r > R) in polar angle: along each ray the joint Gaussian is integrated from R on, in closed form."""
+    (b_x, b_y), (s_x, s_y) = jitter.bias_rad, jitter.rms_rad
+
+    def ray(angle):
+        c, s = math.cos(angle), math.sin(angle)
+        a = (c / s_x) ** 2 + (s / s_y) ** 2
+        middle = (c * b_x / s_x**2 + s * b_y / s_y**2) / a
+        height = math.exp(-0.5 * ((b_x / s_x) ** 2 + (b_y / s_y) ** 2 - a * middle**2))
+        x = radius - middle
+        gauss = math.exp(-0.5 * a * x**2) / a
+        tail = middle * math.sqrt(math.pi / (2.0 * a)) * erfc(x * math.sqrt(a / 2.0))
+        return height * (gauss + tail) / (2.0 * math.pi * s_x * s_y)
+
+    corners = np.linspace(0.0, 2.0 * math.pi, 17)
+    return sum(quad(ray, *pair, epsabs=0.0, epsrel=1e-12)[0] for pair in pairwise(corners))
+
+
+@pytest.mark.parametrize("order", [lambda jitter: jitter, swapped], ids=["as is", "swapped"])
+@pytest.mark.parametrize("jitter", [UNEQUAL, BIASED, Jitter((4.0 * URAD, 1.0 * URAD), (0.2 * URAD, 2.0 * URAD))])
+def test_unequal_axes_agree_with_quadrature_in_polar_angle_down_to_a_survival_of_1e_12(jitter, order):
+    case = order(jitter)
+    radius = ps.radial_quantile(case, [0.9, 0.5, 1e-2, 1e-6, 1e-12])
+    wanted = [survival_by_quad(case, r) for r in radius]
+    np.testing.assert_allclose(ps.radial_survival(case, radius), wanted, rtol=1e-9)
+    np.testing.assert_allclose(wanted, [0.9, 0.5, 1e-2, 1e-6, 1e-12], rtol=1e-9)
+
+
+@pytest.mark.parametrize("jitter", [*KINDS.values(), Jitter((1e-3, 2e-3), (1e-6, 3e-8)), STILL])
+def test_survival_and_distribution_add_up_to_one(jitter):
+    radius = np.abs(jitter.static_rad + np.linspace(-6.1, 6.1, 90) * (max(jitter.rms_rad) + URAD / 7))
+    survival, below = ps.radial_survival(jitter, radius), ps.radial_cdf(jitter, radius)
+    assert min(survival.min(), below.min()) >= 0.0 and max(survival.max(), below.max()) <= 1.0
+    total = survival + below
+    np.testing.assert_allclose(total, 1.0, atol=1e-12)
+
+
+def test_one_axis_without_bias_is_the_error_function():
+    jitter = Jitter((0.0, 0.0), (0.0, 2.0 * URAD))
+    radius = np.array([0.0, 0.1, 2.0, 15.0]) * URAD
+    wanted = erfc(radius / (2.0 * URAD * math.sqrt(2.0)))
+    np.testing.assert_allclose(ps.radial_survival(jitter, radius), wanted, rtol=1e-13)
+    nearly = Jitter((0.0, 0.0), (1e-12, 2.0 * URAD))
+    np.testing.assert_allclose(ps.radial_survival(nearly, radius), wanted, rtol=1e-9)
+
+
+def test_a_static_error_is_exceeded_below_itself_only():
+    assert ps.radial_survival(STILL, [4.99 * URAD, 5.01 * URAD]).tolist() == [1.0, 0.0]
+    assert ps.radial_cdf(STILL, [4.99 * URAD, 5.01 * URAD]).tolist() == [0.0, 1.0]
+    assert ps.radial_quantile(STILL, [0.1, 0.9]) == pytest.approx([5.0 * URAD] * 2)
+
+
+def test_the_quantile_stands_far_out_on_a_narrow_axis_and_at_zero_without_error():
+    # along the bias the error is 1000 times smaller than across it, where it hardly changes the radius
+    narrow = Jitter((1000 * URAD, 0.0), (0.001 * URAD, 1.0 * URAD))
+    radius = ps.radial_quantile(narrow, [1e-20, 0.5])
+    np.testing.assert_allclose(ps.radial_survival(narrow, radius), [1e-20, 0.5], rtol=1e-7)
+    assert float(ps.radial_quantile(Jitter((0.0, 0.0), (0.0, 0.0)), 0.5)) == 0.0
+
+
+@each_kind
+def test_the_quantile_turns_the_survival_round_and_keeps_shapes(jitter):
+    p = np.array([[1e-20, 1e-12, 1e-3], [0.5, 0.99, 1.0 - 1e-9]])
+    radius = ps.radial_quantile(jitter, p)
+    assert radius.shape == p.shape
+    np.testing.assert_allclose(ps.radial_survival(jitter, radius), p, rtol=one_in_a_billion)
+    loss = ps.outage_loss_db(jitter, 2 * THETA, p[0])
+    np.testing.assert_allclose(ps.outage_probability(jitter, 2 * THETA, loss), p[0], rtol=one_in_a_billion)
+    assert ps.outage_probability(jitter, np.full((4, 1), THETA), [0.0, 1.0, 3.0]).shape == (4, 3)
+
+
+@pytest.mark.parametrize("ratio", [1e-5, 0.1, 1.0, 30.0])
+def test_mean_and_variance_agree_with_quadrature_per_axis_and_small_jitter_keeps_its_digits(ratio):
+    jitter = Jitter((0.4 * ratio * URAD, 0.0), (0.5 * ratio * URAD, ratio * URAD))
+    theta = 2.0 * URAD
+
+    def moment(power):
+        product = 1.0
+        for bias, rms in zip(jitter.bias_rad, jitter.rms_rad, strict=True):
+            x = lambda n, b=bias, s=rms: math.exp(-2.0 * power * ((b + n * s) / theta) ** 2)  # noqa: E731
+            edges = [-9.0, -0.9, -0.05, 0.05, 9.0]
+            product *= sum(
+                quad(lambda n, x=x: norm.pdf(n) * x(n), *pair, epsabs=0.0, epsrel=1e-10, limit=200)[0]
+                for pair in pairwise(edges)
+            )
+        return product
+
+    assert float(ps.mean_transmission(jitter, theta)) == pytest.approx(moment(1), rel=one_in_a_billion)
+    if ratio >= 0.1:
+        wanted = moment(2) - moment(1) ** 2
+        assert float(ps.transmission_variance(jitter, theta)) == pytest.approx(wanted, rel=1e-7)
+    else:  # h is 1 - 2 r^2 / theta^2 to first order: variance 4 / theta^4 sum of (2 s^4 + 4 b^2 s^2)
+        axes = zip(jitter.bias_rad, jitter.rms_rad, strict=True)
+        first = 4.0 / theta**4 * sum(2.0 * s**4 + 4.0 * b**2 * s**2 for b, s in axes)
+        assert float(ps.transmission_variance(jitter, theta)) == pytest.approx(first, rel=1e-8)
+
+
+# ---- best divergence
+def mean_gain_db(jitter, theta):
+    return 10.0 * np.log10(8.0 / theta**2) - ps.mean_loss_db(jitter, theta)
+
+
+def test_equal_axes_have_a_best_mean_only_with_a_bias_above_root_two_rms():
+    rms = 1.0 * URAD
+    best = ps.best_divergence_for_mean(Jitter((3.0 * rms, 0.0), (rms, rms)))
+    assert best.half_angle_rad == pytest.approx(math.sqrt(2.0 * 9.0 - 4.0) * rms, rel=1e-9)
+    assert ps.best_divergence_for_mean(Jitter((1.4143 * rms, 0.0), (rms, rms))).half_angle_rad < 0.05 * rms
+    with pytest.raises(ValueError, match="give the smallest half angle"):
+        ps.best_divergence_for_mean(Jitter((1.4142 * rms, 0.0), (rms, rms)))
+
+
+@pytest.mark.parametrize(
+    "jitter",
+    [
+        Jitter((6 * URAD, 4 * URAD), (1 * URAD, 0.0)),
+        Jitter((9 * URAD, 0.0), (2 * URAD, 0.1 * URAD)),
+        Jitter((20 * URAD, 0.3 * URAD), (8 * URAD, 0.0)),  # maxima at 0.6 and 17 urad, the narrow one higher
+        Jitter((9 * URAD, 0.0), (6 * URAD, 0.0)),
+        UNEQUAL,
+        STILL,
+    ],
+)
+@pytest.mark.parametrize("limit", [0.05 * URAD, 3 * URAD, 10 * URAD])
+def test_the_best_mean_is_the_best_of_a_fine_sweep(jitter, limit):
+    best = ps.best_divergence_for_mean(jitter, smallest_half_angle_rad=limit, current_half_angle_rad=50 * URAD)
+    sweep = limit * np.geomspace(1.0, 1e4, 20_001)
+    gain = mean_gain_db(jitter, sweep)
+    peak = int(np.argmax(gain))
+    low, high = np.log(sweep[max(peak - 1, 0)]), np.log(sweep[peak + 1])
+    found = minimize_scalar(lambda x: -float(mean_gain_db(jitter, np.exp(x))), bounds=(low, high), method="bounded")
+    assert best.gain_db == pytest.approx(max(gain[peak], -found.fun), abs=1e-9)
+    assert best.at_limit == (peak == 0)
+    assert best.half_angle_rad == (limit if peak == 0 else pytest.approx(math.exp(found.x), rel=1e-4))
+    assert best.loss_db == pytest.approx(float(ps.mean_loss_db(jitter, best.half_angle_rad)))
+    assert best.current_excess_db == pytest.approx(best.gain_db - float(mean_gain_db(jitter, 50 * URAD)), abs=1e-12)
+
+
+@pytest.mark.parametrize("bias", [(3 * URAD, 4 * URAD), (5 * URAD, 0.0), (0.0, -5 * URAD)])
+def test_without_jitter_the_best_mean_is_the_best_for_the_static_error(bias):
+    best = ps.best_divergence_for_mean(Jitter(bias, (0.0, 0.0)))
+    assert best.half_angle_rad == pytest.approx(math.sqrt(50.0) * URAD, rel=1e-9)
+    assert best.loss_db == pytest.approx(db_per_square / 2)
+
+
+def test_the_best_divergence_for_an_outage_of_biased_axes_is_the_best_of_a_sweep():
+    best = ps.best_divergence_for_outage(BIASED, 1e-3, current_half_angle_rad=THETA)
+    sweep = np.geomspace(1.0, 100.0, 2001) * URAD
+    gain = 10.0 * np.log10(8.0 / sweep**2) - ps.outage_loss_db(BIASED, sweep, 1e-3)
+    assert best.half_angle_rad == pytest.approx(sweep[np.argmax(gain)], rel=2e-3)
+    assert np.max(gain) <= best.gain_db < np.max(gain) + 1e-3
+    excess = best.gain_db - (10.0 * math.log10(8.0 / THETA**2) - float(ps.outage_loss_db(BIASED, THETA, 1e-3)))
+    assert best.current_excess_db == pytest.approx(excess, abs=1e-9)
+    assert excess > 0.0
+
+
+def test_a_smallest_half_angle_binds_only_from_above_the_best():
+    wide = ps.best_divergence_for_static_error(5 * URAD, smallest_half_angle_rad=7.1 * URAD)
+    assert (wide.at_limit, wide.half_angle_rad) == (True, 7.1 * URAD)
+    assert wide.loss_db == pytest.approx(db_per_square * (5 / 7.1) ** 2)
+    free = ps.best_divergence_for_static_error(5 * URAD, smallest_half_angle_rad=7.0 * URAD)
+    assert (free.at_limit, free.half_angle_rad) == (False, pytest.approx(math.sqrt(50.0) * URAD))
+    at_it = ps.best_divergence_for_mean(EQUAL, smallest_half_angle_rad=7 * URAD, current_half_angle_rad=7 * URAD)
+    assert (at_it.at_limit, at_it.current_excess_db) == (True, 0.0)
+
+
+# ---- what the fluctuation costs
+def exponential(target):
+    a = math.log(0.5 / target)
+    return lambda power: 0.5 * np.exp(-a * power)
+
+
+@pytest.mark.parametrize("rms", [0.3 * URAD, 1.0 * URAD, 2.0 * URAD])
+def test_the_uncoded_penalty_meets_the_closed_form_of_an_exponential_error_ratio(rms):
+    target, jitter = 1e-9, Jitter((0.0, 0.0), (rms, rms))
+    extra = pf.uncoded_penalty_db(jitter, THETA, exponential(target))
+    beta, scaled = THETA**2 / (4.0 * rms**2), math.log(0.5 / target) * 10.0 ** (extra / 10.0)
+    # mean of exp(-A h) / 2 over the density beta h^(beta - 1)
+    log_mean = math.log(0.5 * beta) - beta * math.log(scaled) + math.lgamma(beta) + math.log(gammainc(beta, scaled))
+    assert log_mean == pytest.approx(math.log(target), abs=2e-4)
+    assert extra > float(ps.mean_loss_db(jitter, THETA))
+
+
+def test_the_uncoded_penalty_of_biased_axes_meets_a_sum_over_both_axes():
+    def curve(power):
+        return 0.5 * erfc(np.sqrt(10.0 * power))
+
+    extra = pf.uncoded_penalty_db(BIASED, 2 * THETA, curve)
+    n = np.linspace(-9.0, 9.0, 721)
+    x, y = (b + n * s for b, s in zip(BIASED.bias_rad, BIASED.rms_rad, strict=True))
+    weight = np.outer(norm.pdf(n), norm.pdf(n)) * (n[1] - n[0]) ** 2
+    h = np.exp(-2.0 * (x[:, None] ** 2 + y[None, :] ** 2) / (2 * THETA) ** 2)
+    assert np.sum(weight * curve(10.0 ** (extra / 10.0) * h)) == pytest.approx(float(curve(1.0)), rel=1e-4)
+    assert pf.mean_error_ratio(BIASED, 2 * THETA, extra, curve) == pytest.approx(float(curve(1.0)), rel=1e-8)
+    one_axis = pf.uncoded_penalty_db(ONE_AXIS, 2 * THETA, curve)
+    h = np.exp(-2.0 * ((2.0 * URAD) ** 2 + (1.0 * URAD + n * 3.0 * URAD) ** 2) / (2 * THETA) ** 2)
+    mean = np.sum(norm.pdf(n) * (n[1] - n[0]) * curve(10.0 ** (one_axis / 10.0) * h))
+    assert mean == pytest.approx(float(curve(1.0)), rel=1e-4)
+
+
+def test_without_jitter_every_penalty_is_the_static_loss():
+    static = db_per_square * 0.25
+    assert pf.uncoded_penalty_db(STILL, THETA, exponential(1e-9)) == pytest.approx(static, abs=1e-8)
+    assert float(pf.interleaved_penalty_db(STILL, THETA)) == pytest.approx(static)
+    assert float(pf.not_interleaved_penalty_db(STILL, THETA, 1e-3)) == pytest.approx(static)
+    assert pf.uncoded_penalty_db(Jitter((0.0, 0.0), (0.0, 0.0)), THETA, exponential(1e-9)) == 0.0
+
+
+@pytest.mark.parametrize("rms", [0.1 * URAD, 0.2 * URAD, 0.3 * URAD, 0.5 * URAD])
+def test_a_curve_that_is_flat_where_the_power_moves_costs_nothing(rms):
+    jitter = Jitter((0.0, 0.0), (rms, 0.5 * rms))
+    assert pf.uncoded_penalty_db(jitter, THETA, lambda power: np.where(power > 0.1, 1e-3, 0.5)) == pytest.approx(0.0)
+
+
+def test_interleaving_costs_the_mean_loss_and_its_lack_the_outage_loss():
+    np.testing.assert_allclose(pf.interleaved_penalty_db(EQUAL, THETA), 10.0 * math.log10(1.0 + 4.0 * 0.09))
+    beta = 1.0 / (4.0 * 0.09)
+    np.testing.assert_allclose(pf.not_interleaved_penalty_db(EQUAL, THETA, [1e-2, 1e-4]), [20 / beta, 40 / beta])
+
+
+# ---- fades
+def test_the_velocity_of_a_known_spectrum_is_its_second_moment():
+    freq = np.linspace(0.0, 60.0, 6001)
+    psd = np.exp(-((freq / 10.0) ** 2))
+    motion = pf.motion_of_spectrum(freq, np.stack([psd, 4.0 * psd]) * 1e-12)
+    area = 0.5 * math.sqrt(math.pi) * 10.0
+    assert motion.rms_rad == pytest.approx([math.sqrt(area) * URAD, 2.0 * math.sqrt(area) * URAD], rel=1e-6)
+    speed = 2.0 * math.pi * math.sqrt(area * 10.0**2 / 2.0) * URAD
+    assert motion.velocity_rms_rad_s == pytest.approx([speed, 2.0 * speed], rel=1e-6)
+    assert motion.highest_hz == 60.0
+    assert max(motion.top_octave_share) < 0.01 and motion.warning == ""
+
+
+def test_the_top_octave_is_shared_out_as_the_integral_says_on_any_grid():
+    # (2 pi f)^2 S is flat from 1 Hz to 9 Hz: half the highest frequency, 4.5 Hz, is no point of the grid
+    freq = np.arange(1.0, 10.0)
+    motion = pf.motion_of_spectrum(freq, np.stack([freq**-2.0, 0.0 * freq]))
+    assert motion.top_octave_share == pytest.approx([4.5 / 8.0, 0.0])
+    narrow = pf.motion_of_spectrum([6.0, 9.0], [[1.0, 1.0], [1.0, 1.0]])
+    assert narrow.top_octave_share == pytest.approx([1.0, 1.0])
+
+
+@pytest.mark.parametrize(("power", "warned"), [(3.0, True), (6.0, False)])
+def test_a_spectrum_that_falls_no_faster_than_the_third_power_is_warned_of(power, warned):
+    freq = np.geomspace(0.01, 1000.0, 4001)
+    psd = 1e-12 / (1.0 + (freq / 3.0) ** power)
+    motion = pf.motion_of_spectrum(freq, np.stack([psd, 0.0 * psd]))
+    assert ("extend it" in motion.warning) == warned
+    further = np.geomspace(0.01, 8000.0, 4001)
+    longer = pf.motion_of_spectrum(further, np.stack([1e-12 / (1.0 + (further / 3.0) ** power), 0.0 * further]))
+    assert (longer.velocity_rms_rad_s[0] / motion.velocity_rms_rad_s[0] > 1.05) == warned
+
+
+def test_fades_of_equal_axes_follow_the_rayleigh_level_crossings_of_rice():
+    rms, speed = 3.0 * URAD, 200.0 * URAD
+    radius = np.array([0.0, 0.01, 1.0, 6.0, 20.0]) * URAD
+    rate = pf.level_crossing_rate_hz(EQUAL, (speed, speed), radius)
+    wanted = speed / math.sqrt(2.0 * math.pi) * radius / rms**2 * np.exp(-0.5 * (radius / rms) ** 2)
+    np.testing.assert_allclose(rate, wanted, rtol=1e-11)
+    got = pf.fades(EQUAL, (speed, speed), THETA, db_per_square * (radius / THETA) ** 2)
+    np.testing.assert_allclose(got.per_second, wanted, rtol=1e-11)
+    np.testing.assert_allclose(got.share_of_time, np.exp(-0.5 * (radius / rms) ** 2), rtol=1e-11)
+    duration = math.sqrt(2.0 * math.pi) * rms**2 / (speed * radius[1:])
+    np.testing.assert_allclose(got.mean_duration_s[1:], duration, rtol=1e-10)
+    assert got.mean_duration_s[0] == math.inf
+
+
+@pytest.mark.parametrize("order", [lambda jitter: jitter, swapped], ids=["as is", "swapped"])
+def test_the_crossing_rate_is_the_integral_round_the_circle(order):
+    jitter, velocity = order(BIASED), (70.0 * URAD, 300.0 * URAD)
+    a = np.arange(20_000) * 2.0 * math.pi / 20_000
+    for radius in np.array([2.0, 6.0, 15.0]) * URAD:
+        density = radius * 2.0 * math.pi / a.size
+        for trig, b, s in zip((np.cos(a), np.sin(a)), jitter.bias_rad, jitter.rms_rad, strict=True):
+            density = density * norm.pdf(radius * trig, b, s)
+        outward = np.hypot(velocity[0] * np.cos(a), velocity[1] * np.sin(a)) / math.sqrt(2.0 * math.pi)
+        rate = float(pf.level_crossing_rate_hz(jitter, velocity, radius))
+        assert rate == pytest.approx(np.sum(density * outward), rel=1e-10)
+
+
+def test_the_crossing_rate_of_one_axis_is_that_of_a_hardly_moving_other():
+    radius = np.array([1.9, 2.5, 5.0, 9.0]) * URAD
+    rate = pf.level_crossing_rate_hz(ONE_AXIS, (0.0, 1e-4), radius)
+    hardly = Jitter(ONE_AXIS.bias_rad, (1e-5 * URAD, 3.0 * URAD))
+    np.testing.assert_allclose(rate, pf.level_crossing_rate_hz(hardly, (1e-12, 1e-4), radius), rtol=1e-6)
+    assert rate[0] == 0.0 < rate[1]
+
+
+def test_a_beam_that_stands_still_never_fades_or_always():
+    got = pf.fades(STILL, (0.0, 0.0), THETA, [1.0, 3.0])  # the static loss is 2.17 dB
+    assert got.per_second.tolist() == [0.0, 0.0]
+    assert got.mean_duration_s.tolist() == [math.inf, 0.0]
+    assert got.share_of_time.tolist() == [1.0, 0.0]
+
+
+def simulated(jitter, corners_hz, key, samples=2**19, step_s=0.004):
+    """Errors of two axes with one-sided spectra proportional to exp(-(f / corner)^2), lines drawn at random."""
+    freq = np.fft.rfftfreq(samples, step_s)
+    noise = random(key).standard_normal((2, 2, freq.size))
+    axes = []
+    for (re, im), corner, bias, rms in zip(noise, corners_hz, jitter.bias_rad, jitter.rms_rad, strict=True):
+        shape = np.exp(-((freq / corner) ** 2))
+        shape[0] = 0.0
+        # S df is the variance of a line: amplitudes of the two quadratures have it each
+        amplitude = rms * np.sqrt(shape / np.sum(shape))
+        axes.append(bias + np.fft.irfft(amplitude * (re + 1j * im) * samples / 2.0, samples))
+    return np.array(axes)
+
+
+@pytest.mark.parametrize("jitter", [UNEQUAL, BIASED, Jitter((1 * URAD, 2 * URAD), (0.0, 3 * URAD))])
+def test_simulated_motion_fades_as_often_and_as_long_within_its_99_percent_interval(jitter):
+    corners, step_s, blocks, margin_db = (3.0, 1.5), 0.004, 64, 2.5
+    freq = np.linspace(0.0, 20.0, 20_001)
+    psd = [
+        (2.0 * s / (math.sqrt(math.pi) * c)) * s * np.exp(-((freq / c) ** 2))
+        for s, c in zip(jitter.rms_rad, corners, strict=True)
+    ]
+    motion = pf.motion_of_spectrum(freq, psd)
+    assert motion.rms_rad == pytest.approx(jitter.rms_rad, rel=1e-6)
+    wanted = pf.fades(jitter, motion.velocity_rms_rad_s, THETA, margin_db)
+
+    x, y = simulated(jitter, corners, key=11)
+    lost = db_per_square * (x**2 + y**2) / THETA**2 > margin_db
+    begins = np.concatenate(([False], ~lost[:-1] & lost[1:]))
+    rate = begins.reshape(blocks, -1).mean(axis=1) / step_s
+    share = lost.reshape(blocks, -1).mean(axis=1)
+    wide = student.isf(0.005, blocks - 1) / math.sqrt(blocks)
+    assert abs(rate.mean() - wanted.per_second) <= wide * rate.std(ddof=1)
+    assert abs(share.mean() - wanted.share_of_time) <= wide * share.std(ddof=1)
+    duration = share.mean() / rate.mean()
+    spread = np.std(share - duration * rate, ddof=1) / rate.mean()
+    assert abs(duration - wanted.mean_duration_s) <= wide * spread
+    assert wide * rate.std(ddof=1) < 0.08 * rate.mean()  # an interval that could tell
+
+
+# ---- refusals
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: Jitter((0.0, math.nan), (1e-6, 1e-6)), "the bias is .* give two finite values"),
+        (lambda: Jitter((0.0, 0.0), (math.inf, 1e-6)), "the jitter rms is .* give two finite values"),
+        (lambda: Jitter((0.0, 0.0, 0.0), (1e-6, 1e-6)), "give two finite values"),
+        (lambda: Jitter((0.0, 0.0), (1e-6, -1e-6)), "a jitter rms of -1 µrad is below 0"),
+        (lambda: ps.mean_loss_db(EQUAL, 0.0), "a half angle of 0 rad is no beam"),
+        (lambda: ps.mean_transmission(EQUAL, [1e-6, math.nan]), "a half angle of nan"),
+        (lambda: ps.transmission_variance(EQUAL, -1e-6), "a half angle of -1 µrad is no beam"),
+        (lambda: ps.transmission(-1e-6, THETA), "a radial error of -1 µrad is not possible"),
+        (lambda: ps.radial_survival(EQUAL, [0.0, -1e-6]), "a radial error of -1 µrad is not possible"),
+        (lambda: ps.radial_cdf(EQUAL, math.inf), "a radial error of inf"),
+        (lambda: ps.radial_quantile(EQUAL, 1.0), "a probability of 1 is out of range"),
+        (lambda: ps.radial_quantile(EQUAL, 0.99e-20), "a probability of 9.9e-21 is out of range"),
+        (lambda: ps.outage_loss_db(EQUAL, THETA, math.nan), "a probability of nan is out of range"),
+        (lambda: ps.outage_loss_db(EQUAL, 0.0, 0.1), "a half angle of 0 rad is no beam"),
+        (lambda: ps.outage_probability(EQUAL, THETA, -0.1), "a loss of -0.1 dB is not possible"),
+        (lambda: ps.loss_cdf(EQUAL, -THETA, 1.0), "a half angle of -10 µrad is no beam"),
+        (lambda: ps.best_divergence_for_static_error(-1e-6), "a radial error of -1 µrad is not possible"),
+        (lambda: ps.best_divergence_for_static_error(0.0), "give the smallest half angle"),
+        (lambda: ps.best_divergence_for_outage(EQUAL, 0.0), "a probability of 0 is out of range"),
+        (lambda: ps.best_divergence_for_mean(EQUAL), "give the smallest half angle"),
+        (lambda: ps.best_divergence_for_mean(Jitter((0.0, 0.0), (0.0, 0.0))), "give the smallest half angle"),
+        (lambda: ps.best_divergence_for_mean(EQUAL, smallest_half_angle_rad=-1e-6), "smallest half angle of -1 µrad"),
+        (
+            lambda: ps.best_divergence_for_static_error(
+                1e-6, smallest_half_angle_rad=5e-6, current_half_angle_rad=4.9e-6
+            ),
+            "the current half angle of 4.9 µrad is below the smallest, 5 µrad",
+        ),
+        (lambda: ps.best_divergence_for_static_error(1e-6, current_half_angle_rad=0.0), "a half angle of 0 rad"),
+        (lambda: pf.mean_error_ratio(EQUAL, 0.0, 0.0, exponential(1e-9)), "a half angle of 0 rad is no beam"),
+        (lambda: pf.mean_error_ratio(EQUAL, THETA, 0.0, lambda p: 0.5), "one value from 0 to 1 for each power"),
+        (lambda: pf.mean_error_ratio(EQUAL, THETA, 0.0, lambda p: 1.1 + 0.0 * p), "one value from 0 to 1"),
+        (lambda: pf.mean_error_ratio(EQUAL, THETA, 0.0, lambda p: np.nan * p), "one value from 0 to 1"),
+        (lambda: pf.mean_error_ratio(EQUAL, THETA, 0.0, lambda p: 0.1 * p), "grows with the power"),
+        (lambda: pf.uncoded_penalty_db(EQUAL, THETA, lambda p: 0.0 * p), "the bit error ratio at power 1 is 0;"),
+        (lambda: pf.uncoded_penalty_db(EQUAL, URAD, exponential(1e-9)), "even with 100 dB more power"),
+        (lambda: pf.motion_of_spectrum([1.0], [[1.0], [1.0]]), "do not fit"),
+        (lambda: pf.motion_of_spectrum([1.0, 2.0], [1.0, 1.0]), "do not fit"),
+        (lambda: pf.motion_of_spectrum([1.0, 1.0], [[1.0, 1.0]] * 2), "the frequencies do not rise"),
+        (lambda: pf.motion_of_spectrum([-1.0, 1.0], [[1.0, 1.0]] * 2), "the frequencies do not rise"),
+        (lambda: pf.motion_of_spectrum([1.0, math.inf], [[1.0, 1.0]] * 2), "the frequencies do not rise"),
+        (lambda: pf.motion_of_spectrum([1.0, 2.0], [[1.0, -1.0]] * 2), "a spectral density is negative"),
+        (lambda: pf.motion_of_spectrum([1.0, 2.0], [[1.0, math.nan]] * 2), "a spectral density is negative or not"),
+        (lambda: pf.fades(EQUAL, (1e-4, -1e-4), THETA, 3.0), "the velocity rms of axis y is -100 µrad/s"),
+        (lambda: pf.fades(EQUAL, (math.nan, 1e-4), THETA, 3.0), "the velocity rms of axis x is nan"),
+        (lambda: pf.fades(EQUAL, (1e-4, 0.0), THETA, 3.0), "axis y has a jitter rms of 3 µrad and a velocity rms of 0"),
+        (lambda: pf.fades(ONE_AXIS, (1e-4, 1e-4), THETA, 3.0), "axis x has a jitter rms of 0 rad"),
+        (lambda: pf.fades(EQUAL, (1e-4, 1e-4), THETA, -3.0), "a loss of -3 dB is not possible"),
+        (lambda: pf.level_crossing_rate_hz(EQUAL, (1e-4, 1e-4), -1e-6), "a radial error is negative"),
+    ],
+)
+def test_what_is_not_possible_is_refused_in_words(call, message):
+    with pytest.raises(ValueError, match=message):
+        call()

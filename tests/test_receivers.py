@@ -1,0 +1,567 @@
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy import integrate, optimize, stats
+
+from microrad.link.gains import photon_energy_j
+from microrad.link.receivers import (
+    BpskHomodyne,
+    DpskPreamplified,
+    OokApd,
+    OokCounting,
+    OokPin,
+    OokPreamplified,
+    PpmCounting,
+    Receiver,
+    apd_excess_noise_factor,
+    background_photons_per_mode,
+    background_power_w,
+    optical_bandwidth_hz,
+)
+from microrad.units import ELEMENTARY_CHARGE_C, PLANCK_J_S, SPEED_OF_LIGHT_M_S
+
+WAVELENGTH_M = 1.55e-6
+COMMON = {"wavelength_m": WAVELENGTH_M, "bit_error_ratio": 1e-9, "bandwidth_hz": 1e11}
+PHOTON_J = photon_energy_j(WAVELENGTH_M)
+
+COUNTER = OokCounting(**COMMON, detection_efficiency=1.0)
+NOISY_COUNTER = OokCounting(
+    **COMMON, detection_efficiency=0.4, dark_count_rate_hz=2e5, background_power_w=5e-13, extinction_ratio=15.0
+)
+PIN = OokPin(
+    **COMMON,
+    quantum_efficiency=0.8,
+    thermal_noise_a_sqrt_hz=3e-12,
+    dark_current_a=5e-9,
+    background_power_w=2e-8,
+    extinction_ratio=10.0,
+)
+APD = OokApd(
+    **COMMON,
+    quantum_efficiency=0.7,
+    thermal_noise_a_sqrt_hz=3e-12,
+    dark_current_a=2e-9,
+    background_power_w=1e-9,
+    extinction_ratio=20.0,
+    gain=12.0,
+    ionisation_ratio=0.4,
+)
+PREAMPLIFIED = OokPreamplified(
+    **COMMON,
+    noise_figure_db=4.0,
+    gain_db=35.0,
+    optical_bandwidth_hz=5e10,
+    quantum_efficiency=0.8,
+    thermal_noise_a_sqrt_hz=2e-11,
+    extinction_ratio=12.0,
+)
+DPSK = DpskPreamplified(**COMMON, noise_figure_db=3.0)
+NOISY_DPSK = replace(DPSK, noise_figure_db=4.5, background_photons_per_mode=0.2)
+BPSK = BpskHomodyne(**COMMON, quantum_efficiency=1.0)
+NOISY_BPSK = replace(BPSK, quantum_efficiency=0.7, background_photons_per_mode=0.3)
+PPM = PpmCounting(**COMMON, detection_efficiency=1.0, order=16)
+NOISY_PPM = replace(PPM, detection_efficiency=0.5, dark_count_rate_hz=1e5, background_power_w=1e-11)
+
+ALL = {
+    "counter": COUNTER,
+    "noisy counter": NOISY_COUNTER,
+    "pin": PIN,
+    "apd": APD,
+    "preamplified": PREAMPLIFIED,
+    "dpsk": DPSK,
+    "noisy dpsk": NOISY_DPSK,
+    "bpsk": BPSK,
+    "noisy bpsk": NOISY_BPSK,
+    "ppm": PPM,
+    "noisy ppm": NOISY_PPM,
+    "coded ppm": replace(NOISY_PPM, code_gain_db=4.0, code_rate=0.5),
+    "coded pin": replace(PIN, code_gain_db=5.5, code_rate=0.874),
+}
+every_receiver = pytest.mark.parametrize("receiver", ALL.values(), ids=ALL.keys())
+
+
+def near(value, rel=1e-6):
+    return pytest.approx(value, rel=rel, abs=0.0)  # the default absolute tolerance would pass any small ratio
+
+
+# -------------------------------------------------------------------------------------------------- published numbers
+@pytest.mark.parametrize(("receiver", "photons"), [(BPSK, 8.99), (DPSK, 20.03), (COUNTER, 10.02)])
+def test_ideal_receivers_need_the_published_photons_per_bit_at_any_rate(receiver, photons):
+    assert receiver.photons_per_bit([1e6, 1e9]) == pytest.approx([photons, photons], abs=0.005)
+
+
+def test_a_photodiode_without_noise_of_its_own_needs_half_q_squared():
+    pin = OokPin(**COMMON, quantum_efficiency=1.0, thermal_noise_a_sqrt_hz=0.0)
+    assert float(pin.photons_per_bit(1e9)) == near(stats.norm.isf(1e-9) ** 2 / 2.0, rel=1e-9)
+
+
+def test_ppm_without_background_is_an_erasure_channel():
+    for order in (2, 16, 256):
+        ppm = replace(PPM, order=order)
+        power = 3.0 * PHOTON_J * 1e8
+        counts = 3.0 * math.log2(order)
+        assert float(ppm.bit_error_ratio_at(power, 1e8)) == near(0.5 * math.exp(-counts), rel=1e-12)
+        assert float(ppm.photons_per_bit(1e8)) == near(math.log(0.5e9) / math.log2(order), rel=1e-12)
+
+
+def test_mcintyre_noise_has_its_textbook_limits():
+    assert apd_excess_noise_factor(1.0, 0.3) == near(1.0)
+    assert apd_excess_noise_factor(100.0, 1.0) == near(100.0)
+    assert apd_excess_noise_factor(100.0, 0.0) == near(1.99)
+    assert apd_excess_noise_factor(10.0, 0.02) == near(0.2 + 0.98 * 1.9)
+
+
+# ----------------------------------------------------------------------------------------- curves in an independent way
+@pytest.mark.parametrize("rate", [1e5, 1e7, 1e9])
+@pytest.mark.parametrize("photons", [3.0, 40.0, 300.0])
+def test_counting_errs_as_the_best_of_all_thresholds_on_poisson_counts(rate, photons):
+    counter = NOISY_COUNTER
+    floor = (0.4 * counter.background_power_w / PHOTON_J + 2e5) / rate
+    space = 2.0 * photons * 0.4 / 16.0
+    thresholds = np.arange(5000)
+    errors = 0.5 * (stats.poisson.cdf(thresholds, 15.0 * space + floor) + stats.poisson.sf(thresholds, space + floor))
+    got = float(counter.bit_error_ratio_at(photons * PHOTON_J * rate, rate))
+    assert got == near(errors.min(), rel=1e-9)
+
+
+def _correct_words(order, pulse, floor):
+    # Sum over counts and over the number of slots that tie
+    k = np.arange(0, int(floor + pulse + 12.0 * math.sqrt(floor + pulse) + 60.0))
+    below = stats.poisson.cdf(k - 1, floor)
+    here = stats.poisson.pmf(k, floor)
+    won = sum(
+        math.comb(order - 1, ties) * here**ties * below ** (order - 1 - ties) / (ties + 1) for ties in range(order)
+    )
+    return float((stats.poisson.pmf(k, floor + pulse) * won).sum())
+
+
+@pytest.mark.parametrize("order", [2, 16])
+@pytest.mark.parametrize(("pulse", "floor"), [(2.0, 0.01), (6.0, 0.5), (20.0, 5.0), (40.0, 60.0), (250.0, 2500.0)])
+def test_ppm_with_background_errs_as_the_sum_over_counts_and_ties(order, pulse, floor):
+    rate = 1e8
+    slot_rate = rate * order / math.log2(order)
+    ppm = replace(PPM, order=order, dark_count_rate_hz=floor * slot_rate)
+    power = pulse * slot_rate * PHOTON_J / order
+    want = (1.0 - _correct_words(order, pulse, floor)) * order / (2.0 * (order - 1.0))
+    assert float(ppm.bit_error_ratio_at(power, rate)) == pytest.approx(want, rel=1e-7, abs=1e-14)
+
+
+def test_ppm_of_order_256_with_background_errs_as_often_as_simulated_slots():
+    random = np.random.Generator(np.random.Philox(key=5))
+    order, pulse, floor, words = 256, 5.0, 0.3, 40_000
+    slots = random.poisson(floor, (words, order)).astype(float)
+    slots[:, 0] += random.poisson(pulse, words)
+    slots += random.uniform(0.0, 0.5, slots.shape)  # ties at random
+    wrong = int((slots.argmax(axis=1) != 0).sum())
+    slot_rate = 1e8 * order / 8.0
+    ppm = replace(PPM, order=order, background_power_w=floor * slot_rate * PHOTON_J)
+    ratio = float(ppm.bit_error_ratio_at(pulse * slot_rate * PHOTON_J / order, 1e8))
+    low, high = stats.binomtest(wrong, words).proportion_ci(0.99)
+    assert low < ratio * 2.0 * (order - 1.0) / order < high
+
+
+def test_small_ppm_error_ratios_keep_their_digits():
+    # Two slots: the difference of two Poisson counts is Skellam, summed here in its tail
+    pulse, floor, rate = 60.0, 2.0, 1e8
+    ppm = replace(PPM, order=2, dark_count_rate_hz=floor * 2.0 * rate)
+    k = np.arange(-200, 0)
+    law = stats.skellam(floor + pulse, floor)
+    want = float(law.pmf(k).sum() + 0.5 * law.pmf(0))
+    assert want < 1e-11
+    assert float(ppm.bit_error_ratio_at(pulse * rate * PHOTON_J, rate)) == near(want, rel=1e-6)
+
+
+@pytest.mark.parametrize("receiver", [PIN, APD, PREAMPLIFIED], ids=["pin", "apd", "preamplified"])
+def test_the_lines_of_noise_and_both_tails_at_the_threshold_give_the_error_ratio(receiver):
+    rate = 2e9
+    power = float(receiver.required_power_w(rate)) * 0.6
+    lines = receiver.noise_lines(power, rate)
+    gain = {PIN: 1.0, APD: 12.0, PREAMPLIFIED: 10.0**3.5}[receiver]
+    per_watt = gain * receiver.quantum_efficiency * ELEMENTARY_CHARGE_C / PHOTON_J
+    r = receiver.extinction_ratio
+    mark, space = 2.0 * power * r / (r + 1.0) * per_watt, 2.0 * power / (r + 1.0) * per_watt
+    s1 = math.sqrt(sum(line.value**2 for line in lines if not line.name.endswith("spaces")))
+    s0 = math.sqrt(sum(line.value**2 for line in lines if not line.name.endswith("marks")))
+    threshold = (s0 * mark + s1 * space) / (s0 + s1)
+    want = 0.5 * (stats.norm.cdf(threshold, mark, s1) + stats.norm.sf(threshold, space, s0))
+    assert float(receiver.bit_error_ratio_at(power, rate)) == near(want, rel=1e-9)
+
+
+def test_the_terms_of_a_photodiode_are_shot_and_thermal_noise():
+    lines = {line.name: line for line in APD.noise_lines(1e-6, 1e9)}
+    b, r = 0.5e9, 0.7 * ELEMENTARY_CHARGE_C / PHOTON_J
+    f = apd_excess_noise_factor(12.0, 0.4)
+    shot = 2.0 * ELEMENTARY_CHARGE_C * 144.0 * f * b
+    assert lines["Signal shot noise, marks"].value == near(math.sqrt(shot * r * 2e-6 * 20.0 / 21.0))
+    assert lines["Signal shot noise, spaces"].value == near(math.sqrt(shot * r * 2e-6 / 21.0))
+    assert lines["Background shot noise"].value == near(math.sqrt(shot * r * 1e-9))
+    assert lines["Dark current shot noise"].value == near(math.sqrt(shot * 2e-9))
+    assert lines["Thermal noise"].value == near(3e-12 * math.sqrt(b))
+    assert {line.unit for line in lines.values()} == {"A"}
+
+
+def test_shot_noise_is_the_spread_of_poisson_electrons_over_half_a_symbol_rate_of_bandwidth():
+    random = np.random.Generator(np.random.Philox(key=11))
+    rate, power = 1e9, 2e-6
+    electrons = 2.0 * power * 10.0 / 11.0 * 0.8 / PHOTON_J / rate
+    currents = random.poisson(electrons, 200_000) * ELEMENTARY_CHARGE_C * rate
+    line = next(line for line in PIN.noise_lines(power, rate) if line.name == "Signal shot noise, marks")
+    assert line.value == near(float(currents.std()), rel=0.01)
+
+
+def test_the_beats_of_a_preamplifier_are_those_of_simulated_fields():
+    # Complex noise of N photons per mode in both polarisations, many modes: the detector adds their energies
+    random = np.random.Generator(np.random.Philox(key=3))
+    modes, noise, photons, symbols = 40, 10.0**0.4 / 2.0, 900.0, 40_000
+    parts = random.standard_normal((symbols, 4 * modes)) * math.sqrt(noise / 2.0)
+    dark = (parts**2).sum(axis=1)
+    parts[:, 0] += math.sqrt(photons)
+    lit = (parts**2).sum(axis=1)
+    rate = 1e9
+    receiver = replace(PREAMPLIFIED, optical_bandwidth_hz=(modes + 0.25) * rate, extinction_ratio=math.inf)
+    per_photon = 10.0**3.5 * 0.8 * ELEMENTARY_CHARGE_C * rate
+    lines = {line.name: line.value / per_photon for line in receiver.noise_lines(photons * PHOTON_J * rate / 2.0, rate)}
+    assert lines["ASE-ASE beat noise"] == near(float(dark.std()), rel=0.02)
+    assert lines["Signal-ASE beat noise, marks"] ** 2 == near(float(lit.var() - dark.var()), rel=0.04)
+
+
+@pytest.mark.parametrize(("modes", "polarisations", "exact"), [(1, 1, 38.3), (5, 2, 51.2), (20, 2, 70.6)])
+def test_gaussian_beats_cost_less_than_a_third_of_a_decibel_against_chi_square(modes, polarisations, exact):
+    rate, degrees = 1e9, 2 * modes * polarisations
+    receiver = OokPreamplified(
+        **COMMON, noise_figure_db=3.0, gain_db=60.0, optical_bandwidth_hz=modes * rate, polarisations=polarisations
+    )
+
+    def log_ratio(photons):
+        def at(threshold):
+            error = stats.chi2.sf(threshold, degrees) + stats.ncx2.cdf(threshold, degrees, 4.0 * photons)
+            return math.log(0.5 * error)
+
+        return optimize.minimize_scalar(at, bounds=(20.0, 4.0 * photons), method="bounded").fun
+
+    needed = optimize.brentq(lambda photons: log_ratio(photons) - math.log(1e-9), 20.0, 200.0, xtol=1e-3)
+    assert needed == pytest.approx(exact, abs=0.05)
+    assert 0.15 < 10.0 * math.log10(float(receiver.photons_per_bit(rate)) / needed) < 0.34
+
+
+def test_dpsk_errs_as_two_fields_of_which_the_empty_port_is_the_brighter():
+    photons, noise, rate = 6.0, 10.0**0.45 / 2.0 + 0.2, 1e9
+    # amplitudes over two symbols: Rice in one port, Rayleigh in the other
+    sigma = math.sqrt(noise / 2.0)
+    signal = stats.rice(math.sqrt(2.0 * photons) / sigma, scale=sigma)
+    want, _ = integrate.quad(lambda r: signal.pdf(r) * math.exp(-(r**2) / noise), 0.0, 20.0, epsabs=1e-12)
+    assert float(NOISY_DPSK.bit_error_ratio_at(photons * PHOTON_J * rate, rate)) == near(want, rel=1e-8)
+
+
+def test_dpsk_errs_as_often_as_simulated_symbols_and_has_their_noise():
+    random = np.random.Generator(np.random.Philox(key=7))
+    photons, noise, rate, bits = 6.0, 10.0**0.45 / 2.0 + 0.2, 1e9, 400_000
+    fields = random.standard_normal((2, 2, bits)) * math.sqrt(noise / 2.0)
+    first, second = math.sqrt(photons) + fields[0] + 0.0, fields[1]
+    decision = first[0] * first[1] + second[0] * second[1]
+    low, high = stats.binomtest(int((decision < 0.0).sum()), bits).proportion_ci(0.99)
+    power = photons * PHOTON_J * rate
+    assert low < float(NOISY_DPSK.bit_error_ratio_at(power, rate)) < high
+    lines = NOISY_DPSK.noise_lines(power, rate)
+    assert math.hypot(*(line.value for line in lines)) == near(float(decision.std()), rel=0.01)
+
+
+def test_homodyne_errs_as_often_as_simulated_quadratures_and_has_their_noise():
+    random = np.random.Generator(np.random.Philox(key=8))
+    photons, rate, bits, q, background = 1.5, 1e9, 400_000, 0.7, 0.3
+    incoming = math.sqrt(photons) + math.sqrt(background / 2.0) * random.standard_normal(bits)
+    detected = math.sqrt(q) * incoming + 0.5 * random.standard_normal(bits)
+    low, high = stats.binomtest(int((detected < 0.0).sum()), bits).proportion_ci(0.99)
+    power = photons * PHOTON_J * rate
+    assert low < float(NOISY_BPSK.bit_error_ratio_at(power, rate)) < high
+    assert float(BPSK.bit_error_ratio_at(power, rate)) == near(0.5 * math.erfc(math.sqrt(2.0 * photons)))
+    lines = NOISY_BPSK.noise_lines(power, rate)
+    assert math.hypot(*(line.value for line in lines)) == near(float(detected.std()), rel=0.01)
+
+
+def test_counts_in_the_lines_are_roots_of_their_means():
+    lines = {line.name: line for line in NOISY_PPM.noise_lines(1e-9, 1e8)}
+    slot_s = math.log2(16) / (16 * 1e8)
+    assert lines["Signal shot noise, pulse"].value ** 2 == near(0.5 * 16e-9 * slot_s / PHOTON_J)
+    assert lines["Background shot noise"].value ** 2 == near(0.5 * 1e-11 * slot_s / PHOTON_J)
+    assert lines["Dark counts"].value ** 2 == near(1e5 * slot_s)
+    marks, spaces = NOISY_COUNTER.noise_lines(1e-9, 1e8)[:2]
+    assert (marks.value / spaces.value) ** 2 == near(15.0)
+    assert {line.unit for line in (*lines.values(), marks, spaces)} == {"count"}
+
+
+# ----------------------------------------------------------------------------------------- what holds for all of them
+@every_receiver
+def test_the_required_power_meets_the_target(receiver):
+    rates = np.geomspace(1e4, 1e10, 25)
+    power = receiver.required_power_w(rates)
+    assert receiver.bit_error_ratio_at(power, rates) == near(np.full(25, 1e-9), rel=1e-7)
+    for target in (1e-3, 1e-12, 0.4):
+        other = replace(receiver, bit_error_ratio=target)
+        assert float(other.bit_error_ratio_at(other.required_power_w(1e8), 1e8)) == near(target, rel=1e-7)
+
+
+@every_receiver
+def test_more_power_errs_less_and_no_power_is_a_guess(receiver):
+    powers = float(receiver.required_power_w(1e8)) * np.linspace(0.0, 1.5, 200)
+    ratios = receiver.bit_error_ratio_at(powers, 1e8)
+    assert ratios[0] == near(0.5, rel=1e-9)
+    assert np.all(np.diff(ratios) < 0.0)
+    assert float(receiver.bit_error_ratio_at(1e3, 1e4)) == 0.0  # a kilowatt, and still a number
+
+
+@every_receiver
+def test_a_higher_rate_needs_more_power(receiver):
+    assert np.all(np.diff(receiver.required_power_w(np.geomspace(1e4, 1e10, 60))) > 0.0)
+
+
+@every_receiver
+def test_arrays_give_what_scalars_give(receiver):
+    rates = np.geomspace(1e5, 1e10, 7)
+    power = receiver.required_power_w(rates)
+    one_by_one = [float(receiver.required_power_w(rate)) for rate in rates]
+    assert power == near(one_by_one, rel=1e-10)
+    assert receiver.photons_per_bit(rates) == near(power / (rates * PHOTON_J), rel=1e-12)
+    table = receiver.bit_error_ratio_at(power[:, None], rates)
+    assert table.shape == (7, 7)
+    assert table[2, 3] == near(float(receiver.bit_error_ratio_at(power[2], rates[3])), rel=1e-9)
+    assert receiver.required_power_w(rates[:6].reshape(2, 3)).shape == (2, 3)
+    assert receiver.required_power_w([]).shape == (0,)
+
+
+@every_receiver
+def test_the_net_code_gain_is_power_at_the_same_information_rate(receiver):
+    coded = replace(receiver, code_gain_db=receiver.code_gain_db + 3.0, code_rate=0.5)
+    rates = np.array([1e6, 1e9])
+    assert coded.required_power_w(rates) * 10.0**0.3 == near(receiver.required_power_w(rates), rel=1e-12)
+    assert coded.photons_per_bit(rates) * 10.0**0.3 == near(receiver.photons_per_bit(rates), rel=1e-12)
+
+
+@every_receiver
+def test_the_line_rate_of_the_code_fills_the_bandwidth(receiver):
+    slots = 4.0 if isinstance(receiver, PpmCounting) else 1.0
+    limited = replace(receiver, bandwidth_hz=slots * 2e9, code_rate=0.5, code_gain_db=1.0)
+    assert limited.symbol_rate_hz(1e9) == near(slots * 2e9)
+    assert np.isfinite(limited.required_power_w(1e9))
+    with pytest.raises(ValueError, match=r"the data rate is 1\.01 Gbit/s.* at most 1 Gbit/s of data"):
+        limited.required_power_w([1e8, 1.01e9])
+    with pytest.raises(ValueError, match="at most 1 Gbit/s of data"):
+        limited.bit_error_ratio_at(1e-9, 1.01e9)
+    with pytest.raises(ValueError, match="at most 1 Gbit/s of data"):
+        limited.noise_lines(1e-9, 1.01e9)
+
+
+@every_receiver
+def test_every_line_of_noise_has_its_formula_its_source_and_its_regime(receiver):
+    for line in receiver.noise_lines(1e-9, 1e8):
+        assert isinstance(receiver, Receiver)
+        assert line.value >= 0.0
+        assert line.unit and line.basis and line.source and line.regime
+
+
+# ------------------------------------------------------------------------------------------------------------- scaling
+def test_thermal_noise_asks_for_the_root_of_the_rate_and_quantum_noise_for_the_rate():
+    pin = OokPin(**COMMON, quantum_efficiency=0.8, thermal_noise_a_sqrt_hz=1e-9)
+    low, high = pin.required_power_w([1e6, 1e8])
+    assert high / low == near(10.0, rel=1e-3)
+    for receiver in (COUNTER, DPSK, BPSK, PPM):
+        low, high = receiver.required_power_w([1e6, 1e8])
+        assert high / low == near(100.0, rel=1e-9)
+
+
+def test_much_background_asks_for_the_root_of_the_rate_from_counters_too():
+    for receiver in (replace(COUNTER, background_power_w=1e-6), replace(PPM, background_power_w=1e-6)):
+        low, high = receiver.required_power_w([1e2, 1e4])
+        assert high / low == near(10.0, rel=1e-3)
+
+
+@pytest.mark.parametrize("floor", [1e9, 1e12])
+def test_very_many_counts_become_gaussian_down_to_the_last_tail(floor):
+    # scipy's own Poisson tails are wrong by tens of percent here
+    rate, pulse = 1e3, 12.0 * math.sqrt(floor)
+    counter = replace(COUNTER, dark_count_rate_hz=floor * rate)
+    got = float(counter.bit_error_ratio_at(pulse * rate * PHOTON_J / 2.0, rate))
+    assert got == near(stats.norm.sf(pulse / (math.sqrt(floor + pulse) + math.sqrt(floor))), rel=1e-3)
+    ppm = replace(PPM, order=2, dark_count_rate_hz=floor * 2.0 * rate)
+    got = float(ppm.bit_error_ratio_at(pulse * rate * PHOTON_J, rate))
+    assert got == near(stats.norm.sf(pulse / math.sqrt(2.0 * floor + pulse)), rel=1e-6)
+
+
+@pytest.mark.parametrize("floor", [500.0, 2e5])
+def test_counts_in_the_hundreds_and_beyond_the_expansion_are_still_poisson(floor):
+    rate, pulse = 1e3, 9.0 * math.sqrt(floor)
+    k = np.arange(int(floor - 12.0 * math.sqrt(floor)), int(floor + 25.0 * math.sqrt(floor)))
+    counter = replace(COUNTER, dark_count_rate_hz=floor * rate)
+    errors = 0.5 * (stats.poisson.cdf(k, floor + pulse) + stats.poisson.sf(k, floor))
+    got = float(counter.bit_error_ratio_at(pulse * rate * PHOTON_J / 2.0, rate))
+    assert got == near(errors.min(), rel=1e-8)
+    lost = stats.poisson.sf(k, floor) + 0.5 * stats.poisson.pmf(k, floor)
+    ppm = replace(PPM, order=2, dark_count_rate_hz=floor * 2.0 * rate)
+    got = float(ppm.bit_error_ratio_at(pulse * rate * PHOTON_J, rate))
+    assert got == near(float((stats.poisson.pmf(k, floor + pulse) * lost).sum()), rel=1e-7)
+
+
+def test_poisson_tails_meet_where_the_expansion_begins():
+    # one count more in a slot on either side of 1e5 counts: nothing jumps
+    rate = 1e3
+    for receiver, slots in ((COUNTER, 1.0), (replace(PPM, order=2), 2.0)):
+        floors = 1e5 + np.linspace(-3000.0, 1000.0, 81)
+        ratios = [
+            float(
+                replace(receiver, dark_count_rate_hz=f * slots * rate).bit_error_ratio_at(
+                    3000.0 * rate * PHOTON_J, rate
+                )
+            )
+            for f in floors
+        ]
+        steps = np.diff(np.log(ratios), 2)
+        assert np.abs(steps).max() < 2e-3 * np.abs(np.diff(np.log(ratios))).max()
+
+
+def test_an_avalanche_of_gain_one_is_a_pin_and_ten_is_better_where_thermal_noise_rules():
+    fields = {**COMMON, "quantum_efficiency": 0.8, "thermal_noise_a_sqrt_hz": 5e-12}
+    pin = OokPin(**fields)
+    apd = OokApd(**fields, gain=1.0, ionisation_ratio=0.4)
+    assert float(apd.required_power_w(1e9)) == near(float(pin.required_power_w(1e9)), rel=1e-12)
+    gained = float(replace(apd, gain=10.0).required_power_w(1e9)) / float(pin.required_power_w(1e9))
+    assert 0.1 < gained < 0.2
+
+
+def test_a_noise_figure_counts_decibel_for_decibel_above_the_quantum_limit():
+    worse = replace(DPSK, noise_figure_db=10.0 * math.log10(2.0) + 2.0)
+    assert 10.0 * np.log10(worse.photons_per_bit(1e9) / DPSK.photons_per_bit(1e9)) == pytest.approx(2.0, abs=1e-9)
+    hot = replace(DPSK, background_photons_per_mode=0.25)
+    assert float(hot.photons_per_bit(1e9)) == pytest.approx(1.25 * 20.0301, abs=1e-3)
+
+
+def test_a_finite_extinction_ratio_and_a_wider_electrical_filter_cost_power():
+    for receiver in (PIN, APD, PREAMPLIFIED, NOISY_COUNTER):
+        worse = replace(receiver, extinction_ratio=4.0)
+        assert worse.required_power_w(1e9) > receiver.required_power_w(1e9)
+    thermal = replace(PIN, thermal_noise_a_sqrt_hz=1e-9)
+    wider = replace(thermal, electrical_bandwidth_per_symbol=0.7)
+    ratio = float(wider.required_power_w(1e9) / thermal.required_power_w(1e9))
+    assert ratio == near(math.sqrt(1.4), rel=1e-3)
+
+
+def test_the_optical_filter_bounds_the_rate_of_a_preamplified_receiver():
+    narrow = replace(PREAMPLIFIED, optical_bandwidth_hz=2e9)
+    assert np.isfinite(narrow.required_power_w(2e9))
+    with pytest.raises(ValueError, match="the receiver takes 2 GHz, so at most 2 Gbit/s of data"):
+        narrow.required_power_w(2.1e9)
+
+
+# ---------------------------------------------------------------------------------------------------------- background
+def test_background_power_is_radiance_over_the_cone_of_the_field():
+    for field in (1e-4, 0.5, math.pi):
+        solid, _ = integrate.quad(lambda t: 2.0 * math.pi * math.sin(t) * math.cos(t), 0.0, field / 2.0)
+        assert background_power_w(1e7, 0.02, field, 1e-9) == near(1e7 * 0.02 * solid * 1e-9, rel=1e-9)
+    # full angle: a field of 100 urad is a solid angle of pi (50 urad)^2
+    assert background_power_w(1.0, 1.0, 1e-4, 1.0) == near(math.pi * 25e-10, rel=1e-6)
+
+
+def test_a_black_body_gives_its_bose_number_to_a_mode():
+    x = PLANCK_J_S * SPEED_OF_LIGHT_M_S / (WAVELENGTH_M * 1.380649e-23 * 5772.0)
+    radiance = 2.0 * PLANCK_J_S * SPEED_OF_LIGHT_M_S**2 / WAVELENGTH_M**5 / math.expm1(x)
+    photons = background_photons_per_mode(radiance, WAVELENGTH_M)
+    assert photons == near(1.0 / math.expm1(x), rel=1e-12)
+    assert photons == pytest.approx(0.25, abs=0.01)
+    # the same through an aperture and a field that pass one mode, area times solid angle the squared wavelength
+    field = 2.0 * math.sqrt(WAVELENGTH_M**2 / (math.pi * 0.01))
+    power = background_power_w(radiance, 0.01, field, 1e-9) / 2.0
+    per_hz = power / optical_bandwidth_hz(WAVELENGTH_M, 1e-9)
+    assert per_hz / PHOTON_J == near(photons, rel=1e-6)
+
+
+def test_a_filter_of_a_nanometre_at_1550_is_125_gigahertz():
+    assert optical_bandwidth_hz(1.55e-6, 1e-9) == near(124.8e9, rel=1e-3)
+    edges = SPEED_OF_LIGHT_M_S / np.array([1.5e-6, 1.6e-6])
+    assert optical_bandwidth_hz(1.55e-6, 1e-7) == near(edges[0] - edges[1], rel=1e-12)
+
+
+# ------------------------------------------------------------------------------------------------------------ refusals
+@pytest.mark.parametrize(
+    ("receiver", "change", "message"),
+    [
+        (PIN, {"bit_error_ratio": 0.5}, "target bit error ratio is 0.5: .* below 0.5"),
+        (PIN, {"bit_error_ratio": 0.0}, "target bit error ratio is 0: it must be at least 1e-18"),
+        (PIN, {"bit_error_ratio": math.nan}, "target bit error ratio is nan"),
+        (PIN, {"wavelength_m": 0.0}, "wavelength is 0 m: .* above 0 m"),
+        (PIN, {"bandwidth_hz": -1.0}, "bandwidth is -1 Hz: .* above 0 Hz"),
+        (DPSK, {"code_gain_db": -0.1}, "net code gain is -0.1 dB: .* not below 0 dB"),
+        (DPSK, {"code_rate": 0.0}, "code rate is 0: it must lie above 0, up to 1"),
+        (DPSK, {"code_rate": 1.01}, "code rate is 1.01: it must lie above 0, up to 1"),
+        (PIN, {"quantum_efficiency": 1.01}, "quantum efficiency is 1.01: it must lie above 0, up to 1"),
+        (BPSK, {"quantum_efficiency": 0.0}, "quantum efficiency is 0: it must lie above 0"),
+        (PREAMPLIFIED, {"quantum_efficiency": 2.0}, "quantum efficiency is 2"),
+        (COUNTER, {"detection_efficiency": 1.2}, "detection efficiency is 1.2: it must lie above 0, up to 1"),
+        (PPM, {"detection_efficiency": 0.0}, "detection efficiency is 0"),
+        (COUNTER, {"dark_count_rate_hz": -1.0}, "dark count rate is -1 Hz: .* not below 0 Hz"),
+        (PPM, {"background_power_w": -1e-12}, "background power is -1 pW: .* not below 0 W"),
+        (PIN, {"background_power_w": -1e-12}, "background power is -1 pW"),
+        (PIN, {"dark_current_a": -1e-9}, "dark current is -1 nA: .* not below 0 A"),
+        (PIN, {"thermal_noise_a_sqrt_hz": math.inf}, "thermal noise is inf A/sqrt"),
+        (PIN, {"extinction_ratio": 1.0}, "extinction ratio is 1: .* above 1"),
+        (COUNTER, {"extinction_ratio": 0.9}, "extinction ratio is 0.9: .* above 1"),
+        (PIN, {"electrical_bandwidth_per_symbol": 0.49}, "bandwidth per symbol rate is 0.49: it must be at least 0.5"),
+        (APD, {"gain": 0.99}, "gain of the avalanche photodiode is 0.99: it must be at least 1"),
+        (APD, {"ionisation_ratio": 1.01}, "ionisation ratio is 1.01: it lies from 0 to 1"),
+        (APD, {"ionisation_ratio": -0.01}, "ionisation ratio is -0.01: it lies from 0 to 1"),
+        (
+            PREAMPLIFIED,
+            {"noise_figure_db": 2.99},
+            "noise figure is 2.99 dB: it must be at least 3 dB, the quantum limit",
+        ),
+        (DPSK, {"noise_figure_db": 2.99}, "noise figure is 2.99 dB: it must be at least 3 dB, the quantum limit"),
+        (PREAMPLIFIED, {"gain_db": 9.0}, "gain is 9 dB: .* at least 10 dB"),
+        (PREAMPLIFIED, {"polarisations": 3}, "polarisations is 3: it is 1 or 2"),
+        (PREAMPLIFIED, {"optical_bandwidth_hz": 0.0}, "optical bandwidth is 0 Hz"),
+        (PREAMPLIFIED, {"background_photons_per_mode": -1.0}, "background in one mode is -1 photon"),
+        (DPSK, {"background_photons_per_mode": -1.0}, "background in one mode is -1 photon"),
+        (BPSK, {"background_photons_per_mode": -1.0}, "background in one mode is -1 photon"),
+        (PPM, {"order": 1}, "order of the pulse-position modulation is 1: it is a power of two, at least 2"),
+        (PPM, {"order": 12}, "order of the pulse-position modulation is 12: it is a power of two"),
+    ],
+)
+def test_what_cannot_be_is_refused_with_its_value_and_limit(receiver, change, message):
+    with pytest.raises(ValueError, match=message):
+        replace(receiver, **change)
+
+
+def test_the_bounds_themselves_are_taken():
+    replace(APD, gain=1.0, ionisation_ratio=0.0, quantum_efficiency=1.0, extinction_ratio=math.inf)
+    replace(APD, ionisation_ratio=1.0, code_gain_db=0.0, code_rate=1.0, bit_error_ratio=0.499)
+    replace(PPM, order=2, dark_count_rate_hz=0.0, bit_error_ratio=1e-18)
+    replace(PREAMPLIFIED, noise_figure_db=3.0, gain_db=10.0, polarisations=1, electrical_bandwidth_per_symbol=0.5)
+
+
+@every_receiver
+def test_negative_power_and_rates_that_are_none_are_refused(receiver):
+    with pytest.raises(ValueError, match=r"received power is -1 nW: .* not below 0 W"):
+        receiver.bit_error_ratio_at([1e-9, -1e-9], 1e8)
+    with pytest.raises(ValueError, match="received power is nan W"):
+        receiver.noise_lines(math.nan, 1e8)
+    with pytest.raises(ValueError, match=r"data rate is 0 bit/s: .* above 0 bit/s"):
+        receiver.required_power_w([1e8, 0.0])
+    with pytest.raises(ValueError, match="data rate is inf bit/s"):
+        receiver.photons_per_bit(math.inf)
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: background_power_w(-1.0, 1.0, 1.0, 1.0), "spectral radiance is -1 W"),
+        (lambda: background_power_w(1.0, -1.0, 1.0, 1.0), "aperture's area is -1 m"),
+        (lambda: background_power_w(1.0, 1.0, 3.2, 1.0), "field of view is 3.2 rad: it is the full angle"),
+        (lambda: background_power_w(1.0, 1.0, 1.0, -1.0), "filter's bandwidth is -1 m"),
+        (lambda: background_photons_per_mode(-1.0, 1e-6), "spectral radiance is -1 W"),
+        (lambda: background_photons_per_mode(1.0, 0.0), "wavelength is 0 m"),
+        (lambda: optical_bandwidth_hz(0.0, 1e-9), "wavelength is 0 m"),
+        (lambda: optical_bandwidth_hz(1e-6, 2e-6), "optical filter is 2 µm: .* twice the wavelength, 2 µm"),
+    ],
+)
+def test_background_that_cannot_be_is_refused(call, message):
+    with pytest.raises(ValueError, match=message):
+        call()
