@@ -26,6 +26,7 @@ unit: $(VENV)/.test
 	$(BIN)/python -m pytest --numprocesses 2
 
 benchmark: $(VENV)/.test
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[benchmark]'
 	$(BIN)/python benchmarks/loop.py
 	$(BIN)/python benchmarks/ensemble.py
 	$(BIN)/python benchmarks/controllers.py

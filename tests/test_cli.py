@@ -24,7 +24,7 @@ from shipped import without_fine_pointing
 
 ROOT = Path(__file__).parents[1]
 PAPER = ROOT / "src" / "microrad" / "missions" / "leo-geo.toml"
-COMMANDS = ("init", "run", "design", "identify", "bench", "doctor", "schema")
+COMMANDS = ("init", "run", "budget", "presets", "design", "identify", "bench", "doctor", "schema")
 MICRORAD = (sys.executable, "-m", "microrad")
 COLUMNS = ("--input", "drive", "--output", "angle", "--rate", "1000", "--static")
 
@@ -268,9 +268,9 @@ def test_design_refuses_what_it_cannot_design(refused, folder, plain):
 
 def test_run_refuses_missing_and_faulty_files(refused, folder):
     assert "no-such.toml" in refused("run", "no-such.toml")
-    faulty = mission(folder / "faulty.toml", ('body_pointing = "300 urad"', "body_pointing = 300"))
+    faulty = mission(folder / "faulty.toml", ('error = "300 urad"                    # paper: section 2.1', "error = 300 # paper"))
     message = refused("run", faulty)
-    for words in ("pointing.body_pointing", "line ", "without a unit"):
+    for words in ("pointing.lines.body_pointing.error", "line ", "without a unit"):
         assert words in message
     assert "no-mirror.toml" in refused("run", PAPER, "--mirror", "no-mirror.toml")
 

@@ -342,7 +342,7 @@ def test_the_verdict_says_it_in_five_lines(plain, fine):
     assert "better (rms) than the best PI of the gain grid" in added[1]
     assert "axis x needs 623 µrad to either side and has 534 µrad" in added[2]
     assert added[3].startswith(f"PASS  fine pointing at 99.7 % ({SECOND}): 4.23 µrad")
-    assert added[4].startswith(f"PASS  communication margin but for 0.3 % of the time ({SECOND}): 4.8")
+    assert added[4].startswith(f"PASS  link margin but for 0.3 % of the time ({SECOND}): 4.8")
     assert len(added) == 5
 
 

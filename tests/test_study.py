@@ -90,7 +90,7 @@ def test_the_lines_of_the_verdict(shipped):
     ]
     assert found[4][2].endswith(": " + cause)
     words = ("beacon cone", "beacon", "answer", "residual pointing error", "communication", "fine pointing")
-    words += ("communication margin but for 0.3 % of the time",)
+    words += ("link margin but for 0.3 % of the time",)
     assert all(r.name.lower().startswith(word) for r, word in zip(result.requirements, words, strict=True))
     for line in result.requirements:
         sign = -1 if line.name.startswith(("residual pointing error", "fine pointing")) else 1

@@ -32,7 +32,8 @@ COMPOUNDS = [
     ("urad/s", "rad/s", "urad/s"), ("urad^2/Hz", "rad^2/Hz", "urad2/Hz"), ("urad2/kHz", "rad^2/Hz", "urad2/kHz"),
     ("nrad/Hz^2", "rad/Hz^2", "nrad/Hz2"), ("mA/W", "A/W", "mA/W"), ("A/mW", "A/W", "A/mW"),
     ("pA/sqrt(Hz)", "A/sqrt(Hz)", "pA/sqrt(Hz)"), ("pA/√kHz", "A/sqrt(Hz)", "pA/sqrt(kHz)"),
-    ("nV/(sqrt(MHz) K)", "V/(sqrt(Hz) K)", "nV/(sqrt(MHz) K)"), ("sqrt(kHz)", "sqrt(Hz)", "sqrt(kHz)"), ("W/(m^2 sr um)", "W/(m^3 sr)", "W/(m2 sr um)"),
+    ("nV/(sqrt(MHz) K)", "V/(sqrt(Hz) K)", "nV/(sqrt(MHz) K)"), ("sqrt(kHz)", "sqrt(Hz)", "sqrt(kHz)"),
+    ("W/(m^2 sr um)", "W/(m^3 sr)", "W/(m2 sr um)"),
     ("km/s", "m/s", "km/s"),
 ]  # fmt: skip
 KEYS = sorted({unit for _, unit, _ in COMPOUNDS} | set(SI.values()) | {"dB"})

@@ -96,13 +96,18 @@ class Finding:
 
 @dataclass(frozen=True, slots=True)
 class LinkStudy:
-    """Everything that follows from the tables of the links alone. The links that a mission lacks are None."""
+    """Everything that follows from the tables of the links alone. The links that a mission lacks are None.
+
+    ``receiver_noise`` are the noise terms of the communication receiver at the received power, where it is given by
+    what it is made of.
+    """
 
     file: LinkFile
     open_loop: pointing.OpenLoopPointing
     communication: link.LinkBudget
     beacon: link.LinkBudget | None
     answer: link.LinkBudget | None
+    receiver_noise: tuple[Line, ...]
     largest_rate_bit_s: float
     tornado: tuple[link.Swing, ...]
     under_jitter: Performance | None
@@ -154,12 +159,16 @@ def run(file: LinkFile) -> LinkStudy:
     answer = None if m.answer is None else link.answer_budget(m, sources)
     open_loop = pointing.open_loop_budget(m, sources)
     light = tracking(file, answer)
+    communication, receiver = link.communication_budget(m, sources), link.receiver(m)
+    rate = m.communication.data_rate_bit_s
+    noise = () if receiver is None else receiver.noise_lines(communication.received_power_w, rate)
     return LinkStudy(
         file=file,
         open_loop=open_loop,
-        communication=link.communication_budget(m, sources),
+        communication=communication,
         beacon=beacon,
         answer=answer,
+        receiver_noise=noise,
         largest_rate_bit_s=largest_rate(m),
         tornado=link.tornado(m, sources),
         under_jitter=of_jitter(m),

@@ -10,7 +10,7 @@ from pydantic_core import CoreSchema
 
 from microrad.fields import Problem, Quantity, Share, Table, Whole
 from microrad.mirror_table import ANGLE_MOST, Angle, Name
-from microrad.units import format_quantity
+from microrad.units import UnitError, format_quantity
 
 LOWEST_ELEVATION_RAD = math.radians(10.0)
 """Elevation below which a plane-parallel atmosphere is no model of the path."""
@@ -40,7 +40,12 @@ class _DataRate(Quantity):
     """A data rate, or the word for one that is solved for; the latter is nan until then."""
 
     def read(self, value: object) -> float:
-        return math.nan if value == LARGEST else Quantity.read(self, value)
+        if value == LARGEST:
+            return math.nan
+        try:
+            return Quantity.read(self, value)
+        except UnitError as error:
+            raise UnitError(value, error.reason, self.wanted, error.example) from None
 
     @property
     def wanted(self) -> str:

@@ -80,7 +80,7 @@ def fine_pointing_requirement(
 def outage_requirement(m: Mission, margin_db: float, controller: str, cause: str) -> Requirement:
     """The margin that the fine-pointing loop leaves the communication link but for its allowed outage."""
     q = m.requirement
-    name = f"communication margin but for {100 * q.outage:g} % of the time ({controller})"
+    name = f"link margin but for {100 * q.outage:g} % of the time ({controller})"
     return Requirement(name, "dB", q.margin_db, margin_db, margin_db - q.margin_db, cause)
 
 

@@ -1,4 +1,4 @@
-"""Commands of the links: their budgets as tables, and presets of flown terminals to start from."""
+"""Commands of the links: their budgets as tables, and presets from the literature to start from."""
 
 import shutil
 import sys

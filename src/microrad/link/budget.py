@@ -43,6 +43,7 @@ _NOT_GIVEN = "not given"
 LEFT_AT_ZERO = "left at 0 dB"
 """The warning of a term that nothing was given for."""
 _DEEPEST_DB = 20.0  # pointing loss beyond which side lobes and scatter decide, not the main lobe
+_CUT_DB = 0.1  # gain beyond which it counts that the aperture cuts a beam that is taken as whole
 _WORST_STREHL_DB = 5.0  # beyond it the core of the beam no longer has the shape of the perfect one
 
 
@@ -63,11 +64,7 @@ class LinkBudget:
     margin_db: float
     irradiance_w_m2: float
     irradiance_on_axis_w_m2: float
-
-    @property
-    def required_irradiance_w_m2(self) -> float:
-        """Irradiance at the receiving aperture with which the margin would be 0 dB."""
-        return float(self.irradiance_w_m2 / 10.0 ** (self.margin_db / 10.0))
+    required_irradiance_w_m2: float
 
     @property
     def at_zero(self) -> tuple[str, ...]:
@@ -155,13 +152,15 @@ def _gaussian_budget(write: "Writer", beam: Beacon, receiver: str) -> LinkBudget
 
 
 def _cut_by_aperture(half_angle_rad: float, aperture_m: float, wavelength_m: float) -> str:
-    """The warning that a Gaussian beam of this half angle would be wider than the aperture that it leaves."""
+    """The warning that a Gaussian beam of this half angle has less gain, as the aperture that it leaves cuts it."""
     radius = wavelength_m / (math.pi * half_angle_rad)
-    if radius <= aperture_m / 2.0:
+    truncation = aperture_m / 2.0 / radius
+    lost = -20.0 * math.log10(-math.expm1(-(truncation**2)))  # (1 - exp(-a^2))^2, Klein and Degnan 1974
+    if lost <= _CUT_DB:
         return ""
     return (
-        f"a Gaussian beam this narrow is {format_quantity(2.0 * radius, 'm')} wide at 1/e2, wider than the aperture "
-        f"of {format_quantity(aperture_m, 'm')}: cut there, it has less gain and a wider core"
+        f"a Gaussian beam this narrow is {format_quantity(2.0 * radius, 'm')} wide at 1/e2, and the aperture of "
+        f"{format_quantity(aperture_m, 'm')} cuts it: {lost:.2f} dB less gain than this, and a wider core"
     )
 
 
@@ -360,6 +359,7 @@ def _budget(
         margin_db=margin,
         irradiance_w_m2=_irradiance(total_db(transmit), beam.wavelength_m),
         irradiance_on_axis_w_m2=_irradiance(total_db(on_axis), beam.wavelength_m),
+        required_irradiance_w_m2=_irradiance(total_db(transmit) - margin, beam.wavelength_m),
     )
 
 

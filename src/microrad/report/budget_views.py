@@ -17,6 +17,7 @@ COLUMNS = ("budget", "line", "value", "unit", "basis", "source", "holds for", "w
 def lines(study: LinkStudy) -> list[tuple[str, Line]]:
     """Every line of every budget with the name of its budget, totals included, in the order of the page."""
     found = [(b.name, line) for b in study.budgets for line in (*b.lines, *b.totals)]
+    found += [("Communication receiver", line) for line in study.receiver_noise]
     found += [("Open-loop pointing", line) for line in study.open_loop.lines]
     if study.tracking is not None:
         found += [("Tracking sensor", line) for line in study.tracking.noise_lines]

@@ -35,6 +35,7 @@ def context(
         "sentences": _sentences(links),
         "readings": (),
         "ideal": (),
+        "noise": links.receiver_noise,
         "light": _light(links),
         "performance": performance_rows(cases, ""),
         "performance_words": [budget_views.performance(each, links) for each in cases],

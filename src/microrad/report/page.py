@@ -72,12 +72,25 @@ def _links(study: Study, figures: Sequence[Figure]) -> dict[str, Any]:
         (study.answer, ""),
     )
     best = "" if study.fine_pointing is None else study.fine_pointing.best.design.name
+    context = links.context(study.links, budgets=budgets, figures=figures, files=True)
     return {
-        **links.context(study.links, budgets=budgets, figures=figures, files=True),
+        **context,
         **links.performance(study.performance, best),
+        "sentences": [*context["sentences"], *_loop_noise(study)],
         "readings": study.margin_map.readings,
         "ideal": study.margin_map.ideal,
     }
+
+
+def _loop_noise(study: Study) -> list[str]:
+    """The noise that the fine-pointing loop is simulated with, beside what the answer's light would allow."""
+    if study.fine_pointing is None or study.links.tracking is None:
+        return []
+    used = angle(study.fine_pointing.scene.loop.optical.noise_rad)
+    allowed = format_quantity(study.links.tracking.noise_equivalent_angle.value, "rad", 3)
+    return [
+        f"The fine-pointing loop is simulated with {used} of noise in its optical sensor; that light allows {allowed}."
+    ]
 
 
 def _inputs(sources: Any) -> list[tuple[str, Source]]:

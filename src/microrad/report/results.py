@@ -208,9 +208,38 @@ def _sines(fine: FinePointingStudy) -> xr.Dataset:
     return xr.Dataset(data)
 
 
+def _performance(study: Study) -> xr.Dataset:
+    """The communication link under each simulated residual, one entry a case."""
+    cases, dims = study.performance.cases, ("case",)
+    half = "half angle at 1/e2 with the most power at the outage loss"
+    quantities = {
+        "mean_loss": ("dB", "loss of the mean power by pointing", [c.mean_loss_db for c in cases]),
+        "outage_loss": (
+            "dB",
+            "pointing loss exceeded for the outage's share of time",
+            [c.outage_loss_db for c in cases],
+        ),
+        "margin": ("dB", "margin at the outage loss", [c.margin_db for c in cases]),
+        "outage": ("1", "share of the time with a margin below 0 dB", [c.outage for c in cases]),
+        "below_required": ("1", "share of the time below the required margin", [c.short for c in cases]),
+        "data_rate": ("bit/s", "data rate with the required margin there", [c.data_rate_bit_s for c in cases]),
+        "best_half_angle": ("rad", half, [c.best.half_angle_rad for c in cases]),
+    }
+    data = {
+        name: _variable(dims, np.array([getattr(c, name) for c in cases], dtype=object), "1", what)
+        for name, what in (
+            ("source", "pointing error"),
+            ("controller", "controller"),
+            ("mirror", "variant of the mirror"),
+        )
+    }
+    data |= {name: _variable(dims, np.array(values), unit, what) for name, (unit, what, values) in quantities.items()}
+    return xr.Dataset(data, attrs={"outage": study.performance.outage})
+
+
 def write_results(study: Study, path: Path) -> None:
     """results.nc: margin map, hysteresis loops, every trace, the fine-pointing loop; each variable with its unit."""
-    groups = {"margin_map": _map(study), **_loops(study)}
+    groups = {"margin_map": _map(study), "link_performance": _performance(study), **_loops(study)}
     for run in study.runs:
         name = f"{run.mirror} {run.controller} {run.freq_hz:g}_hz".replace(" + ", "_").replace(" ", "_").lower()
         groups[f"tracking/{name}"] = _trace(run)
@@ -224,7 +253,7 @@ def write_results(study: Study, path: Path) -> None:
 def manifest(study: Study, folder: Path) -> dict[str, Any]:
     """What made the results: the mission's text and hash, versions, and a hash of each file written so far.
 
-    Random numbers are drawn for the fine-pointing loop alone, from the mission's seed.
+    Random numbers are drawn for the fine-pointing loop and for acquisition, from the mission's seeds.
     """
     mission: dict[str, Any] = {"file": study.file.path.name, "sha256": study.file.sha256, "text": study.file.text}
     files: Mapping[str, Any] = {
@@ -232,13 +261,18 @@ def manifest(study: Study, folder: Path) -> dict[str, Any]:
         for p in sorted(folder.rglob("*"))
         if p.is_file()
     }
-    mirror, fine = study.file.mirror_file, study.file.mission.fine_pointing
+    mirror, m = study.file.mirror_file, study.file.mission
+    drawn = [
+        f"seed {table.seed} of [{name}], {table.runs} runs"
+        for name, table in (("fine_pointing", m.fine_pointing), ("acquisition", m.acquisition))
+        if table is not None
+    ]
     return {
         "mission": mission,
         "mirror": None if mirror is None else {"file": mirror.path.name, "sha256": mirror.sha256, "text": mirror.text},
         "versions": versions(),
         "machine": platform.machine(),
-        "randomness": "none" if fine is None else f"seed {fine.seed} of [fine_pointing], {fine.runs} runs",
+        "randomness": "; ".join(drawn) or "none",
         "files_sha256": files,
     }
 

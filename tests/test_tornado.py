@@ -1,0 +1,248 @@
+"""Each input of a link a little down and up: every swing by hand, within its bounds, the largest first."""
+
+import math
+
+import pytest
+
+from link_files import GAUSSIAN, PATTERN, RECEIVERS, SKY, link_file, received_with
+from microrad import link
+from microrad.fields import Quantity
+from microrad.link.tornado import RELATIVE, STEP_DB
+from microrad.missionfile import load_link
+from shipped import SHIPPED
+
+HALF = 2 * 1.55e-6 / (math.pi * 0.05)
+CHANNEL = {"channel": {"zenith_transmission": 0.8, "elevation": "30 deg"}}
+LEFT = {"point_ahead.corrected": False, "point_ahead.transverse_velocity": "1 km/s"}
+WAVEFRONT = {"communication.strehl": None, "communication.wavefront_error": "100 nm"}
+
+
+def swings(folder, *changes):
+    file = link_file(folder, *changes)
+    return {each.key: each for each in link.tornado(file.mission, file.sources)}
+
+
+def changed(mission, key, value):
+    """The mission with one key, given by the name of its field, replaced."""
+    *tables, field = key.split(".")
+    path = [mission]
+    for name in tables:
+        path.append(getattr(path[-1], name))
+    record = path.pop().model_copy(update={field: value})
+    for name, outer in zip(reversed(tables), reversed(path), strict=True):
+        record = outer.model_copy(update={name: record})
+    return record
+
+
+def field_of(mission, key):
+    """The name of the field that a file calls by this key."""
+    table = mission
+    *tables, last = key.split(".")
+    for name in tables:
+        table = getattr(table, name)
+    return ".".join([*tables, next(n for n, i in type(table).model_fields.items() if (i.alias or n) == last)])
+
+
+def margins(swing):
+    return swing.margin_low_db, swing.margin_high_db
+
+
+def up_and_down(factor, share=RELATIVE):
+    """Decibels that a product with a factor to a power gains when the factor moves."""
+    return tuple(10 * factor * math.log10(1 + sign * share) for sign in (-1, 1))
+
+
+def test_the_swings_are_those_of_the_formulas(tmp_path):
+    found = swings(tmp_path)
+    margin = link.communication_budget(link_file(tmp_path).mission, {}).margin_db
+    lost = 8.685889638 * (10e-6 / HALF) ** 2
+    apertures = [up_and_down(2)[i] + lost * (1 - (1 + s * RELATIVE) ** 2) for i, s in ((0, -1), (1, 1))]
+    expected = {
+        "communication.transmit_power": up_and_down(1),
+        "communication.distance": up_and_down(-2),
+        "communication.data_rate": up_and_down(-1),
+        "communication.receiver_sensitivity": up_and_down(-1),
+        "communication.strehl": (STEP_DB * 0.8, -STEP_DB),
+        "communication.implementation_loss": (0.0, -STEP_DB),
+        "communication.pointing_error": tuple(lost * (1 - (1 + s * RELATIVE) ** 2) for s in (-1, 1)),
+        "terminals.leo_aperture": tuple(apertures),
+        "terminals.geo_aperture": up_and_down(2),
+    }
+    for key, (low, high) in expected.items():
+        assert margins(found[key]) == pytest.approx((margin + low, margin + high), abs=1e-9), key
+        assert found[key].swing_db == pytest.approx(abs(high - low), abs=1e-9)
+    losses = {f"communication.{each}_loss" for each in ("transmit_optics", "receive_optics", "tracking_split")}
+    assert set(found) == set(expected) | losses | {"communication.wavelength"}
+
+
+CASES = {
+    "as it is": [],
+    "pattern": [PATTERN, {"terminals.leo_obscuration": 0.2, "terminals.geo_obscuration": 0.3}],
+    "ratio": [{"conventions.strehl": "ratio", "communication.strehl": 0.6}],
+    "wavefront, sky and point-ahead": [WAVEFRONT, CHANNEL, LEFT],
+    **{name: [received_with(name)] for name in RECEIVERS},
+    "sky": [received_with("apd ook", background=SKY, background_power=None)],
+}
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_every_swing_is_the_budget_with_one_key_changed(tmp_path, name):
+    file = link_file(tmp_path, *CASES[name])
+    found = link.tornado(file.mission, file.sources)
+    sizes = [each.swing_db for each in found]
+    assert sizes == sorted(sizes, reverse=True)
+    assert len({each.key for each in found}) == len(found)
+    for each in found:
+        field = field_of(file.mission, each.key)
+        assert each.low <= each.value <= each.high
+        assert each.low < each.high
+        for value, margin in ((each.low, each.margin_low_db), (each.high, each.margin_high_db)):
+            assert math.isfinite(margin), each
+            mission = changed(file.mission, field, value)
+            assert link.communication_budget(mission, file.sources).margin_db == pytest.approx(margin, abs=1e-9)
+        assert each.swing_db > 1e-9
+        assert each.source
+
+
+def test_the_keys_that_matter_are_those_that_the_link_has(tmp_path):
+    sky = swings(tmp_path, *CASES["wavefront, sky and point-ahead"])
+    assert {"channel.zenith_transmission", "channel.elevation", "point_ahead.transverse_velocity"} <= sky.keys()
+    assert "communication.wavefront_error" in sky
+    assert "communication.strehl" not in sky
+    pattern = swings(tmp_path, *CASES["pattern"])
+    assert {"communication.beam.radius", "communication.beam.m_squared"} <= pattern.keys()
+    assert {"terminals.leo_obscuration", "terminals.geo_obscuration"} <= pattern.keys()
+
+
+def test_what_does_not_move_the_margin_is_left_out(tmp_path):
+    found = swings(tmp_path, {"terminals.leo_obscuration": 0.2})  # which no formula of an even light holds
+    assert not any(key.startswith(("beacon.", "answer.", "requirement.", "pointing.", "point_ahead.")) for key in found)
+    assert "terminals.leo_obscuration" not in found
+    on_axis = swings(tmp_path, {"communication.pointing_error": "0 urad"})
+    assert "communication.pointing_error" not in on_axis
+
+
+@pytest.mark.parametrize("name", RECEIVERS)
+def test_a_receivers_values_are_among_the_inputs(tmp_path, name):
+    found = {key.removeprefix("communication.receiver.") for key in swings(tmp_path, received_with(name))}
+    plain = set(RECEIVERS[name]) - {"modulation", "detector", "order", "bandwidth"}
+    without_code = name in ("homodyne bpsk", "preamplified dpsk")  # linear in the rate: the code's rate changes nothing
+    plain -= {"code_rate"} if without_code else set()
+    missing = plain - found
+    assert missing <= {"code_rate", "dark_count_rate", "dark_current"}, missing
+    assert "communication.receiver_sensitivity" not in found
+
+
+def test_a_background_of_the_sky_is_among_the_inputs(tmp_path):
+    found = swings(tmp_path, *CASES["sky"])
+    prefix = "communication.receiver.background."
+    assert {f"{prefix}{key}" for key in SKY} <= found.keys()
+    assert found[f"{prefix}field_of_view"].swing_db > found[f"{prefix}filter_bandwidth"].swing_db
+
+
+# ---- bounds
+def test_a_value_at_its_bound_moves_to_the_other_side_only(tmp_path):
+    at_bounds = swings(
+        tmp_path,
+        {"communication.strehl": 0.0, "communication.transmit_optics_loss": "0.2 dB"},
+        received_with("apd ook", efficiency=1.0, code_rate=1.0, ionisation_ratio=0.95, avalanche_gain=1.05),
+    )
+    receiver = "communication.receiver."
+    for key, low, high in (
+        ("communication.strehl", 0.0, STEP_DB),
+        ("communication.transmit_optics_loss", 0.0, 0.2 + STEP_DB),
+        ("communication.tracking_split_loss", 0.0, STEP_DB),
+        (f"{receiver}efficiency", 0.9, 1.0),
+        (f"{receiver}ionisation_ratio", 0.855, 1.0),
+        (f"{receiver}avalanche_gain", 1.0, 1.155),
+    ):
+        assert (at_bounds[key].low, at_bounds[key].high) == pytest.approx((low, high), abs=1e-12), key
+
+
+@pytest.mark.parametrize(("strehl", "low", "high"), [(0.4, 0.36, 0.44), (0.95, 0.855, 1.0), (1.0, 0.9, 1.0)])
+def test_a_strehl_ratio_moves_by_a_share_of_itself_and_not_beyond_one(tmp_path, strehl, low, high):
+    moved = swings(tmp_path, {"conventions.strehl": "ratio", "communication.strehl": strehl})["communication.strehl"]
+    assert (moved.low, moved.high) == pytest.approx((low, high), abs=1e-12)
+    assert moved.swing_db == pytest.approx(10 * math.log10(high / low), abs=1e-9)
+
+
+@pytest.mark.parametrize(("ratio", "low", "high"), [(1e-6, 1e-7, 1e-5), (1e-18, 1e-18, 1e-17), (0.1, 0.01, 0.3)])
+def test_a_bit_error_ratio_moves_by_a_factor_of_ten(tmp_path, ratio, low, high):
+    found = swings(tmp_path, received_with("preamplified dpsk", bit_error_ratio=ratio))
+    moved = found["communication.receiver.bit_error_ratio"]
+    assert (moved.low, moved.high) == pytest.approx((low, high), rel=1e-12, abs=0.0)
+    assert moved.swing_db == pytest.approx(10 * math.log10(math.log(0.5 / low) / math.log(0.5 / high)), abs=1e-9)
+
+
+def test_an_extinction_ratio_stays_above_none(tmp_path):
+    found = swings(tmp_path, received_with("pin ook", extinction_ratio="0.3 dB"))
+    moved = found["communication.receiver.extinction_ratio"]
+    assert (moved.low, moved.high) == pytest.approx((0.15, 0.8), abs=1e-12)
+    assert math.isfinite(moved.swing_db)
+
+
+def test_an_amplifier_and_an_elevation_stay_within_their_bounds(tmp_path):
+    found = swings(
+        tmp_path,
+        {"channel": {"zenith_transmission": 0.95, "elevation": "10.5 deg"}},
+        received_with("preamplified ook", noise_figure="3.1 dB", amplifier_gain="10 dB"),
+    )
+    assert found["communication.receiver.noise_figure"].low == 3.0
+    assert "communication.receiver.amplifier_gain" not in found or (
+        found["communication.receiver.amplifier_gain"].low == 10.0
+    )
+    assert found["channel.elevation"].low == pytest.approx(math.radians(10.0), rel=1e-12)
+    assert found["channel.zenith_transmission"].high == 1.0
+
+
+def test_a_receiver_too_slow_for_the_rate_has_no_margin(tmp_path):
+    # 300 Mbit/s at a code rate of 0.8 are 375 MHz of symbols
+    found = swings(tmp_path, received_with("homodyne bpsk", bandwidth="380 MHz"))
+    for key, side in (("communication.data_rate", "high"), ("communication.receiver.bandwidth", "low")):
+        assert getattr(found[key], f"margin_{side}_db") == -math.inf
+        assert found[key].swing_db == math.inf
+    first = list(found)[:3]
+    assert set(first) == {
+        "communication.data_rate",
+        "communication.receiver.bandwidth",
+        "communication.receiver.code_rate",
+    }
+
+
+# ---- what is said about an input
+def test_units_and_kinds_of_source_travel_along():
+    file = load_link(SHIPPED)
+    found = {each.key: each for each in link.tornado(file.mission, file.sources)}
+    assert found["communication.transmit_power"].kind == "paper"
+    assert found["communication.receiver_sensitivity"].kind == "assumption"
+    assert found["communication.distance"].unit == "m"
+    assert found["communication.distance"].value == 42e6
+    assert found["communication.strehl"].unit == ""
+    assert found["communication.transmit_optics_loss"].unit == "dB"
+    assert found["communication.transmit_power"].source == "paper: Table 2"
+    without = link.tornado(file.mission, {})
+    assert {each.kind for each in without} == {""}
+    assert {each.source for each in without} == {"not stated"}
+
+
+def test_every_quantity_of_the_links_tables_is_tried(tmp_path):
+    # a key whose rule stands in a union or apart would be left out without a word
+    file = link_file(tmp_path, PATTERN, CHANNEL, LEFT, received_with("apd ook", background=SKY, background_power=None))
+    beam = file.mission.communication
+    for table in (
+        file.mission.terminals,
+        beam,
+        beam.receiver,
+        beam.receiver.background,
+        beam.beam,
+        file.mission.channel,
+    ):
+        for name, info in type(table).model_fields.items():
+            if isinstance(getattr(table, name), float):
+                inner = [
+                    rule
+                    for arg in getattr(info.annotation, "__args__", ())
+                    for rule in getattr(arg, "__metadata__", ())
+                ]
+                assert any(isinstance(rule, Quantity) for rule in (*info.metadata, *inner)), name
+    assert GAUSSIAN["m_squared"] > 1.0
