@@ -118,6 +118,14 @@ def test_an_error_that_stands_still_costs_what_the_budget_says_at_it(tmp_path, b
     assert found.fades_per_s == 0.0
 
 
+def test_a_beam_that_never_meets_its_target_still_has_a_mean_loss(tmp_path):
+    found, _ = under(tmp_path, jittery((1000, 0), (5, 5)))
+    # what decides it are errors so rare that their share is lost in rounding: no better than the truth
+    exact = float(pointing.mean_loss_db(record((1000, 0), (5, 5)), HALF_RAD))
+    assert 3080.0 < exact < found.mean_loss_db < loss_db(1e-3)  # its power is below the smallest number there is
+    assert (found.outage, found.short) == (pytest.approx(1.0), pytest.approx(1.0))
+
+
 def test_the_outage_of_the_mission_decides_the_quantile(tmp_path):
     for outage in (0.3, 1e-4):
         found, _ = under(tmp_path, jittery((0, 0), (3, 3)), {"requirement.outage": outage})

@@ -42,7 +42,9 @@ def budget(
     file: Annotated[Path, typer.Argument(help="Mission file, or one with the tables of its links.", metavar="FILE")],
     data_rate: Annotated[str | None, option("--data-rate", "RATE", "In place of the mission's.")] = None,
     pointing_error: Annotated[str | None, option("--pointing-error", "ANGLE", "In place of the mission's.")] = None,
-    solve_rate: Annotated[bool, typer.Option("--solve-rate", help="The largest data rate in its place.")] = False,
+    solve_rate: Annotated[
+        bool, typer.Option("--solve-rate", help="The largest data rate with the required margin in its place.")
+    ] = False,
     as_csv: Annotated[bool, typer.Option("--csv", help="Print one line a row, for a spreadsheet.")] = False,
     as_html: Annotated[bool, typer.Option("--html", help="Print one page that loads nothing.")] = False,
     as_json: Json = False,
@@ -111,5 +113,5 @@ def presets(as_json: Json = False) -> Outcome:
     if as_json:
         return Outcome(json_text([{"name": p.name, "title": p.title, "unknown": list(p.unknown)} for p in found]))
     widest = max(len(p.name) for p in found)
-    lines = [f"{p.name:{widest}}  {p.title} ({len(p.unknown)} to be given)" for p in found]
+    lines = [f"{p.name:{widest}}  {p.title} ({len(p.unknown) or 'nothing'} to be given)" for p in found]
     return Outcome("\n".join([*lines, "", "microrad init --preset NAME writes one."]))

@@ -3,11 +3,13 @@
 import csv
 import io
 import math
+from dataclasses import asdict
 from typing import Any
 
 from microrad.budget import Line
+from microrad.link import Swing
 from microrad.link_performance import Performance
-from microrad.link_study import Finding, LinkStudy
+from microrad.link_study import DEEPEST_DB, Finding, Found, LinkStudy, Tracking
 from microrad.pointing import OpenLoopPointing
 from microrad.report.quantities import quantity
 
@@ -31,7 +33,7 @@ def csv_text(study: LinkStudy) -> str:
     writer = csv.writer(buffer, lineterminator="\n")
     writer.writerow(COLUMNS)
     for name, line in lines(study):
-        value = f"{line.value:.12g}"
+        value = repr(float(line.value))  # every digit, as JSON has it
         writer.writerow([name, line.name, value, line.unit, line.basis, line.source, line.regime, line.warning])
     return buffer.getvalue().rstrip("\n")
 
@@ -48,11 +50,10 @@ def text(study: LinkStudy, width: int) -> str:
         groups.setdefault(name, []).append(line)
     for name, members in groups.items():
         table = Table(title=name, title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False, expand=True)
-        table.add_column("line", ratio=3)
+        table.add_column("line", width=max(width // 6, 14), overflow="fold")
         table.add_column("value", justify="right", no_wrap=True, min_width=12)
-        table.add_column("basis", ratio=5)
-        table.add_column("source", ratio=5)
-        table.add_column("holds for", ratio=4)
+        for heading, ratio in (("basis", 5), ("source", 5), ("holds for", 4)):
+            table.add_column(heading, ratio=ratio, overflow="fold")
         for line in members:
             mark = " !" if line.warning else ""
             table.add_row(line.name + mark, quantity(line.value, line.unit), line.basis, line.source, line.regime)
@@ -82,8 +83,11 @@ def sentences(study: LinkStudy) -> list[str]:
         )
     top = study.tornado[:3]
     if top:
-        moved = "; ".join(f"{s.key} {quantity(s.swing_db, 'dB')}" for s in top)
-        found.append(f"What moves the margin most, each input by 10 % (0.5 dB) both ways: {moved}.")
+        moved = "; ".join(f"{s.key} {_swing(s)}" for s in top)
+        found.append(
+            "What moves the margin most, each input by 10 % (0.5 dB; a bit error ratio by a factor of ten) both ways: "
+            f"{moved}."
+        )
     if study.beacon is not None:
         found.append(
             f"Beacon at its partner: {quantity(study.beacon.irradiance_w_m2, 'W/m^2')} at the pointing error, "
@@ -91,11 +95,7 @@ def sentences(study: LinkStudy) -> list[str]:
             f"{quantity(study.beacon.required_irradiance_w_m2, 'W/m^2')}."
         )
     if study.tracking is not None:
-        nea = study.tracking.noise_equivalent_angle
-        found.append(
-            f"The answer brings {quantity(study.tracking.power_w, 'W')} to the tracking sensor: noise-equivalent angle "
-            f"{quantity(nea.value, 'rad')} rms per axis and reading."
-        )
+        found.append(_light(study.tracking))
     if study.point_ahead is not None:
         found.append(point_ahead(study))
     found += pointing_sentences(study.open_loop)
@@ -108,8 +108,25 @@ def sentences(study: LinkStudy) -> list[str]:
 
 def verdict(study: LinkStudy) -> str:
     """Whether the links close, with each margin."""
-    margins = ", ".join(f"{b.name.lower()} {b.margin_db:+.2f} dB" for b in study.budgets)
+    margins = ", ".join(f"{b.name.lower()} {signed_db(b.margin_db)}" for b in study.budgets)
     return f"The links {'close' if study.closes else 'do not close'}: {margins}."
+
+
+def signed_db(value_db: float) -> str:
+    """A margin in decibels with its sign."""
+    return f"{value_db:+.2f} dB".replace("-", "\u2212")
+
+
+def _swing(s: Swing) -> str:
+    return quantity(s.swing_db, "dB") if math.isfinite(s.swing_db) else "takes the link beyond its receiver"
+
+
+def _light(t: Tracking) -> str:
+    brings = f"The answer brings {quantity(t.power_w, 'W')} to the tracking sensor: "
+    if t.signal_to_noise < 1.0:
+        return brings + f"less than its noise in a reading (signal to noise {t.signal_to_noise:.2g})."
+    angle = quantity(t.noise_equivalent_angle.value, "rad")
+    return f"{brings}noise-equivalent angle {angle} rms per axis and reading."
 
 
 def point_ahead(study: LinkStudy) -> str:
@@ -117,9 +134,10 @@ def point_ahead(study: LinkStudy) -> str:
     p = study.point_ahead
     assert p is not None
     state = "corrected here" if p.corrected else "NOT corrected here"
+    lost = f"{p.loss_db:.1f} dB" if p.loss_db <= DEEPEST_DB else f"more than {DEEPEST_DB:g} dB"
     return (
         f"Point-ahead: up to {quantity(p.angle_rad, 'rad')}, {p.beam_half_angles:.1f} half angles of the communication "
-        f"beam; left out, it would cost {p.loss_db:.1f} dB; a mirror that makes it needs "
+        f"beam; left out, it {'would cost' if p.corrected else 'costs'} {lost}; a mirror that makes it needs "
         f"{quantity(p.mirror_range_rad, 'rad')} of range at the line of sight; {state}."
     )
 
@@ -141,7 +159,7 @@ def performance(p: Performance, study: LinkStudy) -> str:
     q = study.file.mission.requirement
     return (
         f"Under the jitter: mean pointing loss {p.mean_loss_db:.2f} dB; {p.outage_loss_db:.2f} dB but for "
-        f"{100 * q.outage:g} % of the time, which leaves a margin of {p.margin_db:+.2f} dB; below 0 dB for a share "
+        f"{100 * q.outage:g} % of the time, which leaves a margin of {signed_db(p.margin_db)}; below 0 dB for a share "
         f"of {p.outage:.3g} of the time; best half angle {quantity(p.best.half_angle_rad, 'rad')}."
     )
 
@@ -152,9 +170,14 @@ def acquisition(f: Finding) -> list[str]:
     return [
         f"Acquisition by {w.name}: lock with a probability of {w.outcome.success_probability:.4f} "
         f"(simulated {w.simulated_probability:.4f}), {quantity(w.outcome.mean_time_s, 's')} in the mean "
-        f"(simulated {quantity(w.simulated_mean_s, 's')})."
+        f"(simulated {simulated_mean(w)})."
         for w in ways
     ]
+
+
+def simulated_mean(w: Found) -> str:
+    """Mean time of the simulated acquisitions that end in lock; there may be none."""
+    return "none locks" if math.isnan(w.simulated_mean_s) else quantity(w.simulated_mean_s, "s")
 
 
 def html(study: LinkStudy) -> str:
@@ -221,6 +244,8 @@ def data(study: LinkStudy) -> dict[str, Any]:
             ],
             "beacon_coverage": None if p.reading is None else p.reading.coverage,
         },
+        "point_ahead": None if study.point_ahead is None else asdict(study.point_ahead),
+        "receiver_noise": [line_data(line) for line in study.receiver_noise],
         "tracking": None if study.tracking is None else _tracking(study),
         "acquisition": None if study.finding is None else finding_data(study.finding),
         "under_jitter": None if study.under_jitter is None else performance_data(study.under_jitter),

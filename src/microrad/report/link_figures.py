@@ -1,7 +1,11 @@
 """Figures of the links: what moves the margin most, and the wide beacon against the scan."""
 
+import math
+from collections.abc import Sequence
+
 import numpy as np
 from matplotlib import rc_context
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Canvas
 
 from microrad.acquisition import Trade
@@ -27,15 +31,20 @@ def tornado(study: LinkStudy) -> Figure:
     shown, margin = study.tornado[:MOST_BARS], study.communication.margin_db
     canvas = Canvas(figsize=(6.4, 0.9 + 0.27 * len(shown)), layout="constrained")
     axes = canvas.subplots()
+    lost_db = _lost(shown, margin)
     for row, swing in enumerate(shown):
-        axes.barh(row, swing.margin_low_db - margin, left=margin, color=ORANGE, height=0.7, label="input lower")
-        axes.barh(row, swing.margin_high_db - margin, left=margin, color=BLUE, height=0.7, label="input higher")
+        low_db, high_db = max(swing.margin_low_db, lost_db), max(swing.margin_high_db, lost_db)
+        axes.barh(row, low_db - margin, left=margin, color=ORANGE, height=0.7, label="input lower")
+        axes.barh(row, high_db - margin, left=margin, color=BLUE, height=0.7, label="input higher")
+        if not math.isfinite(swing.swing_db):
+            ink = "white" if math.isinf(swing.margin_high_db) else "black"
+            _say(axes, (lost_db, row), "< no margin: receiver too slow", ink, "center")
     axes.axvline(margin, color="black", linewidth=0.8)
     required = study.file.mission.requirement.margin_db
     low, high = axes.get_xlim()
     if low < required < high:
         axes.axvline(required, color=VERMILION, linestyle="--", linewidth=1.0)
-        axes.text(required, -0.55, " required", color=VERMILION, fontsize=8, va="bottom")
+        _say(axes, (required, -0.55), "required", VERMILION, "bottom")
     axes.set_yticks(range(len(shown)), [_label(s) for s in shown], fontsize=8)
     axes.set_ylim(len(shown) - 0.4, -0.6)
     axes.set(xlabel="margin of the communication link (dB)")
@@ -59,6 +68,18 @@ def tornado(study: LinkStudy) -> Figure:
     return Figure("tornado", "What moves the margin", caption, svg_of(canvas), columns)
 
 
+def _say(axes: Axes, place: tuple[float, float], words: str, color: str, va: str) -> None:
+    """Words just right of a place."""
+    axes.annotate(words, place, (3, 0), textcoords="offset points", color=color, fontsize=8, va=va)
+
+
+def _lost(shown: Sequence[Swing], margin_db: float) -> float:
+    """Where the bar of an input ends that leaves no link: beyond all others."""
+    ends = [end for s in shown for end in (s.margin_low_db, s.margin_high_db) if math.isfinite(end)]
+    reach = max((abs(end - margin_db) for end in ends), default=0.0)
+    return margin_db - max(1.5 * reach, 1.0)
+
+
 def _label(swing: Swing) -> str:
     key = swing.key.removeprefix("communication.")
     return f"{key} = {format_quantity(swing.value, swing.unit, 3)}".rstrip()
@@ -73,7 +94,7 @@ def trade(study: LinkStudy, found: Finding, t: Trade) -> Figure:
     axes.loglog(sigma, t.scan_time_s, color=ORANGE, linestyle="--", label="spiral scan: whole area")
     axes.loglog(sigma, t.scan_mean_time_s, color=ORANGE, linestyle=":", label="spiral scan: mean until found")
     axes.axvline(found.sigma_rad * 1e6, color=VERMILION, linewidth=1.0)
-    axes.text(found.sigma_rad * 1e6, t.scan_time_s[-1], " this mission", color=VERMILION, fontsize=8, va="top")
+    _say(axes, (found.sigma_rad * 1e6, t.scan_time_s[-1]), "this mission", VERMILION, "top")
     axes.set(xlabel="pointing uncertainty, rms per axis (µrad)", ylabel="time (s)")
     axes.grid(visible=True, which="both", linewidth=0.3)
     axes.set_xticks([30, 100, 300, 1000], ["30", "100", "300", "1000"])

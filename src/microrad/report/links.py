@@ -39,7 +39,7 @@ def context(
         "light": _light(links),
         "performance": performance_rows(cases, ""),
         "performance_words": [budget_views.performance(each, links) for each in cases],
-        "performance_note": note(),
+        "performance_note": note(costs=False),
         "outage": f"{100 * outage:g} %",
         "costs": [],
         "fades": fades(cases),
@@ -59,7 +59,10 @@ def pointing(p: OpenLoopPointing) -> Row:
     left_for = ""
     if p.reading is not None:
         half = format_quantity(p.reading.half_angle_rad, "rad", 3)
-        left_for = f"the largest half width with which the root sum square equals the beacon's half angle ({half})."
+        left_for = (
+            "the largest half width, all others as they are, with which the root sum square equals the beacon's half "
+            f"angle ({half})."
+        )
     return {
         "rows": rows,
         "left_for": left_for,
@@ -139,14 +142,15 @@ def share(value: float) -> str:
     return "none" if value == 0.0 else f"{value:.1e}" if value < 1e-3 else f"{100 * value:.2g} %"
 
 
-def note() -> str:
+def note(*, costs: bool) -> str:
     """How the columns are to be read."""
-    return (
+    how = (
         "Rms: radial, about zero. Outage: share of the time with a margin below 0 dB. Best half angle: of a Gaussian "
         "beam, at 1/e2, with the most power at the loss of that column; narrower than the present one, it takes a "
-        "larger aperture. Data rate: the largest with the required margin at that loss. What hysteresis costs: against "
-        "the same controller and the same errors on a mirror without it."
+        "larger aperture. Data rate: the largest with the required margin at that loss."
     )
+    against = " What hysteresis costs: against the same controller and the same errors on a mirror without it."
+    return how + against if costs else how
 
 
 def performance(found: LinkPerformance, best: str) -> dict[str, Any]:
@@ -155,6 +159,7 @@ def performance(found: LinkPerformance, best: str) -> dict[str, Any]:
     return {
         "performance": performance_rows(shown, best, found.costs),
         "performance_words": [in_words(found)],
+        "performance_note": note(costs=bool(found.costs)),
         "outage": f"{100 * found.outage:g} %",
         "costs": found.costs,
         "fades": fades(found.cases),
@@ -183,7 +188,7 @@ def fades(cases: Sequence[Performance]) -> list[str]:
     if not known:
         return []
     if all(c.fades_per_s < RAREST_FADE_HZ for c in known):
-        return ["Fades below the required margin: none in a year, for Gaussian errors of the simulated spectra."]
+        return ["Fades below the required margin: none in a year, for Gaussian errors of these spectra."]
     said = "; ".join(
         f"{c.controller or c.source}: "
         + (
@@ -193,10 +198,10 @@ def fades(cases: Sequence[Performance]) -> list[str]:
         )
         for c in known
     )
-    found = [f"Fades below the required margin, for Gaussian errors of the simulated rms and spectrum: {said}."]
+    found = [f"Fades below the required margin, for Gaussian errors of that rms and spectrum: {said}."]
     penalties = [c for c in known if not math.isnan(c.uncoded_penalty_db)]
     if penalties:
-        said = "; ".join(f"{c.controller or c.source} {c.uncoded_penalty_db:.2f} dB" for c in penalties)
+        said = "; ".join(f"{c.controller or c.source} {_penalty(c)}" for c in penalties)
         found.append(
             f"Power that brings an uncoded link's mean bit error ratio back to its target: {said}. A coded link pays "
             "the mean loss when its interleaver spans many fades, and the loss of the outage column when it spans none."
@@ -204,11 +209,15 @@ def fades(cases: Sequence[Performance]) -> list[str]:
     return found + [c.fade_warning.capitalize() + "." for c in known if c.fade_warning][:1]
 
 
+def _penalty(c: Performance) -> str:
+    return "more than any power" if math.isinf(c.uncoded_penalty_db) else f"{c.uncoded_penalty_db:.2f} dB"
+
+
 # --------------------------------------------------------------------------------------------------------- acquisition
 def acquisition(f: Finding) -> Row:
     """Each way to find the partner, with its stages and one run."""
     ways = [f.wide] if f.scan is None else [f.wide, f.scan]
-    return {"sentences": acquisition_words(f), "ways": [way(w) for w in ways]}
+    return {"sentences": acquisition_words(f), "ways": [way(w) for w in ways], "early": f"{100 * EARLY:g} %"}
 
 
 def way(w: Found) -> Row:
@@ -221,7 +230,7 @@ def way(w: Found) -> Row:
             f"{o.success_probability:.4f}",
             f"{w.simulated_probability:.4f}",
             quantity(o.mean_time_s, "s"),
-            quantity(w.simulated_mean_s, "s"),
+            budget_views.simulated_mean(w),
             quantity(late, "s"),
         ],
         "stages": w.stages,
