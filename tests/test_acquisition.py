@@ -1,4 +1,4 @@
-"""Coverage, the sequence of beacon, answer and lock with its retries, and the wide beacon against the scan."""
+"""The sequence of beacon, answer and lock with its retries, and the wide beacon against the scan."""
 
 import itertools
 import math
@@ -14,7 +14,6 @@ from microrad.acquisition import (
     Beams,
     Chances,
     Detector,
-    PointingError,
     Receiver,
     Search,
     Spiral,
@@ -23,8 +22,6 @@ from microrad.acquisition import (
     Timing,
     answer_stages,
     beacon_stages,
-    coverage_probability,
-    coverage_radius,
     detection_times,
     frame_detection_probability,
     frames_detection_probability,
@@ -49,55 +46,6 @@ TIMING = Timing(
     lock_time_s=1.0,
 )
 CHANCES = Chances(0.57, 0.9, 0.95, 0.99, 0.97, 0.98)
-
-
-def by_polar_quadrature(radius, error):
-    node, weight = np.polynomial.legendre.leggauss(200)
-    r = radius * (1 + node)[:, None] / 2
-    angle = np.linspace(0, 2 * math.pi, 400, endpoint=False)
-    density = stats.norm.pdf(r * np.cos(angle), error.bias_rad, error.sigma_rad) * stats.norm.pdf(
-        r * np.sin(angle), error.bias_cross_rad, error.cross_rad
-    )
-    return float(np.sum(density.mean(axis=1) * 2 * math.pi * r[:, 0] * weight) * radius / 2)
-
-
-@pytest.mark.parametrize(
-    "error",
-    [
-        PointingError(300e-3),
-        PointingError(300e-3, bias_rad=100e-3, bias_cross_rad=-250e-3),
-        PointingError(300e-3, 120e-3),
-        PointingError(80e-3, 300e-3, 150e-3, 90e-3),
-    ],
-)
-def test_coverage_is_the_integral_of_the_density_over_the_disc(error):
-    for radius in (0.05, 0.39, 0.9):
-        assert coverage_probability(radius, error) == pytest.approx(by_polar_quadrature(radius, error), rel=1e-11)
-
-
-def test_coverage_of_the_papers_beacon_is_the_rayleigh_law():
-    assert coverage_probability(390 * URAD, PointingError(300 * URAD)) == pytest.approx(
-        1 - math.exp(-(390**2) / (2 * 300**2)), rel=1e-13
-    )
-    assert coverage_radius(0.995, PointingError(300 * URAD)) / URAD == pytest.approx(976.6, abs=0.05)
-
-
-def test_nearly_equal_axes_join_the_equal_ones_and_a_thin_axis_leaves_a_line():
-    equal = coverage_probability(400 * URAD, PointingError(300 * URAD, None, 90 * URAD, 20 * URAD))
-    nearly = coverage_probability(400 * URAD, PointingError(300 * URAD, 300.0001 * URAD, 90 * URAD, 20 * URAD))
-    assert nearly == pytest.approx(equal, rel=1e-6)
-    thin = coverage_probability(400 * URAD, PointingError(300 * URAD, 1e-3 * URAD))
-    assert thin == pytest.approx(math.erf(400 / 300 / math.sqrt(2)), rel=1e-8)
-    beside = coverage_probability(400 * URAD, PointingError(300 * URAD, 1e-3 * URAD, 0.0, 250 * URAD))
-    assert beside == pytest.approx(math.erf(math.sqrt(400**2 - 250**2) / 300 / math.sqrt(2)), rel=1e-8)
-
-
-@pytest.mark.parametrize(
-    "error", [PointingError(3e-4, 1e-4), PointingError(3e-4, None, 5e-4), PointingError(1e-4, 3e-4, 9e-4)]
-)
-def test_the_coverage_radius_covers_what_was_asked(error):
-    for probability in (0.01, 0.5, 0.995):
-        assert coverage_probability(coverage_radius(probability, error), error) == pytest.approx(probability, rel=1e-9)
 
 
 def test_a_time_distribution_keeps_its_books():
@@ -310,13 +258,6 @@ def test_the_wide_beams_edge_is_brightest_at_the_root_of_two():
 ONE = TimeDistribution(np.array([1.0]), np.array([0.5]))
 STAGE = Stage("see", 1.0, 0.5)
 REFUSALS = [
-    (lambda: PointingError(0.0), r"standard deviation of the pointing error is 0 rad: it must be above 0 rad"),
-    (lambda: PointingError(1e-6, 0.0), r"the standard deviation across is 0 rad"),
-    (lambda: PointingError(1e-6, bias_rad=math.nan), r"bias of the pointing error is not finite"),
-    (lambda: coverage_probability(0.0, PointingError(1e-6)), r"the coverage radius is 0 rad: it must lie above 0 rad"),
-    (lambda: coverage_probability(math.pi / 2, PointingError(1e-6)), r"coverage radius is 1\.571 rad: .*below pi/2"),
-    (lambda: coverage_radius(0.0, PointingError(1e-6)), r"probability is 0: it must lie above 0 and below 1"),
-    (lambda: coverage_radius(1.0, PointingError(1e-6)), r"probability is 1: it must lie above 0 and below 1"),
     (lambda: ONE.quantile(0.51), r"no time has the probability 0\.51: .*at most 0\.5"),
     (lambda: ONE.quantile(0.0), r"no time has the probability 0: it must lie above 0"),
     (lambda: ONE.before(0.5).mean_s, r"no time of success: its probability is 0"),

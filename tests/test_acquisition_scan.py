@@ -7,14 +7,12 @@ import pytest
 
 from microrad.acquisition import (
     Detector,
-    PointingError,
     Raster,
     Search,
     Spiral,
     StepStare,
     TimeDistribution,
     Vibration,
-    coverage_probability,
     detection_times,
     dwells_along_track,
     gap_probability,
@@ -23,6 +21,7 @@ from microrad.acquisition import (
     scan_detection_probability,
     simulate_scan,
 )
+from microrad.radial_error import Jitter, radial_cdf
 
 URAD = 1e-6
 SEARCH = Search(300 * URAD, 20 * URAD, 0.25, 0.995)
@@ -265,7 +264,8 @@ def test_the_spirals_time_is_nearly_exponential_since_it_goes_outward():
 
 def test_unequal_axes_are_searched_to_the_same_coverage():
     search = Search(300 * URAD, 20 * URAD, 0.25, 0.99, 120 * URAD)
-    assert coverage_probability(search.radius_rad, PointingError(300 * URAD, 120 * URAD)) == pytest.approx(0.99)
+    assert search.error == Jitter((0.0, 0.0), (300 * URAD, 120 * URAD))
+    assert float(radial_cdf(search.error, search.radius_rad)) == pytest.approx(0.99, rel=1e-12)
     for scan in (Spiral(search, SURE, SLOW), Raster(search, SURE, SLOW), StepStare(search, SURE, 2 * LOOK_S)):
         times = detection_times(scan)
         runs = simulate_scan(scan, 8000, 17, samples=48 if hasattr(scan, "speed_rad_s") else 8)
@@ -344,6 +344,7 @@ REFUSALS = [
     (lambda: Search(300e-6, 0.0, 0.25, 0.9), r"the beam's radius is 0 rad: it must lie above 0 rad"),
     (lambda: Search(300e-6, 1.6, 0.25, 0.9), r"the beam's radius is 1\.6 rad: .*below pi/2"),
     (lambda: Search(0.0, 20e-6, 0.25, 0.9), r"standard deviation of the pointing error is 0 rad"),
+    (lambda: Search(300e-6, 20e-6, 0.25, 0.9, 0.0), r"standard deviation across is 0 rad"),
     (lambda: Search(300e-6, 20e-6, 0.25, 0.9, -1e-6), r"standard deviation across is -1 µrad"),
     (lambda: Search(300e-6, 20e-6, -0.01, 0.9), r"the overlap is -0\.01: it must be 0 or more and below 1"),
     (lambda: Search(300e-6, 20e-6, 1.0, 0.9), r"the overlap is 1: it must be 0 or more and below 1"),

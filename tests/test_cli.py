@@ -268,7 +268,9 @@ def test_design_refuses_what_it_cannot_design(refused, folder, plain):
 
 def test_run_refuses_missing_and_faulty_files(refused, folder):
     assert "no-such.toml" in refused("run", "no-such.toml")
-    faulty = mission(folder / "faulty.toml", ('error = "300 urad"                    # paper: section 2.1', "error = 300 # paper"))
+    faulty = mission(
+        folder / "faulty.toml", ('error = "300 urad"                    # paper: section 2.1', "error = 300 # paper")
+    )
     message = refused("run", faulty)
     for words in ("pointing.lines.body_pointing.error", "line ", "without a unit"):
         assert words in message

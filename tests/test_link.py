@@ -222,7 +222,7 @@ def test_margin_of_error_is_the_map_at_the_missions_rate():
 @settings(deadline=None)  # the machine may be busy
 @given(
     st.floats(0.0, 20.0),
-    st.floats(0.0, 50e-6),
+    st.floats(0.0, 20e-6),
     st.sampled_from(["gaussian", "gain"]),
     st.sampled_from(["decibel", "ratio"]),
 )
@@ -230,6 +230,11 @@ def test_the_largest_data_rate_leaves_the_margin_asked_for(margin, error, pointi
     mission = changed(conventions={"pointing_loss": pointing_loss, "strehl": strehl})
     rate = link.largest_data_rate(mission, margin, error)
     assert link.communication_budget(mission, SOURCES, error, rate).margin_db == pytest.approx(margin, abs=1e-9)
+
+
+def test_a_link_without_a_bit_a_second_has_no_largest_data_rate():
+    with pytest.raises(link.LinkError, match=r"not even 1 bit/s leaves a margin of 3 dB: 114.27 dB are missing"):
+        link.largest_data_rate(MISSION, 3.0, 95e-6)
 
 
 @settings(deadline=None)  # the machine may be busy

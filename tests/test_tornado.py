@@ -217,7 +217,7 @@ def test_units_and_kinds_of_source_travel_along():
     assert found["communication.receiver_sensitivity"].kind == "assumption"
     assert found["communication.distance"].unit == "m"
     assert found["communication.distance"].value == 42e6
-    assert found["communication.strehl"].unit == ""
+    assert found["communication.strehl"].unit == "dB"  # read as a loss
     assert found["communication.transmit_optics_loss"].unit == "dB"
     assert found["communication.transmit_power"].source == "paper: Table 2"
     without = link.tornado(file.mission, {})

@@ -19,6 +19,7 @@ MOST_ITEMS = 1000
 
 UNKNOWN = "unknown"
 """What a preset holds where no source prints a value."""
+_EXAMPLES = (5.0, 1.0, 0.5, 20.0, 45.0, 100.0, 1e3, 0.1, 1e-3)
 NOT_PUBLISHED = "is in no source that the preset names, and has to be given"
 
 _PATTERN = r"^[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]{1,3})? ?[A-Za-zµμ1].*$"
@@ -65,8 +66,14 @@ class Quantity:
 
     @property
     def example(self) -> str:
-        """A value that can be read; whether it is a good one is the mission's affair."""
-        return f"5 {self.typical or kind_of(self.unit)[1]}" if self.unit else "1.0"
+        """A value within the bounds; whether it is a good one is the mission's affair."""
+        unit = self.typical or kind_of(self.unit)[1]
+        for number in _EXAMPLES:
+            text = f"{number:g} {unit}" if self.unit else f"{number:g}" if number % 1 else f"{number:.1f}"
+            value = parse_quantity(text, self.unit) if self.unit else number
+            if not self._out_of_bounds(value):
+                return text
+        return f"5 {unit}" if self.unit else "1.0"
 
     @property
     def wanted(self) -> str:

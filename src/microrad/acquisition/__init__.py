@@ -1,6 +1,5 @@
-"""Acquisition of the laser link: coverage, scans, the sequence of beacon, answer and lock, and their trade."""
+"""Acquisition of the laser link: scans, the sequence of beacon, answer and lock, and their trade."""
 
-from microrad.acquisition.coverage import PointingError, coverage_probability, coverage_radius
 from microrad.acquisition.detection import detection_times, gap_probability, repeated
 from microrad.acquisition.scan import (
     Detector,
@@ -47,7 +46,6 @@ __all__ = [
     "Chances",
     "Detector",
     "Outcome",
-    "PointingError",
     "Raster",
     "Receiver",
     "Scan",
@@ -64,8 +62,6 @@ __all__ = [
     "Vibration",
     "answer_stages",
     "beacon_stages",
-    "coverage_probability",
-    "coverage_radius",
     "detection_times",
     "dwells_along_track",
     "frame_detection_probability",

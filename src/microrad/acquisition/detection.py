@@ -11,10 +11,10 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from microrad.acquisition.coverage import radial_cumulative
 from microrad.acquisition.limits import require_count, require_not_negative, require_positive
 from microrad.acquisition.scan import Raster, Scan, Spiral, StepStare
 from microrad.acquisition.times import TimeDistribution, joined, merged
+from microrad.radial_error import radial_cdf
 
 _Array = NDArray[np.float64]
 _REACH = 8.0  # standard deviations of the vibration
@@ -148,7 +148,7 @@ def _spiral_times(scan: Spiral, jitter_rms_rad: float) -> TimeDistribution:
     edge = np.linspace(0.0, scan.duration_s, _TIMES + 1)
     track = scan.track_radius(edge)
     radius = np.linspace(0.0, search.radius_rad + float(np.max(np.abs(offset), initial=0.0)), _RADII)
-    within = radial_cumulative(radius, search.error)
+    within = radial_cdf(search.error, radius)
     # detected by the time the track has radius rho: the target's radius is below rho - offset
     found = np.zeros_like(track)
     for begin in range(0, offset.size, 256):
@@ -163,14 +163,14 @@ def _raster_times(scan: Raster, jitter_rms_rad: float) -> TimeDistribution:
 
     search, row = scan.search, scan.row_rad
     offset, weight = _offsets(scan, jitter_rms_rad)
-    error = search.error
+    sigma_x, sigma_y = search.error.rms_rad
     reached = math.ceil(float(np.ptp(offset)) / search.pitch_rad)
     first = [weight * _first(scan, offset, jitter_rms_rad, before) for before in range(reached + 1)]
     across = np.array(
-        [float(first[min(i, reached)] @ _density(place - offset, error.cross_rad)) for i, place in enumerate(row)]
+        [float(first[min(i, reached)] @ _density(place - offset, sigma_y)) for i, place in enumerate(row)]
     )
     edge = np.linspace(-search.radius_rad, search.radius_rad, _ALONG + 1)
-    along = np.diff(ndtr(edge / error.sigma_rad))
+    along = np.diff(ndtr(edge / sigma_x))
     middle = (edge[:-1] + edge[1:]) / 2.0
     begin = np.arange(scan.rows) * (scan.row_time_s + scan.turn_around_s)
     time = begin[:, None] + (middle + search.radius_rad) / scan.speed_rad_s  # to and fro alike: the axis is symmetric
@@ -215,11 +215,12 @@ def _dwell_times(scan: StepStare, jitter_rms_rad: float) -> TimeDistribution:
     from scipy.special import ndtr  # slow to load
 
     search = scan.search
+    sigma_x, sigma_y = search.error.rms_rad
     edge, step, probability = _cell(scan, jitter_rms_rad)
     cell = scan.near(search.radius_rad + search.beam_radius_rad + _REACH * jitter_rms_rad)  # all that some dwell sees
     centre = cell @ scan.basis_rad
-    along = np.diff(ndtr((centre[:, :1] + edge[0]) / search.error.sigma_rad), axis=1)
-    across = np.diff(ndtr((centre[:, 1:] + edge[1]) / search.error.cross_rad), axis=1)
+    along = np.diff(ndtr((centre[:, :1] + edge[0]) / sigma_x), axis=1)
+    across = np.diff(ndtr((centre[:, 1:] + edge[1]) / sigma_y), axis=1)
     order = scan.order(cell[:, None, :] + step)
     # all cells whose dwells come in the same order share the chances of each dwell to be the first that detects
     sequence = np.where(order < scan.dwells, np.argsort(np.argsort(order, axis=1), axis=1), -1)

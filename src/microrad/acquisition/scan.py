@@ -7,7 +7,6 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from microrad.acquisition.coverage import PointingError, coverage_radius
 from microrad.acquisition.limits import (
     require_angle,
     require_inside,
@@ -15,6 +14,7 @@ from microrad.acquisition.limits import (
     require_positive,
     require_probability,
 )
+from microrad.radial_error import Jitter, radial_quantile
 from microrad.units import format_quantity
 
 _Array = NDArray[np.float64]
@@ -44,23 +44,32 @@ class Search:
             raise ValueError(
                 f"the overlap is {self.overlap:g}: it must be 0 or more and below 1, a share of a diameter"
             )
+        require_positive("the standard deviation of the pointing error", self.sigma_rad, "rad")
+        if self.sigma_cross_rad is not None:
+            require_positive("the standard deviation across", self.sigma_cross_rad, "rad")
         require_inside("the coverage probability", self.coverage)
-        coverage_radius(self.coverage, self.error)
+        require_angle("the radius that covers the pointing error", self.radius_rad)
 
     @property
-    def error(self) -> PointingError:
+    def error(self) -> Jitter:
         """The uncertainty as a pointing error without bias."""
-        return PointingError(self.sigma_rad, self.sigma_cross_rad)
+        across = self.sigma_rad if self.sigma_cross_rad is None else self.sigma_cross_rad
+        return Jitter((0.0, 0.0), (self.sigma_rad, across))
 
     @property
     def radius_rad(self) -> float:
         """Radius of the searched disc: sigma sqrt(-2 ln(1 - P)) for equal axes."""
-        return coverage_radius(self.coverage, self.error)
+        return _covering_radius(self.error, self.coverage)
 
     @property
     def pitch_rad(self) -> float:
         """Distance of neighbouring tracks, 2 beam_radius (1 - overlap)."""
         return 2.0 * self.beam_radius_rad * (1.0 - self.overlap)
+
+
+@lru_cache(maxsize=256)  # a scan asks for the same one again and again
+def _covering_radius(error: Jitter, coverage: float) -> float:
+    return float(radial_quantile(error, 1.0 - coverage))
 
 
 @dataclass(frozen=True, slots=True)

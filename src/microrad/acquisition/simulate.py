@@ -48,8 +48,7 @@ def simulate_scan(scan: Scan, runs: int, seed: int, vibration: Vibration | None 
     if samples < 2:
         raise ValueError(f"the number of samples in a pass is {samples}: it must be 2 or more")
     draw = np.random.Generator(np.random.Philox(key=seed))
-    x = draw.normal(0.0, scan.search.sigma_rad, runs)
-    y = draw.normal(0.0, scan.search.error.cross_rad, runs)
+    x, y = (draw.normal(0.0, sigma, runs) for sigma in scan.search.error.rms_rad)
     shake = vibration or Vibration(0.0, 1.0)
     start, end = scan.windows(x, y, scan.search.beam_radius_rad + 6.0 * shake.rms_rad)
     state = _Pass(scan, x, y, shake, draw)

@@ -38,7 +38,7 @@ __all__ = ["app", "main"]
 )
 @command
 def init(
-    file: Annotated[Path, typer.Argument(help="File to write.")] = Path("leo-geo.toml"),
+    file: Annotated[Path | None, typer.Argument(help="File to write [default: leo-geo.toml, or NAME.toml].")] = None,
     preset: Annotated[
         str | None, option("--preset", "NAME", "A link from the literature; see microrad presets.")
     ] = None,
@@ -50,7 +50,8 @@ def init(
     from importlib import resources
 
     if preset is not None:
-        return _init_preset(file, preset)
+        return _init_preset(file or Path(f"{preset}.toml"), preset)
+    file = file or Path("leo-geo.toml")
     run_it = f"microrad run {shlex.quote(str(file))}"
     check_target(file, f"name another one (microrad init other.toml) or go on with: {run_it}")
     write_whole(file, resources.files("microrad").joinpath("missions", "leo-geo.toml").read_text("utf-8"))
@@ -60,10 +61,13 @@ def init(
 def _init_preset(file: Path, name: str) -> Outcome:
     from microrad import presets
 
-    text = presets.preset_text(name)
+    try:
+        text = presets.preset_text(name)
+    except ValueError as error:
+        raise Refusal(str(error)) from error
     chosen = next(each for each in presets.presets() if each.name == name)
     run_it = f"microrad budget {shlex.quote(str(file))}"
-    check_target(file, f"name another one (microrad init --preset {name} other.toml)")
+    check_target(file, f"name another one: microrad init --preset {name} other.toml")
     write_whole(file, text)
     first = f"{file} written. " + (f"To be given first: {', '.join(chosen.unknown)}. " if chosen.unknown else "")
     return Outcome(f"{first}Next: {run_it}")

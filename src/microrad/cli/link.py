@@ -95,8 +95,11 @@ def _changed(file: "LinkFile", data_rate: str | None, pointing_error: str | None
         except ValueError as error:
             raise Refusal(f"--{key.replace('_', '-')}: {error}") from error
         sources[f"communication.{key}"] = Source(0, "command line", text)
-    beam = file.mission.communication.model_copy(update=values)
-    return replace(file, mission=file.mission.model_copy(update={"communication": beam}), sources=sources)
+    m = file.mission
+    tables: dict[str, object] = {"communication": m.communication.model_copy(update=values)}
+    if solve_rate and "pointing_error_rad" in values:  # the rate is asked for at this error, not at the required one
+        tables["requirement"] = m.requirement.model_copy(update={"pointing_error_rad": values["pointing_error_rad"]})
+    return replace(file, mission=m.model_copy(update=tables), sources=sources)
 
 
 @app.command(epilog=examples("microrad presets", "microrad init --preset click click.toml"))

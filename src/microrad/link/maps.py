@@ -96,7 +96,13 @@ def rate_at_loss(mission: LinkMission, margin_db: float, loss_db: float) -> floa
     available = received_on_axis_dbm(mission) - loss_db - margin_db
     built = receiver(mission)
     if built is None:
-        return float(10.0 ** ((available - float(required_dbm(mission, 1.0))) / 10.0))
+        rate = float(10.0 ** ((available - float(required_dbm(mission, 1.0))) / 10.0))
+        if rate < _SLOWEST_BIT_S:
+            raise LinkError(
+                f"not even {format_quantity(_SLOWEST_BIT_S, 'bit/s')} leaves a margin of {margin_db:g} dB: "
+                f"{-10.0 * math.log10(rate):.2f} dB are missing"
+            )
+        return rate
     highest = built.highest_data_rate_bit_s
     if float(required_dbm(mission, highest)) <= available:
         return highest

@@ -71,7 +71,7 @@ def _swings(mission: LinkMission, sources: Mapping[str, Source], name: str) -> I
         key = f"{name}.{info.alias or field}"
         yield Swing(
             key=key,
-            unit=rules[0].unit,
+            unit=_unit(mission, field, rules[0]),
             value=value,
             low=low,
             high=high,
@@ -80,6 +80,11 @@ def _swings(mission: LinkMission, sources: Mapping[str, Source], name: str) -> I
             kind=sources[key].kind if key in sources else "",
             source=source_text(sources, key),
         )
+
+
+def _unit(mission: LinkMission, field: str, rule: Quantity) -> str:
+    """Unit of a field; a Strehl has one of its own where it is read as a loss."""
+    return "dB" if field == "strehl" and mission.conventions.strehl == "decibel" else rule.unit
 
 
 def _inner(annotation: object) -> list[Quantity]:

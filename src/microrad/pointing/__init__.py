@@ -17,7 +17,6 @@ from microrad.pointing.open_loop import INTERPRETATIONS, DivergenceReading, Open
 from microrad.pointing.point_ahead import PointAheadAngle, point_ahead, point_ahead_rad
 from microrad.pointing.statistics import (
     BestDivergence,
-    Jitter,
     best_divergence_for_mean,
     best_divergence_for_outage,
     best_divergence_for_static_error,
@@ -26,9 +25,6 @@ from microrad.pointing.statistics import (
     mean_transmission,
     outage_loss_db,
     outage_probability,
-    radial_cdf,
-    radial_quantile,
-    radial_survival,
     radius_of_loss_rad,
     transmission,
     transmission_variance,
@@ -51,6 +47,7 @@ from microrad.pointing.summation import (
     sigma_multiple,
     summations,
 )
+from microrad.radial_error import Jitter, radial_cdf, radial_quantile, radial_survival
 
 __all__ = [
     "INTERPRETATIONS",

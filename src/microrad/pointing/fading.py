@@ -11,15 +11,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from microrad.pointing.statistics import (
-    Jitter,
-    density_on_circle,
     mean_loss_db,
     outage_loss_db,
     outage_probability,
-    radial_survival,
     radius_of_loss_rad,
     transmission,
 )
+from microrad.radial_error import Jitter, density_on_circle, radial_survival
 from microrad.units import format_quantity
 
 Floats = NDArray[np.float64]

@@ -12,7 +12,6 @@ from microrad.mission import LinkMission, Source, source_text
 from microrad.pointing.allocation import Allocation, allocate
 from microrad.pointing.classes import ErrorTerm, Interpretation, StatedError, basis, error_term
 from microrad.pointing.point_ahead import NAME, PointAheadAngle, point_ahead
-from microrad.pointing.statistics import Jitter, radial_cdf
 from microrad.pointing.summation import (
     Rule,
     Summation,
@@ -21,6 +20,7 @@ from microrad.pointing.summation import (
     mean_and_sigma,
     summations,
 )
+from microrad.radial_error import Jitter, radial_cdf
 
 Floats = NDArray[np.float64]
 

@@ -7,7 +7,7 @@ from statistics import NormalDist
 from typing import Literal
 
 from microrad.pointing.classes import ErrorTerm
-from microrad.pointing.statistics import Jitter, radial_quantile
+from microrad.radial_error import Jitter, radial_quantile
 
 Rule = Literal["rss", "esa-1993", "ecss-axis", "ecss-radial", "exact"]
 """The rules that count every term; the Rayleigh rule of ECSS leaves out the means."""

@@ -6,7 +6,7 @@ from typing import Any
 
 from microrad.link_performance import Performance
 from microrad.link_study import Finding, Found, LinkStudy
-from microrad.performance import Cost, LinkPerformance
+from microrad.performance import FINE, Cost, LinkPerformance
 from microrad.pointing import OpenLoopPointing
 from microrad.report import budget_views
 from microrad.report.figures import Figure
@@ -54,7 +54,10 @@ def pointing(p: OpenLoopPointing) -> Row:
     allocated = None if p.reading is None else p.allocation(p.reading.half_angle_rad, "rss")
     rows = []
     for place, line in enumerate(p.lines):
-        left = "" if allocated is None else format_quantity(allocated[place].largest_rad, "rad", 3)
+        left = ""
+        if allocated is not None:
+            # the other lines alone may exceed the beacon's cone
+            left = "nothing" if allocated[place].note else format_quantity(allocated[place].largest_rad, "rad", 3)
         rows.append({"line": line, "share": f"{100 * p.variance_shares[place]:.1f} %", "left": left})
     left_for = ""
     if p.reading is not None:
@@ -139,7 +142,7 @@ def cells(c: Performance) -> list[str]:
 
 def share(value: float) -> str:
     """A share of the time; nothing was seen of what is none."""
-    return "none" if value == 0.0 else f"{value:.1e}" if value < 1e-3 else f"{100 * value:.2g} %"
+    return "none" if value == 0.0 else f"{value:.1e}" if value < 1e-3 else f"{float(f'{100 * value:.2g}'):g} %"
 
 
 def note(*, costs: bool) -> str:
@@ -169,10 +172,12 @@ def performance(found: LinkPerformance, best: str) -> dict[str, Any]:
 def in_words(found: LinkPerformance) -> str:
     """How the residuals enter the link."""
     half = format_quantity(found.half_angle_rad, "rad", 3)
+    fine = any(c.source == FINE for c in found.cases)
+    first, then = (" first", ", then the loop under vibration and noise") if fine else ("", "")
     return (
         "The communication link under every simulated residual, by its own distribution and not by one static number: "
         f"the loss that is exceeded for {100 * found.outage:g} % of the time, against a beam of {half} half angle at "
-        "1/e2. Clean sines first (one axis, as in the paper), then the loop under vibration and noise."
+        f"1/e2. Clean sines{first} (one axis, as in the paper){then}."
     )
 
 

@@ -1,0 +1,397 @@
+"""What the pages say of the links: rows, sentences and figures, against the records that they are made from."""
+
+import math
+import re
+import xml.etree.ElementTree as ET
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from link_files import RECEIVERS, data_with, link_file, received_with, written
+from microrad import link_study
+from microrad.link import Swing
+from microrad.missionfile import load_link
+from microrad.performance import FINE, NO_HYSTERESIS, Cost, LinkPerformance
+from microrad.report import budget_views, link_figures, links
+from microrad.report.quantities import quantity
+
+FEW = {"acquisition.runs": 100}
+NO_SCAN = {**FEW, "acquisition.scan": None}
+JITTER = {"jitter": {"bias": ["1 urad", "0 urad"], "rms": ["3 urad", "3 urad"], "bandwidth": "50 Hz"}}
+YEAR_S = 365.25 * 86400.0
+SVG = "{http://www.w3.org/2000/svg}"
+
+
+def studied(folder, *changes):
+    return link_study.run(link_file(folder, *changes))
+
+
+@pytest.fixture(scope="module")
+def plain(tmp_path_factory):
+    """The paper's links with both ways to find the partner, under a jitter."""
+    return studied(tmp_path_factory.mktemp("plain"), FEW, JITTER)
+
+
+def case(plain, **values):
+    """The link under the jitter, with values of its record replaced."""
+    return replace(plain.under_jitter, **values)
+
+
+def micro(text):
+    """An angle of a cell, in microradians."""
+    value, unit = text.split()
+    return float(value) * {"nrad": 1e-3, "\u00b5rad": 1.0, "mrad": 1e3, "rad": 1e6}[unit]
+
+
+# ------------------------------------------------------------------------------------------------------ cells of shares
+@pytest.mark.parametrize(
+    ("share", "text"),
+    [
+        (0.0, "none"),
+        (4.08e-6, "4.1e-06"),
+        (9.99e-4, "1.0e-03"),
+        (1e-3, "0.1 %"),
+        (0.0042, "0.42 %"),
+        (0.529, "53 %"),
+        (0.997, "100 %"),
+        (1.0, "100 %"),
+    ],
+)
+def test_a_share_of_the_time_is_a_percentage_until_it_is_too_small_for_one(share, text):
+    assert links.share(share) == text
+
+
+def test_the_cells_of_a_case_are_its_record(plain):
+    c = case(
+        plain,
+        mean_loss_db=1.234,
+        outage_loss_db=2.346,
+        margin_db=-0.014,
+        outage=0.02,
+        short=0.0,
+        data_rate_bit_s=242.4e6,
+    )
+    cells = links.cells(c)
+    rms = math.sqrt(1.0**2 + 2 * 3.0**2)
+    assert cells[0] == f"{rms:.2f}"
+    assert cells[1:6] == ["1.23", "2.35", "\u22120.01", "2 %", "none"]
+    assert cells[6:8] == [f"{c.best.half_angle_rad * 1e6:.1f}", f"{c.best.current_excess_db:.2f}"]
+    assert cells[8] == "242"
+    assert links.cells(case(plain, data_rate_bit_s=math.nan))[8] == "none"
+    assert links.cells(case(plain, margin_db=2.0))[3] == "+2.00"
+
+
+@pytest.mark.parametrize(
+    ("margin_db", "rate_bit_s", "cells"),
+    [
+        (-3.104, -252.4e6, ["3.10", "252"]),
+        (0.2, 3e6, ["0.00", "0"]),  # a gain is no cost
+        (-1.0, math.nan, ["1.00", ""]),
+    ],
+)
+def test_what_hysteresis_costs_is_positive_and_blank_where_there_is_no_rate(margin_db, rate_bit_s, cells):
+    assert links.cost_cells(Cost("a", "b", "c", margin_db, rate_bit_s)) == cells
+
+
+def test_costs_stand_in_the_row_of_their_case_and_the_best_controller_is_marked(plain):
+    cases = [
+        case(plain, source=FINE, controller=name, mirror=mirror)
+        for name in ("PID", "LQG")
+        for mirror in ("given", "comparison")
+    ]
+    costs = [Cost(FINE, "LQG", "given", -0.5, -1e6)]
+    rows = links.performance_rows(cases, "LQG", costs)
+    assert [(row["controller"], row["mirror"]) for row in rows] == [(c.controller, c.mirror) for c in cases]
+    assert [row["cells"][-2:] for row in rows] == [["", ""], ["", ""], ["0.50", "1"], ["", ""]]
+    assert [row["best"] for row in rows] == [False, False, True, False]
+    assert {len(row["cells"]) for row in rows} == {11}
+    assert {len(row["cells"]) for row in links.performance_rows(cases, "")} == {9}
+    assert not any(row["best"] for row in links.performance_rows([case(plain)], ""))
+
+
+def test_the_reference_without_hysteresis_and_the_case_without_controller_have_no_row(plain):
+    shown = case(plain, source="sine of 1 Hz", controller="PID", mirror="given")
+    cases = (shown, replace(shown, mirror=NO_HYSTERESIS), case(plain))
+    cost = Cost("sine of 1 Hz", "PID", "given", -1.0, -2e6)
+    context = links.performance(LinkPerformance(0.003, 20e-6, cases, (cost,)), "")
+    assert [(row["source"], row["mirror"]) for row in context["performance"]] == [("sine of 1 Hz", "given")]
+    assert context["outage"] == "0.3 %"
+    assert context["performance_note"].endswith("on a mirror without it.")
+    assert links.note(costs=False).endswith("at that loss.")
+
+
+def test_the_loop_under_vibration_is_named_only_where_it_was_simulated(plain):
+    sine = case(plain, source="sine of 1 Hz", controller="PID", mirror="given")
+    alone, both = (
+        links.in_words(LinkPerformance(0.003, 19.7e-6, cases, ()))
+        for cases in ((sine,), (sine, replace(sine, source=FINE)))
+    )
+    assert "Clean sines (one axis, as in the paper)." in alone
+    assert "Clean sines first (one axis, as in the paper), then the loop under vibration and noise." in both
+    assert "exceeded for 0.3 % of the time, against a beam of 19.7 \u00b5rad half angle" in alone
+
+
+# --------------------------------------------------------------------------------------------------------------- fades
+def test_fades_that_no_spectrum_tells_are_not_spoken_of(plain):
+    assert links.fades(()) == []
+    assert links.fades([case(plain, fades_per_s=math.nan)]) == []
+
+
+def test_fades_rarer_than_one_in_a_year_are_none(plain):
+    rare = case(plain, fades_per_s=0.99 / YEAR_S)
+    assert links.fades([rare]) == [
+        "Fades below the required margin: none in a year, for Gaussian errors of these spectra."
+    ]
+    once = case(plain, fades_per_s=1.01 / YEAR_S, fade_s=2e-3)
+    assert "3.2e-08 a second of 2 ms each" in links.fades([once])[0]
+
+
+def test_each_case_has_its_own_fades(plain):
+    often = case(plain, controller="PID", fades_per_s=75.66, fade_s=7.512e-3, uncoded_penalty_db=1.234)
+    rare = case(plain, controller="", source="jitter as given", fades_per_s=0.0, uncoded_penalty_db=math.nan)
+    said = links.fades([often, rare, case(plain, controller="unknown", fades_per_s=math.nan)])
+    assert said[0].endswith(": PID: 75.7 a second of 7.51 ms each; jitter as given: none in a year.")
+    assert "back to its target: PID 1.23 dB." in said[1]
+    assert len(said) == 2
+    assert len(links.fades([replace(often, uncoded_penalty_db=math.nan)])) == 1
+
+
+def test_a_penalty_that_no_power_makes_good_is_said_in_words(plain):
+    (_, said) = links.fades([case(plain, fades_per_s=1.0, fade_s=1e-3, uncoded_penalty_db=math.inf)])
+    assert "jitter as given more than any power." in said
+    assert "inf" not in said
+
+
+def test_what_there_is_to_doubt_of_fades_is_said_once(plain):
+    doubtful = case(
+        plain, fades_per_s=1.0, fade_s=1e-3, uncoded_penalty_db=math.nan, fade_warning="half of it is noise"
+    )
+    assert links.fades([doubtful, doubtful])[1:] == ["Half of it is noise."]
+
+
+# ------------------------------------------------------------------------------------------------------------ pointing
+def test_the_column_of_what_is_left_fills_the_beacons_cone(plain):
+    shown = links.pointing(plain.open_loop)
+    lines = [row["line"] for row in shown["rows"]]
+    square = sum((line.value * 1e6) ** 2 for line in lines)
+    for row, line in zip(shown["rows"], lines, strict=True):
+        others = square - (line.value * 1e6) ** 2
+        assert micro(row["left"]) == pytest.approx(math.sqrt(390.0**2 - others), rel=6e-3)
+        assert float(row["share"].removesuffix(" %")) == pytest.approx(1e14 * line.value**2 / square, abs=0.06)
+    assert "half angle (390 \u00b5rad)" in shown["left_for"]
+    assert shown["confidence"] == "99.7 %"
+    assert shown["totals"] == plain.open_loop.summations
+
+
+def test_without_a_beacon_nothing_is_left_for_anything(tmp_path):
+    found = studied(tmp_path, {"beacon": None, "acquisition": None})
+    shown = links.pointing(found.open_loop)
+    assert [row["left"] for row in shown["rows"]] == [""] * len(shown["rows"])
+    assert (shown["left_for"], shown["sentences"]) == ("", [])
+
+
+def test_a_line_that_the_others_leave_nothing_is_told_so(tmp_path):
+    found = studied(tmp_path, NO_SCAN, {"pointing.lines.body_pointing.error": "400 urad"})
+    left = {row["line"].name: row["left"] for row in links.pointing(found.open_loop)["rows"]}
+    assert left.pop("Body pointing") == "300 \u00b5rad"
+    assert set(left.values()) == {"nothing"}
+
+
+def test_the_sentence_on_coverage_tells_both_readings(plain, tmp_path):
+    (said,) = links.coverage(plain.open_loop)
+    own, other = plain.open_loop.reading, plain.open_loop.counter_reading
+    assert "Read as full-1/e2, the beacon's half angle is 390 \u00b5rad, at least the root sum square" in said
+    assert f"with a probability of {own.coverage:.4f}" in said
+    assert said.endswith(f"Read as half-1/e2, the cone is 780 \u00b5rad and the probability {other.coverage:.4f}.")
+    narrow = studied(tmp_path, NO_SCAN, {"beacon.divergence": "600 urad"})
+    assert "300 \u00b5rad, less than the root sum square" in links.coverage(narrow.open_loop)[0]
+
+
+def test_no_sentence_is_said_twice_on_the_page(plain):
+    context = links.context(plain, budgets=(), figures=(), files=False)
+    everywhere = budget_views.sentences(plain)
+    elsewhere = [
+        budget_views.verdict(plain),
+        *budget_views.pointing_sentences(plain.open_loop),
+        *context["performance_words"],
+        *budget_views.acquisition(plain.finding),
+    ]
+    assert sorted([*context["sentences"], *elsewhere]) == sorted(everywhere)
+    assert len(context["sentences"]) == 5
+
+
+# --------------------------------------------------------------------------------------------------------- acquisition
+def test_the_rows_of_acquisition_are_those_of_the_record(plain):
+    shown = links.acquisition(plain.finding)
+    assert [row["name"] for row in shown["ways"]] == ["wide beacon", "spiral scan"]
+    assert shown["early"] == "90 %"
+    for row, way in zip(shown["ways"], (plain.finding.wide, plain.finding.scan), strict=True):
+        locked = way.simulated.locked
+        late = row["cells"].pop()
+        assert row["cells"] == [
+            f"{way.outcome.success_probability:.4f}",
+            f"{np.mean(locked):.4f}",
+            quantity(way.outcome.mean_time_s, "s"),
+            quantity(float(np.mean(way.simulated.time_s[locked])), "s"),
+        ]
+        assert float(late.removesuffix(" s")) == pytest.approx(np.quantile(way.simulated.time_s[locked], 0.9), rel=0.25)
+        assert row["stages"] == way.stages
+        assert row["log"] == way.log
+
+
+def test_acquisition_that_never_locks_has_no_simulated_time(tmp_path):
+    found = studied(tmp_path, NO_SCAN, {"answer.transmit_power": "1 mW"})
+    (way,) = links.acquisition(found.finding)["ways"]
+    assert way["cells"][1] == "0.0000"
+    assert way["cells"][3] == "none locks"
+    assert not any("nan" in cell for cell in way["cells"])
+
+
+def test_the_words_on_acquisition_give_each_chance(plain, tmp_path):
+    chances = plain.finding.chances
+    words, scan = links.acquisition_words(plain.finding)
+    for value in (chances.beacon_coverage, chances.answer_coverage, chances.answer_detection, chances.return_coverage):
+        assert f"{value:.4f}" in words
+    assert f"in {quantity(plain.finding.scan_s, 's')} at most." in scan
+    assert len(links.acquisition_words(studied(tmp_path, NO_SCAN).finding)) == 1
+
+
+# ------------------------------------------------------------------------------------------------------------- figures
+def texts(figure):
+    """The words of a figure."""
+    return [each.text for each in ET.fromstring(figure.svg).iter(f"{SVG}text")]
+
+
+def test_the_figures_are_svg_with_their_numbers_beside_them(plain):
+    tornado, trade = link_figures.draw(plain)
+    assert (tornado.name, trade.name) == ("tornado", "wide-beam-or-scan")
+    for figure in (tornado, trade):
+        assert ET.fromstring(figure.svg).tag == f"{SVG}svg"
+        assert figure.title
+        assert len({np.size(column) for column in figure.columns.values()}) == 1
+        assert all(np.isfinite(column).all() for column in figure.columns.values())
+    assert list(tornado.columns["margin lower (dB)"]) == [s.margin_low_db for s in plain.tornado]
+    assert all(re.search(r"\((rad|s)\)|probability", name) for name in trade.columns)
+    assert np.array_equal(trade.columns["scan, whole time (s)"], plain.finding.trade.scan_time_s)
+
+
+def test_the_captions_give_the_missions_own_numbers(plain):
+    _, trade = link_figures.draw(plain)
+    assert "99.5 % coverage" in trade.caption
+    assert (
+        "a beam of 20 \u00b5rad half angle, led over it with an overlap of 0.25 under 5 \u00b5rad of jitter"
+        in trade.caption
+    )
+    least = 100 * float(np.min(plain.finding.trade.scan_probability))
+    assert f"finds {least:.1f} % or more." in trade.caption
+
+
+def test_there_is_no_trade_without_a_scan(tmp_path):
+    assert [figure.name for figure in link_figures.draw(studied(tmp_path, NO_SCAN))] == ["tornado"]
+    assert [figure.name for figure in link_figures.draw(studied(tmp_path, {"acquisition": None}))] == ["tornado"]
+
+
+def swing(plain, low_db, high_db, **others):
+    values = {"key": "communication.data_rate", "unit": "bit/s", "value": 3e8, "low": 2.7e8, "high": 3.3e8}
+    values |= {"kind": "", "source": "mission file", "margin_low_db": low_db, "margin_high_db": high_db}
+    return Swing(**(values | others))
+
+
+@pytest.mark.parametrize(
+    "ends",
+    [
+        [(3.5, 2.5)],
+        [(3.5, -math.inf)],
+        [(-math.inf, -math.inf)],
+        [(-math.inf, 3.0), (3.5, 2.5), (3.5, -math.inf)],
+        [(3.0 + 1e-7, 3.0)],
+    ],
+    ids=["one", "too fast", "never", "several", "hardly any"],
+)
+def test_a_tornado_is_drawn_whatever_its_swings(plain, ends):
+    found = replace(plain, tornado=tuple(swing(plain, *each) for each in ends))
+    figure, _ = link_figures.draw(found)
+    ET.fromstring(figure.svg)
+    assert not re.search(r"\b(nan|inf)\b", figure.svg)
+    slow = sum(not all(map(math.isfinite, each)) for each in ends)
+    assert texts(figure).count("< no margin: receiver too slow") == slow
+    assert {"input lower", "input higher"} <= set(texts(figure))
+
+
+def test_no_swing_is_no_tornado(plain):
+    assert [figure.name for figure in link_figures.draw(replace(plain, tornado=()))] == ["wide-beam-or-scan"]
+
+
+def test_a_receiver_near_its_bandwidth_is_drawn_and_listed(tmp_path):
+    found = studied(tmp_path, NO_SCAN, received_with("preamplified dpsk"), {"communication.data_rate": "3.1 Gbit/s"})
+    assert math.isinf(found.tornado[0].swing_db)
+    (figure,) = link_figures.draw(found)
+    assert texts(figure).count("< no margin: receiver too slow") == 3  # rate, code rate and bandwidth
+    assert math.isinf(figure.columns["margin higher (dB)"].min())
+
+
+def test_a_tornado_shows_its_longest_bars_and_names_assumptions(plain):
+    many = [
+        swing(plain, 3 + x, 3 - x, key=f"communication.k{n}", kind="assumption" * (n == 1))
+        for n, x in enumerate(np.linspace(2, 1, 30))
+    ]
+    figure, _ = link_figures.draw(replace(plain, tornado=tuple(many)))
+    labels = [text for text in texts(figure) if text and text.startswith("k")]
+    assert len(labels) == link_figures.MOST_BARS
+    assert labels[0] == "k0 = 300 Mbit/s"
+    assert figure.caption.endswith("Assumptions among them: communication.k1.")
+    assert all(column.size == 30 for column in figure.columns.values())
+
+
+def test_the_required_margin_is_marked_where_it_is_in_sight(plain, tmp_path):
+    assert "required" in texts(link_figures.draw(plain)[0])
+    far = studied(tmp_path, NO_SCAN, {"requirement.margin": "30 dB"})
+    assert "required" not in texts(link_figures.draw(far)[0])
+
+
+# ------------------------------------------------------------------------------------------------------------ the page
+def test_every_text_of_the_mission_is_escaped(tmp_path):
+    path = written(tmp_path, data_with({**NO_SCAN, "name": "<script>alert(1)</script> & co"}))
+    text = path.read_text(encoding="utf-8")
+    line = 'transmit_power = "5 W"'
+    assert text.count(line) == 1
+    path.write_text(text.replace(line, f"{line} # literature: <img src=x onerror=y> 2021"), encoding="utf-8")
+    page = budget_views.html(link_study.run(load_link(path)))
+    assert "<script" not in page
+    assert "<img" not in page
+    assert page.count("&lt;script&gt;alert(1)&lt;/script&gt; &amp; co") == 3  # title, heading and inputs
+    assert page.count("literature: &lt;img src=x onerror=y&gt; 2021") == 2  # in the budget and among the inputs
+
+
+def test_brackets_of_a_comment_are_no_markup_of_the_terminal(tmp_path):
+    path = written(tmp_path, data_with(NO_SCAN))
+    text = path.read_text(encoding="utf-8").replace(
+        'transmit_power = "5 W"', 'transmit_power = "5 W" # paper: [bold] 2'
+    )
+    path.write_text(text, encoding="utf-8")
+    assert "paper: [bold] 2" in budget_views.text(link_study.run(load_link(path)), 160)
+
+
+def test_the_page_holds_every_line_and_no_hyphen_for_a_minus(plain):
+    page = budget_views.html(plain)
+    for _, line in budget_views.lines(plain):
+        assert f">{quantity(line.value, line.unit)}</td>" in page
+    plain_text = re.sub(r"<(svg|style).*?</\1>|<[^>]*>", " ", page, flags=re.DOTALL)
+    assert not re.search(r"(?<![\w-])-\d+\.\d\d dB", plain_text)
+    assert page.count("<figure") == page.count("</figure>") == 2
+    assert page.count("<table") == page.count("</table>")
+
+
+@pytest.mark.parametrize("name", ["pin ook", "counting ppm"])
+def test_the_noise_of_a_receiver_has_its_table(tmp_path, plain, name):
+    assert name in RECEIVERS
+    found = studied(tmp_path, NO_SCAN, received_with(name))
+    heading = "Noise of the communication receiver"
+    assert (heading in budget_views.html(found)) is bool(found.receiver_noise)
+    assert heading not in budget_views.html(plain)
+
+
+def test_figures_name_their_data_only_where_they_stand_beside_the_page(plain):
+    assert "figures/tornado.csv" not in budget_views.html(plain)
+    assert links.context(plain, budgets=(), figures=(), files=True)["files"] is True
