@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 from scipy.stats import ncx2, norm
 
 from link_files import PATTERN, RECEIVERS, link_file, received_with
-from microrad import acquisition, link, link_study, sensor
+from microrad import acquisition, link, link_acquisition, link_study, sensor
 from microrad.missionfile import LinkFile
 from shipped import edited_file
 from test_presets import NAMES, completed
@@ -387,7 +387,7 @@ def rows():
     ],
 )
 def test_each_kind_of_scan_is_as_fast_as_its_detector_allows(tmp_path, monkeypatch, pattern, duration_s, speed_rad_s):
-    monkeypatch.setattr(link_study, "TRADE_RAD", np.array([1e-4]))
+    monkeypatch.setattr(link_acquisition, "TRADE_RAD", np.array([1e-4]))
     found = link_study.run(link_file(tmp_path, {"acquisition.runs": 1000, "acquisition.scan.pattern": pattern})).finding
     assert found.scan_radius_rad == pytest.approx(RADIUS_RAD, rel=1e-6)
     assert found.scan_s == pytest.approx(duration_s, rel=1e-5)
@@ -425,7 +425,7 @@ def wide_time_s(sigma_rad, receive=1.0):
 
 
 def test_the_trade_spreads_the_beacons_power_or_leads_it_over_the_uncertainty(plain):
-    trade, sigma = plain.finding.trade, link_study.TRADE_RAD
+    trade, sigma = plain.finding.trade, link_acquisition.TRADE_RAD
     assert_allclose(trade.sigma_rad, sigma)
     assert {np.shape(getattr(trade, each.name)) for each in fields(trade)} == {sigma.shape, ()}
     assert_allclose(trade.radius_rad, sigma * math.sqrt(-2 * math.log(0.005)), rtol=1e-12)
@@ -455,6 +455,6 @@ def test_the_trade_spreads_the_beacons_power_or_leads_it_over_the_uncertainty(pl
 )
 def test_the_trade_counts_all_losses_but_those_off_axis(tmp_path, monkeypatch, changes, receive):
     sigma = np.array([3e-4, 1e-3])
-    monkeypatch.setattr(link_study, "TRADE_RAD", sigma)
+    monkeypatch.setattr(link_acquisition, "TRADE_RAD", sigma)
     found = link_study.run(link_file(tmp_path, FEW, changes)).finding
     assert_allclose(found.trade.wide_time_s, wide_time_s(sigma, receive), rtol=1e-9)

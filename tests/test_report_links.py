@@ -110,12 +110,14 @@ def test_costs_stand_in_the_row_of_their_case_and_the_best_controller_is_marked(
     assert not any(row["best"] for row in links.performance_rows([case(plain)], ""))
 
 
-def test_the_reference_without_hysteresis_and_the_case_without_controller_have_no_row(plain):
+def test_the_reference_without_hysteresis_has_no_row_and_the_missions_own_jitter_stands_first(plain):
     shown = case(plain, source="sine of 1 Hz", controller="PID", mirror="given")
-    cases = (shown, replace(shown, mirror=NO_HYSTERESIS), case(plain))
+    cases = (shown, replace(shown, mirror=NO_HYSTERESIS))
     cost = Cost("sine of 1 Hz", "PID", "given", -1.0, -2e6)
-    context = links.performance(LinkPerformance(0.003, 20e-6, cases, (cost,)), "")
+    context = links.performance(LinkPerformance(0.003, 20e-6, cases, (cost,)), "", None)
     assert [(row["source"], row["mirror"]) for row in context["performance"]] == [("sine of 1 Hz", "given")]
+    own = links.performance(LinkPerformance(0.003, 20e-6, cases, (cost,)), "", case(plain))
+    assert [row["source"] for row in own["performance"]] == ["jitter as given", "sine of 1 Hz"]
     assert context["outage"] == "0.3 %"
     assert context["performance_note"].endswith("on a mirror without it.")
     assert links.note(costs=False).endswith("at that loss.")

@@ -8,8 +8,9 @@ from typing import Any
 
 from microrad.budget import Line
 from microrad.link import Swing
+from microrad.link_acquisition import DEEPEST_DB, Finding, Found, Tracking
 from microrad.link_performance import Performance
-from microrad.link_study import DEEPEST_DB, Finding, Found, LinkStudy, Tracking
+from microrad.link_study import LinkStudy
 from microrad.pointing import OpenLoopPointing
 from microrad.report.quantities import quantity
 

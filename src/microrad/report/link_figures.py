@@ -10,7 +10,8 @@ from matplotlib.figure import Figure as Canvas
 
 from microrad.acquisition import Trade
 from microrad.link import Swing
-from microrad.link_study import Finding, LinkStudy
+from microrad.link_acquisition import Finding
+from microrad.link_study import LinkStudy
 from microrad.report.figures import BLUE, ORANGE, STYLE, VERMILION, Figure, svg_of
 from microrad.units import format_quantity
 

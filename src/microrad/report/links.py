@@ -4,8 +4,9 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
+from microrad.link_acquisition import Finding, Found
 from microrad.link_performance import Performance
-from microrad.link_study import Finding, Found, LinkStudy
+from microrad.link_study import LinkStudy
 from microrad.performance import FINE, Cost, LinkPerformance
 from microrad.pointing import OpenLoopPointing
 from microrad.report import budget_views
@@ -156,9 +157,10 @@ def note(*, costs: bool) -> str:
     return how + against if costs else how
 
 
-def performance(found: LinkPerformance, best: str) -> dict[str, Any]:
-    """What the template needs of the link under the simulated residuals."""
-    shown = [c for c in found.cases if c.controller != "" and c.mirror != "no hysteresis"]
+def performance(found: LinkPerformance, best: str, given: Performance | None) -> dict[str, Any]:
+    """What the template needs of the link under the simulated residuals, and under the jitter of a mission's own."""
+    shown = [c for c in found.cases if c.mirror != "no hysteresis"]
+    shown = shown if given is None else [given, *shown]
     return {
         "performance": performance_rows(shown, best, found.costs),
         "performance_words": [in_words(found)],

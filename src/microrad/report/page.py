@@ -75,7 +75,7 @@ def _links(study: Study, figures: Sequence[Figure]) -> dict[str, Any]:
     context = links.context(study.links, budgets=budgets, figures=figures, files=True)
     return {
         **context,
-        **links.performance(study.performance, best),
+        **links.performance(study.performance, best, study.links.under_jitter),
         "sentences": [*context["sentences"], *_loop_noise(study)],
         "readings": study.margin_map.readings,
         "ideal": study.margin_map.ideal,
