@@ -86,11 +86,13 @@ def test_the_cells_of_a_case_are_its_record(plain):
     ("margin_db", "rate_bit_s", "cells"),
     [
         (-3.104, -252.4e6, ["3.10", "252"]),
-        (0.2, 3e6, ["0.00", "0"]),  # a gain is no cost
+        (0.2, 3e6, ["\u22120.20", "\u22123"]),  # it can also gain
+        (0.001, 3e5, ["0.00", "0"]),
+        (0.0, 0.0, ["0.00", "0"]),
         (-1.0, math.nan, ["1.00", ""]),
     ],
 )
-def test_what_hysteresis_costs_is_positive_and_blank_where_there_is_no_rate(margin_db, rate_bit_s, cells):
+def test_what_hysteresis_costs_has_its_sign_and_is_blank_where_there_is_no_rate(margin_db, rate_bit_s, cells):
     assert links.cost_cells(Cost("a", "b", "c", margin_db, rate_bit_s)) == cells
 
 

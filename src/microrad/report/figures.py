@@ -146,6 +146,7 @@ def _band(axes: Axes, rate: Floats, error: Floats, maps: Floats, required_db: fl
         axes.contourf(rate, error, between, levels=[0.5, 1.5], colors="none", hatches=["////"], zorder=1.5)
     for edge in (lowest, highest):
         axes.contour(rate, error, edge.T, levels=[required_db], colors="white", linestyles=":", linewidths=1.0)
+    axes.plot([], [], ":", color="white", label=f"{required_db:g} dB by other readings of the conventions")
 
 
 def residual_urad(study: Study) -> float:

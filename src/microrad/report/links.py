@@ -185,8 +185,13 @@ def in_words(found: LinkPerformance) -> str:
 
 def cost_cells(c: Cost) -> list[str]:
     """What hysteresis takes from one controller, as text: dB of margin, Mbit/s."""
-    rate = "" if math.isnan(c.data_rate_bit_s) else f"{max(-c.data_rate_bit_s * 1e-6, 0.0):.0f}"
-    return [f"{max(-c.margin_db, 0.0):.2f}", rate]
+    rate = "" if math.isnan(c.data_rate_bit_s) else signed(-c.data_rate_bit_s * 1e-6, 0)
+    return [signed(-c.margin_db, 2), rate]
+
+
+def signed(value: float, decimals: int) -> str:
+    """A number that has no sign when it is shown as zero, and a minus sign, not a hyphen, when it is negative."""
+    return f"{round(value, decimals) + 0.0:.{decimals}f}".replace("-", "\u2212")
 
 
 def fades(cases: Sequence[Performance]) -> list[str]:
@@ -213,7 +218,7 @@ def fades(cases: Sequence[Performance]) -> list[str]:
             f"Power that brings an uncoded link's mean bit error ratio back to its target: {said}. A coded link pays "
             "the mean loss when its interleaver spans many fades, and the loss of the outage column when it spans none."
         )
-    return found + [c.fade_warning.capitalize() + "." for c in known if c.fade_warning][:1]
+    return found + [f"{c.fade_warning[0].upper()}{c.fade_warning[1:]}." for c in known if c.fade_warning][:1]
 
 
 def _penalty(c: Performance) -> str:
