@@ -215,7 +215,7 @@ def test_json_is_one_document_of_finite_numbers_with_units_in_their_keys(call, f
     assert len(numbers) > 150
     assert all(math.isfinite(value) for _, value in numbers)
     bare = re.compile(
-        r"(_db|_w|_w_m2|_rad|_s|_bit_s|_per_s|probability|coverage|confidence|detection|outage|runs|noise|angles"
+        r"(_db|_w|_w_m2|_w_sr|_rad|_s|_bit_s|_per_s|probability|coverage|confidence|detection|outage|runs|noise|angles"
         r"|rms_rad\[\d\]|bias_rad\[\d\]|\.below_required_margin)$"
     )
     # what carries its unit beside it: a line's value, an input of the tornado

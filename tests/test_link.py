@@ -136,6 +136,15 @@ def test_ideal_receivers_follow_the_pointing_error_given():
     assert far.source.endswith("chosen for this evaluation")
 
 
+@pytest.mark.parametrize("budget_of", BUDGETS)
+def test_the_radiant_intensity_is_what_the_path_thins_out(budget_of):
+    budget = budget_of(MISSION, SOURCES)
+    beam = getattr(MISSION, budget.name.lower())
+    there = budget.radiant_intensity_w_sr / beam.distance_m**2
+    assert budget.irradiance_w_m2 == pytest.approx(there * 10 ** (value_of(budget, "Pointing loss") / 10), rel=1e-9)
+    assert value_of(budget, "Strehl loss") < 0.0  # counted in both
+
+
 # ---- the shape of a budget
 @pytest.mark.parametrize("budget_of", BUDGETS)
 def test_a_budget_is_the_sum_of_its_lines(budget_of):

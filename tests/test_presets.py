@@ -181,6 +181,7 @@ def test_luce_has_its_power_and_the_on_axis_intensity_that_was_measured(tmp_path
     assert 2 * half_rad == pytest.approx(9.4e-6, rel=1e-3)
     budget = communication_budget(file.mission, file.sources)
     assert budget.irradiance_w_m2 * 4e7**2 == pytest.approx(560e6, rel=5e-3)
+    assert budget.radiant_intensity_w_sr == pytest.approx(560e6, rel=5e-3)
     assert budget.irradiance_w_m2 == pytest.approx(350e-9, rel=5e-3)
 
 

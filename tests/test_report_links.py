@@ -222,7 +222,7 @@ def test_no_sentence_is_said_twice_on_the_page(plain):
         *budget_views.acquisition(plain.finding),
     ]
     assert sorted([*context["sentences"], *elsewhere]) == sorted(everywhere)
-    assert len(context["sentences"]) == 5
+    assert len(context["sentences"]) == 6
 
 
 # --------------------------------------------------------------------------------------------------------- acquisition

@@ -94,6 +94,7 @@ _KINDS = {
     "bit/s": ("a data rate", "Mbit/s"),
     "photon/bit": ("a receiver sensitivity", "photon/bit"),
     "W/m^2": ("an irradiance", "W/m^2"),
+    "W/sr": ("a radiant intensity", "MW/sr"),
     "W/(m^3 sr)": ("a spectral radiance", "W/(m^2 sr um)"),
     "1/s": ("a rate of counts", "1/s"),
     "m/s": ("a velocity", "km/s"),

@@ -54,6 +54,8 @@ class LinkBudget:
     `irradiance_w_m2` stands at the receiving aperture with every loss up to there, at the pointing error;
     `irradiance_on_axis_w_m2` is that of the same beam pointed without error and before Strehl.
     `required_irradiance_w_m2` is the irradiance there, pointing error and all, that leaves no margin.
+    `radiant_intensity_w_sr` leaves the terminal along the beam's axis, optics and Strehl counted: what a far-field test
+    of the terminal measures.
     """
 
     name: str
@@ -65,6 +67,7 @@ class LinkBudget:
     irradiance_w_m2: float
     irradiance_on_axis_w_m2: float
     required_irradiance_w_m2: float
+    radiant_intensity_w_sr: float
 
     @property
     def at_zero(self) -> tuple[str, ...]:
@@ -346,6 +349,8 @@ def _budget(
     margin = received_dbm - required.value
     mispointing = ("Strehl loss", "Pointing loss", "Point-ahead loss")
     on_axis = [line for line in transmit if line.name not in mispointing]
+    path = ("Pointing loss", "Point-ahead loss", "Free-space loss", "Clear-sky loss")
+    leaving = [line for line in transmit if line.name not in path]
     return LinkBudget(
         name=name,
         lines=transmit + receive,
@@ -360,6 +365,7 @@ def _budget(
         irradiance_w_m2=_irradiance(total_db(transmit), beam.wavelength_m),
         irradiance_on_axis_w_m2=_irradiance(total_db(on_axis), beam.wavelength_m),
         required_irradiance_w_m2=_irradiance(total_db(transmit) - margin, beam.wavelength_m),
+        radiant_intensity_w_sr=gains.watt(total_db(leaving)) / (4.0 * math.pi),
     )
 
 

@@ -89,6 +89,8 @@ def sentences(study: LinkStudy) -> list[str]:
             "What moves the margin most, each input by 10 % (0.5 dB; a bit error ratio by a factor of ten) both ways: "
             f"{moved}."
         )
+    intensities = ", ".join(f"{b.name.lower()} {quantity(b.radiant_intensity_w_sr, 'W/sr')}" for b in study.budgets)
+    found.append(f"Radiant intensity on the axis, optics and Strehl counted: {intensities}.")
     if study.beacon is not None:
         found.append(
             f"Beacon at its partner: {quantity(study.beacon.irradiance_w_m2, 'W/m^2')} at the pointing error, "
@@ -215,6 +217,7 @@ def data(study: LinkStudy) -> dict[str, Any]:
                 "required_power_w": b.required_power_w,
                 "irradiance_w_m2": b.irradiance_w_m2,
                 "irradiance_on_axis_w_m2": b.irradiance_on_axis_w_m2,
+                "radiant_intensity_w_sr": b.radiant_intensity_w_sr,
                 "required_irradiance_w_m2": b.required_irradiance_w_m2,
                 "lines": [line_data(line) for line in b.lines],
                 "totals": [line_data(line) for line in b.totals],
