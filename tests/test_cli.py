@@ -1,5 +1,6 @@
 """The command line: exit codes, what is printed and where, each refusal's message, and that it writes nothing."""
 
+import ctypes
 import errno
 import importlib
 import json
@@ -19,7 +20,7 @@ import typer
 
 import microrad
 from microrad import cli, doctor, identify, report, study
-from microrad.cli import lab
+from microrad.cli import frame, lab
 from shipped import without_fine_pointing
 
 ROOT = Path(__file__).parents[1]
@@ -350,6 +351,27 @@ def test_an_interrupt_during_run_leaves_nothing(folder, loop_mirror, plain, name
     assert (process.returncode, out) == (130, "")
     assert err.replace("here\n", "") == "microrad: interrupted, nothing was written\n"
     assert listing(folder) == {}
+
+
+def test_an_interrupt_that_falls_into_a_call_back_is_not_lost(monkeypatch):
+    @ctypes.CFUNCTYPE(None)
+    def call_back():
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(sys, "unraisablehook", frame.interrupt_again)
+    call_back()  # what ctypes cannot raise it hands to the hook
+    with pytest.raises(KeyboardInterrupt):
+        time.sleep(20.0)
+
+
+def test_what_else_cannot_be_raised_is_reported(monkeypatch, capsys):
+    @ctypes.CFUNCTYPE(None)
+    def call_back():
+        raise ValueError("from below")
+
+    monkeypatch.setattr(sys, "unraisablehook", frame.interrupt_again)
+    call_back()
+    assert "ValueError: from below" in capsys.readouterr().err
 
 
 def test_an_interrupt_behind_another_error_is_an_interrupt(call, folder, monkeypatch):

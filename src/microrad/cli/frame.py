@@ -5,6 +5,7 @@ installation with a problem, 2 bad usage or a bad file, 70 a fault of microrad, 
 output.
 """
 
+import _thread
 import contextlib
 import functools
 import json
@@ -12,6 +13,7 @@ import math
 import os
 import signal
 import sys
+import threading
 import traceback
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -67,10 +69,22 @@ def main() -> None:
     for number in (signal.SIGTERM, getattr(signal, "SIGHUP", signal.SIGTERM)):
         if signal.getsignal(number) is not signal.SIG_IGN:
             signal.signal(number, signal.default_int_handler)
+    sys.unraisablehook = interrupt_again
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, TextIOWrapper):
             stream.reconfigure(errors="replace")  # a terminal without µ is no reason to fail
     app(prog_name="microrad")
+
+
+def interrupt_again(unraisable: "sys.UnraisableHookArgs") -> None:
+    """Take up an interrupt that fell into a call back from compiled code (LLVM has one), which cannot pass it on.
+
+    It is raised again a moment later, when that code has returned; anything else is reported as Python does.
+    """
+    if issubclass(unraisable.exc_type, KeyboardInterrupt):
+        threading.Timer(0.05, _thread.interrupt_main).start()
+    else:
+        sys.__unraisablehook__(unraisable)
 
 
 def command(body: Callable[_Arguments, Outcome]) -> Callable[_Arguments, NoReturn]:

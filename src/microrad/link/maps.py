@@ -96,13 +96,13 @@ def rate_at_loss(mission: LinkMission, margin_db: float, loss_db: float) -> floa
     available = received_on_axis_dbm(mission) - loss_db - margin_db
     built = receiver(mission)
     if built is None:
-        rate = float(10.0 ** ((available - float(required_dbm(mission, 1.0))) / 10.0))
-        if rate < _SLOWEST_BIT_S:
+        spare_db = available - float(required_dbm(mission, _SLOWEST_BIT_S))
+        if spare_db < 0.0:
             raise LinkError(
                 f"not even {format_quantity(_SLOWEST_BIT_S, 'bit/s')} leaves a margin of {margin_db:g} dB: "
-                f"{-10.0 * math.log10(rate):.2f} dB are missing"
+                f"{-spare_db:.2f} dB are missing"
             )
-        return rate
+        return _SLOWEST_BIT_S * float(10.0 ** (spare_db / 10.0))
     highest = built.highest_data_rate_bit_s
     if float(required_dbm(mission, highest)) <= available:
         return highest
