@@ -225,6 +225,8 @@ def test_json_is_one_document_of_finite_numbers_with_units_in_their_keys(call, f
         if re.search(r"(lines|totals|noise)\[\d+\]\.value$|tornado\[\d+\]\.(value|low|high)$", path)
     }
     assert found["closes"] is True
+    left = {each["name"]: each["largest_rad"] for each in found["pointing"]["left_for_each"]}
+    assert left["Orbit knowledge"] == pytest.approx(math.sqrt(390**2 - 300**2 - 248**2 - 1) * 1e-6, rel=1e-6)
     assert [each["name"] for each in found["budgets"]] == ["Communication", "Beacon", "Answer"]
     assert [each["name"] for each in found["acquisition"]["ways"]] == ["wide beacon", "spiral scan"]
     assert found["point_ahead"]["angle_rad"] == pytest.approx(2 * 10.65e3 / 299_792_458)

@@ -247,6 +247,7 @@ def data(study: LinkStudy) -> dict[str, Any]:
                 for s in p.summations
             ],
             "beacon_coverage": None if p.reading is None else p.reading.coverage,
+            "left_for_each": _left(p),
         },
         "point_ahead": None if study.point_ahead is None else asdict(study.point_ahead),
         "receiver_noise": [line_data(line) for line in study.receiver_noise],
@@ -255,6 +256,14 @@ def data(study: LinkStudy) -> dict[str, Any]:
         "under_jitter": None if study.under_jitter is None else performance_data(study.under_jitter),
         "warnings": list(study.warnings),
     }
+
+
+def _left(p: OpenLoopPointing) -> list[dict[str, Any]]:
+    """What the beacon's half angle leaves for each line, by root sum square."""
+    if p.reading is None:
+        return []
+    allocated = p.allocation(p.reading.half_angle_rad, "rss")
+    return [{"name": each.name, "largest_rad": each.largest_rad, "missing_rad": each.missing_rad} for each in allocated]
 
 
 def line_data(line: Line) -> dict[str, Any]:
