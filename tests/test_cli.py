@@ -336,6 +336,15 @@ cli.main()
 """
 
 
+@pytest.fixture
+def interruptible():
+    """Take interrupts here and in what is started, also where the tests themselves run in the background."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.usefixtures("interruptible")
 @pytest.mark.parametrize(
     ("name", "module", "function"), [("SIGINT", "study", "run"), ("SIGTERM", "report", "write_columns")]
 )
@@ -353,6 +362,7 @@ def test_an_interrupt_during_run_leaves_nothing(folder, loop_mirror, plain, name
     assert listing(folder) == {}
 
 
+@pytest.mark.usefixtures("interruptible")
 def test_an_interrupt_that_falls_into_a_call_back_is_not_lost(monkeypatch):
     @ctypes.CFUNCTYPE(None)
     def call_back():
