@@ -367,7 +367,7 @@ def test_a_file_of_links_alone_has_no_more_than_they(call, folder):
 def test_an_answer_below_the_noise_is_said_to_be_and_nothing_locks(call, folder):
     result = call("budget", file_with(folder, DARK))
     assert said(result, "The answer brings").endswith("less than its noise in a reading (signal to noise 0.17).")
-    assert said(result, "Acquisition by wide beacon").endswith("(simulated none locks).")
+    assert said(result, "Acquisition by wide beacon").endswith("wide beacon: never (simulated 0.0000).")
 
 
 def test_a_point_ahead_beyond_the_formula_costs_more_than_it_holds_for(call, folder):
@@ -393,7 +393,8 @@ def test_jitter_is_said_with_its_outage(call, folder):
     line = said(call("budget", file_with(folder, JITTER)), "Under the jitter")
     assert re.fullmatch(
         r"Under the jitter: mean pointing loss 0\.41 dB; 2\.4\d dB but for 0\.3 % of the time, which leaves a "
-        r"margin of \+2\.7\d dB; below 0 dB for a share of 4\.\d+e-06 of the time; best half angle 14\.8 \u00b5rad\.",
+        r"margin of \+2\.7\d dB; below 0 dB for a share of 4\.\d+e-06 of the time; "
+        r"best half angle 19\.7 \u00b5rad, the narrowest of the aperture\.",
         line,
     )
 

@@ -11,6 +11,8 @@ from scipy.stats import ncx2, norm
 from link_files import PATTERN, RECEIVERS, link_file, received_with
 from microrad import acquisition, link, link_acquisition, link_study, sensor
 from microrad.missionfile import LinkFile
+from microrad.report import budget_views, links
+from microrad.report.quantities import quantity
 from shipped import edited_file
 from test_presets import NAMES, completed
 
@@ -244,7 +246,23 @@ def test_each_beam_suffices_as_far_off_its_axis_as_it_brings_the_power_that_is_n
     found = plain.finding
     assert found.beacon_radius_rad == pytest.approx(reach_rad(4.0, 390 * URAD, 0.15, 10e-12), rel=1e-6)
     assert found.answer_radius_rad == pytest.approx(reach_rad(1.0, 20 * URAD, 0.05, 100e-12), rel=1e-6)
-    assert found.return_radius_rad == pytest.approx(1.55e-6 / (math.pi * 0.025), rel=1e-12)
+    half = 1.55e-6 / (math.pi * 0.025)
+    on_axis_db = plain.communication.margin_db + 20 / math.log(10) * (10e-6 / half) ** 2
+    assert on_axis_db < 20 / math.log(10)  # its margin ends before 1/e2
+    assert found.return_radius_rad == pytest.approx(half * math.sqrt(on_axis_db / (20 / math.log(10))), rel=1e-9)
+    assert f"{found.chances.return_coverage:.4f}" == "1.0000"
+
+
+def test_the_narrow_beam_back_suffices_to_its_1_e2_at_most_and_nowhere_without_margin_on_its_axis(tmp_path):
+    half = 1.55e-6 / (math.pi * 0.025)
+    strong = studied(tmp_path, {"communication.transmit_power": "100 W"}).finding
+    assert strong.return_radius_rad == pytest.approx(half, rel=1e-12)
+    weak = studied(tmp_path, {"communication.transmit_power": "1 W"}).finding  # 1.8 dB short on its axis
+    assert weak.return_radius_rad == 0.0
+    assert not weak.wide.possible
+    assert strong.wide.possible
+    uncorrected = studied(tmp_path, {"communication.transmit_power": "100 W"}, UNCORRECTED).finding
+    assert uncorrected.return_radius_rad == pytest.approx(half, rel=1e-12)
 
 
 def test_a_beam_with_power_to_spare_is_counted_on_down_to_20_db(tmp_path):
@@ -383,15 +401,17 @@ def rows():
     [
         ("spiral", math.pi * RADIUS_RAD**2 / (PITCH_RAD * SPEED_RAD_S), SPEED_RAD_S),
         ("raster", rows() * 2 * RADIUS_RAD / SPEED_RAD_S + (rows() - 1) * 1e-3, SPEED_RAD_S),
-        ("step-stare", hexagons() * 2e-3 - 1e-3, math.nan),
+        ("step-stare", hexagons() * 2e-3 - 1e-3, None),
     ],
 )
 def test_each_kind_of_scan_is_as_fast_as_its_detector_allows(tmp_path, monkeypatch, pattern, duration_s, speed_rad_s):
     monkeypatch.setattr(link_acquisition, "TRADE_RAD", np.array([1e-4]))
     found = link_study.run(link_file(tmp_path, {"acquisition.runs": 1000, "acquisition.scan.pattern": pattern})).finding
-    assert found.scan_radius_rad == pytest.approx(RADIUS_RAD, rel=1e-6)
-    assert found.scan_s == pytest.approx(duration_s, rel=1e-5)
-    assert found.scan_speed_rad_s == pytest.approx(speed_rad_s, rel=1e-12, nan_ok=True)
+    scanned = found.scanned
+    assert scanned.radius_rad == pytest.approx(RADIUS_RAD, rel=1e-6)
+    assert scanned.duration_s == pytest.approx(duration_s, rel=1e-5)
+    assert scanned.speed_rad_s == (None if speed_rad_s is None else pytest.approx(speed_rad_s, rel=1e-12))
+    assert found.scan is scanned.found
     assert found.scan.name == f"{pattern} scan"
     assert [stage.name for stage in found.scan.stages[:2]] == ["LEO points the scan", "beam travels"]
     assert [stage.name for stage in found.scan.stages[3:]] == [stage.name for stage in found.wide.stages[3:]]
@@ -401,18 +421,110 @@ def test_each_kind_of_scan_is_as_fast_as_its_detector_allows(tmp_path, monkeypat
     assert agrees(found.scan)
 
 
-def test_a_scan_without_overlap_leaves_no_time_between_its_tracks_but_dwells_do(tmp_path):
-    none = {**FEW, "acquisition.scan.overlap": 0.0}
-    with pytest.raises(ValueError, match="the speed of the scan is 0 rad/s"):
-        link_study.run(link_file(tmp_path, none))
-    found = link_study.run(link_file(tmp_path, none, {"acquisition.scan.pattern": "step-stare"})).finding
+@pytest.mark.parametrize("pattern", ["spiral", "raster"])
+@pytest.mark.parametrize(("overlap", "allowed"), [(0.0, False), (0.0009, False), (0.001, True)])
+def test_tracks_must_overlap(tmp_path, pattern, overlap, allowed):
+    changes = {"acquisition.scan.overlap": overlap, "acquisition.scan.pattern": pattern}
+    if allowed:
+        assert link_file(tmp_path, FEW, changes).mission.acquisition.scan.overlap == overlap
+        return
+    with pytest.raises(ValueError, match=rf'(?s)overlap.*pattern = "{pattern}".*overlap = 0.25 or pattern = "step-st'):
+        link_file(tmp_path, FEW, changes)
+
+
+def test_dwells_need_no_overlap_and_have_no_trade_then(tmp_path):
+    dwells = {"acquisition.scan.overlap": 0.0, "acquisition.scan.pattern": "step-stare"}
+    found = link_study.run(link_file(tmp_path, FEW, dwells)).finding
     assert 0.5 < found.scan.stages[2].success_probability < 0.995
+    assert found.trade is None
+
+
+def test_a_direction_that_is_known_without_error_is_not_scanned(tmp_path):
+    lines = ("body_pointing", "orbit_knowledge", "misalignment")
+    sure = {f"pointing.lines.{name}.error": "0 urad" for name in lines} | {"point_ahead": None}
+    with pytest.raises(ValueError, match=r"pointing\.lines: every error is 0 rad"):
+        link_study.run(link_file(tmp_path, FEW, sure))
+    assert studied(tmp_path, sure).finding.chances.beacon_coverage == 1.0
+
+
+def test_the_scan_waits_for_the_light_that_the_sensor_needs(tmp_path, monkeypatch, plain):
+    monkeypatch.setattr(link_acquisition, "TRADE_RAD", np.array([1e-4]))
+    on_axis = 4.0 * 10**-0.04 * 2 / (math.pi * (20 * URAD * 44e6) ** 2) * math.pi / 4 * 0.15**2
+    edge = on_axis * math.exp(-2)
+    assert plain.finding.scanned.needed_detection_s == pytest.approx(0.01 * (10e-12 / edge) ** 2, rel=1e-9)
+    assert plain.finding.scanned.needed_detection_s < plain.finding.scanned.stated_detection_s == 1e-3
+    assert "needs" not in links.acquisition_words(plain.finding)[1]
+
+    dim = link_study.run(link_file(tmp_path, FEW, {"beacon.required_power": "10 nW"})).finding
+    needed = 0.01 * (10e-9 / edge) ** 2
+    assert dim.scanned.needed_detection_s == pytest.approx(needed, rel=1e-9)
+    assert needed > 1e-3
+    assert dim.scanned.duration_s == pytest.approx(plain.finding.scanned.duration_s * needed / 1e-3, rel=1e-9)
+    assert dim.scanned.speed_rad_s == pytest.approx(dim.trade.speed_rad_s, rel=1e-9)
+    assert f"needs {quantity(needed, 's')} in place of the 1 ms" in links.acquisition_words(dim)[1]
+    data = budget_views.finding_data(dim)
+    assert (data["scan_stated_detection_s"], data["scan_needed_detection_s"]) == pytest.approx((1e-3, needed))
+
+
+@pytest.mark.parametrize("changes", [{"beacon.required_power": "1 mW"}, {"beacon.transmit_optics_loss": "900 dB"}])
+def test_a_scan_with_too_little_light_never_finds(tmp_path, changes):
+    found = link_study.run(link_file(tmp_path, FEW, changes)).finding
+    assert not found.scanned.detects
+    assert not any(way.possible for way in found.ways)
+    assert found.trade is None
+    assert "It detects nothing" in links.acquisition_words(found)[1]
+    assert all("never" in sentence for sentence in budget_views.acquisition(found))
+    assert [budget_views.finding_data(found)[key] for key in ("scan_s", "scan_needed_detection_s")] == [None, None]
+
+
+def test_a_way_that_never_locks_has_no_times(tmp_path):
+    found = studied(tmp_path, {"answer.required_power": "1 uW"}).finding
+    (row,) = links.acquisition(found)["ways"]
+    assert row["cells"] == ["never", "0.0000", "\u2013", "none locks", "\u2013"]
+    assert budget_views.acquisition(found) == ["Acquisition by wide beacon: never (simulated 0.0000)."]
+    (way,) = budget_views.finding_data(found)["ways"]
+    assert (way["mean_time_s"], way["simulated_mean_time_s"]) == (None, None)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [{"answer.pointing_error": "600 urad"}, {"answer.transmit_optics_loss": "200 dB"}],
+    ids=["off its axis", "lossy"],
+)
+def test_an_answer_without_light_is_a_result_and_no_refusal(tmp_path, changes):
+    found = studied(tmp_path, changes)
+    assert not found.closes
+    assert found.tracking.noise_equivalent_angle is None
+    assert found.tracking.signal_to_noise < 1e-6
+    assert found.finding.chances.answer_detection == pytest.approx(norm.sf(5.0), rel=1e-3)
+    assert not found.finding.wide.possible
+    assert any("less than its noise" in sentence for sentence in budget_views.sentences(found))
+    assert budget_views.data(found)["tracking"]["noise_equivalent_angle_rad"] is None
+    names = [line.name for name, line in budget_views.lines(found) if name == "Tracking sensor"]
+    assert names == [line.name for line in found.tracking.noise_lines]
+
+
+def test_an_answer_in_the_noise_keeps_its_angle_down_to_the_least_signal(tmp_path, plain):
+    per_watt = by_hand(1e-20)[0] / 1e-20 * plain.tracking.power_w  # ratio over transmitted power, which is 1 W there
+    for ratio, seen in ((1.01e-6, True), (0.99e-6, False)):
+        tracked = studied(tmp_path, {"answer.transmit_power": f"{ratio / per_watt} W"}).tracking
+        assert tracked.signal_to_noise == pytest.approx(ratio, rel=1e-6)
+        assert (tracked.noise_equivalent_angle is not None) == seen
+
+
+def test_stages_have_the_names_of_the_terminals(tmp_path):
+    named = {"terminals.leo_name": "OICETS", "terminals.geo_name": "ARTEMIS"}
+    names = [stage.name for stage in studied(tmp_path, named).finding.wide.stages]
+    assert names[0] == "OICETS points the beacon"
+    assert not any("LEO" in name or "GEO" in name for name in names)
+    twins = studied(tmp_path, {"terminals.leo_name": "LCT", "terminals.geo_name": "LCT"}).finding.wide.stages
+    assert [stage.name for stage in twins][-3::2] == ["LCT (partner) locks", "LCT (own) locks"]
 
 
 def test_a_mission_without_a_scan_is_found_by_its_beacon_alone(tmp_path):
     found = studied(tmp_path).finding
-    assert (found.scan, found.trade) == (None, None)
-    assert all(math.isnan(value) for value in (found.scan_s, found.scan_radius_rad, found.scan_speed_rad_s))
+    assert (found.scanned, found.scan, found.trade) == (None, None, None)
+    assert found.ways == (found.wide,)
     assert found.wide.outcome.success_probability > 0.99
 
 
@@ -450,8 +562,10 @@ def test_the_trade_spreads_the_beacons_power_or_leads_it_over_the_uncertainty(pl
         ({"beacon.receive_optics_loss": "3 dB", "terminals.geo_obscuration": 0.5}, 10**-0.3 * 0.75),
         ({"beacon.pointing_error": "100 urad"}, 1.0),
         (UNCORRECTED, 1.0),
+        ({"beacon.pointing_error": "50 mrad"}, 1.0),
+        ({"beacon.divergence": "60 urad", "beacon.pointing_error": "600 urad"}, 1.0),
     ],
-    ids=["lossy receiver", "another error", "no point-ahead"],
+    ids=["lossy receiver", "another error", "no point-ahead", "far off its axis", "narrow and off its axis"],
 )
 def test_the_trade_counts_all_losses_but_those_off_axis(tmp_path, monkeypatch, changes, receive):
     sigma = np.array([3e-4, 1e-3])

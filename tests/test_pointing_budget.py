@@ -197,10 +197,9 @@ def test_the_words_of_a_line_say_what_was_calculated():
 
 
 # ---- rules
-def test_correlated_terms_add_linearly_and_groups_in_squares():
+def test_means_add_and_deviations_add_in_squares():
     terms = [
-        term(sigma=(3.0, 1.0), group="thermal"),
-        term(sigma=(1.0, 1.0), group="thermal"),
+        term(sigma=(4.0, 2.0)),
         term(sigma=(3.0, 0.0)),
         term(mean=(2.0, -5.0)),
         term(mean=(-7.0, 1.0)),
@@ -236,9 +235,6 @@ def test_the_root_sum_square_is_the_standards_total_exactly_where_it_is_authoris
     assert pointing.rss_caveat(biased) == "not authorised: Alignment has a mean, and means add linearly"
     mixed = [*like, error_term(stated("random", "1-sigma"))]
     assert "not the same number of standard deviations" in pointing.rss_caveat(mixed)
-    correlated = [term(sigma=(1.0, 1.0), group="a"), term(sigma=(1.0, 1.0), group="a")]
-    assert "some terms are correlated" in pointing.rss_caveat(correlated)
-    assert pointing.rss_caveat([term(sigma=(1.0, 1.0), group="a"), term(sigma=(1.0, 1.0), group="b")]) == ""
 
 
 def test_the_rayleigh_rule_applies_to_small_means_and_like_axes():
@@ -298,25 +294,6 @@ def test_at_usual_confidences_the_general_rule_is_never_below_the_exact_total(ro
     assert exact <= general * (1 + 1e-9)
     worse_axis = max(pointing.axis_totals_rad(terms, confidence))
     assert worse_axis <= general * (1 + 1e-9)
-
-
-def test_shares_are_what_the_total_grows_by_with_each_term():
-    rows = [((0.3, -1.0), (0.5, 0.7), ""), ((-0.1, 0.2), (0.4, 0.3), "a"), ((0.0, -0.5), (0.2, 0.1), "a")]
-
-    def terms(grown=-1, by=0.0):
-        scales = [1.0 + by * (index == grown) for index in range(len(rows))]
-        return [
-            term(tuple(scale * m for m in mean), tuple(scale * s for s in sigma), group=group)
-            for scale, (mean, sigma, group) in zip(scales, rows, strict=True)
-        ]
-
-    shares = pointing.axis_shares(terms(), 0.997)
-    assert math.fsum(shares) == pytest.approx(1.0)
-    total = max(pointing.axis_totals_rad(terms(), 0.997))
-    for index, share in enumerate(shares):
-        step = 1e-6
-        up, down = (max(pointing.axis_totals_rad(terms(index, by), 0.997)) for by in (step, -step))
-        assert share == pytest.approx((up - down) / (2 * step * total), rel=1e-6)
 
 
 # ---- allocation
@@ -379,7 +356,7 @@ def test_a_line_alone_gets_the_whole_total(rule, interpretation):
 def test_no_confidence_is_refused(confidence):
     terms = [term(sigma=(1.0, 1.0))]
     rules = (pointing.axis_totals_rad, pointing.radial_total_rad, pointing.rayleigh_total_rad, pointing.exact_total_rad)
-    for rule in (*rules, pointing.summations, pointing.axis_shares):
+    for rule in (*rules, pointing.summations):
         with pytest.raises(ValueError, match="is not possible; give a share above 0 and below 1"):
             rule(terms, confidence)
 

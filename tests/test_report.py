@@ -5,6 +5,7 @@ import hashlib
 import json
 import math
 import re
+from dataclasses import replace
 from html.parser import HTMLParser
 
 import numpy as np
@@ -12,7 +13,8 @@ import pytest
 import xarray as xr
 
 from microrad import folder, missionfile, report, study
-from microrad.report import figures, link_figures
+from microrad.performance import Cost
+from microrad.report import figures, link_figures, words
 from shipped import SHIPPED, edited_file
 
 
@@ -267,3 +269,9 @@ def test_a_drive_beyond_the_identified_range_is_said(no_scan, tmp_path):
     assert "The mirror model is extrapolated." in text.splitlines()[0]
     assert "(identified from 0 to 8 V)" in text
     assert any("beyond the range that the mirror was identified for" in w for w in report.summary(narrow)["warnings"])
+
+
+def test_a_cost_without_a_data_rate_is_said_in_decibels_alone():
+    cost = Cost("sine of 25 Hz", "PID", "given", -1.5, math.nan)
+    assert words._rate_lost(cost) == ""
+    assert words._rate_lost(replace(cost, data_rate_bit_s=-252.4e6)) == " or 252 Mbit/s"

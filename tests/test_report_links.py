@@ -76,7 +76,9 @@ def test_the_cells_of_a_case_are_its_record(plain):
     rms = math.sqrt(1.0**2 + 2 * 3.0**2)
     assert cells[0] == f"{rms:.2f}"
     assert cells[1:6] == ["1.23", "2.35", "\u22120.01", "2 %", "none"]
-    assert cells[6:8] == [f"{c.best.half_angle_rad * 1e6:.1f}", f"{c.best.current_excess_db:.2f}"]
+    assert cells[6:8] == ["19.7 (narrowest)", "0.00"]
+    wider = replace(c.best, half_angle_rad=25.31e-6, at_limit=False, current_excess_db=0.456)
+    assert links.cells(replace(c, best=wider))[6:8] == ["25.3", "0.46"]
     assert cells[8] == "242"
     assert links.cells(case(plain, data_rate_bit_s=math.nan))[8] == "none"
     assert links.cells(case(plain, margin_db=2.0))[3] == "+2.00"
@@ -123,6 +125,7 @@ def test_the_reference_without_hysteresis_has_no_row_and_the_missions_own_jitter
     assert context["outage"] == "0.3 %"
     assert context["performance_note"].endswith("on a mirror without it.")
     assert links.note(costs=False).endswith("at that loss.")
+    assert "narrowest: the present one" in links.note(costs=False)
 
 
 def test_the_loop_under_vibration_is_named_only_where_it_was_simulated(plain):
@@ -257,7 +260,7 @@ def test_the_words_on_acquisition_give_each_chance(plain, tmp_path):
     words, scan = links.acquisition_words(plain.finding)
     for value in (chances.beacon_coverage, chances.answer_coverage, chances.answer_detection, chances.return_coverage):
         assert f"{value:.4f}" in words
-    assert f"in {quantity(plain.finding.scan_s, 's')} at most." in scan
+    assert f"in {quantity(plain.finding.scanned.duration_s, 's')} at most." in scan
     assert len(links.acquisition_words(studied(tmp_path, NO_SCAN).finding)) == 1
 
 

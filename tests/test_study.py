@@ -96,7 +96,7 @@ def test_the_lines_of_the_verdict(shipped):
         sign = -1 if line.name.startswith(("residual pointing error", "fine pointing")) else 1
         assert_allclose(line.margin, sign * (line.actual - line.required), rtol=1e-9)
         assert line.met == (line.margin >= 0)
-    cone = requirement(result, "beacon cone over pointing uncertainty")
+    cone = requirement(result, "beacon cone over the root sum square")
     assert_allclose([cone.required, cone.actual], [np.sqrt(300**2 + 24**2 + 248**2 + 1**2) * 1e-6, 390e-6], rtol=1e-9)
     assert_allclose(requirement(result, "communication").required, 3.0)
 
@@ -261,3 +261,21 @@ def test_the_residual_in_the_budget_says_which_run_it_is_from(shipped):
     found, _ = shipped
     (line,) = [line for line in found.achieved.lines if line.name == "Pointing loss"]
     assert line.source == "simulated: given, PID + inverse, 25 Hz, peak (per-axis)"
+
+
+def test_a_receiver_slower_than_the_papers_rate_leaves_that_claim_unjudged(tmp_path):
+    receiver = (
+        '[communication.receiver]\nmodulation = "dpsk"\ndetector = "preamplified"\nbit_error_ratio = 1e-9\n'
+        'code_gain = "0 dB"\ncode_rate = 1.0\nbandwidth = "100 MHz"\nnoise_figure = "4 dB"\n\n'
+    )
+    text = SHIPPED.read_text(encoding="utf-8")
+    sensitivity = next(line for line in text.splitlines() if line.startswith("receiver_sensitivity"))
+    head = f"# {'-' * 97} what is required"
+    file = edited_file(
+        tmp_path, (sensitivity, ""), (head, receiver + head), ('data_rate = "300 Mbit/s"', 'data_rate = "largest"')
+    )
+    result = study.run(file)
+    claim = next(c for c in result.claims if c.where == "section 2.2, Fig. 2")
+    assert (claim.agrees, claim.ours) == ("not judged", "the receiver takes less than 300 Mbit/s")
+    assert result.file.mission.communication.data_rate_bit_s == 100e6
+    assert result.margin_map.data_rate_bit_s[-1] == pytest.approx(100e6, rel=1e-9)

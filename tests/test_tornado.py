@@ -1,6 +1,7 @@
 """Each input of a link a little down and up: every swing by hand, within its bounds, the largest first."""
 
 import math
+import sys
 
 import pytest
 
@@ -207,6 +208,27 @@ def test_a_receiver_too_slow_for_the_rate_has_no_margin(tmp_path):
         "communication.receiver.bandwidth",
         "communication.receiver.code_rate",
     }
+
+
+def test_only_a_receiver_too_slow_is_left_without_a_margin(tmp_path, monkeypatch):
+    def refused(mission, sources):
+        raise ValueError("a value without meaning")
+
+    file = link_file(tmp_path)
+    monkeypatch.setattr(sys.modules["microrad.link.tornado"], "communication_budget", refused)
+    with pytest.raises(ValueError, match="a value without meaning"):
+        link.tornado(file.mission, file.sources)
+
+
+def test_a_beam_moves_no_further_than_the_obscuration_lets_some_of_it_pass(tmp_path):
+    thin = {"communication.beam": {**GAUSSIAN, "radius": "9 mm"}, "terminals.leo_obscuration": 0.5}
+    found = swings(tmp_path, PATTERN, thin)
+    for key, side in (("communication.beam.radius", "low"), ("terminals.leo_obscuration", "high")):
+        each = found[key]
+        assert each.low < each.value < each.high
+        assert abs(getattr(each, side) - each.value) < RELATIVE * each.value * (1 - 1e-9)
+        assert all(math.isfinite(margin) for margin in margins(each))
+    assert all(math.isfinite(margin) for each in found.values() for margin in margins(each))
 
 
 # ---- what is said about an input

@@ -1,15 +1,19 @@
 """The table of a mission about acquisition: how long each step of finding the partner takes, and the scan instead."""
 
+from collections.abc import Iterator
 from typing import Annotated, Literal
 
 from pydantic import Field
 
-from microrad.fields import Quantity, Share, Table, Whole
+from microrad.fields import Problem, Quantity, Share, Table, Whole
 from microrad.mirror_table import ANGLE_MOST, Angle, Frequency
 
 Seconds = Annotated[float, Quantity("s", "s", least=0.0, most=1e6)]
 Frame = Annotated[float, Quantity("s", "ms", above=0.0, most=1e6)]
 AngleOrZero = Annotated[float, Quantity("rad", "urad", least=0.0, most=ANGLE_MOST)]
+
+LEAST_OVERLAP = 0.001
+"""Overlap below which the tracks of a spiral or a raster leave no time to detect what lies between two of them."""
 
 
 class TrackingSensor(Table):
@@ -40,6 +44,15 @@ class Scan(Table):
     detection_s: Frame = Field(alias="detection", description="time on the partner that its sensor needs")
     turn_s: Seconds = Field(alias="turn", description="raster: at the end of a row; step-stare: from spot to spot")
     jitter_rms_rad: AngleOrZero = Field(alias="jitter", description="of the scanning beam, rms per axis")
+
+    def problems(self) -> Iterator[Problem]:
+        """Tracks that overlap; dwells need not."""
+        if self.pattern != "step-stare" and self.overlap < LEAST_OVERLAP:
+            reason = (
+                f'is {self.overlap:g}: between two tracks of pattern = "{self.pattern}" a target is seen for no time'
+            )
+            expected = f'at least {LEAST_OVERLAP:g}; overlap = 0.25 or pattern = "step-stare" would do'
+            yield Problem("overlap", reason, expected)
 
 
 class Acquisition(Table):

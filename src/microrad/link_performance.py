@@ -28,10 +28,6 @@ class Spread:
         place = min(int(np.searchsorted(total, probability * total[-1])), total.size - 1)
         return float(self.radius_rad[order][place])
 
-    def beyond(self, radius_rad: float) -> float:
-        """Share of the time with a larger error."""
-        return float(np.sum(self.share[self.radius_rad > radius_rad]))
-
 
 @dataclass(frozen=True, slots=True)
 class Performance:
@@ -41,8 +37,13 @@ class Performance:
     Gaussian process of their bias, rms and spectrum, the penalty in a Gaussian beam. ``outage_loss_db`` is the pointing
     loss that is not exceeded but for the mission's ``outage``, and ``margin_db`` what it leaves; ``outage`` is the
     share of the time with less than 0 dB, ``short`` that with less than the required margin. ``data_rate_bit_s`` keeps
-    the required margin at the outage loss. ``best`` is the Gaussian divergence with the most power at it.
-    ``fades_per_s`` and ``fade_s`` are of the fades below the required margin; nan without a spectrum.
+    the required margin at the outage loss. ``best`` is the Gaussian divergence with the most power at that error, no
+    narrower than the present beam, which is what the aperture gives; ``best.wanted_half_angle_rad`` is the one without
+    that limit, what a larger aperture would allow. ``fades_per_s`` and ``fade_s`` are of the fades below the required
+    margin; nan without a spectrum.
+
+    An uncorrected point-ahead is added to the length of every error, as if it had the direction of each. The fades and
+    the penalty have it as a bias, of one direction: see `with_point_ahead`. What a correction leaves is in none.
     """
 
     source: str
@@ -98,8 +99,8 @@ def performance(
     ahead = link.point_ahead_rad(m)
     loss = fall.loss_db(spread.radius_rad + ahead)
     outage_loss = float(fall.loss_db(spread.quantile_rad(1.0 - q.outage) + ahead))
-    half, aside = fall.half_angle_rad, _aside(jitter, ahead)
-    fades_per_s, fade_s, warning = _fades(aside, motion, fall, on_axis - q.margin_db)
+    half, shifted = fall.half_angle_rad, with_point_ahead(jitter, ahead)
+    fades_per_s, fade_s, warning = _fades(shifted, motion, fall, on_axis - q.margin_db)
     return Performance(
         source=source,
         controller=controller,
@@ -112,17 +113,23 @@ def performance(
         short=float(np.sum(spread.share[loss > on_axis - q.margin_db])),
         data_rate_bit_s=_rate(m, outage_loss),
         best=_best(spread, 1.0 - q.outage, half, ahead),
-        uncoded_penalty_db=_uncoded(m, aside, half),
+        uncoded_penalty_db=_uncoded(m, shifted, half),
         fades_per_s=fades_per_s,
         fade_s=fade_s,
         fade_warning=warning,
     )
 
 
-def _aside(jitter: pointing.Jitter, ahead_rad: float) -> pointing.Jitter:
-    """The jitter with its bias longer by an uncorrected point-ahead, which is the worst direction of it."""
+def with_point_ahead(jitter: pointing.Jitter, ahead_rad: float) -> pointing.Jitter:
+    """The jitter with an uncorrected point-ahead in its bias.
+
+    How the point-ahead lies to the axes is not stated. It is taken along the bias, which it makes longer, and without
+    a bias along the axis with the larger rms, where it makes errors well beyond itself the most frequent; along x where
+    the two are equal.
+    """
     (x, y), static = jitter.bias_rad, jitter.static_rad
-    along = (x / static, y / static) if static else (1.0, 0.0)
+    wider = (1.0, 0.0) if jitter.rms_rad[0] >= jitter.rms_rad[1] else (0.0, 1.0)
+    along = (x / static, y / static) if static else wider
     return pointing.Jitter((x + along[0] * ahead_rad, y + along[1] * ahead_rad), jitter.rms_rad)
 
 
@@ -135,8 +142,12 @@ def _mean_loss_db(spread: Spread, loss_db: Floats) -> float:
 
 
 def _best(spread: Spread, probability: float, half_angle_rad: float, ahead_rad: float) -> pointing.BestDivergence:
-    radius = max(spread.quantile_rad(probability) + ahead_rad, 1e-12)
-    return pointing.best_divergence_for_static_error(radius, current_half_angle_rad=half_angle_rad)
+    """The best half angle that the present optics give: none narrower than theirs."""
+    return pointing.best_divergence_for_static_error(
+        spread.quantile_rad(probability) + ahead_rad,
+        smallest_half_angle_rad=half_angle_rad,
+        current_half_angle_rad=half_angle_rad,
+    )
 
 
 def _rate(m: LinkMission, loss_db: float) -> float:
@@ -162,7 +173,7 @@ def _fades(
 def _uncoded(m: LinkMission, jitter: pointing.Jitter, half_angle_rad: float) -> float:
     """Extra power that brings the mean bit error ratio back to the target, with the curve of the mission's receiver.
 
-    nan for a receiver of which only the measured sensitivity is known.
+    nan for a receiver of which only the measured sensitivity is known, infinite where no power makes up for it.
     """
     receiver = link.receiver(m)
     if receiver is None:
@@ -173,5 +184,5 @@ def _uncoded(m: LinkMission, jitter: pointing.Jitter, half_angle_rad: float) -> 
         return pointing.uncoded_penalty_db(
             jitter, half_angle_rad, lambda power: receiver.bit_error_ratio_at(needed * power, rate)
         )
-    except ValueError:  # more than any power makes good
+    except pointing.NoPowerError:
         return math.inf

@@ -4,13 +4,36 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from microrad import fine_pointing, link, pointing, tracking
-from microrad.fine_loop.ensemble import bin_edges_rad
+from microrad.fine_loop.ensemble import bin_edges_rad, histogram_quantile
 from microrad.link_performance import Performance, Spread, performance
 from microrad.mission import Mission
 
 NO_HYSTERESIS = "no hysteresis"
+
+_PARTS = 32  # of a bin of the histogram, which is 3 % wide in the square of the error
+
+
+@dataclass(frozen=True, slots=True)
+class Binned(Spread):
+    """Radial errors from a histogram, evenly in the square inside each bin; ``counts`` are the bins'."""
+
+    counts: NDArray[np.int64]
+
+    @classmethod
+    def of(cls, counts: NDArray[np.int64]) -> "Binned":
+        """The errors that these counts stand for, in the bins of `fine_loop.ensemble.bin_edges_rad`."""
+        squares = bin_edges_rad() ** 2
+        middles = (np.arange(_PARTS) + 0.5) / _PARTS
+        within = squares[:-1, None] + np.diff(squares)[:, None] * middles
+        share = np.repeat(counts / (_PARTS * np.sum(counts)), _PARTS)
+        return cls(np.sqrt(within).ravel(), share, counts)
+
+    def quantile_rad(self, probability: float) -> float:
+        """Error that a share of the time stays below, interpolated inside its bin."""
+        return histogram_quantile(self.counts, probability)
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,16 +104,13 @@ def _fine(
 ) -> Performance:
     """One controller of the fine-pointing loop; the spectrum is known on the mission's own mirror."""
     left = verified.simulated[mirror]
-    edges = bin_edges_rad() ** 2
-    radius, counts = np.sqrt((edges[1:] + edges[:-1]) / 2.0), left.radial_counts
     mean = (*left.axis_mean_rad, 0.0)[:2]
     square = (*left.axis_rms_rad, 0.0)[:2]
     rms = tuple(math.sqrt(max(s**2 - b**2, 0.0)) for s, b in zip(square, mean, strict=True))
     jitter = pointing.Jitter((mean[0], mean[1]), (rms[0], rms[1]))
-    spread = Spread(radius, counts / np.sum(counts))
     motion = None
     if mirror == "given":
         psd = verified.spectrum_rad2_hz.T
         both = psd if psd.shape[0] == 2 else np.vstack([psd, np.zeros_like(psd)])
         motion = pointing.motion_of_spectrum(fine.freq_hz, both)
-    return performance(m, FINE, verified.design.name, mirror, spread, jitter, motion)
+    return performance(m, FINE, verified.design.name, mirror, Binned.of(left.radial_counts), jitter, motion)

@@ -1,6 +1,6 @@
 """Acquisition of the laser link: scans, the sequence of beacon, answer and lock, and their trade."""
 
-from microrad.acquisition.detection import detection_times, gap_probability, repeated
+from microrad.acquisition.detection import detection_times, gap_probability
 from microrad.acquisition.scan import (
     Detector,
     Raster,
@@ -69,7 +69,6 @@ __all__ = [
     "gap_probability",
     "highest_speed",
     "paper_sequence",
-    "repeated",
     "scan_detection_probability",
     "scan_stages",
     "simulate",

@@ -11,10 +11,9 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from microrad.acquisition.limits import require_count, require_not_negative, require_positive
+from microrad.acquisition.limits import require_not_negative
 from microrad.acquisition.scan import Raster, Scan, Spiral, StepStare
-from microrad.acquisition.times import TimeDistribution, joined, merged
-from microrad.radial_error import radial_cdf
+from microrad.acquisition.times import TimeDistribution, merged
 
 _Array = NDArray[np.float64]
 _REACH = 8.0  # standard deviations of the vibration
@@ -52,37 +51,6 @@ def detection_times(scan: Scan, jitter_rms_rad: float = 0.0) -> TimeDistribution
     if isinstance(scan, Raster):
         return _raster_times(scan, jitter_rms_rad)
     return _dwell_times(scan, jitter_rms_rad)
-
-
-def repeated(
-    times: TimeDistribution,
-    duration_s: float,
-    scans: int,
-    between_s: float = 0.0,
-    timeout_s: float = math.inf,
-    never_probability: float = 0.0,
-) -> TimeDistribution:
-    """Time to detection when a scan of `duration_s` is repeated, up to `scans` in all and until the time-out.
-
-    Scans are independent, except that a target which is never found, with `never_probability`, stays so. Zero means
-    that the attitude error is drawn anew for each scan; 1 - coverage, that it stands still and the disc misses it.
-    Raises `ValueError` for no scan, a time that is not positive and a `never_probability` that leaves less than the
-    probability of one scan.
-    """
-    require_count("the number of scans", scans)
-    require_positive("the duration of a scan", duration_s, "s")
-    require_not_negative("the time between scans", between_s, "s")
-    if not timeout_s > 0.0:
-        raise ValueError(f"the time-out is {timeout_s:g} s: it must be above 0 s; leave it out for none")
-    findable = 1.0 - never_probability
-    if not (never_probability >= 0.0 and times.probability <= findable * (1.0 + 1e-9)):
-        raise ValueError(
-            f"the share of targets that are never found is {never_probability:g}: it must be 0 or more and at most"
-            f" {1.0 - times.probability:g}, since one scan finds {times.probability:g}"
-        )
-    missed = max(1.0 - times.probability / findable, 0.0)
-    parts = [times.shifted(k * (duration_s + between_s)).scaled(missed**k) for k in range(scans)]
-    return joined(parts).before(timeout_s)
 
 
 def _levels(scan: Spiral | Raster) -> tuple[_Array, _Array]:
@@ -148,7 +116,7 @@ def _spiral_times(scan: Spiral, jitter_rms_rad: float) -> TimeDistribution:
     edge = np.linspace(0.0, scan.duration_s, _TIMES + 1)
     track = scan.track_radius(edge)
     radius = np.linspace(0.0, search.radius_rad + float(np.max(np.abs(offset), initial=0.0)), _RADII)
-    within = radial_cdf(search.error, radius)
+    within = -np.expm1(-((radius / search.sigma_rad) ** 2) / 2.0)
     # detected by the time the track has radius rho: the target's radius is below rho - offset
     found = np.zeros_like(track)
     for begin in range(0, offset.size, 256):
@@ -163,14 +131,12 @@ def _raster_times(scan: Raster, jitter_rms_rad: float) -> TimeDistribution:
 
     search, row = scan.search, scan.row_rad
     offset, weight = _offsets(scan, jitter_rms_rad)
-    sigma_x, sigma_y = search.error.rms_rad
+    sigma = search.sigma_rad
     reached = math.ceil(float(np.ptp(offset)) / search.pitch_rad)
     first = [weight * _first(scan, offset, jitter_rms_rad, before) for before in range(reached + 1)]
-    across = np.array(
-        [float(first[min(i, reached)] @ _density(place - offset, sigma_y)) for i, place in enumerate(row)]
-    )
+    across = np.array([float(first[min(i, reached)] @ _density(place - offset, sigma)) for i, place in enumerate(row)])
     edge = np.linspace(-search.radius_rad, search.radius_rad, _ALONG + 1)
-    along = np.diff(ndtr(edge / sigma_x))
+    along = np.diff(ndtr(edge / sigma))
     middle = (edge[:-1] + edge[1:]) / 2.0
     begin = np.arange(scan.rows) * (scan.row_time_s + scan.turn_around_s)
     time = begin[:, None] + (middle + search.radius_rad) / scan.speed_rad_s  # to and fro alike: the axis is symmetric
@@ -215,12 +181,12 @@ def _dwell_times(scan: StepStare, jitter_rms_rad: float) -> TimeDistribution:
     from scipy.special import ndtr  # slow to load
 
     search = scan.search
-    sigma_x, sigma_y = search.error.rms_rad
+    sigma = search.sigma_rad
     edge, step, probability = _cell(scan, jitter_rms_rad)
     cell = scan.near(search.radius_rad + search.beam_radius_rad + _REACH * jitter_rms_rad)  # all that some dwell sees
     centre = cell @ scan.basis_rad
-    along = np.diff(ndtr((centre[:, :1] + edge[0]) / sigma_x), axis=1)
-    across = np.diff(ndtr((centre[:, 1:] + edge[1]) / sigma_y), axis=1)
+    along = np.diff(ndtr((centre[:, :1] + edge[0]) / sigma), axis=1)
+    across = np.diff(ndtr((centre[:, 1:] + edge[1]) / sigma), axis=1)
     order = scan.order(cell[:, None, :] + step)
     # all cells whose dwells come in the same order share the chances of each dwell to be the first that detects
     sequence = np.where(order < scan.dwells, np.argsort(np.argsort(order, axis=1), axis=1), -1)

@@ -14,28 +14,25 @@ from microrad.acquisition.limits import (
     require_positive,
     require_probability,
 )
-from microrad.radial_error import Jitter, radial_quantile
 from microrad.units import format_quantity
 
 _Array = NDArray[np.float64]
-_GRIDS = ("hexagonal", "square")
 
 
 @dataclass(frozen=True, slots=True)
 class Search:
     """What is searched and with which beam.
 
-    The target lies at a Gaussian offset from the middle, `sigma_rad` in each axis (`sigma_cross_rad` for the second
-    one where it differs). `beam_radius_rad` is the half angle within which the power suffices for detection, not the
-    1/e2 half angle. `overlap` is the share of the beam's diameter by which neighbouring tracks overlap. `coverage` is
-    the probability that the target lies within the searched disc.
+    The target lies at a Gaussian offset from the middle, `sigma_rad` in each axis. `beam_radius_rad` is the half angle
+    within which the power suffices for detection, not the 1/e2 half angle. `overlap` is the share of the beam's
+    diameter by which neighbouring tracks overlap. `coverage` is the probability that the target lies within the
+    searched disc.
     """
 
     sigma_rad: float
     beam_radius_rad: float
     overlap: float
     coverage: float
-    sigma_cross_rad: float | None = None
 
     def __post_init__(self) -> None:
         """Refuse values that no search has."""
@@ -45,31 +42,18 @@ class Search:
                 f"the overlap is {self.overlap:g}: it must be 0 or more and below 1, a share of a diameter"
             )
         require_positive("the standard deviation of the pointing error", self.sigma_rad, "rad")
-        if self.sigma_cross_rad is not None:
-            require_positive("the standard deviation across", self.sigma_cross_rad, "rad")
         require_inside("the coverage probability", self.coverage)
         require_angle("the radius that covers the pointing error", self.radius_rad)
 
     @property
-    def error(self) -> Jitter:
-        """The uncertainty as a pointing error without bias."""
-        across = self.sigma_rad if self.sigma_cross_rad is None else self.sigma_cross_rad
-        return Jitter((0.0, 0.0), (self.sigma_rad, across))
-
-    @property
     def radius_rad(self) -> float:
-        """Radius of the searched disc: sigma sqrt(-2 ln(1 - P)) for equal axes."""
-        return _covering_radius(self.error, self.coverage)
+        """Radius of the searched disc: sigma sqrt(-2 ln(1 - P))."""
+        return self.sigma_rad * math.sqrt(-2.0 * math.log1p(-self.coverage))
 
     @property
     def pitch_rad(self) -> float:
         """Distance of neighbouring tracks, 2 beam_radius (1 - overlap)."""
         return 2.0 * self.beam_radius_rad * (1.0 - self.overlap)
-
-
-@lru_cache(maxsize=256)  # a scan asks for the same one again and again
-def _covering_radius(error: Jitter, coverage: float) -> float:
-    return float(radial_quantile(error, 1.0 - coverage))
 
 
 @dataclass(frozen=True, slots=True)
@@ -232,24 +216,20 @@ class Raster:
 
 @dataclass(frozen=True, slots=True)
 class StepStare:
-    """Dwells on a grid over the disc, ring after ring outward, each with `dwell_s`, and `settle_s` between them.
+    """Dwells on a hexagonal grid over the disc, ring after ring outward, each with `dwell_s`, `settle_s` between them.
 
-    The grid is "hexagonal" or "square", neighbours one pitch apart. It leaves no gap when the overlap is at least
-    1 - sqrt(3)/2 = 0.134 (hexagonal) or 1 - 1/sqrt(2) = 0.293 (square).
+    Neighbours are one pitch apart. The grid leaves no gap when the overlap is at least 1 - sqrt(3)/2 = 0.134.
     """
 
     search: Search
     detector: Detector
     dwell_s: float
     settle_s: float = 0.0
-    grid: str = "hexagonal"
 
     def __post_init__(self) -> None:
-        """Refuse an unknown grid, a negative time and a dwell that is shorter than the detection time."""
+        """Refuse a negative time and a dwell that is shorter than the detection time."""
         require_not_negative("the settling time", self.settle_s, "s")
         require_positive("the dwell time", self.dwell_s, "s")
-        if self.grid not in _GRIDS:
-            raise ValueError(f'there is no grid "{self.grid}": take "hexagonal" or "square"')
         if self.dwell_s < self.detector.detection_time_s * (1.0 - 1e-9):
             raise ValueError(
                 f"the dwell of {format_quantity(self.dwell_s, 's')} is shorter than the detection time of"
@@ -260,8 +240,7 @@ class StepStare:
     def basis_rad(self) -> _Array:
         """The two steps of the grid as rows, (2, 2)."""
         pitch = self.search.pitch_rad
-        second = (pitch / 2.0, pitch * math.sqrt(3.0) / 2.0) if self.grid == "hexagonal" else (0.0, pitch)
-        return np.array([(pitch, 0.0), second])
+        return np.array([(pitch, 0.0), (pitch / 2.0, pitch * math.sqrt(3.0) / 2.0)])
 
     def order(self, index: NDArray[np.int64]) -> NDArray[np.int64]:
         """Which dwell, from 0, stands at each grid index (..., 2); the number of dwells where there is none."""
@@ -368,8 +347,7 @@ def _dwell_indices(scan: StepStare) -> NDArray[np.int64]:
     inside = np.hypot(place[:, 0], place[:, 1]) <= scan.search.radius_rad
     index, place = index[inside], place[inside]
     first, second = index[:, 0], index[:, 1]
-    size = np.maximum(np.abs(first), np.abs(second))
-    ring = np.maximum(size, np.abs(first + second)) if scan.grid == "hexagonal" else size
+    ring = np.maximum(np.maximum(np.abs(first), np.abs(second)), np.abs(first + second))
     azimuth = np.arctan2(place[:, 1], place[:, 0])
     return np.asarray(index[np.lexsort((azimuth, ring))], dtype=np.int64)
 

@@ -4,8 +4,6 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
 from microrad.acquisition.limits import require_count, require_not_negative, require_positive, require_probability
 from microrad.acquisition.times import TimeDistribution, fixed_time, joined
 from microrad.units import SPEED_OF_LIGHT_M_S, format_quantity
@@ -61,14 +59,10 @@ class Stage:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Outcome:
-    """What a sequence comes to: the time until lock, the time until it is given up, and the visits of each stage.
-
-    `locked.probability` and `lost.probability` sum to 1. `visits` is the expected number of entries of each stage.
-    """
+    """What a sequence comes to: the time until lock and the time until it is given up; their probabilities sum to 1."""
 
     locked: TimeDistribution
     lost: TimeDistribution
-    visits: tuple[float, ...]
 
     @property
     def success_probability(self) -> float:
@@ -92,6 +86,7 @@ class Timing:
 
     GEO looks for the beacon in `frames` frames of `frame_time_s`. `geo_response_s` is the time GEO needs to turn and
     answer, `leo_detection_s` that of LEO's measurement of the answer, `lock_time_s` that of each terminal to lock.
+    `own_name` and `partner_name` are what the stages call LEO and GEO.
     """
 
     range_m: float
@@ -102,6 +97,8 @@ class Timing:
     leo_detection_s: float
     mirror_settling_s: float
     lock_time_s: float
+    own_name: str = "LEO"
+    partner_name: str = "GEO"
 
     def __post_init__(self) -> None:
         """Refuse negative times, a range that is not positive and less than one frame."""
@@ -167,10 +164,11 @@ def beacon_stages(timing: Timing, chances: Chances) -> tuple[Stage, ...]:
     detect_s = timing.frames * timing.frame_time_s
     detected = chances.beacon_coverage * frames_detection_probability(chances.frame_detection, timing.frames)
     wait_s = detect_s + timing.geo_response_s + timing.light_time_s + timing.leo_detection_s
+    first = f"{timing.own_name} points the beacon"
     return (
-        Stage("LEO points the beacon", timing.body_settling_s),
+        Stage(first, timing.body_settling_s),
         Stage("beacon travels", timing.light_time_s),
-        Stage("GEO detects", detect_s, detected, wait_s, "LEO points the beacon"),
+        Stage(f"{timing.partner_name} detects", detect_s, detected, wait_s, first),
     )
 
 
@@ -181,10 +179,11 @@ def scan_stages(timing: Timing, scan: TimeDistribution, duration_s: float) -> tu
     """
     wait_s = duration_s + timing.geo_response_s + timing.light_time_s + timing.leo_detection_s
     probability = min(scan.probability, 1.0)
+    first = f"{timing.own_name} points the scan"
     return (
-        Stage("LEO points the scan", timing.body_settling_s),
+        Stage(first, timing.body_settling_s),
         Stage("beam travels", timing.light_time_s),
-        Stage("GEO detects", scan.given_success(), probability, wait_s, "LEO points the scan"),
+        Stage(f"{timing.partner_name} detects", scan.given_success(), probability, wait_s, first),
     )
 
 
@@ -196,16 +195,17 @@ def answer_stages(timing: Timing, chances: Chances) -> tuple[Stage, ...]:
     """
     light_s, lock_s = timing.light_time_s, timing.lock_time_s
     answered = chances.answer_coverage * chances.answer_detection
-    again = "LEO detects the answer"
+    own, partner = timing.own_name, timing.partner_name
+    answer, again = f"{partner} turns and answers", f"{own} detects the answer"
     return (
-        Stage("GEO turns and answers", timing.geo_response_s),
+        Stage(answer, timing.geo_response_s),
         Stage("answer travels", light_s),
-        Stage(again, timing.leo_detection_s, answered, timing.leo_detection_s + light_s, "GEO turns and answers"),
-        Stage("LEO's mirror turns", timing.mirror_settling_s),
+        Stage(again, timing.leo_detection_s, answered, timing.leo_detection_s + light_s, answer),
+        Stage(f"{own}'s mirror turns", timing.mirror_settling_s),
         Stage("narrow beam travels", light_s),
-        Stage("GEO locks", lock_s, chances.return_coverage * chances.lock, lock_s + light_s, again),
-        Stage("GEO's beam travels", light_s),
-        Stage("LEO locks", lock_s, chances.lock, lock_s, again),
+        Stage(f"{partner} locks", lock_s, chances.return_coverage * chances.lock, lock_s + light_s, again),
+        Stage(f"{partner}'s beam travels", light_s),
+        Stage(f"{own} locks", lock_s, chances.lock, lock_s, again),
     )
 
 
@@ -224,7 +224,6 @@ def solve(stages: Sequence[Stage], attempts: int) -> Outcome:
     attempt, no stage, two stages of one name and a failure that goes back to a stage that is not there or comes later.
     """
     back = check_sequence(stages, attempts)
-    visits = np.zeros(len(stages))
     locked: list[TimeDistribution] = []
     lost: list[TimeDistribution] = []
     arrivals: list[list[TimeDistribution]] = [[] for _ in stages]
@@ -235,7 +234,6 @@ def solve(stages: Sequence[Stage], attempts: int) -> Outcome:
             if not arrivals[index]:
                 continue
             here = joined(arrivals[index])
-            visits[index] += here.probability
             after = arrivals[index + 1] if index + 1 < len(stages) else locked
             after.append(here.followed_by(stage.success_times))
             if stage.success_probability < 1.0:
@@ -243,7 +241,7 @@ def solve(stages: Sequence[Stage], attempts: int) -> Outcome:
                 (lost if attempt == attempts - 1 else failed[back[index]]).append(fail)
         arrivals = failed
     none = fixed_time(0.0, 0.0)
-    return Outcome(joined([*locked, none]), joined([*lost, none]), tuple(float(v) for v in visits))
+    return Outcome(joined([*locked, none]), joined([*lost, none]))
 
 
 def check_sequence(stages: Sequence[Stage], attempts: int) -> tuple[int, ...]:

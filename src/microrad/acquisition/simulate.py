@@ -48,7 +48,7 @@ def simulate_scan(scan: Scan, runs: int, seed: int, vibration: Vibration | None 
     if samples < 2:
         raise ValueError(f"the number of samples in a pass is {samples}: it must be 2 or more")
     draw = np.random.Generator(np.random.Philox(key=seed))
-    x, y = (draw.normal(0.0, sigma, runs) for sigma in scan.search.error.rms_rad)
+    x, y = (draw.normal(0.0, scan.search.sigma_rad, runs) for _ in range(2))
     shake = vibration or Vibration(0.0, 1.0)
     start, end = scan.windows(x, y, scan.search.beam_radius_rad + 6.0 * shake.rms_rad)
     state = _Pass(scan, x, y, shake, draw)
@@ -118,11 +118,10 @@ class Transition:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SequenceRuns:
-    """Simulated sequences: whether each locked, when it locked or was given up, and its failures; (runs,) arrays."""
+    """Simulated sequences: whether each locked, and when it locked or was given up; (runs,) arrays."""
 
     locked: NDArray[np.bool_]
     time_s: _Array
-    failures: NDArray[np.int64]
 
 
 def simulate(stages: Sequence[Stage], attempts: int, runs: int, seed: int) -> SequenceRuns:
@@ -131,11 +130,7 @@ def simulate(stages: Sequence[Stage], attempts: int, runs: int, seed: int) -> Se
     back = check_sequence(stages, attempts)
     draw = np.random.Generator(np.random.Philox(key=seed))
     logs = [_run(stages, back, attempts, draw) for _ in range(runs)]
-    return SequenceRuns(
-        np.array([log[-1].to == LOCKED for log in logs]),
-        np.array([log[-1].time_s for log in logs]),
-        np.array([sum(event.cause != _DONE for event in log) for log in logs]),
-    )
+    return SequenceRuns(np.array([log[-1].to == LOCKED for log in logs]), np.array([log[-1].time_s for log in logs]))
 
 
 def simulate_log(stages: Sequence[Stage], attempts: int, seed: int) -> tuple[Transition, ...]:

@@ -54,11 +54,6 @@ class TimeDistribution:
         index = int(np.searchsorted(np.cumsum(self.weight), probability * (1.0 - 1e-12)))
         return float(self.time_s[min(index, self.time_s.size - 1)])
 
-    def before(self, time_s: float) -> "TimeDistribution":
-        """The part at or before `time_s`; later successes become failures."""
-        kept = self.time_s <= time_s + _SAME_S
-        return TimeDistribution(self.time_s[kept], self.weight[kept])
-
     def given_success(self) -> "TimeDistribution":
         """The same times with probabilities that sum to 1."""
         return TimeDistribution(self.time_s, self.weight / self._certain())

@@ -1,7 +1,14 @@
 """Link budgets: of the beacon, its answer and the communication link, and what follows from them."""
 
 from microrad.link.beams import BEST_TRUNCATION, GaussianFall, LitAperture, OffAxis
-from microrad.link.budget import LEFT_AT_ZERO, LinkBudget, answer_budget, beacon_budget, communication_budget
+from microrad.link.budget import (
+    DEEPEST_DB,
+    LEFT_AT_ZERO,
+    LinkBudget,
+    answer_budget,
+    beacon_budget,
+    communication_budget,
+)
 from microrad.link.gains import (
     air_mass,
     aperture_gain_db,
@@ -38,6 +45,7 @@ from microrad.link.model import (
     TransmittedBeam,
     communication_beam,
     lit_aperture,
+    point_ahead_left_rad,
     point_ahead_rad,
     receiver,
     required_dbm,
@@ -48,6 +56,7 @@ from microrad.link.tornado import Swing, tornado
 __all__ = [
     "BEST_TRUNCATION",
     "BIT_ERROR_RATIO",
+    "DEEPEST_DB",
     "LEFT_AT_ZERO",
     "GaussianFall",
     "IdealReceiver",
@@ -81,6 +90,7 @@ __all__ = [
     "obscuration_loss_db",
     "peak_radiant_intensity_w_sr",
     "photon_energy_j",
+    "point_ahead_left_rad",
     "point_ahead_rad",
     "pointing_loss_db",
     "rate_at_loss",

@@ -41,8 +41,10 @@ _RECEIVING = "area pi D^2 / 4, all of its light on the detector"
 CHOSEN = "chosen for this evaluation"
 _NOT_GIVEN = "not given"
 LEFT_AT_ZERO = "left at 0 dB"
-"""The warning of a term that nothing was given for."""
-_DEEPEST_DB = 20.0  # pointing loss beyond which side lobes and scatter decide, not the main lobe
+"""The warning of a loss that is stated as nothing."""
+STREHL_LOSS, POINTING_LOSS, POINT_AHEAD_LOSS = "Strehl loss", "Pointing loss", "Point-ahead loss"
+FREE_SPACE_LOSS, CLEAR_SKY_LOSS = "Free-space loss", "Clear-sky loss"
+DEEPEST_DB = 20.0  # pointing loss beyond which side lobes and scatter decide, not the main lobe
 _CUT_DB = 0.1  # gain beyond which it counts that the aperture cuts a beam that is taken as whole
 _WORST_STREHL_DB = 5.0  # beyond it the core of the beam no longer has the shape of the perfect one
 
@@ -71,7 +73,7 @@ class LinkBudget:
 
     @property
     def at_zero(self) -> tuple[str, ...]:
-        """Names of the terms that stand at 0 dB because nothing was given for them."""
+        """Names of the losses that are stated as 0 dB, or not given at all."""
         return tuple(line.name for line in self.lines if line.warning == LEFT_AT_ZERO)
 
     @property
@@ -145,7 +147,7 @@ def _gaussian_budget(write: "Writer", beam: Beacon, receiver: str) -> LinkBudget
     basis = f"exp(-2 (error / theta)^2), error = {format_quantity(error, 'rad')}, {theta}"
     loss = 0.0 - float(gains.gaussian_pointing_loss_db(error, half))
     pointing = Line(
-        "Pointing loss", loss, "dB", basis, write.source("pointing_error"), f"{far}; static error", _deep(loss)
+        POINTING_LOSS, loss, "dB", basis, write.source("pointing_error"), f"{far}; static error", _deep(loss)
     )
     with_ahead = float(gains.gaussian_pointing_loss_db(error + point_ahead_rad(write.mission), half))
     level = gains.dbm(beam.required_power_w)
@@ -168,9 +170,9 @@ def _cut_by_aperture(half_angle_rad: float, aperture_m: float, wavelength_m: flo
 
 
 def _deep(loss_db: float) -> str:
-    if abs(loss_db) <= _DEEPEST_DB:
+    if abs(loss_db) <= DEEPEST_DB:
         return ""
-    return f"beyond {_DEEPEST_DB:g} dB the wings and the scatter of a real beam decide, not this formula"
+    return f"beyond {DEEPEST_DB:g} dB the wings and the scatter of a real beam decide, not this formula"
 
 
 def given_or(own: float, given: float | None, source: str, given_source: str) -> tuple[float, str]:
@@ -274,7 +276,7 @@ class Writer:
         near = (
             "" if beam.distance_m >= far else f"nearer than the far field, which begins at {format_quantity(far, 'm')}"
         )
-        return Line("Free-space loss", value, "dB", basis, self.source("distance"), "vacuum, far field", near)
+        return Line(FREE_SPACE_LOSS, value, "dB", basis, self.source("distance"), "vacuum, far field", near)
 
     def _channel(self) -> Line:
         channel = self.mission.channel
@@ -286,18 +288,25 @@ class Writer:
         source = source_text(self.sources, "channel.zenith_transmission", "channel.elevation")
         regime = "clear sky, from 10 degrees of elevation; no turbulence, no clouds"
         doubt = "turbulence is not in this budget: scintillation and beam wander come on top"
-        return Line("Clear-sky loss", 0.0 - clear_sky_db(self.mission), "dB", basis, source, regime, doubt)
+        return Line(CLEAR_SKY_LOSS, 0.0 - clear_sky_db(self.mission), "dB", basis, source, regime, doubt)
 
     def _ahead(self, with_ahead_db: float, pointing_db: float) -> Line:
         ahead = self.mission.point_ahead
         regime = "added to the pointing error in its worst direction"
         if ahead is None:
-            return Line("Point-ahead loss", 0.0, "dB", "taken as corrected", _NOT_GIVEN, regime, LEFT_AT_ZERO)
+            return Line(POINT_AHEAD_LOSS, 0.0, "dB", "taken as corrected", _NOT_GIVEN, regime, LEFT_AT_ZERO)
         source = source_text(self.sources, "point_ahead.transverse_velocity", "point_ahead.corrected")
         if ahead.corrected:
-            return Line("Point-ahead loss", 0.0, "dB", "corrected; the pointing error holds the rest", source, regime)
+            return Line(
+                POINT_AHEAD_LOSS,
+                0.0,
+                "dB",
+                "corrected; what that leaves is for the pointing error to hold",
+                source,
+                regime,
+            )
         basis = f"not corrected: 2 v / c = {format_quantity(point_ahead_rad(self.mission), 'rad')}"
-        return Line("Point-ahead loss", -with_ahead_db - pointing_db, "dB", basis, source, regime, _deep(with_ahead_db))
+        return Line(POINT_AHEAD_LOSS, -with_ahead_db - pointing_db, "dB", basis, source, regime, _deep(with_ahead_db))
 
     def _strehl(self) -> Line:
         beam, convention = self.beam, self.mission.conventions.strehl
@@ -310,14 +319,14 @@ class Writer:
         else:
             basis = "as given in dB" if convention == "decibel" else f"Strehl ratio {beam.strehl:g}"
             source = source_text(self.sources, f"{self.table}.strehl", "conventions.strehl")
-        return Line("Strehl loss", 0.0 - loss, "dB", basis, source, regime, doubt if loss else LEFT_AT_ZERO)
+        return Line(STREHL_LOSS, 0.0 - loss, "dB", basis, source, regime, doubt if loss else LEFT_AT_ZERO)
 
 
 def _pointing_line(mission: LinkMission, error_rad: float, source: str) -> Line:
     loss = 0.0 - float(communication_beam(mission).fall.loss_db(error_rad))
     formula, regime = _POINTING_BASIS[mission.conventions.pointing_loss]
     basis = f"{formula}, error = {format_quantity(error_rad, 'rad')}"
-    return Line("Pointing loss", loss, "dB", basis, source, f"{regime}; static error", _deep(loss))
+    return Line(POINTING_LOSS, loss, "dB", basis, source, f"{regime}; static error", _deep(loss))
 
 
 def _required_line(mission: LinkMission, rate_bit_s: float, write: Writer, rate_source: str) -> Line:
@@ -347,9 +356,9 @@ def _budget(
 ) -> LinkBudget:
     received_dbm = total_db(transmit + receive)
     margin = received_dbm - required.value
-    mispointing = ("Strehl loss", "Pointing loss", "Point-ahead loss")
+    mispointing = (STREHL_LOSS, POINTING_LOSS, POINT_AHEAD_LOSS)
     on_axis = [line for line in transmit if line.name not in mispointing]
-    path = ("Pointing loss", "Point-ahead loss", "Free-space loss", "Clear-sky loss")
+    path = (POINTING_LOSS, POINT_AHEAD_LOSS, FREE_SPACE_LOSS, CLEAR_SKY_LOSS)
     leaving = [line for line in transmit if line.name not in path]
     return LinkBudget(
         name=name,

@@ -71,6 +71,12 @@ def point_ahead_rad(mission: LinkMission) -> float:
     return 2.0 * ahead.transverse_velocity_m_s / SPEED_OF_LIGHT_M_S
 
 
+def point_ahead_left_rad(mission: LinkMission) -> float:
+    """What point-ahead adds to a residual that does not hold it: all of it, or what its correction leaves."""
+    ahead = mission.point_ahead
+    return 0.0 if ahead is None else ahead.error_rad if ahead.corrected else point_ahead_rad(mission)
+
+
 def clear_sky_db(mission: LinkMission) -> float:
     """Loss of a clear atmosphere on the path; 0 in vacuum."""
     channel = mission.channel

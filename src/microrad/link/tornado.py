@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 from microrad.fields import Quantity, Share, Table
 from microrad.link.budget import communication_budget
+from microrad.link.model import lit_aperture
+from microrad.link.receivers import RateError
 from microrad.mission import LinkMission, Source, source_text
 
 RELATIVE = 0.1
@@ -67,7 +69,10 @@ def _swings(mission: LinkMission, sources: Mapping[str, Source], name: str) -> I
         rules = [rule for rule in info.metadata if isinstance(rule, Quantity)] or _inner(info.annotation)
         if not rules or not isinstance(value, float):
             continue
-        low, high = _moved(field, value, rules[0], mission.conventions.strehl)
+        low, high = (
+            _lit(mission, name, field, value, moved)
+            for moved in _moved(field, value, rules[0], mission.conventions.strehl)
+        )
         key = f"{name}.{info.alias or field}"
         yield Swing(
             key=key,
@@ -114,8 +119,27 @@ def _table(mission: LinkMission, name: str) -> Table | None:
     return table
 
 
+def _lit(mission: LinkMission, name: str, field: str, value: float, moved: float) -> float:
+    """The moved value, its step halved until the obscuration still lets some of the beam pass."""
+    while moved != value and mission.conventions.pointing_loss == "pattern":
+        try:
+            lit_aperture(_changed(mission, name, field, moved))
+            break
+        except ValueError:
+            moved = (value + moved) / 2.0
+    return moved
+
+
 def _margin(mission: LinkMission, sources: Mapping[str, Source], name: str, field: str, value: float) -> float:
     """The margin with one field of one table replaced; a receiver too slow for the rate has none."""
+    try:
+        return communication_budget(_changed(mission, name, field, value), sources).margin_db
+    except RateError:
+        return -math.inf
+
+
+def _changed(mission: LinkMission, name: str, field: str, value: float) -> LinkMission:
+    """The mission with one field of one table replaced."""
     parts = name.split(".")
     table = _table(mission, name)
     assert table is not None
@@ -124,7 +148,4 @@ def _margin(mission: LinkMission, sources: Mapping[str, Source], name: str, fiel
         outer = _table(mission, ".".join(parts[:depth]))
         assert outer is not None
         changed = outer.model_copy(update={parts[depth]: changed})
-    try:
-        return communication_budget(mission.model_copy(update={parts[0]: changed}), sources).margin_db
-    except ValueError:
-        return -math.inf
+    return mission.model_copy(update={parts[0]: changed})

@@ -56,9 +56,8 @@ class StatedError:
 class ErrorTerm:
     """A pointing error as the summation takes it: mean and standard deviation about axis x and axis y.
 
-    `stated_rad` is the half width that it was stated with. Terms of the same `group` are correlated with each other,
-    a term without one ("") with nothing. `gaussian` is false for a spread of another shape. Raises `ValueError` for
-    values that are not finite and for a negative deviation.
+    `stated_rad` is the half width that it was stated with. `gaussian` is false for a spread of another shape. No term
+    is correlated with another. Raises `ValueError` for values that are not finite and for a negative deviation.
     """
 
     name: str
@@ -66,7 +65,6 @@ class ErrorTerm:
     stated_rad: float
     mean_rad: tuple[float, float]
     sigma_rad: tuple[float, float]
-    group: str = ""
     gaussian: bool = True
 
     def __post_init__(self) -> None:

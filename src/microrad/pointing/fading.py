@@ -10,13 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from microrad.pointing.statistics import (
-    mean_loss_db,
-    outage_loss_db,
-    outage_probability,
-    radius_of_loss_rad,
-    transmission,
-)
+from microrad.pointing.statistics import outage_probability, radius_of_loss_rad, transmission
 from microrad.radial_error import Jitter, density_on_circle, radial_survival
 from microrad.units import format_quantity
 
@@ -31,6 +25,10 @@ MOST_POWER_DB = 100.0
 
 _REACH = 12.0  # standard deviations about the bias that a mean over the pointing error takes in
 _RADII = 4001  # edges of its steps of the radial error
+
+
+class NoPowerError(ValueError):
+    """Not even `MOST_POWER_DB` more power bring the mean bit error ratio back to its target."""
 
 
 # ----------------------------------------------------------------------------------------------------- from a spectrum
@@ -204,7 +202,7 @@ def _mean_over(power: Floats, share: Floats, extra_db: float, error_ratio: Error
     ratio = np.asarray(error_ratio(10.0 ** (extra_db / 10.0) * power), dtype=np.float64)
     if ratio.shape != power.shape or not np.all((ratio >= 0.0) & (ratio <= 1.0)):
         raise ValueError("the bit error ratio does not give one value from 0 to 1 for each power; correct the curve")
-    if np.any(np.diff(ratio) < -1e-9 * ratio[:-1]):
+    if np.any(np.diff(ratio) < -1e-9 * ratio[:-1] - 1e-300):  # smaller ratios have lost their digits
         raise ValueError("the bit error ratio grows with the power; give a curve that falls")
     return float(np.sum(share * ratio))
 
@@ -217,7 +215,8 @@ def uncoded_penalty_db(jitter: Jitter, half_angle_rad: float, error_ratio: Error
     if there is one, over the power relative to what the target needs without pointing error: its value at 1 is the
     target.
 
-    Raises `ValueError` when the target is not between 0 and 1, when 100 dB do not reach it, and as `mean_error_ratio`.
+    Raises `NoPowerError` when `MOST_POWER_DB` do not reach the target, `ValueError` when that is not between 0 and 1,
+    and as `mean_error_ratio`.
     """
     power, share = _power_shares(jitter, half_angle_rad)
     target = _mean_over(np.ones(1), np.ones(1), 0.0, error_ratio)
@@ -230,28 +229,10 @@ def uncoded_penalty_db(jitter: Jitter, half_angle_rad: float, error_ratio: Error
     if missed(0.0) <= 1e-12:  # nothing but rounding
         return 0.0
     if missed(MOST_POWER_DB) > 0.0:
-        raise ValueError(
+        raise NoPowerError(
             f"the mean bit error ratio stays above {target:g} even with {MOST_POWER_DB:g} dB more power; "
             "widen the beam or reduce the jitter"
         )
     from scipy.optimize import brentq  # here: slow to load
 
     return float(brentq(missed, 0.0, MOST_POWER_DB, xtol=1e-9))
-
-
-def interleaved_penalty_db(jitter: Jitter, half_angle_rad: ArrayLike) -> Floats:
-    """Extra power in dB of a coded link whose interleaver spans many fades: the loss of mean power.
-
-    The code is taken to need a mean power and no more. Capacity is concave in the power, so it is lower for a power
-    that fluctuates than for its mean: this is the least that a code with its interleaver can pay.
-    """
-    return mean_loss_db(jitter, half_angle_rad)
-
-
-def not_interleaved_penalty_db(jitter: Jitter, half_angle_rad: ArrayLike, probability: ArrayLike) -> Floats:
-    """Extra power in dB of a coded link whose fades outlast a code word: the loss at the outage `probability`.
-
-    A code word is lost when its power is below the threshold, so the share of words lost is the share of time in a
-    fade. See `outage_loss_db`.
-    """
-    return outage_loss_db(jitter, half_angle_rad, probability)

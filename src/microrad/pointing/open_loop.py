@@ -15,7 +15,6 @@ from microrad.pointing.point_ahead import NAME, PointAheadAngle, point_ahead
 from microrad.pointing.summation import (
     Rule,
     Summation,
-    axis_shares,
     exact_total_rad,
     mean_and_sigma,
     summations,
@@ -57,9 +56,9 @@ class OpenLoopPointing:
     """Open-loop pointing errors, their totals by each rule, and what the beacon covers of them.
 
     `lines` hold the stated half widths, `terms` in the same order what they mean: mean and standard deviation about x
-    and y. `variance_shares` is the part of each line in the sum of squared half widths, `shares` its part in the ECSS
-    total about the worse axis; zeros when every line is zero. `error` is mean and standard deviation of the sum.
-    `confidence` is to be read by `interpretation`, which `INTERPRETATIONS` puts in words.
+    and y. `variance_shares` is the part of each line in the sum of squared half widths; zeros when every line is zero.
+    `error` is mean and standard deviation of the sum. `confidence` is to be read by `interpretation`, which
+    `INTERPRETATIONS` puts in words.
 
     `convention` is the mission's own for a divergence. `required_divergence_rad` has the root sum square as its half
     angle, `confident_divergence_rad` covers with the mission's confidence. `reading` and its counterpart under the
@@ -70,7 +69,6 @@ class OpenLoopPointing:
     stated: tuple[StatedError, ...]
     terms: tuple[ErrorTerm, ...]
     variance_shares: tuple[float, ...]
-    shares: tuple[float, ...]
     rss_rad: float
     confidence: float
     interpretation: Interpretation
@@ -153,7 +151,6 @@ def open_loop_budget(
         stated=stated,
         terms=terms,
         variance_shares=tuple((term.stated_rad / rss) ** 2 if rss else 0.0 for term in terms),
-        shares=axis_shares(terms, confidence),
         rss_rad=rss,
         confidence=confidence,
         interpretation=interpretation,

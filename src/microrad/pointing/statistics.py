@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from microrad.radial_error import Jitter, at_least_zero, radial_cdf, radial_quantile, radial_survival
+from microrad.radial_error import Jitter, at_least_zero, radial_quantile, radial_survival
 from microrad.units import format_quantity
 
 Floats = NDArray[np.float64]
@@ -28,7 +28,7 @@ def _half_angle(values: ArrayLike) -> Floats:
     return array
 
 
-# --------------------------------------------------------------------------------------------------- mean and variance
+# ---------------------------------------------------------------------------------------------------------------- mean
 def transmission(radius_rad: ArrayLike, half_angle_rad: ArrayLike) -> Floats:
     """h = exp(-2 r^2 / theta^2), the power on axis taken as 1; radial error and half angle are broadcast."""
     radius = at_least_zero(radius_rad, "radial error", "rad")
@@ -58,15 +58,6 @@ def mean_transmission(jitter: Jitter, half_angle_rad: ArrayLike) -> Floats:
     return np.asarray(10.0 ** (-0.1 * mean_loss_db(jitter, half_angle_rad)))
 
 
-def transmission_variance(jitter: Jitter, half_angle_rad: ArrayLike) -> Floats:
-    """Variance of h. E[h^2] is the mean at the half angle theta / sqrt(2); no digits are lost at small jitter."""
-    spread, offset = _squares(jitter, half_angle_rad)
-    # ln(E[h^2] / E[h]^2), as a sum of positive terms
-    excess = 0.5 * np.log1p(spread**2 / (1.0 + 2.0 * spread))
-    excess += 2.0 * offset * spread / ((1.0 + spread) * (1.0 + 2.0 * spread))
-    return np.asarray(mean_transmission(jitter, half_angle_rad) ** 2 * np.expm1(np.sum(excess, axis=-1)))
-
-
 # -------------------------------------------------------------------------------------------------------- distribution
 def outage_probability(jitter: Jitter, half_angle_rad: ArrayLike, margin_db: ArrayLike) -> Floats:
     """P(pointing loss > margin): the share of time that a fade margin above the power on axis does not cover.
@@ -75,11 +66,6 @@ def outage_probability(jitter: Jitter, half_angle_rad: ArrayLike, margin_db: Arr
     `mean_transmission`. Raises `ValueError` for a negative margin or a half angle not above 0.
     """
     return radial_survival(jitter, radius_of_loss_rad(half_angle_rad, margin_db))
-
-
-def loss_cdf(jitter: Jitter, half_angle_rad: ArrayLike, loss_db: ArrayLike) -> Floats:
-    """P(pointing loss < `loss_db`), the distribution of the loss in dB; arguments as for `outage_probability`."""
-    return radial_cdf(jitter, radius_of_loss_rad(half_angle_rad, loss_db))
 
 
 def outage_loss_db(jitter: Jitter, half_angle_rad: ArrayLike, probability: ArrayLike) -> Floats:
@@ -99,13 +85,15 @@ class BestDivergence:
     """Half angle at 1/e^2 that gives the most received power under a criterion.
 
     `loss_db` is the pointing loss that the criterion counts, at this half angle; `gain_db` the transmit gain 8/theta^2
-    less that loss. `at_limit` says that the smallest half angle binds: the beam would be narrower if it could.
-    `current_excess_db` is what the current half angle loses against the best, if one was given.
+    less that loss. `wanted_half_angle_rad` is the best one without a smallest: what a larger aperture would allow, 0
+    where there is no error to be wide for. `at_limit` says that the smallest half angle binds: the beam would be
+    narrower if it could. `current_excess_db` is what the current half angle loses against the best, if one was given.
     """
 
     half_angle_rad: float
     loss_db: float
     gain_db: float
+    wanted_half_angle_rad: float
     at_limit: bool
     current_excess_db: float | None
 
@@ -136,13 +124,13 @@ def best_divergence_for_static_error(
     Raises `ValueError` for a negative error, a current half angle below the smallest, or no error and no limit.
     """
     error = float(at_least_zero(error_rad, "radial error", "rad"))
+    limit = float(at_least_zero(smallest_half_angle_rad, "smallest half angle", "rad"))
     wanted = math.sqrt(2.0) * error
-    return _best(
-        wanted,
-        lambda half_angle: _DB_PER_SQUARE * (error / half_angle) ** 2,
-        smallest_half_angle_rad,
-        current_half_angle_rad,
-    )
+
+    def loss_db(half_angle: float) -> float:
+        return _DB_PER_SQUARE * (error / half_angle) ** 2
+
+    return _best(max(wanted, limit), wanted, loss_db, limit, current_half_angle_rad)
 
 
 def best_divergence_for_mean(
@@ -155,9 +143,16 @@ def best_divergence_for_mean(
     theta^2 = 2 b^2 - 4 s^2. Raises `ValueError` when there is none and no limit, or the current half angle is below it.
     """
     limit = float(at_least_zero(smallest_half_angle_rad, "smallest half angle", "rad"))
-    candidates = [limit**2, *(square for square in _stationary_squares(jitter) if square > limit**2)]
-    wanted = math.sqrt(max(candidates, key=lambda square: _log_mean_gain(jitter, square)))
-    return _best(wanted, lambda half_angle: float(mean_loss_db(jitter, half_angle)), limit, current_half_angle_rad)
+    squares = _stationary_squares(jitter)
+
+    def best_from(smallest: float) -> float:
+        candidates = [smallest**2, *(square for square in squares if square > smallest**2)]
+        return math.sqrt(max(candidates, key=lambda square: _log_mean_gain(jitter, square)))
+
+    def loss_db(half_angle: float) -> float:
+        return float(mean_loss_db(jitter, half_angle))
+
+    return _best(max(best_from(limit), limit), best_from(0.0), loss_db, limit, current_half_angle_rad)
 
 
 def _stationary_squares(jitter: Jitter) -> list[float]:
@@ -188,9 +183,10 @@ def _log_mean_gain(jitter: Jitter, square: float) -> float:
     return total
 
 
-def _best(wanted: float, loss_db: Callable[[float], float], smallest: float, current: float | None) -> BestDivergence:
-    limit = float(at_least_zero(smallest, "smallest half angle", "rad"))
-    if max(wanted, limit) == 0.0:
+def _best(
+    best: float, wanted: float, loss_db: Callable[[float], float], limit: float, current: float | None
+) -> BestDivergence:
+    if best == 0.0:
         raise ValueError(
             "the received power grows without end as the beam narrows (half angle 0 rad); "
             "give the smallest half angle, the diffraction limit of the aperture"
@@ -204,6 +200,5 @@ def _best(wanted: float, loss_db: Callable[[float], float], smallest: float, cur
     def gain_db(half_angle: float) -> float:
         return 10.0 * math.log10(8.0 / half_angle**2) - loss_db(half_angle)
 
-    best = max(wanted, limit)
     excess = None if current is None else gain_db(best) - gain_db(current)
-    return BestDivergence(best, loss_db(best), gain_db(best), wanted <= limit, excess)
+    return BestDivergence(best, loss_db(best), gain_db(best), wanted, best == limit, excess)

@@ -22,7 +22,7 @@ NEGLIGIBLE = 1e-9
 """A standard deviation below this part of the largest mean or deviation is taken as 0."""
 _LEAST_RAD = 1e-30  # standard deviations below it are no pointing errors, and their squares leave the range of a float
 
-_CORRELATED = "terms uncorrelated, but for those of one group, which add linearly"
+_UNCORRELATED = "terms uncorrelated"
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,19 +57,16 @@ def sigma_multiple(confidence: float) -> float:
 def mean_and_sigma(terms: Terms) -> Jitter:
     """Mean (`bias_rad`) and standard deviation (`rms_rad`) of the sum, per axis: ECSS-E-ST-60-10C 4.2.3.
 
-    Means add (a), standard deviations add within a group of correlated terms (b) and in squares otherwise (c, d).
+    Means add (a), standard deviations of uncorrelated terms add in squares (c, d).
     The record is also the Gaussian with these moments, the axes independent, which many errors come close to together.
     A standard deviation that is `NEGLIGIBLE` beside the rest comes out as 0.
     """
-    groups: dict[tuple[str, int], list[ErrorTerm]] = {}
-    for index, term in enumerate(terms):
-        groups.setdefault((term.group, -1 if term.group else index), []).append(term)
 
     def mean(axis: int) -> float:
         return math.fsum(term.mean_rad[axis] for term in terms)
 
     def sigma(axis: int) -> float:
-        return math.hypot(*(math.fsum(term.sigma_rad[axis] for term in group) for group in groups.values()))
+        return math.hypot(*(term.sigma_rad[axis] for term in terms))
 
     means, sigmas = (mean(0), mean(1)), (sigma(0), sigma(1))
     least = max(_LEAST_RAD, NEGLIGIBLE * max(abs(means[0]), abs(means[1]), *sigmas))
@@ -161,7 +158,7 @@ def summations(terms: Terms, confidence: float) -> tuple[Summation, ...]:
             "axis",
             totals["ecss-axis"],
             "abs(sum of means) + n_p sqrt(sum of sigma^2), the worse axis",
-            f"{standard} 4.2.3 and 4.2.4.1; {_CORRELATED}",
+            f"{standard} 4.2.3 and 4.2.4.1; {_UNCORRELATED}",
             shape,
         ),
         Summation(
@@ -170,7 +167,7 @@ def summations(terms: Terms, confidence: float) -> tuple[Summation, ...]:
             "radial",
             totals["ecss-radial"],
             "sqrt(mean_x^2 + mean_y^2) + n_p sqrt(sigma_x^2 + sigma_y^2)",
-            f"{standard} 4.2.3 and 4.2.4.2.1, which calls it extremely conservative; {_CORRELATED}",
+            f"{standard} 4.2.3 and 4.2.4.2.1, which calls it extremely conservative; {_UNCORRELATED}",
             low if totals["ecss-radial"] < totals["exact"] * (1.0 - 1e-9) else shape,
         ),
         Summation(
@@ -203,8 +200,6 @@ def rss_caveat(terms: Terms) -> str:
     ratios = [sigma / term.stated_rad for term in terms if term.stated_rad for sigma in term.sigma_rad]
     if ratios and max(ratios) > min(ratios) * (1.0 + 1e-9):
         return "not authorised: the half widths are not the same number of standard deviations"
-    if len({term.group for term in terms if term.group}) < sum(1 for term in terms if term.group):
-        return "not authorised: some terms are correlated and add linearly"
     return ""
 
 
@@ -229,24 +224,3 @@ def rayleigh_caveat(terms: Terms) -> str:
     if smallest < (1.0 - RAYLEIGH_UNLIKE_AXES) * largest:
         return f"does not apply: the two standard deviations differ by more than {100 * RAYLEIGH_UNLIKE_AXES:g} %"
     return ""
-
-
-def axis_shares(terms: Terms, confidence: float) -> tuple[float, ...]:
-    """Part of each term in `axis_totals_rad` of the worse axis; they sum to 1, and are zeros where the total is zero.
-
-    A term adds its mean, in the direction of the sum of the means, and n_p sigma times its part in the variance. The
-    latter is sigma_term sigma_group, so that correlated terms share what their group adds.
-    """
-    totals, multiple = axis_totals_rad(terms, confidence), sigma_multiple(confidence)
-    axis = totals.index(max(totals))
-    if totals[axis] == 0.0:
-        return (0.0,) * len(terms)
-    total = mean_and_sigma(terms)
-    sign, sigma = math.copysign(1.0, total.bias_rad[axis]), total.rms_rad[axis]
-    shares = []
-    for term in terms:
-        own = term.sigma_rad[axis]
-        group = math.fsum(t.sigma_rad[axis] for t in terms if t.group == term.group) if term.group else own
-        spread = multiple * own * group / sigma if sigma else 0.0
-        shares.append((sign * term.mean_rad[axis] + spread) / totals[axis])
-    return tuple(shares)

@@ -6,6 +6,7 @@ import math
 from dataclasses import asdict
 from typing import Any
 
+from microrad import link
 from microrad.budget import Line
 from microrad.link import Swing
 from microrad.link_acquisition import DEEPEST_DB, Finding, Found, Tracking
@@ -24,7 +25,8 @@ def lines(study: LinkStudy) -> list[tuple[str, Line]]:
     found += [("Open-loop pointing", line) for line in study.open_loop.lines]
     if study.tracking is not None:
         found += [("Tracking sensor", line) for line in study.tracking.noise_lines]
-        found.append(("Tracking sensor", study.tracking.noise_equivalent_angle))
+        if study.tracking.noise_equivalent_angle is not None:
+            found.append(("Tracking sensor", study.tracking.noise_equivalent_angle))
     return found
 
 
@@ -80,7 +82,7 @@ def sentences(study: LinkStudy) -> list[str]:
     else:
         found.append(
             f"Largest data rate with the required {q.margin_db:g} dB at {quantity(q.pointing_error_rad, 'rad')}: "
-            f"{quantity(study.largest_rate_bit_s, 'bit/s')}."
+            f"{quantity(study.largest_rate_bit_s, 'bit/s')}{_rate_limit(study)}."
         )
     top = study.tornado[:3]
     if top:
@@ -109,6 +111,13 @@ def sentences(study: LinkStudy) -> list[str]:
     return found
 
 
+def _rate_limit(study: LinkStudy) -> str:
+    """In words, that the receiver and not the link ends the data rate, or nothing."""
+    receiver = link.receiver(study.file.mission)
+    limited = receiver is not None and study.largest_rate_bit_s >= receiver.highest_data_rate_bit_s * (1.0 - 1e-9)
+    return ", the most that the receiver takes" if limited else ""
+
+
 def verdict(study: LinkStudy) -> str:
     """Whether the links close, with each margin."""
     margins = ", ".join(f"{b.name.lower()} {signed_db(b.margin_db)}" for b in study.budgets)
@@ -126,7 +135,7 @@ def _swing(s: Swing) -> str:
 
 def _light(t: Tracking) -> str:
     brings = f"The answer brings {quantity(t.power_w, 'W')} to the tracking sensor: "
-    if t.signal_to_noise < 1.0:
+    if t.signal_to_noise < 1.0 or t.noise_equivalent_angle is None:
         return brings + f"less than its noise in a reading (signal to noise {t.signal_to_noise:.2g})."
     angle = quantity(t.noise_equivalent_angle.value, "rad")
     return f"{brings}noise-equivalent angle {angle} rms per axis and reading."
@@ -160,22 +169,27 @@ def pointing_sentences(p: OpenLoopPointing) -> list[str]:
 def performance(p: Performance, study: LinkStudy) -> str:
     """The link under its jitter, in a sentence."""
     q = study.file.mission.requirement
+    narrowest = ", the narrowest of the aperture" if p.best.at_limit else ""
     return (
         f"Under the jitter: mean pointing loss {p.mean_loss_db:.2f} dB; {p.outage_loss_db:.2f} dB but for "
         f"{100 * q.outage:g} % of the time, which leaves a margin of {signed_db(p.margin_db)}; below 0 dB for a share "
-        f"of {p.outage:.3g} of the time; best half angle {quantity(p.best.half_angle_rad, 'rad')}."
+        f"of {p.outage:.3g} of the time; best half angle {quantity(p.best.half_angle_rad, 'rad')}{narrowest}."
     )
 
 
 def acquisition(f: Finding) -> list[str]:
     """Time and probability of each way to find the partner."""
-    ways = [f.wide] if f.scan is None else [f.wide, f.scan]
-    return [
+    return [_lock(w) for w in f.ways]
+
+
+def _lock(w: Found) -> str:
+    if not w.possible:
+        return f"Acquisition by {w.name}: never (simulated {w.simulated_probability:.4f})."
+    return (
         f"Acquisition by {w.name}: lock with a probability of {w.outcome.success_probability:.4f} "
         f"(simulated {w.simulated_probability:.4f}), {quantity(w.outcome.mean_time_s, 's')} in the mean "
         f"(simulated {simulated_mean(w)})."
-        for w in ways
-    ]
+    )
 
 
 def simulated_mean(w: Found) -> str:
@@ -285,7 +299,7 @@ def _tracking(study: LinkStudy) -> dict[str, Any]:
     return {
         "power_w": t.power_w,
         "signal_to_noise": t.signal_to_noise,
-        "noise_equivalent_angle_rad": t.noise_equivalent_angle.value,
+        "noise_equivalent_angle_rad": None if t.noise_equivalent_angle is None else t.noise_equivalent_angle.value,
         "lines": [line_data(line) for line in t.noise_lines],
     }
 
@@ -305,6 +319,7 @@ def performance_data(p: Performance) -> dict[str, Any]:
         "below_required_margin": p.short,
         "data_rate_bit_s": p.data_rate_bit_s,
         "best_half_angle_rad": p.best.half_angle_rad,
+        "wanted_half_angle_rad": p.best.wanted_half_angle_rad,
         "lost_against_best_db": p.best.current_excess_db,
         "uncoded_penalty_db": p.uncoded_penalty_db,
         "fades_per_s": p.fades_per_s,
@@ -313,28 +328,31 @@ def performance_data(p: Performance) -> dict[str, Any]:
 
 
 def finding_data(f: Finding) -> dict[str, Any]:
-    """Acquisition as plain data."""
+    """Acquisition as plain data; what never locks has no times."""
+    s = f.scanned
     return {
         "uncertainty_per_axis_rad": f.sigma_rad,
         "beacon_coverage": f.chances.beacon_coverage,
         "answer_coverage": f.chances.answer_coverage,
         "answer_detection": f.chances.answer_detection,
         "return_coverage": f.chances.return_coverage,
-        "scan_s": f.scan_s,
-        "scan_radius_rad": f.scan_radius_rad,
+        "scan_s": None if s is None or not s.detects else s.duration_s,
+        "scan_radius_rad": None if s is None else s.radius_rad,
+        "scan_stated_detection_s": None if s is None else s.stated_detection_s,
+        "scan_needed_detection_s": None if s is None or not s.detects else s.needed_detection_s,
         "ways": [
             {
                 "name": w.name,
                 "success_probability": w.outcome.success_probability,
-                "mean_time_s": w.outcome.mean_time_s,
+                "mean_time_s": w.outcome.mean_time_s if w.possible else None,
                 "simulated_success_probability": w.simulated_probability,
-                "simulated_mean_time_s": w.simulated_mean_s,
+                "simulated_mean_time_s": w.simulated_mean_s if w.simulated.locked.any() else None,
                 "runs": int(w.simulated.locked.size),
                 "stages": [
-                    {"name": s.name, "longest_s": s.longest_s, "success_probability": s.success_probability}
-                    for s in w.stages
+                    {"name": each.name, "longest_s": each.longest_s, "success_probability": each.success_probability}
+                    for each in w.stages
                 ],
             }
-            for w in ((f.wide,) if f.scan is None else (f.wide, f.scan))
+            for w in f.ways
         ],
     }

@@ -4,7 +4,7 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from microrad.link_acquisition import Finding, Found
+from microrad.link_acquisition import LONGEST_LOOK_S, Finding, Found, Scanned
 from microrad.link_performance import Performance
 from microrad.link_study import LinkStudy
 from microrad.performance import FINE, Cost, LinkPerformance
@@ -103,7 +103,7 @@ def _sentences(links: LinkStudy) -> list[str]:
 
 def _light(links: LinkStudy) -> tuple[Any, ...]:
     t = links.tracking
-    return () if t is None else (*t.noise_lines, t.noise_equivalent_angle)
+    return () if t is None or t.noise_equivalent_angle is None else (*t.noise_lines, t.noise_equivalent_angle)
 
 
 # --------------------------------------------------------------------------------------------------------- performance
@@ -135,7 +135,7 @@ def cells(c: Performance) -> list[str]:
         f"{c.margin_db:+.2f}".replace("-", "\u2212"),
         share(c.outage),
         share(c.short),
-        f"{c.best.half_angle_rad * 1e6:.1f}",
+        f"{c.best.half_angle_rad * 1e6:.1f}{' (narrowest)' if c.best.at_limit else ''}",
         f"{c.best.current_excess_db:.2f}",
         "none" if math.isnan(c.data_rate_bit_s) else f"{c.data_rate_bit_s * 1e-6:.0f}",
     ]
@@ -150,8 +150,8 @@ def note(*, costs: bool) -> str:
     """How the columns are to be read."""
     how = (
         "Rms: radial, about zero. Outage: share of the time with a margin below 0 dB. Best half angle: of a Gaussian "
-        "beam, at 1/e2, with the most power at the loss of that column; narrower than the present one, it takes a "
-        "larger aperture. Data rate: the largest with the required margin at that loss."
+        "beam, at 1/e2, with the most power at the error of that column; narrowest: the present one, since a narrower "
+        "one would take a larger aperture. Data rate: the largest with the required margin at that loss."
     )
     against = " What hysteresis costs: against the same controller and the same errors on a mirror without it."
     return how + against if costs else how
@@ -228,22 +228,21 @@ def _penalty(c: Performance) -> str:
 # --------------------------------------------------------------------------------------------------------- acquisition
 def acquisition(f: Finding) -> Row:
     """Each way to find the partner, with its stages and one run."""
-    ways = [f.wide] if f.scan is None else [f.wide, f.scan]
-    return {"sentences": acquisition_words(f), "ways": [way(w) for w in ways], "early": f"{100 * EARLY:g} %"}
+    return {"sentences": acquisition_words(f), "ways": [way(w) for w in f.ways], "early": f"{100 * EARLY:g} %"}
 
 
 def way(w: Found) -> Row:
-    """One way as text: exact beside simulated."""
-    o = w.outcome
+    """One way as text: exact beside simulated; what never locks has no times."""
+    o, none = w.outcome, "\u2013"
     late = o.locked.given_success().quantile(EARLY)
     return {
         "name": w.name,
         "cells": [
-            f"{o.success_probability:.4f}",
+            f"{o.success_probability:.4f}" if w.possible else "never",
             f"{w.simulated_probability:.4f}",
-            quantity(o.mean_time_s, "s"),
+            quantity(o.mean_time_s, "s") if w.possible else none,
             budget_views.simulated_mean(w),
-            quantity(late, "s"),
+            quantity(late, "s") if w.possible else none,
         ],
         "stages": w.stages,
         "log": w.log,
@@ -260,10 +259,25 @@ def acquisition_words(f: Finding) -> list[str]:
         f"and is seen with {c.answer_detection:.4f}, the narrow beam back lands with {c.return_coverage:.4f}. The "
         "random part of the pointing error is drawn anew at each attempt; biases stand at their bounds."
     ]
-    if f.scan is not None:
-        found.append(
-            f"The scan covers {format_quantity(f.scan_radius_rad, 'rad', 3)} about the predicted direction, for an "
-            f"uncertainty of {format_quantity(f.sigma_rad, 'rad', 3)} rms per axis with biases, in "
-            f"{quantity(f.scan_s, 's')} at most."
-        )
+    if f.scanned is not None:
+        found.append(scan_words(f.scanned, f.sigma_rad))
     return found
+
+
+def scan_words(s: Scanned, sigma_rad: float) -> str:
+    """How the scan is laid out, and what its light does to it."""
+    covers = (
+        f"The scan covers {format_quantity(s.radius_rad, 'rad', 3)} about the predicted direction, for an uncertainty "
+        f"of {format_quantity(sigma_rad, 'rad', 3)} rms per axis with biases"
+    )
+    stated = f"the {quantity(s.stated_detection_s, 's')} that are stated"
+    if not s.detects:
+        return (
+            f"{covers}. It detects nothing: at the edge of its beam the partner's sensor would need more than "
+            f"{quantity(LONGEST_LOOK_S, 's')} in place of {stated}."
+        )
+    covers += f", in {quantity(s.duration_s, 's')} at most."
+    if s.needed_detection_s <= s.stated_detection_s:
+        return covers
+    needed = quantity(s.needed_detection_s, "s")
+    return f"{covers} At the edge of its beam the partner's sensor needs {needed} in place of {stated}; the scan waits."

@@ -6,8 +6,10 @@ from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
+from microrad import link
 from microrad.mission import Source
 from microrad.missionfile import assumptions, changed_from_shipped
+from microrad.performance import FINE
 from microrad.report import fine_pointing, links, words
 from microrad.report.figures import Figure
 from microrad.report.quantities import quantity
@@ -73,21 +75,39 @@ def _links(study: Study, figures: Sequence[Figure]) -> dict[str, Any]:
     )
     best = "" if study.fine_pointing is None else study.fine_pointing.best.design.name
     context = links.context(study.links, budgets=budgets, figures=figures, files=True)
+    performance = links.performance(study.performance, best, study.links.under_jitter)
     return {
         **context,
-        **links.performance(study.performance, best, study.links.under_jitter),
+        **performance,
+        "performance_words": [*performance["performance_words"], *_left_out(study)],
         "sentences": [*context["sentences"], *_loop_noise(study)],
         "readings": study.margin_map.readings,
         "ideal": study.margin_map.ideal,
     }
 
 
+def _left_out(study: Study) -> list[str]:
+    """What a correction of the point-ahead leaves, which no simulated error holds."""
+    ahead = study.file.mission.point_ahead
+    if ahead is None or not ahead.corrected or not ahead.error_rad:
+        return []
+    lost = link.communication_beam(study.file.mission).fall
+    at = study.performance.case(FINE, study.fine_pointing.best.design.name, "given") if study.fine_pointing else None
+    cost = ""
+    if at is not None:
+        error = lost.error_rad(at.outage_loss_db)
+        more = float(lost.loss_db(error + ahead.error_rad)) - at.outage_loss_db
+        cost = f": at most {more:.2f} dB more for the best loop"
+    return [f"What the correction of point-ahead leaves ({angle(ahead.error_rad)}) is not in these errors{cost}."]
+
+
 def _loop_noise(study: Study) -> list[str]:
     """The noise that the fine-pointing loop is simulated with, beside what the answer's light would allow."""
-    if study.fine_pointing is None or study.links.tracking is None:
+    light = study.links.tracking
+    if study.fine_pointing is None or light is None or light.noise_equivalent_angle is None:
         return []
     used = angle(study.fine_pointing.scene.loop.optical.noise_rad)
-    allowed = format_quantity(study.links.tracking.noise_equivalent_angle.value, "rad", 3)
+    allowed = format_quantity(light.noise_equivalent_angle.value, "rad", 3)
     return [
         f"The fine-pointing loop is simulated with {used} of noise in its optical sensor; that light allows {allowed}."
     ]

@@ -1,10 +1,11 @@
 """What a study found, in words and as plain data."""
 
+import math
 from typing import Any
 
 from microrad.mission import Mission
 from microrad.missionfile import changed_from_shipped
-from microrad.performance import FINE
+from microrad.performance import FINE, Cost
 from microrad.report import budget_views, fine_pointing_words
 from microrad.report.fine_pointing_data import data as fine_pointing_data
 from microrad.report.quantities import quantity
@@ -65,7 +66,7 @@ def hysteresis_cost(study: Study) -> str:
     if study.fine_pointing is not None:
         named.append((FINE, study.fine_pointing.best.design.name))
     said = [
-        f"{-c.margin_db:.2f} dB or {-c.data_rate_bit_s * 1e-6:.0f} Mbit/s with {c.controller} ({c.source})"
+        f"{-c.margin_db:.2f} dB{_rate_lost(c)} with {c.controller} ({c.source})"
         for c in study.performance.costs
         if c.mirror == "given" and (c.source, c.controller) in named and c.margin_db < 0.0
     ]
@@ -75,14 +76,21 @@ def hysteresis_cost(study: Study) -> str:
     )
 
 
+def _rate_lost(cost: Cost) -> str:
+    """The data rate that goes with a cost, where there is one."""
+    return "" if math.isnan(cost.data_rate_bit_s) else f" or {-cost.data_rate_bit_s * 1e-6:.0f} Mbit/s"
+
+
 def found(study: Study) -> str:
     """How the partner is found, or nothing."""
     f, p = study.links.finding, study.open_loop.reading
     if f is None or p is None:
         return ""
-    ways = [f.wide] if f.scan is None else [f.wide, f.scan]
     said = "; ".join(
-        f"{w.name} {w.outcome.success_probability:.4f} in {quantity(w.outcome.mean_time_s, 's')}" for w in ways
+        f"{w.name} {w.outcome.success_probability:.4f} in {quantity(w.outcome.mean_time_s, 's')}"
+        if w.possible
+        else f"{w.name} never"
+        for w in f.ways
     )
     return (
         f"Acquisition, with its retries: {said} (mean). The beacon's cone at 1/e2 covers its partner with a "
@@ -218,8 +226,8 @@ def summary(study: Study) -> dict[str, Any]:
                 "source": c.source,
                 "controller": c.controller,
                 "mirror": c.mirror,
-                "margin_db": c.margin_db,
-                "data_rate_bit_s": c.data_rate_bit_s,
+                "margin_change_db": c.margin_db,
+                "data_rate_change_bit_s": c.data_rate_bit_s,
             }
             for c in study.performance.costs
         ],

@@ -1,14 +1,13 @@
 """Receivers of a laser link, each one modulation with one detector."""
 
-from microrad.link.receivers.base import Receiver
+from microrad.link.receivers.base import RateError, Receiver
+from microrad.link.receivers.coherent import BpskHomodyne, DpskPreamplified
 from microrad.link.receivers.counting import OokCounting, PpmCounting
 from microrad.link.receivers.currents import OokApd, OokPin, OokPreamplified
-from microrad.link.receivers.fields_of_light import BpskHomodyne, DpskPreamplified
 from microrad.link.receivers.light import (
     apd_excess_noise_factor,
     background_photons_per_mode,
     background_power_w,
-    optical_bandwidth_hz,
 )
 
 __all__ = [
@@ -19,9 +18,9 @@ __all__ = [
     "OokPin",
     "OokPreamplified",
     "PpmCounting",
+    "RateError",
     "Receiver",
     "apd_excess_noise_factor",
     "background_photons_per_mode",
     "background_power_w",
-    "optical_bandwidth_hz",
 ]

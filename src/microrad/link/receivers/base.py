@@ -24,6 +24,10 @@ from microrad.link.receivers.checks import (
 Floats = NDArray[np.float64]
 
 
+class RateError(ValueError):
+    """A data rate above what the receiver's bandwidth takes."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Receiver(ABC):
     """What every receiver has.
@@ -65,7 +69,8 @@ class Receiver(ABC):
     def bit_error_ratio_at(self, power_w: ArrayLike, data_rate_bit_s: ArrayLike) -> Floats:
         """Bit error ratio (after the decoder) at the average power `power_w` and the data rate; the two broadcast.
 
-        Raises `ValueError` for a negative power, and a rate that is not positive or above the bandwidth.
+        Raises `ValueError` for a negative power and a rate that is not positive, `RateError` for a rate above the
+        bandwidth.
         """
         powers = checked_powers(power_w)
         power, rate = np.broadcast_arrays(powers * self._code_gain, self._rates(data_rate_bit_s))
@@ -74,7 +79,7 @@ class Receiver(ABC):
     def required_power_w(self, data_rate_bit_s: ArrayLike) -> Floats:
         """Average power that reaches the target bit error ratio at each data rate.
 
-        Raises `ValueError` for a rate that is not positive or above the bandwidth.
+        Raises `ValueError` for a rate that is not positive, `RateError` for one above the bandwidth.
         """
         rate = self._rates(data_rate_bit_s)
         return np.asarray(self._power_w(rate) / self._code_gain, dtype=np.float64)
@@ -125,7 +130,7 @@ class Receiver(ABC):
         symbols, limit = self.symbol_rate_hz(rates), self._symbol_rate_limit_hz
         if np.any(symbols > limit * (1.0 + 1e-12)):
             highest = float(rates.max())
-            raise ValueError(
+            raise RateError(
                 f"the data rate is {shown(highest, 'bit/s')}, which is {shown(float(symbols.max()), 'Hz')} of "
                 f"symbols or slots on the line: the receiver takes {shown(limit, 'Hz')}, "
                 f"so at most {shown(highest * limit / float(symbols.max()), 'bit/s')} of data"

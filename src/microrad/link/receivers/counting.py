@@ -78,10 +78,12 @@ class OokCounting(_Counter):
 
     def _ratio_of_counts(self, counts: Floats, floor: Floats) -> Floats:
         """Bit error ratio from the mean signal counts in a symbol and the counts without signal."""
-        mark, space = (share * counts + floor for share in mark_and_space(self.extinction_ratio))
-        # more than (l1 - l0) / log(l1 / l0) counts are likelier from a mark
-        log_ratio = np.log(mark / space)
-        threshold = np.divide(mark - space, log_ratio, out=np.array(space), where=log_ratio > 0.0)
+        bright, dim = mark_and_space(self.extinction_ratio)
+        space, swing = dim * counts + floor, (bright - dim) * counts
+        mark = space + swing
+        # more than (l1 - l0) / log(l1 / l0) counts are likelier from a mark; few beside the floor keep their digits
+        log_ratio = np.log1p(swing / space)
+        threshold = np.divide(swing, log_ratio, out=np.array(space), where=log_ratio > 0.0)
         whole = np.floor(threshold)
         return np.asarray(0.5 * (_at_most(whole, mark) + _above(whole, space)), dtype=np.float64)
 
@@ -236,7 +238,8 @@ def _tail(incomplete_gamma: Callable[[Floats, Floats], Floats], sign: float, cou
     first = -1.0 / 3.0 + eta * (1.0 / 12.0 + eta * (-2.0 / 135.0 + eta / 864.0))
     second = -1.0 / 540.0 - eta / 288.0
     rest = np.exp(-squared) / np.sqrt(2.0 * math.pi * a_many) * (first + second / a_many)
-    result[many] = 0.5 * erfc(sign * np.copysign(np.sqrt(squared), eta)) + sign * rest
+    # where erfc underflows, the rest may leave less than nothing
+    result[many] = np.maximum(0.5 * erfc(sign * np.copysign(np.sqrt(squared), eta)) + sign * rest, 0.0)
     return result
 
 

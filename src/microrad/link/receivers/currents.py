@@ -27,6 +27,8 @@ from microrad.units import ELEMENTARY_CHARGE_C
 
 Floats = NDArray[np.float64]
 
+_BANDWIDTH_PER_SYMBOL = 0.5  # one-sided noise bandwidth over the symbol rate of a filter matched to rectangular symbols
+
 
 class _Term(NamedTuple):
     """Variance of the current in A^2: `per_signal` for each watt in the symbol, plus `fixed`."""
@@ -40,18 +42,10 @@ class _Term(NamedTuple):
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _OnOffCurrent(Receiver):
     extinction_ratio: float = math.inf
-    electrical_bandwidth_per_symbol: float = 0.5
 
     def __post_init__(self) -> None:
         Receiver.__post_init__(self)
         require_extinction(self.extinction_ratio)
-        require(
-            0.5 <= self.electrical_bandwidth_per_symbol < math.inf,
-            "the electrical bandwidth per symbol rate",
-            self.electrical_bandwidth_per_symbol,
-            "",
-            "it must be at least 0.5, a filter matched to rectangular symbols; 0.6 to 0.8 is usual",
-        )
 
     @abstractmethod
     def _signal_a_w(self) -> float:
@@ -62,7 +56,7 @@ class _OnOffCurrent(Receiver):
         """Terms of the noise in the electrical (noise-equivalent, one-sided) bandwidth."""
 
     def _variance(self, rate: Floats) -> tuple[Floats, Floats]:
-        terms = self._terms(self.electrical_bandwidth_per_symbol * rate)
+        terms = self._terms(_BANDWIDTH_PER_SYMBOL * rate)
         return sum((t.per_signal for t in terms), np.zeros(())), sum((t.fixed for t in terms), np.zeros(()))
 
     def _ratio(self, power: Floats, rate: Floats) -> Floats:
@@ -85,9 +79,9 @@ class _OnOffCurrent(Receiver):
         return np.asarray(swing / (mark - space), dtype=np.float64)
 
     def _noise(self, power: float, symbol_rate: float) -> tuple[Line, ...]:
-        regime = f"Gaussian noise in {self.electrical_bandwidth_per_symbol:g} of the symbol rate"
+        regime = f"Gaussian noise in {_BANDWIDTH_PER_SYMBOL:g} of the symbol rate"
         lines = []
-        for term in self._terms(np.asarray(self.electrical_bandwidth_per_symbol * symbol_rate)):
+        for term in self._terms(np.asarray(_BANDWIDTH_PER_SYMBOL * symbol_rate)):
             cases = [("", 0.0)]
             if np.any(term.per_signal):
                 cases = list(zip((", marks", ", spaces"), mark_and_space(self.extinction_ratio), strict=True))
@@ -103,8 +97,7 @@ class OokPin(_OnOffCurrent):
 
     `quantum_efficiency` is electrons per photon; `thermal_noise_a_sqrt_hz` the amplifier's current noise at its input,
     one-sided; `dark_current_a` and `background_power_w` (see `background_power_w`) add shot noise;
-    `extinction_ratio` is mark over space. `electrical_bandwidth_per_symbol` is the one-sided noise bandwidth over the
-    symbol rate: 0.5 for a matched filter.
+    `extinction_ratio` is mark over space. The filter is matched: its one-sided noise bandwidth is half the symbol rate.
 
     BER = erfc(Q / sqrt 2) / 2, Q = (i1 - i0) / (s1 + s0) (Agrawal, Fiber-Optic Communication Systems; Personick 1973).
     Holds where shot noise is Gaussian: many electrons in each symbol, as thermal noise demands of a PIN. With dark
@@ -177,8 +170,8 @@ class OokPreamplified(_OnOffCurrent):
     Power is at the amplifier's input. The noise figure F is that of high gain, F = 2 n_sp, at least 3 dB, so that the
     amplified spontaneous emission has G F h f / 2 in W/Hz and polarisation; `background_photons_per_mode` adds
     G N h f. `polarisations` is 2, or 1 behind a polariser. The filter is a rectangle of `optical_bandwidth_hz`, which
-    must hold twice the electrical bandwidth: this bounds the symbol rate as well. `gain_db` G, `quantum_efficiency`
-    and `thermal_noise_a_sqrt_hz` set how far shot and thermal noise lie below the beats.
+    must hold twice the electrical bandwidth, the symbol rate: this bounds the rate as well. `gain_db` G sets how far
+    shot noise lies below the beats; what the photodiode misses and adds counts as nothing behind it.
 
     BER by Q as for `OokPin`, beats as in Agrawal (Fiber-Optic Communication Systems, preamplified receivers) and
     Olsson 1989 (J. Lightwave Technol. 7, 1071): Gaussian, where the photocurrent is chi-square. The ideal receiver
@@ -189,8 +182,6 @@ class OokPreamplified(_OnOffCurrent):
     noise_figure_db: float
     gain_db: float
     optical_bandwidth_hz: float
-    quantum_efficiency: float = 1.0
-    thermal_noise_a_sqrt_hz: float = 0.0
     background_photons_per_mode: float = 0.0
     polarisations: int = 2
 
@@ -200,17 +191,15 @@ class OokPreamplified(_OnOffCurrent):
         require_noise_figure(self.noise_figure_db)
         require(10.0 <= self.gain_db < math.inf, "the gain", self.gain_db, "dB", "high gain is meant, at least 10 dB")
         require_above_zero("the optical bandwidth", self.optical_bandwidth_hz, "Hz")
-        require_efficiency("the quantum efficiency", self.quantum_efficiency)
-        require_zero_or_more("the thermal noise", self.thermal_noise_a_sqrt_hz, "A/sqrt(Hz)")
         require_zero_or_more("the background in one mode", self.background_photons_per_mode, "photon")
         require(self.polarisations in (1, 2), "the number of polarisations", self.polarisations, "", "it is 1 or 2")
 
     @property
     def _symbol_rate_limit_hz(self) -> float:
-        return min(self.bandwidth_hz, self.optical_bandwidth_hz / (2.0 * self.electrical_bandwidth_per_symbol))
+        return min(self.bandwidth_hz, self.optical_bandwidth_hz / (2.0 * _BANDWIDTH_PER_SYMBOL))
 
     def _signal_a_w(self) -> float:
-        return self.quantum_efficiency * ELEMENTARY_CHARGE_C / self._photon_j * float(10.0 ** (self.gain_db / 10.0))
+        return ELEMENTARY_CHARGE_C / self._photon_j * float(10.0 ** (self.gain_db / 10.0))
 
     def _terms(self, bandwidth: Floats) -> tuple[_Term, ...]:
         signal, none = self._signal_a_w(), np.zeros(())
@@ -224,5 +213,4 @@ class OokPreamplified(_OnOffCurrent):
             _Term("ASE-ASE beat noise", "sqrt(2 p S^2 B (Bo - B/2)), S in A/Hz", none, beat),
             _Term("Signal shot noise", "sqrt(2 e I B)", shot * signal, none),
             _Term("ASE shot noise", "sqrt(2 e p S Bo B), S in A/Hz", none, shot * total),
-            _Term("Thermal noise", "density sqrt(B)", none, self.thermal_noise_a_sqrt_hz**2 * bandwidth),
         )

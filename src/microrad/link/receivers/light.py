@@ -2,30 +2,8 @@
 
 import math
 
-import numpy as np
-from numpy.typing import NDArray
-
-from microrad.link.receivers.checks import require, require_zero_or_more, shown
+from microrad.link.receivers.checks import require, require_zero_or_more
 from microrad.units import PLANCK_J_S, SPEED_OF_LIGHT_M_S
-
-Floats = NDArray[np.float64]
-
-
-def optical_bandwidth_hz(wavelength_m: float, filter_bandwidth_m: float) -> float:
-    """Width in Hz of an optical filter of the full width `filter_bandwidth_m`, centred in wavelength.
-
-    c / (lambda - d/2) - c / (lambda + d/2), about c d / lambda^2. Raises `ValueError` for a filter that is not positive
-    or as wide as twice the wavelength.
-    """
-    require(wavelength_m > 0.0, "the wavelength", wavelength_m, "m", "it must be above 0 m")
-    require(
-        0.0 < filter_bandwidth_m < 2.0 * wavelength_m,
-        "the width of the optical filter",
-        filter_bandwidth_m,
-        "m",
-        f"it must lie above 0 m and below twice the wavelength, {shown(2.0 * wavelength_m, 'm')}",
-    )
-    return SPEED_OF_LIGHT_M_S * filter_bandwidth_m / (wavelength_m**2 - filter_bandwidth_m**2 / 4.0)
 
 
 def background_power_w(
