@@ -76,7 +76,7 @@ def test_the_cells_of_a_case_are_its_record(plain):
     rms = math.sqrt(1.0**2 + 2 * 3.0**2)
     assert cells[0] == f"{rms:.2f}"
     assert cells[1:6] == ["1.23", "2.35", "\u22120.01", "2 %", "none"]
-    assert cells[6:8] == ["19.7 (narrowest)", "0.00"]
+    assert cells[6:8] == ["19.7*", "0.00"]
     wider = replace(c.best, half_angle_rad=25.31e-6, at_limit=False, current_excess_db=0.456)
     assert links.cells(replace(c, best=wider))[6:8] == ["25.3", "0.46"]
     assert cells[8] == "242"
@@ -125,7 +125,7 @@ def test_the_reference_without_hysteresis_has_no_row_and_the_missions_own_jitter
     assert context["outage"] == "0.3 %"
     assert context["performance_note"].endswith("on a mirror without it.")
     assert links.note(costs=False).endswith("at that loss.")
-    assert "narrowest: the present one" in links.note(costs=False)
+    assert "a star: the present one" in links.note(costs=False)
 
 
 def test_the_loop_under_vibration_is_named_only_where_it_was_simulated(plain):

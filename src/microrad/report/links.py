@@ -135,7 +135,7 @@ def cells(c: Performance) -> list[str]:
         f"{c.margin_db:+.2f}".replace("-", "\u2212"),
         share(c.outage),
         share(c.short),
-        f"{c.best.half_angle_rad * 1e6:.1f}{' (narrowest)' if c.best.at_limit else ''}",
+        f"{c.best.half_angle_rad * 1e6:.1f}{'*' if c.best.at_limit else ''}",
         f"{c.best.current_excess_db:.2f}",
         "none" if math.isnan(c.data_rate_bit_s) else f"{c.data_rate_bit_s * 1e-6:.0f}",
     ]
@@ -150,7 +150,7 @@ def note(*, costs: bool) -> str:
     """How the columns are to be read."""
     how = (
         "Rms: radial, about zero. Outage: share of the time with a margin below 0 dB. Best half angle: of a Gaussian "
-        "beam, at 1/e2, with the most power at the error of that column; narrowest: the present one, since a narrower "
+        "beam, at 1/e2, with the most power at the error of that column; a star: the present one, since a narrower "
         "one would take a larger aperture. Data rate: the largest with the required margin at that loss."
     )
     against = " What hysteresis costs: against the same controller and the same errors on a mirror without it."
