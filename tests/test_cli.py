@@ -12,13 +12,13 @@ import subprocess
 import sys
 import time
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 import pytest
 import typer
 
 import microrad
+from command_line import listing
 from microrad import cli, doctor, identify, report, study
 from microrad.cli import frame, lab
 from shipped import without_fine_pointing
@@ -28,52 +28,6 @@ PAPER = ROOT / "src" / "microrad" / "missions" / "leo-geo.toml"
 COMMANDS = ("init", "run", "budget", "presets", "design", "identify", "bench", "doctor", "schema")
 MICRORAD = (sys.executable, "-m", "microrad")
 COLUMNS = ("--input", "drive", "--output", "angle", "--rate", "1000", "--static")
-
-
-class Result(NamedTuple):
-    code: int
-    out: str
-    err: str
-
-
-@pytest.fixture
-def folder(tmp_path, monkeypatch):
-    """An empty current folder."""
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
-
-
-@pytest.fixture
-def call(capsys):
-    """Run a command in this process."""
-
-    def run(*args):
-        with pytest.raises(SystemExit) as stop:
-            cli.app(args=[str(a) for a in args], prog_name="microrad")
-        out, err = capsys.readouterr()
-        return Result(int(stop.value.code or 0), out, err)
-
-    return run
-
-
-def listing(folder):
-    """Every file below a folder with its content."""
-    return {str(p.relative_to(folder)): p.read_bytes() if p.is_file() else b"" for p in sorted(folder.rglob("*"))}
-
-
-@pytest.fixture
-def refused(call, folder):
-    """Run a command that must be refused: exit 2, nothing on stdout, no traceback, nothing written; its message."""
-
-    def run(*args):
-        before = listing(folder)
-        result = call(*args)
-        assert (result.code, result.out) == (2, ""), result
-        assert "Traceback" not in result.err
-        assert listing(folder) == before
-        return result.err
-
-    return run
 
 
 def write_recording(path, reverse=False):

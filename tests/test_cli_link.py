@@ -6,11 +6,11 @@ import json
 import math
 import re
 import shlex
-from typing import NamedTuple
 
 import pytest
 import typer
 
+from command_line import listing
 from link_files import PATTERN, RECEIVERS, data_with, received_with, written
 from microrad import cli, link_study
 from microrad.missionfile import load_link
@@ -25,12 +25,6 @@ JITTER = {"jitter": {"bias": ["1 urad", "0 urad"], "rms": ["3 urad", "3 urad"], 
 DARK = {"answer.transmit_power": "1 mW"}  # an answer below the noise of the tracking sensor
 FORMS = ((), ("--csv",), ("--json",), ("--html",))
 NO_NUMBER = re.compile(r"\b(nan|inf|NaN|Infinity|None)\b")
-
-
-class Result(NamedTuple):
-    code: int
-    out: str
-    err: str
 
 
 study_of = link_study.run
@@ -53,46 +47,6 @@ def each_study_once(monkeypatch, studies):
         return studies[key]
 
     monkeypatch.setattr(link_study, "run", run)
-
-
-@pytest.fixture
-def folder(tmp_path, monkeypatch):
-    """An empty current folder."""
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
-
-
-@pytest.fixture
-def call(capsys):
-    """Run a command in this process."""
-
-    def run(*args):
-        with pytest.raises(SystemExit) as stop:
-            cli.app(args=[str(a) for a in args], prog_name="microrad")
-        out, err = capsys.readouterr()
-        return Result(int(stop.value.code or 0), out, err)
-
-    return run
-
-
-def listing(folder):
-    """Every file below a folder with its content."""
-    return {str(p.relative_to(folder)): p.read_bytes() if p.is_file() else b"" for p in sorted(folder.rglob("*"))}
-
-
-@pytest.fixture
-def refused(call, folder):
-    """Run a command that must be refused: exit 2, nothing on stdout, no traceback, nothing written; its message."""
-
-    def run(*args):
-        before = listing(folder)
-        result = call(*args)
-        assert (result.code, result.out) == (2, ""), result
-        assert "Traceback" not in result.err
-        assert listing(folder) == before
-        return result.err
-
-    return run
 
 
 def file_with(folder, *changes):

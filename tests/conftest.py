@@ -1,0 +1,41 @@
+"""Fixtures that run commands in this process, for the tests of the command line."""
+
+import pytest
+
+from command_line import Result, listing
+from microrad import cli
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """An empty current folder."""
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.fixture
+def call(capsys):
+    """Run a command in this process."""
+
+    def run(*args):
+        with pytest.raises(SystemExit) as stop:
+            cli.app(args=[str(a) for a in args], prog_name="microrad")
+        out, err = capsys.readouterr()
+        return Result(int(stop.value.code or 0), out, err)
+
+    return run
+
+
+@pytest.fixture
+def refused(call, folder):
+    """Run a command that must be refused: exit 2, nothing on stdout, no traceback, nothing written; its message."""
+
+    def run(*args):
+        before = listing(folder)
+        result = call(*args)
+        assert (result.code, result.out) == (2, ""), result
+        assert "Traceback" not in result.err
+        assert listing(folder) == before
+        return result.err
+
+    return run
