@@ -5,7 +5,7 @@ import math
 import pytest
 
 from link_files import GAUSSIAN, PATTERN, RECEIVERS, SKY, data_with, link_file, received_with, written
-from microrad.link_table import half_angle_rad, narrowest_half_angle_rad
+from microrad.link_table import Receiver, half_angle_rad, narrowest_half_angle_rad
 from microrad.mission import LinkMission, Mission, mission_schema
 from microrad.missionfile import MissionError, load_link
 from microrad.units import parse_quantity
@@ -440,9 +440,16 @@ def test_the_schema_describes_the_links_keys(schema):
     assert {key for table in RECEIVERS.values() for key in table} | {"background"} == receiver.keys()
     assert receiver["detector"]["enum"] == ["photon-counting", "pin", "apd", "preamplified", "homodyne"]
     assert receiver["bit_error_ratio"]["exclusiveMaximum"] == 0.5
+    assert receiver["bit_error_ratio"]["minimum"] == 1e-18
     assert {"const": "largest"} in tables["Communication"]["properties"]["data_rate"]["anyOf"]
     assert all(
         "description" in each or "$ref" in str(each) or "enum" in each
         for key, each in tables["Communication"]["properties"].items()
         if key in ("receiver", "beam", "data_rate", "wavefront_error")
     )
+
+
+def test_the_example_of_a_bit_error_ratio_is_one_that_links_have():
+    name, rule = Receiver.rule_of("bit_error_ratio")
+    assert (name, rule.example) == ("bit_error_ratio", "1e-09")
+    assert rule.wanted == "a number without quotes, at least 1e-18 and below 0.5"

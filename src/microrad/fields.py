@@ -153,8 +153,10 @@ class Share(Quantity):
 
     @property
     def example(self) -> str:
-        """A number between the bounds."""
-        return f"{self.below / 2:g}"
+        """A number between the bounds, half way in size where there is a least."""
+        return (
+            f"{self.below / 2:g}" if not self.least else f"{10.0 ** round(math.log10(self.least * self.below) / 2):g}"
+        )
 
     @property
     def wanted(self) -> str:
@@ -164,7 +166,8 @@ class Share(Quantity):
 
     def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
         """A number with its bounds."""
-        return {"type": "number", "exclusiveMinimum": 0.0, "exclusiveMaximum": self.below}
+        least = {"exclusiveMinimum": 0.0} if self.least is None else {"minimum": self.least}
+        return {"type": "number", **least, "exclusiveMaximum": self.below}
 
 
 @dataclass(frozen=True, slots=True)
