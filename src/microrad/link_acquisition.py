@@ -16,8 +16,6 @@ from microrad.missionfile import LinkFile
 
 THRESHOLD = 5.0
 """Threshold of the quad cell over its rms noise: a false alarm in 3.5 million readings."""
-DEEPEST_DB = link.DEEPEST_DB
-"""Pointing loss up to which a Gaussian beam is counted on; beyond it wings and scatter decide."""
 TRADE_RAD = np.geomspace(30e-6, 1e-3, 25)
 """Uncertainties per axis over which a wide beacon is set against a scan."""
 RAREST = 1e-9
@@ -196,7 +194,7 @@ def _timing(m: LinkMission, a: Acquisition, range_m: float) -> acquisition.Timin
 def _reach(m: LinkMission, beam: Beacon, budget: link.LinkBudget) -> float:
     """How far off its axis a Gaussian beam still brings the power that is needed, and is counted on."""
     fall = link.GaussianFall(half_angle_rad(beam.divergence_rad, m.conventions.divergence))
-    return fall.error_rad(min(_on_axis_margin_db(budget), DEEPEST_DB))
+    return fall.error_rad(min(_on_axis_margin_db(budget), link.DEEPEST_DB))
 
 
 def _on_axis_margin_db(budget: link.LinkBudget) -> float:

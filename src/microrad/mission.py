@@ -26,8 +26,8 @@ from microrad.link_table import (
     strehl_fits,
 )
 from microrad.mirror_table import ANGLE_MOST, Angle, DurationOrZero, Frequency, Mirror, MirrorGain, Name, Rate, Voltage
-from microrad.pointing_table import JitterTable, PointAhead, Pointing
-from microrad.units import SPEED_OF_LIGHT_M_S, format_quantity
+from microrad.pointing_table import JitterTable, PointAhead, Pointing, point_ahead_rad
+from microrad.units import format_quantity
 
 MOST_SAMPLES = 2_000_000
 """Control samples in a period of the scenario's sines beyond which a run would not fit into memory."""
@@ -158,7 +158,7 @@ def _point_ahead_fits(point_ahead: PointAhead | None, fine: FinePointing | None)
     """One point-ahead: the mirror's largest is that of the largest velocity."""
     if point_ahead is None or fine is None:
         return
-    angle = 2.0 * point_ahead.transverse_velocity_m_s / SPEED_OF_LIGHT_M_S
+    angle = point_ahead_rad(point_ahead.transverse_velocity_m_s)
     if abs(fine.reference.point_ahead_rad - angle) > 0.02 * angle:
         shown = format_quantity(angle, "rad", 3)
         reason = f"is not 2 v / c of point_ahead.transverse_velocity ({shown})"

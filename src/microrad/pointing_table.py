@@ -8,10 +8,14 @@ from pydantic import Field
 
 from microrad.fields import Problem, Quantity, Several, Share, Switch, Table
 from microrad.mirror_table import ANGLE_MOST, Frequency
+from microrad.units import SPEED_OF_LIGHT_M_S, format_quantity
 
 AngleOrZero = Annotated[float, Quantity("rad", "urad", least=0.0, most=ANGLE_MOST)]
 TwoAngles = Annotated[tuple[float, ...], Several(Quantity("rad", "urad", least=0.0, most=ANGLE_MOST))]
 TwoOffsets = Annotated[tuple[float, ...], Several(Quantity("rad", "urad", least=-ANGLE_MOST, most=ANGLE_MOST))]
+
+MOST_VELOCITY_M_S = 0.01 * SPEED_OF_LIGHT_M_S
+"""Velocity up to which 2 v / c holds to a part in ten thousand."""
 
 ErrorClass = Literal["bias", "random", "drift", "transient"]
 Statistic = Literal["1-sigma", "2-sigma", "3-sigma", "bound"]
@@ -83,3 +87,15 @@ class PointAhead(Table):
     )
     corrected: Annotated[bool, Switch("")] = Field(description="false: both beams leave along the line of sight")
     error_rad: AngleOrZero = Field(alias="error", description="what a correction leaves, radial")
+
+
+def point_ahead_rad(transverse_velocity_m_s: float) -> float:
+    """2 v / c for the velocity of one terminal against the other across the line of sight.
+
+    71 µrad for 10.65 km/s. Raises `ValueError` for a negative velocity and above 1 % of the speed of light.
+    """
+    if not 0.0 <= transverse_velocity_m_s <= MOST_VELOCITY_M_S:
+        limit = format_quantity(MOST_VELOCITY_M_S, "m/s")
+        shown = format_quantity(transverse_velocity_m_s, "m/s")
+        raise ValueError(f"a transverse velocity of {shown} is out of range; give 0 m/s to {limit}")
+    return 2.0 * transverse_velocity_m_s / SPEED_OF_LIGHT_M_S

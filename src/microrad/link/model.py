@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from microrad import pointing_table
 from microrad.link import gains, receivers
 from microrad.link.beams import GaussianFall, LitAperture, OffAxis
 from microrad.link_table import Beam, Communication
 from microrad.link_table import Receiver as ReceiverTable
 from microrad.mission import LinkMission
-from microrad.units import SPEED_OF_LIGHT_M_S
 
 Floats = NDArray[np.float64]
 
@@ -68,7 +68,7 @@ def point_ahead_rad(mission: LinkMission) -> float:
     ahead = mission.point_ahead
     if ahead is None or ahead.corrected:
         return 0.0
-    return 2.0 * ahead.transverse_velocity_m_s / SPEED_OF_LIGHT_M_S
+    return pointing_table.point_ahead_rad(ahead.transverse_velocity_m_s)
 
 
 def point_ahead_left_rad(mission: LinkMission) -> float:

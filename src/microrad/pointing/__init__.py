@@ -13,7 +13,7 @@ from microrad.pointing.fading import (
     uncoded_penalty_db,
 )
 from microrad.pointing.open_loop import INTERPRETATIONS, DivergenceReading, OpenLoopPointing, open_loop_budget
-from microrad.pointing.point_ahead import PointAheadAngle, point_ahead, point_ahead_rad
+from microrad.pointing.point_ahead import PointAheadAngle, point_ahead
 from microrad.pointing.statistics import (
     BestDivergence,
     best_divergence_for_mean,
@@ -43,6 +43,7 @@ from microrad.pointing.summation import (
     sigma_multiple,
     summations,
 )
+from microrad.pointing_table import point_ahead_rad
 from microrad.radial_error import Jitter, radial_cdf, radial_quantile, radial_survival
 
 __all__ = [
