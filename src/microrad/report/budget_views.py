@@ -9,7 +9,7 @@ from typing import Any
 from microrad import link
 from microrad.budget import Line
 from microrad.link import Swing
-from microrad.link_acquisition import DEEPEST_DB, Finding, Found, Tracking
+from microrad.link_acquisition import Finding, Found, Tracking
 from microrad.link_performance import Performance
 from microrad.link_study import LinkStudy
 from microrad.pointing import OpenLoopPointing
@@ -74,9 +74,17 @@ def text(study: LinkStudy, width: int) -> str:
 
 def sentences(study: LinkStudy) -> list[str]:
     """What follows from the budgets, a sentence each."""
-    m = study.file.mission
-    q = m.requirement
-    found = [verdict(study)]
+    found = [verdict(study), *consequences(study), *pointing_sentences(study.open_loop)]
+    if study.under_jitter is not None:
+        found.append(performance(study.under_jitter, study))
+    if study.finding is not None:
+        found += acquisition(study.finding)
+    return found
+
+
+def consequences(study: LinkStudy) -> list[str]:
+    """What follows from the budgets that stands in no table: rates, swings, intensities, light, point-ahead."""
+    q, found = study.file.mission.requirement, []
     if math.isnan(study.largest_rate_bit_s):
         found.append(f"No data rate has the required {q.margin_db:g} dB at {quantity(q.pointing_error_rad, 'rad')}.")
     else:
@@ -103,11 +111,6 @@ def sentences(study: LinkStudy) -> list[str]:
         found.append(_light(study.tracking))
     if study.point_ahead is not None:
         found.append(point_ahead(study))
-    found += pointing_sentences(study.open_loop)
-    if study.under_jitter is not None:
-        found.append(performance(study.under_jitter, study))
-    if study.finding is not None:
-        found += acquisition(study.finding)
     return found
 
 
@@ -146,7 +149,7 @@ def point_ahead(study: LinkStudy) -> str:
     p = study.point_ahead
     assert p is not None
     state = "corrected here" if p.corrected else "NOT corrected here"
-    lost = f"{p.loss_db:.1f} dB" if p.loss_db <= DEEPEST_DB else f"more than {DEEPEST_DB:g} dB"
+    lost = f"{p.loss_db:.1f} dB" if p.loss_db <= link.DEEPEST_DB else f"more than {link.DEEPEST_DB:g} dB"
     return (
         f"Point-ahead: up to {quantity(p.angle_rad, 'rad')}, {p.beam_half_angles:.1f} half angles of the communication "
         f"beam; left out, it {'would cost' if p.corrected else 'costs'} {lost}; a mirror that makes it needs "

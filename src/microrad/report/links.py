@@ -33,7 +33,7 @@ def context(
         "pointing": pointing(links.open_loop),
         "budgets": budgets,
         "warnings": links.warnings,
-        "sentences": _sentences(links),
+        "sentences": budget_views.consequences(links),
         "readings": (),
         "ideal": (),
         "noise": links.receiver_noise,
@@ -89,16 +89,6 @@ def coverage(p: OpenLoopPointing) -> list[str]:
         f"take a divergence of {needed}. Read as {other.convention}, the cone is "
         f"{format_quantity(other.half_angle_rad, 'rad', 3)} and the probability {other.coverage:.4f}."
     ]
-
-
-def _sentences(links: LinkStudy) -> list[str]:
-    """What follows from the budgets that no table says."""
-    skipped = {budget_views.verdict(links), *budget_views.pointing_sentences(links.open_loop)}
-    if links.under_jitter is not None:
-        skipped.add(budget_views.performance(links.under_jitter, links))
-    if links.finding is not None:
-        skipped |= set(budget_views.acquisition(links.finding))
-    return [sentence for sentence in budget_views.sentences(links) if sentence not in skipped]
 
 
 def _light(links: LinkStudy) -> tuple[Any, ...]:
