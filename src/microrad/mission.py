@@ -26,6 +26,8 @@ from microrad.link_table import (
     strehl_fits,
 )
 from microrad.mirror_table import ANGLE_MOST, Angle, DurationOrZero, Frequency, Mirror, MirrorGain, Name, Rate, Voltage
+from microrad.operations_table import Constellation, Operations
+from microrad.orbit_table import Orbits
 from microrad.pointing_table import JitterTable, PointAhead, Pointing, point_ahead_rad
 from microrad.units import format_quantity
 
@@ -165,6 +167,24 @@ def _point_ahead_fits(point_ahead: PointAhead | None, fine: FinePointing | None)
         yield Problem("fine_pointing.reference.point_ahead", reason, f'point_ahead = "{shown}" would do')
 
 
+def _needs_orbit(name: str) -> Callable[..., Iterator[Problem]]:
+    """A table that means nothing without the orbits."""
+
+    def check(orbit: Orbits | None, table: Table | None) -> Iterator[Problem]:
+        if table is not None and orbit is None:
+            yield Problem(name, "stands without the table orbit", "the table [orbit], which microrad init writes")
+
+    return check
+
+
+def _pattern_fits_orbit(orbit: Orbits | None, constellation: Constellation | None) -> Iterator[Problem]:
+    """A Walker pattern is one of circular orbits."""
+    if orbit is None or constellation is None or constellation.pattern == "file" or orbit.leo.kind == "circular":
+        return
+    reason = f'is "{constellation.pattern}", and orbit.leo is no circular orbit to repeat'
+    yield Problem("constellation.pattern", reason, 'orbit.leo.kind = "circular", or pattern = "file"')
+
+
 Relation = tuple[tuple[str, ...], Callable[..., Iterator[Problem]]]
 
 LINK_RELATIONS: tuple[Relation, ...] = (
@@ -173,6 +193,9 @@ LINK_RELATIONS: tuple[Relation, ...] = (
     (("conventions", "terminals", "answer"), divergence_fits("answer", "geo")),
     (("conventions", "communication"), pattern_fits),
     (("terminals", "communication"), obscuration_fits),
+    (("orbit", "operations"), _needs_orbit("operations")),
+    (("orbit", "constellation"), _needs_orbit("constellation")),
+    (("orbit", "constellation"), _pattern_fits_orbit),
 )
 """What has to fit between tables of the link: their names, and a check that takes them and yields what does not."""
 
@@ -200,6 +223,9 @@ class LinkMission(Table):
     jitter: JitterTable | None = None
     point_ahead: PointAhead | None = None
     acquisition: Acquisition | None = None
+    orbit: Orbits | None = None
+    operations: Operations | None = None
+    constellation: Constellation | None = None
 
     @classmethod
     def relations(cls) -> tuple[Relation, ...]:

@@ -8,7 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from microrad import (
+    constellation,
+    contact_run,
     control,
+    day_study,
     fine_pointing,
     link,
     link_study,
@@ -57,6 +60,8 @@ class Study:
     """Everything that a report shows, computed. ``achieved`` is the communication budget at the simulated residual.
 
     ``links`` holds what follows from the links' tables alone, ``performance`` what the simulated residuals cost them.
+    ``day`` is what the link delivers under the best of those residuals, ``contact`` one of its contacts in time, and
+    ``plan`` that of a constellation; each is None where the mission lacks a table for it.
     """
 
     file: MissionFile
@@ -72,6 +77,9 @@ class Study:
     scan: paper.Scan | None
     fine_pointing: fine_pointing.FinePointingStudy | None
     performance: performance.LinkPerformance
+    day: day_study.DayStudy | None
+    contact: contact_run.ContactRun | None
+    plan: constellation.ConstellationPlan | None
     requirements: tuple[verdict.Requirement, ...]
     claims: tuple[verdict.Claim, ...]
 
@@ -114,10 +122,10 @@ def run(file: MissionFile, on_progress: Progress = lambda done, total, what: Non
     """
     file = solve_rate(file)
     m, sources = file.mission, file.sources
-    on_progress(0, 3, "budgets and acquisition")
+    on_progress(0, 4, "budgets and acquisition")
     links, fig2 = link_study.run(_links_of(file)), margin_map(file)
 
-    on_progress(1, 3, "mirror and tracking (the first run compiles for half a minute)")
+    on_progress(1, 4, "mirror and tracking (the first run compiles for half a minute)")
     summary, loops = mirror_summary.summarise(m.mirror), tracking.hysteresis_loops(m)
     margins, runs = tracking.loop_margins(m), tracking.tracking_runs(m)
     residual = tracking.worst(m, runs)
@@ -125,15 +133,18 @@ def run(file: MissionFile, on_progress: Progress = lambda done, total, what: Non
     simulated = f"simulated: {residual.trace.name}, {m.requirement.residual_statistic} ({m.conventions.residual})"
     achieved = link.communication_budget(m, sources, pointing_error_rad=left_rad, given_source=simulated)
 
-    on_progress(2, 3, "claims of the paper")
+    on_progress(2, 4, "claims of the paper")
     scan = paper.scan(m, on_progress) if paper.applies(m) else None
     fine = fine_pointing.run(file, on_progress) if m.fine_pointing is not None else None
-    on_progress(3, 3, "verdict")
+    on_progress(3, 4, "the day")
+    found = performance.run(m, runs, fine)
+    day, contact, plan = delivered(file, links, found, fine, residual, achieved)
+
+    on_progress(4, 4, "verdict")
     beacon, answer = _present(links.beacon), _present(links.answer)
     evidence = verdict.Evidence(
-        m, links.open_loop, beacon, links.communication, fig2.readings, fig2.ideal, loops, summary, runs, scan
+        m, links.open_loop, beacon, links.communication, fig2.readings, fig2.ideal, loops, summary, runs, scan, day
     )
-    found = performance.run(m, runs, fine)
     return Study(
         file=file,
         links=links,
@@ -148,6 +159,9 @@ def run(file: MissionFile, on_progress: Progress = lambda done, total, what: Non
         scan=scan,
         fine_pointing=fine,
         performance=found,
+        day=day,
+        contact=contact,
+        plan=plan,
         requirements=(
             *verdict.requirements(m, links.open_loop, beacon, answer, achieved, residual, runs),
             *([] if fine is None else fine_requirements(m, fine, found)),
@@ -175,6 +189,33 @@ def fine_requirements(
     error = verdict.fine_pointing_requirement(m, left.quantile_rad, fine.quantile, name, cause)
     case = found.case(performance.FINE, name, "given")
     return [error] if case is None else [error, verdict.outage_requirement(m, case.margin_db, name, cause)]
+
+
+def delivered(
+    file: MissionFile,
+    links: link_study.LinkStudy,
+    found: performance.LinkPerformance,
+    fine: fine_pointing.FinePointingStudy | None,
+    residual: tracking.Run,
+    achieved: link.LinkBudget,
+) -> tuple[day_study.DayStudy | None, contact_run.ContactRun | None, constellation.ConstellationPlan | None]:
+    """The day under the best controller of the fine-pointing loop, or under the worst of the sines without one.
+
+    Raises ValueError for orbits that do not hold over the mission's span.
+    """
+    m = file.mission
+    if m.orbit is None or m.operations is None:
+        return None, None, None
+    case = None if fine is None else found.case(performance.FINE, fine.best.design.name, "given")
+    if case is not None:
+        loss = day_study.PointingLoss(case.outage_loss_db, case.outage, f"{case.controller}, {case.source}")
+    else:
+        on_axis = float(link.margin_of_error(m, np.zeros(1))[0])
+        loss = day_study.PointingLoss(on_axis - achieved.margin_db, 0.0, f"simulated: {residual.trace.name}")
+    day = day_study.run(links, loss)
+    contact = contact_run.of_mission(m, day.view, links.finding, fine)
+    plan = None if m.constellation is None else constellation.run(_links_of(file), loss)
+    return day, contact, plan
 
 
 def compare(file: MissionFile, runs: tuple[tracking.Run, ...]) -> Comparison | None:

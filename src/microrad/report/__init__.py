@@ -8,7 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from microrad.constellation import ConstellationPlan
 from microrad.folder import MANIFEST, FolderError, check_folder, whole_folder
+from microrad.operations import contact_plan, csv_text
 from microrad.report.identification import ReportError, check_identification, write_identification
 from microrad.report.identification_words import identification_data, identification_text
 from microrad.report.words import summary, verdict_text
@@ -38,22 +40,31 @@ def write(
     Raises FolderError when the folder holds something that must not be replaced. Returns the page's path.
     """
     # Drawing and writing libraries load here, not with the package: they take longer than help should.
-    from microrad.report import figures, fine_pointing_figures, link_figures, page, results
+    from microrad.report import day_plots, figures, fine_pointing_figures, link_figures, page, results
 
     with whole_folder(folder, overwrite) as draft:
         on_progress(0, 3, "figures")
         drawn, fine, links = figures.draw(study), fine_pointing_figures.draw(study), link_figures.draw(study.links)
+        day = () if study.day is None else day_plots.draw(study.day, study.contact)
         (draft / "figures").mkdir()
-        for figure in (*drawn, *fine, *links):
+        for figure in (*drawn, *fine, *links, *day):
             (draft / "figures" / f"{figure.name}.svg").write_text(figure.svg, encoding="utf-8")
             write_columns(figure.columns, draft / "figures" / f"{figure.name}.csv")
         on_progress(1, 3, "page")
-        (draft / "report.html").write_text(page.render(study, drawn, fine, links), encoding="utf-8")
+        (draft / "report.html").write_text(page.render(study, drawn, fine, links, day), encoding="utf-8")
         on_progress(2, 3, "results")
+        if study.plan is not None:
+            write_plan(study.plan, draft)
         results.write_results(study, draft / "results.nc")
         results.write_manifest(study, draft, MANIFEST)
         on_progress(3, 3, "done")
     return folder / "report.html"
+
+
+def write_plan(plan: ConstellationPlan, folder: Path) -> None:
+    """The sessions of a constellation for a spreadsheet, and as a contact plan."""
+    (folder / "sessions.csv").write_text(csv_text(plan.planned, plan.epoch.utc) + "\n", encoding="utf-8")
+    (folder / "contact-plan.ionrc").write_text(contact_plan(plan.planned, plan.epoch.utc) + "\n", encoding="utf-8")
 
 
 def write_columns(columns: dict[str, Any], path: Path) -> None:

@@ -10,7 +10,7 @@ from microrad import link
 from microrad.mission import Source
 from microrad.missionfile import assumptions, changed_from_shipped
 from microrad.performance import FINE
-from microrad.report import fine_pointing, links, words
+from microrad.report import constellation_views, contact_run_words, day_views, fine_pointing, links, words
 from microrad.report.figures import Figure
 from microrad.report.quantities import quantity
 from microrad.report.results import versions
@@ -35,11 +35,12 @@ def render(
     figures: Sequence[Figure],
     fine_figures: Sequence[Figure] = (),
     link_figures: Sequence[Figure] = (),
+    day_figures: Sequence[Figure] = (),
 ) -> str:
     """The page's HTML; every text of the mission is escaped, and nothing is loaded from anywhere.
 
     ``fine_figures`` go to the section on the fine-pointing loop, which a study without that loop does not have,
-    ``link_figures`` to those on the links.
+    ``link_figures`` to those on the links, ``day_figures`` to that on the day.
     """
     template = pages().get_template("page.html")
     m, fine = study.file.mission, study.fine_pointing
@@ -60,6 +61,7 @@ def render(
         "assumptions": assumptions(study.file),
         "inputs": _inputs(study.file.sources),
         "figures": figures,
+        "day": _day(study, day_figures),
         "fine": None if fine is None else fine_pointing.context(fine, m, fine_figures),
         "versions": versions(),
     }
@@ -84,6 +86,31 @@ def _links(study: Study, figures: Sequence[Figure]) -> dict[str, Any]:
         "readings": study.margin_map.readings,
         "ideal": study.margin_map.ideal,
     }
+
+
+def _day(study: Study, figures: Sequence[Figure]) -> dict[str, Any] | None:
+    """The day, one of its contacts in time, and the constellation; None for a mission without orbits."""
+    day, run, plan = study.day, study.contact, study.plan
+    if day is None:
+        return None
+    o, fine = day.mission.operations, study.fine_pointing
+    shown = None
+    if run is not None and fine is not None and o is not None and o.contact is not None:
+        rate, name = day.mission.communication.data_rate_bit_s, fine.best.design.name
+        shown = {
+            "sentences": contact_run_words.sentences(run, o.contact.number, name, rate),
+            "window_headings": contact_run_words.window_headings(fine.quantile),
+            "windows": contact_run_words.window_rows(run),
+            "log": contact_run_words.log_rows(run),
+        }
+    context = day_views.context(day, figures, files=True, run=shown)
+    if plan is not None:
+        context["constellation"] = {
+            "sentences": constellation_views.sentences(plan),
+            "headings": constellation_views.COLUMNS,
+            "rows": constellation_views.rows(plan)[: constellation_views.MOST_ROWS],
+        }
+    return context
 
 
 def _left_out(study: Study) -> list[str]:

@@ -6,7 +6,7 @@ from typing import Any
 from microrad.mission import Mission
 from microrad.missionfile import changed_from_shipped
 from microrad.performance import FINE, Cost
-from microrad.report import budget_views, fine_pointing_words
+from microrad.report import budget_views, constellation_views, contact_run_words, day_words, fine_pointing_words
 from microrad.report.fine_pointing_data import data as fine_pointing_data
 from microrad.report.quantities import quantity
 from microrad.study import Study
@@ -56,6 +56,8 @@ def explanation(study: Study) -> list[str]:
     if study.fine_pointing is not None:
         sentences += fine_pointing_words.short(study.fine_pointing, m)
     sentences += filter(None, (hysteresis_cost(study), found(study)))
+    if study.day is not None:
+        sentences += [*day_words.headline(study.day), *day_words.latency_words(study.day)]
     return sentences
 
 
@@ -133,6 +135,8 @@ def warnings(study: Study) -> list[str]:
     ]
     found += study.summary.warnings
     found += study.links.warnings
+    if study.day is not None:
+        found += study.day.warnings
     m = study.file.mission
     half, bias = m.scenario.loop_amplitude_v, m.mirror.bias_v
     if not m.mirror.drive_min_v <= bias - half <= bias + half <= m.mirror.drive_max_v:
@@ -231,6 +235,9 @@ def summary(study: Study) -> dict[str, Any]:
             }
             for c in study.performance.costs
         ],
+        "day": None if study.day is None else day_words.data(study.day),
+        "contact": None if study.contact is None else contact_run_words.data(study.contact),
+        "constellation": None if study.plan is None else constellation_views.data(study.plan),
         "fine_pointing": None if fine is None else fine_pointing_data(fine, m),
         "warnings": warnings(study),
     }

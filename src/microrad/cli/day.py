@@ -1,0 +1,130 @@
+"""Commands of the day: contacts and what they deliver, and the plan of a constellation."""
+
+import shutil
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from microrad.cli.frame import (
+    CLOSES,
+    DOES_NOT_CLOSE,
+    Json,
+    Outcome,
+    Refusal,
+    app,
+    command,
+    examples,
+    json_text,
+    progress_bar,
+)
+
+# Everything else is imported inside the commands: it takes longer to load than help may take.
+if TYPE_CHECKING:
+    from microrad.link_study import LinkStudy
+
+_WIDE = 160  # columns of a table that goes to a file
+_File = Annotated[
+    Path, typer.Argument(help="Mission file with the tables orbit and operations.", metavar="FILE", show_default=False)
+]
+
+
+def _links(file: Path) -> "LinkStudy":
+    """The links of a mission, whose losses and acquisition the day needs."""
+    from microrad import link_study
+    from microrad.missionfile import load_link
+
+    given = load_link(file)
+    try:
+        return link_study.run(given)
+    except ValueError as error:  # a rate that the receiver does not take, a scan without time to detect
+        raise Refusal(f"{file}: {error}") from error
+
+
+def _width() -> int:
+    return max(shutil.get_terminal_size((_WIDE, 24)).columns if sys.stdout.isatty() else _WIDE, 80)
+
+
+@app.command(
+    epilog=examples(
+        "microrad contacts leo-geo.toml",
+        "microrad contacts leo-geo.toml --csv > contacts.csv",
+        "microrad contacts leo-geo.toml --html > contacts.html",
+    )
+)
+@command
+def contacts(
+    file: _File,
+    as_csv: Annotated[bool, typer.Option("--csv", help="Print one line a contact, for a spreadsheet.")] = False,
+    as_html: Annotated[bool, typer.Option("--html", help="Print one page that loads nothing.")] = False,
+    as_json: Json = False,
+) -> Outcome:
+    """Print when the link has contact, and what it delivers.
+
+    Contacts with the relay and passes over the ground stations, each with its cause to begin and to end; volumes, the
+    on-board store, latency of the data by both ways, and which assumption matters most. The pointing loss is that of
+    the mission's jitter or pointing error; microrad run takes that of the simulated loop. The exit code is 0 when the
+    relay carries something and 1 when it does not.
+    """
+    if sum((as_csv, as_html, as_json)) > 1:
+        raise Refusal("--csv, --html and --json exclude each other; give one of them.")
+    from microrad import day_study
+    from microrad.report import day_views, day_words
+
+    links = _links(file)
+    try:
+        day = day_study.run(links)
+    except ValueError as error:  # a table that is missing, an orbit that does not hold
+        raise Refusal(f"{file}: {error}") from error
+    code = CLOSES if day.relay.capacity_bit > 0.0 else DOES_NOT_CLOSE
+    if as_json:
+        return Outcome(json_text({"mission": links.file.mission.name, **day_words.data(day)}), code)
+    if as_csv:
+        return Outcome(day_views.csv_text(day), code)
+    if as_html:
+        return Outcome(day_views.html(day, links), code)
+    return Outcome(day_views.text(day, _width()), code)
+
+
+@app.command(
+    epilog=examples(
+        "microrad constellation leo-geo.toml",
+        "microrad constellation leo-geo.toml --csv > sessions.csv",
+        "microrad constellation leo-geo.toml --contact-plan > contact-plan.ionrc",
+    )
+)
+@command
+def constellation(
+    file: _File,
+    as_csv: Annotated[bool, typer.Option("--csv", help="Print one line a session, for a spreadsheet.")] = False,
+    as_plan: Annotated[
+        bool, typer.Option("--contact-plan", help="Print a contact plan as CCSDS 734.3-B has it, in ION's text.")
+    ] = False,
+    as_json: Json = False,
+) -> Outcome:
+    """Plan who is served when, where many satellites share some relays.
+
+    Each terminal of a relay serves one satellite at a time, the one that has waited longest first. The exit code is 0
+    when data flow and 1 when none do.
+    """
+    if sum((as_csv, as_plan, as_json)) > 1:
+        raise Refusal("--csv, --contact-plan and --json exclude each other; give one of them.")
+    from microrad import constellation as plans
+    from microrad import day_study, operations
+    from microrad.report import constellation_views
+
+    links = _links(file)
+    try:
+        with progress_bar() as progress:
+            plan = plans.run(links.file, day_study.given_loss(links), progress)
+        code = CLOSES if plan.volume_bit > 0.0 else DOES_NOT_CLOSE
+        if as_csv:
+            return Outcome(operations.csv_text(plan.planned, plan.epoch.utc), code)
+        if as_plan:
+            return Outcome(operations.contact_plan(plan.planned, plan.epoch.utc), code)
+    except ValueError as error:  # a table that is missing, an orbit that does not hold
+        raise Refusal(f"{file}: {error}") from error
+    if as_json:
+        return Outcome(json_text({"mission": links.file.mission.name, **constellation_views.data(plan)}), code)
+    return Outcome(constellation_views.text(plan, _width()), code)

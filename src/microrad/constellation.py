@@ -1,0 +1,165 @@
+"""Many satellites that share a few relays: who sees whom, who is served when, and the plan of it."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from microrad import operations, orbit
+from microrad.day_study.flow import PointingLoss, closings, rate_table
+from microrad.mission import LinkMission
+from microrad.missionfile import LinkFile
+from microrad.operations_table import Constellation
+from microrad.threads import in_threads
+
+Floats = NDArray[np.float64]
+Progress = Callable[[int, int, str], None]
+Span = tuple[float, float]
+
+_AT_ONCE = 16  # satellites of a job
+_RANGES = 25  # samples of a session
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ConstellationPlan:
+    """Who is served when. Times in seconds since ``epoch``; satellites and relays count from 0 in the order of names.
+
+    ``opportunities`` are all contacts, ``sessions`` those that the relays' terminals take, ``planned`` the same with
+    their names, ranges, rates and volumes. ``by_satellite`` and ``by_relay`` add them up.
+    """
+
+    epoch: orbit.Epoch
+    span_s: Span
+    satellites: tuple[str, ...]
+    relays: tuple[str, ...]
+    terminals: int
+    opportunities: operations.Opportunities
+    sessions: operations.Sessions
+    planned: tuple[operations.PlannedSession, ...]
+    by_satellite: operations.Totals
+    by_relay: operations.Totals
+
+    @property
+    def volume_bit(self) -> float:
+        """Data of all sessions."""
+        return sum(one.volume_bit for one in self.planned)
+
+    @property
+    def use(self) -> Floats:
+        """Share of the span in which the terminals of each relay are busy."""
+        return np.asarray(self.by_relay.busy_s / (self.terminals * (self.span_s[1] - self.span_s[0])))
+
+
+def opportunities(
+    satellites: Sequence[orbit.Terminal],
+    relays: Sequence[orbit.Terminal],
+    earth: orbit.Earth,
+    epoch: orbit.Epoch,
+    span_s: Span,
+    on_progress: Progress = lambda done, total, what: None,
+) -> operations.Opportunities:
+    """Every contact of every satellite with every relay, in order of their start.
+
+    The work grows with the number of satellites, and what is kept with the number of contacts. Raises
+    `orbit.OrbitError` as `orbit.contacts`.
+    """
+    groups = [satellites[first : first + _AT_ONCE] for first in range(0, len(satellites), _AT_ONCE)]
+    jobs = [partial(_contacts, group, relays, earth, epoch, span_s) for group in groups]
+    total = len(satellites)
+    found = in_threads(jobs, lambda done: on_progress(min(done * _AT_ONCE, total), total, "contacts"))
+    rows = np.concatenate([np.zeros((0, 4)), *found])
+    counted = np.concatenate([np.zeros(0), *(rows_of[:, 0] + _AT_ONCE * k for k, rows_of in enumerate(found))])
+    order = np.lexsort((rows[:, 1], counted, rows[:, 2]))
+    return operations.Opportunities(counted[order], rows[order, 1], rows[order, 2], rows[order, 3])
+
+
+def _contacts(
+    group: Sequence[orbit.Terminal],
+    relays: Sequence[orbit.Terminal],
+    earth: orbit.Earth,
+    epoch: orbit.Epoch,
+    span_s: Span,
+) -> Floats:
+    """Satellite in its group, relay, start and end of each contact of a group, (n, 4)."""
+    rows = []
+    sampled: dict[float, list[orbit.Sampled]] = {}
+    for place, satellite in enumerate(group):
+        step = orbit.coarse_step_s(satellite.orbit, span_s[0])
+        if step not in sampled:
+            sampled[step] = [orbit.Sampled.over(relay.orbit, span_s, step) for relay in relays]
+        each = orbit.contacts_with_each(satellite, relays, earth, epoch, span_s, sampled[step])
+        rows += [(place, which, c.start_s, c.end_s) for which, found in enumerate(each) for c in found]
+    return np.array(rows, dtype=np.float64).reshape(-1, 4)
+
+
+def run(
+    file: LinkFile, loss: PointingLoss, on_progress: Progress = lambda done, total, what: None
+) -> ConstellationPlan:
+    """The constellation of a mission: contacts, sessions by the rule of `operations.schedule`, and their volumes.
+
+    The rate of a session is the highest that closes at its largest range; volumes leave out the share of time in
+    outage. Raises `operations.OperationsError` without the tables `constellation` and `operations`, and
+    `orbit.OrbitError` for orbits that do not hold.
+    """
+    m, folder = file.mission, file.path.parent
+    c = table(m)
+    pair = orbit.pair(m, folder)
+    own = tuple(orbit.satellites(c, m, pair.epoch, folder))
+    relays = orbit.relays(c, m, pair.epoch)
+    found = opportunities(own, relays, pair.earth, pair.epoch, pair.span_s, on_progress)
+    rules = operations.Rules(c.overhead_s, c.shortest_s, c.session_s)
+    sessions = operations.schedule(found, len(own), len(relays), c.terminals, rules, pair.span_s[0])
+    planned = _planned(m, own, relays, sessions, loss)
+    rate = m.communication.data_rate_bit_s
+    return ConstellationPlan(
+        epoch=pair.epoch,
+        span_s=pair.span_s,
+        satellites=tuple(each.name for each in own),
+        relays=tuple(each.name for each in relays),
+        terminals=c.terminals,
+        opportunities=found,
+        sessions=sessions,
+        planned=planned,
+        by_satellite=operations.totals_by_satellite(sessions, len(own), rate, pair.span_s),
+        by_relay=operations.totals_by_relay(sessions, len(relays), rate, pair.span_s),
+    )
+
+
+def table(m: LinkMission) -> Constellation:
+    """The mission's table of its constellation; `operations.OperationsError` without one."""
+    if m.constellation is None:
+        raise operations.OperationsError("the mission has no table [constellation]: microrad init writes one")
+    return m.constellation
+
+
+def _planned(
+    m: LinkMission,
+    satellites: Sequence[orbit.Terminal],
+    relays: Sequence[orbit.Terminal],
+    s: operations.Sessions,
+    loss: PointingLoss,
+) -> tuple[operations.PlannedSession, ...]:
+    rates = rate_table(closings(m, loss))
+    found = []
+    for one in range(s.satellite.size):
+        own, relay = satellites[s.satellite[one]], relays[s.relay[one]]
+        time_s = np.linspace(s.locked_s[one], s.end_s[one], _RANGES)
+        range_m = orbit.sight(own.orbit, relay.orbit, time_s).range_m
+        furthest = float(np.max(range_m))
+        rate = 0.0 if rates is None else float(rates.rate_bit_s(furthest))
+        found.append(
+            operations.PlannedSession(
+                satellite=own.name,
+                relay=relay.name,
+                start_s=float(s.start_s[one]),
+                locked_s=float(s.locked_s[one]),
+                end_s=float(s.end_s[one]),
+                rate_bit_s=rate,
+                volume_bit=rate * (1.0 - loss.outage) * float(s.end_s[one] - s.locked_s[one]),
+                range_min_m=float(np.min(range_m)),
+                range_max_m=furthest,
+            )
+        )
+    return tuple(found)

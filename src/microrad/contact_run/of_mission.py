@@ -1,0 +1,51 @@
+"""The contact that a mission names, run with its own orbits, acquisition and fine-pointing loop."""
+
+import numpy as np
+
+from microrad import orbit
+from microrad.contact_run.records import Contact, ContactRun, Floats, Settings, Sight
+from microrad.contact_run.sequence import run
+from microrad.day_study import View
+from microrad.fine_pointing import FinePointingStudy
+from microrad.link_acquisition import Finding
+from microrad.mission import Mission
+
+
+def of_mission(m: Mission, seen: View, finding: Finding | None, fine: FinePointingStudy | None) -> ContactRun | None:
+    """The run of `operations.contact` under the best controller; None without that table or what it needs.
+
+    Raises ValueError for a contact that the mission's span does not have.
+    """
+    asked = None if m.operations is None else m.operations.contact
+    if asked is None or finding is None or fine is None or m.fine_pointing is None or m.operations is None:
+        return None
+    if not seen.encounters:
+        return None
+    if asked.number > len(seen.encounters):
+        raise ValueError(
+            f"operations.contact.number is {asked.number}, and the span has {len(seen.encounters)} contacts: give a "
+            "number up to that, or a longer orbit.duration"
+        )
+    settings = Settings(
+        slew_angle_rad=asked.slew_angle_rad,
+        slew_rate_rad_s=asked.slew_rate_rad_s,
+        windows=asked.windows,
+        window_s=asked.window_s,
+        settle_s=m.fine_pointing.settle_s,
+        hold_s=asked.hold_s,
+        seed=m.operations.seed,
+    )
+    return run(m, finding, fine.scene, fine.best.design, _contact(seen, asked.number - 1), settings)
+
+
+def _contact(seen: View, place: int) -> Contact:
+    """One contact of the span with its geometry; the body is free from the end of the one before."""
+    pair, chosen = seen.pair, seen.encounters[place].contact
+    free = seen.encounters[place - 1].contact.end_s if place else pair.span_s[0]
+
+    def geometry(time_s: Floats) -> Sight:
+        found = orbit.sight(pair.leo.orbit, pair.geo.orbit, np.ravel(time_s))
+        shape = np.shape(time_s)
+        return Sight(*(each.reshape(shape) for each in (found.range_m, found.rate_rad_s, found.point_ahead_rad)))
+
+    return Contact(chosen.start_s, chosen.end_s, chosen.begins, chosen.ends, free, geometry)

@@ -1,0 +1,89 @@
+"""What a link delivers in a day: contacts, acquisition, rates, volume and latency, by relay and by direct downlink."""
+
+from dataclasses import dataclass
+
+from microrad import link, orbit
+from microrad.day_study import flow
+from microrad.day_study.assumptions import NOTHING, Numbers, Swing, swings
+from microrad.day_study.flow import DIRECT, RELAY, Closing, PointingLoss, Way
+from microrad.day_study.geometry import Encounter, View, beyond_the_mission, times, view
+from microrad.link_study import LinkStudy
+from microrad.mission import LinkMission
+from microrad.units import format_quantity
+
+__all__ = [
+    "DIRECT",
+    "NOTHING",
+    "RELAY",
+    "Closing",
+    "DayStudy",
+    "Encounter",
+    "Numbers",
+    "PointingLoss",
+    "Swing",
+    "View",
+    "Way",
+    "given_loss",
+    "run",
+    "times",
+    "view",
+]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DayStudy:
+    """The span of a mission by both ways, and the assumptions that move the comparison, the weightiest first.
+
+    ``closings`` are the laser's rates, highest first, with how far each reaches under ``loss``.
+    """
+
+    mission: LinkMission
+    view: View
+    loss: PointingLoss
+    closings: tuple[Closing, ...]
+    relay: Way
+    direct: Way | None
+    swings: tuple[Swing, ...]
+    warnings: tuple[str, ...]
+
+    @property
+    def ratio(self) -> float:
+        """Volume that the relay could carry over that of the direct downlink; nan without one."""
+        if self.direct is None:
+            return float("nan")
+        return self.relay.capacity_bit / self.direct.capacity_bit if self.direct.capacity_bit else float("inf")
+
+
+def given_loss(links: LinkStudy) -> PointingLoss:
+    """The pointing loss of a mission whose loop is not simulated: that of its jitter, else of its pointing error."""
+    m = links.file.mission
+    if links.under_jitter is not None:
+        return PointingLoss(links.under_jitter.outage_loss_db, links.under_jitter.outage, "jitter as given")
+    needed = float(link.required_dbm(m, m.communication.data_rate_bit_s))
+    loss = link.received_on_axis_dbm(m) - needed - links.communication.margin_db
+    error = format_quantity(m.communication.pointing_error_rad, "rad")
+    return PointingLoss(loss, 0.0, f"communication.pointing_error, {error}")
+
+
+def run(links: LinkStudy, loss: PointingLoss | None = None) -> DayStudy:
+    """The day of a mission that has the tables `orbit` and `operations`.
+
+    ``loss`` is what pointing costs the laser link, by default what the mission states. Raises `orbit.OrbitError` and
+    `operations.OperationsError` for tables that are missing and orbits that do not hold.
+    """
+    m, folder = links.file.mission, links.file.path.parent
+    loss = given_loss(links) if loss is None else loss
+    seen = view(m, orbit.pair(m, folder))
+    found = None if links.finding is None else links.finding.wide
+    closing = flow.closings(m, loss)
+    rates, heard = flow.rate_table(closing), flow.heard(m, seen)
+    return DayStudy(
+        mission=m,
+        view=seen,
+        loss=loss,
+        closings=closing,
+        relay=flow.relay(m, seen, rates, loss.outage, found, 1.0),
+        direct=flow.direct(m, seen, heard),
+        swings=swings(m, folder, seen, heard, loss, found),
+        warnings=beyond_the_mission(m, seen),
+    )

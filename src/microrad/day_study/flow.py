@@ -1,0 +1,264 @@
+"""From contacts to data: rates that the link closes at, acquisitions drawn, the store, volumes and latencies."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from microrad import link, operations, orbit
+from microrad.day_study.geometry import View
+from microrad.link_acquisition import Found
+from microrad.mission import LinkMission
+from microrad.operations_table import Downlink, Operations
+
+Floats = NDArray[np.float64]
+Span = tuple[float, float]
+
+RELAY, DIRECT = "relay", "direct downlink"
+
+
+@dataclass(frozen=True, slots=True)
+class PointingLoss:
+    """What pointing costs the laser link: the loss in dB, the share of time in outage, and where both come from."""
+
+    loss_db: float
+    outage: float
+    source: str
+
+
+@dataclass(frozen=True, slots=True)
+class Closing:
+    """A data rate with the margin that it has at the budgeted distance, and the largest range at which it closes."""
+
+    rate_bit_s: float
+    margin_db: float
+    largest_range_m: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Way:
+    """One way down: its contacts, what they could carry, and what happened to the instrument's data.
+
+    ``contacts`` are those with a part in the span, ``carried_bit`` what each could carry within it, and
+    ``capacity_bit`` their sum, both the mean of the runs; ``capacity_spread_bit`` the least and the most of a run.
+    ``contact_s`` is the time in contact, ``gap_s`` the longest time in the span without one. ``history`` is the store
+    in the first run; volumes are means over the runs, and ``latency`` is that of all runs together.
+    """
+
+    name: str
+    contacts: tuple[orbit.Contact, ...]
+    stations: tuple[str, ...]
+    contact_s: float
+    gap_s: float
+    carried_bit: Floats
+    capacity_bit: float
+    capacity_spread_bit: tuple[float, float]
+    generated_bit: float
+    lost_bit: float
+    on_board_bit: float
+    failed_contacts: float
+    history: operations.StoreHistory
+    latency: operations.Latency
+
+    @property
+    def median_s(self) -> float:
+        """Median latency of the data that was kept; infinite when less than half arrived."""
+        return self.latency.quantile(0.5)
+
+    @property
+    def slow_s(self) -> float:
+        """Latency within which 99 % of the data that was kept arrived; infinite when less did."""
+        return self.latency.quantile(0.99)
+
+
+def closings(m: LinkMission, loss: PointingLoss) -> tuple[Closing, ...]:
+    """The rates of the mission, highest first, each with how far it reaches; what the receiver refuses is left out.
+
+    It closes with a margin of `operations.margin`; the margin falls by 20 log10 of the range.
+    """
+    o = table(m)
+    rates = (m.communication.data_rate_bit_s,) if o.rates_bit_s is None else o.rates_bit_s
+    built, found = link.receiver(m), []
+    available = link.received_on_axis_dbm(m) - loss.loss_db
+    for rate in sorted(rates, reverse=True):
+        if built is not None and rate > built.highest_data_rate_bit_s:
+            continue
+        margin = available - float(link.required_dbm(m, rate))
+        spare = margin - o.margin_db
+        found.append(Closing(rate, margin, m.communication.distance_m * 10.0 ** (spare / 20.0)))
+    return tuple(found)
+
+
+def table(m: LinkMission) -> Operations:
+    """The mission's table of operations; `operations.OperationsError` without one."""
+    if m.operations is None:
+        raise operations.OperationsError("the mission has no table [operations]: microrad init writes one")
+    return m.operations
+
+
+def rate_table(found: tuple[Closing, ...]) -> operations.RateTable | None:
+    """The rates as steps of range; None where the receiver takes none."""
+    steps: list[operations.Step] = []
+    for c in found:  # a lower rate that reaches less far never serves
+        if not steps or c.largest_range_m > steps[-1].largest_range_m:
+            steps.append(operations.Step(c.rate_bit_s, c.largest_range_m))
+    return operations.RateTable(tuple(steps)) if steps else None
+
+
+# --------------------------------------------------------------------------------------------------------------- relay
+def relay(
+    m: LinkMission, seen: View, rates: operations.RateTable | None, outage: float, found: Found | None, slower: float
+) -> Way:
+    """The way by the relay: each run draws an acquisition for each contact; ``slower`` stretches their times."""
+    o, whole = table(m), _granted(seen.contacts, table(m).relay_share)
+    bases = [_whole_service(c, r, rates, 1.0 - outage) for c, r in zip(whole, seen.range_m, strict=True)]
+    runs = []
+    for run in range(o.runs):
+        locks = _locks(found, len(whole), o.seed, run, slower)
+        runs.append([delayed(base, base.start_s + lock) for base, lock in zip(bases, locks, strict=True)])
+    failed = float(
+        np.mean(
+            [sum(math.isinf(x) for x in _locks(found, _of_span(whole, seen), o.seed, r, slower)) for r in range(o.runs)]
+        )
+    )
+    return _way(RELAY, whole, (), runs, o, seen, o.relay_delay_s, failed)
+
+
+def _of_span(contacts: tuple[orbit.Contact, ...], seen: View) -> int:
+    return sum(c.start_s < seen.duration_s for c in contacts)
+
+
+def _granted(contacts: tuple[orbit.Contact, ...], share: float) -> tuple[orbit.Contact, ...]:
+    """The part of each contact that the relay grants."""
+    if share == 1.0:
+        return contacts
+    return tuple(
+        orbit.Contact(c.start_s, c.start_s + share * c.duration_s, c.begins, "end of the relay's share")
+        for c in contacts
+    )
+
+
+def _whole_service(
+    contact: orbit.Contact,
+    range_m: Callable[[Floats], Floats],
+    rates: operations.RateTable | None,
+    availability: float,
+) -> operations.Service:
+    """What a contact would carry if it were locked from its beginning."""
+    span = contact.start_s, contact.end_s
+    if rates is None:
+        return operations.Service(np.array(span), np.zeros(1), availability)
+    return operations.service(rates, span, contact.start_s, range_m, availability)
+
+
+def _locks(found: Found | None, contacts: int, seed: int, run: int, slower: float) -> Floats:
+    """Seconds from the beginning of each contact to lock, infinite where acquisition is given up; drawn from its runs.
+
+    Without an acquisition in the mission lock is there at once.
+    """
+    if found is None:
+        return np.zeros(contacts)
+    draw = np.random.Generator(np.random.Philox(key=[seed, run]))
+    chosen = draw.integers(0, found.simulated.time_s.size, contacts)
+    return np.where(found.simulated.locked[chosen], slower * found.simulated.time_s[chosen], math.inf)
+
+
+def delayed(service: operations.Service, lock_s: float) -> operations.Service:
+    """The same contact without data before lock."""
+    if lock_s <= service.start_s:
+        return service
+    if lock_s >= service.end_s:
+        return operations.Service(np.array([service.start_s, service.end_s]), np.zeros(1), service.availability)
+    after = service.edges_s > lock_s
+    first = int(np.argmax(after))
+    edges = np.concatenate(([service.start_s, lock_s], service.edges_s[after]))
+    return operations.Service(edges, np.concatenate(([0.0], service.rate_bit_s[first - 1 :])), service.availability)
+
+
+# -------------------------------------------------------------------------------------------------------------- direct
+Heard = tuple[orbit.Pass, str]
+"""A pass and the station that hears it."""
+
+
+def heard(m: LinkMission, seen: View) -> tuple[Heard, ...]:
+    """Every pass over every station of the direct downlink; none without one."""
+    down, pair = table(m).downlink, seen.pair
+    if down is None:
+        return ()
+    return tuple(
+        (each, station.name)
+        for station in orbit.stations(down)
+        for each in orbit.passes(pair.leo.orbit, station, pair.epoch, pair.whole_s)
+    )
+
+
+def direct(m: LinkMission, seen: View, passes: tuple[Heard, ...]) -> Way | None:
+    """The radio downlink, or None without one. The station that rises first is kept until the satellite sets there."""
+    o = table(m)
+    if o.downlink is None:
+        return None
+    kept, names = [], []
+    until = -math.inf
+    for each, name in sorted(passes, key=lambda item: (item[0].start_s, item[0].end_s)):
+        start, begins = max(each.start_s, until), each.begins if each.start_s >= until else "station free"
+        if each.end_s > start:
+            kept.append(orbit.Contact(start, each.end_s, begins, each.ends))
+            names.append(name)
+            until = each.end_s
+    down = o.downlink
+    services = [_radio(contact, down) for contact in kept]
+    return _way(DIRECT, tuple(kept), tuple(names), [services], o, seen, down.delay_s, 0.0)
+
+
+def _radio(contact: orbit.Contact, down: Downlink) -> operations.Service:
+    span = np.array([contact.start_s, contact.end_s])
+    return delayed(operations.Service(span, np.array([down.data_rate_bit_s]), 1.0), contact.start_s + down.setup_s)
+
+
+# ----------------------------------------------------------------------------------------------------------------- way
+def _way(
+    name: str,
+    contacts: tuple[orbit.Contact, ...],
+    stations: tuple[str, ...],
+    runs: list[list[operations.Service]],
+    o: Operations,
+    seen: View,
+    delay_s: float,
+    failed: float,
+) -> Way:
+    span, whole = seen.pair.span_s, seen.pair.whole_s
+    made = operations.Production(o.instrument_rate_bit_s, *span)
+    histories = [operations.deliver(made, o.store_bit, services, whole, delay_s) for services in runs]
+    inside = _of_span(contacts, seen)
+    carried = np.array([[_until(s, span[1]) for s in services[:inside]] for services in runs]).reshape(len(runs), -1)
+    total = carried.sum(axis=1)
+    return Way(
+        name=name,
+        contacts=contacts[:inside],
+        stations=stations[:inside],
+        contact_s=sum(min(c.end_s, span[1]) - c.start_s for c in contacts[:inside]),
+        gap_s=_gap(contacts[:inside], span),
+        carried_bit=carried.mean(axis=0),
+        capacity_bit=float(total.mean()),
+        capacity_spread_bit=(float(total.min()), float(total.max())),
+        generated_bit=histories[0].total_generated_bit,
+        lost_bit=float(np.mean([h.total_lost_bit for h in histories])),
+        on_board_bit=float(np.mean([h.not_delivered_bit for h in histories])),
+        failed_contacts=failed,
+        history=histories[0],
+        latency=operations.pool([h.latency for h in histories]),
+    )
+
+
+def _until(service: operations.Service, end_s: float) -> float:
+    """What a contact could carry before the end of the span."""
+    edges = np.minimum(service.edges_s, end_s)
+    return float(np.dot(service.mean_rate_bit_s, np.diff(edges)))
+
+
+def _gap(contacts: tuple[orbit.Contact, ...], span: Span) -> float:
+    """Longest time in the span without a contact."""
+    edges = [span[0], *(t for c in contacts for t in (c.start_s, min(c.end_s, span[1]))), span[1]]
+    return max(b - a for a, b in zip(edges[::2], edges[1::2], strict=True))

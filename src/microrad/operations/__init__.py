@@ -1,0 +1,33 @@
+"""The day: contacts and locks become data rates, volumes and latencies; terminals are shared; plans are written."""
+
+from microrad.operations.base import OperationsError
+from microrad.operations.latency import Latency, pool
+from microrad.operations.plan import COLUMNS, PlannedSession, contact_plan, csv_text
+from microrad.operations.rates import RateTable, Service, Step, service
+from microrad.operations.schedule import Opportunities, Rules, Sessions, schedule
+from microrad.operations.store import Production, StoreHistory, deliver
+from microrad.operations.totals import Totals, totals_by_relay, totals_by_satellite
+
+__all__ = [
+    "COLUMNS",
+    "Latency",
+    "OperationsError",
+    "Opportunities",
+    "PlannedSession",
+    "Production",
+    "RateTable",
+    "Rules",
+    "Service",
+    "Sessions",
+    "Step",
+    "StoreHistory",
+    "Totals",
+    "contact_plan",
+    "csv_text",
+    "deliver",
+    "pool",
+    "schedule",
+    "service",
+    "totals_by_relay",
+    "totals_by_satellite",
+]

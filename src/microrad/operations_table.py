@@ -1,0 +1,146 @@
+"""The tables of a mission about its operations: what is to be delivered, by which ways, and to whom else."""
+
+import math
+from collections.abc import Iterator
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from microrad.fields import Problem, Quantity, Several, Table, Whole
+from microrad.mirror_table import Name
+from microrad.orbit_table import HIGHEST_MASK_RAD, Seconds
+from microrad.units import format_quantity
+
+DataRate = Annotated[float, Quantity("bit/s", "Mbit/s", above=0.0)]
+Longitude = Annotated[float, Quantity("rad", "deg", least=-math.pi, most=2.0 * math.pi)]
+
+
+class StationTable(Table):
+    """A ground station of the direct downlink."""
+
+    latitude_rad: Annotated[float, Quantity("rad", "deg", least=-math.pi / 2, most=math.pi / 2)] = Field(
+        alias="latitude", description="geodetic, north positive"
+    )
+    longitude_rad: Longitude = Field(alias="longitude", description="east positive")
+    height_m: Annotated[float, Quantity("m", "m", least=-500.0, most=9000.0)] = Field(alias="height")
+    mask_rad: Annotated[float, Quantity("rad", "deg", least=0.0, most=HIGHEST_MASK_RAD)] = Field(
+        alias="mask", description="lowest elevation at which data flow"
+    )
+
+
+class Downlink(Table):
+    """The radio downlink that the relay is set against: one station at a time."""
+
+    data_rate_bit_s: DataRate = Field(alias="data_rate")
+    setup_s: Seconds = Field(alias="setup", description="from the rise above the mask until data flow")
+    delay_s: Seconds = Field(alias="delay", description="from the station to the user")
+    stations: dict[str, StationTable] = Field(description="one table for each, [operations.downlink.stations.NAME]")
+
+    def __hash__(self) -> int:
+        """Of what is in it, in its order."""
+        return hash((self.data_rate_bit_s, self.setup_s, self.delay_s, tuple(self.stations.items())))
+
+    def problems(self) -> Iterator[Problem]:
+        """At least one station."""
+        if not self.stations:
+            yield Problem("stations", "holds no station", "a table such as [operations.downlink.stations.kiruna]")
+
+
+class ContactTable(Table):
+    """One contact as a run in time, with the fine-pointing loop in sampled windows."""
+
+    number: Annotated[int, Whole("", least=1, most=100_000)] = Field(description="which contact of the span, from 1")
+    slew_rate_rad_s: Annotated[float, Quantity("rad/s", "deg/s", above=0.0)] = Field(
+        alias="slew_rate", description="of the body, towards the partner before the contact"
+    )
+    slew_angle_rad: Annotated[float, Quantity("rad", "deg", least=0.0, most=math.pi)] = Field(
+        alias="slew_angle", description="how far it turns"
+    )
+    windows: Annotated[int, Whole("", least=1, most=1000)]
+    window_s: Annotated[float, Quantity("s", "s", above=0.0, most=1000.0)] = Field(alias="window")
+    hold_s: Seconds = Field(
+        alias="hold", description="how long the margin may stay below 0 dB before lock is taken for lost"
+    )
+
+
+class Operations(Table):
+    """From contacts to delivered data."""
+
+    instrument_rate_bit_s: DataRate = Field(alias="instrument_rate", description="what fills the store, on average")
+    store_bit: Annotated[float, Quantity("bit", "GB", above=0.0)] = Field(alias="store", description="capacity")
+    rates_bit_s: Annotated[tuple[float, ...], Several(Quantity("bit/s", "Mbit/s", above=0.0), rising=True)] | None = (
+        Field(alias="rates", default=None, description="stepped with range; absent: communication.data_rate alone")
+    )
+    margin_db: Annotated[float, Quantity("dB", least=0.0)] = Field(
+        alias="margin", description="of the laser link, at which a data rate counts as one that it closes at"
+    )
+    relay_share: Annotated[float, Quantity("", above=0.0, most=1.0)] = Field(
+        description="share of each contact that the relay grants, from its beginning"
+    )
+    relay_delay_s: Seconds = Field(alias="relay_delay", description="from the satellite's laser to the user")
+    runs: Annotated[int, Whole("", least=1, most=10_000)] = Field(
+        description="of the span, each with acquisitions drawn"
+    )
+    seed: Annotated[int, Whole("", least=0, most=2**63 - 1)]
+    downlink: Downlink | None = None
+    contact: ContactTable | None = None
+
+
+class RelayTable(Table):
+    """A relay of the constellation."""
+
+    longitude_rad: Longitude = Field(alias="longitude", description="of its slot, east positive")
+
+
+_PATTERN_KEYS = ("satellites", "planes", "phasing")
+
+
+class Constellation(Table):
+    """Many satellites that share some relays."""
+
+    pattern: Literal["delta", "star", "file"] = Field(
+        description="delta, star: Walker's patterns around orbit.leo, nodes over 360 or 180 deg; file: element sets"
+    )
+    satellites: Annotated[int, Whole("", least=1, most=100_000)] | None = None
+    planes: Annotated[int, Whole("", least=1, most=100_000)] | None = None
+    phasing: Annotated[int, Whole("", least=0, most=100_000)] | None = Field(
+        default=None, description="Walker's F, of planes"
+    )
+    file: Name | None = Field(default=None, description="TLEs or OMMs, seen from the mission file")
+    terminals: Annotated[int, Whole("", least=1, most=100)] = Field(
+        description="of each relay, each serves one satellite at a time"
+    )
+    overhead_s: Seconds = Field(alias="overhead", description="of each session before data flow")
+    session_s: Annotated[float, Quantity("s", "s", above=0.0, most=1e6)] = Field(
+        alias="session", description="longest, while others wait"
+    )
+    shortest_s: Seconds = Field(alias="shortest", description="session that is worth its overhead")
+    relays: dict[str, RelayTable] = Field(description="one table for each, [constellation.relays.NAME]")
+
+    def __hash__(self) -> int:
+        """Of what is in it, in its order."""
+        own = (getattr(self, name) for name in type(self).model_fields if name != "relays")
+        return hash((*own, tuple(self.relays.items())))
+
+    def problems(self) -> Iterator[Problem]:
+        """The keys of the pattern, and no others; planes that divide the satellites."""
+        for key in (*_PATTERN_KEYS, "file"):
+            present, wanted = getattr(self, key) is not None, (key == "file") == (self.pattern == "file")
+            if wanted and not present:
+                example = '"satellites.tle"' if key == "file" else "1"
+                yield Problem(
+                    key, f'is missing, and pattern = "{self.pattern}" needs it', f"{key} = {example} would do"
+                )
+            if present and not wanted:
+                yield Problem(key, f'does not belong to pattern = "{self.pattern}"', "this line removed")
+        if self.satellites and self.planes and self.satellites % self.planes:
+            yield Problem("planes", f"does not divide satellites = {self.satellites}", "a divisor of it")
+        if self.planes and self.phasing is not None and self.phasing >= self.planes:
+            yield Problem("phasing", f"is not below planes = {self.planes}", f"0 to {self.planes - 1}")
+        if self.shortest_s <= self.overhead_s:
+            reason = "is not above overhead: such a session would carry no data"
+            yield Problem("shortest", reason, f"more than {format_quantity(self.overhead_s, 's')}")
+        if self.session_s < self.shortest_s:
+            yield Problem("session", "is below shortest", f"at least {format_quantity(self.shortest_s, 's')}")
+        if not self.relays:
+            yield Problem("relays", "holds no relay", "a table such as [constellation.relays.east]")

@@ -1,0 +1,40 @@
+"""What every orbit gives, and the refusal shared by the package.
+
+The inertial frame is TEME (true equator, mean equinox of date), the frame of SGP4. The frame fixed in the Earth is TEME
+turned about z by Greenwich mean sidereal time (IAU 1982) at UT1; polar motion (at most 0.6 arcsec) is neglected.
+Times are elapsed seconds since the epoch of the mission. Vectors are axis first: shape (3, n) for n times.
+"""
+
+from typing import NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+
+class OrbitError(ValueError):
+    """An orbit, an instant or a place that is refused: what it is, why, and what to do."""
+
+
+class States(NamedTuple):
+    """Position and velocity in TEME, of shape (3, n) each; shape (3,) for a single time."""
+
+    position_m: Floats
+    velocity_m_s: Floats
+
+
+class Orbit(Protocol):
+    """Anything that moves by a rule: a Kepler orbit, an element set, a table of positions."""
+
+    @property
+    def name(self) -> str:
+        """What the satellite is called in tables and messages."""
+        ...
+
+    def states(self, time_s: Floats) -> States:
+        """States at `time_s`, elapsed seconds since the epoch of the mission, in any order.
+
+        Raises `OrbitError` for a time at which the rule does not hold.
+        """
+        ...

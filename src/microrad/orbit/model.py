@@ -1,0 +1,191 @@
+"""From the mission's tables to orbits, terminals and stations."""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from microrad.mission import LinkMission
+from microrad.operations_table import Constellation, Downlink
+from microrad.orbit.analytic import GeostationarySlot, KeplerOrbit, node_of_local_time, sun_synchronous_inclination_rad
+from microrad.orbit.base import Orbit, OrbitError
+from microrad.orbit.contacts import UNLIMITED, Limits, Terminal
+from microrad.orbit.earth import EARTH_RADIUS_M, Earth
+from microrad.orbit.epoch import Epoch
+from microrad.orbit.ground import Station
+from microrad.orbit.oem import EphemerisOrbit, read_oem
+from microrad.orbit.tle import (
+    MOST_ELEMENTS_AGE_S,
+    Sgp4Orbit,
+    closest_elements,
+    read_elements,
+    sgp4_orbit,
+)
+from microrad.orbit_table import Orbits, OrbitTable, VisibilityLimits
+
+TAIL_S = 86400.0
+"""Time behind the span in which data of the span may still arrive."""
+
+
+@dataclass(frozen=True, slots=True)
+class Pair:
+    """Both terminals of the mission's link over the same Earth. `tail_s` is how far behind `span_s` the orbits hold."""
+
+    epoch: Epoch
+    earth: Earth
+    leo: Terminal
+    geo: Terminal
+    span_s: tuple[float, float]
+    tail_s: float
+
+    @property
+    def whole_s(self) -> tuple[float, float]:
+        """The span with its tail."""
+        return self.span_s[0], self.span_s[1] + self.tail_s
+
+
+def pair(m: LinkMission, folder: Path) -> Pair:
+    """The terminals of a mission with a table `orbit`; files are looked for in ``folder``.
+
+    Raises `OrbitError` for an orbit that is none, or that does not hold over the mission's span.
+    """
+    orbits = table(m)
+    epoch = Epoch.from_text(orbits.epoch)
+    names = m.terminals.called("leo"), m.terminals.called("geo")
+    if names[0] == names[1]:  # two terminals of one make
+        names = f"{names[0]} (own)", f"{names[1]} (partner)"
+    found, tail = [], TAIL_S
+    for end, name in zip(("leo", "geo"), names, strict=True):
+        try:
+            one = terminal(getattr(orbits, end), name, epoch, folder)
+            tail = min(tail, _tail(one.orbit, orbits.duration_s))
+        except OrbitError as error:
+            raise OrbitError(f"orbit.{end}: {error}") from None
+        found.append(one)
+    return Pair(epoch, earth(orbits), found[0], found[1], (0.0, orbits.duration_s), tail)
+
+
+def table(m: LinkMission) -> Orbits:
+    """The mission's table of orbits; `OrbitError` without one."""
+    if m.orbit is None:
+        raise OrbitError("the mission has no table [orbit]: microrad init writes one")
+    return m.orbit
+
+
+def earth(orbits: Orbits) -> Earth:
+    """What hides a partner."""
+    return Earth(orbits.earth, orbits.grazing_height_m)
+
+
+def _tail(orbit: Orbit, duration_s: float) -> float:
+    """How far behind the span an orbit holds; raises `OrbitError` where it does not hold over it."""
+    if not isinstance(orbit, Sgp4Orbit | EphemerisOrbit):
+        return TAIL_S
+    orbit.require(0.0, duration_s)
+    if isinstance(orbit, Sgp4Orbit):
+        return min(TAIL_S, max(MOST_ELEMENTS_AGE_S - orbit.elements_age_s - duration_s, 0.0))
+    return min(TAIL_S, max(orbit.span_s[1] - duration_s, 0.0))
+
+
+def terminal(t: OrbitTable, name: str, epoch: Epoch, folder: Path) -> Terminal:
+    """A terminal on its orbit, with what it can point at."""
+    return Terminal(orbit_of(t, name, epoch, folder), limits(t.limits), name)
+
+
+def orbit_of(t: OrbitTable, name: str, epoch: Epoch, folder: Path) -> Orbit:
+    """The orbit that a table describes; its own checks have seen to the keys."""
+    if t.kind == "geostationary":
+        assert t.longitude_rad is not None
+        return GeostationarySlot(name, epoch, t.longitude_rad)
+    if t.kind == "ephemeris":
+        assert t.file is not None
+        return read_oem(folder / t.file, epoch, t.object)
+    if t.kind == "elements":
+        assert t.file is not None
+        return sgp4_orbit(closest_elements(read_elements(folder / t.file, t.object), epoch), epoch)
+    return _kepler(t, name, epoch)
+
+
+def _kepler(t: OrbitTable, name: str, epoch: Epoch) -> KeplerOrbit:
+    assert t.inclination_rad is not None
+    if t.kind == "circular":
+        assert t.altitude_m is not None and t.phase_rad is not None
+        axis, eccentricity, perigee, anomaly = EARTH_RADIUS_M + t.altitude_m, 0.0, 0.0, t.phase_rad
+    else:
+        assert t.semi_major_axis_m is not None and t.eccentricity is not None
+        assert t.argument_of_perigee_rad is not None and t.mean_anomaly_rad is not None
+        axis, eccentricity, perigee = t.semi_major_axis_m, t.eccentricity, t.argument_of_perigee_rad
+        anomaly = t.mean_anomaly_rad
+    inclination = t.inclination_rad
+    if math.isnan(inclination):
+        inclination = sun_synchronous_inclination_rad(axis - EARTH_RADIUS_M, eccentricity)
+    node = t.node_rad
+    if node is None:
+        assert t.local_time_s is not None
+        node = node_of_local_time(epoch, t.local_time_s / 3600.0 % 24.0)
+    return KeplerOrbit(name, epoch, axis, eccentricity, inclination, node, perigee, anomaly, t.gravity == "j2")
+
+
+def limits(t: VisibilityLimits | None) -> Limits:
+    """What a terminal can point at; a key that is left out sets no limit."""
+    if t is None:
+        return UNLIMITED
+    boresight = UNLIMITED.boresight if t.boresight is None else (t.boresight[0], t.boresight[1], t.boresight[2])
+    return Limits(
+        attitude=t.attitude,
+        boresight=boresight,
+        field_of_regard_rad=math.pi if t.field_of_regard_rad is None else t.field_of_regard_rad,
+        slew_limit_rad_s=math.inf if t.slew_limit_rad_s is None else t.slew_limit_rad_s,
+        sun_exclusion_rad=0.0 if t.sun_exclusion_rad is None else t.sun_exclusion_rad,
+        in_eclipse=t.in_eclipse,
+    )
+
+
+def stations(downlink: Downlink) -> tuple[Station, ...]:
+    """The ground stations of a mission's direct downlink."""
+    return tuple(
+        Station(name, s.latitude_rad, s.longitude_rad, s.height_m, s.mask_rad) for name, s in downlink.stations.items()
+    )
+
+
+def relays(c: Constellation, m: LinkMission, epoch: Epoch) -> tuple[Terminal, ...]:
+    """The relays of a constellation, each limited as the mission's own partner is."""
+    shared = limits(table(m).geo.limits)
+    return tuple(
+        Terminal(GeostationarySlot(name, epoch, relay.longitude_rad), shared, name) for name, relay in c.relays.items()
+    )
+
+
+def satellites(c: Constellation, m: LinkMission, epoch: Epoch, folder: Path) -> Iterator[Terminal]:
+    """The satellites of a constellation, one after the other, each limited as the mission's own is.
+
+    Walker's patterns i: t/p/f: plane k of p has its node 2 pi k / p further ("star": pi k / p), and satellite j of it
+    its phase 2 pi (j p / t + f k / t) further (J. G. Walker, J. Br. Interplanet. Soc. 37, 1984).
+    """
+    shared = limits(table(m).leo.limits)
+    if c.pattern == "file":
+        assert c.file is not None
+        for elements in read_elements(folder / c.file):
+            own = sgp4_orbit(elements, epoch)
+            own.require(0.0, table(m).duration_s)
+            yield Terminal(own, shared, elements.name)
+        return
+    assert c.satellites is not None and c.planes is not None and c.phasing is not None
+    base, turn = _kepler(table(m).leo, "", epoch), 2.0 * math.pi
+    each, round_rad = c.satellites // c.planes, turn if c.pattern == "delta" else turn / 2.0
+    for plane in range(c.planes):
+        for place in range(each):
+            phase = turn * (place * c.planes + c.phasing * plane) / c.satellites
+            name = f"{plane + 1}-{place + 1}"
+            orbit = KeplerOrbit(
+                name,
+                epoch,
+                base.semi_major_axis_m,
+                base.eccentricity,
+                base.inclination_rad,
+                base.node_rad + round_rad * plane / c.planes,
+                base.argument_of_perigee_rad,
+                base.mean_anomaly_rad + phase,
+                base.j2,
+            )
+            yield Terminal(orbit, shared, name)

@@ -1,0 +1,77 @@
+"""The plan of a constellation in words, as a table in a terminal and as plain data."""
+
+from typing import Any
+
+import numpy as np
+
+from microrad.constellation import ConstellationPlan
+from microrad.report.day_words import duration, volume
+from microrad.report.tables import tables_text
+
+MOST_ROWS = 40
+"""Satellites of a table; there may be thousands."""
+COLUMNS = ("satellite", "sessions", "with data", "longest time without", "volume")
+
+
+def sentences(plan: ConstellationPlan) -> list[str]:
+    """What the plan comes to."""
+    served, gaps = plan.by_satellite.served_s, plan.by_satellite.longest_gap_s
+    seen = float(np.sum(plan.opportunities.end_s - plan.opportunities.start_s))
+    span = plan.span_s[1] - plan.span_s[0]
+    used = ", ".join(f"{name} {100 * use:.0f} %" for name, use in zip(plan.relays, plan.use, strict=True))
+    terminals = "one terminal" if plan.terminals == 1 else f"{plan.terminals} terminals"
+    return [
+        f"{len(plan.satellites)} satellites share {len(plan.relays)} relays of {terminals} each: in {duration(span)} "
+        f"{plan.opportunities.start_s.size} contacts, {seen / 3600.0:.0f} h in all, of which {len(plan.planned)} "
+        f"sessions take {float(np.sum(plan.by_satellite.busy_s)) / 3600.0:.0f} h and carry {volume(plan.volume_bit)}.",
+        f"A satellite has data for {duration(float(np.min(served)))} to {duration(float(np.max(served)))}, and waits "
+        f"{duration(float(np.max(gaps)))} at most. Terminals in use: {used}.",
+    ]
+
+
+def rows(plan: ConstellationPlan) -> list[tuple[str, ...]]:
+    """What each satellite gets, as text."""
+    t = plan.by_satellite
+    bits = satellite_bits(plan)
+    return [
+        (name, str(int(t.sessions[k])), duration(t.served_s[k]), duration(t.longest_gap_s[k]), volume(bits[k]))
+        for k, name in enumerate(plan.satellites)
+    ]
+
+
+def satellite_bits(plan: ConstellationPlan) -> list[float]:
+    """Volume of each satellite, by its sessions' own rates."""
+    bits = np.zeros(len(plan.satellites))
+    np.add.at(bits, plan.sessions.satellite, [one.volume_bit for one in plan.planned])
+    return [float(bit) for bit in bits]
+
+
+def text(plan: ConstellationPlan, width: int) -> str:
+    """Sentences and a table of at most ``width`` columns."""
+    found, shown = rows(plan), sentences(plan)
+    if len(found) > MOST_ROWS:
+        shown.append(f"The first {MOST_ROWS} of {len(found)} satellites; --csv has every session.")
+    return tables_text([("What each satellite gets", COLUMNS, found[:MOST_ROWS])], shown, width)
+
+
+def data(plan: ConstellationPlan) -> dict[str, Any]:
+    """The plan as plain data, in SI units with the unit in each key."""
+    by, bits = plan.by_satellite, satellite_bits(plan)
+    return {
+        "epoch": plan.epoch.text,
+        "duration_s": plan.span_s[1] - plan.span_s[0],
+        "contacts": int(plan.opportunities.start_s.size),
+        "sessions": len(plan.planned),
+        "volume_bit": plan.volume_bit,
+        "relays": [{"name": n, "use": float(u)} for n, u in zip(plan.relays, plan.use, strict=True)],
+        "satellites": [
+            {
+                "name": name,
+                "sessions": int(by.sessions[k]),
+                "with_data_s": float(by.served_s[k]),
+                "longest_gap_s": float(by.longest_gap_s[k]),
+                "volume_bit": bits[k],
+            }
+            for k, name in enumerate(plan.satellites)
+        ],
+    }

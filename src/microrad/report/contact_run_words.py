@@ -1,0 +1,96 @@
+"""One contact in time, in words, as rows of text and as plain data."""
+
+from typing import Any
+
+from microrad.contact_run import DATA, LOCK, ContactRun
+from microrad.report.day_words import duration, volume
+from microrad.report.quantities import quantity
+
+WINDOW_HEADINGS = (
+    "since rise (min)",
+    "range (km)",
+    "point-ahead (µrad)",
+    "rate (µrad/s)",
+    "rms (µrad)",
+    "99.7 % (µrad)",
+    "largest (µrad)",
+    "lowest margin (dB)",
+    "below 0 dB",
+)
+
+
+def sentences(run: ContactRun, number: int, controller: str, rate_bit_s: float) -> list[str]:
+    """How the contact went."""
+    c, spent = run.contact, run.seconds
+    length = c.end_s - c.start_s
+    if run.data_s == 0.0:
+        return [f"Contact {number} of {duration(length)} never comes to data: {run.log[-1].cause}."]
+    before = run.first_data_s - c.start_s
+    lost = "lock is never lost in them" if not run.losses else f"lock is lost {_times(run.losses)} in them"
+    carried = f"{volume(run.bits(rate_bit_s))} at {quantity(rate_bit_s, 'bit/s')}"
+    return [
+        f"Contact {number} ({duration(length)}) under {controller}: data begin {quantity(before, 's')} after the rise, "
+        f"{quantity(spent[LOCK], 's')} of it to lock, and flow for {duration(spent[DATA])}, "
+        f"{100 * run.data_share:.1f} % of the contact: {carried}. The fine loop is simulated in {len(run.windows)} "
+        f"windows, {duration(run.sampled_s)} in all, with the point-ahead and the rate of the line of sight of each; "
+        f"{lost}."
+    ]
+
+
+def _times(count: int) -> str:
+    return "once" if count == 1 else f"{count} times"
+
+
+def window_headings(quantile: float) -> tuple[str, ...]:
+    """Headings of the windows; the quantile is the mission's."""
+    return tuple(h.replace("99.7 %", f"{100 * quantile:g} %") for h in WINDOW_HEADINGS)
+
+
+def window_rows(run: ContactRun) -> list[tuple[str, ...]]:
+    """The windows as text."""
+    return [
+        (
+            f"{(w.start_s - run.contact.start_s) / 60.0:.2f}",
+            f"{w.range_m / 1e3:.0f}",
+            f"{w.point_ahead_rad * 1e6:.1f}",
+            f"{w.rate_rad_s * 1e6:.0f}",
+            f"{w.rms_rad * 1e6:.2f}",
+            f"{w.quantile_rad * 1e6:.2f}",
+            f"{w.largest_rad * 1e6:.2f}",
+            f"{w.lowest_margin_db:+.2f}".replace("-", "\u2212"),
+            f"{100 * w.share_below:.2g} %",
+        )
+        for w in run.windows
+    ]
+
+
+def log_rows(run: ContactRun) -> list[tuple[str, ...]]:
+    """The transitions as text, in seconds since the rise."""
+    begin = run.contact.start_s
+    return [(f"{t.time_s - begin:.3f} s".replace("-", "\u2212"), t.state, t.to, t.cause) for t in run.log]
+
+
+def data(run: ContactRun) -> dict[str, Any]:
+    """The run as plain data, in SI units with the unit in each key."""
+    return {
+        "start_s": run.contact.start_s,
+        "end_s": run.contact.end_s,
+        "seconds_in_state": run.seconds,
+        "losses": run.losses,
+        "log": [{"time_s": t.time_s, "state": t.state, "to": t.to, "cause": t.cause} for t in run.log],
+        "windows": [
+            {
+                "start_s": w.start_s,
+                "seconds": w.seconds,
+                "range_m": w.range_m,
+                "point_ahead_rad": w.point_ahead_rad,
+                "rate_rad_s": w.rate_rad_s,
+                "rms_rad": w.rms_rad,
+                "quantile_rad": w.quantile_rad,
+                "largest_rad": w.largest_rad,
+                "lowest_margin_db": w.lowest_margin_db,
+                "share_below_0_db": w.share_below,
+            }
+            for w in run.windows
+        ],
+    }

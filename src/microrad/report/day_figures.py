@@ -1,0 +1,300 @@
+"""Figures of a day in orbit: contacts, what one of them asks of the terminals, data and delay."""
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from matplotlib import rc_context
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure as Canvas
+
+from microrad.report.figures import BLACK, BLUE, GREEN, ORANGE, SKY, STYLE, VERMILION, Figure, Floats, svg_of, thin
+
+Curves = Mapping[str, tuple[Floats, Floats]]  # name: abscissa (n,), ordinate (n,)
+
+# Names come from the mission file: a dollar sign in one is no mathematics.
+PLAIN: dict[Any, Any] = {**STYLE, "text.parse_math": False}
+GREY = "#777777"
+_COLOURS = (BLUE, ORANGE, GREEN, SKY, VERMILION, GREY)
+_DASHES = ("-", "--", "-.", ":")
+WIDTH = 7.6
+_NONE = np.empty(0)
+_IN_GREY: dict[str, Any] = {"ha": "center", "va": "center", "color": GREY}
+_STATES = {"data": BLUE, "loss": VERMILION}  # the other states take the colours that are left
+_TICKS_S = {0.1: "0.1 s", 1.0: "1 s", 10.0: "10 s", 60.0: "1 min", 600.0: "10 min", 3600.0: "1 h", 2.16e4: "6 h"}
+_TICKS_S |= {8.64e4: "1 d", 6.048e5: "7 d"}
+_HOURS = (0.1, 0.25, 0.5, 1.0, 2.0, 3.0, 4.0, 6.0, 12.0, 24.0, 48.0, 96.0, 168.0)
+
+
+class Windows(NamedTuple):
+    """Radial pointing error in the sampled windows of a contact, each (n,): middle (s), rms (rad), largest (rad)."""
+
+    time_s: Floats
+    rms_rad: Floats
+    largest_rad: Floats
+
+
+def short(name: str, most: int = 34) -> str:
+    """The name as it stands in a figure: on one line, and cut where it would leave no room for the data."""
+    plain = " ".join("".join(c if c.isprintable() else " " for c in name).split())
+    return plain if len(plain) <= most else plain[: most - 1] + "…"
+
+
+def duration(time_s: float) -> str:
+    """A length of time in the unit that reads best."""
+    for unit_s, unit in ((3600.0, "h"), (60.0, "min")):
+        if abs(time_s) >= 2.0 * unit_s:
+            return f"{time_s / unit_s:.3g} {unit}"
+    return f"{time_s:.3g} s"
+
+
+def empty(words: str) -> str:
+    """A picture that says why there is nothing to see, as SVG text."""
+    canvas = Canvas(figsize=(WIDTH, 0.9))
+    canvas.text(0.5, 0.5, words, **_IN_GREY)
+    return svg_of(canvas)
+
+
+# ------------------------------------------------------------------------------------------------ bars over time
+
+
+@rc_context(PLAIN)
+def timeline(rows: Sequence[tuple[str, Floats]], span_s: tuple[float, float], epoch_label: str) -> Figure:
+    """Intervals, one row for each name: an array (n, 2) of begins and ends in seconds since the epoch.
+
+    Rows whose names agree up to a colon ("direct: Kiruna") have one colour. Beside each row: how many, and their sum.
+    """
+    svg = _timeline(rows, span_s, epoch_label) if rows else empty("no contacts and no eclipses to show")
+    caption = (
+        f"From {span_s[0] / 3600.0:g} h to {span_s[1] / 3600.0:g} h after {epoch_label}. "
+        "At the right of each row: how many intervals, and how long they are together."
+    )
+    columns = {} if rows else {"start (s)": _NONE, "end (s)": _NONE}
+    for name, intervals in rows:
+        columns[f"{name}, start (s)"], columns[f"{name}, end (s)"] = np.reshape(intervals, (-1, 2)).T
+    return Figure("day-timeline", "Contacts over time", caption, svg, columns)
+
+
+def _timeline(rows: Sequence[tuple[str, Floats]], span_s: tuple[float, float], epoch_label: str) -> str:
+    canvas = Canvas(figsize=(WIDTH, 0.8 + 0.27 * len(rows)), layout="constrained")
+    axes = canvas.subplots()
+    kinds = [*dict.fromkeys(name.split(":")[0] for name, _ in rows)]
+    _bars(axes, rows, [_COLOURS[kinds.index(name.split(":")[0]) % len(_COLOURS)] for name, _ in rows], 3600.0)
+    axes.set_xticks(_hours(*span_s))
+    axes.set_xlim(span_s[0] / 3600.0, span_s[1] / 3600.0)
+    axes.set_xlabel(f"hours since {epoch_label}")
+    return svg_of(canvas)
+
+
+def _bars(axes: Axes, rows: Sequence[tuple[str, Floats]], colours: Sequence[str], unit_s: float) -> None:
+    """A row of bars for each name, the first on top; a bar too short to see keeps the width of its edge."""
+    for row, ((_, intervals), colour) in enumerate(zip(rows, colours, strict=True)):
+        start_s, end_s = np.reshape(intervals, (-1, 2)).T
+        bars = [*zip(start_s / unit_s, (end_s - start_s) / unit_s, strict=True)]
+        axes.broken_barh(bars, (row - 0.34, 0.68), facecolor=colour, edgecolor=colour, linewidth=0.5)
+        words = f"{len(bars)} · {duration(float(np.sum(end_s - start_s)))}" if bars else "none"
+        style: dict[str, Any] = {"textcoords": "offset points", "va": "center", "color": BLACK if bars else GREY}
+        axes.annotate(words, (1, row), (5, 0), axes.get_yaxis_transform(), **style)
+    axes.set_yticks(range(len(rows)), [short(name) for name, _ in rows])
+    axes.set_ylim(len(rows) - 0.4, -0.6)
+    axes.grid(visible=False, axis="y")
+
+
+def _hours(start_s: float, end_s: float) -> Floats:
+    """Round hours over the span, about ten of them."""
+    first, last = start_s / 3600.0, end_s / 3600.0
+    step = next((s for s in _HOURS if last - first <= 12.0 * s), (last - first) / 10.0)
+    return np.arange(math.ceil(first / step - 1e-9), math.floor(last / step + 1e-9) + 1).astype(np.float64) * step
+
+
+@rc_context(PLAIN)
+def contact_run(
+    states: Sequence[tuple[str, float, float]], windows: Windows, required_rad: float | None = None
+) -> Figure:
+    """States of a simulated contact as (name, begin, end) in seconds, above the pointing error in sampled windows."""
+    names = [*dict.fromkeys(name for name, _, _ in states)]
+    rows = [(name, np.array([[a, b] for which, a, b in states if which == name])) for name in names]
+    svg = _contact_run(rows, windows, required_rad) if rows else empty("no contact was run")
+    caption = (
+        "States of the terminal, one row each; at the right how often and how long in all. "
+        "Below: radial pointing error in the windows that were simulated in full."
+    )
+    columns = {f"{name}, start (s)": at[:, 0] for name, at in rows} | {
+        f"{name}, end (s)": at[:, 1] for name, at in rows
+    }
+    columns |= {"window (s)": windows.time_s, "rms (rad)": windows.rms_rad, "largest (rad)": windows.largest_rad}
+    return Figure("contact-run", "A contact, simulated", caption, svg, columns)
+
+
+def _contact_run(rows: Sequence[tuple[str, Floats]], windows: Windows, required_rad: float | None) -> str:
+    high, low = 0.24 * len(rows), 1.7 if windows.time_s.size else 0.5
+    canvas = Canvas(figsize=(WIDTH, 1.3 + high + low), layout="constrained")
+    above, below = canvas.subplots(2, 1, sharex=True, height_ratios=(high, low))
+    spare = [colour for colour in _COLOURS if colour not in _STATES.values()]
+    others = [name for name, _ in rows if name not in _STATES]
+    colours = [_STATES[name] if name in _STATES else spare[others.index(name) % len(spare)] for name, _ in rows]
+    _bars(above, rows, colours, 60.0)
+    everything = np.concatenate([at for _, at in rows]) / 60.0
+    above.set_xlim(everything.min(), everything.max())
+    if windows.time_s.size:
+        _errors(below, windows, required_rad)
+        canvas.legend(*below.get_legend_handles_labels(), loc="outside lower center", ncols=3, fontsize=8)
+    else:
+        below.set(yticks=[])
+        below.text(0.5, 0.5, "no window was simulated in full", transform=below.transAxes, **_IN_GREY)
+    below.set_xlabel("time since the start of the contact (min)")
+    return svg_of(canvas)
+
+
+def _errors(axes: Axes, windows: Windows, required_rad: float | None) -> None:
+    minutes = windows.time_s / 60.0
+    axes.plot(minutes, windows.largest_rad * 1e6, "^", color=VERMILION, markersize=4.5, label="largest")
+    axes.plot(minutes, windows.rms_rad * 1e6, "o", color=BLUE, markersize=4.5, label="rms")
+    if required_rad is not None:
+        label = f"required: {required_rad * 1e6:g} µrad"
+        axes.axhline(required_rad * 1e6, color=BLACK, linestyle="--", linewidth=1.0, label=label)
+    found = np.concatenate([windows.largest_rad, windows.rms_rad])
+    positive = found[np.isfinite(found) & (found > 0.0)]
+    if positive.size and positive.max() > 50.0 * np.median(positive):
+        axes.set_yscale("log")
+        axes.yaxis.set_major_formatter("{x:g}")
+    else:
+        axes.set_ylim(bottom=0.0)
+    axes.set_ylabel("radial error (µrad)")
+
+
+# ------------------------------------------------------------------------------------------------ along a contact
+
+
+@rc_context(PLAIN)
+def along_contact(
+    time_s: Floats, range_m: Floats, point_ahead_rad: Floats, rate_rad_s: Floats, doppler_hz: Floats
+) -> Figure:
+    """What one contact asks of the terminals, each (n,), over the time since its rise."""
+    panels = {
+        "range (m)": ("range (km)", range_m, 1e-3),
+        "point-ahead (rad)": ("point-ahead angle (µrad)", point_ahead_rad, 1e6),
+        "line-of-sight rate (rad/s)": ("line-of-sight rate (µrad/s)", rate_rad_s, 1e6),
+        "Doppler (Hz)": ("Doppler shift (GHz)", doppler_hz, 1e-9),
+    }
+    svg = _along_contact(time_s / 60.0, [*panels.values()]) if time_s.size else empty("no contact in this span")
+    columns = {"time since rise (s)": time_s} | {heading: values for heading, (_, values, _) in panels.items()}
+    caption = "Range, point-ahead angle, inertial rate of the line of sight and Doppler shift over one contact."
+    return Figure("along-contact", "Along a contact", caption, svg, columns)
+
+
+def _along_contact(minutes: Floats, panels: Sequence[tuple[str, Floats, float]]) -> str:
+    canvas = Canvas(figsize=(WIDTH, 4.4), layout="constrained")
+    grid = canvas.subplots(2, 2, sharex=True)
+    for axes, (label, values, factor) in zip(grid.ravel(), panels, strict=True):
+        axes.plot(*thin(minutes, values * factor), color=BLUE)
+        axes.ticklabel_format(useOffset=False, style="plain")
+        axes.set_ylabel(label)
+        if values.min() < 0.0 < values.max():
+            axes.axhline(0.0, color=GREY, linewidth=0.8)
+    grid[0, 0].set_xlim(0.0, max(float(minutes[-1]), 1e-3))
+    for axes in grid[1]:
+        axes.set_xlabel("time since rise (min)")
+    return svg_of(canvas)
+
+
+# ------------------------------------------------------------------------------------------------ data and delay
+
+
+@rc_context(PLAIN)
+def volume(cumulative: Curves, stored: Curves) -> Figure:
+    """Data over time: generated and delivered since the start above, stored on board below; a name has one colour.
+
+    Each curve is a pair of arrays (n,): seconds since the epoch, and bits.
+    """
+    both = {"since the start": cumulative, "stored": stored}
+    some = any(time_s.size for curves in both.values() for time_s, _ in curves.values())
+    svg = _volume(cumulative, stored) if some else empty("no data were generated")
+    columns: dict[str, Floats] = {} if cumulative or stored else {"time (s)": _NONE, "volume (bit)": _NONE}
+    for what, curves in both.items():
+        for name, (time_s, bits) in curves.items():
+            columns |= {f"{name}, {what}, time (s)": time_s, f"{name}, {what} (bit)": bits}
+    caption = "Above: data generated and delivered since the start. Below: what waits on board for its way down."
+    return Figure("data-volume", "Data generated, delivered and stored", caption, svg, columns)
+
+
+def _volume(cumulative: Curves, stored: Curves) -> str:
+    canvas = Canvas(figsize=(WIDTH, 4.8), layout="constrained")
+    panels = canvas.subplots(2, 1, sharex=True, height_ratios=(1.4, 1))
+    names = [*dict.fromkeys([*cumulative, *stored])]
+    for axes, curves, what in zip(panels, (cumulative, stored), ("since the start", "stored on board"), strict=True):
+        factor, unit = _bytes(bits for _, bits in curves.values())
+        for name, (time_s, bits) in curves.items():
+            drawn = thin(time_s / 3600.0, bits / 8.0 * factor)
+            axes.plot(*drawn, label=short(name), **_line_style(names.index(name)))
+        axes.set_ylabel(f"{what} ({unit})")
+        axes.set_ylim(bottom=-0.02 * axes.get_ylim()[1])  # a curve that stays at zero can be seen
+    ends = [time_s[place] for time_s, _ in (*cumulative.values(), *stored.values()) if time_s.size for place in (0, -1)]
+    panels[1].set_xticks(_hours(min(ends), max(ends)))
+    panels[1].set_xlim(min(ends) / 3600.0, max(ends) / 3600.0)
+    panels[1].set_xlabel("time (h)")
+    entries = {label: h for axes in panels for h, label in zip(*axes.get_legend_handles_labels(), strict=True)}
+    canvas.legend(entries.values(), entries.keys(), loc="outside upper center", ncols=4, fontsize=8)
+    return svg_of(canvas)
+
+
+def _line_style(place: int) -> dict[str, Any]:
+    """Black for the first curve, then the palette; the dashes differ too."""
+    colours = (BLACK, *_COLOURS)
+    return {"color": colours[place % len(colours)], "linestyle": _DASHES[place % 4], "linewidth": 1.5}
+
+
+def _bytes(several: Iterable[Floats]) -> tuple[float, str]:
+    """Factor from bytes, and the unit in which the largest is a number of one to three digits."""
+    most = max((float(np.max(bits, initial=0.0)) / 8.0 for bits in several), default=0.0)
+    power = min(max(int(math.log10(most) // 3), 0), 5) if most > 0.0 else 0
+    return 10.0 ** (-3 * power), ("byte", "kB", "MB", "GB", "TB", "PB")[power]
+
+
+def reached_s(latency_s: Floats, share: Floats, wanted: float) -> float:
+    """Latency (s) within which the wanted share has arrived; infinite where it never does."""
+    if not share.size or share[-1] < wanted:
+        return math.inf
+    return float(np.interp(wanted, share, latency_s))
+
+
+@rc_context(PLAIN)
+def latency(curves: Curves) -> Figure:
+    """Share of the data delivered within a latency: pairs of (n,), seconds and shares of one, both rising.
+
+    The axis is logarithmic: a relay takes seconds, a wait for the next station hours.
+    """
+    columns: dict[str, Floats] = {} if curves else {"latency (s)": _NONE, "share": _NONE}
+    for name, (latency_s, share) in curves.items():
+        columns |= {f"{name}, latency (s)": latency_s, f"{name}, share": share}
+    some = any(np.any((latency_s > 0.0) & (share > 0.0)) for latency_s, share in curves.values())
+    svg = _latency(curves) if some else empty("nothing was delivered")
+    caption = "Share of the data that has arrived within a time after it was recorded. Circle: median. Diamond: 99 %."
+    return Figure("latency", "From recording to delivery", caption, svg, columns)
+
+
+def _latency(curves: Curves) -> str:
+    canvas = Canvas(figsize=(WIDTH, 3.6), layout="constrained")
+    axes = canvas.subplots()
+    for place, (name, (latency_s, share)) in enumerate(curves.items()):
+        median_s, most_s = (reached_s(latency_s, share, wanted) for wanted in (0.5, 0.99))
+        words = ", ".join(f"{q} {duration(s)}" for q, s in (("median", median_s), ("99 %", most_s)) if s < math.inf)
+        if most_s == math.inf:
+            words += f"{', ' if words else ''}{100.0 * float(np.max(share, initial=0.0)):.3g} % arrive"
+        style = _line_style(place + 1)
+        axes.plot(latency_s, 100.0 * share, label=f"{short(name)}: {words}", **style)
+        axes.plot([median_s], [50.0], "o", [most_s], [99.0], "D", color=style["color"], clip_on=False, zorder=3)
+    shown = np.concatenate([each[(share > 0.0) & (each > 0.0)] for each, share in curves.values()])
+    _latency_axes(axes, float(shown.min()), float(shown.max()))
+    canvas.legend(loc="outside upper center", ncols=1, fontsize=8)
+    return svg_of(canvas)
+
+
+def _latency_axes(axes: Axes, least_s: float, most_s: float) -> None:
+    for level in (50.0, 99.0):
+        axes.axhline(level, color=GREY, linewidth=0.7, linestyle=":")
+    axes.set(xscale="log", xlabel="time from recording to delivery", ylabel="share of the data (%)", ylim=(0.0, 101.0))
+    axes.set_xlim(max(least_s / 1.5, most_s * 1e-7), most_s * 1.5)
+    axes.set_xticks([*_TICKS_S], [*_TICKS_S.values()])
+    axes.minorticks_off()

@@ -1,0 +1,112 @@
+"""The figures of a day: from its study to what is drawn."""
+
+from itertools import pairwise
+
+import numpy as np
+
+from microrad import orbit
+from microrad.contact_run import ContactRun
+from microrad.day_study import DayStudy, Way, times
+from microrad.day_study.ground_track import Outline, ground_track
+from microrad.report import day_assumptions, day_figures, day_map
+from microrad.report.figures import Figure, Floats
+
+_SHARES = 400  # points of a distribution
+
+
+def draw(day: DayStudy, run: ContactRun | None = None) -> tuple[Figure, ...]:
+    """Every figure of a day; ``run`` is one of its contacts, simulated."""
+    found = [_timeline(day), *_along(day), _volume(day), _latency(day), _map(day), _assumptions(day)]
+    return tuple(found if run is None else [*found, _run(day, run)])
+
+
+def _ways(day: DayStudy) -> tuple[Way, ...]:
+    return (day.relay,) if day.direct is None else (day.relay, day.direct)
+
+
+def _timeline(day: DayStudy) -> Figure:
+    span = day.view.pair.span_s
+    rows = [(day.relay.name, _bars(day.relay.contacts, span[1]))]
+    if day.direct is not None:
+        for station in dict.fromkeys(day.direct.stations):
+            own = tuple(c for c, s in zip(day.direct.contacts, day.direct.stations, strict=True) if s == station)
+            rows.append((f"direct: {station}", _bars(own, span[1])))
+    rows.append((f"eclipse of {day.view.pair.leo.name}", day.view.umbra_s))
+    return day_figures.timeline(rows, span, day.view.pair.epoch.text)
+
+
+def _bars(contacts: tuple[orbit.Contact, ...], end_s: float) -> Floats:
+    return np.array([(c.start_s, min(c.end_s, end_s)) for c in contacts]).reshape(-1, 2)
+
+
+def _along(day: DayStudy) -> list[Figure]:
+    """The longest contact of the span."""
+    if not day.view.encounters:
+        return []
+    contact = max((e.contact for e in day.view.encounters), key=lambda c: c.duration_s)
+    pair = day.view.pair
+    seen = orbit.sight(pair.leo.orbit, pair.geo.orbit, times(contact))
+    doppler = seen.doppler_hz(day.mission.communication.wavelength_m)
+    return [day_figures.along_contact(seen.time_s, seen.range_m, seen.point_ahead_rad, seen.rate_rad_s, doppler)]
+
+
+def _volume(day: DayStudy) -> Figure:
+    history = day.relay.history
+    cumulative = {"made by the instrument": (history.time_s, history.generated_bit)}
+    stored = {}
+    for way in _ways(day):
+        cumulative[way.name] = way.history.time_s, way.history.delivered_bit
+        stored[way.name] = way.history.time_s, way.history.stored_bit
+    return day_figures.volume(cumulative, stored)
+
+
+def _latency(day: DayStudy) -> Figure:
+    return day_figures.latency({way.name: _distribution(way) for way in _ways(day)})
+
+
+def _distribution(way: Way) -> tuple[Floats, Floats]:
+    """Latency and the share of the data that arrived within it: at its own bends, and evenly between."""
+    bends = np.concatenate((way.latency.first_s, way.latency.last_s, np.zeros(1)))
+    latency_s = np.unique(np.concatenate((bends, np.linspace(0.0, float(np.max(bends)), _SHARES))))
+    kept = np.unique(latency_s[:: max(latency_s.size // (4 * _SHARES), 1)])
+    return kept, way.latency.cdf(kept)
+
+
+def _map(day: DayStudy) -> Figure:
+    o = day.mission.operations
+    track = ground_track(day.view, _ways(day), None if o is None else o.downlink)
+    places = day_map.Places(track.latitude_rad, track.longitude_rad)
+    return day_map.world_map(
+        places, track.open, dict([_marked(track.relay)]), dict(_marked(station) for station in track.stations)
+    )
+
+
+def _marked(each: Outline) -> tuple[str, day_map.Marked]:
+    place = day_map.Places(np.array([each.latitude_rad]), np.array([each.longitude_rad]))
+    return each.name, day_map.Marked(place, day_map.Places(each.around_latitude_rad, each.around_longitude_rad))
+
+
+def _assumptions(day: DayStudy) -> Figure:
+    direct = day.direct is not None
+    bars = [
+        day_assumptions.Assumed(
+            f"{s.name}: {s.low} / {s.high}",
+            s.at_low.ratio if direct else s.at_low.relay_bit / 8e12,
+            s.at_high.ratio if direct else s.at_high.relay_bit / 8e12,
+        )
+        for s in day.swings
+    ]
+    if direct:
+        return day_assumptions.assumptions(bars, day.ratio, "volume by the relay over volume of the direct downlink")
+    return day_assumptions.assumptions(bars, day.relay.capacity_bit / 8e12, "volume by the relay (TB)")
+
+
+def _run(day: DayStudy, run: ContactRun) -> Figure:
+    begin = run.contact.start_s
+    states = [(a.to, a.time_s - begin, b.time_s - begin) for a, b in pairwise(run.log) if b.time_s > a.time_s]
+    windows = day_figures.Windows(
+        np.array([w.start_s + w.seconds / 2.0 - begin for w in run.windows]),
+        np.array([w.rms_rad for w in run.windows]),
+        np.array([w.largest_rad for w in run.windows]),
+    )
+    return day_figures.contact_run(states, windows, day.mission.requirement.pointing_error_rad)

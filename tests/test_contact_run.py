@@ -1,0 +1,682 @@
+"""One contact in the time domain: its order, the fine loop in its windows, loss of lock, and what is refused."""
+
+import math
+import re
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from microrad import acquisition, contact_run, control, fine_pointing, kernels, link, link_study
+from microrad.contact_run import Contact, MovingReference, Sampler, Settings, Sight, plan
+from microrad.contact_run.windows import first_run
+from microrad.disturbance import Reference
+from microrad.fine_loop import ensemble
+from microrad.fine_loop.loop import assemble
+from microrad.fine_pointing import designs
+from microrad.missionfile import LinkFile, load_mission
+from shipped import SHIPPED, edited_file
+
+C_M_S = 299_792_458.0
+LEO_M, GEO_M, EARTH_M, MU = 6_878_137.0, 42_164_170.0, 6_378_137.0, 3.986004418e14
+LIMB = "the Earth's limb"
+STRONG, HARD = (800, 10), (1000, 30)  # takes the lock from some windows; from every one
+FIRST = ["slew", "beacon", "detect", "answer", "lock", "data"]
+SHAKEN = 'spectrum = "first-order"\nlevel = "{} urad^2/Hz"\ncorner = "{} Hz"'
+
+
+def coplanar(time_s):
+    """The line of sight of two circular orbits in one plane, aligned at time 0."""
+    radius = np.array([LEO_M, GEO_M])
+    turn = np.sqrt(MU / radius**3)
+    angle = turn[:, None] * time_s
+    place = radius[:, None] * np.array([np.cos(angle), np.sin(angle)])
+    speed = (radius * turn)[:, None] * np.array([-np.sin(angle), np.cos(angle)])
+    between, moving = place[:, 1] - place[:, 0], speed[:, 1] - speed[:, 0]
+    range_m = np.hypot(*between)
+    rate = np.abs(between[0] * moving[1] - between[1] * moving[0]) / range_m**2
+    return Sight(range_m, rate, 2.0 * rate * range_m / C_M_S)
+
+
+HALF_S = (math.acos(EARTH_M / LEO_M) + math.acos(EARTH_M / GEO_M)) / (
+    math.sqrt(MU / LEO_M**3) - math.sqrt(MU / GEO_M**3)
+)
+
+
+def steady(range_m=42e6, rate_rad_s=100e-6, point_ahead_rad=30e-6):
+    """A line of sight that does not change."""
+    return lambda time_s: Sight(*(np.full(np.shape(time_s), v) for v in (range_m, rate_rad_s, point_ahead_rad)))
+
+
+def contact(start_s=1000.0, length_s=600.0, geometry=None, free_from_s=0.0):
+    return Contact(start_s, start_s + length_s, LIMB, "eclipse of LEO", free_from_s, geometry or steady())
+
+
+def settings(**changes):
+    given = {"slew_angle_rad": 1.0, "slew_rate_rad_s": 0.01, "windows": 3, "window_s": 0.4, "settle_s": 0.2}
+    return Settings(**{**given, "hold_s": 0.01, "seed": 1, **changes})
+
+
+def links(file):
+    return link_study.run(LinkFile(file.mission, file.path, file.text, file.sha256, file.sources))
+
+
+@pytest.fixture(scope="module")
+def file():
+    return load_mission(SHIPPED)
+
+
+@pytest.fixture(scope="module")
+def scene(file):
+    return fine_pointing.scene(file)
+
+
+@pytest.fixture(scope="module")
+def design(file, scene):
+    """The PI controller of the grid, for the nominal mirror alone: made in half a second."""
+    tuned = designs.grid_baseline(designs.plants(scene, file.mission, 1)[:1], control.Specification(0.5))
+    return fine_pointing.Design("PI", tuned, assemble("PI", scene.loop, tuned.controller))
+
+
+@pytest.fixture(scope="module")
+def finding(file):
+    return links(file).finding
+
+
+@pytest.fixture(scope="module")
+def run(file, scene, design, finding):
+    """A contact of the shipped mission, or of another scene or way to find the partner."""
+
+    def made(of, how, *, scene=scene, finding=finding, mission=file.mission):
+        return contact_run.run(mission, finding, scene, design, of, how)
+
+    return made
+
+
+@pytest.fixture(scope="module")
+def shaken(tmp_path_factory):
+    """The mission's scene under a strong vibration, by its level (µrad²/Hz) and corner (Hz)."""
+
+    def made(level, corner_hz):
+        text = SHAKEN.format(level, corner_hz)
+        folder = tmp_path_factory.mktemp("shaken")
+        return fine_pointing.scene(edited_file(folder, ('\nspectrum = "olympus"', "\n" + text), whole=True))
+
+    return made
+
+
+@pytest.fixture
+def sampler(file, scene, design):
+    def made(of=None, how=None, mission=None, scene=scene):
+        return Sampler(mission or file.mission, scene.loop, design.controller, of or contact(), how or settings())
+
+    return made
+
+
+@pytest.fixture(scope="module")
+def whole(run):
+    """A whole contact between two orbits in one plane."""
+    of = Contact(-HALF_S, HALF_S, LIMB, LIMB, -HALF_S - 1000.0, coplanar)
+    return run(of, settings(windows=8, window_s=1.0))
+
+
+def route(log):
+    """The states in their order, the first one left out; failures and stages within one state once."""
+    to = [entry.to for entry in log]
+    return [state for i, state in enumerate(to) if i == 0 or state != to[i - 1]]
+
+
+def check_order(found):
+    """Each transition leaves the state that the one before has led to, in the order of time, and says why."""
+    assert found.log[0].state == "idle"
+    for before, after in pairwise(found.log):
+        assert before.to == after.state
+        assert before.time_s <= after.time_s
+    assert [entry.to for entry in found.log].count("end") == 1
+    assert found.log[-1].to == "end"
+    assert all(entry.cause for entry in found.log)
+    ends = found.log[-1].time_s - found.log[0].time_s
+    assert sum(found.seconds.values()) == pytest.approx(ends, abs=1e-9)
+    assert tuple(found.seconds) == contact_run.STATES
+
+
+# ------------------------------------------------------------------------------------------------- a whole contact
+def test_a_contact_goes_from_the_slew_to_data_and_ends_with_its_cause(whole, finding):
+    check_order(whole)
+    assert route(whole.log) == [*FIRST, "end"]
+    assert whole.log[0].time_s == pytest.approx(-HALF_S - 100.0)
+    assert whole.log[0].cause == "1 rad at 10 mrad/s, so that the slew ends when the contact begins"
+    assert (whole.log[1].time_s, whole.log[1].cause) == (pytest.approx(-HALF_S), f"the contact begins: {LIMB}")
+    assert (whole.log[-1].time_s, whole.log[-1].cause) == (pytest.approx(HALF_S), f"the contact ends: {LIMB}")
+    assert [entry.cause for entry in whole.log[2:-1]] == [
+        "beacon travels: done",
+        "GEO detects: done",
+        "LEO detects the answer: done",
+        "LEO locks: done",
+    ]
+    assert whole.first_data_s == pytest.approx(-HALF_S + finding.wide.log[-1].time_s)  # the same seed
+    assert whole.data_s == pytest.approx(HALF_S - whole.first_data_s)
+    assert whole.data_share == pytest.approx(whole.data_s / (2 * HALF_S))
+    assert (whole.losses, whole.losses_per_s, whole.share_below) == (0, 0.0, 0.0)
+    assert whole.bits(300e6) == pytest.approx(300e6 * whole.data_s)
+    assert 58.1 < 2 * HALF_S / 60 < 58.2  # minutes
+
+
+def test_windows_spread_from_lock_to_the_end_over_the_geometry_of_their_moment(whole):
+    begins = np.array([w.start_s for w in whole.windows])
+    assert_allclose(begins, np.linspace(whole.first_data_s, HALF_S - 1.0, 8), rtol=0, atol=1e-9)
+    at = coplanar(begins)
+    assert_allclose([w.range_m for w in whole.windows], at.range_m, rtol=1e-12)
+    assert_allclose([w.rate_rad_s for w in whole.windows], at.rate_rad_s, rtol=1e-9)
+    assert_allclose([w.point_ahead_rad for w in whole.windows], at.point_ahead_rad, rtol=1e-9)
+    for w in whole.windows:
+        assert (w.seconds, w.loss, w.radial_rad.size) == (pytest.approx(1.0), None, 5000)
+        assert_allclose(w.time_s, w.start_s + 2e-4 * np.arange(5000), rtol=0, atol=1e-9)
+        assert w.rms_rad == pytest.approx(math.sqrt(np.mean(w.radial_rad**2)))
+        assert w.quantile_rad == pytest.approx(np.quantile(w.radial_rad, 0.997))
+        assert w.largest_rad == np.max(w.radial_rad) > w.quantile_rad > w.rms_rad
+        assert w.lowest_margin_db == np.min(w.margin_db)
+    assert whole.sampled_s == pytest.approx(8.0)
+
+
+def test_the_margin_follows_the_range_and_the_error(whole, file):
+    """The budget at the range of a sample and at its error."""
+    for w in (whole.windows[0], whole.windows[4]):
+        for k in (0, 1234, 4999):
+            beam = file.mission.communication.model_copy(
+                update={"distance_m": float(coplanar(w.time_s[k : k + 1]).range_m[0])}
+            )
+            there = file.mission.model_copy(update={"communication": beam})
+            budget = link.communication_budget(there, file.sources, pointing_error_rad=float(w.radial_rad[k]))
+            assert w.margin_db[k] == pytest.approx(budget.margin_db, abs=1e-6)
+
+
+def test_the_residual_of_a_window_is_the_ensembles_with_the_same_references(file, scene, design, sampler):
+    """To the last bit that of the run of its number, and about the rms of 64 runs."""
+    how = settings(window_s=1.5, settle_s=0.5, seed=7)
+    windows = [sampler(how=how).window(number, 1000.0, 1.5) for number in range(4)]
+    lag = 0.01 * 100e-6 / (2 * math.pi * 0.1)
+    loop = replace(scene.loop, references=(Reference(30e-6 + lag, 0.0, 0.1), scene.loop.references[1]))
+    span = ensemble.Span(2.0, 0.5, 7)
+    for number in (0, 3):
+        error = ensemble.trace(loop, design.controller, span, number).error_rad[2500:]
+        assert_allclose(windows[number].radial_rad, np.hypot(error[:, 0], error[:, 1]), rtol=1e-9, atol=1e-15)
+    together = ensemble.run(loop, design.controller, span, 64)
+    single = np.sqrt(np.sum(together.rms_rad**2, axis=1))[:4]
+    assert_allclose([w.rms_rad for w in windows], single, rtol=0.02)  # control samples against plant steps
+    mean = math.sqrt(np.mean([w.rms_rad**2 for w in windows]))
+    assert mean == pytest.approx(together.radial_rms_rad, rel=0.05)
+
+
+# ------------------------------------------------------------------------------------------------------ references
+def test_a_moving_reference_is_what_a_first_order_body_leaves_of_a_changing_rate():
+    """Euler's steps of e' = rate(t) - w e, from long before."""
+    moving = MovingReference(30e-6, 2e-6, 0.1, point_ahead_rate_rad_s=-0.5e-6, acceleration_rad_s2=0.3e-6)
+    w, step = 2 * math.pi * 0.1, 5e-4
+    error, found = 0.0, {}
+    for t in np.arange(-20.0, 3.0, step):
+        found[round(t, 4)] = error
+        error += step * (2e-6 + 0.3e-6 * t - w * error)
+    for t in (0.0, 1.0, 2.9):
+        assert moving.at(np.array([t]))[0] == pytest.approx(30e-6 - 0.5e-6 * t + found[t], abs=2e-10)
+
+
+def test_a_moving_reference_that_stands_still_is_a_settled_reference():
+    moving, still = MovingReference(30e-6, 2e-6, 0.1), Reference(30e-6, 2e-6, 0.1)
+    assert moving.at(np.array([0.0]))[0] == pytest.approx(still.at(np.array([60.0]))[0], rel=1e-12)
+    with pytest.raises(ValueError, match="acceleration_rad_s2 of a pointing reference is nan"):
+        MovingReference(30e-6, 2e-6, 0.1, acceleration_rad_s2=math.nan)
+
+
+def test_point_ahead_and_rate_of_the_moment_reach_the_mirror(sampler):
+    """Same random numbers with and without them: the mirror's mean angle differs by just what they are, on x."""
+
+    def growing(time_s):
+        share = (time_s - 1000.0) / 600.0
+        return Sight(42e6 + 0 * share, 250e-6 * share, 70e-6 * share)
+
+    still, moved = sampler(contact(geometry=steady(42e6, 0.0, 0.0))), sampler(contact(geometry=growing))
+    for number, start in enumerate((1000.0, 1300.0, 1599.6)):
+        without, with_it = still.window(number, start, 0.4), moved.window(number, start, 0.4)
+        share = (start + 0.2 - 1000.0) / 600.0
+        wanted = 70e-6 * share + 0.01 * 250e-6 * share / (2 * math.pi * 0.1)
+        assert with_it.mirror_rad[0] - without.mirror_rad[0] == pytest.approx(wanted, abs=0.05e-6)
+        assert with_it.mirror_rad[1] - without.mirror_rad[1] == pytest.approx(0.0, abs=0.05e-6)
+
+
+def test_a_second_mirror_takes_the_point_ahead_and_feedforward_the_rate(file, sampler):
+    f = file.mission.fine_pointing
+    r = f.reference.model_copy(update={"point_ahead_on_mirror": False, "rate_feedforward": 1.0})
+    m = file.mission.model_copy(update={"fine_pointing": f.model_copy(update={"reference": r})})
+    seen = sampler(mission=m).window(0, 1000.0, 0.4)
+    still = sampler(contact(geometry=steady(42e6, 0.0, 0.0))).window(0, 1000.0, 0.4)
+    assert_array_equal(seen.radial_rad, still.radial_rad)
+
+
+def test_references_of_a_window_begin_with_it_and_not_with_its_settling(sampler):
+    """A line is followed over the window whatever the settling; the references at its begin and its end."""
+
+    def growing(time_s):
+        return Sight(42e6 + 0 * time_s, 4e-6 * (time_s - 990.0), 3e-6 * (time_s - 990.0))
+
+    for settle in (0.0, 0.3):
+        s = sampler(contact(geometry=growing), settings(settle_s=settle))
+        moving = s._moving(growing(np.array([1000.0, 1000.4])), 0.4, settle).references[0]
+        w = 2 * math.pi * 0.1
+        lag = [0.01 * (4e-6 * (10.0 + t) - 4e-6 / w) / w for t in (0.0, 0.4)]
+        ahead = np.array([30e-6, 31.2e-6])
+        assert_allclose(moving.at(np.array([settle, settle + 0.4])), ahead + lag, rtol=1e-9)
+
+
+@pytest.mark.parametrize("corrected", [True, False])
+def test_a_point_ahead_that_is_not_corrected_is_that_of_the_geometry(file, sampler, corrected):
+    ahead = file.mission.point_ahead.model_copy(update={"corrected": corrected})
+    m = file.mission.model_copy(update={"point_ahead": ahead})
+    at = steady(42e6, 0.0, 8e-6)(np.zeros(2))
+    found = sampler(mission=m).margin_db(np.array([0.0, 5e-6]), at)
+    missed = np.array([0.0, 5e-6]) + (0.0 if corrected else 8e-6)
+    assert_allclose(found, link.margin_of_error(file.mission, missed), atol=1e-9)
+
+
+# -------------------------------------------------------------------------------------------------------- the plan
+@pytest.mark.parametrize(
+    ("length_s", "begins"),
+    [
+        (100.0, [0.0, 33.0, 66.0, 99.0]),
+        (4.0, [0.0, 1.0, 2.0, 3.0]),
+        (3.9, [0.0, 1.45, 2.9]),
+        (1.5, [0.0]),
+        (0.3, [0.0]),
+    ],
+)
+def test_windows_that_would_overlap_are_fewer(length_s, begins):
+    found = plan(5.0, 5.0 + length_s, settings(windows=4, window_s=1.0))
+    assert_allclose(found, [(5.0 + b, min(1.0, length_s)) for b in begins], rtol=1e-12)
+
+
+def test_a_short_contact_has_fewer_windows_and_the_shortest_none(run, finding):
+    locked = finding.wide.log[-1].time_s
+    for length, count in ((0.9, 2), (0.3, 1), (5e-5, 0)):
+        found = run(contact(length_s=locked + length), settings())
+        check_order(found)
+        assert route(found.log) == [*FIRST, "end"]
+        assert len(found.windows) == count
+        assert found.sampled_s == pytest.approx(min(0.8, length) if count else 0.0, abs=1e-4)
+        assert found.data_s == pytest.approx(length, abs=1e-9)
+        assert found.bits(1.0) == pytest.approx(length, abs=1e-9)
+
+
+def test_the_geometry_is_asked_for_nothing_beyond_the_contact(sampler):
+    """Not even by rounding: (end - 4 ms) + 4 ms exceeds some of these ends."""
+    asked = []
+
+    def ending(time_s):
+        asked.append(float(np.max(time_s)))
+        return steady()(time_s)
+
+    ends = [1000.0 + 0.1 * k for k in range(1, 400)]
+    past = [end for end in ends if (end - 0.004) + 0.004 > end][:3]
+    assert past
+    for end in past:
+        of = Contact(900.0, end, LIMB, LIMB, 0.0, ending)
+        sampler(of, settings(window_s=0.004, settle_s=0.0, hold_s=0.0)).window(0, end - 0.004, 0.004)
+        assert asked[-1] == end
+
+
+# ----------------------------------------------------------------------------------------------------- acquisition
+def test_a_contact_that_is_shorter_than_the_acquisition_ends_in_it(run, finding):
+    stages = {e.stage: e.time_s for e in finding.wide.log}
+    for length, state in (
+        (5.0, "beacon"),
+        (stages["beacon travels"] + 0.5, "detect"),
+        (stages["GEO turns and answers"], "answer"),
+        (stages["GEO locks"] + 0.01, "lock"),
+        (stages["LEO locks"], "lock"),
+    ):
+        found = run(contact(length_s=length), settings())
+        check_order(found)
+        assert (found.log[-1].state, found.log[-1].time_s) == (state, 1000.0 + length)
+        assert found.log[-1].cause == "the contact ends: eclipse of LEO"
+        assert (found.windows, found.data_s, found.data_share, found.bits(3e8)) == ((), 0.0, 0.0, 0.0)
+        assert math.isnan(found.first_data_s)
+        assert found.seconds[state] > 0.0
+
+
+def test_an_acquisition_that_never_succeeds_is_given_up(tmp_path, run):
+    weak = edited_file(tmp_path, ('required_power = "10 pW"', 'required_power = "1 mW"'), whole=True)
+    found = run(contact(), settings(), finding=links(weak).finding)
+    check_order(found)
+    assert found.log[-1].cause == ("acquisition given up after 5 failures; GEO detects: time-out, failure 5 of 5")
+    assert route(found.log) == ["slew", *["beacon", "detect"] * 5, "end"]
+    failures = [e for e in found.log if (e.state, e.to) == ("detect", "beacon")]
+    assert [e.cause for e in failures] == [f"GEO detects: time-out, failure {n} of 5" for n in (1, 2, 3, 4)]
+    assert found.log[-1].time_s < found.contact.end_s
+    assert (found.windows, found.data_s) == ((), 0.0)
+
+
+def test_a_failure_within_an_acquisition_is_logged_and_costs_its_time(run, finding):
+    """Seeds of which the first simulated acquisition fails at least once."""
+    stages = finding.wide.stages
+    logs = {seed: acquisition.simulate_log(stages, 5, seed) for seed in range(200)}
+    failing = {s: log for s, log in logs.items() if any("time-out" in e.cause for e in log) and log[-1].to == "locked"}
+    assert len(failing) > 5
+    for seed, log in list(failing.items())[:5]:
+        found = run(contact(), settings(seed=seed, windows=1))
+        check_order(found)
+        assert found.first_data_s == pytest.approx(1000.0 + log[-1].time_s)
+        wanted = [(1000.0 + e.time_s, f"{e.stage}: {e.cause}") for e in log if "time-out" in e.cause]
+        assert [(e.time_s, e.cause) for e in found.log if "time-out" in e.cause] == [
+            (pytest.approx(time), cause) for time, cause in wanted
+        ]
+
+
+def test_a_scan_finds_the_partner_instead(run, finding):
+    found = run(contact(), settings(way="scan", windows=1))
+    check_order(found)
+    assert route(found.log) == [*FIRST, "end"]
+    assert found.log[2].cause == "beam travels: done"
+    assert found.first_data_s == pytest.approx(1000.0 + finding.scan.log[-1].time_s)
+    assert found.first_data_s != pytest.approx(1000.0 + finding.wide.log[-1].time_s)
+
+
+# ------------------------------------------------------------------------------------------------------------ slew
+def test_a_body_that_is_not_free_in_time_turns_late(run):
+    found = run(contact(free_from_s=960.0), settings(windows=1))
+    check_order(found)
+    assert [e.time_s for e in found.log[:2]] == pytest.approx([960.0, 1060.0])
+    assert found.log[0].cause == "1 rad at 10 mrad/s, as soon as the body is free"
+    assert found.log[1].cause == f"the slew ends 60 s after the contact began: {LIMB}"
+    on_time = run(contact(free_from_s=900.0), settings(windows=1))
+    assert [e.time_s for e in on_time.log[:2]] == pytest.approx([900.0, 1000.0])
+    assert found.first_data_s == pytest.approx(on_time.first_data_s + 60.0)
+
+
+def test_a_slew_may_outlast_its_contact(run):
+    found = run(contact(length_s=50.0, free_from_s=960.0), settings())
+    check_order(found)
+    assert [(e.time_s, e.to) for e in found.log] == [(960.0, "slew"), (1050.0, "end")]
+    assert found.seconds["slew"] == pytest.approx(90.0)
+
+
+def test_without_a_slew_the_contact_begins_at_once(run):
+    found = run(contact(), settings(slew_angle_rad=0.0, windows=1))
+    check_order(found)
+    assert [(e.time_s, e.to) for e in found.log[:2]] == [(1000.0, "slew"), (1000.0, "beacon")]
+    assert found.seconds["slew"] == 0.0
+
+
+# ----------------------------------------------------------------------------------------------------- loss of lock
+def since_below(window, hold_s, period_s=2e-4):
+    """The slow way: when margin has been below 0 dB for longer than it is held, since when."""
+    since = None
+    for time, margin in zip(window.time_s, window.margin_db, strict=True):
+        since = (time if since is None else since) if margin < 0.0 else None
+        if since is not None and time + period_s - since > hold_s * (1 + 1e-6):
+            return since
+    return None
+
+
+@pytest.fixture(scope="module")
+def losing(run, shaken):
+    """A contact in which vibration takes the lock from some windows and not from others."""
+    return run(contact(), settings(windows=6, seed=2), scene=shaken(*STRONG))
+
+
+def test_strong_vibration_loses_lock_and_regains_it(losing):
+    check_order(losing)
+    again = ["loss", "re-acquire", "data"]
+    behind = [e for e in losing.log if e.time_s >= losing.first_data_s]
+    assert route(behind) == ["data", *again * (losing.losses - 1), "loss", "re-acquire", "end"]
+    assert losing.losses == sum(w.loss is not None for w in losing.windows) > 2
+    assert any(w.loss is None for w in losing.windows)
+    assert [e.to for e in losing.log if e.state == "re-acquire"].count("data") == losing.losses - 1
+    assert losing.losses_per_s == pytest.approx(losing.losses / sum(w.seconds for w in losing.windows))
+    below = sum(np.sum(w.margin_db < 0.0) for w in losing.windows) * 2e-4
+    assert losing.bits(2.0) == pytest.approx(2.0 * losing.data_s * (1.0 - below / losing.sampled_s))
+    assert losing.bits(2.0) < 2.0 * losing.data_s
+
+
+def test_the_cause_of_a_loss_says_what_happened(losing):
+    lost = [w.loss for w in losing.windows if w.loss is not None]
+    entries = [e for e in losing.log if e.to == "loss"]
+    known = [e for e in losing.log if e.state == "loss"]
+    assert len(entries) == len(known) == len(lost)
+    for loss, entry, after in zip(lost, entries, known, strict=True):
+        assert (entry.state, entry.time_s, entry.cause) == ("data", loss.time_s, loss.cause)
+        pattern = r"margin below 0 dB for 10.2 ms at (\d+\.\d{3}) s: (\d+) µrad off, range 42000 km"
+        since, off = re.fullmatch(pattern, entry.cause).groups()
+        assert float(since) == pytest.approx(loss.since_s, abs=6e-4)
+        assert 15.0 < float(off) < 300.0
+        assert loss.time_s - loss.since_s == pytest.approx(0.0102, abs=1e-9)
+        light_s = 2 * 42e6 / C_M_S
+        assert (after.time_s, after.to) == (pytest.approx(loss.time_s + light_s), "re-acquire")
+        assert after.cause == "the light has gone there and back, 280 ms"
+
+
+def test_lock_is_lost_at_the_first_stretch_that_is_too_long(losing):
+    for window in losing.windows:
+        since = since_below(window, 0.01)
+        if window.loss is None:
+            assert since is None
+        else:
+            assert window.loss.since_s == pytest.approx(since, abs=1e-9)
+            assert window.time_s[-1] + 2e-4 == pytest.approx(window.loss.time_s)  # and nothing behind it counts
+            assert window.seconds == pytest.approx(window.loss.time_s - window.start_s)
+
+
+def test_a_window_follows_each_new_acquisition(losing):
+    begins = [w.start_s for w in losing.windows]
+    regained = [e.time_s for e in losing.log if (e.state, e.to) == ("re-acquire", "data")]
+    assert begins == sorted(begins)
+    assert set(regained) <= set(begins)
+    planned = [b for b, _ in plan(losing.first_data_s, 1600.0, settings(windows=6))]
+    assert set(begins) == {*regained, *planned}  # nothing is in the way here
+
+
+def test_a_new_acquisition_begins_with_the_beacon_and_has_its_own_random_numbers(losing, finding):
+    starts = [i for i, e in enumerate(losing.log) if (e.state, e.to) == ("loss", "re-acquire")]
+    for number, i in enumerate(starts[:-1], 1):  # the last one is cut short by the end
+        log = acquisition.simulate_log(finding.wide.stages, 5, 2 + (number << 64))
+        last = next(e for e in losing.log[i + 1 :] if e.to == "data")
+        assert last.time_s == pytest.approx(losing.log[i].time_s + log[-1].time_s)
+        assert losing.log[i + 1].cause == "beacon to detect; beacon travels: done"
+
+
+def test_lock_that_is_lost_in_each_window_is_given_up(run, shaken):
+    found = run(contact(), settings(), scene=shaken(*HARD))
+    check_order(found)
+    assert route(found.log) == [*FIRST, *["loss", "re-acquire", "data"] * 4, "loss", "end"]
+    assert found.log[-1].cause.startswith("given up after 5 losses of lock in as many windows in a row; the light")
+    assert found.log[-1].time_s < 1200.0
+    assert (found.losses, len(found.windows)) == (5, 5)
+    assert 0.0 < found.data_s < 1.0
+
+
+def test_a_longer_hold_keeps_lock(run, shaken):
+    found = run(contact(), settings(hold_s=0.3, seed=2), scene=shaken(*STRONG))
+    assert ([e.to for e in found.log][-2:], found.losses) == (["data", "end"], 0)
+    assert found.share_below > 0.3
+
+
+def test_a_contact_may_end_during_the_new_acquisition(run, losing, shaken):
+    first = next(e.time_s for e in losing.log if e.to == "loss")
+    for after, state in ((-0.005, "data"), (0.1, "loss"), (5.0, "re-acquire")):
+        of = Contact(1000.0, first + after, LIMB, LIMB, 0.0, steady())
+        found = run(of, settings(windows=1, seed=2), scene=shaken(*STRONG))
+        check_order(found)
+        assert (found.log[-1].state, found.log[-1].cause) == (state, f"the contact ends: {LIMB}")
+
+
+def test_windows_that_a_new_acquisition_covers_are_left_out(run, whole, monkeypatch):
+    """Windows of 1 s side by side, of which the one with this number, counted as they come, loses lock."""
+    for losing_at in (0, 5, 20):
+        came = []
+
+        def window(self, number, start_s, length_s, came=came, at=losing_at):
+            came.append(number)
+            loss = contact_run.Loss(start_s + 0.3, start_s + 0.5, start_s + 0.75, "made up") if number == at else None
+            return replace(whole.windows[0], start_s=start_s, seconds=0.5 if loss else length_s, loss=loss)
+
+        monkeypatch.setattr(Sampler, "window", window)
+        found = run(contact(length_s=80.0), settings(windows=100, window_s=1.0))
+        check_order(found)
+        planned = [b for b, _ in plan(found.first_data_s, 1080.0, settings(windows=100, window_s=1.0))]
+        assert (len(planned), found.losses) == (64, 1)
+        lost = planned[losing_at]
+        again = next(e.time_s for e in found.log if (e.state, e.to) == ("re-acquire", "data"))
+        wanted = [b for b in planned if b <= lost] + [again] + [b for b in planned if b >= again + 1.0]
+        assert_allclose([w.start_s for w in found.windows], wanted, rtol=0, atol=1e-9)
+        assert (sorted(came), came[-1]) == (list(range(65)), 64)  # the one behind the loss has a number of its own
+
+
+def test_a_whole_window_ends_a_row_of_losses(run, whole, monkeypatch):
+    """Four losses in a row twice, each row ended by a window without; then five."""
+    lost_at = [1400.0] * 4 + [1900.0] * 4 + [2400.0] * 5  # each no earlier than that: planned are 1493, 1970, 2446 s
+
+    def window(self, number, start_s, length_s):
+        loss = None
+        if lost_at and start_s > lost_at[0]:
+            lost_at.pop(0)
+            loss = contact_run.Loss(start_s, start_s + 0.1, start_s + 0.1, "made up")
+        return replace(whole.windows[0], start_s=start_s, seconds=0.1 if loss else length_s, loss=loss)
+
+    monkeypatch.setattr(Sampler, "windows", lambda self, plan: (self.window(n, *span) for n, span in enumerate(plan)))
+    monkeypatch.setattr(Sampler, "window", window)
+    found = run(contact(length_s=2400.0), settings(windows=6))
+    check_order(found)
+    assert (found.losses, lost_at) == (13, [])
+    assert [w.loss is None for w in found.windows] == [True, *([False] * 4 + [True]) * 2, *[False] * 5]
+    assert found.log[-1].cause == "given up after 5 losses of lock in as many windows in a row; seen by its own sensor"
+
+
+def test_a_spot_beyond_the_field_of_view_is_lost_at_once(run, shaken, design):
+    scene = shaken(*HARD)
+    narrow = replace(scene.loop.optical, field_of_view_rad=200e-6)
+    scene = replace(scene, loop=replace(scene.loop, optical=narrow))
+    found = run(contact(), settings(hold_s=0.3, windows=1), scene=scene)
+    check_order(found)
+    lost = found.windows[0].loss
+    pattern = r"spot beyond the optical sensor's field of view at \d+\.\d{3} s: \d+ µrad off, it sees 200 µrad"
+    assert re.fullmatch(pattern, lost.cause)
+    assert (lost.time_s, lost.known_s) == (pytest.approx(lost.since_s + 2e-4), lost.time_s)
+    assert found.windows[0].radial_rad[-1] > 200e-6 >= np.max(found.windows[0].radial_rad[:-1])
+    (first, *_) = [e for e in found.log if e.state == "loss"]
+    assert (first.time_s, first.cause) == (lost.time_s, "seen by its own sensor")
+    span = ensemble.Span(0.6, 0.2, 1)
+    assert ensemble.run(scene.loop, design.controller, span, 1).counts[0, kernels.COUNT_LOST] > 0
+
+
+def test_a_slow_sensor_loses_the_spot_only_where_it_looks(sampler, scene):
+    slow = replace(scene.loop, optical=replace(scene.loop.optical, every=4, field_of_view_rad=100e-6))
+    s = replace(sampler(), loop=slow)
+    time, margin = 1000.0 + 2e-4 * np.arange(40), np.ones(40)
+    ends = steady()(np.zeros(2))
+    for settling, off, wanted in ((0, 8, 8), (0, 9, None), (1, 11, 11), (1, 12, None)):
+        radial = np.where(np.arange(40) == off, 101e-6, 0.0)
+        loss, kept = s._loss(time, radial, margin, ends, settling)
+        assert kept == (40 if wanted is None else wanted + 1)
+        assert (loss is None) is (wanted is None)
+
+
+def test_the_earlier_of_two_losses_counts(sampler, scene):
+    s = sampler(how=settings(hold_s=0.001))
+    time, ends = 1000.0 + 2e-4 * np.arange(40), steady()(np.zeros(2))
+    margin = np.where(np.arange(40) >= 10, -1.0, 1.0)  # six samples are too long: lost with the one at 15
+    for off, kept, what in ((15, 16, "spot"), (16, 16, "margin"), (3, 4, "spot")):
+        loss, found = s._loss(time, np.where(np.arange(40) == off, 3e-3, 20e-6), margin, ends, 0)
+        assert (found, loss.cause.split()[0]) == (kept, what)
+
+
+@pytest.mark.parametrize("length", [1, 2, 3, 7])
+def test_the_first_run_is_the_one_that_a_loop_finds(length):
+    draw = np.random.Generator(np.random.Philox(key=5))
+    for size in (1, 5, 60):
+        for _ in range(40):
+            holds = draw.random(size) < 0.6
+            wanted = next((i for i in range(size - length + 1) if holds[i : i + length].all()), None)
+            assert first_run(holds, length) == wanted
+
+
+# ------------------------------------------------------------------------------------------------------------ seeds
+def test_the_same_seed_gives_the_same_contact_and_another_does_not(run, losing, shaken):
+    again = run(contact(), settings(windows=6, seed=2), scene=shaken(*STRONG))
+    assert again.log == losing.log
+    for one, other in zip(again.windows, losing.windows, strict=True):
+        assert_array_equal(one.radial_rad, other.radial_rad)
+    different = run(contact(), settings(windows=6, seed=3), scene=shaken(*STRONG))
+    assert different.log != losing.log
+    assert different.windows[0].rms_rad != losing.windows[0].rms_rad
+
+
+def test_windows_do_not_share_their_random_numbers(whole):
+    assert len({w.largest_rad for w in whole.windows}) == 8
+    shared = np.corrcoef([w.radial_rad for w in whole.windows]) - np.eye(8)
+    assert np.max(np.abs(shared)) < 0.2
+
+
+# --------------------------------------------------------------------------------------------------------- refusals
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"slew_angle_rad": -0.1}, r"slew_angle_rad of a contact run is -0.1: .*from 0 to pi rad"),
+        ({"slew_angle_rad": math.nan}, "slew_angle_rad of a contact run is nan"),
+        ({"slew_rate_rad_s": 0.0}, "slew_rate_rad_s of a contact run is 0: .*above 0 rad/s"),
+        ({"slew_rate_rad_s": math.inf}, "slew_rate_rad_s of a contact run is inf: it must be finite"),
+        ({"windows": 0}, "windows of a contact run is 0: .*from 1 to"),
+        ({"window_s": 0.0}, "window_s of a contact run is 0: .*above 0 s"),
+        ({"settle_s": -1.0}, "settle_s of a contact run is -1: .*at least 0 s"),
+        ({"hold_s": 0.4}, r"hold_s of a contact run is 0.4: .*below window_s \(400 ms\)"),
+        ({"seed": -1}, "seed of a contact run is -1: .*2\\^63"),
+        ({"way": "shout"}, 'way of a contact run is "shout": it must be "wide beacon" or "scan"'),
+    ],
+)
+def test_settings_without_a_meaning_are_refused(changes, message):
+    with pytest.raises(ValueError, match=message):
+        settings(**changes)
+
+
+def test_a_contact_without_length_and_a_body_that_is_late_are_refused():
+    with pytest.raises(ValueError, match="a contact from 1000 s to 1000 s has no length"):
+        contact(length_s=0.0)
+    with pytest.raises(ValueError, match="a contact from nan s"):
+        contact(start_s=math.nan)
+    with pytest.raises(ValueError, match="free_from_s is 1001 s, and the contact begins at 1000 s"):
+        contact(free_from_s=1001.0)
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ((-1.0, 1e-4, 1e-5), r"range_m = -1 at 1000.000 s, which must be finite and above 0"),
+        ((math.nan, 1e-4, 1e-5), "range_m = nan at 1000.000 s"),
+        ((4e7, -1e-4, 1e-5), "rate_rad_s = -0.0001 at 1000.000 s, which must be finite and at least 0"),
+        ((4e7, 1e-4, math.inf), "point_ahead_rad = inf at 1000.000 s"),
+    ],
+)
+def test_a_geometry_that_is_none_is_refused(values, message):
+    with pytest.raises(ValueError, match=message):
+        contact(geometry=steady(*values)).sight(np.array([1000.0, 1001.0]))
+    with pytest.raises(ValueError, match=r"range_m with the shape \(\) for times of \(2,\)"):
+        contact(geometry=lambda time_s: Sight(4e7, 1e-4, 1e-5)).sight(np.array([1000.0, 1001.0]))
+
+
+def test_a_mission_without_what_a_contact_needs_is_refused(file, run, finding):
+    bare = file.mission.model_copy(update={"fine_pointing": None})
+    with pytest.raises(ValueError, match=r"no table \[fine_pointing\]"):
+        run(contact(), settings(), mission=bare)
+    with pytest.raises(ValueError, match=r"no table \[acquisition\]"):
+        run(contact(), settings(), mission=file.mission.model_copy(update={"acquisition": None}))
+    with pytest.raises(ValueError, match=r'no table \[acquisition.scan\].*"wide beacon"'):
+        run(contact(), settings(way="scan"), finding=replace(finding, scanned=None))
+    odd = replace(finding, wide=replace(finding.wide, stages=finding.wide.stages[1:]))
+    with pytest.raises(ValueError, match='"wide beacon" has 10 stages, a contact run knows the 11'):
+        run(contact(), settings(), finding=odd)
+    with pytest.raises(ValueError, match=r"window_s of a contact run is 50 µs, less than a control period \(200 µs\)"):
+        run(contact(), settings(window_s=5e-5, hold_s=0.0))
+    with pytest.raises(ValueError, match=r"1000 windows of 2 s .* 1e\+07 control samples .* at most 5e\+06"):
+        run(contact(), settings(windows=1000, window_s=2.0))
+    beam = file.mission.communication.model_copy(update={"data_rate_bit_s": math.nan})
+    with pytest.raises(ValueError, match='"largest" has to be solved for first'):
+        run(contact(), settings(), mission=file.mission.model_copy(update={"communication": beam}))

@@ -1,0 +1,677 @@
+"""Intervals, contacts, passes and the line of sight against closed forms, dense grids, differences and skyfield."""
+
+import itertools
+import math
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+from scipy.integrate import solve_ivp
+
+from microrad.orbit import attitude, events
+from microrad.orbit.analytic import GeostationarySlot, KeplerOrbit, circular
+from microrad.orbit.base import OrbitError, States
+from microrad.orbit.closed_form import coplanar_contact
+from microrad.orbit.contacts import (
+    UNLIMITED,
+    Limits,
+    Sampled,
+    Terminal,
+    coarse_step_s,
+    coarse_times,
+    contacts,
+    contacts_with_each,
+    passes,
+)
+from microrad.orbit.earth import EARTH_RADIUS_M, FLATTENING, GEOSTATIONARY_RADIUS_M, Earth, gravity
+from microrad.orbit.epoch import Epoch
+from microrad.orbit.ground import Station, elevation_rad
+from microrad.orbit.line_of_sight import sight
+from microrad.orbit.sun import shadow_rad, sun_direction
+from microrad.pointing_table import point_ahead_rad
+
+DAY = (0.0, 86400.0)
+WEEK = (0.0, 7.0 * 86400.0)
+EPOCH = Epoch.from_text("2026-03-20T12:00:00Z")
+ROUND, FLAT = Earth("sphere", 0.0), Earth("oblate", 100e3)
+SLOT = GeostationarySlot("GEO", EPOCH, 0.3)
+one_millisecond = 1e-3
+one_second = 1.0
+one_microsecond = 1e-6
+deg = math.pi / 180.0
+any_angle = st.floats(0.0, 2.0 * math.pi)
+
+
+def leo(name="LEO", altitude_m=500e3, inclination_rad=97.4 * deg, node_rad=1.0, phase_rad=2.0, j2=False):
+    return circular(name, EPOCH, altitude_m, inclination_rad, node_rad, phase_rad, j2)
+
+
+def free(orbit):
+    return Terminal(orbit, UNLIMITED, orbit.name)
+
+
+def limited(orbit, attitude="free", boresight=(0.0, 0.0, 1.0), regard=math.pi, slew=math.inf, sun=0.0, night=True):
+    return Terminal(orbit, Limits(attitude, boresight, regard, slew, sun, night), orbit.name)
+
+
+def ends(found):
+    return np.array([(c.start_s, c.end_s) for c in found]).reshape(-1, 2)
+
+
+def inside(intervals, time_s):
+    """Whether each time is in one of the intervals: behind an odd number of ends."""
+    return np.searchsorted(intervals.ravel(), time_s) % 2 == 1
+
+
+def far_from_ends(intervals, time_s, by_s):
+    edges = np.concatenate(([-np.inf], intervals.ravel(), [np.inf]))
+    after = np.searchsorted(edges, time_s)
+    return (edges[after] - time_s > by_s) & (time_s - edges[after - 1] > by_s)
+
+
+# ---- where a function is positive
+waves = st.lists(
+    st.tuples(st.floats(-2.0, 2.0), st.floats(0.01, 0.15), st.floats(0.0, 6.3)).map(lambda w: tuple(map(float, w))),
+    min_size=1,
+    max_size=3,
+)
+
+
+def summed(parts, offset):
+    return lambda t: offset + sum(a * np.sin(w * t + p) for a, w, p in parts)
+
+
+@settings(max_examples=150, deadline=None)
+@given(waves, st.floats(-2.0, 2.0))
+@example([(1.0, 0.15, 0.0)], -0.9999)
+@example([(1.0, 0.15, 0.0)], 0.9999)
+def test_positive_intervals_agree_with_a_dense_grid(parts, offset):
+    f = summed(parts, offset)
+    found = events.positive(f, np.arange(0.0, 101.0))
+    dense = np.linspace(0.0, 100.0, 10007)
+    values = f(dense)
+    clear = far_from_ends(found, dense, 1e-5) & (np.abs(values) > 1e-7)
+    np.testing.assert_array_equal(inside(found, dense)[clear], values[clear] > 0.0)
+
+
+@settings(max_examples=150, deadline=None)
+@given(waves, st.floats(-2.0, 2.0))
+def test_every_end_is_a_change_of_sign_or_an_end_of_the_span(parts, offset):
+    f = summed(parts, offset)
+    found = events.positive(f, np.arange(0.0, 101.0))
+    assert np.all(np.diff(found.ravel()) >= 0.0)
+    assert (found.size > 0 and found[0, 0] == 0.0) or f(np.zeros(1))[0] < 1e-5
+    steepest = sum(abs(a) * w for a, w, _ in parts)
+    inner = found[(found > 0.0) & (found < 100.0)]
+    assert np.all(np.abs(f(inner)) <= steepest * events.TOLERANCE_S + 1e-15)
+
+
+@pytest.mark.parametrize("centre", [40.0, 40.5, 40.37, 0.3, 99.7])
+@pytest.mark.parametrize("width", [0.002, 0.1, 1.0, 1.9])
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_an_event_shorter_than_the_step_is_found(centre, width, sign):
+    def f(t):
+        return sign * ((0.5 * width) ** 2 - (t - centre) ** 2)
+
+    found = events.positive(f, np.arange(0.0, 101.0))
+    event = np.clip([[centre - 0.5 * width, centre + 0.5 * width]], 0.0, 100.0)
+    wanted = event if sign > 0.0 else events.complement(event, (0.0, 100.0))
+    np.testing.assert_allclose(found, wanted, atol=1e-5)
+
+
+def test_a_touch_of_zero_is_neither_an_event_nor_a_gap():
+    times = np.arange(0.0, 11.0)
+    assert events.positive(lambda t: -((t - 5.0) ** 2), times).shape == (0, 2)
+    np.testing.assert_array_equal(events.positive(lambda t: (t - 5.0) ** 2, times), [[0.0, 10.0]])
+
+
+def test_a_jump_is_found_where_it_is():
+    found = events.positive(lambda t: np.where(t < math.pi, -1.0, 3.0), np.arange(0.0, 11.0))
+    np.testing.assert_allclose(found, [[math.pi, 10.0]], atol=1e-5)
+    assert found[0, 1] == 10.0
+
+
+def test_rows_are_solved_each_for_itself():
+    shift = np.array([0.0, 1.0, 2.5])
+    times = np.arange(0.0, 30.0)
+
+    def f(t, row):
+        return np.sin(0.3 * t + shift[row])
+
+    together = events.positive_rows(f, times, f(times[None, :], np.arange(3)[:, None]))
+    for row, one in enumerate(together):
+        np.testing.assert_allclose(one, events.positive(lambda t, r=row: np.sin(0.3 * t + shift[r]), times), atol=1e-6)
+
+
+def test_what_cannot_be_searched_is_refused():
+    with pytest.raises(OrbitError, match="do not rise; sort them"):
+        events.positive(np.sin, np.array([0.0, 2.0, 1.0]))
+    with pytest.raises(OrbitError, match="at least 3"):
+        events.positive(np.sin, np.array([0.0, 2.0]))
+    with pytest.raises(OrbitError, match="not finite at 2 s"):
+        events.positive(lambda t: np.where(t == 2.0, np.nan, t), np.arange(4.0))
+
+
+@pytest.mark.parametrize("peak", [0.0, 3.21, 7.0])
+def test_the_largest_in_a_window_is_found(peak):
+    when, value = events.largest(lambda t: -((t - peak) ** 2), np.array([[0.0, 7.0], [2.0, 4.0]]), 1.0)
+    np.testing.assert_allclose(when, [peak, np.clip(peak, 2.0, 4.0)], atol=events.SHORTEST_S)
+    np.testing.assert_allclose(value, [0.0, -((np.clip(peak, 2.0, 4.0) - peak) ** 2)], atol=1e-2 * events.SHORTEST_S)
+
+
+# ---- algebra of intervals, on whole numbers against sets of cells
+cell_sets = st.sets(st.integers(0, 19))
+
+
+def as_intervals(cells):
+    """Each cell an interval of its own: touching ones are not joined."""
+    return np.array([(float(c), c + 1.0) for c in sorted(cells)]).reshape(-1, 2)
+
+
+def as_cells(intervals):
+    return {c for start, end in intervals for c in range(int(start), int(end))}
+
+
+@given(cell_sets, cell_sets, cell_sets)
+def test_the_algebra_is_that_of_sets(a, b, c):
+    sets = tuple(events.union(as_intervals(x)) for x in (a, b, c))
+    assert as_cells(events.union(*sets)) == a | b | c
+    assert as_cells(events.intersection(*sets)) == a & b & c
+    assert as_cells(events.complement(sets[0], (0.0, 20.0))) == set(range(20)) - a
+    for result in (events.union(*sets), events.intersection(*sets), events.complement(sets[0], (0.0, 20.0))):
+        assert np.all(np.diff(result.ravel()) > 0.0)  # sorted, apart, none empty
+
+
+def test_the_complement_ends_with_the_span():
+    np.testing.assert_array_equal(events.complement(np.array([[-5.0, 2.0], [8.0, 20.0]]), (0.0, 10.0)), [[2.0, 8.0]])
+    np.testing.assert_array_equal(events.complement(np.array([[20.0, 30.0]]), (0.0, 10.0)), [[0.0, 10.0]])
+
+
+def test_the_complement_of_the_complement_is_the_set():
+    a = np.array([[0.0, 1.5], [2.25, 7.0]])
+    span = (0.0, 7.0)
+    np.testing.assert_array_equal(events.complement(events.complement(a, span), span), a)
+
+
+# ---- the numbers checked by hand: a low orbit in the plane of the equator
+@pytest.mark.parametrize(("grazing_m", "minutes"), [(0.0, 58.12), (100e3, 56.72)])
+def test_a_coplanar_contact_takes_as_long_by_search_as_by_hand(grazing_m, minutes):
+    by_hand = coplanar_contact(EARTH_RADIUS_M + 500e3, grazing_m)
+    assert round(by_hand.duration_s / 60.0, 2) == minutes
+    for shape in ("sphere", "oblate"):
+        found = contacts(free(leo(inclination_rad=0.0)), free(SLOT), Earth(shape, grazing_m), EPOCH, DAY)[1:-1]
+        assert len(found) >= 12
+        np.testing.assert_allclose([c.duration_s for c in found], by_hand.duration_s, rtol=0, atol=one_millisecond)
+        repeats = np.diff([c.start_s for c in found])
+        np.testing.assert_allclose(repeats, by_hand.repeat_s, rtol=0, atol=one_millisecond)
+
+
+def test_the_range_in_a_coplanar_contact_goes_from_35286_to_44253_km():
+    low, by_hand = leo(inclination_rad=0.0), coplanar_contact(EARTH_RADIUS_M + 500e3, 0.0)
+    assert (int(by_hand.shortest_range_m / 1e3), int(by_hand.longest_range_m / 1e3)) == (35286, 44253)
+    assert by_hand.shortest_range_m == pytest.approx(GEOSTATIONARY_RADIUS_M - EARTH_RADIUS_M - 500e3, abs=1e-6)
+    one = contacts(free(low), free(SLOT), ROUND, EPOCH, DAY)[1]
+    seen = sight(low, SLOT, np.linspace(one.start_s, one.end_s, 10001))
+    assert seen.range_m.min() == pytest.approx(by_hand.shortest_range_m, abs=1.0)
+    np.testing.assert_allclose(seen.range_m[[0, -1]], by_hand.longest_range_m, atol=1.0)
+    assert by_hand.visible_share == pytest.approx(by_hand.duration_s / by_hand.repeat_s)
+
+
+@pytest.mark.parametrize("radius_m", [6000e3, 6478e3, 42200e3, math.nan])
+def test_a_coplanar_orbit_below_the_air_or_above_the_slot_is_refused(radius_m):
+    with pytest.raises(OrbitError, match="not between the surface to clear"):
+        coplanar_contact(radius_m, 100e3)
+
+
+# ---- the numbers checked by hand: a sun-synchronous orbit at 500 km, one day, over node and phase
+def all_nodes_and_phases(earth):
+    grid = itertools.product(np.arange(0.0, 360.0, 15.0) * deg, np.arange(0.0, 360.0, 60.0) * deg)
+    return [contacts(free(leo(node_rad=n, phase_rad=p)), free(SLOT), earth, EPOCH, DAY) for n, p in grid]
+
+
+@pytest.mark.parametrize(("grazing_m", "shares"), [(0.0, (65, 69)), (100e3, (63, 66))])
+def test_a_sun_synchronous_orbit_has_15_contacts_a_day(grazing_m, shares):
+    """15 is the usual number. Near 6 h from the slot's plane the satellite is not hidden at all for some turns, and
+    contacts join; contacts cut by the day's ends may add one or two."""
+    days = all_nodes_and_phases(Earth("sphere", grazing_m))
+    counts, many = np.unique([len(day) for day in days], return_counts=True)
+    assert counts[np.argmax(many)] == 15
+    assert set(counts) <= {12, 13, 14, 15, 16, 17}
+    share = [100.0 * sum(c.duration_s for c in day) / 86400.0 for day in days]
+    assert (math.floor(min(share)), math.floor(max(share))) in {shares, (shares[0], shares[1] - 1)}
+    assert min(share) > shares[0] and max(share) < shares[1] + 0.5
+    middle = np.array([np.median([c.duration_s for c in day]) / 60.0 for day in days])
+    low, high = {0.0: (54.4, 56.7), 100e3: (53.1, 55.1)}[grazing_m]
+    assert low < middle.min() and middle.max() < high
+    if grazing_m == 0.0:
+        assert round(float(np.median(middle))) == 56
+
+
+def test_rate_doppler_shift_and_point_ahead_reach_what_was_checked_by_hand():
+    time_s = np.arange(0.0, 86400.0, 20.0)
+    most = np.zeros(3)
+    for node in np.arange(0.0, 360.0, 15.0) * deg:
+        low = leo(node_rad=node)
+        seen = sight(low, SLOT, time_s)
+        free_of_earth = ROUND.clearance_rad(low.states(time_s).position_m, SLOT.states(time_s).position_m) > 0.0
+        each = seen.rate_rad_s * 1e6, np.abs(seen.doppler_hz(1.55e-6)) / 1e9, seen.point_ahead_rad * 1e6
+        most = np.maximum(most, [value[free_of_earth].max() for value in each])
+    assert (round(most[0]), round(most[1], 2), round(most[2])) == (255, 4.95, 71)
+
+
+# ---- contacts against a dense grid: a segment and an ellipsoid
+def segment_is_clear(first_m, second_m, earth):
+    """Whether no point of the segment is within the raised ellipsoid, by the closest point in scaled coordinates."""
+    polar = EARTH_RADIUS_M * (1.0 - FLATTENING if earth.shape == "oblate" else 1.0)
+    axes = np.array([[EARTH_RADIUS_M], [EARTH_RADIUS_M], [polar]]) + earth.grazing_height_m
+    p, q = first_m / axes, second_m / axes
+    share = np.clip(-np.sum(p * (q - p), axis=0) / np.sum((q - p) ** 2, axis=0), 0.0, 1.0)
+    return np.linalg.norm(p + share * (q - p), axis=0) > 1.0
+
+
+PARTNERS = {
+    "geostationary": SLOT,
+    "another low orbit": leo("other", 800e3, 55.0 * deg, 0.3, 1.0, True),
+    "against it": leo("other", 520e3, 82.6 * deg, 1.0 + math.pi, -2.0),
+    "elongated": KeplerOrbit("other", EPOCH, 26560e3, 0.72, 63.4 * deg, 1.0, 4.7, 0.0, True),
+}
+
+
+@pytest.mark.parametrize("partner", PARTNERS.values(), ids=PARTNERS.keys())
+@pytest.mark.parametrize("earth", [ROUND, FLAT], ids=["sphere", "oblate"])
+def test_contacts_agree_with_a_dense_grid(partner, earth):
+    low = leo()
+    found = ends(contacts(free(low), free(partner), earth, EPOCH, DAY))
+    dense = np.arange(0.0, 86400.0, 1.0)
+    clear = segment_is_clear(low.states(dense).position_m, partner.states(dense).position_m, earth)
+    sure = far_from_ends(found, dense, one_millisecond)
+    assert len(found) > 2
+    np.testing.assert_array_equal(inside(found, dense)[sure], clear[sure])
+
+
+@settings(max_examples=25, deadline=None)
+@given(any_angle, any_angle, st.floats(0.0, math.pi), st.booleans())
+def test_visibility_is_the_same_both_ways_to_the_last_bit(node, phase, inclination, oblate):
+    low = limited(leo(node_rad=node, phase_rad=phase, inclination_rad=inclination), "nadir", (1.0, 0.0, -0.5), 1.7)
+    high = limited(SLOT, "nadir", regard=0.15, sun=5.0 * deg)
+    earth = FLAT if oblate else ROUND
+    assert contacts(low, high, earth, EPOCH, DAY) == contacts(high, low, earth, EPOCH, DAY)
+
+
+def test_contacts_with_each_are_those_with_one_with_and_without_samples():
+    satellite = free(leo())
+    relays = [limited(GeostationarySlot(f"GEO {k}", EPOCH, 1.5 * k), "nadir", regard=0.14) for k in range(3)]
+    kept = [Sampled.over(r.orbit, DAY, coarse_step_s(satellite.orbit, 0.0)) for r in relays]
+    alone = [contacts(satellite, relay, FLAT, EPOCH, DAY) for relay in relays]
+    coarse = [Sampled.over(r.orbit, DAY) for r in relays]
+    for samples in ((), kept, coarse):
+        together = contacts_with_each(satellite, relays, FLAT, EPOCH, DAY, samples)
+        for one, other in zip(together, alone, strict=True):
+            assert [(c.begins, c.ends) for c in one] == [(c.begins, c.ends) for c in other]
+            np.testing.assert_allclose(ends(one), ends(other), rtol=0, atol=one_microsecond)
+    assert contacts_with_each(satellite, (), FLAT, EPOCH, DAY) == ()
+
+
+def test_samples_kept_are_used(monkeypatch):
+    relay = free(SLOT)
+    kept = Sampled.over(SLOT, DAY, 60.0)
+    asked = []
+    states = GeostationarySlot.states
+    monkeypatch.setattr(GeostationarySlot, "states", lambda self, t: asked.append(np.size(t)) or states(self, t))
+    contacts_with_each(free(leo()), [relay], ROUND, EPOCH, DAY, [kept])
+    assert max(asked) < 1441
+
+
+def test_the_steps_follow_the_perigee():
+    assert coarse_step_s(leo(), 0.0) == coarse_step_s(leo(altitude_m=120e3, j2=True), 0.0) == 60.0
+    assert coarse_step_s(SLOT, 0.0) == 960.0
+    assert coarse_step_s(KeplerOrbit("GTO", EPOCH, 24400e3, 0.72, 0.1, 0.0, 0.0, 3.0, False), 0.0) == 30.0
+    np.testing.assert_array_equal(coarse_times((10.0, 100.0), 60.0), [10.0, 32.5, 55.0, 77.5, 100.0])
+    with pytest.raises(OrbitError, match="from 5 s to 5 s holds no time"):
+        coarse_times((5.0, 5.0), 60.0)
+
+
+def test_the_ends_of_the_span_are_ends_of_contacts():
+    whole = contacts(free(leo()), free(SLOT), ROUND, EPOCH, DAY)
+    middle = 0.5 * (whole[3].start_s + whole[3].end_s)
+    first, *_, last = contacts(free(leo()), free(SLOT), ROUND, EPOCH, (middle, middle + 20000.0))
+    assert (first.start_s, first.begins, first.ends) == (middle, "start of the span", "Earth")
+    assert first.end_s == pytest.approx(whole[3].end_s, abs=one_microsecond)
+    assert last.end_s <= middle + 20000.0
+    (short,) = contacts(free(leo()), free(SLOT), ROUND, EPOCH, (middle, middle + 1.0))
+    assert (short.begins, short.ends, short.duration_s) == ("start of the span", "end of the span", 1.0)
+
+
+# ---- limits against a dense grid, by angles
+def plain_axes(attitude, states, sun):
+    """The axes of a body, (n, 3 axes, 3 components), with numpy's own products."""
+    r, v, s = states.position_m.T, states.velocity_m_s.T, sun.T
+    down = -r / np.linalg.norm(r, axis=1)[:, None]
+    if attitude == "nadir":
+        y = np.cross(v, r)
+        y /= np.linalg.norm(y, axis=1)[:, None]
+        return np.stack((np.cross(y, down), y, down), axis=1)
+    z = down - np.sum(down * s, axis=1)[:, None] * s
+    z /= np.linalg.norm(z, axis=1)[:, None]
+    return np.stack((s, np.cross(z, s), z), axis=1)
+
+
+def plain_direction(one, other, time_s):
+    """Direction to the partner in the body of a terminal, (n, 3)."""
+    states, sun = one.orbit.states(time_s), sun_direction(EPOCH, time_s)
+    away = (other.orbit.states(time_s).position_m - states.position_m).T
+    away /= np.linalg.norm(away, axis=1)[:, None]
+    if one.limits.attitude == "free":
+        return away
+    return np.einsum("nij,nj->ni", plain_axes(one.limits.attitude, states, sun), away)
+
+
+def angle(a, b):
+    return 2.0 * np.arctan2(np.linalg.norm(a - b, axis=-1), np.linalg.norm(a + b, axis=-1))
+
+
+def margins(one, other, time_s):
+    """By how much the limits of a terminal hold, each by its angle; the rate in units of its limit."""
+    limits, sun = one.limits, sun_direction(EPOCH, time_s)
+    boresight = np.array(limits.boresight) / np.linalg.norm(limits.boresight)
+    before, after = (plain_direction(one, other, time_s + by) for by in (-0.05, 0.05))
+    states = one.orbit.states(time_s)
+    night = shadow_rad(states.position_m, sun, "oblate")
+    away = other.orbit.states(time_s).position_m - states.position_m
+    off_sun = angle((away / np.linalg.norm(away, axis=0)).T, sun.T) - limits.sun_exclusion_rad
+    return {
+        f"field of regard of {one.name}": limits.field_of_regard_rad
+        - angle(plain_direction(one, other, time_s), boresight),
+        f"slew limit of {one.name}": 1.0 - angle(before, after) / 0.1 / limits.slew_limit_rad_s,
+        f"Sun near the line of sight of {one.name}": np.maximum(off_sun, night),
+        f"eclipse of {one.name}": np.full(time_s.shape, np.inf) if limits.in_eclipse else -night,
+    }
+
+
+def all_margins(pair, time_s):
+    clear = segment_is_clear(*(t.orbit.states(time_s).position_m for t in pair), FLAT)
+    return {"Earth": np.where(clear, 1.0, -1.0)} | margins(*pair, time_s) | margins(*pair[::-1], time_s)
+
+
+NEAR = leo("near", 505e3, 97.0 * deg, 1.0, 2.03)  # 200 km ahead at first
+LIMITED = {
+    "field of regard, nadir": (limited(leo(), "nadir", (1.0, 0.3, -0.7), 80 * deg), free(SLOT)),
+    "field of regard, sun": (limited(leo(), "sun", (0.0, 1.0, -1.0), 60 * deg), free(SLOT)),
+    "both fields of regard": (limited(leo(), "nadir", (0, 0, -1), 85 * deg), limited(SLOT, "nadir", regard=6 * deg)),
+    "slew, free": (limited(leo(), slew=150e-6), free(SLOT)),
+    "slew, nadir": (limited(leo(), "nadir", slew=1100e-6), free(SLOT)),
+    "slew, sun": (limited(leo(), "sun", slew=1500e-6), free(SLOT)),
+    "sun": (limited(leo(), sun=40 * deg), limited(SLOT, sun=20 * deg)),
+    "eclipse": (limited(leo(), night=False), free(SLOT)),
+    "two near one another": (limited(leo(), "nadir", (0, 1, 0), 30 * deg, 4e-3), limited(NEAR, slew=5e-3)),
+    "all": (
+        limited(leo(), "nadir", (1.0, 0.3, -0.7), 80 * deg, 1300e-6, 30 * deg, False),
+        limited(SLOT, "sun", (0.0, 0.0, 1.0), 95 * deg, math.inf, 10 * deg, False),
+    ),
+}
+
+
+@pytest.mark.parametrize("pair", LIMITED.values(), ids=LIMITED.keys())
+def test_limits_agree_with_a_dense_grid_and_name_the_cause(pair):
+    """Up to half a thousandth of the rate: an orbit without drifts does not turn as gravity with J2 would turn it."""
+    found = contacts(*pair, FLAT, EPOCH, DAY)
+    dense = np.arange(1.0, 86400.0, 20.0)
+    hold = all_margins(pair, dense)
+    assert any(np.any(each < 0.0) for cause, each in hold.items() if cause != "Earth"), "the limit is never met"
+    least = np.min(list(hold.values()), axis=0)
+    sure = far_from_ends(ends(found), dense, 0.1) & (np.abs(least) > 5e-4)
+    assert np.mean(sure) > 0.98
+    np.testing.assert_array_equal(inside(ends(found), dense)[sure], least[sure] > 0.0)
+    edges = [(c.start_s - 0.1, c.begins) for c in found] + [(c.end_s + 0.1, c.ends) for c in found]
+    edges = [(when, cause) for when, cause in edges if "span" not in cause]
+    beyond = all_margins(pair, np.array([when for when, _ in edges]))
+    for index, (_, cause) in enumerate(edges):
+        assert {name for name, margin in beyond.items() if margin[index] < 5e-4} >= set(cause.split(" and "))
+
+
+@pytest.mark.parametrize("held", ["nadir", "sun"])
+@pytest.mark.parametrize("orbit", [leo(), SLOT, PARTNERS["elongated"]], ids=["low", "slot", "elongated"])
+def test_the_rate_of_a_body_is_that_of_its_axes(held, orbit):
+    time_s, by = np.arange(100.0, 86400.0, 500.0), 0.5
+    states, sun = orbit.states(time_s), sun_direction(EPOCH, time_s)
+    rate = attitude.body_rate_rad_s(held, states, sun)
+    before, after = (attitude.body_axes(held, orbit.states(t), sun) for t in (time_s - by, time_s + by))
+    now = attitude.body_axes(held, states, sun)
+    np.testing.assert_allclose(now, np.moveaxis(plain_axes(held, states, sun), 0, -1), atol=1e-14)
+    for axis in range(3):
+        turned = np.cross(rate, now[axis], axis=0)
+        tolerance = 1e-3 * np.linalg.norm(rate, axis=0).max()
+        np.testing.assert_allclose(turned, (after[axis] - before[axis]) / (2 * by), rtol=0, atol=tolerance)
+
+
+class Integrated:
+    """Motion under gravity with the flattening, by an integrator of order 8 with its own interpolation."""
+
+    def __init__(self, name, orbit):
+        def slope(_, y):
+            return np.concatenate((y[3:], gravity(y[:3, None], True)[:, 0]))
+
+        start = np.concatenate([vector[:, 0] for vector in orbit.states(np.zeros(1))])
+        self.name = name
+        self.solution = solve_ivp(slope, (0.0, 6000.0), start, "DOP853", rtol=1e-12, atol=1e-6, dense_output=True).sol
+
+    def states(self, time_s):
+        both = self.solution(time_s)
+        return States(both[:3], both[3:])
+
+
+def test_gravity_turns_the_normal_of_an_orbit_and_with_it_the_body():
+    orbit, by = Integrated("LEO", leo()), 5.0
+    time_s = np.arange(100.0, 5900.0, 100.0)
+    sun = np.tile([[1.0], [0.0], [0.0]], time_s.size)
+    states = orbit.states(time_s)
+    rate = attitude.body_rate_rad_s("nadir", states, sun)
+    lift = np.abs(np.sum(rate * states.position_m, axis=0)) / np.linalg.norm(states.position_m, axis=0)
+    assert lift.max() > 3e-7
+    before, now, after = (attitude.body_axes("nadir", orbit.states(time_s + h), sun)[1] for h in (-by, 0.0, by))
+    slope = (after - before) / (2.0 * by)  # of the orbit normal, which nothing else turns
+    np.testing.assert_allclose(np.cross(rate, now, axis=0), slope, rtol=0, atol=1e-4 * lift.max())
+
+
+def test_the_sun_behind_the_earth_does_not_blind():
+    """At an equinox the Sun, the Earth and a slot are in one line once a day."""
+    blind = limited(SLOT, sun=60 * deg)
+    found = contacts(free(leo()), blind, ROUND, EPOCH, DAY)
+    dense = np.arange(0.0, 86400.0, 5.0)
+    night = shadow_rad(SLOT.states(dense).position_m, sun_direction(EPOCH, dense), "sphere") > 0.0
+    seen = inside(ends(found), dense)
+    assert np.any(seen & night) and "Sun near the line of sight of GEO" in {c.ends for c in found}
+
+
+@pytest.mark.parametrize(
+    ("changed", "message"),
+    [
+        ({"attitude": "spin"}, "attitude 'spin' is not known; write nadir, sun or free"),
+        ({"boresight": (0.0, 0.0, 0.0)}, "has no direction"),
+        ({"boresight": (0.0, math.nan, 1.0)}, "has no direction"),
+        ({"field_of_regard_rad": 0.0}, "field of regard of 0 rad is out of range"),
+        ({"field_of_regard_rad": 3.2}, "field of regard of 3.2 rad is out of range"),
+        ({"field_of_regard_rad": 1.0}, 'means nothing with the attitude "free"'),
+        ({"slew_limit_rad_s": 0.0}, "slew limit of 0 rad/s is out of range"),
+        ({"sun_exclusion_rad": -0.1}, "Sun exclusion of -100 mrad is out of range"),
+        ({"sun_exclusion_rad": math.nan}, "Sun exclusion of nan rad is out of range"),
+    ],
+)
+def test_limits_that_mean_nothing_are_refused(changed, message):
+    values = {key: getattr(UNLIMITED, key) for key in Limits.__slots__}
+    with pytest.raises(OrbitError) as refused:
+        Limits(**(values | changed))
+    assert message in str(refused.value)
+
+
+def test_two_terminals_of_one_name_or_in_one_place_are_refused():
+    with pytest.raises(OrbitError, match='two terminals are called "LEO"'):
+        contacts(free(leo()), free(leo()), ROUND, EPOCH, DAY)
+    with pytest.raises(OrbitError, match="LEO and twin are at the same place at 0 s"):
+        contacts(limited(leo(), slew=1e-3), Terminal(leo(), UNLIMITED, "twin"), ROUND, EPOCH, DAY)
+    with pytest.raises(OrbitError, match="LEO and LEO are at the same place"):
+        sight(leo(), leo(), [0.0])
+
+
+def test_a_terminal_below_the_grazing_height_is_refused_by_name():
+    with pytest.raises(OrbitError, match=r"GEO \(first\) and LEO \(second\): the second terminal \(sample [0-9]+\)"):
+        contacts(free(SLOT), free(leo()), Earth("oblate", 600e3), EPOCH, DAY)
+
+
+# ---- the line of sight against differences
+MOVING = {"slot": SLOT, "low": PARTNERS["another low orbit"], "elongated": PARTNERS["elongated"]}
+
+
+@pytest.mark.parametrize("partner", MOVING.values(), ids=MOVING.keys())
+def test_the_rates_of_the_line_of_sight_are_those_of_its_differences(partner):
+    low, other = Integrated("LEO", leo()), Integrated("other", partner)
+    time_s, by = np.arange(100.0, 5900.0, 50.0), 0.5
+    before, now, after = (sight(low, other, time_s + h) for h in (-by, 0.0, by))
+    assert now.direction.shape == (3, time_s.size)
+    np.testing.assert_allclose(np.linalg.norm(now.direction, axis=0), 1.0, rtol=1e-15)
+    closing = (after.range_m - before.range_m) / (2.0 * by)
+    np.testing.assert_allclose(now.range_rate_m_s, closing, rtol=0, atol=0.01)
+    rate = np.linalg.norm(after.direction - before.direction, axis=0) / (2.0 * by)
+    np.testing.assert_allclose(now.rate_rad_s, rate, rtol=1e-5)
+    np.testing.assert_allclose(now.transverse_velocity_m_s, rate * now.range_m, rtol=1e-5)
+    # the change of the rate as a vector: the product of the direction and its second difference
+    second = (after.direction - 2.0 * now.direction + before.direction) / by**2
+    change = np.linalg.norm(np.cross(now.direction, second, axis=0), axis=0)
+    np.testing.assert_allclose(now.acceleration_rad_s2, change, rtol=0, atol=1e-5 * change.max())
+
+
+def test_the_line_of_sight_is_the_same_from_the_other_end():
+    there, back = sight(leo(), SLOT, np.arange(0.0, 6000.0, 100.0)), sight(SLOT, leo(), np.arange(0.0, 6000.0, 100.0))
+    np.testing.assert_array_equal(there.direction, -back.direction)
+    for name in ("range_m", "range_rate_m_s", "rate_rad_s", "acceleration_rad_s2", "point_ahead_rad"):
+        np.testing.assert_array_equal(getattr(there, name), getattr(back, name))
+
+
+def test_point_ahead_and_doppler_shift_are_those_of_the_velocities():
+    seen = sight(leo(), SLOT, np.arange(0.0, 6000.0, 100.0))
+    np.testing.assert_array_equal(seen.point_ahead_rad, [point_ahead_rad(v) for v in seen.transverse_velocity_m_s])
+    np.testing.assert_array_equal(seen.doppler_hz(1e-6), -seen.range_rate_m_s / 1e-6)
+    coming = np.flatnonzero(np.diff(seen.range_m) < 0.0)[0]
+    assert seen.doppler_hz(1e-6)[coming] > 0.0
+    with pytest.raises(OrbitError, match="give one above 0 m"):
+        seen.doppler_hz(0.0)
+
+
+# ---- skyfield
+LEO_ELEMENTS = {"bstar": 5e-5, "ecco": 0.0012, "argpo": 1.2, "inclo": 97.4 * deg, "mo": 0.7, "no": 15.2, "nodeo": 2.0}
+GEO_ELEMENTS = {"bstar": 0.0, "ecco": 3e-4, "argpo": 0.4, "inclo": 0.05 * deg, "mo": 2.4, "no": 1.00273, "nodeo": 1.0}
+
+
+def satellite_record(bstar, ecco, argpo, inclo, mo, no, nodeo):
+    from sgp4.api import WGS72, Satrec
+
+    record = Satrec()
+    since_1949 = sum(EPOCH.julian_date) - 2433281.5 - 0.4
+    record.sgp4init(
+        WGS72, "i", 90001, since_1949, bstar, 0.0, 0.0, ecco, argpo, inclo, mo, no * 2 * math.pi / 1440, nodeo
+    )
+    return record
+
+
+class FromRecord:
+    """An orbit by SGP4, with nothing between."""
+
+    def __init__(self, name, record):
+        self.name, self.record = name, record
+
+    def states(self, time_s):
+        day, share = EPOCH.julian_date
+        error, r, v = self.record.sgp4_array(np.full(time_s.shape, day), share + time_s / 86400.0)
+        assert not error.any()
+        return States(1e3 * np.ascontiguousarray(r.T), 1e3 * np.ascontiguousarray(v.T))
+
+
+@pytest.fixture(scope="module")
+def sky():
+    """A week of skyfield: its time scale, its satellites, its start and end."""
+    from skyfield.api import EarthSatellite, load
+
+    scale = load.timescale(builtin=True)
+    records = satellite_record(**LEO_ELEMENTS), satellite_record(**GEO_ELEMENTS)
+    low, high = (EarthSatellite.from_satrec(record, scale) for record in records)
+    start = scale.utc(2026, 3, 20, 12)
+    return SimpleNamespace(
+        scale=scale,
+        low=low,
+        high=high,
+        orbits=(FromRecord("LEO", records[0]), FromRecord("GEO", records[1])),
+        start=start,
+        end=scale.tt_jd(start.tt + 7.0),
+        seconds=lambda t: (t.tt - start.tt) * 86400.0,
+    )
+
+
+def edges_of_skyfield(sky, high):
+    """Changes of visibility over the sphere by skyfield's positions, its test and its search, with what it is after."""
+    from skyfield.almanac import find_discrete
+
+    def visible(t):
+        return ~(high - sky.low).at(t).is_behind_earth()
+
+    visible.step_days = 200.0 / 86400.0
+    times, values = find_discrete(sky.start, sky.end, visible)
+    return sky.seconds(times), values
+
+
+@pytest.mark.parametrize("kind", ["slot", "elements"])
+def test_a_week_of_contacts_is_that_of_skyfield_within_a_second(sky, kind):
+    from skyfield.api import wgs84
+
+    partner, high = {
+        "slot": (SLOT, wgs84.latlon(0.0, 0.3 / deg, elevation_m=GEOSTATIONARY_RADIUS_M - EARTH_RADIUS_M)),
+        "elements": (sky.orbits[1], sky.high),
+    }[kind]
+    low = sky.orbits[0]
+    found = contacts(free(low), free(partner), ROUND, EPOCH, WEEK)
+    assert found == contacts(free(partner), free(low), ROUND, EPOCH, WEEK)
+    times, values = edges_of_skyfield(sky, high)
+    starts = [c.start_s for c in found if c.begins == "Earth"]
+    stops = [c.end_s for c in found if c.ends == "Earth"]
+    assert len(starts) > 90
+    np.testing.assert_allclose(starts, times[values == 1], rtol=0, atol=one_second)
+    np.testing.assert_allclose(stops, times[values == 0], rtol=0, atol=one_second)
+
+
+@pytest.mark.parametrize("place", [(78.2, 15.4, 450.0, 5.0), (-33.0, -70.7, 600.0, 10.0), (0.0, 0.0, 0.0, 60.0)])
+def test_a_week_of_passes_is_that_of_skyfield_within_a_second(sky, place):
+    from skyfield.api import wgs84
+
+    latitude, longitude, height, mask = place
+    station = Station("ground", latitude * deg, longitude * deg, height, mask * deg)
+    found = passes(sky.orbits[0], station, EPOCH, WEEK)
+    topos = wgs84.latlon(latitude, longitude, elevation_m=height)
+    times, kinds = sky.low.find_events(topos, sky.start, sky.end, altitude_degrees=mask)
+    rises, tops, sets = (sky.seconds(times[kinds == k]) for k in range(3))
+    assert all((p.begins, p.ends) == ("elevation mask of ground",) * 2 for p in found) and found
+    np.testing.assert_allclose([p.start_s for p in found], rises, rtol=0, atol=one_second)
+    np.testing.assert_allclose([p.end_s for p in found], sets, rtol=0, atol=one_second)
+    np.testing.assert_allclose([p.highest_s for p in found], tops, rtol=0, atol=one_second)
+    highest = (sky.low - topos).at(times[kinds == 1]).altaz()[0].radians
+    # skyfield's search stops at half a second; its elevation at our ends does not
+    at_ends = sky.scale.tt_jd(sky.start.tt + np.sort(ends(found).ravel()) / 86400.0)
+    np.testing.assert_allclose((sky.low - topos).at(at_ends).altaz()[0].radians, mask * deg, rtol=0, atol=2e-5)
+    np.testing.assert_allclose([p.highest_rad for p in found], highest, rtol=0, atol=1e-4)
+
+
+@settings(max_examples=20, deadline=None)
+@given(any_angle, any_angle, st.floats(-1.5, 1.5), st.floats(0.0, 1.5))
+def test_passes_agree_with_a_dense_grid(node, phase, latitude, mask):
+    station, low = Station("ground", latitude, 0.4, 0.0, mask), leo(altitude_m=400e3, node_rad=node, phase_rad=phase)
+    found = passes(low, station, EPOCH, DAY)
+    dense = np.arange(0.0, 86400.0, 1.0)
+    elevation = elevation_rad(station, EPOCH, dense, low.states(dense).position_m)
+    sure = far_from_ends(ends(found), dense, one_millisecond)
+    np.testing.assert_array_equal(inside(ends(found), dense)[sure], elevation[sure] > mask)
+    for one in found:
+        in_pass = (dense >= one.start_s) & (dense <= one.end_s)
+        assert one.highest_rad >= elevation[in_pass].max(initial=0.0)
+        assert one.start_s <= one.highest_s <= one.end_s
+        at = elevation_rad(station, EPOCH, np.array([one.highest_s]), low.states(np.array([one.highest_s])).position_m)
+        assert one.highest_rad == pytest.approx(float(at[0]), abs=1e-12)

@@ -1,0 +1,439 @@
+"""Figures of a day in orbit: what stands in them, what their tables hold, and what they say when there is nothing."""
+
+import csv
+import math
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+from microrad.report import day_assumptions, day_figures, day_map, write_columns
+from microrad.report.day_assumptions import MOST_BARS, Assumed, assumptions
+from microrad.report.day_figures import (
+    Windows,
+    along_contact,
+    contact_run,
+    duration,
+    latency,
+    reached_s,
+    short,
+    timeline,
+    volume,
+)
+from microrad.report.day_map import Marked, Places, broken, land, other_side, world_map
+from microrad.report.figures import svg_of
+
+NAME = 'Kiruna <b>"A&B"</b> $x$ $\\nonsense$'
+NOTHING = np.empty(0)
+NO_PLACES = Places(NOTHING, NOTHING)
+SPAN_S = (0.0, 86400.0)
+EPOCH = "2026-03-20T12:00:00Z"
+
+
+def texts(figure):
+    """Every text in the picture, as a reader of the SVG gets it."""
+    root = ElementTree.fromstring(figure.svg)
+    return ["".join(e.itertext()).strip() for e in root.iter("{http://www.w3.org/2000/svg}text")]
+
+
+def intervals(count, long_s):
+    start_s = np.linspace(*SPAN_S, count, endpoint=False)
+    return np.stack([start_s, start_s + long_s], axis=1)
+
+
+def circle(latitude_deg, longitude_deg, radius_deg, points=361):
+    """Points at one angle from a place, by rotating vectors."""
+    latitude, longitude, radius = np.radians([latitude_deg, longitude_deg, radius_deg])
+    at = np.linspace(0.0, 2.0 * np.pi, points)
+    up = np.array([np.cos(latitude) * np.cos(longitude), np.cos(latitude) * np.sin(longitude), np.sin(latitude)])
+    east = np.array([-np.sin(longitude), np.cos(longitude), 0.0])
+    north = np.cross(up, east)
+    ring = np.cos(radius) * up + np.sin(radius) * (np.cos(at)[:, None] * north + np.sin(at)[:, None] * east)
+    return Places(np.arcsin(ring[:, 2]), np.arctan2(ring[:, 1], ring[:, 0]))
+
+
+def marked(latitude_deg, longitude_deg, radius_deg):
+    at = np.radians([[latitude_deg], [longitude_deg]])
+    return Marked(Places(*at), circle(latitude_deg, longitude_deg, radius_deg))
+
+
+def winding(rings, x, y):
+    """How often closed rings of (x, y) run around a point, anticlockwise positive."""
+    a, b = (np.concatenate([ring[part] for ring in rings]).T for part in (slice(None, -1), slice(1, None)))
+    left = (b[0] - a[0]) * (y - a[1]) - (x - a[0]) * (b[1] - a[1])
+    return int(np.sum((a[1] <= y) & (y < b[1]) & (left > 0.0)) - np.sum((b[1] <= y) & (y < a[1]) & (left < 0.0)))
+
+
+def a_track(inclination_deg=97.4, points=400):
+    phase = np.linspace(0.0, 6.0 * np.pi, points)
+    tilt = math.radians(inclination_deg)
+    longitude = np.arctan2(np.sin(phase) * np.cos(tilt), np.cos(phase)) - phase / 15.2
+    return Places(np.arcsin(np.sin(phase) * np.sin(tilt)), longitude)
+
+
+def a_timeline():
+    return timeline([("relay", intervals(15, 2400.0)), (f"direct: {NAME}", intervals(200, 60.0))], SPAN_S, EPOCH)
+
+
+def a_contact():
+    t = np.linspace(0.0, 2400.0, 100)
+    return along_contact(t, 4e7 + t, 5e-5 - 1e-9 * t, 1e-4 + 1e-9 * t, 4e9 - 3e6 * t)
+
+
+def a_volume():
+    t = np.linspace(0.0, 86400.0, 50)
+    return volume({"generated": (t, t * 8e5), NAME: (t, t * 4e5)}, {NAME: (t, t * 4e5)})
+
+
+def a_latency():
+    share = np.linspace(0.001, 1.0, 1000)
+    return latency({NAME: (30.0 * share, share), "direct downlink": (40000.0 * share, 0.75 * share)})
+
+
+def a_map():
+    track = a_track()
+    flags = {"relay": np.cos(track.longitude_rad) > 0.0, "direct": track.latitude_rad > 1.2}
+    return world_map(track, flags, {"GEO": marked(0.0, 20.0, 103.0)}, {NAME: marked(67.9, 21.0, 18.0)})
+
+
+def some_assumptions():
+    return assumptions([Assumed("cloud", 7.0, 7.0), Assumed(NAME, 6.0, 9.0), Assumed("rate", 12.0, 5.0)], 7.0, "ratio")
+
+
+def a_run():
+    states = [("slew", 0.0, 30.0), (NAME, 30.0, 32.0), ("data", 32.0, 1000.0), ("loss", 1000.0, 1002.0)]
+    states += [("data", 1010.0, 2000.0)]
+    t = np.arange(60.0, 2000.0, 60.0)
+    return contact_run(states, Windows(t, np.full(t.size, 1.5e-6), np.full(t.size, 5e-6)), 1e-5)
+
+
+FIGURES = {
+    a_timeline: (f"hours since {EPOCH}", "relay", "15 · 10 h", "200 · 3.33 h", "24"),
+    a_contact: (
+        "range (km)",
+        "point-ahead angle (µrad)",
+        "line-of-sight rate (µrad/s)",
+        "Doppler shift (GHz)",
+        "time since rise (min)",
+    ),
+    a_volume: ("since the start (GB)", "stored on board (GB)", "time (h)", "generated"),
+    a_latency: (
+        "time from recording to delivery",
+        "share of the data (%)",
+        "10 s",
+        "10 min",
+        "6 h",
+        "direct downlink: median 7.41 h, 75 % arrive",
+    ),
+    a_map: ("60° N", "30° S", "120° W", "60° E", "GEO", "ground track", "relay", "direct", "hidden from a relay"),
+    some_assumptions: ("ratio; as assumed: 7", "assumption lower", "assumption higher", "cloud", "no change"),
+    a_run: (
+        "time since the start of the contact (min)",
+        "radial error (µrad)",
+        "rms",
+        "largest",
+        "required: 10 µrad",
+        "2 · 32.6 min",
+    ),
+}
+
+
+@pytest.mark.parametrize("draw", FIGURES, ids=lambda draw: draw.__name__)
+def test_labels_and_units_stand_in_the_picture_and_two_calls_agree(draw):
+    figure = draw()
+    missing = set(FIGURES[draw]) - set(texts(figure))
+    assert not missing, texts(figure)
+    assert draw().svg == figure.svg
+    assert figure.caption.endswith(".")
+
+
+@pytest.mark.parametrize("draw", [draw for draw in FIGURES if draw is not a_contact], ids=lambda draw: draw.__name__)
+def test_a_name_of_the_mission_stays_text(draw):
+    figure = draw()
+    assert "<b>" not in figure.svg
+    assert any(short(NAME, 24)[:-1] in text for text in texts(figure))
+    assert any(NAME in heading for heading in figure.columns)
+
+
+def test_a_name_is_cut_and_kept_on_one_line():
+    assert short("Kiruna") == "Kiruna"
+    assert short("a\nb\x00c") == "a b c"
+    assert short("x" * 35) == "x" * 33 + "…"
+    assert [duration(s) for s in (0.0, 119.0, 120.0, 7199.0, 7200.0)] == ["0 s", "119 s", "2 min", "120 min", "2 h"]
+
+
+@pytest.mark.parametrize(
+    ("draw", "words"),
+    [
+        (lambda: timeline([], SPAN_S, EPOCH), "no contacts and no eclipses to show"),
+        (lambda: timeline([("relay", np.empty((0, 2)))], SPAN_S, EPOCH), "none"),
+        (lambda: along_contact(*[NOTHING] * 5), "no contact in this span"),
+        (lambda: volume({}, {}), "no data were generated"),
+        (lambda: latency({}), "nothing was delivered"),
+        (lambda: latency({"relay": (NOTHING, NOTHING)}), "nothing was delivered"),
+        (lambda: world_map(NO_PLACES, {"relay": np.empty(0, bool)}, {}, {}), "no ground track"),
+        (lambda: assumptions([], 3.0, "ratio"), "no assumption was varied"),
+        (lambda: assumptions([Assumed("a", 1.0, 2.0)], math.inf, "ratio"), "ratio: no finite value"),
+        (lambda: contact_run([], Windows(*[NOTHING] * 3)), "no contact was run"),
+        (lambda: contact_run([("slew", 0.0, 9.0)], Windows(*[NOTHING] * 3)), "no window was simulated in full"),
+    ],
+)
+def test_what_is_missing_is_said_and_still_has_a_table(draw, words, tmp_path):
+    figure = draw()
+    assert words in texts(figure)
+    write_columns(figure.columns, tmp_path / "empty.csv")
+    assert (tmp_path / "empty.csv").read_text(encoding="utf-8").strip()
+
+
+def test_relays_and_stations_show_without_a_track_or_an_outline():
+    bare = Marked(Places(np.array([0.1]), np.array([3.1])), NO_PLACES)
+    figure = world_map(NO_PLACES, {}, {"GEO": bare}, {"Kiruna": marked(67.9, 21.0, 18.0)})
+    assert {"GEO", "Kiruna", "no ground track"} <= set(texts(figure))
+
+
+# ------------------------------------------------------------------------------------------------ tables
+
+
+def test_the_tables_hold_what_was_given(tmp_path):
+    first, second = intervals(15, 2400.0), intervals(3, 10.0)
+    figure = timeline([("relay", first), ("eclipse", second)], SPAN_S, EPOCH)
+    assert list(figure.columns["relay, start (s)"]) == list(first[:, 0])
+    assert list(figure.columns["eclipse, end (s)"]) == list(second[:, 1])
+    write_columns(figure.columns, tmp_path / "t.csv")
+    with (tmp_path / "t.csv").open(encoding="utf-8") as file:
+        rows = [*csv.DictReader(file)]
+    assert [float(row["relay, end (s)"]) for row in rows] == pytest.approx(first[:, 1], rel=1e-8)
+    assert [row["eclipse, start (s)"] for row in rows[3:]] == [""] * 12
+
+
+def test_the_tables_of_curves_are_in_si():
+    t, a = np.arange(5.0), np.arange(5.0) + 1.0
+    found = along_contact(t, a, 2 * a, 3 * a, 4 * a).columns
+    headings = ["time since rise (s)", "range (m)", "point-ahead (rad)", "line-of-sight rate (rad/s)", "Doppler (Hz)"]
+    assert [*found] == headings
+    for heading, values in zip(headings, (t, a, 2 * a, 3 * a, 4 * a), strict=True):
+        assert list(found[heading]) == list(values)
+    found = volume({"relay": (t, a)}, {"relay": (t, 2 * a)}).columns
+    assert list(found["relay, since the start (bit)"]) == list(a)
+    assert list(found["relay, stored (bit)"]) == list(2 * a)
+    found = latency({"relay": (a, t / 4.0)}).columns
+    assert list(found["relay, latency (s)"]) == list(a)
+    assert list(found["relay, share"]) == list(t / 4.0)
+
+
+def test_the_tables_of_states_assumptions_and_the_map():
+    found = a_run().columns
+    assert list(found["data, start (s)"]) == [32.0, 1010.0]
+    assert list(found["data, end (s)"]) == [1000.0, 2000.0]
+    assert set(found["largest (rad)"]) == {5e-6}
+    found = some_assumptions().columns
+    assert [found[key][0] for key in ("as assumed", "rate, lower", "rate, higher", "cloud, lower")] == [7, 12, 5, 7]
+    found, track = a_map().columns, a_track()
+    assert found["track, latitude (deg)"] == pytest.approx(np.degrees(track.latitude_rad))
+    turns = (found["track, longitude (deg)"] - np.degrees(track.longitude_rad)) / 360.0
+    assert turns == pytest.approx(np.round(turns), abs=1e-9)
+    assert np.all(np.abs(found["track, longitude (deg)"]) <= 180.0)
+    assert list(found["in contact: relay"]) == list((np.cos(track.longitude_rad) > 0.0).astype(float))
+    assert found["GEO, longitude (deg)"] == pytest.approx([20.0])
+    assert found["GEO, outline, latitude (deg)"].size == 361
+
+
+# ------------------------------------------------------------------------------------------------ what is drawn
+
+
+@pytest.fixture
+def canvases(monkeypatch):
+    """The canvases that are drawn, to look at the data in them."""
+    seen = []
+    for module in (day_figures, day_map, day_assumptions):
+        monkeypatch.setattr(module, "svg_of", lambda canvas: seen.append(canvas) or svg_of(canvas))
+    return seen
+
+
+def lines(axes):
+    return {line.get_label(): line.get_xydata().T for line in axes.get_lines()}
+
+
+@pytest.mark.parametrize("count", [1, 15, 200])
+def test_each_interval_is_a_bar_where_it_belongs(count, canvases):
+    given = intervals(count, 60.0)
+    timeline([("relay", given)], SPAN_S, EPOCH)
+    (bars,) = canvases[0].axes[0].collections
+    drawn = np.array([[path.vertices[:, 0].min(), path.vertices[:, 0].max()] for path in bars.get_paths()])
+    assert drawn == pytest.approx(given / 3600.0)
+
+
+def test_curves_are_drawn_in_the_unit_of_their_axis(canvases):
+    a_contact()
+    ends = [axes.get_lines()[0].get_ydata()[-1] for axes in canvases[0].axes]
+    assert ends == pytest.approx([40002.4, 50.0 - 2.4, 102.4, 4.0 - 7.2])
+    assert canvases[0].axes[0].get_lines()[0].get_xdata()[-1] == pytest.approx(40.0)
+    a_volume()
+    above, below = canvases[1].axes
+    assert lines(above)["generated"][:, -1] == pytest.approx([24.0, 8.64])
+    assert lines(below)[short(NAME)][:, -1] == pytest.approx([24.0, 4.32])
+    assert above.get_lines()[1].get_color() == below.get_lines()[0].get_color()
+    a_run()
+    errors = lines(canvases[2].axes[1])
+    assert (set(errors["rms"][1]), set(errors["largest"][1])) == ({1.5}, {5.0})
+
+
+def test_bars_reach_from_the_value_to_what_it_becomes(canvases):
+    some_assumptions()
+    bars = {(bar.get_y() + 0.35, *bar.get_facecolor()[:2]): bar for bar in canvases[0].axes[0].patches}
+    ends = sorted((round(row), bar.get_x(), bar.get_x() + bar.get_width()) for (row, *_), bar in bars.items())
+    assert ends == [(0, 7.0, 5.0), (0, 7.0, 12.0), (1, 7.0, 6.0), (1, 7.0, 9.0), (2, 7.0, 7.0), (2, 7.0, 7.0)]
+
+
+def test_the_track_is_thick_only_in_contact_and_one_region_is_shaded_for_each_relay(canvases):
+    track = a_track(28.0)
+    flags = np.cos(track.longitude_rad) > 0.0
+    world_map(track, {"relay": flags}, {n: marked(0.0, at, 103.0) for n, at in (("A", 0.0), ("B", 120.0))}, {})
+    axes = canvases[0].axes[0]
+    x = lines(axes)["relay"][0]
+    assert np.array_equal(x[np.isfinite(x)], track.degrees[0][flags])
+    assert np.sum(np.isfinite(lines(axes)["ground track"][0])) >= flags.size
+    assert len(axes.patches) == 1 + 2  # the land first
+
+
+@pytest.mark.parametrize(
+    ("bits", "unit"), [(7.9e3, "byte"), (8.1e3, "kB"), (8e9, "GB"), (7.9e12, "GB"), (8.1e12, "TB"), (9e30, "PB")]
+)
+def test_the_unit_of_the_volume_suits_the_largest(bits, unit):
+    t = np.array([0.0, 3600.0])
+    assert f"since the start ({unit})" in texts(volume({"generated": (t, np.array([0.0, bits]))}, {}))
+
+
+def test_a_day_without_data_has_an_axis_in_bytes():
+    t = np.array([0.0, 3600.0])
+    assert "stored on board (byte)" in texts(volume({"relay": (t, 0 * t)}, {"relay": (t, 0 * t)}))
+
+
+def test_median_and_99_percent_are_those_of_the_sample():
+    sample = np.sort(np.random.Generator(np.random.Philox(7)).lognormal(3.0, 1.0, 20001))
+    share = np.arange(1, sample.size + 1) / sample.size
+    for wanted in (0.5, 0.99):
+        assert reached_s(sample, share, wanted) == pytest.approx(np.quantile(sample, wanted), rel=1e-3)
+    assert reached_s(sample, 0.98 * share, 0.99) == math.inf
+    assert reached_s(NOTHING, NOTHING, 0.5) == math.inf
+    words = f"relay: median {duration(np.quantile(sample, 0.5))}, 99 % {duration(np.quantile(sample, 0.99))}"
+    assert words in texts(latency({"relay": (sample, share)}))
+
+
+def test_the_largest_change_is_on_top_and_the_least_are_left_to_the_table():
+    many = [Assumed(f"input {k:02d}", 5.0 - 0.1 * k, 5.0 + 0.05 * k) for k in range(MOST_BARS + 3)]
+    figure = assumptions(many, 5.0, "ratio")
+    names = [text for text in texts(figure) if text.startswith("input")]
+    assert names == [f"input {k:02d}" for k in range(MOST_BARS + 2, 2, -1)]
+    assert "3 more, which change less" in figure.caption
+    assert figure.columns["input 00, lower"][0] == 5.0
+
+
+def test_an_assumption_without_a_number_says_so_on_top():
+    figure = assumptions([Assumed("rate", 1.0, 9.0), Assumed("stations", math.inf, math.nan)], 5.0, "ratio")
+    found = texts(figure)
+    assert "lower: without bound, higher: no value" in found
+    assert found.index("stations") < found.index("rate")
+
+
+def test_a_lone_large_error_does_not_flatten_the_others():
+    t = np.arange(1.0, 40.0)
+    rms = np.full(t.size, 1.5e-6)
+    calm = texts(contact_run([("data", 0.0, 41.0)], Windows(t, rms, 3 * rms)))
+    wild = texts(contact_run([("data", 0.0, 41.0)], Windows(t, rms, np.where(t == 7.0, 3e-4, 3 * rms))))
+    assert "100" not in calm
+    assert {"10", "100"} <= set(wild)
+
+
+# ------------------------------------------------------------------------------------------------ map
+
+
+def test_land_is_closed_rings_that_cover_what_land_covers():
+    rings = land()
+    share = 0.0
+    for ring in rings:
+        assert ring.shape[0] >= 4
+        assert np.array_equal(ring[0], ring[-1])
+        assert np.all(np.abs(ring) <= [180.0, 90.0])
+        longitude, sine = np.radians(ring[:, 0]), np.sin(np.radians(ring[:, 1]))
+        share -= np.sum(np.diff(longitude) * (sine[:-1] + sine[1:]) / 2.0) / (4.0 * np.pi)
+    assert share == pytest.approx(0.292, abs=0.005)  # of the sphere; 148.9 of 510.1 million km²
+
+
+@pytest.mark.parametrize(
+    ("longitude", "latitude", "is_land"),
+    [
+        (10.0, 50.0, True),
+        (134.0, -25.0, True),
+        (-60.0, -10.0, True),
+        (0.0, -85.0, True),
+        (-179.0, -89.0, True),
+        (178.0, 68.0, True),  # Chukotka on both sides of the date line
+        (-175.0, 67.0, True),
+        (50.5, 42.0, False),  # the Caspian Sea
+        (0.0, 0.0, False),
+        (-150.0, 0.0, False),
+        (0.0, 85.0, False),
+        (179.0, 0.0, False),
+    ],
+)
+def test_land_lies_where_it_does(longitude, latitude, is_land):
+    assert (winding(land(), longitude + 0.013, latitude + 0.017) != 0) == is_land
+
+
+@pytest.mark.parametrize("inclination_deg", [0.0, 28.0, 51.6, 90.0, 97.4, 152.0])
+def test_no_line_runs_across_the_map_where_the_track_leaves_it(inclination_deg):
+    track = a_track(inclination_deg)
+    longitude, latitude = track.degrees
+    x, y = broken(longitude, latitude)
+    steps = np.abs(np.diff(x))
+    assert np.nanmax(steps) <= 60.0
+    assert set(np.flatnonzero(np.isnan(x))) == set(np.flatnonzero(np.isnan(y)))
+    for gap in np.flatnonzero(np.isnan(x)):
+        over_a_pole = abs(y[gap - 1]) == 90.0
+        assert y[gap - 1] == pytest.approx(y[gap + 1])
+        assert over_a_pole or (abs(x[gap - 1]) == 180.0 and x[gap + 1] == -x[gap - 1])
+    kept = [pair in {*zip(x.tolist(), y.tolist(), strict=True)} for pair in zip(longitude, latitude, strict=True)]
+    assert all(kept)
+
+
+def test_a_break_is_where_the_line_crosses_the_edge():
+    x, y = broken(np.array([170.0, -175.0, -160.0]), np.array([10.0, 25.0, 30.0]))
+    assert x == pytest.approx([170.0, 180.0, np.nan, -180.0, -175.0, -160.0], nan_ok=True)
+    assert y == pytest.approx([10.0, 20.0, np.nan, 20.0, 25.0, 30.0], nan_ok=True)
+    x, y = broken(np.array([-175.0, 170.0]), np.array([25.0, 10.0]))
+    assert x == pytest.approx([-175.0, -180.0, np.nan, 180.0, 170.0], nan_ok=True)
+    assert y == pytest.approx([25.0, 20.0, np.nan, 20.0, 10.0], nan_ok=True)
+    x, y = broken(np.array([10.0, -170.0]), np.array([-89.0, -89.0]))
+    assert y == pytest.approx([-89.0, -90.0, np.nan, -90.0, -89.0], nan_ok=True)
+    x, _ = broken(np.array([1.0, np.nan, 3.0]), np.array([1.0, 2.0, 3.0]))
+    assert x == pytest.approx([1.0, np.nan, 3.0], nan_ok=True)
+
+
+@pytest.mark.parametrize(
+    ("latitude", "longitude", "radius"),
+    [
+        (0.0, 20.0, 103.0),  # a geostationary relay seen from above: the hidden region is about the antipode
+        (0.0, 175.0, 103.0),
+        (0.0, 175.0, 76.0),  # less than half of the Earth: the region seen crosses the date line
+        (0.0, -60.0, 81.0),
+        (52.0, 160.0, 100.0),  # about a pole, seen from north or south
+        (-52.0, -170.0, 70.0),
+        (78.2, 15.4, 18.0),
+        (90.0, 0.0, 30.0),
+    ],
+)
+def test_the_hidden_region_is_what_lies_beyond_the_outline(latitude, longitude, radius):
+    each = marked(latitude, longitude, radius)
+    rings = [np.asarray(ring) for ring in other_side(each).to_polygons(closed_only=True)]
+    here = np.radians([latitude, longitude])
+    compared = 0
+    for y in np.arange(-88.5, 89.0, 11.0):
+        for x in np.arange(-179.2, 180.0, 13.0):
+            lat, lon = np.radians([y, x])
+            cosine = np.sin(here[0]) * np.sin(lat) + np.cos(here[0]) * np.cos(lat) * np.cos(lon - here[1])
+            away = math.degrees(math.acos(min(max(cosine, -1.0), 1.0))) - radius
+            if abs(away) > 1.0:
+                assert (winding(rings, x, y) != 0) == (away > 0.0), (x, y)
+                compared += 1
+    assert compared > 400

@@ -1,0 +1,851 @@
+"""Element sets and ephemeris files: what is read, against outside numbers, and each refusal."""
+
+import csv
+import io
+import json
+import math
+import pickle
+import subprocess
+import sys
+from datetime import UTC, datetime, timedelta
+from importlib.resources import files
+
+import numpy as np
+import pytest
+from sgp4.api import WGS72, Satrec
+from sgp4.exporter import export_omm, export_tle
+from skyfield.api import EarthSatellite, load
+from skyfield.framelib import ICRS_to_J2000, itrs, true_equator_and_equinox_of_date
+from skyfield.sgp4lib import TEME
+
+from microrad.orbit import oem, tle
+from microrad.orbit.base import OrbitError, States
+from microrad.orbit.epoch import Epoch
+from microrad.orbit.oem import read_oem
+from microrad.orbit.tle import closest_elements, read_elements, sgp4_orbit
+
+EPOCH = Epoch("2026-03-20T12:00:00Z")
+SCALE = load.timescale(builtin=True)
+ONE_MM = 1e-3
+
+
+def invented(number=90001, inclination_deg=97.4, mean_motion_rev_day=15.2, drag=1e-5, eccentricity=0.001, day=20.5):
+    """A satellite that does not exist, at an epoch in March 2026."""
+    satellite = Satrec()
+    days = (datetime(2026, 3, 1) - datetime(1949, 12, 31)).days + day - 1
+    satellite.sgp4init(
+        WGS72, "i", number, days, drag, 0.0, 0.0, eccentricity, 1.0, math.radians(inclination_deg), 2.0,
+        mean_motion_rev_day * 2 * math.pi / 1440, 3.0,
+    )  # fmt: skip
+    satellite.classification, satellite.intldesg, satellite.ephtype, satellite.elnum, satellite.revnum = (
+        "U", "26001A", 0, 1, 1,
+    )  # fmt: skip
+    return satellite
+
+
+LINE_1, LINE_2 = export_tle(invented())
+NAMED = f"EXAMPLE 1\n{LINE_1}\n{LINE_2}\n"
+
+
+def summed(line):
+    """The line with the checksum of its characters, by the words of the format: digits, and 1 for a minus."""
+    digits = sum(int(c) for c in line[:68] if c.isdigit()) + line[:68].count("-")
+    return line[:68] + str(digits % 10)
+
+
+def edited(line, column, text):
+    """The line with `text` from a column counted from 1, and a checksum that fits."""
+    return summed(line[: column - 1] + text + line[column - 1 + len(text) :])
+
+
+def close(found, expected, atol):
+    np.testing.assert_allclose(found, expected, rtol=0.0, atol=atol)
+
+
+def write(tmp_path, text, name="a.txt"):
+    path = tmp_path / name
+    path.write_bytes(text if isinstance(text, bytes) else text.encode())
+    return path
+
+
+def elements(tmp_path, text, name=None):
+    return read_elements(write(tmp_path, text), name)
+
+
+def refused(tmp_path, text, *words, read=read_elements):
+    path = write(tmp_path, text)
+    with pytest.raises(OrbitError) as caught:
+        read(path)
+    message = str(caught.value)
+    assert str(path) in message
+    for word in words:
+        assert word in message, message
+    return message
+
+
+# ----------------------------------------------------------------------------------------------------------------- TLE
+def test_tle_with_and_without_a_name(tmp_path):
+    (named,) = elements(tmp_path, NAMED)
+    assert named.name == "EXAMPLE 1" and named.catalogue_number == "90001"
+    assert named.epoch.text == "2026-03-20T12:00:00Z"
+    assert named.mean_motion_rad_s == pytest.approx(15.2 * 2 * math.pi / 86400, rel=1e-9)
+    assert named.inclination_rad == pytest.approx(math.radians(97.4), abs=1e-7)
+    assert named.drag_per_earth_radius == pytest.approx(1e-5, rel=1e-9)
+    assert named.place.endswith("line 2")
+    (bare,) = elements(tmp_path, f"{LINE_1}\r\n{LINE_2}\r\n")
+    assert bare.name == bare.catalogue_number == "90001"
+    (zero,) = elements(tmp_path, "\ufeff0 " + NAMED)
+    assert zero.name == "EXAMPLE 1"
+
+
+def test_checksum_counts_digits_and_minuses():
+    # Vallado et al. 2006, the first case of SGP4-VER.TLE
+    assert tle.checksum("1 00005U 58002B   00179.78495062  .00000023  00000-0  28098-4 0  4753") == 3
+    assert tle.checksum("2 00005  34.2682 348.7242 1859667 331.7664  19.3264 10.82419157413667") == 7
+
+
+def test_epoch_of_the_century_and_to_the_microsecond(tmp_path):
+    line_1 = edited(LINE_1, 19, "99366.00000000")
+    assert elements(tmp_path, f"{line_1}\n{LINE_2}")[0].epoch.text == "2000-01-01T00:00:00Z"
+    line_1 = edited(LINE_1, 19, "57366.00000000")
+    refused(tmp_path, f"{line_1}\n{LINE_2}", "day 366.00000000 of 1957")
+    line_1 = edited(LINE_1, 19, "26001.00000001")
+    assert elements(tmp_path, f"{line_1}\n{LINE_2}")[0].epoch.text == "2026-01-01T00:00:00.000864Z"
+
+
+def verification_cases():
+    """The cases of AIAA 2006-6753 that the package sgp4 carries: lines, and a table of minutes, km and km/s."""
+    text = files("sgp4").joinpath("SGP4-VER.TLE").read_text()
+    lines = [line for line in text.splitlines() if not line.startswith("#")]
+    blocks = {}
+    for line in files("sgp4").joinpath("tcppver.out").read_text().splitlines():
+        words = line.split()
+        if line.endswith("xx"):
+            rows = blocks.setdefault(words[0], [])
+        elif words:
+            rows.append([float(word) for word in words[:7]])
+    return [
+        (one[:69], two[:69], np.array(blocks[one[2:7].lstrip("0")]))
+        for one, two in zip(lines[::2], lines[1::2], strict=True)
+    ]
+
+
+def test_sgp4_against_the_published_verification(tmp_path):
+    """Positions within 1 mm, for all cases that are in orbit, up to 14 days from the epoch."""
+    checked, refusals = set(), {}
+    for one, two, every in verification_cases():
+        table = every[np.abs(every[:, 0]) <= 14 * 1440.0]
+        # an old case ends its line early, without a checksum
+        lines = [summed(line.ljust(69)) for line in (one, two)]
+        try:
+            (found,) = elements(tmp_path, "\n".join(lines))
+            states = sgp4_orbit(found, found.epoch).states(60.0 * table[:, 0])
+        except OrbitError as error:
+            refusals[one[2:7]] = str(error)
+            continue
+        close(states.position_m, 1000 * table[:, 1:4].T, atol=ONE_MM)
+        close(states.velocity_m_s, 1000 * table[:, 4:7].T, atol=1e-5)
+        checked.add(one[2:7])
+    assert len(checked) == 27
+    # four perigees from 82 km down to below the ground, and a mean motion of 1e-5 revolutions a day
+    assert set(refusals) == {"16925", "22312", "28872", "33333", "33334"}
+    assert sum("the perigee is" in text for text in refusals.values()) == 4 and "mean motion" in refusals["33334"]
+
+
+def test_sgp4_against_skyfield_in_teme_and_gcrs(tmp_path):
+    (found,) = elements(tmp_path, NAMED)
+    orbit = sgp4_orbit(found, Epoch("2026-03-22T03:04:05.25Z"))
+    time_s = np.linspace(0.0, 2 * 86400.0, 97)
+    states = orbit.states(time_s)
+    peer = EarthSatellite(LINE_1, LINE_2, ts=SCALE)
+    start = datetime(2026, 3, 22, 3, 4, 5, 250000, tzinfo=UTC)
+    instants = SCALE.from_datetimes([start + timedelta(seconds=float(t)) for t in time_s])
+    position_km, velocity_km_s, _ = peer._position_and_velocity_TEME_km(instants)
+    close(states.position_m, 1000 * position_km, atol=ONE_MM)
+    close(states.velocity_m_s, 1000 * velocity_km_s, atol=1e-6)
+    turned = np.einsum("jin,jn->in", TEME.rotation_at(instants), states.position_m)
+    close(turned, peer.at(instants).position.m, atol=ONE_MM)
+
+
+def test_states_in_any_order_and_for_one_time(tmp_path):
+    orbit = sgp4_orbit(elements(tmp_path, NAMED)[0], EPOCH)
+    time_s = np.array([5000.0, -300.0, 0.0])
+    states = orbit.states(time_s)
+    assert isinstance(states, States) and states.position_m.shape == (3, 3)
+    for k, t in enumerate(time_s):
+        np.testing.assert_array_equal(orbit.states(t).position_m, states.position_m[:, k])
+    assert orbit.name == "EXAMPLE 1" and orbit.states(np.empty(0)).position_m.shape == (3, 0)
+
+
+def test_leap_second_is_an_elapsed_second(tmp_path):
+    """From before to after the leap second of 2016-12-31 one second more passes than UTC shows."""
+    line_1 = edited(LINE_1, 19, "16366.50000000")
+    (found,) = elements(tmp_path, f"{line_1}\n{LINE_2}")
+    assert sgp4_orbit(found, Epoch("2017-01-01T12:00:00Z")).elements_age_s == 86401.0
+
+
+def test_copies_give_the_same_states(tmp_path):
+    orbit = sgp4_orbit(elements(tmp_path, NAMED)[0], EPOCH)
+    again = pickle.loads(pickle.dumps(orbit))
+    assert again == orbit
+    np.testing.assert_array_equal(again.states(60.0).position_m, orbit.states(60.0).position_m)
+
+
+def test_import_is_cheap():
+    """Neither sgp4, skyfield nor scipy come in before a file needs them."""
+    code = "import sys, microrad.orbit.tle; print({'sgp4', 'skyfield', 'scipy'} & set(sys.modules))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "set()\n"
+
+
+def catalogue(count=100):
+    text = []
+    for k in range(count):
+        one, two = export_tle(invented(90000 + k, inclination_deg=50 + 0.1 * k, mean_motion_rev_day=15 + 0.005 * k))
+        text += [f"EXAMPLE {k}", one, two]
+    return "\n".join(text)
+
+
+def test_a_hundred_satellites(tmp_path):
+    found = elements(tmp_path, catalogue())
+    assert len(found) == 100 and len({e.name for e in found}) == 100
+    for k in (0, 57, 99):
+        assert found[k].name == f"EXAMPLE {k}" and found[k].catalogue_number == str(90000 + k)
+        assert found[k].inclination_rad == pytest.approx(math.radians(50 + 0.1 * k), abs=1e-6)
+    path = tmp_path / "a.txt"
+    assert [e.name for e in read_elements(path, "example 7")] == ["EXAMPLE 7"]
+    assert [e.name for e in read_elements(path, "90042")] == ["EXAMPLE 42"]
+    with pytest.raises(OrbitError, match=r"none of its 100 element sets is of 'EXAMPEL 3'.*EXAMPLE 3"):
+        read_elements(path, "EXAMPEL 3")
+
+
+def test_closest_of_several_epochs(tmp_path):
+    sets = [export_tle(invented(day=day)) for day in (10.5, 19.0, 30.0)]
+    found = elements(tmp_path, "\n".join(line for pair in sets for line in pair))
+    assert closest_elements(found, EPOCH).epoch.text == "2026-03-19T00:00:00Z"
+    assert closest_elements(found, Epoch("2026-03-26T00:00:00Z")).epoch.text == "2026-03-30T00:00:00Z"
+    with pytest.raises(OrbitError, match=r"different satellites, EXAMPLE 0 \(90000\)"):
+        closest_elements(elements(tmp_path, catalogue(3)), EPOCH)
+
+
+WRONG_DIGIT = str((int(LINE_1[68]) + 1) % 10)
+TLE_FAULTS = {
+    "short line": (f"{LINE_1[:-1]}\n{LINE_2}", "line 1", "69 characters, this one 68"),
+    "long line": (f"{LINE_1}\n{LINE_2}7", "line 2", "69 characters, this one 70"),
+    "checksum of line 1": (
+        f"X\n{LINE_1[:68]}{WRONG_DIGIT}\n{LINE_2}",
+        "line 2", f"checksum of line 1 is {WRONG_DIGIT}", f"sum to {LINE_1[68]}",
+    ),
+    "checksum of line 2": (
+        f"{LINE_1}\n{LINE_2[:9]}8{LINE_2[10:]}", "line 2", f"checksum of line 2 is {LINE_2[68]}", "characters sum to"
+    ),
+    "no line number 1": (f"X\n  {LINE_1[2:]}\n{LINE_2}", "line 2", "line 1 of an element set must stand here"),
+    "no line number 2": (f"{LINE_1}\n  {LINE_2[2:]}", "line 2", "begin with '2 '"),
+    "line 2 first": (f"{LINE_2}\n{LINE_1}", "line 1", "begin with '1 '"),
+    "two names": ("A\nB\nC", "line 2", "line 1 of an element set"),
+    "line 2 missing": (f"A\n{LINE_1}\nB\n{LINE_1}\n{LINE_2}", "line 3", "begin with '2 '"),
+    "cut off": (LINE_1, "line 1", "line 2 of an element set must follow"),
+    "name alone": ("EXAMPLE", "line 1 of an element set must follow"),
+    "catalogue numbers": (f"{LINE_1}\n{edited(LINE_2, 3, '90002')}", "90001", "90002"),
+    "letters for digits": (f"{edited(LINE_1, 21, 'O79')}\n{LINE_2}", "day of the epoch", "columns 21 to 32", "'O79."),
+    "letters in line 2": (f"{LINE_1}\n{edited(LINE_2, 9, ' 9x.')}", "line 2", "inclination", "digits belong there"),
+    "day 367": (f"{edited(LINE_1, 21, '367')}\n{LINE_2}", "day 367.5", "from 1 to 366"),
+    "year 1960": (f"{edited(LINE_1, 19, '60')}\n{LINE_2}", "line 1", "1960", "outside"),
+    "SGP4-XP": (f"{edited(LINE_1, 63, '4')}\n{LINE_2}", "another theory than SGP4"),
+    "inclination 190": (f"{LINE_1}\n{edited(LINE_2, 9, '190.0000')}", "inclination is 190", "0 to 180 deg"),
+    "mean motion 0": (f"{LINE_1}\n{edited(LINE_2, 53, ' 0.00000000')}", "mean motion is 0", "revolutions a day"),
+    "comments alone": ("# nothing\n", "no element set is in the file"),
+    "empty": ("", "the file is empty"),
+    "blank": ("\n \n", "the file is empty"),
+    "binary": (b"\x1f\x8b\x08\x00\xff", "byte 2", "binary or a compressed file"),
+    "nul": (b"EXAMPLE\0", "byte 8", "binary"),
+    "ephemeris": ("CCSDS_OEM_VERS = 2.0\n", "CCSDS_OEM_VERS", "ephemeris (OEM) by its own key"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("fault", TLE_FAULTS)
+def test_malformed_tle(tmp_path, fault):
+    text, *words = TLE_FAULTS[fault]
+    refused(tmp_path, text, *words)
+
+
+def test_file_that_cannot_be_read(tmp_path, monkeypatch):
+    for path in (tmp_path / "absent.tle", tmp_path):
+        with pytest.raises(OrbitError, match="there is no such file"):
+            read_elements(path)
+    refused(tmp_path, NAMED * 300 + "\n" + catalogue(5)[:-1], "line ")
+    monkeypatch.setattr(oem, "MOST_BYTES", 100)
+    refused(tmp_path, NAMED, "more than the 0 MB that are read", "keep only")
+
+
+# --------------------------------------------------------------------------------------------------------------- decay
+def test_expired_elements(tmp_path):
+    (found,) = elements(tmp_path, NAMED)
+    late = sgp4_orbit(found, Epoch("2026-04-02T12:00:00Z"))
+    assert late.elements_age_s == 13 * 86400.0
+    late.require(0.0, 86400.0)
+    with pytest.raises(OrbitError) as caught:
+        late.require(0.0, 3 * 86400.0)
+    message = str(caught.value)
+    for word in (
+        "expired",
+        "2026-03-20T12:00:00Z",
+        "2026-04-02T12:00:00Z",
+        "16.0 days",
+        "newer elements",
+        "orbit.epoch",
+    ):
+        assert word in message
+    with pytest.raises(OrbitError, match="expired"):
+        late.states(np.array([0.0, 86402.0]))
+    early = sgp4_orbit(found, Epoch("2026-03-01T12:00:00Z"))
+    with pytest.raises(OrbitError, match=r"not valid yet.*19\.0 days.*older elements"):
+        early.require(0.0, 86400.0)
+    with pytest.raises(OrbitError, match="not a finite number"):
+        late.states(np.array([0.0, np.nan]))
+
+
+def test_low_perigee_at_the_epoch_and_later(tmp_path):
+    one, two = export_tle(invented(mean_motion_rev_day=16.56))
+    with pytest.raises(OrbitError, match=r"the perigee is \d+ km high at 2026-03-20T12:00:00.000Z; below 120 km"):
+        sgp4_orbit(elements(tmp_path, f"{one}\n{two}")[0], EPOCH)
+    one, two = export_tle(invented(mean_motion_rev_day=16.2, drag=2e-3))
+    orbit = sgp4_orbit(elements(tmp_path, f"{one}\n{two}")[0], EPOCH)
+    orbit.require(0.0, 3600.0)
+    with pytest.raises(OrbitError, match=r"perigee is|SGP4 stops"):
+        orbit.require(0.0, 10 * 86400.0)
+
+
+def test_decay_in_sgp4(tmp_path):
+    """Catalogue number 28872 of the published verification decays within an hour of its epoch (error 6)."""
+    one, two, _ = next(case for case in verification_cases() if case[0][2:7] == "28350")
+    (found,) = elements(tmp_path, f"{one}\n{two}")
+    orbit = sgp4_orbit(found, found.epoch)
+    with pytest.raises(OrbitError, match=r"SGP4 stops at 2006-.*it has decayed|perigee is"):
+        orbit.require(0.0, 13 * 86400.0)
+
+
+class Stopped:
+    """A satellite for which SGP4 reports an error."""
+
+    def __init__(self, code):
+        self.code, self.jdsatepoch, self.jdsatepochF = code, 2461120.0, 0.0
+
+    def sgp4_array(self, whole, fraction):
+        error = np.zeros(whole.size, dtype=np.uint8)
+        error[-1] = self.code
+        return error, np.zeros((whole.size, 3)), np.zeros((whole.size, 3))
+
+    def sgp4(self, whole, fraction):
+        return self.code, (0.0,) * 3, (0.0,) * 3
+
+
+WORDS = {
+    1: "mean eccentricity", 2: "mean motion", 3: "perturbed eccentricity", 4: "semi-latus rectum",
+    5: "below the Earth's surface", 6: "below the Earth's surface: it has decayed",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("code", WORDS)
+def test_each_error_of_sgp4_in_words(tmp_path, code):
+    orbit = sgp4_orbit(elements(tmp_path, NAMED)[0], EPOCH)
+    object.__setattr__(orbit, "_satellite", Stopped(code))
+    for call in (lambda: orbit.states(np.array([0.0, 60.0])), lambda: orbit.require(60.0, 60.0)):
+        with pytest.raises(OrbitError) as caught:
+            call()
+        assert WORDS[code] in str(caught.value) and "2026-03-20T12:01:00.000Z" in str(caught.value)
+        assert "EXAMPLE 1" in str(caught.value)
+
+
+# ----------------------------------------------------------------------------------------------------------------- OMM
+FIELDS = {key: str(value) for key, value in export_omm(invented(), "EXAMPLE 1").items()}
+DEGREE_KEYS = ("INCLINATION", "RA_OF_ASC_NODE", "ARG_OF_PERICENTER", "MEAN_ANOMALY")
+
+
+def kvn(fields, units=False):
+    head = "CCSDS_OMM_VERS = 2.0\nCOMMENT invented\nCREATION_DATE = 2026-03-20T00:00:00\nORIGINATOR = TEST\n"
+    unit = dict.fromkeys(DEGREE_KEYS, " [deg]") | {"MEAN_MOTION": " [rev/day]"} if units else {}
+    return head + "".join(f"{key} = {value}{unit.get(key, '')}\n" for key, value in fields.items())
+
+
+def xml(fields):
+    def part(keys):
+        return "".join(f"<{key}>{fields[key]}</{key}>\n" for key in keys if key in fields)
+
+    keys = list(FIELDS)
+    return (
+        '<?xml version="1.0" encoding="UTF-8"?>\n<ndm><omm id="CCSDS_OMM_VERS" version="2.0">\n<header/>'
+        "<body><segment>"
+        f"<metadata>{part(keys[:6])}</metadata>\n<data><meanElements>{part(keys[6:13])}</meanElements>\n"
+        f"<tleParameters>{part(keys[13:])}</tleParameters></data></segment></body></omm></ndm>"
+    )
+
+
+def comma(fields):
+    """As the public catalogues write it, without the metadata."""
+    out = io.StringIO()
+    kept = {key: value for key, value in fields.items() if key not in tle._EXPECTED}
+    writer = csv.DictWriter(out, kept)
+    writer.writeheader()
+    writer.writerow(kept)
+    return out.getvalue()
+
+
+def as_json(fields):
+    return json.dumps([{k: float(v) if k in (*DEGREE_KEYS, "BSTAR", "MEAN_MOTION") else v for k, v in fields.items()}])
+
+
+NOTATIONS = {"kvn": kvn, "units": lambda f: kvn(f, units=True), "xml": xml, "json": as_json, "csv": comma}
+
+
+@pytest.mark.parametrize("notation", NOTATIONS)
+def test_omm_gives_the_orbit_of_the_tle(tmp_path, notation):
+    (found,) = elements(tmp_path, NOTATIONS[notation](FIELDS))
+    assert found.name == "EXAMPLE 1" and found.catalogue_number == "90001"
+    time_s = np.linspace(-86400.0, 86400.0, 25)
+    of_message = sgp4_orbit(found, EPOCH).states(time_s)
+    satellite = invented()
+    _, position, velocity = satellite.sgp4_array(
+        np.full(25, satellite.jdsatepoch), satellite.jdsatepochF + time_s / 86400
+    )
+    close(of_message.position_m, 1000 * position.T, atol=ONE_MM)
+    close(of_message.velocity_m_s, 1000 * velocity.T, atol=1e-6)
+    of_lines = sgp4_orbit(elements(tmp_path, NAMED)[0], EPOCH).states(time_s)
+    # a TLE keeps angles to 1e-4 deg (12 m) and the mean motion to 1e-8 revolutions a day
+    assert 0.1 < np.max(np.abs(of_message.position_m - of_lines.position_m)) < 30.0
+
+
+@pytest.mark.parametrize("notation", ["kvn", "xml", "json", "csv"])
+def test_several_omm_in_a_file(tmp_path, notation):
+    two = [FIELDS, {**FIELDS, "OBJECT_NAME": "EXAMPLE 2", "NORAD_CAT_ID": "270001234"}]
+    text = {
+        "kvn": lambda: "".join(map(kvn, two)),
+        "xml": lambda: xml(two[0]).replace("</ndm>", "") + xml(two[1]).partition("<ndm>")[2],
+        "json": lambda: json.dumps(two),
+        "csv": lambda: comma(two[0]) + comma(two[1]).split("\n")[1],
+    }[notation]()
+    found = elements(tmp_path, text)
+    assert [(e.name, e.catalogue_number) for e in found] == [("EXAMPLE 1", "90001"), ("EXAMPLE 2", "270001234")]
+
+
+@pytest.mark.parametrize("notation", ["kvn", "xml", "json", "csv"])
+@pytest.mark.parametrize("key", ["OBJECT_NAME", "EPOCH", "MEAN_MOTION", "RA_OF_ASC_NODE", "BSTAR", "NORAD_CAT_ID"])
+def test_omm_with_a_missing_field(tmp_path, notation, key):
+    fields = {k: v for k, v in FIELDS.items() if k != key}
+    refused(tmp_path, NOTATIONS[notation](fields), f"{key} is missing")
+
+
+@pytest.mark.parametrize("key", ["CENTER_NAME", "REF_FRAME", "TIME_SYSTEM", "MEAN_ELEMENT_THEORY"])
+def test_omm_in_another_convention(tmp_path, key):
+    for notation in ("kvn", "xml", "json"):
+        refused(tmp_path, NOTATIONS[notation]({**FIELDS, key: "OTHER"}), f"{key} is 'OTHER'", "SGP4 takes")
+    for notation in ("kvn", "xml"):
+        refused(tmp_path, NOTATIONS[notation]({k: v for k, v in FIELDS.items() if k != key}), f"{key} is missing")
+    assert elements(tmp_path, kvn({**FIELDS, "MEAN_ELEMENT_THEORY": "SGP/SGP4"}))
+
+
+BOMB = (
+    '<?xml version="1.0"?>\n<!DOCTYPE omm [<!ENTITY a "aaaaaaaaaa">'
+    + "".join(f'<!ENTITY a{k} "{(f"&a{k - 1};" if k else "&a;") * 10}">' for k in range(12))
+    + "]>\n<omm>&a11;</omm>"
+)
+OMM_FAULTS = {
+    "not a number": (kvn({**FIELDS, "ECCENTRICITY": "1,5"}), "ECCENTRICITY is '1,5'", "line 13"),
+    "nan": (as_json({**FIELDS, "MEAN_ANOMALY": "nan"}), "entry 1", "MEAN_ANOMALY is 'nan'"),
+    "underscore": (comma({**FIELDS, "BSTAR": "1_0"}), "line 2", "BSTAR is '1_0'"),
+    "eccentricity": (xml({**FIELDS, "ECCENTRICITY": "1.2"}), "eccentricity is 1.2"),
+    "unit": (kvn({**FIELDS, "INCLINATION": "1 [rad]"}), "INCLINATION is in 'rad'", "'deg'"),
+    "twice": (kvn(FIELDS) + "BSTAR = 3\n", "BSTAR is '3', but line"),
+    "epoch": (kvn({**FIELDS, "EPOCH": "20 March 2026"}), "'20 March 2026', not a date and time"),
+    "epoch not in the calendar": (kvn({**FIELDS, "EPOCH": "2026-02-30T00:00:00"}), "not a date and time"),
+    "leap second": (kvn({**FIELDS, "EPOCH": "2026-03-20T23:59:60"}), "a second that does not exist"),
+    "line": (kvn(FIELDS) + "what is this\n", "'what is this' is neither"),
+    "endless line": (kvn(FIELDS) + "A = " + " " * 1_000_000 + "[", "is neither 'KEY = value'"),
+    "long value": (as_json({**FIELDS, "EPOCH": "9" * 1000}), f"'{'9' * 57}...'"),
+    "no version": ("CREATION_DATE = 2026-03-20T00:00:00\n", "not with CCSDS_OMM_VERS"),
+    "bomb": (BOMB, "line 2", "DOCTYPE"),
+    "cut XML": (xml(FIELDS)[:-30], "not well-formed XML", "cut off"),
+    "XML of another kind": ("<html><p>moved</p></html>", "no element set"),
+    "cut JSON": (as_json(FIELDS)[:-3], "not JSON", "line 1"),
+    "deep JSON": ("[" * 200_000, "nested too deeply"),
+    "JSON list": ("[1, 2]", "entry 1", "'1' is not an object"),
+    "JSON empty": ("[]", "no element set"),
+    "CSV": (comma(FIELDS) + "a,b\n", "line 3", "2 values"),
+    "SGP4-XP": (as_json({**FIELDS, "EPHEMERIS_TYPE": "4"}), "another theory than SGP4"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("fault", OMM_FAULTS)
+def test_malformed_omm(tmp_path, fault):
+    text, *words = OMM_FAULTS[fault]
+    refused(tmp_path, text, *words)
+
+
+# ----------------------------------------------------------------------------------------------------------------- OEM
+RATE_RAD_S, RADIUS_M = 1.1e-3, 6.9e6
+
+
+def truth(time_s, rate_rad_s=RATE_RAD_S, radius_m=RADIUS_M):
+    """An ellipse about the Earth's centre (a force that grows with distance), smooth and known exactly."""
+    c, s = np.cos(rate_rad_s * time_s), np.sin(rate_rad_s * time_s)
+    axes = radius_m * np.array([[1.0, 0.0], [0.0, 0.6], [0.0, 0.81]])
+    return States(axes @ np.array([c, s]), rate_rad_s * axes @ np.array([-s, c]))
+
+
+def stamp(time_s, start=datetime(2026, 3, 20, 12)):
+    return (start + timedelta(seconds=float(time_s))).isoformat(timespec="microseconds")
+
+
+def rows(time_s, states=None, extra="", start=datetime(2026, 3, 20, 12)):
+    position, velocity = states or truth(time_s)
+    return "".join(
+        f"{stamp(t, start)} {' '.join(f'{x:.9f}' for x in (*p / 1000, *v / 1000))}{extra}\n"
+        for t, p, v in zip(time_s, position.T, velocity.T, strict=True)
+    )
+
+
+def metadata(time_s, start=datetime(2026, 3, 20, 12), **changes):
+    given = {
+        "OBJECT_NAME": "EXAMPLE 1", "OBJECT_ID": "2026-001A", "CENTER_NAME": "EARTH", "REF_FRAME": "TEME",
+        "TIME_SYSTEM": "UTC", "START_TIME": stamp(time_s[0], start), "STOP_TIME": stamp(time_s[-1], start),
+    } | changes  # fmt: skip
+    return {key: value for key, value in given.items() if value is not None}
+
+
+def segment(time_s, states=None, extra="", start=datetime(2026, 3, 20, 12), **changes):
+    meta = "".join(f"{key} = {value}\n" for key, value in metadata(time_s, start, **changes).items())
+    return f"META_START\n{meta}META_STOP\nCOMMENT data\n" + rows(time_s, states, extra, start)
+
+
+HEAD = "CCSDS_OEM_VERS = 2.0\nCOMMENT invented\nCREATION_DATE = 2026-03-20T00:00:00\nORIGINATOR = TEST\n\n"
+GRID = np.arange(0.0, 6001.0, 60.0)
+
+
+def ephemeris(tmp_path, text, epoch=EPOCH, name=None):
+    return read_oem(write(tmp_path, text), epoch, name)
+
+
+def no_ephemeris(tmp_path, text, *words):
+    return refused(tmp_path, text, *words, read=lambda path: read_oem(path, EPOCH))
+
+
+def oem_xml(time_s, version="3.0", **changes):
+    position, velocity = truth(time_s)
+    keys = ("X", "Y", "Z", "X_DOT", "Y_DOT", "Z_DOT")
+    units = ("km",) * 3 + ("km/s",) * 3
+    vectors = "".join(
+        f"<stateVector><EPOCH>{stamp(t)}</EPOCH>"
+        + "".join(
+            f'<{k} units="{u}">{x:.9f}</{k}>' for k, u, x in zip(keys, units, (*p / 1000, *v / 1000), strict=True)
+        )
+        + "</stateVector>\n"
+        for t, p, v in zip(time_s, position.T, velocity.T, strict=True)
+    )
+    meta = "".join(f"<{k}>{v}</{k}>" for k, v in metadata(time_s, **changes).items())
+    covariance = f"<covarianceMatrix><EPOCH>{stamp(0)}</EPOCH><CX_X units='km**2'>1</CX_X></covarianceMatrix>"
+    return (
+        f'<?xml version="1.0"?>\n<oem id="CCSDS_OEM_VERS" version="{version}"><header/><body>\n<segment>'
+        f"<metadata>{meta}</metadata>\n<data>{vectors}{covariance}</data></segment></body></oem>"
+    )
+
+
+@pytest.mark.parametrize(
+    ("method", "position_m", "velocity_m_s"),
+    [
+        ({}, 1e-4, 1e-6),
+        ({"INTERPOLATION": "HERMITE", "INTERPOLATION_DEGREE": "7"}, 1e-4, 1e-6),
+        ({"INTERPOLATION": "hermite", "INTERPOLATION_DEGREE": "3"}, 0.5, 0.05),
+        ({"INTERPOLATION": "Lagrange", "INTERPOLATION_DEGREE": "7"}, 1e-3, 1e-5),
+        ({"INTERPOLATION": "LAGRANGE", "INTERPOLATION_DEGREE": "8"}, 1e-4, 1e-5),
+        ({"INTERPOLATION": "LAGRANGE", "INTERPOLATION_DEGREE": "12"}, 1e-4, 1e-4),
+    ],
+)
+def test_interpolation_against_a_known_orbit(tmp_path, method, position_m, velocity_m_s):
+    """State vectors each 60 s, written to 1 um; inside, at the nodes and in the windows at both ends."""
+    orbit = ephemeris(tmp_path, HEAD + segment(GRID, **method))
+    assert orbit.name == "EXAMPLE 1" and orbit.span_s == (0.0, 6000.0)
+    time_s = np.random.Generator(np.random.Philox(5)).permutation(np.linspace(0.0, 6000.0, 4801))
+    states, known = orbit.states(time_s), truth(time_s)
+    worst = np.max(np.abs(states.position_m - known.position_m))
+    assert worst < position_m
+    assert np.max(np.abs(states.velocity_m_s - known.velocity_m_s)) < velocity_m_s
+    if method.get("INTERPOLATION_DEGREE") == "3":  # n^4 r h^4 / 384 of the cubic polynomial
+        assert worst == pytest.approx(RATE_RAD_S**4 * RADIUS_M * 60**4 / 384, rel=0.05)
+    nodes = orbit.states(GRID)
+    close(nodes.position_m, truth(GRID).position_m, atol=2e-6)
+    np.testing.assert_array_equal(orbit.states(90.0).position_m, orbit.states(np.array([90.0])).position_m[:, 0])
+
+
+@pytest.mark.parametrize("method", ["HERMITE", "LAGRANGE"])
+def test_velocity_is_the_rate_of_position(tmp_path, method):
+    orbit = ephemeris(tmp_path, HEAD + segment(GRID, INTERPOLATION=method, INTERPOLATION_DEGREE="9"))
+    time_s, step = np.linspace(10.0, 5990.0, 997), 0.5
+    slope = (orbit.states(time_s + step).position_m - orbit.states(time_s - step).position_m) / (2 * step)
+    close(orbit.states(time_s).velocity_m_s, slope, atol=2e-3)
+
+
+def test_hermite_is_the_polynomial_through_its_points(tmp_path):
+    """Against Newton's divided differences on doubled nodes, in the window of four points about the time.
+
+    Steps of ten minutes, so that another window gives another value.
+    """
+    grid = np.arange(0.0, 9001.0, 600.0)
+    orbit = ephemeris(tmp_path, HEAD + segment(grid))
+    known = orbit.segments[0]
+    for t in (1.0, 1300.0, 4790.0, 8999.0):
+        first = int(np.clip(t // 600 - 1, 0, grid.size - 4))
+        node = np.repeat(grid[first : first + 4], 2)
+        table = np.repeat(known.position_m[0, first : first + 4], 2)
+        slopes = np.repeat(known.velocity_m_s[0, first : first + 4], 2)
+        top = [table[0]]
+        for order in range(1, 8):
+            gap = node[order:] - node[:-order]
+            table = np.where(gap == 0, slopes[: gap.size], np.diff(table) / np.where(gap == 0, 1.0, gap))
+            top.append(table[0])
+        value = sum(c * np.prod(t - node[:k]) for k, c in enumerate(top))
+        assert orbit.states(t).position_m[0] == pytest.approx(value, abs=1e-6)
+
+
+def test_xml_equals_kvn(tmp_path):
+    time_s = np.linspace(0.0, 6000.0, 61)
+    of_kvn = ephemeris(tmp_path, HEAD + segment(GRID)).states(time_s)
+    for version in ("1.0", "2.0", "3.0"):
+        of_xml = ephemeris(tmp_path, oem_xml(GRID, version)).states(time_s)
+        np.testing.assert_array_equal(of_xml.position_m, of_kvn.position_m)
+        np.testing.assert_array_equal(of_xml.velocity_m_s, of_kvn.velocity_m_s)
+
+
+def test_versions_covariance_and_acceleration(tmp_path):
+    covariance = "COVARIANCE_START\nEPOCH = 2026-03-20T12:00:00\n1.0\n0.1 1.0\nCOVARIANCE_STOP\n"
+    plain = ephemeris(tmp_path, HEAD + segment(GRID)).states(GRID)
+    for version in ("1.0", "2.0", "3.0"):
+        head = HEAD.replace("2.0", version, 1)
+        full = ephemeris(tmp_path, head + segment(GRID, extra=" 0.1 0.2 0.3") + covariance).states(GRID)
+        np.testing.assert_array_equal(full.position_m, plain.position_m)
+
+
+@pytest.mark.parametrize(
+    ("system", "ahead_s"), [("UTC", 0.0), ("TAI", 37.0), ("TT", 69.184), ("TDT", 69.184), ("GPS", 18.0)]
+)
+def test_time_systems(tmp_path, system, ahead_s):
+    """In 2026 TAI - UTC is 37 s, TT - TAI 32.184 s and TAI - GPS 19 s (IERS Bulletin C; IS-GPS-200)."""
+    start = datetime(2026, 3, 20, 12) + timedelta(seconds=ahead_s)
+    orbit = ephemeris(tmp_path, HEAD + segment(GRID, start=start, TIME_SYSTEM=system))
+    assert orbit.span_s == pytest.approx((0.0, 6000.0), abs=1e-9)
+    close(orbit.states(90.0).position_m, truth(np.array([90.0])).position_m[:, 0], atol=1e-4)
+
+
+def test_utc_over_a_leap_second(tmp_path):
+    """2016-12-31 has 86401 s; stamps are of UTC, by day of the year and with second 60."""
+    stamps = [
+        "2016-366T23:59:58",
+        "2016-12-31T23:59:59Z",
+        "2016-12-31T23:59:60",
+        "2017-01-01T00:00:00",
+        "2017-001T00:00:01",
+    ]
+    states = truth(np.arange(5.0))
+    body = rows(np.arange(5.0), states).split("\n")
+    text = HEAD + segment(np.arange(5.0), states, START_TIME=stamps[0], STOP_TIME=stamps[-1])
+    for line, given in zip(body, stamps, strict=False):
+        text = text.replace(line.split()[0] + " ", given + " ")
+    orbit = ephemeris(tmp_path, text, Epoch("2016-12-31T23:59:58Z"))
+    np.testing.assert_array_equal(orbit.segments[0].time_s, np.arange(5.0))
+    no_ephemeris(tmp_path, text.replace("2016", "2026").replace("366T", "365T"), "23:59:60", "does not exist")
+
+
+ROTATIONS = {
+    "EME2000": lambda t: ICRS_to_J2000[:, :, np.newaxis] + np.zeros(t.shape),
+    "J2000": lambda t: ICRS_to_J2000[:, :, np.newaxis] + np.zeros(t.shape),
+    "GCRF": lambda t: np.eye(3)[:, :, np.newaxis] + np.zeros(t.shape),
+    "ICRF": lambda t: np.eye(3)[:, :, np.newaxis] + np.zeros(t.shape),
+    "TOD": true_equator_and_equinox_of_date.rotation_at,
+    "ITRF2014": itrs.rotation_at,
+    "ITRF-97": itrs.rotation_at,
+}
+
+
+def in_teme(frame, time_s):
+    """Positions of `truth`, taken as coordinates in the frame, rotated to TEME by skyfield."""
+    start = datetime(2026, 3, 20, 12, tzinfo=UTC)
+    instants = SCALE.from_datetimes([start + timedelta(seconds=float(t)) for t in time_s])
+    turn = np.einsum("ijn,kjn->ikn", TEME.rotation_at(instants), ROTATIONS[frame](instants))
+    return np.einsum("ijn,jn->in", turn, truth(time_s).position_m)
+
+
+@pytest.mark.parametrize("frame", ROTATIONS)
+def test_frames_against_skyfield(tmp_path, frame):
+    """Positions at and between the nodes; velocities by differences, so that the frame's own motion is in them."""
+    orbit = ephemeris(tmp_path, HEAD + segment(GRID, REF_FRAME=frame))
+    time_s = np.linspace(30.0, 5970.0, 199)
+    position = in_teme(frame, time_s)
+    # in the frame that turns with the Earth the windows at both ends err by 0.2 mm
+    close(orbit.states(time_s).position_m, position, 1e-3 if frame.startswith("ITRF") else 1e-4)
+    step = 0.05
+    slope = (in_teme(frame, time_s + step) - in_teme(frame, time_s - step)) / (2 * step)
+    close(orbit.states(time_s).velocity_m_s, slope, 1e-4 if frame.startswith("ITRF") else 2e-5)
+    assert np.max(np.abs(position - truth(time_s).position_m)) > 100.0
+
+
+def test_rotations_between_hours(tmp_path):
+    """The splines between matrices against the matrix itself, over days, in metres at the geostationary radius."""
+    time_s = np.linspace(0.0, 5 * 86400.0, 333)
+    days = 2451545.0 + 36525.0 * EPOCH.terrestrial_centuries(time_s)
+    for frame in ("GCRF", "EME2000", "TOD"):
+        fitted, rate = oem._rotations(frame, EPOCH, time_s)
+        exact = oem._matrices(frame, SCALE.tt_jd(days))
+        assert 4.2e7 * np.max(np.abs(fitted - exact)) < ONE_MM
+        assert np.max(np.abs(rate)) < 2e-11
+
+
+# ----------------------------------------------------------------------------------------------------- spans, segments
+def test_span_by_usable_times(tmp_path):
+    text = HEAD + segment(GRID, USEABLE_START_TIME=stamp(600), USEABLE_STOP_TIME=stamp(3000))
+    orbit = ephemeris(tmp_path, text)
+    assert orbit.span_s == (600.0, 3000.0)
+    orbit.require(600.0, 3000.0)
+    for start, end in ((599.0, 700.0), (2900.0, 3001.0)):
+        with pytest.raises(OrbitError) as caught:
+            orbit.require(start, end)
+        message = str(caught.value)
+        assert "2026-03-20T12:10:00.000Z to 2026-03-20T12:50:00.000Z" in message
+        assert EPOCH.utc(start) in message and EPOCH.utc(end) in message
+    with pytest.raises(OrbitError, match="not a finite number"):
+        orbit.require(700.0, math.nan)
+    for outside in (599.0, 3001.0, math.nan):
+        with pytest.raises(OrbitError):
+            orbit.states(np.array([700.0, outside]))
+
+
+def test_span_never_reaches_past_the_state_vectors(tmp_path):
+    orbit = ephemeris(tmp_path, HEAD + segment(GRID, START_TIME=stamp(-500), STOP_TIME=stamp(9000)))
+    assert orbit.span_s == (0.0, 6000.0)
+    with pytest.raises(OrbitError, match="nothing is extrapolated"):
+        orbit.states(np.array([6000.1]))
+
+
+def test_two_segments_that_meet(tmp_path):
+    """A manoeuvre at 3000 s: before it one orbit, from it on another, each from its own state vectors."""
+    before, after = GRID[GRID <= 3300], GRID[GRID >= 2700]
+    other = truth(after, 1.05e-3)
+    text = HEAD + segment(before, USEABLE_STOP_TIME=stamp(3000)) + segment(after, other, USEABLE_START_TIME=stamp(3000))
+    orbit = ephemeris(tmp_path, text)
+    orbit.require(0.0, 6000.0)
+    for t, known in ((2999.9, truth(np.array([2999.9]))), (3000.0, truth(np.array([3000.0]), 1.05e-3))):
+        close(orbit.states(t).position_m, known.position_m[:, 0], atol=1e-3)
+
+
+def test_gap_between_segments(tmp_path):
+    text = HEAD + segment(GRID[GRID <= 2400]) + segment(GRID[GRID >= 3600])
+    orbit = ephemeris(tmp_path, text)
+    assert orbit.span_s == (0.0, 6000.0)
+    orbit.require(0.0, 2400.0)
+    orbit.require(3600.0, 6000.0)
+    for start, end in ((0.0, 6000.0), (2000.0, 2500.0), (2500.0, 3000.0), (3500.0, 4000.0)):
+        with pytest.raises(OrbitError, match=r"12:40:00\.000Z, 2026-03-20T13:00:00\.000Z to"):
+            orbit.require(start, end)
+    with pytest.raises(OrbitError, match=r"the mission needs 2026-03-20T12:50:00\.000Z"):
+        orbit.states(np.array([100.0, 3000.0]))
+
+
+def test_names_with_brackets(tmp_path):
+    assert ephemeris(tmp_path, HEAD + segment(GRID, OBJECT_NAME="EXAMPLE [B]")).name == "EXAMPLE [B]"
+    assert elements(tmp_path, kvn({**FIELDS, "OBJECT_NAME": "EXAMPLE [B]"}))[0].name == "EXAMPLE [B]"
+
+
+def test_objects_of_a_file(tmp_path):
+    text = HEAD + segment(GRID) + segment(GRID, OBJECT_NAME="EXAMPLE 2", OBJECT_ID="2026-001B")
+    assert ephemeris(tmp_path, text, name="example 2").name == "EXAMPLE 2"
+    assert ephemeris(tmp_path, text, name="2026-001A").name == "EXAMPLE 1"
+    no_ephemeris(tmp_path, text, "EXAMPLE 1 (2026-001A), EXAMPLE 2 (2026-001B)", "name one of them")
+    with pytest.raises(OrbitError, match="'EXAMPLE 3' names 0 of them"):
+        ephemeris(tmp_path, text, name="EXAMPLE 3")
+
+
+# ------------------------------------------------------------------------------------------------------- malformed OEM
+def with_row(index, change):
+    lines = segment(GRID).split("\n")
+    at = lines.index("COMMENT data") + 1 + index
+    lines[at] = change(lines[at])
+    return HEAD + "\n".join(lines)
+
+
+def with_word(index, column, word):
+    def change(line):
+        words = line.split()
+        words[column] = word
+        return " ".join(words)
+
+    return with_row(index, change)
+
+
+SHORT = GRID[:3]
+OEM_FAULTS = {
+    **{f"no {key}": (HEAD + segment(GRID, **{key: None}), f"{key} is missing", "line 6") for key in oem._REQUIRED},
+    **{f"XML no {key}": (oem_xml(GRID, **{key: None}), f"{key} is missing", "line 3") for key in oem._REQUIRED},
+    "centre": (HEAD + segment(GRID, CENTER_NAME="MARS"), "CENTER_NAME is 'MARS'", "EARTH"),
+    "frame": (HEAD + segment(GRID, REF_FRAME="MOD"), "line 10", "REF_FRAME is 'MOD'", "EME2000"),
+    "frame held still": (HEAD + segment(GRID, REF_FRAME_EPOCH=stamp(0)), "REF_FRAME_EPOCH", "frame of date"),
+    "time system": (HEAD + segment(GRID, TIME_SYSTEM="TDB"), "TIME_SYSTEM is 'TDB'", "UTC, TAI, TT, GPS"),
+    "Z in TAI": (HEAD + segment(GRID, TIME_SYSTEM="TAI", START_TIME=stamp(0) + "Z"), "ends in Z", "TAI"),
+    "leap second of TAI": (HEAD + segment(GRID, TIME_SYSTEM="TAI", STOP_TIME="2016-12-31T23:59:60"), "no leap seconds"),
+    "unsorted": (with_word(5, 0, stamp(60)), "does not come after", stamp(240), "line 20"),
+    "twice": (with_word(5, 0, stamp(240)), "does not come after"),
+    "nan": (with_word(4, 2, "nan"), "line 20", "nan or inf"),
+    "inf": (with_word(4, 6, "inf"), "line 20", "nan or inf"),
+    "word": (with_word(4, 1, "abc"), "line 20", "X is 'abc'"),
+    "time": (with_word(4, 0, "20/03/2026"), "line 20", "'20/03/2026', not a date and time"),
+    "hour": (with_word(4, 0, "2026-03-20T25:00:00"), "not a date and time"),
+    "day of the year": (with_word(4, 0, "2026-366T12:00:00"), "not a date and time"),
+    "columns": (with_row(4, lambda line: line + " 1"), "line 20", "8 columns"),
+    "metres": (with_row(0, lambda line: f"{line.split()[0]} 6900000 0 0 0 7500 0"), "6.9e+06 km", "are in km"),
+    "inside the Earth": (with_word(0, 1, "690.0"), "690 km"),
+    "too few": (HEAD + segment(SHORT), "3 state vectors", "takes 4"),
+    "too few for Lagrange": (
+        HEAD + segment(GRID[:8], INTERPOLATION="LAGRANGE", INTERPOLATION_DEGREE="8"), "8 state", "degree 8", "takes 9"
+    ),
+    "none": (HEAD + segment(GRID).partition("COMMENT data")[0], "0 state vectors"),
+    "linear": (HEAD + segment(GRID, INTERPOLATION="LINEAR", INTERPOLATION_DEGREE="1"), "'LINEAR'", "HERMITE or"),
+    "degree 1": (HEAD + segment(GRID, INTERPOLATION="LAGRANGE", INTERPOLATION_DEGREE="1"), "from 3 to 25"),
+    "degree 7.5": (HEAD + segment(GRID, INTERPOLATION="LAGRANGE", INTERPOLATION_DEGREE="7.5"), "whole number"),
+    "no degree": (HEAD + segment(GRID, INTERPOLATION="LAGRANGE"), "without INTERPOLATION_DEGREE"),
+    "usable times": (
+        HEAD + segment(GRID, USEABLE_START_TIME=stamp(7000), USEABLE_STOP_TIME=stamp(8000)), "nothing in common"
+    ),
+    "year": (HEAD + segment(GRID, start=datetime(1960, 1, 1)), "1960", "outside"),
+    "overlap": (HEAD + segment(GRID[:60]) + segment(GRID[40:]), "stated twice", "USEABLE_START_TIME"),
+    "version": (HEAD.replace("2.0", "4.0", 1) + segment(GRID), "line 1", "CCSDS_OEM_VERS = '4.0'"),
+    "element set": (kvn(FIELDS), "CCSDS_OMM_VERS = '2.0'", "Orbit Ephemeris Message"),
+    "two lines": (NAMED, "line 1", "'EXAMPLE 1' is neither"),
+    "no segment": (HEAD, "no segment of an ephemeris"),
+    "cut in the metadata": ((HEAD + segment(GRID)).partition('STOP_TIME')[0], "ends before META_STOP", "cut off"),
+    "cut in the covariance": (HEAD + segment(GRID) + "COVARIANCE_START\n", "ends before COVARIANCE_STOP"),
+    "order": (HEAD + "META_STOP\n", "META_STOP has no place here"),
+    "metadata": (HEAD + "META_START\nhello\n", "line 7", "'hello' is neither"),
+    "empty": ("", "the file is empty"),
+    "binary": (b"\x89HDF\r\n", "binary"),
+    "bomb": (BOMB, "DOCTYPE"),
+    "cut XML": (oem_xml(GRID)[:3000], "not well-formed XML"),
+    "XML of another kind": (xml(FIELDS), "no segment"),
+    "XML unit": (oem_xml(GRID).replace('"km"', '"m"', 1), "X is in 'm'", "'km'"),
+    "XML missing": (oem_xml(GRID).replace("Y_DOT", "Y_DAT"), "Y_DOT is missing in this stateVector"),
+    "XML number": (oem_xml(GRID).replace('<Z units="km">0.', '<Z units="km">O.', 1), "Z is 'O."),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("fault", OEM_FAULTS)
+def test_malformed_oem(tmp_path, fault):
+    text, *words = OEM_FAULTS[fault]
+    no_ephemeris(tmp_path, text, *words)
+
+
+def test_ephemeris_of_sgp4_states(tmp_path):
+    """The states of an element set, sampled each minute, written and read again."""
+    orbit = sgp4_orbit(elements(tmp_path, NAMED)[0], EPOCH)
+    # SGP4's velocity is not the exact slope of its position (2 cm/s here), so Hermite would err by 0.2 m
+    method = {"INTERPOLATION": "LAGRANGE", "INTERPOLATION_DEGREE": "7"}
+    again = ephemeris(tmp_path, HEAD + segment(GRID, orbit.states(GRID), **method))
+    time_s = np.linspace(0.0, 6000.0, 1237)
+    sampled, direct = again.states(time_s), orbit.states(time_s)
+    assert np.max(np.linalg.norm(sampled.position_m - direct.position_m, axis=0)) < 1e-3
+    assert np.max(np.linalg.norm(sampled.velocity_m_s - direct.velocity_m_s, axis=0)) < 1e-5
