@@ -309,19 +309,20 @@ def test_a_short_contact_has_fewer_windows_and_the_shortest_none(run, finding):
 
 
 def test_the_geometry_is_asked_for_nothing_beyond_the_contact(sampler):
-    """Not even by rounding: (end - 4 ms) + 4 ms exceeds some of these ends."""
+    """Not even by rounding: begin + (end - begin) exceeds some of these ends."""
     asked = []
 
     def ending(time_s):
         asked.append(float(np.max(time_s)))
         return steady()(time_s)
 
-    ends = [1000.0 + 0.1 * k for k in range(1, 400)]
-    past = [end for end in ends if (end - 0.004) + 0.004 > end][:3]
-    assert past
-    for end in past:
-        of = Contact(900.0, end, LIMB, LIMB, 0.0, ending)
-        sampler(of, settings(window_s=0.004, settle_s=0.0, hold_s=0.0)).window(0, end - 0.004, 0.004)
+    draw = np.random.Generator(np.random.Philox(key=1))
+    pairs = draw.uniform((-0.1, 0.0), (0.0, 0.01), (200, 2)).tolist()
+    past = [(begin, end) for begin, end in pairs if begin + (end - begin) > end][:2]
+    assert len(past) == 2
+    for begin, end in past:
+        of = Contact(-1.0, end, LIMB, LIMB, -1.0, ending)
+        sampler(of, settings(settle_s=0.0)).window(0, begin, end - begin)
         assert asked[-1] == end
 
 
@@ -370,6 +371,21 @@ def test_a_failure_within_an_acquisition_is_logged_and_costs_its_time(run, findi
         assert [(e.time_s, e.cause) for e in found.log if "time-out" in e.cause] == [
             (pytest.approx(time), cause) for time, cause in wanted
         ]
+
+
+def test_a_failure_that_is_tried_again_in_the_same_state_is_logged(run, finding):
+    """An answer that lands three times in ten: the partner answers again."""
+    stages = list(finding.wide.stages)
+    stages[5] = replace(stages[5], success_probability=0.3)
+    odd = replace(finding, wide=replace(finding.wide, stages=tuple(stages)))
+    found = run(contact(), settings(windows=1), finding=odd)
+    check_order(found)
+    log = acquisition.simulate_log(stages, 5, 1)
+    wanted = [e.time_s for e in log if e.stage == "LEO detects the answer" and "time-out" in e.cause]
+    assert wanted
+    again = [e for e in found.log if (e.state, e.to) == ("answer", "answer")]
+    assert [e.time_s for e in again] == pytest.approx([1000.0 + time for time in wanted])
+    assert again[0].cause == "LEO detects the answer: time-out, failure 1 of 5"
 
 
 def test_a_scan_finds_the_partner_instead(run, finding):
@@ -529,6 +545,19 @@ def test_windows_that_a_new_acquisition_covers_are_left_out(run, whole, monkeypa
         wanted = [b for b in planned if b <= lost] + [again] + [b for b in planned if b >= again + 1.0]
         assert_allclose([w.start_s for w in found.windows], wanted, rtol=0, atol=1e-9)
         assert (sorted(came), came[-1]) == (list(range(65)), 64)  # the one behind the loss has a number of its own
+
+
+def test_windows_without_a_gap_are_all_there(run, whole, finding, monkeypatch):
+    """Data of a whole number of windows: each begins where the one before has ended, but for rounding."""
+
+    def window(self, number, start_s, length_s):
+        return replace(whole.windows[0], start_s=start_s, seconds=length_s)
+
+    monkeypatch.setattr(Sampler, "window", window)
+    for start in (0.0, 0.1, 1000.0):
+        end = start + finding.wide.log[-1].time_s + 40 * 0.3 + 1e-9
+        found = run(contact(start, end - start), settings(windows=40, window_s=0.3))
+        assert len(found.windows) == 40
 
 
 def test_a_whole_window_ends_a_row_of_losses(run, whole, monkeypatch):

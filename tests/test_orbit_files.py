@@ -314,6 +314,10 @@ def test_low_perigee_at_the_epoch_and_later(tmp_path):
     orbit.require(0.0, 3600.0)
     with pytest.raises(OrbitError, match=r"perigee is|SGP4 stops"):
         orbit.require(0.0, 10 * 86400.0)
+    later = sgp4_orbit(orbit.elements, Epoch("2026-03-30T12:00:00Z"))
+    later.require(-10 * 86400.0, -10 * 86400.0 + 3600.0)
+    with pytest.raises(OrbitError, match=r"perigee is|SGP4 stops at 2026-03-30"):
+        later.require(0.0, 3600.0)
 
 
 def test_decay_in_sgp4(tmp_path):

@@ -158,7 +158,7 @@ def _changes(own: _Case, found: Found | None) -> Iterator[tuple[str, _Side, _Sid
         yield scaled("grazing height", "orbit.grazing_height_m", "m", (0.0, 2.0))
     if orbits.leo.limits is None or orbits.leo.limits.attitude == "free":
         held = changed(m, "orbit.leo.limits", _HELD)
-        yield other("attitude of the satellite", "held to nadir, terminal 60 deg about zenith", held)
+        yield other("attitude of the satellite", "nadir, 60 deg about zenith", held)
     if orbits.leo.kind == "circular":
         yield scaled("orbit altitude", "orbit.leo.altitude_m", "m", (0.8, 1.2))
         if orbits.leo.local_time_s is not None:

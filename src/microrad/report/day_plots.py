@@ -12,6 +12,7 @@ from microrad.report import day_assumptions, day_figures, day_map
 from microrad.report.figures import Figure, Floats
 
 _SHARES = 400  # points of a distribution
+_BEFORE = 1e-9  # part of a latency by which a jump of the distribution is looked at before it
 
 
 def draw(day: DayStudy, run: ContactRun | None = None) -> tuple[Figure, ...]:
@@ -40,14 +41,16 @@ def _bars(contacts: tuple[orbit.Contact, ...], end_s: float) -> Floats:
 
 
 def _along(day: DayStudy) -> list[Figure]:
-    """The longest contact of the span."""
+    """The contact that the mission looks at in time, the first where it names none."""
     if not day.view.encounters:
         return []
-    contact = max((e.contact for e in day.view.encounters), key=lambda c: c.duration_s)
-    pair = day.view.pair
+    o, found = day.mission.operations, day.view.encounters
+    asked = 1 if o is None or o.contact is None else o.contact.number
+    contact, pair = found[min(asked, len(found)) - 1].contact, day.view.pair
     seen = orbit.sight(pair.leo.orbit, pair.geo.orbit, times(contact))
     doppler = seen.doppler_hz(day.mission.communication.wavelength_m)
-    return [day_figures.along_contact(seen.time_s, seen.range_m, seen.point_ahead_rad, seen.rate_rad_s, doppler)]
+    since_s = seen.time_s - contact.start_s
+    return [day_figures.along_contact(since_s, seen.range_m, seen.point_ahead_rad, seen.rate_rad_s, doppler)]
 
 
 def _volume(day: DayStudy) -> Figure:
@@ -65,11 +68,14 @@ def _latency(day: DayStudy) -> Figure:
 
 
 def _distribution(way: Way) -> tuple[Floats, Floats]:
-    """Latency and the share of the data that arrived within it: at its own bends, and evenly between."""
-    bends = np.concatenate((way.latency.first_s, way.latency.last_s, np.zeros(1)))
-    latency_s = np.unique(np.concatenate((bends, np.linspace(0.0, float(np.max(bends)), _SHARES))))
-    kept = np.unique(latency_s[:: max(latency_s.size // (4 * _SHARES), 1)])
-    return kept, way.latency.cdf(kept)
+    """Latency and the share of the data that arrived within it: on both sides of each bend, and evenly between."""
+    bends = np.unique(np.concatenate((way.latency.first_s, way.latency.last_s)))
+    if not bends.size:
+        return bends, bends
+    bends = bends[:: max(bends.size // _SHARES, 1)]
+    even = np.linspace(bends[0], bends[-1], _SHARES)
+    latency_s = np.unique(np.concatenate((bends, bends * (1.0 - _BEFORE), even)))
+    return latency_s, way.latency.cdf(latency_s)
 
 
 def _map(day: DayStudy) -> Figure:
@@ -97,7 +103,7 @@ def _assumptions(day: DayStudy) -> Figure:
         for s in day.swings
     ]
     if direct:
-        return day_assumptions.assumptions(bars, day.ratio, "volume by the relay over volume of the direct downlink")
+        return day_assumptions.assumptions(bars, day.ratio, "volume by relay over volume direct")
     return day_assumptions.assumptions(bars, day.relay.capacity_bit / 8e12, "volume by the relay (TB)")
 
 

@@ -87,9 +87,13 @@ def rate_words(day: DayStudy) -> str:
         + ("at every range of the contacts" if c.largest_range_m >= furthest else f"up to {_km(c.largest_range_m)} km")
         for c in day.closings
     )
+    lost = f"; {100 * day.loss.outage:.2g} % of the time is lost in outage" if day.loss.outage else ""
+    idle = ""
+    if all(c.largest_range_m < furthest for c in day.closings):
+        idle = f" Beyond that no data flow: the contacts reach {_km(furthest)} km."
     return (
         f"With a pointing loss of {day.loss.loss_db:.2f} dB ({day.loss.source}) the laser link has the demanded "
-        f"{o.margin_db:g} dB for {said}; {100 * day.loss.outage:.2g} % of the time is lost in outage."
+        f"{o.margin_db:g} dB for {said}{lost}.{idle}"
     )
 
 
@@ -188,8 +192,8 @@ def contact_rows(day: DayStudy) -> list[tuple[str, ...]]:
 
 
 def _first(day: DayStudy, way: str, partner: str, c: Contact) -> tuple[str, ...]:
-    utc = day.view.pair.epoch.utc
-    return way, partner, utc(c.start_s), utc(c.end_s), f"{c.duration_s / 60.0:.2f}", c.begins, c.ends
+    rise, sets = (day.view.pair.epoch.utc(t)[:19].replace("T", " ") for t in (c.start_s, c.end_s))
+    return way, partner, rise, sets, f"{c.duration_s / 60.0:.2f}", c.begins, c.ends
 
 
 def _relay_row(day: DayStudy, c: Contact, e: Encounter, bit: float) -> tuple[str, ...]:

@@ -7,11 +7,13 @@ import numpy as np
 from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Canvas
+from matplotlib.patches import Patch
 
 from microrad.acquisition import Trade
 from microrad.link import Swing
 from microrad.link_acquisition import Finding
 from microrad.link_study import LinkStudy
+from microrad.report.day_assumptions import swing_bars
 from microrad.report.figures import BLUE, ORANGE, STYLE, VERMILION, Figure, svg_of
 from microrad.units import format_quantity
 
@@ -33,25 +35,20 @@ def tornado(study: LinkStudy) -> Figure:
     canvas = Canvas(figsize=(6.4, 0.9 + 0.27 * len(shown)), layout="constrained")
     axes = canvas.subplots()
     lost_db = _lost(shown, margin)
+    ends = [(max(swing.margin_low_db, lost_db), max(swing.margin_high_db, lost_db)) for swing in shown]
+    swing_bars(axes, [_label(swing) for swing in shown], ends, margin)
     for row, swing in enumerate(shown):
-        low_db, high_db = max(swing.margin_low_db, lost_db), max(swing.margin_high_db, lost_db)
-        axes.barh(row, low_db - margin, left=margin, color=ORANGE, height=0.7, label="input lower")
-        axes.barh(row, high_db - margin, left=margin, color=BLUE, height=0.7, label="input higher")
         if not math.isfinite(swing.swing_db):
             ink = "white" if math.isinf(swing.margin_high_db) else "black"
             _say(axes, (lost_db, row), "< no margin: receiver too slow", ink, "center")
-    axes.axvline(margin, color="black", linewidth=0.8)
     required = study.file.mission.requirement.margin_db
     low, high = axes.get_xlim()
     if low < required < high:
         axes.axvline(required, color=VERMILION, linestyle="--", linewidth=1.0)
         _say(axes, (required, -0.55), "required", VERMILION, "bottom")
-    axes.set_yticks(range(len(shown)), [_label(s) for s in shown], fontsize=8)
-    axes.set_ylim(len(shown) - 0.4, -0.6)
     axes.set(xlabel="margin of the communication link (dB)")
-    axes.grid(visible=False, axis="y")
-    handles, labels = axes.get_legend_handles_labels()
-    axes.legend(handles[:2], labels[:2], loc="lower right", fontsize=8)
+    keys = [Patch(color=ORANGE, label="input lower"), Patch(color=BLUE, label="input higher")]
+    axes.legend(handles=keys, loc="lower right", fontsize=8)
     assumed = [s.key for s in shown if s.kind == "assumption"]
     caption = (
         "Margin with one input at a time 10 % lower and higher (0.5 dB for those in decibels, a factor of ten for a "
