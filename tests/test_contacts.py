@@ -431,6 +431,20 @@ def test_limits_agree_with_a_dense_grid_and_name_the_cause(pair):
         assert {name for name, margin in beyond.items() if margin[index] < 5e-4} >= set(cause.split(" and "))
 
 
+def test_a_limit_broken_for_seconds_between_two_samples_is_found():
+    """Two satellites 20 km apart at 15 km/s: the line of sight turns round in less than the step of 60 s."""
+    low, other = leo(), PARTNERS["against it"]
+    found = contacts(limited(low, slew=0.2), free(other), ROUND, EPOCH, (0.0, 12000.0))
+    edges = [c.end_s for c in found if c.ends == "slew limit of LEO"]
+    edges += [c.start_s for c in found if c.begins == "slew limit of LEO"]
+    dense = np.arange(0.0, 12000.0, 0.1)
+    fast = sight(low, other, dense).rate_rad_s > 0.2
+    changes = dense[1:][fast[1:] != fast[:-1]]
+    assert len(changes) == 8
+    np.testing.assert_allclose(np.sort(edges), changes, rtol=0, atol=0.1)
+    np.testing.assert_allclose(sight(low, other, np.sort(edges)).rate_rad_s, 0.2, rtol=1e-5)
+
+
 @pytest.mark.parametrize("held", ["nadir", "sun"])
 @pytest.mark.parametrize("orbit", [leo(), SLOT, PARTNERS["elongated"]], ids=["low", "slot", "elongated"])
 def test_the_rate_of_a_body_is_that_of_its_axes(held, orbit):

@@ -18,11 +18,13 @@ from skyfield.api import EarthSatellite, load
 from skyfield.framelib import ICRS_to_J2000, itrs, true_equator_and_equinox_of_date
 from skyfield.sgp4lib import TEME
 
-from microrad.orbit import oem, tle
+from microrad.orbit import frames, messages, oem, omm
 from microrad.orbit.base import OrbitError, States
+from microrad.orbit.element_files import read_elements
+from microrad.orbit.elements import closest_elements, sgp4_orbit
 from microrad.orbit.epoch import Epoch
 from microrad.orbit.oem import read_oem
-from microrad.orbit.tle import closest_elements, read_elements, sgp4_orbit
+from microrad.orbit.tle import checksum
 
 EPOCH = Epoch("2026-03-20T12:00:00Z")
 SCALE = load.timescale(builtin=True)
@@ -100,8 +102,8 @@ def test_tle_with_and_without_a_name(tmp_path):
 
 def test_checksum_counts_digits_and_minuses():
     # Vallado et al. 2006, the first case of SGP4-VER.TLE
-    assert tle.checksum("1 00005U 58002B   00179.78495062  .00000023  00000-0  28098-4 0  4753") == 3
-    assert tle.checksum("2 00005  34.2682 348.7242 1859667 331.7664  19.3264 10.82419157413667") == 7
+    assert checksum("1 00005U 58002B   00179.78495062  .00000023  00000-0  28098-4 0  4753") == 3
+    assert checksum("2 00005  34.2682 348.7242 1859667 331.7664  19.3264 10.82419157413667") == 7
 
 
 def test_epoch_of_the_century_and_to_the_microsecond(tmp_path):
@@ -193,7 +195,7 @@ def test_copies_give_the_same_states(tmp_path):
 
 def test_import_is_cheap():
     """Neither sgp4, skyfield nor scipy come in before a file needs them."""
-    code = "import sys, microrad.orbit.tle; print({'sgp4', 'skyfield', 'scipy'} & set(sys.modules))"
+    code = "import sys, microrad.orbit; print({'sgp4', 'skyfield', 'scipy'} & set(sys.modules))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout == "set()\n"
 
@@ -274,7 +276,7 @@ def test_file_that_cannot_be_read(tmp_path, monkeypatch):
         with pytest.raises(OrbitError, match="there is no such file"):
             read_elements(path)
     refused(tmp_path, NAMED * 300 + "\n" + catalogue(5)[:-1], "line ")
-    monkeypatch.setattr(oem, "MOST_BYTES", 100)
+    monkeypatch.setattr(messages, "MOST_BYTES", 100)
     refused(tmp_path, NAMED, "more than the 0 MB that are read", "keep only")
 
 
@@ -388,7 +390,7 @@ def xml(fields):
 def comma(fields):
     """As the public catalogues write it, without the metadata."""
     out = io.StringIO()
-    kept = {key: value for key, value in fields.items() if key not in tle._EXPECTED}
+    kept = {key: value for key, value in fields.items() if key not in omm._EXPECTED}
     writer = csv.DictWriter(out, kept)
     writer.writeheader()
     writer.writerow(kept)
@@ -696,8 +698,8 @@ def test_rotations_between_hours(tmp_path):
     time_s = np.linspace(0.0, 5 * 86400.0, 333)
     days = 2451545.0 + 36525.0 * EPOCH.terrestrial_centuries(time_s)
     for frame in ("GCRF", "EME2000", "TOD"):
-        fitted, rate = oem._rotations(frame, EPOCH, time_s)
-        exact = oem._matrices(frame, SCALE.tt_jd(days))
+        fitted, rate = frames._rotations(frame, EPOCH, time_s)
+        exact = frames._matrices(frame, SCALE.tt_jd(days))
         assert 4.2e7 * np.max(np.abs(fitted - exact)) < ONE_MM
         assert np.max(np.abs(rate)) < 2e-11
 

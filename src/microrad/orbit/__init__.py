@@ -17,14 +17,16 @@ from microrad.orbit.contacts import (
     passes,
 )
 from microrad.orbit.earth import EARTH_RADIUS_M, GEOSTATIONARY_RADIUS_M, Earth, subpoint
+from microrad.orbit.element_files import read_elements
+from microrad.orbit.elements import Sgp4Orbit, sgp4_orbit
+from microrad.orbit.ephemeris import EphemerisOrbit
 from microrad.orbit.epoch import Epoch
 from microrad.orbit.events import positive
 from microrad.orbit.ground import Station, elevation_rad
 from microrad.orbit.line_of_sight import LineOfSight, sight
 from microrad.orbit.model import Pair, pair, relays, satellites, stations
-from microrad.orbit.oem import EphemerisOrbit, read_oem
+from microrad.orbit.oem import read_oem
 from microrad.orbit.sun import shadow_rad, sun_direction
-from microrad.orbit.tle import Sgp4Orbit, read_elements, sgp4_orbit
 
 __all__ = [
     "EARTH_RADIUS_M",

@@ -11,16 +11,12 @@ from microrad.orbit.analytic import GeostationarySlot, KeplerOrbit, node_of_loca
 from microrad.orbit.base import Orbit, OrbitError
 from microrad.orbit.contacts import UNLIMITED, Limits, Terminal
 from microrad.orbit.earth import EARTH_RADIUS_M, Earth
+from microrad.orbit.element_files import read_elements
+from microrad.orbit.elements import MOST_ELEMENTS_AGE_S, Sgp4Orbit, closest_elements, sgp4_orbit
+from microrad.orbit.ephemeris import EphemerisOrbit
 from microrad.orbit.epoch import Epoch
 from microrad.orbit.ground import Station
-from microrad.orbit.oem import EphemerisOrbit, read_oem
-from microrad.orbit.tle import (
-    MOST_ELEMENTS_AGE_S,
-    Sgp4Orbit,
-    closest_elements,
-    read_elements,
-    sgp4_orbit,
-)
+from microrad.orbit.oem import read_oem
 from microrad.orbit_table import Orbits, OrbitTable, VisibilityLimits
 
 TAIL_S = 86400.0

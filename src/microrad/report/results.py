@@ -4,7 +4,7 @@ import hashlib
 import json
 import math
 import platform
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -14,25 +14,34 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from microrad.fine_pointing import COUNTERS, FinePointingStudy, Residual
+from microrad.report import day_results
 from microrad.report.fine_pointing_data import margins, rms_by_source, sources
+from microrad.report.variables import coordinate, variable
 from microrad.study import Study
 from microrad.tracking import Run
 
 Floats = NDArray[np.float64]
-LIBRARIES = ("microrad", "numpy", "scipy", "numba", "xarray", "h5netcdf", "matplotlib", "pydantic")
-
-
-def _variable(dims: tuple[str, ...], values: object, units: str, long_name: str) -> xr.Variable:
-    return xr.Variable(dims, np.asarray(values), attrs={"units": units, "long_name": long_name})
+LIBRARIES = (
+    "microrad",
+    "numpy",
+    "scipy",
+    "numba",
+    "xarray",
+    "h5netcdf",
+    "matplotlib",
+    "pydantic",
+    "sgp4",
+    "skyfield",
+)
 
 
 def _trace(run: Run) -> xr.Dataset:
     t, c = run.trace, run.trace.counts
     data = {
-        "reference": _variable(("time",), t.reference_rad[:, 0], "rad", "pointing reference"),
-        "output": _variable(("time",), t.output_rad[:, 0], "rad", "mirror output at the line of sight"),
-        "command": _variable(("time",), t.command_v[:, 0], "V", "controller output about the bias"),
-        "drive": _variable(("time",), t.drive_v[:, 0], "V", "amplifier output over its gain, about the bias"),
+        "reference": variable(("time",), t.reference_rad[:, 0], "rad", "pointing reference"),
+        "output": variable(("time",), t.output_rad[:, 0], "rad", "mirror output at the line of sight"),
+        "command": variable(("time",), t.command_v[:, 0], "V", "controller output about the bias"),
+        "drive": variable(("time",), t.drive_v[:, 0], "V", "amplifier output over its gain, about the bias"),
     }
     attributes = {
         "mirror": run.mirror,
@@ -47,16 +56,16 @@ def _trace(run: Run) -> xr.Dataset:
         "slew_limited_steps": c.slew_limited,
         "alternating_samples": c.alternating,
     }
-    return xr.Dataset(data, {"time": _variable(("time",), t.time_s, "s", "time")}, attributes)
+    return xr.Dataset(data, {"time": variable(("time",), t.time_s, "s", "time")}, attributes)
 
 
 def _map(study: Study) -> xr.Dataset:
     f = study.margin_map
     return xr.Dataset(
-        {"margin": _variable(("data_rate", "pointing_error"), f.margin_db, "dB", "margin of the communication link")},
+        {"margin": variable(("data_rate", "pointing_error"), f.margin_db, "dB", "margin of the communication link")},
         {
-            "data_rate": _variable(("data_rate",), f.data_rate_bit_s, "bit/s", "data rate"),
-            "pointing_error": _variable(("pointing_error",), f.pointing_error_rad, "rad", "pointing error"),
+            "data_rate": variable(("data_rate",), f.data_rate_bit_s, "bit/s", "data rate"),
+            "pointing_error": variable(("pointing_error",), f.pointing_error_rad, "rad", "pointing error"),
         },
     )
 
@@ -66,19 +75,14 @@ def _loops(study: Study) -> dict[str, xr.Dataset]:
     return {
         f"hysteresis_loops/{loop.freq_hz:g}_hz": xr.Dataset(
             {
-                "drive": _variable(("sample",), loop.drive_v + bias, "V", "drive"),
-                "output": _variable(("sample",), loop.output_rad, "rad", "output about the bias"),
-                "hysteresis": _variable(("sample",), loop.hysteresis_rad, "rad", "hysteresis h"),
+                "drive": variable(("sample",), loop.drive_v + bias, "V", "drive"),
+                "output": variable(("sample",), loop.output_rad, "rad", "output about the bias"),
+                "hysteresis": variable(("sample",), loop.hysteresis_rad, "rad", "hysteresis h"),
             },
             attrs={"frequency_hz": loop.freq_hz, "width": loop.width, "rate_clamped_samples": loop.clamped},
         )
         for loop in study.loops
     }
-
-
-def _names(dimension: str, values: Sequence[str], long_name: str) -> dict[str, xr.Variable]:
-    """A coordinate of names."""
-    return {dimension: _variable((dimension,), np.asarray(values, dtype=object), "1", long_name)}
 
 
 def _fine_pointing(fine: FinePointingStudy) -> dict[str, xr.Dataset]:
@@ -95,7 +99,7 @@ def _fine_pointing(fine: FinePointingStudy) -> dict[str, xr.Dataset]:
 
 
 def _controllers(fine: FinePointingStudy) -> dict[str, xr.Variable]:
-    return _names("controller", [v.design.name for v in fine.verified], "controller")
+    return coordinate("controller", [v.design.name for v in fine.verified], "controller")
 
 
 def _spectra(fine: FinePointingStudy) -> xr.Dataset:
@@ -104,12 +108,12 @@ def _spectra(fine: FinePointingStudy) -> xr.Dataset:
     predicted = np.stack([v.predicted_rad2_hz for v in fine.verified])
     before = "one-sided spectrum of the disturbances of an axis before the loop, lines left out"
     data = {
-        "before": _variable(("frequency",), fine.disturbed_rad2_hz, unit, before),
-        "residual": _variable(dims, after, unit, "one-sided spectrum of the simulated residual, mission's mirror"),
-        "predicted": _variable(dims, predicted, unit, "one-sided spectrum of the residual in linear theory"),
+        "before": variable(("frequency",), fine.disturbed_rad2_hz, unit, before),
+        "residual": variable(dims, after, unit, "one-sided spectrum of the simulated residual, mission's mirror"),
+        "predicted": variable(dims, predicted, unit, "one-sided spectrum of the residual in linear theory"),
     }
-    freq = {"frequency": _variable(("frequency",), fine.freq_hz, "Hz", "frequency")}
-    axes = _names("axis", _axes(fine), "axis of the line of sight")
+    freq = {"frequency": variable(("frequency",), fine.freq_hz, "Hz", "frequency")}
+    axes = coordinate("axis", _axes(fine), "axis of the line of sight")
     return xr.Dataset(data, {**_controllers(fine), **freq, **axes})
 
 
@@ -131,15 +135,15 @@ def _residuals(fine: FinePointingStudy) -> xr.Dataset:
     at = f"radial error that {fine.quantile:g} of the time stays below"
     interval = "half width of the 99 % interval of the radial rms over the runs"
     data = {
-        "rms": _variable(dims, gathered(lambda r: r.rms_rad), "rad", "radial rms"),
-        "rms_interval": _variable(dims, gathered(lambda r: r.rms_interval_rad), "rad", interval),
-        "axis_rms": _variable((*dims, "axis"), axis_rms, "rad", "rms by axis"),
-        "quantile": _variable(dims, gathered(lambda r: r.quantile_rad), "rad", at),
-        "largest": _variable(dims, gathered(lambda r: r.largest_rad), "rad", "largest radial error"),
-        "share": _variable((*dims, "limit"), shares, "1", "share of samples or plant steps at which a limit was met"),
+        "rms": variable(dims, gathered(lambda r: r.rms_rad), "rad", "radial rms"),
+        "rms_interval": variable(dims, gathered(lambda r: r.rms_interval_rad), "rad", interval),
+        "axis_rms": variable((*dims, "axis"), axis_rms, "rad", "rms by axis"),
+        "quantile": variable(dims, gathered(lambda r: r.quantile_rad), "rad", at),
+        "largest": variable(dims, gathered(lambda r: r.largest_rad), "rad", "largest radial error"),
+        "share": variable((*dims, "limit"), shares, "1", "share of samples or plant steps at which a limit was met"),
     }
-    names = {**_controllers(fine), **_names("mirror", variants, "variant of the mirror")}
-    names |= _names("axis", _axes(fine), "axis of the line of sight") | _names("limit", limits, "limit")
+    names = {**_controllers(fine), **coordinate("mirror", variants, "variant of the mirror")}
+    names |= coordinate("axis", _axes(fine), "axis of the line of sight") | coordinate("limit", limits, "limit")
     return xr.Dataset(data, names, {"quantile": fine.quantile, "best": fine.best.design.name})
 
 
@@ -149,11 +153,11 @@ def _theory(fine: FinePointingStudy) -> xr.Dataset:
     by_source = np.array([[part.get(name, math.nan) for name in names] for part in parts])
     total = np.array([v.theory.radial_rms_rad for v in fine.verified])
     data = {
-        "rms_by_source": _variable(("controller", "source"), by_source, "rad", "radial rms that one source leaves"),
-        "rms": _variable(("controller",), total, "rad", "radial rms of all sources"),
-        "bound": _variable((), fine.optimum_rad, "rad", "radial rms below which no linear controller comes"),
+        "rms_by_source": variable(("controller", "source"), by_source, "rad", "radial rms that one source leaves"),
+        "rms": variable(("controller",), total, "rad", "radial rms of all sources"),
+        "bound": variable((), fine.optimum_rad, "rad", "radial rms below which no linear controller comes"),
     }
-    return xr.Dataset(data, {**_controllers(fine), **_names("source", names, "source of error")})
+    return xr.Dataset(data, {**_controllers(fine), **coordinate("source", names, "source of error")})
 
 
 _MARGINS = {
@@ -170,7 +174,7 @@ _MARGINS = {
 def _loop_margins(fine: FinePointingStudy) -> xr.Dataset:
     found = [margins(v.design) for v in fine.verified]
     data = {
-        key: _variable(("controller",), np.array([each[key] for each in found]), unit, long_name)
+        key: variable(("controller",), np.array([each[key] for each in found]), unit, long_name)
         for key, (unit, long_name) in _MARGINS.items()
     }
     return xr.Dataset(data, _controllers(fine))
@@ -181,16 +185,16 @@ def _error_budget(fine: FinePointingStudy) -> xr.Dataset:
     alone, theory = ([getattr(p, key) for p in b.parts] for key in ("rms_rad", "theory_rad"))
     with_it, without = ([getattr(d, key) for d in b.differences] for key in ("with_rad", "without_rad"))
     data = {
-        "rms": _variable(("part",), alone, "rad", "radial rms of one part alone, simulated without hysteresis"),
-        "theory": _variable(("part",), theory, "rad", "radial rms of one part alone in linear theory"),
-        "combined": _variable((), b.combined_rad, "rad", "root sum square of the parts"),
-        "together": _variable((), b.together_rad, "rad", "radial rms of all parts together, without hysteresis"),
-        "full": _variable((), b.full_rad, "rad", "radial rms of the full loop"),
-        "with": _variable(("left_out",), with_it, "rad", "radial rms of the full loop"),
-        "without": _variable(("left_out",), without, "rad", "radial rms of the full loop but for what is left out"),
+        "rms": variable(("part",), alone, "rad", "radial rms of one part alone, simulated without hysteresis"),
+        "theory": variable(("part",), theory, "rad", "radial rms of one part alone in linear theory"),
+        "combined": variable((), b.combined_rad, "rad", "root sum square of the parts"),
+        "together": variable((), b.together_rad, "rad", "radial rms of all parts together, without hysteresis"),
+        "full": variable((), b.full_rad, "rad", "radial rms of the full loop"),
+        "with": variable(("left_out",), with_it, "rad", "radial rms of the full loop"),
+        "without": variable(("left_out",), without, "rad", "radial rms of the full loop but for what is left out"),
     }
-    names = _names("part", [p.name for p in b.parts], "part of the error")
-    names |= _names("left_out", [d.name for d in b.differences], "part that is left out")
+    names = coordinate("part", [p.name for p in b.parts], "part of the error")
+    names |= coordinate("left_out", [d.name for d in b.differences], "part that is left out")
     return xr.Dataset(data, names, {"controller": b.controller})
 
 
@@ -199,11 +203,11 @@ def _sines(fine: FinePointingStudy) -> xr.Dataset:
     s, run = fine.sines, ("run",)
     at = f"radial error that {fine.quantile:g} of the time stays below"
     data = {
-        "controller": _variable(run, np.array([each.controller for each in s], dtype=object), "1", "controller"),
-        "mirror": _variable(run, np.array([each.variant for each in s], dtype=object), "1", "variant of the mirror"),
-        "frequency": _variable(run, np.array([each.freq_hz for each in s]), "Hz", "frequency of the sine on axis x"),
-        "rms": _variable(run, np.array([each.rms_rad for each in s]), "rad", "radial rms"),
-        "quantile": _variable(run, np.array([each.quantile_rad for each in s]), "rad", at),
+        "controller": variable(run, np.array([each.controller for each in s], dtype=object), "1", "controller"),
+        "mirror": variable(run, np.array([each.variant for each in s], dtype=object), "1", "variant of the mirror"),
+        "frequency": variable(run, np.array([each.freq_hz for each in s]), "Hz", "frequency of the sine on axis x"),
+        "rms": variable(run, np.array([each.rms_rad for each in s]), "rad", "radial rms"),
+        "quantile": variable(run, np.array([each.quantile_rad for each in s]), "rad", at),
     }
     return xr.Dataset(data)
 
@@ -226,25 +230,27 @@ def _performance(study: Study) -> xr.Dataset:
         "best_half_angle": ("rad", half, [c.best.half_angle_rad for c in cases]),
     }
     data = {
-        name: _variable(dims, np.array([getattr(c, name) for c in cases], dtype=object), "1", what)
+        name: variable(dims, np.array([getattr(c, name) for c in cases], dtype=object), "1", what)
         for name, what in (
             ("source", "pointing error"),
             ("controller", "controller"),
             ("mirror", "variant of the mirror"),
         )
     }
-    data |= {name: _variable(dims, np.array(values), unit, what) for name, (unit, what, values) in quantities.items()}
+    data |= {name: variable(dims, np.array(values), unit, what) for name, (unit, what, values) in quantities.items()}
     return xr.Dataset(data, attrs={"outage": study.performance.outage})
 
 
 def write_results(study: Study, path: Path) -> None:
-    """results.nc: margin map, hysteresis loops, every trace, the fine-pointing loop; each variable with its unit."""
+    """results.nc: margin map, hysteresis loops, traces, fine-pointing loop, the day; each variable with its unit."""
     groups = {"margin_map": _map(study), "link_performance": _performance(study), **_loops(study)}
     for run in study.runs:
         name = f"{run.mirror} {run.controller} {run.freq_hz:g}_hz".replace(" + ", "_").replace(" ", "_").lower()
         groups[f"tracking/{name}"] = _trace(run)
     if study.fine_pointing is not None:
         groups |= _fine_pointing(study.fine_pointing)
+    if study.day is not None:
+        groups |= day_results.datasets(study.day, study.contact, study.plan)
     tree = xr.DataTree.from_dict({f"/{name}": group for name, group in groups.items()})
     tree.attrs = {"title": study.file.mission.name, "mission_sha256": study.file.sha256}
     tree.to_netcdf(path, engine="h5netcdf")
@@ -253,7 +259,7 @@ def write_results(study: Study, path: Path) -> None:
 def manifest(study: Study, folder: Path) -> dict[str, Any]:
     """What made the results: the mission's text and hash, versions, and a hash of each file written so far.
 
-    Random numbers are drawn for the fine-pointing loop and for acquisition, from the mission's seeds.
+    Random numbers are drawn for the fine-pointing loop, for acquisition and for the day, from the mission's seeds.
     """
     mission: dict[str, Any] = {"file": study.file.path.name, "sha256": study.file.sha256, "text": study.file.text}
     files: Mapping[str, Any] = {
@@ -264,7 +270,11 @@ def manifest(study: Study, folder: Path) -> dict[str, Any]:
     mirror, m = study.file.mirror_file, study.file.mission
     drawn = [
         f"seed {table.seed} of [{name}], {table.runs} runs"
-        for name, table in (("fine_pointing", m.fine_pointing), ("acquisition", m.acquisition))
+        for name, table in (
+            ("fine_pointing", m.fine_pointing),
+            ("acquisition", m.acquisition),
+            ("operations", m.operations),
+        )
         if table is not None
     ]
     return {

@@ -1,0 +1,108 @@
+"""What contacts cost: one day of one pair at 1 s, a constellation and how it grows, a week beside skyfield.
+
+    python benchmarks/contacts.py
+
+The pair is that of the paper's mission. The constellation sees four slots over one day, each satellite with each slot:
+1000 x 4 are 4000 searches. Memory is the largest of this process, before and after.
+"""
+
+import resource
+import statistics
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+from skyfield.api import EarthSatellite, load, wgs84
+
+from microrad import constellation, orbit
+from microrad.missionfile import load_mission
+
+FILE = load_mission(Path(__file__).resolve().parents[1] / "missions" / "leo-geo.toml")
+DAY_S = 86400.0
+PAIR_TARGET_S, CONSTELLATION_TARGET_S = 0.3, 60.0
+ISS = (
+    "1 25544U 98067A   19343.69339541  .00001764  00000-0  38792-4 0  9991",
+    "2 25544  51.6439 211.2001 0007417  17.6667  85.6398 15.50103472202482",
+)  # the example of the sgp4 package's own documentation
+
+
+def seconds(job: Callable[[], object], repeats: int) -> float:
+    job()
+    times = []
+    for _ in range(repeats):
+        began = time.perf_counter()
+        job()
+        times.append(time.perf_counter() - began)
+    return statistics.median(times)
+
+
+def megabytes() -> float:
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
+
+
+def one_pair() -> None:
+    pair = orbit.pair(FILE.mission, FILE.path.parent)
+    time_s = np.arange(0.0, DAY_S)
+
+    def day_at_1_s() -> None:
+        seen = orbit.sight(pair.leo.orbit, pair.geo.orbit, time_s)
+        states = (each.orbit.states(time_s).position_m for each in (pair.leo, pair.geo))
+        pair.earth.clearance_rad(*states)
+        seen.doppler_hz(FILE.mission.communication.wavelength_m)
+
+    took = seconds(day_at_1_s, 9)
+    print(f"one pair, one day at 1 s, sight and visibility: {took:.3f} s (at most {PAIR_TARGET_S} s)")
+    took = seconds(lambda: orbit.contacts(pair.leo, pair.geo, pair.earth, pair.epoch, pair.span_s), 9)
+    print(f"one pair, one day, contacts by root search, all limits: {took:.3f} s")
+
+
+def many() -> None:
+    m = FILE.mission
+    pair = orbit.pair(m, FILE.path.parent)
+    slots = [
+        orbit.Terminal(orbit.GeostationarySlot(f"slot {k}", pair.epoch, 0.5 * np.pi * k), pair.geo.limits, f"slot {k}")
+        for k in range(4)
+    ]
+    bare = [orbit.Terminal(each.orbit, orbit.UNLIMITED, each.name) for each in slots]
+    print(f"{'satellites':>10} {'contacts':>9} {'Earth alone':>12} {'all limits':>11} {'memory':>9}")
+    for count in (125, 250, 500, 1000):
+        table = m.constellation.model_copy(update={"satellites": count, "planes": 25, "phasing": 1})
+        own = list(orbit.satellites(table, m, pair.epoch, FILE.path.parent))
+        free = [orbit.Terminal(each.orbit, orbit.UNLIMITED, each.name) for each in own]
+        began = time.perf_counter()
+        found = constellation.opportunities(free, bare, pair.earth, pair.epoch, (0.0, DAY_S))
+        alone = time.perf_counter() - began
+        began = time.perf_counter()
+        constellation.opportunities(own, slots, pair.earth, pair.epoch, (0.0, DAY_S))
+        limited = time.perf_counter() - began
+        print(f"{count:10d} {found.start_s.size:9d} {alone:10.1f} s {limited:9.1f} s {megabytes():6.0f} MB")
+    print(f"at most {CONSTELLATION_TARGET_S:g} s for 1000 satellites")
+
+
+def beside_skyfield() -> None:
+    """Passes over one station in a week, from the same element set."""
+    scale = load.timescale(builtin=True)
+    satellite, place = EarthSatellite(*ISS, "ISS", scale), wgs84.latlon(67.86, 20.96, 400.0)
+    epoch = orbit.Epoch.from_text("2019-12-10T00:00:00Z")
+    station = orbit.Station("station", np.radians(67.86), np.radians(20.96), 400.0, 0.0)
+    with tempfile.TemporaryDirectory() as folder:
+        elements = Path(folder) / "iss.tle"
+        elements.write_text("ISS\n" + "\n".join(ISS) + "\n", encoding="ascii")
+        own = orbit.sgp4_orbit(orbit.read_elements(elements)[0], epoch)
+    begin, end = scale.utc(2019, 12, 10), scale.utc(2019, 12, 17)
+    peer = seconds(lambda: satellite.find_events(place, begin, end, altitude_degrees=0.0), 3)
+    ours = seconds(lambda: orbit.passes(own, station, epoch, (0.0, 7 * DAY_S)), 3)
+    count = len(orbit.passes(own, station, epoch, (0.0, 7 * DAY_S)))
+    print(f"{count} passes in a week: {ours:.2f} s, skyfield {peer:.2f} s, ratio {ours / peer:.2f}")
+
+
+def main() -> None:
+    one_pair()
+    many()
+    beside_skyfield()
+
+
+if __name__ == "__main__":
+    main()
