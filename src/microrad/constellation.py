@@ -104,14 +104,14 @@ def run(
     `orbit.OrbitError` for orbits that do not hold.
     """
     m, folder = file.mission, file.path.parent
-    c = table(m)
+    c, rates = table(m), rate_table(closings(m, loss))
     pair = orbit.pair(m, folder)
     own = tuple(orbit.satellites(c, m, pair.epoch, folder))
     relays = orbit.relays(c, m, pair.epoch)
     found = opportunities(own, relays, pair.earth, pair.epoch, pair.span_s, on_progress)
     rules = operations.Rules(c.overhead_s, c.shortest_s, c.session_s)
     sessions = operations.schedule(found, len(own), len(relays), c.terminals, rules, pair.span_s[0])
-    planned = _planned(m, own, relays, sessions, loss)
+    planned = _planned(rates, own, relays, sessions, 1.0 - loss.outage)
     rate = m.communication.data_rate_bit_s
     return ConstellationPlan(
         epoch=pair.epoch,
@@ -135,13 +135,12 @@ def table(m: LinkMission) -> Constellation:
 
 
 def _planned(
-    m: LinkMission,
+    rates: operations.RateTable | None,
     satellites: Sequence[orbit.Terminal],
     relays: Sequence[orbit.Terminal],
     s: operations.Sessions,
-    loss: PointingLoss,
+    availability: float,
 ) -> tuple[operations.PlannedSession, ...]:
-    rates = rate_table(closings(m, loss))
     found = []
     for one in range(s.satellite.size):
         own, relay = satellites[s.satellite[one]], relays[s.relay[one]]
@@ -157,7 +156,7 @@ def _planned(
                 locked_s=float(s.locked_s[one]),
                 end_s=float(s.end_s[one]),
                 rate_bit_s=rate,
-                volume_bit=rate * (1.0 - loss.outage) * float(s.end_s[one] - s.locked_s[one]),
+                volume_bit=rate * availability * float(s.end_s[one] - s.locked_s[one]),
                 range_min_m=float(np.min(range_m)),
                 range_max_m=furthest,
             )

@@ -185,6 +185,14 @@ def _pattern_fits_orbit(orbit: Orbits | None, constellation: Constellation | Non
     yield Problem("constellation.pattern", reason, 'orbit.leo.kind = "circular", or pattern = "file"')
 
 
+def _scan_there(operations: Operations | None, acquisition: Acquisition | None) -> Iterator[Problem]:
+    """A scan that the mission has."""
+    if operations is None or operations.acquisition != "scan" or acquisition is None or acquisition.scan is not None:
+        return
+    reason = 'is "scan", and the mission has no table acquisition.scan'
+    yield Problem("operations.acquisition", reason, 'the table [acquisition.scan], or "wide beacon"')
+
+
 Relation = tuple[tuple[str, ...], Callable[..., Iterator[Problem]]]
 
 LINK_RELATIONS: tuple[Relation, ...] = (
@@ -196,6 +204,7 @@ LINK_RELATIONS: tuple[Relation, ...] = (
     (("orbit", "operations"), _needs_orbit("operations")),
     (("orbit", "constellation"), _needs_orbit("constellation")),
     (("orbit", "constellation"), _pattern_fits_orbit),
+    (("operations", "acquisition"), _scan_there),
 )
 """What has to fit between tables of the link: their names, and a check that takes them and yields what does not."""
 

@@ -62,6 +62,12 @@ class ContactTable(Table):
         alias="hold", description="how long the margin may stay below 0 dB before lock is taken for lost"
     )
 
+    def problems(self) -> Iterator[Problem]:
+        """A loss that a window can show."""
+        if self.hold_s >= self.window_s:
+            shown = format_quantity(self.window_s, "s")
+            yield Problem("hold", f"is not below window ({shown}): a window would never show a loss", f"below {shown}")
+
 
 class Operations(Table):
     """From contacts to delivered data."""
@@ -74,6 +80,7 @@ class Operations(Table):
     margin_db: Annotated[float, Quantity("dB", least=0.0)] = Field(
         alias="margin", description="of the laser link, at which a data rate counts as one that it closes at"
     )
+    acquisition: Literal["wide beacon", "scan"] = Field(description="by which the partner is found")
     relay_share: Annotated[float, Quantity("", above=0.0, most=1.0)] = Field(
         description="share of each contact that the relay grants, from its beginning"
     )

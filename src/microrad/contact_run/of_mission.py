@@ -34,6 +34,7 @@ def of_mission(m: Mission, seen: View, finding: Finding | None, fine: FinePointi
         settle_s=m.fine_pointing.settle_s,
         hold_s=asked.hold_s,
         seed=m.operations.seed,
+        way=m.operations.acquisition,
     )
     return run(m, finding, fine.scene, fine.best.design, _contact(seen, asked.number - 1), settings)
 

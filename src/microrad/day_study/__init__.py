@@ -7,6 +7,7 @@ from microrad.day_study import flow
 from microrad.day_study.assumptions import NOTHING, Numbers, Swing, swings
 from microrad.day_study.flow import DIRECT, RELAY, Closing, PointingLoss, Way
 from microrad.day_study.geometry import Encounter, View, beyond_the_mission, times, view
+from microrad.link_acquisition import Found
 from microrad.link_study import LinkStudy
 from microrad.mission import LinkMission
 from microrad.units import format_quantity
@@ -48,10 +49,8 @@ class DayStudy:
 
     @property
     def ratio(self) -> float:
-        """Volume that the relay could carry over that of the direct downlink; nan without one."""
-        if self.direct is None:
-            return float("nan")
-        return self.relay.capacity_bit / self.direct.capacity_bit if self.direct.capacity_bit else float("inf")
+        """Volume that the relay could carry over that of the direct downlink (`flow.ratio`); nan without one."""
+        return float("nan") if self.direct is None else flow.ratio(self.relay.capacity_bit, self.direct.capacity_bit)
 
 
 def given_loss(links: LinkStudy) -> PointingLoss:
@@ -65,6 +64,14 @@ def given_loss(links: LinkStudy) -> PointingLoss:
     return PointingLoss(loss, 0.0, f"communication.pointing_error, {error}")
 
 
+def acquired(links: LinkStudy) -> Found | None:
+    """The acquisition by which the mission's partner is found, or None where it has none."""
+    o, finding = links.file.mission.operations, links.finding
+    if finding is None or o is None:
+        return None
+    return finding.wide if o.acquisition == "wide beacon" else finding.scan
+
+
 def run(links: LinkStudy, loss: PointingLoss | None = None) -> DayStudy:
     """The day of a mission that has the tables `orbit` and `operations`.
 
@@ -74,7 +81,7 @@ def run(links: LinkStudy, loss: PointingLoss | None = None) -> DayStudy:
     m, folder = links.file.mission, links.file.path.parent
     loss = given_loss(links) if loss is None else loss
     seen = view(m, orbit.pair(m, folder))
-    found = None if links.finding is None else links.finding.wide
+    found = acquired(links)
     closing = flow.closings(m, loss)
     rates, heard = flow.rate_table(closing), flow.heard(m, seen)
     return DayStudy(

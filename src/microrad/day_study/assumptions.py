@@ -16,9 +16,8 @@ from microrad.units import format_quantity
 
 _T = TypeVar("_T", bound=Table)
 _RUNS = 4  # of each case: what an acquisition takes is little beside what is varied
-_HELD = VisibilityLimits.model_validate(
-    {"attitude": "nadir", "boresight": [0.0, 0.0, -1.0], "field_of_regard": "60 deg", "in_eclipse": True}
-)
+_HELD = {"attitude": "nadir", "boresight": (0.0, 0.0, -1.0), "field_of_regard_rad": math.radians(60.0)}
+_NO_LIMITS = VisibilityLimits.model_validate({"attitude": "free", "in_eclipse": True})
 NOTHING = "as it is"
 
 
@@ -33,8 +32,8 @@ class Numbers:
 
     @property
     def ratio(self) -> float:
-        """Volume that the relay could carry over that of the direct downlink."""
-        return self.relay_bit / self.direct_bit if self.direct_bit else math.inf
+        """Volume that the relay could carry over that of the direct downlink; 0 where the relay carries nothing."""
+        return flow.ratio(self.relay_bit, self.direct_bit)
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,10 +50,11 @@ class Swing:
     def factor(self) -> float:
         """By how much the ratio of the volumes differs between the two; without a direct downlink, the relay's volume.
 
-        Infinite where one side carries nothing.
+        So too where the direct downlink carries nothing either way. Infinite where one side carries nothing.
         """
-        ends = [n.relay_bit if math.isnan(n.direct_bit) else n.ratio for n in (self.at_low, self.at_high)]
-        low, high = min(ends), max(ends)
+        both = self.at_low, self.at_high
+        alone = not any(n.direct_bit > 0.0 for n in both)
+        low, high = sorted(n.relay_bit if alone else n.ratio for n in both)
         return 1.0 if low == high else high / low if low > 0.0 else math.inf
 
 
@@ -116,19 +116,29 @@ def swings(
 ) -> tuple[Swing, ...]:
     """Every assumption of the day, the one that moves the ratio most first; those that move nothing stay in.
 
-    Rates, times and heights are halved and doubled, places and laws replaced. An orbit from a file stays as it is.
+    Rates, times and heights are halved and doubled, places and laws replaced. An orbit from a file stays as it is, and
+    so does what would leave no orbit: one that has decayed, or lies below the surface that lines of sight must clear.
     """
     m = changed(m, "operations.runs", min(flow.table(m).runs, _RUNS))
     own = _Case(m, loss, _Known(m, seen, heard))
     here = numbers(own, folder, found)
     made = []
     for name, low, high in _changes(own, found):
-        ends = [(NOTHING, here) if c is None else (c[0], numbers(c[1], folder, found)) for c in (low, high)]
+        ends = [_end(side, here, folder, found) for side in (low, high)]
         made.append(Swing(name, ends[0][0], ends[1][0], ends[0][1], ends[1][1]))
     return tuple(sorted(made, key=lambda swing: -swing.factor))
 
 
 _Side = tuple[str, _Case] | None
+
+
+def _end(side: _Side, here: Numbers, folder: Path, found: Found | None) -> tuple[str, Numbers]:
+    if side is None:
+        return NOTHING, here
+    try:
+        return side[0], numbers(side[1], folder, found)
+    except orbit.OrbitError:  # the changed orbit is none
+        return NOTHING, here
 
 
 def _changes(own: _Case, found: Found | None) -> Iterator[tuple[str, _Side, _Side]]:
@@ -157,7 +167,7 @@ def _changes(own: _Case, found: Found | None) -> Iterator[tuple[str, _Side, _Sid
     if orbits.grazing_height_m > 0.0:
         yield scaled("grazing height", "orbit.grazing_height_m", "m", (0.0, 2.0))
     if orbits.leo.limits is None or orbits.leo.limits.attitude == "free":
-        held = changed(m, "orbit.leo.limits", _HELD)
+        held = changed(m, "orbit.leo.limits", _held(orbits.leo.limits))
         yield other("attitude of the satellite", "nadir, 60 deg about zenith", held)
     if orbits.leo.kind == "circular":
         yield scaled("orbit altitude", "orbit.leo.altitude_m", "m", (0.8, 1.2))
@@ -168,6 +178,11 @@ def _changes(own: _Case, found: Found | None) -> Iterator[tuple[str, _Side, _Sid
     if o.downlink is not None:
         yield scaled("radio data rate", "operations.downlink.data_rate_bit_s", "bit/s")
         yield from _stations(own)
+
+
+def _held(limits: VisibilityLimits | None) -> VisibilityLimits:
+    """A body that stays with the Earth, its terminal about zenith; other limits as they are."""
+    return (limits or _NO_LIMITS).model_copy(update=_HELD)
 
 
 def _laser_rate(own: _Case, both: tuple[str, _Side, _Side]) -> tuple[str, _Side, _Side]:

@@ -107,6 +107,13 @@ def rate_table(found: tuple[Closing, ...]) -> operations.RateTable | None:
     return operations.RateTable(tuple(steps)) if steps else None
 
 
+def ratio(relay_bit: float, direct_bit: float) -> float:
+    """A volume by relay over one direct: 0 where the relay carries nothing, infinite where the other alone does."""
+    if direct_bit == 0.0:
+        return math.inf if relay_bit > 0.0 else 0.0
+    return relay_bit / direct_bit
+
+
 # --------------------------------------------------------------------------------------------------------------- relay
 def relay(
     m: LinkMission, seen: View, rates: operations.RateTable | None, outage: float, found: Found | None, slower: float

@@ -15,7 +15,7 @@ Floats = NDArray[np.float64]
 
 SAMPLE_S = 10.0
 """Step in which a contact is looked at: a range turns within minutes."""
-_CIRCULAR = 1e-6  # eccentricity, and inclination in rad, up to which the closed form holds
+_CIRCULAR = 1e-6  # eccentricity up to which the closed form holds
 _TOLERANCE = 0.01  # by which a constant of the mission may fall short of its orbits
 
 
@@ -63,6 +63,13 @@ class View:
     def visible_share(self) -> float:
         """Share of the span in contact."""
         return self.contact_s / self.duration_s
+
+    @property
+    def gap_s(self) -> float:
+        """Longest time in the span without a contact."""
+        found = [e.contact for e in self.encounters]
+        begins, ends = [c.start_s for c in found], [min(c.end_s, self.duration_s) for c in found]
+        return max(b - a for a, b in zip([0.0, *ends], [*begins, self.duration_s], strict=True))
 
     @property
     def median_s(self) -> float:

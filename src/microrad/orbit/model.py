@@ -1,7 +1,8 @@
 """From the mission's tables to orbits, terminals and stations."""
 
 import math
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,7 +13,7 @@ from microrad.orbit.base import Orbit, OrbitError
 from microrad.orbit.contacts import UNLIMITED, Limits, Terminal
 from microrad.orbit.earth import EARTH_RADIUS_M, Earth
 from microrad.orbit.element_files import read_elements
-from microrad.orbit.elements import MOST_ELEMENTS_AGE_S, Sgp4Orbit, closest_elements, sgp4_orbit
+from microrad.orbit.elements import MOST_ELEMENTS_AGE_S, ElementSet, Sgp4Orbit, closest_elements, sgp4_orbit
 from microrad.orbit.ephemeris import EphemerisOrbit
 from microrad.orbit.epoch import Epoch
 from microrad.orbit.ground import Station
@@ -152,6 +153,16 @@ def relays(c: Constellation, m: LinkMission, epoch: Epoch) -> tuple[Terminal, ..
     )
 
 
+def _names(sets: Sequence[ElementSet], path: Path) -> list[str]:
+    """A name for each of several satellites: the catalogue number parts those of one name."""
+    counted = Counter(each.name for each in sets)
+    names = [e.name if counted[e.name] == 1 else f"{e.name} ({e.catalogue_number})" for e in sets]
+    again = [name for name, count in Counter(names).items() if count > 1]
+    if again:
+        raise OrbitError(f"{path}: several element sets are of {again[0]}; leave one for each satellite")
+    return names
+
+
 def satellites(c: Constellation, m: LinkMission, epoch: Epoch, folder: Path) -> Iterator[Terminal]:
     """The satellites of a constellation, one after the other, each limited as the mission's own is.
 
@@ -161,10 +172,11 @@ def satellites(c: Constellation, m: LinkMission, epoch: Epoch, folder: Path) -> 
     shared = limits(table(m).leo.limits)
     if c.pattern == "file":
         assert c.file is not None
-        for elements in read_elements(folder / c.file):
+        sets = read_elements(folder / c.file)
+        for elements, name in zip(sets, _names(sets, folder / c.file), strict=True):
             own = sgp4_orbit(elements, epoch)
             own.require(0.0, table(m).duration_s)
-            yield Terminal(own, shared, elements.name)
+            yield Terminal(own, shared, name)
         return
     assert c.satellites is not None and c.planes is not None and c.phasing is not None
     base, turn = _kepler(table(m).leo, "", epoch), 2.0 * math.pi

@@ -26,7 +26,10 @@ def sentences(run: ContactRun, number: int, controller: str, rate_bit_s: float) 
     if run.data_s == 0.0:
         return [f"Contact {number} of {duration(length)} never comes to data: {run.log[-1].cause}."]
     before = run.first_data_s - c.start_s
-    lost = "lock is never lost in them" if not run.losses else f"lock is lost {_times(run.losses)} in them"
+    lost = "lock is never lost in them"
+    if run.losses:
+        every = duration(1.0 / run.losses_per_s)
+        lost = f"lock is lost {_times(run.losses)} in them, once in {every}, which the time between them does not show"
     carried = f"{volume(run.bits(rate_bit_s))} at {quantity(rate_bit_s, 'bit/s')}"
     return [
         f"Contact {number} ({duration(length)}) under {controller}: data begin {quantity(before, 's')} after the rise, "

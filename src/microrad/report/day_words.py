@@ -3,7 +3,7 @@
 import math
 from typing import Any
 
-from microrad.day_study import NOTHING, DayStudy, Encounter, Numbers, Swing, Way
+from microrad.day_study import NOTHING, Closing, DayStudy, Encounter, Numbers, Swing, Way
 from microrad.orbit import Contact
 from microrad.report.quantities import quantity
 
@@ -34,9 +34,10 @@ def sentences(day: DayStudy) -> list[str]:
 def headline(day: DayStudy) -> list[str]:
     """What the relay and the direct downlink could carry."""
     relay, span = day.relay, duration(day.view.duration_s)
+    whole = day.mission.operations is None or day.mission.operations.relay_share == 1.0
     said = (
-        f"In {span} the relay is in view {len(relay.contacts)} times, {relay.contact_s / 60.0:.0f} min in all, and "
-        f"could take {volume(relay.capacity_bit)}"
+        f"In {span} the relay {'is in view' if whole else 'grants the link'} {len(relay.contacts)} times, "
+        f"{relay.contact_s / 60.0:.0f} min in all, and could take {volume(relay.capacity_bit)}"
     )
     if day.direct is None:
         return [f"{said}."]
@@ -63,9 +64,10 @@ def contact_words(day: DayStudy) -> str:
             "coplanar circular orbits."
         )
     ahead, rate = v.largest("point_ahead_most_rad"), v.largest("rate_most_rad_s")
+    at_a_time = "" if math.isnan(v.median_s) else f" {duration(v.median_s)} at a time (median),"
     return (
-        f"The relay is in view for {100 * v.visible_share:.1f} % of the time, {duration(v.median_s)} at a time "
-        f"(median), and out of it for {duration(day.relay.gap_s)} at most. Range {_km(least)} to "
+        f"The relay is in view for {100 * v.visible_share:.1f} % of the time,{at_a_time} and out of it for "
+        f"{duration(v.gap_s)} at most. Range {_km(least)} to "
         f"{_km(v.largest('range_most_m'))} km, point-ahead up to {quantity(ahead, 'rad')}, line of sight up to "
         f"{quantity(rate, 'rad/s')}, Doppler shift up to {quantity(doppler, 'Hz')} either way.{hand}"
     )
@@ -73,7 +75,7 @@ def contact_words(day: DayStudy) -> str:
 
 def _never(day: DayStudy) -> str:
     leo, geo = day.view.pair.leo.name, day.view.pair.geo.name
-    return f"{leo} and {geo} never see one another within the limits of the mission"
+    return f"within the span and the limits of the mission, {leo} and {geo} do not see one another"
 
 
 def rate_words(day: DayStudy) -> str:
@@ -82,9 +84,13 @@ def rate_words(day: DayStudy) -> str:
     assert o is not None
     if not day.closings:
         return "The receiver takes none of the mission's data rates."
+
+    def reaches(c: Closing) -> bool:
+        return 0.0 < furthest <= c.largest_range_m
+
     said = "; ".join(
         f"{quantity(c.rate_bit_s, 'bit/s')} "
-        + ("at every range of the contacts" if c.largest_range_m >= furthest else f"up to {_km(c.largest_range_m)} km")
+        + ("at every range of the contacts" if reaches(c) else f"up to {_km(c.largest_range_m)} km")
         for c in day.closings
     )
     lost = f"; {100 * day.loss.outage:.2g} % of the time is lost in outage" if day.loss.outage else ""
@@ -138,10 +144,16 @@ def assumption_words(day: DayStudy) -> list[str]:
 
 def _ends(s: Swing, ratio: bool) -> str:
     def shown(n: Numbers) -> str:
-        value = f"{n.ratio:.3g}" if ratio else volume(n.relay_bit)
-        return "nothing by relay" if n.relay_bit == 0.0 else value
+        if n.relay_bit == 0.0:
+            return "nothing by relay"
+        return (_ratio(n) or "nothing direct") if ratio else volume(n.relay_bit)
 
     return f"{s.low}: {shown(s.at_low)}, {s.high}: {shown(s.at_high)}"
+
+
+def _ratio(n: Numbers) -> str:
+    """Volume by relay over volume direct; nothing where the latter is none."""
+    return f"{n.ratio:.3g}" if n.direct_bit > 0.0 else ""
 
 
 def _both(s: Swing, name: str) -> str:
@@ -246,7 +258,7 @@ def _numbers(n: Numbers, direct: bool) -> tuple[str, ...]:
     return (
         volume(n.relay_bit),
         volume(n.direct_bit),
-        f"{n.ratio:.3g}",
+        _ratio(n),
         duration(n.relay_slow_s),
         duration(n.direct_slow_s),
     )

@@ -1,0 +1,211 @@
+"""The day in the report: what the page says, its figures, its datasets, the contact in time, the plan of sessions."""
+
+import csv
+import io
+import json
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from microrad import contact_run, control, fine_pointing, report, study
+from microrad.fine_loop.loop import assemble
+from microrad.fine_pointing import designs
+from microrad.missionfile import load_mission
+from microrad.report import contact_run_words, day_plots, day_words
+from shipped import SHIPPED, edited_file
+
+FIGURES = ["day-timeline", "along-contact", "data-volume", "latency", "world-map", "assumptions"]
+
+
+@pytest.fixture(scope="module")
+def file():
+    return load_mission(SHIPPED)
+
+
+@pytest.fixture(scope="module")
+def fine(file):
+    """A fine-pointing study as far as a contact asks for it: the PI of the grid, made in half a second."""
+    scene = fine_pointing.scene(file)
+    tuned = designs.grid_baseline(designs.plants(scene, file.mission, 1)[:1], control.Specification(0.5))
+    design = fine_pointing.Design("PI", tuned, assemble("PI", scene.loop, tuned.controller))
+    return SimpleNamespace(scene=scene, best=SimpleNamespace(design=design), quantile=0.997)
+
+
+@pytest.fixture(scope="module")
+def found(file, fine):
+    """The study of the shipped mission without its fine-pointing loop, and one contact in time under a PI."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(study.fine_pointing, "run", lambda *args: None)
+        patch.setattr(study.paper, "applies", lambda mission: False)
+        whole = study.run(file)
+    run = contact_run.of_mission(file.mission, whole.day.view, whole.links.finding, fine)
+    return replace(whole, contact=run)
+
+
+@pytest.fixture(scope="module")
+def written(found, tmp_path_factory):
+    target = tmp_path_factory.mktemp("day") / "study"
+    report.write(found, target)
+    return target
+
+
+def test_the_study_has_a_day_and_a_plan_but_no_contact_in_time_without_a_fine_loop(found):
+    assert found.day is not None
+    assert found.plan is not None
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(study.fine_pointing, "run", lambda *args: None)
+        assert contact_run.of_mission(found.file.mission, found.day.view, found.links.finding, None) is None
+
+
+def test_the_page_answers_with_contacts_volumes_latencies_and_the_assumption(written, found):
+    text = (written / "report.html").read_text(encoding="utf-8")
+    section = text[text.index("What the link delivers") : text.index("Open-loop pointing</h2>")]
+    for sentence in day_words.sentences(found.day):
+        assert sentence in section
+    for needed in ("15 times", "median", "99 % within", "What matters most", "GB", "Doppler"):
+        assert needed in section
+    assert section.count("<figure") == len(FIGURES) + 1
+
+
+def test_each_claim_of_the_paper_about_contacts_is_judged(found):
+    claims = {c.claim: c for c in found.claims}
+    assert claims["about 45 minutes for each session"].agrees == "yes"
+    assert claims["a line of sight in each of about 15 orbits a day"].ours == "15 contacts a day"
+    assert claims["a ground pass takes less than about 10 minutes"].agrees == "yes"
+    assert "99 % within" in claims["data reach the ground in almost real time"].ours
+
+
+def test_each_figure_of_the_day_stands_with_its_data(written, found):
+    names = [f.name for f in day_plots.draw(found.day, found.contact)]
+    assert names == [*FIGURES, "contact-run"]
+    for name in names:
+        assert (written / "figures" / f"{name}.svg").stat().st_size > 1000
+        with (written / "figures" / f"{name}.csv").open(encoding="utf-8") as lines:
+            assert len(list(csv.reader(lines))) > 1
+    assert [f.name for f in day_plots.draw(found.day)] == FIGURES
+
+
+def test_along_the_contact_time_counts_from_the_rise(written):
+    with (written / "figures" / "along-contact.csv").open(encoding="utf-8") as lines:
+        rows = list(csv.reader(lines))
+    assert float(rows[1][0]) == 0.0
+    assert 3000.0 < float(rows[-1][0]) < 3300.0
+
+
+def test_the_latency_curve_is_the_distribution(found):
+    drawn = next(f for f in day_plots.draw(found.day) if f.name == "latency")
+    latency, share = drawn.columns["relay, latency (s)"], drawn.columns["relay, share"]
+    assert np.all(np.diff(latency) > 0)
+    assert np.all(np.diff(share) >= 0)
+    delay = found.file.mission.operations.relay_delay_s
+    assert share[latency < delay * (1 - 1e-12)].max(initial=0.0) == 0.0
+    np.testing.assert_allclose(share, found.day.relay.latency.cdf(latency), rtol=0, atol=1e-12)
+
+
+def test_results_hold_the_day(written, found):
+    tree = xr.open_datatree(written / "results.nc", engine="h5netcdf")
+    day = tree["day"]
+    assert set(day.children) == {
+        "contacts", "passes", "relay", "direct_downlink", "assumptions", "contact_run", "sessions"
+    }  # fmt: skip
+    contacts = day["contacts"]
+    assert contacts.sizes["contact"] == 15
+    assert contacts["start"].attrs["units"] == "s"
+    assert contacts.attrs["epoch"] == "2026-03-20T12:00:00Z"
+    assert float(contacts["point_ahead"].max()) == found.day.view.largest("point_ahead_most_rad")
+    assert float(day["relay"]["could_carry"]) == found.day.relay.capacity_bit
+    assert day["sessions"].sizes["session"] == len(found.plan.planned)
+    for group in day.children.values():
+        for name, variable in group.data_vars.items():
+            assert {"units", "long_name"} <= set(variable.attrs), name
+    tree.close()
+
+
+def test_the_sessions_stand_as_csv_and_as_a_contact_plan(written, found):
+    rows = list(csv.reader(io.StringIO((written / "sessions.csv").read_text(encoding="utf-8"))))
+    assert len(rows) == 1 + len(found.plan.planned)
+    plan = (written / "contact-plan.ionrc").read_text(encoding="utf-8")
+    assert plan.count("\na contact +") + plan.count("\n# left out") == len(found.plan.planned)
+    files = json.loads((written / "manifest.json").read_text(encoding="utf-8"))["files_sha256"]
+    assert {"sessions.csv", "contact-plan.ionrc"} <= set(files)
+
+
+def test_the_summary_is_plain_data(found):
+    data = report.summary(found)
+    assert data["day"]["relay"]["could_carry_bit"] == found.day.relay.capacity_bit
+    assert data["contact"]["losses"] == found.contact.losses
+    assert data["constellation"]["sessions"] == len(found.plan.planned)
+    json.dumps(data["contact"])
+
+
+# ----------------------------------------------------------------------------------------------- the contact in time
+
+
+def test_the_contact_of_the_mission_has_its_geometry(found):
+    encounter = found.day.view.encounters[0]
+    run = found.contact
+    assert (run.contact.start_s, run.contact.end_s) == (encounter.contact.start_s, encounter.contact.end_s)
+    assert len(run.windows) == found.file.mission.operations.contact.windows
+    ranges = [w.range_m for w in run.windows]
+    assert encounter.range_least_m * 0.999 <= min(ranges) <= max(ranges) <= encounter.range_most_m * 1.001
+    assert max(w.point_ahead_rad for w in run.windows) <= encounter.point_ahead_most_rad * 1.001
+    assert [t.to for t in run.log][:6] == ["slew", "beacon", "detect", "answer", "lock", "data"] or run.log[
+        0
+    ].to == "slew"
+
+
+def test_a_later_contact_is_free_from_the_end_of_the_one_before(found, fine, tmp_path):
+    m = edited_file(tmp_path, ("number = 1 ", "number = 3 "), whole=True).mission
+    run = contact_run.of_mission(m, found.day.view, found.links.finding, fine)
+    before = found.day.view.encounters[1].contact
+    assert run.contact.free_from_s == before.end_s
+    assert run.contact.start_s == found.day.view.encounters[2].contact.start_s
+
+
+def test_a_contact_beyond_those_of_the_span_is_refused(found, fine, tmp_path):
+    m = edited_file(tmp_path, ("number = 1 ", "number = 99 "), whole=True).mission
+    with pytest.raises(ValueError, match=r"operations\.contact\.number is 99, and the span has 15 contacts"):
+        contact_run.of_mission(m, found.day.view, found.links.finding, fine)
+
+
+def test_the_words_say_when_data_begin_and_how_much_flows(found):
+    run = found.contact
+    (said,) = contact_run_words.sentences(run, 1, "PI", 3e8)
+    assert "data begin" in said
+    assert f"{100 * run.data_share:.1f} % of the contact" in said
+    assert "never lost" in said
+    rows = contact_run_words.window_rows(run)
+    assert len(rows) == len(run.windows)
+    assert len(rows[0]) == len(contact_run_words.window_headings(0.997))
+    assert contact_run_words.window_headings(0.95)[5] == "95 % (µrad)"
+
+
+def test_the_words_of_a_contact_without_data_say_why(found):
+    log = found.contact.log
+    none = replace(found.contact, log=(*log[:2], replace(log[-1], state=log[1].to, cause="given up")), windows=())
+    (said,) = contact_run_words.sentences(none, 1, "PI", 3e8)
+    assert "never comes to data: given up" in said
+
+
+# ------------------------------------------------------------------------------------------- missions without a table
+
+
+def test_a_mission_without_orbits_has_no_day(tmp_path, monkeypatch):
+    monkeypatch.setattr(study.paper, "applies", lambda mission: False)
+    text = SHIPPED.read_text(encoding="utf-8")
+    begin, end = (
+        text.index("# ---", text.index("jitter = ")),
+        text.index("# ---", text.index("[constellation.relays.west]")),
+    )
+    mission = tmp_path / "mission.toml"
+    mission.write_text(
+        text[:begin] + text[end : text.index("# ---", text.index("loop_amplitude = "))], encoding="utf-8"
+    )
+    result = study.run(load_mission(mission))
+    assert (result.day, result.contact, result.plan) == (None, None, None)
+    assert not any("orbits a day" in c.claim for c in result.claims)
+    page = report.write(result, tmp_path / "out").read_text(encoding="utf-8")
+    assert "What the link delivers" not in page
