@@ -25,7 +25,19 @@ from shipped import without_fine_pointing
 
 ROOT = Path(__file__).parents[1]
 PAPER = ROOT / "src" / "microrad" / "missions" / "leo-geo.toml"
-COMMANDS = ("init", "run", "budget", "presets", "design", "identify", "bench", "doctor", "schema")
+COMMANDS = (
+    "init",
+    "run",
+    "budget",
+    "contacts",
+    "constellation",
+    "presets",
+    "design",
+    "identify",
+    "bench",
+    "doctor",
+    "schema",
+)
 MICRORAD = (sys.executable, "-m", "microrad")
 COLUMNS = ("--input", "drive", "--output", "angle", "--rate", "1000", "--static")
 

@@ -15,10 +15,7 @@ from microrad.orbit.analytic import GeostationarySlot, KeplerOrbit, circular
 from microrad.orbit.base import OrbitError, States
 from microrad.orbit.closed_form import coplanar_contact
 from microrad.orbit.contacts import (
-    UNLIMITED,
-    Limits,
     Sampled,
-    Terminal,
     coarse_step_s,
     coarse_times,
     contacts,
@@ -28,6 +25,7 @@ from microrad.orbit.contacts import (
 from microrad.orbit.earth import EARTH_RADIUS_M, FLATTENING, GEOSTATIONARY_RADIUS_M, Earth, gravity
 from microrad.orbit.epoch import Epoch
 from microrad.orbit.ground import Station, elevation_rad
+from microrad.orbit.limits import UNLIMITED, Limits, Terminal
 from microrad.orbit.line_of_sight import sight
 from microrad.orbit.sun import shadow_rad, sun_direction
 from microrad.pointing_table import point_ahead_rad

@@ -14,7 +14,7 @@ import xarray as xr
 
 from microrad import folder, missionfile, report, study
 from microrad.performance import Cost
-from microrad.report import figures, link_figures, words
+from microrad.report import day_plots, figures, link_figures, words
 from shipped import SHIPPED, edited_file
 
 
@@ -74,7 +74,7 @@ def test_the_page_holds_what_the_paper_is_judged_by(written):
 
 
 def test_each_figure_is_an_svg_with_its_data(written, paper):
-    drawn = (*figures.draw(paper), *link_figures.draw(paper.links))
+    drawn = (*figures.draw(paper), *link_figures.draw(paper.links), *day_plots.draw(paper.day))
     assert [f.name for f in drawn] == [
         "fig2-margin-map",
         "fig5-hysteresis-loops",
@@ -84,6 +84,12 @@ def test_each_figure_is_an_svg_with_its_data(written, paper):
         "claims-scan",
         "tornado",
         "wide-beam-or-scan",
+        "day-timeline",
+        "along-contact",
+        "data-volume",
+        "latency",
+        "world-map",
+        "assumptions",
     ]
     names = {p.name for p in (written / "figures").iterdir()}
     assert names == {f.name + ending for f in drawn for ending in (".svg", ".csv")}

@@ -114,6 +114,10 @@ def test_the_claims_beside_our_values(shipped):
         ("Fig. 8", "yes"),
         ("Fig. 8", "yes"),
         ("section 3.1, Fig. 6 and 8", "no"),
+        ("abstract", "yes"),
+        ("section 2.2", "yes"),
+        ("abstract", "yes"),
+        ("abstract", "yes"),
     ]
     ours = [c.ours for c in result.claims]
     assert ours[3].startswith("1.07 mrad")
@@ -140,14 +144,18 @@ def test_the_map_of_the_margin_meets_the_budget(shipped):
     assert_allclose(fig2.largest_error_rad, 10e-6, rtol=2e-3)
 
 
+STEPS = (
+    "budgets and acquisition",
+    "mirror and tracking (the first run compiles for half a minute)",
+    "claims of the paper",
+    "the day",
+    "verdict",
+)
+
+
 def test_progress_grows(shipped):
     _, said = shipped
-    assert [message for message in said if message[1] == 3] == [
-        (0, 3, "budgets and acquisition"),
-        (1, 3, "mirror and tracking (the first run compiles for half a minute)"),
-        (2, 3, "claims of the paper"),
-        (3, 3, "verdict"),
-    ]
+    assert [message for message in said if message[2] in STEPS] == [(done, 4, what) for done, what in enumerate(STEPS)]
     scan = [(done, total) for done, total, what in said if what == "scan of gains and compositions"]
     assert scan == [(1, 4), (2, 4), (3, 4), (4, 4)]
     assert said[-1][0] == said[-1][1]
@@ -212,7 +220,7 @@ def test_a_static_mirror_of_plays_runs_through(coarse, tmp_path):
     assert result.comparison is None
     claims = [(c.where, c.claim) for c in result.claims]
     assert "Eq. 2" not in [where for where, _ in claims]
-    assert [where for where, _ in claims][-3:] == ["Fig. 6", "Fig. 8", "Fig. 8"]
+    assert [where for where, _ in claims if "Fig" in where][-3:] == ["Fig. 6", "Fig. 8", "Fig. 8"]
     assert {r.mirror for r in result.runs} == {"given", "no hysteresis"}
     with_inverse, without = peaks(result)["PID + inverse", 25.0], peaks(result)["PID", 25.0]
     assert with_inverse < 0.15 * without

@@ -16,8 +16,8 @@ from microrad.units import PLANCK_J_S, SPEED_OF_LIGHT_M_S, UnitError, format_qua
 # our symbol: astropy's name for it; photon, bit and cycle are base dimensions in both
 ASTROPY = {"B": "byte", "min": "minute", "h": "hour", "deg": "degree"}
 SI = {
-    "m": "m", "g": "kg", "s": "s", "min": "s", "h": "s", "A": "A", "K": "K", "V": "V", "W": "W", "J": "J", "N": "N",
-    "Hz": "Hz", "rad": "rad", "deg": "rad", "arcsec": "rad",
+    "m": "m", "g": "kg", "s": "s", "min": "s", "h": "s", "day": "s", "A": "A", "K": "K", "V": "V", "W": "W", "J": "J",
+    "N": "N", "Hz": "Hz", "rad": "rad", "deg": "rad", "arcsec": "rad",
     "bit": "bit", "B": "bit", "byte": "bit", "photon": "photon", "sr": "rad2",
 }  # fmt: skip
 PREFIXES = {"": 1.0} | {p: au.Unit(f"{p}m").to(au.m) for p in "pnumckMGT"}

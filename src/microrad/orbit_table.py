@@ -34,7 +34,10 @@ class UtcEpoch(Quantity):
     def read(self, value: object) -> str:  # type: ignore[override]
         """The text; raises `UnitError` for what is no date, or does not say that it is UTC."""
         if isinstance(value, datetime) and value.tzinfo is not None:
-            return value.astimezone(UTC).isoformat().replace("+00:00", "Z")
+            try:
+                return value.astimezone(UTC).isoformat().replace("+00:00", "Z")
+            except OverflowError:
+                raise UnitError(str(value), "is no date in UTC", self.wanted, self.example) from None
         if not isinstance(value, str) or not _EPOCH.fullmatch(value):
             shown = value if isinstance(value, str) else str(value)
             raise UnitError(shown, "is not a date and time with a Z for UTC", self.wanted, self.example)
@@ -61,10 +64,15 @@ class UtcEpoch(Quantity):
 
 @dataclass(frozen=True, slots=True)
 class _Inclination(Quantity):
-    """An inclination, or the word for the one of a sun-synchronous orbit; the latter is nan until it is worked out."""
+    """An inclination, or the word for the one of a sun-synchronous orbit."""
 
-    def read(self, value: object) -> float:
-        return math.nan if value == SUN_SYNCHRONOUS else Quantity.read(self, value)
+    def read(self, value: object) -> float | str:  # type: ignore[override]
+        if value == SUN_SYNCHRONOUS:
+            return SUN_SYNCHRONOUS
+        try:
+            return Quantity.read(self, value)
+        except UnitError as error:
+            raise UnitError(value, error.reason, self.wanted, error.example) from None
 
     @property
     def wanted(self) -> str:
@@ -76,7 +84,7 @@ class _Inclination(Quantity):
 
 
 class VisibilityLimits(Table):
-    """What a terminal and its body can point at. A key that is left out sets no limit."""
+    """What a terminal and its body can point at."""
 
     attitude: Literal["nadir", "sun", "free"] = Field(
         description="nadir: z to the Earth's centre, x along the flight; sun: x to the Sun, z as near to nadir as "
@@ -88,11 +96,11 @@ class VisibilityLimits(Table):
     field_of_regard_rad: HalfAngle | None = Field(
         alias="field_of_regard", default=None, description="half angle about the boresight; nadir and sun need it"
     )
-    slew_limit_rad_s: Annotated[float, Quantity("rad/s", "deg/s", above=0.0)] | None = Field(
-        alias="slew_limit", default=None, description="largest rate of the line of sight, in the frame of the attitude"
+    slew_limit_rad_s: Annotated[float, Quantity("rad/s", "deg/s", above=0.0)] = Field(
+        alias="slew_limit", description="largest rate of the line of sight, in the frame of the attitude"
     )
-    sun_exclusion_rad: Annotated[float, Quantity("rad", "deg", least=0.0, most=math.pi / 2)] | None = Field(
-        alias="sun_exclusion", default=None, description="least angle between line of sight and a Sun that is not set"
+    sun_exclusion_rad: Annotated[float, Quantity("rad", "deg", least=0.0, most=math.pi / 2)] = Field(
+        alias="sun_exclusion", description='least angle between line of sight and a Sun that is not set; "0 deg": none'
     )
     in_eclipse: Annotated[bool, Switch("")] = Field(description="false: the terminal is off in the Earth's shadow")
 
@@ -150,7 +158,7 @@ class OrbitTable(Table):
         alias="semi_major_axis", default=None
     )
     eccentricity: Annotated[float, Quantity("", least=0.0, most=0.999)] | None = None
-    inclination_rad: Annotated[float, _Inclination("rad", "deg", least=0.0, most=math.pi)] | None = Field(
+    inclination_rad: Annotated[float | str, _Inclination("rad", "deg", least=0.0, most=math.pi)] | None = Field(
         alias="inclination", default=None, description=f'"{SUN_SYNCHRONOUS}": the node follows the Sun'
     )
     node_rad: Anomaly | None = Field(

@@ -16,8 +16,6 @@ from microrad.units import format_quantity
 
 _T = TypeVar("_T", bound=Table)
 _RUNS = 4  # of each case: what an acquisition takes is little beside what is varied
-_HELD = {"attitude": "nadir", "boresight": (0.0, 0.0, -1.0), "field_of_regard_rad": math.radians(60.0)}
-_NO_LIMITS = VisibilityLimits.model_validate({"attitude": "free", "in_eclipse": True})
 NOTHING = "as it is"
 
 
@@ -180,9 +178,15 @@ def _changes(own: _Case, found: Found | None) -> Iterator[tuple[str, _Side, _Sid
         yield from _stations(own)
 
 
-def _held(limits: VisibilityLimits | None) -> VisibilityLimits:
-    """A body that stays with the Earth, its terminal about zenith; other limits as they are."""
-    return (limits or _NO_LIMITS).model_copy(update=_HELD)
+def _held(own: VisibilityLimits | None) -> VisibilityLimits:
+    """The limits of a body that does not turn to its partner, with a terminal on top of it."""
+    given = {"attitude": "nadir", "boresight": [0.0, 0.0, -1.0], "field_of_regard": "60 deg", "in_eclipse": True}
+    given |= {"slew_limit": "10 deg/s", "sun_exclusion": "0 deg"}
+    held = VisibilityLimits.model_validate(given)
+    if own is None:
+        return held
+    kept = {name: getattr(own, name) for name in ("slew_limit_rad_s", "sun_exclusion_rad", "in_eclipse")}
+    return held.model_copy(update=kept)
 
 
 def _laser_rate(own: _Case, both: tuple[str, _Side, _Side]) -> tuple[str, _Side, _Side]:

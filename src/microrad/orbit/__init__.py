@@ -4,12 +4,9 @@ from microrad.orbit.analytic import GeostationarySlot, KeplerOrbit, circular, su
 from microrad.orbit.base import Orbit, OrbitError, States
 from microrad.orbit.closed_form import CoplanarContact, coplanar_contact
 from microrad.orbit.contacts import (
-    UNLIMITED,
     Contact,
-    Limits,
     Pass,
     Sampled,
-    Terminal,
     coarse_step_s,
     coarse_times,
     contacts,
@@ -23,6 +20,7 @@ from microrad.orbit.ephemeris import EphemerisOrbit
 from microrad.orbit.epoch import Epoch
 from microrad.orbit.events import positive
 from microrad.orbit.ground import Station, elevation_rad
+from microrad.orbit.limits import UNLIMITED, Limits, Terminal
 from microrad.orbit.line_of_sight import LineOfSight, sight
 from microrad.orbit.model import Pair, pair, relays, satellites, stations
 from microrad.orbit.oem import read_oem

@@ -10,13 +10,13 @@ from microrad.mission import LinkMission
 from microrad.operations_table import Constellation, Downlink
 from microrad.orbit.analytic import GeostationarySlot, KeplerOrbit, node_of_local_time, sun_synchronous_inclination_rad
 from microrad.orbit.base import Orbit, OrbitError
-from microrad.orbit.contacts import UNLIMITED, Limits, Terminal
 from microrad.orbit.earth import EARTH_RADIUS_M, Earth
 from microrad.orbit.element_files import read_elements
 from microrad.orbit.elements import MOST_ELEMENTS_AGE_S, ElementSet, Sgp4Orbit, closest_elements, sgp4_orbit
 from microrad.orbit.ephemeris import EphemerisOrbit
 from microrad.orbit.epoch import Epoch
 from microrad.orbit.ground import Station
+from microrad.orbit.limits import UNLIMITED, Limits, Terminal
 from microrad.orbit.oem import read_oem
 from microrad.orbit_table import Orbits, OrbitTable, VisibilityLimits
 
@@ -47,7 +47,7 @@ def pair(m: LinkMission, folder: Path) -> Pair:
     Raises `OrbitError` for an orbit that is none, or that does not hold over the mission's span.
     """
     orbits = table(m)
-    epoch = Epoch.from_text(orbits.epoch)
+    epoch = _epoch(orbits)
     names = m.terminals.called("leo"), m.terminals.called("geo")
     if names[0] == names[1]:  # two terminals of one make
         names = f"{names[0]} (own)", f"{names[1]} (partner)"
@@ -67,6 +67,13 @@ def table(m: LinkMission) -> Orbits:
     if m.orbit is None:
         raise OrbitError("the mission has no table [orbit]: microrad init writes one")
     return m.orbit
+
+
+def _epoch(orbits: Orbits) -> Epoch:
+    try:
+        return Epoch.from_text(orbits.epoch)
+    except OrbitError as error:
+        raise OrbitError(f"orbit.epoch: {error}") from None
 
 
 def earth(orbits: Orbits) -> Earth:
@@ -114,7 +121,7 @@ def _kepler(t: OrbitTable, name: str, epoch: Epoch) -> KeplerOrbit:
         axis, eccentricity, perigee = t.semi_major_axis_m, t.eccentricity, t.argument_of_perigee_rad
         anomaly = t.mean_anomaly_rad
     inclination = t.inclination_rad
-    if math.isnan(inclination):
+    if isinstance(inclination, str):
         inclination = sun_synchronous_inclination_rad(axis - EARTH_RADIUS_M, eccentricity)
     node = t.node_rad
     if node is None:
@@ -124,7 +131,7 @@ def _kepler(t: OrbitTable, name: str, epoch: Epoch) -> KeplerOrbit:
 
 
 def limits(t: VisibilityLimits | None) -> Limits:
-    """What a terminal can point at; a key that is left out sets no limit."""
+    """What a terminal can point at; anything without the table."""
     if t is None:
         return UNLIMITED
     boresight = UNLIMITED.boresight if t.boresight is None else (t.boresight[0], t.boresight[1], t.boresight[2])
@@ -132,8 +139,8 @@ def limits(t: VisibilityLimits | None) -> Limits:
         attitude=t.attitude,
         boresight=boresight,
         field_of_regard_rad=math.pi if t.field_of_regard_rad is None else t.field_of_regard_rad,
-        slew_limit_rad_s=math.inf if t.slew_limit_rad_s is None else t.slew_limit_rad_s,
-        sun_exclusion_rad=0.0 if t.sun_exclusion_rad is None else t.sun_exclusion_rad,
+        slew_limit_rad_s=t.slew_limit_rad_s,
+        sun_exclusion_rad=t.sun_exclusion_rad,
         in_eclipse=t.in_eclipse,
     )
 

@@ -14,6 +14,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from microrad.fine_pointing import COUNTERS, FinePointingStudy, Residual
+from microrad.mission import Mission
 from microrad.report import day_results
 from microrad.report.fine_pointing_data import margins, rms_by_source, sources
 from microrad.report.variables import coordinate, variable
@@ -263,9 +264,7 @@ def manifest(study: Study, folder: Path) -> dict[str, Any]:
     """
     mission: dict[str, Any] = {"file": study.file.path.name, "sha256": study.file.sha256, "text": study.file.text}
     files: Mapping[str, Any] = {
-        str(p.relative_to(folder)): hashlib.sha256(p.read_bytes()).hexdigest()
-        for p in sorted(folder.rglob("*"))
-        if p.is_file()
+        str(p.relative_to(folder)): _sha256(p) for p in sorted(folder.rglob("*")) if p.is_file()
     }
     mirror, m = study.file.mirror_file, study.file.mission
     drawn = [
@@ -279,12 +278,25 @@ def manifest(study: Study, folder: Path) -> dict[str, Any]:
     ]
     return {
         "mission": mission,
+        "inputs_sha256": {name: _sha256(study.file.path.parent / name) for name in _inputs(m)},
         "mirror": None if mirror is None else {"file": mirror.path.name, "sha256": mirror.sha256, "text": mirror.text},
         "versions": versions(),
         "machine": platform.machine(),
         "randomness": "; ".join(drawn) or "none",
         "files_sha256": files,
     }
+
+
+def _inputs(m: Mission) -> list[str]:
+    """Files that the mission names beside its mirror, as it names them."""
+    tables = [] if m.orbit is None else [m.orbit.leo, m.orbit.geo]
+    named = [t.file for t in tables] + [None if m.constellation is None else m.constellation.file]
+    named.append(None if m.fine_pointing is None else m.fine_pointing.vibration.file)
+    return [name for name in dict.fromkeys(named) if name is not None]
+
+
+def _sha256(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
 def write_manifest(study: Study, folder: Path, name: str) -> None:
