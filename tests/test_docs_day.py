@@ -213,6 +213,9 @@ def test_rates_share_and_store(replaced, links, day):
     assert stepped.closings[0].largest_range_m < min(e.range_least_m for e in day.view.encounters)
     told(f"in place of {day.relay.capacity_bit / 8e12:.2f} TB at 300 Mbit/s alone")
     told(f"within {stepped.relay.slow_s / 60:.1f} min in place of {day.relay.slow_s / 60:.1f} min")
+    told("Without `[acquisition]` lock is there at once")
+    at_once = flow.relay(day.mission, day.view, flow.rate_table(day.closings), 0.0, None, 1.0)
+    assert np.ptp(at_once.capacity_spread_bit) == 0.0 and at_once.capacity_bit > day.relay.capacity_bit
     half = of("relay_share = 1.0", "relay_share = 0.5")
     told(f"`relay_share = 0.5` {half.relay.capacity_bit / 8e12:.2f} TB are left", f"{half.relay.slow_s / 60:.1f} min")
     small = of('"128 GB"', '"2 GB"')
@@ -280,14 +283,30 @@ def test_one_contact_in_time(lqg, links, day):
 # ---------------------------------------------------------------------------------------------------- constellation
 def test_the_constellation(links):
     plan = constellation.run(links.file, day_study.given_loss(links))
-    idle = sum(one.rate_bit_s == 0.0 for one in plan.planned)
-    told(f"{idle} of the {len(plan.planned)} sessions of `microrad constellation leo-geo.toml`")
+    reach = np.sum(plan.opportunities.end_s - plan.opportunities.start_s) / 3600.0
+    told(
+        f"`microrad constellation leo-geo.toml` has {len(plan.planned)} of them, in {reach:.0f} h of contacts in reach"
+    )
+    assert all(one.rate_bit_s > 0.0 for one in plan.planned)
     text = operations.contact_plan(plan.planned, plan.epoch.utc)
-    assert text.count("# left out") == idle
+    assert "# left out" not in text
     lights = {line.split()[-1] for line in text.splitlines() if line.startswith("a range")}
     assert lights == {"1"}
     counted = np.sum(plan.by_satellite.served_s)
     assert counted == pytest.approx(sum(one.end_s - one.locked_s for one in plan.planned))
+
+
+def test_a_pattern_repeats_a_circular_orbit_and_a_file_goes_with_every_kind(folder):
+    told("`[constellation]` repeats a circular `orbit.leo`", "and goes with every kind of `orbit.leo`")
+    path = folder / "many.toml"
+    path.write_text(TEXT.replace(shipped("orbit.leo"), ORBITS[1] + "\n\n"), encoding="utf-8")
+    with pytest.raises(missionfile.MissionError, match="no circular orbit to repeat"):
+        missionfile.load_link(path)
+    text = re.sub(r"(?m)^(satellites|planes|phasing) = .*\n", "", path.read_text(encoding="utf-8"))
+    path.write_text(text.replace('pattern = "delta"', 'pattern = "file"\nfile = "satellite.tle"'), encoding="utf-8")
+    m = missionfile.load_link(path).mission
+    (only,) = orbit.satellites(m.constellation, m, orbit.Epoch.from_text(m.orbit.epoch), folder)
+    assert only.name == "DEMO"
 
 
 @pytest.mark.parametrize(("pattern", "round_deg"), [("delta", 360.0), ("star", 180.0)])

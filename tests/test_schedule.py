@@ -30,6 +30,11 @@ def opportunities(*rows):
     return Opportunities(*(np.array(c) for c in columns))
 
 
+def volumes(sessions, rate_bit_s=1e9):
+    """The data of each session at one rate."""
+    return rate_bit_s * (sessions.end_s - sessions.locked_s)
+
+
 def listed(sessions):
     """(satellite, relay, terminal, start, end) of each session."""
     fields = (sessions.satellite, sessions.relay, sessions.terminal, sessions.start_s, sessions.end_s)
@@ -159,11 +164,11 @@ def test_no_terminal_idles_while_someone_could_use_it(case):
 def test_the_time_served_is_bounded_by_the_terminals_and_by_what_is_in_view(case):
     rows, satellites, relays, terminals, rules = case
     got = schedule(opportunities(*rows), satellites, relays, terminals, rules, 0.0)
-    each = totals_by_satellite(got, satellites, 1e9, (0.0, 40.0))
+    each = totals_by_satellite(got, satellites, volumes(got), (0.0, 40.0))
     for satellite in range(satellites):
         seconds = {s for row in rows if row[0] == satellite for s in range(int(row[2]), int(row[3]))}
         assert each.busy_s[satellite] <= len(seconds)
-    both = totals_by_relay(got, relays, 1e9, (0.0, 40.0))
+    both = totals_by_relay(got, relays, volumes(got), (0.0, 40.0))
     assert np.all(both.busy_s <= 40.0 * terminals)
     assert both.busy_s.sum() == pytest.approx(each.busy_s.sum(), abs=rounding)
     assert both.sessions.sum() == each.sessions.sum() == got.start_s.size
@@ -210,7 +215,7 @@ def test_satellites_that_see_the_same_get_the_same_within_one_session(count, ter
     rules = Rules(overhead_s=60.0, shortest_s=120.0, longest_s=600.0)
     rows = [(satellite, 0, 0.0, DAY) for satellite in range(count)]
     got = schedule(opportunities(*rows), count, 1, terminals, rules, 0.0)
-    each = totals_by_satellite(got, count, 1e9, (0.0, DAY))
+    each = totals_by_satellite(got, count, volumes(got), (0.0, DAY))
     assert np.ptp(each.served_s) <= rules.longest_s - rules.overhead_s + rounding
     if terminals < count:  # every terminal is busy all day, in sessions of the longest
         assert each.busy_s.sum() == pytest.approx(terminals * DAY)
@@ -237,7 +242,10 @@ def test_a_thousand_satellites_on_four_relays_keep_every_terminal_busy_and_every
         same = np.diff(key[order]) == 0
         assert np.all(got.start_s[order][1:][same] >= got.end_s[order][:-1][same])
     span = (0.0, float(got.end_s.max()))
-    each, relays = totals_by_satellite(got, 1000, 1e9, span), totals_by_relay(got, 4, 1e9, span)
+    each, relays = (
+        totals_by_satellite(got, 1000, volumes(got), span),
+        totals_by_relay(got, 4, volumes(got), span),
+    )
     assert np.all(each.sessions >= 1)
     # from 2 h to 22 h there is always someone in view: no terminal is without a session
     assert np.all(relays.busy_s >= 16 * (20 * 3600.0))
@@ -256,13 +264,13 @@ def sessions(*rows):
 
 def test_totals_count_data_from_lock_to_end_and_gaps_from_data_to_data():
     got = sessions((0, 0, 0, 10, 12, 20), (1, 0, 1, 11, 15, 40), (2, 0, 2, 16, 17, 18), (0, 1, 0, 50, 55, 60))
-    each = totals_by_satellite(got, 4, 2.0, (0.0, 100.0))
+    each = totals_by_satellite(got, 4, volumes(got, 2.0), (0.0, 100.0))
     assert each.sessions.tolist() == [2, 1, 1, 0]
     assert each.busy_s.tolist() == [20.0, 29.0, 2.0, 0.0]
     assert each.served_s.tolist() == [13.0, 25.0, 1.0, 0.0]
     assert each.volume_bit.tolist() == [26.0, 50.0, 2.0, 0.0]
     assert each.longest_gap_s.tolist() == [40.0, 60.0, 82.0, 100.0]
-    relays = totals_by_relay(got, 2, 2.0, (0.0, 100.0))
+    relays = totals_by_relay(got, 2, volumes(got, 2.0), (0.0, 100.0))
     assert relays.longest_gap_s.tolist() == [60.0, 55.0]  # relay 0 has data from 12 to 40 on its three terminals
     assert relays.served_s.tolist() == [34.0, 5.0]
 
@@ -270,7 +278,7 @@ def test_totals_count_data_from_lock_to_end_and_gaps_from_data_to_data():
 def test_a_schedule_without_an_opportunity_is_empty():
     got = schedule(opportunities(), 2, 1, 1, RULES, 0.0)
     assert listed(got) == []
-    assert totals_by_satellite(got, 2, 1.0, (0.0, 9.0)).longest_gap_s.tolist() == [9.0, 9.0]
+    assert totals_by_satellite(got, 2, volumes(got, 1.0), (0.0, 9.0)).longest_gap_s.tolist() == [9.0, 9.0]
 
 
 # ---- refusals
@@ -338,16 +346,17 @@ def test_a_relay_beyond_the_count_is_refused():
 
 
 @pytest.mark.parametrize(
-    ("count", "rate", "span", "words"),
+    ("count", "volume", "span", "words"),
     [
-        (1, 1.0, (0.0, 50.0), "names index 1"),
-        (2, -1.0, (0.0, 50.0), "data rate is -1"),
-        (2, math.nan, (0.0, 50.0), "data rate is nan"),
-        (2, 1.0, (50.0, 0.0), "not after its start"),
-        (2, 1.0, (0.0, 15.0), "outside the span"),
-        (2, 1.0, (11.0, 50.0), "outside the span"),
+        (1, [1.0], (0.0, 50.0), "names index 1"),
+        (2, [-1.0], (0.0, 50.0), "the least -1 bit"),
+        (2, [math.nan], (0.0, 50.0), "number 0 is nan"),
+        (2, [1.0, 1.0], (0.0, 50.0), "2 volumes for 1 sessions"),
+        (2, [1.0], (50.0, 0.0), "not after its start"),
+        (2, [1.0], (0.0, 15.0), "outside the span"),
+        (2, [1.0], (11.0, 50.0), "outside the span"),
     ],
 )
-def test_totals_of_what_does_not_fit_are_refused(count, rate, span, words):
+def test_totals_of_what_does_not_fit_are_refused(count, volume, span, words):
     with pytest.raises(OperationsError, match=words):
-        totals_by_satellite(sessions((1, 0, 0, 10, 12, 20)), count, rate, span)
+        totals_by_satellite(sessions((1, 0, 0, 10, 12, 20)), count, volume, span)

@@ -1,8 +1,8 @@
 """Many satellites that share a few relays: who sees whom, who is served when, and the plan of it."""
 
-from collections.abc import Callable, Sequence
+import math
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,13 +12,13 @@ from microrad.day_study.flow import PointingLoss, closings, rate_table
 from microrad.mission import LinkMission
 from microrad.missionfile import LinkFile
 from microrad.operations_table import Constellation
-from microrad.threads import in_threads
 
 Floats = NDArray[np.float64]
 Progress = Callable[[int, int, str], None]
 Span = tuple[float, float]
 
-_AT_ONCE = 16  # satellites of a job
+_STEP_S = 60.0  # in which a range is looked at
+_EDGE = 1e-9  # part of a range by which a session that ends at a limit may seem to exceed it
 _RANGES = 25  # samples of a session
 
 
@@ -53,45 +53,43 @@ class ConstellationPlan:
 
 
 def opportunities(
-    satellites: Sequence[orbit.Terminal],
+    satellites: Iterable[orbit.Terminal],
     relays: Sequence[orbit.Terminal],
     earth: orbit.Earth,
     epoch: orbit.Epoch,
     span_s: Span,
-    on_progress: Progress = lambda done, total, what: None,
+    furthest_m: float = math.inf,
+    on_progress: Callable[[int], None] = lambda done: None,
 ) -> operations.Opportunities:
-    """Every contact of every satellite with every relay, in order of their start.
+    """Every contact of every satellite with every relay up to a range of ``furthest_m``, in order of their start.
 
-    The work grows with the number of satellites, and what is kept with the number of contacts. Raises
-    `orbit.OrbitError` as `orbit.contacts`.
+    One satellite after the other, as the work is many small arrays, for which threads only wait on one another: it
+    grows with the number of satellites, and what is kept with the number of contacts. Raises `orbit.OrbitError` as
+    `orbit.contacts`.
     """
-    groups = [satellites[first : first + _AT_ONCE] for first in range(0, len(satellites), _AT_ONCE)]
-    jobs = [partial(_contacts, group, relays, earth, epoch, span_s) for group in groups]
-    total = len(satellites)
-    found = in_threads(jobs, lambda done: on_progress(min(done * _AT_ONCE, total), total, "contacts"))
-    rows = np.concatenate([np.zeros((0, 4)), *found])
-    counted = np.concatenate([np.zeros(0), *(rows_of[:, 0] + _AT_ONCE * k for k, rows_of in enumerate(found))])
-    order = np.lexsort((rows[:, 1], counted, rows[:, 2]))
-    return operations.Opportunities(counted[order], rows[order, 1], rows[order, 2], rows[order, 3])
-
-
-def _contacts(
-    group: Sequence[orbit.Terminal],
-    relays: Sequence[orbit.Terminal],
-    earth: orbit.Earth,
-    epoch: orbit.Epoch,
-    span_s: Span,
-) -> Floats:
-    """Satellite in its group, relay, start and end of each contact of a group, (n, 4)."""
-    rows = []
+    rows: list[tuple[int, int, float, float]] = []
     sampled: dict[float, list[orbit.Sampled]] = {}
-    for place, satellite in enumerate(group):
+    for place, satellite in enumerate(satellites):
         step = orbit.coarse_step_s(satellite.orbit, span_s[0])
         if step not in sampled:
             sampled[step] = [orbit.Sampled.over(relay.orbit, span_s, step) for relay in relays]
         each = orbit.contacts_with_each(satellite, relays, earth, epoch, span_s, sampled[step])
-        rows += [(place, which, c.start_s, c.end_s) for which, found in enumerate(each) for c in found]
-    return np.array(rows, dtype=np.float64).reshape(-1, 4)
+        for which, found in enumerate(each):
+            for contact in found:
+                spans = _within(satellite.orbit, relays[which].orbit, contact, furthest_m)
+                rows += [(place, which, float(start), float(end)) for start, end in spans]
+        on_progress(place + 1)
+    table = np.array(rows, dtype=np.float64).reshape(-1, 4)
+    order = np.lexsort((table[:, 1], table[:, 0], table[:, 2]))
+    return operations.Opportunities(*(table[order, column] for column in range(4)))
+
+
+def _within(first: orbit.Orbit, second: orbit.Orbit, contact: orbit.Contact, furthest_m: float) -> Floats:
+    """The parts of a contact in which the range is below a limit, (n, 2)."""
+    if furthest_m == math.inf:
+        return np.array([[contact.start_s, contact.end_s]])
+    time_s = orbit.coarse_times((contact.start_s, contact.end_s), _STEP_S)
+    return orbit.positive(lambda time: furthest_m - orbit.sight(first, second, time).range_m, time_s)
 
 
 def run(
@@ -99,7 +97,8 @@ def run(
 ) -> ConstellationPlan:
     """The constellation of a mission: contacts, sessions by the rule of `operations.schedule`, and their volumes.
 
-    The rate of a session is the highest that closes at its largest range; volumes leave out the share of time in
+    A session takes place where the link closes at the lowest of its rates at least; its rate is the highest that closes
+    at its largest range. Volumes leave out the share of time in
     outage. Raises `operations.OperationsError` without the tables `constellation` and `operations`, and
     `orbit.OrbitError` for orbits that do not hold.
     """
@@ -108,11 +107,21 @@ def run(
     pair = orbit.pair(m, folder)
     own = tuple(orbit.satellites(c, m, pair.epoch, folder))
     relays = orbit.relays(c, m, pair.epoch)
-    found = opportunities(own, relays, pair.earth, pair.epoch, pair.span_s, on_progress)
+    rates = rate_table(closings(m, loss))
+    furthest = 0.0 if rates is None else rates.steps[-1].largest_range_m
+    found = opportunities(
+        own,
+        relays,
+        pair.earth,
+        pair.epoch,
+        pair.span_s,
+        furthest,
+        lambda done: on_progress(done, len(own), "contacts of the constellation"),
+    )
     rules = operations.Rules(c.overhead_s, c.shortest_s, c.session_s)
     sessions = operations.schedule(found, len(own), len(relays), c.terminals, rules, pair.span_s[0])
     planned = _planned(rates, own, relays, sessions, 1.0 - loss.outage)
-    rate = m.communication.data_rate_bit_s
+    volumes = [one.volume_bit for one in planned]
     return ConstellationPlan(
         epoch=pair.epoch,
         span_s=pair.span_s,
@@ -122,8 +131,8 @@ def run(
         opportunities=found,
         sessions=sessions,
         planned=planned,
-        by_satellite=operations.totals_by_satellite(sessions, len(own), rate, pair.span_s),
-        by_relay=operations.totals_by_relay(sessions, len(relays), rate, pair.span_s),
+        by_satellite=operations.totals_by_satellite(sessions, len(own), volumes, pair.span_s),
+        by_relay=operations.totals_by_relay(sessions, len(relays), volumes, pair.span_s),
     )
 
 
@@ -147,7 +156,7 @@ def _planned(
         time_s = np.linspace(s.locked_s[one], s.end_s[one], _RANGES)
         range_m = orbit.sight(own.orbit, relay.orbit, time_s).range_m
         furthest = float(np.max(range_m))
-        rate = 0.0 if rates is None else float(rates.rate_bit_s(furthest))
+        rate = 0.0 if rates is None else float(rates.rate_bit_s(furthest * (1.0 - _EDGE)))
         found.append(
             operations.PlannedSession(
                 satellite=own.name,

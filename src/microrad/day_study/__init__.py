@@ -24,6 +24,7 @@ __all__ = [
     "Swing",
     "View",
     "Way",
+    "acquired",
     "given_loss",
     "run",
     "times",

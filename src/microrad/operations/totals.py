@@ -3,8 +3,9 @@
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from microrad.operations.base import Floats, Integers, OperationsError, check_number, check_span
+from microrad.operations.base import Floats, Integers, OperationsError, check_span, vector
 from microrad.operations.schedule import Sessions
 
 
@@ -23,22 +24,31 @@ class Totals:
     longest_gap_s: Floats
 
 
-def totals_by_satellite(sessions: Sessions, satellites: int, rate_bit_s: float, span: tuple[float, float]) -> Totals:
-    """What each satellite got at the data rate `rate_bit_s` over the span (start_s, end_s).
+def totals_by_satellite(
+    sessions: Sessions, satellites: int, volume_bit: ArrayLike, span: tuple[float, float]
+) -> Totals:
+    """What each satellite got over the span (start_s, end_s); `volume_bit` (n,) is the data of each session.
 
-    Raises `OperationsError` for a rate that is negative or not finite, a span that does not end after it starts or
-    leaves out part of a session, and an index beyond the count.
+    Raises `OperationsError` for a volume that is negative, not finite or not one for each session, a span that does
+    not end after it starts or leaves out part of a session, and an index beyond the count.
     """
-    return _totals(sessions, sessions.satellite, satellites, rate_bit_s, span)
+    return _totals(sessions, sessions.satellite, satellites, volume_bit, span)
 
 
-def totals_by_relay(sessions: Sessions, relays: int, rate_bit_s: float, span: tuple[float, float]) -> Totals:
+def totals_by_relay(sessions: Sessions, relays: int, volume_bit: ArrayLike, span: tuple[float, float]) -> Totals:
     """What each relay carried over all its terminals; arguments and errors as `totals_by_satellite`."""
-    return _totals(sessions, sessions.relay, relays, rate_bit_s, span)
+    return _totals(sessions, sessions.relay, relays, volume_bit, span)
 
 
-def _totals(sessions: Sessions, index: Integers, count: int, rate_bit_s: float, span: tuple[float, float]) -> Totals:
-    check_number(rate_bit_s, "the data rate", "bit/s")
+def _totals(
+    sessions: Sessions, index: Integers, count: int, volume_bit: ArrayLike, span: tuple[float, float]
+) -> Totals:
+    volume = vector(volume_bit, "the volumes of the sessions")
+    if volume.shape != index.shape or np.any(volume < 0.0):
+        raise OperationsError(
+            f"{volume.size} volumes for {index.size} sessions, the least {np.min(volume, initial=0.0):g} bit; give one "
+            "of at least 0 bit for each"
+        )
     check_span(span, "the span of the totals")
     if index.size and index.max() >= count:
         raise OperationsError(f"a session names index {index.max()}, but there are {count}; give their number")
@@ -48,15 +58,14 @@ def _totals(sessions: Sessions, index: Integers, count: int, rate_bit_s: float, 
             f"{span[0]:.9g} s to {span[1]:.9g} s; lengthen the span"
         )
 
-    def add(duration_s: Floats) -> Floats:
-        return np.bincount(index, duration_s, minlength=count).astype(np.float64)
+    def add(each: Floats) -> Floats:
+        return np.bincount(index, each, minlength=count).astype(np.float64)
 
-    served = add(sessions.end_s - sessions.locked_s)
     return Totals(
         sessions=np.bincount(index, minlength=count).astype(np.int64),
         busy_s=add(sessions.end_s - sessions.start_s),
-        served_s=served,
-        volume_bit=served * rate_bit_s,
+        served_s=add(sessions.end_s - sessions.locked_s),
+        volume_bit=add(volume),
         longest_gap_s=_longest_gaps(sessions, index, count, span),
     )
 

@@ -20,10 +20,11 @@ def sentences(plan: ConstellationPlan) -> list[str]:
     span = plan.span_s[1] - plan.span_s[0]
     used = ", ".join(f"{name} {100 * use:.0f} %" for name, use in zip(plan.relays, plan.use, strict=True))
     terminals = "one terminal" if plan.terminals == 1 else f"{plan.terminals} terminals"
+    views, busy = plan.opportunities.start_s.size, float(np.sum(plan.by_satellite.busy_s))
     return [
         f"{len(plan.satellites)} satellites share {len(plan.relays)} relays of {terminals} each: in {duration(span)} "
-        f"{plan.opportunities.start_s.size} contacts, {seen / 3600.0:.0f} h in all, of which {len(plan.planned)} "
-        f"sessions take {float(np.sum(plan.by_satellite.busy_s)) / 3600.0:.0f} h and carry {volume(plan.volume_bit)}.",
+        f"{views} contacts in reach, {seen / 3600.0:.0f} h in all, of which {len(plan.planned)} sessions take "
+        f"{busy / 3600.0:.0f} h and carry {volume(plan.volume_bit)}.",
         f"A satellite has data for {duration(float(np.min(served)))} to {duration(float(np.max(served)))}, and waits "
         f"{duration(float(np.max(gaps)))} at most. Terminals in use: {used}.",
     ]
@@ -32,18 +33,10 @@ def sentences(plan: ConstellationPlan) -> list[str]:
 def rows(plan: ConstellationPlan) -> list[tuple[str, ...]]:
     """What each satellite gets, as text."""
     t = plan.by_satellite
-    bits = satellite_bits(plan)
     return [
-        (name, str(int(t.sessions[k])), duration(t.served_s[k]), duration(t.longest_gap_s[k]), volume(bits[k]))
+        (name, str(int(t.sessions[k])), duration(t.served_s[k]), duration(t.longest_gap_s[k]), volume(t.volume_bit[k]))
         for k, name in enumerate(plan.satellites)
     ]
-
-
-def satellite_bits(plan: ConstellationPlan) -> list[float]:
-    """Volume of each satellite, by its sessions' own rates."""
-    bits = np.zeros(len(plan.satellites))
-    np.add.at(bits, plan.sessions.satellite, [one.volume_bit for one in plan.planned])
-    return [float(bit) for bit in bits]
 
 
 def text(plan: ConstellationPlan, width: int) -> str:
@@ -56,7 +49,7 @@ def text(plan: ConstellationPlan, width: int) -> str:
 
 def data(plan: ConstellationPlan) -> dict[str, Any]:
     """The plan as plain data, in SI units with the unit in each key."""
-    by, bits = plan.by_satellite, satellite_bits(plan)
+    by = plan.by_satellite
     return {
         "epoch": plan.epoch.text,
         "duration_s": plan.span_s[1] - plan.span_s[0],
@@ -70,7 +63,7 @@ def data(plan: ConstellationPlan) -> dict[str, Any]:
                 "sessions": int(by.sessions[k]),
                 "with_data_s": float(by.served_s[k]),
                 "longest_gap_s": float(by.longest_gap_s[k]),
-                "volume_bit": bits[k],
+                "volume_bit": float(by.volume_bit[k]),
             }
             for k, name in enumerate(plan.satellites)
         ],
