@@ -149,8 +149,8 @@ def _contact_run(rows: Sequence[tuple[str, Floats]], windows: Windows, required_
 
 def _errors(axes: Axes, windows: Windows, required_rad: float | None) -> None:
     minutes = windows.time_s / 60.0
-    axes.plot(minutes, windows.largest_rad * 1e6, "^", color=VERMILION, markersize=4.5, label="largest")
-    axes.plot(minutes, windows.rms_rad * 1e6, "o", color=BLUE, markersize=4.5, label="rms")
+    axes.plot(minutes, windows.largest_rad * 1e6, "^", color=VERMILION, markersize=4.5, label="largest", clip_on=False)
+    axes.plot(minutes, windows.rms_rad * 1e6, "o", color=BLUE, markersize=4.5, label="rms", clip_on=False)
     if required_rad is not None:
         label = f"required: {required_rad * 1e6:g} µrad"
         axes.axhline(required_rad * 1e6, color=BLACK, linestyle="--", linewidth=1.0, label=label)
