@@ -206,6 +206,25 @@ def test_without_acquisition_volume_and_latency_are_those_of_packets(quick, seco
         assert got == pytest.approx(sent[order, 0][np.searchsorted(shares, wanted)], abs=3.0)
 
 
+def test_a_contact_at_the_end_of_the_span_counts_up_to_it(quick, seconds, links):
+    found = quick(NO_SEARCH, {"orbit.duration": "6.8 h"})  # in the long contact about half past seven
+    last = found.view.encounters[-1].contact
+    assert last.start_s < 6.8 * 3600.0 < last.end_s
+    until = seconds.time_s < 6.8 * 3600.0
+    rate = seconds.rate_bit_s(links, [300e6], 3.0)
+    assert found.relay.capacity_bit == pytest.approx(np.sum(rate[until]), rel=2e-3)
+    assert np.sum(rate[seconds.time_s < last.end_s]) > 1.05 * found.relay.capacity_bit
+    assert found.view.contact_s == found.relay.contact_s == pytest.approx(np.sum(seconds.seen[until]), abs=10.0)
+
+
+def test_delays_add_to_every_latency(quick):
+    delayed = {"operations.relay_delay": "101 s", "operations.downlink.delay": "51 s"}
+    short, long = quick(SIX_HOURS, NO_SEARCH), quick(SIX_HOURS, NO_SEARCH, delayed)
+    assert long.relay.median_s - short.relay.median_s == pytest.approx(100.0)
+    assert long.relay.slow_s - short.relay.slow_s == pytest.approx(100.0)
+    assert long.direct.slow_s - short.direct.slow_s == pytest.approx(50.0)
+
+
 def test_the_time_to_lock_is_drawn_from_the_acquisitions(day, links, seconds):
     rate = seconds.rate_bit_s(links, [300e6], 3.0)
     o, simulated = day.mission.operations, links.finding.wide.simulated

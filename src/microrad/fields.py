@@ -198,6 +198,33 @@ class Switch(Quantity):
 
 
 @dataclass(frozen=True, slots=True)
+class OrWord(Quantity):
+    """A quantity, or one word in its place, which is read as `stands_for`; `meaning` follows the word in messages."""
+
+    word: str = ""
+    meaning: str = ""
+    stands_for: float | str = math.nan
+
+    def read(self, value: object) -> float | str:  # type: ignore[override]
+        """SI value of the text, or what the word stands for; raises `UnitError`."""
+        if value == self.word:
+            return self.stands_for
+        try:
+            return Quantity.read(self, value)
+        except UnitError as error:
+            raise UnitError(value, error.reason, self.wanted, error.example) from None
+
+    @property
+    def wanted(self) -> str:
+        """What the key expects, in words."""
+        return f'{Quantity.wanted.fget(self)}, or "{self.word}"{self.meaning}'  # type: ignore[attr-defined]
+
+    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        """What a quantity has for an editor, or the word."""
+        return {"anyOf": [Quantity.__get_pydantic_json_schema__(self, schema, handler), {"const": self.word}]}
+
+
+@dataclass(frozen=True, slots=True)
 class Several:
     """A list of at least one quantity; rising lists are strictly increasing."""
 

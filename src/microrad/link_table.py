@@ -2,15 +2,13 @@
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
-from pydantic import Field, GetJsonSchemaHandler
-from pydantic_core import CoreSchema
+from pydantic import Field
 
-from microrad.fields import Problem, Quantity, Share, Table, Whole
+from microrad.fields import OrWord, Problem, Quantity, Share, Table, Whole
 from microrad.mirror_table import ANGLE_MOST, Angle, Name
-from microrad.units import UnitError, format_quantity
+from microrad.units import format_quantity
 
 LOWEST_ELEVATION_RAD = math.radians(10.0)
 """Elevation below which a plane-parallel atmosphere is no model of the path."""
@@ -33,27 +31,6 @@ NoiseDensity = Annotated[float, Quantity("A/sqrt(Hz)", "pA/sqrt(Hz)", least=0.0,
 
 LARGEST = "largest"
 """What a mission writes for the data rate that is to be solved for."""
-
-
-@dataclass(frozen=True, slots=True)
-class _DataRate(Quantity):
-    """A data rate, or the word for one that is solved for; the latter is nan until then."""
-
-    def read(self, value: object) -> float:
-        if value == LARGEST:
-            return math.nan
-        try:
-            return Quantity.read(self, value)
-        except UnitError as error:
-            raise UnitError(value, error.reason, self.wanted, error.example) from None
-
-    @property
-    def wanted(self) -> str:
-        return f'{Quantity.wanted.fget(self)}, or "{LARGEST}" for what the required margin leaves'  # type: ignore[attr-defined]
-
-    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
-        rate = Quantity.__get_pydantic_json_schema__(self, schema, handler)
-        return {"anyOf": [rate, {"const": LARGEST}]}
 
 
 class Terminals(Table):
@@ -257,9 +234,9 @@ class Receiver(Table):
 class Communication(Beam):
     """The data link, diffraction-limited by its aperture."""
 
-    data_rate_bit_s: Annotated[float, _DataRate("bit/s", above=0.0)] = Field(
-        alias="data_rate", description=f'"{LARGEST}" solves for it'
-    )
+    data_rate_bit_s: Annotated[
+        float, OrWord("bit/s", above=0.0, word=LARGEST, meaning=" for what the required margin leaves")
+    ] = Field(alias="data_rate", description=f'"{LARGEST}" solves for it')
     tracking_split_loss_db: Loss = Field(alias="tracking_split_loss", description="light for the tracking sensor")
     implementation_loss_db: Loss = Field(alias="implementation_loss", description="receiver against its sensitivity")
     receiver_sensitivity_photon_bit: Annotated[float, Quantity("photon/bit", above=0.0)] | None = Field(

@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, GetJsonSchemaHandler
 from pydantic_core import CoreSchema
 
-from microrad.fields import Problem, Quantity, Several, Switch, Table
+from microrad.fields import OrWord, Problem, Quantity, Several, Switch, Table
 from microrad.mirror_table import Name
 from microrad.units import UnitError
 
@@ -24,6 +24,7 @@ _EPOCH = re.compile(r"\d{4}-\d{2}-\d{2}T\d{2}:\d{2}(:\d{2}(\.\d{1,6})?)?Z")
 
 Anomaly = Annotated[float, Quantity("rad", "deg", least=-2.0 * math.pi, most=2.0 * math.pi)]
 HalfAngle = Annotated[float, Quantity("rad", "deg", above=0.0, most=math.pi)]
+_INCLINATION = OrWord("rad", "deg", least=0.0, most=math.pi, word=SUN_SYNCHRONOUS, stands_for=SUN_SYNCHRONOUS)
 Seconds = Annotated[float, Quantity("s", "s", least=0.0, most=1e6)]
 
 
@@ -60,27 +61,6 @@ class UtcEpoch(Quantity):
     def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
         """Text with its pattern for an editor."""
         return {"type": "string", "pattern": f"^{_EPOCH.pattern}$", "examples": [self.example]}
-
-
-@dataclass(frozen=True, slots=True)
-class _Inclination(Quantity):
-    """An inclination, or the word for the one of a sun-synchronous orbit."""
-
-    def read(self, value: object) -> float | str:  # type: ignore[override]
-        if value == SUN_SYNCHRONOUS:
-            return SUN_SYNCHRONOUS
-        try:
-            return Quantity.read(self, value)
-        except UnitError as error:
-            raise UnitError(value, error.reason, self.wanted, error.example) from None
-
-    @property
-    def wanted(self) -> str:
-        return f'{Quantity.wanted.fget(self)}, or "{SUN_SYNCHRONOUS}"'  # type: ignore[attr-defined]
-
-    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
-        plain = Quantity.__get_pydantic_json_schema__(self, schema, handler)
-        return {"anyOf": [plain, {"const": SUN_SYNCHRONOUS}]}
 
 
 class VisibilityLimits(Table):
@@ -158,7 +138,7 @@ class OrbitTable(Table):
         alias="semi_major_axis", default=None
     )
     eccentricity: Annotated[float, Quantity("", least=0.0, most=0.999)] | None = None
-    inclination_rad: Annotated[float | str, _Inclination("rad", "deg", least=0.0, most=math.pi)] | None = Field(
+    inclination_rad: Annotated[float | str, _INCLINATION] | None = Field(
         alias="inclination", default=None, description=f'"{SUN_SYNCHRONOUS}": the node follows the Sun'
     )
     node_rad: Anomaly | None = Field(
