@@ -98,16 +98,14 @@ def run(
     """The constellation of a mission: contacts, sessions by the rule of `operations.schedule`, and their volumes.
 
     A session takes place where the link closes at the lowest of its rates at least; its rate is the highest that closes
-    at its largest range. Volumes leave out the share of time in
-    outage. Raises `operations.OperationsError` without the tables `constellation` and `operations`, and
-    `orbit.OrbitError` for orbits that do not hold.
+    at its largest range. Volumes leave out the share of time in outage. Raises `operations.OperationsError` without the
+    tables `constellation` and `operations`, and `orbit.OrbitError` for orbits that do not hold.
     """
     m, folder = file.mission, file.path.parent
     c, rates = table(m), rate_table(closings(m, loss))
     pair = orbit.pair(m, folder)
     own = tuple(orbit.satellites(c, m, pair.epoch, folder))
     relays = orbit.relays(c, m, pair.epoch)
-    rates = rate_table(closings(m, loss))
     furthest = 0.0 if rates is None else rates.steps[-1].largest_range_m
     found = opportunities(
         own,
