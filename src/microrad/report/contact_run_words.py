@@ -19,8 +19,8 @@ WINDOW_HEADINGS = (
 )
 
 
-def sentences(run: ContactRun, number: int, controller: str, rate_bit_s: float) -> list[str]:
-    """How the contact went."""
+def sentences(run: ContactRun, number: int, controller: str, rate_bit_s: float | None) -> list[str]:
+    """How the contact went; without a rate, where it is stepped with range, the volume is left to the day."""
     c, spent = run.contact, run.seconds
     length = c.end_s - c.start_s
     if run.data_s == 0.0:
@@ -30,11 +30,13 @@ def sentences(run: ContactRun, number: int, controller: str, rate_bit_s: float) 
     if run.losses:
         every = duration(1.0 / run.losses_per_s)
         lost = f"lock is lost {_times(run.losses)} in them, once in {every}, which the time between them does not show"
-    carried = f"{volume(run.bits(rate_bit_s))} at {quantity(rate_bit_s, 'bit/s')}"
+    carried = ""
+    if rate_bit_s is not None:
+        carried = f": {volume(run.bits(rate_bit_s))} at {quantity(rate_bit_s, 'bit/s')}"
     return [
         f"Contact {number} ({duration(length)}) under {controller}: data begin {quantity(before, 's')} after the rise, "
         f"{quantity(spent[LOCK], 's')} of it to lock, and flow for {duration(spent[DATA])}, "
-        f"{100 * run.data_share:.1f} % of the contact: {carried}. The fine loop is simulated in {len(run.windows)} "
+        f"{100 * run.data_share:.1f} % of the contact{carried}. The fine loop is simulated in {len(run.windows)} "
         f"windows, {duration(run.sampled_s)} in all, with the point-ahead and the rate of the line of sight of each; "
         f"{lost}."
     ]

@@ -36,18 +36,32 @@ def headline(day: DayStudy) -> list[str]:
     relay, span = day.relay, duration(day.view.duration_s)
     whole = day.mission.operations is None or day.mission.operations.relay_share == 1.0
     said = (
-        f"In {span} the relay {'is in view' if whole else 'grants the link'} {len(relay.contacts)} times, "
-        f"{relay.contact_s / 60.0:.0f} min in all, and could take {volume(relay.capacity_bit)}"
+        f"In {span} the relay {'is in view' if whole else 'grants the link'} {_how_much(day, relay)}, and could take "
+        f"{volume(relay.capacity_bit)}{_a_day(day, volume(relay.capacity_bit / _days(day)))}"
     )
     if day.direct is None:
         return [f"{said}."]
     d, down = day.direct, day.mission.operations.downlink if day.mission.operations else None
     stations = ", ".join(down.stations) if down else ""
     times = f", {day.ratio:.3g} times less" if math.isfinite(day.ratio) and day.ratio > 1.0 else ""
-    return [
-        f"{said}; the ground ({stations}) {len(d.contacts)} times, {d.contact_s / 60.0:.0f} min in all, and could take "
-        f"{volume(d.capacity_bit)}{times}."
-    ]
+    carried = f"{volume(d.capacity_bit)}{_a_day(day, volume(d.capacity_bit / _days(day)))}"
+    return [f"{said}; the ground ({stations}) {_how_much(day, d)}, and could take {carried}{times}."]
+
+
+def _how_much(day: DayStudy, way: Way) -> str:
+    """Number and time of the contacts of a way."""
+    minutes, days = way.contact_s / 60.0, _days(day)
+    a_day = _a_day(day, f"{len(way.contacts) / days:.3g} times, {minutes / days:.0f} min")
+    return f"{len(way.contacts)} times, {minutes:.0f} min in all{a_day}"
+
+
+def _days(day: DayStudy) -> float:
+    return day.view.duration_s / 86400.0
+
+
+def _a_day(day: DayStudy, said: str) -> str:
+    """What that is in a day, where the span is not one."""
+    return "" if math.isclose(_days(day), 1.0) else f" ({said} a day)"
 
 
 def contact_words(day: DayStudy) -> str:

@@ -96,7 +96,8 @@ def _day(study: Study, figures: Sequence[Figure]) -> dict[str, Any] | None:
     o, fine = day.mission.operations, study.fine_pointing
     shown = None
     if run is not None and fine is not None and o is not None and o.contact is not None:
-        rate, name = day.mission.communication.data_rate_bit_s, fine.best.design.name
+        rate = day.mission.communication.data_rate_bit_s if o.rates_bit_s is None else None
+        name = fine.best.design.name
         shown = {
             "sentences": contact_run_words.sentences(run, o.contact.number, name, rate),
             "window_headings": contact_run_words.window_headings(fine.quantile),

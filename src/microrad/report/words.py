@@ -57,7 +57,8 @@ def explanation(study: Study) -> list[str]:
         sentences += fine_pointing_words.short(study.fine_pointing, m)
     sentences += filter(None, (hysteresis_cost(study), found(study)))
     if study.day is not None:
-        sentences += [*day_words.headline(study.day), *day_words.latency_words(study.day)]
+        day = study.day
+        sentences += [*day_words.headline(day), *day_words.latency_words(day), *day_words.assumption_words(day)[:1]]
     return sentences
 
 
