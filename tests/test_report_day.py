@@ -10,10 +10,11 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from microrad import contact_run, control, fine_pointing, report, study
+from microrad import contact_run, control, day_study, fine_pointing, report, study
 from microrad.fine_loop.loop import assemble
 from microrad.fine_pointing import designs
 from microrad.missionfile import load_mission
+from microrad.operations import OperationsError
 from microrad.report import contact_run_words, day_plots, day_words
 from shipped import SHIPPED, edited_file
 
@@ -165,10 +166,11 @@ def test_a_later_contact_is_free_from_the_end_of_the_one_before(found, fine, tmp
     assert run.contact.start_s == found.day.view.encounters[2].contact.start_s
 
 
-def test_a_contact_beyond_those_of_the_span_is_refused(found, fine, tmp_path):
-    m = edited_file(tmp_path, ("number = 1 ", "number = 99 "), whole=True).mission
-    with pytest.raises(ValueError, match=r"operations\.contact\.number is 99, and the span has 15 contacts"):
-        contact_run.of_mission(m, found.day.view, found.links.finding, fine)
+def test_a_contact_beyond_those_of_the_span_is_refused(found, tmp_path):
+    file = edited_file(tmp_path, ("number = 1 ", "number = 99 "), whole=True)
+    links = replace(found.links, file=replace(found.links.file, mission=file.mission))
+    with pytest.raises(OperationsError, match=r"operations\.contact\.number is 99, and the span has 15 contacts"):
+        day_study.run(links)
 
 
 def test_the_words_say_when_data_begin_and_how_much_flows(found):

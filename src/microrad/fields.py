@@ -92,6 +92,8 @@ class Quantity:
         return ""
 
     def _show(self, number: float) -> str:
+        if self.typical.startswith("deg"):  # whoever writes degrees does not read radians
+            return f"{number / parse_quantity(f'1 {self.typical}', self.unit):.4g} {self.typical}"
         return format_quantity(number, self.unit) if self.unit else f"{number:g}"
 
     def __get_pydantic_core_schema__(self, source: object, handler: GetCoreSchemaHandler) -> CoreSchema:

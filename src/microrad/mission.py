@@ -187,7 +187,8 @@ def _pattern_fits_orbit(orbit: Orbits | None, constellation: Constellation | Non
 
 def _scan_there(operations: Operations | None, acquisition: Acquisition | None) -> Iterator[Problem]:
     """A scan that the mission has."""
-    if operations is None or operations.acquisition != "scan" or acquisition is None or acquisition.scan is not None:
+    there = acquisition is not None and acquisition.scan is not None
+    if operations is None or operations.acquisition != "scan" or there:
         return
     reason = 'is "scan", and the mission has no table acquisition.scan'
     yield Problem("operations.acquisition", reason, 'the table [acquisition.scan], or "wide beacon"')

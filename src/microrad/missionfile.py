@@ -208,9 +208,10 @@ def _check_relations(document: Document, model: type[LinkMission], data: Mapping
     for name in {name for names, _ in model.relations() for name in names} & data.keys():
         with contextlib.suppress(ValidationError):
             tables[name] = _table_at(model, (name,)).model_validate(data[name])
+    absent = {name for name, info in model.model_fields.items() if not info.is_required()} - data.keys()
     for names, check in model.relations():
-        if all(name in tables for name in names):
-            for problem in check(*(tables[name] for name in names)):
+        if all(name in tables or name in absent for name in names):
+            for problem in check(*(tables.get(name) for name in names)):
                 _note_problem(document, problem.key, problem, "")
 
 
@@ -320,7 +321,8 @@ def _table_at(table: type[Table], location: _Location) -> type[Table]:
 
 def _choices(table: type[Table], key: str) -> tuple[str, ...]:
     info = _info(table, key)
-    return get_args(info.annotation) if info and get_origin(info.annotation) is Literal else ()
+    kinds = (info.annotation, *get_args(info.annotation)) if info else ()
+    return next((get_args(kind) for kind in kinds if get_origin(kind) is Literal), ())
 
 
 def _expected(table: type[Table], key: str) -> str:

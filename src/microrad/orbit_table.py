@@ -174,6 +174,9 @@ class OrbitTable(Table):
                 yield Problem(key, f'does not belong to kind = "{self.kind}"', "this line removed")
         if "node" not in allowed:
             return
+        if self.inclination_rad == SUN_SYNCHRONOUS and self.gravity == "two-body":
+            reason = f'is "two-body", in which no node follows the Sun, and inclination is "{SUN_SYNCHRONOUS}"'
+            yield Problem("gravity", reason, 'gravity = "j2", or an inclination in degrees')
         if self.node_rad is None and self.local_time_s is None:
             yield Problem(
                 "node", "is missing, and so is local_time", 'node = "0 deg" or local_time = "10.5 h" would do'

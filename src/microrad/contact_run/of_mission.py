@@ -12,20 +12,12 @@ from microrad.mission import Mission
 
 
 def of_mission(m: Mission, seen: View, finding: Finding | None, fine: FinePointingStudy | None) -> ContactRun | None:
-    """The run of `operations.contact` under the best controller; None without that table or what it needs.
-
-    Raises ValueError for a contact that the mission's span does not have.
-    """
+    """The run of `operations.contact` under the best controller; None without that table or what it needs."""
     asked = None if m.operations is None else m.operations.contact
     if asked is None or finding is None or fine is None or m.fine_pointing is None or m.operations is None:
         return None
     if not seen.encounters:
         return None
-    if asked.number > len(seen.encounters):
-        raise ValueError(
-            f"operations.contact.number is {asked.number}, and the span has {len(seen.encounters)} contacts: give a "
-            "number up to that, or a longer orbit.duration"
-        )
     settings = Settings(
         slew_angle_rad=asked.slew_angle_rad,
         slew_rate_rad_s=asked.slew_rate_rad_s,

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from microrad import link, orbit
+from microrad import link, operations, orbit
 from microrad.day_study import flow
 from microrad.day_study.assumptions import NOTHING, Numbers, Swing, swings
 from microrad.day_study.flow import DIRECT, RELAY, Closing, PointingLoss, Way
@@ -65,6 +65,16 @@ def given_loss(links: LinkStudy) -> PointingLoss:
     return PointingLoss(loss, 0.0, f"communication.pointing_error, {error}")
 
 
+def _check_contact(m: LinkMission, seen: View) -> None:
+    """Refuse a contact beyond those of the span."""
+    asked = None if m.operations is None else m.operations.contact
+    if asked is not None and seen.encounters and asked.number > len(seen.encounters):
+        raise operations.OperationsError(
+            f"operations.contact.number is {asked.number}, and the span has {len(seen.encounters)} contacts: give a "
+            "number up to that, or a longer orbit.duration"
+        )
+
+
 def acquired(links: LinkStudy) -> Found | None:
     """The acquisition by which the mission's partner is found, or None where it has none."""
     o, finding = links.file.mission.operations, links.finding
@@ -82,6 +92,7 @@ def run(links: LinkStudy, loss: PointingLoss | None = None) -> DayStudy:
     m, folder = links.file.mission, links.file.path.parent
     loss = given_loss(links) if loss is None else loss
     seen = view(m, orbit.pair(m, folder))
+    _check_contact(m, seen)
     found = acquired(links)
     closing = flow.closings(m, loss)
     rates, heard = flow.rate_table(closing), flow.heard(m, seen)

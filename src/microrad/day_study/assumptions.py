@@ -11,7 +11,7 @@ from microrad.day_study import flow, geometry
 from microrad.fields import Table
 from microrad.link_acquisition import Found
 from microrad.mission import LinkMission
-from microrad.orbit_table import VisibilityLimits
+from microrad.orbit_table import HIGHEST_MASK_RAD, VisibilityLimits
 from microrad.units import format_quantity
 
 _T = TypeVar("_T", bound=Table)
@@ -225,7 +225,9 @@ def _stations(own: _Case) -> Iterator[tuple[str, _Side, _Side]]:
     yield "ground stations", fewer, (f"one more, opposite {name}", more)
     masks = []
     for factor, text in ((0.0, "0 deg"), (2.0, "twice")):
-        moved = {n: s.model_copy(update={"mask_rad": min(factor * s.mask_rad, 1.5)}) for n, s in given.items()}
+        moved = {
+            n: s.model_copy(update={"mask_rad": min(factor * s.mask_rad, HIGHEST_MASK_RAD)}) for n, s in given.items()
+        }
         masks.append((text, replace(own, mission=changed(m, key, moved))))
     yield "elevation mask", masks[0], masks[1]
 

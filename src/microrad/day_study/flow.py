@@ -119,8 +119,10 @@ def relay(
     m: LinkMission, seen: View, rates: operations.RateTable | None, outage: float, found: Found | None, slower: float
 ) -> Way:
     """The way by the relay: each run draws an acquisition for each contact; ``slower`` stretches their times."""
-    o, whole = table(m), _granted(seen.contacts, table(m).relay_share)
-    bases = [_whole_service(c, r, rates, 1.0 - outage) for c, r in zip(whole, seen.range_m, strict=True)]
+    o = table(m)
+    granted = _granted(seen, o.relay_share)
+    whole = tuple(contact for contact, _ in granted)
+    bases = [_whole_service(contact, range_m, rates, 1.0 - outage) for contact, range_m in granted]
     runs = []
     for run in range(o.runs):
         locks = _locks(found, len(whole), o.seed, run, slower)
@@ -137,19 +139,29 @@ def _of_span(contacts: tuple[orbit.Contact, ...], seen: View) -> int:
     return sum(c.start_s < seen.duration_s for c in contacts)
 
 
-def _granted(contacts: tuple[orbit.Contact, ...], share: float) -> tuple[orbit.Contact, ...]:
-    """The part of each contact that the relay grants."""
+_Range = Callable[[Floats], Floats]
+
+
+def _granted(seen: View, share: float) -> list[tuple[orbit.Contact, _Range]]:
+    """The part of each contact that the relay grants, with its range over time.
+
+    A contact that goes on behind the span is granted in two parts: what it has in the span counts by itself.
+    """
+    pairs = list(zip(seen.contacts, seen.range_m, strict=True))
     if share == 1.0:
-        return contacts
-    return tuple(
-        orbit.Contact(c.start_s, c.start_s + share * c.duration_s, c.begins, "end of the relay's share")
-        for c in contacts
-    )
+        return pairs
+    found, end = [], seen.duration_s
+    for c, range_m in pairs:
+        parts = [(c.start_s, c.end_s)] if not c.start_s < end < c.end_s else [(c.start_s, end), (end, c.end_s)]
+        for first, last in parts:
+            cut = orbit.Contact(first, first + share * (last - first), c.begins, "end of the relay's share")
+            found.append((cut, range_m))
+    return found
 
 
 def _whole_service(
     contact: orbit.Contact,
-    range_m: Callable[[Floats], Floats],
+    range_m: _Range,
     rates: operations.RateTable | None,
     availability: float,
 ) -> operations.Service:

@@ -87,7 +87,12 @@ def _tail(orbit: Orbit, duration_s: float) -> float:
         return TAIL_S
     orbit.require(0.0, duration_s)
     if isinstance(orbit, Sgp4Orbit):
-        return min(TAIL_S, max(MOST_ELEMENTS_AGE_S - orbit.elements_age_s - duration_s, 0.0))
+        tail = min(TAIL_S, max(MOST_ELEMENTS_AGE_S - orbit.elements_age_s - duration_s, 0.0))
+        try:
+            orbit.require(0.0, duration_s + tail)
+        except OrbitError:  # it decays behind the span
+            return 0.0
+        return tail
     return min(TAIL_S, max(orbit.span_s[1] - duration_s, 0.0))
 
 
