@@ -62,11 +62,13 @@ def test_the_words_of_a_day(call, folder):
     said = call("contacts", path_of(folder)).out
     data = json.loads(call("contacts", path_of(folder), "--json").out)
     relay, direct = data["relay"], data["direct"]
+    said = " ".join(said.split())
     head = f"In 6 h the relay is in view {relay['contacts']} times, {relay['contact_s'] / 60:.0f} min in all"
     assert head in said
     volume, a_day = (f"{n * relay['could_carry_bit'] / 8e9:.3g}" for n in (1, 4))
     assert re.search(rf"could take {volume} GB( \({float(a_day) / 1e3:.3g} TB a day\))?; the ground", said)
-    assert f"the ground (kiruna) {direct['contacts']} times" in said
+    heard = f"{direct['contacts']} times" if direct["contacts"] else "never"
+    assert f"the ground (kiruna) {heard}" in said
     assert f"in view for {100 * data['visible_share']:.1f} % of the time" in said
     assert "Over the equator a contact would take 56.72 min" in said
     assert "Warning: communication.distance is 42000 km" in said
@@ -76,7 +78,7 @@ def test_the_words_of_a_day(call, folder):
 
 def test_words_of_a_share_keep_the_view_apart_from_what_is_granted(call, folder):
     whole, half = (call("contacts", path_of(folder, each)).out for each in ({}, MISSIONS["a share"]))
-    view = re.compile(r"The relay is in view for .*? at most\.")
+    view = re.compile(r"The relay is in view for .*? at most\.", re.DOTALL)
     assert view.search(whole).group() == view.search(half).group()
 
 
@@ -124,7 +126,7 @@ def test_contacts_as_json(call, folder, name):
     assert sum(c["could_carry_bit"] for c in data["contacts"]) == pytest.approx(data["relay"]["could_carry_bit"])
     assert (data["direct"] is None) == (name == "no downlink")
     assert (data["median_contact_s"] is None) == (name in ("nothing at all", "always in view"))
-    assert (data["closed_form_contact_s"] is None) == (name == "always in view")
+    assert (data["closed_form_contact_s"] is None) == (name in ("nothing at all", "always in view"))
     if name == "plain":
         assert data["relay"]["could_carry_least_bit"] <= data["relay"]["could_carry_most_bit"]
         factors = [each["factor"] for each in data["assumptions"]]
@@ -194,7 +196,7 @@ def test_a_constellation_of_a_file(call, folder):
     result = call("constellation", path_of(folder, {"constellation": BY_FILE}))
     assert result.code == 0
     assert "EXAMPLE 1" in result.out
-    assert "2 satellites share 1 relays" in result.out
+    assert "2 satellites share 1 relay of one terminal: in" in result.out
 
 
 # ------------------------------------------------------------------------------------------------------------ refusals
@@ -223,9 +225,9 @@ def test_forms_exclude_each_other(refused, folder, command, flags):
         ("contacts", {"orbit.epoch": "1950-01-01T00:00:00Z"}, ("day.toml: orbit.epoch:", "take an instant")),
         ("contacts", {"orbit.leo": {"kind": "elements", "file": "a.tle"}, **ALONE}, ("a.tle", "no such file")),
         ("contacts", {"orbit": None, "operations": None, **ALONE}, ("no table [orbit]", "microrad init writes one")),
-        ("contacts", {"operations": None}, ("no table [operations]", "microrad init writes one")),
+        ("contacts", {"operations": None, **ALONE}, ("no table [operations]", "microrad init writes one")),
         ("constellation", ALONE, ("no table [constellation]", "microrad init writes one")),
-        ("constellation", {"operations": None}, ("no table [operations]", "microrad init writes one")),
+        ("constellation", {"operations": None}, ("stands without the table operations", "microrad init writes")),
         ("constellation", {"constellation.planes": 5}, ("planes = 5", "does not divide satellites = 12")),
         ("constellation", {"constellation": BY_FILE}, ("a.tle", "no such file")),
     ],

@@ -83,7 +83,7 @@ def test_the_phase_of_a_delta_goes_round_to_itself(tmp_path):
 def test_relays_stand_at_their_longitudes_with_the_limits_of_the_partner(tmp_path):
     pair, _, relays = made(tmp_path)
     assert [r.name for r in relays] == ["east", "west"]
-    assert [math.degrees(r.orbit.longitude_rad) for r in relays] == pytest.approx([143.0, 9.0])
+    assert [math.degrees(r.orbit.longitude_rad) for r in relays] == pytest.approx([143.0, -37.0])
     assert {r.limits for r in relays} == {pair.geo.limits}
 
 
@@ -196,9 +196,9 @@ def test_a_planned_session_has_the_rate_that_its_largest_range_leaves(tmp_path, 
 
 
 def test_a_session_over_several_rates_has_the_one_that_closes_throughout(tmp_path):
-    rates = {"operations.rates": ["200 Mbit/s", "300 Mbit/s", "400 Mbit/s"]}
+    rates = {"operations.rates": ["200 Mbit/s", "300 Mbit/s", "350 Mbit/s"]}
     plan, _ = planned(tmp_path, SIX_HOURS, rates)
-    reach = {rate: 42_002e3 * math.sqrt(300e6 / rate) for rate in (400e6, 300e6, 200e6)}
+    reach = {rate: 42_002e3 * math.sqrt(300e6 / rate) for rate in (350e6, 300e6, 200e6)}
     for one in plan.planned:
         closing = [rate for rate, furthest in reach.items() if one.range_max_m < furthest - 1e3]
         assert one.rate_bit_s == max(closing, default=200e6) or abs(one.range_max_m - reach[one.rate_bit_s]) < 2e3
@@ -296,10 +296,7 @@ def test_a_long_table_is_cut_and_says_so(tmp_path):
 
 
 def test_the_tables_that_a_plan_needs(tmp_path):
-    links = link_study.run(day_file(tmp_path, {"operations": None}))
     loss = day_study.PointingLoss(1.0, 0.0, "test")
-    with pytest.raises(operations.OperationsError, match=r"no table \[operations\]"):
-        constellation.run(links.file, loss)
     links = link_study.run(day_file(tmp_path, {"constellation": None}))
     with pytest.raises(operations.OperationsError, match=r"no table \[constellation\]"):
         constellation.run(links.file, loss)

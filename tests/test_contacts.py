@@ -2,6 +2,7 @@
 
 import itertools
 import math
+import re
 from types import SimpleNamespace
 
 import numpy as np
@@ -157,6 +158,28 @@ def test_the_largest_in_a_window_is_found(peak):
     when, value = events.largest(lambda t: -((t - peak) ** 2), np.array([[0.0, 7.0], [2.0, 4.0]]), 1.0)
     np.testing.assert_allclose(when, [peak, np.clip(peak, 2.0, 4.0)], atol=events.SHORTEST_S)
     np.testing.assert_allclose(value, [0.0, -((np.clip(peak, 2.0, 4.0) - peak) ** 2)], atol=1e-2 * events.SHORTEST_S)
+
+
+def test_the_largest_is_searched_for_in_all_windows_at_once():
+    """Against a dense grid in each window; the rounds are those of one window, however many there are."""
+    starts = np.cumsum(np.random.Generator(np.random.Philox(7)).uniform(5.0, 90.0, 40))
+    lengths = np.concatenate((np.geomspace(1e-4, 10.0, 20), np.linspace(20.0, 60.0, 20)))
+    windows = np.stack((starts, starts + lengths), axis=1)
+    rounds = []
+
+    def f(t):
+        rounds.append(t.size)
+        return np.sin(0.05 * t) + 0.1 * np.cos(0.07 * t)
+
+    when, value = events.largest(f, windows, 1.0)
+    assert len(rounds) < 8
+    assert np.sum((when > windows[:, 0]) & (when < windows[:, 1])) >= 3
+    for (start, end), at, found in zip(windows, when, value, strict=True):
+        dense = np.linspace(start, end, 20001)
+        best = int(np.argmax(f(dense)))
+        assert start <= at <= end and at == pytest.approx(dense[best], abs=events.SHORTEST_S + dense[1] - dense[0])
+        assert found == f(at) and found == pytest.approx(f(dense[best]), abs=1e-3 * events.SHORTEST_S)
+    assert [part.shape for part in events.largest(f, np.empty((0, 2)), 1.0)] == [(0,), (0,)]
 
 
 # ---- algebra of intervals, on whole numbers against sets of cells
@@ -528,8 +551,63 @@ def test_two_terminals_of_one_name_or_in_one_place_are_refused():
 
 
 def test_a_terminal_below_the_grazing_height_is_refused_by_name():
-    with pytest.raises(OrbitError, match=r"GEO \(first\) and LEO \(second\): the second terminal \(sample [0-9]+\)"):
-        contacts(free(SLOT), free(leo()), Earth("oblate", 600e3), EPOCH, DAY)
+    low = Terminal(leo(), UNLIMITED, "own terminal")
+    for surface in (Earth("oblate", 600e3), Earth("sphere", 600e3)):
+        for pair in ((low, free(SLOT)), (free(SLOT), low)):
+            name, height_m, time_s = too_low(*pair, surface, 600)
+            assert name == "own terminal"
+            at = low.orbit.states(np.array([time_s])).position_m[:, 0]
+            assert height_m == pytest.approx(height_over(surface, at), abs=0.6)
+            assert height_m == pytest.approx(500e3, abs=50.0)  # the lowest sample: the one nearest to the equator
+
+
+def too_low(first, second, surface, grazing_km):
+    """Name, height and time of the refusal."""
+    with pytest.raises(OrbitError) as refused:
+        contacts(first, second, surface, EPOCH, DAY)
+    end = f" s, not above the {grazing_km} km that lines of sight must clear; lower orbit.grazing_height, or raise the "
+    found = re.fullmatch(r"(.+) is (\d+\.\d{3}) km over the Earth at ([\d.]+)" + end + "orbit", str(refused.value))
+    assert found, str(refused.value)
+    return found[1], float(found[2]) * 1e3, float(found[3])
+
+
+def height_over(surface, position_m):
+    """The distance to the nearest of many points of the meridian's ellipse, or circle."""
+    angle = np.linspace(-0.5 * math.pi, 0.5 * math.pi, 1_000_001)
+    polar = EARTH_RADIUS_M * (1.0 - FLATTENING if surface.shape == "oblate" else 1.0)
+    across = math.hypot(position_m[0], position_m[1])
+    return np.hypot(across - EARTH_RADIUS_M * np.cos(angle), position_m[2] - polar * np.sin(angle)).min()
+
+
+@pytest.mark.parametrize("surface", [ROUND, FLAT], ids=["sphere", "oblate"])
+def test_the_height_over_the_earth_is_the_distance_to_its_figure(surface):
+    position_m = leo(phase_rad=0.0).states(np.linspace(0.0, 1420.0, 5)).position_m
+    wanted = [height_over(surface, position) for position in position_m.T]
+    np.testing.assert_allclose(surface.height_m(position_m), wanted, rtol=0, atol=0.01)
+    assert np.ptp(wanted) == pytest.approx(0.0 if surface is ROUND else 21.3e3, abs=500.0)
+
+
+def test_a_terminal_that_is_too_low_between_two_samples_is_named():
+    def states(time_s):
+        return States(*(np.where(time_s % 60.0 == 0.0, x, 0.1 * x) for x in SLOT.states(time_s)))
+
+    broken = Terminal(SimpleNamespace(name="x", states=states), UNLIMITED, "GEO 2")
+    with pytest.raises(OrbitError, match=r"GEO 2 is -2161\.720 km over the Earth at "):
+        contacts_with_each(free(leo()), [free(SLOT), broken], ROUND, EPOCH, DAY)
+
+
+def test_a_position_that_is_no_number_is_refused_by_name():
+    def states(time_s):
+        return States(*(np.where(time_s == 600.0, np.nan, x) for x in leo().states(time_s)))
+
+    broken = SimpleNamespace(name="LEO", states=states)
+    with pytest.raises(OrbitError, match="the position of LEO at 600 s is not a number; check its orbit"):
+        contacts(free(SLOT), free(broken), ROUND, EPOCH, DAY)
+
+
+def test_a_decayed_orbit_is_told_what_to_raise():
+    with pytest.raises(OrbitError, match="raise the altitude or the semi-major axis, or lower the eccentricity"):
+        leo(altitude_m=110e3)
 
 
 # ---- the line of sight against differences
@@ -687,3 +765,17 @@ def test_passes_agree_with_a_dense_grid(node, phase, latitude, mask):
         assert one.start_s <= one.highest_s <= one.end_s
         at = elevation_rad(station, EPOCH, np.array([one.highest_s]), low.states(np.array([one.highest_s])).position_m)
         assert one.highest_rad == pytest.approx(float(at[0]), abs=1e-12)
+
+
+def test_a_contact_ends_where_the_partner_is_too_far(both=(leo(), SLOT)):
+    own, other = (free(each) for each in both)
+    far = 42_000e3
+    (near,) = contacts_with_each(own, (other,), ROUND, EPOCH, DAY, (), far)
+    (whole,) = contacts_with_each(own, (other,), ROUND, EPOCH, DAY)
+    assert sum(c.duration_s for c in near) < sum(c.duration_s for c in whole)
+    for c in near:
+        ends = sight(*both, [c.start_s, c.end_s]).range_m
+        for cause, range_m in zip((c.begins, c.ends), ends, strict=True):
+            assert (cause == "range") == (abs(range_m - far) < 0.1), (cause, range_m)
+        assert np.all(sight(*both, np.linspace(c.start_s, c.end_s, 500)).range_m <= far + 0.1)
+    assert any("range" in (c.begins, c.ends) for c in near)

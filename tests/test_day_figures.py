@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from microrad.report import day_assumptions, day_figures, day_map, write_columns
-from microrad.report.day_assumptions import MOST_BARS, Assumed, assumptions
+from microrad.report.day_assumptions import MOST_BARS, Assumed, assumptions, in_lines
 from microrad.report.day_figures import (
     Windows,
     along_contact,
@@ -28,6 +28,8 @@ NOTHING = np.empty(0)
 NO_PLACES = Places(NOTHING, NOTHING)
 SPAN_S = (0.0, 86400.0)
 EPOCH = "2026-03-20T12:00:00Z"
+GEO, KIRUNA = (0.0, 20.0, 103.0), (67.9, 21.0, 18.0)
+THIRD = {"number": 3, "rise_utc": "2026-03-20 15:28:04"}
 
 
 def texts(figure):
@@ -77,7 +79,7 @@ def a_timeline():
 
 def a_contact():
     t = np.linspace(0.0, 2400.0, 100)
-    return along_contact(t, 4e7 + t, 5e-5 - 1e-9 * t, 1e-4 + 1e-9 * t, 4e9 - 3e6 * t)
+    return along_contact(t, 4e7 + t, 5e-5 - 1e-9 * t, 1e-4 + 1e-9 * t, 4e9 - 3e6 * t, **THIRD)
 
 
 def a_volume():
@@ -167,7 +169,7 @@ def test_a_name_is_cut_and_kept_on_one_line():
     [
         (lambda: timeline([], SPAN_S, EPOCH), "no contacts and no eclipses to show"),
         (lambda: timeline([("relay", np.empty((0, 2)))], SPAN_S, EPOCH), "none"),
-        (lambda: along_contact(*[NOTHING] * 5), "no contact in this span"),
+        (lambda: along_contact(*[NOTHING] * 5, **THIRD), "no contact in this span"),
         (lambda: volume({}, {}), "no data were generated"),
         (lambda: latency({}), "nothing was delivered"),
         (lambda: latency({"relay": (NOTHING, NOTHING)}), "nothing was delivered"),
@@ -191,6 +193,12 @@ def test_relays_and_stations_show_without_a_track_or_an_outline():
     assert {"GEO", "Kiruna", "no ground track"} <= set(texts(figure))
 
 
+def test_a_contact_says_which_it_is():
+    figure = a_contact()
+    assert figure.title == "Along contact 3"
+    assert "over contact 3, which rises at 2026-03-20 15:28:04 UTC." in figure.caption
+
+
 # ------------------------------------------------------------------------------------------------ tables
 
 
@@ -208,7 +216,7 @@ def test_the_tables_hold_what_was_given(tmp_path):
 
 def test_the_tables_of_curves_are_in_si():
     t, a = np.arange(5.0), np.arange(5.0) + 1.0
-    found = along_contact(t, a, 2 * a, 3 * a, 4 * a).columns
+    found = along_contact(t, a, 2 * a, 3 * a, 4 * a, **THIRD).columns
     headings = ["time since rise (s)", "range (m)", "point-ahead (rad)", "line-of-sight rate (rad/s)", "Doppler (Hz)"]
     assert [*found] == headings
     for heading, values in zip(headings, (t, a, 2 * a, 3 * a, 4 * a), strict=True):
@@ -296,6 +304,42 @@ def test_the_track_is_thick_only_in_contact_and_one_region_is_shaded_for_each_re
     assert len(axes.patches) == 1 + 2  # the land first
 
 
+SHADED, CIRCLE = "has no line of sight to the relay", "above the lowest elevation"
+LEGEND = {"hidden from a relay", "relay, limit of its view", "relay at the start, its track", "relay"}
+LEGEND |= {"station, its horizon", "station"}
+
+
+def test_a_relay_that_moves_has_its_track_and_no_shade(canvases):
+    way = a_track(5.0)
+    figure = world_map(a_track(), {}, {"MEO": Marked(way, NO_PLACES)}, {})
+    axes = canvases[0].axes[0]
+    assert len(axes.patches) == 1  # the land
+    longitude, _ = way.degrees
+    drawn = [line for line in axes.get_lines() if {*longitude.tolist()} <= {*line.get_xdata().tolist()}]
+    assert [(line.get_linewidth(), line.get_linestyle()) for line in drawn] == [(0.7, "-")]
+    assert LEGEND & set(texts(figure)) == {"relay at the start, its track"}
+    assert "its own ground track as a thin line" in figure.caption
+    assert SHADED not in figure.caption
+    assert CIRCLE not in figure.caption
+    assert figure.columns["MEO, longitude (deg)"].size == way.latitude_rad.size
+    assert figure.columns["MEO, outline, longitude (deg)"].size == 0
+
+
+@pytest.mark.parametrize("outlined", [True, False])
+def test_the_caption_of_the_map_says_only_what_is_drawn(outlined):
+    relay, station = (marked(*each) if outlined else Marked(marked(*each).place, NO_PLACES) for each in (GEO, KIRUNA))
+    figure = world_map(a_track(), {}, {"GEO": relay}, {"Kiruna": station})
+    assert (SHADED in figure.caption) == (CIRCLE in figure.caption) == outlined
+    assert "thin line" not in figure.caption
+    with_outlines = {"hidden from a relay", "relay, limit of its view", "station, its horizon"}
+    assert LEGEND & set(texts(figure)) == (with_outlines if outlined else {"relay", "station"})
+
+
+def test_the_map_of_a_long_span_says_that_it_shows_its_beginning():
+    assert "in the first 24 h of the span, thick" in world_map(a_track(), {}, {}, {}, 86400.0).caption
+    assert "first" not in world_map(a_track(), {}, {}, {}).caption
+
+
 @pytest.mark.parametrize(
     ("bits", "unit"), [(7.9e3, "byte"), (8.1e3, "kB"), (8e9, "GB"), (7.9e12, "GB"), (8.1e12, "TB"), (9e30, "PB")]
 )
@@ -318,6 +362,43 @@ def test_median_and_99_percent_are_those_of_the_sample():
     assert reached_s(NOTHING, NOTHING, 0.5) == math.inf
     words = f"relay: median {duration(np.quantile(sample, 0.5))}, 99 % {duration(np.quantile(sample, 0.99))}"
     assert words in texts(latency({"relay": (sample, share)}))
+
+
+@pytest.mark.parametrize(
+    ("least_s", "most_s", "begin_s", "ticks"),
+    [
+        (1.0, 33600.0, 0.5, ["1 s", "10 s", "1 min", "10 min", "1 h", "6 h"]),
+        (0.25, 4.0, 0.1, ["100 ms", "200 ms", "500 ms", "1 s", "2 s"]),
+        (30.0, 45.0, 10.0, ["10 s", "20 s", "30 s"]),
+        (3000.0, 3500.0, 1000.0, ["20 min", "30 min", "1 h"]),
+        (7.0, 900000.0, 2.0, ["10 s", "1 min", "10 min", "1 h", "6 h", "1 d", "7 d"]),
+        (1e-9, 86400.0, 5e-3, ["10 ms", "0.1 s", "1 s", "10 s", "1 min", "10 min", "1 h", "6 h", "1 d"]),
+    ],
+)
+def test_the_axis_of_latencies_ends_where_they_do(least_s, most_s, begin_s, ticks, canvases):
+    latency({"relay": (np.array([least_s, most_s]), np.array([0.1, 1.0]))})
+    axes = canvases[0].axes[0]
+    assert axes.get_xlim() == pytest.approx((begin_s, 1.2 * most_s))
+    assert [label.get_text() for label in axes.get_xticklabels()] == ticks
+    assert all(begin_s <= tick <= 1.2 * most_s for tick in axes.get_xticks())
+
+
+def test_a_long_label_is_broken_and_not_cut():
+    values = "without kiruna / one more, opposite kiruna"
+    given = {
+        "attitude of the satellite: nadir, 60 deg about zenith": (
+            "attitude of the satellite:\nnadir, 60 deg about zenith"
+        ),
+        "margin demanded of the laser link: 0 dB / 6 dB": "margin demanded of the laser link:\n0 dB / 6 dB",
+        "orbit altitude: 400 km / 600 km": "orbit altitude: 400 km / 600 km",
+        f"ground stations: {values}": f"ground stations:\n{values}",
+        f"ground stations: {values}, far": f"ground stations:\n{values.replace('/ ', f'/{chr(10)}')}, far",
+    }
+    assert {label: in_lines(label) for label in given} == given
+    figure = assumptions([Assumed(label, 4.0, 6.0) for label in given], 5.0, "ratio")
+    assert {line for label in given.values() for line in label.split("\n")} <= set(texts(figure))
+    assert set(figure.columns) >= {f"{label}, lower" for label in given}
+    assert all(len(line) <= 44 for line in in_lines("word " * 50 + "y" * 99).split("\n"))
 
 
 def test_the_largest_change_is_on_top_and_the_least_are_left_to_the_table():

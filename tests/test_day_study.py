@@ -208,8 +208,10 @@ def test_without_acquisition_volume_and_latency_are_those_of_packets(quick, seco
 
 def test_a_contact_at_the_end_of_the_span_counts_up_to_it(quick, seconds, links):
     found = quick(NO_SEARCH, {"orbit.duration": "6.8 h"})  # in the long contact about half past seven
-    last = found.view.encounters[-1].contact
+    cut, last = found.view.encounters[-1].contact, found.view.contacts[len(found.view.encounters) - 1]
     assert last.start_s < 6.8 * 3600.0 < last.end_s
+    assert (cut.start_s, cut.end_s, cut.ends) == (last.start_s, 6.8 * 3600.0, "end of the span")
+    assert found.relay.contacts[-1] == cut
     until = seconds.time_s < 6.8 * 3600.0
     rate = seconds.rate_bit_s(links, [300e6], 3.0)
     assert found.relay.capacity_bit == pytest.approx(np.sum(rate[until]), rel=2e-3)
@@ -380,7 +382,7 @@ def test_a_day_without_any_contact_is_a_day_all_the_same(quick, changes):
     assert v.gap_s == way.gap_s == v.duration_s
     assert found.warnings == ()
     assert (found.ratio == 0.0) == (found.relay.capacity_bit == 0.0)
-    if not v.later:
+    if not v.contacts:
         assert way.slow_s == math.inf
         assert way.on_board_bit == pytest.approx(way.generated_bit)
 
@@ -458,6 +460,8 @@ CHANGED = {
     "laser data rate": "communication.data_rate_bit_s",
     "margin demanded of the laser link": "operations.margin_db",
     "time of acquisition": "",
+    "pointing loss": "",
+    "eclipse": "orbit.leo.limits.in_eclipse",
     "share of each contact that the relay grants": "operations.relay_share",
     "grazing height": "orbit.grazing_height_m",
     "attitude of the satellite": "orbit.leo.limits",
@@ -480,7 +484,7 @@ def test_each_side_changes_just_its_own_key(links, day, monkeypatch):
 
     monkeypatch.setattr(assumptions, "numbers", noted)
     m, folder = links.file.mission, links.file.path.parent
-    found = assumptions.swings(m, folder, day.view, (), day.loss, links.finding.wide)
+    found = assumptions.swings(m, folder, day.view, (), day.loss, links.finding.wide, lambda *said: None)
     assert {s.name for s in found} == CHANGED.keys()
     before = flat(m.model_dump()) | {"operations.runs": 4}
     for s in found:
@@ -493,8 +497,8 @@ def test_each_side_changes_just_its_own_key(links, day, monkeypatch):
                 continue
             key = CHANGED[s.name]
             assert all(k.startswith(key) for k in differs) and bool(differs) == bool(key), (s.name, differs)
-            assert (case.slower == 1.0) == bool(key)
-            assert case.loss == day.loss
+            assert (case.slower == 1.0) == (s.name != "time of acquisition")
+            assert (case.loss == day.loss) == (s.name != "pointing loss")
             if s.name == "attitude of the satellite":  # slew, Sun and eclipse stay
                 assert {k.rpartition(".")[2] for k in differs} == {"attitude", "boresight", "field_of_regard_rad"}
 
@@ -515,9 +519,9 @@ SIDES = {
     ("elevation mask", 1): {"operations.downlink.stations.kiruna.mask": "10 deg"},
     ("ground stations", 1): {
         "operations.downlink.stations.south": {
-            "latitude": "-67.86 deg",
-            "longitude": "-159.04 deg",
-            "height": "400 m",
+            "latitude": "-67.85713 deg",
+            "longitude": "-159.03567 deg",
+            "height": "402.2 m",
             "mask": "5 deg",
         }
     },
@@ -609,3 +613,27 @@ def test_nothing_about_a_day_is_asked_of_a_mission_without_its_tables(tmp_path):
     with pytest.raises(ValueError, match=r"no table \[operations\]: microrad init writes one"):
         day_study.run(links)
     assert geometry.view(links.file.mission, orbit.pair(links.file.mission, tmp_path)).encounters
+
+
+def test_an_uncorrected_point_ahead_is_in_the_loss_and_so_in_the_reach(tmp_path):
+    links = link_study.run(day_file(tmp_path, SIX_HOURS, {"point_ahead.corrected": False}))
+    loss = day_study.given_loss(links)
+    assert loss.loss_db > 100.0
+    (closing,) = flow.closings(links.file.mission, loss)
+    assert closing.margin_db == pytest.approx(links.communication.margin_db, abs=1e-9)
+    again = day_study.loss_at(links.file.mission, links.communication.margin_db, "")
+    assert again.loss_db == loss.loss_db
+
+
+def test_orbits_that_end_with_the_span_are_said_to(quick, tmp_path):
+    assert not any("behind the span" in w for w in quick(SIX_HOURS).warnings)
+    found = quick({"orbit.epoch": "2050-12-31T12:00:00Z", "orbit.duration": "6 h"})
+    assert found.view.pair.tail_s == 0.0
+    assert any(w.startswith("the orbits hold for 0 s behind the span") for w in found.warnings)
+
+
+def test_a_contact_cut_by_the_sun_counts_as_one_rise(quick):
+    found = quick({})
+    assert (len(found.view.encounters), found.view.rises) == (15, 14)
+    free = quick({"orbit.leo.limits.sun_exclusion": "0 deg", "orbit.geo.limits.sun_exclusion": "0 deg"})
+    assert (len(free.view.encounters), free.view.rises) == (14, 14)

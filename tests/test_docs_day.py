@@ -273,7 +273,7 @@ def test_what_the_simulated_loop_leaves(lqg, links, day):
 def test_one_contact_in_time(lqg, links, day):
     m, scene, design = lqg
     study = SimpleNamespace(scene=scene, best=SimpleNamespace(design=design))
-    run = contact_run.of_mission(m, day.view, links.finding, study)
+    run = contact_run.of_mission(m, day, links.finding, study)
     begins = run.contact.start_s - run.log[0].time_s
     told(f"the slew begins {begins:.0f} s before the rise, data {run.first_data_s - run.contact.start_s:.1f} s after")
     told(f"flow for {run.data_s / 60:.1f} min, {100 * run.data_share:.1f} % of the contact,")
@@ -299,12 +299,13 @@ def test_the_constellation(links):
     assert counted == pytest.approx(sum(one.end_s - one.locked_s for one in plan.planned))
 
 
-def test_a_pattern_repeats_a_circular_orbit_and_a_file_goes_with_every_kind(folder):
-    told("`[constellation]` repeats a circular `orbit.leo`", "and goes with every kind of `orbit.leo`")
+def test_a_pattern_repeats_elements_and_a_file_goes_with_every_kind(folder):
+    told("`[constellation]` repeats a circular or Keplerian `orbit.leo`", "and goes with every kind of `orbit.leo`")
     path = folder / "many.toml"
-    path.write_text(TEXT.replace(shipped("orbit.leo"), ORBITS[1] + "\n\n"), encoding="utf-8")
-    with pytest.raises(missionfile.MissionError, match="no circular orbit to repeat"):
-        missionfile.load_link(path)
+    path.write_text(TEXT.replace(shipped("orbit.leo"), ORBITS[2] + "\n\n"), encoding="utf-8")
+    m = missionfile.load_link(path).mission
+    with pytest.raises(orbit.OrbitError, match='of kind "elements" has nothing to repeat: give pattern = "file"'):
+        tuple(orbit.satellites(m.constellation, m, orbit.Epoch.from_text(m.orbit.epoch), folder))
     text = re.sub(r"(?m)^(satellites|planes|phasing) = .*\n", "", path.read_text(encoding="utf-8"))
     path.write_text(text.replace('pattern = "delta"', 'pattern = "file"\nfile = "satellite.tle"'), encoding="utf-8")
     m = missionfile.load_link(path).mission

@@ -3,6 +3,7 @@
 import csv
 import io
 import math
+import re
 from collections import deque
 from datetime import UTC, datetime, timedelta
 
@@ -514,6 +515,30 @@ def test_the_contact_plan_is_read_back():
     assert '# node 1 is "B"\n# node 2 is "A"\n# node 3 is "GEO"\n# node 4 is "MOON RELAY"\n' in text
 
 
+def test_the_numbers_of_nodes_do_not_depend_on_who_is_served():
+    own, partners = ("C", "A", "B"), ("GEO 2", "GEO 1")
+    everyone = [
+        planned(a, r, 100.0 * k + 10, 100.0 * k + 10, 100.0 * k + 90)
+        for k, (a, r) in enumerate([("A", "GEO 1"), ("B", "GEO 2"), ("X", "MOON"), ("C", "GEO 1")])
+    ]
+    numbers = {"C": 1, "A": 2, "B": 3, "GEO 2": 4, "GEO 1": 5}
+    for sessions in (everyone[:2], everyone[1:2], everyone[3:], everyone[::-1][:1] + everyone[:1], []):
+        text = contact_plan(sessions, utc, satellites=own, relays=partners)
+        named = re.findall(r'# node (\d+) is "(.+)"', text)
+        assert named == [(str(number), name) for name, number in numbers.items()]
+        found = [(one[2], one[3]) for one in read_plan(text)[1]]
+        ordered = sorted(sessions, key=lambda s: s.start_s)
+        assert found == [(numbers[s.satellite], numbers[s.relay]) for s in ordered]
+    text = contact_plan(everyone, utc, satellites=own, relays=partners)
+    assert '# node 5 is "GEO 1"\n# node 6 is "X"\n# node 7 is "MOON"\n@' in text
+    with pytest.raises(OperationsError, match="'GEO 1' is named as a satellite and as a relay; give it one role"):
+        contact_plan(everyone, utc, satellites=("GEO 1",))
+    with pytest.raises(OperationsError, match="'A' is named as a satellite and as a relay"):
+        contact_plan(everyone, utc, relays=("A",))
+    with pytest.raises(OperationsError, match="'Y' is named as a satellite and as a relay"):
+        contact_plan([], utc, satellites=("Y",), relays=("Y",))
+
+
 def test_an_epoch_within_a_second_is_kept():
     _, contacts, _ = read_plan(contact_plan([planned(locked_s=12.25, end_s=99.25)], lambda t: utc(t + 0.8)))
     assert contacts[0][:2] == (14, 100)  # 12.25 + 0.8 s up, 99.25 + 0.8 s down
@@ -567,7 +592,7 @@ def test_a_planned_session_that_makes_no_sense_is_refused(change, words):
         ([planned(start_s=-1.0)], "starts 1 s before the epoch"),
         ([planned(rate_bit_s=4e10)], "4e\\+10 bit/s; ION takes at most"),
         ([planned(), planned(start_s=99.0, locked_s=99.5)], "overlap: one starts at 99 s, the other ends at 99.75 s"),
-        ([planned(), planned("GEO 1", "X")], "'GEO 1' is a satellite in one session and a relay in another"),
+        ([planned(), planned("GEO 1", "X")], "'GEO 1' is named as a satellite and as a relay"),
     ],
 )
 def test_sessions_that_are_no_contact_plan_are_refused(sessions, words):

@@ -555,7 +555,7 @@ def test_any_order_and_any_shape_of_times_gives_the_same_states(orbit):
         ({"eccentricity": 1.0}, "eccentricity 1 is not from 0 to below 1"),
         ({"eccentricity": -0.1}, "eccentricity -0.1 is not"),
         ({"eccentricity": 0.7}, r"perigee is -4158\.14 km over the equator, below 120 km: it has decayed"),
-        ({"semi_major_axis_m": 700e3}, "it has decayed; raise the semi-major axis"),
+        ({"semi_major_axis_m": 700e3}, "it has decayed; raise the altitude or the semi-major axis"),
         ({"inclination_rad": 3.2}, "inclination of 183.346 deg is not from 0 to 180 deg"),
         ({"node_rad": math.nan}, "node_rad is nan, not a number"),
         ({"semi_major_axis_m": math.inf}, "semi_major_axis_m is inf"),

@@ -4,11 +4,13 @@ import csv
 import io
 import json
 import math
+import os
 import pickle
 import subprocess
 import sys
 from datetime import UTC, datetime, timedelta
 from importlib.resources import files
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -258,7 +260,7 @@ TLE_FAULTS = {
     "mean motion 0": (f"{LINE_1}\n{edited(LINE_2, 53, ' 0.00000000')}", "mean motion is 0", "revolutions a day"),
     "comments alone": ("# nothing\n", "no element set is in the file"),
     "empty": ("", "the file is empty"),
-    "blank": ("\n \n", "the file is empty"),
+    "blank": ("\n \n", "blanks and nothing else"),
     "binary": (b"\x1f\x8b\x08\x00\xff", "byte 2", "binary or a compressed file"),
     "nul": (b"EXAMPLE\0", "byte 8", "binary"),
     "ephemeris": ("CCSDS_OEM_VERS = 2.0\n", "CCSDS_OEM_VERS", "ephemeris (OEM) by its own key"),
@@ -272,12 +274,44 @@ def test_malformed_tle(tmp_path, fault):
 
 
 def test_file_that_cannot_be_read(tmp_path, monkeypatch):
-    for path in (tmp_path / "absent.tle", tmp_path):
-        with pytest.raises(OrbitError, match="there is no such file"):
+    inside = write(tmp_path, NAMED, "a.tle") / "b.tle"
+    for path in (tmp_path / "absent.tle", inside, tmp_path / "nul\0.tle"):
+        with pytest.raises(OrbitError) as caught:
             read_elements(path)
+        seen = "a name in a mission is seen from the mission file"
+        assert str(caught.value) == f"{path}: there is no such file; check the path: {seen}"
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(OrbitError) as caught:
+        read_elements(Path("absent.tle"))
+    assert f"absent.tle: there is no such file ({tmp_path / 'absent.tle'} was tried); check" in str(caught.value)
     refused(tmp_path, NAMED * 300 + "\n" + catalogue(5)[:-1], "line ")
     monkeypatch.setattr(messages, "MOST_BYTES", 100)
     refused(tmp_path, NAMED, "more than the 0 MB that are read", "keep only")
+
+
+def test_what_is_no_file_of_text_is_refused_with_its_own_reason(tmp_path, monkeypatch):
+    os.mkfifo(tmp_path / "pipe")
+    loop = tmp_path / "loop"
+    loop.symlink_to(loop)
+    empty = write(tmp_path, "", "empty.tle")
+    reasons = {
+        tmp_path: "this is a folder; name the file in it",
+        Path("/dev/null"): "this is a device or a pipe; give a file",
+        tmp_path / "pipe": "this is a device or a pipe; give a file",
+        empty: "the file is empty; download",
+        loop: "cannot be read (Too many levels of symbolic links); check the path",
+    }
+    for path, reason in reasons.items():
+        for read in (read_elements, lambda p: read_oem(p, EPOCH)):
+            with pytest.raises(OrbitError) as caught:
+                read(path)
+            assert str(caught.value).startswith(f"{path}: {reason}")
+
+    def locked(_):
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(Path, "read_bytes", locked)  # permissions do not stop every user
+    refused(tmp_path, NAMED, "cannot be read (Permission denied); check the permissions of the file and of its folders")
 
 
 # --------------------------------------------------------------------------------------------------------------- decay
@@ -293,7 +327,7 @@ def test_expired_elements(tmp_path):
         "expired",
         "2026-03-20T12:00:00Z",
         "2026-04-02T12:00:00Z",
-        "16.0 days",
+        "16.00 days",
         "newer elements",
         "orbit.epoch",
     ):
@@ -301,7 +335,7 @@ def test_expired_elements(tmp_path):
     with pytest.raises(OrbitError, match="expired"):
         late.states(np.array([0.0, 86402.0]))
     early = sgp4_orbit(found, Epoch("2026-03-01T12:00:00Z"))
-    with pytest.raises(OrbitError, match=r"not valid yet.*19\.0 days.*older elements"):
+    with pytest.raises(OrbitError, match=r"not valid yet.*19\.00 days.*older elements"):
         early.require(0.0, 86400.0)
     with pytest.raises(OrbitError, match="not a finite number"):
         late.states(np.array([0.0, np.nan]))
@@ -752,6 +786,42 @@ def test_gap_between_segments(tmp_path):
             orbit.require(start, end)
     with pytest.raises(OrbitError, match=r"the mission needs 2026-03-20T12:50:00\.000Z"):
         orbit.states(np.array([100.0, 3000.0]))
+
+
+def holed(first_s, last_s, grid=GRID):
+    """The grid without what lies between two times."""
+    return grid[(grid <= first_s) | (grid >= last_s)]
+
+
+@pytest.mark.parametrize("text", [lambda t: HEAD + segment(t), oem_xml], ids=["kvn", "xml"])
+def test_a_hole_within_a_segment_is_refused(tmp_path, text):
+    """An hour that is missing would move what is interpolated by kilometres."""
+    path = write(tmp_path, text(holed(1200, 4800)))
+    with pytest.raises(OrbitError) as caught:
+        read_oem(path, EPOCH)
+    at = [n for n, line in enumerate(path.read_text().split("\n"), 1) if stamp(1200) in line or stamp(4800) in line]
+    assert str(caught.value).startswith(
+        f"{path}, line {at[1]}: no state vector between {stamp(1200)} (line {at[0]}) and {stamp(4800)}, 3600 s apart, "
+        "where the usual step of the segment is 60 s;"
+    )
+    assert "split the segment into two there, or take a file without the hole" in str(caught.value)
+
+
+def test_a_hole_is_more_than_ten_usual_steps(tmp_path):
+    orbit = ephemeris(tmp_path, HEAD + segment(holed(1200, 1800)))
+    close(orbit.states(1500.0).position_m, truth(np.array([1500.0])).position_m[:, 0], atol=0.1)
+    no_ephemeris(tmp_path, HEAD + segment(holed(1200, 1860)), "660 s apart")
+
+
+def test_a_hole_outside_the_usable_times_does_no_harm(tmp_path):
+    for first, last in ((1800, 3600), (0, 600)):
+        usable = {"USEABLE_START_TIME": stamp(first), "USEABLE_STOP_TIME": stamp(last)}
+        times = holed(3600, 5400, holed(600, 1800))
+        orbit = ephemeris(tmp_path, HEAD + segment(times, **usable))
+        close(orbit.states(first + 270.0).position_m, truth(np.array([first + 270.0])).position_m[:, 0], atol=1e-3)
+        for key, by in (("USEABLE_START_TIME", first - 1), ("USEABLE_STOP_TIME", last + 1)):
+            if by >= 0:
+                no_ephemeris(tmp_path, HEAD + segment(times, **usable | {key: stamp(by)}), "no state vector between")
 
 
 def test_names_with_brackets(tmp_path):

@@ -17,7 +17,6 @@ Floats = NDArray[np.float64]
 Progress = Callable[[int, int, str], None]
 Span = tuple[float, float]
 
-_STEP_S = 60.0  # in which a range is looked at
 _EDGE = 1e-9  # part of a range by which a session that ends at a limit may seem to exceed it
 _RANGES = 25  # samples of a session
 
@@ -40,6 +39,10 @@ class ConstellationPlan:
     planned: tuple[operations.PlannedSession, ...]
     by_satellite: operations.Totals
     by_relay: operations.Totals
+
+    def contact_plan(self) -> str:
+        """The sessions as a contact plan, see `operations.contact_plan`; nodes are numbered in the order of names."""
+        return operations.contact_plan(self.planned, self.epoch.utc, satellites=self.satellites, relays=self.relays)
 
     @property
     def volume_bit(self) -> float:
@@ -73,23 +76,12 @@ def opportunities(
         step = orbit.coarse_step_s(satellite.orbit, span_s[0])
         if step not in sampled:
             sampled[step] = [orbit.Sampled.over(relay.orbit, span_s, step) for relay in relays]
-        each = orbit.contacts_with_each(satellite, relays, earth, epoch, span_s, sampled[step])
-        for which, found in enumerate(each):
-            for contact in found:
-                spans = _within(satellite.orbit, relays[which].orbit, contact, furthest_m)
-                rows += [(place, which, float(start), float(end)) for start, end in spans]
+        each = orbit.contacts_with_each(satellite, relays, earth, epoch, span_s, sampled[step], furthest_m)
+        rows += [(place, which, c.start_s, c.end_s) for which, found in enumerate(each) for c in found]
         on_progress(place + 1)
     table = np.array(rows, dtype=np.float64).reshape(-1, 4)
     order = np.lexsort((table[:, 1], table[:, 0], table[:, 2]))
     return operations.Opportunities(*(table[order, column] for column in range(4)))
-
-
-def _within(first: orbit.Orbit, second: orbit.Orbit, contact: orbit.Contact, furthest_m: float) -> Floats:
-    """The parts of a contact in which the range is below a limit, (n, 2)."""
-    if furthest_m == math.inf:
-        return np.array([[contact.start_s, contact.end_s]])
-    time_s = orbit.coarse_times((contact.start_s, contact.end_s), _STEP_S)
-    return orbit.positive(lambda time: furthest_m - orbit.sight(first, second, time).range_m, time_s)
 
 
 def run(

@@ -177,12 +177,11 @@ def _needs_orbit(name: str) -> Callable[..., Iterator[Problem]]:
     return check
 
 
-def _pattern_fits_orbit(orbit: Orbits | None, constellation: Constellation | None) -> Iterator[Problem]:
-    """A Walker pattern is one of circular orbits."""
-    if orbit is None or constellation is None or constellation.pattern == "file" or orbit.leo.kind == "circular":
-        return
-    reason = f'is "{constellation.pattern}", and orbit.leo is no circular orbit to repeat'
-    yield Problem("constellation.pattern", reason, 'orbit.leo.kind = "circular", or pattern = "file"')
+def _needs_operations(operations: Operations | None, constellation: Constellation | None) -> Iterator[Problem]:
+    """A constellation has its rates and its acquisition from the operations."""
+    if constellation is not None and operations is None:
+        reason = "stands without the table operations"
+        yield Problem("constellation", reason, "the table [operations], which microrad init writes")
 
 
 def _scan_there(operations: Operations | None, acquisition: Acquisition | None) -> Iterator[Problem]:
@@ -204,8 +203,8 @@ LINK_RELATIONS: tuple[Relation, ...] = (
     (("terminals", "communication"), obscuration_fits),
     (("orbit", "operations"), _needs_orbit("operations")),
     (("orbit", "constellation"), _needs_orbit("constellation")),
-    (("orbit", "constellation"), _pattern_fits_orbit),
     (("operations", "acquisition"), _scan_there),
+    (("operations", "constellation"), _needs_operations),
 )
 """What has to fit between tables of the link: their names, and a check that takes them and yields what does not."""
 

@@ -81,7 +81,7 @@ class Operations(Table):
         alias="margin", description="of the laser link, at which a data rate counts as one that it closes at"
     )
     acquisition: Literal["wide beacon", "scan"] = Field(description="by which the partner is found")
-    relay_share: Annotated[float, Quantity("", above=0.0, most=1.0)] = Field(
+    relay_share: Annotated[float, Quantity("", least=0.01, most=1.0)] = Field(
         description="share of each contact that the relay grants, from its beginning"
     )
     relay_delay_s: Seconds = Field(alias="relay_delay", description="from the satellite's laser to the user")
@@ -106,7 +106,8 @@ class Constellation(Table):
     """Many satellites that share some relays."""
 
     pattern: Literal["delta", "star", "file"] = Field(
-        description="delta, star: Walker's patterns around orbit.leo, nodes over 360 or 180 deg; file: element sets"
+        description="delta, star: Walker's patterns around orbit.leo (circular or keplerian), nodes over 360 or "
+        "180 deg; file: element sets"
     )
     satellites: Annotated[int, Whole("", least=1, most=100_000)] | None = None
     planes: Annotated[int, Whole("", least=1, most=100_000)] | None = None

@@ -16,6 +16,7 @@ from microrad import (
     link,
     link_study,
     mirror_summary,
+    orbit,
     paper,
     performance,
     pointing,
@@ -210,11 +211,11 @@ def delivered(
     if case is not None:
         loss = day_study.PointingLoss(case.outage_loss_db, case.outage, f"{case.controller}, {case.source}")
     else:
-        on_axis = float(link.margin_of_error(m, np.zeros(1))[0])
-        loss = day_study.PointingLoss(on_axis - achieved.margin_db, 0.0, f"simulated: {residual.trace.name}")
+        loss = day_study.loss_at(m, achieved.margin_db, f"simulated: {residual.trace.name}")
     day = day_study.run(links, loss)
-    contact = contact_run.of_mission(m, day.view, links.finding, fine)
-    plan = None if m.constellation is None else constellation.run(_links_of(file), loss)
+    contact = contact_run.of_mission(m, day, links.finding, fine)
+    planned = m.constellation is not None and orbit.repeats(m.constellation, m)
+    plan = constellation.run(_links_of(file), loss) if planned else None
     return day, contact, plan
 
 

@@ -156,12 +156,12 @@ def against_paper(e: Evidence) -> tuple[Claim, ...]:
 def _day_claims(day: day_study.DayStudy) -> list[Claim]:
     """What the paper says of contacts, judged on the mission's own orbits."""
     relay, direct, days = day.relay, day.direct, day.view.duration_s / 86400.0
-    a_day, minutes = len(relay.contacts) / days, day.view.median_s / 60.0
+    a_day, minutes = day.view.rises / days, day.view.median_s / 60.0
     claims = [
         Claim(
             "abstract",
             "a line of sight in each of about 15 orbits a day",
-            f"{a_day:.3g} contacts a day",
+            f"the relay rises {a_day:.3g} times a day",
             _agrees(14.0 <= a_day <= 16.0, days >= 1.0),
             "orbit, slot and grazing height are assumptions: the paper prints none",
         ),
@@ -176,8 +176,8 @@ def _day_claims(day: day_study.DayStudy) -> list[Claim]:
             "abstract",
             "data reach the ground in almost real time",
             f"half within {_minutes(relay.median_s)}, 99 % within {_minutes(relay.slow_s)}",
-            _agrees(relay.median_s <= 60.0, True),
-            "judged by the median, at one minute: data made out of sight of the relay wait for the next contact",
+            "partly" if relay.median_s <= 60.0 < relay.slow_s else _agrees(relay.slow_s <= 60.0, True),
+            "judged at one minute, by the median and by 99 %: data made out of sight of the relay wait for a contact",
         ),
     ]
     if direct is not None and direct.contacts:

@@ -1,7 +1,5 @@
 """Commands of the day: contacts and what they deliver, and the plan of a constellation."""
 
-import shutil
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -18,13 +16,13 @@ from microrad.cli.frame import (
     examples,
     json_text,
     progress_bar,
+    width,
 )
 
 # Everything else is imported inside the commands: it takes longer to load than help may take.
 if TYPE_CHECKING:
     from microrad.link_study import LinkStudy
 
-_WIDE = 160  # columns of a table that goes to a file
 _File = Annotated[
     Path, typer.Argument(help="Mission file with the tables orbit and operations.", metavar="FILE", show_default=False)
 ]
@@ -40,10 +38,6 @@ def _links(file: Path) -> "LinkStudy":
         return link_study.run(given)
     except ValueError as error:  # a rate that the receiver does not take, a scan without time to detect
         raise Refusal(f"{file}: {error}") from error
-
-
-def _width() -> int:
-    return max(shutil.get_terminal_size((_WIDE, 24)).columns if sys.stdout.isatty() else _WIDE, 80)
 
 
 @app.command(
@@ -70,21 +64,22 @@ def contacts(
     if sum((as_csv, as_html, as_json)) > 1:
         raise Refusal("--csv, --html and --json exclude each other; give one of them.")
     from microrad import day_study
-    from microrad.report import day_views, day_words
+    from microrad.report import day_tables, day_views
 
     links = _links(file)
     try:
-        day = day_study.run(links)
+        with progress_bar() as progress:
+            day = day_study.run(links, on_progress=progress)
     except ValueError as error:  # a table that is missing, an orbit that does not hold
         raise Refusal(f"{file}: {error}") from error
     code = CLOSES if day.relay.capacity_bit > 0.0 else DOES_NOT_CLOSE
     if as_json:
-        return Outcome(json_text({"mission": links.file.mission.name, **day_words.data(day)}), code)
+        return Outcome(json_text({"mission": links.file.mission.name, **day_tables.data(day)}), code)
     if as_csv:
         return Outcome(day_views.csv_text(day), code)
     if as_html:
         return Outcome(day_views.html(day, links), code)
-    return Outcome(day_views.text(day, _width()), code)
+    return Outcome(day_views.text(day, width()), code)
 
 
 @app.command(
@@ -122,9 +117,9 @@ def constellation(
         if as_csv:
             return Outcome(operations.csv_text(plan.planned, plan.epoch.utc), code)
         if as_plan:
-            return Outcome(operations.contact_plan(plan.planned, plan.epoch.utc), code)
+            return Outcome(plan.contact_plan(), code)
     except ValueError as error:  # a table that is missing, an orbit that does not hold
         raise Refusal(f"{file}: {error}") from error
     if as_json:
         return Outcome(json_text({"mission": links.file.mission.name, **constellation_views.data(plan)}), code)
-    return Outcome(constellation_views.text(plan, _width()), code)
+    return Outcome(constellation_views.text(plan, width()), code)

@@ -11,6 +11,7 @@ import functools
 import json
 import math
 import os
+import shutil
 import signal
 import sys
 import threading
@@ -24,6 +25,8 @@ from typing import Annotated, Any, NoReturn, ParamSpec
 import typer
 
 CLOSES, DOES_NOT_CLOSE, REFUSED, BUG, INTERRUPTED, UNREAD = 0, 1, 2, 70, 130, 141
+
+_WIDE = 160  # columns of a table that goes to a file
 
 _Arguments = ParamSpec("_Arguments")
 OnProgress = Callable[[int, int, str], None]
@@ -186,6 +189,12 @@ def progress_bar() -> Iterator[OnProgress]:
     with Progress(console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task("reading", total=None)
         yield lambda done, total, what: bar.update(task, completed=done, total=total, description=what)
+
+
+def width() -> int:
+    """Columns for tables: those of the terminal, or of a file where the output goes to one; at least 80."""
+    own = shutil.get_terminal_size((_WIDE, 24)).columns if sys.stdout and sys.stdout.isatty() else _WIDE
+    return max(own, 80)
 
 
 def check_target(path: Path, advice: str, replace_if_begins: str = "") -> None:

@@ -1,7 +1,5 @@
 """Commands of the links: their budgets as tables, and presets from the literature to start from."""
 
-import shutil
-import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -19,13 +17,12 @@ from microrad.cli.frame import (
     examples,
     json_text,
     option,
+    width,
 )
 
 # Everything else is imported inside the commands: it takes longer to load than help may take.
 if TYPE_CHECKING:
     from microrad.missionfile import LinkFile
-
-_WIDE = 160  # columns of a table that goes to a file
 
 
 @app.command(
@@ -75,8 +72,7 @@ def budget(
         return Outcome(budget_views.csv_text(study), code)
     if as_html:
         return Outcome(budget_views.html(study), code)
-    width = shutil.get_terminal_size((_WIDE, 24)).columns if sys.stdout.isatty() else _WIDE
-    return Outcome(budget_views.text(study, max(width, 80)), code)
+    return Outcome(budget_views.text(study, width()), code)
 
 
 def _changed(file: "LinkFile", data_rate: str | None, pointing_error: str | None, solve_rate: bool) -> "LinkFile":

@@ -5,18 +5,18 @@ import numpy as np
 from microrad import orbit
 from microrad.contact_run.records import Contact, ContactRun, Floats, Settings, Sight
 from microrad.contact_run.sequence import run
-from microrad.day_study import View
+from microrad.day_study import DayStudy
 from microrad.fine_pointing import FinePointingStudy
 from microrad.link_acquisition import Finding
 from microrad.mission import Mission
 
 
-def of_mission(m: Mission, seen: View, finding: Finding | None, fine: FinePointingStudy | None) -> ContactRun | None:
+def of_mission(m: Mission, day: DayStudy, finding: Finding | None, fine: FinePointingStudy | None) -> ContactRun | None:
     """The run of `operations.contact` under the best controller; None without that table or what it needs."""
     asked = None if m.operations is None else m.operations.contact
     if asked is None or finding is None or fine is None or m.fine_pointing is None or m.operations is None:
         return None
-    if not seen.encounters:
+    if not day.relay.contacts:
         return None
     settings = Settings(
         slew_angle_rad=asked.slew_angle_rad,
@@ -28,13 +28,13 @@ def of_mission(m: Mission, seen: View, finding: Finding | None, fine: FinePointi
         seed=m.operations.seed,
         way=m.operations.acquisition,
     )
-    return run(m, finding, fine.scene, fine.best.design, _contact(seen, asked.number - 1), settings)
+    return run(m, finding, fine.scene, fine.best.design, _contact(day, asked.number - 1), settings)
 
 
-def _contact(seen: View, place: int) -> Contact:
-    """One contact of the span with its geometry; the body is free from the end of the one before."""
-    pair, chosen = seen.pair, seen.encounters[place].contact
-    free = seen.encounters[place - 1].contact.end_s if place else pair.span_s[0]
+def _contact(day: DayStudy, place: int) -> Contact:
+    """One contact that the relay grants, with its geometry; the body is free from the end of the one before."""
+    pair, chosen = day.view.pair, day.relay.contacts[place]
+    free = day.relay.contacts[place - 1].end_s if place else pair.span_s[0]
 
     def geometry(time_s: Floats) -> Sight:
         found = orbit.sight(pair.leo.orbit, pair.geo.orbit, np.ravel(time_s))

@@ -1,16 +1,19 @@
 """What a link delivers in a day: contacts, acquisition, rates, volume and latency, by relay and by direct downlink."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from microrad import link, operations, orbit
 from microrad.day_study import flow
 from microrad.day_study.assumptions import NOTHING, Numbers, Swing, swings
 from microrad.day_study.flow import DIRECT, RELAY, Closing, PointingLoss, Way
-from microrad.day_study.geometry import Encounter, View, beyond_the_mission, times, view
+from microrad.day_study.geometry import Encounter, View, beyond_the_mission, encounter, short_tail, times, view
 from microrad.link_acquisition import Found
 from microrad.link_study import LinkStudy
 from microrad.mission import LinkMission
 from microrad.units import format_quantity
+
+Progress = Callable[[int, int, str], None]
 
 __all__ = [
     "DIRECT",
@@ -26,6 +29,7 @@ __all__ = [
     "Way",
     "acquired",
     "given_loss",
+    "loss_at",
     "run",
     "times",
     "view",
@@ -36,11 +40,13 @@ __all__ = [
 class DayStudy:
     """The span of a mission by both ways, and the assumptions that move the comparison, the weightiest first.
 
-    ``closings`` are the laser's rates, highest first, with how far each reaches under ``loss``.
+    ``encounters`` are the contacts of the relay as it grants them, with what their line of sight reaches. ``closings``
+    are the laser's rates, highest first, with how far each reaches under ``loss``.
     """
 
     mission: LinkMission
     view: View
+    encounters: tuple[Encounter, ...]
     loss: PointingLoss
     closings: tuple[Closing, ...]
     relay: Way
@@ -59,10 +65,14 @@ def given_loss(links: LinkStudy) -> PointingLoss:
     m = links.file.mission
     if links.under_jitter is not None:
         return PointingLoss(links.under_jitter.outage_loss_db, links.under_jitter.outage, "jitter as given")
-    needed = float(link.required_dbm(m, m.communication.data_rate_bit_s))
-    loss = link.received_on_axis_dbm(m) - needed - links.communication.margin_db
     error = format_quantity(m.communication.pointing_error_rad, "rad")
-    return PointingLoss(loss, 0.0, f"communication.pointing_error, {error}")
+    return loss_at(m, links.communication.margin_db, f"communication.pointing_error, {error}")
+
+
+def loss_at(m: LinkMission, margin_db: float, source: str) -> PointingLoss:
+    """The pointing loss, an uncorrected point-ahead in it, that leaves a margin at the budgeted rate and distance."""
+    needed = float(link.required_dbm(m, m.communication.data_rate_bit_s))
+    return PointingLoss(link.received_on_axis_dbm(m) - needed - margin_db, 0.0, source)
 
 
 def _check_contact(m: LinkMission, seen: View) -> None:
@@ -83,7 +93,9 @@ def acquired(links: LinkStudy) -> Found | None:
     return finding.wide if o.acquisition == "wide beacon" else finding.scan
 
 
-def run(links: LinkStudy, loss: PointingLoss | None = None) -> DayStudy:
+def run(
+    links: LinkStudy, loss: PointingLoss | None = None, on_progress: Progress = lambda done, total, what: None
+) -> DayStudy:
     """The day of a mission that has the tables `orbit` and `operations`.
 
     ``loss`` is what pointing costs the laser link, by default what the mission states. Raises `orbit.OrbitError` and
@@ -96,13 +108,15 @@ def run(links: LinkStudy, loss: PointingLoss | None = None) -> DayStudy:
     found = acquired(links)
     closing = flow.closings(m, loss)
     rates, heard = flow.rate_table(closing), flow.heard(m, seen)
+    relay = flow.relay(m, seen, rates, loss.outage, found, 1.0)
     return DayStudy(
         mission=m,
         view=seen,
         loss=loss,
         closings=closing,
-        relay=flow.relay(m, seen, rates, loss.outage, found, 1.0),
+        encounters=tuple(encounter(m, seen.pair, contact) for contact in relay.contacts),
+        relay=relay,
         direct=flow.direct(m, seen, heard),
-        swings=swings(m, folder, seen, heard, loss, found),
-        warnings=beyond_the_mission(m, seen),
+        swings=swings(m, folder, seen, heard, loss, found, on_progress),
+        warnings=(*beyond_the_mission(m, seen), *short_tail(seen.pair)),
     )

@@ -1,7 +1,7 @@
 """Which assumption the comparison of relay and direct downlink rests on most: each one alone, changed on purpose."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TypeVar
@@ -111,17 +111,22 @@ def swings(
     heard: tuple[flow.Heard, ...],
     loss: flow.PointingLoss,
     found: Found | None,
+    on_progress: Callable[[int, int, str], None],
 ) -> tuple[Swing, ...]:
-    """Every assumption of the day, the one that moves the ratio most first; those that move nothing stay in.
+    """Assumptions of the day, the one that moves the ratio most first; those that move nothing stay in.
 
-    Rates, times and heights are halved and doubled, places and laws replaced. An orbit from a file stays as it is, and
+    Data rates and the time of acquisition are halved and doubled, the margin, the grazing height and the masks go to 0
+    and to twice, the pointing loss to 0 and 3 dB up, the altitude by a fifth; attitude, eclipse, local time, stations
+    and what the relay grants are replaced. An orbit from a file stays as it is, and
     so does what would leave no orbit: one that has decayed, or lies below the surface that lines of sight must clear.
     """
     m = changed(m, "operations.runs", min(flow.table(m).runs, _RUNS))
     own = _Case(m, loss, _Known(m, seen, heard))
     here = numbers(own, folder, found)
     made = []
-    for name, low, high in _changes(own, found):
+    cases = list(_changes(own, found))
+    for done, (name, low, high) in enumerate(cases):
+        on_progress(done, len(cases), "each assumption changed alone")
         ends = [_end(side, here, folder, found) for side in (low, high)]
         made.append(Swing(name, ends[0][0], ends[1][0], ends[0][1], ends[1][1]))
     return tuple(sorted(made, key=lambda swing: -swing.factor))
@@ -158,6 +163,8 @@ def _changes(own: _Case, found: Found | None) -> Iterator[tuple[str, _Side, _Sid
     if o.rates_bit_s is None:
         yield _laser_rate(own, scaled("laser data rate", "communication.data_rate_bit_s", "bit/s"))
     yield _margin(own)
+    none, more = replace(own.loss, loss_db=0.0), replace(own.loss, loss_db=own.loss.loss_db + 3.0)
+    yield "pointing loss", ("0 dB", replace(own, loss=none)), ("3 dB more", replace(own, loss=more))
     if found is not None:
         yield "time of acquisition", ("half", replace(own, slower=0.5)), ("twice", replace(own, slower=2.0))
     if o.relay_share == 1.0:
@@ -167,6 +174,8 @@ def _changes(own: _Case, found: Found | None) -> Iterator[tuple[str, _Side, _Sid
     if orbits.leo.limits is None or orbits.leo.limits.attitude == "free":
         held = changed(m, "orbit.leo.limits", _held(orbits.leo.limits))
         yield other("attitude of the satellite", "nadir, 60 deg about zenith", held)
+    if orbits.leo.limits is not None and orbits.leo.limits.in_eclipse:
+        yield other("eclipse", "terminal off in it", changed(m, "orbit.leo.limits.in_eclipse", False))
     if orbits.leo.kind == "circular":
         yield scaled("orbit altitude", "orbit.leo.altitude_m", "m", (0.8, 1.2))
         if orbits.leo.local_time_s is not None:

@@ -2,26 +2,28 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from microrad import link, operations, orbit
-from microrad.day_study.geometry import View
+from microrad.day_study.geometry import View, cut_at, longest_gap_s
 from microrad.link_acquisition import Found
 from microrad.mission import LinkMission
 from microrad.operations_table import Downlink, Operations
 
 Floats = NDArray[np.float64]
-Span = tuple[float, float]
 
 RELAY, DIRECT = "relay", "direct downlink"
 
 
 @dataclass(frozen=True, slots=True)
 class PointingLoss:
-    """What pointing costs the laser link: the loss in dB, the share of time in outage, and where both come from."""
+    """What pointing costs the laser link: the loss in dB, the share of time in outage, and where both come from.
+
+    Both are those at the budgeted rate and distance, and are taken for every range and rate.
+    """
 
     loss_db: float
     outage: float
@@ -41,10 +43,11 @@ class Closing:
 class Way:
     """One way down: its contacts, what they could carry, and what happened to the instrument's data.
 
-    ``contacts`` are those with a part in the span, ``carried_bit`` what each could carry within it, and
-    ``capacity_bit`` their sum, both the mean of the runs; ``capacity_spread_bit`` the least and the most of a run.
-    ``contact_s`` is the time in contact, ``gap_s`` the longest time in the span without one. ``history`` is the store
-    in the first run; volumes are means over the runs, and ``latency`` is that of all runs together.
+    ``contacts`` are those of the span, cut at its end, passes over ``stations`` for a downlink; ``carried_bit`` is what
+    each could carry, and ``capacity_bit`` their sum, both the mean of the runs; ``capacity_spread_bit`` the least and
+    the most of a run. ``contact_s`` is the time in contact, ``gap_s`` the longest time in the span without one.
+    ``history`` is the store in the first run; volumes are means over the runs, and ``latency`` is that of all runs
+    together.
     """
 
     name: str
@@ -61,6 +64,11 @@ class Way:
     failed_contacts: float
     history: operations.StoreHistory
     latency: operations.Latency
+
+    @property
+    def arrived_bit(self) -> float:
+        """The instrument's data that arrive."""
+        return max(self.generated_bit - self.lost_bit - self.on_board_bit, 0.0)
 
     @property
     def median_s(self) -> float:
@@ -223,7 +231,7 @@ def direct(m: LinkMission, seen: View, passes: tuple[Heard, ...]) -> Way | None:
     for each, name in sorted(passes, key=lambda item: (item[0].start_s, item[0].end_s)):
         start, begins = max(each.start_s, until), each.begins if each.start_s >= until else "station free"
         if each.end_s > start:
-            kept.append(orbit.Contact(start, each.end_s, begins, each.ends))
+            kept.append(replace(each, start_s=start, begins=begins))
             names.append(name)
             until = each.end_s
     down = o.downlink
@@ -252,13 +260,13 @@ def _way(
     histories = [operations.deliver(made, o.store_bit, services, whole, delay_s) for services in runs]
     inside = _of_span(contacts, seen)
     carried = np.array([[_until(s, span[1]) for s in services[:inside]] for services in runs]).reshape(len(runs), -1)
-    total = carried.sum(axis=1)
+    total, shown = carried.sum(axis=1), tuple(cut_at(c, span[1]) for c in contacts[:inside])
     return Way(
         name=name,
-        contacts=contacts[:inside],
+        contacts=shown,
         stations=stations[:inside],
-        contact_s=sum(min(c.end_s, span[1]) - c.start_s for c in contacts[:inside]),
-        gap_s=_gap(contacts[:inside], span),
+        contact_s=sum(c.duration_s for c in shown),
+        gap_s=longest_gap_s(shown, span),
         carried_bit=carried.mean(axis=0),
         capacity_bit=float(total.mean()),
         capacity_spread_bit=(float(total.min()), float(total.max())),
@@ -275,9 +283,3 @@ def _until(service: operations.Service, end_s: float) -> float:
     """What a contact could carry before the end of the span."""
     edges = np.minimum(service.edges_s, end_s)
     return float(np.dot(service.mean_rate_bit_s, np.diff(edges)))
-
-
-def _gap(contacts: tuple[orbit.Contact, ...], span: Span) -> float:
-    """Longest time in the span without a contact."""
-    edges = [span[0], *(t for c in contacts for t in (c.start_s, min(c.end_s, span[1]))), span[1]]
-    return max(b - a for a, b in zip(edges[::2], edges[1::2], strict=True))

@@ -1,8 +1,9 @@
 """When both terminals of the link see one another, and what the line of sight does meanwhile."""
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,7 @@ from microrad.mission import LinkMission
 from microrad.units import SPEED_OF_LIGHT_M_S, format_quantity
 
 Floats = NDArray[np.float64]
+_C = TypeVar("_C", bound=orbit.Contact)
 
 SAMPLE_S = 10.0
 """Step in which a contact is looked at: a range turns within minutes."""
@@ -21,14 +23,19 @@ _TOLERANCE = 0.01  # by which a constant of the mission may fall short of its or
 
 @dataclass(frozen=True, slots=True)
 class Encounter:
-    """A contact with what its line of sight reaches: all largest in magnitude but for ``range_least_m``."""
+    """A contact with its line of sight at the moments of `times`, and what that reaches.
+
+    All are largest in magnitude but for ``range_least_m``.
+    """
 
     contact: orbit.Contact
+    sight: orbit.LineOfSight
     range_least_m: float
     range_most_m: float
     point_ahead_most_rad: float
     rate_most_rad_s: float
     acceleration_most_rad_s2: float
+    range_rate_most_m_s: float
     doppler_most_hz: float
 
 
@@ -36,15 +43,15 @@ class Encounter:
 class View:
     """The contacts of the mission's two terminals.
 
-    ``encounters`` begin within the span of ``pair``, the last may end behind it; ``later`` are those behind, in which
-    data of the span may still be sent. ``range_m`` has the range over time for each of both. ``umbra_s`` (n, 2) are
-    the eclipses of the lower satellite in the span, and ``closed_form`` is the contact of an orbit of the same radius
-    over the equator, where there is one.
+    ``encounters`` are those of the span of ``pair``, cut at its end. ``contacts`` are all of them whole, those behind
+    the span too, in which its data may still be sent, and ``range_m`` has the range over time for each. ``umbra_s``
+    (n, 2) are the eclipses of the lower satellite in the span, and ``closed_form`` is the contact of an orbit of the
+    same radius over the equator, where that orbit and no field of regard decide.
     """
 
     pair: orbit.Pair
     encounters: tuple[Encounter, ...]
-    later: tuple[orbit.Contact, ...]
+    contacts: tuple[orbit.Contact, ...]
     range_m: tuple[Callable[[Floats], Floats], ...]
     umbra_s: Floats
     closed_form: orbit.CoplanarContact | None
@@ -57,7 +64,7 @@ class View:
     @property
     def contact_s(self) -> float:
         """Time in contact within the span."""
-        return sum(min(e.contact.end_s, self.duration_s) - e.contact.start_s for e in self.encounters)
+        return sum(e.contact.duration_s for e in self.encounters)
 
     @property
     def visible_share(self) -> float:
@@ -67,9 +74,15 @@ class View:
     @property
     def gap_s(self) -> float:
         """Longest time in the span without a contact."""
-        found = [e.contact for e in self.encounters]
-        begins, ends = [c.start_s for c in found], [min(c.end_s, self.duration_s) for c in found]
-        return max(b - a for a, b in zip([0.0, *ends], [*begins, self.duration_s], strict=True))
+        return longest_gap_s([e.contact for e in self.encounters], self.pair.span_s)
+
+    @property
+    def rises(self) -> int:
+        """How often the partner comes out from behind the Earth, or is there at the beginning.
+
+        A contact that the Sun or a limit cuts in two counts once.
+        """
+        return sum(orbit.EARTH in e.contact.begins or orbit.START in e.contact.begins for e in self.encounters)
 
     @property
     def median_s(self) -> float:
@@ -77,29 +90,35 @@ class View:
         whole = [e.contact.duration_s for e in self.encounters if not _cut(e.contact)]
         return float(np.median(whole)) if whole else math.nan
 
-    @property
-    def contacts(self) -> tuple[orbit.Contact, ...]:
-        """All contacts, those behind the span too."""
-        return (*(e.contact for e in self.encounters), *self.later)
-
     def largest(self, name: str) -> float:
         """Largest of one of the quantities of `Encounter` over all contacts; 0 without any."""
         return max((getattr(e, name) for e in self.encounters), default=0.0)
 
 
+def longest_gap_s(contacts: Sequence[orbit.Contact], span_s: tuple[float, float]) -> float:
+    """Longest time in the span without a contact."""
+    edges = [span_s[0], *(t for c in contacts for t in (c.start_s, c.end_s)), span_s[1]]
+    return max(b - a for a, b in zip(edges[::2], edges[1::2], strict=True))
+
+
 def _cut(contact: orbit.Contact) -> bool:
-    return "start of the span" in contact.begins or "end of the span" in contact.ends
+    return orbit.START in contact.begins or orbit.END in contact.ends
+
+
+def cut_at(contact: _C, end_s: float) -> _C:
+    """The contact up to the end of the span."""
+    return contact if contact.end_s <= end_s else replace(contact, end_s=end_s, ends=orbit.END)
 
 
 def view(m: LinkMission, pair: orbit.Pair) -> View:
     """The contacts of the mission's pair of terminals; raises `orbit.OrbitError`."""
     found = orbit.contacts(pair.leo, pair.geo, pair.earth, pair.epoch, pair.whole_s)
     end = pair.span_s[1]
-    sights = [orbit.sight(pair.leo.orbit, pair.geo.orbit, times(c)) for c in found]
+    sights = [_sight(pair, c) for c in found]
     return View(
         pair=pair,
-        encounters=tuple(_encounter(m, c, s) for c, s in zip(found, sights, strict=True) if c.start_s < end),
-        later=tuple(c for c in found if c.start_s >= end),
+        encounters=tuple(encounter(m, pair, cut_at(c, end)) for c in found if c.start_s < end),
+        contacts=found,
         range_m=tuple(_range(s) for s in sights),
         umbra_s=_umbra(pair),
         closed_form=_closed_form(pair),
@@ -119,14 +138,22 @@ def _range(seen: orbit.LineOfSight) -> Callable[[Floats], Floats]:
     return lambda time_s: np.asarray(spline(time_s))
 
 
-def _encounter(m: LinkMission, contact: orbit.Contact, seen: orbit.LineOfSight) -> Encounter:
+def _sight(pair: orbit.Pair, contact: orbit.Contact) -> orbit.LineOfSight:
+    return orbit.sight(pair.leo.orbit, pair.geo.orbit, times(contact))
+
+
+def encounter(m: LinkMission, pair: orbit.Pair, contact: orbit.Contact) -> Encounter:
+    """A contact with what its line of sight reaches."""
+    seen = _sight(pair, contact)
     return Encounter(
         contact,
+        seen,
         float(np.min(seen.range_m)),
         float(np.max(seen.range_m)),
         float(np.max(seen.point_ahead_rad)),
         float(np.max(seen.rate_rad_s)),
         float(np.max(seen.acceleration_rad_s2)),
+        float(np.max(np.abs(seen.range_rate_m_s))),
         float(np.max(np.abs(seen.doppler_hz(m.communication.wavelength_m)))),
     )
 
@@ -149,7 +176,18 @@ def _closed_form(pair: orbit.Pair) -> orbit.CoplanarContact | None:
         return None
     if low.eccentricity > _CIRCULAR or low.semi_major_axis_m >= orbit.GEOSTATIONARY_RADIUS_M:
         return None
+    off_nadir = math.asin(low.semi_major_axis_m / orbit.GEOSTATIONARY_RADIUS_M)
+    if pair.leo.limits.field_of_regard_rad < math.pi or pair.geo.limits.field_of_regard_rad < off_nadir:
+        return None
     return orbit.coplanar_contact(low.semi_major_axis_m, pair.earth.grazing_height_m)
+
+
+def short_tail(pair: orbit.Pair) -> tuple[str, ...]:
+    """That the orbits do not hold for long enough behind the span to deliver all of its data."""
+    if pair.tail_s >= orbit.TAIL_S:
+        return ()
+    held = format_quantity(pair.tail_s, "s")
+    return (f"the orbits hold for {held} behind the span: data still on board then count as never arrived",)
 
 
 def beyond_the_mission(m: LinkMission, seen: View) -> tuple[str, ...]:

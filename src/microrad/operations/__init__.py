@@ -2,7 +2,7 @@
 
 from microrad.operations.base import OperationsError
 from microrad.operations.latency import Latency, pool
-from microrad.operations.plan import COLUMNS, PlannedSession, contact_plan, csv_text
+from microrad.operations.plan import COLUMNS, PlannedSession, contact_plan, csv_text, spreadsheet_text
 from microrad.operations.rates import RateTable, Service, Step, service
 from microrad.operations.schedule import Opportunities, Rules, Sessions, schedule
 from microrad.operations.store import Production, StoreHistory, deliver
@@ -28,6 +28,7 @@ __all__ = [
     "pool",
     "schedule",
     "service",
+    "spreadsheet_text",
     "totals_by_relay",
     "totals_by_satellite",
 ]

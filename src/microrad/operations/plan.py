@@ -101,7 +101,7 @@ def csv_text(sessions: Sequence[PlannedSession], utc: Utc) -> str:
     for one in sessions:
         times = (one.start_s, one.locked_s, one.end_s)
         ranges = ["" if r is None else _number(r) for r in (one.range_min_m, one.range_max_m)]
-        names = (_safe(one.satellite), _safe(one.relay))
+        names = (spreadsheet_text(one.satellite), spreadsheet_text(one.relay))
         numbers = (*map(_number, times), *ranges, _number(one.rate_bit_s), _number(one.volume_bit))
         writer.writerow([*names, *map(utc, times), *numbers])
     return buffer.getvalue().rstrip("\n")
@@ -111,11 +111,14 @@ def _number(value: float) -> str:
     return repr(float(value))
 
 
-def _safe(name: str) -> str:
+def spreadsheet_text(name: str) -> str:
+    """A name that no spreadsheet takes for a formula; an apostrophe in front can be taken off again."""
     return "'" + name if name.startswith(_FORMULA) else name
 
 
-def contact_plan(sessions: Sequence[PlannedSession], utc: Utc) -> str:
+def contact_plan(
+    sessions: Sequence[PlannedSession], utc: Utc, *, satellites: Sequence[str] = (), relays: Sequence[str] = ()
+) -> str:
     """The sessions as a contact plan that the ION implementation of delay-tolerant networking reads.
 
     A contact plan in the sense of CCSDS 734.3-B-1 (Schedule-Aware Bundle Routing) lists contacts, each with start,
@@ -128,17 +131,18 @@ def contact_plan(sessions: Sequence[PlannedSession], utc: Utc) -> str:
         a range +start +end from to one-way-light-time  in light seconds; the first node number the smaller one, so
                                                         that it holds both ways
 
-    Nodes are numbers: satellites from 1 in the order they appear, then the relays; a comment names each (JSON text,
-    cut where the line would be too long for ION). ION reads whole numbers only. So a contact is cut inwards to whole
-    seconds, its rate rounded down to whole bytes, and the light time rounded up to whole seconds: 1 s up to a range of
-    299 792 km. A session of which nothing is left, or that has no rate, is named in a comment.
+    Nodes are numbers: first the `satellites` from 1, then the `relays`, in the order given, so that a number does not
+    depend on who is served; then satellites and relays that only sessions name, in the order they appear. A comment
+    names each (JSON text, cut where the line would be too long for ION). ION reads whole numbers only. So a contact is
+    cut inwards to whole seconds, its rate rounded down to whole bytes, and the light time rounded up to whole seconds:
+    1 s up to a range of 299 792 km. A session of which nothing is left, or that has no rate, is named in a comment.
 
     Raises `OperationsError` for a session without ranges, before the epoch or of more than 2^32 - 1 byte/s, two
     sessions of one satellite and relay that overlap, a relay with the name of a satellite, and a `utc` that does not
     give ISO 8601 text that ends in Z.
     """
     reference, shift = _reference(utc(0.0))
-    nodes = _nodes(sessions)
+    nodes = _nodes(sessions, satellites, relays)
     ordered = sorted(sessions, key=lambda s: (s.start_s, nodes[s.satellite], nodes[s.relay]))
     _check_overlaps(ordered)
     lines = ["# Contact plan: seconds after the reference time, rates in byte/s, one-way light times in s."]
@@ -158,13 +162,14 @@ def _reference(text: str) -> tuple[str, float]:
     return f"{year}/{month}/{day}-{clock}", float(fraction or 0.0)
 
 
-def _nodes(sessions: Sequence[PlannedSession]) -> dict[str, int]:
-    satellites = dict.fromkeys(s.satellite for s in sessions)
-    relays = dict.fromkeys(s.relay for s in sessions)
-    both = [name for name in relays if name in satellites]
+def _nodes(sessions: Sequence[PlannedSession], satellites: Sequence[str], relays: Sequence[str]) -> dict[str, int]:
+    served, serving = [s.satellite for s in sessions], [s.relay for s in sessions]
+    below = {*satellites, *served}
+    both = [name for name in (*relays, *serving) if name in below]
     if both:
-        raise OperationsError(f"{both[0]!r} is a satellite in one session and a relay in another; give it one role")
-    return {name: number for number, name in enumerate([*satellites, *relays], start=1)}
+        raise OperationsError(f"{both[0]!r} is named as a satellite and as a relay; give it one role")
+    names = dict.fromkeys((*satellites, *relays, *served, *serving))
+    return {name: number for number, name in enumerate(names, start=1)}
 
 
 def _check_overlaps(ordered: Sequence[PlannedSession]) -> None:

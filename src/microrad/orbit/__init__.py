@@ -4,6 +4,9 @@ from microrad.orbit.analytic import GeostationarySlot, KeplerOrbit, circular, su
 from microrad.orbit.base import Orbit, OrbitError, States
 from microrad.orbit.closed_form import CoplanarContact, coplanar_contact
 from microrad.orbit.contacts import (
+    EARTH,
+    END,
+    START,
     Contact,
     Pass,
     Sampled,
@@ -22,13 +25,17 @@ from microrad.orbit.events import positive
 from microrad.orbit.ground import Station, elevation_rad
 from microrad.orbit.limits import UNLIMITED, Limits, Terminal
 from microrad.orbit.line_of_sight import LineOfSight, sight
-from microrad.orbit.model import Pair, pair, relays, satellites, stations
+from microrad.orbit.model import TAIL_S, Pair, pair, relays, repeats, satellites, stations
 from microrad.orbit.oem import read_oem
 from microrad.orbit.sun import shadow_rad, sun_direction
 
 __all__ = [
+    "EARTH",
     "EARTH_RADIUS_M",
+    "END",
     "GEOSTATIONARY_RADIUS_M",
+    "START",
+    "TAIL_S",
     "UNLIMITED",
     "Contact",
     "CoplanarContact",
@@ -61,6 +68,7 @@ __all__ = [
     "read_elements",
     "read_oem",
     "relays",
+    "repeats",
     "satellites",
     "sgp4_orbit",
     "shadow_rad",

@@ -56,8 +56,8 @@ class KeplerOrbit:
         if height_m < LOWEST_PERIGEE_M:
             raise OrbitError(
                 f"orbit {self.name}: its perigee is {height_m / 1e3:.6g} km over the equator, below "
-                f"{LOWEST_PERIGEE_M / 1e3:.0f} km: it has decayed; raise the semi-major axis (counted from the centre "
-                "of the Earth) or lower the eccentricity"
+                f"{LOWEST_PERIGEE_M / 1e3:.0f} km: it has decayed; raise the altitude or the semi-major axis, or "
+                "lower the eccentricity (a semi-major axis counts from the centre of the Earth)"
             )
 
     @property

@@ -12,11 +12,13 @@ from microrad.orbit.epoch import Epoch
 from microrad.orbit.events import Intervals, Rows, intersection, largest, positive, positive_rows
 from microrad.orbit.ground import Station, elevation_rad
 from microrad.orbit.limits import Condition, Side, Terminal, conditions
+from microrad.orbit.line_of_sight import dot
 
 Span = tuple[float, float]
 
 START, END = "start of the span", "end of the span"
 EARTH = "Earth"
+RANGE = "range"
 
 _STEPS_PER_TURN = 85.0  # 60 s for every orbit with its perigee above 100 km
 
@@ -113,8 +115,9 @@ def contacts_with_each(
     epoch: Epoch,
     span_s: Span,
     sampled: Sequence[Sampled] = (),
+    furthest_m: float = math.inf,
 ) -> tuple[tuple[Contact, ...], ...]:
-    """`contacts` of a satellite with each of the relays, solved together.
+    """`contacts` of a satellite with each of the relays, solved together, up to a range of `furthest_m`.
 
     `sampled`, one for each relay, saves to compute their states anew for every satellite:
     ``Sampled.over(relay.orbit, span_s, coarse_step_s(satellite.orbit, span_s[0]))``; samples in another step are left
@@ -126,10 +129,11 @@ def contacts_with_each(
     own = coarse_step_s(satellite.orbit, span_s[0])
     others = tuple(sampled) or tuple(Sampled.over(relay.orbit, span_s, own) for relay in relays)
     time_s = coarse_times(span_s, min(own, *(other.step_s for other in others), math.inf))
-    clear = _clear_of_earth(satellite.orbit, others, earth, time_s)
+    clear = _clear_of_earth((satellite, *relays), others, earth, time_s)
+    near = _in_reach(satellite.orbit, others, furthest_m, time_s)
     found = []
-    for relay, seen in zip(relays, clear, strict=True):
-        kept = [(EARTH, seen)]
+    for place, relay in enumerate(relays):
+        kept = [(EARTH, clear[place]), *((RANGE, each[place]) for each in near)]
         for one, other in ((satellite, relay), (relay, satellite)):
             kept.extend(conditions(Side(one, other, earth, epoch), time_s))
         found.append(_combined(kept, span_s))
@@ -142,27 +146,67 @@ def _check_names(satellite: Terminal, relays: Sequence[Terminal]) -> None:
             raise OrbitError(f'two terminals are called "{relay.name}"; give each a name of its own')
 
 
-def _clear_of_earth(orbit: Orbit, others: Sequence[Sampled], earth: Earth, time_s: Floats) -> tuple[Intervals, ...]:
-    """When the Earth is not in the way, for each of the others."""
+def _clear_of_earth(
+    terminals: Sequence[Terminal], others: Sequence[Sampled], earth: Earth, time_s: Floats
+) -> tuple[Intervals, ...]:
+    """When the Earth is not in the way from the first of the terminals to each of the others."""
     if not others:
         return ()
+    orbit = terminals[0].orbit
+
+    def checked(time: Floats, row: Rows, first: Floats, second: Floats) -> Floats:
+        try:
+            return earth.clearance_rad(first, second)
+        except OrbitError:
+            heights = np.stack((earth.height_m(first), earth.height_m(second)))
+            which, worst = np.unravel_index(np.argmin(heights), heights.shape)  # argmin finds nan first
+            low = terminals[0 if which == 0 else row[worst] + 1]
+            raise _too_low(low.name, float(time[worst]), float(heights[which, worst]), earth) from None
 
     def clearance(time: Floats, row: Rows) -> Floats:
-        first = orbit.states(time).position_m
-        second = np.empty_like(first)
-        for index in np.unique(row):
-            chosen = row == index
-            second[:, chosen] = others[index].orbit.states(time[chosen]).position_m
-        return earth.clearance_rad(first, second)
+        return checked(time, row, *_places(orbit, others, time, row))
 
     first = orbit.states(time_s).position_m
     values = np.empty((len(others), time_s.size))
     for index, other in enumerate(others):
-        try:
-            values[index] = earth.clearance_rad(first, other.at(time_s).position_m)
-        except OrbitError as error:
-            raise OrbitError(f"{orbit.name} (first) and {other.orbit.name} (second): {error}") from None
+        values[index] = checked(time_s, np.full(time_s.size, index), first, other.at(time_s).position_m)
     return positive_rows(clearance, time_s, values)
+
+
+def _places(orbit: Orbit, others: Sequence[Sampled], time: Floats, row: Rows) -> tuple[Floats, Floats]:
+    """Where an orbit is at each time, and where the other of that row is."""
+    first = orbit.states(time).position_m
+    second = np.empty_like(first)
+    for index in np.unique(row):
+        chosen = row == index
+        second[:, chosen] = others[index].orbit.states(time[chosen]).position_m
+    return first, second
+
+
+def _in_reach(
+    orbit: Orbit, others: Sequence[Sampled], furthest_m: float, time_s: Floats
+) -> tuple[tuple[Intervals, ...], ...]:
+    """When each of the others is nearer than the limit: one set of intervals for each, or none without a limit."""
+    if furthest_m == math.inf or not others:
+        return ()
+
+    def spare(first: Floats, second: Floats) -> Floats:
+        apart = second - first
+        return np.asarray(1.0 - dot(apart, apart) / furthest_m**2)
+
+    first = orbit.states(time_s).position_m
+    values = np.stack([spare(first, other.at(time_s).position_m) for other in others])
+    return (positive_rows(lambda time, row: spare(*_places(orbit, others, time, row)), time_s, values),)
+
+
+def _too_low(name: str, time_s: float, height_m: float, earth: Earth) -> OrbitError:
+    if math.isnan(height_m):
+        return OrbitError(f"the position of {name} at {time_s:.9g} s is not a number; check its orbit")
+    return OrbitError(
+        f"{name} is {height_m / 1e3:.3f} km over the Earth at {time_s:.9g} s, not above the "
+        f"{earth.grazing_height_m / 1e3:.6g} km that lines of sight must clear; lower orbit.grazing_height, or raise "
+        "the orbit"
+    )
 
 
 def _combined(kept: Sequence[Condition], span_s: Span) -> tuple[Contact, ...]:

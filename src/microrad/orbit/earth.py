@@ -67,6 +67,12 @@ class Earth:
                 "height below which the air is not to be crossed, for example 100 km"
             )
 
+    def height_m(self, position_m: Floats) -> Floats:
+        """Height of positions of shape (3, n) over the figure itself: geodetic over the oblate Earth."""
+        if self.shape == "oblate":
+            return subpoint(position_m, np.zeros(())).height_m
+        return np.asarray(np.sqrt(_square(np.asarray(position_m, dtype=np.float64))) - EARTH_RADIUS_M)
+
     def clearance_rad(self, first_m: Floats, second_m: Floats) -> Floats:
         """Angle by which the line of sight between two terminals clears the surface: above 0 it is free.
 

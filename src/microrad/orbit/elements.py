@@ -161,7 +161,7 @@ class Sgp4Orbit:
             state = "expired" if age_s > 0 else "not valid yet"
             raise OrbitError(
                 f"{self._where()}: the elements are {state}: their epoch is {self.elements.epoch.text}, the "
-                f"mission's {self.epoch.text}, and {self.epoch.utc(furthest)} is {abs(age_s) / DAY_S:.1f} days from "
+                f"mission's {self.epoch.text}, and {self.epoch.utc(furthest)} is {abs(age_s) / DAY_S:.2f} days from "
                 f"the elements; SGP4 is trusted for {MOST_ELEMENTS_AGE_S / DAY_S:.0f} days: take "
                 f"{'newer' if age_s > 0 else 'older'} elements, or set orbit.epoch near theirs"
             )

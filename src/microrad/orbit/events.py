@@ -236,21 +236,30 @@ def _next_share(a: Floats, b: Floats, c: Floats, fa: Floats, fb: Floats, fc: Flo
 def largest(function: Function, windows: Intervals, step_s: float) -> tuple[Floats, Floats]:
     """Time and value of the largest value in each of the windows (k, 2), ends included.
 
-    The function must have at most one maximum in twice `step_s`. The time is within `SHORTEST_S`.
+    The function must have at most one maximum in twice `step_s`. The time is within `SHORTEST_S`. All windows are
+    searched at once: `step_s` or finer first, then `_CUT` pieces of the two steps about the largest value.
     """
-    best = [_largest_in(function, float(start), float(end), step_s) for start, end in windows]
-    return np.array([time for time, _ in best]), np.array([value for _, value in best])
-
-
-def _largest_in(function: Function, start: float, end: float, step_s: float) -> tuple[float, float]:
-    times = np.linspace(start, end, max(int(np.ceil((end - start) / step_s)) + 1, _CUT))
-    while True:
-        values = function(times)
-        at = int(np.argmax(values))
-        low, high = times[max(at - 1, 0)], times[min(at + 1, times.size - 1)]
-        if high - low <= SHORTEST_S:
-            return float(times[at]), float(values[at])
+    if not windows.size:
+        return np.empty(0), np.empty(0)
+    cuts = [max(int(np.ceil((end - start) / step_s)) + 1, _CUT) for start, end in windows]
+    samples = [np.linspace(start, end, cut) for (start, end), cut in zip(windows, cuts, strict=True)]
+    levels = np.split(function(np.concatenate(samples)), np.cumsum(cuts)[:-1])
+    about = [time[_neighbours(int(np.argmax(level)), time.size)] for time, level in zip(samples, levels, strict=True)]
+    low, when, high = np.array(about).T
+    value = np.array([np.max(level) for level in levels])
+    each = np.arange(when.size)
+    while np.any(high - low > SHORTEST_S):
         times = np.linspace(low, high, _CUT + 1)
+        values = function(times.ravel()).reshape(times.shape)
+        at = np.argmax(values, axis=0)
+        value = values[at, each]
+        low, when, high = times[_neighbours(at, _CUT + 1), each]
+    return when, value
+
+
+def _neighbours(at: int | Rows, count: int) -> Rows:
+    """The places before, at and after `at` among `count`, the ends their own neighbours."""
+    return np.stack((np.maximum(at - 1, 0), np.asarray(at), np.minimum(at + 1, count - 1)))
 
 
 # ------------------------------------------------------------------------------------------------------ finer sampling

@@ -46,7 +46,8 @@ def sight(first: Orbit, second: Orbit, time_s: ArrayLike) -> LineOfSight:
 
     With the relative position p, velocity v and acceleration a, w = p x v / p^2 turns the line, and
     dw/dt = p x a / p^2 - 2 (p . v) / p^2 w. The acceleration is that of gravity with the flattening (J2); thrust, drag,
-    Sun and Moon, together below a ten-thousandth of it, are left out.
+    Sun and Moon, together below a ten-thousandth of it, are left out. An orbit without the
+    periodic terms of J2 (two bodies, or mean elements) has an acceleration of its own, up to 0.3 % off.
 
     Raises `OrbitError` where both are at the same place, and what the orbits raise.
     """

@@ -5,6 +5,7 @@ Mean-elements messages and ephemeris messages share both notations. Source: CCSD
 
 import math
 import re
+import stat
 from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
@@ -37,17 +38,18 @@ class Field(NamedTuple):
 def read_text(path: Path) -> str:
     """Text of a file in UTF-8, lines ending in a newline; raises `OrbitError` for one that is none, or too large."""
     try:
-        if not path.is_file():
-            raise OrbitError(f"{path}: there is no such file; check the path, relative to the current folder")
-        size = path.stat().st_size
-        if size > MOST_BYTES:
-            raise OrbitError(
-                f"{path}: {size / 1e6:.0f} MB, more than the {MOST_BYTES / 1e6:.0f} MB that are read; keep only the "
-                "satellites and the days that the mission needs"
-            )
+        _check_file(path)
         data = path.read_bytes()
+    except OrbitError:
+        raise
+    except (FileNotFoundError, NotADirectoryError, ValueError):  # the last for a name that holds a NUL
+        tried = "" if path.is_absolute() else f" ({path.absolute()} was tried)"
+        raise OrbitError(
+            f"{path}: there is no such file{tried}; check the path: a name in a mission is seen from the mission file"
+        ) from None
     except OSError as error:
-        raise OrbitError(f"{path}: cannot be read ({error.strerror}); check the permissions of the file") from None
+        what = "permissions of the file and of its folders" if isinstance(error, PermissionError) else "path"
+        raise OrbitError(f"{path}: cannot be read ({error.strerror}); check the {what}") from None
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -55,8 +57,24 @@ def read_text(path: Path) -> str:
     if "\0" in text:
         raise _binary(path, data.index(b"\0"))
     if not text.strip():
-        raise OrbitError(f"{path}: the file is empty; download or export it again")
+        raise OrbitError(f"{path}: the file holds blanks and nothing else; download or export it again")
     return text.replace("\r\n", "\n").replace("\r", "\n")
+
+
+def _check_file(path: Path) -> None:
+    """Refuse what is no file, an empty one and one too large; raises what asking the system for it raises."""
+    found = path.stat()
+    if stat.S_ISDIR(found.st_mode):
+        raise OrbitError(f"{path}: this is a folder; name the file in it")
+    if not stat.S_ISREG(found.st_mode):
+        raise OrbitError(f"{path}: this is a device or a pipe; give a file with an orbit")
+    if found.st_size == 0:
+        raise OrbitError(f"{path}: the file is empty; download or export it again")
+    if found.st_size > MOST_BYTES:
+        raise OrbitError(
+            f"{path}: {found.st_size / 1e6:.0f} MB, more than the {MOST_BYTES / 1e6:.0f} MB that are read; keep only "
+            "the satellites and the days that the mission needs"
+        )
 
 
 def _binary(path: Path, byte: int) -> OrbitError:

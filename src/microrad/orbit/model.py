@@ -55,7 +55,7 @@ def pair(m: LinkMission, folder: Path) -> Pair:
     for end, name in zip(("leo", "geo"), names, strict=True):
         try:
             one = terminal(getattr(orbits, end), name, epoch, folder)
-            tail = min(tail, _tail(one.orbit, orbits.duration_s))
+            tail = min(tail, _tail(one.orbit, epoch, orbits.duration_s))
         except OrbitError as error:
             raise OrbitError(f"orbit.{end}: {error}") from None
         found.append(one)
@@ -81,10 +81,10 @@ def earth(orbits: Orbits) -> Earth:
     return Earth(orbits.earth, orbits.grazing_height_m)
 
 
-def _tail(orbit: Orbit, duration_s: float) -> float:
+def _tail(orbit: Orbit, epoch: Epoch, duration_s: float) -> float:
     """How far behind the span an orbit holds; raises `OrbitError` where it does not hold over it."""
     if not isinstance(orbit, Sgp4Orbit | EphemerisOrbit):
-        return TAIL_S
+        return TAIL_S if _tabulated(epoch, duration_s + TAIL_S) else 0.0
     orbit.require(0.0, duration_s)
     if isinstance(orbit, Sgp4Orbit):
         tail = min(TAIL_S, max(MOST_ELEMENTS_AGE_S - orbit.elements_age_s - duration_s, 0.0))
@@ -94,6 +94,15 @@ def _tail(orbit: Orbit, duration_s: float) -> float:
             return 0.0
         return tail
     return min(TAIL_S, max(orbit.span_s[1] - duration_s, 0.0))
+
+
+def _tabulated(epoch: Epoch, time_s: float) -> bool:
+    """Whether the rotation of the Earth is known at that time."""
+    try:
+        epoch.utc(time_s)
+    except OrbitError:
+        return False
+    return True
 
 
 def terminal(t: OrbitTable, name: str, epoch: Epoch, folder: Path) -> Terminal:
@@ -175,6 +184,11 @@ def _names(sets: Sequence[ElementSet], path: Path) -> list[str]:
     return names
 
 
+def repeats(c: Constellation, m: LinkMission) -> bool:
+    """Whether the constellation has satellites: from a file, or from elements that its pattern can repeat."""
+    return c.pattern == "file" or table(m).leo.kind in ("circular", "keplerian")
+
+
 def satellites(c: Constellation, m: LinkMission, epoch: Epoch, folder: Path) -> Iterator[Terminal]:
     """The satellites of a constellation, one after the other, each limited as the mission's own is.
 
@@ -191,6 +205,11 @@ def satellites(c: Constellation, m: LinkMission, epoch: Epoch, folder: Path) -> 
             yield Terminal(own, shared, name)
         return
     assert c.satellites is not None and c.planes is not None and c.phasing is not None
+    if not repeats(c, m):
+        raise OrbitError(
+            f'constellation.pattern is "{c.pattern}", and orbit.leo of kind "{table(m).leo.kind}" has nothing to '
+            'repeat: give pattern = "file", or an orbit.leo of kind "circular" or "keplerian"'
+        )
     base, turn = _kepler(table(m).leo, "", epoch), 2.0 * math.pi
     each, round_rad = c.satellites // c.planes, turn if c.pattern == "delta" else turn / 2.0
     for plane in range(c.planes):

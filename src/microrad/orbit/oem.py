@@ -23,6 +23,9 @@ DEFAULT_DEGREE = 7
 DEGREES = (3, 25)
 """Degrees of interpolation that are taken: below, the track between points is not an orbit's; above, rounding grows."""
 
+MOST_STEPS = 10.0
+"""Longest step between two state vectors that is interpolated over, in median steps of their segment."""
+
 _RADII_M = (6_356_000.0, 1.5e9)  # from the surface at the poles to where the Earth's gravity ceases to lead
 _REQUIRED = ("OBJECT_NAME", "OBJECT_ID", "CENTER_NAME", "REF_FRAME", "TIME_SYSTEM", "START_TIME", "STOP_TIME")
 _COLUMNS = ("X", "Y", "Z", "X_DOT", "Y_DOT", "Z_DOT")
@@ -55,7 +58,8 @@ def read_oem(path: Path, epoch: Epoch, name: str | None = None) -> EphemerisOrbi
     Time systems: UTC, TAI, TT, GPS. Frames: TEME, TOD, EME2000 (J2000), GCRF, ICRF, and ITRF without polar motion;
     velocities of ITRF gain the Earth's rotation. Interpolation: LAGRANGE (degree + 1 state vectors) or HERMITE
     ((degree + 1) / 2, rounded up); Hermite of degree 7 when the file names none. Covariances and accelerations are
-    passed over. Raises `OrbitError` with file, line and value for all else.
+    passed over. Raises `OrbitError` with file, line and value for all else, and for a hole within the usable times of a
+    segment: a step of more than `MOST_STEPS` median ones.
     """
     text = read_text(path)
     drafts = list(_xml_drafts(path, text) if text.lstrip().startswith("<") else _kvn_drafts(path, text))
@@ -224,6 +228,7 @@ def _segment(path: Path, draft: _Draft, epoch: Epoch) -> Segment:
     values = 1000.0 * np.array(draft.values).T
     states = to_teme(_frame(draft.metadata), epoch, time, values)
     start, stop = _usable(path, draft, epoch, time)
+    _check_holes(path, draft, time, (start, stop))
     return Segment(time, states.position_m, states.velocity_m_s, method, points, start, stop)
 
 
@@ -249,6 +254,21 @@ def _check_rows(path: Path, draft: _Draft, time: Floats) -> None:
         raise OrbitError(
             f"{path}, {draft.places[bad[0]]}: {radius[bad[0]] / 1000.0:.6g} km from the Earth's centre, where no "
             "satellite of the Earth is; positions are in km and velocities in km/s"
+        )
+
+
+def _check_holes(path: Path, draft: _Draft, time: Floats, usable: tuple[float, float]) -> None:
+    """Refuse a segment that would be interpolated over a hole between its state vectors."""
+    step = np.diff(time)
+    median = float(np.median(step))
+    used = (time[1:] > usable[0] + SLACK_S) & (time[:-1] < usable[1] - SLACK_S)
+    holes = np.flatnonzero(used & (step > MOST_STEPS * median))
+    if holes.size:
+        k = int(holes[0])
+        raise OrbitError(
+            f"{path}, {draft.places[k + 1]}: no state vector between {draft.times[k]} ({draft.places[k]}) and "
+            f"{draft.times[k + 1]}, {step[k]:.6g} s apart, where the usual step of the segment is {median:.6g} s; over "
+            "such a hole the orbit is not known: split the segment into two there, or take a file without the hole"
         )
 
 

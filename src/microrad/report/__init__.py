@@ -10,7 +10,7 @@ import numpy as np
 
 from microrad.constellation import ConstellationPlan
 from microrad.folder import MANIFEST, FolderError, check_folder, whole_folder
-from microrad.operations import contact_plan, csv_text
+from microrad.operations import csv_text
 from microrad.report.identification import ReportError, check_identification, write_identification
 from microrad.report.identification_words import identification_data, identification_text
 from microrad.report.words import summary, verdict_text
@@ -64,7 +64,7 @@ def write(
 def write_plan(plan: ConstellationPlan, folder: Path) -> None:
     """The sessions of a constellation for a spreadsheet, and as a contact plan."""
     (folder / "sessions.csv").write_text(csv_text(plan.planned, plan.epoch.utc) + "\n", encoding="utf-8")
-    (folder / "contact-plan.ionrc").write_text(contact_plan(plan.planned, plan.epoch.utc) + "\n", encoding="utf-8")
+    (folder / "contact-plan.ionrc").write_text(plan.contact_plan() + "\n", encoding="utf-8")
 
 
 def write_columns(columns: dict[str, Any], path: Path) -> None:

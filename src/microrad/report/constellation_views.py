@@ -6,7 +6,7 @@ import numpy as np
 
 from microrad.constellation import ConstellationPlan
 from microrad.report.day_words import duration, volume
-from microrad.report.tables import tables_text
+from microrad.report.tables import Table, tables_text
 
 MOST_ROWS = 40
 """Satellites of a table; there may be thousands."""
@@ -19,10 +19,13 @@ def sentences(plan: ConstellationPlan) -> list[str]:
     seen = float(np.sum(plan.opportunities.end_s - plan.opportunities.start_s))
     span = plan.span_s[1] - plan.span_s[0]
     used = ", ".join(f"{name} {100 * use:.0f} %" for name, use in zip(plan.relays, plan.use, strict=True))
+    satellites = "1 satellite shares" if len(plan.satellites) == 1 else f"{len(plan.satellites)} satellites share"
+    relays = "1 relay" if len(plan.relays) == 1 else f"{len(plan.relays)} relays"
+    each = "" if len(plan.relays) == 1 else " each"
     terminals = "one terminal" if plan.terminals == 1 else f"{plan.terminals} terminals"
     views, busy = plan.opportunities.start_s.size, float(np.sum(plan.by_satellite.busy_s))
     return [
-        f"{len(plan.satellites)} satellites share {len(plan.relays)} relays of {terminals} each: in {duration(span)} "
+        f"{satellites} {relays} of {terminals}{each}: in {duration(span)} "
         f"{views} contacts in reach, {seen / 3600.0:.0f} h in all, of which {len(plan.planned)} sessions take "
         f"{busy / 3600.0:.0f} h and carry {volume(plan.volume_bit)}.",
         f"A satellite has data for {duration(float(np.min(served)))} to {duration(float(np.max(served)))}, and waits "
@@ -44,7 +47,7 @@ def text(plan: ConstellationPlan, width: int) -> str:
     found, shown = rows(plan), sentences(plan)
     if len(found) > MOST_ROWS:
         shown.append(f"The first {MOST_ROWS} of {len(found)} satellites; --csv has every session.")
-    return tables_text([("What each satellite gets", COLUMNS, found[:MOST_ROWS])], shown, width)
+    return tables_text([Table("What each satellite gets", COLUMNS, found[:MOST_ROWS], (0,))], shown, width)
 
 
 def data(plan: ConstellationPlan) -> dict[str, Any]:

@@ -1,6 +1,7 @@
 """Figure of what each assumption decides: bars about the value as assumed."""
 
 import math
+import textwrap
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -14,13 +15,15 @@ from microrad.report.day_figures import GREY, PLAIN, WIDTH, empty, short
 from microrad.report.figures import BLACK, BLUE, ORANGE, Figure, svg_of
 
 MOST_BARS = 14
-_LONGEST_LABEL = 60
+_LINE = 44  # characters
+_MOST_LABEL = 1000
 
 
 class Assumed(NamedTuple):
     """What one assumption does to a number: that number with the assumption at its lower and at its higher value.
 
-    ``label`` names the assumption and both of its values. A number may be infinite, or nan where there is none.
+    ``label`` names the assumption and its values, a side that is as assumed left out. A number may be infinite, or nan
+    where there is none.
     """
 
     label: str
@@ -47,13 +50,25 @@ def assumptions(swings: Sequence[Assumed], value: float, quantity: str) -> Figur
 
 
 def _tornado(shown: Sequence[Assumed], value: float, label: str) -> str:
-    canvas = Canvas(figsize=(WIDTH, 1.0 + 0.27 * len(shown)), layout="constrained")
+    labels = [in_lines(s.label) for s in shown]
+    most = max(label.count("\n") + 1 for label in labels)
+    canvas = Canvas(figsize=(WIDTH, 1.0 + max(0.27, 0.14 * most + 0.06) * len(shown)), layout="constrained")
     axes = canvas.subplots()
-    swing_bars(axes, [short(s.label, _LONGEST_LABEL) for s in shown], [(s.low, s.high) for s in shown], value)
+    swing_bars(axes, labels, [(s.low, s.high) for s in shown], value)
     axes.set_xlabel(label)
     keys = [Patch(color=ORANGE, label="assumption lower"), Patch(color=BLUE, label="assumption higher")]
     canvas.legend(handles=keys, loc="outside upper center", ncols=2, fontsize=8)
     return svg_of(canvas)
+
+
+def in_lines(label: str) -> str:
+    """A label too long for its line in several: broken behind the assumption, then between its values."""
+    lines = [short(label, _MOST_LABEL)]
+    for mark in (": ", " / "):
+        head, found, tail = lines[-1].partition(mark)
+        if found and len(lines[-1]) > _LINE:
+            lines[-1:] = [head + mark.rstrip(), tail]
+    return "\n".join(textwrap.fill(line, _LINE, max_lines=2, placeholder="…") for line in lines)
 
 
 def _swing(each: Assumed, value: float) -> float:

@@ -22,8 +22,10 @@ WIDTH = 7.6
 _NONE = np.empty(0)
 _IN_GREY: dict[str, Any] = {"ha": "center", "va": "center", "color": GREY}
 _STATES = {"data": BLUE, "loss": VERMILION}  # the other states take the colours that are left
-_TICKS_S = {0.1: "0.1 s", 1.0: "1 s", 10.0: "10 s", 60.0: "1 min", 600.0: "10 min", 3600.0: "1 h", 2.16e4: "6 h"}
-_TICKS_S |= {8.64e4: "1 d", 6.048e5: "7 d"}
+_UNITS_S = {"ms": 1e-3, "s": 1.0, "min": 60.0, "h": 3600.0, "d": 86400.0}
+_WIDE = {"ms": (1, 10), "s": (0.1, 1, 10), "min": (1, 10), "h": (1, 6), "d": (1, 7, 30)}
+_DENSE = {"ms": (1, 2, 5, 10, 20, 50, 100, 200, 500), "s": (1, 2, 5, 10, 20, 30), "min": (1, 2, 5, 10, 20, 30)}
+_DENSE |= {"h": (1, 2, 3, 6, 12), "d": (1, 2, 4, 7, 14, 30, 60, 120, 240)}
 _HOURS = (0.1, 0.25, 0.5, 1.0, 2.0, 3.0, 4.0, 6.0, 12.0, 24.0, 48.0, 96.0, 168.0)
 
 
@@ -169,9 +171,16 @@ def _errors(axes: Axes, windows: Windows, required_rad: float | None) -> None:
 
 @rc_context(PLAIN)
 def along_contact(
-    time_s: Floats, range_m: Floats, point_ahead_rad: Floats, rate_rad_s: Floats, doppler_hz: Floats
+    time_s: Floats,
+    range_m: Floats,
+    point_ahead_rad: Floats,
+    rate_rad_s: Floats,
+    doppler_hz: Floats,
+    *,
+    number: int,
+    rise_utc: str,
 ) -> Figure:
-    """What one contact asks of the terminals, each (n,), over the time since its rise."""
+    """What one contact asks of the terminals, each (n,), over the time since its rise; ``number`` counts from 1."""
     panels = {
         "range (m)": ("range (km)", range_m, 1e-3),
         "point-ahead (rad)": ("point-ahead angle (µrad)", point_ahead_rad, 1e6),
@@ -180,8 +189,11 @@ def along_contact(
     }
     svg = _along_contact(time_s / 60.0, [*panels.values()]) if time_s.size else empty("no contact in this span")
     columns = {"time since rise (s)": time_s} | {heading: values for heading, (_, values, _) in panels.items()}
-    caption = "Range, point-ahead angle, inertial rate of the line of sight and Doppler shift over one contact."
-    return Figure("along-contact", "Along a contact", caption, svg, columns)
+    caption = (
+        f"Range, point-ahead angle, inertial rate of the line of sight and Doppler shift over contact {number}, "
+        f"which rises at {rise_utc} UTC."
+    )
+    return Figure("along-contact", f"Along contact {number}", caption, svg, columns)
 
 
 def _along_contact(minutes: Floats, panels: Sequence[tuple[str, Floats, float]]) -> str:
@@ -295,6 +307,21 @@ def _latency_axes(axes: Axes, least_s: float, most_s: float) -> None:
     for level in (50.0, 99.0):
         axes.axhline(level, color=GREY, linewidth=0.7, linestyle=":")
     axes.set(xscale="log", xlabel="time from recording to delivery", ylabel="share of the data (%)", ylim=(0.0, 101.0))
-    axes.set_xlim(max(least_s / 1.5, most_s * 1e-7), most_s * 1.5)
-    axes.set_xticks([*_TICKS_S], [*_TICKS_S.values()])
+    begin, end = _round_below(max(least_s / 2.0, most_s * 1e-7)), most_s * 1.2
+    ticks = _durations(_WIDE, begin, end)
+    ticks = ticks if len(ticks) > 3 else _durations(_DENSE, begin, end)
+    axes.set_xticks([*ticks], [*ticks.values()])  # widens the limits to its ticks
+    axes.set_xlim(begin, end)
     axes.minorticks_off()
+
+
+def _round_below(value: float) -> float:
+    """The next of 1, 2, 5 times a power of ten that is not above a positive value."""
+    power = 10.0 ** math.floor(math.log10(value))
+    return power * next(step for step in (5.0, 2.0, 1.0) if step * power <= value or step == 1.0)
+
+
+def _durations(of: Mapping[str, Sequence[float]], begin_s: float, end_s: float) -> dict[float, str]:
+    """Those of some round lengths of time that lie within both, with their words."""
+    found = {count * _UNITS_S[unit]: f"{count:g} {unit}" for unit, counts in of.items() for count in counts}
+    return {time_s: words for time_s, words in found.items() if begin_s <= time_s <= end_s}

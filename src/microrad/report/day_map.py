@@ -2,7 +2,7 @@
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from importlib import resources
 from typing import Any, NamedTuple
 
@@ -15,13 +15,14 @@ from matplotlib.patches import Patch, PathPatch
 from matplotlib.path import Path
 from numpy.typing import NDArray
 
-from microrad.report.day_figures import PLAIN, short
+from microrad.report.day_figures import PLAIN, duration, short
 from microrad.report.figures import BLACK, BLUE, GREEN, ORANGE, SKY, VERMILION, Figure, Floats, svg_of
 
 LAND, COAST, SHADE = "#e9e6df", "#b5b0a5", "#0072B21F"
 _HALF_TURN = 180.0
 _TURN = 360.0
 _OVER_A_POLE = 60.0  # degrees: beyond this latitude, so wide a step in longitude goes over the pole
+_THIN = 0.7  # line of a relay that moves
 _CONTACT = (SKY, ORANGE, GREEN)
 _FRAME = ((-180.0, -90.0), (-180.0, 90.0), (180.0, 90.0), (180.0, -90.0), (-180.0, -90.0))
 
@@ -49,6 +50,16 @@ class Marked(NamedTuple):
     place: Places
     outline: Places
 
+    @property
+    def outlined(self) -> bool:
+        """Whether there is an outline."""
+        return self.outline.latitude_rad.size > 0
+
+    @property
+    def moves(self) -> bool:
+        """Whether there is a way instead of one point."""
+        return self.place.latitude_rad.size > 1
+
 
 @rc_context(PLAIN)
 def world_map(
@@ -56,8 +67,12 @@ def world_map(
     contact: Mapping[str, NDArray[np.bool_]],
     relays: Mapping[str, Marked],
     stations: Mapping[str, Marked],
+    first_s: float | None = None,
 ) -> Figure:
-    """Ground track, its parts in contact (a name and (n,) flags of the track's points), relays and stations."""
+    """Ground track, its parts in contact (a name and (n,) flags of the track's points), relays and stations.
+
+    ``first_s`` is the time that the track takes, where it is the beginning of a longer span only.
+    """
     canvas = Canvas(figsize=(7.6, 4.6), layout="constrained")
     axes = canvas.subplots()
     _earth(axes)
@@ -68,27 +83,50 @@ def world_map(
         _marked(axes, name, relay, BLUE, "D")
     for name, station in stations.items():
         _marked(axes, name, station, VERMILION, "^")
-    canvas.legend(handles=_entries(axes, bool(relays), bool(stations)), loc="outside lower center", ncols=3, fontsize=8)
+    canvas.legend(
+        handles=_entries(axes, [*relays.values()], [*stations.values()]),
+        loc="outside lower center",
+        ncols=3,
+        fontsize=8,
+    )
     columns = _columns("track", track) | {f"in contact: {name}": flags.astype(float) for name, flags in contact.items()}
     for name, each in (*relays.items(), *stations.items()):
         columns |= _columns(name, each.place) | _columns(f"{name}, outline", each.outline)
-    caption = (
-        "Ground track of the satellite, thick where it is in contact. "
-        "A satellite at its altitude has no line of sight to the relay over the shaded region of that relay, "
-        "and sees a station above the lowest elevation inside that station's circle. Land: Natural Earth."
-    )
+    caption = _caption([*relays.values()], [*stations.values()], first_s)
     return Figure("world-map", "Ground track, relays and stations", caption, svg_of(canvas), columns)
 
 
-def _entries(axes: Axes, relays: bool, stations: bool) -> list[Any]:
+def _caption(relays: Sequence[Marked], stations: Sequence[Marked], first_s: float | None) -> str:
+    """What is drawn, and nothing else."""
+    part = "" if first_s is None else f" in the first {duration(first_s)} of the span"
+    said = [f"Ground track of the satellite{part}, thick where it is in contact."]
+    if any(r.outlined for r in relays):
+        said.append("At its altitude a satellite over the shaded region has no line of sight to the relay.")
+    if any(r.moves for r in relays):
+        said.append("The relay moves: marked where it is at the start, with its own ground track as a thin line.")
+    if any(s.outlined for s in stations):
+        said.append("Inside a station's circle the satellite is above the lowest elevation of that station.")
+    return " ".join([*said, "Land: Natural Earth."])
+
+
+def _entries(axes: Axes, relays: Sequence[Marked], stations: Sequence[Marked]) -> list[Any]:
     """What the legend explains: the track and its parts, then what a relay's and a station's marks mean."""
     handles, _ = axes.get_legend_handles_labels()
-    white: dict[str, Any] = {"markeredgecolor": "white", "markersize": 7}
-    if relays:
+
+    def mark(label: str, **style: Any) -> Line2D:
+        return Line2D([], [], label=label, markeredgecolor="white", markersize=7, **style)
+
+    if any(r.outlined for r in relays):
         handles.append(Patch(color=SHADE, label="hidden from a relay"))
-        handles.append(Line2D([], [], color=BLUE, ls="--", lw=1, marker="D", label="relay, limit of its view", **white))
-    if stations:
-        handles.append(Line2D([], [], color=VERMILION, lw=1, marker="^", label="station, its horizon", **white))
+        handles.append(mark("relay, limit of its view", color=BLUE, marker="D", linewidth=1.0, linestyle="--"))
+    if any(r.moves for r in relays):
+        handles.append(mark("relay at the start, its track", color=BLUE, marker="D", linewidth=_THIN))
+    if any(not r.outlined and not r.moves for r in relays):
+        handles.append(mark("relay", color=BLUE, marker="D", linestyle=""))
+    if any(s.outlined for s in stations):
+        handles.append(mark("station, its horizon", color=VERMILION, marker="^", linewidth=1.0))
+    if any(not s.outlined for s in stations):
+        handles.append(mark("station", color=VERMILION, marker="^", linestyle=""))
     return handles
 
 
@@ -160,7 +198,7 @@ def _marked(axes: Axes, name: str, each: Marked, colour: str, marker: str) -> No
     """Marker, name, outline, and the way of a sub-satellite point that moves."""
     x, y = each.place.degrees
     axes.plot(*broken(*each.outline.degrees), color=colour, linewidth=1.0, linestyle="-" if marker == "^" else "--")
-    axes.plot(*broken(x, y), color=colour, linewidth=1.0)
+    axes.plot(*broken(x, y), color=colour, linewidth=_THIN)
     axes.plot(x[:1], y[:1], marker, color=colour, markeredgecolor="white", markersize=7, zorder=4, clip_on=False)
     side = -1 if x[0] > 120.0 else 1
     box = {"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 0.8}
@@ -182,7 +220,7 @@ def _marked(axes: Axes, name: str, each: Marked, colour: str, marker: str) -> No
 
 def _hidden(axes: Axes, relay: Marked) -> None:
     """Shade the side of the outline on which the relay's sub-satellite point is not."""
-    if relay.outline.latitude_rad.size:
+    if relay.outlined:
         axes.add_patch(PathPatch(other_side(relay), color=SHADE, linewidth=0.0, zorder=1.0))
 
 

@@ -6,8 +6,8 @@ import numpy as np
 
 from microrad import orbit
 from microrad.contact_run import ContactRun
-from microrad.day_study import DayStudy, Way, times
-from microrad.day_study.ground_track import Outline, ground_track
+from microrad.day_study import NOTHING, DayStudy, Swing, Way, times
+from microrad.day_study.ground_track import LONGEST_S, Outline, ground_track
 from microrad.report import day_assumptions, day_figures, day_map
 from microrad.report.figures import Figure, Floats
 
@@ -45,12 +45,23 @@ def _along(day: DayStudy) -> list[Figure]:
     if not day.view.encounters:
         return []
     o, found = day.mission.operations, day.view.encounters
-    asked = 1 if o is None or o.contact is None else o.contact.number
-    contact, pair = found[min(asked, len(found)) - 1].contact, day.view.pair
+    number = 1 if o is None or o.contact is None else o.contact.number
+    contact, pair = found[number - 1].contact, day.view.pair
     seen = orbit.sight(pair.leo.orbit, pair.geo.orbit, times(contact))
     doppler = seen.doppler_hz(day.mission.communication.wavelength_m)
     since_s = seen.time_s - contact.start_s
-    return [day_figures.along_contact(since_s, seen.range_m, seen.point_ahead_rad, seen.rate_rad_s, doppler)]
+    rise = pair.epoch.utc(contact.start_s)[:19].replace("T", " ")
+    return [
+        day_figures.along_contact(
+            since_s,
+            seen.range_m,
+            seen.point_ahead_rad,
+            seen.rate_rad_s,
+            doppler,
+            number=number,
+            rise_utc=rise,
+        )
+    ]
 
 
 def _volume(day: DayStudy) -> Figure:
@@ -82,13 +93,13 @@ def _map(day: DayStudy) -> Figure:
     o = day.mission.operations
     track = ground_track(day.view, _ways(day), None if o is None else o.downlink)
     places = day_map.Places(track.latitude_rad, track.longitude_rad)
-    return day_map.world_map(
-        places, track.open, dict([_marked(track.relay)]), dict(_marked(station) for station in track.stations)
-    )
+    relay, stations = dict([_marked(track.relay)]), dict(_marked(station) for station in track.stations)
+    first_s = LONGEST_S if day.view.duration_s > LONGEST_S else None
+    return day_map.world_map(places, track.open, relay, stations, first_s)
 
 
 def _marked(each: Outline) -> tuple[str, day_map.Marked]:
-    place = day_map.Places(np.array([each.latitude_rad]), np.array([each.longitude_rad]))
+    place = day_map.Places(each.latitude_rad, each.longitude_rad)
     return each.name, day_map.Marked(place, day_map.Places(each.around_latitude_rad, each.around_longitude_rad))
 
 
@@ -96,7 +107,7 @@ def _assumptions(day: DayStudy) -> Figure:
     direct = day.direct is not None
     bars = [
         day_assumptions.Assumed(
-            f"{s.name}: {s.low} / {s.high}",
+            _label(s),
             s.at_low.ratio if direct else s.at_low.relay_bit / 8e12,
             s.at_high.ratio if direct else s.at_high.relay_bit / 8e12,
         )
@@ -105,6 +116,12 @@ def _assumptions(day: DayStudy) -> Figure:
     if direct:
         return day_assumptions.assumptions(bars, day.ratio, "volume by relay over volume direct")
     return day_assumptions.assumptions(bars, day.relay.capacity_bit / 8e12, "volume by the relay (TB)")
+
+
+def _label(swing: Swing) -> str:
+    """The assumption and what it is changed to."""
+    changed = [side for side in (swing.low, swing.high) if side != NOTHING]
+    return f"{swing.name}: {' / '.join(changed)}" if changed else swing.name
 
 
 def _run(day: DayStudy, run: ContactRun) -> Figure:

@@ -2,6 +2,7 @@
 
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 
 from microrad.constellation import ConstellationPlan
 from microrad.contact_run import ContactRun
@@ -9,11 +10,14 @@ from microrad.day_study import DayStudy, Way
 from microrad.orbit import Contact
 from microrad.report.variables import coordinate, variable
 
+Floats = NDArray[np.float64]
+
 
 def datasets(day: DayStudy, run: ContactRun | None, plan: ConstellationPlan | None) -> dict[str, xr.Dataset]:
     """By group: "day/contacts", "day/relay" and the others that the study has."""
     found = {
         "day/contacts": _contacts(day),
+        "day/line_of_sight": _line_of_sight(day),
         "day/assumptions": _assumptions(day),
         f"day/{_group(day.relay)}": _way(day.relay),
     }
@@ -44,7 +48,7 @@ def _spans(contacts: tuple[Contact, ...]) -> dict[str, xr.Variable]:
 
 
 def _contacts(day: DayStudy) -> xr.Dataset:
-    dims, each = ("contact",), day.view.encounters
+    dims, each = ("contact",), day.encounters
     quantities = {
         "range_least": ("m", "smallest range", [e.range_least_m for e in each]),
         "range_most": ("m", "largest range", [e.range_most_m for e in each]),
@@ -56,6 +60,29 @@ def _contacts(day: DayStudy) -> xr.Dataset:
     }
     data = {name: variable(dims, values, unit, what) for name, (unit, what, values) in quantities.items()}
     return xr.Dataset({**_spans(tuple(e.contact for e in each)), **data})
+
+
+def _line_of_sight(day: DayStudy) -> xr.Dataset:
+    """Every contact in time, one after the other."""
+    dims, each = ("sample",), day.encounters
+    wavelength = day.mission.communication.wavelength_m
+    quantities = {
+        "time": ("s", "time since the epoch", [e.sight.time_s for e in each]),
+        "range": ("m", "range", [e.sight.range_m for e in each]),
+        "range_rate": ("m/s", "range rate, positive while they recede", [e.sight.range_rate_m_s for e in each]),
+        "doppler": ("Hz", "frequency received less sent", [e.sight.doppler_hz(wavelength) for e in each]),
+        "rate": ("rad/s", "angular rate of the line of sight", [e.sight.rate_rad_s for e in each]),
+        "acceleration": ("rad/s^2", "change of that rate, as a vector", [e.sight.acceleration_rad_s2 for e in each]),
+        "point_ahead": ("rad", "point-ahead angle", [e.sight.point_ahead_rad for e in each]),
+    }
+    number = [np.full(e.sight.time_s.size, float(k + 1)) for k, e in enumerate(each)]
+    data = {"contact": variable(dims, _joined(number), "1", "number of the contact in the span, from 1")}
+    data |= {name: variable(dims, _joined(parts), unit, what) for name, (unit, what, parts) in quantities.items()}
+    return xr.Dataset(data)
+
+
+def _joined(parts: list[Floats]) -> Floats:
+    return np.concatenate([np.zeros(0), *parts])
 
 
 def _passes(way: Way) -> xr.Dataset:

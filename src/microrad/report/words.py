@@ -6,7 +6,14 @@ from typing import Any
 from microrad.mission import Mission
 from microrad.missionfile import changed_from_shipped
 from microrad.performance import FINE, Cost
-from microrad.report import budget_views, constellation_views, contact_run_words, day_words, fine_pointing_words
+from microrad.report import (
+    budget_views,
+    constellation_views,
+    contact_run_words,
+    day_tables,
+    day_words,
+    fine_pointing_words,
+)
 from microrad.report.fine_pointing_data import data as fine_pointing_data
 from microrad.report.quantities import quantity
 from microrad.study import Study
@@ -138,6 +145,7 @@ def warnings(study: Study) -> list[str]:
     found += study.links.warnings
     if study.day is not None:
         found += study.day.warnings
+        found += _not_run(study)
     m = study.file.mission
     half, bias = m.scenario.loop_amplitude_v, m.mirror.bias_v
     if not m.mirror.drive_min_v <= bias - half <= bias + half <= m.mirror.drive_max_v:
@@ -166,6 +174,17 @@ def warnings(study: Study) -> list[str]:
     ]
     if study.fine_pointing is not None:
         found += fine_pointing_words.warnings(study.fine_pointing, m)
+    return found
+
+
+def _not_run(study: Study) -> list[str]:
+    """Tables of the day that this study has no use for, and why."""
+    m, found = study.file.mission, []
+    asked = m.operations is not None and m.operations.contact is not None
+    if asked and study.contact is None and study.day is not None and study.day.relay.contacts:
+        found.append("operations.contact is not run: it takes the tables acquisition and fine_pointing")
+    if m.constellation is not None and study.plan is None:
+        found.append("constellation is left out: its pattern cannot repeat an orbit.leo from a file, or a slot")
     return found
 
 
@@ -236,7 +255,7 @@ def summary(study: Study) -> dict[str, Any]:
             }
             for c in study.performance.costs
         ],
-        "day": None if study.day is None else day_words.data(study.day),
+        "day": None if study.day is None else day_tables.data(study.day),
         "contact": None if study.contact is None else contact_run_words.data(study.contact),
         "constellation": None if study.plan is None else constellation_views.data(study.plan),
         "fine_pointing": None if fine is None else fine_pointing_data(fine, m),
