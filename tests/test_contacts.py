@@ -767,7 +767,8 @@ def test_passes_agree_with_a_dense_grid(node, phase, latitude, mask):
         assert one.highest_rad == pytest.approx(float(at[0]), abs=1e-12)
 
 
-def test_a_contact_ends_where_the_partner_is_too_far(both=(leo(), SLOT)):
+def test_a_contact_ends_where_the_partner_is_too_far():
+    both = leo(), SLOT
     own, other = (free(each) for each in both)
     far = 42_000e3
     (near,) = contacts_with_each(own, (other,), ROUND, EPOCH, DAY, (), far)
