@@ -231,7 +231,8 @@ def test_rates_share_and_store(replaced, links, day):
 def test_the_papers_claim(links, day):
     relay, direct = day.relay, day.direct
     minutes = [c.duration_s / 60.0 for c in relay.contacts]
-    told(f"| {len(minutes)} contacts |", f"| {day.view.median_s / 60:.1f} min in the median, {min(minutes):.1f} to")
+    told(f"| the relay rises {day.view.rises} times; {len(minutes)} contacts, since the Sun cuts one in two |")
+    told(f"| {day.view.median_s / 60:.1f} min in the median, {min(minutes):.1f} to")
     told(f"to {max(minutes):.1f} min; {relay.contact_s / 60:.0f} min in all |")
     passes = [c.duration_s / 60.0 for c in direct.contacts]
     told(f"| {min(passes):.1f} to {max(passes):.1f} min above 5 deg at Kiruna, {len(passes)} of them,")

@@ -155,7 +155,7 @@ def against_paper(e: Evidence) -> tuple[Claim, ...]:
 
 def _day_claims(day: day_study.DayStudy) -> list[Claim]:
     """What the paper says of contacts, judged on the mission's own orbits."""
-    relay, direct, days = day.relay, day.direct, day.view.duration_s / 86400.0
+    relay, direct, days = day.relay, day.direct, day.view.days
     a_day, minutes = day.view.rises / days, day.view.median_s / 60.0
     claims = [
         Claim(

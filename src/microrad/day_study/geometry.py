@@ -62,6 +62,11 @@ class View:
         return self.pair.span_s[1]
 
     @property
+    def days(self) -> float:
+        """The span in days of 86 400 s."""
+        return self.duration_s / 86400.0
+
+    @property
     def contact_s(self) -> float:
         """Time in contact within the span."""
         return sum(e.contact.duration_s for e in self.encounters)

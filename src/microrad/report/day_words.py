@@ -35,13 +35,13 @@ def headline(day: DayStudy) -> list[str]:
     whole = day.mission.operations is None or day.mission.operations.relay_share == 1.0
     said = (
         f"In {span} the relay {'is in view' if whole else 'grants the link'} {_how_much(day, relay)}, and could take "
-        f"{volume(relay.capacity_bit)}{_a_day(day, volume(relay.capacity_bit / _days(day)))}"
+        f"{volume(relay.capacity_bit)}{_a_day(day, volume(relay.capacity_bit / day.view.days))}"
     )
     if day.direct is None:
         return [f"{said}."]
     d, down = day.direct, day.mission.operations.downlink if day.mission.operations else None
     stations = ", ".join(down.stations) if down else ""
-    carried = f"{volume(d.capacity_bit)}{_a_day(day, volume(d.capacity_bit / _days(day)))}"
+    carried = f"{volume(d.capacity_bit)}{_a_day(day, volume(d.capacity_bit / day.view.days))}"
     return [f"{said}; the ground ({stations}) {_how_much(day, d)}, and could take {carried}{_compared(day.ratio)}."]
 
 
@@ -61,7 +61,7 @@ def _how_much(day: DayStudy, way: Way) -> str:
     """Number and time of the contacts of a way."""
     if not way.contacts:
         return "never"
-    days = _days(day)
+    days = day.view.days
     a_day = _a_day(day, f"{times(len(way.contacts) / days)}, {contact_time(way.contact_s / days)}")
     return f"{times(len(way.contacts))}, {contact_time(way.contact_s)} in all{a_day}"
 
@@ -71,13 +71,9 @@ def contact_time(time_s: float) -> str:
     return f"{time_s / 60.0:.0f} min" if time_s < 6e4 else f"{time_s / 3600.0:.1f} h"
 
 
-def _days(day: DayStudy) -> float:
-    return day.view.duration_s / 86400.0
-
-
 def _a_day(day: DayStudy, said: str) -> str:
     """What that is in a day, where the span has more than one."""
-    return f" ({said} a day)" if _days(day) > 1.0 + 1e-9 else ""
+    return f" ({said} a day)" if day.view.days > 1.0 + 1e-9 else ""
 
 
 def contact_words(day: DayStudy) -> str:
