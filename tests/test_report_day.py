@@ -1,6 +1,7 @@
 """The day in the report: what the page says, its figures, its datasets, the contact in time, the plan of sessions."""
 
 import csv
+import hashlib
 import io
 import json
 from dataclasses import replace
@@ -15,7 +16,7 @@ from microrad.fine_loop.loop import assemble
 from microrad.fine_pointing import designs
 from microrad.missionfile import load_mission
 from microrad.operations import OperationsError
-from microrad.report import contact_run_words, day_plots, day_words
+from microrad.report import contact_run_words, day_plots, day_words, results
 from shipped import SHIPPED, edited_file
 
 FIGURES = ["day-timeline", "along-contact", "data-volume", "latency", "world-map", "assumptions"]
@@ -216,3 +217,16 @@ def test_a_mission_without_orbits_has_no_day(tmp_path, monkeypatch):
     assert not any("orbits a day" in c.claim for c in result.claims)
     page = report.write(result, tmp_path / "out").read_text(encoding="utf-8")
     assert "What the link delivers" not in page
+
+
+def test_the_manifest_has_the_hash_of_each_file_that_the_mission_names(found, tmp_path):
+    (tmp_path / "a.tle").write_bytes(b"elements")
+    m = found.file.mission
+    leo = m.orbit.leo.model_copy(update={"kind": "elements", "file": "a.tle"})
+    m = m.model_copy(update={"orbit": m.orbit.model_copy(update={"leo": leo})})
+    study = replace(found, file=replace(found.file, mission=m, path=tmp_path / "mission.toml"))
+    (tmp_path / "out").mkdir()
+    made = results.manifest(study, tmp_path / "out")
+    assert made["inputs_sha256"] == {"a.tle": hashlib.sha256(b"elements").hexdigest()}
+    assert "seed 1 of [operations], 20 runs" in made["randomness"]
+    assert results.manifest(found, tmp_path / "out")["inputs_sha256"] == {}
