@@ -298,3 +298,13 @@ def test_the_loss_is_the_jitters_where_the_mission_has_one(call, folder):
     assert plain["pointing_loss_source"].startswith("communication.pointing_error, 10 ")
     # the loss of the budget itself: a Gaussian beam 10 urad off its axis
     assert plain["pointing_loss_db"] == pytest.approx(2.23, abs=0.01)
+
+
+def test_where_nothing_goes_direct_the_relays_volume_is_what_matters(call, folder):
+    said = " ".join(call("contacts", path_of(folder, {"operations.downlink.setup": "1 h"})).out.split())
+    assert "could take 0 B" in said
+    assert (
+        "What matters most to the relay's volume, each assumption changed alone: laser data rate (150 Mbit/s:" in said
+    )
+    assert "nothing direct" not in said
+    assert "nothing arrives by the direct downlink" in said

@@ -163,9 +163,10 @@ def assumption_words(day: DayStudy) -> list[str]:
     """Which assumption matters most, for the volumes and for the latencies."""
     moving = [s for s in day.swings if s.factor > MATTERS]
     found = []
+    both = day.direct is not None and day.direct.capacity_bit > 0.0
     if moving:
-        what = "ratio of the two volumes" if day.direct is not None else "relay's volume"
-        named = "; ".join(f"{s.name} ({_ends(s, day.direct is not None)})" for s in moving[:3])
+        what = "ratio of the two volumes" if both else "relay's volume"
+        named = "; ".join(f"{s.name} ({_ends(s, both)})" for s in moving[:3])
         found.append(f"What matters most to the {what}, each assumption changed alone: {named}.")
     waits = sorted(day.swings, key=lambda s: -_wait_factor(s))
     if waits and _wait_factor(waits[0]) > MATTERS:
