@@ -78,11 +78,11 @@ def test_a_contact_that_never_locks_carries_nothing(lock_s):
 
 
 def test_one_rate_is_one_step():
-    everywhere = service(RateTable.fixed(3 * GBIT, INF), (10.0, 20.0), 10.0, swing, 1.0)
+    everywhere = service(RateTable((Step(3 * GBIT, INF),)), (10.0, 20.0), 10.0, swing, 1.0)
     assert (everywhere.edges_s.tolist(), everywhere.rate_bit_s.tolist()) == ([10.0, 20.0], [3 * GBIT])
-    near = service(RateTable.fixed(3 * GBIT, 40_000 * KM), (0.0, 7200.0), 0.0, swing, 1.0)
+    near = service(RateTable((Step(3 * GBIT, 40_000 * KM),)), (0.0, 7200.0), 0.0, swing, 1.0)
     np.testing.assert_allclose(near.edges_s, [0.0, 1800.0, 5400.0, 7200.0], atol=one_millisecond)
-    never = service(RateTable.fixed(3 * GBIT, 0.0), (0.0, 7200.0), 0.0, swing, 1.0)
+    never = service(RateTable((Step(3 * GBIT, 0.0),)), (0.0, 7200.0), 0.0, swing, 1.0)
     assert never.capacity_bit == 0.0
 
 
@@ -191,7 +191,7 @@ def test_a_store_by_hand():
     assert got.stored_bit.tolist() == [0.0, 500.0, 0.0, 0.0]
     assert got.delivered_bit.tolist() == [0.0, 0.0, 750.0, 1000.0]
     assert got.generated_bit.tolist() == [0.0, 500.0, 750.0, 1000.0]
-    assert (got.largest_stored_bit, got.link_capacity_bit, got.not_delivered_bit) == (500.0, 1500.0, 0.0)
+    assert (got.largest_stored_bit, np.sum(got.contact_capacity_bit), got.not_delivered_bit) == (500.0, 1500.0, 0.0)
     assert (got.contact_bit.tolist(), got.contact_capacity_bit.tolist()) == ([1000.0], [1500.0])
     assert got.delivered_share == 1.0
     # the first bit waits 50 s, the bit of 75 s none, linear between; a quarter does not wait at all
@@ -242,7 +242,7 @@ def test_without_production_or_without_a_contact_there_is_nothing_to_be_late():
     numbers = (nothing.delivered_share, nothing.latency.quantile(0.5), nothing.latency.mean_s, nothing.latency.cdf(9.0))
     assert all(math.isnan(x) for x in numbers)
     dark = deliver(Production(1.0, 0.0, 100.0), INF, [], (0.0, 100.0), 0.0)
-    assert (dark.not_delivered_bit, dark.link_capacity_bit, dark.latency.quantile(0.01)) == (100.0, 0.0, INF)
+    assert (dark.not_delivered_bit, np.sum(dark.contact_capacity_bit), dark.latency.quantile(0.01)) == (100.0, 0.0, INF)
     assert math.isnan(dark.latency.mean_s)
     assert dark.contact_bit.shape == (0,)
 
@@ -251,7 +251,7 @@ def test_outages_take_their_share_of_the_volume():
     half = Service(np.array([0.0, 100.0]), np.array([20.0]), 0.25)
     got = deliver(Production(10.0, 0.0, 100.0), INF, [half], (0.0, 100.0), 0.0)
     assert got.total_delivered_bit == pytest.approx(500.0)
-    assert got.link_capacity_bit == 500.0
+    assert np.sum(got.contact_capacity_bit) == 500.0
 
 
 # ---- packets of one second of data, second by second

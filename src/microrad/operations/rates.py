@@ -64,11 +64,6 @@ class RateTable:
                     f"the higher rate before it ({high.largest_range_m:g} m): it would never serve; leave it out"
                 )
 
-    @classmethod
-    def fixed(cls, rate_bit_s: float, largest_range_m: float) -> "RateTable":
-        """One rate up to a largest range, which may be inf."""
-        return cls((Step(rate_bit_s, largest_range_m),))
-
     def rate_bit_s(self, range_m: ArrayLike) -> Floats:
         """Rate at each range, of the shape of `range_m`; 0 beyond every step. At its largest range a step serves."""
         limits = np.array([s.largest_range_m for s in self.steps])

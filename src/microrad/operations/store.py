@@ -78,11 +78,6 @@ class StoreHistory:
         return float(np.max(self.stored_bit))
 
     @property
-    def link_capacity_bit(self) -> float:
-        """What the link could have sent, had there always been data."""
-        return float(np.sum(self.contact_capacity_bit))
-
-    @property
     def delivered_share(self) -> float:
         """Share of the data produced that was sent by the end of the span; nan where none was produced."""
         total = self.total_generated_bit
