@@ -131,15 +131,9 @@ def relay(
     granted = _granted(seen, o.relay_share)
     whole = tuple(contact for contact, _ in granted)
     bases = [_whole_service(contact, range_m, rates, 1.0 - outage) for contact, range_m in granted]
-    runs = []
-    for run in range(o.runs):
-        locks = _locks(found, len(whole), o.seed, run, slower)
-        runs.append([delayed(base, base.start_s + lock) for base, lock in zip(bases, locks, strict=True)])
-    failed = float(
-        np.mean(
-            [sum(math.isinf(x) for x in _locks(found, _of_span(whole, seen), o.seed, r, slower)) for r in range(o.runs)]
-        )
-    )
+    locks = np.array([_locks(found, len(whole), o.seed, run, slower) for run in range(o.runs)])
+    runs = [[delayed(base, base.start_s + lock) for base, lock in zip(bases, row, strict=True)] for row in locks]
+    failed = float(np.mean(np.isinf(locks[:, : _of_span(whole, seen)]).sum(axis=1)))
     return _way(RELAY, whole, (), runs, o, seen, o.relay_delay_s, failed)
 
 
