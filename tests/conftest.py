@@ -1,5 +1,9 @@
 """Fixtures that run commands in this process, for the tests of the command line."""
 
+import os
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the command line does, before numpy is loaded
+
 import pytest
 
 from command_line import Result, listing

@@ -192,8 +192,9 @@ class PointingTwin:
     ``crossings`` counts the plant steps within which the memory of a Bouc-Wen element changed its sign.
     """
 
-    def __init__(self, case, run, shaping, reference):
-        self.case, self.run = case, run
+    def __init__(self, case, run, shaping, reference, shift=kernels.UNSHIFTED):
+        """``shift`` is the kernel's record with the sizes of this run alone, by direction."""
+        self.case, self.run, self.shift = case, run, shift
         self.mirror = oracles.MirrorTwin(case.mirror, case.step_s)
         self.inverse = TargetInverse(case.loop, case.step_s * case.loop.steps_per_sample)
         self.s = np.array(shaping, dtype=float)
@@ -206,7 +207,15 @@ class PointingTwin:
         self.saturated = self.slew = self.outside = self.lost = self.crossings = 0
 
     def sensor_noise(self, k, c):
-        return gaussian(self.case.seed, self.run, kernels.SENSOR_PURPOSE + c // 4, 4 * k + c % 4)
+        drawn = gaussian(self.case.seed, self.run, kernels.SENSOR_PURPOSE + c // 4, 4 * k + c % 4)
+        at = k - self.shift.first_sample
+        return drawn + (self.shift.sample[at, c] @ self.shift.size if 0 <= at < len(self.shift.sample) else 0.0)
+
+    def vibration_noise(self, k):
+        """Standard normal numbers of the disturbances, by source, at plant step ``k``."""
+        drawn = np.array([gaussian(self.case.seed, self.run, purpose, k) for purpose in self.case.purpose])
+        at = k - self.shift.first_sample * self.case.loop.steps_per_sample
+        return drawn + (self.shift.step[at] @ self.shift.size if 0 <= at < len(self.shift.step) else 0.0)
 
     def measure(self, k, reference):
         """Optical reading by axis, gauge reading by output, reference by axis."""
@@ -255,8 +264,7 @@ class PointingTwin:
         before = list(self.mirror.h)
         self.mirror.step(self.drives[-1])
         self.crossings += sum(h * h_next < 0.0 for h, h_next in zip(before, self.mirror.h, strict=True))
-        g = np.array([gaussian(case.seed, self.run, purpose, k) for purpose in case.purpose])
-        self.s = case.As @ self.s + case.Bs @ g
+        self.s = case.As @ self.s + case.Bs @ self.vibration_noise(k)
         self.errors.append(reference + case.Cs @ self.s - case.optics @ self.mirror.output())
 
     def sample(self, reference, reference_next):
@@ -276,9 +284,9 @@ class PointingTwin:
         return Counts(self.saturated, self.slew, clamped, inverse, self.outside, self.lost)
 
 
-def run_twin(case, run, shaping, reference):
+def run_twin(case, run, shaping, reference, shift=kernels.UNSHIFTED):
     """One run over the control samples of ``reference`` (samples + 1, axes)."""
-    twin = PointingTwin(case, run, shaping, reference[0])
+    twin = PointingTwin(case, run, shaping, reference[0], shift)
     for now, after in pairwise(reference):
         twin.sample(now, after)
     return twin
@@ -427,12 +435,12 @@ class EnsembleRun(NamedTuple):
         return getattr(self.state, name).reshape(-1, kernels.LANES)
 
 
-def run_kernel(case, first_run, shaping, reference, state=None):
+def run_kernel(case, first_run, shaping, reference, state=None, shift=kernels.UNSHIFTED):
     """The compiled ``ensemble_loop`` over the control samples of ``reference``, from rest or from ``state``."""
     p = build_ensemble(case)
     state = build_state(case, p, first_run, shaping, reference[0]) if state is None else state
     channels = case.axes + kernels.DRIVE_FIELDS * case.actuators + len(case.mirror.C) + p.B.shape[1]
     residual = np.empty((len(reference) - 1, case.axes, kernels.LANES))
     trace = np.empty((len(reference) - 1, channels, kernels.LANES))
-    kernels.ensemble_loop(p, state, np.ascontiguousarray(reference, dtype=float), residual, trace)
+    kernels.ensemble_loop(p, state, np.ascontiguousarray(reference, dtype=float), residual, trace, shift)
     return EnsembleRun(residual, trace, state)

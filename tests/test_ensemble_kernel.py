@@ -804,13 +804,47 @@ def test_a_run_does_not_depend_on_its_batch_bit_for_bit():
     assert_array_equal(alone.state.histogram[0], batch.state.histogram[i])
 
 
+def test_shifted_random_numbers_are_those_of_the_twin():
+    """The shift lies inside the run, so that both its begin and its end are seen; two directions, sizes by run."""
+    case, samples, steps = statistics_case(), 30, statistics_case().loop.steps_per_sample
+    rng, start, reference = np.random.default_rng(5), make_start(case), make_reference(case, samples)
+    numbers, outputs, directions = len(case.purpose), case.axes + len(case.mirror.C), 2
+    step, sample = rng.normal(size=(9 * steps, numbers, directions)), rng.normal(size=(11, outputs, directions))
+    step[rng.random(step.shape) < 0.3] = 0.0
+    sizes = rng.normal(size=(directions, LANES))
+    shift = kernels.Shift(12, step, sample, sizes.ravel())
+    shifted, plain = pointing.run_kernel(case, 100, start, reference, shift=shift), kernel(case, samples)
+    lanes = (0, 37)
+    found = []
+    for lane in lanes:
+        of_run = shift._replace(size=sizes[:, lane])
+        found.append(pointing.run_twin(case, 100 + lane, start[:, lane], reference, of_run))
+    assert_same(shifted, found, lanes)
+    assert_array_equal(shifted.residual[:13], plain.residual[:13])
+    assert np.all(shifted.residual[14:] != plain.residual[14:])
+
+
+def test_a_shift_of_size_zero_changes_nothing():
+    case, samples = statistics_case(), 30
+    numbers, outputs = len(case.purpose), case.axes + len(case.mirror.C)
+    ones = np.ones((20, numbers, 1)), np.ones((20, outputs, 1))
+    still = kernels.Shift(3, *ones, np.zeros(LANES))
+    moved = still._replace(size=np.full(LANES, 1e-9))
+    plain, *others = (
+        pointing.run_kernel(case, 100, make_start(case), make_reference(case, samples), shift=shift)
+        for shift in (kernels.UNSHIFTED, still, moved)
+    )
+    assert_array_equal(others[0].residual, plain.residual)
+    assert not np.array_equal(others[1].residual, plain.residual)
+
+
 def test_residual_and_trace_without_rows_are_left_out_and_change_nothing():
     case, samples = statistics_case(), 30
     reference, nothing = make_reference(case, samples), np.empty((0, 0, 0))
     whole = kernel(case, samples)
     p = pointing.build_ensemble(case)
     state = pointing.build_state(case, p, 100, make_start(case), reference[0])
-    kernels.ensemble_loop(p, state, reference, nothing, nothing)
+    kernels.ensemble_loop(p, state, reference, nothing, nothing, kernels.UNSHIFTED)
     for name in kernels.EnsembleState._fields:
         assert_array_equal(getattr(state, name), getattr(whole.state, name), err_msg=name)
 
@@ -828,7 +862,8 @@ def test_nothing_is_written_beyond_the_arrays_of_the_state(seed):
         fenced[name] = buffers[name][fence:-fence].reshape(values.shape)
         fenced[name][...] = values
     before = [np.array(field) for field in p if isinstance(field, np.ndarray)]
-    kernels.ensemble_loop(p, state._replace(**fenced), reference, np.empty((0, 0, 0)), np.empty((0, 0, 0)))
+    nothing = np.empty((0, 0, 0))
+    kernels.ensemble_loop(p, state._replace(**fenced), reference, nothing, nothing, kernels.UNSHIFTED)
     for name, buffer in buffers.items():
         assert np.all(buffer[:fence] == 77), name
         assert np.all(buffer[-fence:] == 77), name

@@ -1098,6 +1098,24 @@ class EnsembleState(NamedTuple):
 
 SAMPLE, STEP, COUNTING = range(3)  # of ``place``
 
+
+class Shift(NamedTuple):
+    """What is added to the random numbers of LANES runs from the control sample ``first_sample`` on.
+
+    The disturbances' number of source w at a plant step k from there grows by ``step[k, w]`` @ ``size``, the reading's
+    number i (optical by axis, then gauge by output) at a sample by ``sample[k, i]`` @ ``size``. ``size`` has a row of
+    runs for each direction, flat (directions x LANES), the others a last index by direction. Behind the end of ``step``
+    and ``sample``, which may be empty, the numbers are as they are drawn.
+    """
+
+    first_sample: int
+    step: Floats
+    sample: Floats
+    size: Floats
+
+
+UNSHIFTED = Shift(0, np.zeros((0, 0, 0)), np.zeros((0, 0, 0)), np.zeros(0))
+
 # A Taylor series about 0 of (exp(r) - 1) / r up to r^11, and of log as in the C library fdlibm, for |r| <= ln 2 / 2.
 _ROUND = 6755399441055744.0  # 1.5 x 2^52: adding it leaves the nearest whole number in the low bits
 _LOG2_E = 1.4426950408889634
@@ -1346,6 +1364,13 @@ def _sum_rows(weights, rows, first, stride, total, row):  # type: ignore[no-unty
 
 
 @_compile
+def _shift_rows(weights, size, rows, first, stride):  # type: ignore[no-untyped-def]
+    """row first + stride i += weights[i] @ size, in a function by itself as few calls of the loop need it."""
+    for i in range(weights.shape[0]):
+        _weigh_some(weights[i], size, 0, 1, rows, _at(first + stride * i), False)
+
+
+@_compile
 def _modal_step(diagonal, coupling, x):  # type: ignore[no-untyped-def]
     """x = Ad x in place, for Ad of neighbouring pairs."""
     for i in range(0, diagonal.size, 2):
@@ -1542,12 +1567,15 @@ def _ensemble_amplifier(p, s, due):  # type: ignore[no-untyped-def]
 
 
 @_inline
-def _ensemble_disturbance(p, s):  # type: ignore[no-untyped-def]
+def _ensemble_disturbance(p, s, shift):  # type: ignore[no-untyped-def]
     """The disturbance one plant step on, from four steps' worth of random numbers at a time."""
     step = s.place[STEP]
     if step % 4 == 0:
         for w in range(p.purpose.size):
             _gaussians(p.seed, s.first_run[0], p.purpose[w], step // 4, s.gauss, _at(4 * w))
+    k = step - shift.first_sample * p.steps_per_sample
+    if 0 <= k < shift.step.shape[0]:
+        _shift_rows(shift.step[k], shift.size, s.gauss, step % 4, 4)
     _modal_step(p.shaping_diagonal, p.shaping_coupling, s.shaping)
     for i in range(p.shaping_diagonal.size):
         _weigh_some(p.shaping_noise[i], s.gauss, step % 4, 4, s.shaping, _at(i), False)
@@ -1594,7 +1622,7 @@ def _count_radial(error, axes, work, total, histogram):  # type: ignore[no-untyp
 
 
 @_inline
-def _measure(p, s, reference):  # type: ignore[no-untyped-def]
+def _measure(p, s, reference, shift):  # type: ignore[no-untyped-def]
     """The readings m of a control sample: optical, gauge, reference."""
     axes, outputs, sample = p.optics.shape[0], p.optics.shape[1], s.place[SAMPLE]
     noisy = p.gauge_noise > 0.0
@@ -1603,6 +1631,9 @@ def _measure(p, s, reference):  # type: ignore[no-untyped-def]
     for word in range(0, axes + outputs if noisy else 0, 4):
         purpose = np.uint64(SENSOR_PURPOSE + word // 4)
         _gaussians(p.seed, s.first_run[0], purpose, sample, s.sensor_gauss, _at(word))
+    k = sample - shift.first_sample
+    if noisy and 0 <= k < shift.sample.shape[0]:
+        _shift_rows(shift.sample[k], shift.size, s.sensor_gauss, 0, 1)
     if sample % p.sensor_every == 0:
         _measure_optical(p, s)
     for o in range(outputs):
@@ -1745,20 +1776,21 @@ def _record(k, rows, width, trace, channel):  # type: ignore[no-untyped-def]
 
 
 @_compile
-def ensemble_loop(p, s, reference, residual, trace):  # type: ignore[no-untyped-def]
+def ensemble_loop(p, s, reference, residual, trace, shift):  # type: ignore[no-untyped-def]
     """Advance LANES runs over the control samples of ``reference`` (samples + 1, axes), linear between them.
 
     Fills ``residual`` (samples, axes, LANES) with the line-of-sight error at the begin of each sample, if it has rows,
     and ``trace`` (samples, channels, LANES) likewise, once the sample has measured: disturbance by axis, drive before
     and now actuator by actuator, the plant's outputs, readings. Statistics are taken where ``place`` says so: squares
     and the largest error at the end of every plant step, sums and the histogram at the end of each control sample; the
-    counters go on all the time. The states are left at the end, so that a following call continues.
+    counters go on all the time. The states are left at the end, so that a following call continues. ``shift`` is added
+    to the random numbers (UNSHIFTED: none); those that the runs began with are drawn already.
     """
     axes, steps, actuators = p.optics.shape[0], p.steps_per_sample, p.actuator.shape[0]
     length = s.command.size // (actuators * LANES)
     ring_length = p.sensor_delay_steps + 1
     for k in range(reference.shape[0] - 1):
-        _measure(p, s, reference[k])
+        _measure(p, s, reference[k], shift)
         _control(p, s, length)
         if residual.shape[0] > 0:
             _record(k, s.error, axes, residual, 0)
@@ -1772,7 +1804,7 @@ def ensemble_loop(p, s, reference, residual, trace):  # type: ignore[no-untyped-
             _ensemble_amplifier(p, s, due)
             _ensemble_plant(p, s)
             if p.shaping_diagonal.size > 0:
-                _ensemble_disturbance(p, s)
+                _ensemble_disturbance(p, s, shift)
             s.place[STEP] += 1
             share = (j + 1) / steps
             for i in range(axes):

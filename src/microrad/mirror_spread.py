@@ -1,7 +1,8 @@
 """Mirrors that an identification leaves possible: drawn from the covariance that its mirror file gives."""
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from itertools import chain, islice
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +32,38 @@ def draws(table: Mirror, count: int, seed: int) -> tuple[Mirror, ...]:
     root = lti.covariance_root(relative_covariance(table))
     streams = (np.random.SeedSequence(seed, spawn_key=(index,)) for index in range(count))
     return tuple(_drawn(table, places, root, np.random.Generator(np.random.Philox(stream))) for stream in streams)
+
+
+def parameters(table: Mirror, normals: Floats, again: Callable[[int], Iterator[Floats]]) -> Floats:
+    """Values (count, n) of the n uncertain parameters, one mirror for each row of standard normal numbers (count, n).
+
+    A row that is no mirror is drawn again from the numbers (n,) that ``again`` yields for its place among the rows. Of
+    a list that scales together the value is the factor of its items. Raises ValueError as `draws` does.
+    """
+    keys = _uncertainty(table).parameters
+    places = [place(table, key) for key in keys]
+    root = lti.covariance_root(relative_covariance(table))
+    scale = np.array(
+        [1.0 if _scales_a_list(table, at) else _first(table, key) for key, at in zip(keys, places, strict=True)]
+    )
+    accepted = (_accepted(table, places, root, chain((row,), again(i))) for i, row in enumerate(normals))
+    factors = [factors for _, factors in accepted]
+    return np.asarray(np.array(factors).reshape(normals.shape) * scale)
+
+
+def parameter_units(table: Mirror) -> dict[str, str]:
+    """SI units of what `parameters` draws, by key; "" for plain numbers and for the factor of a whole list.
+
+    Raises ValueError without an `uncertainty`.
+    """
+    return {key: _unit(table, place(table, key)) for key in _uncertainty(table).parameters}
+
+
+def _unit(table: Mirror, at: Place) -> str:
+    rule = _rule(type(getattr(table, at.table)).model_fields[at.field])
+    if rule is None or _scales_a_list(table, at):
+        return ""
+    return rule.unit if isinstance(rule, Quantity) else rule.each.unit
 
 
 def relative_covariance(table: Mirror) -> Floats:
@@ -72,6 +105,10 @@ def _values(table: Mirror, at: Place) -> tuple[float, ...]:
     return value if isinstance(value, tuple) else (value,)
 
 
+def _scales_a_list(table: Mirror, at: Place) -> bool:
+    return at.item is None and isinstance(getattr(getattr(table, at.table), at.field), tuple)
+
+
 def _first(table: Mirror, key: str) -> float:
     """The value of a parameter; of a list that scales together the first that is not 0."""
     at = place(table, key)
@@ -91,16 +128,22 @@ def _share_of_gain(table: Mirror, at: Place) -> float:
 
 # -------------------------------------------------------------------------------------------------------------- drawing
 def _drawn(table: Mirror, places: list[Place], root: Floats, rng: np.random.Generator) -> Mirror:
+    normals = (rng.standard_normal(len(places)) for _ in range(TRIES))
+    return _accepted(table, places, root, normals)[0]
+
+
+def _accepted(table: Mirror, places: list[Place], root: Floats, normals: Iterator[Floats]) -> tuple[Mirror, Floats]:
+    """The first mirror among the draws from standard normal numbers, and the factors of its parameters."""
     refused: Counter[str] = Counter()
     why: dict[str, str] = {}
-    for _ in range(TRIES):
-        factors = 1.0 + root @ rng.standard_normal(len(places))
+    for row in islice(normals, TRIES):
+        factors = 1.0 + root @ row
         faults = dict(_turned(table, factors))
         if not faults:
             moved = _moved(table, places, factors)
             faults = dict(_faults(moved, places))
             if not faults:
-                return moved
+                return moved, factors
         refused.update(faults.keys())
         why = faults | why
     key, times = refused.most_common(1)[0]

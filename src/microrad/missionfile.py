@@ -3,7 +3,7 @@
 import contextlib
 import difflib
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import resources
 from pathlib import Path
 from typing import Any, Literal, TypeVar, get_args, get_origin
@@ -28,6 +28,10 @@ __all__ = [
     "load_link",
     "load_mirror",
     "load_mission",
+    "mission_file",
+    "named_files",
+    "open_mission",
+    "with_values",
 ]
 
 _BEYOND_LINK = Mission.model_fields.keys() - LinkMission.model_fields.keys()
@@ -79,8 +83,30 @@ def load_mission(path: str | Path, mirror_path: str | Path | None = None) -> Mis
     Without it, `[mirror]` may hold the single key `file`, the path of a mirror file as seen from the mission file.
     Raises `MissionError` with every fault of both files.
     """
+    return mission_file(open_mission(path, mirror_path))
+
+
+def open_mission(path: str | Path, mirror_path: str | Path | None = None) -> Document:
+    """A mission file as it stands, its mirror file taken in, for `mission_file`; nothing but its TOML is checked.
+
+    Raises `MissionError` when it is no TOML.
+    """
     document = _open(Path(path), "mission file", "")
     _take_in_mirror(document, None if mirror_path is None else Path(mirror_path))
+    return document
+
+
+def with_values(document: Document, data: Mapping[str, Any], mirror_path: Path | None = None) -> Document:
+    """The document with other data in place of its own, and with the mirror of another file; its faults are kept."""
+    inner = {name: replace(each, faults=list(each.faults)) for name, each in document.inner.items()}
+    other = replace(document, data=dict(data), faults=list(document.faults), inner=inner)
+    if mirror_path is not None:
+        _take_in_mirror(other, mirror_path)
+    return other
+
+
+def mission_file(document: Document) -> MissionFile:
+    """The mission of a document. Raises `MissionError` with every fault of it and of its mirror file."""
     mission = check_table(document, Mission, document.data)
     if mission is None or document.all_faults():
         raise MissionError(document.path, document.all_faults())
@@ -88,6 +114,14 @@ def load_mission(path: str | Path, mirror_path: str | Path | None = None) -> Mis
     mirror_file = _mirror_file(inner, mission.mirror) if inner else None
     sources = _sources(document)
     return MissionFile(mission, document.path, document.text, document.sha256, sources, mirror_file)
+
+
+def named_files(m: Mission) -> tuple[str, ...]:
+    """Files that the mission names beside its mirror, as it names them: seen from the mission file."""
+    tables = [] if m.orbit is None else [m.orbit.leo, m.orbit.geo]
+    named = [t.file for t in tables] + [None if m.constellation is None else m.constellation.file]
+    named.append(None if m.fine_pointing is None else m.fine_pointing.vibration.file)
+    return tuple(name for name in dict.fromkeys(named) if name is not None)
 
 
 def load_link(path: str | Path) -> LinkFile:
@@ -190,6 +224,20 @@ def _leaves(data: Mapping[str, Any], table: str) -> Iterator[str]:
 
 
 # --------------------------------------------------------------------------------------------------------- validating
+def check_value(document: Document, table: type[Table], key: str, value: object) -> bool:
+    """Whether a value fits a key of a table by itself; what is wrong with it is noted.
+
+    The document's prefix is the dotted key of the table.
+    """
+    try:
+        table.model_validate({key: value})
+    except ValidationError as error:
+        own = [d for d in error.errors(include_url=False) if d["loc"][:1] == (key,)]
+        _Report(document, table).note(own)
+        return not own
+    return True
+
+
 def check_table(document: Document, model: type[_T], data: Mapping[str, Any]) -> _T | None:
     """The data as a record, or None with every fault in it noted."""
     try:

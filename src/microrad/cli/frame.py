@@ -136,7 +136,8 @@ def say(message: str) -> None:
 def _failed(error: BaseException) -> int:
     """Say what went wrong, on stderr; returns the exit code."""
     if _interrupted(error):
-        say("interrupted, nothing was written")
+        said = str(error) if isinstance(error, KeyboardInterrupt) else ""
+        say(said or "interrupted, nothing was written")
         return INTERRUPTED
     if isinstance(error, OSError):
         where = f"{error.filename}: {error.strerror}" if error.filename else str(error.strerror or error)

@@ -30,6 +30,7 @@ __all__ = [
     "acquired",
     "given_loss",
     "loss_at",
+    "relay",
     "run",
     "times",
     "view",
@@ -91,6 +92,13 @@ def acquired(links: LinkStudy) -> Found | None:
     if finding is None or o is None:
         return None
     return finding.wide if o.acquisition == "wide beacon" else finding.scan
+
+
+def relay(links: LinkStudy, loss: PointingLoss) -> Way:
+    """The way by the relay alone: what `run` finds of it, without the rest of the day."""
+    m = links.file.mission
+    seen, rates = view(m, orbit.pair(m, links.file.path.parent)), flow.rate_table(flow.closings(m, loss))
+    return flow.relay(m, seen, rates, loss.outage, acquired(links), 1.0)
 
 
 def run(

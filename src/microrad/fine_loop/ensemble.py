@@ -3,7 +3,7 @@
 import math
 import zlib
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -67,6 +67,18 @@ class Ensemble:
         """Radial error that a share of the time stays below, over all runs, from the histogram."""
         return histogram_quantile(self.histogram.sum(axis=0), share)
 
+    def beyond(self, radius_rad: float) -> float:
+        """Share of the time with a larger radial error, over all runs, from the histogram."""
+        return histogram_beyond(self.histogram.sum(axis=0), radius_rad)
+
+    def part(self, first: int, runs: int) -> "Ensemble":
+        """The same of some of the runs, from the ``first`` of this ensemble on; the spectrum is left as it is."""
+        of = slice(first, first + runs)
+        by_run = {
+            name: getattr(self, name)[of] for name in ("rms_rad", "mean_rad", "largest_rad", "histogram", "counts")
+        }
+        return replace(self, **by_run)
+
     def share(self, counter: int) -> float:
         """How often a counter counted, of all actuators or elements together, so that it may exceed 1.
 
@@ -96,6 +108,16 @@ def histogram_quantile(counts: NDArray[np.integer], share: float) -> float:
     inside = (wanted - below) / float(counts[at])
     low, high = bin_edges_rad()[at : at + 2] ** 2
     return math.sqrt(low + inside * (high - low))
+
+
+def histogram_beyond(counts: NDArray[np.integer], radius_rad: float) -> float:
+    """Share of binned radial errors beyond a radius, linear in the square inside a bin."""
+    total = float(np.sum(counts))
+    if not total:
+        return math.nan
+    edges = bin_edges_rad() ** 2
+    below = np.concatenate([[0.0], np.cumsum(counts, dtype=float)])
+    return 1.0 - float(np.interp(max(radius_rad, 0.0) ** 2, edges, below)) / total
 
 
 def arrays(loop: PointingLoop, controller: LoopController, seed: int) -> kernels.Ensemble:
@@ -328,10 +350,16 @@ def run(
     span: Span,
     runs: int,
     *,
+    first_run: int = 0,
     threads: int | None = None,
     on_progress: Progress = lambda done, total, what: None,
+    beat: Callable[[], None] = lambda: None,
 ) -> Ensemble:
-    """Statistics of ``runs`` runs. They depend on the seed and the run's number alone, not on ``threads``.
+    """Statistics of ``runs`` runs, those of the numbers from ``first_run`` on.
+
+    They depend on the seed and the run's number alone, not on ``threads``. ``beat`` is called between slices of
+    compiled code, on the thread that runs them, and ends the runs by raising. The spectrum is that of run 0 and its
+    batch, nan where they are not among the runs.
 
     Memory does not grow with the length of the runs, and by 5 kB a run. Raises ValueError for what does not fit and for
     less than one run.
@@ -339,7 +367,7 @@ def run(
     if runs < 1:
         raise ValueError(f"an ensemble of {runs} runs has no statistics: ask for 1 run or more")
     p = arrays(loop, controller, span.seed)
-    jobs = [partial(_batch, loop, p, span, first) for first in range(0, runs, LANES)]
+    jobs = [partial(_batch, loop, p, span, first, beat) for first in range(first_run, first_run + runs, LANES)]
     parts = in_threads(jobs, lambda done: on_progress(min(done * LANES, runs), runs, controller.name), threads)
     return _joined(controller.name, loop, span, parts, runs)
 
@@ -350,7 +378,7 @@ class _Batch:
     psd: Floats
 
 
-def _samples(loop: PointingLoop, span: Span) -> tuple[int, int]:
+def control_samples(loop: PointingLoop, span: Span) -> tuple[int, int]:
     """Control samples in all, and those that settle."""
     period = loop.timing.period_s
     total, settle = round(span.duration_s / period), round(span.settle_s / period)
@@ -364,37 +392,39 @@ def _samples(loop: PointingLoop, span: Span) -> tuple[int, int]:
 
 def _segment(loop: PointingLoop, span: Span) -> int:
     """Samples in a segment of the spectrum: a power of 2 that fits behind the settling time."""
-    total, settle = _samples(loop, span)
+    total, settle = control_samples(loop, span)
     return min(SLICE_SAMPLES, 1 << (total - settle).bit_length() - 1)
 
 
-def _reference(loop: PointingLoop, begin: int, end: int) -> Floats:
+def reference(loop: PointingLoop, begin: int, end: int) -> Floats:
     """Reference at the control samples ``begin`` to ``end``, both included: (samples, axes)."""
     time: Floats = np.arange(begin, end + 1, dtype=float) * loop.timing.period_s
     return np.ascontiguousarray(np.stack([r.at(time) for r in loop.references], axis=1))
 
 
-def _batch(loop: PointingLoop, p: kernels.Ensemble, span: Span, first_run: int) -> _Batch:
+def _batch(loop: PointingLoop, p: kernels.Ensemble, span: Span, first_run: int, beat: Callable[[], None]) -> _Batch:
     state = start(loop, p, first_run)
-    total, settle = _samples(loop, span)
+    total, settle = control_samples(loop, span)
     nothing = np.empty((0, 0, 0))
     segment = _segment(loop, span)
     spectrum, segments = np.zeros((segment // 2 + 1, loop.axes)), 0
     residual = np.empty((segment, loop.axes, LANES)) if first_run == 0 else nothing
     at = 0
     while at < total:
+        beat()
         counting = at >= settle
         end = min(at + segment, total if counting else settle)
         if counting and not state.place[kernels.COUNTING]:
             state.place[kernels.COUNTING] = 1
             state.counts[:] = 0.0
         whole = counting and residual.size > 0 and end - at == segment
-        kernels.ensemble_loop(p, state, _reference(loop, at, end), residual if whole else nothing, nothing)
+        kept = residual if whole else nothing
+        kernels.ensemble_loop(p, state, reference(loop, at, end), kept, nothing, kernels.UNSHIFTED)
         if whole:
             spectrum += _periodogram(residual, loop.timing.period_s)
             segments += 1
         at = end
-    return _Batch(state, spectrum / max(segments, 1))
+    return _Batch(state, spectrum / segments if segments else np.full_like(spectrum, math.nan))
 
 
 def _periodogram(residual: Floats, period_s: float) -> Floats:
@@ -410,7 +440,7 @@ def _periodogram(residual: Floats, period_s: float) -> Floats:
 
 
 def _joined(name: str, loop: PointingLoop, span: Span, parts: list[_Batch], runs: int) -> Ensemble:
-    total, settle = _samples(loop, span)
+    total, settle = control_samples(loop, span)
     samples = total - settle
     steps = samples * loop.timing.steps_per_sample
 
@@ -454,19 +484,19 @@ def trace(loop: PointingLoop, controller: LoopController, span: Span, run_number
     """One run in full: the run of that number of an ensemble, to the last bit. The settling time is part of it."""
     p = arrays(loop, controller, span.seed)
     state = start(loop, p, run_number)
-    total, _ = _samples(loop, span)
+    total, _ = control_samples(loop, span)
     axes, m, outputs = loop.axes, loop.mirror.actuators, loop.mirror.axes
     channels = axes + kernels.DRIVE_FIELDS * m + outputs + p.B.shape[1]
     errors, rest = np.empty((total, axes)), np.empty((total, channels))
     for at in range(0, total, SLICE_SAMPLES):
         end = min(at + SLICE_SAMPLES, total)
         residual, recorded = np.empty((end - at, axes, LANES)), np.empty((end - at, channels, LANES))
-        kernels.ensemble_loop(p, state, _reference(loop, at, end), residual, recorded)
+        kernels.ensemble_loop(p, state, reference(loop, at, end), residual, recorded, kernels.UNSHIFTED)
         errors[at:end], rest[at:end] = residual[:, :, 0], recorded[:, :, 0]
     drives = axes + kernels.DRIVE_FIELDS * m
     return PointingTrace(
         time_s=np.arange(total, dtype=float) * loop.timing.period_s,
-        reference_rad=_reference(loop, 0, total)[:-1],
+        reference_rad=reference(loop, 0, total)[:-1],
         disturbance_rad=rest[:, :axes],
         error_rad=errors,
         measured_rad=rest[:, drives + outputs : drives + outputs + axes],

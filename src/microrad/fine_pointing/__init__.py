@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from microrad import disturbance
-from microrad.fine_pointing.designs import BASELINE, Design, design, optimum_rms_rad
+from microrad.fine_pointing.designs import BASELINE, Design, build, design, names, optimum_rms_rad, plants, tune
 from microrad.fine_pointing.results import (
     COUNTERS,
     Difference,
@@ -19,15 +19,17 @@ from microrad.fine_pointing.results import (
     Verified,
     best,
     error_budget,
+    on_variant,
     sines,
     verify,
 )
-from microrad.fine_pointing.scenario import Scene, scene, table
+from microrad.fine_pointing.scenario import VARIANTS, Scene, scene, table
 from microrad.missionfile import MissionFile
 
 __all__ = [
     "BASELINE",
     "COUNTERS",
+    "VARIANTS",
     "Design",
     "Difference",
     "ErrorBudget",
@@ -38,12 +40,18 @@ __all__ = [
     "Sine",
     "Verified",
     "best",
+    "build",
     "design",
     "error_budget",
+    "names",
+    "on_variant",
     "optimum_rms_rad",
+    "plants",
     "run",
     "scene",
     "sines",
+    "table",
+    "tune",
     "verify",
 ]
 

@@ -16,6 +16,9 @@ from microrad.mission import Mission
 Progress = Callable[[int, int, str], None]
 
 BASELINE = "PI, best of a gain grid"
+WITH_INVERSE = f"{control.PI.name} + inverse"
+IN_SERIES = "PI + inverse in series"
+_INVERSE_USED = {WITH_INVERSE: "of the reference", IN_SERIES: "in series"}
 DRAWS = 8
 """Mirrors drawn from the identification's covariance that a tuned controller has to hold for."""
 
@@ -55,44 +58,59 @@ def _drawn(m: Mission, of: object) -> mirror.Mirror:
     return one_mirror(m.model_copy(update={"mirror": of}), "given")
 
 
+def names(m: Mission) -> tuple[str, ...]:
+    """The controllers that the study of a mission designs, the baseline first."""
+    found = [BASELINE]
+    for family in families(m):
+        found += [family.name, WITH_INVERSE] if family is control.PI else [family.name]
+    return (*found, IN_SERIES)
+
+
 def design(scene: Scene, m: Mission, on_progress: Progress = lambda done, total, what: None) -> tuple[Design, ...]:
     """Every controller of the study, tuned on the linear cost; the first is the baseline.
 
     Raises ValueError with the reason when one of them cannot meet the modulus margin.
     """
+    straight, wanted = plants(scene, m, table(m).seed), names(m)
+    tuned: dict[str, Tuned] = {}
+    for done, name in enumerate(wanted):
+        on_progress(done, len(wanted), f"tuning {name}")
+        tuned[name] = tuned[control.PI.name] if name == WITH_INVERSE else tune(name, m, straight)
+    on_progress(len(wanted), len(wanted), "controllers tuned")
+    return tuple(Design(n, t, build(n, scene, m, t.controller), _INVERSE_USED.get(n, "")) for n, t in tuned.items())
+
+
+def tune(name: str, m: Mission, of: Sequence[DesignPlant]) -> Tuned:
+    """One of the controllers that `names` lists, tuned for these plants of an axis (see `plants`).
+
+    Raises ValueError for another name, and with the reason when it cannot meet the modulus margin.
+    """
     f = table(m)
     wanted = Specification(f.modulus_margin)
-    straight = plants(scene, m, f.seed)
-    path = ReferenceFilter(f.reference_filter_hz)
-    kinds = families(m)
-    total = len(kinds) + 2
-    on_progress(0, total, f"tuning {BASELINE}")
-    found = [_plain(BASELINE, scene.loop, grid_baseline(straight, wanted))]
-    for done, family in enumerate(kinds, 1):
-        on_progress(done, total, f"tuning {family.name}")
-        tuned = control.tune(family, straight, wanted, seed=f.seed, evaluations=evaluations(family))
-        found.append(_plain(family.name, scene.loop, tuned))
-        if family is control.PI:
-            inverse = control.inverse(scene.loop.mirror)
-            made = with_inverse(f"{family.name} + inverse", scene.loop, tuned.controller, inverse, path, False)
-            found.append(Design(made.name, tuned, made, "of the reference"))
-    on_progress(total - 1, total, "tuning PI with the inverse in series")
-    filtered = tuple(behind_filter(p, path.discrete(p.period_s)) for p in straight)
-    tuned = control.tune(control.PI, filtered, wanted, seed=f.seed)
-    name = "PI + inverse in series"
-    inverse = control.inverse(scene.loop.mirror)
-    made = with_inverse(name, scene.loop, tuned.controller, inverse, path, True)
-    on_progress(total, total, "controllers tuned")
-    return (*found, Design(name, tuned, made, "in series"))
+    if name == BASELINE:
+        return grid_baseline(of, wanted)
+    if name == IN_SERIES:
+        path = ReferenceFilter(f.reference_filter_hz)
+        filtered = tuple(behind_filter(p, path.discrete(p.period_s)) for p in of)
+        return control.tune(control.PI, filtered, wanted, seed=f.seed)
+    wanted_family = control.PI.name if name == WITH_INVERSE else name
+    for family in families(m):
+        if family.name == wanted_family:
+            return control.tune(family, of, wanted, seed=f.seed, evaluations=evaluations(family))
+    raise ValueError(f"{name!r} is no controller of this mission; it has {', '.join(names(m))}")
+
+
+def build(name: str, scene: Scene, m: Mission, axis: control.AxisController) -> LoopController:
+    """A tuned axis controller on all axes of the scene, with its inverse where its name says so."""
+    if name not in _INVERSE_USED:
+        return assemble(name, scene.loop, axis)
+    path, inverse = ReferenceFilter(table(m).reference_filter_hz), control.inverse(scene.loop.mirror)
+    return with_inverse(name, scene.loop, axis, inverse, path, name == IN_SERIES)
 
 
 def evaluations(family: Family) -> int:
     """How many candidates a search may look at: more change its result by less than a per cent."""
     return 400 if family is control.LQG else 300
-
-
-def _plain(name: str, loop: PointingLoop, tuned: Tuned) -> Design:
-    return Design(name, tuned, assemble(name, loop, tuned.controller))
 
 
 def grid_baseline(of: Sequence[DesignPlant], wanted: Specification) -> Tuned:

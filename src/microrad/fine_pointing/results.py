@@ -158,9 +158,13 @@ def verify(
 
 
 def _job(scene: Scene, m: Mission, design: Design, variant: str) -> Callable[[], ensemble.Ensemble]:
+    return _run(on_variant(scene.loop, m, variant), design.controller, m)
+
+
+def on_variant(loop: PointingLoop, m: Mission, variant: str) -> PointingLoop:
+    """The loop on one of `scenario.VARIANTS` of its mirror."""
     straight = variant == "no hysteresis"  # each element its slow gain, as in theory and in the error budget
-    loop = parts.without(scene.loop, parts.HYSTERESIS) if straight else with_mirror(scene.loop, m, variant)
-    return _run(loop, design.controller, m)
+    return parts.without(loop, parts.HYSTERESIS) if straight else with_mirror(loop, m, variant)
 
 
 def _run(loop: PointingLoop, controller: LoopController, m: Mission) -> Callable[[], ensemble.Ensemble]:

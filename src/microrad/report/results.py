@@ -14,7 +14,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from microrad.fine_pointing import COUNTERS, FinePointingStudy, Residual
-from microrad.mission import Mission
+from microrad.missionfile import named_files
 from microrad.report import day_results
 from microrad.report.fine_pointing_data import margins, rms_by_source, sources
 from microrad.report.variables import coordinate, variable
@@ -278,21 +278,13 @@ def manifest(study: Study, folder: Path) -> dict[str, Any]:
     ]
     return {
         "mission": mission,
-        "inputs_sha256": {name: _sha256(study.file.path.parent / name) for name in _inputs(m)},
+        "inputs_sha256": {name: _sha256(study.file.path.parent / name) for name in named_files(m)},
         "mirror": None if mirror is None else {"file": mirror.path.name, "sha256": mirror.sha256, "text": mirror.text},
         "versions": versions(),
         "machine": platform.machine(),
         "randomness": "; ".join(drawn) or "none",
         "files_sha256": files,
     }
-
-
-def _inputs(m: Mission) -> list[str]:
-    """Files that the mission names beside its mirror, as it names them."""
-    tables = [] if m.orbit is None else [m.orbit.leo, m.orbit.geo]
-    named = [t.file for t in tables] + [None if m.constellation is None else m.constellation.file]
-    named.append(None if m.fine_pointing is None else m.fine_pointing.vibration.file)
-    return [name for name in dict.fromkeys(named) if name is not None]
 
 
 def _sha256(path: Path) -> str:

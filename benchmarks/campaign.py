@@ -1,0 +1,116 @@
+"""Campaigns: pace, efficiency on two cores by threads and by Dask, the price of 100 000 runs, memory; in one run.
+
+    python benchmarks/campaign.py            # everything, some minutes
+    python benchmarks/campaign.py --quick    # a tenth of the runs
+
+One axis of the shipped mission under PI, ten seconds a run, a drawn transmit power: 64 runs side by side in the
+compiled kernel, the link budgeted under each. One thread, two threads of one worker process and two Dask workers do
+the same chunks in turn, several times; the start of the workers is left out, and told apart. Efficiency is the time on
+one thread over twice the time on two, median of the rounds.
+"""
+
+import resource
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+from microrad.campaign import bundle, plan, run
+from microrad.campaign.file import load_campaign
+from microrad.campaign.records import Engine, Job
+
+HERE = Path(__file__).resolve().parent
+MISSION = HERE.parent / "missions" / "leo-geo.toml"
+RUNS, ROUNDS = 1024, 3
+TEXT = """
+mission = "mission.toml"
+seed = 1
+runs = {runs}
+sampling = "random"
+worst = 0
+{loop}
+[inputs."communication.transmit_power"]
+distribution = "normal"
+mean = "5 W"
+deviation = "0.2 W"
+"""
+LOOP = """
+[loop]
+controller = "PI"
+axes = "one"
+duration = "10 s"
+"""
+MEANS = {
+    "one thread": run.Means(threads=1),
+    "two threads": run.Means(threads=2),
+    "two Dask workers": run.Means(workers=2),
+}
+
+
+def written(folder: str, runs: int, loop: str = LOOP) -> Path:
+    """A campaign file."""
+    path = Path(folder, "campaign.toml")
+    path.with_name("mission.toml").write_text(MISSION.read_text(encoding="utf-8"), encoding="utf-8")
+    path.write_text(TEXT.format(runs=runs, loop=loop), encoding="utf-8")
+    return path
+
+
+def timed(engine: Engine, jobs: list[Job]) -> float:
+    """Seconds that these chunks take."""
+    began = time.perf_counter()
+    kinds = [outcome.kind for outcome in engine.outcomes(iter(jobs))]
+    assert kinds == ["done"] * len(jobs), kinds
+    return time.perf_counter() - began
+
+
+def efficiency(runs: int) -> None:
+    """Each way of doing the work in turn, on the same chunks."""
+    with tempfile.TemporaryDirectory() as folder:
+        campaign = load_campaign(written(folder, runs))
+        spec = bundle.packed(campaign, run.controllers(campaign, lambda done, total, what: None))
+        jobs = plan.chunks(campaign, 0, campaign.rows)
+        engines, started = {}, {}
+        for name, means in MEANS.items():
+            began = time.perf_counter()
+            engines[name] = means.engine(spec, 600.0)
+            timed(engines[name], jobs[:4])  # every worker has opened the campaign
+            started[name] = time.perf_counter() - began
+        rounds = [{name: timed(engine, jobs) for name, engine in engines.items()} for _ in range(ROUNDS)]
+        for engine in engines.values():
+            engine.close()
+    print(f"{campaign.rows} runs of 10 s, one axis, {len(jobs)} chunks; median of {ROUNDS} rounds")
+    for name in MEANS:
+        took = statistics.median(each[name] for each in rounds)
+        gain = statistics.median(each["one thread"] / (2.0 * each[name]) for each in rounds)
+        shown = "" if name == "one thread" else f", efficiency {gain:.2f}"
+        each_ms = 1e3 * took / campaign.rows
+        print(f"  {name:18} {took:6.2f} s, {each_ms:.2f} ms a run{shown}; begins in {started[name]:.1f} s")
+        if name == "two threads":
+            print(f"    100 000 such runs: {took / campaign.rows * 1e5 / 60.0:.0f} min, projected from these")
+
+
+def memory(runs: int) -> None:
+    """Peak memory of the command and of its workers for campaigns of growing length."""
+    print("\npeak memory of the command and of its worker, links alone")
+    for rows in (runs, 8 * runs):
+        with tempfile.TemporaryDirectory() as folder:
+            path = written(folder, rows, loop="")
+            code = f"import sys; from pathlib import Path; sys.path.insert(0, {str(HERE)!r}); import campaign as c; "
+            code += f"c.peak(Path({str(path)!r}))"
+            said = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True).stdout
+        print(f"  {rows:8d} rows: {said.strip()}")
+
+
+def peak(path: Path) -> None:
+    """Run a campaign and say how much memory it took."""
+    run.begin(path, path.with_suffix(".ledger"), run.Means(threads=2))
+    own, child = (resource.getrusage(who).ru_maxrss / 1024 for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
+    print(f"{own:.0f} MB and {child:.0f} MB")
+
+
+if __name__ == "__main__":
+    quick = "--quick" in sys.argv
+    efficiency(RUNS // 8 if quick else RUNS)
+    memory(5_000 if quick else 50_000)

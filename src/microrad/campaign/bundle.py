@@ -1,0 +1,131 @@
+"""A campaign in one piece that any worker can open: its files, and the controllers that were tuned for it."""
+
+import base64
+import hashlib
+import json
+import os
+import shutil
+import tempfile
+import weakref
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path, PurePosixPath
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from microrad import lti
+from microrad.campaign.file import CampaignFile, load_campaign
+from microrad.campaign.records import CampaignError
+from microrad.control import AxisController
+from microrad.missionfile import named_files
+
+LIBRARIES = ("numpy", "scipy", "numba", "llvmlite", "sgp4", "skyfield")
+"""Libraries whose version may move the last digits of a row."""
+
+
+@cache
+def code_sha256() -> str:
+    """SHA-256 over microrad's own source files and the versions of Python and the libraries that rows depend on."""
+    import platform
+    from importlib.metadata import version
+
+    root = Path(__file__).resolve().parent.parent
+    digest = hashlib.sha256()
+    for path in sorted(p for p in root.rglob("*") if p.suffix in {".py", ".json"}):
+        digest.update(f"{path.relative_to(root).as_posix()}\0".encode())
+        digest.update(path.read_bytes())
+    digest.update(repr([platform.python_version(), *((name, version(name)) for name in LIBRARIES)]).encode())
+    return digest.hexdigest()
+
+
+@dataclass(frozen=True, eq=False)
+class Opened:
+    """A bundle that a worker has opened; the folder with its files goes when this does."""
+
+    campaign: CampaignFile
+    controllers: tuple[AxisController, ...]
+
+
+def mission_sha256(campaign: CampaignFile) -> str:
+    """SHA-256 over every file of a campaign but the campaign file itself: the mission and what it and the grid name."""
+    digest = hashlib.sha256()
+    for name, path in sorted(_named(campaign.files).items()):
+        if path != campaign.path:
+            digest.update(f"{name}\0".encode())
+            digest.update(hashlib.sha256(path.read_bytes()).digest())
+    return digest.hexdigest()
+
+
+def hashes(campaign: CampaignFile) -> dict[str, str]:
+    """What the rows of a campaign follow from: the campaign file, the mission with its files, and the code."""
+    return {"campaign": campaign.sha256, "mission": mission_sha256(campaign), "code": code_sha256()}
+
+
+def packed(campaign: CampaignFile, controllers: Sequence[AxisController]) -> bytes:
+    """The files of a campaign and its controllers, one for each cell (none without a loop), as bytes."""
+    _refuse_absolute(campaign)
+    files = {name: base64.b64encode(path.read_bytes()).decode() for name, path in _named(campaign.files).items()}
+    name = next(name for name, path in _named(campaign.files).items() if path == campaign.path)
+    made = [_written(controller) for controller in controllers]
+    data = {"campaign": name, "files": files, "controllers": made, "code": code_sha256()}
+    return json.dumps(data, sort_keys=True).encode()
+
+
+def opened(spec: bytes, any_code: bool = False) -> Opened:
+    """What `packed` put together. Raises `CampaignError` when it was packed by other code, if that is not allowed."""
+    data = json.loads(spec)
+    if data["code"] != code_sha256() and not any_code:
+        raise CampaignError(
+            f"this worker runs other code than the campaign: {code_sha256()} here, {data['code']} there; install the "
+            "same microrad, Python and libraries on every worker"
+        )
+    folder = Path(tempfile.mkdtemp(prefix="microrad-campaign-"))
+    try:
+        for name, content in data["files"].items():
+            path = folder.joinpath(*PurePosixPath(name).parts)
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_bytes(base64.b64decode(content))
+        campaign = load_campaign(folder.joinpath(*PurePosixPath(data["campaign"]).parts))
+        found = Opened(campaign, tuple(_read(each) for each in data["controllers"]))
+    except BaseException:
+        shutil.rmtree(folder, ignore_errors=True)
+        raise
+    weakref.finalize(found, shutil.rmtree, folder, ignore_errors=True)
+    return found
+
+
+def _refuse_absolute(campaign: CampaignFile) -> None:
+    """Every worker reads the bundle's own copies, which are found by relative names alone."""
+    named = [campaign.table.mission, *named_files(campaign.mission.mission)]
+    named += [cell["mirror"] for cell in campaign.cells if "mirror" in cell]
+    for name in named:
+        if Path(name).is_absolute():
+            raise CampaignError(
+                f"{campaign.path} depends on {name}, an absolute path that another machine would not find: name the "
+                "file relative to the one that names it"
+            )
+
+
+def _named(files: Sequence[Path]) -> dict[str, Path]:
+    """Files by their path from the nearest folder that holds them all."""
+    there = [Path(os.path.abspath(path)) for path in files]  # noqa: PTH100  links stay: the files name each other by them
+    above = Path(os.path.commonpath([path.parent for path in there]))
+    return {path.relative_to(above).as_posix(): given for path, given in zip(there, files, strict=True)}
+
+
+def _written(controller: AxisController) -> dict[str, Any]:
+    s = controller.system
+    arrays = {"A": s.A, "B": s.B, "C": s.C, "D": s.D, "L": controller.anti_windup}
+    return {"name": controller.name, **{key: [list(m.shape), m.ravel().tolist()] for key, m in arrays.items()}}
+
+
+def _read(data: dict[str, Any]) -> AxisController:
+    def array(key: str) -> NDArray[np.float64]:
+        shape, values = data[key]
+        return np.array(values, dtype=float).reshape(shape)
+
+    system = lti.StateSpace(array("A"), array("B"), array("C"), array("D"))
+    return AxisController(data["name"], system, array("L"))

@@ -1,0 +1,200 @@
+"""The drawn inputs and the design variables of a campaign file, read by the rules of the mission's own keys."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
+
+from microrad.campaign import distributions
+from microrad.campaign.distributions import AnyTable, Distribution
+from microrad.campaign.inputs import Base, Draw
+from microrad.campaign.keys import MIRROR, Key
+from microrad.campaign.reading import Reading, is_number, quoted_near
+from microrad.campaign.records import InputText
+from microrad.campaign.tables import VariableTable
+from microrad.document import shown
+from microrad.fields import MOST_ITEMS, Quantity
+from microrad.missionfile import check_table
+
+
+class Variable(NamedTuple):
+    """A design variable with its bounds in SI units."""
+
+    key: str
+    unit: str
+    low: float
+    high: float
+
+
+@dataclass(frozen=True, slots=True)
+class DrawReader:
+    """Reads [inputs] against the raw data of the mission; ``given`` are the keys that other tables give."""
+
+    on: Reading
+    data: Mapping[str, Any]
+    bases: tuple[Base, ...]
+    given: frozenset[str]
+
+    def draw(self, key: str, raw: object) -> Draw | None:
+        """One input, or None with what is wrong noted."""
+        at = f"inputs.{key}"
+        table = self._distribution_table(at, raw)
+        if table is None:
+            return None
+        if key == MIRROR or isinstance(table, distributions.IdentifiedTable):
+            return self._identified(at, key, table)
+        found = self.on.key("inputs", key, None, self.data)
+        distribution = None if found is None else self._distribution(at, found, table)
+        if found is None or distribution is None:
+            return None
+        if table.drawn_as is None:
+            return Draw(key, found.unit, distribution, None)
+        drawn_as = self._drawn_as(f"{at}.drawn_as", found, table.drawn_as, distribution)
+        return Draw(key, found.unit, distribution, drawn_as)
+
+    def _distribution_table(self, at: str, raw: object) -> AnyTable | None:
+        kinds = list(distributions.TABLES)
+        choices = " or ".join(f'distribution = "{kind}"' for kind in kinds)
+        if not isinstance(raw, dict):
+            self.on.fault(at, raw, "is no table", f"[{at}] with {choices}")
+            return None
+        kind = raw.get("distribution")
+        if not isinstance(kind, str) or kind not in kinds:
+            reason = "is missing" if kind is None else "is none of the choices"
+            self.on.fault(f"{at}.distribution", kind, reason, choices, "" if kind is None else quoted_near(kind, kinds))
+            return None
+        return check_table(replace(self.on.document, prefix=at), distributions.TABLES[kind], raw)  # type: ignore[return-value]
+
+    def _identified(self, at: str, key: str, table: AnyTable) -> Draw | None:
+        """The mirrors that the identification leaves possible, in every cell."""
+        if key != MIRROR or not isinstance(table, distributions.IdentifiedTable):
+            expected = f'[inputs.{MIRROR}] with distribution = "identified", or the key of a single value'
+            self.on.fault(at, None, "does not go together with its distribution", expected)
+            return None
+        for base in self.bases:
+            m = base.file.mission.mirror
+            if m.uncertainty is None:
+                reason = f'is to be identified, but the mirror "{m.name}" has no table uncertainty'
+                self.on.fault(at, None, reason, "a mirror file as microrad identify writes it")
+                return None
+            twice = next((f"{MIRROR}.{p}" for p in m.uncertainty.parameters if f"{MIRROR}.{p}" in self.given), "")
+            if twice:
+                self.on.fault(at, None, f"draws {twice}, which the campaign gives too", "one of the two removed")
+                return None
+        return Draw(MIRROR, "", None, None)
+
+    def _drawn_as(self, at: str, key: Key, raw: object, wanted: Distribution) -> Distribution | None:
+        table = self._distribution_table(at, raw)
+        if table is None:
+            return None
+        if isinstance(table, distributions.IdentifiedTable) or table.drawn_as is not None:
+            self.on.fault(at, None, "is no distribution that an input can be drawn as", "a normal one, for example")
+            return None
+        found = self._distribution(at, key, table)
+        if found is not None and (reason := distributions.uncovered(wanted, found)):
+            self.on.fault(at, None, reason, "a distribution that reaches as far as the input's own")
+            return None
+        return found
+
+    def _distribution(self, at: str, key: Key, table: AnyTable) -> Distribution | None:
+        """The distribution of a table, its quantities read by the rule of the key."""
+        if isinstance(table, distributions.ListTable):
+            return self._one_of(at, key, table)
+        rule = key.numeric
+        if rule is None:
+            advice = 'distribution = "table" with its values, or a grid of them'
+            self.on.fault(at, None, "is not a quantity that takes any value in a range", advice)
+            return None
+        if isinstance(table, distributions.NormalTable):
+            mean = self.on.number(f"{at}.mean", rule, table.mean)
+            spread = self.on.number(f"{at}.deviation", Quantity(rule.unit, rule.typical, above=0.0), table.deviation)
+            return None if mean is None or spread is None else distributions.Normal(mean, spread)
+        assert not isinstance(table, distributions.IdentifiedTable)
+        is_log = isinstance(table, distributions.LogUniformTable)
+        bounds = bounds_of(self.on, at, rule, (table.low, table.high), is_log)
+        kind = distributions.LogUniform if is_log else distributions.Uniform
+        return None if bounds is None else kind(*bounds)
+
+    def _one_of(self, at: str, key: Key, table: distributions.ListTable) -> Distribution | None:
+        values = table.values
+        if not isinstance(values, list) or not 0 < len(values) <= MOST_ITEMS:
+            self.on.fault(f"{at}.values", values, "is not a list with something in it", f"1 to {MOST_ITEMS} values")
+            return None
+        fitting = [value for value in values if self.on.fits(f"{at}.values", key, value)]
+        if len(fitting) < len(values):
+            return None
+        read: list[Any] = [value if key.rule is None else key.rule.read(value) for value in values]
+        if any(read.count(value) > 1 for value in read):
+            self.on.fault(f"{at}.values", values, "has a value twice", "each value once, with its weight")
+            return None
+        is_words = not all(is_number(value) for value in read)
+        numbers = tuple(float(i) for i in range(1, len(read) + 1)) if is_words else tuple(float(v) for v in read)
+        weights = self._weights(f"{at}.weights", table.weights, len(read))
+        return None if weights is None else distributions.OneOf(numbers, weights, tuple(values), is_words)
+
+    def _weights(self, at: str, raw: object, count: int) -> tuple[float, ...] | None:
+        if raw is None:
+            return (1.0 / count,) * count
+        expected = f"{count} plain numbers above 0, one for each value"
+        if not isinstance(raw, list) or len(raw) != count or not all(is_number(v) and v > 0 for v in raw):
+            self.on.fault(at, raw, "does not give each value its weight", expected)
+            return None
+        total = math.fsum(raw)
+        return tuple(float(v) / total for v in raw)
+
+
+def bounds_of(
+    on: Reading, at: str, rule: Quantity, raw: tuple[object, object], is_log: bool = False
+) -> tuple[float, float] | None:
+    """The keys low and high of a table in SI units, or None with what is wrong noted."""
+    low, high = (on.number(f"{at}.{name}", rule, value) for name, value in zip(("low", "high"), raw, strict=True))
+    if low is None or high is None:
+        return None
+    if low >= high:
+        on.fault(f"{at}.high", raw[1], f"is not above low ({shown(raw[0])})", "a range that goes up")
+        return None
+    if is_log and low <= 0.0:
+        advice = 'a value above 0, or distribution = "uniform"'
+        on.fault(f"{at}.low", raw[0], "is not above 0, so that it has no logarithm", advice)
+        return None
+    return low, high
+
+
+def variable(on: Reading, key: str, table: VariableTable, data: Mapping[str, Any]) -> Variable | None:
+    """One design variable, or None with what is wrong noted."""
+    found = on.key("optimise.variables", key, None, data)
+    if found is None:
+        return None
+    at = f"optimise.variables.{key}"
+    if found.numeric is None:
+        on.fault(at, None, "is not a quantity that takes any value in a range", "the key of a quantity")
+        return None
+    bounds = bounds_of(on, at, found.numeric, (table.low, table.high))
+    return None if bounds is None else Variable(key, found.unit, *bounds)
+
+
+def input_texts(draws: tuple[Draw, ...], bases: tuple[Base, ...]) -> tuple[InputText, ...]:
+    """The drawn columns in words; an identified mirror has one for each parameter of any cell's mirror."""
+    found: list[InputText] = []
+    for draw in draws:
+        if draw.distribution is None:
+            found += _identified_texts(bases)
+            continue
+        words = draw.distribution.words(draw.unit)
+        instead = "" if draw.drawn_as is None else f"; drawn as {draw.drawn_as.words(draw.unit)} and weighted"
+        found.append(InputText(draw.key, draw.unit, words + instead))
+    return tuple(found)
+
+
+def _identified_texts(bases: tuple[Base, ...]) -> list[InputText]:
+    from microrad.mirror_spread import parameter_units  # here, to keep the start quick
+
+    found: dict[str, InputText] = {}
+    for base in bases:
+        table = base.file.mission.mirror
+        assert table.uncertainty is not None
+        errors = table.uncertainty.standard_errors
+        for (key, unit), error in zip(parameter_units(table).items(), errors, strict=True):
+            text = f"identified, standard error {100.0 * error:.3g} %"
+            found.setdefault(key, InputText(f"{MIRROR}.{key}", unit, text))
+    return list(found.values())

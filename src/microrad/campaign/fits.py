@@ -1,0 +1,166 @@
+"""What has to fit between the tables of a campaign file, and between them and the mission; faults go to the reading."""
+
+import difflib
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+from microrad.campaign.inputs import Base
+from microrad.campaign.outputs import OUTPUTS
+from microrad.campaign.reading import FILE_WORD, Reading, quoted_near
+from microrad.campaign.records import Limit
+from microrad.campaign.tables import MOST_RUNS, CampaignTable, LimitTable, LoopTable
+from microrad.fields import Quantity
+from microrad.mission import Mission
+from microrad.missionfile import check_table
+from microrad.units import format_quantity
+
+
+def check_loop(on: Reading, table: LoopTable, bases: Sequence[Base]) -> None:
+    """In every cell a mission with a loop, a controller of it, and time behind the settling."""
+    for base in bases:
+        m = base.file.mission
+        if m.fine_pointing is None:
+            expected = "a mission with [fine_pointing], which microrad init writes, or [loop] removed"
+            on.fault("loop", None, "needs a mission with the table [fine_pointing]", expected)
+            return
+        if not _has_controller(on, table, m):
+            return
+        if table.mirror == "comparison" and m.mirror.comparison is None:
+            reason = f'needs a comparison model, which the mirror "{m.mirror.name}" has not'
+            on.fault("loop.mirror", table.mirror, reason, 'mirror = "given"')
+            return
+        duration = table.duration_s or m.fine_pointing.duration_s
+        settle = m.fine_pointing.settle_s if table.settle_s is None else table.settle_s
+        if not duration > settle:
+            reason = f"leaves {format_quantity(duration, 's')}, all of it settling ({format_quantity(settle, 's')})"
+            on.fault("loop.duration", None, reason, f'duration = "{format_quantity(4.0 * settle, "s")}" would do')
+            return
+
+
+def _has_controller(on: Reading, table: LoopTable, m: Mission) -> bool:
+    from microrad import fine_pointing  # here, to keep the start quick
+
+    names = fine_pointing.names(m)
+    if table.controller in names:
+        return True
+    expected = " or ".join(f'"{name}"' for name in names)
+    near = quoted_near(table.controller, names)
+    on.fault("loop.controller", table.controller, "is no controller of the fine-pointing study", expected, near)
+    return False
+
+
+def kept(on: Reading, raw: object, table: CampaignTable | None) -> tuple[str, ...]:
+    """The outputs to keep in the order of `OUTPUTS`; by default all that there are but for those of the day."""
+    has_loop = table is None or table.loop is not None
+    if raw is None:
+        groups = {"residual", "link"} if has_loop else {"link"}
+        return tuple(name for name, output in OUTPUTS.items() if output.group in groups)
+    if not isinstance(raw, list) or not raw:
+        on.fault("keep", raw, "is not a list with something in it", 'names of outputs: keep = ["margin"]')
+        return ()
+    for name in raw:
+        if on.is_output("keep", name) and OUTPUTS[name].group == "residual" and not has_loop:
+            on.fault("keep", name, "needs the fine-pointing loop", "a table [loop], or this output left out")
+    return tuple(name for name in OUTPUTS if name in raw)
+
+
+def check_day(on: Reading, keep: Sequence[str], bases: Sequence[Base]) -> None:
+    """Outputs of the day only from missions that have a day."""
+    day = [name for name in keep if OUTPUTS[name].group == "day"]
+    if day and any(base.file.mission.orbit is None or base.file.mission.operations is None for base in bases):
+        expected = "a mission with [orbit] and [operations], which microrad init writes, or these outputs left out"
+        on.fault("keep", day, "needs the mission's tables [orbit] and [operations]", expected)
+
+
+# -------------------------------------------------------------------------------------------------------------- limits
+def default_limits(
+    on: Reading, keep: Sequence[str], m: Mission, varied: Mapping[str, Mapping[str, Any]]
+) -> tuple[Limit, ...]:
+    """The limits that the mission requires of the kept outputs; ``varied`` are keys that vary, by their table."""
+    r = m.requirement
+    wanted = (
+        Limit("margin", r.margin_db, None, "requirement.margin"),
+        Limit("residual_quantile", None, r.pointing_error_rad, "requirement.pointing_error"),
+    )
+    limits = tuple(limit for limit in wanted if limit.output in keep)
+    for limit in limits:
+        for name in (name for name, keys in varied.items() if limit.source in keys):
+            reason = f"is the limit of {limit.output} as well, which is the same in all rows"
+            on.fault(f"{name}.{limit.source}", None, reason, f"a table [limits.{limit.output}] with a value of its own")
+    return limits
+
+
+def limit(on: Reading, name: str, raw: object, keep: Sequence[str]) -> Limit | None:
+    """One limit, or None with what is wrong noted."""
+    at = f"limits.{name}"
+    if not on.is_output(at, name):
+        return None
+    if name not in keep:
+        on.fault(at, None, "is a limit of an output that is not kept", f'"{name}" in keep, or this table removed')
+        return None
+    if not isinstance(raw, dict) or not raw:
+        on.fault(at, None, "has neither least nor most", f"[{at}] with least or most")
+        return None
+    table = check_table(replace(on.document, prefix=at), LimitTable, raw)
+    if table is None:
+        return None
+    rule = Quantity(OUTPUTS[name].unit, OUTPUTS[name].typical)
+    least = None if table.least is None else on.number(f"{at}.least", rule, table.least)
+    most = None if table.most is None else on.number(f"{at}.most", rule, table.most)
+    if least is not None and most is not None and least >= most:
+        on.fault(f"{at}.most", table.most, "is not above least", "a range that goes up")
+    return Limit(name, least, most, FILE_WORD)
+
+
+def half_width(on: Reading, table: CampaignTable, keep: Sequence[str]) -> float:
+    """The half width that a precision wants, in its output's SI unit; nan without one."""
+    wanted = table.precision
+    if wanted is None or not on.is_output("precision.output", wanted.output):
+        return math.nan
+    if wanted.output not in keep:
+        on.fault("precision.output", wanted.output, "is not kept", f'"{wanted.output}" in keep, or another output')
+    rule = Quantity(OUTPUTS[wanted.output].unit, OUTPUTS[wanted.output].typical, above=0.0)
+    found = on.number("precision.half_width", rule, wanted.half_width)
+    return math.nan if found is None else found
+
+
+# --------------------------------------------------------------------------------------------------------------- whole
+def check_tail(on: Reading, table: CampaignTable, varying: Sequence[str], present: Mapping[str, Any]) -> None:
+    """Importance sampling of the noise: one loop for all rows of a cell, and no other outputs."""
+    if table.tail is None:
+        return
+    if table.loop is None:
+        on.fault("tail", None, "needs the fine-pointing loop", "a table [loop]")
+    for key in varying:
+        reason = "changes the loop, and a table [tail] needs the same loop in all rows"
+        on.fault(f"inputs.{key}", None, reason, "the mission's own value, or a grid of values")
+    for name in [name for name in ("keep", "limits", "precision", "realisations") if name in present]:
+        on.fault(name, None, "stands beside [tail], whose rows are single errors", "one of the two removed")
+
+
+def check_minimise(on: Reading, table: CampaignTable) -> None:
+    """An optimisation has variables, and minimises one of them or an output."""
+    if table.optimise is None:
+        return
+    if not table.optimise.variables:
+        on.fault("optimise.variables", None, "holds no variable", "[optimise.variables.KEY] with low and high")
+    wanted, names = table.optimise.minimise, [*table.optimise.variables, *OUTPUTS]
+    name = wanted.removeprefix("-")
+    if name in names:
+        return
+    near = next(iter(difflib.get_close_matches(name[:60], names, n=1)), "")
+    sign = "-" if wanted.startswith("-") else ""
+    expected = f"one of {', '.join(names)}"
+    reason = "is neither a variable of the optimisation nor an output"
+    on.fault("optimise.minimise", wanted, reason, expected, near and f'"{sign}{near}"')
+
+
+def check_size(on: Reading, rows: int, most_rows: int, realisations: int) -> None:
+    """Runs that the noise streams have numbers for; a first round within the most."""
+    if most_rows < rows:
+        on.fault("precision.at_most", most_rows, f"is below the {rows} rows of the first round", f"at least {rows}")
+    if most_rows * realisations > MOST_RUNS:
+        reason = f"makes {most_rows} rows of {realisations} runs each in a cell"
+        on.fault("runs", None, reason, f"at most 2^32 = {MOST_RUNS} runs: fewer rows or realisations")

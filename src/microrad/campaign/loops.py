@@ -1,0 +1,84 @@
+"""The fine-pointing loop of a campaign: its controller, tuned for a cell, and the runs of rows that share a loop."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+from microrad import fine_pointing
+from microrad.campaign.file import CampaignFile, LoopTable
+from microrad.campaign.records import CampaignError
+from microrad.control import AxisController
+from microrad.fine_loop import ensemble
+from microrad.fine_loop.loop import LoopController, PointingLoop
+from microrad.missionfile import MissionFile
+
+Beat = Callable[[], None]
+
+
+def scene(file: MissionFile, table: LoopTable) -> fine_pointing.Scene:
+    """The scene of a mission with the axes that the campaign simulates."""
+    built = fine_pointing.scene(file)
+    return replace(built, loop=built.axis) if table.axes == "one" else built
+
+
+def tuned(file: MissionFile, table: LoopTable) -> AxisController:
+    """The controller that the campaign names, tuned for this mission.
+
+    Raises `CampaignError` for a name that the mission has no controller of, and with the reason when none can be tuned.
+    """
+    m = file.mission
+    if table.controller not in fine_pointing.names(m):
+        names = ", ".join(f'"{name}"' for name in fine_pointing.names(m))
+        raise CampaignError(f'loop.controller = "{table.controller}" is no controller of the mission; it has {names}')
+    try:
+        of = fine_pointing.plants(scene(file, table), m, fine_pointing.table(m).seed)
+        return fine_pointing.tune(table.controller, m, of).controller
+    except ValueError as error:
+        raise CampaignError(f"the controller {table.controller!r} cannot be tuned: {error}") from error
+
+
+def held(file: MissionFile, table: LoopTable, axis: AxisController) -> LoopController:
+    """The tuned controller on the axes of a cell's own mission: what all its rows are flown with."""
+    built = scene(file, table)
+    built = replace(built, loop=fine_pointing.on_variant(built.loop, file.mission, table.mirror))
+    return fine_pointing.build(table.controller, built, file.mission, axis)
+
+
+def row_loop(file: MissionFile, table: LoopTable) -> PointingLoop:
+    """The loop of a row's mission."""
+    return fine_pointing.on_variant(scene(file, table).loop, file.mission, table.mirror)
+
+
+def span(campaign: CampaignFile, file: MissionFile) -> ensemble.Span:
+    """How long the runs of a campaign are: as its table `loop` says, else the mission; seeded by the campaign."""
+    f, table = fine_pointing.table(file.mission), campaign.table.loop
+    assert table is not None
+    duration = f.duration_s if table.duration_s is None else table.duration_s
+    settle = f.settle_s if table.settle_s is None else table.settle_s
+    return ensemble.Span(duration, settle, campaign.table.seed)
+
+
+@dataclass(frozen=True, slots=True)
+class Simulated:
+    """The runs of consecutive rows that share a loop, from ``first_row`` on, ``realisations`` for each."""
+
+    first_row: int
+    realisations: int
+    runs: ensemble.Ensemble
+
+    def row(self, row: int) -> ensemble.Ensemble:
+        """The runs of one row."""
+        return self.runs.part((row - self.first_row) * self.realisations, self.realisations)
+
+
+def simulate(
+    loop: PointingLoop,
+    controller: LoopController,
+    span: ensemble.Span,
+    rows: range,
+    realisations: int,
+    beat: Beat,
+) -> Simulated:
+    """All runs of these rows, one batch after the other on this thread; the numbers of the runs follow the rows'."""
+    numbers = range(rows.start * realisations, rows.stop * realisations)
+    found = ensemble.run(loop, controller, span, len(numbers), first_run=numbers.start, threads=1, beat=beat)
+    return Simulated(rows.start, realisations, found)

@@ -1,0 +1,66 @@
+"""Which rows a campaign has, in which chunks: it follows from the campaign file alone, whoever does the work."""
+
+import math
+
+from microrad import kernels
+from microrad.campaign import loops
+from microrad.campaign.file import CampaignFile
+from microrad.campaign.outputs import OUTPUTS, TAIL_OUTPUTS, Output
+from microrad.campaign.records import Job
+
+_CHUNK_STEPS = 4e7  # plant steps of all runs in a chunk: one to three seconds
+_CHUNK_ROWS = 1024  # at most, and without a loop
+_DAY_ROWS = 8  # with outputs of the day, which take a second each
+_GROWTH = 1.5  # of the rows from one round to the next, until the precision is reached
+
+
+def outputs(campaign: CampaignFile) -> tuple[Output, ...]:
+    """The outputs that each row has, in their order."""
+    if campaign.table.tail is not None:
+        return tuple(TAIL_OUTPUTS.values())
+    return tuple(OUTPUTS[name] for name in campaign.keep)
+
+
+def chunk_rows(campaign: CampaignFile) -> int:
+    """Rows in a chunk: a power of two, a few seconds of work."""
+    if any(output.group == "day" for output in outputs(campaign)):
+        return _DAY_ROWS
+    if campaign.table.loop is None:
+        return _CHUNK_ROWS
+    fine, own = campaign.mission.mission.fine_pointing, campaign.realisations
+    assert fine is not None  # the campaign file's own check
+    lanes = kernels.LANES * math.ceil(own / kernels.LANES) if campaign.loop_varies else own
+    steps = loops.span(campaign, campaign.mission).duration_s / fine.plant_step_s * lanes
+    full = 1 if campaign.loop_varies else math.ceil(kernels.LANES / own)  # rows that fill the lanes of a batch
+    wanted = max(_CHUNK_STEPS / steps, 1.0)
+    return max(min(1 << int(math.log2(wanted)), _CHUNK_ROWS), 1 << math.ceil(math.log2(full)))
+
+
+def rounds(campaign: CampaignFile) -> tuple[int, ...]:
+    """Rows of a cell at the end of each round, rising: one round, or more until a wanted precision is reached.
+
+    With a precision each round has whole chunks and blocks, so that what is done does not depend on where it stops.
+    """
+    wanted = campaign.table.precision
+    if wanted is None:
+        return (campaign.rows,)
+    unit = max(chunk_rows(campaign), campaign.block)  # powers of two, so the larger holds whole ones of the other
+    totals = [_whole(campaign.rows, unit)]
+    while totals[-1] < wanted.at_most:
+        totals.append(_whole(min(math.ceil(_GROWTH * totals[-1]), wanted.at_most), unit))
+    return tuple(totals)
+
+
+def _whole(rows: int, unit: int) -> int:
+    return -(-rows // unit) * unit
+
+
+def chunks(campaign: CampaignFile, cell: int, rows: int) -> list[Job]:
+    """The chunks that the first ``rows`` rows of a cell are in."""
+    return [Job(cell, number) for number in range(-(-rows // chunk_rows(campaign)))]
+
+
+def rows_of(campaign: CampaignFile, number: int) -> range:
+    """The rows of a chunk; the last one of a campaign may be shorter."""
+    size = chunk_rows(campaign)
+    return range(number * size, min((number + 1) * size, rounds(campaign)[-1]))

@@ -1,0 +1,80 @@
+"""What every part of a campaign file is read with: its document, and how a fault is said of it."""
+
+import difflib
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+from microrad.campaign.keys import Key, UnknownKeyError, find
+from microrad.campaign.outputs import OUTPUTS
+from microrad.document import Document, shown
+from microrad.fields import Quantity
+from microrad.missionfile import check_value
+from microrad.units import UnitError
+
+FILE_WORD = "campaign file"
+"""What messages call it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """A campaign file on its way to a record; keys are dotted and begin with the table they stand in."""
+
+    document: Document
+
+    def fault(self, key: str, value: object, reason: str, expected: str, nearest: str = "") -> None:
+        """Note a fault on the line of a key."""
+        self.document.fault(key, "" if value is None else shown(value), reason, expected, nearest=nearest)
+
+    def key(self, at: str, key: str, value: object, data: Mapping[str, Any]) -> Key | None:
+        """A key of the mission, or None with what is wrong noted."""
+        try:
+            return find(key, data)
+        except UnknownKeyError as error:
+            self.fault(f"{at}.{key}", value, error.reason, error.expected, error.nearest)
+            return None
+
+    def fits(self, at: str, key: Key, value: object) -> bool:
+        """Whether a value fits a key by itself; what is wrong with it is noted at a key of the campaign."""
+        scratch = replace(self.document, faults=[], prefix=key.text.rpartition(".")[0])
+        if check_value(scratch, key.table, key.name, value):
+            return True
+        for fault in scratch.faults:
+            self.fault(at, value, fault.reason, fault.expected, fault.nearest)
+        return False
+
+    def number(self, at: str, rule: Quantity, raw: object) -> float | None:
+        """The SI value of a quantity, or None with what is wrong noted."""
+        try:
+            return float(rule.read(raw))
+        except UnitError as error:
+            example = f'"{error.example}"' if " " in error.example else error.example
+            name = at.rpartition(".")[2]
+            self.fault(at, raw, error.reason, f"{error.expected}; for example {name} = {example}")
+            return None
+
+    def is_output(self, at: str, name: object) -> bool:
+        """Whether a name is that of an output; what is wrong with it is noted."""
+        if isinstance(name, str) and name in OUTPUTS:
+            return True
+        self.fault(at, name, "is no output", f"one of {', '.join(OUTPUTS)}", quoted_near(name, OUTPUTS))
+        return False
+
+
+def text_of(value: object) -> str:
+    """A value of a campaign file as text, in full: strings without their quotes."""
+    if isinstance(value, list):
+        return f"[{', '.join(text_of(each) for each in value)}]"
+    return str(value).lower() if isinstance(value, bool) else str(value)
+
+
+def is_number(value: object) -> bool:
+    """Whether a value is a finite plain number."""
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+
+
+def quoted_near(word: object, words: Iterable[str]) -> str:
+    """The choice that a word resembles, in quotes, or ""."""
+    near = next(iter(difflib.get_close_matches(str(word)[:60], list(words), n=1)), "")
+    return near and f'"{near}"'

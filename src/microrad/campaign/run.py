@@ -1,0 +1,334 @@
+"""Runs a campaign into its ledger, from the begin or from where it stopped: rounds, second tries, worst traces."""
+
+import heapq
+import math
+import os
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from datetime import UTC, datetime
+from pathlib import Path
+
+import numpy as np
+
+from microrad.campaign import blob, bundle, ledger, loops, plan, sampling, summary, work
+from microrad.campaign.blob import Column, Head
+from microrad.campaign.file import CampaignFile, load_campaign
+from microrad.campaign.inputs import Builder
+from microrad.campaign.ledger import Ledger
+from microrad.campaign.records import CampaignError, Chunk, Engine, Failed, Job, Outcome
+from microrad.campaign.sketch import Sketch
+from microrad.control import AxisController
+from microrad.units import format_quantity
+
+Progress = Callable[[int, int, str], None]
+
+TARGET = "microrad.campaign.work:open_work"
+LATE_S = 30.0
+"""Without a sign of life for this long beyond the campaign's row_limit, a worker is stopped."""
+
+
+@dataclass(frozen=True, slots=True)
+class Means:
+    """What does the work: ``threads`` of one worker process, ``workers`` of a Dask cluster here, or a scheduler.
+
+    At most one is given; None of all is as many threads as the machine has cores.
+    """
+
+    threads: int | None = None
+    workers: int | None = None
+    scheduler: str | None = None
+
+    def engine(self, spec: bytes, late_s: float) -> Engine:
+        """The engine, started."""
+        if self.workers is None and self.scheduler is None:
+            from microrad.campaign.engines import LocalEngine
+
+            return LocalEngine(spec, TARGET, self.threads or os.cpu_count() or 1, late_s)
+        from microrad.campaign.cluster import DaskEngine  # dask is an extra
+
+        return DaskEngine(spec, TARGET, address=self.scheduler, workers=self.workers, late_s=late_s)
+
+
+def begin(file: Path, path: Path, means: Means, on_progress: Progress = lambda done, total, what: None) -> None:
+    """Run a campaign file into a new ledger.
+
+    Raises `CampaignError` and `missionfile.MissionError` for what cannot be run, and KeyboardInterrupt with words that
+    say how to go on; what was finished by then is in the ledger.
+    """
+    campaign = load_campaign(file)
+    spec = bundle.packed(campaign, controllers(campaign, on_progress))
+    with Ledger.create(path, _head(campaign, spec)) as book:
+        book.note("file", str(file.resolve()))
+        _Run(campaign, spec, book, means, on_progress).whole()
+
+
+def resume(path: Path, means: Means, on_progress: Progress = lambda done, total, what: None) -> None:
+    """Go on with a campaign that stopped; one that is complete stays as it is. Damaged chunks are done again.
+
+    Raises `CampaignError` with both hashes when microrad, the campaign file or the mission is no longer what it was;
+    files that are no longer there are taken from the ledger.
+    """
+    if not ledger.verify(path).sound:
+        ledger.mend(path)
+    with Ledger.open(path, write=True) as book:
+        head = book.head
+        file = Path(book.notes().get("file", ""))
+        opened = bundle.opened(head.bundle, any_code=True)
+        campaign = load_campaign(file) if file.is_file() else opened.campaign
+        ledger.check_same(head.hashes, bundle.hashes(campaign), path)
+        _Run(opened.campaign, head.bundle, book, means, on_progress).whole()
+
+
+def controllers(campaign: CampaignFile, on_progress: Progress) -> tuple[AxisController, ...]:
+    """The controller of each cell, tuned; none without a loop."""
+    table = campaign.table.loop
+    if table is None:
+        return ()
+    builder = Builder(campaign)
+    made: dict[object, AxisController] = {}
+    found = []
+    for cell in range(len(campaign.cells)):
+        on_progress(cell, len(campaign.cells), f"tuning {table.controller}")
+        key = builder.loop_key(cell, {})
+        if key not in made:
+            made[key] = loops.tuned(builder.mission(cell, {}), table)
+        found.append(made[key])
+    return tuple(found)
+
+
+def _head(campaign: CampaignFile, spec: bytes) -> Head:
+    from importlib.metadata import version
+
+    outputs = plan.outputs(campaign)
+    drawn = sampling.rows(campaign, 0, 0, 1)[0]
+    units = dict(campaign.dimensions)
+    columns = [Column("row", "", "number of the row in its cell"), Column("weight", "", "weight of the row")]
+    columns += [Column(name, units[name], "drawn") for name in drawn]
+    columns += [Column(output.name, output.unit, output.meaning) for output in outputs]
+    return Head(
+        campaign_name=campaign.path.stem,
+        campaign_text=campaign.text,
+        mission_name=campaign.mission.mission.name,
+        seed=campaign.table.seed,
+        hashes=bundle.hashes(campaign),
+        versions={name: version(name) for name in ("microrad", *bundle.LIBRARIES)},
+        created=datetime.now(UTC).isoformat(timespec="seconds"),
+        cells=tuple(campaign.cells),
+        columns=tuple(columns),
+        bundle=spec,
+    )
+
+
+@dataclass
+class _Pace:
+    """Rows done here and before, the time that they took, and the first limit's output so far."""
+
+    done: int
+    spent_s: float
+    began_s: float = field(default_factory=time.monotonic)
+    here: int = 0
+    sketch: Sketch = field(default_factory=Sketch)
+
+    @property
+    def seconds(self) -> float:
+        return self.spent_s + time.monotonic() - self.began_s
+
+    def words(self, total: int, shown: str) -> str:
+        """Rate, time left and the interim quantile."""
+        took = time.monotonic() - self.began_s
+        if not self.here or took <= 0.0:
+            return "rows"
+        rate = self.here / took
+        left = (total - self.done) / rate
+        return ", ".join(part for part in (f"{rate:.3g} rows/s", f"{_minutes(left)} left", shown) if part)
+
+
+def _minutes(seconds: float) -> str:
+    if seconds < 90.0:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60.0:.0f} min" if seconds < 5400.0 else f"{seconds / 3600.0:.1f} h"
+
+
+class _Run:
+    """One campaign on its way into its ledger."""
+
+    def __init__(self, campaign: CampaignFile, spec: bytes, book: Ledger, means: Means, on_progress: Progress) -> None:
+        self.campaign, self.spec, self.book, self.means, self.on_progress = campaign, spec, book, means, on_progress
+        self.late_s = campaign.table.row_limit_s + LATE_S
+        done = book.done()
+        rows = sum(len(plan.rows_of(campaign, number)) for _, number in done)
+        self.pace = _Pace(rows, float(book.notes().get("seconds", 0.0)))
+        self.total = 0
+
+    def whole(self) -> None:
+        """All rounds, then the traces; whatever stops it, what is done stays."""
+        self.book.note("state", "running")
+        engine: Engine | None = None
+        try:
+            for rows in plan.rounds(self.campaign):
+                cells = [cell for cell in range(len(self.campaign.cells)) if not self._reached(cell, rows)]
+                jobs = [job for cell in cells for job in plan.chunks(self.campaign, cell, rows)]
+                missing = [job for job in jobs if (job.cell, job.number) not in self.book.done()]
+                self.total = self.pace.done + sum(len(plan.rows_of(self.campaign, job.number)) for job in missing)
+                if missing:
+                    engine = engine or self.means.engine(self.spec, self.late_s)
+                    self._round(engine, missing)
+            self._traces(engine)
+            self._note("complete")
+        except KeyboardInterrupt:
+            if engine is not None:
+                engine.close()
+            self._note("stopped")
+            raise KeyboardInterrupt(f"stopped; {self._stopped()}") from None
+        except BaseException as error:
+            if engine is not None:
+                engine.close()
+            self._note("stopped", quietly=True)
+            if isinstance(error, CampaignError) and "campaign resume" not in str(error):
+                raise CampaignError(f"{error}; {self._stopped()}") from error
+            raise
+        finally:
+            if engine is not None:
+                engine.close()
+
+    def _note(self, state: str, quietly: bool = False) -> None:
+        try:
+            self.book.note("seconds", self.pace.seconds)
+            self.book.note("state", state)
+        except CampaignError:
+            if not quietly:
+                raise
+
+    def _stopped(self) -> str:
+        return f"{self.pace.done} rows are in {self.book.path}. Go on with: microrad campaign resume {self.book.path}"
+
+    # ---------------------------------------------------------------------------------------------------------- rounds
+    def _reached(self, cell: int, rows: int) -> bool:
+        """Whether the rows of the rounds before this one are already as precise as wanted."""
+        before = [total for total in plan.rounds(self.campaign) if total < rows]
+        wanted = self.campaign.table.precision
+        if wanted is None or not before:
+            return False
+        return any(summary.reached(self.campaign, self.book, cell, total) for total in before)
+
+    def _round(self, engine: Engine, jobs: Sequence[Job]) -> None:
+        """Do these chunks: each at most twice as a whole, then the rows of those that failed one by one."""
+        failed = self._pass(engine, jobs)
+        failed = self._pass(engine, [outcome.job for outcome in failed])
+        for outcome in failed:
+            self._by_rows(engine, outcome.job)
+
+    def _pass(self, engine: Engine, jobs: Sequence[Job]) -> list[Outcome]:
+        """Put what is done into the ledger; returns what is not."""
+        missed = []
+        for outcome in engine.outcomes(iter(jobs)) if jobs else ():
+            if outcome.kind == "done":
+                self._keep(outcome.job, outcome.payload)
+            else:
+                missed.append(outcome)
+        return missed
+
+    def _keep(self, job: Job, payload: bytes) -> None:
+        self.book.put(job.cell, job.number, payload)
+        rows = len(plan.rows_of(self.campaign, job.number))
+        self.pace.done, self.pace.here = self.pace.done + rows, self.pace.here + rows
+        self.book.note("seconds", self.pace.seconds)
+        self.on_progress(self.pace.done, self.total, self.pace.words(self.total, self._interim(payload)))
+
+    def _interim(self, payload: bytes) -> str:
+        """The quantile of the first limit's output over the rows of this sitting."""
+        if not self.campaign.limits:
+            return ""
+        limit = self.campaign.limits[0]
+        output = next((each for each in plan.outputs(self.campaign) if each.name == limit.output), None)
+        if output is None:
+            return ""
+        self.pace.sketch.add(blob.unpack_chunk(payload).columns[output.name])
+        share = 0.01 if limit.least is not None else 0.99
+        value = self.pace.sketch.quantile(share)
+        shown = "-" if math.isnan(value) else format_quantity(value, output.unit or "1", 3)
+        return f"{output.name} {100 * share:g} %: {shown}"
+
+    def _by_rows(self, engine: Engine, job: Job) -> None:
+        """The rows of a chunk that cannot be done whole, each by itself and at most twice; the rest have failed."""
+        rows = [Job(job.cell, job.number, row, "row") for row in plan.rows_of(self.campaign, job.number)]
+        found: dict[int, Chunk] = {}
+        lost: dict[int, str] = {}
+        for _ in range(work.ATTEMPTS):
+            todo = [each for each in rows if each.row not in found or found[each.row].failed]
+            for outcome in engine.outcomes(iter(todo)) if todo else ():
+                if outcome.kind == "done":
+                    found[outcome.job.row] = blob.unpack_chunk(outcome.payload)
+                else:
+                    lost[outcome.job.row] = outcome.reason
+        parts = [
+            self._tried(found[each.row]) if each.row in found else self._lost(each, lost[each.row]) for each in rows
+        ]
+        self._keep(job, blob.pack_chunk(joined(job, parts)))
+
+    @staticmethod
+    def _tried(chunk: Chunk) -> Chunk:
+        """A chunk of one row with the number of its tries, if it failed."""
+        return replace(chunk, failed=tuple(replace(each, attempts=work.ATTEMPTS) for each in chunk.failed))
+
+    def _lost(self, job: Job, reason: str) -> Chunk:
+        """A row that took its worker down, or that was stopped."""
+        drawn, weight = sampling.rows(self.campaign, job.cell, job.row, 1)
+        columns = {"row": np.array([float(job.row)]), "weight": weight, **drawn}
+        columns |= {output.name: np.array([math.nan]) for output in plan.outputs(self.campaign)}
+        failed = Failed(job.row, self.campaign.table.seed, work.ATTEMPTS, reason)
+        return Chunk(job.cell, job.number, columns, (failed,), np.zeros(0), np.zeros(0))
+
+    # ---------------------------------------------------------------------------------------------------------- traces
+    def _traces(self, engine: Engine | None) -> None:
+        """Keep the traces of the rows that are worst in the first limit's output, in each cell."""
+        wanted = {(cell, row): value for cell in range(len(self.campaign.cells)) for row, value in self._worst(cell)}
+        if not wanted:
+            return
+        output = self.campaign.limits[0].output
+        there = {(trace.cell, trace.row) for trace in self.book.traces()}
+        for trace in self.book.traces():
+            if (trace.cell, trace.row) not in wanted:
+                self.book.drop_trace(trace)
+        jobs = [Job(cell, 0, row, "trace") for cell, row in wanted if (cell, row) not in there]
+        if not jobs:
+            return
+        engine = engine or self.means.engine(self.spec, self.late_s)
+        try:
+            for outcome in engine.outcomes(iter(jobs)):
+                if outcome.kind == "done":
+                    found = blob.unpack_trace(outcome.payload)
+                    value = wanted[found.cell, found.row]
+                    self.book.put_trace(replace(found, output=output, value=value))
+        finally:
+            engine.close()
+
+    def _worst(self, cell: int) -> list[tuple[int, float]]:
+        """Rows with the worst values of the first limit's output, and the values."""
+        if self.campaign.table.loop is None or self.campaign.table.tail is not None or not self.campaign.limits:
+            return []
+        limit = self.campaign.limits[0]
+        sign = -1.0 if limit.least is not None else 1.0
+        scored = (
+            (sign * value, -int(row))
+            for chunk in self.book.chunks(cell)
+            for row, value in zip(chunk.columns["row"], chunk.columns[limit.output], strict=True)
+            if not math.isnan(value)
+        )
+        return [(-row, sign * score) for score, row in heapq.nlargest(self.campaign.table.worst, scored)]
+
+
+def joined(job: Job, parts: Sequence[Chunk]) -> Chunk:
+    """The chunk that these chunks of one row make up."""
+    names = parts[0].columns
+    sums = [chunk for chunk in parts if chunk.survival.size]
+    zeros = np.zeros(sums[0].survival.size) if sums else np.zeros(0)
+    return Chunk(
+        job.cell,
+        job.number,
+        {name: np.concatenate([chunk.columns[name] for chunk in parts]) for name in names},
+        tuple(failed for chunk in parts for failed in chunk.failed),
+        sum((chunk.survival for chunk in sums), zeros),
+        sum((chunk.survival_square for chunk in sums), zeros),
+    )

@@ -1,0 +1,235 @@
+"""Commands of campaigns: run, look, go on, verify, export, draw, optimise."""
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from microrad.cli.frame import (
+    CLOSES,
+    DOES_NOT_CLOSE,
+    Json,
+    Outcome,
+    Overwrite,
+    Refusal,
+    app,
+    check_target,
+    command,
+    examples,
+    json_text,
+    option,
+    progress_bar,
+    width,
+)
+from microrad.folder import write_whole
+
+# Everything else is imported inside the commands: it takes longer to load than help may take.
+if TYPE_CHECKING:
+    from microrad.campaign.run import Means
+
+campaigns = typer.Typer(
+    name="campaign",
+    help="Many runs of a mission with drawn inputs: tails, sweeps, sensitivity, optimisation.",
+    epilog=examples(
+        "microrad campaign init            write a campaign file to start from",
+        "microrad campaign run campaign.toml",
+        "microrad campaign status campaign.ledger",
+    ),
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+)
+app.add_typer(campaigns)
+
+_File = Annotated[Path, typer.Argument(help="Campaign file; microrad campaign init writes one.", metavar="FILE")]
+_Ledger = Annotated[Path, typer.Argument(help="Ledger that microrad campaign run wrote.", metavar="LEDGER")]
+_Threads = Annotated[int | None, option("--threads", "N", "Threads of this machine [default: all].", min=1)]
+_Workers = Annotated[int | None, option("--workers", "N", "A Dask cluster of N processes on this machine.", min=1)]
+_Scheduler = Annotated[
+    str | None, option("--scheduler", "ADDRESS", "A running Dask scheduler, such as tcp://head:8786.")
+]
+
+
+def _means(threads: int | None, workers: int | None, scheduler: str | None) -> "Means":
+    if sum(each is not None for each in (threads, workers, scheduler)) > 1:
+        raise Refusal("--threads, --workers and --scheduler exclude each other; give one of them.")
+    from microrad.campaign.run import Means
+
+    return Means(threads, workers, scheduler)
+
+
+def _shown(path: Path, as_json: bool, output: str = "") -> Outcome:
+    """The state of a ledger, as text or JSON; the exit code says whether the rows keep the limits."""
+    from microrad.campaign.summary import summarise
+    from microrad.report import campaign_words
+
+    found = summarise(path)
+    code = CLOSES if campaign_words.verdict(found) == "pass" else DOES_NOT_CLOSE
+    if as_json:
+        return Outcome(json_text({**campaign_words.data(found), "ledger": str(path)}), code)
+    return Outcome(f"{campaign_words.text(found, width())}\n\n{output or path}", code)
+
+
+@campaigns.command(epilog=examples("microrad campaign init", "microrad campaign init tails.toml"))
+@command
+def init(
+    file: Annotated[Path | None, typer.Argument(help="File to write [default: campaign.toml].")] = None,
+) -> Outcome:
+    """Write a campaign file with the paper's mission, ready to run.
+
+    The mission is written beside it as leo-geo.toml where there is none. No file is ever overwritten.
+    """
+    from importlib import resources
+
+    file = file or Path("campaign.toml")
+    check_target(file, "name another one: microrad campaign init other.toml")
+    shipped, mission = resources.files("microrad").joinpath("missions"), file.with_name("leo-geo.toml")
+    if not mission.exists():
+        write_whole(mission, shipped.joinpath("leo-geo.toml").read_text("utf-8"))
+    write_whole(file, shipped.joinpath("campaign.toml").read_text("utf-8"))
+    return Outcome(f"{file} written, for {mission}. Next: microrad campaign run {file}")
+
+
+@campaigns.command(
+    epilog=examples(
+        "microrad campaign run campaign.toml",
+        "microrad campaign run campaign.toml --ledger tails.ledger --workers 4",
+        "microrad campaign run campaign.toml --scheduler tcp://head:8786",
+    )
+)
+@command
+def run(
+    file: _File,
+    ledger: Annotated[
+        Path | None, option("--ledger", "LEDGER", "File to write [default: the campaign file's name, with .ledger].")
+    ] = None,
+    threads: _Threads = None,
+    workers: _Workers = None,
+    scheduler: _Scheduler = None,
+    as_json: Json = False,
+) -> Outcome:
+    """Run a campaign into a new ledger, and print what the rows say.
+
+    Whatever stops it (Ctrl-C, a kill, a full disk), finished rows are in the ledger, and microrad campaign resume goes
+    on to the same results. The exit code is 0 when all rows keep all limits (with a grid: in one of its cells at
+    least), and 1 when they do not.
+    """
+    from microrad.campaign.run import begin
+
+    path = ledger or file.with_suffix(".ledger")
+    means = _means(threads, workers, scheduler)
+    with progress_bar() as progress:
+        begin(file, path, means, progress)
+    return _shown(path, as_json)
+
+
+@campaigns.command(epilog=examples("microrad campaign resume campaign.ledger"))
+@command
+def resume(
+    ledger: _Ledger,
+    threads: _Threads = None,
+    workers: _Workers = None,
+    scheduler: _Scheduler = None,
+    as_json: Json = False,
+) -> Outcome:
+    """Go on with a campaign that stopped, to the results it would have had.
+
+    Refused where microrad, the campaign file or the mission is no longer what it was.
+    """
+    from microrad.campaign.run import resume as go_on
+
+    means = _means(threads, workers, scheduler)
+    with progress_bar() as progress:
+        go_on(ledger, means, progress)
+    return _shown(ledger, as_json)
+
+
+@campaigns.command(epilog=examples("microrad campaign status campaign.ledger"))
+@command
+def status(ledger: _Ledger, as_json: Json = False) -> Outcome:
+    """Print how far a campaign is and what its rows say so far; it may be running meanwhile."""
+    return _shown(ledger, as_json)
+
+
+@campaigns.command(epilog=examples("microrad campaign verify campaign.ledger"))
+@command
+def verify(ledger: _Ledger, as_json: Json = False) -> Outcome:
+    """Check every byte of a ledger against its checksums.
+
+    The exit code is 1 when something is damaged; microrad campaign resume does just that again.
+    """
+    from microrad.campaign import ledger as books
+
+    found = books.verify(ledger)
+    if as_json:
+        return Outcome(json_text({**asdict(found), "sound": found.sound}), int(not found.sound))
+    lines = [f"{found.checked} chunks with a right checksum"]
+    lines += [f"damaged: chunk {number} of cell {cell}" for cell, number in found.damaged]
+    lines += [f"damaged: {fault}" for fault in found.faults]
+    if not found.sound:
+        lines.append(f"Next: microrad campaign resume {ledger} does again what is damaged, and nothing else")
+    return Outcome("\n".join(lines), int(not found.sound))
+
+
+@campaigns.command(
+    epilog=examples(
+        "microrad campaign export campaign.ledger rows.csv",
+        "microrad campaign export campaign.ledger rows.parquet",
+        "microrad campaign export campaign.ledger rows.nc",
+    )
+)
+@command
+def export(
+    ledger: _Ledger,
+    file: Annotated[Path, typer.Argument(help="File to write: .nc, .parquet or .csv.", metavar="FILE")],
+    overwrite: Overwrite = False,
+) -> Outcome:
+    """Write the table of rows: drawn inputs, weights, outputs, and why a row failed."""
+    from microrad.campaign.export import export as write
+    from microrad.campaign.ledger import Ledger
+
+    if not overwrite:
+        check_target(file, "choose another name, or replace it with --overwrite")
+    with Ledger.open(ledger, write=False) as book:
+        write(book, file)
+    return Outcome(str(file))
+
+
+@campaigns.command(
+    epilog=examples("microrad campaign report campaign.ledger", "microrad campaign report x.ledger x.html")
+)
+@command
+def report(
+    ledger: _Ledger,
+    file: Annotated[Path | None, typer.Argument(help="Page to write [default: the ledger's name, .html].")] = None,
+    overwrite: Overwrite = False,
+) -> Outcome:
+    """Write one page with the pictures: distributions, tail, sensitivity, failure region, worst rows."""
+    from microrad.campaign.summary import summarise
+    from microrad.report import campaign_page
+
+    file = file or ledger.with_suffix(".html")
+    if not overwrite:
+        check_target(file, "choose another name, or replace it with --overwrite")
+    write_whole(file, campaign_page.html(summarise(ledger)))
+    return Outcome(str(file))
+
+
+@campaigns.command(epilog=examples("microrad campaign optimise campaign.toml"))
+@command
+def optimise(file: _File, threads: _Threads = None, as_json: Json = False) -> Outcome:
+    """Find the design of least cost whose rows keep the limits often enough.
+
+    The table optimise of the campaign file says what may change. The optimum is checked with rows that the search has
+    not seen. The exit code is 0 when it keeps the limits there, too, and 1 when it does not.
+    """
+    from microrad.campaign import search
+    from microrad.report import campaign_optimum
+
+    with progress_bar() as progress:
+        found = search.run(file, threads, progress)
+    code = CLOSES if found.feasible and found.fresh is not None and found.fresh.feasible else DOES_NOT_CLOSE
+    if as_json:
+        return Outcome(json_text(campaign_optimum.data(found)), code)
+    return Outcome(campaign_optimum.text(found), code)

@@ -1,0 +1,120 @@
+"""A campaign as one page that loads nothing, with its pictures."""
+
+from typing import Any
+
+import numpy as np
+
+from microrad.campaign.records import CampaignSummary, CellSummary, Limit, OutputSummary
+from microrad.report import campaign_figures, page
+from microrad.report import campaign_words as words
+from microrad.report.figures import Figure
+
+MOST_FAILED, MOST_TRACES = 40, 6
+_MOST_QUANTILES = 7
+
+
+def html(summary: CampaignSummary) -> str:
+    """The page; every text of the campaign is escaped, and nothing is loaded from anywhere."""
+    return page.pages().get_template("campaign.html").render(context(summary, draw(summary)))
+
+
+def context(summary: CampaignSummary, figures: dict[str, Any]) -> dict[str, Any]:
+    """What the template needs; ``figures`` by section."""
+    cell = words.best(summary)
+    failed = words.failed_rows(summary, MOST_FAILED)
+    return {
+        **_head(summary),
+        **_of_cell(summary, cell),
+        "verdict": words.verdict(summary),
+        "headline": words.headline(summary),
+        "answers": words.answers(summary, cell),
+        "progress": words.progress_words(summary),
+        "warnings": summary.warnings,
+        "combinations": words.cell_table(summary) if len(summary.cells) > 1 else None,
+        "keys": len(summary.cells[0].values) if summary.cells else 0,
+        "index_headings": words.INDEX_HEADINGS,
+        "indices": words.index_rows(summary.sensitivities),
+        "figures": figures,
+        "failed_headings": words.FAILED_HEADINGS,
+        "failed": failed,
+        "more_failed": words.more_failed(summary, len(failed)),
+        "setting": words.setting(summary),
+        "inputs": [(each.key, each.distribution) for each in summary.inputs],
+        "hashes": list(summary.hashes.items()),
+    }
+
+
+def _head(summary: CampaignSummary) -> dict[str, Any]:
+    """The mission and the campaign's file, as the head of every page names them."""
+    file = {"path": {"name": summary.name}, "sha256": summary.hashes.get("campaign", "")}
+    return {"mission": {"name": summary.mission_name}, "study": {"file": file}}
+
+
+def _of_cell(summary: CampaignSummary, cell: CellSummary | None) -> dict[str, Any]:
+    """Limits and outputs of the cell shown in detail; nothing where no row has results."""
+    if cell is None:
+        return {"detail": "", "limits": None, "outputs": None, "even": [], "tail": None}
+    return {
+        "detail": cell.label,
+        "limits": words.limit_table(summary, cell) if summary.limits else None,
+        "outputs": words.output_table(cell, _MOST_QUANTILES),
+        "tail": None if cell.tail is None else words.tail_table(cell.tail),
+        "even": words.even(cell),
+    }
+
+
+# ------------------------------------------------------------------------------------------------------------- figures
+def draw(summary: CampaignSummary) -> dict[str, tuple[Figure, ...]]:
+    """The figures by the section of the page that they stand in; a section with nothing to show has none."""
+    cell = words.best(summary)
+    if cell is None:
+        return dict.fromkeys(("grid", "outputs", "tail", "sensitivity", "region", "worst"), ())
+    spread = [output for output in cell.outputs.values() if _spread(output)]
+    return {
+        "grid": campaign_figures.grid(summary),
+        "outputs": tuple(campaign_figures.distribution(o, campaign_figures.limit_of(summary, o.name)) for o in spread),
+        "tail": campaign_figures.tail(summary, cell),
+        "sensitivity": campaign_figures.sensitivity(summary),
+        "region": region(summary),
+        "worst": tuple(
+            campaign_figures.worst(summary, trace, k + 1) for k, trace in enumerate(summary.worst[:MOST_TRACES])
+        ),
+    }
+
+
+def _spread(output: OutputSummary) -> bool:
+    """Whether there is more than one value to draw."""
+    return output.rows > 1 and output.edges.size > 2 and output.most > output.least and float(output.counts.sum()) > 0.0
+
+
+def region(summary: CampaignSummary) -> tuple[Figure, ...]:
+    """Where the limit that is most often missed is missed; nothing where all rows are on one side of each limit."""
+    found = _split(summary)
+    if found is None:
+        return ()
+    inputs = _leading(summary, found[0].output, summary.sample["cell"] == found[1])
+    return (campaign_figures.region(summary, *found, inputs),) if inputs else ()
+
+
+def _split(summary: CampaignSummary) -> tuple[Limit, int] | None:
+    """The limit most often missed, and the cell whose rows are the most evenly on both sides of it."""
+    missed = {
+        (limit.output, k): cell.missed_by[limit.output].value
+        for limit in summary.limits
+        for k, cell in enumerate(summary.cells)
+        if limit.output in cell.missed_by and limit.output in cell.outputs and limit.output in summary.sample
+    }
+    split = {key: share for key, share in missed.items() if 0.0 < share < 1.0}
+    if not split:
+        return None
+    output = max(split, key=lambda key: split[key])[0]
+    number = min((k for name, k in split if name == output), key=lambda k: abs(split[output, k] - 0.5))
+    return next(limit for limit in summary.limits if limit.output == output), number
+
+
+def _leading(summary: CampaignSummary, output: str, rows: Any) -> list[str]:
+    """At most two inputs that matter most to an output, of those that differ over the rows."""
+    found = [s for s in summary.sensitivities if s.output == output]
+    ordered = [key for s in found for key, _ in words.ranked(s)]
+    ordered += [each.key for each in summary.inputs if each.key not in ordered]
+    return [key for key in ordered if key in summary.sample and np.unique(summary.sample[key][rows]).size > 1][:2]

@@ -1,0 +1,94 @@
+"""Work for the tests of engines: the specification says by a job's number what it does, else it gives its own name."""
+
+import ctypes
+import json
+import os
+import signal
+import sys
+import time
+from pathlib import Path
+
+from microrad.campaign.records import CampaignError
+
+
+def code_sha256():
+    return os.environ.get("CODE_OF_TARGET", "c0de")
+
+
+def open_work(spec):
+    if spec == b"refuse":
+        raise CampaignError("mission.toml: no such mission")
+    if spec == b"die":
+        print("cannot go on", file=sys.stderr, flush=True)
+        os._exit(3)
+    return Work(json.loads(spec))
+
+
+class Work:
+    def __init__(self, table):
+        self.table = table
+
+    def do(self, job, beat):
+        doing = self.table.get(str(job.number), self.table.get("else", "work"))
+        getattr(self, doing.split()[0])(job, beat, *doing.split()[1:])
+        return f"{job.cell}/{job.number}/{job.row}".encode()
+
+    def work(self, job, beat):
+        pass
+
+    def slow(self, job, beat, seconds="0.05"):
+        end = time.monotonic() + float(seconds)
+        while time.monotonic() < end:
+            beat()
+            time.sleep(0.01)
+
+    def quiet(self, job, beat, seconds):
+        for _ in range(int(float(seconds) * 100)):  # seconds of its own, not of the clock on the wall
+            time.sleep(0.01)
+
+    def chat(self, job, beat):
+        print("a line for stdout", flush=True)
+        os.write(1, b"raw bytes for stdout")
+        os.system("echo from a program")
+
+    def shout(self, job, beat):
+        raise ValueError("no mirror\n  at all")
+
+    def refuse(self, job, beat):
+        raise CampaignError("row 3: no mission")
+
+    def leave(self, job, beat):
+        sys.exit("enough")
+
+    def hang(self, job, beat):
+        time.sleep(1000)
+
+    def hog(self, job, beat):
+        time.sleep(0.3)  # what the other threads have done gets out
+        ctypes.PyDLL(None).sleep(1000)  # never gives the interpreter's lock back
+
+    def segfault(self, job, beat):
+        ctypes.string_at(0)
+
+    def killed(self, job, beat):
+        os.kill(os.getpid(), signal.SIGKILL)
+
+    def hang_once(self, job, beat, mark):
+        self.once(mark, lambda: time.sleep(1000))
+
+    def killed_once(self, job, beat, mark):
+        self.once(mark, lambda: os.kill(os.getpid(), signal.SIGKILL))
+
+    def once(self, mark, action):
+        if not Path(mark).exists():
+            Path(mark).touch()
+            action()
+
+    def side_by_side(self, job, beat, folder):
+        mark = Path(folder) / f"{job.kind}-{job.number}"
+        mark.touch()
+        self.slow(job, beat, "0.05")
+        others = sorted(p.name for p in Path(folder).iterdir())
+        mark.unlink()
+        if job.kind == "row" and len(others) > 1:
+            raise ValueError(f"not alone: {others}")

@@ -1,0 +1,99 @@
+"""A campaign whose rows take milliseconds: one axis of the shipped mission under PI, and how to run it as users do."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+from shipped import SHIPPED
+
+LOOP = """
+mission = "mission.toml"
+seed = 7
+runs = {runs}
+sampling = "{sampling}"
+row_limit = "{row_limit}"
+
+[loop]
+controller = "PI"
+axes = "one"
+duration = "{duration}"
+settle = "0.1 s"
+
+[inputs."communication.transmit_power"]
+distribution = "normal"
+mean = "5 W"
+deviation = "0.2 W"
+"""
+
+
+def campaign_file(folder, runs=64, *, sampling="random", duration="0.2 s", row_limit="5 min", more="", mission=()):
+    """A campaign file in a folder, beside its mission with pieces of the text replaced."""
+    text = SHIPPED.read_text(encoding="utf-8")
+    for old, new in mission:
+        assert text.count(old) == 1, old
+        text = text.replace(old, new)
+    (folder / "mission.toml").write_text(text, encoding="utf-8")
+    path = folder / "campaign.toml"
+    path.write_text(
+        LOOP.format(runs=runs, sampling=sampling, duration=duration, row_limit=row_limit) + more, encoding="utf-8"
+    )
+    return path
+
+
+def started(*args, cwd, **environment):
+    """A command of the command line, running in a process of its own."""
+    return subprocess.Popen(
+        [sys.executable, "-m", "microrad", "campaign", *map(str, args)],
+        cwd=cwd,
+        env={**os.environ, **environment},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,  # a Ctrl-C of the tests is not theirs
+    )
+
+
+def finished(*args, cwd, **environment):
+    """The same, waited for: exit code, stdout, stderr."""
+    process = started(*args, cwd=cwd, **environment)
+    out, err = process.communicate(timeout=300)
+    return process.returncode, out, err
+
+
+def children(pid):
+    """Processes that a process started and that live."""
+    found = []
+    for entry in Path("/proc").iterdir():
+        if entry.name.isdigit():
+            try:
+                fields = (entry / "stat").read_text().rpartition(")")[2].split()
+            except OSError:  # it ended meanwhile
+                continue
+            if int(fields[1]) == pid and fields[0] != "Z":
+                found.append(int(entry.name))
+    return found
+
+
+def gone(pid, within_s=10.0):
+    """Whether a process is gone, or a corpse, before the time is up."""
+    end = time.monotonic() + within_s
+    while time.monotonic() < end:
+        try:
+            if Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] == "Z":
+                return True
+        except OSError:
+            return True
+        time.sleep(0.02)
+    return False
+
+
+def kill(pid):
+    """Kill -9, of a process that may just have ended."""
+    try:
+        os.kill(pid, signal.SIGKILL)
+    except ProcessLookupError:
+        return False
+    return True

@@ -1,0 +1,299 @@
+"""The dask engine: workers of a cluster made here and of a scheduler elsewhere die, hang, differ and go away."""
+
+import json
+import os
+import random
+import socket
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from pathlib import Path
+
+import psutil
+import pytest
+
+from microrad.campaign import cluster
+from microrad.campaign.cluster import DaskEngine
+from microrad.campaign.records import CampaignError, Job
+
+pytest.importorskip("distributed")
+
+HERE = str(Path(__file__).parent)
+TARGET = "campaign_target:open_work"
+TABLE = {"100": "killed", "101": "hang", "102": "shout", "103": "refuse", "104": "leave", "105": "slow 4", "106": "hog"}
+
+
+def workers_here(pid=None):
+    """Worker processes of clusters that a process (this one) has made."""
+    return [p for p in psutil.Process(pid).children(recursive=True) if "spawn_main" in " ".join(p.cmdline())]
+
+
+def chunks(*numbers):
+    return [Job(0, n) for n in numbers]
+
+
+def run(engine, jobs):
+    """Outcomes by number of the job; each job has one."""
+    outcomes = list(engine.outcomes(iter(jobs)))
+    assert sorted(o.job for o in outcomes) == sorted(jobs)
+    return {o.job.number: o for o in outcomes}
+
+
+def kinds(outcomes):
+    return {number: o.kind for number, o in outcomes.items() if o.kind != "done"}
+
+
+@pytest.fixture(autouse=True, scope="module")
+def target_for_children():
+    before = os.environ.get("PYTHONPATH")
+    os.environ["PYTHONPATH"] = HERE
+    yield
+    if before is None:
+        del os.environ["PYTHONPATH"]
+    else:
+        os.environ["PYTHONPATH"] = before
+
+
+@pytest.fixture(scope="module")
+def engine():
+    """Two workers on this machine, whose jobs do what the table by number says."""
+    one = DaskEngine(json.dumps(TABLE | {"else": "slow 0.05"}).encode(), TARGET, workers=2, late_s=2.0)
+    yield one
+    one.close()
+
+
+def test_every_job_has_its_own_result_and_both_workers_work(engine):
+    outcomes = engine.outcomes(iter(chunks(*range(20))))
+    first, places = next(outcomes), set()
+    done = {first.job.number: first.payload}
+    for outcome in outcomes:
+        places |= {flight.where for flight in engine._flights.values() if flight.begun}
+        done[outcome.job.number] = outcome.payload
+    assert done == {n: f"0/{n}/-1".encode() for n in range(20)}
+    assert len(places) == 2
+
+
+def test_jobs_are_taken_only_as_fast_as_they_start(engine):
+    taken = []
+    outcomes = engine.outcomes(taken.append(j) or j for j in chunks(*range(99)))
+    for done in range(1, 6):
+        next(outcomes)
+        assert len(taken) <= done + 4, "two for each worker"
+    outcomes.close()
+    assert len(taken) < 15
+
+
+def test_errors_are_of_their_job_alone_and_keep_their_words(engine):
+    outcomes = run(engine, chunks(0, 102, 1, 103, 2, 104))
+    assert kinds(outcomes) == {102: "raised", 103: "raised", 104: "raised"}
+    assert outcomes[102].reason == "ValueError: no mirror at all"
+    assert outcomes[103].reason == "row 3: no mission"
+    assert outcomes[104].reason == "SystemExit: enough"
+
+
+def test_a_job_that_kills_its_worker_has_died_and_those_that_waited_there_come_out(engine):
+    outcomes = run(engine, chunks(0, 100, *range(1, 10)))
+    assert kinds(outcomes) == {100: "died"}
+    assert outcomes[100].reason.startswith("its worker at tcp://127.0.0.1:")
+    assert outcomes[100].reason.endswith(" ended")
+
+
+def test_a_job_without_a_sign_of_life_is_late_and_one_that_lasts_is_not(engine):
+    outcomes = run(engine, chunks(101, 105, *range(6)))
+    assert kinds(outcomes) == {101: "late"}
+    assert outcomes[101].reason == "gave no sign of life for 2 s and was stopped"
+
+
+def test_a_job_that_keeps_the_interpreter_to_itself_is_late(engine):
+    assert kinds(run(engine, chunks(106, *range(6)))) == {106: "late"}
+
+
+def test_workers_killed_at_random_lose_and_double_nothing(engine):
+    todo, done, died = chunks(*range(60)), {}, 0
+    stop, generator = threading.Event(), random.Random(1)
+
+    def kill_now_and_then():
+        while not stop.wait(generator.uniform(0.5, 1.5)):
+            living = workers_here()
+            if len(engine._threads) == 2 and living:  # a cluster whose workers die as they start never works
+                generator.choice(living).kill()
+
+    killer = threading.Thread(target=kill_now_and_then)
+    killer.start()
+    try:
+        while todo:
+            outcomes = list(engine.outcomes(iter(todo)))
+            assert sorted(o.job for o in outcomes) == todo
+            done |= {o.job.number: o.payload for o in outcomes if o.kind == "done"}
+            todo = sorted(o.job for o in outcomes if o.kind != "done")
+            died += len(todo)
+    finally:
+        stop.set()
+        killer.join()
+    assert done == {n: f"0/{n}/-1".encode() for n in range(60)}
+    assert died > 0, "no kill hit a job"
+
+
+@pytest.mark.parametrize("deed", ["slow 1000", "hog"])
+def test_close_stops_at_once_whatever_runs_and_leaves_nothing(deed):
+    folders = {p.name for p in Path(tempfile.gettempdir()).glob("microrad-dask-*")}
+    one = DaskEngine(json.dumps({"else": deed, "0": "work"}).encode(), TARGET, workers=2, late_s=100.0)
+    workers = [psutil.Process(nanny.pid) for nanny in one._cluster._cluster.workers.values()]
+    assert len(workers) == 2
+    assert next(one.outcomes(iter(chunks(*range(9))))).kind == "done"
+    time.sleep(0.5)  # into the deed
+    began = time.monotonic()
+    one.close()
+    one.close()
+    assert time.monotonic() - began < 1.0
+    assert not any(worker.is_running() for worker in workers)
+    assert {p.name for p in Path(tempfile.gettempdir()).glob("microrad-dask-*")} <= folders
+    with pytest.raises(CampaignError, match="were stopped"):
+        run(one, chunks(1))
+
+
+PARENT = """
+import sys
+from microrad.campaign.cluster import DaskEngine
+from microrad.campaign.records import Job
+if __name__ == "__main__":
+    engine = DaskEngine(b'{"0": "work", "else": "hog"}', "campaign_target:open_work", workers=2, late_s=100.0)
+    for outcome in engine.outcomes(Job(0, n) for n in range(9)):
+        print(outcome.kind, flush=True)
+"""
+
+
+def test_a_killed_parent_leaves_no_orphan(tmp_path):
+    (tmp_path / "parent.py").write_text(PARENT)
+    process = subprocess.Popen(
+        [sys.executable, tmp_path / "parent.py"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+    alarm = threading.Timer(30.0, process.kill)
+    alarm.start()
+    assert process.stdout.readline() == "done\n"
+    alarm.cancel()
+    time.sleep(0.8)  # into the hog
+    workers = workers_here(process.pid)
+    assert len(workers) == 2
+    process.kill()
+    process.communicate()
+    gone, _ = psutil.wait_procs(workers, timeout=5.0)
+    assert len(gone) == 2
+
+
+# --------------------------------------------------------------------------------------------- a scheduler elsewhere
+class Elsewhere:
+    """A scheduler and workers started as one does by hand."""
+
+    def __init__(self, folder):
+        self.folder, self.started, self.count = folder, [], 0
+        with socket.socket() as free:
+            free.bind(("127.0.0.1", 0))
+            port = free.getsockname()[1]
+        self.address = f"tcp://127.0.0.1:{port}"
+        self.scheduler = self.start("scheduler", "--host", "127.0.0.1", "--port", str(port), "--no-dashboard")
+
+    def start(self, what, *arguments, prelude="", **environment):
+        code = f"{prelude}\nimport runpy; runpy.run_module('distributed.cli.dask_{what}', run_name='__main__')"
+        with (self.folder / "log").open("a") as log:
+            process = subprocess.Popen(
+                [sys.executable, "-c", code, *arguments],
+                cwd=self.folder, env=os.environ | environment, stdout=log, stderr=log,
+            )  # fmt: skip
+        self.started.append(process)
+        return process
+
+    def worker(self, *arguments, **kwargs):
+        own = ("--nthreads", "1", "--no-dashboard", "--local-directory", str(self.folder), *arguments)
+        return self.start("worker", self.address, *own, **kwargs)
+
+    def close(self):
+        for process in reversed(self.started):
+            for child in psutil.Process(process.pid).children(recursive=True):
+                child.kill()
+            process.kill()
+            process.wait()
+
+
+@pytest.fixture
+def elsewhere(tmp_path):
+    one = Elsewhere(tmp_path)
+    yield one
+    one.close()
+
+
+def connect(elsewhere, table="{}", late_s=20.0):
+    """An engine; the scheduler may still be starting."""
+    return DaskEngine(table.encode(), TARGET, elsewhere.address, late_s=late_s)
+
+
+def test_a_scheduler_that_goes_away_is_told_within_seconds(elsewhere):
+    elsewhere.worker("--no-nanny")
+    one = connect(elsewhere, '{"else": "slow 0.2"}')
+    outcomes = one.outcomes(iter(chunks(*range(1000))))
+    assert [next(outcomes).kind for _ in range(3)] == ["done"] * 3
+    began = time.monotonic()
+    elsewhere.scheduler.kill()
+    with pytest.raises(CampaignError, match=f"the scheduler at {elsewhere.address} is gone"):
+        list(outcomes)
+    assert time.monotonic() - began < 30.0
+    one.close()
+
+
+def test_workers_elsewhere_serve_one_engine_after_another_and_forget(elsewhere):
+    elsewhere.worker()
+    for _ in range(2):
+        one = connect(elsewhere, '{"3": "hang", "4": "slow 1000", "5": "killed"}', late_s=1.5)
+        outcomes = run(one, chunks(0, 1, 2, 3))
+        assert kinds(outcomes) == {3: "late"}
+        next(one.outcomes(iter(chunks(0, 4))))
+        one.close()
+
+
+def test_a_worker_with_other_code_is_refused_with_both_hashes(elsewhere):
+    elsewhere.worker("--no-nanny", CODE_OF_TARGET="d1ff")
+    one = connect(elsewhere)
+    with pytest.raises(CampaignError, match=r"the worker at tcp://.*: runs other code .*: d1ff, .* campaign's is c0de"):
+        run(one, chunks(0))
+    one.close()
+
+
+def test_a_worker_without_microrad_is_refused(elsewhere):
+    elsewhere.worker("--no-nanny", prelude="import sys; sys.modules['microrad'] = None")
+    one = connect(elsewhere)
+    with pytest.raises(CampaignError, match=r"the worker at tcp://\S* has no microrad that fits .* code is c0de"):
+        run(one, chunks(0))
+    one.close()
+
+
+def test_a_scheduler_without_workers_is_told(elsewhere, monkeypatch):
+    monkeypatch.setattr(cluster, "_NO_WORKERS_S", 1.0)
+    one = connect(elsewhere)
+    with pytest.raises(CampaignError, match="had no worker for 1 s: start some with `dask worker tcp://"):
+        run(one, chunks(0))
+    one.close()
+
+
+def test_work_that_cannot_be_opened_is_an_error_with_its_words(elsewhere):
+    elsewhere.worker("--no-nanny")
+    one = connect(elsewhere, "refuse")
+    with pytest.raises(CampaignError, match=r"the worker at tcp://\S*: mission.toml: no such mission"):
+        run(one, chunks(0))
+    one.close()
+
+
+@pytest.mark.parametrize("address", ["tcp://127.0.0.1:9", "no-such-kind://x", "tcp://127.0.0.1"])
+def test_an_address_without_a_scheduler_is_told(monkeypatch, address):
+    monkeypatch.setattr(cluster, "_CONNECT_S", 1.0)
+    threads = threading.active_count()
+    with pytest.raises(CampaignError, match=f"no scheduler answers at {address} "):
+        DaskEngine(b"{}", TARGET, address)
+    assert threading.active_count() <= threads + 2, "none but of distributed's own pools"
+
+
+def test_without_distributed_the_extra_is_named(monkeypatch):
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    with pytest.raises(CampaignError, match=r'pip install "microrad\[cluster\]"'):
+        DaskEngine(b"{}", TARGET, workers=1)

@@ -1,0 +1,364 @@
+"""The local engine: whatever a job does to its process, the others come out, and nothing is left behind."""
+
+import os
+import random
+import signal
+import subprocess
+import sys
+import threading
+import time
+from itertools import islice
+from pathlib import Path
+
+import psutil
+import pytest
+
+from microrad.campaign.engines import Clock, Flight, LocalEngine, late_flights
+from microrad.campaign.records import CampaignError, Job
+from microrad.campaign.worker import Beat
+
+
+@pytest.fixture
+def engine(monkeypatch):
+    """Make a local engine whose jobs do what a table by number says; closed at the end, and no process left."""
+    monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parent))
+    made = []
+
+    def make(table="{}", threads=2, late_s=20.0):
+        made.append(LocalEngine(table.encode(), "campaign_target:open_work", threads, late_s))
+        return made[-1]
+
+    yield make
+    for one in made:
+        one.close()
+        one.close()
+    assert children() == []
+
+
+def children():
+    return [p for p in psutil.Process().children(recursive=True) if "microrad.campaign.worker" in " ".join(p.cmdline())]
+
+
+def chunks(count, first=0):
+    return [Job(0, n) for n in range(first, first + count)]
+
+
+def run(engine, jobs):
+    """Outcomes by number of the job; each job has one."""
+    outcomes = list(engine.outcomes(iter(jobs)))
+    assert sorted(o.job for o in outcomes) == sorted(jobs)
+    return {o.job.number: o for o in outcomes}
+
+
+def kinds(outcomes):
+    return {number: o.kind for number, o in outcomes.items() if o.kind != "done"}
+
+
+def test_every_job_has_its_own_result(engine):
+    done = run(engine(threads=3), [Job(2, n, 7 * n, "chunk") for n in range(100)])
+    assert [done[n].payload for n in range(100)] == [f"2/{n}/{7 * n}".encode() for n in range(100)]
+    assert kinds(done) == {}
+
+
+def test_results_do_not_depend_on_the_order_of_jobs_or_the_number_of_threads(engine):
+    jobs = chunks(30)
+    shuffled = random.Random(1).sample(jobs, len(jobs))
+    assert shuffled != jobs
+    one, other = run(engine(threads=1), jobs), run(engine(threads=4), shuffled)
+    assert {n: o.payload for n, o in one.items()} == {n: o.payload for n, o in other.items()}
+
+
+def test_an_engine_serves_several_calls_with_one_process(engine):
+    one = engine()
+    run(one, chunks(3))
+    pids = [p.pid for p in children()]
+    run(one, chunks(3, first=3))
+    assert [p.pid for p in children()] == pids
+    assert len(pids) == 1
+
+
+def test_jobs_are_taken_only_as_fast_as_they_start(engine):
+    taken = []
+    outcomes = engine('{"else": "slow"}', threads=2).outcomes(taken.append(j) or j for j in chunks(1000))
+    for done in range(1, 11):
+        next(outcomes)
+        assert len(taken) <= done + 3, "two at work, one at hand"
+    outcomes.close()
+    assert len(taken) < 20
+
+
+def test_jobs_that_come_up_by_outcomes_are_taken_too(engine):
+    class Growing:
+        def __init__(self):
+            self.jobs = chunks(2)
+
+        def __iter__(self):
+            return self
+
+        def __next__(self):
+            if not self.jobs:
+                raise StopIteration
+            return self.jobs.pop(0)
+
+    jobs, numbers = Growing(), []
+    for outcome in engine().outcomes(jobs):
+        numbers.append(outcome.job.number)
+        if outcome.job.number < 2:
+            jobs.jobs.append(Job(0, outcome.job.number + 10))
+    assert sorted(numbers) == [0, 1, 10, 11]
+
+
+def test_an_error_is_of_its_job_alone_and_keeps_its_words(engine):
+    table = '{"1": "shout", "2": "refuse", "3": "leave"}'
+    outcomes = run(engine(table), chunks(6))
+    assert kinds(outcomes) == {1: "raised", 2: "raised", 3: "raised"}
+    assert outcomes[1].reason == "ValueError: no mirror at all"
+    assert outcomes[2].reason == "row 3: no mission"
+    assert outcomes[3].reason == "SystemExit: enough"
+
+
+def test_what_jobs_print_does_not_disturb_the_messages(engine):
+    assert kinds(run(engine('{"else": "chat"}'), chunks(20))) == {}
+
+
+@pytest.mark.parametrize(("deed", "words"), [("segfault", "SIGSEGV"), ("killed", "SIGKILL")])
+def test_a_job_that_kills_its_process_has_died_and_the_others_come_out(engine, deed, words):
+    outcomes = run(engine(f'{{"3": "{deed}"}}', threads=1), chunks(8))
+    assert kinds(outcomes) == {3: "died"}, "the one that waited behind it starts again"
+    assert words in outcomes[3].reason
+
+
+def test_last_words_of_a_process_are_told(engine):
+    outcomes = run(engine('{"0": "segfault"}', threads=1), chunks(1))
+    assert "Fatal Python error: Segmentation fault" in outcomes[0].reason
+
+
+def test_a_row_by_itself_runs_with_no_other_beside_it(engine, tmp_path):
+    (tmp_path / "marks").mkdir()
+    table = f'{{"else": "side_by_side {tmp_path / "marks"}"}}'
+    jobs = [Job(0, n, 1, "row" if n % 4 == 1 else "chunk") for n in range(12)]
+    assert kinds(run(engine(table, threads=3), jobs)) == {}
+
+
+def test_a_row_that_kills_takes_no_other_row_with_it(engine):
+    jobs = [Job(0, n, n, "row") for n in range(4)]
+    assert kinds(run(engine('{"1": "killed"}', threads=2), jobs)) == {1: "died"}
+
+
+@pytest.mark.parametrize("deed", ["hang", "hog"])
+def test_a_job_without_a_sign_of_life_is_late(engine, deed):
+    outcomes = run(engine(f'{{"2": "{deed}"}}', threads=1, late_s=1.0), chunks(5))
+    assert kinds(outcomes) == {2: "late"}
+    assert outcomes[2].reason == "gave no sign of life for 1 s and was stopped"
+
+
+def test_neighbours_of_a_late_job_start_again_and_are_not_blamed(engine):
+    outcomes = run(engine('{"0": "hang", "1": "slow 2.5"}', threads=2, late_s=1.0), chunks(6))
+    assert kinds(outcomes) == {0: "late"}
+    assert outcomes[1].payload == b"0/1/-1"
+
+
+def test_a_job_that_lasts_but_beats_is_not_late(engine):
+    assert kinds(run(engine('{"0": "slow 2.5"}', late_s=0.5), chunks(2))) == {}
+
+
+def test_a_job_that_failed_once_may_be_done_again(engine, tmp_path):
+    one = engine(f'{{"1": "hang_once {tmp_path}/a", "2": "killed_once {tmp_path}/b"}}', threads=1, late_s=1.0)
+    assert kinds(run(one, chunks(4))) == {1: "late", 2: "died"}
+    assert kinds(run(one, chunks(4))) == {}
+
+
+def test_a_process_killed_at_random_loses_and_doubles_nothing(engine):
+    one, todo, done, generator = engine('{"else": "slow 0.02"}'), chunks(200), {}, random.Random(2)
+    stop = threading.Event()
+
+    def kill_now_and_then():
+        while not stop.wait(generator.uniform(0.1, 0.9)):
+            for process in children():
+                process.kill()
+
+    killer = threading.Thread(target=kill_now_and_then)
+    killer.start()
+    died = 0
+    try:
+        while todo:
+            outcomes = list(one.outcomes(iter(todo)))
+            assert sorted(o.job for o in outcomes) == todo
+            done |= {o.job.number: o.payload for o in outcomes if o.kind == "done"}
+            todo = sorted(o.job for o in outcomes if o.kind != "done")
+            died += len(todo)
+    finally:
+        stop.set()
+        killer.join()
+    assert done == {n: f"0/{n}/-1".encode() for n in range(200)}
+    assert died > 0, "no kill hit a job"
+
+
+def test_work_that_cannot_be_opened_is_an_error_with_its_words(engine):
+    with pytest.raises(CampaignError, match=r"^mission.toml: no such mission$"):
+        run(engine("refuse"), chunks(1))
+
+
+def test_a_process_that_cannot_start_is_given_up(engine):
+    with pytest.raises(CampaignError, match=r"ended 3 times .* exit code 3; its last words: cannot go on"):
+        run(engine("die"), chunks(1))
+
+
+def test_deaths_without_anything_done_between_are_given_up(engine):
+    with pytest.raises(CampaignError, match=r"ended 20 times without a job done between.*SIGKILL"):
+        run(engine('{"else": "killed"}', threads=1), chunks(40))
+    assert children() == []
+
+
+def test_other_code_after_a_restart_is_refused(engine, tmp_path, monkeypatch):
+    one = engine(f'{{"1": "killed_once {tmp_path}/a"}}', threads=1)
+    outcomes = one.outcomes(iter(chunks(4)))
+    assert next(outcomes).kind == "done"
+    monkeypatch.setenv("CODE_OF_TARGET", "d1ff")
+    with pytest.raises(CampaignError, match="began with c0de, now it is d1ff"):
+        list(outcomes)
+
+
+@pytest.mark.parametrize("deed", ["slow 1000", "hang", "hog"])
+def test_close_stops_at_once_whatever_runs(engine, deed):
+    one = engine(f'{{"else": "{deed}", "0": "work"}}')
+    assert next(one.outcomes(iter(chunks(10)))).kind == "done"
+    began = time.monotonic()
+    one.close()
+    assert time.monotonic() - began < 1.0
+    assert children() == []
+
+
+def test_a_closed_engine_starts_nothing_more(engine):
+    one = engine('{"else": "slow 1"}')
+    threading.Timer(1.0, one.close).start()
+    with pytest.raises(CampaignError, match="were stopped while jobs were running"):
+        list(one.outcomes(iter(chunks(100))))
+    assert children() == []
+
+
+def test_a_caller_that_goes_away_leaves_nothing_running(engine):
+    one = engine('{"else": "slow 1000", "0": "work"}')
+    list(islice(one.outcomes(iter(chunks(10))), 1))
+    assert children() == []
+    assert kinds(run(one, [Job(0, 0)])) == {}
+
+
+# ------------------------------------------------------------------------------------------- the parent's own end
+PARENT = """
+import sys
+from microrad.campaign.engines import LocalEngine
+from microrad.campaign.records import Job
+engine = LocalEngine(sys.argv[1].encode(), "campaign_target:open_work", 2, float(sys.argv[2]))
+try:
+    for outcome in engine.outcomes(Job(0, n) for n in range(int(sys.argv[3]))):
+        print(outcome.kind, flush=True)
+except KeyboardInterrupt:
+    engine.close()
+    print("stopped", flush=True)
+"""
+
+
+@pytest.fixture
+def parent():
+    """Start a process that runs an engine with a table of jobs; returns it and its worker when two jobs are done."""
+    started = []
+
+    def start(table, late_s=1000.0, jobs=10000):
+        process = subprocess.Popen(
+            [sys.executable, "-c", PARENT, table, str(late_s), str(jobs)],
+            env=os.environ | {"PYTHONPATH": str(Path(__file__).parent)},
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            start_new_session=True,
+        )
+        started.append(process)
+        alarm = threading.Timer(30.0, process.kill)
+        alarm.start()
+        assert [process.stdout.readline() for _ in range(2)] == ["done\n"] * 2
+        alarm.cancel()
+        (worker,) = psutil.Process(process.pid).children()
+        return process, worker
+
+    yield start
+    for process in started:
+        process.kill()
+        process.communicate()
+
+
+FINE = '{"0": "work", "1": "work"'
+
+
+@pytest.mark.parametrize("deed", ["slow 1000", "hang", "hog"])
+def test_a_killed_parent_leaves_no_orphan(parent, deed):
+    process, worker = parent(f'{FINE}, "else": "{deed}"}}')
+    time.sleep(0.6)  # into the deed
+    assert worker.is_running()
+    process.kill()
+    gone, _ = psutil.wait_procs([worker], timeout=5.0)
+    assert gone == [worker]
+
+
+def test_ctrl_c_stops_within_a_second_and_leaves_no_orphan(parent):
+    process, worker = parent(f'{FINE}, "else": "hog"}}')
+    time.sleep(0.6)
+    began = time.monotonic()
+    os.killpg(process.pid, signal.SIGINT)  # as a terminal does: to parent and worker
+    assert process.communicate(timeout=10.0) == ("stopped\n", "")
+    assert time.monotonic() - began < 1.0
+    assert not worker.is_running()
+
+
+@pytest.mark.parametrize(("deed", "late"), [("quiet 1.0", 0), ("hang", 1)])
+def test_a_campaign_stopped_for_a_while_calls_only_that_late_which_is(parent, deed, late):
+    process, _ = parent(f'{FINE}, "2": "{deed}"}}', late_s=1.5, jobs=10)
+    time.sleep(0.3)
+    os.killpg(process.pid, signal.SIGSTOP)
+    time.sleep(2.5)
+    os.killpg(process.pid, signal.SIGCONT)
+    lines, _ = process.communicate(timeout=10.0)
+    assert sorted(lines.split()) == ["done"] * (8 - late) + ["late"] * late
+
+
+def wait_in_another_process(code, tmp_path, seconds):
+    return subprocess.run(
+        [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, timeout=seconds, check=False
+    )
+
+
+def test_a_process_stuck_in_code_that_keeps_the_lock_ends_by_itself(tmp_path):
+    code = "import ctypes; from microrad.campaign.worker import end_when_stuck; end_when_stuck(0.5); {}"
+    stuck = wait_in_another_process(code.format("ctypes.PyDLL(None).sleep(100)"), tmp_path, 20.0)
+    assert stuck.returncode == 1
+    assert "Timeout" in stuck.stderr
+    free = wait_in_another_process(code.format("ctypes.CDLL(None).sleep(2)"), tmp_path, 20.0)
+    assert (free.returncode, free.stderr) == (0, "")
+
+
+# ------------------------------------------------------------------------------------------------- the small parts
+def test_late_flights_are_those_silent_for_too_long_and_their_silent_neighbours():
+    flights = {k: Flight(Job(0, k), heard) for k, heard in enumerate([10.0, 14.9, 16.0, float("nan")])}
+    assert late_flights(flights, now_s=19.0, late_s=10.0) == []
+    assert late_flights(flights, now_s=20.5, late_s=10.0) == [0, 1]
+
+
+def test_beats_are_told_at_once_and_then_not_too_often():
+    told = []
+    beat = Beat(lambda: told.append(1), every_s=3600.0)
+    beat()
+    beat()
+    assert len(told) == 1
+    often = Beat(lambda: told.append(1), every_s=0.0)
+    often()
+    often()
+    assert len(told) == 3
+
+
+def test_a_clock_counts_seconds_awake():
+    clock = Clock()
+    time.sleep(0.5)
+    first = clock.now()
+    clock.close()
+    assert 0.2 <= first <= 0.7
+    assert clock.now() - first <= 0.2

@@ -1,0 +1,336 @@
+"""The table of rows in each format: the same values, units, order and bytes; damage to it is found on reading."""
+
+import csv
+import hashlib
+import random
+import subprocess
+import sys
+import textwrap
+from pathlib import Path
+
+import h5netcdf
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+import xarray as xr
+
+from microrad.campaign import blob, export
+from microrad.campaign.blob import Column, Head
+from microrad.campaign.ledger import Ledger
+from microrad.campaign.records import CampaignError, Chunk, Failed
+
+COLUMNS = (
+    Column("row", "", "number of the row"),
+    Column("weight", "", "weight"),
+    Column("link/power", "W", "transmitted power"),
+    Column("margin", "dB", "margin of the link"),
+)
+ROWS, FORMATS = 50, ("nc", "parquet", "csv")
+REASON = "=1+1 raised\nValueError: µ"
+
+
+def head(cells=({"mirror": "-a.toml", "aperture": "5 cm"}, {"mirror": "bb µ.toml", "aperture": "8 cm"})):
+    hashes = {"campaign": "aa", "code": "cc", "mission": "bb"}
+    return Head("c.toml", "text", "a mission", 2**64 - 1, hashes, {"numpy": "2"}, "now", cells, COLUMNS, b"")
+
+
+def chunk(number, cell, rows=ROWS):
+    """Rows whose values follow from cell and number; the sixth row of chunk 1 has failed."""
+    draw = np.random.default_rng([cell, number])
+    margin, failed = draw.normal(size=rows), ()
+    if number == 1:
+        margin[5], failed = np.nan, (Failed(rows + 5, 9, 2, REASON + " \udc80"),)
+    row = np.arange(rows) + float(rows * number)
+    columns = {"row": row, "weight": np.ones(rows), "link/power": draw.random(rows) * 1e-300, "margin": margin}
+    return Chunk(cell, number, columns, failed, np.zeros(0), np.zeros(0))
+
+
+def write(folder, numbers=((0, 2, 1), (1, 0)), cells=None, order=1, rows=ROWS):
+    """A ledger with these chunks by cell, put in the order given or backwards."""
+    path = folder / f"{len(list(folder.iterdir()))}.ledger"
+    with Ledger.create(path, head(cells) if cells else head()) as ledger:
+        for cell, each in list(enumerate(numbers))[::order]:
+            for number in each[::order]:
+                ledger.put(cell, number, blob.pack_chunk(chunk(number, cell, rows)))
+    return path
+
+
+def exported(path, target):
+    with Ledger.open(path, write=False) as ledger:
+        return export.export(ledger, target)
+
+
+def expected():
+    """The table of `write` as lists by column."""
+    places = [(0, 0), (0, 1), (0, 2), (1, 0), (1, 1)]
+    table = {"cell": [cell for cell, _ in places for _ in range(ROWS)]}
+    cells = head().cells
+    table |= {key: [cells[cell][key] for cell in table["cell"]] for key in ("mirror", "aperture")}
+    whole = {c.name: np.concatenate([chunk(number, cell).columns[c.name] for cell, number in places]) for c in COLUMNS}
+    table |= {name: values.tolist() for name, values in whole.items()} | {"row": list(map(int, whole["row"]))}
+    table["failed"] = [REASON + " \\udc80" if row == ROWS + 5 else "" for row in table["row"]]
+    return table
+
+
+def read_nc(path):
+    with xr.open_dataset(path, engine="h5netcdf") as table:
+        return {str(name).replace("|", "/"): values.values.tolist() for name, values in table.items()}
+
+
+def read_parquet(path):
+    return pq.read_table(path, page_checksum_verification=True).to_pydict()
+
+
+def read_csv(path):
+    with path.open(newline="", encoding="utf-8") as file:
+        names, *rows = list(csv.reader(file))
+    texts = {"mirror", "aperture", "failed"}
+    columns = {name.split(" [")[0]: values for name, values in zip(names, zip(*rows, strict=True), strict=True)}
+    return {
+        name: [
+            value.removeprefix("'") if name in texts else int(value) if name in {"cell", "row"} else float(value)
+            for value in values
+        ]
+        for name, values in columns.items()
+    }
+
+
+READ = {"nc": read_nc, "parquet": read_parquet, "csv": read_csv}
+
+
+def said(call, *args):
+    with pytest.raises(CampaignError) as caught:
+        call(*args)
+    return str(caught.value)
+
+
+@pytest.mark.parametrize("kind", FORMATS)
+@pytest.mark.parametrize("together", [16384, 64, 50, 7])
+def test_every_format_has_the_same_table_to_the_last_bit(tmp_path, kind, together, monkeypatch):
+    monkeypatch.setattr(export, "_ROWS", together)
+    target = tmp_path / f"rows.{kind}"
+    assert exported(write(tmp_path), target) == 5 * ROWS
+    found, wanted = READ[kind](target), expected()
+    assert list(found) == list(wanted)
+    for name in wanted:
+        assert list(map(repr, found[name])) == list(map(repr, wanted[name])), name
+
+
+@pytest.mark.parametrize("kind", FORMATS)
+def test_the_same_chunks_give_the_same_bytes_whatever_the_order_in_which_they_came(tmp_path, kind):
+    targets = [tmp_path / f"{name}.{kind}" for name in ("a", "b", "c")]
+    exported(write(tmp_path), targets[0])
+    exported(write(tmp_path, order=-1), targets[1])
+    exported(write(tmp_path, numbers=((0, 2, 1), (1,))), targets[2])
+    first, second, other = (hashlib.sha256(each.read_bytes()).hexdigest() for each in targets)
+    assert first == second != other
+
+
+def test_each_column_has_its_unit_and_meaning_and_the_table_its_origin(tmp_path):
+    path = write(tmp_path)
+    for kind in FORMATS:
+        exported(path, tmp_path / f"rows.{kind}")
+    origin = {"title": "a mission", "campaign": "c.toml", "seed": str(2**64 - 1), "versions": '{"numpy": "2"}'}
+    origin |= {"campaign_sha256": "aa", "code_sha256": "cc", "mission_sha256": "bb"}
+    with xr.open_dataset(tmp_path / "rows.nc", engine="h5netcdf") as table:
+        assert table.attrs == origin
+        assert table["margin"].attrs == {"units": "dB", "long_name": "margin of the link"}
+        assert table["weight"].attrs["units"] == table["cell"].attrs["units"] == "1"
+    schema = pq.read_schema(tmp_path / "rows.parquet")
+    assert schema.metadata == {key.encode(): value.encode() for key, value in origin.items()}
+    assert schema.field("link/power").metadata == {b"unit": b"W", b"long_name": b"transmitted power"}
+    first = (tmp_path / "rows.csv").read_text("utf-8").splitlines()[0]
+    assert first == "cell,mirror,aperture,row,weight,link/power [W],margin [dB],failed"
+
+
+def test_no_text_in_a_csv_file_is_a_formula(tmp_path):
+    exported(write(tmp_path), tmp_path / "rows.csv")
+    lines = (tmp_path / "rows.csv").read_text("utf-8").splitlines()
+    assert lines[1].startswith("0,'-a.toml,5 cm,0,1.0,")
+    assert sum("\"'=1+1 raised" in line for line in lines) == 2
+    assert not any(cell.startswith(("=", "+", "@")) for line in lines for cell in line.split(","))
+
+
+def test_a_campaign_without_a_grid_or_with_different_keys_by_cell_has_no_empty_columns(tmp_path):
+    target = tmp_path / "rows.csv"
+    assert exported(write(tmp_path, numbers=((0,),), cells=({},)), target) == ROWS
+    assert target.read_text().startswith("cell,row,weight,")
+
+
+# -------------------------------------------------------------------------------------------------------------- damage
+def flips(path, spots, read):
+    """How many of these flips an attempt to read tells of, and how many change what it gives without a word."""
+    whole, wanted = path.read_bytes(), read(path)
+    told = silent = 0
+    for at, bit in spots:
+        path.write_bytes(whole[:at] + bytes([whole[at] ^ 1 << bit]) + whole[at + 1 :])
+        try:
+            found = read(path)
+        except (OSError, ValueError, RuntimeError, KeyError):
+            told += 1
+        else:
+            silent += any(list(map(repr, found[name])) != list(map(repr, wanted[name])) for name in wanted)
+    path.write_bytes(whole)
+    return told, silent
+
+
+def margins(whole, number):
+    """Where the margins of a chunk of cell 0 stand in a file, and places among them to flip."""
+    draw = random.Random(4)
+    at = whole.index(chunk(number, 0).columns["margin"].tobytes())
+    return [(at + draw.randrange(8 * ROWS), draw.randrange(8)) for _ in range(20)]
+
+
+def test_a_flipped_bit_in_parquet_is_an_error_where_without_checksums_it_is_silent(tmp_path):
+    target = tmp_path / "rows.parquet"
+    exported(write(tmp_path), target)
+
+    def numbers(path, check):
+        table = pq.read_table(path, columns=["margin"], page_checksum_verification=check)
+        return {"margin": table["margin"].to_numpy()}
+
+    plain = tmp_path / "plain.parquet"
+    pq.write_table(pq.read_table(target), plain, compression="none", use_dictionary=False)
+    spots = margins(plain.read_bytes(), 0)
+    assert flips(plain, spots, lambda path: numbers(path, True)) == (0, len(spots))
+    found = pq.ParquetFile(target).metadata.row_group(0).column(6)
+    assert found.path_in_schema == "margin"
+    draw = random.Random(5)
+    start, end = found.data_page_offset, found.data_page_offset + found.total_compressed_size
+    spots = [(draw.randrange((start + end) // 2, end), draw.randrange(8)) for _ in range(20)]
+    assert flips(target, spots, lambda path: numbers(path, True)) == (len(spots), 0)
+    assert flips(target, spots, lambda path: numbers(path, False))[1] > 0
+
+
+def test_a_flipped_bit_in_netcdf_is_an_error_where_without_checksums_it_is_silent(tmp_path):
+    target, plain = tmp_path / "rows.nc", tmp_path / "plain.nc"
+    exported(write(tmp_path), target)
+
+    def numbers(path):
+        with h5netcdf.File(path) as file:
+            return {"margin": file["margin"][:]}
+
+    with h5netcdf.File(plain, "w") as file:
+        file.dimensions = {"index": 5 * ROWS}
+        file.create_variable("margin", ("index",), "f8", data=numbers(target)["margin"])
+    spots = margins(plain.read_bytes(), 0)
+    assert flips(plain, spots, numbers) == (0, len(spots))
+    assert flips(target, margins(target.read_bytes(), 0), numbers) == (len(spots), 0)
+
+
+@pytest.mark.parametrize("kind", ["nc", "parquet"])
+def test_no_flip_among_the_values_of_any_column_is_silent(tmp_path, kind):
+    target = tmp_path / f"rows.{kind}"
+    exported(write(tmp_path), target)
+    if kind == "nc":
+        with h5netcdf.File(target) as file:
+            data = [file._h5file[name].id.get_chunk_info(0) for name in file.variables]
+        places = [(each.byte_offset, each.byte_offset + each.size) for each in data]
+    else:
+        group = pq.ParquetFile(target).metadata.row_group(0)
+        each = [group.column(k) for k in range(group.num_columns)]
+        starts = [c.dictionary_page_offset if c.has_dictionary_page else c.data_page_offset for c in each]
+        places = [(at, at + c.total_compressed_size) for at, c in zip(starts, each, strict=True)]
+    draw = random.Random(6)
+    spots = [(draw.randrange(*place), draw.randrange(8)) for place in places for _ in range(5)]
+    told, silent = flips(target, spots, READ[kind])
+    assert silent == 0
+    assert told > len(spots) / 2
+
+
+# ------------------------------------------------------------------------------------------------------------ refusals
+def test_what_cannot_be_exported_is_refused_and_writes_nothing(tmp_path):
+    path = write(tmp_path)
+    before = sorted(tmp_path.iterdir())
+    assert "exports to .nc, .parquet, .csv, not to '.xlsx'" in said(exported, path, tmp_path / "rows.xlsx")
+    assert "not to 'no suffix'" in said(exported, path, tmp_path / "rows")
+    assert "there is no folder" in said(exported, path, tmp_path / "none" / "rows.csv")
+    assert sorted(tmp_path.iterdir()) == before
+    empty = write(tmp_path, numbers=())
+    assert "has no rows yet: run or resume" in said(exported, empty, tmp_path / "rows.csv")
+    assert not (tmp_path / "rows.csv").exists()
+    exported(path, tmp_path / "rows.csv")
+    assert (tmp_path / "rows.csv").exists()
+
+
+@pytest.mark.parametrize("kind", FORMATS)
+def test_a_damaged_chunk_stops_the_export_and_leaves_the_old_file(tmp_path, kind):
+    path, target = write(tmp_path), tmp_path / f"rows.{kind}"
+    target.write_text("last week's")
+    data = bytearray(path.read_bytes())
+    data[data.index(blob.pack_chunk(chunk(2, 0))[-300:-200])] ^= 1
+    path.write_bytes(data)
+    assert "chunk 2 of cell 0 is damaged" in said(exported, path, target)
+    assert target.read_text() == "last week's"
+    assert [each for each in tmp_path.iterdir() if each.name.endswith(".part")] == []
+
+
+def test_a_missing_pyarrow_is_told_by_what_to_install(tmp_path, monkeypatch):
+    path = write(tmp_path)
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    assert 'pip install "microrad[parquet]"' in said(exported, path, tmp_path / "rows.parquet")
+    assert exported(path, tmp_path / "rows.nc") == 5 * ROWS
+    assert not (tmp_path / "rows.parquet").exists()
+
+
+FULL = """
+    import sys
+    from pathlib import Path
+    from microrad.campaign.export import export
+    from microrad.campaign.ledger import Ledger
+    from microrad.campaign.records import CampaignError
+    with Ledger.open(Path(sys.argv[1]), write=False) as ledger:
+        try:
+            export(ledger, Path(sys.argv[2]))
+        except CampaignError as error:
+            print(error)
+"""
+
+
+@pytest.mark.parametrize("kind", FORMATS)
+def test_a_full_disk_leaves_the_old_file_and_no_part_of_a_new_one(tmp_path, kind):
+    path, folder = write(tmp_path, numbers=(range(40), range(40))), tmp_path / "small"
+    folder.mkdir()
+    made = subprocess.run(["mount", "-t", "tmpfs", "-o", "size=64k", "tmpfs", folder], capture_output=True, check=False)
+    if made.returncode:
+        pytest.skip("this machine does not allow to mount a small disk")
+    try:
+        target = folder / f"rows.{kind}"
+        target.write_text("last week's")
+        code = [sys.executable, "-W", "error", "-c", textwrap.dedent(FULL), str(path), str(target)]
+        ended = subprocess.run(code, capture_output=True, text=True, check=False)
+        assert (ended.returncode, ended.stderr) == (0, "")
+        assert "could not be written" in ended.stdout and "No space left" in ended.stdout
+        assert [each.name for each in folder.iterdir()] == [target.name]
+        assert target.read_text() == "last week's"
+    finally:
+        subprocess.run(["umount", "-l", folder], check=True)
+
+
+PEAK = """
+    import resource, sys
+    from pathlib import Path
+    from microrad.campaign.export import export
+    from microrad.campaign.ledger import Ledger
+    with Ledger.open(Path(sys.argv[1]), write=False) as ledger:
+        export(ledger, Path(sys.argv[2]))
+    print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
+"""
+
+
+@pytest.fixture(scope="module")
+def two_sizes(tmp_path_factory):
+    """A ledger of 100 000 rows and one of 400 000."""
+    folder = tmp_path_factory.mktemp("sizes")
+    return [write(folder, (range(count),), ({},), rows=5000) for count in (20, 80)]
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="the peak of memory is in kB on Linux alone")
+@pytest.mark.parametrize("kind", FORMATS)
+def test_memory_does_not_grow_with_the_number_of_rows(tmp_path, kind, two_sizes):
+    code = [sys.executable, "-c", textwrap.dedent(PEAK)]
+    target = str(tmp_path / f"rows.{kind}")
+    runs = [subprocess.run([*code, str(path), target], capture_output=True, check=True) for path in two_sizes]
+    less, more = (int(each.stdout) for each in runs)
+    assert Path(target).stat().st_size > 8_000_000
+    assert more - less < 300_000 * 3 * 8 / 1024 / 2  # half of what the further rows' numbers take

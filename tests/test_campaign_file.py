@@ -1,0 +1,660 @@
+"""Campaign files: what they hold once read, every way in which one is refused, and the missions of their rows."""
+
+import math
+import pickle
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from campaign_files import HEAD, IDENTIFIED, LOOP, NOISE, POWER, UNCERTAINTY, loaded, written
+from microrad import fine_pointing
+from microrad.campaign import keys, sampling
+from microrad.campaign.file import load_campaign
+from microrad.campaign.inputs import Builder
+from microrad.campaign.records import CampaignError
+from microrad.missionfile import MissionError, load_mission, named_files
+from shipped import SHIPPED
+
+QUAD_CELL = (
+    'noise = "1 urad"                      # assumption: rms per axis',
+    'quad_cell = { responsivity = "1 A/W", background_power = "0 pW", dark_current = "1 nA", '
+    'thermal_noise = "0.05 pA/sqrt(Hz)", received_power = "100 pW", spot = "airy" } # rms per axis',
+)
+
+
+def faults(folder, text, **how):
+    with pytest.raises(MissionError) as caught:
+        loaded(folder, text, **how)
+    return caught.value.faults
+
+
+def line_of(folder, piece):
+    text = (folder / "campaign.toml").read_text(encoding="utf-8")
+    return next(i for i, line in enumerate(text.splitlines(), 1) if piece in line)
+
+
+# ------------------------------------------------------------------------------------------------------------- reading
+def test_a_campaign_with_everything_in_it(tmp_path):
+    text = f"""{HEAD.replace("256", "300")}realisations = 32
+row_limit = "60 s"
+worst = 5
+keep = ["residual_rms", "margin"]
+{LOOP}
+[set]
+"fine_pointing.strain_gauge.noise" = "0.2 urad"   # measured: on the bench
+{POWER}{NOISE}{IDENTIFIED}
+[grid]
+"terminals.geo_aperture" = ["15 cm", "20 cm"]
+mirror = ["mirror.toml"]
+[limits.margin]
+least = "2 dB"
+[precision]
+output = "margin"
+quantile = 0.003
+half_width = "0.05 dB"
+confidence = 0.99
+at_most = 1000
+[optimise]
+minimise = "-margin"
+confidence = 0.99
+rows = 64
+evaluations = 50
+[optimise.variables."terminals.leo_aperture"]
+low = "3 cm"
+high = "12 cm"
+"""
+    c = loaded(tmp_path, text)
+    assert (c.rows, c.most_rows, c.block, c.realisations, c.loop_varies) == (320, 1024, 32, 32, True)
+    assert (c.table.row_limit_s, c.table.worst, c.keep) == (60.0, 5, ("residual_rms", "margin"))
+    assert c.half_width == 0.05
+    assert [(each.output, each.least, each.most) for each in c.limits] == [("margin", 2.0, None)]
+    assert c.cells == tuple({"terminals.geo_aperture": size, "mirror": "mirror.toml"} for size in ("15 cm", "20 cm"))
+    assert [b.file.mission.terminals.geo_aperture_m for b in c.bases] == [0.15, 0.2]
+    assert c.dimensions == (
+        ("communication.transmit_power", "W"),
+        ("fine_pointing.optical_sensor.noise", "rad"),
+        ("mirror.bouc_wen.d1", "rad/V"),
+        ("mirror.bouc_wen.alpha", "1/V"),
+        ("mirror.linear.poles.1", "Hz"),
+    )
+    assert [each.distribution for each in c.inputs][:3] == [
+        "normal, mean 5 W, deviation 200 mW",
+        "log-uniform, 500 nrad to 2 µrad",
+        "identified, standard error 2 %",
+    ]
+    assert c.variables == (("terminals.leo_aperture", "m", 0.03, 0.12),)
+    assert c.fixed == {"fine_pointing.strain_gauge.noise": "0.2 urad"}
+    gauge = c.mission.sources["fine_pointing.strain_gauge.noise"]
+    assert (gauge.value, gauge.comment, gauge.file) == ("0.2 urad", "campaign: measured: on the bench", "campaign file")
+    assert gauge.line == line_of(tmp_path, "strain_gauge")
+    gridded = c.bases[1].file.sources["terminals.geo_aperture"]
+    assert (gridded.value, gridded.comment, gridded.line) == ("20 cm", "campaign: [grid]", line_of(tmp_path, "geo_"))
+    assert [path.name for path in c.files] == ["campaign.toml", "mission.toml", "mirror.toml"]
+    assert len(c.warnings) == 2
+    assert "300 is rounded up to 320" in c.warnings[0]
+    assert "takes as long as 64" in c.warnings[1]
+
+
+def test_what_is_left_out_has_its_default(tmp_path):
+    c = loaded(tmp_path, HEAD + POWER)
+    assert (c.rows, c.most_rows, c.block, c.realisations, c.loop_varies) == (256, 256, 32, 1, False)
+    assert (c.table.row_limit_s, c.table.worst, c.table.loop) == (300.0, 3, None)
+    assert c.keep == ("margin", "outage", "short", "data_rate", "beacon_margin", "answer_margin")
+    assert [(each.output, each.least, each.source) for each in c.limits] == [("margin", 3.0, "requirement.margin")]
+    assert (c.cells, c.warnings, c.fixed, np.isnan(c.half_width)) == (({},), (), {}, True)
+    with_loop = loaded(tmp_path, HEAD + LOOP + POWER)
+    assert "residual_rms" in with_loop.keep
+    assert "volume" not in with_loop.keep
+    assert [(each.output, each.most) for each in with_loop.limits][1] == ("residual_quantile", 1e-5)
+
+
+@pytest.mark.parametrize(
+    ("inputs", "varies", "realisations"), [(POWER, False, 1), (NOISE, True, 64), (IDENTIFIED, True, 64)]
+)
+def test_realisations_follow_from_whether_rows_share_their_loop(tmp_path, inputs, varies, realisations):
+    c = loaded(tmp_path, f'{HEAD}{LOOP}{inputs}[set]\nmirror = "mirror.toml"\n')
+    assert (c.loop_varies, c.realisations) == (varies, realisations)
+
+
+def test_random_rows_are_not_rounded(tmp_path):
+    c = loaded(tmp_path, HEAD.replace("sobol", "random").replace("256", "301") + POWER)
+    assert (c.rows, c.warnings) == (301, ())
+
+
+def test_keys_may_be_quoted_or_tables_inside_tables(tmp_path):
+    quoted = loaded(tmp_path, f'{HEAD}{POWER}[set]\n"terminals.leo_aperture" = "6 cm"\n')
+    plain = POWER.replace('"communication.transmit_power"', "communication.transmit_power")
+    nested = loaded(tmp_path, f'{HEAD}{plain}[set.terminals]\nleo_aperture = "6 cm"\n')
+    assert nested.draws == quoted.draws
+    assert nested.mission.mission == quoted.mission.mission
+    assert nested.mission.mission.terminals.leo_aperture_m == 0.06
+
+
+def test_a_mirror_of_set_takes_the_place_of_the_missions(tmp_path):
+    c = loaded(tmp_path, f'{HEAD}[set]\nmirror = "plain.toml"\n"mirror.travel" = "3 mrad"\n')
+    assert c.mission.mission.mirror.name == "plain mirror of a test"
+    assert c.mission.mission.mirror.travel_rad == 3e-3
+    assert (tmp_path / "plain.toml") in c.files
+    assert c.mission.mirror_file.path == tmp_path / "plain.toml"
+
+
+def test_a_grid_may_give_what_the_mission_leaves_open(tmp_path):
+    """The mission under [set] alone is none; every cell is."""
+    unknown = (('leo_aperture = "5 cm"', 'leo_aperture = "unknown"'),)
+    text = HEAD + '[grid]\n"terminals.leo_aperture" = ["6 cm", "7 cm"]\n'
+    c = loaded(tmp_path, text, changes=unknown)
+    assert [b.file.mission.terminals.leo_aperture_m for b in c.bases] == [0.06, 0.07]
+    assert c.mission.mission.terminals.leo_aperture_m == 0.06
+    assert "in no source" in faults(tmp_path, HEAD, changes=unknown)[0].reason
+
+
+def test_words_lists_and_switches_in_set_and_grid(tmp_path):
+    text = f"""{HEAD}
+[set]
+"conventions.residual" = "radial"
+"point_ahead.corrected" = false
+"scenario.pid_frequencies" = ["2 Hz", "20 Hz"]
+[grid]
+"conventions.strehl" = ["decibel", "ratio"]
+"fine_pointing.geometry.coupling" = [[1.0, 0.0, 0.0, 1.0], [1.0, 0.1, 0.0, 1.0]]
+"""
+    c = loaded(tmp_path, text)
+    assert len(c.cells) == 4
+    assert c.cells[1] == {"conventions.strehl": "decibel", "fine_pointing.geometry.coupling": "[1.0, 0.1, 0.0, 1.0]"}
+    m = c.bases[3].file.mission
+    assert (m.conventions.residual, m.point_ahead.corrected, m.conventions.strehl) == ("radial", False, "ratio")
+    assert m.scenario.pid_frequencies_hz == (2.0, 20.0)
+    assert m.fine_pointing.geometry.coupling == (1.0, 0.1, 0.0, 1.0)
+
+
+def test_files_that_a_mission_names_belong_to_the_campaign(tmp_path):
+    text = HEAD + '[set]\n"fine_pointing.vibration.spectrum" = "table"\n"fine_pointing.vibration.file" = "a.csv"\n'
+    assert "does not exist" in faults(tmp_path, text)[0].reason
+    (tmp_path / "a.csv").write_text("Hz, urad^2/Hz\n1, 1\n2, 1\n")
+    c = loaded(tmp_path, text)
+    assert c.files[-1] == tmp_path / "a.csv"
+    assert named_files(c.mission.mission) == ("a.csv",)
+    text = text.replace('"a.csv"\n', '"a.csv"\n[inputs."fine_pointing.vibration.file"]\n') + (
+        'distribution = "table"\nvalues = ["a.csv", "b.csv"]\n'
+    )
+    text = text.replace('"fine_pointing.vibration.file" = "a.csv"\n', "")
+    (tmp_path / "b.csv").write_text("Hz, urad^2/Hz\n1, 2\n2, 1\n")
+    text = text.replace(
+        '"fine_pointing.vibration.spectrum" = "table"', '"fine_pointing.vibration.spectrum" = "olympus"'
+    )
+    assert "does not belong to spectrum" in faults(tmp_path, text)[0].reason
+
+
+# ------------------------------------------------------------------------------------------------------------ refusals
+def distributed(key, body):
+    return f'[inputs."{key}"]\n{body}\n'
+
+
+TABLE = 'distribution = "table"\n'
+REFUSED = {
+    "a misspelled key of the file": ("sampling =", "samplng =", "samplng", "is no key of"),
+    "a kind of sampling": ('"sobol"', '"sobols"', "sampling", "is none of the choices"),
+    "no rows": ("runs = 256", "runs = 0", "runs", "is below 1"),
+    "a seed below 0": ("seed = 1", "seed = -1", "seed", "is below 0"),
+    "a seed too large": ("seed = 1", f"seed = {2**64}", "seed", "is above"),
+    "a unit": ('mean = "5 W"', 'mean = "5 m"', "inputs.communication.transmit_power.mean", "another kind"),
+    "no unit": ('mean = "5 W"', "mean = 5.0", "inputs.communication.transmit_power.mean", "without a unit"),
+    "a bound": ('mean = "5 W"', 'mean = "-5 W"', "inputs.communication.transmit_power.mean", "is not above 0 W"),
+    "no deviation": ('deviation = "0.2 W"', "", "inputs.communication.transmit_power.deviation", "is missing"),
+    "a deviation of 0": ('"0.2 W"', '"0 W"', "inputs.communication.transmit_power.deviation", "is not above 0 W"),
+    "a kind of distribution": ('"normal"', '"norml"', "inputs.communication.transmit_power.distribution", "is none"),
+    "a key of a distribution": ("mean =", "means =", "inputs.communication.transmit_power.means", "is no key"),
+    "an unknown key": ("transmit_power", "transmitpower", "inputs.communication.transmitpower", "is no key"),
+    "a table as key": ("communication.transmit_power", "communication", "inputs.communication", "is a table"),
+    "a key behind a value": ("transmit_power", "transmit_power.x", "inputs.communication.transmit_power.x", "goes on"),
+}
+ADDED = {
+    "a key in set and inputs": (
+        '[set]\n"communication.transmit_power" = "4 W"',
+        "inputs.communication.transmit_power",
+        "stands in [set] too",
+    ),
+    "a key in grid and inputs": (
+        '[grid]\n"communication.transmit_power" = ["4 W"]',
+        "inputs.communication.transmit_power",
+        "stands in [grid] too",
+    ),
+    "a value of set": ('[set]\n"terminals.leo_aperture" = "5 kg"', "set.terminals.leo_aperture", "another kind"),
+    "a word of set": ('[set]\n"conventions.strehl" = "ratios"', "set.conventions.strehl", "is none of the choices"),
+    "a mirror that is no path": ("[set]\nmirror = 1", "set.mirror", "is no path"),
+    "a value that does not fit others": (
+        '[set]\n"fine_pointing.reference.point_ahead" = "0 urad"',
+        "set.fine_pointing.reference.point_ahead",
+        "is not 2 v / c",
+    ),
+    "an empty grid": ('[grid]\n"terminals.leo_aperture" = []', "grid.terminals.leo_aperture", "something in it"),
+    "no list in a grid": ('[grid]\n"terminals.leo_aperture" = "5 cm"', "grid.terminals.leo_aperture", "is not a list"),
+    "a value of a grid": ('[grid]\n"terminals.leo_aperture" = ["5"]', "grid.terminals.leo_aperture", "without a unit"),
+    "a grid with a value twice": (
+        '[grid]\n"terminals.leo_aperture" = ["5 cm", "6 cm", "5 cm"]',
+        "grid.terminals.leo_aperture",
+        "stands twice",
+    ),
+    "a cell that is no mission": (
+        '[grid]\n"beacon.divergence" = ["780 urad", "1 urad"]',
+        "grid.beacon.divergence",
+        "is below diffraction",
+    ),
+    "a grid too large": (
+        f'[grid]\n"terminals.leo_aperture" = {[f"{i} mm" for i in range(50, 150)]}\n'
+        f'"terminals.geo_aperture" = {[f"{i} mm" for i in range(50, 150)]}'.replace("'", '"'),
+        "grid",
+        "has 10000 cells",
+    ),
+    "a mirror without uncertainty": (IDENTIFIED, "inputs.mirror", "has no table uncertainty"),
+    "a grid of mirrors, one without": (
+        f'{IDENTIFIED}[grid]\nmirror = ["mirror.toml", "plain.toml"]',
+        "inputs.mirror",
+        'the mirror "plain mirror of a test" has no table uncertainty',
+    ),
+    "a parameter of an identified mirror drawn by itself": (
+        IDENTIFIED
+        + distributed("mirror.bouc_wen.d1", 'distribution = "uniform"\nlow = "1 urad/V"\nhigh = "2 urad/V"')
+        + '[set]\nmirror = "mirror.toml"',
+        "inputs.mirror",
+        "draws mirror.bouc_wen.d1, which the campaign gives too",
+    ),
+    "a mirror that is not identified": (
+        '[inputs.mirror]\ndistribution = "normal"\nmean = 1\ndeviation = 1',
+        "inputs.mirror",
+        "does not go together",
+    ),
+    "identified, and no mirror": (
+        distributed("terminals.leo_aperture", 'distribution = "identified"'),
+        "inputs.terminals.leo_aperture",
+        "does not go together",
+    ),
+    "an input that is no table": ("inputs.name = 1", "inputs.name", "is no table"),
+    "a range that goes down": (
+        distributed("terminals.leo_aperture", 'distribution = "uniform"\nlow = "6 cm"\nhigh = "5 cm"'),
+        "inputs.terminals.leo_aperture.high",
+        'is not above low ("6 cm")',
+    ),
+    "a logarithm of 0": (
+        distributed("beacon.receive_optics_loss", 'distribution = "log-uniform"\nlow = "0 dB"\nhigh = "1 dB"'),
+        "inputs.beacon.receive_optics_loss.low",
+        "has no logarithm",
+    ),
+    "a word drawn from a range": (
+        distributed("conventions.strehl", 'distribution = "uniform"\nlow = 1\nhigh = 2'),
+        "inputs.conventions.strehl",
+        "is not a quantity that takes any value",
+    ),
+    "a list drawn from a range": (
+        distributed("jitter.rms", 'distribution = "uniform"\nlow = "1 urad"\nhigh = "2 urad"'),
+        "inputs.jitter.rms",
+        "is not a quantity that takes any value",
+    ),
+    "a table without values": (
+        distributed("terminals.leo_aperture", TABLE + "values = []"),
+        "inputs.terminals.leo_aperture.values",
+        "is not a list with something in it",
+    ),
+    "a value of a table": (
+        distributed("terminals.leo_aperture", TABLE + 'values = ["5 cm", "0 cm"]'),
+        "inputs.terminals.leo_aperture.values",
+        "is not above 0 m",
+    ),
+    "a table with a value twice": (
+        distributed("terminals.leo_aperture", TABLE + 'values = ["5 cm", "50 mm"]'),
+        "inputs.terminals.leo_aperture.values",
+        "has a value twice",
+    ),
+    "too few weights": (
+        distributed("terminals.leo_aperture", TABLE + 'values = ["5 cm", "6 cm"]\nweights = [1]'),
+        "inputs.terminals.leo_aperture.weights",
+        "each value its weight",
+    ),
+    "a weight of 0": (
+        distributed("terminals.leo_aperture", TABLE + 'values = ["5 cm", "6 cm"]\nweights = [1, 0]'),
+        "inputs.terminals.leo_aperture.weights",
+        "each value its weight",
+    ),
+    "drawn too narrow": (
+        '[inputs."communication.transmit_power".drawn_as]\ndistribution = "normal"\nmean = "4 W"\ndeviation = "0.1 W"',
+        "inputs.communication.transmit_power.drawn_as",
+        "is too narrow",
+    ),
+    "drawn from a range": (
+        '[inputs."communication.transmit_power".drawn_as]\ndistribution = "uniform"\nlow = "4 W"\nhigh = "6 W"',
+        "inputs.communication.transmit_power.drawn_as",
+        "never draws far out",
+    ),
+    "drawn as identified": (
+        '[inputs."communication.transmit_power".drawn_as]\ndistribution = "identified"',
+        "inputs.communication.transmit_power.drawn_as",
+        "is no distribution that an input can be drawn as",
+    ),
+    "no list of outputs": ("keep = []", "keep", "is not a list with something in it"),
+    "an unknown output": ('keep = ["margn"]', "keep", "is no output"),
+    "an output of the loop without a loop": ('keep = ["residual_rms"]', "keep", "needs the fine-pointing loop"),
+    "an unknown limit": ('[limits.margn]\nleast = "3 dB"', "limits.margn", "is no output"),
+    "a limit of what is not kept": ('[limits.volume]\nleast = "3 GB"', "limits.volume", "is not kept"),
+    "a limit without a value": ("[limits.margin]", "limits.margin", "has neither least nor most"),
+    "a limit in another unit": ('[limits.margin]\nleast = "3 W"', "limits.margin.least", "another kind"),
+    "limits the wrong way round": ('[limits.margin]\nleast = "3 dB"\nmost = "2 dB"', "limits.margin.most", "not above"),
+    "a default limit that varies": (
+        distributed("requirement.margin", 'distribution = "uniform"\nlow = "1 dB"\nhigh = "2 dB"'),
+        "inputs.requirement.margin",
+        "is the limit of margin as well",
+    ),
+    "a loop that no controller closes": (
+        LOOP.replace('"PI"', '"LQR"'),
+        "loop.controller",
+        "is no controller",
+    ),
+    "a loop that only settles": (LOOP.replace('"1 s"', '"0.5 s"'), "loop.duration", "all of it settling"),
+    "a comparison model that is missing": (
+        f'{LOOP}mirror = "comparison"\n[set]\nmirror = "plain.toml"',
+        "loop.mirror",
+        "needs a comparison model",
+    ),
+    "a tail without a loop": ('[tail]\nerror = "12 urad"\nprobability = 1e-6', "tail", "needs the fine-pointing loop"),
+    "a tail with drawn inputs of the loop": (
+        f'{LOOP}{NOISE}[tail]\nerror = "12 urad"\nprobability = 1e-6',
+        "inputs.fine_pointing.optical_sensor.noise",
+        "changes the loop",
+    ),
+    "a tail with outputs": (
+        f'keep = ["margin"]\n{LOOP}[tail]\nerror = "12 urad"\nprobability = 1e-6',
+        "keep",
+        "stands beside [tail]",
+    ),
+    "an optimisation of nothing": (
+        '[optimise]\nminimise = "margin"\nconfidence = 0.99\nrows = 64\nevaluations = 10\n[optimise.variables]',
+        "optimise.variables",
+        "holds no variable",
+    ),
+    "an optimisation of something else": (
+        '[optimise]\nminimise = "-margn"\nconfidence = 0.99\nrows = 64\nevaluations = 10\n'
+        '[optimise.variables."terminals.leo_aperture"]\nlow = "3 cm"\nhigh = "6 cm"',
+        "optimise.minimise",
+        "is neither a variable of the optimisation nor an output",
+    ),
+    "a variable that is no quantity": (
+        '[optimise]\nminimise = "margin"\nconfidence = 0.99\nrows = 64\nevaluations = 10\n'
+        '[optimise.variables."conventions.strehl"]\nlow = 1\nhigh = 2',
+        "optimise.variables.conventions.strehl",
+        "is not a quantity",
+    ),
+    "a precision of what is not kept": (
+        '[precision]\noutput = "volume"\nquantile = 0.1\nhalf_width = "1 GB"\nconfidence = 0.9\nat_most = 1000',
+        "precision.output",
+        "is not kept",
+    ),
+    "a precision in another unit": (
+        '[precision]\noutput = "margin"\nquantile = 0.1\nhalf_width = "1 GB"\nconfidence = 0.9\nat_most = 1000',
+        "precision.half_width",
+        "another kind",
+    ),
+    "a precision that ends before its first round": (
+        '[precision]\noutput = "margin"\nquantile = 0.1\nhalf_width = "1 dB"\nconfidence = 0.9\nat_most = 100',
+        "precision.at_most",
+        "is below the 256 rows",
+    ),
+    "distributions about no mission": (
+        distributed("beacon.divergence", 'distribution = "normal"\nmean = "2 urad"\ndeviation = "0.1 urad"'),
+        "inputs.beacon.divergence",
+        "leaves no mission in the middle of all distributions: ",
+    ),
+}
+
+
+def placed(text, added):
+    """A piece of a campaign file where TOML takes it: keys of the root before the first table."""
+    root, tables = ("", added) if added.startswith("[") else (added.partition("\n[")[0], added.partition("\n[")[2])
+    head, _, rest = text.partition("[inputs")
+    tables = tables if tables.startswith("[") or not tables else f"[{tables}"
+    return f"{head}{root}\n[inputs{rest}{tables}\n"
+
+
+@pytest.mark.parametrize("what", REFUSED)
+def test_a_wrong_value_is_refused_with_its_key_and_line(tmp_path, what):
+    old, new, key, reason = REFUSED[what]
+    text = HEAD + POWER
+    assert old in text
+    found = faults(tmp_path, text.replace(old, new, 1))
+    assert [(fault.key, reason in fault.reason) for fault in found] == [(key, True)], found
+    assert 1 <= found[0].line <= 9
+    assert found[0].file.endswith("campaign.toml")
+    assert load_campaign(written(tmp_path, text)).rows == 256  # and without it nothing is refused
+
+
+@pytest.mark.parametrize("what", ADDED)
+def test_what_does_not_fit_is_refused_with_its_key(tmp_path, what):
+    added, key, reason = ADDED[what]
+    found = faults(tmp_path, placed(HEAD + POWER, added))
+    assert [fault.key for fault in found] == [key], found
+    assert reason in found[0].reason
+    assert found[0].expected
+    assert found[0].line > 0
+
+
+@pytest.mark.parametrize(
+    ("text", "nearest"),
+    [
+        (HEAD.replace("sampling", "samplng") + POWER, "sampling"),
+        (HEAD.replace("sobol", "soboll") + POWER, '"sobol"'),
+        (HEAD + POWER.replace("transmit_power", "transmitpower"), "communication.transmit_power"),
+        (HEAD + POWER.replace("communication", "comunication"), "communication.transmit_power"),
+        (HEAD + POWER.replace("normal", "normall"), '"normal"'),
+        (HEAD + LOOP.replace('"PI"', '"LQR"'), '"LQG"'),
+        (HEAD + '[limits.margn]\nleast = "3 dB"\n', '"margin"'),
+        (HEAD + '[set]\n"pointing.lines.missalignment.error" = "1 urad"\n', "pointing.lines.misalignment.error"),
+    ],
+)
+def test_a_slip_of_the_pen_is_told_what_was_probably_meant(tmp_path, text, nearest):
+    assert [fault.nearest for fault in faults(tmp_path, text)] == [nearest]
+
+
+def test_all_faults_come_at_once(tmp_path):
+    text = HEAD.replace("sobol", "sobl") + POWER.replace("5 W", "5 m") + '[set]\n"terminals.leo_aperture" = "1"\n'
+    found = faults(tmp_path, text + '[grid]\n"terminals.geo_aperture" = []\n[limits.nothing]\nleast = 1\n')
+    assert len({fault.key for fault in found}) >= 4, found
+
+
+def test_faults_of_the_mission_are_said_with_its_own_lines(tmp_path):
+    found = faults(tmp_path, HEAD, changes=(('leo_aperture = "5 cm"', 'leo_aperture = "5 kg"'),))
+    assert [(fault.key, fault.file.endswith("mission.toml")) for fault in found] == [("terminals.leo_aperture", True)]
+    assert "[terminals]" in (tmp_path / "mission.toml").read_text(encoding="utf-8").splitlines()[found[0].line - 2]
+    text = HEAD + '[set]\n"point_ahead.transverse_velocity" = "1 km/s"\n'
+    found = faults(tmp_path, text)  # the key that no longer fits stands in the mission
+    assert [fault.key for fault in found] == ["fine_pointing.reference.point_ahead"]
+
+
+def test_a_fault_names_the_cell_that_alone_has_it(tmp_path):
+    grid = '[grid]\n"beacon.divergence" = ["780 urad", "1 urad"]\n'
+    (alone,) = faults(tmp_path, HEAD + grid)
+    assert alone.reason.endswith("(in the cell beacon.divergence = 1 urad)")
+    (every,) = faults(tmp_path, HEAD + grid + '[set]\n"fine_pointing.reference.point_ahead" = "0 urad"\n')
+    assert "in the cell" not in every.reason
+    assert every.key == "set.fine_pointing.reference.point_ahead"
+
+
+def test_files_that_are_not_there_are_named(tmp_path):
+    with pytest.raises(MissionError, match="the campaign file does not exist"):
+        load_campaign(tmp_path / "none.toml")
+    assert "does not exist" in faults(tmp_path, HEAD.replace("mission.toml", "none.toml"))[0].reason
+    assert "does not exist" in faults(tmp_path, HEAD + '[grid]\nmirror = ["none.toml"]\n')[0].reason
+    assert "is missing" in faults(tmp_path, HEAD.partition("\n")[2])[0].reason
+
+
+def test_a_loop_or_a_day_needs_a_mission_that_has_one(tmp_path):
+    assert "needs a mission with the table" in faults(tmp_path, HEAD + LOOP, whole=False)[0].reason
+    keep = HEAD + 'keep = ["volume"]\n'
+    assert loaded(tmp_path, keep).keep == ("volume",)
+    path = written(tmp_path, keep)
+    mission = (tmp_path / "mission.toml").read_text(encoding="utf-8")
+    cut = mission[: mission.index("[orbit]")] + mission[mission.index("[mirror]") :]
+    (tmp_path / "mission.toml").write_text(cut, encoding="utf-8")
+    with pytest.raises(MissionError, match=re.escape("needs the mission's tables [orbit] and [operations]")):
+        load_campaign(path)
+
+
+def test_more_runs_than_noise_streams_have_numbers_for(tmp_path):
+    text = HEAD.replace("runs = 256", "runs = 4294967296")
+    assert loaded(tmp_path, text + POWER).rows == 2**32
+    found = faults(tmp_path, f"{text}realisations = 2\n{LOOP}{NOISE}")
+    assert [(fault.key, "4294967296 rows of 2 runs" in fault.reason) for fault in found] == [("runs", True)]
+
+
+# ---------------------------------------------------------------------------------------------------- missions of rows
+def test_a_row_has_the_drawn_values_to_the_last_bit(tmp_path):
+    c = loaded(tmp_path, f'{HEAD}{LOOP}{POWER}{NOISE}{IDENTIFIED}[set]\nmirror = "mirror.toml"\n')
+    builder = Builder(c)
+    columns, _ = sampling.rows(c, 0, 0, 16)
+    for i in range(16):
+        values = {key: float(column[i]) for key, column in columns.items()}
+        file = builder.mission(0, values)
+        m = file.mission
+        assert m.communication.transmit_power_w == values["communication.transmit_power"]
+        assert m.fine_pointing.optical_sensor.noise_rad == values["fine_pointing.optical_sensor.noise"]
+        assert m.mirror.bouc_wen.d1_rad_v == values["mirror.bouc_wen.d1"]
+        assert m.mirror.linear.poles_hz == (values["mirror.linear.poles.1"],)
+        assert m.mirror.uncertainty is None
+        assert m.mirror.bouc_wen.beta_1_v == 0.6
+        for key in ("communication.transmit_power", "mirror.bouc_wen.d1"):
+            assert file.sources[key].comment.startswith("campaign: drawn")
+        assert file.sources["terminals.leo_aperture"].comment.startswith("paper")
+    assert builder.mission(0, {}) is c.bases[0].file
+    assert builder.mission(0, {"mirror.bouc_wen.d1": 9e-5}).mission.mirror.uncertainty is None
+    assert c.bases[0].file.mission.mirror.uncertainty is not None
+
+
+def test_a_row_is_the_mission_that_a_file_with_its_values_would_be(tmp_path):
+    c = loaded(tmp_path, HEAD + POWER + distributed("terminals.leo_aperture", TABLE + 'values = ["5 cm", "7 cm"]'))
+    row = Builder(c).mission(0, {"communication.transmit_power": 4.5, "terminals.leo_aperture": 0.07}).mission
+    text = SHIPPED.read_text(encoding="utf-8")
+    for old, new in (('transmit_power = "5 W"', 'transmit_power = "4.5 W"'), ('= "5 cm"', '= "7 cm"')):
+        text = text.replace(old, new)
+    (tmp_path / "own.toml").write_text(text, encoding="utf-8")
+    assert row == load_mission(tmp_path / "own.toml").mission
+    assert row != c.mission.mission
+
+
+def test_words_of_a_table_are_drawn_by_their_place(tmp_path):
+    body = TABLE + 'values = ["decibel", "ratio"]\nweights = [1, 3]'
+    c = loaded(tmp_path, HEAD + distributed("conventions.strehl", body))
+    assert c.inputs[0].distribution == "one of 1 = decibel, 2 = ratio, weights 0.25, 0.75"
+    columns, _ = sampling.rows(c, 0, 0, 256)
+    drawn = columns["conventions.strehl"]
+    assert set(drawn) == {1.0, 2.0}
+    assert np.mean(drawn == 2.0) == 0.75  # eight Sobol sets
+    builder = Builder(c)
+    words = [builder.mission(0, {"conventions.strehl": place}).mission.conventions.strehl for place in (1.0, 2.0)]
+    assert words == ["decibel", "ratio"]
+
+
+def test_whole_numbers_of_a_table_stay_whole(tmp_path):
+    c = loaded(tmp_path, HEAD + distributed("constellation.terminals", TABLE + "values = [1, 2]"))
+    assert Builder(c).mission(0, {"constellation.terminals": 2.0}).mission.constellation.terminals == 2
+
+
+def test_a_row_that_is_no_mission_says_key_value_and_reason(tmp_path):
+    c = loaded(tmp_path, HEAD + POWER)
+    with pytest.raises(CampaignError, match=r'communication\.transmit_power = "-1\.0 W" is not above 0 W'):
+        Builder(c).mission(0, {"communication.transmit_power": -1.0})
+    with pytest.raises(CampaignError, match=r"beacon\.divergence = 1e-06 rad is below diffraction"):
+        Builder(c).mission(0, {"beacon.divergence": 1e-6})
+    assert Builder(c).mission(0, {"communication.transmit_power": 1.0}).mission.communication.transmit_power_w == 1.0
+
+
+def test_mirrors_of_a_grid_are_each_drawn_from_their_own_covariance(tmp_path):
+    path = written(tmp_path, f'{HEAD}{IDENTIFIED}[grid]\nmirror = ["mirror.toml", "other.toml"]\n')
+    text = (tmp_path / "mirror.toml").read_text(encoding="utf-8")
+    other = text[: text.index("[uncertainty]")].replace('poles = ["1 kHz"]', 'poles = ["2 kHz"]')
+    other += '[uncertainty]\nparameters = ["linear.poles.1", "bouc_wen.epsilon"]\nstandard_errors = [0.02, 0.1]\n'
+    (tmp_path / "other.toml").write_text(other, encoding="utf-8")
+    c = load_campaign(path)
+    assert len(c.dimensions) == 4  # what either mirror has
+    first, second = (sampling.rows(c, cell, 0, 64)[0] for cell in (0, 1))
+    assert np.all(np.isnan(second["mirror.bouc_wen.d1"]))
+    assert np.all(np.isnan(first["mirror.bouc_wen.epsilon"]))
+    assert 1900 < np.mean(second["mirror.linear.poles.1"]) < 2100
+    values = {key: float(column[3]) for key, column in second.items()}
+    m = Builder(c).mission(1, values).mission
+    assert m.mirror.bouc_wen.epsilon_rad_v == values["mirror.bouc_wen.epsilon"]
+    assert m.mirror.bouc_wen.d1_rad_v == pytest.approx(0.089e-3, rel=1e-12)
+
+
+def test_a_list_that_scales_together_is_one_column(tmp_path):
+    path = written(tmp_path, f'{HEAD}{IDENTIFIED}[set]\nmirror = "mirror.toml"\n')
+    text = (tmp_path / "mirror.toml").read_text(encoding="utf-8")
+    text = text.replace(UNCERTAINTY, '\n[uncertainty]\nparameters = ["linear.poles"]\nstandard_errors = [0.1]\n')
+    text = text.replace(
+        'poles = ["1 kHz"]\npole_dampings = [0.5]', 'poles = ["1 kHz", "2 kHz"]\npole_dampings = [0.5, 1.0]'
+    )
+    (tmp_path / "mirror.toml").write_text(text, encoding="utf-8")
+    c = load_campaign(path)
+    assert c.dimensions == (("mirror.linear.poles", ""),)
+    m = Builder(c).mission(0, {"mirror.linear.poles": 1.5}).mission
+    assert m.mirror.linear.poles_hz == (1500.0, 3000.0)
+
+
+# ---------------------------------------------------------------------------------------------------------- same loop?
+def leaves(table, prefix=""):
+    for name, info in type(table).model_fields.items():
+        value, key = getattr(table, name), f"{prefix}{info.alias or name}"
+        if isinstance(value, dict):
+            for each, inner in value.items():
+                yield from leaves(inner, f"{key}.{each}.")
+        elif hasattr(type(value), "model_fields"):
+            yield from leaves(value, f"{key}.")
+        elif isinstance(value, float) and math.isfinite(value):
+            yield key, value
+
+
+def moved(table, key, value):
+    """A mission with another value, past all checks."""
+    name, _, rest = key.partition(".")
+    fields = {info.alias or field: field for field, info in type(table).model_fields.items()}
+    inner = getattr(table, fields[name])
+    if isinstance(inner, dict):
+        each, _, rest = rest.partition(".")
+        return table.model_copy(update={fields[name]: {**inner, each: moved(inner[each], rest, value)}})
+    return table.model_copy(update={fields[name]: moved(inner, rest, value) if rest else value})
+
+
+@pytest.mark.parametrize("sensor", ["noise", "quad cell"])
+def test_only_keys_that_touch_the_loop_change_it(tmp_path, sensor):
+    """Every number of the mission is moved in turn, and the loop built anew."""
+    written(tmp_path, HEAD, changes=(QUAD_CELL,) if sensor == "quad cell" else ())
+    file = load_mission(tmp_path / "mission.toml")
+
+    def loop_of(m):
+        scene = fine_pointing.scene(replace(file, mission=m))
+        return pickle.dumps((scene.loop, scene.axis, m.fine_pointing.modulus_margin, m.fine_pointing.seed))
+
+    same, changed = loop_of(file.mission), []
+    for key, value in leaves(file.mission):
+        try:
+            if loop_of(moved(file.mission, key, 1.01 * value if value else 0.01)) != same:
+                changed.append(key)
+        except (ValueError, ArithmeticError):
+            continue  # plant_step and such, which the loop looks at
+    assert {"fine_pointing.strain_gauge.noise", "mirror.bouc_wen.d1", "amplifier.gain"} <= set(changed)
+    assert [key for key in changed if not keys.touches_loop(key, file.mission)] == []
+    assert ("terminals.leo_aperture" in changed) == (sensor == "quad cell")
+    assert keys.touches_loop("answer.wavelength", file.mission) == (sensor == "quad cell")
+    assert not keys.touches_loop("communication.transmit_power", file.mission)
+    assert keys.touches_loop("conventions.mirror_angle", file.mission)  # a word
+
+
+def test_rows_with_the_same_loop_have_the_same_key(tmp_path):
+    text = f'{HEAD}{LOOP}{POWER}{NOISE}[grid]\n"terminals.geo_aperture" = ["15 cm", "20 cm"]\n'
+    text += '"fine_pointing.strain_gauge.noise" = ["0.1 urad", "0.2 urad"]\n'
+    builder = Builder(loaded(tmp_path, text))
+    power, noise = "communication.transmit_power", "fine_pointing.optical_sensor.noise"
+    one = builder.loop_key(0, {power: 4.0, noise: 1e-6})
+    assert one == builder.loop_key(0, {power: 5.0, noise: 1e-6})
+    assert one != builder.loop_key(0, {power: 4.0, noise: 2e-6})
+    assert one != builder.loop_key(1, {power: 4.0, noise: 1e-6})  # another gauge
+    assert one == builder.loop_key(2, {power: 4.0, noise: 1e-6})  # another partner's aperture
+    assert hash(one) == hash(builder.loop_key(2, {power: 4.0, noise: 1e-6}))

@@ -1,0 +1,502 @@
+"""Optimisation under a probability constraint: against closed forms, known optima, and what it must not claim."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.optimize import NonlinearConstraint, brentq, differential_evolution
+from scipy.stats import beta, norm
+
+from microrad import link
+from microrad.campaign.optimise import Problem, Variable, optimise
+from microrad.campaign.records import CampaignError, Limit
+from microrad.missionfile import load_link
+from microrad.presets import preset_text
+
+MARGIN = Limit("margin", 3.0, None, "test")
+ANSWER = Limit("answer_margin", 3.0, None, "test")
+APERTURE, DIVERGENCE = "terminals.leo_aperture", "answer.divergence"
+
+
+def quiet(*_):
+    pass
+
+
+def never(_):
+    raise AssertionError("not to be called")
+
+
+def gaussian(rows, seed):
+    return np.random.default_rng(seed).normal(size=rows)
+
+
+def unit_cube(size):
+    return tuple(Variable(f"x{i}", "", 0.0, 1.0) for i in range(size))
+
+
+def problem(**changes):
+    given = {
+        "variables": unit_cube(1),
+        "minimise": "x0",
+        "limits": (MARGIN,),
+        "confidence": 0.99,
+        "evaluations": 100,
+        "seed": 1,
+    }
+    return Problem(**given | changes)
+
+
+def rising(rows=400, seed=0, slope=10.0, spread=1.0):
+    """Margin slope * x0 + noise: kept by a share with a closed form."""
+    noise = gaussian(rows, seed)
+    return lambda x: {"margin": slope * x[0] + spread * noise}
+
+
+# ---------------------------------------------------------------------------------------------------- closed forms
+@pytest.fixture(scope="module")
+def mission(tmp_path_factory):
+    path = tmp_path_factory.mktemp("link") / "link.toml"
+    path.write_text(preset_text("paper"), encoding="utf-8")
+    return load_link(path)
+
+
+def with_values(file, aperture, divergence=None, answer_error=None):
+    m = file.mission
+    answer = {"divergence_rad": divergence, "pointing_error_rad": answer_error}
+    terminals = m.terminals.model_copy(update={"leo_aperture_m": aperture})
+    answer = m.answer.model_copy(update={k: v for k, v in answer.items() if v is not None})
+    return m.model_copy(update={"terminals": terminals, "answer": answer})
+
+
+def test_smallest_aperture_is_that_of_the_normal_quantile(mission):
+    """P(margin(aperture) + Gaussian loss >= 3 dB) >= 0.99: the aperture follows from the normal quantile alone."""
+    rows, spread = 4000, 0.7
+    noise = spread * gaussian(rows, 3)
+
+    def margin(aperture):
+        return float(link.margin_of_error(with_values(mission, aperture), 5e-6))
+
+    def evaluate(x):
+        return {"margin": margin(x[0]) + noise}
+
+    def fresh(x):
+        return {"margin": margin(x[0]) + spread * gaussian(rows, 4)}
+
+    aperture = Variable(APERTURE, "m", 0.02, 0.08)
+    wanted = margin(0.05) - 1.0
+    limit = Limit("margin", wanted, None, "test")
+    found = optimise(problem(variables=(aperture,), minimise=APERTURE, limits=(limit,)), evaluate, fresh, quiet)
+    quantile = norm.ppf(0.99)
+    exact = brentq(lambda d: margin(d) - wanted - spread * quantile, 0.02, 0.06)
+    # standard error of a sample quantile, as an aperture by the slope of the margin
+    error_db = spread * math.sqrt(0.01 * 0.99 / rows) / norm.pdf(quantile)
+    slope = (margin(exact * 1.01) - margin(exact)) / (0.01 * exact)
+    assert found.feasible and found.reason == ""
+    assert abs(found.best.cost - exact) < 3.0 * error_db / slope
+    # to the search's own precision it is the aperture at which the 41st worst row is on the limit
+    own = brentq(lambda d: margin(d) + np.sort(noise)[40] - wanted, 0.02, 0.06)
+    assert own <= found.best.cost < own + 2e-4 * 0.06
+    assert found.best.kept[0].share.value == pytest.approx(0.99, abs=1e-12)
+    assert found.bound_by == ("margin",)
+    assert abs(found.fresh.kept[0].share.value - 0.99) < 4.0 * math.sqrt(2 * 0.01 * 0.99 / rows)
+    assert found.fresh.kept[0].share.value != found.best.kept[0].share.value
+
+
+def test_aperture_and_divergence_of_the_answer(mission):
+    """The Gaussian beam that is widest in dB at error r has theta = sqrt(2) r; the aperture then follows."""
+    rows, sigma = 400, 8e-6
+    error = sigma * np.sqrt(-2.0 * np.log(np.random.default_rng(5).uniform(size=rows)))
+    clear = with_values(mission, 0.05, 40e-6, 0.0)
+    base_db = link.answer_budget(clear, mission.sources).margin_db
+
+    def margin_db(aperture, divergence, r):
+        """Relative to the real budget at 5 cm, 40 urad and no error."""
+        gain = link.gains.gaussian_beam_gain_db(divergence / 2) - link.gains.gaussian_beam_gain_db(20e-6)
+        received = link.gains.aperture_gain_db(aperture, 1.55e-6) - link.gains.aperture_gain_db(0.05, 1.55e-6)
+        return base_db + gain + received - link.gains.gaussian_pointing_loss_db(r, divergence / 2)
+
+    for trial in ((0.05, 40e-6, 0.0), (0.03, 70e-6, 15e-6), (0.12, 25e-6, 30e-6)):
+        budget = link.answer_budget(with_values(mission, *trial), mission.sources)
+        assert margin_db(*trial) == pytest.approx(budget.margin_db, abs=1e-9)
+    wanted = base_db - 4.0
+    variables = (Variable(APERTURE, "m", 0.01, 0.3), Variable(DIVERGENCE, "rad", 20e-6, 200e-6))
+    asked = problem(
+        variables=variables,
+        minimise=APERTURE,
+        limits=(Limit("answer_margin", wanted, None, "test"),),
+        evaluations=200,
+    )
+
+    def evaluate(x):
+        return {"answer_margin": margin_db(x[0], x[1], error)}
+
+    found = optimise(asked, evaluate, evaluate, quiet)
+    decides = np.sort(error)[-1 - 4]  # 4 of 400 rows may miss the limit
+    best = 2.0 * math.sqrt(2.0) * decides
+    aperture = brentq(lambda d: margin_db(d, best, decides) - wanted, 1e-3, 1.0)
+    assert aperture <= found.best.values[APERTURE] < aperture * 1.001
+    assert found.best.values[DIVERGENCE] == pytest.approx(best, rel=0.03)
+    assert found.best.kept[0].share.value == 0.99
+    # and the draws' quantile is Rayleigh's within its error
+    assert decides == pytest.approx(sigma * math.sqrt(-2.0 * math.log(0.01)), rel=0.12)
+
+
+# ---------------------------------------------------------------------------------------------------- known optima
+def gomez_levy(x):
+    """Disjoint feasible regions, optimum -1.031628453 at (0.0898, -0.7126)."""
+    a, b = -1.0 + 1.75 * x[0], -1.0 + 2.0 * x[1]
+    cost = 4 * a**2 - 2.1 * a**4 + a**6 / 3 + a * b - 4 * b**2 + 4 * b**4
+    return cost, (1.5 + math.sin(4 * math.pi * a) - 2 * math.sin(2 * math.pi * b) ** 2,)
+
+
+def rosen_suzuki(x):
+    """Four variables, two active limits of three, optimum -44 at (0, 1, 2, -1)."""
+    a, b, c, d = -3.0 + 6.0 * np.asarray(x)
+    cost = a**2 + b**2 + 2 * c**2 + d**2 - 5 * a - 5 * b - 21 * c + 7 * d
+    return cost, (
+        8 - a**2 - b**2 - c**2 - d**2 - a + b - c + d,
+        10 - a**2 - 2 * b**2 - c**2 - 2 * d**2 + a + d,
+        5 - 2 * a**2 - b**2 - c**2 - 2 * a + b + d,
+    )
+
+
+def two_wells(x):
+    """The deeper of two wells is narrower; the limit keeps off both by the same."""
+    wide, narrow = 0.8 * math.exp(-(((x[0] - 0.25) / 0.15) ** 2)), math.exp(-(((x[0] - 0.8) / 0.06) ** 2))
+    return -wide - narrow + (x[1] - 0.5) ** 2, (x[1] - 0.6,)
+
+
+NAMES = ("margin", "answer_margin", "beacon_margin")
+
+
+def as_rows(function, rows=128):
+    """The function's cost as an output, and its constraints as outputs with a spread that is taken back exactly."""
+    noise = norm.ppf((np.random.default_rng(2).permutation(rows) + 0.5) / rows)
+    shift = -np.sort(noise)[1]  # 1 of 128 rows may miss a limit in 99 %
+
+    def evaluate(x):
+        cost, inside = function(x)
+        outputs = {name: value + 0.05 * (noise + shift) for name, value in zip(NAMES, inside, strict=False)}
+        return {"residual_rms": np.full(rows, cost)} | outputs
+
+    return evaluate
+
+
+@pytest.mark.parametrize(
+    ("function", "size", "limits", "optimum", "scale", "known"),
+    [
+        (gomez_levy, 2, 1, (0.6227, 0.1437), 1.0, -1.031628453),
+        (rosen_suzuki, 4, 3, (0.5, 4 / 6, 5 / 6, 2 / 6), 44.0, -44.0),
+        (two_wells, 2, 1, (0.8, 0.6), 1.0, None),
+    ],
+)
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_known_optima_are_found_in_200_evaluations(function, size, limits, optimum, scale, known, seed):
+    known = function(optimum)[0] if known is None else known
+    asked = problem(
+        variables=unit_cube(size),
+        minimise="residual_rms",
+        limits=tuple(Limit(name, 0.0, None, "test") for name in NAMES[:limits]),
+        evaluations=200,
+        seed=seed,
+    )
+    found = optimise(asked, as_rows(function), as_rows(function), quiet)
+    assert found.feasible
+    assert -1e-6 * scale < found.best.cost - known < 1e-3 * scale
+    assert np.array(list(found.best.values.values())) == pytest.approx(np.array(optimum), abs=0.02)
+    assert found.evaluations <= 200
+
+
+def test_a_global_peer_finds_no_better_with_ten_times_as_many_evaluations():
+    evaluate = as_rows(two_wells)
+    limit = Limit("margin", 0.0, None, "test")
+    asked = problem(variables=unit_cube(2), minimise="residual_rms", limits=(limit,), evaluations=200)
+    found = optimise(asked, evaluate, evaluate, quiet)
+    peer = differential_evolution(
+        lambda x: two_wells(x)[0],
+        [(0.0, 1.0)] * 2,
+        constraints=NonlinearConstraint(lambda x: np.sort(evaluate(x)["margin"])[1], 0.0, np.inf),
+        popsize=40,
+        tol=0.0,
+        maxiter=60,
+        polish=False,
+        rng=np.random.default_rng(0),
+    )
+    assert peer.nfev > 1000
+    assert abs(found.best.cost - peer.fun) < 2e-3
+    assert found.best.cost < -0.9  # the wide well alone has -0.79
+
+
+def test_a_rough_output_does_not_stop_the_search():
+    """A controller tuned anew leaves a cost that is no smooth function of the variables."""
+
+    def rough(x):
+        cost, inside = rosen_suzuki(x)
+        return cost + 0.02 * math.sin(1e5 * float(np.sum(x * np.arange(1, 5)))), inside
+
+    limits = tuple(Limit(name, 0.0, None, "test") for name in NAMES)
+    asked = problem(variables=unit_cube(4), minimise="residual_rms", limits=limits, evaluations=200)
+    found = optimise(asked, as_rows(rough), as_rows(rough), quiet)
+    assert -44.05 < found.best.cost < -43.6
+
+
+def test_maximising_an_output_and_its_quantile():
+    """margin = 6 - (x - 0.3)^2 + noise * x: its mean is largest at 0.3, its lower quantile at a smaller x."""
+    noise = gaussian(1000, 8)
+    noise -= noise.mean()
+
+    def evaluate(x):
+        return {"margin": 6.0 - 10.0 * (x[0] - 0.3) ** 2 + noise * x[0]}
+
+    mean = optimise(problem(minimise="-margin"), evaluate, evaluate, quiet)
+    low = optimise(problem(minimise="-margin", quantile=0.1), evaluate, evaluate, quiet)
+    tenth = np.sort(noise)[100]
+    assert mean.best.values["x0"] == pytest.approx(0.3, abs=2e-3)
+    assert mean.best.cost == pytest.approx(6.0, abs=1e-4)
+    assert low.best.values["x0"] == pytest.approx(0.3 + tenth / 20.0, abs=2e-3)
+    assert low.best.cost < 5.8
+    assert mean.bound_by == low.bound_by == ()
+
+
+def test_without_limits_the_cost_alone_decides():
+    def evaluate(x):
+        return {"residual_rms": np.full(5, 1e-6 * (1.0 + (x[0] - 0.7) ** 2))}
+
+    found = optimise(problem(minimise="residual_rms", limits=()), evaluate, evaluate, quiet)
+    assert found.feasible and found.best.kept == ()
+    assert found.best.values["x0"] == pytest.approx(0.7, abs=1e-2)
+    assert found.best.values["x0"] != 0.7
+
+
+def test_a_limit_from_above_and_one_from_both_sides():
+    noise = 0.1 * gaussian(400, 6)
+
+    def evaluate(x):
+        return {"residual_rms": 10e-6 * (1.0 - x[0]) * (1.0 + noise), "margin": 10.0 * x[0] + noise}
+
+    above = Limit("residual_rms", None, 4e-6, "test")
+    between = Limit("margin", 2.0, 8.0, "test")
+    found = optimise(problem(limits=(above, between)), evaluate, evaluate, quiet)
+    exact = 1.0 - 0.4 / (1.0 + np.sort(noise)[-1 - 4])
+    assert exact <= found.best.cost < exact + 3e-4
+    assert found.bound_by == ("residual_rms",)
+    assert found.best.kept[0].value == pytest.approx(4e-6, rel=2e-3)
+    most = optimise(problem(limits=(above, between), minimise="-x0"), evaluate, evaluate, quiet)
+    assert most.best.cost == pytest.approx(0.1 * (8.0 - np.sort(noise)[-1 - 4]), abs=5e-4)
+    assert most.bound_by == ("margin",)
+    assert most.best.kept[1].wanted == "margin >= 2 dB and <= 8 dB"
+
+
+# ------------------------------------------------------------------------------------------------ what rows can say
+def test_the_share_kept_is_that_of_the_rows_with_clopper_and_pearsons_interval():
+    found = optimise(problem(confidence=0.9), rising(), rising(seed=1), quiet)
+    kept, rows = found.best.kept[0], rising()(np.array([found.best.cost]))["margin"]
+    hits = int(np.sum(rows >= 3.0))
+    assert hits == 360
+    assert kept.share.value == hits / 400
+    assert kept.share.low == pytest.approx(beta.ppf(0.025, hits, 401 - hits), abs=1e-9)
+    assert kept.share.high == pytest.approx(beta.ppf(0.975, hits + 1, 400 - hits), abs=1e-9)
+    assert kept.value == np.sort(rows)[40]
+    assert kept.excess == pytest.approx(kept.value - 3.0)
+    other = rising(seed=1)(np.array([found.best.cost]))["margin"]
+    assert found.fresh.kept[0].share.value == np.mean(other >= 3.0) != kept.share.value
+    assert found.fresh.values == found.best.values
+
+
+def test_failed_rows_have_missed_every_limit():
+    def some_failed(x, share):
+        margin = rising()(x)["margin"]
+        margin[: int(share * 400)] = np.nan
+        return {"margin": margin}
+
+    few = optimise(problem(confidence=0.9), lambda x: some_failed(x, 0.05), lambda x: some_failed(x, 0.05), quiet)
+    none = optimise(problem(confidence=0.9), rising(), rising(), quiet)
+    # 20 of the 40 rows that may miss the limit have failed
+    left = np.sort(gaussian(400, 0)[20:])[20]
+    assert few.best.cost == pytest.approx((3.0 - left) / 10.0, abs=5e-4)
+    assert few.best.cost > none.best.cost + 0.01
+    many = optimise(problem(confidence=0.9), lambda x: some_failed(x, 0.25), never, quiet)
+    assert not many.feasible
+    assert many.reason == "no candidate keeps margin >= 3 dB in 90 % of rows; the best has 75 %"
+
+
+def test_rows_with_weights_count_by_them():
+    """Rows from a wider distribution, weighted back, lead to the closed form of the narrow one."""
+    noise = 2.0 * gaussian(20000, 11)
+    weight = norm.pdf(noise) / norm.pdf(noise, scale=2.0)
+
+    def evaluate(x):
+        return {"weight": weight, "margin": 10.0 * x[0] + noise}
+
+    exact = (3.0 + norm.ppf(0.99)) / 10.0
+    found = optimise(problem(), evaluate, evaluate, quiet)
+    assert found.best.cost == pytest.approx(exact, abs=0.006)
+    ignored = optimise(problem(), lambda x: {"margin": evaluate(x)["margin"]}, evaluate, quiet)
+    assert ignored.best.cost > exact + 0.15
+    share = found.best.kept[0].share
+    assert share.value >= 0.99 - 1e-9
+    assert share.low < 0.99 < share.high + 1e-3
+
+
+def test_an_optimum_that_leans_on_its_rows_is_told():
+    found = optimise(problem(), rising(), rising(rows=4000, seed=5, spread=1.6), quiet)
+    assert found.feasible
+    (warning,) = found.warnings
+    share = found.fresh.kept[0].share
+    assert share.high < 0.99
+    assert warning == (
+        "fresh rows keep margin >= 3 dB less often than the 99 % of rows that were wanted: "
+        f"{100 * share.value:.4g} % ({100 * share.low:.4g} % to {100 * share.high:.4g} %); "
+        "the optimum leans on its own rows, draw more of them (optimise.rows)"
+    )
+    good = optimise(problem(), rising(), rising(rows=400, seed=5, spread=0.9), quiet)
+    assert good.warnings == ()
+
+
+def test_fresh_rows_that_cannot_be_drawn_leave_the_optimum():
+    def refuses(_):
+        raise CampaignError("row 7 is no mission")
+
+    found = optimise(problem(), rising(), refuses, quiet)
+    assert found.feasible and found.fresh is None
+    assert found.warnings == ("the optimum could not be checked with fresh rows: row 7 is no mission",)
+
+
+# ------------------------------------------------------------------------------------------------------- no optimum
+def test_an_infeasible_problem_says_what_cannot_be_kept_and_how_near_it_came():
+    found = optimise(problem(), rising(slope=5.0), never, quiet)
+    share = np.mean(5.0 + gaussian(400, 0) >= 3.0)
+    assert not found.feasible and found.fresh is None
+    assert found.best.cost == pytest.approx(1.0, abs=1e-3)
+    assert found.reason == f"no candidate keeps margin >= 3 dB in 99 % of rows; the best has {100 * share:.4g} %"
+    assert found.bound_by == ("margin", "x0 at its high")
+    assert optimise(problem(), rising(slope=7.0), rising(slope=7.0), quiet).feasible
+
+
+def test_limits_that_exclude_each_other():
+    noise = 0.1 * gaussian(400, 6)
+
+    def evaluate(x):
+        return {"margin": 10.0 * x[0] + noise, "answer_margin": 8.0 - 10.0 * x[0] + noise}
+
+    limits = (Limit("margin", 5.0, None, "test"), Limit("answer_margin", 5.0, None, "test"))
+    found = optimise(problem(limits=limits), evaluate, never, quiet)
+    assert not found.feasible
+    assert found.reason.startswith("no candidate keeps margin >= 5 dB and answer_margin >= 5 dB in 99 % of rows")
+    assert found.reason.endswith("the best has 0 % and 0 %")
+    assert 0.25 < found.best.cost < 0.55
+
+
+def test_refused_candidates_are_counted_and_the_search_goes_round_them():
+    """No mission above 0.6, where the cost would be least."""
+
+    def evaluate(x):
+        if x[0] > 0.6:
+            raise CampaignError(f"x0 = {x[0]:g} is no mission")
+        return rising()(x)
+
+    found = optimise(problem(minimise="-x0"), evaluate, evaluate, quiet)
+    assert found.feasible
+    assert 0.598 < found.best.cost <= 0.6
+    refused = [c for c in found.trace if c.refused]
+    assert found.refused == len(refused) > 0
+    assert all(c.values["x0"] > 0.6 and math.isnan(c.cost) and c.kept == () for c in refused)
+    assert refused[0].refused == f"x0 = {refused[0].values['x0']:g} is no mission"
+    assert len(found.trace) == found.evaluations
+
+
+def test_only_refused_candidates():
+    def refuses(x):
+        raise CampaignError("a mirror of no mission")
+
+    found = optimise(problem(), refuses, never, quiet)
+    assert not found.feasible and found.best is None and found.fresh is None
+    assert found.reason == (
+        f"no candidate is a mission: all {found.refused} were refused, the last because a mirror of no mission"
+    )
+    assert found.evaluations == found.refused == 25  # the first look alone
+
+
+def test_rows_that_all_fail_are_refused_where_their_mean_is_the_cost():
+    def evaluate(x):
+        margin = rising()(x)["margin"]
+        return {"margin": margin if x[0] < 0.7 else np.full(400, np.nan)}
+
+    found = optimise(problem(minimise="-margin"), evaluate, evaluate, quiet)
+    assert 0.69 < found.best.values["x0"] < 0.7
+    assert {c.refused for c in found.trace} == {"", "no row has a margin"}
+
+
+def test_infinite_outputs_do_not_lead_astray():
+    """A link that is never closed has a margin of minus infinity."""
+
+    def evaluate(x):
+        return {"margin": rising()(x)["margin"] if x[0] > 0.3 else np.full(400, -np.inf)}
+
+    found = optimise(problem(), evaluate, evaluate, quiet)
+    plain = optimise(problem(), rising(), rising(), quiet)
+    assert found.best.cost == pytest.approx(plain.best.cost, abs=2e-3)
+
+
+# ---------------------------------------------------------------------------------------------------------- the rest
+def test_the_same_seed_gives_the_same_candidates_and_another_does_not():
+    def trace(seed):
+        asked = problem(variables=unit_cube(2), seed=seed)
+        return [tuple(c.values.values()) for c in optimise(asked, rising(), rising(), quiet).trace]
+
+    assert trace(1) == trace(1)
+    assert trace(1) != trace(2)
+    assert len(set(trace(1))) == len(trace(1))
+
+
+def test_progress_counts_up_to_the_candidates_looked_at():
+    said = []
+    found = optimise(problem(), rising(), rising(), lambda *what: said.append(what))
+    assert [done for done, _, _ in said] == list(range(1, found.evaluations + 1))
+    assert {total for _, total, _ in said} == {100}
+    assert found.evaluations <= 100
+    assert said[-1][2] == f"best x0 {found.best.cost:.4g}"
+    told = []
+    optimise(problem(), rising(slope=1.0), never, lambda *what: told.append(what[2]))
+    assert set(told) == {"no candidate keeps the limits yet"}
+
+
+def test_bounds_hold_and_wide_ones_are_searched_by_ratio():
+    wide, narrow = Variable("x0", "", 1e-3, 10.0), Variable("x0", "", 1.0, 9.0)
+    assert wide.log and not narrow.log and not Variable("x0", "", 0.0, 100.0).log
+    assert wide.at(0.5) == pytest.approx(0.1) and narrow.at(0.5) == pytest.approx(5.0)
+    assert (wide.at(0.0), wide.at(1.0), narrow.at(0.0), narrow.at(1.0)) == (1e-3, 10.0, 1.0, 9.0)
+    noise = gaussian(400, 0)
+    asked = problem(variables=(wide,))
+    found = optimise(asked, *[lambda x: {"margin": 10.0 + 10 * math.log10(x[0]) + noise}] * 2, quiet)
+    exact = 10.0 ** ((3.0 - np.sort(noise)[4] - 10.0) / 10.0)
+    assert exact <= found.best.cost < exact * 1.002
+    assert all(1e-3 <= c.values["x0"] <= 10.0 for c in found.trace)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"variables": ()}, "optimise.variables: there is none; name at least one with its low and high"),
+        ({"evaluations": 15}, "optimise.evaluations: 15 are too few for 1 variables; give at least 16"),
+        ({"minimise": "-x1"}, "optimise.minimise: 'x1' is neither one of the variables nor an output"),
+        ({"confidence": 1.0}, "optimise.confidence: 1 is not between 0 and 1"),
+        (
+            {"confidence": 0.999},
+            "optimise.rows: 400 rows cannot tell whether 99.9 % of them keep a limit; draw at least 1000",
+        ),
+        (
+            {"limits": (ANSWER,)},
+            "the rows have no output answer_margin, which the optimisation needs; add it to keep",
+        ),
+    ],
+)
+def test_what_cannot_be_searched_is_refused(changes, message):
+    with pytest.raises(CampaignError) as error:
+        optimise(problem(**changes), rising(), never, quiet)
+    assert str(error.value) == message
+
+
+def test_the_least_that_is_not_refused():
+    assert optimise(problem(evaluations=16), rising(), rising(), quiet).feasible
+    assert optimise(problem(confidence=0.999), rising(rows=1000), rising(rows=1000), quiet).evaluations > 0

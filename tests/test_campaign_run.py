@@ -1,0 +1,414 @@
+"""Campaigns from file to ledger: the same rows however they are run, killed, stopped, damaged or resumed."""
+
+import os
+import random
+import shutil
+import signal
+import sqlite3
+import subprocess
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import microrad
+from microrad import kernels
+from microrad.campaign import blob, bundle, ledger, plan, run, work
+from microrad.campaign.export import export
+from microrad.campaign.file import load_campaign
+from microrad.campaign.inputs import Builder
+from microrad.campaign.ledger import Ledger
+from microrad.campaign.records import CampaignError, Job, Outcome
+from microrad.campaign.summary import summarise
+from small_campaign import campaign_file, children, finished, gone, kill, started
+
+KILLS = 20
+
+
+def begun(folder, path=None, **means):
+    """A campaign run to its end in this process's own worker; its ledger."""
+    book = folder / "campaign.ledger"
+    run.begin(path or folder / "campaign.toml", book, run.Means(**(means or {"threads": 2})))
+    return book
+
+
+def table(book):
+    """The exported rows as text."""
+    file = book.with_suffix(".csv")
+    with Ledger.open(book, write=False) as opened:
+        export(opened, file)
+    return file.read_text(encoding="utf-8")
+
+
+def whole(book, campaign):
+    """That every chunk is in once, with a right checksum."""
+    jobs = [
+        (job.cell, job.number) for c in range(len(campaign.cells)) for job in plan.chunks(campaign, c, campaign.rows)
+    ]
+    with Ledger.open(book, write=False) as opened:
+        assert opened.done() == set(jobs)
+    with sqlite3.connect(book) as raw:
+        assert raw.execute("SELECT count(*) FROM chunks").fetchone() == (len(jobs),)
+    assert ledger.verify(book, jobs) == ledger.Verified(len(jobs), (), (), ())
+
+
+@pytest.fixture(scope="module")
+def long(tmp_path_factory):
+    """A campaign of some thirty chunks, and the table of an undisturbed run."""
+    folder = tmp_path_factory.mktemp("long")
+    rates = ", ".join(f'"{100 + 10 * i} Mbit/s"' for i in range(30))
+    path = campaign_file(folder, runs=200, duration="0.3 s", more=f'[grid]\n"communication.data_rate" = [{rates}]\n')
+    book = begun(folder)
+    return path, load_campaign(path), table(book)
+
+
+# --------------------------------------------------------------------------------------------------------------- kills
+def test_twenty_kills_of_worker_and_parent_change_nothing(long, tmp_path):
+    path, campaign, undisturbed = long
+    book, dice = tmp_path / "k.ledger", random.Random(1)
+    dead, kills, parents = [], 0, 0
+    command = ("run", path, "--ledger", book, "--threads", "2")
+    process = started(*command, cwd=tmp_path)
+    while process.poll() is None or kills < KILLS:
+        if process.poll() is not None:  # killed, or finished before the last kill
+            command = ("resume", book, "--threads", "2") if book.exists() else command
+            if parents and ledger.is_written(book):
+                time.sleep(0.05)
+                continue
+            process = started(*command, cwd=tmp_path)
+        time.sleep(dice.uniform(0.1, 2.5))
+        workers = children(process.pid)
+        victim = process.pid if not workers or dice.random() < 0.5 else dice.choice(workers)
+        if kills < KILLS and process.poll() is None and kill(victim):
+            kills += 1
+            parents += victim == process.pid
+            dead += [process.pid, *workers] if victim == process.pid else [victim]
+            if victim == process.pid:
+                process.communicate(timeout=60)
+        elif kills >= KILLS:
+            process.communicate(timeout=300)
+    assert kills == KILLS and 0 < parents < KILLS
+    code, _, err = finished("resume", book, cwd=tmp_path)
+    assert code in (0, 1), err
+    assert table(book) == undisturbed
+    whole(book, campaign)
+    assert all(gone(pid) for pid in dead)
+
+
+def test_ctrl_c_stops_within_a_second_and_says_how_to_go_on(long, tmp_path):
+    path, _, undisturbed = long
+    book = tmp_path / "c.ledger"
+    process = started("run", path, "--ledger", book, cwd=tmp_path)
+    while not (book.exists() and Ledger.open(book, write=False).done()):
+        assert process.poll() is None, process.communicate()
+        time.sleep(0.05)
+    workers = children(process.pid)
+    asked = time.monotonic()
+    process.send_signal(signal.SIGINT)
+    _, err = process.communicate(timeout=30)
+    assert time.monotonic() - asked < 1.0
+    assert process.returncode == 130
+    assert f"microrad campaign resume {book}" in err and "Traceback" not in err
+    assert workers and all(gone(pid, 1.0) for pid in workers)
+    assert summarise(book).progress.state == "stopped"
+    assert finished("resume", book, cwd=tmp_path)[0] in (0, 1)
+    assert table(book) == undisturbed
+
+
+def test_a_second_process_on_a_ledger_is_refused_and_a_reader_is_not(long, tmp_path):
+    path, _, _ = long
+    book = tmp_path / "s.ledger"
+    process = started("run", path, "--ledger", book, cwd=tmp_path)
+    try:
+        while not (book.exists() and Ledger.open(book, write=False).done()):
+            assert process.poll() is None, process.communicate()
+            time.sleep(0.05)
+        code, out, err = finished("resume", book, cwd=tmp_path)
+        assert (code, out) == (2, "") and str(process.pid) in err and "Traceback" not in err
+        code, out, _ = finished("status", book, cwd=tmp_path)
+        assert code in (0, 1) and "rows" in out
+    finally:
+        kill(process.pid)
+        process.communicate()
+
+
+# --------------------------------------------------------------------------------------------------- same rows, however
+@pytest.fixture(scope="module")
+def short(tmp_path_factory):
+    """A campaign of few chunks whose rows have loops of their own, and its table."""
+    folder = tmp_path_factory.mktemp("short")
+    path = campaign_file(folder, runs=40, sampling="sobol", duration="2 s", more=NOISE + GRID)
+    return path, load_campaign(path), table(begun(folder))
+
+
+NOISE = """
+[inputs."fine_pointing.optical_sensor.noise"]
+distribution = "uniform"
+low = "0.5 urad"
+high = "2 urad"
+"""
+GRID = """
+[grid]
+"communication.data_rate" = ["200 Mbit/s", "300 Mbit/s"]
+"""
+
+
+def test_one_thread_two_threads_and_two_dask_workers_give_the_same_bits(short, tmp_path):
+    path, campaign, undisturbed = short
+    assert len(plan.chunks(campaign, 0, campaign.rows)) > 2
+    for name, means in (("one", {"threads": 1}), ("dask", {"workers": 2})):
+        (tmp_path / name).mkdir()
+        assert table(begun(tmp_path / name, path, **means)) == undisturbed
+
+
+def test_rows_by_themselves_and_in_any_chunk_are_the_same(short):
+    _, campaign, _ = short
+    evaluator = work.Evaluator(campaign, Builder(campaign), {}, dict(enumerate(run.controllers(campaign, _quiet))))
+    together = evaluator.rows(1, range(5, 9), _still)
+    apart = [evaluator.rows(1, range(row, row + 1), _still) for row in range(5, 9)]
+    joined = run.joined(Job(1, 0), apart)
+    for name, column in together.columns.items():
+        np.testing.assert_array_equal(column, joined.columns[name])
+    np.testing.assert_array_equal(together.survival, joined.survival)
+    np.testing.assert_array_equal(together.survival_square, joined.survival_square)
+    assert np.ptp(together.columns["residual_rms"]) > 0.0
+
+
+def _quiet(done, total, what):
+    pass
+
+
+def _still():
+    pass
+
+
+def test_cells_have_the_same_draws_and_differ_by_their_value(short):
+    path, _, _ = short
+    with Ledger.open(path.with_name("campaign.ledger"), write=False) as book:
+        first, second = (list(book.chunks(cell)) for cell in (0, 1))
+    power = "communication.transmit_power"
+    for a, b in zip(first, second, strict=True):
+        np.testing.assert_array_equal(a.columns[power], b.columns[power])
+        np.testing.assert_array_equal(a.columns["residual_rms"], b.columns["residual_rms"])
+        np.testing.assert_allclose(a.columns["margin"] - b.columns["margin"], 10 * np.log10(1.5), rtol=0, atol=1e-9)
+
+
+# -------------------------------------------------------------------------------------------------------------- damage
+def test_a_flipped_bit_is_found_and_only_its_chunk_done_again(short, tmp_path):
+    path, campaign, undisturbed = short
+    book = tmp_path / "campaign.ledger"
+    shutil.copy(path.with_name("campaign.ledger"), book)
+    with sqlite3.connect(book) as raw:
+        payload = raw.execute("SELECT payload FROM chunks WHERE cell = 1 AND number = 1").fetchone()[0]
+        before = dict(raw.execute("SELECT cell * 1000 + number, rowid FROM chunks"))
+    data = bytearray(book.read_bytes())
+    at = data.find(payload[-80:-40])  # a piece of it that lies in one page
+    assert at > 0
+    data[at + 7] ^= 0x10
+    book.write_bytes(data)
+    code, out, _ = finished("verify", book, cwd=tmp_path)
+    assert code == 1 and "chunk 1 of cell 1" in out and out.count("damaged:") == 1
+    assert finished("resume", book, cwd=tmp_path)[0] in (0, 1)
+    assert table(book) == undisturbed
+    whole(book, campaign)
+    with sqlite3.connect(book) as raw:
+        after = dict(raw.execute("SELECT cell * 1000 + number, rowid FROM chunks"))
+    assert [key for key in before if before[key] != after[key]] == [1001]
+    assert finished("verify", book, cwd=tmp_path)[0] == 0
+
+
+def test_a_full_disk_stops_it_in_words_and_it_goes_on_once_there_is_room(short, tmp_path):
+    path, _, undisturbed = short
+    disk = tmp_path / "disk"
+    disk.mkdir()
+    if (
+        os.geteuid()
+        or subprocess.run(["mount", "-t", "tmpfs", "-o", "size=4m", "tmpfs", disk], check=False).returncode
+    ):
+        pytest.skip("needs the right to mount a small file system")
+    try:
+        book = disk / "campaign.ledger"
+        (disk / "ballast").write_bytes(bytes(3_900_000))
+        code, out, err = finished("run", path, "--ledger", book, cwd=tmp_path)
+        assert (code, out) == (2, "") and "full" in err and "resume" in err and "Traceback" not in err
+        (disk / "ballast").unlink()
+        command = ("resume", book) if book.exists() else ("run", path, "--ledger", book)
+        code, _, err = finished(*command, cwd=tmp_path)
+        assert code in (0, 1), err
+        shutil.copy(book, tmp_path / "out.ledger")
+    finally:
+        subprocess.run(["umount", disk], check=True)
+    assert table(tmp_path / "out.ledger") == undisturbed
+
+
+# ------------------------------------------------------------------------------------------------------ another version
+def test_another_mission_or_campaign_is_refused_with_both_hashes(short, tmp_path):
+    path, campaign, _ = short
+    for name in ("mission.toml", "campaign.toml"):
+        shutil.copy(path.with_name(name), tmp_path / name)
+    book = begun(tmp_path)
+    kept = bundle.hashes(campaign)
+    for name, key in (("mission.toml", "mission"), ("campaign.toml", "campaign")):
+        text = (tmp_path / name).read_text(encoding="utf-8")
+        (tmp_path / name).write_text(text + "\n# changed\n", encoding="utf-8")
+        now = bundle.hashes(load_campaign(tmp_path / "campaign.toml"))
+        with pytest.raises(CampaignError) as error:
+            run.resume(book, run.Means(threads=1))
+        assert kept[key] in str(error.value) and now[key] in str(error.value)
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    run.resume(book, run.Means(threads=1))
+
+
+def test_other_code_is_refused_with_both_hashes(short, tmp_path):
+    path, _, _ = short
+    changed = tmp_path / "changed"
+    shutil.copytree(Path(microrad.__file__).parent, changed / "microrad", ignore=shutil.ignore_patterns("__pycache__"))
+    with (changed / "microrad" / "lti.py").open("a", encoding="utf-8") as file:
+        file.write("# another version\n")
+    book = tmp_path / "campaign.ledger"
+    shutil.copy(path.with_name("campaign.ledger"), book)
+    code, out, err = finished("resume", book, cwd=tmp_path, PYTHONPATH=str(changed))
+    assert (code, out) == (2, "") and "code" in err and bundle.code_sha256() in err and err.count("in the ledger") >= 1
+    assert finished("status", book, cwd=tmp_path, PYTHONPATH=str(changed))[0] in (0, 1)  # to look is allowed
+
+
+# ---------------------------------------------------------------------------------------------------------- failed rows
+def test_rows_that_raise_or_never_end_are_failed_rows_and_the_rest_is_as_without_them(tmp_path):
+    more = """
+[inputs."fine_pointing.duration"]
+distribution = "table"
+values = ["1 s", "100000 s"]
+weights = [3, 1]
+"""
+    text = (
+        ('mean = "5 W"\ndeviation = "0.2 W"', 'mean = "5 W"\ndeviation = "4 W"'),
+        ('duration = "0.2 s"\nsettle = "0.1 s"', 'settle = "0.5 s"'),
+    )
+    path = campaign_file(tmp_path, runs=24, row_limit="2 s", more=more)
+    campaign_text = path.read_text(encoding="utf-8")
+    for old, new in text:
+        assert old in campaign_text
+        campaign_text = campaign_text.replace(old, new)
+    path.write_text(campaign_text, encoding="utf-8")
+    found = summarise(begun(tmp_path))
+    reasons = {failed.row: failed for _, failed in found.failed}
+    power, duration = found.sample["communication.transmit_power"], found.sample["fine_pointing.duration"]
+    raising, endless = power <= 0.0, (duration == duration.max()) & (power > 0.0)
+    assert raising.any() and endless.any()
+    assert sorted(reasons) == np.flatnonzero(raising | endless).tolist()
+    for row in np.flatnonzero(raising):
+        assert "communication.transmit_power" in reasons[row].reason and reasons[row].attempts == 2
+    for row in np.flatnonzero(endless):
+        assert "row_limit, 2 s" in reasons[row].reason and reasons[row].seed == 7
+    good = ~(raising | endless)
+    assert np.isfinite(found.sample["margin"][good]).all() and np.isnan(found.sample["margin"][~good]).all()
+    campaign = load_campaign(path)
+    evaluator = work.Evaluator(campaign, Builder(campaign), {}, dict(enumerate(run.controllers(campaign, _quiet))))
+    for row in np.flatnonzero(good)[:3]:
+        alone = evaluator.rows(0, range(row, row + 1), _still)
+        assert alone.columns["margin"][0] == found.sample["margin"][row]
+
+
+def test_a_row_without_a_number_is_tried_again_by_itself_and_then_blamed(tmp_path, monkeypatch):
+    campaign = load_campaign(campaign_file(tmp_path, runs=4))
+    evaluator = work.Evaluator(campaign, Builder(campaign), {}, dict(enumerate(run.controllers(campaign, _quiet))))
+    good = evaluator.rows(0, range(4), _still)
+    asked, outputs = [], work.evaluate.outputs
+
+    def broken(file, runs, keep):
+        found = outputs(file, runs, keep)
+        if abs(found["margin"] - good.columns["margin"][2]) < 1e-12:
+            asked.append(runs.rms_rad.shape[0])
+            return found | {"margin": float("nan")}
+        return found
+
+    monkeypatch.setattr(work.evaluate, "outputs", broken)
+    found = evaluator.rows(0, range(4), _still)
+    (failed,) = found.failed
+    assert (failed.row, failed.attempts, failed.reason) == (2, 2, "gives nan for margin")
+    assert len(asked) == 2
+    np.testing.assert_array_equal(np.delete(found.columns["margin"], 2), np.delete(good.columns["margin"], 2))
+    assert np.isnan(found.columns["margin"][2])
+
+
+class _Fragile:
+    """An engine in this process whose worker dies of one row."""
+
+    def __init__(self, evaluator, deadly):
+        self.evaluator, self.deadly, self.asked = evaluator, deadly, []
+
+    def outcomes(self, jobs):
+        for job in jobs:
+            self.asked.append(job)
+            rows = plan.rows_of(self.evaluator.campaign, job.number)
+            rows = range(job.row, job.row + 1) if job.kind == "row" else rows
+            if job.kind != "trace" and self.deadly in rows:
+                yield Outcome(job, "died", reason="the worker was killed by signal 9")
+            elif job.kind != "trace":
+                yield Outcome(job, "done", blob.pack_chunk(self.evaluator.rows(0, rows, _still, number=job.number)))
+
+    def close(self):
+        pass
+
+
+def test_a_row_that_takes_its_worker_down_is_found_and_the_rest_of_its_chunk_kept(tmp_path, monkeypatch):
+    path = campaign_file(tmp_path, runs=4 * kernels.LANES, duration="10 s", more="worst = 0\n")
+    path.write_text("worst = 0\n" + path.read_text(encoding="utf-8").replace("worst = 0\n", ""), encoding="utf-8")
+    campaign = load_campaign(path)
+    rows = plan.chunk_rows(campaign)
+    assert campaign.rows > rows
+    evaluator = work.Evaluator(campaign, Builder(campaign), {}, dict(enumerate(run.controllers(campaign, _quiet))))
+    evaluator = _Cheap(evaluator)
+    engine = _Fragile(evaluator, deadly=rows + 3)
+    monkeypatch.setattr(run.Means, "engine", lambda self, spec, late_s: engine)
+    book = begun(tmp_path)
+    whole(book, campaign)
+    found = summarise(book)
+    ((_, failed),) = found.failed
+    assert (failed.row, failed.attempts) == (rows + 3, 2) and "signal 9" in failed.reason
+    times = [(job.kind, job.row if job.kind == "row" else job.number) for job in engine.asked]
+    assert times.count(("chunk", 1)) == 2 and times.count(("row", rows + 3)) == 2
+    assert times.count(("chunk", 0)) == 1 and times.count(("row", rows + 2)) == 1
+    assert found.cells[0].rows == campaign.rows
+
+
+class _Cheap:
+    """Rows of drawn inputs alone: what fails does not depend on what is computed."""
+
+    def __init__(self, evaluator):
+        self.campaign, self.evaluator = evaluator.campaign, evaluator
+
+    def rows(self, cell, rows, beat, number=0):
+        drawn = self.evaluator._drawn(cell, rows)
+        columns = {"row": np.array(rows, dtype=float), "weight": drawn.weight, **drawn.columns}
+        columns |= {output.name: np.ones(len(rows)) for output in plan.outputs(self.campaign)}
+        survival = np.linspace(1.0, 0.0, kernels.BINS) * len(rows)
+        return blob.Chunk(cell, number, columns, (), survival, survival**2 / len(rows))
+
+
+# ----------------------------------------------------------------------------------------------------------- precision
+PRECISION = """
+[precision]
+output = "margin"
+quantile = 0.5
+half_width = "{width}"
+confidence = 0.95
+at_most = {most}
+"""
+
+
+def test_it_stops_when_the_wanted_quantile_is_known_well_enough(tmp_path):
+    path = campaign_file(tmp_path, runs=64, more=PRECISION.format(width="0.02 dB", most=20_000))
+    found = summarise(begun(tmp_path, path))
+    median = found.cells[0].outputs["margin"].quantiles[0.5]
+    campaign = load_campaign(path)
+    rounds = plan.rounds(campaign)
+    assert found.progress.state == "complete" and found.cells[0].rows in rounds[:-1]
+    assert (median.high - median.low) / 2.0 <= 0.02
+    before = rounds[rounds.index(found.cells[0].rows) - 1] if found.cells[0].rows > rounds[0] else None
+    if before is not None:
+        with Ledger.open(tmp_path / "campaign.ledger", write=False) as book:
+            from microrad.campaign import summary
+
+            assert not summary.reached(campaign, book, 0, before)

@@ -1,0 +1,277 @@
+"""The random numbers of a campaign: their distributions, how they fill the cube, and that any row can be had alone."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from campaign_files import HEAD, IDENTIFIED, POWER, loaded, written
+from microrad import lti, mirror_spread
+from microrad.campaign import distributions, sampling
+from microrad.campaign.distributions import LogUniform, Normal, OneOf, Uniform
+from microrad.campaign.file import load_campaign
+
+METHODS = ("random", "latin-hypercube", "sobol")
+WIDE = (
+    '[inputs."communication.transmit_power".drawn_as]\ndistribution = "normal"\nmean = "4.8 W"\ndeviation = "0.25 W"\n'
+)
+
+
+def campaign(folder, method="sobol", runs=4096, inputs=POWER, seed=1):
+    head = HEAD.replace("sobol", method).replace("256", str(runs)).replace("seed = 1", f"seed = {seed}")
+    return loaded(folder, head + inputs)
+
+
+# ------------------------------------------------------------------------------------------------------- distributions
+DRAWN = {
+    "normal": (Normal(5.0, 0.2), stats.norm(5.0, 0.2)),
+    "uniform": (Uniform(-1.0, 3.0), stats.uniform(-1.0, 4.0)),
+    "log-uniform": (LogUniform(1e-7, 1e-5), stats.loguniform(1e-7, 1e-5)),
+}
+
+
+@pytest.mark.parametrize("name", DRAWN)
+@pytest.mark.parametrize("method", METHODS)
+def test_marginals_are_those_of_scipy(name, method):
+    ours, peer = DRAWN[name]
+    for seed in (1, 2, 3):
+        drawn = ours.at(sampling.uniform(method, seed, 256, 3, 0, 4096)[:, 1])
+        assert stats.kstest(drawn, peer.cdf).pvalue > 1e-3
+        assert stats.kstest(drawn, stats.norm(peer.mean(), peer.std()).cdf).pvalue < 1e-3 or name == "normal"
+    value = peer.ppf([0.01, 0.3, 0.99])
+    np.testing.assert_allclose(ours.log_density(value), peer.logpdf(value), rtol=1e-12)
+    np.testing.assert_allclose(ours.at(np.array([0.01, 0.3, 0.99])), value, rtol=1e-12)
+
+
+def test_a_range_has_no_density_outside():
+    assert Uniform(1.0, 2.0).log_density(np.array([0.99, 2.01])).tolist() == [-math.inf] * 2
+    assert LogUniform(1.0, 2.0).log_density(np.array([-1.0, 0.99, 2.01])).tolist() == [-math.inf] * 3
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_values_of_a_table_come_as_often_as_their_weights(method):
+    table = OneOf((0.05, 0.06, 0.08), (0.5, 0.125, 0.375), ("5 cm", "6 cm", "8 cm"), False)
+    drawn = table.at(sampling.uniform(method, 3, 256, 1, 0, 8192)[:, 0])
+    counts = [int(np.sum(drawn == value)) for value in table.values]
+    assert sum(counts) == 8192
+    assert stats.chisquare(counts, 8192 * np.array(table.probabilities)).pvalue > 1e-3
+    np.testing.assert_allclose(np.exp(table.log_density(np.array([0.06, 0.07]))), [0.125, 0.0])
+
+
+# ------------------------------------------------------------------------------------------------------------ any row
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("dimensions", [1, 4, 5])
+def test_a_row_by_itself_is_the_same_as_in_any_range(method, dimensions):
+    whole = sampling.uniform(method, 7, 64, dimensions, 0, 300)
+    assert whole.shape == (300, dimensions)
+    parts = [
+        sampling.uniform(method, 7, 64, dimensions, first, count) for first, count in ((0, 17), (17, 130), (147, 153))
+    ]
+    assert np.array_equal(np.concatenate(parts), whole)
+    for row in (0, 63, 64, 65, 299):
+        assert np.array_equal(sampling.uniform(method, 7, 64, dimensions, row, 1)[0], whole[row])
+    assert np.unique(whole).size == whole.size
+    assert not np.isin(sampling.uniform(method, 8, 64, dimensions, 0, 300), whole).any()  # another seed
+    assert sampling.uniform(method, 7, 64, dimensions, 5, 0).shape == (0, dimensions)
+    assert sampling.uniform(method, 7, 64, 0, 5, 3).shape == (3, 0)
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2**64 - 1])
+def test_rows_are_independent_of_each_other_and_of_neighbouring_seeds(seed):
+    drawn = sampling.uniform("random", seed, 64, 3, 10**9, 4000)
+    other = sampling.uniform("random", seed - 1 if seed else 1, 64, 3, 10**9, 4000)
+    pairs = [(drawn[:-1], drawn[1:]), (drawn, other), (drawn[:, :2], drawn[:, 1:])]
+    for a, b in pairs:
+        assert abs(np.corrcoef(a.ravel(), b.ravel())[0, 1]) < 4.0 / math.sqrt(a.size)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_all_points_lie_inside_the_open_cube(method):
+    drawn = sampling.uniform(method, 5, 4096, 2, 0, 1 << 16)
+    assert 0.0 < drawn.min() < 1e-3
+    assert 1.0 - 1e-3 < drawn.max() < 1.0
+    assert np.all(np.isfinite(distributions.standard_normal(drawn)))
+
+
+def test_words_at_the_ends_of_their_range_stay_inside():
+    ends = np.array([0, 2**64 - 1], dtype=np.uint64)
+    low, high = sampling._open_unit(ends)
+    assert 0.0 < low < 1e-15
+    assert 1.0 - 1e-15 < high < 1.0
+
+
+# ---------------------------------------------------------------------------------------------------------- even cubes
+@pytest.mark.parametrize(("runs", "block"), [(1, 16), (100, 16), (128, 16), (256, 32), (2048, 256), (10**6, 4096)])
+def test_a_block_is_an_eighth_of_the_runs_within_bounds(runs, block):
+    assert sampling.block_rows(runs) == block
+
+
+def strata(points):
+    """Points in each of as many equal intervals as there are points, by dimension."""
+    size = len(points)
+    return [np.bincount((column * size).astype(int), minlength=size) for column in points.T]
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_each_block_has_one_point_in_each_stratum_of_each_input(method):
+    for number in range(3):
+        counts = strata(sampling.uniform(method, 11, 128, 4, 128 * number, 128))
+        even = all(np.all(count == 1) for count in counts)
+        assert even == (method != "random")
+    across = strata(sampling.uniform(method, 11, 128, 4, 64, 128))
+    assert not all(np.all(count == 1) for count in across)  # two halves of two blocks
+
+
+def test_blocks_are_independent_replicates():
+    """Their means spread as those of independent sets: no correlation from one block to the next."""
+    for method in ("latin-hypercube", "sobol"):
+        points = sampling.uniform(method, 2, 16, 2, 0, 16 * 800).reshape(800, 16, 2)
+        means = (points[:, :, 0] * points[:, :, 1]).mean(axis=1)
+        assert abs(np.corrcoef(means[:-1], means[1:])[0, 1]) < 4.0 / math.sqrt(800)
+        assert abs(np.mean(means) - 0.25) < 4.0 * np.std(means) / math.sqrt(800)
+
+
+def test_sobol_knows_a_smooth_mean_better_than_a_hypercube_and_that_better_than_random():
+    """Spread of the mean of a product of five inputs over 40 seeds, 1024 rows in blocks of 128."""
+    spread = {}
+    for method in METHODS:
+        means = [np.prod(1.0 + sampling.uniform(method, seed, 128, 5, 0, 1024), axis=1).mean() for seed in range(40)]
+        assert abs(np.mean(means) - 1.5**5) < 4.0 * np.std(means) / math.sqrt(40)
+        spread[method] = np.std(means)
+    assert spread["sobol"] < 0.5 * spread["latin-hypercube"] < 0.25 * spread["random"]
+
+
+# ------------------------------------------------------------------------------------------------------------ campaigns
+def test_columns_come_in_the_order_of_the_file_and_are_the_same_for_all_cells(tmp_path):
+    other = '[inputs."terminals.leo_aperture"]\ndistribution = "uniform"\nlow = "4 cm"\nhigh = "6 cm"\n'
+    c = campaign(tmp_path, inputs=POWER + other + '[grid]\n"terminals.geo_aperture" = ["15 cm", "20 cm"]\n')
+    columns, weight = sampling.rows(c, 0, 100, 50)
+    assert list(columns) == ["communication.transmit_power", "terminals.leo_aperture"]
+    assert [column.shape for column in columns.values()] == [(50,)] * 2
+    assert np.all(weight == 1.0)
+    second, _ = sampling.rows(c, 1, 100, 50)
+    assert all(np.array_equal(columns[key], second[key]) for key in columns)
+    assert abs(np.corrcoef(*columns.values())[0, 1]) < 0.5
+    assert 0.04 <= columns["terminals.leo_aperture"].min() < columns["terminals.leo_aperture"].max() <= 0.06
+
+
+def test_a_campaign_without_inputs_has_rows_without_columns(tmp_path):
+    columns, weight = sampling.rows(campaign(tmp_path, inputs=""), 0, 3, 7)
+    assert columns == {}
+    assert weight.tolist() == [1.0] * 7
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_columns_and_weights_of_a_row_by_itself_are_those_of_the_range(tmp_path, method):
+    low = '[inputs."terminals.leo_aperture"]\ndistribution = "log-uniform"\nlow = "4 cm"\nhigh = "6 cm"\n'
+    c = campaign(tmp_path, method, 256, f'{POWER}{WIDE}{low}{IDENTIFIED}[set]\nmirror = "mirror.toml"\n')
+    columns, weight = sampling.rows(c, 0, 0, 100)
+    assert len(columns) == 5
+    for first, count in ((0, 1), (31, 2), (57, 43)):
+        some, some_weight = sampling.rows(c, 0, first, count)
+        assert np.array_equal(some_weight, weight[first : first + count])
+        assert all(np.array_equal(some[key], columns[key][first : first + count]) for key in columns)
+    assert not np.array_equal(weight[:10], weight[10:20])
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_weights_average_to_one_and_bring_the_mean_back(tmp_path, method):
+    c = campaign(tmp_path, method, 8192, POWER + WIDE)
+    assert "drawn as normal, mean 4.8 W, deviation 250 mW and weighted" in c.inputs[0].distribution
+    columns, weight = sampling.rows(c, 0, 0, 8192)
+    power = columns["communication.transmit_power"]
+    error = np.std(weight) / math.sqrt(8192)
+    assert 0.0 < error < 0.02
+    assert abs(weight.mean() - 1.0) < 4.0 * error
+    assert abs(np.mean(power) - 4.8) < 0.02  # drawn as
+    spread = np.std(weight * (power - 5.0)) / math.sqrt(8192)
+    assert abs(np.mean(weight * (power - 5.0))) < 4.0 * spread
+    far = weight * (power < 4.4)  # 3 sigma of what is meant, 1.6 of what is drawn
+    assert np.mean(far) == pytest.approx(stats.norm.cdf(-3.0), rel=0.15)
+    expected = stats.norm.pdf(power, 5.0, 0.2) / stats.norm.pdf(power, 4.8, 0.25)
+    np.testing.assert_allclose(weight, expected, rtol=1e-9)
+
+
+COVERED = [
+    (Normal(0.0, 1.0), Normal(3.0, 1.0), ""),
+    (Normal(0.0, 1.0), Normal(0.0, 0.7), "is too narrow"),
+    (Normal(0.0, 1.0), Uniform(-9.0, 9.0), "never draws far out"),
+    (Uniform(1.0, 2.0), Normal(0.0, 0.1), ""),
+    (Uniform(1.0, 2.0), LogUniform(1.0, 2.0), ""),
+    (Uniform(1.0, 2.0), LogUniform(1.1, 2.0), "does not reach every value"),
+    (LogUniform(1.0, 2.0), Uniform(0.0, 1.9), "does not reach every value"),
+    (OneOf((1.0, 2.0), (0.5, 0.5), (1, 2), False), OneOf((2.0, 1.0), (0.9, 0.1), (2, 1), False), ""),
+    (OneOf((1.0, 2.0), (0.5, 0.5), (1, 2), False), OneOf((1.0, 3.0), (0.9, 0.1), (1, 3), False), "every value"),
+    (OneOf((1.0, 2.0), (0.5, 0.5), ("a", "b"), True), OneOf((1.0, 2.0), (0.9, 0.1), ("b", "a"), True), "every value"),
+    (OneOf((1.0, 2.0), (0.5, 0.5), ("a", "b"), True), OneOf((1.0, 2.0), (0.9, 0.1), ("a", "b"), True), ""),
+    (Uniform(1.0, 2.0), OneOf((1.0, 2.0), (0.9, 0.1), (1, 2), False), "every value"),
+]
+
+
+@pytest.mark.parametrize("case", range(len(COVERED)))
+def test_only_what_reaches_every_value_can_stand_for_another_distribution(case):
+    wanted, drawn, reason = COVERED[case]
+    found = distributions.uncovered(wanted, drawn)
+    assert (reason in found) and bool(found) == bool(reason)
+
+
+# --------------------------------------------------------------------------------------------------- identified mirrors
+def test_identified_mirrors_have_the_covariance_of_their_file(tmp_path):
+    c = campaign(tmp_path, "sobol", 4096, f'{IDENTIFIED}[set]\nmirror = "mirror.toml"\n')
+    columns, weight = sampling.rows(c, 0, 0, 4096)
+    assert np.all(weight == 1.0)
+    nominal = c.mission.mission.mirror
+    values = [nominal.bouc_wen.d1_rad_v, nominal.bouc_wen.alpha_1_v, nominal.linear.poles_hz[0]]
+    factors = np.array([column / value for column, value in zip(columns.values(), values, strict=True)])
+    wanted = mirror_spread.relative_covariance(nominal)
+    assert np.linalg.norm(np.cov(factors) - wanted) < 0.02 * np.linalg.norm(wanted)
+    assert abs(wanted[0, 1]) > 0.1 * math.sqrt(wanted[0, 0] * wanted[1, 1])  # and it is not diagonal
+    np.testing.assert_allclose(factors.mean(axis=1), 1.0, atol=1e-4)
+
+
+def test_parameters_are_the_covariance_root_times_the_normals_and_those_of_draws(tmp_path):
+    c = campaign(tmp_path, inputs=f'{IDENTIFIED}[set]\nmirror = "mirror.toml"\n')
+    table = c.mission.mission.mirror
+    normals = np.array([[0.0, 0.0, 0.0], [1.0, -1.0, 0.5]])
+    found = mirror_spread.parameters(table, normals, lambda row: iter(()))
+    root = lti.covariance_root(mirror_spread.relative_covariance(table))
+    nominal = np.array([table.bouc_wen.d1_rad_v, table.bouc_wen.alpha_1_v, table.linear.poles_hz[0]])
+    assert np.array_equal(found, nominal * (1.0 + normals @ root.T))
+    assert mirror_spread.parameter_units(table) == {
+        "bouc_wen.d1": "rad/V",
+        "bouc_wen.alpha": "1/V",
+        "linear.poles.1": "Hz",
+    }
+    stream = np.random.Generator(np.random.Philox(np.random.SeedSequence(5, spawn_key=(0,))))
+    drawn = mirror_spread.draws(table, 1, 5)[0]
+    same = mirror_spread.parameters(table, stream.standard_normal((1, 3)), lambda row: iter(()))
+    assert drawn.bouc_wen.d1_rad_v == same[0, 0]
+
+
+def test_a_draw_that_is_no_mirror_is_drawn_again_from_the_rows_own_stream(tmp_path):
+    path = written(tmp_path, HEAD + f'{IDENTIFIED}[set]\nmirror = "mirror.toml"\n')
+    text = (tmp_path / "mirror.toml").read_text(encoding="utf-8")
+    wide = text.replace("standard_errors = [0.02, 0.03, 0.01]", "standard_errors = [0.9, 0.03, 0.01]")
+    (tmp_path / "mirror.toml").write_text(wide, encoding="utf-8")
+    c = load_campaign(path)
+    whole, _ = sampling.rows(c, 0, 0, 256)
+    gain = whole["mirror.bouc_wen.d1"]
+    normals = distributions.standard_normal(sampling.uniform("sobol", 1, c.block, 3, 0, 256))
+    root = lti.covariance_root(mirror_spread.relative_covariance(c.mission.mission.mirror))
+    first_tries = 1.0 + normals @ root.T
+    again = first_tries[:, 0] <= 0.0
+    assert 10 < np.sum(again) < 80  # about one in eight changes its sign
+    assert np.all(gain > 0.0)
+    np.testing.assert_allclose(gain[~again], 0.089e-3 * first_tries[~again, 0], rtol=1e-14)
+    assert np.unique(gain[again]).size == np.sum(again)
+    for row in np.flatnonzero(again)[:5]:
+        alone, _ = sampling.rows(c, 0, int(row), 1)
+        assert alone["mirror.bouc_wen.d1"][0] == gain[row]
+
+
+def test_an_uncertainty_that_leaves_no_mirror_says_so(tmp_path):
+    c = campaign(tmp_path, inputs=f'{IDENTIFIED}[set]\nmirror = "mirror.toml"\n')
+    bad = iter([np.array([-1e3, 0.0, 0.0])] * mirror_spread.TRIES)
+    with pytest.raises(ValueError, match=r"leaves no mirror: none of 10000 draws is one.*10000 times because"):
+        mirror_spread.parameters(c.mission.mission.mirror, np.array([[-1e3, 0.0, 0.0]]), lambda row: bad)

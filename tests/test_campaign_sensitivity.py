@@ -1,0 +1,200 @@
+"""Sensitivities from given rows: against functions whose indices are known, and what must not be said."""
+
+import math
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy import stats
+
+from microrad.campaign.records import Floats, Sensitivity
+from microrad.campaign.sensitivity import MOST_ROWS, sensitivity
+from truths import philox
+
+G_FACTORS = np.array([0.0, 1.0, 4.5, 9.0, 99.0, 99.0])
+
+
+def ishigami(x: Floats) -> Floats:
+    angle = (2.0 * x - 1.0) * math.pi
+    return np.asarray(np.sin(angle[:, 0]) * (1.0 + 0.1 * angle[:, 2] ** 4) + 7.0 * np.sin(angle[:, 1]) ** 2)
+
+
+def g_function(x: Floats) -> Floats:
+    return np.asarray(np.prod((np.abs(4.0 * x - 2.0) + G_FACTORS) / (1.0 + G_FACTORS), axis=1))
+
+
+def g_indices() -> tuple[Floats, Floats]:
+    """I. M. Sobol, Math. Comput. Simul. 55 (2001) 271."""
+    alone = 1.0 / 3.0 / (1.0 + G_FACTORS) ** 2
+    whole = np.prod(1.0 + alone) - 1.0
+    return alone / whole, alone * np.prod(1.0 + alone) / (1.0 + alone) / whole
+
+
+ISHIGAMI = (np.array([0.3139, 0.4424, 0.0]), np.array([0.5576, 0.4424, 0.2437]))
+FUNCTIONS = {"ishigami": (ishigami, 3, ISHIGAMI), "g": (g_function, 6, g_indices())}
+
+
+def of(x: Floats, y: Floats) -> Sensitivity:
+    return sensitivity({f"x{at}": column for at, column in enumerate(x.T)}, y, "y")
+
+
+def points(kind: str, seed: int, rows: int, inputs: int) -> Floats:
+    """Random rows, or eight Sobol sets one after the other."""
+    if kind == "random":
+        return philox(seed).random((rows, inputs))
+    sets = [stats.qmc.Sobol(inputs, rng=100 * seed + block).random(rows // 8) for block in range(8)]
+    return np.concatenate(sets)
+
+
+@pytest.mark.parametrize("kind", ["random", "sobol"])
+@pytest.mark.parametrize("name", FUNCTIONS)
+def test_indices_of_known_functions(name: str, kind: str) -> None:
+    function, inputs, (first, total) = FUNCTIONS[name]
+    x = points(kind, 1, 2048, inputs)
+    found = of(x, function(x))
+    assert found.rows == 2048
+    assert found.surrogate_q2 > 0.9
+    assert found.note == ""
+    assert_allclose([i.value for i in found.first.values()], first, atol=0.04)
+    assert_allclose([i.value for i in found.total.values()], total, atol=0.05)
+    if name == "ishigami":  # it has interactions
+        assert found.total["x0"].low > found.first["x0"].high
+        assert found.total["x2"].low > 0.2 > found.first["x2"].high
+
+
+@pytest.mark.parametrize("kind", ["random", "sobol"])
+@pytest.mark.parametrize("name", FUNCTIONS)
+def test_intervals_hold_the_known_indices(name: str, kind: str) -> None:
+    function, inputs, exact = FUNCTIONS[name]
+    held, times = np.zeros((2, inputs)), np.zeros(2)
+    for seed in range(30):
+        x = points(kind, seed, 256, inputs)
+        found = of(x, function(x))
+        for at, indices in enumerate((found.first, found.total)):
+            times[at] += bool(indices)
+            if indices:
+                held[at] += [i.low - 1e-3 <= v <= i.high for i, v in zip(indices.values(), exact[at], strict=True)]
+    assert times[0] == 30
+    assert times[1] >= 12
+    assert np.all(held >= 0.85 * times[:, None])
+    widths = [i.high - i.low for i in found.first.values()]
+    assert max(widths) < 0.35
+
+
+def test_a_function_without_a_surrogate_has_no_total_indices() -> None:
+    x = philox(2).random((3000, 2))
+    board = np.sign(np.sin(9.0 * math.pi * x[:, 0]) * np.sin(9.0 * math.pi * x[:, 1]))
+    found = of(x, board)
+    assert found.total == {}
+    assert found.surrogate_q2 < 0.1
+    assert "surrogate predicts 0% of the variance where 80% are needed" in found.note
+    assert max(i.value for i in found.first.values()) < 0.05
+    assert of(x, np.sin(3.0 * x[:, 0]) * x[:, 1]).total != {}
+
+
+def test_what_the_surrogate_leaves_out_is_in_the_intervals() -> None:
+    x = philox(3).random((2000, 2))
+    step = of(x, (x[:, 0] > 0.3).astype(float))
+    assert 0.8 < step.surrogate_q2 < 0.98
+    assert step.total["x0"].high == 1.0  # all of it comes from x0
+    assert step.total["x1"].high == pytest.approx(1.0 - step.surrogate_q2, abs=0.01)
+    noisy = of(x, x[:, 0] + 0.1 * philox(4).normal(size=2000))
+    exact = (1.0 / 12.0) / (1.0 / 12.0 + 0.01)
+    assert noisy.total["x0"].low <= exact <= noisy.total["x0"].high
+    assert_allclose([noisy.first["x0"].value, noisy.total["x0"].value], exact, atol=0.02)
+
+
+def test_inputs_of_any_distribution() -> None:
+    normal = philox(5).normal(50.0, 3.0, (2000, 2))
+    found = of(normal, 4.0 * normal[:, 0] - 3.0 * normal[:, 1])
+    assert_allclose([i.value for i in found.total.values()], [0.64, 0.36], atol=0.03)
+    assert_allclose([i.value for i in found.first.values()], [0.64, 0.36], atol=0.03)
+    assert found.surrogate_q2 > 0.999
+    decades = 10.0 ** philox(6).uniform(-6.0, 0.0, (2000, 2))
+    found = of(decades, 2.0 * np.log(decades[:, 0]) + np.log(decades[:, 1]))
+    assert_allclose([i.value for i in found.total.values()], [0.8, 0.2], atol=0.03)
+    assert found.surrogate_q2 > 0.999  # a polynomial in the values themselves has 0.9
+
+
+def test_inputs_with_few_values() -> None:
+    x = philox(7).integers(0, 2, (2000, 3)).astype(float)
+    found = of(x, x[:, 0] + x[:, 1] * x[:, 2])
+    assert_allclose([i.value for i in found.first.values()], [4 / 7, 1 / 7, 1 / 7], atol=0.04)
+    assert_allclose([i.value for i in found.total.values()], [4 / 7, 2 / 7, 2 / 7], atol=0.04)
+    assert found.surrogate_q2 > 0.999
+    three = np.column_stack([philox(8).choice([1.0, 2.0, 50.0], 2000), philox(9).random(2000)])
+    assert of(three, np.abs(three[:, 0] - 2.0)).first["x0"].value == pytest.approx(1.0)
+
+
+def test_rows_without_a_value_are_left_out() -> None:
+    x = philox(10).random((600, 3))
+    y = ishigami(x)
+    holes_x, holes_y = x.copy(), y.copy()
+    holes_y[[3, 17]], holes_x[5, 2] = (math.nan, math.inf), math.nan
+    kept = np.setdiff1d(np.arange(600), [3, 5, 17])
+    assert of(holes_x, holes_y) == of(x[kept], y[kept])
+    assert of(holes_x, holes_y).rows == 597
+    assert of(holes_x, holes_y) != of(x, y)
+
+
+def test_what_does_not_vary_explains_nothing() -> None:
+    x = philox(11).random((500, 2))
+    x[:, 1] = 7.0
+    found = of(x, x[:, 0] ** 2)
+    assert (found.first["x1"].value, found.first["x1"].high, found.total["x1"].high) == (0.0, 0.0, 0.0)
+    assert math.isnan(found.rank_correlation["x1"].value)
+    assert found.total["x0"].value == pytest.approx(1.0, abs=1e-6)
+    still = of(x, np.full(500, 0.1))
+    assert (still.first, still.total, still.rank_correlation) == ({}, {}, {})
+    assert still.note == "the output is the same in all rows"
+    alone = of(x[:, 1:], x[:, 0])
+    assert (alone.total, alone.note) == ({}, "no total indices: no input varies")
+
+
+def test_too_few_rows_and_no_inputs() -> None:
+    x = philox(12).random((63, 1))
+    assert of(x, x[:, 0]).note == "63 good rows are too few to say what matters: 64 are needed"
+    assert of(x, x[:, 0]).first == {}
+    enough = philox(12).random((64, 1))
+    assert of(enough, enough[:, 0]).first["x0"].value > 0.99
+    assert sensitivity({}, x[:, 0], "y").note == "no inputs are drawn"
+
+
+def test_inputs_that_depend_on_each_other_have_no_total_indices() -> None:
+    x = philox(13).normal(size=(1000, 3))
+    x[:, 2] = 0.8 * x[:, 1] + 0.6 * x[:, 2]
+    found = of(x, x[:, 0] + x[:, 1])
+    assert found.total == {}
+    assert found.note.startswith("no total indices: x1 and x2 are not independent (rank correlation 0.7")
+    assert found.first["x2"].value == pytest.approx(0.5 * 0.64, abs=0.06)  # what it shares with x1
+    assert of(x[:, :2], x[:, 0] + x[:, 1]).total != {}
+
+
+def test_rank_correlations() -> None:
+    x = philox(14).random((400, 2))
+    y = np.exp(5.0 * x[:, 0]) + 20.0 * x[:, 1].round(1)
+    found = of(x, y).rank_correlation
+    for at in range(2):
+        exact = stats.spearmanr(x[:, at], y).statistic
+        assert found[f"x{at}"].value == pytest.approx(exact, abs=1e-12)
+        assert found[f"x{at}"].low < exact < found[f"x{at}"].high
+    ties = of(x.round(1), y.round(0)).rank_correlation["x0"].value
+    assert ties == pytest.approx(stats.spearmanr(x[:, 0].round(1), y.round(0)).statistic, abs=1e-12)
+    falling = of(x, -x[:, 0]).rank_correlation["x0"]
+    assert falling.value == pytest.approx(-1.0)
+    assert falling.high < -0.999
+    held = 0
+    for seed in range(200):
+        pair = philox(15_000 + seed).normal(size=(100, 2))
+        found = of(pair, 0.6 * pair[:, 0] + 0.8 * pair[:, 1]).rank_correlation
+        held += found["x0"].low <= 6.0 / math.pi * math.asin(0.3) <= found["x0"].high
+    assert 180 <= held < 200
+
+
+def test_it_is_the_same_each_time_and_looks_at_no_more_rows_than_it_says() -> None:
+    x = philox(16).random((MOST_ROWS + 500, 2))
+    y = x[:, 0] + x[:, 1] ** 2
+    whole = of(x, y)
+    assert whole.rows == MOST_ROWS
+    assert whole == of(x[:MOST_ROWS], y[:MOST_ROWS])
+    assert whole != of(x[500:], y[500:])

@@ -1,0 +1,388 @@
+"""Statistics of rows: the sketch against exact quantiles, and every interval against how often it holds the truth."""
+
+import math
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy import stats
+from scipy.signal import lfilter
+from scipy.special import i0e
+
+from microrad.campaign.records import Floats, Interval
+from microrad.campaign.sketch import LARGEST, RELATIVE_ERROR, SMALLEST, Sketch
+from microrad.campaign.statistics import (
+    Fold,
+    Moments,
+    mean_interval,
+    moments,
+    proportion_interval,
+    quantile_interval,
+    share_interval,
+    tail_of_time,
+    tail_weighted,
+)
+from microrad.fine_loop.ensemble import bin_edges_rad, histogram_quantile
+from truths import philox
+
+SHARES = (0.0, 1e-3, 0.01, 0.3, 0.5, 0.9, 0.997, 0.9999, 1.0)
+
+
+def sketched(values: Floats, weights: Floats | None = None) -> Sketch:
+    sketch = Sketch()
+    sketch.add(values, weights)
+    return sketch
+
+
+# --------------------------------------------------------------------------------------------------------------- sketch
+DATA = {
+    "normal about 0": lambda r: r.normal(size=30_000),
+    "narrow about 12": lambda r: 12.0 + 0.001 * r.normal(size=5000),
+    "twenty decades": lambda r: np.exp(10.0 * r.normal(size=20_000)),
+    "counts": lambda r: r.poisson(2.0, 3000).astype(float),
+    "negative": lambda r: -r.exponential(3e-6, 7000),
+    "one": lambda r: np.array([-4.2e-6]),
+}
+
+
+@pytest.mark.parametrize("kind", DATA)
+def test_quantiles_are_as_near_as_promised(kind: str) -> None:
+    values = DATA[kind](philox(1))
+    sketch = sketched(values)
+    exact = np.quantile(values, SHARES, method="inverted_cdf")
+    found = np.array([sketch.quantile(share) for share in SHARES])
+    assert np.all(np.abs(found - exact) <= sketch.error * (1.0 + 1e-9) * np.abs(exact))
+    assert sketch.error == RELATIVE_ERROR < 1e-3
+    if kind in ("narrow about 12", "twenty decades"):  # it is a sketch, not the values
+        assert np.max(np.abs(found - exact)) > 0.0
+
+
+def test_weighted_quantiles_are_those_of_repeated_values() -> None:
+    values = philox(2).normal(size=500)
+    weights = philox(3).integers(1, 9, 500).astype(float)
+    weighted, repeated = sketched(values, weights), sketched(np.repeat(values, weights.astype(int)))
+    for share in SHARES:
+        assert weighted.quantile(share) == repeated.quantile(share)
+    assert weighted.quantile(0.3) != sketched(values).quantile(0.3)
+    assert weighted.weight == weights.sum()
+
+
+def test_parts_merge_into_the_whole_without_loss() -> None:
+    values = philox(4).normal(3.0, 2.0, 20_000)
+    whole, merged, chunked = sketched(values), sketched(values[:77]), Sketch()
+    merged.merge(sketched(values[77:9000]))
+    merged.merge(sketched(values[9000:]))
+    for begin in range(0, values.size, 64):
+        chunked.add(values[begin : begin + 64])
+    for other in (merged, chunked):
+        assert other.bins == whole.bins
+        assert all(other.quantile(share) == whole.quantile(share) for share in SHARES)
+    assert sketched(values[:77]).quantile(0.5) != whole.quantile(0.5)
+
+
+def test_bins_are_bounded_for_any_data() -> None:
+    random = philox(5)
+    sketch = Sketch()
+    for _ in range(4):
+        sketch.add(random.choice([-1.0, 1.0], 300_000) * 10.0 ** random.uniform(-40.0, 40.0, 300_000))
+    most = sketch.bins
+    assert 300_000 < most < 600_000
+    narrow = sketched(random.normal(3.0, 0.1, 300_000))
+    assert narrow.bins < 3000
+
+
+def test_values_without_end_zeros_and_nothing() -> None:
+    sketch = sketched(np.array([-math.inf, 0.0, 0.0, SMALLEST / 10.0, math.nan, 5.0, LARGEST * 10.0, math.inf]))
+    assert sketch.weight == 7.0
+    assert [sketch.quantile(share) for share in (0.0, 0.5, 1.0)] == [-math.inf, 0.0, math.inf]
+    assert sketch.quantile(0.7) == pytest.approx(5.0, rel=RELATIVE_ERROR)
+    edges, counts = sketch.histogram(5)
+    assert (edges[0], counts.sum()) == (0.0, 4.0)
+    assert edges[-1] == pytest.approx(5.0, rel=RELATIVE_ERROR)
+    assert math.isnan(Sketch().quantile(0.5))
+    assert Sketch().histogram(5)[0].size == 0
+    assert sketched(np.array([math.inf])).histogram(5)[1].size == 0
+
+
+@pytest.mark.parametrize("kind", ["normal about 0", "narrow about 12", "counts"])
+def test_picture_has_all_rows_where_they_are(kind: str) -> None:
+    values = DATA[kind](philox(6))
+    edges, counts = sketched(values).histogram(8)
+    assert_allclose(counts.sum(), values.size, rtol=1e-12)
+    exact = np.histogram(values, edges + 1e-9 * np.array([-1.0, *[0.0] * 7, 1.0]))[0]
+    tolerance = 0.35 if kind == "narrow about 12" else 0.005  # the first is hardly wider than a bin of the sketch
+    if kind != "counts":  # whole numbers lie on edges
+        assert np.max(np.abs(counts - exact)) < tolerance * values.size
+    same, one = sketched(np.full(9, 3.3)).histogram(8)
+    assert same[0] < 3.3 < same[1]
+    assert one.tolist() == [9.0]
+
+
+# -------------------------------------------------------------------------------------------------------------- moments
+def test_moments_are_those_of_numpy_even_far_from_zero() -> None:
+    values = 1e9 + philox(7).normal(size=1000)
+    found = moments(values)
+    exact = np.var(values - 1e9, ddof=1)
+    assert found.count == 1000
+    assert_allclose(found.mean, np.mean(values), rtol=1e-15)
+    assert_allclose(found.variance, exact, rtol=1e-6)
+    assert_allclose(found.mean_variance, found.variance / 1000, rtol=1e-12)
+    assert (found.least, found.most) == (values.min(), values.max())
+    naive = np.mean(values**2) - np.mean(values) ** 2
+    assert abs(naive - exact) > 0.1  # what a plain sum of squares would give
+
+
+def test_weighted_moments_and_their_parts() -> None:
+    values, weights = philox(8).normal(5.0, 2.0, 300), philox(9).exponential(size=300)
+    whole, parts = moments(values, weights), Moments()
+    for begin, end in pairwise((0, 1, 90, 91, 300)):
+        parts = parts.merged(moments(values[begin:end], weights[begin:end]))
+    for name in ("count", "weight", "weight_square", "mean", "spread", "square", "least", "most"):
+        assert_allclose(getattr(parts, name), getattr(whole, name), rtol=1e-12)
+    assert_allclose(whole.mean, np.average(values, weights=weights), rtol=1e-13)
+    assert_allclose(whole.variance, np.cov(values, aweights=weights), rtol=1e-12)
+    by_hand = np.sum((weights * (values - whole.mean)) ** 2) / weights.sum() ** 2 * 300 / 299
+    assert_allclose([whole.mean_variance, parts.mean_variance], by_hand, rtol=1e-12)
+    assert abs(whole.mean - values.mean()) > 1e-3
+
+
+def test_moments_of_nothing_one_the_same_and_without_end() -> None:
+    assert moments(np.array([math.nan])).count == 0
+    assert Moments().merged(moments(np.array([2.0]))).mean == 2.0
+    assert math.isnan(moments(np.array([2.0])).deviation)
+    same = moments(np.full(7, 0.1)).merged(moments(np.full(5, 0.1)))
+    assert (same.mean, same.deviation) == (0.1, 0.0)
+    assert moments(np.array([1.0, -math.inf])).least == -math.inf
+    assert math.isnan(moments(np.array([1.0, math.inf])).merged(moments(np.ones(2))).deviation)
+
+
+# ------------------------------------------------------------------------------------------------------------ intervals
+def test_mean_of_independent_rows_has_students_interval() -> None:
+    values = philox(10).normal(size=12)
+    found = mean_interval(moments(values), 0.9)
+    exact = stats.ttest_1samp(values, 0.0).confidence_interval(0.9)
+    assert_allclose([found.low, found.high], [exact.low, exact.high], rtol=1e-12)
+    assert math.isnan(mean_interval(moments(values[:1]), 0.9).low)
+
+
+def test_blocks_of_sobol_rows_give_a_narrower_interval_that_holds() -> None:
+    held, narrower = 0, 0
+    for seed in range(60):
+        fold = Fold(block=32)
+        for block in range(8):
+            points = stats.qmc.Sobol(2, rng=1000 * seed + block).random(32)
+            fold.add(block * 32, np.exp(points[:, 0]) + points[:, 1] ** 2)
+        by_block, by_row = fold.mean(0.95), mean_interval(fold.moments, 0.95)
+        held += by_block.low <= math.e - 1.0 + 1.0 / 3.0 <= by_block.high
+        narrower += by_block.high - by_block.low < 0.2 * (by_row.high - by_row.low)
+    assert 51 <= held <= 60
+    assert narrower == 60
+
+
+def test_shares_have_clopper_and_pearsons_interval() -> None:
+    for hits, trials in ((0, 20), (3, 20), (20, 20), (1, 5000)):
+        found = proportion_interval(hits, trials, 0.99)
+        exact = stats.binomtest(hits, trials).proportion_ci(0.99)
+        assert_allclose([found.value, found.low, found.high], [hits / trials, exact.low, exact.high], rtol=1e-9)
+        rows = share_interval(moments((np.arange(trials) < hits).astype(float)), 0.99)
+        assert_allclose([rows.low, rows.high], [exact.low, exact.high], rtol=1e-9)
+    assert math.isnan(share_interval(Moments(), 0.99).value)
+
+
+def test_interval_of_a_weighted_share_holds_where_that_without_weights_does_not() -> None:
+    held = plain = 0
+    for seed in range(400):
+        x = philox(1000 * 11 + seed).exponential(2.0, 500)  # drawn wider than it is distributed
+        weights, hit = 2.0 * np.exp(-x / 2.0), (x > 2.0).astype(float)
+        found = share_interval(moments(hit, weights), 0.95)
+        held += found.low <= math.exp(-2.0) <= found.high
+        narrow = proportion_interval(found.value * 1e4, 1e4, 0.95)
+        plain += narrow.low <= math.exp(-2.0) <= narrow.high
+    assert held >= 370
+    assert plain < 300
+
+
+def test_quantile_interval_has_the_order_statistics_that_the_binomial_distribution_says() -> None:
+    values = np.sort(philox(12).normal(size=200))
+    for share in (0.1, 0.5, 0.9):
+        found = quantile_interval(sketched(values), share, 0.95)
+        low = int(stats.binom.ppf(0.025, 200, share)) - 1
+        high = int(stats.binom.ppf(0.975, 200, share))
+        assert_allclose([found.low, found.high], values[[low, high]], rtol=2e-3)
+        assert found.low <= values[low]  # to the sketch's error outwards
+        assert found.high >= values[high]
+        assert values[low - 1] < found.low
+        assert found.high < values[high + 1]
+
+
+def test_an_end_that_few_rows_cannot_have_is_not_known() -> None:
+    values = np.arange(1.0, 101.0)
+    assert math.isnan(quantile_interval(sketched(values), 0.003, 0.95).low)
+    assert not math.isnan(quantile_interval(sketched(values), 0.003, 0.95).high)
+    assert math.isnan(quantile_interval(sketched(values), 0.99, 0.95).high)
+    assert quantile_interval(sketched(values), 0.5, 0.95).low == pytest.approx(40.0, rel=1e-3)
+    assert math.isnan(quantile_interval(Sketch(), 0.5, 0.95).value)
+
+
+def test_interval_of_a_weighted_quantile_holds() -> None:
+    held, widths = 0, []
+    for seed in range(400):
+        x = philox(1000 * 13 + seed).exponential(2.0, 400)
+        found = quantile_interval(sketched(x, 2.0 * np.exp(-x / 2.0)), 0.9, 0.95)
+        held += found.low <= math.log(10.0) <= found.high
+        widths.append(found.high - found.low)
+    assert 370 <= held <= 398
+    assert np.median(widths) < 1.2
+
+
+# ---------------------------------------------------------------------------------------------------------------- folds
+def test_a_fold_does_not_depend_on_where_chunks_end() -> None:
+    values = philox(14).normal(size=256)
+    values[[3, 77]] = math.nan
+    whole, parts = Fold(block=64), Fold(block=64)
+    whole.add(0, values)
+    for begin, end in pairwise((0, 10, 64, 70, 200, 256)):
+        parts.add(begin, values[begin:end])
+    assert (whole.blocks.count, parts.blocks.count) == (4, 4)
+    assert_allclose(parts.mean(0.95).high, whole.mean(0.95).high, rtol=1e-13)
+    summary = parts.summary("margin", "dB", "the margin", (0.5, 0.003), 0.95)
+    assert (summary.rows, summary.counts.sum()) == (254, pytest.approx(254.0))
+    assert summary.quantiles[0.5].low < summary.quantiles[0.5].value < summary.quantiles[0.5].high
+    assert summary.sketch_error == RELATIVE_ERROR
+    assert (summary.least, summary.most) == (np.nanmin(values), np.nanmax(values))
+
+
+def test_a_block_with_missing_chunks_is_no_draw_of_the_mean() -> None:
+    fold = Fold(block=64)
+    fold.add(0, np.zeros(64))
+    fold.add(64, np.ones(32))  # its second half and the first half of the next are missing
+    fold.add(160, np.ones(32))
+    assert fold.blocks.count == 1
+    fold.add(192, np.ones(64))
+    assert fold.blocks.count == 2
+    assert fold.moments.count == 192
+
+
+def test_a_fold_of_no_good_rows_has_a_summary() -> None:
+    fold = Fold(block=16)
+    fold.add(0, np.full(16, math.nan))
+    summary = fold.summary("margin", "dB", "the margin", (0.5,), 0.95)
+    assert summary.rows == summary.counts.size == 0
+    assert math.isnan(summary.mean.value)
+    assert math.isnan(summary.quantiles[0.5].value)
+
+
+# ---------------------------------------------------------------------------------------------------------------- tails
+SIGMA = 2e-6
+EDGES = bin_edges_rad()
+
+
+def counted(seed: int, rows: int, samples: int, memory: float) -> np.ndarray:
+    """Histograms (rows, bins) of the radius of two first-order processes."""
+    keep = math.exp(-1.0 / memory)
+    noise = philox(1000 * 15 + seed).normal(size=(2, rows, samples)) * SIGMA
+    noise[:, :, 1:] *= math.sqrt(1.0 - keep**2)
+    radius = np.hypot(*lfilter([1.0], [1.0, -keep], noise, axis=-1))
+    return np.stack([np.histogram(row, EDGES)[0] for row in radius])
+
+
+def holds(found: Interval, truth: float) -> bool:
+    """An end that is not known leaves all beyond it possible."""
+    return not (found.low > truth or found.high < truth)
+
+
+def shares(counts: np.ndarray) -> Floats:
+    return np.asarray(np.cumsum(counts[:, ::-1], axis=1)[:, ::-1] / counts.sum(axis=1, keepdims=True))
+
+
+def test_interval_of_a_correlated_tail_holds_rayleighs_quantile() -> None:
+    probability = 1e-4
+    exact = SIGMA * math.sqrt(-2.0 * math.log(probability))
+    held = naive = known = 0
+    for seed in range(100):
+        share = shares(counted(seed, 64, 5000, 10.0))
+        tail = tail_of_time(share.sum(axis=0), (share**2).sum(axis=0), 64, EDGES, [probability], 0.99)
+        found = tail.wanted[probability]
+        held += holds(found, exact)
+        known += found.high < 1.15 * exact
+        at = int(np.searchsorted(EDGES, exact))
+        band = proportion_interval(share.mean(axis=0)[at] * 320_000, 320_000, 0.99)  # as if all errors were independent
+        naive += band.low <= math.exp(-0.5 * (EDGES[at] / SIGMA) ** 2) <= band.high
+    assert held >= 95
+    assert known >= 95
+    assert naive < 93
+
+
+def test_tail_is_that_of_the_histogram() -> None:
+    counts = counted(1, 64, 10_000, 20.0)
+    share = shares(counts)
+    tail = tail_of_time(share.sum(axis=0), (share**2).sum(axis=0), 64, EDGES, (0.5, 0.01, 1e-3), 0.95)
+    for probability, found in tail.wanted.items():
+        assert found.value == pytest.approx(histogram_quantile(counts.sum(axis=0), 1.0 - probability), rel=2e-3)
+        assert found.low < found.value < found.high
+    assert np.all(np.diff(tail.survival) <= 0.0)
+    assert np.all((tail.low <= tail.survival) & (tail.survival <= tail.high))
+    assert (tail.survival[0], tail.survival[-1], tail.high[-1] > 0.0) == (1.0, 0.0, True)
+    assert tail.radius_rad.shape == tail.survival.shape
+    assert 640_000 / 20.0 < tail.effective_runs < 640_000  # excursions to 1e-3 are shorter than the memory
+    assert "64 rows" in tail.method
+
+
+def test_between_edges_the_radius_is_rayleighs() -> None:
+    exact = np.exp(-0.5 * (EDGES[:-1] / SIGMA) ** 2)
+    probabilities = (0.7, 0.1, 3e-3, 1.1e-5)
+    tail = tail_of_time(exact * 50, exact**2 * 50, 50, EDGES, probabilities, 0.95)
+    for probability in probabilities:
+        assert tail.wanted[probability].value == pytest.approx(
+            SIGMA * math.sqrt(-2.0 * math.log(probability)), rel=1e-9
+        )
+        linear = histogram_quantile((-np.diff(exact, append=0.0) * 1e9).astype(int), 1.0 - probability)
+        assert linear == pytest.approx(tail.wanted[probability].value, rel=2e-3)
+
+
+def test_what_few_rows_cannot_tell_is_not_known() -> None:
+    share = shares(counted(2, 4, 1000, 20.0))
+    tail = tail_of_time(share.sum(axis=0), (share**2).sum(axis=0), 4, EDGES, (0.3, 1e-6), 0.99)
+    assert tail.wanted[0.3].high < 5.0 * SIGMA
+    assert math.isnan(tail.wanted[1e-6].high)
+    one = tail_of_time(share[0], share[0] ** 2, 1, EDGES, (0.3,), 0.99)
+    assert math.isnan(one.wanted[0.3].high)
+    assert one.wanted[0.3].value > 0.0
+    assert math.isnan(tail_of_time(share[0], share[0] ** 2, 1, EDGES, (), 0.99).effective_runs)
+    with pytest.raises(ValueError, match="no rows"):
+        tail_of_time(share[0], share[0], 0, EDGES, (0.3,), 0.99)
+
+
+def tilted(seed: int, draws: int, shift: float) -> tuple[Floats, Floats]:
+    """Radii of two normal numbers that are shifted in any direction, and the logarithm of their weights."""
+    random = philox(1000 * 16 + seed)
+    angle = random.uniform(0.0, 2.0 * math.pi, draws)
+    radius = np.hypot(random.normal(shift * np.cos(angle), 1.0), random.normal(shift * np.sin(angle), 1.0))
+    return radius, shift**2 / 2.0 - np.log(i0e(shift * radius)) - shift * radius
+
+
+@pytest.mark.parametrize(("draws", "miss"), [(64, 1.0), (256, 0.8), (640, 1.0)])
+def test_interval_of_a_weighted_tail_holds_rayleighs_quantile(draws: int, miss: float) -> None:
+    probability, held, widths = 1e-6, 0, []
+    exact = math.sqrt(-2.0 * math.log(probability))
+    for seed in range(200):
+        tail = tail_weighted(*tilted(seed, draws, miss * exact), [probability], 0.99)
+        found = tail.wanted[probability]
+        held += holds(found, exact)
+        widths.append(found.high - found.low)
+        assert tail.effective_runs > 20 * draws
+    assert held >= 194
+    assert np.median(widths) < 0.12 * exact  # 9 % of the radius is a factor of 10 in probability
+
+
+def test_draws_that_are_not_tilted_know_nothing_of_a_rare_tail() -> None:
+    tail = tail_weighted(*tilted(1, 640, 0.0), (0.5, 1e-6), 0.99)
+    assert tail.wanted[0.5].low < math.sqrt(2.0 * math.log(2.0)) < tail.wanted[0.5].high
+    assert math.isnan(tail.wanted[1e-6].high)
+    assert tail.effective_runs == pytest.approx(640, rel=0.02)
+    many = tail_weighted(*tilted(1, 5000, 5.0), (1e-6,), 0.99)
+    assert many.radius_rad.size <= 200
+    assert np.all((many.low <= many.survival) & (many.survival <= many.high))
+    with pytest.raises(ValueError, match="no draws"):
+        tail_weighted(np.empty(0), np.empty(0), (0.5,), 0.99)

@@ -1,0 +1,742 @@
+"""A campaign on a page, in a terminal and as plain data, from summaries of a toy model."""
+
+import functools
+import json
+import math
+import re
+from dataclasses import replace
+from html.parser import HTMLParser
+from itertools import product
+from types import SimpleNamespace
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from microrad.campaign.outputs import OUTPUTS
+from microrad.campaign.records import (
+    CampaignSummary,
+    CellSummary,
+    Failed,
+    InputText,
+    Interval,
+    Limit,
+    OutputSummary,
+    Progress,
+    Sensitivity,
+    Tail,
+    WorstTrace,
+)
+from microrad.fine_loop.ensemble import bin_edges_rad
+from microrad.report import campaign_figures, campaign_page, campaign_words
+from microrad.report.campaign_words import share, value
+
+NAME = 'LEO <b>"A&B"</b> $x$'
+CONFIDENCE = 0.99
+QUANTILES = (0.003, 0.01, 0.5, 0.99, 0.997)
+INPUTS = {
+    "communication.transmit_power": ("W", "normal, mean 5 W, deviation 0.2 W"),
+    "communication.pointing_error": ("rad", "normal, mean 5 urad, deviation 1 urad"),
+    "terminals.leo_aperture": ("m", "uniform, 4.8 cm to 5.2 cm"),
+    "fine_pointing.disturbances.reaction_wheel.imbalance_of_the_first_wheel": ("", "log-uniform, 0.1 to 10"),
+    "mirror.alpha": ("1/V", "identified: the covariance of its file"),
+    "mirror.mode_1.frequency": ("Hz", "identified: the covariance of its file"),
+}
+LIMITS = (
+    Limit("margin", 3.0, None, "requirement.margin"),
+    Limit("residual_quantile", None, 10e-6, "requirement.pointing_error"),
+)
+
+
+# --------------------------------------------------------------------------------------------------------- a toy model
+def proportion(count, rows):
+    """Clopper and Pearson's interval."""
+    beta, half = stats.beta, (1.0 - CONFIDENCE) / 2.0
+    low = beta.ppf(half, count, rows - count + 1) if count else 0.0
+    high = beta.ppf(1.0 - half, count + 1, rows - count) if count < rows else 1.0
+    return Interval(count / rows if rows else math.nan, float(low), float(high), CONFIDENCE)
+
+
+def drawn(count, rows, seed):
+    """Columns of ``count`` inputs, in SI units."""
+    rng = np.random.default_rng(seed)
+    every = {
+        "communication.transmit_power": rng.normal(5.0, 0.2, rows),
+        "communication.pointing_error": rng.normal(5e-6, 1e-6, rows),
+        "terminals.leo_aperture": rng.uniform(0.048, 0.052, rows),
+        "fine_pointing.disturbances.reaction_wheel.imbalance_of_the_first_wheel": 10.0 ** rng.uniform(-1.0, 1.0, rows),
+        "mirror.alpha": rng.normal(0.02, 0.001, rows),
+        "mirror.mode_1.frequency": rng.normal(750.0, 20.0, rows),
+    }
+    return dict(list(every.items())[:count])
+
+
+def outputs_of(inputs, rows, shift_db, loop):
+    """Columns of the outputs: a link and the residual that its loop leaves."""
+    power = inputs.get("communication.transmit_power", np.full(rows, 5.0))
+    error = inputs.get("communication.pointing_error", np.full(rows, 5e-6))
+    margin = 4.2 + shift_db + 10.0 * np.log10(power / 5.0) - 0.06 * (error * 1e6 - 2.0) ** 2
+    found = {"margin": margin, "beacon_margin": np.full(rows, 6.1)}
+    if loop:
+        wheel = inputs.get("fine_pointing.disturbances.reaction_wheel.imbalance_of_the_first_wheel", np.ones(rows))
+        found["residual_quantile"] = (6.0 + 0.5 * wheel + 0.3 * (error * 1e6 - 5.0)) * 1e-6
+        found["beyond_share"] = np.exp(-0.5 * (10e-6 / found["residual_quantile"]) ** 2 * 11.6)
+    return found
+
+
+def output_summary(name, column):
+    known = column[~np.isnan(column)]
+    o = OUTPUTS[name]
+    spread = known.std() / math.sqrt(max(known.size, 1)) if known.size else math.nan
+    quantiles = {}
+    for p in QUANTILES:
+        ends = np.clip(
+            [p, p - 2.0 * math.sqrt(p * (1 - p) / known.size), p + 2.0 * math.sqrt(p * (1 - p) / known.size)], 0, 1
+        )
+        quantiles[p] = Interval(*map(float, np.quantile(known, ends)), CONFIDENCE)
+    counts, edges = np.histogram(known, bins=40)
+    mean = float(known.mean())
+    return OutputSummary(
+        name,
+        o.unit,
+        o.meaning,
+        known.size,
+        Interval(mean, mean - 2.6 * spread, mean + 2.6 * spread, CONFIDENCE),
+        float(known.std()),
+        float(known.min()),
+        float(known.max()),
+        quantiles,
+        1e-3,
+        edges,
+        counts.astype(float),
+    )
+
+
+def rayleigh_tail(sigma_rad, wanted=(0.1, 0.01, 0.003, 1e-3, 1e-4, 1e-5, 1e-6)):
+    """A tail that thins out beyond 3e-7, the radius at the last probability without an upper end."""
+    edges = bin_edges_rad()
+    survival = np.exp(-0.5 * (edges / sigma_rad) ** 2)
+    survival[survival < 3e-7] = 0.0
+    width = np.exp(0.4 * np.log10(np.maximum(survival, 1e-9)) ** 2 / 8.0)
+    radii = {p: sigma_rad * math.sqrt(-2.0 * math.log(p)) for p in wanted}
+    return Tail(
+        edges,
+        survival,
+        survival / width,
+        np.maximum(survival * width, 5e-7),
+        {p: Interval(r, 0.98 * r, 1.03 * r if p > 2e-6 else math.nan, CONFIDENCE) for p, r in radii.items()},
+        CONFIDENCE,
+        "share of the time of 64 rows, which are independent",
+        1.3e5,
+    )
+
+
+def cell_of(values, columns, failed, tail):
+    """A cell from the columns of its outputs."""
+    known = {name: column for name, column in columns.items() if not np.isnan(column).all()}
+    good = max((int((~np.isnan(c)).sum()) for c in known.values()), default=0)
+    missed = {}
+    for limit in LIMITS:
+        if limit.output in known:
+            column = known[limit.output]
+            missed[limit.output] = (column < (limit.least or -math.inf)) | (column > (limit.most or math.inf))
+    any_missed = np.any(list(missed.values()), axis=0) if missed else np.zeros(1)
+    nothing = Interval(math.nan, math.nan, math.nan, CONFIDENCE)
+    return CellSummary(
+        values,
+        good + failed,
+        failed,
+        {name: output_summary(name, column) for name, column in known.items()},
+        proportion(int(any_missed.sum()), good) if good and missed else nothing,
+        {name: proportion(int(which.sum()), good) for name, which in missed.items()},
+        tail if good else None,
+    )
+
+
+def sensitivity_of(name, inputs, column):
+    """Squared correlations in place of indices: the toy model is nearly linear."""
+
+    def about(x, half=0.04):
+        return Interval(x, x - half, x + half, 0.95)
+
+    known = ~np.isnan(column)
+    if known.sum() < 10 or np.ptp(column[known]) == 0.0:
+        return Sensitivity(
+            name, int(known.sum()), {}, {}, {}, math.nan, "the output is the same in every row, or there are too few"
+        )
+    rank = {key: float(stats.spearmanr(x[known], column[known])[0]) for key, x in inputs.items()}
+    first = {key: about(r**2) for key, r in rank.items()}
+    total = {key: about(min(r**2 + 0.03, 1.0)) for key, r in rank.items()} if name != "beyond_share" else {}
+    note = "" if total else "no surrogate is good enough for total indices (Q2 = 0.41)"
+    return Sensitivity(name, int(known.sum()), first, total, {k: about(r) for k, r in rank.items()}, 0.97, note)
+
+
+def trace_of(number, cell=0):
+    time_s = np.arange(0.0, 2.0, 1e-4)
+    rng = np.random.default_rng(number)
+    error = np.stack([4e-6 * np.sin(2 * np.pi * (30.0 + 7 * axis) * time_s) for axis in range(2)], axis=1)
+    error += rng.normal(0.0, 1e-6, error.shape)
+    drive = 40.0 + np.stack([20.0 * np.sin(2 * np.pi * 3 * time_s), 15.0 * np.cos(2 * np.pi * 3 * time_s)], axis=1)
+    return WorstTrace(cell, 100 + number, "margin", 1.2 + 0.1 * number, time_s, error, drive)
+
+
+def summary_of(
+    inputs=2, *, rows=512, grid=None, loop=True, shift_db=0.0, failed=0, limits=LIMITS, state="complete", worst=0
+):
+    """What a campaign of the toy model comes to; ``grid`` are the texts of each key's values."""
+    grid = grid or {}
+    cells, sample = [], []
+    for number, texts in enumerate(product(*grid.values())):
+        x = drawn(inputs, rows, 1)
+        y = outputs_of(x, rows, shift_db + 0.4 * number, loop)
+        for column in y.values():
+            column[:failed] = math.nan
+        tail = rayleigh_tail((2.0 + 0.1 * number) * 1e-6) if loop else None
+        cells.append(cell_of(dict(zip(grid, texts, strict=True)), y, failed, tail))
+        sample.append({"cell": np.full(rows, float(number)), "row": np.arange(rows) * 1.0, **x, **y})
+    kept = tuple(limit for limit in limits if any(limit.output in cell.outputs for cell in cells))
+    if not kept:
+        cells = [replace(c, missed=Interval(math.nan, math.nan, math.nan, CONFIDENCE), missed_by={}) for c in cells]
+    first_in = {key: sample[0][key] for key in drawn(inputs, rows, 1)}
+    done = rows * len(cells)
+    return CampaignSummary(
+        name="margin <tail>.toml",
+        mission_name=NAME,
+        hashes={"campaign": "c" * 64, "mission": "d" * 64, "code": "e" * 64},
+        seed=2**64 - 1,
+        sampling="sobol",
+        loop="LQG, both axes, 10 s, 64 runs a row" if loop else "",
+        inputs=tuple(InputText(key, *INPUTS[key]) for key in first_in),
+        fixed={"fine_pointing.reference.point_ahead": "0 urad"},
+        limits=kept,
+        cells=tuple(cells),
+        sensitivities=tuple(sensitivity_of(n, first_in, sample[0][n]) for n in cells[0].outputs) if inputs else (),
+        sample={key: np.concatenate([s[key] for s in sample]) for key in sample[0]},
+        worst=tuple(trace_of(k) for k in range(worst if loop else 0)),
+        failed=tuple(
+            (k, Failed(row, 2**63 + row, 2, "ended with <ValueError>: the loop is not stable; take a smaller gain"))
+            for k in range(len(cells))
+            for row in range(failed)
+        ),
+        progress=Progress(done, done if state == "complete" else 20 * done, 125.0, done / 125.0, 2375.0, state),
+        warnings=("2000 rows were made 2048: Sobol takes whole blocks",),
+    )
+
+
+def tail_alone():
+    """Importance sampling of the noise: its rows are draws for the tail, without outputs or limits."""
+    found = summary_of(0, rows=256, worst=0)
+    tail = replace(rayleigh_tail(2e-6, (1e-6,)), method="importance sampling of 256 runs")
+    cell = replace(found.cells[0], outputs={}, missed=Interval(*[math.nan] * 3, 0.95), missed_by={}, tail=tail)
+    return replace(found, limits=(), cells=(cell,), sensitivities=(), sample={})
+
+
+APERTURES = {"terminals.leo_aperture": ("4 cm", "5 cm", "6 cm", "8 cm")}
+TWO_KEYS = {**APERTURES, "mirror": ("lab-a.toml", "lab-b.toml", "lab-c.toml")}
+THREE_KEYS = {**APERTURES, "mirror": ("lab-a.toml", "lab-b.toml"), "conventions.strehl": ("decibel", "ratio")}
+CASES = {
+    "two inputs": lambda: summary_of(2, worst=3, failed=3),
+    "one input": lambda: summary_of(1),
+    "six inputs": lambda: summary_of(6),
+    "no inputs": lambda: summary_of(0, rows=64, worst=1),
+    "no loop": lambda: summary_of(2, loop=False),
+    "grid of one key": lambda: summary_of(2, grid=APERTURES, rows=256, loop=False),
+    "grid of two keys": lambda: summary_of(2, grid=TWO_KEYS, rows=256),
+    "grid of three keys": lambda: summary_of(2, grid=THREE_KEYS, rows=256),
+    "all kept": lambda: summary_of(2, shift_db=30.0),
+    "all missed": lambda: summary_of(2, shift_db=-30.0),
+    "all failed": lambda: summary_of(2, rows=16, failed=16),
+    "few rows": lambda: summary_of(2, rows=4, state="running"),
+    "one row": lambda: summary_of(2, rows=1, state="stopped"),
+    "no limits": lambda: summary_of(2, limits=(), loop=False),
+    "tail alone": tail_alone,
+    "not begun": lambda: replace(summary_of(2, rows=16, failed=16, state="waiting"), cells=(), failed=()),
+}
+
+
+@functools.cache
+def made(name):
+    """A summary with its figures and its page, drawn once."""
+    summary = CASES[name]()
+    figures = campaign_page.draw(summary)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(campaign_page, "draw", lambda _: figures)
+        return SimpleNamespace(summary=summary, figures=figures, html=campaign_page.html(summary))
+
+
+@pytest.fixture(params=CASES)
+def case(request):
+    return made(request.param)
+
+
+# -------------------------------------------------------------------------------------------------------- helpers here
+class Page(HTMLParser):
+    """What a browser sees: headings, tables as rows of texts, and whether every tag is closed."""
+
+    EMPTY = ("meta", "br", "image", "use", "path", "rect", "circle", "stop")
+
+    def __init__(self, text):
+        super().__init__()
+        self.open, self.headings, self.rows, self.loads, self.figures = [], [], [], [], 0
+        self.feed(text)
+        self.close()
+
+    def handle_starttag(self, tag, attrs):
+        self.loads += [v for k, v in attrs if k in ("src", "href", "xlink:href") and not v.startswith(("#", "data:"))]
+        self.figures += tag == "figure"
+        if tag == "tr":
+            self.rows.append([])
+        if tag in ("td", "th"):
+            self.rows[-1].append("")
+        if tag in ("h1", "h2"):
+            self.headings.append("")
+        if tag not in self.EMPTY:
+            self.open.append(tag)
+
+    def handle_endtag(self, tag):
+        if tag not in self.EMPTY:
+            assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        if self.open and self.open[-1] in ("h1", "h2"):
+            self.headings[-1] += data
+        if self.open and self.open[-1] in ("td", "th"):
+            self.rows[-1][-1] += data
+
+
+def texts(figure):
+    """Every text in the picture, as a reader of the SVG gets it."""
+    root = ElementTree.fromstring(figure.svg)
+    return ["".join(e.itertext()).strip() for e in root.iter("{http://www.w3.org/2000/svg}text")]
+
+
+def boxes(figure):
+    """Where the texts of a picture stand that are not turned: x, y, rough width, and the text."""
+    found = []
+    for e in ElementTree.fromstring(figure.svg).iter("{http://www.w3.org/2000/svg}text"):
+        at = re.search(r"rotate\(-?0\.?0*\)|rotate\(-0\)", e.get("transform", "")) or "rotate" not in e.get(
+            "transform", ""
+        )
+        place = re.search(r"translate\((-?[\d.]+)[ ,]+(-?[\d.]+)\)", e.get("transform", ""))
+        x, y = place.groups() if place else (e.get("x", "nan"), e.get("y", "nan"))
+        size = float(re.search(r"([\d.]+)px", e.get("style", "font: 9px")).group(1))
+        anchor = re.search(r"text-anchor: (\w+)", e.get("style", ""))
+        word = "".join(e.itertext()).strip()
+        long = 0.55 * size * len(word)
+        shift = {"middle": 0.5, "end": 1.0}.get(anchor.group(1) if anchor else "", 0.0) * long
+        if at and word:
+            found.append((float(x) - shift, float(y), long, size, word))
+    return found
+
+
+# --------------------------------------------------------------------------------------------------------- every case
+def test_each_page_is_whole_loads_nothing_and_escapes_its_texts(case):
+    text = case.html
+    page = Page(text)
+    assert page.open == []
+    assert page.loads == []
+    assert page.headings[0] == NAME
+    assert "<b>" not in text
+    assert "How the rows were made" in page.headings
+    assert not re.search(r"\bnan\b|\binf\b|None(?! of)", re.sub(r"<svg.*?</svg>", "", text, flags=re.S))
+
+
+def test_no_picture_is_empty_or_has_texts_that_overlap(case):
+    for figures in case.figures.values():
+        for figure in figures:
+            assert len(texts(figure)) > 3
+            assert not any("mathdefault" in t or "nan" in t.split() for t in texts(figure)), figure.name
+            found = boxes(figure)
+            for k, (x, y, long, size, word) in enumerate(found):
+                for other in found[k + 1 :]:
+                    apart = abs(y - other[1]) >= 0.8 * min(size, other[3])
+                    assert apart or x + long <= other[0] + 1.5 or other[0] + other[2] <= x + 1.5, (
+                        figure.name,
+                        word,
+                        other,
+                    )
+
+
+def test_the_terminal_has_the_verdict_first_and_the_progress_last_within_its_width(case):
+    for width in (80, 140):
+        text = campaign_words.text(case.summary, width)
+        lines = text.splitlines()
+        assert max(map(len, lines)) <= width
+        joined = " ".join(text.split())
+        assert joined.startswith(" ".join(campaign_words.headline(case.summary).split()))
+        assert joined.endswith(campaign_words.progress_words(case.summary))
+        assert not re.search(r"\bnan\b|\binf\b", text)
+
+
+def test_the_data_is_json_without_arrays_and_says_the_same(case):
+    found = campaign_words.data(case.summary)
+    back = json.loads(json.dumps(found))  # an array or a record would raise
+    assert back["verdict"] == campaign_words.headline(case.summary)
+    assert back["seed"] == 2**64 - 1
+    assert len(back["cells"]) == len(case.summary.cells)
+    for shown, cell in zip(back["cells"], case.summary.cells, strict=True):
+        assert shown["rows"] + shown["failed"] == cell.rows
+        assert [o["name"] for o in shown["outputs"]] == list(cell.outputs)
+
+
+# ------------------------------------------------------------------------------------------------------------- verdict
+@pytest.mark.parametrize(
+    ("name", "said", "word"),
+    [
+        ("two inputs", "91.2 % of the rows keep both limits (87.4 % to 94.1 % at 99 % confidence).", "open"),
+        ("all kept", "All 512 rows keep both limits; at 99 % confidence at least 99.0 % of all draws do.", "pass"),
+        (
+            "all missed",
+            "None of 512 rows keeps both limits; at 99 % confidence at most 1.03 % of all draws do.",
+            "fail",
+        ),
+        ("all failed", "No row has results: all 16 failed.", "fail"),
+        (
+            "one row",
+            "So far: the only row keeps both limits; at 99 % confidence at least 0.5 % of all draws do.",
+            "open",
+        ),
+        (
+            "few rows",
+            "So far: all 4 rows keep both limits; at 99 % confidence at least 26.6 % of all draws do.",
+            "open",
+        ),
+        ("no limits", "512 rows with results; no limit is set.", "open"),
+        ("not begun", "No row has been simulated yet.", "open"),
+        (
+            "tail alone",
+            "The radial error exceeds 10.5 µrad with probability 1e-6 (at least 10.3 µrad at 99 % confidence).",
+            "open",
+        ),
+    ],
+)
+def test_the_verdict_says_how_likely_a_row_keeps_the_limits(name, said, word):
+    summary = made(name).summary
+    assert campaign_words.headline(summary) == said
+    assert campaign_words.verdict(summary) == word
+    assert f'class="verdict {word}"' in made(name).html
+
+
+def test_one_limit_is_named_in_the_verdict():
+    said = campaign_words.headline(summary_of(2, limits=LIMITS[:1]))
+    assert "of the rows keep margin ≥ 3.00 dB (" in said
+
+
+def test_a_grid_names_its_best_and_its_worst_combination():
+    said = campaign_words.headline(summary_of(2, grid=APERTURES, rows=256))
+    assert said.startswith("Of 4 combinations, terminals.leo_aperture = 8 cm keeps both limits most often, in 100 % (")
+    assert "; terminals.leo_aperture = 4 cm least often, in 92.6 % (87.3 % to 96.2 %) (intervals at 99 %)." in said
+    several = campaign_words.headline(summary_of(2, grid=APERTURES, rows=256, shift_db=1.0))
+    assert "3 keep both limits in all of their rows, the first of them terminals.leo_aperture = 5 cm" in several
+    same = campaign_words.headline(summary_of(2, grid=APERTURES, rows=256, shift_db=30.0))
+    assert same == "In each of 4 combinations 100 % of the rows keep both limits."
+
+
+def test_a_cell_without_results_is_never_the_best():
+    good, bad = summary_of(2, rows=64), summary_of(2, rows=64, failed=64)
+    both = replace(good, cells=(bad.cells[0], good.cells[0]))
+    assert campaign_words.best(both) is good.cells[0]
+    assert campaign_words.best(bad) is None
+
+
+# ----------------------------------------------------------------------------------------------------- words in detail
+@pytest.mark.parametrize(
+    ("probability", "said"),
+    [
+        (0.0, "0 %"),
+        (1.0, "100 %"),
+        (0.5, "50 %"),
+        (0.0123, "1.23 %"),
+        (0.99987, "99.987 %"),
+        (0.999999, "99.99990 %"),
+        (1e-6, "1e-6"),
+        (3.14e-4, "3.1e-4"),
+        (math.nan, "not known"),
+    ],
+)
+def test_a_probability_keeps_the_digits_that_tell_it_from_0_and_1(probability, said):
+    assert share(probability) == said
+
+
+@pytest.mark.parametrize(
+    ("number", "unit", "name", "said"),
+    [
+        (3.456, "dB", "margin", "3.46 dB"),
+        (-3.456, "dB", "margin", "−3.46 dB"),
+        (9.87e-6, "rad", "residual_rms", "9.87 µrad"),
+        (3e8, "bit/s", "data_rate", "300 Mbit/s"),
+        (8e12, "bit", "volume", "1 TB"),
+        (1800.0, "s", "contact_time", "30 min"),
+        (0.02, "", "outage", "2 %"),
+        (0.02, "", "mirror.alpha", "0.02"),
+        (math.nan, "rad", "residual_rms", "not known"),
+    ],
+)
+def test_values_stand_in_the_users_units(number, unit, name, said):
+    assert value(number, unit, name) == said
+
+
+def test_what_matters_names_the_inputs_that_matter_and_no_others():
+    summary = summary_of(6)
+    margin, residual = campaign_words.matters(summary)
+    assert margin.startswith("What matters most to margin (total Sobol index): communication.pointing_error 0.8")
+    assert "transmit_power" in margin
+    assert "mirror.alpha" not in margin
+    assert "imbalance_of_the_first_wheel 0.7" in residual
+    assert "transmit_power" not in campaign_words.matters(summary_of(2))[1]  # its index is below the least named
+    weak = replace(summary, sensitivities=(replace(summary.sensitivities[0], total={}, first={}, note="too few rows"),))
+    assert campaign_words.matters(weak) == ["No input by itself decides margin: too few rows."]
+    first = replace(summary.sensitivities[0], total={}, note="Q2 = 0.41")
+    (said,) = campaign_words.matters(replace(summary, sensitivities=(first,)))
+    assert "(first-order Sobol index)" in said
+    assert said.endswith("; Q2 = 0.41.")
+
+
+def test_the_tail_is_read_off_at_the_limit():
+    tail = rayleigh_tail(2e-6)
+    found = campaign_words.beyond(tail, 9e-6)
+    assert found.value == pytest.approx(math.exp(-0.5 * 4.5**2), rel=0.01)
+    assert found.low < found.value < found.high
+    unseen = campaign_words.beyond(tail, 14e-6)
+    assert unseen.value == 0.0
+    assert 0.0 < unseen.high < 1e-5
+    assert campaign_words.beyond(replace(tail, radius_rad=tail.radius_rad + 5e-6), 4e-6) is None
+    none = replace(tail, survival=np.zeros(tail.survival.size))
+    assert campaign_words.beyond(none, 9e-6) is None
+
+
+def test_the_tail_says_the_least_probability_that_is_known():
+    summary = summary_of(2)
+    cell = summary.cells[0]
+    known = {**cell.tail.wanted, 1e-7: Interval(math.nan, math.nan, math.nan, CONFIDENCE)}
+    said = campaign_words.tail_sentences(summary, replace(cell, tail=replace(cell.tail, wanted=known)))
+    assert said[0].startswith("The radial error exceeds 10.5 µrad with probability 1e-6 (at least 10.3 µrad")
+    assert said[1].startswith("The radial error is beyond 10 µrad with probability 3.7e-6 (")
+    assert campaign_words.tail_sentences(summary, replace(cell, tail=None)) == []
+    far = replace(summary, limits=(replace(LIMITS[1], most=20e-6),))
+    unseen = campaign_words.tail_sentences(far, cell)[1]
+    assert unseen.startswith("No radial error beyond 20 µrad was seen (0 % to ")
+    _, rows = campaign_words.tail_table(replace(cell.tail, wanted=known))
+    assert rows[-1] == ("1e-7", "not known", "")
+    assert rows[0][:2] == ("10 %", "4.29 µrad")
+
+
+@pytest.mark.parametrize(
+    ("state", "done", "rate", "left", "said"),
+    [
+        ("complete", 2048, 4.0, 0.0, "Complete: 2048 rows in 8.33 min, 4 rows a second."),
+        ("running", 512, 4.0, 384.0, "Running: 512 of 2048 rows, 4 rows a second, 6.4 min left."),
+        ("running", 0, math.nan, math.nan, "Running: 0 of 2048 rows."),
+        ("running", 4096, 4.0, math.nan, "Running: 4096 rows, 4 rows a second."),
+        ("stopped", 512, 4.0, 384.0, "Stopped after 512 of 2048 rows; microrad campaign resume goes on from there."),
+        ("waiting", 0, math.nan, math.nan, "Not begun: 0 of 2048 rows."),
+    ],
+)
+def test_the_progress_has_pace_and_time_left_while_it_runs(state, done, rate, left, said):
+    summary = replace(summary_of(0, rows=4), progress=Progress(done, 2048, 500.0, rate, left, state))
+    assert campaign_words.progress_words(summary) == said
+
+
+def test_failed_rows_stand_with_seed_and_reason_and_the_rest_is_counted():
+    summary = summary_of(2, rows=60, failed=60)
+    text, page = campaign_words.text(summary, 140), Page(campaign_page.html(summary))
+    assert str(2**63 + 9) in text
+    assert str(2**63 + 10) not in text
+    assert "50 more failed rows are in the export." in text
+    rows = [row for row in page.rows if row[1:2] == [str(2**63 + 39)]]
+    assert rows == [["39", str(2**63 + 39), "2", summary.failed[39][1].reason]]
+    assert not any(row[1:2] == [str(2**63 + 40)] for row in page.rows)
+    assert "20 more failed rows" in campaign_page.html(summary)
+    few = made("two inputs").html
+    assert "more failed" not in few
+
+
+def test_a_failed_row_of_a_grid_names_its_combination():
+    summary = summary_of(1, rows=64, failed=1, grid=APERTURES)
+    assert campaign_words.failed_rows(summary, 9)[1][0] == "0 of terminals.leo_aperture = 5 cm"
+    assert campaign_words.failed_rows(summary_of(1, rows=64, failed=1), 9)[0][0] == "0"
+
+
+def test_a_narrow_terminal_has_fewer_quantiles_the_median_among_them():
+    summary = summary_of(2)
+    wide, narrow = campaign_words.text(summary, 140), campaign_words.text(summary, 72)
+    assert "99.7 %" in wide.split("Outputs")[1]
+    heading = next(line for line in narrow.splitlines() if line.split()[:2] == ["output", "mean"])
+    assert "50 %" in heading
+    assert "99.7 %" not in heading
+
+
+def test_outputs_that_are_the_same_in_every_row_stand_in_a_sentence_not_in_the_table():
+    cell = summary_of(2).cells[0]
+    names = [row[0] for row in campaign_words.output_table(cell, 3)[1]]
+    assert names == ["margin", "residual_quantile", "beyond_share"]
+    assert campaign_words.even(cell) == ["The same in every row: beacon_margin 6.10 dB."]
+    assert campaign_words.even(replace(cell, outputs={"margin": cell.outputs["margin"]})) == []
+    assert campaign_words.output_table(summary_of(0, rows=64).cells[0], 3)[1] == []
+    for shown in (made("no inputs").html, campaign_words.text(made("no inputs").summary, 140)):
+        assert "The same in every row: margin 3.66 dB, beacon_margin 6.10 dB, residual_quantile 6.5 µrad" in shown
+
+
+# ------------------------------------------------------------------------------------------------------------ pictures
+def test_sections_are_there_where_they_have_something_to_show_and_only_there():
+    def drawn_in(name):
+        return {key: len(figures) for key, figures in made(name).figures.items() if figures}
+
+    assert drawn_in("two inputs") == {"outputs": 3, "tail": 1, "sensitivity": 1, "region": 1, "worst": 3}
+    assert drawn_in("no inputs") == {"tail": 1, "worst": 1}
+    assert drawn_in("no loop") == {"outputs": 1, "sensitivity": 1, "region": 1}
+    assert drawn_in("all kept") == {"outputs": 3, "tail": 1, "sensitivity": 1}
+    assert drawn_in("all failed") == {}
+    assert drawn_in("tail alone") == {"tail": 1}
+    assert drawn_in("grid of two keys")["grid"] == 1
+    page = Page(made("all failed").html)
+    assert page.headings[1:] == ["Rows without results", "How the rows were made"]
+    assert page.figures == 0
+
+
+def test_a_distribution_shows_its_limit_its_quantiles_and_all_of_its_rows():
+    summary = summary_of(2)
+    output = summary.cells[0].outputs["margin"]
+    figure = campaign_figures.distribution(output, LIMITS[0])
+    assert {"limit ≥ 3.00 dB", "margin (dB)", "rows (%)"} <= set(texts(figure))
+    assert any(t.startswith("50 %: 3.6") for t in texts(figure))
+    assert figure.columns["rows (%)"].sum() == pytest.approx(100.0)
+    assert not any("limit" in t for t in texts(campaign_figures.distribution(output, None)))
+    far = texts(campaign_figures.distribution(output, replace(LIMITS[0], least=-40.0)))
+    assert "far from here" in " ".join(far)
+    both = texts(campaign_figures.distribution(output, replace(LIMITS[0], most=4.5)))
+    assert {"limit ≥ 3.00 dB", "limit ≤ 4.50 dB"} <= set(both)
+
+
+def test_an_axis_has_a_prefix_that_suits_its_values():
+    scale = campaign_figures.scale_of
+    for values, unit, name, factor, label in (
+        ([2e-6, 9e-6], "rad", "residual_rms", 1e6, "µrad"),
+        ([3e8], "bit/s", "data_rate", 1e-6, "Mbit/s"),
+        ([8e12], "bit", "volume", 0.125e-12, "TB"),
+        ([7200.0], "s", "contact_time", 1.0 / 3600.0, "h"),
+        ([0.3], "", "outage", 100.0, "%"),
+        ([1e-5], "", "outage", 1.0, "share"),
+        ([0.3], "", "mirror.alpha", 1.0, ""),
+        ([math.nan], "rad", "residual_rms", 1.0, "rad"),
+        ([2.0], "furlong", "", 1.0, "furlong"),
+    ):
+        found = scale(np.array(values), unit, name)
+        assert found.factor == pytest.approx(factor)
+        assert found.label == label
+
+
+def test_the_tail_marks_what_was_wanted_and_the_limit():
+    summary = summary_of(2, grid=APERTURES, rows=64)
+    (figure,) = campaign_figures.tail(summary, summary.cells[0])
+    seen = texts(figure)
+    assert {"1e-4: 8.58 µrad", "1e-6: 10.5 µrad", "limit ≤ 10 µrad", "other combinations"} <= set(seen)
+    assert "1e-5" in seen  # a decade of the axis
+    single = summary_of(2, limits=LIMITS[:1], rows=64)
+    (alone,) = campaign_figures.tail(single, single.cells[0])
+    assert "other combinations" not in texts(alone)
+    assert not any("limit" in t for t in texts(alone))
+    dark = replace(summary.cells[0], tail=replace(summary.cells[0].tail, survival=np.zeros(4), radius_rad=np.ones(4)))
+    assert campaign_figures.tail(summary, dark) == ()
+
+
+def test_many_inputs_are_cut_in_the_picture_but_not_in_its_data():
+    summary = summary_of(2)
+    index = summary.sensitivities[0].first["communication.transmit_power"]
+    many = {f"mirror.parameter_{k}": replace(index, value=0.9 - 0.01 * k) for k in range(40)}
+    each = replace(summary.sensitivities[0], first=many, total={}, rank_correlation=many)
+    (figure,) = campaign_figures.sensitivity(replace(summary, sensitivities=(each,)))
+    shown = [t for t in texts(figure) if t.startswith("mirror.parameter_")]
+    assert shown == [f"mirror.parameter_{k}" for k in range(campaign_figures.MOST_INPUTS)]
+    assert "26 inputs with smaller indices" in figure.caption
+    assert len(figure.columns) == 40
+
+
+def test_a_key_is_cut_to_what_tells_it_from_the_others():
+    keys = ["a.b.left.gain", "a.b.right.gain", "mirror", "x.y.right.gain"]
+    cut = [campaign_figures.label_of(key, keys) for key in keys]
+    assert cut == ["left.gain", "b.right.gain", "mirror", "y.right.gain"]
+    long = campaign_figures.label_of(f"table.{'long_' * 30}", ["x"])
+    assert max(map(len, long.splitlines())) <= 30
+    assert long.endswith("…")
+
+
+def test_the_failure_region_is_of_the_limit_most_often_missed_over_what_matters_to_it():
+    summary = summary_of(6, rows=400, shift_db=0.3)
+    (figure,) = campaign_page.region(summary)
+    worst = max(summary.cells[0].missed_by, key=lambda name: summary.cells[0].missed_by[name].value)
+    assert figure.title == f"Where {worst} misses its limit"
+    assert list(figure.columns)[-1] == worst
+    leading = [key for key, _ in campaign_words.ranked(next(s for s in summary.sensitivities if s.output == worst))[:2]]
+    assert list(figure.columns)[:2] == leading
+    assert {"kept", "missed"} <= set(texts(figure))
+    assert "no results" not in texts(figure)
+    (failing,) = campaign_page.region(summary_of(2, failed=5))
+    assert "no results" in texts(failing)
+
+
+def test_with_one_input_the_region_has_the_output_beside_it():
+    (figure,) = campaign_page.region(summary_of(1, shift_db=-0.6))
+    assert {"communication.transmit_power (W)", "margin (dB)", "limit ≥ 3.00 dB"} <= set(texts(figure))
+    assert "the input that matters most" in figure.caption
+
+
+def test_the_region_is_of_the_combination_with_rows_on_both_sides():
+    summary = summary_of(2, grid=APERTURES, rows=256, shift_db=-1.5)
+    (figure,) = campaign_page.region(summary)
+    half = min(summary.cells, key=lambda cell: abs(cell.missed_by["margin"].value - 0.5))
+    assert f"256 rows of {half.label}" in figure.caption
+
+
+def test_a_grid_of_two_keys_is_a_map_with_a_number_in_each_field():
+    summary = summary_of(1, grid=TWO_KEYS, rows=128)
+    (figure,) = campaign_figures.grid(summary)
+    shown = [f"{cell.outputs['margin'].quantiles[0.5].value:.3g}" for cell in summary.cells]
+    assert set(shown) <= set(texts(figure))
+    gap = replace(summary, cells=(replace(summary.cells[0], rows=0, failed=0, outputs={}), *summary.cells[1:]))
+    assert texts(campaign_figures.grid(gap)[0]).count("none") == 2
+    assert texts(figure).count("none") == 0
+
+
+def test_other_grids_have_a_row_for_each_combination():
+    for keys in (APERTURES, THREE_KEYS):
+        summary = summary_of(1, grid=keys, rows=64)
+        (figure,) = campaign_figures.grid(summary)
+        for cell in summary.cells:
+            assert ", ".join(cell.values.values()) in texts(figure)
+    assert campaign_figures.grid(summary_of(1, rows=64)) == ()
+
+
+def test_a_grid_without_limits_shows_medians():
+    summary = summary_of(1, grid=APERTURES, rows=64, limits=())
+    (figure,) = campaign_figures.grid(summary)
+    assert "rows that miss a limit" not in " ".join(texts(figure))
+    assert "median margin" in " ".join(texts(figure))
+
+
+def test_a_worst_row_of_one_axis_and_one_of_two():
+    summary = summary_of(2)
+    two = campaign_figures.worst(summary, trace_of(0), 1)
+    assert two.columns["radial error (rad)"] == pytest.approx(np.hypot(*trace_of(0).error_rad.T))
+    assert {"drive 1", "drive 2"} <= set(texts(two))
+    trace = trace_of(0)
+    single = replace(trace, error_rad=trace.error_rad[:, :1], drive_v=trace.drive_v[:, 0])
+    one = campaign_figures.worst(summary, single, 1)
+    assert one.columns["radial error (rad)"] == pytest.approx(np.abs(trace.error_rad[:, 0]))
+    assert "drive 1" not in texts(one)
+    assert one.caption == "Row 100, where margin is 1.20 dB."
+    trace.error_rad[0] = 500e-6  # the loop only closes
+    begun = campaign_figures.worst(summary, trace, 1)
+    assert begun.caption.endswith("Its begin, up to 707 µrad, is cut off.")
+    assert "500" not in texts(begun)
+    trace.error_rad[[0, -1]] = 0.0, 500e-6  # a real excursion is never cut
+    late = campaign_figures.worst(summary, trace, 1)
+    assert "cut off" not in late.caption
+    assert "500" in texts(late)
+
+
+def test_the_same_summary_gives_the_same_page_twice():
+    again = campaign_page.html(CASES["few rows"]())
+    assert again == made("few rows").html
+    assert again != made("one row").html
