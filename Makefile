@@ -34,6 +34,7 @@ benchmark: $(VENV)/.test
 	$(BIN)/python benchmarks/link_conventions.py
 	$(BIN)/python benchmarks/contacts.py
 	$(BIN)/python benchmarks/campaign.py
+	$(BIN)/python benchmarks/campaign_tail.py
 	$(BIN)/python benchmarks/recording.py
 	$(BIN)/python benchmarks/vector_fitting.py
 	$(BIN)/python benchmarks/hysteresis_fit.py

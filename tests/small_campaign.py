@@ -15,6 +15,7 @@ seed = 7
 runs = {runs}
 sampling = "{sampling}"
 row_limit = "{row_limit}"
+worst = {worst}
 
 [loop]
 controller = "PI"
@@ -29,7 +30,9 @@ deviation = "0.2 W"
 """
 
 
-def campaign_file(folder, runs=64, *, sampling="random", duration="0.2 s", row_limit="5 min", more="", mission=()):
+def campaign_file(
+    folder, runs=64, *, sampling="random", duration="0.2 s", row_limit="5 min", worst=0, more="", mission=()
+):
     """A campaign file in a folder, beside its mission with pieces of the text replaced."""
     text = SHIPPED.read_text(encoding="utf-8")
     for old, new in mission:
@@ -38,7 +41,8 @@ def campaign_file(folder, runs=64, *, sampling="random", duration="0.2 s", row_l
     (folder / "mission.toml").write_text(text, encoding="utf-8")
     path = folder / "campaign.toml"
     path.write_text(
-        LOOP.format(runs=runs, sampling=sampling, duration=duration, row_limit=row_limit) + more, encoding="utf-8"
+        LOOP.format(runs=runs, sampling=sampling, duration=duration, row_limit=row_limit, worst=worst) + more,
+        encoding="utf-8",
     )
     return path
 

@@ -10,7 +10,7 @@ import pytest
 
 from campaign_files import HEAD, IDENTIFIED, LOOP, NOISE, POWER, UNCERTAINTY, loaded, written
 from microrad import fine_pointing
-from microrad.campaign import keys, sampling
+from microrad.campaign import keys, ledger_file, sampling
 from microrad.campaign.file import load_campaign
 from microrad.campaign.inputs import Builder
 from microrad.campaign.records import CampaignError
@@ -133,7 +133,7 @@ def test_keys_may_be_quoted_or_tables_inside_tables(tmp_path):
 
 
 def test_a_mirror_of_set_takes_the_place_of_the_missions(tmp_path):
-    c = loaded(tmp_path, f'{HEAD}[set]\nmirror = "plain.toml"\n"mirror.travel" = "3 mrad"\n')
+    c = loaded(tmp_path, f'{HEAD}{POWER}[set]\nmirror = "plain.toml"\n"mirror.travel" = "3 mrad"\n')
     assert c.mission.mission.mirror.name == "plain mirror of a test"
     assert c.mission.mission.mirror.travel_rad == 3e-3
     assert (tmp_path / "plain.toml") in c.files
@@ -143,7 +143,7 @@ def test_a_mirror_of_set_takes_the_place_of_the_missions(tmp_path):
 def test_a_grid_may_give_what_the_mission_leaves_open(tmp_path):
     """The mission under [set] alone is none; every cell is."""
     unknown = (('leo_aperture = "5 cm"', 'leo_aperture = "unknown"'),)
-    text = HEAD + '[grid]\n"terminals.leo_aperture" = ["6 cm", "7 cm"]\n'
+    text = HEAD + POWER + '[grid]\n"terminals.leo_aperture" = ["6 cm", "7 cm"]\n'
     c = loaded(tmp_path, text, changes=unknown)
     assert [b.file.mission.terminals.leo_aperture_m for b in c.bases] == [0.06, 0.07]
     assert c.mission.mission.terminals.leo_aperture_m == 0.06
@@ -151,7 +151,7 @@ def test_a_grid_may_give_what_the_mission_leaves_open(tmp_path):
 
 
 def test_words_lists_and_switches_in_set_and_grid(tmp_path):
-    text = f"""{HEAD}
+    text = f"""{HEAD}{POWER}
 [set]
 "conventions.residual" = "radial"
 "point_ahead.corrected" = false
@@ -170,7 +170,9 @@ def test_words_lists_and_switches_in_set_and_grid(tmp_path):
 
 
 def test_files_that_a_mission_names_belong_to_the_campaign(tmp_path):
-    text = HEAD + '[set]\n"fine_pointing.vibration.spectrum" = "table"\n"fine_pointing.vibration.file" = "a.csv"\n'
+    text = (
+        HEAD + POWER + '[set]\n"fine_pointing.vibration.spectrum" = "table"\n"fine_pointing.vibration.file" = "a.csv"\n'
+    )
     assert "does not exist" in faults(tmp_path, text)[0].reason
     (tmp_path / "a.csv").write_text("Hz, urad^2/Hz\n1, 1\n2, 1\n")
     c = loaded(tmp_path, text)
@@ -389,6 +391,11 @@ ADDED = {
         "precision.output",
         "is not kept",
     ),
+    "a precision of the radius without a loop": (
+        '[precision]\noutput = "radius"\nquantile = 0.9\nhalf_width = "1 urad"\nconfidence = 0.9\nat_most = 1000',
+        "precision.output",
+        "needs the fine-pointing loop",
+    ),
     "a precision in another unit": (
         '[precision]\noutput = "margin"\nquantile = 0.1\nhalf_width = "1 GB"\nconfidence = 0.9\nat_most = 1000',
         "precision.half_width",
@@ -398,6 +405,21 @@ ADDED = {
         '[precision]\noutput = "margin"\nquantile = 0.1\nhalf_width = "1 dB"\nconfidence = 0.9\nat_most = 100',
         "precision.at_most",
         "is below the 256 rows",
+    ),
+    "a precision of what is no output": (
+        '[precision]\noutput = "radios"\nquantile = 0.9\nhalf_width = "1 urad"\nconfidence = 0.9\nat_most = 1000',
+        "precision.output",
+        "is no output",
+    ),
+    "distributions beyond both bounds of a key": (
+        distributed("requirement.outage", 'distribution = "normal"\nmean = 0.5\ndeviation = 2.0'),
+        "inputs.requirement.outage",
+        "has 80.3 % of its draws not above 0 or not below 1",
+    ),
+    "drawn beyond the bounds of a key": (
+        '[inputs."communication.transmit_power".drawn_as]\ndistribution = "uniform"\nlow = "-1 W"\nhigh = "9 W"',
+        "inputs.communication.transmit_power.drawn_as.low",
+        "is not above 0 W",
     ),
     "distributions about no mission": (
         distributed("beacon.divergence", 'distribution = "normal"\nmean = "2 urad"\ndeviation = "0.1 urad"'),
@@ -446,7 +468,7 @@ def test_what_does_not_fit_is_refused_with_its_key(tmp_path, what):
         (HEAD + POWER.replace("communication", "comunication"), "communication.transmit_power"),
         (HEAD + POWER.replace("normal", "normall"), '"normal"'),
         (HEAD + LOOP.replace('"PI"', '"LQR"'), '"LQG"'),
-        (HEAD + '[limits.margn]\nleast = "3 dB"\n', '"margin"'),
+        (HEAD + POWER + '[limits.margn]\nleast = "3 dB"\n', '"margin"'),
         (HEAD + '[set]\n"pointing.lines.missalignment.error" = "1 urad"\n', "pointing.lines.misalignment.error"),
     ],
 )
@@ -488,7 +510,7 @@ def test_files_that_are_not_there_are_named(tmp_path):
 
 def test_a_loop_or_a_day_needs_a_mission_that_has_one(tmp_path):
     assert "needs a mission with the table" in faults(tmp_path, HEAD + LOOP, whole=False)[0].reason
-    keep = HEAD + 'keep = ["volume"]\n'
+    keep = HEAD + 'keep = ["volume"]\n' + POWER
     assert loaded(tmp_path, keep).keep == ("volume",)
     path = written(tmp_path, keep)
     mission = (tmp_path / "mission.toml").read_text(encoding="utf-8")
@@ -496,6 +518,125 @@ def test_a_loop_or_a_day_needs_a_mission_that_has_one(tmp_path):
     (tmp_path / "mission.toml").write_text(cut, encoding="utf-8")
     with pytest.raises(MissionError, match=re.escape("needs the mission's tables [orbit] and [operations]")):
         load_campaign(path)
+
+
+def beyond(deviation, *, runs=256, instead=""):
+    """What a campaign warns of whose transmit power has this deviation about 5 W."""
+    return HEAD.replace("256", str(runs)) + POWER.replace("0.2 W", deviation) + instead
+
+
+def test_draws_that_a_key_does_not_take_are_warned_of_with_their_share(tmp_path):
+    (said,) = loaded(tmp_path, beyond("2.9 W")).warnings
+    assert said.startswith("4.2 % of the draws of communication.transmit_power are not above 0 W: those rows will fail")
+    assert '"log-uniform"' in said
+    rare = "1.25 W"  # four deviations: 3.2e-5 of the draws
+    assert loaded(tmp_path, beyond(rare)).warnings == ()
+    assert "0.0032 % of the draws" in loaded(tmp_path, beyond(rare, runs=4096)).warnings[0]
+    drawn_as = '[inputs."communication.transmit_power".drawn_as]\ndistribution = "normal"\n'
+    assert (
+        "0.62 %" in loaded(tmp_path, beyond("0.2 W", instead=f'{drawn_as}mean = "5 W"\ndeviation = "2 W"')).warnings[0]
+    )
+    outage = distributed("requirement.outage", 'distribution = "normal"\nmean = 0.5\ndeviation = 0.5')
+    assert (
+        "31.7 % of the draws of requirement.outage are not above 0 or not below 1:"
+        in (loaded(tmp_path, HEAD + outage).warnings[0])
+    )
+
+
+def test_the_share_that_is_warned_of_is_that_of_rows_that_fail(tmp_path):
+    c = loaded(tmp_path, beyond("5 W", runs=1024))
+    builder, (columns, _) = Builder(c), sampling.rows(c, 0, 0, 1024)
+    failed = 0
+    for watt in columns["communication.transmit_power"]:
+        try:
+            builder.mission(0, {"communication.transmit_power": float(watt)})
+        except CampaignError:
+            failed += 1
+    assert c.warnings[0].startswith("15.9 % of")
+    assert failed == pytest.approx(0.1587 * 1024, abs=8)  # one for each Sobol set
+
+
+def test_rows_that_would_all_be_the_same_are_refused(tmp_path):
+    (found,) = faults(tmp_path, HEAD)
+    assert (found.key, found.line) == ("runs", 3)
+    assert "makes 256 rows that are all the same: nothing is drawn" in found.reason
+    assert found.expected.startswith('runs = 1 with sampling = "random", one row for each cell')
+    one = HEAD.replace("256", "1")
+    (found,) = faults(tmp_path, one)
+    assert (found.key, "makes 16 rows" in found.reason) == ("sampling", True)
+    one, grid = one.replace("sobol", "random"), '[grid]\n"terminals.leo_aperture" = ["5 cm", "6 cm"]\n'
+    assert (len(loaded(tmp_path, one + grid).cells), loaded(tmp_path, one + grid).rows) == (2, 1)
+    precision = '[precision]\noutput = "margin"\nquantile = 0.1\nhalf_width = "1 dB"\nconfidence = 0.9\nat_most = 9\n'
+    (found,) = faults(tmp_path, one + precision)
+    assert (found.key, "and no [precision]" in found.expected) == ("precision.at_most", True)
+    assert loaded(tmp_path, HEAD + LOOP).rows == loaded(tmp_path, HEAD + POWER).rows == 256
+    wrong = HEAD + POWER.replace("5 W", "5 m")
+    assert [fault.key for fault in faults(tmp_path, wrong)] == ["inputs.communication.transmit_power.mean"]
+
+
+def test_a_required_limit_that_limits_leave_out_is_warned_of(tmp_path):
+    margin, quantile = '[limits.margin]\nleast = "2 dB"\n', '[limits.residual_quantile]\nmost = "9 urad"\n'
+    (said,) = loaded(tmp_path, HEAD + LOOP + margin).warnings
+    assert said.startswith("[limits] leaves out residual_quantile, so that requirement.pointing_error = 10 µrad is not")
+    advice = said.partition("[limits.residual_quantile] with ")[2].partition(" checks")[0]
+    mended = loaded(tmp_path, f"{HEAD}{LOOP}{margin}[limits.residual_quantile]\n{advice}\n")
+    assert (mended.warnings, mended.limits[1].most) == ((), 1e-5)
+    assert "[limits.margin] with least = " in loaded(tmp_path, HEAD + LOOP + quantile).warnings[0]
+    assert loaded(tmp_path, HEAD + LOOP + margin + quantile).warnings == ()
+    assert loaded(tmp_path, HEAD + LOOP).warnings == ()
+    assert loaded(tmp_path, f'{HEAD}keep = ["margin"]\n{LOOP}{margin}').warnings == ()
+    varied = '[grid]\n"requirement.pointing_error" = ["9 urad", "8 urad"]\n'  # no single value that could be checked
+    assert loaded(tmp_path, HEAD + LOOP + margin + varied).warnings == ()
+
+
+def test_a_mirror_that_was_not_identified_is_told_where_one_goes(tmp_path):
+    (found,) = faults(tmp_path, HEAD + IDENTIFIED)
+    assert found.expected.startswith('[set] with mirror = "FILE", or [grid] with mirror = ["FILE"]')
+    for table in ('[set]\nmirror = "mirror.toml"\n', '[grid]\nmirror = ["mirror.toml"]\n'):
+        assert len(loaded(tmp_path, HEAD + IDENTIFIED + table).dimensions) == 3
+
+
+@pytest.mark.parametrize(
+    ("output", "example", "width"),
+    [
+        ("margin", '"0.05 dB"', 0.05),
+        ("radius", '"0.05 urad"', 5e-8),
+        ("data_rate", '"0.05 Mbit/s"', 5e4),
+        ("outage", "0.001", 1e-3),
+    ],
+)
+def test_a_precision_is_shown_a_half_width_in_the_unit_of_its_output(tmp_path, output, example, width):
+    text = f'{HEAD}{LOOP}{POWER}[precision]\noutput = "{output}"\nat_most = 1000\n'
+    found = {fault.key: fault.expected for fault in faults(tmp_path, text)}
+    assert found.keys() == {"precision.quantile", "precision.half_width", "precision.confidence"}
+    assert found["precision.half_width"].endswith(f"; for example half_width = {example}")
+    assert found["precision.quantile"].endswith("for example quantile = 0.99")
+    text += "quantile = 0.99\nconfidence = 0.99\n"
+    assert loaded(tmp_path, f"{text}half_width = {example}\n").half_width == pytest.approx(width, rel=1e-12)
+    (wrong,) = faults(tmp_path, text + 'half_width = "1 kg"\n')
+    assert wrong.expected.endswith(f"; for example half_width = {example}")
+
+
+def test_radius_is_among_what_a_precision_may_ask_for_and_no_limit(tmp_path):
+    precision = '[precision]\noutput = "radios"\nquantile = 0.9\nhalf_width = 1\nconfidence = 0.9\nat_most = 1000\n'
+    (found,) = faults(tmp_path, HEAD + LOOP + precision)
+    assert (found.nearest, found.expected.endswith(", radius")) == ('"radius"', True)
+    (found,) = faults(tmp_path, f'{HEAD}{LOOP}[limits.radius]\nmost = "1 urad"\n')
+    assert "radius" not in found.expected
+
+
+def test_a_ledger_is_no_campaign_file_and_the_other_way_round(tmp_path):
+    path = tmp_path / "a b.ledger"
+    ledger_file.make_empty(path)
+    with pytest.raises(MissionError, match="is a ledger, not a campaign file") as caught:
+        load_campaign(path)
+    assert "microrad campaign resume '" in caught.value.faults[0].expected
+    text = written(tmp_path, HEAD + POWER)
+    with pytest.raises(CampaignError, match=rf"is text, not a ledger: begin it with `microrad campaign run {text}`"):
+        ledger_file.refuse_foreign(text)
+    (tmp_path / "table.csv").write_text("row\n1\n")
+    with pytest.raises(CampaignError, match="is text, not a ledger: name the file"):
+        ledger_file.refuse_foreign(tmp_path / "table.csv")
 
 
 def test_more_runs_than_noise_streams_have_numbers_for(tmp_path):

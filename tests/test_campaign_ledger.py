@@ -18,7 +18,9 @@ import pytest
 
 from microrad.campaign import blob
 from microrad.campaign.blob import Column, Head
-from microrad.campaign.ledger import FORMAT, Ledger, check_same, is_written, mend, verify
+from microrad.campaign.ledger import Ledger, check_same
+from microrad.campaign.ledger_file import FORMAT, is_written
+from microrad.campaign.mending import mend, verify
 from microrad.campaign.records import CampaignError, Chunk, Failed, WorstTrace
 
 COLUMNS = (Column("row", "", "number"), Column("weight", "", "weight"), Column("margin", "dB", "margin"))
@@ -165,7 +167,7 @@ def test_chunks_come_in_order_however_they_were_put(path):
         assert ledger.done() == {(0, 0), (0, 2), (0, 4), (1, 0)}
         assert ledger.get(0, 2) == packed(2) and ledger.get(0, 1) is None
         assert [each.cell for each in ledger.chunks(1)] == [1]
-        found = ledger.verify([(0, 0), (0, 1), (0, 2)])
+        found = verify(path, [(0, 0), (0, 1), (0, 2)])
         assert (found.checked, found.damaged, found.missing, found.faults, found.sound) == (4, (), ((0, 1),), (), True)
 
 
@@ -245,6 +247,8 @@ def test_a_ledger_is_never_begun_over_a_file_nor_opened_where_none_is(path, tmp_
 @pytest.mark.parametrize("write", [True, False])
 def test_files_that_are_no_ledger_are_refused(path, write):
     path.write_text("my notes, which are long enough for SQLite to look at\n" * 100)
+    assert "is text, not a ledger" in said(Ledger.open, path, write=write)
+    path.write_bytes(bytes([0xA5]) * 5000)
     assert "it is no ledger, or its first page is damaged" in said(Ledger.open, path, write=write)
     path.unlink()
     with contextlib.closing(sqlite3.connect(path)) as other, other:
@@ -266,7 +270,7 @@ def test_a_ledger_of_a_later_microrad_is_not_mended_into_this_format(path, monke
     assert blob.VERSION == FORMAT  # else the head of a later ledger could be read
     with monkeypatch.context() as later:
         later.setattr("microrad.campaign.blob.VERSION", 2)
-        later.setattr("microrad.campaign.ledger.FORMAT", 2)
+        later.setattr("microrad.campaign.ledger_file.FORMAT", 2)
         filled(path, 2)
         assert verify(path).sound
     whole = path.read_bytes()
@@ -305,7 +309,7 @@ def mended(path, payloads):
         for cell, number in lost:
             ledger.put(cell, number, payloads[cell, number])
         assert {key: ledger.get(*key) for key in ledger.done()} == payloads
-        assert ledger.verify(payloads).checked == len(payloads)
+        assert verify(path, payloads).checked == len(payloads)
     return lost
 
 
@@ -482,7 +486,7 @@ def test_kills_at_any_moment_lose_and_double_nothing(path):
         with Ledger.open(path, write=False) as ledger:
             count = len(ledger.done())
             assert acknowledged <= count <= acknowledged + 1
-            assert ledger.verify((0, number) for number in range(count)).sound
+            assert verify(path, ((0, number) for number in range(count))).sound
             assert ledger.done() == {(0, number) for number in range(count)}
             assert all(ledger.get(0, number) == packed(number) for number in range(count))
         acknowledged = count
@@ -531,7 +535,7 @@ def test_a_full_disk_costs_only_the_chunk_being_written(small_disk):
     with Ledger.open(path, write=True) as ledger:
         ledger.put(0, count, packed(count))
         assert [each.number for each in ledger.chunks(0)] == list(range(count + 1))
-        assert ledger.verify().sound
+        assert verify(path).sound
 
 
 def test_a_disk_that_is_full_from_the_start_leaves_no_half_ledger(small_disk):
@@ -550,14 +554,14 @@ def test_a_read_only_disk_can_be_read_and_verified_but_not_written(small_disk):
     subprocess.run(["mount", "-o", "remount,ro", small_disk], check=True)
     with Ledger.open(path, write=False) as ledger:
         assert {key: ledger.get(*key) for key in ledger.done()} == payloads
-        assert ledger.verify(payloads).checked == 4
+        assert verify(path, payloads).checked == 4
     message = said(Ledger.open, path, write=True)
     assert "could not open the ledger" in message and "Make file and folder" in message
     assert "4 chunks are in and stay" in message
 
 
 def test_a_program_that_holds_the_file_is_told(path, monkeypatch):
-    monkeypatch.setattr("microrad.campaign.ledger._PATIENCE_S", 0.1)
+    monkeypatch.setattr("microrad.campaign.ledger_file.PATIENCE_S", 0.1)
     filled(path, 1)
     with Ledger.open(path, write=True) as ledger, contextlib.closing(sqlite3.connect(path)) as other:
         other.execute("BEGIN IMMEDIATE")

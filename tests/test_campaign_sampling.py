@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from campaign_files import HEAD, IDENTIFIED, POWER, loaded, written
+from campaign_files import HEAD, IDENTIFIED, LOOP, POWER, loaded, written
 from microrad import lti, mirror_spread
 from microrad.campaign import distributions, sampling
 from microrad.campaign.distributions import LogUniform, Normal, OneOf, Uniform
@@ -157,7 +157,7 @@ def test_columns_come_in_the_order_of_the_file_and_are_the_same_for_all_cells(tm
 
 
 def test_a_campaign_without_inputs_has_rows_without_columns(tmp_path):
-    columns, weight = sampling.rows(campaign(tmp_path, inputs=""), 0, 3, 7)
+    columns, weight = sampling.rows(campaign(tmp_path, inputs=LOOP), 0, 3, 7)
     assert columns == {}
     assert weight.tolist() == [1.0] * 7
 

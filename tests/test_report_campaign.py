@@ -5,6 +5,7 @@ import json
 import math
 import re
 from dataclasses import replace
+from html import unescape
 from html.parser import HTMLParser
 from itertools import product
 from types import SimpleNamespace
@@ -29,8 +30,15 @@ from microrad.campaign.records import (
     WorstTrace,
 )
 from microrad.fine_loop.ensemble import bin_edges_rad
-from microrad.report import campaign_figures, campaign_page, campaign_words
-from microrad.report.campaign_words import share, value
+from microrad.report import (
+    campaign_axes,
+    campaign_figures,
+    campaign_numbers,
+    campaign_page,
+    campaign_tables,
+    campaign_words,
+)
+from microrad.report.campaign_numbers import share, value
 
 NAME = 'LEO <b>"A&B"</b> $x$'
 CONFIDENCE = 0.99
@@ -336,7 +344,8 @@ def test_each_page_is_whole_loads_nothing_and_escapes_its_texts(case):
     page = Page(text)
     assert page.open == []
     assert page.loads == []
-    assert page.headings[0] == NAME
+    assert page.headings[0] == "margin <tail>"
+    assert f"Mission: {NAME}</p>" in unescape(text)
     assert "<b>" not in text
     assert "How the rows were made" in page.headings
     assert not re.search(r"\bnan\b|\binf\b|None(?! of)", re.sub(r"<svg.*?</svg>", "", text, flags=re.S))
@@ -384,7 +393,12 @@ def test_the_data_is_json_without_arrays_and_says_the_same(case):
 @pytest.mark.parametrize(
     ("name", "said", "word"),
     [
-        ("two inputs", "91.2 % of the rows keep both limits (87.4 % to 94.1 % at 99 % confidence).", "open"),
+        (
+            "two inputs",
+            "3 of 512 rows failed; 91.2 % of the other 509 rows keep both limits "
+            "(87.4 % to 94.1 % at 99 % confidence).",
+            "open",
+        ),
         ("all kept", "All 512 rows keep both limits; at 99 % confidence at least 99.0 % of all draws do.", "pass"),
         (
             "all missed",
@@ -466,8 +480,12 @@ def test_a_probability_keeps_the_digits_that_tell_it_from_0_and_1(probability, s
         (-3.456, "dB", "margin", "−3.46 dB"),
         (9.87e-6, "rad", "residual_rms", "9.87 µrad"),
         (3e8, "bit/s", "data_rate", "300 Mbit/s"),
-        (8e12, "bit", "volume", "1 TB"),
-        (1800.0, "s", "contact_time", "30 min"),
+        (8e12, "bit", "volume", "1.00 TB"),
+        (4.1e-6, "rad", "residual_rms", "4.10 µrad"),
+        (1e-6, "rad", "residual_rms", "1.00 µrad"),
+        (0.1, "dB", "margin", "0.10 dB"),
+        (0.0, "rad", "residual_rms", "0 rad"),
+        (1800.0, "s", "contact_time", "30.0 min"),
         (0.02, "", "outage", "2 %"),
         (0.02, "", "mirror.alpha", "0.02"),
         (math.nan, "rad", "residual_rms", "not known"),
@@ -486,7 +504,7 @@ def test_what_matters_names_the_inputs_that_matter_and_no_others():
     assert "imbalance_of_the_first_wheel 0.7" in residual
     assert "transmit_power" not in campaign_words.matters(summary_of(2))[1]  # its index is below the least named
     weak = replace(summary, sensitivities=(replace(summary.sensitivities[0], total={}, first={}, note="too few rows"),))
-    assert campaign_words.matters(weak) == ["No input by itself decides margin: too few rows."]
+    assert campaign_words.matters(weak) == ["What matters to margin is not known: too few rows."]
     first = replace(summary.sensitivities[0], total={}, note="Q2 = 0.41")
     (said,) = campaign_words.matters(replace(summary, sensitivities=(first,)))
     assert "(first-order Sobol index)" in said
@@ -516,8 +534,8 @@ def test_the_tail_says_the_least_probability_that_is_known():
     assert campaign_words.tail_sentences(summary, replace(cell, tail=None)) == []
     far = replace(summary, limits=(replace(LIMITS[1], most=20e-6),))
     unseen = campaign_words.tail_sentences(far, cell)[1]
-    assert unseen.startswith("No radial error beyond 20 µrad was seen (0 % to ")
-    _, rows = campaign_words.tail_table(replace(cell.tail, wanted=known))
+    assert unseen.startswith("No radial error beyond 20 µrad was seen (0 to ")
+    _, rows = campaign_tables.tail_table(replace(cell.tail, wanted=known))
     assert rows[-1] == ("1e-7", "not known", "")
     assert rows[0][:2] == ("10 %", "4.29 µrad")
 
@@ -554,8 +572,8 @@ def test_failed_rows_stand_with_seed_and_reason_and_the_rest_is_counted():
 
 def test_a_failed_row_of_a_grid_names_its_combination():
     summary = summary_of(1, rows=64, failed=1, grid=APERTURES)
-    assert campaign_words.failed_rows(summary, 9)[1][0] == "0 of terminals.leo_aperture = 5 cm"
-    assert campaign_words.failed_rows(summary_of(1, rows=64, failed=1), 9)[0][0] == "0"
+    assert campaign_tables.failed_rows(summary, 9)[1][0] == "0 of terminals.leo_aperture = 5 cm"
+    assert campaign_tables.failed_rows(summary_of(1, rows=64, failed=1), 9)[0][0] == "0"
 
 
 def test_a_narrow_terminal_has_fewer_quantiles_the_median_among_them():
@@ -569,13 +587,13 @@ def test_a_narrow_terminal_has_fewer_quantiles_the_median_among_them():
 
 def test_outputs_that_are_the_same_in_every_row_stand_in_a_sentence_not_in_the_table():
     cell = summary_of(2).cells[0]
-    names = [row[0] for row in campaign_words.output_table(cell, 3)[1]]
+    names = [row[0] for row in campaign_tables.output_table(cell, 3)[1]]
     assert names == ["margin", "residual_quantile", "beyond_share"]
-    assert campaign_words.even(cell) == ["The same in every row: beacon_margin 6.10 dB."]
-    assert campaign_words.even(replace(cell, outputs={"margin": cell.outputs["margin"]})) == []
-    assert campaign_words.output_table(summary_of(0, rows=64).cells[0], 3)[1] == []
+    assert campaign_words.few_values(cell) == ["The same in every row: beacon_margin 6.10 dB."]
+    assert campaign_words.few_values(replace(cell, outputs={"margin": cell.outputs["margin"]})) == []
+    assert campaign_tables.output_table(summary_of(0, rows=64).cells[0], 3)[1] == []
     for shown in (made("no inputs").html, campaign_words.text(made("no inputs").summary, 140)):
-        assert "The same in every row: margin 3.66 dB, beacon_margin 6.10 dB, residual_quantile 6.5 µrad" in shown
+        assert "The same in every row: margin 3.66 dB, beacon_margin 6.10 dB, residual_quantile 6.50 µrad" in shown
 
 
 # ------------------------------------------------------------------------------------------------------------ pictures
@@ -610,7 +628,7 @@ def test_a_distribution_shows_its_limit_its_quantiles_and_all_of_its_rows():
 
 
 def test_an_axis_has_a_prefix_that_suits_its_values():
-    scale = campaign_figures.scale_of
+    scale = campaign_axes.scale_of
     for values, unit, name, factor, label in (
         ([2e-6, 9e-6], "rad", "residual_rms", 1e6, "µrad"),
         ([3e8], "bit/s", "data_rate", 1e-6, "Mbit/s"),
@@ -655,9 +673,9 @@ def test_many_inputs_are_cut_in_the_picture_but_not_in_its_data():
 
 def test_a_key_is_cut_to_what_tells_it_from_the_others():
     keys = ["a.b.left.gain", "a.b.right.gain", "mirror", "x.y.right.gain"]
-    cut = [campaign_figures.label_of(key, keys) for key in keys]
+    cut = [campaign_axes.label_of(key, keys) for key in keys]
     assert cut == ["left.gain", "b.right.gain", "mirror", "y.right.gain"]
-    long = campaign_figures.label_of(f"table.{'long_' * 30}", ["x"])
+    long = campaign_axes.label_of(f"table.{'long_' * 30}", ["x"])
     assert max(map(len, long.splitlines())) <= 30
     assert long.endswith("…")
 
@@ -668,7 +686,9 @@ def test_the_failure_region_is_of_the_limit_most_often_missed_over_what_matters_
     worst = max(summary.cells[0].missed_by, key=lambda name: summary.cells[0].missed_by[name].value)
     assert figure.title == f"Where {worst} misses its limit"
     assert list(figure.columns)[-1] == worst
-    leading = [key for key, _ in campaign_words.ranked(next(s for s in summary.sensitivities if s.output == worst))[:2]]
+    leading = [
+        key for key, _ in campaign_tables.ranked(next(s for s in summary.sensitivities if s.output == worst))[:2]
+    ]
     assert list(figure.columns)[:2] == leading
     assert {"kept", "missed"} <= set(texts(figure))
     assert "no results" not in texts(figure)
@@ -682,11 +702,19 @@ def test_with_one_input_the_region_has_the_output_beside_it():
     assert "the input that matters most" in figure.caption
 
 
-def test_the_region_is_of_the_combination_with_rows_on_both_sides():
+def test_the_region_is_of_the_combination_shown_in_detail_unless_it_misses_nothing():
     summary = summary_of(2, grid=APERTURES, rows=256, shift_db=-1.5)
+    best = campaign_words.best(summary)
     (figure,) = campaign_page.region(summary)
-    half = min(summary.cells, key=lambda cell: abs(cell.missed_by["margin"].value - 0.5))
-    assert f"256 rows of {half.label}" in figure.caption
+    assert 0.0 < best.missed.value < 1.0
+    assert f"256 rows of {best.label}" in figure.caption
+    assert "on both of its sides" not in figure.caption
+    kept = summary_of(2, grid=APERTURES, rows=256)
+    best = campaign_words.best(kept)
+    (figure,) = campaign_page.region(kept)
+    assert best.missed.value == 0.0
+    assert f"256 rows of {best.label}" not in figure.caption
+    assert figure.caption.endswith(f"No limit has rows of {best.label} on both of its sides.")
 
 
 def test_a_grid_of_two_keys_is_a_map_with_a_number_in_each_field():
@@ -725,7 +753,9 @@ def test_a_worst_row_of_one_axis_and_one_of_two():
     one = campaign_figures.worst(summary, single, 1)
     assert one.columns["radial error (rad)"] == pytest.approx(np.abs(trace.error_rad[:, 0]))
     assert "drive 1" not in texts(one)
-    assert one.caption == "Row 100, where margin is 1.20 dB."
+    assert one.caption == "Row 100: of its rows the worst in margin, 1.20 dB. Shown is the first run of the row's."
+    assert one.title == "Worst row in time"
+    assert campaign_figures.worst(summary, single, 2).title == "Second worst row in time"
     trace.error_rad[0] = 500e-6  # the loop only closes
     begun = campaign_figures.worst(summary, trace, 1)
     assert begun.caption.endswith("Its begin, up to 707 µrad, is cut off.")
@@ -734,6 +764,169 @@ def test_a_worst_row_of_one_axis_and_one_of_two():
     late = campaign_figures.worst(summary, trace, 1)
     assert "cut off" not in late.caption
     assert "500" in texts(late)
+
+
+# ------------------------------------------------------------------------------------------------ what a reader misread
+def unknown_beyond(summary, least, most):
+    """The summary with the ends of the quantiles outside of least to most unknown."""
+    cell = summary.cells[0]
+
+    def cut(output):
+        found = {
+            p: q if least <= p <= most else replace(q, low=math.nan) if p < 0.5 else replace(q, high=math.nan)
+            for p, q in output.quantiles.items()
+        }
+        return replace(output, quantiles=found)
+
+    outputs = {name: cut(output) for name, output in cell.outputs.items()}
+    return replace(summary, cells=(replace(cell, outputs=outputs),))
+
+
+def test_a_quantile_that_the_rows_cannot_know_is_a_dash_and_is_not_in_the_picture():
+    whole, few = summary_of(2), unknown_beyond(summary_of(2), 0.01, 0.99)
+    headings, rows = campaign_tables.output_table(few.cells[0], 9)
+    assert [rows[0][headings.index(p)] for p in ("0.3 %", "99.7 %")] == ["–", "–"]
+    assert "–" not in rows[0][headings.index("1 %")]
+    assert not any("–" in row for row in campaign_tables.output_table(whole.cells[0], 9)[1])
+    assert "–: not known, there are too few rows" in campaign_words.text(few, 140)
+    assert "there are too few rows" not in campaign_words.text(whole, 140)
+    shown, before = (texts(campaign_figures.distribution(s.cells[0].outputs["margin"], None)) for s in (few, whole))
+    assert any(t.startswith("0.3 %: ") for t in before)
+    assert not any(t.startswith(("0.3 %: ", "99.7 %: ")) for t in shown)
+    assert any(t.startswith("1 %: ") for t in shown)
+    span = campaign_figures._span(few.cells[0].outputs["margin"])
+    assert span.low == whole.cells[0].outputs["margin"].quantiles[0.01].value
+    nothing = unknown_beyond(whole, 0.5, 0.5).cells[0].outputs["margin"]
+    assert campaign_figures._span(nothing).low == nothing.least
+
+
+def test_quantiles_come_in_pairs_and_those_known_first():
+    output = summary_of(2).cells[0].outputs["margin"]
+    inner = dict.fromkeys((0.05, 0.95), output.quantiles[0.5])
+    nine = replace(output, quantiles={**output.quantiles, **inner})
+    for most in range(1, 10):
+        chosen = campaign_tables.chosen_quantiles([nine], most)
+        assert 0.5 in chosen
+        assert len(chosen) <= most
+        assert {round(1.0 - p, 6) for p in chosen} == set(chosen)
+    assert campaign_tables.chosen_quantiles([nine], 3) == [0.01, 0.5, 0.99]
+    few = {p: q if p in (0.05, 0.5, 0.95) else replace(q, low=math.nan) for p, q in nine.quantiles.items()}
+    assert campaign_tables.chosen_quantiles([replace(nine, quantiles=few)], 3) == [0.05, 0.5, 0.95]
+
+
+def test_the_page_has_the_intervals_of_the_quantiles():
+    made_of = made("two inputs")
+    median = made_of.summary.cells[0].outputs["margin"].quantiles[0.5]
+    assert f"{value(median.low, 'dB')} to {value(median.high, 'dB')}</span>" in made_of.html
+    assert f"{value(median.low, 'dB')} to" not in campaign_words.text(made_of.summary, 140)
+
+
+def test_failed_rows_stand_before_the_share_of_the_others():
+    kept = summary_of(2, rows=16, failed=15, shift_db=30.0)
+    assert campaign_words.headline(kept).startswith("15 of 16 rows failed; the only other row keeps both limits;")
+    none = campaign_words.headline(summary_of(2, rows=16, failed=3, shift_db=-30.0))
+    assert none.startswith("3 of 16 rows failed; none of the other 13 rows keeps both limits; ")
+    every = campaign_words.headline(summary_of(2, rows=16, failed=3, shift_db=30.0))
+    assert every.startswith("3 of 16 rows failed; all other 13 rows keep both limits; ")
+    grid = campaign_words.headline(summary_of(2, grid=APERTURES, rows=64, failed=2))
+    assert grid.startswith("8 of 256 rows failed; of 4 combinations, ")
+    assert "failed" not in campaign_words.headline(summary_of(2, rows=16))
+
+
+def test_where_it_is_not_known_what_matters_nothing_matters_most():
+    summary = summary_of(2)
+    few = tuple(replace(s, first={}, total={}, note="32 good rows are too few") for s in summary.sensitivities)
+    blind = replace(summary, sensitivities=few)
+    said = campaign_words.matters(blind)
+    assert said == ["What matters to margin and residual_quantile is not known: 32 good rows are too few."]
+    assert "matter" not in campaign_page.region(blind)[0].caption
+    assert "the inputs that matter most" in campaign_page.region(summary_of(6, rows=400, shift_db=0.3))[0].caption
+
+
+def test_each_output_is_explained_and_the_rate_that_is_possible_is_not_the_grids():
+    summary = summary_of(2)
+    for shown in (campaign_words.text(summary, 140), campaign_page.html(summary)):
+        for output in summary.cells[0].outputs.values():
+            assert output.meaning in shown
+    cell = summary.cells[0]
+    rate = replace(cell.outputs["margin"], name="data_rate", unit="bit/s")
+    of_rate = replace(cell, outputs={"data_rate": rate})
+    assert campaign_tables.output_table(of_rate, 3)[1][0][0] == "data_rate (possible)"
+    assert campaign_tables.output_table(cell, 3)[1][0][0] == "margin"
+    assert campaign_figures.distribution(rate, None).title == "Distribution of data_rate (possible)"
+
+
+def test_a_low_end_that_is_as_good_as_nothing_reads_0():
+    ends = campaign_numbers.ends
+    assert ends(Interval(3.5e-7, 7.5e-39, 2.6e-5, 0.99), "", "outage") == "0 to 2.6e-5"
+    assert ends(Interval(3.5e-7, 7.5e-11, 2.6e-5, 0.99), "", "outage") == "7.5e-11 to 2.6e-5"
+    assert ends(Interval(0.01, 0.0, 0.02, 0.99), "", "outage") == "0 % to 2 %"
+
+
+def test_the_tails_worth_stands_in_plain_english():
+    tail = replace(rayleigh_tail(2e-6), effective_runs=2.44e7)
+    said = campaign_words.tail_method(tail)
+    assert said.startswith("It comes from the share of the time of 64 rows")
+    assert said.endswith("24 million independent samples of the error would tell as much of 1e-6.")
+    assert "samples" not in campaign_words.tail_method(replace(tail, effective_runs=math.nan))
+    for count, words in ((1.3e5, "130000 "), (3.21e9, "3.2 billion ")):
+        assert f" {words}independent" in campaign_words.tail_method(replace(tail, effective_runs=count))
+
+
+def test_worst_rows_are_numbered_in_their_cell():
+    summary = summary_of(2, grid=APERTURES, rows=64)
+    traces = (trace_of(0), trace_of(1), trace_of(2, cell=1))
+    drawn_ = campaign_page.draw(replace(summary, worst=traces))["worst"]
+    assert [figure.title.split(" row")[0] for figure in drawn_] == ["Worst", "Second worst", "Worst"]
+    assert len({figure.name for figure in drawn_}) == 3
+
+
+def test_no_axis_has_a_factor_beside_it():
+    summary = summary_of(2)
+    output = summary.cells[0].outputs["margin"]
+    tiny = replace(output, name="outage", unit="", edges=output.edges * 1e-6, least=1e-6, most=5e-6, quantiles={})
+    near = replace(output, edges=output.edges * 1e-5 + 7.0, least=7.0, most=7.00005, quantiles={})
+    for each in (tiny, near):
+        seen = texts(campaign_figures.distribution(each, None))
+        assert not any(t == "1e\u22126" or t.startswith(("+", "1e\u22125+")) for t in seen)
+    assert any(re.fullmatch(r"[2-4](\.\d+)?e\u22126", t) for t in texts(campaign_figures.distribution(tiny, None)))
+
+
+def test_an_output_of_two_values_has_a_sentence_and_no_picture():
+    column = np.where(np.arange(64) < 48, 0.0, 0.25)
+    two = replace(output_summary("lost_share", column), deviation=float(column.std(ddof=1)))
+    three = output_summary("lost_share", np.append(column, 0.125))
+    cell = summary_of(2).cells[0]
+    for output, pictures in ((two, 0), (three, 1)):
+        summary = replace(summary_of(2), cells=(replace(cell, outputs={"lost_share": output}),))
+        said = "lost_share has two values: 0 % in 75 % of the rows, 25 % in 25 %."
+        assert (said in campaign_words.text(summary, 140)) == (not pictures)
+        assert len(campaign_page.draw(summary)["outputs"]) == pictures
+
+
+def test_the_grid_lists_mean_and_misses_of_each_limit_for_every_combination():
+    summary = summary_of(2, grid=APERTURES, rows=256, shift_db=-1.5)
+    wide, narrow = campaign_words.text(summary, 200), campaign_words.text(summary, 90)
+    assert "Limits by combination" in narrow
+    assert "Limits by combination" not in wide
+    for text in (wide, narrow):
+        assert all(heading in text for heading in ("mean margin", "miss margin", "keep all"))
+        for cell in summary.cells:
+            line = f"{value(cell.outputs['margin'].mean.value, 'dB')} +{share(cell.missed_by['margin'].value)}"
+            assert re.search(line, text)
+    assert any("mean margin" in row for row in Page(campaign_page.html(summary)).rows)
+
+
+def test_findings_stand_under_the_verdict_in_text_page_and_data():
+    plain = summary_of(2)
+    told = replace(plain, findings=("The 1 % quantile of margin is known within 0.05 dB, as asked.",))
+    lines = campaign_words.text(told, 140).splitlines()
+    assert lines[2] == told.findings[0]
+    assert lines[0] == campaign_words.headline(told)
+    assert f"<p>{told.findings[0]}</p>" in campaign_page.html(told).split("</section>")[0]
+    assert campaign_words.data(told)["findings"] == list(told.findings)
+    assert campaign_words.data(plain)["findings"] == []
+    assert "Limits" in campaign_words.text(plain, 140).splitlines()[2]
 
 
 def test_the_same_summary_gives_the_same_page_twice():

@@ -289,7 +289,7 @@ def _decoded(content: bytes) -> str:
     if content.count(b"\n") > MAX_LINES:
         raise UnreadableError(f"has more than {MAX_LINES} lines", "a TOML file of a few hundred lines")
     if not text.strip():
-        raise UnreadableError("is empty", "a TOML file; `microrad init` writes a mission to start from")
+        raise UnreadableError("is empty", "a TOML file; `microrad init` writes one to start from")
     return text.replace("\r\n", "\n")
 
 

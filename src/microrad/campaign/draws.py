@@ -1,19 +1,19 @@
 """The drawn inputs and the design variables of a campaign file, read by the rules of the mission's own keys."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 from microrad.campaign import distributions
 from microrad.campaign.distributions import AnyTable, Distribution
 from microrad.campaign.inputs import Base, Draw
-from microrad.campaign.keys import MIRROR, Key
+from microrad.campaign.keys import MIRROR, Key, find
 from microrad.campaign.reading import Reading, is_number, quoted_near
 from microrad.campaign.records import InputText
 from microrad.campaign.tables import VariableTable
 from microrad.document import shown
-from microrad.fields import MOST_ITEMS, Quantity
+from microrad.fields import MOST_ITEMS, Quantity, Share
 from microrad.missionfile import check_table
 
 
@@ -44,7 +44,7 @@ class DrawReader:
         if key == MIRROR or isinstance(table, distributions.IdentifiedTable):
             return self._identified(at, key, table)
         found = self.on.key("inputs", key, None, self.data)
-        distribution = None if found is None else self._distribution(at, found, table)
+        distribution = None if found is None else self._mostly_inside(at, found, table)
         if found is None or distribution is None:
             return None
         if table.drawn_as is None:
@@ -75,7 +75,11 @@ class DrawReader:
             m = base.file.mission.mirror
             if m.uncertainty is None:
                 reason = f'is to be identified, but the mirror "{m.name}" has no table uncertainty'
-                self.on.fault(at, None, reason, "a mirror file as microrad identify writes it")
+                expected = (
+                    f'[set] with {MIRROR} = "FILE", or [grid] with {MIRROR} = ["FILE"]: a mirror file as microrad '
+                    "identify writes it, seen from the campaign file"
+                )
+                self.on.fault(at, None, reason, expected)
                 return None
             twice = next((f"{MIRROR}.{p}" for p in m.uncertainty.parameters if f"{MIRROR}.{p}" in self.given), "")
             if twice:
@@ -90,11 +94,19 @@ class DrawReader:
         if isinstance(table, distributions.IdentifiedTable) or table.drawn_as is not None:
             self.on.fault(at, None, "is no distribution that an input can be drawn as", "a normal one, for example")
             return None
-        found = self._distribution(at, key, table)
+        found = self._mostly_inside(at, key, table)
         if found is not None and (reason := distributions.uncovered(wanted, found)):
             self.on.fault(at, None, reason, "a distribution that reaches as far as the input's own")
             return None
         return found
+
+    def _mostly_inside(self, at: str, key: Key, table: AnyTable) -> Distribution | None:
+        """The distribution of a table, unless most of its draws are none that the key takes."""
+        found = self._distribution(at, key, table)
+        if found is None or (outside := outside_of(key, found)).share <= 0.5:
+            return found
+        self.on.fault(at, None, f"has {_percent(outside.share)} of its draws {outside.where}", _INSIDE)
+        return None
 
     def _distribution(self, at: str, key: Key, table: AnyTable) -> Distribution | None:
         """The distribution of a table, its quantities read by the rule of the key."""
@@ -141,6 +153,61 @@ class DrawReader:
             return None
         total = math.fsum(raw)
         return tuple(float(v) / total for v in raw)
+
+
+_INSIDE = 'a smaller deviation, or distribution = "uniform" or "log-uniform" between bounds'
+
+
+class Outside(NamedTuple):
+    """Share of the draws that a key does not take, and where they are."""
+
+    share: float
+    where: str
+
+
+def outside_of(key: Key, drawn: Distribution) -> Outside:
+    """The draws beyond the bounds of a key by itself; only a normal distribution has any: others end within them."""
+    rule = key.numeric
+    if rule is None or not isinstance(drawn, distributions.Normal):
+        return Outside(0.0, "")
+    from scipy.special import ndtr  # here, to keep the start quick
+
+    above, below = (0.0, rule.below) if isinstance(rule, Share) else (rule.above, None)
+    ends = (
+        (-1.0, above, "not above"),
+        (-1.0, rule.least, "below"),
+        (1.0, rule.most, "above"),
+        (1.0, below, "not below"),
+    )
+    parts = [
+        (float(ndtr(sign * (drawn.mean - end) / drawn.deviation)), f"{word} {distributions.quantity(end, key.unit)}")
+        for sign, end, word in ends
+        if end is not None
+    ]
+    total = math.fsum(share for share, _ in parts)
+    return Outside(total, " or ".join(where for share, where in parts if share > 0.01 * total))
+
+
+def failing(draws: tuple[Draw, ...], data: Mapping[str, Any], rows: int) -> Iterator[str]:
+    """Of inputs that are drawn beyond the bounds of their key: how many rows fail for it, unless it is hardly one."""
+    for draw in draws:
+        drawn = draw.drawn_as or draw.distribution
+        if drawn is None:
+            continue  # an identification draws again what is no mirror
+        share, where = outside_of(find(draw.key, data), drawn)
+        if share * rows >= _HARDLY:
+            yield (
+                f"{_percent(share)} of the draws of {draw.key} are {where}: those rows will fail, and the results will "
+                f"be those of the others; {_INSIDE} avoids it"
+            )
+
+
+_HARDLY = 0.01
+"""Expected number of failing rows below which nothing is said."""
+
+
+def _percent(share: float) -> str:
+    return f"{100.0 * share:.3g} %" if share >= 0.1 else f"{100.0 * share:.2g} %"
 
 
 def bounds_of(

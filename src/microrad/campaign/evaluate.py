@@ -1,7 +1,8 @@
 """The outputs of one row: from its runs to the residual, the links under it, and the day."""
 
 from collections.abc import Collection
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -56,6 +57,8 @@ def _residual(m: Mission, runs: ensemble.Ensemble) -> dict[str, float]:
         "beyond_share": runs.beyond(m.requirement.pointing_error_rad),
         "lost_share": runs.share(kernels.COUNT_LOST),
         "saturated_share": runs.share(kernels.COUNT_SATURATED),
+        "beyond_rate_share": runs.share(kernels.COUNT_CLAMPED),
+        "outside_share": runs.share(kernels.COUNT_OUTSIDE),
     }
 
 
@@ -94,8 +97,24 @@ def _links(file: MissionFile, pointing: Pointing) -> dict[str, float]:
         "outage": pointing.outage,
         "short": pointing.short,
         "data_rate": _rate(m, pointing.outage_loss_db),
-        "beacon_margin": link.beacon_budget(m, file.sources).margin_db,
-        "answer_margin": link.answer_budget(m, file.sources).margin_db,
+        **_beams(_Beams((m.beacon, m.answer, m.terminals, m.conventions, m.channel, m.point_ahead), file)),
+    }
+
+
+@dataclass(frozen=True, slots=True)
+class _Beams:
+    """A mission for its beacon and answer, equal to another with the same tables: most rows draw something else."""
+
+    tables: tuple[object, ...]
+    file: MissionFile = field(compare=False)
+
+
+@lru_cache(maxsize=256)
+def _beams(of: _Beams) -> dict[str, float]:
+    m, sources = of.file.mission, of.file.sources
+    return {
+        "beacon_margin": link.beacon_budget(m, sources).margin_db,
+        "answer_margin": link.answer_budget(m, sources).margin_db,
     }
 
 

@@ -12,6 +12,7 @@ from microrad.campaign.distributions import OneOf
 from microrad.campaign.draws import DrawReader, Variable
 from microrad.campaign.inputs import Base, Builder, Draw
 from microrad.campaign.keys import MIRROR, flat, flat_tables, touches_loop
+from microrad.campaign.ledger_file import argument, is_ledger
 from microrad.campaign.reading import FILE_WORD, Reading, text_of
 from microrad.campaign.records import CampaignError, InputText, Limit
 from microrad.campaign.sampling import block_rows
@@ -74,10 +75,16 @@ def load_campaign(path: Path) -> CampaignFile:
     Raises `MissionError` with every fault of the campaign file, of the mission under its [set] and in the cells of its
     grid.
     """
+    if is_ledger(path):
+        name = argument(path)
+        expected = f"`microrad campaign resume {name}` goes on with it, `microrad campaign status {name}` looks at it"
+        fault = Fault("", "", 0, f"is a ledger, not a {FILE_WORD}", expected, file=clipped(str(path)))
+        raise MissionError(path, [fault])
     try:
         document = Document.read(path, FILE_WORD)
     except UnreadableError as error:
-        fault = Fault("", "", 0, f"the {FILE_WORD} {error.reason}", error.expected, file=clipped(str(path)))
+        expected = error.expected.replace("`microrad init`", "`microrad campaign init`")
+        fault = Fault("", "", 0, f"the {FILE_WORD} {error.reason}", expected, file=clipped(str(path)))
         raise MissionError(path, [fault]) from None
     campaign = _Reader(document).read()
     if campaign is None or document.faults:
@@ -96,6 +103,8 @@ class _Reader:
         self.inputs = flat_tables(self._table("inputs"), ("drawn_as",))
         self.limits = self._table("limits")
         self.table = check_table(document, CampaignTable, _flat_variables(document.data))
+        precision = document.data.get("precision")
+        fits.tell_half_width(self.on, precision.get("output") if isinstance(precision, dict) else None)
 
     def _table(self, name: str) -> dict[str, Any]:
         found = self.document.data.get(name, {})
@@ -163,6 +172,10 @@ class _Reader:
         found = [fits.limit(self.on, name, raw, keep) for name, raw in self.limits.items()]
         return tuple(limit for limit in found if limit is not None)
 
+    def _unchecked(self, table: CampaignTable, keep: tuple[str, ...], nominal: MissionFile) -> Iterator[str]:
+        if table.tail is None and "limits" in self.document.data:
+            yield from fits.unchecked(self.limits, keep, nominal.mission, {*self.grid, *self.inputs})
+
     def _campaign(
         self,
         table: CampaignTable,
@@ -187,6 +200,7 @@ class _Reader:
         loop_varies = table.loop is not None and bool(varying)
         realisations = table.realisations or (LANES if loop_varies else 1)
         fits.check_size(self.on, rows, most, realisations)
+        fits.check_repeats(self.on, table, bool(self.inputs), rows, most)
         files = self._files(mission, bases, draws)
         if not self.document.faults:
             self._check_median(bases, draws)
@@ -215,7 +229,11 @@ class _Reader:
             half_width=width,
             loop_varies=loop_varies,
             files=files,
-            warnings=tuple(_warnings(table, rows, loop_varies)),
+            warnings=(
+                *_warnings(table, rows, loop_varies),
+                *drawing.failing(draws, bases[0].data, most),
+                *self._unchecked(table, keep, nominal),
+            ),
         )
 
     def _files(self, mission: Document, bases: tuple[Base, ...], draws: tuple[Draw, ...]) -> tuple[Path, ...]:

@@ -2,12 +2,12 @@
 
 import difflib
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
 from microrad.campaign.inputs import Base
-from microrad.campaign.outputs import OUTPUTS
+from microrad.campaign.outputs import OUTPUTS, RADIUS
 from microrad.campaign.reading import FILE_WORD, Reading, quoted_near
 from microrad.campaign.records import Limit
 from microrad.campaign.tables import MOST_RUNS, CampaignTable, LimitTable, LoopTable
@@ -79,17 +79,35 @@ def default_limits(
     on: Reading, keep: Sequence[str], m: Mission, varied: Mapping[str, Mapping[str, Any]]
 ) -> tuple[Limit, ...]:
     """The limits that the mission requires of the kept outputs; ``varied`` are keys that vary, by their table."""
-    r = m.requirement
-    wanted = (
-        Limit("margin", r.margin_db, None, "requirement.margin"),
-        Limit("residual_quantile", None, r.pointing_error_rad, "requirement.pointing_error"),
-    )
-    limits = tuple(limit for limit in wanted if limit.output in keep)
+    limits = _required(keep, m)
     for limit in limits:
         for name in (name for name, keys in varied.items() if limit.source in keys):
             reason = f"is the limit of {limit.output} as well, which is the same in all rows"
             on.fault(f"{name}.{limit.source}", None, reason, f"a table [limits.{limit.output}] with a value of its own")
     return limits
+
+
+def _required(keep: Sequence[str], m: Mission) -> tuple[Limit, ...]:
+    r = m.requirement
+    wanted = (
+        Limit("margin", r.margin_db, None, "requirement.margin"),
+        Limit("residual_quantile", None, r.pointing_error_rad, "requirement.pointing_error"),
+    )
+    return tuple(limit for limit in wanted if limit.output in keep)
+
+
+def unchecked(given: Collection[str], keep: Sequence[str], m: Mission, varied: Collection[str]) -> Iterator[str]:
+    """Of limits that the mission requires and [limits] leaves out: that nothing checks them; ``varied`` are keys."""
+    for limit in _required(keep, m):
+        if limit.output in given or limit.source in varied:
+            continue
+        word, bound = ("least", limit.least) if limit.most is None else ("most", limit.most)
+        assert bound is not None  # each has one of the two
+        asked = format_quantity(bound, OUTPUTS[limit.output].unit)
+        yield (
+            f"[limits] leaves out {limit.output}, so that {limit.source} = {asked} is not checked: a table "
+            f'[limits.{limit.output}] with {word} = "{asked}" checks it'
+        )
 
 
 def limit(on: Reading, name: str, raw: object, keep: Sequence[str]) -> Limit | None:
@@ -117,13 +135,29 @@ def limit(on: Reading, name: str, raw: object, keep: Sequence[str]) -> Limit | N
 def half_width(on: Reading, table: CampaignTable, keep: Sequence[str]) -> float:
     """The half width that a precision wants, in its output's SI unit; nan without one."""
     wanted = table.precision
-    if wanted is None or not on.is_output("precision.output", wanted.output):
+    if wanted is not None and wanted.output == RADIUS:
+        if table.loop is None:
+            on.fault("precision.output", RADIUS, "needs the fine-pointing loop", "a table [loop], or another output")
+    elif wanted is None or not on.is_output("precision.output", wanted.output, RADIUS):
         return math.nan
-    if wanted.output not in keep:
+    elif wanted.output not in keep:
         on.fault("precision.output", wanted.output, "is not kept", f'"{wanted.output}" in keep, or another output')
-    rule = Quantity(OUTPUTS[wanted.output].unit, OUTPUTS[wanted.output].typical, above=0.0)
-    found = on.number("precision.half_width", rule, wanted.half_width)
+    rule, example = _width_of(wanted.output)
+    found = on.number("precision.half_width", rule, wanted.half_width, example)
     return math.nan if found is None else found
+
+
+def tell_half_width(on: Reading, output: object) -> None:
+    """Say of a precision without half_width, if noted, what would do there, in the unit of its output."""
+    if isinstance(output, str) and (output in OUTPUTS or output == RADIUS):
+        rule, example = _width_of(output)
+        on.tell_missing("precision.half_width", f"{rule.wanted}; for example half_width = {example}")
+
+
+def _width_of(output: str) -> tuple[Quantity, str]:
+    """The rule of a half width of an output or the radius, and an example as it stands in a file."""
+    unit, typical = ("rad", "urad") if output == RADIUS else (OUTPUTS[output].unit, OUTPUTS[output].typical)
+    return Quantity(unit, typical, above=0.0), f'"0.05 {typical}"' if unit else "0.001"
 
 
 # --------------------------------------------------------------------------------------------------------------- whole
@@ -138,6 +172,16 @@ def check_tail(on: Reading, table: CampaignTable, varying: Sequence[str], presen
         on.fault(f"inputs.{key}", None, reason, "the mission's own value, or a grid of values")
     for name in [name for name in ("keep", "limits", "precision", "realisations") if name in present]:
         on.fault(name, None, "stands beside [tail], whose rows are single errors", "one of the two removed")
+
+
+def check_repeats(on: Reading, table: CampaignTable, is_drawn: bool, rows: int, most_rows: int) -> None:
+    """More than one row only where something makes rows differ: a drawn input, or the noise of the loop."""
+    if is_drawn or table.loop is not None or most_rows == 1:
+        return
+    key = "precision.at_most" if rows == 1 else "sampling" if table.runs == 1 else "runs"
+    reason = f"makes {most_rows} rows that are all the same: nothing is drawn, and without [loop] there is no noise"
+    alone = 'runs = 1 with sampling = "random"' + (", and no [precision]" if table.precision is not None else "")
+    on.fault(key, None, reason, f"{alone}, one row for each cell; or [inputs.KEY] with a distribution; or [loop]")
 
 
 def check_minimise(on: Reading, table: CampaignTable) -> None:

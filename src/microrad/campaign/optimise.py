@@ -1,8 +1,7 @@
 """Optimisation: the design variables that cost least while each limit is kept by a wanted share of the rows.
 
 The wanted probability is asked of the same drawn rows for every candidate (sample average approximation: Luedtke and
-Ahmed, SIAM J. Optim. 19, 2008, 674-699). The share of rows that keep a limit moves in steps, so the search looks at the
-row that decides it: of all rows ordered by how far they are inside the limit, the first that may not miss it any more.
+Ahmed, SIAM J. Optim. 19, 2008, 674-699). The search looks at the value in the row that decides a limit (candidates.py).
 That quantile is continuous in the variables, and on the right side of the limit exactly where the share is large
 enough. An optimum leans on its own rows, so it is judged once more on fresh ones.
 
@@ -21,19 +20,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from microrad.campaign.candidates import Candidate, Problem, judged, percent, quantity_text
 from microrad.campaign.outputs import OUTPUTS
-from microrad.campaign.records import CampaignError, Floats, Interval, Limit
-from microrad.campaign.statistics import moments, share_interval
-from microrad.units import format_quantity
+from microrad.campaign.records import CampaignError, Floats, Limit
 
 Evaluate = Callable[[Floats], dict[str, Floats]]
 Progress = Callable[[int, int, str], None]
-
-INTERVAL_CONFIDENCE = 0.95
-"""Confidence of the interval of a share of rows."""
-
-LOG_RATIO = 10.0
-"""A variable is searched on a logarithmic scale where its bounds are at least this far apart."""
 
 FIRST_LOOK = 0.25
 """Share of the evaluations that is spread over the whole range before the searches set out."""
@@ -64,106 +56,6 @@ FARTHEST = 10.0
 
 
 @dataclass(frozen=True, slots=True)
-class Variable:
-    """A design variable: its mission key, its SI unit ("" for a plain number), and the bounds that it stays within."""
-
-    key: str
-    unit: str
-    low: float
-    high: float
-
-    @property
-    def log(self) -> bool:
-        """Whether equal ratios, and not equal differences, are equal steps of the search."""
-        return self.low > 0.0 and self.high >= LOG_RATIO * self.low
-
-    def at(self, place: float) -> float:
-        """Value at a place from 0 (low) to 1 (high)."""
-        value = self.low * (self.high / self.low) ** place if self.log else self.low + place * (self.high - self.low)
-        return float(min(max(value, self.low), self.high))
-
-
-@dataclass(frozen=True, slots=True)
-class Problem:
-    """What to minimise over which variables, and what each row has to keep.
-
-    ``minimise`` is the key of a variable or an output, with a minus in front to maximise it; an output counts by its
-    mean over the rows, or by its quantile at ``quantile``. Each of ``limits`` is to be kept by the share ``confidence``
-    of the rows. ``evaluations`` is the most candidates that may be looked at.
-    """
-
-    variables: tuple[Variable, ...]
-    minimise: str
-    limits: tuple[Limit, ...]
-    confidence: float
-    evaluations: int
-    seed: int
-    quantile: float | None = None
-
-    @property
-    def cost_name(self) -> str:
-        """The variable or output that is minimised or maximised."""
-        return self.minimise.removeprefix("-")
-
-    @property
-    def cost_unit(self) -> str:
-        """Its SI unit."""
-        units = {v.key: v.unit for v in self.variables}
-        return units[self.cost_name] if self.cost_name in units else OUTPUTS[self.cost_name].unit
-
-    @property
-    def sign(self) -> float:
-        """-1 where the cost is maximised."""
-        return -1.0 if self.minimise.startswith("-") else 1.0
-
-
-@dataclass(frozen=True, slots=True)
-class Kept:
-    """How a candidate stands to a limit.
-
-    ``value`` is the output in the row that decides: all rows but the share that may miss the limit are no worse.
-    ``excess`` is how far inside the limit that row is, below 0 where too many miss it. ``share`` of the rows keep it.
-    """
-
-    limit: Limit
-    value: float
-    excess: float
-    share: Interval
-
-    @property
-    def holds(self) -> bool:
-        """Whether enough rows keep the limit."""
-        return self.excess >= 0.0
-
-    @property
-    def wanted(self) -> str:
-        """The limit in words: "margin >= 3 dB"."""
-        unit = OUTPUTS[self.limit.output].unit
-        sides = ((">=", self.limit.least), ("<=", self.limit.most))
-        return f"{self.limit.output} " + " and ".join(
-            f"{sign} {_text(bound, unit)}" for sign, bound in sides if bound is not None
-        )
-
-
-@dataclass(frozen=True, slots=True)
-class Candidate:
-    """One choice of the variables by key (SI), the cost as it is named (not turned round), and the limits under it.
-
-    ``refused`` says why it is no mission; then the cost is nan and ``kept`` is empty.
-    """
-
-    values: dict[str, float]
-    cost: float
-    kept: tuple[Kept, ...]
-    refused: str = ""
-
-    @property
-    def feasible(self) -> bool:
-        """Whether it is a mission and keeps all limits."""
-        return not self.refused and all(k.holds for k in self.kept)
-
-
-@dataclass(frozen=True, slots=True)
 class Optimum:
     """The best candidate, what binds it, and how it does on fresh rows.
 
@@ -188,6 +80,15 @@ class Optimum:
         """Whether a candidate keeps all limits on the rows of the search."""
         return self.best is not None and self.best.feasible
 
+    @property
+    def confirmed(self) -> bool:
+        """Whether fresh rows agree: the interval of each share of them that keeps a limit reaches the wanted one.
+
+        Not whether the shares themselves do: those of an optimum on a limit fall short of it as often as not.
+        """
+        fresh = self.fresh
+        return fresh is not None and not fresh.refused and all(k.agrees(self.problem.confidence) for k in fresh.kept)
+
 
 def optimise(problem: Problem, evaluate: Evaluate, evaluate_fresh: Evaluate, on_progress: Progress) -> Optimum:
     """The candidate of least cost whose rows keep each limit often enough; the same for the same seed.
@@ -205,51 +106,6 @@ def optimise(problem: Problem, evaluate: Evaluate, evaluate_fresh: Evaluate, on_
         search.explore()
         search.refine()
     return _optimum(search, evaluate_fresh)
-
-
-# -------------------------------------------------------------------------------------------------------------- judging
-def _judged(problem: Problem, values: dict[str, float], columns: dict[str, Floats]) -> Candidate:
-    """The candidate with these outputs of its rows."""
-    weight = columns.get("weight", np.ones(len(next(iter(columns.values())))))
-    _check_rows(problem, weight.size)
-    kept = tuple(_kept(limit, _column(columns, limit.output), weight, problem.confidence) for limit in problem.limits)
-    name = problem.cost_name
-    cost = values[name] if name in values else _typical(_column(columns, name), weight, problem.quantile)
-    return Candidate(values, cost, kept, "" if not np.isnan(cost) else f"no row has a {name}")
-
-
-def _column(columns: dict[str, Floats], name: str) -> Floats:
-    if name not in columns:
-        raise CampaignError(f"the rows have no output {name}, which the optimisation needs; add it to keep")
-    return columns[name]
-
-
-def _kept(limit: Limit, output: Floats, weight: Floats, confidence: float) -> Kept:
-    """Failed rows (nan) have missed the limit: nothing shows that they would keep it."""
-    inside = np.minimum(
-        np.inf if limit.least is None else output - limit.least, np.inf if limit.most is None else limit.most - output
-    )
-    inside = np.where(np.isnan(inside), -np.inf, inside)
-    deciding = _at(inside, weight, 1.0 - confidence)
-    share = share_interval(moments((inside >= 0.0).astype(np.float64), weight), INTERVAL_CONFIDENCE)
-    return Kept(limit, float(output[deciding]), float(inside[deciding]), share)
-
-
-def _at(values: Floats, weight: Floats, probability: float) -> int:
-    """Index of the first value, rising, up to which the weights add up to more than `probability` of them all."""
-    order = np.argsort(values, kind="stable")
-    share = np.cumsum(weight[order]) / np.sum(weight)
-    # rounding must not turn the last row that may miss the limit into one that may not
-    first = int(np.searchsorted(share, probability + 1e-9, side="right"))
-    return int(order[min(first, order.size - 1)])
-
-
-def _typical(output: Floats, weight: Floats, probability: float | None) -> float:
-    """Mean of the good rows or their quantile; nan without any."""
-    good = ~np.isnan(output)
-    if probability is None or not np.any(good):
-        return moments(output, weight).mean
-    return float(output[good][_at(output[good], weight[good], probability)])
 
 
 # ------------------------------------------------------------------------------------------------------------ searching
@@ -285,13 +141,13 @@ class _Search:
             columns = self.evaluate(np.array(list(values.values())))
         except CampaignError as error:
             return Candidate(values, float("nan"), (), str(error) or "refused")
-        return _judged(self.problem, values, columns)
+        return judged(self.problem, values, columns)
 
     def _so_far(self) -> str:
         best = self.best()
         if best is None or not best.feasible:
             return "no candidate keeps the limits yet"
-        return f"best {self.problem.cost_name} {_text(best.cost, self.problem.cost_unit)}"
+        return f"best {self.problem.cost_name} {quantity_text(best.cost, self.problem.cost_unit)}"
 
     @property
     def trace(self) -> tuple[Candidate, ...]:
@@ -342,7 +198,9 @@ class _Search:
             self.at(place)
         seen = [candidate for _, candidate in self.accepted]
         self.cost_scale = _spread([c.cost for c in seen])
-        self.scales = np.array([_spread([c.kept[i].excess for c in seen]) for i in range(len(self.problem.limits))])
+        self.scales = np.array(
+            [_spread([c.kept[i].excess for c in seen], _bounds(x)) for i, x in enumerate(self.problem.limits)]
+        )
 
     def starts(self) -> list[Floats]:
         """Places to set out from, the most promising first, no two close together."""
@@ -391,14 +249,19 @@ def _distance(place: Floats, other: Floats) -> float:
     return float(np.linalg.norm(place - other))
 
 
-def _spread(numbers: list[float]) -> float:
-    """Distance of the quartiles, or of the extremes where these agree; 1 where all agree."""
+def _spread(numbers: list[float], bounds: tuple[float, ...] = ()) -> float:
+    """Distance of the quartiles, or of the extremes where these agree; where all agree the largest size, or 1."""
     finite = np.array([x for x in numbers if np.isfinite(x)])
     for share in (0.25, 0.0):
         width = float(np.ptp(np.quantile(finite, [share, 1.0 - share]))) if finite.size else 0.0
         if width > 0.0:
             return width
-    return 1.0
+    # not 1 at once: in SI units what no variable moves may be a millionth of it, and would look like being on the limit
+    return max(map(abs, (*finite.tolist(), *bounds)), default=0.0) or 1.0
+
+
+def _bounds(limit: Limit) -> tuple[float, ...]:
+    return tuple(bound for bound in (limit.least, limit.most) if bound is not None)
 
 
 # ------------------------------------------------------------------------------------------------------------- the end
@@ -422,29 +285,24 @@ def _optimum(search: _Search, evaluate_fresh: Evaluate) -> Optimum:
 def _on_fresh_rows(
     problem: Problem, best: Candidate | None, evaluate_fresh: Evaluate
 ) -> tuple[Candidate | None, tuple[str, ...]]:
-    """The best candidate, if it is feasible, on other draws, and what these take back of what the search found."""
+    """The best candidate, if it is feasible, on other draws, and why it could not be drawn."""
     if best is None or not best.feasible:
         return None, ()
     try:
         columns = evaluate_fresh(np.array(list(best.values.values())))
     except CampaignError as error:
         return None, (f"the optimum could not be checked with fresh rows: {error}",)
-    fresh = _judged(problem, best.values, columns)
-    return fresh, tuple(
-        f"fresh rows keep {k.wanted} less often than the {_percent(problem.confidence)} of rows that were wanted: "
-        f"{_percent(k.share.value)} ({_percent(k.share.low)} to {_percent(k.share.high)}); "
-        "the optimum leans on its own rows, draw more of them (optimise.rows)"
-        for k in fresh.kept
-        if k.share.high < problem.confidence
-    )
+    return judged(problem, best.values, columns), ()
 
 
 def _bound_by(search: _Search, best: Candidate) -> tuple[str, ...]:
+    """Limits and bounds that the best candidate is at; a limit that no candidate missed has kept it from nothing."""
+    missed = {k.limit.output for _, c in search.accepted for k in c.kept if not k.holds}
     place = next(p for p, c in search.known.values() if c is best)
     variables = zip(search.problem.variables, place, strict=True)
     limits = zip(best.kept, search.excess(best), strict=True)
     return (
-        *(k.limit.output for k, excess in limits if excess < ACTIVE),
+        *(k.limit.output for k, excess in limits if excess < ACTIVE and k.limit.output in missed),
         *(f"{v.key} at its {'low' if x < 0.5 else 'high'}" for v, x in variables if min(x, 1.0 - x) < ACTIVE),
     )
 
@@ -457,8 +315,8 @@ def _reason(problem: Problem, best: Candidate | None, refused: list[Candidate]) 
     if not missed:
         return ""
     return (
-        f"no candidate keeps {' and '.join(k.wanted for k in missed)} in {_percent(problem.confidence)} of rows; "
-        f"the best has {' and '.join(_percent(k.share.value) for k in missed)}"
+        f"no candidate keeps {' and '.join(k.wanted for k in missed)} in {percent(problem.confidence)} of rows; "
+        f"the best has {' and '.join(percent(k.share.value) for k in missed)}"
     )
 
 
@@ -475,21 +333,4 @@ def _check(problem: Problem) -> None:
     if problem.cost_name not in OUTPUTS and problem.cost_name not in {v.key for v in problem.variables}:
         raise CampaignError(f"optimise.minimise: {problem.cost_name!r} is neither one of the variables nor an output")
     if not 0.0 < problem.confidence < 1.0:
-        raise CampaignError(f"optimise.confidence: {problem.confidence:g} is not between 0 and 1")
-
-
-def _check_rows(problem: Problem, rows: int) -> None:
-    """Raise `CampaignError` where one missing row already is more than may miss a limit."""
-    if problem.limits and rows * (1.0 - problem.confidence) < 1.0 - 1e-9:
-        raise CampaignError(
-            f"optimise.rows: {rows} rows cannot tell whether {_percent(problem.confidence)} of them keep a limit; "
-            f"draw at least {int(np.ceil(1.0 / (1.0 - problem.confidence) - 1e-6))}"
-        )
-
-
-def _percent(share: float) -> str:
-    return f"{100.0 * share:.4g} %"
-
-
-def _text(value: float, unit: str) -> str:
-    return format_quantity(value, unit).strip()
+        raise CampaignError(f"optimise.confidence: {problem.confidence:g} is no share of rows between 0 and 1")

@@ -24,6 +24,8 @@ _ALL = (
     Output("beyond_share", "", "", "share of the time beyond requirement.pointing_error", "residual"),
     Output("lost_share", "", "", "share of the optical readings without the spot", "residual"),
     Output("saturated_share", "", "", "control samples with a drive at its limit, over all samples", "residual"),
+    Output("beyond_rate_share", "", "", "plant steps beyond the mirror's identified rate, over all steps", "residual"),
+    Output("outside_share", "", "", "plant steps outside the mirror's identified drive range, over all", "residual"),
     Output("margin", "dB", "dB", "margin that the communication link keeps but for requirement.outage", "link"),
     Output("outage", "", "", "share of the time with less than 0 dB", "link"),
     Output("short", "", "", "share of the time with less than requirement.margin", "link"),
@@ -36,6 +38,9 @@ _ALL = (
 
 OUTPUTS: dict[str, Output] = {output.name: output for output in _ALL}
 """Every output by its name, in the order in which they are written."""
+
+RADIUS = "radius"
+"""The radial error over the time of all rows, whose quantile a precision may ask for; no output of a row."""
 
 TAIL_OUTPUTS: dict[str, Output] = {
     output.name: output

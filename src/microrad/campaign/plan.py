@@ -23,31 +23,33 @@ def outputs(campaign: CampaignFile) -> tuple[Output, ...]:
 
 def chunk_rows(campaign: CampaignFile) -> int:
     """Rows in a chunk: a power of two, a few seconds of work."""
+    few = 1 << int(math.log2(campaign.rows))
     if any(output.group == "day" for output in outputs(campaign)):
-        return _DAY_ROWS
+        return min(_DAY_ROWS, few)
     if campaign.table.loop is None:
-        return _CHUNK_ROWS
+        return min(_CHUNK_ROWS, few)
     fine, own = campaign.mission.mission.fine_pointing, campaign.realisations
     assert fine is not None  # the campaign file's own check
     lanes = kernels.LANES * math.ceil(own / kernels.LANES) if campaign.loop_varies else own
     steps = loops.span(campaign, campaign.mission).duration_s / fine.plant_step_s * lanes
     full = 1 if campaign.loop_varies else math.ceil(kernels.LANES / own)  # rows that fill the lanes of a batch
     wanted = max(_CHUNK_STEPS / steps, 1.0)
-    return max(min(1 << int(math.log2(wanted)), _CHUNK_ROWS), 1 << math.ceil(math.log2(full)))
+    return max(min(1 << int(math.log2(wanted)), _CHUNK_ROWS, few), 1 << math.ceil(math.log2(full)))
 
 
 def rounds(campaign: CampaignFile) -> tuple[int, ...]:
     """Rows of a cell at the end of each round, rising: one round, or more until a wanted precision is reached.
 
-    With a precision each round has whole chunks and blocks, so that what is done does not depend on where it stops.
+    With a precision each round has whole chunks and blocks, so that what is done does not depend on where it stops;
+    the last one ends at the most rows that are wanted, or less than a chunk or block before.
     """
     wanted = campaign.table.precision
     if wanted is None:
         return (campaign.rows,)
     unit = max(chunk_rows(campaign), campaign.block)  # powers of two, so the larger holds whole ones of the other
-    totals = [_whole(campaign.rows, unit)]
-    while totals[-1] < wanted.at_most:
-        totals.append(_whole(min(math.ceil(_GROWTH * totals[-1]), wanted.at_most), unit))
+    totals, most = [_whole(campaign.rows, unit)], wanted.at_most // unit * unit
+    while totals[-1] < most:
+        totals.append(min(_whole(math.ceil(_GROWTH * totals[-1]), unit), most))
     return tuple(totals)
 
 

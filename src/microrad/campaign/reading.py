@@ -44,21 +44,28 @@ class Reading:
             self.fault(at, value, fault.reason, fault.expected, fault.nearest)
         return False
 
-    def number(self, at: str, rule: Quantity, raw: object) -> float | None:
-        """The SI value of a quantity, or None with what is wrong noted."""
+    def number(self, at: str, rule: Quantity, raw: object, example: str = "") -> float | None:
+        """The SI value of a quantity, or None with what is wrong noted, with ``example`` or the rule's own."""
         try:
             return float(rule.read(raw))
         except UnitError as error:
-            example = f'"{error.example}"' if " " in error.example else error.example
+            example = example or (f'"{error.example}"' if " " in error.example else error.example)
             name = at.rpartition(".")[2]
             self.fault(at, raw, error.reason, f"{error.expected}; for example {name} = {example}")
             return None
 
-    def is_output(self, at: str, name: object) -> bool:
-        """Whether a name is that of an output; what is wrong with it is noted."""
-        if isinstance(name, str) and name in OUTPUTS:
+    def tell_missing(self, key: str, expected: str) -> None:
+        """Say of a key that was noted as missing what would do in its place."""
+        for i, fault in enumerate(self.document.faults):
+            if fault.key == key and fault.reason == "is missing":
+                self.document.faults[i] = replace(fault, expected=expected)
+
+    def is_output(self, at: str, name: object, *others: str) -> bool:
+        """Whether a name is that of an output, or one of ``others``; what is wrong with it is noted."""
+        names = (*OUTPUTS, *others)
+        if isinstance(name, str) and name in names:
             return True
-        self.fault(at, name, "is no output", f"one of {', '.join(OUTPUTS)}", quoted_near(name, OUTPUTS))
+        self.fault(at, name, "is no output", f"one of {', '.join(names)}", quoted_near(name, names))
         return False
 
 

@@ -222,7 +222,8 @@ class CampaignSummary:
     """Everything that a status, a page or a picture shows of a campaign.
 
     ``sample`` are columns of at most some thousand rows of all cells, spread evenly, with ``cell`` among them, for
-    scatter plots. ``sensitivities`` are of the first cell.
+    scatter plots. ``sensitivities`` are of the first cell, ``worst`` those of each cell, the worst first. ``findings``
+    are sentences that belong beside the verdict.
     """
 
     name: str
@@ -241,3 +242,4 @@ class CampaignSummary:
     failed: tuple[tuple[int, Failed], ...]
     progress: Progress
     warnings: tuple[str, ...] = field(default=())
+    findings: tuple[str, ...] = field(default=())

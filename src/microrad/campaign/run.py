@@ -5,17 +5,19 @@ import math
 import os
 import time
 from collections.abc import Callable, Sequence
+from contextlib import closing, suppress
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
 
-from microrad.campaign import blob, bundle, ledger, loops, plan, sampling, summary, work
+from microrad.campaign import blob, bundle, loops, mending, plan, sampling, summary, work
 from microrad.campaign.blob import Column, Head
 from microrad.campaign.file import CampaignFile, load_campaign
 from microrad.campaign.inputs import Builder
-from microrad.campaign.ledger import Ledger
+from microrad.campaign.ledger import Ledger, check_same
+from microrad.campaign.ledger_file import argument, refuse_existing
 from microrad.campaign.records import CampaignError, Chunk, Engine, Failed, Job, Outcome
 from microrad.campaign.sketch import Sketch
 from microrad.control import AxisController
@@ -57,10 +59,14 @@ def begin(file: Path, path: Path, means: Means, on_progress: Progress = lambda d
     say how to go on; what was finished by then is in the ledger.
     """
     campaign = load_campaign(file)
+    refuse_existing(path)  # before the controllers are tuned
     spec = bundle.packed(campaign, controllers(campaign, on_progress))
-    with Ledger.create(path, _head(campaign, spec)) as book:
-        book.note("file", str(file.resolve()))
-        _Run(campaign, spec, book, means, on_progress).whole()
+    with closing(_Workers(campaign, spec, means)) as workers:
+        if means.scheduler is not None:
+            workers.engine()  # one that is not there leaves no ledger behind
+        with Ledger.create(path, _head(campaign, spec)) as book:
+            book.note("file", str(file.resolve()))
+            _Run(campaign, workers, book, on_progress).whole()
 
 
 def resume(path: Path, means: Means, on_progress: Progress = lambda done, total, what: None) -> None:
@@ -69,15 +75,16 @@ def resume(path: Path, means: Means, on_progress: Progress = lambda done, total,
     Raises `CampaignError` with both hashes when microrad, the campaign file or the mission is no longer what it was;
     files that are no longer there are taken from the ledger.
     """
-    if not ledger.verify(path).sound:
-        ledger.mend(path)
+    if not mending.verify(path).sound:
+        mending.mend(path)
     with Ledger.open(path, write=True) as book:
         head = book.head
         file = Path(book.notes().get("file", ""))
         opened = bundle.opened(head.bundle, any_code=True)
         campaign = load_campaign(file) if file.is_file() else opened.campaign
-        ledger.check_same(head.hashes, bundle.hashes(campaign), path)
-        _Run(opened.campaign, head.bundle, book, means, on_progress).whole()
+        check_same(head.hashes, bundle.hashes(campaign), path)
+        with closing(_Workers(opened.campaign, head.bundle, means)) as workers:
+            _Run(opened.campaign, workers, book, on_progress).whole()
 
 
 def controllers(campaign: CampaignFile, on_progress: Progress) -> tuple[AxisController, ...]:
@@ -150,12 +157,30 @@ def _minutes(seconds: float) -> str:
     return f"{seconds / 60.0:.0f} min" if seconds < 5400.0 else f"{seconds / 3600.0:.1f} h"
 
 
+class _Workers:
+    """The engine of a campaign, started when it is first needed."""
+
+    def __init__(self, campaign: CampaignFile, spec: bytes, means: Means) -> None:
+        self._late_s, self._spec, self._means = campaign.table.row_limit_s + LATE_S, spec, means
+        self._engine: Engine | None = None
+
+    def engine(self) -> Engine:
+        """The engine, started."""
+        if self._engine is None:
+            self._engine = self._means.engine(self._spec, self._late_s)
+        return self._engine
+
+    def close(self) -> None:
+        """Stop it at once, if it was started."""
+        if self._engine is not None:
+            self._engine.close()
+
+
 class _Run:
     """One campaign on its way into its ledger."""
 
-    def __init__(self, campaign: CampaignFile, spec: bytes, book: Ledger, means: Means, on_progress: Progress) -> None:
-        self.campaign, self.spec, self.book, self.means, self.on_progress = campaign, spec, book, means, on_progress
-        self.late_s = campaign.table.row_limit_s + LATE_S
+    def __init__(self, campaign: CampaignFile, workers: _Workers, book: Ledger, on_progress: Progress) -> None:
+        self.campaign, self.workers, self.book, self.on_progress = campaign, workers, book, on_progress
         done = book.done()
         rows = sum(len(plan.rows_of(campaign, number)) for _, number in done)
         self.pace = _Pace(rows, float(book.notes().get("seconds", 0.0)))
@@ -164,44 +189,36 @@ class _Run:
     def whole(self) -> None:
         """All rounds, then the traces; whatever stops it, what is done stays."""
         self.book.note("state", "running")
-        engine: Engine | None = None
         try:
             for rows in plan.rounds(self.campaign):
                 cells = [cell for cell in range(len(self.campaign.cells)) if not self._reached(cell, rows)]
                 jobs = [job for cell in cells for job in plan.chunks(self.campaign, cell, rows)]
-                missing = [job for job in jobs if (job.cell, job.number) not in self.book.done()]
+                done = self.book.done()
+                missing = [job for job in jobs if (job.cell, job.number) not in done]
                 self.total = self.pace.done + sum(len(plan.rows_of(self.campaign, job.number)) for job in missing)
                 if missing:
-                    engine = engine or self.means.engine(self.spec, self.late_s)
-                    self._round(engine, missing)
-            self._traces(engine)
+                    self._round(missing)
+            self._traces()
             self._note("complete")
         except KeyboardInterrupt:
-            if engine is not None:
-                engine.close()
+            self.workers.close()
             self._note("stopped")
             raise KeyboardInterrupt(f"stopped; {self._stopped()}") from None
         except BaseException as error:
-            if engine is not None:
-                engine.close()
-            self._note("stopped", quietly=True)
+            self.workers.close()
+            with suppress(CampaignError):
+                self._note("stopped")
             if isinstance(error, CampaignError) and "campaign resume" not in str(error):
                 raise CampaignError(f"{error}; {self._stopped()}") from error
             raise
-        finally:
-            if engine is not None:
-                engine.close()
 
-    def _note(self, state: str, quietly: bool = False) -> None:
-        try:
-            self.book.note("seconds", self.pace.seconds)
-            self.book.note("state", state)
-        except CampaignError:
-            if not quietly:
-                raise
+    def _note(self, state: str) -> None:
+        self.book.note("seconds", self.pace.seconds)
+        self.book.note("state", state)
 
     def _stopped(self) -> str:
-        return f"{self.pace.done} rows are in {self.book.path}. Go on with: microrad campaign resume {self.book.path}"
+        path = self.book.path
+        return f"{self.pace.done} rows are in {path}. Go on with: microrad campaign resume {argument(path)}"
 
     # ---------------------------------------------------------------------------------------------------------- rounds
     def _reached(self, cell: int, rows: int) -> bool:
@@ -212,17 +229,17 @@ class _Run:
             return False
         return any(summary.reached(self.campaign, self.book, cell, total) for total in before)
 
-    def _round(self, engine: Engine, jobs: Sequence[Job]) -> None:
+    def _round(self, jobs: Sequence[Job]) -> None:
         """Do these chunks: each at most twice as a whole, then the rows of those that failed one by one."""
-        failed = self._pass(engine, jobs)
-        failed = self._pass(engine, [outcome.job for outcome in failed])
+        failed = self._pass(jobs)
+        failed = self._pass([outcome.job for outcome in failed])
         for outcome in failed:
-            self._by_rows(engine, outcome.job)
+            self._by_rows(outcome.job)
 
-    def _pass(self, engine: Engine, jobs: Sequence[Job]) -> list[Outcome]:
+    def _pass(self, jobs: Sequence[Job]) -> list[Outcome]:
         """Put what is done into the ledger; returns what is not."""
         missed = []
-        for outcome in engine.outcomes(iter(jobs)) if jobs else ():
+        for outcome in self.workers.engine().outcomes(iter(jobs)) if jobs else ():
             if outcome.kind == "done":
                 self._keep(outcome.job, outcome.payload)
             else:
@@ -250,14 +267,14 @@ class _Run:
         shown = "-" if math.isnan(value) else format_quantity(value, output.unit or "1", 3)
         return f"{output.name} {100 * share:g} %: {shown}"
 
-    def _by_rows(self, engine: Engine, job: Job) -> None:
+    def _by_rows(self, job: Job) -> None:
         """The rows of a chunk that cannot be done whole, each by itself and at most twice; the rest have failed."""
         rows = [Job(job.cell, job.number, row, "row") for row in plan.rows_of(self.campaign, job.number)]
         found: dict[int, Chunk] = {}
         lost: dict[int, str] = {}
         for _ in range(work.ATTEMPTS):
             todo = [each for each in rows if each.row not in found or found[each.row].failed]
-            for outcome in engine.outcomes(iter(todo)) if todo else ():
+            for outcome in self.workers.engine().outcomes(iter(todo)) if todo else ():
                 if outcome.kind == "done":
                     found[outcome.job.row] = blob.unpack_chunk(outcome.payload)
                 else:
@@ -281,7 +298,7 @@ class _Run:
         return Chunk(job.cell, job.number, columns, (failed,), np.zeros(0), np.zeros(0))
 
     # ---------------------------------------------------------------------------------------------------------- traces
-    def _traces(self, engine: Engine | None) -> None:
+    def _traces(self) -> None:
         """Keep the traces of the rows that are worst in the first limit's output, in each cell."""
         wanted = {(cell, row): value for cell in range(len(self.campaign.cells)) for row, value in self._worst(cell)}
         if not wanted:
@@ -294,15 +311,11 @@ class _Run:
         jobs = [Job(cell, 0, row, "trace") for cell, row in wanted if (cell, row) not in there]
         if not jobs:
             return
-        engine = engine or self.means.engine(self.spec, self.late_s)
-        try:
-            for outcome in engine.outcomes(iter(jobs)):
-                if outcome.kind == "done":
-                    found = blob.unpack_trace(outcome.payload)
-                    value = wanted[found.cell, found.row]
-                    self.book.put_trace(replace(found, output=output, value=value))
-        finally:
-            engine.close()
+        for outcome in self.workers.engine().outcomes(iter(jobs)):
+            if outcome.kind == "done":
+                found = blob.unpack_trace(outcome.payload)
+                value = wanted[found.cell, found.row]
+                self.book.put_trace(replace(found, output=output, value=value))
 
     def _worst(self, cell: int) -> list[tuple[int, float]]:
         """Rows with the worst values of the first limit's output, and the values."""

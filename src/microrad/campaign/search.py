@@ -9,10 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from microrad.campaign import loops, plan, work
+from microrad.campaign.candidates import Problem, Variable
 from microrad.campaign.file import CampaignFile, load_campaign
 from microrad.campaign.inputs import Builder
 from microrad.campaign.keys import touches_loop
-from microrad.campaign.optimise import Optimum, Problem, Variable, optimise
+from microrad.campaign.optimise import Optimum, optimise
 from microrad.campaign.records import CampaignError
 from microrad.control import AxisController
 from microrad.threads import in_threads

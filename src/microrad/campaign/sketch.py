@@ -27,15 +27,16 @@ class Sketch:
     Endowment 12 (2019) 2195; here with weights, their squares beside them, and interpolation inside a bin.
     """
 
-    __slots__ = ("_keys", "_square", "_waiting", "_weight", "largest", "smallest")
+    __slots__ = ("_high", "_keys", "_low", "_square", "_waiting", "_weight")
 
     def __init__(self) -> None:
         """A sketch of nothing."""
         self._keys: NDArray[np.int64] = np.empty(0, dtype=np.int64)
         self._weight: Floats = np.empty(0)
         self._square: Floats = np.empty(0)
+        self._low: Floats = np.empty(0)
+        self._high: Floats = np.empty(0)
         self._waiting: list[tuple[Floats, Floats]] = []
-        self.smallest, self.largest = math.inf, -math.inf
 
     @property
     def error(self) -> float:
@@ -61,8 +62,6 @@ class Sketch:
         values, given = values[known], given[known]
         if not values.size:
             return
-        self.smallest = min(self.smallest, float(values.min()))
-        self.largest = max(self.largest, float(values.max()))
         self._waiting.append((values, given))
         if sum(waiting.size for waiting, _ in self._waiting) >= _WAITING:
             self._settle()
@@ -71,18 +70,23 @@ class Sketch:
         """Take in all that another sketch has; the other stays as it is."""
         self._settle()
         other._settle()
-        self.smallest, self.largest = min(self.smallest, other.smallest), max(self.largest, other.largest)
-        self._take(other._keys, other._weight, other._square)
+        self._take(other._keys, other._weight, other._square, other._low, other._high)
 
     def _settle(self) -> None:
         """Put the values that wait into their bins: many at once, since each time costs as much as all bins do."""
         if self._waiting:
             values, weights = (np.concatenate(parts) for parts in zip(*self._waiting, strict=True))
             self._waiting.clear()
-            self._take(_keys(values), weights, weights**2)
+            keys = _keys(values)
+            held = np.where(keys == 0, 0.0, np.where(np.abs(keys) == _LAST, np.copysign(math.inf, values), values))
+            self._take(keys, weights, weights**2, held, held)
 
-    def _take(self, keys: NDArray[np.int64], weight: Floats, square: Floats) -> None:
+    def _take(self, keys: NDArray[np.int64], weight: Floats, square: Floats, low: Floats, high: Floats) -> None:
         self._keys, place = np.unique(np.concatenate([self._keys, keys]), return_inverse=True)
+        lowest, highest = np.full(self._keys.size, math.inf), np.full(self._keys.size, -math.inf)
+        np.minimum.at(lowest, place, np.concatenate([self._low, low]))
+        np.maximum.at(highest, place, np.concatenate([self._high, high]))
+        self._low, self._high = lowest, highest
         self._weight = _summed(place, np.concatenate([self._weight, weight]), self._keys.size)
         self._square = _summed(place, np.concatenate([self._square, square]), self._keys.size)
 
@@ -100,10 +104,9 @@ class Sketch:
         return low + min(max(inside, 0.0), 1.0) * (high - low)
 
     def edges(self) -> tuple[Floats, Floats]:
-        """Smallest and largest value (bins,) that each bin can hold, rising, no further out than the values are."""
+        """Smallest and largest value (bins,) that each bin holds, rising: what has few values keeps them exactly."""
         self._settle()
-        low, high = _edges(self._keys)
-        return np.clip(low, self.smallest, self.largest), np.clip(high, self.smallest, self.largest)
+        return self._low, self._high
 
     def cumulative(self) -> tuple[Floats, Floats]:
         """Sums (bins,) of the weights and of their squares up to the upper end of each bin."""
@@ -137,14 +140,6 @@ def _keys(values: Floats) -> NDArray[np.int64]:
 
 def _summed(place: NDArray[np.intp], weight: Floats, size: int) -> Floats:
     return np.bincount(place, weight, size).astype(np.float64, copy=False)
-
-
-def _edges(keys: NDArray[np.int64]) -> tuple[Floats, Floats]:
-    number = np.abs(keys)
-    inner, outer = (SMALLEST * np.exp((number - back) * _STEP) for back in (1, 0))
-    inner = np.where(number == 0, 0.0, np.where(number == _LAST, math.inf, inner))
-    outer = np.where(number == 0, 0.0, np.where(number == _LAST, math.inf, outer))
-    return np.where(keys < 0, -outer, inner), np.where(keys < 0, -inner, outer)
 
 
 def _spread(edges: Floats, low: Floats, high: Floats, weight: Floats) -> Floats:

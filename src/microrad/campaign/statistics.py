@@ -1,4 +1,4 @@
-"""Statistics of rows as they come: means, quantiles, shares and tails, with intervals that hold for few rows."""
+"""Statistics of rows as they come: means, quantiles and shares, with intervals that hold for few rows."""
 
 import math
 from collections.abc import Iterable
@@ -6,13 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from microrad.campaign.records import Floats, Interval, OutputSummary, Tail
+from microrad.campaign.records import Floats, Interval, OutputSummary
 from microrad.campaign.sketch import Sketch
 
 PICTURE_BINS = 40
-TAIL_POINTS = 200
-_MOST = 1e12  # independent errors, where rows hardly differ
-_ENOUGH = 20.0  # events below which the variance of a share is not trusted
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,7 +113,7 @@ def mean_interval(rows: Moments, confidence: float, blocks: Moments | None = Non
     parts = blocks or rows
     if parts.count < 2:
         return Interval(rows.mean, math.nan, math.nan, confidence)
-    half = _student(confidence, parts.count - 1) * math.sqrt(parts.mean_variance)
+    half = student(confidence, parts.count - 1) * math.sqrt(parts.mean_variance)
     return Interval(rows.mean, rows.mean - half, rows.mean + half, confidence)
 
 
@@ -127,7 +124,7 @@ def proportion_interval(hits: float, trials: float, confidence: float) -> Interv
     """
     if trials <= 0.0:
         return Interval(math.nan, math.nan, math.nan, confidence)
-    low, high = _binomial_band(np.array([hits]), np.array([trials]), confidence)
+    low, high = binomial_band(np.array([hits]), np.array([trials]), confidence)
     return Interval(hits / trials, float(low[0]), float(high[0]), confidence)
 
 
@@ -136,16 +133,16 @@ def share_interval(rows: Moments, confidence: float) -> Interval:
 
     Rows without weights: `proportion_interval`. With weights it is the same for the number of independent rows that
     would know the share as well: E. L. Korn and B. I. Graubard, Confidence intervals for proportions with small
-    expected number of positive counts estimated from survey data, Survey Methodology 24 (1998) 193. It is no more than
-    the number of rows, and Kish's (sum w)^2 / sum w^2 where all or none hit. For rows of Latin hypercubes or Sobol sets
-    it is wider than needed.
+    expected number of positive counts estimated from survey data, Survey Methodology 24 (1998) 193. It is
+    Kish's (sum w)^2 / sum w^2 where all or none hit, and may be many times the number of rows where the weights of
+    those that hit are small. For rows of Latin hypercubes or Sobol sets it is wider than needed.
     """
     if not rows.count:
         return proportion_interval(0.0, 0.0, confidence)
     share = min(max(rows.mean, 0.0), 1.0)
     size = rows.weight**2 / rows.weight_square
     if 0.0 < share < 1.0 and rows.weight_square != rows.weight:
-        size = min(share * (1.0 - share) / rows.mean_variance, float(rows.count))
+        size = share * (1.0 - share) / rows.mean_variance
     return proportion_interval(share * size, size, confidence)
 
 
@@ -193,7 +190,7 @@ def _binomial_tails(share: Floats, size: Floats, probability: float) -> tuple[Fl
     return few, many
 
 
-def _binomial_band(hits: Floats, trials: Floats, confidence: float) -> tuple[Floats, Floats]:
+def binomial_band(hits: Floats, trials: Floats, confidence: float) -> tuple[Floats, Floats]:
     """Ends of Clopper and Pearson's interval, for real numbers of hits and trials, too."""
     from scipy.special import betaincinv  # slow to import, not needed to show help
 
@@ -203,7 +200,8 @@ def _binomial_band(hits: Floats, trials: Floats, confidence: float) -> tuple[Flo
     return low, high
 
 
-def _student(confidence: float, freedom: float) -> float:
+def student(confidence: float, freedom: float) -> float:
+    """Half width of the interval of Student's t with so many degrees of freedom, inf for the normal distribution."""
     from scipy.special import stdtrit  # slow to import, not needed to show help
 
     return float(stdtrit(freedom, 0.5 + confidence / 2.0))
@@ -269,139 +267,3 @@ class Fold:
             edges=edges,
             counts=counts,
         )
-
-
-# ---------------------------------------------------------------------------------------------------------------- tails
-def tail_of_time(
-    survival: Floats,
-    survival_square: Floats,
-    rows: int,
-    edges_rad: Floats,
-    probabilities: Iterable[float],
-    confidence: float,
-) -> Tail:
-    """Share of the time that the radial error exceeds a radius, from the sums over rows that a `Chunk` has.
-
-    ``survival`` (bins,) and ``survival_square`` (bins,) belong to the first ``bins`` of ``edges_rad``. Errors of one
-    row are correlated in time, rows are not: the spread of the rows' own shares gives the number of independent errors
-    that would know the share as well, and the interval is that of Korn and Graubard (see `share_interval`) with their
-    correction for few rows. Where few events are left, that number is held to what it was before them: it rises
-    further out, where excursions are shorter. The interval of a radius has those radii whose own interval holds the
-    probability; an end that the rows cannot tell is nan. Raises ValueError for less than one row.
-    """
-    if rows < 1:
-        raise ValueError("a tail of no rows: at least one row has to have succeeded")
-    share = survival / rows
-    variance = np.maximum(survival_square / rows - share**2, 0.0) / max(rows - 1, 1)
-    if rows == 1:
-        variance = share * (1.0 - np.minimum(share, 1.0))  # one row knows as much as one error
-    band = _band(share, _held(share, _size(share, variance)), rows, confidence)
-    edges = edges_rad[: share.size]
-    wanted = {p: _radius(edges, band, p, confidence) for p in probabilities}
-    seen = slice(max(int(np.count_nonzero(share >= 1.0)) - 1, 0), int(np.count_nonzero(share)) + 1)
-    return Tail(
-        radius_rad=edges[seen],
-        survival=band.share[seen],
-        low=band.low[seen],
-        high=band.high[seen],
-        wanted=wanted,
-        confidence=confidence,
-        method=f"share of the time of {rows} rows, which are independent",
-        effective_runs=_effective(band, wanted),
-    )
-
-
-def tail_weighted(radius_rad: Floats, log_weight: Floats, probabilities: Iterable[float], confidence: float) -> Tail:
-    """Probability that one error exceeds a radius, from draws (n,) with the logarithm of their weights (n,).
-
-    The weights are those of importance sampling, of mean 1. The interval is as in `tail_of_time`, each draw a row by
-    itself; in the tail it is that of Poisson's distribution for as many exceedances as would be known as well. The
-    tail has at most `TAIL_POINTS` radii, while ``wanted`` is from all draws. Raises ValueError without draws.
-    """
-    if not radius_rad.size:
-        raise ValueError("a tail of no draws: at least one run has to have succeeded")
-    order, draws = np.argsort(radius_rad, kind="stable"), radius_rad.size
-    radius, weight = radius_rad[order], np.exp(log_weight[order])
-    share = np.cumsum(weight[::-1])[::-1] / draws
-    spread = np.maximum(np.cumsum(weight[::-1] ** 2)[::-1] / draws - share**2, 0.0) / max(draws - 1, 1)
-    band = _band(share, _size(share, spread), draws, confidence)
-    wanted = {p: _radius(radius, band, p, confidence) for p in probabilities}
-    even = np.linspace(radius[0], radius[-1], TAIL_POINTS)
-    shown = np.unique(np.minimum(np.searchsorted(radius, even), draws - 1))
-    return Tail(
-        radius_rad=radius[shown],
-        survival=band.share[shown],
-        low=band.low[shown],
-        high=band.high[shown],
-        wanted=wanted,
-        confidence=confidence,
-        method=f"importance sampling of the noise in {draws} runs",
-        effective_runs=_effective(band, wanted),
-    )
-
-
-@dataclass(frozen=True, slots=True)
-class _Band:
-    """Falling shares with the ends of their intervals, and the number of independent errors that know them as well."""
-
-    share: Floats
-    low: Floats
-    high: Floats
-    size: Floats
-
-
-def _band(share: Floats, size: Floats, rows: int, confidence: float) -> _Band:
-    share, size = np.clip(share, 0.0, 1.0), np.where(np.isnan(size), float(rows), size)
-    normal = _student(confidence, math.inf)
-    few = (normal / _student(confidence, rows - 1)) ** 2 if rows > 1 else 1.0
-    low, high = _binomial_band(share * size * few, size * few, confidence)
-    # a share is no less than one further out and no more than one further in, so neither are the ends of its interval
-    return _Band(share, np.maximum.accumulate(low[::-1])[::-1], np.minimum.accumulate(high), size)
-
-
-def _size(share: Floats, variance: Floats) -> Floats:
-    """Independent errors that would know a share as well; nan where none or all exceed."""
-    known = (share > 0.0) & (share < 1.0)
-    some = share * (1.0 - share)
-    return np.where(known, some / np.maximum(variance, np.abs(some) / _MOST + 1e-300), math.nan)
-
-
-def _held(share: Floats, size: Floats) -> Floats:
-    """The sizes, no larger in the tail than at the last share that enough events have told of."""
-    with np.errstate(invalid="ignore"):
-        told = np.flatnonzero((size * share >= _ENOUGH) & (size * (1.0 - share) >= _ENOUGH))
-    if not told.size:
-        return size
-    nearest = told[np.clip(np.searchsorted(told, np.arange(size.size), side="right") - 1, 0, told.size - 1)]
-    return np.fmin(size, size[nearest])
-
-
-def _radius(radius_rad: Floats, band: _Band, probability: float, confidence: float) -> Interval:
-    value, low, high = (_crossing(radius_rad, falling, probability) for falling in (band.share, band.low, band.high))
-    return Interval(value, low, high, confidence)
-
-
-def _crossing(radius_rad: Floats, falling: Floats, probability: float) -> float:
-    """Radius where a falling share reaches a probability; nan where it does not.
-
-    Between two radii its logarithm is linear in the square of the radius, as that of Rayleigh's distribution is; next
-    to a share of 0 it is itself linear.
-    """
-    if not falling.size or falling[0] < probability or falling[-1] > probability:
-        return math.nan
-    at = min(max(int(np.count_nonzero(falling > probability)), 1), falling.size - 1)
-    before, behind = float(falling[at - 1]), float(falling[at])
-    if before == behind:
-        return float(radius_rad[at])
-    if behind > 0.0:
-        inside = math.log(before / probability) / math.log(before / behind)
-    else:
-        inside = (before - probability) / before
-    low, high = float(radius_rad[at - 1]) ** 2, float(radius_rad[at]) ** 2
-    return math.sqrt(low + min(max(inside, 0.0), 1.0) * (high - low))
-
-
-def _effective(band: _Band, wanted: dict[float, Interval]) -> float:
-    """Independent errors that would know as well the smallest probability with a known radius; nan without any."""
-    known = [probability for probability, radius in wanted.items() if not math.isnan(radius.value)]
-    return float(band.size[max(int(np.count_nonzero(band.share > min(known))) - 1, 0)]) if known else math.nan

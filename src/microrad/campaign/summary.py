@@ -1,17 +1,18 @@
 """What the rows of a ledger say together, read chunk by chunk and always in their order: the same each time."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
 from microrad import kernels
-from microrad.campaign import bundle, plan, statistics
+from microrad.campaign import bundle, plan, statistics, tails
 from microrad.campaign.file import CampaignFile
-from microrad.campaign.ledger import Ledger, is_written
-from microrad.campaign.outputs import Output
+from microrad.campaign.ledger import Ledger
+from microrad.campaign.ledger_file import is_written
+from microrad.campaign.outputs import OUTPUTS, RADIUS, Output
 from microrad.campaign.records import (
     CampaignSummary,
     CellSummary,
@@ -24,9 +25,11 @@ from microrad.campaign.records import (
     Progress,
     Sensitivity,
     Tail,
+    WorstTrace,
 )
 from microrad.campaign.statistics import Fold, Moments
 from microrad.fine_loop.ensemble import bin_edges_rad
+from microrad.units import format_quantity
 
 CONFIDENCE = 0.95
 """Of every interval, but for those that the campaign file asks for."""
@@ -53,6 +56,12 @@ class _Cell:
     survival: Floats = field(default_factory=lambda: np.zeros(kernels.BINS))
     survival_square: Floats = field(default_factory=lambda: np.zeros(kernels.BINS))
     tilted: list[tuple[Floats, Floats]] = field(default_factory=list)
+
+    @property
+    def worth(self) -> float:
+        """Rows of equal weight that would know a mean as well (Kish, Survey Sampling, 1965)."""
+        weights = next(iter(self.outputs.values())).moments
+        return weights.weight**2 / weights.weight_square if weights.count else 0.0
 
 
 def missed(limit: Limit, values: Floats) -> Floats:
@@ -105,10 +114,10 @@ def _tail(campaign: CampaignFile, cell: _Cell) -> Tail | None:
     if wanted is not None and cell.good:
         radius, log_weight = (np.concatenate(part) for part in zip(*cell.tilted, strict=True))
         known = np.isfinite(radius)
-        return statistics.tail_weighted(radius[known], log_weight[known], (wanted.probability,), 0.99)
+        return tails.tail_weighted(radius[known], log_weight[known], (wanted.probability,), 0.99, (wanted.error_rad,))
     if campaign.table.loop is None or not cell.good:
         return None
-    return statistics.tail_of_time(cell.survival, cell.survival_square, cell.good, bin_edges_rad(), TAIL_SHARES, 0.99)
+    return tails.tail_of_time(cell.survival, cell.survival_square, cell.good, bin_edges_rad(), TAIL_SHARES, 0.99)
 
 
 def reached(campaign: CampaignFile, book: Ledger, cell: int, rows: int) -> bool:
@@ -123,16 +132,41 @@ def precision(campaign: CampaignFile, read: _Cell) -> Interval:
     """The quantile that the campaign wants to know, as well as it is known."""
     wanted = campaign.table.precision
     assert wanted is not None
-    if wanted.output == "radius":
+    if wanted.output == RADIUS:
         return _time_tail(read, 1.0 - wanted.quantile, wanted.confidence)
     return statistics.quantile_interval(read.outputs[wanted.output].sketch, wanted.quantile, wanted.confidence)
 
 
 def _time_tail(read: _Cell, probability: float, confidence: float) -> Interval:
-    tail = statistics.tail_of_time(
+    tail = tails.tail_of_time(
         read.survival, read.survival_square, read.good, bin_edges_rad(), (probability,), confidence
     )
     return tail.wanted[probability]
+
+
+def _precision_words(campaign: CampaignFile, read: _Cell, values: Mapping[str, str]) -> list[str]:
+    """How well the wanted quantile is known, and whether that is enough."""
+    wanted = campaign.table.precision
+    if wanted is None or not read.good:
+        return []
+    found = precision(campaign, read)
+    unit = "rad" if wanted.output == RADIUS else OUTPUTS[wanted.output].unit
+    value, low, high, half = (
+        "unknown" if math.isnan(x) else format_quantity(x, unit, 4) if unit else f"{x:.4g}"
+        for x in (found.value, found.low, found.high, campaign.half_width)
+    )
+    where = "".join(f" with {key} = {text}" for key, text in values.items())
+    enough = (found.high - found.low) / 2.0 <= campaign.half_width
+    said = f"as precise as asked for (± {half})" if enough else f"NOT as precise as asked for (± {half})"
+    return [
+        f"{100 * wanted.quantile:g} % quantile of {wanted.output}{where}: {value}, {low} to {high} at "
+        f"{100 * wanted.confidence:g} % confidence; {said}."
+    ]
+
+
+def _worst_first(campaign: CampaignFile, traces: tuple[WorstTrace, ...]) -> tuple[WorstTrace, ...]:
+    sign = -1.0 if campaign.limits and campaign.limits[0].most is not None else 1.0
+    return tuple(sorted(traces, key=lambda trace: (trace.cell, sign * trace.value, trace.row)))
 
 
 # -------------------------------------------------------------------------------------------------------------- summary
@@ -143,10 +177,12 @@ def summarise(path: Path) -> CampaignSummary:
         opened = bundle.opened(head.bundle, any_code=True)
         campaign = opened.campaign
         of = plan.outputs(campaign)
-        cells, failed, sample = [], [], _Sample(campaign, book)
+        cells, reads, failed, findings, sample = [], [], [], [], _Sample(campaign, book)
         for number, values in enumerate(campaign.cells):
             read = _read(campaign, sample.passing(number))
+            reads.append(read)
             failed += [(number, each) for each in read.failed]
+            findings += _precision_words(campaign, read, values)
             cells.append(
                 CellSummary(
                     values=dict(values),
@@ -171,10 +207,11 @@ def summarise(path: Path) -> CampaignSummary:
             cells=tuple(cells),
             sensitivities=_sensitivities(campaign, book),
             sample=sample.columns(),
-            worst=book.traces(),
+            worst=_worst_first(campaign, book.traces()),
             failed=tuple(failed[:MOST_FAILED]),
             progress=_progress(campaign, cells, notes, is_written(path)),
-            warnings=_warnings(campaign, cells),
+            warnings=_warnings(campaign, cells, reads),
+            findings=tuple(findings),
         )
 
 
@@ -246,11 +283,27 @@ def _progress(campaign: CampaignFile, cells: list[CellSummary], notes: dict[str,
     return Progress(done, total, seconds, rate, left, state)  # type: ignore[arg-type]
 
 
-def _warnings(campaign: CampaignFile, cells: list[CellSummary]) -> tuple[str, ...]:
+_EXTRAPOLATED = {
+    "beyond_rate_share": "In some rows the mirror moves faster than the records that its model was identified from.",
+    "outside_share": "In some rows the drive leaves the range that the mirror's model was identified in.",
+}
+
+
+def _largest(cells: list[CellSummary], name: str) -> float:
+    """Largest value of an output in any row, 0 where it is not kept."""
+    return max((cell.outputs[name].most for cell in cells if name in cell.outputs), default=0.0)
+
+
+def _warnings(campaign: CampaignFile, cells: list[CellSummary], reads: list[_Cell]) -> tuple[str, ...]:
     found = list(campaign.warnings)
     failed, rows = sum(cell.failed for cell in cells), sum(cell.rows for cell in cells)
     if failed:
         found.append(f"{failed} of {rows} rows have no result; the figures are those of the others.")
+    found += [words for name, words in _EXTRAPOLATED.items() if _largest(cells, name) > 0.0]
     if any(draw.drawn_as is not None for draw in campaign.draws):
-        found.append("Some inputs are drawn from another distribution than their own and weighted back.")
+        worth = min((cell.worth for cell in reads if cell.good), default=math.nan)
+        found.append(
+            "Some inputs are drawn from another distribution than their own and weighted back: for a mean the rows are "
+            f"worth {worth:.3g} equal ones."
+        )
     return tuple(found)

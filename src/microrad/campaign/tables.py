@@ -1,5 +1,6 @@
 """The tables of a campaign file, as `microrad.campaign.file` reads them."""
 
+from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
 from pydantic import Field
@@ -11,6 +12,16 @@ MOST_RUNS = 2**32
 """Runs of a cell, rows times realisations: the number of a run is one word of its noise stream's counter."""
 
 Seconds = Annotated[float, Quantity("s", "s", above=0.0, most=1e9)]
+
+
+@dataclass(frozen=True, slots=True)
+class _Mostly(Share):
+    """A share of rows, or of the time, that is most of it."""
+
+    @property
+    def example(self) -> str:
+        """Such a share."""
+        return "0.99"
 
 
 class LoopTable(Table):
@@ -35,10 +46,10 @@ class LimitTable(Table):
 class PrecisionTable(Table):
     """When to stop: once the interval of a quantile is narrow enough."""
 
-    output: Name
-    quantile: Annotated[float, Share("")]
+    output: Name = Field(description='an output of the rows, or "radius", the radial error over the time of all rows')
+    quantile: Annotated[float, _Mostly("")]
     half_width: Any
-    confidence: Annotated[float, Share("")]
+    confidence: Annotated[float, _Mostly("")]
     at_most: Annotated[int, Whole("", least=1, most=MOST_RUNS)] = Field(description="rows of a cell")
 
 
@@ -60,7 +71,7 @@ class OptimiseTable(Table):
     """What an optimisation changes, and what for."""
 
     minimise: Name = Field(description="a variable or an output; with - before it, it is maximised")
-    confidence: Annotated[float, Share("")] = Field(description="share of the rows that keep each limit")
+    confidence: Annotated[float, _Mostly("")] = Field(description="share of the rows that keep each limit")
     rows: Annotated[int, Whole("", least=16, most=1_000_000)]
     evaluations: Annotated[int, Whole("", least=1, most=100_000)]
     variables: dict[str, VariableTable]

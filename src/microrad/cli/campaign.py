@@ -1,5 +1,8 @@
 """Commands of campaigns: run, look, go on, verify, export, draw, optimise."""
 
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -17,6 +20,7 @@ from microrad.cli.frame import (
     check_target,
     command,
     examples,
+    interrupted,
     json_text,
     option,
     progress_bar,
@@ -42,6 +46,8 @@ campaigns = typer.Typer(
 )
 app.add_typer(campaigns)
 
+_LINE_S = 30.0  # between two lines of progress in a log
+
 _File = Annotated[Path, typer.Argument(help="Campaign file; microrad campaign init writes one.", metavar="FILE")]
 _Ledger = Annotated[Path, typer.Argument(help="Ledger that microrad campaign run wrote.", metavar="LEDGER")]
 _Threads = Annotated[int | None, option("--threads", "N", "Threads of this machine [default: all].", min=1)]
@@ -51,12 +57,45 @@ _Scheduler = Annotated[
 ]
 
 
+_PAGE = b"<!DOCTYPE html>"
+_BEGINS = {".csv": b"cell,", ".parquet": b"PAR1", ".nc": b"\x89HDF"}  # as what microrad exports does
+_ADDRESS = re.compile(r"((tcp|tls|ucx|ws|wss)://)?[^/\s]+:\d{1,5}")  # those that Dask knows
+
+
 def _means(threads: int | None, workers: int | None, scheduler: str | None) -> "Means":
     if sum(each is not None for each in (threads, workers, scheduler)) > 1:
         raise Refusal("--threads, --workers and --scheduler exclude each other; give one of them.")
+    if scheduler is not None and not _ADDRESS.fullmatch(scheduler):
+        raise Refusal(f"--scheduler {scheduler!r} is no address; `dask scheduler` prints its own, tcp://head:8786 say.")
     from microrad.campaign.run import Means
 
     return Means(threads, workers, scheduler)
+
+
+def _check_output(file: Path, overwrite: bool) -> None:
+    """Refuse to replace anything but, if asked to, a file that begins as those of its kind that microrad writes."""
+    if not overwrite:
+        check_target(file, "choose another name, or replace it with --overwrite")
+    elif file.is_file():
+        with file.open("rb") as old:
+            first = old.read(16)
+        if first and not first.startswith(_BEGINS.get(file.suffix.lower(), _PAGE)):
+            raise Refusal(f"{file} was not written by microrad and is left as it is; choose another name.")
+
+
+@contextmanager
+def _kept(path: Path) -> Iterator[None]:
+    """Within it, an interrupt that says nothing itself says what is in the ledger and how to go on."""
+    try:
+        yield
+    except (Exception, KeyboardInterrupt) as error:
+        said = isinstance(error, KeyboardInterrupt) and str(error)
+        if not interrupted(error) or said or not path.is_file():
+            raise
+        from microrad.campaign.ledger_file import argument
+
+        words = f"stopped; finished rows are in {path}. Go on with: microrad campaign resume {argument(path)}"
+        raise KeyboardInterrupt(words) from None
 
 
 def _shown(path: Path, as_json: bool, output: str = "") -> Outcome:
@@ -82,13 +121,15 @@ def init(
     """
     from importlib import resources
 
+    from microrad.campaign.ledger_file import argument
+
     file = file or Path("campaign.toml")
     check_target(file, "name another one: microrad campaign init other.toml")
     shipped, mission = resources.files("microrad").joinpath("missions"), file.with_name("leo-geo.toml")
     if not mission.exists():
         write_whole(mission, shipped.joinpath("leo-geo.toml").read_text("utf-8"))
     write_whole(file, shipped.joinpath("campaign.toml").read_text("utf-8"))
-    return Outcome(f"{file} written, for {mission}. Next: microrad campaign run {file}")
+    return Outcome(f"{file} written, for {mission}. Next: microrad campaign run {argument(file)}")
 
 
 @campaigns.command(
@@ -117,11 +158,12 @@ def run(
     """
     from microrad.campaign.run import begin
 
-    path = ledger or file.with_suffix(".ledger")
     means = _means(threads, workers, scheduler)
-    with progress_bar() as progress:
-        begin(file, path, means, progress)
-    return _shown(path, as_json)
+    path = ledger or file.parent / f"{file.stem}.ledger"
+    with _kept(path):
+        with progress_bar(_LINE_S) as progress:
+            begin(file, path, means, progress)
+        return _shown(path, as_json)
 
 
 @campaigns.command(epilog=examples("microrad campaign resume campaign.ledger"))
@@ -140,15 +182,19 @@ def resume(
     from microrad.campaign.run import resume as go_on
 
     means = _means(threads, workers, scheduler)
-    with progress_bar() as progress:
-        go_on(ledger, means, progress)
-    return _shown(ledger, as_json)
+    with _kept(ledger):
+        with progress_bar(_LINE_S) as progress:
+            go_on(ledger, means, progress)
+        return _shown(ledger, as_json)
 
 
 @campaigns.command(epilog=examples("microrad campaign status campaign.ledger"))
 @command
 def status(ledger: _Ledger, as_json: Json = False) -> Outcome:
-    """Print how far a campaign is and what its rows say so far; it may be running meanwhile."""
+    """Print how far a campaign is and what its rows say so far; it may be running meanwhile.
+
+    The exit code is 0 when it is complete and its rows keep all limits, and 1 otherwise.
+    """
     return _shown(ledger, as_json)
 
 
@@ -159,16 +205,17 @@ def verify(ledger: _Ledger, as_json: Json = False) -> Outcome:
 
     The exit code is 1 when something is damaged; microrad campaign resume does just that again.
     """
-    from microrad.campaign import ledger as books
+    from microrad.campaign import mending
+    from microrad.campaign.ledger_file import argument
 
-    found = books.verify(ledger)
+    found = mending.verify(ledger)
     if as_json:
         return Outcome(json_text({**asdict(found), "sound": found.sound}), int(not found.sound))
     lines = [f"{found.checked} chunks with a right checksum"]
     lines += [f"damaged: chunk {number} of cell {cell}" for cell, number in found.damaged]
     lines += [f"damaged: {fault}" for fault in found.faults]
     if not found.sound:
-        lines.append(f"Next: microrad campaign resume {ledger} does again what is damaged, and nothing else")
+        lines.append(f"Next: microrad campaign resume {argument(ledger)} does again what is damaged, and nothing else")
     return Outcome("\n".join(lines), int(not found.sound))
 
 
@@ -189,8 +236,7 @@ def export(
     from microrad.campaign.export import export as write
     from microrad.campaign.ledger import Ledger
 
-    if not overwrite:
-        check_target(file, "choose another name, or replace it with --overwrite")
+    _check_output(file, overwrite)
     with Ledger.open(ledger, write=False) as book:
         write(book, file)
     return Outcome(str(file))
@@ -209,9 +255,8 @@ def report(
     from microrad.campaign.summary import summarise
     from microrad.report import campaign_page
 
-    file = file or ledger.with_suffix(".html")
-    if not overwrite:
-        check_target(file, "choose another name, or replace it with --overwrite")
+    file = file or ledger.parent / f"{ledger.stem}.html"
+    _check_output(file, overwrite)
     write_whole(file, campaign_page.html(summarise(ledger)))
     return Outcome(str(file))
 
@@ -222,14 +267,15 @@ def optimise(file: _File, threads: _Threads = None, as_json: Json = False) -> Ou
     """Find the design of least cost whose rows keep the limits often enough.
 
     The table optimise of the campaign file says what may change. The optimum is checked with rows that the search has
-    not seen. The exit code is 0 when it keeps the limits there, too, and 1 when it does not.
+    not seen. The exit code is 0 when these agree (the 95 % interval of the share of them that keeps each limit reaches
+    optimise.confidence, the share that is wanted), and 1 when they do not or no design keeps the limits.
     """
     from microrad.campaign import search
     from microrad.report import campaign_optimum
 
-    with progress_bar() as progress:
+    with progress_bar(_LINE_S) as progress:
         found = search.run(file, threads, progress)
-    code = CLOSES if found.feasible and found.fresh is not None and found.fresh.feasible else DOES_NOT_CLOSE
+    code = CLOSES if found.confirmed else DOES_NOT_CLOSE
     if as_json:
         return Outcome(json_text(campaign_optimum.data(found)), code)
     return Outcome(campaign_optimum.text(found), code)

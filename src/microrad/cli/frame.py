@@ -15,6 +15,7 @@ import shutil
 import signal
 import sys
 import threading
+import time
 import traceback
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -135,7 +136,7 @@ def say(message: str) -> None:
 
 def _failed(error: BaseException) -> int:
     """Say what went wrong, on stderr; returns the exit code."""
-    if _interrupted(error):
+    if interrupted(error):
         said = str(error) if isinstance(error, KeyboardInterrupt) else ""
         say(said or "interrupted, nothing was written")
         return INTERRUPTED
@@ -151,7 +152,7 @@ def _failed(error: BaseException) -> int:
     return BUG
 
 
-def _interrupted(error: BaseException | None) -> bool:
+def interrupted(error: BaseException | None) -> bool:
     """Whether an interrupt is behind an error: one that falls into an import comes out as another error."""
     while error is not None and not isinstance(error, KeyboardInterrupt):
         error = error.__cause__ or error.__context__
@@ -178,11 +179,24 @@ def _finite(data: Any) -> Any:
     return None if isinstance(data, float) and not math.isfinite(data) else data
 
 
+def _progress_lines(every_s: float) -> OnProgress:
+    """Progress for a log: a line now and then, none in the first interval."""
+    last_s = time.monotonic()
+
+    def say_now_and_then(done: int, total: int, what: str) -> None:
+        nonlocal last_s
+        if time.monotonic() - last_s >= every_s:
+            last_s = time.monotonic()
+            say(f"{done} of {total}: {what}")
+
+    return say_now_and_then
+
+
 @contextlib.contextmanager
-def progress_bar() -> Iterator[OnProgress]:
-    """A bar on stderr while something is computed, where stderr is a terminal."""
+def progress_bar(line_s: float = math.inf) -> Iterator[OnProgress]:
+    """A bar on stderr while something is computed, where stderr is a terminal; a line every ``line_s`` elsewhere."""
     if not (sys.stderr and sys.stderr.isatty()):
-        yield lambda done, total, what: None
+        yield _progress_lines(line_s)
         return
     from rich.console import Console
     from rich.progress import Progress

@@ -4,7 +4,7 @@ import math
 import zlib
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cache, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -89,11 +89,14 @@ class Ensemble:
         return float(np.mean(self.counts[:, counter])) / max(times, 1)  # no reading in a short run: none lost
 
 
+@cache
 def bin_edges_rad() -> Floats:
-    """Edges of the histogram's bins of the radial error, BINS + 1 of them."""
+    """Edges of the histogram's bins of the radial error, BINS + 1 of them; not to be written to."""
     octave, part = np.divmod(np.arange(kernels.BINS + 1), 1 << kernels.BINS_OCTAVE_BITS)
     squares = 2.0 ** (octave + kernels.BINS_LOWEST_OCTAVE) * (1.0 + part / (1 << kernels.BINS_OCTAVE_BITS))
-    return np.asarray(np.sqrt(squares))
+    edges = np.sqrt(squares)
+    edges.flags.writeable = False
+    return np.asarray(edges)
 
 
 def histogram_quantile(counts: NDArray[np.integer], share: float) -> float:

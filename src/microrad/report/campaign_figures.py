@@ -22,47 +22,18 @@ from microrad.campaign.records import (
     Tail,
     WorstTrace,
 )
+from microrad.report import campaign_numbers as numbers
+from microrad.report import campaign_tables as tables
 from microrad.report import campaign_words as words
+from microrad.report.campaign_axes import Scale, label_of, logarithm, scale_of, svg_of
 from microrad.report.day_figures import GREY, PLAIN, WIDTH, short
-from microrad.report.figures import BLACK, BLUE, GREEN, ORANGE, SKY, VERMILION, Figure, Floats, svg_of, thin
-from microrad.units import UnitError, format_quantity, parse_quantity
+from microrad.report.figures import BLACK, BLUE, GREEN, ORANGE, SKY, VERMILION, Figure, Floats, thin
 
 MOST_INPUTS, MOST_CELLS, MOST_POINTS = 14, 40, 1500
 _ACROSS = 3  # panels beside each other
-_LABEL = 30  # characters
 _SMALL: dict[str, Any] = {"fontsize": 8}
 _LIMIT: dict[str, Any] = {"color": VERMILION, "linestyle": (0, (5, 2)), "linewidth": 1.4}
 _MARKED = ((BLACK, "-"), (GREEN, "--"), (ORANGE, "-."), (BLACK, ":"), (GREY, (0, (8, 2, 2, 2))))
-
-
-class Scale(NamedTuple):
-    """How values of an axis are shown: multiplied by ``factor``, then in the unit ``label``."""
-
-    factor: float
-    label: str
-
-    def title(self, name: str) -> str:
-        """The axis's title."""
-        return f"{name} ({self.label})" if self.label else name
-
-
-def scale_of(values: Floats, unit: str, name: str = "") -> Scale:
-    """The prefix of the unit, or per cent, that suits the largest of the values."""
-    finite = np.abs(values[np.isfinite(values)])
-    largest = float(finite.max()) if finite.size else 0.0
-    if words.is_share(name, unit):
-        return Scale(100.0, "%") if largest >= 1e-3 else Scale(1.0, "share")
-    if unit in ("", "1") or unit.startswith("dB"):
-        return Scale(1.0, unit if unit != "1" else "")
-    if unit == "s":
-        seconds, label = next(((s, u) for s, u in ((3600.0, "h"), (60.0, "min")) if largest >= 2.0 * s), (1.0, "s"))
-        return Scale(1.0 / seconds, label)
-    factor, unit = (0.125, "B") if unit == "bit" else (1.0, unit)
-    label = format_quantity(factor * largest, unit).partition(" ")[2]
-    try:
-        return Scale(factor / parse_quantity(f"1 {label}", unit), label)
-    except UnitError:
-        return Scale(factor, unit)
 
 
 def limit_of(summary: CampaignSummary, output: str) -> Limit | None:
@@ -77,19 +48,6 @@ def _bounds(limit: Limit | None) -> list[tuple[str, float]]:
     return [(side, bound) for side, bound in (("least", limit.least), ("most", limit.most)) if bound is not None]
 
 
-def label_of(key: str, keys: Sequence[str]) -> str:
-    """The end of a dotted key that tells it from the others, two parts at least, on lines that leave room for data."""
-    parts = key.split(".")
-    for count in range(2, len(parts)):
-        tail_ = ".".join(parts[-count:])
-        if sum(other == tail_ or other.endswith(f".{tail_}") for other in keys) == 1:
-            break
-    else:
-        count = len(parts)
-    whole = short(".".join(parts[-count:]), 90)
-    return textwrap.fill(whole.replace(".", ". "), _LABEL, max_lines=2, placeholder="…").replace(". ", ".")
-
-
 # ------------------------------------------------------------------------------------------------------- distributions
 @rc_context(PLAIN)
 def distribution(output: OutputSummary, limit: Limit | None) -> Figure:
@@ -101,17 +59,18 @@ def distribution(output: OutputSummary, limit: Limit | None) -> Figure:
     edges = output.edges * scale.factor
     axes.stairs(shares, edges, fill=True, color=SKY)
     axes.stairs(shares, edges, color=BLUE, linewidth=0.8)
-    chosen = words.chosen_quantiles([output], len(_MARKED))
+    chosen = tables.chosen_quantiles([output], len(_MARKED))
     styles = dict(zip(sorted(chosen, key=lambda p: abs(p - 0.5)), _MARKED, strict=False))
     for p in chosen:
         found, (colour, line) = output.quantiles[p], styles[p]
-        if math.isfinite(found.value):
-            label = f"{100.0 * p:.6g} %: {words.value(found.value, output.unit, output.name)}"
+        if tables.is_known(found):
+            label = f"{100.0 * p:.6g} %: {numbers.value(found.value, output.unit, output.name)}"
             axes.axvline(found.value * scale.factor, color=colour, linestyle=line, linewidth=1.1, label=label)
     _mark_limits(axes, limit, output, scale)
-    axes.set(xlabel=scale.title(output.name), ylabel="rows (%)")
+    axes.set(xlabel=scale.title(numbers.label(output.name)), ylabel="rows (%)")
     axes.set_ylim(bottom=0.0)
-    canvas.legend(loc="outside right upper", **_SMALL)
+    if axes.get_legend_handles_labels()[0]:  # few rows know no quantile
+        canvas.legend(loc="outside right upper", **_SMALL)
     columns = {
         f"{output.name}, lower edge ({output.unit})": output.edges[:-1],
         f"{output.name}, upper edge ({output.unit})": output.edges[1:],
@@ -120,22 +79,16 @@ def distribution(output: OutputSummary, limit: Limit | None) -> Figure:
     caption = (
         f"{output.meaning[:1].upper()}{output.meaning[1:]}: share of the rows in each bin, and quantiles over them."
     )
-    return Figure(f"campaign-{output.name}", f"Distribution of {output.name}", caption, svg_of(canvas), columns)
-
-
-def _logarithm(axes: Axes, which: str) -> None:
-    """Make an axis logarithmic, its decades in plain text."""
-    (axes.set_xscale if which == "x" else axes.set_yscale)("log")
-    axis = axes.xaxis if which == "x" else axes.yaxis
-    axis.set_major_formatter(lambda x, _: f"{x:g}" if 1e-3 < x < 1e4 else words.power(x))
-    axis.set_minor_formatter(lambda x, _: "")
+    return Figure(
+        f"campaign-{output.name}", f"Distribution of {numbers.label(output.name)}", caption, svg_of(canvas), columns
+    )
 
 
 def _mark_limits(axes: Axes, limit: Limit | None, output: OutputSummary, scale: Scale) -> None:
     """The limit as a line with the side that misses it shaded; in words alone where it is far from all rows."""
     reach = output.edges[-1] - output.edges[0]
     for side, bound in _bounds(limit):
-        label = f"limit {words.SYMBOL[side]} {words.value(bound, output.unit, output.name)}"
+        label = f"limit {numbers.SYMBOL[side]} {numbers.bound(bound, output.unit, output.name)}"
         if output.edges[0] - reach <= bound <= output.edges[-1] + reach:
             axes.axvline(bound * scale.factor, label=label, **_LIMIT)
             low, high = axes.get_xlim()
@@ -160,7 +113,7 @@ def tail(summary: CampaignSummary, cell: CellSummary) -> tuple[Figure, ...]:
         axes.plot(x, y, color=GREY, linewidth=0.7, label="other combinations" if k == 0 else None)
     columns = _tail_band(axes, cell)
     _tail_marks(axes, summary, cell.tail)
-    _logarithm(axes, "y")
+    logarithm(axes, "y")
     axes.set(xlabel="radial error (µrad)", ylabel="probability of a larger one")
     axes.set_xlim(left=0.0)
     axes.set_ylim(_floor(cell.tail), 1.0)
@@ -196,15 +149,15 @@ def _tail_marks(axes: Axes, summary: CampaignSummary, found: Tail) -> None:
         found.wanted.items(), zip(cycle((VERMILION, GREEN, BLACK)), cycle("osD")), strict=False
     ):
         if math.isfinite(radius.value):
-            span = None if not words.ends(radius, "rad") else _arms([radius], 1e6)
-            label = f"{words.share(p)}: {words.value(radius.value, 'rad')}"
+            span = None if not numbers.ends(radius, "rad") else _arms([radius], 1e6)
+            label = f"{numbers.share(p)}: {numbers.value(radius.value, 'rad')}"
             axes.errorbar(radius.value * 1e6, p, xerr=span, fmt=marker, color=colour, capsize=3, label=label, zorder=4)
     limits = [limit for limit in summary.limits if limit.most is not None and limit.output.startswith("residual")]
     for bound in sorted({limit.most for limit in limits if limit.most is not None})[:1]:
         if bound <= 2.0 * float(found.radius_rad[found.survival > 0.0].max()):
-            axes.axvline(bound * 1e6, label=f"limit ≤ {words.value(bound, 'rad')}", **_LIMIT)
+            axes.axvline(bound * 1e6, label=f"limit ≤ {numbers.bound(bound, 'rad')}", **_LIMIT)
         else:
-            axes.plot([], [], label=f"limit ≤ {words.value(bound, 'rad')},\nfar from here", **_LIMIT)
+            axes.plot([], [], label=f"limit ≤ {numbers.bound(bound, 'rad')},\nfar from here", **_LIMIT)
 
 
 def _floor(found: Tail) -> float:
@@ -222,10 +175,10 @@ def _arms(found: Sequence[Interval], factor: float = 1.0) -> NDArray[np.float64]
 # --------------------------------------------------------------------------------------------------------- sensitivity
 def sensitivity(summary: CampaignSummary) -> tuple[Figure, ...]:
     """Sobol indices of the inputs, a panel for each output; outputs that no input moves have none."""
-    found = [s for s in summary.sensitivities if words.ranked(s)]
+    found = [s for s in summary.sensitivities if tables.ranked(s)]
     if not found:
         return ()
-    size = {key: max(dict(words.ranked(s)).get(key, _NONE).value for s in found) for s in found for key in s.first}
+    size = {key: max(dict(tables.ranked(s)).get(key, _NONE).value for s in found) for s in found for key in s.first}
     keys = sorted(size, key=lambda key: -size[key])
     groups = [found[k : k + _ACROSS] for k in range(0, len(found), _ACROSS)]
     return tuple(_sensitivity(group, keys, size, k + 1, summary) for k, group in enumerate(groups))
@@ -300,8 +253,11 @@ def _known(interval: Interval) -> bool:
 
 # ------------------------------------------------------------------------------------------------------ failure region
 @rc_context(PLAIN)
-def region(summary: CampaignSummary, limit: Limit, number: int, inputs: Sequence[str]) -> Figure:
-    """Rows of a cell that keep and that miss a limit, over two inputs, or over one with the output beside it."""
+def region(summary: CampaignSummary, limit: Limit, number: int, inputs: Sequence[str], note: str = "") -> Figure:
+    """Rows of a cell that keep and that miss a limit, over two inputs, or over one with the output beside it.
+
+    ``note`` ends the caption.
+    """
     cell, units = summary.cells[number], {each.key: each.unit for each in summary.inputs}
     rows = np.flatnonzero(summary.sample["cell"] == number)
     rows = rows[:: max(-(-rows.size // MOST_POINTS), 1)]
@@ -309,15 +265,22 @@ def region(summary: CampaignSummary, limit: Limit, number: int, inputs: Sequence
     output = cell.outputs[limit.output]
     axes_of = [(label_of(key, list(units)), columns[key], units.get(key, "")) for key in inputs]
     if len(inputs) == 1:
-        axes_of.append((limit.output, columns[limit.output], output.unit))
+        axes_of.append((numbers.label(limit.output), columns[limit.output], output.unit))
     svg = _scatter(axes_of, limit, columns[limit.output], output, second=len(inputs) == 1)
     of = f" of {cell.label}" if cell.values else ""
     caption = (
-        f"{rows.size} rows{of}: those that keep {words.limit_text(limit, output.unit)} and those that miss it, over "
-        f"{' and '.join(inputs)}, {'the inputs that matter' if len(inputs) > 1 else 'the input that matters'} most to "
-        f"it. Of all rows {words.share(cell.missed_by[limit.output].value)} miss it."
+        f"{rows.size} rows{of}: those that keep {numbers.limit_text(limit, output.unit)} and those that miss it, over "
+        f"{' and '.join(inputs)}{_mattering(summary, limit.output, inputs)}. Of all rows "
+        f"{numbers.share(cell.missed_by[limit.output].value)} miss it.{note}"
     )
-    return Figure("campaign-region", f"Where {limit.output} misses its limit", caption, svg, columns)
+    return Figure("campaign-region", f"Where {numbers.label(limit.output)} misses its limit", caption, svg, columns)
+
+
+def _mattering(summary: CampaignSummary, output: str, inputs: Sequence[str]) -> str:
+    """That the inputs matter most to an output, where that is known of each."""
+    if not set(inputs) <= set(words.leading(summary, output)):
+        return ""
+    return ", the inputs that matter most to it" if len(inputs) > 1 else ", the input that matters most to it"
 
 
 def _scatter(
@@ -338,13 +301,13 @@ def _scatter(
             axes.scatter(x[which], y[which], size, colour, marker=marker, label=label, linewidths=1.0)
     if second:
         for side, bound in _bounds(limit):
-            label = f"limit {words.SYMBOL[side]} {words.value(bound, output.unit, output.name)}"
+            label = f"limit {numbers.SYMBOL[side]} {numbers.bound(bound, output.unit, output.name)}"
             axes.axhline(bound * scales[1].factor, label=label, **_LIMIT)
     titles = [scale.title(name.replace("\n", "")) for (name, _, _), scale in zip(axes_of, scales, strict=True)]
     axes.set(xlabel=titles[0], ylabel=titles[1])
     for which_axis, (_, column, _) in zip("xy", axes_of, strict=True):
         if _wide(column):
-            _logarithm(axes, which_axis)
+            logarithm(axes, which_axis)
     canvas.legend(loc="outside right upper", **_SMALL)
     return svg_of(canvas)
 
@@ -378,7 +341,11 @@ def grid(summary: CampaignSummary) -> tuple[Figure, ...]:
     maps = len(keys) == 2 and min(map(len, levels)) > 1 and max(map(len, levels)) <= 12 and min(map(len, levels)) <= 8
     svg = _maps(summary, keys, levels, panels[:2]) if maps else _dots(summary, keys, panels)
     columns = {f"{p.name}, {what}": np.array([getattr(i, what) for i in p.of]) for p in panels for what in _WHAT}
-    shown = "a number in each field" if maps else "bars: intervals of a share, else from the 1 % to the 99 % quantile"
+    shown = (
+        "a number in each field"
+        if maps
+        else "bars: intervals of a share, else from the known quantiles nearest to 1 % and 99 %, or of all values"
+    )
     caption = f"Over {' and '.join(keys)}: {', '.join(p.name for p in panels[: 2 if maps else None])}; {shown}."
     if not maps and len(summary.cells) > MOST_CELLS:
         caption += f" The first {MOST_CELLS} of {len(summary.cells)} combinations."
@@ -390,22 +357,28 @@ def _panels(summary: CampaignSummary, cells: Sequence[CellSummary]) -> Iterator[
     limited = [limit.output for limit in summary.limits]
     unknown = Interval(math.nan, math.nan, math.nan, 0.0)
     if limited:
-        missed = [cell.missed if words.good(cell) else unknown for cell in cells]
+        missed = [cell.missed if tables.good(cell) else unknown for cell in cells]
         yield Panel("rows that miss a limit", Scale(100.0, "%"), missed)
     names = [name for name in dict.fromkeys(limited) if any(name in cell.outputs for cell in cells)]
     for name in (names or list(dict.fromkeys(o for cell in cells for o in cell.outputs)))[: _ACROSS - bool(limited)]:
         spans = [_span(cell.outputs[name]) if name in cell.outputs else unknown for cell in cells]
         every = np.array([[getattr(span, what) for what in _WHAT] for span in spans])
-        yield Panel(f"median {name}", scale_of(every, words.unit_of(summary, name), name), spans)
+        yield Panel(f"median {numbers.label(name)}", scale_of(every, tables.unit_of(summary, name), name), spans)
 
 
 def _span(output: OutputSummary) -> Interval:
-    """Median, with the quantiles nearest to 1 % and 99 % that are known."""
+    """Median, with the known quantiles nearest to 1 % and 99 %; with all values where none are known."""
     if not output.rows or 0.5 not in output.quantiles:
         return Interval(output.mean.value, output.least, output.most, 0.0)
-    low, high = (min(output.quantiles, key=lambda p: abs(p - end)) for end in (0.01, 0.99))
-    middle, first, last = (output.quantiles[p].value for p in (0.5, low, high))
-    return Interval(middle, first, last, 0.98)
+    known = [p for p, quantile in output.quantiles.items() if tables.is_known(quantile) and p != 0.5]
+    ends = {
+        p < 0.5: min((q for q in known if (q < 0.5) == (p < 0.5)), key=lambda q: abs(q - p), default=None)
+        for p in (0.01, 0.99)
+    }
+    low, high = ends[True], ends[False]
+    first = output.least if low is None else output.quantiles[low].value
+    last = output.most if high is None else output.quantiles[high].value
+    return Interval(output.quantiles[0.5].value, first, last, 0.98)
 
 
 def _dots(summary: CampaignSummary, keys: Sequence[str], panels: Sequence[Panel]) -> str:
@@ -429,7 +402,8 @@ def _dots(summary: CampaignSummary, keys: Sequence[str], panels: Sequence[Panel]
 def _limit_line(axes: Axes, summary: CampaignSummary, panel: Panel) -> None:
     """The limit of the output of a panel, where it is near what is drawn."""
     low, high = axes.get_xlim()
-    limit = limit_of(summary, panel.name.removeprefix("median "))
+    named = {f"median {numbers.label(limit.output)}": limit for limit in summary.limits}
+    limit = named.get(panel.name)
     for _, bound in _bounds(limit):
         if low - (high - low) <= bound * panel.scale.factor <= high + (high - low):
             axes.axvline(bound * panel.scale.factor, **_LIMIT)
@@ -474,7 +448,7 @@ def _field(axes: Axes, field: Floats) -> None:
 # --------------------------------------------------------------------------------------------------------------- worst
 @rc_context(PLAIN)
 def worst(summary: CampaignSummary, trace: WorstTrace, number: int) -> Figure:
-    """A row that an output is worst in: radial error and drive over time."""
+    """The ``number``-th worst row, from 1: radial error and drive over time."""
     canvas = Canvas(figsize=(WIDTH, 3.4), layout="constrained")
     above, below = canvas.subplots(2, 1, sharex=True, height_ratios=(1.3, 1))
     error = np.reshape(trace.error_rad, (trace.time_s.size, -1))
@@ -493,8 +467,25 @@ def worst(summary: CampaignSummary, trace: WorstTrace, number: int) -> Figure:
     below.set(xlabel="time (s)", ylabel="drive (V)")
     if drive.shape[1] > 1:
         canvas.legend(*below.get_legend_handles_labels(), loc="outside right lower", **_SMALL)
-    cell, unit = summary.cells[trace.cell], words.unit_of(summary, trace.output)
+    cell, unit = summary.cells[trace.cell], tables.unit_of(summary, trace.output)
     of = f" of {cell.label}" if cell.values else ""
-    caption = f"Row {trace.row}{of}, where {trace.output} is {words.value(trace.value, unit, trace.output)}."
-    caption += f" Its begin, up to {words.value(float(radial.max()), 'rad')}, is cut off." if cut else ""
-    return Figure(f"campaign-worst-{number}", f"Worst row {number} in time", caption, svg_of(canvas), columns)
+    found = numbers.value(trace.value, unit, trace.output)
+    caption = f"Row {trace.row}{of}: of its rows the {_rank(number)}in {trace.output}, {found}."
+    caption += " Shown is the first run of the row's."
+    caption += f" Its begin, up to {numbers.value(float(radial.max()), 'rad')}, is cut off." if cut else ""
+    return Figure(
+        f"campaign-worst-{trace.cell + 1}-{number}",
+        f"{_rank(number).capitalize()}row in time",
+        caption,
+        svg_of(canvas),
+        columns,
+    )
+
+
+def _rank(number: int) -> str:
+    """How bad a row is, in words."""
+    return (
+        ("", "second ", "third ", "fourth ", "fifth ", "sixth ")[number - 1] + "worst "
+        if number <= 6
+        else f"{number}th worst "
+    )

@@ -7,93 +7,22 @@ from typing import Any
 
 import numpy as np
 
-from microrad.campaign.records import CampaignSummary, CellSummary, Interval, Limit, OutputSummary, Sensitivity, Tail
-from microrad.report.day_words import duration, volume
-from microrad.report.quantities import quantity
+from microrad.campaign.records import CampaignSummary, CellSummary, Interval, OutputSummary, Sensitivity, Tail
+from microrad.report import campaign_tables
+from microrad.report.campaign_numbers import bound, complement, ends, label, limit_text, share, share_ends, value
+from microrad.report.campaign_tables import Row, good, more_failed, ranked, unit_of
+from microrad.report.day_words import duration
 from microrad.report.tables import Table, tables_text
 
-Row = tuple[str, ...]
 MATTERS = 0.05
 """Sobol index from which an input is named."""
 MOST_FAILED = 10
 """Failed rows of a table in a terminal; the rest are counted."""
 _MOST_CELLS = 40
-_USUAL = (0.5, 0.01, 0.99, 0.997, 0.003, 0.9, 0.1, 0.999, 0.001)  # quantiles, those to be shown before others first
-_UNKNOWN, _TINY = "not known", 1e-300
-SYMBOL = {"least": "≥", "most": "≤"}
-
-
-# ------------------------------------------------------------------------------------------------------------- numbers
-def share(probability: float) -> str:
-    """A probability: in per cent with the digits that tell it from 0 and 1, below a thousandth as a power of ten."""
-    if math.isnan(probability):
-        return _UNKNOWN
-    if 0.0 < probability < 1e-3:
-        return power(probability)
-    rest = 1.0 - probability
-    if 0.0 < rest < 0.1:
-        return f"{100.0 * probability:.{min(max(1 - math.floor(math.log10(100.0 * rest)), 1), 8)}f} %"
-    return f"{100.0 * probability:.3g} %"
-
-
-def power(number: float) -> str:
-    """A number in two digits with its power of ten: "1.3e-6"."""
-    mantissa, _, exponent = f"{number:.1e}".partition("e")
-    return f"{mantissa.removesuffix('.0')}e{int(exponent)}"
-
-
-def is_share(name: str, unit: str) -> bool:
-    """Whether an output is a share of something, shown as a probability."""
-    return unit in ("", "1") and (name in ("outage", "short") or name.endswith("_share"))
-
-
-def value(number: float, unit: str, name: str = "") -> str:
-    """A value of the output ``name`` with its unit as it stands in words."""
-    if math.isnan(number):
-        return _UNKNOWN
-    if is_share(name, unit):
-        return share(number)
-    if unit in ("", "1"):
-        return f"{number:.4g}"
-    by_unit = {"s": duration, "bit": volume}
-    return by_unit[unit](number) if unit in by_unit else quantity(number, unit)
-
-
-def ends(interval: Interval, unit: str, name: str = "") -> str:
-    """The interval alone: "3.1 dB to 3.3 dB", "at least 3.1 dB" where one end is not known, "" where neither is."""
-    low, high = (value(end, unit, name) for end in (interval.low, interval.high))
-    if math.isnan(interval.low):
-        return "" if math.isnan(interval.high) else f"at most {high}"
-    return f"at least {low}" if math.isnan(interval.high) else f"{low} to {high}"
-
-
-def with_ends(interval: Interval, unit: str, name: str = "") -> str:
-    """The estimate with its interval."""
-    found = ends(interval, unit, name)
-    return value(interval.value, unit, name) + (f" ({found})" if found else "")
-
-
-def share_ends(interval: Interval) -> str:
-    """A probability with its interval."""
-    return with_ends(interval, "", "outage")
-
-
-def limit_text(limit: Limit, unit: str) -> str:
-    """What an output has to keep, as an inequality."""
-    both = [
-        f"{SYMBOL[side]} {value(bound, unit, limit.output)}"
-        for side in ("least", "most")
-        if (bound := getattr(limit, side)) is not None
-    ]
-    return f"{limit.output} {' and '.join(both)}"
+_TINY = 1e-300
 
 
 # -------------------------------------------------------------------------------------------------------------- choice
-def good(cell: CellSummary) -> int:
-    """Rows of a cell that have results."""
-    return cell.rows - cell.failed
-
-
 def best(summary: CampaignSummary) -> CellSummary | None:
     """The cell shown in detail: of those with results the one that misses its limits least, the first of equals."""
     cells = [cell for cell in summary.cells if good(cell)]
@@ -102,17 +31,6 @@ def best(summary: CampaignSummary) -> CellSummary | None:
 
 def _last(number: float) -> float:
     return math.inf if math.isnan(number) else number
-
-
-def unit_of(summary: CampaignSummary, output: str) -> str:
-    """The unit of an output; nothing where no cell has it."""
-    return next((cell.outputs[output].unit for cell in summary.cells if output in cell.outputs), "")
-
-
-def ranked(found: Sensitivity) -> list[tuple[str, Interval]]:
-    """Inputs and their total indices (first-order ones where there are no total ones), the largest first."""
-    known = {key: index for key, index in (found.total or found.first).items() if not math.isnan(index.value)}
-    return sorted(known.items(), key=lambda item: -item[1].value)
 
 
 def beyond(tail: Tail, radius_rad: float) -> Interval | None:
@@ -149,7 +67,7 @@ def verdict(summary: CampaignSummary) -> str:
 
 
 def headline(summary: CampaignSummary) -> str:
-    """The verdict in one sentence: how likely a row keeps the limits."""
+    """The verdict in one sentence: which rows failed, and how likely the others keep the limits."""
     failed = sum(cell.failed for cell in summary.cells)
     shown = best(summary)
     if shown is None:
@@ -157,7 +75,14 @@ def headline(summary: CampaignSummary) -> str:
             return "No row has been simulated yet."
         return "No row has results: " + ("the only one failed." if failed == 1 else f"all {failed} failed.")
     said = _said(summary, shown)
-    return said if summary.progress.state == "complete" else f"So far: {said[0].lower()}{said[1:]}"
+    if failed:
+        said = f"{failed} of {_rows(sum(cell.rows for cell in summary.cells))} failed; {_lower(said)}"
+    return said if summary.progress.state == "complete" else f"So far: {_lower(said)}"
+
+
+def _lower(sentence: str) -> str:
+    """A sentence that goes on from a colon; names of keys stay as they are."""
+    return sentence[0].lower() + sentence[1:]
 
 
 def _said(summary: CampaignSummary, shown: CellSummary) -> str:
@@ -185,23 +110,26 @@ def _kept(cell: CellSummary, limits: str) -> str:
     """What share of a cell's rows keeps the limits."""
     missed, rows = cell.missed, good(cell)
     sure, kept = f"at {100.0 * missed.confidence:g} % confidence", complement(missed)
+    others = f"other {rows}" if cell.failed else f"{rows}"
     if missed.value == 0.0:
-        which = "The only row keeps" if rows == 1 else f"All {rows} rows keep"
+        which = "The only row keeps" if cell.rows == 1 else f"All {others} rows keep"
+        which = "The only other row keeps" if cell.failed and rows == 1 else which
         return f"{which} {limits}" + _bound(f"{sure} at least", kept.low)
     if missed.value == 1.0:
-        which = "The only row misses" if rows == 1 else f"None of {rows} rows keeps"
+        which = (
+            "The only row misses"
+            if cell.rows == 1
+            else f"None of {f'the {others}' if cell.failed else rows} rows keeps"
+        )
+        which = "The only other row misses" if cell.failed and rows == 1 else which
         return f"{which} {limits}" + _bound(f"{sure} at most", kept.high)
     between = ends(kept, "", "outage")
-    return f"{share(kept.value)} of the rows keep {limits}" + (f" ({between} {sure})" if between else "")
+    of = f"the other {rows}" if cell.failed else "the"
+    return f"{share(kept.value)} of {of} rows keep {limits}" + (f" ({between} {sure})" if between else "")
 
 
 def _bound(words: str, probability: float) -> str:
     return "" if math.isnan(probability) else f"; {words} {share(probability)} of all draws do"
-
-
-def complement(missed: Interval) -> Interval:
-    """The probability of the opposite."""
-    return Interval(1.0 - missed.value, 1.0 - missed.high, 1.0 - missed.low, missed.confidence)
 
 
 def _cells_said(summary: CampaignSummary, shown: CellSummary) -> str:
@@ -223,20 +151,31 @@ def matters(summary: CampaignSummary) -> list[str]:
     """Which inputs act most on each output that has a limit; on the first ones where none has."""
     limited = [limit.output for limit in summary.limits]
     wanted = [s for s in summary.sensitivities if s.output in limited] or list(summary.sensitivities[:3])
-    return [_matters(each) for each in wanted]
+    unknown: dict[str, list[str]] = {}
+    for each in wanted:
+        if not ranked(each):
+            unknown.setdefault(each.note, []).append(each.output)
+    said = [_matters(each) for each in wanted if ranked(each)]
+    return said + [f"What matters to {' and '.join(names)} is not known: {why}." for why, names in unknown.items()]
+
+
+def leading(summary: CampaignSummary, output: str) -> list[str]:
+    """The inputs that matter to an output, the one that matters most first; none where it is not known."""
+    found = [s for s in summary.sensitivities if s.output == output]
+    return [key for s in found for key, index in ranked(s) if index.value >= MATTERS]
 
 
 def _matters(found: Sensitivity) -> str:
-    named = [f"{key} {_index(index)}" for key, index in ranked(found) if index.value >= MATTERS][:3]
+    named = [f"{key} {campaign_tables.index_text(index)}" for key, index in ranked(found) if index.value >= MATTERS][:3]
     kind = "total" if found.total else "first-order"
     if not named:
-        return f"No input by itself decides {found.output}{f': {found.note}' if found.note else ''}."
+        return f"No input by itself decides {found.output}{f'; {found.note}' if found.note else ''}."
     note = f"; {found.note}" if found.note else ""
     return f"What matters most to {found.output} ({kind} Sobol index): {', '.join(named)}{note}."
 
 
 def tail_sentences(summary: CampaignSummary, cell: CellSummary | None) -> list[str]:
-    """The radius exceeded with the least probability that is known, and how likely the error is beyond its limit."""
+    """The radius exceeded with the least probability that is known, and how likely the error is beyond its bounds."""
     if cell is None or cell.tail is None:
         return []
     tail, found = cell.tail, []
@@ -245,12 +184,12 @@ def tail_sentences(summary: CampaignSummary, cell: CellSummary | None) -> list[s
         p, radius = min(known.items())
         exceeded = f"The radial error exceeds {value(radius.value, 'rad')} with probability {share(p)}"
         found.append(f"{exceeded}{_sure(radius)}.")
-    for bound in sorted({limit.most for limit in summary.limits if limit.most and limit.output.startswith("residual")}):
-        if (past := beyond(tail, bound)) and not past.value:
-            found.append(f"No radial error beyond {value(bound, 'rad')} was seen{_sure(past, 'outage', '')}.")
-        elif past:
-            likely = f"The radial error is beyond {value(bound, 'rad')} with probability {share(past.value)}"
-            found.append(f"{likely}{_sure(past, 'outage', '')}.")
+    bounds = [limit.most for limit in summary.limits if limit.most and limit.output.startswith("residual")]
+    asked = {at: past for at in bounds if (past := beyond(tail, at))}
+    for at, past in sorted({**asked, **tail.beyond}.items()):
+        likely = f"The radial error is beyond {bound(at, 'rad')} with probability {share(past.value)}"
+        unseen = f"No radial error beyond {bound(at, 'rad')} was seen"
+        found.append(f"{likely if past.value else unseen}{_sure(past, 'outage', '')}.")
     return found
 
 
@@ -261,9 +200,21 @@ def answers(summary: CampaignSummary, cell: CellSummary | None) -> list[str]:
 
 
 def tail_method(tail: Tail) -> str:
-    """Where a tail comes from, and what it is worth."""
-    worth = f", worth {power(tail.effective_runs)} independent errors" if math.isfinite(tail.effective_runs) else ""
-    return f"From {tail.method}{worth}."
+    """Where a tail comes from, and how many independent samples of the error would tell as much."""
+    known = [p for p, radius in tail.wanted.items() if not math.isnan(radius.value)]
+    said = f"It comes from {'the ' if tail.method.startswith('share') else ''}{tail.method}."
+    if not known or not math.isfinite(tail.effective_runs):
+        return said
+    count, of = _many(tail.effective_runs), share(min(known))
+    return f"{said} {count} independent samples of the error would tell as much of {of}."
+
+
+def _many(count: float) -> str:
+    """A number in two digits, as it is spoken: "24 million"."""
+    for size, name in ((1e9, "billion"), (1e6, "million")):
+        if count >= size:
+            return f"{float(f'{count / size:.2g}'):g} {name}"
+    return f"{float(f'{count:.2g}'):.0f}"
 
 
 def _sure(interval: Interval, name: str = "", unit: str = "rad") -> str:
@@ -294,143 +245,88 @@ def setting(summary: CampaignSummary) -> list[str]:
     return [f"Sampling {summary.sampling}, {drawn}, seed {summary.seed}.", loop, *fixed]
 
 
-# -------------------------------------------------------------------------------------------------------------- tables
-def limit_table(summary: CampaignSummary, cell: CellSummary) -> tuple[Row, list[Row]]:
-    """Headings and rows: each limit, how many rows miss it, and where it comes from."""
-    rows: list[Row] = []
-    for limit in summary.limits:
-        if missed := cell.missed_by.get(limit.output):
-            kept = limit_text(limit, unit_of(summary, limit.output))
-            rows.append((kept, share(missed.value), ends(missed, "", "outage"), limit.source))
-    return ("limit", "missed by", f"{100.0 * cell.missed.confidence:g} % interval", "from"), rows
-
-
-def chosen_quantiles(outputs: Sequence[OutputSummary], most: int) -> list[float]:
-    """Probabilities of at most ``most`` quantiles, rising, the usual ones before others."""
-    known = sorted({p for output in outputs for p in output.quantiles})
-    order = sorted(known, key=lambda p: (_USUAL.index(p) if p in _USUAL else len(_USUAL), p))
-    return sorted(order[:most])
-
-
-def output_table(cell: CellSummary, most: int) -> tuple[Row, list[Row]]:
-    """Headings and rows: each output that differs, with mean, deviation and at most ``most`` quantiles."""
-    outputs = [output for output in cell.outputs.values() if output.rows and output.most > output.least]
-    chosen = chosen_quantiles(outputs, most)
-    rows = [
-        (
-            o.name,
-            value(o.mean.value, o.unit, o.name),
-            value(o.deviation, o.unit, o.name),
-            *(value(o.quantiles[p].value, o.unit, o.name) if p in o.quantiles else "" for p in chosen),
-        )
-        for o in outputs
-    ]
-    return ("output", "mean", "deviation", *(f"{100.0 * p:.6g} %" for p in chosen)), rows
-
-
-def even(cell: CellSummary | None) -> list[str]:
-    """The outputs that are the same in every row."""
-    outputs = [] if cell is None else [o for o in cell.outputs.values() if o.rows and o.most == o.least]
-    named = ", ".join(f"{o.name} {value(o.least, o.unit, o.name)}" for o in outputs)
-    return [f"The same in every row: {named}."] if named else []
-
-
-def cell_table(summary: CampaignSummary) -> tuple[Row, list[Row]]:
-    """Headings and rows: each combination of the grid, and how many rows keep the limits there."""
-    keys = list(dict.fromkeys(key for cell in summary.cells for key in cell.values))
-    names = [limit.output for limit in summary.limits]
-    headings = (*keys, *(("keep all",) if names else ()), "rows", "failed", *(f"miss {name}" for name in names))
-    return headings, [_cell_row(cell, keys, names) for cell in summary.cells]
-
-
-def _cell_row(cell: CellSummary, keys: Sequence[str], names: Sequence[str]) -> Row:
-    kept = [share_ends(complement(cell.missed))] if names else []
-    by = [share(cell.missed_by[name].value) if name in cell.missed_by else "" for name in names]
-    if not good(cell):
-        kept, by = [""] * len(kept), [""] * len(by)
-    return (*(cell.values.get(key, "") for key in keys), *kept, str(good(cell)), str(cell.failed), *by)
-
-
-def tail_table(tail: Tail) -> tuple[Row, list[Row]]:
-    """Headings and rows: the radii that are exceeded with the wanted probabilities."""
-    wanted = sorted(tail.wanted.items(), reverse=True)
-    rows: list[Row] = [(share(p), value(radius.value, "rad"), ends(radius, "rad")) for p, radius in wanted]
-    return ("probability", "radial error", f"{100.0 * tail.confidence:g} % interval"), rows
-
-
-INDEX_HEADINGS = ("output", "input", "first order", "total", "rank correlation")
-
-
-def index_rows(found: Sequence[Sensitivity]) -> list[Row]:
-    """Sobol indices and rank correlations of each output, the inputs that act most on it first."""
-    return [
-        (s.output, key, _index(s.first.get(key)), _index(s.total.get(key)), _index(s.rank_correlation.get(key)))
-        for s in found
-        for key, _ in ranked(s)
-    ]
-
-
-def _index(index: Interval | None) -> str:
-    if index is None or math.isnan(index.value):
-        return ""
-    text = f"{index.value:.2f} ({index.low:.2f} to {index.high:.2f})"
-    return text.replace("-", "\u2212")  # a minus sign, not a hyphen
-
-
-FAILED_HEADINGS = ("row", "seed", "tries", "reason")
-
-
-def failed_rows(summary: CampaignSummary, most: int) -> list[Row]:
-    """Rows without results, with the combination of the grid where there is one."""
-    return [
-        (
-            f"{each.row}" + (f" of {summary.cells[cell].label}" if summary.cells[cell].values else ""),
-            str(each.seed),
-            str(each.attempts),
-            each.reason,
-        )
-        for cell, each in summary.failed[:most]
-    ]
-
-
-def more_failed(summary: CampaignSummary, shown: int) -> str:
-    """How many failed rows are not shown; nothing where all are."""
-    more = sum(cell.failed for cell in summary.cells) - shown
-    return f"{more} more failed rows are in the export." if more > 0 else ""
-
-
 def text(summary: CampaignSummary, width: int) -> str:
     """The campaign for a terminal of ``width`` columns: the verdict first, how far it is last."""
     cell = best(summary)
-    tables, below = _tables(summary, cell, width), [*even(cell), *answers(summary, cell)]
+    tables, below = _tables(summary, cell, width), [*few_values(cell), *answers(summary, cell)]
     last = [*(f"Warning: {warning}" for warning in summary.warnings), progress_words(summary)]
-    failed = failed_rows(summary, MOST_FAILED)
+    failed = campaign_tables.failed_rows(summary, MOST_FAILED)
     if more := more_failed(summary, len(failed)):
         last = [more, *last]
-    parts = [tables_text([], [headline(summary), ""], width), tables_text(tables, below, width)]
+    first = [tables_text([], [headline(summary), ""], width)]
+    first += [tables_text([], [*summary.findings, ""], width)] if summary.findings else []
+    parts = [*first, tables_text(tables, below, width)]
     if failed:
-        parts.append("\n" + tables_text([Table("Failed rows", FAILED_HEADINGS, failed, (0, 3))], [], width))
+        table = Table("Failed rows", campaign_tables.FAILED_HEADINGS, failed, (0, 3))
+        parts.append("\n" + tables_text([table], [], width))
     return "\n".join([*filter(None, parts), tables_text([], last, width)])
 
 
 def _tables(summary: CampaignSummary, cell: CellSummary | None, width: int) -> list[Table]:
-    found = []
-    if len(summary.cells) > 1:
-        keys = len(summary.cells[0].values)
-        headings, rows = _narrowed(*cell_table(summary), keys + 2, width)
-        found.append(Table("Combinations", headings, rows[:_MOST_CELLS], tuple(range(keys))))
+    found = _over_the_grid(summary, width) if len(summary.cells) > 1 else []
     if cell is None:
         return found
     of = f" of {cell.label}" if cell.values else ""
     if summary.limits:
-        found.append(Table(f"Limits{of}", *limit_table(summary, cell), (0, 3)))
-    narrower = (output_table(cell, most) for most in range(len(_USUAL), 0, -1))
-    headings, rows = next((t for t in narrower if _wide(*t) <= width), output_table(cell, 1))
+        found.append(Table(f"Limits{of}", *campaign_tables.limit_table(summary, cell), (0, 3)))
+    narrower = (campaign_tables.output_table(cell, most) for most in range(campaign_tables.MOST_QUANTILES, 0, -1))
+    headings, rows = next((t for t in narrower if _wide(*t) <= width), campaign_tables.output_table(cell, 1))
     if rows:
-        found.append(Table(f"Outputs{of}, and their quantiles over the rows", headings, rows, (0,)))
+        unknown = f" ({_UNKNOWN_QUANTILE})" if any(campaign_tables.UNKNOWN in row for row in rows) else ""
+        found.append(Table(f"Outputs{of}, and their quantiles over the rows{unknown}", headings, rows, (0,)))
+    if meanings := campaign_tables.meanings(cell):
+        found.append(Table("What they are", ("output", "meaning"), meanings, (1,)))
     if cell.tail is not None:
-        found.append(Table(f"Radial errors{of} that are exceeded", *tail_table(cell.tail), (2,)))
+        found.append(Table(f"Radial errors{of} that are exceeded", *campaign_tables.tail_table(cell.tail), (2,)))
     return found
+
+
+_UNKNOWN_QUANTILE = f"{campaign_tables.UNKNOWN}: not known, there are too few rows"
+
+
+def _over_the_grid(summary: CampaignSummary, width: int) -> list[Table]:
+    """Every combination, in two tables where one is too wide: the rows that keep all, then limit by limit."""
+    keys, cells = len(summary.cells[0].values), summary.cells[:_MOST_CELLS]
+    both = [campaign_tables.cell_table(summary, cells), campaign_tables.limited_table(summary, cells)]
+    joined = both[0][0] + both[1][0][keys:], [a + b[keys:] for a, b in zip(both[0][1], both[1][1], strict=True)]
+    broken = tuple(range(keys))
+    if _wide(*joined) <= width or not summary.limits:
+        return [Table("Combinations", *joined, broken)]
+    return [
+        Table(title, *_narrowed(*table, keys + 2, width), broken)
+        for title, table in zip(("Combinations", "Limits by combination"), both, strict=True)
+    ]
+
+
+def few_values(cell: CellSummary | None) -> list[str]:
+    """The outputs that are the same in every row, and those of two values."""
+    outputs = [] if cell is None else [o for o in cell.outputs.values() if o.rows]
+    same = ", ".join(f"{label(o.name)} {_at(o, o.least)}" for o in outputs if o.most == o.least)
+    two = [
+        f"{label(o.name)} has two values: {_at(o, o.least)} in {share(1.0 - high)} of the rows, "
+        f"{_at(o, o.most)} in {share(high)}."
+        for o in outputs
+        if (high := two_values(o)) is not None
+    ]
+    return [*([f"The same in every row: {same}."] if same else []), *two]
+
+
+def _at(output: OutputSummary, number: float) -> str:
+    return value(number, output.unit, output.name)
+
+
+def two_values(output: OutputSummary) -> float | None:
+    """Share of the rows at the larger of two values; None where there are more values, or one.
+
+    No values between two ends spread as much about their mean as those that are all at an end (Bhatia and Davis,
+    Amer. Math. Monthly 107, 2000, 353), so that mean and deviation tell.
+    """
+    reach, rows = output.most - output.least, output.rows
+    if rows < 2 or not reach > 0.0:
+        return None
+    high = (output.mean.value - output.least) / reach
+    spread = (output.deviation / reach) ** 2 * (rows - 1) / rows
+    return high if math.isclose(spread, high * (1.0 - high), rel_tol=1e-6) else None
 
 
 def _wide(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> int:
@@ -453,6 +349,7 @@ def data(summary: CampaignSummary) -> dict[str, Any]:
         "name": summary.name,
         "mission": summary.mission_name,
         "verdict": headline(summary),
+        "findings": list(summary.findings),
         "hashes": dict(summary.hashes),
         "seed": summary.seed,
         "sampling": summary.sampling,
@@ -496,4 +393,5 @@ def _tail_data(tail: Tail) -> dict[str, Any]:
     curves = {key: getattr(tail, key).tolist() for key in ("radius_rad", "survival", "low", "high")}
     wanted = [{"probability": p, "unit": "rad", **asdict(each)} for p, each in tail.wanted.items()]
     kept = {key: getattr(tail, key) for key in ("confidence", "method", "effective_runs")}
-    return {**curves, "wanted": wanted, **kept}
+    past = [{"error_rad": error, **asdict(each)} for error, each in tail.beyond.items()]
+    return {**curves, "wanted": wanted, "beyond": past, **kept}

@@ -1,0 +1,329 @@
+"""Tails of the radial error: how often their intervals hold the truth, of toy processes, of tilted draws, of a loop."""
+
+import math
+from dataclasses import asdict, replace
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+from scipy.special import i0e
+
+from microrad.campaign import loops, run, tilt
+from microrad.campaign.file import CampaignFile, load_campaign
+from microrad.campaign.inputs import Builder
+from microrad.campaign.records import Chunk, Floats, Interval
+from microrad.campaign.statistics import proportion_interval
+from microrad.campaign.summary import summarise
+from microrad.campaign.tails import tail_of_time, tail_weighted
+from microrad.campaign.work import Evaluator
+from microrad.fine_loop import linear
+from microrad.fine_loop.ensemble import LANES, bin_edges_rad, histogram_quantile
+from microrad.report import campaign_words
+from microrad.report.quantities import quantity
+from microrad.threads import in_threads
+from shipped import SHIPPED
+from truths import philox
+
+SIGMA = 2e-6
+EDGES = bin_edges_rad()
+
+
+# ------------------------------------------------------------------------------------------------------- toy processes
+def counted(seed: int, rows: int, samples: int, memory: float) -> np.ndarray:
+    """Histograms (rows, bins) of the radius of two first-order processes."""
+    keep = math.exp(-1.0 / memory)
+    noise = philox(1000 * 15 + seed).normal(size=(2, rows, samples)) * SIGMA
+    noise[:, :, 1:] *= math.sqrt(1.0 - keep**2)
+    radius = np.hypot(*lfilter([1.0], [1.0, -keep], noise, axis=-1))
+    return np.stack([np.histogram(row, EDGES)[0] for row in radius])
+
+
+def holds(found: Interval, truth: float) -> bool:
+    """An end that is not known leaves all beyond it possible."""
+    return not (found.low > truth or found.high < truth)
+
+
+def shares(counts: np.ndarray) -> Floats:
+    return np.asarray(np.cumsum(counts[:, ::-1], axis=1)[:, ::-1] / counts.sum(axis=1, keepdims=True))
+
+
+def test_interval_of_a_correlated_tail_holds_rayleighs_quantile() -> None:
+    probability = 1e-4
+    exact = SIGMA * math.sqrt(-2.0 * math.log(probability))
+    held = naive = known = 0
+    for seed in range(100):
+        share = shares(counted(seed, 64, 5000, 10.0))
+        tail = tail_of_time(share.sum(axis=0), (share**2).sum(axis=0), 64, EDGES, [probability], 0.99)
+        found = tail.wanted[probability]
+        held += holds(found, exact)
+        known += found.high < 1.15 * exact
+        at = int(np.searchsorted(EDGES, exact))
+        band = proportion_interval(share.mean(axis=0)[at] * 320_000, 320_000, 0.99)  # as if all errors were independent
+        naive += band.low <= math.exp(-0.5 * (EDGES[at] / SIGMA) ** 2) <= band.high
+    assert held >= 95
+    assert known >= 95
+    assert naive < 93
+
+
+def test_tail_is_that_of_the_histogram() -> None:
+    counts = counted(1, 64, 10_000, 20.0)
+    share = shares(counts)
+    tail = tail_of_time(share.sum(axis=0), (share**2).sum(axis=0), 64, EDGES, (0.5, 0.01, 1e-3), 0.95)
+    for probability, found in tail.wanted.items():
+        assert found.value == pytest.approx(histogram_quantile(counts.sum(axis=0), 1.0 - probability), rel=2e-3)
+        assert found.low < found.value < found.high
+    assert np.all(np.diff(tail.survival) <= 0.0)
+    assert np.all((tail.low <= tail.survival) & (tail.survival <= tail.high))
+    assert (tail.survival[0], tail.survival[-1], tail.high[-1] > 0.0) == (1.0, 0.0, True)
+    assert tail.radius_rad.shape == tail.survival.shape
+    assert 640_000 / 20.0 < tail.effective_runs < 640_000  # excursions to 1e-3 are shorter than the memory
+    assert "64 rows" in tail.method
+
+
+def test_between_edges_the_radius_is_rayleighs() -> None:
+    exact = np.exp(-0.5 * (EDGES[:-1] / SIGMA) ** 2)
+    probabilities = (0.7, 0.1, 3e-3, 1.1e-5)
+    tail = tail_of_time(exact * 50, exact**2 * 50, 50, EDGES, probabilities, 0.95)
+    for probability in probabilities:
+        assert tail.wanted[probability].value == pytest.approx(
+            SIGMA * math.sqrt(-2.0 * math.log(probability)), rel=1e-9
+        )
+        linear = histogram_quantile((-np.diff(exact, append=0.0) * 1e9).astype(int), 1.0 - probability)
+        assert linear == pytest.approx(tail.wanted[probability].value, rel=2e-3)
+
+
+def test_what_few_rows_cannot_tell_is_not_known() -> None:
+    share = shares(counted(2, 4, 1000, 20.0))
+    tail = tail_of_time(share.sum(axis=0), (share**2).sum(axis=0), 4, EDGES, (0.3, 1e-6), 0.99)
+    assert tail.wanted[0.3].high < 5.0 * SIGMA
+    assert math.isnan(tail.wanted[1e-6].high)
+    one = tail_of_time(share[0], share[0] ** 2, 1, EDGES, (0.3,), 0.99)
+    assert math.isnan(one.wanted[0.3].high)
+    assert one.wanted[0.3].value > 0.0
+    assert math.isnan(tail_of_time(share[0], share[0] ** 2, 1, EDGES, (), 0.99).effective_runs)
+    with pytest.raises(ValueError, match="no rows"):
+        tail_of_time(share[0], share[0], 0, EDGES, (0.3,), 0.99)
+
+
+# -------------------------------------------------------------------------------------------------------- tilted draws
+def tilted(seed: int, draws: int, shift: float) -> tuple[Floats, Floats]:
+    """Radii of two normal numbers that are shifted in any direction, and the logarithm of their weights."""
+    random = philox(1000 * 16 + seed)
+    angle = random.uniform(0.0, 2.0 * math.pi, draws)
+    radius = np.hypot(random.normal(shift * np.cos(angle), 1.0), random.normal(shift * np.sin(angle), 1.0))
+    return radius, shift**2 / 2.0 - np.log(i0e(shift * radius)) - shift * radius
+
+
+@pytest.mark.parametrize(("draws", "miss"), [(64, 1.0), (256, 0.8), (640, 1.0)])
+def test_interval_of_a_weighted_tail_holds_rayleighs_quantile(draws: int, miss: float) -> None:
+    probability, held, widths = 1e-6, 0, []
+    exact = math.sqrt(-2.0 * math.log(probability))
+    for seed in range(200):
+        tail = tail_weighted(*tilted(seed, draws, miss * exact), [probability], 0.99)
+        found = tail.wanted[probability]
+        held += holds(found, exact)
+        widths.append(found.high - found.low)
+        assert tail.effective_runs > 20 * draws
+    assert held >= 194
+    assert np.median(widths) < 0.12 * exact  # 9 % of the radius is a factor of 10 in probability
+
+
+def test_draws_that_are_not_tilted_know_nothing_of_a_rare_tail() -> None:
+    tail = tail_weighted(*tilted(1, 640, 0.0), (0.5, 1e-6), 0.99)
+    assert tail.wanted[0.5].low < math.sqrt(2.0 * math.log(2.0)) < tail.wanted[0.5].high
+    assert math.isnan(tail.wanted[1e-6].high)
+    assert tail.effective_runs == pytest.approx(640, rel=0.02)
+    many = tail_weighted(*tilted(1, 5000, 5.0), (1e-6,), 0.99)
+    assert many.radius_rad.size <= 200
+    assert np.all((many.low <= many.survival) & (many.survival <= many.high))
+    with pytest.raises(ValueError, match="no draws"):
+        tail_weighted(np.empty(0), np.empty(0), (0.5,), 0.99)
+
+
+def rayleigh(probability: float, sigma: float = 1.0) -> float:
+    """Radius that two normal numbers exceed together with a probability."""
+    return sigma * math.sqrt(-2.0 * math.log(probability))
+
+
+def mixed(seed: int, draws: int, aim: float) -> tuple[Floats, Floats]:
+    """Radii drawn as tilted runs of a linear loop draw them, aimed at a probability, and the logarithm of weights."""
+    level = -math.log(aim)
+    by = tilt.Tilt(0, np.zeros((1, 1, 1)), np.zeros((1, 1, 1)), np.ones(2), level - 0.3, level + 1.0)
+    found = [tilt.drawn(by, 5000 + seed, LANES * batch) for batch in range(draws // LANES)]
+    return np.concatenate([np.hypot(*unit) for unit, _ in found]), np.concatenate([weight for _, weight in found])
+
+
+@pytest.mark.parametrize("draws", [64, 256])
+def test_intervals_of_tilted_draws_hold_at_all_radii(draws: int) -> None:
+    """Also where the weighted share is near 1, and those of the probability beyond a radius."""
+    probabilities = (0.9, 0.5, 0.1, 1e-3, 1e-6)
+    radii, repetitions = {p: rayleigh(p) for p in probabilities}, 100
+    held, likely = dict.fromkeys(probabilities, 0), dict.fromkeys(probabilities, 0)
+    width: dict[float, list[float]] = {p: [] for p in probabilities}
+    for seed in range(repetitions):
+        tail = tail_weighted(*mixed(seed, draws, 1e-6), probabilities, 0.99, radii.values())
+        for p, radius in radii.items():
+            found, past = tail.wanted[p], tail.beyond[radius]
+            assert 0.0 <= found.low <= found.value <= found.high  # all known
+            assert 0.0 <= past.low <= past.value <= past.high <= 1.0
+            held[p] += found.low <= radius <= found.high
+            likely[p] += past.low <= p <= past.high
+            width[p].append(math.log(past.high / max(past.low, 1e-9)))
+    assert min(held.values()) >= 96
+    assert min(likely.values()) >= 96
+    assert np.median(width[1e-6]) < (1.2 if draws == 64 else 0.6)  # a factor in probability, where it is aimed at
+    assert np.median(width[0.1]) > 1.0  # and the plain runs, a tenth of all, tell little of the rest
+
+
+def test_beyond_all_draws_little_is_known_and_below_them_all() -> None:
+    radius, log_weight = mixed(1, 256, 1e-6)
+    least, most = float(radius.min()), float(radius.max())
+    tail = tail_weighted(radius, log_weight, (), 0.99, (0.5 * least, most, 2.0 * most, rayleigh(1e-6)))
+    below, last, past, aimed = tail.beyond.values()
+    assert (below.value, below.high) == (1.0, 1.0)
+    assert 0.8 < below.low < 1.0
+    assert last == past  # larger than the largest is none of them
+    assert (past.value, past.low) == (0.0, 0.0)
+    assert math.exp(-0.5 * most**2) < past.high < 1e-7
+    assert past.high < aimed.low < 1e-6 < aimed.high
+    flat = tail_weighted(np.arange(1.0, 101.0), np.zeros(100), (0.5,), 0.99, (30.0, 0.0))
+    assert flat.beyond[30.0].value == pytest.approx(0.7)
+    exact = proportion_interval(70, 100, 0.99)
+    assert flat.beyond[30.0].low == pytest.approx(exact.low, abs=0.05)
+    assert flat.beyond[30.0].high == pytest.approx(exact.high, abs=0.05)
+    assert flat.beyond[0.0].low == pytest.approx(proportion_interval(100, 100, 0.99).low, abs=0.03)
+
+
+# -------------------------------------------------------------------------------------------------------- the real loop
+CAMPAIGN = """
+mission = "mission.toml"
+seed = 1
+runs = 64
+sampling = "random"
+{keep}
+
+[loop]
+controller = "PI"
+axes = "both"
+mirror = "no hysteresis"
+duration = "{duration}"
+settle = "0.2 s"
+
+[set]
+"fine_pointing.delay" = "1.4 ms"
+"fine_pointing.plant_step" = "200 us"
+"fine_pointing.optical_sensor.noise" = "0.1 urad"
+"fine_pointing.optical_sensor.field_of_view" = "1 rad"
+"fine_pointing.strain_gauge.resolution" = "0 urad"
+"fine_pointing.drive_resolution" = "1e-9 V"
+"fine_pointing.reference.point_ahead_on_mirror" = false
+"fine_pointing.reference.rate_feedforward" = 1
+"""
+"""A loop that is Gaussian, and slow because of its delay: an excursion to 1e-4 lasts for several samples."""
+
+
+class Slow:
+    """Campaigns of this loop, with the controller and the deviation of an axis that they share."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        (folder / "mission.toml").write_text(SHIPPED.read_text(encoding="utf-8"), encoding="utf-8")
+        campaign = self.campaign("1 s")
+        self.axis = loops.tuned(campaign.mission, campaign.table.loop)
+        loop = loops.row_loop(campaign.mission, campaign.table.loop)
+        held = loops.held(campaign.mission, campaign.table.loop, self.axis)
+        covariance = tilt.end_covariance(linear.close(loop, held), 5000)
+        assert covariance == pytest.approx(covariance[0, 0] * np.eye(2), abs=1e-9 * covariance[0, 0])
+        self.sigma = math.sqrt(covariance[0, 0])
+
+    def campaign(self, duration: str, more: str = "") -> CampaignFile:
+        path = self.folder / "campaign.toml"
+        keep = "" if more else 'keep = ["residual_rms"]'
+        path.write_text(CAMPAIGN.format(duration=duration, keep=keep) + more, encoding="utf-8")
+        return load_campaign(path)
+
+    def chunk(self, campaign: CampaignFile, rows: range, seed: int = 1) -> Chunk:
+        """These rows under another seed."""
+        seeded = replace(campaign, table=campaign.table.model_copy(update={"seed": seed}))
+        found = Evaluator(seeded, Builder(seeded), {}, {0: self.axis}).rows(0, rows, lambda: None)
+        assert not found.failed
+        return found
+
+
+@pytest.fixture(scope="module")
+def slow(tmp_path_factory: pytest.TempPathFactory) -> Slow:
+    return Slow(tmp_path_factory.mktemp("slow"))
+
+
+def test_interval_of_a_loops_tail_holds_rayleighs_quantile(slow: Slow) -> None:
+    """64 rows of 4 s each, seeds 0 to 99; some 50 excursions are in each repetition."""
+    probability, samples = 1e-4, 64 * 20_000
+    exact = rayleigh(probability, slow.sigma)
+    campaign = slow.campaign("4.2 s")
+    chunks = in_threads([partial(slow.chunk, campaign, range(64), seed) for seed in range(100)], workers=2)
+    at = int(np.searchsorted(EDGES, exact))
+    truth = math.exp(-0.5 * (EDGES[at] / slow.sigma) ** 2)
+    held, naive, shares, events = {0.99: 0, 0.95: 0}, {0.99: 0, 0.95: 0}, [], []
+    for chunk in chunks:
+        for confidence in held:
+            tail = tail_of_time(chunk.survival, chunk.survival_square, 64, EDGES, [probability], confidence)
+            found = tail.wanted[probability]
+            held[confidence] += found.low <= exact <= found.high < 1.15 * exact
+            share = float(chunk.survival[at]) / 64
+            band = proportion_interval(share * samples, samples, confidence)  # as if samples were independent
+            naive[confidence] += band.low <= truth <= band.high
+        shares.append(share)
+        events.append(tail.effective_runs * probability)
+    assert held[0.99] >= 95
+    assert held[0.95] >= 88
+    assert naive[0.99] < 92
+    assert naive[0.95] < 80
+    assert np.mean(shares) == pytest.approx(truth, rel=0.06)
+    assert 30 < np.median(events) < 100
+
+
+def test_importance_sampling_needs_a_twentieth_of_the_runs(slow: Slow) -> None:
+    """Against twenty times as many plain runs of the same length outright, and by what both are worth."""
+    probability, runs = 1e-6, 128
+    exact = rayleigh(probability, slow.sigma)
+    aimed = slow.campaign("0.5 s", f'[tail]\nerror = "{exact * 1e6:.6f} urad"\nprobability = {probability}\n')
+    columns = slow.chunk(aimed, range(runs)).columns
+    tail = tail_weighted(columns["tail_radius"], columns["tail_log_weight"], (probability,), 0.99, (exact,))
+    plain = slow.chunk(slow.campaign("0.5 s"), range(20 * runs))
+    time = tail_of_time(plain.survival, plain.survival_square, 20 * runs, EDGES, (probability, 1e-3), 0.99)
+    found, other = tail.wanted[probability], time.wanted[probability]
+    assert found.low <= exact <= found.high
+    assert not other.high - other.low < 2.0 * (found.high - found.low)  # or not known at all
+    assert time.wanted[1e-3].low <= rayleigh(1e-3, slow.sigma) <= time.wanted[1e-3].high
+    past = tail.beyond[exact]
+    assert past.low <= probability <= past.high < 5.0 * past.low
+    # what the plain ones tell at 1e-3, with a thousandth of the excursions at 1e-6 and the slope of Rayleigh's tail
+    seen = time.wanted[1e-3]
+    relative = 0.5 * (seen.high - seen.low) / seen.value / ((found.high - found.low) / found.value)
+    assert 20 * runs * 1000 * relative**2 > 2 * 20 * runs
+
+
+def test_a_campaign_says_how_likely_its_error_is(slow: Slow) -> None:
+    """From the command's own ledger: text, data and page."""
+    exact = rayleigh(1e-6, slow.sigma)
+    tables = f'[tail]\nerror = "{exact * 1e6:.6f} urad"\nprobability = 1e-5\n'
+    campaign, book = slow.campaign("0.3 s", tables), slow.folder / "tail.ledger"
+    run.begin(campaign.path, book, run.Means(threads=2))
+    found = summarise(book)
+    (cell,) = found.cells
+    assert cell.tail is not None
+    ((error, past),) = cell.tail.beyond.items()
+    assert error == pytest.approx(exact, rel=1e-6)
+    assert past.low <= 1e-6 <= past.high < 20.0 * past.low
+    radius, likely = campaign_words.tail_sentences(found, cell)
+    assert radius.startswith("The radial error exceeds ") and "with probability 1e-5 (" in radius
+    said = campaign_words.share(past.value)
+    assert likely.startswith(f"The radial error is beyond {quantity(error, 'rad')} with probability {said} (")
+    assert "at 99 % confidence" in likely and likely in campaign_words.text(found, 10_000)
+    (told,) = campaign_words.data(found)["cells"][0]["tail"]["beyond"]
+    assert told == {"error_rad": error, **asdict(past)}
+    none = replace(cell.tail, beyond={error: replace(past, value=0.0, low=0.0)})
+    unseen = campaign_words.tail_sentences(found, replace(cell, tail=none))[1]
+    assert unseen.startswith("No radial error beyond ") and "0 % to " in unseen

@@ -1,0 +1,345 @@
+"""The commands `microrad campaign`: what they print, write, refuse and return, for careful and for hasty users."""
+
+import json
+import re
+import shutil
+import sqlite3
+import subprocess
+import sys
+
+import pytest
+
+from campaign_files import HEAD, POWER, written
+from command_line import listing
+from microrad.campaign import mending, run
+from microrad.campaign.ledger import Ledger
+from microrad.cli.campaign import campaigns
+
+LIMIT = '[limits.margin]\nleast = "1 dB"\n'
+LINKS = HEAD.replace("256", "64") + POWER + LIMIT  # without a loop: a worker has its rows in milliseconds
+OPTIMISE = """
+[optimise]
+minimise = "terminals.leo_aperture"
+confidence = 0.9
+rows = 32
+evaluations = 30
+[optimise.variables."terminals.leo_aperture"]
+low = "{low}"
+high = "{high}"
+"""
+
+
+def numbers(data):
+    """Every number of a JSON document."""
+    if isinstance(data, dict | list):
+        return [n for each in (data.values() if isinstance(data, dict) else data) for n in numbers(each)]
+    return [data] if isinstance(data, int | float) else []
+
+
+def parsed(text):
+    """A JSON document without what JSON does not know."""
+
+    def refuse(word):
+        raise AssertionError(word)
+
+    return json.loads(text, parse_constant=refuse)
+
+
+@pytest.fixture(scope="module")
+def done(tmp_path_factory):
+    """A folder with a campaign that has been run."""
+    folder = tmp_path_factory.mktemp("a done one")
+    run.begin(written(folder, LINKS, whole=False), folder / "campaign.ledger", run.Means(threads=1))
+    (folder / "campaign.ledger.lock").unlink()
+    return folder
+
+
+@pytest.fixture
+def there(folder, done):
+    """The current folder with that campaign in it."""
+    shutil.copytree(done, folder, dirs_exist_ok=True)
+    return folder
+
+
+def shortened(folder):
+    """Take one chunk out of the ledger, as if the campaign had been killed before it."""
+    with Ledger.open(folder / "campaign.ledger", write=True) as book:
+        book.drop(*max(book.done()))
+        book.note("state", "running")
+
+
+def broken(folder):
+    """Flip one bit in the payload of a chunk."""
+    with sqlite3.connect(folder / "campaign.ledger") as book:
+        (payload,) = book.execute("SELECT payload FROM chunks").fetchone()
+        book.execute("UPDATE chunks SET payload = ?", (payload[:-1] + bytes([payload[-1] ^ 1]),))
+    book.close()
+
+
+# --------------------------------------------------------------------------------------------------------------- help
+def test_every_command_has_an_example_that_names_it(call):
+    names = [each.name or each.callback.__name__ for each in campaigns.registered_commands]
+    assert set(names) == {"init", "run", "resume", "status", "verify", "export", "report", "optimise"}
+    for name in names:
+        shown = call("campaign", name, "--help")
+        assert shown.code == 0 and f"Examples:\n    microrad campaign {name}" in shown.out, name
+    assert "microrad campaign init" in call("campaign", "--help").out
+
+
+# --------------------------------------------------------------------------------------------------------------- init
+def test_init_writes_a_campaign_and_its_mission_and_never_overwrites(call, folder, refused):
+    shown = call("campaign", "init")
+    assert (shown.code, sorted(listing(folder))) == (0, ["campaign.toml", "leo-geo.toml"])
+    assert shown.out.endswith("Next: microrad campaign run campaign.toml\n")
+    assert "campaign.toml exists and is left as it is" in refused("campaign", "init")
+
+
+def test_init_keeps_a_mission_that_is_there(call, folder):
+    (folder / "leo-geo.toml").write_text("mine", encoding="utf-8")
+    shown = call("campaign", "init", "my tails.toml")
+    assert (folder / "leo-geo.toml").read_text(encoding="utf-8") == "mine"
+    assert (folder / "my tails.toml").is_file() and "microrad campaign run 'my tails.toml'" in shown.out
+
+
+def test_init_refuses_a_folder_that_is_not_there(refused):
+    assert "there is no folder no" in refused("campaign", "init", "no/campaign.toml")
+
+
+# ---------------------------------------------------------------------------------------------------------------- run
+def test_a_run_prints_and_keeps_what_status_shows(call, folder):
+    (folder / "my runs").mkdir()
+    file = written(folder / "my runs", LINKS, whole=False)
+    shown = call("campaign", "run", file, "--threads", 1)
+    book = folder / "my runs" / "campaign.ledger"
+    assert shown.code == 0, shown.err
+    assert shown.out == call("campaign", "status", book).out and shown.out.endswith(f"{book}\n")
+    assert mending.verify(book, [(0, 0)]).missing == ()
+
+
+def test_rows_that_miss_a_limit_are_an_exit_code(call, folder):
+    file = written(folder, LINKS.replace('"1 dB"', '"30 dB"'), whole=False)
+    shown = call("campaign", "run", file, "--ledger", "tails.ledger", "--json")
+    assert shown.code == 1, shown.err
+    assert parsed(shown.out)["ledger"] == "tails.ledger"
+    assert (folder / "tails.ledger").is_file() and not (folder / "campaign.ledger").exists()
+
+
+def test_an_existing_ledger_is_left_and_said_before_anything_is_tuned(there, refused, monkeypatch):
+    monkeypatch.setattr(run, "controllers", lambda *_: pytest.fail("tuned for nothing"))
+    said = refused("campaign", "run", "campaign.toml")
+    assert "there is already campaign.ledger: go on with `microrad campaign resume campaign.ledger`" in said
+    assert "which is no ledger, and it stays" in refused("campaign", "run", "campaign.toml", "--ledger", "mission.toml")
+    assert "which is no ledger, and it stays" in refused("campaign", "run", "campaign.toml", "--ledger", ".")
+
+
+@pytest.mark.parametrize(
+    "means",
+    [("--threads", 1, "--workers", 1), ("--threads", 1, "--scheduler", "a:1"), ("--workers", 1, "--scheduler", "a:1")],
+)
+def test_ways_to_work_exclude_each_other(there, refused, means):
+    for command in (("run", "campaign.toml", "--ledger", "new.ledger"), ("resume", "campaign.ledger")):
+        said = refused("campaign", *command, *means)
+        assert "--threads, --workers and --scheduler exclude each other" in said
+
+
+@pytest.mark.parametrize("address", ["", "head", "http://head:8786", "tcp://head", "tcp://head:port", "a b:1"])
+def test_what_is_no_address_of_a_scheduler_is_refused(there, refused, address):
+    said = refused("campaign", "run", "campaign.toml", "--ledger", "new.ledger", "--scheduler", address)
+    assert f"--scheduler {address!r} is no address" in said and "tcp://head:8786" in said
+
+
+def test_a_scheduler_that_is_not_there_leaves_no_ledger_behind(there, refused, monkeypatch):
+    monkeypatch.setattr("microrad.campaign.cluster._CONNECT_S", 1.0)
+    address = "tcp://127.0.0.1:1"
+    said = refused("campaign", "run", "campaign.toml", "--ledger", "new.ledger", "--scheduler", address)
+    assert said.count("\n") == 1 and f"no scheduler answers at {address}" in said
+
+
+@pytest.mark.parametrize("count", ["0", "-1", "two"])
+def test_a_number_of_threads_is_at_least_one(there, refused, count):
+    assert "--threads" in refused("campaign", "run", "campaign.toml", "--ledger", "new.ledger", "--threads", count)
+
+
+def test_a_missing_package_is_named_with_its_extra(there, call, refused, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    assert 'pip install "microrad[parquet]"' in refused("campaign", "export", "campaign.ledger", "rows.parquet")
+    for name in ("dask", "distributed"):
+        monkeypatch.setitem(sys.modules, name, None)
+    shown = call("campaign", "run", "campaign.toml", "--ledger", "new.ledger", "--workers", 1)
+    assert shown.code == 2 and 'pip install "microrad[cluster]"' in shown.err and "Traceback" not in shown.err
+
+
+# ----------------------------------------------------------------------------------------------- the wrong kind of file
+@pytest.mark.parametrize("command", ["run", "optimise"])
+def test_what_is_no_campaign_file_is_refused(there, refused, command):
+    (there / "empty").touch()
+    for file, words in (
+        ("nothing.toml", "`microrad campaign init` writes one"),
+        ("empty", "`microrad campaign init` writes one"),
+        (".", "is a directory"),
+        ("campaign.ledger", "`microrad campaign resume campaign.ledger` goes on with it"),
+        ("mission.toml", "mission.toml"),
+    ):
+        assert words in refused("campaign", command, file), file
+
+
+@pytest.mark.parametrize(
+    "command", [("status",), ("resume",), ("verify",), ("report",), ("export", "rows.csv")], ids=lambda words: words[0]
+)
+def test_what_is_no_ledger_is_refused_and_nothing_is_left_beside_it(there, refused, command):
+    (there / "empty").touch()
+    (there / "table.csv").write_text("row,µ\n1,2\n", encoding="utf-8")
+    (there / "long.txt").write_bytes(b"x" + "µ".encode() * 4096)  # the first page ends within a character
+    name, *more = command
+    for file, words in (
+        ("nothing.ledger", "there is no ledger nothing.ledger: begin the campaign with `microrad campaign run`"),
+        (".", "is a folder, not a ledger"),
+        ("empty", "is an empty file, not a ledger"),
+        ("table.csv", "is text, not a ledger"),
+        ("long.txt", "is text, not a ledger"),
+        ("campaign.toml", "is text, not a ledger"),
+    ):
+        said = refused("campaign", name, file, *more)
+        assert words in said and said.count("\n") == 1, file
+
+
+def test_a_ledger_goes_nowhere_but_into_a_folder(there, refused):
+    assert "there is no folder no" in refused("campaign", "run", "campaign.toml", "--ledger", "no/new.ledger")
+
+
+# --------------------------------------------------------------------------------------------------- status and resume
+def test_status_of_what_is_complete_and_of_what_is_not(there, call):
+    shown, data = call("campaign", "status", "campaign.ledger"), call("campaign", "status", "campaign.ledger", "--json")
+    assert (shown.code, data.code) == (0, 0) and "Complete: 64 rows" in shown.out
+    assert parsed(data.out)["ledger"] == "campaign.ledger" and 64 in numbers(parsed(data.out))
+    shortened(there)
+    shown, data = call("campaign", "status", "campaign.ledger"), call("campaign", "status", "campaign.ledger", "--json")
+    assert (shown.code, data.code) == (1, 1) and "microrad campaign resume" in shown.out
+    assert parsed(data.out) and "Complete" not in shown.out
+
+
+def test_resume_comes_to_what_was_there(there, call):
+    before = call("campaign", "export", "campaign.ledger", "before.csv")
+    shortened(there)
+    shown = call("campaign", "resume", "campaign.ledger", "--threads", 1)
+    assert (before.code, shown.code) == (0, 0) and "Complete: 64 rows" in shown.out
+    call("campaign", "export", "campaign.ledger", "after.csv")
+    assert (there / "after.csv").read_bytes() == (there / "before.csv").read_bytes()
+
+
+def test_an_interrupt_says_how_to_go_on(there, call, monkeypatch):
+    def interrupt(*args):
+        raise KeyboardInterrupt
+
+    shortened(there)
+    (there / "campaign.ledger").rename(there / "my rows.ledger")
+    with monkeypatch.context() as patched:
+        patched.setattr(run.Means, "engine", interrupt)
+        shown = call("campaign", "resume", "my rows.ledger")
+    assert (shown.code, shown.out) == (130, "")
+    assert re.search(r"stopped; \d+ rows are in my rows.ledger. Go on with: microrad campaign resume 'my", shown.err)
+    with monkeypatch.context() as patched:  # after the rows, while they are read
+        patched.setattr("microrad.campaign.summary.summarise", interrupt)
+        shown = call("campaign", "resume", "my rows.ledger", "--threads", 1)
+    assert shown.code == 130 and "Go on with: microrad campaign resume 'my rows.ledger'" in shown.err
+    with monkeypatch.context() as patched:  # before there is a ledger
+        patched.setattr(run, "controllers", interrupt)
+        shown = call("campaign", "run", "campaign.toml", "--ledger", "new.ledger")
+    assert (shown.code, shown.err) == (130, "microrad: interrupted, nothing was written\n")
+    assert call("campaign", "status", "my rows.ledger").code == 0
+
+
+def test_a_ledger_that_cannot_be_written_is_read_all_the_same(there, call, tmp_path_factory):
+    locked = tmp_path_factory.mktemp("locked")
+    shutil.copytree(there, locked, dirs_exist_ok=True)
+    for step in (["mount", "--bind", locked, locked], ["mount", "-o", "remount,ro,bind", locked]):
+        if subprocess.run(step, capture_output=True, check=False).returncode:
+            pytest.skip("this machine does not allow to mount a folder read-only")
+    try:
+        assert call("campaign", "status", locked / "campaign.ledger").code == 0
+        for command in (("resume", "campaign.ledger"), ("report", "campaign.ledger"), ("run", "campaign.toml")):
+            name, file = command
+            more = ("--ledger", locked / "new.ledger") if name == "run" else ()
+            shown = call("campaign", name, locked / file, *more)
+            assert (shown.code, shown.out, shown.err.count("\n")) == (2, "", 1), shown
+            assert str(locked) in shown.err and "Traceback" not in shown.err
+        assert listing(locked) == listing(there)
+    finally:
+        subprocess.run(["umount", "-l", locked], check=True)
+
+
+# -------------------------------------------------------------------------------------------------------------- verify
+def test_verify_finds_a_flipped_bit_and_resume_mends_it(there, call):
+    sound, data = call("campaign", "verify", "campaign.ledger"), call("campaign", "verify", "campaign.ledger", "--json")
+    assert (sound.code, data.code) == (0, 0) and parsed(data.out)["sound"] is True
+    assert "with a right checksum" in sound.out and "damaged" not in sound.out
+    broken(there)
+    found, data = call("campaign", "verify", "campaign.ledger"), call("campaign", "verify", "campaign.ledger", "--json")
+    assert (found.code, data.code) == (1, 1) and parsed(data.out)["damaged"] == [[0, 0]]
+    assert "damaged: chunk 0 of cell 0" in found.out and "Next: microrad campaign resume campaign.ledger" in found.out
+    shown = call("campaign", "status", "campaign.ledger")
+    assert shown.code == 2 and "`microrad campaign resume campaign.ledger` does it again" in shown.err
+    assert call("campaign", "resume", "campaign.ledger", "--threads", 1).code == 0
+    assert call("campaign", "verify", "campaign.ledger").code == 0
+
+
+# --------------------------------------------------------------------------------------------------- export and report
+@pytest.mark.parametrize(("name", "begins"), [("r.csv", b"cell,"), ("r.parquet", b"PAR1"), ("r.nc", b"\x89HDF")])
+def test_export_writes_and_replaces_only_what_it_wrote(there, call, refused, name, begins):
+    shown = call("campaign", "export", "campaign.ledger", name)
+    whole = (there / name).read_bytes()
+    assert (shown.code, shown.out) == (0, f"{name}\n") and whole.startswith(begins)
+    assert f"{name} exists and is left as it is" in refused("campaign", "export", "campaign.ledger", name)
+    (there / name).write_bytes(whole[:1000])
+    assert call("campaign", "export", "campaign.ledger", name, "--overwrite").code == 0
+    assert (there / name).read_bytes()[:1000] == whole[:1000]
+    (there / name).write_bytes(b"my own table")
+    said = refused("campaign", "export", "campaign.ledger", name, "--overwrite")
+    assert f"{name} was not written by microrad and is left as it is" in said
+
+
+@pytest.mark.parametrize("name", ["rows.txt", "rows", "no/rows.csv", "."])
+def test_export_refuses_other_kinds_and_places(there, refused, name):
+    assert name in refused("campaign", "export", "campaign.ledger", name)
+
+
+def test_the_report_is_a_page_and_replaces_nothing_but_a_page(there, call, refused):
+    shown = call("campaign", "report", "campaign.ledger")
+    page = (there / "campaign.html").read_text(encoding="utf-8")
+    assert (shown.code, shown.out) == (0, "campaign.html\n")
+    assert page.startswith("<!DOCTYPE html>") and page.rstrip().endswith("</html>")
+    assert "campaign.html exists and is left as it is" in refused("campaign", "report", "campaign.ledger")
+    assert call("campaign", "report", "campaign.ledger", "--overwrite").code == 0
+    for victim in ("campaign.ledger", "mission.toml"):
+        said = refused("campaign", "report", "campaign.ledger", victim, "--overwrite")
+        assert f"{victim} was not written by microrad and is left as it is" in said
+    assert "there is no folder no" in refused("campaign", "report", "campaign.ledger", "no/page.html")
+
+
+# ------------------------------------------------------------------------------------------------------------ optimise
+def test_optimise_finds_the_least_aperture(call, folder):
+    file = written(folder, LINKS + OPTIMISE.format(low="3 cm", high="12 cm"), whole=False)
+    shown, data = call("campaign", "optimise", file), call("campaign", "optimise", file, "--json")
+    found = parsed(data.out)
+    least = found["best"]["values"]["terminals.leo_aperture"]
+    assert shown.code == data.code and shown.out.startswith("least ")
+    assert found["feasible"] and 0.03 <= least < 0.12
+    assert data.code == int(not found["confirmed"])
+    assert found["check"] in shown.out
+    assert all(each["cost"] >= least - 1e-12 for each in found["trace"] if each["feasible"])
+    for rows in ("searched", "fresh"):
+        assert re.search(rf"\nmargin ≥ 1 dB  {rows} +[01]\.\d\d dB +\d+\.?\d* % +[\d.]+ to [\d.]+ %\n", shown.out)
+    assert "The best of the designs tried" not in shown.out
+    assert sorted(p.name for p in folder.iterdir()) == ["campaign.toml", "mirror.toml", "mission.toml", "plain.toml"]
+
+
+def test_optimise_says_when_no_design_will_do(call, folder):
+    file = written(folder, LINKS + OPTIMISE.format(low="1 cm", high="2 cm"), whole=False)
+    shown, data = call("campaign", "optimise", file), call("campaign", "optimise", file, "--json")
+    assert (shown.code, data.code) == (1, 1)
+    assert shown.out.startswith("NO DESIGN KEEPS THE LIMITS: ") and "\nThe best of the designs tried:\n" in shown.out
+    assert not parsed(data.out)["feasible"] and parsed(data.out)["reason"]
+
+
+def test_optimise_needs_its_table(there, refused):
+    assert "there is no table [optimise] in it" in refused("campaign", "optimise", "campaign.toml")
