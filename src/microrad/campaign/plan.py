@@ -8,7 +8,7 @@ from microrad.campaign.file import CampaignFile
 from microrad.campaign.outputs import OUTPUTS, TAIL_OUTPUTS, Output
 from microrad.campaign.records import Job
 
-_CHUNK_STEPS = 4e7  # plant steps of all runs in a chunk: one to three seconds
+_CHUNK_STEPS = 2e7  # plant steps of all runs in a chunk: about a second
 _CHUNK_ROWS = 1024  # at most, and without a loop
 _DAY_ROWS = 8  # with outputs of the day, which take a second each
 _GROWTH = 1.5  # of the rows from one round to the next, until the precision is reached
@@ -22,7 +22,7 @@ def outputs(campaign: CampaignFile) -> tuple[Output, ...]:
 
 
 def chunk_rows(campaign: CampaignFile) -> int:
-    """Rows in a chunk: a power of two, a few seconds of work."""
+    """Rows in a chunk: a power of two, about a second of work."""
     few = 1 << int(math.log2(campaign.rows))
     if any(output.group == "day" for output in outputs(campaign)):
         return min(_DAY_ROWS, few)
