@@ -36,7 +36,15 @@ def engine(monkeypatch):
 
 
 def children():
-    return [p for p in psutil.Process().children(recursive=True) if "microrad.campaign.worker" in " ".join(p.cmdline())]
+    return [p for p in psutil.Process().children(recursive=True) if "microrad.campaign.worker" in command(p)]
+
+
+def command(process):
+    """The command line of a process; of one that has just ended there is none."""
+    try:
+        return " ".join(process.cmdline())
+    except (psutil.ZombieProcess, psutil.NoSuchProcess):
+        return ""
 
 
 def chunks(count, first=0):

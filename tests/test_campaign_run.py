@@ -64,6 +64,17 @@ def long(tmp_path_factory):
     return path, load_campaign(path), table(book)
 
 
+def wait_for_a_chunk(process, book):
+    """Until the first chunk is in."""
+    done = set()
+    while not done:
+        assert process.poll() is None, process.communicate()
+        time.sleep(0.05)
+        if book.exists():
+            with Ledger.open(book, write=False) as opened:
+                done = opened.done()
+
+
 # --------------------------------------------------------------------------------------------------------------- kills
 def test_twenty_kills_of_worker_and_parent_change_nothing(long, tmp_path):
     path, campaign, undisturbed = long
@@ -103,9 +114,7 @@ def test_ctrl_c_stops_within_a_second_and_says_how_to_go_on(long, tmp_path):
     path, _, undisturbed = long
     book = tmp_path / "c.ledger"
     process = started("run", path, "--ledger", book, cwd=tmp_path)
-    while not (book.exists() and Ledger.open(book, write=False).done()):
-        assert process.poll() is None, process.communicate()
-        time.sleep(0.05)
+    wait_for_a_chunk(process, book)
     workers = children(process.pid)
     asked = time.monotonic()
     process.send_signal(signal.SIGINT)
@@ -124,9 +133,7 @@ def test_a_second_process_on_a_ledger_is_refused_and_a_reader_is_not(long, tmp_p
     book = tmp_path / "s.ledger"
     process = started("run", path, "--ledger", book, cwd=tmp_path)
     try:
-        while not (book.exists() and Ledger.open(book, write=False).done()):
-            assert process.poll() is None, process.communicate()
-            time.sleep(0.05)
+        wait_for_a_chunk(process, book)
         code, out, err = finished("resume", book, cwd=tmp_path)
         assert (code, out) == (2, "") and str(process.pid) in err and "Traceback" not in err
         code, out, _ = finished("status", book, cwd=tmp_path)

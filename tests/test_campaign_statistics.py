@@ -276,3 +276,15 @@ def test_values_that_repeat_are_their_own_quantiles():
     other.add(np.array([1.0 - 1e-5]))  # in the bin of 1, and no longer the same
     sketch.merge(other)
     assert 1.0 - 1e-5 <= sketch.quantile(0.6) < 1.0
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_a_rare_share_does_not_hang_on_heavy_rows_far_from_it(seed: int) -> None:
+    value = philox(seed).normal(4.4, 0.15, 1024)  # drawn for a normal of mean 5: rows near 5 weigh thousands
+    weight = np.exp((((value - 4.4) / 0.15) ** 2 - ((value - 5.0) / 0.15) ** 2) / 2.0)
+    hit, truth = (value < 4.56).astype(float), stats.norm.cdf(4.56, 5.0, 0.15)
+    found, missed = share_interval(moments(hit, weight), 0.99), share_interval(moments(1.0 - hit, weight), 0.99)
+    assert found.low < truth < found.high < 1.4 * truth
+    assert missed.low < 1.0 - truth < missed.high and missed.value == pytest.approx(1.0 - found.value, abs=1e-15)
+    alone = np.sum(weight * hit) / np.sum(weight)
+    assert abs(found.value / truth - 1.0) < 0.25 and abs(alone / truth - 1.0) > abs(found.value / truth - 1.0)

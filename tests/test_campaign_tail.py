@@ -326,4 +326,4 @@ def test_a_campaign_says_how_likely_its_error_is(slow: Slow) -> None:
     assert told == {"error_rad": error, **asdict(past)}
     none = replace(cell.tail, beyond={error: replace(past, value=0.0, low=0.0)})
     unseen = campaign_words.tail_sentences(found, replace(cell, tail=none))[1]
-    assert unseen.startswith("No radial error beyond ") and "0 % to " in unseen
+    assert unseen.startswith("No radial error beyond ") and "(0 to " in unseen

@@ -11,7 +11,7 @@ The file itself is in `ledger_file`; checks of every byte and mending are in `me
 import json
 import sqlite3
 from collections.abc import Iterator, Mapping
-from contextlib import ExitStack, closing, contextmanager, suppress
+from contextlib import closing, contextmanager, suppress
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -62,13 +62,21 @@ class Ledger:
     @classmethod
     def open(cls, path: Path, *, write: bool) -> Self:
         """The ledger in a file. Raises `CampaignError` where it is none, or where another process already writes."""
-        with told(path, "open the ledger"), ExitStack() as undo:
+        with told(path, "open the ledger"):
             refuse_foreign(path)
-            lock = undo.enter_context(closing(locked(path))) if write else None
-            ledger = cls(path, undo.enter_context(closing(connected(path, write=write))), lock)
-            if write:
-                ledger.note("writer", this_process())
-            undo.pop_all()
+            lock = locked(path) if write else None
+            try:
+                ledger = cls(path, connected(path, write=write), lock)
+            except BaseException:
+                if lock is not None:
+                    lock.close()
+                raise
+            try:
+                if write:
+                    ledger.note("writer", this_process())
+            except BaseException:
+                ledger.close()
+                raise
             return ledger
 
     def __enter__(self) -> Self:

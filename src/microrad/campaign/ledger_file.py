@@ -21,7 +21,6 @@ FORMAT = blob.VERSION  # one number for both, so that what another microrad wrot
 _APPLICATION = 0x6D726164  # "mrad": SQLite's application_id, so that another program's file is told from a ledger
 HEADS = ("head", "head_again")  # two tables, so that no page has both
 PAGE = 4096
-_MAGIC = b"SQLite format 3\0"
 _GLANCE_S = 0.5  # longer than `is_written` holds the lock
 PATIENCE_S = 30.0  # how long another program may hold the file, such as a copy being made
 _TABLES = """
@@ -95,23 +94,34 @@ def refuse_existing(path: Path) -> None:
 
 
 def is_ledger(path: Path) -> bool:
-    """Whether a file begins as SQLite's do."""
-    with suppress(OSError), path.open("rb") as file:
-        return file.read(len(_MAGIC)) == _MAGIC
-    return False  # a folder, or what cannot be read
+    """Whether a file is one of SQLite's."""
+    if not path.is_file() or not path.stat().st_size:
+        return False
+    with suppress(sqlite3.Error), closing(sqlite3.connect(f"{path.absolute().as_uri()}?mode=rw", uri=True)) as probe:
+        probe.execute("PRAGMA application_id")
+        return True
+    return False
 
 
 def refuse_foreign(path: Path) -> None:
-    """Raise `CampaignError` for what cannot have been a ledger, however damaged: no file, an empty one, or text."""
+    """Raise `CampaignError` for what cannot have been a ledger, however damaged: no file, an empty one, or text.
+
+    A file of SQLite's is never opened but by SQLite: to close it again would drop the locks that other connections of
+    this process hold on it, and with them what they know of its log (SQLite, How To Corrupt, 2.2).
+    """
     if path.is_dir():
         raise CampaignError(f"{path} is a folder, not a ledger: name the file that `microrad campaign run` wrote")
     if not path.is_file():
         raise CampaignError(f"there is no ledger {path}: begin the campaign with `microrad campaign run`")
+    if not path.stat().st_size:
+        if not files(path)[1].exists():
+            raise CampaignError(f"{path} is an empty file, not a ledger: name the file `microrad campaign run` wrote")
+        return
+    if is_ledger(path):
+        return
     with path.open("rb") as file:
         first = file.read(PAGE)
-    if not first and not files(path)[1].exists():
-        raise CampaignError(f"{path} is an empty file, not a ledger: name the file that `microrad campaign run` wrote")
-    if first and _is_text(first):
+    if _is_text(first):
         begin = f"begin it with `microrad campaign run {argument(path)}`, or " if path.suffix == ".toml" else ""
         raise CampaignError(f"{path} is text, not a ledger: {begin}name the file that `microrad campaign run` wrote")
 

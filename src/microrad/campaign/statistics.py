@@ -131,19 +131,27 @@ def proportion_interval(hits: float, trials: float, confidence: float) -> Interv
 def share_interval(rows: Moments, confidence: float) -> Interval:
     """Share of the rows that hit, from the moments of 1 (hit) and 0, with its interval.
 
-    Rows without weights: `proportion_interval`. With weights it is the same for the number of independent rows that
-    would know the share as well: E. L. Korn and B. I. Graubard, Confidence intervals for proportions with small
-    expected number of positive counts estimated from survey data, Survey Methodology 24 (1998) 193. It is
-    Kish's (sum w)^2 / sum w^2 where all or none hit, and may be many times the number of rows where the weights of
-    those that hit are small. For rows of Latin hypercubes or Sobol sets it is wider than needed.
+    Rows without weights: `proportion_interval`. Weights are those of importance sampling, of mean 1: the share is the
+    sum of the weights that hit (or miss, where those weigh less) over the number of rows, not over the sum of all
+    weights, since few heavy rows far from what is rare would decide that. The interval is that of the independent rows
+    that would know the share as well: E. L. Korn and B. I. Graubard, Confidence intervals for proportions with small
+    expected number of positive counts estimated from survey data, Survey Methodology 24 (1998) 193; of Kish's
+    (sum w)^2 / sum w^2 where all or none hit. For rows of Latin hypercubes or Sobol sets it is wider than needed.
     """
     if not rows.count:
         return proportion_interval(0.0, 0.0, confidence)
     share = min(max(rows.mean, 0.0), 1.0)
     size = rows.weight**2 / rows.weight_square
-    if 0.0 < share < 1.0 and rows.weight_square != rows.weight:
-        size = share * (1.0 - share) / rows.mean_variance
-    return proportion_interval(share * size, size, confidence)
+    if rows.weight_square == rows.weight or not 0.0 < share < 1.0:
+        return proportion_interval(share * size, size, confidence)
+    hits, hits_square = rows.mean * rows.weight, rows.skewed + rows.mean * rows.weight_square
+    rare = hits <= rows.weight - hits
+    total, square = (hits, hits_square) if rare else (rows.weight - hits, rows.weight_square - hits_square)
+    part = min(total / rows.count, 1.0)
+    variance = max(square / rows.count - part**2, 0.0) / max(rows.count - 1, 1)
+    size = part * (1.0 - part) / variance if variance > 0.0 else size
+    found = proportion_interval(part * size, size, confidence)
+    return found if rare else Interval(1.0 - found.value, 1.0 - found.high, 1.0 - found.low, confidence)
 
 
 def quantile_interval(sketch: Sketch, probability: float, confidence: float) -> Interval:
