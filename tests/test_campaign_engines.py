@@ -325,7 +325,8 @@ def test_a_campaign_stopped_for_a_while_calls_only_that_late_which_is(parent, de
     os.killpg(process.pid, signal.SIGSTOP)
     time.sleep(2.5)
     os.killpg(process.pid, signal.SIGCONT)
-    lines, _ = process.communicate(timeout=10.0)
+    lines = process.stdout.read()  # communicate would leave out what readline has already taken in
+    assert process.wait(timeout=10.0) == 0
     assert sorted(lines.split()) == ["done"] * (8 - late) + ["late"] * late
 
 
