@@ -13,6 +13,7 @@ from scipy.special import i0e
 from microrad.campaign import loops, run, tilt
 from microrad.campaign.file import CampaignFile, load_campaign
 from microrad.campaign.inputs import Builder
+from microrad.campaign.ledger import Ledger
 from microrad.campaign.records import Chunk, Floats, Interval
 from microrad.campaign.statistics import proportion_interval
 from microrad.campaign.summary import summarise
@@ -323,7 +324,14 @@ def test_a_campaign_says_how_likely_its_error_is(slow: Slow) -> None:
     assert likely.startswith(f"The radial error is beyond {quantity(error, 'rad')} with probability {said} (")
     assert "at 99 % confidence" in likely and likely in campaign_words.text(found, 10_000)
     (told,) = campaign_words.data(found)["cells"][0]["tail"]["beyond"]
-    assert told == {"error_rad": error, **asdict(past)}
+    assert told == {"error_rad": error, **asdict(past), "variance": cell.tail.variance[error]}
+    assert f"The variance of that estimate is {told['variance']:.2g}, as of " in likely
+    with Ledger.open(book, write=False) as opened:
+        rows = [chunk.columns for chunk in opened.chunks(0)]
+    drawn = {name: np.concatenate([each[name] for each in rows]) for name in ("tail_radius", "tail_log_weight")}
+    terms = np.exp(drawn["tail_log_weight"]) * (drawn["tail_radius"] > error)
+    assert told["variance"] == pytest.approx(np.var(terms, ddof=1) / terms.size, rel=1e-9)
+    assert past.value == pytest.approx(np.mean(terms), rel=1e-12)
     none = replace(cell.tail, beyond={error: replace(past, value=0.0, low=0.0)})
     unseen = campaign_words.tail_sentences(found, replace(cell, tail=none))[1]
     assert unseen.startswith("No radial error beyond ") and "(0 to " in unseen

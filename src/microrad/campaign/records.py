@@ -121,7 +121,8 @@ class Tail:
 
     ``wanted`` are radii exceeded with a probability, an interval each. ``method`` says where it comes from;
     ``effective_runs`` is the number of independent draws of one error that would know the ``wanted`` probability as
-    well, nan where none is wanted. ``beyond`` are probabilities of a larger error than a radius that was asked for.
+    well, nan where none is wanted. ``beyond`` are probabilities of a larger error than a radius that was asked for,
+    and ``variance`` the variances of these estimates in importance sampling.
     """
 
     radius_rad: Floats
@@ -133,6 +134,7 @@ class Tail:
     method: str
     effective_runs: float
     beyond: dict[float, Interval] = field(default_factory=dict)
+    variance: dict[float, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)

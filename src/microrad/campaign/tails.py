@@ -1,7 +1,7 @@
 """Tails of the radial error, with intervals that hold for few rows: of the time of plain runs, or of tilted draws."""
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -60,7 +60,7 @@ def tail_weighted(
     log_weight: Floats,
     probabilities: Iterable[float],
     confidence: float,
-    errors_rad: Iterable[float] = (),
+    errors_rad: Sequence[float] = (),
 ) -> Tail:
     """Probability that one error exceeds a radius, from draws (n,) with the logarithm of their weights (n,).
 
@@ -94,7 +94,14 @@ def tail_weighted(
         method=f"importance sampling of the noise in {draws} runs",
         effective_runs=_effective(whole, wanted),
         beyond={error: _beyond(radius, band, error, confidence) for error in errors_rad},
+        variance={error: _variance(weight[radius > error], draws) for error in errors_rad},
     )
+
+
+def _variance(weight: Floats, draws: int) -> float:
+    """Variance of the mean of weight times 1(draw > radius), from the weights of those that are larger."""
+    share = float(np.sum(weight)) / draws
+    return max(float(np.sum(weight**2)) / draws - share**2, 0.0) / max(draws - 1, 1)
 
 
 def _beyond(radius_rad: Floats, band: "_Band", error_rad: float, confidence: float) -> Interval:

@@ -189,8 +189,17 @@ def tail_sentences(summary: CampaignSummary, cell: CellSummary | None) -> list[s
     for at, past in sorted({**asked, **tail.beyond}.items()):
         likely = f"The radial error is beyond {bound(at, 'rad')} with probability {share(past.value)}"
         unseen = f"No radial error beyond {bound(at, 'rad')} was seen"
-        found.append(f"{likely if past.value else unseen}{_sure(past, 'outage', '')}.")
+        found.append(f"{likely if past.value else unseen}{_sure(past, 'outage', '')}.{_worth(tail, at, past)}")
     return found
+
+
+def _worth(tail: Tail, radius_rad: float, past: Interval) -> str:
+    """The variance of an estimate by importance sampling, and how many plain draws have the same."""
+    variance = tail.variance.get(radius_rad, 0.0)
+    if not variance:
+        return ""
+    plain = past.value * (1.0 - past.value) / variance
+    return f" The variance of that estimate is {variance:.2g}, as of {plain:.2g} draws without importance sampling."
 
 
 def answers(summary: CampaignSummary, cell: CellSummary | None) -> list[str]:
@@ -394,4 +403,5 @@ def _tail_data(tail: Tail) -> dict[str, Any]:
     wanted = [{"probability": p, "unit": "rad", **asdict(each)} for p, each in tail.wanted.items()]
     kept = {key: getattr(tail, key) for key in ("confidence", "method", "effective_runs")}
     past = [{"error_rad": error, **asdict(each)} for error, each in tail.beyond.items()]
+    past = [each | {"variance": tail.variance.get(each["error_rad"])} for each in past]
     return {**curves, "wanted": wanted, "beyond": past, **kept}
