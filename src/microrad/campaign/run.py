@@ -201,8 +201,7 @@ class _Run:
             self._traces()
             self._note("complete")
         except KeyboardInterrupt:
-            self.workers.close()
-            self._note("stopped")
+            self.workers.close()  # that nobody writes any more says that it was stopped: no further sync of the disk
             raise KeyboardInterrupt(f"stopped; {self._stopped()}") from None
         except BaseException as error:
             self.workers.close()
