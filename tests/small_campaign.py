@@ -47,6 +47,11 @@ def campaign_file(
     return path
 
 
+def hears_ctrl_c():
+    """Take Ctrl-C as a terminal's commands do: tests that run in the background of a shell were told to ignore it."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
 def started(*args, cwd, **environment):
     """A command of the command line, running in a process of its own."""
     return subprocess.Popen(
@@ -57,6 +62,7 @@ def started(*args, cwd, **environment):
         stderr=subprocess.PIPE,
         text=True,
         start_new_session=True,  # a Ctrl-C of the tests is not theirs
+        preexec_fn=hears_ctrl_c,
     )
 
 
