@@ -62,7 +62,7 @@ def started(*args, cwd, **environment):
         stderr=subprocess.PIPE,
         text=True,
         start_new_session=True,  # a Ctrl-C of the tests is not theirs
-        preexec_fn=hears_ctrl_c,
+        preexec_fn=hears_ctrl_c,  # noqa: PLW1509
     )
 
 

@@ -16,6 +16,7 @@ import pytest
 from microrad.campaign.engines import Clock, Flight, LocalEngine, late_flights
 from microrad.campaign.records import CampaignError, Job
 from microrad.campaign.worker import Beat
+from small_campaign import hears_ctrl_c
 
 
 @pytest.fixture
@@ -257,7 +258,6 @@ PARENT = """
 import sys
 from microrad.campaign.engines import LocalEngine
 from microrad.campaign.records import Job
-from small_campaign import hears_ctrl_c
 engine = LocalEngine(sys.argv[1].encode(), "campaign_target:open_work", 2, float(sys.argv[2]))
 try:
     for outcome in engine.outcomes(Job(0, n) for n in range(int(sys.argv[3]))):
@@ -281,7 +281,7 @@ def parent():
             stderr=subprocess.PIPE,
             text=True,
             start_new_session=True,
-            preexec_fn=hears_ctrl_c,
+            preexec_fn=hears_ctrl_c,  # noqa: PLW1509
         )
         started.append(process)
         alarm = threading.Timer(30.0, process.kill)
