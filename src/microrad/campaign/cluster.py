@@ -216,7 +216,7 @@ class DaskEngine:
             client = distributed.Client(self.address, timeout=_CONNECT_S, set_as_default=False)
             client.subscribe_topic(self._topic, self._hear)
             return client
-        except (OSError, ValueError, TimeoutError) as error:
+        except (OSError, ValueError, TimeoutError, AssertionError) as error:  # the last: its own loop did not start
             if self._cluster:
                 self._cluster.close()
             self._clock.close()

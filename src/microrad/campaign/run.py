@@ -190,14 +190,14 @@ class _Run:
         """All rounds, then the traces; whatever stops it, what is done stays."""
         self.book.note("state", "running")
         try:
+            cells = list(range(len(self.campaign.cells)))
             for rows in plan.rounds(self.campaign):
-                cells = [cell for cell in range(len(self.campaign.cells)) if not self._reached(cell, rows)]
-                jobs = [job for cell in cells for job in plan.chunks(self.campaign, cell, rows)]
                 done = self.book.done()
+                jobs = [job for cell in cells for job in plan.chunks(self.campaign, cell, rows)]
                 missing = [job for job in jobs if (job.cell, job.number) not in done]
                 self.total = self.pace.done + sum(len(plan.rows_of(self.campaign, job.number)) for job in missing)
-                if missing:
-                    self._round(missing)
+                self._round(missing)
+                cells = [cell for cell in cells if not self._precise(cell, rows)]
             self._traces()
             self._note("complete")
         except KeyboardInterrupt:
@@ -220,13 +220,9 @@ class _Run:
         return f"{self.pace.done} rows are in {path}. Go on with: microrad campaign resume {argument(path)}"
 
     # ---------------------------------------------------------------------------------------------------------- rounds
-    def _reached(self, cell: int, rows: int) -> bool:
-        """Whether the rows of the rounds before this one are already as precise as wanted."""
-        before = [total for total in plan.rounds(self.campaign) if total < rows]
-        wanted = self.campaign.table.precision
-        if wanted is None or not before:
-            return False
-        return any(summary.reached(self.campaign, self.book, cell, total) for total in before)
+    def _precise(self, cell: int, rows: int) -> bool:
+        """Whether a cell's first rows know what is wanted well enough; never where nothing is wanted."""
+        return self.campaign.table.precision is not None and summary.reached(self.campaign, self.book, cell, rows)
 
     def _round(self, jobs: Sequence[Job]) -> None:
         """Do these chunks: each at most twice as a whole, then the rows of those that failed one by one."""

@@ -176,7 +176,7 @@ class Evaluator:
         key = (drawn.keys[group.start], rows)
         if self.memory is not None and key in self.memory:
             return self.memory[key]
-        loop, controller = loops.row_loop(file, table), self._controller(drawn.cell)
+        loop, controller = loops.row_loop(file, table), self.controller(drawn.cell)
         span = loops.span(self.campaign, file)
         if self.campaign.table.tail is not None:
             return _Tilted.run(self._tilt(drawn.cell), loop, controller, span, rows, watch)
@@ -197,7 +197,7 @@ class Evaluator:
         return found, None if own is None else evaluate.exceeded(own)
 
     # ----------------------------------------------------------------------------------------------------------- loops
-    def _controller(self, cell: int) -> LoopController:
+    def controller(self, cell: int) -> LoopController:
         """The controller of a cell, on the cell's own mission."""
         if cell not in self._held:
             table = self.campaign.table.loop
@@ -212,7 +212,7 @@ class Evaluator:
             assert table is not None and wanted is not None
             file = self.builder.mission(cell, self.fixed)
             loop, span = loops.row_loop(file, table), loops.span(self.campaign, file)
-            self._tilts[cell] = tilt.tilt(loop, self._controller(cell), span, wanted.error_rad)
+            self._tilts[cell] = tilt.tilt(loop, self.controller(cell), span, wanted.error_rad)
         return self._tilts[cell]
 
     def trace(self, cell: int, row: int, beat: Beat) -> WorstTrace:
@@ -223,7 +223,7 @@ class Evaluator:
             raise CampaignError(file)
         beat()
         loop, span = loops.row_loop(file, table), loops.span(self.campaign, file)
-        found = ensemble.trace(loop, self._controller(cell), span, row * self.campaign.realisations)
+        found = ensemble.trace(loop, self.controller(cell), span, row * self.campaign.realisations)
         settled = found.time_s >= span.settle_s
         return WorstTrace(
             cell, row, "", math.nan, found.time_s[settled], found.error_rad[settled], found.drive_v[settled]
@@ -249,7 +249,7 @@ class Work:
         table = self.campaign.table.loop
         assert table is not None
         period = 1.0 / fine_pointing.table(self.campaign.mission.mission).rate_hz
-        loop, controller = loops.row_loop(self.campaign.mission, table), self.evaluator._controller(0)
+        loop, controller = loops.row_loop(self.campaign.mission, table), self.evaluator.controller(0)
         ensemble.trace(loop, controller, ensemble.Span(2.0 * period, 0.0, 0))
 
     def do(self, job: Job, beat: Beat) -> bytes:
