@@ -5,9 +5,16 @@ import os
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the command line does, before numpy is loaded
 
 import pytest
+from hypothesis import settings
 
 from command_line import Result, listing
 from microrad import cli
+
+# The gate looks at the same examples each time: what one run finds, the next one finds, too. To look for new ones:
+# HYPOTHESIS_PROFILE=explore make unit
+settings.register_profile("gate", derandomize=True)
+settings.register_profile("explore")
+settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "gate"))
 
 
 @pytest.fixture

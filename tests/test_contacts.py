@@ -37,6 +37,7 @@ EPOCH = Epoch.from_text("2026-03-20T12:00:00Z")
 ROUND, FLAT = Earth("sphere", 0.0), Earth("oblate", 100e3)
 SLOT = GeostationarySlot("GEO", EPOCH, 0.3)
 one_millisecond = 1e-3
+one_nanoradian = 1e-9  # what a millisecond is worth at the top of a pass at 400 km: 4e-4 rad/s^2 x (1 ms)^2 / 2
 one_second = 1.0
 one_microsecond = 1e-6
 deg = math.pi / 180.0
@@ -761,7 +762,7 @@ def test_passes_agree_with_a_dense_grid(node, phase, latitude, mask):
     np.testing.assert_array_equal(inside(ends(found), dense)[sure], elevation[sure] > mask)
     for one in found:
         in_pass = (dense >= one.start_s) & (dense <= one.end_s)
-        assert one.highest_rad >= elevation[in_pass].max(initial=0.0)
+        assert one.highest_rad >= elevation[in_pass].max(initial=0.0) - one_nanoradian
         assert one.start_s <= one.highest_s <= one.end_s
         at = elevation_rad(station, EPOCH, np.array([one.highest_s]), low.states(np.array([one.highest_s])).position_m)
         assert one.highest_rad == pytest.approx(float(at[0]), abs=1e-12)
