@@ -30,6 +30,7 @@ benchmark: $(VENV)/.test
 	$(BIN)/python benchmarks/loop.py
 	$(BIN)/python benchmarks/ensemble.py
 	$(BIN)/python benchmarks/controllers.py
+	$(BIN)/python benchmarks/flight_step.py
 	$(BIN)/python benchmarks/start.py
 	$(BIN)/python benchmarks/link_conventions.py
 	$(BIN)/python benchmarks/contacts.py

@@ -162,4 +162,4 @@ def schema() -> Outcome:
     return Outcome(json_text(mission_schema()))
 
 
-from microrad.cli import campaign, day, lab, link, pointing  # noqa: E402, F401  their commands stand behind these in the help
+from microrad.cli import campaign, day, export, lab, link, pointing  # noqa: E402, F401  their commands stand behind these in the help

@@ -1,0 +1,290 @@
+"""Commands that take a design out of microrad, and a linear model in: flight code, co-simulation units, matrices."""
+
+import shlex
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from microrad.cli.frame import (
+    Json,
+    Outcome,
+    Overwrite,
+    Refusal,
+    app,
+    check_target,
+    command,
+    examples,
+    json_text,
+    option,
+    progress_bar,
+)
+from microrad.folder import write_whole
+
+# Everything else is imported inside the commands: it takes longer to load than help may take.
+if TYPE_CHECKING:
+    from microrad.missionfile import MissionFile
+
+exports = typer.Typer(
+    name="export",
+    help="Take a design to the flight computer and to other simulators: C, FMU, matrices.",
+    epilog=examples(
+        "microrad export c leo-geo.toml                C99 of a controller with its inverse, compiled and run",
+        "microrad export fmu leo-geo.toml              the mirror as a co-simulation unit",
+        "microrad export matrices leo-geo.toml         state-space, zeros and poles for MATLAB and Python",
+    ),
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+)
+app.add_typer(exports)
+
+_File = Annotated[Path, typer.Argument(help="Mission file; microrad init writes one.", metavar="FILE")]
+_Mirror = Annotated[Path | None, option("--mirror", "FILE", "Mirror file in place of the mission's mirror.")]
+_CONTROLLER = "A controller of the mission, as microrad design names them, or PID, PID + inverse"
+
+
+class _Precision(StrEnum):
+    DOUBLE = "double"
+    SINGLE = "single"
+    FIXED = "fixed"
+
+
+class _Version(StrEnum):
+    FMI_2 = "2.0"
+    FMI_3 = "3.0"
+
+
+class _AngleUnit(StrEnum):
+    RAD = "rad"
+    MRAD = "mrad"
+    URAD = "urad"
+
+
+class _Loop(StrEnum):
+    FINE_POINTING = "fine_pointing"
+    CONTROL = "control"
+
+
+DEFAULT_CONTROLLER = "PI + inverse"
+
+
+def _mission(file: Path, mirror: Path | None) -> "MissionFile":
+    from microrad.missionfile import load_mission
+
+    return load_mission(file, mirror)
+
+
+def _default_controller(mission: "MissionFile") -> str:
+    """Feedback with the inverse of the hysteresis ahead of it: the paper's choice, in the loop that the mission has."""
+    return DEFAULT_CONTROLLER if mission.mission.fine_pointing is not None else "PID + inverse"
+
+
+@exports.command(
+    epilog=examples(
+        "microrad export c leo-geo.toml",
+        'microrad export c leo-geo.toml --controller "PID + inverse" --precision single',
+        "microrad export c leo-geo.toml --controller LQG --name mirror_loop --output flight",
+    )
+)
+@command
+def c(
+    file: _File,
+    controller: Annotated[
+        str | None, option("--controller", "NAME", f"{_CONTROLLER} [default: {DEFAULT_CONTROLLER}].")
+    ] = None,
+    name: Annotated[
+        str | None, option("--name", "IDENTIFIER", "What names in the code begin with [default: from the controller].")
+    ] = None,
+    precision: Annotated[
+        _Precision, option("--precision", "KIND", "double, single, or fixed (linear part in 32-bit integers).")
+    ] = _Precision.DOUBLE,
+    mirror: _Mirror = None,
+    output: Annotated[
+        Path | None, option("--output", "FOLDER", "Folder to write [default: <mission>-<identifier>].")
+    ] = None,
+    overwrite: Overwrite = False,
+    as_json: Json = False,
+) -> Outcome:
+    """Write a controller as C99 for a flight computer.
+
+    With its inverse, limits and counters, a test bench, a recorded run of the loop and a Makefile; compiled and run
+    over that run where there is a C compiler.
+    """
+    from microrad.export import choice, write
+    from microrad.export.identifiers import identifier, suggested
+
+    mission = _mission(file, mirror)
+    wanted = controller if controller is not None else _default_controller(mission)
+    name = identifier(name) if name is not None else suggested(wanted)
+    folder = output or Path(f"{file.stem}-{name}")
+    write.check_output(folder, overwrite)
+    with progress_bar() as progress:
+        chosen = choice.choose(mission, wanted, progress)
+        found = write.export_flight(
+            chosen,
+            folder,
+            name=name,
+            precision=precision.value,
+            overwrite=overwrite,
+            on_progress=progress,
+        )
+    if as_json:
+        return Outcome(json_text({**write.data(found), "folder": str(folder)}))
+    return Outcome(f"{write.report_text(found)}\n\n{folder}")
+
+
+@exports.command(
+    epilog=examples(
+        "microrad export fmu leo-geo.toml",
+        'microrad export fmu leo-geo.toml --controller "PID + inverse" --fmi 3.0',
+        "microrad export fmu leo-geo.toml --loop control --output mirror.fmu",
+    )
+)
+@command
+def fmu(
+    file: _File,
+    controller: Annotated[
+        str | None, option("--controller", "NAME", f"{_CONTROLLER}: the closed loop with it [default: the mirror].")
+    ] = None,
+    loop: Annotated[
+        _Loop | None, option("--loop", "TABLE", "Whose amplifier and step the mirror has: fine_pointing or control.")
+    ] = None,
+    fmi: Annotated[_Version, option("--fmi", "VERSION", "2.0 or 3.0.")] = _Version.FMI_2,
+    name: Annotated[str | None, option("--name", "IDENTIFIER", "Model identifier [default: what it holds].")] = None,
+    mirror: _Mirror = None,
+    output: Annotated[Path | None, option("--output", "FILE", "File to write [default: <mission>-<name>.fmu].")] = None,
+    overwrite: Overwrite = False,
+) -> Outcome:
+    """Write the mirror with its amplifier, or the closed loop, as a co-simulation unit (FMI).
+
+    C inside, compiled here where there is a C compiler, sources beside it; parameters and units in its description. For
+    Simulink, Modelica tools, Basilisk and whatever else imports an FMU.
+    """
+    from microrad.export import choice
+    from microrad.export.fmu import write_unit
+    from microrad.export.identifiers import identifier, suggested
+
+    if controller is not None and loop is not None:
+        raise Refusal("--controller and --loop exclude each other: a controller stands in one loop of the mission.")
+    mission = _mission(file, mirror)
+    name = identifier(name) if name is not None else suggested(f"{controller} loop" if controller else "mirror")
+    path = output or Path(f"{file.stem}-{name}.fmu")
+    _check_file(path, overwrite, b"PK")
+    with progress_bar() as progress:
+        if controller is not None:
+            unit: Any = choice.loop_unit(choice.choose(mission, controller, progress))
+        else:
+            table = loop.value if loop else choice.LOOPS[0 if mission.mission.fine_pointing is not None else 1]
+            unit = choice.plant_unit(mission, table)
+        written = write_unit(unit, path, fmi.value, name)
+    return Outcome(written.words)
+
+
+@exports.command(
+    epilog=examples(
+        "microrad export matrices leo-geo.toml",
+        "microrad export matrices leo-geo.toml --controller LQG --output lqg.mat",
+        "microrad export matrices leo-geo.toml --json > models.json",
+    )
+)
+@command
+def matrices(
+    file: _File,
+    controller: Annotated[
+        str | None, option("--controller", "NAME", f"{_CONTROLLER}: it and its loop too [default: the mirror].")
+    ] = None,
+    mirror: _Mirror = None,
+    output: Annotated[Path | None, option("--output", "FILE", "File to write [default: <mission>.mat].")] = None,
+    overwrite: Overwrite = False,
+    as_json: Json = False,
+) -> Outcome:
+    """Write linear models to a MATLAB file: state space, zeros and poles, transfer functions.
+
+    The mirror's linear part, the mirror at the slow gain of its hysteresis and, with a controller, the plant as it is
+    sampled, the controller and the loop. --json prints them instead; in Python, microrad.export.matrices.to_control
+    makes objects of python-control.
+    """
+    from microrad.export import choice
+    from microrad.export import matrices as linear
+
+    mission = _mission(file, mirror)
+    path = output or Path(f"{file.stem}.mat")
+    if not as_json:
+        _check_file(path, overwrite, b"MATLAB 5.0")
+    with progress_bar() as progress:
+        found = linear.models(mission if controller is None else choice.choose(mission, controller, progress))
+    if as_json:
+        return Outcome(linear.json_text(found))
+    linear.write_mat(found, path)
+    return Outcome(f"{path} written: {', '.join(each.name for each in found)}")
+
+
+@app.command(
+    "import",
+    epilog=examples(
+        "microrad import mirror.mat --travel '2.5 mrad' --drive '0 V' '12 V' --bias '6 V' --rate-limit '3770 V/s' "
+        "--band '1 Hz' '5 kHz' --normalise-at '2 Hz' --output-unit mrad"
+    ),
+)
+@command
+def import_(  # noqa: PLR0913, PLR0917  what a linear model does not say has to be given, each by itself
+    file: Annotated[Path, typer.Argument(help="MATLAB file with A B C D, z p k or num den.", metavar="FILE")],
+    travel: Annotated[str, option("--travel", "ANGLE", "From stop to stop.")],
+    drive: Annotated[tuple[str, str], option("--drive", "LOW HIGH", "Range of the drive it was identified in.")],
+    bias: Annotated[str, option("--bias", "VOLTAGE", "Drive about which it works.")],
+    rate_limit: Annotated[str, option("--rate-limit", "RATE", "Fastest drive that it was identified for.")],
+    band: Annotated[tuple[str, str], option("--band", "LOW HIGH", "Frequencies that it was identified between.")],
+    normalise_at: Annotated[str, option("--normalise-at", "FREQUENCY", "Where its gain is taken, inside the band.")],
+    output_unit: Annotated[_AngleUnit, option("--output-unit", "UNIT", "What the model's output counts in.")],
+    name: Annotated[str | None, option("--name", "TEXT", "Name of the mirror [default: the file's].")] = None,
+    variable: Annotated[
+        str | None, option("--variable", "NAME", "The structure to take where the file has several.")
+    ] = None,
+    output: Annotated[
+        Path | None, option("--output", "FILE", "Mirror file to write [default: <file>-mirror.toml].")
+    ] = None,
+    overwrite: Overwrite = False,
+) -> Outcome:
+    """Make a mirror file of a linear model from another tool.
+
+    Volts in, an angle out, continuous in time, one input and one output. Such a mirror has no hysteresis; what a linear
+    model does not say has to be given.
+    """
+    from microrad.export.linear_import import Given, import_mat
+
+    given = Given(
+        name=name if name is not None else file.stem,
+        travel_rad=_quantity("--travel", travel, "rad"),
+        rate_limit_v_s=_quantity("--rate-limit", rate_limit, "V/s"),
+        bias_v=_quantity("--bias", bias, "V"),
+        drive_min_v=_quantity("--drive", drive[0], "V"),
+        drive_max_v=_quantity("--drive", drive[1], "V"),
+        excited_from_hz=_quantity("--band", band[0], "Hz"),
+        excited_to_hz=_quantity("--band", band[1], "Hz"),
+        normalise_at_hz=_quantity("--normalise-at", normalise_at, "Hz"),
+        output_unit=output_unit.value,
+    )
+    path = output or Path(f"{file.stem}-mirror.toml")
+    _check_file(path, overwrite, b"# Mirror imported")
+    write_whole(path, import_mat(file, given, variable))
+    return Outcome(f"{path} written. Next: microrad run leo-geo.toml --mirror {shlex.quote(str(path))}")
+
+
+def _quantity(flag: str, text: str, unit: str) -> float:
+    from microrad.units import UnitError, parse_quantity
+
+    try:
+        return parse_quantity(text, unit)
+    except UnitError as error:
+        raise Refusal(f"{flag}: {error}") from error
+
+
+def _check_file(path: Path, overwrite: bool, begins: bytes) -> None:
+    """Refuse to replace anything but, if asked to, a file that begins as those that microrad writes here."""
+    if not overwrite or not path.exists():
+        check_target(path, "choose another --output, or replace it with --overwrite")
+        return
+    if path.is_dir() or not path.read_bytes()[: len(begins)].startswith(begins):
+        raise Refusal(f"{path} was not written by microrad and is left as it is; choose another --output.")

@@ -1,0 +1,330 @@
+"""From a mission to what is exported: one of its controllers, the loop around it, and a run of it in the kernel."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+
+from microrad import control, fine_pointing, hysteresis, kernels, lti, mirror, simulate, tracking
+from microrad.export.modes import minimal
+from microrad.export.records import (
+    GAUGE,
+    OPTICAL_ERROR,
+    READING,
+    REFERENCE,
+    ExportError,
+    FlightController,
+    Floats,
+    InverseLaw,
+    LoopUnit,
+    Origin,
+    PlantUnit,
+    Signal,
+    Vectors,
+)
+from microrad.fine_loop.loop import LoopController
+from microrad.fine_loop.replay import replay
+from microrad.missionfile import MissionFile
+
+Progress = Callable[[int, int, str], None]
+
+PID, PID_WITH_INVERSE = "PID", "PID + inverse"
+"""The controllers of the table [control], as the study names them."""
+
+LOOPS = ("fine_pointing", "control")
+"""Tables of a mission that describe a loop."""
+
+INPUT_LIMIT_RAD = 0.1
+"""Readings and references beyond it are taken for faults: no fine steering mirror or tracking sensor goes so far."""
+
+
+@dataclass(frozen=True, slots=True)
+class PointingChoice:
+    """A controller of the fine-pointing loop."""
+
+    file: MissionFile
+    scene: fine_pointing.Scene
+    tuned: control.Tuned
+    controller: LoopController
+
+
+@dataclass(frozen=True, slots=True)
+class TrackingChoice:
+    """A controller of the table [control]: one axis that tracks sines, the paper's Fig. 6 and 8."""
+
+    file: MissionFile
+    name: str
+    mirror: mirror.Mirror
+    setup: simulate.Setup
+    inverse: control.Inverse
+
+
+Choice = PointingChoice | TrackingChoice
+
+
+def names(file: MissionFile) -> tuple[str, ...]:
+    """The controllers that a mission has."""
+    pointing = fine_pointing.names(file.mission) if file.mission.fine_pointing is not None else ()
+    return (*pointing, PID, PID_WITH_INVERSE)
+
+
+def choose(
+    file: MissionFile, name: str, on_progress: Progress = lambda done, total, what: None
+) -> PointingChoice | TrackingChoice:
+    """A controller of a mission, tuned where it belongs to the fine-pointing loop; `names` lists them.
+
+    Raises ExportError with the reason for a name that the mission does not have, and for a controller that cannot be
+    built on its mirror.
+    """
+    if name not in names(file):
+        raise ExportError(f"{file.path} has no controller {name!r}; it has: {'; '.join(names(file))}")
+    try:
+        return _tracking(file, name) if name in (PID, PID_WITH_INVERSE) else _pointing(file, name, on_progress)
+    except ExportError:
+        raise
+    except ValueError as error:
+        raise ExportError(f"{file.path}: {error}") from error
+
+
+def _pointing(file: MissionFile, name: str, on_progress: Progress) -> PointingChoice:
+    m = file.mission
+    on_progress(0, 2, f"tuning {name}")
+    scene = fine_pointing.scene(file)
+    tuned = fine_pointing.tune(name, m, fine_pointing.plants(scene, m, fine_pointing.table(m).seed))
+    on_progress(1, 2, f"{name} tuned")
+    return PointingChoice(file, scene, tuned, fine_pointing.build(name, scene, m, tuned.controller))
+
+
+def _tracking(file: MissionFile, name: str) -> TrackingChoice:
+    m = file.mission
+    model = tracking.mirror_model(m, m.mirror)
+    setup = simulate.setup_from_mission(m, hysteresis.secant_gain(model, m.scenario.amplitude_rad))
+    plant = mirror.from_mission(m.mirror, model, times=hysteresis.LINE_OF_SIGHT[m.conventions.mirror_angle])
+    inverse = control.inverse(plant) if name == PID_WITH_INVERSE else control.no_feedforward(plant)
+    return TrackingChoice(file, name, plant, setup, inverse)
+
+
+# ------------------------------------------------------------------------------------------------------ the controller
+def flight_controller(choice: Choice) -> FlightController:
+    """The chosen controller as it flies, without inputs and modes that do nothing.
+
+    A design that holds a model of its plant may have a mode that nothing drives or no output shows.
+    """
+    return minimal(trimmed(_whole_controller(choice)))
+
+
+def _whole_controller(choice: Choice) -> FlightController:
+    return _pointing_controller(choice) if isinstance(choice, PointingChoice) else _tracking_controller(choice)
+
+
+def columns(inputs: tuple[Signal, ...]) -> dict[str, slice]:
+    """Where each of the signals stands among the inputs."""
+    ends = np.cumsum([0] + [each.size for each in inputs])
+    return {each.name: slice(int(a), int(b)) for each, (a, b) in zip(inputs, pairwise(ends), strict=True)}
+
+
+def _looked_at(of: FlightController) -> dict[str, slice]:
+    s = of.system
+    return {name: at for name, at in columns(of.inputs).items() if np.any(s.B[:, at]) or np.any(s.D[:, at])}
+
+
+def trimmed(of: FlightController) -> FlightController:
+    """The controller without the signals that it does not look at."""
+    s, kept = of.system, _looked_at(of)
+    places = np.concatenate([np.arange(at.start, at.stop) for at in kept.values()])
+    return replace(
+        of,
+        inputs=tuple(each for each in of.inputs if each.name in kept),
+        system=lti.StateSpace(s.A, s.B[:, places], s.C, s.D[:, places]),
+    )
+
+
+def origin(file: MissionFile) -> Origin:
+    """Where an export of a mission comes from."""
+    return Origin(file.mission.name, file.sha256, file.mission.mirror.name)
+
+
+def inverse_law(of: control.Inverse, period_s: float, by_difference: bool) -> InverseLaw:
+    """An inverse at a control period."""
+    arrays = control.inverse_arrays(of, period_s)
+    return InverseLaw(
+        **{key.removeprefix("inverse_"): value for key, value in arrays.items()}, by_difference=by_difference
+    )
+
+
+def _pointing_controller(choice: PointingChoice) -> FlightController:
+    loop, made, margins = choice.scene.loop, choice.controller, choice.tuned.margins
+    period = loop.timing.period_s
+    inputs = (
+        Signal(
+            OPTICAL_ERROR, loop.axes, "rad", "line-of-sight error from the optical sensor, by axis", INPUT_LIMIT_RAD
+        ),
+        Signal(GAUGE, loop.mirror.axes, "rad", "strain gauge's reading of the mirror, by output", INPUT_LIMIT_RAD),
+        Signal(REFERENCE, loop.axes, "rad", "known part of the line-of-sight error, by axis", INPUT_LIMIT_RAD),
+    )
+    return FlightController(
+        name=made.name,
+        origin=origin(choice.file),
+        period_s=period,
+        inputs=inputs,
+        actuators=loop.mirror.actuators,
+        system=made.system,
+        anti_windup=made.anti_windup,
+        inverse=None if made.inverse is None else inverse_law(made.inverse, period, by_difference=False),
+        minimum_v=loop.drive.minimum_v,
+        maximum_v=loop.drive.maximum_v,
+        resolution_v=loop.drive.drive_resolution_v,
+        bias_v=choice.file.mission.mirror.bias_v,
+        margins=(
+            ("modulus margin", margins.modulus, ""),
+            ("gain margin", 20.0 * math.log10(margins.gain_up), "dB"),
+            ("phase margin", math.degrees(margins.phase_rad), "deg"),
+            ("delay margin", margins.delay_s, "s"),
+            ("bandwidth", margins.bandwidth_hz, "Hz"),
+        ),
+    )
+
+
+def _tracking_controller(choice: TrackingChoice) -> FlightController:
+    setup, s, axes = choice.setup, choice.setup.controller, choice.mirror.axes
+    margins = simulate.margins(choice.mirror, setup)
+    inverse = None
+    D = np.hstack([-s.D, s.D])
+    C = s.C
+    if choice.name == PID_WITH_INVERSE:
+        inverse = inverse_law(choice.inverse, setup.timing.period_s, by_difference=True)
+        D = np.vstack([D, np.hstack([np.zeros((axes, axes)), np.eye(axes)])])  # the target is the reference
+        C = np.vstack([C, np.zeros((axes, s.order))])
+    return FlightController(
+        name=choice.name,
+        origin=origin(choice.file),
+        period_s=setup.timing.period_s,
+        inputs=(
+            Signal(READING, axes, "rad", "line of sight as the mirror's sensor reads it", INPUT_LIMIT_RAD),
+            Signal(REFERENCE, axes, "rad", "wanted line of sight", INPUT_LIMIT_RAD),
+        ),
+        actuators=choice.mirror.actuators,
+        system=lti.StateSpace(s.A, np.hstack([-s.B, s.B]), C, D),
+        anti_windup=control.anti_windup(s),
+        inverse=inverse,
+        minimum_v=setup.drive.minimum_v,
+        maximum_v=setup.drive.maximum_v,
+        resolution_v=setup.drive.drive_resolution_v,
+        bias_v=choice.file.mission.mirror.bias_v,
+        margins=(
+            ("modulus margin", margins.modulus, ""),
+            ("gain margin", 20.0 * math.log10(margins.gain), "dB"),
+            ("phase margin", math.degrees(margins.phase_rad), "deg"),
+            ("delay margin", margins.delay_s, "s"),
+        ),
+    )
+
+
+# ---------------------------------------------------------------------------------------------------- plants and loops
+def plant_unit(file: MissionFile, loop: str) -> PlantUnit:
+    """Amplifier and mirror of one of the `LOOPS` of a mission, at the loop's plant step.
+
+    Raises ExportError with the reason for a loop that the mission does not have or that cannot be built.
+    """
+    if loop not in LOOPS or (loop == LOOPS[0] and file.mission.fine_pointing is None):
+        raise ExportError(f"{file.path} has no loop {loop!r}: one of {', '.join(LOOPS)} that is a table of the mission")
+    try:
+        if loop == LOOPS[0]:
+            made = fine_pointing.scene(file).loop
+            return _plant_unit(file, made.mirror, made.optics, made.drive, made.timing)
+        chosen = _tracking(file, PID)
+        return _plant_unit(file, chosen.mirror, np.eye(chosen.mirror.axes), chosen.setup.drive, chosen.setup.timing)
+    except ValueError as error:
+        raise ExportError(f"{file.path}: {error}") from error
+
+
+def _plant_unit(
+    file: MissionFile, of: mirror.Mirror, optics: Floats, drive: control.Drive, timing: control.Timing
+) -> PlantUnit:
+    return PlantUnit(
+        origin(file),
+        mirror.discretise(of, timing.step_s),
+        optics,
+        drive.bandwidth_hz,
+        control.amplifier_factor(drive, timing.step_s),
+        drive.slew_v_s * timing.step_s,
+        file.mission.mirror.bias_v,
+    )
+
+
+def loop_unit(choice: Choice) -> LoopUnit:
+    """The chosen controller with the loop around it; sensors without their noise."""
+    made = flight_controller(choice)
+    if isinstance(choice, PointingChoice):
+        loop = choice.scene.loop
+        return LoopUnit(
+            plant=_plant_unit(choice.file, loop.mirror, loop.optics, loop.drive, loop.timing),
+            controller=made,
+            steps_per_sample=loop.timing.steps_per_sample,
+            delay_steps=loop.timing.delay_steps,
+            optical_delay_steps=loop.optical.delay_steps,
+            optical_every=loop.optical.every,
+            field_of_view_rad=loop.optical.field_of_view_rad,
+            optical_resolution_rad=loop.optical.resolution_rad,
+            gauge_resolution_rad=0.0 if loop.gauge is None else loop.gauge.resolution_rad,
+        )
+    setup = choice.setup
+    return LoopUnit(
+        plant=_plant_unit(choice.file, choice.mirror, np.eye(choice.mirror.axes), setup.drive, setup.timing),
+        controller=made,
+        steps_per_sample=setup.timing.steps_per_sample,
+        delay_steps=setup.timing.delay_steps,
+        optical_delay_steps=0,
+        optical_every=1,
+        field_of_view_rad=math.inf,
+        optical_resolution_rad=setup.drive.sensor_resolution_rad,
+        gauge_resolution_rad=0.0,
+    )
+
+
+# ------------------------------------------------------------------------------------------------------------- vectors
+def vectors(choice: Choice, samples: int, *, freq_hz: float | None = None) -> Vectors:
+    """A run of the chosen loop in the kernel, from rest, with what its controller read and commanded.
+
+    The fine-pointing loop runs in its mission's jitter (run 0 of its seed). The loop of [control] tracks the scenario's
+    sine of ``freq_hz`` (its fastest one with an inverse if None).
+    """
+    if isinstance(choice, PointingChoice):
+        found = _pointing_vectors(choice, samples)
+    else:
+        found = _tracking_vectors(choice, samples, freq_hz)
+    kept = _looked_at(_whole_controller(choice)).values()
+    return replace(found, inputs=np.hstack([found.inputs[:, at] for at in kept]))
+
+
+def _pointing_vectors(choice: PointingChoice, samples: int) -> Vectors:
+    found = replay(choice.scene.loop, choice.controller, samples, fine_pointing.table(choice.file.mission).seed)
+    return Vectors(
+        found.inputs,
+        found.commands,
+        found.disturbance_rad,
+        found.error_rad,
+        int(found.counts[kernels.COUNT_SATURATED]),
+        int(found.counts[kernels.COUNT_INVERSE_CLAMPED]),
+    )
+
+
+def _tracking_vectors(choice: TrackingChoice, samples: int, freq_hz: float | None) -> Vectors:
+    scenario, setup = choice.file.mission.scenario, choice.setup
+    f = freq_hz if freq_hz is not None else max(scenario.inverse_frequencies_hz)
+    time: Floats = np.arange(samples, dtype=float) * setup.timing.period_s
+    reference = scenario.amplitude_rad * np.sin(2.0 * np.pi * f * time)[:, None]
+    trace = simulate.track(choice.name, choice.mirror, setup, choice.inverse, reference, slice(0, samples))
+    resolution, reading = setup.drive.sensor_resolution_rad, trace.output_rad
+    if resolution > 0.0:
+        reading = np.floor(reading / resolution + 0.5) * resolution
+    return Vectors(
+        np.hstack([reading, reference]),
+        trace.command_v,
+        np.zeros_like(reference),
+        trace.error_rad,
+        trace.counts.saturated,
+        trace.counts.inverse_clamped,
+    )

@@ -1,0 +1,112 @@
+"""A controller over a recorded run in double precision: what its states, its outputs and its inverse go through."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from microrad import kernels
+from microrad.export.records import FlightController, Floats, InverseLaw
+from microrad.export.sections import Sections
+
+
+@dataclass(frozen=True, slots=True)
+class InverseRun:
+    """The inverse over a run: ``target`` behind creep (output units) and its ``rate`` by actuator, ``h`` by element and
+    ``travel`` (V) of its drive, ``lag`` at the begin of each sample, and what is ``added`` to the commands (V)."""
+
+    target: Floats
+    rate: Floats
+    travel: Floats
+    h: Floats
+    lag: Floats
+    added: Floats
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """A controller over a run in double: by sample, ``states`` before it, ``outputs`` of the linear part, the commands
+    ``free`` of the clip, and the ``excess`` clip(free) - free that goes to the anti-windup."""
+
+    states: Floats
+    outputs: Floats
+    free: Floats
+    excess: Floats
+    inverse: InverseRun | None
+
+
+class Inverse:
+    """The inverse in double precision, sample by sample, as `kernels.ensemble_loop` has it."""
+
+    def __init__(self, of: FlightController, samples: int) -> None:
+        """At rest; ``samples`` is how many it can record."""
+        assert of.inverse is not None
+        self.law, self.period_s, self.actuators = of.inverse, of.period_s, of.actuators
+        self.before, self.k = np.zeros(of.actuators), 0
+        self.play = np.zeros(self.law.play_threshold.size)
+        self.lag = np.zeros(self.law.lag_keep.size)
+        n, elements = of.actuators, len(self.law.bouc_wen)
+        self.record = InverseRun(*(np.zeros((samples, w)) for w in (n, n, elements, elements, self.lag.size, n)))
+
+    def step(self, outputs: Floats) -> Floats:
+        """What the inverse adds to each command, from the linear part's outputs of this sample."""
+        law, r, k, n = self.law, self.record, self.k, self.actuators
+        target = outputs[n : 2 * n].copy()
+        np.subtract.at(target, law.lag_actuator.astype(int), law.lag_weight * self.lag)
+        rate = (target - self.before) / self.period_s if law.by_difference else outputs[2 * n : 3 * n]
+        r.target[k], r.rate[k], r.lag[k] = target, rate, self.lag
+        added = law.direct * target
+        for e, a in enumerate(law.bouc_wen_actuator.tolist()):
+            added[a] += self._bouc_wen(e, float(target[a]), float(target[a] - self.before[a]), float(rate[a]))
+        self._plays(target, rate, added)
+        self.lag = law.lag_keep * self.lag + (1.0 - law.lag_keep) * added[law.lag_actuator.astype(int)]
+        self.before, self.k = target, k + 1
+        r.added[k] = added
+        return added
+
+    def _bouc_wen(self, e: int, now: float, change: float, rate: float) -> float:
+        row, k = self.law.bouc_wen[e].tolist(), self.k
+        d1, limit, bias = row[kernels.D1], row[kernels.RATE_LIMIT], row[kernels.BIAS]
+        drive_rate = min(max(rate / d1, -limit), limit)
+        grown = row[kernels.EPSILON] * math.exp(row[kernels.DELTA] * abs(drive_rate))
+        h, travel = self.record.h[k - 1, e] if k else 0.0, change / d1
+        if row[kernels.POWER] != 0.0:
+            h = kernels.bouc_wen_power_step(h, travel, grown, self.law.bouc_wen, e)
+        else:
+            decay = (row[kernels.ALPHA], row[kernels.BETA], row[kernels.GAMMA], row[kernels.ETA])
+            h = kernels.bouc_wen_step(h, travel, grown, *decay)
+        self.record.travel[k, e], self.record.h[k, e] = travel, h
+        return float((now - h + d1 * bias) / (d1 * math.exp(-row[kernels.D2] * drive_rate)) - bias)
+
+    def _plays(self, target: Floats, rate: Floats, added: Floats) -> None:
+        law = self.law
+        if not law.play_threshold.size:
+            return
+        at = law.play_actuator.astype(int)
+        wide = law.play_threshold + np.where(law.play_threshold > 0.0, widened(law, rate)[at], 0.0)
+        self.play = np.maximum(target[at] - wide, np.minimum(target[at] + wide, self.play))
+        np.add.at(added, at, law.play_weight * self.play)
+
+
+def widened(law: InverseLaw, rate: Floats) -> Floats:
+    """Growth of the thresholds above 0 at a rate of the target, by actuator (the last index of ``rate``)."""
+    return np.asarray(law.widening[:, 0] * np.minimum(np.abs(rate), law.widening[:, 1]))
+
+
+def run(of: FlightController, form: Sections, inputs: Floats) -> Run:
+    """The controller in this form over recorded ``inputs`` (samples, numbers), in double precision and from rest."""
+    samples, A, pushed = inputs.shape[0], form.A, inputs @ form.B.T
+    x, direct = np.zeros(A.shape[0]), inputs @ form.D.T
+    states, outputs = np.empty((samples, x.size)), np.empty((samples, form.C.shape[0]))
+    free, excess = np.empty((samples, of.actuators)), np.zeros((samples, of.actuators))
+    inverse = None if of.inverse is None else Inverse(of, samples)
+    for k in range(samples):
+        y = form.C @ x + direct[k]
+        v = y[: of.actuators] if inverse is None else y[: of.actuators] + inverse.step(y)
+        states[k], outputs[k], free[k] = x, y, v
+        x = A @ x + pushed[k]
+        over = np.clip(v, of.minimum_v, of.maximum_v) - v
+        if np.any(over):
+            excess[k] = over
+            x += form.L @ over
+    return Run(states, outputs, free, excess, None if inverse is None else inverse.record)

@@ -1,0 +1,236 @@
+"""The linear part of a controller in fixed point: whole numbers with powers of two as units, and their scales.
+
+A number of the code stands for ``integer 2^-scale``. States move by their change,
+
+    x[k+1] = x[k] + (A - 1) x~ + B m + L (clip(v) - v),       outputs = C x~ + D m,
+
+where x is kept with all bits of the products (64 bits) and x~ is x rounded to a word. No product is rounded, so an
+integrator adds up the smallest reading, there is no dead band, and what rounds x~ is weighted by A - 1: its noise has
+a zero at frequency 0 (error feedback; Thong and Liu, IEEE Trans. Circuits Syst. 24 (1977) 181). Each row of the
+matrices has its own scale, the finest at which the sum of its coefficients' sizes is within a word: whatever the
+readings, no sum leaves 64 bits, and what grows beyond its range stays at its end.
+"""
+
+import math
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from microrad import kernels
+from microrad.export.double_run import Run
+from microrad.export.records import FlightController, Floats, Signal
+from microrad.export.rounding import responses
+from microrad.export.sections import Sections
+
+Whole = NDArray[np.int64]
+Poles = tuple[tuple[complex, complex], ...]
+"""Pairs of a pole as designed and as quantised."""
+
+HEAD_ROOM = 4.0
+"""Range of each number over its largest size in the recorded run."""
+
+_REACH_SAMPLES = 4096  # of an impulse response
+
+
+@dataclass(frozen=True, slots=True)
+class Rows:
+    """A matrix in whole numbers: each is the entry times 2^(``scale`` of its row - scale of its column's signal)."""
+
+    value: Whole
+    scale: tuple[int, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Converter:
+    """Command to counts: (command ``factor`` + half) >> ``shift``, then within ``lowest`` and ``highest``."""
+
+    factor: int
+    shift: int
+    lowest: int
+    highest: int
+
+
+@dataclass(frozen=True, slots=True)
+class OutputQuality:
+    """One output in its ``unit``: largest relative error of its frequency response (norm over the inputs) and where,
+    the noise of rounding as predicted and as measured over the run (rms), and the largest swing (peak to peak) that
+    rounding can sustain without input, and did."""
+
+    name: str
+    unit: str
+    response_error: float
+    at_hz: float
+    noise_predicted: float
+    noise_measured: float
+    cycle_bound: float
+    cycle_found: float
+
+
+@dataclass(frozen=True, slots=True)
+class QuantisationReport:
+    """What fixed point costs over a recorded run of ``samples``.
+
+    ``head_room_bits`` go by state, from the largest size in the run.
+    ``error_v`` is the largest difference of a command from double precision, ahead of the converter, that fixed point
+    makes, and ``inverse_v`` a bound of what single precision in the inverse adds to it; ``bound_v`` is that of the
+    difference of two commands behind the converter.
+    """
+
+    samples: int
+    period_s: float
+    poles: Poles
+    outputs: tuple[OutputQuality, ...]
+    head_room_bits: tuple[float, ...]
+    error_v: float
+    inverse_v: float
+    resolution_v: float
+    bound_v: float
+
+
+@dataclass(frozen=True, slots=True)
+class FixedForm:
+    """A controller's linear part in words of ``bits``; scales are by number of the inputs, states and outputs.
+
+    ``state`` is [A - 1, B, L] and ``output`` [C, D] side by side. A state is kept with its row's scale, and rounded to
+    ``state_scale`` where it is used. ``minimum`` and ``maximum`` are the limits of the commands in their scale.
+    """
+
+    bits: int
+    head_room: float
+    input_scale: tuple[int, ...]
+    state_scale: tuple[int, ...]
+    output_scale: tuple[int, ...]
+    state: Rows
+    output: Rows
+    minimum: tuple[int, ...]
+    maximum: tuple[int, ...]
+    converter: tuple[Converter, ...]
+    report: QuantisationReport
+
+    @property
+    def word(self) -> int:
+        """Largest number of a word; the smallest is its negative."""
+        return int(2 ** (self.bits - 1) - 1)
+
+    @property
+    def state_shift(self) -> tuple[int, ...]:
+        """Bits that a state keeps below its word."""
+        return tuple(a - b for a, b in zip(self.state.scale, self.state_scale, strict=True))
+
+    @property
+    def output_shift(self) -> tuple[int, ...]:
+        """Bits of an output's sum below its word."""
+        return tuple(a - b for a, b in zip(self.output.scale, self.output_scale, strict=True))
+
+
+def scaled(of: FlightController, form: Sections, inputs: Floats, ideal: Run, bits: int, head_room: float) -> FixedForm:
+    """The controller in words of ``bits``, scaled by a recorded run; its report is empty yet."""
+    word = 2 ** (bits - 1) - 1
+    sizes = _input_peaks(of.inputs, inputs) * head_room
+    states = _or_reachable(np.max(np.abs(ideal.states), axis=0) * head_room, np.eye(form.order), form, sizes)
+    ranges = _output_ranges(of, form, ideal, sizes, head_room)
+    read, kept, given = (tuple(_scale(float(x), word) for x in most) for most in (sizes, states, ranges))
+    step = np.hstack([form.A - np.eye(form.order), form.B, form.L])
+    from_v = given[: of.actuators]
+    state = _rows(step, (*kept, *read, *from_v), word, [s + bits - 1 for s in kept])
+    output = _rows(np.hstack([form.C, form.D]), (*kept, *read), word, [s + 61 for s in given])
+    limits = [_limits(of, s, word) for s in from_v]
+    converters = tuple(_converter(of, s) for s in from_v) if of.resolution_v > 0.0 else ()
+    empty = QuantisationReport(0, of.period_s, (), (), (), 0.0, 0.0, of.resolution_v, 0.0)
+    low, high = tuple(a for a, _ in limits), tuple(b for _, b in limits)
+    return FixedForm(bits, head_room, read, kept, given, state, output, low, high, converters, empty)
+
+
+def _scale(size: float, word: int) -> int:
+    """Finest power of two at which numbers up to ``size`` fit into a word."""
+    return math.floor(math.log2(word / size))
+
+
+def _input_peaks(signals: tuple[Signal, ...], inputs: Floats) -> Floats:
+    """Largest size in the run by signal, for each of its numbers; the signal's limit where it rests."""
+    ends, found = np.cumsum([0] + [s.size for s in signals]), []
+    for s, (a, b) in zip(signals, pairwise(ends), strict=True):
+        peak = float(np.max(np.abs(inputs[:, a:b]), initial=0.0))
+        found += [peak or s.limit] * s.size
+    return np.array(found)
+
+
+def _or_reachable(peaks: Floats, rows: Floats, form: Sections, inputs: Floats) -> Floats:
+    """Peaks, where there are some; else what inputs of these sizes can make of ``rows`` x at most."""
+    found = peaks.copy()
+    for i in np.flatnonzero(peaks == 0.0):
+        gains = np.sum(np.abs(responses(rows[i], form.A, _REACH_SAMPLES) @ form.B), axis=0)
+        found[i] = float(gains @ inputs) or 1.0
+    return found
+
+
+def _output_ranges(of: FlightController, form: Sections, ideal: Run, inputs: Floats, head_room: float) -> Floats:
+    """Ranges of the outputs, the same for all actuators: of v, that of the commands and of their limits."""
+    n = of.actuators
+    peaks = np.max(np.abs(ideal.outputs), axis=0).reshape(-1, n).max(axis=1)
+    limits = [abs(x) for x in (of.minimum_v, of.maximum_v) if math.isfinite(x)]
+    peaks[0] = max(*limits, peaks[0], float(np.max(np.abs(ideal.free)))) if limits else np.max(np.abs(ideal.free))
+    groups = _or_reachable(peaks * head_room, form.C[::n], form, inputs)
+    return np.repeat(groups, n)
+
+
+def _rows(matrix: Floats, columns: tuple[int, ...], word: int, most: list[int]) -> Rows:
+    """Each row at the finest scale, up to ``most``, at which the sum of its sizes is within a word."""
+    values, scales = np.zeros(matrix.shape, dtype=np.int64), []
+    for i, row in enumerate(matrix):
+        weights = row * np.exp2(-np.array(columns, dtype=float))
+        size = float(np.sum(np.abs(weights)))
+        scale = most[i] if size == 0.0 else min(most[i], math.floor(math.log2(word / size)))
+        while np.sum(np.abs(np.rint(np.ldexp(weights, scale)))) > word:
+            scale -= 1
+        values[i] = np.rint(np.ldexp(weights, scale)).astype(np.int64)
+        scales.append(scale)
+    return Rows(values, tuple(scales))
+
+
+def _limits(of: FlightController, scale: int, word: int) -> tuple[int, int]:
+    """The command's limits in its scale, rounded inwards."""
+    low = -word if math.isinf(of.minimum_v) else math.ceil(math.ldexp(of.minimum_v, scale))
+    high = word if math.isinf(of.maximum_v) else math.floor(math.ldexp(of.maximum_v, scale))
+    return low, high
+
+
+def _converter(of: FlightController, scale: int) -> Converter:
+    r, near = of.resolution_v, 1e-6  # a limit that is a multiple of the resolution up to rounding is one of its counts
+    counts = math.ldexp(1.0, -scale) / r
+    shift = 30 - math.frexp(counts)[1]
+    ends = [-(2**31) + 1, 2**31 - 1]
+    if math.isfinite(of.minimum_v):
+        ends[0] = math.ceil(of.minimum_v / r - near)
+    if math.isfinite(of.maximum_v):
+        ends[1] = math.floor(of.maximum_v / r + near)
+    return Converter(round(math.ldexp(counts, shift)), shift, *ends)
+
+
+def dequantised(form: Sections, made: FixedForm) -> Sections:
+    """The linear part with the coefficients that the whole numbers stand for."""
+    n, m = form.order, form.B.shape[1]
+    columns = np.array([*made.state_scale, *made.input_scale, *made.output_scale[: form.L.shape[1]]])
+    step = _values(made.state, columns)
+    output = _values(made.output, columns[: n + m])
+    A = step[:, :n] + np.eye(n)
+    row, column = np.indices(A.shape)
+    beside = ((row ^ 1) == column) & (np.maximum(row, column) < n - n % 2)
+    return replace(
+        form,
+        diagonal=np.diag(A).copy(),
+        coupling=np.array([A[i, i ^ 1] if i < n - n % 2 else 0.0 for i in range(n)]),
+        rest=kernels.rows(np.where((row == column) | beside, 0.0, A)),
+        B=step[:, n : n + m],
+        L=step[:, n + m :],
+        C=output[:, :n],
+        D=output[:, n:],
+    )
+
+
+def _values(rows: Rows, columns: NDArray[np.integer[Any]]) -> Floats:
+    exponents = columns[None, :] - np.array(rows.scale, dtype=int)[:, None]
+    return np.asarray(np.ldexp(rows.value.astype(float), exponents))

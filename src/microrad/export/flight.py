@@ -1,0 +1,290 @@
+"""Flight code: a controller as C99 with its make file and test bench, and the recorded run that goes with it."""
+
+import math
+from dataclasses import dataclass
+from importlib.metadata import version
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from microrad import kernels
+from microrad.export.identifiers import identifier
+from microrad.export.records import ExportError, FlightController, Floats, InverseLaw, Signal, Vectors
+from microrad.export.sections import Sections
+from microrad.export.templating import Precision, Terms, render
+
+if TYPE_CHECKING:
+    from microrad.export.rounding import RoundingBound
+
+BOUND_SHARE = 1e-12
+"""In double precision the code agrees with the kernel within this share of the largest command."""
+
+POWER_BOUND_SHARE = 1e-10
+"""The same where an exponent of Bouc-Wen is not 1: each of the two integrates to 1e-11 of h's size a step."""
+
+SLOW = 0.99
+"""Blocks of a larger spectral radius move by little a sample: in single precision they are compensated sums."""
+
+ELEMENT_KEYS = (
+    "d1",
+    "d2",
+    "epsilon",
+    "delta",
+    "alpha",
+    "beta",
+    "rate_limit",
+    "bias",
+    "gamma",
+    "eta",
+    "power",
+    "per_size",
+)
+"""Fields of a Bouc-Wen element in C, in the order of the columns of `kernels.bouc_wen_rows`."""
+
+
+def flight_code(
+    of: FlightController, form: Sections, name: str, precision: Precision, bound: "RoundingBound | None" = None
+) -> dict[str, str]:
+    """The controller with its linear part in ``form`` as C99: file names and texts.
+
+    Files: the code, {name}.h and {name}.c, with {name}_hysteresis.h where it has an inverse; a test bench that replays
+    a recorded run (`vectors_text`), and a Makefile. ``bound`` is what single precision may differ by over that run.
+    Raises ExportError for a name that is no identifier, for limits between which no command lies, for numbers beyond
+    the precision, and for single precision without a bound.
+    """
+    values = _values(of, form, identifier(name), precision)
+    if precision == "single":
+        if bound is None:
+            raise ExportError(
+                f"controller {of.name!r} in single precision: no bound on its rounding is given, so that the bench has "
+                "nothing to hold it to; find it with rounding_bound, or export double precision"
+            )
+        values |= {"bound_v": bound.command_v, "bound_samples": bound.samples}
+    values["facts"] = _facts(of, form, values, bound if precision == "single" else None)
+    headers = [f"{name}.h"] + ([f"{name}_hysteresis.h"] if of.inverse is not None else [])
+    templates = {
+        f"{name}.h": "controller.h.j2",
+        f"{name}.c": "controller.c.j2",
+        f"{name}_hysteresis.h": "hysteresis.h.j2",
+        f"{name}_bench.c": "bench.c.j2",
+        "Makefile": "Makefile.j2",
+    }
+    if of.inverse is None:
+        del templates[f"{name}_hysteresis.h"]
+    sources = [f"{name}.c", f"{name}_bench.c"]
+    return {file: render(template, headers=headers, sources=sources, **values) for file, template in templates.items()}
+
+
+def vectors_text(of: FlightController, v: Vectors) -> str:
+    """The recorded run as the bench reads it: readings and commands by sample, with all their digits."""
+    names = [f"{each.name}_{i}" for each in of.inputs for i in range(each.size)]
+    names += [f"command_v_{a}" for a in range(of.actuators)]
+    rows = np.hstack([v.inputs, v.commands]).tolist()
+    return "\n".join([",".join(names), *(",".join(f"{x:.17g}" for x in row) for row in rows)]) + "\n"
+
+
+# ----------------------------------------------------------------------------------------------- what the templates get
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """Commands (V from the bias): limits, resolution of the converter, and the outermost values it can give."""
+
+    minimum: float
+    maximum: float
+    resolution: float
+    lowest: float
+    highest: float
+
+    @property
+    def rest(self) -> float:
+        """The command nearest to 0."""
+        return min(max(0.0, self.lowest), self.highest)
+
+
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """An input as the templates write it: its place among the readings, and its name and unit in constants."""
+
+    name: str
+    size: int
+    unit: str
+    meaning: str
+    limit: float
+    first: int
+    NAME: str
+    UNIT: str
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """A matrix as its numbers that are not 0, with its name in C and what it does, in words."""
+
+    name: str
+    words: str
+    terms: Terms
+
+
+def _values(of: FlightController, form: Sections, name: str, precision: Precision) -> dict[str, Any]:
+    kept = np.array(compensated_states(form), dtype=bool) & (precision == "single")
+    tables = _tables(of, form, kept)
+    return {
+        "name": name,
+        "precision": precision,
+        "version": version("microrad"),
+        "use": _use(name),
+        "of": of,
+        "limits": _limits(of, precision),
+        "signals": _readings(of.inputs),
+        "readings": sum(each.size for each in of.inputs),
+        "outputs": form.C.shape[0],
+        "states": form.order,
+        "compensated": kept.tolist() if np.any(kept) else [],
+        "all_compensated": bool(np.any(kept) and np.all(kept)),
+        "tables": tuple(tables.values()),
+        "has": {key: bool(table.terms) for key, table in tables.items()},
+        "bound_share": bound_share(of),
+        "element_keys": ELEMENT_KEYS,
+        **_inverse_values(of.inverse),
+    }
+
+
+def bound_share(of: FlightController) -> float:
+    """Largest difference of a command in double precision from the kernel's, over the largest command of the run."""
+    power = of.inverse is not None and bool(np.any(of.inverse.bouc_wen[:, kernels.POWER]))
+    return POWER_BOUND_SHARE if power else BOUND_SHARE
+
+
+def compensated_states(form: Sections) -> list[bool]:
+    """By state, whether single precision keeps what rounding leaves out of it: slow blocks and integrators."""
+    found, A = [False] * form.order, form.A
+    for first, size in form.blocks:
+        at = slice(first, first + size)
+        found[at] = [float(np.max(np.abs(np.linalg.eigvals(A[at, at])))) > SLOW] * size
+    return found
+
+
+def _tables(of: FlightController, form: Sections, kept: NDArray[np.bool_]) -> dict[str, Table]:
+    kinds = ["v (V)", "target (rad)", "rate of the target (rad/s)"][: form.C.shape[0] // of.actuators]
+    outputs = f"Rows: {_places(kinds, [of.actuators] * len(kinds))}"
+    readings = f"Columns: {_places([each.name for each in of.inputs], [each.size for each in of.inputs])}"
+    return {
+        "C": Table("OUTPUT_OF_STATES", f"C. {outputs}. Columns: the states.", terms(form.C)),
+        "D": Table("OUTPUT_OF_READINGS", f"D. {outputs}. {readings}.", terms(form.D)),
+        "A": Table("STATE_OF_STATES", _words_of_a(form), terms(form.A - np.diag(kept.astype(float)))),
+        "B": Table("STATE_OF_READINGS", f"B. Rows: the states. {readings}.", terms(form.B)),
+        "L": Table("STATE_OF_EXCESS", "L, the anti-windup gain, per V. Columns: the actuators.", terms(form.L)),
+    }
+
+
+def _places(names: list[str], sizes: list[int]) -> str:
+    """Names with the rows or columns that they stand for."""
+    ends = np.cumsum(sizes).tolist()
+    return ", ".join(
+        f"{name} {end - size}" + (f" to {end - 1}" if size > 1 else "")
+        for name, size, end in zip(names, sizes, ends, strict=True)
+    )
+
+
+def _words_of_a(form: Sections) -> str:
+    sizes = [size for _, size in form.blocks]
+    counts = [f"{sizes.count(n)} of {n}" for n in sorted(set(sizes))]
+    return f"A, block-diagonal. Blocks: {', '.join(counts)} state{'' if max(sizes, default=1) == 1 else 's'}."
+
+
+def terms(matrix: Floats) -> Terms:
+    """Row, column and value of each number that is not 0, row by row."""
+    return [(int(i), int(j), float(matrix[i, j])) for i, j in np.argwhere(matrix)]
+
+
+def _readings(inputs: tuple[Signal, ...]) -> list[Reading]:
+    found, first = [], 0
+    for s in inputs:
+        plain = s.name.removesuffix(f"_{s.unit}").upper()
+        found.append(Reading(s.name, s.size, s.unit, s.meaning, s.limit, first, plain, s.unit.upper()))
+        first += s.size
+    return found
+
+
+def _limits(of: FlightController, precision: Precision) -> Limits:
+    """Limits that the precision holds, never outside the controller's own."""
+    low, high, step = _inwards(of.minimum_v, math.inf, precision), _inwards(of.maximum_v, -math.inf, precision), 0.0
+    lowest, highest = low, high
+    if of.resolution_v > 0.0:
+        # A limit that is a multiple of the resolution up to rounding is one that the converter gives.
+        step, near = of.resolution_v, 1e-6
+        lowest = max(low, math.ceil(low / step - near) * step) if math.isfinite(low) else low
+        highest = min(high, math.floor(high / step + near) * step) if math.isfinite(high) else high
+    if not lowest <= highest:
+        raise ExportError(
+            f"controller {of.name!r}: no command lies between its limits of {of.minimum_v:g} V and {of.maximum_v:g} V"
+            + (f" at a resolution of {of.resolution_v:g} V" if of.resolution_v > 0.0 else "")
+            + "; see the mission's amplifier, bias and drive_resolution"
+        )
+    return Limits(low, high, step, lowest, highest)
+
+
+def _inwards(limit: float, towards: float, precision: Precision) -> float:
+    """A limit in the precision, rounded to the side ``towards``."""
+    if precision == "double" or math.isinf(limit):
+        return limit
+    held = np.float32(limit)
+    outside = float(held) > limit if towards < 0 else float(held) < limit
+    return float(np.nextafter(held, np.float32(towards)) if outside else held)
+
+
+def _inverse_values(of: InverseLaw | None) -> dict[str, Any]:
+    if of is None:
+        return {"inverse": None, "elements": 0, "plays": 0, "lags": 0, "widening": False, "direct": False}
+    widening = bool(np.any(of.widening[:, 0]))
+    elements, plays = of.bouc_wen.shape[0], of.play_threshold.size
+    return {
+        "inverse": of,
+        "elements": elements,
+        "plays": plays,
+        "lags": of.lag_keep.size,
+        "lag_share": 1.0 - of.lag_keep,
+        "widening": widening and plays > 0,
+        "direct": bool(np.any(of.direct)),
+        "uses_rate": elements > 0 or (widening and plays > 0),
+    }
+
+
+def _facts(of: FlightController, form: Sections, values: dict[str, Any], bound: "RoundingBound | None") -> list[str]:
+    """Lines of the header: what the code holds, and how exact it is."""
+    precision = (
+        f"Double precision: within {values['bound_share']:g} of the largest command of what the simulation commands."
+    )
+    if bound is not None:
+        precision = (
+            f"Single precision: within {bound.command_v:.3g} V of double precision over {bound.samples} recorded "
+            f"samples; each further one adds up to {bound.per_sample_v:.2g} V ahead of the converter."
+        )
+    inverse = []
+    if of.inverse is not None:
+        inverse = [f"Inverse of hysteresis: {_counted(values)}; taken at the target's rate, {_rate_words(of.inverse)}."]
+    return [
+        f"Period: {of.period_s:.9g} s ({1.0 / of.period_s:.9g} Hz).",
+        f"Linear part: {form.order} states in {len(form.blocks)} blocks ({form.form} form).",
+        *inverse,
+        precision,
+    ]
+
+
+def _counted(values: dict[str, Any]) -> str:
+    counts = {"Bouc-Wen element(s)": "elements", "play operator(s)": "plays", "lag(s) of creep": "lags"}
+    found = [f"{values[key]} {words}" for words, key in counts.items() if values[key]]
+    return ", ".join(found) or "a direct gain"
+
+
+def _rate_words(of: InverseLaw) -> str:
+    return "the difference of two samples" if of.by_difference else "from the linear part"
+
+
+def _use(name: str) -> str:
+    return (
+        f"Use: one {name}_state for each loop, {name}_init() once, {name}_step() once a period. All memory is in the "
+        "state, which is the caller's; a step calls nothing but <math.h>, and each of its loops has a fixed bound. A "
+        "reading that is no number or beyond its limit is rejected: the last one that was accepted stands in for it. A "
+        "command is always a finite number within the limits. Mask floating-point traps where the processor has them: "
+        "nan and infinity are dealt with here. Do not compile with -ffast-math."
+    )

@@ -1,0 +1,285 @@
+"""What a co-simulation unit (FMU) shows of itself: its variables with units, and the model description."""
+
+from dataclasses import dataclass
+from importlib.metadata import version as version_of
+from typing import Literal
+
+from microrad import kernels
+from microrad.export.records import LoopUnit, PlantUnit
+from microrad.export.templating import render
+
+Version = Literal["2.0", "3.0"]
+Causality = Literal["independent", "input", "output", "parameter", "local"]
+Range = Literal["any", "not negative", "positive"]
+
+UNITS = (
+    ("s", (("s", 1),), ()),
+    ("V", (("kg", 1), ("m", 2), ("s", -3), ("A", -1)), ()),
+    ("rad", (("rad", 1),), (("urad", "1e6"), ("mrad", "1e3"))),
+    ("Hz", (("s", -1),), ()),
+    ("V/s", (("kg", 1), ("m", 2), ("s", -4), ("A", -1)), ()),
+    ("rad/V", (("kg", -1), ("m", -2), ("s", 3), ("A", 1), ("rad", 1)), ()),
+    ("s/V", (("kg", -1), ("m", -2), ("s", 4), ("A", 1)), ()),
+    ("1/V", (("kg", -1), ("m", -2), ("s", 3), ("A", 1)), ()),
+)
+"""Units of the variables: name, powers of the base units of the SI, and units to show it in, with their factors."""
+
+STOP_S = 0.2
+"""End of the experiment that a tool proposes."""
+
+BOUC_WEN = (
+    ("d1_rad_v", "d1", kernels.D1, "rad/V", "any", "linear gain"),
+    ("d2_s_v", "d2", kernels.D2, "s/V", "any", "change of the linear gain with the rate of the drive"),
+    ("epsilon_rad_v", "epsilon", kernels.EPSILON, "rad/V", "any", "gain of the hysteresis"),
+    ("delta_s_v", "delta", kernels.DELTA, "s/V", "any", "growth of the hysteresis with the rate of the drive"),
+    ("alpha_1_v", "alpha", kernels.ALPHA, "1/V", "any", "decay of the hysteresis"),
+    ("beta_1_v", "beta", kernels.BETA, "1/V", "any", "decay that tells loading from unloading"),
+    ("gamma_1_v", "gamma", kernels.GAMMA, "1/V", "any", "decay that tells the signs of the hysteresis apart"),
+    ("eta_1_v", "eta", kernels.ETA, "1/V", "any", "decay that tells rising from falling drive"),
+    ("rate_limit_v_s", "rate_limit", kernels.RATE_LIMIT, "V/s", "positive", "fastest rate that was identified"),
+    ("bias_v", "bias", kernels.BIAS, "V", "any", "drive at rest"),
+)
+"""Parameters of a Bouc-Wen element: name, field in C, column of the kernel, unit, range, meaning."""
+
+
+@dataclass(frozen=True, slots=True)
+class Variable:
+    """A variable of a unit; its place in the list is its value reference.
+
+    ``place`` is where it stands in the C structure of an instance. It is a whole number if it ``counts``, else a real
+    number. Outputs depend at once on the inputs ``dependencies``, by name.
+    """
+
+    name: str
+    place: str
+    causality: Causality
+    description: str
+    unit: str = ""
+    start: float | None = None
+    counts: bool = False
+    constant: bool = False
+    range: Range = "any"
+    dependencies: tuple[str, ...] = ()
+
+    @property
+    def variability(self) -> str:
+        """How the variable may change, as the standard calls it."""
+        if self.constant:
+            return "constant"
+        if self.causality == "parameter":
+            return "fixed"
+        return "discrete" if self.counts else "continuous"
+
+    @property
+    def initial(self) -> str | None:
+        """Where the first value comes from, as the standard calls it; None where it goes without saying."""
+        if self.constant or self.causality == "parameter":
+            return "exact"
+        return "calculated" if self.causality == "output" else None
+
+    @property
+    def least(self) -> str | None:
+        """Lower bound of its numbers."""
+        return None if self.range == "any" else "0"
+
+
+def plant_of(unit: PlantUnit | LoopUnit) -> PlantUnit:
+    """The plant of a unit."""
+    return unit.plant if isinstance(unit, LoopUnit) else unit
+
+
+def exponent(row: kernels.Floats) -> float:
+    """Exponent of a Bouc-Wen element from its row of parameters."""
+    return 1.0 + float(row[kernels.POWER])
+
+
+def variables(unit: PlantUnit | LoopUnit) -> tuple[Variable, ...]:
+    """The variables of a unit by value reference."""
+    found = [Variable("time", "time_s", "independent", "simulation time", "s")]
+    loop = isinstance(unit, LoopUnit)
+    plant = plant_of(unit)
+    found += _loop_signals(unit) if isinstance(unit, LoopUnit) else _commands(unit)
+    found += _plant_outputs(plant) + (_controller_counters() if loop else [])
+    return (*found, *_parameters(plant), *_constants(unit))
+
+
+def _commands(unit: PlantUnit) -> list[Variable]:
+    text = "command to actuator {}, from the bias, held over the communication step"
+    return _row("command_v", len(unit.plant.actuators), "input", text, "V", start=0.0)
+
+
+def _loop_signals(unit: LoopUnit) -> list[Variable]:
+    axes, actuators = unit.plant.optics.shape[0], len(unit.plant.plant.actuators)
+    held = "taken at the begin of the communication step and held over it"
+    found = _row("reference_rad", axes, "input", f"reference of axis {{}}, {held}", "rad", start=0.0)
+    found += _row("disturbance_rad", axes, "input", f"disturbance of axis {{}}, {held}", "rad", start=0.0)
+    text = "error of axis {}: reference + disturbance - line of sight"
+    for axis in range(axes):
+        seen = (f"reference_rad[{axis + 1}]", f"disturbance_rad[{axis + 1}]")
+        found.append(_output(f"error_rad[{axis + 1}]", f"error_rad[{axis}]", text.format(axis + 1), "rad", seen))
+    text = "command that the last control sample gave actuator {}, from the bias"
+    return found + _row("command_v", actuators, "output", text, "V", within="loop.")
+
+
+def _plant_outputs(of: PlantUnit) -> list[Variable]:
+    plant, axes = of.plant, of.optics.shape[0]
+    found = _row("line_of_sight_rad", axes, "output", "line of sight, axis {}", "rad")
+    found += _row(
+        "mirror_rad", len(plant.outputs), "output", "output {} of the mirror", "rad", within="plant.", field="y"
+    )
+    text = "drive of actuator {} behind the amplifier, as seen at its input, from the bias"
+    found += _row("drive_v", len(plant.actuators), "output", text, "V", within="plant.", field="u")
+    return [
+        *found,
+        _counter("rate_clamped", "plant.rate_clamped", "elements and plant steps beyond the identified rate"),
+        _counter("slew_limited", "plant.slew_limited", "actuators and plant steps at the amplifier's slew limit"),
+        _counter("faults", "plant.faults", "elements and plant steps whose hysteresis could not be advanced"),
+    ]
+
+
+def _controller_counters() -> list[Variable]:
+    of = "loop.controller."
+    return [
+        _counter("saturated", f"{of}saturated", "commands that the limits cut off"),
+        _counter("inverse_rate_clamped", f"{of}rate_clamped", "samples of the inverse beyond the identified rate"),
+        _counter("rejected", f"{of}rejected", "readings that the controller did not accept"),
+        _counter("controller_faults", f"{of}faults", "results that the controller did not give out"),
+        _counter("lost", "loop.lost", "optical readings with the spot beyond the field of view"),
+    ]
+
+
+def _parameters(of: PlantUnit) -> list[Variable]:
+    p, slew = of.plant, of.slew_step_v / of.plant.step_s
+    found = [
+        _number("amplifier_bandwidth_hz", "first-order bandwidth of the amplifier", "Hz", of.bandwidth_hz, "positive"),
+        _number("amplifier_slew_v_s", "slew limit of the amplifier, as seen at its input", "V/s", slew, "positive"),
+    ]
+    for e, row in enumerate(p.bouc_wen):
+        within = f"bouc_wen[{e + 1}]."
+        for name, field, column, unit, allowed, meaning in BOUC_WEN:
+            place = f"plant.bouc_wen[{e}].{field}"
+            found.append(_parameter(within + name, place, meaning, unit, float(row[column]), allowed))
+        place, meaning = f"plant.exponent[{e}]", "exponent of the hysteresis in its decay"
+        found.append(_parameter(f"{within}exponent", place, meaning, "", exponent(row), "positive"))
+    for o in range(len(p.operators)):
+        found += _operator_parameters(p, o)
+    return found
+
+
+def _operator_parameters(p: kernels.Plant, o: int) -> list[Variable]:
+    within, (growth, limit) = f"prandtl_ishlinskii[{o + 1}].", p.operator[o]
+    text, fastest = "growth of the thresholds above 0 with the rate of the drive", "fastest rate that was identified"
+    found = [
+        _parameter(f"{within}widening_s", f"plant.widening_s[{o}]", text, "s", growth, "not negative"),
+        _parameter(f"{within}rate_limit_v_s", f"plant.rate_limit_v_s[{o}]", fastest, "V/s", limit, "positive"),
+    ]
+    plays = range(int(p.play_start[o]), int(p.play_start[o + 1]))
+    for name, unit, values, allowed, text in (
+        ("threshold_v", "V", p.play_threshold, "not negative", "threshold of play {}"),
+        ("weight_rad_v", "rad/V", p.play_weight, "any", "weight of play {}"),
+    ):
+        for at, j in enumerate(plays, start=1):
+            place, start = f"plant.{name}[{j}]", float(values[j])
+            found.append(_parameter(f"{within}{name}[{at}]", place, text.format(at), unit, start, allowed))
+    return found
+
+
+def constants(unit: PlantUnit | LoopUnit) -> tuple[tuple[str, str, float, str], ...]:
+    """What a unit was made for and cannot be changed in it: name, unit, value, meaning."""
+    plant = plant_of(unit)
+    found: tuple[tuple[str, str, float, str], ...] = (
+        ("bias_v", "V", plant.bias_v, "bias that commands and drives count from"),
+        ("plant_step_s", "s", plant.plant.step_s, "internal step: a communication step is a multiple of it"),
+    )
+    if isinstance(unit, LoopUnit):
+        of, step = unit.controller, plant.plant.step_s
+        found += (
+            ("control_period_s", "s", of.period_s, "period of the controller"),
+            ("computation_delay_s", "s", unit.delay_steps * step, "from a control sample to its command"),
+            ("command_minimum_v", "V", of.minimum_v, "lowest command, from the bias"),
+            ("command_maximum_v", "V", of.maximum_v, "highest command, from the bias"),
+        )
+    return found
+
+
+def _constants(unit: PlantUnit | LoopUnit) -> list[Variable]:
+    return [
+        Variable(name, f"constants[{i}]", "local", meaning, unit_name, value, constant=True)
+        for i, (name, unit_name, value, meaning) in enumerate(constants(unit))
+    ]
+
+
+def _row(
+    name: str,
+    size: int,
+    causality: Causality,
+    text: str,
+    unit: str,
+    *,
+    start: float | None = None,
+    within: str = "",
+    field: str = "",
+) -> list[Variable]:
+    """The elements of an array, each a variable by itself."""
+    return [
+        Variable(f"{name}[{i + 1}]", f"{within}{field or name}[{i}]", causality, text.format(i + 1), unit, start)
+        for i in range(size)
+    ]
+
+
+def _output(name: str, place: str, text: str, unit: str, dependencies: tuple[str, ...]) -> Variable:
+    return Variable(name, place, "output", text, unit, dependencies=dependencies)
+
+
+def _counter(name: str, place: str, text: str) -> Variable:
+    return Variable(name, place, "output", text, counts=True)
+
+
+def _number(name: str, text: str, unit: str, start: float, allowed: Range) -> Variable:
+    return _parameter(name, f"plant.{name}", text, unit, start, allowed)
+
+
+def _parameter(name: str, place: str, text: str, unit: str, start: float, allowed: str) -> Variable:
+    return Variable(name, place, "parameter", text, unit, float(start), range=allowed)  # type: ignore[arg-type]
+
+
+def described(unit: PlantUnit | LoopUnit) -> tuple[str, str]:
+    """Name and description of a unit in words, on one line each, of characters that XML can hold."""
+    origin = plant_of(unit).origin
+    step = f"internal step {plant_of(unit).plant.step_s:g} s"
+    if isinstance(unit, LoopUnit):
+        name = f"{origin.mirror}, closed loop of {unit.controller.name}"
+        what = f"Amplifier, mirror with hysteresis, sensors and controller {unit.controller.name}, {step}"
+    else:
+        name, what = origin.mirror, f"Amplifier and fast steering mirror with hysteresis, {step}"
+    return _line(name), _line(f"{what}. Mission: {origin.mission}, sha256 {origin.mission_sha256}.")
+
+
+def _line(text: str) -> str:
+    return " ".join("".join(c if c.isprintable() else " " for c in text).split())
+
+
+def model_description(
+    unit: PlantUnit | LoopUnit, version: Version, name: str, guid: str, compiled: tuple[str, ...]
+) -> str:
+    """modelDescription.xml of a unit in that version of FMI; ``compiled`` are its source files without headers."""
+    listed = variables(unit)
+    places = {v.name: i for i, v in enumerate(listed)}
+    unknowns = [(i, [places[d] for d in v.dependencies]) for i, v in enumerate(listed) if v.causality == "output"]
+    model, text = described(unit)
+    step_s = plant_of(unit).plant.step_s
+    return render(
+        f"model_description_{version[0]}.xml.j2",
+        model=model,
+        description=text,
+        name=name,
+        guid=guid,
+        version=version_of("microrad"),
+        units=UNITS,
+        variables=listed,
+        unknowns=unknowns,
+        compiled=compiled,
+        plant_step_s=step_s,
+        step_s=unit.controller.period_s if isinstance(unit, LoopUnit) else step_s,
+        stop_s=STOP_S,
+    )

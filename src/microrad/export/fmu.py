@@ -1,0 +1,292 @@
+"""Co-simulation units (FMU, the Functional Mock-up Interface 2.0 and 3.0) of a mirror or its closed loop, C inside.
+
+Source: Modelica Association, "Functional Mock-up Interface for Model Exchange and Co-Simulation", 2.0.4 (2022) and
+"Functional Mock-up Interface Specification", 3.0.1 (2023).
+"""
+
+import hashlib
+import os
+import platform
+import subprocess
+import sys
+import tempfile
+import uuid
+import zipfile
+from collections.abc import Mapping
+from dataclasses import dataclass
+from importlib.metadata import version as version_of
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from microrad import kernels
+from microrad.export.build import FLAGS, compiler, compiler_words
+from microrad.export.flight import flight_code
+from microrad.export.fmi_description import Version, constants, exponent, model_description, plant_of, variables
+from microrad.export.identifiers import identifier
+from microrad.export.records import GAUGE, OPTICAL_ERROR, READING, REFERENCE, ExportError, LoopUnit, PlantUnit
+from microrad.export.sections import sections
+from microrad.export.templating import render
+
+SHARED = (*FLAGS, "-fPIC", "-shared", "-fvisibility=hidden")
+"""What the library of a unit is compiled with."""
+
+HEADERS: Mapping[str, tuple[str, ...]] = {
+    "2.0": ("fmi2Functions.h", "fmi2FunctionTypes.h", "fmi2TypesPlatform.h"),
+    "3.0": ("fmi3Functions.h", "fmi3FunctionTypes.h", "fmi3PlatformTypes.h"),
+}
+"""Headers of the standard, by version."""
+
+LONGEST_NAME = 27
+"""Characters of a unit's name: the controller inside has the name with an ending, in at most 31."""
+
+TIME_LIMIT_S = 300.0
+"""A compiler that takes longer is ended."""
+
+EPOCH = (1980, 1, 1, 0, 0, 0)
+"""Time stamp of all files in the archive, so that the same unit is the same file."""
+
+
+@dataclass(frozen=True, slots=True)
+class WrittenUnit:
+    """A unit that was written. ``platform`` is what it holds a library for; None without a C compiler: sources alone.
+
+    ``guid`` belongs to its contents.
+    """
+
+    path: Path
+    version: Version
+    guid: str
+    platform: str | None
+
+    @property
+    def words(self) -> str:
+        """What the unit holds, in a sentence."""
+        if self.platform is None:
+            return (
+                f"{self.path}: FMI {self.version}, sources alone: no C compiler was found; compile it where it is used"
+            )
+        return f"{self.path}: FMI {self.version}, sources and a library for {self.platform}"
+
+
+def write_unit(unit: PlantUnit | LoopUnit, path: Path, version: Version, name: str) -> WrittenUnit:
+    """Write a unit for co-simulation to ``path``, usually "{name}.fmu": whole or not at all. A file there is replaced.
+
+    Plant: inputs command_v (V from the bias, held over the communication step); outputs mirror_rad, line_of_sight_rad,
+    drive_v and counters. Loop: inputs reference_rad and disturbance_rad (rad, taken at the begin of the communication
+    step and held over it); outputs error_rad, line_of_sight_rad, mirror_rad, command_v, drive_v and counters. Arrays
+    are scalars ``command_v[1]``. A communication step is a whole number of plant steps; another one is an error of the
+    call, and changes nothing. Parameters act until the initialisation ends.
+
+    The library inside is compiled here, if there is a C compiler. The same unit gives the same file. Raises ExportError
+    for another version, a name that is no identifier or too long, a controller that cannot be exported (see
+    `sections`), and a compiler that fails.
+    """
+    if version not in HEADERS:
+        raise ExportError(f"FMI {version!r} is not written here: choose {' or '.join(HEADERS)}")
+    if len(identifier(name)) > LONGEST_NAME:
+        raise ExportError(
+            f"the name {name!r} of a co-simulation unit has {len(name)} characters: at most {LONGEST_NAME}, since what "
+            "is inside has the name with an ending; take a shorter one"
+        )
+    made, guid = _texts(unit, version, name)
+    contents = {file: text.encode() for file, text in made.items()}
+    found = _library(made, version, name) if compiler() is not None else None
+    if found is not None:
+        contents[f"binaries/{_platform(version)}/{name}{_ending()}"] = found
+    _write_whole(path, _archive(contents))
+    return WrittenUnit(path, version, guid, None if found is None else _platform(version))
+
+
+def _texts(unit: PlantUnit | LoopUnit, version: Version, name: str) -> tuple[dict[str, str], str]:
+    """All files but the library, and the GUID, which stands for what is in them."""
+    code = unit_code(unit, name)
+    adapter = f"fmi{version[0]}.c"
+    compiled = (*(file for file in code if file.endswith(".c")), adapter)
+
+    def around(guid: str) -> dict[str, str]:
+        return {
+            "modelDescription.xml": model_description(unit, version, name, guid, compiled),
+            f"sources/{adapter}": render(f"{adapter}.j2", unit=f"{name}_unit", guid=guid),
+        }
+
+    rest = {f"sources/{file}": text for file, text in code.items()}
+    headers = files("microrad.export") / "fmi"
+    rest |= {f"sources/{file}": (headers / file).read_text(encoding="utf-8") for file in HEADERS[version]}
+    rest["documentation/licenses/license.txt"] = render("fmi_licence.txt.j2")
+    if version == "3.0":
+        rest["sources/buildDescription.xml"] = render("build_description.xml.j2", name=name, compiled=compiled)
+    guid = _guid({**rest, **around("")})
+    return {**around(guid), **rest}, guid
+
+
+def _guid(texts: Mapping[str, str]) -> str:
+    digest = hashlib.sha256()
+    for file in sorted(texts):
+        digest.update(f"{file}\n{len(texts[file])}\n{texts[file]}".encode())
+    return f"{{{uuid.UUID(bytes=digest.digest()[:16], version=5)}}}"
+
+
+# -------------------------------------------------------------------------------------------------------------- sources
+def unit_code(unit: PlantUnit | LoopUnit, name: str) -> dict[str, str]:
+    """The C of a unit without the functions of the standard: file names and texts. Raises ExportError as `sections`."""
+    plant, loop, control = f"{name}_plant", f"{name}_loop", f"{name}_ctl"
+    code = {f"{plant}_hysteresis.h": render("hysteresis.h.j2", name=plant, precision="double")}
+    values = plant_values(plant_of(unit))
+    code |= {f"{plant}.{kind}": render(f"plant.{kind}.j2", name=plant, **values) for kind in ("h", "c")}
+    if isinstance(unit, LoopUnit):
+        flight = flight_code(unit.controller, sections(unit.controller), control, "double")
+        code |= {file: text for file, text in flight.items() if file.endswith((".h", ".c")) and "_bench" not in file}
+        values = {"name": loop, "plant": plant, "control": control, **_loop_values(unit)}
+        code |= {f"{loop}.{kind}": render(f"loop.{kind}.j2", **values) for kind in ("h", "c")}
+    shown = {
+        "name": f"{name}_unit",
+        "plant": plant,
+        "loop": loop if isinstance(unit, LoopUnit) else "",
+        "variables": variables(unit),
+        "constants": [value for _, _, value, _ in constants(unit)],
+    }
+    return code | {f"{name}_unit.{kind}": render(f"fmi_unit.{kind}.j2", **shown) for kind in ("h", "c")}
+
+
+def plant_values(unit: PlantUnit) -> dict[str, Any]:
+    """What the templates of a plant are filled with, but for its name."""
+    p = unit.plant
+    n, elements = len(p.states), len(p.elements) + len(p.operators)
+    arrays = ("diagonal", "coupling", "B0", "B1", "E_held", "E1", "F", "G", "C", "D", "CE1", "K", "play_start")
+    return {
+        "mission": unit.origin.mission,
+        "mirror": unit.origin.mirror,
+        "version": version_of("microrad"),
+        "step_s": p.step_s,
+        "bias_v": unit.bias_v,
+        "bandwidth_hz": unit.bandwidth_hz,
+        "slew_v_s": unit.slew_step_v / p.step_s,
+        "actuators": len(p.actuators),
+        "outputs": len(p.outputs),
+        "axes": unit.optics.shape[0],
+        "optics": unit.optics,
+        "states": p.diagonal.size if n else 0,
+        "elements": elements,
+        "direct": p.direct,
+        "feedback": p.feedback and elements > 0,
+        "rest": _entries(p.rest),
+        "bouc_wen": [row[: kernels.POWER] for row in p.bouc_wen],
+        "exponent": np.array([exponent(row) for row in p.bouc_wen]),
+        "operator": list(p.operator),
+        "widening": p.operator[:, kernels.WIDENING],
+        "operator_limit": p.operator[:, kernels.WIDENING_LIMIT],
+        "play_threshold": list(p.play_threshold),
+        "play_weight": p.play_weight,
+        **{key: getattr(p, key) for key in arrays},
+    }
+
+
+def _entries(rows: kernels.Rows) -> list[tuple[int, int, float]]:
+    """Row, column and value of each number."""
+    count: Any = np.diff(rows.start.astype(np.int64))
+    at = np.repeat(np.arange(count.size), count)
+    return [(int(i), int(j), float(v)) for i, j, v in zip(at, rows.column, rows.value, strict=True)]
+
+
+def _loop_values(unit: LoopUnit) -> dict[str, Any]:
+    """What the templates of a loop are filled with. Raises ExportError for an input that no sensor delivers."""
+    sources = {
+        OPTICAL_ERROR: "loop->reading_rad",
+        GAUGE: "gauge_rad",
+        READING: "line_of_sight_rad",
+        REFERENCE: "reference_rad",
+    }
+    names = [each.name for each in unit.controller.inputs]
+    if unknown := [each for each in names if each not in sources]:
+        raise ExportError(
+            f"controller {unit.controller.name!r} reads {', '.join(unknown)}, which a loop does not measure: it has "
+            f"{', '.join(sources)}"
+        )
+    return {
+        "mission": unit.plant.origin.mission,
+        "controller_name": unit.controller.name,
+        "version": version_of("microrad"),
+        "steps_per_sample": unit.steps_per_sample,
+        "delay_steps": unit.delay_steps,
+        "optical_delay_steps": unit.optical_delay_steps,
+        "optical_every": unit.optical_every,
+        "field_of_view_rad2": min(unit.field_of_view_rad**2, sys.float_info.max),
+        "optical_resolution_rad": unit.optical_resolution_rad,
+        "gauge_resolution_rad": unit.gauge_resolution_rad,
+        "optical": OPTICAL_ERROR in names,
+        "gauge": GAUGE in names,
+        "reading": READING in names,
+        "reference": REFERENCE in names,
+        "arguments": [sources[each] for each in names],
+    }
+
+
+# ------------------------------------------------------------------------------------------------- library and archive
+def _platform(version: Version) -> str:
+    """The folder of libraries for this machine, as the standard calls it."""
+    machine = platform.machine().lower()
+    wide = sys.maxsize > 2**32
+    system = {"win32": "windows", "cygwin": "windows", "darwin": "darwin"}.get(sys.platform, "linux")
+    if version == "2.0":
+        return {"windows": "win"}.get(system, system) + ("64" if wide else "32")
+    kind = "aarch64" if machine in ("aarch64", "arm64") else "x86_64" if wide else "x86"
+    if kind != "aarch64" and machine not in ("x86_64", "amd64", "i386", "i686", "x86"):
+        kind = machine
+    return f"{kind}-{system}"
+
+
+def _ending() -> str:
+    return {"win32": ".dll", "cygwin": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
+
+
+def _library(texts: Mapping[str, str], version: Version, name: str) -> bytes:
+    """The compiled library of a unit's sources."""
+    with tempfile.TemporaryDirectory(prefix="microrad-fmu-") as folder:
+        for file, text in texts.items():
+            if file.startswith("sources/"):
+                (Path(folder) / Path(file).name).write_text(text, encoding="utf-8", newline="\n")
+        sources = sorted(Path(file).name for file in texts if file.endswith(".c"))
+        target = f"{name}{_ending()}"
+        flags = [flag for flag in SHARED if flag != "-fPIC" or _ending() != ".dll"]
+        command = [*compiler_words(), *flags, "-o", target, *sources, "-lm"]
+        try:
+            done = subprocess.run(
+                command, cwd=folder, capture_output=True, text=True, errors="replace", timeout=TIME_LIMIT_S, check=False
+            )
+        except (OSError, subprocess.TimeoutExpired) as error:
+            raise ExportError(
+                f"the C compiler {command[0]!r} cannot compile the FMI {version} unit: {error}"
+            ) from error
+        if done.returncode != 0:
+            first = "\n  ".join(done.stderr.splitlines()[:12])
+            raise ExportError(f"the C compiler {command[0]!r} refuses the FMI {version} unit {name!r}:\n  {first}")
+        return (Path(folder) / target).read_bytes()
+
+
+def _archive(contents: Mapping[str, bytes]) -> bytes:
+    """A zip file with the model description first, that depends on nothing but its contents."""
+    import io
+
+    file = io.BytesIO()
+    with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name in sorted(contents, key=lambda each: (each != "modelDescription.xml", each)):
+            entry = zipfile.ZipInfo(name, EPOCH)
+            entry.create_system = 3  # permissions as on POSIX, wherever it is written
+            entry.external_attr = (0o100755 if name.startswith("binaries/") else 0o100644) << 16
+            archive.writestr(entry, contents[name], zipfile.ZIP_DEFLATED)
+    return file.getvalue()
+
+
+def _write_whole(path: Path, data: bytes) -> None:
+    part = path.with_name(f".microrad-{os.getpid()}.part")
+    try:
+        with part.open("xb") as file:
+            file.write(data)
+            file.flush()
+            os.fsync(file.fileno())
+        part.replace(path)
+    finally:
+        part.unlink(missing_ok=True)

@@ -1,0 +1,208 @@
+"""A linear system of one input and one output as zeros, poles and gain, from the forms that tools save; its checks."""
+
+import math
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+
+from microrad import lti
+from microrad.export.linear_select import form_of, numbers
+from microrad.export.matrices_files import python_control, sample_time_s
+from microrad.export.matrices_forms import LinearModel, Port, factored, zero_pole_gain
+from microrad.export.matrices_polynomials import roots
+from microrad.export.matrices_structure import pole_text
+from microrad.export.records import ExportError, Floats
+from microrad.lti import Complexes
+
+MOST_ORDER = 60
+"""States of a mirror's linear part beyond which it is taken for a mistake."""
+CANCELLING = 1e-8
+"""Distance of a zero from a pole, over the pole's size, below which they cancel."""
+COINCIDING = 1e-9
+"""The same between two poles: without this distance there is no modal form."""
+_INTEGRATOR = 1e-12  # of the largest pole
+_CONJUGATE = 1e-9
+
+
+@dataclass(frozen=True, slots=True)
+class Roots:
+    """gain x product of (s - zero) over product of (s - pole), s in rad/s; pairs of conjugates to the last bit."""
+
+    zeros: Complexes
+    poles: Complexes
+    gain: float
+
+
+def response(of: Roots, freq_hz: Floats) -> Complexes:
+    """Frequency response."""
+    return factored(of.zeros, of.poles, of.gain, np.asarray(2j * np.pi * freq_hz, dtype=complex))
+
+
+# --------------------------------------------------------------------------------------------------------------- forms
+def roots_of_fields(fields: dict[str, Any], source: str) -> Roots:
+    """Roots from a MATLAB file's fields. Raises ExportError with the reason for what is not one continuous system."""
+    _refuse_units(fields, source)
+    if "Ts" in fields:
+        value = numbers(fields, "Ts", source)
+        _refuse_sampled(float(value.item()) if value.size == 1 else math.nan, source)
+    form = form_of(fields)
+    if form[0] == "A":
+        return roots_of_states(lti.StateSpace(*(numbers(fields, key, source) for key in form)), source)
+    if form[0] == "num":
+        num, den = (_row(numbers(fields, key, source), key, source) for key in form)
+        return roots_of_coefficients(num, den, source)
+    gain = numbers(fields, "k", source)
+    if gain.size != 1:
+        raise ExportError(f"{source}: k has {gain.size} gains; choose one input and one output")
+    zeros, poles = (_row(numbers(fields, key, source, is_complex=True), key, source) for key in "zp")
+    return Roots(paired(zeros, "z", source), paired(poles, "p", source), float(gain.item()))
+
+
+def _refuse_units(fields: dict[str, Any], source: str) -> None:
+    """An export of microrad names its input's unit: a mirror takes volts."""
+    stated = fields.get("InputUnit")
+    unit = stated.item() if isinstance(stated, np.ndarray) and stated.size == 1 else ""
+    if isinstance(unit, str) and unit not in ("V", ""):
+        raise ExportError(
+            f"{source}: its input is in {unit}, and a mirror's drive is in V; choose the one from drive to angle"
+        )
+
+
+def _refuse_sampled(period_s: float, source: str) -> None:
+    if period_s != 0.0:
+        raise ExportError(
+            f"{source}: sampled, Ts = {period_s:g} s, and a mirror is continuous; convert it first (d2c in MATLAB), or "
+            "say Ts = 0 if it is continuous"
+        )
+
+
+def _row(values: Any, key: str, source: str) -> Any:
+    if min(values.shape, default=0) > 1:
+        raise ExportError(
+            f"{source}: {key} has shape {values.shape}, not a row or a column; choose one input and one output"
+        )
+    return values.reshape(-1)
+
+
+def roots_of_states(system: lti.StateSpace, source: str) -> Roots:
+    """Roots of a continuous state space. Raises ExportError for shapes that do not fit, and as `zero_pole_gain`."""
+    n = system.A.shape[0]
+    inputs, outputs = system.B.shape[1], system.C.shape[0]
+    shapes = {"A": (n, n), "B": (n, inputs), "C": (outputs, n), "D": (outputs, inputs)}
+    for key, wanted in shapes.items():
+        if getattr(system, key).shape != wanted:
+            raise ExportError(f"{source}: {key} has shape {getattr(system, key).shape}, where {wanted} fits the others")
+    if (inputs, outputs) != (1, 1):
+        raise ExportError(
+            f"{source}: {inputs} inputs and {outputs} outputs; a mirror file has one drive and one angle: choose"
+        )
+    if n > MOST_ORDER:
+        raise ExportError(f"{source}: {n} states, and a mirror has at most {MOST_ORDER}; reduce the model (balred)")
+    ports = (Port("drive_v", "V"),), (Port("mirror", ""),), tuple(Port(f"x_{i}", "") for i in range(n))
+    found = zero_pole_gain(LinearModel(source, "", system, 0.0, *ports, None))
+    return Roots(paired(found.zeros, "zeros", source), paired(found.poles, "poles", source), found.gain)
+
+
+def roots_of_coefficients(numerator: Floats, denominator: Floats, source: str) -> Roots:
+    """Roots of a numerator and a denominator in powers of s (rad/s), highest first."""
+    num, den = (np.trim_zeros(each, "f") for each in (numerator, denominator))
+    if not den.size:
+        raise ExportError(f"{source}: the denominator is zero; save one with a coefficient other than 0")
+    if not num.size:
+        raise ExportError(f"{source}: the numerator is zero, so the mirror does not move; check the model")
+    if den.size - 1 > MOST_ORDER:
+        raise ExportError(
+            f"{source}: order {den.size - 1}, and a mirror has at most {MOST_ORDER}; reduce the model (balred)"
+        )
+    return Roots(_exact(num), _exact(den), float(num[0] / den[0]))
+
+
+def _exact(coefficients: Floats) -> Complexes:
+    return roots([Fraction(float(each)) for each in coefficients])
+
+
+def roots_of_control(system: Any, source: str) -> Roots:
+    """Roots of an object of python-control. Raises ExportError for other objects, several inputs, and sampled ones."""
+    library = python_control()
+    if not isinstance(system, library.StateSpace | library.TransferFunction):
+        raise ExportError(
+            f"{source}: a {type(system).__name__}; give a control.StateSpace or a control.TransferFunction"
+        )
+    _refuse_sampled(sample_time_s(system), source)
+    if (system.ninputs, system.noutputs) != (1, 1):
+        found = f"{system.ninputs} inputs and {system.noutputs} outputs"
+        raise ExportError(f"{source}: {found}; a mirror file has one drive and one angle: choose")
+    arrays = {key: getattr(system, key) for key in "ABCD"} if isinstance(system, library.StateSpace) else {}
+    arrays = arrays or {"num": system.num_array[0, 0][None], "den": system.den_array[0, 0][None]}
+    return roots_of_fields({key: np.atleast_2d(np.asarray(value)) for key, value in arrays.items()}, source)
+
+
+# -------------------------------------------------------------------------------------------------------------- checks
+def paired(found: Complexes, key: str, source: str) -> Complexes:
+    """Real roots, and pairs of conjugates that agree to the last bit. Raises ExportError for a root without its own."""
+    real = np.abs(found.imag) <= 1e-14 * np.abs(found)
+    upper, lower = (list(found[~real & (sign * found.imag > 0.0)]) for sign in (1.0, -1.0))
+    both = [complex(r.real) for r in found[real]]
+    for root in upper:
+        nearest = min(lower, key=lambda r: abs(r - root.conjugate()), default=None)
+        if nearest is None or abs(nearest - root.conjugate()) > _CONJUGATE * abs(root):
+            raise _single(root, key, source)
+        lower.remove(nearest)
+        both += [complex(root), complex(root.conjugate())]
+    if lower:
+        raise _single(lower[0], key, source)
+    return np.array(both, dtype=complex)
+
+
+def _single(root: complex, key: str, source: str) -> ExportError:
+    return ExportError(
+        f"{source}: {key} has the complex root {root:.6g} without its conjugate; a mirror's response is real: give both"
+    )
+
+
+def checked(of: Roots, source: str) -> Roots:
+    """The same roots, where a mirror file can say them. Raises ExportError with the reason where it cannot."""
+    if of.zeros.size >= of.poles.size:
+        raise ExportError(
+            f"{source}: {of.zeros.size} zeros over {of.poles.size} poles, not strictly proper; a mirror does not "
+            "follow a jump at once: add the pole that ends its band"
+        )
+    if not (math.isfinite(of.gain) and of.gain != 0.0):
+        raise ExportError(f"{source}: a gain of {of.gain}; the mirror does not move: check the model")
+    for pole in of.poles:
+        _check_pole(pole, float(np.max(np.abs(of.poles))), source)
+    for number, pole in enumerate(of.poles):
+        _check_distances(of, number, pole, source)
+    if np.any(of.zeros == 0.0):
+        raise ExportError(
+            f"{source}: a zero at 0 Hz: the mirror does not hold an angle; a mirror file has zeros above 0 Hz, so give "
+            "the model with its answer to a constant drive"
+        )
+    return of
+
+
+def _check_pole(pole: complex, largest: float, source: str) -> None:
+    if abs(pole) <= _INTEGRATOR * largest:
+        raise ExportError(
+            f"{source}: an integrator, a pole at {abs(pole) / (2.0 * math.pi):.3g} Hz; a mirror comes to rest: take "
+            "drift off the records and identify again"
+        )
+    if pole.real >= 0.0:
+        raise ExportError(
+            f"{source}: unstable, a pole at {pole_text(pole, 0.0)}; a mirror is stable: identify it again"
+        )
+
+
+def _check_distances(of: Roots, number: int, pole: complex, source: str) -> None:
+    others = np.delete(of.poles, number)
+    if np.any(np.abs(others - pole) <= COINCIDING * abs(pole)):
+        raise ExportError(
+            f"{source}: two poles coincide at {pole_text(pole, 0.0)}; a mirror file has no modal form for them: set "
+            "them apart, or reduce the model"
+        )
+    if np.any(np.abs(of.zeros - pole) <= CANCELLING * abs(pole)):
+        raise ExportError(
+            f"{source}: not minimal, a zero cancels the pole at {pole_text(pole, 0.0)}; remove both (minreal)"
+        )

@@ -1,0 +1,92 @@
+"""Which linear system of a MATLAB file is meant: variables of their own, or the fields of a structure."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from microrad.export.matrices_mat import Structure, Unread, load
+from microrad.export.matrices_structure import LARGEST
+from microrad.export.records import ExportError
+
+FORMS = (("A", "B", "C", "D"), ("z", "p", "k"), ("num", "den"))
+"""What makes a linear system, the first one that is whole counts."""
+
+
+def select(path: Path, variable: str | None) -> tuple[str, dict[str, Any]]:
+    """The system of a file: the name of its structure ("" for variables of their own), and its fields.
+
+    Raises ExportError for a file without one, with several of which none is chosen, and for objects.
+    """
+    variables = load(path)
+    systems = _systems(path, variables)
+    if variable is not None:
+        if variable not in systems:
+            raise ExportError(f"{path} has no system {variable!r}; {_what_it_has(systems, variables)}")
+        return variable, systems[variable]
+    if len(systems) == 1:
+        return next(iter(systems.items()))
+    if systems:
+        listed = ", ".join(repr(name) for name in systems)
+        raise ExportError(
+            f"{path} holds {len(systems)} systems, {listed}; choose one by its name ('' has no structure)"
+        )
+    raise ExportError(f"{path} has no linear system; {_what_it_has(systems, variables)}")
+
+
+def _what_it_has(systems: dict[str, Any], variables: dict[str, Any]) -> str:
+    if systems:
+        return f"it has {', '.join(repr(name) for name in systems)}; choose one of these"
+    listed = ", ".join(list(variables)[:20]) or "nothing"
+    return f"it holds {listed}, and none with A B C D, z p k or num den: save one of these forms"
+
+
+def _systems(path: Path, variables: dict[str, Any]) -> dict[str, dict[str, Any]]:
+    """Systems by the name of their structure, "" for variables of their own."""
+    found = {"": variables} if _form(variables) else {}
+    for name, value in variables.items():
+        if isinstance(value, Unread) and value.kind == "an object of MATLAB":
+            raise ExportError(
+                f"{path}: variable {name!r} is {value.kind}, which only MATLAB can read; save its matrices: "
+                f"s = struct('A', {name}.A, 'B', {name}.B, 'C', {name}.C, 'D', {name}.D, 'Ts', {name}.Ts)"
+            )
+        if not isinstance(value, Structure) or not _form(value.fields):
+            continue
+        if value.size != 1:
+            raise ExportError(f"{path}: variable {name!r} is an array of {value.size} structures; save one of them")
+        found[name] = value.fields
+    return found
+
+
+def _form(fields: dict[str, Any]) -> tuple[str, ...]:
+    return next((form for form in FORMS if all(key in fields for key in form)), ())
+
+
+def form_of(fields: dict[str, Any]) -> tuple[str, ...]:
+    """Names of the fields that make the system."""
+    return _form(fields)
+
+
+def numbers(fields: dict[str, Any], key: str, source: str, *, is_complex: bool = False) -> Any:
+    """A field as an array of two axes, of floats or of complex numbers.
+
+    Raises ExportError for text, cells of several entries, objects, sparse matrices, complex numbers where there must be
+    none, and numbers that are not finite or beyond `LARGEST`.
+    """
+    value = fields[key]
+    if isinstance(value, np.ndarray) and value.dtype == object and value.size == 1:
+        value = value.item()  # MATLAB's cell of the one entry
+    if isinstance(value, np.ndarray) and value.dtype == object:
+        raise ExportError(f"{source}: {key} has cells for {value.size} entries; choose one input and one output")
+    if not isinstance(value, np.ndarray) or value.dtype.kind not in "iufc" or value.ndim != 2:
+        kind = value.kind if isinstance(value, Unread) else "not a matrix of numbers"
+        raise ExportError(f"{source}: {key} is {kind}; save numbers")
+    if value.dtype.kind == "c" and not is_complex:
+        raise ExportError(
+            f"{source}: {key} holds complex numbers; a mirror's response to a real drive is real: save it real"
+        )
+    if not np.all(np.abs(value) <= LARGEST):
+        raise ExportError(
+            f"{source}: {key} holds a number that is not finite or beyond {LARGEST:g}; look for NaN or Inf in the model"
+        )
+    return value.astype(complex if is_complex else float)

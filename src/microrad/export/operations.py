@@ -1,0 +1,240 @@
+"""What a step of exported code costs: operations counted from the sizes of its tables, the worst branch taken.
+
+The counts follow templates/controller.c.j2, hysteresis.h.j2 and fixed.c.j2 line by line, as they are written: a
+processor without a floating-point unit calls a routine for each of these operations. Changes of sign and absolute
+values count nothing: they set a bit. Calls of exp, expm1, log1p, pow and floor count as one each, whatever they cost
+inside.
+"""
+
+from collections.abc import Iterable
+from dataclasses import astuple, dataclass, fields
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from microrad import kernels
+from microrad.export.fixed import FixedForm
+from microrad.export.flight import compensated_states
+from microrad.export.records import FlightController, InverseLaw
+from microrad.export.sections import Sections
+from microrad.export.templating import Precision
+
+MOST_TRIALS = 256
+"""Most trial steps of a Bouc-Wen element with an exponent other than 1, as in templates/hysteresis.h.j2."""
+
+
+@dataclass(frozen=True, slots=True)
+class Operations:
+    """Floating-point operations. Subtractions are additions, exponentials exp and expm1, roundings floor.
+
+    Kinds are counted each by itself: where one branch has more products and another more exponentials, both count.
+    """
+
+    multiplications: int = 0
+    additions: int = 0
+    divisions: int = 0
+    comparisons: int = 0
+    exponentials: int = 0
+    logarithms: int = 0
+    powers: int = 0
+    roundings: int = 0
+
+    def __add__(self, other: "Operations") -> "Operations":
+        """One behind the other."""
+        return Operations(*(a + b for a, b in zip(astuple(self), astuple(other), strict=True)))
+
+    def __mul__(self, times: int) -> "Operations":
+        """So many times."""
+        return Operations(*(a * times for a in astuple(self)))
+
+    def __or__(self, other: "Operations") -> "Operations":
+        """The worse of two branches, kind by kind."""
+        return Operations(*(max(a, b) for a, b in zip(astuple(self), astuple(other), strict=True)))
+
+    @property
+    def total(self) -> int:
+        """All of them."""
+        return int(sum(astuple(self)))
+
+    @property
+    def words(self) -> str:
+        """The counts in a line, without those that are 0."""
+        return _counts(self, (each.name for each in fields(self)))
+
+
+def operations(of: FlightController, form: Sections, precision: Precision) -> Operations:
+    """The most that one call of {name}_step costs in floating point, whatever it reads; see `by_part`."""
+    return sum(by_part(of, form, precision).values(), start=Operations())
+
+
+def by_part(of: FlightController, form: Sections, precision: Precision) -> dict[str, Operations]:
+    """`operations` by the part of a step that they belong to, in the order of the step.
+
+    "readings": whether they are accepted; "outputs": C x + D m; "inverse", where there is one; "commands": limits,
+    whether they are sound, the converter; "states": A x + B m + L times what the limits took off.
+    """
+    numbers = sum(each.size for each in of.inputs)
+    found = {"readings": Operations(comparisons=2) * numbers, "outputs": _product(form.C) + _product(form.D)}
+    if of.inverse is not None:
+        found["inverse"] = _inverse(of.inverse, of.actuators, precision)
+    found["commands"] = _command(of.resolution_v > 0.0) * of.actuators
+    if form.order:
+        found["states"] = _states(form, precision)
+    return found
+
+
+@dataclass(frozen=True, slots=True)
+class FixedOperations:
+    """Operations of a step in fixed point: products of two numbers of 32 bits into 64, and the rest on 64 bits.
+
+    ``single`` are those of the inverse, in single precision, with ``conversions`` between whole and real numbers.
+    """
+
+    multiplications: int
+    additions: int
+    shifts: int
+    comparisons: int
+    conversions: int = 0
+    single: Operations = Operations()
+
+    @property
+    def words(self) -> str:
+        """The counts in a line, without those that are 0."""
+        found = f"{_counts(self, INTEGERS)} of whole numbers"
+        if self.single == Operations():
+            return found
+        return f"{found}; {_counts(self, ('conversions',))}; in single precision {self.single.words}"
+
+
+INTEGERS = ("multiplications", "additions", "shifts", "comparisons")
+"""Fields of `FixedOperations` that count operations of whole numbers."""
+
+
+def _counts(of: Operations | FixedOperations, names: Iterable[str]) -> str:
+    counts = [(name, int(getattr(of, name))) for name in names]
+    return ", ".join(f"{n} {name if n > 1 else name[:-1]}" for name, n in counts if n) or "no operations"
+
+
+def fixed_operations(of: FlightController, fixed: FixedForm) -> FixedOperations:
+    """The most that one call of {name}_fixed_step costs, whatever it reads; loops and counters not counted."""
+    states, actuators, outputs = len(fixed.state_scale), of.actuators, len(fixed.output_scale)
+    m, A, C = len(fixed.input_scale), fixed.state.value[:, :states], fixed.output.value[:, :states]
+    terms = int(np.count_nonzero(fixed.state.value) + np.count_nonzero(fixed.output.value))
+    reads = int(np.any(A)) + int(np.any(C))  # the states are rounded for each of the two products
+    shifts = [*(fixed.state_shift * reads), *fixed.output_shift, *(each.shift for each in fixed.converter)]
+    up = sum(shift > 0 for shift in shifts)
+    held, clipped = m + outputs + states, 5 + (2 if fixed.converter else 0)
+    windup = 2 * actuators if np.any(fixed.state.value[:, states + m :]) else 0
+    added = 0 if of.inverse is None else actuators
+    return FixedOperations(
+        multiplications=terms + len(fixed.converter),
+        additions=terms + up + states + actuators + added,
+        shifts=up + len(shifts) + states,
+        comparisons=len(shifts) + 3 * held + clipped * actuators + windup,
+        **({} if of.inverse is None else _single(of.inverse, actuators, outputs - actuators)),
+    )
+
+
+# -------------------------------------------------------------------------------------------------------- linear part
+_SOUND = Operations(comparisons=2)
+_CLAMP = Operations(comparisons=2)
+_COMPENSATED = _SOUND + Operations(additions=4)
+
+
+def _product(matrix: NDArray[np.float64]) -> Operations:
+    """Of a matrix by a vector, added to another: the numbers that are not 0 are multiplied and added."""
+    return Operations(multiplications=1, additions=1) * int(np.count_nonzero(matrix))
+
+
+def _states(form: Sections, precision: Precision) -> Operations:
+    compensated = np.array(compensated_states(form) if precision == "single" else [False] * form.order)
+    moves = form.A - np.diag(compensated.astype(float))
+    found = _product(moves) + _product(form.B) + _product(form.L)
+    slow = int(np.count_nonzero(compensated))
+    return found + _COMPENSATED * slow + _SOUND * (form.order - slow)
+
+
+def _command(converter: bool) -> Operations:
+    """Clip, whether v is finite and was clipped, what the limits took off; rounding to the converter's values."""
+    found = _CLAMP + Operations(comparisons=3, additions=1)
+    return found + _CLAMP + Operations(1, 1, 1, roundings=1) if converter else found
+
+
+# ------------------------------------------------------------------------------------------------------------ inverse
+def _inverse(of: InverseLaw, actuators: int, precision: Precision) -> Operations:
+    elements, plays, lags = of.bouc_wen.shape[0], of.play_threshold.size, of.lag_keep.size
+    widens = of.widening[:, 0] != 0.0
+    widening = bool(np.any(widens)) and plays > 0
+    found = (_SOUND + Operations(additions=1)) * actuators  # targets; the sum of v and drive
+    found += Operations(multiplications=1, additions=1) * lags  # what creep adds is taken off
+    if (widening or elements > 0) and of.by_difference:
+        found += Operations(additions=1, divisions=1) * actuators
+    if np.any(of.direct):
+        found += Operations(multiplications=1) * actuators
+    if widening:
+        found += (_CLAMP + Operations(multiplications=1, comparisons=1)) * actuators
+        found += Operations(comparisons=1) * int(np.count_nonzero(widens))
+    for row in of.bouc_wen:
+        found += _element(power=float(row[kernels.POWER]) != 0.0)
+    for threshold in of.play_threshold:
+        found += _play(widening, bool(threshold > 0.0))
+    return found + _lag(precision) * lags
+
+
+def _play(widening: bool, wide: bool) -> Operations:
+    found = _CLAMP + Operations(multiplications=1, additions=3)
+    return found + Operations(additions=1 if wide else 0, comparisons=1) if widening else found
+
+
+def _lag(precision: Precision) -> Operations:
+    found = Operations(multiplications=1, additions=1)
+    return found + (_COMPENSATED if precision == "single" else _SOUND + Operations(additions=1))
+
+
+def _element(power: bool) -> Operations:
+    """A Bouc-Wen element of the inverse: travel and rate, h, and Eq. 4; its share of the drive."""
+    travel = _CLAMP + Operations(additions=1, divisions=2, comparisons=1)
+    equation = Operations(multiplications=3, additions=4, divisions=1, exponentials=1)
+    return travel + _advance(power) + equation
+
+
+def _advance(power: bool) -> Operations:
+    """{name}_bouc_wen_advance: the forcing, a decay for each sign of h, h at the end, and whether it is finite."""
+    flow = Operations(multiplications=7, additions=6, exponentials=1)
+    return flow + Operations(comparisons=3) + (_power_step() if power else _linear_step())
+
+
+_RELAXED = Operations(multiplications=2, additions=2, divisions=1, comparisons=1, exponentials=1)
+
+
+def _linear_step() -> Operations:
+    """{name}_linear_step. At h = 0 one comparison more tells the side, but then h crosses nothing."""
+    end = _RELAXED + Operations(multiplications=1, comparisons=1)
+    at_zero = Operations(comparisons=3) + end
+    crossing = Operations(multiplications=1, comparisons=1)
+    crossing += Operations(multiplications=1, divisions=2, comparisons=1, logarithms=1)
+    crossing += Operations(multiplications=2, additions=1, comparisons=1) + _RELAXED
+    return at_zero | (Operations(comparisons=2) + end + crossing)
+
+
+_SLOPE = Operations(multiplications=3, additions=1, comparisons=1, powers=1)
+
+_TRIAL = _SLOPE * 7 + Operations(multiplications=31, additions=25, divisions=3)
+
+
+def _power_step() -> Operations:
+    """{name}_power_step with as many trial steps as it may take."""
+    begin = Operations(multiplications=3, additions=2, divisions=1, comparisons=2)
+    taken = Operations(multiplications=1, additions=2, divisions=1, comparisons=3)
+    change = Operations(multiplications=2, additions=1, comparisons=2, powers=1)
+    return begin + (_TRIAL + taken + change) * MOST_TRIALS
+
+
+# -------------------------------------------------------------------------------------------- fixed point's own inverse
+def _single(of: InverseLaw, actuators: int, numbers: int) -> dict[str, Any]:
+    """{name}_inverse_step and the way there and back: ``numbers`` targets and rates, a drive by actuator."""
+    there = Operations(multiplications=1) * numbers
+    back = (_CLAMP + Operations(multiplications=1, additions=1, roundings=1)) * actuators
+    step = (_SOUND + Operations(multiplications=1, additions=1)) * numbers + _inverse(of, actuators, "single")
+    return {"conversions": numbers + actuators, "single": there + back + step + _command(converter=False) * actuators}

@@ -1,0 +1,168 @@
+"""A controller's linear part in sections: small blocks of states that go on by themselves, side by side.
+
+In this form a step costs a handful of products for each state, poles are entries of the matrix (no polynomial whose
+coefficients would have to be exact), and rounding stays in its block. `block_diagonal` says how the blocks are found.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from microrad import kernels, lti
+from microrad.export.block_diagonal import BlockDiagonal
+from microrad.export.modes import NEAR, Modes, hidden, modes, sizes
+from microrad.export.records import ExportError, FlightController
+
+Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
+
+MODAL, TRIANGULAR = "modal", "triangular"
+"""Forms: blocks of one and two states alone; or some larger upper quasi-triangular ones beside them."""
+
+MOST_OUTSIDE = 1e-9
+"""Poles further outside the unit circle than this are unstable."""
+
+DUST = 4.0 * float(np.finfo(float).eps)
+"""Numbers of a block below this share of its largest are what rounding left of 0."""
+
+
+@dataclass(frozen=True, slots=True)
+class Sections:
+    """x[k+1] = A x + B m + L (clip(v) - v), outputs C x + D m, with a block-diagonal A (see FlightController for m, v).
+
+    ``blocks`` are (first state, size). A is stored for the kernel's way to multiply by it,
+
+        x_i[k+1] = diagonal_i x_i + coupling_i x_(i^1) + sum of rest + ...,
+
+    with ``coupling`` between the neighbours 0 and 1, 2 and 3, ... (0 at the last state of an odd number) and ``rest``
+    by rows for what is neither. ``form`` is MODAL where there is no rest, else TRIANGULAR. States are scaled by powers
+    of two to sizes near 1 for white noise of 1 at each input. ``condition`` is that of the transformation from the
+    controller's own states, each of the size that this noise gives it.
+    """
+
+    form: str
+    blocks: tuple[tuple[int, int], ...]
+    diagonal: Floats
+    coupling: Floats
+    rest: kernels.Rows
+    B: Floats
+    C: Floats
+    D: Floats
+    L: Floats
+    condition: float
+
+    @property
+    def order(self) -> int:
+        """Number of states."""
+        return int(self.diagonal.size)
+
+    @property
+    def A(self) -> Floats:  # noqa: N802
+        """The dense matrix."""
+        n, dense = self.order, np.diag(self.diagonal)
+        paired = np.arange(n - n % 2)
+        dense[paired, paired ^ 1] = self.coupling[paired]
+        start = self.rest.start.astype(int)
+        dense[np.repeat(np.arange(n), np.diff(start)), self.rest.column.astype(int)] += self.rest.value
+        return dense
+
+    @property
+    def system(self) -> lti.StateSpace:
+        """The same without anti-windup (discrete)."""
+        return lti.StateSpace(self.A, self.B, self.C, self.D)
+
+
+def sections(of: FlightController) -> Sections:
+    """The controller's linear part in sections: the finest form whose blocks do not cancel each other.
+
+    Raises ExportError for numbers that are not finite, for poles outside the unit circle or repeated ones on it that
+    grow, and for modes that no input and no anti-windup drives or that no output shows. Integrators are welcome.
+    """
+    found = modes(of)
+    _refuse_growing(of, found.found)
+    if (lack := hidden(found)) is not None:
+        raise ExportError(
+            f"controller {of.name!r} is not minimal: {lack[0]} its mode with {_pole(of, lack[1])}, so that the code "
+            "would compute it for nothing; take a minimal realisation (`microrad.export.modes.minimal` makes one), or "
+            "take out the filter or input that the mode belongs to"
+        )
+    return _sections(found, of.system.D)
+
+
+# ------------------------------------------------------------------------------------------------------------ refusals
+def _pole(of: FlightController, z: complex) -> str:
+    return f"|z| = {abs(z):.9g} at {abs(np.angle(z)) / (2.0 * math.pi * of.period_s):.6g} Hz"
+
+
+def _refuse_growing(of: FlightController, found: BlockDiagonal) -> None:
+    for each in found.slices:
+        block = found.blocks[each, each].astype(float)
+        poles = np.linalg.eigvals(block)
+        worst = poles[np.argmax(np.abs(poles))]
+        if abs(worst) > 1.0 + MOST_OUTSIDE:
+            raise ExportError(
+                f"controller {of.name!r} is unstable: it has a pole with {_pole(of, worst)}, and its states would grow "
+                "without bound while the loop is open or clipped; lower the gains or bandwidth that it is tuned for"
+            )
+        if (repeated := _defective(block, poles)) is not None:
+            raise ExportError(
+                f"controller {of.name!r} has a repeated pole on the unit circle, {_pole(of, repeated)}, whose states "
+                "drive each other and grow without bound; keep one integrator (or undamped oscillator) in a chain, or "
+                "draw one of the two inside the circle"
+            )
+
+
+def _defective(block: Floats, poles: Complexes) -> complex | None:
+    """A repeated eigenvalue on the circle with fewer eigenvectors than its multiplicity, if there is one."""
+    for z in poles[np.abs(poles) > 1.0 - NEAR]:
+        near = poles[np.abs(poles - z) < NEAR]
+        values = np.linalg.svd(block - np.mean(near) * np.eye(len(poles)), compute_uv=False)
+        if np.count_nonzero(values < NEAR) < near.size:
+            return complex(np.mean(near))
+    return None
+
+
+# --------------------------------------------------------------------------------------------------------- the sections
+def _sections(of: Modes, D: Floats) -> Sections:
+    size = _block_sizes(of)
+    A = _without_dust(of) * size / size[:, None]
+    n = A.shape[0]
+    row, column = np.indices(A.shape)
+    beside = (row ^ 1) == column
+    paired = np.arange(n - n % 2)
+    coupling = np.zeros(n)
+    coupling[paired] = A[paired, paired ^ 1]
+    rest = kernels.rows(np.where((row == column) | beside, 0.0, A))
+    return Sections(
+        form=TRIANGULAR if rest.value.size else MODAL,
+        blocks=tuple((at.start, at.stop - at.start) for at in of.found.slices),
+        diagonal=np.diag(A).copy(),
+        coupling=coupling,
+        rest=rest,
+        B=of.B.astype(float) / size[:, None],
+        C=of.C.astype(float) * size,
+        D=D.astype(float),
+        L=of.L.astype(float) / size[:, None],
+        condition=of.found.condition,
+    )
+
+
+def _without_dust(of: Modes) -> Floats:
+    """A with 0 for what is rounding of a block's largest number."""
+    A = of.found.blocks.astype(float)
+    for at in of.found.slices:
+        block = A[at, at]
+        block[np.abs(block) < DUST * np.max(np.abs(block))] = 0.0
+    return A
+
+
+def _block_sizes(of: Modes) -> Floats:
+    """Sizes of the states, the same one for the two of a rotation, so that it stays one."""
+    blocks = of.found.blocks.astype(float)
+    size = sizes(blocks, of.driven)
+    for at in of.found.slices:
+        if at.stop - at.start == 2 and blocks[at.start + 1, at.start] != 0.0:
+            size[at] = np.max(size[at])
+    return size

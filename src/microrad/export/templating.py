@@ -1,0 +1,110 @@
+"""The templates of exported code: C, make files and XML with the numbers of a design in them."""
+
+import math
+from collections.abc import Iterable
+from functools import cache
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from microrad.export.records import ExportError
+
+if TYPE_CHECKING:
+    from jinja2 import Environment
+
+Precision = Literal["double", "single"]
+
+Terms = list[tuple[int, int, float]]
+"""Numbers of a matrix: row, column, value."""
+
+LINE = 112
+"""Longest line of a table or of words."""
+
+LARGEST = {"double": float(np.finfo(np.float64).max), "single": float(np.finfo(np.float32).max)}
+SMALLEST = {
+    "double": float(np.finfo(np.float64).smallest_normal),
+    "single": float(np.finfo(np.float32).smallest_normal),
+}
+"""What a number of exported code can hold, by precision."""
+
+
+def real(x: float, precision: Precision = "double") -> str:
+    """A number as the shortest C literal that reads back to it; infinity becomes the largest finite number.
+
+    At most 17 significant digits; in single precision 9, with the suffix f. What is too small for the precision becomes
+    0 (a compiler warns of such a literal). Raises ExportError for nan, and for a finite number that is too large.
+    """
+    largest = LARGEST[precision]
+    if math.isnan(x):
+        raise ExportError("a number of the exported code is nan: no literal of C stands for it; look for its origin")
+    if abs(x) > largest and not math.isinf(x):
+        raise ExportError(
+            f"{float(x)!r} is beyond single precision, which ends at {largest:.4g}: export double precision"
+        )
+    held = min(max(float(x), -largest), largest)
+    held = 0.0 if abs(held) < SMALLEST[precision] else held
+    text = repr(held) if precision == "double" else str(np.float32(held))
+    text = text if "." in text or "e" in text else text + ".0"
+    return text if precision == "double" else text + "f"
+
+
+def table(matrix: Any, precision: Precision = "double") -> str:
+    """Numbers as a C initialiser: ``{a, b}`` of one dimension, a braced line for each row of two."""
+    numbers = np.asarray(matrix, dtype=float)
+    if numbers.ndim == 1:
+        return _braced(real(float(x), precision) for x in numbers)
+    return "{\n    " + ",\n    ".join(table(row, precision) for row in numbers) + ",\n}"
+
+
+def _braced(items: Iterable[str]) -> str:
+    return "{" + ", ".join(items) + "}"
+
+
+def whole(numbers: Iterable[int]) -> str:
+    """Whole numbers as a C initialiser."""
+    return _braced(str(int(n)) for n in numbers)
+
+
+def terms(of: Terms, precision: Precision = "double") -> str:
+    """Numbers of a matrix as braced rows, columns and values; each row of the matrix begins a line."""
+    lines: list[str] = []
+    last = -1
+    for row, column, value in of:
+        text = f"{{{row}, {column}, {real(value, precision)}}},"
+        if row == last and len(lines[-1]) + 1 + len(text) <= LINE:
+            lines[-1] += f" {text}"
+        else:
+            lines.append(text)
+        last = row
+    return "\n    ".join(lines)
+
+
+def comment(text: str, prefix: str = "") -> str:
+    """Text for a comment of C, in lines that begin with ``prefix``: nothing in it can end the comment or hide code."""
+    import textwrap  # only where code is made
+
+    plain = "".join(c if c.isprintable() else " " for c in text).replace("\\", "/").replace("??", "? ?")
+    while "*/" in plain or "/*" in plain:
+        plain = plain.replace("*/", "* /").replace("/*", "/ *")
+    return f"\n{prefix}".join(textwrap.wrap(plain, LINE) or [""])
+
+
+def render(template: str, **values: Any) -> str:
+    """A file of the folder `templates` with the values filled in; a name without a value is an error of jinja2."""
+    return _environment().get_template(template).render(**values)
+
+
+@cache
+def _environment() -> "Environment":
+    from jinja2 import Environment, PackageLoader, StrictUndefined  # slow to import, not needed to show help
+
+    made = Environment(
+        loader=PackageLoader("microrad.export", "templates"),
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+        autoescape=False,  # C, not HTML; templates of XML escape what they put in
+    )
+    made.filters.update(real=real, table=table, whole=whole, terms=terms, comment=comment)
+    return made

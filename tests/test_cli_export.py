@@ -1,0 +1,187 @@
+"""Commands that take a design out of microrad and a linear model in: what they write, print and refuse."""
+
+import hashlib
+import json
+import re
+import shutil
+import zipfile
+
+import pytest
+
+from microrad.export import build
+from microrad.missionfile import load_mirror
+from shipped import SHIPPED, without_fine_pointing
+
+needs_a_compiler = pytest.mark.skipif(build.compiler() is None, reason="no C compiler")
+
+IMPORT = (
+    *("--travel", "2.5 mrad", "--drive", "0 V", "12 V", "--bias", "6 V", "--rate-limit", "3770 V/s"),
+    *("--band", "1 Hz", "5 kHz", "--normalise-at", "2 Hz", "--output-unit", "rad"),
+)
+
+
+@pytest.fixture
+def mission(folder):
+    """The paper's mission in the current folder."""
+    (folder / "leo-geo.toml").write_text(SHIPPED.read_text(encoding="utf-8"), encoding="utf-8")
+    return folder
+
+
+# --------------------------------------------------------------------------------------------------------------- C code
+@needs_a_compiler
+@pytest.mark.parametrize("precision", ["double", "single", "fixed"])
+def test_a_controller_becomes_code_that_keeps_to_the_kernel(mission, call, precision):
+    done = call("export", "c", "leo-geo.toml", "--controller", "PID + inverse", "--precision", precision, "--json")
+    assert done.code == 0, done.err
+    found = json.loads(done.out)
+    bench = found["bench"]
+    assert (found["controller"], found["precision"], found["folder"]) == (
+        "PID + inverse",
+        precision,
+        "leo-geo-pid_inverse",
+    )
+    assert bench["samples"] == 5000
+    assert bench["largest_difference_v"] <= bench["bound_v"] < 1e-3
+    assert bench["peak_command_v"] > 3.0  # the scenario drives the mirror over more than half of its range
+    assert 0 < found["operations"]["multiplications"] < 1000
+
+
+@needs_a_compiler
+def test_the_folder_holds_sources_vectors_and_hashes_and_nothing_compiled(mission, call):
+    done = call("export", "c", "leo-geo.toml", "--controller", "PID", "--name", "mirror_loop", "--output", "flight")
+    assert done.code == 0, done.err
+    files = {path.name for path in (mission / "flight").iterdir()}
+    sources = {"mirror_loop.h", "mirror_loop.c", "mirror_loop_bench.c", "Makefile"}
+    assert files == {*sources, "vectors.csv", "report.txt", "manifest.json"}
+    manifest = json.loads((mission / "flight" / "manifest.json").read_text(encoding="utf-8"))
+    assert manifest["mission"]["sha256"] == hashlib.sha256((mission / "leo-geo.toml").read_bytes()).hexdigest()
+    for name, digest in manifest["files_sha256"].items():
+        assert hashlib.sha256((mission / "flight" / name).read_bytes()).hexdigest() == digest
+    assert "at most" in done.out and "off the kernel" in done.out
+    assert manifest["mission"]["sha256"] in (mission / "flight" / "mirror_loop.h").read_text(encoding="utf-8")
+
+
+def test_without_a_compiler_the_code_is_written_and_that_is_said(mission, call, monkeypatch):
+    monkeypatch.setattr(build, "COMPILERS", ())
+    monkeypatch.delenv("CC", raising=False)
+    done = call("export", "c", "leo-geo.toml", "--controller", "PID")
+    assert done.code == 0, done.err
+    assert "there is no C compiler here" in done.out
+    assert (mission / "leo-geo-pid" / "pid.c").is_file()
+
+
+def test_results_are_replaced_only_when_asked_to(mission, call, refused):
+    words = ("export", "c", "leo-geo.toml", "--controller", "PID")
+    assert call(*words).code == 0
+    assert "already holds exported code" in refused(*words)
+    assert call(*words, "--overwrite").code == 0
+    (mission / "mine").mkdir()
+    (mission / "mine" / "thesis.txt").write_text("mine", encoding="utf-8")
+    assert "not exported code" in refused(*words, "--output", "mine", "--overwrite")
+    assert (mission / "mine" / "thesis.txt").read_text(encoding="utf-8") == "mine"
+
+
+@pytest.mark.parametrize(
+    ("extra", "words"),
+    [
+        (("--controller", "PDI"), "has no controller 'PDI'; it has: PI, best of a gain grid; PI;"),
+        (("--controller", "PID", "--name", "7up"), "'7up' is no name for exported code"),
+        (("--controller", "PID", "--name", "for"), "it is a keyword of C"),
+        (("--controller", "PID", "--name", "exp"), "exp"),
+    ],
+)
+def test_code_that_cannot_be_is_refused_with_the_reason(mission, refused, extra, words):
+    assert words in refused("export", "c", "leo-geo.toml", *extra)
+
+
+def test_a_mirror_without_an_inverse_is_refused_where_one_is_asked_for(mission, refused):
+    text = (mission / "leo-geo.toml").read_text(encoding="utf-8")
+    begin, end = text.index("[mirror.bouc_wen]"), text.index("# A set with the same slow loop")
+    plays = '[mirror.prandtl_ishlinskii]\nthresholds = ["0 V", "1 V"]\nweights = ["0 urad/V", "89 urad/V"]\n\n'
+    (mission / "stuck.toml").write_text(text[:begin] + plays + text[end:], encoding="utf-8")
+    said = refused("export", "c", "stuck.toml", "--controller", "PID + inverse")
+    assert "stuck.toml" in said and "stands still after each reversal and has no inverse" in said
+
+
+def test_a_compiler_that_is_not_there_is_refused_and_nothing_is_written(mission, refused, monkeypatch):
+    monkeypatch.setenv("CC", "no-such-compiler")
+    assert "CC is 'no-such-compiler'" in refused("export", "c", "leo-geo.toml", "--controller", "PID")
+
+
+# ----------------------------------------------------------------------------------------------------------------- FMU
+@pytest.mark.parametrize(
+    ("extra", "name", "version"),
+    [
+        ((), "leo-geo-mirror.fmu", "2.0"),
+        (("--loop", "control", "--fmi", "3.0"), "leo-geo-mirror.fmu", "3.0"),
+        (("--controller", "PID + inverse"), "leo-geo-pid_inverse_loop.fmu", "2.0"),
+    ],
+)
+def test_a_unit_is_written_with_its_description(mission, call, extra, name, version):
+    done = call("export", "fmu", "leo-geo.toml", *extra)
+    assert done.code == 0, done.err
+    assert done.out.startswith(f"{name}: FMI {version}")
+    with zipfile.ZipFile(mission / name) as archive:
+        description = archive.read("modelDescription.xml").decode()
+    assert f'fmiVersion="{version}"' in description
+    assert ("reference_rad" in description) == ("--controller" in extra)
+
+
+def test_a_unit_does_not_replace_other_files(mission, call, refused):
+    (mission / "mine.fmu").write_text("not a unit", encoding="utf-8")
+    assert "left as it is" in refused("export", "fmu", "leo-geo.toml", "--output", "mine.fmu")
+    assert "was not written by microrad" in refused(
+        "export", "fmu", "leo-geo.toml", "--output", "mine.fmu", "--overwrite"
+    )
+    assert call("export", "fmu", "leo-geo.toml", "--loop", "control").code == 0
+    assert call("export", "fmu", "leo-geo.toml", "--loop", "control", "--overwrite").code == 0
+
+
+def test_a_controller_and_a_loop_exclude_each_other(mission, refused):
+    said = refused("export", "fmu", "leo-geo.toml", "--loop", "control", "--controller", "PID")
+    assert "--controller and --loop exclude each other" in said
+
+
+def test_a_loop_that_the_mission_does_not_have_is_refused(mission, refused):
+    text = (mission / "leo-geo.toml").read_text(encoding="utf-8")
+    (mission / "bare.toml").write_text(without_fine_pointing(text), encoding="utf-8")
+    assert "has no loop 'fine_pointing'" in refused("export", "fmu", "bare.toml", "--loop", "fine_pointing")
+
+
+# ------------------------------------------------------------------------------------------------------------- matrices
+def test_matrices_go_to_a_matlab_file_and_to_json(mission, call):
+    scipy_io = pytest.importorskip("scipy.io")
+    done = call("export", "matrices", "leo-geo.toml", "--controller", "PID + inverse")
+    assert done.code == 0, done.err
+    read = scipy_io.loadmat(mission / "leo-geo.mat", squeeze_me=True)
+    assert {"linear_part", "mirror", "sampled_plant", "controller", "loop"} <= set(read)
+    printed = call("export", "matrices", "leo-geo.toml", "--json")
+    assert "linear_part" in printed.out and json.loads(printed.out)
+
+
+# --------------------------------------------------------------------------------------------------------------- import
+def test_a_linear_model_makes_a_mirror_file(mission, call):
+    assert call("export", "matrices", "leo-geo.toml", "--output", "models.mat").code == 0
+    done = call("import", "models.mat", "--variable", "mirror", *IMPORT)
+    assert done.code == 0, done.err
+    assert "models-mirror.toml written" in done.out
+    made = load_mirror(mission / "models-mirror.toml").mirror
+    assert made.drive_max_v == 12.0
+    assert made.prandtl_ishlinskii is not None
+    assert made.prandtl_ishlinskii.weights_rad_v == pytest.approx((8.9e-5,), rel=1e-9)  # d1
+
+
+def test_what_a_linear_model_does_not_say_has_a_unit(mission, call, refused):
+    assert call("export", "matrices", "leo-geo.toml", "--output", "models.mat").code == 0
+    words = ["6" if each == "6 V" else each for each in IMPORT]
+    assert '--bias: "6" is a number without a unit' in refused("import", "models.mat", "--variable", "mirror", *words)
+    assert "models.mat" in refused("import", "models.mat", *IMPORT)  # two models, and none is chosen
+    assert re.search("No such file|cannot be read|is not there", refused("import", "none.mat", *IMPORT))
+
+
+def test_an_imported_mirror_does_not_replace_other_files(mission, call, refused):
+    assert call("export", "matrices", "leo-geo.toml", "--output", "models.mat").code == 0
+    shutil.copy(mission / "leo-geo.toml", mission / "mine.toml")
+    words = ("import", "models.mat", "--variable", "mirror", *IMPORT, "--output", "mine.toml")
+    assert "left as it is" in refused(*words)
+    assert "was not written by microrad" in refused(*words, "--overwrite")

@@ -1,0 +1,229 @@
+"""Compiling exported code and running its bench: results, and what is said where it fails."""
+
+import os
+import re
+import shutil
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from microrad.export import build
+from microrad.export.records import ExportError
+
+needs_compiler = pytest.mark.skipif(not any(map(shutil.which, build.COMPILERS)), reason="no C compiler here")
+needs_make = pytest.mark.skipif(shutil.which("make") is None, reason="no make here")
+
+CODE = "double gain_step(double x);\ndouble gain_step(double x) { return 2.0 * x; }\n"
+
+BENCH = """#include <stdio.h>
+double gain_step(double x);
+int main(int count, char **words) {
+    char line[64];
+    FILE *file = fopen(words[1], "r");
+    if (file == NULL || fgets(line, 64, file) == NULL || fclose(file)) return 2;
+    printf("samples %d\\nlargest_difference_v %g\\n", count, gain_step(DIFFERENCE));
+    printf("peak_command_v 3.5\\nbound_v 1e-3\\nsaturated 4\\nrate_clamped 5\\nrejected 6\\nfaults 7\\n");
+    printf("worst_step_ns %s\\nmedian_step_ns 20.5\\nclock_ns 18\\nBEHIND", words[2]);
+    return gain_step(DIFFERENCE) > 1e-3;
+}
+"""
+
+EXPECTED = build.BenchResult(3, 2e-4, 3.5, 1e-3, 4, 5, 6, 7, 11.0, 20.5, 18.0)
+
+
+def written(folder: Path, difference: str = "1e-4", behind: str = "", makefile: str | None = None) -> Path:
+    """Code named ``gain`` in the folder, whose bench finds twice this difference and ends with a line more."""
+    bench = BENCH.replace("DIFFERENCE", difference).replace("BEHIND", behind)
+    for name, text in {"gain.c": CODE, "gain_bench.c": bench, "vectors.csv": "a,b\n1,2\n"}.items():
+        (folder / name).write_text(text)
+    if makefile is not None:
+        (folder / "Makefile").write_text(makefile)
+    return folder
+
+
+# ---------------------------------------------------------------------------------------------------- the compiler
+def test_the_first_compiler_on_the_path_is_taken(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("CC", raising=False)
+    monkeypatch.setenv("PATH", str(tmp_path))
+    assert build.compiler() is None
+    for name in reversed(build.COMPILERS):
+        (tmp_path / name).write_text("#!/bin/sh\n")
+        (tmp_path / name).chmod(0o755)
+        assert build.compiler() == name
+    assert build.compiler_words() == ("cc",)
+
+
+def test_no_compiler_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("CC", " ")
+    monkeypatch.setenv("PATH", str(tmp_path))
+    with pytest.raises(ExportError, match=r"no C compiler was found \(looked for cc, gcc, clang\): install one or"):
+        build.compiler_words()
+
+
+def test_the_environment_variable_names_the_compiler(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    odd = tmp_path / "with space" / "my cc"
+    odd.parent.mkdir()
+    odd.write_text("#!/bin/sh\n")
+    odd.chmod(0o755)
+    monkeypatch.setenv("CC", f"'{odd}' -m32")
+    assert build.compiler() == f"'{odd}' -m32"
+    assert build.compiler_words() == (str(odd), "-m32")
+    monkeypatch.setenv("CC", str(odd))
+    assert build.compiler_words() == (str(odd),)
+
+
+def test_a_compiler_that_is_not_there_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("CC", "no-such-compiler -O3")
+    with pytest.raises(ExportError, match="CC is 'no-such-compiler -O3', and there is no such program on the path"):
+        build.compiler()
+    monkeypatch.setenv("CC", "'gcc")
+    with pytest.raises(ExportError, match='CC is "\'gcc": no closing quotation'):
+        build.compiler()
+
+
+# ----------------------------------------------------------------------------------------------------- the results
+@needs_compiler
+def test_the_bench_s_lines_become_a_record(tmp_path: Path) -> None:
+    assert build.compile_and_run(written(tmp_path), "gain", passes=11) == EXPECTED
+    assert build.compile_and_run(tmp_path, "gain") == replace(EXPECTED, worst_step_ns=20.0)
+
+
+@needs_compiler
+def test_what_else_the_bench_prints_is_kept(tmp_path: Path) -> None:
+    found = build.compile_and_run(written(tmp_path, behind="noise_v 2.5e-5\\nsome 12 words\\nno number\\n"), "gain", 11)
+    assert found == replace(EXPECTED, others=(("noise_v", 2.5e-5),))
+
+
+@needs_compiler
+def test_without_a_makefile_all_sources_but_other_benches_are_compiled(tmp_path: Path) -> None:
+    written(tmp_path)
+    (tmp_path / "gain.c").write_text("double twice(double x);\n" + CODE.replace("2.0 * x", "twice(x)"))
+    (tmp_path / "other_bench.c").write_text("int main(void) { return 3; }\n")
+    with pytest.raises(ExportError, match="twice"):
+        build.compile_and_run(tmp_path, "gain", 11)
+    (tmp_path / "part.c").write_text("double twice(double x);\ndouble twice(double x) { return 2.0 * x; }\n")
+    assert build.compile_and_run(tmp_path, "gain", 11) == EXPECTED
+
+
+@needs_compiler
+def test_a_folder_is_named_from_anywhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "made").mkdir()
+    written(tmp_path / "made")
+    monkeypatch.chdir(tmp_path)
+    assert build.compile_and_run(Path("made"), "gain", 11) == EXPECTED
+
+
+@needs_compiler
+@needs_make
+def test_the_makefile_of_the_folder_is_used_with_our_compiler(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    words = " ".join(build.compiler_words())
+    monkeypatch.setenv("CC", f"{words} -DOURS")
+    monkeypatch.setenv("MAKEFLAGS", "--dry-run")  # of a make that runs this; it would compile nothing
+    makefile = "CC = false\ngain_bench: gain.c gain_bench.c\n\t$(CC) -DMADE -o $@ gain.c gain_bench.c\n"
+    folder = written(tmp_path, behind="made %d\\n", makefile=makefile)
+    bench = folder / "gain_bench.c"
+    bench.write_text(bench.read_text().replace('made %d\\n", words[2]', 'made %d\\n", words[2], MADE + OURS'))
+    assert build.compile_and_run(folder, "gain", 11) == replace(EXPECTED, others=(("made", 2.0),))
+
+
+@needs_compiler
+@needs_make
+def test_what_was_compiled_before_is_compiled_anew(tmp_path: Path) -> None:
+    makefile = "gain_bench: gain.c gain_bench.c\n\t$(CC) -o $@ gain.c gain_bench.c\n"
+    folder = written(tmp_path, makefile=makefile)
+    build.compile_and_run(folder, "gain", 11)
+    written(tmp_path, difference="2e-4")
+    for old in ("gain.c", "gain_bench.c"):
+        os.utime(folder / old, (0, 0))
+    assert build.compile_and_run(folder, "gain", 11) == replace(EXPECTED, largest_difference_v=4e-4)
+
+
+# ----------------------------------------------------------------------------------------------------- the refusals
+@needs_compiler
+def test_a_difference_beyond_the_bound_is_an_error(tmp_path: Path) -> None:
+    written(tmp_path, difference="1e-2")
+    with pytest.raises(ExportError, match=r"gain in .* commands up to 0\.02 V off the recorded run, .* 0\.001 V: comp"):
+        build.compile_and_run(tmp_path, "gain")
+
+
+@needs_compiler
+def test_a_failing_bench_s_first_lines_are_shown(tmp_path: Path) -> None:
+    printed = "".join(f'printf("line {i} of it\\n");' for i in range(20))
+    (written(tmp_path) / "gain_bench.c").write_text(f"#include <stdio.h>\nint main(void) {{ {printed} return 3; }}\n")
+    with pytest.raises(ExportError) as caught:
+        build.compile_and_run(tmp_path, "gain")
+    shown = str(caught.value).splitlines()
+    assert shown[0] == f"the bench of gain in {tmp_path} failed with exit status 3:"
+    assert shown[1:] == [f"  line {i} of it" for i in range(build.FIRST_LINES)] + ["  ... and 8 lines more"]
+
+
+@needs_compiler
+def test_a_bench_that_is_killed_and_one_that_is_silent_are_said(tmp_path: Path) -> None:
+    (written(tmp_path) / "gain_bench.c").write_text("#include <stdlib.h>\nint main(void) { abort(); }\n")
+    with pytest.raises(ExportError, match=r"the bench of gain in .* was ended by signal 6:\n  \(it wrote nothing\)"):
+        build.compile_and_run(tmp_path, "gain")
+    (tmp_path / "gain_bench.c").write_text('#include <stdio.h>\nint main(void) { puts("samples 1"); return 0; }\n')
+    with pytest.raises(ExportError, match=r"printed no largest_difference_v, no peak_command_v, .*:\n  samples 1"):
+        build.compile_and_run(tmp_path, "gain")
+
+
+@needs_compiler
+@pytest.mark.parametrize("makefile", [None, "gain_bench:\n\t$(CC) -std=c99 -Werror -o $@ gain.c gain_bench.c\n"])
+def test_what_does_not_compile_is_shown(tmp_path: Path, makefile: str | None) -> None:
+    (written(tmp_path, makefile=makefile) / "gain.c").write_text("int gain_step(double x) { return y; }\n")
+    with pytest.raises(ExportError, match=r" in .* failed with exit status \d+:\n") as caught:
+        build.compile_and_run(tmp_path, "gain")
+    assert re.search(r"gain\.c:1:\d+: error: .*y", str(caught.value))
+    assert len(str(caught.value).splitlines()) <= build.FIRST_LINES + 2
+
+
+@needs_compiler
+def test_warnings_are_errors(tmp_path: Path) -> None:
+    (written(tmp_path) / "gain.c").write_text(CODE + "int unused(int x);\nint unused(int x) { return 1; }\n")
+    with pytest.raises(ExportError, match="unused"):
+        build.compile_and_run(tmp_path, "gain")
+
+
+@needs_compiler
+@needs_make
+def test_what_does_not_end_is_ended_with_all_that_it_started(tmp_path: Path) -> None:
+    makefile = "gain_bench:\n\tsleep 300 & echo $$! > sleeping; wait\n"
+    written(tmp_path, makefile=makefile)
+    with pytest.raises(ExportError, match=r"make .* gain_bench in .* did not end within 1 s and was stopped"):
+        build.compile_and_run(tmp_path, "gain", time_limit_s=1.0)
+    assert not running(int((tmp_path / "sleeping").read_text()))
+
+
+def running(process: int) -> bool:
+    """Whether a process is still there, after a moment to go."""
+    for _ in range(200):
+        try:
+            state = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0]
+        except OSError:
+            return False
+        if state == "Z":
+            return False
+        time.sleep(0.02)
+    return True
+
+
+def test_no_passes_and_missing_files_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(ExportError, match="0 passes of the bench: it takes at least 1"):
+        build.compile_and_run(tmp_path, "gain", passes=0)
+    with pytest.raises(ExportError, match=r"has no gain\.c, no gain_bench\.c, no vectors\.csv: export the code there"):
+        build.compile_and_run(tmp_path, "gain")
+    (written(tmp_path) / "vectors.csv").unlink()
+    with pytest.raises(ExportError, match=r"has no vectors\.csv: export"):
+        build.compile_and_run(tmp_path, "gain")
+
+
+@needs_compiler
+def test_a_compiler_that_cannot_be_started_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    broken = tmp_path / "broken-cc"
+    broken.write_bytes(b"\x7fELF nothing")
+    broken.chmod(0o755)
+    monkeypatch.setenv("CC", str(broken))
+    with pytest.raises(ExportError, match=r"broken-cc cannot be run in .*: Exec format error"):
+        build.compile_and_run(written(tmp_path), "gain")

@@ -1,0 +1,729 @@
+"""Flight code: compiled, replayed against the kernel, fed with garbage, and read as a reviewer would."""
+
+import ctypes
+import re
+import shutil
+import subprocess
+from dataclasses import dataclass, replace
+from math import inf, nan, pi
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from microrad import control, disturbance, kernels, lti, mirror
+from microrad.control import AxisController, Drive, Timing
+from microrad.export import choice, flight
+from microrad.export.modes import minimal
+from microrad.export.records import ExportError, Origin
+from microrad.export.rounding import RoundingBound, rounding_bound
+from microrad.export.sections import sections
+from microrad.export.templating import comment, real, render, table, terms
+from microrad.fine_loop import loop as fine
+from microrad.fine_loop.loop import PointingLoop, ReferenceFilter, with_inverse
+from microrad.hysteresis import NO_CREEP, BoucWen, Creep, Play
+from microrad.missionfile import load_mission
+from microrad.sensor import OpticalSensor
+from shipped import SHIPPED, without_fine_pointing
+
+URAD = 1e-6
+WARNINGS = ["-Wall", "-Wextra", "-Werror", "-pedantic", "-Wconversion", "-Wdouble-promotion", "-Wshadow"]
+FLAGS = ["-std=c99", "-O2", *WARNINGS]
+SANITIZERS = ["-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
+EXACT = 1e-12  # of the largest command
+GENEROUS = RoundingBound(command_v=1e-3, samples=1, per_sample_v=0.0, words="For tests.")
+PRECISIONS = ("double", "single")
+NUMBER = {"double": np.float64, "single": np.float32}
+
+pytestmark = pytest.mark.skipif(shutil.which("gcc") is None, reason="no gcc")
+
+# ------------------------------------------------------------------------------------------------ compiled code
+
+DRIVER = """
+#include "{name}.h"
+#include <stddef.h>
+size_t state_size(void) {{ return sizeof({name}_state); }}
+void begin({name}_state *state) {{ {name}_init(state); }}
+void counters(const {name}_state *state, uint32_t *to)
+{{ to[0] = state->saturated; to[1] = state->rate_clamped; to[2] = state->rejected; to[3] = state->faults; }}
+void replay({name}_state *state, size_t samples, const {name}_real *m, {name}_real *command)
+{{
+    for (size_t k = 0; k < samples; k++, m += {readings}, command += {actuators})
+        {name}_step(state, {arguments}, command);
+}}
+"""
+
+
+@dataclass(frozen=True)
+class Counters:
+    saturated: int
+    rate_clamped: int
+    rejected: int
+    faults: int
+
+
+class Code:
+    """The generated code as a shared library, with a state to each instance of `begin`."""
+
+    def __init__(self, folder, of, precision="double", name="flown", compiler="gcc", bound=GENEROUS):
+        self.folder, self.of, self.name, self.number = folder, of, name, NUMBER[precision]
+        folder.mkdir(parents=True, exist_ok=True)
+        self.files = flight.flight_code(of, sections(of), name, precision, bound)
+        for file, text in self.files.items():
+            (folder / file).write_text(text, encoding="utf-8")
+        places = np.cumsum([0, *(each.size for each in of.inputs)])
+        arguments = ", ".join(f"m + {at}" for at in places[:-1])
+        driver = DRIVER.format(name=name, readings=places[-1], actuators=of.actuators, arguments=arguments)
+        (folder / "driver.c").write_text(driver)
+        library = folder / "flown.so"
+        built = [compiler, *FLAGS, "-shared", "-fPIC", "-o", library, folder / f"{name}.c", folder / "driver.c", "-lm"]
+        subprocess.run(built, check=True, timeout=60)
+        self.library = ctypes.CDLL(str(library))
+        self.library.state_size.restype = ctypes.c_size_t
+
+    def begin(self):
+        state = (ctypes.c_char * self.library.state_size())()
+        self.library.begin(state)
+        return state
+
+    def replay(self, inputs, state=None):
+        state = self.begin() if state is None else state
+        m = np.ascontiguousarray(inputs, dtype=self.number)
+        command = np.empty((len(m), self.of.actuators), dtype=self.number)
+        pointers = (each.ctypes.data_as(ctypes.c_void_p) for each in (m, command))
+        self.library.replay(state, ctypes.c_size_t(len(m)), *pointers)
+        return command
+
+    def counters(self, state):
+        found = (ctypes.c_uint32 * 4)()
+        self.library.counters(state, found)
+        return Counters(*found)
+
+    def run(self, inputs):
+        """Commands and counters from rest."""
+        state = self.begin()
+        return self.replay(inputs, state), self.counters(state)
+
+
+def bench(code, vectors, target="check", passes=1):
+    """Status and numbers of the bench that the Makefile builds, over these vectors."""
+    (code.folder / "vectors.csv").write_text(flight.vectors_text(code.of, vectors), encoding="utf-8")
+    words = ["make", "-s", "-C", code.folder, target, "CC=gcc", f"PASSES={passes}"]
+    done = subprocess.run(words, check=False, capture_output=True, text=True, timeout=120)
+    lines = [line.split() for line in done.stdout.splitlines()]
+    return done.returncode, {line[0]: float(line[1]) for line in lines if len(line) == 2}, done.stderr
+
+
+# ------------------------------------------------------------------------------------------------ controllers
+
+
+def mission(folder, *changes, whole=True):
+    text = SHIPPED.read_text(encoding="utf-8")
+    text = text if whole else without_fine_pointing(text)
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new)
+    path = folder / "mission.toml"
+    path.write_text(text, encoding="utf-8")
+    return load_mission(path)
+
+
+NO_CONVERTER = ('drive_resolution = "0.305 mV"', 'drive_resolution = "0 V"')
+POINTING = ("PI + inverse", "PI + inverse in series")
+
+
+@pytest.fixture(scope="module")
+def exact(tmp_path_factory):
+    """The mission without its converter, which would hide what is smaller than a count."""
+    return mission(tmp_path_factory.mktemp("exact"), NO_CONVERTER)
+
+
+@pytest.fixture(scope="module", params=POINTING)
+def flown(request, exact):
+    """The controller and 1e5 samples of the loop in its jitter."""
+    chosen = choice.choose(exact, request.param)
+    return choice.flight_controller(chosen), choice.vectors(chosen, 100_000)
+
+
+@pytest.fixture(scope="module")
+def shipped():
+    return choice.choose(load_mission(SHIPPED), "PI + inverse in series")
+
+
+BOUC_WEN = BoucWen(89e-6, -2.96e-7, -22e-6, 4.7e-4, 2.4, 0.6, 3770.0, 6.0)
+PRINTED = replace(BOUC_WEN, epsilon_rad_v=-48e-6, alpha_1_v=38.421, beta_1_v=34.635)
+PLAYS = Play((0.0, 0.1, 0.4, 1.0, 2.0), (50e-6, 12e-6, 12e-6, 8e-6, 7e-6))
+CREEP = Creep((4e-6, 4e-6), (0.01, 0.1))
+PAIRS = {  # the models of two actuators, so that each pair is compiled once
+    "printed, widening plays that creep": (
+        (PRINTED, NO_CREEP),
+        (replace(PLAYS, widening_s=1e-4, rate_limit_v_s=3770.0), CREEP),
+    ),
+    "generalised that creeps, plays": ((replace(BOUC_WEN, gamma_1_v=0.4, eta_1_v=-0.3), CREEP), (PLAYS, NO_CREEP)),
+    "exponent 2 without a limit of rate, plays that creep": (
+        (replace(BOUC_WEN, exponent=2.0, rate_limit_v_s=inf, delta_s_v=0.0), NO_CREEP),
+        (PLAYS, CREEP),
+    ),
+}
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """A sine that grows for 20 ms."""
+
+    amplitude_rad: float
+    freq_hz: float
+
+    def at(self, time_s):
+        t = np.asarray(time_s)
+        return self.amplitude_rad * np.sin(2 * pi * self.freq_hz * t) * np.minimum(1.0, (t / 0.02) ** 2)
+
+
+def pair_loop(models, resolution_v=0.0):
+    """Two coupled axes at 5 kHz whose references go beyond the identified rate and, at times, beyond the limits."""
+    parts = [mirror.assemble("static", "static", None, *each) for each in models]
+    lines = disturbance.wheels(1.0, (20.0, 130.0), (20 * URAD, 5 * URAD), convention="per-axis")
+    return PointingLoop(
+        mirror=mirror.combine(*parts),
+        optics=np.array([[1.0, 0.1], [-0.2, 0.9]]),
+        drive=Drive(-2.5, 2.5, 5e3, inf, resolution_v, 0.0),
+        timing=Timing(2e-4, 10, 10),
+        disturbances=((lines,), (lines,)),
+        optical=OpticalSensor(URAD, inf, 0.0, 1, 0),
+        gauge=None,
+        references=(Sweep(250 * URAD, 350.0), Sweep(200 * URAD, 410.0)),
+    )
+
+
+def pi_axis(loop):
+    ki = 2 * pi * 100.0 / fine.nominal_axis_gain(loop)
+    s = control.pid(control.Gains(ki / (2 * pi * 1500.0), ki, 0.0, 0.0), loop.timing.period_s)
+    none = np.zeros((1, 1))
+    system = lti.StateSpace(s.A, np.hstack([s.B, none]), s.C, np.hstack([s.D, none]))
+    return AxisController("PI", system, s.B / s.D)
+
+
+def pair(of, models, resolution_v=0.0, in_series=True):
+    """Controller and recorded run of a pair's loop, around a mirror of plays: those are quick, whatever is inverted."""
+    loop = pair_loop(models, resolution_v)
+    inverse = control.inverse(loop.mirror)
+    made = with_inverse("pair", loop, pi_axis(loop), inverse, ReferenceFilter(1000.0), in_series)
+    quick = replace(loop, mirror=pair_loop(((PLAYS, NO_CREEP),) * 2).mirror)
+    chosen = replace(of, scene=replace(of.scene, loop=quick), controller=made)
+    of = choice.flight_controller(chosen)
+    return of, choice.vectors(chosen, 1000 if 1.0 in of.inverse.bouc_wen[:, kernels.POWER] else 2500)
+
+
+# ------------------------------------------------------------------------------------------------ the same numbers
+
+
+def difference(code, vectors):
+    """Largest difference from the recorded commands over the largest of them, and the counters."""
+    found, counters = code.run(vectors.inputs)
+    return np.max(np.abs(found - vectors.commands)) / np.max(np.abs(vectors.commands)), counters
+
+
+def test_double_precision_is_the_kernel_over_1e5_samples_of_the_jitter(flown, tmp_path):
+    of, vectors = flown
+    code = Code(tmp_path, of)
+    off, counters = difference(code, vectors)
+    assert vectors.inputs.shape[0] == 100_000
+    assert 0.0 < off < EXACT
+    assert counters == Counters(vectors.saturated, vectors.rate_clamped, 0, 0)
+    status, numbers, _ = bench(code, vectors, passes=0)
+    assert status == 0
+    peak = np.max(np.abs(vectors.commands))
+    assert_allclose(numbers["largest_difference_v"], off * peak, rtol=1e-5)
+    assert_allclose([numbers["peak_command_v"], numbers["bound_v"]], [peak, EXACT * peak], rtol=1e-5)
+    assert numbers["samples"] == 100_000
+    assert "worst_step_ns" not in numbers
+
+
+def first(vectors, samples):
+    return replace(vectors, inputs=vectors.inputs[:samples], commands=vectors.commands[:samples])
+
+
+def test_single_precision_stays_within_the_bound_that_it_states(flown, tmp_path):
+    of, vectors = flown[0], first(flown[1], 5000)
+    bound = rounding_bound(of, sections(of), vectors)
+    code = Code(tmp_path, of, "single", bound=bound)
+    off, counters = difference(code, vectors)
+    found = off * np.max(np.abs(vectors.commands))
+    assert 1e-8 < found <= bound.command_v < 2.0
+    assert counters == Counters(vectors.saturated, vectors.rate_clamped, 0, 0)
+    status, numbers, _ = bench(code, vectors, passes=0)
+    assert status == 0
+    assert_allclose(numbers["bound_v"], bound.command_v, rtol=1e-5)
+    assert f"within {bound.command_v:.3g} V of double precision over 5000 recorded" in code.files["flown.h"]
+
+
+@pytest.mark.parametrize("name", PAIRS)
+def test_every_model_of_hysteresis_and_creep_on_several_actuators(name, shipped, tmp_path):
+    """With rates beyond the limit and commands beyond the stroke, which are counted as the kernel does."""
+    of, vectors = pair(shipped, PAIRS[name])
+    assert vectors.saturated > 50
+    assert (vectors.rate_clamped > 50) == (("exponent" not in name and "generalised" not in name) or "gen" in name)
+    off, counters = difference(Code(tmp_path / "double", of), vectors)
+    assert off < flight.bound_share(of) == (1e-10 if "exponent" in name else EXACT)
+    assert counters == Counters(vectors.saturated, vectors.rate_clamped, 0, 0)
+    off, counters = difference(Code(tmp_path / "single", of, "single"), vectors)
+    assert 1e-8 < off < 2e-5
+    assert_allclose([counters.saturated, counters.rate_clamped], [vectors.saturated, vectors.rate_clamped], atol=3)
+    assert (counters.rejected, counters.faults) == (0, 0)
+
+
+ADVANCE = """
+#include "p_hysteresis.h"
+void advance(int n, const p_bouc_wen *e, p_real *h, const p_real *travel, const p_real *rate, uint32_t *faults);
+void advance(int n, const p_bouc_wen *e, p_real *h, const p_real *travel, const p_real *rate, uint32_t *faults)
+{
+    for (int i = 0; i < n; i++)
+        h[i] = p_bouc_wen_advance(h[i], travel[i], rate[i], e, faults);
+}
+"""
+
+
+def advancer(folder, precision, model):
+    """The header alone, compiled: h, travel and rate to the new h and the faults."""
+    (folder / "p_hysteresis.h").write_text(render("hysteresis.h.j2", name="p", precision=precision))
+    (folder / "p.c").write_text(ADVANCE)
+    subprocess.run(["gcc", *FLAGS, "-shared", "-fPIC", "-o", folder / "p.so", folder / "p.c", "-lm"], check=True)
+    library, row = ctypes.CDLL(str(folder / "p.so")), kernels.bouc_wen_rows([model.row])[0].astype(NUMBER[precision])
+
+    def run(*columns):
+        h, travel, rate = (np.ascontiguousarray(each, dtype=row.dtype).copy() for each in columns)
+        faults = ctypes.c_uint32(0)
+        pointers = [each.ctypes.data_as(ctypes.c_void_p) for each in (row, h, travel, rate)]
+        library.advance(h.size, *pointers, ctypes.byref(faults))
+        return h, faults.value
+
+    return run
+
+
+@pytest.mark.parametrize("precision", PRECISIONS)
+def test_a_step_of_bouc_wen_is_exact_however_long_and_keeps_h_where_it_has_no_number(precision, tmp_path):
+    model = replace(BOUC_WEN, gamma_1_v=0.4, eta_1_v=-0.3)
+    advance, rng = advancer(tmp_path, precision, model), np.random.default_rng(5)
+    travel = rng.standard_normal(5000) * 10.0 ** rng.uniform(-6, 2, 5000)
+    rate = np.clip(travel / 2e-5, -3770.0, 3770.0)
+    h = model.settled_rad * rng.uniform(-1, 1, 5000) * (np.arange(5000) % 7 > 0)
+    grown = model.epsilon_rad_v * np.exp(model.delta_s_v * np.abs(rate))
+    wanted = np.array(
+        [kernels.bouc_wen_step(*each, 2.4, 0.6, 0.4, -0.3) for each in zip(h, travel, grown, strict=True)]
+    )
+    found, faults = advance(h, travel, rate)
+    assert faults == 0
+    assert np.count_nonzero(h * wanted < 0.0) > 500  # they cross zero
+    unit = np.finfo(NUMBER[precision]).eps
+    assert_allclose(found, wanted, rtol=0, atol=20 * unit * np.max(np.abs(wanted)))
+    bad = np.array([inf, nan, 1.0, 1.0, -inf])
+    found, faults = advance(np.full(5, 1e-6), bad, [0.0, 0.0, nan, 3e38, 0.0])
+    assert faults == 5
+    assert_allclose(found, 1e-6, rtol=unit)
+
+
+def without_a_play(of):
+    keep = np.arange(of.inverse.play_threshold.size) > 0
+    parts = {key: getattr(of.inverse, key)[keep] for key in ("play_threshold", "play_weight", "play_actuator")}
+    return replace(of, inverse=replace(of.inverse, **parts))
+
+
+def test_each_part_of_an_inverse_counts(shipped, tmp_path):
+    """The agreement above is not for want of hysteresis: without one play, creep or gamma it is lost."""
+    of, vectors = pair(shipped, PAIRS["printed, widening plays that creep"])
+    law = of.inverse
+    changes = (
+        without_a_play(of),
+        replace(of, inverse=replace(law, lag_weight=0.99 * law.lag_weight)),
+        replace(of, inverse=replace(law, widening=law.widening * [[0.99, 1.0]])),
+        replace(of, inverse=replace(law, direct=0.999 * law.direct)),
+        replace(of, anti_windup=0.9 * of.anti_windup),
+    )
+    for number, changed in enumerate(changes):
+        off, _ = difference(Code(tmp_path / str(number), changed), vectors)
+        assert off > 1e-6, number
+
+
+def test_the_converter_rounds_as_the_kernels(shipped, tmp_path):
+    of, vectors = choice.flight_controller(shipped), choice.vectors(shipped, 5000)
+    off, counters = difference(Code(tmp_path, of), vectors)
+    assert off == 0.0
+    assert counters == Counters(0, 0, 0, 0)
+    coarse = replace(of, resolution_v=1.01 * of.resolution_v)
+    off, _ = difference(Code(tmp_path / "coarse", coarse), vectors)
+    assert off * np.max(np.abs(vectors.commands)) > 0.4 * of.resolution_v
+
+
+STATIC = 'composition = "cascade"', 'composition = "static"'
+WIDENING_PLAYS = """[mirror.prandtl_ishlinskii]
+thresholds = ["0 V", "0.5 V", "2 V"]
+weights = ["60 urad/V", "20 urad/V", "9 urad/V"]
+widening = "50 us"
+
+[mirror.creep]
+time_constants = ["10 ms", "100 ms"]
+weights = ["2 urad/V", "2 urad/V"]
+
+"""
+
+
+def mirror_of(tables):
+    """Changes of the shipped mission that put other tables in place of its mirror's."""
+    text = SHIPPED.read_text(encoding="utf-8")
+    given = text[text.index("[mirror.linear]") : text.index("[amplifier]")]
+    return (given, tables), STATIC
+
+
+EXPONENT = 'beta = "34.635 1/V" ', 'exponent = 2\nbeta = "34.635 1/V" '
+
+
+@pytest.mark.parametrize("changes", [(), (EXPONENT,), mirror_of(WIDENING_PLAYS)], ids=["Eq. 3", "exponent 2", "plays"])
+def test_the_controller_of_fig_8_takes_its_rate_from_two_samples(changes, tmp_path):
+    """The loop of [control]: one axis at 50 kHz, and an inverse that the reference alone drives."""
+    chosen = choice.choose(mission(tmp_path, NO_CONVERTER, *changes, whole=False), choice.PID_WITH_INVERSE)
+    of, vectors = choice.flight_controller(chosen), choice.vectors(chosen, 10_000)
+    assert of.inverse.by_difference
+    code = Code(tmp_path, of)
+    off, counters = difference(code, vectors)
+    assert off < EXACT
+    assert counters == Counters(vectors.saturated, vectors.rate_clamped, 0, 0)
+    off, _ = difference(Code(tmp_path / "single", of, "single"), vectors)
+    assert 1e-9 < off < 1e-4
+
+
+@pytest.mark.parametrize("name", ["PI", "LQG"])
+def test_controllers_without_an_inverse_have_no_header_for_it(name, exact, tmp_path):
+    chosen = choice.choose(exact, name)
+    of, vectors = minimal(choice.flight_controller(chosen)), choice.vectors(chosen, 3000)
+    code = Code(tmp_path, of)
+    off, counters = difference(code, vectors)
+    assert off < EXACT
+    assert counters == Counters(0, 0, 0, 0)
+    assert set(code.files) == {"flown.h", "flown.c", "flown_bench.c", "Makefile"}
+    assert "inverse" not in code.files["flown.c"]
+    off, _ = difference(Code(tmp_path / "single", of, "single"), vectors)
+    assert 1e-9 < off < 1e-4
+
+
+@pytest.mark.skipif(shutil.which("clang") is None, reason="no clang")
+@pytest.mark.parametrize("precision", PRECISIONS)
+def test_another_compiler_makes_the_same_of_it(precision, shipped, tmp_path):
+    of, vectors = pair(shipped, PAIRS["printed, widening plays that creep"])
+    off, _ = difference(Code(tmp_path, of, precision, compiler="clang"), vectors)
+    assert off < (EXACT if precision == "double" else 2e-5)
+
+
+# ------------------------------------------------------------------------------------------------ garbage
+
+GARBAGE = (inf, -inf, nan, 1e38, -1e38, 1e300, -1e300, 5e-324, -1e-310, 1e-40, -0.0, 0.1, -0.1, 0.100001)
+LIMIT_RAD = 0.1
+
+
+def spoiled(sound, number):
+    """Five samples of garbage or of flipped signs after each twenty sound ones, in the precision."""
+    rng = np.random.default_rng(8)
+    found = sound.copy()
+    for begin in range(20, len(found), 25):
+        at = slice(begin, begin + 5)
+        bad = rng.choice(GARBAGE, found[at].shape)
+        found[at] = np.where(rng.random(bad.shape) < 0.3, -found[at], bad)
+    with np.errstate(over="ignore"):  # what single precision does not hold is infinite
+        return found.astype(number)
+
+
+def held(inputs):
+    """What the code is to take for them: the last accepted number, 0 at first; and how many it rejects."""
+    with np.errstate(invalid="ignore"):
+        bad = ~(np.abs(inputs) <= inputs.dtype.type(LIMIT_RAD))
+    found = np.zeros_like(inputs)
+    for k, (row, wrong) in enumerate(zip(inputs, bad, strict=True)):
+        found[k] = np.where(wrong, found[k - 1] if k else 0.0, row)
+    return found, int(np.count_nonzero(bad))
+
+
+FREE = replace(PRINTED, rate_limit_v_s=inf, delta_s_v=0.0)
+FUZZED = {
+    "printed, widening plays that creep": PAIRS["printed, widening plays that creep"],
+    "without a limit, exponent 2": ((FREE, CREEP), (replace(BOUC_WEN, exponent=2.0), NO_CREEP)),
+}
+
+
+@pytest.mark.parametrize("precision", PRECISIONS)
+@pytest.mark.parametrize("name", FUZZED)
+def test_garbage_is_held_off_and_never_leaves_the_limits(name, precision, shipped, tmp_path):
+    of, vectors = pair(shipped, FUZZED[name], resolution_v=0.35e-3)  # 2.5 V would be rounded to 2.50005 V
+    code = Code(tmp_path, of, precision)
+    bad = spoiled(vectors.inputs, code.number)
+    good, rejected = held(bad)
+    found, counters = code.run(bad)
+    assert np.all(np.isfinite(found))
+    assert 2.49 < np.max(np.abs(found)) <= 2.5
+    assert len(bad) / 10 < rejected == counters.rejected
+    again, held_counters = code.run(good)
+    assert_array_equal(found, again)
+    assert held_counters == replace(counters, rejected=0)
+    assert (counters.faults > 0) == ("without" in name)
+    state = code.begin()
+    code.replay(bad, state)
+    behind = code.replay(vectors.inputs[:200], state)
+    assert min(len(np.unique(drive)) for drive in behind.T) > 50  # they move, and not from limit to limit alone
+    assert code.counters(state).rejected == rejected
+    replayed = replace(vectors, inputs=bad.astype(float), commands=found.astype(float))
+    status, numbers, words = bench(code, replayed, "sanitized")
+    assert (status, words) == (0, "")
+    assert (numbers["rejected"], numbers["faults"]) == (rejected, counters.faults)
+
+
+def test_the_sanitizers_would_see_it(shipped, tmp_path):
+    """A row beyond the outputs, written into the generated code, ends the same run."""
+    of, vectors = choice.flight_controller(shipped), choice.vectors(shipped, 20)
+    code = Code(tmp_path, of)
+    text = code.files["flown.c"]
+    spoilt = text.replace("{2, 0, ", "{7, 0, ", 1)
+    assert spoilt != text
+    (tmp_path / "flown.c").write_text(spoilt)
+    status, _, words = bench(code, vectors, "sanitized")
+    assert status != 0
+    assert "runtime error" in words or "AddressSanitizer" in words
+
+
+def steady(code, samples, garbage=()):
+    """The loop around a mirror that just has a gain, at a constant reference: the commands, by sample."""
+    of, state = code.of, code.begin()
+    command, found = np.zeros(of.actuators), []
+    for k in range(samples):
+        wanted = np.full(2, 60 * URAD)
+        m = np.concatenate([wanted - 89e-6 * command, wanted])
+        if k in garbage:
+            m = garbage[k]
+        command = code.replay(m[None], state)[0].astype(float)
+        found.append(command)
+    return np.array(found)
+
+
+@pytest.mark.parametrize("precision", PRECISIONS)
+def test_the_loop_recovers_once_its_inputs_are_sound_again(precision, shipped, tmp_path):
+    of = choice.flight_controller(shipped)
+    code = Code(tmp_path, replace(of, resolution_v=0.0), precision)
+    rng = np.random.default_rng(3)
+    with np.errstate(over="ignore"):
+        garbage = {k: rng.choice(GARBAGE, 4).astype(code.number) for k in range(100, 400)}
+    quiet, disturbed = steady(code, 3000), steady(code, 3000, garbage)
+    assert_allclose(quiet[-1], 60 / 89, rtol=1e-3)
+    assert np.max(np.abs(disturbed[100:400] - quiet[100:400])) > 1.0
+    assert_allclose(disturbed[-1], quiet[-1], rtol=1e-3)
+
+
+# ------------------------------------------------------------------------------------------------ state and source
+
+
+def test_all_memory_is_the_callers(shipped, tmp_path):
+    of, vectors = pair(shipped, PAIRS["printed, widening plays that creep"])
+    code = Code(tmp_path, of)
+    alone, other = code.run(vectors.inputs)[0], code.run(-vectors.inputs)[0]
+    one, two = code.begin(), code.begin()
+    fresh = bytes(one)
+    both = [[code.replay(sign * m[None], s)[0] for sign, s in ((1, one), (-1, two))] for m in vectors.inputs[:500]]
+    assert_array_equal(np.array(both)[:, 0], alone[:500])
+    assert_array_equal(np.array(both)[:, 1], other[:500])
+    assert np.max(np.abs(alone - other)) > 1.0
+    assert bytes(one) != fresh
+    code.library.begin(one)
+    code.library.begin(one)
+    assert bytes(one) == fresh
+
+
+@pytest.mark.parametrize("precision", PRECISIONS)
+def test_a_drive_that_is_no_number_is_not_given_out(precision, shipped, tmp_path):
+    """A gain of exp(-2500) and an h of exp(1200): the last command stays, and once the inputs are sound it recovers."""
+    endless = replace(PRINTED, rate_limit_v_s=inf, d2_s_v=1e-3)
+    of, vectors = pair(shipped, ((endless, CREEP), (PLAYS, NO_CREEP)), in_series=False)
+    settling = np.concatenate([np.zeros((60_000, 4)), 0.1 * vectors.inputs[:2000]])
+    jump = np.array([[0.0, 0.0, 0.09, 0.0]])
+    code = Code(tmp_path / "around", of, precision)
+    before, quiet = code.begin(), code.replay(1e-3 * vectors.inputs[:50])
+    code.replay(1e-3 * vectors.inputs[:50], before)
+    assert code.counters(before) == Counters(0, 0, 0, 0)
+    found = code.replay(jump, before)
+    assert 0.0 < abs(found[0, 0]) < 1.0
+    assert found[0, 0] == quiet[-1, 0]
+    assert code.counters(before).faults >= 2  # the command and the lags
+    behind = code.replay(settling, before)
+    assert len(np.unique(behind[-500:, 0])) > 50
+    first = Code(tmp_path / "above", replace(of, minimum_v=1.0), precision).replay(jump)
+    assert first[0, 0] == 1.0  # the nearest to 0 within the limits
+
+
+def test_single_precision_keeps_what_rounding_leaves_out(exact, tmp_path):
+    """Increments a thousand times smaller than the last digit of the integrators: 1e-5 of the command, all told."""
+    of = choice.flight_controller(choice.choose(exact, "PI"))
+    inputs = np.full((22_000, 4), 1e-10)
+    inputs[:2000] = 1e-6
+    inputs = inputs[:, : sum(each.size for each in of.inputs)]
+    double = Code(tmp_path / "double", of).replay(inputs)
+    single = Code(tmp_path / "single", of, "single").replay(inputs)
+    grown = double[-1, 0] - double[2000, 0]
+    assert 1e-5 < abs(grown / double[-1, 0]) < 1e-2
+    assert_allclose(single[-1, 0] - single[2000, 0], grown, rtol=0.02)
+
+
+def functions(text):
+    """Names of the functions and their bodies, in the order of the file."""
+    found = re.findall(r"^(?:static )?(?:inline )?\w+ (\w+)\((?:[^;{}]*)\)\n\{\n(.*?)^\}", text, re.M | re.S)
+    return [(name, re.sub(r"/\*.*?\*/", "", body, flags=re.S)) for name, body in found]
+
+
+ALLOWED = {"exp", "expm1", "log1p", "floor", "pow", "fabs", "fmin", "fmax"}
+
+
+@pytest.mark.parametrize("precision", PRECISIONS)
+def test_no_heap_no_recursion_no_memory_of_its_own_and_bounded_loops(precision, shipped, tmp_path):
+    """Each function calls only those that stand above it, so none comes back to itself."""
+    of, _ = pair(shipped, PAIRS["printed, widening plays that creep"])
+    code = Code(tmp_path, of, precision)
+    text = code.files["flown_hysteresis.h"] + code.files["flown.c"]
+    names = [name for name, _ in functions(text)]
+    assert len(names) == len(set(names)) == text.count("\n{\n") > 20
+    for place, (name, body) in enumerate(functions(text)):
+        assert not [later for later in names[place:] if re.search(rf"\b{later}\(", body)], name
+        assert not re.search(r"\b(while|goto|do|malloc|calloc|realloc|static)\b", body), name
+        for bound in re.findall(r"for \([^;]*; \w+ < ([^;]*);", body):
+            assert re.fullmatch(r"[A-Z_]+|count", bound), bound
+    variables = [line for line in text.splitlines() if line.startswith("static ") and "(" not in line]
+    assert len(variables) > 10
+    assert all(line.startswith("static const ") for line in variables)
+    subprocess.run(["gcc", *FLAGS, "-c", "-o", tmp_path / "flown.o", tmp_path / "flown.c"], check=True)
+    symbols = subprocess.run(["nm", tmp_path / "flown.o"], check=True, capture_output=True, text=True).stdout
+    kinds = {line.split()[-1]: line.split()[-2] for line in symbols.splitlines()}
+    assert set(kinds.values()) <= set("TtUr")
+    outside = {name for name, kind in kinds.items() if kind == "U"} - {"_GLOBAL_OFFSET_TABLE_", "memset"}
+    assert outside <= {each + ("f" if precision == "single" else "") for each in ALLOWED}
+    assert "exp" + ("f" if precision == "single" else "") in outside
+    assert {name for name, kind in kinds.items() if kind == "T"} == {"flown_init", "flown_step"}
+
+
+def test_the_header_says_what_it_is(shipped, tmp_path):
+    of = choice.flight_controller(shipped)
+    text = Code(tmp_path, of, name="pi_inverse_in_series").files["pi_inverse_in_series.h"]
+    assert f'controller "{of.name}"' in text
+    for words in (
+        of.origin.mission,
+        of.origin.mission_sha256,
+        of.origin.mirror,
+        "Period: 0.0002 s (5000 Hz)",
+        "Linear part: 6 states in 4 blocks (modal form).",
+        "Inverse of hysteresis: 2 Bouc-Wen element(s); taken at the target's rate, from the linear part.",
+        "Double precision: within 1e-12 of the largest command",
+        *(f"{margin} {value:.4g} {unit}".rstrip() for margin, value, unit in of.margins),
+        "#define PI_INVERSE_IN_SERIES_OPTICAL_ERROR_LIMIT_RAD 0.1\n",
+        "#define PI_INVERSE_IN_SERIES_RESOLUTION_V 0.000305\n",
+    ):
+        assert words in text, words
+    assert max(map(len, text.splitlines())) <= 120
+
+
+def test_words_of_a_mission_cannot_become_code(shipped, tmp_path):
+    """A comment's end, a trigraph, an end of line, a text that turns around: compiled, and nothing defined."""
+    hostile = Origin("a */ int evil; /* b ??/\n#error c \\", "0" * 64, "d\u202e */*/ e")
+    of = replace(choice.flight_controller(shipped), origin=hostile, name="*/ #error /*")
+    files = Code(tmp_path, of, name="x" * 31).files
+    plain = re.sub(r"/\*.*?\*/", "", "".join(files.values()), flags=re.S)
+    assert "evil" not in plain
+    assert "#error c" not in plain
+    assert "evil" in files["x" * 31 + ".h"]
+    assert comment("a */ b") == "a * / b"
+    assert comment("word " * 40, " * ").count("\n * ") == 1
+
+
+def test_the_bench_finds_what_is_off_and_times_the_steps(shipped, tmp_path):
+    of, vectors = choice.flight_controller(shipped), choice.vectors(shipped, 300)
+    code = Code(tmp_path, of)
+    status, numbers, _ = bench(code, vectors, passes=3)
+    assert status == 0
+    assert numbers["worst_step_ns"] >= numbers["median_step_ns"] > 0.0
+    assert numbers["clock_ns"] > 0.0
+    off = vectors.commands.copy()
+    off[200, 1] += 2e-12 * np.max(np.abs(off))
+    status, numbers, _ = bench(code, replace(vectors, commands=off))
+    assert status != 0
+    assert numbers["largest_difference_v"] > numbers["bound_v"] > 0.0
+    program = tmp_path / "flown_bench"
+    (tmp_path / "short.csv").write_text("names\n1,2\n")
+    for words, said in (
+        (["none.csv"], "none.csv: No such file"),
+        (["short.csv"], "short.csv: line 2: "),
+        ([], "usage"),
+    ):
+        done = subprocess.run([program, *words], cwd=tmp_path, check=False, capture_output=True, text=True)
+        assert done.returncode == 2
+        assert said in done.stderr
+
+
+def test_vectors_keep_all_their_digits(shipped):
+    of, vectors = choice.flight_controller(shipped), choice.vectors(shipped, 5)
+    lines = flight.vectors_text(of, vectors).splitlines()
+    assert lines[0].split(",") == [
+        *(f"{name}_{i}" for name in ("optical_error_rad", "reference_rad") for i in range(2)),
+        "command_v_0",
+        "command_v_1",
+    ]
+    numbers = np.array([[float(x) for x in line.split(",")] for line in lines[1:]])
+    assert_array_equal(numbers, np.hstack([vectors.inputs, vectors.commands]))
+
+
+# ------------------------------------------------------------------------------------------------ refusals, literals
+
+
+def code_of(of, name="flown", precision="double", bound=None):
+    return flight.flight_code(of, sections(of), name, precision, bound)
+
+
+def test_what_cannot_become_code_is_refused(shipped):
+    of = choice.flight_controller(shipped)
+    assert code_of(of)
+    cases = (
+        ({"name": "2nd"}, "2nd"),
+        ({"precision": "single"}, "in single precision: no bound on its rounding is given"),
+        ({"of": replace(of, minimum_v=1.0, maximum_v=0.5)}, "no command lies between its limits of 1 V and 0.5 V"),
+        ({"of": replace(of, minimum_v=0.0001, maximum_v=0.0002)}, "at a resolution of 0.000305 V; see the mission's"),
+        (
+            {"of": replace(of, bias_v=1e39), "precision": "single", "bound": GENEROUS},
+            "1e+39 is beyond single",
+        ),
+        ({"of": replace(of, bias_v=nan)}, "a number of the exported code is nan"),
+    )
+    for given, words in cases:
+        with pytest.raises(ExportError, match=re.escape(words)):
+            code_of(**{"of": of, **given})
+
+
+def test_limits_are_never_rounded_outwards(shipped, tmp_path):
+    """6.1 is no number of single precision; the nearest one is larger."""
+    of = replace(choice.flight_controller(shipped), minimum_v=-6.1, maximum_v=6.1, resolution_v=0.0)
+    assert float(np.float32(6.1)) < 6.1
+    of = replace(of, maximum_v=6.3, minimum_v=-6.3)
+    assert float(np.float32(6.3)) > 6.3
+    found, _ = Code(tmp_path, of, "single").run(np.full((400, 4), 0.09) * np.sign(np.arange(400) - 200)[:, None])
+    assert_array_equal([np.max(found), -np.min(found)], float(np.nextafter(np.float32(6.3), np.float32(0))))
+
+
+@pytest.mark.parametrize(
+    ("x", "double", "single"),
+    [
+        (0.1, "0.1", "0.1f"),
+        (1.0, "1.0", "1.0f"),
+        (-1e22, "-1e+22", "-1e+22f"),
+        (inf, "1.7976931348623157e+308", "3.4028235e+38f"),
+        (1e-40, "1e-40", "0.0f"),
+        (5e-324, "0.0", "0.0f"),
+        (1 / 3, "0.3333333333333333", "0.33333334f"),
+    ],
+)
+def test_literals_read_back_to_the_same_number(x, double, single):
+    assert (real(x), real(x, "single")) == (double, single)
+
+
+def test_tables_stand_row_by_row():
+    assert table([[1, 2], [3, 4e30]]) == "{\n    {1.0, 2.0},\n    {3.0, 4e+30},\n}"
+    assert terms([(0, 0, 1.0), (0, 2, 0.5), (1, 1, -1.0)]) == "{0, 0, 1.0}, {0, 2, 0.5},\n    {1, 1, -1.0},"
+    assert max(map(len, terms([(0, j, 1 / 3) for j in range(20)]).splitlines())) <= 116

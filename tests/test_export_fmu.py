@@ -1,0 +1,867 @@
+"""Co-simulation units: FMPy accepts them, and they do what the kernels do, also where there is no microrad."""
+
+import importlib.metadata
+import json
+import os
+import shutil
+import subprocess
+import sys
+import zipfile
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import fmpy
+import numpy as np
+import pytest
+from fmpy import fmi2, fmi3
+from fmpy.fmi1 import FMICallException
+from fmpy.validation import validate_fmu
+from packaging.requirements import Requirement
+
+from microrad import control, hysteresis, kernels, lti, mirror, simulate
+from microrad.export import choice, fmi_description, fmu
+from microrad.export.build import compiler
+from microrad.export.records import ExportError, Origin, PlantUnit, Signal
+from microrad.fine_loop import ensemble
+from microrad.fine_loop.loop import LoopController, PointingLoop
+from microrad.missionfile import load_mission
+from shipped import SHIPPED
+
+VERSIONS = ("2.0", "3.0")
+AGREEMENT = 1e-9
+"""Largest difference from the kernel, as a share of the peak."""
+
+pytestmark = pytest.mark.skipif(compiler() is None, reason="there is no C compiler")
+
+
+# --------------------------------------------------------------------------------------------------- units, and a slave
+@cache
+def mission():
+    return load_mission(SHIPPED)
+
+
+@cache
+def tracking():
+    return choice.choose(mission(), "PID + inverse")
+
+
+@cache
+def pointing(name="PI + inverse"):
+    return choice.choose(mission(), name)
+
+
+OPTICS = np.array([[1.0, 0.2], [-0.1, 0.9], [0.5, 0.5]])
+
+
+def everything():
+    """A mirror with all that a plant may have: feedback through hysteresis, direct paths, a full matrix, both families
+    of hysteresis, an exponent other than 1 and thresholds that widen; two actuators and two outputs."""
+    elements = (
+        hysteresis.BoucWen(9e-5, -3e-7, -4.8e-5, 4.7e-4, 38.4, 34.6, 400.0, 6.0),
+        hysteresis.BoucWen(8e-5, 0.0, -2e-5, 0.0, 2.4, 0.6, np.inf, 5.0, gamma_1_v=0.1, eta_1_v=-0.2, exponent=1.7),
+    )
+    plays = (
+        hysteresis.Play((0.0, 0.3, 0.9), (5e-5, 2e-5, 1e-5), widening_s=2e-4, rate_limit_v_s=300.0),
+        hysteresis.Play((0.0, 0.5), (4e-5, 1e-5)),
+    )
+    rng = np.random.default_rng(5)
+    A = np.array([[-900.0, 3000.0, 50.0], [-3000.0, -900.0, 20.0], [10.0, 5.0, -40.0]])
+    F = np.zeros((4, 3))
+    F[0, 0], F[3, 1] = 40.0, -30.0
+    return mirror.Mirror(
+        "all there is",
+        A=A,
+        B=rng.normal(size=(3, 2)) * 1e-2,
+        E=rng.normal(size=(3, 4)) * 800.0,
+        F=F,
+        G=np.array([[1.0, 0.0], [0.0, 1.0], [0.7, 0.2], [0.0, 0.9]]),
+        C=rng.normal(size=(2, 3)),
+        D=rng.normal(size=(2, 2)) * 1e-5,
+        K=rng.normal(size=(2, 4)),
+        bouc_wen=elements,
+        plays=plays,
+        inverse=(),
+    )
+
+
+def rich_unit():
+    step = 2e-5
+    plant = mirror.discretise(everything(), step)
+    follow = control.amplifier_factor(replace(control.IDEAL_DRIVE, bandwidth_hz=2000.0), step)
+    origin = Origin('a <mission> & "more"', "0" * 64, "all\x07 there */ is")
+    return PlantUnit(origin, plant, OPTICS, 2000.0, follow, 0.02, 6.0)
+
+
+def play_mirror():
+    """A mirror without states: hysteresis alone."""
+    return mirror.assemble("static", "static", None, hysteresis.Play((0.0, 0.4), (5e-5, 2e-5)))
+
+
+def play_unit():
+    plant = mirror.discretise(play_mirror(), 1e-5)
+    return PlantUnit(Origin("m", "0" * 64, "static"), plant, np.eye(1), np.inf, 1.0, np.inf, 0.0)
+
+
+UNITS = {
+    "mirror": lambda: choice.plant_unit(mission(), "control"),
+    "rich": rich_unit,
+    "plays": play_unit,
+    "loop": lambda: choice.loop_unit(tracking()),
+    "pointing": lambda: choice.loop_unit(pointing()),
+}
+
+
+@pytest.fixture(scope="module")
+def archive(tmp_path_factory):
+    """The file of a unit, written once."""
+    folder = tmp_path_factory.mktemp("units")
+
+    @cache
+    def written(name, version):
+        path = folder / f"{name}_{version[0]}.fmu"
+        made = fmu.write_unit(UNITS[name](), path, version, name)
+        assert made.platform is not None
+        assert made.words == f"{path}: FMI {version}, sources and a library for {made.platform}"
+        return path
+
+    return written
+
+
+class Slave:
+    """An instance of a unit, the same for both versions of FMI. ``said`` are its messages."""
+
+    def __init__(self, path, folder, *, guid=None, start=True, **parameters):
+        folder = folder / path.stem
+        if not folder.exists():
+            fmpy.extract(path, folder)
+        self.description = fmpy.read_model_description(folder)
+        self.places = {v.name: v.valueReference for v in self.description.modelVariables}
+        self.said = []
+        self.two = self.description.fmiVersion == "2.0"
+        known = {"guid": guid or self.description.guid, "unzipDirectory": str(folder)}
+        known |= {"modelIdentifier": self.description.coSimulation.modelIdentifier, "instanceName": "one"}
+        self.unit = (fmi2.FMU2Slave if self.two else fmi3.FMU3Slave)(**known)
+        self._instantiate()
+        self.time = 0.0
+        if start:
+            self.begin(parameters)
+
+    def _instantiate(self):
+        if self.two:
+            calls = fmi2.fmi2CallbackFunctions()
+            calls.logger = fmi2.fmi2CallbackLoggerTYPE(lambda *args: self.said.append(args[4].decode()))
+            self.unit.instantiate(callbacks=calls)
+        else:
+            self.unit.instantiate(logMessage=lambda *args: self.said.append(args[3].decode()))
+
+    def begin(self, parameters=()):
+        for name, value in dict(parameters).items():
+            self.set(name, [value])
+        if self.two:
+            self.unit.setupExperiment(startTime=0.0)
+            self.unit.enterInitializationMode()
+        else:
+            self.unit.enterInitializationMode(startTime=0.0)
+        self.unit.exitInitializationMode()
+
+    def references(self, name):
+        if name in self.places:
+            return [self.places[name]]
+        return [self.places[each] for each in self.places if each.startswith(f"{name}[")]
+
+    def set(self, name, values):
+        (self.unit.setReal if self.two else self.unit.setFloat64)(self.references(name), list(values))
+
+    def get(self, name):
+        return np.array((self.unit.getReal if self.two else self.unit.getFloat64)(self.references(name)))
+
+    def count(self, name):
+        return (self.unit.getInteger if self.two else self.unit.getInt32)(self.references(name))[0]
+
+    def step(self, duration):
+        self.unit.doStep(currentCommunicationPoint=self.time, communicationStepSize=duration)
+        self.time += duration
+
+    def state(self):
+        return self.unit.getFMUstate() if self.two else self.unit.getFMUState()
+
+    def restore(self, state, time):
+        (self.unit.setFMUstate if self.two else self.unit.setFMUState)(state)
+        self.time = time
+
+
+@pytest.fixture
+def slave(archive, tmp_path):
+    """Makes instances and frees them in the end."""
+    made = []
+
+    def instance(name, version, **options):
+        made.append(Slave(archive(name, version), tmp_path, **options))
+        return made[-1]
+
+    yield instance
+    for each in made:
+        each.unit.freeInstance()
+
+
+def assert_follows(found, wanted, agreement=AGREEMENT):
+    peak = np.max(np.abs(wanted))
+    assert peak > 0.0
+    assert np.max(np.abs(np.asarray(found) - wanted)) <= agreement * peak
+
+
+# ------------------------------------------------------------------------------------------------------------- contents
+@pytest.mark.parametrize("version", VERSIONS)
+@pytest.mark.parametrize("name", ["mirror", "rich", "loop", "pointing"])
+def test_fmpy_finds_no_fault(archive, name, version):
+    path = archive(name, version)
+    assert validate_fmu(str(path)) == []
+    description = fmpy.read_model_description(path, validate=True)
+    assert description.fmiVersion == version
+    assert description.coSimulation.canGetAndSetFMUstate and description.coSimulation.canSerializeFMUstate
+    listed = fmi_description.variables(UNITS[name]())
+    assert [v.name for v in description.modelVariables] == [v.name for v in listed]
+    if name == "rich":
+        assert description.modelName == "all there */ is"
+        assert 'Mission: a <mission> & "more", sha256 0' in description.description
+    units = {v.name: v.unit for v in description.modelVariables}
+    assert units["mirror_rad[1]"] == "rad" and units["amplifier_slew_v_s"] == "V/s" and units["drive_v[1]"] == "V"
+
+
+def test_fmpy_notices_a_fault(archive, tmp_path):
+    """The check can fail: a description with an output too many is refused."""
+    fmpy.extract(archive("mirror", "2.0"), tmp_path)
+    path = tmp_path / "modelDescription.xml"
+    path.write_text(path.read_text().replace('<Unknown index="3"', '<Unknown index="5"', 1))
+    assert any("Outputs" in problem for problem in validate_fmu(str(tmp_path)))
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_the_start_values_are_those_of_the_design(archive, version):
+    description = fmpy.read_model_description(archive("rich", version))
+    start = {v.name: float(v.start) for v in description.modelVariables if v.start is not None}
+    model = everything().bouc_wen[1]
+    assert start["bouc_wen[2].exponent"] == model.exponent
+    assert start["bouc_wen[1].alpha_1_v"] == 38.4
+    assert start["bouc_wen[2].rate_limit_v_s"] == sys.float_info.max  # none
+    assert start["prandtl_ishlinskii[1].threshold_v[3]"] == 0.9
+    assert start["prandtl_ishlinskii[1].widening_s"] == 2e-4
+    assert start["amplifier_bandwidth_hz"] == 2000.0
+    assert start["amplifier_slew_v_s"] == pytest.approx(1000.0, rel=1e-14)
+    assert start["bias_v"] == 6.0
+    assert start["plant_step_s"] == 2e-5
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_it_holds_its_sources_and_licence(archive, version):
+    with zipfile.ZipFile(archive("loop", version)) as opened:
+        names = opened.namelist()
+        assert names[0] == "modelDescription.xml"
+        licence = opened.read("documentation/licenses/license.txt").decode()
+        assert {info.date_time for info in opened.infolist()} == {(1980, 1, 1, 0, 0, 0)}
+    assert "BSD 3-Clause License" in licence and "2-Clause" in licence
+    kinds = ("plant.c", "loop.c", "ctl.c", "unit.c", "plant_hysteresis.h", "ctl_hysteresis.h")
+    assert {f"sources/loop_{kind}" for kind in kinds} <= set(names)
+    assert f"sources/fmi{version[0]}.c" in names
+    assert ("sources/buildDescription.xml" in names) == (version == "3.0")
+    assert not [each for each in names if "bench" in each or "Makefile" in each]
+
+
+def test_the_build_description_names_the_sources(archive):
+    description = fmpy.read_model_description(archive("loop", "3.0"), validate=True)
+    found = description.buildConfigurations[0].sourceFileSets[0]
+    assert found.language == "C99"
+    with zipfile.ZipFile(archive("loop", "3.0")) as opened:
+        wanted = {Path(each).name for each in opened.namelist() if each.endswith(".c")}
+    assert set(found.sourceFiles) == wanted
+
+
+@pytest.mark.skipif(shutil.which("nm") is None, reason="there is no nm")
+@pytest.mark.parametrize("version", VERSIONS)
+def test_the_library_shows_the_functions_of_the_standard_alone(archive, tmp_path, version):
+    fmpy.extract(archive("loop", version), tmp_path)
+    (library,) = (tmp_path / "binaries").glob("*/*")
+    listed = subprocess.run(["nm", "-D", "--defined-only", library], capture_output=True, text=True, check=True).stdout
+    shown = {line.split()[-1] for line in listed.splitlines()} - {"_init", "_fini"}
+    key = f"fmi{version[0]}"
+    header = (tmp_path / "sources" / f"{key}Functions.h").read_text()
+    declared = {line.split()[-1].rstrip(";") for line in header.splitlines() if "TYPE " in line and "_Export" in line}
+    model_exchange = {each for each in declared if version == "2.0" and each not in shown}
+    assert shown <= declared and len(shown) > 20
+    assert model_exchange <= {
+        *("fmi2EnterEventMode", "fmi2NewDiscreteStates", "fmi2EnterContinuousTimeMode", "fmi2CompletedIntegratorStep"),
+        *("fmi2SetTime", "fmi2SetContinuousStates", "fmi2GetDerivatives", "fmi2GetEventIndicators"),
+        *("fmi2GetContinuousStates", "fmi2GetNominalsOfContinuousStates"),
+    }
+    if version == "3.0":
+        assert shown == declared
+
+
+def test_the_same_unit_is_the_same_file(tmp_path):
+    unit = UNITS["mirror"]()
+    other = replace(unit, bias_v=unit.bias_v + 1.0)
+    made = [fmu.write_unit(each, tmp_path / f"{i}.fmu", "2.0", "mirror") for i, each in enumerate((unit, unit, other))]
+    assert made[0].path.read_bytes() == made[1].path.read_bytes()
+    assert made[0].guid == made[1].guid != made[2].guid
+    assert made[0].path.read_bytes() != made[2].path.read_bytes()
+    assert sorted(each.name for each in tmp_path.iterdir()) == ["0.fmu", "1.fmu", "2.fmu"]
+
+
+# ------------------------------------------------------------------------------------------ the scenario of the paper
+def sine(freq_hz):
+    c = tracking()
+    reference, steady = simulate.sine(mission().mission.scenario.amplitude_rad, freq_hz, c.setup.timing.period_s)
+    return simulate.track(c.name, c.mirror, c.setup, c.inverse, reference, steady)
+
+
+@pytest.mark.parametrize(("version", "freq_hz"), [("2.0", 25.0), ("3.0", 15.0)])
+def test_the_mirror_follows_the_kernel_over_figure_8(slave, version, freq_hz):
+    """Driven by the recorded commands of PID and inverse, each with the computation delay."""
+    trace, timing = sine(freq_hz), tracking().setup.timing
+    one = slave("mirror", version)
+    commands = trace.command_v.ravel()
+    places = {each: one.references(each) for each in ("command_v", "line_of_sight_rad", "drive_v")}
+    late, rest = divmod(timing.delay_steps, timing.steps_per_sample)
+    found = np.zeros((commands.size, 2))
+    for k in range(commands.size):
+        found[k] = *one.get("line_of_sight_rad"), *one.get("drive_v")
+        for behind, steps in ((late + 1, rest), (late, timing.steps_per_sample - rest)):
+            if steps:
+                one.set("command_v", [commands[k - behind] if k >= behind else 0.0])
+                one.step(steps * timing.step_s)
+    assert all(len(each) == 1 for each in places.values())
+    assert_follows(found[:, 0], trace.output_rad[:, 0])
+    assert_follows(found[:, 1], trace.drive_v[:, 0])
+    assert one.count("rate_clamped") == trace.counts.clamped
+    assert one.count("slew_limited") == trace.counts.slew_limited
+    one.unit.terminate()
+
+
+@pytest.mark.parametrize(("version", "freq_hz"), [("3.0", 25.0), ("2.0", 15.0)])
+def test_the_closed_loop_follows_the_kernel_over_figure_8(slave, version, freq_hz):
+    trace, timing = sine(freq_hz), tracking().setup.timing
+    one = slave("loop", version)
+    samples = trace.time_s.size
+    found, errors, commands = np.zeros(samples), np.zeros(samples), np.zeros(samples)
+    for k in range(samples):
+        one.set("reference_rad", trace.reference_rad[k])
+        found[k], errors[k] = one.get("line_of_sight_rad")[0], one.get("error_rad")[0]
+        one.step(timing.period_s)
+        commands[k] = one.get("command_v")[0]
+    assert_follows(found, trace.output_rad[:, 0])
+    assert_follows(errors, trace.error_rad[:, 0])
+    assert_follows(commands, trace.command_v[:, 0])
+    assert one.count("rate_clamped") == trace.counts.clamped
+    assert one.count("slew_limited") == trace.counts.slew_limited
+    assert one.count("saturated") == trace.counts.saturated
+    assert one.count("inverse_rate_clamped") == trace.counts.inverse_clamped
+    assert one.count("rejected") == one.count("faults") == one.count("controller_faults") == one.count("lost") == 0
+    assert one.get("time")[0] == pytest.approx(samples * timing.period_s)
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_fmpys_own_simulation_runs_the_loop(archive, version):
+    """The high-level call that users make, with a reference as an array over time."""
+    trace, timing = sine(25.0), tracking().setup.timing
+    samples = 400
+    signal = np.array(
+        list(zip(trace.time_s, trace.reference_rad[:, 0], strict=True)),
+        dtype=[("time", float), ("reference_rad[1]", float)],
+    )[: samples + 1]
+    result = fmpy.simulate_fmu(
+        archive("loop", version),
+        stop_time=samples * timing.period_s,
+        output_interval=timing.period_s,
+        input=signal,
+        output=["line_of_sight_rad[1]"],
+    )
+    assert result.size == samples + 1
+    assert_follows(result["line_of_sight_rad[1]"], trace.output_rad[: samples + 1, 0])
+
+
+# ---------------------------------------------------------------------------------------------- the fine-pointing loop
+def quiet(of, **optical):
+    """A choice with sensors that have no noise, and its optical sensor otherwise changed."""
+    loop = of.scene.loop
+    changed = replace(
+        loop, optical=replace(loop.optical, noise_rad=0.0, **optical), gauge=replace(loop.gauge, noise_rad=0.0)
+    )
+    return replace(of, scene=replace(of.scene, loop=changed))
+
+
+def outside(loop, p, state, by_sample):
+    """Reference and disturbance at each plant step, (steps + 1, axes), of run 0: what the kernel does not show."""
+    steps = (len(by_sample) - 1) * p.steps_per_sample
+    blocks = -(-steps // 4)
+    gauss = []
+    for purpose in p.purpose:
+        numbers = np.zeros(4 * blocks * kernels.LANES)
+        kernels.gaussian_kernel(p.seed, state.first_run, purpose, 0, numbers)
+        gauss.append(numbers.reshape(-1, kernels.LANES)[:steps, 0])
+    gauss = np.array(gauss).T
+    n = p.shaping_diagonal.size
+    A = np.diag(p.shaping_diagonal)
+    A[np.arange(n), np.arange(n) ^ 1] = p.shaping_coupling
+    shaping = state.shaping.reshape(-1, kernels.LANES)[:n, 0].copy()
+    disturbance = np.zeros((steps + 1, loop.axes))
+    disturbance[0] = p.shaping_output @ shaping
+    for k in range(steps):
+        shaping = A @ shaping + p.shaping_noise @ gauss[k]
+        disturbance[k + 1] = p.shaping_output @ shaping
+    at = np.arange(len(by_sample)) * p.steps_per_sample
+    reference = np.stack([np.interp(np.arange(steps + 1), at, column) for column in by_sample.T], axis=1)
+    return reference, disturbance
+
+
+POINTING = {
+    "PI + inverse": {},
+    "resonant damping": {"delay_steps": 7, "every": 2, "resolution_rad": 2e-8, "field_of_view_rad": 1.5e-4},
+}
+
+
+@pytest.mark.parametrize(("name", "version"), [("PI + inverse", "2.0"), ("resonant damping", "3.0")])
+def test_the_loop_follows_the_kernel_in_the_jitter(tmp_path, name, version):
+    """Fine pointing, plant step by plant step; also with a late, coarse optical sensor that loses the spot."""
+    chosen = quiet(pointing(name), **POINTING[name])
+    loop, samples = chosen.scene.loop, 1500
+    p = ensemble.arrays(loop, chosen.controller, 11)
+    state = ensemble.start(loop, p, 0)
+    by_sample = ensemble.reference(loop, 0, samples)
+    by_sample[700:760] += 3e-4  # further than the narrow field of view
+    reference, disturbance = outside(loop, p, state, by_sample)
+    axes, m, outputs = loop.axes, loop.mirror.actuators, loop.mirror.axes
+    trace = np.empty((samples, axes + kernels.DRIVE_FIELDS * m + outputs + p.B.shape[1], kernels.LANES))
+    residual = np.empty((samples, axes, kernels.LANES))
+    kernels.ensemble_loop(p, state, by_sample, residual, trace, kernels.UNSHIFTED)
+    assert_follows(disturbance[: -1 : p.steps_per_sample], trace[:, :axes, 0], 1e-12)  # as the kernel has it
+
+    path = tmp_path / "jitter.fmu"
+    fmu.write_unit(choice.loop_unit(chosen), path, version, "jitter")
+    one = Slave(path, tmp_path)
+    errors, drives, mirrors = np.zeros((samples, axes)), np.zeros((samples, m)), np.zeros((samples, outputs))
+    for k in range(samples):
+        for j in range(p.steps_per_sample):
+            one.set("reference_rad", reference[k * p.steps_per_sample + j])
+            one.set("disturbance_rad", disturbance[k * p.steps_per_sample + j])
+            if j == 0:
+                errors[k], drives[k], mirrors[k] = one.get("error_rad"), one.get("drive_v"), one.get("mirror_rad")
+            one.step(p.step_s)
+    assert_follows(errors, residual[:, :, 0])
+    at = axes + kernels.DRIVE_FIELDS * m
+    assert_follows(drives, trace[:, axes + kernels.DRIVE_NOW : at : kernels.DRIVE_FIELDS, 0])
+    assert_follows(mirrors, trace[:, at : at + outputs, 0])
+    counts = state.counts.reshape(-1, kernels.LANES)[:, 0]
+    assert one.count("lost") == counts[kernels.COUNT_LOST]
+    assert 0 < counts[kernels.COUNT_LOST] < 100 if POINTING[name] else counts[kernels.COUNT_LOST] == 0
+    assert one.count("saturated") == counts[kernels.COUNT_SATURATED]
+    assert one.count("rate_clamped") == counts[kernels.COUNT_CLAMPED]
+    assert one.count("slew_limited") == counts[kernels.COUNT_SLEW]
+    one.unit.terminate()
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_a_long_communication_step_holds_its_inputs(slave, version):
+    unit = UNITS["pointing"]()
+    short, long = slave("pointing", version), slave("pointing", version)
+    for one, parts in ((short, unit.steps_per_sample), (long, 1)):
+        for k in range(40):
+            one.set("disturbance_rad", [1e-5 * np.sin(k), 2e-5])
+            for _ in range(parts):
+                one.step(unit.controller.period_s / parts)
+    assert np.max(np.abs(long.get("command_v"))) > 1e-3
+    np.testing.assert_array_equal(short.get("command_v"), long.get("command_v"))
+    np.testing.assert_array_equal(short.get("mirror_rad"), long.get("mirror_rad"))
+
+
+# ------------------------------------------------------------------------------------------------ every kind of a plant
+class Nothing:
+    """A reference that stands still: the commands come in by its way below."""
+
+    def at(self, time_s):
+        return np.zeros(time_s.shape)
+
+
+def by_kernel(of, optics, drive, commands, steps, step_s):
+    """The kernel's mirror under commands that are held over so many plant steps: outputs and drives behind each, and
+    the counters. Commands come in as a reference that the controller gives out as it is."""
+    (samples, m), axes = commands.shape, optics.shape[0]
+    timing = control.Timing(steps * step_s, steps, 0)
+    optical = replace(pointing().scene.loop.optical, noise_rad=0.0, delay_steps=0, every=1)
+    nothing = (Nothing(),) * axes
+    loop = PointingLoop(of, optics, drive, timing, ((),) * axes, optical, None, nothing)
+    inputs = axes + of.axes + axes
+    through = np.zeros((m, inputs))
+    through[:, axes + of.axes : axes + of.axes + m] = np.eye(m)
+    system = lti.StateSpace(np.zeros((0, 0)), np.zeros((0, inputs)), np.zeros((m, 0)), through)
+    p = ensemble.arrays(loop, LoopController("through", system, np.zeros((0, m))), 0)
+    state = ensemble.start(loop, p, 0)
+    reference = np.zeros((samples + 2, axes))
+    reference[:samples, :m] = commands
+    trace = np.empty((samples + 1, axes + kernels.DRIVE_FIELDS * m + of.axes + inputs, kernels.LANES))
+    kernels.ensemble_loop(p, state, reference, np.empty((0, 0, 0)), trace, kernels.UNSHIFTED)
+    at = axes + kernels.DRIVE_FIELDS * m
+    drives = trace[1:, axes + kernels.DRIVE_NOW : at : kernels.DRIVE_FIELDS, 0]
+    return trace[1:, at : at + of.axes, 0], drives, state.counts.reshape(-1, kernels.LANES)[:, 0]
+
+
+def rich_by_kernel(commands, steps=1, of=None, bandwidth_hz=2000.0):
+    drive = replace(control.IDEAL_DRIVE, bandwidth_hz=bandwidth_hz, slew_v_s=1000.0)
+    return by_kernel(of or everything(), OPTICS, drive, commands, steps, 2e-5)
+
+
+def walk(actuators, samples=400):
+    return 3.0 * np.sin(np.cumsum(np.random.default_rng(3).normal(size=(samples, actuators)) * 0.2, axis=0))
+
+
+def driven(one, commands, duration):
+    found = []
+    for command in commands:
+        one.set("command_v", command)
+        one.step(duration)
+        found.append(one.get("mirror_rad"))
+    return np.array(found)
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_a_plant_with_all_there_is_follows_the_kernel(slave, version):
+    """Feedback, direct paths, a full matrix, both families of hysteresis with all their parameters."""
+    unit = rich_unit()
+    assert unit.plant.feedback and unit.plant.direct and unit.plant.rest.value.size
+    one, commands = slave("rich", version), walk(2)
+    found = driven(one, commands, 3 * unit.plant.step_s)
+    output, drives, counts = rich_by_kernel(commands, 3)
+    assert_follows(found, output)
+    assert_follows(one.get("drive_v"), drives[-1])
+    assert_follows(one.get("line_of_sight_rad"), OPTICS @ output[-1])
+    driven(one, np.zeros((1, 2)), 3 * unit.plant.step_s)  # the kernel's last sample, which its trace does not show
+    assert one.count("rate_clamped") == counts[kernels.COUNT_CLAMPED] > 10
+    assert one.count("slew_limited") == counts[kernels.COUNT_SLEW] > 10
+    assert one.count("faults") == 0
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_a_plant_without_states_follows_the_kernel(slave, version):
+    one, commands = slave("plays", version), walk(1)
+    output, _, _ = by_kernel(play_mirror(), np.eye(1), control.IDEAL_DRIVE, commands, 2, 1e-5)
+    assert_follows(driven(one, commands, 2e-5), output)
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_a_parameter_acts_when_it_is_set_before_the_begin(slave, version):
+    models = everything().bouc_wen
+    d1 = 2.0 * models[1].d1_rad_v
+    other = replace(everything(), bouc_wen=(models[0], replace(models[1], d1_rad_v=d1, exponent=1.2)))
+    commands = walk(2, 100)
+    parameters = {"bouc_wen[2].d1_rad_v": d1, "bouc_wen[2].exponent": 1.2, "amplifier_bandwidth_hz": 500.0}
+    found = driven(slave("rich", version, **parameters), commands, 2e-5)
+    assert_follows(found, rich_by_kernel(commands, of=other, bandwidth_hz=500.0)[0])
+    plain = rich_by_kernel(commands)[0]
+    assert np.max(np.abs(found - plain)) > 0.01 * np.max(np.abs(plain))
+
+
+# ------------------------------------------------------------------------------------------------- state and life cycle
+@pytest.mark.parametrize("version", VERSIONS)
+def test_a_state_comes_back(slave, version):
+    """Within an instance, as bytes into another one, and to the begin with its parameters by a reset."""
+    unit, commands = rich_unit(), walk(2, 60)
+    one = slave("rich", version, **{"amplifier_bandwidth_hz": 500.0})
+    begun = driven(one, commands[:30], unit.plant.step_s)
+    state, time = one.state(), one.time
+    first = driven(one, commands[30:], unit.plant.step_s)
+    one.restore(state, time)
+    np.testing.assert_array_equal(driven(one, commands[30:], unit.plant.step_s), first)
+    assert np.max(np.abs(first - begun)) > 0.0
+
+    serialise = one.unit.serializeFMUstate if one.two else one.unit.serializeFMUState
+    data = serialise(state)
+    two = slave("rich", version)
+    state_of_two = (two.unit.deSerializeFMUstate if two.two else two.unit.deserializeFMUState)(data)
+    two.restore(state_of_two, time)
+    np.testing.assert_array_equal(driven(two, commands[30:], unit.plant.step_s), first)
+    (one.unit.freeFMUstate if one.two else one.unit.freeFMUState)(state)
+
+    one.unit.reset()
+    one.time = 0.0
+    one.begin()
+    again = driven(one, commands[:30], unit.plant.step_s)
+    assert_follows(again, rich_by_kernel(commands[:30])[0])  # with the bandwidth of the design
+    assert np.max(np.abs(again - begun)) > 0.0
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_bytes_that_are_no_state_are_refused(slave, version):
+    one = slave("rich", version)
+    serialised = one.unit.serializeFMUstate if one.two else one.unit.serializeFMUState
+    data = bytearray(serialised(one.state()))
+    data[3] ^= 1
+    with pytest.raises(FMICallException):
+        (one.unit.deSerializeFMUstate if one.two else one.unit.deserializeFMUState)(bytes(data))
+    assert one.said[-1].endswith("this is no state of this unit")
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_two_instances_do_not_know_each_other(slave, version):
+    unit, commands = rich_unit(), walk(2, 50)
+    one, two = slave("rich", version), slave("rich", version)
+    found = []
+    for command in commands:
+        for each, sign in ((one, 1.0), (two, -0.5)):
+            each.set("command_v", sign * command)
+            each.step(unit.plant.step_s)
+        found.append((one.get("mirror_rad"), two.get("mirror_rad")))
+    assert_follows([a for a, _ in found], rich_by_kernel(commands)[0])
+    assert_follows([b for _, b in found], rich_by_kernel(-0.5 * commands)[0])
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+@pytest.mark.parametrize("steps", [0.5, 2.00001, 0.0, -1.0, np.nan, np.inf])
+def test_a_part_of_a_plant_step_is_refused(slave, version, steps):
+    unit = rich_unit()
+    one, other = slave("rich", version), slave("rich", version)
+    commands = walk(2, 3)
+    driven(one, commands, unit.plant.step_s), driven(other, commands, unit.plant.step_s)
+    with pytest.raises(FMICallException):
+        one.unit.doStep(currentCommunicationPoint=one.time, communicationStepSize=steps * unit.plant.step_s)
+    assert one.said[-1].endswith("is no whole number of plant steps of 2e-05 s: choose a multiple of it")
+    np.testing.assert_array_equal(driven(one, commands, unit.plant.step_s), driven(other, commands, unit.plant.step_s))
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_a_step_is_whole_up_to_rounding(slave, version):
+    """What differences of times leave is no part of a step, also late in a simulation."""
+    unit = rich_unit()
+    for start in (0.0, 1e7):
+        one = slave("rich", version)
+        one.set("command_v", [1.0, 1.0])
+        one.time = start
+        for k in range(20):
+            now, then = start + k * 3 * unit.plant.step_s, start + (k + 1) * 3 * unit.plant.step_s
+            one.unit.doStep(currentCommunicationPoint=now, communicationStepSize=then - now)
+        assert_follows(one.get("mirror_rad"), rich_by_kernel(np.ones((20, 2)), 3)[0][-1])
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_another_guid_is_refused(archive, tmp_path, version):
+    with pytest.raises(Exception, match="instantiate"):
+        Slave(archive("rich", version), tmp_path, guid="{00000000-0000-0000-0000-000000000000}")
+    assert Slave(archive("rich", version), tmp_path).get("drive_v").size == 2
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+@pytest.mark.parametrize(
+    ("name", "value", "wanted"),
+    [
+        ("amplifier_bandwidth_hz", -1.0, "finite and positive"),
+        ("prandtl_ishlinskii[1].threshold_v[2]", -0.1, "finite and not negative"),
+        ("bouc_wen[1].d1_rad_v", np.nan, "finite"),
+    ],
+)
+def test_an_impossible_parameter_is_refused(slave, version, name, value, wanted):
+    one = slave("rich", version, start=False)
+    with pytest.raises(FMICallException):
+        one.begin({name: value})
+    assert one.said[-1] == f"parameter {name} is {value:g}: it has to be {wanted}"
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_what_cannot_be_set_is_refused(slave, version):
+    one = slave("rich", version)
+    before = one.get("bouc_wen[1].d1_rad_v")
+    for name, message in (
+        ("bouc_wen[1].d1_rad_v", "bouc_wen[1].d1_rad_v cannot be set once the simulation has begun"),
+        ("drive_v[1]", "drive_v[1] cannot be set"),
+    ):
+        with pytest.raises(FMICallException):
+            one.set(name, [1.0])
+        assert one.said[-1] == message
+    with pytest.raises(FMICallException):
+        (one.unit.getReal if one.two else one.unit.getFloat64)([10_000])
+    assert "no such variable with the value reference 10000" in one.said[-1]
+    with pytest.raises(FMICallException):
+        one.unit.enterInitializationMode()
+    assert one.said[-1].endswith("EnterInitializationMode is called at the wrong time")
+    np.testing.assert_array_equal(one.get("bouc_wen[1].d1_rad_v"), before)
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_an_input_that_is_no_number_is_refused(slave, version):
+    unit, one = rich_unit(), slave("rich", version)
+    one.set("command_v", [0.0, np.nan])
+    with pytest.raises(FMICallException):
+        one.step(unit.plant.step_s)
+    assert one.said[-1] == "input command_v[2] is nan at 0 s: it has to be finite"
+    one.set("command_v", [1.0, 1.0])
+    one.step(unit.plant.step_s)
+    assert np.all(np.isfinite(one.get("mirror_rad")))
+
+
+# ------------------------------------------------------------------------------------------------------ other machines
+SCRIPT = """
+import json, sys
+import numpy as np
+try:
+    import microrad
+except ImportError:
+    found = {"microrad": False}
+else:
+    found = {"microrad": True}
+import fmpy
+wanted = json.load(open(sys.argv[2]))
+signal = np.array(list(zip(wanted["time"], wanted["reference"])), dtype=[("time", float), ("reference_rad[1]", float)])
+result = fmpy.simulate_fmu(
+    sys.argv[1],
+    stop_time=wanted["time"][-1],
+    output_interval=wanted["period"],
+    input=signal,
+    output=["line_of_sight_rad[1]"],
+)
+found["line_of_sight_rad"] = result["line_of_sight_rad[1]"].tolist()
+found["fmpy"] = fmpy.__file__
+print(json.dumps(found))
+"""
+
+
+def distributions(name):
+    """A distribution and all that it needs here, by name."""
+    found, left = {}, [name]
+    while left:
+        name = left.pop()
+        try:
+            of = importlib.metadata.distribution(name)
+        except importlib.metadata.PackageNotFoundError:
+            continue
+        if of.metadata["Name"] not in found:
+            found[of.metadata["Name"]] = of
+            needed = [Requirement(each) for each in of.requires or ()]
+            left += [each.name for each in needed if each.marker is None or each.marker.evaluate({"extra": ""})]
+    return found.values()
+
+
+def fresh_environment(folder):
+    """A virtual environment with FMPy and what it needs, as links to what is installed here; returns its Python."""
+    subprocess.run([sys.executable, "-m", "venv", "--without-pip", folder], check=True)
+    (packages,) = folder.glob("lib/python*/site-packages")
+    for of in distributions("fmpy"):
+        for top in {Path(str(file)).parts[0] for file in of.files or ()} - {"..", "__pycache__"}:
+            if not (packages / top).exists():
+                (packages / top).symlink_to(Path(str(of.locate_file(top))))
+    return folder / "bin" / "python"
+
+
+@pytest.mark.skipif(os.name != "posix", reason="links")
+def test_it_runs_where_there_is_no_microrad(archive, tmp_path):
+    trace, timing = sine(25.0), tracking().setup.timing
+    samples = 500
+    data = {"time": trace.time_s[: samples + 1].tolist(), "period": timing.period_s}
+    data["reference"] = trace.reference_rad[: samples + 1, 0].tolist()
+    (tmp_path / "reference.json").write_text(json.dumps(data))
+    (tmp_path / "script.py").write_text(SCRIPT)
+    python = fresh_environment(tmp_path / "fresh")
+    copy = shutil.copy(archive("loop", "2.0"), tmp_path / "here.fmu")
+    command = [python, "-I", "script.py", copy, "reference.json"]  # without PYTHONPATH and the user's own packages
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout.splitlines()[-1])
+    assert found["microrad"] is False
+    assert Path(found["fmpy"]).is_relative_to(tmp_path / "fresh")
+    assert_follows(found["line_of_sight_rad"], trace.output_rad[: samples + 1, 0])
+
+
+def test_without_a_compiler_it_holds_sources_alone(tmp_path, monkeypatch):
+    monkeypatch.setattr(fmu, "compiler", lambda: None)
+    made = fmu.write_unit(UNITS["mirror"](), tmp_path / "bare.fmu", "3.0", "bare")
+    assert made.platform is None
+    assert made.words == (f"{made.path}: FMI 3.0, sources alone: no C compiler was found; compile it where it is used")
+    assert validate_fmu(str(made.path)) == []
+    with zipfile.ZipFile(made.path) as opened:
+        assert not [each for each in opened.namelist() if each.startswith("binaries/")]
+    assert fmpy.supported_platforms(str(made.path)) == ["c-code"]
+
+
+def test_a_compiler_that_fails_is_said_and_leaves_nothing(tmp_path, monkeypatch):
+    monkeypatch.setattr(fmu, "SHARED", (*fmu.SHARED, "-include", "missing.h"))
+    with pytest.raises(ExportError, match=r"the C compiler '.*' refuses the FMI 2.0 unit 'mirror':\n  .*missing\.h"):
+        fmu.write_unit(UNITS["mirror"](), tmp_path / "mirror.fmu", "2.0", "mirror")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_disk_that_is_full_leaves_the_old_file(tmp_path, monkeypatch):
+    def full(_):
+        raise OSError(28, "No space left on device")
+
+    path = tmp_path / "mirror.fmu"
+    path.write_text("old")
+    with monkeypatch.context() as patched, pytest.raises(OSError, match="No space"):
+        patched.setattr(fmu.os, "fsync", full)
+        fmu.write_unit(UNITS["mirror"](), path, "2.0", "mirror")
+    assert path.read_text() == "old" and list(tmp_path.iterdir()) == [path]
+    fmu.write_unit(UNITS["mirror"](), path, "2.0", "mirror")
+    assert zipfile.is_zipfile(path) and list(tmp_path.iterdir()) == [path]
+
+
+@pytest.mark.parametrize(
+    ("version", "name", "message"),
+    [
+        ("1.0", "mirror", "FMI '1.0' is not written here: choose 2.0 or 3.0"),
+        ("2.0", "two words", "'two words' is no name for exported code"),
+        ("2.0", "a" * 28, "has 28 characters: at most 27"),
+    ],
+)
+def test_other_versions_and_names_are_refused(tmp_path, version, name, message):
+    with pytest.raises(ExportError, match=message):
+        fmu.write_unit(UNITS["mirror"](), tmp_path / "mirror.fmu", version, name)
+    assert list(tmp_path.iterdir()) == []
+    assert fmu.write_unit(UNITS["mirror"](), tmp_path / "mirror.fmu", "2.0", "a" * 27).path.exists()
+
+
+def test_an_input_that_no_sensor_delivers_is_refused():
+    unit = UNITS["loop"]()
+    first, *rest = unit.controller.inputs
+    other = replace(unit.controller, inputs=(Signal("star_rad", 1, "rad", first.meaning, first.limit), *rest))
+    with pytest.raises(ExportError, match="reads star_rad, which a loop does not measure: it has optical_error_rad"):
+        fmu.unit_code(replace(unit, controller=other), "loop")
+    assert "loop_loop.c" in fmu.unit_code(unit, "loop")
+
+
+HARSH = """
+import sys
+import fmpy
+from fmpy.fmi1 import FMICallException
+import numpy as np
+rng = np.random.default_rng(1)
+for path in sys.argv[1:]:
+    description = fmpy.read_model_description(path)
+    step = {v.name: v for v in description.modelVariables}["plant_step_s"].start
+    names = [v.name for v in description.modelVariables if v.causality == "input"]
+    for size in (1e-6, 1.0, 1e9, 1e300):
+        signal = np.zeros(300, dtype=[("time", float), *((name, float) for name in names)])
+        signal["time"] = np.arange(300) * float(step)
+        for name in names:
+            signal[name] = rng.normal(size=300) * size
+        try:
+            result = fmpy.simulate_fmu(path, stop_time=signal["time"][-1], output_interval=float(step), input=signal)
+            print("done", size, len(result))
+        except FMICallException as error:
+            print("refused", size, error)
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux" or shutil.which("gcc") is None, reason="gcc's sanitizer")
+def test_nothing_in_it_is_undefined(archive, tmp_path):
+    """Both versions, the richest mirror and a loop, under inputs from small to absurd."""
+    folders = []
+    for name, version in (("rich", "2.0"), ("pointing", "3.0")):
+        folder = tmp_path / name
+        fmpy.extract(archive(name, version), folder)
+        (library,) = (folder / "binaries").glob("*/*")
+        sources = sorted(str(each) for each in (folder / "sources").glob("*.c"))
+        checks = ("-fsanitize=undefined,float-divide-by-zero,float-cast-overflow", "-fno-sanitize-recover=all")
+        subprocess.run(["gcc", *fmu.SHARED, *checks, "-o", library, *sources, "-lm"], check=True)
+        folders.append(folder)
+    command = [sys.executable, "-c", HARSH, *map(str, folders)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert "runtime error" not in done.stderr
+    said = [line for line in done.stdout.splitlines() if line.startswith(("done", "refused"))]
+    assert len(said) == 8 and sum(line.startswith("done") for line in said) >= 6

@@ -1,0 +1,572 @@
+"""Linear models of a mission: files and objects carry the same numbers, and forms that hide something are refused."""
+
+import json
+import struct
+import sys
+import zlib
+from dataclasses import replace
+
+import control as python_control
+import numpy as np
+import pytest
+from scipy.io import loadmat, savemat
+
+from microrad import control, lti, mirror, simulate
+from microrad.control.analysis import loop_response
+from microrad.export import choice, matrices
+from microrad.export.matrices import LinearModel, Port
+from microrad.export.matrices_polynomials import polynomials
+from microrad.export.matrices_structure import without_copies
+from microrad.export.records import ExportError, Origin
+from microrad.fine_loop.design import design_plant
+from microrad.missionfile import load_mission
+from shipped import SHIPPED
+
+NINE_DIGITS = 1e-9
+ROUNDING = 1e-12
+STATIC = """
+name = "static"
+travel = "1 mrad"
+composition = "static"
+rate_limit = "400 V/s"
+bias = "6 V"
+drive_min = "0 V"
+drive_max = "12 V"
+
+[prandtl_ishlinskii]
+thresholds = ["0 V", "1 V"]
+weights = ["80 urad/V", "9 urad/V"]
+"""
+
+
+@pytest.fixture(scope="module")
+def file():
+    return load_mission(SHIPPED)
+
+
+@pytest.fixture(scope="module")
+def tracking(file):
+    return choice.choose(file, choice.PID_WITH_INVERSE)
+
+
+@pytest.fixture(scope="module")
+def pointing(file):
+    return choice.choose(file, "PI + inverse in series")
+
+
+@pytest.fixture(scope="module")
+def gauged(file):
+    return choice.choose(file, "resonant damping")
+
+
+def of(chosen, name):
+    return matrices.models(chosen, [name])[0]
+
+
+def model(A, B, C, D=None, period_s=0.0, name="made"):
+    A, B, C = (np.atleast_2d(np.array(each, dtype=float)) for each in (A, B, C))
+    D = np.zeros((C.shape[0], B.shape[1])) if D is None else np.atleast_2d(np.array(D, dtype=float))
+    ports = [
+        tuple(Port(f"{k}_{i}", "V") for i in range(n))
+        for k, n in zip("uyx", (B.shape[1], C.shape[0], len(A)), strict=True)
+    ]
+    return LinearModel(name, "made by hand", lti.StateSpace(A, B, C, D), period_s, *ports, None)
+
+
+def grid(period_s, points=200):
+    return np.geomspace(1e-5, 0.499, points) / period_s
+
+
+def response(m, freq_hz):
+    return lti.frequency_response(m.system, freq_hz, m.period_s or None)
+
+
+def difference(found, wanted):
+    return np.max(np.abs(found / wanted - 1.0))
+
+
+# ---------------------------------------------------------------------------------------------------------- the models
+def test_mirror_and_its_linear_part_are_those_of_the_mission(file):
+    part, whole = matrices.models(file)
+    m = file.mission.mirror
+    assert (part.name, whole.name) == (matrices.LINEAR_PART, matrices.MIRROR)
+    assert (part.period_s, whole.period_s) == (0.0, 0.0)
+    freq = np.geomspace(0.01, 1e5, 200)
+    s = 2j * np.pi * freq
+    shape = np.polyval(m.linear.numerator, s) / np.polyval(m.linear.denominator, s)
+    at = 2j * np.pi * m.linear.normalise_at_hz
+    size = abs(np.polyval(m.linear.numerator, at) / np.polyval(m.linear.denominator, at))
+    assert difference(response(part, freq)[:, 0, 0], shape / size) < ROUNDING
+    assert difference(response(whole, freq)[:, 0, 0], m.bouc_wen.d1_rad_v * shape / size) < ROUNDING
+    assert whole.inputs == (Port("drive_v", "V"),) and whole.outputs == (Port("mirror_rad", "rad"),)
+    assert whole.origin == Origin(file.mission.name, file.sha256, m.name)
+    assert f"{size:.6g}" in part.meaning and "6 V" in whole.meaning
+
+
+def test_sampled_plant_of_the_tracking_loop_is_that_of_the_study_with_no_state_too_many(tracking):
+    m, setup = of(tracking, matrices.SAMPLED_PLANT), tracking.setup
+    whole = control.sampled_plant(tracking.mirror, setup.drive, setup.timing)
+    freq = grid(m.period_s)
+    wanted = lti.frequency_response(whole, freq, setup.timing.period_s)
+    assert difference(response(m, freq), wanted) < 1e-13
+    assert (m.system.order, whole.order) == (7, 8)  # five modes, the amplifier, and one sample of delay, held twice
+    assert m.period_s == setup.timing.period_s == 2e-5
+
+
+@pytest.mark.parametrize("which", ["pointing", "gauged"])
+def test_sampled_plant_of_the_pointing_loop_is_what_its_controller_was_designed_for(which, request):
+    chosen = request.getfixturevalue(which)
+    m = of(chosen, matrices.SAMPLED_PLANT)
+    freq = grid(m.period_s)
+    plant = design_plant(chosen.scene.axis)
+    wanted = lti.frequency_response(plant.system, freq, plant.period_s)[:, :, 0]
+    if which == "pointing":
+        path = chosen.file.mission.fine_pointing.reference_filter_hz
+        w, T = 2.0 * np.pi * path, plant.period_s
+        Ad, Bd = lti.zero_order_hold(np.array([[0.0, 1.0], [-w * w, -2.0 * w]]), np.array([[0.0], [w * w]]), T)
+        filtered = lti.StateSpace(Ad, Bd, Ad[:1], Bd[:1])
+        wanted = wanted * lti.frequency_response(filtered, freq, T)[:, :, 0]
+    found = response(m, freq)[:, :, 0]
+    assert difference(found[:, 0], -wanted[:, control.RESIDUAL]) < 1e-11
+    assert difference(found[:, 1], wanted[:, control.OPTICAL]) < 1e-11
+    assert difference(found[:, 2], wanted[:, control.GAUGE]) < 1e-11
+    assert [p.name for p in m.outputs] == ["line_of_sight_rad", "optical_error_rad", "gauge_rad"]
+    assert m.system.order < plant.system.order
+    assert ("reference filter" in m.meaning) == (which == "pointing")
+
+
+def test_controller_is_the_one_that_flies(pointing):
+    m, flies = of(pointing, matrices.CONTROLLER), choice.flight_controller(pointing)
+    assert all(np.array_equal(getattr(m.system, key), getattr(flies.system, key)) for key in "ABCD")
+    assert np.array_equal(m.anti_windup, flies.anti_windup) and m.anti_windup.any()
+    assert m.period_s == flies.period_s > 0.0
+    assert [p.name for p in m.inputs] == [f"{n}_{i}" for n in ("optical_error_rad", "reference_rad") for i in (0, 1)]
+    assert [(p.name, p.unit) for p in m.outputs] == [
+        (f"{n}_{i}", u)
+        for n, u in (("command_v", "V"), ("target_rad", "rad"), ("target_rate_rad_s", "rad/s"))
+        for i in (0, 1)
+    ]
+    assert len(m.states) == m.system.order
+
+
+def test_one_controller_without_an_inverse_has_commands_alone(gauged):
+    m = of(gauged, matrices.CONTROLLER)
+    assert [p.name for p in m.outputs] == ["command_v_0", "command_v_1"]
+    assert [p.name for p in m.inputs][2:] == ["gauge_rad_0", "gauge_rad_1"]
+    assert "inverse" not in m.meaning
+
+
+def test_target_by_difference_has_no_rate(tracking):
+    assert [p.name for p in of(tracking, matrices.CONTROLLER).outputs] == ["command_v_0", "target_rad_0"]
+
+
+@pytest.mark.parametrize("which", ["tracking", "pointing", "gauged"])
+def test_python_control_has_the_response_of_the_loop(which, request):
+    """The exported object against the loop that margins are taken of, and against our own evaluation."""
+    chosen = request.getfixturevalue(which)
+    m = of(chosen, matrices.LOOP)
+    freq = grid(m.period_s)
+    assert freq.size == 200
+    theirs = matrices.to_control(m)(np.exp(2j * np.pi * freq * m.period_s))
+    assert difference(theirs, response(m, freq)[:, 0, 0]) < NINE_DIGITS
+    if which == "tracking":
+        whole = simulate.sampled_loop(chosen.mirror, chosen.setup)
+        wanted = lti.frequency_response(whole, freq, m.period_s)[:, 0, 0]
+    else:
+        plant = matrices.axis_plant(chosen) if which == "pointing" else design_plant(chosen.scene.axis)
+        wanted = loop_response(plant, chosen.tuned.controller, freq)
+    assert difference(theirs, wanted) < NINE_DIGITS
+    assert np.min(np.abs(1.0 + theirs)) < 1.0 < np.max(np.abs(theirs))
+
+
+def test_static_mirror_has_no_linear_part(tmp_path):
+    path = tmp_path / "static.toml"
+    path.write_text(STATIC, encoding="utf-8")
+    file = load_mission(SHIPPED, path)
+    assert matrices.names(file) == (matrices.MIRROR,)
+    (m,) = matrices.models(file)
+    assert m.system.order == 0 and m.system.D.item() == pytest.approx(89e-6, rel=1e-15)
+    matrices.write_mat([m], tmp_path / "static.mat")
+    same(m, *matrices.read_mat(tmp_path / "static.mat"))
+    assert matrices.to_control(m)(0.0) == m.system.D.item()
+    with pytest.raises(ExportError, match="no model 'linear_part' here, but mirror; choose one of these"):
+        matrices.models(file, ["linear_part"])
+
+
+def test_models_that_there_are_not_are_refused(file, tracking):
+    assert matrices.names(tracking) == ("linear_part", "mirror", "sampled_plant", "controller", "loop")
+    with pytest.raises(ExportError, match="no model 'loop' here, but linear_part, mirror"):
+        matrices.models(file, ["mirror", "loop"])
+
+
+# ------------------------------------------------------------------------------------------------------------ structure
+def test_copies_and_multiples_of_states_vanish_and_the_response_stays():
+    delays = np.array([[0.5, 0, 0, 0, 0], [1, 0, 0, 0, 0], [0, 1, 0, 0, 0], [0, -2, 0, 0, 0], [0, 0, 0, 1, 0]])
+    whole = model(delays, [[1], [0], [0], [0], [0]], [[0, 1, 3, 1, 0]], period_s=0.1)
+    small = without_copies(whole.system)
+    freq = grid(0.1)
+    assert small.order == 3
+    wanted = lti.frequency_response(whole.system, freq, 0.1)
+    assert difference(lti.frequency_response(small, freq, 0.1), wanted) < 1e-12
+
+
+def test_a_state_that_stays_zero_vanishes_and_a_minimal_system_stays():
+    whole = model(np.diag([0.5, 0.0, 0.25]), [[1], [0], [1]], [[1, 1, 2]], period_s=0.1)
+    assert without_copies(whole.system).order == 2
+    minimal = model(np.diag([0.5, 0.25]), [[1], [1]], [[1, 2]], period_s=0.1)
+    assert without_copies(minimal.system) is minimal.system
+
+
+# ---------------------------------------------------------------------------------------------------------------- forms
+def test_coefficients_are_exact():
+    """(s + 3) / ((s + 1)(s + 2)(s + 0.5)) and its direct path, in a state space of powers of two."""
+    made = model([[-3.5, -3.5, -1.0], [1, 0, 0], [0, 1, 0]], [[1], [0], [0]], [[0, 1, 3]], [[0.5]])
+    tf = matrices.transfer_function(made)
+    assert tf.denominator.tolist() == [1.0, 3.5, 3.5, 1.0]
+    assert tf.numerator.tolist() == [0.5, 1.75, 2.75, 3.5]
+    zpk = matrices.zero_pole_gain(made)
+    assert sorted(zpk.poles.real) == [-2.0, -1.0, -0.5] and zpk.gain == 0.5
+    assert np.max(np.abs(np.polyval([0.5, 1.75, 2.75, 3.5], zpk.zeros))) < 1e-14
+
+
+def test_delays_have_their_poles_at_zero_to_the_last_bit():
+    n = 8
+    made = model(np.eye(n, k=-1), np.eye(n)[:, :1], np.eye(n)[-1:], period_s=1.0)
+    zpk, tf = matrices.zero_pole_gain(made), matrices.transfer_function(made)
+    assert zpk.poles.tolist() == [0.0] * n and zpk.zeros.size == 0 and zpk.gain == 1.0
+    assert tf.numerator.tolist() == [1.0] and tf.denominator.tolist() == [1.0] + [0.0] * n
+    assert (
+        np.max(np.abs(np.linalg.eigvals(made.system.A + 1e-16 * np.eye(n, k=n - 1)))) > 1e-3
+    )  # what rounding makes of it
+
+
+def test_zeros_of_eq_2_are_those_of_its_numerator(file):
+    part = of(file, matrices.LINEAR_PART)
+    zpk = matrices.zero_pole_gain(part)
+    linear = file.mission.mirror.linear
+    assert np.sort(zpk.zeros.real) == pytest.approx(np.sort(np.roots(linear.numerator).real), rel=1e-10)
+    wanted = np.roots(linear.denominator)
+    assert np.sort_complex(zpk.poles) == pytest.approx(np.sort_complex(wanted), rel=1e-9)
+    assert zpk.largest_error < ROUNDING
+
+
+def test_eq_2_in_coefficients_costs_every_digit_of_a_state_space(file):
+    tf = matrices.transfer_function(of(file, matrices.LINEAR_PART))
+    assert tf.largest_error < ROUNDING  # the coefficients themselves are right
+    assert 1e15 < tf.condition < 1e16
+    assert tf.denominator == pytest.approx(file.mission.mirror.linear.denominator, rel=1e-10)
+
+
+def test_error_of_the_coefficients_is_the_one_they_have(tracking):
+    """The sampled loop in powers of z: slow poles near 1 cost digits, and how many is said."""
+    m = of(tracking, matrices.LOOP)
+    tf, zpk = matrices.transfer_function(m), matrices.zero_pole_gain(m)
+    at = np.array([tf.at_hz])
+    z = np.exp(2j * np.pi * at * m.period_s)
+    own = abs(np.polyval(tf.numerator, z) / np.polyval(tf.denominator, z) / response(m, at)[:, 0, 0] - 1.0)[0]
+    assert tf.largest_error == pytest.approx(own, rel=1e-6)
+    assert tf.largest_error > 1e-3 and tf.at_hz < 10.0
+    assert zpk.largest_error < NINE_DIGITS
+
+
+def test_entries_of_several_inputs_and_outputs_are_given_one_by_one(tracking):
+    m = of(tracking, matrices.CONTROLLER)
+    found = matrices.forms(m)
+    freq = grid(m.period_s)
+    z, wanted = np.exp(2j * np.pi * freq * m.period_s), response(m, freq)
+    for o, i in np.ndindex(wanted.shape[1:]):
+        tf, zpk = found.transfer_function[o][i], found.zero_pole_gain[o][i]
+        by_powers = np.polyval(tf.numerator, z) / np.polyval(tf.denominator, z)
+        by_roots = zpk.gain * np.prod(z[:, None] - zpk.zeros, axis=1) / np.prod(z[:, None] - zpk.poles, axis=1)
+        assert np.allclose(by_powers, wanted[:, o, i], rtol=1e-10, atol=0.0)
+        assert np.allclose(by_roots, wanted[:, o, i], rtol=1e-10, atol=0.0)
+    assert found.transfer_function[1][0].numerator.tolist() == [0.0]  # the target is the reference alone
+    assert found.transfer_function[0][0].numerator[0] < 0.0 < found.transfer_function[0][1].numerator[0]
+
+
+@pytest.mark.parametrize(
+    ("made", "why"),
+    [
+        (model(np.diag([-1.0, -20.0]), [[1], [0]], [[1, 1]]), r"no input drives: 3\.183 Hz with a damping ratio of 1"),
+        (model(np.diag([-1.0, -20.0]), [[1], [1]], [[0, 1]]), r"no output shows: 0\.1592 Hz"),
+        (model(np.diag([0.5, -1.0]), [[1], [1]], [[1, 0]], period_s=0.01), r"no output shows: \|z\| = 1 at 50 Hz"),
+    ],
+)
+def test_hidden_modes_are_refused_by_name(made, why):
+    for form in (matrices.zero_pole_gain, matrices.transfer_function):
+        with pytest.raises(ExportError, match=f"made: not minimal, it has a mode that {why}.*minimal realisation"):
+            form(made)
+    found = matrices.forms(made)
+    assert "not minimal" in found.zero_pole_gain and found.transfer_function == found.zero_pole_gain
+    assert response(made, np.array([1.0])).shape == (1, 1, 1)
+
+
+def test_a_mode_that_one_entry_lacks_is_no_hidden_one():
+    made = model(np.diag([-1.0, -2.0]), np.eye(2), np.eye(2))
+    found = matrices.forms(made)
+    assert [[e.poles.tolist() for e in row] for row in found.zero_pole_gain] == [[[-1.0], []], [[], [-2.0]]]
+
+
+@pytest.mark.parametrize(
+    ("made", "where"),
+    [
+        (model([[0.25]], [[1]], [[1]]), r"0\.03979 Hz with a damping ratio of -1"),
+        (model([[1.01]], [[1]], [[1]], period_s=0.01), r"\|z\| = 1\.01 at 0 Hz"),
+    ],
+)
+def test_unstable_models_are_refused_as_coefficients_alone(made, where):
+    with pytest.raises(ExportError, match=f"made: unstable, {where}.*state space or zeros and poles"):
+        matrices.transfer_function(made)
+    found = matrices.forms(made)
+    assert "unstable" in found.transfer_function
+    assert found.zero_pole_gain[0][0].poles.size == 1
+    integrator = model([[1.0]], [[1]], [[1]], period_s=0.01)
+    assert matrices.transfer_function(integrator).denominator.tolist() == [1.0, -1.0]
+
+
+def test_orders_beyond_floats_are_refused():
+    with pytest.raises(ExportError, match=r"101 states .* takes 100"):
+        polynomials(model(np.diag(-np.arange(1.0, 102.0)), np.ones((101, 1)), np.ones((1, 101))).system)
+
+
+# ----------------------------------------------------------------------------------------------------------------- .mat
+@pytest.fixture(scope="module")
+def written(file, tracking, pointing, gauged, tmp_path_factory):
+    """The models of the mission and of three controllers under names of their own, and their file."""
+    found = list(matrices.models(file))
+    for name, chosen in (("tracking", tracking), ("pointing", pointing), ("gauged", gauged)):
+        several = matrices.models(chosen, ["sampled_plant", "controller", "loop"])
+        found += [replace(m, name=f"{name}_{m.name}") for m in several]
+    path = tmp_path_factory.mktemp("mat") / "models.mat"
+    matrices.write_mat(found, path)
+    return found, path
+
+
+def same(a, b):
+    arrays = [(getattr(a.system, k), getattr(b.system, k)) for k in "ABCD"]
+    assert all(x.dtype == y.dtype == float and x.shape == y.shape and x.tobytes() == y.tobytes() for x, y in arrays)
+    assert (a.anti_windup is None) == (b.anti_windup is None)
+    assert a.anti_windup is None or a.anti_windup.tobytes() == b.anti_windup.tobytes()
+    rest = ("name", "meaning", "period_s", "inputs", "outputs", "states", "origin")
+    assert [getattr(a, k) for k in rest] == [getattr(b, k) for k in rest]
+
+
+def test_mat_reads_back_to_the_last_bit(written):
+    found, path = written
+    back = matrices.read_mat(path)
+    assert len(back) == len(found) == 11
+    for a, b in zip(found, back, strict=True):
+        same(a, b)
+
+
+def test_scipy_reads_the_same_numbers(written):
+    found, path = written
+    variables = loadmat(path, struct_as_record=True)
+    for m in found:
+        record = variables[m.name][0, 0]
+        for key in "ABCD":
+            assert np.asarray(record[key], dtype=float, order="C").tobytes() == getattr(m.system, key).tobytes()
+        assert record["Ts"].item() == m.period_s
+        assert [name.item() for name in record["InputName"][:, 0]] == [p.name for p in m.inputs]
+        assert [unit.item() for unit in record["OutputUnit"][:, 0]] == [p.unit for p in m.outputs]
+        assert record["MissionSha256"].item() == m.origin.mission_sha256
+
+
+def test_scipy_reads_zeros_poles_and_coefficients(written):
+    found, path = written
+    variables = loadmat(path)
+    single, several = found[0], found[3]
+    record, zpk = variables[single.name][0, 0], matrices.zero_pole_gain(single)
+    assert np.array_equal(record["z"][:, 0], zpk.zeros) and np.array_equal(record["p"][:, 0], zpk.poles)
+    assert record["k"].item() == zpk.gain and record["zpkError"].item() == zpk.largest_error
+    tf = matrices.transfer_function(single)
+    assert np.array_equal(record["num"][0], tf.numerator) and np.array_equal(record["den"][0], tf.denominator)
+    assert record["tfCondition"].item() == tf.condition and record["tfRefused"].size == 0
+    record = variables[several.name][0, 0]
+    assert record["num"].shape == (2, 2) == record["k"].shape
+    assert np.array_equal(record["num"][0, 1][0], matrices.transfer_function(several, 0, 1).numerator)
+
+
+def test_a_form_that_is_refused_is_missing_with_its_reason(tmp_path):
+    matrices.write_mat([model(np.diag([-1.0, -2.0]), [[1], [0]], [[1, 1]])], tmp_path / "a.mat")
+    record = loadmat(tmp_path / "a.mat")["made"][0, 0]
+    assert "z" not in record.dtype.names and "num" not in record.dtype.names
+    assert "not minimal" in record["zpkRefused"].item() and "not minimal" in record["tfRefused"].item()
+
+
+def test_mat_is_the_same_from_day_to_day(written, tmp_path):
+    found, path = written
+    matrices.write_mat(found, tmp_path / "again.mat")
+    assert (tmp_path / "again.mat").read_bytes() == path.read_bytes()
+    assert path.read_bytes()[:40] == b"MATLAB 5.0 MAT-file, microrad linear mod"
+    assert not list(tmp_path.glob(".*"))
+
+
+@pytest.mark.parametrize("name", ["2nd", "a b", "end", "x" * 32, "_x", ""])
+def test_names_that_matlab_does_not_take_are_refused(name, tmp_path):
+    with pytest.raises(ExportError, match="is no name of a variable in MATLAB"):
+        matrices.write_mat([model([[-1]], [[1]], [[1]], name=name)], tmp_path / "a.mat")
+    assert not list(tmp_path.iterdir())
+
+
+def test_two_models_of_a_name_are_refused(tmp_path):
+    with pytest.raises(ExportError, match="two models are called 'made'"):
+        matrices.write_mat([model([[-1]], [[1]], [[1]])] * 2, tmp_path / "a.mat")
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_file_that_cannot_be_written_is_said(tmp_path):
+    with pytest.raises(ExportError, match=r"could not be written .*so nothing is"):
+        matrices.write_mat([model([[-1]], [[1]], [[1]])], tmp_path / "none" / "a.mat")
+
+
+def element(kind, data):
+    return struct.pack("<II", kind, len(data)) + data + b"\0" * (-len(data) % 8)
+
+
+def nested(depth):
+    """A cell in a cell in a cell."""
+    data = b""
+    for _ in range(depth):
+        parts = ((6, struct.pack("<II", 1, 0)), (5, struct.pack("<ii", 1, 1)), (1, b"x" * 8))
+        data = b"".join(element(*part) for part in parts) + element(14, data)
+    return element(14, data)
+
+
+HEAD = b"MATLAB 5.0 MAT-file".ljust(124) + b"\x00\x01IM"
+
+
+@pytest.mark.parametrize(
+    ("data", "why"),
+    [
+        (b"", "no header of version 5"),
+        (b"\x80\x04\x95pickle".ljust(200), "no header of version 5"),
+        (b"MATLAB 7.3 MAT-file".ljust(600), "version 7.3; save it as version 7"),
+        (b"\x89HDF\r\n\x1a\n".ljust(600), "version 7.3"),
+        (HEAD + struct.pack("<II", 14, 4000) + b"short", "an element is cut off"),
+        (HEAD + nested(5_000), "nest deeper than 4"),
+        (HEAD + struct.pack("<II", 15, 5) + b"wrong", "incorrect header check"),
+        (HEAD + element(14, b"\xff" * 64), "no MATLAB file that can be read"),
+        (HEAD + element(14, struct.pack("<IIII", 6, 8, 6, 0)), "no MATLAB file that can be read"),
+    ],
+)
+def test_hostile_files_are_refused_before_or_by_the_reader(data, why, tmp_path):
+    path = tmp_path / "bad.mat"
+    path.write_bytes(data)
+    with pytest.raises(ExportError, match=why) as error:
+        matrices.read_mat(path)
+    assert "bad.mat" in str(error.value)
+
+
+def test_a_file_that_unpacks_to_too_much_is_refused(tmp_path, monkeypatch):
+    monkeypatch.setattr("microrad.export.matrices_mat.MOST_BYTES", 100_000)
+    path = tmp_path / "bomb.mat"
+    packed = zlib.compress(b"\0" * 1_000_000)
+    path.write_bytes(HEAD + struct.pack("<II", 15, len(packed)) + packed)
+    with pytest.raises(ExportError, match="unpacks to more than 100000 bytes"):
+        matrices.read_mat(path)
+    path.write_bytes(HEAD.ljust(100_001))
+    with pytest.raises(ExportError, match="has 100001 bytes; a linear model has at most 100000"):
+        matrices.read_mat(path)
+
+
+def test_missing_and_foreign_files_are_refused(tmp_path):
+    with pytest.raises(ExportError, match=r"none\.mat cannot be read"):
+        matrices.read_mat(tmp_path / "none.mat")
+    savemat(tmp_path / "other.mat", {"A": np.eye(2)})
+    with pytest.raises(ExportError, match="variable 'A' is no model that microrad wrote, it lacks A, B, C"):
+        matrices.read_mat(tmp_path / "other.mat")
+
+
+def test_a_damaged_model_is_refused(written, tmp_path):
+    for key, value in (("Ts", np.zeros((0, 0))), ("meaning", 3.0), ("InputUnit", np.zeros((0, 1), dtype=object))):
+        record = loadmat(written[1])["mirror"]
+        record[0, 0][key] = value
+        savemat(tmp_path / "damaged.mat", {"mirror": record})
+        with pytest.raises(ExportError, match="variable 'mirror' is damaged"):
+            matrices.read_mat(tmp_path / "damaged.mat")
+
+
+@pytest.mark.parametrize("how", [{"do_compression": True}, {"long_field_names": True}])
+def test_other_ways_to_save_are_read(how, written, tmp_path):
+    variables = {name: value for name, value in loadmat(written[1]).items() if not name.startswith("__")}
+    savemat(tmp_path / "other.mat", variables, **how)
+    for a, b in zip(written[0], matrices.read_mat(tmp_path / "other.mat"), strict=True):
+        same(a, b)
+
+
+def test_random_damage_is_refused_or_read_and_nothing_else(file, tmp_path):
+    """The library's own reader ends the process on some of these."""
+    path, seen = tmp_path / "a.mat", set()
+    matrices.write_mat([of(file, matrices.MIRROR)], path)
+    whole, rng = path.read_bytes(), np.random.default_rng(1)
+    for _ in range(300):
+        data = bytearray(whole)
+        for place in rng.integers(128, len(data), rng.integers(1, 4)):
+            data[place] = rng.integers(256)
+        path.write_bytes(data[: rng.integers(128, len(data))] if rng.random() < 0.2 else data)
+        try:
+            seen.add(type(matrices.read_mat(path)))
+        except ExportError:
+            seen.add(ExportError)
+    assert seen == {tuple, ExportError}
+
+
+# ----------------------------------------------------------------------------------------------------------------- JSON
+def test_json_reads_back_to_the_last_bit(written):
+    found, _ = written
+    data = json.loads(matrices.json_text(found))
+    assert data["format"] == "microrad linear models" and data["version"] == 1
+    for m, each in zip(found, data["models"], strict=True):
+        for key in "ABCD":
+            assert (
+                np.array(each[key], dtype=float).reshape(getattr(m.system, key).shape).tobytes()
+                == getattr(m.system, key).tobytes()
+            )
+        assert each["Ts_s"] == m.period_s and each["mission_sha256"] == m.origin.mission_sha256
+        assert each["inputs"] == [{"name": p.name, "unit": p.unit} for p in m.inputs]
+    zpk = matrices.zero_pole_gain(found[0])
+    entry = data["models"][0]["zero_pole_gain"]["entries"][0][0]
+    assert [complex(*pair) for pair in entry["poles"]] == zpk.poles.tolist()
+    assert entry["gain"] == zpk.gain
+
+
+def test_json_says_what_is_refused_and_takes_no_nan():
+    hidden = json.loads(matrices.json_text([model(np.diag([-1.0, -2.0]), [[1], [0]], [[1, 1]])]))["models"][0]
+    assert "not minimal" in hidden["zero_pole_gain"]["refused"]
+    assert hidden["mission"] is None and hidden["anti_windup"] is None
+    with pytest.raises(ExportError, match="made holds a number that is not finite"):
+        matrices.json_text([model([[-1.0]], [[1.0]], [[1.0]], [[np.nan]])])
+
+
+# ------------------------------------------------------------------------------------------------------- python-control
+def test_python_control_and_back(pointing):
+    for m in matrices.models(pointing):
+        theirs = matrices.to_control(m)
+        assert isinstance(theirs, python_control.StateSpace)
+        assert theirs.dt == m.period_s and theirs.name == m.name
+        assert theirs.input_labels == [p.name for p in m.inputs] and theirs.state_labels == [p.name for p in m.states]
+        back = matrices.from_control(theirs)
+        assert all(getattr(back.system, k).tobytes() == getattr(m.system, k).tobytes() for k in "ABCD")
+        assert [p.name for p in back.outputs] == [p.name for p in m.outputs]
+        assert back.period_s == m.period_s and back.origin is None
+
+
+def test_other_objects_are_no_models():
+    with pytest.raises(ExportError, match="a TransferFunction is no state space"):
+        matrices.from_control(python_control.tf([1, 0, 0], [1, 1]))
+    for dt in (None, True):
+        with pytest.raises(ExportError, match=f"dt = {dt}: continuous, or sampled how fast"):
+            matrices.from_control(python_control.ss([[-1]], [[1]], [[1]], 0, dt=dt))
+
+
+def test_without_python_control_the_extra_is_named(file, monkeypatch):
+    monkeypatch.setitem(sys.modules, "control", None)
+    with pytest.raises(ExportError, match=r"not installed.*pip install 'microrad\[control\]'"):
+        matrices.to_control(of(file, matrices.MIRROR))
+
+
+def test_model_of_the_mirror_is_the_mirrors_own_loop(file):
+    m = file.mission.mirror
+    made = mirror.from_mission(m, mirror.hysteresis_model(m, m.rate_limit_v_s, m.bias_v)).linear_loop
+    assert np.array_equal(of(file, matrices.MIRROR).system.A, made.A)

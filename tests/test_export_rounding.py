@@ -1,0 +1,450 @@
+"""Single precision stays within the bound that the export states: held against a twin in numpy's float32 and against C.
+
+The twin takes the operations of the generated code one by one, in its order, with Kahan's sums where it has them.
+"""
+
+import math
+import shutil
+import subprocess
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from microrad import kernels, lti
+from microrad.export import double_run, rounding
+from microrad.export.choice import choose, flight_controller, vectors
+from microrad.export.flight import compensated_states, flight_code, vectors_text
+from microrad.export.modes import minimal
+from microrad.export.records import FlightController, InverseLaw, Origin, Signal, Vectors
+from microrad.export.sections import sections
+from microrad.missionfile import load_mission
+
+MISSION = Path(__file__).parent.parent / "missions" / "leo-geo.toml"
+SAMPLES = 2000
+f = np.float32
+ONE, TOLERANCE, TRIALS = f(1.0), f(1e-6), 256
+
+SHIPPED = ("PI + inverse", "PI + inverse in series", "LQG", "PID + inverse")
+
+
+@cache
+def shipped(name):
+    """A controller of the shipped mission, its sections and a recorded run."""
+    chosen = choose(load_mission(MISSION), name)
+    of = minimal(flight_controller(chosen))
+    return of, sections(of), vectors(chosen, SAMPLES)
+
+
+# ------------------------------------------------------------------------------------------------------------- the twin
+def times(matrix, numbers, total):
+    """total + matrix numbers, column by column: in each row the order of the code's terms."""
+    for column, number in zip(matrix.T, numbers, strict=True):
+        total = total + column * number
+    return total
+
+
+class Element:
+    """A Bouc-Wen element as {name}_hysteresis.h has it."""
+
+    def __init__(self, row):
+        (self.d1, self.d2, self.epsilon, self.delta, self.alpha, self.beta, self.limit, self.bias, self.gamma, self.eta,
+         self.power, self.per_size) = (f(x) for x in row)  # fmt: skip
+        self.h = f(0.0)
+
+    def relaxed(self, h, forcing, decay):
+        share = ONE if decay == 0.0 else -np.expm1(-decay) / decay
+        return h + (forcing - decay * h) * share
+
+    def linear(self, h, forcing, positive, negative):
+        above = h > 0.0 or (h == 0.0 and forcing > 0.0)
+        decay, other = (positive, negative) if above else (negative, positive)
+        end = self.relaxed(h, forcing, decay)
+        if h * forcing >= 0.0 or h * end > 0.0:
+            return end
+        fraction = -h / forcing if decay == 0.0 else np.log1p(-decay * h / forcing) / decay
+        rest = ONE - fraction if fraction < 1.0 else f(0.0)
+        return self.relaxed(f(0.0), forcing * rest, other * rest)
+
+    def slope(self, h, forcing, positive, negative):
+        decay = positive if h > 0.0 else negative
+        return forcing - decay * h * np.power(abs(h) * self.per_size, self.power)
+
+    def integrated(self, h, forcing, positive, negative):
+        largest = max(abs(positive), abs(negative))
+        step = ONE / (ONE + largest * (self.power + ONE) * max(ONE, abs(h) * self.per_size))
+        done = f(0.0)
+        rows = [[], [1 / 5], [3 / 40, 9 / 40], [44 / 45, -56 / 15, 32 / 9],
+                [19372 / 6561, -25360 / 2187, 64448 / 6561, -212 / 729],
+                [9017 / 3168, -355 / 33, 46732 / 5247, 49 / 176, -5103 / 18656],
+                [35 / 384, 0, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84]]  # fmt: skip
+        wrong = [71 / 57600, 0, -71 / 16695, 71 / 1920, -17253 / 339200, 22 / 525, -1 / 40]
+        for _ in range(TRIALS):
+            step, k, at = min(step, ONE - done), [], h
+            for row in rows:
+                at = h + step * sum((f(w) * each for w, each in zip(row, k, strict=True)), f(0.0))
+                k.append(self.slope(at, forcing, positive, negative))
+            error = abs(step * sum((f(w) * each for w, each in zip(wrong, k, strict=True)), f(0.0)))
+            error = error * (self.per_size / TOLERANCE)
+            if error <= 1.0:
+                done, h = done + step, at
+            if done >= 1.0:
+                return h
+            step = step * min(f(5.0), max(f(0.2), f(0.9) * np.power(error + f(1e-12), f(-0.2))))
+        raise AssertionError("the trials ran out")
+
+    def drive(self, target, before, rate):
+        travel, rate = (target - before) / self.d1, min(max(rate / self.d1, -self.limit), self.limit)
+        forcing = self.epsilon * np.exp(self.delta * abs(rate)) * travel
+        size = abs(travel)
+        positive = (self.alpha + self.gamma) * size + (self.beta + self.eta) * travel
+        negative = (self.alpha - self.gamma) * size + (self.eta - self.beta) * travel
+        step = self.linear if self.power == 0.0 else self.integrated
+        self.h = step(self.h, forcing, positive, negative)
+        return (target - self.h + self.d1 * self.bias) / (self.d1 * np.exp(-self.d2 * rate)) - self.bias
+
+
+class Single:
+    """The generated code in single precision."""
+
+    def __init__(self, of, form):
+        self.of, self.n = of, of.actuators
+        self.slow = np.array(compensated_states(form), dtype=bool)
+        step = form.A - np.diag(self.slow.astype(float))
+        self.A, self.B, self.L, self.C, self.D = (m.astype(f) for m in (step, form.B, form.L, form.C, form.D))
+        self.x, self.rest = np.zeros(form.order, f), np.zeros(form.order, f)
+        self.target = np.zeros(self.n, f)
+        if (law := of.inverse) is not None:
+            self.law = law
+            self.elements = [Element(row) for row in law.bouc_wen]
+            self.play, self.lag = np.zeros(law.play_weight.size, f), np.zeros(law.lag_keep.size, f)
+            self.lag_rest = np.zeros_like(self.lag)
+            self.direct, self.threshold, self.weight = (
+                a.astype(f) for a in (law.direct, law.play_threshold, law.play_weight)
+            )
+            self.widening = law.widening[:, 0].astype(f)
+            self.limit = np.minimum(law.widening[:, 1], np.finfo(f).max).astype(f)
+            self.share, self.creep = (1.0 - law.lag_keep).astype(f), law.lag_weight.astype(f)
+
+    def kahan(self, total, rest, change):
+        whole = change - rest
+        new = total + whole
+        return new, (new - total) - whole
+
+    def inverse(self, y):
+        law, n, before = self.law, self.n, self.target
+        target = y[n : 2 * n].copy()
+        for j, a in enumerate(law.lag_actuator.astype(int)):
+            target[a] = target[a] - self.creep[j] * self.lag[j]
+        rate = (target - before) / f(self.of.period_s) if law.by_difference else y[2 * n :]
+        drive = self.direct * target
+        for element, a in zip(self.elements, law.bouc_wen_actuator.astype(int), strict=True):
+            drive[a] = drive[a] + element.drive(target[a], before[a], rate[a])
+        widened = self.widening * np.minimum(np.abs(rate), self.limit)
+        for j, a in enumerate(law.play_actuator.astype(int)):
+            half = self.threshold[j] + widened[a] if self.threshold[j] > 0.0 else f(0.0)
+            self.play[j] = min(max(self.play[j], target[a] - half), target[a] + half)
+            drive[a] = drive[a] + self.weight[j] * self.play[j]
+        for j, a in enumerate(law.lag_actuator.astype(int)):
+            change = self.share[j] * (drive[a] - self.lag[j])
+            self.lag[j], self.lag_rest[j] = self.kahan(self.lag[j], self.lag_rest[j], change)
+        self.target = target
+        return drive
+
+    def step(self, reading):
+        """Commands ahead of the clip, and behind the converter."""
+        m = reading.astype(f)
+        y = times(self.D, m, times(self.C, self.x, np.zeros(self.C.shape[0], f)))
+        v = y[: self.n] if self.of.inverse is None else y[: self.n] + self.inverse(y)
+        low, high = f(self.of.minimum_v), f(self.of.maximum_v)
+        clipped = np.minimum(np.maximum(v, low), high)
+        new = times(self.L, clipped - v, times(self.B, m, times(self.A, self.x, np.zeros_like(self.x))))
+        total, rest = self.kahan(self.x, self.rest, new)
+        self.x, self.rest = np.where(self.slow, total, new), np.where(self.slow, rest, f(0.0))
+        if self.of.resolution_v == 0.0:
+            return v, clipped
+        r = f(self.of.resolution_v)
+        edge = (
+            (math.floor(self.of.maximum_v / self.of.resolution_v + 1e-6) * self.of.resolution_v) if high < 1e9 else high
+        )
+        return v, np.minimum(np.floor(clipped / r + f(0.5)) * r, f(edge))
+
+
+def single_run(of, form, inputs):
+    twin = Single(of, form)
+    with np.errstate(under="ignore"):
+        found = [twin.step(row) for row in inputs]
+    return np.array([v for v, _ in found], dtype=float), np.array([c for _, c in found], dtype=float)
+
+
+# ----------------------------------------------------------------------------------------------------- shipped mission
+@pytest.mark.parametrize("name", SHIPPED)
+def test_the_run_in_double_is_the_recorded_one(name):
+    of, form, v = shipped(name)
+    found = double_run.run(of, form, v.inputs)
+    r = of.resolution_v
+    commands = np.floor(np.clip(found.free, of.minimum_v, of.maximum_v) / r + 0.5) * r
+    assert np.max(np.abs(commands - v.commands)) <= 1e-12
+    assert np.max(np.abs(commands)) > 0.5
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_single_precision_stays_within_its_bound(name):
+    of, form, v = shipped(name)
+    bound = rounding.rounding_bound(of, form, v)
+    ahead = rounding.errors_before_converter(of, form, v)
+    free, commands = single_run(of, form, v.inputs)
+    wrong = np.abs(free - double_run.run(of, form, v.inputs).free)
+    assert np.all(wrong <= ahead)
+    assert np.max(ahead) <= 100.0 * np.max(wrong)
+    difference = np.max(np.abs(commands - v.commands))
+    assert difference <= bound.command_v <= 2.01 * of.resolution_v
+    assert bound.samples == SAMPLES
+
+
+@pytest.mark.parametrize("name", ["PI + inverse in series", "LQG"])
+def test_the_compiled_code_stays_within_it(name, tmp_path):
+    if not shutil.which("gcc"):
+        pytest.skip("no gcc here")
+    of, form, v = shipped(name)
+    bound = rounding.rounding_bound(of, form, v)
+    for file, text in flight_code(of, form, "single", "single", bound).items():
+        (tmp_path / file).write_text(text)
+    (tmp_path / "vectors.csv").write_text(vectors_text(of, v))
+    flags = "-std=c99 -O2 -Wall -Wextra -Werror -pedantic"
+    subprocess.run(
+        ["gcc", *flags.split(), "-o", "bench", "single.c", "single_bench.c", "-lm"], cwd=tmp_path, check=True
+    )
+    done = subprocess.run(["./bench", "vectors.csv"], cwd=tmp_path, capture_output=True, text=True, check=False)
+    told = dict(line.split() for line in done.stdout.splitlines())
+    assert done.returncode == 0, done.stdout
+    assert 0.0 <= float(told["largest_difference_v"]) <= bound.command_v
+    assert float(told["bound_v"]) == pytest.approx(bound.command_v, rel=1e-5)
+    assert float(told["peak_command_v"]) == pytest.approx(np.max(np.abs(v.commands)))
+
+
+def test_what_integrators_lose_grows_with_the_samples():
+    of, form, v = shipped("PI + inverse")
+    half = Vectors(
+        *(getattr(v, key)[: SAMPLES // 2] for key in ("inputs", "commands", "disturbance_rad", "error_rad")), 0, 0
+    )
+    whole, early = rounding.rounding_bound(of, form, v), rounding.rounding_bound(of, form, half)
+    assert whole.per_sample_v > 0.0 < early.per_sample_v
+    ahead = np.max(rounding.errors_before_converter(of, form, v))
+    assert np.max(rounding.errors_before_converter(of, form, half)) < ahead
+    assert f"{whole.command_v:.3g} V of double over these {SAMPLES} samples" in whole.words
+    assert f"up to {whole.per_sample_v:.2g} V." in whole.words
+
+
+# ---------------------------------------------------------------------------------------------------- other controllers
+PERIOD_S = 2e-4
+
+
+def one_axis(system, *, windup=0.0, inverse=None, limit_v=math.inf, resolution_v=0.0):
+    return FlightController(
+        name="a design",
+        origin=Origin("a mission", "0" * 64, "a mirror"),
+        period_s=PERIOD_S,
+        inputs=(Signal("reading_rad", system.B.shape[1], "rad", "reading", 0.1),),
+        actuators=1,
+        system=system,
+        anti_windup=np.full((system.order, 1), windup),
+        inverse=inverse,
+        minimum_v=-limit_v,
+        maximum_v=limit_v,
+        resolution_v=resolution_v,
+        bias_v=0.0,
+        margins=(),
+    )
+
+
+def vectors_of(inputs):
+    nothing = np.zeros((len(inputs), 1))
+    return Vectors(inputs, nothing, nothing, nothing, 0, 0)
+
+
+def integral(gain=3000.0, step=300.0):
+    return lti.StateSpace(np.eye(1), np.array([[step]]), np.eye(1), np.array([[gain]]))
+
+
+def law(elements=(), *, plays=(), widening=0.0, creep=(), direct=0.0, by_difference=True):
+    zeros = np.zeros
+    return InverseLaw(
+        direct=np.array([direct]),
+        bouc_wen=kernels.bouc_wen_rows(elements),
+        bouc_wen_actuator=zeros(len(elements), np.uint64),
+        play_threshold=np.array([r for r, _ in plays], dtype=float),
+        play_weight=np.array([w for _, w in plays], dtype=float),
+        play_actuator=zeros(len(plays), np.uint64),
+        widening=np.array([[widening, 0.02]]),
+        lag_keep=np.array([math.exp(-PERIOD_S / tau) for _, tau in creep]),
+        lag_weight=np.array([w for w, _ in creep]),
+        lag_actuator=zeros(len(creep), np.uint64),
+        by_difference=by_difference,
+    )
+
+
+PAPER = (0.089e-3, -2.96e-7, -0.048e-3, 4.7e-4, 38.421, 34.635, 3770.0, 6.0)
+STEEP = (0.089e-3, -2.96e-7, -0.022e-3, 4.7e-4, 2.4, 0.6, 20.0, 6.0, 0.3, -0.2)
+POWER = (*STEEP, 0.6, 2.4 / 0.022e-3)
+PLAYS = {"plays": ((0.0, 900.0), (2e-5, -500.0), (1e-4, -200.0)), "direct": 12000.0}
+CREEP = {"creep": ((2e-6, 0.01), (1e-6, 3.0))}
+
+LAWS = {
+    "Bouc-Wen": law((PAPER,)),
+    "asymmetric, rate clamped": law((STEEP,)),
+    "exponent 1.6": law((POWER,)),
+    "plays": law(**PLAYS),
+    "widening plays with creep": law(**PLAYS, **CREEP, widening=1e-3),
+    "two elements, plays and creep": law((PAPER, STEEP), **PLAYS, **CREEP),
+    "creep that amplifies": law(direct=12000.0, creep=((-0.85 / 12000.0, 1e-3),)),
+    "creep that amplifies through a play": law(plays=((0.0, 12000.0),), creep=((-0.85 / 12000.0, 1e-3),)),
+}
+
+
+def tracking_reference(samples=1500):
+    time = PERIOD_S * np.arange(samples)
+    noise = 1e-6 * np.random.default_rng(3).standard_normal(samples)
+    return (2e-4 * np.sin(2 * np.pi * 15.0 * time) + 4e-5 * np.sin(2 * np.pi * 170.0 * time) + noise)[:, None]
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_the_bound_holds_for_each_kind_of_inverse(name):
+    system = lti.StateSpace(np.eye(1), np.array([[0.5]]), np.array([[1.0], [0.0]]), np.array([[800.0], [1.0]]))
+    of = one_axis(system, inverse=LAWS[name])
+    form, v = sections(of), vectors_of(tracking_reference())
+    ahead = rounding.errors_before_converter(of, form, v)
+    wrong = np.abs(single_run(of, form, v.inputs)[0] - double_run.run(of, form, v.inputs).free)
+    assert np.all(wrong <= ahead)
+    assert np.max(ahead) <= 300.0 * np.max(wrong)
+    assert np.max(wrong) > 1e-8
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_the_run_in_double_is_the_kernels(name):
+    """The inverse alone, against `kernels.closed_loop`'s."""
+    system = lti.StateSpace(np.zeros((0, 0)), np.zeros((0, 1)), np.zeros((2, 0)), np.array([[0.0], [1.0]]))
+    of = one_axis(system, inverse=LAWS[name])
+    reference = tracking_reference(600)
+    found = double_run.Inverse(of, len(reference))
+    added = np.array([found.step(np.concatenate([[0.0], row])) for row in reference])
+    assert np.max(np.abs(added - kernel_inverse(LAWS[name], reference))) <= 1e-12 * np.max(np.abs(added))
+    assert np.max(np.abs(added)) > 1.0
+
+
+def kernel_inverse(of, reference):
+    empty, n = np.zeros((0, 0)), of.bouc_wen.shape[0]
+    loop = kernels.Loop(
+        (0,), 1, (), (0,) * n, True, 1, 0, empty, empty, empty, empty, empty, empty, np.zeros(1), np.eye(1),
+        of.direct, of.bouc_wen, of.bouc_wen_actuator, of.play_threshold, of.play_weight, of.play_actuator, of.widening,
+        of.lag_keep, of.lag_weight, of.lag_actuator,
+    )._replace(axes=(0,))  # fmt: skip
+    zero = np.zeros(1)
+    state = kernels.LoopState(
+        zero, zero, zero, zero, zero, np.zeros((1, 2)), np.zeros(n), np.zeros(of.play_weight.size),
+        np.zeros(of.lag_keep.size), empty, np.zeros(1, np.int64), np.zeros((1, 2), np.int64), np.zeros(n + 1, np.int64),
+    )  # fmt: skip
+    found = np.zeros_like(reference)
+    kernels._inverse(loop, state, reference, PERIOD_S, found)
+    return found
+
+
+def test_a_slow_oscillation_counts_as_what_it_is():
+    """A resonance of 1000 samples' decay: |A| element by element grows as 1.4^k and would bound nothing."""
+    z = 0.999 * np.exp(0.8j)
+    A = np.array([[z.real, -z.imag], [z.imag, z.real]])
+    system = lti.StateSpace(A, np.array([[1.0], [0.5]]), np.array([[100.0, 30.0]]), np.zeros((1, 1)))
+    of, inputs = one_axis(system), 1e-4 * np.random.default_rng(1).standard_normal((3000, 1))
+    form = sections(of)
+    ahead = rounding.errors_before_converter(of, form, vectors_of(inputs))
+    wrong = np.abs(single_run(of, form, inputs)[0] - double_run.run(of, form, inputs).free)
+    assert np.all(wrong <= ahead)
+    assert np.max(ahead) <= 300.0 * np.max(wrong)
+    assert np.max(np.linalg.matrix_power(np.abs(A), 100)) > 1e10
+
+
+def held(of, inputs):
+    """Errors ahead of the converter, as bounded and as the twin makes them."""
+    form = sections(of)
+    ahead = rounding.errors_before_converter(of, form, vectors_of(inputs))
+    return ahead, np.abs(single_run(of, form, inputs)[0] - double_run.run(of, form, inputs).free)
+
+
+def test_a_memory_that_single_precision_cannot_move_is_bounded():
+    """A drive that creeps by less than rounding of h: h stays where it is."""
+    law_ = law(((0.089e-3, 0.0, -0.048e-3, 0.0, 38.421, 34.635, 1e9, 0.0),))
+    of = one_axis(
+        lti.StateSpace(np.zeros((0, 0)), np.zeros((0, 1)), np.zeros((2, 0)), np.array([[0.0], [1.0]])), inverse=law_
+    )
+    swing, creeping = 2e-4 * np.sin(np.linspace(0.0, np.pi, 300)), 1e-13 * np.arange(1.0, 3001.0)
+    ahead, wrong = held(of, np.concatenate([swing, creeping])[:, None])
+    assert np.all(wrong <= ahead)
+    assert wrong[-1, 0] > 3.0 * wrong[400, 0]
+    assert np.max(ahead) < 1e-3
+
+
+def test_creep_that_amplifies_its_own_errors_is_bounded():
+    """A gain of nearly 1 through the lag, and coefficients that round the same way, by half a unit each."""
+    near = f(-0.97 / 12000.0)
+    weight = 0.51 * float(near) + 0.49 * float(np.nextafter(near, f(0.0)))
+    law_ = law(direct=11999.99955, creep=((weight, 1e-3),))
+    system = lti.StateSpace(np.zeros((0, 0)), np.zeros((0, 1)), np.zeros((2, 0)), np.array([[0.0], [1.0]]))
+    ahead, wrong = held(one_axis(system, inverse=law_), np.full((1200, 1), 1e-4))
+    assert np.all(wrong <= ahead)
+    assert np.max(ahead) < 300.0 * np.max(wrong)
+    assert np.max(wrong) > 1e-4
+
+
+def test_a_small_difference_of_large_readings_is_bounded():
+    of = one_axis(lti.StateSpace(np.zeros((0, 0)), np.zeros((0, 2)), np.zeros((1, 0)), np.array([[3000.0, -2999.9]])))
+    reading = 1e-2 * np.sin(np.arange(800.0))[:, None]
+    ahead, wrong = held(of, np.hstack([reading, reading]))
+    assert np.all(wrong <= ahead)
+    assert np.max(wrong) > 1e-7
+    assert np.max(ahead) < 30.0 * np.max(wrong)
+
+
+def test_the_bound_holds_where_commands_are_clipped():
+    of = one_axis(integral(), windup=0.09, limit_v=1.0, resolution_v=1e-3)
+    inputs = 3.5e-4 * np.sin(2 * np.pi * np.arange(300) / 30.0)[:, None]
+    form, found = sections(of), double_run.run(of, sections(of), inputs)
+    assert 20 < np.count_nonzero(found.excess) < 100
+    ahead, wrong = held(of, inputs)
+    assert np.all(wrong <= ahead)
+    assert np.max(wrong) > 0.0
+    assert np.max(ahead) < 1e-2
+    bound, commands = rounding.rounding_bound(of, form, vectors_of(inputs)), single_run(of, form, inputs)[1]
+    in_double = np.floor(np.clip(found.free, -1.0, 1.0) / 1e-3 + 0.5) * 1e-3
+    assert np.max(np.abs(commands - in_double)) <= bound.command_v < 0.02
+    assert "not bounded" not in bound.words
+
+
+def test_errors_that_may_feed_themselves_are_bounded_by_the_limits_alone():
+    of = one_axis(integral(), windup=1.5, limit_v=1.0)
+    inputs = np.full((400, 1), 8e-4)
+    assert np.max(np.abs(double_run.run(of, sections(of), inputs).free)) < 10.0
+    bound = rounding.rounding_bound(of, sections(of), vectors_of(inputs))
+    assert bound.command_v == 2.0
+    assert "not bounded" in bound.words
+    calm = rounding.rounding_bound(of, sections(of), vectors_of(inputs * 1e-3))
+    assert calm.command_v < 1e-5
+    assert "not bounded" not in calm.words
+
+
+def test_neighbouring_counts_are_a_count_apart():
+    of = one_axis(integral(), limit_v=6.0, resolution_v=1e-3)
+    little = 4.0 * rounding.UNIT * 6.0
+    found = rounding.behind_converter(of, np.array([1e-9, 0.9e-3, 1.1e-3, math.inf]))
+    assert found == pytest.approx([1e-3 + little, 1e-3 + little, 2e-3 + little, 12.0], rel=1e-12)
+    without = rounding.behind_converter(replace(of, resolution_v=0.0), np.array([1e-9]))
+    assert without == pytest.approx([1e-9 + little], rel=1e-12)
+
+
+def test_impulse_responses_by_doubling_are_the_powers():
+    A = np.array([[0.9, 0.2], [-0.1, 0.8]])
+    row = np.array([1.0, -2.0])
+    found = rounding.responses(row, A, 37)
+    assert found.shape == (37, 2)
+    assert found == pytest.approx(np.array([row @ np.linalg.matrix_power(A, j) for j in range(37)]), rel=1e-12)

@@ -1,0 +1,481 @@
+"""Sections of exported controllers against plain recursions of the matrices they come from, and names in C."""
+
+import math
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from microrad import lti
+from microrad.export import choice
+from microrad.export.block_diagonal import block_diagonal
+from microrad.export.identifiers import LONGEST, identifier, suggested
+from microrad.export.modes import minimal
+from microrad.export.records import ExportError, FlightController, Origin, Signal
+from microrad.export.sections import MODAL, TRIANGULAR, sections
+from microrad.missionfile import load_mission
+from shipped import SHIPPED
+
+PERIOD = 1e-3
+RECORDED, LONG = 2000, 100_000
+WIDE = np.finfo(np.longdouble).eps < 1e-18  # the form is refined at a precision that some machines do not have
+FLYING = ("PI + inverse", "PI + inverse in series", "LQG", "disturbance observer", "PID")
+
+
+# ------------------------------------------------------------------------------------------------ systems and replays
+def controller(A, B, C, D=None, L=None, period_s=PERIOD):
+    """A controller of these matrices: one input signal and as many actuators as L has columns."""
+    A = np.array(A, dtype=float)
+    B, C = (np.array(each, dtype=float) for each in (B, C))
+    B, C = (B, C) if A.size == 0 else (B.reshape(len(A), -1), C.reshape(-1, len(A)))
+    D = np.zeros((len(C), B.shape[1])) if D is None else np.array(D, dtype=float)
+    L = np.zeros((len(A), 1)) if L is None else np.array(L, dtype=float).reshape(len(A), -1)
+    return FlightController(
+        name="tried",
+        origin=Origin("by hand", "0" * 64, "none"),
+        period_s=period_s,
+        inputs=(Signal("reading_rad", B.shape[1], "rad", "what is read", 1.0),),
+        actuators=L.shape[1],
+        system=lti.StateSpace(A, B, C, D),
+        anti_windup=L,
+        inverse=None,
+        minimum_v=-1.0,
+        maximum_v=1.0,
+        resolution_v=0.0,
+        bias_v=0.0,
+        margins=(),
+    )
+
+
+def replay(system, windup, inputs, limit, first=0):
+    """The plain recursion of dense matrices: the outputs. From the ``first`` on, one by actuator is clipped, and what
+    that takes off goes to the states (with an inverse in series the command itself is made of the target behind it)."""
+    commands, x = slice(first, first + windup.shape[1]), np.zeros(system.order)
+    drive, direct, outputs = inputs @ system.B.T, inputs @ system.D.T, np.empty((len(inputs), len(system.D)))
+    for k in range(len(inputs)):
+        outputs[k] = y = system.C @ x + direct[k]
+        v = y[commands]
+        x = system.A @ x + drive[k] + windup @ (np.minimum(np.maximum(v, -limit), limit) - v)
+    return outputs
+
+
+def by_sections(form, inputs, limit, first=0):
+    """The same as the code does it: the state's own term, its neighbour's, and the rows of the rest."""
+    n, commands = form.diagonal.size, slice(first, first + form.L.shape[1])
+    neighbour = np.minimum(np.arange(n) ^ 1, max(n - 1, 0))
+    start, column, value = form.rest.start.astype(int), form.rest.column.astype(int), form.rest.value
+    row = np.repeat(np.arange(n), np.diff(start))
+    x, outputs = np.zeros(n), np.empty((len(inputs), len(form.D)))
+    drive, direct = inputs @ form.B.T, inputs @ form.D.T
+    for k in range(len(inputs)):
+        outputs[k] = y = form.C @ x + direct[k]
+        v = y[commands]
+        clipped = np.minimum(np.maximum(v, -limit), limit) - v
+        after = form.diagonal * x + form.coupling * x[neighbour] + drive[k] + form.L @ clipped
+        if value.size:
+            after += np.bincount(row, value * x[column], n)
+        x = after
+    return outputs
+
+
+def difference(of, inputs, share=math.inf, form=None):
+    """Largest difference of the sections from the original, by output over its peak, and how many commands it clipped:
+    those beyond this share of the peak that they come to in the beginning, without a limit."""
+    form = sections(of) if form is None else form
+    free = np.max(np.abs(replay(of.system, of.anti_windup, inputs[:2000], math.inf)), axis=0)
+    first = 0 if free[0] > 0.0 else of.actuators
+    limit = share * free[first]
+    wanted = replay(of.system, of.anti_windup, inputs, limit, first)
+    apart = np.max(np.abs(by_sections(form, inputs, limit, first) - wanted), axis=0)
+    peak = np.max(np.abs(wanted), axis=0)
+    assert not np.any(apart[peak == 0.0])
+    clipped = np.count_nonzero(np.abs(wanted[:, first : first + of.actuators]) > limit)
+    return float(np.max(apart[peak > 0.0] / peak[peak > 0.0])), clipped
+
+
+def noise(of, samples, seed=1):
+    return np.random.default_rng(seed).normal(size=(samples, of.system.B.shape[1]))
+
+
+def rotation(turn, radius=1.0):
+    c, s = radius * math.cos(turn), radius * math.sin(turn)
+    return [[c, s], [-s, c]]
+
+
+def mixed(diagonal, seed=2):
+    """A matrix with these eigenvalues and all its entries filled: similar by a random orthogonal matrix."""
+    Q = np.linalg.qr(np.random.default_rng(seed).normal(size=(len(diagonal),) * 2))[0]
+    return Q @ np.diag(diagonal) @ Q.T
+
+
+TURN = 0.3
+SYSTEMS = {
+    "gain": controller(np.zeros((0, 0)), np.zeros((0, 2)), np.zeros((1, 0)), [[2.0, -1.0]]),
+    "integrator": controller([[1.0]], [0.01], [1.0], [[0.5]], [0.02]),
+    "double pole": controller([[0.5, 1.0], [0.0, 0.5]], [0.0, 1.0], [1.0, 0.0], L=[1.0, 0.5]),
+    "double pole, companion": controller([[1.2, -0.36], [1.0, 0.0]], [1.0, 0.0], [1.0, 0.0], L=[0.2, 0.1]),
+    "triple pole": controller(np.eye(3) * 0.9 + np.eye(3, k=1), [0, 0, 1], [1, 0, 0], L=[0.001, 0.001, 0.001]),
+    "delays": controller(np.eye(5, k=-1), np.eye(5)[0], [0, 0, 0.5, 0, 1], [[0.25]], 0.1 * np.eye(5)[0]),
+    "undamped oscillator": controller(rotation(TURN), [1.0, 0.0], [0.01, 0.02], L=[0.05, 0.0]),
+    "two integrators": controller(np.eye(2), 0.1 * np.eye(2), np.eye(2), L=0.2 * np.eye(2)),
+    "two integrators, mixed": controller(mixed([1, 1, 0.5]), [[1, 0], [2, 1], [-1, 3]], np.eye(3)[:2]),
+    "by anti-windup alone": controller(np.diag([0.5, 0.7]), [1, 0], [1, 0.5], [[0.3]], [0, 0.4]),
+    "odd": controller(np.diag([0.3, 0.2, 0.1]) + np.diag([1, 1], -1), [1, 0, 0], [0, 0, 1], L=[0.1, 0, 0]),
+    "integrator behind a filter": controller([[1, 0.3], [0, 0.9]], [0, 1], [0.02, 0], L=[0.01, 0]),
+    "slow beside an integrator": controller([[1, 0.3], [0, 0.99999]], [0, 0.01], [0.001, 0.2], L=[0.1, 0]),
+}
+
+
+# -------------------------------------------------------------------------------------------------- systems by hand
+@pytest.mark.parametrize("name", SYSTEMS)
+def test_sections_replay_their_system(name):
+    of = SYSTEMS[name]
+    inputs = noise(of, 3000)
+    free, never = difference(of, inputs)
+    clipped, often = difference(of, inputs, 0.3)
+    assert 0.0 <= free < 2e-13 and never == 0
+    assert 0.0 <= clipped < 2e-13 and often > 50
+
+
+@pytest.mark.parametrize("name", SYSTEMS)
+def test_sections_keep_the_frequency_response(name):
+    of = SYSTEMS[name]
+    freq = np.geomspace(1.0, 490.0, 60)
+    wanted = lti.frequency_response(of.system, freq, PERIOD)
+    got = lti.frequency_response(sections(of).system, freq, PERIOD)
+    assert_allclose(got, wanted, rtol=1e-11, atol=1e-12 * np.max(np.abs(wanted)))
+    assert np.max(np.abs(wanted)) > 0.1
+
+
+def test_blocks_are_as_small_as_the_poles_allow():
+    forms = {name: sections(of) for name, of in SYSTEMS.items()}
+    found = {name: (form.form, tuple(size for _, size in form.blocks)) for name, form in forms.items()}
+    assert found == {
+        "gain": (MODAL, ()),
+        "integrator": (MODAL, (1,)),
+        "double pole": (MODAL, (2,)),
+        "double pole, companion": (MODAL, (2,)),
+        "triple pole": (TRIANGULAR, (3,)),
+        "delays": (TRIANGULAR, (5,)),
+        "undamped oscillator": (MODAL, (2,)),
+        "two integrators": (MODAL, (1, 1)),
+        "two integrators, mixed": (MODAL, (1, 1, 1)),
+        "by anti-windup alone": (MODAL, (1, 1)),
+        "odd": (TRIANGULAR, (3,)),
+        "integrator behind a filter": (MODAL, (1, 1)),
+        "slow beside an integrator": (MODAL, (2,)),
+    }
+    assert all(np.sum([size for _, size in form.blocks]) == form.order for form in forms.values())
+
+
+def test_integrators_and_delays_keep_poles_of_exactly_one_and_zero():
+    assert sections(SYSTEMS["integrator"]).diagonal.tolist() == [1.0]
+    assert sections(SYSTEMS["integrator behind a filter"]).diagonal.tolist() == [1.0, 0.9]
+    assert sections(SYSTEMS["slow beside an integrator"]).diagonal.tolist() == [0.99999, 1.0]
+    assert sections(SYSTEMS["delays"]).diagonal.tolist() == [0.0] * 5
+    filled = sections(SYSTEMS["two integrators, mixed"]).diagonal  # rounding of its entries is all that is left
+    assert_allclose(filled, [0.5, 1.0, 1.0], rtol=0.0, atol=1e-15)
+    assert np.any(filled != [0.5, 1.0, 1.0])
+
+
+def test_delays_between_filters_keep_poles_of_exactly_zero():
+    """A Schur form of the whole would spread the six zeros over a circle of the sixth root of rounding."""
+    A = np.diag([0.0, 0.5, 0.3, 0.7, 1.1, 0.9, 0.6, 0.4, 0.0], -1)
+    A[:2, :2], A[8:, 8:] = rotation(0.7, 0.9), rotation(0.4, 0.8)
+    order = np.random.default_rng(4).permutation(10)
+    form = sections(controller(A[np.ix_(order, order)], np.eye(10)[0][order], np.eye(10)[9][order]))
+    assert [size for _, size in form.blocks] == [2, 2, 6]
+    assert form.diagonal[4:].tolist() == [0.0] * 6 and np.min(np.abs(form.diagonal[:4])) > 0.6
+    assert np.max(np.abs(np.linalg.eigvals(form.A[4:, 4:]))) == 0.0
+
+
+@pytest.mark.skipif(not WIDE, reason="this machine has no extended precision")
+def test_the_blocks_are_those_of_the_matrix_far_below_its_rounding():
+    A = mixed([0.9, 0.5, 0.2, -0.4]) + 0.3 * np.eye(4, k=2)
+    found = block_diagonal(A, np.ones((1, 4)), 100.0)
+    left = float(np.max(np.abs(found.basis @ found.blocks @ found.inverse - A)))
+    assert len(found.sizes) > 1
+    assert 0.0 < left < 5e-18 < np.finfo(float).eps
+
+
+def test_a_complex_pair_turns_in_a_rotation():
+    Q, A = np.linalg.qr(np.random.default_rng(3).normal(size=(4, 4)))[0], np.diag([0.0, 0.0, 0.5, -0.4])
+    A[:2, :2] = rotation(0.7, 0.9)
+    of = controller(Q @ A @ Q.T, np.arange(1.0, 5.0), [1.0, -1.0, 0.5, 2.0])
+    form, poles = sections(of), np.linalg.eigvals(of.system.A)
+    pairs = [at for at, size in form.blocks if size == 2]
+    assert pairs == [0] and np.count_nonzero(poles.imag > 0.0) == 1
+    for at in pairs:
+        assert form.diagonal[at] == form.diagonal[at + 1]
+        assert form.coupling[at] == -form.coupling[at + 1] != 0.0
+    assert_allclose(np.sort_complex(np.linalg.eigvals(form.A)), np.sort_complex(poles), rtol=1e-12)
+
+
+def test_the_dense_matrix_is_block_diagonal_and_has_the_poles():
+    of = SYSTEMS["triple pole"]
+    form = sections(
+        controller(
+            np.block([[of.system.A, np.zeros((3, 2))], [np.zeros((2, 3)), np.array(rotation(1.0, 0.8))]]),
+            np.ones((5, 1)),
+            np.ones((1, 5)),
+        )
+    )
+    assert [size for _, size in form.blocks] == [2, 3] and form.coupling[4] == 0.0 and form.rest.value.size > 0
+    inside = np.zeros((5, 5), dtype=bool)
+    for at, size in form.blocks:
+        inside[at : at + size, at : at + size] = True
+    assert np.any(form.A[inside]) and not np.any(form.A[~inside])
+    wanted = [0.9, 0.9, 0.9, 0.8 * np.exp(1j), 0.8 * np.exp(-1j)]
+    assert_allclose(np.sort_complex(np.linalg.eigvals(form.A)), np.sort_complex(wanted), rtol=1e-12)
+
+
+def test_states_of_any_units_come_out_alike():
+    of = SYSTEMS["two integrators, mixed"]
+    units = np.array([2.0**-40, 1.0, 2.0**40])
+    s = of.system
+    scaled = replace(
+        of,
+        system=lti.StateSpace(s.A * units[:, None] / units, s.B * units[:, None], s.C / units, s.D),
+        anti_windup=of.anti_windup * units[:, None],
+    )
+    form = sections(scaled)
+    assert np.max(np.abs(scaled.system.A)) > 1e20 and 0.9 < np.max(np.abs(form.A)) < 2.0
+    assert 0.01 < np.min(np.max(np.abs(form.B), axis=1)) < np.max(np.abs(form.B)) < 2.0
+    assert difference(of, noise(of, 2000), form=form)[0] < 1e-12
+
+
+def test_a_mode_that_a_zero_cancels_drives_nothing_however_large_it_grows():
+    """Its eigenvector stands first; last, each rounding of its coefficients would reach the output a millionfold."""
+    A = np.array([[1.0, -9.76e-4, 1.36e-3], [0.0, 0.99996, -2.36e-2], [0.0, 0.0, 0.9999]])
+    C = np.array([[1.0, -9.76e-4 / 4e-5, 0.3]])  # C (9.76e-4 / -4e-5, -1, 0) = 0 but for rounding
+    C[0, 1] = -C[0, 0] * (A[0, 1] / (A[1, 1] - 1.0))
+    found = block_diagonal(A, C, 100.0)
+    first = found.blocks.astype(float)[0, 0], np.abs((C @ found.basis).astype(float))[0]
+    assert found.sizes == (3,) and first[0] == pytest.approx(0.99996, abs=1e-9)
+    assert first[1][0] < 1e-13 and np.min(first[1][1:]) > 1e-2
+    assert not np.any(np.tril(found.blocks.astype(float), -1)) and np.any(np.triu(found.blocks.astype(float), 1))
+    error = found.basis @ found.blocks @ found.inverse - A
+    assert 0.0 <= float(np.max(np.abs(error))) < (1e-17 if WIDE else 1e-12)
+
+
+# ------------------------------------------------------------------------------------------------------------ refusals
+REFUSED = {
+    "unstable": (controller([[1.01]], [1], [1]), ["unstable", r"\|z\| = 1\.01 at 0 Hz", "lower the gains"]),
+    "unstable pair": (
+        controller(rotation(math.pi / 5, 1.001), [1, 0], [1, 0]),
+        ["unstable", r"\|z\| = 1\.001 at 100 Hz"],
+    ),
+    "double integrator": (
+        controller([[1, 1], [0, 1]], [0, 1], [1, 0]),
+        ["repeated pole on the unit circle", r"\|z\| = 1 at 0 Hz", "keep one integrator"],
+    ),
+    "double integrator, companion": (
+        controller([[2, -1], [1, 0]], [1, 0], [1, 0]),
+        ["repeated pole on the unit circle", r"\|z\| = 1 at 0 Hz"],
+    ),
+    "unobservable": (
+        controller(np.diag([0.5, 0.7]), [1, 1], [1, 0], L=[0.3, 0.1]),
+        ["not minimal", r"no output shows its mode with \|z\| = 0\.7 at 0 Hz", "minimal realisation"],
+    ),
+    "uncontrollable": (
+        controller(np.diag([0.5, -0.7]), [1, 0], [1, 1]),
+        ["not minimal", r"no input and no anti-windup drives its mode with \|z\| = 0\.7 at 500 Hz"],
+    ),
+    "uncontrollable, mixed": (
+        controller(mixed([0.9, 0.6, 0.3]), mixed([0.9, 0.6, 0.3]) @ mixed([1.0, 0.0, 0.5]), np.eye(3)),
+        ["not minimal", r"no input .* \|z\| = 0\.6 at 0 Hz"],
+    ),
+    "equal integrators driven alike": (
+        controller(np.eye(2), [1, 1], np.eye(2)),
+        ["not minimal", r"no input .* \|z\| = 1 at 0 Hz"],
+    ),
+    "a delay behind the last output": (
+        controller(np.eye(3, k=-1), [1, 0, 0], [0, 1, 0]),
+        ["not minimal", r"no output shows its mode with \|z\| = 0 at 0 Hz"],
+    ),
+}
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_what_cannot_fly_is_refused_with_the_reason(name):
+    of, words = REFUSED[name]
+    with pytest.raises(ExportError) as caught:
+        sections(of)
+    assert "'tried'" in str(caught.value)
+    for each in words:
+        assert re.search(each, str(caught.value)), (each, str(caught.value))
+
+
+@pytest.mark.parametrize(
+    ("matrix", "named"), [("A", "A"), ("B", "B"), ("C", "C"), ("D", "D"), ("L", "anti-windup gain L")]
+)
+def test_numbers_that_are_not_finite_are_refused_by_their_place(matrix, named):
+    good = controller([[0.5, 0.1], [0.0, 0.2]], [1, 1], [1, 1], [[1.0]], [1, 1])
+    value = np.array(good.anti_windup if matrix == "L" else getattr(good.system, matrix))
+    value[0, -1] = math.nan
+    bad = (
+        replace(good, anti_windup=value)
+        if matrix == "L"
+        else replace(good, system=replace(good.system, **{matrix: value}))
+    )
+    assert sections(good).order == 2
+    for of_it in (sections, minimal):
+        with pytest.raises(ExportError, match=rf"{named} is nan in row 0, column {value.shape[1] - 1} .*not finite"):
+            of_it(bad)
+
+
+def test_poles_on_the_circle_pass_up_to_rounding():
+    assert sections(controller([[1.0 + 5e-10]], [1], [1])).diagonal[0] > 1.0
+    with pytest.raises(ExportError, match="unstable"):
+        sections(controller([[1.0 + 2e-9]], [1], [1]))
+
+
+# ------------------------------------------------------------------------------------------------------- minimal forms
+def test_a_minimal_controller_is_left_as_it_is():
+    of = SYSTEMS["odd"]
+    assert minimal(of) is of and sections(of).order == 3
+
+
+@pytest.mark.parametrize(
+    ("name", "left"),
+    [("unobservable", 1), ("uncontrollable", 1), ("uncontrollable, mixed", 2), ("a delay behind the last output", 2)],
+)
+def test_hidden_modes_are_taken_out_without_a_trace(name, left):
+    of = REFUSED[name][0]
+    less = minimal(of)
+    inputs = noise(of, 500)
+    wanted = replay(of.system, of.anti_windup, inputs, 0.5)
+    got = replay(less.system, less.anti_windup, inputs, 0.5)
+    assert (of.system.order, less.system.order, sections(less).order) == (len(of.system.A), left, left)
+    assert_allclose(got, wanted, rtol=0.0, atol=1e-14 * np.max(np.abs(wanted)))
+    assert np.max(np.abs(wanted)) > 0.1
+
+
+def test_everything_hidden_leaves_a_gain():
+    less = minimal(controller(np.diag([0.5, 0.7]), [1, 1], [0, 0], [[3.0]]))
+    assert less.system.order == 0 and less.anti_windup.shape == (0, 1)
+    assert_array_equal(sections(less).D, [[3.0]])
+
+
+# -------------------------------------------------------------------------------------------- controllers of a mission
+@pytest.fixture(scope="module")
+def flying():
+    """The mission's controllers as they fly, with a recorded run: (as designed, minimal, its sections, inputs)."""
+    file, made = load_mission(SHIPPED), {}
+    for name in FLYING:
+        assert name in choice.names(file)
+        chosen = choice.choose(file, name)
+        of = choice.trimmed(choice._whole_controller(chosen))  # before `flight_controller` makes it minimal
+        less = choice.flight_controller(chosen)
+        made[name] = of, less, sections(less), choice.vectors(chosen, RECORDED).inputs
+    return made
+
+
+@pytest.mark.parametrize("name", FLYING)
+def test_a_mission_s_controllers_replay_their_recorded_run(flying, name):
+    of, _, form, inputs = flying[name]
+    free, never = difference(of, inputs, form=form)
+    clipped, often = difference(of, inputs, 0.5, form)
+    # In the observer's matrices a zero misses a pole by rounding; the mode that this hides adds 2e-12 to the output.
+    limit = (2e-12 if name == "disturbance observer" else 1e-13) if WIDE else 1e-9
+    assert 0.0 <= free < limit and never == 0
+    assert 0.0 <= clipped < limit and often > 20
+
+
+@pytest.mark.parametrize("name", ["PI + inverse in series", "LQG", "disturbance observer"])
+def test_a_mission_s_controllers_replay_a_long_random_run(flying, name):
+    of, _, form, recorded = flying[name]
+    found, often = difference(of, noise(of, LONG) * np.std(recorded, axis=0), 0.5, form)
+    # Against extended precision the observer's own matrices lose 4e-11, its sections 2e-11.
+    limit = (1e-10 if name == "disturbance observer" else 2e-13) if WIDE else 1e-8
+    assert 0.0 <= found < limit and often > 100
+
+
+@pytest.mark.parametrize("name", FLYING)
+def test_a_mission_s_controllers_keep_their_frequency_response(flying, name):
+    of, _, form, _ = flying[name]
+    freq = np.geomspace(1.0, 0.45 / of.period_s, 80)
+    wanted = lti.frequency_response(of.system, freq, of.period_s)
+    got = lti.frequency_response(form.system, freq, of.period_s)
+    for i, j in np.argwhere(np.max(np.abs(wanted), axis=0) > 0.0):
+        assert_allclose(got[:, i, j], wanted[:, i, j], rtol=1e-8, atol=1e-9 * np.max(np.abs(wanted[:, i, j])))
+
+
+def test_a_mission_s_controllers_come_in_blocks_of_one_and_two(flying):
+    orders = {name: (of.system.order, form.order) for name, (of, _, form, _) in flying.items()}
+    assert all(less.system.order == form.order for _, less, form, _ in flying.values())
+    assert {form.form for _, _, form, _ in flying.values()} == {MODAL}
+    assert orders == {
+        "PI + inverse": (6, 6),
+        "PI + inverse in series": (6, 6),
+        "LQG": (28, 22),
+        "disturbance observer": (24, 18),
+        "PID": (1, 1),
+    }
+    for name in ("LQG", "disturbance observer"):
+        with pytest.raises(ExportError, match="not minimal"):
+            sections(flying[name][0])
+    conditions = [form.condition for _, _, form, _ in flying.values()]
+    assert 1.0 <= min(conditions) <= max(conditions) < 100.0
+
+
+# --------------------------------------------------------------------------------------------------------------- names
+@pytest.mark.parametrize("name", ["pi", "PI_inverse_2", "a", "x" * LONGEST, "sine", "step", "state"])
+def test_names_that_code_can_bear_come_back(name):
+    assert identifier(name) == name
+
+
+@pytest.mark.parametrize(
+    ("name", "why"),
+    [
+        ("", "begins with a letter"),
+        ("2axis", "begins with a letter"),
+        ("PI + inverse", "begins with a letter"),
+        ("Regler_\u00e4", "begins with a letter"),
+        ("name\n", "begins with a letter"),
+        ("_hidden", "begin with an underscore"),
+        ("__x", "begin with an underscore"),
+        ("a__b", "two underscores"),
+        ("x" * (LONGEST + 1), f"{LONGEST + 1} characters"),
+        ("double", "keyword"),
+        ("restrict", "keyword"),
+        ("class", "keyword"),
+        ("sin", "C library"),
+        ("fabsf", "C library"),
+        ("hypotl", "C library"),
+        ("memcpy", "C library"),
+        ("strtod", "C library"),
+        ("printf", "C library"),
+        ("main", "entry point"),
+        ("uint32_t", "end in _t"),
+        ("loop_t", "end in _t"),
+    ],
+)
+def test_other_names_are_refused_with_the_reason_and_an_example(name, why):
+    with pytest.raises(ExportError, match=re.escape(why)) as caught:
+        identifier(name)
+    example = re.search(r"take for example '(\w+)'", str(caught.value))[1]
+    assert repr(name) in str(caught.value) and identifier(example) == example != name
+
+
+@pytest.mark.parametrize(
+    ("text", "name"),
+    [
+        ("PI + inverse in series", "pi_inverse_in_series"),
+        ("PI, best of a gain grid", "pi_best_of_a_gain_grid"),
+        ("LQG", "lqg"),
+        ("2-axis PID", "c_2_axis_pid"),
+        ("R\u00e9gulateur", "regulateur"),
+        ("double", "double_code"),
+        ("sin", "sin_code"),
+        ("speed_t", "speed_t_code"),
+        ("", "controller"),
+        ("\u2014", "controller"),
+        ("disturbance observer with a very long name indeed", "disturbance_observer_with"),
+        ("y" * 60, "y" * 26),
+    ],
+)
+def test_suggested_names_resemble_the_text_and_can_be_borne(text, name):
+    assert suggested(text) == name == identifier(name)

@@ -1,0 +1,330 @@
+"""Linear mirrors of other tools become mirror files that answer as they did, or are refused with the reason."""
+
+import hashlib
+import math
+import pickle
+import struct
+import sys
+from dataclasses import replace
+from types import SimpleNamespace
+
+import control as python_control
+import numpy as np
+import pytest
+from scipy.io import loadmat, savemat
+from scipy.sparse import csc_array
+
+from microrad import lti, mirror
+from microrad.export import linear_import, matrices
+from microrad.export.linear_import import Given, import_control, import_mat
+from microrad.export.records import ExportError
+from microrad.missionfile import load_mirror, load_mission
+from shipped import SHIPPED
+
+NINE_DIGITS = 1e-9
+GIVEN = Given("Our mirror", 2.5e-3, 3770.0, 6.0, 0.0, 12.0, 1.0, 5000.0, 2.0, "rad")
+POLES = [-300.0, complex(-40.0, 5000.0), complex(-40.0, -5000.0)]
+ZEROS = [complex(-30.0, 6000.0), complex(-30.0, -6000.0)]
+GAIN = 2e-5
+
+
+@pytest.fixture(scope="module")
+def models():
+    return matrices.models(load_mission(SHIPPED))
+
+
+def answer(folder, text, freq_hz):
+    """Frequency response (rad/V) of what a mirror file says, read as a user's file is."""
+    path = folder / "mirror.toml"
+    path.write_text(text, encoding="utf-8")
+    m = load_mirror(path).mirror
+    made = mirror.from_mission(m, mirror.hysteresis_model(m, m.rate_limit_v_s, m.bias_v))
+    return lti.frequency_response(made.linear_loop, freq_hz)[:, 0, 0]
+
+
+def by_roots(freq_hz, zeros=ZEROS, poles=POLES, gain=GAIN):
+    s = 2j * np.pi * freq_hz
+    up, down = (np.prod(s[:, None] - np.array(each).reshape(1, -1), axis=1) for each in (zeros, poles))
+    return gain * up / down
+
+
+def difference(found, wanted):
+    return np.max(np.abs(found / wanted - 1.0))
+
+
+BAND = np.geomspace(0.01, 1e5, 300)
+STATES = lti.StateSpace(
+    np.array([[-300.0, 0, 0], [0, -40.0, 5000.0], [0, -5000.0, -40.0]]),
+    np.array([[1.0], [1.0], [0.0]]),
+    np.array([[2e-2, 1e-3, 2e-2]]),
+    np.zeros((1, 1)),
+)
+SHAPES = {
+    "states": {key: getattr(STATES, key) for key in "ABCD"},
+    "roots": {"z": np.array(ZEROS)[:, None], "p": np.array(POLES)[:, None], "k": GAIN},
+    "coefficients": {"num": np.poly(ZEROS).real * GAIN, "den": np.poly(POLES).real},
+}
+cell = np.empty((1, 1), dtype=object)
+cell[0, 0] = np.array(POLES)[:, None]
+other = np.empty((1, 1), dtype=object)
+other[0, 0] = np.array(ZEROS)[:, None]
+SHAPES["cells"] = {"z": other, "p": cell, "k": GAIN}
+
+
+def save(folder, **variables):
+    path = folder / "model.mat"
+    savemat(path, variables)
+    return path
+
+
+# ----------------------------------------------------------------------------------------------------------- round trip
+def test_mirror_of_the_mission_through_mat_and_mirror_file(models, tmp_path):
+    matrices.write_mat(models, tmp_path / "models.mat")
+    found = answer(tmp_path, import_mat(tmp_path / "models.mat", GIVEN, "mirror"), BAND)
+    whole = models[1].system
+    assert difference(found, lti.frequency_response(whole, BAND)[:, 0, 0]) < NINE_DIGITS
+    part = lti.frequency_response(models[0].system, BAND)[:, 0, 0]
+    assert difference(found / found[0], part / part[0]) < NINE_DIGITS
+    assert abs(found[0]) > 0.0 and difference(found, part) > 0.1  # rad/V is no ratio
+
+
+def test_mirror_of_the_mission_through_python_control(models, tmp_path):
+    text = import_control(matrices.to_control(models[1]), GIVEN, "our export")
+    wanted = lti.frequency_response(models[1].system, BAND)[:, 0, 0]
+    assert difference(answer(tmp_path, text, BAND), wanted) < NINE_DIGITS
+    assert "imported from our export" in text
+
+
+@pytest.mark.parametrize("where", ["variables", "structure", "sampled at 0"])
+@pytest.mark.parametrize("shape", list(SHAPES))
+def test_every_form_gives_its_own_response(shape, where, tmp_path):
+    fields = dict(SHAPES[shape])
+    if where == "sampled at 0":
+        fields["Ts"] = 0.0
+    path = save(tmp_path, s=fields) if where == "structure" else save(tmp_path, **fields)
+    found = answer(tmp_path, import_mat(path, GIVEN), BAND)
+    wanted = lti.frequency_response(STATES, BAND)[:, 0, 0] if shape == "states" else by_roots(BAND)
+    assert difference(found, wanted) < NINE_DIGITS
+
+
+def test_transfer_function_of_python_control(tmp_path):
+    system = python_control.tf(np.poly(ZEROS).real * GAIN, np.poly(POLES).real)
+    assert difference(answer(tmp_path, import_control(system, GIVEN), BAND), by_roots(BAND)) < NINE_DIGITS
+
+
+@pytest.mark.parametrize(("unit", "scale"), [("rad", 1.0), ("mrad", 1e-3), ("urad", 1e-6)])
+def test_output_counts_in_the_unit_that_is_given(unit, scale, tmp_path):
+    text = import_mat(save(tmp_path, **SHAPES["roots"]), replace(GIVEN, output_unit=unit))
+    assert difference(answer(tmp_path, text, BAND), scale * by_roots(BAND)) < NINE_DIGITS
+    assert f" {unit}/V" in text
+
+
+def test_a_negative_factor_is_no_falling_mirror(tmp_path):
+    """A zero in the right half plane: k is below 0 and the answer to a constant drive above it."""
+    fields = {"z": np.array([[4e4]]), "p": np.array(POLES)[:, None], "k": -3.0}
+    text = import_mat(save(tmp_path, **fields), GIVEN)
+    assert "zero_dampings = [-1.0]" in text
+    assert difference(answer(tmp_path, text, BAND), by_roots(BAND, [4e4], POLES, -3.0)) < NINE_DIGITS
+
+
+def test_what_is_given_stands_in_the_file_and_what_it_came_from(tmp_path):
+    path = save(tmp_path, **SHAPES["roots"])
+    text = import_mat(path, replace(GIVEN, name='A "quoted" name'))
+    (tmp_path / "mirror.toml").write_text(text, encoding="utf-8")
+    found = load_mirror(tmp_path / "mirror.toml")
+    m = found.mirror
+    assert m.name == 'A "quoted" name' and m.travel_rad == 2.5e-3 and m.rate_limit_v_s == 3770.0
+    assert (m.bias_v, m.drive_min_v, m.drive_max_v) == (6.0, 0.0, 12.0)
+    assert (m.linear.excited_from_hz, m.linear.excited_to_hz, m.linear.normalise_at_hz) == (1.0, 5000.0, 2.0)
+    assert m.prandtl_ishlinskii.thresholds_v == (0.0,) and m.bouc_wen is None and m.creep is None
+    assert text.startswith("# Mirror imported from model.mat:") and str(tmp_path) not in text
+    assert hashlib.sha256(path.read_bytes()).hexdigest() in text
+    assert "imported from model.mat" in found.sources["mirror.linear.poles"].comment
+    assert "given on import" in found.sources["mirror.travel"].comment
+
+
+# ------------------------------------------------------------------------------------------------------------- choosing
+def test_one_of_several_systems_is_chosen_by_its_name(tmp_path):
+    first, second = dict(SHAPES["roots"]), {**SHAPES["roots"], "k": 3.0 * GAIN}
+    path = save(tmp_path, first=first, second=second, note="text")
+    with pytest.raises(ExportError, match=r"model\.mat holds 2 systems, 'first', 'second'; choose one by its name"):
+        import_mat(path, GIVEN)
+    assert difference(answer(tmp_path, import_mat(path, GIVEN, "second"), BAND), 3.0 * by_roots(BAND)) < NINE_DIGITS
+    with pytest.raises(ExportError, match="has no system 'third'; it has 'first', 'second'"):
+        import_mat(path, GIVEN, "third")
+
+
+def test_variables_of_their_own_beside_a_structure_go_by_no_name(tmp_path):
+    path = save(tmp_path, **SHAPES["roots"], s={**SHAPES["roots"], "k": 3.0 * GAIN})
+    with pytest.raises(ExportError, match=r"holds 2 systems, '', 's'"):
+        import_mat(path, GIVEN)
+    assert difference(answer(tmp_path, import_mat(path, GIVEN, ""), BAND), by_roots(BAND)) < NINE_DIGITS
+
+
+def test_states_count_where_there_are_several_forms(tmp_path):
+    path = save(tmp_path, **SHAPES["states"], **SHAPES["roots"])
+    wanted = lti.frequency_response(STATES, BAND)[:, 0, 0]
+    assert difference(answer(tmp_path, import_mat(path, GIVEN), BAND), wanted) < NINE_DIGITS
+    assert difference(wanted, by_roots(BAND)) > 0.1
+
+
+def test_linear_part_alone_has_no_drive_in_volts(models, tmp_path):
+    matrices.write_mat(models, tmp_path / "models.mat")
+    with pytest.raises(ExportError, match=r"its input is in rad, and a mirror's drive is in V"):
+        import_mat(tmp_path / "models.mat", GIVEN, "linear_part")
+
+
+# ------------------------------------------------------------------------------------------------------------- refusals
+def roots(poles=POLES, zeros=ZEROS, k=GAIN, **more):
+    column = {key: np.array(each, dtype=complex).reshape(-1, 1) for key, each in (("z", zeros), ("p", poles))}
+    return {**column, "k": k, **more}
+
+
+def states(**changed):
+    return {**SHAPES["states"], **changed}
+
+
+TWO = {"A": -np.eye(2), "B": np.eye(2), "C": np.ones((1, 2)), "D": np.zeros((1, 2))}
+HIDING = {"A": np.diag([-1.0, -20.0]), "B": np.array([[1.0], [0.0]]), "C": np.ones((1, 2)), "D": np.zeros((1, 1))}
+
+
+@pytest.mark.parametrize(
+    ("fields", "why"),
+    [
+        ({"note": "text"}, r"has no linear system; it holds note, and none with A B C D, z p k or num den"),
+        ({"A": np.eye(2)}, r"has no linear system; it holds A"),
+        ({"s": np.array([(1, 2), (3, 4)], dtype=[("num", "O"), ("den", "O")])}, "an array of 2 structures"),
+        (TWO, "2 inputs and 1 outputs; a mirror file has one drive and one angle"),
+        (states(B=np.ones((4, 1))), r"B has shape \(4, 1\), where \(3, 1\) fits"),
+        (states(A=np.ones((3, 2))), r"A has shape \(3, 2\), where \(3, 3\) fits"),
+        (states(A=STATES.A + 1j), "A holds complex numbers"),
+        (states(A=STATES.A * 1e200), "A holds a number that is not finite or beyond 1e\\+100"),
+        (roots(poles=[-1e90, -2e90, -3e90, -4e90, -5e90], zeros=[]), "cannot be divided out"),
+        ({"num": [[1.0]], "den": [[1.0, 1e300]]}, "den holds a number that is not finite or beyond"),
+        (states(A=csc_array(STATES.A)), "A is a sparse matrix"),
+        (states(C="text"), "C is not a matrix of numbers"),
+        (states(C=np.array([[1.0, math.nan, 0.0]])), "C holds a number that is not finite"),
+        (
+            states(A=-np.diag(np.arange(1.0, 62.0)), B=np.ones((61, 1)), C=np.ones((1, 61))),
+            "61 states, and a mirror has",
+        ),
+        (states(D=np.ones((1, 1))), "3 zeros over 3 poles, not strictly proper"),
+        (states(C=np.zeros((1, 3))), "not minimal, it has a mode that no output shows"),
+        (HIDING, r"no input drives: 3\.183 Hz"),
+        (states(Ts=2e-5), r"sampled, Ts = 2e-05 s.*convert it first \(d2c"),
+        (states(Ts=-1.0), "sampled, Ts = -1 s"),
+        (states(Ts=np.zeros((2, 2))), "sampled, Ts = nan s"),
+        (roots(k=np.ones((2, 1))), "k has 2 gains"),
+        (roots(k=math.inf), "k holds a number that is not finite"),
+        (roots(k=0.0), "a gain of 0.0; the mirror does not move"),
+        (roots(poles=[-300.0, -5.0 + 3.0j], zeros=[]), r"p has the complex root -5\+3j without its conjugate"),
+        (roots(poles=[-300.0, -5.0 - 3.0j], zeros=[]), r"p has the complex root -5-3j without its conjugate"),
+        (roots(zeros=[-5.0 + 3.0j, -5.1 - 3.0j]), "z has the complex root"),
+        (roots(zeros=[]) | {"p": np.ones((2, 2))}, r"p has shape \(2, 2\), not a row or a column"),
+        (roots(poles=[300.0, -400.0], zeros=[]), r"unstable, a pole at 47\.75 Hz with a damping ratio of -1"),
+        (roots(poles=[3000.0j, -3000.0j], zeros=[]), r"unstable, a pole at 477\.5 Hz with a damping ratio of -?0"),
+        (roots(poles=[0.0, -300.0], zeros=[]), "an integrator, a pole at 0 Hz"),
+        (roots(poles=[-300.0, -300.0], zeros=[]), r"two poles coincide at 47\.75 Hz"),
+        (roots(poles=[-300.0, -300.0 * (1 + 1e-8)], zeros=[], k=9.0), "differ from the model by .* nearly coincide"),
+        (roots(poles=[-300.0, -600.0], zeros=[-300.0]), r"not minimal, a zero cancels the pole at 47\.75 Hz"),
+        (roots(zeros=[0.0]), "a zero at 0 Hz: the mirror does not hold an angle"),
+        (roots(k=-GAIN), "the output falls as the drive rises"),
+        ({"num": [[1.0, 2.0]], "den": [[1.0, 2.0]]}, "1 zeros over 1 poles, not strictly proper"),
+        ({"num": [[1.0, 2.0, 1.0]], "den": [[1.0, 2.0]]}, "2 zeros over 1 poles, not strictly proper"),
+        ({"num": [[0.0]], "den": [[1.0, 2.0]]}, "the numerator is zero"),
+        ({"num": [[1.0]], "den": [[0.0, 0.0]]}, "the denominator is zero"),
+        ({"num": [[1.0]], "den": np.ones((1, 62))}, "order 61, and a mirror has at most 60"),
+        ({"num": [[1.0]], "den": [[1.0, 2.0, 0.0]]}, "an integrator, a pole at 0 Hz"),
+        ({"num": [[1.0]], "den": [[1.0, 2.0 + 1.0j]]}, "den holds complex numbers"),
+        (
+            {"num": np.array([[0, 0]], dtype=object), "den": np.array([[1, 2]], dtype=object)},
+            "num has cells for 2 entries",
+        ),
+        (
+            roots(zeros=[2j * np.pi * 2.0, -2j * np.pi * 2.0]),
+            r"response at normalise_at \(2 Hz\) is .* cannot be divided",
+        ),
+    ],
+)
+def test_what_is_no_linear_mirror_is_refused(fields, why, tmp_path):
+    with pytest.raises(ExportError, match=why) as error:
+        import_mat(save(tmp_path, **fields), GIVEN)
+    assert "model.mat" in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("change", "why"),
+    [
+        ({"name": "  "}, "the mirror has no name"),
+        ({"travel_rad": math.nan}, "travel_rad = nan is not finite"),
+        ({"output_unit": "deg"}, "output_unit = 'deg' is none of rad, mrad, urad"),
+        ({"travel_rad": -1.0}, r"the mirror file would be refused: travel: .*not above 0"),
+        ({"bias_v": 20.0}, r"would be refused: .*bias is outside drive_min to drive_max"),
+        ({"normalise_at_hz": 0.5}, r"would be refused: linear: .*normalise_at is outside excited_from to excited_to"),
+        ({"name": "x" * 201}, "would be refused: name: "),
+    ],
+)
+def test_what_is_given_wrongly_is_refused(change, why, tmp_path):
+    with pytest.raises(ExportError, match=why):
+        import_mat(save(tmp_path, **SHAPES["roots"]), replace(GIVEN, **change))
+
+
+def element(kind, data):
+    return struct.pack("<II", kind, len(data)) + data + b"\0" * (-len(data) % 8)
+
+
+def test_objects_of_matlab_are_refused_with_what_to_save(tmp_path):
+    """MATLAB saves `ss` as an object of its own, whose format is not published."""
+    parts = ((6, struct.pack("<II", 17, 0)), (1, b"sys"), (1, b"MCOS"), (1, b"ss"))
+    data = element(14, b"".join(element(*part) for part in parts))
+    (tmp_path / "model.mat").write_bytes(b"MATLAB 5.0 MAT-file".ljust(124) + b"\x00\x01IM" + data)
+    with pytest.raises(ExportError, match=r"variable 'sys' is an object of MATLAB.*struct\('A', sys\.A"):
+        import_mat(tmp_path / "model.mat", GIVEN)
+
+
+def test_pickles_are_not_opened(tmp_path):
+    class Trap:
+        def __reduce__(self):
+            return (tmp_path.joinpath("sprung").write_text, ("x",))
+
+    (tmp_path / "model.mat").write_bytes(pickle.dumps(Trap()).ljust(400))
+    with pytest.raises(ExportError, match="no MATLAB file that can be read"):
+        import_mat(tmp_path / "model.mat", GIVEN)
+    assert not (tmp_path / "sprung").exists()
+
+
+@pytest.mark.parametrize(
+    ("system", "why"),
+    [
+        (python_control.ss(-np.eye(2), np.eye(2), np.eye(2), 0), "2 inputs and 2 outputs"),
+        (python_control.tf([1.0], [1.0, -0.5], 0.01), "sampled, Ts = 0.01 s"),
+        (python_control.tf([1.0], [1.0, -0.5], True), "dt = True: continuous, or sampled how fast"),
+        (python_control.tf([1.0, 0.0, 0.0], [1.0, 1.0]), "2 zeros over 1 poles, not strictly proper"),
+        (python_control.tf([1.0], [1.0, -5.0]), "unstable, a pole at 0.7958 Hz"),
+        (python_control.frd([1.0, 2.0], [1.0, 2.0]), "a FrequencyResponseData; give a control.StateSpace or"),
+        (SimpleNamespace(A=1), "a SimpleNamespace; give a control.StateSpace or"),
+    ],
+)
+def test_objects_that_are_no_linear_mirror_are_refused(system, why):
+    with pytest.raises(ExportError, match=f"bench: .*{why}|{why}"):
+        import_control(system, GIVEN, "bench")
+
+
+def test_without_python_control_the_extra_is_named(monkeypatch):
+    monkeypatch.setitem(sys.modules, "control", None)
+    with pytest.raises(ExportError, match=r"pip install 'microrad\[control\]'"):
+        import_control(object(), GIVEN)
+
+
+def test_a_mirror_file_that_says_something_else_is_never_returned(tmp_path, monkeypatch):
+    path = save(tmp_path, **SHAPES["roots"])
+    assert import_mat(path, GIVEN)
+    monkeypatch.setattr(linear_import, "READ_BACK", 1e-18)
+    with pytest.raises(ExportError, match="the mirror file would differ from the model"):
+        import_mat(path, GIVEN)
+
+
+def test_scipy_sees_the_same_file(tmp_path):
+    """The test's own files are what MATLAB would write: structures of one element."""
+    path = save(tmp_path, s=SHAPES["states"])
+    assert loadmat(path)["s"].shape == (1, 1)
