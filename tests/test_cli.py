@@ -33,7 +33,7 @@ COMMANDS = (
     "constellation",
     "presets",
     "design",
-    "identify",
+    "identify", "import",
     "bench",
     "doctor",
     "schema",

@@ -355,6 +355,60 @@ def test_an_obscuration_that_a_reading_leaves_out_is_warned_of(read):
     assert not warned(budget_of(read({"terminals.leo_obscuration": 0.0})), "is not in it")
 
 
+@pytest.mark.parametrize(("name", "end", "other"), [("beacon", "leo", "geo"), ("answer", "geo", "leo")])
+def test_an_obscuration_of_the_terminal_that_sends_a_gaussian_beam_is_warned_of(read, name, end, other):
+    budget = {"beacon": link.beacon_budget, "answer": link.answer_budget}[name]
+
+    def found(*changes):
+        file = read(*changes)
+        return warned(budget(file.mission, file.sources), "is not in it")
+
+    (said,) = found({f"terminals.{end}_obscuration": 0.5})
+    assert said.startswith(f"{name.capitalize()} budget: Beam gain: the obscuration of 0.5 is not in it")
+    assert "transmit_optics_loss" in said
+    assert len(found({f"terminals.{end}_obscuration": 0.5}, PATTERN)) == 1  # that is of the data's beam
+    for hole in ({f"terminals.{other}_obscuration": 0.5}, {f"terminals.{end}_obscuration": 0.0}, {}):
+        assert not found(hole)
+
+
+def test_a_beam_that_is_cut_and_obscured_is_warned_of_both(read):
+    narrow = {"answer.divergence": "25 urad", "answer.pointing_error": "1 urad", "terminals.geo_obscuration": 0.3}
+    file = read(narrow)
+    (said,) = warned(link.answer_budget(file.mission, file.sources), "Beam gain")
+    assert "cuts it: 0." in said
+    assert "wider core; the obscuration of 0.3 is not in it" in said
+
+
+@pytest.mark.parametrize("name", ["beacon", "answer"])
+def test_a_beam_and_an_error_that_are_no_small_angles_are_warned_of(read, name):
+    budget = {"beacon": link.beacon_budget, "answer": link.answer_budget}[name]
+    for milliradians, wide in ((100.1, True), (99.9, False)):
+        file = read({f"{name}.divergence": f"{2 * milliradians} mrad", f"{name}.pointing_error": "1 mrad"})
+        found = warned(budget(file.mission, file.sources), "Beam gain: the half angle of")
+        assert bool(found) == wide
+        assert all("is above 0.1 rad, where small angles end" in each for each in found)
+        file = read({f"{name}.divergence": "190 mrad", f"{name}.pointing_error": f"{milliradians} mrad"})
+        assert bool(warned(budget(file.mission, file.sources), "Pointing loss: the error of")) == wide
+
+
+@pytest.mark.parametrize("how", [{}, PATTERN, {"conventions.pointing_loss": "gain"}], ids=["w", "pattern", "gain"])
+def test_an_error_of_the_data_link_that_is_no_small_angle_is_warned_of_beside_its_depth(read, how):
+    for milliradians, wide in ((100.1, True), (99.9, False)):
+        (said,) = warned(budget_of(read(how), milliradians * 1e-3), "Pointing loss")
+        assert ("the error of 100 mrad is above 0.1 rad, where small angles end; beyond 20 dB" in said) == wide
+        assert "beyond 20 dB" in said
+
+
+@pytest.mark.parametrize("lit", [{}, {**PATTERN, "communication.beam": {"profile": "uniform"}}], ids=["w", "pattern"])
+def test_an_aperture_so_small_that_its_beam_is_no_small_angle_is_warned_of(read, lit):
+    alone = dict.fromkeys(("beacon", "answer", "acquisition"))
+    half = link.communication_beam(read(alone, lit, {"terminals.leo_aperture": "1 cm"}).mission).fall.half_angle_rad
+    for share, wide in ((0.99, True), (1.01, False)):
+        aperture = {"terminals.leo_aperture": f"{share * half / 0.1 * 1e4:.6f} um"}
+        found = warned(budget_of(read(alone, lit, aperture)), "LEO aperture gain: the half angle of")
+        assert bool(found) == wide
+
+
 # ---- solved for
 KINDS = [None, *RECEIVERS]
 

@@ -449,8 +449,10 @@ def test_a_direction_that_is_known_without_error_is_not_scanned(tmp_path):
 
 def test_the_scan_waits_for_the_light_that_the_sensor_needs(tmp_path, monkeypatch, plain):
     monkeypatch.setattr(link_acquisition, "TRADE_RAD", np.array([1e-4]))
-    on_axis = 4.0 * 10**-0.04 * 2 / (math.pi * (20 * URAD * 44e6) ** 2) * math.pi / 4 * 0.15**2
-    edge = on_axis * math.exp(-2)
+    half = math.sqrt(8) * 1.55e-6 / (math.pi * 0.05)  # of diffraction at the aperture, wider than 20 urad
+    on_axis = 4.0 * 10**-0.04 * 2 / (math.pi * (half * 44e6) ** 2) * math.pi / 4 * 0.15**2
+    edge = on_axis * math.exp(-2 * (20 * URAD / half) ** 2)
+    assert plain.finding.scanned.half_angle_rad == pytest.approx(half, rel=1e-12)
     assert plain.finding.scanned.needed_detection_s == pytest.approx(0.01 * (10e-12 / edge) ** 2, rel=1e-9)
     assert plain.finding.scanned.needed_detection_s < plain.finding.scanned.stated_detection_s == 1e-3
     assert "needs" not in links.acquisition_words(plain.finding)[1]
@@ -464,6 +466,21 @@ def test_the_scan_waits_for_the_light_that_the_sensor_needs(tmp_path, monkeypatc
     assert f"needs {quantity(needed, 's')} in place of the 1 ms" in links.acquisition_words(dim)[1]
     data = budget_views.finding_data(dim)
     assert (data["scan_stated_detection_s"], data["scan_needed_detection_s"]) == pytest.approx((1e-3, needed))
+
+
+@pytest.mark.parametrize("used_urad", [1, 27, 28, 60])
+def test_no_beam_of_a_scan_is_brighter_than_its_aperture_makes_it(tmp_path, used_urad):
+    changes = {"acquisition.scan.beam_radius": f"{used_urad} urad", "beacon.required_power": "10 nW"}
+    file = link_file(tmp_path, FEW, changes)
+    m, scan = file.mission, file.mission.acquisition.scan
+    beacon = link.beacon_budget(m, file.sources)
+    beams, receiver = link_acquisition._sender(m, m.beacon, beacon, m.acquisition, scan)
+    most = 4.0 * 10**-0.04 * math.pi / 4 * 0.05**2 / (1.55e-6 * 44e6) ** 2  # P A / (lambda R)^2
+    on_axis = float(beams.irradiance_w_m2(beams.narrow_half_angle_rad, 0.0))
+    assert on_axis == pytest.approx(most if used_urad < 27.9 else most * (27.9098 / used_urad) ** 2, rel=1e-4)
+    assert beams.edge_irradiance_w_m2 < on_axis
+    needed = float(receiver.detection_time_s(receiver.aperture_area_m2 * beams.edge_irradiance_w_m2))
+    assert needed > 0.01 * (10e-9 / (most * receiver.aperture_area_m2)) ** 2
 
 
 @pytest.mark.parametrize("changes", [{"beacon.required_power": "1 mW"}, {"beacon.transmit_optics_loss": "900 dB"}])

@@ -185,6 +185,23 @@ def test_luce_has_its_power_and_the_on_axis_intensity_that_was_measured(tmp_path
     assert budget.irradiance_w_m2 == pytest.approx(350e-9, rel=5e-3)
 
 
+@pytest.mark.parametrize(
+    ("name", "key", "value", "comment"),
+    [
+        ("sentinel1-edrs", "communication.data_rate", "1.8 Gbit/s", "Seel et al."),
+        ("sentinel1-edrs", "communication.distance", "45000 km", "longest range"),
+        ("oicets-artemis", "communication.data_rate", "49.3724 Mbit/s", "usually rounded to 50 Mbit/s"),
+        ("tbird", "jitter.rms", ["35 urad", "35 urad"], "20 to 35 urad rms per axis"),
+        ("click", "communication.data_rate", "20 Mbit/s", "17.7 Mbit/s at 520 km"),
+    ],
+)
+def test_what_is_published_of_a_flown_link_stands_in_its_preset(name, key, value, comment):
+    assert value_of(name, key) == value
+    (line,) = [each for each in statements(preset_text(name)) if each.key == key]
+    assert line.comment.startswith("literature: ")
+    assert comment in line.comment
+
+
 @pytest.mark.parametrize(("name", "width_rad"), [("tbird", 380e-6), ("click", math.radians(14.6 / 3600))])
 def test_beams_published_at_half_of_their_maximum_have_half_of_it_there(tmp_path, name, width_rad):
     loss = [

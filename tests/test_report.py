@@ -5,6 +5,7 @@ import hashlib
 import json
 import math
 import re
+import xml.etree.ElementTree as ET
 from dataclasses import replace
 from html.parser import HTMLParser
 
@@ -83,6 +84,8 @@ def test_each_figure_is_an_svg_with_its_data(written, paper):
         "comparison",
         "claims-scan",
         "tornado",
+        "tornado-beacon",
+        "tornado-answer",
         "wide-beam-or-scan",
         "day-timeline",
         "along-contact",
@@ -102,6 +105,14 @@ def test_each_figure_is_an_svg_with_its_data(written, paper):
             kept = [row[place] for row in rows if row[place]]
             assert len(kept) == np.size(column)
             np.testing.assert_allclose(np.array(kept, dtype=float), column, rtol=1e-8, atol=1e-18)
+
+
+def test_the_map_shows_the_contours_with_their_labels_and_the_band_of_the_readings(written):
+    svg = (written / "figures" / "fig2-margin-map.svg").read_text(encoding="utf-8")
+    words = [each.text for each in ET.fromstring(svg).iter("{http://www.w3.org/2000/svg}text")]
+    for needed in ("0 dB", "3 dB", "3 dB by other readings of the conventions", "budget: 300 Mbit/s at 10 \u00b5rad"):
+        assert words.count(needed) == 1, needed
+    assert "6 dB" not in words  # no other contour has a label
 
 
 def test_results_carry_units_and_the_numbers_of_the_study(written, paper):

@@ -1,5 +1,7 @@
 """What the pages say of the links: rows, sentences and figures, against the records that they are made from."""
 
+import csv
+import io
 import math
 import re
 import xml.etree.ElementTree as ET
@@ -11,6 +13,7 @@ import pytest
 from link_files import RECEIVERS, data_with, link_file, received_with, written
 from microrad import link_study
 from microrad.link import Swing
+from microrad.link_study import UNDER_JITTER
 from microrad.missionfile import load_link
 from microrad.performance import FINE, NO_HYSTERESIS, Cost, LinkPerformance
 from microrad.report import budget_views, link_figures, links
@@ -19,6 +22,7 @@ from microrad.report.quantities import quantity
 FEW = {"acquisition.runs": 100}
 NO_SCAN = {**FEW, "acquisition.scan": None}
 JITTER = {"jitter": {"bias": ["1 urad", "0 urad"], "rms": ["3 urad", "3 urad"], "bandwidth": "50 Hz"}}
+TORNADOS = ("tornado", "tornado-under-jitter", "tornado-beacon", "tornado-answer")
 YEAR_S = 365.25 * 86400.0
 SVG = "{http://www.w3.org/2000/svg}"
 
@@ -75,13 +79,18 @@ def test_the_cells_of_a_case_are_its_record(plain):
     cells = links.cells(c)
     rms = math.sqrt(1.0**2 + 2 * 3.0**2)
     assert cells[0] == f"{rms:.2f}"
-    assert cells[1:6] == ["1.23", "2.35", "\u22120.01", "2 %", "none"]
-    assert cells[6:8] == ["19.7*", "0.00"]
+    assert cells[1:7] == ["1.23", "2.35", "unknown", "\u22120.01", "2 %", "none"]
+    assert cells[7:9] == ["19.7*", "0.00"]
     wider = replace(c.best, half_angle_rad=25.31e-6, at_limit=False, current_excess_db=0.456)
-    assert links.cells(replace(c, best=wider))[6:8] == ["25.3", "0.46"]
-    assert cells[8] == "242"
-    assert links.cells(case(plain, data_rate_bit_s=math.nan))[8] == "none"
-    assert links.cells(case(plain, margin_db=2.0))[3] == "+2.00"
+    assert links.cells(replace(c, best=wider))[7:9] == ["25.3", "0.46"]
+    assert cells[9] == "242"
+    assert links.cells(case(plain, data_rate_bit_s=math.nan))[9] == "none"
+    assert links.cells(case(plain, margin_db=2.0))[4] == "+2.00"
+    assert [links.cells(case(plain, uncoded_penalty_db=each))[3] for each in (1.234, math.inf, math.nan)] == [
+        "1.23",
+        "beyond any power",
+        "unknown",
+    ]
 
 
 @pytest.mark.parametrize(
@@ -109,8 +118,8 @@ def test_costs_stand_in_the_row_of_their_case_and_the_best_controller_is_marked(
     assert [(row["controller"], row["mirror"]) for row in rows] == [(c.controller, c.mirror) for c in cases]
     assert [row["cells"][-2:] for row in rows] == [["", ""], ["", ""], ["0.50", "1"], ["", ""]]
     assert [row["best"] for row in rows] == [False, False, True, False]
-    assert {len(row["cells"]) for row in rows} == {11}
-    assert {len(row["cells"]) for row in links.performance_rows(cases, "")} == {9}
+    assert {len(row["cells"]) for row in rows} == {12}
+    assert {len(row["cells"]) for row in links.performance_rows(cases, "")} == {10}
     assert not any(row["best"] for row in links.performance_rows([case(plain)], ""))
 
 
@@ -159,15 +168,58 @@ def test_each_case_has_its_own_fades(plain):
     rare = case(plain, controller="", source="jitter as given", fades_per_s=0.0, uncoded_penalty_db=math.nan)
     said = links.fades([often, rare, case(plain, controller="unknown", fades_per_s=math.nan)])
     assert said[0].endswith(": PID: 75.7 a second of 7.51 ms each; jitter as given: none in a year.")
-    assert "back to its target: PID 1.23 dB." in said[1]
-    assert len(said) == 2
-    assert len(links.fades([replace(often, uncoded_penalty_db=math.nan)])) == 1
+    assert len(said) == 1
 
 
-def test_a_penalty_that_no_power_makes_good_is_said_in_words(plain):
-    (_, said) = links.fades([case(plain, fades_per_s=1.0, fade_s=1e-3, uncoded_penalty_db=math.inf)])
-    assert "jitter as given more than any power." in said
-    assert "inf" not in said
+# ------------------------------------------------------------------------------------------------------------- penalty
+@pytest.mark.parametrize(
+    ("penalty_db", "words"),
+    [
+        (1.014, "without a code 1.01 dB."),
+        (math.inf, "without a code beyond any power."),
+        (math.nan, "without a code unknown, as the receiver is given by its sensitivity alone."),
+    ],
+)
+def test_the_penalty_is_said_with_a_code_and_without_however_rare_the_fades(plain, penalty_db, words):
+    # and without a spectrum, too
+    for fades_per_s in (0.0, math.nan):
+        c = case(
+            plain, mean_loss_db=0.414, outage_loss_db=2.456, uncoded_penalty_db=penalty_db, fades_per_s=fades_per_s
+        )
+        said = budget_views.performance(c, plain)
+        coded = "with a code 0.41 dB where its interleaver spans many fades, 2.46 dB where it spans none; "
+        assert said.endswith(coded + words)
+        assert not re.search(r"\b(nan|inf)\b", said)
+        data = budget_views.performance_data(c)
+        assert (data["coded_penalty_many_fades_db"], data["coded_penalty_no_interleaver_db"]) == (0.414, 2.456)
+
+
+def test_a_receiver_that_is_known_has_its_penalty_on_the_page_although_no_fade_is_as_deep(tmp_path):
+    found = studied(tmp_path, NO_SCAN, JITTER, received_with("preamplified dpsk"))
+    page = budget_views.html(found)
+    assert "none in a year" in page
+    assert 0.5 < found.under_jitter.uncoded_penalty_db < 2.0
+    assert f'<td class="number">{found.under_jitter.uncoded_penalty_db:.2f}</td>' in page
+    assert "Penalty, the power that the errors cost: with a code" in page
+
+
+@pytest.mark.parametrize("name", [None, "preamplified dpsk"])
+def test_the_rows_of_the_jitter_stand_in_the_csv(tmp_path, name):
+    found = studied(tmp_path, NO_SCAN, JITTER, received_with(name) if name else {})
+    p, known = found.under_jitter, name is not None
+    rows = {r[1]: r for r in csv.reader(io.StringIO(budget_views.csv_text(found))) if r[0] == UNDER_JITTER}
+    expected = {
+        "Mean pointing loss": -p.mean_loss_db,
+        "Pointing loss at outage": -p.outage_loss_db,
+        "Margin at outage": p.margin_db,
+        "Outage": p.outage,
+        "Below required margin": p.short,
+    } | ({"Penalty without a code": -p.uncoded_penalty_db} if known else {})
+    assert {key: float(row[2]) for key, row in rows.items()} == expected
+    assert rows["Mean pointing loss"][-1] == (
+        "" if known else "the penalty without a code is unknown, as the receiver is given by its sensitivity alone"
+    )
+    assert UNDER_JITTER not in budget_views.csv_text(studied(tmp_path, NO_SCAN))
 
 
 def test_what_there_is_to_doubt_of_fades_is_said_once(plain):
@@ -225,7 +277,7 @@ def test_no_sentence_is_said_twice_on_the_page(plain):
         *budget_views.acquisition(plain.finding),
     ]
     assert sorted([*context["sentences"], *elsewhere]) == sorted(everywhere)
-    assert len(context["sentences"]) == 6
+    assert len(context["sentences"]) == 9
 
 
 # --------------------------------------------------------------------------------------------------------- acquisition
@@ -271,32 +323,39 @@ def texts(figure):
 
 
 def test_the_figures_are_svg_with_their_numbers_beside_them(plain):
-    tornado, trade = link_figures.draw(plain)
-    assert (tornado.name, trade.name) == ("tornado", "wide-beam-or-scan")
-    for figure in (tornado, trade):
+    drawn = link_figures.draw(plain)
+    assert [figure.name for figure in drawn] == [*TORNADOS, "wide-beam-or-scan"]
+    tornado, trade = drawn[0], drawn[-1]
+    for figure in drawn:
         assert ET.fromstring(figure.svg).tag == f"{SVG}svg"
         assert figure.title
         assert len({np.size(column) for column in figure.columns.values()}) == 1
         assert all(np.isfinite(column).all() for column in figure.columns.values())
     assert list(tornado.columns["margin lower (dB)"]) == [s.margin_low_db for s in plain.tornado]
+    for figure, each in zip(drawn[1:4], plain.tornados, strict=True):
+        assert list(figure.columns["margin higher (dB)"]) == [s.margin_high_db for s in each.swings]
+        assert ("required" in texts(figure)) is (each.of == UNDER_JITTER)
     assert all(re.search(r"\((rad|s)\)|probability", name) for name in trade.columns)
     assert np.array_equal(trade.columns["scan, whole time (s)"], plain.finding.trade.scan_time_s)
 
 
 def test_the_captions_give_the_missions_own_numbers(plain):
-    _, trade = link_figures.draw(plain)
+    trade = link_figures.draw(plain)[-1]
     assert "99.5 % coverage" in trade.caption
     assert (
-        "a beam of 20 \u00b5rad half angle, led over it with an overlap of 0.25 under 5 \u00b5rad of jitter"
-        in trade.caption
+        "a beam of 27.9 \u00b5rad half angle at 1/e2, used out to 20 \u00b5rad and led over it with an overlap of 0.25 "
+        "under 5 \u00b5rad of jitter" in trade.caption
     )
     least = 100 * float(np.min(plain.finding.trade.scan_probability))
     assert f"finds {least:.1f} % or more." in trade.caption
 
 
 def test_there_is_no_trade_without_a_scan(tmp_path):
-    assert [figure.name for figure in link_figures.draw(studied(tmp_path, NO_SCAN))] == ["tornado"]
-    assert [figure.name for figure in link_figures.draw(studied(tmp_path, {"acquisition": None}))] == ["tornado"]
+    both = ["tornado", "tornado-beacon", "tornado-answer"]
+    assert [figure.name for figure in link_figures.draw(studied(tmp_path, NO_SCAN))] == both
+    assert [figure.name for figure in link_figures.draw(studied(tmp_path, {"acquisition": None}))] == both
+    alone = studied(tmp_path, dict.fromkeys(("acquisition", "beacon", "answer")))
+    assert [figure.name for figure in link_figures.draw(alone)] == ["tornado"]
 
 
 def swing(plain, low_db, high_db, **others):
@@ -318,7 +377,7 @@ def swing(plain, low_db, high_db, **others):
 )
 def test_a_tornado_is_drawn_whatever_its_swings(plain, ends):
     found = replace(plain, tornado=tuple(swing(plain, *each) for each in ends))
-    figure, _ = link_figures.draw(found)
+    figure = link_figures.draw(found)[0]
     ET.fromstring(figure.svg)
     assert not re.search(r"\b(nan|inf)\b", figure.svg)
     slow = sum(not all(map(math.isfinite, each)) for each in ends)
@@ -327,13 +386,15 @@ def test_a_tornado_is_drawn_whatever_its_swings(plain, ends):
 
 
 def test_no_swing_is_no_tornado(plain):
-    assert [figure.name for figure in link_figures.draw(replace(plain, tornado=()))] == ["wide-beam-or-scan"]
+    assert [figure.name for figure in link_figures.draw(replace(plain, tornado=(), tornados=()))] == [
+        "wide-beam-or-scan"
+    ]
 
 
 def test_a_receiver_near_its_bandwidth_is_drawn_and_listed(tmp_path):
     found = studied(tmp_path, NO_SCAN, received_with("preamplified dpsk"), {"communication.data_rate": "3.1 Gbit/s"})
     assert math.isinf(found.tornado[0].swing_db)
-    (figure,) = link_figures.draw(found)
+    figure = link_figures.draw(found)[0]
     assert texts(figure).count("< no margin: receiver too slow") == 3  # rate, code rate and bandwidth
     assert math.isinf(figure.columns["margin higher (dB)"].min())
 
@@ -343,7 +404,7 @@ def test_a_tornado_shows_its_longest_bars_and_names_assumptions(plain):
         swing(plain, 3 + x, 3 - x, key=f"communication.k{n}", kind="assumption" * (n == 1))
         for n, x in enumerate(np.linspace(2, 1, 30))
     ]
-    figure, _ = link_figures.draw(replace(plain, tornado=tuple(many)))
+    figure = link_figures.draw(replace(plain, tornado=tuple(many)))[0]
     labels = [text for text in texts(figure) if text and text.startswith("k")]
     assert len(labels) == link_figures.MOST_BARS
     assert labels[0] == "k0 = 300 Mbit/s"
@@ -386,7 +447,7 @@ def test_the_page_holds_every_line_and_no_hyphen_for_a_minus(plain):
         assert f">{quantity(line.value, line.unit)}</td>" in page
     plain_text = re.sub(r"<(svg|style).*?</\1>|<[^>]*>", " ", page, flags=re.DOTALL)
     assert not re.search(r"(?<![\w-])-\d+\.\d\d dB", plain_text)
-    assert page.count("<figure") == page.count("</figure>") == 2
+    assert page.count("<figure") == page.count("</figure>") == 5
     assert page.count("<table") == page.count("</table>")
 
 

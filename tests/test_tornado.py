@@ -6,7 +6,7 @@ import sys
 import pytest
 
 from link_files import GAUSSIAN, PATTERN, RECEIVERS, SKY, link_file, received_with
-from microrad import link
+from microrad import link, link_performance, link_study
 from microrad.fields import Quantity
 from microrad.link.tornado import RELATIVE, STEP_DB
 from microrad.missionfile import load_link
@@ -15,6 +15,8 @@ from shipped import SHIPPED
 HALF = 2 * 1.55e-6 / (math.pi * 0.05)
 CHANNEL = {"channel": {"zenith_transmission": 0.8, "elevation": "30 deg"}}
 LEFT = {"point_ahead.corrected": False, "point_ahead.transverse_velocity": "1 km/s"}
+JITTER = {"jitter": {"bias": ["1 urad", "0 urad"], "rms": ["3 urad", "2 urad"], "bandwidth": "50 Hz"}}
+NO_BEAMS = dict.fromkeys(("beacon", "answer", "acquisition"))
 WAVEFRONT = {"communication.strehl": None, "communication.wavefront_error": "100 nm"}
 
 
@@ -116,11 +118,105 @@ def test_the_keys_that_matter_are_those_that_the_link_has(tmp_path):
 
 
 def test_what_does_not_move_the_margin_is_left_out(tmp_path):
-    found = swings(tmp_path, {"terminals.leo_obscuration": 0.2})  # which no formula of an even light holds
-    assert not any(key.startswith(("beacon.", "answer.", "requirement.", "pointing.", "point_ahead.")) for key in found)
+    # an obscuration, which no formula of an even light holds, and a jitter, which the budget of a static error has not
+    found = swings(tmp_path, {"terminals.leo_obscuration": 0.2}, JITTER)
+    others = ("beacon.", "answer.", "requirement.", "pointing.", "point_ahead.", "jitter.")
+    assert not any(key.startswith(others) for key in found)
     assert "terminals.leo_obscuration" not in found
     on_axis = swings(tmp_path, {"communication.pointing_error": "0 urad"})
     assert "communication.pointing_error" not in on_axis
+
+
+# ---- the other margins
+@pytest.mark.parametrize(("name", "end", "other"), [("beacon", "leo", "geo"), ("answer", "geo", "leo")])
+def test_the_margin_of_the_other_beams_over_their_own_inputs(tmp_path, name, end, other):
+    file = link_file(tmp_path, CHANNEL, LEFT, {f"terminals.{other}_obscuration": 0.3})
+    m, budget = file.mission, {"beacon": link.beacon_budget, "answer": link.answer_budget}[name]
+    found = {each.key: each for each in link.beam_tornado(m, file.sources, name)}
+    keys = {f"{name}.{key}" for key in ("transmit_power", "divergence", "pointing_error", "distance", "strehl")}
+    keys |= {f"{name}.{key}" for key in ("required_power", "transmit_optics_loss", "receive_optics_loss")}
+    keys |= {f"terminals.{other}_{key}" for key in ("aperture", "obscuration")}
+    keys |= {"channel.zenith_transmission", "channel.elevation", "point_ahead.transverse_velocity"}
+    assert found.keys() == keys  # wavelength and sending aperture are not in the gain of a Gaussian beam
+    assert [each.swing_db for each in found.values()] == sorted((s.swing_db for s in found.values()), reverse=True)
+    margin = budget(m, file.sources).margin_db
+    for key, factor in (("transmit_power", 1), ("required_power", -1), ("distance", -2)):
+        low, high = up_and_down(factor)
+        assert margins(found[f"{name}.{key}"]) == pytest.approx((margin + low, margin + high), abs=1e-9)
+    for each in found.values():
+        for value, moved in ((each.low, each.margin_low_db), (each.high, each.margin_high_db)):
+            mission = changed(m, field_of(m, each.key), value)
+            assert budget(mission, file.sources).margin_db == pytest.approx(moved, abs=1e-9)
+    assert not any(key.startswith("communication.") for key in found)
+
+
+@pytest.mark.parametrize(("name", "diameter"), [("beacon", 0.05), ("answer", 0.15)])
+def test_no_beam_is_moved_below_diffraction(tmp_path, name, diameter):
+    least = 2 * math.sqrt(8) * 1.55e-6 / (math.pi * diameter)
+    file = link_file(tmp_path, {f"{name}.divergence": f"{1.05 * least * 1e6} urad", f"{name}.pointing_error": "9 urad"})
+    found = {each.key: each for each in link.beam_tornado(file.mission, file.sources, name)}
+    moved = found[f"{name}.divergence"]
+    assert least <= moved.low < moved.value
+    assert moved.low == pytest.approx(1.05 * least * (1 - RELATIVE / 4), rel=1e-9)  # halved twice from 10 %
+    assert moved.high == pytest.approx(1.05 * least * (1 + RELATIVE), rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    "changes", [[], [PATTERN], [LEFT], [received_with("apd ook")]], ids=["w", "pattern", "ahead", "apd"]
+)
+def test_the_margin_under_jitter_over_its_inputs(tmp_path, changes):
+    file = link_file(tmp_path, JITTER, NO_BEAMS, *changes)
+    m = file.mission
+    (under,) = link_study.tornados(file, None, None)
+    assert under.of == link_study.UNDER_JITTER
+    assert under.margin_db == pytest.approx(link_performance.of_jitter(m).margin_db, abs=1e-9)
+    found = {each.key: each for each in under.swings}
+    assert {"jitter.bias x", "jitter.rms x", "jitter.rms y", "requirement.outage"} <= found.keys()
+    assert {"communication.transmit_power", "terminals.leo_aperture"} <= found.keys()
+    # a bias of 0 has no share to be moved by; the static error and how fast it moves are not in it
+    assert (
+        not {"jitter.bias y", "jitter.bandwidth", "communication.pointing_error", "requirement.margin"} & found.keys()
+    )
+    outage = found["requirement.outage"]
+    assert (outage.low, outage.high) == pytest.approx((0.0003, 0.03), rel=1e-12)
+    assert outage.margin_low_db < under.margin_db < outage.margin_high_db
+    assert outage.source.startswith("mission file, line")
+    for key, place, item in (
+        ("jitter.bias x", "bias_rad", 0),
+        ("jitter.rms x", "rms_rad", 0),
+        ("jitter.rms y", "rms_rad", 1),
+    ):
+        each = found[key]
+        assert (each.low, each.high) == pytest.approx((0.9 * each.value, 1.1 * each.value), rel=1e-12)
+        assert each.unit == "rad"
+        for value, margin in ((each.low, each.margin_low_db), (each.high, each.margin_high_db)):
+            both = list(getattr(m.jitter, place))
+            both[item] = value
+            moved = changed(m, f"jitter.{place}", tuple(both))
+            assert link_performance.of_jitter(moved).margin_db == pytest.approx(margin, abs=1e-9)
+        assert each.margin_low_db > under.margin_db > each.margin_high_db
+
+
+def test_the_margin_under_a_jitter_of_equal_axes_is_at_a_quantile_of_rayleigh(tmp_path):
+    equal = {"jitter": {"bias": ["0 urad", "0 urad"], "rms": ["3 urad", "3 urad"], "bandwidth": "50 Hz"}}
+    m = link_file(tmp_path, equal).mission
+    loss = 8.685889638 * (3e-6 / HALF) ** 2 * 2 * math.log(1 / 0.003)
+    on_axis = link.communication_budget(m, {}, pointing_error_rad=0.0).margin_db
+    assert link_performance.margin_under_jitter_db(m) == pytest.approx(on_axis - loss, abs=1e-8)
+    with pytest.raises(ValueError, match=r"no table \[jitter\]"):
+        link_performance.margin_under_jitter_db(link_file(tmp_path).mission)
+
+
+def test_a_study_holds_a_tornado_for_each_margin_that_there_is(tmp_path):
+    file = link_file(tmp_path, {"acquisition": None}, JITTER)
+    m, budgets = file.mission, (link.beacon_budget, link.answer_budget)
+    both = [budget(m, file.sources) for budget in budgets]
+    found = link_study.tornados(file, *both)
+    assert [each.of for each in found] == [link_study.UNDER_JITTER, "Beacon", "Answer"]
+    assert [each.margin_db for each in found[1:]] == [each.margin_db for each in both]
+    assert found[1].swings == link.beam_tornado(m, file.sources, "beacon")
+    assert found[2].swings == link.beam_tornado(m, file.sources, "answer")
+    assert link_study.tornados(link_file(tmp_path), None, None) == ()
 
 
 @pytest.mark.parametrize("name", RECEIVERS)

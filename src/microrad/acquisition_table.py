@@ -36,7 +36,10 @@ class Scan(Table):
     """A narrow beam led over the uncertainty in place of the wide beacon."""
 
     pattern: Literal["spiral", "raster", "step-stare"]
-    beam_radius_rad: Angle = Field(alias="beam_radius", description="off axis, where the partner still sees it")
+    beam_radius_rad: Angle = Field(
+        alias="beam_radius",
+        description="off axis, where the partner still sees it; the beam itself is no narrower than diffraction",
+    )
     overlap: Annotated[float, Quantity("", least=0.0, most=0.95)] = Field(
         description="of neighbouring tracks, share of the beam's diameter"
     )

@@ -10,7 +10,7 @@ from microrad.acquisition_table import LEAST_OVERLAP, Acquisition
 from microrad.acquisition_table import Scan as ScanTable
 from microrad.budget import Line, total_db
 from microrad.link.budget import POINT_AHEAD_LOSS, POINTING_LOSS
-from microrad.link_table import Beacon, half_angle_rad
+from microrad.link_table import Beacon, half_angle_rad, narrowest_half_angle_rad
 from microrad.mission import LinkMission, source_text
 from microrad.missionfile import LinkFile
 
@@ -72,14 +72,16 @@ class Found:
 class Scanned:
     """Acquisition by the mission's scan; `trade` sets a spiral with its beam and overlap against the wide beacon.
 
-    The partner's sensor needs `needed_detection_s` at the edge of the scan's beam, by its power alone; the scan gives
-    it that or `stated_detection_s`, the longer. A scan by dwells has no speed. There is no trade for a spiral without
-    overlap, nor where no scan detects.
+    The scan's beam has the half angle `half_angle_rad` at 1/e2 and is used out to `acquisition.scan.beam_radius`, where
+    the partner's sensor needs `needed_detection_s` by its power alone; the scan gives it that or `stated_detection_s`,
+    the longer. A scan by dwells has no speed. There is no trade for a spiral without overlap, nor where no scan
+    detects.
     """
 
     found: Found
     duration_s: float
     radius_rad: float
+    half_angle_rad: float
     speed_rad_s: float | None
     stated_detection_s: float
     needed_detection_s: float
@@ -284,6 +286,7 @@ def _scanned(
         found=_found(f"{s.pattern} scan", stages, a),
         duration_s=pattern.duration_s,
         radius_rad=pattern.search.radius_rad,
+        half_angle_rad=beams.narrow_half_angle_rad,
         speed_rad_s=None if isinstance(pattern, acquisition.StepStare) else pattern.speed_rad_s,
         stated_detection_s=s.detection_s,
         needed_detection_s=needed,
@@ -310,15 +313,17 @@ def _sender(
 
     The sensor is that of the beacon budget: it needs its required power for one frame, and four times as long at half
     the power, as noise that does not depend on the light has it. Every loss but those off the axis is in the power.
+    The beam is as narrow as the radius out to which it is used, but no narrower than diffraction at its aperture.
     """
     half = half_angle_rad(beam.divergence_rad, m.conventions.divergence)
+    least = narrowest_half_angle_rad(m.terminals.leo_aperture_m, beam.wavelength_m)
     area = math.pi / 4.0 * m.terminals.geo_aperture_m**2
     margin_db = min(max(_on_axis_margin_db(budget), -_DEEPEST_MARGIN_DB), _DEEPEST_MARGIN_DB)
     on_axis = beam.required_power_w * 10.0 ** (margin_db / 10.0) / area
     beams = acquisition.Beams(
         power_w=on_axis * math.pi * (half * beam.distance_m) ** 2 / 2.0,
         range_m=beam.distance_m,
-        narrow_half_angle_rad=s.beam_radius_rad,
+        narrow_half_angle_rad=max(s.beam_radius_rad, least),
         beam_radius_rad=s.beam_radius_rad,
         overlap=s.overlap,
     )

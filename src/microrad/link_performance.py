@@ -8,10 +8,12 @@ from numpy.typing import NDArray
 
 from microrad import link, pointing
 from microrad.mission import LinkMission
+from microrad.pointing_table import JitterTable
 
 Floats = NDArray[np.float64]
 
 _STEPS = 4000  # of the radial error, for a distribution that is known and not sampled
+_RAREST = 1e-16
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,6 +32,32 @@ class Spread:
 
 
 @dataclass(frozen=True, slots=True)
+class Known(Spread):
+    """The errors of a known distribution, in radial steps that are small against it; quantiles are exact."""
+
+    jitter: pointing.Jitter
+
+    @classmethod
+    def of(cls, jitter: pointing.Jitter) -> "Known":
+        """The errors of this jitter."""
+        reach = jitter.static_rad + 12.0 * max(jitter.rms_rad)
+        if reach == jitter.static_rad:
+            return cls(np.array([reach]), np.ones(1), jitter)
+        edges = np.linspace(0.0, reach, _STEPS + 1)
+        share = np.maximum(-np.diff(pointing.radial_survival(jitter, edges)), 0.0)
+        return cls(edges[1:], share / np.sum(share), jitter)  # the upper edge: no error is made smaller
+
+    def quantile_rad(self, probability: float) -> float:
+        """Error that a share of the time stays below."""
+        return _exact_quantile_rad(self.jitter, 1.0 - probability)
+
+
+def _exact_quantile_rad(jitter: pointing.Jitter, exceeded: float) -> float:
+    """Error that is exceeded for a share of the time, which is told from none down to the last digit of 1."""
+    return float(pointing.radial_quantile(jitter, max(exceeded, _RAREST)))
+
+
+@dataclass(frozen=True, slots=True)
 class Performance:
     """The communication link under the pointing errors of one source, of one controller on one variant of the mirror.
 
@@ -41,6 +69,11 @@ class Performance:
     narrower than the present beam, which is what the aperture gives; ``best.wanted_half_angle_rad`` is the one without
     that limit, what a larger aperture would allow. ``fades_per_s`` and ``fade_s`` are of the fades below the required
     margin; nan without a spectrum.
+
+    What the pointing error costs a coded link in power lies between two of these: ``mean_loss_db`` where its
+    interleaver spans many fades, ``outage_loss_db`` where it spans none. ``uncoded_penalty_db`` is what it costs
+    without a code; nan for a receiver of which only the measured sensitivity is known, infinite where no power makes
+    up for it.
 
     An uncorrected point-ahead is added to the length of every error, as if it had the direction of each. The fades and
     the penalty have it as a bias, of one direction: see `with_point_ahead`. What a correction leaves is in none.
@@ -67,21 +100,30 @@ def of_jitter(m: LinkMission) -> Performance | None:
     """The link under the mission's own jitter, or None where it gives none."""
     if m.jitter is None:
         return None
-    (bias_x, bias_y), (rms_x, rms_y) = m.jitter.bias_rad, m.jitter.rms_rad
-    jitter = pointing.Jitter((bias_x, bias_y), (rms_x, rms_y))
-    speed = 2.0 * math.pi * m.jitter.bandwidth_hz
+    jitter, speed = _given(m.jitter), 2.0 * math.pi * m.jitter.bandwidth_hz
+    rms_x, rms_y = jitter.rms_rad
     motion = pointing.SpectralMotion((rms_x, rms_y), (speed * rms_x, speed * rms_y), (0.0, 0.0), m.jitter.bandwidth_hz)
-    return performance(m, "jitter as given", "", "", _known(jitter), jitter, motion)
+    return performance(m, "jitter as given", "", "", Known.of(jitter), jitter, motion)
 
 
-def _known(jitter: pointing.Jitter) -> Spread:
-    """A known distribution in radial steps that are small against it."""
-    reach = jitter.static_rad + 12.0 * max(jitter.rms_rad)
-    if reach == jitter.static_rad:
-        return Spread(np.array([reach]), np.ones(1))
-    edges = np.linspace(0.0, reach, _STEPS + 1)
-    share = np.maximum(-np.diff(pointing.radial_survival(jitter, edges)), 0.0)
-    return Spread(edges[1:], share / np.sum(share))  # the upper edge: no error is made smaller
+def margin_under_jitter_db(m: LinkMission) -> float:
+    """Margin of the communication link but for the mission's outage under its own jitter, as `of_jitter` has it.
+
+    Raises `ValueError` for a mission without a table `[jitter]`, and for a data rate that the receiver does not take.
+    """
+    if m.jitter is None:
+        raise ValueError("the mission has no table [jitter]")
+    error_rad = _exact_quantile_rad(_given(m.jitter), m.requirement.outage) + link.point_ahead_rad(m)
+    return _on_axis_margin_db(m) - float(link.communication_beam(m).fall.loss_db(error_rad))
+
+
+def _given(table: JitterTable) -> pointing.Jitter:
+    (bias_x, bias_y), (rms_x, rms_y) = table.bias_rad, table.rms_rad
+    return pointing.Jitter((bias_x, bias_y), (rms_x, rms_y))
+
+
+def _on_axis_margin_db(m: LinkMission) -> float:
+    return link.received_on_axis_dbm(m) - float(link.required_dbm(m, m.communication.data_rate_bit_s))
 
 
 def performance(
@@ -95,8 +137,7 @@ def performance(
 ) -> Performance:
     """The link under these errors; ``motion`` is what their spectrum says, None where it is not known."""
     q, fall = m.requirement, link.communication_beam(m).fall
-    on_axis = link.received_on_axis_dbm(m) - float(link.required_dbm(m, m.communication.data_rate_bit_s))
-    ahead = link.point_ahead_rad(m)
+    on_axis, ahead = _on_axis_margin_db(m), link.point_ahead_rad(m)
     loss = fall.loss_db(spread.radius_rad + ahead)
     outage_loss = float(fall.loss_db(spread.quantile_rad(1.0 - q.outage) + ahead))
     half, shifted = fall.half_angle_rad, with_point_ahead(jitter, ahead)

@@ -9,12 +9,15 @@ from numpy.typing import NDArray
 from microrad import link, pointing
 from microrad.budget import Line
 from microrad.link_acquisition import Finding, Tracking, finding, tracking
-from microrad.link_performance import Performance, of_jitter
+from microrad.link_performance import Performance, margin_under_jitter_db, of_jitter
 from microrad.mission import LinkMission
 from microrad.missionfile import LinkFile
 from microrad.units import format_quantity
 
 Floats = NDArray[np.float64]
+
+UNDER_JITTER = "Communication under jitter"
+"""What the margin of the communication link but for the outage is called."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,7 +40,8 @@ class LinkStudy:
     """Everything that follows from the tables of the links alone. The links that a mission lacks are None.
 
     ``receiver_noise`` are the noise terms of the communication receiver at the received power, where it is given by
-    what it is made of.
+    what it is made of. ``tornado`` is that of the communication budget, ``tornados`` those of the margin under jitter,
+    of the beacon and of the answer, as far as there are such.
     """
 
     file: LinkFile
@@ -48,6 +52,7 @@ class LinkStudy:
     receiver_noise: tuple[Line, ...]
     largest_rate_bit_s: float
     tornado: tuple[link.Swing, ...]
+    tornados: tuple[link.Tornado, ...]
     under_jitter: Performance | None
     tracking: Tracking | None
     point_ahead: PointAheadEffect | None
@@ -109,11 +114,28 @@ def run(file: LinkFile) -> LinkStudy:
         receiver_noise=noise,
         largest_rate_bit_s=largest_rate(m),
         tornado=link.tornado(m, sources),
+        tornados=tornados(file, beacon, answer),
         under_jitter=of_jitter(m),
         tracking=light,
         point_ahead=point_ahead(m),
         finding=finding(m, open_loop, beacon, answer, light),
     )
+
+
+def tornados(
+    file: LinkFile, beacon: link.LinkBudget | None, answer: link.LinkBudget | None
+) -> tuple[link.Tornado, ...]:
+    """What moves the margins that stand in no communication budget: under jitter, of the beacon, of the answer."""
+    m, sources, found = file.mission, file.sources, []
+    if m.jitter is not None:
+        tables = ("jitter", "requirement", *link.LINK_TABLES)
+        swings = link.swings(m, sources, tables, margin_under_jitter_db)
+        found.append(link.Tornado(UNDER_JITTER, margin_under_jitter_db(m), swings))
+    for budget in (beacon, answer):
+        if budget is not None:
+            swings = link.beam_tornado(m, sources, "beacon" if budget is beacon else "answer")
+            found.append(link.Tornado(budget.name, budget.margin_db, swings))
+    return tuple(found)
 
 
 def largest_rate(m: LinkMission) -> float:

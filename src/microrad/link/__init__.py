@@ -51,13 +51,14 @@ from microrad.link.model import (
     required_dbm,
     strehl_db,
 )
-from microrad.link.tornado import Swing, tornado
+from microrad.link.tornado import LINK_TABLES, Swing, Tornado, beam_tornado, swings, tornado
 
 __all__ = [
     "BEST_TRUNCATION",
     "BIT_ERROR_RATIO",
     "DEEPEST_DB",
     "LEFT_AT_ZERO",
+    "LINK_TABLES",
     "GaussianFall",
     "IdealReceiver",
     "LinkBudget",
@@ -66,11 +67,13 @@ __all__ = [
     "OffAxis",
     "SensitivityReading",
     "Swing",
+    "Tornado",
     "TransmittedBeam",
     "air_mass",
     "answer_budget",
     "aperture_gain_db",
     "beacon_budget",
+    "beam_tornado",
     "clear_sky_loss_db",
     "communication_beam",
     "communication_budget",
@@ -101,5 +104,6 @@ __all__ = [
     "strehl_db",
     "strehl_loss_db",
     "strehl_ratio",
+    "swings",
     "tornado",
 ]

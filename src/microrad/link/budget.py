@@ -45,6 +45,7 @@ LEFT_AT_ZERO = "left at 0 dB"
 STREHL_LOSS, POINTING_LOSS, POINT_AHEAD_LOSS = "Strehl loss", "Pointing loss", "Point-ahead loss"
 FREE_SPACE_LOSS, CLEAR_SKY_LOSS = "Free-space loss", "Clear-sky loss"
 DEEPEST_DB = 20.0  # pointing loss beyond which side lobes and scatter decide, not the main lobe
+WIDEST_RAD = 0.1  # half angle or error beyond which a small angle is none
 _CUT_DB = 0.1  # gain beyond which it counts that the aperture cuts a beam that is taken as whole
 _WORST_STREHL_DB = 5.0  # beyond it the core of the beam no longer has the shape of the perfect one
 
@@ -142,13 +143,17 @@ def _gaussian_budget(write: "Writer", beam: Beacon, receiver: str) -> LinkBudget
     theta = f"theta = {format_quantity(half, 'rad')} half angle at 1/e2"
     far = "Gaussian beam, far field, not cut by its aperture"
     shape = source_text(write.sources, f"{write.table}.divergence", "conventions.divergence")
-    cut = _cut_by_aperture(half, write.aperture_m(write.end), beam.wavelength_m)
-    gain = Line("Beam gain", gains.gaussian_beam_gain_db(half), "dB", f"8 / theta^2, {theta}", shape, far, cut)
+    doubts = _both(
+        _wide("the half angle", half),
+        _cut_by_aperture(half, write.aperture_m(write.end), beam.wavelength_m),
+        _blocked(getattr(write.mission.terminals, f"{write.end}_obscuration") or 0.0),
+    )
+    gain = Line("Beam gain", gains.gaussian_beam_gain_db(half), "dB", f"8 / theta^2, {theta}", shape, far, doubts)
     basis = f"exp(-2 (error / theta)^2), error = {format_quantity(error, 'rad')}, {theta}"
     loss = 0.0 - float(gains.gaussian_pointing_loss_db(error, half))
-    pointing = Line(
-        POINTING_LOSS, loss, "dB", basis, write.source("pointing_error"), f"{far}; static error", _deep(loss)
-    )
+    doubts = _both(_wide("the error", error), _deep(loss))
+    source, regime = write.source("pointing_error"), f"{far}; static error"
+    pointing = Line(POINTING_LOSS, loss, "dB", basis, source, regime, doubts)
     with_ahead = float(gains.gaussian_pointing_loss_db(error + point_ahead_rad(write.mission), half))
     level = gains.dbm(beam.required_power_w)
     required = Line("Required power", level, "dBm", "as given", write.source("required_power"), _GIVEN)
@@ -167,6 +172,27 @@ def _cut_by_aperture(half_angle_rad: float, aperture_m: float, wavelength_m: flo
         f"a Gaussian beam this narrow is {format_quantity(2.0 * radius, 'm')} wide at 1/e2, and the aperture of "
         f"{format_quantity(aperture_m, 'm')} cuts it: {lost:.2f} dB less gain than this, and a wider core"
     )
+
+
+def _blocked(obscuration: float) -> str:
+    """The warning that an obscuration of the terminal that sends a Gaussian beam is not in its gain."""
+    if not obscuration:
+        return ""
+    return (
+        f"the obscuration of {obscuration:g} is not in it: what it stops of the beam belongs into transmit_optics_loss"
+    )
+
+
+def _wide(what: str, angle_rad: float) -> str:
+    """The warning that an angle is not small."""
+    if angle_rad <= WIDEST_RAD:
+        return ""
+    return f"{what} of {format_quantity(angle_rad, 'rad', 3)} is above {WIDEST_RAD:g} rad, where small angles end"
+
+
+def _both(*warnings: str) -> str:
+    """The warnings that there are, as one."""
+    return "; ".join(each for each in warnings if each)
 
 
 def _deep(loss_db: float) -> str:
@@ -215,13 +241,14 @@ class Writer:
 
     def lit_gain(self) -> tuple[Line, ...]:
         """Gain of the transmitting aperture and, where the mission says how it is lit, what that changes."""
-        beam = self.mission.communication
+        beam, lit = self.mission.communication, communication_beam(self.mission)
+        wide = _wide("the half angle", lit.fall.half_angle_rad)
         if beam.beam is None:
             hole = self.mission.terminals.leo_obscuration or 0.0
             left_out = f'the obscuration of {hole:g} is not in it: only pointing_loss = "pattern" takes it into account'
-            return (replace(self.gain("leo", _TRANSMITTING), warning=left_out if hole else ""),)
-        lit = communication_beam(self.mission)
-        whole = self.gain("leo", "evenly lit and unobscured; how it is lit stands below")
+            doubts = _both(wide, left_out if hole else "")
+            return (replace(self.gain("leo", _TRANSMITTING), warning=doubts),)
+        whole = replace(self.gain("leo", "evenly lit and unobscured; how it is lit stands below"), warning=wide)
         shape, hole = beam.beam, self.mission.terminals.leo_obscuration or 0.0
         keys = ["communication.beam.profile"]
         if shape.radius_m is None:
@@ -326,7 +353,8 @@ def _pointing_line(mission: LinkMission, error_rad: float, source: str) -> Line:
     loss = 0.0 - float(communication_beam(mission).fall.loss_db(error_rad))
     formula, regime = _POINTING_BASIS[mission.conventions.pointing_loss]
     basis = f"{formula}, error = {format_quantity(error_rad, 'rad')}"
-    return Line(POINTING_LOSS, loss, "dB", basis, source, f"{regime}; static error", _deep(loss))
+    doubts = _both(_wide("the error", error_rad), _deep(loss))
+    return Line(POINTING_LOSS, loss, "dB", basis, source, f"{regime}; static error", doubts)
 
 
 def _required_line(mission: LinkMission, rate_bit_s: float, write: Writer, rate_source: str) -> Line:

@@ -1,20 +1,24 @@
-"""Which input moves the margin most: each one alone, a little down and up."""
+"""Which input moves a margin most: each one alone, a little down and up."""
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from typing import Literal
 
-from microrad.fields import Quantity, Share, Table
-from microrad.link.budget import communication_budget
+from pydantic.fields import FieldInfo
+
+from microrad.fields import Quantity, Several, Share, Table
+from microrad.link.budget import answer_budget, beacon_budget, communication_budget
 from microrad.link.model import lit_aperture
 from microrad.link.receivers import RateError
+from microrad.link_table import divergence_fits
 from microrad.mission import LinkMission, Source, source_text
 
 RELATIVE = 0.1
 """How far a quantity is moved, as a share of itself."""
 STEP_DB = 0.5
 """How far a quantity in decibels is moved."""
-_TABLES = (
+LINK_TABLES = (
     "terminals",
     "communication",
     "communication.receiver",
@@ -23,14 +27,19 @@ _TABLES = (
     "channel",
     "point_ahead",
 )
-_BY_TEN = "bit_error_ratio"  # a ratio that is judged by its order of magnitude
+"""The tables with the inputs of the communication link."""
+_BY_TEN = ("bit_error_ratio", "outage")  # shares that are judged by their order of magnitude
+_AXES = ("x", "y")
+
+Margin = Callable[[LinkMission], float]
 
 
 @dataclass(frozen=True, slots=True)
 class Swing:
     """The margin with one input moved down to ``low`` and up to ``high``, both in ``unit``, all others as they are.
 
-    ``kind`` is the kind of source that the input has, "assumption" for one.
+    ``kind`` is the kind of source that the input has, "assumption" for one. An item of a list has its axis behind the
+    key.
     """
 
     key: str
@@ -49,42 +58,130 @@ class Swing:
         return abs(self.margin_high_db - self.margin_low_db)
 
 
+@dataclass(frozen=True, slots=True)
+class Tornado:
+    """One margin, ``of`` what it is, and its swings over each of its inputs, the largest first."""
+
+    of: str
+    margin_db: float
+    swings: tuple[Swing, ...]
+
+
 def tornado(mission: LinkMission, sources: Mapping[str, Source]) -> tuple[Swing, ...]:
-    """The margin of the communication link over each of its inputs, one at a time, the largest swing first.
+    """The margin of the communication link over each of its inputs, as `swings` moves them."""
+    return swings(mission, sources, LINK_TABLES, lambda m: communication_budget(m, sources).margin_db)
 
-    Every quantity is moved by 10 % both ways, one in decibels by 0.5 dB, a bit error ratio by a factor of ten; none
-    beyond the bounds that its key has. Inputs that do not move the margin are left out.
+
+def beam_tornado(
+    mission: LinkMission, sources: Mapping[str, Source], name: Literal["beacon", "answer"]
+) -> tuple[Swing, ...]:
+    """The margin of the beacon or of its answer over each of its inputs, as `swings` moves them.
+
+    Raises `ValueError` for a beam that the mission has not.
     """
-    swings = [swing for name in _TABLES for swing in _swings(mission, sources, name)]
-    moving = [swing for swing in swings if swing.swing_db > 1e-9]
-    return tuple(sorted(moving, key=lambda swing: -swing.swing_db))
+    budget, end = (beacon_budget, "leo") if name == "beacon" else (answer_budget, "geo")
+    too_narrow, tables = divergence_fits(name, end), ("terminals", name, "channel", "point_ahead")
+
+    def possible(m: LinkMission) -> bool:
+        return not any(too_narrow(m.conventions, m.terminals, getattr(m, name)))
+
+    return swings(mission, sources, tables, lambda m: budget(m, sources).margin_db, possible)
 
 
-def _swings(mission: LinkMission, sources: Mapping[str, Source], name: str) -> Iterator[Swing]:
+def _lit(mission: LinkMission) -> bool:
+    """Whether the obscuration lets some of the data's beam pass."""
+    if mission.conventions.pointing_loss == "pattern":
+        try:
+            lit_aperture(mission)
+        except ValueError:
+            return False
+    return True
+
+
+def swings(
+    mission: LinkMission,
+    sources: Mapping[str, Source],
+    tables: tuple[str, ...],
+    margin_db: Margin,
+    possible: Callable[[LinkMission], bool] = _lit,
+) -> tuple[Swing, ...]:
+    """A margin over each input of these tables, one at a time, the largest swing first.
+
+    Every quantity is moved by 10 % both ways, one in decibels by 0.5 dB, a bit error ratio and an outage by a factor of
+    ten; none beyond the bounds that its key has, nor to a mission that is not ``possible``, by default one whose
+    obscuration stops the beam. Inputs that do not move the margin are left out.
+    """
+    found = [_swing(mission, sources, each, margin_db, possible) for name in tables for each in _inputs(mission, name)]
+    return tuple(sorted((s for s in found if s.swing_db > 1e-9), key=lambda swing: -swing.swing_db))
+
+
+@dataclass(frozen=True, slots=True)
+class _Input:
+    """One number of a mission: a field of a table, or an item of one that holds a list."""
+
+    key: str
+    table: str
+    field: str
+    item: int | None
+    value: float
+    rule: Quantity
+
+    @property
+    def shown(self) -> str:
+        """The key, with the axis of an item."""
+        return self.key if self.item is None else f"{self.key} {_AXES[self.item]}"
+
+    def moved(self, mission: LinkMission, value: float) -> LinkMission:
+        """The mission with this number replaced."""
+        if self.item is None:
+            return _changed(mission, self.table, self.field, value)
+        items = list(getattr(_table(mission, self.table), self.field))
+        items[self.item] = value
+        return _changed(mission, self.table, self.field, tuple(items))
+
+
+def _swing(
+    mission: LinkMission,
+    sources: Mapping[str, Source],
+    each: _Input,
+    margin_db: Margin,
+    possible: Callable[[LinkMission], bool],
+) -> Swing:
+    ends = _ends(each.field, each.value, each.rule, mission.conventions.strehl)
+    low, high = (_nearest(mission, each, end, possible) for end in ends)
+    return Swing(
+        key=each.shown,
+        unit=_unit(mission, each.field, each.rule),
+        value=each.value,
+        low=low,
+        high=high,
+        margin_low_db=_margin(each.moved(mission, low), margin_db),
+        margin_high_db=_margin(each.moved(mission, high), margin_db),
+        kind=sources[each.key].kind if each.key in sources else "",
+        source=source_text(sources, each.key),
+    )
+
+
+def _inputs(mission: LinkMission, name: str) -> Iterator[_Input]:
+    """Every quantity of a table that has a value."""
     table = _table(mission, name)
     if table is None:
         return
     for field, info in type(table).model_fields.items():
-        value = getattr(table, field)
-        rules = [rule for rule in info.metadata if isinstance(rule, Quantity)] or _inner(info.annotation)
-        if not rules or not isinstance(value, float):
-            continue
-        low, high = (
-            _lit(mission, name, field, value, moved)
-            for moved in _moved(field, value, rules[0], mission.conventions.strehl)
-        )
-        key = f"{name}.{info.alias or field}"
-        yield Swing(
-            key=key,
-            unit=_unit(mission, field, rules[0]),
-            value=value,
-            low=low,
-            high=high,
-            margin_low_db=_margin(mission, sources, name, field, low),
-            margin_high_db=_margin(mission, sources, name, field, high),
-            kind=sources[key].kind if key in sources else "",
-            source=source_text(sources, key),
-        )
+        value, key = getattr(table, field), f"{name}.{info.alias or field}"
+        rules = _rules(info)
+        if rules and isinstance(value, float):
+            yield _Input(key, name, field, None, value, rules[0])
+        for rule in (each for each in info.metadata if isinstance(each, Several)):
+            for item, number in enumerate(value):
+                yield _Input(key, name, field, item, number, rule.each)
+
+
+def _rules(info: FieldInfo) -> list[Quantity]:
+    """The rule of a quantity; that of one that may be left out stands inside the union."""
+    kinds = getattr(info.annotation, "__args__", ())
+    inner = [rule for kind in kinds for rule in getattr(kind, "__metadata__", ())]
+    return [rule for rule in (*info.metadata, *inner) if isinstance(rule, Quantity)]
 
 
 def _unit(mission: LinkMission, field: str, rule: Quantity) -> str:
@@ -92,15 +189,9 @@ def _unit(mission: LinkMission, field: str, rule: Quantity) -> str:
     return "dB" if field == "strehl" and mission.conventions.strehl == "decibel" else rule.unit
 
 
-def _inner(annotation: object) -> list[Quantity]:
-    """The rule of a quantity that may be left out: it stands inside the union."""
-    kinds = getattr(annotation, "__args__", ())
-    return [rule for kind in kinds for rule in getattr(kind, "__metadata__", ()) if isinstance(rule, Quantity)]
-
-
-def _moved(field: str, value: float, rule: Quantity, strehl: str) -> tuple[float, float]:
+def _ends(field: str, value: float, rule: Quantity, strehl: str) -> tuple[float, float]:
     step = STEP_DB if field.endswith("_db") or (field, strehl) == ("strehl", "decibel") else RELATIVE * abs(value)
-    low, high = (value / 10.0, value * 10.0) if field == _BY_TEN else (value - step, value + step)
+    low, high = (value / 10.0, value * 10.0) if field in _BY_TEN else (value - step, value + step)
     ratio = (field, strehl) == ("strehl", "ratio")
     least = -math.inf if rule.least is None else rule.least
     most = 1.0 if ratio else math.inf if rule.most is None else rule.most
@@ -119,26 +210,22 @@ def _table(mission: LinkMission, name: str) -> Table | None:
     return table
 
 
-def _lit(mission: LinkMission, name: str, field: str, value: float, moved: float) -> float:
-    """The moved value, its step halved until the obscuration still lets some of the beam pass."""
-    while moved != value and mission.conventions.pointing_loss == "pattern":
-        try:
-            lit_aperture(_changed(mission, name, field, moved))
-            break
-        except ValueError:
-            moved = (value + moved) / 2.0
-    return moved
+def _nearest(mission: LinkMission, each: _Input, end: float, possible: Callable[[LinkMission], bool]) -> float:
+    """The end of a swing, its step halved until there is such a mission."""
+    while end != each.value and not possible(each.moved(mission, end)):
+        end = (each.value + end) / 2.0
+    return end
 
 
-def _margin(mission: LinkMission, sources: Mapping[str, Source], name: str, field: str, value: float) -> float:
-    """The margin with one field of one table replaced; a receiver too slow for the rate has none."""
+def _margin(mission: LinkMission, margin_db: Margin) -> float:
+    """The margin; a receiver too slow for the rate has none."""
     try:
-        return communication_budget(_changed(mission, name, field, value), sources).margin_db
+        return margin_db(mission)
     except RateError:
         return -math.inf
 
 
-def _changed(mission: LinkMission, name: str, field: str, value: float) -> LinkMission:
+def _changed(mission: LinkMission, name: str, field: str, value: float | tuple[float, ...]) -> LinkMission:
     """The mission with one field of one table replaced."""
     parts = name.split(".")
     table = _table(mission, name)

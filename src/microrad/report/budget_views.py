@@ -3,7 +3,8 @@
 import csv
 import io
 import math
-from dataclasses import asdict
+from collections.abc import Sequence
+from dataclasses import asdict, replace
 from typing import Any
 
 from microrad import link
@@ -11,7 +12,8 @@ from microrad.budget import Line
 from microrad.link import Swing
 from microrad.link_acquisition import Finding, Found, Tracking
 from microrad.link_performance import Performance
-from microrad.link_study import LinkStudy
+from microrad.link_study import UNDER_JITTER, LinkStudy
+from microrad.mission import source_text
 from microrad.pointing import OpenLoopPointing
 from microrad.report.quantities import quantity
 
@@ -30,12 +32,35 @@ def lines(study: LinkStudy) -> list[tuple[str, Line]]:
     return found
 
 
+def jitter_lines(study: LinkStudy) -> list[Line]:
+    """The link under its jitter as lines: what the errors cost, with and without a code, and the margin left."""
+    p = study.under_jitter
+    if p is None:
+        return []
+    source = source_text(study.file.sources, "jitter.bias", "jitter.rms", "requirement.outage")
+    regime, known = "Gaussian errors about the bias, two axes", math.isfinite(p.uncoded_penalty_db)
+    but_for = f"all but {100 * study.file.mission.requirement.outage:g} % of the time"
+    back = "power that brings the mean bit error ratio back to its target"
+    rows = [
+        ("Mean pointing loss", 0.0 - p.mean_loss_db, "dB", "what a code pays whose interleaver spans many fades"),
+        ("Pointing loss at outage", 0.0 - p.outage_loss_db, "dB", f"{but_for}; what a code pays without interleaver"),
+        ("Penalty without a code", 0.0 - p.uncoded_penalty_db, "dB", f"{back}, Gaussian beam"),
+        ("Margin at outage", p.margin_db, "dB", but_for),
+        ("Outage", p.outage, "", "share of the time with a margin below 0 dB"),
+        ("Below required margin", p.short, "", "share of the time"),
+    ]
+    found = [Line(*row, source, regime) for row in rows if math.isfinite(row[1])]
+    doubt = "" if known else f"the penalty without a code is {_uncoded(p)}"
+    return [replace(found[0], warning=doubt), *found[1:]]
+
+
 def csv_text(study: LinkStudy) -> str:
     """Every line with its value in full, for a spreadsheet."""
     buffer = io.StringIO()
     writer = csv.writer(buffer, lineterminator="\n")
     writer.writerow(COLUMNS)
-    for name, line in lines(study):
+    jitter = [(UNDER_JITTER, line) for line in jitter_lines(study)]
+    for name, line in (*lines(study), *jitter):
         value = repr(float(line.value))  # every digit, as JSON has it
         writer.writerow([name, line.name, value, line.unit, line.basis, line.source, line.regime, line.warning])
     return buffer.getvalue().rstrip("\n")
@@ -92,13 +117,12 @@ def consequences(study: LinkStudy) -> list[str]:
             f"Largest data rate with the required {q.margin_db:g} dB at {quantity(q.pointing_error_rad, 'rad')}: "
             f"{quantity(study.largest_rate_bit_s, 'bit/s')}{_rate_limit(study)}."
         )
-    top = study.tornado[:3]
-    if top:
-        moved = "; ".join(f"{s.key} {_swing(s)}" for s in top)
+    if study.tornado:
         found.append(
-            "What moves the margin most, each input by 10 % (0.5 dB; a bit error ratio by a factor of ten) both ways: "
-            f"{moved}."
+            "What moves the margin most, each input by 10 % (0.5 dB; a bit error ratio or an outage by a factor of "
+            f"ten) both ways: {_top(study.tornado)}."
         )
+    found += [f"What moves the margin {_of(t)} most: {_top(t.swings)}." for t in study.tornados if t.swings]
     intensities = ", ".join(f"{b.name.lower()} {quantity(b.radiant_intensity_w_sr, 'W/sr')}" for b in study.budgets)
     found.append(f"Radiant intensity on the axis, optics and Strehl counted: {intensities}.")
     if study.beacon is not None:
@@ -130,6 +154,16 @@ def verdict(study: LinkStudy) -> str:
 def signed_db(value_db: float) -> str:
     """A margin in decibels with its sign."""
     return f"{value_db:+.2f} dB".replace("-", "\u2212")
+
+
+def _of(t: link.Tornado) -> str:
+    """Whose margin a tornado moves, in a sentence."""
+    return "under jitter" if t.of == UNDER_JITTER else f"of the {t.of.lower()}"
+
+
+def _top(swings: Sequence[Swing]) -> str:
+    """The three inputs that move a margin most, with their swings."""
+    return "; ".join(f"{s.key} {_swing(s)}" for s in swings[:3])
 
 
 def _swing(s: Swing) -> str:
@@ -170,14 +204,29 @@ def pointing_sentences(p: OpenLoopPointing) -> list[str]:
 
 
 def performance(p: Performance, study: LinkStudy) -> str:
-    """The link under its jitter, in a sentence."""
+    """The link under its jitter, in two sentences."""
     q = study.file.mission.requirement
     narrowest = ", the narrowest of the aperture" if p.best.at_limit else ""
     return (
         f"Under the jitter: mean pointing loss {p.mean_loss_db:.2f} dB; {p.outage_loss_db:.2f} dB but for "
         f"{100 * q.outage:g} % of the time, which leaves a margin of {signed_db(p.margin_db)}; below 0 dB for a share "
-        f"of {p.outage:.3g} of the time; best half angle {quantity(p.best.half_angle_rad, 'rad')}{narrowest}."
+        f"of {p.outage:.3g} of the time; best half angle {quantity(p.best.half_angle_rad, 'rad')}{narrowest}. "
+        f"Power that it costs: with a code {p.mean_loss_db:.2f} dB where its interleaver spans many fades, "
+        f"{p.outage_loss_db:.2f} dB where it spans none; without a code {_uncoded(p)}."
     )
+
+
+def without_code(p: Performance) -> str:
+    """The penalty without a code in decibels, as it stands in a cell."""
+    if math.isnan(p.uncoded_penalty_db):
+        return "unknown"
+    return "beyond any power" if math.isinf(p.uncoded_penalty_db) else f"{p.uncoded_penalty_db:.2f}"
+
+
+def _uncoded(p: Performance) -> str:
+    if math.isnan(p.uncoded_penalty_db):
+        return "unknown, as the receiver is given by its sensitivity alone"
+    return without_code(p) + (" dB" if math.isfinite(p.uncoded_penalty_db) else "")
 
 
 def acquisition(f: Finding) -> list[str]:
@@ -243,18 +292,10 @@ def data(study: LinkStudy) -> dict[str, Any]:
             for b in study.budgets
         ],
         "largest_data_rate_bit_s": study.largest_rate_bit_s,
-        "tornado": [
-            {
-                "input": s.key,
-                "unit": s.unit,
-                "value": s.value,
-                "low": s.low,
-                "high": s.high,
-                "margin_low_db": s.margin_low_db,
-                "margin_high_db": s.margin_high_db,
-                "source": s.source,
-            }
-            for s in study.tornado
+        "tornado": [_swing_data(s) for s in study.tornado],
+        "other_tornados": [
+            {"of": t.of, "margin_db": t.margin_db, "tornado": [_swing_data(s) for s in t.swings]}
+            for t in study.tornados
         ],
         "pointing": {
             "lines": [line_data(line) for line in p.lines],
@@ -272,6 +313,19 @@ def data(study: LinkStudy) -> dict[str, Any]:
         "acquisition": None if study.finding is None else finding_data(study.finding),
         "under_jitter": None if study.under_jitter is None else performance_data(study.under_jitter),
         "warnings": list(study.warnings),
+    }
+
+
+def _swing_data(s: Swing) -> dict[str, Any]:
+    return {
+        "input": s.key,
+        "unit": s.unit,
+        "value": s.value,
+        "low": s.low,
+        "high": s.high,
+        "margin_low_db": s.margin_low_db,
+        "margin_high_db": s.margin_high_db,
+        "source": s.source,
     }
 
 
@@ -324,6 +378,8 @@ def performance_data(p: Performance) -> dict[str, Any]:
         "best_half_angle_rad": p.best.half_angle_rad,
         "wanted_half_angle_rad": p.best.wanted_half_angle_rad,
         "lost_against_best_db": p.best.current_excess_db,
+        "coded_penalty_many_fades_db": p.mean_loss_db,
+        "coded_penalty_no_interleaver_db": p.outage_loss_db,
         "uncoded_penalty_db": p.uncoded_penalty_db,
         "fades_per_s": p.fades_per_s,
         "mean_fade_s": p.fade_s,
@@ -341,6 +397,7 @@ def finding_data(f: Finding) -> dict[str, Any]:
         "return_coverage": f.chances.return_coverage,
         "scan_s": None if s is None or not s.detects else s.duration_s,
         "scan_radius_rad": None if s is None else s.radius_rad,
+        "scan_half_angle_rad": None if s is None else s.half_angle_rad,
         "scan_stated_detection_s": None if s is None else s.stated_detection_s,
         "scan_needed_detection_s": None if s is None or not s.detects else s.needed_detection_s,
         "ways": [

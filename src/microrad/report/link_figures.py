@@ -10,28 +10,41 @@ from matplotlib.figure import Figure as Canvas
 from matplotlib.patches import Patch
 
 from microrad.acquisition import Trade
-from microrad.link import Swing
+from microrad.link import Swing, Tornado
 from microrad.link_acquisition import Finding
-from microrad.link_study import LinkStudy
+from microrad.link_study import UNDER_JITTER, LinkStudy
 from microrad.report.day_assumptions import swing_bars
 from microrad.report.figures import BLUE, ORANGE, STYLE, VERMILION, Figure, svg_of
 from microrad.units import format_quantity
 
 MOST_BARS = 14
+_LINKS = {"Communication": "communication link", UNDER_JITTER: "communication link but for the outage, under jitter"}
+_TITLES = {
+    "Communication": ("tornado", "What moves the margin"),
+    UNDER_JITTER: ("tornado-under-jitter", "What moves the margin under jitter"),
+    "Beacon": ("tornado-beacon", "What moves the margin of the beacon"),
+    "Answer": ("tornado-answer", "What moves the margin of the answer"),
+}
 
 
 def draw(study: LinkStudy) -> tuple[Figure, ...]:
     """The figures of the links, in the order of the page."""
     with rc_context(STYLE):
         figures = [tornado(study)] if study.tornado else []
+        figures += [one_tornado(study, t) for t in study.tornados if t.swings]
         if study.finding is not None and study.finding.trade is not None:
             figures.append(trade(study, study.finding, study.finding.trade))
     return tuple(figures)
 
 
 def tornado(study: LinkStudy) -> Figure:
-    """The margin over each input, one at a time."""
-    shown, margin = study.tornado[:MOST_BARS], study.communication.margin_db
+    """The margin of the communication link over each input, one at a time."""
+    return one_tornado(study, Tornado("Communication", study.communication.margin_db, study.tornado))
+
+
+def one_tornado(study: LinkStudy, of: Tornado) -> Figure:
+    """One margin over each of its inputs, one at a time."""
+    shown, margin = of.swings[:MOST_BARS], of.margin_db
     canvas = Canvas(figsize=(6.4, 0.9 + 0.27 * len(shown)), layout="constrained")
     axes = canvas.subplots()
     lost_db = _lost(shown, margin)
@@ -41,29 +54,30 @@ def tornado(study: LinkStudy) -> Figure:
         if not math.isfinite(swing.swing_db):
             ink = "white" if math.isinf(swing.margin_high_db) else "black"
             _say(axes, (lost_db, row), "< no margin: receiver too slow", ink, "center")
-    required = study.file.mission.requirement.margin_db
+    data, required = of.of.startswith("Communication"), study.file.mission.requirement.margin_db
     low, high = axes.get_xlim()
-    if low < required < high:
+    if data and low < required < high:
         axes.axvline(required, color=VERMILION, linestyle="--", linewidth=1.0)
         _say(axes, (required, -0.55), "required", VERMILION, "bottom")
-    axes.set(xlabel="margin of the communication link (dB)")
+    axes.set(xlabel=f"margin of the {_LINKS.get(of.of, of.of.lower())} (dB)")
     keys = [Patch(color=ORANGE, label="input lower"), Patch(color=BLUE, label="input higher")]
     axes.legend(handles=keys, loc="lower right", fontsize=8)
     assumed = [s.key for s in shown if s.kind == "assumption"]
     caption = (
         "Margin with one input at a time 10 % lower and higher (0.5 dB for those in decibels, a factor of ten for a "
-        "bit error ratio), never beyond its bounds; all others as they are."
+        "bit error ratio and an outage), never beyond its bounds; all others as they are."
     )
     if assumed:
         caption += f" Assumptions among them: {', '.join(assumed)}."
     columns = {
-        "margin lower (dB)": np.array([s.margin_low_db for s in study.tornado]),
-        "margin higher (dB)": np.array([s.margin_high_db for s in study.tornado]),
-        "value (SI)": np.array([s.value for s in study.tornado]),
-        "lower (SI)": np.array([s.low for s in study.tornado]),
-        "higher (SI)": np.array([s.high for s in study.tornado]),
+        "margin lower (dB)": np.array([s.margin_low_db for s in of.swings]),
+        "margin higher (dB)": np.array([s.margin_high_db for s in of.swings]),
+        "value (SI)": np.array([s.value for s in of.swings]),
+        "lower (SI)": np.array([s.low for s in of.swings]),
+        "higher (SI)": np.array([s.high for s in of.swings]),
     }
-    return Figure("tornado", "What moves the margin", caption, svg_of(canvas), columns)
+    name, title = _TITLES[of.of]
+    return Figure(name, title, caption, svg_of(canvas), columns)
 
 
 def _say(axes: Axes, place: tuple[float, float], words: str, color: str, va: str) -> None:
@@ -101,13 +115,15 @@ def trade(study: LinkStudy, found: Finding, t: Trade) -> Figure:
     m = study.file.mission
     assert m.acquisition is not None
     assert m.acquisition.scan is not None
-    scan = m.acquisition.scan
+    assert found.scanned is not None
+    scan, half = m.acquisition.scan, format_quantity(found.scanned.half_angle_rad, "rad", 3)
     caption = (
         f"Time to be found at {100 * scan.coverage:g} % coverage, without settling and light time. The beacon's "
         "power, spread over a cone that covers the uncertainty, makes the partner's sensor integrate with the fourth "
         f"power of it (noise that does not depend on the light; at least {format_quantity(scan.detection_s, 's')}); "
-        f"the same power in a beam of {format_quantity(scan.beam_radius_rad, 'rad')} half angle, led over it with an "
-        f"overlap of {scan.overlap:g} under {format_quantity(scan.jitter_rms_rad, 'rad')} of jitter per axis, takes a "
+        f"the same power in a beam of {half} half angle at 1/e2, used out to "
+        f"{format_quantity(scan.beam_radius_rad, 'rad')} and led over it with an overlap of {scan.overlap:g} under "
+        f"{format_quantity(scan.jitter_rms_rad, 'rad')} of jitter per axis, takes a "
         f"time that grows with its square and finds {100 * float(np.min(t.scan_probability)):.1f} % or more."
     )
     columns = {

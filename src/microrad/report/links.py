@@ -122,6 +122,7 @@ def cells(c: Performance) -> list[str]:
         f"{math.hypot(*c.jitter.bias_rad, *c.jitter.rms_rad) * 1e6:.2f}",
         f"{c.mean_loss_db:.2f}",
         f"{c.outage_loss_db:.2f}",
+        budget_views.without_code(c),
         f"{c.margin_db:+.2f}".replace("-", "\u2212"),
         share(c.outage),
         share(c.short),
@@ -139,9 +140,12 @@ def share(value: float) -> str:
 def note(*, costs: bool) -> str:
     """How the columns are to be read."""
     how = (
-        "Rms: radial, about zero. Outage: share of the time with a margin below 0 dB. Best half angle: of a Gaussian "
-        "beam, at 1/e2, with the most power at the error of that column; a star: the present one, since a narrower "
-        "one would take a larger aperture. Data rate: the largest with the required margin at that loss."
+        "Rms: radial, about zero. Penalty, the power that the errors cost: with a code the mean loss where its "
+        "interleaver spans many fades, the loss at the outage where it spans none; without a code what brings the mean "
+        "bit error ratio back to its target, in a Gaussian beam, unknown for a receiver that is given by its "
+        "sensitivity alone. Outage: share of the time with a margin below 0 dB. Best half angle: of a Gaussian beam, "
+        "at 1/e2, with the most power at the error of that column; a star: the present one, since a narrower one would "
+        "take a larger aperture. Data rate: the largest with the required margin at that loss."
     )
     against = " What hysteresis costs: against the same controller and the same errors on a mirror without it."
     return how + against if costs else how
@@ -201,18 +205,7 @@ def fades(cases: Sequence[Performance]) -> list[str]:
         for c in known
     )
     found = [f"Fades below the required margin, for Gaussian errors of that rms and spectrum: {said}."]
-    penalties = [c for c in known if not math.isnan(c.uncoded_penalty_db)]
-    if penalties:
-        said = "; ".join(f"{c.controller or c.source} {_penalty(c)}" for c in penalties)
-        found.append(
-            f"Power that brings an uncoded link's mean bit error ratio back to its target: {said}. A coded link pays "
-            "the mean loss when its interleaver spans many fades, and the loss of the outage column when it spans none."
-        )
     return found + [f"{c.fade_warning[0].upper()}{c.fade_warning[1:]}." for c in known if c.fade_warning][:1]
-
-
-def _penalty(c: Performance) -> str:
-    return "more than any power" if math.isinf(c.uncoded_penalty_db) else f"{c.uncoded_penalty_db:.2f} dB"
 
 
 # --------------------------------------------------------------------------------------------------------- acquisition

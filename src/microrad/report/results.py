@@ -224,6 +224,11 @@ def _performance(study: Study) -> xr.Dataset:
             "pointing loss exceeded for the outage's share of time",
             [c.outage_loss_db for c in cases],
         ),
+        "uncoded_penalty": (
+            "dB",
+            "power that the pointing error costs without a code; nan where the receiver's curve is not known",
+            [c.uncoded_penalty_db for c in cases],
+        ),
         "margin": ("dB", "margin at the outage loss", [c.margin_db for c in cases]),
         "outage": ("1", "share of the time with a margin below 0 dB", [c.outage for c in cases]),
         "below_required": ("1", "share of the time below the required margin", [c.short for c in cases]),
