@@ -67,10 +67,15 @@ def within(x, low, high):
     return min(max(x, low), high)
 
 
+def weights(matrix):
+    """By row, the places and the values of the numbers that are not 0, as whole numbers of Python."""
+    return [[(j, weight) for j, weight in enumerate(row) if weight] for row in matrix.tolist()]
+
+
 def dot(row, numbers):
     total = 0
-    for weight, number in zip(row, numbers, strict=True):
-        total += int(weight) * number
+    for place, weight in row:
+        total += weight * numbers[place]
         assert -(2**63) <= total < 2**63
     return total
 
@@ -82,6 +87,7 @@ class Twin:
         self.of = of
         self.x = [0] * len(of.state_scale)
         self.read = [0] * len(of.input_scale)
+        self.outputs, self.moves = weights(of.output.value), weights(of.state.value)
 
     def words(self):
         return [rounded(x, s) for x, s in zip(self.x, self.of.state_shift, strict=True)]
@@ -89,13 +95,13 @@ class Twin:
     def output(self, reading):
         word, signals = self.of.word, self.words()
         self.read = [within(int(r), -word, word) for r in reading]
-        sums = [dot(row, signals + self.read) for row in self.of.output.value]
+        sums = [dot(row, signals + self.read) for row in self.outputs]
         return [within(rounded(y, s), -word, word) for y, s in zip(sums, self.of.output_shift, strict=True)]
 
     def update(self, excess):
         word = self.of.word
         signals = self.words() + self.read + [within(int(e), -word, word) for e in excess]
-        moved = [x + dot(row, signals) for x, row in zip(self.x, self.of.state.value, strict=True)]
+        moved = [x + dot(row, signals) for x, row in zip(self.x, self.moves, strict=True)]
         assert all(-(2**63) <= x < 2**63 for x in moved)
         self.x = [within(x, -(word << s), word << s) for x, s in zip(moved, self.of.state_shift, strict=True)]
 

@@ -19,14 +19,13 @@ from fmpy.fmi1 import FMICallException
 from fmpy.validation import validate_fmu
 from packaging.requirements import Requirement
 
+import designs
 from microrad import control, hysteresis, kernels, lti, mirror, simulate
 from microrad.export import choice, fmi_description, fmu
 from microrad.export.build import compiler
 from microrad.export.records import ExportError, Origin, PlantUnit, Signal
 from microrad.fine_loop import ensemble
 from microrad.fine_loop.loop import LoopController, PointingLoop
-from microrad.missionfile import load_mission
-from shipped import SHIPPED
 
 VERSIONS = ("2.0", "3.0")
 AGREEMENT = 1e-9
@@ -36,19 +35,12 @@ pytestmark = pytest.mark.skipif(compiler() is None, reason="there is no C compil
 
 
 # --------------------------------------------------------------------------------------------------- units, and a slave
-@cache
-def mission():
-    return load_mission(SHIPPED)
-
-
-@cache
 def tracking():
-    return choice.choose(mission(), "PID + inverse")
+    return designs.chosen("PID + inverse")
 
 
-@cache
 def pointing(name="PI + inverse"):
-    return choice.choose(mission(), name)
+    return designs.chosen(name)
 
 
 OPTICS = np.array([[1.0, 0.2], [-0.1, 0.9], [0.5, 0.5]])
@@ -104,7 +96,7 @@ def play_unit():
 
 
 UNITS = {
-    "mirror": lambda: choice.plant_unit(mission(), "control"),
+    "mirror": lambda: choice.plant_unit(designs.mission(), "control"),
     "rich": rich_unit,
     "plays": play_unit,
     "loop": lambda: choice.loop_unit(tracking()),
@@ -299,7 +291,7 @@ def test_the_library_shows_the_functions_of_the_standard_alone(archive, tmp_path
 
 
 def test_the_same_unit_is_the_same_file(tmp_path):
-    unit = UNITS["mirror"]()
+    unit = UNITS["plays"]()
     other = replace(unit, bias_v=unit.bias_v + 1.0)
     made = [fmu.write_unit(each, tmp_path / f"{i}.fmu", "2.0", "mirror") for i, each in enumerate((unit, unit, other))]
     assert made[0].path.read_bytes() == made[1].path.read_bytes()
@@ -310,8 +302,8 @@ def test_the_same_unit_is_the_same_file(tmp_path):
 
 # ------------------------------------------------------------------------------------------ the scenario of the paper
 def sine(freq_hz):
-    c = tracking()
-    reference, steady = simulate.sine(mission().mission.scenario.amplitude_rad, freq_hz, c.setup.timing.period_s)
+    c, scenario = tracking(), designs.mission().mission.scenario
+    reference, steady = simulate.sine(scenario.amplitude_rad, freq_hz, c.setup.timing.period_s)
     return simulate.track(c.name, c.mirror, c.setup, c.inverse, reference, steady)
 
 
@@ -424,7 +416,7 @@ POINTING = {
 def test_the_loop_follows_the_kernel_in_the_jitter(tmp_path, name, version):
     """Fine pointing, plant step by plant step; also with a late, coarse optical sensor that loses the spot."""
     chosen = quiet(pointing(name), **POINTING[name])
-    loop, samples = chosen.scene.loop, 1500
+    loop, samples = chosen.scene.loop, 800
     p = ensemble.arrays(loop, chosen.controller, 11)
     state = ensemble.start(loop, p, 0)
     by_sample = ensemble.reference(loop, 0, samples)

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from scipy.io import loadmat, savemat
 
+import designs
 from microrad import control, lti, mirror, simulate
 from microrad.control.analysis import loop_response
 from microrad.export import choice, matrices
@@ -41,22 +42,22 @@ weights = ["80 urad/V", "9 urad/V"]
 
 @pytest.fixture(scope="module")
 def file():
-    return load_mission(SHIPPED)
+    return designs.mission()
 
 
 @pytest.fixture(scope="module")
-def tracking(file):
-    return choice.choose(file, choice.PID_WITH_INVERSE)
+def tracking():
+    return designs.chosen(choice.PID_WITH_INVERSE)
 
 
 @pytest.fixture(scope="module")
-def pointing(file):
-    return choice.choose(file, "PI + inverse in series")
+def pointing():
+    return designs.chosen("PI + inverse in series")
 
 
 @pytest.fixture(scope="module")
-def gauged(file):
-    return choice.choose(file, "resonant damping")
+def gauged():
+    return designs.chosen("resonant damping")
 
 
 def of(chosen, name):

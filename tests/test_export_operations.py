@@ -5,22 +5,20 @@ import re
 import shutil
 import subprocess
 from dataclasses import astuple, dataclass, fields, replace
-from functools import cache
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+import designs
 from microrad import lti
-from microrad.export import choice, fixed, flight, operations
+from microrad.export import fixed, flight, operations
 from microrad.export.fixed import FixedForm
 from microrad.export.operations import FixedOperations, Operations
 from microrad.export.records import FlightController, Floats, InverseLaw, Origin, Signal, Vectors
 from microrad.export.rounding import RoundingBound
 from microrad.export.sections import Sections, sections
-from microrad.missionfile import load_mission
 
-MISSION = Path(__file__).resolve().parent.parent / "missions" / "leo-geo.toml"
 KINDS = tuple(each.name for each in fields(Operations))
 WHOLE_KINDS = ("multiplications", "additions", "shifts", "comparisons", "conversions")
 
@@ -147,7 +145,7 @@ def compiled(folder: Path, files: dict[str, str], of: FlightController, precisio
     base, suffix = ("float", "f") if precision == "single" else ("double", "")
     names = ("exp", "expm1", "log1p", "floor", "fabs", "pow", "fmin", "fmax")
     defined = [f"-D{each.upper()}={each}{suffix}" for each in names]
-    command = ["g++", "-std=gnu++20", "-w", "-O1", "-shared", "-fPIC", f"-DBASE={base}", *defined]
+    command = ["g++", "-std=gnu++20", "-w", "-O0", "-shared", "-fPIC", f"-DBASE={base}", *defined]
     subprocess.run([*command, "-o", "code.so", "all.cpp"], cwd=folder, check=True, timeout=120)
     return Counted(ctypes.CDLL(str(folder / "code.so")), of.actuators)
 
@@ -176,11 +174,9 @@ def counted_fixed(folder: Path, of: FlightController, made: FixedForm) -> Counte
 
 
 # ----------------------------------------------------------------------------------------------------------- designs
-@cache
 def designed(name: str) -> tuple[FlightController, Vectors]:
     """A controller of the mission, and a recorded run of it."""
-    chosen = choice.choose(load_mission(MISSION), name)
-    return choice.flight_controller(chosen), choice.vectors(chosen, 1500)
+    return designs.flown(name, 1500)
 
 
 def plain(of: InverseLaw | None, resolution_v: float = 1e-3) -> FlightController:

@@ -8,21 +8,17 @@ import shutil
 import subprocess
 from dataclasses import replace
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 import pytest
 
+import designs
 from microrad import kernels, lti
 from microrad.export import double_run, rounding
-from microrad.export.choice import choose, flight_controller, vectors
 from microrad.export.flight import compensated_states, flight_code, vectors_text
-from microrad.export.modes import minimal
 from microrad.export.records import FlightController, InverseLaw, Origin, Signal, Vectors
 from microrad.export.sections import sections
-from microrad.missionfile import load_mission
 
-MISSION = Path(__file__).parent.parent / "missions" / "leo-geo.toml"
 SAMPLES = 2000
 f = np.float32
 ONE, TOLERANCE, TRIALS = f(1.0), f(1e-6), 256
@@ -33,9 +29,8 @@ SHIPPED = ("PI + inverse", "PI + inverse in series", "LQG", "PID + inverse")
 @cache
 def shipped(name):
     """A controller of the shipped mission, its sections and a recorded run."""
-    chosen = choose(load_mission(MISSION), name)
-    of = minimal(flight_controller(chosen))
-    return of, sections(of), vectors(chosen, SAMPLES)
+    of, v = designs.flown(name, SAMPLES)
+    return of, sections(of), v
 
 
 # ------------------------------------------------------------------------------------------------------------- the twin
@@ -235,7 +230,7 @@ def test_what_integrators_lose_grows_with_the_samples():
     ahead = np.max(rounding.errors_before_converter(of, form, v))
     assert np.max(rounding.errors_before_converter(of, form, half)) < ahead
     assert f"{whole.command_v:.3g} V of double over these {SAMPLES} samples" in whole.words
-    assert f"up to {whole.per_sample_v:.2g} V." in whole.words
+    assert f"grows by {whole.per_sample_v:.2g} V a sample." in whole.words
 
 
 # ---------------------------------------------------------------------------------------------------- other controllers
@@ -383,6 +378,36 @@ def test_a_memory_that_single_precision_cannot_move_is_bounded():
     assert np.all(wrong <= ahead)
     assert wrong[-1, 0] > 3.0 * wrong[400, 0]
     assert np.max(ahead) < 1e-3
+
+
+@pytest.mark.parametrize("row", [PAPER, STEEP, POWER, (*PAPER[:6], 400.0, 6.0, 0.4, -0.3)])
+def test_no_drive_takes_h_beyond_what_the_element_holds(row):
+    """Steps to and fro of all sizes, at rates up to the limit; sweeps to either side come near to it."""
+    row = np.array([*row, *[0.0] * (12 - len(row))])
+    limit, arrays = row[kernels.RATE_LIMIT], kernels.bouc_wen_rows([tuple(row)])
+    grown = row[kernels.EPSILON] * math.exp(row[kernels.DELTA] * limit)
+    held_ = rounding._held_at_most(row, abs(grown))
+    rng = np.random.default_rng(4)
+    wild = rng.normal(size=2000) * 10.0 ** rng.uniform(-4, 1, 2000)
+    steps = np.concatenate([np.full(400, 0.5), np.full(400, -0.5), wild])
+    h, largest = 0.0, 0.0
+    for travel in steps:
+        if row[kernels.POWER] == 0.0:
+            h = kernels.bouc_wen_step(h, travel, grown, *row[[kernels.ALPHA, kernels.BETA, kernels.GAMMA, kernels.ETA]])
+        else:
+            h = kernels.bouc_wen_power_step(h, travel, grown, arrays, 0)
+        largest = max(largest, abs(h))
+    assert 0.9 * held_ < largest <= held_
+
+
+def test_a_drive_that_rests_does_not_let_the_bound_grow_for_ever():
+    """Each sample of a resting reference may turn h round in single precision, but not beyond what it holds."""
+    system = lti.StateSpace(np.zeros((0, 0)), np.zeros((0, 1)), np.zeros((2, 0)), np.array([[0.0], [1.0]]))
+    of = one_axis(system, inverse=law((PAPER,)))
+    inputs = np.concatenate([np.linspace(0.0, 4e-3, 500), np.full(9500, 4e-3)])[:, None]
+    ahead = rounding.errors_before_converter(of, sections(of), vectors_of(inputs))[:, 0]
+    assert 0.1 < ahead[-1] < 0.6
+    assert ahead[-1] - ahead[-2000] < 1e-2 * (ahead[2000] - ahead[1000])
 
 
 def test_creep_that_amplifies_its_own_errors_is_bounded():

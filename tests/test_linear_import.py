@@ -260,7 +260,9 @@ def test_what_is_no_linear_mirror_is_refused(fields, why, tmp_path):
         ({"output_unit": "deg"}, "output_unit = 'deg' is none of rad, mrad, urad"),
         ({"travel_rad": -1.0}, r"the mirror file would be refused: travel: .*not above 0"),
         ({"bias_v": 20.0}, r"would be refused: .*bias is outside drive_min to drive_max"),
-        ({"normalise_at_hz": 0.5}, r"would be refused: linear: .*normalise_at is outside excited_from to excited_to"),
+        ({"normalise_at_hz": 0.5}, r"the gain is taken at 0\.5 Hz .*not in the band of 1 Hz to 5000 Hz"),
+        ({"normalise_at_hz": 9000.0}, r"the gain is taken at 9000 Hz .*not in the band of 1 Hz to 5000 Hz"),
+        ({"drive_min_v": 12.0, "drive_max_v": 0.0}, r"would be refused: drive_max is not above drive_min"),
         ({"name": "x" * 201}, "would be refused: name: "),
     ],
 )

@@ -69,6 +69,17 @@ class _Loop(StrEnum):
 
 DEFAULT_CONTROLLER = "PI + inverse"
 
+_FlightController = Annotated[
+    str | None, option("--controller", "NAME", f"{_CONTROLLER} [default: {DEFAULT_CONTROLLER}].")
+]
+_Begin = Annotated[
+    str | None, option("--name", "IDENTIFIER", "What names in the code begin with [default: from the controller].")
+]
+_Kind = Annotated[
+    _Precision, option("--precision", "KIND", "double, single, or fixed (linear part in 32-bit integers).")
+]
+_Folder = Annotated[Path | None, option("--output", "FOLDER", "Folder to write [default: <mission>-<identifier>].")]
+
 
 def _mission(file: Path, mirror: Path | None) -> "MissionFile":
     from microrad.missionfile import load_mission
@@ -91,19 +102,11 @@ def _default_controller(mission: "MissionFile") -> str:
 @command
 def c(
     file: _File,
-    controller: Annotated[
-        str | None, option("--controller", "NAME", f"{_CONTROLLER} [default: {DEFAULT_CONTROLLER}].")
-    ] = None,
-    name: Annotated[
-        str | None, option("--name", "IDENTIFIER", "What names in the code begin with [default: from the controller].")
-    ] = None,
-    precision: Annotated[
-        _Precision, option("--precision", "KIND", "double, single, or fixed (linear part in 32-bit integers).")
-    ] = _Precision.DOUBLE,
+    controller: _FlightController = None,
+    name: _Begin = None,
+    precision: _Kind = _Precision.DOUBLE,
     mirror: _Mirror = None,
-    output: Annotated[
-        Path | None, option("--output", "FOLDER", "Folder to write [default: <mission>-<identifier>].")
-    ] = None,
+    output: _Folder = None,
     overwrite: Overwrite = False,
     as_json: Json = False,
 ) -> Outcome:

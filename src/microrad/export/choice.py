@@ -157,12 +157,11 @@ def inverse_law(of: control.Inverse, period_s: float, by_difference: bool) -> In
 def _pointing_controller(choice: PointingChoice) -> FlightController:
     loop, made, margins = choice.scene.loop, choice.controller, choice.tuned.margins
     period = loop.timing.period_s
+    error = "line-of-sight error (wanted less actual)"
     inputs = (
-        Signal(
-            OPTICAL_ERROR, loop.axes, "rad", "line-of-sight error from the optical sensor, by axis", INPUT_LIMIT_RAD
-        ),
+        Signal(OPTICAL_ERROR, loop.axes, "rad", f"{error} from the optical sensor, by axis", INPUT_LIMIT_RAD),
         Signal(GAUGE, loop.mirror.axes, "rad", "strain gauge's reading of the mirror, by output", INPUT_LIMIT_RAD),
-        Signal(REFERENCE, loop.axes, "rad", "known part of the line-of-sight error, by axis", INPUT_LIMIT_RAD),
+        Signal(REFERENCE, loop.axes, "rad", f"known part of the {error}, by axis", INPUT_LIMIT_RAD),
     )
     return FlightController(
         name=made.name,

@@ -10,7 +10,7 @@ from microrad import kernels, lti
 from microrad.export.double_run import run
 from microrad.export.fixed_form import HEAD_ROOM, FixedForm, Poles, scaled
 from microrad.export.fixed_report import poles, report, report_text
-from microrad.export.flight import flight_code
+from microrad.export.flight import flight_code, start_words
 from microrad.export.identifiers import identifier
 from microrad.export.records import ExportError, FlightController, Signal, Vectors
 from microrad.export.rounding import RoundingBound
@@ -119,6 +119,7 @@ def fixed_code(of: FlightController, form: Sections, fixed: FixedForm, name: str
         "outputs": _output_constants(of, fixed),
         "tables": _tables(form, fixed),
         "report": report_text(fixed).splitlines(),
+        "start": start_words(of, rejects=False),
     }
     files = {
         f"{whole}.h": render("fixed.h.j2", **values),
@@ -171,7 +172,7 @@ def _inverse_code(of: FlightController, fixed: FixedForm, name: str) -> dict[str
     ends = [math.ldexp(1.001 * fixed.word, -fixed.output_scale[j * n]) for j in range(1, rows // n)]
     signals = (
         Signal("wanted_rad", n, "rad", "target, by actuator", ends[0]),
-        *(Signal("wanted_rate_rad_s", n, "rad_s", "rate of the target (rad/s), by actuator", end) for end in ends[1:]),
+        *(Signal("wanted_rate_rad_s", n, "rad/s", "rate of the target, by actuator", end) for end in ends[1:]),
     )
     D = np.vstack([np.zeros((n, rows - n)), np.eye(rows - n)])
     nothing = np.zeros((0, 0))

@@ -1,7 +1,8 @@
 """Flight code: a controller as C99 with its make file and test bench, and the recorded run that goes with it."""
 
 import math
-from dataclasses import dataclass
+import re
+from dataclasses import dataclass, replace
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
@@ -76,6 +77,12 @@ def flight_code(
     return {file: render(template, headers=headers, sources=sources, **values) for file, template in templates.items()}
 
 
+def within_limits(of: FlightController, v: Vectors) -> Vectors:
+    """The recorded run with commands that leave no limit: the kernel rounds to the nearest count, the code inwards."""
+    limits = _limits(of, "double")
+    return replace(v, commands=np.clip(v.commands, limits.lowest, limits.highest))
+
+
 def vectors_text(of: FlightController, v: Vectors) -> str:
     """The recorded run as the bench reads it: readings and commands by sample, with all their digits."""
     names = [f"{each.name}_{i}" for each in of.inputs for i in range(each.size)]
@@ -131,7 +138,7 @@ def _values(of: FlightController, form: Sections, name: str, precision: Precisio
         "name": name,
         "precision": precision,
         "version": version("microrad"),
-        "use": _use(name),
+        "use": (_use(name), start_words(of)),
         "of": of,
         "limits": _limits(of, precision),
         "signals": _readings(of.inputs),
@@ -199,8 +206,9 @@ def terms(matrix: Floats) -> Terms:
 def _readings(inputs: tuple[Signal, ...]) -> list[Reading]:
     found, first = [], 0
     for s in inputs:
-        plain = s.name.removesuffix(f"_{s.unit}").upper()
-        found.append(Reading(s.name, s.size, s.unit, s.meaning, s.limit, first, plain, s.unit.upper()))
+        unit = re.sub(r"[^A-Z0-9]+", "_", s.unit.upper())  # rad/s: RAD_S
+        plain = s.name.upper().removesuffix(f"_{unit}")
+        found.append(Reading(s.name, s.size, s.unit, s.meaning, s.limit, first, plain, unit))
         first += s.size
     return found
 
@@ -254,10 +262,12 @@ def _facts(of: FlightController, form: Sections, values: dict[str, Any], bound: 
     precision = (
         f"Double precision: within {values['bound_share']:g} of the largest command of what the simulation commands."
     )
-    if bound is not None:
+    if bound is not None and bound.command_v >= of.maximum_v - of.minimum_v:
+        precision = f"Single precision. {bound.words}"
+    elif bound is not None:
         precision = (
             f"Single precision: within {bound.command_v:.3g} V of double precision over {bound.samples} recorded "
-            f"samples; each further one adds up to {bound.per_sample_v:.2g} V ahead of the converter."
+            "samples. A longer run has a larger bound (microrad.export.rounding works it out)."
         )
     inverse = []
     if of.inverse is not None:
@@ -288,3 +298,18 @@ def _use(name: str) -> str:
         "command is always a finite number within the limits. Mask floating-point traps where the processor has them: "
         "nan and infinity are dealt with here. Do not compile with -ffast-math."
     )
+
+
+def start_words(of: FlightController, rejects: bool = True) -> str:
+    """How to begin, and what to do while the loop is open; ``rejects``: the code holds off readings that are faults."""
+    words = (
+        "Drives and modes: the amplifier's input is the bias plus the command, and the mirror's angle rises with it. "
+        "The initial state is that of a mirror at rest at the bias; the first command answers the first readings. "
+        "While there is no error signal, go on stepping with an error of 0 (a reading equal to its reference): "
+        "integrators then stay where they are, and to close the loop again makes no jump."
+    )
+    if of.inverse is not None:
+        words += " The inverse keeps track of the mirror's hysteresis only as long as each command is applied."
+    if rejects:
+        words += " A reading that goes on being rejected goes on driving the integrators: watch `rejected`."
+    return words + " After any other drive, bring the mirror back to rest at the bias and initialise."

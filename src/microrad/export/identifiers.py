@@ -40,6 +40,7 @@ _LIBRARY = """
     strncpy strpbrk strrchr strspn strstr strtok strxfrm
     errno assert offsetof clock time timespec tm clock_gettime
     linux unix i386
+    state_of output_of
 """
 
 _TAKEN = frozenset(_LIBRARY.split()) | {name + ending for name in _MATHEMATICS.split() for ending in ("", "f", "l")}
@@ -68,7 +69,7 @@ def _trouble(name: str) -> str:
             f"it has {len(name)} characters, and C compilers need not tell apart more than {LONGEST}",
         ),
         (name in _KEYWORDS.split(), "it is a keyword of C or C++"),
-        (name in _TAKEN, "the C library, or the code's own entry point, has that name"),
+        (name in _TAKEN, "the C library, or the exported code itself, has that name"),
         ("__" in name, "C++ keeps names with two underscores in a row for itself"),
         (name.endswith("_t"), "POSIX keeps names that end in _t for its types"),
     )

@@ -130,6 +130,12 @@ def _check_given(given: Given, source: str) -> None:
             raise ExportError(f"{source}: {field.name} = {value} is not finite; give a number")
     if given.output_unit not in ("rad", "mrad", "urad"):
         raise ExportError(f"{source}: output_unit = {given.output_unit!r} is none of rad, mrad, urad; give one of them")
+    low, at, high = given.excited_from_hz, given.normalise_at_hz, given.excited_to_hz
+    if not low <= at <= high:
+        raise ExportError(
+            f"{source}: the gain is taken at {at:g} Hz (normalise_at), which is not in the band of {low:g} Hz to "
+            f"{high:g} Hz that the model was identified in; give a frequency inside it"
+        )
 
 
 def _gain(model: Roots, given: Given, source: str) -> float:
@@ -191,7 +197,8 @@ def _reasons(error: ValueError) -> str:
         return str(error)
     found = error.errors(include_url=False)
     return "; ".join(
-        f"{'.'.join(map(str, each['loc']))}: {each['msg'].removeprefix('Value error, ')}" for each in found
+        ": ".join(filter(None, (".".join(map(str, each["loc"])), each["msg"].removeprefix("Value error, "))))
+        for each in found
     )
 
 

@@ -7,9 +7,8 @@ from numpy.typing import NDArray
 
 from microrad import lti
 from microrad.export.block_diagonal import BlockDiagonal, block_diagonal
-from microrad.export.records import ExportError, FlightController
+from microrad.export.records import ExportError, FlightController, Floats
 
-Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 Wide = NDArray[np.longdouble]
 

@@ -32,8 +32,9 @@ _ROUND_OFF = 1e-5
 class RoundingBound:
     """Largest |command in single precision - command in double| over the ``samples`` of a recorded run, in V.
 
-    ``per_sample_v`` is what each further sample of the same kind adds ahead of the converter: integrators keep what is
-    lost in them. ``words`` says the same in a sentence.
+    ``per_sample_v`` is what a sample adds to the bound ahead of the converter over the second half of them: integrators
+    keep what is lost in them. It says nothing of a longer run, which has a bound of its own. ``words`` says the same in
+    a sentence.
     """
 
     command_v: float
@@ -76,8 +77,8 @@ def _words(of: FlightController, command: float, largest: float, growth: float, 
         return f"Over these {samples} samples it is not bounded: errors may grow while commands are clipped."
     where = "" if of.resolution_v == 0.0 else f" ({largest:.3g} V ahead of a converter of {of.resolution_v:.3g} V)"
     return (
-        f"It stays within {command:.3g} V of double over these {samples} samples{where}; each further one adds up to "
-        f"{growth:.2g} V."
+        f"It stays within {command:.3g} V of double over these {samples} samples{where}; over the second half of them "
+        f"that grows by {growth:.2g} V a sample."
     )
 
 
@@ -206,7 +207,9 @@ def _memory_errors(
     """Errors of h by sample: h' = a h + b travel to first order, a <= exp(-decay), b the slope dh/dq at the end.
 
     The drive's own error q^ - q does not add up: what it adds at one step it takes back at the next but for the change
-    of its weight, so that the variation of the weights counts (summation by parts).
+    of its weight, so that the variation of the weights counts (summation by parts). Where a drive creeps by less than
+    its error the direction is not known, and the variation is that between both; neither h goes beyond what the element
+    holds, which ends the sum.
     """
     before = np.concatenate([[0.0], h[:-1]])
     grown = row[kernels.EPSILON] * np.exp(row[kernels.DELTA] * np.abs(rate))
@@ -228,7 +231,22 @@ def _memory_errors(
     if row[kernels.POWER] != 0.0:
         local += _POWER_TOLERANCE / row[kernels.PER_SIZE] * np.minimum(1.0, most)
     added = local + error_before * _variation(keep, low, high)
-    return np.asarray(drive_error * size + _accumulated(keep, added))
+    most_wrong = np.abs(h) + _held_at_most(row, float(np.max(np.abs(grown) + grown_error)))
+    return np.asarray(drive_error * size + _accumulated(keep, added, most_wrong))
+
+
+def _held_at_most(row: Floats, grown: float) -> float:
+    """Largest |h| that drives reach from rest where |epsilon exp(delta |q'|)| is at most ``grown``; may be infinite.
+
+    |h| grows while the drive moves to the side that epsilon gives h, and settles where the decay equals the growth.
+    """
+    side = math.copysign(1.0, row[kernels.EPSILON])
+    decay = row[kernels.ALPHA] + side * row[kernels.BETA] - abs(side * row[kernels.GAMMA] + row[kernels.ETA])
+    if decay <= 0.0:
+        return math.inf
+    power = float(row[kernels.POWER])
+    size = 1.0 if power == 0.0 else float(row[kernels.PER_SIZE]) ** power
+    return _HIGHER_ORDERS * float((grown / (decay * size)) ** (1.0 / (1.0 + power)))
 
 
 def _decay(row: Floats, h: Floats, travel: Floats | float) -> Floats:
@@ -246,11 +264,11 @@ def _variation(keep: Floats, low: Floats, high: Floats) -> Floats:
     return np.asarray(np.maximum(np.abs(keep * high_before - low), np.abs(keep * low_before - high)))
 
 
-def _accumulated(keep: Floats, added: Floats) -> Floats:
-    """s[k] = keep[k] s[k-1] + added[k] from 0."""
+def _accumulated(keep: Floats, added: Floats, most: Floats) -> Floats:
+    """s[k] = keep[k] s[k-1] + added[k] from 0, but never beyond most[k]."""
     total, found = 0.0, np.empty(added.size)
-    for k, (a, b) in enumerate(zip(keep.tolist(), added.tolist(), strict=True)):
-        total = a * total + b
+    for k, (a, b, end) in enumerate(zip(keep.tolist(), added.tolist(), most.tolist(), strict=True)):
+        total = min(a * total + b, end)
         found[k] = total
     return found
 
@@ -271,5 +289,5 @@ def _lag_errors(law: InverseLaw, i: InverseRun, added: Floats) -> Floats:
     for j, a in enumerate(law.lag_actuator.astype(int)):
         keep, lag = float(law.lag_keep[j]), np.abs(i.lag[:, j])
         local = (1.0 - keep) * (added[:, a] + 8.0 * UNIT * (lag + np.abs(i.added[:, a]))) + 4.0 * UNIT**2 * lag
-        found[1:, j] = _accumulated(np.full(local.size, keep), local)[:-1]
+        found[1:, j] = _accumulated(np.full(local.size, keep), local, np.full(local.size, math.inf))[:-1]
     return found

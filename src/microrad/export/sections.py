@@ -13,9 +13,8 @@ from numpy.typing import NDArray
 from microrad import kernels, lti
 from microrad.export.block_diagonal import BlockDiagonal
 from microrad.export.modes import NEAR, Modes, hidden, modes, sizes
-from microrad.export.records import ExportError, FlightController
+from microrad.export.records import ExportError, FlightController, Floats
 
-Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 
 MODAL, TRIANGULAR = "modal", "triangular"

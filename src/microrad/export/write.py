@@ -12,7 +12,7 @@ from microrad.export.build import BenchResult, compile_and_run, compiler
 from microrad.export.choice import Choice, flight_controller, vectors
 from microrad.export.fixed import FixedForm, fixed_code, quantised
 from microrad.export.fixed import report_text as quantisation_text
-from microrad.export.flight import flight_code, vectors_text
+from microrad.export.flight import flight_code, vectors_text, within_limits
 from microrad.export.identifiers import identifier, suggested
 from microrad.export.operations import FixedOperations, Operations, fixed_operations, operations
 from microrad.export.records import FlightController, Progress, Vectors
@@ -73,7 +73,7 @@ def export_flight(
     name = identifier(name if name is not None else suggested(controller.name))
     form = sections(controller)
     on_progress(0, 3, f"recording {samples} samples of the loop")
-    run = vectors(choice, samples)
+    run = within_limits(controller, vectors(choice, samples))
     made = _code(controller, form, run, name, precision)
     with whole_folder(folder, overwrite, KIND, WHAT) as draft:
         for file, text in made.files.items():

@@ -1,0 +1,35 @@
+"""Controllers of the shipped mission, tuned once a session for all tests of exports: LQG alone takes ten seconds."""
+
+from dataclasses import replace
+from functools import cache
+
+from microrad.export import choice
+from microrad.export.records import FlightController, Vectors
+from microrad.missionfile import MissionFile, load_mission
+from shipped import SHIPPED
+
+
+@cache
+def mission() -> MissionFile:
+    return load_mission(SHIPPED)
+
+
+@cache
+def chosen(name: str) -> choice.Choice:
+    return choice.choose(mission(), name)
+
+
+@cache
+def without_converter(name: str) -> choice.PointingChoice:
+    """The same tuning in a loop whose converter does not round: that would hide what is smaller than a count."""
+    of = chosen(name)
+    assert isinstance(of, choice.PointingChoice)
+    loop = of.scene.loop
+    exact = replace(loop, drive=replace(loop.drive, drive_resolution_v=0.0))
+    return replace(of, scene=replace(of.scene, loop=exact))
+
+
+@cache
+def flown(name: str, samples: int) -> tuple[FlightController, Vectors]:
+    """The controller as it flies, and a recorded run."""
+    return choice.flight_controller(chosen(name)), choice.vectors(chosen(name), samples)
