@@ -28,6 +28,7 @@ PAPER = ROOT / "src" / "microrad" / "missions" / "leo-geo.toml"
 COMMANDS = (
     "init",
     "run",
+    "reproduce",
     "budget",
     "contacts",
     "constellation",
@@ -36,6 +37,7 @@ COMMANDS = (
     "identify", "import",
     "bench",
     "doctor",
+    "studio",
     "schema",
 )
 MICRORAD = (sys.executable, "-m", "microrad")
@@ -484,6 +486,58 @@ def test_progress_goes_to_a_terminal_and_never_to_stdout(call, folder, monkeypat
     assert result.code == 0
     assert json.loads(result.out)["model"]
     assert "Bouc-Wen starts" in result.err
+
+
+def test_progress_goes_to_a_file_that_the_environment_names(call, folder, monkeypatch):
+    monkeypatch.setenv(frame.PROGRESS_FILE, str(folder / "progress"))
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+    (folder / "progress").write_text('{"of": "a run before"}\n')
+    began_s = time.time()
+    result = call("identify", write_recording(folder / "loop.csv"), *COLUMNS, "--json")
+    assert (result.code, result.err) == (0, "")
+    before, *notes = [json.loads(line) for line in (folder / "progress").read_text("utf-8").splitlines()]
+    assert before == {"of": "a run before"}
+    assert notes[-1]["done"] == notes[-1]["total"]
+    assert "Bouc-Wen starts" in {note["what"] for note in notes}
+    times = [began_s - 1.0, *(note["at"] for note in notes), time.time() + 1.0]
+    assert times == sorted(times)
+
+
+def test_a_file_of_progress_has_a_line_for_each_phase_and_no_flood(folder, monkeypatch):
+    monkeypatch.setenv(frame.PROGRESS_FILE, str(folder / "progress"))
+    monkeypatch.setattr(frame, "_PROGRESS_S", 3600.0)
+    with frame.progress_bar() as progress:
+        for done in range(1, 101):
+            progress(done, 100, "rows")
+        progress(0, 100, "µ")
+        progress(1, 100, "µ")
+        progress(0, 4, "µ")
+    notes = [json.loads(line) for line in (folder / "progress").read_text("utf-8").splitlines()]
+    assert [(note["done"], note["total"], note["what"]) for note in notes] == [
+        (1, 100, "rows"),
+        (100, 100, "rows"),
+        (0, 100, "µ"),
+        (0, 4, "µ"),
+    ]
+
+
+def test_a_file_of_progress_begins_anew_before_it_fills_the_disk(folder, monkeypatch):
+    monkeypatch.setenv(frame.PROGRESS_FILE, str(folder / "progress"))
+    monkeypatch.setattr(frame, "_PROGRESS_BYTES", 1000)
+    with frame.progress_bar() as progress:
+        for done in range(200):
+            progress(done, 200, f"row {done}")
+            assert (folder / "progress").stat().st_size < 1200
+    lines = (folder / "progress").read_text("utf-8").splitlines()
+    assert json.loads(lines[-1])["done"] == 199
+    assert 1 <= len(lines) < 20
+
+
+def test_a_file_of_progress_that_cannot_be_written_is_refused(call, folder, monkeypatch):
+    monkeypatch.setenv(frame.PROGRESS_FILE, str(folder / "none" / "progress"))
+    result = call("identify", write_recording(folder / "loop.csv"), *COLUMNS)
+    assert (result.code, result.out) == (2, "")
+    assert f"microrad: {folder / 'none' / 'progress'}: No such file or directory; nothing was written." in result.err
 
 
 # --------------------------------------------------------------------------------------------------- doctor and schema

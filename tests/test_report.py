@@ -2,6 +2,7 @@
 
 import csv
 import hashlib
+import html
 import json
 import math
 import re
@@ -15,7 +16,17 @@ import xarray as xr
 
 from microrad import folder, missionfile, report, study
 from microrad.performance import Cost
-from microrad.report import day_plots, figures, link_figures, words
+from microrad.report import (
+    chain,
+    day_plots,
+    figures,
+    link_figures,
+    page,
+    paper_bench,
+    paper_views,
+    requirement_views,
+    words,
+)
 from shipped import SHIPPED, edited_file
 
 
@@ -35,35 +46,188 @@ def paper():
 @pytest.fixture(scope="module")
 def written(paper, tmp_path_factory):
     target = tmp_path_factory.mktemp("report") / "study"
-    page = report.write(paper, target)
-    assert page == target / "report.html"
+    assert report.write(paper, target) == target / "report.html"
     return target
 
 
 class Links(HTMLParser):
-    """Everything a page would load or link to."""
+    """Everything a page would load or link to, its anchors, and its text outside scripts, styles apart."""
 
     def __init__(self):
         super().__init__()
-        self.found, self.scripts = [], 0
+        self.found, self.ids, self.text, self.styles, self.inside = [], [], [], [], ""
 
     def handle_starttag(self, tag, attrs):
-        self.scripts += tag == "script"
+        self.inside = tag
         names = {"src", "href", "xlink:href", "data", "action", "poster", "srcset"}
         self.found += [value for name, value in attrs if name in names]
+        self.ids += [value for name, value in attrs if name == "id"]
+
+    def handle_endtag(self, tag):
+        self.inside = ""
+
+    def handle_data(self, data):
+        if self.inside == "style":
+            self.styles.append(data)
+        elif self.inside != "script":
+            self.text.append(data)
 
 
-def test_the_page_loads_nothing_and_opens_with_the_verdict(written, paper):
-    text = (written / "report.html").read_text(encoding="utf-8")
+def parsed(text):
     links = Links()
     links.feed(text)
-    assert [link for link in links.found if not link.startswith(("#", "data:image/png;base64,"))] == []
-    assert links.scripts == 0
-    assert "@import" not in text
-    assert not re.search(r"url\((?!#)", text)
-    body = text[text.index("<body>") :]
-    assert body.index(report.words.headline(paper)) < body.index("Warnings") < body.index("The paper against this run")
-    assert body.index("The paper against this run") < body.index("Link budgets") < body.index("Assumptions")
+    return links
+
+
+def test_the_page_loads_nothing(written):
+    links = parsed((written / "report.html").read_text(encoding="utf-8"))
+    own = ("#", "data:image/png;base64,", "figures/")
+    assert [link for link in links.found if not link.startswith(own)] == []
+    assert all((written / link).is_file() for link in links.found if link.startswith("figures/"))
+    styles = "".join(links.styles)
+    assert len(styles) > 1000
+    assert "@import" not in styles
+    assert not re.search(r"url\((?!#)", styles)
+
+
+def test_the_page_opens_with_the_verdict_and_keeps_its_order(written, paper):
+    text = (written / "report.html").read_text(encoding="utf-8")
+    links = parsed(text)
+    visible = " ".join(links.text)
+    wanted = (
+        report.words.headline(paper),
+        "5 requirements are met. FAIL: ",
+        "Contents",
+        "Each arrow hands a result on",
+        "Link budgets",
+        "What the link delivers",
+        "Table 1  Past",
+        "Fig. 1  Open-loop pointing",
+        "Table 2  Link budgets",
+        "Fig. 2  Link margin",
+        "Fig. 3  Experiment",
+        "Fig. 4  Identified linear dynamics",
+        "Fig. 5  Hysteresis measured",
+        "Fig. 6  PID",
+        "Fig. 7  Feedforward",
+        "Fig. 8  PID against",
+        "claims against this run",
+        "Mirror and loop",
+        "Not in this study",
+        "This page holds what made it",
+    )
+    places = [visible.index(each) for each in wanted]
+    assert places == sorted(places)
+    titles = [title for _, title in page.PARTS if title != "Monte Carlo tails"]
+    found = re.findall(r'<h2 class="part[^"]*" id="([^"]+)">(\d)&ensp;([^<]+)</h2>', text)
+    assert [number for _, number, _ in found] == [str(i + 1) for i in range(len(titles))]
+    assert [html.unescape(title) for _, _, title in found] == titles
+    anchors = [link[1:] for link in links.found if link.startswith("#") and link[1:] in dict(page.PARTS)]
+    assert anchors[-len(titles) :] == [id for id, _, _ in found]
+    assert all(links.ids.count(id) == 1 for id in (*anchors, "chain-wide-desc", "chain-narrow-desc", "fig1-desc"))
+
+
+def test_each_requirement_stands_with_its_margin_and_its_contributor(written, paper):
+    rows = requirement_views.rows(paper)
+    assert [row["mark"] for row in rows] == ["PASS" if r.met else "FAIL" for r in paper.requirements]
+    for row, r in zip(rows, paper.requirements, strict=True):
+        assert row["contributor"].lower().startswith(r.limited_by.lower())
+        assert row["margin"][0] == ("+" if r.met else "\u2212")
+    cone, beacon, answer, residual, link = (row["contributor"] for row in rows)
+    shares = paper.open_loop.variance_shares
+    assert cone == f"Body pointing: {100 * max(shares):.2g} % of the squares, 300 µrad half width"
+    for text, tornado in ((beacon, paper.links.tornados[-2]), (answer, paper.links.tornados[-1])):
+        top = tornado.swings[0]
+        assert text.endswith(f"the margin moves most with {top.key}: {top.swing_db:.2f} dB for 10 % both ways")
+    straight = next(
+        r for r in paper.runs if (r.mirror, r.controller, r.freq_hz) == ("no hysteresis", "PID + inverse", 25.0)
+    )
+    assert f"{paper.residual.trace.peak_rad * 1e6:.1f} µrad with hysteresis" in residual
+    assert f"{straight.trace.peak_rad * 1e6:.1f} µrad without" in residual
+    lost = next(line.value for line in paper.achieved.lines if line.name == "Pointing loss")
+    assert f"pointing loss {-lost:.2f} dB; the margin moves most with {paper.links.tornado[0].key}" in link
+    visible = " ".join(parsed((written / "report.html").read_text(encoding="utf-8")).text)
+    assert all(row["contributor"] in visible for row in rows)
+
+
+def test_a_requirement_moved_most_by_a_share_says_by_what_factor(paper):
+    swing = replace(paper.links.tornado[0], key="requirement.outage", margin_low_db=0.0, margin_high_db=9.0)
+    beyond = replace(swing, margin_high_db=math.nan)
+    level = replace(swing, key="channel.loss", unit="dB")
+    said = requirement_views.most_sensitive
+    assert (
+        said([beyond, swing])
+        == "; the margin moves most with requirement.outage: 9.00 dB for a factor of ten both ways"
+    )
+    assert said([level]).endswith("9.00 dB for 0.5 dB both ways")
+    assert said([beyond]) == said([]) == ""
+
+
+def test_the_chain_shows_the_numbers_of_the_study_on_both_widths(written, paper):
+    boxes = chain.stages(paper)
+    assert [b.name for b in boxes] == ["Orbit", "Link", "Pointing", "Mirror", "Loop", "Residual", "Volume", "Verdict"]
+    said = chain.alternative(boxes)
+    for needed in (
+        "15 contacts in 24 h",
+        "300 Mbit/s with 5 W",
+        "margin +3.00 dB as budgeted",
+        "12.1 µrad peak, 25 Hz sine",
+    ):
+        assert needed in said
+    assert f"{paper.day.relay.capacity_bit / 8e9:.0f} GB possible by the relay" in said
+    assert ",," not in said
+    assert "Residual (FAIL): " in said
+    assert "Verdict (FAIL): 3 of 5 requirements met" in said
+    text = (written / "report.html").read_text(encoding="utf-8")
+    for kind, columns, width in (("wide", 4, 960.0), ("narrow", 1, 340.0)):
+        svg = ET.fromstring(text[(start := text.index(f'<svg class="{kind}"')) : text.index("</svg>", start) + 6])
+        shown = [each.text for each in svg.iter("text")]
+        assert {b.name for b in boxes} <= set(shown)
+        assert "12.1 µrad peak, 25 Hz sine" in shown
+        assert svg.find("desc").text == said
+        drawn = chain.layout(boxes, columns, width, 24.0)
+        assert len({b.x for b in drawn.boxes}) == columns
+        assert all(b.x >= 0.0 and b.x + b.width <= width and b.y + b.height <= drawn.height for b in drawn.boxes)
+        assert len(drawn.arrows) == len(boxes) - 1
+    assert text.count('role="img" aria-labelledby="chain-') == 2
+
+
+def test_long_lines_of_the_chain_are_broken_to_their_box():
+    stage = chain.Stage("Orbit", ("a line that is much too long for a box of that width",))
+    (box,) = chain.layout([stage], 1, 200.0, 20.0).boxes
+    assert len(box.stage.lines) > 1
+    assert max(map(len, box.stage.lines)) <= 29
+    assert " ".join(box.stage.lines) == stage.lines[0]
+
+
+def test_the_virtual_bench_stands_where_the_paper_measures(written, paper):
+    found = paper_bench.chirp()
+    assert 96.9 <= found.fit_percent < 97.1
+    visible = " ".join(parsed((written / "report.html").read_text(encoding="utf-8")).text)
+    assert f"explains {found.fit_percent:.1f} % of it (the paper: about 97 %)" in visible
+    for title in (
+        "Fig. 4  Identified linear dynamics (virtual bench)",
+        "Fig. 5  Hysteresis measured and modelled (virtual",
+    ):
+        assert title in visible
+    assert [loop.freq_hz for loop in paper_bench.loops()] == [60.0, 80.0, 100.0]
+    assert {loop.fitted_hz for loop in paper_bench.loops()} == {100.0}
+    assert all(0.0 < loop.error_percent < 0.2 for loop in paper_bench.loops())
+
+
+def test_another_kind_of_mirror_leaves_the_bench_out(no_scan, tmp_path):
+    other = study.run(edited_file(tmp_path))
+    visible = " ".join(parsed(report.write(other, tmp_path / "out").read_text(encoding="utf-8")).text)
+    assert not (tmp_path / "out" / "figures" / "fig4-chirp.csv").exists()
+    assert "Fig. 4, what differs from the paper: Not drawn: the mission's mirror is not of the paper's kind" in visible
+
+
+def test_table_2_sets_the_mission_beside_the_paper(written, paper):
+    rows = {row[0]: row[1:] for row in paper_views.link_table(paper)}
+    assert rows["Pointing accuracy"] == ("300 µrad", "300 µrad", "10 µrad", "10 µrad")
+    assert rows["Strehl ratio"] == ("0.4 dB",) * 4
+    assert rows["Margin"] == ("+", f"{paper.beacon.margin_db:.2f} dB", "+", f"{paper.communication.margin_db:.2f} dB")
+    assert paper_views.projects(paper)[-1] == ("", f"this mission: {paper.file.mission.name}", "", "300", "")
 
 
 def test_the_page_holds_what_the_paper_is_judged_by(written):
@@ -75,7 +239,12 @@ def test_the_page_holds_what_the_paper_is_judged_by(written):
 
 
 def test_each_figure_is_an_svg_with_its_data(written, paper):
-    drawn = (*figures.draw(paper), *link_figures.draw(paper.links), *day_plots.draw(paper.day))
+    drawn = (
+        *figures.draw(paper),
+        *paper_bench.draw(paper),
+        *link_figures.draw(paper.links),
+        *day_plots.draw(paper.day),
+    )
     assert [f.name for f in drawn] == [
         "fig2-margin-map",
         "fig5-hysteresis-loops",
@@ -83,6 +252,8 @@ def test_each_figure_is_an_svg_with_its_data(written, paper):
         "fig8-inverse",
         "comparison",
         "claims-scan",
+        "fig4-chirp",
+        "fig5-bench-loops",
         "tornado",
         "tornado-beacon",
         "tornado-answer",
@@ -134,11 +305,12 @@ def test_results_carry_units_and_the_numbers_of_the_study(written, paper):
         tree.close()
 
 
-def test_the_manifest_names_mission_versions_and_every_file(written):
+def test_the_manifest_names_mission_versions_and_every_file(written, paper):
     manifest = json.loads((written / "manifest.json").read_text(encoding="utf-8"))
     assert manifest["mission"]["text"] == SHIPPED.read_text(encoding="utf-8")
     assert manifest["mission"]["sha256"] == hashlib.sha256(SHIPPED.read_bytes()).hexdigest()
     assert {"python", "microrad", "numpy", "numba"} <= set(manifest["versions"])
+    assert manifest["summary"]["margin_db"]["communication_at_residual"] == paper.achieved.margin_db
     files = {str(p.relative_to(written)): p for p in written.rglob("*") if p.is_file() and p.name != "manifest.json"}
     assert set(manifest["files_sha256"]) == set(files)
     for name, path in files.items():
@@ -198,9 +370,11 @@ def test_text_of_the_mission_is_escaped(tmp_path):
     file = edited_file(
         tmp_path, ('name = "LEO-to-GEO relay of a 100 kg satellite"', 'name = "<script>alert(1)</script>"')
     )
-    page = report.write(study.run(file), tmp_path / "out").read_text(encoding="utf-8")
-    assert "<script" not in page
-    assert "&lt;script&gt;alert(1)&lt;/script&gt;" in page
+    text = report.write(study.run(file), tmp_path / "out").read_text(encoding="utf-8")
+    assert "<script>alert" not in text
+    assert "&lt;script&gt;alert(1)&lt;/script&gt;" in text
+    manifest = text.partition('<script type="application/json" id="manifest">')[2].partition("</script>")[0]
+    assert json.loads(manifest)["mission"]["text"] == file.text
 
 
 def test_a_hopeless_link_is_reported_not_refused(tmp_path):
@@ -268,8 +442,8 @@ def test_a_changed_value_does_not_keep_the_papers_name(no_scan, paper, tmp_path)
     assert missionfile.changed_from_shipped(file) == (("terminals.leo_aperture", '"6 cm"', '"5 cm"'),)
     changed = study.run(file)
     assert any("names the paper as its source" in w for w in report.summary(changed)["warnings"])
-    page = report.write(changed, tmp_path / "out").read_text(encoding="utf-8")
-    assert "This mission is not the paper" in page
+    text = report.write(changed, tmp_path / "out").read_text(encoding="utf-8")
+    assert "This mission is not the paper" in text
 
 
 def test_a_radial_residual_is_two_axes(no_scan, paper, tmp_path):

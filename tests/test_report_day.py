@@ -64,7 +64,8 @@ def test_the_study_has_a_day_and_a_plan_but_no_contact_in_time_without_a_fine_lo
 
 def test_the_page_answers_with_contacts_volumes_latencies_and_the_assumption(written, found):
     text = (written / "report.html").read_text(encoding="utf-8")
-    section = text[text.index("What the link delivers") : text.index("Open-loop pointing</h2>")]
+    begin = text.index(">What the link delivers</h3>")
+    section = text[begin : text.index('<h2 class="part', begin)]
     for sentence in day_words.sentences(found.day):
         assert sentence in section
     for needed in ("15 times", "median", "99 % within", "What matters most", "GB", "Doppler"):

@@ -3,8 +3,11 @@
 import csv
 import json
 import math
+import re
+import tempfile
 from dataclasses import replace
 from html.parser import HTMLParser
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -22,10 +25,11 @@ from microrad.report import fine_pointing as section
 from microrad.report import fine_pointing_figures as figures
 from microrad.report import fine_pointing_words as words
 from microrad.report import page as report_page
-from microrad.report import results
+from microrad.report import requirement_views, results
 from shipped import SHIPPED
 
 HEADING = "Fine pointing under vibration and noise"
+HEADINGS = ("h2", "h3", "h4")
 VARIANTS = ("given", "comparison", "no hysteresis")
 SECOND, THIRD = "PI + inverse in series", "quick PI"
 
@@ -143,7 +147,8 @@ def written(plain, fine, tmp_path_factory):
 
 def render(of, drawn=()):
     """The page without its other figures, which take most of the time."""
-    return report_page.render(of, (), drawn)
+    with tempfile.TemporaryDirectory() as nothing:
+        return report_page.render(of, report_page.Drawn(fine=tuple(drawn)), results.manifest(of, Path(nothing)))
 
 
 def results_of(of, folder):
@@ -160,8 +165,8 @@ class Tables(HTMLParser):
         self.found, self.text, self.heading, self.inside = {}, [], "", None
 
     def handle_starttag(self, tag, attrs):
-        self.inside = tag if tag in ("h2", "h3", "td", "th", "svg") else self.inside
-        if tag in ("h2", "h3"):
+        self.inside = tag if tag in (*HEADINGS, "td", "th", "svg", "script") else self.inside
+        if tag in HEADINGS:
             self.heading = ""
         if tag == "tr":
             self.found.setdefault(self.heading, []).append([])
@@ -172,11 +177,11 @@ class Tables(HTMLParser):
         self.inside = None if tag == self.inside else self.inside
 
     def handle_data(self, data):
-        if self.inside in ("h2", "h3"):
+        if self.inside in HEADINGS:
             self.heading += data
         elif self.inside in ("td", "th"):
             self.found[self.heading][-1][-1] += " ".join(data.split()) + " "
-        if self.inside != "svg":
+        if self.inside not in ("svg", "script"):
             self.text.append(data)
 
 
@@ -344,6 +349,28 @@ def test_the_verdict_says_it_in_five_lines(plain, fine):
     assert added[3].startswith(f"PASS  fine pointing at 99.7 % ({SECOND}): 4.23 µrad")
     assert added[4].startswith(f"PASS  link margin but for 0.3 % of the time ({SECOND}): 4.8")
     assert len(added) == 5
+
+
+def test_the_tail_stands_by_itself_with_its_intervals(page, fine, written):
+    heading = next(each for each in page[0] if each.endswith("Monte Carlo tails"))
+    head, *rows = page[0][heading]
+    assert head[1:8] == ["50 %", "90 %", "99 %", "99.7 %", "99.9 %", "99.99 %", "99.999 %"]
+    assert [cells[0] for cells in rows] == [
+        f"{SECOND}, mission's mirror",
+        f"{SECOND}, comparison model",
+        f"{SECOND}, no hysteresis",
+        f"{fine_pointing.BASELINE}, mission's mirror",
+    ]
+    assert re.fullmatch(r"4\.23 4\.\d+ to 4\.\d+", rows[0][4])
+    with (written / "figures" / "monte-carlo-tail.csv").open(newline="", encoding="utf-8") as file:
+        assert next(csv.reader(file))[0] == "radial error, mission's mirror (rad)"
+
+
+def test_fine_requirements_stand_with_their_dominant_part(plain, fine):
+    rows = requirement_views.rows(with_fine(plain, fine))
+    assert rows[5]["contributor"] == "Vibration (OLYMPUS): 3 µrad of 3.05 µrad rms, 97 % of the squares"
+    assert rows[6]["contributor"].startswith("Vibration (OLYMPUS), pointing loss ")
+    assert "; the margin moves most with " in rows[6]["contributor"]
 
 
 def test_a_missed_requirement_is_said_everywhere(plain, fine, mission):

@@ -18,6 +18,7 @@ from microrad.missionfile import load_link
 from microrad.performance import FINE, NO_HYSTERESIS, Cost, LinkPerformance
 from microrad.report import budget_views, link_figures, links
 from microrad.report.quantities import quantity
+from report_pages import without_scripts
 
 FEW = {"acquisition.runs": 100}
 NO_SCAN = {**FEW, "acquisition.scan": None}
@@ -425,7 +426,7 @@ def test_every_text_of_the_mission_is_escaped(tmp_path):
     line = 'transmit_power = "5 W"'
     assert text.count(line) == 1
     path.write_text(text.replace(line, f"{line} # literature: <img src=x onerror=y> 2021"), encoding="utf-8")
-    page = budget_views.html(link_study.run(load_link(path)))
+    page = without_scripts(budget_views.html(link_study.run(load_link(path))))
     assert "<script" not in page
     assert "<img" not in page
     assert page.count("&lt;script&gt;alert(1)&lt;/script&gt; &amp; co") == 3  # title, heading and inputs
@@ -442,7 +443,7 @@ def test_brackets_of_a_comment_are_no_markup_of_the_terminal(tmp_path):
 
 
 def test_the_page_holds_every_line_and_no_hyphen_for_a_minus(plain):
-    page = budget_views.html(plain)
+    page = without_scripts(budget_views.html(plain))
     for _, line in budget_views.lines(plain):
         assert f">{quantity(line.value, line.unit)}</td>" in page
     plain_text = re.sub(r"<(svg|style).*?</\1>|<[^>]*>", " ", page, flags=re.DOTALL)

@@ -91,7 +91,7 @@ class Statement:
 
     `kind` is a key with a value, a table header, the header of a table in a list ("tables"), or what is neither:
     a header that is not one ("broken") and "junk". `depth` counts the brackets of a value, `closed` says whether each
-    was closed.
+    was closed; `place` is the character of the text that a value begins at.
     """
 
     kind: Literal["key", "table", "tables", "broken", "junk"]
@@ -102,6 +102,7 @@ class Statement:
     comment: str = ""
     depth: int = 0
     closed: bool = True
+    place: int = 0
 
 
 _PART = r"""(?:[A-Za-z0-9_-]+|"(?:[^"\\\n]|\\.)*"|'[^'\n]*')"""
@@ -172,10 +173,11 @@ def _assignment(text: str, assigned: re.Match[str], line: int, table: str) -> tu
             deepest = max(deepest, depth)
             value_end = position
     value = text[start:value_end].strip()
+    place = text.index(value, start)
     last_line = line + text.count("\n", start, start + len(text[start:value_end].rstrip()))
     key = _joined(table, _plain_key(assigned[1]))
     comment = (behind or inside).lstrip("#").strip()
-    return Statement("key", key, line, last_line, value, comment, deepest, closed=depth <= 0), position
+    return Statement("key", key, line, last_line, value, comment, deepest, closed=depth <= 0, place=place), position
 
 
 def _begins_another(text: str, position: int) -> bool:
@@ -231,7 +233,14 @@ class Document:
 
         Raises `UnreadableError` when it is no text, and `MissionError` when nothing in it can be parsed.
         """
-        content = _content(path)
+        return cls.of(_content(path), path, label, prefix)
+
+    @classmethod
+    def of(cls, content: bytes, path: Path, label: str, prefix: str = "") -> Self:
+        """Scan and parse what a file holds, or would hold if it were written to `path`.
+
+        Raises what `read` raises.
+        """
         document = cls(path, label, prefix, _decoded(content), hashlib.sha256(content).hexdigest())
         _Parser(document).run()
         return document
@@ -273,12 +282,12 @@ def _content(path: Path) -> bytes:
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
         raise UnreadableError(f"cannot be read: {reason}", "a file that you may read") from None
-    if len(content) > MAX_BYTES:
-        raise UnreadableError(f"is larger than {MAX_BYTES // 1000} kB", "a TOML file of a few kB")
     return content
 
 
 def _decoded(content: bytes) -> str:
+    if len(content) > MAX_BYTES:
+        raise UnreadableError(f"is larger than {MAX_BYTES // 1000} kB", "a TOML file of a few kB")
     if b"\0" in content:
         raise UnreadableError("holds binary data", "a TOML file, plain text in UTF-8")
     try:

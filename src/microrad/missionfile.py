@@ -77,21 +77,22 @@ class MissionFile:
     mirror_file: MirrorFile | None = None
 
 
-def load_mission(path: str | Path, mirror_path: str | Path | None = None) -> MissionFile:
+def load_mission(path: str | Path, mirror_path: str | Path | None = None, *, text: str | None = None) -> MissionFile:
     """Read a mission file; `mirror_path` names a mirror file that replaces what the mission says about its mirror.
 
     Without it, `[mirror]` may hold the single key `file`, the path of a mirror file as seen from the mission file.
+    With `text`, the mission is that text, as if it stood at `path`, which need not exist.
     Raises `MissionError` with every fault of both files.
     """
-    return mission_file(open_mission(path, mirror_path))
+    return mission_file(open_mission(path, mirror_path, text=text))
 
 
-def open_mission(path: str | Path, mirror_path: str | Path | None = None) -> Document:
+def open_mission(path: str | Path, mirror_path: str | Path | None = None, *, text: str | None = None) -> Document:
     """A mission file as it stands, its mirror file taken in, for `mission_file`; nothing but its TOML is checked.
 
-    Raises `MissionError` when it is no TOML.
+    With `text`, the mission is that text. Raises `MissionError` when it is no TOML.
     """
-    document = _open(Path(path), "mission file", "")
+    document = _open(Path(path), "mission file", "", text)
     _take_in_mirror(document, None if mirror_path is None else Path(mirror_path))
     return document
 
@@ -124,14 +125,14 @@ def named_files(m: Mission) -> tuple[str, ...]:
     return tuple(name for name in dict.fromkeys(named) if name is not None)
 
 
-def load_link(path: str | Path) -> LinkFile:
+def load_link(path: str | Path, *, text: str | None = None) -> LinkFile:
     """Read a file for its links alone: a whole mission, or one without the tables on mirror, loop and scenario.
 
-    Raises `MissionError` with every fault of it.
+    With `text`, the mission is that text, as if it stood at `path`. Raises `MissionError` with every fault of it.
     """
-    document = _open(Path(path), "mission file", "")
+    document = _open(Path(path), "mission file", "", text)
     if _BEYOND_LINK & document.data.keys():
-        file = load_mission(path)
+        file = load_mission(path, text=text)
         return LinkFile(file.mission, file.path, file.text, file.sha256, file.sources)
     mission = check_table(document, LinkMission, document.data)
     if mission is None or document.faults:
@@ -158,8 +159,10 @@ def assumptions(mission_file: MissionFile | LinkFile) -> tuple[tuple[str, str, s
 
 
 # --------------------------------------------------------------------------------------------------------------- files
-def _open(path: Path, label: str, prefix: str) -> Document:
+def _open(path: Path, label: str, prefix: str, text: str | None = None) -> Document:
     try:
+        if text is not None:
+            return Document.of(text.encode("utf-8", "surrogatepass"), path, label, prefix)
         return Document.read(path, label, prefix)
     except UnreadableError as error:
         fault = Fault("", "", 0, f"the {label} {error.reason}", error.expected, file=clipped(str(path)))

@@ -129,6 +129,37 @@ def _study_outcome(study: "Study", folder: Path, as_json: bool) -> Outcome:
     return Outcome(f"{report.verdict_text(study)}\n\n{files}", code)
 
 
+@app.command(
+    epilog=examples(
+        "microrad reproduce leo-geo-study/report.html",
+        "microrad reproduce leo-geo-study --tolerance 1e-9",
+        "microrad reproduce report.html --json",
+    )
+)
+@command
+def reproduce(
+    report_file: Annotated[
+        Path, typer.Argument(help="A report.html, a manifest.json, or the folder of both.", metavar="REPORT")
+    ],
+    tolerance: Annotated[
+        float, option("--tolerance", "SHARE", "Relative difference up to which two numbers are the same.", min=0.0)
+    ] = 1e-6,
+    as_json: Json = False,
+) -> Outcome:
+    """Run a report again and say what differs.
+
+    The mission and the files that it names are taken from the report itself. Every number of its summary is compared,
+    then the data of the figures and the text of the page. The exit code is 0 when nothing differs beyond the tolerance,
+    1 when something does and 2 for a file that is no whole report.
+    """
+    from microrad.report import reproduce as again
+
+    with progress_bar() as progress:
+        found = again.reproduce(report_file, tolerance, progress)
+    text = json_text(again.data(found)) if as_json else again.words(found)
+    return Outcome(text, CLOSES if found.same else DOES_NOT_CLOSE)
+
+
 # ------------------------------------------------------------------------------------------------------- installation
 @app.command(epilog=examples("microrad doctor", "microrad doctor --json"))
 @command
@@ -162,4 +193,4 @@ def schema() -> Outcome:
     return Outcome(json_text(mission_schema()))
 
 
-from microrad.cli import campaign, day, export, lab, link, pointing  # noqa: E402, F401  their commands stand behind these in the help
+from microrad.cli import campaign, day, export, lab, link, pointing, studio  # noqa: E402, F401  their commands stand behind these in the help

@@ -8,6 +8,7 @@ output.
 import _thread
 import contextlib
 import functools
+import io
 import json
 import math
 import os
@@ -27,7 +28,12 @@ import typer
 
 CLOSES, DOES_NOT_CLOSE, REFUSED, BUG, INTERRUPTED, UNREAD = 0, 1, 2, 70, 130, 141
 
+PROGRESS_FILE = "MICRORAD_PROGRESS"
+"""Environment variable that names a file for progress, as JSON lines, in place of a bar or lines on stderr."""
+
 _WIDE = 160  # columns of a table that goes to a file
+_PROGRESS_S = 0.2  # between two lines of a progress file, unless another phase begins
+_PROGRESS_BYTES = 1_000_000  # of a progress file, which begins anew beyond
 
 _Arguments = ParamSpec("_Arguments")
 OnProgress = Callable[[int, int, str], None]
@@ -192,9 +198,35 @@ def _progress_lines(every_s: float) -> OnProgress:
     return say_now_and_then
 
 
+def _progress_records(file: io.FileIO) -> OnProgress:
+    """Progress for a program that looks on: a JSON object a line, with the time (s, since 1970) in "at"."""
+    last_s, last = -math.inf, (0, "")
+
+    def write_down(done: int, total: int, what: str) -> None:
+        nonlocal last_s, last
+        now_s = time.monotonic()
+        if now_s - last_s < _PROGRESS_S and (total, what) == last and done < total:
+            return
+        last_s, last = now_s, (total, what)
+        line = json.dumps({"at": round(time.time(), 3), "done": done, "total": total, "what": what})
+        with contextlib.suppress(OSError):  # a full disk is the run's affair
+            if file.tell() > _PROGRESS_BYTES:
+                file.truncate(0)
+            file.write(f"{line}\n".encode())
+
+    return write_down
+
+
 @contextlib.contextmanager
 def progress_bar(line_s: float = math.inf) -> Iterator[OnProgress]:
-    """A bar on stderr while something is computed, where stderr is a terminal; a line every ``line_s`` elsewhere."""
+    """A bar on stderr while something is computed, where stderr is a terminal; a line every ``line_s`` elsewhere.
+
+    Where the environment variable `PROGRESS_FILE` names a file, progress goes there and nowhere else.
+    """
+    if name := os.environ.get(PROGRESS_FILE):
+        with Path(name).open("ab", buffering=0) as records:
+            yield _progress_records(records)
+        return
     if not (sys.stderr and sys.stderr.isatty()):
         yield _progress_lines(line_s)
         return

@@ -1,6 +1,7 @@
 """Commands for the laboratory: a mirror from recordings, and recordings from the virtual bench."""
 
 import functools
+import os
 import re
 import shlex
 from collections.abc import Callable
@@ -12,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from microrad.cli.frame import (
+    PROGRESS_FILE,
     Json,
     Outcome,
     Overwrite,
@@ -130,6 +132,7 @@ def identify(  # noqa: PLR0913  every argument is a named option
     """
     from microrad import identify as identification
     from microrad import report
+    from microrad.studio.live_fit import looker_on
 
     target = mirror_file or Path(f"{files[0].stem}-mirror.toml")
     page = report_file or target.with_suffix(".html")
@@ -159,6 +162,7 @@ def identify(  # noqa: PLR0913  every argument is a named option
             output_unit=output_unit,
             lever_arm_m=lever_arm,
             input_unit=input_unit,
+            on_fit=looker_on(os.environ.get(PROGRESS_FILE)),
         )
     if found.unsupported:
         raise Refusal(found.unsupported)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -25,7 +25,7 @@ from microrad.identify.joint import FORMS, JointFit, fit_joint, time_constants
 from microrad.identify.linear import LinearFit, fit_linear
 from microrad.identify.plant_structures import LinearPoles, poles_of
 from microrad.identify.prandtl_ishlinskii import PrandtlIshlinskiiFit, fit_prandtl_ishlinskii
-from microrad.identify.predictions import Fit, Prediction, Score, predict, straight_line
+from microrad.identify.predictions import Fit, Judged, Prediction, Score, predict, straight_line
 from microrad.identify.records import (
     FloatArray,
     IdentificationError,
@@ -140,6 +140,7 @@ def identify(  # noqa: PLR0913  all but the first are named options in practice
     output_unit: str = "mrad",
     lever_arm_m: float | None = None,
     input_unit: str = "V",
+    on_fit: Callable[[Judged], None] = lambda judged: None,
 ) -> Identification:
     """Fit the models on the first part of each recording and choose the one that is better on the rest.
 
@@ -149,8 +150,8 @@ def identify(  # noqa: PLR0913  all but the first are named options in practice
     residual rms over all held-out samples wins; where the difference may be chance an admissible model goes before one
     that is not, and fewer parameters before more. A winner with a linear part is fitted once more with everything free.
     `admissible` keeps the slope of each Bouc-Wen model behind a reversal from turning against its gain.
-    `on_progress(done, total, what)` counts fits. Raises `IdentificationError`, also where not even the best model
-    follows the output.
+    `on_progress(done, total, what)` counts fits, and `on_fit` is given each model as soon as it is fitted, the winner
+    again when everything was free. Raises `IdentificationError`, also where not even the best model follows the output.
     """
     units = Units(input_unit, output_unit, lever_arm_m)
     _check_models(models)
@@ -169,10 +170,18 @@ def identify(  # noqa: PLR0913  all but the first are named options in practice
     names, refused = _supported(models, prepared, linear)
     fitter = _Fitter(heads, response[:1], linear, units, seed, admissible)
     judge = _Judge(loops, splits, tuple(validation), units, span(prepared))
-    fits, failed = fitter.all(names, on_progress)
-    predictions = [judge.predictions(fit) for fit in fits]
+    predictions: list[tuple[Prediction, ...]] = []
+
+    def look(fit: Fit) -> None:
+        predictions.append(judge.predictions(fit))
+        on_fit(judge.judged(fit, predictions[-1]))
+
+    fits, failed = fitter.all(names, on_progress, look)
     best = _best(fits, [[r for p in each if (r := p.residual_rad[p.split :]).size] for each in predictions])
+    winner = fits[best]
     fits, predictions = _polished(fitter, judge, fits, predictions, best, on_progress)
+    if fits[best] is not winner:
+        on_fit(judge.judged(fits[best], predictions[best]))
     sources = _sources(judge, broadband, response if linear is not None else ())
     return _identification(judge, prepared, fits, predictions, best, [*refused, *failed], linear, sources)
 
@@ -258,7 +267,9 @@ class _Fitter:
     seed: int
     admissible: bool
 
-    def all(self, models: Sequence[str], on_progress: Progress | None) -> tuple[list[Fit], list[Refused]]:
+    def all(
+        self, models: Sequence[str], on_progress: Progress | None, on_fit: Callable[[Fit], None]
+    ) -> tuple[list[Fit], list[Refused]]:
         """One fit a model; a joint fit that fails is refused with its reason, a static one raises."""
         efforts = [1 if model not in ("bouc_wen", "bouc_wen_admissible") else _STARTS for model in models]
         fits: list[Fit] = []
@@ -267,11 +278,15 @@ class _Fitter:
             progress = _shifted(on_progress, sum(efforts[:i]), sum(efforts))
             if model in STATIC:
                 fits.append(self.static(model, progress))
+                on_fit(fits[-1])
                 continue
+            progress(0, 1, f"fitting {model}")
             try:
                 fits.append(self.joint(model, self._poles(), free_linear=False))
             except IdentificationError as error:
                 failed.append(Refused(model, str(error)))
+            else:
+                on_fit(fits[-1])
             progress(1, 1, model)
         if not fits:
             raise IdentificationError(failed[0].reason)
@@ -367,6 +382,10 @@ class _Judge:
     def predictions(self, fit: Fit) -> tuple[Prediction, ...]:
         pairs = zip(self.recordings, self.all_splits, strict=True)
         return tuple(predict(fit, recording, split) for recording, split in pairs)
+
+    def judged(self, fit: Fit, predictions: tuple[Prediction, ...]) -> Judged:
+        name = fit_name(fit)
+        return Judged(name, self.score(name, predictions), predictions, self.recordings)
 
     def score(self, model: str, predictions: Sequence[Prediction]) -> Score:
         fitted = [p.residual_rad[p.start : p.split] for p in predictions[: len(self.loops)]]

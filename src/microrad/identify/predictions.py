@@ -47,6 +47,16 @@ class Score:
     held_out_peak_percent: float
 
 
+@dataclass(frozen=True, eq=False)
+class Judged:
+    """A model as soon as it is fitted: its score, and its predictions in the order of the recordings judged on."""
+
+    model: str
+    score: Score
+    predictions: tuple[Prediction, ...]
+    recordings: tuple[Recording, ...]
+
+
 def predict(fit: Fit, recording: Recording, split: int | None = None) -> Prediction:
     """Run a fitted model over a recording with the units of the fit, states carried through from the first sample.
 

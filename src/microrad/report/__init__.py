@@ -40,18 +40,34 @@ def write(
     Raises FolderError when the folder holds something that must not be replaced. Returns the page's path.
     """
     # Drawing and writing libraries load here, not with the package: they take longer than help should.
-    from microrad.report import day_plots, figures, fine_pointing_figures, link_figures, page, results
+    from microrad.report import (
+        day_plots,
+        figures,
+        fine_pointing_figures,
+        link_figures,
+        page,
+        paper_bench,
+        results,
+        tails,
+    )
 
     with whole_folder(folder, overwrite) as draft:
         on_progress(0, 3, "figures")
-        drawn, fine, links = figures.draw(study), fine_pointing_figures.draw(study), link_figures.draw(study.links)
-        day = () if study.day is None else day_plots.draw(study.day, study.contact)
+        drawn = page.Drawn(
+            figures.draw(study),
+            paper_bench.draw(study),
+            fine_pointing_figures.draw(study),
+            tails.draw(study),
+            link_figures.draw(study.links),
+            () if study.day is None else day_plots.draw(study.day, study.contact),
+        )
         (draft / "figures").mkdir()
-        for figure in (*drawn, *fine, *links, *day):
+        for figure in drawn.every:
             (draft / "figures" / f"{figure.name}.svg").write_text(figure.svg, encoding="utf-8")
             write_columns(figure.columns, draft / "figures" / f"{figure.name}.csv")
         on_progress(1, 3, "page")
-        (draft / "report.html").write_text(page.render(study, drawn, fine, links, day), encoding="utf-8")
+        text = page.render(study, drawn, results.manifest(study, draft))
+        (draft / "report.html").write_text(text, encoding="utf-8")
         on_progress(2, 3, "results")
         if study.plan is not None:
             write_plan(study.plan, draft)

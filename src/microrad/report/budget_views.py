@@ -252,7 +252,7 @@ def simulated_mean(w: Found) -> str:
 def html(study: LinkStudy) -> str:
     """The budgets as one page that loads nothing, with their figures."""
     # drawing takes longer to load than a table needs
-    from microrad.report import link_figures, links, page
+    from microrad.report import interactive, link_figures, links, page
 
     figures = link_figures.draw(study)
     budgets = [(budget, "") for budget in study.budgets]
@@ -265,7 +265,7 @@ def html(study: LinkStudy) -> str:
         "angle": page.angle,
         "inputs": list(study.file.sources.items()),
     }
-    return page.pages().get_template("budget.html").render(context)
+    return interactive.with_library(page.pages().get_template("budget.html").render(context))
 
 
 def data(study: LinkStudy) -> dict[str, Any]:

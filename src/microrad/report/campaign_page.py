@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from microrad.campaign.records import CampaignSummary, CellSummary, Limit, OutputSummary
-from microrad.report import campaign_figures, page
+from microrad.report import campaign_figures, interactive, page
 from microrad.report import campaign_tables as tables
 from microrad.report import campaign_words as words
 from microrad.report.figures import Figure
@@ -16,7 +16,8 @@ _MOST_QUANTILES = 5
 
 def html(summary: CampaignSummary) -> str:
     """The page; every text of the campaign is escaped, and nothing is loaded from anywhere."""
-    return page.pages().get_template("campaign.html").render(context(summary, draw(summary)))
+    text = page.pages().get_template("campaign.html").render(context(summary, draw(summary)))
+    return interactive.with_library(text)
 
 
 def context(summary: CampaignSummary, figures: dict[str, Any]) -> dict[str, Any]:

@@ -105,10 +105,10 @@ def context(day: DayStudy, figures: Sequence["Figure"], *, files: bool, run: Any
 
 def html(day: DayStudy, links: LinkStudy) -> str:
     """The day as one page that loads nothing, with its figures."""
-    from microrad.report import day_plots, page
+    from microrad.report import day_plots, interactive, page
 
     figures = day_plots.draw(day)
-    return (
+    text = (
         page.pages()
         .get_template("day_page.html")
         .render(
@@ -118,3 +118,4 @@ def html(day: DayStudy, links: LinkStudy) -> str:
             inputs=list(links.file.sources.items()),
         )
     )
+    return interactive.with_library(text)

@@ -1,5 +1,7 @@
 """The figures of a study: each an SVG, with the data it shows as a table of columns."""
 
+import contextlib
+import html
 import io
 import math
 import re
@@ -14,6 +16,7 @@ from numpy.typing import NDArray
 
 from microrad import paper, simulate
 from microrad.mission import Mission
+from microrad.report import interactive
 from microrad.study import Study
 from microrad.tracking import Run, residual_rad
 
@@ -40,6 +43,12 @@ _PATH = re.compile(r' d="[^"]*"')
 _DECIMALS = re.compile(r"(\.\d\d)\d+")
 
 
+class Picture(str):
+    """The text of an <svg> element; ``plot`` is the same picture for the page's script, "" where it is static only."""
+
+    plot: str = ""
+
+
 @dataclass(frozen=True, slots=True)
 class Figure:
     """One figure: file name without ending, title, caption, SVG text, and columns of data by heading with unit."""
@@ -49,6 +58,16 @@ class Figure:
     caption: str
     svg: str
     columns: dict[str, Floats]
+
+    @property
+    def plot(self) -> str:
+        """The JSON that the page draws the interactive figure from; "" where the SVG stands alone."""
+        return self.svg.plot if isinstance(self.svg, Picture) else ""
+
+    @property
+    def labelled(self) -> str:
+        """The SVG with its text alternative, for the page."""
+        return self.svg.replace("<svg ", f'<svg role="img" aria-label="{html.escape(self.title)}" ', 1)
 
 
 def draw(study: Study) -> tuple[Figure, ...]:
@@ -62,12 +81,15 @@ def draw(study: Study) -> tuple[Figure, ...]:
     return tuple(figures)
 
 
-def svg_of(canvas: Canvas) -> str:
-    """The canvas as the text of an <svg> element, its coordinates to a hundredth of a point."""
+def svg_of(canvas: Canvas) -> Picture:
+    """The canvas as the text of an <svg> element, its coordinates to a hundredth of a point, with its plot."""
     buffer = io.StringIO()
     canvas.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
     text = buffer.getvalue()
-    return _PATH.sub(lambda path: _DECIMALS.sub(r"\1", path.group()), text[text.index("<svg") :])
+    picture = Picture(_PATH.sub(lambda path: _DECIMALS.sub(r"\1", path.group()), text[text.index("<svg") :]))
+    with contextlib.suppress(interactive.StaticOnlyError):
+        picture.plot = interactive.text_of(interactive.plot_of(canvas))
+    return picture
 
 
 def thin(x: Floats, y: Floats, most: int = MOST_POINTS) -> tuple[Floats, Floats]:
@@ -90,6 +112,7 @@ def margin_map(study: Study) -> Figure:
     rate, error = f.data_rate_bit_s * 1e-6, f.pointing_error_rad * 1e6
     levels = np.arange(-12.0, 19.0, 3.0)
     filled = axes.contourf(rate, error, f.margin_db.T, levels=levels, cmap="cividis", extend="both")
+    interactive.keep_values(filled, rate, error, f.margin_db.T)
     _band(axes, rate, error, np.stack(list(f.by_reading.values())), m.requirement.margin_db)
     lines = axes.contour(rate, error, f.margin_db.T, levels=[0.0, m.requirement.margin_db], colors="white")
     axes.clabel(lines, fmt=lambda level: f"{level:g} dB", fontsize=8)

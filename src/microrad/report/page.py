@@ -1,7 +1,9 @@
 """The report as one self-contained page."""
 
+import json
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
@@ -10,12 +12,37 @@ from microrad import link
 from microrad.mission import Source
 from microrad.missionfile import assumptions, changed_from_shipped
 from microrad.performance import FINE
-from microrad.report import constellation_views, contact_run_words, day_views, fine_pointing, links, words
+from microrad.report import (
+    chain,
+    constellation_views,
+    contact_run_words,
+    day_views,
+    fine_pointing,
+    interactive,
+    links,
+    paper_views,
+    requirement_views,
+    tails,
+    words,
+)
 from microrad.report.figures import Figure
 from microrad.report.quantities import quantity
 from microrad.report.results import versions
 from microrad.study import Study
 from microrad.units import format_quantity
+
+PARTS = (
+    ("verdict", "Verdict"),
+    ("chain", "The chain"),
+    ("budgets", "Budgets and what the link delivers"),
+    ("paper", "The paper's figures and tables"),
+    ("error-budget", "Mirror, loop and error budget"),
+    ("tails", "Monte Carlo tails"),
+    ("assumptions", "Assumptions and inputs"),
+    ("warnings", "Warnings"),
+    ("origin", "Manifest"),
+)
+"""The page's parts in their order, by the name of their anchor."""
 
 
 def pages() -> Environment:
@@ -30,28 +57,49 @@ def angle(value_rad: float) -> str:
     return format_quantity(value_rad, "rad")
 
 
-def render(
-    study: Study,
-    figures: Sequence[Figure],
-    fine_figures: Sequence[Figure] = (),
-    link_figures: Sequence[Figure] = (),
-    day_figures: Sequence[Figure] = (),
-) -> str:
+@dataclass(frozen=True, slots=True)
+class Drawn:
+    """The figures of a page by the part that shows them; a part that a study does not have has none."""
+
+    study: tuple[Figure, ...] = ()
+    bench: tuple[Figure, ...] = ()
+    fine: tuple[Figure, ...] = ()
+    tails: tuple[Figure, ...] = ()
+    links: tuple[Figure, ...] = ()
+    day: tuple[Figure, ...] = ()
+
+    @property
+    def every(self) -> tuple[Figure, ...]:
+        """All of them, in the order of the files."""
+        return (*self.study, *self.bench, *self.fine, *self.tails, *self.links, *self.day)
+
+
+def render(study: Study, drawn: Drawn, manifest: Mapping[str, Any]) -> str:
     """The page's HTML; every text of the mission is escaped, and nothing is loaded from anywhere.
 
-    ``fine_figures`` go to the section on the fine-pointing loop, which a study without that loop does not have,
-    ``link_figures`` to those on the links, ``day_figures`` to that on the day.
+    ``manifest`` is put into the page as JSON: what `reproduce` runs again.
     """
     template = pages().get_template("page.html")
     m, fine = study.file.mission, study.fine_pointing
+    titles = [(id, title) for id, title in PARTS if fine is not None or id != "tails"]
+    boxes = chain.stages(study)
     context: dict[str, Any] = {
         "study": study,
         "mission": m,
+        "top": 3,  # level of the headings inside a part
+        "parts": titles,
+        "titles": dict(titles),
+        "numbers": {id: place for place, (id, _) in enumerate(titles, start=1)},
         "headline": words.headline(study),
+        "paragraph": requirement_views.paragraph(study),
         "explanation": words.explanation(study),
         "warnings": words.warnings(study),
-        "requirements": study.requirements,
-        "links": _links(study, link_figures),
+        "requirements": requirement_views.rows(study),
+        "chain_wide": chain.layout(boxes, 4, 960.0, 26.0),
+        "chain_narrow": chain.layout(boxes, 1, 340.0, 24.0),
+        "chain_words": chain.alternative(boxes),
+        "paper": paper_views.context(study, (*drawn.study, *drawn.bench)),
+        "links": _links(study, drawn.links),
         "quantity": quantity,
         "angle": angle,
         "mirror_lines": [line for line in str(study.summary).splitlines() if not line.startswith("  warning")],
@@ -60,12 +108,30 @@ def render(
         "margins": _margins(study),
         "assumptions": assumptions(study.file),
         "inputs": _inputs(study.file.sources),
-        "figures": figures,
-        "day": _day(study, day_figures),
-        "fine": None if fine is None else fine_pointing.context(fine, m, fine_figures),
+        "day": _day(study, drawn.day),
+        "fine": None if fine is None else fine_pointing.context(fine, m, drawn.fine),
+        "tails": None if fine is None else tails.context(fine, m, drawn.tails),
         "versions": versions(),
+        "origin": _origin(manifest),
+        "manifest": embedded(manifest),
     }
-    return template.render(context)
+    return interactive.with_library(template.render(context))
+
+
+def embedded(manifest: Mapping[str, Any]) -> str:
+    """The manifest as JSON that cannot end the element it stands in: no "<", ">" or "&" is left in it."""
+    text = json.dumps(manifest, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
+    return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
+
+
+def _origin(manifest: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """The manifest's short entries, for the page."""
+    files = [("mission file", manifest["mission"])]
+    files += [("mirror file", manifest["mirror"])] if manifest["mirror"] else []
+    rows = [(what, f"{each['file']}, SHA-256 {each['sha256']}") for what, each in files]
+    rows += [("named file", f"{name}, SHA-256 {digest}") for name, digest in manifest["inputs_sha256"].items()]
+    rows += [("random numbers", manifest["randomness"]), ("machine", manifest["machine"])]
+    return [*rows, ("figures, as data and drawn", f"{len(manifest['files_sha256'])} files with their hashes")]
 
 
 def _links(study: Study, figures: Sequence[Figure]) -> dict[str, Any]:

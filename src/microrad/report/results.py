@@ -1,5 +1,6 @@
 """The numbers of a study as files: netCDF with units, and a manifest that says what made them."""
 
+import contextlib
 import hashlib
 import json
 import math
@@ -14,8 +15,8 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from microrad.fine_pointing import COUNTERS, FinePointingStudy, Residual
-from microrad.missionfile import named_files
-from microrad.report import day_results
+from microrad.missionfile import MirrorFile, MissionFile, named_files
+from microrad.report import day_results, words
 from microrad.report.fine_pointing_data import margins, rms_by_source, sources
 from microrad.report.variables import coordinate, variable
 from microrad.study import Study
@@ -34,6 +35,10 @@ LIBRARIES = (
     "sgp4",
     "skyfield",
 )
+
+
+MOST_INPUT_BYTES = 1_000_000
+"""Length up to which a file that the mission names is carried in the manifest."""
 
 
 def _trace(run: Run) -> xr.Dataset:
@@ -263,11 +268,11 @@ def write_results(study: Study, path: Path) -> None:
 
 
 def manifest(study: Study, folder: Path) -> dict[str, Any]:
-    """What made the results: the mission's text and hash, versions, and a hash of each file written so far.
+    """What made the results, with the numbers of the summary and a hash of each file written so far.
 
-    Random numbers are drawn for the fine-pointing loop, for acquisition and for the day, from the mission's seeds.
+    The mission's text and hash, those of the files that it names, and versions. Random numbers are drawn for the
+    fine-pointing loop, for acquisition and for the day, from the mission's seeds.
     """
-    mission: dict[str, Any] = {"file": study.file.path.name, "sha256": study.file.sha256, "text": study.file.text}
     files: Mapping[str, Any] = {
         str(p.relative_to(folder)): _sha256(p) for p in sorted(folder.rglob("*")) if p.is_file()
     }
@@ -282,14 +287,42 @@ def manifest(study: Study, folder: Path) -> dict[str, Any]:
         if table is not None
     ]
     return {
-        "mission": mission,
+        "mission": _text_file(study.file),
         "inputs_sha256": {name: _sha256(study.file.path.parent / name) for name in named_files(m)},
-        "mirror": None if mirror is None else {"file": mirror.path.name, "sha256": mirror.sha256, "text": mirror.text},
+        "inputs": _input_texts(study),
+        "mirror": None if mirror is None else _text_file(mirror),
         "versions": versions(),
         "machine": platform.machine(),
         "randomness": "; ".join(drawn) or "none",
         "files_sha256": files,
+        "summary": finite(words.summary(study)),
     }
+
+
+def _text_file(file: MissionFile | MirrorFile) -> dict[str, str]:
+    """Name, text and hashes of a file: its bytes', and its text's, whose line ends and mark at the begin may differ."""
+    text_sha256 = hashlib.sha256(file.text.encode()).hexdigest()
+    return {"file": file.path.name, "sha256": file.sha256, "text_sha256": text_sha256, "text": file.text}
+
+
+def _input_texts(study: Study) -> dict[str, str]:
+    """The text of each file that the mission names, but for those too long to be carried along."""
+    found = {}
+    for name in named_files(study.file.mission):
+        path = study.file.path.parent / name
+        if path.stat().st_size <= MOST_INPUT_BYTES:
+            with contextlib.suppress(UnicodeDecodeError):  # no text: left to its hash
+                found[name] = path.read_bytes().decode("utf-8")
+    return found
+
+
+def finite(data: Any) -> Any:
+    """Plain data with null for what is no finite number, which JSON cannot say."""
+    if isinstance(data, Mapping):
+        return {key: finite(value) for key, value in data.items()}
+    if isinstance(data, list | tuple):
+        return [finite(value) for value in data]
+    return None if isinstance(data, float) and not math.isfinite(data) else data
 
 
 def _sha256(path: Path) -> str:

@@ -1,0 +1,141 @@
+"""The verdict by requirement: its margin and what contributes most to it, with the numbers of the budgets."""
+
+import math
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from microrad import link
+from microrad.link.budget import FREE_SPACE_LOSS, POINTING_LOSS
+from microrad.link_study import UNDER_JITTER
+from microrad.performance import FINE, NO_HYSTERESIS
+from microrad.report.fine_pointing_words import percent, source_name
+from microrad.report.quantities import quantity
+from microrad.study import Study
+from microrad.tracking import residual_rad
+from microrad.verdict import Requirement
+
+Row = dict[str, Any]
+_BY_TEN = ("bit_error_ratio", "outage")  # inputs that a tornado moves by their order of magnitude
+
+
+def rows(study: Study) -> list[Row]:
+    """Each requirement as text: mark, required, achieved, margin, and its dominant contributor."""
+    return [
+        {
+            "name": r.name,
+            "mark": mark(r),
+            "required": quantity(r.required, r.unit),
+            "achieved": quantity(r.actual, r.unit),
+            "margin": signed(r),
+            "contributor": text,
+        }
+        for r, text in zip(study.requirements, contributors(study), strict=True)
+    ]
+
+
+def mark(r: Requirement) -> str:
+    """PASS or FAIL."""
+    return "PASS" if r.met else "FAIL"
+
+
+def signed(r: Requirement) -> str:
+    """The margin with its sign."""
+    text = quantity(r.margin, r.unit)
+    return f"+{text}" if r.margin >= 0.0 else text
+
+
+def paragraph(study: Study) -> str:
+    """What holds and what does not, a clause for each requirement."""
+    failed, passed = ([r for r in study.requirements if r.met == met] for met in (False, True))
+    count = f"{len(passed)} of {len(study.requirements)} requirements are met."
+    parts = [count]
+    if failed:
+        parts.append(f"FAIL: {'; '.join(f'{r.name} {signed(r)}, by {r.limited_by}' for r in failed)}.")
+    if passed:
+        parts.append(f"PASS: {'; '.join(f'{r.name} {signed(r)}' for r in passed)}.")
+    return " ".join(parts)
+
+
+def contributors(study: Study) -> list[str]:
+    """The dominant contributor to each requirement, in the order of the study's requirements."""
+    return [_capital(of(study, r.limited_by)) for of, r in zip(_CONTRIBUTORS, study.requirements, strict=False)]
+
+
+def _capital(text: str) -> str:
+    return text[:1].upper() + text[1:]
+
+
+def _cone(study: Study) -> str:
+    p = study.open_loop
+    share, line = max(zip(p.variance_shares, p.lines, strict=True), key=lambda pair: pair[0])
+    return f"{line.name}: {percent(share)} of the squares, {quantity(line.value, 'rad')} half width"
+
+
+def _tornado(study: Study, of: str) -> Sequence[link.Swing]:
+    return next((t.swings for t in study.links.tornados if t.of == of), ())
+
+
+def most_sensitive(swings: Sequence[link.Swing]) -> str:
+    """The input that moves a margin most, and by how much, or nothing."""
+    known = [s for s in swings if math.isfinite(s.swing_db)]
+    if not known:
+        return ""
+    top = max(known, key=lambda s: s.swing_db)
+    step = "a factor of ten" if top.key.endswith(_BY_TEN) else "0.5 dB" if top.unit.startswith("dB") else "10 %"
+    return f"; the margin moves most with {top.key}: {quantity(top.swing_db, 'dB')} for {step} both ways"
+
+
+def largest_loss(budget: link.LinkBudget) -> str:
+    """The largest loss that a design can change, with its size."""
+    losses = [line for line in budget.lines if line.unit == "dB" and line.name != FREE_SPACE_LOSS]
+    line = min(losses, key=lambda each: each.value)
+    return f"{line.name} {quantity(-line.value, 'dB')}"
+
+
+def _power(study: Study, budget: link.LinkBudget) -> str:
+    return f"{largest_loss(budget)}{most_sensitive(_tornado(study, budget.name))}"
+
+
+def _residual(study: Study, cause: str) -> str:
+    m, run = study.file.mission, study.residual
+    straight = next(
+        r for r in study.runs if (r.mirror, r.controller, r.freq_hz) == (NO_HYSTERESIS, run.controller, run.freq_hz)
+    )
+    with_it, without = (quantity(residual_rad(m, r.trace), "rad") for r in (run, straight))
+    return f"{cause}: {with_it} with hysteresis, {without} without"
+
+
+def _communication(study: Study, cause: str) -> str:
+    lost = next(line.value for line in study.achieved.lines if line.name == POINTING_LOSS)
+    return f"{cause}, pointing loss {quantity(-lost, 'dB')}{most_sensitive(study.links.tornado)}"
+
+
+def _fine(study: Study, cause: str) -> str:
+    fine = study.fine_pointing
+    assert fine is not None  # such a requirement has one
+    sizes = {part.name: part.rms_rad for part in fine.budget.parts}
+    sizes |= {d.name: d.added_rad for d in fine.budget.differences}
+    own, whole = sizes[cause], fine.budget.full_rad
+    share = percent((own / whole) ** 2)
+    return f"{source_name(cause)}: {quantity(own, 'rad')} of {quantity(whole, 'rad')} rms, {share} of the squares"
+
+
+def _outage(study: Study, cause: str) -> str:
+    fine = study.fine_pointing
+    assert fine is not None  # such a requirement has one
+    case = study.performance.case(FINE, fine.best.design.name, "given")
+    assert case is not None
+    swings = _tornado(study, UNDER_JITTER) or study.links.tornado
+    lost = quantity(case.outage_loss_db, "dB")
+    return f"{source_name(cause)}, pointing loss {lost} at the outage{most_sensitive(swings)}"
+
+
+_CONTRIBUTORS: tuple[Callable[[Study, str], str], ...] = (
+    lambda study, cause: _cone(study),
+    lambda study, cause: _power(study, study.beacon),
+    lambda study, cause: _power(study, study.answer),
+    _residual,
+    _communication,
+    _fine,
+    _outage,
+)

@@ -1,0 +1,84 @@
+"""Where the studio listens, under which names it answers, and the secret in the address that the command prints."""
+
+from __future__ import annotations
+
+import re
+import secrets
+from typing import Any
+
+MESSAGE_BYTES = 1_000_000
+"""Largest message to the server, by WebSocket or in a plain request; NiceGUI's pages send no larger one."""
+
+_LOOPBACK = ("127.0.0.1", "localhost", "[::1]")
+_NAME = re.compile(r"[A-Za-z0-9.-]{1,253}|\[[0-9A-Fa-f:.]{2,45}\]")
+_SHOWN = 120
+
+
+class ExposureError(ValueError):
+    """The studio was to be opened to other machines, or under a name that is none; the message says what to do."""
+
+
+def new_token() -> str:
+    """The secret of one session: 256 random bits as text for an address."""
+    return secrets.token_urlsafe(32)
+
+
+def bind_address(host: str = "127.0.0.1", exposed: bool = False) -> str:
+    """The address to listen on; any but a loopback address is refused unless `exposed` was asked for in so many words.
+
+    Raises `ExposureError`.
+    """
+    if host in ("127.0.0.1", "::1", "localhost"):
+        return "127.0.0.1" if host == "localhost" else host
+    if not exposed:
+        raise ExposureError(
+            f"the studio listens on this machine only, and '{host[:_SHOWN]}' is open to others: whoever reads the "
+            "address on its way, which is not encrypted, may then read and write your missions. Leave the host at "
+            "127.0.0.1 and come in by an SSH tunnel (ssh -L), or add --expose-to-the-network if you want just that"
+        )
+    return host
+
+
+def hosts(port: int, names: tuple[str, ...] = _LOOPBACK) -> tuple[str, ...]:
+    """The names under which the studio answers, as a browser sends them: `name:port`, without the port where it is 80.
+
+    Raises `ExposureError` for a text that is no name of a host.
+    """
+    wrong = [name for name in names if not _NAME.fullmatch(name)]
+    if wrong or not names:
+        raise ExposureError(
+            f"'{', '.join(wrong)[:_SHOWN]}' is no name of a host; give names such as localhost, without http:// or port"
+        )
+    return tuple(name.lower() if port == 80 else f"{name.lower()}:{port}" for name in names)
+
+
+def origins(names: tuple[str, ...]) -> tuple[str, ...]:
+    """The origins of the studio's own pages, from its `hosts`."""
+    return tuple(f"http://{name}" for name in names)
+
+
+def entrance(host: str, token: str) -> str:
+    """The address that the command prints; `host` is one of `hosts`."""
+    return f"http://{host}/?token={token}"
+
+
+def cookie_name(host: str) -> str:
+    """Name of the cookie of the studio at `host`: browsers share cookies between ports, so the port is in the name."""
+    port = re.search(r":([0-9]+)$", host)
+    return f"microrad_studio_{port.group(1) if port else '80'}"
+
+
+def server_settings() -> dict[str, Any]:
+    """Settings of uvicorn that belong to the guard: bounded headers and messages, no log that shows tokens.
+
+    h11 bounds the head of a request at 64 KiB. Compression would cost time on a loopback, and unpack what was sent.
+    """
+    return {
+        "http": "h11",
+        "ws": "websockets-sansio",
+        "ws_max_size": MESSAGE_BYTES,
+        "ws_per_message_deflate": False,
+        "proxy_headers": False,
+        "server_header": False,
+        "access_log": False,
+    }

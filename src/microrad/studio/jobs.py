@@ -1,0 +1,157 @@
+"""Runs as processes of their own: started, queued, looked at, cancelled and removed by files alone.
+
+A job outlives its page, a reload, a second tab and the server: a campaign may take days, and whoever closes the studio
+does not mean to throw its rows away. The next server finds it by its folder. What the page shows is read from there
+each time, and nothing is kept here.
+"""
+
+from __future__ import annotations
+
+import json
+import shutil
+import tempfile
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+from microrad.folder import write_whole
+from microrad.studio.jobs_files import (
+    CANCEL,
+    JOB,
+    KINDS,
+    Job,
+    JobError,
+    Kind,
+    Progress,
+    State,
+    held,
+    job_folders,
+    now,
+    output,
+    read_job,
+)
+from microrad.studio.jobs_process import start_waiting
+
+__all__ = ["Job", "JobError", "Jobs", "Kind", "Order", "Progress", "State"]
+
+_LAST = "last"
+_QUEUE_S = 60.0
+
+
+@dataclass(frozen=True, slots=True)
+class Order:
+    """What is to be run: `arguments` of microrad, seen from the folder `cwd`, and the `results` that it writes there.
+
+    `commands` makes the arguments; `title` is what the page calls the job.
+    """
+
+    kind: Kind
+    title: str
+    arguments: tuple[str, ...]
+    cwd: Path
+    results: tuple[str, ...] = ()
+
+
+class Jobs:
+    """The jobs in the studio's working folder, `studio` / jobs; at most `at_once` run, the others wait in order."""
+
+    def __init__(self, studio: Path, at_once: int = 1) -> None:
+        """Make the folders, for their owner alone; raises `JobError` where one is a link or cannot be made."""
+        if at_once < 1:
+            raise JobError(f"{at_once} jobs at once would never start one; give 1 or more")
+        self.folder = (studio / "jobs").absolute()
+        self.at_once = at_once
+        for folder in (studio, self.folder):
+            _make_private(folder)
+
+    def submit(self, order: Order) -> Job:
+        """Put a job into the queue, and start it if there is room. Raises `JobError`."""
+        if order.kind not in KINDS:
+            raise JobError(f"'{order.kind}' is no kind of job; it is one of {', '.join(KINDS)}")
+        if not order.cwd.is_dir():
+            raise JobError(f"{order.cwd} is no folder to run a job in; choose another working folder")
+        described = {
+            "kind": order.kind,
+            "title": order.title,
+            "arguments": list(order.arguments),
+            "cwd": str(order.cwd.absolute()),
+            "results": list(order.results),
+            "queued": now(),
+        }
+        try:
+            folder = self._put(json.dumps(described, indent=2))
+        except OSError as error:
+            raise JobError(f"{self.folder}: {error.strerror}; check free space and permissions") from error
+        start_waiting(self.folder, self.at_once)
+        return read_job(folder)
+
+    def _put(self, description: str) -> Path:
+        """A new folder with the description of a job, which appears with both or not at all."""
+        draft = Path(tempfile.mkdtemp(prefix=".new-", dir=self.folder))  # its mode is 0700
+        try:
+            write_whole(draft / JOB, description)
+            with held(self.folder / "lock", _QUEUE_S) as mine:
+                if not mine:
+                    raise JobError(f"the queue in {self.folder} is taken by another program; try again")
+                folder = self.folder / str(self._next_number())
+                draft.rename(folder)
+                write_whole(self.folder / _LAST, folder.name)
+        except BaseException:
+            shutil.rmtree(draft, ignore_errors=True)
+            raise
+        return folder
+
+    def _next_number(self) -> int:
+        """One more than any job had, the removed ones included: a number is never used again."""
+        last = 0
+        with suppress(OSError, ValueError):
+            last = int((self.folder / _LAST).read_text("utf-8"))
+        return max([last, *(int(each.name) for each in job_folders(self.folder))]) + 1
+
+    def listed(self) -> tuple[Job, ...]:
+        """Every job, the newest first; one that waits is started if there is room meanwhile."""
+        start_waiting(self.folder, self.at_once)
+        found = [read_job(folder) for folder in job_folders(self.folder)]
+        return tuple(job for job in found if job.folder.is_dir())  # one may have been removed meanwhile
+
+    def get(self, number: int) -> Job:
+        """The job of this number. Raises `JobError` where there is none."""
+        folder = self.folder / str(number)
+        if number < 1 or not folder.is_dir():
+            raise JobError(f"there is no job {number} any more; it was removed, or never started")
+        return read_job(folder)
+
+    def cancel(self, number: int) -> Job:
+        """Ask a job to stop: Ctrl-C at once, and harder when it does not listen (`jobs_process.WAITS_S`).
+
+        One that waits never starts. A campaign keeps its finished rows, and can be resumed. Raises `JobError`.
+        """
+        job = self.get(number)
+        if job.finished:
+            raise JobError(f"job {number} is not running any more ({job.state}); there is nothing to cancel")
+        (job.folder / CANCEL).touch()
+        return self.get(number)
+
+    def remove(self, number: int) -> None:
+        """Remove a finished job from the list, with what it printed; its results stay. Raises `JobError`."""
+        job = self.get(number)
+        if not job.finished:
+            raise JobError(f"job {number} is {job.state}; cancel it first")
+        gone = Path(tempfile.mkdtemp(prefix=".removed-", dir=self.folder))
+        job.folder.rename(gone / job.folder.name)
+        shutil.rmtree(gone, ignore_errors=True)
+
+    def output(self, number: int, name: str = "stdout") -> str:
+        """What a job has printed so far, the last 200 kB: "stdout" or "stderr". Raises `JobError`."""
+        return output(self.get(number).folder, "stderr" if name == "stderr" else "stdout")
+
+
+def _make_private(folder: Path) -> None:
+    """Make a folder that only its owner may read; JobError where it is something else."""
+    try:
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        if folder.is_symlink():
+            raise JobError(f"{folder} is a link; remove it, or choose another working folder")
+        folder.chmod(0o700)
+    except OSError as error:
+        raise JobError(f"{folder} cannot be made or made private: {error.strerror}; choose another folder") from error

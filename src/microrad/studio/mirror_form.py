@@ -1,0 +1,220 @@
+"""The form of an identification: what a recording says of itself, what is typed, and the job that comes of it."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+
+from microrad.folder import write_whole
+from microrad.studio.commands import Identify
+from microrad.studio.jobs import Order
+from microrad.studio.names import NameRefusedError, safe_name
+from microrad.studio.reading import Columns, Listing
+from microrad.units import UnitError, parse_quantity
+
+DRIVE_UNITS = ("V", "mV")
+OUTPUT_UNITS = ("mrad", "urad", "rad", "um", "mm", "m")
+LENGTHS = ("um", "mm", "m")
+_WRITTEN = {"urad": "µrad", "um": "µm"}
+_SPELLINGS = {"µrad": "urad", "μrad": "urad", "microrad": "urad", "µm": "um", "μm": "um", "volt": "V", "volts": "V"}
+_BEHIND = re.compile(r"[(\[]\s*([^)\]]*?)\s*[)\]]\s*$")
+_DRIVES = re.compile(r"\b(u|drive|input|command|voltage|in|ch0|v)\b|volt|drive", re.IGNORECASE)
+_OUTPUTS = re.compile(r"\b(y|output|out|angle|tilt|sensor|displacement|position)\b|angle|disp", re.IGNORECASE)
+
+
+class SettingError(ValueError):
+    """Something in the form that cannot be used; the message names the field and says what to type."""
+
+
+@dataclass(frozen=True, slots=True)
+class Setting:
+    """What the form says, as it is typed: channels by number, quantities as text, "" where nothing is said."""
+
+    drive: int | None = None
+    output: int | None = None
+    rate: str = ""
+    drive_unit: str = "V"
+    output_unit: str = "mrad"
+    lever_arm: str = ""
+    accept: tuple[str, ...] = ()
+    static: bool = False
+    admissible: bool = False
+    name: str = "mirror"
+
+
+@dataclass(frozen=True, slots=True)
+class Dropped:
+    """A recording that was dropped: its key among the uploads, its name, its path, and what it is used for."""
+
+    key: str
+    name: str
+    path: Path
+    use: str = "fit"
+
+
+USES = {"fit": "fit", "check": "check only", "leave": "leave out"}
+"""What a recording may serve for; "check" is a recording that no fit sees."""
+
+
+@dataclass(frozen=True, slots=True)
+class Form:
+    """The form as every tab sees it; `uses` holds what is not to be fitted, by the key of the upload."""
+
+    setting: Setting = field(default_factory=Setting)
+    uses: dict[str, str] = field(default_factory=dict)
+
+
+def kept_form(path: Path) -> Form:
+    """The form that was kept in a file; an empty one where there is none, or none that can be read."""
+    from pydantic import TypeAdapter
+
+    with suppress(OSError, ValueError):
+        return TypeAdapter(Form).validate_json(path.read_bytes())
+    return Form()
+
+
+def keep_form(path: Path, form: Form) -> None:
+    """Keep the form for a reload and for other tabs. Raises OSError."""
+    write_whole(path, json.dumps(asdict(form)))
+
+
+def first_setting(listing: Listing, file: str) -> Setting:
+    """What a recording says of itself: channels by their names and units, its rate where it states one."""
+    usable = [k for k, channel in enumerate(listing.channels) if k != listing.time and channel.samples != 0]
+    drive = _guess(listing, usable, _DRIVES, DRIVE_UNITS)
+    drive = next(iter(usable), None) if drive is None else drive
+    rest = [k for k in usable if k != drive]
+    output = _guess(listing, rest, _OUTPUTS, OUTPUT_UNITS)
+    output = next(iter(rest), None) if output is None else output
+    rate = f"{listing.rates_hz[0]:.10g} Hz" if len(listing.rates_hz) == 1 else ""
+    return Setting(
+        drive,
+        output,
+        rate,
+        _stated(listing, drive, DRIVE_UNITS) or "V",
+        _stated(listing, output, OUTPUT_UNITS) or "mrad",
+        name=f"{Path(file).stem[:100]}-mirror",
+    )
+
+
+def _guess(listing: Listing, among: Sequence[int], names: re.Pattern[str], units: Sequence[str]) -> int | None:
+    """The first channel whose unit or name speaks for it."""
+    by_unit = [k for k in among if _stated(listing, k, units)]
+    by_name = [k for k in among if names.search(listing.channels[k].name.replace("_", " "))]
+    return next(iter([k for k in by_unit if k in by_name] or by_unit or by_name), None)
+
+
+def _stated(listing: Listing, channel: int | None, units: Sequence[str]) -> str:
+    """The unit that a file states for a channel, or behind its name in brackets; "" for none of these."""
+    if channel is None:
+        return ""
+    found = listing.channels[channel]
+    behind = _BEHIND.search(found.name)
+    unit = found.unit.strip() or (behind[1] if behind else "")
+    unit = _SPELLINGS.get(unit, unit)
+    return unit if unit in units else ""
+
+
+def labels(listing: Listing) -> dict[int, str]:
+    """The channels by number, with name, unit and length, for a choice."""
+    return {k: _label(k, c.name, c.unit, c.samples) for k, c in enumerate(listing.channels)}
+
+
+def _label(number: int, name: str, unit: str, samples: int | None) -> str:
+    told = f" ({unit})" if unit else ""
+    length = "" if samples is None else f", {samples} samples"
+    own = f"column {number}" if name in ("", str(number)) else f"{number}: {name}"
+    return f"{own}{told}{length}"
+
+
+def rate_hz(typed: str) -> float | None:
+    """A sample rate as it is typed, with its unit or without; None for nothing. Raises `SettingError`."""
+    if not typed.strip():
+        return None
+    text = typed.strip()
+    try:
+        return parse_quantity(text if re.search(r"[A-Za-z]", text) else f"{text} Hz", "Hz")
+    except UnitError as error:
+        raise SettingError(f"sample rate: {error}") from None
+
+
+def lever_arm_m(setting: Setting) -> float | None:
+    """The lever arm of a displacement; None for an angle. Raises `SettingError`."""
+    if setting.output_unit not in LENGTHS:
+        return None
+    if not setting.lever_arm.strip():
+        raise SettingError(
+            f"lever arm: the output is a length ({written(setting.output_unit)}) and a mirror needs an angle; type the "
+            'distance from the axis of rotation to the point measured, such as "50 mm"'
+        )
+    try:
+        found = parse_quantity(setting.lever_arm.strip(), "m")
+    except UnitError as error:
+        raise SettingError(f"lever arm: {error}") from None
+    if not found > 0.0:
+        raise SettingError(f"lever arm: {setting.lever_arm} is not above 0; type a length such as 50 mm")
+    return found
+
+
+def columns(setting: Setting) -> Columns:
+    """Which channels are read. Raises `SettingError` where they are not chosen, or chosen twice."""
+    if setting.drive is None or setting.output is None:
+        missing = "drive" if setting.drive is None else "output"
+        raise SettingError(f"{missing}: choose the channel")
+    if setting.drive == setting.output:
+        raise SettingError(f"output: channel {setting.output} is the drive already; choose the channel of the sensor")
+    return Columns((setting.drive,), (setting.output,), rate_hz(setting.rate), accept=setting.accept)
+
+
+def written(unit: str) -> str:
+    """A unit as it is read, not typed."""
+    return _WRITTEN.get(unit, unit)
+
+
+def identification(folder: Path, recordings: Sequence[Dropped], setting: Setting) -> Identify:
+    """The identification that the form asks for, seen from the working folder.
+
+    Raises `SettingError` for what is missing in it and for a mirror file that is there already.
+    """
+    chosen = columns(setting)
+    fitted = tuple(each.path.relative_to(folder) for each in recordings if each.use == "fit")
+    if not fitted:
+        raise SettingError("recordings: none is to be fitted; drop one, or set its use to fit")
+    return Identify(
+        files=fitted,
+        input=str(chosen.inputs[0]),
+        output=str(chosen.outputs[0]),
+        mirror_file=_new_file(folder, setting.name),
+        input_unit=setting.drive_unit,
+        output_unit=setting.output_unit,
+        rate_hz=chosen.rate_hz,
+        accept=setting.accept,
+        validate=tuple(each.path.relative_to(folder) for each in recordings if each.use == "check"),
+        lever_arm_m=lever_arm_m(setting),
+        static=setting.static,
+        admissible=setting.admissible,
+        name=setting.name.strip(),
+    )
+
+
+def _new_file(folder: Path, name: str) -> Path:
+    """The mirror file of this name, which neither it nor its report may be there already."""
+    if not name.strip():
+        raise SettingError("name of the mirror: it has none; type one, such as stage-x")
+    try:
+        path = Path(safe_name(f"{name.strip()}.toml"))
+    except NameRefusedError as error:
+        raise SettingError(f"name of the mirror: {error}") from None
+    for each in (path, path.with_suffix(".html")):
+        if (folder / each).exists():
+            raise SettingError(f"name of the mirror: {each} is there already and is left as it is; type another name")
+    return path
+
+
+def order(folder: Path, action: Identify) -> Order:
+    """The job of an identification."""
+    return Order("identification", f"identify {action.name}", (*action.arguments, "--json"), folder, action.results)

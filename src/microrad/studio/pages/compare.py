@@ -1,0 +1,209 @@
+"""Two missions side by side: the keys that differ, the links of both, and the verdicts of their studies."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from nicegui import run, ui
+
+from microrad import presets
+from microrad.studio import commands, compare_view
+from microrad.studio.compare_view import Beside, Found, Number
+from microrad.studio.draft import Draft
+from microrad.studio.pages import layout
+from microrad.studio.workshop import Workshop
+
+TITLE = "Compare"
+PATH = "/compare"
+
+_PAPER, _SAVED = "paper's mission", "saved file of this mission"
+
+
+def page(workshop: Workshop) -> None:
+    """The choice of the other mission, and the tables of both."""
+    _Page(workshop)
+
+
+@dataclass(frozen=True, slots=True)
+class _Both:
+    """What is shown: the numbers of both, or why there are none."""
+
+    numbers: tuple[Beside, ...]
+    faults: tuple[str, str]
+    studies: tuple[Found | None, Found | None]
+
+
+class _Page:
+    """The page of one tab. The other mission is the workshop's, so every tab compares with the same."""
+
+    def __init__(self, workshop: Workshop) -> None:
+        self.workshop = workshop
+        self.asked = 0
+        with ui.row().classes("compare-choice"):
+            self.choice = ui.select(self._options(), label="Compare with", on_change=self._chosen)
+            self.choice.props("outlined dense").classes("compare-select")
+            layout.copy_buttons(partial(self._action, other=False))
+            ui.label("for the other:").classes("soft")
+            layout.copy_buttons(partial(self._action, other=True))
+        self.fault = ui.label().classes("no kept").props('role="alert"')
+        self.place = ui.column().classes("compare-tables")
+        layout.follow(workshop, self._look)
+
+    def _options(self) -> dict[str, str]:
+        """The missions that can be chosen, by what they are called inside, with their names."""
+        draft, found = self.workshop.draft, {}
+        if draft.path.exists() and draft.changed:
+            found[_SAVED] = f"{self.workshop.name_of(draft.path)} as it is saved"
+        files = (path.name for path in self.workshop.missions() if path != draft.path)
+        found |= {f"file {name}": name for name in files} | {_PAPER: "the paper's mission"}
+        return found | {f"preset {each.name}": f"{each.name}: {each.title}" for each in presets.presets()}
+
+    def _chosen(self, event: Any) -> None:
+        if not event.value:
+            return
+        self.fault.text = ""
+        try:
+            self.workshop.other = self._draft(event.value)
+        except (ValueError, OSError) as error:
+            self.fault.text = str(error)
+
+    def _draft(self, name: str) -> Draft:
+        if name == _SAVED:
+            return Draft.open(self.workshop.draft.path)
+        kind, _, rest = name.partition(" ")
+        if kind == "file":
+            return Draft.open(self.workshop.inside(rest))
+        paper = Draft.shipped(self.workshop.inside("leo-geo.toml" if name == _PAPER else f"{rest}.toml"))
+        return paper if name == _PAPER else paper.with_text(presets.preset_text(rest))
+
+    def _action(self, other: bool) -> commands.Budget | None:
+        draft = self.workshop.other if other else self.workshop.draft
+        if draft is None:
+            layout.refuse("There is no other mission yet; choose one.")
+            return None
+        if not draft.path.exists():
+            layout.refuse(f"{self.workshop.name_of(draft.path)} is not a file of this folder yet; save it there first.")
+            return None
+        return commands.Budget(Path(self.workshop.name_of(draft.path)))
+
+    # ------------------------------------------------------------------------------------------------------- the tables
+    def _look(self) -> None:
+        options = self._options()
+        if options != self.choice.options:
+            self.choice.set_options(options, value=self.choice.value if self.choice.value in options else None)
+        self.asked += 1
+        ui.timer(0.0, partial(self._show, self.asked), once=True)
+
+    async def _show(self, asked: int) -> None:
+        """Compute in a thread, and show it if nothing has changed meanwhile."""
+        here, there = self.workshop.draft, self.workshop.other
+        if there is None:
+            self.place.clear()
+            with self.place:
+                ui.label("Choose the mission that this one is to be compared with.").classes("soft")
+            return
+        both = await run.io_bound(_both, self.workshop, here, there)
+        if both is None or asked != self.asked:
+            return
+        names = (self.workshop.name_of(here.path), self._name(there))
+        self.place.clear()
+        with self.place:
+            _numbers(both, names)
+            _studies(both, names)
+            _differences(here, there, names)
+
+    def _name(self, draft: Draft) -> str:
+        name = self.workshop.name_of(draft.path)
+        return f"{name} (saved)" if draft.path == self.workshop.draft.path else name
+
+
+def _both(workshop: Workshop, here: Draft, there: Draft) -> _Both:
+    (ours, why), (theirs, why_not) = _of_links(here), _of_links(there)
+    studies = (compare_view.finished_study(workshop, here), compare_view.finished_study(workshop, there))
+    return _Both(compare_view.beside(ours, theirs), (why, why_not), studies)
+
+
+def _of_links(draft: Draft) -> tuple[tuple[Number, ...], str]:
+    try:
+        return compare_view.link_numbers(draft), ""
+    except ValueError as error:
+        return (), str(error)
+
+
+def _differences(here: Draft, there: Draft, names: tuple[str, str]) -> None:
+    found = compare_view.differences(here, there)
+    layout.heading(f"Differences: {len(found)}")
+    if not found:
+        ui.label("Every key has the same value in both.").classes("soft")
+        return
+    with ui.element("div").classes("compare-scroll"), layout.words("table").classes("compare-table"):
+        _head("Key", *names)
+        with ui.element("tbody"):
+            for each in found:
+                with ui.element("tr"):
+                    layout.words("th", each.key).props("scope=row")
+                    _cell(each.here, each.here_source)
+                    _cell(each.there, each.there_source)
+
+
+def _numbers(both: _Both, names: tuple[str, str]) -> None:
+    layout.heading("Links")
+    for name, fault in zip(names, both.faults, strict=True):
+        if fault:
+            ui.label(f"{name} has no link budget.").classes("no")
+            ui.label(fault).classes("small kept")
+    if both.numbers:
+        _table(both.numbers, names)
+
+
+def _studies(both: _Both, names: tuple[str, str]) -> None:
+    layout.heading("Verdicts")
+    for name, found in zip(names, both.studies, strict=True):
+        words = f"{name}: {found.verdict} ({found.folder})" if found else _no_study(name)
+        ui.label(words).classes("soft" if found is None else "yes" if found.closes else "no")
+    if any(both.studies):
+        ours, theirs = (() if found is None else found.numbers for found in both.studies)
+        _table(compare_view.beside(ours, theirs), names)
+
+
+def _no_study(name: str) -> str:
+    return f"{name}: no study of this text is in the folder; the page Runs makes one."
+
+
+def _table(rows: tuple[Beside, ...], names: tuple[str, str]) -> None:
+    with ui.element("div").classes("compare-scroll"), layout.words("table").classes("compare-table"):
+        _head("Number", *names, "Change")
+        with ui.element("tbody"):
+            for row in rows:
+                with ui.element("tr"):
+                    layout.words("th", row.name).props("scope=row")
+                    _number(row.here)
+                    _number(row.there)
+                    layout.words("td", row.change).classes("number")
+
+
+def _head(*names: str) -> None:
+    with ui.element("thead"), ui.element("tr"):
+        for name in names:
+            layout.words("th", name).props("scope=col")
+
+
+def _cell(typed: str, source: str) -> None:
+    with ui.element("td"):
+        layout.words("div", typed or "not given").classes("" if typed else "soft")
+        layout.words("div", source).classes("small soft")
+
+
+def _number(number: Number | None) -> None:
+    with ui.element("td").classes("number"):
+        if number is None:
+            layout.words("span", "none").classes("soft")
+            return
+        layout.words("span", number.text)
+        if number.met is not None:
+            mark, style = ("PASS", "PASS") if number.met else ("FAIL", "FAIL")
+            layout.words("span", f"  {mark}").classes(f"{style} compare-mark")
+            layout.words("div", f"required {number.required}").classes("small soft")

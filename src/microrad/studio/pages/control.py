@@ -1,0 +1,273 @@
+"""Control: the mission's controllers with their margins, and what the loop of a chosen one does."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from nicegui import background_tasks, run, ui
+
+from microrad.missionfile import MissionFile
+from microrad.studio.commands import Design
+from microrad.studio.pages import layout
+from microrad.studio.workshop import Workshop
+
+TITLE = "Control"
+PATH = "/control"
+
+_COLUMNS = [
+    {"name": "name", "label": "Controller", "field": "name", "align": "left"},
+    {"name": "residual", "label": "Residual of an axis (rms, linear)", "field": "residual", "align": "right"},
+    {"name": "modulus", "label": "Modulus margin", "field": "modulus", "align": "right"},
+    {"name": "gain", "label": "Gain margin", "field": "gain", "align": "right"},
+    {"name": "phase", "label": "Phase margin", "field": "phase", "align": "right"},
+    {"name": "bandwidth", "label": "Bandwidth", "field": "bandwidth", "align": "right"},
+]
+_PLOTS = {
+    "sensitivity": "Sensitivity by frequency",
+    "gain": "Loop gain by frequency",
+    "step": "Step response",
+    "step_drive": "Drive behind a step",
+    "sine": "Error while a sine is followed",
+    "sine_drive": "Drive while a sine is followed",
+    "jitter": "Error under disturbance",
+    "motion": "What is to be followed and what the mirror does",
+    "jitter_drive": "Drive under disturbance",
+}
+_CSS = """
+.control-asked { display: grid; grid-template-columns: 19rem repeat(3, minmax(8rem, 12rem)) auto; gap: .75rem;
+                 align-items: center; }
+.control-words { color: var(--fail); white-space: pre-wrap; overflow-wrap: anywhere; }
+.control-numbers { display: grid; grid-template-columns: repeat(auto-fit, minmax(20rem, 1fr)); gap: 0 2rem; margin: 0;
+                   width: 100%; }
+.control-numbers div { display: flex; justify-content: space-between; gap: 1rem; border-bottom: 1px solid var(--line); }
+.control-numbers dd { margin: 0; font-variant-numeric: tabular-nums; text-align: right; }
+.control-plots { display: grid; grid-template-columns: repeat(2, minmax(0, 1fr)); gap: .5rem; width: 100%; }
+.control-plots > * { height: 21rem; min-width: 0; }
+@media (max-width: 1150px) { .control-asked { grid-template-columns: repeat(3, minmax(0, 1fr)); } }
+"""
+
+
+def page(workshop: Workshop) -> None:
+    """A table of all controllers, and below it one of them."""
+    ui.add_head_html(f"<style>{_CSS}</style>")
+    ControlPage(workshop)
+
+
+class ControlPage:
+    """The page of one tab; what is tuned is kept for all tabs by `control_model`."""
+
+    def __init__(self, workshop: Workshop) -> None:
+        """Build the body, and have it follow the workshop."""
+        self.workshop = workshop
+        self.file: MissionFile | None = None
+        self.question, self.round, self.filling = 0, 0, False
+        self.rows: dict[str, dict[str, Any]] = {}
+        self.plots: dict[str, Any] = {}
+        layout.copy_buttons(lambda: Design(Path(workshop.name_of(workshop.draft.path))))
+        self.words = ui.label().classes("control-words").props('role="alert"')
+        self._all()
+        self._one()
+        layout.follow(workshop, lambda: background_tasks.create(self.reload()))
+
+    def _all(self) -> None:
+        layout.heading("Controllers of the mission")
+        ui.label("Each is tuned for the least residual under the modulus margin of the mission.").classes("soft")
+        with ui.row().classes("items-center"):
+            self.tune = ui.button("Tune all", on_click=self.tune_all).props("no-caps dense outline")
+            self.stop = ui.button("Stop", on_click=self.stop_all).props("no-caps dense flat")
+            self.stop.visible = False
+        self.table = ui.table(rows=[], columns=_COLUMNS, row_key="name").props("flat dense hide-bottom wrap-cells")
+        self.table.props(":pagination='{rowsPerPage: 0}'").classes("w-full")
+
+    def _one(self) -> None:
+        layout.heading("One controller")
+        with ui.element("div").classes("control-asked w-full"):
+            self.name = ui.select([], label="Controller", on_change=self.show).props("dense outlined options-dense")
+            self.step = self._text("Step", "100 urad")
+            self.amplitude = self._text("Sine, amplitude", "300 urad")
+            self.frequency = self._text("Sine, frequency", "15 Hz")
+            names = {"both": "both", "with": "with hysteresis", "without": "without"}
+            self.variants = ui.toggle(names, value="both", on_change=self.show)
+            self.variants.props('dense no-caps aria-label="Hysteresis of the mirror"')
+        self.state = ui.label().classes("soft").props('role="status"')
+        self.notes = ui.column().classes("gap-0")
+        self.numbers = ui.element("dl").classes("control-numbers")
+        layout.heading("By frequency", 3)
+        self._plots("sensitivity", "gain")
+        layout.heading("A step of the reference on axis x", 3)
+        self.told_step = self._told()
+        self._plots("step", "step_drive")
+        layout.heading("A sine of the reference on axis x", 3)
+        self.told_sine = self._told()
+        self._plots("sine", "sine_drive")
+        with ui.column().classes("w-full") as self.shaken:
+            layout.heading("Everything that disturbs the loop", 3)
+            self.told_jitter = self._told()
+            self._plots("jitter", "motion", "jitter_drive")
+
+    def _text(self, label: str, value: str) -> Any:
+        return ui.input(label, value=value, on_change=self.show).props("dense outlined debounce=500")
+
+    def _told(self) -> Any:
+        return ui.label().props('role="status"')
+
+    def _plots(self, *names: str) -> None:
+        from microrad.studio.plots import empty
+
+        with ui.element("div").classes("control-plots"):
+            for name in names:
+                self.plots[name] = ui.plotly(empty("Being simulated.")).props(
+                    f'role="figure" aria-label="{_PLOTS[name]}"'
+                )
+
+    # ------------------------------------------------------------------------------------------------------ the mission
+    async def reload(self) -> None:
+        """Take over the mission as it is now; while it has faults, the last one stays."""
+        file = self.workshop.mission()
+        self.words.text = self.workshop.faults()
+        if file is None or (self.file is not None and file.sha256 == self.file.sha256 and file == self.file):
+            return
+        from microrad.studio import control_view
+
+        names = await run.io_bound(_names, file)
+        if names is None:
+            return
+        self.file, self.round = file, self.round + 1
+        self.rows = {name: control_view.waiting_row(name) for name in names}
+        self._table()
+        self.filling = True
+        if not self.name.value:
+            self.amplitude.value = _amplitude(file)
+            self.frequency.value = f"{file.mission.scenario.pid_frequencies_hz[-1]:g} Hz"
+        self.name.set_options(list(names), value=self.name.value if self.name.value in names else _first(names))
+        self.filling = False
+        await self.show()
+
+    # -------------------------------------------------------------------------------------------------------------- all
+    async def tune_all(self) -> None:
+        """Tune one controller after the other, each shown as soon as it is there."""
+        if self.file is None:
+            return
+        self.round += 1
+        mine, file = self.round, self.file
+        self.tune.visible, self.stop.visible = False, True
+        for name in list(self.rows):
+            if mine != self.round:
+                break
+            await self._tuned(file, name)
+        if mine == self.round:
+            self.stop_all()
+
+    def stop_all(self) -> None:
+        """Leave the others untuned."""
+        self.round += 1
+        self.tune.visible, self.stop.visible = True, False
+
+    async def _tuned(self, file: MissionFile, name: str) -> Any:
+        """A controller, and its row; None where it cannot be built, which its row says."""
+        from microrad.studio import control_view
+
+        if not self.rows[name]["modulus"]:
+            self._row(file, control_view.waiting_row(name, "being tuned ..."))
+        try:
+            found = await run.io_bound(_controller, file, name)
+        except ValueError as error:
+            self._row(file, control_view.waiting_row(name, str(error)))
+            return None
+        if found is not None:
+            self._row(file, control_view.table_row(found))
+        return found
+
+    def _row(self, file: MissionFile, row: dict[str, Any]) -> None:
+        if file is self.file:
+            self.rows[row["name"]] = row
+            self._table()
+
+    def _table(self) -> None:
+        self.table.rows = list(self.rows.values())
+
+    # -------------------------------------------------------------------------------------------------------------- one
+    async def show(self) -> None:
+        """Show the chosen controller; a late answer to an older question is dropped."""
+        from microrad.studio import control_view
+
+        file, name = self.file, self.name.value
+        if self.filling or file is None or not name:
+            return
+        self.question += 1
+        mine = self.question
+        self.state.text = f"Tuning {name} ..."
+        found = await self._tuned(file, name)
+        if mine != self.question:
+            return
+        self.state.text = "" if found is not None else f"{name} cannot be built for this mission; the table says why."
+        if found is None:
+            return
+        self._controller(found)
+        try:
+            ask = control_view.ask_of(self.step.value, self.amplitude.value, self.frequency.value)
+            self.state.text = "Simulating ..."
+            answers = await run.io_bound(found.ask, ask, control_view.SHOWN[self.variants.value])
+        except ValueError as error:
+            self.state.text = str(error)
+            return
+        if mine == self.question and answers is not None:
+            self.state.text = ""
+            self._answers(found, answers)
+
+    def _controller(self, found: Any) -> None:
+        from microrad.studio import control_view
+
+        self.notes.clear()
+        with self.notes:
+            for note in control_view.notes(found):
+                ui.label(note).classes("soft")
+        self.numbers.clear()
+        with self.numbers:
+            for name, value in (*control_view.margin_rows(found), *control_view.value_rows(found)):
+                with ui.element("div"):
+                    layout.words("dt", name)
+                    layout.words("dd", value)
+        self.plots["sensitivity"].update_figure(control_view.sensitivity_plot(found))
+        self.plots["gain"].update_figure(control_view.gain_plot(found))
+
+    def _answers(self, found: Any, answers: Any) -> None:
+        from microrad.studio import control_view as view
+
+        self.shaken.visible = bool(answers.jitter)
+        self.told_step.text = view.answer_words(answers.step, "Error")
+        self.told_sine.text = view.answer_words(answers.sine, "Radial error")
+        self.told_jitter.text = view.answer_words(answers.jitter, "Radial error")
+        drawn = {
+            "step": view.step_plot(answers),
+            "step_drive": view.drive_plot(found, answers.step),
+            "sine": view.sine_plot(answers),
+            "sine_drive": view.drive_plot(found, answers.sine),
+            "jitter": view.jitter_plot(answers),
+            "motion": view.motion_plot(answers),
+            "jitter_drive": view.drive_plot(found, answers.jitter, "s"),
+        }
+        for name, figure in drawn.items():
+            self.plots[name].update_figure(figure)
+
+
+def _names(file: MissionFile) -> tuple[str, ...]:
+    from microrad.studio import control_model  # loads the kernels, in a thread
+
+    return control_model.names(file)
+
+
+def _controller(file: MissionFile, name: str) -> Any:
+    from microrad.studio import control_model
+
+    return control_model.controller(file, name)
+
+
+def _first(names: tuple[str, ...]) -> str:
+    """The controller that is shown first: the tuned PI rather than the baseline."""
+    return names[1] if len(names) > 3 else names[0]
+
+
+def _amplitude(file: MissionFile) -> str:
+    return f"{1e6 * file.mission.scenario.amplitude_rad:g} urad"

@@ -1,0 +1,132 @@
+"""The day: contacts over time, what they deliver and how soon, by the relay and directly; computed beside the page."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import Any
+
+from nicegui import run, ui
+
+from microrad.day_study import DayStudy
+from microrad.missionfile import LinkFile
+from microrad.studio import day_view, plots
+from microrad.studio.commands import Contacts
+from microrad.studio.latest import Latest, State, shared
+from microrad.studio.pages import layout
+from microrad.studio.pages.dial_rows import add_style
+from microrad.studio.pages.pieces import Column, columns, file_of, plot, table
+from microrad.studio.workshop import Workshop
+
+TITLE = "Day"
+PATH = "/day"
+
+_LOOK_S = 0.25
+_SWINGS = (
+    ("assumption", "Assumption"),
+    ("changed", "Changed to"),
+    ("relay", "Relay"),
+    ("direct", "Direct"),
+    ("ratio", "Ratio"),
+    ("slow_relay", "99 % by relay"),
+    ("slow_direct", "99 % direct"),
+)
+
+
+def page(workshop: Workshop) -> None:
+    """Progress, then timeline, volumes, latencies and tables."""
+    add_style()
+    DayPage(workshop)
+
+
+class DayPage:
+    """The page of one tab; the day is computed once for all tabs."""
+
+    def __init__(self, workshop: Workshop) -> None:
+        """Build the body, and have it follow the workshop."""
+        self.workshop, self.shown = workshop, ""
+        self.latest: Latest[DayStudy] = shared(workshop, "day")
+        layout.copy_buttons(lambda: Contacts(file_of(workshop)))
+        self._progress()
+        with ui.column().classes("w-full") as self.results:
+            self._results()
+        self.results.visible = False
+        layout.follow(workshop, self.reload)
+        ui.timer(_LOOK_S, self.look)
+
+    def _progress(self) -> None:
+        with ui.row().classes("items-center w-full"):
+            self.state = ui.label().props('role="status"')
+            self.bar = ui.linear_progress(show_value=False).props('aria-label="Progress"').classes("day-bar")
+            self.bar.style("max-width: 20rem")
+            self.cancel = ui.button("Cancel", on_click=self.latest.cancel).props("dense no-caps outline")
+            self.again = ui.button("Compute", on_click=self.reload).props("dense no-caps outline")
+        self.faults = ui.label().classes("faults kept").props('role="alert"')
+        self.faults.visible = False
+
+    def _results(self) -> None:
+        self.words = ui.column()
+        layout.heading("Contacts over time")
+        self.timeline = plot("Contacts and eclipses over time; in numbers in the table of contacts")
+        layout.heading("Data made, delivered and on board")
+        self.volume = plot("Data made, delivered and on board over time").style("height: 24rem")
+        layout.heading("From recording to delivery")
+        self.latency = plot("Share of the data that has arrived within a time").style("height: 22rem")
+        layout.heading("Relay and direct downlink")
+        self.ways = table(())
+        layout.heading("Contacts")
+        headings = [(f"c{k}", text) for k, text in enumerate(day_view.contact_headings())]
+        self.contacts = table([Column(name, text[:1].upper() + text[1:]) for name, text in headings])
+        layout.heading("One assumption changed")
+        self.swings = table([Column(*each) for each in _SWINGS])
+
+    def reload(self) -> None:
+        """Have the day of the draft computed, if it can be."""
+        draft, file = self.workshop.draft, self.workshop.link()
+        lacking = "" if file is None else day_view.missing(file)
+        self.faults.text = draft.report if file is None else lacking
+        self.faults.visible = file is None or bool(lacking)
+        if file is not None and not lacking:
+            self.latest.ask(draft.sha256, partial(_day, file))
+
+    async def look(self) -> None:
+        """Show how far it is, and the day once it is there."""
+        state = self.latest.state
+        self._show_progress(state)
+        key = state.key
+        if state.result is None or key == self.shown:
+            return
+        self.shown = key
+        drawn = await run.io_bound(_drawn, state.result)
+        if drawn is not None:
+            self._show(state.result, drawn)
+
+    def _show_progress(self, state: State[DayStudy]) -> None:
+        step = f": {state.done} of {state.total}" if state.total else ""
+        known = "The day of the mission as it stands." if state.key == self.workshop.draft.sha256 else ""
+        words = known if state.result else "Not computed."
+        self.state.text = f"Computing, {state.what or 'links'}{step}" if state.running else state.error or words
+        self.bar.visible = self.cancel.visible = state.running
+        self.again.visible = not state.running and state.result is None and not self.faults.visible
+        self.bar.value = state.done / state.total if state.total else 0.0
+        self.results.classes(**{"add" if state.result is None else "remove": "behind"})
+
+    def _show(self, day: DayStudy, drawn: tuple[plots.Plot, plots.Plot, plots.Plot]) -> None:
+        self.words.clear()
+        with self.words:
+            for sentence in day_view.words(day):
+                ui.label(sentence)
+        for element, figure in zip((self.timeline, self.volume, self.latency), drawn, strict=True):
+            element.update_figure(figure)
+        names = [("what", ""), *zip(("relay", "direct"), (way.name for way in day_view.ways(day)), strict=False)]
+        self.ways.columns = columns([Column(*each) for each in names])
+        self.ways.rows, self.contacts.rows = day_view.way_rows(day), day_view.contact_rows(day)
+        self.swings.rows = day_view.swing_rows(day)
+        self.results.visible = True
+
+
+def _day(file: LinkFile, progress: Any) -> DayStudy:
+    return day_view.run(file, progress)
+
+
+def _drawn(day: DayStudy) -> tuple[plots.Plot, plots.Plot, plots.Plot]:
+    return day_view.timeline_plot(day), day_view.volume_plot(day), day_view.latency_plot(day)

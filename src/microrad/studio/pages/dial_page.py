@@ -1,0 +1,129 @@
+"""A page with dials: what it shows follows them at once, and the mission when one is let go."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Mapping
+from functools import partial
+from typing import Generic, TypeVar
+
+from nicegui import background_tasks, run, ui
+from nicegui.element import Element
+
+from microrad.missionfile import LinkFile
+from microrad.studio.attempts import Attempt, attempt, seen
+from microrad.studio.dials import Dial, faulty
+from microrad.studio.draft import Draft
+from microrad.studio.pages import layout
+from microrad.studio.pages.dial_rows import DialBoard
+from microrad.studio.workshop import Workshop
+
+T = TypeVar("T")
+_SHORT_S = 0.01
+_OLD = "Shown in grey: the mission before this."
+
+
+class DialPage(Generic[T]):
+    """The dials of one tab and what follows them.
+
+    It shows the workshop's draft, and while a dial moves, the draft with its value. Answers are computed in a thread;
+    of questions that wait, the newest alone is asked. `dimmed` turns grey while the draft has no view.
+    """
+
+    dimmed: tuple[Element, ...] = ()
+
+    def __init__(self, workshop: Workshop, seldom: Callable[[str], bool] = lambda key: False) -> None:
+        """Build dials at the left and results at the right, and have them follow the workshop."""
+        self.workshop = workshop
+        self.view_now: T | None = None
+        self.last: Attempt[T] | None = None
+        self._wanted: Callable[[], Attempt[T]] | None = None
+        self._busy = self._grey = False
+        with ui.element("div").classes("beside"):
+            with ui.element("div").classes("dial-column"):
+                self.board = DialBoard(self._try, self._set, seldom)
+            with ui.column():
+                self._faults = ui.label().classes("faults kept").props('role="alert"')
+                self._faults.visible = False
+                self.build()
+        self._mark = layout.follow(workshop, lambda: background_tasks.create(self._reload()))
+
+    # ------------------------------------------------------------------------------------------ what a page is made of
+    def build(self) -> None:
+        """Build what stands at the right."""
+        raise NotImplementedError
+
+    def dials(self, draft: Draft) -> Mapping[str, tuple[Dial, ...]]:
+        """The dials of a draft in groups."""
+        raise NotImplementedError
+
+    def view(self, file: LinkFile) -> T:
+        """What is to be shown of a mission; runs in a thread."""
+        raise NotImplementedError
+
+    def show(self, view: T) -> None:
+        """Show it."""
+        raise NotImplementedError
+
+    # --------------------------------------------------------------------------------------------------------- changes
+    async def _try(self, key: str, typed: str) -> None:
+        """Show what a value would do, without writing it."""
+        await self._ask(partial(attempt, self.workshop.draft, key, typed, self.view))
+
+    async def _set(self, key: str, typed: str) -> None:
+        """Write a value into the draft; what it does is shown first."""
+        while self._busy:
+            await asyncio.sleep(_SHORT_S)
+        try:
+            await run.io_bound(self.workshop.set, key, typed)
+        except (ValueError, OSError) as error:
+            layout.refuse(str(error))
+            return
+        self._mark()
+        await self._reload()
+
+    async def _reload(self) -> None:
+        """Show the draft as it is."""
+        draft = self.workshop.draft
+        self.board.show(self.dials(draft))
+        if self.last is None or self.last.draft.text != draft.text:  # else the dial was let go where it has been tried
+            await self._ask(partial(seen, draft, self.view))
+
+    async def _ask(self, question: Callable[[], Attempt[T]]) -> None:
+        """Have a question answered in a thread; one that waits is dropped for it."""
+        self._wanted = question
+        if self._busy:
+            return
+        self._busy = True
+        try:
+            while self._wanted is not None:
+                question, self._wanted = self._wanted, None
+                found = await run.io_bound(question)
+                if found is not None:  # there is none when the studio ends
+                    self._answer(found)
+        except ValueError as error:
+            layout.refuse(str(error))
+        finally:
+            self._busy = False
+
+    # --------------------------------------------------------------------------------------------------------- showing
+    def _answer(self, found: Attempt[T]) -> None:
+        """Show a draft, or why it has no view."""
+        same = self.last is not None and self.last.draft.text == found.draft.text and self.last.view is not None
+        self.last = found
+        rows = {key: row.dial for key, row in self.board.rows.items()}
+        told = faulty(found.draft, rows)
+        self.board.faults(told)
+        others = [str(fault) for fault in found.draft.problems if fault.key not in told]
+        self._faults.text = "\n".join([_OLD, *others, *([found.refusal] if found.refusal else [])])
+        self._faults.visible = found.view is None
+        self._dim(found.view is None)
+        if found.view is not None and not same:
+            self.view_now = found.view
+            self.show(found.view)
+
+    def _dim(self, grey: bool) -> None:
+        if grey != self._grey:
+            self._grey = grey
+            for element in self.dimmed:
+                element.classes(**{"add" if grey else "remove": "behind"})

@@ -1,0 +1,81 @@
+"""The place where recordings are dropped: each goes into the private folder, and a refusal is answered in words."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncIterator, Awaitable, Callable
+from typing import Any
+
+from nicegui import app, ui
+from starlette.datastructures import UploadFile
+from starlette.requests import Request
+from starlette.responses import PlainTextResponse, Response
+
+from microrad.studio.names import NameRefusedError
+from microrad.studio.uploads import Upload, UploadError, Uploads
+
+_BLOCK_BYTES = 1 << 20
+
+# One request a file, one after the other; the field is emptied, so that the same file can be chosen again.
+_SEND = """
+async (event) => {
+  const field = event.target, files = Array.from(field.files);
+  field.disabled = true;
+  for (const file of files) {
+    const form = new FormData();
+    form.append("file", file, file.name);
+    try {
+      const answer = await fetch("URL", {method: "POST", body: form});
+      if (!answer.ok) emit(file.name, await answer.text());
+    } catch (error) {
+      emit(file.name, "the connection to the studio broke off");
+    }
+  }
+  field.value = "";
+  field.disabled = false;
+}
+"""
+
+
+class Drop:
+    """A field for files; `taken` gets each stored one, `refused` the words for each that is not taken.
+
+    It is no `ui.upload`, which cuts the path off a name before anybody could refuse it, and has buttons without names.
+    """
+
+    def __init__(
+        self, uploads: Uploads, taken: Callable[[Upload], Awaitable[None]], refused: Callable[[str], None]
+    ) -> None:
+        """Build the field, and take its files as they are sent."""
+        self._uploads, self._taken, self._refused = uploads, taken, refused
+        field = ui.element("input").props('type=file multiple aria-label="Recordings: drop files here, or choose them"')
+        field.classes("drop-zone")
+        client = ui.context.client
+        url = f"/_nicegui/client/{client.id}/upload/{field.id}"  # where the guard lets large bodies pass
+        app.add_api_route(url, self._take, methods=["POST"], include_in_schema=False)
+        client.on_delete(lambda: app.remove_route(url))
+        field.on("change", self._unsent, js_handler=_SEND.replace("URL", url))
+
+    def _unsent(self, event: Any) -> None:
+        """Say why the guard, or the connection, has stopped a file."""
+        name, words = event.args
+        self._refused(f"{str(name)[:60]}: {str(words)[:400]}")
+
+    async def _take(self, request: Request) -> Response:
+        async with request.form(max_files=1, max_fields=1) as form:
+            for each in form.values():
+                if isinstance(each, UploadFile):
+                    await self._one(each)
+        return PlainTextResponse("read")
+
+    async def _one(self, sent: UploadFile) -> None:
+        try:
+            stored = await self._uploads.save(sent.filename or "", _blocks(sent))
+        except (NameRefusedError, UploadError) as error:
+            self._refused(str(error))
+            return
+        await self._taken(stored)
+
+
+async def _blocks(sent: UploadFile) -> AsyncIterator[bytes]:
+    while block := await sent.read(_BLOCK_BYTES):
+        yield block

@@ -1,0 +1,127 @@
+"""The frame of every page: what is being edited and whether it is saved, the way to the other pages, one style."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from importlib import resources
+from typing import Any
+
+from nicegui import ui
+from nicegui.elements.mixins.text_element import TextElement
+
+from microrad.studio.commands import Action, command
+from microrad.studio.draft import Draft
+from microrad.studio.names import NameRefusedError
+from microrad.studio.workshop import Workshop
+
+POLL_S = 0.5
+"""Between two looks at what another tab or a job has changed."""
+
+
+@contextmanager
+def frame(workshop: Workshop, title: str, entries: tuple[tuple[str, str], ...]) -> Iterator[None]:
+    """Header with state and navigation, a heading, and the body to be filled; `entries` are titles and paths."""
+    style = resources.files(__package__).joinpath("style.css").read_text("utf-8")
+    ui.add_head_html(f"<style>{style}</style>")  # ui.add_css would add a script, which the guard's policy stops
+    ui.colors(primary="#0a4f96", negative="#a63c00", positive="#00664a")
+    with ui.header().classes("studio-header"):
+        _state(workshop)
+        with ui.element("nav").props('aria-label="Pages"').classes("studio-nav"):
+            for name, path in entries:
+                here = ' aria-current="page"' if name == title else ""
+                ui.link(name, path).props(here.strip())
+    with ui.column().classes("studio-body"):
+        heading(title, 1)
+        yield
+
+
+def _state(workshop: Workshop) -> None:
+    with ui.row().classes("studio-state"):
+        ui.label("microrad studio").classes("studio-name")
+        mission = ui.label().classes("studio-mission")
+        state = ui.label().props('role="status"').classes("studio-saved")
+        save = ui.button("Save", on_click=lambda: save_draft(workshop)).props("dense no-caps outline")
+
+    def show() -> None:
+        draft = workshop.draft
+        mission.text = workshop.name_of(draft.path)
+        state.text = _words(draft)
+        save.enabled = draft.changed
+
+    follow(workshop, show)
+
+
+def _words(draft: Draft) -> str:
+    faults = len(draft.problems)
+    saved = "not saved" if draft.changed else "saved"
+    return saved if not faults else f"{saved}, {faults} fault{'s' if faults > 1 else ''} to correct"
+
+
+def save_draft(workshop: Workshop) -> bool:
+    """Save the mission to its own file; says what went wrong, and whether it is saved."""
+    return attempt(lambda: workshop.change(workshop.draft.save()))
+
+
+def attempt(do: Callable[[], object]) -> bool:
+    """Do something that may be refused; the refusal is shown until it is dismissed, and False returned."""
+    try:
+        do()
+    except (ValueError, OSError) as error:
+        refuse(str(error))
+        return False
+    return True
+
+
+def name_words(error: NameRefusedError) -> str:
+    """The refusal of a name that was typed, where the words are those for a file that was dropped."""
+    return str(error).replace("rename it and drop it again", "choose another name")
+
+
+def refuse(words: str) -> None:
+    """Show a refusal until it is dismissed."""
+    ui.notify(words, type="negative", multi_line=True, timeout=0, close_button="Dismiss", position="top")
+
+
+def follow(workshop: Workshop, show: Callable[[], Any]) -> Callable[[], None]:
+    """Call `show` now and whenever the workshop has changed; what is returned says that this page has shown it."""
+    seen = -1
+
+    def look() -> None:
+        nonlocal seen
+        if seen != workshop.revision:
+            seen = workshop.revision
+            show()
+
+    def mark() -> None:
+        nonlocal seen
+        seen = workshop.revision
+
+    look()
+    ui.timer(POLL_S, look)
+    return mark
+
+
+def words(tag: str, text: str = "") -> TextElement:
+    """An element of this tag with a text, which is escaped; its text can be changed."""
+    return TextElement(tag=tag, text=text)
+
+
+def heading(text: str, level: int = 2) -> TextElement:
+    """A heading of the page's outline: 1 is the page's own, and there already."""
+    return words(f"h{level}", text)
+
+
+def copy_buttons(action: Callable[[], Action | None]) -> None:
+    """Buttons that copy what `action` returns as a command and as Python; None says why by a notice of its own."""
+    with ui.row().classes("studio-copy"):
+        ui.button("Copy as command", on_click=lambda: _copy(action(), python=False)).props("dense no-caps flat")
+        ui.button("Copy as Python", on_click=lambda: _copy(action(), python=True)).props("dense no-caps flat")
+
+
+def _copy(action: Action | None, python: bool) -> None:
+    if action is None:
+        return
+    text = action.python if python else command(action)
+    ui.clipboard.write(text)
+    ui.notify(f"Copied: {text.splitlines()[0]}{' ...' if python else ''}", type="positive")

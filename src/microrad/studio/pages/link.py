@@ -1,0 +1,168 @@
+"""The links: sliders for what they are made of, and margins, budgets and the margin map that follow at once."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import Mapping
+from functools import partial
+
+from nicegui import background_tasks, run, ui
+
+from microrad import link_study
+from microrad.link_study import LinkStudy
+from microrad.missionfile import LinkFile
+from microrad.studio import link_view
+from microrad.studio.commands import Budget
+from microrad.studio.dials import Dial
+from microrad.studio.draft import Draft
+from microrad.studio.latest import Latest, Progress, shared
+from microrad.studio.link_view import LinkView
+from microrad.studio.pages import layout
+from microrad.studio.pages.dial_page import DialPage
+from microrad.studio.pages.dial_rows import add_style
+from microrad.studio.pages.pieces import Column, LivePlot, file_of, plot, table
+from microrad.studio.plots import Plot
+from microrad.studio.workshop import Workshop
+
+TITLE = "Links"
+PATH = "/link"
+
+_COLUMNS = (
+    Column("line", "Line"),
+    Column("value", "Value", number=True),
+    Column("basis", "Basis"),
+    Column("source", "Source"),
+)
+_LOOK_S, _REST_S, _AFTER_S = 0.25, 0.8, 0.08
+_CSS = """
+.margins { display: grid; grid-template-columns: repeat(auto-fit, minmax(11rem, 1fr)); gap: .75rem; width: 100%; }
+.margin-card { border: 1px solid var(--line); border-radius: 4px; padding: .4rem .7rem; }
+.margin-card .value { font-size: 1.5rem; font-weight: 600; font-variant-numeric: tabular-nums; line-height: 1.3; }
+.margin-map { width: 100%; height: 27rem; }
+"""
+
+
+def page(workshop: Workshop) -> None:
+    """Sliders at the left; margins, map and tables at the right."""
+    add_style(_CSS)
+    LinkPage(workshop)
+
+
+class LinkPage(DialPage[LinkView]):
+    """The page of one tab."""
+
+    def __init__(self, workshop: Workshop) -> None:
+        """Build the body, and have it follow the workshop."""
+        self.study: Latest[LinkStudy] = shared(workshop, "links")
+        self.shown, self.rested = "", ("", 0.0)
+        self.slow: dict[str, list[link_view.Row]] = {}
+        layout.copy_buttons(lambda: Budget(file_of(workshop)))
+        super().__init__(workshop, link_view.second)
+        ui.timer(_LOOK_S, self._look)
+
+    def build(self) -> None:
+        """Margins, map, budgets, and what takes a second."""
+        layout.heading("Margins")
+        cards = ui.element("div").classes("margins")
+        with cards:
+            self.cards = [_card() for _ in range(3)]
+        layout.heading("Margin map")
+        self.map = LivePlot("Link margin over data rate and pointing error; in words below", "margin-map")
+        self.key = ui.label().classes("soft")
+        self.words = ui.label().props('role="status"')
+        layout.heading("Budgets")
+        self.which = ui.toggle([], on_change=self._show_table).props('no-caps dense aria-label="Budget shown"')
+        self.table = table(_COLUMNS)
+        layout.heading("What follows")
+        self.state = ui.label().classes("soft").props('role="status"')
+        self.sentences = ui.column()
+        layout.heading("What moves the margin of the communication link")
+        ui.label("Each input alone, 10 % lower and higher (0.5 dB; an outage by a factor of ten).").classes("soft")
+        self.tornado = plot("What moves the margin; in words above")
+        self.dimmed = (cards, self.map.box, self.key, self.words, self.table)
+
+    def dials(self, draft: Draft) -> Mapping[str, tuple[Dial, ...]]:
+        """The numbers of the links' tables."""
+        return link_view.dials(draft)
+
+    def view(self, file: LinkFile) -> LinkView:
+        """Budgets and map, on the axes that the map has."""
+        return link_view.view(file, None if self.view_now is None else self.view_now.frame)
+
+    def show(self, view: LinkView) -> None:
+        """Margins and map at once; what is read and not looked at follows."""
+        self.map.show(link_view.map_plot(view))
+        for place, (card, name, value, needs) in enumerate(self.cards):
+            card.visible = place < len(view.margins)
+            if card.visible:
+                margin = view.margins[place]
+                name.text, value.text, needs.text = margin.name, margin.words, margin.needs
+                needs.classes(add="PASS" if margin.met else "FAIL", remove="FAIL" if margin.met else "PASS")
+        background_tasks.create_lazy(self._show_rest(view), name=f"links {id(self)}")
+
+    async def _show_rest(self, view: LinkView) -> None:
+        await asyncio.sleep(_AFTER_S)
+        self.key.text = link_view.map_key(view.file.mission)
+        self.words.text = link_view.map_words(view)
+        self._tabs()
+
+    def _tabs(self) -> None:
+        names = [*(b.name for b in self.view_now.budgets), *self.slow] if self.view_now else []
+        if names != self.which.options:
+            chosen = self.which.value if self.which.value in names else names[0] if names else None
+            self.which.set_options(names, value=chosen)
+        self._show_table()
+
+    def _show_table(self) -> None:
+        name = self.which.value
+        budget = next((b for b in (self.view_now.budgets if self.view_now else ()) if b.name == name), None)
+        rows = self.slow.get(str(name), []) if budget is None else link_view.rows_of(budget)
+        if rows != self.table.rows:
+            self.table.rows = rows
+
+    async def _look(self) -> None:
+        """Have the study of the links made once a draft rests, and show it once it is there."""
+        self._ask_study()
+        state = self.study.state
+        self.state.text = "Computing acquisition and what moves the margins ..." if state.running else state.error
+        self.state.visible = bool(self.state.text)
+        if state.result is None or state.key == self.shown:
+            return
+        self.shown = state.key
+        told = await run.io_bound(_told, state.result)
+        if told is None:  # the studio ends
+            return
+        words, self.slow, tornado = told
+        self.sentences.clear()
+        with self.sentences:
+            for sentence in words:
+                ui.label(sentence)
+        self.tornado.update_figure(tornado)
+        self._tabs()
+
+    def _ask_study(self) -> None:
+        """It takes a second of a core: not for every step of a slider."""
+        draft, now = self.workshop.draft, time.monotonic()
+        if self.rested[0] != draft.text:
+            self.rested = (draft.text, now)
+        elif now - self.rested[1] > _REST_S and self.study.state.key != draft.sha256:
+            file = self.workshop.link()
+            if file is not None:
+                self.study.ask(draft.sha256, partial(_study, file))
+
+
+def _card() -> tuple[ui.element, ui.label, ui.label, ui.label]:
+    """A card with the name, the value and the need of a margin, still empty."""
+    with ui.element("div").classes("margin-card") as card:
+        return card, ui.label().classes("soft"), ui.label().classes("value"), ui.label()
+
+
+def _told(study: LinkStudy) -> tuple[list[str], dict[str, list[link_view.Row]], Plot]:
+    """Words, tables and plot of a study."""
+    return link_view.consequences(study), link_view.tables(study), link_view.tornado_plot(study)
+
+
+def _study(file: LinkFile, progress: Progress) -> LinkStudy:
+    progress(0, 0, "links")
+    return link_study.run(file)

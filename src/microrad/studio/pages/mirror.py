@@ -1,0 +1,285 @@
+"""The mirror: recordings dropped in, their channels chosen, and a model identified while one looks on."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+from nicegui import run, ui
+
+from microrad.recording import ACCEPTABLE
+from microrad.studio import mirror_form, mirror_view, reading
+from microrad.studio.commands import Identify
+from microrad.studio.jobs import JobError
+from microrad.studio.mirror_form import Dropped, Form, Setting, SettingError
+from microrad.studio.pages import layout
+from microrad.studio.pages.drop import Drop
+from microrad.studio.pages.mirror_job import JobView
+from microrad.studio.plots import CONFIG
+from microrad.studio.uploads import Upload, UploadError, Uploads
+from microrad.studio.workshop import Workshop
+
+TITLE = "Mirror"
+PATH = "/mirror"
+
+_LOOK_S = 0.5
+_CSS = """
+.mirror-page { display: grid; grid-template-columns: minmax(21rem, 26rem) minmax(0, 1fr); gap: 1.5rem; width: 100%; }
+.mirror-form, .mirror-seen { display: flex; flex-direction: column; gap: .5rem; min-width: 0; }
+.mirror-form .q-field { width: 100%; }
+.drop-zone { width: 100%; padding: 1.75rem .9rem; border: 2px dashed #8c959f; border-radius: 4px; background: #f6f8fa; }
+.drop-zone:hover { border-color: #0a4f96; }
+.mirror-words { color: var(--fail); white-space: pre-wrap; overflow-wrap: anywhere; }
+.mirror-file { display: grid; grid-template-columns: minmax(0, 1fr) 8.5rem auto auto; gap: .4rem; align-items: center; }
+.mirror-file .name { overflow: hidden; text-overflow: ellipsis; white-space: nowrap; }
+.mirror-file .seen { font-weight: 600; }
+.numbers { display: grid; grid-template-columns: repeat(auto-fit, minmax(17rem, 1fr)); gap: 0 2rem;
+           margin: .5rem 0; width: 100%; }
+.numbers div { display: flex; justify-content: space-between; gap: 1rem; border-bottom: 1px solid var(--line); }
+.numbers dd { margin: 0; font-variant-numeric: tabular-nums; white-space: nowrap; }
+.pair { display: grid; grid-template-columns: repeat(2, minmax(0, 1fr)); gap: .5rem; }
+.plots { display: grid; grid-template-columns: repeat(auto-fit, minmax(19rem, 1fr)); gap: .5rem; width: 100%; }
+.plots > * { height: 21rem; min-width: 0; }
+"""
+
+
+def page(workshop: Workshop) -> None:
+    """The form at the left; the recording and the identification at the right."""
+    ui.add_head_html(f"<style>{_CSS}</style>")
+    MirrorPage(workshop)
+
+
+class MirrorPage:
+    """The page of one tab; recordings and form lie in the studio's folder, the identification in its job's."""
+
+    def __init__(self, workshop: Workshop) -> None:
+        """Build the body, and look at the folder and the job from time to time."""
+        self.workshop = workshop
+        self.uploads = Uploads(workshop.studio / "uploads")
+        self.path = workshop.studio / "mirror-form.json"
+        self.form = mirror_form.kept_form(self.path)
+        self.seen, self.shown, self.question = "", "", 0
+        self.listing: reading.Listing | None = None
+        self.files: tuple[Dropped, ...] | None = None
+        self.filling = False
+        layout.copy_buttons(self.action)
+        with ui.element("div").classes("mirror-page"):
+            with ui.element("div").classes("mirror-form"):
+                self._inputs()
+            with ui.element("div").classes("mirror-seen"):
+                self._plots()
+                self.job = JobView(workshop)
+        ui.timer(_LOOK_S, self.look)
+
+    # ------------------------------------------------------------------------------------------------------- the parts
+    def _inputs(self) -> None:
+        layout.heading("Recordings")
+        self.drop = Drop(self.uploads, self.take, self.refuse)
+        ui.label("Drop files on the field: CSV, text, LVM, TDMS, MAT, NPY, NPZ or HDF5; up to 200 MB each.").classes(
+            "soft small"
+        )
+        self.refused = ui.label().classes("mirror-words").props('role="alert"')
+        self.list = ui.column().classes("w-full gap-1")
+        layout.heading("Channels")
+        self.fields: dict[str, Any] = {}
+        self._select("drive", "Drive", {})
+        self._select("output", "Angle or displacement", {})
+        with ui.element("div").classes("pair"):
+            self._select("drive_unit", "Unit of the drive", list(mirror_form.DRIVE_UNITS))
+            units = {unit: mirror_form.written(unit) for unit in mirror_form.OUTPUT_UNITS}
+            self._select("output_unit", "Unit of the output", units)
+            self._text("rate", "Sample rate", "200 Hz; empty: as the file says")
+            self._text("lever_arm", "Lever arm", "50 mm; for a displacement")
+        self._select("accept", "Go on in spite of", list(ACCEPTABLE), "multiple use-chips clearable")
+        layout.heading("Identification")
+        self._text("name", "Name of the mirror", "its file: name.toml")
+        self.fields["static"] = ui.checkbox("Hysteresis alone: two models, in seconds", on_change=self.typed)
+        self.fields["admissible"] = ui.checkbox("No model that moves the wrong way", on_change=self.typed)
+        self.words = ui.label().classes("mirror-words").props('role="alert"')
+        ui.button("Identify", on_click=self.start).props("no-caps")
+
+    def _select(self, key: str, label: str, options: Any, props: str = "") -> None:
+        found = ui.select(options, label=label, on_change=self.typed, multiple="multiple" in props)
+        self.fields[key] = found.props(f"dense outlined options-dense {props.replace('multiple', '')}")
+
+    def _text(self, key: str, label: str, hint: str) -> None:
+        found = ui.input(label, on_change=self.typed).props(f'dense outlined hint="{hint}" debounce=400')
+        self.fields[key] = found
+
+    def _plots(self) -> None:
+        layout.heading("Measured")
+        self.about = ui.label().props('role="status"')
+        self.findings = ui.column().classes("gap-1")
+        with ui.element("div").classes("plots"):
+            self.loop, self.time = (ui.plotly({"data": [], "layout": {}, "config": CONFIG}) for _ in range(2))
+        self.loop.props('role="figure" aria-label="Measured loop: output over drive"')
+        self.time.props('role="figure" aria-label="Drive and output over time"')
+        self.loop.update_figure(mirror_view.nothing())
+        self.time.update_figure(mirror_view.nothing())
+
+    # -------------------------------------------------------------------------------------------------- the recordings
+    async def take(self, upload: Upload) -> None:
+        """Look into a file that was dropped; one that is no recording is thrown away, in the reader's words."""
+        try:
+            listing = await run.io_bound(reading.list_channels, upload.path)
+        except reading.ReadingError as error:
+            self.uploads.remove(upload.key)
+            self.refuse(str(error))
+            return
+        self.refused.text = ""
+        if listing is None:
+            return
+        if len(self.dropped()) == 1 or self.form.setting.drive is None:
+            self.keep(replace(self.form, setting=mirror_form.first_setting(listing, upload.name)))
+        self.seen = upload.key
+        await self.look()
+
+    def refuse(self, words: str) -> None:
+        """Say why a file is not taken."""
+        self.refused.text = words
+
+    def dropped(self) -> tuple[Dropped, ...]:
+        """The recordings in the folder, with what each is used for."""
+        uses = self.form.uses
+        return tuple(Dropped(u.key, u.name, u.path, uses.get(u.key, "fit")) for u in self.uploads.listed())
+
+    def _rows(self) -> None:
+        self.list.clear()
+        with self.list:
+            for each in self.files or ():
+                self._row(each)
+
+    def _row(self, each: Dropped) -> None:
+        with ui.element("div").classes("mirror-file w-full"):
+            name = ui.label(each.name).classes("name" + (" seen" if each.key == self.seen else ""))
+            name.tooltip(each.name)
+            use = ui.select(mirror_form.USES, value=each.use, on_change=lambda e: self.use(each.key, e.value))
+            use.props(f'dense outlined options-dense aria-label="Use of {_attribute(each.name)}"')
+            ui.button("Show", on_click=lambda: self.see(each.key)).props("dense no-caps flat")
+            ui.button("Remove", on_click=lambda: self.remove(each.key)).props("dense no-caps flat")
+
+    async def see(self, key: str) -> None:
+        """Show another recording."""
+        self.seen = key
+        self._rows()
+        await self.look()
+
+    async def remove(self, key: str) -> None:
+        """Delete a recording from the studio's folder."""
+        if layout.attempt(lambda: self.uploads.remove(key)):
+            await self.look()
+
+    def use(self, key: str, use: str) -> None:
+        """Have a recording serve for something else."""
+        self.keep(replace(self.form, uses={**self.form.uses, key: use}))
+
+    # -------------------------------------------------------------------------------------------------------- the form
+    async def typed(self) -> None:
+        """Take over what the form says."""
+        if self.filling:
+            return
+        values = {key: field.value for key, field in self.fields.items()}
+        values["accept"] = tuple(values["accept"] or ())
+        self.keep(replace(self.form, setting=Setting(**values)))
+        await self._measured()
+
+    def keep(self, form: Form) -> None:
+        """Keep the form where other tabs and a reload find it."""
+        self.form = form
+        layout.attempt(lambda: mirror_form.keep_form(self.path, form))
+
+    def _fill(self) -> None:
+        """Show the form as it is kept, with the channels of the recording that is shown."""
+        self.filling = True
+        options = {} if self.listing is None else mirror_form.labels(self.listing)
+        setting = self.form.setting
+        for key, field in self.fields.items():
+            value = getattr(setting, key)
+            if key in ("drive", "output"):
+                field.set_options(options, value=value if value in options else None)
+            elif key == "accept":
+                field.value = list(value)
+            elif field.value != value:
+                field.value = value
+        self.fields["lever_arm"].enabled = setting.output_unit in mirror_form.LENGTHS
+        self.filling = False
+
+    def action(self) -> Identify | None:
+        """The identification that the form asks for; None where it says why there is none."""
+        self.words.text = ""
+        try:
+            return mirror_form.identification(self.workshop.folder, self.dropped(), self.form.setting)
+        except SettingError as error:
+            self.words.text = str(error)
+            return None
+
+    async def start(self) -> None:
+        """Queue the identification as a job."""
+        action = self.action()
+        if action is None:
+            return
+        try:
+            job = await run.io_bound(self.workshop.jobs.submit, mirror_form.order(self.workshop.folder, action))
+        except JobError as error:
+            self.words.text = str(error)
+            return
+        if job is not None:
+            await self.job.follow(job.number)
+
+    # --------------------------------------------------------------------------------------------------------- looking
+    async def look(self) -> None:
+        """Follow the folder and what other tabs have typed."""
+        form, files = mirror_form.kept_form(self.path), None
+        if form != self.form:
+            self.form = form
+            self._fill()
+        files = self.dropped()
+        if files != self.files:
+            self.files = files
+            if self.seen not in {each.key for each in files}:
+                self.seen = files[-1].key if files else ""
+            self._rows()
+        await self._measured()
+
+    async def _measured(self) -> None:
+        """Show the recording, unless it is shown already; a late answer to an old question is dropped."""
+        key = f"{self.seen} {self.form.setting}"
+        if key == self.shown:
+            return
+        self.shown, self.question = key, self.question + 1
+        mine = self.question
+        found = await run.io_bound(self._look_into, self.seen, self.form.setting)
+        if mine == self.question and found is not None:
+            self._show(*found)
+
+    def _look_into(self, key: str, setting: Setting) -> tuple[reading.Listing | None, reading.View | None, str]:
+        """The channels of a recording, its samples, and why there are none."""
+        if not key:
+            return None, None, ""
+        listing = None
+        try:
+            upload = self.uploads.get(key)
+            listing = reading.list_channels(upload.path)
+            return listing, reading.view(upload.path, mirror_form.columns(setting)), ""
+        except (UploadError, reading.ReadingError, SettingError) as error:
+            return listing, None, str(error)
+
+    def _show(self, listing: reading.Listing | None, view: reading.View | None, words: str) -> None:
+        if listing != self.listing:
+            self.listing = listing
+        self._fill()
+        self.words.text = words
+        setting = self.form.setting
+        empty = mirror_view.nothing()
+        self.loop.update_figure(empty if view is None else mirror_view.recording_plot(view, setting))
+        self.time.update_figure(empty if view is None else mirror_view.time_plot(view, setting))
+        self.about.text = "" if view is None else mirror_view.about(view)
+        self.findings.clear()
+        with self.findings:
+            for finding in [] if view is None else mirror_view.findings(view):
+                ui.label(finding).classes("soft small")
+
+
+def _attribute(text: str) -> str:
+    """A name inside of a quoted property."""
+    return "".join(c if c.isalnum() or c in " ._-" else " " for c in text)

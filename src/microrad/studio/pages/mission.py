@@ -1,0 +1,164 @@
+"""The mission as forms with units and sources, checked as one types, with its text beside it."""
+
+from __future__ import annotations
+
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from nicegui import ui
+
+from microrad.studio import commands
+from microrad.studio.draft import Draft, DraftError
+from microrad.studio.pages import layout
+from microrad.studio.pages.mission_files import file_buttons
+from microrad.studio.pages.mission_form import Form, fault_words, table_of, tables
+from microrad.studio.workshop import Workshop
+
+TITLE = "Mission"
+PATH = "/"
+
+_NAME_EDITOR = """
+document.querySelectorAll('.mission-text .cm-content').forEach(e => e.ariaLabel = 'Text of the mission');
+document.querySelectorAll('.mission-text .cm-scroller').forEach(e => e.tabIndex = 0);
+"""
+
+
+def page(workshop: Workshop) -> None:
+    """The form of one table at a time, the text, and what is wrong with it."""
+    _Page(workshop)
+
+
+class _Page:
+    """The page of one tab: which table it shows is its own, everything else is the workshop's."""
+
+    def __init__(self, workshop: Workshop) -> None:
+        self.workshop = workshop
+        with ui.row().classes("mission-tools"):
+            file_buttons(workshop, self._other)
+            layout.copy_buttons(lambda: commands.Budget(Path(workshop.name_of(workshop.draft.path))))
+        with ui.element("div").classes("mission-columns"):
+            with ui.element("nav").classes("mission-tables").props('aria-label="Tables"'):
+                self.search = ui.input("Find a key", on_change=self._search).props(
+                    "dense outlined clearable debounce=200"
+                )
+                self.list = ui.column().classes("mission-list")
+            self.form = Form(workshop, self._edited, self._reveal)
+            with ui.element("section").classes("mission-text").props('aria-label="Text"'):
+                self.editor = ui.codemirror(
+                    _plain(workshop.draft), language="TOML", theme="vscodeLight", on_change=self._text
+                )
+                self.faults = ui.column().classes("mission-faults")
+        self.entries: dict[str, tuple[Any, Any]] = {}
+        self._list()
+        self.form.show(next(iter(tables(workshop.draft)), ""))
+        self._choose(self.form.table)
+        self._faults()
+        self.mark = layout.follow(workshop, self._all)
+        ui.timer(0.5, lambda: ui.run_javascript(_NAME_EDITOR), once=True)
+
+    # ---------------------------------------------------------------------------------------------------- what is shown
+    def _all(self) -> None:
+        """Everything anew, after a change that was not made in this page's form or text."""
+        if self.form.table not in tables(self.workshop.draft):
+            self.form.show(next(iter(tables(self.workshop.draft)), ""))
+        self.form.refresh()
+        self._edited()
+
+    def _other(self, table: str) -> None:
+        """Another text is in place, which may have got a table to look at."""
+        self._all()
+        if table:
+            self._show(table_of(table.strip("[]") + "."))
+
+    def _edited(self) -> None:
+        """The text, the faults and the list, after a change in the form."""
+        self.editor.value = _plain(self.workshop.draft)
+        self._around()
+
+    def _around(self) -> None:
+        if hasattr(self, "mark"):
+            self.mark()
+        self._list()
+        self._faults()
+
+    def _list(self) -> None:
+        """The tables, each with the number of its faults."""
+        found = tables(self.workshop.draft)
+        if list(found) != list(self.entries):
+            self.list.clear()
+            with self.list:
+                self.entries = {name: self._entry(name) for name in found}
+            self._choose(self.form.table)
+        for name, (_, badge) in self.entries.items():
+            badge.text = str(found[name]) if found[name] else ""
+
+    def _entry(self, name: str) -> tuple[Any, Any]:
+        button = ui.button(on_click=partial(self._show, name)).props("flat no-caps align=left").classes("mission-entry")
+        with button:
+            layout.words("span", name)
+            badge = layout.words("span").classes("mission-badge")
+        return button, badge
+
+    def _show(self, name: str) -> None:
+        self.search.value = ""
+        self.form.show(name)
+        self._choose(name)
+        self._reveal(next((key for key in self.workshop.draft.values if table_of(key) == name), ""))
+
+    def _reveal(self, key: str) -> None:
+        """Scroll the text to the line of a key."""
+        value = self.workshop.draft.values.get(key)
+        if value is not None:
+            self.editor.reveal_line(value.line)
+
+    def _choose(self, chosen: str) -> None:
+        for name, (button, _) in self.entries.items():
+            here = name == chosen and not self.form.sought
+            button.props(add="aria-current=true" if here else "", remove="" if here else "aria-current")
+
+    def _search(self, event: Any) -> None:
+        sought = (event.value or "").strip().lower()
+        if sought != self.form.sought:
+            self.form.show(self.form.table, sought)
+            self._choose(self.form.table)
+
+    # ------------------------------------------------------------------------------------------------------------- text
+    def _text(self, event: Any) -> None:
+        if event.value == _plain(self.workshop.draft):
+            return
+        try:
+            self.workshop.change(self.workshop.draft.with_text(event.value))
+        except (DraftError, OSError) as error:
+            layout.refuse(str(error))
+            return
+        if self.form.table not in tables(self.workshop.draft):
+            self.form.show(next(iter(tables(self.workshop.draft)), ""))
+        self.form.refresh()
+        self._around()
+
+    def _faults(self) -> None:
+        """Every fault with its line, each a way to its key."""
+        problems = self.workshop.draft.problems
+        self.faults.clear()
+        with self.faults:
+            count = f"{len(problems)} fault{'s' if len(problems) > 1 else ''} to correct" if problems else "No faults."
+            ui.label(count).props('role="status"').classes("no" if problems else "soft")
+            for fault in problems:
+                place = f"line {fault.line}: {fault.key}" if fault.line else fault.key
+                with ui.element("div").classes("mission-fault"):
+                    go = ui.button(place, on_click=partial(self._go, fault.key, fault.line))
+                    go.props("flat dense no-caps")
+                    ui.label(fault_words(fault)).classes("small")
+
+    def _go(self, key: str, line: int) -> None:
+        found = tables(self.workshop.draft)
+        name = key.split(".", maxsplit=1)[0]
+        self._show(name if name in found else table_of(key))
+        if line:
+            self.editor.reveal_line(line)
+
+
+def _plain(draft: Draft) -> str:
+    """The text as an editor holds it."""
+    return draft.text.removeprefix("\ufeff").replace("\r\n", "\n")

@@ -1,0 +1,155 @@
+"""Files of the mission page: open, begin from a link of the literature, save under another name, add a table."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from nicegui import ui
+
+from microrad import presets
+from microrad.studio.draft import Draft
+from microrad.studio.names import NameRefusedError, safe_name
+from microrad.studio.optional_tables import offered, with_table
+from microrad.studio.pages import layout
+from microrad.studio.workshop import Workshop
+
+_PAPER = "paper's mission"
+
+
+def file_buttons(workshop: Workshop, shown: Callable[[str], None]) -> None:
+    """Buttons for everything that is done with files; `shown` is called with the table to look at, "" for any."""
+    with ui.row().classes("mission-files"):
+        ui.button("Open ...", on_click=lambda: _open(workshop, shown)).props("no-caps outline dense")
+        ui.button("New ...", on_click=lambda: _new(workshop, shown)).props("no-caps outline dense")
+        ui.button("Save as ...", on_click=lambda: _save_as(workshop, shown)).props("no-caps outline dense")
+        back = ui.button("Back to the saved file", on_click=lambda: _revert(workshop, shown))
+        back.props("no-caps outline dense")
+        ui.button("Add a table ...", on_click=lambda: _add_table(workshop, shown)).props("no-caps outline dense")
+
+    def look() -> None:
+        back.enabled = workshop.draft.changed and workshop.draft.path.exists()
+
+    layout.follow(workshop, look)
+
+
+def _open(workshop: Workshop, shown: Callable[[str], None]) -> None:
+    names = [path.name for path in workshop.missions()]
+    if not names:
+        layout.refuse(f"There is no TOML file in {workshop.folder} yet; save this mission there first.")
+        return
+
+    def do(name: str) -> None:
+        workshop.change(Draft.open(workshop.inside(name)))
+
+    _ask(f"Open a mission in {workshop.folder}", "File", "Open", names, do, shown, _lost(workshop))
+
+
+def _new(workshop: Workshop, shown: Callable[[str], None]) -> None:
+    texts = {_PAPER: "", **{each.name: f"{each.name}: {each.title}" for each in presets.presets()}}
+    texts[_PAPER] = "the paper's mission, with mirror, loop and orbit"
+
+    def do(name: str) -> None:
+        file = "leo-geo.toml" if name == _PAPER else f"{name}.toml"
+        draft = Draft.shipped(_free(workshop, file))
+        workshop.change(draft if name == _PAPER else draft.with_text(presets.preset_text(name)))
+
+    _ask("Begin a new mission", "From", "Begin", texts, do, shown, _lost(workshop))
+
+
+def _free(workshop: Workshop, name: str) -> str:
+    """The path of a name that no file has yet."""
+    stem, number, path = name.removesuffix(".toml"), 1, workshop.inside(name)
+    while path.exists():
+        number += 1
+        path = workshop.inside(f"{stem}-{number}.toml")
+    return str(path)
+
+
+def _lost(workshop: Workshop) -> str:
+    changed = workshop.draft.changed and workshop.draft.path.exists()
+    return "Changes that are not saved will be lost." if changed else ""
+
+
+def _add_table(workshop: Workshop, shown: Callable[[str], None]) -> None:
+    names = [f"[{name}]" for name in offered(workshop.draft)]
+    if not names:
+        layout.refuse("This mission has every table that there is an example of.")
+        return
+
+    def do(name: str) -> None:
+        workshop.change(with_table(workshop.draft, name.strip("[]")))
+
+    _ask("Add a table, with example values to be changed", "Table", "Add", names, do, shown)
+
+
+def _revert(workshop: Workshop, shown: Callable[[str], None]) -> None:
+    def do() -> None:
+        if layout.attempt(lambda: workshop.change(Draft.open(workshop.draft.path))):
+            shown("")
+        dialog.close()
+
+    with ui.dialog() as dialog, ui.card():
+        layout.heading(f"Open {workshop.draft.path.name} again and lose the changes?")
+        with ui.row():
+            ui.button("Lose the changes", on_click=do).props("no-caps")
+            ui.button("Cancel", on_click=dialog.close).props("no-caps outline")
+    dialog.open()
+
+
+def _save_as(workshop: Workshop, shown: Callable[[str], None]) -> None:
+    def save() -> None:
+        fault.text = ""
+        try:
+            given = safe_name(name.value or "")
+            path = workshop.inside(given if given.endswith(".toml") else f"{given}.toml")
+            workshop.change(workshop.draft.save(path))
+        except NameRefusedError as error:
+            fault.text = layout.name_words(error)
+            return
+        except (ValueError, OSError) as error:
+            fault.text = str(error)
+            return
+        dialog.close()
+        shown("")
+
+    with ui.dialog() as dialog, ui.card().classes("mission-dialog"):
+        layout.heading(f"Save the mission in {workshop.folder}")
+        name = ui.input("Name of the file", value=workshop.draft.path.name).props("outlined").classes("w-full")
+        name.on("keydown.enter", save)
+        fault = ui.label().classes("no kept").props('role="alert"')
+        with ui.row():
+            ui.button("Save", on_click=save).props("no-caps")
+            ui.button("Cancel", on_click=dialog.close).props("no-caps outline")
+    dialog.open()
+
+
+def _ask(
+    title: str,
+    label: str,
+    verb: str,
+    options: list[str] | dict[str, str],
+    do: Callable[[str], None],
+    shown: Callable[[str], None],
+    warning: str = "",
+) -> None:
+    """A dialog that asks for one of several, and says in itself why it cannot be done."""
+
+    def go() -> None:
+        try:
+            do(choice.value)
+        except (ValueError, OSError) as error:
+            fault.text = str(error)
+            return
+        dialog.close()
+        shown(choice.value if choice.value.startswith("[") else "")
+
+    with ui.dialog() as dialog, ui.card().classes("mission-dialog"):
+        layout.heading(title)
+        choice = ui.select(options, label=label, value=next(iter(options))).props("outlined").classes("w-full")
+        if warning:
+            ui.label(warning)
+        fault = ui.label().classes("no kept").props('role="alert"')
+        with ui.row():
+            ui.button(verb, on_click=go).props("no-caps")
+            ui.button("Cancel", on_click=dialog.close).props("no-caps outline")
+    dialog.open()

@@ -1,0 +1,97 @@
+"""The pointing budget: its lines by class, the totals of each rule against the beacon, what is left, point-ahead."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from nicegui import background_tasks, run, ui
+
+from microrad.missionfile import LinkFile
+from microrad.studio import pointing_view
+from microrad.studio.commands import Budget
+from microrad.studio.dials import Dial
+from microrad.studio.draft import Draft
+from microrad.studio.pages import layout
+from microrad.studio.pages.dial_page import DialPage
+from microrad.studio.pages.dial_rows import add_style
+from microrad.studio.pages.pieces import Column, file_of, plot, table
+from microrad.studio.pointing_view import PointingView
+from microrad.studio.workshop import Workshop
+
+TITLE = "Pointing"
+PATH = "/pointing"
+
+_LINES = (
+    Column("line", "Error"),
+    Column("value", "Half width", number=True),
+    Column("share", "Share of squares", number=True),
+    Column("left_rss", "Left for it, root sum square", number=True),
+    Column("left_ecss", "Left for it, ECSS two axes", number=True),
+    Column("basis", "How it counts, and where it is from"),
+)
+_TOTALS = (
+    Column("rule", "Rule"),
+    Column("value", "Total", number=True),
+    Column("beacon", "Beacon's half angle"),
+    Column("formula", "Formula and authority"),
+    Column("caveat", "What speaks against it here"),
+)
+_AHEAD = (Column("what", "Point-ahead"), Column("value", "Value", number=True))
+
+
+def page(workshop: Workshop) -> None:
+    """Sliders at the left; plots and tables at the right."""
+    add_style()
+    PointingPage(workshop)
+
+
+class PointingPage(DialPage[PointingView]):
+    """The page of one tab."""
+
+    def __init__(self, workshop: Workshop) -> None:
+        """Build the body, and have it follow the workshop."""
+        layout.copy_buttons(lambda: Budget(file_of(workshop)))
+        super().__init__(workshop)
+
+    def build(self) -> None:
+        """Coverage, lines and totals, point-ahead."""
+        layout.heading("What the beacon covers")
+        self.words = ui.label().props('role="status"')
+        self.coverage = plot("Probability that the pointing error is below an angle; totals in the table below")
+        self.coverage.style("height: 24rem")
+        layout.heading("Lines and totals")
+        self.bars = plot("Half widths of the lines and totals of the rules; in numbers in the tables below")
+        self.lines = table(_LINES)
+        ui.label(
+            "Left for it: the largest half width, all others as they are, with which the total equals the beacon's "
+            "half angle."
+        ).classes("soft")
+        layout.heading("Root sum square against ECSS")
+        self.totals = table(_TOTALS)
+        layout.heading("Point-ahead")
+        self.ahead = table(_AHEAD).style("max-width: 36rem")
+        self.no_ahead = ui.label("The mission has no table [point_ahead].").classes("soft")
+        self.dimmed = (self.words, self.coverage, self.bars, self.lines, self.totals, self.ahead)
+
+    def dials(self, draft: Draft) -> Mapping[str, tuple[Dial, ...]]:
+        """The numbers that move the budget."""
+        return pointing_view.dials(draft)
+
+    def view(self, file: LinkFile) -> PointingView:
+        """The budget."""
+        return pointing_view.view(file)
+
+    def show(self, view: PointingView) -> None:
+        """The plots at once, the sentences when they are there."""
+        self.coverage.update_figure(pointing_view.coverage_plot(view))
+        self.bars.update_figure(pointing_view.lines_plot(view))
+        self.lines.rows = pointing_view.line_rows(view)
+        self.totals.rows = pointing_view.total_rows(view)
+        self.ahead.rows = pointing_view.ahead_rows(view)
+        self.ahead.visible = bool(self.ahead.rows)
+        self.no_ahead.visible = not self.ahead.rows
+        background_tasks.create_lazy(self._say(view), name=f"pointing words {id(self)}")
+
+    async def _say(self, view: PointingView) -> None:
+        """The sentences, apart from the rest: their module takes a second to load the first time."""
+        self.words.text = " ".join(await run.io_bound(pointing_view.words, view) or ())

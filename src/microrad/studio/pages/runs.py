@@ -1,0 +1,172 @@
+"""Studies and campaigns: started as jobs of their own, which survive the page, with progress, results and reports."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from nicegui import run, ui
+
+from microrad.studio import commands
+from microrad.studio.names import NameRefusedError, safe_name
+from microrad.studio.pages import layout
+from microrad.studio.pages.runs_jobs import JobList, submit
+from microrad.studio.runs_view import campaign_files, free_name, ledgers, write_campaign
+from microrad.studio.workshop import Workshop
+
+TITLE = "Runs"
+PATH = "/runs"
+
+
+def page(workshop: Workshop) -> None:
+    """What can be started, the jobs, and a report in its frame."""
+    with ui.element("div").classes("runs-start"):
+        _Study(workshop)
+        _Campaign(workshop)
+    layout.heading("Jobs")
+    ui.label("They run in processes of their own, one after the other, and go on when this page is closed.").classes(
+        "soft"
+    )
+    viewer = _Viewer()
+    JobList(workshop, viewer.show)
+    viewer.build()
+
+
+class _Study:
+    """The study of the mission, into a folder."""
+
+    def __init__(self, workshop: Workshop) -> None:
+        self.workshop = workshop
+        with ui.element("section").classes("runs-card").props('aria-label="Study"'):
+            layout.heading("Study of the mission")
+            self.about = ui.label().classes("soft")
+            self.folder = ui.input("Folder for the results").props("dense outlined").classes("runs-name")
+            with ui.row().classes("runs-go"):
+                self.button = ui.button("Run the study", on_click=self._run).props("no-caps")
+                layout.copy_buttons(self._action)
+            self.fault = ui.label().classes("no kept").props('role="alert"')
+        layout.follow(workshop, self._look)
+        ui.timer(0.0, self._name, once=True)
+
+    def _look(self) -> None:
+        draft, faults = self.workshop.draft, self.workshop.faults()
+        self.about.text = f"Everything that follows from {self.workshop.name_of(draft.path)}: verdict, figures, report."
+        self.button.text = "Save and run the study" if draft.changed else "Run the study"
+        self.button.enabled = not faults
+        self.fault.text = faults
+
+    async def _name(self) -> None:
+        """Propose a folder, unless one was typed meanwhile."""
+        before, stem = self.folder.value, f"{self.workshop.draft.path.stem}-study"
+        name = await run.io_bound(free_name, self.workshop, stem) or stem
+        if self.folder.value == before:
+            self.folder.value = name
+
+    def _action(self) -> commands.Run | None:
+        try:
+            name = safe_name(self.folder.value or "")
+        except NameRefusedError as error:
+            self.fault.text = layout.name_words(error)
+            return None
+        return commands.Run(Path(self.workshop.name_of(self.workshop.draft.path)), Path(name))
+
+    async def _run(self) -> None:
+        action = self._action()
+        if action is None or (self.workshop.draft.changed and not layout.save_draft(self.workshop)):
+            return
+        if await submit(self.workshop, "study", f"Study of {action.file}", action):
+            await self._name()
+
+
+class _Campaign:
+    """Campaigns of the folder: a new one from a file, or one that goes on from its ledger."""
+
+    def __init__(self, workshop: Workshop) -> None:
+        self.workshop = workshop
+        with ui.element("section").classes("runs-card").props('aria-label="Campaign"'):
+            layout.heading("Campaign")
+            ui.label("Many runs of a mission with drawn inputs: tails, sweeps, sensitivity.").classes("soft")
+            self.file = ui.select([], label="Campaign file", on_change=self._name)
+            self.file.props("dense outlined").classes("runs-name")
+            self.ledger = ui.input("Ledger").props("dense outlined").classes("runs-name")
+            with ui.row().classes("runs-go"):
+                self.button = ui.button("Run the campaign", on_click=self._run).props("no-caps")
+                ui.button("Write an example", on_click=self._example).props("no-caps outline")
+                layout.copy_buttons(self._action)
+            self.fault = ui.label().classes("no kept").props('role="alert"')
+        ui.timer(0.0, self._look, once=True)
+        ui.timer(4.0, self._look)
+
+    async def _look(self) -> None:
+        """The files that there are, which others may write meanwhile."""
+        names = list(await run.io_bound(campaign_files, self.workshop) or ())
+        going = [f"{name} (go on)" for name in await run.io_bound(ledgers, self.workshop) or ()]
+        options = [*names, *going]
+        if options != self.file.options:
+            keep = self.file.value if self.file.value in options else next(iter(options), None)
+            self.file.set_options(options, value=keep)
+            await self._name()
+        self.button.enabled = bool(options)
+
+    async def _name(self) -> None:
+        self.fault.text = ""
+        chosen = self.file.value or ""
+        self.ledger.enabled = not chosen.endswith(" (go on)")
+        stem = chosen.removesuffix(" (go on)").rpartition(".")[0]
+        if chosen.endswith(" (go on)"):
+            self.ledger.value = chosen.removesuffix(" (go on)")
+        elif stem:
+            self.ledger.value = await run.io_bound(free_name, self.workshop, stem, ".ledger") or ""
+
+    def _action(self) -> commands.CampaignRun | commands.CampaignResume | None:
+        chosen = self.file.value or ""
+        try:
+            ledger = safe_name(self.ledger.value or "")
+        except NameRefusedError as error:
+            self.fault.text = layout.name_words(error)
+            return None
+        if not chosen:
+            self.fault.text = "There is no campaign file in this folder yet; write an example, and change it."
+            return None
+        if chosen.endswith(" (go on)"):
+            return commands.CampaignResume(Path(ledger))
+        return commands.CampaignRun(Path(chosen), Path(ledger))
+
+    async def _run(self) -> None:
+        self.fault.text = ""
+        action = self._action()
+        if action is None:
+            return
+        new = isinstance(action, commands.CampaignRun)
+        title = f"Campaign {action.file}" if isinstance(action, commands.CampaignRun) else f"Campaign {action.ledger}"
+        if await submit(self.workshop, "campaign", title if new else f"{title}, going on", action):
+            await self._name()
+
+    async def _example(self) -> None:
+        self.fault.text = ""
+        try:
+            path = await run.io_bound(write_campaign, self.workshop)
+        except (ValueError, OSError) as error:
+            self.fault.text = str(error)
+            return
+        await self._look()
+        if path is not None and path.name in self.file.options:
+            self.file.value = path.name
+
+
+class _Viewer:
+    """A finished report in a frame of the page, below the list."""
+
+    def build(self) -> None:
+        """The place where a report is shown."""
+        self.place = ui.element("section").classes("runs-viewer").props('aria-label="Report"')
+
+    def show(self, address: str, title: str) -> None:
+        """Show the document at an address of the studio."""
+        self.place.clear()
+        with self.place:
+            with ui.row().classes("runs-head"):
+                layout.heading(title)
+                ui.button("Close the report", on_click=self.place.clear).props("no-caps outline dense")
+            frame = ui.element("iframe").classes("runs-frame")
+            frame.props["src"], frame.props["title"] = address, title
+        ui.run_javascript("document.querySelector('.runs-viewer').scrollIntoView({behavior: 'smooth'})")

@@ -1,0 +1,172 @@
+"""What the page of runs shows: what can be started from the files of the folder, and a job in words."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Callable, Iterable
+from contextlib import suppress
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from importlib import resources
+from pathlib import Path
+
+from microrad.document import MAX_BYTES
+from microrad.folder import write_whole
+from microrad.studio.commands import Action
+from microrad.studio.jobs import Job, JobError, Kind, Order, Progress
+from microrad.studio.workshop import Workshop
+
+_VERDICTS = {
+    ("study", 0): "the link closes",
+    ("study", 1): "the link does not close",
+    ("campaign", 0): "the rows keep the limits",
+    ("campaign", 1): "the rows do not keep the limits",
+}
+_STATES = {
+    "queued": "waiting for the job before it",
+    "done": "done",
+    "failed": "failed",
+    "cancelled": "cancelled",
+    "lost": "lost",
+    "unreadable": "unreadable",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class CampaignReport:
+    """The page with the pictures of a campaign's ledger."""
+
+    ledger: Path
+    page: Path
+
+    @property
+    def arguments(self) -> tuple[str, ...]:
+        """What follows `microrad` on the command line."""
+        return ("campaign", "report", str(self.ledger), str(self.page), "--overwrite")
+
+    @property
+    def python(self) -> str:
+        """Lines of Python that do the same."""
+        return (
+            "from pathlib import Path\n\n"
+            "from microrad import summarise_campaign\n"
+            "from microrad.report import campaign_page\n\n"
+            f"text = campaign_page.html(summarise_campaign(Path({str(self.ledger)!r})))\n"
+            f'Path({str(self.page)!r}).write_text(text, encoding="utf-8")\n'
+        )
+
+    @property
+    def results(self) -> tuple[str, ...]:
+        """The page."""
+        return (str(self.page),)
+
+
+def order(workshop: Workshop, kind: Kind, title: str, action: Action) -> Order:
+    """An action as a job in the working folder."""
+    return Order(kind, title, action.arguments, workshop.folder, action.results)
+
+
+# -------------------------------------------------------------------------------------------------- what can be started
+def free_name(workshop: Workshop, stem: str, ending: str = "") -> str:
+    """A name in the working folder that nothing has yet, and no job that is still to run will take."""
+    taken = {Path(each).parts[0] for job in _unfinished(workshop) for each in job.results if each}
+    number, name = 1, f"{stem}{ending}"
+    while (workshop.folder / name).exists() or name in taken:
+        number += 1
+        name = f"{stem}-{number}{ending}"
+    return name
+
+
+def _unfinished(workshop: Workshop) -> Iterable[Job]:
+    return (job for job in workshop.jobs.listed() if not job.finished)
+
+
+def campaign_files(workshop: Workshop) -> tuple[str, ...]:
+    """The campaign files of the working folder: those that name a mission."""
+    return tuple(path.name for path in workshop.missions() if isinstance(_top(path).get("mission"), str))
+
+
+def _top(path: Path) -> dict[str, object]:
+    """What a TOML file holds; nothing where it cannot be read."""
+    with suppress(OSError, ValueError, RecursionError):
+        if path.stat().st_size <= MAX_BYTES:
+            return tomllib.loads(path.read_text("utf-8"))
+    return {}
+
+
+def ledgers(workshop: Workshop) -> tuple[str, ...]:
+    """The ledgers of the working folder."""
+    return tuple(sorted(path.name for path in workshop.folder.glob("*.ledger") if path.is_file()))
+
+
+def write_campaign(workshop: Workshop) -> Path:
+    """Write the shipped campaign for the mission that is being edited; raises `JobError` where it has no file yet."""
+    mission = workshop.draft.path
+    if not mission.is_file():
+        raise JobError(f"{workshop.name_of(mission)} is not saved yet, and a campaign reads it from its file; save it")
+    text = resources.files("microrad").joinpath("missions", "campaign.toml").read_text("utf-8")
+    path = workshop.inside(free_name(workshop, "campaign", ".toml"))
+    write_whole(path, text.replace('mission = "leo-geo.toml"', f'mission = "{workshop.name_of(mission)}"', 1))
+    return path
+
+
+# ------------------------------------------------------------------------------------------------------- a job in words
+def state_words(job: Job) -> str:
+    """The state of a job, with what was found where it is over."""
+    if job.state == "running":
+        return "stopping ..." if job.cancelling else "running"
+    verdict = _VERDICTS.get((job.kind, job.code if job.code is not None else -1), "")
+    return f"{_STATES[job.state]}: {verdict}" if job.state == "done" and verdict else _STATES[job.state]
+
+
+def progress_words(progress: Progress | None) -> str:
+    """How far a job is, how fast, and how long it may still take."""
+    if progress is None:
+        return "starting"
+    words = f"{100.0 * progress.share:.0f} %, {progress.done} of {progress.total}: {progress.what}"
+    if progress.rate_1_s:
+        left_s = (progress.total - progress.done) / progress.rate_1_s
+        words += f"; {progress.rate_1_s:.3g} a second, {duration_words(left_s)} left"
+    return words
+
+
+def duration_words(time_s: float) -> str:
+    """A time as one says it: "48 s", "3 min 20 s", "2 h 5 min"."""
+    whole = round(time_s)
+    if whole < 60:
+        return f"{whole} s"
+    if whole < 3600:
+        return f"{whole // 60} min {whole % 60} s"
+    return f"{whole // 3600} h {whole % 3600 // 60} min"
+
+
+def time_words(job: Job, now: Callable[[], datetime] = lambda: datetime.now(UTC)) -> str:
+    """When a job began, and how long it took or takes."""
+    if not job.started:
+        return f"put in the queue {_at(job.queued)}"
+    begun, ended = _read(job.started), _read(job.ended) or now()
+    took = "" if begun is None else f", {duration_words(max((ended - begun).total_seconds(), 0.0))}"
+    return f"started {_at(job.started)}{took}"
+
+
+def _at(time: str) -> str:
+    read = _read(time)
+    return "" if read is None else f"{read:%Y-%m-%d %H:%M:%S} UTC"
+
+
+def _read(time: str) -> datetime | None:
+    with suppress(ValueError):
+        return datetime.fromisoformat(time)
+    return None
+
+
+def result_files(workshop: Workshop, job: Job) -> tuple[tuple[int, str], ...]:
+    """The results of a job that are there: their places among them, and their names."""
+    found = ((place, name, job.cwd / name) for place, name in enumerate(job.results))
+    return tuple((place, name) for place, name, path in found if path.is_file() and _is_inside(workshop, path))
+
+
+def _is_inside(workshop: Workshop, path: Path) -> bool:
+    with suppress(OSError, RuntimeError):
+        return path.resolve().is_relative_to(workshop.folder)
+    return False

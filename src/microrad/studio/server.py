@@ -1,0 +1,195 @@
+"""The studio as a server: the pages behind the guard, on a socket of this machine, until it is told to end."""
+
+from __future__ import annotations
+
+import os
+import socket
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib import import_module, util
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from microrad.studio import address
+from microrad.studio.workshop import Workshop
+
+# NiceGUI and what it stands on take a second to load, and are not there in an installation without the studio.
+if TYPE_CHECKING:
+    from starlette.responses import Response
+
+    from microrad.studio.guard import Guard
+
+PAGES = ("mission", "link", "pointing", "day", "mirror", "control", "runs", "compare")
+"""Modules of `microrad.studio.pages`, in the order of the navigation."""
+DOCUMENTS = "/results/"
+"""Where finished documents are served, each in a sandbox: a job's number, then the place among its results."""
+
+_GRACE_S = 2
+_ANY = ("0.0.0.0", "::", "[::]", "*", "")
+
+
+class StudioError(ValueError):
+    """The studio cannot be started; the message says why and what to do."""
+
+
+@dataclass(frozen=True, slots=True)
+class Entrance:
+    """Where the studio listens: `bind` the address of this machine, `names` those that a browser may ask for."""
+
+    listener: socket.socket
+    names: tuple[str, ...]
+    token: str
+
+    @property
+    def url(self) -> str:
+        """The address to open, with the token."""
+        return address.entrance(self.names[0], self.token)
+
+
+def check_installed() -> None:
+    """Raise `StudioError` where the studio's libraries are missing."""
+    missing = [name for name in ("nicegui", "uvicorn") if util.find_spec(name) is None]
+    if missing:
+        raise StudioError(
+            f"the studio needs {' and '.join(missing)}, which this installation does not have; install it with: "
+            'pip install "microrad[studio]"'
+        )
+
+
+def listen(port: int = 0, exposed: str | None = None) -> Entrance:
+    """Take the port (0: any free one) on 127.0.0.1, or on the address `exposed` of this machine in the network.
+
+    Raises `StudioError` where the port is taken or the address is not this machine's, `ExposureError` for a bad name.
+    """
+    if exposed is not None and exposed in _ANY:
+        raise StudioError(
+            f"'{exposed}' is no address that a browser could open; give this machine's own address or name in the "
+            "network, such as 192.168.1.7"
+        )
+    host = address.bind_address(exposed or "127.0.0.1", exposed=exposed is not None)
+    listener = _bound(host, port)
+    given = listener.getsockname()[1]
+    own = () if exposed is None else (f"[{exposed}]" if ":" in exposed else exposed,)
+    names = address.hosts(given, own) if own else address.hosts(given)
+    return Entrance(listener, names, address.new_token())
+
+
+def _bound(host: str, port: int) -> socket.socket:
+    try:
+        family, kind, protocol, _, place = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
+        listener = socket.socket(family, kind, protocol)
+    except OSError as error:
+        raise StudioError(f"'{host}' is no address of this machine: {error.strerror}") from error
+    try:
+        if os.name == "posix":  # elsewhere it would let another program take the port as well
+            listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        listener.bind(place)
+        listener.listen()  # a second one that takes the same port is refused from here on
+    except OSError as error:
+        listener.close()
+        raise StudioError(_unbound(host, port, error)) from error
+    return listener
+
+
+def _unbound(host: str, port: int, error: OSError) -> str:
+    """Why a port could not be taken, and what to do."""
+    import errno
+
+    if error.errno == errno.EADDRINUSE:
+        why = "is in use, perhaps by another studio; give another one with --port, or leave --port out for a free one"
+        return f"port {port} {why}"
+    if error.errno == errno.EACCES:
+        return f"port {port} is not open to this user; give one from 1024 on with --port"
+    return f"'{host}' port {port} cannot be listened on: {error.strerror}; give an address of this machine"
+
+
+def serve(workshop: Workshop, entrance: Entrance, on_ready: Callable[[], None]) -> None:
+    """Serve the pages until Ctrl-C or a request to terminate; `on_ready` is called when a browser may come.
+
+    Jobs go on. One process serves one studio: NiceGUI keeps its state in its modules.
+    """
+    import uvicorn
+
+    guarded = application(workshop, entrance)
+
+    class Server(uvicorn.Server):
+        async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+            await super().startup(sockets)
+            on_ready()
+
+    settings = address.server_settings()
+    config = uvicorn.Config(guarded, log_level="warning", timeout_graceful_shutdown=_GRACE_S, **settings)
+    Server(config).run(sockets=[entrance.listener])
+
+
+def application(workshop: Workshop, entrance: Entrance) -> Guard:
+    """The pages of a workshop behind the guard."""
+    os.environ["NICEGUI_STORAGE_PATH"] = str(workshop.studio / "nicegui")  # read when NiceGUI is loaded
+    from fastapi import FastAPI
+    from nicegui import ui
+    from nicegui.client import templates
+
+    from microrad.studio import policy
+    from microrad.studio.guard import Guard
+    from microrad.studio.uploads import Uploads
+
+    Uploads(workshop.studio / "uploads").hold_temporary_files()
+    policy.sign_template(templates.env)
+    inner = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
+    inner.add_api_route(DOCUMENTS + "{number}/{place}", _documents(workshop), methods=["GET"])
+    _add_pages(workshop)
+    ui.run_with(
+        inner, title="microrad studio", language="en-US", show_welcome_message=False, gzip_middleware_factory=None
+    )
+    return Guard(inner, entrance.names, address.origins(entrance.names), entrance.token, documents=(DOCUMENTS,))
+
+
+def _add_pages(workshop: Workshop) -> None:
+    """Register every page, each within the common frame."""
+    from nicegui import ui
+
+    modules = [import_module(f"microrad.studio.pages.{name}") for name in PAGES if _there(name)]
+    entries = tuple((module.TITLE, module.PATH) for module in modules)
+    for module in modules:
+        ui.page(module.PATH, title=f"{module.TITLE} - microrad studio")(_framed(workshop, module, entries))
+
+
+def _there(name: str) -> bool:
+    return util.find_spec(f"microrad.studio.pages.{name}") is not None
+
+
+def _framed(workshop: Workshop, module: Any, entries: tuple[tuple[str, str], ...]) -> Callable[[], None]:
+    from microrad.studio.pages import layout
+
+    def build() -> None:
+        with layout.frame(workshop, module.TITLE, entries):
+            module.page(workshop)
+
+    return build
+
+
+def _documents(workshop: Workshop) -> Callable[[int, int], Response]:
+    """A handler that shows what a job has written: a page of its own as such, anything else to be saved."""
+    from starlette.responses import FileResponse, PlainTextResponse
+
+    def show(number: int, place: int) -> Any:
+        path = result(workshop, number, place)
+        if path is None:
+            return PlainTextResponse("This result is not there any more.", 404)
+        page = path.suffix == ".html"
+        return FileResponse(path, filename=path.name, content_disposition_type="inline" if page else "attachment")
+
+    return show
+
+
+def result(workshop: Workshop, number: int, place: int) -> Path | None:
+    """A file that a job has written, where it lies in the working folder; None where there is none."""
+    from microrad.studio.jobs import JobError
+    from microrad.studio.names import NameRefusedError, within
+
+    try:
+        job = workshop.jobs.get(number)
+        path = within(workshop.folder, job.cwd / job.results[place])
+    except (JobError, NameRefusedError, IndexError):
+        return None
+    return path if place >= 0 and path.is_file() else None

@@ -1,0 +1,434 @@
+"""A report run again from the manifest that it carries: what differs, and what is refused."""
+
+import hashlib
+import json
+import re
+import shutil
+
+import pytest
+
+from microrad import cli, missionfile, report, study
+from microrad.report import carried, compared, page, reproduce
+from shipped import SHIPPED, edited_file, without_fine_pointing
+
+
+@pytest.fixture(scope="module", autouse=True)
+def no_scan():
+    """The scan has tests of its own and takes the longest."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(study.paper, "applies", lambda mission: False)
+        yield
+
+
+@pytest.fixture(scope="module")
+def ran(tmp_path_factory):
+    return study.run(edited_file(tmp_path_factory.mktemp("mission"), ("runs = 4000 ", "runs = 100 ")))
+
+
+@pytest.fixture(scope="module")
+def written(ran, tmp_path_factory):
+    target = tmp_path_factory.mktemp("report") / "study"
+    report.write(ran, target)
+    return target
+
+
+@pytest.fixture
+def not_run(monkeypatch, ran, written):
+    """The study and its report as they were, without the time that they take."""
+    monkeypatch.setattr(reproduce.study, "run", lambda file, on_progress: ran)
+
+    def copied(found, target, **settings):
+        shutil.copytree(written, target)
+        return target / "report.html"
+
+    monkeypatch.setattr(report, "write", copied)
+
+
+def manifest_of(folder):
+    return json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
+
+
+@pytest.fixture
+def changed(written, tmp_path):
+    """The report with its manifest edited, as a file of its own."""
+
+    def edit(change):
+        found = carried.read(written / "report.html")
+        data = json.loads(json.dumps(found.data))
+        change(data)
+        before, _, behind = found.page.partition(carried.OPENING)
+        text = before + carried.OPENING + page.embedded(data) + carried.ENDING + behind.partition(carried.ENDING)[2]
+        path = tmp_path / "changed.html"
+        path.write_text(text, encoding="utf-8")
+        return path
+
+    return edit
+
+
+def call(capsys, *args):
+    with pytest.raises(SystemExit) as ended:
+        cli.app(["reproduce", *map(str, args)])
+    out, err = capsys.readouterr()
+    return ended.value.code, out, err
+
+
+# ---------------------------------------------------------------------------------------------------------------- same
+def test_the_same_inputs_give_nothing_that_differs(written, capsys):
+    code, out, _ = call(capsys, written / "report.html", "--json")
+    found = json.loads(out)
+    assert (code, found["same"]) == (0, True)
+    assert found["largest_relative_difference"] == 0.0
+    assert found["numbers"] > 500
+    assert found["differences"] == found["altered"] == found["figure_data"] == found["page"] == []
+    assert found["versions"] == {}
+
+
+@pytest.mark.parametrize("name", ["", "manifest.json"])
+def test_a_folder_or_its_manifest_will_do(not_run, written, capsys, name):
+    code, out, _ = call(capsys, written / name)
+    assert code == 0
+    assert "nothing differs (" in out
+    assert "tolerance 1e-06" in out
+
+
+def test_the_page_and_the_manifest_beside_it_carry_the_same(written, ran):
+    inside, beside = carried.read(written / "report.html").data, manifest_of(written)
+    hashes = [each.pop("files_sha256") for each in (inside, beside)]
+    assert inside == beside
+    assert inside["mission"]["text"] == ran.file.text
+    assert set(hashes[1]) - set(hashes[0]) >= {"report.html", "results.nc"}
+    assert {k: v for k, v in hashes[1].items() if k in hashes[0]} == hashes[0]
+
+
+# -------------------------------------------------------------------------------------------------------------- changed
+def test_a_changed_aperture_is_told_with_what_follows(changed, capsys):
+    def wider(data):
+        text = data["mission"]["text"]
+        assert text.count('leo_aperture = "5 cm"') == 1
+        data["mission"]["text"] = text.replace('leo_aperture = "5 cm"', 'leo_aperture = "6 cm"')
+
+    code, out, _ = call(capsys, changed(wider))
+    assert code == 1
+    assert "the report is not reproduced" in out
+    assert "the mission's text was changed after the report was written" in out
+    margin = r"margin_db\.communication_as_budgeted: was 3\.00\d+ and is 3\.\d+, relative difference 0\.\d+"
+    assert re.search(margin, out)
+    assert "mission_sha256: was" in out
+
+
+def test_a_changed_number_is_told_with_its_size(not_run, changed, capsys):
+    def more(data):
+        data["summary"]["margin_db"]["beacon"] *= 1.001
+
+    path = changed(more)
+    found = reproduce.reproduce(path)
+    assert [each.place for each in found.differences] == ["margin_db.beacon"]
+    assert found.differences[0].relative == pytest.approx(0.001 / 1.001, rel=1e-9)
+    assert found.largest == found.differences[0].relative
+    assert found.page == found.files == found.altered == ()
+    code, out, _ = call(capsys, path)
+    assert code == 1
+    assert "margin_db.beacon: was 6.30" in out
+    assert call(capsys, path, "--tolerance", "0.01")[0] == 0
+
+
+def test_a_verdict_turned_round_is_told(not_run, changed):
+    def pass_all(data):
+        for each in data["summary"]["requirements"]:
+            each["met"] = True
+
+    found = reproduce.reproduce(changed(pass_all))
+    assert [(d.place, d.was, d.now) for d in found.differences] == [
+        ("requirements[3].met", True, False),
+        ("requirements[4].met", True, False),
+    ]
+
+
+def test_a_number_changed_on_the_page_alone_is_told(not_run, written, tmp_path, capsys):
+    text = (written / "report.html").read_text(encoding="utf-8")
+    assert text.count("12.1 µrad with hysteresis") == 1
+    path = tmp_path / "report.html"
+    path.write_text(text.replace("12.1 µrad with hysteresis", "2.1 µrad with hysteresis"), encoding="utf-8")
+    code, out, _ = call(capsys, path)
+    assert code == 1
+    assert "the page's text is not what this run writes: line " in out
+    assert "2.1 µrad with hysteresis" in out
+
+
+def test_a_hash_of_figure_data_that_is_another_is_told(not_run, changed):
+    def other(data):
+        data["files_sha256"]["figures/fig6-pid.csv"] = "0" * 64
+        data["files_sha256"]["figures/fig6-pid.svg"] = "0" * 64  # drawn, not data
+
+    found = reproduce.reproduce(changed(other))
+    assert found.files == ("figures/fig6-pid.csv",)
+    assert not found.same
+
+
+def test_versions_are_told_and_bytes_no_longer_counted(not_run, changed, capsys):
+    def older(data):
+        data["versions"]["numpy"] = "0.1"
+        data["files_sha256"]["figures/fig6-pid.csv"] = "0" * 64
+
+    code, out, _ = call(capsys, changed(older))
+    assert code == 0
+    assert re.search(r"numpy was 0\.1 and is \d", out)
+    assert "not byte for byte the same: figures/fig6-pid.csv" in out
+
+
+def test_a_file_with_other_line_ends_is_not_called_changed(tmp_path):
+    text = without_fine_pointing(SHIPPED.read_text(encoding="utf-8"))
+    path = tmp_path / "mission.toml"
+    path.write_bytes(b"\xef\xbb\xbf" + text.replace("\n", "\r\n").encode())
+    file = missionfile.load_mission(path)
+    data = {"mission": report_entry(file), "summary": {}}
+    held = carried.Carried(path, data, "")
+    assert carried.altered(held) == ()
+    again, moved = carried.unpack(held, tmp_path / "again")
+    assert again.sha256 == file.sha256 == hashlib.sha256(path.read_bytes()).hexdigest()
+    assert (again.mission, moved) == (file.mission, {})
+
+
+def report_entry(file, **changes):
+    """A mission as the manifest has it."""
+    digest = hashlib.sha256(file.text.encode()).hexdigest()
+    return {"file": file.path.name, "sha256": file.sha256, "text_sha256": digest, "text": file.text, **changes}
+
+
+# -------------------------------------------------------------------------------------------------------------- refused
+def cut(where):
+    def text(whole):
+        return whole[: whole.index(where) + len(where)]
+
+    return text
+
+
+OPENING = carried.OPENING
+REFUSED = {
+    "cut before its manifest": (cut("The paper against"[:9]), "carries no manifest: it was cut short"),
+    "cut within its manifest": (cut(OPENING + '{"mission"'), "ends within its manifest: it was cut short"),
+    "no report": (lambda whole: "<html><body>holiday</body></html>", "is no report of microrad; name a report.html"),
+    "empty": (lambda whole: "", "is no report of microrad"),
+    "two manifests": (lambda whole: whole + OPENING + "{}</script>", "carries 2 manifests"),
+    "no JSON": (lambda whole: OPENING + "{nonsense</script>", "its manifest is no JSON"),
+    "no number": (lambda whole: OPENING + '{"a": NaN}</script>', "NaN is no number of JSON"),
+    "nested": (lambda whole: OPENING + "[" * 100_000 + "</script>", "its manifest is nested too deeply"),
+    "a list": (lambda whole: OPENING + "[]</script>", "has no mission with file, sha256, text"),
+    "of a campaign": (lambda whole: OPENING + '{"campaign": {}}</script>', "none of a study of this version"),
+}
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_what_is_no_whole_report_is_refused_in_words(written, tmp_path, capsys, case):
+    make, words = REFUSED[case]
+    path = tmp_path / "report.html"
+    path.write_text(make((written / "report.html").read_text(encoding="utf-8")), encoding="utf-8")
+    code, out, err = call(capsys, path)
+    assert (code, out) == (2, "")
+    assert words in err
+    assert err.startswith("microrad: ")
+    assert len(err) < 500
+
+
+def test_what_is_no_text_or_not_there_is_refused_in_words(tmp_path, capsys):
+    (tmp_path / "image.html").write_bytes(b"\x89PNG\xff\xfe")
+    assert "is no text, so no report of microrad" in call(capsys, tmp_path / "image.html")[2]
+    assert "there is no such file" in call(capsys, tmp_path / "absent.html")[2]
+    assert "there is no such file" in call(capsys, tmp_path)[2]  # a folder without a manifest
+
+
+def test_a_huge_report_is_refused_before_it_is_read(tmp_path, monkeypatch):
+    path = tmp_path / "report.html"
+    with path.open("wb") as file:
+        file.truncate(carried.MOST_BYTES + 1)
+    monkeypatch.setattr(type(path), "read_bytes", lambda self: pytest.fail("read"))
+    with pytest.raises(reproduce.ReproduceError, match=r"is 64 MB long; a report of microrad has at most 64 MB"):
+        carried.read(path)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"mission": {"file": "m.toml", "sha256": "0", "text": 3, "text_sha256": "0"}}, "no mission with file"),
+        ({"mirror": ["mirror.toml"]}, "no mirror with file, sha256, text, text_sha256"),
+        ({"inputs": {"a": 3}}, "no inputs as names with texts"),
+        ({"inputs": {str(i): "" for i in range(17)}}, "more inputs than a mission names"),
+        ({"versions": 3}, "no versions as names with texts"),
+        ({"summary": None}, "no summary, against which a run could be held"),
+    ],
+)
+def test_values_of_another_kind_are_refused_in_words(changed, change, words):
+    with pytest.raises(reproduce.ReproduceError, match=words):
+        carried.read(changed(lambda data: data.update(change)))
+
+
+def test_a_text_that_is_too_long_is_refused(changed, monkeypatch):
+    monkeypatch.setattr(carried, "MOST_TEXT", 1000)
+    with pytest.raises(reproduce.ReproduceError, match=r"a mission text of \d+ characters"):
+        carried.read(changed(lambda data: None))
+
+
+def test_a_mission_that_is_none_is_refused_by_its_faults(changed, capsys):
+    code, _, err = call(capsys, changed(lambda data: data["mission"].update(text="name = 3\nname = [")))
+    assert code == 2
+    assert "fault" in err
+    assert "name" in err
+
+
+def test_a_mission_that_does_not_run_is_refused_in_words(changed, capsys):
+    def unstable(data):
+        text = data["mission"]["text"]
+        data["mission"]["text"] = text.replace('integral = "16000 V/(mrad s)"', 'integral = "1e9 V/(mrad s)"')
+
+    code, _, err = call(capsys, changed(unstable))
+    assert code == 2
+    assert "the mission that it carries does not run: " in err
+
+
+# -------------------------------------------------------------------------------------------------------------- hostile
+def test_a_text_with_markup_stays_text(tmp_path, ran):
+    text = ran.file.text + "\n# </script><script>alert(1)</script> & <!--\n"
+    data = {"mission": report_entry(ran.file, text=text)}
+    embedded = page.embedded(data)
+    assert not set("<>&") & set(embedded)
+    assert json.loads(embedded)["mission"]["text"] == text
+
+
+EVIL = (
+    "../evil.txt",
+    "../../evil.txt",
+    "a/../../evil.txt",
+    "/tmp/microrad-evil.txt",
+    "..",
+    ".",
+    "",
+    "..\\evil.txt",
+    "C:\\evil.txt",
+    "a\0b",
+    "\udc80.txt",
+    ".bashrc",
+    "x" * 300,
+    "a/b/c/d/e/f.txt",
+)
+
+
+@pytest.mark.parametrize("name", EVIL)
+def test_no_name_leads_out_of_the_folder(tmp_path, name):
+    """Of the mission's file, of its mirror's and of a file that it names."""
+    text = SHIPPED.read_text(encoding="utf-8")
+    olympus = re.search(r'(?m)^spectrum = "olympus".*\n', text)[0]
+    quoted = json.dumps(name) if name.isprintable() and 0 < len(name) < 200 else '"spectrum.csv"'
+    text = text.replace(olympus, f'spectrum = "table"\nfile = {quoted}\n')
+    begin, end = text.index("[mirror]\n"), text.index("[amplifier]\n")
+    mirror = text[begin + len("[mirror]\n") : end].replace("[mirror.", "[")
+    text = text[:begin] + '[mirror]\nfile = "/etc/hostname"\n\n' + text[end:]
+    entry = {"file": name, "sha256": "0", "text_sha256": "0"}
+    named = json.loads(quoted)
+    data = {
+        "mission": {**entry, "text": text},
+        "mirror": {**entry, "text": mirror},
+        "inputs": {named: "Hz, urad^2/Hz\n1, 1\n", name: "evil"} if name != named else {named: "Hz\n"},
+    }
+    inside = tmp_path / "a" / "b" / "inside"
+    inside.parent.mkdir(parents=True)
+    before = set(tmp_path.parent.iterdir())
+    file, moved = carried.unpack(carried.Carried(tmp_path / "report.html", data, ""), inside)
+    found = [path for path in tmp_path.rglob("*") if path.is_file()]
+    assert len(found) == 3
+    assert all(path.resolve().is_relative_to(inside) for path in found)
+    assert set(tmp_path.parent.iterdir()) == before
+    own = file.mission.fine_pointing.vibration.file
+    assert (file.path.parent / own).read_text() == data["inputs"][named]
+    assert moved == ({} if own == named else {named: own})
+    assert file.mission.mirror.bouc_wen is not None
+
+
+def test_a_plain_name_is_kept():
+    for name in ("leo.tle", "orbits/leo 2.oem", "Bahn-Übergabe.csv"):
+        assert carried.plain(name) == name
+    assert [carried.plain(name) for name in EVIL] == [""] * len(EVIL)
+
+
+def test_names_that_were_replaced_are_put_back_before_comparing():
+    moved = {'../a"b<.tle': "named-file-0.tle"}
+    again = reproduce.restored('{"file": "named-file-0.tle"}', moved, reproduce._in_json)
+    assert json.loads(again) == {"file": '../a"b<.tle'}
+
+
+def test_a_mirror_file_that_is_not_carried_is_not_read(tmp_path, ran):
+    secret = tmp_path / "secret.toml"
+    secret.write_text('password = "open"\n')
+    text = ran.file.text
+    text = text[: text.index("[mirror]\n")] + f'[mirror]\nfile = "{secret}"\n' + text[text.index("[amplifier]\n") :]
+    held = carried.Carried(tmp_path / "report.html", {"mission": report_entry(ran.file, text=text)}, "")
+    with pytest.raises(
+        reproduce.ReproduceError, match="which the report does not carry; run the mission itself"
+    ) as told:
+        carried.unpack(held, tmp_path / "inside")
+    assert "password" not in str(told.value)
+
+
+def test_a_named_file_that_is_not_carried_is_refused(tmp_path):
+    text = SHIPPED.read_text(encoding="utf-8")
+    text = re.sub(r'(?m)^spectrum = "olympus".*\n', 'spectrum = "table"\nfile = "/etc/passwd"\n', text)
+    file = missionfile.load_mission(SHIPPED)
+    held = carried.Carried(tmp_path / "report.html", {"mission": report_entry(file, text=text)}, "")
+    with pytest.raises(
+        reproduce.ReproduceError, match="the mission names /etc/passwd, which the report does not carry"
+    ):
+        carried.unpack(held, tmp_path / "inside")
+
+
+def test_control_characters_of_a_report_do_not_reach_the_terminal(not_run, changed, capsys):
+    def coloured(data):
+        data["summary"]["\x1b[31mred"] = "\x1b]0;title\x07"
+
+    _, out, _ = call(capsys, changed(coloured))
+    assert "\\u001b[31mred: was \\u001b]0;title\\u0007 and is (none)" in out
+    assert "\x1b" not in out
+
+
+# ------------------------------------------------------------------------------------------------------------ comparing
+def test_the_relative_difference_is_over_the_larger_number():
+    assert compared.relative(2.0, 1.0) == compared.relative(-1.0, -2.0) == 0.5
+    assert compared.relative(1.0, -1.0) == 2.0
+    assert compared.relative(0.0, 1e-16) == 0.0  # closer than any quantity of a study
+    assert compared.relative(0.0, 1e-9) == 1.0
+    assert compared.relative(float("inf"), 1.0) == float("inf")
+    assert compared.relative(float("inf"), float("inf")) == 0.0
+
+
+def test_what_is_compared_and_what_counts():
+    was = {"a": 1.0, "b": [1.0, 2.0], "c": True, "d": "3.10 dB left", "e": None, "g": "PID"}
+    now = {"a": 1.0 + 1e-9, "b": [1.0, 2.1, 3.0], "c": 1, "d": "3.10000001 dB left", "f": 0.0, "g": "PI"}
+    found = compared.compare(was, now, 1e-6)
+    assert found.numbers == 3
+    assert found.largest == pytest.approx(0.1 / 2.1)
+    places = {d.place: (d.was, d.now) for d in found.differences}
+    missing = compared.MISSING
+    assert places == {
+        "b[1]": (2.0, 2.1),
+        "b[2]": (missing, 3.0),
+        "c": (True, 1),
+        "e": (None, missing),
+        "f": (missing, 0.0),
+        "g": ("PID", "PI"),
+    }
+    assert compared.compare(was, was, 0.0).differences == ()
+
+
+def test_words_with_another_number_or_other_words_differ():
+    assert compared.compare("x 3.1 dB", "x 3.2 dB", 1e-6).differences
+    assert compared.compare("x 3.1 dB", "y 3.1 dB", 1e-6).differences
+    assert not compared.compare("x \u22123.1 dB", "x \u22123.1000000001 dB", 1e-6).differences
+
+
+def test_a_number_of_thousands_of_digits_is_no_way_to_stop_it(changed, not_run):
+    path = changed(lambda data: None)
+    text = path.read_text(encoding="utf-8")
+    at = re.search(r'"margin_db":\{"beacon":([0-9.]+)', text)
+    path.write_text(text[: at.start(1)] + "9" * 10_000 + text[at.end(1) :], encoding="utf-8")
+    found = reproduce.reproduce(path)
+    assert [d.place for d in found.differences] == ["margin_db.beacon"]
+    assert found.largest == float("inf")
+    json.loads(json.dumps(reproduce.data(found), allow_nan=True))

@@ -1,0 +1,475 @@
+"""What the pages on mirror and control show, without a browser: forms, live fits, plots, the mirror in a mission."""
+
+import json
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from microrad import fine_pointing, tracking
+from microrad.fine_loop import linear
+from microrad.identify import STATIC, identify
+from microrad.kernels import bouc_wen_response
+from microrad.missionfile import load_mission
+from microrad.recording import recording_from_arrays
+from microrad.studio import control_model, control_view, live_fit, mirror_form, mirror_view
+from microrad.studio.control_model import PID, PID_INVERSE, WITH, WITHOUT
+from microrad.studio.draft import Draft
+from microrad.studio.jobs_files import Job, Progress
+from microrad.studio.live_fit import LiveFit, Loop
+from microrad.studio.mirror_form import Dropped, Form, Setting, SettingError
+from microrad.studio.mirror_use import with_mirror_file
+from microrad.studio.reading import ChannelInfo, Listing, Note, View
+from shipped import SHIPPED
+
+PAPER = np.array([0.089e-3, -2.96e-7, -0.048e-3, 0.00047, 38.421, 34.635, math.inf, 0.0])
+RATE_HZ = 5000.0
+
+
+def recorded(freq_hz=50.0, samples=2000):
+    drive = 6.0 + 6.0 * np.sin(2 * np.pi * freq_hz * np.arange(samples) / RATE_HZ)
+    output = 1e3 * bouc_wen_response(drive, 1 / RATE_HZ, PAPER, 0.0)[0]
+    noise = np.random.Generator(np.random.Philox(4)).standard_normal(samples)
+    return recording_from_arrays(drive, output + 0.002 * np.ptp(output) * noise, RATE_HZ, f"{freq_hz:g}Hz.csv")
+
+
+@pytest.fixture(scope="module")
+def identified():
+    """An identification, and each model as it was handed over."""
+    seen = []
+    return identify([recorded()], models=STATIC[:2], on_fit=seen.append), seen
+
+
+# ------------------------------------------------------------------------------------------------------------ live fits
+def test_each_model_is_handed_over_as_it_is_scored_in_the_end(identified):
+    found, seen = identified
+    assert [each.model for each in seen] == ["prandtl_ishlinskii", "bouc_wen"]
+    assert tuple(each.score for each in seen) == found.scores
+    assert [each.predictions for each in seen] == list(found.predictions)
+    assert seen[0].recordings == found.recordings
+
+
+def test_fits_are_read_as_they_were_written(identified, tmp_path):
+    _, seen = identified
+    look = live_fit.looker_on(str(tmp_path / "progress"))
+    assert live_fit.read_fits(tmp_path) == ()
+    for n, each in enumerate(seen, start=1):
+        look(each)
+        assert len(live_fit.read_fits(tmp_path)) == n
+    fits = live_fit.read_fits(tmp_path)
+    assert fits == tuple(live_fit.live_fit(each) for each in seen)
+    loop = fits[1].loops[0]
+    assert loop.name == "50Hz.csv"
+    assert len(loop.drive) == len(loop.model_rad) == len(loop.measured_rad) == 200  # two periods of 100 samples
+    assert np.ptp(loop.drive) == pytest.approx(12.0, rel=1e-3)
+    assert loop.split_s == pytest.approx(0.2)
+    assert loop.time_s[0] == pytest.approx(seen[1].predictions[0].start / RATE_HZ)
+    residual = seen[1].predictions[0].residual_rad[seen[1].predictions[0].start :]
+    assert max(map(abs, loop.residual_rad)) == pytest.approx(np.max(np.abs(residual)), rel=1e-6)
+
+
+def test_a_line_that_is_being_written_is_left_out(identified, tmp_path):
+    look = live_fit.looker_on(str(tmp_path / "progress"))
+    look(identified[1][0])
+    with (tmp_path / live_fit.FITS).open("a") as file:
+        file.write('{"model": "bouc_w')
+    assert [each.model for each in live_fit.read_fits(tmp_path)] == ["prandtl_ishlinskii"]
+
+
+def test_nobody_looks_on_without_a_file_and_a_disk_that_refuses_does_not_end_the_fit(identified, tmp_path):
+    live_fit.looker_on(None)(identified[1][0])
+    (tmp_path / live_fit.FITS).mkdir()
+    live_fit.looker_on(str(tmp_path / "progress"))(identified[1][0])
+    assert live_fit.read_fits(tmp_path) == ()
+    assert [each.name for each in tmp_path.iterdir()] == [live_fit.FITS]
+
+
+def test_the_command_writes_its_fits_beside_its_progress(call, folder, monkeypatch):
+    """`microrad identify` hands `looker_on` to `identify`: without it the page shows no live fit."""
+    record = recorded()
+    np.savetxt(folder / "loop.csv", np.hstack([record.drive, record.output]), delimiter=",", header="drive,angle")
+    monkeypatch.setenv("MICRORAD_PROGRESS", str(folder / "progress"))
+    result = call("identify", "loop.csv", "--input", "0", "--output", "1", "--rate", "5000", "--static")
+    assert result.code == 0, result.err
+    assert [each.model for each in live_fit.read_fits(folder)] == ["prandtl_ishlinskii", "bouc_wen"]
+
+
+def fitted(model, held_out, fit=0.5):
+    loop = Loop("a.csv", (0.0, 1.0), (1e-6, 2e-6), (1e-6, 3e-6), (0.5, 1.0), (0.0, -1e-6), 0.75)
+    return LiveFit(model, fit, held_out, (loop,))
+
+
+def test_the_best_is_the_one_that_leaves_least_of_what_no_fit_has_seen():
+    fits = fitted("a", 0.9, 0.1), fitted("b", 0.4), fitted("c", 0.6)
+    assert live_fit.best(fits).model == "b"
+    assert live_fit.best((*fits, fitted("b, free", 0.4))).model == "b, free"
+    assert live_fit.best(()) is None
+    assert live_fit.leader(fits).model == "b"
+    assert live_fit.leader((*fits, fitted("a", 0.8)), "a").held_out_rms_percent == 0.8
+    assert [row["note"] for row in mirror_view.score_rows(fits, "c")] == ["", "chosen", ""]
+    rows = mirror_view.score_rows(fits)
+    assert [row["model"] for row in rows] == ["b", "c", "a"]
+    assert [row["note"] for row in rows] == ["best so far", "", ""]
+    assert rows[0]["held_out"] == "0.4 %"
+
+
+# ------------------------------------------------------------------------------------------------------------ the form
+def listed(*channels, time=None, rates=()):
+    infos = tuple(ChannelInfo(name, unit, 1000) for name, unit in channels)
+    return Listing("csv", "ab" * 32, infos, 0, (), time, rates)
+
+
+@pytest.mark.parametrize(
+    ("listing", "drive", "output", "units"),
+    [
+        (listed(("time", "s"), ("Drive", "mV"), ("Angle", "µrad"), time=0), 1, 2, ("mV", "urad")),
+        (listed(("angle [mrad]", ""), ("drive [V]", "")), 1, 0, ("V", "mrad")),
+        (listed(("y", ""), ("u", "")), 1, 0, ("V", "mrad")),
+        (listed(("0", ""), ("1", ""), ("2", "")), 0, 1, ("V", "mrad")),
+        (listed(("only", "")), 0, None, ("V", "mrad")),
+        (listed(), None, None, ("V", "mrad")),
+    ],
+)
+def test_channels_are_guessed_by_unit_then_by_name(listing, drive, output, units):
+    found = mirror_form.first_setting(listing, "loop 1.csv")
+    assert (found.drive, found.output) == (drive, output)
+    assert (found.drive_unit, found.output_unit) == units
+    assert found.name == "loop 1-mirror"
+
+
+def test_a_rate_is_taken_from_the_file_where_it_states_one_alone():
+    assert mirror_form.first_setting(listed(rates=(200.0,)), "a").rate == "200 Hz"
+    assert mirror_form.first_setting(listed(rates=(200.0, 100.0)), "a").rate == ""
+    assert mirror_form.rate_hz("") is None
+    assert mirror_form.rate_hz(" 200 ") == mirror_form.rate_hz("0.2 kHz") == 200.0
+    with pytest.raises(SettingError, match=r"^sample rate: .*5 V"):
+        mirror_form.rate_hz("5 V")
+
+
+def test_channels_are_called_as_the_file_calls_them():
+    labels = mirror_form.labels(listed(("0", ""), ("<b>u</b>", "V")))
+    assert labels == {0: "column 0, 1000 samples", 1: "1: <b>u</b> (V), 1000 samples"}
+
+
+@pytest.mark.parametrize(
+    ("setting", "words"),
+    [
+        (Setting(None, 1), "drive: choose the channel"),
+        (Setting(0, None), "output: choose the channel"),
+        (Setting(2, 2), "output: channel 2 is the drive already; choose the channel of the sensor"),
+        (Setting(0, 1, output_unit="um"), "lever arm: the output is a length (µm) and a mirror needs an angle"),
+        (Setting(0, 1, output_unit="um", lever_arm="5 V"), 'lever arm: "5 V" is in "V"'),
+        (Setting(0, 1, output_unit="um", lever_arm="-5 mm"), "lever arm: -5 mm is not above 0"),
+        (Setting(0, 1, name=" "), "name of the mirror: it has none; type one, such as stage-x"),
+        (Setting(0, 1, name="../up"), "name of the mirror: the file '../up.toml' is not taken: its name holds a path"),
+        (Setting(0, 1, name="there"), "name of the mirror: there.html is there already and is left as it is"),
+    ],
+)
+def test_what_is_missing_in_the_form_is_said(tmp_path, setting, words):
+    (tmp_path / "there.html").touch()
+    recordings = [Dropped("k", "a.csv", tmp_path / "up" / "a.csv")]
+    assert mirror_form.identification(tmp_path, recordings, Setting(0, 1, name="new")).mirror_file.name == "new.toml"
+    with pytest.raises(SettingError) as refusal:
+        mirror_form.identification(tmp_path, recordings, setting)
+    assert words in str(refusal.value)
+
+
+def test_the_form_becomes_the_command(tmp_path):
+    uses = {"a.csv": "fit", "b.csv": "check", "c.csv": "leave"}
+    recordings = [Dropped(name, name, tmp_path / "up" / name, use) for name, use in uses.items()]
+    setting = Setting(0, 4, "200 Hz", "V", "um", "50 mm", ("clipping",), True, True, "stage x")
+    action = mirror_form.identification(tmp_path, recordings, setting)
+    assert action.arguments[:2] == ("identify", "up/a.csv")
+    said = " ".join(action.arguments)
+    for option in (
+        "--input 0 --output 4 --rate 200.0 --accept clipping --validate up/b.csv --input-unit V --output-unit um",
+        "--lever-arm 0.05 m",
+        "--name stage x --mirror-file stage x.toml",
+        "--static",
+        "--admissible",
+    ):
+        assert option in said
+    assert "c.csv" not in said
+    order = mirror_form.order(tmp_path, action)
+    assert (order.kind, order.title, order.cwd) == ("identification", "identify stage x", tmp_path)
+    assert order.arguments == (*action.arguments, "--json")
+    assert order.results == ("stage x.toml", "stage x.html")
+    angle = mirror_form.identification(tmp_path, recordings, replace(setting, output_unit="mrad"))
+    assert angle.lever_arm_m is None
+    with pytest.raises(SettingError, match="recordings: none is to be fitted; drop one, or set its use to fit"):
+        mirror_form.identification(tmp_path, recordings[1:], setting)
+
+
+def test_the_form_is_kept_for_other_tabs(tmp_path):
+    form = Form(Setting(1, 2, "5 kHz", accept=("drift",), name="a"), {"key": "check"})
+    path = tmp_path / "form.json"
+    assert mirror_form.kept_form(path) == Form()
+    mirror_form.keep_form(path, form)
+    assert mirror_form.kept_form(path) == form
+    path.write_text('{"setting": 3}')
+    assert mirror_form.kept_form(path) == Form()
+
+
+# ----------------------------------------------------------------------------------------------------------- the plots
+def viewed():
+    note = Note("drift", "y", None, "the output drifts", False)
+    values = ((0.0, 1.0, 2.0),), ((5.0, 6.0, 7.0),)
+    return View("ab", 300, 100.0, ("u",), ("y",), ("V",), ("um",), (note,), (0, 150, 299), *values)
+
+
+def titles(figure):
+    return [axis["title"]["text"] for key, axis in figure["layout"].items() if key[1:5] == "axis" and "title" in axis]
+
+
+def test_a_recording_is_drawn_with_its_units():
+    setting = Setting(0, 1, drive_unit="mV", output_unit="um")
+    loop = mirror_view.recording_plot(viewed(), setting)
+    assert titles(loop) == ["drive (mV)", "output (µm)"]
+    assert (loop["data"][0]["x"], loop["data"][0]["y"]) == ([0.0, 1.0, 2.0], [5.0, 6.0, 7.0])
+    over_time = mirror_view.time_plot(viewed(), setting)
+    assert titles(over_time) == ["time (s)", "drive (mV)", "output (µm)"]
+    assert over_time["data"][1]["x"] == [0.0, 1.5, 2.99]
+    assert mirror_view.about(viewed()) == "300 samples at 100 Hz, 3 s."
+    assert mirror_view.findings(viewed()) == ["The output drifts."]
+    assert not loop["config"]["displaylogo"]
+
+
+def test_a_model_is_drawn_over_what_was_measured():
+    fit = fitted("bouc_wen", 0.4)
+    figure = mirror_view.loop_plot(fit, 0, "V")
+    assert [trace["name"] for trace in figure["data"]] == ["measured", "bouc_wen"]
+    assert figure["data"][0]["y"] == [1.0, 2.0]
+    assert figure["data"][1]["y"] == [1.0, 3.0]
+    assert titles(figure) == ["drive (V)", "angle (µrad)"]
+    residual = mirror_view.residual_plot(fit, 0)
+    assert residual["data"][0]["y"] == [0.0, -1.0]
+    assert (residual["layout"]["shapes"][0]["x0"], residual["layout"]["shapes"][0]["x1"]) == (0.75, 1.0)
+
+
+def test_the_state_of_an_identification_in_words(tmp_path):
+    job = Job(1, tmp_path, "running", "identification", arguments=("identify", "a", "--input-unit", "mV"))
+    said = mirror_view.state_words
+    assert said(job, None) == "Begins."
+    busy = replace(job, progress=Progress(3, 14, "Bouc-Wen starts"))
+    assert said(busy, None) == "3 of 14 fits: fitting bouc_wen, start by start."
+    best = fitted("bouc_wen", 0.4)
+    assert said(replace(busy, cancelling=True), best) == (
+        "3 of 14 fits: fitting bouc_wen, start by start, stopping. "
+        "Best so far: bouc_wen, 0.4 % rms on samples that no fit has seen."
+    )
+    assert said(replace(job, state="failed", words="no recording"), None) == "failed: no recording"
+    assert said(replace(job, state="done"), best).startswith("Done. Chosen: bouc_wen, 0.4 %")
+    assert mirror_view.argument(job, "--input-unit", "V") == "mV"
+    assert mirror_view.argument(job, "--rate", "none") == "none"
+
+
+def test_the_outcome_is_read_from_what_the_command_prints():
+    said = {"model": "m", "verdict": ["a"], "warnings": ["b"], "refused": {"c": "why"}, "travel_rad": 1e-3}
+    found = mirror_view.outcome(json.dumps(said))
+    assert (found.model, found.verdict, found.warnings, found.refused) == ("m", ("a",), ("b",), ("c: why",))
+    assert found.numbers == (("travel over the fitted drive", "1 mrad"),)
+    for damaged in ("", "{", "[]", '{"model": "m"}', '{"model": "m", "verdict": 1}'):
+        assert mirror_view.outcome(damaged) is None
+
+
+# ---------------------------------------------------------------------------------------------- the mirror in a mission
+MIRROR = """name = "identified"
+travel = "1 mrad"
+composition = "static"
+rate_limit = "100 V/s"
+bias = "5 V"
+drive_min = "0 V"
+drive_max = "10 V"
+[prandtl_ishlinskii]
+thresholds = ["0 V", "1 V"]
+weights = ["80 urad/V", "9 urad/V"]
+"""
+
+
+def test_a_mission_takes_an_identified_mirror_and_keeps_the_rest(tmp_path):
+    (tmp_path / "found").mkdir()
+    (tmp_path / "found" / "stage.toml").write_text(MIRROR)
+    before = Draft.shipped(tmp_path / "m.toml")
+    after = with_mirror_file(before, tmp_path / "found" / "stage.toml")
+    assert after.problems == ()
+    assert after.file().mission.mirror.name == "identified"
+    begin, end = before.text.index("[mirror]"), before.text.index("\n[amplifier]")
+    assert after.text == before.text[:begin] + '[mirror]\nfile = "found/stage.toml"\n' + before.text[end:]
+    assert with_mirror_file(after, tmp_path / "found" / "stage.toml").text == after.text
+    away = with_mirror_file(before, tmp_path / "gone.toml")
+    assert "the mirror file does not exist" in away.report
+
+
+def test_line_ends_and_byte_order_mark_stay(tmp_path):
+    text = "\ufeff" + Draft.shipped(tmp_path / "m.toml").text.replace("\n", "\r\n")
+    (tmp_path / "m.toml").write_bytes(text.encode())
+    (tmp_path / "stage.toml").write_text(MIRROR)
+    after = with_mirror_file(Draft.open(tmp_path / "m.toml"), tmp_path / "stage.toml")
+    assert after.problems == ()
+    assert after.text.startswith("\ufeff#")
+    assert '\r\n[mirror]\r\nfile = "stage.toml"\r\n\r\n[amplifier]\r\n' in after.text
+    assert after.text.count("\n") == after.text.count("\r\n")
+
+
+def test_a_mirror_in_two_places_of_the_text_and_one_that_is_missing(tmp_path):
+    draft = Draft.shipped(tmp_path / "m.toml")
+    apart = draft.with_text('[mirror]\nname = "a"\n[amplifier]\ngain = 2\n# kept\n[mirror.linear]\n[other]')
+    assert with_mirror_file(apart, tmp_path / "s.toml").text == (
+        '[mirror]\nfile = "s.toml"\n[amplifier]\ngain = 2\n# kept\n[other]'
+    )
+    without = draft.with_text("[amplifier]\ngain = 2")
+    assert with_mirror_file(without, tmp_path / "s.toml").text == (
+        '[amplifier]\ngain = 2\n\n[mirror]\nfile = "s.toml"\n'
+    )
+
+
+# ------------------------------------------------------------------------------------------------------------- control
+@pytest.fixture(scope="module")
+def mission():
+    return load_mission(SHIPPED)
+
+
+@pytest.fixture(scope="module")
+def pi(mission):
+    return control_model.controller(mission, "PI")
+
+
+@pytest.fixture(scope="module")
+def answers(pi):
+    return pi.ask(control_view.ask_of("100 urad", "300 urad", "15 Hz"), (WITH, WITHOUT))
+
+
+def test_the_controllers_are_those_of_the_study_and_of_control(mission):
+    names = control_model.names(mission)
+    assert names == (*fine_pointing.names(mission.mission), PID, PID_INVERSE)
+    bare = replace(mission, mission=mission.mission.model_copy(update={"fine_pointing": None}))
+    assert control_model.names(bare) == (PID, PID_INVERSE)
+    with pytest.raises(ValueError, match="'none' is no controller of this mission"):
+        control_model.controller(mission, "none")
+
+
+def test_a_tuned_controller_has_the_numbers_of_the_study(mission, pi):
+    m, scene = mission.mission, fine_pointing.scene(mission)
+    tuned = fine_pointing.tune("PI", m, fine_pointing.plants(scene, m, m.fine_pointing.seed))
+    assert pi.residual_rad == tuned.residual_rms_rad
+    assert (pi.margins["modulus"], pi.margins["gain"]) == (tuned.margins.modulus, tuned.margins.gain_up)
+    assert pi.margins["modulus"] >= pi.asked_modulus == m.fine_pointing.modulus_margin
+    assert {name: value for name, (value, _) in pi.values.items()} == tuned.values
+    assert {unit for _, unit in pi.values.values()} == {"Hz"}
+    closed = linear.close(scene.loop, fine_pointing.build("PI", scene, m, tuned.controller))
+    at = np.array([10.0, 100.0, 1000.0])
+    expected = np.abs(linear.sensitivity(closed, at)[:, 0, 0])
+    np.testing.assert_allclose(np.interp(at, pi.freq_hz, pi.sensitivity), expected, rtol=2e-3)
+    assert pi.sensitivity.max() == pytest.approx(pi.margins["peak"], rel=1e-2)
+
+
+def test_a_controller_is_tuned_once_for_a_text(mission, pi, tmp_path):
+    assert control_model.controller(load_mission(SHIPPED), "PI") is pi
+    text = SHIPPED.read_text("utf-8").replace("modulus_margin = 0.5", "modulus_margin = 0.6")
+    other = load_mission(tmp_path / "m.toml", text=text)
+    assert control_model._Keyed(other) != control_model._Keyed(mission)
+    assert control_model._Keyed(load_mission(SHIPPED)) == control_model._Keyed(mission)
+
+
+def test_step_sine_and_jitter_answer_what_they_are_asked(mission, pi, answers):
+    step = answers.step[WITHOUT]
+    assert step.found_rad[0] == 0.0
+    assert step.found_rad[-1] == pytest.approx(100e-6, rel=0.02)
+    assert step.time_s[0] == 0.0
+    sine = answers.sine[WITH]
+    assert np.ptp(sine.wanted_rad) == pytest.approx(600e-6, rel=1e-2)
+    assert sine.time_s[-1] - sine.time_s[0] == pytest.approx(2 / 15, rel=1e-2)
+    assert sine.time_s[0] == pytest.approx(0.4, abs=1e-3)  # what settles is left out
+    assert 0 < sine.rms_rad < sine.peak_rad < 300e-6
+    jitter = answers.jitter[WITH]
+    table = mission.mission.fine_pointing
+    assert jitter.time_s[0] == pytest.approx(table.settle_s)
+    assert jitter.disturbance_rad.std() > 5 * jitter.error_rad.std()
+    residual = math.sqrt(2.0) * pi.residual_rad  # of both axes, linear, without hysteresis
+    assert 0.85 * residual < answers.jitter[WITHOUT].rms_rad < 1.15 * residual
+    assert jitter.rms_rad > answers.jitter[WITHOUT].rms_rad  # the same noise, and hysteresis
+    for curves in (answers.step, answers.sine, answers.jitter):
+        assert set(curves) == {WITH, WITHOUT}
+        assert all(np.all(np.abs(c.drive_v) <= pi.limits_v[1]) for c in curves.values())
+
+
+def test_only_the_variants_that_are_asked_for_are_simulated(pi):
+    ask = control_view.ask_of("50 urad", "100 urad", "25 Hz")
+    found = pi.ask(ask, control_view.SHOWN["without"])
+    assert {*found.step, *found.sine, *found.jitter} == {WITHOUT}
+
+
+@pytest.mark.parametrize("name", [PID, PID_INVERSE])
+def test_the_paper_s_loop_has_the_numbers_of_the_study(mission, name):
+    found = control_model.controller(mission, name)
+    margins = tracking.loop_margins(mission.mission)
+    assert found.margins["modulus"] == margins.modulus
+    assert found.margins["crossover"] == margins.crossover_hz
+    assert found.margins["bandwidth"] == pytest.approx(358, rel=0.02)
+    asked = found.ask(control_view.ask_of("100 urad", "300 urad", "15 Hz"), (WITH, WITHOUT))
+    runs = tracking.tracking_runs(mission.mission)
+    kind = "PID" if name == PID else "PID + inverse"
+    for variant, which in ((WITH, "given"), (WITHOUT, "no hysteresis")):
+        run = next(r for r in runs if (r.mirror, r.controller, r.freq_hz) == (which, kind, 15.0))
+        assert asked.sine[variant].peak_rad == pytest.approx(run.trace.peak_rad, rel=1e-2)
+    assert asked.jitter == {}
+    assert asked.step[WITHOUT].found_rad[-1] == pytest.approx(100e-6, rel=0.02)
+
+
+def test_margins_in_words_against_what_is_asked_for(mission, pi):
+    rows = dict(control_view.margin_rows(pi))
+    assert rows["Modulus margin, least |1 + L|"] == f"{pi.margins['modulus']:.3f} (asked for: 0.5)"
+    assert rows["Phase margin"].endswith("°")
+    assert rows["Residual of an axis, rms, linear"].endswith(" µrad")
+    assert control_view.value_rows(pi)[0][1].endswith(" Hz")
+    assert control_view.table_row(pi)["name"] == "PI"
+    assert control_view.waiting_row("PI")["modulus"] == ""
+    assert control_view.notes(pi) == ()
+    pid = control_model.controller(mission, PID)
+    assert "asked for" not in dict(control_view.margin_rows(pid))["Modulus margin, least |1 + L|"]
+    assert "nothing shakes it" in control_view.notes(pid)[0]
+    bound = replace(pi, bound_by=("modulus margin",), sensitivity=None, loop_gain=None)
+    assert control_view.notes(bound)[0] == "What keeps its residual from being smaller: modulus margin."
+    assert "slower than the control" in control_view.notes(bound)[1]
+    assert control_view.sensitivity_plot(bound)["data"] == control_view.gain_plot(bound)["data"] == []
+
+
+def test_plots_carry_units_limits_and_both_variants(pi, answers):
+    shown = {
+        control_view.step_plot: ("time (ms)", "line of sight, axis x (µrad)"),
+        control_view.sine_plot: ("time, settled (ms)", "error, axis x (µrad)"),
+        control_view.jitter_plot: ("time (s)", "error, axis x (µrad)"),
+        control_view.motion_plot: ("time (s)", "angle, axis x (µrad)"),
+    }
+    for draw, axes in shown.items():
+        figure = draw(answers)
+        assert tuple(titles(figure)) == axes
+        assert [t["name"] for t in figure["data"] if "hysteresis" in t["name"]] == [WITH, WITHOUT]
+        assert all(len(t["x"]) == len(t["y"]) <= 2500 for t in figure["data"])
+    drive = control_view.drive_plot(pi, answers.jitter, "s")
+    limits = [t["y"][0] for t in drive["data"] if t["name"] == "amplifier's limits"]
+    assert limits == [*pi.limits_v] == [-6.0, 6.0]
+    apart = control_view.drive_plot(replace(pi, identified_v=(-3.0, 3.0)), answers.step)
+    assert [t["y"][0] for t in apart["data"] if t["name"] == "range of the identification"] == [-3.0, 3.0]
+    ceiling = [t for t in control_view.sensitivity_plot(pi)["data"] if "margin asked for" in t["name"]]
+    assert ceiling[0]["y"] == [2.0, 2.0]
+    assert titles(control_view.gain_plot(pi)) == ["frequency", "|L|, loop gain"]
+    assert control_view.answer_words(answers.step, "Error").startswith(f"Error: {WITH} ")
+    assert control_view.answer_words({}, "Error") == ""
+
+
+@pytest.mark.parametrize(
+    ("typed", "words"),
+    [
+        (("5 V", "1 urad", "1 Hz"), 'step: "5 V" is in "V"'),
+        (("1 urad", "2", "1 Hz"), 'amplitude of the sine: "2" is a number without a unit'),
+        (("1 urad", "0 urad", "1 Hz"), "amplitude of the sine: 0 urad is outside 1 nrad to 100 mrad; type one between"),
+        (("1 urad", "1 urad", "20 kHz"), "frequency of the sine: 20 kHz is outside 100 mHz to 10 kHz"),
+    ],
+)
+def test_what_cannot_be_asked_is_said(typed, words):
+    assert control_view.ask_of("1 urad", "1 urad", "1 Hz").sine_hz == 1.0
+    with pytest.raises(control_view.AskError) as refusal:
+        control_view.ask_of(*typed)
+    assert words in str(refusal.value)

@@ -1,0 +1,395 @@
+"""Jobs of the studio: processes of their own, whose state is read from files alone."""
+
+import json
+import signal
+import stat
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from microrad.studio import jobs_files, jobs_process
+from microrad.studio.jobs import JobError, Jobs, Order
+from small_campaign import campaign_file, gone, kill
+
+PATIENCE_S = 300.0  # a fresh installation compiles first
+
+
+@pytest.fixture
+def studio(tmp_path):
+    """The jobs of an empty working folder; what is still running at the end of a test is ended."""
+    jobs = Jobs(tmp_path / ".microrad-studio")
+    yield jobs
+    for job in map(jobs_files.read_job, jobs_files.job_folders(jobs.folder)):
+        if not job.finished:
+            (job.folder / "cancel").touch()
+    for folder in jobs_files.job_folders(jobs.folder):
+        ended(folder)
+    for own in jobs_process._started:
+        own.wait(PATIENCE_S)
+
+
+def ended(folder):
+    assert jobs_files.wait_for(lambda: jobs_files.read_job(folder).finished, PATIENCE_S), jobs_files.read_job(folder)
+    return jobs_files.read_job(folder)
+
+
+def order(tmp_path, *arguments, kind="study", title="a title", results=()):
+    return Order(kind, title, arguments, tmp_path, results)
+
+
+def written(tmp_path, arguments=(), number=1, **described):
+    """A job's folder as `submit` leaves it, for a process of the test's own."""
+    folder = tmp_path / "jobs" / str(number)
+    folder.mkdir(parents=True)
+    described = {
+        "kind": "study",
+        "title": "t",
+        "arguments": list(arguments),
+        "cwd": str(tmp_path),
+        "results": [],
+        "queued": "",
+    } | described
+    (folder / "job.json").write_text(json.dumps(described))
+    return folder
+
+
+def python(code):
+    return (sys.executable, "-c", code)
+
+
+# ------------------------------------------------------------------------------------------------------------ one job
+def test_a_job_runs_by_itself_and_leaves_its_output_and_code(studio, tmp_path):
+    job = studio.submit(order(tmp_path, "init", "mine.toml", results=("mine.toml",)))
+    assert (job.number, job.title, job.kind, job.results) == (1, "a title", "study", ("mine.toml",))
+    job = ended(job.folder)
+    assert (job.state, job.code, job.words) == ("done", 0, "")
+    assert studio.output(1) == "mine.toml written. Next: microrad run mine.toml\n"
+    assert (tmp_path / "mine.toml").is_file()
+    assert job.queued <= job.started <= job.ended
+    assert job.started.endswith("Z")
+
+
+def test_what_a_job_keeps_is_for_its_owner_alone(studio, tmp_path):
+    job = studio.submit(order(tmp_path, "presets"))
+    for folder in (studio.folder.parent, studio.folder, job.folder):
+        assert stat.S_IMODE(folder.stat().st_mode) == 0o700
+    ended(job.folder)
+
+
+def test_a_failed_job_says_what_the_command_line_said(studio, tmp_path, call, monkeypatch):
+    job = ended(studio.submit(order(tmp_path, "run", "none.toml")).folder)
+    assert (job.state, job.code) == ("failed", 2)
+    monkeypatch.chdir(tmp_path)
+    assert f"microrad: {job.words}\n" == call("run", "none.toml").err
+    assert "the mission file does not exist" in job.words
+
+
+def test_a_job_that_ends_with_1_is_done(tmp_path):
+    folder = written(tmp_path)
+    jobs_process.run_job(folder, python("raise SystemExit(1)"))
+    assert (jobs_files.read_job(folder).state, jobs_files.read_job(folder).code) == ("done", 1)
+
+
+def test_a_job_ended_by_a_signal_says_which(tmp_path):
+    folder = written(tmp_path)
+    jobs_process.run_job(folder, python("import os; os.kill(os.getpid(), 9)"))
+    job = jobs_files.read_job(folder)
+    assert (job.state, job.code) == ("failed", -9)
+    assert "ended by signal 9; signal 9 is often that of a machine out of memory" in job.words
+
+
+def test_a_job_is_run_by_its_first_process_alone(tmp_path):
+    folder = written(tmp_path)
+    jobs_process.run_job(folder, python("print('first')"))
+    jobs_process.run_job(folder, python("print('second')"))
+    assert jobs_files.output(folder, "stdout") == "first\n"
+
+
+def test_no_file_of_the_working_folder_is_taken_for_a_module(studio, tmp_path):
+    (tmp_path / "microrad.py").write_text("print('mine')")
+    (tmp_path / "json.py").write_text("print('mine')")
+    job = ended(studio.submit(order(tmp_path, "presets")).folder)
+    assert job.state == "done"
+    assert "mine" not in studio.output(job.number)
+
+
+def test_a_job_goes_on_when_whoever_started_it_is_gone(tmp_path):
+    """The page and its server are there to look on: both may be killed."""
+    campaign_file(tmp_path, runs=64)
+    code = (
+        "from pathlib import Path; from microrad.studio.jobs import Jobs, Order; import os, signal\n"
+        "jobs = Jobs(Path('studio'))\n"
+        "jobs.submit(Order('study', 't', ('presets',), Path('.')))\n"
+        "jobs.submit(Order('study', 't', ('init', 'after.toml'), Path('.')))\n"
+        "os.kill(os.getpid(), signal.SIGKILL)\n"
+    )
+    server = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, check=False)
+    assert server.returncode == -signal.SIGKILL
+    folder = tmp_path / "studio" / "jobs"
+    assert jobs_files.wait_for(lambda: jobs_files.read_job(folder / "2").finished, PATIENCE_S)  # nobody looks on
+    assert [jobs_files.read_job(folder / name).state for name in "12"] == ["done", "done"]
+    assert (tmp_path / "after.toml").is_file()
+
+
+# ----------------------------------------------------------------------------------------------------------- progress
+def test_progress_is_handed_over_with_its_rate(studio, tmp_path):
+    campaign_file(tmp_path, runs=96)
+    job = ended(studio.submit(order(tmp_path, "campaign", "run", "campaign.toml", kind="campaign")).folder)
+    assert job.code == 0, job
+    assert (job.progress.done, job.progress.total, job.progress.share) == (96, 96, 1.0)
+    assert "rows" in job.progress.what
+    assert "of 96" not in studio.output(job.number, "stderr")
+
+
+def progress_of(tmp_path, *notes, more=""):
+    lines = [json.dumps(dict(zip(("at", "done", "total", "what"), note, strict=True))) for note in notes]
+    (tmp_path / "progress").write_text("\n".join(lines) + more)
+    return jobs_files.read_progress(tmp_path)
+
+
+def test_the_rate_is_that_of_this_phase_over_the_last_minute(tmp_path):
+    found = progress_of(tmp_path, (0.0, 50, 90, "x"), (10.0, 0, 100, "x"), (100.0, 10, 100, "x"), (140.0, 30, 100, "x"))
+    assert found.rate_1_s == pytest.approx(20 / 40)
+    assert found.share == pytest.approx(0.3)
+
+
+def test_steps_with_names_of_their_own_have_no_rate(tmp_path):
+    found = progress_of(tmp_path, (0.0, 1, 4, "budgets"), (2.0, 2, 4, "the day"))
+    assert (found.done, found.total, found.what, found.rate_1_s) == (2, 4, "the day", None)
+
+
+def test_a_line_of_progress_that_is_being_written_is_not_read(tmp_path):
+    assert progress_of(tmp_path, (1.0, 3, 10, "x"), more='\n{"at": 2.0, "do').done == 3
+    assert progress_of(tmp_path, more='{"at": 2.0, "do') is None
+
+
+# ------------------------------------------------------------------------------------------------------------- cancel
+def test_a_cancelled_campaign_keeps_its_rows_and_resumes(studio, tmp_path):
+    campaign_file(tmp_path, runs=4096, duration="1 s")
+    job = studio.submit(order(tmp_path, "campaign", "run", "campaign.toml", kind="campaign"))
+
+    def rows():
+        found = jobs_files.read_job(job.folder)
+        assert not found.finished, found
+        return found.progress is not None and found.progress.total == 4096 and found.progress.done > 0
+
+    assert jobs_files.wait_for(rows, PATIENCE_S)
+    assert studio.cancel(job.number).cancelling
+    job = ended(job.folder)
+    assert (job.state, job.code) == ("cancelled", 130)
+    assert "Go on with: microrad campaign resume campaign.ledger" in studio.output(job.number, "stderr")
+    again = studio.submit(order(tmp_path, "campaign", "resume", "campaign.ledger", kind="campaign"))
+    done = job.progress.done
+
+    def further():
+        found = jobs_files.read_job(again.folder)
+        assert not found.finished, found
+        return found.progress is not None and found.progress.done > done
+
+    assert jobs_files.wait_for(further, PATIENCE_S)
+
+
+def test_a_command_that_does_not_listen_is_asked_harder_each_time(tmp_path):
+    folder = written(tmp_path)
+    deaf = (
+        "import pathlib, signal, time\n"
+        "for n in (signal.SIGINT, signal.SIGTERM): signal.signal(n, lambda n, _: print(n, flush=True))\n"
+        f"pathlib.Path({str(folder / 'cancel')!r}).touch()\n"
+        "while True: time.sleep(0.01)\n"
+    )
+    jobs_process.run_job(folder, python(deaf), waits_s=(0.3, 0.3), look_s=0.02)
+    job = jobs_files.read_job(folder)
+    assert (job.state, job.code) == ("cancelled", -signal.SIGKILL)
+    asked = [int(line) for line in jobs_files.output(folder, "stdout").split()]
+    assert asked == [signal.SIGINT, signal.SIGTERM]
+
+
+def test_what_a_command_has_started_is_stopped_with_it(tmp_path):
+    folder = written(tmp_path)
+    code = (
+        "import pathlib, subprocess, sys, time\n"
+        "inner = subprocess.Popen([sys.executable, '-c', 'import time; time.sleep(600)'])\n"
+        f"print(inner.pid, flush=True); time.sleep(0.5); pathlib.Path({str(folder / 'cancel')!r}).touch()\n"
+        "time.sleep(600)\n"
+    )
+    jobs_process.run_job(folder, python(code), waits_s=(5.0, 5.0), look_s=0.02)
+    job = jobs_files.read_job(folder)
+    assert job.state == "cancelled"
+    assert job.code in (-signal.SIGINT, -signal.SIGTERM)  # the second where the tests themselves ignore Ctrl-C
+    assert gone(int(jobs_files.output(folder, "stdout")))
+
+
+def test_a_job_that_waits_and_is_cancelled_never_starts(studio, tmp_path):
+    campaign_file(tmp_path, runs=4096, duration="1 s")
+    first = studio.submit(order(tmp_path, "campaign", "run", "campaign.toml", kind="campaign"))
+    second = studio.submit(order(tmp_path, "init", "never.toml"))
+    assert (first.state, second.state) == ("running", "queued")
+    assert studio.cancel(2).state == "cancelled"
+    studio.cancel(1)
+    ended(first.folder)
+    assert [job.state for job in studio.listed()] == ["cancelled", "cancelled"]
+    assert not (tmp_path / "never.toml").exists()
+    with pytest.raises(JobError, match=r"job 2 is not running any more \(cancelled\); there is nothing to cancel"):
+        studio.cancel(2)
+
+
+# -------------------------------------------------------------------------------------------------------------- queue
+def test_the_queue_goes_on_in_order_and_nothing_starts_twice(studio, tmp_path):
+    """Many programs look at the queue at once; each job's file tells how often and when it ran."""
+    for number in range(1, 5):
+        studio.submit(order(tmp_path, "init", f"{number}.toml"))
+    place = str(studio.folder.parent)
+    look = f"import pathlib; from microrad.studio.jobs import Jobs; Jobs(pathlib.Path({place!r})).listed()"
+    tabs = [subprocess.Popen([sys.executable, "-c", look]) for _ in range(4)]
+    assert [tab.wait(PATIENCE_S) for tab in tabs] == [0] * 4
+    found = [ended(studio.folder / str(number)) for number in range(1, 5)]
+    assert [job.state for job in found] == ["done"] * 4  # init refuses a file that is there: each ran once
+    begun = [(job.folder / "started.json").stat().st_mtime_ns for job in found]
+    over = [(job.folder / "exit.json").stat().st_mtime_ns for job in found]
+    assert all(a < b for a, b in zip(over[:-1], begun[1:], strict=True))  # one at a time, in order
+    assert [job.number for job in studio.listed()] == [4, 3, 2, 1]
+
+
+def test_two_may_run_at_once(tmp_path):
+    jobs = Jobs(tmp_path / "studio", at_once=2)
+    campaign_file(tmp_path, runs=4096, duration="1 s")
+    orders = [order(tmp_path, "campaign", "run", "campaign.toml", "--ledger", f"{n}.ledger") for n in range(3)]
+    found = [jobs.submit(each) for each in orders]
+    assert [job.state for job in found] == ["running", "running", "queued"]
+    for number in (3, 2, 1):
+        jobs.cancel(number)
+    assert {ended(job.folder).state for job in found} == {"cancelled"}
+
+
+def test_who_looks_at_the_list_starts_what_nobody_started(studio, tmp_path):
+    folder = written(tmp_path, ["init", "late.toml"])
+    folder.rename(studio.folder / "1")
+    assert jobs_files.read_job(studio.folder / "1").state == "queued"
+    assert studio.listed()[0].state in ("running", "done")
+    assert ended(studio.folder / "1").state == "done"
+
+
+# ------------------------------------------------------------------------------------------------------------- crashes
+def test_a_job_whose_process_is_killed_is_lost_and_lets_the_next_one_go(studio, tmp_path):
+    campaign_file(tmp_path, runs=4096, duration="1 s")
+    first = studio.submit(order(tmp_path, "campaign", "run", "campaign.toml", kind="campaign"))
+    second = studio.submit(order(tmp_path, "init", "next.toml"))
+    pid = json.loads((first.folder / "started.json").read_text())["pid"]
+    inner = [int(each) for each in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
+    for each in (pid, *inner):
+        assert kill(each)
+    assert jobs_files.wait_for(lambda: jobs_files.read_job(first.folder).finished, PATIENCE_S)
+    lost = studio.get(1)
+    assert (lost.state, lost.code) == ("lost", None)
+    assert "gone without an exit code" in lost.words
+    assert [job.number for job in studio.listed()] == [2, 1]
+    assert ended(second.folder).state == "done"
+
+
+@pytest.mark.parametrize("text", ['{"kind": "study", "ti', "", "[]", "{}", None])
+def test_a_damaged_description_is_told_and_breaks_no_list(studio, tmp_path, text):
+    good = ended(studio.submit(order(tmp_path, "presets")).folder)
+    bad = studio.submit(order(tmp_path, "presets"))
+    ended(bad.folder)
+    (bad.folder / "job.json").unlink()
+    if text is not None:
+        (bad.folder / "job.json").write_text(text)
+    second, first = studio.listed()
+    assert (first.number, first.state) == (good.number, "done")
+    assert second.state == "unreadable"
+    assert f"{bad.folder / 'job.json'} cannot be read" in second.words
+    studio.remove(second.number)
+    assert [job.number for job in studio.listed()] == [good.number]
+
+
+def test_a_working_folder_that_is_gone_is_told(studio, tmp_path):
+    place = tmp_path / "place"
+    place.mkdir()
+    folder = written(tmp_path, ["presets"], cwd=str(place))
+    place.rmdir()
+    folder.rename(studio.folder / "1")
+    studio.listed()
+    job = ended(studio.folder / "1")
+    assert (job.state, job.code) == ("failed", 2)
+    assert job.words == f"{place}: No such file or directory; the job cannot be started there."
+
+
+# ------------------------------------------------------------------------------------------------------------ the list
+def test_a_finished_job_is_removed_with_its_output_and_its_number_is_not_used_again(studio, tmp_path):
+    job = ended(studio.submit(order(tmp_path, "init", "kept.toml")).folder)
+    studio.remove(job.number)
+    assert studio.listed() == ()
+    assert (tmp_path / "kept.toml").is_file()
+    assert [each.name for each in studio.folder.iterdir() if each.is_dir()] == []
+    with pytest.raises(JobError, match="there is no job 1 any more"):
+        studio.get(1)
+    assert ended(studio.submit(order(tmp_path, "presets")).folder).number == 2
+
+
+def test_a_running_job_is_not_removed(studio, tmp_path):
+    campaign_file(tmp_path, runs=4096, duration="1 s")
+    job = studio.submit(order(tmp_path, "campaign", "run", "campaign.toml", kind="campaign"))
+    with pytest.raises(JobError, match="job 1 is running; cancel it first"):
+        studio.remove(job.number)
+    assert job.folder.is_dir()
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"kind": "shell"}, "'shell' is no kind of job; it is one of study, campaign, identification, export"),
+        ({"cwd": Path("/nowhere")}, "/nowhere is no folder to run a job in"),
+    ],
+)
+def test_an_order_that_cannot_be_run_is_refused(studio, tmp_path, change, words):
+    said = {"kind": "study", "title": "t", "arguments": ("presets",), "cwd": tmp_path} | change
+    with pytest.raises(JobError) as refusal:
+        studio.submit(Order(**said))
+    assert words in str(refusal.value)
+    assert studio.listed() == ()
+
+
+def test_no_jobs_at_once_is_refused(tmp_path):
+    with pytest.raises(JobError, match="0 jobs at once would never start one; give 1 or more"):
+        Jobs(tmp_path, at_once=0)
+
+
+def test_a_link_for_the_folder_is_refused(tmp_path):
+    (tmp_path / "elsewhere").mkdir()
+    (tmp_path / "studio").symlink_to(tmp_path / "elsewhere")
+    with pytest.raises(JobError, match="is a link; remove it, or choose another working folder"):
+        Jobs(tmp_path / "studio")
+    assert list((tmp_path / "elsewhere").iterdir()) == []
+
+
+# -------------------------------------------------------------------------------------------------------------- locks
+def test_a_lock_has_one_holder_and_is_seen_by_any_number(tmp_path):
+    path = tmp_path / "alive"
+    assert not jobs_files.is_held(path)
+    with jobs_files.held(path, 0.0) as first:
+        assert first
+        assert jobs_files.is_held(path)
+        with jobs_files.held(path, 0.0) as second:
+            assert not second
+        assert jobs_files.is_held(path)
+    assert not jobs_files.is_held(path)
+
+
+def test_a_lock_is_gone_with_its_process(tmp_path):
+    path = tmp_path / "alive"
+    code = (
+        "import sys, time; from pathlib import Path; from microrad.studio.jobs_files import held\n"
+        "with held(Path(sys.argv[1]), 1.0): print('mine', flush=True); time.sleep(600)\n"
+    )
+    other = subprocess.Popen([sys.executable, "-c", code, str(path)], stdout=subprocess.PIPE)
+    with other:
+        assert other.stdout.readline() == b"mine\n"
+        assert jobs_files.is_held(path)
+        other.kill()
+    assert not jobs_files.is_held(path)
+
+
+def test_the_module_that_runs_a_job_is_named_as_it_is():
+    assert jobs_process.__name__ == jobs_process._OWN

@@ -1,0 +1,282 @@
+"""What the studio's pages of the mission, of runs and of comparisons show, without a browser."""
+
+import json
+import re
+import tomllib
+from dataclasses import replace
+from datetime import UTC, datetime
+from pathlib import Path
+
+import pytest
+
+from microrad import link_study
+from microrad.missionfile import load_link
+from microrad.presets import preset_text
+from microrad.studio import compare_view, runs_view
+from microrad.studio.commands import CampaignRun, command
+from microrad.studio.compare_view import Beside, Number
+from microrad.studio.draft import Draft, DraftError
+from microrad.studio.jobs import Job, JobError, Progress
+from microrad.studio.optional_tables import offered, with_table
+from microrad.studio.workshop import Workshop
+from shipped import SHIPPED
+
+
+@pytest.fixture
+def workshop(tmp_path):
+    (tmp_path / "leo-geo.toml").write_bytes(SHIPPED.read_bytes())
+    return Workshop(tmp_path)
+
+
+@pytest.fixture
+def draft(workshop):
+    return workshop.draft
+
+
+# ---------------------------------------------------------------------------------------------------- optional tables
+def test_tables_that_the_papers_mission_could_get():
+    found = offered(Draft.shipped("x.toml"))
+    wanted = {"channel", "jitter", "communication.beam", "communication.receiver", "fine_pointing.wheels"}
+    assert wanted <= set(found)
+    assert not {"beacon", "orbit", "mirror", "pointing"} & set(found)
+
+
+def test_a_commented_example_comes_to_life_where_it_stands(draft):
+    got = with_table(draft, "fine_pointing.wheels")
+    lines = got.text.split("\n")
+    assert len(lines) == len(draft.text.split("\n"))
+    changed = [(a, b) for a, b in zip(draft.text.split("\n"), lines, strict=True) if a != b]
+    assert [(a.removeprefix("# "), b) for a, b in changed] == [(b, b) for _, b in changed]
+    assert len(changed) == 5
+    assert got.file().mission.fine_pointing.wheels.speed_hz == 50.0
+
+
+@pytest.mark.parametrize("name", offered(Draft.shipped("x.toml")))
+def test_each_example_leaves_every_other_value_as_it_is(draft, name):
+    got = with_table(draft, name)
+    assert name not in offered(got)
+    others = {key: value.typed for key, value in got.values.items() if not key.startswith(f"{name}.")}
+    assert others == {key: value.typed for key, value in draft.values.items()}
+    own = [key for key in got.values if key.startswith(f"{name}.")]
+    assert own
+    assert [got.values[key].problems for key in own if "threshold" not in key] == [()] * len(
+        [key for key in own if "threshold" not in key]
+    )
+
+
+@pytest.mark.parametrize("name", ["channel", "jitter", "fine_pointing.wheels", "mirror.creep"])
+def test_examples_that_need_nothing_else_leave_no_fault(draft, name):
+    assert with_table(draft, name).problems == ()
+
+
+def test_an_outermost_table_comes_with_its_inner_ones(draft):
+    link = draft.with_text(preset_text("paper"))
+    got = with_table(link, "orbit")
+    tables = tomllib.loads(got.text)["orbit"]
+    shipped = tomllib.loads(SHIPPED.read_text("utf-8"))["orbit"]
+    assert tables == shipped
+    assert "orbit" not in tomllib.loads(link.text)
+
+
+def test_an_inner_table_without_its_outer_one_is_not_offered(draft):
+    found = offered(draft.with_text(preset_text("paper")))
+    assert "fine_pointing" in found
+    assert "fine_pointing.wheels" not in found
+
+
+def test_a_table_that_is_there_is_not_added_twice(draft):
+    for name in ("beacon", "no_table"):
+        with pytest.raises(DraftError, match=rf"\[{name}\] cannot be added: it is there already, or a mission has no"):
+            with_table(draft, name)
+
+
+def test_an_example_above_keys_of_another_table_goes_to_the_end(draft):
+    text = '[fine_pointing]\n# [channel]\n# elevation = "30 deg"\nrate = "5 kHz"\n'
+    got = with_table(draft.with_text(text), "channel")
+    assert tomllib.loads(got.text)["fine_pointing"] == {"rate": "5 kHz"}
+    assert tomllib.loads(got.text)["channel"]["elevation"] == "30 deg"
+
+
+# --------------------------------------------------------------------------------------------------------------- runs
+def test_a_name_that_nothing_has_yet(workshop):
+    assert runs_view.free_name(workshop, "found") == "found"
+    (workshop.folder / "found").mkdir()
+    assert runs_view.free_name(workshop, "found") == "found-2"
+    (workshop.folder / "found-2").mkdir()
+    assert runs_view.free_name(workshop, "found") == "found-3"
+    assert runs_view.free_name(workshop, "found", ".ledger") == "found.ledger"
+
+
+def test_a_name_that_a_waiting_job_will_take_is_taken(workshop, monkeypatch):
+    job = Job(1, workshop.folder, "queued", results=("found/report.html", "found/results.nc"))
+    monkeypatch.setattr(type(workshop.jobs), "listed", lambda self: (job,))
+    assert runs_view.free_name(workshop, "found") == "found-2"
+    monkeypatch.setattr(type(workshop.jobs), "listed", lambda self: (replace(job, state="cancelled"),))
+    assert runs_view.free_name(workshop, "found") == "found"
+
+
+def test_campaign_files_are_told_from_missions(workshop):
+    path = runs_view.write_campaign(workshop)
+    (workshop.folder / "broken.toml").write_text("mission = [", "utf-8")
+    (workshop.folder / "binary.toml").write_bytes(b"\xff\x00")
+    assert runs_view.campaign_files(workshop) == ("campaign.toml",)
+    assert path.name == "campaign.toml"
+    assert runs_view.write_campaign(workshop).name == "campaign-2.toml"
+
+
+def test_an_example_campaign_names_the_mission_that_is_edited(workshop):
+    workshop.change(workshop.draft.save(workshop.inside("mine.toml")))
+    assert tomllib.loads(runs_view.write_campaign(workshop).read_text("utf-8"))["mission"] == "mine.toml"
+    workshop.change(Draft.shipped(workshop.inside("unsaved.toml")))
+    with pytest.raises(JobError, match=r"unsaved\.toml is not saved yet, and a campaign reads it from its file"):
+        runs_view.write_campaign(workshop)
+    assert not (workshop.folder / "campaign-2.toml").exists()
+
+
+def test_an_action_becomes_a_job_in_the_working_folder(workshop):
+    action = CampaignRun(Path("campaign.toml"), Path("x.ledger"))
+    order = runs_view.order(workshop, "campaign", "Campaign", action)
+    assert (order.cwd, order.arguments, order.results) == (workshop.folder, action.arguments, ("x.ledger",))
+
+
+def test_the_report_of_a_ledger_as_a_command():
+    action = runs_view.CampaignReport(Path("x.ledger"), Path("x.html"))
+    assert command(action) == "microrad campaign report x.ledger x.html --overwrite"
+    compile(action.python, "copied", "exec")
+    assert action.results == ("x.html",)
+
+
+@pytest.mark.parametrize(
+    ("time_s", "words"),
+    [
+        (0.0, "0 s"),
+        (59.4, "59 s"),
+        (59.6, "1 min 0 s"),
+        (200.0, "3 min 20 s"),
+        (3599.6, "1 h 0 min"),
+        (7500, "2 h 5 min"),
+    ],
+)
+def test_a_duration_in_words(time_s, words):
+    assert runs_view.duration_words(time_s) == words
+
+
+def test_progress_in_words():
+    assert runs_view.progress_words(None) == "starting"
+    assert runs_view.progress_words(Progress(3, 12, "rows")) == "25 %, 3 of 12: rows"
+    assert runs_view.progress_words(Progress(3, 12, "rows", 0.5)) == "25 %, 3 of 12: rows; 0.5 a second, 18 s left"
+
+
+def test_the_state_of_a_job_in_words(tmp_path):
+    job = Job(1, tmp_path, "done", "study", code=1)
+    assert runs_view.state_words(job) == "done: the link does not close"
+    assert runs_view.state_words(replace(job, code=0)) == "done: the link closes"
+    assert runs_view.state_words(replace(job, kind="campaign")) == "done: the rows do not keep the limits"
+    assert runs_view.state_words(replace(job, kind="export", code=0)) == "done"
+    assert runs_view.state_words(replace(job, state="running", code=None)) == "running"
+    assert runs_view.state_words(replace(job, state="running", cancelling=True, code=None)) == "stopping ..."
+    assert runs_view.state_words(replace(job, state="lost", code=None)) == "lost"
+
+
+def test_the_times_of_a_job_in_words(tmp_path):
+    job = Job(1, tmp_path, "done", queued="2026-03-20T12:00:00Z")
+    assert runs_view.time_words(job) == "put in the queue 2026-03-20 12:00:00 UTC"
+    job = replace(job, started="2026-03-20T12:01:00Z", ended="2026-03-20T12:03:05Z")
+    assert runs_view.time_words(job) == "started 2026-03-20 12:01:00 UTC, 2 min 5 s"
+    now = datetime(2026, 3, 20, 12, 1, 30, tzinfo=UTC)
+    assert runs_view.time_words(replace(job, ended=""), lambda: now).endswith(", 30 s")
+
+
+def test_only_results_that_are_there_and_inside_are_offered(workshop, tmp_path_factory):
+    outside = tmp_path_factory.mktemp("outside") / "secret.html"
+    outside.write_text("secret", "utf-8")
+    (workshop.folder / "page.html").write_text("page", "utf-8")
+    job = Job(1, workshop.folder, "done", cwd=workshop.folder, results=(str(outside), "missing.nc", "page.html"))
+    assert runs_view.result_files(workshop, job) == ((2, "page.html"),)
+
+
+# ------------------------------------------------------------------------------------------------------------ compare
+def test_keys_that_differ_with_their_sources(draft):
+    there = draft.set("terminals.leo_aperture", "6 cm").set("conventions.strehl", "ratio")
+    found = compare_view.differences(draft, there)
+    assert [(each.key, each.here, each.there) for each in found] == [
+        ("terminals.leo_aperture", "5 cm", "6 cm"),
+        ("conventions.strehl", "decibel", "ratio"),
+    ]
+    assert found[0].here_source == "paper: Table 2"
+    assert compare_view.differences(draft, draft) == ()
+
+
+@pytest.mark.parametrize(
+    ("key", "same", "other"),
+    [
+        ("terminals.leo_aperture", "50 mm", "51 mm"),
+        ("communication.data_rate", "0.3 Gbit/s", "0.31 Gbit/s"),
+        ("beacon.required_power", "0.01 nW", "10.0001 pW"),
+        ("pointing.confidence", "0.9970", "0.998"),
+        ("scenario.pid_frequencies", "1000 mHz, 15 Hz", "1000 mHz, 16 Hz"),
+        ("orbit.leo.inclination", "sun-synchronous", "97 deg"),
+    ],
+)
+def test_an_equal_quantity_in_another_unit_is_no_difference(draft, key, same, other):
+    assert compare_view.differences(draft, draft.set(key, same)) == ()
+    assert [each.key for each in compare_view.differences(draft, draft.set(key, other))] == [key]
+
+
+def test_a_table_of_one_mission_alone_is_one_difference(draft):
+    there = with_table(draft, "channel")
+    (found,) = compare_view.differences(draft, there)
+    assert (found.key, found.here, found.there) == ("[channel]", "", "2 keys")
+    (found,) = compare_view.differences(there, draft)
+    assert (found.here, found.there) == ("2 keys", "")
+
+
+def test_the_numbers_are_those_of_the_link_study(workshop, draft):
+    found = {each.name: each for each in compare_view.link_numbers(draft)}
+    study = link_study.run(load_link(workshop.folder / "leo-geo.toml"))
+    for budget in study.budgets:
+        assert found[f"{budget.name}: margin"].value == budget.margin_db
+        assert found[f"{budget.name}: received power"].value == budget.received_power_w
+    margin = found["Communication: margin"]
+    assert (margin.text, margin.required, margin.met) == ("3.00 dB", "3.00 dB", True)
+    weak = {each.name: each for each in compare_view.link_numbers(draft.set("communication.transmit_power", "4 W"))}
+    assert weak["Communication: margin"].met is False
+    with pytest.raises(ValueError, match="parsec"):
+        compare_view.link_numbers(draft.set("terminals.leo_aperture", "5 parsec"))
+
+
+def test_numbers_beside_each_other_with_their_change():
+    here, there = (
+        (Number("margin", 3.0, "dB"), Number("a", 1.0, "W")),
+        (Number("margin", 1.5, "dB"), Number("b", 1.0, "")),
+    )
+    found = compare_view.beside(here, there)
+    assert [(each.name, each.change) for each in found] == [("margin", "−1.50 dB"), ("a", ""), ("b", "")]
+    assert found[1].there is None
+    assert found[2].here is None
+    assert Beside("x", here[0], here[0]).change == "same"
+
+
+def test_the_study_of_exactly_this_text_is_found(workshop, draft):
+    def put(folder, sha256, verdict):
+        requirement = {"name": "margin", "unit": "dB", "required": 3.0, "actual": 2.0, "met": False}
+        summary = {"verdict": verdict, "closes": True, "requirements": [requirement, {**requirement, "actual": None}]}
+        (workshop.folder / folder).mkdir()
+        data = json.dumps({"mission": {"sha256": sha256}, "summary": summary})
+        (workshop.folder / folder / "manifest.json").write_text(data, "utf-8")
+
+    assert compare_view.finished_study(workshop, draft) is None
+    put("other", "0" * 64, "of another text")
+    (workshop.folder / "broken").mkdir()
+    (workshop.folder / "broken" / "manifest.json").write_text("{", "utf-8")
+    assert compare_view.finished_study(workshop, draft) is None
+    put("mine", draft.sha256, "of this text")
+    found = compare_view.finished_study(workshop, draft)
+    assert (found.folder, found.verdict, found.closes) == ("mine", "of this text", True)
+    assert [(each.text, each.required, each.met) for each in found.numbers] == [("2.00 dB", "3.00 dB", False)]
+    assert compare_view.finished_study(workshop, draft.set("terminals.leo_aperture", "6 cm")) is None
+
+
+def test_each_table_of_the_form_is_named_as_in_the_text(draft):
+    names = {key.partition(".")[0] for key in draft.values if "." in key}
+    assert names == set(re.findall(r"^\[([a-z_]+)", draft.text, re.MULTILINE))

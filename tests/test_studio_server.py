@@ -1,0 +1,334 @@
+"""The studio's workshop, its server and its command: what is kept, what is refused, how it begins and ends."""
+
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import urllib.error
+import urllib.request
+from contextlib import closing, contextmanager
+from pathlib import Path
+
+import pytest
+
+from command_line import listing
+from microrad.document import MissionError
+from microrad.missionfile import load_mission
+from microrad.presets import preset_text
+from microrad.studio import server
+from microrad.studio.address import ExposureError
+from microrad.studio.draft import Draft, DraftError
+from microrad.studio.jobs import Order
+from microrad.studio.names import NameRefusedError
+from microrad.studio.workshop import STUDIO, Workshop
+from shipped import SHIPPED
+
+MICRORAD = (sys.executable, "-m", "microrad")
+APERTURE = "terminals.leo_aperture"
+
+
+@pytest.fixture
+def file(tmp_path):
+    """A working folder with the paper's mission in it."""
+    path = tmp_path / "leo-geo.toml"
+    path.write_bytes(SHIPPED.read_bytes())
+    return path
+
+
+# ----------------------------------------------------------------------------------------------------------- workshop
+def test_a_workshop_opens_the_file_that_it_is_given(file):
+    other = file.with_name("other.toml")
+    other.write_text(file.read_text("utf-8").replace('leo_aperture = "5 cm"', 'leo_aperture = "7 cm"'), "utf-8")
+    assert Workshop(file.parent, other).draft.values[APERTURE].typed == "7 cm"
+    assert Workshop(file.parent).draft.path == file
+    assert Workshop(file.parent).draft.values[APERTURE].typed == "5 cm"
+
+
+def test_an_empty_folder_gets_the_papers_mission_unsaved(tmp_path):
+    workshop = Workshop(tmp_path)
+    assert workshop.draft.text == SHIPPED.read_text("utf-8")
+    assert workshop.draft.changed
+    assert not (tmp_path / "leo-geo.toml").exists()
+
+
+def test_unsaved_changes_survive_a_restart(file):
+    before = file.read_bytes()
+    Workshop(file.parent, file).set(APERTURE, "6 cm")
+    again = Workshop(file.parent)
+    assert again.draft.values[APERTURE].typed == "6 cm"
+    assert again.draft.changed
+    assert file.read_bytes() == before
+
+
+def test_unsaved_changes_of_one_file_are_not_put_into_another(file):
+    other = file.with_name("other.toml")
+    other.write_bytes(file.read_bytes())
+    Workshop(file.parent, file).set(APERTURE, "6 cm")
+    assert Workshop(file.parent, other).draft.values[APERTURE].typed == "5 cm"
+    assert Workshop(file.parent, file).draft.values[APERTURE].typed == "6 cm"
+
+
+def test_what_was_saved_is_read_from_the_file_after_a_restart(file):
+    workshop = Workshop(file.parent, file)
+    workshop.set(APERTURE, "6 cm")
+    workshop.change(workshop.draft.save())
+    file.write_text(file.read_text("utf-8").replace('"6 cm"', '"8 cm"'), "utf-8")
+    again = Workshop(file.parent)
+    assert again.draft.values[APERTURE].typed == "8 cm"
+    assert not again.draft.changed
+
+
+def test_a_file_changed_behind_unsaved_changes_is_not_overwritten_after_a_restart(file):
+    Workshop(file.parent, file).set(APERTURE, "6 cm")
+    file.write_text(file.read_text("utf-8").replace('"15 cm"', '"16 cm"'), "utf-8")
+    kept = file.read_bytes()
+    with pytest.raises(DraftError, match="was changed since it was opened here"):
+        Workshop(file.parent).draft.save()
+    assert file.read_bytes() == kept
+
+
+@pytest.mark.parametrize("kept", ["", "{", "[]", "{}", '{"path": 3, "disk_sha256": "", "text": ""}', "\x00"])
+def test_a_damaged_note_of_unsaved_changes_is_passed_over(file, kept):
+    Workshop(file.parent, file).set(APERTURE, "6 cm")
+    (file.parent / STUDIO / "draft.json").write_text(kept, "utf-8")
+    assert Workshop(file.parent).draft.values[APERTURE].typed == "5 cm"
+
+
+def test_a_note_of_unsaved_changes_opens_nothing_outside_of_the_folder(file, tmp_path_factory):
+    outside = tmp_path_factory.mktemp("outside") / "secret.toml"
+    outside.write_text('name = "secret"', "utf-8")
+    Workshop(file.parent)
+    note = {"path": os.path.relpath(outside, file.parent), "disk_sha256": "", "text": "changed"}
+    (file.parent / STUDIO / "draft.json").write_text(json.dumps(note), "utf-8")
+    assert Workshop(file.parent).draft.path == file
+
+
+def test_nothing_outside_of_the_folder_is_opened(file, tmp_path_factory):
+    elsewhere = tmp_path_factory.mktemp("elsewhere")
+    with pytest.raises(NameRefusedError, match="is outside of"):
+        Workshop(elsewhere, file)
+    with pytest.raises(NameRefusedError, match="is outside of"):
+        Workshop(file.parent).inside("../x.toml")
+    assert not (elsewhere / STUDIO).exists()
+
+
+def test_each_change_is_a_new_revision_and_none_is_none(file):
+    workshop = Workshop(file.parent, file)
+    workshop.set(APERTURE, "6 cm")
+    assert workshop.revision == 1
+    workshop.set(APERTURE, "6 cm")
+    assert workshop.revision == 1
+    workshop.other = Draft.shipped("paper.toml")
+    assert workshop.revision == 2
+
+
+def test_changes_of_two_tabs_are_both_kept(file):
+    workshop = Workshop(file.parent, file)
+    keys = ("communication.transmit_power", "beacon.transmit_power")
+
+    def turn(key):
+        for number in range(20):
+            workshop.set(key, f"{number + 1} W")
+
+    threads = [threading.Thread(target=turn, args=(key,)) for key in keys]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert [workshop.draft.values[key].typed for key in keys] == ["20 W", "20 W"]
+    assert workshop.revision == 40
+
+
+def test_a_mission_with_faults_is_none_and_says_the_words_of_the_command_line(file):
+    workshop = Workshop(file.parent, file)
+    assert workshop.mission().mission == load_mission(file).mission
+    assert workshop.faults() == ""
+    workshop.set(APERTURE, "5 parsec")
+    assert workshop.mission() is None
+    assert workshop.link() is None
+    workshop.draft.save()
+    with pytest.raises(MissionError) as refused:
+        load_mission(file)
+    assert workshop.faults() == str(refused.value)
+    assert 'no unit is called "parsec"' in workshop.faults()
+
+
+def test_a_link_alone_has_a_budget_and_no_mission(file):
+    workshop = Workshop(file.parent, file)
+    workshop.change(workshop.draft.with_text(preset_text("paper")))
+    assert workshop.link().mission.terminals.leo_aperture_m == 0.05
+    assert workshop.mission() is None
+    assert "mirror" in workshop.faults()
+
+
+def test_only_the_missions_of_the_folder_itself_are_listed(file):
+    for name in ("b.toml", ".hidden.toml", "x.txt", "inner/c.toml"):
+        path = file.parent / name
+        path.parent.mkdir(exist_ok=True)
+        path.write_text("", "utf-8")
+    assert [path.name for path in Workshop(file.parent).missions()] == ["b.toml", "leo-geo.toml"]
+
+
+def test_the_studios_own_folder_is_private_and_overlooked_by_git(file):
+    Workshop(file.parent)
+    folder = file.parent / STUDIO
+    assert folder.stat().st_mode & 0o777 == 0o700
+    assert (folder / ".gitignore").read_text("utf-8") == "*\n"
+
+
+# ------------------------------------------------------------------------------------------------------------- server
+@contextmanager
+def taken_port():
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        yield listener.getsockname()[1]
+
+
+def test_a_free_port_is_taken_on_this_machine_alone():
+    entrance = server.listen()
+    with closing(entrance.listener):
+        host, port = entrance.listener.getsockname()
+        assert host == "127.0.0.1"
+        assert entrance.names == (f"127.0.0.1:{port}", f"localhost:{port}", f"[::1]:{port}")
+        assert entrance.url == f"http://127.0.0.1:{port}/?token={entrance.token}"
+        assert len(entrance.token) >= 32
+        again = server.listen()
+        with closing(again.listener):
+            assert again.token != entrance.token
+
+
+def test_an_address_for_others_is_the_only_name(monkeypatch):
+    monkeypatch.setattr(server, "_bound", lambda host, port: socket.create_server(("127.0.0.1", port)))
+    entrance = server.listen(exposed="192.0.2.7")
+    with closing(entrance.listener):
+        port = entrance.listener.getsockname()[1]
+        assert entrance.names == (f"192.0.2.7:{port}",)
+
+
+@pytest.mark.parametrize("address", ["0.0.0.0", "::", "*", ""])
+def test_every_address_at_once_is_refused(address):
+    with pytest.raises(server.StudioError, match="no address that a browser could open; give this machine's own"):
+        server.listen(exposed=address)
+
+
+def test_what_is_no_name_of_a_host_is_refused(monkeypatch):
+    listener = socket.create_server(("127.0.0.1", 0))
+    monkeypatch.setattr(server, "_bound", lambda host, port: listener)
+    with closing(listener), pytest.raises(ExposureError, match="is no name of a host"):
+        server.listen(exposed="a/b")
+
+
+def test_an_address_of_another_machine_is_refused():
+    with pytest.raises(server.StudioError, match=r"'192\.0\.2\.1' port 0 cannot be listened on: .*; give an address"):
+        server.listen(exposed="192.0.2.1")
+
+
+def test_only_results_of_a_job_within_the_folder_are_shown(file, tmp_path_factory):
+    outside = tmp_path_factory.mktemp("outside") / "secret.html"
+    outside.write_text("secret", "utf-8")
+    workshop = Workshop(file.parent)
+    (file.parent / "page.html").write_text("page", "utf-8")
+    (file.parent / "link.html").symlink_to(outside)
+    names = ("page.html", "missing.html", str(outside), os.path.relpath(outside, file.parent), "link.html", ".")
+    (workshop.jobs.folder / "1").mkdir()
+    order = Order("study", "x", (), file.parent, names)
+    job = {"kind": order.kind, "title": "x", "arguments": [], "cwd": str(order.cwd), "results": names, "queued": ""}
+    (workshop.jobs.folder / "1" / "job.json").write_text(json.dumps(job), "utf-8")
+    found = [server.result(workshop, 1, place) for place in range(-1, 8)]
+    assert found == [None, file.parent / "page.html", *[None] * 7]
+    assert server.result(workshop, 2, 0) is None
+
+
+# ------------------------------------------------------------------------------------------------------------ command
+def test_a_port_in_use_is_refused(refused):
+    with taken_port() as port:
+        said = refused("studio", "--no-browser", "--port", port)
+    assert said == (
+        f"microrad: port {port} is in use, perhaps by another studio; give another one with --port, "
+        "or leave --port out for a free one\n"
+    )
+
+
+def test_a_file_that_is_not_there_is_refused(refused):
+    assert "missing.toml" in refused("studio", "missing.toml", "--no-browser")
+
+
+def test_a_file_that_is_no_text_is_refused(refused, folder):
+    (folder / "picture.toml").write_bytes(b"\x89PNG\x00\xff")
+    assert "picture.toml" in refused("studio", "picture.toml", "--no-browser")
+
+
+def test_an_installation_without_the_studio_says_what_to_install(refused, monkeypatch):
+    monkeypatch.setattr(server.util, "find_spec", lambda name: None)
+    said = refused("studio")
+    assert said == (
+        "microrad: the studio needs nicegui and uvicorn, which this installation does not have; install it with: "
+        'pip install "microrad[studio]"\n'
+    )
+
+
+def test_to_be_open_to_others_needs_the_flag_typed_out_with_an_address(refused):
+    for short in ("--expose", "--expose-to-net", "--host"):
+        assert "No such option" in refused("studio", short, "192.0.2.1", "--no-browser")
+    said = refused("studio", "--expose-to-network", "192.0.2.1", "--no-browser")
+    assert "microrad: '192.0.2.1' port 0 cannot be listened on" in said
+    assert "0.0.0.0" in refused("studio", "--expose-to-network", "0.0.0.0", "--no-browser")
+
+
+@contextmanager
+def running(folder, *args):
+    pytest.importorskip("nicegui")
+    process = subprocess.Popen(
+        [*MICRORAD, "studio", "--no-browser", *args],
+        cwd=folder,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+    try:
+        yield process, process.stdout.readline().strip()
+    finally:
+        process.kill()
+        process.communicate()
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_the_address_opens_the_studio_and_a_signal_ends_it(file, number):
+    before = listing(file.parent)
+    with running(file.parent, "leo-geo.toml") as (process, url):
+        base, _, token = url.partition("?token=")
+        with pytest.raises(urllib.error.HTTPError, match="403"):
+            urllib.request.urlopen(base)
+        request = urllib.request.Request(base, headers={"Cookie": f"microrad_studio_{base.split(':')[2][:-1]}={token}"})
+        with urllib.request.urlopen(request) as answer:
+            assert answer.status == 200
+            assert "leo-geo.toml" in answer.read().decode("utf-8")
+        process.send_signal(number)
+        out, err = process.communicate(timeout=30)
+    assert (process.returncode, out, err) == (0, "the studio is closed\n", "")
+    kept = {name: data for name, data in listing(file.parent).items() if not name.startswith(STUDIO)}
+    assert kept == before
+
+
+def test_a_job_goes_on_when_the_studio_ends(file):
+    workshop = Workshop(file.parent)
+    with running(file.parent) as (process, _):
+        job = workshop.jobs.submit(Order("study", "long", ("run", "leo-geo.toml", "--output", "x"), file.parent))
+        process.send_signal(signal.SIGTERM)
+        out, _ = process.communicate(timeout=30)
+    assert out == "the studio is closed; 1 of its jobs goes on, and can be seen by starting it again\n"
+    assert workshop.jobs.get(job.number).state == "running"
+    workshop.jobs.cancel(job.number)
+    for _ in range(600):
+        if workshop.jobs.get(job.number).finished:
+            break
+        threading.Event().wait(0.05)
+    assert workshop.jobs.get(job.number).state == "cancelled"
+
+
+def test_every_page_is_there():
+    pages = Path(server.__file__).parent / "pages"
+    assert [name for name in server.PAGES if not (pages / f"{name}.py").is_file()] == []
