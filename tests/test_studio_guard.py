@@ -483,7 +483,7 @@ def test_only_the_templates_own_scripts_are_signed():
 def test_the_studio_listens_on_this_machine_unless_told_otherwise():
     assert [address.bind_address(h) for h in ("127.0.0.1", "localhost", "::1")] == ["127.0.0.1", "127.0.0.1", "::1"]
     for host in ("0.0.0.0", "", "::", "192.168.1.5", "lab.example", "127.0.0.1.evil.example"):
-        with pytest.raises(address.ExposureError, match=r"ssh -L.*--expose-to-the-network"):
+        with pytest.raises(address.ExposureError, match=r"ssh -L.*--expose-to-network"):
             address.bind_address(host)
         assert address.bind_address(host, exposed=True) == host
 

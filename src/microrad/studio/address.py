@@ -34,7 +34,7 @@ def bind_address(host: str = "127.0.0.1", exposed: bool = False) -> str:
         raise ExposureError(
             f"the studio listens on this machine only, and '{host[:_SHOWN]}' is open to others: whoever reads the "
             "address on its way, which is not encrypted, may then read and write your missions. Leave the host at "
-            "127.0.0.1 and come in by an SSH tunnel (ssh -L), or add --expose-to-the-network if you want just that"
+            "127.0.0.1 and come in by an SSH tunnel (ssh -L), or add --expose-to-network if you want just that"
         )
     return host
 

@@ -148,14 +148,10 @@ def _add_pages(workshop: Workshop) -> None:
     """Register every page, each within the common frame."""
     from nicegui import ui
 
-    modules = [import_module(f"microrad.studio.pages.{name}") for name in PAGES if _there(name)]
+    modules = [import_module(f"microrad.studio.pages.{name}") for name in PAGES]
     entries = tuple((module.TITLE, module.PATH) for module in modules)
     for module in modules:
         ui.page(module.PATH, title=f"{module.TITLE} - microrad studio")(_framed(workshop, module, entries))
-
-
-def _there(name: str) -> bool:
-    return util.find_spec(f"microrad.studio.pages.{name}") is not None
 
 
 def _framed(workshop: Workshop, module: Any, entries: tuple[tuple[str, str], ...]) -> Callable[[], None]:
