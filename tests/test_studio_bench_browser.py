@@ -26,6 +26,8 @@ api = pytest.importorskip("playwright.sync_api", reason="Playwright is not insta
 REAL = (
     Path(os.environ.get("MICRORAD_DATA") or Path(__file__).parents[2] / "shared" / "data") / "piezo_1hz/Model_Vi_Do.dat"
 )
+
+pytestmark = pytest.mark.long
 LONG_MS = 45_000  # a machine with other work to do
 
 

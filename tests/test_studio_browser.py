@@ -20,6 +20,8 @@ from microrad.studio import server
 from microrad.studio.draft import Draft
 from shipped import SHIPPED, without_fine_pointing
 
+pytestmark = pytest.mark.long
+
 pytest.importorskip("nicegui", reason="the studio is not installed (nicegui)")
 api = pytest.importorskip("playwright.sync_api", reason="Playwright is not installed")
 

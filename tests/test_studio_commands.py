@@ -31,6 +31,8 @@ from shipped import SHIPPED, without_fine_pointing
 from small_campaign import campaign_file
 from test_cli import write_recording
 
+pytestmark = pytest.mark.long
+
 MISSION = Path("my mission.toml")
 
 

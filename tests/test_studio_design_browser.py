@@ -14,6 +14,8 @@ from microrad.report.budget_views import signed_db
 from microrad.studio.draft import Draft
 from shipped import SHIPPED
 
+pytestmark = pytest.mark.long
+
 pytest.importorskip("nicegui", reason="the studio is not installed (nicegui)")
 api = pytest.importorskip("playwright.sync_api", reason="Playwright is not installed")
 

@@ -13,6 +13,8 @@ from microrad.studio import jobs_files, jobs_process
 from microrad.studio.jobs import JobError, Jobs, Order
 from small_campaign import campaign_file, gone, kill
 
+pytestmark = pytest.mark.long
+
 PATIENCE_S = 300.0  # a fresh installation compiles first
 
 
