@@ -6,6 +6,8 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the command line does, 
 
 import pytest
 from hypothesis import settings
+from hypothesis.internal.conjecture import providers
+from hypothesis.internal.constants_ast import Constants
 
 from command_line import Result, listing
 from microrad import cli
@@ -15,6 +17,9 @@ from microrad import cli
 settings.register_profile("gate", derandomize=True)
 settings.register_profile("explore")
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "gate"))
+if "HYPOTHESIS_PROFILE" not in os.environ and hasattr(providers, "_get_local_constants"):
+    # Else the numbers of whatever modules a worker has imported so far would be among the examples.
+    providers._get_local_constants = Constants
 
 
 @pytest.fixture
