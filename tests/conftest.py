@@ -1,13 +1,13 @@
 """Fixtures that run commands in this process, for the tests of the command line."""
 
+import contextlib
+import importlib
 import os
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the command line does, before numpy is loaded
 
 import pytest
 from hypothesis import settings
-from hypothesis.internal.conjecture import providers
-from hypothesis.internal.constants_ast import Constants
 
 from command_line import Result, listing
 from microrad import cli
@@ -17,9 +17,13 @@ from microrad import cli
 settings.register_profile("gate", derandomize=True)
 settings.register_profile("explore")
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "gate"))
-if "HYPOTHESIS_PROFILE" not in os.environ and hasattr(providers, "_get_local_constants"):
+if os.environ.get("HYPOTHESIS_PROFILE", "gate") == "gate":
     # Else the numbers of whatever modules a worker has imported so far would be among the examples.
-    providers._get_local_constants = Constants
+    with contextlib.suppress(ImportError, AttributeError):  # it has no public switch, and other versions may differ
+        providers = importlib.import_module("hypothesis.internal.conjecture.providers")
+        nothing = importlib.import_module("hypothesis.internal.constants_ast").Constants
+        assert callable(providers._get_local_constants)
+        providers._get_local_constants = nothing
 
 
 @pytest.fixture

@@ -785,7 +785,7 @@ def test_a_disk_that_is_full_leaves_the_old_file(tmp_path, monkeypatch):
     path = tmp_path / "mirror.fmu"
     path.write_text("old")
     with monkeypatch.context() as patched, pytest.raises(OSError, match="No space"):
-        patched.setattr(fmu.os, "fsync", full)
+        patched.setattr(os, "fsync", full)
         fmu.write_unit(UNITS["mirror"](), path, "2.0", "mirror")
     assert path.read_text() == "old" and list(tmp_path.iterdir()) == [path]
     fmu.write_unit(UNITS["mirror"](), path, "2.0", "mirror")

@@ -4,6 +4,7 @@ import json
 import os
 import shutil
 import tempfile
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -71,12 +72,12 @@ def _replace(draft: Path, folder: Path) -> None:
         shutil.rmtree(old, ignore_errors=True)
 
 
-def write_whole(path: Path, text: str) -> None:
-    """Write a file whole or not at all: beside its place first."""
-    part = path.with_name(f".microrad-{os.getpid()}.part")
+def write_whole(path: Path, content: str | bytes) -> None:
+    """Write a file whole or not at all: beside its place first. Text is written in UTF-8, its line ends as they are."""
+    part = path.with_name(f".microrad-{os.getpid()}-{threading.get_ident()}.part")
     try:
-        with part.open("x", encoding="utf-8", newline="\n") as file:
-            file.write(text)
+        with part.open("xb") as file:
+            file.write(content.encode("utf-8") if isinstance(content, str) else content)
             file.flush()
             os.fsync(file.fileno())
         part.replace(path)

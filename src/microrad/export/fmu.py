@@ -5,7 +5,6 @@ Source: Modelica Association, "Functional Mock-up Interface for Model Exchange a
 """
 
 import hashlib
-import os
 import platform
 import subprocess
 import sys
@@ -29,6 +28,7 @@ from microrad.export.identifiers import identifier
 from microrad.export.records import GAUGE, OPTICAL_ERROR, READING, REFERENCE, ExportError, LoopUnit, PlantUnit
 from microrad.export.sections import sections
 from microrad.export.templating import render
+from microrad.folder import write_whole
 
 SHARED = (*FLAGS, "-fPIC", "-shared", "-fvisibility=hidden")
 """What the library of a unit is compiled with."""
@@ -96,7 +96,7 @@ def write_unit(unit: PlantUnit | LoopUnit, path: Path, version: Version, name: s
     found = _library(made, version, name) if compiler() is not None else None
     if found is not None:
         contents[f"binaries/{_platform(version)}/{name}{_ending()}"] = found
-    _write_whole(path, _archive(contents))
+    write_whole(path, _archive(contents))
     return WrittenUnit(path, version, guid, None if found is None else _platform(version))
 
 
@@ -278,15 +278,3 @@ def _archive(contents: Mapping[str, bytes]) -> bytes:
             entry.external_attr = (0o100755 if name.startswith("binaries/") else 0o100644) << 16
             archive.writestr(entry, contents[name], zipfile.ZIP_DEFLATED)
     return file.getvalue()
-
-
-def _write_whole(path: Path, data: bytes) -> None:
-    part = path.with_name(f".microrad-{os.getpid()}.part")
-    try:
-        with part.open("xb") as file:
-            file.write(data)
-            file.flush()
-            os.fsync(file.fileno())
-        part.replace(path)
-    finally:
-        part.unlink(missing_ok=True)

@@ -3,7 +3,6 @@
 import io
 import json
 import math
-import os
 import re
 from collections.abc import Sequence
 from importlib import import_module
@@ -17,6 +16,7 @@ from microrad import lti
 from microrad.export.matrices_forms import Forms, LinearModel, Port, forms
 from microrad.export.matrices_mat import Structure, load
 from microrad.export.records import ExportError, Origin
+from microrad.folder import write_whole
 
 FORMAT = "microrad linear models"
 """What a JSON text of models says that it is."""
@@ -49,14 +49,10 @@ def write_mat(models: Sequence[LinearModel], path: Path) -> None:
 
 
 def _write(path: Path, data: bytes) -> None:
-    part = path.with_name(f".{path.name}-{os.getpid()}.part")
     try:
-        part.write_bytes(data)
-        part.replace(path)
+        write_whole(path, data)
     except OSError as error:
         raise ExportError(f"{path} could not be written ({error.strerror or error}), so nothing is") from error
-    finally:
-        part.unlink(missing_ok=True)
 
 
 def _check_names(models: Sequence[LinearModel]) -> None:

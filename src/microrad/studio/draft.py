@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 import threading
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from decimal import Decimal
 from importlib import resources
 from pathlib import Path
@@ -55,6 +55,7 @@ class Draft:
     path: Path
     problems: tuple[Fault, ...]
     disk_sha256: str = ""
+    _link: LinkFile | None = field(default=None, repr=False, compare=False)  # what finding the faults has read
 
     @classmethod
     def open(cls, path: str | Path) -> Draft:
@@ -151,7 +152,7 @@ class Draft:
 
     def link(self) -> LinkFile:
         """What a link budget needs, also of a text without mirror and loop. Raises `MissionError`."""
-        return load_link(self.path, text=self.text)
+        return load_link(self.path, text=self.text) if self._link is None else self._link
 
     def save(self, path: str | Path | None = None) -> Draft:
         """Write the text whole, to its own path or to another; returns the draft of the written file.
@@ -213,10 +214,9 @@ class Draft:
 def _draft(text: str, path: Path, disk_sha256: str) -> Draft:
     """A draft with the faults that the text has if it stands at the path."""
     try:
-        load_link(path, text=text)
+        return Draft(text, path, (), disk_sha256, load_link(path, text=text))
     except MissionError as error:
         return Draft(text, path, error.faults, disk_sha256)
-    return Draft(text, path, (), disk_sha256)
 
 
 def _content(path: Path) -> bytes:
