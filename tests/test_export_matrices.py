@@ -445,7 +445,7 @@ HEAD = b"MATLAB 5.0 MAT-file".ljust(124) + b"\x00\x01IM"
         (b"MATLAB 7.3 MAT-file".ljust(600), "version 7.3; save it as version 7"),
         (b"\x89HDF\r\n\x1a\n".ljust(600), "version 7.3"),
         (HEAD + struct.pack("<II", 14, 4000) + b"short", "an element is cut off"),
-        (HEAD + nested(5_000), "nest deeper than 4"),
+        (HEAD + nested(5_000), "nest deeper than 16"),
         (HEAD + struct.pack("<II", 15, 5) + b"wrong", "incorrect header check"),
         (HEAD + element(14, b"\xff" * 64), "no MATLAB file that can be read"),
         (HEAD + element(14, struct.pack("<IIII", 6, 8, 6, 0)), "no MATLAB file that can be read"),
@@ -462,7 +462,8 @@ def test_hostile_files_are_refused_before_or_by_the_reader(data, why, tmp_path):
 def test_a_file_that_unpacks_to_too_much_is_refused(tmp_path, monkeypatch):
     monkeypatch.setattr("microrad.export.matrices_mat.MOST_BYTES", 100_000)
     path = tmp_path / "bomb.mat"
-    packed = zlib.compress(b"\0" * 1_000_000)
+    parts = ((6, struct.pack("<II", 6, 0)), (5, struct.pack("<ii", 125_000, 1)), (1, b"A" * 8), (9, bytes(1_000_000)))
+    packed = zlib.compress(element(14, b"".join(element(*part) for part in parts)))
     path.write_bytes(HEAD + struct.pack("<II", 15, len(packed)) + packed)
     with pytest.raises(ExportError, match="unpacks to more than 100000 bytes"):
         matrices.read_mat(path)

@@ -5,6 +5,7 @@ import pickle
 import struct
 import sys
 import zipfile
+import zlib
 
 import h5py
 import lvm_read
@@ -12,6 +13,7 @@ import numpy as np
 import pytest
 from nptdms import ChannelObject, TdmsWriter
 from scipy.io import savemat
+from scipy.sparse import csc_array
 
 from microrad.recording import RecordingError, multisine_recordings, read_recording
 
@@ -127,7 +129,7 @@ def test_empty_tdms(tmp_path):
         file.write_segment([ChannelObject("g", "words", ["a", "b"]), ChannelObject("g", "none", np.array([]))])
     message = refusal(path, "words", 1)
     assert "'g/words' holds" in message
-    assert "'g/none' holds no samples" in message
+    assert "'g/none' holds no samples; record again" in message
 
 
 def test_renamed_files(tmp_path):
@@ -234,7 +236,7 @@ def test_damaged_lvm(tmp_path):
     path.write_bytes(text[: text.index(b"Channels")])
     assert "no segment with a header" in refusal(path, 0, 1)
     path.write_bytes(text.replace(b"Separator\tTab", b"Separator\tPipe", 1))
-    assert "names the separator 'Pipe'" in refusal(path, 0, 1)
+    assert "names the separator 'Pipe'; LVM files have Tab or Comma: correct that word" in refusal(path, 0, 1)
     path.write_bytes(text.replace(b"X_Value\t", b"1.0\t", 1))
     assert "should name the columns, beginning with 'X_Value'" in refusal(path, 0, 1)
 
@@ -272,18 +274,80 @@ def test_matlab_v73(tmp_path):
     assert "nearest is 'both[1]'" in refusal(path, "both[0]", "both[2]")
 
 
-@pytest.mark.parametrize("kept", [200, 1000, 9000])
-def test_truncated_matlab(tmp_path, kept):
+def test_matlab_array_of_structures(tmp_path):
+    """As a real-time system writes its channels."""
+    made = np.zeros((1, 2), dtype=[("Name", object), ("Data", object), ("dt", object)])
+    made[0, 0], made[0, 1] = ("drive", DRIVE, 1 / RATE_HZ), ("output", OUTPUT, 1 / RATE_HZ)
+    savemat(tmp_path / "a.mat", {"run": {"Y": made}}, do_compression=True)
+    names = ("run/Y[0]/Data", "run/Y[1]/Data")
+    check(read_recording(tmp_path / "a.mat", *names), names)
+    assert "'Data' may be 'run/Y[0]/Data', 'run/Y[1]/Data'" in refusal(tmp_path / "a.mat", "Data", 1)
+    assert "'run/Y[0]/Name' holds text; save numbers" in refusal(tmp_path / "a.mat", "run/Y[0]/Name", 1)
+
+
+@pytest.mark.parametrize(("kept", "missing"), [(200, 7992), (1000, 7192), (9000, 7256)])
+def test_truncated_matlab(tmp_path, kept, missing):
     path = tmp_path / "a.mat"
     savemat(path, {"drive": DRIVE, "output": OUTPUT})
     path.write_bytes(path.read_bytes()[:kept])
-    assert "damaged or truncated" in refusal(path, "drive", "output", RATE_HZ)
+    message = refusal(path, "drive", "output", RATE_HZ)
+    assert f"an element is cut off, {missing} bytes of it are missing" in message
+    assert "the file is damaged or truncated: copy it again" in message
 
 
-def test_complex_matlab(tmp_path):
+def test_damaged_matlab_names_the_variable(tmp_path):
+    """Damage to packed numbers shows in their checksum, when they are read."""
     path = tmp_path / "a.mat"
-    savemat(path, {"drive": DRIVE + 1j, "output": OUTPUT})
-    assert "complex numbers" in refusal(path, "drive", "output", RATE_HZ)
+    noise = np.random.default_rng(1).standard_normal(20_000)
+    savemat(path, {"drive": noise, "output": noise[::-1]}, do_compression=True)
+    data = bytearray(path.read_bytes())
+    data[-2] ^= 1
+    path.write_bytes(data)
+    message = refusal(path, "drive", "output", RATE_HZ)
+    assert "channel 1 ('output') cannot be read (the variable at byte" in message
+    assert "incorrect data check" in message
+
+
+@pytest.mark.parametrize(
+    ("value", "words"),
+    [
+        (DRIVE + 1j, "'x' holds complex numbers, not real numbers; save the real signal"),
+        (DRIVE > 6, "'x' holds booleans, not real numbers; save numbers"),
+        ("hello", "'x' holds text; save numbers"),
+        (np.array([[DRIVE, OUTPUT]], dtype=object), "'x' holds cells; save the numbers of each cell as an array"),
+        (csc_array(np.eye(30)), "'x' holds a sparse matrix; save it as full"),
+        (np.zeros((0, 1)), "'x' holds no samples; record again"),
+        (np.zeros((200, 11_000), np.uint8), "at most 10000 channels are listed; save the columns that you need"),
+    ],
+)
+def test_matlab_variables_that_are_no_channel(tmp_path, monkeypatch, value, words):
+    monkeypatch.setattr("microrad.recording.arrays._MOST_COLUMNS", 100)
+    path = tmp_path / "a.mat"
+    savemat(path, {"x": value, "output": OUTPUT}, do_compression=True)
+    assert words.replace("10000", "100") in refusal(path, "x", "output", RATE_HZ)
+
+
+def test_a_matlab_file_that_unpacks_to_too_much(tmp_path, monkeypatch):
+    monkeypatch.setattr("microrad.recording.files._UNPACKED_BYTES", 100_000)
+    path = tmp_path / "a.mat"
+    savemat(path, {"drive": DRIVE, "output": np.zeros(100_000)}, do_compression=True)
+    message = refusal(path, "drive", "output", RATE_HZ)
+    assert "unpacks to more than" in message
+    assert "save it without compression (-v6)" in message
+    savemat(path, {"drive": DRIVE, "output": np.zeros(N)}, do_compression=True)
+    assert "is constant" in refusal(path, "drive", "output", RATE_HZ)
+
+
+def test_too_little_memory_is_no_damage(tmp_path, monkeypatch):
+    def full(self, left):
+        raise MemoryError
+
+    path = tmp_path / "a.mat"
+    savemat(path, {"drive": DRIVE, "output": OUTPUT})
+    monkeypatch.setattr("microrad.matlab_file.MatlabFile.numbers", full)
+    message = refusal(path, "drive", "output", RATE_HZ)
+    assert "channel 0 ('drive') takes more memory than there is to read; cut out the part that you need" in message
+    assert "damaged" not in message
 
 
 # --------------------------------------------------------------------------------------------------------------- NumPy
@@ -334,6 +398,31 @@ def test_pickles_are_never_loaded(tmp_path):
     assert "holds Python objects" in refusal(tmp_path / "a.npy", 0, 1, RATE_HZ)
 
 
+def test_arrays_of_objects_are_not_called_truncated(tmp_path):
+    """Their pickle is shorter than an array of as many pointers."""
+    path = tmp_path / "a.npz"
+    np.savez(path, drive=DRIVE, output=np.full(N, None, dtype=object))
+    message = refusal(path, "drive", "output", RATE_HZ)
+    assert "'output' holds Python objects, which are pickled and not read" in message
+    assert "save them as plain numbers, array.astype(float)" in message
+    assert "truncated" not in message
+
+
+def test_numpy_arrays_that_are_no_channel(tmp_path, monkeypatch):
+    path = tmp_path / "a.npz"
+    np.savez_compressed(
+        path, drive=DRIVE, output=OUTPUT, big=np.zeros(40_000), table=np.zeros(9, [("t", "f8"), ("y", "f8")])
+    )
+    check(read_recording(path, "drive", "output", RATE_HZ))
+    assert "'table' holds records of t, y; save each of these" in refusal(path, "drive", "table", RATE_HZ)
+    monkeypatch.setattr("microrad.recording.files._UNPACKED_BYTES", 100_000)
+    monkeypatch.setattr("microrad.recording.files._UNPACKED_TIMES", 1)
+    message = refusal(path, "drive", "big", RATE_HZ)
+    assert "'big' states 4e+04 samples, 0.32 MB in a file of 0.0" in message
+    assert "at most 0.1 MB are unpacked from that; cut out the part that you need" in message
+    check(read_recording(path, "drive", "output", RATE_HZ))
+
+
 def test_truncated_numpy(tmp_path):
     path = tmp_path / "a.npy"
     np.save(path, np.column_stack((DRIVE, OUTPUT)))
@@ -369,7 +458,7 @@ def test_hdf5(tmp_path):
     check(read, ("run/drive", "run/output"))
     assert (read.input_units, read.output_units) == (("V",), ("",))
     assert "'output' may be 'other/output', 'run/output'" in refusal(path, "drive", "output")
-    assert "'run/words' holds Python objects or cells" in refusal(path, "words", "run/output")
+    assert "'run/words' holds text" in refusal(path, "words", "run/output")
     assert "there is no input channel 9: the HDF5 file has 3 channels" in refusal(path, 9, 0)
 
 
@@ -377,6 +466,108 @@ def test_truncated_hdf5(tmp_path):
     path = hdf5(tmp_path / "a.h5")
     path.write_bytes(path.read_bytes()[:3000])
     assert "damaged or truncated" in refusal(path, 0, 1)
+
+
+@pytest.fixture(scope="module")
+def odd_hdf5(tmp_path_factory):
+    """A recording among datasets that are none, some of whose values stand in other files."""
+    folder = tmp_path_factory.mktemp("hdf5")
+    with h5py.File(folder / "other.h5", "w") as other:
+        other["x"] = np.arange(400.0)
+    (folder / "values.bin").write_bytes(np.arange(400.0).tobytes())
+    layout = h5py.VirtualLayout(shape=(400,), dtype="f8")
+    layout[:] = h5py.VirtualSource(str(folder / "other.h5"), "x", shape=(400,))
+    with h5py.File(hdf5(folder / "a.h5"), "a") as file:
+        group = file.create_group("odd")
+        group.create_dataset("external", (400,), "f8", external=[(str(folder / "values.bin"), 0, 3200)])
+        group.create_virtual_dataset("virtual", layout)
+        group["link"] = h5py.ExternalLink(str(folder / "other.h5"), "x")
+        group["references"] = np.array([file["run/drive"].ref] * 9, dtype=h5py.ref_dtype)
+        group.create_dataset("rows", (9,), h5py.vlen_dtype("f8"))
+        group["records"] = np.zeros(9, dtype=[("t", "f8"), ("y", "f8")])
+        group["complex"], group["flags"], group["none"] = DRIVE + 1j, DRIVE > 6, h5py.Empty("f8")
+        h5py.h5d.create(group.id, b"times", h5py.h5t.UNIX_D32LE, h5py.h5s.create_simple((9,)))
+        group.create_dataset("foreign", (9,), "f8", chunks=(9,), compression=32015, allow_unknown_filter=True)
+        twice = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
+        twice.set_chunk((9,))
+        twice.set_deflate(1)
+        twice.set_deflate(1)
+        h5py.h5d.create(group.id, b"twice", h5py.h5t.NATIVE_DOUBLE, h5py.h5s.create_simple((9,)), twice)
+        group.create_dataset("huge", (10**12,), "f8", chunks=(1024,))
+        group.create_dataset("pieces", (9,), "f8", maxshape=(None,), chunks=(10**8,), compression="gzip")
+        group["drive"] = DRIVE
+        h5py.h5a.create(group["drive"].id, b"units", h5py.h5t.UNIX_D32LE, h5py.h5s.create(h5py.h5s.SCALAR))
+    return folder / "a.h5"
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("external", "takes its values from other files, and no other file is opened; copy the values into this one"),
+        ("virtual", "takes its values from other files, and no other file is opened; copy the values into this one"),
+        ("link", "is a link into another file, and no other file is opened; copy the values into this one"),
+        ("references", "holds references to other data (cells, or an array of structures, in MATLAB); save these as"),
+        ("rows", "holds rows of different lengths; save each as an array"),
+        ("records", "holds records of t, y; save each of these as an array"),
+        ("complex", "holds complex numbers, not real numbers; save the real signal"),
+        ("flags", "holds booleans, not real numbers; save numbers"),
+        ("none", "holds no samples; record again"),
+        ("times", "has a type that is not read (No NumPy equivalent for TypeTimeID exists); save it as floating-point"),
+        (
+            "foreign",
+            "is packed by the filter 32015, which is none of HDF5's own; pack it with gzip or not at all (h5re",
+        ),
+        ("twice", "is packed twice over; pack it with gzip"),
+        ("huge", "states 1e+12 samples, 8e+06 MB in a file of 0.0"),
+        ("pieces", "is stored in pieces, each of which states 1e+08 samples, 800 MB in a file of"),
+    ],
+)
+def test_datasets_that_are_no_channel(odd_hdf5, name, words):
+    assert f"the output 'odd/{name}' is no channel: 'odd/{name}' {words}" in refusal(odd_hdf5, 0, f"odd/{name}")
+
+
+def test_the_other_datasets_are_read(odd_hdf5):
+    """The rest of the file is as good as without them."""
+    check(read_recording(odd_hdf5, "run/drive", "run/output"), ("run/drive", "run/output"))
+    check(read_recording(odd_hdf5, "odd/drive", "run/output", RATE_HZ), ("odd/drive", "run/output"))
+
+
+def test_a_piece_that_unpacks_to_more_than_it_states(tmp_path, monkeypatch):
+    """The library itself would make room for all of it, and say nothing."""
+    monkeypatch.setattr("microrad.recording.hdf5_datasets._HARMLESS_BYTES", 1_000_000)
+    path = tmp_path / "a.h5"
+    with h5py.File(path, "w") as file:
+        drive = file.create_dataset("drive", (N,), "f8", chunks=(N // 2,), compression="gzip", shuffle=True)
+        output = file.create_dataset("output", data=OUTPUT, chunks=(N // 2,), compression="gzip", fletcher32=True)
+        drive[:] = DRIVE
+        drive.id.write_direct_chunk((N // 2,), zlib.compress(bytes(2_000_000)))
+        assert (file["drive"][-1], output[1]) == (0.0, OUTPUT[1])
+    message = refusal(path, "drive", "output", RATE_HZ)
+    assert "'drive' has a piece, from sample (500,) on, that unpacks to more than the 4000 bytes that it" in message
+    with h5py.File(path, "a") as file:
+        file["drive"][:] = DRIVE
+    check(read_recording(path, "drive", "output", RATE_HZ))
+
+
+def test_matlab_v73_variables_that_are_no_channel(tmp_path):
+    path = matlab73(tmp_path / "a.mat", drive=DRIVE, output=OUTPUT, table=DRIVE, cell=DRIVE, word=DRIVE, flag=DRIVE)
+    with h5py.File(path, "a") as file:
+        for name, kind in (("drive", "double"), ("table", "timetable"), ("cell", "cell"), ("word", "char")):
+            file[name].attrs["MATLAB_class"] = np.bytes_(kind)
+        file["flag"].attrs["MATLAB_empty"] = 1
+        file["complex"] = np.zeros((1, N), dtype=[("real", "f8"), ("imag", "f8")])
+        file["sparse/data"] = np.arange(9.0)
+        file["sparse"].attrs["MATLAB_sparse"] = 9
+    check(read_recording(path, "drive", "output", RATE_HZ))
+    for name, words in (
+        ("table", "is an object of MATLAB, which only MATLAB reads; save its numbers as arrays"),
+        ("cell", "holds cells; save the numbers of each cell as an array"),
+        ("word", "holds text, not real numbers; save numbers"),
+        ("flag", "holds no samples"),
+        ("complex", "holds complex numbers, not real numbers; save the real signal"),
+        ("sparse/data", "is part of a sparse matrix; save it as full"),
+    ):
+        assert f"the output '{name}' is no channel: '{name}' {words}" in refusal(path, "drive", name, RATE_HZ)
 
 
 # ----------------------------------------------------------------------------------------------------- several channels

@@ -461,7 +461,7 @@ def test_a_tdms_file_that_states_a_trillion_samples_counts_for_what_it_holds(tmp
 
 
 @posix
-@pytest.mark.parametrize("how", ["external", "virtual"])
+@pytest.mark.parametrize("how", ["external", "virtual", "link"])
 def test_data_of_other_files_are_not_read(tmp_path, how):
     h5py = pytest.importorskip("h5py")
     secret = tmp_path / "secret.bin"
@@ -474,25 +474,19 @@ def test_data_of_other_files_are_not_read(tmp_path, how):
         group = file.create_group("deep")
         if how == "external":
             group.create_dataset("u", (400,), "f8", external=[(str(secret), 0, 3200)])
+        elif how == "link":
+            group["u"] = h5py.ExternalLink(str(tmp_path / "other.h5"), "x")
         else:
             layout = h5py.VirtualLayout(shape=(400,), dtype="f8")
             layout[:] = h5py.VirtualSource(str(tmp_path / "other.h5"), "x", shape=(400,))
             group.create_virtual_dataset("u", layout)
     with h5py.File(path) as file:
         assert file["deep/u"][7] == 7.0  # the library would
-    for columns in (None, Columns(("mine",), ("deep/u",))):
-        assert "'deep/u' takes its values from other files" in refused(path, columns)
-
-
-def test_an_external_link_is_no_channel(tmp_path):
-    h5py = pytest.importorskip("h5py")
-    with h5py.File(tmp_path / "other.h5", "w") as other:
-        other["x"] = np.arange(400.0)
-    path = tmp_path / "link.h5"
-    with h5py.File(path, "w") as file:
-        file["mine"] = np.arange(400.0)
-        file["theirs"] = h5py.ExternalLink(str(tmp_path / "other.h5"), "x")
-    assert [c.name for c in list_channels(path).channels] == ["mine"]
+    found = list_channels(path)
+    assert [c.name for c in found.channels] == ["mine"]
+    assert found.unusable[0][0] == "deep/u"
+    for words in (found.unusable[0][1], refused(path, Columns(("mine",), ("deep/u",)))):
+        assert "and no other file is opened; copy the values into this one" in words
 
 
 # ------------------------------------------------------------------------------------------------------- the process

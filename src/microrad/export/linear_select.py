@@ -78,9 +78,10 @@ def numbers(fields: dict[str, Any], key: str, source: str, *, is_complex: bool =
         value = value.item()  # MATLAB's cell of the one entry
     if isinstance(value, np.ndarray) and value.dtype == object:
         raise ExportError(f"{source}: {key} has cells for {value.size} entries; choose one input and one output")
-    if not isinstance(value, np.ndarray) or value.dtype.kind not in "iufc" or value.ndim != 2:
-        kind = value.kind if isinstance(value, Unread) else "not a matrix of numbers"
-        raise ExportError(f"{source}: {key} is {kind}; save numbers")
+    if isinstance(value, Unread):
+        raise ExportError(f"{source}: {key} is {value.kind}; {value.remedy}")
+    if not isinstance(value, np.ndarray) or value.dtype.kind not in "iufcb" or value.ndim != 2:
+        raise ExportError(f"{source}: {key} is not a matrix of numbers; save numbers")
     if value.dtype.kind == "c" and not is_complex:
         raise ExportError(
             f"{source}: {key} holds complex numbers; a mirror's response to a real drive is real: save it real"

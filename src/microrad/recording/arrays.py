@@ -24,6 +24,7 @@ STEP_NAMES = frozenset({
 })
 # fmt: on
 UNIT_NAMES = ("units", "unit", "unit_string")
+_MOST_COLUMNS = 10_000  # a few bytes may claim millions
 _INDEXED = re.compile(r"(.*)\[([\d,\s]*)\]")
 
 
@@ -63,13 +64,18 @@ def channels_of(variables: list[Variable], unusable: dict[str, str]) -> tuple[Ch
     for variable in variables:
         shape = tuple(n for n in variable.shape if n != 1)
         if variable.dtype.kind not in "iuf":
-            unusable[variable.name] = f"holds {_type_words(variable.dtype)}, not real numbers"
+            unusable[variable.name] = f"holds {_type_words(variable.dtype)}"
         elif math.prod(variable.shape) == 0:
-            unusable[variable.name] = "holds no samples"
+            unusable[variable.name] = "holds no samples; record again, or name another"
         elif len(shape) == 0:
-            unusable[variable.name] = "is a single number"
+            unusable[variable.name] = "is a single number; name an array"
         elif len(shape) == 1:
             found.append(_channel(variable, ()))
+        elif len(shape) == 2 and min(shape) > _MOST_COLUMNS:
+            unusable[variable.name] = (
+                f"is an array of shape {variable.shape}: at most {_MOST_COLUMNS} channels are listed; save the columns "
+                "that you need"
+            )
         elif len(shape) == 2:
             found.extend(_channel(variable, (column,)) for column in range(min(shape)))
         else:
@@ -104,7 +110,8 @@ def _channel(variable: Variable, index: tuple[int, ...]) -> Channel:
         key[k] = i
 
     def load() -> FloatArray:
-        return np.ascontiguousarray(variable.load(tuple(key)), dtype=np.float64).reshape(-1)
+        with np.errstate(invalid="ignore"):  # a signalling NaN becomes a quiet one, and is found as such
+            return np.ascontiguousarray(variable.load(tuple(key)), dtype=np.float64).reshape(-1)
 
     name = f"{variable.name}[{', '.join(map(str, index))}]" if index else variable.name
     return Channel(name, variable.shape[axis], load, variable.unit)
@@ -130,8 +137,17 @@ def indexed(source: Container, variables: list[Variable], wanted: int | str) -> 
 
 
 def _type_words(dtype: np.dtype[Any]) -> str:
-    words = {"c": "complex numbers", "b": "booleans", "O": "Python objects or cells", "S": "text", "U": "text"}
-    return words.get(dtype.kind, f"the type {dtype}")
+    if dtype.names and dtype.names != ("real", "imag"):  # the latter is MATLAB's complex number in HDF5
+        return f"records of {', '.join(dtype.names[:5])}; save each of these as an array of its own"
+    words = {
+        "c": "complex numbers, not real numbers; save the real signal",
+        "b": "booleans, not real numbers; save numbers, or name another",
+        "S": "text, not real numbers; save numbers, or name another",
+        "U": "text, not real numbers; save numbers, or name another",
+    }
+    return words.get(
+        "c" if dtype.names else dtype.kind, f"the type {dtype}, not real numbers; save it as floating-point numbers"
+    )
 
 
 class ArraySource(Container):

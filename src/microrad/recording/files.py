@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import difflib
 import hashlib
+import math
+from collections.abc import Sequence
 from pathlib import Path
 
 from microrad.recording.records import RecordingError
 
 MAX_BYTES = 2_000_000_000
+_UNPACKED_BYTES, _UNPACKED_TIMES = 256_000_000, 20
 _HEAD_BYTES = 1024
 
 _HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
@@ -81,6 +84,23 @@ def read_head(path: Path, size: int) -> bytes:
             return file.read(size)
     except OSError as error:
         raise RecordingError(f"{path}: the file cannot be read ({error}); check its permissions.") from None
+
+
+def most_unpacked(path: Path) -> int:
+    """Bytes that an array of a file may unpack to: no recording packs better, and a few kB could fill the memory."""
+    return min(max(_UNPACKED_BYTES, _UNPACKED_TIMES * path.stat().st_size), MAX_BYTES)
+
+
+def too_large(path: Path, shape: Sequence[int], itemsize: int) -> str:
+    """Words for an array that states more than its file may unpack to; empty for any other."""
+    size, most = math.prod(shape) * itemsize, most_unpacked(path)
+    if size <= most:
+        return ""
+    return (
+        f"states {max(shape):.4g} samples, {size / 1e6:.4g} MB in a file of {path.stat().st_size / 1e6:.3g} MB, and at "
+        f"most {most / 1e6:.4g} MB are unpacked from that; cut out the part that you need, or save it without "
+        "compression"
+    )
 
 
 def sha256_of(path: Path) -> str:

@@ -1,4 +1,4 @@
-"""HDF5 files, MATLAB's version 7.3 among them; datasets are named `group/dataset`."""
+"""HDF5 files, MATLAB's version 7.3 among them; datasets are named `group/dataset`. No other file is ever opened."""
 
 from __future__ import annotations
 
@@ -18,6 +18,8 @@ from microrad.recording.arrays import (
     stated_rate,
 )
 from microrad.recording.files import sha256_of
+from microrad.recording.hdf5_datasets import ELSEWHERE, attribute, check_pieces, matlab_class, unusable_dataset
+from microrad.recording.records import RecordingError
 from microrad.recording.sources import StatedRate, damaged, missing_library
 
 
@@ -30,31 +32,48 @@ class Hdf5Source(ArraySource):
             import h5py
         except ImportError:
             raise missing_library(path, "an HDF5 file", "h5py") from None
-        kind = "MATLAB v7.3" if matlab else "HDF5"
+        kind = "a MATLAB v7.3 file" if matlab else "an HDF5 file"
         self.variables = []
-        self._path = path
+        unusable: dict[str, str] = {}
         stated: dict[str, list[StatedRate]] = {}
         try:
             with h5py.File(path, "r") as file:
-                _note_rates(stated, "", file.attrs, "")
-
-                def visit(name: str, item: Any) -> None:
-                    if name.startswith("#"):  # MATLAB's store of cells and references
-                        return
-                    is_dataset = isinstance(item, h5py.Dataset)
-                    _note_rates(stated, name, item.attrs, name)
-                    if is_dataset and not item.attrs.get("MATLAB_empty", 0):
-                        self.variables.append(_variable(path, name, item, matlab))
-                        if item.size == 1 and item.dtype.kind in "iuf":
-                            _add(stated, name.rpartition("/")[0], stated_rate(name, item[()]))
-
-                file.visititems(visit)
+                self._search(file, path, matlab, unusable, stated)
+        except RecordingError:
+            raise
         except Exception as error:  # a damaged file may raise OSError, KeyError, RuntimeError and more
-            raise damaged(path, f"an {kind} file" if kind == "HDF5" else f"a {kind} file", error) from None
-        unusable: dict[str, str] = {}
+            raise damaged(path, kind, error) from None
         channels = channels_of(self.variables, unusable)
         rates = {group: tuple(found) for group, found in stated.items()}
-        super().__init__(path, kind, channels, sha256_of(path), unusable, rates)
+        super().__init__(path, kind.split(" ", 1)[1].removesuffix(" file"), channels, sha256_of(path), unusable, rates)
+
+    def _search(
+        self, file: Any, path: Path, matlab: bool, unusable: dict[str, str], stated: dict[str, list[StatedRate]]
+    ) -> None:
+        import h5py
+
+        def visit(name: str, item: Any) -> None:
+            if name.startswith("#"):  # MATLAB's store of cells and references
+                return
+            _note_rates(stated, name, item.attrs, name)
+            if not isinstance(item, h5py.Dataset):
+                return
+            reason = unusable_dataset(path, item)
+            if reason:
+                unusable[name] = reason
+                return
+            self.variables.append(_variable(path, name, item, matlab))
+            if item.size == 1 and item.dtype.kind in "iuf":
+                check_pieces(path, name, item)
+                _add(stated, name.rpartition("/")[0], stated_rate(name, item[()]))
+
+        def visit_link(name: str, link: Any) -> None:
+            if isinstance(link, h5py.ExternalLink):
+                unusable[name] = f"is a link into another file, {ELSEWHERE}"
+
+        _note_rates(stated, "", file.attrs, "")
+        file.visititems(visit)
+        file.visititems_links(visit_link)
 
     def rates(self, indices: Any) -> list[StatedRate]:
         """Rates of the dataset's own attributes, else of the nearest group above it."""
@@ -75,12 +94,12 @@ def _add(stated: dict[str, list[StatedRate]], group: str, rate: StatedRate | Non
 def _note_rates(stated: dict[str, list[StatedRate]], group: str, attributes: Mapping[str, Any], where: str) -> None:
     for name in attributes:
         if name.casefold() in RATE_NAMES | STEP_NAMES:
-            _add(stated, group, stated_rate(f"{where}/{name}" if where else name, attributes[name]))
+            _add(stated, group, stated_rate(f"{where}/{name}" if where else name, attribute(attributes, name)))
 
 
 def _unit(attributes: Mapping[str, Any]) -> str:
     for name in UNIT_NAMES:
-        value = attributes.get(name)
+        value = attribute(attributes, name)
         if isinstance(value, bytes):
             return value.decode("utf-8", "replace")
         if isinstance(value, str):
@@ -93,9 +112,9 @@ def _variable(path: Path, name: str, item: Any, matlab: bool) -> Variable:
         import h5py
 
         with h5py.File(path, "r") as file:
+            check_pieces(path, name, file[name])
             return file[name][key[::-1] if matlab else key]
 
-    dtype = np.dtype(bool) if "MATLAB_int_decode" in item.attrs and item.dtype.itemsize == 1 else item.dtype
-    if item.attrs.get("MATLAB_class") in (b"char", b"cell", b"string"):
-        dtype = np.dtype(object) if item.attrs["MATLAB_class"] == b"cell" else np.dtype("S1")
+    logical = matlab_class(item) == "logical" or (not matlab_class(item) and "MATLAB_int_decode" in item.attrs)
+    dtype = np.dtype(bool) if logical and item.dtype.itemsize == 1 else item.dtype
     return Variable(name, item.shape[::-1] if matlab else item.shape, dtype, load, _unit(item.attrs))

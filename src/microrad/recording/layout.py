@@ -75,7 +75,7 @@ def layout_of(path: Path) -> Layout:
     content = [line for line in lines if line.strip() and not line.lstrip().startswith(COMMENT)]
     if not content:
         reason = "holds only blank lines and comments" if complete else "has no line break in its first megabyte"
-        raise RecordingError(f"{path}: the file {reason}; a recording needs rows of numbers, one row per sample.")
+        raise RecordingError(f"{path}: the file {reason}; export the recording as rows of numbers, one per sample.")
     typical = content[-_TYPICAL_LINES:]
     delimiter = Counter(_guess_delimiter(line) for line in typical).most_common(1)[0][0]
     columns = Counter(len(split(line, delimiter)) for line in typical).most_common(1)[0][0]

@@ -187,7 +187,10 @@ class LvmSource(Container):
 def _separator(path: Path, header: dict[str, str]) -> str:
     word = header.get("Separator", "Tab")
     if word.casefold() not in _SEPARATORS:
-        raise RecordingError(f"{path}: the header names the separator '{word}'; LVM files have Tab or Comma.")
+        raise RecordingError(
+            f"{path}: the header names the separator '{word}'; LVM files have Tab or Comma: correct that word, or "
+            "export the recording again from LabVIEW."
+        )
     return _SEPARATORS[word.casefold()]
 
 

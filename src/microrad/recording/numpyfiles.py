@@ -10,11 +10,14 @@ from typing import IO, Any
 import numpy as np
 
 from microrad.recording.arrays import ArraySource, Variable, channels_of, stated_rate
-from microrad.recording.files import sha256_of
+from microrad.recording.files import sha256_of, too_large
 from microrad.recording.records import RecordingError
 from microrad.recording.sources import StatedRate, damaged
 
-_NO_OBJECTS = "holds Python objects, which would have to be unpickled and could run code; save plain numbers"
+_NO_OBJECTS = (
+    "holds Python objects, which are pickled and not read, because loading them could run code; save them as plain "
+    "numbers, array.astype(float)"
+)
 
 
 class NumpySource(ArraySource):
@@ -77,15 +80,26 @@ def _of_archive(path: Path, unusable: dict[str, str]) -> list[Variable]:
         for member in archive.infolist():
             name = member.filename.removesuffix(".npy")
             if name == member.filename:
-                unusable[name] = "is no NumPy array"
+                unusable[name] = "is no NumPy array; name another, or add it with numpy.savez"
                 continue
             with archive.open(member) as file:
                 shape, dtype = _header(file)
-            if int(np.prod(shape, dtype=object)) * dtype.itemsize > member.file_size:
-                unusable[name] = f"is truncated: an array of shape {shape} does not fit into {member.file_size} bytes"
+            # The pickle of objects has a size of its own; they are refused for what they are.
+            if not dtype.hasobject and (reason := _unfit(path, shape, dtype.itemsize, member.file_size)):
+                unusable[name] = reason
                 continue
             variables.append(Variable(name, shape, dtype, _loader(path, name)))
     return variables
+
+
+def _unfit(path: Path, shape: tuple[int, ...], itemsize: int, present: int) -> str:
+    """Why an array of the archive cannot be read, in words; empty where it can."""
+    if int(np.prod(shape, dtype=object)) * itemsize > present:
+        return (
+            f"is truncated, an array of shape {shape} does not fit into {present} bytes; copy the file again from its "
+            "source"
+        )
+    return too_large(path, shape, itemsize)
 
 
 def _loader(path: Path, name: str) -> Callable[[tuple[int | slice, ...]], Any]:

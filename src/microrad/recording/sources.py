@@ -174,6 +174,11 @@ class Container(Source):
                 values.append(self.channels[index].load())
             except RecordingError:
                 raise
+            except MemoryError:
+                raise RecordingError(
+                    f"{self.path}: {self.label(index)} takes more memory than there is to read; cut out the part that "
+                    "you need, or keep every n-th sample."
+                ) from None
             except Exception as error:  # a damaged file may raise anything in its library
                 raise RecordingError(
                     f"{self.path}: {self.label(index)} cannot be read ({_first_line(error)}); the file is damaged or "

@@ -88,9 +88,9 @@ def _channels(tdms: Any, unusable: dict[str, str]) -> Iterator[tuple[str, Any]]:
             name = f"{group.name}/{channel.name}"
             dtype = channel.dtype
             if len(channel) == 0:
-                unusable[name] = "holds no samples"
+                unusable[name] = "holds no samples; record again, or name another"
             elif dtype.kind not in "iuf":
-                unusable[name] = f"holds {dtype}, not real numbers"
+                unusable[name] = f"holds {dtype}, not real numbers; save numbers, or name another"
             else:
                 yield name, channel
 

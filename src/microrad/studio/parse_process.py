@@ -67,11 +67,12 @@ def limit(limits: dict[str, Any]) -> None:
 def answer_to(request: dict[str, Any]) -> dict[str, Any]:
     """The answer, or the refusal in words."""
     from microrad.recording import RecordingError
+    from microrad.recording.files import check_file
 
     name = request["name"]
     try:
         os.chdir(request["folder"])  # messages then name the file without the folder
-        check_links(Path(name))
+        check_file(Path(name))
         task = {"channels": channels, "view": view}[request["task"]]
         return task(Path(name), request)
     except (RecordingError, RefusedError) as error:
@@ -84,31 +85,6 @@ def answer_to(request: dict[str, Any]) -> dict[str, Any]:
 
 def _memory(request: dict[str, Any]) -> str:
     return f"{request['limits']['memory_bytes'] / 1e9:.3g} GB of memory"
-
-
-def check_links(path: Path) -> None:
-    """Refuse HDF5 that takes its data out of other files, which may be any of this machine."""
-    from microrad.recording.files import check_file, file_format
-
-    check_file(path)
-    if file_format(path) not in ("hdf5", "mat73"):
-        return
-    import h5py
-
-    def elsewhere(name: str, item: Any) -> str | None:
-        outside = isinstance(item, h5py.Dataset) and (item.external or item.is_virtual)
-        return name if outside else None
-
-    try:
-        with h5py.File(path, "r") as file:
-            found = file.visititems(elsewhere)
-    except (OSError, RuntimeError, ValueError, KeyError):
-        return  # damaged; the reader says how
-    if found is not None:
-        raise RefusedError(
-            f"{path}: '{found[:_TEXT]}' takes its values from other files, which are not opened; save the data "
-            "themselves."
-        )
 
 
 def opened(path: Path, request: dict[str, Any]) -> Source:
