@@ -4,6 +4,7 @@ import contextlib
 import difflib
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import cache
 from importlib import resources
 from pathlib import Path
 from typing import Any, Literal, TypeVar, get_args, get_origin
@@ -132,7 +133,8 @@ def load_link(path: str | Path, *, text: str | None = None) -> LinkFile:
     """
     document = _open(Path(path), "mission file", "", text)
     if _BEYOND_LINK & document.data.keys():
-        file = load_mission(path, text=text)
+        _take_in_mirror(document, None)
+        file = mission_file(document)
         return LinkFile(file.mission, file.path, file.text, file.sha256, file.sources)
     mission = check_table(document, LinkMission, document.data)
     if mission is None or document.faults:
@@ -394,9 +396,14 @@ def _dotted(table: str, location: Iterable[object]) -> str:
     return ".".join(str(part) for part in (table, *location) if part != "")
 
 
+@cache
+def _shipped_sources() -> Mapping[str, Source]:
+    with resources.as_file(resources.files("microrad") / "missions" / "leo-geo.toml") as path:
+        return load_mission(path).sources
+
+
 def changed_from_shipped(file: MissionFile) -> tuple[tuple[str, str, str], ...]:
     """Keys that name the paper as their source but differ from the paper's mission: (key, value, value there)."""
-    with resources.as_file(resources.files("microrad") / "missions" / "leo-geo.toml") as path:
-        shipped = load_mission(path).sources
+    shipped = _shipped_sources()
     named = {key: source.value for key, source in file.sources.items() if source.kind == "paper"}
     return tuple((k, v, shipped[k].value) for k, v in named.items() if k in shipped and shipped[k].value != v)

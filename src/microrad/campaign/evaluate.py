@@ -7,7 +7,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from microrad import day_study, fine_pointing, kernels, link, link_performance, link_study
+from microrad import fine_pointing, kernels, link, link_performance
 from microrad.campaign.outputs import OUTPUTS
 from microrad.fine_loop import ensemble
 from microrad.mission import Mission
@@ -128,6 +128,8 @@ def _rate(m: Mission, loss_db: float) -> float:
 # ----------------------------------------------------------------------------------------------------------------- day
 def _day(file: MissionFile, pointing: Pointing) -> dict[str, float]:
     """What the relay takes under this pointing; nothing where the link has no contact."""
+    from microrad import day_study, link_study  # orbits: slow to load, and few campaigns ask for them
+
     links = link_study.run(LinkFile(file.mission, file.path, file.text, file.sha256, file.sources))
     loss = day_study.PointingLoss(pointing.outage_loss_db, pointing.outage, "campaign")
     way = day_study.relay(links, loss)

@@ -14,7 +14,7 @@ Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 Flags = NDArray[np.bool_]
 Response = Callable[[Floats], Complexes]
-Distance = Callable[[Floats], Floats]
+Distance = Callable[[Complexes], Floats]
 
 COMMAND = 3
 """Output of a closed loop behind those of the plant (residual, optical, gauge): the command (V)."""
@@ -115,8 +115,8 @@ def refuse_unstable(plant: DesignPlant, controller: AxisController) -> None:
     worst = loop_poles(plant, controller)[0]
     if abs(worst) < 1.0:
         return
-    distance = _modulus(_respond(plant, controller, "command"))
-    least, _ = _least(distance, _frequencies(plant, controller))
+    response, f = _respond(plant, controller, "command"), _frequencies(plant, controller)
+    least, _ = _least(_modulus, response, f, response(f))
     raise ValueError(
         f"controller {controller.name!r} makes the loop unstable: a pole at |z| = {abs(worst):.6f} (the limit is 1), "
         f"{abs(np.angle(worst)) / (2 * math.pi * plant.period_s):.4g} Hz, at a control period of {plant.period_s:g} s. "
@@ -270,11 +270,10 @@ def margins_at(plant: DesignPlant, controller: AxisController, broken_at: str = 
     refuse_unstable(plant, controller)
     response = _respond(plant, controller, broken_at)
     f = _frequencies(plant, controller)
-    f = _closer(f, response(f))
-    L = response(f)
+    f, L = _closer(f, response(f), response)
     up, down = _gain_margins(L)
     crossing, phase = _crossings(f, L)
-    modulus, where = _least(_modulus(response), f)
+    modulus, where = _least(_modulus, response, f, L)
     both_ways = np.minimum(phase, 2 * math.pi - phase)
     return LoopMargins(
         gain_up=up,
@@ -282,7 +281,7 @@ def margins_at(plant: DesignPlant, controller: AxisController, broken_at: str = 
         phase_rad=float(np.min(both_ways, initial=math.inf)),
         delay_s=float(np.min(phase / (2 * math.pi * crossing), initial=math.inf)),
         modulus=modulus,
-        disk=2.0 * _least(_balanced(response), f)[0],
+        disk=2.0 * _least(_balanced, response, f, L)[0],
         crossover_hz=float(np.max(crossing)) if crossing.size else math.nan,
         bandwidth_hz=bandwidth_hz(f, np.abs(1.0 + L)),
         peak=1.0 / modulus,
@@ -332,36 +331,34 @@ def bandwidth_hz(freq_hz: Floats, distance: Floats) -> float:
     return float(freq_hz[at - 1] * (freq_hz[at] / freq_hz[at - 1]) ** (above / (above - below)))
 
 
-def _modulus(response: Response) -> Distance:
-    """|1 + L| as a function of frequency."""
-    return lambda freq_hz: np.abs(1.0 + response(freq_hz))
+def _modulus(L: Complexes) -> Floats:
+    """|1 + L|."""
+    return np.abs(1.0 + L)
 
 
-def _balanced(response: Response) -> Distance:
-    """1 / |S - T| = |1 + L| / |1 - L| as a function of frequency, cut off where it is large."""
-
-    def distance(freq_hz: Floats) -> Floats:
-        L = response(freq_hz)
-        return np.asarray(np.abs(1.0 + L) / np.maximum(np.abs(1.0 - L), 1e-9))
-
-    return distance
+def _balanced(L: Complexes) -> Floats:
+    """1 / |S - T| = |1 + L| / |1 - L|, cut off where it is large."""
+    return np.asarray(np.abs(1.0 + L) / np.maximum(np.abs(1.0 - L), 1e-9))
 
 
-def _least(distance: Distance, f: Floats) -> tuple[float, float]:
+def _least(distance: Distance, response: Response, f: Floats, L: Complexes) -> tuple[float, float]:
     """Smallest distance and its frequency, the grid made finer around it."""
-    for _ in range(4):
-        found = distance(f)
+    found = distance(L)
+    for _ in range(3):
         at = int(np.argmin(found))
-        best, where = float(found[at]), float(f[at])
         f = np.linspace(f[max(at - 1, 0)], f[min(at + 1, f.size - 1)], 41)
-    return best, where
+        found = distance(response(f))
+    at = int(np.argmin(found))
+    return float(found[at]), float(f[at])
 
 
-def _closer(f: Floats, L: Complexes) -> Floats:
-    """The grid with more points where L crosses the real axis or the unit circle, so that straight lines will do."""
+def _closer(f: Floats, L: Complexes, response: Response) -> tuple[Floats, Complexes]:
+    """Grid and loop with more points where L crosses the real axis or the unit circle, so that straight lines do."""
     beyond, below = np.abs(L) >= 1.0, L.imag < 0.0
     at = np.flatnonzero((beyond[:-1] != beyond[1:]) | (below[:-1] != below[1:]))
-    return np.unique(np.concatenate([f, np.linspace(f[at], f[at + 1], 33).ravel()]))
+    more = np.linspace(f[at], f[at + 1], 33)[1:-1].ravel()
+    whole, first = np.unique(np.concatenate([f, more]), return_index=True)
+    return whole, np.concatenate([L, response(more)])[first]
 
 
 def _crossings(f: Floats, L: Complexes) -> tuple[Floats, Floats]:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from microrad import lti
 from microrad.control import filters
-from microrad.control.problem import OPTICAL, AxisController, DesignPlant, Family, Parameter
+from microrad.control.problem import OPTICAL, AxisController, DesignPlant, Family, Parameter, once_per_plant
 from microrad.control.sampled import Gains, pid
 
 Floats = NDArray[np.float64]
@@ -49,6 +49,7 @@ class Resonance:
     prominence: float
 
 
+@once_per_plant
 def optical_model(plant: DesignPlant) -> lti.StateSpace:
     """P: command (V) to the reading that its answer takes off the optical error (rad), delays included.
 
@@ -78,6 +79,7 @@ def _connected(A: Floats, start: Floats) -> NDArray[np.bool_]:
     return np.asarray(reached)
 
 
+@once_per_plant
 def resonances(plant: DesignPlant) -> tuple[Resonance, ...]:
     """Lightly damped pole pairs of P below half the control rate, the most prominent first."""
     model = optical_model(plant)
@@ -91,6 +93,7 @@ def resonances(plant: DesignPlant) -> tuple[Resonance, ...]:
     return tuple(Resonance(float(freq_hz[i]), float(-light[i].real / abs(light[i])), float(height[i])) for i in order)
 
 
+@once_per_plant
 def corner_hz(plant: DesignPlant) -> float:
     """Lowest frequency at which |P| is 3 dB below the slow gain; a quarter of the control rate where there is none.
 
@@ -109,6 +112,12 @@ def drift(model: lti.StateSpace, below: float) -> list[tuple[float, float]]:
         real = roots[(np.abs(roots.imag) < 1e-9) & (roots.real > math.exp(-2.0 * math.pi * below)) & (roots.real < 1.0)]
         found.append(np.sort(real.real)[::-1])
     return [(float(pole), float(zero)) for pole, zero in zip(*found, strict=False)]
+
+
+@once_per_plant
+def _drift(plant: DesignPlant) -> list[tuple[float, float]]:
+    """What of P an inverse undoes as drift."""
+    return drift(optical_model(plant), SLOW_SHARE * corner_hz(plant) * plant.period_s)
 
 
 def _slow(model: lti.StateSpace) -> float:
@@ -303,6 +312,7 @@ def _observer_parameters(plant: DesignPlant) -> tuple[Parameter, ...]:
     )
 
 
+@once_per_plant
 def _refuse_unstable_model(plant: DesignPlant) -> None:
     """Raise ValueError where the model that runs in the controller would not settle."""
     worst = float(np.max(np.abs(np.linalg.eigvals(optical_model(plant).A)), initial=0.0))
@@ -336,7 +346,7 @@ def observer_filter(plant: DesignPlant, bandwidth_hz: float, lead_hz: float, dam
     model = optical_model(plant)
     low_pass = filters.low_pass(bandwidth_hz, damping, plant.period_s, lead_hz)
     slow = _slow(model)
-    for pole, zero in drift(model, SLOW_SHARE * corner_hz(plant) * plant.period_s):
+    for pole, zero in _drift(plant):
         gain = (1.0 - zero) / (1.0 - pole)
         undone = lti.StateSpace(
             np.array([[zero]]), np.ones((1, 1)), np.array([[gain * (zero - pole)]]), np.array([[gain]])

@@ -14,7 +14,16 @@ from numpy.typing import NDArray
 
 from microrad import lti
 from microrad.control.analysis import reachable
-from microrad.control.problem import GAUGE, OPTICAL, RESIDUAL, AxisController, DesignPlant, Family, Parameter
+from microrad.control.problem import (
+    GAUGE,
+    OPTICAL,
+    RESIDUAL,
+    AxisController,
+    DesignPlant,
+    Family,
+    Parameter,
+    once_per_plant,
+)
 
 Floats = NDArray[np.float64]
 
@@ -115,6 +124,7 @@ def _refuse(plant: DesignPlant, weights: Weights) -> None:
         )
 
 
+@once_per_plant
 def _walk(plant: DesignPlant) -> tuple[float, float]:
     """Step of the random walk (rad a sample), and a floor for the sensors' noise (rad), far below either."""
     there = _slow_response(plant)
@@ -122,12 +132,14 @@ def _walk(plant: DesignPlant) -> tuple[float, float]:
     return 2 * math.pi * WALK_CORNER * level, 1e-6 * level
 
 
+@once_per_plant
 def _slow_response(plant: DesignPlant) -> NDArray[np.complex128]:
     """Response from the white sequences to residual and sensors where the walk takes over."""
     corner = np.array([WALK_CORNER / plant.period_s])
     return lti.frequency_response(plant.system, corner, plant.period_s)[0, :, 1:]
 
 
+@once_per_plant
 def _has_integrator(plant: DesignPlant) -> bool:
     """Whether the disturbance itself holds a constant, beside which a walk could not be told apart."""
     own = ~reachable(plant.system.A, plant.system.B[:, :1])

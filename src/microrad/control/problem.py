@@ -1,7 +1,9 @@
 """What a controller of one axis is designed for, and what a design is: plants and controllers as discrete matrices."""
 
+import functools
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,6 +11,7 @@ from numpy.typing import NDArray
 from microrad import lti
 
 Floats = NDArray[np.float64]
+_Answer = TypeVar("_Answer")
 
 RESIDUAL, OPTICAL, GAUGE = range(3)
 """Outputs of a design plant; a controller's inputs are the last two, in this order."""
@@ -37,6 +40,21 @@ class DesignPlant:
         """Command (V) to optical and gauge readings, without noise: what the loop gain is made of."""
         s = self.system
         return lti.StateSpace(s.A, s.B[:, :1], s.C[OPTICAL:], s.D[OPTICAL:, :1])
+
+
+def once_per_plant(of: Callable[[DesignPlant], _Answer]) -> Callable[[DesignPlant], _Answer]:
+    """The function, its last answer kept: a search asks the same of one plant for each of its candidates."""
+    last: tuple[DesignPlant, _Answer] | None = None
+
+    @functools.wraps(of)
+    def asked(plant: DesignPlant) -> _Answer:
+        nonlocal last
+        kept = last
+        if kept is None or kept[0] is not plant:
+            last = kept = (plant, of(plant))
+        return kept[1]
+
+    return asked
 
 
 @dataclass(frozen=True, slots=True)

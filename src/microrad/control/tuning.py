@@ -100,6 +100,7 @@ class Search:
         self.parameters = family.parameters(plants[0]) if plants else ()
         self.judge = Judge(plants)
         self.trials: list[Trial] = []
+        self.looked_at: dict[Trial, tuple[AxisController, list[LoopMargins]]] = {}
         self.count = 0
         self.optimism = 1.0  # by how much the grid has been seen to overstate the modulus margin
         self.reason: ValueError | None = None
@@ -185,8 +186,10 @@ def tune(
     for start in _apart(starts, STARTS):
         _polish(search, start, int(0.9 * evaluations))
     for _ in range(OVERSTATED):
-        if best := _overstated(search):
-            _polish(search, best, min(search.count + 12 * d, evaluations))
+        best = _overstated(search)
+        if best is None:
+            break
+        _polish(search, best, min(search.count + 12 * d, evaluations))
     on_progress(evaluations, evaluations, what)
     return _chosen(search)
 
@@ -286,8 +289,10 @@ def _candidates(search: Search) -> list[Trial]:
 
 
 def _closely(search: Search, trial: Trial) -> tuple[AxisController, list[LoopMargins]]:
-    controller = search.family.build(search.plants[0], trial.values)
-    margins = [loop_margins(p, controller) for p in search.plants]
+    if trial not in search.looked_at:
+        controller = search.family.build(search.plants[0], trial.values)
+        search.looked_at[trial] = controller, [loop_margins(p, controller) for p in search.plants]
+    controller, margins = search.looked_at[trial]
     search.optimism = max(search.optimism, trial.modulus / min(m.modulus for m in margins))
     return controller, margins
 
