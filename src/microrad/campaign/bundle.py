@@ -85,16 +85,24 @@ def opened(spec: bytes, any_code: bool = False) -> Opened:
     folder = Path(tempfile.mkdtemp(prefix="microrad-campaign-"))
     try:
         for name, content in data["files"].items():
-            path = folder.joinpath(*PurePosixPath(name).parts)
+            path = _inside(folder, name)
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_bytes(base64.b64decode(content))
-        campaign = load_campaign(folder.joinpath(*PurePosixPath(data["campaign"]).parts))
+        campaign = load_campaign(_inside(folder, data["campaign"]))
         found = Opened(campaign, tuple(_read(each) for each in data["controllers"]))
     except BaseException:
         shutil.rmtree(folder, ignore_errors=True)
         raise
     weakref.finalize(found, shutil.rmtree, folder, ignore_errors=True)
     return found
+
+
+def _inside(folder: Path, name: str) -> Path:
+    """The path of a file of a bundle. Raises `CampaignError` where it leaves the folder: anyone may make a ledger."""
+    path = Path(os.path.abspath(folder.joinpath(*PurePosixPath(name).parts)))  # noqa: PTH100  nothing is there yet
+    if not path.is_relative_to(folder) or path == folder:
+        raise CampaignError(f"the ledger holds a file {name!r}, which microrad never puts there: leave it alone")
+    return path
 
 
 def _refuse_absolute(campaign: CampaignFile) -> None:

@@ -132,6 +132,21 @@ class Ledger:
             for number, sha256, payload in self._connection.execute(wanted, (cell,)):
                 yield blob.unpack_chunk(self._sound(cell, number, sha256, payload))
 
+    def added(self, mark: int) -> Iterator[tuple[int, Chunk]]:
+        """The chunks that came in behind a mark, 0 for all, in that order, each with its own mark.
+
+        Raises `CampaignError` if damaged.
+        """
+        with told(self.path, "read what was added"):
+            wanted = "SELECT rowid, cell, number, sha256, payload FROM chunks WHERE rowid > ? ORDER BY rowid"
+            for at, cell, number, sha256, payload in self._connection.execute(wanted, (mark,)):
+                yield at, blob.unpack_chunk(self._sound(cell, number, sha256, payload))
+
+    def count(self) -> int:
+        """How many chunks are in."""
+        with told(self.path, "count what is done"):
+            return int(self._connection.execute("SELECT count(*) FROM chunks").fetchone()[0])
+
     def drop(self, cell: int, number: int) -> None:
         """Take a chunk out, so that it is done again."""
         with self._writing(f"drop chunk {number} of cell {cell}"):

@@ -2,17 +2,18 @@
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 
 from microrad import kernels
 from microrad.campaign import bundle, plan, statistics, tails
+from microrad.campaign.blob import Head
 from microrad.campaign.file import CampaignFile
 from microrad.campaign.ledger import Ledger
 from microrad.campaign.ledger_file import is_written
-from microrad.campaign.outputs import OUTPUTS, RADIUS, Output
+from microrad.campaign.outputs import OUTPUTS, RADIUS
 from microrad.campaign.records import (
     CampaignSummary,
     CellSummary,
@@ -43,8 +44,8 @@ MOST_FAILED = 1000
 
 
 @dataclass
-class _Cell:
-    """A cell as far as it has been read."""
+class Folded:
+    """A cell as far as it has been read; see `begun` and `take`."""
 
     outputs: dict[str, Fold]
     missed: Moments = field(default_factory=Moments)
@@ -74,42 +75,52 @@ def missed(limit: Limit, values: Floats) -> Floats:
     return np.where(np.isnan(values), math.nan, bad)
 
 
-def _read(campaign: CampaignFile, chunks: Iterator[Chunk]) -> _Cell:
+def begun(campaign: CampaignFile) -> Folded:
+    """A cell that nothing was read of yet."""
     block = campaign.block if campaign.table.sampling != "random" else 0
-    cell = _Cell({output.name: Fold(block) for output in plan.outputs(campaign)})
+    return Folded({output.name: Fold(block) for output in plan.outputs(campaign)})
+
+
+def take(campaign: CampaignFile, cell: Folded, chunk: Chunk) -> None:
+    """Take a chunk in. All but the intervals of means is the same in any order of the chunks, to rounding."""
+    weight = chunk.columns["weight"]
+    cell.rows += weight.size
+    cell.failed_rows += len(chunk.failed)
+    cell.good += weight.size - len(chunk.failed)
+    cell.failed += chunk.failed[: MOST_FAILED - len(cell.failed)]
+    for name, fold in cell.outputs.items():
+        fold.add(int(chunk.columns["row"][0]), chunk.columns[name], weight)
+    every = np.zeros(weight.size)
+    for limit in campaign.limits:
+        bad = missed(limit, chunk.columns[limit.output])
+        every = np.maximum(every, bad)
+        before = cell.missed_by.get(limit.output, Moments())
+        cell.missed_by[limit.output] = before.merged(statistics.moments(bad, weight))
+    cell.missed = cell.missed.merged(statistics.moments(every, weight))
+    if chunk.survival.size:
+        cell.survival += chunk.survival
+        cell.survival_square += chunk.survival_square
+    if campaign.table.tail is not None:
+        cell.tilted.append((chunk.columns["tail_radius"], chunk.columns["tail_log_weight"]))
+
+
+def _read(campaign: CampaignFile, chunks: Iterator[Chunk]) -> Folded:
+    cell = begun(campaign)
     for chunk in chunks:
-        weight = chunk.columns["weight"]
-        cell.rows += weight.size
-        cell.failed_rows += len(chunk.failed)
-        cell.good += weight.size - len(chunk.failed)
-        cell.failed += chunk.failed[: MOST_FAILED - len(cell.failed)]
-        for name, fold in cell.outputs.items():
-            fold.add(int(chunk.columns["row"][0]), chunk.columns[name], weight)
-        every = np.zeros(weight.size)
-        for limit in campaign.limits:
-            bad = missed(limit, chunk.columns[limit.output])
-            every = np.maximum(every, bad)
-            before = cell.missed_by.get(limit.output, Moments())
-            cell.missed_by[limit.output] = before.merged(statistics.moments(bad, weight))
-        cell.missed = cell.missed.merged(statistics.moments(every, weight))
-        if chunk.survival.size:
-            cell.survival += chunk.survival
-            cell.survival_square += chunk.survival_square
-        if campaign.table.tail is not None:
-            cell.tilted.append((chunk.columns["tail_radius"], chunk.columns["tail_log_weight"]))
+        take(campaign, cell, chunk)
     return cell
 
 
-def _outputs(campaign: CampaignFile, cell: _Cell, of: tuple[Output, ...]) -> dict[str, OutputSummary]:
+def _outputs(campaign: CampaignFile, cell: Folded, quantiles: tuple[float, ...]) -> dict[str, OutputSummary]:
     if campaign.table.tail is not None:  # its rows are draws for the tail alone
         return {}
     return {
-        output.name: cell.outputs[output.name].summary(output.name, output.unit, output.meaning, QUANTILES, CONFIDENCE)
-        for output in of
+        output.name: cell.outputs[output.name].summary(output.name, output.unit, output.meaning, quantiles, CONFIDENCE)
+        for output in plan.outputs(campaign)
     }
 
 
-def _tail(campaign: CampaignFile, cell: _Cell) -> Tail | None:
+def _tail(campaign: CampaignFile, cell: Folded) -> Tail | None:
     wanted = campaign.table.tail
     if wanted is not None and cell.good:
         radius, log_weight = (np.concatenate(part) for part in zip(*cell.tilted, strict=True))
@@ -128,7 +139,7 @@ def reached(campaign: CampaignFile, book: Ledger, cell: int, rows: int) -> bool:
     return (interval.high - interval.low) / 2.0 <= campaign.half_width  # nan is not narrow
 
 
-def precision(campaign: CampaignFile, read: _Cell) -> Interval:
+def precision(campaign: CampaignFile, read: Folded) -> Interval:
     """The quantile that the campaign wants to know, as well as it is known."""
     wanted = campaign.table.precision
     assert wanted is not None
@@ -137,14 +148,14 @@ def precision(campaign: CampaignFile, read: _Cell) -> Interval:
     return statistics.quantile_interval(read.outputs[wanted.output].sketch, wanted.quantile, wanted.confidence)
 
 
-def _time_tail(read: _Cell, probability: float, confidence: float) -> Interval:
+def _time_tail(read: Folded, probability: float, confidence: float) -> Interval:
     tail = tails.tail_of_time(
         read.survival, read.survival_square, read.good, bin_edges_rad(), (probability,), confidence
     )
     return tail.wanted[probability]
 
 
-def _precision_words(campaign: CampaignFile, read: _Cell, values: Mapping[str, str]) -> list[str]:
+def _precision_words(campaign: CampaignFile, read: Folded, values: Mapping[str, str]) -> list[str]:
     """How well the wanted quantile is known, and whether that is enough."""
     wanted = campaign.table.precision
     if wanted is None or not read.good:
@@ -175,44 +186,58 @@ def summarise(path: Path) -> CampaignSummary:
     with Ledger.open(path, write=False) as book, book.still():
         head, notes = book.head, book.notes()
         opened = bundle.opened(head.bundle, any_code=True)
-        campaign = opened.campaign
-        of = plan.outputs(campaign)
-        cells, reads, failed, findings, sample = [], [], [], [], _Sample(campaign, book)
-        for number, values in enumerate(campaign.cells):
-            read = _read(campaign, sample.passing(number))
-            reads.append(read)
-            failed += [(number, each) for each in read.failed]
-            findings += _precision_words(campaign, read, values)
-            cells.append(
-                CellSummary(
-                    values=dict(values),
-                    rows=read.rows,
-                    failed=read.failed_rows,
-                    outputs=_outputs(campaign, read, of),
-                    missed=statistics.share_interval(read.missed, CONFIDENCE),
-                    missed_by={k: statistics.share_interval(v, CONFIDENCE) for k, v in read.missed_by.items()},
-                    tail=_tail(campaign, read),
-                )
-            )
-        return CampaignSummary(
-            name=head.campaign_name,
-            mission_name=head.mission_name,
-            hashes=head.hashes,
-            seed=head.seed,
-            sampling=campaign.table.sampling,
-            loop=_loop_words(campaign),
-            inputs=campaign.inputs,
-            fixed=campaign.fixed,
-            limits=campaign.limits,
-            cells=tuple(cells),
+        campaign, sample = opened.campaign, _Sample(opened.campaign, book)
+        reads = [_read(campaign, sample.passing(number)) for number in range(len(campaign.cells))]
+        cells = [cell_summary(campaign, number, read) for number, read in enumerate(reads)]
+        pace = progress(campaign, sum(read.rows for read in reads), notes, is_written(path))
+        return replace(
+            assembled(head, campaign, cells, reads, pace),
             sensitivities=_sensitivities(campaign, book),
             sample=sample.columns(),
             worst=_worst_first(campaign, book.traces()),
-            failed=tuple(failed[:MOST_FAILED]),
-            progress=_progress(campaign, cells, notes, is_written(path)),
-            warnings=_warnings(campaign, cells, reads),
-            findings=tuple(findings),
         )
+
+
+def cell_summary(
+    campaign: CampaignFile, number: int, read: Folded, quantiles: tuple[float, ...] = QUANTILES
+) -> CellSummary:
+    """A cell as it was read; without ``quantiles``, how its rows keep the limits alone."""
+    return CellSummary(
+        values=dict(campaign.cells[number]),
+        rows=read.rows,
+        failed=read.failed_rows,
+        outputs=_outputs(campaign, read, quantiles) if quantiles else {},
+        missed=statistics.share_interval(read.missed, CONFIDENCE),
+        missed_by={name: statistics.share_interval(share, CONFIDENCE) for name, share in read.missed_by.items()},
+        tail=_tail(campaign, read) if quantiles else None,
+    )
+
+
+def assembled(
+    head: Head, campaign: CampaignFile, cells: list[CellSummary], reads: list[Folded], pace: Progress
+) -> CampaignSummary:
+    """A summary without what needs single rows: sensitivities, a sample and the worst traces."""
+    failed = [(number, each) for number, read in enumerate(reads) for each in read.failed]
+    findings = (_precision_words(campaign, read, campaign.cells[number]) for number, read in enumerate(reads))
+    return CampaignSummary(
+        name=head.campaign_name,
+        mission_name=head.mission_name,
+        hashes=head.hashes,
+        seed=head.seed,
+        sampling=campaign.table.sampling,
+        loop=_loop_words(campaign),
+        inputs=campaign.inputs,
+        fixed=campaign.fixed,
+        limits=campaign.limits,
+        cells=tuple(cells),
+        sensitivities=(),
+        sample={},
+        worst=(),
+        failed=tuple(failed[:MOST_FAILED]),
+        progress=pace,
+        warnings=_warnings(campaign, cells, reads),
+        findings=tuple(words for found in findings for words in found),
+    )
 
 
 def _loop_words(campaign: CampaignFile) -> str:
@@ -271,9 +296,9 @@ def _sensitivities(campaign: CampaignFile, book: Ledger) -> tuple[Sensitivity, .
     return tuple(sensitivity({name: columns[name] for name in drawn}, columns[name], name) for name in names)
 
 
-def _progress(campaign: CampaignFile, cells: list[CellSummary], notes: dict[str, object], written: bool) -> Progress:
-    done, seconds = sum(cell.rows for cell in cells), float(str(notes.get("seconds", 0.0)))
-    state = str(notes.get("state", "waiting"))
+def progress(campaign: CampaignFile, done: int, notes: Mapping[str, object], written: bool) -> Progress:
+    """How far a campaign is with so many rows, from what its ledger notes, and whether a process writes to that."""
+    seconds, state = float(str(notes.get("seconds", 0.0))), str(notes.get("state", "waiting"))
     if state == "running" and not written:  # whoever ran it was killed
         state = "stopped"
     total = done if state == "complete" else max(done, plan.rounds(campaign)[0] * len(campaign.cells))
@@ -294,7 +319,7 @@ def _largest(cells: list[CellSummary], name: str) -> float:
     return max((cell.outputs[name].most for cell in cells if name in cell.outputs), default=0.0)
 
 
-def _warnings(campaign: CampaignFile, cells: list[CellSummary], reads: list[_Cell]) -> tuple[str, ...]:
+def _warnings(campaign: CampaignFile, cells: list[CellSummary], reads: list[Folded]) -> tuple[str, ...]:
     found = list(campaign.warnings)
     failed, rows = sum(cell.failed for cell in cells), sum(cell.rows for cell in cells)
     if failed:
