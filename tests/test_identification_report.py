@@ -28,7 +28,7 @@ from microrad.report.identification_parameters import (
     starts_text,
     two_digits,
 )
-from report_pages import without_scripts
+from report_pages import assert_sound, without_scripts
 
 RATE_HZ = 2000.0
 HOSTILE = "<script>alert(1)</script> $x_^2$ .csv"
@@ -144,6 +144,7 @@ class Links(HTMLParser):
 
 def test_the_page_loads_nothing_and_has_its_sections_in_order(page, full):
     text = without_scripts(text_of(page))
+    assert_sound(text)
     links = Links()
     links.feed(text)
     assert [link for link in links.found if not link.startswith("#")] == []

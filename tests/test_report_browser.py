@@ -5,16 +5,19 @@ from pathlib import Path
 
 import pytest
 
+import test_identification_report as identified
+import test_report_campaign as campaigns
+import test_report_fine_pointing as fine_loops
+from browser import violations
 from microrad import missionfile, report, study
-from microrad.report import budget_views, day_views
+from microrad.identify import identify
+from microrad.report import budget_views, campaign_page, day_views
 from shipped import SHIPPED
 
-sync_api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
-CHROMIUM = next((p for p in map(Path, ("/usr/bin/chromium", "/usr/bin/chromium-browser")) if p.exists()), None)
-pytestmark = [pytest.mark.long, pytest.mark.skipif(CHROMIUM is None, reason="Chromium is not installed")]
-
 WIDTHS = (1280, 400)
-SERIOUS = ("serious", "critical")
+A4_PX = 680  # between the margins
+ALIVE = {"report": 20, "day": 6, "campaign": 6, "identification": 5}
+"""Pages with interactive figures, and how many they have at least."""
 MOST_BYTES = 6_000_000
 SLOW_MS = 60_000
 
@@ -29,20 +32,22 @@ def found():
 
 @pytest.fixture(scope="module")
 def files(found, tmp_path_factory):
+    """Every kind of page that there is; the fine-pointing loop of the report is made up."""
     folder = tmp_path_factory.mktemp("browser")
-    written = {"report": report.write(found, folder / "study")}
-    for name, text in (("day", day_views.html(found.day, found.links)), ("budget", budget_views.html(found.links))):
+    fine = fine_loops.made_up(found.file)
+    written = {"report": report.write(fine_loops.with_fine(found, fine), folder / "study")}
+    recordings = [identified.loop(60.0, 1, "60.csv"), identified.loop(100.0, 3, "100.csv"), identified.chirp()]
+    mirror = identify(recordings, 0.5, models=("prandtl_ishlinskii", "linear"))
+    written["identification"] = identified.write(mirror, folder / "identification.html", recordings=recordings)
+    texts = {
+        "day": day_views.html(found.day, found.links),
+        "budget": budget_views.html(found.links),
+        "campaign": campaign_page.html(campaigns.CASES["two inputs"]()),
+    }
+    for name, text in texts.items():
         written[name] = folder / f"{name}.html"
         written[name].write_text(text, encoding="utf-8")
     return written
-
-
-@pytest.fixture(scope="module")
-def browser():
-    with sync_api.sync_playwright() as playwright:
-        chromium = playwright.chromium.launch(executable_path=str(CHROMIUM), args=["--no-sandbox"])
-        yield chromium
-        chromium.close()
 
 
 class Opened:
@@ -88,12 +93,12 @@ def visible(figure, selector):
 
 
 @pytest.mark.parametrize("width", WIDTHS)
-@pytest.mark.parametrize("name", ["report", "day", "budget"])
+@pytest.mark.parametrize("name", ALIVE)
 def test_each_figure_comes_alive_and_nothing_is_loaded_or_complained_of(opened, files, name, width):
     assert files[name].stat().st_size < MOST_BYTES
     here = opened(name, width)
     figures = here.figures()
-    assert len(figures) >= (4 if name == "budget" else 6)
+    assert len(figures) >= ALIVE[name]
     first = figures[-1]
     assert visible(first, ".picture svg")  # before it comes into view
     for figure in figures:
@@ -103,6 +108,19 @@ def test_each_figure_comes_alive_and_nothing_is_loaded_or_complained_of(opened, 
         assert figure.query_selector_all(".tools button")
     assert here.said == []
     assert set(here.asked) == {files[name].as_uri()}
+    assert here.page.evaluate("document.documentElement.scrollWidth") <= width
+    ids = here.page.evaluate("[...document.querySelectorAll('[id]')].map(each => each.id)")
+    assert len(ids) == len(set(ids)) > 30
+
+
+@pytest.mark.parametrize("width", WIDTHS)
+def test_the_page_of_budgets_is_pictures_with_their_numbers_below(opened, files, width):
+    here = opened("budget", width)
+    assert all(visible(figure, "svg[role=img]") for figure in here.figures("figure"))
+    assert len(here.figures("figure")) == len(here.figures("figure + details")) == 4
+    assert len(here.figures("script")) == 1  # for the keyboard
+    assert here.said == []
+    assert set(here.asked) == {files["budget"].as_uri()}
     assert here.page.evaluate("document.documentElement.scrollWidth") <= width
 
 
@@ -174,6 +192,20 @@ def test_the_pictures_print_and_the_buttons_do_not(opened, tmp_path):
     assert printed.stat().st_size > 200_000
 
 
+SHOWN = "each => each.getBoundingClientRect().height > 2 * each.querySelector('summary').getBoundingClientRect().height"
+
+
+@pytest.mark.parametrize("name", [*ALIVE, "budget"])
+def test_paper_is_wide_enough_and_shows_what_is_folded(opened, name):
+    here = opened(name, A4_PX)
+    folded = here.figures("details:not([open]):not(.data)")
+    assert folded
+    here.page.emulate_media(media="print")
+    assert here.page.evaluate("document.documentElement.scrollWidth") <= A4_PX  # else all of it would print smaller
+    assert [each.inner_text()[:50] for each in folded if not here.page.evaluate(SHOWN, each)] == []
+    assert not any(each.is_visible() for each in here.figures("nav, button, details.data"))
+
+
 def test_without_scripts_every_figure_is_its_picture(opened):
     here = opened(java_script_enabled=False)
     figures = here.figures("figure")
@@ -194,13 +226,14 @@ def test_points_are_saved_as_a_table_where_there_is_no_folder(opened):
     assert here.figure("Contacts").query_selector("a") is None
 
 
-@pytest.mark.parametrize(("name", "width"), [("report", 1280), ("report", 400), ("day", 1280), ("budget", 400)])
-def test_axe_finds_nothing_serious(opened, name, width):
-    axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="axe is not installed")
+@pytest.mark.parametrize(
+    ("name", "width"),
+    [("report", 1280), ("report", 400), ("day", 1280), ("budget", 400), ("campaign", 1280), ("identification", 400)],
+)
+def test_axe_finds_nothing(opened, name, width):
     here = opened(name, width)
     here.page.evaluate("document.querySelectorAll('details').forEach(each => { each.open = true })")
     for figure in here.figures():
         here.ready(figure)
-    found = axe.Axe().run(here.page).response["violations"]
-    bad = [(each["id"], each["nodes"][0]["html"][:150]) for each in found if each["impact"] in SERIOUS]
-    assert bad == []
+    found = violations(here.page)
+    assert [(each["id"], each["impact"], each["nodes"][0]["html"][:150]) for each in found] == []

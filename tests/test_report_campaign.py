@@ -35,11 +35,12 @@ from microrad.report import (
     campaign_figures,
     campaign_numbers,
     campaign_page,
+    campaign_scale,
     campaign_tables,
     campaign_words,
 )
 from microrad.report.campaign_numbers import share, value
-from report_pages import without_scripts
+from report_pages import assert_sound, without_scripts
 
 NAME = 'LEO <b>"A&B"</b> $x$'
 CONFIDENCE = 0.99
@@ -345,6 +346,7 @@ def test_each_page_is_whole_loads_nothing_and_escapes_its_texts(case):
     page = Page(text)
     assert page.open == []
     assert page.loads == []
+    assert_sound(text)
     assert page.headings[0] == "margin <tail>"
     assert f"Mission: {NAME}</p>" in unescape(text)
     assert "<b>" not in text
@@ -629,7 +631,7 @@ def test_a_distribution_shows_its_limit_its_quantiles_and_all_of_its_rows():
 
 
 def test_an_axis_has_a_prefix_that_suits_its_values():
-    scale = campaign_axes.scale_of
+    scale = campaign_scale.scale_of
     for values, unit, name, factor, label in (
         ([2e-6, 9e-6], "rad", "residual_rms", 1e6, "µrad"),
         ([3e8], "bit/s", "data_rate", 1e-6, "Mbit/s"),

@@ -21,11 +21,13 @@ from microrad.fine_loop.ensemble import bin_edges_rad
 from microrad.fine_loop.linear import close, stationary
 from microrad.fine_loop.loop import ReferenceFilter, assemble, with_inverse
 from microrad.fine_pointing import Difference, ErrorBudget, FinePointingStudy, Part, Residual, Sine, Verified
+from microrad.link import Tornado
+from microrad.link_study import UNDER_JITTER
+from microrad.report import chain, requirement_views, results
 from microrad.report import fine_pointing as section
 from microrad.report import fine_pointing_figures as figures
 from microrad.report import fine_pointing_words as words
 from microrad.report import page as report_page
-from microrad.report import requirement_views, results
 from shipped import SHIPPED
 
 HEADING = "Fine pointing under vibration and noise"
@@ -55,6 +57,10 @@ def plain(file):
 
 @pytest.fixture(scope="module")
 def fine(file):
+    return made_up(file)
+
+
+def made_up(file):
     """A study of three controllers in the mission's own loop; what they leave is made up, each number unlike others."""
     scene = fine_pointing.scene(file)
     freq = np.linspace(0.0, 0.5 / scene.loop.timing.period_s, 129)
@@ -369,8 +375,17 @@ def test_the_tail_stands_by_itself_with_its_intervals(page, fine, written):
 def test_fine_requirements_stand_with_their_dominant_part(plain, fine):
     rows = requirement_views.rows(with_fine(plain, fine))
     assert rows[5]["contributor"] == "Vibration (OLYMPUS): 3 µrad of 3.05 µrad rms, 97 % of the squares"
-    assert rows[6]["contributor"].startswith("Vibration (OLYMPUS), pointing loss ")
-    assert "; the margin moves most with " in rows[6]["contributor"]
+    whole = with_fine(plain, fine)
+    lost = whole.performance.case(performance.FINE, SECOND, "given").outage_loss_db
+    top = plain.links.tornado[0]
+    assert rows[6]["contributor"] == (
+        f"Vibration (OLYMPUS), pointing loss {lost:.2f} dB at the outage; the margin moves most with {top.key}: "
+        f"{top.swing_db:.2f} dB for 10 % both ways"
+    )
+    swing = replace(top, key="jitter.rms", margin_low_db=0.0, margin_high_db=1.5)
+    under = replace(plain.links, tornados=(*plain.links.tornados, Tornado(UNDER_JITTER, 0.7, (swing,))))
+    said = requirement_views.rows(replace(whole, links=under))[6]["contributor"]
+    assert said.endswith("with jitter.rms: 1.50 dB for 10 % both ways")  # the margin that the outage leaves moves so
 
 
 def test_a_missed_requirement_is_said_everywhere(plain, fine, mission):
@@ -471,6 +486,25 @@ def test_a_limit_that_a_controller_met_is_a_warning_and_on_the_page(fine, missio
     assert f"fine pointing: {THIRD} on the comparison model: {percent} {limit}" in words.warnings(met, mission)
     assert not any(limit in w for w in words.warnings(fine, mission))
     assert section.limits(met) == [f"{THIRD}, comparison model: {percent} {limit}"]
+
+
+def test_the_chain_marks_the_mirror_by_its_stroke(plain, fine):
+    roomy = [replace(axis, usable_travel_rad=axis.travel_rad) for axis in fine.scene.stroke]
+    enough = replace(fine, scene=replace(fine.scene, stroke=tuple(roomy)))
+
+    def box(of):
+        (found,) = (stage for stage in chain.stages(of) if stage.name == "Mirror")
+        return found.mark, found.lines[-1]
+
+    assert box(with_fine(plain, fine)) == ("FAIL", "stroke 623 of 534 µrad (x)")
+    mark, line = box(with_fine(plain, enough))
+    assert (mark, line) == ("PASS", f"stroke 623 of {roomy[0].travel_rad / 2 * 1e6:.0f} µrad (x)")
+    assert box(plain)[0] == ""  # nothing says what it has to follow
+    residual = next(stage for stage in chain.stages(with_fine(plain, enough)) if stage.name == "Residual")
+    assert residual.mark == "FAIL"  # of the sines, though the fine loop is within it
+    assert residual.lines == ("12.1 µrad peak, 25 Hz sine", "4.23 µrad at 99.7 %, vibration", "allowed 10 µrad")
+    words = "at the mirror, whether its stroke covers the worst case"
+    assert (words in render(with_fine(plain, fine)), words in render(plain)) == (True, False)
 
 
 def test_a_stroke_that_does_not_fit_is_a_warning_for_each_axis(fine, mission):

@@ -3,6 +3,7 @@
 import json
 import math
 import re
+import xml.etree.ElementTree as ET
 
 import matplotlib as mpl
 import numpy as np
@@ -16,6 +17,8 @@ from microrad.report.day_figures import empty
 from microrad.report.figures import MOST_POINTS, STYLE, Figure, svg_of
 from microrad.report.interactive_style import numbers, outlines, thin_curve, words
 from microrad.report.page import pages
+from microrad.report.tables import rows_of
+from report_pages import assert_sound
 from shipped import SHIPPED
 
 HOSTILE = '</script><b onclick="x()">&amp; %{x} <a href="https://example.org">link</a>'
@@ -357,7 +360,47 @@ def test_hostile_names_are_words_and_end_nothing(canvas):
 def page_of(*drawn, files=False):
     env = pages()
     source = '{% from "figure.html" import drawn %}<!DOCTYPE html><html><body>{{ drawn(figures, files) }}</body></html>'
-    return interactive.with_library(env.from_string(source).render(figures=drawn, files=files))
+    return interactive.with_scripts(env.from_string(source).render(figures=drawn, files=files))
+
+
+def test_two_pictures_of_a_page_share_no_id_and_keep_what_theirs_refer_to(canvas):
+    for axes in canvas.subplots(1, 2):
+        axes.fill_between([0, 1], [0, 1], hatch="////", facecolor="none")
+        axes.plot([0, 1], [1, 0], "o", label='<g id="a" href="#b">')
+        axes.legend()
+    svg = svg_of(canvas)
+    one, two = (Figure(name, "T", "C", svg, {}) for name in ("one", "two (a/b)"))
+    page = page_of(one, two)
+    assert_sound(page)
+    for picture, prefix in ((one.labelled, "one-"), (two.labelled, "two--a-b--")):
+        root = ET.fromstring(picture)
+        ids = [each.get("id") for each in root.iter() if each.get("id")]
+        assert len(ids) > 4
+        assert ids == [each for each in ids if each.startswith(prefix)]
+        drawn = [each for each in ET.fromstring(svg).iter() if each.get("{http://www.w3.org/1999/xlink}href")]
+        assert picture.count("url(#") == svg.count("url(#") > 0
+        assert picture.count('xlink:href="#') == len(drawn) > 0
+        assert '&lt;g id="a" href="#b"&gt;' in picture  # a text is no tag
+        assert "<style" not in picture  # it would hold for the whole page
+    assert one.labelled == Figure("one", "T", "C", svg, {}).labelled
+
+
+def test_columns_become_rows_of_text_with_gaps_left_empty():
+    columns = {"input": ("a", "b", "c"), "value (m)": np.array([1.0 / 3.0, math.nan]), "n": np.array([1e9])}
+    assert rows_of(columns, 3) == [("a", "0.333", "1e+09"), ("b", "", ""), ("c", "", "")]
+
+
+def test_numbers_stand_below_a_picture_where_they_are_wanted(canvas):
+    canvas.subplots().plot([0, 1], [0, 1])
+    one = Figure("one", "T", "C", svg_of(canvas), {"input <b>": ("x&y",), "value (m)": np.array([0.25])})
+    assert one.static.plot == ""
+    assert one.static.svg == one.svg
+    source = '{% from "figure.html" import drawn %}{{ drawn(figures, false, true) }}'
+    page = pages().from_string(source).render(figures=[one.static])
+    assert "<script" not in page
+    assert '<th>input &lt;b&gt;</th><th class="number">value (m)</th>' in page
+    assert '<td>x&amp;y</td><td class="number">0.25</td>' in page
+    assert "<details" not in page_of(one)
 
 
 def test_a_page_carries_the_library_once_and_only_for_interactive_figures(canvas):
@@ -370,7 +413,8 @@ def test_a_page_carries_the_library_once_and_only_for_interactive_figures(canvas
     assert '<a href="figures/one.csv">' in page
     static = Figure("two", "Words", "Caption", empty("nothing to see"), {})
     assert static.plot == ""
-    assert "<script" not in page_of(static)
+    assert interactive.library() not in page_of(static)
+    assert page_of(static).count("<script") == page_of(one).count(interactive.keyboard()) == 1
     assert 'role="img"' in page_of(static)
 
 

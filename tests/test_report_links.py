@@ -331,7 +331,9 @@ def test_the_figures_are_svg_with_their_numbers_beside_them(plain):
         assert ET.fromstring(figure.svg).tag == f"{SVG}svg"
         assert figure.title
         assert len({np.size(column) for column in figure.columns.values()}) == 1
-        assert all(np.isfinite(column).all() for column in figure.columns.values())
+        assert all(np.isfinite(column).all() for column in figure.columns.values() if not isinstance(column, tuple))
+    assert tornado.columns["input"] == tuple(s.key for s in plain.tornado)
+    assert tornado.columns["SI unit"] == tuple(s.unit for s in plain.tornado)
     assert list(tornado.columns["margin lower (dB)"]) == [s.margin_low_db for s in plain.tornado]
     for figure, each in zip(drawn[1:4], plain.tornados, strict=True):
         assert list(figure.columns["margin higher (dB)"]) == [s.margin_high_db for s in each.swings]
@@ -410,7 +412,8 @@ def test_a_tornado_shows_its_longest_bars_and_names_assumptions(plain):
     assert len(labels) == link_figures.MOST_BARS
     assert labels[0] == "k0 = 300 Mbit/s"
     assert figure.caption.endswith("Assumptions among them: communication.k1.")
-    assert all(column.size == 30 for column in figure.columns.values())
+    assert {len(column) for column in figure.columns.values()} == {30}
+    assert figure.columns["input"][:2] == ("communication.k0", "communication.k1")
 
 
 def test_the_required_margin_is_marked_where_it_is_in_sight(plain, tmp_path):

@@ -1,20 +1,20 @@
 """Reports of a study and of an identification: a page that opens offline, the verdict in words, plain data."""
 
 import csv
-import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from microrad.constellation import ConstellationPlan
 from microrad.folder import MANIFEST, FolderError, check_folder, whole_folder
-from microrad.operations import csv_text
-from microrad.report.identification import ReportError, check_identification, write_identification
-from microrad.report.identification_words import identification_data, identification_text
-from microrad.report.words import summary, verdict_text
-from microrad.study import Study
+from microrad.report.tables import Column, rows_of
+
+if TYPE_CHECKING:
+    from microrad.constellation import ConstellationPlan
+    from microrad.report.identification import ReportError, check_identification, write_identification
+    from microrad.report.identification_words import identification_data, identification_text
+    from microrad.report.words import summary, verdict_text
+    from microrad.study import Study
 
 __all__ = [
     "FolderError",
@@ -29,11 +29,28 @@ __all__ = [
     "write_identification",
 ]
 
+_LAZY = {
+    "ReportError": "identification",
+    "check_identification": "identification",
+    "write_identification": "identification",
+    "identification_data": "identification_words",
+    "identification_text": "identification_words",
+    "summary": "words",
+    "verdict_text": "words",
+}
+
 Progress = Callable[[int, int, str], None]
 
 
+def __getattr__(name: str) -> Any:
+    """A name of `_LAZY`: study and identification load when they are asked for, not with the words of a campaign."""
+    if name in _LAZY:
+        return getattr(import_module(f"{__name__}.{_LAZY[name]}"), name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
 def write(
-    study: Study, folder: Path, *, overwrite: bool = False, on_progress: Progress = lambda done, total, what: None
+    study: "Study", folder: Path, *, overwrite: bool = False, on_progress: Progress = lambda done, total, what: None
 ) -> Path:
     """Write report.html, results.nc, manifest.json and figures/ into ``folder``, all of them or none.
 
@@ -66,28 +83,29 @@ def write(
             (draft / "figures" / f"{figure.name}.svg").write_text(figure.svg, encoding="utf-8")
             write_columns(figure.columns, draft / "figures" / f"{figure.name}.csv")
         on_progress(1, 3, "page")
-        text = page.render(study, drawn, results.manifest(study, draft))
+        made = results.manifest(study, draft)
+        text = page.render(study, drawn, made)
         (draft / "report.html").write_text(text, encoding="utf-8")
         on_progress(2, 3, "results")
         if study.plan is not None:
             write_plan(study.plan, draft)
         results.write_results(study, draft / "results.nc")
-        results.write_manifest(study, draft, MANIFEST)
+        results.write_manifest(made, draft, MANIFEST)
         on_progress(3, 3, "done")
     return folder / "report.html"
 
 
-def write_plan(plan: ConstellationPlan, folder: Path) -> None:
+def write_plan(plan: "ConstellationPlan", folder: Path) -> None:
     """The sessions of a constellation for a spreadsheet, and as a contact plan."""
+    from microrad.operations import csv_text
+
     (folder / "sessions.csv").write_text(csv_text(plan.planned, plan.epoch.utc) + "\n", encoding="utf-8")
     (folder / "contact-plan.ionrc").write_text(plan.contact_plan() + "\n", encoding="utf-8")
 
 
-def write_columns(columns: dict[str, Any], path: Path) -> None:
-    """Columns of numbers as CSV with a heading; shorter columns end early."""
-    longest = max(np.size(c) for c in columns.values())
-    padded = [[*map(float, c), *[math.nan] * (longest - np.size(c))] for c in columns.values()]
+def write_columns(columns: Mapping[str, Column], path: Path) -> None:
+    """Columns as CSV with a heading, numbers to nine digits; shorter columns end early."""
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         writer.writerow(columns)
-        writer.writerows(["" if math.isnan(v) else f"{v:.9g}" for v in row] for row in zip(*padded, strict=True))
+        writer.writerows(rows_of(columns, 9))

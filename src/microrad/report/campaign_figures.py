@@ -25,7 +25,8 @@ from microrad.campaign.records import (
 from microrad.report import campaign_numbers as numbers
 from microrad.report import campaign_tables as tables
 from microrad.report import campaign_words as words
-from microrad.report.campaign_axes import Scale, label_of, logarithm, scale_of, svg_of
+from microrad.report.campaign_axes import label_of, logarithm, svg_of
+from microrad.report.campaign_scale import Scale, scale_of
 from microrad.report.day_figures import GREY, PLAIN, WIDTH, short
 from microrad.report.figures import BLACK, BLUE, GREEN, ORANGE, SKY, VERMILION, Figure, Floats, thin
 

@@ -17,7 +17,7 @@ _MOST_QUANTILES = 5
 def html(summary: CampaignSummary) -> str:
     """The page; every text of the campaign is escaped, and nothing is loaded from anywhere."""
     text = page.pages().get_template("campaign.html").render(context(summary, draw(summary)))
-    return interactive.with_library(text)
+    return interactive.with_scripts(text)
 
 
 def context(summary: CampaignSummary, figures: dict[str, Any]) -> dict[str, Any]:

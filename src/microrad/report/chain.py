@@ -18,7 +18,7 @@ from microrad.tracking import residual_rad
 from microrad.units import format_quantity
 
 _TITLE_HEIGHT, _LINE_HEIGHT, _PAD = 30, 18, 12
-_CHARACTER_WIDTH = 6.3  # of the text, in the mean of a line
+_CHARACTER_WIDTH = 6.5  # of the text, in the mean of a line
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,10 +129,11 @@ def _mirror(study: Study) -> Stage:
         low, high = min(study.loops, key=lambda loop: loop.freq_hz), max(study.loops, key=lambda loop: loop.freq_hz)
         lines.append(f"hysteresis {100 * low.width:.1f} % at {low.freq_hz:g} Hz,")
         lines.append(f"{100 * high.width:.1f} % at {high.freq_hz:g} Hz")
-    if study.fine_pointing is not None:
-        axis = min(mission_stroke(study.fine_pointing, m), key=lambda a: a.margin_rad)
-        lines.append(f"stroke needs {micro(axis.needed_rad)} of {micro(axis.available_rad)} µrad ({axis.name})")
-    return Stage("Mirror", tuple(lines))
+    if study.fine_pointing is None:
+        return Stage("Mirror", tuple(lines))
+    axis = min(mission_stroke(study.fine_pointing, m), key=lambda a: a.margin_rad)
+    lines.append(f"stroke {micro(axis.needed_rad)} of {micro(axis.available_rad)} µrad ({axis.name})")
+    return Stage("Mirror", tuple(lines), "PASS" if axis.fits else "FAIL")
 
 
 def _loop(study: Study) -> Stage:

@@ -17,7 +17,7 @@ _BEFORE = 1e-9  # part of a latency by which a jump of the distribution is looke
 
 def draw(day: DayStudy, run: ContactRun | None = None) -> tuple[Figure, ...]:
     """Every figure of a day; ``run`` is one of its contacts, simulated."""
-    found = [_timeline(day), *_along(day), _volume(day), _latency(day), _map(day), _assumptions(day)]
+    found = [_timeline(day), *_along(day), _volume(day), _latency(day), ground_map(day), _assumptions(day)]
     return tuple(found if run is None else [*found, _run(day, run)])
 
 
@@ -89,7 +89,8 @@ def _distribution(way: Way) -> tuple[Floats, Floats]:
     return latency_s, way.latency.cdf(latency_s)
 
 
-def _map(day: DayStudy) -> Figure:
+def ground_map(day: DayStudy) -> Figure:
+    """The world with the ground track, the relay and the stations."""
     o = day.mission.operations
     track = ground_track(day.view, _ways(day), None if o is None else o.downlink)
     places = day_map.Places(track.latitude_rad, track.longitude_rad)

@@ -118,4 +118,4 @@ def html(day: DayStudy, links: LinkStudy) -> str:
             inputs=list(links.file.sources.items()),
         )
     )
-    return interactive.with_library(text)
+    return interactive.with_scripts(text)

@@ -1,9 +1,14 @@
 """A day of the link in words and as plain data."""
 
-import math
+from __future__ import annotations
 
-from microrad.day_study import Closing, DayStudy, Numbers, Swing, Way
+import math
+from typing import TYPE_CHECKING
+
 from microrad.report.quantities import quantity
+
+if TYPE_CHECKING:  # slow to load, and others take a length of time from here
+    from microrad.day_study import Closing, DayStudy, Numbers, Swing, Way
 
 MATTERS = 1.1
 """Factor by which an assumption has to change the comparison to be named."""

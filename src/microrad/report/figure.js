@@ -249,7 +249,7 @@
       buttons(plot, drawn, bar, figure);
       figure.classList.add("ready");
       follow(plot, drawn, box);
-      reachable();
+      dispatchEvent(new Event("drawn"));
     });
   }
 
@@ -264,14 +264,6 @@
     }).observe(box);
   }
 
-  // What scrolls sideways can be reached and scrolled by the keyboard.
-  function reachable() {
-    for (const box of document.querySelectorAll(".scroll, .picture")) {
-      if (box.scrollWidth > box.clientWidth) box.tabIndex = 0;
-      else box.removeAttribute("tabindex");
-    }
-  }
-
   const waiting = new IntersectionObserver((entries) => {
     for (const { isIntersecting, target } of entries) {
       if (!isIntersecting) continue;
@@ -282,8 +274,5 @@
       });
     }
   }, { rootMargin: "300px" });
-  addEventListener("resize", reachable);
-  addEventListener("toggle", reachable, true);  // of details
-  reachable();
   for (const source of document.querySelectorAll("figure > script.plot")) waiting.observe(source.parentElement);
 })();

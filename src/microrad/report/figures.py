@@ -1,11 +1,9 @@
 """The figures of a study: each an SVG, with the data it shows as a table of columns."""
 
 import contextlib
-import html
-import io
 import math
-import re
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -17,6 +15,9 @@ from numpy.typing import NDArray
 from microrad import paper, simulate
 from microrad.mission import Mission
 from microrad.report import interactive
+from microrad.report.inlined import inlined
+from microrad.report.svg_text import svg_text
+from microrad.report.tables import Column, rows_of
 from microrad.study import Study
 from microrad.tracking import Run, residual_rad
 
@@ -39,8 +40,6 @@ STYLE: dict[Any, Any] = {
     "lines.linewidth": 1.3,
 }
 MOST_POINTS = 1200  # of a drawn line; peaks are kept
-_PATH = re.compile(r' d="[^"]*"')
-_DECIMALS = re.compile(r"(\.\d\d)\d+")
 
 
 class Picture(str):
@@ -57,7 +56,7 @@ class Figure:
     title: str
     caption: str
     svg: str
-    columns: dict[str, Floats]
+    columns: Mapping[str, Column]
 
     @property
     def plot(self) -> str:
@@ -66,8 +65,17 @@ class Figure:
 
     @property
     def labelled(self) -> str:
-        """The SVG with its text alternative, for the page."""
-        return self.svg.replace("<svg ", f'<svg role="img" aria-label="{html.escape(self.title)}" ', 1)
+        """The SVG with its text alternative and ids of its own, for the page."""
+        return inlined(self.svg, self.name, self.title)
+
+    @property
+    def static(self) -> "Figure":
+        """The figure without its interactive form."""
+        return replace(self, svg=str(self.svg))
+
+    def rows(self, digits: int) -> list[tuple[str, ...]]:
+        """The data as rows of text, numbers to so many digits."""
+        return rows_of(self.columns, digits)
 
 
 def draw(study: Study) -> tuple[Figure, ...]:
@@ -83,10 +91,7 @@ def draw(study: Study) -> tuple[Figure, ...]:
 
 def svg_of(canvas: Canvas) -> Picture:
     """The canvas as the text of an <svg> element, its coordinates to a hundredth of a point, with its plot."""
-    buffer = io.StringIO()
-    canvas.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
-    text = buffer.getvalue()
-    picture = Picture(_PATH.sub(lambda path: _DECIMALS.sub(r"\1", path.group()), text[text.index("<svg") :]))
+    picture = Picture(svg_text(canvas))
     with contextlib.suppress(interactive.StaticOnlyError):
         picture.plot = interactive.text_of(interactive.plot_of(canvas))
     return picture

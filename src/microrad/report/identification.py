@@ -91,7 +91,7 @@ def render(
     """The page's HTML; every text that is not ours is escaped, and nothing is loaded from anywhere."""
     # Drawing libraries load here, not with the package: they take longer than help should.
     from microrad.report import identification_figures as figures
-    from microrad.report.interactive import with_library
+    from microrad.report.interactive import with_scripts
     from microrad.report.page import pages
     from microrad.report.results import versions
 
@@ -122,7 +122,7 @@ def render(
         "figures": figures.draw(found, recordings, virtual=virtual),
         "versions": versions(),
     }
-    return with_library(pages().get_template("identification.html").render(context))
+    return with_scripts(pages().get_template("identification.html").render(context))
 
 
 def _recordings(found: Identification, everything: Sequence[Recording]) -> list[dict[str, Any]]:

@@ -17,7 +17,7 @@ from microrad.report.interactive_sheet import Sheet, keep_values
 from microrad.report.interactive_style import StaticOnlyError, colour, numbers, words
 from microrad.report.interactive_traces import turn
 
-__all__ = ["StaticOnlyError", "keep_values", "library", "plot_of", "text_of", "with_library"]
+__all__ = ["StaticOnlyError", "keep_values", "keyboard", "library", "plot_of", "text_of", "with_scripts"]
 
 MARK = '<script type="application/json" class="plot">'
 _LIBRARY = "vendor/plotly-cartesian.min.js"
@@ -63,19 +63,25 @@ def text_of(plot: dict[str, Any]) -> str:
     return text.replace("&", "\\u0026").replace("<", "\\u003c").replace(">", "\\u003e")
 
 
-def with_library(page: str) -> str:
-    """The page with the drawing library and the script at its end, where a figure of it is interactive."""
-    if MARK not in page:
-        return page
+def with_scripts(page: str) -> str:
+    """The page with its scripts at its end: the drawing library only where a figure of it is interactive."""
     body, end, rest = page.rpartition("</body>")
-    return body + library() + end + rest
+    return body + keyboard() + (library() if MARK in page else "") + end + rest
+
+
+def keyboard() -> str:
+    """The script element that lets the keyboard scroll what is wider than the page."""
+    return _scripts("reach.js")
 
 
 def library() -> str:
-    """The script elements of a page: plotly (MIT licence, in ``vendor/``), and what draws the figures with it."""
+    """The script elements of figures: plotly (MIT licence, in ``vendor/``), and what draws the figures with it."""
+    return _scripts(_LIBRARY, "figure.js")
+
+
+def _scripts(*names: str) -> str:
     folder = resources.files("microrad.report")
-    scripts = [folder.joinpath(name).read_text(encoding="utf-8") for name in (_LIBRARY, "figure.js")]
-    return "".join(f"<script>\n{script}</script>\n" for script in scripts)
+    return "".join(f"<script>\n{folder.joinpath(name).read_text(encoding='utf-8')}</script>\n" for name in names)
 
 
 def _coloured(axes: Any) -> list[Any]:

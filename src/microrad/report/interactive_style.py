@@ -141,25 +141,29 @@ def thin_curve(x: Floats, y: Floats, most: int = MOST_POINTS) -> NDArray[np.int6
         return np.arange(x.size)
     for picks in range(2, _PICKS + 1):  # a stretch of a smooth curve has two extremes, its ends
         kept = _of_stretches(x, y, max((most - 2) // picks, 1))
-        if len(kept) <= most:
+        if kept.size <= most:
             break
-    return np.array(sorted(kept), dtype=np.int64)
-
-
-def _of_stretches(x: Floats, y: Floats, count: int) -> set[int]:
-    kept = {0, x.size - 1}
-    edges = np.linspace(0, x.size, count + 1, dtype=np.int64)
-    for first, last in pairwise(edges.tolist()):
-        kept |= {first + pick for pick in _extremes(x[first:last], y[first:last])}
     return kept
 
 
-def _extremes(x: Floats, y: Floats) -> set[int]:
-    gaps = np.flatnonzero(np.isnan(x) | np.isnan(y))
-    if gaps.size == x.size:
-        return {0}
-    picks = {int(gaps[0])} if gaps.size else set()
-    return picks | {int(pick(values)) for values in (x, y) for pick in (np.nanargmin, np.nanargmax)}
+def _of_stretches(x: Floats, y: Floats, count: int) -> NDArray[np.int64]:
+    """Both ends, and of each of ``count`` stretches its extremes and its first gap; of one that is a gap, its first."""
+    edges = np.linspace(0, x.size, count + 1, dtype=np.int64)
+    first, gaps = edges[:-1], np.isnan(x) | np.isnan(y)
+    stretch = np.repeat(np.arange(count), np.diff(edges))
+    broken = np.add.reduceat(gaps.astype(np.int64), first) == np.diff(edges)
+    picked = [_firsts(gaps, stretch)]
+    for values in (x, y):
+        for extreme in (np.fmin, np.fmax):
+            found = _firsts(values == extreme.reduceat(values, first)[stretch], stretch)
+            picked.append(found[~broken[stretch[found]]])
+    return np.unique(np.concatenate([[0, x.size - 1], *picked]))
+
+
+def _firsts(held: NDArray[np.bool_], stretch: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Place of the first point of each stretch at which it holds."""
+    places = np.flatnonzero(held)
+    return places[np.unique(stretch[places], return_index=True)[1]]
 
 
 def scale_of(colours: Any, count: int = 17) -> list[list[Any]]:

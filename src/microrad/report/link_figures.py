@@ -15,6 +15,7 @@ from microrad.link_acquisition import Finding
 from microrad.link_study import UNDER_JITTER, LinkStudy
 from microrad.report.day_assumptions import swing_bars
 from microrad.report.figures import BLUE, ORANGE, STYLE, VERMILION, Figure, svg_of
+from microrad.report.tables import Column
 from microrad.units import format_quantity
 
 MOST_BARS = 14
@@ -69,7 +70,9 @@ def one_tornado(study: LinkStudy, of: Tornado) -> Figure:
     )
     if assumed:
         caption += f" Assumptions among them: {', '.join(assumed)}."
-    columns = {
+    columns: dict[str, Column] = {
+        "input": tuple(s.key for s in of.swings),
+        "SI unit": tuple(s.unit for s in of.swings),
         "margin lower (dB)": np.array([s.margin_low_db for s in of.swings]),
         "margin higher (dB)": np.array([s.margin_high_db for s in of.swings]),
         "value (SI)": np.array([s.value for s in of.swings]),

@@ -4,6 +4,7 @@ import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
@@ -45,6 +46,7 @@ PARTS = (
 """The page's parts in their order, by the name of their anchor."""
 
 
+@cache
 def pages() -> Environment:
     """The package's templates, with every text escaped and a missing one an error."""
     return Environment(
@@ -115,7 +117,7 @@ def render(study: Study, drawn: Drawn, manifest: Mapping[str, Any]) -> str:
         "origin": _origin(manifest),
         "manifest": embedded(manifest),
     }
-    return interactive.with_library(template.render(context))
+    return interactive.with_scripts(template.render(context))
 
 
 def embedded(manifest: Mapping[str, Any]) -> str:

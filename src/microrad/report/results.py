@@ -6,6 +6,7 @@ import json
 import math
 import platform
 from collections.abc import Callable, Mapping
+from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -273,9 +274,6 @@ def manifest(study: Study, folder: Path) -> dict[str, Any]:
     The mission's text and hash, those of the files that it names, and versions. Random numbers are drawn for the
     fine-pointing loop, for acquisition and for the day, from the mission's seeds.
     """
-    files: Mapping[str, Any] = {
-        str(p.relative_to(folder)): _sha256(p) for p in sorted(folder.rglob("*")) if p.is_file()
-    }
     mirror, m = study.file.mirror_file, study.file.mission
     drawn = [
         f"seed {table.seed} of [{name}], {table.runs} runs"
@@ -294,7 +292,7 @@ def manifest(study: Study, folder: Path) -> dict[str, Any]:
         "versions": versions(),
         "machine": platform.machine(),
         "randomness": "; ".join(drawn) or "none",
-        "files_sha256": files,
+        "files_sha256": _hashes(folder),
         "summary": finite(words.summary(study)),
     }
 
@@ -329,12 +327,22 @@ def _sha256(path: Path) -> str:
     return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
-def write_manifest(study: Study, folder: Path, name: str) -> None:
-    """The manifest, written last, so that its presence says that the folder is whole."""
-    text = json.dumps(manifest(study, folder), indent=2, ensure_ascii=False)
+def _hashes(folder: Path) -> dict[str, str]:
+    """The hash of each file by its place in the folder."""
+    return {str(p.relative_to(folder)): _sha256(p) for p in sorted(folder.rglob("*")) if p.is_file()}
+
+
+def write_manifest(made: Mapping[str, Any], folder: Path, name: str) -> None:
+    """A manifest with the hashes of all files, written last, so that its presence says that the folder is whole."""
+    text = json.dumps({**made, "files_sha256": _hashes(folder)}, indent=2, ensure_ascii=False)
     (folder / name).write_text(text + "\n", encoding="utf-8")
+
+
+@cache
+def _versions() -> tuple[tuple[str, str], ...]:
+    return (("python", platform.python_version()), *((name, version(name)) for name in LIBRARIES))
 
 
 def versions() -> dict[str, str]:
     """Versions of Python and of the libraries that the numbers depend on."""
-    return {"python": platform.python_version(), **{name: version(name) for name in LIBRARIES}}
+    return dict(_versions())

@@ -1,8 +1,27 @@
-"""Tables for a terminal."""
+"""Tables for a terminal, and columns of data as rows of text."""
 
 import io
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
+from itertools import zip_longest
 from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Column = NDArray[np.float64] | tuple[str, ...]
+"""Of a table of data: numbers, or what the rows are called."""
+
+
+def rows_of(columns: Mapping[str, Column], digits: int) -> list[tuple[str, ...]]:
+    """Columns as rows of text: numbers to so many digits, nothing for a nan and behind the end of a short column."""
+    return [*zip_longest(*(_texts(column, digits) for column in columns.values()), fillvalue="")]
+
+
+def _texts(column: Column, digits: int) -> Sequence[str]:
+    if isinstance(column, tuple):
+        return column
+    return ["" if math.isnan(value) else f"{value:.{digits}g}" for value in column.tolist()]
 
 
 class Table(NamedTuple):

@@ -1,0 +1,169 @@
+"""Debian's Chromium and a running studio for the tests that look at pages, and a watch on what a page says and asks.
+
+conftest.py takes the fixtures in. Chromium is started once for each file of tests, not for all of them: Playwright's
+plain interface leaves an event loop running in its thread, in which no other test could call asyncio.run. A studio is
+a process of its own and serves every file that does not ask for one for itself.
+"""
+
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from shipped import SHIPPED, without_fine_pointing
+
+MISSION = "leo-geo.toml"
+_SETTLED = """
+() => new Promise(done => {
+  let last = setTimeout(done, 250);
+  new MutationObserver(() => { clearTimeout(last); last = setTimeout(done, 250); })
+    .observe(document, { subtree: true, childList: true, attributes: true, characterData: true });
+})
+"""
+_AXE = {"preload": False, "resultTypes": ["violations"]}  # requests of its own would be seen by the page
+LONG_MS = 60_000  # on a machine with other work to do
+
+
+class Studio:
+    """`microrad studio` in a folder of its own with the paper's mission, but for its fine-pointing loop.
+
+    `url` has the token, `base` has not.
+    """
+
+    def __init__(self, folder):
+        pytest.importorskip("nicegui", reason="the studio is not installed (nicegui)")
+        self.folder, self.file = folder, folder / MISSION
+        self.file.write_text(without_fine_pointing(SHIPPED.read_text("utf-8")), "utf-8")
+        self.process = subprocess.Popen(
+            [sys.executable, "-m", "microrad", "studio", MISSION, "--no-browser"],
+            cwd=folder,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            start_new_session=True,
+        )
+        self.url = self.process.stdout.readline().strip()
+        if not self.url:
+            pytest.fail(f"the studio did not start: {self.process.communicate()[1]}")
+        self.base = self.url.partition("?")[0]
+
+    def enter(self, context, path=""):
+        """A watched tab on one of the pages, which has shown the token."""
+        page = watched(context.new_page())
+        page.goto(self.url.replace(self.base, self.base + path))
+        page.get_by_role("heading", level=1).wait_for()
+        assert page.url == self.base + path
+        return page
+
+    def end(self):
+        """End it as Ctrl-C does; it must have complained of nothing."""
+        self.process.send_signal(signal.SIGINT)
+        _, told = self.process.communicate(timeout=60)
+        assert (self.process.returncode, told) == (0, "")
+
+
+def watched(page):
+    """The page, with what it complains of and what it asks for."""
+    page.complaints, page.asked = [], []
+    page.on("console", lambda m: page.complaints.append(m.text) if m.type in ("error", "warning") else None)
+    page.on("pageerror", lambda error: page.complaints.append(str(error)))
+    page.on("request", lambda request: page.asked.append(request.url))
+    return page
+
+
+def check_quiet(page, base):
+    """The page has complained of nothing, and asked nobody but the studio at `base`."""
+    assert page.complaints == []
+    here = re.escape(base.removeprefix("http://"))
+    own = re.compile(rf"(http|ws)://{here}|data:|blob:http://{here}")
+    assert [url for url in page.asked if not own.match(url)] == []
+    assert len(page.asked) > 5
+
+
+def settled(page):
+    """Wait until every plot is drawn and nothing of the page has changed for a quarter of a second."""
+    page.wait_for_function("[...document.querySelectorAll('.js-plotly-plot')].every(e => e.querySelector('.main-svg'))")
+    page.evaluate(_SETTLED)
+
+
+def violations(page):
+    """What axe finds wrong in a page."""
+    axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="axe is not installed")
+    return axe.Axe().run(page, options=_AXE).response["violations"]
+
+
+def until(page, there):
+    """Wait until something holds on this side; the page goes on meanwhile."""
+    for _ in range(LONG_MS // 20):
+        if there():
+            return
+        page.wait_for_timeout(20)
+    pytest.fail("waited in vain")
+
+
+@pytest.fixture(scope="module")
+def browser():
+    """Debian's Chromium, without a window."""
+    api = pytest.importorskip("playwright.sync_api", reason="Playwright is not installed")
+    program = shutil.which("chromium") or shutil.which("chromium-browser")
+    if program is None:
+        pytest.skip("Chromium is not installed")
+    api.expect.set_options(timeout=LONG_MS)
+    with api.sync_playwright() as play:
+        found = play.chromium.launch(executable_path=program, args=["--no-sandbox"])
+        yield found
+        found.close()
+
+
+@pytest.fixture(scope="module")
+def context(browser):
+    """Tabs that share the studio's cookie."""
+    found = browser.new_context(viewport={"width": 1400, "height": 900})
+    found.set_default_timeout(LONG_MS)
+    found.grant_permissions(["clipboard-read", "clipboard-write"])
+    yield found
+    found.close()
+
+
+@pytest.fixture(scope="session")
+def studio(tmp_path_factory):
+    """A studio for many files: behind each test, its mission and the file are as they were."""
+    found = Studio(tmp_path_factory.mktemp("studio"))
+    yield found
+    found.end()
+
+
+@pytest.fixture
+def opened(studio, context):
+    """Opens tabs of the studio, by the path of a page; none of them may complain of anything or ask anybody else."""
+    made = []
+
+    def enter(path=""):
+        made.append(studio.enter(context, path))
+        return made[-1]
+
+    yield enter
+    for page in made:
+        page.close()
+    for page in made:
+        check_quiet(page, studio.base)
+
+
+@pytest.fixture
+def tab(opened):
+    """A tab of the studio, on its first page."""
+    return opened()
+
+
+@pytest.fixture(scope="session")
+def pictures(tmp_path_factory):
+    """Where screenshots go: the folder that MICRORAD_SCREENSHOTS names, else a temporary one."""
+    named = os.environ.get("MICRORAD_SCREENSHOTS")
+    folder = Path(named) if named else tmp_path_factory.mktemp("screenshots")
+    folder.mkdir(parents=True, exist_ok=True)
+    return folder
