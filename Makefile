@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 DEMO := demo
 
-.PHONY: demo test unit long lint types contract benchmark clean
+.PHONY: demo test unit lint types contract benchmark clean
 .DELETE_ON_ERROR:
 
 demo: $(VENV)/.run
@@ -25,10 +25,6 @@ types: $(VENV)/.test
 unit: $(VENV)/.test
 	$(BIN)/python -m pytest --numprocesses 2
 
-# Browsers and jobs of the studio, which the gate's time has no room for.
-long: $(VENV)/.test
-	$(BIN)/python -m pytest --numprocesses 2 -m long
-
 benchmark: $(VENV)/.test
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[benchmark]'
 	$(BIN)/python benchmarks/loop.py
@@ -45,6 +41,7 @@ benchmark: $(VENV)/.test
 	$(BIN)/python benchmarks/hysteresis_fit.py
 	$(BIN)/python benchmarks/cubespec_linear.py
 	$(BIN)/python benchmarks/cubespec_one_model.py
+	$(BIN)/python benchmarks/studio_map.py
 
 clean:
 	rm -rf $(VENV) $(DEMO)

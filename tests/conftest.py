@@ -12,6 +12,8 @@ from hypothesis import settings
 from command_line import Result, listing
 from microrad import cli
 
+pytest_plugins = ("browser",)
+
 # The gate looks at the same examples each time: what one run finds, the next one finds, too. To look for new ones:
 # HYPOTHESIS_PROFILE=explore make unit
 settings.register_profile("gate", derandomize=True)
@@ -24,6 +26,14 @@ if os.environ.get("HYPOTHESIS_PROFILE", "gate") == "gate":
         nothing = importlib.import_module("hypothesis.internal.constants_ast").Constants
         assert callable(providers._get_local_constants)
         providers._get_local_constants = nothing
+
+
+@pytest.fixture(scope="session", autouse=True)
+def own_state(tmp_path_factory):
+    """What microrad keeps for its user outside of working folders goes to a folder of the tests."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("XDG_STATE_HOME", str(tmp_path_factory.mktemp("state")))
+        yield
 
 
 @pytest.fixture

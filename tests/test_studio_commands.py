@@ -31,8 +31,6 @@ from shipped import SHIPPED, without_fine_pointing
 from small_campaign import campaign_file
 from test_cli import write_recording
 
-pytestmark = pytest.mark.long
-
 MISSION = Path("my mission.toml")
 
 

@@ -1,7 +1,9 @@
 """What the studio's pages of links, pointing and day compute, without a browser."""
 
+import base64
 import json
 import math
+import re
 import threading
 from pathlib import Path
 
@@ -10,7 +12,7 @@ import pytest
 
 from link_files import RECEIVERS, data_with, link_file, received_with
 from microrad import day_study, link, link_study
-from microrad.report import figures
+from microrad.report import day_plots, figures
 from microrad.studio import attempts, day_view, dials, link_view, plots, pointing_view
 from microrad.studio.draft import Draft
 from microrad.studio.latest import Latest, shared
@@ -280,6 +282,18 @@ def test_the_timeline_has_every_contact_of_either_way(day):
     assert float(np.sum(rows[0][2][:, 1] - rows[0][2][:, 0])) == pytest.approx(day.relay.contact_s, rel=1e-9)
     bars = day_view.timeline_plot(day)["data"][1]
     assert bars["base"][0] == pytest.approx(day.direct.contacts[0].start_s / 3600.0, abs=1e-5)
+
+
+def test_the_map_is_that_of_the_report_and_loads_nothing(day):
+    address, words = day_view.ground_map(day)
+    kind, _, data = address.partition(",")
+    drawn = base64.b64decode(data, validate=True).decode()
+    assert kind == "data:image/svg+xml;base64"
+    assert drawn == day_plots.ground_map(day).svg
+    assert drawn.startswith("<svg ")
+    assert 'xmlns="http://www.w3.org/2000/svg"' in drawn
+    assert not re.search(r'(?:href="|url\()(?!#)', drawn)
+    assert words.startswith("Ground track of the satellite, thick where it is in contact.")
 
 
 def test_volumes_end_where_the_ways_do(day):

@@ -1,79 +1,42 @@
 """The pages of links, pointing and day in a browser: dials are moved and typed, and what they show follows."""
 
-import re
-import shutil
-import signal
-import subprocess
-import sys
+import json
 
 import pytest
 
-from microrad import link_study
+from browser import check_quiet, until
+from microrad import link, pointing
 from microrad.link_study import largest_rate
 from microrad.report.budget_views import signed_db
+from microrad.studio import link_view
+from microrad.studio.dials import dial
 from microrad.studio.draft import Draft
-from shipped import SHIPPED
 
-pytestmark = pytest.mark.long
-
-pytest.importorskip("nicegui", reason="the studio is not installed (nicegui)")
-api = pytest.importorskip("playwright.sync_api", reason="Playwright is not installed")
-
-LONG_MS = 120_000  # on a machine with other work to do
 APERTURE = "LEO aperture"
+KEY = "terminals.leo_aperture"
+DRAWN = """() => {
+  const map = document.querySelector('.margin-map');
+  window.drawn = [];
+  map.on('plotly_afterplot', () => window.drawn.push(map.data[0].z[0][0]));
+}"""
 CORNER = "() => document.querySelector('.margin-map').data?.[0]?.z?.[0]?.[0]"
 
 
 @pytest.fixture(scope="module")
-def studio(tmp_path_factory):
-    """The command in a folder with the paper's mission: its address, and the file."""
-    folder = tmp_path_factory.mktemp("studio")
-    shutil.copy(SHIPPED, folder / "mission.toml")
-    command = [sys.executable, "-m", "microrad", "studio", "mission.toml", "--no-browser"]
-    process = subprocess.Popen(
-        command, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
-    )
-    url = process.stdout.readline().strip()
-    if not url:
-        pytest.fail(f"the studio did not start: {process.communicate()[1]}")
-    yield url, folder / "mission.toml"
-    process.send_signal(signal.SIGINT)
-    _, told = process.communicate(timeout=30)
-    assert (process.returncode, told) == (0, "")
-
-
-@pytest.fixture(scope="module")
-def context():
-    program = shutil.which("chromium")
-    if program is None:
-        pytest.skip("Chromium is not installed")
-    with api.sync_playwright() as play:
-        browser = play.chromium.launch(executable_path=program, args=["--no-sandbox"])
-        found = browser.new_context(viewport={"width": 1400, "height": 900})
-        found.grant_permissions(["clipboard-read", "clipboard-write"])
-        yield found
-        browser.close()
+def links_tab(studio, context):
+    found = studio.enter(context, "link")
+    yield found
+    found.close()
+    check_quiet(found, studio.base)
 
 
 @pytest.fixture
-def tab(studio, context):
-    """A tab that has shown the token; nothing of it may fail, or ask another host."""
-    page, complaints, asked = context.new_page(), [], []
-    page.set_default_timeout(LONG_MS)
-    page.on("console", lambda m: complaints.append(m.text) if m.type in ("error", "warning") else None)
-    page.on("pageerror", lambda error: complaints.append(str(error)))
-    page.on("request", lambda request: asked.append(request.url))
-    page.goto(studio[0])
-    yield page
-    page.close()
-    assert complaints == []
-    assert len(asked) > 5
-    assert [url for url in asked if not re.match(r"(http|ws)://127\.0\.0\.1:|data:|blob:", url)] == []
-
-
-def show(page, name):
-    page.get_by_role("link", name=name, exact=True).click()
-    page.get_by_role("heading", name=name, level=1).wait_for()
+def links(links_tab):
+    """The page of the links with its map, on the paper's mission, as each test leaves it."""
+    shown_margin(links_tab, "+3.00 dB")
+    links_tab.wait_for_function(CORNER)
+    assert typed(links_tab, APERTURE).input_value() == "5 cm"
+    return links_tab
 
 
 def typed(page, label):
@@ -88,115 +51,137 @@ def shown_margin(page, words):
     page.wait_for_function("w => document.querySelector('.margin-card .value')?.textContent === w", arg=words)
 
 
-def margin_at(file, **changes):
+def mission_at(file, **changes):
+    """The mission with other values, as the command line reads it, and its sources."""
     draft = Draft.open(file)
     for key, value in changes.items():
         draft = draft.set(key.replace("__", "."), value)
-    return link_study.run(draft.link())
+    found = draft.link()
+    return found.mission, found.sources
+
+
+def margin_at(file, **changes):
+    return signed_db(link.communication_budget(*mission_at(file, **changes)).margin_db)
+
+
+def written(studio):
+    """The text that the studio keeps: what is tried only is not in it."""
+    kept = studio.folder / ".microrad-studio" / "draft.json"
+    return json.loads(kept.read_text("utf-8"))["text"] if kept.exists() else studio.file.read_text("utf-8")
 
 
 # --------------------------------------------------------------------------------------------------------------- links
-def test_the_margin_and_the_map_follow_a_typed_aperture(studio, tab):
-    show(tab, "Links")
-    shown_margin(tab, "+3.00 dB")
-    tab.wait_for_function(CORNER)
-    before = tab.evaluate(CORNER)
-    typed(tab, APERTURE).fill("6 cm")
-    wider = margin_at(studio[1], terminals__leo_aperture="6 cm")
-    shown_margin(tab, signed_db(wider.communication.margin_db))
-    tab.wait_for_function(f"before => ({CORNER})() !== before", arg=before)
-    # typed and not let go: nothing is written
-    assert tab.get_by_text("not saved", exact=True).count() == 0
-    typed(tab, APERTURE).press("Enter")
-    tab.get_by_text("not saved", exact=True).wait_for()
-    rate = largest_rate(wider.file.mission)
-    tab.get_by_text(f"At most {rate / 1e6:.3g} Mbit/s at 10 µrad").wait_for()
-    tab.get_by_text(f"Largest data rate with the required 3 dB at 10 µrad: {rate / 1e6:.3g} Mbit/s.").wait_for()
-    typed(tab, APERTURE).fill("5 cm")
-    typed(tab, APERTURE).press("Enter")
-    tab.get_by_role("status").get_by_text("saved", exact=True).wait_for()
-    shown_margin(tab, "+3.00 dB")
+def test_the_margin_and_the_map_follow_a_typed_aperture(studio, links):
+    before, text = links.evaluate(CORNER), written(studio)
+    typed(links, APERTURE).fill("6 cm")
+    shown_margin(links, margin_at(studio.file, terminals__leo_aperture="6 cm"))
+    links.wait_for_function(f"before => ({CORNER})() !== before", arg=before)
+    assert written(studio) == text  # typed and not let go
+    typed(links, APERTURE).press("Enter")
+    links.get_by_text("not saved", exact=True).wait_for()
+    assert written(studio) == text.replace('leo_aperture = "5 cm"', 'leo_aperture = "6 cm"') != text
+    rate = largest_rate(mission_at(studio.file, terminals__leo_aperture="6 cm")[0])
+    links.get_by_text(f"At most {rate / 1e6:.3g} Mbit/s at 10 µrad").wait_for()
+    links.get_by_text(f"Largest data rate with the required 3 dB at 10 µrad: {rate / 1e6:.3g} Mbit/s.").wait_for()
+    typed(links, APERTURE).fill("5 cm")
+    typed(links, APERTURE).press("Enter")
+    links.get_by_role("status").get_by_text("saved", exact=True).wait_for()
+    shown_margin(links, "+3.00 dB")
 
 
-def test_a_slider_that_is_moved_shows_its_value_in_the_map_and_writes_it_when_let_go(studio, tab):
-    show(tab, "Links")
-    shown_margin(tab, "+3.00 dB")
-    tab.wait_for_function(CORNER)
-    before, slider = tab.evaluate(CORNER), tab.get_by_role("slider", name=f"{APERTURE}, slider")
-    box = slider.bounding_box()
-    tab.mouse.move(box["x"] + 0.55 * box["width"], box["y"] + box["height"] / 2)
-    tab.mouse.down()
-    tab.mouse.move(box["x"] + 0.7 * box["width"], box["y"] + box["height"] / 2, steps=4)
-    tab.wait_for_function(f"before => ({CORNER})() > before + 0.5", arg=before)
-    tab.wait_for_timeout(600)
-    assert tab.get_by_text("not saved", exact=True).count() == 0
-    tab.mouse.up()
-    tab.get_by_text("not saved", exact=True).wait_for()
-    value = typed(tab, APERTURE).input_value()
+def test_a_slider_that_is_moved_shows_its_value_in_the_map_and_writes_it_when_let_go(studio, links, opened):
+    before, text = links.evaluate(CORNER), written(studio)
+    typed(links, APERTURE).fill("7 cm")
+    box = links.get_by_role("slider", name=f"{APERTURE}, slider").bounding_box()
+    links.mouse.move(box["x"] + 0.55 * box["width"], box["y"] + box["height"] / 2)
+    links.mouse.down()  # what was typed is not let go by it
+    links.mouse.move(box["x"] + 0.7 * box["width"], box["y"] + box["height"] / 2, steps=4)
+    links.wait_for_function(f"before => ({CORNER})() > before + 4.0", arg=before)
+    assert written(studio) == text
+    links.mouse.up()
+    links.get_by_text("not saved", exact=True).wait_for()
+    value = typed(links, APERTURE).input_value()
     assert 5.0 < float(value.removesuffix(" cm")) < 20.0
-    shown_margin(tab, signed_db(margin_at(studio[1], terminals__leo_aperture=value).communication.margin_db))
-    second = tab.context.new_page()
-    second.goto(studio[0])
-    show(second, "Links")
+    there = margin_at(studio.file, terminals__leo_aperture=value)
+    shown_margin(links, there)
+    second = opened("link")
     second.wait_for_function("() => document.querySelector('.margin-card .value')?.textContent")
     assert typed(second, APERTURE).input_value() == value
+    assert margins(second)[0] == there
     typed(second, APERTURE).fill("5 cm")
     typed(second, APERTURE).press("Enter")
-    shown_margin(tab, "+3.00 dB")  # the first tab follows the second
-    assert typed(tab, APERTURE).input_value() == "5 cm"
-    second.close()
+    shown_margin(links, "+3.00 dB")  # the first tab follows the second
+    assert typed(links, APERTURE).input_value() == "5 cm"
 
 
-def test_a_wrong_unit_is_told_beside_its_field_and_the_last_map_stays(studio, tab):
-    show(tab, "Links")
-    shown_margin(tab, "+3.00 dB")
-    typed(tab, APERTURE).fill("5 W")
-    told = tab.locator(".dial", has=typed(tab, APERTURE)).get_by_role("alert")
+def test_quick_steps_of_a_slider_never_go_back_and_end_at_the_last_in_map_field_and_mission(studio, links):
+    aperture = dial(Draft.open(studio.file).values[KEY])
+    last = aperture.at(aperture.position + 12)
+    links.evaluate(DRAWN)
+    links.get_by_role("slider", name=f"{APERTURE}, slider").locator("[tabindex='0']").focus()
+    for _ in range(12):
+        links.keyboard.press("ArrowRight")
+    until(links, lambda: f'leo_aperture = "{last}"' in written(studio))
+    there = margin_at(studio.file, terminals__leo_aperture=last)
+    shown_margin(links, there)
+    links.get_by_text(f"the communication link has {there}.").wait_for()
+    assert typed(links, APERTURE).input_value() == last
+    drawn = links.evaluate("window.drawn")
+    assert drawn == sorted(drawn)
+    view = link_view.view(Draft.open(studio.file).set(KEY, last).link())
+    assert drawn[-1] == pytest.approx(view.margin_db[0, 0], abs=0.006)
+    typed(links, APERTURE).fill("5 cm")
+    typed(links, APERTURE).press("Enter")
+    links.get_by_role("status").get_by_text("saved", exact=True).wait_for()
+    shown_margin(links, "+3.00 dB")
+
+
+def test_a_wrong_unit_is_told_beside_its_field_and_the_last_map_stays(studio, links):
+    typed(links, APERTURE).fill("5 W")
+    told = links.locator(".dial", has=typed(links, APERTURE)).get_by_role("alert")
     told.wait_for()
-    (fault,) = Draft.open(studio[1]).set("terminals.leo_aperture", "5 W").problems
+    (fault,) = Draft.open(studio.file).set("terminals.leo_aperture", "5 W").problems
     assert told.inner_text() == f"{fault.reason}; expected {fault.expected}"
-    tab.get_by_text("Shown in grey: the mission before this.").wait_for()
-    assert margins(tab)[0] == "+3.00 dB"
-    assert tab.locator(".margin-map-box.behind").count() == 1
-    typed(tab, APERTURE).fill("5 cm")
+    links.get_by_text("Shown in grey: the mission before this.").wait_for()
+    assert margins(links)[0] == "+3.00 dB"
+    assert links.locator(".margin-map.behind").count() == 1
+    typed(links, APERTURE).fill("5 cm")
     told.wait_for(state="hidden")
-    tab.locator(".margin-map-box.behind").wait_for(state="detached")
-    assert typed(tab, APERTURE).get_attribute("aria-invalid") == "false"
+    links.locator(".margin-map.behind").wait_for(state="detached")
+    assert typed(links, APERTURE).get_attribute("aria-invalid") == "false"
 
 
-def test_the_budget_of_another_link_is_chosen_and_the_page_copied_as_a_command(studio, tab):
-    show(tab, "Links")
-    tab.get_by_text("The links close: ").wait_for()
-    tab.get_by_role("button", name="Beacon", exact=True).click()
-    beacon = margin_at(studio[1]).beacon
-    row = tab.locator("tr.total").filter(has_text="Margin")
+def test_the_budget_of_another_link_is_chosen_and_the_page_copied_as_a_command(studio, links):
+    links.get_by_text("The links close: ").wait_for()
+    links.get_by_role("button", name="Beacon", exact=True).click()
+    beacon = link.beacon_budget(*mission_at(studio.file))
+    row = links.locator("tr.total").filter(has_text="Margin")
     row.get_by_text(f"{beacon.margin_db:.2f} dB").wait_for()
-    tab.get_by_role("button", name="Copy as command").click()
-    tab.get_by_text("Copied: microrad budget mission.toml").wait_for()
-    assert tab.evaluate("navigator.clipboard.readText()") == "microrad budget mission.toml"
+    links.get_by_role("button", name="Copy as command").click()
+    links.get_by_text("Copied: microrad budget leo-geo.toml").wait_for()
+    assert links.evaluate("navigator.clipboard.readText()") == "microrad budget leo-geo.toml"
 
 
 # ------------------------------------------------------------------------------------------------------------ pointing
-def test_the_coverage_follows_the_beacon_s_divergence(studio, tab):
-    show(tab, "Pointing")
-    tab.get_by_text("with a probability of 0.53").wait_for()
-    typed(tab, "Divergence").fill("1310 urad")
-    wide = margin_at(studio[1], beacon__divergence="1310 urad").open_loop
-    tab.get_by_text(f"with a probability of {wide.reading.coverage:.4f}").wait_for()
-    tab.get_by_role("cell", name="off the line of sight").first.wait_for()
-    assert tab.get_by_role("row").filter(has_text="radial distribution").get_by_text("covered").count() == 1
+def test_the_coverage_follows_the_beacon_s_divergence(studio, opened):
+    page = opened("pointing")
+    page.get_by_text("with a probability of 0.53").wait_for()
+    typed(page, "Divergence").fill("1310 urad")
+    wide = pointing.open_loop_budget(*mission_at(studio.file, beacon__divergence="1310 urad"))
+    page.get_by_text(f"with a probability of {wide.reading.coverage:.4f}").wait_for()
+    page.get_by_role("cell", name="off the line of sight").first.wait_for()
+    assert page.get_by_role("row").filter(has_text="radial distribution").get_by_text("covered").count() == 1
+    typed(page, "Divergence").fill("780 urad")
+    page.get_by_text("with a probability of 0.53").wait_for()
 
 
 # ----------------------------------------------------------------------------------------------------------------- day
-def test_the_day_is_computed_with_progress_and_a_second_tab_finds_it(studio, tab):
-    show(tab, "Day")
-    tab.get_by_text("Computing, ").wait_for()
-    tab.get_by_text("In 24 h the relay is in view 15 times").wait_for()
-    assert tab.get_by_role("row").filter(has_text="time in contact").get_by_text("913 min").count() == 1
-    tab.wait_for_function("() => document.querySelectorAll('.js-plotly-plot .barlayer .point').length > 30")
-    again = tab.context.new_page()
-    again.goto(studio[0])
-    show(again, "Day")
+def test_the_day_is_computed_with_progress_and_a_second_tab_finds_it(opened):
+    page = opened("day")
+    page.get_by_text("Computing, ").wait_for()
+    page.get_by_text("In 24 h the relay is in view 15 times").wait_for()
+    assert page.get_by_role("row").filter(has_text="time in contact").get_by_text("913 min").count() == 1
+    page.wait_for_function("() => document.querySelectorAll('.js-plotly-plot .barlayer .point').length > 30")
+    again = opened("day")
     again.get_by_text("In 24 h the relay is in view 15 times").wait_for()
     assert again.get_by_text("Computing, ").count() == 0
-    again.close()

@@ -4,16 +4,17 @@ import asyncio
 import contextlib
 import http.client
 import re
-import shutil
 import socket
 import subprocess
 import sys
 import textwrap
 import time
+from html import unescape
 from pathlib import Path
 
 import pytest
 
+from browser import watched
 from microrad.studio import address, policy
 from microrad.studio.guard import Guard, Limits
 
@@ -196,6 +197,20 @@ def test_a_foreign_page_is_refused(origin):
     assert ask(guard(inner), "POST", origin=PAGE).body == "inside"
 
 
+def test_a_page_asks_under_its_own_name_alone():
+    """Another program may listen on [::1] with the same port: its pages are not those of 127.0.0.1."""
+    inner = Inner()
+    for name in (f"localhost:{PORT}", f"[::1]:{PORT}"):
+        page = f"http://{name}"
+        assert ask(guard(inner), origin=page).status == 403
+        assert ask(guard(inner), "POST", origin=page).status == 403
+        assert connect(guard(inner), origin=page).kinds == ["websocket.close"]
+        assert inner.scopes == []
+        assert ask(guard(inner), "POST", host=name, origin=page).status == 200
+        assert connect(guard(inner), host=name, origin=page).kinds == ["websocket.accept"]
+        inner.scopes.clear()
+
+
 def test_what_acts_must_say_where_it_comes_from():
     inner = Inner()
     for method in ("POST", "PUT", "DELETE", "PATCH", "OPTIONS"):
@@ -256,6 +271,15 @@ def test_start_and_stop_of_the_server_pass():
     inner = Inner()
     exchange(guard(inner), {"type": "lifespan"}, [])
     assert [scope["type"] for scope in inner.scopes] == ["lifespan"]
+
+
+@pytest.mark.parametrize("path", ["/\x1b[2J", "/a\r\nb", "/\0", "/\u202e"])
+def test_a_path_that_does_not_print_is_refused(path):
+    inner = Inner()
+    reply = ask(guard(inner), path=path)
+    assert (reply.status, inner.scopes) == (400, [])
+    assert reply.headers[b"connection"] == b"close"
+    assert ask(guard(inner), path="/é/ü").body == "inside"
 
 
 def test_headers_of_a_proxy_do_not_reach_the_application():
@@ -382,6 +406,20 @@ def test_an_application_that_answers_a_body_cut_off_is_not_heard():
     assert "fine" not in reply.body
 
 
+def test_a_flood_into_an_answer_that_has_begun_ends_it_without_a_second_one():
+    seen = []
+
+    async def eager(scope, receive, send):
+        await send({"type": "http.response.start", "status": 200, "headers": []})
+        while (message := await receive())["type"] != "http.disconnect":
+            seen.append(len(message["body"]))
+        await send({"type": "http.response.body", "body": b"all of it"})
+
+    reply = ask(guard(eager), "POST", body=[b"a" * 600] * 3, transfer_encoding="chunked")
+    assert (reply.status, reply.kinds, seen) == (200, ["http.response.start"], [600])
+    assert reply.headers[b"connection"] == b"close"
+
+
 def test_an_answer_before_the_body_was_read_ends_the_connection():
     early = ask(guard(Inner(read=False)), "POST", body=[b"a"] * 9, transfer_encoding="chunked")
     assert (early.status, early.headers.get(b"connection")) == (200, b"close")
@@ -397,6 +435,20 @@ def test_a_websocket_message_over_the_limit_ends_it():
     assert reply.kinds == ["websocket.accept", "websocket.close"]
     assert (reply.sent[1]["code"], inner.messages, inner.ends) == (1009, [small], [1009])
     assert connect(guard(inner), [text_message("é" * 501)]).sent[-1]["code"] == 1009  # bytes, not characters
+
+
+def test_a_websocket_that_was_ended_hears_and_says_nothing_more():
+    heard = []
+
+    async def stubborn(scope, receive, send):
+        await receive()
+        await send({"type": "websocket.accept"})
+        heard.extend([(await receive())["type"], (await receive())["type"]])
+        await send({"type": "websocket.send", "text": "more"})
+
+    reply = connect(guard(stubborn), [text_message("a" * 1001), text_message("a")])
+    assert (reply.kinds, heard) == (["websocket.accept", "websocket.close"], ["websocket.disconnect"] * 2)
+    assert reply.pulled == 2  # the handshake and the message that was too large
 
 
 # ----------------------------------------------------------------------------------------------- what browsers are told
@@ -455,6 +507,7 @@ def test_html_is_escaped_in_refusals():
     body = ask(guard(Inner()), host="<b>&\"'x").body
     assert "&lt;b&gt;&amp;&quot;&#x27;x" in body
     assert "<b>" not in body
+    assert "'a?[2J'" in unescape(ask(guard(Inner()), host="a\x1b[2J").body)
     long = ask(guard(Inner()), host="h" * 5000).body
     assert "h" * 80 + "..." in long
     assert "h" * 81 not in long
@@ -488,6 +541,16 @@ def test_the_studio_listens_on_this_machine_unless_told_otherwise():
         assert address.bind_address(host, exposed=True) == host
 
 
+def test_the_server_believes_no_proxy_and_writes_down_no_address():
+    uvicorn = pytest.importorskip("uvicorn")
+    inner = Inner()
+    config = uvicorn.Config(inner, log_config=None, **address.server_settings())
+    config.load()
+    assert config.loaded_app is inner  # and nothing around it that would believe X-Forwarded-For
+    assert (config.access_log, config.server_header, config.ws_per_message_deflate) == (False, False, False)
+    assert (config.ws_max_size, config.http_protocol_class.__name__) == (address.MESSAGE_BYTES, "H11Protocol")
+
+
 def test_names_and_origins():
     assert address.hosts(80, ("Lab.example",)) == ("lab.example",)
     assert address.hosts(81, ("Lab.example", "[::1]")) == ("lab.example:81", "[::1]:81")
@@ -504,8 +567,9 @@ def test_tokens_cannot_be_guessed_and_short_ones_are_refused():
     assert len(address.new_token()) >= 43
     with pytest.raises(ValueError, match="32 characters"):
         Guard(Inner(), (HOST,), (PAGE,), "short")
-    with pytest.raises(ValueError, match="needs hosts"):
-        Guard(Inner(), (), (PAGE,), TOKEN)
+    for hosts, pages in (((), (PAGE,)), ((HOST,), ()), ((), ()), ((HOST,), (PAGE, PAGE))):
+        with pytest.raises(ValueError, match="needs hosts, their origins"):
+            Guard(Inner(), hosts, pages, TOKEN)
 
 
 # ------------------------------------------------------------------------------------------------------- a real server
@@ -766,33 +830,15 @@ uvicorn.run(app, host=address.bind_address(), port=port, log_level="warning", **
 @pytest.fixture(scope="module")
 def studio():
     pytest.importorskip("nicegui")
-    pytest.importorskip("playwright")
     with serving(STUDIO) as (port, _):
         yield port
-
-
-@pytest.fixture(scope="module")
-def browser():
-    api = pytest.importorskip("playwright.sync_api")
-    program = shutil.which("chromium")
-    if program is None:
-        pytest.skip("Chromium is not installed")
-    with api.sync_playwright() as play:
-        found = play.chromium.launch(executable_path=program, args=["--no-sandbox"])
-        yield found
-        found.close()
 
 
 @pytest.fixture
 def tab(browser):
     """A tab of a fresh browser, with what it complained of and where it sent requests."""
     context = browser.new_context()
-    page = context.new_page()
-    page.complaints, page.asked = [], []
-    page.on("console", lambda m: page.complaints.append(m.text) if m.type in ("error", "warning") else None)
-    page.on("pageerror", lambda error: page.complaints.append(str(error)))
-    page.on("request", lambda request: page.asked.append(request.url))
-    yield page
+    yield watched(context.new_page())
     context.close()
 
 

@@ -11,9 +11,8 @@ import pytest
 
 from microrad.studio import jobs_files, jobs_process
 from microrad.studio.jobs import JobError, Jobs, Order
-from small_campaign import campaign_file, gone, kill
-
-pytestmark = pytest.mark.long
+from small_campaign import campaign_file, children, gone, kill
+from studio_jobs import written
 
 PATIENCE_S = 300.0  # a fresh installation compiles first
 
@@ -39,22 +38,6 @@ def ended(folder):
 
 def order(tmp_path, *arguments, kind="study", title="a title", results=()):
     return Order(kind, title, arguments, tmp_path, results)
-
-
-def written(tmp_path, arguments=(), number=1, **described):
-    """A job's folder as `submit` leaves it, for a process of the test's own."""
-    folder = tmp_path / "jobs" / str(number)
-    folder.mkdir(parents=True)
-    described = {
-        "kind": "study",
-        "title": "t",
-        "arguments": list(arguments),
-        "cwd": str(tmp_path),
-        "results": [],
-        "queued": "",
-    } | described
-    (folder / "job.json").write_text(json.dumps(described))
-    return folder
 
 
 def python(code):
@@ -89,13 +72,25 @@ def test_a_failed_job_says_what_the_command_line_said(studio, tmp_path, call, mo
 
 
 def test_a_job_that_ends_with_1_is_done(tmp_path):
-    folder = written(tmp_path)
+    folder = written(tmp_path / "jobs", cwd=str(tmp_path))
     jobs_process.run_job(folder, python("raise SystemExit(1)"))
     assert (jobs_files.read_job(folder).state, jobs_files.read_job(folder).code) == ("done", 1)
 
 
+@pytest.mark.parametrize(("printed", "state"), [("the verdict", "done"), ("", "cancelled")])
+def test_a_job_that_ends_with_1_while_it_is_cancelled_is_done_if_it_says_what_it_found(tmp_path, printed, state):
+    """Python ends with 1, too, when it is interrupted as it begins."""
+    folder = written(tmp_path / "jobs", cwd=str(tmp_path))
+    code = (
+        "import pathlib, signal; signal.signal(signal.SIGINT, signal.SIG_IGN)\n"
+        f"pathlib.Path({str(folder / 'cancel')!r}).touch(); print({printed!r}, end=''); raise SystemExit(1)\n"
+    )
+    jobs_process.run_job(folder, python(code))
+    assert (jobs_files.read_job(folder).state, jobs_files.read_job(folder).code) == (state, 1)
+
+
 def test_a_job_ended_by_a_signal_says_which(tmp_path):
-    folder = written(tmp_path)
+    folder = written(tmp_path / "jobs", cwd=str(tmp_path))
     jobs_process.run_job(folder, python("import os; os.kill(os.getpid(), 9)"))
     job = jobs_files.read_job(folder)
     assert (job.state, job.code) == ("failed", -9)
@@ -103,7 +98,7 @@ def test_a_job_ended_by_a_signal_says_which(tmp_path):
 
 
 def test_a_job_is_run_by_its_first_process_alone(tmp_path):
-    folder = written(tmp_path)
+    folder = written(tmp_path / "jobs", cwd=str(tmp_path))
     jobs_process.run_job(folder, python("print('first')"))
     jobs_process.run_job(folder, python("print('second')"))
     assert jobs_files.output(folder, "stdout") == "first\n"
@@ -194,7 +189,7 @@ def test_a_cancelled_campaign_keeps_its_rows_and_resumes(studio, tmp_path):
 
 
 def test_a_command_that_does_not_listen_is_asked_harder_each_time(tmp_path):
-    folder = written(tmp_path)
+    folder = written(tmp_path / "jobs", cwd=str(tmp_path))
     deaf = (
         "import pathlib, signal, time\n"
         "for n in (signal.SIGINT, signal.SIGTERM): signal.signal(n, lambda n, _: print(n, flush=True))\n"
@@ -209,7 +204,7 @@ def test_a_command_that_does_not_listen_is_asked_harder_each_time(tmp_path):
 
 
 def test_what_a_command_has_started_is_stopped_with_it(tmp_path):
-    folder = written(tmp_path)
+    folder = written(tmp_path / "jobs", cwd=str(tmp_path))
     code = (
         "import pathlib, subprocess, sys, time\n"
         "inner = subprocess.Popen([sys.executable, '-c', 'import time; time.sleep(600)'])\n"
@@ -266,23 +261,29 @@ def test_two_may_run_at_once(tmp_path):
 
 
 def test_who_looks_at_the_list_starts_what_nobody_started(studio, tmp_path):
-    folder = written(tmp_path, ["init", "late.toml"])
-    folder.rename(studio.folder / "1")
+    written(studio.folder, arguments=["init", "late.toml"], cwd=str(tmp_path))
     assert jobs_files.read_job(studio.folder / "1").state == "queued"
     assert studio.listed()[0].state in ("running", "done")
     assert ended(studio.folder / "1").state == "done"
 
 
 # ------------------------------------------------------------------------------------------------------------- crashes
-def test_a_job_whose_process_is_killed_is_lost_and_lets_the_next_one_go(studio, tmp_path):
+def test_a_job_whose_process_is_killed_is_lost_ends_with_it_and_lets_the_next_one_go(studio, tmp_path):
+    """The process that watches over it alone: nobody would hear that the command is to stop."""
     campaign_file(tmp_path, runs=4096, duration="1 s")
     first = studio.submit(order(tmp_path, "campaign", "run", "campaign.toml", kind="campaign"))
     second = studio.submit(order(tmp_path, "init", "next.toml"))
     pid = json.loads((first.folder / "started.json").read_text())["pid"]
-    inner = [int(each) for each in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
-    for each in (pid, *inner):
-        assert kill(each)
-    assert jobs_files.wait_for(lambda: jobs_files.read_job(first.folder).finished, PATIENCE_S)
+    below = []
+
+    def works():
+        below[:] = [command for command in children(pid) if children(command)]
+        return bool(below)
+
+    assert jobs_files.wait_for(works, PATIENCE_S)
+    below += children(below[0])
+    assert kill(pid)
+    assert all(gone(each, PATIENCE_S) for each in below)
     lost = studio.get(1)
     assert (lost.state, lost.code) == ("lost", None)
     assert "gone without an exit code" in lost.words
@@ -301,7 +302,7 @@ def test_a_damaged_description_is_told_and_breaks_no_list(studio, tmp_path, text
     second, first = studio.listed()
     assert (first.number, first.state) == (good.number, "done")
     assert second.state == "unreadable"
-    assert f"{bad.folder / 'job.json'} cannot be read" in second.words
+    assert f"{bad.folder / 'job.json'} is not taken: " in second.words
     studio.remove(second.number)
     assert [job.number for job in studio.listed()] == [good.number]
 
@@ -309,9 +310,8 @@ def test_a_damaged_description_is_told_and_breaks_no_list(studio, tmp_path, text
 def test_a_working_folder_that_is_gone_is_told(studio, tmp_path):
     place = tmp_path / "place"
     place.mkdir()
-    folder = written(tmp_path, ["presets"], cwd=str(place))
+    written(studio.folder, arguments=["presets"], cwd=str(place))
     place.rmdir()
-    folder.rename(studio.folder / "1")
     studio.listed()
     job = ended(studio.folder / "1")
     assert (job.state, job.code) == ("failed", 2)

@@ -163,8 +163,11 @@ def test_a_duration_in_words(time_s, words):
 
 def test_progress_in_words():
     assert runs_view.progress_words(None) == "starting"
-    assert runs_view.progress_words(Progress(3, 12, "rows")) == "25 %, 3 of 12: rows"
-    assert runs_view.progress_words(Progress(3, 12, "rows", 0.5)) == "25 %, 3 of 12: rows; 0.5 a second, 18 s left"
+    assert runs_view.progress_words(Progress(3, 12, "rows")) == "25 %, 3 of 12 rows"
+    assert runs_view.progress_words(Progress(3, 12, "budgets")) == "25 %, 3 of 12: budgets"
+    assert runs_view.progress_words(Progress(1, 160, "rows")) == "0.6 %, 1 of 160 rows"
+    assert runs_view.progress_words(Progress(0, 160, "rows")) == "0 %, 0 of 160 rows"
+    assert runs_view.progress_words(Progress(3, 12, "rows", 0.5)) == "25 %, 3 of 12 rows; 0.5 a second, 18 s left"
 
 
 def test_the_state_of_a_job_in_words(tmp_path):
@@ -181,10 +184,76 @@ def test_the_state_of_a_job_in_words(tmp_path):
 def test_the_times_of_a_job_in_words(tmp_path):
     job = Job(1, tmp_path, "done", queued="2026-03-20T12:00:00Z")
     assert runs_view.time_words(job) == "put in the queue 2026-03-20 12:00:00 UTC"
+    assert runs_view.time_words(replace(job, state="unreadable", queued="")) == ""
     job = replace(job, started="2026-03-20T12:01:00Z", ended="2026-03-20T12:03:05Z")
     assert runs_view.time_words(job) == "started 2026-03-20 12:01:00 UTC, 2 min 5 s"
     now = datetime(2026, 3, 20, 12, 1, 30, tzinfo=UTC)
     assert runs_view.time_words(replace(job, ended=""), lambda: now).endswith(", 30 s")
+
+
+def test_a_campaigns_own_pace_does_not_stand_beside_that_of_the_job():
+    progress = Progress(3, 12, "7.5 rows/s, 9 s left, margin 1 %: 3.1 dB", 0.5)
+    assert runs_view.progress_words(progress) == "25 %, 3 of 12 rows; 0.5 a second, 18 s left"
+    assert runs_view.progress_words(replace(progress, what="tuning PI")).startswith("25 %, 3 of 12: tuning PI; ")
+
+
+def campaign(folder, number, state="done", ledger="x.ledger"):
+    return Job(number, folder, state, "campaign", arguments=("campaign",), cwd=folder, results=(ledger,))
+
+
+def report(folder, number, state="done", ledger="x.ledger"):
+    action = runs_view.CampaignReport(Path(ledger), Path("x.html"))
+    return Job(number, folder, state, "export", arguments=action.arguments, cwd=folder, results=action.results)
+
+
+def test_the_last_job_of_a_ledger_is_the_one_to_go_on_from(tmp_path):
+    first, other, again = (
+        campaign(tmp_path, n, ledger=name) for n, name in ((1, "x.ledger"), (2, "y.ledger"), (3, "x.ledger"))
+    )
+    jobs = (again, other, first)
+    assert runs_view.others(jobs, first) == runs_view.Others()
+    assert runs_view.others(jobs, other) == runs_view.Others(newest=True)
+    assert runs_view.others(jobs, again) == runs_view.Others(newest=True, latest=True)
+    assert runs_view.others((other, first), first) == runs_view.Others(newest=True)
+    study = Job(4, tmp_path, "done", "study", results=("report.html",))
+    assert runs_view.others((study, *jobs), study) == runs_view.Others()
+    assert runs_view.others((study, *jobs), again).latest
+
+
+def test_a_campaigns_report_is_found_once_it_is_written_of_the_ledger_as_it_is(tmp_path):
+    done = campaign(tmp_path, 1)
+
+    def found(*later):
+        return runs_view.others((*later, done), done).report
+
+    assert found() is None
+    waiting = report(tmp_path, 2, "queued")
+    assert found(waiting) is waiting
+    written = report(tmp_path, 2)
+    assert found(written) is None  # its page was removed
+    (tmp_path / "x.html").write_text("page", "utf-8")
+    assert found(written) is written
+    assert found(report(tmp_path, 2, "failed")) is None
+    assert found(report(tmp_path, 2, ledger="y.ledger")) is None
+    newer = report(tmp_path, 3, "running")
+    assert found(newer, written) is newer
+    again = campaign(tmp_path, 3)
+    assert runs_view.others((again, written, done), again).report is None  # it is of the rows before
+
+
+def test_the_ledger_of_a_campaign_lies_in_the_folder(workshop, tmp_path_factory):
+    folder, outside = workshop.folder, tmp_path_factory.mktemp("outside")
+    assert runs_view.ledger_path(workshop, campaign(folder, 1)) == folder / "x.ledger"
+    assert runs_view.ledger_path(workshop, campaign(outside, 1)) is None
+    assert runs_view.ledger_path(workshop, campaign(folder, 1, ledger="../x.ledger")) is None
+    (folder / "x.ledger").symlink_to(outside / "x.ledger")
+    assert runs_view.ledger_path(workshop, campaign(folder, 1)) is None
+    assert runs_view.ledger_path(workshop, Job(1, folder, "done", "study", results=("x.ledger",))) is None
+
+
+def test_a_ledger_that_is_named_like_an_option_is_none():
+    action = runs_view.CampaignReport(Path("-x.ledger"), Path("--help"))
+    assert action.arguments == ("campaign", "report", "./-x.ledger", "./--help", "--overwrite")
 
 
 def test_only_results_that_are_there_and_inside_are_offered(workshop, tmp_path_factory):
@@ -275,6 +344,58 @@ def test_the_study_of_exactly_this_text_is_found(workshop, draft):
     assert (found.folder, found.verdict, found.closes) == ("mine", "of this text", True)
     assert [(each.text, each.required, each.met) for each in found.numbers] == [("2.00 dB", "3.00 dB", False)]
     assert compare_view.finished_study(workshop, draft.set("terminals.leo_aperture", "6 cm")) is None
+
+
+# ------------------------------------------------------------------------------------------- the other, kept on disk
+def again(workshop):
+    return Workshop(workshop.folder)
+
+
+def test_the_other_mission_survives_a_restart(workshop, draft):
+    assert again(workshop).other is None
+    paper = Draft.shipped(workshop.inside("leo-geo.toml"))
+    for other in (
+        draft.set("terminals.leo_aperture", "6 cm").save(workshop.inside("wide.toml")),
+        paper,
+        paper.with_text(preset_text("tbird")),
+        draft.set("terminals.leo_aperture", "7 parsec"),
+    ):
+        workshop.other = other
+        found = again(workshop).other
+        assert (found.text, found.path, found.problems) == (other.text, other.path, other.problems)
+        assert again(workshop).draft == draft
+    workshop.other = None
+    assert again(workshop).other is None
+
+
+def test_a_file_that_the_other_mission_came_from_is_read_anew_after_a_restart(workshop, draft):
+    """As long as nothing was changed here."""
+    workshop.other = draft.save(workshop.inside("wide.toml"))
+    changed = draft.set("terminals.leo_aperture", "6 cm").text
+    workshop.inside("wide.toml").write_text(changed, "utf-8")
+    assert again(workshop).other.text == changed
+    workshop.other = workshop.other.set("terminals.leo_aperture", "7 cm")
+    assert again(workshop).other.values["terminals.leo_aperture"].typed == "7 cm"
+
+
+@pytest.mark.parametrize("kept", ["", "{", "[]", "[" * 100_000, '{"path": 3, "disk_sha256": "", "text": ""}', "\x00"])
+def test_a_damaged_note_of_the_other_mission_is_passed_over(workshop, draft, kept):
+    workshop.other = draft
+    assert again(workshop).other == draft
+    (workshop.studio / "other.json").write_text(kept, "utf-8")
+    assert again(workshop).other is None
+
+
+def test_no_link_in_the_studios_folder_is_followed(workshop, draft, tmp_path_factory):
+    workshop.other = draft
+    note = workshop.studio / "other.json"
+    elsewhere = tmp_path_factory.mktemp("elsewhere") / "other.json"
+    note.rename(elsewhere)
+    note.symlink_to(elsewhere)
+    assert again(workshop).other is None
+    note.unlink()
+    note.write_bytes(elsewhere.read_bytes())
+    assert again(workshop).other == draft
 
 
 def test_each_table_of_the_form_is_named_as_in_the_text(draft):

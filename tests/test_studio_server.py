@@ -25,6 +25,7 @@ from microrad.studio.jobs import Order
 from microrad.studio.names import NameRefusedError
 from microrad.studio.workshop import STUDIO, Workshop
 from shipped import SHIPPED
+from studio_jobs import written
 
 MICRORAD = (sys.executable, "-m", "microrad")
 APERTURE = "terminals.leo_aperture"
@@ -207,10 +208,23 @@ def test_an_address_for_others_is_the_only_name(monkeypatch):
         assert entrance.names == (f"192.0.2.7:{port}",)
 
 
-@pytest.mark.parametrize("address", ["0.0.0.0", "::", "*", ""])
+@pytest.mark.parametrize(
+    "address", ["0.0.0.0", "::", "*", "", "0", "0x0", "00.0", "::0", "0:0:0:0:0:0:0:0", "::ffff:0:0"]
+)
 def test_every_address_at_once_is_refused(address):
     with pytest.raises(server.StudioError, match="no address that a browser could open; give this machine's own"):
         server.listen(exposed=address)
+
+
+@pytest.mark.parametrize(
+    ("typed", "name"), [("127.1", "127.0.0.1"), ("127.0.0.1", "127.0.0.1"), ("LocalHost", "localhost")]
+)
+def test_an_address_is_named_as_browsers_write_it(typed, name):
+    entrance = server.listen(exposed=typed)
+    with closing(entrance.listener):
+        host, port = entrance.listener.getsockname()
+        assert (host, entrance.names) == ("127.0.0.1", (f"{name}:{port}",))
+        assert entrance.url == f"http://{name}:{port}/?token={entrance.token}"
 
 
 def test_what_is_no_name_of_a_host_is_refused(monkeypatch):
@@ -225,19 +239,45 @@ def test_an_address_of_another_machine_is_refused():
         server.listen(exposed="192.0.2.1")
 
 
+@pytest.mark.parametrize("address", ["a" * 300, "a..b"])
+def test_a_name_that_none_can_be_is_refused(address):
+    with pytest.raises(server.StudioError, match=r"'a[a.b]*' is no address of this machine; give one such as"):
+        server.listen(exposed=address)
+
+
+def test_the_page_that_a_browser_is_started_with_is_its_owners_alone(file, tmp_path_factory):
+    studio = Workshop(file.parent).studio
+    outside = tmp_path_factory.mktemp("outside") / "kept"
+    outside.write_text("kept", "utf-8")
+    (studio / "open.html").symlink_to(outside)  # came with the folder
+    url = "http://127.0.0.1:8123/?token=secret"
+    page = server.way_in(studio, url)
+    path = studio / "open.html"
+    assert (page, path.is_symlink(), outside.read_text("utf-8")) == (path.as_uri(), False, "kept")
+    assert path.stat().st_mode & 0o777 == 0o600
+    assert f'content="0;url={url}"' in path.read_text("utf-8")
+    assert server.way_in(studio, url) == page  # a second time
+
+
 def test_only_results_of_a_job_within_the_folder_are_shown(file, tmp_path_factory):
     outside = tmp_path_factory.mktemp("outside") / "secret.html"
     outside.write_text("secret", "utf-8")
     workshop = Workshop(file.parent)
     (file.parent / "page.html").write_text("page", "utf-8")
     (file.parent / "link.html").symlink_to(outside)
-    names = ("page.html", "missing.html", str(outside), os.path.relpath(outside, file.parent), "link.html", ".")
-    (workshop.jobs.folder / "1").mkdir()
-    order = Order("study", "x", (), file.parent, names)
-    job = {"kind": order.kind, "title": "x", "arguments": [], "cwd": str(order.cwd), "results": names, "queued": ""}
-    (workshop.jobs.folder / "1" / "job.json").write_text(json.dumps(job), "utf-8")
+    names = (
+        "page.html",
+        "missing.html",
+        str(outside),
+        os.path.relpath(outside, file.parent),
+        "link.html",
+        ".",
+        "page.html",
+    )
+    written(workshop.jobs.folder, cwd=str(file.parent), results=names)
     found = [server.result(workshop, 1, place) for place in range(-1, 8)]
-    assert found == [None, file.parent / "page.html", *[None] * 7]
+    page = file.parent / "page.html"
+    assert found == [None, page, *[None] * 5, page, None]  # none is counted from the end
     assert server.result(workshop, 2, 0) is None
 
 
@@ -278,11 +318,12 @@ def test_to_be_open_to_others_needs_the_flag_typed_out_with_an_address(refused):
 
 
 @contextmanager
-def running(folder, *args):
+def running(folder, *args, browser=None):
     pytest.importorskip("nicegui")
     process = subprocess.Popen(
-        [*MICRORAD, "studio", "--no-browser", *args],
+        [*MICRORAD, "studio", *(["--no-browser"] if browser is None else []), *args],
         cwd=folder,
+        env=os.environ | ({} if browser is None else {"BROWSER": str(browser)}),
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
@@ -311,6 +352,65 @@ def test_the_address_opens_the_studio_and_a_signal_ends_it(file, number):
     assert (process.returncode, out, err) == (0, "the studio is closed\n", "")
     kept = {name: data for name, data in listing(file.parent).items() if not name.startswith(STUDIO)}
     assert kept == before
+
+
+def asked(url, path):
+    """What a browser that has the cookie gets: status, headers."""
+    base, _, token = url.partition("?token=")
+    cookie = f"microrad_studio_{base.split(':')[2][:-1]}={token}"
+    try:
+        with urllib.request.urlopen(
+            urllib.request.Request(base + path, headers={"Cookie": cookie}), timeout=30
+        ) as answer:
+            return answer.status, answer.headers
+    except urllib.error.HTTPError as error:
+        return error.code, error.headers
+
+
+_BROWSER = """#!/bin/sh
+exec >/dev/null 2>&1
+echo "$@" > {folder}/new
+mv {folder}/new {folder}/said
+while [ -e {folder}/open ]; do sleep 0.1; done
+"""
+
+
+@pytest.mark.skipif(os.name != "posix", reason="the browser of the test is a shell script")
+def test_a_browser_is_started_without_the_token_on_its_command_line(file, tmp_path_factory):
+    """Every user of the machine may read command lines. This browser ends as late as one that is closed by hand."""
+    told = tmp_path_factory.mktemp("browser")
+    script, still_open, page = told / "browser", told / "open", file.parent / STUDIO / "open.html"
+    script.write_text(_BROWSER.format(folder=told), "utf-8")
+    script.chmod(0o700)
+    still_open.touch()
+    for name in ("page.html", "picture.svg"):
+        (file.parent / name).write_text("<script>1</script>", "utf-8")
+    job = written(Workshop(file.parent).jobs.folder, cwd=str(file.parent), results=("page.html", "picture.svg"))
+    for name in ("started.json", "exit.json"):  # over, so that nobody starts it
+        (job / name).write_text('{"at": "", "code": 0}', "utf-8")
+    with running(file.parent, "leo-geo.toml", browser=script) as (process, url):
+        for _ in range(600):
+            if (told / "said").exists():
+                break
+            threading.Event().wait(0.05)
+        assert (told / "said").read_text("utf-8") == f"{page.as_uri()}\n"
+        assert page.stat().st_mode & 0o777 == 0o600
+        assert url in page.read_text("utf-8")
+        with pytest.raises(urllib.error.HTTPError, match="403"):
+            urllib.request.urlopen(url.partition("?")[0], timeout=30)  # the studio answers while the browser is open
+        status, page_of_its_own = asked(url, "results/1/0")
+        assert (status, "sandbox allow-scripts" in page_of_its_own["Content-Security-Policy"]) == (200, True)
+        assert page_of_its_own["Content-Disposition"].startswith("inline")
+        status, picture = asked(url, "results/1/1")
+        assert (status, "sandbox allow-scripts" in picture["Content-Security-Policy"]) == (200, True)
+        assert picture["Content-Disposition"].startswith("attachment")
+        status, studio = asked(url, "runs")
+        assert (status, "sandbox" in studio["Content-Security-Policy"]) == (200, False)
+        assert [asked(url, name)[0] for name in ("docs", "redoc", "openapi.json")] == [404] * 3
+        process.send_signal(signal.SIGTERM)
+        assert process.wait(timeout=30) == 0
+        still_open.unlink()
+    assert not page.exists()
 
 
 def test_a_job_goes_on_when_the_studio_ends(file):

@@ -24,8 +24,6 @@ from microrad.studio.names import NameRefusedError, safe_name, within
 from microrad.studio.reading import Columns, ReadingError, ReadingLimits, list_channels, view
 from microrad.studio.uploads import UploadError, UploadLimits, Uploads
 
-pytestmark = pytest.mark.long
-
 posix = pytest.mark.skipif(os.name != "posix", reason="POSIX keeps modes and limits")
 linux = pytest.mark.skipif(sys.platform != "linux", reason="the address space is bounded on Linux")
 

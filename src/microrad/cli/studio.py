@@ -2,11 +2,15 @@
 
 from contextlib import closing, suppress
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from microrad.cli.frame import CLOSES, Outcome, app, command, examples, option, say
+
+if TYPE_CHECKING:
+    from microrad.studio.server import Entrance
+    from microrad.studio.workshop import Workshop
 
 # Everything else is imported inside the command: it takes longer to load than help may take.
 
@@ -47,18 +51,27 @@ def studio(
     with closing(entrance.listener):
         workshop = Workshop(Path.cwd() if file is None else file.resolve().parent, file)
         with suppress(KeyboardInterrupt):  # the usual end of a server
-            server.serve(workshop, entrance, lambda: _ready(entrance.url, expose, not no_browser))
+            server.serve(workshop, entrance, lambda: _ready(workshop, entrance, expose, not no_browser))
     running = sum(not job.finished for job in workshop.jobs.listed())
     going_on = f"; {running} of its jobs {'goes' if running == 1 else 'go'} on, and can be seen by starting it again"
     return Outcome(f"the studio is closed{going_on if running else ''}", CLOSES)
 
 
-def _ready(url: str, exposed: str | None, browser: bool) -> None:
+def _ready(workshop: "Workshop", entrance: "Entrance", exposed: str | None, browser: bool) -> None:
     """Say where the studio is, and open it."""
-    print(url, flush=True)
+    print(entrance.url, flush=True)
     if exposed is not None:
         say(f"open to the network on {exposed}, and not encrypted: who reads the address on its way can come in.")
     if browser:
+        import threading
         import webbrowser
 
-        webbrowser.open(url)
+        from microrad.studio import server
+
+        try:
+            page = server.way_in(workshop.studio, entrance.url)
+        except OSError as error:
+            say(f"the browser was not opened ({error.strerror}); open the address yourself.")
+            return
+        # Some browsers keep whoever has started them waiting, and the studio is to answer meanwhile.
+        threading.Thread(target=webbrowser.open, args=(page,), daemon=True).start()

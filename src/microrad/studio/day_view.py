@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import base64
 import math
+import threading
 from collections.abc import Iterable
 from typing import Any
 
@@ -23,6 +25,7 @@ Row = dict[str, Any]
 MOST_POINTS = 1500
 """Of a drawn curve."""
 
+_DRAWING = threading.Lock()  # matplotlib's settings are those of the whole process
 _COLOURS = {0: plots.BLUE, 1: plots.ORANGE, 2: plots.GREEN}
 _HOUR_S = 3600.0
 
@@ -141,6 +144,15 @@ def _how_much(intervals: Floats) -> str:
 
 def _clock(utc: str) -> str:
     return utc[:19].replace("T", " ")
+
+
+def ground_map(day: DayStudy) -> tuple[str, str]:
+    """The report's map of the day as the address of an image, and what it shows in words."""
+    from microrad.report import day_plots  # drawing takes longer to load than a page may
+
+    with _DRAWING:
+        figure = day_plots.ground_map(day)
+    return f"data:image/svg+xml;base64,{base64.b64encode(figure.svg.encode()).decode()}", figure.caption
 
 
 def volume_plot(day: DayStudy) -> plots.Plot:

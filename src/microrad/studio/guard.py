@@ -56,11 +56,13 @@ class Limits:
 class Guard:
     """ASGI middleware that lets only the studio's own pages through, and no more than `limits` from them.
 
-    `hosts` are the exact values of the Host header, `origins` those of Origin, `token` is the secret that opens the
-    door; see `microrad.studio.address`. Answers under `documents` (beginnings of paths) run in a sandbox.
+    `hosts` are the exact values of the Host header, `origins` those of Origin, one for each host: a page of one name
+    asks under that name alone. `token` is the secret that opens the door; see `microrad.studio.address`. Answers under
+    `documents` (beginnings of paths) run in a sandbox.
 
-    A request under a wrong name is answered 421; without a name or with two, 400; from another page, with a wrong token
-    or without one, 403; one that is too large, 413. Nothing is held back: bodies are counted as they pass.
+    A request under a wrong name is answered 421; without a name or with two, or for a path that does not print, 400;
+    from another page, with a wrong token or without one, 403; one that is too large, 413. Nothing is held back: bodies
+    are counted as they pass.
     """
 
     def __init__(
@@ -72,9 +74,11 @@ class Guard:
         limits: Limits | None = None,
         documents: tuple[str, ...] = (),
     ) -> None:
-        """Stand in front of `app`; raises ValueError without hosts or origins, or for a token that is short."""
-        if len(token) < 32 or not hosts or not origins:
-            raise ValueError("the guard needs hosts, origins and a token of at least 32 characters; see new_token")
+        """Stand in front of `app`; raises ValueError without hosts and their origins, or for a token that is short."""
+        if len(token) < 32 or not hosts or len(hosts) != len(origins):
+            raise ValueError(
+                "the guard needs hosts, their origins and a token of at least 32 characters; see new_token"
+            )
         self.app = app
         self.hosts, self.origins, self.documents = hosts, origins, documents
         self.limits = limits or Limits()
@@ -93,7 +97,7 @@ class Guard:
     async def _http(self, scope: Scope, receive: Receive, send: Send) -> None:
         limit = self.limits.of(scope["path"])
         answer = self._stranger(scope) or self._shown_token(scope) or self._without_cookie(scope)
-        answer = answer or _announced(scope, limit)
+        answer = answer or _unprintable(scope) or _announced(scope, limit)
         if answer is not None:
             await send_answer(answer, scope, send)
             return
@@ -126,9 +130,10 @@ class Guard:
         names, pages = _values(scope, b"host"), _values(scope, b"origin")
         if len(names) != 1 or len(pages) > 1:
             return refusal(400, "A request names exactly one host and at most one page that it comes from.")
-        if names[0].lower() not in self.hosts:
+        name = names[0].lower()
+        if name not in self.hosts:
             return refusal(421, f"'{short(names[0])}' is not this server. Open http://{self.hosts[0]} instead.")
-        if pages and pages[0] not in self.origins:
+        if pages and pages[0] != self.origins[self.hosts.index(name)]:
             return refusal(403, f"A page of '{short(pages[0])}' may not use the studio.")
         if not pages and (scope["type"] == "websocket" or scope["method"] not in _SAFE_METHODS):
             return refusal(403, "A request that acts says by its Origin which page it comes from; this one does not.")
@@ -189,6 +194,11 @@ def _of_another_site(scope: Scope) -> bool:
         return False
     followed = _values(scope, b"sec-fetch-mode") == ["navigate"] and _values(scope, b"sec-fetch-dest") == ["document"]
     return not (followed and scope["type"] == "http" and scope["method"] == "GET")
+
+
+def _unprintable(scope: Scope) -> Answer | None:
+    """The refusal of a path with control characters, which would reach the user's terminal in a message."""
+    return None if scope["path"].isprintable() else refusal(400, "The address holds characters that do not print.")
 
 
 def _announced(scope: Scope, limit: int) -> Answer | None:

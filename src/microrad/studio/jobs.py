@@ -8,6 +8,7 @@ each time, and nothing is kept here.
 from __future__ import annotations
 
 import json
+import os
 import shutil
 import tempfile
 from contextlib import suppress
@@ -15,8 +16,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from microrad.folder import write_whole
+from microrad.studio import plain_files, signing
 from microrad.studio.jobs_files import (
     CANCEL,
+    CODE,
     JOB,
     KINDS,
     Job,
@@ -31,10 +34,12 @@ from microrad.studio.jobs_files import (
     read_job,
 )
 from microrad.studio.jobs_process import start_waiting
+from microrad.studio.signing import SigningError
 
 __all__ = ["Job", "JobError", "Jobs", "Kind", "Order", "Progress", "State"]
 
 _LAST = "last"
+_LAST_FIGURES = 9  # of a last number that is believed
 _QUEUE_S = 60.0
 
 
@@ -77,19 +82,24 @@ class Jobs:
             "cwd": str(order.cwd.absolute()),
             "results": list(order.results),
             "queued": now(),
+            "folder": str(self.folder),
         }
         try:
             folder = self._put(json.dumps(described, indent=2))
         except OSError as error:
             raise JobError(f"{self.folder}: {error.strerror}; check free space and permissions") from error
+        except SigningError as error:
+            raise JobError(str(error)) from error
         start_waiting(self.folder, self.at_once)
         return read_job(folder)
 
     def _put(self, description: str) -> Path:
-        """A new folder with the description of a job, which appears with both or not at all."""
+        """A new folder with the description of a job and its code, which appears with all or not at all."""
+        code = signing.code(description.encode())
         draft = Path(tempfile.mkdtemp(prefix=".new-", dir=self.folder))  # its mode is 0700
         try:
             write_whole(draft / JOB, description)
+            write_whole(draft / CODE, code)
             with held(self.folder / "lock", _QUEUE_S) as mine:
                 if not mine:
                     raise JobError(f"the queue in {self.folder} is taken by another program; try again")
@@ -105,8 +115,12 @@ class Jobs:
         """One more than any job had, the removed ones included: a number is never used again."""
         last = 0
         with suppress(OSError, ValueError):
-            last = int((self.folder / _LAST).read_text("utf-8"))
-        return max([last, *(int(each.name) for each in job_folders(self.folder))]) + 1
+            last = int(plain_files.content(self.folder / _LAST, _LAST_FIGURES))
+        there = [read_job(folder) for folder in job_folders(self.folder)]
+        number = max([last, *(job.number for job in there if job.state != "unreadable")]) + 1
+        while os.path.lexists(self.folder / str(number)):
+            number += 1
+        return number
 
     def listed(self) -> tuple[Job, ...]:
         """Every job, the newest first; one that waits is started if there is room meanwhile."""
@@ -117,7 +131,7 @@ class Jobs:
     def get(self, number: int) -> Job:
         """The job of this number. Raises `JobError` where there is none."""
         folder = self.folder / str(number)
-        if number < 1 or not folder.is_dir():
+        if number < 1 or not plain_files.is_folder(folder):
             raise JobError(f"there is no job {number} any more; it was removed, or never started")
         return read_job(folder)
 
@@ -143,7 +157,8 @@ class Jobs:
 
     def output(self, number: int, name: str = "stdout") -> str:
         """What a job has printed so far, the last 200 kB: "stdout" or "stderr". Raises `JobError`."""
-        return output(self.get(number).folder, "stderr" if name == "stderr" else "stdout")
+        job = self.get(number)
+        return "" if job.state == "unreadable" else output(job.folder, "stderr" if name == "stderr" else "stdout")
 
 
 def _make_private(folder: Path) -> None:

@@ -3,12 +3,17 @@
 A job is a folder with a number for its name. `job.json` says what is to be done, `started.json` that a process of its
 own has taken it up, `exit.json` how it ended; `cancel` asks that process to stop. While it lives, that process holds a
 lock on `alive`, which the operating system drops however it ends: so what is running is told from what is lost.
+
+`job.code` shows that this user queued the job (`signing`). Nothing is believed of a folder without it, and no link in
+a folder of jobs is followed.
 """
 
 from __future__ import annotations
 
 import json
+import re
 import sqlite3
+import stat
 import time
 from collections.abc import Iterator
 from contextlib import closing, contextmanager, suppress
@@ -18,15 +23,19 @@ from pathlib import Path
 from typing import Any, Literal
 
 from microrad.folder import write_whole
+from microrad.studio import plain_files, signing
+from microrad.studio.signing import SigningError
 
 Kind = Literal["study", "campaign", "identification", "export"]
 State = Literal["queued", "running", "done", "failed", "cancelled", "lost", "unreadable"]
 
 KINDS: tuple[Kind, ...] = ("study", "campaign", "identification", "export")
 FINISHED: tuple[State, ...] = ("done", "failed", "cancelled", "lost", "unreadable")
-JOB, STARTED, EXIT, CANCEL, ALIVE, PROGRESS = "job.json", "started.json", "exit.json", "cancel", "alive", "progress"
+JOB, CODE, STARTED, EXIT, CANCEL = "job.json", "job.code", "started.json", "exit.json", "cancel"
+ALIVE, PROGRESS = "alive", "progress"
 STDOUT, STDERR = "stdout", "stderr"
 
+_NUMBER = re.compile(r"[1-9][0-9]{0,11}")
 _TAIL_BYTES = 64_000
 _OUTPUT_BYTES = 200_000
 _RATE_S = 60.0  # of the past that the rate is taken over
@@ -88,7 +97,7 @@ def read_job(folder: Path) -> Job:
     """A job from its folder alone; one whose description cannot be read is "unreadable" and says why."""
     number = int(folder.name)
     try:
-        said = json.loads((folder / JOB).read_text("utf-8"))
+        said, home = _described(folder)
         told = {
             "kind": said["kind"],
             "title": str(said["title"]),
@@ -99,9 +108,11 @@ def read_job(folder: Path) -> Job:
         }
     except OSError as error:
         return _unreadable(number, folder, str(error.strerror))
+    except (SigningError, JobError) as error:
+        return _unreadable(number, folder, str(error))
     except (ValueError, KeyError, TypeError):
         return _unreadable(number, folder, "it is cut off, or was not written by microrad")
-    state, began, end = _state(folder)
+    state, began, end = _state(folder, home)
     code = end.get("code")
     return Job(
         number=number,
@@ -117,30 +128,47 @@ def read_job(folder: Path) -> Job:
     )
 
 
+def _described(folder: Path) -> tuple[dict[str, Any], bool]:
+    """What a job is to do, and whether it was queued in just this place; `JobError` where this user did not queue it.
+
+    A copy elsewhere is never started: it would do again, and in its old place, what was asked for once.
+    """
+    text = plain_files.content(folder / JOB)
+    try:
+        code = plain_files.content(folder / CODE, 1000).decode("ascii", "replace")
+    except OSError:
+        code = ""
+    if not signing.is_ours(text, code):
+        raise JobError("it was not queued by you with this installation of microrad, so it is not started")
+    said = json.loads(text)
+    return said, said["folder"] == str(folder.parent.absolute())
+
+
 def _unreadable(number: int, folder: Path, why: str) -> Job:
-    words = f"{folder / JOB} cannot be read: {why}; remove this job, its results are where they were"
+    words = f"{folder / JOB} is not taken: {why}; remove this job, its results are where they were"
     return Job(number, folder, "unreadable", title="(unreadable)", words=words)
 
 
-def _state(folder: Path) -> tuple[State, dict[str, Any], dict[str, Any]]:
+def _state(folder: Path, home: bool) -> tuple[State, dict[str, Any], dict[str, Any]]:
     """The state of a job, and what was noted at its begin and at its end."""
     asked = (folder / CANCEL).exists()
     began = _noted(folder / STARTED)
     if began is None:
-        return "cancelled" if asked else "queued", {}, {}
+        waits: State = "queued" if home else "lost"
+        return "cancelled" if asked else waits, {}, {}
     lives = is_held(folder / ALIVE)
     end = _noted(folder / EXIT)  # looked at behind the lock: a job that ends between the two is no lost one
     if end is None:
         return ("running", began, {}) if lives else ("cancelled" if asked else "lost", began, {})
-    if end.get("code") in (0, 1):
+    if end.get("code") == 0 or (end.get("code") == 1 and (not asked or output(folder, STDOUT))):
         return "done", began, end
-    return "cancelled" if asked else "failed", began, end
+    return "cancelled" if asked else "failed", began, end  # a Python interrupted as it begins ends with 1, too
 
 
 def _noted(path: Path) -> dict[str, Any] | None:
     """What a note holds: nothing for a damaged one, None where there is none."""
     try:
-        data = json.loads(path.read_text("utf-8"))
+        data = json.loads(plain_files.content(path))
     except FileNotFoundError:
         return None
     except (OSError, ValueError):
@@ -150,6 +178,8 @@ def _noted(path: Path) -> dict[str, Any] | None:
 
 def _words(folder: Path, state: State, code: int | None) -> str:
     """Why a job came to nothing: its own last words on stderr, or what is known without them."""
+    if state == "lost" and not (folder / STARTED).exists():
+        return "its folder was moved or copied before it was started, so it is not started here; start it anew"
     if state == "lost":
         return "its process is gone without an exit code: the machine went down, or the process was killed"
     if state != "failed":
@@ -194,7 +224,7 @@ def output(folder: Path, name: str) -> str:
 
 def _tail(path: Path, most: int) -> str:
     try:
-        with path.open("rb") as file:
+        with plain_files.opened(path) as file:
             size = file.seek(0, 2)
             file.seek(max(size - most, 0))
             return file.read(most).decode("utf-8", "replace")
@@ -219,7 +249,9 @@ def held(path: Path, patience_s: float) -> Iterator[bool]:
     """Hold the lock of a file, for this process alone; False when another one has it for all of `patience_s`.
 
     It is SQLite's, as that of a campaign's ledger: the same on each operating system, and gone with its process.
+    Raises `JobError` where there is something else in its place, which SQLite would open.
     """
+    _refuse_strange(path)
     with closing(sqlite3.connect(path, timeout=patience_s, isolation_level=None)) as lock:
         try:
             lock.execute("PRAGMA journal_mode = MEMORY")  # no further file beside it
@@ -228,6 +260,13 @@ def held(path: Path, patience_s: float) -> Iterator[bool]:
             yield False
             return
         yield True
+
+
+def _refuse_strange(path: Path) -> None:
+    with suppress(FileNotFoundError):
+        found = path.lstat()
+        if not stat.S_ISREG(found.st_mode) or found.st_size:
+            raise JobError(f"{path} is no lock of the studio, but a link or another program's; remove it")
 
 
 def is_held(path: Path) -> bool:
@@ -253,8 +292,8 @@ def wait_for(happened: Any, patience_s: float, step_s: float = 0.01) -> bool:
 
 
 def job_folders(folder: Path) -> list[Path]:
-    """The folders of the jobs, the newest first."""
+    """The folders of the jobs, the newest first; a link is none."""
     found = []
     with suppress(FileNotFoundError):
-        found = [each for each in folder.iterdir() if each.name.isascii() and each.name.isdigit() and each.is_dir()]
+        found = [each for each in folder.iterdir() if _NUMBER.fullmatch(each.name) and plain_files.is_folder(each)]
     return sorted(found, key=lambda each: int(each.name), reverse=True)

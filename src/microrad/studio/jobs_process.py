@@ -1,7 +1,8 @@
 """The process that a job runs under: it starts the command, waits for it, stops it when asked, and notes how it ended.
 
 It belongs to no server: a server that ends, or is ended with Ctrl-C, leaves it running, since a campaign may take days
-and the page is only there to look on. When its job is over it starts the next one of the queue.
+and the page is only there to look on. When its job is over it starts the next one of the queue. Should it be killed,
+its command ends with it (`jobs_command`).
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ import subprocess
 import sys
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 from microrad.studio.jobs_files import (
     ALIVE,
@@ -22,6 +23,7 @@ from microrad.studio.jobs_files import (
     STARTED,
     STDERR,
     STDOUT,
+    Job,
     held,
     job_folders,
     note,
@@ -29,8 +31,6 @@ from microrad.studio.jobs_files import (
     wait_for,
 )
 
-PROGRAM = (sys.executable, "-P", "-m", "microrad")
-"""What a job's arguments are given to; -P: no file of the working folder is taken for a module of Python."""
 WAITS_S = (10.0, 10.0)
 """How long a command that is to stop has behind SIGINT, and then behind SIGTERM, before SIGKILL ends it."""
 
@@ -102,9 +102,18 @@ def apart() -> dict[str, Any]:
 
 # --------------------------------------------------------------------------------------------------------------- a job
 def run_job(
-    folder: Path, program: tuple[str, ...] = PROGRAM, waits_s: tuple[float, float] = WAITS_S, look_s: float = _LOOK_S
+    folder: Path,
+    program: tuple[str, ...] | None = None,
+    waits_s: tuple[float, float] = WAITS_S,
+    look_s: float = _LOOK_S,
 ) -> None:
-    """Run a job to its end, whichever it is, and note how it ended; nothing where another process has it."""
+    """Run a job to its end, whichever it is, and note how it ended; nothing where another process has it.
+
+    Nothing either where this user did not queue it, in this place.
+    """
+    job = read_job(folder)
+    if job.state not in ("queued", "cancelled"):
+        return
     with held(folder / ALIVE, 2.0) as mine:
         if not mine or (folder / STARTED).exists():
             return
@@ -112,24 +121,34 @@ def run_job(
         if (folder / CANCEL).exists():
             note(folder / EXIT, code=130)
             return
-        job = read_job(folder)
         with (folder / STDOUT).open("ab") as out, (folder / STDERR).open("ab") as errors:
             try:
-                command = subprocess.Popen(
-                    [*program, *job.arguments],
-                    stdin=subprocess.DEVNULL,
-                    stdout=out,
-                    stderr=errors,
-                    cwd=job.cwd,
-                    env={**_environment(), "MICRORAD_PROGRESS": str(folder.absolute() / PROGRESS)},
-                    **apart(),
-                )
+                command = _command(job, program or _program(), out, errors)
             except OSError as error:
                 errors.write(f"microrad: {job.cwd}: {error.strerror}; the job cannot be started there.\n".encode())
                 note(folder / EXIT, code=2)
                 return
-            code = _ended(command, folder / CANCEL, waits_s, look_s)
+            with command:
+                code = _ended(command, folder / CANCEL, waits_s, look_s)
         note(folder / EXIT, code=code)
+
+
+def _program() -> tuple[str, ...]:
+    """What a job's arguments are given to, by this process; no file of the working folder is a module for it (-P)."""
+    return (sys.executable, "-P", "-m", "microrad.studio.jobs_command", str(os.getpid()))
+
+
+def _command(job: Job, program: tuple[str, ...], out: IO[bytes], errors: IO[bytes]) -> subprocess.Popen[bytes]:
+    """The command of a job, which ends when this process does, since nobody else holds its stdin."""
+    return subprocess.Popen(
+        [*program, *job.arguments],
+        stdin=subprocess.PIPE,
+        stdout=out,
+        stderr=errors,
+        cwd=job.cwd,
+        env={**_environment(), "MICRORAD_PROGRESS": str(job.folder.absolute() / PROGRESS)},
+        **apart(),
+    )
 
 
 def _ended(command: subprocess.Popen[bytes], cancel: Path, waits_s: tuple[float, float], look_s: float) -> int:

@@ -13,6 +13,7 @@ from pathlib import Path
 from microrad.document import MAX_BYTES
 from microrad.folder import write_whole
 from microrad.studio.commands import Action
+from microrad.studio.commands_pieces import path_argument
 from microrad.studio.jobs import Job, JobError, Kind, Order, Progress
 from microrad.studio.workshop import Workshop
 
@@ -42,7 +43,7 @@ class CampaignReport:
     @property
     def arguments(self) -> tuple[str, ...]:
         """What follows `microrad` on the command line."""
-        return ("campaign", "report", str(self.ledger), str(self.page), "--overwrite")
+        return ("campaign", "report", path_argument(self.ledger), path_argument(self.page), "--overwrite")
 
     @property
     def python(self) -> str:
@@ -123,11 +124,20 @@ def progress_words(progress: Progress | None) -> str:
     """How far a job is, how fast, and how long it may still take."""
     if progress is None:
         return "starting"
-    words = f"{100.0 * progress.share:.0f} %, {progress.done} of {progress.total}: {progress.what}"
+    words = f"{_percent(progress.share)}, {progress.done} of {progress.total}{_what(progress)}"
     if progress.rate_1_s:
         left_s = (progress.total - progress.done) / progress.rate_1_s
         words += f"; {progress.rate_1_s:.3g} a second, {duration_words(left_s)} left"
     return words
+
+
+def _percent(share: float) -> str:
+    return f"{100.0 * share:.1f} %" if 0.0 < share < 0.1 else f"{100.0 * share:.0f} %"
+
+
+def _what(progress: Progress) -> str:
+    """What is being done; a campaign's own pace, which is that since it began, is left out."""
+    return " rows" if progress.what == "rows" or " rows/s" in progress.what else f": {progress.what}"
 
 
 def duration_words(time_s: float) -> str:
@@ -143,7 +153,7 @@ def duration_words(time_s: float) -> str:
 def time_words(job: Job, now: Callable[[], datetime] = lambda: datetime.now(UTC)) -> str:
     """When a job began, and how long it took or takes."""
     if not job.started:
-        return f"put in the queue {_at(job.queued)}"
+        return f"put in the queue {_at(job.queued)}" if job.queued else ""
     begun, ended = _read(job.started), _read(job.ended) or now()
     took = "" if begun is None else f", {duration_words(max((ended - begun).total_seconds(), 0.0))}"
     return f"started {_at(job.started)}{took}"
@@ -158,6 +168,47 @@ def _read(time: str) -> datetime | None:
     with suppress(ValueError):
         return datetime.fromisoformat(time)
     return None
+
+
+@dataclass(frozen=True, slots=True)
+class Others:
+    """A campaign's job among the others: whether none goes on with its ledger, whether it is the last campaign.
+
+    `report` is the job that writes or has written a report of the ledger as it is now.
+    """
+
+    newest: bool = False
+    latest: bool = False
+    report: Job | None = None
+
+
+def others(jobs: Iterable[Job], job: Job) -> Others:
+    """A job among all of them."""
+    ledger = ledger_of(job)
+    later = [each for each in jobs if each.number > job.number]
+    campaigns = [ledger_of(each) for each in later if each.kind == "campaign"]
+    if ledger is None or ledger in campaigns:
+        return Others()
+    about = ("campaign", "report", path_argument(Path(ledger)))
+    reports = (each for each in later if each.arguments[:3] == about and _may_show(each))
+    return Others(newest=True, latest=not campaigns, report=next(reports, None))
+
+
+def _may_show(report: Job) -> bool:
+    """Whether the result of a report's job is there, or is to be."""
+    return not report.finished or (report.state == "done" and (report.cwd / report.results[0]).is_file())
+
+
+def ledger_of(job: Job) -> str | None:
+    """The ledger that a campaign writes, as its job names it."""
+    return next((name for name in job.results if name.endswith(".ledger")), None) if job.kind == "campaign" else None
+
+
+def ledger_path(workshop: Workshop, job: Job) -> Path | None:
+    """The ledger of a campaign's job, where it lies in the working folder; it may not be there yet."""
+    ledger = ledger_of(job)
+    path = None if ledger is None else job.cwd / ledger
+    return path if path is not None and _is_inside(workshop, path) else None
 
 
 def result_files(workshop: Workshop, job: Job) -> tuple[tuple[int, str], ...]:

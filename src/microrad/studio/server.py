@@ -25,7 +25,15 @@ DOCUMENTS = "/results/"
 """Where finished documents are served, each in a sandbox: a job's number, then the place among its results."""
 
 _GRACE_S = 2
-_ANY = ("0.0.0.0", "::", "[::]", "*", "")
+_SHOWN = 120
+_ANY = ("0.0.0.0", "::", "::ffff:0.0.0.0", "[::]", "*", "")
+
+_WAY_IN = "open.html"
+_PAGE = """<!doctype html>
+<html lang="en"><head><meta charset="utf-8"><meta name="referrer" content="no-referrer">
+<meta http-equiv="refresh" content="0;url={url}"><title>microrad studio</title></head>
+<body><p><a href="{url}">Open the studio</a></p></body></html>
+"""
 
 
 class StudioError(ValueError):
@@ -61,23 +69,33 @@ def listen(port: int = 0, exposed: str | None = None) -> Entrance:
 
     Raises `StudioError` where the port is taken or the address is not this machine's, `ExposureError` for a bad name.
     """
-    if exposed is not None and exposed in _ANY:
+    host = "127.0.0.1" if exposed is None else _as_browsers_write(exposed)
+    if host in _ANY:
         raise StudioError(
             f"'{exposed}' is no address that a browser could open; give this machine's own address or name in the "
             "network, such as 192.168.1.7"
         )
-    host = address.bind_address(exposed or "127.0.0.1", exposed=exposed is not None)
-    listener = _bound(host, port)
+    listener = _bound(address.bind_address(host, exposed=exposed is not None), port)
     given = listener.getsockname()[1]
-    own = () if exposed is None else (f"[{exposed}]" if ":" in exposed else exposed,)
+    own = () if exposed is None else (f"[{host}]" if ":" in host else host,)
     names = address.hosts(given, own) if own else address.hosts(given)
     return Entrance(listener, names, address.new_token())
+
+
+def _as_browsers_write(host: str) -> str:
+    """An address in the form that browsers send, 10.0.0.7 for "10.7"; a name stays as it is, and is not looked up."""
+    try:
+        return str(socket.getaddrinfo(host, None, flags=socket.AI_NUMERICHOST)[0][4][0])
+    except (OSError, ValueError):
+        return host
 
 
 def _bound(host: str, port: int) -> socket.socket:
     try:
         family, kind, protocol, _, place = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
         listener = socket.socket(family, kind, protocol)
+    except UnicodeError:  # what no name can be
+        raise StudioError(f"'{host[:_SHOWN]}' is no address of this machine; give one such as 192.168.1.7") from None
     except OSError as error:
         raise StudioError(f"'{host}' is no address of this machine: {error.strerror}") from error
     try:
@@ -119,7 +137,24 @@ def serve(workshop: Workshop, entrance: Entrance, on_ready: Callable[[], None]) 
 
     settings = address.server_settings()
     config = uvicorn.Config(guarded, log_level="warning", timeout_graceful_shutdown=_GRACE_S, **settings)
-    Server(config).run(sockets=[entrance.listener])
+    try:
+        Server(config).run(sockets=[entrance.listener])
+    finally:
+        (workshop.studio / _WAY_IN).unlink(missing_ok=True)
+
+
+def way_in(studio: Path, url: str) -> str:
+    """The address of a page in the studio's own folder that leads to `url`, until `serve` ends. Raises OSError.
+
+    A browser has what it is to open on its command line, where every user of the machine can read it: the token must
+    not stand there. The page is its owner's alone.
+    """
+    path = studio / _WAY_IN
+    path.unlink(missing_ok=True)
+    handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
+    with os.fdopen(handle, "w", encoding="ascii") as file:
+        file.write(_PAGE.format(url=url))
+    return path.as_uri()
 
 
 def application(workshop: Workshop, entrance: Entrance) -> Guard:

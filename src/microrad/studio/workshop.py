@@ -1,6 +1,7 @@
 """What all tabs of the studio share: the mission being edited, a second one beside it, the jobs, the working folder.
 
-Unsaved changes are kept in the working folder's `.microrad-studio`, so that they survive a closed tab and a restart.
+Unsaved changes and the second mission are kept in the working folder's `.microrad-studio`, so that they survive a
+closed tab and a restart.
 """
 
 from __future__ import annotations
@@ -14,6 +15,8 @@ from pathlib import Path
 from microrad.document import MissionError
 from microrad.folder import write_whole
 from microrad.missionfile import LinkFile, MissionFile
+from microrad.studio import plain_files
+from microrad.studio.campaign_live import LiveCampaigns
 from microrad.studio.draft import Draft
 from microrad.studio.jobs import Jobs
 from microrad.studio.names import within
@@ -24,14 +27,15 @@ STUDIO = ".microrad-studio"
 """Name of the studio's own folder in the working folder."""
 
 _DEFAULT = "leo-geo.toml"
-_KEPT = "draft.json"
+_KEPT, _OTHER = "draft.json", "other.json"
 
 
 class Workshop:
     """The one working place behind all tabs; safe to use from several threads.
 
     `folder` is the working folder: nothing outside of it is written or listed. `studio` is the studio's own folder in
-    it, `jobs` what runs. `revision` grows with each change of `draft` or `other`, so a page sees that it is behind.
+    it, `jobs` what runs, `campaigns` what their ledgers say so far. `revision` grows with each change of `draft` or
+    `other`, so a page sees that it is behind.
     """
 
     def __init__(self, folder: Path, file: Path | None = None) -> None:
@@ -47,7 +51,8 @@ class Workshop:
         self._draft = self._begin(None if file is None else within(self.folder, file.absolute()))
         self.jobs = Jobs(self.studio)  # behind what may be refused: nothing is written then
         _keep_out_of_repositories(self.studio)
-        self._other: Draft | None = None
+        self.campaigns = LiveCampaigns()
+        self._other = self._kept(_OTHER)
         self._mission: tuple[Draft, MissionFile | None, str] | None = None
         self._link: tuple[Draft, LinkFile | None] | None = None
 
@@ -59,12 +64,16 @@ class Workshop:
 
     @property
     def other(self) -> Draft | None:
-        """The second mission, which the first is compared with."""
+        """The second mission, which the first is compared with; kept on disk, too. Setting it raises OSError."""
         return self._other
 
     @other.setter
     def other(self, draft: Draft | None) -> None:
         with self._lock:
+            if draft is None:
+                (self.studio / _OTHER).unlink(missing_ok=True)
+            else:
+                self._keep(draft, _OTHER)
             self._other = draft
             self.revision += 1
 
@@ -73,7 +82,7 @@ class Workshop:
         with self._lock:
             if draft == self._draft:
                 return
-            self._keep(draft)
+            self._keep(draft, _KEPT)
             self._draft = draft
             self.revision += 1
 
@@ -127,30 +136,30 @@ class Workshop:
         return tuple(sorted(found, key=lambda path: path.name))
 
     # ---------------------------------------------------------------------------------------------------- kept on disk
-    def _keep(self, draft: Draft) -> None:
-        kept = {"path": self.name_of(draft.path), "disk_sha256": draft.disk_sha256, "text": draft.text}
-        write_whole(self.studio / _KEPT, json.dumps(kept))
+    def _keep(self, draft: Draft, name: str) -> None:
+        noted = {"path": self.name_of(draft.path), "disk_sha256": draft.disk_sha256, "text": draft.text}
+        write_whole(self.studio / name, json.dumps(noted))
 
     def _begin(self, file: Path | None) -> Draft:
         """The unsaved changes of `file` where there are some, else the file, else the paper's mission."""
-        kept = self._kept(file)
-        if kept is not None:
-            return kept
+        found = self._kept(_KEPT, file)
+        if found is not None:
+            return found
         path = file or self.folder / _DEFAULT
         return Draft.open(path) if file is not None or path.exists() else Draft.shipped(path)
 
-    def _kept(self, file: Path | None) -> Draft | None:
-        """What an earlier studio was editing, if that was `file` or no file is asked for."""
+    def _kept(self, name: str, file: Path | None = None) -> Draft | None:
+        """What an earlier studio has kept under a name, if that was `file` or no file is asked for."""
         try:
-            noted = json.loads((self.studio / _KEPT).read_text("utf-8"))
+            noted = json.loads(plain_files.content(self.studio / name))
             path, disk, text = within(self.folder, noted["path"]), str(noted["disk_sha256"]), str(noted["text"])
             if file is not None and path != file:
                 return None
             base = Draft.open(path) if path.exists() else Draft.shipped(path)
-            kept = replace(base.with_text(text), text=text, disk_sha256=disk)
-        except (OSError, ValueError, KeyError, TypeError):
+            draft = replace(base.with_text(text), text=text, disk_sha256=disk)
+        except (OSError, ValueError, KeyError, TypeError, RecursionError):
             return None
-        return base if base.text == text or not kept.changed else kept
+        return base if base.text == text or not draft.changed else draft
 
 
 def _keep_out_of_repositories(studio: Path) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 from nicegui import run, ui
 
@@ -30,6 +30,14 @@ _SWINGS = (
     ("slow_relay", "99 % by relay"),
     ("slow_direct", "99 % direct"),
 )
+
+
+class Drawn(NamedTuple):
+    """Timeline, volumes and latencies; the map as the address of an image, and what it shows."""
+
+    plots: tuple[plots.Plot, plots.Plot, plots.Plot]
+    map: str
+    words: str
 
 
 def page(workshop: Workshop) -> None:
@@ -67,6 +75,9 @@ class DayPage:
         self.words = ui.column()
         layout.heading("Contacts over time")
         self.timeline = plot("Contacts and eclipses over time; in numbers in the table of contacts")
+        layout.heading("Over the Earth")
+        self.map = ui.element("img").style("width: 100%; max-width: 52rem")
+        self.map_words = ui.label().classes("soft small")
         layout.heading("Data made, delivered and on board")
         self.volume = plot("Data made, delivered and on board over time").style("height: 24rem")
         layout.heading("From recording to delivery")
@@ -110,13 +121,15 @@ class DayPage:
         self.bar.value = state.done / state.total if state.total else 0.0
         self.results.classes(**{"add" if state.result is None else "remove": "behind"})
 
-    def _show(self, day: DayStudy, drawn: tuple[plots.Plot, plots.Plot, plots.Plot]) -> None:
+    def _show(self, day: DayStudy, drawn: Drawn) -> None:
         self.words.clear()
         with self.words:
             for sentence in day_view.words(day):
                 ui.label(sentence)
-        for element, figure in zip((self.timeline, self.volume, self.latency), drawn, strict=True):
+        for element, figure in zip((self.timeline, self.volume, self.latency), drawn.plots, strict=True):
             element.update_figure(figure)
+        self.map.props["src"], self.map.props["alt"] = drawn.map, "Map of the world: " + drawn.words
+        self.map_words.text = drawn.words
         names = [("what", ""), *zip(("relay", "direct"), (way.name for way in day_view.ways(day)), strict=False)]
         self.ways.columns = columns([Column(*each) for each in names])
         self.ways.rows, self.contacts.rows = day_view.way_rows(day), day_view.contact_rows(day)
@@ -128,5 +141,6 @@ def _day(file: LinkFile, progress: Any) -> DayStudy:
     return day_view.run(file, progress)
 
 
-def _drawn(day: DayStudy) -> tuple[plots.Plot, plots.Plot, plots.Plot]:
-    return day_view.timeline_plot(day), day_view.volume_plot(day), day_view.latency_plot(day)
+def _drawn(day: DayStudy) -> Drawn:
+    made = day_view.timeline_plot(day), day_view.volume_plot(day), day_view.latency_plot(day)
+    return Drawn(made, *day_view.ground_map(day))

@@ -19,7 +19,7 @@ from microrad.studio.pages.dial_rows import DialBoard
 from microrad.studio.workshop import Workshop
 
 T = TypeVar("T")
-_SHORT_S = 0.01
+_SHORT_S, _REST_S = 0.01, 0.15
 _OLD = "Shown in grey: the mission before this."
 
 
@@ -27,7 +27,8 @@ class DialPage(Generic[T]):
     """The dials of one tab and what follows them.
 
     It shows the workshop's draft, and while a dial moves, the draft with its value. Answers are computed in a thread;
-    of questions that wait, the newest alone is asked. `dimmed` turns grey while the draft has no view.
+    of questions that wait, the newest alone is asked, once the browser has drawn the answer before. `dimmed` turns grey
+    while the draft has no view.
     """
 
     dimmed: tuple[Element, ...] = ()
@@ -39,6 +40,7 @@ class DialPage(Generic[T]):
         self.last: Attempt[T] | None = None
         self._wanted: Callable[[], Attempt[T]] | None = None
         self._busy = self._grey = False
+        self._writing = asyncio.Lock()
         with ui.element("div").classes("beside"):
             with ui.element("div").classes("dial-column"):
                 self.board = DialBoard(self._try, self._set, seldom)
@@ -61,8 +63,12 @@ class DialPage(Generic[T]):
         """What is to be shown of a mission; runs in a thread."""
         raise NotImplementedError
 
-    def show(self, view: T) -> None:
-        """Show it."""
+    async def show(self, view: T) -> None:
+        """Show at once what one looks at while a dial moves; returns when the browser has drawn it."""
+        raise NotImplementedError
+
+    def show_rest(self, view: T) -> None:
+        """Show what is read, and not looked at, once the dials rest."""
         raise NotImplementedError
 
     # --------------------------------------------------------------------------------------------------------- changes
@@ -71,22 +77,25 @@ class DialPage(Generic[T]):
         await self._ask(partial(attempt, self.workshop.draft, key, typed, self.view))
 
     async def _set(self, key: str, typed: str) -> None:
-        """Write a value into the draft; what it does is shown first."""
-        while self._busy:
-            await asyncio.sleep(_SHORT_S)
-        try:
-            await run.io_bound(self.workshop.set, key, typed)
-        except (ValueError, OSError) as error:
-            layout.refuse(str(error))
-            return
+        """Write a value into the draft, behind those let go before; what it does is shown first."""
+        async with self._writing:
+            while self._busy:
+                await asyncio.sleep(_SHORT_S)
+            try:
+                await run.io_bound(self.workshop.set, key, typed)
+            except (ValueError, OSError) as error:
+                layout.refuse(str(error))
+                return
         self._mark()
         await self._reload()
 
     async def _reload(self) -> None:
-        """Show the draft as it is."""
-        draft = self.workshop.draft
+        """Show the draft as it is, but for a dial that moves."""
+        draft, moved = self.workshop.draft, self.board.moved
         self.board.show(self.dials(draft))
-        if self.last is None or self.last.draft.text != draft.text:  # else the dial was let go where it has been tried
+        if moved is not None:
+            await self._try(*moved)
+        elif self.last is None or self.last.draft.text != draft.text:
             await self._ask(partial(seen, draft, self.view))
 
     async def _ask(self, question: Callable[[], Attempt[T]]) -> None:
@@ -100,14 +109,14 @@ class DialPage(Generic[T]):
                 question, self._wanted = self._wanted, None
                 found = await run.io_bound(question)
                 if found is not None:  # there is none when the studio ends
-                    self._answer(found)
+                    await self._answer(found)
         except ValueError as error:
             layout.refuse(str(error))
         finally:
             self._busy = False
 
     # --------------------------------------------------------------------------------------------------------- showing
-    def _answer(self, found: Attempt[T]) -> None:
+    async def _answer(self, found: Attempt[T]) -> None:
         """Show a draft, or why it has no view."""
         same = self.last is not None and self.last.draft.text == found.draft.text and self.last.view is not None
         self.last = found
@@ -120,7 +129,13 @@ class DialPage(Generic[T]):
         self._dim(found.view is None)
         if found.view is not None and not same:
             self.view_now = found.view
-            self.show(found.view)
+            background_tasks.create_lazy(self._rest(found.view), name=f"rest {id(self)}")
+            await self.show(found.view)
+
+    async def _rest(self, view: T) -> None:
+        await asyncio.sleep(_REST_S)
+        if view is self.view_now:
+            self.show_rest(view)
 
     def _dim(self, grey: bool) -> None:
         if grey != self._grey:

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from nicegui import ui
+from nicegui.element import Element
 
 from microrad.studio.dials import Dial
 
@@ -38,76 +39,79 @@ def add_style(more: str = "") -> None:
 Told = Callable[[str, str], Any]
 
 
-class _Slider(ui.slider):
-    """A slider whose knob the browser moves by itself; an echo of the server would come late."""
+class DialRow(Element, component="dial.js"):
+    """One dial. `on_try` is told key and text while it moves or is typed, `on_set` when it is let go.
 
-    LOOPBACK = False
-
-
-class DialRow:
-    """One dial. `on_try` is told key and text while it moves or is typed, `on_set` when it is let go."""
+    It is `busy` from then on until the mission has its value.
+    """
 
     def __init__(self, dial: Dial, on_try: Told, on_set: Told) -> None:
         """Build the row in the present container."""
+        super().__init__()
         self.dial, self._try, self._set = dial, on_try, on_set
-        self.busy = False
-        with ui.element("div").classes("dial"):
-            self.field = ui.input(dial.label, value=dial.typed).props("dense autocomplete=off spellcheck=false")
-            self.slider = _Slider(min=0, max=dial.steps, step=1, value=dial.position)
-            self.slider.props(f'aria-label="{dial.label}, slider" color=primary')
-            self.told = ui.label().classes("dial-fault").props('role="alert"')
-            self.told.visible = False
-        self.slider.visible = dial.scale != "none"
-        self.field.on("update:model-value", self._typing, throttle=0.15, leading_events=False)
-        self.field.on("blur", self._let_go)
-        self.field.on("keydown.enter", self._let_go)
-        self.slider.on("update:model-value", self._moving, throttle=0.04)
-        self.slider.on("change", self._released)
+        self.busy, self._changes = False, 0
+        self._shown: dict[str, Any] = {"fault": "", **_shown(dial)}
+        self._props["label"] = dial.label
+        self._props["begin"] = dict(self._shown)
+        self.on("try_text", lambda event: self._tried(event.args))
+        self.on("set_text", lambda event: self._let_go(event.args))
+        self.on("try_place", lambda event: self._tried(self._turned(event.args)))
+        self.on("set_place", lambda event: self._let_go(self._turned(event.args)))
+
+    @property
+    def typed(self) -> str:
+        """What its field says."""
+        return str(self._shown["text"])
 
     def show(self, dial: Dial) -> None:
         """Show the value that the mission has; what is being moved stays as it is."""
-        if self.busy or dial.typed == self.field.value == self.dial.typed:
-            return
-        self.dial = self.dial.holding(dial.typed)
-        self.field.value = dial.typed
-        self._place()
+        if not self.busy and not dial.typed == self.typed == self.dial.typed:
+            self._hold(dial.typed)
 
     def fault(self, words: str) -> None:
         """Show what is wrong with the value, or nothing."""
-        self.told.text = words
-        self.told.visible = bool(words)
-        self.field.props(f"aria-invalid={'true' if words else 'false'}")
+        self._tell(fault=words)
 
-    def _place(self) -> None:
-        self.slider.visible = self.dial.scale != "none"
-        self.slider._props["max"] = self.dial.steps
-        self.slider.value = self.dial.position
-        self.slider.update()
+    def _hold(self, typed: str) -> None:
+        self.dial = self.dial.holding(typed)
+        self._tell(**_shown(self.dial))
 
-    async def _moving(self) -> None:
-        self.busy = True
-        typed = self.dial.at(int(self.slider.value or 0))
-        self.field.value = typed
+    def _tell(self, **now: Any) -> None:
+        """Have the browser show what it does not show yet."""
+        new = {key: value for key, value in now.items() if self._shown[key] != value}
+        if new:
+            self._shown |= new
+            self.run_method("show", new)
+
+    def _turned(self, place: float) -> str:
+        """What the slider has come to, which its field then says."""
+        self._shown["place"] = int(place)
+        typed = self.dial.at(int(place))
+        self._tell(text=typed)
+        return typed
+
+    async def _tried(self, typed: str) -> None:
+        self._begin(typed)
         await self._try(self.dial.key, typed)
 
-    async def _released(self) -> None:
-        self.busy = False
-        typed = self.dial.at(int(self.slider.value or 0))
-        self.dial = self.dial.holding(typed)
-        await self._set(self.dial.key, typed)
-
-    async def _typing(self) -> None:
-        self.busy = True
-        await self._try(self.dial.key, str(self.field.value or ""))
-
-    async def _let_go(self) -> None:
-        self.busy = False
-        typed = str(self.field.value or "")
-        if typed == self.dial.typed:
+    async def _let_go(self, typed: str) -> None:
+        if not self.busy and typed == self.dial.typed:
             return
-        self.dial = self.dial.holding(typed)
-        self._place()
+        mine = self._begin(typed)
+        self._hold(typed)
         await self._set(self.dial.key, typed)
+        self.busy = mine != self._changes  # else it has been moved again meanwhile
+
+    def _begin(self, typed: str) -> int:
+        """Note a change that is not the mission's yet."""
+        self.busy, self._shown["text"] = True, typed
+        self._changes += 1
+        return self._changes
+
+
+def _shown(dial: Dial) -> dict[str, Any]:
+    """What the browser shows of a dial; no steps where it has no slider."""
+    return {"text": dial.typed, "place": dial.position, "steps": 0 if dial.scale == "none" else dial.steps}
 
 
 class DialBoard:
@@ -126,6 +130,11 @@ class DialBoard:
             self._build(groups)
         for key, dial in dials.items():
             self.rows[key].show(dial)
+
+    @property
+    def moved(self) -> tuple[str, str] | None:
+        """Key and text of a dial that shows what the mission does not have yet, or None."""
+        return next(((key, row.typed) for key, row in self.rows.items() if row.busy), None)
 
     def faults(self, of: Mapping[str, str]) -> None:
         """Show what is wrong with each key; nothing where nothing is."""

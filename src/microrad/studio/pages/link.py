@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import asyncio
 import time
 from collections.abc import Mapping
 from functools import partial
 
-from nicegui import background_tasks, run, ui
+from nicegui import run, ui
 
 from microrad import link_study
 from microrad.link_study import LinkStudy
@@ -21,7 +20,8 @@ from microrad.studio.link_view import LinkView
 from microrad.studio.pages import layout
 from microrad.studio.pages.dial_page import DialPage
 from microrad.studio.pages.dial_rows import add_style
-from microrad.studio.pages.pieces import Column, LivePlot, file_of, plot, table
+from microrad.studio.pages.live import LivePlot, MarginCards
+from microrad.studio.pages.pieces import Column, file_of, plot, table
 from microrad.studio.plots import Plot
 from microrad.studio.workshop import Workshop
 
@@ -34,7 +34,7 @@ _COLUMNS = (
     Column("basis", "Basis"),
     Column("source", "Source"),
 )
-_LOOK_S, _REST_S, _AFTER_S = 0.25, 0.8, 0.08
+_LOOK_S, _REST_S = 0.25, 0.8
 _CSS = """
 .margins { display: grid; grid-template-columns: repeat(auto-fit, minmax(11rem, 1fr)); gap: .75rem; width: 100%; }
 .margin-card { border: 1px solid var(--line); border-radius: 4px; padding: .4rem .7rem; }
@@ -64,11 +64,9 @@ class LinkPage(DialPage[LinkView]):
     def build(self) -> None:
         """Margins, map, budgets, and what takes a second."""
         layout.heading("Margins")
-        cards = ui.element("div").classes("margins")
-        with cards:
-            self.cards = [_card() for _ in range(3)]
+        self.cards = MarginCards()
         layout.heading("Margin map")
-        self.map = LivePlot("Link margin over data rate and pointing error; in words below", "margin-map")
+        self.map = LivePlot("Link margin over data rate and pointing error; in words below").classes("margin-map")
         self.key = ui.label().classes("soft")
         self.words = ui.label().props('role="status"')
         layout.heading("Budgets")
@@ -80,7 +78,7 @@ class LinkPage(DialPage[LinkView]):
         layout.heading("What moves the margin of the communication link")
         ui.label("Each input alone, 10 % lower and higher (0.5 dB; an outage by a factor of ten).").classes("soft")
         self.tornado = plot("What moves the margin; in words above")
-        self.dimmed = (cards, self.map.box, self.key, self.words, self.table)
+        self.dimmed = (self.cards, self.map, self.key, self.words, self.table)
 
     def dials(self, draft: Draft) -> Mapping[str, tuple[Dial, ...]]:
         """The numbers of the links' tables."""
@@ -90,19 +88,13 @@ class LinkPage(DialPage[LinkView]):
         """Budgets and map, on the axes that the map has."""
         return link_view.view(file, None if self.view_now is None else self.view_now.frame)
 
-    def show(self, view: LinkView) -> None:
-        """Margins and map at once; what is read and not looked at follows."""
-        self.map.show(link_view.map_plot(view))
-        for place, (card, name, value, needs) in enumerate(self.cards):
-            card.visible = place < len(view.margins)
-            if card.visible:
-                margin = view.margins[place]
-                name.text, value.text, needs.text = margin.name, margin.words, margin.needs
-                needs.classes(add="PASS" if margin.met else "FAIL", remove="FAIL" if margin.met else "PASS")
-        background_tasks.create_lazy(self._show_rest(view), name=f"links {id(self)}")
+    async def show(self, view: LinkView) -> None:
+        """Margins and map."""
+        self.cards.show(view.margins)
+        await self.map.draw(link_view.map_plot(view))
 
-    async def _show_rest(self, view: LinkView) -> None:
-        await asyncio.sleep(_AFTER_S)
+    def show_rest(self, view: LinkView) -> None:
+        """The map in words, and the budgets."""
         self.key.text = link_view.map_key(view.file.mission)
         self.words.text = link_view.map_words(view)
         self._tabs()
@@ -150,12 +142,6 @@ class LinkPage(DialPage[LinkView]):
             file = self.workshop.link()
             if file is not None:
                 self.study.ask(draft.sha256, partial(_study, file))
-
-
-def _card() -> tuple[ui.element, ui.label, ui.label, ui.label]:
-    """A card with the name, the value and the need of a margin, still empty."""
-    with ui.element("div").classes("margin-card") as card:
-        return card, ui.label().classes("soft"), ui.label().classes("value"), ui.label()
 
 
 def _told(study: LinkStudy) -> tuple[list[str], dict[str, list[link_view.Row]], Plot]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Awaitable
 from dataclasses import replace
 from typing import Any
 
@@ -174,10 +175,11 @@ class MirrorPage:
         self.keep(replace(self.form, uses={**self.form.uses, key: use}))
 
     # -------------------------------------------------------------------------------------------------------- the form
-    async def typed(self) -> None:
-        """Take over what the form says."""
-        if self.filling:
-            return
+    def typed(self) -> Awaitable[None] | None:
+        """Take over what the form says, unless it is only being filled; a task would begin when it is full."""
+        return None if self.filling else self._take_over()
+
+    async def _take_over(self) -> None:
         values = {key: field.value for key, field in self.fields.items()}
         values["accept"] = tuple(values["accept"] or ())
         self.keep(replace(self.form, setting=Setting(**values)))

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 from nicegui import ui
 
-from microrad.studio.plots import CONFIG, Plot
+from microrad.studio.plots import CONFIG
 from microrad.studio.workshop import Workshop
 
 
@@ -24,31 +24,6 @@ def plot(label: str) -> ui.plotly:
     """A plot that is still empty; `label` says what it shows and where the same stands in words."""
     made = ui.plotly({"data": [], "layout": {}, "config": CONFIG}).classes("w-full")
     return made.props(f'role="figure" aria-label="{label}"')
-
-
-class LivePlot:
-    """A plot that is drawn many times a second: from the second time on its data go to plotly as they are.
-
-    NiceGUI would have each number watched by Vue, through which plotly reads it again; that takes longer than drawing.
-    `box` is what may be styled: a change of the plot's own element would draw its first figure again.
-    """
-
-    def __init__(self, label: str, classes: str) -> None:
-        """Build it, still empty."""
-        with ui.element("div").classes(f"w-full {classes}-box") as self.box:
-            self._plot = plot(label).classes(classes)
-        self._drawn = False
-        self._plot.on("plotly_afterplot.once", self._ready, args=[])
-
-    def _ready(self) -> None:
-        self._drawn = True
-
-    def show(self, figure: Plot) -> None:
-        """Draw a figure."""
-        if self._drawn:
-            self._plot.run_plot_method("react", figure["data"], figure["layout"], figure["config"])
-        else:
-            self._plot.update_figure(figure)
 
 
 def table(of: Sequence[Column]) -> ui.table:

@@ -14,7 +14,8 @@ from microrad.studio.draft import Draft
 from microrad.studio.pages import layout
 from microrad.studio.pages.dial_page import DialPage
 from microrad.studio.pages.dial_rows import add_style
-from microrad.studio.pages.pieces import Column, file_of, plot, table
+from microrad.studio.pages.live import LivePlot
+from microrad.studio.pages.pieces import Column, file_of, table
 from microrad.studio.pointing_view import PointingView
 from microrad.studio.workshop import Workshop
 
@@ -57,10 +58,10 @@ class PointingPage(DialPage[PointingView]):
         """Coverage, lines and totals, point-ahead."""
         layout.heading("What the beacon covers")
         self.words = ui.label().props('role="status"')
-        self.coverage = plot("Probability that the pointing error is below an angle; totals in the table below")
+        self.coverage = LivePlot("Probability that the pointing error is below an angle; totals in the table below")
         self.coverage.style("height: 24rem")
         layout.heading("Lines and totals")
-        self.bars = plot("Half widths of the lines and totals of the rules; in numbers in the tables below")
+        self.bars = LivePlot("Half widths of the lines and totals of the rules; in numbers in the tables below")
         self.lines = table(_LINES)
         ui.label(
             "Left for it: the largest half width, all others as they are, with which the total equals the beacon's "
@@ -81,10 +82,13 @@ class PointingPage(DialPage[PointingView]):
         """The budget."""
         return pointing_view.view(file)
 
-    def show(self, view: PointingView) -> None:
-        """The plots at once, the sentences when they are there."""
-        self.coverage.update_figure(pointing_view.coverage_plot(view))
-        self.bars.update_figure(pointing_view.lines_plot(view))
+    async def show(self, view: PointingView) -> None:
+        """Both plots."""
+        await self.coverage.draw(pointing_view.coverage_plot(view))
+        await self.bars.draw(pointing_view.lines_plot(view))
+
+    def show_rest(self, view: PointingView) -> None:
+        """The tables, and the sentences when they are there."""
         self.lines.rows = pointing_view.line_rows(view)
         self.totals.rows = pointing_view.total_rows(view)
         self.ahead.rows = pointing_view.ahead_rows(view)

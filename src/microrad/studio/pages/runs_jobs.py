@@ -13,10 +13,15 @@ from nicegui import run, ui
 from microrad.studio import commands
 from microrad.studio.jobs import Job, JobError
 from microrad.studio.pages import layout
+from microrad.studio.pages.runs_campaign import CampaignPanel
 from microrad.studio.runs_view import (
     CampaignReport,
+    Others,
     free_name,
+    ledger_of,
+    ledger_path,
     order,
+    others,
     progress_words,
     result_files,
     state_words,
@@ -54,7 +59,7 @@ class JobList:
             for job in reversed(jobs):
                 if job.number not in self._cards:
                     self._add(job)
-                await self._cards[job.number].show(job)
+                await self._cards[job.number].show(job, others(jobs, job))
 
     def _add(self, job: Job) -> None:
         with self._place:
@@ -68,12 +73,15 @@ class _Card:
     def __init__(self, jobs: JobList, job: Job) -> None:
         self.jobs, self.workshop, self.number = jobs, jobs.workshop, job.number
         self._last: Job | None = None
+        self._beside: Others | None = None
+        self._panel: CampaignPanel | None = None
         with ui.element("article").classes("runs-job") as self.element:
             with ui.row().classes("runs-head"):
                 layout.heading(f"{job.number}. {job.title}", 3)
                 self.state = ui.label().props('role="status"').classes("runs-state")
                 self.cancel = ui.button("Cancel", on_click=self._cancel).props("no-caps outline dense")
                 self.again = ui.button("Go on", on_click=self._go_on).props("no-caps outline dense")
+                self.figures = ui.button("Show its figures", on_click=self._toggle).props("no-caps outline dense")
                 self.page = ui.button("Write its report", on_click=self._write_page).props("no-caps outline dense")
                 self.drop = ui.button("Remove from the list", on_click=self._remove).props("no-caps flat dense")
             self.bar = ui.linear_progress(0.0, show_value=False, size="8px").props("instant-feedback")
@@ -81,18 +89,24 @@ class _Card:
             self.progress = ui.label().classes("small")
             self.when = ui.label().classes("small soft")
             self.fault = ui.label().classes("no kept")
-            self.results = ui.row().classes("runs-results")
-            self.said = layout.words("pre").classes("runs-said").props("tabindex=0")
+            with ui.row().classes("runs-results"):
+                self.report, self.results = (ui.row().classes("runs-results") for _ in range(2))
+            self.place = ui.element("div")
+            with ui.element("details").classes("runs-details") as self.details:
+                layout.words("summary", "What it printed")
+                self.said = layout.words("pre").classes("runs-said").props("tabindex=0")
+            if job.kind != "campaign":  # its figures say the same
+                self.details.props("open")
             if job.arguments:
                 layout.words("code", commands.command(_Done(job))).classes("mono runs-command")
 
-    async def show(self, job: Job) -> None:
-        """Show the job as it is now."""
+    async def show(self, job: Job, beside: Others) -> None:
+        """Show the job as it is now, beside the others."""
         self.when.text = time_words(job)
-        if job == self._last:
+        if job == self._last and beside == self._beside:
             return
         ended = job.finished and (self._last is None or not self._last.finished)
-        self._last = job
+        self._last, self._beside = job, beside
         self.state.text = state_words(job)
         self.state.classes(add=_class(job), remove="yes no soft".replace(_class(job), ""))
         running = job.state == "running"
@@ -102,30 +116,68 @@ class _Card:
         self.progress.text = progress_words(job.progress)
         self.fault.text = job.words
         self.fault.visible = bool(job.words)
-        stopped = job.state in ("cancelled", "failed", "lost")
-        ledger = _ledger(job)
-        self.again.visible = stopped and ledger is not None and (job.cwd / ledger).is_file()
-        self.page.visible = job.state == "done" and ledger is not None
+        self._campaign(job, beside)
         if ended:
             await self._ended(job)
         else:
-            self.said.visible = self.said.visible and job.finished
+            self.details.visible = job.finished and bool(self.said.text)
+
+    def _campaign(self, job: Job, beside: Others) -> None:
+        """What a campaign has beside other jobs: its figures, the way on, and its report."""
+        path = ledger_path(self.workshop, job) if beside.newest else None
+        there = path is not None and path.is_file()
+        self.results.visible = job.kind != "campaign" or beside.newest  # else another job may be writing to it
+        self.again.visible = there and job.state in ("cancelled", "failed", "lost")
+        self.page.visible = there and job.state == "done" and beside.report is None
+        self.figures.visible = path is not None and (there or job.state == "running")
+        if path is None or not self.figures.visible:
+            if self._panel is not None:
+                self._panel.open = False
+        elif self._panel is None:
+            with self.place:
+                self._panel = CampaignPanel(self.workshop, path)
+            self._panel.open = beside.latest or job.state == "running"
+        self._name_figures()
+        self._link_report(beside.report)
+
+    def _link_report(self, report: Job | None) -> None:
+        """The report of a campaign, where it is written or is being written."""
+        self.report.clear()
+        if report is None:
+            return
+        with self.report:
+            if report.state == "done":
+                self._open_links(report, 0, report.results[0])
+            else:
+                ui.label(f"Its report is written by job {report.number}: {state_words(report)}").classes("small soft")
+
+    def _toggle(self) -> None:
+        if self._panel is not None:
+            self._panel.open = not self._panel.open
+            self._name_figures()
+
+    def _name_figures(self) -> None:
+        self.figures.text = "Hide its figures" if self._panel is not None and self._panel.open else "Show its figures"
 
     async def _ended(self, job: Job) -> None:
         """What a job has said and written, read once it is over."""
         said = await run.io_bound(self.workshop.jobs.output, job.number)
         self.said.text = (said or "").strip()
-        self.said.visible = bool(self.said.text)
+        self.details.visible = bool(self.said.text)
         self.results.clear()
         with self.results:
             for place, name in result_files(self.workshop, job):
-                address = f"{RESULTS}/{job.number}/{place}"
-                if name.endswith(".html"):
-                    show = partial(self.jobs.open_page, address, f"{job.number}. {name}")
-                    ui.button(f"Show {Path(name).name} here", on_click=show).props("no-caps dense")
-                    ui.link(f"{name} in a tab of its own", address, new_tab=True)
-                else:
-                    ui.link(f"Save {name}", address)
+                self._open_links(job, place, name)
+
+    def _open_links(self, job: Job, place: int, name: str) -> None:
+        """A result of a job: to be shown here where it is a page, else to be saved."""
+        address = f"{RESULTS}/{job.number}/{place}"
+        if not name.endswith(".html"):
+            ui.link(f"Save {name}", address)
+            return
+        show = partial(self.jobs.open_page, address, f"{job.number}. {name}")
+        ui.button(f"Show {Path(name).name} here", on_click=show).props("no-caps dense")
+        ui.link(f"{name} in a tab of its own", address, new_tab=True)
 
     # --------------------------------------------------------------------------------------------------------- buttons
     def _cancel(self) -> None:
@@ -136,14 +188,14 @@ class _Card:
 
     async def _go_on(self) -> None:
         job = self._last
-        ledger = None if job is None else _ledger(job)
+        ledger = None if job is None else ledger_of(job)
         if ledger is not None:
             action = commands.CampaignResume(Path(ledger))
             await submit(self.workshop, "campaign", f"Campaign {ledger}, going on", action)
 
     async def _write_page(self) -> None:
         job = self._last
-        ledger = None if job is None else _ledger(job)
+        ledger = None if job is None else ledger_of(job)
         if ledger is not None:
             page = await run.io_bound(free_name, self.workshop, Path(ledger).stem, ".html") or ""
             await submit(self.workshop, "export", f"Report of {ledger}", CampaignReport(Path(ledger), Path(page)))
@@ -160,11 +212,6 @@ def _class(job: Job) -> str:
     if job.state == "done":
         return "no" if job.code == 1 else "yes"
     return "no" if job.state in ("failed", "lost", "unreadable") else "soft"
-
-
-def _ledger(job: Job) -> str | None:
-    """The ledger that a campaign writes."""
-    return next((name for name in job.results if name.endswith(".ledger")), None) if job.kind == "campaign" else None
 
 
 async def submit(workshop: Workshop, kind: Any, title: str, action: commands.Action) -> bool:

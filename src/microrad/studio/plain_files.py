@@ -1,0 +1,41 @@
+"""Files that the studio keeps in a working folder, which may have come from a stranger: read with care, or not at all.
+
+A link there could name any file of this machine, and a pipe or a device would never end.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import stat
+from pathlib import Path
+from typing import BinaryIO
+
+MOST_BYTES = 16_000_000
+"""Of a file that is read whole; a draft is the largest."""
+
+
+def opened(path: Path) -> BinaryIO:
+    """A plain file to read from. Raises OSError where there is none, a link included."""
+    if path.is_symlink():
+        raise OSError(errno.ELOOP, "it is a link", str(path))
+    flags = ("O_NOFOLLOW", "O_NONBLOCK", "O_CLOEXEC", "O_BINARY")  # those that this system has
+    file = os.fdopen(os.open(path, sum((getattr(os, each, 0) for each in flags), os.O_RDONLY)), "rb")
+    if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
+        file.close()
+        raise OSError(errno.EINVAL, "it is no plain file", str(path))
+    return file
+
+
+def content(path: Path, most: int = MOST_BYTES) -> bytes:
+    """The bytes of a plain file. Raises OSError where there is none, a link included, and for more than `most`."""
+    with opened(path) as file:
+        data = file.read(most + 1)
+    if len(data) > most:
+        raise OSError(errno.EFBIG, f"it is larger than {most} bytes", str(path))
+    return data
+
+
+def is_folder(folder: Path) -> bool:
+    """Whether this is a folder, and no link to one."""
+    return folder.is_dir() and not folder.is_symlink()

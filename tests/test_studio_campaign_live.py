@@ -1,0 +1,325 @@
+"""The figures of a campaign in the studio, from a ledger that grows while it is read; no row is simulated here."""
+
+import json
+import math
+import threading
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from microrad.campaign import blob, bundle, interim, plan, run, sampling
+from microrad.campaign.file import load_campaign
+from microrad.campaign.interim import Interim
+from microrad.campaign.ledger import Ledger
+from microrad.campaign.records import CampaignError, Chunk, Failed
+from microrad.campaign.summary import summarise
+from microrad.fine_loop.ensemble import bin_edges_rad
+from microrad.report import campaign_words
+from microrad.studio import campaign_live, campaign_view
+from microrad.studio.campaign_live import Live, LiveCampaigns
+from small_campaign import campaign_file
+
+LIMIT = '\n[limits]\nresidual_rms = { most = "5 urad" }\n'
+TAIL = "Radial errors that are exceeded"
+GRID = '\n[grid]\n"communication.data_rate" = ["1 Gbit/s", "2 Gbit/s"]\n'
+
+
+ROWS = 512
+
+
+class Growing:
+    """A ledger that gets its chunks one by one: of the rows that a campaign draws, with outputs made up here."""
+
+    def __init__(self, folder, more="", runs=ROWS, failed=()):
+        self.path, self.failed = folder / "x.ledger", failed
+        self.campaign = load_campaign(campaign_file(folder, runs=runs, duration="16 s", more=LIMIT + more))
+        self.head = run._head(self.campaign, bundle.packed(self.campaign, ()))
+        self.rows = plan.chunk_rows(self.campaign)
+        self.every = len(plan.chunks(self.campaign, 0, runs))
+        self.begin()
+
+    def begin(self, seed=1):
+        self.random = np.random.default_rng(seed)
+        with Ledger.create(self.path, replace(self.head, created=str(seed))) as book:
+            book.note("state", "running")
+            book.note("seconds", 10.0)
+
+    def put(self, *numbers, cell=0):
+        with Ledger.open(self.path, write=True) as book:
+            for number in numbers:
+                book.put(cell, number, blob.pack_chunk(self.chunk(number, cell)))
+
+    def chunk(self, number, cell=0):
+        rows = plan.rows_of(self.campaign, number)
+        drawn, weight = sampling.rows(self.campaign, cell, rows.start, len(rows))
+        columns = {"row": np.arange(rows.start, rows.stop, dtype=float), "weight": weight, **drawn}
+        lost = np.isin(columns["row"], self.failed)
+        for output in plan.outputs(self.campaign):
+            values = self.random.lognormal(math.log(4e-6), 0.2, len(rows))
+            columns[output.name] = np.where(lost, math.nan, values)
+        failed = tuple(Failed(row, 7, 2, "the reason") for row in rows if row in self.failed)
+        beyond = np.exp(-0.5 * (bin_edges_rad()[:-1] / 3e-6) ** 2)
+        return Chunk(cell, number, columns, failed, len(rows) * beyond, len(rows) * beyond**2)
+
+    def end(self):
+        with Ledger.open(self.path, write=True) as book:
+            book.note("state", "complete")
+
+
+@pytest.fixture
+def growing(tmp_path):
+    return Growing(tmp_path)
+
+
+@pytest.fixture
+def at_once(monkeypatch):
+    """A look reads at any time, however short the last one is ago."""
+    monkeypatch.setattr(campaign_live, "_PAUSE_S", 0.0)
+    monkeypatch.setattr(campaign_live, "_REST", 0.0)
+
+
+def same(found, wanted, outputs=True):
+    """The statistics of two summaries agree; the sums were made in another order."""
+    for a, b in zip(found.cells, wanted.cells, strict=True):
+        assert (a.rows, a.failed, a.values) == (b.rows, b.failed, b.values)
+        assert tuple(vars_of(a.missed)) == pytest.approx(tuple(vars_of(b.missed)))
+        assert a.missed_by.keys() == b.missed_by.keys()
+        if outputs and a.outputs:
+            for name, output in a.outputs.items():
+                for p, quantile in output.quantiles.items():
+                    wants = b.outputs[name].quantiles[p]
+                    assert vars_of(quantile) == pytest.approx(vars_of(wants), nan_ok=True)
+
+
+def vars_of(interval):
+    return interval.value, interval.low, interval.high, interval.confidence
+
+
+# ---------------------------------------------------------------------------------------------------------- the reader
+def test_a_growing_ledger_says_at_each_time_what_its_rows_say(growing):
+    """Chunks come out of order, some rows have failed, and the campaign's own summary is the measure."""
+    reader = Interim(growing.path)
+    growing.failed = (3, 70)
+    growing.put(1)
+    first = reader.look()
+    same(first, summarise(growing.path))
+    assert first.progress.rows_done == growing.rows
+    assert reader.look() is first  # nothing is new
+    growing.put(3, 0)
+    second = reader.look()
+    assert second is not first
+    same(second, summarise(growing.path))
+    assert second.cells[0].rows == 3 * growing.rows
+    assert 0.0 < second.cells[0].missed.low < second.cells[0].missed.value < second.cells[0].missed.high < 1.0
+    growing.put(*(n for n in range(growing.every) if n not in (0, 1, 3)))
+    growing.end()
+    whole = reader.look()
+    same(whole, summarise(growing.path))
+    assert (whole.progress.state, whole.progress.rows_done, whole.cells[0].failed) == ("complete", ROWS, 2)
+    assert campaign_words.headline(whole) == campaign_words.headline(summarise(growing.path))
+
+
+def test_each_chunk_is_read_once(growing, monkeypatch):
+    taken = []
+    take = interim.summary.take
+    monkeypatch.setattr(interim.summary, "take", lambda *all: (taken.append(all[2].number), take(*all)))
+    reader = Interim(growing.path)
+    for number in (0, 2, 1):
+        growing.put(number)
+        reader.look()
+        reader.look()
+    assert taken == [0, 2, 1]
+
+
+def test_a_long_ledger_is_read_a_little_at_a_time(growing):
+    growing.put(*range(growing.every))
+    reader = Interim(growing.path)
+    seen = []
+    while not seen or seen[-1] < ROWS:
+        found = reader.look(0.0)
+        seen.append(found.cells[0].rows)
+        assert found.progress.rows_done == ROWS
+    assert seen == [growing.rows * (k + 1) for k in range(growing.every)]
+    same(found, summarise(growing.path))
+
+
+def test_a_reader_in_the_middle_of_a_writers_transaction_sees_whole_chunks(growing):
+    growing.put(0)
+    reader = Interim(growing.path)
+    with Ledger.open(growing.path, write=True) as book, book._writing("write"):
+        row = (0, 1, b"half a checksum", b"half a chunk")
+        book._connection.execute("INSERT INTO chunks VALUES (?, ?, ?, ?)", row)
+        assert reader.look().cells[0].rows == growing.rows
+        book._connection.execute("DELETE FROM chunks WHERE number = 1")
+    growing.put(1)
+    assert reader.look().cells[0].rows == 2 * growing.rows
+
+
+def test_another_campaign_in_the_same_place_and_chunks_taken_out_are_read_anew(growing):
+    growing.put(0, 1, 2)
+    reader = Interim(growing.path)
+    assert reader.look().cells[0].rows == 3 * growing.rows
+    with Ledger.open(growing.path, write=True) as book:
+        book.drop(0, 2)
+    same(reader.look(), summarise(growing.path))
+    assert reader.found.cells[0].rows == 2 * growing.rows
+    for path in growing.path.parent.glob("x.ledger*"):
+        path.unlink()
+    growing.begin(seed=2)
+    growing.put(0, 1, 2)
+    same(reader.look(), summarise(growing.path))
+    assert reader.found.cells[0].rows == 3 * growing.rows
+
+
+def test_of_a_grid_the_cell_that_is_shown_alone_has_outputs(tmp_path):
+    growing = Growing(tmp_path, GRID, runs=64)
+    growing.put(0)
+    growing.put(0, cell=1)
+    found, wanted = Interim(growing.path).look(), summarise(growing.path)
+    same(found, wanted)
+    shown = [bool(cell.outputs) for cell in found.cells]
+    assert sorted(shown) == [False, True]
+    assert campaign_words.best(found).values == campaign_words.best(wanted).values
+    assert campaign_words.best(found).outputs
+
+
+def test_a_ledger_cannot_write_outside_of_its_own_folder(growing, tmp_path):
+    for name in ("../planted.txt", str(tmp_path / "planted.txt"), "a/../../planted.txt", ".."):
+        data = json.loads(growing.head.bundle)
+        data["files"][name] = ""
+        with pytest.raises(CampaignError, match="which microrad never puts there: leave it alone"):
+            bundle.opened(json.dumps(data).encode())
+    assert not (tmp_path / "planted.txt").exists()
+    data["files"].pop(name)
+    data["files"]["a/../kept.txt"] = ""
+    assert bundle.opened(json.dumps(data).encode()).campaign.rows == ROWS
+
+
+# ------------------------------------------------------------------------------------------------------- for all tabs
+def test_every_tab_is_told_the_same(growing, at_once):
+    tabs = LiveCampaigns()
+    growing.put(0)
+    first = tabs.look(growing.path)
+    assert (first.rows, first.failed, first.fault) == (growing.rows, 0, "")
+    assert tabs.look(growing.path) is first
+    growing.put(1)
+    found = []
+    threads = [threading.Thread(target=lambda: found.append(tabs.look(growing.path))) for _ in range(8)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert {each.rows for each in found} <= {growing.rows, 2 * growing.rows}
+    assert tabs.look(growing.path).rows == 2 * growing.rows
+
+
+def test_between_two_readings_there_is_a_pause(growing, monkeypatch):
+    monkeypatch.setattr(campaign_live, "_PAUSE_S", 3600.0)
+    tabs = LiveCampaigns()
+    growing.put(0)
+    first = tabs.look(growing.path)
+    growing.put(1)
+    assert tabs.look(growing.path) is first
+
+
+def test_a_ledger_that_is_not_there_yet_says_nothing(tmp_path, at_once):
+    tabs = LiveCampaigns()
+    path = tmp_path / "x.ledger"
+    assert tabs.look(path) == Live()
+    assert campaign_view.figures(Live()) is None
+    growing = Growing(tmp_path)
+    assert tabs.look(path).rows == 0
+    assert campaign_view.figures(tabs.look(path)) is None
+    growing.put(0)
+    assert tabs.look(path).rows == growing.rows
+    for each in tmp_path.glob("x.ledger*"):
+        each.unlink()
+    assert tabs.look(path) == Live()
+
+
+def test_damage_and_other_files_are_told_and_what_was_read_stays(growing, at_once):
+    tabs = LiveCampaigns()
+    growing.put(0)
+    rows = tabs.look(growing.path).rows
+    with Ledger.open(growing.path, write=True) as book, book._writing("write"):
+        book._connection.execute("INSERT INTO chunks VALUES (0, 1, x'00', x'00')")
+    found = tabs.look(growing.path)
+    assert (found.rows, rows) == (growing.rows, growing.rows)
+    assert "chunk 1 of cell 0 is damaged, its checksum differs; `microrad campaign resume" in found.fault
+    with Ledger.open(growing.path, write=True) as book:
+        book.drop(0, 1)
+    assert tabs.look(growing.path).fault == ""
+    other = growing.path.with_name("other.ledger")
+    other.write_text("a text", "utf-8")
+    assert "is text, not a ledger" in tabs.look(other).fault
+
+
+def test_a_made_up_ledger_is_told(tmp_path, growing, at_once):
+    path = tmp_path / "made-up.ledger"
+    with Ledger.create(path, replace(growing.head, bundle=b'{"code": ""}')):
+        pass
+    assert "files" in LiveCampaigns().look(path).fault
+
+
+# -------------------------------------------------------------------------------------------------------- on the page
+def test_the_figures_say_of_how_many_rows_they_are(growing, at_once):
+    tabs = LiveCampaigns()
+    growing.failed = (3,)
+    growing.put(0)
+    found = campaign_view.figures(tabs.look(growing.path))
+    assert found.rows == f"Of {growing.rows} rows so far ({ROWS} are wanted)"
+    assert found.headline.startswith(f"1 of {growing.rows} rows failed; ")
+    assert found.notes[0] == "1 of them failed."
+    titles = [table.title for table in found.tables]
+    assert titles == ["Limits", TAIL, "Outputs and their quantiles over the rows", "Failed rows"]
+    cell = summarise(growing.path).cells[0]
+    (limit,) = found.tables[0].rows
+    kept = 100.0 * (1.0 - cell.missed_by["residual_rms"].value)
+    assert limit[0] == "residual_rms ≤ 5 µrad"
+    assert limit[1] == f"{kept:.3g} %"
+    low, high = (100.0 * (1.0 - end) for end in (cell.missed.high, cell.missed.low))
+    said = [float(end.removesuffix(" %")) for end in limit[2].split(" to ")]
+    assert said == [pytest.approx(low, abs=0.05), pytest.approx(high, abs=0.05)]
+    outputs = {row[0]: row for row in found.tables[2].rows}
+    headings = found.tables[2].headings
+    assert headings[:3] == ("output", "mean", "deviation")
+    median = cell.outputs["residual_rms"].quantiles[0.5]
+    shown = outputs["residual_rms"][headings.index("50 %")]
+    assert shown == f"{1e6 * median.value:.2f} µrad\n{1e6 * median.low:.2f} to {1e6 * median.high:.2f} µrad"
+    assert found.tables[3].rows == (("3", "7", "2", "the reason"),)
+    growing.put(*range(1, growing.every))
+    growing.end()
+    assert campaign_view.figures(tabs.look(growing.path)).rows == f"Of all {ROWS} rows"
+
+
+def test_the_plot_shows_the_share_below_its_quantiles_and_the_limit(growing, at_once):
+    growing.put(0, 1, 2)
+    found = campaign_view.figures(LiveCampaigns().look(growing.path))
+    assert next(iter(found.plots)) == "residual_rms"  # the one with a limit comes first
+    plot = found.plots["residual_rms"]
+    rows, quantiles, limit = plot["data"]
+    output = summarise(growing.path).cells[0].outputs["residual_rms"]
+    assert (rows["y"][0], rows["y"][-1]) == (0.0, pytest.approx(100.0))
+    assert all(a <= b for a, b in zip(rows["y"][:-1], rows["y"][1:], strict=True))
+    at = dict(zip(quantiles["y"], quantiles["x"], strict=True))
+    assert at[50.0] == pytest.approx(1e6 * output.quantiles[0.5].value, rel=1e-5)
+    assert np.interp(at[50.0], rows["x"], rows["y"]) == pytest.approx(50.0, abs=1.0)
+    assert min(quantiles["error_x"]["array"] + quantiles["error_x"]["arrayminus"]) >= 0.0
+    assert limit["x"] == [pytest.approx(5.0)] * 2
+    assert limit["name"] == "limit ≤ 5 µrad"
+    assert plot["layout"]["xaxis"]["title"]["text"] == "residual_rms (µrad)"
+    assert plot["layout"]["yaxis"]["title"]["text"] == "rows at or below (%)"
+    unlimited = found.plots[next(name for name in found.plots if name != "residual_rms")]
+    assert not any("limit" in trace["name"] for trace in unlimited["data"])
+
+
+def test_a_limit_far_from_all_rows_is_named_and_not_drawn(growing):
+    growing.put(0)
+    output = summarise(growing.path).cells[0].outputs["residual_rms"]
+    (limit,) = growing.campaign.limits
+    far = campaign_view.distribution_plot(output, replace(limit, most=1e-3))["data"][-1]
+    assert (far["name"], far["x"]) == ("limit ≤ 1 mrad, right of here", [None])
+    both = campaign_view.distribution_plot(output, replace(limit, least=-1e-3, most=4e-6))["data"][-2:]
+    assert [each["name"] for each in both] == ["limit ≥ −1 mrad, left of here", "limit ≤ 4 µrad"]
+    assert both[1]["x"] == [pytest.approx(4.0)] * 2

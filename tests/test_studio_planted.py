@@ -1,0 +1,285 @@
+"""Jobs that this user did not queue: found in a working folder of a stranger's, and never started."""
+
+import json
+import os
+import stat
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from microrad.studio import jobs_files, jobs_process, plain_files, signing
+from microrad.studio.jobs import JobError, Jobs, Order
+from microrad.studio.workshop import Workshop
+from small_campaign import gone
+from studio_jobs import described, written
+
+
+@pytest.fixture
+def jobs(tmp_path):
+    return Jobs(tmp_path / "studio")
+
+
+@pytest.fixture
+def started(monkeypatch):
+    """The folders that would be started."""
+    found = []
+
+    def start(folder, at_once):
+        found.append(folder)
+        jobs_files.note(folder / "started.json")
+        jobs_files.note(folder / "exit.json", code=0)
+
+    monkeypatch.setattr(jobs_process, "_start", start)
+    return found
+
+
+@pytest.fixture
+def own_key(tmp_path, monkeypatch):
+    """The key's file, in a folder of the test's own."""
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    return tmp_path / "state" / "microrad" / "studio-key"
+
+
+# ------------------------------------------------------------------------------------------------------------ planted
+PLANTED = {
+    "without a code": lambda text: None,
+    "with an empty code": lambda text: "",
+    "with the code of another text": lambda text: signing.code(b"x" + text.encode()),
+    "with a code beyond ASCII": lambda text: "µ" * 64,
+}
+
+
+@pytest.mark.parametrize("how", PLANTED)
+def test_a_planted_job_is_never_started(jobs, started, tmp_path, how):
+    """As the right code and nothing else tells it from one that is."""
+    folder = written(jobs.folder, arguments=[str(tmp_path / "touched")])
+    code = PLANTED[how]((folder / "job.json").read_text("utf-8"))
+    own = (folder / "job.code").read_text("utf-8")
+    (folder / "job.code").unlink()
+    if code is not None:
+        (folder / "job.code").write_text(code, "utf-8")
+    (job,) = jobs.listed()
+    assert (job.state, job.finished, job.title, job.results) == ("unreadable", True, "(unreadable)", ())
+    assert "it was not queued by you with this installation of microrad, so it is not started" in job.words
+    jobs_process.run_job(folder, ("touch",))
+    assert started == []
+    assert sorted(each.name for each in folder.iterdir()) == ["job.code"] * (code is not None) + ["job.json"]
+    (folder / "job.code").write_text(own, "utf-8")
+    assert jobs.listed()[0].state == "done"
+    assert started == [folder]
+
+
+def test_the_process_of_a_job_runs_what_was_queued_and_nothing_else(jobs, tmp_path):
+    touched = [str(tmp_path / f"touched-{n}") for n in (1, 2)]
+    ours, theirs = (written(jobs.folder, n, arguments=[touched[n - 1]], cwd=str(tmp_path)) for n in (1, 2))
+    (theirs / "job.code").unlink()
+    for folder in (ours, theirs):
+        jobs_process.run_job(folder, ("touch",))
+    assert [path.name for path in tmp_path.glob("touched*")] == ["touched-1"]
+
+
+def test_a_job_that_was_changed_is_not_started(jobs, started):
+    folder = written(jobs.folder, arguments=["presets"])
+    text = (folder / "job.json").read_text("utf-8")
+    (folder / "job.json").write_text(text.replace("presets", "studio"), "utf-8")
+    assert jobs.listed()[0].state == "unreadable"
+    assert started == []
+
+
+def test_a_copy_of_a_waiting_job_is_not_started_elsewhere(jobs, started, tmp_path):
+    folder = written(tmp_path / "old", arguments=["presets"])
+    folder.rename(jobs.folder / "1")
+    (job,) = jobs.listed()
+    assert (job.state, started) == ("lost", [])
+    assert "its folder was moved or copied before it was started, so it is not started here; start it anew" in job.words
+    jobs_process.run_job(job.folder, ("touch",))
+    assert not (job.folder / "started.json").exists()
+
+
+def test_what_a_moved_job_has_done_is_still_told(jobs, tmp_path):
+    folder = written(tmp_path / "old", title="mine")
+    jobs_files.note(folder / "started.json")
+    jobs_files.note(folder / "exit.json", code=0)
+    folder.rename(jobs.folder / "1")
+    (job,) = jobs.listed()
+    assert (job.state, job.title) == ("done", "mine")
+
+
+def test_a_studio_opened_in_a_strangers_folder_starts_and_believes_nothing(tmp_path, started):
+    place = tmp_path / ".microrad-studio" / "jobs"
+    (place / "7").mkdir(parents=True)
+    (place / "7" / "job.json").write_text(described(place, arguments=["init", "planted.toml"]), "utf-8")
+    (place / "7" / "stdout").write_text("<b>believe me</b>", "utf-8")
+    (place / "last").write_text("9" * 100, "utf-8")
+    workshop = Workshop(tmp_path)
+    (job,) = workshop.jobs.listed()
+    assert (job.state, workshop.jobs.output(7)) == ("unreadable", "")
+    job = workshop.jobs.submit(Order("study", "mine", ("presets",), tmp_path))
+    assert (job.number, [each.name for each in started]) == (1, ["1"])
+    workshop.jobs.remove(7)
+    assert [each.number for each in workshop.jobs.listed()] == [1]
+
+
+def test_a_number_that_is_taken_by_anything_is_passed_over(jobs, started, tmp_path):
+    (jobs.folder / "1").mkdir()
+    (jobs.folder / "1" / "job.json").write_text("{}", "utf-8")
+    (jobs.folder / "2").symlink_to(tmp_path)
+    (jobs.folder / "3").write_text("", "utf-8")
+    assert jobs.submit(Order("study", "mine", ("presets",), tmp_path)).number == 4
+    assert [each.name for each in started] == ["4"]
+
+
+# -------------------------------------------------------------------------------------------------------------- links
+def test_a_link_among_the_jobs_is_none(jobs, started, tmp_path):
+    """Even to a job that was queued here."""
+    folder = written(tmp_path / "elsewhere", folder=str(jobs.folder))
+    (jobs.folder / "1").symlink_to(folder)
+    assert jobs.listed() == ()
+    with pytest.raises(JobError, match="there is no job 1 any more"):
+        jobs.get(1)
+    (jobs.folder / "1").unlink()
+    folder.rename(jobs.folder / "1")
+    assert [job.state for job in jobs.listed()] == ["done"]
+
+
+@pytest.mark.parametrize("name", ["stdout", "stderr", "progress", "exit.json", "job.json"])
+def test_no_link_in_a_job_is_followed(jobs, tmp_path, name):
+    secret = tmp_path / "secret"
+    folder = written(jobs.folder)
+    jobs_files.note(folder / "started.json")
+    jobs_files.note(folder / "exit.json", code=0)
+    note = {"at": 1.0, "done": 1, "total": 2, "what": "x"}
+    plain = {"exit.json": json.dumps({"at": "", "code": 1}), "job.json": (folder / "job.json").read_text("utf-8")}
+    secret.write_text(plain.get(name, json.dumps(note)), "utf-8")
+
+    def seen():
+        job = jobs.get(1)
+        return job.state, job.code, job.progress, jobs.output(1), jobs.output(1, "stderr")
+
+    (folder / name).unlink(missing_ok=True)
+    nothing = seen()
+    (folder / name).symlink_to(secret)
+    linked = seen()
+    (folder / name).unlink()
+    secret.rename(folder / name)
+    assert seen() not in (nothing, linked)  # as a plain file it is read
+    assert linked == nothing or name == "exit.json"
+    assert linked[1] is None or name not in ("exit.json", "job.json")
+
+
+@pytest.mark.parametrize("kind", ["link", "folder", "pipe", "content"])
+def test_what_is_no_lock_is_not_opened_as_one(jobs, started, tmp_path, kind):
+    lock = jobs.folder / "lock"
+    made = {
+        "link": lambda: lock.symlink_to(tmp_path / "made"),
+        "folder": lock.mkdir,
+        "pipe": lambda: os.mkfifo(lock),
+        "content": lambda: lock.write_text("SQLite format 3"),
+    }
+    made[kind]()
+    with pytest.raises(JobError, match="lock is no lock of the studio, but a link or another program's; remove it"):
+        jobs.submit(Order("study", "t", ("presets",), tmp_path))
+    assert not (tmp_path / "made").exists()
+    assert started == []
+    lock.rmdir() if kind == "folder" else lock.unlink()
+    assert jobs.submit(Order("study", "t", ("presets",), tmp_path)).number == 1
+
+
+@pytest.mark.parametrize("make", ["link", "pipe", "folder", "device", "large"])
+def test_only_a_plain_file_is_read(tmp_path, make):
+    path = tmp_path / "file"
+    if make == "device":
+        path = Path("/dev/zero")
+    elif make == "large":
+        path.write_bytes(b"x" * 11)
+    else:
+        {"link": lambda: path.symlink_to("/etc/passwd"), "pipe": lambda: os.mkfifo(path), "folder": path.mkdir}[make]()
+    with pytest.raises(OSError, match=r"link|plain file|larger than 10 bytes|directory"):
+        plain_files.content(path, 10)
+    (tmp_path / "plain").write_bytes(b"x" * 10)
+    assert plain_files.content(tmp_path / "plain", 10) == b"x" * 10
+
+
+# ------------------------------------------------------------------------------------------------------------ the key
+def test_the_key_is_made_once_for_this_user_alone_and_outside_of_the_folder(own_key, tmp_path):
+    assert not signing.is_ours(b"text", "")
+    assert not own_key.exists()  # to look makes none
+    code = signing.code(b"text")
+    assert signing.is_ours(b"text", code)
+    assert not signing.is_ours(b"other", code)
+    assert signing.code(b"text") == code
+    assert signing.code(b"other") != code
+    assert stat.S_IMODE(own_key.stat().st_mode) == 0o600
+    assert stat.S_IMODE(own_key.parent.stat().st_mode) == 0o700
+    own_key.unlink()
+    assert signing.code(b"text") != code  # a new key
+    assert not signing.is_ours(b"text", code)
+
+
+@pytest.mark.parametrize(
+    ("spoil", "words"),
+    [
+        (lambda key: key.chmod(0o640), "is not this user's alone; remove it: the next job makes a new one"),
+        (lambda key: key.write_text("short"), "is damaged; remove it"),
+        (lambda key: (key.rename(key.with_name("x")), key.symlink_to("x")), "cannot be read: it is a link"),
+    ],
+)
+def test_a_key_that_others_may_know_or_that_is_damaged_is_told(own_key, jobs, tmp_path, monkeypatch, spoil, words):
+    monkeypatch.setattr(signing, "_PATIENCE_S", 0.0)
+    signing.code(b"text")
+    spoil(own_key)
+    with pytest.raises(JobError) as refusal:
+        jobs.submit(Order("study", "t", ("presets",), tmp_path))
+    assert f"the studio's key {own_key} " in str(refusal.value)
+    assert words in str(refusal.value)
+    assert jobs.listed() == ()
+    own_key.unlink()
+    signing.code(b"text")
+    assert stat.S_IMODE(own_key.stat().st_mode) == 0o600
+
+
+def test_a_place_that_cannot_take_the_key_is_told(own_key, tmp_path):
+    own_key.parent.parent.write_text("a file", "utf-8")
+    with pytest.raises(signing.SigningError, match=r"cannot be made: .*; give XDG_STATE_HOME a folder"):
+        signing.code(b"text")
+
+
+def test_a_relative_state_home_is_ignored(monkeypatch):
+    monkeypatch.setenv("XDG_STATE_HOME", "here")
+    assert signing.key_file() == Path.home() / ".local" / "state" / "microrad" / "studio-key"
+    monkeypatch.setenv("XDG_STATE_HOME", "/there")
+    assert signing.key_file() == Path("/there/microrad/studio-key")
+
+
+def test_a_user_without_a_home_is_told(monkeypatch, jobs, tmp_path):
+    def nowhere(kind):
+        raise RuntimeError
+
+    monkeypatch.setenv("XDG_STATE_HOME", "")
+    monkeypatch.setattr(Path, "home", classmethod(nowhere))
+    with pytest.raises(JobError, match="this user has no home folder for the studio's key; set HOME or XDG_STATE_HOME"):
+        jobs.submit(Order("study", "t", ("presets",), tmp_path))
+    assert jobs.listed() == ()
+
+
+# -------------------------------------------------------------------------------------------------- with its watcher
+def test_a_command_without_its_watcher_ends_with_all_that_it_has_started():
+    """Where the system does not see to it by itself: the end of the pipe that the watcher holds."""
+    code = (
+        "import subprocess, sys, threading, time; from microrad.studio.jobs_command import end_with\n"
+        "inner = subprocess.Popen([sys.executable, '-c', 'import time; time.sleep(600)'])\n"
+        "threading.Thread(target=end_with, args=(0,), daemon=True).start()\n"
+        "print(inner.pid, flush=True); time.sleep(600)\n"
+    )
+    command = subprocess.Popen(
+        [sys.executable, "-c", code], stdin=subprocess.PIPE, stdout=subprocess.PIPE, start_new_session=True
+    )
+    with command:
+        inner = int(command.stdout.readline())
+        assert command.poll() is None
+        assert not gone(inner, 0.1)
+        command.stdin.close()
+        assert command.wait(60.0) == -9
+    assert gone(inner)
