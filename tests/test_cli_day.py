@@ -12,7 +12,7 @@ from link_files import written
 from microrad import link_study
 from microrad.missionfile import load_link
 from microrad.operations import COLUMNS
-from report_pages import without_scripts
+from report_pages import assert_sound, without_scripts
 from test_day_tables import ALONE, BY_FILE, HELD, LIMITS, day_data, day_path, element_set
 
 QUICK = {"orbit.duration": "6 h", "operations.runs": 3}
@@ -140,6 +140,7 @@ def test_contacts_as_json(call, folder, name):
 def test_contacts_as_a_page_that_loads_nothing(call, folder, name):
     result = call("contacts", path_of(folder, MISSIONS[name]), "--html")
     assert (result.code, result.err) == (int(name != "plain"), "")
+    assert_sound(result.out)
     page = without_scripts(result.out)
     assert page.lstrip().lower().startswith("<!doctype html>")
     for load in re.findall(r"""(?:src|href|xlink:href|action|data)\s*=\s*["']([^"']*)""", page):

@@ -16,7 +16,7 @@ from microrad import cli, link_study
 from microrad.missionfile import load_link
 from microrad.presets import preset_text
 from microrad.report import budget_views
-from report_pages import without_scripts
+from report_pages import assert_sound, without_scripts
 from shipped import SHIPPED, without_fine_pointing
 from test_presets import EXAMPLES, NAMES, as_file, statements
 
@@ -264,6 +264,8 @@ def test_html_is_one_page_that_loads_nothing(call, folder):
     page = call("budget", path, "--html").out
     assert page.startswith("<!DOCTYPE html>")
     assert page.rstrip().endswith("</html>")
+    assert_sound(page)
+    assert len(page) < 250_000  # bars and curves with their numbers below: no drawing library
     page = without_scripts(page)
     assert page.count("<svg") == 5
     assert not re.search(r"<(script|link|img|iframe|object|embed)\b|@import|url\((?!#)", page)

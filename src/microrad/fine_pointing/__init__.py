@@ -48,6 +48,7 @@ __all__ = [
     "optimum_rms_rad",
     "plants",
     "run",
+    "run_one",
     "scene",
     "sines",
     "table",
@@ -102,3 +103,13 @@ def run(file: MissionFile, on_progress: Progress = lambda done, total, what: Non
         table(m).quantile,
         math.sqrt(built.loop.axes) * optimum_rms_rad(built.axis),
     )
+
+
+def run_one(file: MissionFile, name: str) -> Verified:
+    """One controller of the mission, tuned and simulated as `run` does it, without the others; `names` lists them.
+
+    Raises ValueError for another name, and as `run`.
+    """
+    m, built = file.mission, scene(file)
+    (found,) = verify(built, m, design(built, m, only=(name,)))
+    return found

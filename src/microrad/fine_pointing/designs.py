@@ -66,16 +66,22 @@ def names(m: Mission) -> tuple[str, ...]:
     return (*found, IN_SERIES)
 
 
-def design(scene: Scene, m: Mission, on_progress: Progress = lambda done, total, what: None) -> tuple[Design, ...]:
-    """Every controller of the study, tuned on the linear cost; the first is the baseline.
+def design(
+    scene: Scene,
+    m: Mission,
+    on_progress: Progress = lambda done, total, what: None,
+    only: Sequence[str] = (),
+) -> tuple[Design, ...]:
+    """Every controller of the study, the baseline first, or ``only`` some of them by name; tuned on the linear cost.
 
-    Raises ValueError with the reason when one of them cannot meet the modulus margin.
+    Raises ValueError for a name that `names` does not list, and with the reason when a modulus margin cannot be met.
     """
-    straight, wanted = plants(scene, m, table(m).seed), names(m)
+    straight, wanted = plants(scene, m, table(m).seed), tuple(only) or names(m)
     tuned: dict[str, Tuned] = {}
     for done, name in enumerate(wanted):
         on_progress(done, len(wanted), f"tuning {name}")
-        tuned[name] = tuned[control.PI.name] if name == WITH_INVERSE else tune(name, m, straight)
+        known = tuned.get(control.PI.name) if name == WITH_INVERSE else None
+        tuned[name] = known or tune(name, m, straight)
     on_progress(len(wanted), len(wanted), "controllers tuned")
     return tuple(Design(n, t, build(n, scene, m, t.controller), _INVERSE_USED.get(n, "")) for n, t in tuned.items())
 
