@@ -11,8 +11,6 @@ from microrad import cli, missionfile, report, study
 from microrad.report import carried, compared, page, reproduce
 from shipped import SHIPPED, edited_file, without_fine_pointing
 
-pytestmark = pytest.mark.long
-
 
 @pytest.fixture(scope="module", autouse=True)
 def no_scan():
