@@ -29,7 +29,7 @@ from microrad.report import (
     words,
 )
 from report_pages import assert_sound
-from shipped import SHIPPED, edited_file
+from shipped import SHIPPED, edited_file, plain_study
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -42,7 +42,13 @@ def no_fine_pointing():
 
 @pytest.fixture(scope="module")
 def paper():
-    return study.run(missionfile.load_mission(SHIPPED))
+    return plain_study()
+
+
+@pytest.fixture(scope="module")
+def small(tmp_path_factory):
+    """A study of a second."""
+    return study.run(edited_file(tmp_path_factory.mktemp("small"), day=False))
 
 
 @pytest.fixture(scope="module")
@@ -428,15 +434,15 @@ def test_two_runs_write_the_same_page_and_figures(paper, written, tmp_path):
         assert (tmp_path / "again" / path.relative_to(written)).read_bytes() == path.read_bytes()
 
 
-def test_results_are_never_replaced_silently(paper, tmp_path):
+def test_results_are_never_replaced_silently(small, tmp_path):
     target = tmp_path / "out"
-    report.write(paper, target)
+    report.write(small, target)
     before = {p: p.read_bytes() for p in target.rglob("*") if p.is_file()}
     with pytest.raises(report.FolderError, match="already holds results: choose another --output, or replace"):
-        report.write(paper, target)
+        report.write(small, target)
     assert {p: p.read_bytes() for p in target.rglob("*") if p.is_file()} == before
     (target / "left over.txt").write_text("x")
-    report.write(paper, target, overwrite=True)
+    report.write(small, target, overwrite=True)
     assert not (target / "left over.txt").exists()
     assert sorted(p.name for p in tmp_path.iterdir()) == ["out"]
 
@@ -473,7 +479,7 @@ def test_an_interrupted_write_leaves_nothing_and_keeps_the_old(tmp_path, error):
 
 def test_text_of_the_mission_is_escaped(tmp_path):
     file = edited_file(
-        tmp_path, ('name = "LEO-to-GEO relay of a 100 kg satellite"', 'name = "<script>alert(1)</script>"')
+        tmp_path, ('name = "LEO-to-GEO relay of a 100 kg satellite"', 'name = "<script>alert(1)</script>"'), day=False
     )
     text = report.write(study.run(file), tmp_path / "out").read_text(encoding="utf-8")
     assert "<script>alert" not in text
@@ -503,11 +509,11 @@ def test_verdict_and_summary_say_the_same(paper):
     json.dumps(data)
 
 
-def test_a_drive_beyond_the_identified_rate_is_the_first_thing_said(tmp_path):
-    slow = study.run(edited_file(tmp_path, ('rate_limit = "3770 V/s"', 'rate_limit = "100 V/s"')))
+def test_a_drive_beyond_the_identified_rate_is_the_first_thing_said(paper, tmp_path):
+    slow = study.run(edited_file(tmp_path, ('rate_limit = "3770 V/s"', 'rate_limit = "100 V/s"'), day=False))
     assert "Not to be relied on" in report.verdict_text(slow)
     assert any("(identified up to 100 V/s)" in w for w in report.summary(slow)["warnings"])
-    assert "Not to be relied on" not in report.verdict_text(study.run(missionfile.load_mission(SHIPPED)))
+    assert "Not to be relied on" not in report.verdict_text(paper)
 
 
 def test_thinning_keeps_every_peak():
@@ -528,14 +534,14 @@ def no_scan(monkeypatch):
 
 
 def test_the_headline_names_the_link_that_does_not_close(no_scan, tmp_path):
-    file = edited_file(tmp_path, ('required_power = "10 pW"', 'required_power = "1 nW"'))
+    file = edited_file(tmp_path, ('required_power = "10 pW"', 'required_power = "1 nW"'), day=False)
     text = report.verdict_text(study.run(file))
     assert text.startswith("The link does not close: beacon -13.70 dB, at 300 Mbit/s")
     assert "communication" not in text.splitlines()[0]
 
 
 def test_an_amplifier_at_its_limits_is_named_as_the_cause_and_claims_are_not_judged(no_scan, tmp_path):
-    weak = study.run(edited_file(tmp_path, ('output_max = "180 V"', 'output_max = "100 V"')))
+    weak = study.run(edited_file(tmp_path, ('output_max = "180 V"', 'output_max = "100 V"'), day=False))
     assert "What limits it: the amplifier's limits (" in report.verdict_text(weak)
     assert {c.agrees for c in weak.claims if c.where in ("Fig. 6", "Fig. 8")} == {"not judged"}
     assert any("beyond the amplifier's range" in w for w in report.summary(weak)["warnings"])
@@ -543,7 +549,7 @@ def test_an_amplifier_at_its_limits_is_named_as_the_cause_and_claims_are_not_jud
 
 def test_a_changed_value_does_not_keep_the_papers_name(no_scan, paper, tmp_path):
     assert missionfile.changed_from_shipped(paper.file) == ()
-    file = edited_file(tmp_path, ('leo_aperture = "5 cm"', 'leo_aperture = "6 cm"'))
+    file = edited_file(tmp_path, ('leo_aperture = "5 cm"', 'leo_aperture = "6 cm"'), day=False)
     assert missionfile.changed_from_shipped(file) == (("terminals.leo_aperture", '"6 cm"', '"5 cm"'),)
     changed = study.run(file)
     assert any("names the paper as its source" in w for w in report.summary(changed)["warnings"])
@@ -552,7 +558,7 @@ def test_a_changed_value_does_not_keep_the_papers_name(no_scan, paper, tmp_path)
 
 
 def test_a_radial_residual_is_two_axes(no_scan, paper, tmp_path):
-    radial = study.run(edited_file(tmp_path, ('residual = "per-axis"', 'residual = "radial"')))
+    radial = study.run(edited_file(tmp_path, ('residual = "per-axis"', 'residual = "radial"'), day=False))
     used, one_axis = report.summary(radial)["residual"]["used_rad"], report.summary(paper)["residual"]["used_rad"]
     assert used == pytest.approx(math.sqrt(2.0) * one_axis, rel=1e-12)
     assert "times √2 for two equal axes" in report.verdict_text(radial)
@@ -560,7 +566,7 @@ def test_a_radial_residual_is_two_axes(no_scan, paper, tmp_path):
 
 
 def test_a_drive_beyond_the_identified_range_is_said(no_scan, tmp_path):
-    narrow = study.run(edited_file(tmp_path, ('drive_max = "12 V"', 'drive_max = "8 V"')))
+    narrow = study.run(edited_file(tmp_path, ('drive_max = "12 V"', 'drive_max = "8 V"'), day=False))
     text = report.verdict_text(narrow)
     assert "The mirror model is extrapolated." in text.splitlines()[0]
     assert "(identified from 0 to 8 V)" in text

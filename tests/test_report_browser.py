@@ -9,10 +9,10 @@ import test_identification_report as identified
 import test_report_campaign as campaigns
 import test_report_fine_pointing as fine_loops
 from browser import violations
-from microrad import missionfile, report, study
+from microrad import report
 from microrad.identify import identify
 from microrad.report import budget_views, campaign_page, day_views
-from shipped import SHIPPED
+from shipped import plain_study
 
 WIDTHS = (1280, 400)
 A4_PX = 680  # between the margins
@@ -24,10 +24,7 @@ SLOW_MS = 60_000
 
 @pytest.fixture(scope="module")
 def found():
-    """The shipped mission but for its fine-pointing loop, which takes the longest."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(study.fine_pointing, "run", lambda *args: None)
-        return study.run(missionfile.load_mission(SHIPPED))
+    return plain_study()
 
 
 @pytest.fixture(scope="module")

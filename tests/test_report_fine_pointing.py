@@ -14,7 +14,7 @@ import pytest
 import xarray as xr
 from numpy.testing import assert_allclose, assert_array_equal
 
-from microrad import control, fine_pointing, missionfile, paper, performance, report, study
+from microrad import control, fine_pointing, performance, report, study
 from microrad.control.tuning import MARGIN
 from microrad.fine_loop.design import design_plant, residual_spectrum
 from microrad.fine_loop.ensemble import bin_edges_rad
@@ -28,7 +28,7 @@ from microrad.report import fine_pointing as section
 from microrad.report import fine_pointing_figures as figures
 from microrad.report import fine_pointing_words as words
 from microrad.report import page as report_page
-from shipped import SHIPPED
+from shipped import plain_study
 
 HEADING = "Fine pointing under vibration and noise"
 HEADINGS = ("h2", "h3", "h4")
@@ -38,7 +38,7 @@ SECOND, THIRD = "PI + inverse in series", "quick PI"
 
 @pytest.fixture(scope="module")
 def file():
-    return missionfile.load_mission(SHIPPED)
+    return plain_study().file
 
 
 @pytest.fixture(scope="module")
@@ -47,12 +47,9 @@ def mission(file):
 
 
 @pytest.fixture(scope="module")
-def plain(file):
+def plain():
     """The study of the shipped mission but for its fine-pointing loop."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(study.fine_pointing, "run", lambda *args: None)
-        patch.setattr(paper, "applies", lambda mission: False)
-        return study.run(file)
+    return plain_study()
 
 
 @pytest.fixture(scope="module")

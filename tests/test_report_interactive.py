@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure as Canvas
 
-from microrad import missionfile, study
-from microrad.report import day_plots, figures, interactive, link_figures
+from microrad.report import interactive
 from microrad.report.day_assumptions import Assumed, assumptions
 from microrad.report.day_figures import empty
 from microrad.report.figures import MOST_POINTS, STYLE, Figure, svg_of
@@ -19,7 +18,7 @@ from microrad.report.interactive_style import numbers, outlines, thin_curve, wor
 from microrad.report.page import pages
 from microrad.report.tables import rows_of
 from report_pages import assert_sound
-from shipped import SHIPPED
+from shipped import plain_drawn
 
 HOSTILE = '</script><b onclick="x()">&amp; %{x} <a href="https://example.org">link</a>'
 STATIC_ONLY = {"latency": "nothing was delivered", "assumptions": "no assumption was varied"}  # pictures of words alone
@@ -463,10 +462,7 @@ def test_what_cannot_be_turned_says_so_and_stays_a_picture(canvas, draw, why):
 @pytest.fixture(scope="module")
 def drawn():
     """Every figure of the shipped mission but those of the fine-pointing loop, which takes the longest."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(study.fine_pointing, "run", lambda *args: None)
-        found = study.run(missionfile.load_mission(SHIPPED))
-    return (*figures.draw(found), *link_figures.draw(found.links), *day_plots.draw(found.day))
+    return plain_drawn().every
 
 
 def test_every_figure_of_the_study_is_interactive_and_small(drawn):
