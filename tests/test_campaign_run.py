@@ -91,7 +91,7 @@ def test_twenty_kills_of_worker_and_parent_change_nothing(long, tmp_path):
             process = started(*command, cwd=tmp_path)
         while process.poll() is None and not children(process.pid) and kills < KILLS:
             time.sleep(0.02)
-        time.sleep(dice.uniform(0.0, 2.0))
+        time.sleep(dice.uniform(0.0, 1.0))
         workers = children(process.pid)
         victim = process.pid if not workers or dice.random() < 0.5 else dice.choice(workers)
         if kills < KILLS and process.poll() is None and kill(victim):

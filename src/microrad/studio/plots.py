@@ -14,6 +14,7 @@ Trace = dict[str, Any]
 BLACK, ORANGE, SKY, GREEN, BLUE, VERMILION = "#000000", "#E69F00", "#56B4E9", "#009E73", "#0072B2", "#D55E00"
 GREY, GRID = "#777777", "#dddddd"
 DASHES = ("solid", "dash", "dashdot", "dot")
+_MOST_TICKS = 8
 
 CONFIG: dict[str, Any] = {
     "displaylogo": False,
@@ -58,12 +59,16 @@ def plain(text: str, most: int = 40) -> str:
 
 
 def decades(low: float, high: float, unit: str) -> tuple[list[float], list[str]]:
-    """Ticks at 1, 2 and 5 times the powers of ten between two values of the SI unit, as log10 and in words."""
+    """Ticks at 1, 2 and 5 times the powers of ten between two values of the SI unit, as log10 and in words.
+
+    At 1 and 3 times them, or at them alone, where these would be more than eight, whose words turn.
+    """
     first, last = math.floor(math.log10(low)), math.ceil(math.log10(high))
-    values = [step * 10.0**power for power in range(first, last + 1) for step in (1.0, 2.0, 5.0)]
-    shown = [value for value in values if low * (1 - 1e-9) <= value <= high * (1 + 1e-9)]
-    if len(shown) > 12:
-        shown = [value for value in shown if f"{value:.0e}"[0] == "1"]
+    for steps in ((1.0, 2.0, 5.0), (1.0, 3.0), (1.0,)):
+        values = [step * 10.0**power for power in range(first, last + 1) for step in steps]
+        shown = [value for value in values if low * (1 - 1e-9) <= value <= high * (1 + 1e-9)]
+        if len(shown) <= _MOST_TICKS:
+            break
     return [math.log10(value) for value in shown], [format_quantity(value, unit) for value in shown]
 
 
