@@ -198,7 +198,12 @@ def _filled(v: LinkView, lg_rate: Floats, urad: Floats) -> plots.Trace:
         "zmin": LEVELS_DB[0],
         "zmax": LEVELS_DB[1],
         "colorscale": "Cividis",
-        "colorbar": {"title": {"text": "margin<br>(dB)", "side": "top"}, "thickness": 14, "outlinewidth": 0, "dtick": 3},
+        "colorbar": {
+            "title": {"text": "margin<br>(dB)", "side": "top"},
+            "thickness": 14,
+            "outlinewidth": 0,
+            "dtick": 3,
+        },
         "hovertemplate": "10^%{x:.2f} bit/s, %{y:.2f} µrad: %{z:.2f} dB<extra></extra>",
     }
 
