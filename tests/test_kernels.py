@@ -818,7 +818,7 @@ def run_direct(reference, mirror=None, step_s=1e-3, **given):
     """A single-axis loop over ``reference``, around y = u unless a mirror is given; a number fills its matrix."""
     idle = oracles.idle_loop(1, 1, controllers=1)._replace(allocation=np.eye(1))
     given = {
-        name: np.full(np.shape(getattr(idle, name)), value) if isinstance(getattr(idle, name), np.ndarray) else value
+        name: np.full_like(getattr(idle, name), value) if isinstance(getattr(idle, name), np.ndarray) else value
         for name, value in given.items()
     }
     column = np.array(reference, dtype=float)[:, None]

@@ -56,7 +56,7 @@ def choose(tab, label, option):
     tab.get_by_role("option", name=option, exact=True).click()
 
 
-def test_what_is_no_recording_is_refused_in_words(studio, opened):
+def test_what_is_no_recording_is_refused_in_words(studio, opened, tmp_path):
     tab = opened("mirror")
     words = tab.get_by_role("alert").first
     drop(tab, {"name": "../evil.csv", "mimeType": "text/csv", "buffer": b"1,2\n3,4\n"})
@@ -64,6 +64,14 @@ def test_what_is_no_recording_is_refused_in_words(studio, opened):
     api.expect(words).to_have_text(refusal)
     drop(tab, {"name": "<b>no.csv", "mimeType": "text/csv", "buffer": b"PK\x00\x01 not a table"})
     api.expect(words).to_have_text(re.compile(r"^<b>no\.csv: this is a binary file, not text; export the recording"))
+    large = tmp_path / "large.csv"
+    with large.open("wb") as file:
+        file.truncate(300_000_000)  # a hole
+    tab.get_by_label("Recordings: drop files here, or choose them").set_input_files(large)
+    api.expect(words).to_have_text(
+        "the file 'large.csv' has more than 200 MB; cut out the part that you need, keep every n-th sample, or run "
+        "microrad identify on the file, which needs no upload"
+    )
     assert list((studio.folder / ".microrad-studio" / "uploads").glob("*/*.csv")) == []
     assert not list(studio.folder.glob("*.csv"))
 

@@ -103,6 +103,26 @@ def test_the_text_and_the_form_follow_each_other(studio, tab):
     tab.wait_for_function("document.querySelector('.mission-row:nth-of-type(2) input')?.value === '15 cm'")
 
 
+def test_a_text_too_long_for_a_message_is_not_pasted(tab):
+    text = tab.locator(".cm-content")
+    text.click()
+    tab.keyboard.press("Control+Home")
+    paste = """length => {
+      const given = new DataTransfer();
+      given.setData("text/plain", "#".repeat(length));
+      const event = new ClipboardEvent("paste", { clipboardData: given, bubbles: true, cancelable: true });
+      document.querySelector(".cm-content").dispatchEvent(event);
+    }"""
+    tab.evaluate(paste, 500_001)
+    tab.get_by_text("more than 500000 characters and is no mission: it was not put in").wait_for()
+    assert "##" not in text.inner_text()
+    tab.evaluate(paste, 12)
+    text.get_by_text("#" * 12).wait_for()
+    tab.get_by_role("button", name="Back to the saved file").click()
+    tab.get_by_role("button", name="Lose the changes").click()
+    text.get_by_text("#" * 12).wait_for(state="detached")
+
+
 def test_a_second_tab_and_a_reload_see_what_the_first_has_changed(tab, opened):
     second = opened()
     for page in (tab, second):

@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 import threading
 from dataclasses import replace
 
@@ -255,11 +256,21 @@ def test_damage_and_other_files_are_told_and_what_was_read_stays(growing, at_onc
     assert "is text, not a ledger" in tabs.look(other).fault
 
 
-def test_a_made_up_ledger_is_told(tmp_path, growing, at_once):
+@pytest.mark.parametrize(
+    ("made_up", "words"),
+    [
+        (b'{"code": ""}', r"KeyError: 'files'"),
+        (b'{"code": "", "files": []}', r"AttributeError: .*"),
+        (b"[]", r"TypeError: .*"),
+        (b"[" * 100_000, r"RecursionError: .*"),
+    ],
+)
+def test_a_made_up_ledger_is_told(tmp_path, growing, at_once, made_up, words):
     path = tmp_path / "made-up.ledger"
-    with Ledger.create(path, replace(growing.head, bundle=b'{"code": ""}')):
+    with Ledger.create(path, replace(growing.head, bundle=made_up)):
         pass
-    assert "files" in LiveCampaigns().look(path).fault
+    told = rf"made-up\.ledger is no ledger that microrad wrote: its contents cannot be read \({words}\)"
+    assert re.fullmatch(told, LiveCampaigns().look(path).fault)
 
 
 # -------------------------------------------------------------------------------------------------------- on the page

@@ -506,6 +506,7 @@ def test_a_head_request_has_no_body():
 def test_html_is_escaped_in_refusals():
     body = ask(guard(Inner()), host="<b>&\"'x").body
     assert "&lt;b&gt;&amp;&quot;&#x27;x" in body
+    assert f"is not this server. Open http://{HOST} instead; a tunnel has this port at both ends." in body
     assert "<b>" not in body
     assert "'a?[2J'" in unescape(ask(guard(Inner()), host="a\x1b[2J").body)
     long = ask(guard(Inner()), host="h" * 5000).body
@@ -549,6 +550,7 @@ def test_the_server_believes_no_proxy_and_writes_down_no_address():
     assert config.loaded_app is inner  # and nothing around it that would believe X-Forwarded-For
     assert (config.access_log, config.server_header, config.ws_per_message_deflate) == (False, False, False)
     assert (config.ws_max_size, config.http_protocol_class.__name__) == (address.MESSAGE_BYTES, "H11Protocol")
+    assert config.h11_max_incomplete_event_size == 65_536
 
 
 def test_names_and_origins():
@@ -665,6 +667,20 @@ def raw(port, head, body=(), most=1 << 30):
     return (int(answer.split()[1]) if answer else None), passed
 
 
+def head_in_pieces(port, size):
+    """The status for a head of so many bytes, whose end comes later."""
+    head = "GET / HTTP/1.1\r\n" + own_headers(port)
+    padding = f"X-Own: {'a' * (size - len(head) - 11)}\r\n\r\n"
+    with socket.create_connection(("127.0.0.1", port), timeout=60) as link:
+        link.sendall((head + padding)[:-4].encode())
+        time.sleep(0.2)
+        answer = b""
+        with contextlib.suppress(ConnectionError):
+            link.sendall(b"\r\n\r\n")
+            answer = link.recv(65536)
+    return int(answer.split()[1]) if answer else None
+
+
 def zeros(total, chunked):
     block = bytes(65536)
     head, tail = (b"10000\r\n", b"\r\n") if chunked else (b"", b"")
@@ -713,6 +729,12 @@ def test_a_gigabyte_is_cut_off_and_takes_no_memory(server, path, chunked):
     if sys.platform == "linux":
         assert largest_memory_kb(process) - before < 20_000
     assert raw(port, "GET / HTTP/1.1\r\n" + own_headers(port))[0] == 200
+
+
+def test_the_head_of_a_request_is_bounded(server):
+    port, _ = server
+    assert head_in_pieces(port, 60_000) == 200
+    assert head_in_pieces(port, 70_000) in (400, 431, None)
 
 
 def test_a_large_upload_within_the_limit_passes(server):

@@ -1,14 +1,18 @@
 """Jobs of the studio: processes of their own, whose state is read from files alone."""
 
 import json
+import os
+import shutil
 import signal
 import stat
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
 
+from microrad.studio import jobs as jobs_module
 from microrad.studio import jobs_files, jobs_process
 from microrad.studio.jobs import JobError, Jobs, Order
 from small_campaign import campaign_file, children, gone, kill
@@ -351,6 +355,84 @@ def test_an_order_that_cannot_be_run_is_refused(studio, tmp_path, change, words)
         studio.submit(Order(**said))
     assert words in str(refusal.value)
     assert studio.listed() == ()
+
+
+def test_an_order_that_is_refused_is_not_in_the_queue(studio, tmp_path, monkeypatch):
+    write = jobs_module.write_whole
+
+    def full(path, content):
+        if path.name == "last":
+            raise OSError(28, "No space left on device")
+        write(path, content)
+
+    monkeypatch.setattr(jobs_module, "write_whole", full)
+    with pytest.raises(JobError, match="No space left on device; check free space and permissions"):
+        studio.submit(order(tmp_path, "presets"))
+    assert (studio.listed(), [each.name for each in studio.folder.iterdir() if each.is_dir()]) == ((), [])
+
+
+def test_what_cannot_be_cancelled_or_removed_is_told(studio, tmp_path, monkeypatch):
+    waits, over = (written(studio.folder, number, cwd=str(tmp_path)) for number in (1, 2))
+    for name in ("started.json", "exit.json"):
+        (over / name).write_text('{"at": "", "code": 0}', "utf-8")
+
+    def refuse(*_, **__):
+        raise PermissionError(13, "Permission denied")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Path, "touch", refuse)
+        with pytest.raises(JobError, match=r"job 1 cannot be asked to stop: .*: Permission denied; check free space"):
+            studio.cancel(1)
+    with monkeypatch.context() as patch:
+        patch.setattr(Path, "rename", refuse)
+        with pytest.raises(JobError, match=r"job 2 cannot be removed: .*: Permission denied; check free space"):
+            studio.remove(2)
+    assert sorted(each.name for each in studio.folder.iterdir()) == ["1", "2"]
+    assert studio.cancel(1).state == "cancelled"
+    studio.remove(2)
+    assert [each.name for each in studio.folder.iterdir()] == [waits.name]
+
+
+def test_a_list_is_shown_while_the_queue_cannot_go_on(studio, tmp_path):
+    written(studio.folder, arguments=["presets"], cwd=str(tmp_path))
+    lock = studio.folder / "lock"
+    lock.write_text("another program's", "utf-8")
+    assert [job.state for job in studio.listed()] == ["queued"]
+    with pytest.raises(JobError, match="is no lock of the studio"):
+        studio.submit(order(tmp_path, "presets"))
+    lock.unlink()
+    assert studio.listed()[0].state in ("running", "done")
+
+
+def test_a_studio_whose_folder_was_removed_goes_on(studio, tmp_path):
+    """As "git clean" does."""
+    shutil.rmtree(studio.folder.parent)
+    assert studio.listed() == ()
+    job = ended(studio.submit(order(tmp_path, "presets")).folder)
+    assert (job.number, job.state, stat.S_IMODE(studio.folder.parent.stat().st_mode)) == (1, "done", 0o700)
+
+
+def test_what_a_killed_program_left_is_cleared_away(tmp_path):
+    folder = Jobs(tmp_path).folder
+    for name, age_s in ((".new-old", 7200), (".new-young", 60), (".removed-young", 60)):
+        (folder / name).mkdir()
+        (folder / name / "job.json").touch()
+        os.utime(folder / name, (time.time() - age_s,) * 2)
+    Jobs(tmp_path)
+    assert [each.name for each in folder.iterdir()] == [".new-young"]
+
+
+@pytest.mark.parametrize("name", ["exit.json", "progress", "alive"])
+@pytest.mark.parametrize(
+    "text", ["[" * 100_000, '{"code": [], "at": 1, "done": 1e999, "total": 1, "what": ""}', "SQLite"]
+)
+def test_a_damaged_note_breaks_no_list(studio, tmp_path, name, text):
+    folder = written(studio.folder, cwd=str(tmp_path))
+    jobs_files.note(folder / "started.json")
+    jobs_files.note(folder / "exit.json", code=3)
+    (folder / name).write_text(text, "utf-8")
+    (job,) = studio.listed()
+    assert (job.state, job.code, job.progress) == ("failed", None if name == "exit.json" else 3, None)
 
 
 def test_no_jobs_at_once_is_refused(tmp_path):

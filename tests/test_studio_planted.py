@@ -1,5 +1,6 @@
 """Jobs that this user did not queue: found in a working folder of a stranger's, and never started."""
 
+import io
 import json
 import os
 import stat
@@ -9,8 +10,9 @@ from pathlib import Path
 
 import pytest
 
-from microrad.studio import jobs_files, jobs_process, plain_files, signing
+from microrad.studio import jobs_files, jobs_process, mirror_form, plain_files, signing
 from microrad.studio.jobs import JobError, Jobs, Order
+from microrad.studio.mirror_form import Form
 from microrad.studio.workshop import Workshop
 from small_campaign import gone
 from studio_jobs import described, written
@@ -202,6 +204,16 @@ def test_only_a_plain_file_is_read(tmp_path, make):
     assert plain_files.content(tmp_path / "plain", 10) == b"x" * 10
 
 
+def test_the_form_of_the_mirror_is_read_from_a_plain_file_alone(tmp_path):
+    path, elsewhere = tmp_path / "mirror-form.json", tmp_path / "elsewhere.json"
+    mirror_form.keep_form(elsewhere, Form(uses={"0": "check"}))
+    path.symlink_to(elsewhere)
+    assert mirror_form.kept_form(path) == Form()
+    path.unlink()
+    elsewhere.rename(path)
+    assert mirror_form.kept_form(path).uses == {"0": "check"}
+
+
 # ------------------------------------------------------------------------------------------------------------ the key
 def test_the_key_is_made_once_for_this_user_alone_and_outside_of_the_folder(own_key, tmp_path):
     assert not signing.is_ours(b"text", "")
@@ -244,6 +256,36 @@ def test_a_place_that_cannot_take_the_key_is_told(own_key, tmp_path):
     own_key.parent.parent.write_text("a file", "utf-8")
     with pytest.raises(signing.SigningError, match=r"cannot be made: .*; give XDG_STATE_HOME a folder"):
         signing.code(b"text")
+
+
+def test_a_key_that_cannot_be_written_leaves_nothing(own_key, monkeypatch):
+    class Full(io.BytesIO):
+        def write(self, data):
+            raise OSError(28, "No space left on device")
+
+    def full(handle, mode):
+        os.close(handle)
+        return Full()
+
+    with monkeypatch.context() as patch:
+        patch.setattr(signing.os, "fdopen", full)
+        with pytest.raises(signing.SigningError, match="cannot be made: No space left on device"):
+            signing.code(b"text")
+    assert not own_key.exists()
+    assert signing.is_ours(b"text", signing.code(b"text"))
+
+
+def test_a_home_of_somebody_else_is_told(own_key, monkeypatch, jobs, tmp_path):
+    def closed(path):
+        raise PermissionError(13, "Permission denied", str(path))
+
+    with monkeypatch.context() as patch:
+        patch.setattr(signing.plain_files, "opened", closed)
+        with pytest.raises(JobError) as refusal:
+            jobs.submit(Order("study", "t", ("presets",), tmp_path))
+    words = f"the studio's key {own_key} cannot be read: Permission denied; give XDG_STATE_HOME a folder that you may"
+    assert str(refusal.value) == f"{words} write to"
+    assert jobs.listed() == ()
 
 
 def test_a_relative_state_home_is_ignored(monkeypatch):

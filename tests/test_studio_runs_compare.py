@@ -127,6 +127,11 @@ def test_campaign_files_are_told_from_missions(workshop):
 def test_an_example_campaign_names_the_mission_that_is_edited(workshop):
     workshop.change(workshop.draft.save(workshop.inside("mine.toml")))
     assert tomllib.loads(runs_view.write_campaign(workshop).read_text("utf-8"))["mission"] == "mine.toml"
+    odd = 'a"b\\c\n.toml'
+    workshop.change(workshop.draft.save(workshop.inside(odd)))
+    path = runs_view.write_campaign(workshop)
+    assert tomllib.loads(path.read_text("utf-8"))["mission"] == odd
+    path.unlink()
     workshop.change(Draft.shipped(workshop.inside("unsaved.toml")))
     with pytest.raises(JobError, match=r"unsaved\.toml is not saved yet, and a campaign reads it from its file"):
         runs_view.write_campaign(workshop)

@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import signal
 import socket
 import subprocess
@@ -124,6 +125,13 @@ def test_each_change_is_a_new_revision_and_none_is_none(file):
     assert workshop.revision == 1
     workshop.other = Draft.shipped("paper.toml")
     assert workshop.revision == 2
+
+
+def test_a_change_is_kept_where_the_studios_folder_was_removed(file):
+    workshop = Workshop(file.parent, file)
+    shutil.rmtree(workshop.studio)
+    workshop.set(APERTURE, "6 cm")
+    assert Workshop(file.parent).draft.values[APERTURE].typed == "6 cm"
 
 
 def test_changes_of_two_tabs_are_both_kept(file):
@@ -281,7 +289,25 @@ def test_only_results_of_a_job_within_the_folder_are_shown(file, tmp_path_factor
     assert server.result(workshop, 2, 0) is None
 
 
+def test_a_number_that_no_job_can_have_shows_nothing(file):
+    assert server.result(Workshop(file.parent), 10**400, 0) is None
+
+
 # ------------------------------------------------------------------------------------------------------------ command
+def test_a_second_studio_in_a_folder_is_refused(refused, folder, monkeypatch):
+    monkeypatch.setattr(server, "serve", lambda *_: pytest.fail("there are two of them"))
+    with server.alone(Workshop(folder).studio):
+        said = refused("studio", "--no-browser")
+    assert said == (
+        f"microrad: {folder} is open in another studio, process {os.getpid()}; go on in that one, or end it with "
+        "Ctrl-C first: two would not see, and overwrite, each other's unsaved changes\n"
+    )
+    (folder / STUDIO / "open.json").write_text("{", "utf-8")
+    with server.alone(Workshop(folder).studio):  # the first is gone
+        (folder / STUDIO / "open.json").write_text("[]", "utf-8")
+        assert f"microrad: {folder} is open in another studio; go on" in refused("studio", "--no-browser")
+
+
 def test_a_port_in_use_is_refused(refused):
     with taken_port() as port:
         said = refused("studio", "--no-browser", "--port", port)
@@ -336,7 +362,7 @@ def running(folder, *args, browser=None):
         process.communicate()
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, getattr(signal, "SIGHUP", 1)])
 def test_the_address_opens_the_studio_and_a_signal_ends_it(file, number):
     before = listing(file.parent)
     with running(file.parent, "leo-geo.toml") as (process, url):
@@ -352,6 +378,16 @@ def test_the_address_opens_the_studio_and_a_signal_ends_it(file, number):
     assert (process.returncode, out, err) == (0, "the studio is closed\n", "")
     kept = {name: data for name, data in listing(file.parent).items() if not name.startswith(STUDIO)}
     assert kept == before
+
+
+def test_a_second_signal_breaks_nothing_off_and_a_third_does():
+    uvicorn = pytest.importorskip("uvicorn")
+    own = server._server(uvicorn.Config(None), lambda: None)
+    found = []
+    for _ in range(3):
+        own.handle_exit(signal.SIGINT, None)
+        found.append((own.should_exit, own.force_exit))
+    assert found == [(True, False), (True, False), (True, True)]
 
 
 def asked(url, path):

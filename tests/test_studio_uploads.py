@@ -5,6 +5,7 @@ import io
 import json
 import math
 import os
+import shutil
 import stat
 import struct
 import subprocess
@@ -232,6 +233,22 @@ def test_a_full_disk_is_said(tmp_path):
     assert everything(tmp_path) == []
 
 
+def test_a_disk_that_is_full_before_a_file_is_there_is_said(tmp_path):
+    """The form around it is kept in a temporary file first."""
+    pytest.importorskip("nicegui")
+    from microrad.studio.pages.drop import Drop
+
+    class Full:
+        def form(self, **limits):
+            raise OSError(28, "No space left on device")
+
+    said = []
+    drop = Drop.__new__(Drop)
+    drop._refused = said.append
+    asyncio.run(drop._take(Full()))
+    assert said == ["the file could not be stored: No space left on device; check free space and permissions"]
+
+
 def test_a_bad_name_stores_nothing(tmp_path):
     uploads = Uploads(tmp_path / "in" / "ner", LIMITS)
     for name in ("../../x.csv", str(tmp_path / "x.csv"), ".part"):
@@ -264,6 +281,33 @@ def test_what_a_killed_studio_left_is_cleared_away_after_an_hour(tmp_path):
     assert {p.name for p in tmp_path.iterdir()} == {kept.key, "1" * 16, "other"}
 
 
+@posix
+def test_a_link_among_the_uploads_is_no_recording(tmp_path):
+    """It came with the folder, and names a file elsewhere."""
+    secret, uploads = tmp_path / "secret.csv", Uploads(tmp_path / "uploads", LIMITS)
+    secret.write_text("1,2", "utf-8")
+    planted = uploads.folder / ("0" * 16)
+    planted.mkdir()
+    (planted / "x.csv").symlink_to(secret)
+    assert uploads.listed() == ()
+    with pytest.raises(UploadError, match="drop the file again"):
+        uploads.get(planted.name)
+    (planted / "x.csv").unlink()
+    secret.rename(planted / "x.csv")
+    assert [each.key for each in uploads.listed()] == [planted.name]
+
+
+def test_a_folder_that_was_removed_meanwhile_is_made_again(tmp_path):
+    uploads = Uploads(tmp_path / "uploads", LIMITS)
+    uploads.folder.rmdir()
+    assert uploads.listed() == ()
+    assert save(uploads, "x.csv", b"1").path.read_bytes() == b"1"
+    shutil.rmtree(uploads.folder)
+    uploads.folder.write_text("a file", "utf-8")
+    with pytest.raises(UploadError, match=r"'x.csv' could not be stored: "):
+        save(uploads, "x.csv", b"1")
+
+
 def test_temporary_files_lie_in_the_private_folder(tmp_path, monkeypatch):
     monkeypatch.setattr(tempfile, "tempdir", tempfile.gettempdir())
     uploads = Uploads(tmp_path / "uploads", LIMITS)
@@ -271,6 +315,9 @@ def test_temporary_files_lie_in_the_private_folder(tmp_path, monkeypatch):
     with tempfile.NamedTemporaryFile() as file:
         assert Path(file.name).parent == uploads.folder / "spool"
         os.utime(file.name, (0, 0))
+        left = Path(tempfile.mkdtemp())  # with a campaign's files, by a studio that was killed
+        (left / "campaign.toml").touch()
+        os.utime(left, (0, 0))
         (uploads.folder / "spool" / "new").touch()
         uploads.hold_temporary_files()
         assert [p.name for p in (uploads.folder / "spool").iterdir()] == ["new"]

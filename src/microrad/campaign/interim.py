@@ -20,7 +20,7 @@ QUANTILES = (0.01, 0.05, 0.5, 0.95, 0.99)
 class Interim:
     """The campaign in a ledger, which another process may be writing to; in one thread at a time.
 
-    Nothing is written, and no lock is held that the writer would wait for.
+    Nothing is added to it, and no lock is held that the writer would wait for.
     """
 
     def __init__(self, path: Path) -> None:

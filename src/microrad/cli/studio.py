@@ -50,7 +50,7 @@ def studio(
     entrance = server.listen(port, expose)
     with closing(entrance.listener):
         workshop = Workshop(Path.cwd() if file is None else file.resolve().parent, file)
-        with suppress(KeyboardInterrupt):  # the usual end of a server
+        with server.alone(workshop.studio), suppress(KeyboardInterrupt):  # the usual end of a server
             server.serve(workshop, entrance, lambda: _ready(workshop, entrance, expose, not no_browser))
     running = sum(not job.finished for job in workshop.jobs.listed())
     going_on = f"; {running} of its jobs {'goes' if running == 1 else 'go'} on, and can be seen by starting it again"

@@ -71,10 +71,12 @@ def cookie_name(host: str) -> str:
 def server_settings() -> dict[str, Any]:
     """Settings of uvicorn that belong to the guard: bounded headers and messages, no log that shows tokens.
 
-    h11 bounds the head of a request at 64 KiB. Compression would cost time on a loopback, and unpack what was sent.
+    A browser sends the cookies of every other server on this machine, too: 64 KiB of head have room for them.
+    Compression would cost time on a loopback, and unpack what was sent.
     """
     return {
         "http": "h11",
+        "h11_max_incomplete_event_size": 65_536,
         "ws": "websockets-sansio",
         "ws_max_size": MESSAGE_BYTES,
         "ws_per_message_deflate": False,

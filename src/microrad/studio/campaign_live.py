@@ -73,8 +73,11 @@ class _Reader:
         self.interim = self.interim or Interim(self.path)
         try:
             found = self.interim.look(_READ_S)
-        except (ValueError, LookupError, TypeError, OSError) as error:  # a made-up ledger may hold anything
+        except (ValueError, OSError) as error:
             return replace(self.last, fault=str(error) or type(error).__name__)
+        except Exception as error:  # a made-up ledger may hold anything
+            what = f"{self.path.name} is no ledger that microrad wrote: its contents cannot be read"
+            return replace(self.last, fault=f"{what} ({type(error).__name__}: {error})")
         return self.last if found is self.last.summary and not self.last.fault else Live(found)
 
 

@@ -132,7 +132,8 @@ class Guard:
             return refusal(400, "A request names exactly one host and at most one page that it comes from.")
         name = names[0].lower()
         if name not in self.hosts:
-            return refusal(421, f"'{short(names[0])}' is not this server. Open http://{self.hosts[0]} instead.")
+            here = f"Open http://{self.hosts[0]} instead; a tunnel has this port at both ends."
+            return refusal(421, f"'{short(names[0])}' is not this server. {here}")
         if pages and pages[0] != self.origins[self.hosts.index(name)]:
             return refusal(403, f"A page of '{short(pages[0])}' may not use the studio.")
         if not pages and (scope["type"] == "websocket" or scope["method"] not in _SAFE_METHODS):

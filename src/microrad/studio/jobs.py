@@ -11,6 +11,7 @@ import json
 import os
 import shutil
 import tempfile
+import time
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -41,6 +42,8 @@ __all__ = ["Job", "JobError", "Jobs", "Kind", "Order", "Progress", "State"]
 _LAST = "last"
 _LAST_FIGURES = 9  # of a last number that is believed
 _QUEUE_S = 60.0
+_NEW, _REMOVED = ".new-", ".removed-"  # folders that are a job not yet, and not any more
+_FORGOTTEN_S = 3600.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,6 +71,7 @@ class Jobs:
         self.at_once = at_once
         for folder in (studio, self.folder):
             _make_private(folder)
+        _clear_away(self.folder)
 
     def submit(self, order: Order) -> Job:
         """Put a job into the queue, and start it if there is room. Raises `JobError`."""
@@ -85,18 +89,20 @@ class Jobs:
             "folder": str(self.folder),
         }
         try:
+            for each in (self.folder.parent, self.folder):  # both may have been removed meanwhile
+                _make_private(each)
             folder = self._put(json.dumps(described, indent=2))
         except OSError as error:
             raise JobError(f"{self.folder}: {error.strerror}; check free space and permissions") from error
         except SigningError as error:
             raise JobError(str(error)) from error
-        start_waiting(self.folder, self.at_once)
+        self._go_on()
         return read_job(folder)
 
     def _put(self, description: str) -> Path:
         """A new folder with the description of a job and its code, which appears with all or not at all."""
         code = signing.code(description.encode())
-        draft = Path(tempfile.mkdtemp(prefix=".new-", dir=self.folder))  # its mode is 0700
+        draft = Path(tempfile.mkdtemp(prefix=_NEW, dir=self.folder))  # its mode is 0700
         try:
             write_whole(draft / JOB, description)
             write_whole(draft / CODE, code)
@@ -104,8 +110,8 @@ class Jobs:
                 if not mine:
                     raise JobError(f"the queue in {self.folder} is taken by another program; try again")
                 folder = self.folder / str(self._next_number())
-                draft.rename(folder)
                 write_whole(self.folder / _LAST, folder.name)
+                draft.rename(folder)  # at last: what is refused is not in the queue
         except BaseException:
             shutil.rmtree(draft, ignore_errors=True)
             raise
@@ -123,10 +129,15 @@ class Jobs:
         return number
 
     def listed(self) -> tuple[Job, ...]:
-        """Every job, the newest first; one that waits is started if there is room meanwhile."""
-        start_waiting(self.folder, self.at_once)
+        """Every job, the newest first; one that waits is started if there is room meanwhile, and if it can be."""
+        self._go_on()
         found = [read_job(folder) for folder in job_folders(self.folder)]
         return tuple(job for job in found if job.folder.is_dir())  # one may have been removed meanwhile
+
+    def _go_on(self) -> None:
+        """Start what waits; a full disk or a lock that is none keeps it waiting, and nobody from looking."""
+        with suppress(JobError, OSError):
+            start_waiting(self.folder, self.at_once)
 
     def get(self, number: int) -> Job:
         """The job of this number. Raises `JobError` where there is none."""
@@ -143,7 +154,11 @@ class Jobs:
         job = self.get(number)
         if job.finished:
             raise JobError(f"job {number} is not running any more ({job.state}); there is nothing to cancel")
-        (job.folder / CANCEL).touch()
+        try:
+            (job.folder / CANCEL).touch()
+        except OSError as error:
+            where = f"job {number} cannot be asked to stop: {job.folder}: {error.strerror}"
+            raise JobError(f"{where}; check free space and permissions") from error
         return self.get(number)
 
     def remove(self, number: int) -> None:
@@ -151,9 +166,15 @@ class Jobs:
         job = self.get(number)
         if not job.finished:
             raise JobError(f"job {number} is {job.state}; cancel it first")
-        gone = Path(tempfile.mkdtemp(prefix=".removed-", dir=self.folder))
-        job.folder.rename(gone / job.folder.name)
-        shutil.rmtree(gone, ignore_errors=True)
+        try:
+            gone = Path(tempfile.mkdtemp(prefix=_REMOVED, dir=self.folder))
+            try:
+                job.folder.rename(gone / job.folder.name)
+            finally:
+                shutil.rmtree(gone, ignore_errors=True)
+        except OSError as error:
+            where = f"job {number} cannot be removed: {self.folder}: {error.strerror}"
+            raise JobError(f"{where}; check free space and permissions") from error
 
     def output(self, number: int, name: str = "stdout") -> str:
         """What a job has printed so far, the last 200 kB: "stdout" or "stderr". Raises `JobError`."""
@@ -170,3 +191,13 @@ def _make_private(folder: Path) -> None:
         folder.chmod(0o700)
     except OSError as error:
         raise JobError(f"{folder} cannot be made or made private: {error.strerror}; choose another folder") from error
+
+
+def _clear_away(jobs: Path) -> None:
+    """Remove what a program that was killed has left half made or half removed."""
+    now_s = time.time()
+    for prefix, age_s in ((_NEW, _FORGOTTEN_S), (_REMOVED, 0.0)):
+        for folder in filter(plain_files.is_folder, jobs.glob(f"{prefix}*")):
+            with suppress(OSError):
+                if folder.stat().st_mtime <= now_s - age_s:
+                    shutil.rmtree(folder)

@@ -113,7 +113,7 @@ def read_job(folder: Path) -> Job:
     except (ValueError, KeyError, TypeError):
         return _unreadable(number, folder, "it is cut off, or was not written by microrad")
     state, began, end = _state(folder, home)
-    code = end.get("code")
+    code = _code(end)
     return Job(
         number=number,
         folder=folder,
@@ -160,9 +160,15 @@ def _state(folder: Path, home: bool) -> tuple[State, dict[str, Any], dict[str, A
     end = _noted(folder / EXIT)  # looked at behind the lock: a job that ends between the two is no lost one
     if end is None:
         return ("running", began, {}) if lives else ("cancelled" if asked else "lost", began, {})
-    if end.get("code") == 0 or (end.get("code") == 1 and (not asked or output(folder, STDOUT))):
+    if _code(end) == 0 or (_code(end) == 1 and (not asked or output(folder, STDOUT))):
         return "done", began, end
     return "cancelled" if asked else "failed", began, end  # a Python interrupted as it begins ends with 1, too
+
+
+def _code(end: dict[str, Any]) -> int | None:
+    """The exit code in a note of the end, which does not have the code of a signature and may hold anything."""
+    found = end.get("code")
+    return found if isinstance(found, int) else None
 
 
 def _noted(path: Path) -> dict[str, Any] | None:
@@ -171,7 +177,7 @@ def _noted(path: Path) -> dict[str, Any] | None:
         data = json.loads(plain_files.content(path))
     except FileNotFoundError:
         return None
-    except (OSError, ValueError):
+    except (OSError, ValueError, RecursionError):
         return {}
     return data if isinstance(data, dict) else {}
 
@@ -213,8 +219,8 @@ def _progress(line: str) -> tuple[float, int, int, str] | None:
     try:
         note = json.loads(line)
         return float(note["at"]), int(note["done"]), int(note["total"]), str(note["what"])
-    except (ValueError, KeyError, TypeError):  # the first line may be cut, and the last is being written
-        return None
+    except (ValueError, LookupError, TypeError, OverflowError, RecursionError):
+        return None  # the first line may be cut, and the last is being written
 
 
 def output(folder: Path, name: str) -> str:
@@ -249,17 +255,35 @@ def held(path: Path, patience_s: float) -> Iterator[bool]:
     """Hold the lock of a file, for this process alone; False when another one has it for all of `patience_s`.
 
     It is SQLite's, as that of a campaign's ledger: the same on each operating system, and gone with its process.
-    Raises `JobError` where there is something else in its place, which SQLite would open.
+    Raises `JobError` where there is something else in its place, which SQLite would open, and where it cannot be made.
     """
     _refuse_strange(path)
-    with closing(sqlite3.connect(path, timeout=patience_s, isolation_level=None)) as lock:
+    with closing(_lock(path, patience_s)) as lock:
         try:
             lock.execute("PRAGMA journal_mode = MEMORY")  # no further file beside it
             lock.execute("BEGIN EXCLUSIVE")
-        except sqlite3.OperationalError:
+        except sqlite3.OperationalError as error:
+            if not _is_busy(error):
+                raise JobError(_unlocked(path, error)) from error
             yield False
             return
         yield True
+
+
+def _lock(path: Path, patience_s: float) -> sqlite3.Connection:
+    try:
+        return sqlite3.connect(path, timeout=patience_s, isolation_level=None)
+    except sqlite3.OperationalError as error:
+        raise JobError(_unlocked(path, error)) from error
+
+
+def _unlocked(path: Path, error: sqlite3.OperationalError) -> str:
+    return f"{path} cannot be locked: {error}; check free space and permissions"
+
+
+def _is_busy(error: sqlite3.Error) -> bool:
+    """Whether another process holds what was asked for."""
+    return error.sqlite_errorcode & 0xFF == sqlite3.SQLITE_BUSY
 
 
 def _refuse_strange(path: Path) -> None:
@@ -273,11 +297,11 @@ def is_held(path: Path) -> bool:
     """Whether some process holds the lock; to look never keeps another one from looking."""
     if not path.exists():
         return False
-    with closing(sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro", uri=True, timeout=0.0)) as glance:
-        try:
+    try:
+        with closing(sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro", uri=True, timeout=0.0)) as glance:
             glance.execute("SELECT count(*) FROM sqlite_master").fetchone()
-        except sqlite3.OperationalError:
-            return True
+    except sqlite3.DatabaseError as error:  # else it was removed meanwhile, or is none
+        return _is_busy(error)
     return False
 
 

@@ -12,6 +12,8 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from microrad.studio import plain_files
+
 if TYPE_CHECKING:
     from microrad.identify.predictions import Judged, Prediction
     from microrad.recording import Recording
@@ -118,7 +120,7 @@ def read_fits(folder: Path) -> tuple[LiveFit, ...]:
     from pydantic import TypeAdapter
 
     try:
-        with (folder / FITS).open("rb") as file:
+        with plain_files.opened(folder / FITS) as file:
             lines = file.read(_MOST_BYTES).splitlines()
     except OSError:
         return ()

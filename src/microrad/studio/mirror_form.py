@@ -10,6 +10,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
 from microrad.folder import write_whole
+from microrad.studio import plain_files
 from microrad.studio.commands import Identify
 from microrad.studio.jobs import Order
 from microrad.studio.names import NameRefusedError, safe_name
@@ -73,7 +74,7 @@ def kept_form(path: Path) -> Form:
     from pydantic import TypeAdapter
 
     with suppress(OSError, ValueError):
-        return TypeAdapter(Form).validate_json(path.read_bytes())
+        return TypeAdapter(Form).validate_json(plain_files.content(path))
     return Form()
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import tomllib
 from collections.abc import Callable, Iterable
 from contextlib import suppress
@@ -107,7 +108,8 @@ def write_campaign(workshop: Workshop) -> Path:
         raise JobError(f"{workshop.name_of(mission)} is not saved yet, and a campaign reads it from its file; save it")
     text = resources.files("microrad").joinpath("missions", "campaign.toml").read_text("utf-8")
     path = workshop.inside(free_name(workshop, "campaign", ".toml"))
-    write_whole(path, text.replace('mission = "leo-geo.toml"', f'mission = "{workshop.name_of(mission)}"', 1))
+    named = json.dumps(workshop.name_of(mission), ensure_ascii=False)  # with quotes in the name escaped
+    write_whole(path, text.replace('mission = "leo-geo.toml"', f"mission = {named}", 1))
     return path
 
 

@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
+import json
 import os
+import signal
 import socket
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from importlib import import_module, util
 from pathlib import Path
+from types import FrameType
 from typing import TYPE_CHECKING, Any
 
-from microrad.studio import address
+from microrad.studio import address, plain_files
 from microrad.studio.workshop import Workshop
 
 # NiceGUI and what it stands on take a second to load, and are not there in an installation without the studio.
 if TYPE_CHECKING:
+    import uvicorn
     from starlette.responses import Response
 
     from microrad.studio.guard import Guard
@@ -28,6 +33,7 @@ _GRACE_S = 2
 _SHOWN = 120
 _ANY = ("0.0.0.0", "::", "::ffff:0.0.0.0", "[::]", "*", "")
 
+_LOCK, _OPEN = "open.lock", "open.json"
 _WAY_IN = "open.html"
 _PAGE = """<!doctype html>
 <html lang="en"><head><meta charset="utf-8"><meta name="referrer" content="no-referrer">
@@ -121,6 +127,32 @@ def _unbound(host: str, port: int, error: OSError) -> str:
     return f"'{host}' port {port} cannot be listened on: {error.strerror}; give an address of this machine"
 
 
+@contextmanager
+def alone(studio: Path) -> Iterator[None]:
+    """Be the only studio of a working folder, whose own folder is `studio`: a second one would not see what is changed
+    in the first, and write over it.
+
+    Raises `StudioError` where there is one, and `JobError` where that cannot be told.
+    """
+    from microrad.studio.jobs_files import held, note
+
+    with held(studio / _LOCK, 0.0) as mine:
+        if not mine:
+            raise StudioError(
+                f"{studio.parent} is open in another studio{_process(studio / _OPEN)}; go on in that one, or end it "
+                "with Ctrl-C first: two would not see, and overwrite, each other's unsaved changes"
+            )
+        note(studio / _OPEN, pid=os.getpid())
+        yield
+
+
+def _process(note: Path) -> str:
+    """The process of the studio that has left a note, in words; nothing where the note cannot be read."""
+    with suppress(OSError, ValueError, LookupError, TypeError, RecursionError):
+        return f", process {int(json.loads(plain_files.content(note))['pid'])}"
+    return ""
+
+
 def serve(workshop: Workshop, entrance: Entrance, on_ready: Callable[[], None]) -> None:
     """Serve the pages until Ctrl-C or a request to terminate; `on_ready` is called when a browser may come.
 
@@ -129,18 +161,39 @@ def serve(workshop: Workshop, entrance: Entrance, on_ready: Callable[[], None]) 
     import uvicorn
 
     guarded = application(workshop, entrance)
-
-    class Server(uvicorn.Server):
-        async def startup(self, sockets: list[socket.socket] | None = None) -> None:
-            await super().startup(sockets)
-            on_ready()
-
     settings = address.server_settings()
     config = uvicorn.Config(guarded, log_level="warning", timeout_graceful_shutdown=_GRACE_S, **settings)
     try:
-        Server(config).run(sockets=[entrance.listener])
+        _server(config, on_ready).run(sockets=[entrance.listener])
     finally:
         (workshop.studio / _WAY_IN).unlink(missing_ok=True)
+
+
+def _server(config: uvicorn.Config, on_ready: Callable[[], None]) -> uvicorn.Server:
+    """The server, which calls `on_ready` when it listens and which a second Ctrl-C does not hurry, a third one does."""
+    import uvicorn
+
+    class Server(uvicorn.Server):
+        asked = 0
+
+        def handle_exit(self, sig: int, frame: FrameType | None) -> None:
+            self.asked += 1
+            if self.asked != 2:  # of an impatient user, who would get a traceback for two seconds
+                super().handle_exit(sig, frame)
+
+        async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+            await super().startup(sockets)
+            _end_with_terminal(self.handle_exit)
+            on_ready()
+
+    return Server(config)
+
+
+def _end_with_terminal(end: Callable[[int, FrameType | None], None]) -> None:
+    """Have a terminal that is closed end the server as Ctrl-C does: uvicorn hears that and SIGTERM alone."""
+    number = getattr(signal, "SIGHUP", None)
+    if number is not None and signal.getsignal(number) is not signal.SIG_IGN:  # as behind nohup
+        signal.signal(number, end)
 
 
 def way_in(studio: Path, url: str) -> str:
@@ -221,6 +274,6 @@ def result(workshop: Workshop, number: int, place: int) -> Path | None:
     try:
         job = workshop.jobs.get(number)
         path = within(workshop.folder, job.cwd / job.results[place])
-    except (JobError, NameRefusedError, IndexError):
+    except (JobError, NameRefusedError, IndexError, OSError):
         return None
     return path if place >= 0 and path.is_file() else None

@@ -22,6 +22,7 @@ _NAME = "studio-key"
 _LENGTH = 64  # figures, of 256 bits
 _PATIENCE_S = 2.0  # for another process that is just writing the key
 _REMEDY = "remove it: the next job makes a new one, and jobs queued before are not started any more"
+_ELSEWHERE = "give XDG_STATE_HOME a folder that you may write to"
 _PURPOSE = b"microrad studio job\0"
 
 
@@ -74,6 +75,9 @@ def _key() -> bytes | None:
                 found, key = os.fstat(file.fileno()), file.read(_LENGTH + 1)
         except (FileNotFoundError, NotADirectoryError):
             return None
+        except PermissionError as error:
+            where = f"the studio's key {path} cannot be read: {error.strerror}"
+            raise SigningError(f"{where}; {_ELSEWHERE}") from error
         except OSError as error:
             raise SigningError(f"the studio's key {path} cannot be read: {error.strerror}; {_REMEDY}") from error
         if os.name == "posix" and (found.st_uid != os.geteuid() or stat.S_IMODE(found.st_mode) & 0o077):
@@ -85,18 +89,27 @@ def _key() -> bytes | None:
         time.sleep(0.01)
 
 
+def _write_new(path: Path, content: bytes) -> None:
+    """Write a file that is not there yet, for its owner alone; what cannot be written whole is taken back."""
+    with os.fdopen(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "wb") as file:
+        try:
+            file.write(content)
+            file.flush()
+        except OSError:
+            path.unlink()
+            raise
+
+
 def _new_key() -> bytes:
     """Make the key, unless another process was first."""
     path = key_file()
     try:
         path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
         with suppress(FileExistsError):
-            handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
-            with os.fdopen(handle, "wb") as file:
-                file.write(secrets.token_hex(_LENGTH // 2).encode())
+            _write_new(path, secrets.token_hex(_LENGTH // 2).encode())
     except OSError as error:
         where = f"the studio's key {path} cannot be made: {error.strerror}"
-        raise SigningError(f"{where}; give XDG_STATE_HOME a folder that you may write to") from error
+        raise SigningError(f"{where}; {_ELSEWHERE}") from error
     key = _key()
     if key is None:
         raise SigningError(f"the studio's key {path} was removed at once; try again")

@@ -15,10 +15,12 @@ import stat
 import tempfile
 import time
 from collections.abc import AsyncIterator
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO
 
+from microrad.studio import plain_files
 from microrad.studio.names import safe_name, shown
 
 _KEY = re.compile(r"[0-9a-f]{16}")
@@ -65,7 +67,7 @@ class Uploads:
         """Have this program's temporary files lie in the private folder, too: a form is spooled before it is read."""
         spool = _private(self.folder / "spool")
         for path in filter(_forgotten, _files(spool)):
-            path.unlink(missing_ok=True)
+            _remove(path)
         tempfile.tempdir = str(spool)
 
     async def save(self, name: str, blocks: AsyncIterator[bytes]) -> Upload:
@@ -75,19 +77,25 @@ class Uploads:
         that is full.
         """
         name = safe_name(name)
-        place = self._reserve(name)
-        part = place / _PART
         try:
-            with _new_file(part) as file:
-                await self._fill(file, name, blocks)
-            part.rename(place / name)
+            place = self._reserve(name)
+            try:
+                with _new_file(place / _PART) as file:
+                    await self._fill(file, name, blocks)
+                (place / _PART).rename(place / name)
+            except BaseException:  # the browser went away, too
+                shutil.rmtree(place, ignore_errors=True)
+                raise
         except OSError as error:
-            shutil.rmtree(place, ignore_errors=True)
             raise UploadError(f"the file {shown(name)} could not be stored: {error.strerror or error}") from error
-        except BaseException:  # the browser went away, too
-            shutil.rmtree(place, ignore_errors=True)
-            raise
         return Upload(place.name, name, place / name, _size(place / name))
+
+    def too_large(self, name: str) -> str:
+        """The refusal of a file that is over the limit."""
+        return (
+            f"the file {shown(name)} has more than {self.limits.file_bytes / 1e6:.4g} MB; cut out the part that you "
+            "need, keep every n-th sample, or run microrad identify on the file, which needs no upload"
+        )
 
     def _reserve(self, name: str) -> Path:
         """A new folder for one file: files on their way count, so that none slips in beside another."""
@@ -96,7 +104,7 @@ class Uploads:
             raise UploadError(
                 f"the file {shown(name)} is not taken: {len(places)} recordings are here already; remove one first"
             )
-        place = self.folder / secrets.token_hex(8)
+        place = _private(self.folder) / secrets.token_hex(8)  # the folder may have been removed meanwhile
         place.mkdir(mode=0o700)
         return place
 
@@ -106,10 +114,7 @@ class Uploads:
         async for block in blocks:
             size += len(block)
             if size > self.limits.file_bytes:
-                raise UploadError(
-                    f"the file {shown(name)} has more than {self.limits.file_bytes / 1e6:.4g} MB; cut out the part "
-                    "that you need, keep every n-th sample, or run microrad identify on the file, which needs no upload"
-                )
+                raise UploadError(self.too_large(name))
             waiting += block
             if len(waiting) >= _BLOCK_BYTES:
                 await self._write(file, name, waiting)
@@ -143,15 +148,18 @@ class Uploads:
         shutil.rmtree(self.get(key).path.parent)
 
     def _places(self) -> list[Path]:
-        return [p for p in self.folder.iterdir() if _KEY.fullmatch(p.name) and p.is_dir() and not p.is_symlink()]
+        return [p for p in _files(self.folder) if _KEY.fullmatch(p.name) and p.is_dir() and not p.is_symlink()]
 
     def _total(self) -> int:
         return sum(_size(path) for place in self._places() for path in _files(place))
 
 
 def _stored(place: Path) -> Upload | None:
-    """The file in a folder of its own; None while it is on its way, and when another tab has removed it."""
-    found = next((path for path in _files(place) if path.name != _PART), None)
+    """The file in a folder of its own; None while it is on its way, and when another tab has removed it.
+
+    A link is none: the folder may have come from a stranger, and a link could name any file of this machine.
+    """
+    found = next((path for path in _files(place) if path.name != _PART and _is_plain(path)), None)
     return None if found is None else Upload(place.name, found.name, found, _size(found))
 
 
@@ -160,6 +168,22 @@ def _files(place: Path) -> list[Path]:
         return list(place.iterdir())
     except FileNotFoundError:
         return []
+
+
+def _is_plain(path: Path) -> bool:
+    try:
+        return stat.S_ISREG(path.lstat().st_mode)
+    except FileNotFoundError:
+        return False
+
+
+def _remove(path: Path) -> None:
+    """Remove a file, or a folder with all that is in it; what cannot be removed stays."""
+    if plain_files.is_folder(path):
+        shutil.rmtree(path, ignore_errors=True)
+        return
+    with suppress(OSError):
+        path.unlink()
 
 
 def _size(path: Path) -> int:

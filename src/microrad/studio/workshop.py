@@ -137,6 +137,7 @@ class Workshop:
 
     # ---------------------------------------------------------------------------------------------------- kept on disk
     def _keep(self, draft: Draft, name: str) -> None:
+        self.studio.mkdir(mode=0o700, exist_ok=True)  # "git clean" may have removed it meanwhile
         noted = {"path": self.name_of(draft.path), "disk_sha256": draft.disk_sha256, "text": draft.text}
         write_whole(self.studio / name, json.dumps(noted))
 

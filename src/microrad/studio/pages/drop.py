@@ -21,11 +21,18 @@ async (event) => {
   const field = event.target, files = Array.from(field.files);
   field.disabled = true;
   for (const file of files) {
+    if (file.size > MOST) {
+      emit(file.name, "");  // the guard would end the connection before the browser has read why
+      continue;
+    }
     const form = new FormData();
     form.append("file", file, file.name);
     try {
       const answer = await fetch("URL", {method: "POST", body: form});
-      if (!answer.ok) emit(file.name, await answer.text());
+      if (!answer.ok) {
+        const page = new DOMParser().parseFromString(await answer.text(), "text/html");
+        emit(file.name, (page.querySelector("main > p") ?? page.body).textContent || `error ${answer.status}`);
+      }
     } catch (error) {
       emit(file.name, "the connection to the studio broke off");
     }
@@ -53,18 +60,22 @@ class Drop:
         url = f"/_nicegui/client/{client.id}/upload/{field.id}"  # where the guard lets large bodies pass
         app.add_api_route(url, self._take, methods=["POST"], include_in_schema=False)
         client.on_delete(lambda: app.remove_route(url))
-        field.on("change", self._unsent, js_handler=_SEND.replace("URL", url))
+        most = str(uploads.limits.file_bytes)
+        field.on("change", self._unsent, js_handler=_SEND.replace("URL", url).replace("MOST", most))
 
     def _unsent(self, event: Any) -> None:
-        """Say why the guard, or the connection, has stopped a file."""
-        name, words = event.args
-        self._refused(f"{str(name)[:60]}: {str(words)[:400]}")
+        """Say why the page, the guard or the connection has stopped a file."""
+        name, words = (str(each) for each in event.args)
+        self._refused(f"{name[:60]}: {words[:400]}" if words else self._uploads.too_large(name))
 
     async def _take(self, request: Request) -> Response:
-        async with request.form(max_files=1, max_fields=1) as form:
-            for each in form.values():
-                if isinstance(each, UploadFile):
-                    await self._one(each)
+        try:
+            async with request.form(max_files=1, max_fields=1) as form:
+                for each in form.values():
+                    if isinstance(each, UploadFile):
+                        await self._one(each)
+        except OSError as error:  # of the temporary file that a form is kept in
+            self._refused(f"the file could not be stored: {error.strerror or error}; check free space and permissions")
         return PlainTextResponse("read")
 
     async def _one(self, sent: UploadFile) -> None:

@@ -18,6 +18,19 @@ from microrad.studio.workshop import Workshop
 TITLE = "Mission"
 PATH = "/"
 
+_MOST_PASTED = 500_000
+"""Characters: a message of two bytes each still comes through to the server, and a mission has some ten thousand."""
+_TOO_MUCH = """
+(event) => {
+  const given = event.clipboardData ?? event.dataTransfer;
+  const size = [...given.files].reduce((sum, file) => sum + file.size, given.getData("text").length);
+  if (size <= MOST) return;
+  event.preventDefault();
+  event.stopPropagation();
+  emit();
+}
+""".replace("MOST", str(_MOST_PASTED))
+
 _NAME_EDITOR = """
 document.querySelectorAll('.mission-text .cm-content').forEach(e => e.ariaLabel = 'Text of the mission');
 document.querySelectorAll('.mission-text .cm-scroller').forEach(e => e.tabIndex = 0);
@@ -44,11 +57,13 @@ class _Page:
                 )
                 self.list = ui.column().classes("mission-list")
             self.form = Form(workshop, self._edited, self._reveal)
-            with ui.element("section").classes("mission-text").props('aria-label="Text"'):
+            with ui.element("section").classes("mission-text").props('aria-label="Text"') as section:
                 self.editor = ui.codemirror(
                     _plain(workshop.draft), language="TOML", theme="vscodeLight", on_change=self._text
                 )
                 self.faults = ui.column().classes("mission-faults")
+        for event in ("paste.capture", "drop.capture"):
+            section.on(event, self._too_much, js_handler=_TOO_MUCH)
         self.entries: dict[str, tuple[Any, Any]] = {}
         self._list()
         self.form.show(next(iter(tables(workshop.draft)), ""))
@@ -136,6 +151,9 @@ class _Page:
             self.form.show(next(iter(tables(self.workshop.draft)), ""))
         self.form.refresh()
         self._around()
+
+    def _too_much(self) -> None:
+        layout.refuse(f"that text has more than {_MOST_PASTED} characters and is no mission: it was not put in")
 
     def _faults(self) -> None:
         """Every fault with its line, each a way to its key."""
