@@ -319,7 +319,7 @@ def response_from_periods(
     total, noise, distortion = _levels(total_variance, noise_variance, spread, m > inputs)
     coherence = 1.0 - total_variance * m / np.maximum(np.sum(np.abs(y) ** 2, axis=0), 1e-300)
     values = (response, total, noise, distortion, np.clip(coherence, 0.0, 1.0))
-    method = f"best linear approximation of {m} realisations, {p} periods each"
+    method = f"best linear approximation, realisations: {m}, periods of each: {p}"
     return _record(records, freq, values, (auto / m, total_variance), method, hold, (float(freq[0]), float(freq[-1])))
 
 
