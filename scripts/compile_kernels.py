@@ -1,0 +1,7 @@
+"""Compile the ensemble of loops, which takes half a minute: each process of a first test run would do it for itself."""
+
+from pathlib import Path
+
+from microrad import fine_pointing, load_mission
+
+fine_pointing.run_one(load_mission(Path(__file__).parent.parent / "missions" / "leo-geo.toml"), "PI")
