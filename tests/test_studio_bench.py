@@ -427,6 +427,8 @@ def test_margins_in_words_against_what_is_asked_for(mission, pi):
     assert control_view.waiting_row("PI")["modulus"] == ""
     assert control_view.notes(pi) == ()
     pid = control_model.controller(mission, PID)
+    assert control_view.table_row(pi)["residual"].endswith(" µrad")
+    assert control_view.table_row(pid)["residual"] == "not computed"
     assert "asked for" not in dict(control_view.margin_rows(pid))["Modulus margin, least |1 + L|"]
     assert "nothing shakes it" in control_view.notes(pid)[0]
     bound = replace(pi, bound_by=("modulus margin",), sensitivity=None, loop_gain=None)

@@ -151,6 +151,21 @@ def test_a_wrong_unit_is_told_beside_its_field_and_the_last_map_stays(studio, li
     assert typed(links, APERTURE).get_attribute("aria-invalid") == "false"
 
 
+def test_a_page_that_is_opened_on_a_faulty_mission_promises_nothing_in_grey(studio, links, context):
+    typed(links, APERTURE).fill("5 W")
+    typed(links, APERTURE).press("Enter")
+    until(links, lambda: 'leo_aperture = "5 W"' in written(studio))
+    opened_now = studio.enter(context, "link")
+    opened_now.get_by_text("Nothing can be shown before the mission is corrected.").wait_for()
+    assert opened_now.get_by_text("Shown in grey").count() == 0
+    opened_now.close()
+    check_quiet(opened_now, studio.base)
+    typed(links, APERTURE).fill("5 cm")
+    typed(links, APERTURE).press("Enter")
+    links.get_by_role("status").get_by_text("saved", exact=True).wait_for()
+    shown_margin(links, "+3.00 dB")
+
+
 def test_the_budget_of_another_link_is_chosen_and_the_page_copied_as_a_command(studio, links):
     links.get_by_text("The links close: ").wait_for()
     links.get_by_role("button", name="Beacon", exact=True).click()
@@ -185,3 +200,15 @@ def test_the_day_is_computed_with_progress_and_a_second_tab_finds_it(opened):
     again = opened("day")
     again.get_by_text("In 24 h the relay is in view 15 times").wait_for()
     assert again.get_by_text("Computing, ").count() == 0
+
+
+def test_a_day_that_is_shown_beside_a_fault_says_that_it_is_the_one_before(opened, links):
+    page = opened("day")
+    page.get_by_text("The day of the mission as it stands.").wait_for()
+    typed(links, APERTURE).fill("5 W")
+    typed(links, APERTURE).press("Enter")
+    page.get_by_text("The day of the mission before this.").wait_for()
+    assert page.get_by_text("In 24 h the relay is in view 15 times").is_visible()
+    typed(links, APERTURE).fill("5 cm")
+    typed(links, APERTURE).press("Enter")
+    page.get_by_text("The day of the mission as it stands.").wait_for()

@@ -178,7 +178,7 @@ def test_progress_in_words():
 def test_the_state_of_a_job_in_words(tmp_path):
     job = Job(1, tmp_path, "done", "study", code=1)
     assert runs_view.state_words(job) == "done: the link does not close"
-    assert runs_view.state_words(replace(job, code=0)) == "done: the link closes"
+    assert runs_view.state_words(replace(job, code=0)) == "done: the link closes; each requirement is judged below"
     assert runs_view.state_words(replace(job, kind="campaign")) == "done: the rows do not keep the limits"
     assert runs_view.state_words(replace(job, kind="export", code=0)) == "done"
     assert runs_view.state_words(replace(job, state="running", code=None)) == "running"

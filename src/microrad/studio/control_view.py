@@ -103,7 +103,7 @@ def table_row(of: Controller) -> dict[str, Any]:
     m = of.margins
     return {
         "name": of.name,
-        "residual": _told(of.residual_rad, "rad") if math.isfinite(of.residual_rad) else "",
+        "residual": _told(of.residual_rad, "rad") if math.isfinite(of.residual_rad) else "not computed",
         "modulus": f"{m['modulus']:.3f}",
         "gain": _gain(m["gain"]),
         "phase": f"{math.degrees(m['phase']):.1f}°" if math.isfinite(m["phase"]) else "none",

@@ -19,7 +19,7 @@ from microrad.studio.jobs import Job, JobError, Kind, Order, Progress
 from microrad.studio.workshop import Workshop
 
 _VERDICTS = {
-    ("study", 0): "the link closes",
+    ("study", 0): "the link closes; each requirement is judged below",
     ("study", 1): "the link does not close",
     ("campaign", 0): "the rows keep the limits",
     ("campaign", 1): "the rows do not keep the limits",

@@ -117,7 +117,7 @@ class ControlPage:
 
         with ui.element("div").classes("control-plots"):
             for name in names:
-                self.plots[name] = ui.plotly(empty("Being simulated.")).props(
+                self.plots[name] = ui.plotly(empty("Nothing simulated yet.")).props(
                     f'role="figure" aria-label="{_PLOTS[name]}"'
                 )
 

@@ -113,7 +113,8 @@ class DayPage:
 
     def _show_progress(self, state: State[DayStudy]) -> None:
         step = f": {state.done} of {state.total}" if state.total else ""
-        known = "The day of the mission as it stands." if state.key == self.workshop.draft.sha256 else ""
+        now = state.key == self.workshop.draft.sha256
+        known = "The day of the mission as it stands." if now else "The day of the mission before this."
         words = known if state.result else "Not computed."
         self.state.text = f"Computing, {state.what or 'links'}{step}" if state.running else state.error or words
         self.bar.visible = self.cancel.visible = state.running

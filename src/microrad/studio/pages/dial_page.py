@@ -21,6 +21,7 @@ from microrad.studio.workshop import Workshop
 T = TypeVar("T")
 _SHORT_S, _REST_S = 0.01, 0.15
 _OLD = "Shown in grey: the mission before this."
+_NONE = "Nothing can be shown before the mission is corrected."
 
 
 class DialPage(Generic[T]):
@@ -124,7 +125,8 @@ class DialPage(Generic[T]):
         told = faulty(found.draft, rows)
         self.board.faults(told)
         others = [str(fault) for fault in found.draft.problems if fault.key not in told]
-        self._faults.text = "\n".join([_OLD, *others, *([found.refusal] if found.refusal else [])])
+        state = _NONE if self.view_now is None else _OLD
+        self._faults.text = "\n".join([state, *others, *([found.refusal] if found.refusal else [])])
         self._faults.visible = found.view is None
         self._dim(found.view is None)
         if found.view is not None and not same:

@@ -72,6 +72,7 @@ class LinkPage(DialPage[LinkView]):
         layout.heading("Budgets")
         self.which = ui.toggle([], on_change=self._show_table).props('no-caps dense aria-label="Budget shown"')
         self.table = table(_COLUMNS)
+        ui.label("! marks a line with a warning: see the end of the next section.").classes("soft small")
         layout.heading("What follows")
         self.state = ui.label().classes("soft").props('role="status"')
         self.sentences = ui.column()

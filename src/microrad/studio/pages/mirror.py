@@ -93,7 +93,7 @@ class MirrorPage:
             self._text("lever_arm", "Lever arm", "50 mm; for a displacement")
         self._select("accept", "Go on in spite of", list(ACCEPTABLE), "multiple use-chips clearable")
         layout.heading("Identification")
-        self._text("name", "Name of the mirror", "its file: name.toml")
+        self._text("name", "Name of the mirror", "its file has this name and .toml")
         self.fields["static"] = ui.checkbox("Hysteresis alone: two models, in seconds", on_change=self.typed)
         self.fields["admissible"] = ui.checkbox("No model that moves the wrong way", on_change=self.typed)
         self.words = ui.label().classes("mirror-words").props('role="alert"')

@@ -95,7 +95,7 @@ class _Card:
             with ui.element("details").classes("runs-details") as self.details:
                 layout.words("summary", "What it printed")
                 self.said = layout.words("pre").classes("runs-said").props("tabindex=0")
-            if job.kind != "campaign":  # its figures say the same
+            if job.kind not in ("campaign", "identification"):  # figures and the page of the mirror say the same
                 self.details.props("open")
             if job.arguments:
                 layout.words("code", commands.command(_Done(job))).classes("mono runs-command")
