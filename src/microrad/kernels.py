@@ -313,7 +313,7 @@ def bouc_wen_power_step(h, travel, epsilon_rate, rows, e):  # type: ignore[no-un
     return np.nan
 
 
-@_inline
+@_merge
 def _bouc_wen_advance(h, travel, rate, rows, e):  # type: ignore[no-untyped-def]
     """h of Bouc-Wen element e after its drive has moved by ``travel``; the rate is the clamped one."""
     grown = rows[e, EPSILON] * _near_exp(rows[e, DELTA] * abs(rate))
@@ -472,7 +472,7 @@ def _element_drive(plant, state, e):  # type: ignore[no-untyped-def]
     return q
 
 
-@_inline
+@_merge
 def _plant_step(plant, state):  # type: ignore[no-untyped-def]
     """One step to ``u_next``, behind _predict: second order, and nothing is iterated."""
     x, x_next, y, bank, first_operator = state.x, state.x_next, state.y, state.bank, len(plant.elements)
