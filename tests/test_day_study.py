@@ -1,5 +1,6 @@
 """A day of the link against what one sees second by second: contacts, volumes, latencies, and what moves them."""
 
+import itertools
 import math
 
 import numpy as np
@@ -379,7 +380,8 @@ def test_a_day_without_any_contact_is_a_day_all_the_same(quick, changes):
     assert math.isnan(v.median_s)
     assert (way.contacts, way.capacity_bit, way.capacity_spread_bit, way.failed_contacts) == ((), 0.0, (0.0, 0.0), 0.0)
     assert way.carried_bit.shape == (0,)
-    assert v.gap_s == way.gap_s == v.duration_s
+    first = v.contacts[0].start_s if v.contacts else v.duration_s  # behind the minute there are some
+    assert v.gap_s == way.gap_s == first >= v.duration_s
     assert found.warnings == ()
     assert (found.ratio == 0.0) == (found.relay.capacity_bit == 0.0)
     if not v.contacts:
@@ -587,7 +589,28 @@ def test_the_ratio_with_nothing_on_either_side(relay, direct, ratio):
 )
 def test_the_factor_between_two_sides(low, high, factor):
     ends = [Numbers(relay, direct, 1.0, 1.0) for relay, direct in (low, high)]
-    assert Swing("an assumption", "low", "high", *ends).factor == pytest.approx(factor)
+    assert Swing("an assumption", "low", "high", *ends, ends[0]).factor == pytest.approx(factor)
+
+
+def test_what_lowers_the_ratio_on_both_sides_counts_from_where_it_is():
+    low, high, here = (Numbers(relay, 2.0, 1.0, 1.0) for relay in (6.0, 2.0, 12.0))
+    assert Swing("an assumption", "low", "high", low, high, here).factor == pytest.approx(6.0)
+    assert Swing("an assumption", "low", "high", low, high, low).factor == pytest.approx(3.0)
+
+
+def test_the_longest_time_without_contact_is_followed_beyond_the_span(day):
+    """Nothing is heard from the last pass of the day on until the first one of the next day."""
+    passes, span, whole = day.direct.contacts, day.view.pair.span_s, day.view.pair.whole_s
+    later = min(
+        each.start_s
+        for station in orbit.stations(day.mission.operations.downlink)
+        for each in orbit.passes(day.view.pair.leo.orbit, station, day.view.pair.epoch, whole)
+        if each.start_s > passes[-1].end_s
+    )
+    inside = max(b.start_s - a.end_s for a, b in itertools.pairwise(passes))
+    assert later > span[1]
+    assert day.direct.gap_s == pytest.approx(max(passes[0].start_s - span[0], inside, later - passes[-1].end_s))
+    assert day.direct.gap_s > max(inside, span[1] - passes[-1].end_s)
 
 
 # ------------------------------------------------------------------------------------------------------------- the map

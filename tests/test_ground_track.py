@@ -144,8 +144,9 @@ def test_a_track_is_of_a_day_at_most(track_of):
 def drawn(tmp_path, monkeypatch):
     """The figures of six hours with one assumption changed, by changes of the mission."""
     side = Numbers(1e12, 1e11, 10.0, 100.0)
-    swings = [Swing("attitude", "nadir", NOTHING, side, side), Swing("rate", NOTHING, "2 bit/s", side, side)]
-    swings += [Swing("mask", "0 deg", "10 deg", side, side), Swing("altitude", NOTHING, NOTHING, side, side)]
+    both = side, side, side
+    swings = [Swing("attitude", "nadir", NOTHING, *both), Swing("rate", NOTHING, "2 bit/s", *both)]
+    swings += [Swing("mask", "0 deg", "10 deg", *both), Swing("altitude", NOTHING, NOTHING, *both)]
     monkeypatch.setattr(day_study, "swings", lambda *given: tuple(swings))
 
     def draw(*changes):

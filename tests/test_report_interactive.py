@@ -105,6 +105,43 @@ def test_bars_of_one_colour_are_one_trace_and_name_their_rows(canvas):
     assert [t["marker"]["color"] for t in (swings, one, other)] == ["#e69f00", "#0072b2", "#56b4e9"]
 
 
+def test_a_bar_that_lies_on_a_longer_one_stays_in_front_of_it(canvas):
+    axes = canvas.subplots()
+    for row, ends in enumerate(((5.0, 2.0), (1.0, -1.0), (2.0, 6.0))):
+        colours = ("#E69F00", "#0072B2")
+        for end, colour in sorted(zip(ends, colours, strict=True), key=lambda bar: -abs(bar[0])):
+            axes.barh(row, end, height=0.7, color=colour)
+    plot = turned(canvas)["data"]
+    behind, in_front = plot[:2], plot[2:]
+    assert [(t["marker"]["color"], t["x"]) for t in behind] == [("#e69f00", [5, 1]), ("#0072b2", [-1, 6])]
+    assert [(t["marker"]["color"], t["x"]) for t in in_front] == [("#0072b2", [2]), ("#e69f00", [2])]
+
+
+def test_a_curve_that_no_legend_shows_may_have_a_name(canvas):
+    axes = canvas.subplots()
+    axes.plot([0, 1], [1, 2], color="#0072B2", label="simulated")
+    axes.plot([0, 1], [1, 3], "--", color="#0072B2", label="_predicted")
+    axes.plot([0, 1], [1, 4], ":", color="#0072B2")
+    axes.legend()
+    plot = turned(canvas)
+    assert [trace["name"] for trace in plot["data"]] == ["simulated", "predicted", "simulated"]
+    assert [(e["label"], e["data"]) for e in plot["keys"][0]["entries"]] == [("simulated", [0, 1, 2])]
+
+
+def test_a_value_between_ticks_in_words_is_its_own_and_a_row_of_numbers_has_its_title(canvas):
+    axes = canvas.subplots()
+    axes.plot([0.5, 61.25], [0, 1], color="#0072B2")
+    axes.set_xticks([0.0, 60.0])
+    axes.xaxis.set_major_formatter(lambda degrees, _: f"{degrees:g}° E")
+    axes.set_yticks([0, 1], ["4", "13"])
+    axes.set_ylabel("gain (V)")
+    plot = turned(canvas)
+    assert only(plot)["text"] == ["gain: 4 V<br>0.5° E", "gain: 13 V<br>61.25° E"]
+    assert plot["layout"]["xaxis"]["ticktext"] == ["0° E", "60° E"]
+    axes.set_xlabel("longitude")
+    assert only(turned(canvas))["text"][1] == "gain: 13 V<br>longitude: 61.25° E"
+
+
 def test_broken_bars_are_bars_with_their_begins(canvas):
     axes = canvas.subplots()
     axes.broken_barh([(1.0, 0.5), (4.0, 2.0)], (-0.3, 0.6), facecolor="#0072B2")

@@ -36,23 +36,28 @@ class Numbers:
 
 @dataclass(frozen=True, slots=True)
 class Swing:
-    """One assumption changed to ``low`` and to ``high``, in words, all others as they are; a side may be unchanged."""
+    """One assumption changed to ``low`` and to ``high``, in words, all others as they are; a side may be unchanged.
+
+    ``here`` is what all are compared with: every assumption as it is.
+    """
 
     name: str
     low: str
     high: str
     at_low: Numbers
     at_high: Numbers
+    here: Numbers
 
     @property
     def factor(self) -> float:
-        """By how much the ratio of the volumes differs between the two; without a direct downlink, the relay's volume.
+        """Largest over smallest ratio of the volumes, as it is and at both sides.
 
-        So too where the direct downlink carries nothing either way. Infinite where one side carries nothing.
+        Without a direct downlink, and where that carries nothing in any case, it is the relay's volume that counts.
+        Infinite where one of them is nothing.
         """
-        both = self.at_low, self.at_high
-        alone = not any(n.direct_bit > 0.0 for n in both)
-        low, high = sorted(n.relay_bit if alone else n.ratio for n in both)
+        every = self.here, self.at_low, self.at_high
+        alone = not any(n.direct_bit > 0.0 for n in every)
+        low, *_, high = sorted(n.relay_bit if alone else n.ratio for n in every)
         return 1.0 if low == high else high / low if low > 0.0 else math.inf
 
 
@@ -128,7 +133,7 @@ def swings(
     for done, (name, low, high) in enumerate(cases):
         on_progress(done, len(cases), "each assumption changed alone")
         ends = [_end(side, here, folder, found) for side in (low, high)]
-        made.append(Swing(name, ends[0][0], ends[1][0], ends[0][1], ends[1][1]))
+        made.append(Swing(name, ends[0][0], ends[1][0], ends[0][1], ends[1][1], here))
     return tuple(sorted(made, key=lambda swing: -swing.factor))
 
 

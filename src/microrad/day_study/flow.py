@@ -45,7 +45,7 @@ class Way:
 
     ``contacts`` are those of the span, cut at its end, passes over ``stations`` for a downlink; ``carried_bit`` is what
     each could carry, and ``capacity_bit`` their sum, both the mean of the runs; ``capacity_spread_bit`` the least and
-    the most of a run. ``contact_s`` is the time in contact, ``gap_s`` the longest time in the span without one.
+    the most of a run. ``contact_s`` is the time in contact, ``gap_s`` the longest time without one, begun in the span.
     ``history`` is the store in the first run; volumes are means over the runs, and ``latency`` is that of all runs
     together.
     """
@@ -260,7 +260,7 @@ def _way(
         contacts=shown,
         stations=stations[:inside],
         contact_s=sum(c.duration_s for c in shown),
-        gap_s=longest_gap_s(shown, span),
+        gap_s=longest_gap_s(contacts, seen.pair),
         carried_bit=carried.mean(axis=0),
         capacity_bit=float(total.mean()),
         capacity_spread_bit=(float(total.min()), float(total.max())),

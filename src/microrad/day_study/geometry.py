@@ -78,8 +78,8 @@ class View:
 
     @property
     def gap_s(self) -> float:
-        """Longest time in the span without a contact."""
-        return longest_gap_s([e.contact for e in self.encounters], self.pair.span_s)
+        """Longest time without a contact, see `longest_gap_s`."""
+        return longest_gap_s(self.contacts, self.pair)
 
     @property
     def rises(self) -> int:
@@ -100,10 +100,16 @@ class View:
         return max((getattr(e, name) for e in self.encounters), default=0.0)
 
 
-def longest_gap_s(contacts: Sequence[orbit.Contact], span_s: tuple[float, float]) -> float:
-    """Longest time in the span without a contact."""
-    edges = [span_s[0], *(t for c in contacts for t in (c.start_s, c.end_s)), span_s[1]]
-    return max(b - a for a, b in zip(edges[::2], edges[1::2], strict=True))
+def longest_gap_s(contacts: Sequence[orbit.Contact], pair: orbit.Pair) -> float:
+    """Longest time (s) without a contact that begins within the span, to its end behind it as far as that is known.
+
+    ``contacts`` are those of the whole, in order. Without any it is the span.
+    """
+    begin_s, end_s = pair.span_s
+    if not contacts:
+        return end_s - begin_s
+    edges = [begin_s, *(t for c in contacts for t in (c.start_s, c.end_s)), pair.whole_s[1]]
+    return max(b - a for a, b in zip(edges[::2], edges[1::2], strict=True) if a < end_s)
 
 
 def _cut(contact: orbit.Contact) -> bool:

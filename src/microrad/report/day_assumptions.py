@@ -33,19 +33,18 @@ class Assumed(NamedTuple):
 
 @rc_context(PLAIN)
 def assumptions(swings: Sequence[Assumed], value: float, quantity: str) -> Figure:
-    """A number over each assumption, one at a time; the largest change on top. ``quantity`` is its name with unit."""
-    ordered = sorted(swings, key=lambda each: -_swing(each, value))
-    shown = ordered[:MOST_BARS]
+    """A number over each assumption, one at a time, the first on top. ``quantity`` is its name with unit."""
+    shown = swings[:MOST_BARS]
     if shown and math.isfinite(value):
         svg = _tornado(shown, value, f"{quantity}; as assumed: {value:.4g}")
     else:
         svg = empty("no assumption was varied" if math.isfinite(value) else f"{quantity}: no finite value")
     caption = f"{quantity[:1].upper()}{quantity[1:]}: one assumption at a time at its lower and at its higher value."
-    if len(ordered) > len(shown):
-        caption += f" {len(ordered) - len(shown)} more, which change less, are in the data only."
+    if len(swings) > len(shown):
+        caption += f" {len(swings) - len(shown)} more, which change less, are in the data only."
     columns = {"as assumed": np.array([value])}
-    columns |= {f"{s.label}, lower": np.array([s.low]) for s in ordered}
-    columns |= {f"{s.label}, higher": np.array([s.high]) for s in ordered}
+    columns |= {f"{s.label}, lower": np.array([s.low]) for s in swings}
+    columns |= {f"{s.label}, higher": np.array([s.high]) for s in swings}
     return Figure("assumptions", "What the assumptions decide", caption, svg, columns)
 
 
@@ -69,12 +68,6 @@ def in_lines(label: str) -> str:
         if found and len(lines[-1]) > _LINE:
             lines[-1:] = [head + mark.rstrip(), tail]
     return "\n".join(textwrap.fill(line, _LINE, max_lines=2, placeholder="…") for line in lines)
-
-
-def _swing(each: Assumed, value: float) -> float:
-    """How far the farther end is away; one that is not finite goes before all others."""
-    ends = [abs(end - value) for end in (each.low, each.high)]
-    return max(ends) if all(math.isfinite(end) for end in ends) else math.inf
 
 
 def swing_bars(axes: Axes, labels: Sequence[str], ends: Sequence[tuple[float, float]], value: float) -> None:

@@ -310,7 +310,8 @@ def _latency_axes(axes: Axes, least_s: float, most_s: float) -> None:
     begin, end = _round_below(max(least_s / 2.0, most_s * 1e-7)), most_s * 1.2
     ticks = _durations(_WIDE, begin, end)
     ticks = ticks if len(ticks) > 3 else _durations(_DENSE, begin, end)
-    axes.set_xticks([*ticks], [*ticks.values()])  # widens the limits to its ticks
+    axes.set_xticks([*ticks])  # widens the limits to its ticks
+    axes.xaxis.set_major_formatter(lambda time_s, _: ticks.get(time_s) or duration(time_s))
     axes.set_xlim(begin, end)
     axes.minorticks_off()
 

@@ -140,14 +140,18 @@ def _earth(axes: Axes) -> None:
     path = Path.make_compound_path(*(Path(ring, closed=True) for ring in land()))
     axes.add_patch(PathPatch(path, facecolor=LAND, edgecolor=COAST, linewidth=0.4, zorder=0.5))
     axes.set(xlim=(-180, 180), ylim=(-90, 90), aspect="equal")
-    east = {0: "0°", -180: "180°", 180: "180°"}
-    axes.set_xticks(
-        range(-180, 181, 60), [east.get(d, f"{abs(d)}° {'E' if d > 0 else 'W'}") for d in range(-180, 181, 60)]
-    )
-    north = range(-90, 91, 30)
-    axes.set_yticks(north, [f"{abs(d)}° {'N' if d > 0 else 'S'}" if d else "0°" for d in north])
+    axes.set_xticks(range(-180, 181, 60))
+    axes.xaxis.set_major_formatter(lambda degrees, _: _degrees(degrees, "WE"))
+    axes.set_yticks(range(-90, 91, 30))
+    axes.yaxis.set_major_formatter(lambda degrees, _: _degrees(degrees, "SN"))
     for side in ("top", "right"):
         axes.spines[side].set_visible(True)
+
+
+def _degrees(value: float, sides: str) -> str:
+    """An angle to one side: 60.5° E."""
+    size = f"{abs(value):.4g}"
+    return f"{size}°" if size in ("0", "180") else f"{size}° {sides[int(value > 0.0)]}"
 
 
 def _track(axes: Axes, track: Places, contact: Mapping[str, NDArray[np.bool_]]) -> None:

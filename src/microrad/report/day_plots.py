@@ -105,6 +105,7 @@ def _marked(each: Outline) -> tuple[str, day_map.Marked]:
 
 
 def _assumptions(day: DayStudy) -> Figure:
+    """The bars stand in the order of `Swing.factor`, as the words about them do."""
     direct = day.direct is not None
     bars = [
         day_assumptions.Assumed(

@@ -203,10 +203,10 @@ def _both(s: Swing, name: str) -> str:
 
 
 def _wait_factor(s: Swing) -> float:
-    """By how much an assumption changes the 99 % latency of the way that it changes more."""
+    """Largest over smallest 99 % latency, as it is and at both sides, of the way that an assumption changes more."""
     factors = [1.0]
     for name in ("relay_slow_s", "direct_slow_s"):
-        low, high = sorted(getattr(n, name) for n in (s.at_low, s.at_high))
-        if low > 0.0 and low != high and not math.isnan(low + high):
+        low, middle, high = sorted(getattr(n, name) for n in (s.here, s.at_low, s.at_high))
+        if low > 0.0 and low != high and not math.isnan(low + middle + high):
             factors.append(high / low)
     return max(factors)

@@ -94,9 +94,10 @@ def spectra(fine: FinePointingStudy, controllers: tuple[Shown, ...]) -> Figure:
         after, predicted = each.of.spectrum_rad2_hz[inner, 0], each.of.predicted_rad2_hz[inner, 0]
         style = each.style(freq, place)
         left.plot(freq, after * 1e12, label=each.name, **style)
-        left.plot(freq, predicted * 1e12, color=each.colour, **_PREDICTED)
+        name = f"_{each.name}, predicted, linear"
+        left.plot(freq, predicted * 1e12, label=name, color=each.colour, **_PREDICTED)
         right.plot(freq, cumulative_rms(freq, after) * 1e6, **style)
-        right.plot(freq, cumulative_rms(freq, predicted) * 1e6, color=each.colour, **_PREDICTED)
+        right.plot(freq, cumulative_rms(freq, predicted) * 1e6, label=name, color=each.colour, **_PREDICTED)
         columns[f"{each.name}, simulated (rad^2/Hz)"] = after
         columns[f"{each.name}, predicted (rad^2/Hz)"] = predicted
     left.plot([], [], color=_GREY, label="dashed: predicted, linear", **_PREDICTED)

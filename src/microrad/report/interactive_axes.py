@@ -12,7 +12,7 @@ from matplotlib.axis import Axis
 from matplotlib.backends.backend_agg import RendererAgg
 from matplotlib.figure import Figure as Canvas
 from matplotlib.text import Text
-from matplotlib.ticker import FixedLocator
+from matplotlib.ticker import FixedLocator, FuncFormatter
 from matplotlib.transforms import Bbox
 
 from microrad.report.interactive_style import StaticOnlyError, colour, numbers, pixels, words
@@ -52,10 +52,16 @@ class Side:
         return "" if self.named else spoken(self.title, placeholder)
 
     def word(self, value: float) -> str:
-        """The word at the tick nearest to a value; "" where the axis has numbers."""
+        """A value in the words of the ticks: those nearest to it, unless they follow from it; "" for plain numbers."""
         if not self.named:
             return ""
-        return self.named[min(self.named, key=lambda at: abs(at - value))].replace("\n", " ")
+        formatter = self.of.get_major_formatter()
+        if isinstance(formatter, FuncFormatter):
+            text = formatter(value)
+        else:
+            text = self.named[min(self.named, key=lambda at: abs(at - value))].replace("\n", " ")
+        name, unit = _parts(self.title)
+        return f"{name}: {text} {unit}".rstrip() if name and text[:1].isdigit() else text
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,10 +81,16 @@ class Panel:
 
 def spoken(title: str, placeholder: str) -> str:
     """Part of a hover label: an axis's title with a value in it, the unit behind the value."""
-    found = _WITH_UNIT.fullmatch(" ".join(title.split()))
-    name, unit = (found["name"], f" {words(found['unit'])}") if found else (" ".join(title.split()), "")
-    unit = unit.replace(" °", "°")
+    name, unit = _parts(title)
+    unit = f" {words(unit)}".rstrip().replace(" °", "°")
     return f"{words(name) or placeholder}: %{{{placeholder}:.5~g}}{unit}"
+
+
+def _parts(title: str) -> tuple[str, str]:
+    """Name and unit of an axis's title, in one line; either may be missing."""
+    line = " ".join(title.split())
+    found = _WITH_UNIT.fullmatch(line)
+    return (found["name"], found["unit"]) if found else (line, "")
 
 
 def panels(canvas: Canvas, left_out: Iterable[Axes]) -> list[Panel]:

@@ -16,16 +16,31 @@ _VALUE = "%{@:.5~g}"
 
 
 def bars(pen: Pen) -> set[int]:
-    """Bars of one colour and direction as one trace; returns what has been turned."""
-    groups: dict[tuple[bool, str, Look], list[Rectangle]] = {}
+    """Bars of one colour and direction as one trace, those that lie on others as one behind it.
+
+    Returns what has been turned.
+    """
+    groups: dict[tuple[int, bool, str, Look], list[Rectangle]] = {}
     containers = [each for each in pen.axes.containers if isinstance(each, BarContainer)]
+    before: list[tuple[Rectangle, Look]] = []
     for each in containers:
         for bar in each.patches:
-            groups.setdefault((each.orientation == "horizontal", label_of(each), look_of(bar)), []).append(bar)
-    for (flat, label, look), several in groups.items():
+            look = look_of(bar)
+            layer = sum(other != look and _on(bar, under) for under, other in before)
+            groups.setdefault((layer, each.orientation == "horizontal", label_of(each), look), []).append(bar)
+            before.append((bar, look))
+    for (_, flat, label, look), several in sorted(groups.items(), key=lambda group: group[0][0]):
         made = np.array([[b.get_x(), b.get_y(), b.get_width(), b.get_height()] for b in several])
         pen.add(boxes(pen, made, flat, look), label, look)
     return {id(bar) for each in containers for bar in each.patches}
+
+
+def _on(bar: Rectangle, under: Rectangle) -> bool:
+    """Whether two bars have some area in common."""
+    one, other = bar.get_bbox(), under.get_bbox()
+    wide = min(one.xmax, other.xmax) - max(one.xmin, other.xmin)
+    high = min(one.ymax, other.ymax) - max(one.ymin, other.ymin)
+    return bool(wide > 0.0 and high > 0.0)
 
 
 def boxes(pen: Pen, made: Floats, flat: bool, look: Look, edge: str = "") -> dict[str, Any]:

@@ -21,8 +21,10 @@ from microrad.report.interactive_style import (
     pixels,
     symbol_of,
     thin_curve,
+    words,
 )
 
+_UNNAMED = ("_child", "_nolegend_")
 _STEPS = {"default": "linear", "steps": "vh", "steps-pre": "vh", "steps-post": "hv", "steps-mid": "hvh"}
 
 
@@ -62,13 +64,19 @@ def _kept(drawn: Line2D, x: Floats, y: Floats) -> Any:
 def curve(pen: Pen, drawn: Line2D, x: Floats, y: Floats) -> dict[str, Any]:
     """Points joined by a line."""
     style = {**_stroke(drawn), "shape": _STEPS[drawn.get_drawstyle()], "simplify": False}
-    return {**pen.scatter(x, y, "lines"), "line": style, **_outside(drawn)}
+    return {**pen.scatter(x, y, "lines"), "line": style, **_outside(drawn), **quiet_name(drawn)}
 
 
 def markers(pen: Pen, drawn: Line2D, x: Floats, y: Floats) -> dict[str, Any]:
     """Points by themselves."""
     alpha = {} if drawn.get_alpha() is None else {"opacity": drawn.get_alpha()}
     return {**pen.scatter(x, y, "markers"), "marker": {**marker_of(drawn), **alpha}, **_outside(drawn)}
+
+
+def quiet_name(drawn: Line2D) -> dict[str, str]:
+    """The name of a curve that no legend shows: its label behind an underscore, which matplotlib keeps out of them."""
+    label = str(drawn.get_label())
+    return {"name": words(label[1:])} if label.startswith("_") and not label.startswith(_UNNAMED) else {}
 
 
 def _stroke(drawn: Line2D) -> dict[str, Any]:
