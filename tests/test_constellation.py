@@ -275,12 +275,13 @@ def test_the_contact_plan_has_every_session_with_data_in_whole_seconds(plan):
 
 
 def test_the_words_add_up(plan):
-    first, second = constellation_views.sentences(plan)
+    first, second, third = constellation_views.sentences(plan)
     seen = float(np.sum(plan.opportunities.end_s - plan.opportunities.start_s)) / 3600.0
     assert f"12 satellites share 2 relays of one terminal each: in 6 h {len(plan.opportunities.start_s)} conta" in first
     assert f"{seen:.0f} h in all" in first
     assert f"{len(plan.planned)} sessions" in first
     assert all(f"{name} {100 * use:.0f} %" in second for name, use in zip(plan.relays, plan.use, strict=True))
+    assert third.endswith(f" a pointing loss of {plan.loss.loss_db:.2f} dB ({plan.loss.source}).")
     data = constellation_views.data(plan)
     assert sum(s["sessions"] for s in data["satellites"]) == data["sessions"] == len(plan.planned)
     assert sum(s["volume_bit"] for s in data["satellites"]) == pytest.approx(data["volume_bit"])

@@ -17,7 +17,7 @@ from microrad.link_study import UNDER_JITTER
 from microrad.missionfile import load_link
 from microrad.performance import FINE, NO_HYSTERESIS, Cost, LinkPerformance
 from microrad.report import budget_views, link_figures, links
-from microrad.report.quantities import quantity
+from microrad.report.quantities import apart, quantity
 from report_pages import without_scripts
 
 FEW = {"acquisition.runs": 100}
@@ -149,16 +149,30 @@ def test_the_loop_under_vibration_is_named_only_where_it_was_simulated(plain):
     assert "exceeded for 0.3 % of the time, against a beam of 19.7 \u00b5rad half angle" in alone
 
 
+@pytest.mark.parametrize(
+    ("one", "other", "unit", "texts"),
+    [
+        (390e-6, 389.9756e-6, "rad", ("390 µrad", "389.98 µrad")),
+        (390e-6, 389e-6, "rad", ("390 µrad", "389 µrad")),
+        (3.0, 3.0, "dB", ("3.00 dB", "3.00 dB")),
+        (3.0, 2.9996, "dB", ("3.0000 dB", "2.9996 dB")),
+        (1.0, 1.0 + 1e-12, "rad", ("1 rad", "1 rad")),
+    ],
+)
+def test_two_values_have_the_digits_that_tell_them_apart(one, other, unit, texts):
+    assert apart(one, other, unit) == texts
+
+
 # --------------------------------------------------------------------------------------------------------------- fades
 def test_fades_that_no_spectrum_tells_are_not_spoken_of(plain):
     assert links.fades(()) == []
     assert links.fades([case(plain, fades_per_s=math.nan)]) == []
 
 
-def test_fades_rarer_than_one_in_a_year_are_none(plain):
+def test_fades_rarer_than_one_in_a_year_are_not_counted(plain):
     rare = case(plain, fades_per_s=0.99 / YEAR_S)
     assert links.fades([rare]) == [
-        "Fades below the required margin: none in a year, for Gaussian errors of these spectra."
+        "Fades below the required margin: less than one a year, for Gaussian errors of these spectra."
     ]
     once = case(plain, fades_per_s=1.01 / YEAR_S, fade_s=2e-3)
     assert "3.2e-08 a second of 2 ms each" in links.fades([once])[0]
@@ -168,7 +182,7 @@ def test_each_case_has_its_own_fades(plain):
     often = case(plain, controller="PID", fades_per_s=75.66, fade_s=7.512e-3, uncoded_penalty_db=1.234)
     rare = case(plain, controller="", source="jitter as given", fades_per_s=0.0, uncoded_penalty_db=math.nan)
     said = links.fades([often, rare, case(plain, controller="unknown", fades_per_s=math.nan)])
-    assert said[0].endswith(": PID: 75.7 a second of 7.51 ms each; jitter as given: none in a year.")
+    assert said[0].endswith(": PID: 75.7 a second of 7.51 ms each; jitter as given: less than one a year.")
     assert len(said) == 1
 
 
@@ -198,7 +212,7 @@ def test_the_penalty_is_said_with_a_code_and_without_however_rare_the_fades(plai
 def test_a_receiver_that_is_known_has_its_penalty_on_the_page_although_no_fade_is_as_deep(tmp_path):
     found = studied(tmp_path, NO_SCAN, JITTER, received_with("preamplified dpsk"))
     page = budget_views.html(found)
-    assert "none in a year" in page
+    assert "less than one a year" in page
     assert 0.5 < found.under_jitter.uncoded_penalty_db < 2.0
     assert f'<td class="number">{found.under_jitter.uncoded_penalty_db:.2f}</td>' in page
     assert "Penalty, the power that the errors cost: with a code" in page

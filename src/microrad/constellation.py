@@ -26,7 +26,7 @@ class ConstellationPlan:
     """Who is served when. Times in seconds since ``epoch``; satellites and relays count from 0 in the order of names.
 
     ``opportunities`` are all contacts, ``sessions`` those that the relays' terminals take, ``planned`` the same with
-    their names, ranges, rates and volumes. ``by_satellite`` and ``by_relay`` add them up.
+    their names, ranges, rates and volumes, under ``loss``. ``by_satellite`` and ``by_relay`` add them up.
     """
 
     epoch: orbit.Epoch
@@ -37,6 +37,7 @@ class ConstellationPlan:
     opportunities: operations.Opportunities
     sessions: operations.Sessions
     planned: tuple[operations.PlannedSession, ...]
+    loss: PointingLoss
     by_satellite: operations.Totals
     by_relay: operations.Totals
 
@@ -121,6 +122,7 @@ def run(
         opportunities=found,
         sessions=sessions,
         planned=planned,
+        loss=loss,
         by_satellite=operations.totals_by_satellite(sessions, len(own), volumes, pair.span_s),
         by_relay=operations.totals_by_relay(sessions, len(relays), volumes, pair.span_s),
     )

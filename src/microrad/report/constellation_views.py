@@ -30,6 +30,8 @@ def sentences(plan: ConstellationPlan) -> list[str]:
         f"{busy / 3600.0:.0f} h and carry {volume(plan.volume_bit)}.",
         f"A satellite has data for {duration(float(np.min(served)))} to {duration(float(np.max(served)))}, and waits "
         f"{duration(float(np.max(gaps)))} at most. Terminals in use: {used}.",
+        f"In reach is where the link closes at its lowest rate, with a pointing loss of {plan.loss.loss_db:.2f} dB "
+        f"({plan.loss.source}).",
     ]
 
 

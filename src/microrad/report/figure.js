@@ -213,7 +213,7 @@
     });
     drag.setAttribute("aria-pressed", "false");
     add("Reset", "The limits of the printed figure", () => reset(plot, drawn));
-    if (figure.dataset.name) add("Save CSV", "The points that are drawn, as a file", () => save(plot, figure.dataset.name));
+    add("Save CSV", "The points that are drawn, as a file", () => save(plot, figure.dataset.name));
   }
 
   function save(plot, name) {

@@ -304,7 +304,7 @@ def sines(fine: FinePointingStudy, required_rad: float) -> Row:
             }
             for name in dict.fromkeys(s.controller for s in fine.sines)
         ],
-        "sentence": _sine_sentence(fine, required_rad),
+        "sentence": words.tracked(fine, required_rad),
     }
 
 
@@ -317,16 +317,3 @@ def _sine(sine: Sine | None, required_rad: float) -> Row:
         "quantile": words.micro(sine.quantile_rad),
         "mark": "PASS" if met else "FAIL",
     }
-
-
-def _sine_sentence(fine: FinePointingStudy, required_rad: float) -> str:
-    """At which frequencies the requirement is met on the mission's mirror, and by whom."""
-    parts = []
-    for freq in dict.fromkeys(s.freq_hz for s in fine.sines):
-        here = [s for s in fine.sines if s.variant == "given" and s.freq_hz == freq]
-        met = [s.controller for s in here if s.quantile_rad <= required_rad]
-        who = "by all controllers" if len(met) == len(here) else f"by {words.listed(met)}" if met else "by none"
-        least = min(here, key=lambda s: s.quantile_rad)
-        who += "" if met else f" (least: {words.angle(least.quantile_rad)}, {least.controller})"
-        parts.append(f"{freq:g} Hz {who}")
-    return f"On the mission's mirror the requirement is met at {'; at '.join(parts)}." if parts else ""

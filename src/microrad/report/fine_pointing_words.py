@@ -193,12 +193,13 @@ def theory(fine: FinePointingStudy) -> list[str]:
 
 
 def short(fine: FinePointingStudy, m: Mission) -> list[str]:
-    """The verdict in a line each: what is left, what theory leaves to gain, whether the stroke suffices."""
+    """The verdict in a line each: what is left, on a sine too, what theory leaves to gain, whether the stroke does."""
     required, left, r = m.requirement.pointing_error_rad, fine.best.simulated["given"], room(fine)
     lines = [
         f"Fine pointing under vibration and noise: {fine.best.design.name} leaves {angle(left.quantile_rad)} radial at "
         f"{share_of_time(fine.quantile)} ({angle(left.rms_rad)} rms); {given(required)} is allowed."
     ]
+    lines += filter(None, [tracked(fine, required)])
     if r.holds:
         lines.append(
             f"Without hysteresis no linear controller can be more than {percent(r.at_baseline)} better (rms) than the "
@@ -213,6 +214,20 @@ def short(fine: FinePointingStudy, m: Mission) -> list[str]:
             f"either side and has {angle(worst.available_rad)}."
         )
     return lines
+
+
+def tracked(fine: FinePointingStudy, required_rad: float) -> str:
+    """At which of the paper's sines the requirement is met on the mission's mirror, and by whom."""
+    parts = []
+    for freq in dict.fromkeys(s.freq_hz for s in fine.sines):
+        here = [s for s in fine.sines if s.variant == "given" and s.freq_hz == freq]
+        met = [s.controller for s in here if s.quantile_rad <= required_rad]
+        who = "by all controllers" if len(met) == len(here) else f"by {listed(met)}" if met else "by none"
+        least = min(here, key=lambda s: s.quantile_rad)
+        who += "" if met else f" (least: {angle(least.quantile_rad)}, {least.controller})"
+        parts.append(f"{freq:g} Hz {who}")
+    met_at = f"the requirement is met at {'; at '.join(parts)}"
+    return f"While a sine of the paper is tracked on the mission's mirror, {met_at}." if parts else ""
 
 
 # ------------------------------------------------------------------------------------------------ stroke
@@ -287,6 +302,7 @@ def warnings(fine: FinePointingStudy, m: Mission) -> list[str]:
     ]
     found += _stroke_warnings(fine, m)
     found += _bound_warnings(fine)
+    found += _hardware_warnings(m)
     found += _theory_warnings(fine)
     return [f"fine pointing: {text}" for text in found]
 
@@ -294,10 +310,29 @@ def warnings(fine: FinePointingStudy, m: Mission) -> list[str]:
 def _stroke_warnings(fine: FinePointingStudy, m: Mission) -> list[str]:
     return [
         f"the stroke does not cover the worst case on {_output(axis)}: {angle(axis.needed_rad)} needed to either side, "
-        f"{angle(axis.available_rad)} available (root sum square {angle(axis.needed_rss_rad)})"
+        f"{angle(axis.available_rad)} available (root sum square {angle(axis.needed_rss_rad)}); no simulated run has "
+        "the static misalignment, so that they may stay within limits which the worst case exceeds"
         for axis in mission_stroke(fine, m)
         if not axis.fits
     ]
+
+
+def _hardware_warnings(m: Mission) -> list[str]:
+    """Where the paper's sines are tracked by other hardware than that of the fine-pointing loop."""
+    f, c = m.fine_pointing, m.control
+    if f is None:
+        return []
+    loops = [
+        tuple(format_quantity(value, unit, 3) for value, unit in ((rate, "Hz"), (delay, "s"), (bandwidth, "Hz")))
+        for rate, delay, bandwidth in (
+            (f.rate_hz, f.delay_s, f.amplifier_bandwidth_hz),
+            (c.rate_hz, c.delay_s, m.amplifier.bandwidth_hz),
+        )
+    ]
+    if loops[0] == loops[1]:
+        return []
+    own, paper = (f"{rate}, {delay} of delay, an amplifier of {bandwidth}" for rate, delay, bandwidth in loops)
+    return [f"judged at {own}; the residual and the communication margin at {paper}: one does not stand for the other"]
 
 
 def _bound_warnings(fine: FinePointingStudy) -> list[str]:

@@ -194,13 +194,13 @@ def fades(cases: Sequence[Performance]) -> list[str]:
     if not known:
         return []
     if all(c.fades_per_s < RAREST_FADE_HZ for c in known):
-        return ["Fades below the required margin: none in a year, for Gaussian errors of these spectra."]
+        return ["Fades below the required margin: less than one a year, for Gaussian errors of these spectra."]
     said = "; ".join(
         f"{c.controller or c.source}: "
         + (
             f"{c.fades_per_s:.3g} a second of {format_quantity(c.fade_s, 's', 3)} each"
             if c.fades_per_s >= RAREST_FADE_HZ
-            else "none in a year"
+            else "less than one a year"
         )
         for c in known
     )

@@ -144,8 +144,8 @@ def draw_chirp(found: Chirp) -> Figure:
     caption = (
         f"Virtual bench, no laboratory: a chirp of {found.freq_hz[0]:.3g} Hz to {far:.4g} Hz played into Eq. 2 as "
         f"printed, with sensor noise of 3 % and 16-bit converters; a model with {ORDER} poles fitted to the record "
-        f"explains {found.fit_percent:.1f} % of it (the paper: about {CLAIMED_FIT_PERCENT:g} %). Top: output over "
-        "time, whole and close up; bottom: the frequency response that was fitted."
+        f"explains {found.fit_percent:.1f} % of it (the paper: about {CLAIMED_FIT_PERCENT:g} %); the rest is the noise "
+        "that was put in. Top: output over time, whole and close up; bottom: the frequency response that was fitted."
     )
     columns = {
         "time, close up (s)": found.time_s[zoom],
@@ -175,7 +175,7 @@ def draw_loops(found: tuple[Loop, ...]) -> Figure:
     panels = canvas.subplots(1, len(found), sharey=True, squeeze=False)[0]
     for axes, loop, colour in zip(panels, found, _COLOURS, strict=False):
         shown = _points(loop.drive_v, loop.measured_rad)
-        axes.plot(*shown, "o", color=colour, markersize=4.5, markerfacecolor="none", label="measured")
+        axes.plot(*shown, "o", color=colour, markersize=4.5, markerfacecolor="none", label="measured (virtual bench)")
         axes.plot(loop.drive_v, loop.modelled_rad * 1e3, "-", color=BLACK, linewidth=0.9, label="model")
         role = "fitted" if loop.freq_hz == loop.fitted_hz else "predicted"
         axes.set_title(f"{loop.freq_hz:g} Hz, {role}: {loop.error_percent:.2f} % rms", fontsize=8.5, loc="left")

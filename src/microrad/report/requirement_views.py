@@ -9,7 +9,7 @@ from microrad.link.budget import FREE_SPACE_LOSS, POINTING_LOSS
 from microrad.link_study import UNDER_JITTER
 from microrad.performance import FINE, NO_HYSTERESIS
 from microrad.report.fine_pointing_words import percent, source_name
-from microrad.report.quantities import quantity
+from microrad.report.quantities import apart, quantity
 from microrad.study import Study
 from microrad.tracking import residual_rad
 from microrad.verdict import Requirement
@@ -20,17 +20,13 @@ _BY_TEN = ("bit_error_ratio", "outage")  # inputs that a tornado moves by their 
 
 def rows(study: Study) -> list[Row]:
     """Each requirement as text: mark, required, achieved, margin, and its dominant contributor."""
-    return [
-        {
-            "name": r.name,
-            "mark": mark(r),
-            "required": quantity(r.required, r.unit),
-            "achieved": quantity(r.actual, r.unit),
-            "margin": signed(r),
-            "contributor": text,
-        }
-        for r, text in zip(study.requirements, contributors(study), strict=True)
-    ]
+    found = zip(study.requirements, contributors(study), strict=True)
+    return [_row(r, *apart(r.required, r.actual, r.unit), text) for r, text in found]
+
+
+def _row(r: Requirement, required: str, achieved: str, contributor: str) -> Row:
+    texts = {"required": required, "achieved": achieved, "margin": signed(r), "contributor": contributor}
+    return {"name": r.name, "mark": mark(r), **texts}
 
 
 def mark(r: Requirement) -> str:
@@ -117,7 +113,8 @@ def _fine(study: Study, cause: str) -> str:
     sizes |= {d.name: d.added_rad for d in fine.budget.differences}
     own, whole = sizes[cause], fine.budget.full_rad
     share = percent((own / whole) ** 2)
-    return f"{source_name(cause)}: {quantity(own, 'rad')} of {quantity(whole, 'rad')} rms, {share} of the squares"
+    sizes_of = f"{quantity(own, 'rad')} of {quantity(whole, 'rad')} rms with hysteresis"
+    return f"{source_name(cause)}: {sizes_of}, {share} of the squares"
 
 
 def _outage(study: Study, cause: str) -> str:

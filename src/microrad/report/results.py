@@ -19,6 +19,7 @@ from microrad.fine_pointing import COUNTERS, FinePointingStudy, Residual
 from microrad.missionfile import MirrorFile, MissionFile, named_files
 from microrad.report import day_results, words
 from microrad.report.fine_pointing_data import margins, rms_by_source, sources
+from microrad.report.paper_bench import PLAN, SEED
 from microrad.report.variables import coordinate, variable
 from microrad.study import Study
 from microrad.tracking import Run
@@ -272,7 +273,7 @@ def manifest(study: Study, folder: Path) -> dict[str, Any]:
     """What made the results, with the numbers of the summary and a hash of each file written so far.
 
     The mission's text and hash, those of the files that it names, and versions. Random numbers are drawn for the
-    fine-pointing loop, for acquisition and for the day, from the mission's seeds.
+    fine-pointing loop, for acquisition and for the day, from the mission's seeds, and for Fig. 4 and 5.
     """
     mirror, m = study.file.mirror_file, study.file.mission
     drawn = [
@@ -284,6 +285,7 @@ def manifest(study: Study, folder: Path) -> dict[str, Any]:
         )
         if table is not None
     ]
+    drawn += [f"seed {SEED} of the virtual bench, {PLAN}"] if study.scan is not None else []
     return {
         "mission": _text_file(study.file),
         "inputs_sha256": {name: _sha256(study.file.path.parent / name) for name in named_files(m)},

@@ -15,7 +15,7 @@ from microrad.report import (
     fine_pointing_words,
 )
 from microrad.report.fine_pointing_data import data as fine_pointing_data
-from microrad.report.quantities import quantity
+from microrad.report.quantities import apart, quantity
 from microrad.study import Study
 from microrad.tracking import Run, residual_rad
 from microrad.units import format_quantity
@@ -117,7 +117,8 @@ def verdict_text(study: Study) -> str:
     lines = [headline(study), *explanation(study), ""]
     for r in study.requirements:
         mark = "PASS" if r.met else "FAIL"
-        lines.append(f"{mark}  {r.name}: {quantity(r.actual, r.unit)} (required {quantity(r.required, r.unit)})")
+        actual, required = apart(r.actual, r.required, r.unit)
+        lines.append(f"{mark}  {r.name}: {actual} (required {required})")
     return "\n".join(lines)
 
 
