@@ -349,8 +349,6 @@ def test_the_verdict_says_it_in_six_lines(plain, fine):
     assert "10 µrad is allowed" in added[0]
     assert added[1] == words.tracked(fine, 10e-6)
     assert added[1].startswith("While a sine of the paper is tracked on the mission's mirror, the requirement is met")
-        "While a sine of the paper is tracked on the mission's mirror, the requirement is met at 1"
-    )
     del added[1]
     assert "better (rms) than the best PI of the gain grid" in added[1]
     assert "axis x needs 623 µrad to either side and has 534 µrad" in added[2]
