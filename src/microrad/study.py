@@ -20,6 +20,7 @@ from microrad import (
     paper,
     performance,
     pointing,
+    readings,
     simulate,
     tracking,
     verdict,
@@ -60,6 +61,7 @@ class Comparison:
 class Study:
     """Everything that a report shows, computed. ``achieved`` is the communication budget at the simulated residual.
 
+    ``other_readings`` are the verdict's numbers by other readings of what the paper leaves open.
     ``links`` holds what follows from the links' tables alone, ``performance`` what the simulated residuals cost them.
     ``day`` is what the link delivers under the best of those residuals, ``contact`` one of its contacts in time, and
     ``plan`` that of a constellation; each is None where the mission lacks a table for it.
@@ -75,6 +77,7 @@ class Study:
     runs: tuple[tracking.Run, ...]
     residual: tracking.Run
     comparison: Comparison | None
+    other_readings: tuple[readings.Reading, ...]
     scan: paper.Scan | None
     fine_pointing: fine_pointing.FinePointingStudy | None
     performance: performance.LinkPerformance
@@ -133,6 +136,7 @@ def run(file: MissionFile, on_progress: Progress = lambda done, total, what: Non
     left_rad = tracking.residual_rad(m, residual.trace)
     simulated = f"simulated: {residual.trace.name}, {m.requirement.residual_statistic} ({m.conventions.residual})"
     achieved = link.communication_budget(m, sources, pointing_error_rad=left_rad, given_source=simulated)
+    as_read = readings.others(m, residual)
 
     on_progress(2, 4, "claims of the paper")
     scan = paper.scan(m, on_progress) if paper.applies(m) else None
@@ -157,6 +161,7 @@ def run(file: MissionFile, on_progress: Progress = lambda done, total, what: Non
         runs=runs,
         residual=residual,
         comparison=compare(file, runs),
+        other_readings=as_read,
         scan=scan,
         fine_pointing=fine,
         performance=found,

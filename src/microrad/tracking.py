@@ -10,6 +10,9 @@ from microrad.mirror_table import Comparison
 from microrad.mirror_table import Mirror as MirrorTable
 from microrad.mission import Mission
 
+VARIANTS = ("given", "no hysteresis", "comparison")
+"""The mission's mirror, the same with a gain in place of its hysteresis, and its comparison model."""
+
 Model = hysteresis.BoucWen | hysteresis.Play
 
 
@@ -69,8 +72,8 @@ def loop_margins(m: Mission) -> control.Margins:
     return simulate.margins(mirror.from_mission(m.mirror, model, times=_times(m)), setup)
 
 
-def tracking_runs(m: Mission) -> tuple[Run, ...]:
-    """Fig. 6 and 8: the sines of the scenario under PID and PID + inverse, on each variant of the mirror.
+def tracking_runs(m: Mission, variants: tuple[str, ...] = VARIANTS) -> tuple[Run, ...]:
+    """Fig. 6 and 8: the sines of the scenario under PID and PID + inverse, on variants of the mirror that it has.
 
     Raises ValueError when the mirror has no inverse.
     """
@@ -81,7 +84,7 @@ def tracking_runs(m: Mission) -> tuple[Run, ...]:
     if m.mirror.comparison is not None:
         models["comparison"] = mirror_model(m, m.mirror.comparison)
     runs = []
-    for which, variant in models.items():
+    for which, variant in ((name, models[name]) for name in models if name in variants):
         plant = mirror.from_mission(m.mirror, variant, times=_times(m))
         controllers = {"PID": control.no_feedforward(plant), "PID + inverse": control.inverse(plant)}
         for controller, f in _cases(m):

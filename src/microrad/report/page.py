@@ -97,6 +97,7 @@ def render(study: Study, drawn: Drawn, manifest: Mapping[str, Any]) -> str:
         "explanation": words.explanation(study),
         "warnings": words.warnings(study),
         "requirements": requirement_views.rows(study),
+        "other_readings": requirement_views.readings(study),
         "chain_wide": chain.layout(boxes, 4, 960.0, 26.0),
         "chain_narrow": chain.layout(boxes, 1, 340.0, 24.0),
         "chain_words": chain.alternative(boxes),

@@ -8,6 +8,7 @@ from microrad import link
 from microrad.link.budget import FREE_SPACE_LOSS, POINTING_LOSS
 from microrad.link_study import UNDER_JITTER
 from microrad.performance import FINE, NO_HYSTERESIS
+from microrad.readings import Reading
 from microrad.report.fine_pointing_words import percent, source_name
 from microrad.report.quantities import apart, quantity
 from microrad.study import Study
@@ -27,6 +28,25 @@ def rows(study: Study) -> list[Row]:
 def _row(r: Requirement, required: str, achieved: str, contributor: str) -> Row:
     texts = {"required": required, "achieved": achieved, "margin": signed(r), "contributor": contributor}
     return {"name": r.name, "mark": mark(r), **texts}
+
+
+def readings(study: Study) -> list[Row]:
+    """The numbers that rest on the residual by each other reading, as text; first as the mission has them."""
+    m = study.file.mission
+    left, margin = residual_rad(m, study.residual.trace), study.achieved.margin_db
+    own = Reading("as it stands", "", "", left, margin)
+    return [
+        {
+            "key": r.key,
+            "given": r.given,
+            "other": r.other,
+            "residual": r.failure or quantity(r.residual_rad, "rad"),
+            "margin": "" if r.failure else quantity(r.margin_db, "dB"),
+            "closes": "" if r.failure else "yes" if r.closes else "no",
+            "mark": "" if r.failure else "PASS" if r.meets(m) else "FAIL",
+        }
+        for r in (own, *study.other_readings)
+    ]
 
 
 def mark(r: Requirement) -> str:

@@ -60,6 +60,7 @@ def explanation(study: Study) -> list[str]:
             f"On the mission's comparison model of the mirror the residual is {format_quantity(left, 'rad', 3)} and "
             f"the margin {study.comparison.margin_db:+.2f} dB."
         )
+    sentences += read_otherwise(study)
     if study.fine_pointing is not None:
         sentences += fine_pointing_words.short(study.fine_pointing, m)
     sentences += filter(None, (hysteresis_cost(study), found(study)))
@@ -67,6 +68,19 @@ def explanation(study: Study) -> list[str]:
         day = study.day
         sentences += [*day_words.headline(day), *day_words.latency_words(day), *day_words.assumption_words(day)[:1]]
     return sentences
+
+
+def read_otherwise(study: Study) -> list[str]:
+    """Which readings of what the paper leaves open, each changed alone, would turn the communication link's verdict."""
+    closes = study.achieved.margin_db >= 0.0
+    run = [r for r in study.other_readings if not r.failure]
+    turned = [f"{r.key} = {r.other} ({quantity(r.margin_db, 'dB')})" for r in run if r.closes != closes]
+    if not run:
+        return []
+    if not turned:
+        return [f"None of {len(run)} other readings, each changed alone, changes whether that link closes."]
+    would = "would not close" if closes else "would close"
+    return [f"By another reading, one changed alone, that link {would}: {', '.join(turned)}."]
 
 
 def hysteresis_cost(study: Study) -> str:
@@ -243,6 +257,17 @@ def summary(study: Study) -> dict[str, Any]:
         ],
         "paper": [
             {"where": c.where, "claim": c.claim, "ours": c.ours, "agrees": c.agrees, "why": c.why} for c in study.claims
+        ],
+        "other_readings": [
+            {
+                "key": r.key,
+                "given": r.given,
+                "other": r.other,
+                "residual_rad": r.residual_rad,
+                "margin_db": r.margin_db,
+                "failure": r.failure,
+            }
+            for r in study.other_readings
         ],
         "links": budget_views.data(study.links),
         "performance": [budget_views.performance_data(each) for each in study.performance.cases],

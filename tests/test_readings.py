@@ -1,0 +1,74 @@
+"""The verdict by other readings: each against the mission that is written so."""
+
+import math
+
+import numpy as np
+import pytest
+
+from microrad import link, readings, report, tracking
+from microrad.report import requirement_views, words
+from shipped import edited, plain_study
+
+
+@pytest.fixture(scope="module")
+def found():
+    return {(r.key, r.other): r for r in plain_study().other_readings}
+
+
+def test_every_reading_that_fits_is_there_once(found):
+    assert list(found) == [
+        ("conventions.residual", "radial"),
+        ("conventions.pointing_loss", "gain"),  # and "pattern" for a mission that gives a beam
+        ("conventions.strehl", "ratio"),
+        ("conventions.mirror_angle", "optical"),
+        ("conventions.mirror_angle", "mechanical"),
+        ("requirement.residual_statistic", "rms"),
+        ("mirror.composition", "additive"),  # and "static" without a linear part
+    ]
+    assert "/".join(dict.fromkeys(r.given for r in found.values())) == (
+        "per-axis/gaussian/decibel/line-of-sight/peak/cascade"
+    )
+
+
+@pytest.mark.parametrize(
+    ("key", "change"),
+    [
+        (("conventions.residual", "radial"), ('residual = "per-axis"', 'residual = "radial"')),
+        (("conventions.strehl", "ratio"), ('strehl = "decibel"', 'strehl = "ratio"')),
+        (("requirement.residual_statistic", "rms"), ('statistic = "peak"', 'statistic = "rms"')),
+        (("conventions.mirror_angle", "mechanical"), ('angle = "line-of-sight"', 'angle = "mechanical"')),
+        (("mirror.composition", "additive"), ('composition = "cascade"', 'composition = "additive"')),
+    ],
+)
+def test_a_reading_is_the_mission_written_so(tmp_path, found, key, change):
+    m = edited(tmp_path, change)
+    run = tracking.worst(m, tracking.tracking_runs(m, ("given",)))
+    left = tracking.residual_rad(m, run.trace)
+    assert found[key].residual_rad == pytest.approx(left, rel=1e-12)
+    assert found[key].margin_db == pytest.approx(float(link.margin_of_error(m, np.array([left]))[0]), abs=1e-9)
+
+
+def test_the_page_and_the_verdict_say_which_of_them_turn_it(found):
+    study = plain_study()
+    (said,) = words.read_otherwise(study)
+    turned = [f"{key} = {other}" for (key, other), r in found.items() if r.margin_db < 0.0]
+    assert study.achieved.margin_db > 0.0 and len(turned) == 5
+    assert all(each in said for each in turned) and "optical" not in said
+    assert said in report.verdict_text(study)
+    rows = {(r["key"], r["other"]): r for r in requirement_views.readings(study)}
+    assert rows["as it stands", ""]["closes"] == "yes" and rows["as it stands", ""]["mark"] == "FAIL"
+    assert rows["mirror.composition", "additive"]["closes"] == "no"
+    assert rows["requirement.residual_statistic", "rms"]["mark"] == "PASS"
+
+
+def test_a_loop_that_cannot_be_run_so_says_why(monkeypatch):
+    study = plain_study()
+
+    def unstable(*given):
+        raise ValueError("the loop is unstable")
+
+    monkeypatch.setattr(readings.tracking, "tracking_runs", unstable)
+    made = {(r.key, r.other): r for r in readings.others(study.file.mission, study.residual)}
+    failed = made["mirror.composition", "additive"]
+    assert failed.failure == "the loop is unstable" and math.isnan(failed.residual_rad) and not failed.closes
+    assert made["conventions.residual", "radial"].failure == ""
