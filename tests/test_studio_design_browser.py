@@ -152,12 +152,15 @@ def test_a_wrong_unit_is_told_beside_its_field_and_the_last_map_stays(studio, li
 
 
 def test_a_page_that_is_opened_on_a_faulty_mission_promises_nothing_in_grey(studio, links, context):
+    links.get_by_text("The links close: ").wait_for()
     typed(links, APERTURE).fill("5 W")
     typed(links, APERTURE).press("Enter")
     until(links, lambda: 'leo_aperture = "5 W"' in written(studio))
     opened_now = studio.enter(context, "link")
     opened_now.get_by_text("Nothing can be shown before the mission is corrected.").wait_for()
     assert opened_now.get_by_text("Shown in grey").count() == 0
+    opened_now.get_by_text("Of the mission before this:").wait_for()
+    assert opened_now.locator(".behind").get_by_text("The links close: ").is_visible()
     opened_now.close()
     check_quiet(opened_now, studio.base)
     typed(links, APERTURE).fill("5 cm")
@@ -208,7 +211,8 @@ def test_a_day_that_is_shown_beside_a_fault_says_that_it_is_the_one_before(opene
     typed(links, APERTURE).fill("5 W")
     typed(links, APERTURE).press("Enter")
     page.get_by_text("The day of the mission before this.").wait_for()
-    assert page.get_by_text("In 24 h the relay is in view 15 times").is_visible()
+    assert page.locator(".behind").get_by_text("In 24 h the relay is in view 15 times").is_visible()
     typed(links, APERTURE).fill("5 cm")
     typed(links, APERTURE).press("Enter")
     page.get_by_text("The day of the mission as it stands.").wait_for()
+    page.locator(".behind").wait_for(state="detached")

@@ -76,7 +76,7 @@ class Reply:
 
 
 def guard(app, **kwargs):
-    names = address.hosts(PORT)
+    names = address.hosts(PORT, ("127.0.0.1", "localhost", "[::1]"))
     return Guard(app, names, address.origins(names), TOKEN, kwargs.pop("limits", LIMITS), **kwargs)
 
 

@@ -161,6 +161,13 @@ def test_steps_with_names_of_their_own_have_no_rate(tmp_path):
     assert (found.done, found.total, found.what, found.rate_1_s) == (2, 4, "the day", None)
 
 
+@pytest.mark.parametrize("wrong", [{"total": 10**400}, {"done": -1}, {"at": 1e999}])
+def test_progress_that_nothing_counts_to_is_not_believed(tmp_path, wrong):
+    good = {"at": 1.0, "done": 1, "total": 2, "what": "x"}
+    (tmp_path / jobs_files.PROGRESS).write_text(f"{json.dumps(good)}\n{json.dumps(good | wrong)}\n", "utf-8")
+    assert jobs_files.read_progress(tmp_path) == jobs_files.Progress(1, 2, "x", None)
+
+
 def test_a_line_of_progress_that_is_being_written_is_not_read(tmp_path):
     assert progress_of(tmp_path, (1.0, 3, 10, "x"), more='\n{"at": 2.0, "do').done == 3
     assert progress_of(tmp_path, more='{"at": 2.0, "do') is None

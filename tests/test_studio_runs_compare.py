@@ -119,6 +119,7 @@ def test_campaign_files_are_told_from_missions(workshop):
     path = runs_view.write_campaign(workshop)
     (workshop.folder / "broken.toml").write_text("mission = [", "utf-8")
     (workshop.folder / "binary.toml").write_bytes(b"\xff\x00")
+    (workshop.folder / "deep.toml").write_text("a." * 200_000 + "b = 1", "utf-8")  # minutes for a parser
     assert runs_view.campaign_files(workshop) == ("campaign.toml",)
     assert path.name == "campaign.toml"
     assert runs_view.write_campaign(workshop).name == "campaign-2.toml"

@@ -200,7 +200,7 @@ def test_a_free_port_is_taken_on_this_machine_alone():
     with closing(entrance.listener):
         host, port = entrance.listener.getsockname()
         assert host == "127.0.0.1"
-        assert entrance.names == (f"127.0.0.1:{port}", f"localhost:{port}", f"[::1]:{port}")
+        assert entrance.names == (f"127.0.0.1:{port}",)  # another program may have that port of [::1], and localhost
         assert entrance.url == f"http://127.0.0.1:{port}/?token={entrance.token}"
         assert len(entrance.token) >= 32
         again = server.listen()

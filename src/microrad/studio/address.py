@@ -9,7 +9,7 @@ from typing import Any
 MESSAGE_BYTES = 1_000_000
 """Largest message to the server, by WebSocket or in a plain request; NiceGUI's pages send no larger one."""
 
-_LOOPBACK = ("127.0.0.1", "localhost", "[::1]")
+_LOOPBACK = ("127.0.0.1",)  # not localhost: a browser may find another program there, on [::1]
 _NAME = re.compile(r"[A-Za-z0-9.-]{1,253}|\[[0-9A-Fa-f:.]{2,45}\]")
 _SHOWN = 120
 
@@ -47,7 +47,7 @@ def hosts(port: int, names: tuple[str, ...] = _LOOPBACK) -> tuple[str, ...]:
     wrong = [name for name in names if not _NAME.fullmatch(name)]
     if wrong or not names:
         raise ExposureError(
-            f"'{', '.join(wrong)[:_SHOWN]}' is no name of a host; give names such as localhost, without http:// or port"
+            f"'{', '.join(wrong)[:_SHOWN]}' is no name of a host; give names such as 127.0.0.1, without http:// or port"
         )
     return tuple(name.lower() if port == 80 else f"{name.lower()}:{port}" for name in names)
 

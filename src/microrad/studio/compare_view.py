@@ -14,6 +14,7 @@ from microrad.folder import MANIFEST
 from microrad.report.quantities import quantity
 from microrad.studio.draft import Draft, Value
 from microrad.studio.draft_keys import value_of
+from microrad.studio.link_view import ROUNDING_DB
 from microrad.studio.workshop import Workshop
 from microrad.units import UnitError, parse_quantity
 
@@ -125,7 +126,7 @@ def link_numbers(draft: Draft) -> tuple[Number, ...]:
     found = []
     for budget in study.budgets:
         least = required if budget is study.communication else 0.0
-        met = budget.margin_db >= least - 1e-9
+        met = budget.margin_db >= least - ROUNDING_DB
         found.append(Number(f"{budget.name}: margin", budget.margin_db, "dB", quantity(least, "dB"), met))
         found.append(Number(f"{budget.name}: received power", budget.received_power_w, "W"))
     rate = study.file.mission.communication.data_rate_bit_s

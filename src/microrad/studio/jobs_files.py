@@ -11,6 +11,7 @@ a folder of jobs is followed.
 from __future__ import annotations
 
 import json
+import math
 import re
 import sqlite3
 import stat
@@ -40,6 +41,7 @@ _TAIL_BYTES = 64_000
 _OUTPUT_BYTES = 200_000
 _RATE_S = 60.0  # of the past that the rate is taken over
 _FEW = 20
+_MOST_STEPS = 10**15  # whole numbers beyond are none that a program counts to
 
 
 class JobError(ValueError):
@@ -187,7 +189,7 @@ def _words(folder: Path, state: State, code: int | None) -> str:
     if state == "lost" and not (folder / STARTED).exists():
         return "its folder was moved or copied before it was started, so it is not started here; start it anew"
     if state == "lost":
-        return "its process is gone without an exit code: the machine went down, or the process was killed"
+        return "its process is gone without an exit code: the machine went down, it was killed, or the disk is full"
     if state != "failed":
         return ""
     said = [line for line in output(folder, STDERR).splitlines() if line.strip()]
@@ -218,7 +220,9 @@ def read_progress(folder: Path) -> Progress | None:
 def _progress(line: str) -> tuple[float, int, int, str] | None:
     try:
         note = json.loads(line)
-        return float(note["at"]), int(note["done"]), int(note["total"]), str(note["what"])
+        at, done, total = float(note["at"]), int(note["done"]), int(note["total"])
+        sound = math.isfinite(at) and 0 <= done < _MOST_STEPS and 0 <= total < _MOST_STEPS
+        return (at, done, total, str(note["what"])) if sound else None
     except (ValueError, LookupError, TypeError, OverflowError, RecursionError):
         return None  # the first line may be cut, and the last is being written
 

@@ -193,7 +193,8 @@ def main() -> None:
     if hasattr(os, "nice"):
         os.nice(_NICENESS)
     folder, at_once = Path(sys.argv[1]), int(sys.argv[2])
-    run_job(folder)
+    with suppress(OSError):  # of a full disk: this job is lost, the next may find room
+        run_job(folder)
     start_waiting(folder.parent, at_once)
 
 

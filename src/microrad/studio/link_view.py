@@ -37,6 +37,8 @@ TABLES = {
 RATES, ERRORS, EDGES = 65, 61, 385
 """Points of the map along data rate and pointing error, and of the rates between which its contours are read."""
 
+ROUNDING_DB = 1e-9
+"""By which a margin may miss what is needed: a rate that was solved for that margin does."""
 LEVELS_DB = (-12.0, 18.0)
 """Between which margins the map's colours change."""
 
@@ -67,8 +69,8 @@ class Margin:
 
     @property
     def met(self) -> bool:
-        """Whether the margin is at least what is needed."""
-        return self.margin_db >= self.required_db
+        """Whether the margin is at least what is needed, but for rounding: a rate may be solved for that margin."""
+        return self.margin_db >= self.required_db - ROUNDING_DB
 
     @property
     def words(self) -> str:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from microrad import link_study, pointing
+from microrad.link import DEEPEST_DB
 from microrad.link_study import PointAheadEffect
 from microrad.missionfile import LinkFile
 from microrad.pointing import OpenLoopPointing
@@ -137,7 +138,7 @@ def ahead_rows(v: PointingView) -> list[Row]:
     if a is None:
         return []
     left_out = "left out, it would cost" if a.corrected else "not corrected, it costs"
-    most = "more than 100 dB" if not a.loss_db <= 100.0 else f"{a.loss_db:.2f} dB"
+    most = f"more than {DEEPEST_DB:g} dB" if not a.loss_db <= DEEPEST_DB else f"{a.loss_db:.2f} dB"
     cells = (
         ("point-ahead angle, largest", quantity(a.angle_rad, "rad")),
         ("in half angles of the communication beam", f"{a.beam_half_angles:.2f}"),

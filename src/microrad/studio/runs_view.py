@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import json
-import tomllib
 from collections.abc import Callable, Iterable
 from contextlib import suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from functools import lru_cache
 from importlib import resources
 from pathlib import Path
 
-from microrad.document import MAX_BYTES
+from microrad.document import MAX_BYTES, scan
 from microrad.folder import write_whole
 from microrad.studio.commands import Action
 from microrad.studio.commands_pieces import path_argument
@@ -85,15 +85,22 @@ def _unfinished(workshop: Workshop) -> Iterable[Job]:
 
 def campaign_files(workshop: Workshop) -> tuple[str, ...]:
     """The campaign files of the working folder: those that name a mission."""
-    return tuple(path.name for path in workshop.missions() if isinstance(_top(path).get("mission"), str))
+    return tuple(path.name for path in workshop.missions() if _names_a_mission(path))
 
 
-def _top(path: Path) -> dict[str, object]:
-    """What a TOML file holds; nothing where it cannot be read."""
-    with suppress(OSError, ValueError, RecursionError):
-        if path.stat().st_size <= MAX_BYTES:
-            return tomllib.loads(path.read_text("utf-8"))
-    return {}
+def _names_a_mission(path: Path) -> bool:
+    with suppress(OSError):
+        about = path.stat()
+        return about.st_size <= MAX_BYTES and _of_campaign(path, about.st_mtime_ns, about.st_size)
+    return False
+
+
+@lru_cache(maxsize=256)
+def _of_campaign(path: Path, changed_ns: int, size: int) -> bool:
+    """Whether a file, as it was changed last, names a mission. It is not parsed: a parser may take minutes for it."""
+    with suppress(OSError, ValueError):
+        return any(s.key == "mission" and s.value[:1] in ("'", '"') for s in scan(path.read_text("utf-8")))
+    return False
 
 
 def ledgers(workshop: Workshop) -> tuple[str, ...]:

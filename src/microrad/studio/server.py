@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import json
+import logging
 import os
+import secrets
 import signal
 import socket
+import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
@@ -163,10 +166,16 @@ def serve(workshop: Workshop, entrance: Entrance, on_ready: Callable[[], None]) 
     guarded = application(workshop, entrance)
     settings = address.server_settings()
     config = uvicorn.Config(guarded, log_level="warning", timeout_graceful_shutdown=_GRACE_S, **settings)
+    logging.getLogger("uvicorn.error").addFilter(_is_news)
     try:
         _server(config, on_ready).run(sockets=[entrance.listener])
     finally:
         (workshop.studio / _WAY_IN).unlink(missing_ok=True)
+
+
+def _is_news(record: logging.LogRecord) -> bool:
+    """Whether a message is one for the terminal: a WebSocket that was refused is none, and any site can try one."""
+    return "without completing handshake" not in record.getMessage()
 
 
 def _server(config: uvicorn.Config, on_ready: Callable[[], None]) -> uvicorn.Server:
@@ -212,7 +221,8 @@ def way_in(studio: Path, url: str) -> str:
 
 def application(workshop: Workshop, entrance: Entrance) -> Guard:
     """The pages of a workshop behind the guard."""
-    os.environ["NICEGUI_STORAGE_PATH"] = str(workshop.studio / "nicegui")  # read when NiceGUI is loaded
+    # Read when NiceGUI is loaded: nobody can have put a file there, and the studio keeps nothing in it.
+    os.environ["NICEGUI_STORAGE_PATH"] = str(Path(tempfile.gettempdir()) / f"microrad-{secrets.token_hex(16)}")
     from fastapi import FastAPI
     from nicegui import ui
     from nicegui.client import templates

@@ -13,13 +13,16 @@ from microrad import presets
 from microrad.studio import commands, compare_view
 from microrad.studio.compare_view import Beside, Found, Number
 from microrad.studio.draft import Draft
-from microrad.studio.pages import layout
+from microrad.studio.pages import layout, pieces
+from microrad.studio.runs_view import campaign_files
 from microrad.studio.workshop import Workshop
 
 TITLE = "Compare"
 PATH = "/compare"
 
-_PAPER, _SAVED = "paper's mission", "saved file of this mission"
+_PAPER, _SAVED = "the paper's mission", "saved file of this mission"
+_PRESET = "the preset "
+"""What missions that are no files of the folder are called in it: by no name that a file could have."""
 
 
 def page(workshop: Workshop) -> None:
@@ -42,6 +45,7 @@ class _Page:
     def __init__(self, workshop: Workshop) -> None:
         self.workshop = workshop
         self.asked = 0
+        self.shown: str | None = None
         with ui.row().classes("compare-choice"):
             self.choice = ui.select(self._options(), label="Compare with", on_change=self._chosen)
             self.choice.props("outlined dense").classes("compare-select")
@@ -57,14 +61,23 @@ class _Page:
         draft, found = self.workshop.draft, {}
         if draft.path.exists() and draft.changed:
             found[_SAVED] = f"{self.workshop.name_of(draft.path)} as it is saved"
-        files = (path.name for path in self.workshop.missions() if path != draft.path)
-        found |= {f"file {name}": name for name in files} | {_PAPER: "the paper's mission"}
-        return found | {f"preset {each.name}": f"{each.name}: {each.title}" for each in presets.presets()}
+        campaigns = campaign_files(self.workshop)
+        files = (path.name for path in self.workshop.missions() if path != draft.path and path.name not in campaigns)
+        found |= {f"file {name}": name for name in files} | {_PAPER: _PAPER}
+        return found | {_PRESET + each.name: f"{each.name}: {each.title}" for each in presets.presets()}
+
+    def _compared(self) -> str | None:
+        """The option that the other mission is."""
+        other = self.workshop.other
+        if other is None:
+            return None
+        name = self.workshop.name_of(other.path)
+        return _SAVED if other.path == self.workshop.draft.path else name if name.startswith("the ") else f"file {name}"
 
     def _chosen(self, event: Any) -> None:
-        if not event.value:
+        if not event.value or event.value == self.shown:
             return
-        self.fault.text = ""
+        self.shown, self.fault.text = event.value, ""
         try:
             self.workshop.other = self._draft(event.value)
         except (ValueError, OSError) as error:
@@ -73,11 +86,10 @@ class _Page:
     def _draft(self, name: str) -> Draft:
         if name == _SAVED:
             return Draft.open(self.workshop.draft.path)
-        kind, _, rest = name.partition(" ")
-        if kind == "file":
-            return Draft.open(self.workshop.inside(rest))
-        paper = Draft.shipped(self.workshop.inside("leo-geo.toml" if name == _PAPER else f"{rest}.toml"))
-        return paper if name == _PAPER else paper.with_text(presets.preset_text(rest))
+        if name.startswith("file "):
+            return Draft.open(self.workshop.inside(name.removeprefix("file ")))
+        paper = Draft.shipped(self.workshop.folder / name)
+        return paper if name == _PAPER else paper.with_text(presets.preset_text(name.removeprefix(_PRESET)))
 
     def _action(self, other: bool) -> commands.Budget | None:
         draft = self.workshop.other if other else self.workshop.draft
@@ -87,13 +99,17 @@ class _Page:
         if not draft.path.exists():
             layout.refuse(f"{self.workshop.name_of(draft.path)} is not a file of this folder yet; save it there first.")
             return None
-        return commands.Budget(Path(self.workshop.name_of(draft.path)))
+        return commands.Budget(Path(self.workshop.name_of(draft.path)) if other else pieces.file_of(self.workshop))
 
     # ------------------------------------------------------------------------------------------------------- the tables
     def _look(self) -> None:
         options = self._options()
         if options != self.choice.options:
             self.choice.set_options(options, value=self.choice.value if self.choice.value in options else None)
+        compared = self._compared()
+        if self.choice.value is None and compared in options:
+            self.shown = compared
+            self.choice.value = compared
         self.asked += 1
         ui.timer(0.0, partial(self._show, self.asked), once=True)
 

@@ -73,6 +73,9 @@ class DayPage:
 
     def _results(self) -> None:
         self.words = ui.column()
+        ui.label(
+            "A study of a whole mission takes the pointing loss that its loop leaves in place of this one."
+        ).classes("soft")
         layout.heading("Contacts over time")
         self.timeline = plot("Contacts and eclipses over time; in numbers in the table of contacts")
         layout.heading("Over the Earth")
@@ -120,7 +123,7 @@ class DayPage:
         self.bar.visible = self.cancel.visible = state.running
         self.again.visible = not state.running and state.result is None and not self.faults.visible
         self.bar.value = state.done / state.total if state.total else 0.0
-        self.results.classes(**{"add" if state.result is None else "remove": "behind"})
+        self.results.classes(**{"remove" if now and state.result else "add": "behind"})
 
     def _show(self, day: DayStudy, drawn: Drawn) -> None:
         self.words.clear()

@@ -24,7 +24,6 @@ CSS = """
 .dial-column { position: sticky; top: 6.2rem; max-height: calc(100vh - 7rem); overflow-y: auto;
                padding-bottom: 3.5rem; }
 @media (max-width: 1000px) { .beside { grid-template-columns: 17.5rem minmax(0, 1fr); } }
-.behind { opacity: .45; }
 .faults { background: #fff4ee; border-left: 4px solid #a63c00; padding: .4rem .7rem; width: 100%; color: #7a2c00; }
 .wide-table { width: 100%; } .wide-table td { white-space: normal !important; vertical-align: top; }
 .wide-table td.text-no-wrap { white-space: nowrap !important; } .wide-table tr.total td { font-weight: 600; }

@@ -118,8 +118,13 @@ class LinkPage(DialPage[LinkView]):
         """Have the study of the links made once a draft rests, and show it once it is there."""
         self._ask_study()
         state = self.study.state
-        self.state.text = "Computing acquisition and what moves the margins ..." if state.running else state.error
+        now = state.key == self.workshop.draft.sha256 and state.result is not None
+        before = "" if now or self.shown == "" else "Of the mission before this:"
+        computing = "Computing acquisition and what moves the margins ..." if state.running else ""
+        self.state.text = computing or state.error or before
         self.state.visible = bool(self.state.text)
+        for part in (self.sentences, self.tornado):
+            part.classes(**{"remove" if now else "add": "behind"})
         if state.result is None or state.key == self.shown:
             return
         self.shown = state.key

@@ -48,7 +48,7 @@ def columns(of: Sequence[Column]) -> list[dict[str, Any]]:
 
 
 def file_of(workshop: Workshop) -> Path:
-    """The mission's file, seen from the working folder; says so where it lacks what is shown."""
+    """The mission's file, seen from the working folder, for a command to be copied; says so where it is not saved."""
     if workshop.draft.changed:
         ui.notify("The command reads the file: save the mission first, for the same numbers.", type="warning")
     return Path(workshop.name_of(workshop.draft.path))

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 from nicegui import run, ui
 
 from microrad.studio import commands
 from microrad.studio.names import NameRefusedError, safe_name
-from microrad.studio.pages import layout
+from microrad.studio.pages import layout, pieces
 from microrad.studio.pages.runs_jobs import JobList, submit
 from microrad.studio.runs_view import campaign_files, free_name, ledgers, write_campaign
 from microrad.studio.workshop import Workshop
@@ -42,7 +43,7 @@ class _Study:
             self.folder = ui.input("Folder for the results").props("dense outlined").classes("runs-name")
             with ui.row().classes("runs-go"):
                 self.button = ui.button("Run the study", on_click=self._run).props("no-caps")
-                layout.copy_buttons(self._action)
+                layout.copy_buttons(self._copied)
             self.fault = ui.label().classes("no kept").props('role="alert"')
         layout.follow(workshop, self._look)
         ui.timer(0.0, self._name, once=True)
@@ -61,12 +62,17 @@ class _Study:
         if self.folder.value == before:
             self.folder.value = name
 
+    def _copied(self) -> commands.Run | None:
+        action = self._action()
+        return None if action is None else replace(action, file=pieces.file_of(self.workshop))
+
     def _action(self) -> commands.Run | None:
         try:
             name = safe_name(self.folder.value or "")
         except NameRefusedError as error:
             self.fault.text = layout.name_words(error)
             return None
+        self.fault.text = self.workshop.faults()
         return commands.Run(Path(self.workshop.name_of(self.workshop.draft.path)), Path(name))
 
     async def _run(self) -> None:
@@ -124,6 +130,7 @@ class _Campaign:
         except NameRefusedError as error:
             self.fault.text = layout.name_words(error)
             return None
+        self.fault.text = ""
         if not chosen:
             self.fault.text = "There is no campaign file in this folder yet; write an example, and change it."
             return None
