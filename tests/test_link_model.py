@@ -301,7 +301,9 @@ def test_terms_left_at_zero_are_said_in_one_warning(read):
     )
     names = ("Transmit optics loss", "Strehl loss", "Point-ahead loss", "Receive optics loss", "Implementation loss")
     assert budget.at_zero == names
-    assert budget.warnings == (f"Communication budget: {link.LEFT_AT_ZERO}: {', '.join(names)}",)
+    assert budget.warnings == (
+        f"Communication budget: {link.LEFT_AT_ZERO}: {', '.join(names)}; what the hardware has comes off the margin",
+    )
     losses = {f"communication.{key}_loss": "1 dB" for key in ("transmit_optics", "receive_optics", "implementation")}
     assert budget_of(read(losses, {"communication.tracking_split_loss": "1 dB"})).warnings == ()
 

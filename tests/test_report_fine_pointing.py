@@ -534,13 +534,14 @@ def test_warnings_reach_the_page_and_the_summary(page, plain, fine, mission):
 
 
 def test_a_design_pressed_against_a_bound_is_a_warning(fine, mission):
-    assert not any("bound by" in w for w in words.warnings(fine, mission))
+    assert not any("up to a bound" in w for w in words.warnings(fine, mission))
     design = fine.verified[2].design
     tuned = replace(design.tuned, bound_by=(MARGIN, "zero at its most"))
     bound = changed(fine, THIRD, design=replace(design, tuned=tuned))
     found = words.warnings(bound, mission)
-    assert f"fine pointing: bound by the modulus margin asked for: {THIRD}" in found
-    assert f"fine pointing: bound by zero at its most: {THIRD}" in found
+    less = "beyond it less error may be left"
+    assert f"fine pointing: tuned up to a bound, the modulus margin asked for: {THIRD}; {less}" in found
+    assert f"fine pointing: tuned up to a bound, zero at its most: {THIRD}; {less}" in found
 
 
 def test_a_budget_that_is_not_linear_is_a_warning_and_says_where(fine, mission):

@@ -83,7 +83,7 @@ class LinkBudget:
         lines = [line for line in (*self.lines, *self.totals) if line.warning not in ("", LEFT_AT_ZERO)]
         found = [f"{line.name}: {line.warning}" for line in lines]
         if self.at_zero:
-            found.append(f"{LEFT_AT_ZERO}: {', '.join(self.at_zero)}")
+            found.append(f"{LEFT_AT_ZERO}: {', '.join(self.at_zero)}; what the hardware has comes off the margin")
         return tuple(f"{self.name} budget: {each}" for each in found)
 
 

@@ -341,7 +341,8 @@ def _bound_warnings(fine: FinePointingStudy) -> list[str]:
         for bound in v.design.tuned.bound_by:
             names.setdefault(bound, []).append(v.design.name)
     return [
-        f"bound by {'the modulus margin asked for' if bound == MARGIN else bound}: {listed(held)}"
+        f"tuned up to a bound, {'the modulus margin asked for' if bound == MARGIN else bound}: {listed(held)}; "
+        "beyond it less error may be left"
         for bound, held in names.items()
     ]
 
