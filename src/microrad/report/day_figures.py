@@ -228,6 +228,7 @@ def volume(cumulative: Curves, stored: Curves) -> Figure:
         for name, (time_s, bits) in curves.items():
             columns |= {f"{name}, {what}, time (s)": time_s, f"{name}, {what} (bit)": bits}
     caption = "Above: data generated and delivered since the start. Below: what waits on board for its way down."
+    caption += " Behind the mission's span nothing more is generated, and what waits is still delivered."
     return Figure("data-volume", "Data generated, delivered and stored", caption, svg, columns)
 
 

@@ -79,7 +79,7 @@ def way_rows(day: DayStudy) -> list[tuple[str, ...]]:
         row("made by the instrument", *(volume(w.generated_bit) for w in ways)),
         row("lost for want of room", *(volume(w.lost_bit) for w in ways)),
         row("on board at most", *(volume(w.history.largest_stored_bit) for w in ways)),
-        row("on board at the end", *(volume(w.on_board_bit) for w in ways)),
+        row("on board at the end of what is followed", *(volume(w.on_board_bit) for w in ways)),
         row("arrive", *(volume(w.arrived_bit) for w in ways)),
         row("latency of what is kept, median", *(duration(w.median_s) for w in ways)),
         row("latency of what is kept, 99 %", *(duration(w.slow_s) for w in ways)),
