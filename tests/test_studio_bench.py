@@ -12,7 +12,7 @@ from microrad.fine_loop import linear
 from microrad.identify import STATIC, identify
 from microrad.kernels import bouc_wen_response
 from microrad.missionfile import load_mission
-from microrad.recording import recording_from_arrays
+from microrad.recording import RecordingError, read_recording, recording_from_arrays
 from microrad.studio import control_model, control_view, live_fit, mirror_form, mirror_view
 from microrad.studio.control_model import PID, PID_INVERSE, WITH, WITHOUT
 from microrad.studio.draft import Draft
@@ -150,6 +150,97 @@ def test_a_rate_is_taken_from_the_file_where_it_states_one_alone():
 def test_channels_are_called_as_the_file_calls_them():
     labels = mirror_form.labels(listed(("0", ""), ("<b>u</b>", "V")))
     assert labels == {0: "column 0, 1000 samples", 1: "1: <b>u</b> (V), 1000 samples"}
+    said_twice = mirror_form.labels(listed(("angle [urad]", "urad"), ("angle [x]", "urad")))
+    assert said_twice == {0: "0: angle [urad], 1000 samples", 1: "1: angle [x] (urad), 1000 samples"}
+
+
+IN_MRAD = listed(("drive [V]", ""), ("angle [mrad]", ""), ("sensor [um]", ""), ("raw", ""))
+IN_URAD = listed(("drive [V]", ""), ("angle [urad]", ""))
+PLAYED = listed(("multisine/y", "rad"), ("multisine/u", "mV"), rates=(500.0,))
+
+
+def test_units_and_channels_are_guessed_anew_for_another_recording():
+    first = mirror_form.shown(Form(), IN_MRAD, "a", "a.csv", alone=True)
+    first = mirror_form.edited(first, IN_MRAD, replace(first.setting, rate="200", name="mine", static=True))
+    second = mirror_form.shown(first, IN_URAD, "b", "b.csv").setting
+    assert (first.setting.output_unit, second.output_unit) == ("mrad", "urad")
+    assert (second.name, second.static, second.rate) == ("mine", True, "")
+    third = mirror_form.shown(first, PLAYED, "c", "c.h5")
+    assert third.setting == replace(second, drive=1, output=0, drive_unit="mV", output_unit="rad", rate="500 Hz")
+    assert mirror_form.shown(third, IN_MRAD, "a", "a.csv").setting == first.setting  # as it was set for this one
+    again = mirror_form.shown(third, IN_URAD, "d", "d.csv", alone=True)
+    assert (again.setting.name, again.setting.static, again.chosen) == ("d-mirror", False, {})
+
+
+def test_a_channel_brings_its_unit_unless_it_was_set_for_it():
+    form = mirror_form.shown(Form(), IN_MRAD, "a", "a.csv", alone=True)
+
+    def typed(**changes):
+        nonlocal form
+        form = mirror_form.edited(form, IN_MRAD, replace(form.setting, **changes))
+        return form.setting.output_unit
+
+    assert typed(output=2) == "um"
+    assert typed(output=3) == "mrad"  # it states none
+    assert typed(output_unit="mm") == "mm"
+    assert typed(output=1) == "mrad"
+    assert typed(output_unit="urad") == "urad"
+    assert typed(output=3) == "mm"
+    assert typed(output=1) == "urad"
+    assert form.setting.drive_unit == "V"
+    assert mirror_form.shown(form, IN_URAD, "b", "b.csv").setting.output == 1
+    unknown = mirror_form.edited(form, None, replace(form.setting, drive=None, output=None, rate="1 Hz"))
+    assert unknown == replace(
+        form, setting=replace(form.setting, rate="1 Hz")
+    )  # the page does not know the channels yet
+
+
+@pytest.mark.parametrize(
+    ("setting", "use", "words"),
+    [
+        (Setting(0, 1), "fit", None),
+        (
+            Setting(0, 1, output_unit="urad"),
+            "fit",
+            "unit of the output: the form says µrad and a.csv says mrad; choose",
+        ),
+        (Setting(0, 1, output_unit="urad"), "check", "unit of the output: the form says µrad and a.csv says mrad"),
+        (
+            Setting(0, 1, drive_unit="mV"),
+            "fit",
+            "unit of the drive: the form says mV and a.csv says V; choose what the",
+        ),
+        (Setting(0, 1, output_unit="urad"), "leave", None),
+        (Setting(0, 3, output_unit="urad"), "fit", None),
+        (Setting(0, 9, output_unit="urad"), "fit", None),
+    ],
+)
+def test_units_that_a_recording_denies_are_refused(tmp_path, setting, use, words):
+    recordings = [
+        Dropped("a", "a.csv", tmp_path / "a.csv", use, IN_MRAD),
+        Dropped("b", "b.csv", tmp_path / "b.csv"),
+    ]
+    if words is None:
+        assert mirror_form.identification(tmp_path, recordings, setting).output_unit == setting.output_unit
+        return
+    with pytest.raises(SettingError) as refusal:
+        mirror_form.identification(tmp_path, recordings, setting)
+    assert words in str(refusal.value)
+
+
+def test_the_reader_s_words_name_the_fields_of_the_form(tmp_path):
+    np.savetxt(tmp_path / "a.csv", np.random.default_rng(1).random((400, 2)), delimiter=",")
+    with pytest.raises(RecordingError) as refusal:
+        read_recording(tmp_path / "a.csv", 0, 1)
+    words = mirror_form.in_the_form(str(refusal.value))
+    assert words.endswith("a.csv: the file does not say how fast it was sampled; type the sample rate.")
+    time = np.arange(400) / 400
+    clipped = np.minimum(np.sin(60 * time), 0.5)
+    np.savetxt(tmp_path / "b.csv", np.stack([np.sin(60 * time), clipped], axis=1), delimiter=",")
+    with pytest.raises(RecordingError, match="--accept clipping") as refusal:
+        read_recording(tmp_path / "b.csv", 0, 1, 400.0)
+    words = mirror_form.in_the_form(str(refusal.value))
+    assert words.endswith('To take it on as it is, choose it at "Go on in spite of".')
 
 
 @pytest.mark.parametrize(
@@ -162,7 +253,7 @@ def test_channels_are_called_as_the_file_calls_them():
         (Setting(0, 1, output_unit="um", lever_arm="5 V"), 'lever arm: "5 V" is in "V"'),
         (Setting(0, 1, output_unit="um", lever_arm="-5 mm"), "lever arm: -5 mm is not above 0"),
         (Setting(0, 1, name=" "), "name of the mirror: it has none; type one, such as stage-x"),
-        (Setting(0, 1, name="../up"), "name of the mirror: the file '../up.toml' is not taken: its name holds a path"),
+        (Setting(0, 1, name="../up"), "'../up.toml' is not taken: its name holds a path; type another name"),
         (Setting(0, 1, name="there"), "name of the mirror: there.html is there already and is left as it is"),
     ],
 )
@@ -209,6 +300,22 @@ def test_the_form_is_kept_for_other_tabs(tmp_path):
     assert mirror_form.kept_form(path) == form
     path.write_text('{"setting": 3}')
     assert mirror_form.kept_form(path) == Form()
+
+
+def test_a_form_that_somebody_else_has_written_holds_what_can_be_chosen(tmp_path):
+    path, link = tmp_path / "form.json", '<a href="https://evil.example">V</a>'
+    odd = Setting(-1, -2, "5 kHz", link, link, accept=("drift", link), name="a")
+    mirror_form.keep_form(path, Form(odd, {"a": "zzz", "b": "check"}, chosen={"output_unit": link}))
+    found = mirror_form.kept_form(path)
+    assert found.setting == Setting(None, None, "5 kHz", "V", "mrad", accept=("drift",), name="a")
+    assert found.uses == {"b": "check"}
+    assert mirror_form.shown(found, listed(("u", ""), ("y", "")), "b", "b.csv").setting.output_unit == "mrad"
+    setting = Setting(0, 1, drive_unit=link, output_unit=link)
+    drawn = (mirror_view.recording_plot, mirror_view.time_plot)
+    titled = [title for draw in drawn for title in titles(draw(viewed(), setting))]
+    titled += titles(mirror_view.loop_plot(fitted("bouc_wen", 0.4), 0, link))
+    assert len(titled) == 7
+    assert not any("<" in title for title in titled)
 
 
 # ----------------------------------------------------------------------------------------------------------- the plots
@@ -337,7 +444,7 @@ def pi(mission):
 
 @pytest.fixture(scope="module")
 def answers(pi):
-    return pi.ask(control_view.ask_of("100 urad", "300 urad", "15 Hz"), (WITH, WITHOUT))
+    return pi.ask(control_view.ask_of("100 urad", "300 urad", "15 Hz", 5000.0), (WITH, WITHOUT))
 
 
 def test_the_controllers_are_those_of_the_study_and_of_control(mission):
@@ -395,7 +502,7 @@ def test_step_sine_and_jitter_answer_what_they_are_asked(mission, pi, answers):
 
 
 def test_only_the_variants_that_are_asked_for_are_simulated(pi):
-    ask = control_view.ask_of("50 urad", "100 urad", "25 Hz")
+    ask = control_view.ask_of("50 urad", "100 urad", "25 Hz", 5000.0)
     found = pi.ask(ask, control_view.SHOWN["without"])
     assert {*found.step, *found.sine, *found.jitter} == {WITHOUT}
 
@@ -407,7 +514,7 @@ def test_the_paper_s_loop_has_the_numbers_of_the_study(mission, name):
     assert found.margins["modulus"] == margins.modulus
     assert found.margins["crossover"] == margins.crossover_hz
     assert found.margins["bandwidth"] == pytest.approx(358, rel=0.02)
-    asked = found.ask(control_view.ask_of("100 urad", "300 urad", "15 Hz"), (WITH, WITHOUT))
+    asked = found.ask(control_view.ask_of("100 urad", "300 urad", "15 Hz", 5000.0), (WITH, WITHOUT))
     runs = tracking.tracking_runs(mission.mission)
     kind = "PID" if name == PID else "PID + inverse"
     for variant, which in ((WITH, "given"), (WITHOUT, "no hysteresis")):
@@ -417,12 +524,38 @@ def test_the_paper_s_loop_has_the_numbers_of_the_study(mission, name):
     assert asked.step[WITHOUT].found_rad[-1] == pytest.approx(100e-6, rel=0.02)
 
 
+def test_a_step_beyond_the_sensor_s_field_of_view_says_why_the_loop_stands_still(mission, pi):
+    assert pi.field_of_view_rad == mission.mission.fine_pointing.optical_sensor.field_of_view_rad == 2e-3
+    assert (pi.rate_hz, control_model.controller(mission, PID).field_of_view_rad) == (5000.0, math.inf)
+    curves = pi.ask(control_view.ask_of("100 mrad", "300 urad", "15 Hz", pi.rate_hz), (WITHOUT,)).step
+    assert np.all(curves[WITHOUT].drive_v == 0.0)
+    lost = "The sensor sees errors up to 2 mrad: beyond, it holds its last reading, and the loop does not act."
+    assert control_view.answer_words(curves, "Error", pi.field_of_view_rad).endswith(f"at most 100 mrad. {lost}")
+    assert control_view.answer_words(curves, "Error").endswith("at most 100 mrad.")
+
+
+def test_the_warnings_of_the_mirror_s_file_stand_beside_the_margins(mission, pi, tmp_path):
+    text = "# Mirror identified.\n# Warning: Not valid above 18.85 V/s.\n# Warning: b.\n" + MIRROR
+    (tmp_path / "stage.toml").write_text(text)
+    draft = with_mirror_file(Draft.shipped(tmp_path / "m.toml"), tmp_path / "stage.toml")
+    warned = control_model.mirror_warnings(draft.file())
+    assert warned == (
+        "The mirror has no linear part: its dynamics are not known, and margins and answers are those of one without "
+        "any.",
+        "Warning of the mirror's file: Not valid above 18.85 V/s.",
+        "Warning of the mirror's file: b.",
+    )
+    assert control_model.mirror_warnings(mission) == pi.warnings == ()
+    assert control_view.notes(replace(pi, warnings=warned)) == warned
+
+
 def test_margins_in_words_against_what_is_asked_for(mission, pi):
     rows = dict(control_view.margin_rows(pi))
     assert rows["Modulus margin, least |1 + L|"] == f"{pi.margins['modulus']:.3f} (asked for: 0.5)"
     assert rows["Phase margin"].endswith("°")
     assert rows["Residual of an axis, rms, linear"].endswith(" µrad")
     assert control_view.value_rows(pi)[0][1].endswith(" Hz")
+    assert "Integral frequency" in dict(control_view.value_rows(pi))
     assert control_view.table_row(pi)["name"] == "PI"
     assert control_view.waiting_row("PI")["modulus"] == ""
     assert control_view.notes(pi) == ()
@@ -440,13 +573,14 @@ def test_margins_in_words_against_what_is_asked_for(mission, pi):
 def test_plots_carry_units_limits_and_both_variants(pi, answers):
     shown = {
         control_view.step_plot: ("time (ms)", "line of sight, axis x (µrad)"),
-        control_view.sine_plot: ("time, settled (ms)", "error, axis x (µrad)"),
+        control_view.sine_plot: ("time (ms)", "error, axis x (µrad)"),
         control_view.jitter_plot: ("time (s)", "error, axis x (µrad)"),
         control_view.motion_plot: ("time (s)", "angle, axis x (µrad)"),
     }
     for draw, axes in shown.items():
         figure = draw(answers)
         assert tuple(titles(figure)) == axes
+        assert figure["layout"]["yaxis"]["exponentformat"] == "none"  # no "100k" µrad
         assert [t["name"] for t in figure["data"] if "hysteresis" in t["name"]] == [WITH, WITHOUT]
         assert all(len(t["x"]) == len(t["y"]) <= 2500 for t in figure["data"])
     drive = control_view.drive_plot(pi, answers.jitter, "s")
@@ -468,10 +602,15 @@ def test_plots_carry_units_limits_and_both_variants(pi, answers):
         (("1 urad", "2", "1 Hz"), 'amplitude of the sine: "2" is a number without a unit'),
         (("1 urad", "0 urad", "1 Hz"), "amplitude of the sine: 0 urad is outside 1 nrad to 100 mrad; type one between"),
         (("1 urad", "1 urad", "20 kHz"), "frequency of the sine: 20 kHz is outside 100 mHz to 10 kHz"),
+        (
+            ("1 urad", "1 urad", "2.5 kHz"),
+            "frequency of the sine: 2.5 kHz is not below 2.5 kHz, half the rate of the loop, 5 kHz",
+        ),
     ],
 )
 def test_what_cannot_be_asked_is_said(typed, words):
-    assert control_view.ask_of("1 urad", "1 urad", "1 Hz").sine_hz == 1.0
+    assert control_view.ask_of("1 urad", "1 urad", "2.49 kHz", 5000.0).sine_hz == 2490.0
+    assert control_view.ask_of("1 urad", "1 urad", "1 Hz", 5000.0).sine_hz == 1.0
     with pytest.raises(control_view.AskError) as refusal:
-        control_view.ask_of(*typed)
+        control_view.ask_of(*typed, 5000.0)
     assert words in str(refusal.value)

@@ -3,10 +3,12 @@
 The recording is the real one of 1 Hz where it is present, else one of the virtual bench.
 """
 
+import http.client
 import os
 import re
 import tomllib
 from pathlib import Path
+from urllib.parse import urlsplit
 
 import numpy as np
 import pytest
@@ -15,6 +17,7 @@ from browser import until
 from microrad import bench
 from microrad.studio.live_fit import read_fits
 from microrad.studio.mirror_form import kept_form
+from test_cli import write_recording
 
 api = pytest.importorskip("playwright.sync_api", reason="Playwright is not installed")
 
@@ -35,8 +38,19 @@ def recording(tmp_path_factory):
 
 
 def drop(tab, file):
-    with tab.expect_response(lambda answer: "/upload/" in answer.url):
+    with tab.expect_response(lambda answer: "/upload/" in answer.url) as answer:
         tab.get_by_label("Recordings: drop files here, or choose them").set_input_files(file)
+    return answer.value.url
+
+
+def break_off(tab, url):
+    """Begin to send a file there, and go away."""
+    cookies = "; ".join(f"{each['name']}={each['value']}" for each in tab.context.cookies(url))
+    own = urlsplit(url)
+    heads = {"Cookie": cookies, "Origin": f"{own.scheme}://{own.netloc}", "Content-Length": "1000"}
+    gone = http.client.HTTPConnection(own.netloc)
+    gone.request("POST", own.path, b"--b\r\n", {**heads, "Content-Type": "multipart/form-data; boundary=b"})
+    gone.close()
 
 
 def traces(tab, label):
@@ -62,8 +76,9 @@ def test_what_is_no_recording_is_refused_in_words(studio, opened, tmp_path):
     drop(tab, {"name": "../evil.csv", "mimeType": "text/csv", "buffer": b"1,2\n3,4\n"})
     refusal = "the file '../evil.csv' is not taken: its name holds a path; rename it and drop it again"
     api.expect(words).to_have_text(refusal)
-    drop(tab, {"name": "<b>no.csv", "mimeType": "text/csv", "buffer": b"PK\x00\x01 not a table"})
+    url = drop(tab, {"name": "<b>no.csv", "mimeType": "text/csv", "buffer": b"PK\x00\x01 not a table"})
     api.expect(words).to_have_text(re.compile(r"^<b>no\.csv: this is a binary file, not text; export the recording"))
+    break_off(tab, url)  # which the studio has nothing to say of in the end
     large = tmp_path / "large.csv"
     with large.open("wb") as file:
         file.truncate(300_000_000)  # a hole
@@ -74,6 +89,49 @@ def test_what_is_no_recording_is_refused_in_words(studio, opened, tmp_path):
     )
     assert list((studio.folder / ".microrad-studio" / "uploads").glob("*/*.csv")) == []
     assert not list(studio.folder.glob("*.csv"))
+
+
+def looped(path, unit, scale=1.0):
+    """A recording with a loop of 0.6 mrad, written in another unit."""
+    time, drive, angle = np.loadtxt(write_recording(path), delimiter=",", skiprows=1).T
+    heads = f"time [s],drive [V],angle [{unit}]"
+    np.savetxt(
+        path, np.column_stack((time, drive, scale * angle)), delimiter=",", header=heads, comments="", fmt="%.9g"
+    )
+    return path
+
+
+def test_each_recording_has_its_own_units_and_one_that_cannot_be_read_says_so(opened, tmp_path, pictures):
+    tab = opened("mirror")
+    for name, unit, scale in (("a_mrad", "mrad", 1.0), ("b_urad", "urad", 1e3)):
+        drop(tab, looped(tmp_path / f"{name}.csv", unit, scale))
+        api.expect(tab.locator(".mirror-file .seen")).to_have_text(f"{name}.csv")
+        api.expect(figure_title(tab, f"output ({unit.replace('urad', 'µrad')})")).to_have_count(2)
+    tab.get_by_role("button", name="Identify").click()
+    denied = (
+        "unit of the output: the form says µrad and a_mrad.csv says mrad; choose what the file says, or set its use"
+    )
+    api.expect(tab.get_by_role("alert").last).to_contain_text(denied)
+    odd = looped(tmp_path / "c_nan.csv", "urad")
+    odd.write_text(odd.read_text("utf-8").replace("\n0.009,", "\n0.009,nan,0\n0.010,", 1), "utf-8")
+    drop(tab, odd)
+    row = tab.locator(".mirror-file", has_text="c_nan.csv")
+    fault = row.locator("xpath=following-sibling::*[1]")
+    api.expect(fault).to_contain_text("c_nan.csv: ")
+    tab.locator(".mirror-file", has_text="a_mrad.csv").get_by_role("button", name="Show").click()
+    api.expect(figure_title(tab, "output (mrad)")).to_have_count(2)
+    api.expect(tab.locator(".mirror-file .seen")).to_have_text("a_mrad.csv")
+    api.expect(fault).to_contain_text("c_nan.csv: ")
+    tab.screenshot(path=pictures / "mirror-units.png", full_page=True)
+    for name in ("c_nan.csv", "a_mrad.csv", "b_urad.csv"):
+        tab.locator(".mirror-file", has_text=name).get_by_role("button", name="Remove").click()
+        api.expect(tab.locator(".mirror-file", has_text=name)).to_have_count(0)
+        if name == "a_mrad.csv":  # which was shown
+            api.expect(figure_title(tab, "output (µrad)")).to_have_count(2)
+
+
+def figure_title(tab, words):
+    return tab.locator(".js-plotly-plot text", has_text=words)
 
 
 def test_a_recording_is_dropped_identified_while_one_looks_on_and_its_mirror_used(studio, opened, recording, pictures):
@@ -139,4 +197,8 @@ def test_a_controller_is_chosen_and_its_loop_answers(opened, pictures):
     assert list(traces(tab, "Step response")) == ["wanted", "without hysteresis"]
     tab.get_by_label("Step", exact=True).fill("5 V")
     tab.get_by_text('step: "5 V" is in "V", another kind of quantity').wait_for()
+    api.expect(tab.get_by_label("Step response")).to_have_class(re.compile(r"\bbehind\b"))
     tab.screenshot(path=pictures / "control.png", full_page=True)
+    tab.get_by_label("Step", exact=True).fill("50 urad")
+    api.expect(tab.get_by_label("Step response")).not_to_have_class(re.compile(r"\bbehind\b"))
+    assert tab.get_by_text("another kind of quantity").count() == 0

@@ -14,6 +14,7 @@ import microrad
 from microrad import cli, fine_pointing, study
 from microrad.document import MissionError
 from microrad.folder import FolderError
+from microrad.recording import RecordingError, read_in, read_recording
 from microrad.studio.commands import (
     Budget,
     CampaignResume,
@@ -171,6 +172,29 @@ def test_every_choice_of_an_identification_is_in_both(folder, capsys):
     assert executed(action.python).strip() == out.partition("\n\n")[2].strip()
     assert Path("two.toml").read_bytes() == written
     assert b"it's" in written
+
+
+@pytest.mark.parametrize(
+    ("header", "drive", "output", "words"),
+    [
+        ("time [s],drive [V],angle [urad]", "V", "urad", None),
+        ("time [s],drive [V],angle [µrad]", "V", "mrad", "the output is to be read in mrad and the file says urad"),
+        ("time [s],drive [mV],angle [urad]", "V", "urad", "the drive is to be read in V and the file says mV"),
+    ],
+)
+def test_units_that_the_file_denies_are_refused_in_both(folder, capsys, header, drive, output, words):
+    write_recording(folder / "a.csv")
+    _, *rows = (folder / "a.csv").read_text("utf-8").splitlines()
+    (folder / "a.csv").write_text("\n".join([header, *rows]), encoding="utf-8")
+    action = Identify((Path("a.csv"),), "1", "2", Path("m.toml"), drive, output, rate_hz=1000.0, static=True)
+    if words is None:
+        assert read_in(read_recording("a.csv", "1", "2", 1000.0), drive, output).samples == len(rows)
+        return
+    with pytest.raises(RecordingError, match=f"^a.csv: {words}; give the unit that the file says"):
+        executed(action.python)
+    _, code, err = typed(command(action), capsys)
+    assert code != 0
+    assert "give what the files say" in err
 
 
 def test_a_campaign_gives_the_same_rows(folder, capsys):

@@ -268,6 +268,9 @@ def test_only_results_that_are_there_and_inside_are_offered(workshop, tmp_path_f
     (workshop.folder / "page.html").write_text("page", "utf-8")
     job = Job(1, workshop.folder, "done", cwd=workshop.folder, results=(str(outside), "missing.nc", "page.html"))
     assert runs_view.result_files(workshop, job) == ((2, "page.html"),)
+    for state in ("failed", "cancelled"):  # another run has written it
+        assert runs_view.result_files(workshop, replace(job, state=state, kind="identification")) == ()
+        assert runs_view.result_files(workshop, replace(job, state=state, kind="campaign")) == ((2, "page.html"),)
 
 
 # ------------------------------------------------------------------------------------------------------------ compare

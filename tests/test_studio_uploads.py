@@ -1,6 +1,7 @@
 """Recordings dropped into the studio: odd names, floods and bombs are refused in words, and the studio goes on."""
 
 import asyncio
+import importlib
 import io
 import json
 import math
@@ -249,6 +250,79 @@ def test_a_disk_that_is_full_before_a_file_is_there_is_said(tmp_path):
     assert said == ["the file could not be stored: No space left on device; check free space and permissions"]
 
 
+def uploaded(tmp_path, monkeypatch, receive, turns=2):
+    """What is said of an upload, by a field whose browser sends `receive`."""
+    drop = pytest.importorskip("nicegui") and importlib.import_module("microrad.studio.pages.drop")
+    said, taken = [], []
+    field = drop.Drop.__new__(drop.Drop)
+    field._uploads, field._refused = Uploads(tmp_path / "uploads", LIMITS), said.append
+
+    async def take(upload):
+        taken.append(upload.name)
+
+    async def send():
+        monkeypatch.setattr(drop, "_TURNS", asyncio.Semaphore(turns))  # of this loop
+        head = [(b"content-type", b"multipart/form-data; boundary=b")]
+        requests = [drop.Request({"type": "http", "headers": head}, each) for each in receive]
+        await asyncio.gather(*map(field._take, requests))
+
+    field._taken = take
+    asyncio.run(send())
+    return said, taken
+
+
+FORM = b'--b\r\nContent-Disposition: form-data; name="file"; filename="a.csv"\r\n\r\n1,2\r\n--b--\r\n'
+
+
+def sender(*messages):
+    """A browser that sends these, and then nothing for ever."""
+    left = iter(messages)
+
+    async def receive():
+        for message in left:
+            return message
+        return await asyncio.Future()
+
+    return receive
+
+
+def body(data, more=False):
+    return {"type": "http.request", "body": data, "more_body": more}
+
+
+def test_an_upload_that_is_broken_off_is_no_fault_of_the_studio(tmp_path, monkeypatch):
+    broken = sender(body(FORM[:40], more=True), {"type": "http.disconnect"})
+    assert uploaded(tmp_path, monkeypatch, [broken, sender(body(FORM))], turns=1) == ([], ["a.csv"])
+    assert len(everything(tmp_path / "uploads")) == 2  # the file in its folder
+
+
+def test_an_upload_that_hangs_is_ended_and_those_behind_it_are_not_read_before(tmp_path, monkeypatch):
+    drop = pytest.importorskip("nicegui") and importlib.import_module("microrad.studio.pages.drop")
+    read = []
+
+    async def behind():
+        read.append(len(list((tmp_path / "spool").iterdir())))
+        return body(FORM)
+
+    class Spooled(drop.Request):
+        async def form(self, **limits):
+            waiting = tmp_path / "spool" / str(id(self))
+            waiting.touch()
+            try:
+                return await super().form(**limits)
+            finally:
+                waiting.unlink()
+
+    (tmp_path / "spool").mkdir()
+    monkeypatch.setattr(drop, "Request", Spooled)
+    monkeypatch.setattr(drop, "_MOST_S", 0.3)
+    hanging = [sender(body(FORM[:40], more=True)) for _ in range(2)]
+    said, taken = uploaded(tmp_path, monkeypatch, [*hanging, behind])
+    assert read in ([1], [2])  # on their way as the third is read, itself among them
+    assert taken == ["a.csv"]
+    assert [words[:62] for words in said] == ["the file is not taken: it was not here after 0.005 min; cut ou"] * 2
+
+
 def test_a_bad_name_stores_nothing(tmp_path):
     uploads = Uploads(tmp_path / "in" / "ner", LIMITS)
     for name in ("../../x.csv", str(tmp_path / "x.csv"), ".part"):
@@ -306,6 +380,21 @@ def test_a_folder_that_was_removed_meanwhile_is_made_again(tmp_path):
     uploads.folder.write_text("a file", "utf-8")
     with pytest.raises(UploadError, match=r"'x.csv' could not be stored: "):
         save(uploads, "x.csv", b"1")
+
+
+def test_what_no_recording_is_in_is_cleared_away_at_the_start(tmp_path, monkeypatch):
+    """Twenty of them, a minute old, and no recording could be dropped any more."""
+    monkeypatch.setattr(tempfile, "tempdir", tempfile.gettempdir())
+    uploads = Uploads(tmp_path, LIMITS)
+    kept = save(uploads, "kept.csv", b"1")
+    for key in "012":
+        (tmp_path / (key * 16)).mkdir()
+        (tmp_path / (key * 16) / ".part").touch()
+    with pytest.raises(UploadError, match="4 recordings are here already; remove one first"):
+        save(uploads, "x.csv", b"1")
+    Uploads(tmp_path, LIMITS).hold_temporary_files()
+    assert {p.name for p in tmp_path.iterdir()} == {kept.key, "spool"}
+    assert save(uploads, "x.csv", b"1").size == 1
 
 
 def test_temporary_files_lie_in_the_private_folder(tmp_path, monkeypatch):

@@ -2,7 +2,6 @@
 
 import functools
 import os
-import re
 import shlex
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -132,6 +131,7 @@ def identify(  # noqa: PLR0913  every argument is a named option
     """
     from microrad import identify as identification
     from microrad import report
+    from microrad.recording import stated_units
     from microrad.studio.live_fit import looker_on
 
     target = mirror_file or Path(f"{files[0].stem}-mirror.toml")
@@ -145,8 +145,8 @@ def identify(  # noqa: PLR0913  every argument is a named option
     columns = _Columns(input_column, output_column, rate, time, period, tuple(accept or ()))
     records, validation, virtual = _recordings(files, validate or [], columns)
     everything = [*records, *validation]
-    drive_said = set().union(*(_stated(r.input_units, r.input_names) for r in everything))
-    output_said = set().union(*(_stated(r.output_units, r.output_names) for r in everything))
+    drive_said = set().union(*(stated_units(r.input_units, r.input_names) for r in everything))
+    output_said = set().union(*(stated_units(r.output_units, r.output_names) for r in everything))
     input_unit, drive_by = _unit(input_unit, drive_said, "--input-unit", "V")
     output_unit, output_by = _unit(output_unit, output_said, "--output-unit", "mrad")
     models = identification.STATIC[:2] if static else identification.MODELS
@@ -232,20 +232,6 @@ def _recordings(
         )
 
     return [read(path) for path in files], [read(path) for path in validate], False
-
-
-_SPELLINGS = {"µrad": "urad", "μrad": "urad", "microrad": "urad", "µm": "um", "μm": "um", "volt": "V", "volts": "V"}
-_KNOWN = ("V", "mV", "rad", "mrad", "urad", "m", "mm", "um")
-_BRACKETS = re.compile(r"[(\[]\s*([^)\]]*?)\s*[)\]]\s*$")
-
-
-def _stated(units: tuple[str, ...], names: tuple[str, ...]) -> set[str]:
-    """Units that a file states for its channels, by itself or in brackets behind a name it knows the unit of."""
-    said = {unit.strip() for unit in units if unit.strip()}
-    if not said:
-        behind = [found[1] for name in names if (found := _BRACKETS.search(name))]
-        said = {unit for unit in behind if _SPELLINGS.get(unit, unit) in _KNOWN}
-    return {_SPELLINGS.get(unit, unit) for unit in said}
 
 
 def _unit(given: str | None, said: set[str], flag: str, assumed: str) -> tuple[str, str]:

@@ -6,6 +6,7 @@ The values keep the units of the file; `identify` is told what they are.
 
 from microrad.recording.reader import multisine_recordings, read_recording, recording_from_arrays
 from microrad.recording.records import ACCEPTABLE, MIN_SAMPLES, Finding, FloatArray, Recording, RecordingError
+from microrad.recording.stated import read_in, stated_units
 
 __all__ = [
     "ACCEPTABLE",
@@ -15,6 +16,8 @@ __all__ = [
     "Recording",
     "RecordingError",
     "multisine_recordings",
+    "read_in",
     "read_recording",
     "recording_from_arrays",
+    "stated_units",
 ]

@@ -33,6 +33,10 @@ WITH, WITHOUT = "with hysteresis", "without hysteresis"
 _POINTS = 500
 _STEP_PERIODS = 6.0  # of the bandwidth
 _SHOWN_PERIODS = 2.0
+_WARNING = "# Warning: "
+_NO_LINEAR_PART = (
+    "The mirror has no linear part: its dynamics are not known, and margins and answers are those of one without any."
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,7 +90,9 @@ class Controller:
     ``margins`` hold gain (a factor), phase (rad), delay (s), modulus, crossover, bandwidth (Hz) and the peak of |S|;
     ``values`` are what it was tuned to by name, each with its unit. ``loop_gain`` and ``sensitivity`` are magnitudes at
     ``freq_hz``, None where a slower sensor folds frequencies. ``limits_v`` are the amplifier's about the bias,
-    ``identified_v`` the range that the mirror was identified in.
+    ``identified_v`` the range that the mirror was identified in. ``rate_hz`` is that of the control,
+    ``field_of_view_rad`` the radial error beyond which the sensor holds its last reading. ``warnings`` say what
+    the mirror leaves out.
     """
 
     name: str
@@ -100,6 +106,9 @@ class Controller:
     sensitivity: Floats | None
     limits_v: tuple[float, float]
     identified_v: tuple[float, float]
+    rate_hz: float
+    field_of_view_rad: float
+    warnings: tuple[str, ...]
     ask: Callable[[Ask, tuple[str, ...]], Answers]
 
 
@@ -165,8 +174,19 @@ def _fine(file: MissionFile, name: str) -> Controller:
         sensitivity,
         (scene.loop.drive.minimum_v, scene.loop.drive.maximum_v),
         scene.loop.drive_range_v,
+        1.0 / scene.loop.timing.period_s,
+        scene.loop.optical.field_of_view_rad,
+        mirror_warnings(file),
         partial(_fine_answers, scene.loop, m, built, tuned.margins.bandwidth_hz),
     )
+
+
+def mirror_warnings(file: MissionFile) -> tuple[str, ...]:
+    """What the mirror leaves out, in sentences: its linear part, and what the head of its own file warns of."""
+    text = "" if file.mirror_file is None else file.mirror_file.text
+    own = [line.removeprefix(_WARNING) for line in text.splitlines() if line.startswith(_WARNING)]
+    told = [] if file.mission.mirror.linear is not None else [_NO_LINEAR_PART]
+    return (*told, *(f"Warning of the mirror's file: {warning}" for warning in own))
 
 
 def _numbers(of: control.LoopMargins) -> dict[str, float]:
@@ -272,6 +292,9 @@ def _pid(file: MissionFile, name: str) -> Controller:
         sensitivity,
         (setup.drive.minimum_v, setup.drive.maximum_v),
         (m.mirror.drive_min_v - m.mirror.bias_v, m.mirror.drive_max_v - m.mirror.bias_v),
+        1.0 / period,
+        math.inf,
+        mirror_warnings(file),
         partial(_pid_answers, name, plants, setup, found.crossover_hz),
     )
 

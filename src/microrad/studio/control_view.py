@@ -28,17 +28,25 @@ class AskError(ValueError):
     """Something typed that no loop can be asked; the message names the field."""
 
 
-def ask_of(step: str, amplitude: str, frequency: str) -> Ask:
-    """Step, amplitude and frequency as they are typed. Raises `AskError`."""
-    return Ask(_angle("step", step), _angle("amplitude of the sine", amplitude), _frequency(frequency))
+def ask_of(step: str, amplitude: str, frequency: str, rate_hz: float) -> Ask:
+    """Step, amplitude and frequency as they are typed, for a loop of this rate. Raises `AskError`."""
+    return Ask(_angle("step", step), _angle("amplitude of the sine", amplitude), _frequency(frequency, rate_hz))
 
 
 def _angle(name: str, typed: str) -> float:
     return _quantity(name, typed, "rad", 1e-9, 0.1)
 
 
-def _frequency(typed: str) -> float:
-    return _quantity("frequency of the sine", typed, "Hz", 0.1, 10_000.0)
+def _frequency(typed: str, rate_hz: float) -> float:
+    """The frequency of a sine that the samples of the loop can tell from a slower one."""
+    found = _quantity("frequency of the sine", typed, "Hz", 0.1, 10_000.0)
+    if found < 0.5 * rate_hz:
+        return found
+    half, rate = format_quantity(0.5 * rate_hz, "Hz"), format_quantity(rate_hz, "Hz")
+    raise AskError(
+        f"frequency of the sine: {typed.strip()} is not below {half}, half the rate of the loop, {rate}, which would "
+        "take it for a slower one; type one below"
+    )
 
 
 def _quantity(name: str, typed: str, unit: str, least: float, most: float) -> float:
@@ -81,7 +89,9 @@ def _told(value: float, unit: str) -> str:
 
 def value_rows(of: Controller) -> list[tuple[str, str]]:
     """What the controller was tuned to."""
-    return [(name, f"{value:.5g} {unit}".rstrip()) for name, (value, unit) in of.values.items()]
+    return [
+        (f"{name[:1].upper()}{name[1:]}", f"{value:.5g} {unit}".rstrip()) for name, (value, unit) in of.values.items()
+    ]
 
 
 def notes(of: Controller) -> tuple[str, ...]:
@@ -95,7 +105,7 @@ def notes(of: Controller) -> tuple[str, ...]:
         told.append(f"What keeps its residual from being smaller: {', '.join(of.bound_by)}.")
     if of.sensitivity is None:
         told.append("The optical sensor is slower than the control: the loop has no response by frequency of its own.")
-    return tuple(told)
+    return (*told, *of.warnings)
 
 
 def table_row(of: Controller) -> dict[str, Any]:
@@ -116,14 +126,18 @@ def waiting_row(name: str, words: str = "not looked at yet") -> dict[str, Any]:
     return {"name": name, "residual": words, "modulus": "", "gain": "", "phase": "", "bandwidth": ""}
 
 
-def answer_words(curves: dict[str, Curve], what: str) -> str:
-    """Rms and peak of the error of each variant in a sentence."""
+def answer_words(curves: dict[str, Curve], what: str, field_of_view_rad: float = math.inf) -> str:
+    """Rms and peak of the error of each variant in a sentence, and one on a sensor that has lost sight of it."""
     told = [
         f"{variant} {format_quantity(float(f'{c.rms_rad:.3g}'), 'rad')} rms, at most "
         f"{format_quantity(float(f'{c.peak_rad:.3g}'), 'rad')}"
         for variant, c in curves.items()
     ]
-    return f"{what}: {'; '.join(told)}." if told else ""
+    words = f"{what}: {'; '.join(told)}." if told else ""
+    if not any(c.peak_rad > field_of_view_rad for c in curves.values()):
+        return words
+    view = format_quantity(field_of_view_rad, "rad")
+    return f"{words} The sensor sees errors up to {view}: beyond, it holds its last reading, and the loop does not act."
 
 
 # ------------------------------------------------------------------------------------------------ plots by frequency
@@ -175,13 +189,13 @@ def step_plot(answers: Answers) -> Plot:
     first = next(iter(answers.step.values()))
     traces = [_line(_ms(first), 1e6 * first.wanted_rad, "wanted", GREY, "dot")]
     traces += [_styled(_ms(c), 1e6 * c.found_rad, v) for v, c in answers.step.items()]
-    return plot(traces, {"title": "time (ms)"}, {"title": "line of sight, axis x (µrad)"})
+    return plot(traces, {"title": "time (ms)"}, _micro("line of sight, axis x"))
 
 
 def sine_plot(answers: Answers) -> Plot:
-    """The error of axis x while the loop follows a sine, settled."""
+    """The error of axis x while the loop follows a sine, settled; the time is that since it has settled."""
     traces = [_styled(_ms(c), 1e6 * c.error_rad[:, 0], v) for v, c in answers.sine.items()]
-    return plot(traces, {"title": "time, settled (ms)"}, {"title": "error, axis x (µrad)"})
+    return plot(traces, {"title": "time (ms)"}, _micro("error, axis x"))
 
 
 def jitter_plot(answers: Answers) -> Plot:
@@ -189,7 +203,7 @@ def jitter_plot(answers: Answers) -> Plot:
     if not answers.jitter:
         return empty("Nothing disturbs this loop.")
     traces = [_styled(_s(c), 1e6 * c.error_rad[:, 0], v, 0.8) for v, c in answers.jitter.items()]
-    return plot(traces, {"title": "time (s)"}, {"title": "error, axis x (µrad)"})
+    return plot(traces, {"title": "time (s)"}, _micro("error, axis x"))
 
 
 def motion_plot(answers: Answers) -> Plot:
@@ -200,7 +214,7 @@ def motion_plot(answers: Answers) -> Plot:
     assert first.disturbance_rad is not None  # a loop that is shaken says by what
     traces = [_line(_s(first), 1e6 * first.disturbance_rad[:, 0], "to be followed", GREY, width=4.0)]
     traces += [_styled(_s(c), 1e6 * c.found_rad, v) for v, c in answers.jitter.items()]
-    return plot(traces, {"title": "time (s)"}, {"title": "angle, axis x (µrad)"})
+    return plot(traces, {"title": "time (s)"}, _micro("angle, axis x"))
 
 
 def drive_plot(of: Controller, curves: dict[str, Curve], over: str = "ms") -> Plot:
@@ -222,6 +236,11 @@ def _pair(ends: Floats, limits: tuple[float, float], name: str, colour: str, das
     for each in lines[1:]:
         each["showlegend"] = False
     return [{**each, "legendgroup": name} for each in lines]
+
+
+def _micro(title: str) -> dict[str, Any]:
+    """An axis of angles; its ticks are numbers, and not "100k" of a unit that has a prefix already."""
+    return {"title": f"{title} (µrad)", "exponentformat": "none"}
 
 
 def _styled(x: Floats, y: Floats, variant: str, width: float = 1.6) -> dict[str, Any]:

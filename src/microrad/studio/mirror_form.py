@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import re
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 
 from microrad.folder import write_whole
+from microrad.recording import ACCEPTABLE, stated_units
 from microrad.studio import plain_files
 from microrad.studio.commands import Identify
 from microrad.studio.jobs import Order
@@ -21,8 +23,15 @@ DRIVE_UNITS = ("V", "mV")
 OUTPUT_UNITS = ("mrad", "urad", "rad", "um", "mm", "m")
 LENGTHS = ("um", "mm", "m")
 _WRITTEN = {"urad": "µrad", "um": "µm"}
-_SPELLINGS = {"µrad": "urad", "μrad": "urad", "microrad": "urad", "µm": "um", "μm": "um", "volt": "V", "volts": "V"}
 _BEHIND = re.compile(r"[(\[]\s*([^)\]]*?)\s*[)\]]\s*$")
+_CHOSEN = 200
+_IN_THE_FORM = (
+    (re.compile(r"give the rate \(--rate, rate_hz\) in Hz, or name the time column \(time\)"), "type the sample rate"),
+    (
+        re.compile(r"To take it on as it is: --accept .* \(in Python accept=.*\)"),
+        'To take it on as it is, choose it at "Go on in spite of"',
+    ),
+)
 _DRIVES = re.compile(r"\b(u|drive|input|command|voltage|in|ch0|v)\b|volt|drive", re.IGNORECASE)
 _OUTPUTS = re.compile(r"\b(y|output|out|angle|tilt|sensor|displacement|position)\b|angle|disp", re.IGNORECASE)
 
@@ -49,12 +58,16 @@ class Setting:
 
 @dataclass(frozen=True, slots=True)
 class Dropped:
-    """A recording that was dropped: its key among the uploads, its name, its path, and what it is used for."""
+    """A recording that was dropped: its key among the uploads, its name, its path, and what it is used for.
+
+    `listing` holds its channels, where somebody has looked into it already.
+    """
 
     key: str
     name: str
     path: Path
     use: str = "fit"
+    listing: Listing | None = None
 
 
 USES = {"fit": "fit", "check": "check only", "leave": "leave out"}
@@ -63,10 +76,16 @@ USES = {"fit": "fit", "check": "check only", "leave": "leave out"}
 
 @dataclass(frozen=True, slots=True)
 class Form:
-    """The form as every tab sees it; `uses` holds what is not to be fitted, by the key of the upload."""
+    """The form as every tab sees it; `uses` holds what is not to be fitted, by the key of the upload.
+
+    `seen` is the key of the recording that is shown, and that the setting is for. `chosen` is what somebody has set, by
+    the channels that it was set for: they are guessed anew for others.
+    """
 
     setting: Setting = field(default_factory=Setting)
     uses: dict[str, str] = field(default_factory=dict)
+    seen: str = ""
+    chosen: dict[str, str] = field(default_factory=dict)
 
 
 def kept_form(path: Path) -> Form:
@@ -74,8 +93,22 @@ def kept_form(path: Path) -> Form:
     from pydantic import TypeAdapter
 
     with suppress(OSError, ValueError):
-        return TypeAdapter(Form).validate_json(plain_files.content(path))
+        return _possible(TypeAdapter(Form).validate_json(plain_files.content(path)))
     return Form()
+
+
+def _possible(form: Form) -> Form:
+    """The form with what can be chosen alone: the folder, and the file in it, may have come from a stranger."""
+    s = form.setting
+    setting = replace(
+        s,
+        drive=s.drive if s.drive is not None and s.drive >= 0 else None,
+        output=s.output if s.output is not None and s.output >= 0 else None,
+        drive_unit=s.drive_unit if s.drive_unit in DRIVE_UNITS else "V",
+        output_unit=s.output_unit if s.output_unit in OUTPUT_UNITS else "mrad",
+        accept=tuple(each for each in s.accept if each in ACCEPTABLE),
+    )
+    return replace(form, setting=setting, uses={key: use for key, use in form.uses.items() if use in USES})
 
 
 def keep_form(path: Path, form: Form) -> None:
@@ -102,6 +135,80 @@ def first_setting(listing: Listing, file: str) -> Setting:
     )
 
 
+# ------------------------------------------------------------------------------------------------ another recording
+def shown(form: Form, listing: Listing, key: str, name: str, *, alone: bool = False) -> Form:
+    """The form for another recording: channels, units and rate are guessed, unless they were set for such channels.
+
+    With `alone` nothing is left of what the form said of recordings before.
+    """
+    first = first_setting(listing, name)
+    if alone:
+        return replace(form, setting=first, seen=key, chosen={})
+    if key == form.seen:
+        return form
+    drive, output = (_channel(form, listing, which, getattr(first, which)) for which in ("drive", "output"))
+    setting = replace(
+        form.setting,
+        drive=drive,
+        output=output,
+        rate=form.chosen.get(f"{_about(listing)} rate", first.rate),
+        drive_unit=_unit(form, listing, "drive_unit", drive),
+        output_unit=_unit(form, listing, "output_unit", output),
+    )
+    return replace(form, setting=setting, seen=key)
+
+
+def edited(form: Form, listing: Listing | None, setting: Setting) -> Form:
+    """The form as somebody has changed its setting; a channel that was changed brings its unit along.
+
+    Without the channels of the recording that is shown, those of the form stay.
+    """
+    old = form.setting
+    if listing is None:
+        return replace(form, setting=replace(setting, drive=old.drive, output=old.output))
+    known = {**form.chosen, **_set(old, listing, setting)}
+    form = replace(form, chosen=dict(list(known.items())[-_CHOSEN:]))
+    drive_unit, output_unit = setting.drive_unit, setting.output_unit
+    if setting.drive != old.drive and drive_unit == old.drive_unit:
+        drive_unit = _unit(form, listing, "drive_unit", setting.drive)
+    if setting.output != old.output and output_unit == old.output_unit:
+        output_unit = _unit(form, listing, "output_unit", setting.output)
+    return replace(form, setting=replace(setting, drive_unit=drive_unit, output_unit=output_unit))
+
+
+def _set(old: Setting, listing: Listing, new: Setting) -> dict[str, str]:
+    """What somebody has set, by the channels of the recording that is shown; a unit counts for other channels, too."""
+    about = _about(listing)
+    changed = {which for which, value in asdict(new).items() if value != getattr(old, which)}
+    said = {f"{about} {which}": str(getattr(new, which)) for which in ("drive", "output", "rate") if which in changed}
+    for which, channel, unit in (
+        ("drive_unit", new.drive, new.drive_unit),
+        ("output_unit", new.output, new.output_unit),
+    ):
+        if which in changed:
+            said |= {f"{about} {channel} {which}": unit, which: unit}
+    return said
+
+
+def _about(listing: Listing) -> str:
+    """What tells the channels of a file from others: names, units, and the rates that it states."""
+    told = [[each.name, each.unit] for each in listing.channels], listing.rates_hz
+    return hashlib.sha256(json.dumps(told).encode("ascii")).hexdigest()[:16]
+
+
+def _channel(form: Form, listing: Listing, which: str, otherwise: int | None) -> int | None:
+    said = form.chosen.get(f"{_about(listing)} {which}", "")
+    return int(said) if said.isascii() and said.isdigit() and int(said) < len(listing.channels) else otherwise
+
+
+def _unit(form: Form, listing: Listing, which: str, channel: int | None) -> str:
+    """The unit of a channel: as it was set for this one, as the file states it, or as it was set for others."""
+    units, otherwise = (DRIVE_UNITS, "V") if which == "drive_unit" else (OUTPUT_UNITS, "mrad")
+    own = form.chosen.get(f"{_about(listing)} {channel} {which}", "")
+    said = own, _stated(listing, channel, units), form.chosen.get(which, ""), otherwise
+    return next(unit for unit in said if unit in units)
+
+
 def _guess(listing: Listing, among: Sequence[int], names: re.Pattern[str], units: Sequence[str]) -> int | None:
     """The first channel whose unit or name speaks for it."""
     by_unit = [k for k in among if _stated(listing, k, units)]
@@ -113,11 +220,12 @@ def _stated(listing: Listing, channel: int | None, units: Sequence[str]) -> str:
     """The unit that a file states for a channel, or behind its name in brackets; "" for none of these."""
     if channel is None:
         return ""
+    return next((unit for unit in _said(listing, channel) if unit in units), "")
+
+
+def _said(listing: Listing, channel: int) -> set[str]:
     found = listing.channels[channel]
-    behind = _BEHIND.search(found.name)
-    unit = found.unit.strip() or (behind[1] if behind else "")
-    unit = _SPELLINGS.get(unit, unit)
-    return unit if unit in units else ""
+    return stated_units((found.unit,), (found.name,))
 
 
 def labels(listing: Listing) -> dict[int, str]:
@@ -126,7 +234,8 @@ def labels(listing: Listing) -> dict[int, str]:
 
 
 def _label(number: int, name: str, unit: str, samples: int | None) -> str:
-    told = f" ({unit})" if unit else ""
+    behind = _BEHIND.search(name)
+    told = f" ({unit})" if unit and (behind is None or behind[1] != unit) else ""
     length = "" if samples is None else f", {samples} samples"
     own = f"column {number}" if name in ("", str(number)) else f"{number}: {name}"
     return f"{own}{told}{length}"
@@ -171,6 +280,13 @@ def columns(setting: Setting) -> Columns:
     return Columns((setting.drive,), (setting.output,), rate_hz(setting.rate), accept=setting.accept)
 
 
+def in_the_form(words: str) -> str:
+    """The reader's words, which name options of the command, as they are for somebody before the form."""
+    for pattern, instead in _IN_THE_FORM:
+        words = pattern.sub(instead, words)
+    return words
+
+
 def written(unit: str) -> str:
     """A unit as it is read, not typed."""
     return _WRITTEN.get(unit, unit)
@@ -179,9 +295,13 @@ def written(unit: str) -> str:
 def identification(folder: Path, recordings: Sequence[Dropped], setting: Setting) -> Identify:
     """The identification that the form asks for, seen from the working folder.
 
-    Raises `SettingError` for what is missing in it and for a mirror file that is there already.
+    Raises `SettingError` for what is missing in it, for units that a recording denies, and for a mirror file that is
+    there already.
     """
     chosen = columns(setting)
+    for each in recordings:
+        if each.use != "leave" and each.listing is not None:
+            _agree(each.name, each.listing, setting)
     fitted = tuple(each.path.relative_to(folder) for each in recordings if each.use == "fit")
     if not fitted:
         raise SettingError("recordings: none is to be fitted; drop one, or set its use to fit")
@@ -202,6 +322,20 @@ def identification(folder: Path, recordings: Sequence[Dropped], setting: Setting
     )
 
 
+def _agree(name: str, listing: Listing, setting: Setting) -> None:
+    """Refuse a unit other than that which the file states: the mirror would be larger or smaller than it is."""
+    for which, channel, unit in (
+        ("drive", setting.drive, setting.drive_unit),
+        ("output", setting.output, setting.output_unit),
+    ):
+        said = _said(listing, channel) if channel is not None and channel < len(listing.channels) else set()
+        if said and said != {unit}:
+            raise SettingError(
+                f"unit of the {which}: the form says {written(unit)} and {name} says "
+                f"{', '.join(map(written, sorted(said)))}; choose what the file says, or set its use to leave out"
+            )
+
+
 def _new_file(folder: Path, name: str) -> Path:
     """The mirror file of this name, which neither it nor its report may be there already."""
     if not name.strip():
@@ -209,7 +343,8 @@ def _new_file(folder: Path, name: str) -> Path:
     try:
         path = Path(safe_name(f"{name.strip()}.toml"))
     except NameRefusedError as error:
-        raise SettingError(f"name of the mirror: {error}") from None
+        words = str(error).replace("rename it and drop it again", "type another name")
+        raise SettingError(f"name of the mirror: {words}") from None
     for each in (path, path.with_suffix(".html")):
         if (folder / each).exists():
             raise SettingError(f"name of the mirror: {each} is there already and is left as it is; type another name")

@@ -20,7 +20,7 @@ def recording_plot(view: View, setting: Setting) -> Plot:
     """The measured loop: output over drive, each sample that is shown a point."""
     drive, output = view.drive[0], view.output[0]
     points = _trace(drive, output, "measured", BLUE, mode="markers", marker={"size": 3, "color": BLUE})
-    return plot([points], {"title": _drive_title(setting)}, {"title": f"output ({written(setting.output_unit)})"})
+    return plot([points], {"title": _drive_title(setting)}, {"title": _output_title(setting)})
 
 
 def time_plot(view: View, setting: Setting) -> Plot:
@@ -28,7 +28,7 @@ def time_plot(view: View, setting: Setting) -> Plot:
     time = [row / view.rate_hz for row in view.rows]
     drive = _trace(time, view.drive[0], "drive", BLACK)
     output = {**_trace(time, view.output[0], "output", BLUE), "yaxis": "y2"}
-    titles = _drive_title(setting), f"output ({written(setting.output_unit)})"
+    titles = _drive_title(setting), _output_title(setting)
     return plot(
         [drive, output],
         {"title": "time (s)", "anchor": "y2"},
@@ -39,7 +39,11 @@ def time_plot(view: View, setting: Setting) -> Plot:
 
 
 def _drive_title(setting: Setting) -> str:
-    return f"drive ({setting.drive_unit})"
+    return f"drive ({plain(setting.drive_unit)})"
+
+
+def _output_title(setting: Setting) -> str:
+    return f"output ({plain(written(setting.output_unit))})"
 
 
 def loop_plot(fit: LiveFit, number: int, drive_unit: str) -> Plot:
@@ -47,14 +51,20 @@ def loop_plot(fit: LiveFit, number: int, drive_unit: str) -> Plot:
     loop = fit.loops[number]
     measured = _trace(loop.drive, _micro(loop.measured_rad), "measured", GREY, width=4.0)
     model = _trace(loop.drive, _micro(loop.model_rad), plain(fit.model), VERMILION, dash="dash")
-    return plot([measured, model], {"title": f"drive ({drive_unit})"}, {"title": "angle (µrad)"})
+    return plot(
+        [measured, model],
+        {"title": f"drive ({plain(drive_unit)})"},
+        {"title": "angle (µrad)", "exponentformat": "none"},
+    )
 
 
 def residual_plot(fit: LiveFit, number: int) -> Plot:
     """What the model leaves of a recording over time, with the part that no fit has seen shaded."""
     loop = fit.loops[number]
     residual = _trace(loop.time_s, _micro(loop.residual_rad), "measured less model", BLUE)
-    shown = plot([residual], {"title": "time (s)"}, {"title": "residual (µrad)"}, showlegend=False)
+    shown = plot(
+        [residual], {"title": "time (s)"}, {"title": "residual (µrad)", "exponentformat": "none"}, showlegend=False
+    )
     shown["layout"] |= {"shapes": [_unseen(loop)], "annotations": [_told_unseen(loop)]}
     return shown
 

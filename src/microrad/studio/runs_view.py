@@ -221,7 +221,12 @@ def ledger_path(workshop: Workshop, job: Job) -> Path | None:
 
 
 def result_files(workshop: Workshop, job: Job) -> tuple[tuple[int, str], ...]:
-    """The results of a job that are there: their places among them, and their names."""
+    """The results of a job that are there: their places among them, and their names.
+
+    Where a job has failed or was cancelled, files of these names are another run's; a campaign alone writes as it goes.
+    """
+    if job.kind != "campaign" and job.state in ("failed", "cancelled"):
+        return ()
     found = ((place, name, job.cwd / name) for place, name in enumerate(job.results))
     return tuple((place, name) for place, name, path in found if path.is_file() and _is_inside(workshop, path))
 

@@ -64,7 +64,14 @@ class Uploads:
                 shutil.rmtree(place, ignore_errors=True)
 
     def hold_temporary_files(self) -> None:
-        """Have this program's temporary files lie in the private folder, too: a form is spooled before it is read."""
+        """Have this program's temporary files lie in the private folder, too: a form is spooled before it is read.
+
+        It is called by the only studio of the folder as it starts: no file is on its way then, and what an earlier
+        studio or a stranger has left there without a recording in it would count for one.
+        """
+        for place in self._places():
+            if _stored(place) is None:
+                shutil.rmtree(place, ignore_errors=True)
         spool = _private(self.folder / "spool")
         for path in filter(_forgotten, _files(spool)):
             _remove(path)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from pathlib import Path
 from typing import Any
 
@@ -34,6 +35,7 @@ _PLOTS = {
     "motion": "What is to be followed and what the mirror does",
     "jitter_drive": "Drive under disturbance",
 }
+_OWN = ("sensitivity", "gain")  # of the controller, whatever is asked
 _CSS = """
 .control-asked { display: grid; grid-template-columns: 19rem repeat(3, minmax(8rem, 12rem)) auto; gap: .75rem;
                  align-items: center; }
@@ -91,6 +93,7 @@ class ControlPage:
             self.variants = ui.toggle(names, value="both", on_change=self.show)
             self.variants.props('dense no-caps aria-label="Hysteresis of the mirror"')
         self.state = ui.label().classes("soft").props('role="status"')
+        self.fault = ui.label().classes("control-words").props('role="alert"')
         self.notes = ui.column().classes("gap-0")
         self.numbers = ui.element("dl").classes("control-numbers")
         layout.heading("By frequency", 3)
@@ -201,20 +204,32 @@ class ControlPage:
         found = await self._tuned(file, name)
         if mine != self.question:
             return
-        self.state.text = "" if found is not None else f"{name} cannot be built for this mission; the table says why."
+        self.state.text = ""
         if found is None:
+            self.fault.text = f"{name} cannot be built for this mission; the table says why."
+            self._dim(self.plots)
             return
         self._controller(found)
         try:
-            ask = control_view.ask_of(self.step.value, self.amplitude.value, self.frequency.value)
+            ask = control_view.ask_of(self.step.value, self.amplitude.value, self.frequency.value, found.rate_hz)
             self.state.text = "Simulating ..."
             answers = await run.io_bound(found.ask, ask, control_view.SHOWN[self.variants.value])
         except ValueError as error:
-            self.state.text = str(error)
+            self.fault.text, self.state.text = str(error), ""
+            self._dim([name for name in self.plots if name not in _OWN])
             return
         if mine == self.question and answers is not None:
-            self.state.text = ""
+            self.state.text = self.fault.text = ""
             self._answers(found, answers)
+            self._dim([])
+
+    def _dim(self, plots: Collection[str]) -> None:
+        """Turn grey the plots that answer another question than the one that is typed, and the words and numbers."""
+        told = self.told_step, self.told_sine, self.told_jitter
+        grey = [self.plots[name] for name in plots] + [*(told if plots else ())]
+        grey += [self.numbers, self.notes] if any(name in plots for name in _OWN) else []
+        for each in (*self.plots.values(), *told, self.numbers, self.notes):
+            each.classes(**{"add" if each in grey else "remove": "behind"})
 
     def _controller(self, found: Any) -> None:
         from microrad.studio import control_view
@@ -236,9 +251,9 @@ class ControlPage:
         from microrad.studio import control_view as view
 
         self.shaken.visible = bool(answers.jitter)
-        self.told_step.text = view.answer_words(answers.step, "Error")
-        self.told_sine.text = view.answer_words(answers.sine, "Radial error")
-        self.told_jitter.text = view.answer_words(answers.jitter, "Radial error")
+        self.told_step.text = view.answer_words(answers.step, "Error", found.field_of_view_rad)
+        self.told_sine.text = view.answer_words(answers.sine, "Radial error", found.field_of_view_rad)
+        self.told_jitter.text = view.answer_words(answers.jitter, "Radial error", found.field_of_view_rad)
         drawn = {
             "step": view.step_plot(answers),
             "step_drive": view.drive_plot(found, answers.step),

@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import AsyncIterator, Awaitable, Callable
 from typing import Any
 
 from nicegui import app, ui
-from starlette.datastructures import UploadFile
-from starlette.requests import Request
+from starlette.datastructures import FormData, UploadFile
+from starlette.requests import ClientDisconnect, Request
 from starlette.responses import PlainTextResponse, Response
 
 from microrad.studio.names import NameRefusedError
 from microrad.studio.uploads import Upload, UploadError, Uploads
 
 _BLOCK_BYTES = 1 << 20
+_MOST_S = 600.0
+# A form is spooled whole before it is stored, and counts for no limit until then; those that wait are not read.
+_TURNS = asyncio.Semaphore(2)
 
 # One request a file, one after the other; the field is emptied, so that the same file can be chosen again.
 _SEND = """
@@ -69,22 +73,40 @@ class Drop:
         self._refused(f"{name[:60]}: {words[:400]}" if words else self._uploads.too_large(name))
 
     async def _take(self, request: Request) -> Response:
-        try:
-            async with request.form(max_files=1, max_fields=1) as form:
-                for each in form.values():
-                    if isinstance(each, UploadFile):
-                        await self._one(each)
-        except OSError as error:  # of the temporary file that a form is kept in
-            self._refused(f"the file could not be stored: {error.strerror or error}; check free space and permissions")
+        """Store the file of a request, in its turn, and hand it on."""
+        for stored in await self._stored(request):
+            await self._taken(stored)
         return PlainTextResponse("read")
 
-    async def _one(self, sent: UploadFile) -> None:
+    async def _stored(self, request: Request) -> list[Upload]:
+        """The file of a request as it is stored; nothing where it is refused, or its sender is gone."""
         try:
-            stored = await self._uploads.save(sent.filename or "", _blocks(sent))
+            async with _TURNS:
+                form = await asyncio.wait_for(_form(request), _MOST_S)
+                try:
+                    return [await self._uploads.save(f.filename or "", _blocks(f)) for f in _files(form)]
+                finally:
+                    await form.close()
+        except ClientDisconnect:
+            pass
+        except TimeoutError:
+            self._refused(
+                f"the file is not taken: it was not here after {_MOST_S / 60:g} min; cut out the part that you need, "
+                "or run microrad identify on the file, which needs no upload"
+            )
         except (NameRefusedError, UploadError) as error:
             self._refused(str(error))
-            return
-        await self._taken(stored)
+        except OSError as error:  # of the temporary file that a form is kept in
+            self._refused(f"the file could not be stored: {error.strerror or error}; check free space and permissions")
+        return []
+
+
+async def _form(request: Request) -> FormData:
+    return await request.form(max_files=1, max_fields=1)
+
+
+def _files(form: FormData) -> list[UploadFile]:
+    return [each for each in form.values() if isinstance(each, UploadFile)]
 
 
 async def _blocks(sent: UploadFile) -> AsyncIterator[bytes]:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Awaitable
+from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
@@ -59,10 +61,11 @@ class MirrorPage:
         self.uploads = Uploads(workshop.studio / "uploads")
         self.path = workshop.studio / "mirror-form.json"
         self.form = mirror_form.kept_form(self.path)
-        self.seen, self.shown, self.question = "", "", 0
-        self.listing: reading.Listing | None = None
-        self.files: tuple[Dropped, ...] | None = None
-        self.filling = False
+        self.shown, self.question, self.filling, self.kept = "", 0, False, True
+        self.listings: dict[str, reading.Listing | str] = {}  # by key: a recording stays as it is
+        self.listing_turn = asyncio.Lock()
+        self.faults: dict[tuple[str, reading.Columns], str] = {}
+        self.drawn: object = None
         layout.copy_buttons(self.action)
         with ui.element("div").classes("mirror-page"):
             with ui.element("div").classes("mirror-form"):
@@ -71,6 +74,7 @@ class MirrorPage:
                 self._plots()
                 self.job = JobView(workshop)
         ui.timer(_LOOK_S, self.look)
+        ui.timer(_LOOK_S, self.check)
 
     # ------------------------------------------------------------------------------------------------------- the parts
     def _inputs(self) -> None:
@@ -121,49 +125,106 @@ class MirrorPage:
     # -------------------------------------------------------------------------------------------------- the recordings
     async def take(self, upload: Upload) -> None:
         """Look into a file that was dropped; one that is no recording is thrown away, in the reader's words."""
-        try:
-            listing = await run.io_bound(reading.list_channels, upload.path)
-        except reading.ReadingError as error:
+        found = await self._listing(upload.key)
+        if isinstance(found, str):
             self.uploads.remove(upload.key)
-            self.refuse(str(error))
+            self.refuse(found)
             return
         self.refused.text = ""
-        if listing is None:
+        if found is None:
             return
-        if len(self.dropped()) == 1 or self.form.setting.drive is None:
-            self.keep(replace(self.form, setting=mirror_form.first_setting(listing, upload.name)))
-        self.seen = upload.key
+        alone = len(self.dropped()) == 1 or self.form.setting.drive is None
+        self.keep(mirror_form.shown(self.form, found, upload.key, upload.name, alone=alone))
+        self._fill()
         await self.look()
+
+    async def _listing(self, key: str) -> reading.Listing | str | None:
+        """The channels of a recording, or why there are none; None while the server ends."""
+        async with self.listing_turn:
+            if key not in self.listings:
+                found = await run.io_bound(self._channels, key)
+                if found is None:
+                    return None
+                self.listings[key] = found
+        return self.listings[key]
+
+    def _channels(self, key: str) -> reading.Listing | str:
+        try:
+            return reading.list_channels(self.uploads.get(key).path)
+        except (UploadError, reading.ReadingError) as error:
+            return str(error)
 
     def refuse(self, words: str) -> None:
         """Say why a file is not taken."""
         self.refused.text = words
 
     def dropped(self) -> tuple[Dropped, ...]:
-        """The recordings in the folder, with what each is used for."""
+        """The recordings in the folder, with what each is used for, and the channels of those that were looked into."""
         uses = self.form.uses
-        return tuple(Dropped(u.key, u.name, u.path, uses.get(u.key, "fit")) for u in self.uploads.listed())
+        return tuple(
+            Dropped(u.key, u.name, u.path, uses.get(u.key, "fit"), self._known(u.key)) for u in self.uploads.listed()
+        )
 
-    def _rows(self) -> None:
+    def _known(self, key: str) -> reading.Listing | None:
+        found = self.listings.get(key)
+        return found if isinstance(found, reading.Listing) else None
+
+    def _rows(self, files: tuple[Dropped, ...]) -> None:
+        """List the recordings, where there is something new to be said of them."""
+        faults = [self._fault(each) for each in files]
+        if self.drawn == (drawn := ([replace(each, listing=None) for each in files], self.form.seen, faults)):
+            return
+        self.drawn = drawn
         self.list.clear()
         with self.list:
-            for each in self.files or ():
-                self._row(each)
+            for each, fault in zip(files, faults, strict=True):
+                self._row(each, fault)
 
-    def _row(self, each: Dropped) -> None:
+    def _row(self, each: Dropped, fault: str) -> None:
         with ui.element("div").classes("mirror-file w-full"):
-            name = ui.label(each.name).classes("name" + (" seen" if each.key == self.seen else ""))
+            name = ui.label(each.name).classes("name" + (" seen" if each.key == self.form.seen else ""))
             name.tooltip(each.name)
             use = ui.select(mirror_form.USES, value=each.use, on_change=lambda e: self.use(each.key, e.value))
             use.props(f'dense outlined options-dense aria-label="Use of {_attribute(each.name)}"')
             ui.button("Show", on_click=lambda: self.see(each.key)).props("dense no-caps flat")
             ui.button("Remove", on_click=lambda: self.remove(each.key)).props("dense no-caps flat")
+        if fault and each.use != "leave":
+            ui.label(fault).classes("mirror-words small")
+
+    def _fault(self, each: Dropped) -> str:
+        """Why a recording cannot be used with the channels of the form, as far as it is known."""
+        found = self.listings.get(each.key)
+        if isinstance(found, str):
+            return found
+        with suppress(SettingError):
+            return self.faults.get((each.key, mirror_form.columns(self.form.setting)), "")
+        return ""
+
+    async def check(self) -> None:
+        """Read one recording that was not read yet with the channels of the form: a fit would stumble over it."""
+        with suppress(SettingError):
+            columns = mirror_form.columns(self.form.setting)
+            for each in self.dropped():
+                if each.use != "leave" and each.key != self.form.seen and (each.key, columns) not in self.faults:
+                    await self._checked(each, columns)
+                    break
+
+    async def _checked(self, each: Dropped, columns: reading.Columns) -> None:
+        if await self._listing(each.key) is not None:
+            words = (await run.io_bound(self._view, each.key, columns) or (None, ""))[1]
+            self.faults[each.key, columns] = words
 
     async def see(self, key: str) -> None:
-        """Show another recording."""
-        self.seen = key
-        self._rows()
-        await self.look()
+        """Show another recording, with the form as it is for its channels."""
+        name = next((each.name for each in self.dropped() if each.key == key), "")
+        found = await self._listing(key) if key else None
+        if isinstance(found, reading.Listing):
+            self.keep(mirror_form.shown(self.form, found, key, name))
+        else:
+            self.keep(replace(self.form, seen=key))
+        self._fill()
+        self._rows(self.dropped())
+        await self._measured()
 
     async def remove(self, key: str) -> None:
         """Delete a recording from the studio's folder."""
@@ -182,18 +243,20 @@ class MirrorPage:
     async def _take_over(self) -> None:
         values = {key: field.value for key, field in self.fields.items()}
         values["accept"] = tuple(values["accept"] or ())
-        self.keep(replace(self.form, setting=Setting(**values)))
+        self.keep(mirror_form.edited(self.form, self._known(self.form.seen), Setting(**values)))
+        self._fill()
         await self._measured()
 
     def keep(self, form: Form) -> None:
         """Keep the form where other tabs and a reload find it."""
         self.form = form
-        layout.attempt(lambda: mirror_form.keep_form(self.path, form))
+        self.kept = layout.attempt(lambda: mirror_form.keep_form(self.path, form))
 
     def _fill(self) -> None:
         """Show the form as it is kept, with the channels of the recording that is shown."""
         self.filling = True
-        options = {} if self.listing is None else mirror_form.labels(self.listing)
+        listing = self._known(self.form.seen)
+        options = {} if listing is None else mirror_form.labels(listing)
         setting = self.form.setting
         for key, field in self.fields.items():
             value = getattr(setting, key)
@@ -231,44 +294,49 @@ class MirrorPage:
     # --------------------------------------------------------------------------------------------------------- looking
     async def look(self) -> None:
         """Follow the folder and what other tabs have typed."""
-        form, files = mirror_form.kept_form(self.path), None
+        form = mirror_form.kept_form(self.path) if self.kept else self.form
         if form != self.form:
             self.form = form
             self._fill()
         files = self.dropped()
-        if files != self.files:
-            self.files = files
-            if self.seen not in {each.key for each in files}:
-                self.seen = files[-1].key if files else ""
-            self._rows()
+        if self.form.seen not in {"", *(each.key for each in files)} or (files and not self.form.seen):
+            await self.see(files[-1].key if files else "")
+        self._rows(self.dropped())
         await self._measured()
 
     async def _measured(self) -> None:
         """Show the recording, unless it is shown already; a late answer to an old question is dropped."""
-        key = f"{self.seen} {self.form.setting}"
+        seen, setting = self.form.seen, self.form.setting
+        key = f"{seen} {setting}"
         if key == self.shown:
             return
         self.shown, self.question = key, self.question + 1
         mine = self.question
-        found = await run.io_bound(self._look_into, self.seen, self.form.setting)
+        found = await self._look_into(seen, setting)
         if mine == self.question and found is not None:
             self._show(*found)
 
-    def _look_into(self, key: str, setting: Setting) -> tuple[reading.Listing | None, reading.View | None, str]:
-        """The channels of a recording, its samples, and why there are none."""
-        if not key:
-            return None, None, ""
-        listing = None
+    async def _look_into(self, key: str, setting: Setting) -> tuple[reading.View | None, str] | None:
+        """The samples of a recording, and why there are none."""
+        listing = await self._listing(key) if key else ""
+        if not isinstance(listing, reading.Listing):
+            return None if listing is None else (None, listing)
         try:
-            upload = self.uploads.get(key)
-            listing = reading.list_channels(upload.path)
-            return listing, reading.view(upload.path, mirror_form.columns(setting)), ""
-        except (UploadError, reading.ReadingError, SettingError) as error:
-            return listing, None, str(error)
+            columns = mirror_form.columns(setting)
+        except SettingError as error:
+            return None, str(error)
+        found: tuple[reading.View | None, str] | None = await run.io_bound(self._view, key, columns)
+        if found is not None:
+            self.faults[key, columns] = found[1]
+        return found
 
-    def _show(self, listing: reading.Listing | None, view: reading.View | None, words: str) -> None:
-        if listing != self.listing:
-            self.listing = listing
+    def _view(self, key: str, columns: reading.Columns) -> tuple[reading.View | None, str]:
+        try:
+            return reading.view(self.uploads.get(key).path, columns), ""
+        except (UploadError, reading.ReadingError) as error:
+            return None, mirror_form.in_the_form(str(error))
+
+    def _show(self, view: reading.View | None, words: str) -> None:
         self._fill()
         self.words.text = words
         setting = self.form.setting
