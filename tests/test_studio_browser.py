@@ -85,6 +85,12 @@ def test_an_aperture_is_changed_checked_saved_and_budgeted_by_the_command_line(s
         assert shown.startswith(f"{margin:.2f} dB")
     assert "6 cm" in tab.get_by_role("row").filter(has_text=APERTURE).inner_text()
     assert "5 cm" in tab.get_by_role("row").filter(has_text=APERTURE).inner_text()
+    assert tab.get_by_role("columnheader", name="the paper's mission").count() == 2  # though both are leo-geo.toml
+    tab.get_by_role("button", name="Copy as command").last.click()
+    tab.get_by_text("the paper's mission is not a file of this folder yet; save it there first.").wait_for()
+    tab.reload()
+    tab.get_by_role("heading", name="Verdicts").wait_for()
+    assert tab.get_by_label("Compare with").input_value() == "the paper's mission"
     tab.screenshot(path=pictures / "compare.png", full_page=True)
 
 
@@ -101,6 +107,34 @@ def test_the_text_and_the_form_follow_each_other(studio, tab):
     tab.get_by_role("button", name="Back to the saved file").click()
     tab.get_by_role("button", name="Lose the changes").click()
     tab.wait_for_function("document.querySelector('.mission-row:nth-of-type(2) input')?.value === '15 cm'")
+
+
+def test_a_file_that_another_program_changes_is_told_and_opened_again(studio, tab):
+    before = studio.file.read_text("utf-8")
+    show_table(tab, "terminals")
+    for size, text in (("17 cm", before.replace('"15 cm"', '"17 cm"', 1)), ("15 cm", before)):
+        studio.file.write_text(text, "utf-8")
+        tab.get_by_role("status").get_by_text("changed on disk; open it again", exact=True).wait_for()
+        tab.get_by_role("button", name="Back to the saved file").click()
+        tab.get_by_role("button", name="Open again").click()
+        api.expect(tab.get_by_label("geo_aperture")).to_have_value(size)
+        tab.get_by_role("status").get_by_text("saved", exact=True).wait_for()
+
+
+def test_a_dial_that_is_typed_is_in_the_file_that_a_click_on_save_writes_at_once(studio, opened):
+    before = studio.file.read_text("utf-8")
+    tab = opened("link")
+    size = tab.get_by_label("LEO aperture", exact=True)
+    size.wait_for()
+    old = size.input_value()
+    for last in ("8 cm", old):
+        size.fill("7 cm")
+        size.press("Enter")
+        tab.get_by_role("status").get_by_text("not saved", exact=True).wait_for()
+        size.fill(last)
+        tab.get_by_role("button", name="Save", exact=True).click()
+        tab.get_by_role("status").get_by_text("saved", exact=True).wait_for()
+        assert studio.file.read_text("utf-8") == before.replace(f'leo_aperture = "{old}"', f'leo_aperture = "{last}"')
 
 
 def test_a_text_too_long_for_a_message_is_not_pasted(tab):
@@ -161,6 +195,15 @@ def test_a_table_is_added_from_its_example_and_saved_under_another_name(studio, 
     tab.get_by_role("option", name="leo-geo.toml").click()
     dialog.get_by_role("button", name="Open", exact=True).click()
     tab.locator(".mission-entry").filter(has_text="channel").wait_for(state="detached")
+    tab.locator(".cm-content").click()
+    tab.keyboard.press("Control+z")  # not into the mission before
+    tab.keyboard.type("#")
+    tab.get_by_role("status").get_by_text("not saved").wait_for()
+    kept = json.loads((studio.folder / ".microrad-studio" / "draft.json").read_text("utf-8"))
+    assert "channel" not in re.findall(r"^\[(\w+)", kept["text"], re.MULTILINE)
+    tab.get_by_role("button", name="Back to the saved file").click()
+    tab.get_by_role("button", name="Lose the changes").click()
+    tab.get_by_role("status").get_by_text("saved", exact=True).wait_for()
     (studio.folder / "with-channel.toml").unlink()
 
 

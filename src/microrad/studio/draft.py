@@ -8,11 +8,14 @@ from __future__ import annotations
 
 import hashlib
 import threading
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from decimal import Decimal
+from functools import lru_cache
 from importlib import resources
 from pathlib import Path
+from typing import Literal
 
 from microrad.document import MAX_BYTES, Fault, MissionError, Statement, clipped, scan
 from microrad.folder import write_whole
@@ -22,6 +25,9 @@ from microrad.studio.draft_keys import Key, key_of, keys_in, loose_toml, typed_f
 _MARK = "\ufeff"
 _HEADERS = ("table", "tables", "broken")
 _saving = threading.Lock()
+
+OnDisk = Literal["", "changed", "gone"]
+"""What another program has done with a draft's file; "" for nothing."""
 
 
 class DraftError(ValueError):
@@ -80,6 +86,18 @@ class Draft:
         """Whether the text is not what stands on disk, as far as is known here."""
         return self.sha256 != self.disk_sha256
 
+    def on_disk(self) -> OnDisk:
+        """What has become of the file since it was read or written here; a file not written yet has changed if it is
+        there.
+        """
+        try:
+            if not self.path.exists():
+                return "gone" if self.disk_sha256 else ""
+            content = self.path.read_bytes() if self.path.is_file() and self.path.stat().st_size <= MAX_BYTES else b""
+        except OSError:
+            return "changed"
+        return "" if hashlib.sha256(content).hexdigest() in (self.disk_sha256, self.sha256) else "changed"
+
     @property
     def report(self) -> str:
         """Every fault, as the command line prints them; "" when there is none."""
@@ -88,21 +106,12 @@ class Draft:
     @property
     def values(self) -> dict[str, Value]:
         """Each key that has a line of its own, in the order of the text."""
-        faults: dict[str, list[Fault]] = {}
-        for fault in self.problems:
-            faults.setdefault(fault.key, []).append(fault)
-        found: dict[str, Value] = {}
-        for each in scan(_plain(self.text)):
-            if each.kind == "key" and each.key not in found:
-                told = tuple(faults.get(clipped(each.key), ()))
-                typed, about = typed_from(each.value), key_of(each.key)
-                found[each.key] = Value(each.key, each.value, typed, each.comment, each.line, about, told)
-        return found
+        return dict(_values(self.text, self.problems))
 
     @property
     def absent(self) -> tuple[Key, ...]:
         """Keys that the tables of the text may have or need, and do not have."""
-        statements = scan(_plain(self.text))
+        statements = _statements(self.text)
         tables = ["", *(each.key for each in statements if each.kind == "table")]
         there = {each.key for each in statements}
         return tuple(key for table in tables for key in keys_in(table) if key.key not in there)
@@ -217,6 +226,25 @@ def _draft(text: str, path: Path, disk_sha256: str) -> Draft:
         return Draft(text, path, (), disk_sha256, load_link(path, text=text))
     except MissionError as error:
         return Draft(text, path, error.faults, disk_sha256)
+
+
+@lru_cache(maxsize=4)  # a page asks for them a dozen times, and a long text takes its time
+def _statements(text: str) -> tuple[Statement, ...]:
+    return tuple(scan(_plain(text)))
+
+
+@lru_cache(maxsize=4)
+def _values(text: str, problems: tuple[Fault, ...]) -> Mapping[str, Value]:
+    faults: dict[str, list[Fault]] = {}
+    for fault in problems:
+        faults.setdefault(fault.key, []).append(fault)
+    found: dict[str, Value] = {}
+    for each in _statements(text):
+        if each.kind == "key" and each.key not in found:
+            told = tuple(faults.get(clipped(each.key), ()))
+            typed, about = typed_from(each.value), key_of(each.key)
+            found[each.key] = Value(each.key, each.value, typed, each.comment, each.line, about, told)
+    return found
 
 
 def _content(path: Path) -> bytes:

@@ -1,14 +1,15 @@
 // A number of the mission as a field and a slider, with what is wrong with it. It keeps what it shows by itself: for a
 // change of a property, NiceGUI would build the whole page anew.
+// What is typed is let go with the focus, so before a click elsewhere is told; Quasar's own blur comes behind it.
 const TYPING_MS = 150;
 const MOVING_MS = 20;
 
 export default {
   template: `
-    <div class="dial">
+    <div class="dial" @focusout="settle">
       <q-input dense autocomplete="off" spellcheck="false" :label="label" :model-value="text"
         :aria-invalid="fault ? 'true' : 'false'"
-        @update:model-value="typing" @blur="settle" @keydown.enter="settle" />
+        @update:model-value="typing" @keydown.enter="settle" />
       <q-slider v-if="steps" color="primary" :min="0" :max="steps" :step="1" :model-value="place"
         :aria-label="label + ', slider'" @update:model-value="moving" @change="release" />
       <div v-show="fault" class="dial-fault" role="alert">{{ fault }}</div>

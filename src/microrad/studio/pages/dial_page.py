@@ -41,7 +41,6 @@ class DialPage(Generic[T]):
         self.last: Attempt[T] | None = None
         self._wanted: Callable[[], Attempt[T]] | None = None
         self._busy = self._grey = False
-        self._writing = asyncio.Lock()
         with ui.element("div").classes("beside"):
             with ui.element("div").classes("dial-column"):
                 self.board = DialBoard(self._try, self._set, seldom)
@@ -78,15 +77,14 @@ class DialPage(Generic[T]):
         await self._ask(partial(attempt, self.workshop.draft, key, typed, self.view))
 
     async def _set(self, key: str, typed: str) -> None:
-        """Write a value into the draft, behind those let go before; what it does is shown first."""
-        async with self._writing:
-            while self._busy:
-                await asyncio.sleep(_SHORT_S)
-            try:
-                await run.io_bound(self.workshop.set, key, typed)
-            except (ValueError, OSError) as error:
-                layout.refuse(str(error))
-                return
+        """Write a value into the draft at once, before anything else that the same click asks for, and show it."""
+        try:
+            self.workshop.set(key, typed)
+        except (ValueError, OSError) as error:
+            layout.refuse(str(error))
+            return
+        while self._busy:
+            await asyncio.sleep(_SHORT_S)
         self._mark()
         await self._reload()
 

@@ -11,12 +11,14 @@ from nicegui import ui
 from nicegui.elements.mixins.text_element import TextElement
 
 from microrad.studio.commands import Action, command
-from microrad.studio.draft import Draft
+from microrad.studio.draft import Draft, OnDisk
 from microrad.studio.names import NameRefusedError
 from microrad.studio.workshop import Workshop
 
 POLL_S = 0.5
 """Between two looks at what another tab or a job has changed."""
+
+_ON_DISK: dict[OnDisk, str] = {"": "", "changed": "changed on disk; open it again", "gone": "gone from disk"}
 
 
 @contextmanager
@@ -37,30 +39,34 @@ def frame(workshop: Workshop, title: str, entries: tuple[tuple[str, str], ...]) 
 
 
 def _state(workshop: Workshop) -> None:
+    async def late_save() -> None:  # a task, as writing a dial is, and so behind the one that this click has let go
+        save_draft(workshop)
+
     with ui.row().classes("studio-state"):
         ui.label("microrad studio").classes("studio-name")
         mission = ui.label().classes("studio-mission")
         state = ui.label().props('role="status"').classes("studio-saved")
-        save = ui.button("Save", on_click=lambda: save_draft(workshop)).props("dense no-caps outline")
+        save = ui.button("Save", on_click=late_save).props("dense no-caps outline")
 
     def show() -> None:
-        draft = workshop.draft
+        draft, disk = workshop.draft, workshop.disk
         mission.text = workshop.name_of(draft.path)
-        state.text = _words(draft)
-        save.enabled = draft.changed
+        state.text = _words(draft, disk)
+        save.enabled = draft.changed or disk == "gone"
 
     follow(workshop, show)
 
 
-def _words(draft: Draft) -> str:
+def _words(draft: Draft, disk: OnDisk) -> str:
     faults = len(draft.problems)
-    saved = "not saved" if draft.changed else "saved"
-    return saved if not faults else f"{saved}, {faults} fault{'s' if faults > 1 else ''} to correct"
+    saved = "not saved" if draft.changed or disk == "gone" else "" if disk else "saved"
+    count = f"{faults} fault{'s' if faults > 1 else ''} to correct" if faults else ""
+    return ", ".join(filter(None, (saved, count, _ON_DISK[disk])))
 
 
 def save_draft(workshop: Workshop) -> bool:
     """Save the mission to its own file; says what went wrong, and whether it is saved."""
-    return attempt(lambda: workshop.change(workshop.draft.save()))
+    return attempt(workshop.save)
 
 
 def attempt(do: Callable[[], object]) -> bool:
@@ -89,6 +95,7 @@ def follow(workshop: Workshop, show: Callable[[], Any]) -> Callable[[], None]:
 
     def look() -> None:
         nonlocal seen
+        _ = workshop.disk  # looking is what finds out that another program has changed it
         if seen != workshop.revision:
             seen = workshop.revision
             show()

@@ -158,7 +158,7 @@ class JobView:
 
     def use(self, mirror: Path) -> None:
         """Put the mirror into the mission that is being edited."""
-        if layout.attempt(lambda: self.workshop.change(with_mirror_file(self.workshop.draft, mirror))):
+        if layout.attempt(lambda: self.workshop.edit(lambda draft: with_mirror_file(draft, mirror))):
             ui.notify(f"[mirror] of the mission names {mirror.name} now; save the mission to keep it.", type="positive")
 
 

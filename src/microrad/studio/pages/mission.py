@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import partial
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,7 @@ from microrad.studio.workshop import Workshop
 TITLE = "Mission"
 PATH = "/"
 
+_MOST_TABLES = _MOST_FAULTS = 50  # in a list; the command line shows as many faults, a mission has some 20 tables
 _MOST_PASTED = 500_000
 """Characters: a message of two bytes each still comes through to the server, and a mission has some ten thousand."""
 _TOO_MUCH = """
@@ -35,6 +37,10 @@ _NAME_EDITOR = """
 document.querySelectorAll('.mission-text .cm-content').forEach(e => e.ariaLabel = 'Text of the mission');
 document.querySelectorAll('.mission-text .cm-scroller').forEach(e => e.tabIndex = 0);
 """
+
+
+class _BehindError(ValueError):
+    """What was typed belongs to a text that is not the mission's any more."""
 
 
 def page(workshop: Workshop) -> None:
@@ -57,20 +63,17 @@ class _Page:
                 )
                 self.list = ui.column().classes("mission-list")
             self.form = Form(workshop, self._edited, self._reveal)
-            with ui.element("section").classes("mission-text").props('aria-label="Text"') as section:
-                self.editor = ui.codemirror(
-                    _plain(workshop.draft), language="TOML", theme="vscodeLight", on_change=self._text
-                )
+            with ui.element("section").classes("mission-text").props('aria-label="Text"') as self.section:
+                self.editor = self._editor()
                 self.faults = ui.column().classes("mission-faults")
         for event in ("paste.capture", "drop.capture"):
-            section.on(event, self._too_much, js_handler=_TOO_MUCH)
+            self.section.on(event, self._too_much, js_handler=_TOO_MUCH)
         self.entries: dict[str, tuple[Any, Any]] = {}
         self._list()
         self.form.show(next(iter(tables(workshop.draft)), ""))
         self._choose(self.form.table)
         self._faults()
         self.mark = layout.follow(workshop, self._all)
-        ui.timer(0.5, lambda: ui.run_javascript(_NAME_EDITOR), once=True)
 
     # ---------------------------------------------------------------------------------------------------- what is shown
     def _all(self) -> None:
@@ -88,7 +91,9 @@ class _Page:
 
     def _edited(self) -> None:
         """The text, the faults and the list, after a change in the form."""
-        self.editor.value = _plain(self.workshop.draft)
+        if self.opened != self.workshop.opened:
+            self._new_editor()
+        self.shown = self.editor.value = _plain(self.workshop.draft)
         self._around()
 
     def _around(self) -> None:
@@ -99,7 +104,7 @@ class _Page:
 
     def _list(self) -> None:
         """The tables, each with the number of its faults."""
-        found = tables(self.workshop.draft)
+        found = dict(islice(tables(self.workshop.draft).items(), _MOST_TABLES))
         if list(found) != list(self.entries):
             self.list.clear()
             with self.list:
@@ -139,18 +144,41 @@ class _Page:
             self._choose(self.form.table)
 
     # ------------------------------------------------------------------------------------------------------------- text
+    def _editor(self) -> ui.codemirror:
+        self.opened, self.shown = self.workshop.opened, _plain(self.workshop.draft)
+        ui.timer(0.5, lambda: ui.run_javascript(_NAME_EDITOR), once=True)
+        return ui.codemirror(self.shown, language="TOML", theme="vscodeLight", on_change=self._text)
+
+    def _new_editor(self) -> None:
+        """An editor that cannot undo its way back into another mission; what is typed in the one before is dropped."""
+        self.editor.delete()
+        with self.section:
+            self.editor = self._editor().move(target_index=0)
+
     def _text(self, event: Any) -> None:
-        if event.value == _plain(self.workshop.draft):
+        if event.value == self.shown:
             return
         try:
-            self.workshop.change(self.workshop.draft.with_text(event.value))
+            self.workshop.edit(lambda draft: self._followed(draft, event.value))
+        except _BehindError as error:
+            self._new_editor()
+            self._all()
+            ui.notify(str(error), type="warning")
+            return
         except (DraftError, OSError) as error:
             layout.refuse(str(error))
             return
+        self.shown = _plain(self.workshop.draft)
         if self.form.table not in tables(self.workshop.draft):
             self.form.show(next(iter(tables(self.workshop.draft)), ""))
         self.form.refresh()
         self._around()
+
+    def _followed(self, draft: Draft, text: str) -> Draft:
+        """The draft with this page's text; `_BehindError` where the page does not show the draft as it is."""
+        if self.opened != self.workshop.opened or self.shown != _plain(draft):
+            raise _BehindError("The mission was changed in another tab just now: the text shows it; type that again.")
+        return draft.with_text(text)
 
     def _too_much(self) -> None:
         layout.refuse(f"that text has more than {_MOST_PASTED} characters and is no mission: it was not put in")
@@ -162,12 +190,14 @@ class _Page:
         with self.faults:
             count = f"{len(problems)} fault{'s' if len(problems) > 1 else ''} to correct" if problems else "No faults."
             ui.label(count).props('role="status"').classes("no" if problems else "soft")
-            for fault in problems:
+            for fault in problems[:_MOST_FAULTS]:
                 place = f"line {fault.line}: {fault.key}" if fault.line else fault.key
                 with ui.element("div").classes("mission-fault"):
                     go = ui.button(place, on_click=partial(self._go, fault.key, fault.line))
                     go.props("flat dense no-caps")
                     ui.label(fault_words(fault)).classes("small")
+            if len(problems) > _MOST_FAULTS:
+                ui.label(f"and {len(problems) - _MOST_FAULTS} more").classes("small")
 
     def _go(self, key: str, line: int) -> None:
         found = tables(self.workshop.draft)

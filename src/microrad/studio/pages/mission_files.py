@@ -27,7 +27,7 @@ def file_buttons(workshop: Workshop, shown: Callable[[str], None]) -> None:
         ui.button("Add a table ...", on_click=lambda: _add_table(workshop, shown)).props("no-caps outline dense")
 
     def look() -> None:
-        back.enabled = workshop.draft.changed and workshop.draft.path.exists()
+        back.enabled = workshop.draft.path.exists() and (workshop.draft.changed or workshop.disk == "changed")
 
     layout.follow(workshop, look)
 
@@ -39,7 +39,7 @@ def _open(workshop: Workshop, shown: Callable[[str], None]) -> None:
         return
 
     def do(name: str) -> None:
-        workshop.change(Draft.open(workshop.inside(name)))
+        workshop.replace(Draft.open(workshop.inside(name)))
 
     _ask(f"Open a mission in {workshop.folder}", "File", "Open", names, do, shown, _lost(workshop))
 
@@ -51,7 +51,7 @@ def _new(workshop: Workshop, shown: Callable[[str], None]) -> None:
     def do(name: str) -> None:
         file = "leo-geo.toml" if name == _PAPER else f"{name}.toml"
         draft = Draft.shipped(_free(workshop, file))
-        workshop.change(draft if name == _PAPER else draft.with_text(presets.preset_text(name)))
+        workshop.replace(draft if name == _PAPER else draft.with_text(presets.preset_text(name)))
 
     _ask("Begin a new mission", "From", "Begin", texts, do, shown, _lost(workshop))
 
@@ -66,8 +66,16 @@ def _free(workshop: Workshop, name: str) -> str:
 
 
 def _lost(workshop: Workshop) -> str:
-    changed = workshop.draft.changed and workshop.draft.path.exists()
-    return "Changes that are not saved will be lost." if changed else ""
+    """What is lost with the draft, where that is more than one can begin from again."""
+    draft, disk = workshop.draft, workshop.disk
+    if disk == "gone" or (draft.changed and not draft.disk_sha256 and draft.text not in _beginnings()):
+        return f"{draft.path.name} is not on disk and will be lost; save it first to keep it."
+    return "Changes that are not saved will be lost." if draft.changed and draft.disk_sha256 else ""
+
+
+def _beginnings() -> set[str]:
+    """The texts that a new mission begins with."""
+    return {Draft.shipped("").text, *(presets.preset_text(each.name) for each in presets.presets())}
 
 
 def _add_table(workshop: Workshop, shown: Callable[[str], None]) -> None:
@@ -77,21 +85,23 @@ def _add_table(workshop: Workshop, shown: Callable[[str], None]) -> None:
         return
 
     def do(name: str) -> None:
-        workshop.change(with_table(workshop.draft, name.strip("[]")))
+        workshop.edit(lambda draft: with_table(draft, name.strip("[]")))
 
     _ask("Add a table, with example values to be changed", "Table", "Add", names, do, shown)
 
 
 def _revert(workshop: Workshop, shown: Callable[[str], None]) -> None:
     def do() -> None:
-        if layout.attempt(lambda: workshop.change(Draft.open(workshop.draft.path))):
+        if layout.attempt(workshop.reopen):
             shown("")
         dialog.close()
 
     with ui.dialog() as dialog, ui.card():
-        layout.heading(f"Open {workshop.draft.path.name} again and lose the changes?")
+        lost = workshop.draft.changed
+        asked = "and lose the changes?" if lost else "as it is on disk now?"
+        layout.heading(f"Open {workshop.draft.path.name} again {asked}")
         with ui.row():
-            ui.button("Lose the changes", on_click=do).props("no-caps")
+            ui.button("Lose the changes" if lost else "Open again", on_click=do).props("no-caps")
             ui.button("Cancel", on_click=dialog.close).props("no-caps outline")
     dialog.open()
 
@@ -101,8 +111,7 @@ def _save_as(workshop: Workshop, shown: Callable[[str], None]) -> None:
         fault.text = ""
         try:
             given = safe_name(name.value or "")
-            path = workshop.inside(given if given.endswith(".toml") else f"{given}.toml")
-            workshop.change(workshop.draft.save(path))
+            workshop.save(given if given.endswith(".toml") else f"{given}.toml")
         except NameRefusedError as error:
             fault.text = layout.name_words(error)
             return

@@ -18,6 +18,7 @@ from microrad.studio.workshop import Workshop
 ROOT = "general"
 """What the keys outside of every table are called."""
 
+_MOST = 300  # rows; a mission has some two hundred keys in all, and a page with thousands stops the browser
 _WAIT_MS = 150  # behind the last character, before what was typed is checked
 
 
@@ -63,6 +64,7 @@ class Form:
         self.workshop, self.table, self.sought = workshop, "", ""
         self._changed, self._entered = changed, entered
         self._rows: dict[str, _Row] = {}
+        self._left = 0
         self._place = ui.column().classes("mission-form")
 
     def show(self, table: str, sought: str = "") -> None:
@@ -78,18 +80,24 @@ class Form:
                 if inner != (inner := value.key.rpartition(".")[0]) or not self._rows:
                     layout.heading(f"[{inner}]" if inner else "General")
                 self._row(value)
+            if self._left:
+                more = f"Only the first {_MOST} of {_MOST + self._left} keys have a row here"
+                ui.label(f'{more}; look for others with "Find a key", or change them in the text.').classes("no")
             if not self.sought:
                 self._more()
 
-    def refresh(self) -> None:
-        """Take over what has changed elsewhere; the rows are built anew only when there are others."""
+    def refresh(self, typed: str = "") -> None:
+        """Take over what has changed elsewhere, but for the key that is being typed here.
+
+        The rows are built anew only when there are others.
+        """
         values = {value.key: value for value in self._chosen()}
         if list(values) != list(self._rows) and not (self.sought and set(values) < set(self._rows)):
             self.show(self.table, self.sought)
             return
         for key, value in values.items():
             row = self._rows[key]
-            if value.typed != row.typed:
+            if value.typed != row.typed and key != typed:
                 row.typed = value.typed
                 _put(row.field, value)
         self.judge()
@@ -102,10 +110,14 @@ class Form:
                 _judge(row, values[key])
 
     def _chosen(self) -> list[Value]:
-        values = self.workshop.draft.values.values()
+        """The values that get a row; notes how many do not."""
+        values = [*self.workshop.draft.values.values()]
         if self.sought:
-            return [v for v in values if self.sought in f"{v.key} = {v.typed} {v.comment}".lower()]
-        return [v for v in values if table_of(v.key) == self.table]
+            values = [v for v in values if self.sought in f"{v.key} = {v.typed} {v.comment}".lower()]
+        else:
+            values = [v for v in values if table_of(v.key) == self.table]
+        self._left = max(0, len(values) - _MOST)
+        return values[:_MOST]
 
     # ------------------------------------------------------------------------------------------------------------ rows
     def _row(self, value: Value) -> None:
@@ -141,11 +153,11 @@ class Form:
         except (DraftError, OSError) as error:
             _say(row, str(error), wrong=True)
             return
-        self.judge()
+        self.refresh(key)
         self._changed()
 
     def _drop(self, key: str) -> None:
-        if layout.attempt(lambda: self.workshop.change(self.workshop.draft.without(key))):
+        if layout.attempt(lambda: self.workshop.edit(lambda draft: draft.without(key))):
             self.refresh()
             self._changed()
 
@@ -166,7 +178,7 @@ class Form:
         if key is None:
             return
         example = key.example or "to be given"
-        if layout.attempt(lambda: self.workshop.change(self.workshop.draft.set(key.key, example))):
+        if layout.attempt(lambda: self.workshop.set(key.key, example)):
             self.refresh()
             self._changed()
 

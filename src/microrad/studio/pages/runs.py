@@ -49,11 +49,14 @@ class _Study:
         ui.timer(0.0, self._name, once=True)
 
     def _look(self) -> None:
-        draft, faults = self.workshop.draft, self.workshop.faults()
+        draft, faults = self.workshop.draft, self._faults()
         self.about.text = f"Everything that follows from {self.workshop.name_of(draft.path)}: verdict, figures, report."
         self.button.text = "Save and run the study" if draft.changed else "Run the study"
         self.button.enabled = not faults
         self.fault.text = faults
+
+    def _faults(self) -> str:
+        return self.workshop.faults() or self.workshop.disk_words()
 
     async def _name(self) -> None:
         """Propose a folder, unless one was typed meanwhile."""
@@ -72,12 +75,12 @@ class _Study:
         except NameRefusedError as error:
             self.fault.text = layout.name_words(error)
             return None
-        self.fault.text = self.workshop.faults()
+        self.fault.text = self._faults()
         return commands.Run(Path(self.workshop.name_of(self.workshop.draft.path)), Path(name))
 
     async def _run(self) -> None:
         action = self._action()
-        if action is None or (self.workshop.draft.changed and not layout.save_draft(self.workshop)):
+        if action is None or self._faults() or (self.workshop.draft.changed and not layout.save_draft(self.workshop)):
             return
         if await submit(self.workshop, "study", f"Study of {action.file}", action):
             await self._name()

@@ -1,0 +1,237 @@
+"""The mission page and the frame of each page as the server builds them, without a browser."""
+
+import asyncio
+import os
+import threading
+from types import SimpleNamespace
+
+import pytest
+
+from microrad.studio import draft as drafts
+from microrad.studio.draft import Draft, DraftError
+from microrad.studio.names import NameRefusedError
+from microrad.studio.workshop import Workshop
+from shipped import SHIPPED
+
+pytest.importorskip("nicegui", reason="the studio is not installed (nicegui)")
+
+from nicegui.client import Client
+from nicegui.page import page as at
+
+from microrad.studio.pages import layout, mission, mission_files
+from microrad.studio.pages.dial_page import DialPage
+
+LEO, GEO = "terminals.leo_aperture", "terminals.geo_aperture"
+TEXT = SHIPPED.read_text("utf-8")
+
+
+@pytest.fixture
+def workshop(tmp_path):
+    """The paper's mission, saved."""
+    (tmp_path / "leo-geo.toml").write_text(TEXT, "utf-8")
+    return Workshop(tmp_path)
+
+
+@pytest.fixture
+def opened(workshop):
+    """Opens tabs on the mission page, at the table of the terminals."""
+    clients = []
+
+    def enter():
+        clients.append(Client(at("/"), request=None))
+        with clients[-1]:
+            found = mission._Page(workshop)
+            found.form.show("terminals")
+        return found
+
+    yield enter
+    for client in clients:
+        client.delete()
+
+
+def edited(page, text):
+    """What the page does when its editor says that it has another text."""
+    with page.section:
+        page._text(SimpleNamespace(value=text))
+
+
+def field(page, key):
+    return page.form._rows[key].field.value
+
+
+# ------------------------------------------------------------------------------------------------------ lose no work
+def test_the_editor_cannot_undo_its_way_from_one_mission_into_another(workshop, opened):
+    page, other = opened(), opened()
+    before, others = page.editor, other.editor
+    workshop.set(LEO, "6 cm")
+    page._all()
+    assert page.editor is before  # the change of another tab can be undone
+    workshop.folder.joinpath("b.toml").write_text(TEXT.replace('"5 cm"', '"7 cm"'), "utf-8")
+    workshop.replace(Draft.open(workshop.inside("b.toml")))
+    edited(page, page.editor.value + "# of the first mission\n")
+    assert "of the first" not in workshop.draft.text
+    assert page.editor is not before
+    other._all()
+    assert before.is_deleted
+    assert others.is_deleted
+    assert page.editor.value == other.editor.value == workshop.draft.text
+    assert '"7 cm"' in page.editor.value
+
+
+def test_a_mission_that_was_never_saved_is_not_dropped_without_a_word(tmp_path):
+    workshop = Workshop(tmp_path)
+    assert mission_files._lost(workshop) == ""  # as it began: it can be begun again
+    workshop.set(LEO, "6 cm")
+    assert mission_files._lost(workshop) == "leo-geo.toml is not on disk and will be lost; save it first to keep it."
+    workshop.save()
+    assert mission_files._lost(workshop) == ""
+    workshop.set(LEO, "7 cm")
+    assert mission_files._lost(workshop) == "Changes that are not saved will be lost."
+    workshop.save()
+    (tmp_path / "leo-geo.toml").unlink()
+    assert "will be lost" in mission_files._lost(workshop)
+
+
+def test_a_change_of_another_thread_is_not_lost_by_saving(workshop, monkeypatch):
+    workshop.set(LEO, "6 cm")
+    other = threading.Thread(target=workshop.set, args=(GEO, "16 cm"))
+
+    def slow(path, text, write=drafts.write_whole):
+        write(path, text)
+        other.start()
+        other.join(0.2)  # it waits for this one
+
+    monkeypatch.setattr(drafts, "write_whole", slow)
+    workshop.save()
+    other.join()
+    assert workshop.draft.values[GEO].typed == "16 cm"
+    assert workshop.draft.changed
+    assert '"6 cm"' in workshop.draft.path.read_text("utf-8")
+    assert '"16 cm"' not in workshop.draft.path.read_text("utf-8")
+
+
+def test_two_tabs_show_what_the_other_sets_also_when_both_set_at_once(workshop, opened):
+    one, two = opened(), opened()
+    one.form._typed(LEO, "6 cm")
+    two.form._typed(GEO, "16 cm ")
+    assert (field(two, LEO), two.form._rows[GEO].typed) == ("6 cm", "16 cm ")  # what is typed stays as it is
+    assert two.editor.value == workshop.draft.text
+    assert '"6 cm"' in two.editor.value
+
+
+def test_a_text_that_is_behind_takes_nothing_back(workshop, opened):
+    one, two = opened(), opened()
+    one.form._typed(LEO, "6 cm")
+    edited(two, two.editor.value + "# typed\n")
+    assert workshop.draft.values[LEO].typed == field(two, LEO) == "6 cm"
+    assert two.editor.value == workshop.draft.text
+    edited(two, two.editor.value + "# typed\n")
+    assert workshop.draft.text.endswith("# typed\n")
+    assert workshop.draft.values[LEO].typed == "6 cm"
+
+
+def test_a_dial_that_is_let_go_is_written_before_anything_else_is_done(workshop):
+    page = DialPage.__new__(DialPage)
+    page.workshop, page._busy = workshop, True  # with the answer to what was tried before
+
+    async def let_go():
+        writing = asyncio.create_task(page._set(LEO, "6 cm"))
+        saving = asyncio.create_task(asyncio.to_thread(workshop.save))  # by the same click
+        await saving
+        writing.cancel()
+
+    asyncio.run(let_go())
+    assert '"6 cm"' in workshop.draft.path.read_text("utf-8")
+
+
+# ------------------------------------------------------------------------------------------------------ too many keys
+def test_a_mission_of_thousands_of_keys_has_some_rows_and_says_so(workshop, opened):
+    keys = "".join(f"k{n} = 1\n" for n in range(20_000))
+    tables = "".join(f"[t{n}]\nx = 1\n" for n in range(900))
+    workshop.change(workshop.draft.with_text(keys + workshop.draft.text + tables))
+    page = opened()
+    with page.section:
+        page._show("general")
+    assert len(page.form._rows) == 300
+    said = [each.text for each in page.form._place.descendants() if "Only the first" in getattr(each, "text", "")]
+    assert said == [
+        'Only the first 300 of 20001 keys have a row here; look for others with "Find a key", or change them in the '
+        "text."
+    ]
+    assert len(page.entries) == 50
+    assert len(page.section.client.elements) < 5000
+    with page.section:
+        page.form.show("general", "k19999")
+    assert list(page.form._rows) == ["k19999"]
+
+
+def test_many_faults_are_counted_and_the_first_are_listed(workshop, opened):
+    workshop.change(workshop.draft.with_text(workshop.draft.text + "".join(f"k{n} = 1\n" for n in range(70))))
+    listed = [getattr(each, "text", "") for each in opened().faults.descendants()]
+    assert "70 faults to correct" in listed
+    assert "and 20 more" in listed
+    assert sum(text.startswith("line ") for text in listed) == 50
+
+
+# ----------------------------------------------------------------------------------------------------- changed on disk
+def test_a_file_that_another_program_changes_is_told(workshop):
+    path, revision = workshop.draft.path, workshop.revision
+    assert (workshop.disk, workshop.disk_words(), layout._words(workshop.draft, workshop.disk)) == ("", "", "saved")
+    path.write_text(TEXT.replace('"5 cm"', '"12 cm"'), "utf-8")
+    assert workshop.disk == "changed"
+    assert workshop.revision == revision + 1  # so every page shows it
+    assert workshop.disk_words() == (
+        "leo-geo.toml was changed on disk by another program since it was opened here; open it again "
+        '("Back to the saved file" on the page Mission), or save this text under another name'
+    )
+    assert layout._words(workshop.draft, "changed") == "changed on disk; open it again"
+    workshop.set(LEO, "x")
+    told = layout._words(workshop.draft, workshop.disk)
+    assert told == "not saved, 1 fault to correct, changed on disk; open it again"
+    workshop.reopen()
+    assert workshop.draft.values[LEO].typed == "12 cm"
+    assert (workshop.disk, workshop.disk_words()) == ("", "")
+    assert layout._words(workshop.draft, workshop.disk) == "saved"
+
+
+def test_a_file_that_another_program_removes_is_told_and_can_be_saved_again(workshop):
+    workshop.draft.path.unlink()
+    assert (workshop.disk, workshop.disk_words()) == ("gone", "leo-geo.toml is not on disk any more; save it again")
+    assert layout._words(workshop.draft, workshop.disk) == "not saved, gone from disk"
+    workshop.save()
+    assert workshop.disk == ""
+    assert workshop.draft.path.read_text("utf-8") == TEXT
+
+
+def test_the_same_text_written_again_and_a_draft_that_is_not_saved_are_no_change_on_disk(workshop):
+    workshop.set(LEO, "6 cm")
+    assert workshop.disk == ""
+    workshop.draft.path.write_text(TEXT, "utf-8")
+    assert workshop.disk == ""
+    workshop.draft.path.write_text(workshop.draft.text, "utf-8")
+    assert workshop.disk == ""
+    workshop.save()
+    assert not workshop.draft.changed
+
+
+def test_what_is_no_file_any_more_is_not_read(workshop):
+    workshop.draft.path.unlink()
+    os.mkfifo(workshop.draft.path)  # reading it would never end
+    assert workshop.disk == "changed"
+
+
+@pytest.mark.parametrize("content", [TEXT, None])
+def test_nothing_is_saved_through_a_link_that_has_come_in_the_files_place(workshop, tmp_path_factory, content):
+    outside = tmp_path_factory.mktemp("outside") / "mine.toml"
+    if content is not None:
+        outside.write_text(content, "utf-8")
+    workshop.draft.path.unlink()
+    workshop.draft.path.symlink_to(outside)
+    workshop.set(LEO, "6 cm")
+    with pytest.raises(DraftError, match=r"leo-geo\.toml is or lies behind a link to .*mine\.toml now, which it was"):
+        workshop.save()
+    with pytest.raises(NameRefusedError, match="is outside of"):
+        workshop.reopen()
+    assert not outside.exists() if content is None else outside.read_text("utf-8") == content
+    workshop.save("other.toml")
+    assert '"6 cm"' in workshop.inside("other.toml").read_text("utf-8")
