@@ -253,7 +253,7 @@ def test_the_reader_s_words_name_the_fields_of_the_form(tmp_path):
         (Setting(0, 1, output_unit="um", lever_arm="5 V"), 'lever arm: "5 V" is in "V"'),
         (Setting(0, 1, output_unit="um", lever_arm="-5 mm"), "lever arm: -5 mm is not above 0"),
         (Setting(0, 1, name=" "), "name of the mirror: it has none; type one, such as stage-x"),
-        (Setting(0, 1, name="../up"), "'../up.toml' is not taken: its name holds a path; type another name"),
+        (Setting(0, 1, name="../up"), "'../up.toml' is not taken: its name holds a path; choose another name"),
         (Setting(0, 1, name="there"), "name of the mirror: there.html is there already and is left as it is"),
     ],
 )

@@ -298,6 +298,11 @@ class Table(BaseModel):
                 return name, rules[0]
         raise KeyError(key)
 
+    def with_value(self, key: str, value: object) -> Self:
+        """The table with another value for a dotted attribute, such as "communication.data_rate_bit_s", unchecked."""
+        name, _, rest = key.partition(".")
+        return self.model_copy(update={name: getattr(self, name).with_value(rest, value) if rest else value})
+
     def problems(self) -> Iterator[Problem]:
         """What does not fit together in a table whose keys are each in order."""
         return iter(())

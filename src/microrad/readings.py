@@ -8,7 +8,6 @@ from typing import Any, get_args
 import numpy as np
 
 from microrad import link, tracking
-from microrad.day_study.assumptions import changed
 from microrad.mirror_table import Mirror
 from microrad.mission import Conventions, Mission, Requirement
 
@@ -61,7 +60,7 @@ def _choices(m: Mission) -> Iterator[tuple[str, str]]:
     """Keys with what else they could be, where that fits the other tables."""
     for key, table in _OPEN:
         for other in get_args(table.model_fields[key.partition(".")[2]].annotation):
-            as_read = changed(m, key, other)
+            as_read = m.with_value(key, other)
             if other != _given(m, key) and not [*as_read.problems(), *as_read.mirror.problems()]:
                 yield key, other
 
@@ -72,7 +71,7 @@ def _given(m: Mission, key: str) -> str:
 
 
 def _reading(m: Mission, key: str, other: str, residual: tracking.Run) -> Reading:
-    as_read, run = changed(m, key, other), residual
+    as_read, run = m.with_value(key, other), residual
     try:
         if key in _SIMULATED:
             run = tracking.worst(as_read, tracking.tracking_runs(as_read, ("given",)))

@@ -4,7 +4,6 @@ import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TypeVar
 
 from microrad import link, orbit
 from microrad.day_study import flow, geometry
@@ -14,7 +13,6 @@ from microrad.mission import LinkMission
 from microrad.orbit_table import HIGHEST_MASK_RAD, VisibilityLimits
 from microrad.units import format_quantity
 
-_T = TypeVar("_T", bound=Table)
 _RUNS = 4  # of each case: what an acquisition takes is little beside what is varied
 NOTHING = "as it is"
 
@@ -125,7 +123,7 @@ def swings(
     and what the relay grants are replaced. An orbit from a file stays as it is, and
     so does what would leave no orbit: one that has decayed, or lies below the surface that lines of sight must clear.
     """
-    m = changed(m, "operations.runs", min(flow.table(m).runs, _RUNS))
+    m = m.with_value("operations.runs", min(flow.table(m).runs, _RUNS))
     own = _Case(m, loss, _Known(m, seen, heard))
     here = numbers(own, folder, found)
     made = []
@@ -158,7 +156,7 @@ def _changes(own: _Case, found: Found | None) -> Iterator[tuple[str, _Side, _Sid
     def scaled(name: str, key: str, unit: str, factors: tuple[float, float] = (0.5, 2.0)) -> tuple[str, _Side, _Side]:
         value = value_of(m, key)
         low, high = (
-            (format_quantity(f * value, unit, 3), replace(own, mission=changed(m, key, f * value))) for f in factors
+            (format_quantity(f * value, unit, 3), replace(own, mission=m.with_value(key, f * value))) for f in factors
         )
         return name, low, high
 
@@ -173,18 +171,18 @@ def _changes(own: _Case, found: Found | None) -> Iterator[tuple[str, _Side, _Sid
     if found is not None:
         yield "time of acquisition", ("half", replace(own, slower=0.5)), ("twice", replace(own, slower=2.0))
     if o.relay_share == 1.0:
-        yield other("share of each contact that the relay grants", "half", changed(m, "operations.relay_share", 0.5))
+        yield other("share of each contact that the relay grants", "half", m.with_value("operations.relay_share", 0.5))
     if orbits.grazing_height_m > 0.0:
         yield scaled("grazing height", "orbit.grazing_height_m", "m", (0.0, 2.0))
     if orbits.leo.limits is None or orbits.leo.limits.attitude == "free":
-        held = changed(m, "orbit.leo.limits", _held(orbits.leo.limits))
+        held = m.with_value("orbit.leo.limits", _held(orbits.leo.limits))
         yield other("attitude of the satellite", "nadir, 60 deg about zenith", held)
     if orbits.leo.limits is not None and orbits.leo.limits.in_eclipse:
-        yield other("eclipse", "terminal off in it", changed(m, "orbit.leo.limits.in_eclipse", False))
+        yield other("eclipse", "terminal off in it", m.with_value("orbit.leo.limits.in_eclipse", False))
     if orbits.leo.kind == "circular":
         yield scaled("orbit altitude", "orbit.leo.altitude_m", "m", (0.8, 1.2))
         if orbits.leo.local_time_s is not None:
-            later = changed(m, "orbit.leo.local_time_s", (orbits.leo.local_time_s + 21600.0) % 86400.0)
+            later = m.with_value("orbit.leo.local_time_s", (orbits.leo.local_time_s + 21600.0) % 86400.0)
             yield other("local time of the node", "6 h later", later)
     yield scaled("instrument data rate", "operations.instrument_rate_bit_s", "bit/s")
     if o.downlink is not None:
@@ -216,7 +214,7 @@ def _margin(own: _Case) -> tuple[str, _Side, _Side]:
     asked = flow.table(own.mission).margin_db
     ends = (0.0, 2.0 * asked) if asked else (0.0, 3.0)
     low, high = (
-        (format_quantity(end, "dB"), replace(own, mission=changed(own.mission, "operations.margin_db", end)))
+        (format_quantity(end, "dB"), replace(own, mission=own.mission.with_value("operations.margin_db", end)))
         for end in ends
     )
     return "margin demanded of the laser link", low if asked else None, high
@@ -234,15 +232,15 @@ def _stations(own: _Case) -> Iterator[tuple[str, _Side, _Side]]:
     fewer: _Side = None
     if len(given) > 1:
         kept = {n: s for n, s in given.items() if n != name}
-        fewer = f"without {name}", replace(own, mission=changed(m, key, kept))
-    more = replace(own, mission=changed(m, key, {**given, f"opposite {name}": opposite}))
+        fewer = f"without {name}", replace(own, mission=m.with_value(key, kept))
+    more = replace(own, mission=m.with_value(key, {**given, f"opposite {name}": opposite}))
     yield "ground stations", fewer, (f"one more, opposite {name}", more)
     masks = []
     for factor, text in ((0.0, "0 deg"), (2.0, "twice")):
         moved = {
             n: s.model_copy(update={"mask_rad": min(factor * s.mask_rad, HIGHEST_MASK_RAD)}) for n, s in given.items()
         }
-        masks.append((text, replace(own, mission=changed(m, key, moved))))
+        masks.append((text, replace(own, mission=m.with_value(key, moved))))
     yield "elevation mask", masks[0], masks[1]
 
 
@@ -253,10 +251,3 @@ def value_of(table: Table, key: str) -> float:
         found = getattr(found, part)
     assert isinstance(found, float)
     return found
-
-
-def changed(table: _T, key: str, value: object) -> _T:
-    """The table with another value for a dotted attribute."""
-    name, _, rest = key.partition(".")
-    inner = changed(getattr(table, name), rest, value) if rest else value
-    return table.model_copy(update={name: inner})

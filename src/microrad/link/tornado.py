@@ -134,10 +134,10 @@ class _Input:
     def moved(self, mission: LinkMission, value: float) -> LinkMission:
         """The mission with this number replaced."""
         if self.item is None:
-            return _changed(mission, self.table, self.field, value)
+            return mission.with_value(f"{self.table}.{self.field}", value)
         items = list(getattr(_table(mission, self.table), self.field))
         items[self.item] = value
-        return _changed(mission, self.table, self.field, tuple(items))
+        return mission.with_value(f"{self.table}.{self.field}", tuple(items))
 
 
 def _swing(
@@ -223,16 +223,3 @@ def _margin(mission: LinkMission, margin_db: Margin) -> float:
         return margin_db(mission)
     except RateError:
         return -math.inf
-
-
-def _changed(mission: LinkMission, name: str, field: str, value: float | tuple[float, ...]) -> LinkMission:
-    """The mission with one field of one table replaced."""
-    parts = name.split(".")
-    table = _table(mission, name)
-    assert table is not None
-    changed: Table = table.model_copy(update={field: value})
-    for depth in range(len(parts) - 1, 0, -1):
-        outer = _table(mission, ".".join(parts[:depth]))
-        assert outer is not None
-        changed = outer.model_copy(update={parts[depth]: changed})
-    return mission.model_copy(update={parts[0]: changed})

@@ -15,7 +15,7 @@ from microrad.recording import ACCEPTABLE, stated_units
 from microrad.studio import plain_files
 from microrad.studio.commands import Identify
 from microrad.studio.jobs import Order
-from microrad.studio.names import NameRefusedError, safe_name
+from microrad.studio.names import NameRefusedError, safe_name, typed_words
 from microrad.studio.reading import Columns, Listing
 from microrad.units import UnitError, parse_quantity
 
@@ -23,7 +23,6 @@ DRIVE_UNITS = ("V", "mV")
 OUTPUT_UNITS = ("mrad", "urad", "rad", "um", "mm", "m")
 LENGTHS = ("um", "mm", "m")
 _WRITTEN = {"urad": "µrad", "um": "µm"}
-_BEHIND = re.compile(r"[(\[]\s*([^)\]]*?)\s*[)\]]\s*$")
 _CHOSEN = 200
 _IN_THE_FORM = (
     (re.compile(r"give the rate \(--rate, rate_hz\) in Hz, or name the time column \(time\)"), "type the sample rate"),
@@ -234,8 +233,7 @@ def labels(listing: Listing) -> dict[int, str]:
 
 
 def _label(number: int, name: str, unit: str, samples: int | None) -> str:
-    behind = _BEHIND.search(name)
-    told = f" ({unit})" if unit and (behind is None or behind[1] != unit) else ""
+    told = f" ({unit})" if unit and not name.endswith((f"({unit})", f"[{unit}]")) else ""
     length = "" if samples is None else f", {samples} samples"
     own = f"column {number}" if name in ("", str(number)) else f"{number}: {name}"
     return f"{own}{told}{length}"
@@ -343,8 +341,7 @@ def _new_file(folder: Path, name: str) -> Path:
     try:
         path = Path(safe_name(f"{name.strip()}.toml"))
     except NameRefusedError as error:
-        words = str(error).replace("rename it and drop it again", "type another name")
-        raise SettingError(f"name of the mirror: {words}") from None
+        raise SettingError(f"name of the mirror: {typed_words(error)}") from None
     for each in (path, path.with_suffix(".html")):
         if (folder / each).exists():
             raise SettingError(f"name of the mirror: {each} is there already and is left as it is; type another name")

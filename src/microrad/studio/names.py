@@ -11,6 +11,7 @@ MAX_NAME_BYTES = 160
 
 _DEVICE = re.compile(r"(con|prn|aux|nul|conin\$|conout\$|(com|lpt)[0-9¹²³])\s*(\..*)?", re.IGNORECASE | re.DOTALL)
 _WINDOWS = '<>:"|?*'
+_DROP_AGAIN = "rename it and drop it again"
 _UNSEEN = ("Cc", "Cf", "Cs", "Co", "Cn", "Zl", "Zp")
 
 
@@ -24,6 +25,11 @@ def shown(name: str) -> str:
     return f"'{text}...'" if len(name) > 60 else f"'{text}'"
 
 
+def typed_words(error: NameRefusedError) -> str:
+    """The refusal of a name that was typed, where the words are those for a file that was dropped."""
+    return str(error).replace(_DROP_AGAIN, "choose another name")
+
+
 def safe_name(name: str) -> str:
     """The name of a file as it may be stored in a folder, with composed characters (NFC).
 
@@ -34,7 +40,7 @@ def safe_name(name: str) -> str:
     name = unicodedata.normalize("NFC", name)
     fault = _fault(name)
     if fault is not None:
-        raise NameRefusedError(f"the file {shown(name)} is not taken: {fault}; rename it and drop it again")
+        raise NameRefusedError(f"the file {shown(name)} is not taken: {fault}; {_DROP_AGAIN}")
     return name
 
 

@@ -66,13 +66,14 @@ class _Page:
         found |= {f"file {name}": name for name in files} | {_PAPER: _PAPER}
         return found | {_PRESET + each.name: f"{each.name}: {each.title}" for each in presets.presets()}
 
-    def _compared(self) -> str | None:
+    def _compared(self, options: dict[str, str]) -> str | None:
         """The option that the other mission is."""
         other = self.workshop.other
         if other is None:
             return None
         name = self.workshop.name_of(other.path)
-        return _SAVED if other.path == self.workshop.draft.path else name if name.startswith("the ") else f"file {name}"
+        own = _SAVED if other.path == self.workshop.draft.path else f"file {name}"
+        return next((option for option in (own, name) if option in options), None)
 
     def _chosen(self, event: Any) -> None:
         if not event.value or event.value == self.shown:
@@ -106,8 +107,8 @@ class _Page:
         options = self._options()
         if options != self.choice.options:
             self.choice.set_options(options, value=self.choice.value if self.choice.value in options else None)
-        compared = self._compared()
-        if self.choice.value is None and compared in options:
+        compared = self._compared(options)
+        if self.choice.value is None and compared is not None:
             self.shown = compared
             self.choice.value = compared
         self.asked += 1

@@ -229,7 +229,7 @@ class ControlPage:
         grey = [self.plots[name] for name in plots] + [*(told if plots else ())]
         grey += [self.numbers, self.notes] if any(name in plots for name in _OWN) else []
         for each in (*self.plots.values(), *told, self.numbers, self.notes):
-            each.classes(**{"add" if each in grey else "remove": "behind"})
+            layout.grey(each, each in grey)
 
     def _controller(self, found: Any) -> None:
         from microrad.studio import control_view

@@ -123,7 +123,7 @@ class DayPage:
         self.bar.visible = self.cancel.visible = state.running
         self.again.visible = not state.running and state.result is None and not self.faults.visible
         self.bar.value = state.done / state.total if state.total else 0.0
-        self.results.classes(**{"remove" if now and state.result else "add": "behind"})
+        layout.grey(self.results, not (now and state.result))
 
     def _show(self, day: DayStudy, drawn: Drawn) -> None:
         self.words.clear()

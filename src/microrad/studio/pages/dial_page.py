@@ -141,4 +141,4 @@ class DialPage(Generic[T]):
         if grey != self._grey:
             self._grey = grey
             for element in self.dimmed:
-                element.classes(**{"add" if grey else "remove": "behind"})
+                layout.grey(element, grey)

@@ -12,7 +12,6 @@ from nicegui.elements.mixins.text_element import TextElement
 
 from microrad.studio.commands import Action, command
 from microrad.studio.draft import Draft, OnDisk
-from microrad.studio.names import NameRefusedError
 from microrad.studio.workshop import Workshop
 
 POLL_S = 0.5
@@ -79,9 +78,9 @@ def attempt(do: Callable[[], object]) -> bool:
     return True
 
 
-def name_words(error: NameRefusedError) -> str:
-    """The refusal of a name that was typed, where the words are those for a file that was dropped."""
-    return str(error).replace("rename it and drop it again", "choose another name")
+def grey(element: ui.element, old: bool) -> None:
+    """Show an element in grey while it belongs to a mission or a question before the one that stands."""
+    element.classes(**{"add" if old else "remove": "behind"})
 
 
 def refuse(words: str) -> None:

@@ -124,7 +124,7 @@ class LinkPage(DialPage[LinkView]):
         self.state.text = computing or state.error or before
         self.state.visible = bool(self.state.text)
         for part in (self.sentences, self.tornado):
-            part.classes(**{"remove" if now else "add": "behind"})
+            layout.grey(part, not now)
         if state.result is None or state.key == self.shown:
             return
         self.shown = state.key

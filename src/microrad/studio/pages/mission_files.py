@@ -8,7 +8,7 @@ from nicegui import ui
 
 from microrad import presets
 from microrad.studio.draft import Draft
-from microrad.studio.names import NameRefusedError, safe_name
+from microrad.studio.names import NameRefusedError, safe_name, typed_words
 from microrad.studio.optional_tables import offered, with_table
 from microrad.studio.pages import layout
 from microrad.studio.workshop import Workshop
@@ -113,7 +113,7 @@ def _save_as(workshop: Workshop, shown: Callable[[str], None]) -> None:
             given = safe_name(name.value or "")
             workshop.save(given if given.endswith(".toml") else f"{given}.toml")
         except NameRefusedError as error:
-            fault.text = layout.name_words(error)
+            fault.text = typed_words(error)
             return
         except (ValueError, OSError) as error:
             fault.text = str(error)

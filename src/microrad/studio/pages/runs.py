@@ -8,7 +8,7 @@ from pathlib import Path
 from nicegui import run, ui
 
 from microrad.studio import commands
-from microrad.studio.names import NameRefusedError, safe_name
+from microrad.studio.names import NameRefusedError, safe_name, typed_words
 from microrad.studio.pages import layout, pieces
 from microrad.studio.pages.runs_jobs import JobList, submit
 from microrad.studio.runs_view import campaign_files, free_name, ledgers, write_campaign
@@ -73,7 +73,7 @@ class _Study:
         try:
             name = safe_name(self.folder.value or "")
         except NameRefusedError as error:
-            self.fault.text = layout.name_words(error)
+            self.fault.text = typed_words(error)
             return None
         self.fault.text = self._faults()
         return commands.Run(Path(self.workshop.name_of(self.workshop.draft.path)), Path(name))
@@ -131,7 +131,7 @@ class _Campaign:
         try:
             ledger = safe_name(self.ledger.value or "")
         except NameRefusedError as error:
-            self.fault.text = layout.name_words(error)
+            self.fault.text = typed_words(error)
             return None
         self.fault.text = ""
         if not chosen:
