@@ -180,6 +180,7 @@ def draw_loops(found: tuple[Loop, ...]) -> Figure:
         role = "fitted" if loop.freq_hz == loop.fitted_hz else "predicted"
         axes.set_title(f"{loop.freq_hz:g} Hz, {role}: {loop.error_percent:.2f} % rms", fontsize=8.5, loc="left")
         axes.set_xlabel("drive (V)")
+        axes.locator_params(axis="x", nbins=4)  # more would run into those of the next panel
         columns[f"drive at {loop.freq_hz:g} Hz (V)"] = loop.drive_v
         columns[f"measured at {loop.freq_hz:g} Hz (rad)"] = loop.measured_rad
         columns[f"model at {loop.freq_hz:g} Hz (rad)"] = loop.modelled_rad
