@@ -2,6 +2,7 @@
 
 import itertools
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -597,6 +598,21 @@ def test_what_lowers_the_ratio_on_both_sides_counts_from_where_it_is():
     low, high, here = (Numbers(relay, 2.0, 1.0, 1.0) for relay in (6.0, 2.0, 12.0))
     assert Swing("an assumption", "low", "high", low, high, here).factor == pytest.approx(6.0)
     assert Swing("an assumption", "low", "high", low, high, low).factor == pytest.approx(3.0)
+
+
+@pytest.mark.parametrize(
+    ("contacts", "gap_s"),
+    [
+        ([], 100.0),
+        ([(10.0, 20.0)], 130.0),  # to the end of what is known
+        ([(10.0, 20.0), (120.0, 130.0)], 100.0),
+        ([(60.0, 95.0), (98.0, 105.0)], 60.0),  # what begins behind the span does not count
+    ],
+)
+def test_the_longest_gap_by_hand(contacts, gap_s):
+    pair = SimpleNamespace(span_s=(0.0, 100.0), whole_s=(0.0, 150.0))
+    given = [SimpleNamespace(start_s=start, end_s=end) for start, end in contacts]
+    assert geometry.longest_gap_s(given, pair) == gap_s
 
 
 def test_the_longest_time_without_contact_is_followed_beyond_the_span(day):

@@ -47,6 +47,14 @@ def test_a_dial_stands_at_its_value_and_writes_its_unit(draft):
     assert 5.0 < float(aperture.at(aperture.position + 1).split()[0]) < 5.2
 
 
+def test_a_margin_that_was_solved_for_is_met_whatever_rounding_leaves():
+    missed, solved, short = (
+        link_view.Margin("communication", margin_db, 3.0) for margin_db in (2.9, 3.0 - 1e-12, 2.999)
+    )
+    assert (missed.met, solved.met, short.met) == (False, True, False)
+    assert solved.needs == "needs 3 dB: met"
+
+
 def test_every_position_of_every_dial_is_a_value_that_the_mission_takes(draft):
     groups = link_view.dials(draft) | pointing_view.dials(draft)
     every = [dial for group in groups.values() for dial in group]

@@ -18,7 +18,7 @@ pytest.importorskip("nicegui", reason="the studio is not installed (nicegui)")
 from nicegui.client import Client
 from nicegui.page import page as at
 
-from microrad.studio.pages import layout, mission, mission_files
+from microrad.studio.pages import layout, mission, mission_files, runs
 from microrad.studio.pages.dial_page import DialPage
 
 LEO, GEO = "terminals.leo_aperture", "terminals.geo_aperture"
@@ -218,6 +218,25 @@ def test_what_is_no_file_any_more_is_not_read(workshop):
     workshop.draft.path.unlink()
     os.mkfifo(workshop.draft.path)  # reading it would never end
     assert workshop.disk == "changed"
+
+
+def test_a_study_of_a_file_that_another_program_has_changed_is_not_run(workshop, monkeypatch):
+    asked = []
+    monkeypatch.setattr(runs, "submit", lambda *order: asked.append(order))
+    client = Client(at("/"), request=None)
+    with client:
+        study = runs._Study(workshop)
+        study.folder.value = "found"
+        workshop.draft.path.write_text(TEXT.replace('"5 cm"', '"6 cm"', 1), "utf-8")
+        asyncio.run(study._run())
+        study._look()
+    assert asked == [] and not study.button.enabled
+    assert study.fault.text == workshop.disk_words() != ""
+    workshop.reopen()
+    with client:
+        study._look()
+    assert study.button.enabled and study.fault.text == ""
+    client.delete()
 
 
 @pytest.mark.parametrize("content", [TEXT, None])
