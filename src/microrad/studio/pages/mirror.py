@@ -133,9 +133,7 @@ class MirrorPage:
         self.refused.text = ""
         if found is None:
             return
-        alone = len(self.dropped()) == 1 or self.form.setting.drive is None
-        self.keep(mirror_form.shown(self.form, found, upload.key, upload.name, alone=alone))
-        self._fill()
+        self._turn_to(found, upload.key, upload.name)
         await self.look()
 
     async def _listing(self, key: str) -> reading.Listing | str | None:
@@ -218,13 +216,21 @@ class MirrorPage:
         """Show another recording, with the form as it is for its channels."""
         name = next((each.name for each in self.dropped() if each.key == key), "")
         found = await self._listing(key) if key else None
+        if self.list.is_deleted:  # the page was closed meanwhile
+            return
         if isinstance(found, reading.Listing):
-            self.keep(mirror_form.shown(self.form, found, key, name))
+            self._turn_to(found, key, name)
         else:
             self.keep(replace(self.form, seen=key))
-        self._fill()
+            self._fill()
         self._rows(self.dropped())
         await self._measured()
+
+    def _turn_to(self, listing: reading.Listing, key: str, name: str) -> None:
+        """Show the form for a recording; what was typed since it is shown stays, whoever has found it first."""
+        first = key != self.form.seen and (not self.form.seen or self.form.setting.drive is None)
+        self.keep(mirror_form.shown(self.form, listing, key, name, alone=first))
+        self._fill()
 
     async def remove(self, key: str) -> None:
         """Delete a recording from the studio's folder."""
@@ -313,7 +319,7 @@ class MirrorPage:
         self.shown, self.question = key, self.question + 1
         mine = self.question
         found = await self._look_into(seen, setting)
-        if mine == self.question and found is not None:
+        if mine == self.question and found is not None and not self.list.is_deleted:
             self._show(*found)
 
     async def _look_into(self, key: str, setting: Setting) -> tuple[reading.View | None, str] | None:
