@@ -133,6 +133,7 @@ def test_a_text_that_is_behind_takes_nothing_back(workshop, opened):
 def test_a_dial_that_is_let_go_is_written_before_anything_else_is_done(workshop):
     page = DialPage.__new__(DialPage)
     page.workshop, page._busy = workshop, True  # with the answer to what was tried before
+    page._faults = SimpleNamespace(is_deleted=False)
 
     async def let_go():
         writing = asyncio.create_task(page._set(LEO, "6 cm"))

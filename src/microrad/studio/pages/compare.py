@@ -7,13 +7,14 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from nicegui import run, ui
+from nicegui import ui
 
 from microrad import presets
 from microrad.studio import commands, compare_view
 from microrad.studio.compare_view import Beside, Found, Number
 from microrad.studio.draft import Draft
 from microrad.studio.pages import layout, pieces
+from microrad.studio.pages.aside import aside
 from microrad.studio.runs_view import campaign_files
 from microrad.studio.workshop import Workshop
 
@@ -122,8 +123,8 @@ class _Page:
             with self.place:
                 ui.label("Choose the mission that this one is to be compared with.").classes("soft")
             return
-        both = await run.io_bound(_both, self.workshop, here, there)
-        if both is None or asked != self.asked:
+        both = await aside(self.place, _both, self.workshop, here, there)
+        if asked != self.asked:
             return
         names = (self.workshop.name_of(here.path), self._name(there))
         self.place.clear()

@@ -6,11 +6,12 @@ from collections.abc import Collection
 from pathlib import Path
 from typing import Any
 
-from nicegui import background_tasks, run, ui
+from nicegui import background_tasks, ui
 
 from microrad.missionfile import MissionFile
 from microrad.studio.commands import Design
 from microrad.studio.pages import layout
+from microrad.studio.pages.aside import aside, stay
 from microrad.studio.workshop import Workshop
 
 TITLE = "Control"
@@ -127,15 +128,14 @@ class ControlPage:
     # ------------------------------------------------------------------------------------------------------ the mission
     async def reload(self) -> None:
         """Take over the mission as it is now; while it has faults, the last one stays."""
+        stay(self.table)
         file = self.workshop.mission()
         self.words.text = self.workshop.faults()
         if file is None or (self.file is not None and file.sha256 == self.file.sha256 and file == self.file):
             return
         from microrad.studio import control_view
 
-        names = await run.io_bound(_names, file)
-        if names is None:
-            return
+        names = await aside(self.table, _names, file)
         self.file, self.round = file, self.round + 1
         self.rows = {name: control_view.waiting_row(name) for name in names}
         self._table()
@@ -174,12 +174,11 @@ class ControlPage:
         if not self.rows[name]["modulus"]:
             self._row(file, control_view.waiting_row(name, "being tuned ..."))
         try:
-            found = await run.io_bound(_controller, file, name)
+            found = await aside(self.table, _controller, file, name)
         except ValueError as error:
             self._row(file, control_view.waiting_row(name, str(error)))
             return None
-        if found is not None:
-            self._row(file, control_view.table_row(found))
+        self._row(file, control_view.table_row(found))
         return found
 
     def _row(self, file: MissionFile, row: dict[str, Any]) -> None:
@@ -213,12 +212,12 @@ class ControlPage:
         try:
             ask = control_view.ask_of(self.step.value, self.amplitude.value, self.frequency.value, found.rate_hz)
             self.state.text = "Simulating ..."
-            answers = await run.io_bound(found.ask, ask, control_view.SHOWN[self.variants.value])
+            answers = await aside(self.table, found.ask, ask, control_view.SHOWN[self.variants.value])
         except ValueError as error:
             self.fault.text, self.state.text = str(error), ""
             self._dim([name for name in self.plots if name not in _OWN])
             return
-        if mine == self.question and answers is not None:
+        if mine == self.question:
             self.state.text = self.fault.text = ""
             self._answers(found, answers)
             self._dim([])

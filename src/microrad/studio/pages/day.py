@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import partial
 from typing import Any, NamedTuple
 
-from nicegui import run, ui
+from nicegui import ui
 
 from microrad.day_study import DayStudy
 from microrad.missionfile import LinkFile
@@ -13,6 +13,7 @@ from microrad.studio import day_view, plots
 from microrad.studio.commands import Contacts
 from microrad.studio.latest import Latest, State, shared
 from microrad.studio.pages import layout
+from microrad.studio.pages.aside import aside
 from microrad.studio.pages.dial_rows import add_style
 from microrad.studio.pages.pieces import Column, columns, file_of, plot, table
 from microrad.studio.workshop import Workshop
@@ -110,9 +111,7 @@ class DayPage:
         if state.result is None or key == self.shown:
             return
         self.shown = key
-        drawn = await run.io_bound(_drawn, state.result)
-        if drawn is not None:
-            self._show(state.result, drawn)
+        self._show(state.result, await aside(self.results, _drawn, state.result))
 
     def _show_progress(self, state: State[DayStudy]) -> None:
         step = f": {state.done} of {state.total}" if state.total else ""

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import asyncio
 from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Generic, TypeVar
 
-from nicegui import background_tasks, run, ui
+from nicegui import background_tasks, ui
 from nicegui.element import Element
 
 from microrad.missionfile import LinkFile
@@ -15,6 +14,7 @@ from microrad.studio.attempts import Attempt, attempt, seen
 from microrad.studio.dials import Dial, faulty
 from microrad.studio.draft import Draft
 from microrad.studio.pages import layout
+from microrad.studio.pages.aside import aside, pause, stay
 from microrad.studio.pages.dial_rows import DialBoard
 from microrad.studio.workshop import Workshop
 
@@ -84,12 +84,13 @@ class DialPage(Generic[T]):
             layout.refuse(str(error))
             return
         while self._busy:
-            await asyncio.sleep(_SHORT_S)
+            await pause(self._faults, _SHORT_S)
         self._mark()
         await self._reload()
 
     async def _reload(self) -> None:
         """Show the draft as it is, but for a dial that moves."""
+        stay(self._faults)
         draft, moved = self.workshop.draft, self.board.moved
         self.board.show(self.dials(draft))
         if moved is not None:
@@ -106,9 +107,7 @@ class DialPage(Generic[T]):
         try:
             while self._wanted is not None:
                 question, self._wanted = self._wanted, None
-                found = await run.io_bound(question)
-                if found is not None:  # there is none when the studio ends
-                    await self._answer(found)
+                await self._answer(await aside(self._faults, question))
         except ValueError as error:
             layout.refuse(str(error))
         finally:
@@ -133,7 +132,7 @@ class DialPage(Generic[T]):
             await self.show(found.view)
 
     async def _rest(self, view: T) -> None:
-        await asyncio.sleep(_REST_S)
+        await pause(self._faults, _REST_S)
         if view is self.view_now:
             self.show_rest(view)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import AsyncIterator, Awaitable, Callable
+from contextlib import suppress
 from typing import Any
 
 from nicegui import app, ui
@@ -57,9 +58,9 @@ class Drop:
         self, uploads: Uploads, taken: Callable[[Upload], Awaitable[None]], refused: Callable[[str], None]
     ) -> None:
         """Build the field, and take its files as they are sent."""
-        self._uploads, self._taken, self._refused = uploads, taken, refused
-        field = ui.element("input").props('type=file multiple aria-label="Recordings: drop files here, or choose them"')
-        field.classes("drop-zone")
+        self._uploads, self._taken, self._told = uploads, taken, refused
+        self._field = field = ui.element("input").classes("drop-zone")
+        field.props('type=file multiple aria-label="Recordings: drop files here, or choose them"')
         client = ui.context.client
         url = f"/_nicegui/client/{client.id}/upload/{field.id}"  # where the guard lets large bodies pass
         app.add_api_route(url, self._take, methods=["POST"], include_in_schema=False)
@@ -75,8 +76,13 @@ class Drop:
     async def _take(self, request: Request) -> Response:
         """Store the file of a request, in its turn, and hand it on."""
         for stored in await self._stored(request):
-            await self._taken(stored)
+            with suppress(asyncio.CancelledError):  # the page was closed meanwhile; the next one finds the file
+                await self._taken(stored)
         return PlainTextResponse("read")
+
+    def _refused(self, words: str) -> None:
+        if not self._field.is_deleted:
+            self._told(words)
 
     async def _stored(self, request: Request) -> list[Upload]:
         """The file of a request as it is stored; nothing where it is refused, or its sender is gone."""

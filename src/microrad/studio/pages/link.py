@@ -6,7 +6,7 @@ import time
 from collections.abc import Mapping
 from functools import partial
 
-from nicegui import run, ui
+from nicegui import ui
 
 from microrad import link_study
 from microrad.link_study import LinkStudy
@@ -18,6 +18,7 @@ from microrad.studio.draft import Draft
 from microrad.studio.latest import Latest, Progress, shared
 from microrad.studio.link_view import LinkView
 from microrad.studio.pages import layout
+from microrad.studio.pages.aside import aside
 from microrad.studio.pages.dial_page import DialPage
 from microrad.studio.pages.dial_rows import add_style
 from microrad.studio.pages.live import LivePlot, MarginCards
@@ -128,10 +129,7 @@ class LinkPage(DialPage[LinkView]):
         if state.result is None or state.key == self.shown:
             return
         self.shown = state.key
-        told = await run.io_bound(_told, state.result)
-        if told is None:  # the studio ends
-            return
-        words, self.slow, tornado = told
+        words, self.slow, tornado = await aside(self.sentences, _told, state.result)
         self.sentences.clear()
         with self.sentences:
             for sentence in words:

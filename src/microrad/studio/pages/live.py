@@ -11,6 +11,7 @@ from contextlib import suppress
 from nicegui.element import Element
 
 from microrad.studio.link_view import Margin
+from microrad.studio.pages.aside import stay
 from microrad.studio.plots import Plot
 
 _DRAWN_S = 5.0
@@ -29,6 +30,7 @@ class LivePlot(Element, component="live_plot.js"):
         """Draw a figure; returns when the browser has done so, or does not answer any more."""
         with suppress(TimeoutError):
             await self.run_method("draw", figure, timeout=_DRAWN_S)
+        stay(self)
 
 
 class MarginCards(Element, component="margin_cards.js"):

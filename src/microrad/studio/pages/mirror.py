@@ -8,7 +8,7 @@ from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
-from nicegui import run, ui
+from nicegui import ui
 
 from microrad.recording import ACCEPTABLE
 from microrad.studio import mirror_form, mirror_view, reading
@@ -16,6 +16,7 @@ from microrad.studio.commands import Identify
 from microrad.studio.jobs import JobError
 from microrad.studio.mirror_form import Dropped, Form, Setting, SettingError
 from microrad.studio.pages import layout
+from microrad.studio.pages.aside import aside, stay
 from microrad.studio.pages.drop import Drop
 from microrad.studio.pages.mirror_job import JobView
 from microrad.studio.plots import CONFIG
@@ -131,19 +132,15 @@ class MirrorPage:
             self.refuse(found)
             return
         self.refused.text = ""
-        if found is None:
-            return
         self._turn_to(found, upload.key, upload.name)
         await self.look()
 
-    async def _listing(self, key: str) -> reading.Listing | str | None:
-        """The channels of a recording, or why there are none; None while the server ends."""
+    async def _listing(self, key: str) -> reading.Listing | str:
+        """The channels of a recording, or why there are none."""
         async with self.listing_turn:
             if key not in self.listings:
-                found = await run.io_bound(self._channels, key)
-                if found is None:
-                    return None
-                self.listings[key] = found
+                self.listings[key] = await aside(self.list, self._channels, key)
+        stay(self.list)  # the turn may have come after the page was closed
         return self.listings[key]
 
     def _channels(self, key: str) -> reading.Listing | str:
@@ -208,16 +205,13 @@ class MirrorPage:
                     break
 
     async def _checked(self, each: Dropped, columns: reading.Columns) -> None:
-        if await self._listing(each.key) is not None:
-            words = (await run.io_bound(self._view, each.key, columns) or (None, ""))[1]
-            self.faults[each.key, columns] = words
+        await self._listing(each.key)
+        self.faults[each.key, columns] = (await aside(self.list, self._view, each.key, columns))[1]
 
     async def see(self, key: str) -> None:
         """Show another recording, with the form as it is for its channels."""
         name = next((each.name for each in self.dropped() if each.key == key), "")
         found = await self._listing(key) if key else None
-        if self.list.is_deleted:  # the page was closed meanwhile
-            return
         if isinstance(found, reading.Listing):
             self._turn_to(found, key, name)
         else:
@@ -290,12 +284,11 @@ class MirrorPage:
         if action is None:
             return
         try:
-            job = await run.io_bound(self.workshop.jobs.submit, mirror_form.order(self.workshop.folder, action))
+            job = await aside(self.list, self.workshop.jobs.submit, mirror_form.order(self.workshop.folder, action))
         except JobError as error:
             self.words.text = str(error)
             return
-        if job is not None:
-            await self.job.follow(job.number)
+        await self.job.follow(job.number)
 
     # --------------------------------------------------------------------------------------------------------- looking
     async def look(self) -> None:
@@ -319,21 +312,20 @@ class MirrorPage:
         self.shown, self.question = key, self.question + 1
         mine = self.question
         found = await self._look_into(seen, setting)
-        if mine == self.question and found is not None and not self.list.is_deleted:
+        if mine == self.question:
             self._show(*found)
 
-    async def _look_into(self, key: str, setting: Setting) -> tuple[reading.View | None, str] | None:
+    async def _look_into(self, key: str, setting: Setting) -> tuple[reading.View | None, str]:
         """The samples of a recording, and why there are none."""
         listing = await self._listing(key) if key else ""
         if not isinstance(listing, reading.Listing):
-            return None if listing is None else (None, listing)
+            return None, listing
         try:
             columns = mirror_form.columns(setting)
         except SettingError as error:
             return None, str(error)
-        found: tuple[reading.View | None, str] | None = await run.io_bound(self._view, key, columns)
-        if found is not None:
-            self.faults[key, columns] = found[1]
+        found = await aside(self.list, self._view, key, columns)
+        self.faults[key, columns] = found[1]
         return found
 
     def _view(self, key: str, columns: reading.Columns) -> tuple[reading.View | None, str]:

@@ -5,13 +5,14 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from nicegui import run, ui
+from nicegui import ui
 
 from microrad.studio import live_fit, mirror_view
 from microrad.studio.jobs import Job
 from microrad.studio.live_fit import LiveFit
 from microrad.studio.mirror_use import with_mirror_file
 from microrad.studio.pages import layout
+from microrad.studio.pages.aside import aside
 from microrad.studio.plots import CONFIG
 from microrad.studio.workshop import Workshop
 
@@ -80,7 +81,7 @@ class JobView:
 
     async def look(self) -> None:
         """Read the jobs, and show what has changed."""
-        jobs, fits = await run.io_bound(self._read) or ([], ())  # nothing comes while the server ends
+        jobs, fits = await aside(self.end, self._read)
         if not jobs:
             return
         found = next((job for job in jobs if job.number == self.number), jobs[0])

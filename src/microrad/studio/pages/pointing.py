@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from nicegui import background_tasks, run, ui
+from nicegui import background_tasks, ui
 
 from microrad.missionfile import LinkFile
 from microrad.studio import pointing_view
@@ -12,6 +12,7 @@ from microrad.studio.commands import Budget
 from microrad.studio.dials import Dial
 from microrad.studio.draft import Draft
 from microrad.studio.pages import layout
+from microrad.studio.pages.aside import aside
 from microrad.studio.pages.dial_page import DialPage
 from microrad.studio.pages.dial_rows import add_style
 from microrad.studio.pages.live import LivePlot
@@ -98,4 +99,4 @@ class PointingPage(DialPage[PointingView]):
 
     async def _say(self, view: PointingView) -> None:
         """The sentences, apart from the rest: their module takes a second to load the first time."""
-        self.words.text = " ".join(await run.io_bound(pointing_view.words, view) or ())
+        self.words.text = " ".join(await aside(self.words, pointing_view.words, view))

@@ -5,11 +5,12 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-from nicegui import run, ui
+from nicegui import ui
 
 from microrad.studio import commands
 from microrad.studio.names import NameRefusedError, safe_name, typed_words
 from microrad.studio.pages import layout, pieces
+from microrad.studio.pages.aside import aside
 from microrad.studio.pages.runs_jobs import JobList, submit
 from microrad.studio.runs_view import campaign_files, free_name, ledgers, write_campaign
 from microrad.studio.workshop import Workshop
@@ -61,7 +62,7 @@ class _Study:
     async def _name(self) -> None:
         """Propose a folder, unless one was typed meanwhile."""
         before, stem = self.folder.value, f"{self.workshop.draft.path.stem}-study"
-        name = await run.io_bound(free_name, self.workshop, stem) or stem
+        name = await aside(self.folder, free_name, self.workshop, stem)
         if self.folder.value == before:
             self.folder.value = name
 
@@ -82,7 +83,7 @@ class _Study:
         action = self._action()
         if action is None or self._faults() or (self.workshop.draft.changed and not layout.save_draft(self.workshop)):
             return
-        if await submit(self.workshop, "study", f"Study of {action.file}", action):
+        if await submit(self.folder, self.workshop, "study", f"Study of {action.file}", action):
             await self._name()
 
 
@@ -107,8 +108,8 @@ class _Campaign:
 
     async def _look(self) -> None:
         """The files that there are, which others may write meanwhile."""
-        names = list(await run.io_bound(campaign_files, self.workshop) or ())
-        going = [f"{name} (go on)" for name in await run.io_bound(ledgers, self.workshop) or ()]
+        names = await aside(self.file, campaign_files, self.workshop)
+        going = [f"{name} (go on)" for name in await aside(self.file, ledgers, self.workshop)]
         options = [*names, *going]
         if options != self.file.options:
             keep = self.file.value if self.file.value in options else next(iter(options), None)
@@ -124,7 +125,7 @@ class _Campaign:
         if chosen.endswith(" (go on)"):
             self.ledger.value = chosen.removesuffix(" (go on)")
         elif stem:
-            self.ledger.value = await run.io_bound(free_name, self.workshop, stem, ".ledger") or ""
+            self.ledger.value = await aside(self.file, free_name, self.workshop, stem, ".ledger")
 
     def _action(self) -> commands.CampaignRun | commands.CampaignResume | None:
         chosen = self.file.value or ""
@@ -148,13 +149,13 @@ class _Campaign:
             return
         new = isinstance(action, commands.CampaignRun)
         title = f"Campaign {action.file}" if isinstance(action, commands.CampaignRun) else f"Campaign {action.ledger}"
-        if await submit(self.workshop, "campaign", title if new else f"{title}, going on", action):
+        if await submit(self.file, self.workshop, "campaign", title if new else f"{title}, going on", action):
             await self._name()
 
     async def _example(self) -> None:
         self.fault.text = ""
         try:
-            path = await run.io_bound(write_campaign, self.workshop)
+            path = await aside(self.file, write_campaign, self.workshop)
         except (ValueError, OSError) as error:
             self.fault.text = str(error)
             return

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from nicegui import run, ui
+from nicegui import ui
 from nicegui.elements.mixins.text_element import TextElement
 
 from microrad.studio.campaign_live import Live
 from microrad.studio.campaign_view import Figures, Table, figures
 from microrad.studio.pages import layout
+from microrad.studio.pages.aside import aside
 from microrad.studio.workshop import Workshop
 
 _LOOK_S = 1.0
@@ -52,11 +53,11 @@ class CampaignPanel:
 
     async def _look(self) -> None:
         """Read what is new, and show it."""
-        live = await run.io_bound(self.workshop.campaigns.look, self.ledger)
-        if live is None or live is self._last:  # the server is ending, or nothing is new
+        live = await aside(self.place, self.workshop.campaigns.look, self.ledger)
+        if live is self._last:  # nothing is new
             return
         self._last = live
-        found = await run.io_bound(figures, live)
+        found = await aside(self.place, figures, live)
         self._fault.text = live.fault
         self._fault.visible = bool(live.fault)
         if found is None:

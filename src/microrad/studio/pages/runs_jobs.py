@@ -8,11 +8,12 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from nicegui import run, ui
+from nicegui import ui
 
 from microrad.studio import commands
 from microrad.studio.jobs import Job, JobError
 from microrad.studio.pages import layout
+from microrad.studio.pages.aside import aside
 from microrad.studio.pages.runs_campaign import CampaignPanel
 from microrad.studio.runs_view import (
     CampaignReport,
@@ -49,9 +50,7 @@ class JobList:
         if self._busy.locked():
             return
         async with self._busy:
-            jobs = await run.io_bound(self.workshop.jobs.listed)
-            if jobs is None:  # the server is ending
-                return
+            jobs = await aside(self._place, self.workshop.jobs.listed)
             self._empty.visible = not jobs
             there = {job.number for job in jobs}
             for number in self._cards.keys() - there:
@@ -161,8 +160,8 @@ class _Card:
 
     async def _ended(self, job: Job) -> None:
         """What a job has said and written, read once it is over."""
-        said = await run.io_bound(self.workshop.jobs.output, job.number)
-        self.said.text = (said or "").strip()
+        said = await aside(self.element, self.workshop.jobs.output, job.number)
+        self.said.text = said.strip()
         self.details.visible = bool(self.said.text)
         self.results.clear()
         with self.results:
@@ -191,14 +190,15 @@ class _Card:
         ledger = None if job is None else ledger_of(job)
         if ledger is not None:
             action = commands.CampaignResume(Path(ledger))
-            await submit(self.workshop, "campaign", f"Campaign {ledger}, going on", action)
+            await submit(self.element, self.workshop, "campaign", f"Campaign {ledger}, going on", action)
 
     async def _write_page(self) -> None:
         job = self._last
         ledger = None if job is None else ledger_of(job)
         if ledger is not None:
-            page = await run.io_bound(free_name, self.workshop, Path(ledger).stem, ".html") or ""
-            await submit(self.workshop, "export", f"Report of {ledger}", CampaignReport(Path(ledger), Path(page)))
+            page = await aside(self.element, free_name, self.workshop, Path(ledger).stem, ".html")
+            action = CampaignReport(Path(ledger), Path(page))
+            await submit(self.element, self.workshop, "export", f"Report of {ledger}", action)
 
 
 class _Done:
@@ -214,10 +214,10 @@ def _class(job: Job) -> str:
     return "no" if job.state in ("failed", "lost", "unreadable") else "soft"
 
 
-async def submit(workshop: Workshop, kind: Any, title: str, action: commands.Action) -> bool:
-    """Put an action into the queue; says why it cannot be, and whether it is."""
+async def submit(page: ui.element, workshop: Workshop, kind: Any, title: str, action: commands.Action) -> bool:
+    """Put an action into the queue; says on the page of this element why it cannot be, and returns whether it is."""
     try:
-        await run.io_bound(workshop.jobs.submit, order(workshop, kind, title, action))
+        await aside(page, workshop.jobs.submit, order(workshop, kind, title, action))
     except (JobError, OSError) as error:
         layout.refuse(str(error))
         return False

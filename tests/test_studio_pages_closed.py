@@ -1,0 +1,265 @@
+"""Pages that are closed while they wait for something: what was to come is dropped, and nobody complains."""
+
+import ast
+import asyncio
+import importlib
+from itertools import cycle
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from microrad.studio import latest
+from microrad.studio.jobs import JobError
+from microrad.studio.uploads import Uploads
+from microrad.studio.workshop import Workshop
+from shipped import SHIPPED
+from studio_jobs import written
+
+pytest.importorskip("nicegui", reason="the studio is not installed (nicegui)")
+
+from nicegui import background_tasks, client, core, ui
+from nicegui.app.app import State
+from nicegui.client import Client
+from nicegui.outbox import Outbox
+from nicegui.page import page as at
+
+from microrad.studio import pages
+from microrad.studio.pages import aside, link, mirror, runs
+
+FOLDER = Path(pages.__file__).parent
+
+
+class Answer:
+    """What a browser answers, if anybody waits for it."""
+
+    def __init__(self, come):
+        self.come = come
+
+    def __await__(self):
+        return self.come().__await__()
+
+
+async def _nothing(*_):
+    pass
+
+
+class Visit:
+    """A tab without a browser, which is closed as its page waits for the time that `leave` tells; 0 for never.
+
+    `told` is what NiceGUI complains of then; `waits` is how often the page has waited.
+    """
+
+    def __init__(self, patch, leave=0):
+        self.patch, self.leave = patch, leave
+        self.waits, self.told, self.looks = 0, [], []
+        patch.setattr(core, "loop", asyncio.get_running_loop())
+        patch.setattr(client.helpers, "warn_once", lambda words, **more: self.told.append(words))
+        patch.setattr(core.app, "handle_exception", lambda error: self.told.append(repr(error)))
+        patch.setattr(aside.run, "io_bound", self._wait)
+        patch.setattr(ui, "timer", self._timer)
+        patch.setattr(Outbox, "loop", _nothing)
+        patch.setattr(Client, "run_javascript", lambda *code, **more: Answer(self._closed_in_turn))
+        self.tab = Client(at("/"), request=None)
+
+    def _timer(self, interval, look, **how):
+        self.looks.append(look)
+        return SimpleNamespace(active=True)
+
+    async def _wait(self, work, *args, **kwargs):
+        """In place of waiting for a thread; as there, a handler goes on behind it although its page is gone."""
+        await self._closed_in_turn()
+        return work(*args, **kwargs)
+
+    async def _closed_in_turn(self):
+        self.waits += 1
+        if self.waits == self.leave:
+            self.tab.delete()
+        await asyncio.sleep(0)
+
+    async def over(self, *handlers):
+        """Run handlers as events of the page do, and what they have begun."""
+        for handler in handlers:
+            if self.tab.is_deleted:
+                break
+            background_tasks.create(self._handled(handler))
+            await self.rest()
+
+    async def _handled(self, handler):
+        with self.tab:
+            found = handler()
+            if asyncio.iscoroutine(found):
+                await found
+
+    async def rest(self):
+        """Have everything end that was begun."""
+        while background_tasks.running_tasks:
+            await asyncio.wait(background_tasks.running_tasks)
+
+    def end(self):
+        """Close the tab, unless it is closed."""
+        if not self.tab.is_deleted:
+            self.tab.delete()
+
+
+@pytest.fixture(scope="module")
+def workshop(tmp_path_factory):
+    """A folder with a mission, a campaign, a recording and jobs that have ended; its day is computed."""
+    folder = tmp_path_factory.mktemp("folder")
+    (folder / "leo-geo.toml").write_text(SHIPPED.read_text("utf-8"), "utf-8")
+    found = Workshop(folder)
+    found.other = found.draft
+    runs.write_campaign(found)
+    for number, kind in enumerate(("identification", "campaign", "study"), 1):
+        job = written(found.studio / "jobs", number, kind=kind)
+        (job / "started").touch()
+        (job / "stdout").write_text("said\n", "utf-8")
+    time = np.arange(400) / 200
+    drive = 50 - 50 * np.cos(2 * np.pi * time)
+    rows = np.column_stack([time, drive, 10 * drive])
+    text = "Time (s),Drive (V),Angle (urad)\n" + "".join(f"{t:.3f},{v:.4f},{a:.4f}\n" for t, v, a in rows)
+
+    async def blocks():
+        yield text.encode()
+
+    asyncio.run(Uploads(found.studio / "uploads").save("loop.csv", blocks()))
+    return found
+
+
+def left(patch, workshop, build, leave):
+    """A visit of what `build` puts on a page, closed as it waits for this time."""
+
+    async def go():
+        visit = Visit(patch, leave)
+        with visit.tab:
+            handlers = build(workshop, visit)
+        await visit.over(*handlers)
+        for question in latest._shared.get(workshop, {}).values():
+            question.wait(60.0)
+        await visit.over(*handlers)
+        visit.end()
+        return visit
+
+    return asyncio.run(go())
+
+
+def every_time(workshop, build):
+    """How often a page waits, closed in turn as it waits for each time; what is complained of, by the time."""
+    told, leave = {}, 0
+    while True:
+        with pytest.MonkeyPatch.context() as patch:
+            visit = left(patch, workshop, build, leave)
+        if visit.told:
+            told[leave] = visit.told
+        if leave and visit.waits < leave:
+            return leave - 1, told
+        leave += 1
+
+
+WAITS = {"compare": 2, "control": 4, "day": 1, "link": 3, "mirror": 4, "mission": 0, "pointing": 4, "runs": 17}
+
+
+@pytest.mark.parametrize("name", WAITS)
+def test_a_page_may_be_closed_whenever_it_waits(workshop, name, monkeypatch):
+    monkeypatch.setattr(link, "_REST_S", -1.0)  # asks for the study of the links at once
+    module = importlib.import_module(f"microrad.studio.pages.{name}")
+
+    def build(workshop, visit):
+        module.page(workshop)
+        return visit.looks
+
+    assert every_time(workshop, build) == (WAITS[name], {})
+
+
+def test_every_page_is_closed_here():
+    parsed = {path.stem: ast.parse(path.read_text("utf-8")).body for path in FOLDER.glob("*.py")}
+    assert set(WAITS) == {name for name, body in parsed.items() if "page" in {getattr(e, "name", "") for e in body}}
+
+
+def dropped(workshop, visit):
+    page = mirror.MirrorPage(workshop)
+    recording = page.uploads.listed()[0]
+
+    async def stored(request):
+        return [recording]
+
+    page.drop._stored = stored
+    return [lambda: page.drop._take(None), page.start]
+
+
+def started(workshop, visit):
+    """A study that may be queued, and one that may not."""
+    study = runs._Study(workshop)
+    study.folder.value = "found"
+    answers = cycle([None, JobError("the disk is full")])
+
+    def submit(order):
+        answer = next(answers)
+        if answer is not None:
+            raise answer
+
+    visit.patch.setattr(workshop.jobs, "submit", submit)
+    return [study._run, study._run]
+
+
+def told_of(workshop, visit):
+    """A campaign's example that is refused, as there is one."""
+    return [runs._Campaign(workshop)._example]
+
+
+@pytest.mark.parametrize("build", [dropped, started, told_of])
+def test_a_page_may_be_closed_while_what_was_clicked_is_done(workshop, build):
+    times, told = every_time(workshop, build)
+    assert (times >= 2, told) == (True, {})
+
+
+def test_a_file_that_comes_after_its_page_was_closed_is_answered(workshop, monkeypatch):
+    """The browser may be another tab's; its request is answered whether its page is there or not."""
+
+    async def send():
+        visit = Visit(monkeypatch, leave=1)
+        with visit.tab:
+            page = mirror.MirrorPage(workshop)
+        recording = page.uploads.listed()[0]
+        page.drop._stored = lambda request: asyncio.sleep(0, [recording])
+        answer = await page.drop._take(None)
+        page.drop._refused("late")
+        return visit, answer.body
+
+    visit, answer = asyncio.run(send())
+    assert (visit.tab.is_deleted, visit.told, answer) == (True, [], b"read")
+
+
+def test_what_is_done_aside_is_answered_or_ends_whoever_asked(monkeypatch):
+    def refuse():
+        raise ValueError("a reason")
+
+    async def ask(work, leave):
+        visit = Visit(monkeypatch, leave)
+        with visit.tab:
+            label = ui.label()
+        try:
+            return await aside.aside(label, work)
+        except (ValueError, asyncio.CancelledError) as error:
+            return type(error), str(error)
+        finally:
+            visit.end()
+
+    assert asyncio.run(ask(lambda: 7, leave=0)) == 7
+    assert asyncio.run(ask(refuse, leave=0)) == (ValueError, "a reason")
+    assert asyncio.run(ask(lambda: 7, leave=1)) == (asyncio.CancelledError, "")
+    assert asyncio.run(ask(refuse, leave=1)) == (asyncio.CancelledError, "")
+    monkeypatch.setattr(core.app, "_state", State.STOPPING)
+    assert asyncio.run(ask(lambda: 7, leave=0)) == (asyncio.CancelledError, "")
+
+
+def test_pages_wait_by_the_one_way_that_ends_with_them():
+    others = {"io_bound", "cpu_bound", "to_thread", "run_in_executor", "sleep"}
+    found = {
+        (path.name, node.attr)
+        for path in FOLDER.glob("*.py")
+        for node in ast.walk(ast.parse(path.read_text("utf-8")))
+        if isinstance(node, ast.Attribute) and node.attr in others
+    }
+    assert found == {("aside.py", "io_bound"), ("aside.py", "sleep")}
