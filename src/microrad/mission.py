@@ -39,12 +39,16 @@ _KINDS = ("paper", "assumption", "standard", "measured", "identified", "literatu
 
 @dataclass(frozen=True, slots=True)
 class Source:
-    """Where a value of the mission comes from: the line it stands on, its raw text and the comment behind it."""
+    """Where a value of the mission comes from: the line it stands on, its raw text and the comment behind it.
+
+    `was` is the raw value that the comment was written for, where it has another one in front of it now.
+    """
 
     line: int
     comment: str
     value: str = ""
     file: str = "mission file"
+    was: str = ""
 
     @property
     def kind(self) -> str:
@@ -54,8 +58,11 @@ class Source:
 
     @property
     def text(self) -> str:
-        """The comment, or the place in the file when there is none."""
-        return self.comment or f"{self.file}, line {self.line}"
+        """The comment, or the place in the file where there is none or it speaks of another value."""
+        place, was = f"{self.file}, line {self.line}", self.was.strip('"')
+        if was:
+            return f"{place}, in place of {was} ({self.comment})"
+        return self.comment or place
 
 
 def source_text(sources: Mapping[str, Source], *keys: str) -> str:

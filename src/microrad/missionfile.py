@@ -4,8 +4,6 @@ import contextlib
 import difflib
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from functools import cache
-from importlib import resources
 from pathlib import Path
 from typing import Any, Literal, TypeVar, get_args, get_origin
 
@@ -16,6 +14,7 @@ from microrad.document import Document, Fault, MissionError, UnreadableError, cl
 from microrad.fields import NOT_PUBLISHED, UNKNOWN, Problem, ProblemsError, Quantity, Several, Table
 from microrad.mirror_table import Mirror
 from microrad.mission import LinkMission, Mission, Source
+from microrad.origins import written_for
 from microrad.units import UnitError
 
 __all__ = [
@@ -155,9 +154,9 @@ def load_mirror(path: str | Path) -> MirrorFile:
 
 
 def assumptions(mission_file: MissionFile | LinkFile) -> tuple[tuple[str, str, str], ...]:
-    """Key, raw value and comment of every value whose comment calls it an assumption."""
+    """Key, raw value and source of every value whose comment calls it an assumption."""
     items = mission_file.sources.items()
-    return tuple((key, source.value, source.comment) for key, source in items if source.kind == "assumption")
+    return tuple((key, source.value, source.text) for key, source in items if source.kind == "assumption")
 
 
 # --------------------------------------------------------------------------------------------------------------- files
@@ -215,7 +214,8 @@ def _sources(document: Document) -> dict[str, Source]:
         holder = document.holder(key)
         found = holder.statement(key)
         value, line, comment = (" ".join(found.value.split()), found.line, found.comment) if found else ("", 0, "")
-        sources[key] = Source(line, comment, value, holder.label)
+        was = written_for(found.key, comment, found.value) if found else ""
+        sources[key] = Source(line, comment, value, holder.label, was)
     return sources
 
 
@@ -396,14 +396,6 @@ def _dotted(table: str, location: Iterable[object]) -> str:
     return ".".join(str(part) for part in (table, *location) if part != "")
 
 
-@cache
-def _shipped_sources() -> Mapping[str, Source]:
-    with resources.as_file(resources.files("microrad") / "missions" / "leo-geo.toml") as path:
-        return load_mission(path).sources
-
-
 def changed_from_shipped(file: MissionFile) -> tuple[tuple[str, str, str], ...]:
     """Keys that name the paper as their source but differ from the paper's mission: (key, value, value there)."""
-    shipped = _shipped_sources()
-    named = {key: source.value for key, source in file.sources.items() if source.kind == "paper"}
-    return tuple((k, v, shipped[k].value) for k, v in named.items() if k in shipped and shipped[k].value != v)
+    return tuple((k, s.value, s.was) for k, s in file.sources.items() if s.kind == "paper" and s.was)

@@ -101,8 +101,8 @@ def _shown(a: Value | None, b: Value | None) -> tuple[str, str, str, str]:
     return (
         "" if a is None else a.typed,
         "" if b is None else b.typed,
-        "" if a is None else a.comment,
-        "" if b is None else b.comment,
+        "" if a is None else a.source,
+        "" if b is None else b.source,
     )
 
 

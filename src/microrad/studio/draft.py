@@ -19,7 +19,9 @@ from typing import Literal
 
 from microrad.document import MAX_BYTES, Fault, MissionError, Statement, clipped, scan
 from microrad.folder import write_whole
+from microrad.mission import Source
 from microrad.missionfile import LinkFile, MissionFile, load_link, load_mission
+from microrad.origins import written_for
 from microrad.studio.draft_keys import Key, key_of, keys_in, loose_toml, typed_from, value_of
 
 _MARK = "\ufeff"
@@ -48,6 +50,12 @@ class Value:
     line: int
     about: Key | None
     problems: tuple[Fault, ...]
+
+    @property
+    def source(self) -> str:
+        """Where the value comes from, as budgets say it; "" without a comment."""
+        was = written_for(self.key, self.comment, self.raw)
+        return Source(self.line, self.comment, self.raw, was=was).text if self.comment else ""
 
 
 @dataclass(frozen=True, slots=True)

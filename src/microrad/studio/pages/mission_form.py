@@ -222,7 +222,7 @@ def _say(row: _Row, words: str, wrong: bool) -> None:
 def _explained(value: Value) -> str:
     """What a key is, what it takes, and where its value comes from."""
     about = "a key that no mission has" if value.about is None else _about(value.about)
-    return f"{about}\n{value.comment}" if value.comment else about
+    return f"{about}\n{value.source}" if value.comment else about
 
 
 def _about(key: Key) -> str:

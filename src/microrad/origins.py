@@ -1,0 +1,60 @@
+"""Whether a comment still stands behind the value that it was written for."""
+
+import math
+import tomllib
+from collections.abc import Mapping
+from contextlib import suppress
+from functools import cache
+from importlib import resources
+from importlib.resources.abc import Traversable
+
+from microrad.document import scan
+from microrad.units import UnitError, parse_quantity
+
+
+def written_for(key: str, comment: str, value: str) -> str:
+    """The value that a comment was written for, where it stands behind another one now; "" where it does not.
+
+    `value` is raw TOML, as is what is returned. A shipped mission or preset holds the comment, word for word, behind
+    the same dotted key. Quantities that are equal in other units ("5 cm", "50 mm") are one value. Of a comment of the
+    user's own nothing is known.
+    """
+    there = _shipped().get((key, comment), ())
+    return "" if not there or any(_same(value, each) for each in there) else " ".join(there[0].split())
+
+
+@cache
+def _shipped() -> Mapping[tuple[str, str], tuple[str, ...]]:
+    """Values by key and comment, of every shipped mission and preset."""
+    found: dict[tuple[str, str], tuple[str, ...]] = {}
+    missions = resources.files("microrad") / "missions"
+    for file in (*_texts(missions), *_texts(missions / "presets")):
+        for each in scan(file.read_text(encoding="utf-8")):
+            if each.kind == "key" and each.comment:
+                where = each.key, each.comment
+                found[where] = (*found.get(where, ()), each.value)
+    return found
+
+
+def _texts(folder: Traversable) -> list[Traversable]:
+    return sorted((each for each in folder.iterdir() if each.name.endswith(".toml")), key=lambda each: each.name)
+
+
+def _same(value: str, other: str) -> bool:
+    if value == other:
+        return True
+    try:
+        ours, theirs = (tomllib.loads(f"x = {raw}")["x"] for raw in (value, other))
+    except (ValueError, RecursionError):
+        return False
+    return _equal(ours, theirs)
+
+
+def _equal(ours: object, theirs: object) -> bool:
+    if isinstance(ours, list) and isinstance(theirs, list):
+        return len(ours) == len(theirs) and all(map(_equal, ours, theirs))
+    if isinstance(ours, str) and isinstance(theirs, str):
+        unit = theirs.partition(" ")[2]
+        with suppress(UnitError, ValueError):
+            return math.isclose(parse_quantity(ours, unit), parse_quantity(theirs, unit), rel_tol=1e-12)
+    return isinstance(ours, bool) == isinstance(theirs, bool) and ours == theirs
