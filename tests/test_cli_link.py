@@ -258,6 +258,17 @@ def test_csv_quotes_what_a_comment_says(call, folder):
     assert row[5] == comment
 
 
+def test_csv_has_no_formula_that_a_mission_brings_along(call, folder):
+    path = file_with(folder)
+    text = path.read_text(encoding="utf-8")
+    formula = '=HYPERLINK("http://example.org")'
+    path.write_text(text.replace('transmit_power = "5 W"', f'transmit_power = "5 W" # {formula}'), encoding="utf-8")
+    body = rows(call("budget", path, "--csv").out)
+    (row,) = [r for r in body if r[:2] == ["Communication", "Transmit power"]]
+    assert row[5] == f"'{formula}"
+    assert not [cell for row in body for k, cell in enumerate(row) if k != 2 and cell[:1] in ("=", "+", "-", "@")]
+
+
 # ---------------------------------------------------------------------------------------------------------------- HTML
 def test_html_is_one_page_that_loads_nothing(call, folder):
     path = file_with(folder, JITTER, {"acquisition.scan": data_with({})["acquisition"]["scan"]})

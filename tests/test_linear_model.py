@@ -97,6 +97,16 @@ def test_the_order_is_chosen_for_a_reason(paper_fit):
     assert "order 6 gains" in paper_fit.reason
 
 
+def test_a_tone_in_the_output_is_not_taken_for_the_mirror_without_a_word(chirp_and_answer, paper_fit):
+    hum = 0.1 * np.sin(2 * np.pi * 50 * np.arange(500_000) / 50_000.0 + 0.7)[:, None]
+    drive, answer = chirp_and_answer
+    fit = fit_linear([noisy((drive, answer + np.std(answer) * hum), 0)], 7, strictly_proper=True)
+    (told,) = [w for w in fit.warnings if "steady tone" in w]
+    assert told.startswith("pole at 50 Hz rings for ")
+    assert "the recording lasts 10 s" in told
+    assert not any("steady tone" in w for w in paper_fit.warnings)
+
+
 def test_the_slow_pair_is_outside_the_band(paper_fit):
     text = "\n".join(paper_fit.warnings)
     assert "pole at 0.03" in text

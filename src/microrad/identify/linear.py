@@ -257,10 +257,21 @@ def _finish(
         dc_gain_error=known.dc_gain_error,
         edge_gain=known.edge_gain,
         edge_gain_error=known.edge_gain_error,
-        warnings=_warnings(known, response),
+        warnings=_warnings(known, response, max(len(r.drive) / r.rate_hz for r in records)),
         response=response,
         residual=residual,
     )
+
+
+def _tones(poles: Complexes, longest_s: float) -> list[str]:
+    """Poles that ring longer than the longest recording: it cannot show that, but a steady tone in it looks so."""
+    ringing = {f"{abs(p) / (2 * np.pi):.4g}": -1 / p.real for p in poles if p.imag > 0 and -1 / p.real > longest_s}
+    return [
+        f"pole at {hz} Hz rings for {decay_s:.3g} s, the recording lasts {longest_s:.3g} s: that is a steady tone "
+        "which the drive has not made (mains, a wheel), not the mirror; record without it, else a controller is "
+        "designed for a resonance that is not there."
+        for hz, decay_s in ringing.items()
+    ]
 
 
 def _inflation(errors: Sequence[Floats]) -> float:
@@ -268,9 +279,9 @@ def _inflation(errors: Sequence[Floats]) -> float:
     return colour_inflation(columns) if columns else 1.0
 
 
-def _warnings(known: Uncertainty, response: FrequencyResponse) -> tuple[str, ...]:
+def _warnings(known: Uncertainty, response: FrequencyResponse, longest_s: float) -> tuple[str, ...]:
     low, high = response.excited_hz
-    found = []
+    found = _tones(known.poles, longest_s)
     for name, values in (("pole", known.poles), ("zero", known.zeros)):
         freq = np.abs(values) / (2 * np.pi)
         outside = sorted({float(f"{f:.3g}") for f in freq[(freq < low) | (freq > high)]})

@@ -14,6 +14,7 @@ from microrad.link_acquisition import Finding, Found, Tracking
 from microrad.link_performance import Performance
 from microrad.link_study import UNDER_JITTER, LinkStudy
 from microrad.mission import source_text
+from microrad.operations import spreadsheet_text
 from microrad.pointing import OpenLoopPointing
 from microrad.report.quantities import quantity
 
@@ -62,7 +63,8 @@ def csv_text(study: LinkStudy) -> str:
     jitter = [(UNDER_JITTER, line) for line in jitter_lines(study)]
     for name, line in (*lines(study), *jitter):
         value = repr(float(line.value))  # every digit, as JSON has it
-        writer.writerow([name, line.name, value, line.unit, line.basis, line.source, line.regime, line.warning])
+        texts = map(spreadsheet_text, (line.basis, line.source, line.regime, line.warning))
+        writer.writerow([name, spreadsheet_text(line.name), value, line.unit, *texts])
     return buffer.getvalue().rstrip("\n")
 
 
