@@ -266,6 +266,9 @@ def test_csv_has_no_formula_that_a_mission_brings_along(call, folder):
     body = rows(call("budget", path, "--csv").out)
     (row,) = [r for r in body if r[:2] == ["Communication", "Transmit power"]]
     assert row[5] == f"'{formula}"
+    path.write_text(text.replace("[terminals]\n", '[terminals]\nleo_name = "=1+1"\n'), encoding="utf-8")
+    body += rows(call("budget", path, "--csv").out)
+    assert "'=1+1 aperture gain" in {row[1] for row in body}
     assert not [cell for row in body for k, cell in enumerate(row) if k != 2 and cell[:1] in ("=", "+", "-", "@")]
 
 

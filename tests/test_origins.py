@@ -5,7 +5,7 @@ import pytest
 from microrad import origins
 from microrad.document import scan
 from microrad.link import communication_budget
-from microrad.missionfile import assumptions, load_link, load_mission
+from microrad.missionfile import assumptions, changed_from_shipped, load_link, load_mission
 from microrad.presets import preset_text, presets
 from microrad.studio.draft import Draft
 from shipped import SHIPPED
@@ -92,3 +92,19 @@ def test_a_draft_says_it_as_the_budget_does(tmp_path):
     assert changed.comment == TABLE_2  # the text keeps it
     assert draft.set("terminals.leo_aperture", "50 mm").values["terminals.leo_aperture"].source == TABLE_2
     assert draft.values["name"].source == ""
+
+
+def test_what_names_the_paper_is_held_against_the_papers_mission_by_its_key_alone(tmp_path):
+    path = tmp_path / "mission.toml"
+    for comment in ("paper: Fig. 3", "paper:  Table 2"):
+        line = f'leo_aperture = "6 cm" # {comment}\n'
+        path.write_text(TEXT.replace(TEXT[TEXT.index("leo_aperture = ") :].partition("\n")[0] + "\n", line), "utf-8")
+        assert changed_from_shipped(load_mission(path)) == (("terminals.leo_aperture", '"6 cm"', '"5 cm"'),)
+        path.write_text(path.read_text("utf-8").replace('"6 cm"', '"50 mm"'), "utf-8")
+        assert changed_from_shipped(load_mission(path)) == ()
+
+
+def test_a_comment_that_is_shipped_with_several_values_speaks_of_none():
+    said = {s.value for p in presets() for s in scan(p.text) if s.key == "terminals.leo_name"}
+    assert len(said) > 2
+    assert origins.written_for("terminals.leo_name", "assumption: what budgets call it", '"MYSAT"') == ""

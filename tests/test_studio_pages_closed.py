@@ -3,6 +3,7 @@
 import ast
 import asyncio
 import importlib
+import threading
 from itertools import cycle
 from pathlib import Path
 from types import SimpleNamespace
@@ -224,12 +225,46 @@ def test_a_file_that_comes_after_its_page_was_closed_is_answered(workshop, monke
             page = mirror.MirrorPage(workshop)
         recording = page.uploads.listed()[0]
         page.drop._stored = lambda request: asyncio.sleep(0, [recording])
-        answer = await page.drop._take(None)
-        page.drop._refused("late")
-        return visit, answer.body
+        return visit, (await page.drop._take(None)).body
 
     visit, answer = asyncio.run(send())
     assert (visit.tab.is_deleted, visit.told, answer) == (True, [], b"read")
+
+
+def test_a_file_that_is_no_recording_is_thrown_away_although_its_page_is_closed(tmp_path, monkeypatch):
+    uploads = Uploads(tmp_path / "uploads")
+
+    async def blocks():
+        yield b"this is no recording"
+
+    async def send(leave):
+        visit = Visit(monkeypatch, leave)
+        with visit.tab:
+            page = mirror.MirrorPage(SimpleNamespace(studio=tmp_path, folder=tmp_path, jobs=None))
+        upload = await uploads.save("junk.csv", blocks())
+        page.drop._stored = lambda request: asyncio.sleep(0, [upload])
+        await page.drop._take(None)
+        visit.end()
+        return page.refused.text
+
+    assert "junk.csv" in asyncio.run(send(leave=0))
+    assert asyncio.run(send(leave=1)) == ""
+    assert uploads.listed() == ()
+
+
+def test_a_handler_that_is_cancelled_ends():
+    """NiceGUI's own wait takes that for an answer."""
+    released = threading.Event()
+
+    async def cancelled():
+        task = asyncio.create_task(aside.aside(SimpleNamespace(is_deleted=False), released.wait))
+        await asyncio.sleep(0.05)
+        task.cancel()
+        await asyncio.wait([task])
+        released.set()
+        return task.cancelled()
+
+    assert asyncio.run(cancelled())
 
 
 def test_what_is_done_aside_is_answered_or_ends_whoever_asked(monkeypatch):

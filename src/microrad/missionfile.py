@@ -14,7 +14,7 @@ from microrad.document import Document, Fault, MissionError, UnreadableError, cl
 from microrad.fields import NOT_PUBLISHED, UNKNOWN, Problem, ProblemsError, Quantity, Several, Table
 from microrad.mirror_table import Mirror
 from microrad.mission import LinkMission, Mission, Source
-from microrad.origins import written_for
+from microrad.origins import of_paper, written_for
 from microrad.units import UnitError
 
 __all__ = [
@@ -398,4 +398,5 @@ def _dotted(table: str, location: Iterable[object]) -> str:
 
 def changed_from_shipped(file: MissionFile) -> tuple[tuple[str, str, str], ...]:
     """Keys that name the paper as their source but differ from the paper's mission: (key, value, value there)."""
-    return tuple((k, s.value, s.was) for k, s in file.sources.items() if s.kind == "paper" and s.was)
+    named = {key: source.value for key, source in file.sources.items() if source.kind == "paper"}
+    return tuple((key, value, there) for key, value in named.items() if (there := of_paper(key, value)))

@@ -8,19 +8,27 @@ from functools import cache
 from importlib import resources
 from importlib.resources.abc import Traversable
 
-from microrad.document import scan
+from microrad.document import Statement, scan
 from microrad.units import UnitError, parse_quantity
 
 
 def written_for(key: str, comment: str, value: str) -> str:
     """The value that a comment was written for, where it stands behind another one now; "" where it does not.
 
-    `value` is raw TOML, as is what is returned. A shipped mission or preset holds the comment, word for word, behind
-    the same dotted key. Quantities that are equal in other units ("5 cm", "50 mm") are one value. Of a comment of the
-    user's own nothing is known.
+    `value` is raw TOML, as is what is returned. It is known only for a comment that the shipped missions and presets
+    hold, word for word, behind the same dotted key and one value. Quantities that are equal in other units ("5 cm",
+    "50 mm") are one value.
     """
     there = _shipped().get((key, comment), ())
-    return "" if not there or any(_same(value, each) for each in there) else " ".join(there[0].split())
+    if not there or any(_same(value, each) for each in there) or not all(_same(each, there[0]) for each in there):
+        return ""
+    return " ".join(there[0].split())
+
+
+def of_paper(key: str, value: str) -> str:
+    """The raw value that the paper's mission has for a dotted key, where it is another one; "" where it is not."""
+    there = _paper().get(key, value)
+    return "" if _same(value, there) else " ".join(there.split())
 
 
 @cache
@@ -29,11 +37,20 @@ def _shipped() -> Mapping[tuple[str, str], tuple[str, ...]]:
     found: dict[tuple[str, str], tuple[str, ...]] = {}
     missions = resources.files("microrad") / "missions"
     for file in (*_texts(missions), *_texts(missions / "presets")):
-        for each in scan(file.read_text(encoding="utf-8")):
-            if each.kind == "key" and each.comment:
+        for each in _keys(file):
+            if each.comment:
                 where = each.key, each.comment
                 found[where] = (*found.get(where, ()), each.value)
     return found
+
+
+@cache
+def _paper() -> Mapping[str, str]:
+    return {each.key: each.value for each in _keys(resources.files("microrad") / "missions" / "leo-geo.toml")}
+
+
+def _keys(file: Traversable) -> list[Statement]:
+    return [each for each in scan(file.read_text(encoding="utf-8")) if each.kind == "key"]
 
 
 def _texts(folder: Traversable) -> list[Traversable]:

@@ -24,6 +24,11 @@ from microrad.recording import Recording
 _ORDERS_SINGLE = range(1, 9)
 _ORDERS_SEVERAL = range(4, 29, 4)
 _GAIN_DIFFERS = 0.05
+# Spare poles that are fitted to noise have at most 0.2 of the rms of the residual, those fitted to a tone 0.3 and more,
+# and both decay in ten times the recording or more. A true resonance, however sharp, was fitted by at most twice.
+_RINGS, _CYCLES, _TONE = 5.0, 3.0, 0.25
+_STEADY = "most likely a steady tone that the drive has not made (mains, a wheel)"
+_SPARE = "most likely noise, which a spare pole was fitted to"
 
 
 @dataclass(frozen=True)
@@ -194,17 +199,19 @@ def output_error(
     From rest at the first sample's drive; with `steady`, each period in the steady state of its own drive
     (`period_samples`).
     """
-    if steady:
-        period = record.period_samples or record.samples
-        parts = [
-            simulate_periodic(modes, record.drive[k : k + period], record.rate_hz, hold)
-            for k in range(0, record.samples - period + 1, period)
-        ]
-        modelled = np.concatenate(parts)
-    else:
-        modelled = simulate(modes, record.drive - record.drive[:1], record.rate_hz, hold)
+    modelled = _modelled(modes, record, hold, steady)
     error = (record.output[: len(modelled)] - modelled)[drop:]
     return np.asarray(error - error.mean(axis=0))
+
+
+def _modelled(modes: ModalModel, record: Recording, hold: Hold, steady: bool) -> Floats:
+    """What the model makes of the drive of a record; with `steady`, of its whole periods alone."""
+    if not steady:
+        return simulate(modes, record.drive - record.drive[:1], record.rate_hz, hold)
+    period = record.period_samples or record.samples
+    begins = range(0, record.samples - period + 1, period)
+    parts = [simulate_periodic(modes, record.drive[k : k + period], record.rate_hz, hold) for k in begins]
+    return np.concatenate(parts)
 
 
 def fit_percent(measured: Floats, error: Floats) -> Floats:
@@ -257,21 +264,37 @@ def _finish(
         dc_gain_error=known.dc_gain_error,
         edge_gain=known.edge_gain,
         edge_gain_error=known.edge_gain_error,
-        warnings=_warnings(known, response, max(len(r.drive) / r.rate_hz for r in records)),
+        warnings=(*(_tones(model, records, rms, response.hold) if errors else ()), *_warnings(known, response)),
         response=response,
         residual=residual,
     )
 
 
-def _tones(poles: Complexes, longest_s: float) -> list[str]:
-    """Poles that ring longer than the longest recording: it cannot show that, but a steady tone in it looks so."""
-    ringing = {f"{abs(p) / (2 * np.pi):.4g}": -1 / p.real for p in poles if p.imag > 0 and -1 / p.real > longest_s}
-    return [
-        f"pole at {hz} Hz rings for {decay_s:.3g} s, the recording lasts {longest_s:.3g} s: that is a steady tone "
-        "which the drive has not made (mains, a wheel), not the mirror; record without it, else a controller is "
-        "designed for a resonance that is not there."
-        for hz, decay_s in ringing.items()
-    ]
+def _tones(model: ModalModel, records: Sequence[Recording], residual_rms: Floats, hold: Hold) -> list[str]:
+    """Modes that ring for much longer than the recording lasts: it holds a steady tone, or a pole was to spare."""
+    longest_s, found = max(r.samples / r.rate_hz for r in records), []
+    for k, pole in enumerate(model.poles_rad_s):
+        hz, decay_s = abs(pole) / (2 * np.pi), -1.0 / pole.real
+        if decay_s > _RINGS * longest_s and hz * longest_s > _CYCLES:
+            tone = _share(model, k, records, hold, residual_rms) > _TONE
+            found.append(
+                f"pole at {hz:.4g} Hz rings for {decay_s:.3g} s, the recording lasts {longest_s:.3g} s and cannot show "
+                f"that: {_STEADY if tone else _SPARE}; do not design a controller for it."
+            )
+    return found
+
+
+def _share(model: ModalModel, k: int, records: Sequence[Recording], hold: Hold, residual_rms: Floats) -> float:
+    """Largest rms output of a mode by itself, in that of the residual of the whole model."""
+    alone = ModalModel(
+        model.poles_rad_s[k : k + 1],
+        model.input_vectors[k : k + 1],
+        model.output_vectors[:, k : k + 1],
+        np.zeros_like(model.direct),
+    )
+    steady = all(r.period_samples is not None for r in records)
+    own = np.concatenate([_modelled(alone, r, hold, steady) for r in records])
+    return float(np.max(own.std(axis=0) / residual_rms))
 
 
 def _inflation(errors: Sequence[Floats]) -> float:
@@ -279,9 +302,9 @@ def _inflation(errors: Sequence[Floats]) -> float:
     return colour_inflation(columns) if columns else 1.0
 
 
-def _warnings(known: Uncertainty, response: FrequencyResponse, longest_s: float) -> tuple[str, ...]:
+def _warnings(known: Uncertainty, response: FrequencyResponse) -> tuple[str, ...]:
     low, high = response.excited_hz
-    found = _tones(known.poles, longest_s)
+    found = []
     for name, values in (("pole", known.poles), ("zero", known.zeros)):
         freq = np.abs(values) / (2 * np.pi)
         outside = sorted({float(f"{f:.3g}") for f in freq[(freq < low) | (freq > high)]})

@@ -68,6 +68,12 @@ def order(workshop: Workshop, kind: Kind, title: str, action: Action) -> Order:
     return Order(kind, title, action.arguments, workshop.folder, action.results)
 
 
+def report_order(workshop: Workshop, ledger: Path) -> Order:
+    """The report of a ledger as a job, under a name that is free."""
+    page = free_name(workshop, ledger.stem, ".html")
+    return order(workshop, "export", f"Report of {ledger}", CampaignReport(ledger, Path(page)))
+
+
 # -------------------------------------------------------------------------------------------------- what can be started
 def free_name(workshop: Workshop, stem: str, ending: str = "") -> str:
     """A name in the working folder that nothing has yet, and no job that is still to run will take."""

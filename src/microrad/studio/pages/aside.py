@@ -1,8 +1,8 @@
 """What a page has done beside it, and the end of whoever waits for it once the page is closed.
 
-A handler that goes on after its page was closed would change parts that are gone, of which NiceGUI complains. What it
-waits for therefore raises `asyncio.CancelledError` then, which ends a handler without a word; `nicegui.run` would
-return None in place of an answer.
+A handler that goes on after its page was closed would build parts of a page that is gone, of which NiceGUI complains.
+What it waits for therefore raises `asyncio.CancelledError` then, which ends a handler without a word. So it does where
+the handler itself was cancelled: `nicegui.run` would return None.
 """
 
 from __future__ import annotations
@@ -33,6 +33,7 @@ async def pause(page: Element, seconds: float) -> None:
 
 
 def stay(page: Element) -> None:
-    """End the caller if the page of this element is closed, or the studio ends."""
-    if page.is_deleted or app.is_stopping:
+    """End the caller if the page of this element is closed, the caller was cancelled, or the studio ends."""
+    task = asyncio.current_task()
+    if page.is_deleted or app.is_stopping or (task is not None and task.cancelling()):
         raise asyncio.CancelledError

@@ -58,8 +58,8 @@ class Drop:
         self, uploads: Uploads, taken: Callable[[Upload], Awaitable[None]], refused: Callable[[str], None]
     ) -> None:
         """Build the field, and take its files as they are sent."""
-        self._uploads, self._taken, self._told = uploads, taken, refused
-        self._field = field = ui.element("input").classes("drop-zone")
+        self._uploads, self._taken, self._refused = uploads, taken, refused
+        field = ui.element("input").classes("drop-zone")
         field.props('type=file multiple aria-label="Recordings: drop files here, or choose them"')
         client = ui.context.client
         url = f"/_nicegui/client/{client.id}/upload/{field.id}"  # where the guard lets large bodies pass
@@ -79,10 +79,6 @@ class Drop:
             with suppress(asyncio.CancelledError):  # the page was closed meanwhile; the next one finds the file
                 await self._taken(stored)
         return PlainTextResponse("read")
-
-    def _refused(self, words: str) -> None:
-        if not self._field.is_deleted:
-            self._told(words)
 
     async def _stored(self, request: Request) -> list[Upload]:
         """The file of a request as it is stored; nothing where it is refused, or its sender is gone."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 from nicegui import ui
@@ -12,7 +13,7 @@ from microrad.studio.names import NameRefusedError, safe_name, typed_words
 from microrad.studio.pages import layout, pieces
 from microrad.studio.pages.aside import aside
 from microrad.studio.pages.runs_jobs import JobList, submit
-from microrad.studio.runs_view import campaign_files, free_name, ledgers, write_campaign
+from microrad.studio.runs_view import campaign_files, free_name, ledgers, order, write_campaign
 from microrad.studio.workshop import Workshop
 
 TITLE = "Runs"
@@ -83,7 +84,8 @@ class _Study:
         action = self._action()
         if action is None or self._faults() or (self.workshop.draft.changed and not layout.save_draft(self.workshop)):
             return
-        if await submit(self.folder, self.workshop, "study", f"Study of {action.file}", action):
+        make = partial(order, self.workshop, "study", f"Study of {action.file}", action)
+        if await submit(self.folder, self.workshop, make):
             await self._name()
 
 
@@ -149,7 +151,8 @@ class _Campaign:
             return
         new = isinstance(action, commands.CampaignRun)
         title = f"Campaign {action.file}" if isinstance(action, commands.CampaignRun) else f"Campaign {action.ledger}"
-        if await submit(self.file, self.workshop, "campaign", title if new else f"{title}, going on", action):
+        title = title if new else f"{title}, going on"
+        if await submit(self.file, self.workshop, partial(order, self.workshop, "campaign", title, action)):
             await self._name()
 
     async def _example(self) -> None:

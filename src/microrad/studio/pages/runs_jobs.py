@@ -6,24 +6,22 @@ import asyncio
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 from nicegui import ui
 
 from microrad.studio import commands
-from microrad.studio.jobs import Job, JobError
+from microrad.studio.jobs import Job, JobError, Order
 from microrad.studio.pages import layout
 from microrad.studio.pages.aside import aside
 from microrad.studio.pages.runs_campaign import CampaignPanel
 from microrad.studio.runs_view import (
-    CampaignReport,
     Others,
-    free_name,
     ledger_of,
     ledger_path,
     order,
     others,
     progress_words,
+    report_order,
     result_files,
     state_words,
     time_words,
@@ -190,15 +188,14 @@ class _Card:
         ledger = None if job is None else ledger_of(job)
         if ledger is not None:
             action = commands.CampaignResume(Path(ledger))
-            await submit(self.element, self.workshop, "campaign", f"Campaign {ledger}, going on", action)
+            title = f"Campaign {ledger}, going on"
+            await submit(self.element, self.workshop, partial(order, self.workshop, "campaign", title, action))
 
     async def _write_page(self) -> None:
         job = self._last
         ledger = None if job is None else ledger_of(job)
         if ledger is not None:
-            page = await aside(self.element, free_name, self.workshop, Path(ledger).stem, ".html")
-            action = CampaignReport(Path(ledger), Path(page))
-            await submit(self.element, self.workshop, "export", f"Report of {ledger}", action)
+            await submit(self.element, self.workshop, partial(report_order, self.workshop, Path(ledger)))
 
 
 class _Done:
@@ -214,10 +211,10 @@ def _class(job: Job) -> str:
     return "no" if job.state in ("failed", "lost", "unreadable") else "soft"
 
 
-async def submit(page: ui.element, workshop: Workshop, kind: Any, title: str, action: commands.Action) -> bool:
-    """Put an action into the queue; says on the page of this element why it cannot be, and returns whether it is."""
+async def submit(page: ui.element, workshop: Workshop, make: Callable[[], Order]) -> bool:
+    """Queue what `make` returns; says on the page of this element why it cannot be, and returns whether it is."""
     try:
-        await aside(page, workshop.jobs.submit, order(workshop, kind, title, action))
+        await aside(page, lambda: workshop.jobs.submit(make()))
     except (JobError, OSError) as error:
         layout.refuse(str(error))
         return False
