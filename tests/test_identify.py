@@ -468,6 +468,8 @@ def test_held_out_samples_are_not_seen_by_the_fit():
     assert b.scores[0].held_out_rms_percent > 50 * a.scores[0].held_out_rms_percent
     assert a.unsupported == ""
     assert "on the held-out samples, where a straight line does as well" in b.unsupported
+    assert b.unsupported.endswith("and another recording to judge by.")
+    assert "belong together" not in b.unsupported
     assert any("held-out samples lie outside" in w for w in b.warnings)
     assert any("The residual grows" in w for w in b.warnings)
 

@@ -10,7 +10,17 @@ from numpy.testing import assert_allclose
 
 from microrad import mirror
 from microrad.identify import IdentificationError
-from microrad.identify.plant_fit import Parameter, Run, Structure, fit_plant, runs, simulate, upsampled
+from microrad.identify.plant_fit import (
+    Parameter,
+    Problem,
+    Run,
+    Structure,
+    _covariance,
+    fit_plant,
+    runs,
+    simulate,
+    upsampled,
+)
 from microrad.identify.plant_structures import hysteretic_oscillator
 from microrad.recording import read_recording, recording_from_arrays
 
@@ -186,6 +196,15 @@ def test_a_start_that_cannot_be_simulated_is_refused():
         IdentificationError, match=r"cannot be simulated from any start at a step of 0\.001 s; begin nearer"
     ):
         fit_plant(Structure("stiff", structure.parameters, lambda _: frozen.build(np.zeros(0))), runs([low_pass(4)]))
+
+
+def test_a_slope_that_is_no_number_is_refused_and_no_fault_of_the_program():
+    problem = Problem(hysteretic_oscillator(2.0, 300.0, 5e4, 2e4, 300.0, 100.0), runs([low_pass(3)]))
+    slopes = np.ones((20, 6))
+    assert np.isfinite(_covariance(slopes, np.ones(20), problem)[0]).all()
+    slopes[3, 2] = 1e200
+    with pytest.raises(IdentificationError, match="nothing can be said of their errors; record loops over the whole"):
+        _covariance(slopes, np.ones(20), problem)
 
 
 def test_nothing_left_to_fit_is_refused():

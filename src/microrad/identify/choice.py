@@ -47,6 +47,15 @@ MODELS = (*STATIC, *FORMS)
 _STARTS = 12
 _MIN_PART = 100
 _EXPLAINED = 0.5
+_HARDLY = (
+    "The output hardly follows the drive: check that the channels belong together, and record a larger drive, or with "
+    "less noise and drift."
+)
+_OTHER_MOTION = (
+    "It follows the part that was fitted, so the rest moves in another way (a chirp goes on to other frequencies), or "
+    "drowns in noise or drift: record loops of several periods, a chirp or multisine beside them for the dynamics, and "
+    "another recording to judge by."
+)
 _BETTER = 0.9
 _CREEP_S = 1.0
 _POLISH = "linear part, hysteresis and creep together"
@@ -475,7 +484,7 @@ def _check_explained(score: Score, predictions: Sequence[Prediction]) -> None:
     """Refuse recordings whose output even the best model does not follow where it was fitted."""
     fitted = [(p.measured_rad[p.start : p.split], p.residual_rad[p.start : p.split]) for p in predictions]
     if text := _unexplained(score, fitted, "on the very samples it was fitted to"):
-        raise IdentificationError(text)
+        raise IdentificationError(f"{text} {_HARDLY}")
 
 
 def _unsupported(score: Score, line: Score, predictions: Sequence[Prediction]) -> str:
@@ -483,7 +492,8 @@ def _unsupported(score: Score, line: Score, predictions: Sequence[Prediction]) -
     if score.held_out_rms_percent <= _BETTER * line.held_out_rms_percent:
         return ""
     unseen = [(p.measured_rad[p.split :], p.residual_rad[p.split :]) for p in predictions]
-    return _unexplained(score, unseen, "on the held-out samples, where a straight line does as well")
+    text = _unexplained(score, unseen, "on the held-out samples, where a straight line does as well")
+    return f"{text} {_OTHER_MOTION}" if text else ""
 
 
 def _unexplained(score: Score, parts: Sequence[tuple[FloatArray, FloatArray]], where: str) -> str:
@@ -493,10 +503,8 @@ def _unexplained(score: Score, parts: Sequence[tuple[FloatArray, FloatArray]], w
     if left <= _EXPLAINED * spread:
         return ""
     return (
-        f"the recordings do not support a model: the best one, {score.model}, leaves {left:.3g} rad rms of "
-        f"{spread:.3g} rad {where} ({100 * left / spread:.0f} %, at most {100 * _EXPLAINED:.0f} % is a model). The "
-        "output hardly follows the drive: check that the channels belong together, and record a larger drive, or with "
-        "less noise and drift."
+        f"the recordings do not support a model: the chosen one, {score.model}, leaves {left:.3g} rad rms of "
+        f"{spread:.3g} rad {where} ({100 * left / spread:.0f} %, at most {100 * _EXPLAINED:.0f} % is a model)."
     )
 
 

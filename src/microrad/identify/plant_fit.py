@@ -354,7 +354,7 @@ def _report(problem: Problem, best: Any, costs: list[float]) -> PlantFit:
         np.full(r.size, lost * colour * run.weight**2 * float(np.mean(r**2)))
         for r, colour, run in zip(residuals, colours, problem.runs, strict=True)
     ]
-    covariance, condition = _covariance(best.jac, np.concatenate(variances), problem.scale)
+    covariance, condition = _covariance(best.jac, np.concatenate(variances), problem)
     return PlantFit(
         structure=problem.structure,
         values=values,
@@ -371,15 +371,20 @@ def _report(problem: Problem, best: Any, costs: list[float]) -> PlantFit:
     )
 
 
-def _covariance(jacobian: FloatArray, variance: FloatArray, scale: FloatArray) -> tuple[FloatArray, float]:
+def _covariance(jacobian: FloatArray, variance: FloatArray, problem: Problem) -> tuple[FloatArray, float]:
     """The sandwich in the parameters' units, and the condition number of J with columns of length 1."""
     length = np.sqrt(np.einsum("ij,ij->j", jacobian, jacobian)) + 1e-300
+    if not np.isfinite(length).all():
+        raise IdentificationError(
+            f"{problem.structure.name}: a small change of the best parameters leads to a mirror that cannot be "
+            "simulated, so nothing can be said of their errors; record loops over the whole range of the drive as well."
+        )
     gram = (jacobian.T @ jacobian) / np.outer(length, length)
     values, vectors = np.linalg.eigh(gram)
     values = np.maximum(values, 1e-15)
     bread = (vectors / values) @ vectors.T
     half = bread @ (jacobian / length * np.sqrt(variance)[:, None]).T  # a square cannot come out negative
-    size = scale / length
+    size = problem.scale / length
     return np.asarray(size[:, None] * (half @ half.T) * size), float(math.sqrt(values[-1] / values[0]))
 
 
