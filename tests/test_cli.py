@@ -204,6 +204,11 @@ def test_identify_then_run_on_the_mirror_it_wrote(call, refused, folder, loop_mi
     assert summary["closes"] is True
     assert summary["folder"] == "leo-geo-study"
     assert loop_mirror.name in (folder / "leo-geo-study" / "manifest.json").read_text(encoding="utf-8")
+    *power, residual, margin = summary["requirements"]
+    assert all(r["met"] == (r["margin"] >= 0) for r in power)
+    for r in (residual, margin):  # of a loop around a mirror whose dynamics were not recorded
+        assert (r["margin"] > 0, r["met"]) == (True, False)
+        assert r["limited_by"] == "dynamics of the mirror, which its model does not have"
 
     assert "replace them with --overwrite" in refused(*args)
     (folder / "leo-geo-study" / "report.html").write_text("old")
@@ -225,9 +230,19 @@ def test_design_prints_each_controller_with_its_margins(call, folder):
     assert (result.code, result.err) == (0, "")
     for words in ("PI, best of a gain grid", "LQG", "PI + inverse in series", "modulus", "integral frequency"):
         assert words in result.out
+    assert "warning" not in result.out
     data = json.loads(call("design", "leo-geo.toml", "--json").out)
+    assert data["warnings"] == []
     assert all(c["margins"]["modulus"] >= 0.5 for c in data["controllers"])
     assert len(data["controllers"][0]["matrices"]["A"]) == 2  # an integrator an axis
+
+
+def test_design_says_when_nothing_is_known_of_the_mirrors_dynamics(call, folder, loop_mirror):
+    call("init")
+    result = call("design", "leo-geo.toml", "--mirror", loop_mirror)
+    assert result.code == 0
+    assert "warning: the model of the mirror has no linear part, so its resonances and its lag are not" in result.out
+    assert len(json.loads(call("design", "leo-geo.toml", "--mirror", loop_mirror, "--json").out)["warnings"]) == 1
 
 
 def test_design_refuses_what_it_cannot_design(refused, folder, plain):

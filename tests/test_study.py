@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from microrad import paper, simulate, study
+from microrad import fine_pointing, paper, simulate, study, verdict
 from microrad.missionfile import load_mission
 from microrad.report import links
+from microrad.report.fine_pointing_words import not_reliable
 from shipped import SHIPPED, edited_file
 
 
@@ -337,3 +338,16 @@ def test_a_receiver_slower_than_the_papers_rate_leaves_that_claim_unjudged(tmp_p
     assert (claim.agrees, claim.ours) == ("not judged", "the receiver takes less than 300 Mbit/s")
     assert result.file.mission.communication.data_rate_bit_s == 100e6
     assert result.margin_map.data_rate_bit_s[-1] == pytest.approx(100e6, rel=1e-9)
+
+
+def test_nothing_that_a_loop_must_do_is_met_by_a_mirror_without_dynamics():
+    known = load_mission(SHIPPED).mission
+    bare = known.model_copy(update={"mirror": known.mirror.model_copy(update={"linear": None})})
+    for m, met in ((known, True), (bare, False)):
+        error = verdict.fine_pointing_requirement(m, 5e-6, 0.997, "PI", "Gauge")
+        for each in (error, verdict.outage_requirement(m, 5.0, "PI", "Gauge")):
+            assert (each.margin > 0, each.met) == (True, met)
+            assert each.because == ("Gauge" if met else "dynamics of the mirror, which its model does not have")
+        assert not verdict.fine_pointing_requirement(m, 11e-6, 0.997, "PI", "Gauge").met
+        assert not_reliable(m) == ([] if met else [f"Not to be relied on: {fine_pointing.unknown_dynamics(m)}."])
+    assert "resonances and its lag are not known" in fine_pointing.unknown_dynamics(bare)

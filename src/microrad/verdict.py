@@ -18,7 +18,11 @@ PAPER_RATE_BIT_S = 300e6  # section 2.2
 
 @dataclass(frozen=True, slots=True)
 class Requirement:
-    """One line of the verdict, in one unit; ``margin`` is positive when it is met."""
+    """One line of the verdict, in one unit; ``margin`` is positive when it is met.
+
+    ``unknown`` says, where it is not empty, what would have to be known before the number may be relied on: such a
+    requirement is not met, whatever its margin.
+    """
 
     name: str
     unit: str
@@ -26,11 +30,17 @@ class Requirement:
     actual: float
     margin: float
     limited_by: str
+    unknown: str = ""
 
     @property
     def met(self) -> bool:
         """Whether the requirement is met."""
-        return self.margin >= 0.0
+        return self.margin >= 0.0 and not self.unknown
+
+    @property
+    def because(self) -> str:
+        """What limits it, or what is not known."""
+        return self.unknown or self.limited_by
 
 
 def requirements(
@@ -53,7 +63,13 @@ def requirements(
         losses = [line for line in budget.lines if line.unit == "dB" and line.name != "Free-space loss"]
         limit = by or min(losses, key=lambda line: line.value).name
         return Requirement(
-            f"{budget.name.lower()} margin", "dB", required_db, budget.margin_db, budget.margin_db - required_db, limit
+            f"{budget.name.lower()} margin",
+            "dB",
+            required_db,
+            budget.margin_db,
+            budget.margin_db - required_db,
+            limit,
+            unknown(m) if by else "",
         )
 
     return (
@@ -63,10 +79,21 @@ def requirements(
         power(beacon),
         power(answer),
         Requirement(
-            "residual pointing error", "rad", q.pointing_error_rad, residual, q.pointing_error_rad - residual, cause
+            "residual pointing error",
+            "rad",
+            q.pointing_error_rad,
+            residual,
+            q.pointing_error_rad - residual,
+            cause,
+            unknown(m),
         ),
         power(achieved, q.margin_db, "the residual: " + cause),
     )
+
+
+def unknown(m: Mission) -> str:
+    """What would have to be known of the mission's mirror before a loop around it may be relied on, or nothing."""
+    return "" if m.mirror.linear is not None else "dynamics of the mirror, which its model does not have"
 
 
 def fine_pointing_requirement(
@@ -75,14 +102,14 @@ def fine_pointing_requirement(
     """The radial error of the fine-pointing loop, at its share of the time, against the same requirement."""
     allowed = m.requirement.pointing_error_rad
     name = f"fine pointing at {100 * quantile:g} % ({controller})"
-    return Requirement(name, "rad", allowed, quantile_rad, allowed - quantile_rad, cause)
+    return Requirement(name, "rad", allowed, quantile_rad, allowed - quantile_rad, cause, unknown(m))
 
 
 def outage_requirement(m: Mission, margin_db: float, controller: str, cause: str) -> Requirement:
     """The margin that the fine-pointing loop leaves the communication link but for its allowed outage."""
     q = m.requirement
     name = f"link margin but for {100 * q.outage:g} % of the time ({controller})"
-    return Requirement(name, "dB", q.margin_db, margin_db, margin_db - q.margin_db, cause)
+    return Requirement(name, "dB", q.margin_db, margin_db, margin_db - q.margin_db, cause, unknown(m))
 
 
 def residual_cause(m: Mission, worst: Run, runs: tuple[Run, ...]) -> str:

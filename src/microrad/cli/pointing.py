@@ -41,9 +41,11 @@ def design(
             designs = fine_pointing.design(scene, mission.mission, progress)
         except ValueError as error:  # a loop that cannot be built, a margin out of reach
             raise Refusal(f"{mission.path}: {error}") from error
+    warnings = [text for text in [fine_pointing.unknown_dynamics(mission.mission)] if text]
     if as_json:
-        return Outcome(json_text({"mission_sha256": mission.sha256, "controllers": [_data(d) for d in designs]}))
-    return Outcome("\n".join(_lines(scene, designs)))
+        found = {"mission_sha256": mission.sha256, "controllers": [_data(d) for d in designs], "warnings": warnings}
+        return Outcome(json_text(found))
+    return Outcome("\n".join([*_lines(scene, designs), *(f"warning: {text}" for text in warnings)]))
 
 
 def _lines(scene: "Scene", designs: "tuple[Design, ...]") -> list[str]:

@@ -23,7 +23,7 @@ from microrad.fine_pointing.results import (
     sines,
     verify,
 )
-from microrad.fine_pointing.scenario import VARIANTS, Scene, scene, table
+from microrad.fine_pointing.scenario import VARIANTS, Scene, scene, table, unknown_dynamics
 from microrad.missionfile import MissionFile
 
 __all__ = [
@@ -53,6 +53,7 @@ __all__ = [
     "sines",
     "table",
     "tune",
+    "unknown_dynamics",
     "verify",
 ]
 

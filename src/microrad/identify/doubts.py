@@ -8,7 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from microrad.hysteresis import BoucWen
+from microrad.hysteresis import BoucWen, slow_gain
+from microrad.identify.bouc_wen import BoucWenFit
 from microrad.identify.joint import JointFit, turned_over
 from microrad.identify.prandtl_ishlinskii import PrandtlIshlinskiiFit
 from microrad.identify.predictions import Fit, Prediction, Score
@@ -27,6 +28,10 @@ _DRIFT_PERCENT = 0.2
 _NOISY_RATE = 0.2
 _LAGS = 50
 _SET_ASIDE = 0.2
+_FLIPPED = (
+    "The sensor's sign was flipped: its reading falls with the drive, and the mirror that is written rises. Turn the "
+    "reading as well before a controller that was designed for this mirror gets it, or it drives the mirror away."
+)
 
 
 def range_warnings(drive_range: tuple[float, float], rate: float) -> list[str]:
@@ -110,7 +115,14 @@ def score_warnings(score: Score, line: Score) -> list[str]:
 
 def fit_warnings(fit: Fit) -> list[str]:
     """Warnings that belong to one fit, whichever model is chosen."""
-    return [*_convergence_warnings(fit), *_slope_warnings(fit)]
+    return [*_convergence_warnings(fit), *_slope_warnings(fit), *([_FLIPPED] if falling(fit) else [])]
+
+
+def falling(fit: Fit) -> bool:
+    """Whether the output falls with the drive."""
+    if isinstance(fit, JointFit):
+        return slow_gain(fit.model) < 0
+    return fit.d1_rad_per_v < 0 if isinstance(fit, BoucWenFit) else fit.sign < 0
 
 
 def _convergence_warnings(fit: Fit) -> list[str]:

@@ -17,7 +17,7 @@ from microrad import kernels
 from microrad.hysteresis import BoucWen, Play, scaled, slow_gain
 from microrad.identify.bouc_wen import PARAMETERS, BoucWenFit
 from microrad.identify.choice import Identification
-from microrad.identify.doubts import fit_warnings
+from microrad.identify.doubts import falling, fit_warnings
 from microrad.identify.joint import JointFit, turned_over
 from microrad.identify.plant_structures import LinearPoles, propagated
 from microrad.identify.prandtl_ishlinskii import PrandtlIshlinskiiFit
@@ -85,8 +85,6 @@ def _header(identification: Identification, fit: Fit, model: str) -> list[str]:
         lines += [f"Not identified: {item.name}, {item.reason}" for item in fit.not_identified]
     if isinstance(fit, JointFit):
         lines += [f"Not identified: {parameter}, {why}" for parameter, why in fit.not_identified]
-    if _falling(fit):
-        lines.append("The sensor's sign was flipped: its reading falls with the drive, and a mirror's angle rises.")
     return [f"# {_one_line(text)}" for text in lines]
 
 
@@ -94,12 +92,6 @@ def _names(paths: Sequence[str]) -> str:
     """The files by name, or how many they are beyond three: the head of the file has them all."""
     names = [_one_line(Path(path).name) for path in paths]
     return ", ".join(names) if len(names) <= 3 else f"{names[0]} and {len(names) - 1} more"
-
-
-def _falling(fit: Fit) -> bool:
-    if isinstance(fit, JointFit):
-        return slow_gain(fit.model) < 0
-    return fit.d1_rad_per_v < 0 if isinstance(fit, BoucWenFit) else fit.sign < 0
 
 
 def _composition(fit: Fit, identification: Identification) -> list[str]:
@@ -119,7 +111,7 @@ def _tables(fit: Fit, identification: Identification, source: str) -> list[str]:
 
 # ----------------------------------------------------------------------------------------------------- joint models
 def _joint(fit: JointFit, identification: Identification, source: str) -> list[str]:
-    turned = -1.0 if _falling(fit) else 1.0
+    turned = -1.0 if falling(fit) else 1.0
     lines = _joint_bouc_wen(fit, source) if isinstance(fit.model, BoucWen) else _joint_plays(fit, source)
     if fit.creep.weights_rad_v:
         error = fit.fit.standard_errors[[p.name for p in fit.structure.parameters].index("creep")]
@@ -167,7 +159,7 @@ def _bouc_wen_numbers(m: BoucWen) -> FloatArray:
 
 def _upright(fit: JointFit, model: BoucWen | Play) -> BoucWen | Play:
     """The model with its output counted as the mirror file counts it: rising with the drive."""
-    if not _falling(fit):
+    if not falling(fit):
         return model
     return turned_over(model) if isinstance(model, BoucWen) else scaled(model, -1.0)
 
@@ -232,7 +224,7 @@ def _bouc_wen(fit: BoucWenFit, source: str) -> list[str]:
 
 
 def _signs(fit: BoucWenFit) -> FloatArray:
-    return np.array([-1.0, 1.0, -1.0, 1.0, 1.0, -1.0]) if _falling(fit) else np.ones(6)
+    return np.array([-1.0, 1.0, -1.0, 1.0, 1.0, -1.0]) if falling(fit) else np.ones(6)
 
 
 def _prandtl_ishlinskii(fit: PrandtlIshlinskiiFit, source: str) -> list[str]:
@@ -306,7 +298,7 @@ def _numbers(fit: JointFit, at: FloatArray) -> dict[str, float]:
         found |= {f"prandtl_ishlinskii.weights.{i}": w for i, w in enumerate(model.weights_rad_v, 1)}
         found["prandtl_ishlinskii.widening"] = model.widening_s
     if axis.creep.weights_rad_v:
-        found["creep.weights"] = (-1.0 if _falling(fit) else 1.0) * axis.creep.weights_rad_v[0]
+        found["creep.weights"] = (-1.0 if falling(fit) else 1.0) * axis.creep.weights_rad_v[0]
     if axis.linear is not None:
         for kind, roots in (("pole", axis.linear.poles), ("zero", axis.linear.zeros)):
             found |= {f"linear.{kind}s.{i}": f for i, f in enumerate(roots.frequencies_hz, 1)}

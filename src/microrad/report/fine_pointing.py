@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from microrad.control import LoopMargins
-from microrad.fine_pointing import FinePointingStudy, Residual, Sine
+from microrad.fine_pointing import FinePointingStudy, Residual, Sine, unknown_dynamics
 from microrad.fine_pointing.parts import DELAY
 from microrad.geometry import StrokeBudget
 from microrad.mission import Mission
@@ -25,7 +25,7 @@ def context(fine: FinePointingStudy, m: Mission, figures: Sequence[Figure]) -> d
     required = m.requirement.pointing_error_rad
     variants = [v for v in HEADINGS if any(v in each.simulated for each in fine.verified)]
     return {
-        "met": fine.best.meets(required),
+        "met": fine.best.meets(required) and not unknown_dynamics(m),
         "verdict": words.result(fine, m),
         "theory": words.theory(fine),
         "setting": setting(fine, m),

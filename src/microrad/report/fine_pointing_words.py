@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from microrad.control.tuning import MARGIN
-from microrad.fine_pointing import FinePointingStudy, Verified
+from microrad.fine_pointing import FinePointingStudy, Verified, unknown_dynamics
 from microrad.geometry import StrokeBudget
 from microrad.mission import Mission
 from microrad.units import format_quantity
@@ -129,6 +129,7 @@ def result(fine: FinePointingStudy, m: Mission) -> list[str]:
     time = share_of_time(fine.quantile)
     met = "met" if best.meets(required) else "missed"
     sentences = [
+        *not_reliable(m),
         f"{best.design.name} is the best of {len(fine.verified)} controllers: on the mission's mirror the radial error "
         f"stays within {angle(left.quantile_rad)} for {time} of the time ({angle(left.rms_rad)} rms, "
         f"{angle(left.largest_rad)} at most). The {given(required)} required are {met}.",
@@ -192,6 +193,12 @@ def theory(fine: FinePointingStudy) -> list[str]:
     return sentences
 
 
+def not_reliable(m: Mission) -> list[str]:
+    """That no number of the loop may be relied on, and why, where that is so."""
+    unknown = unknown_dynamics(m)
+    return [f"Not to be relied on: {unknown}."] if unknown else []
+
+
 def short(fine: FinePointingStudy, m: Mission) -> list[str]:
     """The verdict in a line each: what is left, on a sine too, what theory leaves to gain, whether the stroke does."""
     required, left, r = m.requirement.pointing_error_rad, fine.best.simulated["given"], room(fine)
@@ -199,7 +206,7 @@ def short(fine: FinePointingStudy, m: Mission) -> list[str]:
         f"Fine pointing under vibration and noise: {fine.best.design.name} leaves {angle(left.quantile_rad)} radial at "
         f"{share_of_time(fine.quantile)} ({angle(left.rms_rad)} rms); {given(required)} is allowed."
     ]
-    lines += filter(None, [tracked(fine, required)])
+    lines += [*not_reliable(m), *filter(None, [tracked(fine, required)])]
     if r.holds:
         lines.append(
             f"Without hysteresis no linear controller can be more than {percent(r.at_baseline)} better (rms) than the "
@@ -300,6 +307,7 @@ def warnings(fine: FinePointingStudy, m: Mission) -> list[str]:
         for variant, residual in v.simulated.items()
         if residual.shares
     ]
+    found += filter(None, [unknown_dynamics(m)])
     found += _stroke_warnings(fine, m)
     found += _bound_warnings(fine)
     found += _hardware_warnings(m)

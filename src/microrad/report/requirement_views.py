@@ -66,7 +66,7 @@ def paragraph(study: Study) -> str:
     count = f"{len(passed)} of {len(study.requirements)} requirements are met."
     parts = [count]
     if failed:
-        parts.append(f"FAIL: {'; '.join(f'{r.name} {signed(r)}, by {r.limited_by}' for r in failed)}.")
+        parts.append(f"FAIL: {'; '.join(f'{r.name} {signed(r)}, by {r.because}' for r in failed)}.")
     if passed:
         parts.append(f"PASS: {'; '.join(f'{r.name} {signed(r)}' for r in passed)}.")
     return " ".join(parts)
@@ -74,7 +74,8 @@ def paragraph(study: Study) -> str:
 
 def contributors(study: Study) -> list[str]:
     """The dominant contributor to each requirement, in the order of the study's requirements."""
-    return [_capital(of(study, r.limited_by)) for of, r in zip(_CONTRIBUTORS, study.requirements, strict=False)]
+    named = zip(_CONTRIBUTORS, study.requirements, strict=False)
+    return [_capital(r.unknown or of(study, r.limited_by)) for of, r in named]
 
 
 def _capital(text: str) -> str:

@@ -52,7 +52,7 @@ def explanation(study: Study) -> list[str]:
         sentences.append(f"Not to be relied on: {extrapolated}.")
     failed = [r for r in study.requirements if not r.met]
     if failed:
-        causes = dict.fromkeys(r.limited_by.removeprefix("the residual: ") for r in failed)
+        causes = dict.fromkeys(r.because.removeprefix("the residual: ") for r in failed)
         sentences.append(f"What limits it: {'; '.join(causes)}.")
     if study.comparison is not None:
         left = residual_rad(m, study.comparison.residual.trace)
@@ -237,7 +237,7 @@ def summary(study: Study) -> dict[str, Any]:
                 "actual": r.actual,
                 "margin": r.margin,
                 "met": r.met,
-                "limited_by": r.limited_by,
+                "limited_by": r.because,
             }
             for r in study.requirements
         ],
