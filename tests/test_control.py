@@ -337,6 +337,9 @@ def test_an_unstable_loop_is_refused_with_its_pole(straight):
     plant = control.sampled_plant(straight, replace(IDEAL_DRIVE, bandwidth_hz=5e3), Timing(PERIOD, 2, 2))
     with pytest.raises(ValueError, match=r"unstable: a pole at \|z\| = .*2e-05 s; lower the gains") as refusal:
         control.margins(controller, plant, PERIOD)
+    share = float(re.search(r"all of them at (\S+) of what they are it has 6 dB", str(refusal.value)).group(1))
+    less = control.pid(Gains(share * 1e3, share * 50 * 16e6, 0.0, 1e-4), PERIOD)
+    assert control.margins(less, plant, PERIOD).gain == pytest.approx(2.0, rel=0.06)
     named = float(re.search(r"\|z\| = (\S+)", str(refusal.value)).group(1))
     assert named > 1.0
     assert_allclose(named, largest_pole(controller, plant, PERIOD), atol=1e-6)
