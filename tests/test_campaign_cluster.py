@@ -3,7 +3,6 @@
 import json
 import os
 import random
-import socket
 import subprocess
 import sys
 import tempfile
@@ -189,11 +188,13 @@ class Elsewhere:
 
     def __init__(self, folder):
         self.folder, self.started, self.count = folder, [], 0
-        with socket.socket() as free:
-            free.bind(("127.0.0.1", 0))
-            port = free.getsockname()[1]
-        self.address = f"tcp://127.0.0.1:{port}"
-        self.scheduler = self.start("scheduler", "--host", "127.0.0.1", "--port", str(port), "--no-dashboard")
+        told = folder / "scheduler.json"  # written once it listens, at a port that nobody else can have taken
+        own = ("--host", "127.0.0.1", "--port", "0", "--no-dashboard", "--scheduler-file", str(told))
+        self.scheduler = self.start("scheduler", *own)
+        while not told.exists() or not told.read_text("utf-8").endswith("}"):
+            assert self.scheduler.poll() is None, self.log
+            time.sleep(0.02)
+        self.address = json.loads(told.read_text("utf-8"))["address"]
 
     def start(self, what, *arguments, prelude="", **environment):
         code = f"{prelude}\nimport runpy; runpy.run_module('distributed.cli.dask_{what}', run_name='__main__')"
@@ -204,6 +205,10 @@ class Elsewhere:
             )  # fmt: skip
         self.started.append(process)
         return process
+
+    @property
+    def log(self):
+        return (self.folder / "log").read_text("utf-8", "replace")
 
     def worker(self, *arguments, **kwargs):
         own = ("--nthreads", "1", "--no-dashboard", "--local-directory", str(self.folder), *arguments)
@@ -222,10 +227,11 @@ def elsewhere(tmp_path):
     one = Elsewhere(tmp_path)
     yield one
     one.close()
+    print(one.log)  # shown where a test fails
 
 
 def connect(elsewhere, table="{}", late_s=20.0):
-    """An engine; the scheduler may still be starting."""
+    """An engine; its workers may still be starting."""
     return DaskEngine(table.encode(), TARGET, elsewhere.address, late_s=late_s)
 
 
@@ -261,8 +267,10 @@ def test_a_worker_with_other_code_is_refused_with_both_hashes(elsewhere):
 
 
 def test_a_worker_without_microrad_is_refused(elsewhere):
-    elsewhere.worker("--no-nanny", prelude="import sys; sys.modules['microrad'] = None")
+    """Also where it joins a campaign that waits for workers: a job would end it before it was looked at."""
     one = connect(elsewhere)
+    bare = {"prelude": "import sys; sys.modules['microrad'] = None"}
+    threading.Timer(0.5, elsewhere.worker, ["--no-nanny"], bare).start()
     with pytest.raises(CampaignError, match=r"the worker at tcp://\S* has no microrad that fits .* code is c0de"):
         run(one, chunks(0))
     one.close()

@@ -236,7 +236,7 @@ class DaskEngine:
             while True:
                 self._look()
                 self._feed(waiting)
-                if not self._flights:
+                if not self._flights and not self._expects(waiting):
                     return
                 yield from self._wait(waiting)
         finally:
@@ -340,9 +340,19 @@ class DaskEngine:
             self._installed.add(address)
 
     # ---------------------------------------------------------------------------------------------------------- jobs
+    def _expects(self, waiting: Waiting) -> bool:
+        """Whether there are jobs, and no worker for them yet."""
+        job = None if self._threads else waiting.next()
+        if job is not None:
+            waiting.put_back(job)
+        return job is not None
+
     def _feed(self, waiting: Waiting) -> None:
-        """Hand out jobs: one a thread of the workers, and one that it finds when it has done its own."""
-        while len(self._flights) < _AHEAD * max(1, sum(self._threads.values())):
+        """Hand out jobs: one a thread of the workers, and one that it finds when it has done its own.
+
+        A worker of others gets none before it was looked at: one without microrad would end of it, and never be told.
+        """
+        while len(self._flights) < _AHEAD * (sum(self._threads.values()) or (1 if self._cluster else 0)):
             job = waiting.next()
             if job is None:
                 return
