@@ -75,7 +75,8 @@ def growing(tmp_path):
 
 @pytest.fixture
 def at_once(monkeypatch):
-    """A look reads at any time, however short the last one is ago."""
+    """A look reads at any time, however short the last one is ago, and to the end, however slow the machine is."""
+    monkeypatch.setattr(campaign_live, "_READ_S", 60.0)
     monkeypatch.setattr(campaign_live, "_PAUSE_S", 0.0)
     monkeypatch.setattr(campaign_live, "_REST", 0.0)
 
