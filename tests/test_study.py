@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from microrad import fine_pointing, paper, simulate, study, verdict
+from microrad import paper, simulate, study, verdict
+from microrad.mirror_summary import summarise, unknown_dynamics
 from microrad.missionfile import load_mission
 from microrad.report import links
 from microrad.report.fine_pointing_words import not_reliable
@@ -349,5 +350,7 @@ def test_nothing_that_a_loop_must_do_is_met_by_a_mirror_without_dynamics():
             assert (each.margin > 0, each.met) == (True, met)
             assert each.because == ("Gauge" if met else "dynamics of the mirror, which its model does not have")
         assert not verdict.fine_pointing_requirement(m, 11e-6, 0.997, "PI", "Gauge").met
-        assert not_reliable(m) == ([] if met else [f"Not to be relied on: {fine_pointing.unknown_dynamics(m)}."])
-    assert "resonances and its lag are not known" in fine_pointing.unknown_dynamics(bare)
+        assert not_reliable(m) == ([] if met else [f"Not to be relied on: {unknown_dynamics(m.mirror)}."])
+    assert "resonances and its lag are not known" in unknown_dynamics(bare.mirror)
+    assert unknown_dynamics(bare.mirror) in summarise(bare.mirror).warnings
+    assert not any("linear part" in text for text in summarise(known.mirror).warnings)

@@ -82,10 +82,20 @@ def _flat_band(table: mirror_table.LinearPart) -> tuple[float, float]:
     return table.excited_from_hz, max(top, table.excited_from_hz)
 
 
+def unknown_dynamics(table: mirror_table.Mirror) -> str:
+    """Why nothing that is found of a loop around a mirror may be relied on; "" where it may."""
+    if table.linear is not None:
+        return ""
+    return (
+        "the model of the mirror has no linear part, so its resonances and its lag are not known, and a controller "
+        "that is tuned on it may be unstable on the mirror; record a chirp or a multisine as well, and identify again"
+    )
+
+
 def summarise(table: mirror_table.Mirror) -> Summary:
     """Facts and warnings about the mission's mirror: gains, poles and zeros outside the excited band, admissibility."""
     model = hysteresis_model(table, table.rate_limit_v_s, table.bias_v)
-    warnings = list(_admissibility(model))
+    warnings = [*_admissibility(model), *filter(None, [unknown_dynamics(table)])]
     roots: tuple[Root, ...] = ()
     dc, flat, band, by, at = math.nan, (math.nan, math.nan), (math.nan, math.nan), 1.0, math.nan
     if table.linear is not None:

@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from contextlib import suppress
 from functools import cache
 from importlib import resources
-from importlib.resources.abc import Traversable
 
-from microrad.document import Statement, scan
+from microrad.document import scan
+from microrad.presets import presets
 from microrad.units import UnitError, parse_quantity
 
 
@@ -33,12 +33,11 @@ def of_paper(key: str, value: str) -> str:
 
 @cache
 def _shipped() -> Mapping[tuple[str, str], tuple[str, ...]]:
-    """Values by key and comment, of every shipped mission and preset."""
+    """Values by key and comment, of the paper's mission and every preset."""
     found: dict[tuple[str, str], tuple[str, ...]] = {}
-    missions = resources.files("microrad") / "missions"
-    for file in (*_texts(missions), *_texts(missions / "presets")):
-        for each in _keys(file):
-            if each.comment:
+    for text in (_papers_mission(), *(preset.text for preset in presets())):
+        for each in scan(text):
+            if each.kind == "key" and each.comment:
                 where = each.key, each.comment
                 found[where] = (*found.get(where, ()), each.value)
     return found
@@ -46,15 +45,11 @@ def _shipped() -> Mapping[tuple[str, str], tuple[str, ...]]:
 
 @cache
 def _paper() -> Mapping[str, str]:
-    return {each.key: each.value for each in _keys(resources.files("microrad") / "missions" / "leo-geo.toml")}
+    return {each.key: each.value for each in scan(_papers_mission()) if each.kind == "key"}
 
 
-def _keys(file: Traversable) -> list[Statement]:
-    return [each for each in scan(file.read_text(encoding="utf-8")) if each.kind == "key"]
-
-
-def _texts(folder: Traversable) -> list[Traversable]:
-    return sorted((each for each in folder.iterdir() if each.name.endswith(".toml")), key=lambda each: each.name)
+def _papers_mission() -> str:
+    return (resources.files("microrad") / "missions" / "leo-geo.toml").read_text(encoding="utf-8")
 
 
 def _same(value: str, other: str) -> bool:

@@ -93,7 +93,8 @@ def requirements(
 
 def unknown(m: Mission) -> str:
     """What would have to be known of the mission's mirror before a loop around it may be relied on, or nothing."""
-    return "" if m.mirror.linear is not None else "dynamics of the mirror, which its model does not have"
+    lacking = mirror_summary.unknown_dynamics(m.mirror)
+    return "dynamics of the mirror, which its model does not have" if lacking else ""
 
 
 def fine_pointing_requirement(

@@ -30,6 +30,7 @@ def design(
     Each is tuned for the mission's mirror, disturbances, noise and delay under its modulus margin, for one axis, in
     theory (linear); microrad run simulates them. --json also prints their matrices.
     """
+    from microrad.mirror_summary import unknown_dynamics
     from microrad.missionfile import load_mission
 
     mission = load_mission(file, mirror)
@@ -41,7 +42,7 @@ def design(
             designs = fine_pointing.design(scene, mission.mission, progress)
         except ValueError as error:  # a loop that cannot be built, a margin out of reach
             raise Refusal(f"{mission.path}: {error}") from error
-    warnings = [text for text in [fine_pointing.unknown_dynamics(mission.mission)] if text]
+    warnings = list(filter(None, [unknown_dynamics(mission.mission.mirror)]))
     if as_json:
         found = {"mission_sha256": mission.sha256, "controllers": [_data(d) for d in designs], "warnings": warnings}
         return Outcome(json_text(found))

@@ -23,7 +23,7 @@ from microrad.fine_pointing.results import (
     sines,
     verify,
 )
-from microrad.fine_pointing.scenario import VARIANTS, Scene, scene, table, unknown_dynamics
+from microrad.fine_pointing.scenario import VARIANTS, Scene, scene, table
 from microrad.missionfile import MissionFile
 
 __all__ = [
@@ -53,7 +53,6 @@ __all__ = [
     "sines",
     "table",
     "tune",
-    "unknown_dynamics",
     "verify",
 ]
 

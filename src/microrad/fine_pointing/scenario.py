@@ -46,16 +46,6 @@ def scene(file: MissionFile) -> Scene:
     return Scene(loop, axis, with_it, without)
 
 
-def unknown_dynamics(m: Mission) -> str:
-    """Why nothing that is found of a loop around the mission's mirror may be relied on; "" where it may."""
-    if m.mirror.linear is not None:
-        return ""
-    return (
-        "the model of the mirror has no linear part, so its resonances and its lag are not known, and a controller "
-        "that is tuned on it may be unstable on the mirror; record a chirp or a multisine as well, and identify again"
-    )
-
-
 def table(m: Mission) -> FinePointing:
     """The mission's fine-pointing table; ValueError without one."""
     if m.fine_pointing is None:

@@ -5,9 +5,10 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from microrad.control import LoopMargins
-from microrad.fine_pointing import FinePointingStudy, Residual, Sine, unknown_dynamics
+from microrad.fine_pointing import FinePointingStudy, Residual, Sine
 from microrad.fine_pointing.parts import DELAY
 from microrad.geometry import StrokeBudget
+from microrad.mirror_summary import unknown_dynamics
 from microrad.mission import Mission
 from microrad.report import fine_pointing_words as words
 from microrad.report.figures import Figure
@@ -25,7 +26,7 @@ def context(fine: FinePointingStudy, m: Mission, figures: Sequence[Figure]) -> d
     required = m.requirement.pointing_error_rad
     variants = [v for v in HEADINGS if any(v in each.simulated for each in fine.verified)]
     return {
-        "met": fine.best.meets(required) and not unknown_dynamics(m),
+        "met": fine.best.meets(required) and not unknown_dynamics(m.mirror),
         "verdict": words.result(fine, m),
         "theory": words.theory(fine),
         "setting": setting(fine, m),

@@ -8,8 +8,9 @@ import numpy as np
 
 from microrad import control
 from microrad.fine_loop.design import design_plant
-from microrad.fine_pointing import Design, ErrorBudget, FinePointingStudy, Residual, Verified, unknown_dynamics
+from microrad.fine_pointing import Design, ErrorBudget, FinePointingStudy, Residual, Verified
 from microrad.geometry import StrokeBudget
+from microrad.mirror_summary import unknown_dynamics
 from microrad.mission import Mission
 from microrad.report.fine_pointing_words import room
 
@@ -24,7 +25,7 @@ def data(fine: FinePointingStudy, m: Mission) -> dict[str, Any]:
         "required_rad": required,
         "best": fine.best.design.name,
         "baseline": r.baseline.design.name,
-        "met": fine.best.meets(required) and not unknown_dynamics(m),
+        "met": fine.best.meets(required) and not unknown_dynamics(m.mirror),
         "linear_bound_rms_rad": fine.optimum_rad,
         "linear_bound_holds": r.holds,
         "rms_gained_over_baseline": r.gained,

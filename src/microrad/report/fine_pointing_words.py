@@ -5,8 +5,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from microrad.control.tuning import MARGIN
-from microrad.fine_pointing import FinePointingStudy, Verified, unknown_dynamics
+from microrad.fine_pointing import FinePointingStudy, Verified
 from microrad.geometry import StrokeBudget
+from microrad.mirror_summary import unknown_dynamics
 from microrad.mission import Mission
 from microrad.units import format_quantity
 
@@ -195,7 +196,7 @@ def theory(fine: FinePointingStudy) -> list[str]:
 
 def not_reliable(m: Mission) -> list[str]:
     """That no number of the loop may be relied on, and why, where that is so."""
-    unknown = unknown_dynamics(m)
+    unknown = unknown_dynamics(m.mirror)
     return [f"Not to be relied on: {unknown}."] if unknown else []
 
 
@@ -307,7 +308,6 @@ def warnings(fine: FinePointingStudy, m: Mission) -> list[str]:
         for variant, residual in v.simulated.items()
         if residual.shares
     ]
-    found += filter(None, [unknown_dynamics(m)])
     found += _stroke_warnings(fine, m)
     found += _bound_warnings(fine)
     found += _hardware_warnings(m)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable
 from contextlib import suppress
 from dataclasses import replace
 from typing import Any
@@ -126,23 +126,20 @@ class MirrorPage:
     # -------------------------------------------------------------------------------------------------- the recordings
     async def take(self, upload: Upload) -> None:
         """Look into a file that was dropped; one that is no recording is thrown away, in the reader's words."""
-        found = await self._listing(upload.key, self._taken)
+        async with self.listing_turn:
+            found = await aside(self.list, self._read_in, upload.key)
         if isinstance(found, str):
-            with suppress(UploadError):  # it is thrown away already, unless it was listed before it was read here
-                self.uploads.remove(upload.key)
             self.refuse(found)
             return
-        self.refused.text = ""
+        self.listings[upload.key], self.refused.text = found, ""
         self._turn_to(found, upload.key, upload.name)
         await self.look()
 
-    async def _listing(
-        self, key: str, read: Callable[[str], reading.Listing | str] | None = None
-    ) -> reading.Listing | str:
+    async def _listing(self, key: str) -> reading.Listing | str:
         """The channels of a recording, or why there are none."""
         async with self.listing_turn:
             if key not in self.listings:
-                self.listings[key] = await aside(self.list, read or self._channels, key)
+                self.listings[key] = await aside(self.list, self._channels, key)
         stay(self.list)  # the turn may have come after the page was closed
         return self.listings[key]
 
@@ -152,10 +149,11 @@ class MirrorPage:
         except (UploadError, reading.ReadingError) as error:
             return str(error)
 
-    def _taken(self, key: str) -> reading.Listing | str:
+    def _read_in(self, key: str) -> reading.Listing | str:
         found = self._channels(key)
         if isinstance(found, str):  # here, for the page may be closed by now
-            self.uploads.remove(key)
+            with suppress(UploadError):  # another tab has removed it
+                self.uploads.remove(key)
         return found
 
     def refuse(self, words: str) -> None:

@@ -149,10 +149,9 @@ class _Campaign:
         action = self._action()
         if action is None:
             return
-        new = isinstance(action, commands.CampaignRun)
-        title = f"Campaign {action.file}" if isinstance(action, commands.CampaignRun) else f"Campaign {action.ledger}"
-        title = title if new else f"{title}, going on"
-        if await submit(self.file, self.workshop, partial(order, self.workshop, "campaign", title, action)):
+        what = action.file if isinstance(action, commands.CampaignRun) else f"{action.ledger}, going on"
+        make = partial(order, self.workshop, "campaign", f"Campaign {what}", action)
+        if await submit(self.file, self.workshop, make):
             await self._name()
 
     async def _example(self) -> None:
