@@ -61,6 +61,14 @@ def test_the_page_and_the_verdict_say_which_of_them_turn_it(found):
     assert rows["requirement.residual_statistic", "rms"]["mark"] == "PASS"
 
 
+def test_no_reading_passes_on_a_mirror_without_dynamics(monkeypatch):
+    study = plain_study()
+    marks = [r["mark"] for r in requirement_views.readings(study)]
+    assert "PASS" in marks
+    monkeypatch.setattr(requirement_views, "unknown", lambda mission: "dynamics")
+    assert {r["mark"] for r in requirement_views.readings(study)} == {"FAIL"}
+
+
 def test_a_loop_that_cannot_be_run_so_says_why(monkeypatch):
     study = plain_study()
 

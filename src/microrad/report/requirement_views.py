@@ -13,7 +13,7 @@ from microrad.report.fine_pointing_words import percent, source_name
 from microrad.report.quantities import apart, quantity
 from microrad.study import Study
 from microrad.tracking import residual_rad
-from microrad.verdict import Requirement
+from microrad.verdict import Requirement, unknown
 
 Row = dict[str, Any]
 _BY_TEN = ("bit_error_ratio", "outage")  # inputs that a tornado moves by their order of magnitude
@@ -43,7 +43,7 @@ def readings(study: Study) -> list[Row]:
             "residual": r.failure or quantity(r.residual_rad, "rad"),
             "margin": "" if r.failure else quantity(r.margin_db, "dB"),
             "closes": "" if r.failure else "yes" if r.closes else "no",
-            "mark": "" if r.failure else "PASS" if r.meets(m) else "FAIL",
+            "mark": "" if r.failure else "PASS" if r.meets(m) and not unknown(m) else "FAIL",
         }
         for r in (own, *study.other_readings)
     ]
