@@ -147,8 +147,8 @@ def test_with_wheel_lines_the_tuned_loop_beats_the_best_pi_by_20_percent(tmp_pat
     rms = {}
     for name, found in {
         "PI": baseline,
-        "LQG": control.tune(control.LQG, plant, wanted, seed=1, evaluations=60),
-        "peaks": control.tune(control.peak_family((80.0, 160.0)), plant, wanted, seed=1, evaluations=300),
+        "LQG": control.tune(control.LQG, plant, wanted, seed=1),
+        "peaks": control.tune(control.peak_family((80.0, 160.0)), plant, wanted, seed=1),
     }.items():
         assert found.margins.modulus >= 0.5
         controller = assemble(name, straight, found.controller)
@@ -302,8 +302,8 @@ def test_an_uncertain_mirror_is_tuned_for_its_draws(tmp_path):
     assert len(plants) == 1 + designs.DRAWS
     drawn = [t.bouc_wen.d1_rad_v for t in mirror_spread.draws(m.mirror, designs.DRAWS, 1)]
     assert_allclose([p.gain_rad_v for p in plants], [0.089e-3, *drawn], rtol=1e-12)
-    robust = control.tune(control.PI, plants, control.Specification(0.6), seed=1, evaluations=200)
-    nominal = control.tune(control.PI, plants[:1], control.Specification(0.6), seed=1, evaluations=200)
+    robust = control.tune(control.PI, plants, control.Specification(0.6), seed=1)
+    nominal = control.tune(control.PI, plants[:1], control.Specification(0.6), seed=1)
     assert min(control.loop_margins(p, robust.controller).modulus for p in plants) >= 0.6
     assert min(control.loop_margins(p, nominal.controller).modulus for p in plants) < 0.6
     assert robust.residual_rms_rad >= 0.999 * nominal.residual_rms_rad

@@ -41,7 +41,7 @@ def in_microradians(plant):
 
 def simulate(plant, controller, white, disturbance, limit=math.inf, windup=True):
     """Difference equations with a clipped command and an added error: residual, command, innovation of the observer."""
-    p, c = plant.system, controller.system
+    p, c, seen = plant.system, controller.system, lqg.in_own_units(plant).system.C[[OPTICAL, GAUGE]]
     L = controller.anti_windup[:, 0] if windup else np.zeros(c.order)
     x, xc, residual, command, states = np.zeros(p.order), np.zeros(c.order), [], [], []
     for w, d in zip(white, disturbance, strict=True):
@@ -51,7 +51,7 @@ def simulate(plant, controller, white, disturbance, limit=math.inf, windup=True)
         v = min(max(asked, -limit), limit)
         residual.append(out[RESIDUAL])
         command.append(v)
-        states.append(m - p.C[[OPTICAL, GAUGE]] @ xc[: p.order])
+        states.append(m - seen @ xc[: p.order])
         x = p.A @ x + p.B[:, 0] * v + p.B[:, 1:] @ w
         xc = c.A @ xc + c.B @ m + L * (v - asked)
     return np.array(residual), np.array(command), np.array(states)

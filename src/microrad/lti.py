@@ -178,9 +178,45 @@ def _diagonal(X: Floats) -> Floats:
 
 
 def covariance_root(matrix: Floats) -> Floats:
-    """R with R R' the positive semidefinite matrix, its scale removed first so that small states keep their digits."""
+    """Lower triangular R with R R' the positive semidefinite matrix; a column is 0 where a state adds nothing.
+
+    Cholesky's factor, row by row, its scale removed first so that small states keep their digits. Unlike a root from
+    eigenvectors it is the only one with a diagonal of no sign but plus: what is drawn through it is the same on every
+    machine. A pivot below `_NO_PIVOT` of its state's variance is rounding.
+    """
     scale = np.sqrt(np.maximum(np.diag(matrix), 0.0))
     product = np.outer(scale, scale)
     unit = np.where(product > 0.0, matrix, 0.0) / np.where(product > 0.0, product, 1.0)
-    values, vectors = np.linalg.eigh(0.5 * (unit + unit.T))
-    return np.asarray(scale[:, None] * vectors * np.sqrt(np.maximum(values, 0.0)))
+    root = np.zeros_like(unit)
+    for j in range(unit.shape[0]):
+        column = unit[j:, j] - root[j:, :j] @ root[j, :j]
+        if column[0] > _NO_PIVOT:
+            root[j:, j] = column / np.sqrt(column[0])
+    return np.asarray(scale[:, None] * root)
+
+
+_NO_PIVOT = 1e-12
+"""Rounding leaves some 1e-15 of a state's variance; the root of what is cut off is a millionth of its deviation."""
+
+
+def principal_axes(covariance: Floats) -> tuple[Floats, Floats]:
+    """Variances, rising, and principal axes (columns) of a covariance, the same on every machine.
+
+    Each axis points to where its largest entry is above 0. Correlations below `_UNCORRELATED` count as none and
+    variances that agree as closely count as equal: without that, axes of two like states would be wherever rounding
+    leaves them.
+    """
+    size = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    limit = _UNCORRELATED * np.outer(size, size)
+    if np.all(np.abs(covariance - np.diag(np.diag(covariance))) <= limit):
+        digits = round(-np.log10(_UNCORRELATED))
+        largest = float(np.max(np.diag(covariance), initial=0.0)) or 1.0
+        order = np.argsort(np.round(np.diag(covariance) / largest, digits), kind="stable")
+        return np.diag(covariance)[order], np.eye(size.size)[:, order]
+    values, vectors = np.linalg.eigh(covariance)
+    large = np.abs(vectors) > 0.99 * np.max(np.abs(vectors), axis=0)
+    first = np.argmax(large, axis=0)  # of entries of one size the first, or rounding would choose
+    return values, vectors * np.sign(vectors[first, np.arange(size.size)])
+
+
+_UNCORRELATED = 1e-9

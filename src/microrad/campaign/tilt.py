@@ -86,7 +86,7 @@ def tilt(loop: PointingLoop, controller: LoopController, span: Span, error_rad: 
     total, _ = ensemble.control_samples(loop, span)
     step, sample = _backwards(closed, total)
     covariance = np.einsum("kwa,kwb->ab", step, step) + np.einsum("kwa,kwb->ab", sample, sample)
-    variance, principal = np.linalg.eigh(covariance)
+    variance, principal = lti.principal_axes(covariance)
     used = np.flatnonzero(variance > LEAST_VARIANCE * max(float(variance[-1]), 1e-300))[::-1]
     if not used.size:
         raise ValueError("no random noise reaches the line of sight of this loop: there is no tail to sample")

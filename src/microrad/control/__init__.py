@@ -50,6 +50,7 @@ from microrad.control.sampled import (
     slowest_pole,
     timing_from_mission,
 )
+from microrad.control.search import rounded
 from microrad.control.tuning import Tuned, grid_best, tune
 
 __all__ = [
@@ -94,6 +95,7 @@ __all__ = [
     "peak_family",
     "pid",
     "play_inverse",
+    "rounded",
     "sampled_plant",
     "sensitivity",
     "side_by_side",

@@ -135,13 +135,22 @@ Design = Callable[..., tuple[lti.StateSpace, Floats]]
 """From a plant and checked values to the controller's system and its anti-windup gain."""
 
 
-def _family(name: str, parameters: Callable[[DesignPlant], tuple[Parameter, ...]], design: Design) -> Family:
-    """A family whose `build` refuses what `parameters` refuses, and values that are not what it takes."""
+def _family(
+    name: str,
+    parameters: Callable[[DesignPlant], tuple[Parameter, ...]],
+    design: Design,
+    base: Family | None = None,
+    neutral: Callable[[DesignPlant], tuple[float, ...]] = lambda plant: (),
+) -> Family:
+    """A family whose `build` refuses what `parameters` refuses, and values that are not what it takes.
+
+    ``neutral`` are the values behind those of the ``base`` with which its controller is that of the base, or nearly so.
+    """
 
     def build(plant: DesignPlant, values: Floats) -> AxisController:
         return AxisController(name, *design(plant, *_checked(name, parameters(plant), values)))
 
-    return Family(name, parameters, build)
+    return Family(name, parameters, build, base, lambda plant, values: np.append(values, neutral(plant)))
 
 
 def _checked(name: str, parameters: tuple[Parameter, ...], values: Floats) -> list[float]:
@@ -166,7 +175,8 @@ def _integral_frequency(plant: DesignPlant) -> Parameter:
 
 def _zero(plant: DesignPlant, name: str) -> Parameter:
     """From a tenth of the plant's corner to ten times the rate, where the part it adds vanishes."""
-    return Parameter(name, "Hz", 0.1 * corner_hz(plant), 10.0 / plant.period_s)
+    most = 10.0 / plant.period_s
+    return Parameter(name, "Hz", 0.1 * corner_hz(plant), most, gentle=most)
 
 
 def _band(plant: DesignPlant, around: float, least: float) -> tuple[float, float]:
@@ -223,7 +233,12 @@ def _pid_design(
     return _on_error(system), np.array([[1.0], [0.0]]) * system.B / system.D
 
 
-PID = _family("PID", _pid_parameters, _pid_design)
+def _pid_neutral(plant: DesignPlant) -> tuple[float, ...]:
+    derivative, roll_off = _pid_parameters(plant)[2:]
+    return derivative.most, roll_off.least
+
+
+PID = _family("PID", _pid_parameters, _pid_design, PI, _pid_neutral)
 """PI and a filtered derivative, Kd = Kp / (2 pi derivative zero): the numerator is 1 + s/wz + s^2/(wz wd), with complex
 zeros below wd = 4 wz. Anti-windup: that of the PI with the derivative in its direct gain; the filter sees e alone."""
 
@@ -233,7 +248,7 @@ def _notch_parameters(plant: DesignPlant) -> tuple[Parameter, ...]:
     return (
         *_pi_parameters(plant),
         Parameter("notch centre", "Hz", *_band(plant, around=1.5, least=0.005)),
-        Parameter("notch depth", "", 0.01, deepest_to),
+        Parameter("notch depth", "", 0.01, deepest_to, gentle=1.0),
         Parameter("notch width", "", 0.05, 4.0),
     )
 
@@ -246,7 +261,12 @@ def _notch_design(
     return _on_error(system), np.vstack([np.zeros((2, 1)), behind.B / behind.D])
 
 
-PI_NOTCH = _family("PI + notch", _notch_parameters, _notch_design)
+def _no_notch(plant: DesignPlant) -> tuple[float, ...]:
+    centre, _, width = _notch_parameters(plant)[2:]
+    return centre.least, 1.0, width.least
+
+
+PI_NOTCH = _family("PI + notch", _notch_parameters, _notch_design, PI, _no_notch)
 """PI behind a notch on the error: `filters.notch` by its centre, depth (gain there) and width (over the centre).
 
 Its centre is sought around the plant's own resonances. On a plant that has none the bounds span the band and the depth
@@ -266,8 +286,8 @@ def _damping_parameters(plant: DesignPlant) -> tuple[Parameter, ...]:
     return (
         _integral_frequency(plant),
         Parameter("filter frequency", "Hz", *_band(plant, around=4.0, least=0.02)),
-        Parameter("filter damping", "", 0.05, 2.0),
-        Parameter("position feedback", "", -STATIC_FEEDBACK, STATIC_FEEDBACK, log=False),
+        Parameter("filter damping", "", 0.05, 2.0, gentle=2.0),
+        Parameter("position feedback", "", -STATIC_FEEDBACK, STATIC_FEEDBACK, log=False, gentle=0.0),
     )
 
 
@@ -308,7 +328,7 @@ def _observer_parameters(plant: DesignPlant) -> tuple[Parameter, ...]:
     return (
         Parameter("Q bandwidth", "Hz", 1e-4 / plant.period_s, 0.45 / plant.period_s),
         _zero(plant, "lead"),
-        Parameter("Q damping", "", 0.3, 4.0),
+        Parameter("Q damping", "", 0.3, 4.0, gentle=4.0),
     )
 
 
@@ -383,8 +403,8 @@ def peak_family(line_freqs_hz: Sequence[float]) -> Family:
 
     def parameters(plant: DesignPlant) -> tuple[Parameter, ...]:
         _refuse_lines(lines, plant.period_s)
-        gain = Parameter("peak gain", "", 0.1, 300.0)
-        return *_pi_parameters(plant), gain, Parameter("peak damping", "", 1e-4, 2e-2)
+        gain = Parameter("peak gain", "", *_PEAK_GAIN)
+        return *_pi_parameters(plant), gain, Parameter("peak damping", "", *_PEAK_DAMPING)
 
     def design(
         plant: DesignPlant, integral_hz: float, zero_hz: float, gain: float, damping: float
@@ -396,7 +416,10 @@ def peak_family(line_freqs_hz: Sequence[float]) -> Family:
         system = filters.parallel(base, *peaks)
         return _on_error(system), follow_command(system)
 
-    return _family("PI + peaks", parameters, design)
+    return _family("PI + peaks", parameters, design, PI, lambda plant: (_PEAK_GAIN[0], _PEAK_DAMPING[0]))
+
+
+_PEAK_GAIN, _PEAK_DAMPING = (0.1, 300.0), (1e-4, 2e-2)
 
 
 def _refuse_lines(lines: tuple[float, ...], period_s: float) -> None:

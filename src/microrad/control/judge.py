@@ -14,6 +14,12 @@ from microrad.control.problem import OPTICAL, RESIDUAL, AxisController, DesignPl
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 
+NEAR_LEAST = 1.3
+"""Dips of |1 + L| within this factor of the deepest one are followed between the grid's points."""
+
+CLOSER = (0.05, 0.0025)
+"""Half widths, over the grid's step, of the three points through which the parabola is laid again and again."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Verdict:
@@ -62,14 +68,15 @@ class Judge:
         if not pole < 1.0 - 1e-9:  # nearer than rounding can tell
             return self.unstable(pole)
         K = response(controller.system, self._points)
-        whole = np.abs(1.0 + cut(K, self._to_sensors, "command"))
-        optical = np.abs(1.0 + cut(K, self._to_sensors, "optical")) if uses_both(controller) else whole
+        whole = 1.0 + cut(K, self._to_sensors, "command")
+        cuts = {"command": np.abs(whole)}
+        if uses_both(controller):
+            cuts["optical"] = np.abs(1.0 + cut(K, self._to_sensors, "optical"))
         command = K[:, :1] * self._seen[:, 0] + K[:, 1:] * self._seen[:, 1]
-        command /= (1.0 + cut(K, self._to_sensors, "command"))[:, None]
+        command /= whole[:, None]
         residual = self._white + self._to_residual[:, None] * command
-        least = np.minimum(self._dips(whole), self._dips(optical)) if optical is not whole else self._dips(whole)
-        moduli = np.minimum.reduceat(least, self._bands)
-        return Verdict(pole, self._mean(residual), moduli, self._bandwidths(optical))
+        moduli = np.minimum.reduceat(self._dips(controller, cuts), self._bands)
+        return Verdict(pole, self._mean(residual), moduli, self._bandwidths(cuts.get("optical", cuts["command"])))
 
     def unstable(self, pole: float) -> Verdict:
         """What is said of a candidate that is unstable, or that could not be built."""
@@ -80,14 +87,57 @@ class Judge:
         spectrum = np.sum(white.real**2 + white.imag**2, axis=1)
         return float(np.mean(np.add.reduceat(self._weights * spectrum, self._edges[:-1])))
 
-    def _dips(self, distance: Floats) -> Floats:
-        """The distance with each local minimum replaced by that of a parabola through it and its neighbours."""
+    def _dips(self, controller: AxisController, cuts: dict[str, Floats]) -> Floats:
+        """The least distance over the cuts, each local minimum on the grid replaced by the least between its points.
+
+        A parabola through a minimum and its neighbours tells where it is; what is near the least of all is looked at
+        again there, more closely each time, so that the least moves smoothly with the controller.
+        """
+        least = np.full(self._freq.size, math.inf)
+        deepest = NEAR_LEAST * min(float(np.min(distance)) for distance in cuts.values())
+        for broken_at, distance in cuts.items():
+            found = distance.copy()
+            at, where, squared = self._minima(distance)
+            found[at] = np.sqrt(np.maximum(squared, 0.0))
+            near = found[at] < deepest
+            found[at[near]] = self._closer(controller, broken_at, at[near], where[near])
+            least = np.minimum(least, found)
+        return least
+
+    def _minima(self, distance: Floats) -> tuple[NDArray[np.intp], Floats, Floats]:
+        """Places on the grid, frequencies and squares of the local minima, by parabolas through three points each."""
         squared, before, after = distance**2, self._steps[:-1], self._steps[1:]
         left, right = np.diff(squared)[:-1] / before, np.diff(squared)[1:] / after
         slope, curvature = (left * after + right * before) / (before + after), (right - left) / (before + after)
         at = np.flatnonzero((left < 0.0) & (right > 0.0) & (before > 0.0) & (after > 0.0))
-        squared[at + 1] -= slope[at] ** 2 / (4.0 * curvature[at])
-        return np.sqrt(np.maximum(squared, 0.0))
+        where = self._freq[at + 1] - slope[at] / (2.0 * curvature[at])
+        return at + 1, where, squared[at + 1] - slope[at] ** 2 / (4.0 * curvature[at])
+
+    def _closer(self, controller: AxisController, broken_at: str, at: NDArray[np.intp], freq_hz: Floats) -> Floats:
+        """Minima of the distance near some frequencies, beside the places ``at`` of the grid."""
+        plant = np.searchsorted(self._edges, at, side="right") - 1
+        width, least = np.minimum(self._steps[at - 1], self._steps[at]), np.zeros(at.size)
+        for share in CLOSER:
+            step = share * width
+            near = freq_hz[:, None] + step[:, None] * np.array([-1.0, 0.0, 1.0])
+            squared = self._distance(controller, broken_at, plant, near) ** 2
+            slope = 0.5 * (squared[:, 2] - squared[:, 0])
+            curvature = squared[:, 2] - 2.0 * squared[:, 1] + squared[:, 0]
+            moved = np.where(curvature > 0.0, -slope / np.where(curvature > 0.0, curvature, 1.0), 0.0)
+            moved = np.clip(moved, -0.5 / share, 0.5 / share)  # within the grid's own step
+            freq_hz = freq_hz + moved * step
+            least = squared[:, 1] + moved * (slope + 0.5 * moved * curvature)
+        return np.sqrt(np.maximum(least, 0.0))
+
+    def _distance(self, controller: AxisController, broken_at: str, plant: NDArray[np.intp], freq_hz: Floats) -> Floats:
+        """|1 + L| of these plants (one for each row) at any frequencies."""
+        K = lti.frequency_response(controller.system, freq_hz.ravel(), self._period).reshape(*freq_hz.shape, 2)
+        G = np.empty_like(K)
+        for i in np.unique(plant):
+            rows = plant == i
+            found = lti.frequency_response(self._plants[i].from_command, freq_hz[rows].ravel(), self._period)
+            G[rows] = found.reshape(-1, freq_hz.shape[1], 2)
+        return np.abs(1.0 + cut(K, G, broken_at))
 
     def _bandwidths(self, distance: Floats) -> Floats:
         parts = (slice(*edge) for edge in zip(self._edges[:-1], self._edges[1:], strict=True))
@@ -146,14 +196,28 @@ def _spectral_radius(plant: DesignPlant, controller: AxisController) -> float:
 
 
 def response(system: lti.StateSpace, points: Complexes) -> Complexes:
-    """Response of a controller at points z, shape (points, inputs).
+    """Response of a controller (one output) at points z, shape (points, inputs).
 
     By forward substitution in its Schur form A = U T U', all points at once: the row r (z - T) = C U, then r U' B + D.
+    States in volts beside states in radians cost Schur's rotations the digits of the small ones: they are scaled first,
+    by powers of 2 that make rows and columns of A alike, and the rows are corrected once by what they leave of C.
     """
-    from scipy.linalg import schur  # slow to import, not needed to show help
+    from scipy.linalg import matrix_balance, schur  # slow to import, not needed to show help
 
-    T, U = schur(system.A.astype(complex)) if system.order else (system.A.astype(complex),) * 2
-    row, start = np.empty((system.order, points.size), dtype=complex), (system.C @ U)[0]
-    for j in range(system.order):
-        row[j] = (start[j] + T[:j, j] @ row[:j]) / (points - T[j, j])
-    return np.asarray(row.T @ (U.conj().T @ system.B) + system.D[0])
+    if not system.order:
+        return np.broadcast_to(system.D[0].astype(complex), (points.size, system.D.shape[1]))
+    A, (scale, _) = matrix_balance(system.A, permute=False, separate=True)
+    T, U = schur(A.astype(complex))
+    near = 1.0 / (points - np.diag(T)[:, None])
+
+    def rows(right: Complexes) -> Complexes:
+        start = U.T @ right
+        found = np.empty(near.shape, dtype=complex)
+        for j in range(T.shape[0]):
+            found[j] = (start[j] + T[:j, j] @ found[:j]) * near[j]
+        return np.asarray(U.conj() @ found)
+
+    C = (system.C * scale).T
+    first = rows(C.astype(complex))
+    second = first + rows(C - (first * points - A.T @ first))
+    return np.asarray(second.T @ (system.B / scale[:, None]) + system.D[0])

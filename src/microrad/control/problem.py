@@ -84,13 +84,18 @@ class Specification:
 
 @dataclass(frozen=True, slots=True)
 class Parameter:
-    """One number that a design is tuned by: bounds in SI units, searched on a logarithmic scale where ``log``."""
+    """One number that a design is tuned by: bounds in SI units, searched on a logarithmic scale where ``log``.
+
+    ``gentle`` is the value with which the controller acts least (the lowest gain, no notch), the least one without it:
+    where the residual hardly tells, a tuning goes towards it.
+    """
 
     name: str
     unit: str
     least: float
     most: float
     log: bool = True
+    gentle: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,9 +103,12 @@ class Family:
     """A kind of controller: the parameters it is tuned by for a plant, and how it is built from their values.
 
     ``parameters`` and ``build`` may raise ValueError with the reason when the plant has no such controller (no gauge to
-    damp with, no wheel line to filter).
+    damp with, no wheel line to filter). A family that contains another names it as ``base``; ``extended`` turns the
+    values of that one into its own, for the same controller or the nearest that it has.
     """
 
     name: str
     parameters: Callable[[DesignPlant], tuple[Parameter, ...]]
     build: Callable[[DesignPlant, Floats], AxisController]
+    base: "Family | None" = None
+    extended: Callable[[DesignPlant, Floats], Floats] | None = None

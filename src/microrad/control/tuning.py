@@ -1,6 +1,5 @@
 """Tuning: the parameters of a family of controllers that leave the least residual, under a margin, on every plant."""
 
-import contextlib
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -9,9 +8,10 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from microrad.control.analysis import LoopMargins, close, h2, loop_margins, refuse_misfit
-from microrad.control.judge import Judge, Verdict
-from microrad.control.problem import RESIDUAL, AxisController, DesignPlant, Family, Parameter, Specification
+from microrad.control.analysis import LoopMargins, close, h2, loop_margins
+from microrad.control.descent import descend, settle
+from microrad.control.problem import RESIDUAL, AxisController, DesignPlant, Family, Specification
+from microrad.control.search import HEADROOM, Search, Trial, apart, rounded
 
 Floats = NDArray[np.float64]
 Progress = Callable[[int, int, str], None]
@@ -23,16 +23,22 @@ CLOSE_LOOKS = 30
 """Trials whose margins are looked at closely before the specification is called out of reach."""
 
 OVERSTATED = 4
-"""Times that the search goes on with a stricter margin where its grid has missed a narrow dip of |1 + L|."""
+"""Times that an optimum is sought with a stricter margin, where its grid has missed a narrow dip of |1 + L|."""
 
-STARTS = 8
+SURVEY = 100
+"""Places of the Latin hypercube that a search begins with."""
+
+STARTS = 6
 """Places that a local search sets out from: a family may have several optima."""
 
-STEP = 1e-4
-"""Step of the differences, over a parameter's range."""
+FINALISTS = 3
+"""Optima that are followed to their last digit."""
 
-HEADROOM = 1e-3
-"""Relative excess over what is asked for that the search aims at: its grid may miss the least by a little."""
+CLOSE = 1e-3
+"""Excess of cost over the best from which an optimum is not followed."""
+
+SAME_COST = 6
+"""Decimals of the cost to which two optima are as good as each other: then the smaller values are taken."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,103 +66,6 @@ class Tuned:
 # ------------------------------------------------------------------------------------------------ search
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Trial:
-    """One candidate: its place within the bounds (each coordinate in 0..1), what it reaches and by what it falls short.
-
-    ``excess`` is relative to what is asked for, one number for each constraint, below 0 where it is not met.
-    """
-
-    place: Floats
-    values: Floats
-    verdict: Verdict
-    cost: float
-    excess: Floats
-
-    @property
-    def modulus(self) -> float:
-        """Least modulus margin over the plants."""
-        return float(np.min(self.verdict.moduli))
-
-    @property
-    def violation(self) -> float:
-        """By how much the worst constraint is missed, 0 where everything is met."""
-        return max(0.0, -float(np.min(self.excess)))
-
-    @property
-    def score(self) -> float:
-        """Cost and, well above what any gain in cost can outweigh, the violation."""
-        return self.cost + 10.0 * self.violation
-
-
-class Search:
-    """One tuning: builds, judges and counts candidates; `trials` are those that could be built."""
-
-    def __init__(
-        self, family: Family, plants: Sequence[DesignPlant], specification: Specification, report: Callable[[int], None]
-    ) -> None:
-        """Raise ValueError where the plants do not fit together or the family has no controller for the nominal one."""
-        self.family, self.plants, self.specification = family, plants, specification
-        self.parameters = family.parameters(plants[0]) if plants else ()
-        self.judge = Judge(plants)
-        self.trials: list[Trial] = []
-        self.looked_at: dict[Trial, tuple[AxisController, list[LoopMargins]]] = {}
-        self.count = 0
-        self.optimism = 1.0  # by how much the grid has been seen to overstate the modulus margin
-        self.reason: ValueError | None = None
-        self._report = report
-
-    def at(self, place: Floats) -> Trial:
-        """Judge the candidate at a place, its coordinates clipped to the bounds."""
-        place = np.clip(place, 0.0, 1.0)
-        return self.of(np.array([value(p, x) for p, x in zip(self.parameters, place, strict=True)]), place)
-
-    def of(self, values: Floats, place: Floats) -> Trial:
-        """Judge the candidate of these values; one that cannot be built counts as unstable."""
-        try:
-            controller = self.family.build(self.plants[0], values)
-            refuse_misfit(self.plants[0], controller)
-        except ValueError as error:
-            self.reason = self.reason or error
-            verdict = self.judge.unstable(math.inf)
-        else:
-            verdict = self.judge(controller)
-        trial = self._trial(place, values, verdict)
-        if math.isfinite(verdict.pole):
-            self.trials.append(trial)
-        self.count += 1
-        self._report(self.count)
-        return trial
-
-    def _trial(self, place: Floats, values: Floats, verdict: Verdict) -> Trial:
-        asked = self.specification
-        ceiling = 0.5 * math.log(self.judge.open_rad2) + 1.0
-        beyond = min(verdict.pole - 1.0, 1.0) if verdict.pole >= 1.0 else 0.0
-        cost = ceiling + beyond if verdict.pole >= 1.0 else min(0.5 * math.log(verdict.mean_rad2), ceiling)
-        margin = asked.modulus_margin * self.optimism * (1.0 + HEADROOM)
-        excess = (verdict.moduli - margin) / max(asked.modulus_margin, 0.1) - beyond
-        if asked.bandwidth_hz > 0.0:
-            reached = verdict.bandwidths_hz / asked.bandwidth_hz / (1.0 + HEADROOM)
-            excess = np.append(excess, np.log(np.maximum(reached, 0.1)) - beyond)
-        return Trial(place, values, verdict, cost, excess)
-
-
-def value(parameter: Parameter, place: float) -> float:
-    """Value of a parameter at a place from 0 (its least) to 1 (its most), on its own scale."""
-    if parameter.log:
-        return float(parameter.least * (parameter.most / parameter.least) ** place)
-    return float(parameter.least + place * (parameter.most - parameter.least))
-
-
-def place_of(parameter: Parameter, number: float) -> float:
-    """The reverse of `value`; 0 below the least."""
-    if number <= parameter.least:
-        return 0.0
-    if parameter.log:
-        return math.log(number / parameter.least) / math.log(parameter.most / parameter.least)
-    return (number - parameter.least) / (parameter.most - parameter.least)
-
-
 def tune(
     family: Family,
     plants: Sequence[DesignPlant],
@@ -164,168 +73,136 @@ def tune(
     *,
     seed: int,
     on_progress: Progress = lambda done, total, what: None,
-    evaluations: int = 1000,
+    survey: int = SURVEY,
+    base: Tuned | None = None,
 ) -> Tuned:
     """The controller of a family, built for the first plant, that leaves the least mean variance over all plants.
 
     Every plant has to be stable with it, have the modulus margin, cut at the command and at the optical sensor, and the
     bandwidth that ``specification`` asks for. The first plant is the nominal one, the others are what it could also be.
-    A Latin hypercube drawn from ``seed``, then sequential quadratic programming under constraints from its best places
-    (SLSQP: Kraft, DFVLR-FB 88-28, 1988), ``evaluations`` at most. ``on_progress(done, total, what)`` counts them.
+    A Latin hypercube of ``survey`` places drawn from ``seed``, then local searches from its best places and, where the
+    family contains another, from that one's optimum, ``base`` where it is known: the result is never worse than that.
+    The best optima are followed until they stand still; the values are used to four significant digits.
+    ``on_progress(done, total, what)`` counts the survey's places and the local searches.
 
     Raises ValueError where the family has no controller for the nominal plant, none was stable on every plant, or the
     specification is not met, with the best that was reached.
     """
-    what = f"tune {family.name}"
-    search = Search(family, plants, specification, lambda n: on_progress(min(n, evaluations), evaluations, what))
-    d = len(search.parameters)
-    first = max(int(0.3 * evaluations), 1)
+    total, what = survey + STARTS + FINALISTS, f"tune {family.name}"
+    search = Search(family, plants, specification)
+    contained = _contained(search, seed, survey, base)
+    surveyed = []
+    for place in _hypercube(len(search.parameters), survey, seed):
+        surveyed.append(search.at(place))
+        on_progress(len(surveyed), total, what)
+    if not search.trials:
+        raise ValueError(_no_stable(search))
+    rough = []
+    for start in [*contained, *apart(sorted(surveyed, key=_score), STARTS - len(contained), 0.1)]:
+        rough.append(descend(search, start))
+        on_progress(survey + len(rough), total, what)
+    finalists = apart(sorted(rough, key=_score), FINALISTS, 0.02)
+    found = _tuned(search, _settled(search, [t for t in finalists if t.score < finalists[0].score + CLOSE]))
+    inner = [_tuned(search, t) for t in contained if _holds(search, t)]
+    on_progress(total, total, what)
+    return min([found, *inner], key=lambda t: t.mean_rms_rad)
+
+
+def _contained(search: Search, seed: int, survey: int, base: Tuned | None) -> list[Trial]:
+    """The optimum of the family that this one contains; none where it contains no other or that one has none."""
+    inner, extended = search.family.base, search.family.extended
+    if inner is None or extended is None:
+        return []
+    try:
+        known = base or tune(inner, search.plants, search.specification, seed=seed, survey=survey)
+    except ValueError:
+        return []
+    values = extended(search.plants[0], np.array(list(known.values.values())))
+    return [search.of(np.array([rounded(v) for v in values]))]
+
+
+def _hypercube(dimensions: int, count: int, seed: int) -> Floats:
+    """Places (count, dimensions) of a Latin hypercube."""
     rng = np.random.Generator(np.random.Philox(seed))
-    strata = np.array([rng.permutation(first) for _ in range(d)]).reshape(d, first).T
-    starts = sorted((search.at(place) for place in (strata + rng.random((first, d))) / first), key=lambda t: t.score)
-    for start in _apart(starts, STARTS):
-        _polish(search, start, int(0.9 * evaluations))
+    strata = np.array([rng.permutation(count) for _ in range(dimensions)]).reshape(dimensions, count).T
+    return np.asarray((strata + rng.random((count, dimensions))) / count)
+
+
+def _score(trial: Trial) -> float:
+    return trial.score
+
+
+def _settled(search: Search, optima: Sequence[Trial]) -> Trial:
+    """The best of some optima, its values rounded. Raises ValueError where it does not keep the specification."""
     for _ in range(OVERSTATED):
-        best = _overstated(search)
-        if best is None:
-            break
-        _polish(search, best, min(search.count + 12 * d, evaluations))
-    on_progress(evaluations, evaluations, what)
-    return _chosen(search)
+        optima = [settle(search, t) for t in optima]
+        best = min(optima, key=lambda t: (round(t.score, SAME_COST), *t.values))
+        found = search.of(np.array([rounded(v) for v in best.values]), best.place)
+        if _holds(search, found):
+            return found
+        search.optimism = max(search.optimism, _overstated(search, found)) * (1.0 + HEADROOM)
+    raise ValueError(_refusal(search))
 
 
 def grid_best(
     family: Family, plants: Sequence[DesignPlant], specification: Specification, grid: Sequence[Sequence[float]]
 ) -> Tuned:
     """The best controller of an explicit grid, one row of values for each parameter; as `tune` for everything else."""
-    search = Search(family, plants, specification, lambda n: None)
+    search = Search(family, plants, specification, pull=0.0)
     if len(grid) != len(search.parameters):
         names = ", ".join(p.name for p in search.parameters)
         raise ValueError(
             f"{len(grid)} rows of values for the parameters of {family.name} ({names}): give each one its row"
         )
     for values in product(*grid):
-        place = np.array([place_of(p, v) for p, v in zip(search.parameters, values, strict=True)])
-        search.of(np.array(values, dtype=float), place)
+        search.of(np.array(values, dtype=float))
     return _chosen(search)
-
-
-def _apart(trials: Sequence[Trial], most: int) -> list[Trial]:
-    """The first trials that lie at least a tenth of the bounds apart from each other."""
-    found: list[Trial] = []
-    for t in trials:
-        if len(found) < most and all(np.max(np.abs(t.place - other.place)) > 0.1 for other in found):
-            found.append(t)
-    return found
-
-
-class _SpentError(Exception):
-    """No evaluation is left."""
-
-
-class _Local:
-    """Cost and constraints around one trial, with derivatives by differences; each place is judged once."""
-
-    def __init__(self, search: Search, evaluations: int) -> None:
-        self._search, self._evaluations = search, evaluations
-        self._known: dict[bytes, Trial] = {}
-        self._slopes: dict[bytes, tuple[Floats, Floats]] = {}
-
-    def at(self, place: Floats) -> Trial:
-        key = place.tobytes()
-        if key not in self._known:
-            if self._search.count >= self._evaluations:
-                raise _SpentError
-            self._known[key] = self._search.at(place)
-        return self._known[key]
-
-    def slopes(self, place: Floats) -> tuple[Floats, Floats]:
-        """Gradient of the cost and of each constraint, by a step into the bounds."""
-        key = place.tobytes()
-        if key not in self._slopes:
-            here, rows = self.at(place), []
-            for i in range(place.size):
-                step = np.zeros(place.size)
-                step[i] = STEP if place[i] < 0.5 else -STEP
-                there = self.at(np.clip(place, 0.0, 1.0) + step)
-                rows.append(np.append(there.cost - here.cost, there.excess - here.excess) / step[i])
-            self._slopes[key] = np.array(rows)[:, 0], np.array(rows)[:, 1:].T
-        return self._slopes[key]
-
-
-def _polish(search: Search, start: Trial, evaluations: int) -> None:
-    """Local search from one trial, as long as the search has evaluations left; what it finds is among the trials."""
-    from scipy.optimize import minimize  # slow to import, not needed to show help
-
-    if not start.place.size:
-        return
-    local, eye = _Local(search, evaluations), np.eye(start.place.size)
-    inside = {
-        "type": "ineq",
-        "fun": lambda x: np.concatenate([local.at(x).excess, x, 1.0 - x]),
-        "jac": lambda x: np.vstack([local.slopes(x)[1], eye, -eye]),
-    }
-    with contextlib.suppress(_SpentError):
-        minimize(
-            lambda x: local.at(x).cost,
-            start.place,
-            jac=lambda x: local.slopes(x)[0].copy(),  # SLSQP writes into it
-            method="SLSQP",
-            constraints=[inside],
-            options={"maxiter": 20, "ftol": 1e-6},
-        )
 
 
 def _candidates(search: Search) -> list[Trial]:
     """Trials that meet the specification as far as the grid can tell, the cheapest first."""
     asked = search.specification
-    least = asked.modulus_margin * search.optimism
     met = (
         t
         for t in search.trials
-        if t.verdict.pole < 1.0 and t.modulus >= least and np.min(t.verdict.bandwidths_hz) >= asked.bandwidth_hz
+        if t.verdict.pole < 1.0
+        and t.modulus >= asked.modulus_margin
+        and np.min(t.verdict.bandwidths_hz) >= asked.bandwidth_hz
     )
     return sorted(met, key=lambda t: t.cost)
 
 
-def _closely(search: Search, trial: Trial) -> tuple[AxisController, list[LoopMargins]]:
-    if trial not in search.looked_at:
-        controller = search.family.build(search.plants[0], trial.values)
-        search.looked_at[trial] = controller, [loop_margins(p, controller) for p in search.plants]
-    controller, margins = search.looked_at[trial]
-    search.optimism = max(search.optimism, trial.modulus / min(m.modulus for m in margins))
-    return controller, margins
+def _margins(search: Search, trial: Trial) -> list[LoopMargins]:
+    """Margins of a stable trial on all plants, looked at closely."""
+    controller = search.family.build(search.plants[0], trial.values)
+    return [loop_margins(p, controller) for p in search.plants]
 
 
-def _overstated(search: Search) -> Trial | None:
-    """The cheapest trial, if it does not hold when its margins are looked at closely."""
-    best = next(iter(_candidates(search)), None)
-    if best is None or _holds(_closely(search, best)[1], search.specification):
-        return None
-    return best
+def _holds(search: Search, trial: Trial) -> bool:
+    """Whether a trial keeps the specification when its margins are looked at closely."""
+    asked = search.specification
+    return trial.verdict.pole < 1.0 and all(
+        m.modulus >= asked.modulus_margin and m.bandwidth_hz >= asked.bandwidth_hz for m in _margins(search, trial)
+    )
+
+
+def _overstated(search: Search, trial: Trial) -> float:
+    """By how much the search has overstated a trial's modulus margin, 1 for one that is unstable."""
+    if trial.verdict.pole >= 1.0:
+        return 1.0
+    return trial.modulus / min(m.modulus for m in _margins(search, trial))
 
 
 def _chosen(search: Search) -> Tuned:
     """The cheapest trial that holds when its margins are looked at closely. Raises ValueError where none does."""
-    stable = [t for t in search.trials if t.verdict.pole < 1.0]
-    if not stable:
-        raise ValueError(_no_stable(search))
-    for _ in range(CLOSE_LOOKS):
-        best = next(iter(_candidates(search)), None)
-        if best is None:
-            break
-        controller, margins = _closely(search, best)
-        if _holds(margins, search.specification):
-            return _tuned(search, best, controller, margins)
-        search.trials.remove(best)
-    raise ValueError(_out_of_reach(search, min(stable, key=lambda t: (t.violation, t.cost))))
+    for trial in _candidates(search)[:CLOSE_LOOKS]:
+        if _holds(search, trial):
+            return _tuned(search, trial)
+    raise ValueError(_refusal(search))
 
 
-def _holds(margins: Sequence[LoopMargins], asked: Specification) -> bool:
-    return all(m.modulus >= asked.modulus_margin and m.bandwidth_hz >= asked.bandwidth_hz for m in margins)
-
-
-def _tuned(search: Search, trial: Trial, controller: AxisController, margins: Sequence[LoopMargins]) -> Tuned:
+def _tuned(search: Search, trial: Trial) -> Tuned:
+    controller, margins = search.family.build(search.plants[0], trial.values), _margins(search, trial)
     variances = [float(np.sum(h2(close(p, controller))[RESIDUAL])) for p in search.plants]
     evaluations = search.count
     modulus, bandwidth = min(m.modulus for m in margins), min(m.bandwidth_hz for m in margins)
@@ -371,6 +248,11 @@ def _everywhere(search: Search) -> str:
     return f" on all {len(search.plants)} plants" if len(search.plants) > 1 else ""
 
 
+def _refusal(search: Search) -> str:
+    stable = [t for t in search.trials if t.verdict.pole < 1.0]
+    return _out_of_reach(search, min(stable, key=lambda t: (t.violation, t.cost))) if stable else _no_stable(search)
+
+
 def _no_stable(search: Search) -> str:
     if not search.trials:
         return f"no {search.family.name} could be built in {search.count} tries; the first was refused: {search.reason}"
@@ -384,7 +266,7 @@ def _no_stable(search: Search) -> str:
 
 def _out_of_reach(search: Search, best: Trial) -> str:
     asked = search.specification
-    margins = [loop_margins(p, search.family.build(search.plants[0], best.values)) for p in search.plants]
+    margins = _margins(search, best)
     bandwidth = f" and a bandwidth of {asked.bandwidth_hz:g} Hz" if asked.bandwidth_hz else ""
     reached = f" and {min(m.bandwidth_hz for m in margins):.4g} Hz" if asked.bandwidth_hz else ""
     return (

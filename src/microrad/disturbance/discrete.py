@@ -76,7 +76,7 @@ def _sampled_filter(disturbance: Disturbance, step_s: float) -> tuple[Floats, Fl
     columns = [np.zeros((A.shape[0], 0))]
     for b in B.T[:, :, None]:
         root = lti.covariance_root(_noise_covariance(A, b, step_s))
-        parts, directions = np.linalg.eigh(root.T @ seen @ root)
+        parts, directions = lti.principal_axes(root.T @ seen @ root)
         kept = parts > _DROPPED * np.sum(parts)
         variance = float((C @ covariance(A, b) @ C.T).item())
         if variance > 0.0:

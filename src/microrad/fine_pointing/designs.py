@@ -80,14 +80,16 @@ def design(
     tuned: dict[str, Tuned] = {}
     for done, name in enumerate(wanted):
         on_progress(done, len(wanted), f"tuning {name}")
-        known = tuned.get(control.PI.name) if name == WITH_INVERSE else None
-        tuned[name] = known or tune(name, m, straight)
+        known = tuned.get(control.PI.name)
+        tuned[name] = known if known and name == WITH_INVERSE else tune(name, m, straight, known)
     on_progress(len(wanted), len(wanted), "controllers tuned")
     return tuple(Design(n, t, build(n, scene, m, t.controller), _INVERSE_USED.get(n, "")) for n, t in tuned.items())
 
 
-def tune(name: str, m: Mission, of: Sequence[DesignPlant]) -> Tuned:
+def tune(name: str, m: Mission, of: Sequence[DesignPlant], known: Tuned | None = None) -> Tuned:
     """One of the controllers that `names` lists, tuned for these plants of an axis (see `plants`).
+
+    ``known`` is the tuned PI, where there is one: families that contain it begin with it.
 
     Raises ValueError for another name, and with the reason when it cannot meet the modulus margin.
     """
@@ -102,7 +104,7 @@ def tune(name: str, m: Mission, of: Sequence[DesignPlant]) -> Tuned:
     wanted_family = control.PI.name if name == WITH_INVERSE else name
     for family in families(m):
         if family.name == wanted_family:
-            return control.tune(family, of, wanted, seed=f.seed, evaluations=evaluations(family))
+            return control.tune(family, of, wanted, seed=f.seed, base=known)
     raise ValueError(f"{name!r} is no controller of this mission; it has {', '.join(names(m))}")
 
 
@@ -114,16 +116,11 @@ def build(name: str, scene: Scene, m: Mission, axis: control.AxisController) -> 
     return with_inverse(name, scene.loop, axis, inverse, path, name == IN_SERIES)
 
 
-def evaluations(family: Family) -> int:
-    """How many candidates a search may look at: more change its result by less than a per cent."""
-    return 400 if family is control.LQG else 300
-
-
 def grid_baseline(of: Sequence[DesignPlant], wanted: Specification) -> Tuned:
     """The best PI on a grid of both its parameters over their whole range: what the tuned ones are held against."""
     parameters = control.PI.parameters(of[0])
     axes = [np.geomspace(p.least, p.most, GRID) if p.log else np.linspace(p.least, p.most, GRID) for p in parameters]
-    return control.grid_best(control.PI, of, wanted, [[float(v) for v in axis] for axis in axes])
+    return control.grid_best(control.PI, of, wanted, [[control.rounded(v) for v in axis] for axis in axes])
 
 
 def optimum_rms_rad(axis: PointingLoop) -> float:

@@ -1,0 +1,232 @@
+"""Local search: from one candidate to the optimum under constraints beside it, and to its last digit."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from microrad.control.search import Search, Trial
+
+Floats = NDArray[np.float64]
+
+STEP = 1e-3
+"""Step of the rough search's differences, over a parameter's range."""
+
+ROUGH_GAIN, ROUGH_ITERATIONS = 1e-6, 30
+"""Gain of cost and number of iterations at which the rough search ends."""
+
+NODE = 3e-3
+"""Distance of the five points of an exact derivative: it errs by some 1e-10 of rounding and 3e-12 of the fifth one."""
+
+REACH, LEAST_REACH = 0.1, 1e-4
+"""How far the optimum of a quadratic model is trusted, at first and at last, over a parameter's range."""
+
+SAME_PLACE = 1e-8
+"""Change of a place, over the bounds, at which an optimum stands still."""
+
+SAME_SCORE = 1e-9
+"""Rise of the score that is rounding."""
+
+MODELS = 25
+"""Quadratic models after which an optimum is taken as it is."""
+
+NEAR = 0.3
+"""Excess over what is asked for from which a constraint is left out of the model."""
+
+
+# ------------------------------------------------------------------------------------------------ to the optimum
+
+
+class _Local:
+    """Cost and constraints around one trial, with derivatives by differences; each place is judged once."""
+
+    def __init__(self, search: Search) -> None:
+        self._search = search
+        self._known: dict[bytes, Trial] = {}
+        self._slopes: dict[bytes, tuple[Floats, Floats]] = {}
+
+    def at(self, place: Floats) -> Trial:
+        key = place.tobytes()
+        if key not in self._known:
+            self._known[key] = self._search.at(place)
+        return self._known[key]
+
+    def slopes(self, place: Floats) -> tuple[Floats, Floats]:
+        """Gradient of the cost, and of each constraint (rows), by a step to either side or two into the bounds."""
+        key = place.tobytes()
+        if key not in self._slopes:
+            rows, inside = [], np.clip(place, 0.0, 1.0)  # a line search may look beyond
+            for i in range(place.size):
+                ends = np.clip(inside[i] + np.array([-STEP, STEP]), 0.0, 1.0)
+                below, above = (_numbers(self.at(_with(inside, i, end))) for end in ends)
+                rows.append((above - below) / (ends[1] - ends[0]))
+            self._slopes[key] = np.array(rows)[:, 0], np.array(rows)[:, 1:].T
+        return self._slopes[key]
+
+
+def _with(place: Floats, i: int, x: float) -> Floats:
+    there = place.copy()
+    there[i] = x
+    return there
+
+
+def _numbers(trial: Trial) -> Floats:
+    return np.append(trial.cost, trial.excess)
+
+
+def descend(search: Search, start: Trial) -> Trial:
+    """Where a sequence of quadratic programs leads from ``start``: near an optimum, which `settle` ends at."""
+    if not start.place.size:
+        return start
+    local = _Local(search)
+    found = _programmed(
+        lambda x: local.at(x).cost,
+        lambda x: local.slopes(x)[0],
+        lambda x: local.at(x).excess,
+        lambda x: local.slopes(x)[1],
+        start.place,
+        (0.0, 1.0),
+        ROUGH_GAIN,
+        ROUGH_ITERATIONS,
+    )
+    return local.at(found)
+
+
+Function = Callable[[Floats], Any]
+
+
+def _programmed(
+    cost: Function,
+    gradient: Function,
+    excess: Function,
+    slopes: Function,
+    start: Floats,
+    bounds: tuple[Floats | float, Floats | float],
+    least_gain: float,
+    iterations: int,
+) -> Floats:
+    """Where the cost is least within bounds while no excess is below 0: SLSQP (Kraft, DFVLR-FB 88-28, 1988)."""
+    from scipy.optimize import minimize  # slow to import, not needed to show help
+
+    low, high = bounds
+    eye = np.eye(start.size)
+    found = minimize(
+        cost,
+        start,
+        jac=lambda x: np.array(gradient(x)),  # SLSQP writes into it
+        method="SLSQP",
+        constraints=[
+            {
+                "type": "ineq",
+                "fun": lambda x: np.concatenate([excess(x), x - low, high - x]),
+                "jac": lambda x: np.vstack([slopes(x), eye, -eye]),
+            }
+        ],
+        options={"maxiter": iterations, "ftol": least_gain},
+    )
+    return np.asarray(np.clip(found.x, low, high))
+
+
+# ------------------------------------------------------------------------------------------------ to its last digit
+
+
+@dataclass(frozen=True, slots=True)
+class _Quadratic:
+    """Cost (first row) and near constraints as quadratic functions of the step from a place."""
+
+    value: Floats
+    slope: Floats
+    bend: Floats
+
+    def at(self, step: Floats) -> Floats:
+        return self.value + self.slope @ step + 0.5 * (self.bend @ step) @ step
+
+    def gradient(self, step: Floats) -> Floats:
+        return self.slope + self.bend @ step
+
+
+def settle(search: Search, start: Trial) -> Trial:
+    """The optimum beside ``start``, by the optima of quadratic models until one stands still.
+
+    A search that builds up its curvature as it goes stops where the cost hardly falls, which in a flat valley is
+    anywhere; the model's curvature is that of the valley.
+    """
+    here, reach, model = start, REACH, None
+    for _ in range(MODELS if start.place.size else 0):
+        model = model or _model(search, here)
+        if model is None:
+            break
+        there = search.at(here.place + _optimum(model, here.place, reach))
+        moved = float(np.max(np.abs(there.place - here.place)))
+        if moved < SAME_PLACE:
+            return there
+        if there.score <= here.score + SAME_SCORE:
+            here, model = there, None
+        elif reach < LEAST_REACH:
+            break
+        else:
+            reach *= 0.25
+    return here
+
+
+def _optimum(model: _Quadratic, place: Floats, reach: float) -> Floats:
+    """The step to the optimum of the model, within the bounds and the reach."""
+    if np.any(model.value[1:] < 0.0) and reach < REACH:  # a constraint that is not met yet may need more than the reach
+        reach = REACH
+    bounds = np.maximum(-place, -reach), np.minimum(1.0 - place, reach)
+    return _programmed(
+        lambda x: model.at(x)[0] - model.value[0],
+        lambda x: model.gradient(x)[0],
+        lambda x: model.at(x)[1:],
+        lambda x: model.gradient(x)[1:],
+        np.zeros(place.size),
+        bounds,
+        1e-20,
+        200,
+    )
+
+
+def _model(search: Search, here: Trial) -> _Quadratic | None:
+    """Value, slope and bend by differences of the fourth order; None where a point beside ``here`` cannot be judged."""
+    place, d = here.place, here.place.size
+    offsets = [_offsets(float(x)) for x in place]
+    near = np.concatenate([[True], here.excess < NEAR])
+    slope, bend = np.zeros((int(near.sum()), d)), np.zeros((int(near.sum()), d, d))
+
+    def numbers(*moves: tuple[int, float]) -> Floats | None:
+        there = place.copy()
+        for i, offset in moves:
+            there[i] += NODE * offset
+        trial = search.at(there)
+        return _numbers(trial)[near] if math.isfinite(trial.verdict.pole) and trial.verdict.pole < 1.0 else None
+
+    for i in range(d):
+        first, second = (_weights(offsets[i], order) / NODE**order for order in (1, 2))
+        points = [_numbers(here)[near] if o == 0.0 else numbers((i, o)) for o in offsets[i]]
+        if any(p is None for p in points):
+            return None
+        slope[:, i], bend[:, i, i] = first @ np.array(points), second @ np.array(points)
+    for i, j in combinations(range(d), 2):
+        ends = [(a, b) for a in offsets[i][[1, 3]] for b in offsets[j][[1, 3]]]
+        points = [numbers((i, a), (j, b)) for a, b in ends]
+        if any(p is None for p in points):
+            return None
+        area = NODE**2 * (offsets[i][3] - offsets[i][1]) * (offsets[j][3] - offsets[j][1])
+        bend[:, i, j] = bend[:, j, i] = np.array([1.0, -1.0, -1.0, 1.0]) @ np.array(points) / area
+    return _Quadratic(_numbers(here)[near], slope, bend)
+
+
+def _offsets(x: float) -> Floats:
+    """Five points about a coordinate, in nodes, all within the bounds."""
+    room = max(0.0, 2.0 - x / NODE) - max(0.0, 2.0 - (1.0 - x) / NODE)
+    return np.arange(-2.0, 3.0) + room
+
+
+def _weights(offsets: Floats, order: int) -> Floats:
+    """Weights of the points in the first or second derivative, exact for polynomials of the fourth degree."""
+    powers = np.vander(offsets, increasing=True).T
+    return np.asarray(np.linalg.solve(powers, math.factorial(order) * np.eye(offsets.size)[order]))
