@@ -255,10 +255,8 @@ def lqg():
     """The shipped mission's scene and its LQG, tuned as `microrad run` tunes it."""
     file = missionfile.load_mission(ROOT / "missions" / "leo-geo.toml")
     scene, f = fine_pointing.scene(file), file.mission.fine_pointing
-    wanted, calls = control.Specification(f.modulus_margin), designs.evaluations(control.LQG)
-    tuned = control.tune(
-        control.LQG, designs.plants(scene, file.mission, f.seed), wanted, seed=f.seed, evaluations=calls
-    )
+    wanted = control.Specification(f.modulus_margin)
+    tuned = control.tune(control.LQG, designs.plants(scene, file.mission, f.seed), wanted, seed=f.seed)
     return file.mission, scene, fine_pointing.Design("LQG", tuned, assemble("LQG", scene.loop, tuned.controller))
 
 
