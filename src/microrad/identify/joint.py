@@ -170,7 +170,7 @@ def fit_joint(  # noqa: PLR0913  all but the first three are named options
         if broadband
         else run_list
     )
-    tolerance = 1e-9 if free_linear else 1e-6  # a candidate is only compared
+    tolerance = 1e-12 if free_linear else 1e-9  # a candidate is only compared
     fit = fit_plant(
         structure,
         both,
