@@ -39,7 +39,9 @@ class Difference:
         """A line for a terminal."""
         apart = "" if math.isnan(self.relative) else f", relative difference {self.relative:.2g}"
         limit = f" ({self.allowed:.2g} apart is allowed)" if self.allowed else ""
-        return f"{clipped(self.place)}: was {_value(self.was)} and is {_value(self.now)}{apart}{limit}"
+        digits = 9 if _value(self.was, 9) != _value(self.now, 9) else 17
+        was, now = _value(self.was, digits), _value(self.now, digits)
+        return f"{clipped(self.place)}: was {was} and is {now}{apart}{limit}"
 
     def data(self) -> dict[str, Any]:
         """The difference as plain data."""
@@ -156,11 +158,11 @@ def _cell(text: str) -> float | str:
 
 
 def relative(was: float, now: float) -> float:
-    """Distance of two numbers over the larger of them; 0 for two that are closer than `SMALLEST`."""
+    """Distance of two numbers over the larger of them; 0 for two that are both below `SMALLEST`."""
     if not (math.isfinite(was) and math.isfinite(now)):
         return 0.0 if was == now else math.inf
-    apart = abs(was - now)
-    return 0.0 if apart <= SMALLEST else apart / max(abs(was), abs(now))
+    larger = max(abs(was), abs(now))
+    return 0.0 if larger <= SMALLEST else abs(was - now) / larger
 
 
 def is_number(value: Any) -> bool:
@@ -193,5 +195,5 @@ def clipped(text: str) -> str:
     return "".join(c if c.isprintable() else f"\\u{ord(c):04x}" for c in short)
 
 
-def _value(value: Any) -> str:
-    return f"{value:.9g}" if is_number(value) else clipped(str(value))
+def _value(value: Any, digits: int) -> str:
+    return f"{value:.{digits}g}" if is_number(value) else clipped(str(value))

@@ -16,7 +16,9 @@ VARIABLES = (
     "NUMBA_DISABLE_JIT",
     "NUMBA_OPT",
     "OMP_NUM_THREADS",
+    "OPENBLAS_BLOCK_FACTOR",
     "OPENBLAS_CORETYPE",
+    "OPENBLAS_L2_SIZE",
     "OPENBLAS_NUM_THREADS",
 )
 """Variables of the environment that choose instructions, or in how many parts a sum is made."""

@@ -231,7 +231,8 @@ def headline(found: Reproduction) -> str:
     ]
     if other:
         return f"{found.path}: the numbers agree ({compared_}); other than this run's: {', '.join(other)}."
-    return f"{found.path}: nothing differs ({compared_})."
+    apart = found.largest > 0.0 or found.files
+    return f"{found.path}: {'the numbers agree' if apart else 'nothing differs'} ({compared_})."
 
 
 def basis(found: Reproduction) -> str:
