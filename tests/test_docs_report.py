@@ -63,7 +63,9 @@ def test_the_parts_of_the_report_are_those_of_the_page():
 
 
 def test_the_numbers_of_the_report_are_those_of_the_code():
-    told(REPORT, f"in words to {100 * compared.WORDS_SHARE:g} %", f"at most {interactive_style.MOST_POINTS} points there")
+    told(
+        REPORT, f"in words to {100 * compared.WORDS_SHARE:g} %", f"at most {interactive_style.MOST_POINTS} points there"
+    )
     assert set(re.findall(r"`([A-Z0-9_]+)`", REPORT)) == set(machine.VARIABLES)
     told(REPORT, f"up to {results.MOST_INPUT_BYTES / 1e6:g} MB each")
 
