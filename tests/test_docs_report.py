@@ -11,7 +11,7 @@ import pytest
 import typer
 
 from microrad import cli, document
-from microrad.report import interactive_style, page, reproduce, results
+from microrad.report import compared, interactive_style, machine, page, results, tolerances
 from microrad.studio import address, guard, jobs_process, reading, server, uploads, workshop
 
 ROOT = Path(__file__).parent.parent
@@ -63,9 +63,16 @@ def test_the_parts_of_the_report_are_those_of_the_page():
 
 
 def test_the_numbers_of_the_report_are_those_of_the_code():
-    assert reproduce.TOLERANCE == 1e-6
-    told(REPORT, "more than `--tolerance` (1e-6) counts", f"at most {interactive_style.MOST_POINTS} points there")
+    told(
+        REPORT, f"in words to {100 * compared.WORDS_SHARE:g} %", f"at most {interactive_style.MOST_POINTS} points there"
+    )
+    assert set(re.findall(r"`([A-Z0-9_]+)`", REPORT)) == set(machine.VARIABLES)
     told(REPORT, f"up to {results.MOST_INPUT_BYTES / 1e6:g} MB each")
+
+
+def test_each_kind_of_tolerance_has_its_row():
+    section = REPORT.split("## Run it again")[1]
+    assert re.findall(r"(?m)^\| (\w[\w ]+) \| .* \| .* \| .* \|$", section)[1:] == [*tolerances.SUMMARY, "spectrum"]
 
 
 # -------------------------------------------------------------------------------------------------------------- studio

@@ -2,13 +2,15 @@
 
 import hashlib
 import json
+import math
+import platform
 import re
 import shutil
 
 import pytest
 
 from microrad import cli, missionfile, report, study
-from microrad.report import carried, compared, page, reproduce
+from microrad.report import carried, compared, machine, page, reproduce, tolerances
 from shipped import SHIPPED, edited_file, without_fine_pointing
 
 
@@ -50,19 +52,24 @@ def manifest_of(folder):
 
 @pytest.fixture
 def changed(written, tmp_path):
-    """The report with its manifest edited, as a file of its own."""
+    """The report with its manifest edited, as a file of its own; the hash of its summary is stated anew."""
 
-    def edit(change):
+    def edit(change, restated=True):
         found = carried.read(written / "report.html")
         data = json.loads(json.dumps(found.data))
         change(data)
-        before, _, behind = found.page.partition(carried.OPENING)
-        text = before + carried.OPENING + page.embedded(data) + carried.ENDING + behind.partition(carried.ENDING)[2]
+        if restated and isinstance(data["summary"], dict):
+            data["summary_sha256"] = carried.hash_of_summary(data["summary"])
         path = tmp_path / "changed.html"
-        path.write_text(text, encoding="utf-8")
+        path.write_text(carried.with_manifest(found.page, page.embedded(data)), encoding="utf-8")
         return path
 
     return edit
+
+
+def elsewhere(data):
+    """The manifest as another processor would have written it."""
+    data["machine"]["processor"] = "another"
 
 
 def call(capsys, *args):
@@ -80,7 +87,8 @@ def test_the_same_inputs_give_nothing_that_differs(written, capsys):
     assert found["largest_relative_difference"] == 0.0
     assert found["numbers"] > 500
     assert found["differences"] == found["altered"] == found["figure_data"] == found["page"] == []
-    assert found["versions"] == {}
+    assert (found["layout"], found["machine_and_versions"]) == (False, {})
+    assert found["compared"] == "to the last bit"
 
 
 @pytest.mark.parametrize("name", ["", "manifest.json"])
@@ -88,12 +96,13 @@ def test_a_folder_or_its_manifest_will_do(not_run, written, capsys, name):
     code, out, _ = call(capsys, written / name)
     assert code == 0
     assert "nothing differs (" in out
-    assert "tolerance 1e-06" in out
+    assert "Same machine and versions: compared to the last bit." in out
 
 
 def test_the_page_and_the_manifest_beside_it_carry_the_same(written, ran):
     inside, beside = carried.read(written / "report.html").data, manifest_of(written)
     hashes = [each.pop("files_sha256") for each in (inside, beside)]
+    assert inside.pop("page_sha256") == carried.hash_of_page((written / "report.html").read_text(encoding="utf-8"))
     assert inside == beside
     assert inside["mission"]["text"] == ran.file.text
     assert set(hashes[1]) - set(hashes[0]) >= {"report.html", "results.nc"}
@@ -128,8 +137,9 @@ def test_a_changed_number_is_told_with_its_size(not_run, changed, capsys):
     assert found.page == found.files == found.altered == ()
     code, out, _ = call(capsys, path)
     assert code == 1
+    assert "the report is not reproduced (" in out
+    assert "1 differs." in out
     assert "margin_db.beacon: was 6.30" in out
-    assert call(capsys, path, "--tolerance", "0.01")[0] == 0
 
 
 def test_a_verdict_turned_round_is_told(not_run, changed):
@@ -144,6 +154,66 @@ def test_a_verdict_turned_round_is_told(not_run, changed):
     ]
 
 
+# --------------------------------------------------------------------------------------- here, and on another machine
+def last_bit(data):
+    beacon = data["summary"]["margin_db"]["beacon"]
+    data["summary"]["margin_db"]["beacon"] = math.nextafter(beacon, math.inf)
+
+
+def test_the_last_bit_counts_on_the_same_machine_alone(not_run, changed, capsys):
+    code, out, _ = call(capsys, changed(last_bit))
+    assert code == 1
+    assert "Same machine and versions: compared to the last bit." in out
+    assert re.search(
+        r"margin_db\.beacon: was (6\.30\d{10,}) and is (?!\1)6\.30\d{10,}, relative difference 1\.\de-16", out
+    )
+    code, out, _ = call(capsys, changed(lambda data: (last_bit(data), elsewhere(data))))
+    assert code == 0
+    assert "the numbers agree (" in out
+    assert re.search(r"other versions: compared to stated tolerances \(processor was another and is \S+\)\.", out)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda data: data["machine"].update({"instruction sets": "SSE"}),
+        lambda data: data["machine"].update(OPENBLAS_CORETYPE="Prescott"),
+        lambda data: data["machine"].pop("processor"),
+        lambda data: data["versions"].update(numpy="0.1"),
+        lambda data: data.pop("machine"),
+    ],
+    ids=["instruction sets", "OPENBLAS_CORETYPE", "processor", "numpy", "nothing said"],
+)
+def test_whatever_changes_arithmetic_makes_another_machine(not_run, changed, change):
+    found = reproduce.reproduce(changed(lambda data: (last_bit(data), change(data))))
+    assert (found.to_the_last_bit, found.same) == (False, True)
+    assert set(found.unlike) <= {*machine.machine(), "OPENBLAS_CORETYPE", "numpy"}
+
+
+def test_a_machine_that_is_said_by_its_architecture_alone_is_another(not_run, changed, capsys):
+    code, out, _ = call(capsys, changed(lambda data: (last_bit(data), data.update(machine="x86_64"))))
+    assert code == 0
+    assert "of its machine the report says no more than x86_64, as version 0.1.0 wrote it" in out
+    assert "was none" not in out
+
+
+def test_the_machine_says_what_changes_arithmetic(monkeypatch):
+    monkeypatch.delenv("OPENBLAS_CORETYPE", raising=False)
+    before = machine.machine()
+    monkeypatch.setenv("OPENBLAS_CORETYPE", "Prescott")
+    monkeypatch.setenv("NUMBA_CPU_NAME", "generic")
+    assert machine.machine() == {**before, "OPENBLAS_CORETYPE": "Prescott", "NUMBA_CPU_NAME": "generic"}
+    assert all(before[name] for name in ("processor", "instruction sets", "C library", "numpy's BLAS", "scipy's BLAS"))
+
+
+def test_the_machine_does_not_say_whose_it_is(monkeypatch):
+    monkeypatch.setattr(platform, "node", lambda: "secret-host")
+    for name in ("HOSTNAME", "USER", "LOGNAME", "HOME"):
+        monkeypatch.setenv(name, "secret-user")
+    assert "secret" not in " ".join(machine.machine().values())
+
+
+# --------------------------------------------------------------------------------------- altered, or drawn differently
 def test_a_number_changed_on_the_page_alone_is_told(not_run, written, tmp_path, capsys):
     text = (written / "report.html").read_text(encoding="utf-8")
     assert text.count("12.1 µrad with hysteresis") == 1
@@ -151,29 +221,104 @@ def test_a_number_changed_on_the_page_alone_is_told(not_run, written, tmp_path, 
     path.write_text(text.replace("12.1 µrad with hysteresis", "2.1 µrad with hysteresis"), encoding="utf-8")
     code, out, _ = call(capsys, path)
     assert code == 1
+    assert "it was changed after it was written" in out
+    assert "its page was changed after the report was written" in out
     assert "the page's text is not what this run writes: line " in out
     assert "2.1 µrad with hysteresis" in out
 
 
-def test_a_hash_of_figure_data_that_is_another_is_told(not_run, changed):
+def test_a_summary_changed_within_its_tolerance_is_told(not_run, changed):
+    def little(data):
+        elsewhere(data)
+        last_bit(data)
+
+    found = reproduce.reproduce(changed(little, restated=False))
+    assert found.differences == ()
+    assert [text.partition(" was")[0] for text in found.altered] == ["its summary"]
+    assert not found.same
+
+
+@pytest.fixture
+def copy(written, tmp_path):
+    return shutil.copytree(written, tmp_path / "copy")
+
+
+def rewritten(folder, name, old, new):
+    """A file of a folder of results with other text, and the page and the manifest as if it had been written so."""
+    path = folder / name
+    text = path.read_text(encoding="utf-8")
+    assert text.count(old)
+    path.write_text(text.replace(old, new, 1), encoding="utf-8", newline="")
+    data = manifest_of(folder)
+    data["files_sha256"][name] = hashlib.sha256(path.read_bytes()).hexdigest()
+    return folder, data
+
+
+@pytest.mark.parametrize("name", ["report.html", "figures/tornado.csv", "results.nc"])
+def test_a_file_beside_a_manifest_that_was_changed_is_told(not_run, copy, capsys, name):
+    with (copy / name).open("ab") as file:
+        file.write(b"\n")
+    code, out, _ = call(capsys, copy)
+    assert code == 1
+    assert f"{name} beside it was changed after the report was written" in out
+
+
+def test_another_layout_and_other_words_of_the_page_leave_the_numbers_agreeing(not_run, written, tmp_path, capsys):
+    found = carried.read(written / "report.html")
+
+    def of_another_version(old, new):
+        text = found.page.replace(old, new)
+        assert text != found.page
+        text = carried.with_manifest(text, page.embedded({**found.data, "page_sha256": carried.hash_of_page(text)}))
+        path = tmp_path / "report.html"
+        path.write_text(text, encoding="utf-8")
+        return call(capsys, path)[:2]
+
+    code, out = of_another_version("<h3>", '<h3 class="new">')
+    assert code == 0
+    assert "the numbers agree (" in out
+    assert "other than this run's: the page's layout." in out
+    assert "the page's layout or drawings are not what this run writes; its text is" in out
+    code, out = of_another_version("Not in this study", "Left out of this study")
+    assert code == 0
+    assert "other than this run's: the page's text." in out
+    assert "Left out of this study" in out
+
+
+def test_figure_data_beside_the_report_are_compared_as_numbers(not_run, copy, changed, capsys):
+    name = "figures/tornado.csv"
+    first = (copy / name).read_text(encoding="utf-8").splitlines()[1].split(",")[2]
+
+    def with_first(value, machine="here"):
+        shutil.copyfile(copy / name, copy / "kept")
+        folder, data = rewritten(copy, name, first, value)
+        if machine == "elsewhere":
+            elsewhere(data)
+        (folder / "manifest.json").write_text(json.dumps(data), encoding="utf-8")
+        (folder / "report.html").unlink(missing_ok=True)  # its own manifest states the hash that the data had
+        found = reproduce.reproduce(folder)
+        shutil.move(copy / "kept", copy / name)
+        return found
+
+    near, far = f"{float(first) + 2e-8:.9g}", f"{float(first) + 2e-6:.9g}"
+    here = with_first(near)
+    assert [d.place for d in here.differences] == [f"{name}: margin lower (dB), row 1"]
+    assert here.read == here.files == (name,)
+    assert with_first(near, "elsewhere").same
+    there = with_first(far, "elsewhere")
+    assert [d.place for d in there.differences] == [f"{name}: margin lower (dB), row 1"]
+
+
+def test_figure_data_that_do_not_stand_beside_the_report_are_told(not_run, changed, capsys):
     def other(data):
         data["files_sha256"]["figures/fig6-pid.csv"] = "0" * 64
         data["files_sha256"]["figures/fig6-pid.svg"] = "0" * 64  # drawn, not data
 
-    found = reproduce.reproduce(changed(other))
-    assert found.files == ("figures/fig6-pid.csv",)
-    assert not found.same
-
-
-def test_versions_are_told_and_bytes_no_longer_counted(not_run, changed, capsys):
-    def older(data):
-        data["versions"]["numpy"] = "0.1"
-        data["files_sha256"]["figures/fig6-pid.csv"] = "0" * 64
-
-    code, out, _ = call(capsys, changed(older))
+    code, out, _ = call(capsys, changed(other))
     assert code == 0
-    assert re.search(r"numpy was 0\.1 and is \d", out)
-    assert "not byte for byte the same: figures/fig6-pid.csv" in out
+    assert "the numbers agree (" in out
+    assert "other than this run's: data of figures." in out
+    assert "not byte for byte the same: figures/fig6-pid.csv; their numbers are not compared" in out
 
 
 def test_a_file_with_other_line_ends_is_not_called_changed(tmp_path):
@@ -254,6 +399,8 @@ def test_a_huge_report_is_refused_before_it_is_read(tmp_path, monkeypatch):
         ({"inputs": {"a": 3}}, "no inputs as names with texts"),
         ({"inputs": {str(i): "" for i in range(17)}}, "more inputs than a mission names"),
         ({"versions": 3}, "no versions as names with texts"),
+        ({"machine": {"processor": 3}}, "no machine as names with texts"),
+        ({"machine": 3}, "no machine as names with texts"),
         ({"summary": None}, "no summary, against which a run could be held"),
     ],
 )
@@ -392,16 +539,21 @@ def test_control_characters_of_a_report_do_not_reach_the_terminal(not_run, chang
 def test_the_relative_difference_is_over_the_larger_number():
     assert compared.relative(2.0, 1.0) == compared.relative(-1.0, -2.0) == 0.5
     assert compared.relative(1.0, -1.0) == 2.0
-    assert compared.relative(0.0, 1e-16) == 0.0  # closer than any quantity of a study
+    assert compared.relative(0.0, 1e-16) == 0.0  # smaller than any quantity of a study
+    assert compared.relative(6.0, 6.0 + 2.0**-50) == 2.0**-50 / (6.0 + 2.0**-50)  # the last bit
     assert compared.relative(0.0, 1e-9) == 1.0
     assert compared.relative(float("inf"), 1.0) == float("inf")
     assert compared.relative(float("inf"), float("inf")) == 0.0
 
 
+def a_millionth(place, unit, was, now):
+    return 1e-6 * max(abs(was), abs(now))
+
+
 def test_what_is_compared_and_what_counts():
     was = {"a": 1.0, "b": [1.0, 2.0], "c": True, "d": "3.10 dB left", "e": None, "g": "PID"}
-    now = {"a": 1.0 + 1e-9, "b": [1.0, 2.1, 3.0], "c": 1, "d": "3.10000001 dB left", "f": 0.0, "g": "PI"}
-    found = compared.compare(was, now, 1e-6)
+    now = {"a": 1.0 + 1e-9, "b": [1.0, 2.1, 3.0], "c": 1, "d": "3.11 dB left", "f": 0.0, "g": "PI"}
+    found = compared.compare(was, now, a_millionth)
     assert found.numbers == 3
     assert found.largest == pytest.approx(0.1 / 2.1)
     places = {d.place: (d.was, d.now) for d in found.differences}
@@ -414,13 +566,40 @@ def test_what_is_compared_and_what_counts():
         "f": (missing, 0.0),
         "g": ("PID", "PI"),
     }
-    assert compared.compare(was, was, 0.0).differences == ()
+    assert [d.place for d in compared.compare(was, now, None).differences] == ["a", *[*places][:3], "d", *[*places][3:]]
+    assert compared.compare(was, was, None).differences == ()
 
 
-def test_words_with_another_number_or_other_words_differ():
-    assert compared.compare("x 3.1 dB", "x 3.2 dB", 1e-6).differences
-    assert compared.compare("x 3.1 dB", "y 3.1 dB", 1e-6).differences
-    assert not compared.compare("x \u22123.1 dB", "x \u22123.1000000001 dB", 1e-6).differences
+def test_numbers_in_words_are_roundings_and_counts_are_not():
+    def differ(was, now):
+        return bool(compared.compare(was, now, a_millionth).differences)
+
+    assert differ("x 3.1 dB", "x 3.3 dB")
+    assert differ("x 3.1 dB", "y 3.1 dB")
+    assert differ("in view 15 times", "in view 16 times")
+    assert not differ("x 0.02 dB", "x 0.03 dB")
+    assert not differ("x \u22123.1 dB", "x \u22123.2 dB")
+    assert compared.compare("x 3.1 dB", "x 3.2 dB", None).differences
+
+
+def test_the_unit_is_that_of_the_key_or_stands_beside_the_value():
+    assert tolerances.unit_of("margin_db.beacon") == "dB"
+    assert tolerances.unit_of("simulated.given.axis_rms_rad[1]") == "rad"
+    assert tolerances.unit_of("performance[0].data_rate_bit_s") == "bit/s"
+    assert tolerances.unit_of("links.pointing.confidence") == ""
+    line = {"unit": "dB", "value": 3.0}
+    assert [unit for place, unit, _, _ in compared.leaves(line, line, "") if place == "value"] == ["dB"]
+
+
+def test_a_column_with_more_rows_or_another_heading_is_told():
+    def places(was, now):
+        return [d.place for d in compared.compare_tables("fig", was, now, a_millionth).differences]
+
+    table = "a (s),b\n1,2\n3,\n"
+    assert places(table, table) == []
+    assert places(table, "a (s),b\n1.0000001,2\n3,\n") == []
+    assert places(table, "a (s),b\n1,2\n3,4\n5,\n") == ["fig: a (s), row 3", "fig: b, row 2"]
+    assert places(table, "a (s),c\n1,2\n3,\n") == ["fig: b", "fig: c"]
 
 
 def test_a_number_of_thousands_of_digits_is_no_way_to_stop_it(changed, not_run):

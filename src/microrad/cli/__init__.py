@@ -132,7 +132,7 @@ def _study_outcome(study: "Study", folder: Path, as_json: bool) -> Outcome:
 @app.command(
     epilog=examples(
         "microrad reproduce leo-geo-study/report.html",
-        "microrad reproduce leo-geo-study --tolerance 1e-9",
+        "microrad reproduce leo-geo-study",
         "microrad reproduce report.html --json",
     )
 )
@@ -141,21 +141,19 @@ def reproduce(
     report_file: Annotated[
         Path, typer.Argument(help="A report.html, a manifest.json, or the folder of both.", metavar="REPORT")
     ],
-    tolerance: Annotated[
-        float, option("--tolerance", "SHARE", "Relative difference up to which two numbers are the same.", min=0.0)
-    ] = 1e-6,
     as_json: Json = False,
 ) -> Outcome:
-    """Run a report again and say what differs.
+    """Run a report again and say whether its numbers agree.
 
-    The mission and the files that it names are taken from the report itself. Every number of its summary is compared,
-    then the data of the figures and the text of the page. The exit code is 0 when nothing differs beyond the tolerance,
-    1 when something does and 2 for a file that is no whole report.
+    The mission and the files that it names are taken from the report itself. On the same machine, with the same
+    versions, every number is compared to the last bit, elsewhere to the tolerance of its kind. The exit code is 0 when
+    the numbers agree, 1 when one does not or the report was changed after it was written, and 2 for a file that is no
+    whole report.
     """
     from microrad.report import reproduce as again
 
     with progress_bar() as progress:
-        found = again.reproduce(report_file, tolerance, progress)
+        found = again.reproduce(report_file, progress)
     text = json_text(again.data(found)) if as_json else again.words(found)
     return Outcome(text, CLOSES if found.same else DOES_NOT_CLOSE)
 

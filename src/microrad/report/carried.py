@@ -34,7 +34,10 @@ class ReproduceError(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class Carried:
-    """A manifest as it was read: ``data`` of which the keys are checked, and the page that it stood in, or ""."""
+    """A manifest as it was read from ``path``: ``data`` of which the keys are checked.
+
+    ``page`` is the page that it stood in, or "" where it is a file of its own.
+    """
 
     path: Path
     data: Mapping[str, Any]
@@ -126,6 +129,8 @@ def _check(path: Path, data: Any) -> None:
         *_texts_faults("versions", found.get("versions")),
         *_texts_faults("files_sha256", found.get("files_sha256", {})),
     ]
+    if not isinstance(found.get("machine", ""), str):  # as version 0.1.0 wrote it
+        faults += _texts_faults("machine", found["machine"])
     if not isinstance(found.get("summary"), dict):
         faults.append("no summary, against which a run could be held")
     if faults:
@@ -148,19 +153,61 @@ def _texts_faults(name: str, value: Any) -> Iterator[str]:
 
 
 def altered(carried: Carried) -> tuple[str, ...]:
-    """What in the manifest no longer has the hash that it was written with."""
+    """What of the report, and of the files beside it, no longer has the hash that it was written with."""
     data = carried.data
     files = [("the mission's text", data["mission"])]
     files += [("the mirror file's text", data["mirror"])] if data.get("mirror") else []
-    parts = [(what, each["text_sha256"], each["text"]) for what, each in files]
+    parts = [(what, each["text_sha256"], _sha256(each["text"])) for what, each in files]
     hashes = data.get("inputs_sha256") or {}
-    parts += [(f"the text of {clipped(name)}", hashes.get(name, ""), text) for name, text in carried.named.items()]
+    named = carried.named.items()
+    parts += [(f"the text of {clipped(name)}", hashes.get(name, ""), _sha256(text)) for name, text in named]
+    if "summary_sha256" in data:
+        parts.append(("its summary", str(data["summary_sha256"]), hash_of_summary(data["summary"])))
+    if carried.page and "page_sha256" in data:
+        parts.append(("its page", str(data["page_sha256"]), hash_of_page(carried.page)))
+    parts += [(f"{clipped(name)} beside it", *hashes) for name, hashes in _beside(carried)]
     return tuple(
-        f"{what} was changed after the report was written: its SHA-256 is {_sha256(text)[:16]}…, and "
+        f"{what} was changed after the report was written: its SHA-256 is {own[:16]}…, and "
         f"{clipped(stated[:16])}… is stated"
-        for what, stated, text in parts
-        if _sha256(text) != stated
+        for what, stated, own in parts
+        if own != stated
     )
+
+
+def _beside(carried: Carried) -> Iterator[tuple[str, tuple[str, str]]]:
+    """Each file beside the report that the manifest states a hash for: its name, the hash stated and its own."""
+    for name, stated in (carried.data.get("files_sha256") or {}).items():
+        if (content := held(carried, name)) is not None:
+            yield name, (stated, hashlib.sha256(content).hexdigest())
+
+
+def held(carried: Carried, name: str) -> bytes | None:
+    """What stands in a file beside the report, as the manifest names it; None without such a file."""
+    path = carried.path.parent / name
+    fits = plain(name) and path.is_file() and path.stat().st_size <= MOST_BYTES
+    return path.read_bytes() if fits else None
+
+
+def hash_of_summary(summary: Mapping[str, Any]) -> str:
+    """The hash of a summary's names, words and numbers, in their order."""
+    return _sha256(json.dumps(summary, ensure_ascii=False, separators=(",", ":")))
+
+
+def hash_of_page(page: str) -> str:
+    """The hash of what a page shows, whatever its line ends: all of it but the manifest."""
+    return _sha256("\n".join(shown_part(page).splitlines()))
+
+
+def shown_part(page: str) -> str:
+    """A page without its manifest."""
+    before, _, behind = page.partition(OPENING)
+    return before + behind.partition(ENDING)[2]
+
+
+def with_manifest(page: str, text: str) -> str:
+    """A page with this text in the place of its manifest."""
+    before, _, behind = page.partition(OPENING)
+    return before + OPENING + text + ENDING + behind.partition(ENDING)[2]
 
 
 def _sha256(text: str) -> str:

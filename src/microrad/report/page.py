@@ -14,6 +14,7 @@ from microrad.mission import Source
 from microrad.missionfile import assumptions, changed_from_shipped
 from microrad.performance import FINE
 from microrad.report import (
+    carried,
     chain,
     constellation_views,
     contact_run_words,
@@ -116,9 +117,9 @@ def render(study: Study, drawn: Drawn, manifest: Mapping[str, Any]) -> str:
         "tails": None if fine is None else tails.context(fine, m, drawn.tails),
         "versions": versions(),
         "origin": _origin(manifest),
-        "manifest": embedded(manifest),
     }
-    return interactive.with_scripts(template.render(context))
+    text = interactive.with_scripts(template.render(context))
+    return carried.with_manifest(text, embedded({**manifest, "page_sha256": carried.hash_of_page(text)}))
 
 
 def embedded(manifest: Mapping[str, Any]) -> str:
@@ -133,7 +134,8 @@ def _origin(manifest: Mapping[str, Any]) -> list[tuple[str, str]]:
     files += [("mirror file", manifest["mirror"])] if manifest["mirror"] else []
     rows = [(what, f"{each['file']}, SHA-256 {each['sha256']}") for what, each in files]
     rows += [("named file", f"{name}, SHA-256 {digest}") for name, digest in manifest["inputs_sha256"].items()]
-    rows += [("random numbers", manifest["randomness"]), ("machine", manifest["machine"])]
+    arithmetic = "; ".join(f"{name}: {text}" for name, text in manifest["machine"].items())
+    rows += [("random numbers", manifest["randomness"]), ("machine", arithmetic)]
     return [*rows, ("figures, as data and drawn", f"{len(manifest['files_sha256'])} files with their hashes")]
 
 

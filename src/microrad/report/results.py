@@ -18,7 +18,9 @@ from numpy.typing import NDArray
 from microrad.fine_pointing import COUNTERS, FinePointingStudy, Residual
 from microrad.missionfile import MirrorFile, MissionFile, named_files
 from microrad.report import day_results, words
+from microrad.report.carried import hash_of_summary
 from microrad.report.fine_pointing_data import margins, rms_by_source, sources
+from microrad.report.machine import machine
 from microrad.report.paper_bench import PLAN, SEED
 from microrad.report.variables import coordinate, variable
 from microrad.study import Study
@@ -285,6 +287,7 @@ def manifest(study: Study, folder: Path) -> dict[str, Any]:
         )
         if table is not None
     ]
+    summary = finite(words.summary(study))
     drawn += [f"seed {SEED} of the virtual bench, {PLAN}"] if study.scan is not None else []
     return {
         "mission": _text_file(study.file),
@@ -292,10 +295,11 @@ def manifest(study: Study, folder: Path) -> dict[str, Any]:
         "inputs": _input_texts(study),
         "mirror": None if mirror is None else _text_file(mirror),
         "versions": versions(),
-        "machine": platform.machine(),
+        "machine": machine(),
         "randomness": "; ".join(drawn) or "none",
         "files_sha256": _hashes(folder),
-        "summary": finite(words.summary(study)),
+        "summary": summary,
+        "summary_sha256": hash_of_summary(summary),
     }
 
 

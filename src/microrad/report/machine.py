@@ -1,0 +1,67 @@
+"""What of a machine changes the last digits of a result, and nothing that says whose machine it is."""
+
+import os
+import platform
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+VARIABLES = (
+    "GLIBC_TUNABLES",
+    "NPY_DISABLE_CPU_FEATURES",
+    "NPY_ENABLE_CPU_FEATURES",
+    "NUMBA_CPU_FEATURES",
+    "NUMBA_CPU_NAME",
+    "NUMBA_DISABLE_JIT",
+    "NUMBA_OPT",
+    "OMP_NUM_THREADS",
+    "OPENBLAS_BLOCK_FACTOR",
+    "OPENBLAS_CORETYPE",
+    "OPENBLAS_L2_SIZE",
+    "OPENBLAS_NUM_THREADS",
+)
+"""Variables of the environment that choose instructions, or in how many parts a sum is made."""
+ARCHITECTURE = "architecture"
+
+
+def machine() -> dict[str, str]:
+    """What arithmetic is done with here, by name; a variable that is not set is left out."""
+    return {
+        ARCHITECTURE: platform.machine(),
+        "processor": _processor(),
+        "instruction sets": _instruction_sets(),
+        "C library": " ".join(filter(None, platform.libc_ver())) or platform.platform(terse=True),
+        "numpy's BLAS": _blas(np),
+        "scipy's BLAS": _scipy_blas(),
+        **{name: os.environ[name] for name in VARIABLES if name in os.environ},
+    }
+
+
+def as_stated(stated: Any) -> dict[str, str]:
+    """The machine of a manifest; one of version 0.1.0 has no more than the architecture, as a text."""
+    return dict(stated) if isinstance(stated, Mapping) else {ARCHITECTURE: str(stated)} if stated else {}
+
+
+def _processor() -> str:
+    """The processor's kind, as the compiler of the loops names it."""
+    from llvmlite.binding import get_host_cpu_name  # type: ignore[import-untyped]  # here: slow to load
+
+    return str(get_host_cpu_name())
+
+
+def _instruction_sets() -> str:
+    """Those that numpy uses, beyond any that were disabled."""
+    found = np.show_config(mode="dicts")["SIMD Extensions"]
+    return " ".join([*found["baseline"], *found["found"]])
+
+
+def _scipy_blas() -> str:
+    import scipy  # here: slow to load
+
+    return _blas(scipy)
+
+
+def _blas(library: Any) -> str:
+    found = library.show_config(mode="dicts")["Build Dependencies"]["blas"]
+    return f"{found['name']} {found['version']}"
