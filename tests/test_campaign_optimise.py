@@ -283,7 +283,9 @@ def test_the_last_digits_of_a_processor_do_not_move_the_search():
     def other(x):
         return {name: column * (1.0 + 1e-14 * rounding.standard_normal()) for name, column in exact(x).items()}
 
-    of = problem(variables=unit_cube(2), minimise="residual_rms", limits=(Limit("margin", 5.0, None, "test"),), evaluations=60)
+    of = problem(
+        variables=unit_cube(2), minimise="residual_rms", limits=(Limit("margin", 5.0, None, "test"),), evaluations=60
+    )
     here, there = (optimise(of, evaluate, evaluate, quiet) for evaluate in (exact, other))
     assert [c.values for c in here.trace] == [c.values for c in there.trace]
     assert all(v == float(f"{v:.3e}") for c in here.trace for v in c.values.values())

@@ -20,6 +20,7 @@ from microrad.export.matrices_polynomials import polynomials
 from microrad.export.matrices_structure import without_copies
 from microrad.export.records import ExportError, Origin
 from microrad.fine_loop.design import design_plant
+from microrad.fine_loop.loop import EXACT_BITS
 from microrad.missionfile import load_mission
 from shipped import SHIPPED
 
@@ -86,6 +87,14 @@ def difference(found, wanted):
     return np.max(np.abs(found / wanted - 1.0))
 
 
+def rounding(system, freq_hz, period_s):
+    """What solving (z - A) x = B leaves of a response, over its largest: eps times its condition number, twice."""
+    z = np.exp(2j * np.pi * freq_hz * period_s)
+    scale = np.max(np.abs(system.C), axis=0)  # states in units of what they add to the outputs
+    worst = np.max(np.linalg.cond(scale[:, None] * (z[:, None, None] * np.eye(system.order) - system.A) / scale))
+    return 2.0 * np.finfo(float).eps * worst
+
+
 # ---------------------------------------------------------------------------------------------------------- the models
 def test_mirror_and_its_linear_part_are_those_of_the_mission(file):
     part, whole = matrices.models(file)
@@ -109,7 +118,7 @@ def test_sampled_plant_of_the_tracking_loop_is_that_of_the_study_with_no_state_t
     whole = control.sampled_plant(tracking.mirror, setup.drive, setup.timing)
     freq = grid(m.period_s)
     wanted = lti.frequency_response(whole, freq, setup.timing.period_s)
-    assert difference(response(m, freq), wanted) < 1e-13
+    assert difference(response(m, freq), wanted) < rounding(whole, freq, setup.timing.period_s)
     assert (m.system.order, whole.order) == (7, 8)  # five modes, the amplifier, and one sample of delay, held twice
     assert m.period_s == setup.timing.period_s == 2e-5
 
@@ -128,9 +137,10 @@ def test_sampled_plant_of_the_pointing_loop_is_what_its_controller_was_designed_
         filtered = lti.StateSpace(Ad, Bd, Ad[:1], Bd[:1])
         wanted = wanted * lti.frequency_response(filtered, freq, T)[:, :, 0]
     found = response(m, freq)[:, :, 0]
-    assert difference(found[:, 0], -wanted[:, control.RESIDUAL]) < 1e-11
-    assert difference(found[:, 1], wanted[:, control.OPTICAL]) < 1e-11
-    assert difference(found[:, 2], wanted[:, control.GAUGE]) < 1e-11
+    known = 2.0 ** (1 - EXACT_BITS)  # to that the plant of a design is rounded, and so is its response
+    assert difference(found[:, 0], -wanted[:, control.RESIDUAL]) < known
+    assert difference(found[:, 1], wanted[:, control.OPTICAL]) < known
+    assert difference(found[:, 2], wanted[:, control.GAUGE]) < known
     assert [p.name for p in m.outputs] == ["line_of_sight_rad", "optical_error_rad", "gauge_rad"]
     assert m.system.order < plant.system.order
     assert ("reference filter" in m.meaning) == (which == "pointing")

@@ -177,6 +177,25 @@ def _diagonal(X: Floats) -> Floats:
     return np.diagonal(X, axis1=-2, axis2=-1)
 
 
+def to_bits(values: Floats, bits: int) -> Floats:
+    """The values rounded to a number of significant bits: what processors round otherwise in the last ones is equal."""
+    share, exponent = np.frexp(values)
+    return np.asarray(np.ldexp(np.round(share * 2.0**bits) / 2.0**bits, exponent))
+
+
+def decay_to_bits(factors: Floats, bits: int) -> Floats:
+    """What is left of a state after a step, rounded by what is lost of it: a slow one keeps its time constant.
+
+    Down to 2^-44 of the state, which is as much above the rounding of the factor itself.
+    """
+    return np.asarray(1.0 - np.round(to_bits(1.0 - factors, bits) * 2.0**44) / 2.0**44)
+
+
+def system_to_bits(system: StateSpace, bits: int) -> StateSpace:
+    """The system with matrices of a number of significant bits."""
+    return StateSpace(*(to_bits(matrix, bits) for matrix in (system.A, system.B, system.C, system.D)))
+
+
 def covariance_root(matrix: Floats) -> Floats:
     """Lower triangular R with R R' the positive semidefinite matrix; a column is 0 where a state adds nothing.
 

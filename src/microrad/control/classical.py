@@ -24,6 +24,9 @@ Complexes = NDArray[np.complex128]
 LIGHT_DAMPING = 0.3
 """Damping ratio below which a pole pair counts as a resonance."""
 
+DRIFT_BITS = 24
+"""Significant bits of how far a drift's pole or zero lies from 1: the last five of its digits are rounding."""
+
 SLOW_SHARE = 0.2
 """Share of the plant's corner below which its real poles and zeros are drift, which an inverse undoes."""
 
@@ -110,7 +113,7 @@ def drift(model: lti.StateSpace, below: float) -> list[tuple[float, float]]:
     found = []
     for roots in (np.linalg.eigvals(model.A).astype(complex), lti.zeros(model)):
         real = roots[(np.abs(roots.imag) < 1e-9) & (roots.real > math.exp(-2.0 * math.pi * below)) & (roots.real < 1.0)]
-        found.append(np.sort(real.real)[::-1])
+        found.append(1.0 - lti.to_bits(1.0 - np.sort(real.real)[::-1], DRIFT_BITS))
     return [(float(pole), float(zero)) for pole, zero in zip(*found, strict=False)]
 
 

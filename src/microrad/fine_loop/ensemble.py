@@ -9,9 +9,9 @@ from functools import cache, partial
 import numpy as np
 from numpy.typing import NDArray
 
-from microrad import disturbance, kernels, mirror
+from microrad import disturbance, kernels, lti, mirror
 from microrad.control import amplifier_factor, inverse_arrays, no_feedforward
-from microrad.fine_loop.loop import LoopController, PointingLoop
+from microrad.fine_loop.loop import EXACT_BITS, LoopController, PointingLoop
 from microrad.sensor import StrainGauge
 from microrad.threads import in_threads
 
@@ -128,7 +128,7 @@ def arrays(loop: PointingLoop, controller: LoopController, seed: int) -> kernels
     check_controller(loop, controller)
     drive, timing = loop.drive, loop.timing
     plant = mirror.discretise(loop.mirror, timing.step_s)
-    shaping = combined_shaping(loop)
+    shaping, exact = combined_shaping(loop), partial(lti.to_bits, bits=EXACT_BITS)
     inverse = controller.inverse or no_feedforward(loop.mirror)
     row = [drive.minimum_v, drive.maximum_v, drive.drive_resolution_v, amplifier_factor(drive, timing.step_s)]
     row += [drive.slew_v_s * timing.step_s, *loop.drive_range_v]
@@ -137,30 +137,30 @@ def arrays(loop: PointingLoop, controller: LoopController, seed: int) -> kernels
     return kernels.Ensemble(
         step_s=timing.step_s,
         feedback=plant.feedback,
-        diagonal=plant.diagonal,
-        coupling=plant.coupling,
-        rest=plant.rest,
-        B0=plant.B0,
-        B1=plant.B1,
-        E0=plant.E_held - plant.E1,
-        E1=plant.E1,
-        E_held=plant.E_held,
-        E_back=-plant.E1,
-        F=plant.F,
-        G=plant.G,
-        Cy=plant.C,
-        Dy=plant.D,
-        Ky=plant.K,
+        diagonal=lti.decay_to_bits(plant.diagonal, EXACT_BITS),
+        coupling=exact(plant.coupling),
+        rest=plant.rest._replace(value=exact(plant.rest.value)),
+        B0=exact(plant.B0),
+        B1=exact(plant.B1),
+        E0=exact(plant.E_held - plant.E1),
+        E1=exact(plant.E1),
+        E_held=exact(plant.E_held),
+        E_back=-exact(plant.E1),
+        F=exact(plant.F),
+        G=exact(plant.G),
+        Cy=exact(plant.C),
+        Dy=exact(plant.D),
+        Ky=exact(plant.K),
         bouc_wen=plant.bouc_wen,
         operator=plant.operator,
         play_start=plant.play_start,
         play_threshold=plant.play_threshold,
         play_weight=plant.play_weight,
-        optics=np.ascontiguousarray(loop.optics, dtype=float),
+        optics=np.ascontiguousarray(exact(loop.optics), dtype=float),
         shaping_diagonal=shaping.diagonal,
         shaping_coupling=shaping.coupling,
-        shaping_noise=shaping.noise,
-        shaping_output=shaping.output,
+        shaping_noise=exact(shaping.noise),
+        shaping_output=exact(shaping.output),
         purpose=shaping.purpose,
         seed=np.array([seed & 0xFFFFFFFF, seed >> 32 & 0xFFFFFFFF], dtype=np.uint64),
         steps_per_sample=timing.steps_per_sample,
@@ -261,13 +261,16 @@ def combined_shaping(loop: PointingLoop) -> Shaping:
         pairs = np.pad(model.Ad, (0, n % 2))
         if np.any(np.where(np.eye(n, dtype=bool) | (np.arange(n)[:, None] == partner), 0.0, model.Ad)):
             raise ValueError("a disturbance's states do not come in pairs: give its filter in modal form")
-        diagonal[at : at + n] = np.diag(model.Ad)
-        coupling[at : at + n] = pairs[np.arange(n), partner]
+        turning = 2 * model.line_amplitude_rad.size  # lines are turned by a sine and a cosine that no processor rounds
+        kept = np.arange(n) < turning
+        own, beside = np.diag(model.Ad), pairs[np.arange(n), partner]
+        diagonal[at : at + n] = np.where(kept, own, lti.decay_to_bits(own, EXACT_BITS))
+        coupling[at : at + n] = np.where(kept, beside, lti.to_bits(beside, EXACT_BITS))
         noise[at : at + n, source : source + w] = model.Bd
         output[axis, at : at + n] = model.C[0]
         purposes[source : source + w] = purpose + np.arange(w)
-    kept = tuple((at, model, purpose) for _, at, _, purpose, model in parts)
-    return Shaping(diagonal, coupling, noise, output, purposes, kept)
+    starts = tuple((at, model, purpose) for _, at, _, purpose, model in parts)
+    return Shaping(diagonal, coupling, noise, output, purposes, starts)
 
 
 def start(loop: PointingLoop, p: kernels.Ensemble, first_run: int) -> kernels.EnsembleState:
@@ -311,7 +314,7 @@ def start(loop: PointingLoop, p: kernels.Ensemble, first_run: int) -> kernels.En
         counts=rows(kernels.COUNT_FIELDS),
         histogram=np.zeros((LANES, kernels.BINS), dtype=np.int32),
     )
-    shaped = p.shaping_output @ state.shaping.reshape(-1, LANES)[: p.shaping_diagonal.size]
+    shaped = lti.to_bits(p.shaping_output @ state.shaping.reshape(-1, LANES)[: p.shaping_diagonal.size], EXACT_BITS)
     now = np.array([r.at(np.zeros(1))[0] for r in loop.references])
     state.disturbance[:] = shaped.ravel()
     state.error[:] = (shaped + now[:, None]).ravel()
@@ -327,7 +330,8 @@ def start_disturbance(loop: PointingLoop, p: kernels.Ensemble, runs: NDArray[np.
         numbers = np.zeros(4 * (-(-2 * n // 4)) * LANES)
         kernels.gaussian_kernel(p.seed, runs, np.uint64(kernels.START_PURPOSE + purpose), 0, numbers)
         drawn = numbers.reshape(-1, LANES)
-        states[at : at + n] = disturbance.initial_state(model, drawn[:n], uniform(drawn[n : 2 * n]))
+        begin = disturbance.initial_state(model, drawn[:n], uniform(drawn[n : 2 * n]))
+        states[at : at + n] = lti.to_bits(begin, EXACT_BITS)
     return np.ascontiguousarray(states).ravel()
 
 

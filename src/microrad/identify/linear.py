@@ -182,7 +182,9 @@ def _choose(scan: Sequence[OrderScore]) -> tuple[int, str]:
     if smaller:
         reason += f"; order {smaller[-1].order} is worse by {smaller[-1].criterion - best.criterion:.3g}"
     if larger:
-        reason += f"; order {larger[0].order} gains {best.chi_square - larger[0].chi_square:.3g} in chi-square for "
+        reason += (
+            f"; order {larger[0].order} gains {max(best.chi_square - larger[0].chi_square, 0.0):.1f} in chi-square for "
+        )
         reason += f"{larger[0].parameters - best.parameters} parameters more, which is worth less than it costs"
     else:
         reason += "; a larger order was not tried"
