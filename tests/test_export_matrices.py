@@ -88,11 +88,11 @@ def difference(found, wanted):
 
 
 def rounding(system, freq_hz, period_s):
-    """What solving (z - A) x = B leaves of a response, over its largest: eps times its condition number, twice."""
-    z = np.exp(2j * np.pi * freq_hz * period_s)
-    scale = np.max(np.abs(system.C), axis=0)  # states in units of what they add to the outputs
-    worst = np.max(np.linalg.cond(scale[:, None] * (z[:, None, None] * np.eye(system.order) - system.A) / scale))
-    return 2.0 * np.finfo(float).eps * worst
+    """What an error of eps in each entry of A, and in solving, does to a response, over its largest (Skeel's bound)."""
+    z = np.exp(2j * np.pi * freq_hz * period_s)[:, None, None] * np.eye(system.order)
+    inverse = np.linalg.inv(z - system.A)
+    moved = np.abs(system.C @ inverse) @ (np.abs(z) + np.abs(system.A)) @ np.abs(inverse @ system.B)
+    return np.finfo(float).eps * np.max(moved) / np.max(np.abs(system.C @ inverse @ system.B))
 
 
 # ---------------------------------------------------------------------------------------------------------- the models
