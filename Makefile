@@ -29,7 +29,7 @@ compiled: $(VENV)/.test
 	$(BIN)/python scripts/compile_kernels.py
 
 unit: $(VENV)/.test
-	$(BIN)/python -m pytest --numprocesses 2
+	$(BIN)/python -m pytest --numprocesses 2 --dist loadfile
 
 benchmark: $(VENV)/.test
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[benchmark]'
