@@ -1,6 +1,7 @@
 """The reference: what becomes a quantity, what counts as moved, and the line that the changelog owes to it."""
 
 import json
+import runpy
 from pathlib import Path
 
 import pytest
@@ -10,7 +11,12 @@ from reference.quantities import MOST, Quantity, flatten, quantities
 
 ROOT = Path(__file__).parent.parent
 REFERENCE = ROOT / "reference"
-WAS = {"margin_db": Quantity(4.456, "dB", 0.01), "verdict": Quantity("closes", "", 0.0), "rows": Quantity(256, "", 0.0)}
+WAS = {
+    "margin_db": Quantity(4.456, "dB", 0.01),
+    "verdict": Quantity("no gap", "", 0.0),
+    "closes": Quantity(True, "", 0.0),
+    "rows": Quantity(256, "", 0.0),
+}
 
 
 def names(changes):
@@ -87,7 +93,7 @@ def test_within_the_tolerance_nothing_moves_and_outside_of_it_by_name():
         ("margin_db", Quantity(None, "", 0.0)),
         ("verdict", Quantity("does not close", "", 0.0)),
         ("rows", Quantity(257, "", 0.0)),
-        ("rows", Quantity(True, "", 0.0)),
+        ("closes", Quantity(1, "", 0.0)),
     ],
 )
 def test_another_unit_word_count_or_no_number_has_moved(name, now):
@@ -108,9 +114,10 @@ def test_what_is_written_anew_keeps_the_digits_of_what_did_not_move(tmp_path):
     assert comparing.load(tmp_path / "mission.json") == WAS | {"rows": Quantity(512, "", 0.0)}
     assert (tmp_path / "mission.json").read_text(encoding="utf-8").splitlines() == [
         "{",
+        '"closes": [true, "", 0.0],',
         '"margin_db": [4.456, "dB", 0.01],',
         '"rows": [512, "", 0.0],',
-        '"verdict": ["closes", "", 0.0]',
+        '"verdict": ["no gap", "", 0.0]',
         "}",
     ]
 
@@ -148,7 +155,7 @@ def test_a_number_that_moved_demands_its_line():
         "### Numbers that moved of CHANGELOG.md lacks: - mission: rows 256 -> 512: why",
     ]
     explained = (
-        "- mission: margin_db 4.46 -> 4.99: the beam is\n  cut at the aperture",
+        "- mission: margin_db 4.46 ->\n  4.99: the beam is cut at the aperture",
         "- mission: ro* 256 -> 512: why",
     )
     assert lacking(*explained, **moved) == []
@@ -170,19 +177,49 @@ def test_a_line_with_other_values_is_named(said):
 
 
 @pytest.mark.parametrize(
-    "said", ["- budget: rows 256 -> 512: why", "- mission: rows 256 -> 512", "- mission: row 256 -> 512: w"]
+    "said",
+    [
+        "- budget: rows 256 -> 512: why",
+        "- mission: rows 256 -> 512",
+        "- mission: row 256 -> 512: w",
+        "- mission: rows 256 -> 512: ",
+    ],
 )
 def test_a_line_of_another_case_or_quantity_or_without_a_reason_does_not_count(said):
     assert lacking(said, rows=Quantity(512, "", 0.0))[0].endswith("- mission: rows 256 -> 512: why")
 
 
+def test_the_lines_of_an_older_version_do_not_count():
+    assert [line.now for line in comparing.lines(CHANGELOG.format("- mission: rows 1 -> 3: why"))] == ["3"]
+    assert comparing.lines(CHANGELOG.replace("### Numbers that moved\n\n{}", "")) == []
+
+
 def test_a_word_that_changed_and_a_quantity_that_is_gone_have_lines_too():
     now = {name: each for name, each in WAS.items() if name != "rows"} | {"verdict": Quantity("no link", "", 0.0)}
     said = comparing.lines(
-        CHANGELOG.format('- mission: verdict "closes" -> "no link": w\n- mission: rows 256 -> gone: w')
+        CHANGELOG.format('- mission: verdict "no gap" -> "no link": w\n- mission: rows 256 -> gone: w')
     )
     assert list(comparing.unexplained("mission", WAS, now, said)) == []
     assert len(list(comparing.unexplained("mission", WAS, now, []))) == 2
+
+
+# --------------------------------------------------------------------------------------------------------- the command
+def test_a_case_that_moves_or_fails_is_named_and_one_that_cannot_run_here_is_skipped_by_name(monkeypatch, capsys):
+    def fails(place):
+        raise cases.CommandFailedError("microrad budget ended with 2")
+
+    def cannot(place):
+        raise cases.SkippedError("there is no C compiler (cc)")
+
+    for name, measure in (("budget", fails), ("export-c", cannot), ("contacts", lambda place: {"duration_s": 1.0})):
+        monkeypatch.setitem(cases.CASES, name, cases.Case(measure))
+    check = runpy.run_path(str(ROOT / "scripts" / "numbers"))["check"]
+    assert check(["export-c"]) == 0
+    assert capsys.readouterr().out == "export-c: skipped: there is no C compiler (cc)\nno number moved\n"
+    assert check(["budget"]) == 1
+    assert capsys.readouterr().out.startswith("budget: microrad budget ended with 2\n1 ")
+    assert check(["contacts"]) == 1
+    assert "contacts: ... and " in capsys.readouterr().out
 
 
 # ------------------------------------------------------------------------------------------------------- what is there

@@ -9,7 +9,7 @@ import math
 import re
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, TypeGuard
 
 from reference.quantities import Quantity, Value
 
@@ -51,7 +51,9 @@ def relative_change(was: Value, now: Value) -> float | None:
 
 # --------------------------------------------------------------------------------------------------------------- files
 def load(path: Path) -> dict[str, Quantity]:
-    """Quantities of a file of the reference, by name."""
+    """Quantities of a file of the reference, by name; none where there is no such file."""
+    if not path.exists():
+        return {}
     return {name: Quantity(*line) for name, line in json.loads(path.read_text(encoding="utf-8")).items()}
 
 
@@ -91,7 +93,7 @@ def moved(case: str, was: Quantities, now: Quantities) -> list[Moved]:
     ]
 
 
-def _is_number(value: object) -> bool:
+def _is_number(value: object) -> TypeGuard[float]:
     return isinstance(value, int | float) and not isinstance(value, bool)
 
 
@@ -150,7 +152,7 @@ def lacking(reference: Path, changelog: str) -> Iterator[str]:
     said = lines(changelog)
     for path in sorted(reference.glob("*/*.json")):
         now = reference / path.name
-        yield from unexplained(path.stem, load(path), load(now) if now.exists() else {}, said)
+        yield from unexplained(path.stem, load(path), load(now), said)
 
 
 def unexplained(case: str, released: Quantities, now: Quantities, said: list[Line]) -> Iterator[str]:

@@ -7,7 +7,7 @@ A list or table of more than `MOST` values is kept as a few of its figures.
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeGuard
 
 MOST = 50
 """Values of an array that are kept one by one."""
@@ -39,7 +39,8 @@ class Found(NamedTuple):
 LEFT_OUT = {
     r".*sha256.*|hashes|versions|microrad|files_sha256": "differs with every edit",
     r"folder|files?|path|report|mirror_file|ledger|written": "a path",
-    r".*_ns|elapsed_s|seconds|wall_.*": "time of this machine",
+    r".*_ns|left_s|rows_per_s|seconds": "time of this machine",
+    r"edges|counts": "a histogram, whose bins a value at an edge leaves",
     r".*_utc": "the same moment stands beside it in seconds",
     r"unit|units|long_name|meaning|holds_for|source|authority|caveat|why|basis": "words about a number",
     r"at_hz|largest_error": "where rounding happens to be largest, and how large",
@@ -164,7 +165,7 @@ def _joined(name: str, key: str) -> str:
     return f"{name}.{key}" if name else key
 
 
-def _is_number(value: object) -> bool:
+def _is_number(value: object) -> TypeGuard[float]:
     return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
 
 
@@ -190,6 +191,12 @@ ENSEMBLE = Kind(
 )
 RARE = Kind(0.2, {"": 1e-6, "1/s": 1e-6}, "tails go with the exponential of the square of an error that may move")
 FITTED = Kind(1e-4, {"rad": 1e-10, "": 1e-9}, "a search ends where its cost falls by 1e-9: 3e-5 of a parameter")
+SEARCHED = Kind(
+    5e-3,
+    {"rad": 1e-10, "rad/V": 1e-12, "": 1e-4},
+    "searches along flat valleys end where they are: far within the standard errors of what is barely told apart",
+)
+INDEX = Kind(0.05, {"": 0.01}, "shares of a variance, known from so many rows to some per cent of the whole")
 
 _ORBITS = r"contacts|constellation|gallery-constellation"
 _SPAN = r".*(?<!rad)(?<!bit)(?<!m)_s"
@@ -207,12 +214,15 @@ KINDS: Sequence[tuple[str, str, Kind]] = (
     (r"mirror-.*", r".*", SINES),
     (r"mission.*", r"tracking.*|runs\..*|other_readings.*|residual.*|requirements.*", SINES),
     (r"mission.*", r"day\.(contacts|passes|direct\w*|line_of_sight)\b(?!.*could_carry).*", ORBIT),
-    (r"mission.*|gallery-mirrors", r".*(margins|theory|bound|stroke).*", LINEAR),
+    (r"mission.*|gallery-mirrors", r"(.*\.)?(margins|theory|theory_\w+|bound|stroke)\b.*", LINEAR),
     (r"mission.*|gallery-mirrors", r".*", ENSEMBLE),
     (r"design|export-.*", r".*", LINEAR),
-    (r"campaign", r".*(miss|outage|tail|sensitivity|importance).*", RARE),
-    (r"campaign", r".*", ENSEMBLE),
-    (r"identify-.*|gallery-lab", r".*", FITTED),
+    (r"campaign.*", r"rows\.(communication|fine_pointing)\..*", CLOSED),
+    (r"campaign.*", r".*(miss|outage|tail).*", RARE),
+    (r"campaign.*", r".*sensitivities.*", INDEX),
+    (r"campaign.*", r".*", ENSEMBLE),
+    (r"identify-whole|gallery-lab", r".*", SEARCHED),
+    (r"identify-.*", r".*", FITTED),
     (r".*", r".*", CLOSED),
 )
 """Which kind a quantity is of: patterns of the case and of the name; the first line that fits both counts."""
