@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 DEMO := demo
 
-.PHONY: demo test unit lint types compiled contract benchmark clean
+.PHONY: demo test unit lint types compiled contract numbers benchmark clean
 .DELETE_ON_ERROR:
 
 demo: $(VENV)/.run
@@ -13,6 +13,7 @@ demo: $(VENV)/.run
 # Types are checked on one core; what most tests wait for is compiled on another one.
 test: contract lint
 	@$(MAKE) --no-print-directory --jobs=2 types compiled
+	@$(MAKE) --no-print-directory numbers
 	@$(MAKE) --no-print-directory unit
 
 contract: $(VENV)/.test
@@ -27,6 +28,10 @@ types: $(VENV)/.test
 
 compiled: $(VENV)/.test
 	$(BIN)/python scripts/compile_kernels.py
+
+# Each quantity of the quick cases against reference/; `scripts/numbers check --all` compares all cases.
+numbers: $(VENV)/.test
+	$(BIN)/python scripts/numbers check
 
 unit: $(VENV)/.test
 	$(BIN)/python -m pytest --numprocesses 2 --dist loadfile
