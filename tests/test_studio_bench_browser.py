@@ -153,7 +153,7 @@ def test_a_recording_is_dropped_identified_while_one_looks_on_and_its_mirror_use
     tab.get_by_label("Name of the mirror").fill("stage")
     tab.get_by_text("Hysteresis alone: two models, in seconds").click()
     kept = studio.folder / ".microrad-studio" / "mirror-form.json"
-    until(tab, lambda: (kept_form(kept).setting.name, kept_form(kept).setting.static) == ("stage", True))
+    until(tab, lambda: (kept_form(kept).setting.name, kept_form(kept).setting.static) == ("stage", True), "the form")
     tab.get_by_role("button", name="Identify").click()
     tab.get_by_role("button", name="Cancel").wait_for()
     tab.screenshot(path=pictures / "mirror-running.png", full_page=True)

@@ -404,6 +404,20 @@ def asked(url, path):
         return error.code, error.headers
 
 
+def test_a_browser_may_be_silent_for_long_before_its_page_is_taken_for_closed(file):
+    """It is, where it draws on a busy machine; what the page says to a browser that comes in are its terms in ms."""
+    with running(file.parent, "leo-geo.toml") as (_, url):
+        base, _, token = url.partition("?token=")
+        cookie = f"microrad_studio_{base.split(':')[2][:-1]}={token}"
+        terms = urllib.request.Request(
+            f"{base}_nicegui_ws/socket.io/?EIO=4&transport=polling", headers={"Cookie": cookie}
+        )
+        with urllib.request.urlopen(terms, timeout=HANG_S) as answer:
+            told = json.loads(answer.read().decode("utf-8").removeprefix("0"))
+    assert told["pingTimeout"] >= 20_000
+    assert told["pingInterval"] + told["pingTimeout"] >= 60_000
+
+
 _BROWSER = """#!/bin/sh
 exec >/dev/null 2>&1
 echo "$@" > {folder}/new
