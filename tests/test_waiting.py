@@ -31,6 +31,8 @@ def faults(text, name):
     for node in ast.walk(ast.parse(text)):
         if isinstance(node, ast.Attribute) and node.attr in CLOCKS and f"{name}: {node.attr}" != CLOCK:
             found.append((node.lineno, f"measures time by {node.attr}"))
+        elif isinstance(node, ast.Assert) and "time.time()" in ast.unparse(node):
+            found.append((node.lineno, "asserts what the clock says"))
         elif isinstance(node, ast.ImportFrom) and node.module in ("time", "timeit"):
             found.append((node.lineno, f"takes a clock from {node.module}"))
         elif isinstance(node, ast.Call):
@@ -67,6 +69,7 @@ def test_no_test_asserts_a_time_or_has_a_limit_of_its_own(path):
     ("text", "words"),
     [
         ("began = time.perf_counter()", "measures time by perf_counter"),
+        ("assert time.time() - began < 1", "asserts what the clock says"),
         ("from time import monotonic", "takes a clock from time"),
         ("process.communicate(timeout=30)", "a limit of its own: timeout=30"),
         ("page.click(timeout=2 * 1000.0)", "a limit of its own: timeout=2 * 1000.0"),

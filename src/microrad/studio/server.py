@@ -33,7 +33,9 @@ DOCUMENTS = "/results/"
 """Where finished documents are served, each in a sandbox: a job's number, then the place among its results."""
 
 _GRACE_S = 10  # for open pages to be closed, as a machine that is busy takes
-_SILENT_S = 60.0
+_RETURN_S = 60.0
+"""For a browser to come back to its page; it may be silent for 0.4 of that, as where it draws on a busy machine."""
+
 _SHOWN = 120
 _ANY = ("0.0.0.0", "::", "::ffff:0.0.0.0", "[::]", "*", "")
 
@@ -243,7 +245,7 @@ def application(workshop: Workshop, entrance: Entrance) -> Guard:
         language="en-US",
         show_welcome_message=False,
         gzip_middleware_factory=None,
-        reconnect_timeout=_SILENT_S,  # a browser that draws for long is silent, and would lose what was typed meanwhile
+        reconnect_timeout=_RETURN_S,
     )
     return Guard(inner, entrance.names, address.origins(entrance.names), entrance.token, documents=(DOCUMENTS,))
 
