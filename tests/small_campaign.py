@@ -50,6 +50,11 @@ def campaign_file(
     return path
 
 
+def import_path():
+    """The folder of the tests, before what a program that is started here imports from anyway."""
+    return os.pathsep.join([str(Path(__file__).parent), *filter(None, [os.environ.get("PYTHONPATH")])])
+
+
 def hears_ctrl_c():
     """Take Ctrl-C as a terminal's commands do: tests that run in the background of a shell were told to ignore it."""
     signal.signal(signal.SIGINT, signal.SIG_DFL)

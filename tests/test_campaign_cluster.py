@@ -15,13 +15,12 @@ import pytest
 from microrad.campaign import cluster
 from microrad.campaign.cluster import DaskEngine
 from microrad.campaign.records import CampaignError, Job
-from small_campaign import killing
+from small_campaign import import_path, killing
 from waiting import HANG_S, alive, beside, gone, no_hang, until
 
 pytest.importorskip("distributed")
 
 LATE_S = 5.0  # a job that does nothing but end may be silent for half of that on a busy machine
-HERE = str(Path(__file__).parent)
 TARGET = "campaign_target:open_work"
 TABLE = {
     "100": "killed",
@@ -57,7 +56,7 @@ def kinds(outcomes):
 @pytest.fixture(autouse=True, scope="module")
 def target_for_children():
     before = os.environ.get("PYTHONPATH")
-    os.environ["PYTHONPATH"] = HERE
+    os.environ["PYTHONPATH"] = import_path()
     yield
     if before is None:
         del os.environ["PYTHONPATH"]

@@ -9,7 +9,6 @@ import textwrap
 import threading
 import time
 from itertools import islice
-from pathlib import Path
 from types import SimpleNamespace
 
 import psutil
@@ -19,7 +18,7 @@ from microrad.campaign import engines
 from microrad.campaign.engines import Clock, Flight, LocalEngine, late_flights
 from microrad.campaign.records import CampaignError, Job
 from microrad.campaign.worker import Beat
-from small_campaign import hears_ctrl_c, killing
+from small_campaign import hears_ctrl_c, import_path, killing
 from waiting import HANG_S, alive, beside, gone, no_hang, until
 
 LATE_S = 3.0  # a job that does nothing but end may be silent for half of that on a busy machine
@@ -28,7 +27,7 @@ LATE_S = 3.0  # a job that does nothing but end may be silent for half of that o
 @pytest.fixture
 def engine(monkeypatch):
     """Make a local engine whose jobs do what a table by number says; closed at the end, and no process left."""
-    monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parent))
+    monkeypatch.setenv("PYTHONPATH", import_path())
     made = []
 
     def make(table="{}", threads=2, late_s=20.0):
@@ -313,7 +312,7 @@ def parent():
     def start(table, late_s=1000.0, jobs=10000):
         process = subprocess.Popen(
             [sys.executable, "-c", PARENT, table, str(late_s), str(jobs)],
-            env=os.environ | {"PYTHONPATH": str(Path(__file__).parent)},
+            env=os.environ | {"PYTHONPATH": import_path()},
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,

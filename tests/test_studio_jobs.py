@@ -204,7 +204,7 @@ def test_a_command_that_does_not_listen_is_asked_harder_each_time(tmp_path, monk
         "import pathlib, signal, time\n"
         "for n in (signal.SIGINT, signal.SIGTERM): signal.signal(n, lambda n, _: print(n, flush=True))\n"
         f"pathlib.Path({str(folder / 'cancel')!r}).touch()\n"
-        "while True: time.sleep(0.01)\n"
+        f"time.sleep({2.0 * HANG_S})\n"
     )
 
     def once_heard(ask, count):
