@@ -15,7 +15,9 @@ from pathlib import Path
 
 import pytest
 
+import waiting
 from shipped import SHIPPED, without_fine_pointing
+from waiting import HANG_MS, HANG_S
 
 MISSION = "leo-geo.toml"
 _SETTLED = """
@@ -26,7 +28,6 @@ _SETTLED = """
 })
 """
 _AXE = {"preload": False, "resultTypes": ["violations"]}  # requests of its own would be seen by the page
-LONG_MS = 60_000  # on a machine with other work to do
 
 
 class Studio:
@@ -63,7 +64,7 @@ class Studio:
     def end(self):
         """End it as Ctrl-C does; it must have complained of nothing."""
         self.process.send_signal(signal.SIGINT)
-        _, told = self.process.communicate(timeout=60)
+        _, told = self.process.communicate(timeout=HANG_S)
         assert (self.process.returncode, told) == (0, "")
 
 
@@ -97,13 +98,16 @@ def violations(page):
     return axe.Axe().run(page, options=_AXE).response["violations"]
 
 
-def until(page, there):
+def until(page, there, what):
     """Wait until something holds on this side; the page goes on meanwhile."""
-    for _ in range(LONG_MS // 20):
-        if there():
-            return
-        page.wait_for_timeout(20)
-    pytest.fail("waited in vain")
+    return waiting.until(there, what, pause=lambda seconds: page.wait_for_timeout(1000.0 * seconds))
+
+
+def new_context(browser, **options):
+    """Tabs of their own, whose waits have the one limit."""
+    found = browser.new_context(**options)
+    found.set_default_timeout(HANG_MS)
+    return found
 
 
 @pytest.fixture(scope="module")
@@ -113,7 +117,7 @@ def browser():
     program = shutil.which("chromium") or shutil.which("chromium-browser")
     if program is None:
         pytest.skip("Chromium is not installed")
-    api.expect.set_options(timeout=LONG_MS)
+    api.expect.set_options(timeout=HANG_MS)
     with api.sync_playwright() as play:
         found = play.chromium.launch(executable_path=program, args=["--no-sandbox"])
         yield found
@@ -123,8 +127,7 @@ def browser():
 @pytest.fixture(scope="module")
 def context(browser):
     """Tabs that share the studio's cookie."""
-    found = browser.new_context(viewport={"width": 1400, "height": 900})
-    found.set_default_timeout(LONG_MS)
+    found = new_context(browser, viewport={"width": 1400, "height": 900})
     found.grant_permissions(["clipboard-read", "clipboard-write"])
     yield found
     found.close()

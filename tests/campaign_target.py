@@ -10,6 +10,8 @@ from pathlib import Path
 
 from microrad.campaign.records import CampaignError
 
+DAY_S = 86400
+
 
 def code_sha256():
     return os.environ.get("CODE_OF_TARGET", "c0de")
@@ -24,6 +26,12 @@ def open_work(spec):
     return Work(json.loads(spec))
 
 
+def touch(mark):
+    """Say that a deed has begun, where somebody waits for it."""
+    if mark is not None:
+        Path(mark).touch()
+
+
 class Work:
     def __init__(self, table):
         self.table = table
@@ -36,14 +44,19 @@ class Work:
     def work(self, job, beat):
         pass
 
-    def slow(self, job, beat, seconds="0.05"):
-        end = time.monotonic() + float(seconds)
-        while time.monotonic() < end:
+    def slow(self, job, beat, times=5):
+        for _ in range(int(times)):
             beat()
             time.sleep(0.01)
 
-    def quiet(self, job, beat, seconds):
-        for _ in range(int(float(seconds) * 100)):  # seconds of its own, not of the clock on the wall
+    def endless(self, job, beat, mark=None):
+        touch(mark)
+        while True:
+            self.slow(job, beat)
+
+    def quiet(self, job, beat, mark, end):
+        touch(mark)
+        while not Path(end).exists():
             time.sleep(0.01)
 
     def chat(self, job, beat):
@@ -60,12 +73,15 @@ class Work:
     def leave(self, job, beat):
         sys.exit("enough")
 
-    def hang(self, job, beat):
-        time.sleep(1000)
+    def hang(self, job, beat, mark=None):
+        touch(mark)
+        time.sleep(DAY_S)
 
-    def hog(self, job, beat):
-        time.sleep(0.3)  # what the other threads have done gets out
-        ctypes.PyDLL(None).sleep(1000)  # never gives the interpreter's lock back
+    def hog(self, job, beat, mark=None):
+        for _ in range(30):
+            time.sleep(0.01)  # what the other threads have done gets out
+        touch(mark)
+        ctypes.PyDLL(None).sleep(DAY_S)  # never gives the interpreter's lock back
 
     def segfault(self, job, beat):
         ctypes.string_at(0)
@@ -74,7 +90,7 @@ class Work:
         os.kill(os.getpid(), signal.SIGKILL)
 
     def hang_once(self, job, beat, mark):
-        self.once(mark, lambda: time.sleep(1000))
+        self.once(mark, lambda: self.hang(job, beat))
 
     def killed_once(self, job, beat, mark):
         self.once(mark, lambda: os.kill(os.getpid(), signal.SIGKILL))
@@ -87,7 +103,7 @@ class Work:
     def side_by_side(self, job, beat, folder):
         mark = Path(folder) / f"{job.kind}-{job.number}"
         mark.touch()
-        self.slow(job, beat, "0.05")
+        self.slow(job, beat)
         others = sorted(p.name for p in Path(folder).iterdir())
         mark.unlink()
         if job.kind == "row" and len(others) > 1:

@@ -9,6 +9,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the command line does, 
 import pytest
 from hypothesis import settings
 
+import waiting
 from command_line import Result, listing
 from microrad import cli
 
@@ -26,6 +27,10 @@ if os.environ.get("HYPOTHESIS_PROFILE", "gate") == "gate":
         nothing = importlib.import_module("hypothesis.internal.constants_ast").Constants
         assert callable(providers._get_local_constants)
         providers._get_local_constants = nothing
+
+
+def pytest_configure():
+    waiting.told = os.dup(2)  # before what tests write is taken in
 
 
 @pytest.fixture(scope="session", autouse=True)

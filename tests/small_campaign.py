@@ -1,13 +1,16 @@
 """A campaign whose rows take milliseconds: one axis of the shipped mission under PI, and how to run it as users do."""
 
 import os
+import random
 import signal
 import subprocess
 import sys
-import time
+import threading
+from contextlib import contextmanager
 from pathlib import Path
 
 from shipped import SHIPPED
+from waiting import HANG_S, any_moment, beside
 
 LOOP = """
 mission = "mission.toml"
@@ -47,6 +50,11 @@ def campaign_file(
     return path
 
 
+def import_path():
+    """The folder of the tests, before what a program that is started here imports from anyway."""
+    return os.pathsep.join([str(Path(__file__).parent), *filter(None, [os.environ.get("PYTHONPATH")])])
+
+
 def hears_ctrl_c():
     """Take Ctrl-C as a terminal's commands do: tests that run in the background of a shell were told to ignore it."""
     signal.signal(signal.SIGINT, signal.SIG_DFL)
@@ -69,7 +77,7 @@ def started(*args, cwd, **environment):
 def finished(*args, cwd, **environment):
     """The same, waited for: exit code, stdout, stderr."""
     process = started(*args, cwd=cwd, **environment)
-    out, err = process.communicate(timeout=300)
+    out, err = process.communicate(timeout=HANG_S)
     return process.returncode, out, err
 
 
@@ -87,17 +95,33 @@ def children(pid):
     return found
 
 
-def gone(pid, within_s=10.0):
-    """Whether a process is gone, or a corpse, before the time is up."""
-    end = time.monotonic() + within_s
-    while time.monotonic() < end:
-        try:
-            if Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] == "Z":
-                return True
-        except OSError:
-            return True
-        time.sleep(0.02)
-    return False
+@contextmanager
+def killing(kill, most_s):
+    """Call `kill` at random moments, `most_s` (s) at most behind every tenth job that is done: what is left goes on.
+
+    Gives what is to hear each outcome, and passes it on.
+    """
+    draw, due, over, done = random.Random(2), threading.Semaphore(0), threading.Event(), 0
+
+    def go_on():
+        while due.acquire() and not over.is_set():
+            any_moment(draw, most_s)
+            kill()
+
+    def heard(outcome):
+        nonlocal done
+        done += outcome.kind == "done"
+        if outcome.kind == "done" and done % 10 == 0:
+            due.release()
+        return outcome
+
+    killer = beside(go_on)
+    try:
+        yield heard
+    finally:
+        over.set()
+        due.release()
+        killer.join(HANG_S)
 
 
 def kill(pid):

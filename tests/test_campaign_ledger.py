@@ -9,7 +9,6 @@ import struct
 import subprocess
 import sys
 import textwrap
-import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -22,6 +21,7 @@ from microrad.campaign.ledger import Ledger, check_same
 from microrad.campaign.ledger_file import FORMAT, is_written
 from microrad.campaign.mending import mend, verify
 from microrad.campaign.records import CampaignError, Chunk, Failed, WorstTrace
+from waiting import any_moment
 
 COLUMNS = (Column("row", "", "number"), Column("weight", "", "weight"), Column("margin", "dB", "margin"))
 HEAD = Head(
@@ -479,10 +479,11 @@ def test_kills_at_any_moment_lose_and_double_nothing(path):
         with process(path, 10**6) as child:
             while child.stdout.readline().strip() != "open":
                 pass
-            time.sleep(draw.uniform(0.0, 0.06))
+            lines = [child.stdout.readline() for _ in range(draw.randrange(5))]
+            any_moment(draw, 0.03)
             child.kill()
-            said_last = child.stdout.read().split()
-        acknowledged = int(said_last[-1]) + 1 if said_last else acknowledged
+            numbers = "".join([*lines, child.stdout.read()]).split()
+        acknowledged = int(numbers[-1]) + 1 if numbers else acknowledged
         with Ledger.open(path, write=False) as ledger:
             count = len(ledger.done())
             assert acknowledged <= count <= acknowledged + 1

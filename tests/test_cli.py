@@ -22,6 +22,7 @@ from command_line import listing
 from microrad import cli, doctor, identify, report, study
 from microrad.cli import frame, lab
 from shipped import without_fine_pointing
+from waiting import HANG_S, lines_of, until
 
 ROOT = Path(__file__).parents[1]
 PAPER = ROOT / "src" / "microrad" / "missions" / "leo-geo.toml"
@@ -334,15 +335,17 @@ def interruptible():
 @pytest.mark.parametrize(
     ("name", "module", "function"), [("SIGINT", "study", "run"), ("SIGTERM", "report", "write_columns")]
 )
-def test_an_interrupt_during_run_leaves_nothing(folder, loop_mirror, plain, name, module, function):
+def test_an_interrupt_during_run_leaves_nothing(folder, loop_mirror, plain, name, module, function, tmp_path_factory):
     code = MARKED.format(module=module, function=function)
     args = [sys.executable, "-c", code, "run", str(plain)]
     args += ["--mirror", str(loop_mirror)] if module == "report" else []
-    process = subprocess.Popen(args, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    progress = tmp_path_factory.mktemp("progress") / "progress"
+    environment = os.environ | {frame.PROGRESS_FILE: str(progress)}
+    process = subprocess.Popen(args, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     assert process.stderr.readline() == "here\n"
-    time.sleep(0.4 if module == "study" else 0.0)
+    lines_of(progress, 2 if module == "study" else 0)  # the study is in its second step
     process.send_signal(getattr(signal, name))
-    out, err = process.communicate(timeout=30)
+    out, err = process.communicate(timeout=HANG_S)
     assert (process.returncode, out) == (130, "")
     assert err.replace("here\n", "") == "microrad: interrupted, nothing was written\n"
     assert listing(folder) == {}
@@ -356,9 +359,8 @@ def test_an_interrupt_that_falls_into_a_call_back_is_not_lost(monkeypatch):
 
     monkeypatch.setattr(sys, "unraisablehook", frame.interrupt_again)
     call_back()  # what ctypes cannot raise it hands to the hook
-    with pytest.raises(KeyboardInterrupt):
-        for _ in range(1000):  # it falls between two steps of Python, and wakes nobody
-            time.sleep(0.02)
+    with pytest.raises(KeyboardInterrupt):  # it falls between two steps of Python, and wakes nobody
+        until(lambda: False, "the interrupt")
 
 
 def test_what_else_cannot_be_raised_is_reported(monkeypatch, capsys):

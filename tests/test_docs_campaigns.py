@@ -19,6 +19,7 @@ from command_line import Result
 from microrad import cli
 from microrad.campaign import bundle, cluster, run, sampling, sensitivity, sketch, tables
 from microrad.campaign.file import load_campaign
+from waiting import HANG_S
 
 for _extra in ("distributed", "pyarrow", "h5netcdf"):
     pytest.importorskip(_extra)
@@ -207,16 +208,12 @@ def cluster_commands():
         for process in reversed(begun):
             os.killpg(process.pid, signal.SIGTERM)
         for process in reversed(begun):
-            try:
-                process.wait(10.0)
-            except subprocess.TimeoutExpired:
-                os.killpg(process.pid, signal.SIGKILL)
-                process.wait()
+            process.wait(HANG_S)
 
 
 def test_a_cluster_gives_the_same_bytes(folder, cluster_commands, monkeypatch):
     told("cluster.csv is rows.csv to the byte")
-    monkeypatch.setattr(cluster, "_CONNECT_S", 60.0)  # the scheduler is only starting
+    monkeypatch.setattr(cluster, "_CONNECT_S", HANG_S)  # the scheduler is only starting
     ran = call(*cluster_commands[1:])
     assert ran.code == 0 and first_sentence(ran.out) == below("links.toml")
     assert command("microrad", "campaign", "export", "cluster.ledger", "cluster.csv").code == 0

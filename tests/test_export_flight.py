@@ -26,6 +26,7 @@ from microrad.hysteresis import NO_CREEP, BoucWen, Creep, Play
 from microrad.missionfile import load_mission
 from microrad.sensor import OpticalSensor
 from shipped import SHIPPED, without_fine_pointing
+from waiting import HANG_S
 
 URAD = 1e-6
 WARNINGS = ["-Wall", "-Wextra", "-Werror", "-pedantic", "-Wconversion", "-Wdouble-promotion", "-Wshadow"]
@@ -78,7 +79,7 @@ class Code:
         (folder / "driver.c").write_text(driver)
         library = folder / "flown.so"
         built = [compiler, *FLAGS, "-shared", "-fPIC", "-o", library, folder / f"{name}.c", folder / "driver.c", "-lm"]
-        subprocess.run(built, check=True, timeout=60)
+        subprocess.run(built, check=True, timeout=HANG_S)
         self.library = ctypes.CDLL(str(library))
         self.library.state_size.restype = ctypes.c_size_t
 
@@ -110,7 +111,7 @@ def bench(code, vectors, target="check", passes=1):
     """Status and numbers of the bench that the Makefile builds, over these vectors."""
     (code.folder / "vectors.csv").write_text(flight.vectors_text(code.of, vectors), encoding="utf-8")
     words = ["make", "-s", "-C", code.folder, target, "CC=gcc", f"PASSES={passes}"]
-    done = subprocess.run(words, check=False, capture_output=True, text=True, timeout=120)
+    done = subprocess.run(words, check=False, capture_output=True, text=True, timeout=HANG_S)
     lines = [line.split() for line in done.stdout.splitlines()]
     return done.returncode, {line[0]: float(line[1]) for line in lines if len(line) == 2}, done.stderr
 

@@ -18,6 +18,7 @@ from microrad.export.operations import FixedOperations, Operations
 from microrad.export.records import FlightController, Floats, InverseLaw, Origin, Signal, Vectors
 from microrad.export.rounding import RoundingBound
 from microrad.export.sections import Sections, sections
+from waiting import HANG_S
 
 KINDS = tuple(each.name for each in fields(Operations))
 WHOLE_KINDS = ("multiplications", "additions", "shifts", "comparisons", "conversions")
@@ -146,7 +147,7 @@ def compiled(folder: Path, files: dict[str, str], of: FlightController, precisio
     names = ("exp", "expm1", "log1p", "floor", "fabs", "pow", "fmin", "fmax")
     defined = [f"-D{each.upper()}={each}{suffix}" for each in names]
     command = ["g++", "-std=gnu++20", "-w", "-O0", "-shared", "-fPIC", f"-DBASE={base}", *defined]
-    subprocess.run([*command, "-o", "code.so", "all.cpp"], cwd=folder, check=True, timeout=120)
+    subprocess.run([*command, "-o", "code.so", "all.cpp"], cwd=folder, check=True, timeout=HANG_S)
     return Counted(ctypes.CDLL(str(folder / "code.so")), of.actuators)
 
 

@@ -13,13 +13,13 @@ from microrad import report
 from microrad.identify import identify
 from microrad.report import budget_views, campaign_page, day_views
 from shipped import plain_study
+from waiting import HANG_MS
 
 WIDTHS = (1280, 400)
 A4_PX = 680  # between the margins
 ALIVE = {"report": 20, "day": 6, "campaign": 6, "identification": 5}
 """Pages with interactive figures, and how many they have at least."""
 MOST_BYTES = 6_000_000
-SLOW_MS = 60_000
 
 
 @pytest.fixture(scope="module")
@@ -52,7 +52,7 @@ class Opened:
 
     def __init__(self, browser, file, width=1280, **options):
         self.page = browser.new_page(viewport={"width": width, "height": 900}, **options)
-        self.page.set_default_timeout(SLOW_MS)
+        self.page.set_default_timeout(HANG_MS)
         self.said, self.asked = [], []
         self.page.on("console", lambda message: self.said.append(message.text))
         self.page.on("pageerror", lambda error: self.said.append(str(error)))

@@ -30,11 +30,17 @@ REAL = (
 def recording(tmp_path_factory):
     """The file to drop, and what the form has to say of it."""
     if REAL.exists():
-        return REAL, {"output": "column 4", "unit": "µm", "rate": "200 Hz", "arm": "50 mm"}
+        return REAL, {
+            "output": "column 4",
+            "unit": "µm",
+            "rate": "200 Hz",
+            "arm": "50 mm",
+            "said": "type the sample rate",
+        }
     folder = tmp_path_factory.mktemp("bench") / "played"
     files = bench.write(bench.load_plan("paper-experiment"), folder, 0, False, lambda done, total, what: None)
     loop = next(path for path in files if path.stem == "loop-100hz")
-    return loop, {"output": None, "unit": None, "rate": "", "arm": ""}
+    return loop, {"output": None, "unit": None, "rate": "", "arm": "", "said": ""}
 
 
 def drop(tab, file):
@@ -137,7 +143,8 @@ def figure_title(tab, words):
 def test_a_recording_is_dropped_identified_while_one_looks_on_and_its_mirror_used(studio, opened, recording, pictures):
     (file, says), tab = recording, opened("mirror")
     drop(tab, file)
-    tab.get_by_text(file.name, exact=True).wait_for()
+    api.expect(tab.locator(".mirror-file .seen")).to_have_text(file.name)
+    api.expect(tab.get_by_role("alert").last).to_contain_text(says["said"])  # the form is full: nothing fills it again
     for label, value in (("Angle or displacement", says["output"]), ("Unit of the output", says["unit"])):
         if value is not None:
             choose(tab, label, value)
@@ -153,7 +160,7 @@ def test_a_recording_is_dropped_identified_while_one_looks_on_and_its_mirror_use
     tab.get_by_label("Name of the mirror").fill("stage")
     tab.get_by_text("Hysteresis alone: two models, in seconds").click()
     kept = studio.folder / ".microrad-studio" / "mirror-form.json"
-    until(tab, lambda: (kept_form(kept).setting.name, kept_form(kept).setting.static) == ("stage", True))
+    until(tab, lambda: (kept_form(kept).setting.name, kept_form(kept).setting.static) == ("stage", True), "the form")
     tab.get_by_role("button", name="Identify").click()
     tab.get_by_role("button", name="Cancel").wait_for()
     tab.screenshot(path=pictures / "mirror-running.png", full_page=True)

@@ -281,7 +281,7 @@ def test_a_study_ends_with_its_verdict_and_a_report_in_the_page(studio, tab, pic
 def held_up(studio, tab, number, ledger):
     """The group of a job's command, stopped as soon as its ledger has rows: it has no end while a test looks on."""
     folder = studio.folder / ".microrad-studio" / "jobs" / str(number)
-    until(tab, lambda: ledger.is_file() and rows_in(ledger) > 0)
+    until(tab, lambda: ledger.is_file() and rows_in(ledger) > 0, "rows")
     (command,) = children(json.loads((folder / "started.json").read_text("utf-8"))["pid"])
     os.killpg(command, signal.SIGSTOP)
     return command
@@ -313,7 +313,7 @@ def test_a_campaign_shows_its_figures_while_it_runs_goes_on_after_a_cancel_and_h
         page.screenshot(path=pictures / "runs-campaign.png", full_page=True)
         page.reload()
     there.get_by_role("button", name="Cancel").click()
-    until(tab, (studio.folder / ".microrad-studio" / "jobs" / str(number) / "cancel").exists)
+    until(tab, (studio.folder / ".microrad-studio" / "jobs" / str(number) / "cancel").exists, "the cancel")
     os.killpg(command, signal.SIGCONT)
     for card in (first, there):
         card.get_by_text("cancelled").wait_for()

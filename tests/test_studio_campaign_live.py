@@ -20,6 +20,7 @@ from microrad.report import campaign_words
 from microrad.studio import campaign_live, campaign_view
 from microrad.studio.campaign_live import Live, LiveCampaigns
 from small_campaign import campaign_file
+from waiting import HANG_S
 
 LIMIT = '\n[limits]\nresidual_rms = { most = "5 urad" }\n'
 TAIL = "Radial errors that are exceeded"
@@ -76,7 +77,7 @@ def growing(tmp_path):
 @pytest.fixture
 def at_once(monkeypatch):
     """A look reads at any time, however short the last one is ago, and to the end, however slow the machine is."""
-    monkeypatch.setattr(campaign_live, "_READ_S", 60.0)
+    monkeypatch.setattr(campaign_live, "_READ_S", HANG_S)
     monkeypatch.setattr(campaign_live, "_PAUSE_S", 0.0)
     monkeypatch.setattr(campaign_live, "_REST", 0.0)
 

@@ -16,6 +16,7 @@ from microrad.report import day_plots, figures
 from microrad.studio import attempts, day_view, dials, link_view, plots, pointing_view
 from microrad.studio.draft import Draft
 from microrad.studio.latest import Latest, shared
+from waiting import HANG_S
 
 
 @pytest.fixture(scope="module")
@@ -367,9 +368,9 @@ def test_the_latest_question_is_answered_once_and_kept():
         return 42
 
     latest.ask("a", work)
-    assert latest.wait(10.0).result == 42
+    assert latest.wait(HANG_S).result == 42
     latest.ask("a", work)
-    state = latest.wait(10.0)
+    state = latest.wait(HANG_S)
     assert (len(calls), state.done, state.total, state.what, state.running) == (1, 1, 2, "half", False)
 
 
@@ -378,25 +379,25 @@ def test_an_older_question_is_dropped_for_a_newer_one():
 
     def slow(progress):
         begun.set()
-        go.wait(10.0)
+        go.wait(HANG_S)
         progress(1, 2, "late")
         ended.append("slow")
         return "slow"
 
     latest.ask("a", slow)
-    assert begun.wait(10.0)
+    assert begun.wait(HANG_S)
     first = latest._thread
     latest.ask("b", lambda progress: "quick")
-    assert latest.wait(10.0).result == "quick"
+    assert latest.wait(HANG_S).result == "quick"
     go.set()
-    first.join(10.0)
+    first.join(HANG_S)
     assert ended == []
     assert latest.state.result == "quick"
 
 
 def test_a_cancelled_question_can_be_asked_again_and_an_error_is_kept():
     latest, go = Latest(), threading.Event()
-    latest.ask("a", lambda progress: (go.wait(10.0), progress(0, 0, ""))[0])
+    latest.ask("a", lambda progress: (go.wait(HANG_S), progress(0, 0, ""))[0])
     latest.cancel()
     go.set()
     assert latest.state.key == ""
@@ -406,7 +407,7 @@ def test_a_cancelled_question_can_be_asked_again_and_an_error_is_kept():
         raise day_study.flow.operations.OperationsError("no day; give it an orbit")
 
     latest.ask("a", refuse)
-    state = latest.wait(10.0)
+    state = latest.wait(HANG_S)
     assert (state.error, state.result) == ("no day; give it an orbit", None)
 
 

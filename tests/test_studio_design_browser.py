@@ -121,7 +121,7 @@ def test_quick_steps_of_a_slider_never_go_back_and_end_at_the_last_in_map_field_
     links.get_by_role("slider", name=f"{APERTURE}, slider").locator("[tabindex='0']").focus()
     for _ in range(12):
         links.keyboard.press("ArrowRight")
-    until(links, lambda: f'leo_aperture = "{last}"' in written(studio))
+    until(links, lambda: f'leo_aperture = "{last}"' in written(studio), "the last step")
     there = margin_at(studio.file, terminals__leo_aperture=last)
     shown_margin(links, there)
     links.get_by_text(f"the communication link has {there}.").wait_for()
@@ -155,7 +155,7 @@ def test_a_page_that_is_opened_on_a_faulty_mission_promises_nothing_in_grey(stud
     links.get_by_text("The links close: ").wait_for()
     typed(links, APERTURE).fill("5 W")
     typed(links, APERTURE).press("Enter")
-    until(links, lambda: 'leo_aperture = "5 W"' in written(studio))
+    until(links, lambda: 'leo_aperture = "5 W"' in written(studio), "the fault")
     opened_now = studio.enter(context, "link")
     opened_now.get_by_text("Nothing can be shown before the mission is corrected.").wait_for()
     assert opened_now.get_by_text("Shown in grey").count() == 0

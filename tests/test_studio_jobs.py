@@ -15,10 +15,9 @@ import pytest
 from microrad.studio import jobs as jobs_module
 from microrad.studio import jobs_files, jobs_process
 from microrad.studio.jobs import JobError, Jobs, Order
-from small_campaign import campaign_file, children, gone, kill
+from small_campaign import campaign_file, children, kill
 from studio_jobs import written
-
-PATIENCE_S = 300.0  # a fresh installation compiles first
+from waiting import HANG_S, gone, lines_of, until
 
 
 @pytest.fixture
@@ -32,11 +31,11 @@ def studio(tmp_path):
     for folder in jobs_files.job_folders(jobs.folder):
         ended(folder)
     for own in jobs_process._started:
-        own.wait(PATIENCE_S)
+        own.wait(HANG_S)
 
 
 def ended(folder):
-    assert jobs_files.wait_for(lambda: jobs_files.read_job(folder).finished, PATIENCE_S), jobs_files.read_job(folder)
+    until(lambda: jobs_files.read_job(folder).finished, f"the end of the job in {folder}")
     return jobs_files.read_job(folder)
 
 
@@ -129,7 +128,7 @@ def test_a_job_goes_on_when_whoever_started_it_is_gone(tmp_path):
     server = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, check=False)
     assert server.returncode == -signal.SIGKILL
     folder = tmp_path / "studio" / "jobs"
-    assert jobs_files.wait_for(lambda: jobs_files.read_job(folder / "2").finished, PATIENCE_S)  # nobody looks on
+    ended(folder / "2")  # nobody looks on
     assert [jobs_files.read_job(folder / name).state for name in "12"] == ["done", "done"]
     assert (tmp_path / "after.toml").is_file()
 
@@ -183,7 +182,7 @@ def test_a_cancelled_campaign_keeps_its_rows_and_resumes(studio, tmp_path):
         assert not found.finished, found
         return found.progress is not None and found.progress.total == 4096 and found.progress.done > 0
 
-    assert jobs_files.wait_for(rows, PATIENCE_S)
+    until(rows, "rows of the campaign")
     assert studio.cancel(job.number).cancelling
     job = ended(job.folder)
     assert (job.state, job.code) == ("cancelled", 130)
@@ -196,18 +195,30 @@ def test_a_cancelled_campaign_keeps_its_rows_and_resumes(studio, tmp_path):
         assert not found.finished, found
         return found.progress is not None and found.progress.done > done
 
-    assert jobs_files.wait_for(further, PATIENCE_S)
+    until(further, "further rows of the campaign")
 
 
-def test_a_command_that_does_not_listen_is_asked_harder_each_time(tmp_path):
+def test_a_command_that_does_not_listen_is_asked_harder_each_time(tmp_path, monkeypatch):
     folder = written(tmp_path / "jobs", cwd=str(tmp_path))
     deaf = (
         "import pathlib, signal, time\n"
         "for n in (signal.SIGINT, signal.SIGTERM): signal.signal(n, lambda n, _: print(n, flush=True))\n"
         f"pathlib.Path({str(folder / 'cancel')!r}).touch()\n"
-        "while True: time.sleep(0.01)\n"
+        f"time.sleep({2.0 * HANG_S})\n"
     )
-    jobs_process.run_job(folder, python(deaf), waits_s=(0.3, 0.3), look_s=0.02)
+
+    def once_heard(ask, count):
+        """Ask harder when the command has heard what came before."""
+
+        def asked(command):
+            lines_of(folder / jobs_files.STDOUT, count)
+            ask(command)
+
+        return asked
+
+    monkeypatch.setattr(jobs_process, "_terminate", once_heard(jobs_process._terminate, 1))
+    monkeypatch.setattr(jobs_process, "_kill", once_heard(jobs_process._kill, 2))
+    jobs_process.run_job(folder, python(deaf), waits_s=(0.1, 0.1), look_s=0.02)
     job = jobs_files.read_job(folder)
     assert (job.state, job.code) == ("cancelled", -signal.SIGKILL)
     asked = [int(line) for line in jobs_files.output(folder, "stdout").split()]
@@ -218,11 +229,13 @@ def test_what_a_command_has_started_is_stopped_with_it(tmp_path):
     folder = written(tmp_path / "jobs", cwd=str(tmp_path))
     code = (
         "import pathlib, subprocess, sys, time\n"
-        "inner = subprocess.Popen([sys.executable, '-c', 'import time; time.sleep(600)'])\n"
-        f"print(inner.pid, flush=True); time.sleep(0.5); pathlib.Path({str(folder / 'cancel')!r}).touch()\n"
-        "time.sleep(600)\n"
+        "endless = 'import time; print(1, flush=True); time.sleep(86400)'\n"
+        "inner = subprocess.Popen([sys.executable, '-c', endless], stdout=subprocess.PIPE)\n"
+        "inner.stdout.readline()\n"
+        f"print(inner.pid, flush=True); pathlib.Path({str(folder / 'cancel')!r}).touch()\n"
+        "time.sleep(86400)\n"
     )
-    jobs_process.run_job(folder, python(code), waits_s=(5.0, 5.0), look_s=0.02)
+    jobs_process.run_job(folder, python(code), waits_s=(5.0, HANG_S), look_s=0.02)
     job = jobs_files.read_job(folder)
     assert job.state == "cancelled"
     assert job.code in (-signal.SIGINT, -signal.SIGTERM)  # the second where the tests themselves ignore Ctrl-C
@@ -251,7 +264,7 @@ def test_the_queue_goes_on_in_order_and_nothing_starts_twice(studio, tmp_path):
     place = str(studio.folder.parent)
     look = f"import pathlib; from microrad.studio.jobs import Jobs; Jobs(pathlib.Path({place!r})).listed()"
     tabs = [subprocess.Popen([sys.executable, "-c", look]) for _ in range(4)]
-    assert [tab.wait(PATIENCE_S) for tab in tabs] == [0] * 4
+    assert [tab.wait(HANG_S) for tab in tabs] == [0] * 4
     found = [ended(studio.folder / str(number)) for number in range(1, 5)]
     assert [job.state for job in found] == ["done"] * 4  # init refuses a file that is there: each ran once
     begun = [(job.folder / "started.json").stat().st_mtime_ns for job in found]
@@ -291,10 +304,10 @@ def test_a_job_whose_process_is_killed_is_lost_ends_with_it_and_lets_the_next_on
         below[:] = [command for command in children(pid) if children(command)]
         return bool(below)
 
-    assert jobs_files.wait_for(works, PATIENCE_S)
+    until(works, "a worker of the campaign")
     below += children(below[0])
     assert kill(pid)
-    assert all(gone(each, PATIENCE_S) for each in below)
+    assert gone(*below)
     lost = studio.get(1)
     assert (lost.state, lost.code) == ("lost", None)
     assert "gone without an exit code" in lost.words
@@ -472,7 +485,7 @@ def test_a_lock_is_gone_with_its_process(tmp_path):
     path = tmp_path / "alive"
     code = (
         "import sys, time; from pathlib import Path; from microrad.studio.jobs_files import held\n"
-        "with held(Path(sys.argv[1]), 1.0): print('mine', flush=True); time.sleep(600)\n"
+        "with held(Path(sys.argv[1]), 1.0): print('mine', flush=True); time.sleep(86400)\n"
     )
     other = subprocess.Popen([sys.executable, "-c", code, str(path)], stdout=subprocess.PIPE)
     with other:

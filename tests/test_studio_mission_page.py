@@ -20,6 +20,7 @@ from nicegui.page import page as at
 
 from microrad.studio.pages import layout, mission, mission_files, runs
 from microrad.studio.pages.dial_page import DialPage
+from waiting import until
 
 LEO, GEO = "terminals.leo_aperture", "terminals.geo_aperture"
 TEXT = SHIPPED.read_text("utf-8")
@@ -94,13 +95,24 @@ def test_a_mission_that_was_never_saved_is_not_dropped_without_a_word(tmp_path):
 
 def test_a_change_of_another_thread_is_not_lost_by_saving(workshop, monkeypatch):
     workshop.set(LEO, "6 cm")
-    other = threading.Thread(target=workshop.set, args=(GEO, "16 cm"))
+    other, real = threading.Thread(target=workshop.set, args=(GEO, "16 cm")), workshop._lock
+    waits = threading.Event()
+
+    class Lock:
+        def __enter__(self):
+            if threading.current_thread() is other:
+                waits.set()
+            real.acquire()
+
+        def __exit__(self, *_):
+            real.release()
 
     def slow(path, text, write=drafts.write_whole):
         write(path, text)
         other.start()
-        other.join(0.2)  # it waits for this one
+        until(lambda: waits.is_set() or not other.is_alive(), "the other thread at the lock")
 
+    monkeypatch.setattr(workshop, "_lock", Lock())
     monkeypatch.setattr(drafts, "write_whole", slow)
     workshop.save()
     other.join()

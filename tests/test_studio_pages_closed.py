@@ -28,6 +28,7 @@ from nicegui.page import page as at
 
 from microrad.studio import pages
 from microrad.studio.pages import aside, link, mirror, runs
+from waiting import HANG_S
 
 FOLDER = Path(pages.__file__).parent
 
@@ -137,7 +138,7 @@ def left(patch, workshop, build, leave):
             handlers = build(workshop, visit)
         await visit.over(*handlers)
         for question in latest._shared.get(workshop, {}).values():
-            question.wait(60.0)
+            question.wait(HANG_S)
         await visit.over(*handlers)
         visit.end()
         return visit
@@ -254,11 +255,15 @@ def test_a_file_that_is_no_recording_is_thrown_away_although_its_page_is_closed(
 
 def test_a_handler_that_is_cancelled_ends():
     """NiceGUI's own wait takes that for an answer."""
-    released = threading.Event()
+    begun, released = threading.Event(), threading.Event()
+
+    def work():
+        begun.set()
+        released.wait(HANG_S)
 
     async def cancelled():
-        task = asyncio.create_task(aside.aside(SimpleNamespace(is_deleted=False), released.wait))
-        await asyncio.sleep(0.05)
+        task = asyncio.create_task(aside.aside(SimpleNamespace(is_deleted=False), work))
+        assert await asyncio.to_thread(begun.wait, HANG_S)
         task.cancel()
         await asyncio.wait([task])
         released.set()

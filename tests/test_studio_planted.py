@@ -14,8 +14,8 @@ from microrad.studio import jobs_files, jobs_process, mirror_form, plain_files, 
 from microrad.studio.jobs import JobError, Jobs, Order
 from microrad.studio.mirror_form import Form
 from microrad.studio.workshop import Workshop
-from small_campaign import gone
 from studio_jobs import described, written
+from waiting import HANG_S, alive, gone
 
 
 @pytest.fixture
@@ -311,9 +311,9 @@ def test_a_command_without_its_watcher_ends_with_all_that_it_has_started():
     """Where the system does not see to it by itself: the end of the pipe that the watcher holds."""
     code = (
         "import subprocess, sys, threading, time; from microrad.studio.jobs_command import end_with\n"
-        "inner = subprocess.Popen([sys.executable, '-c', 'import time; time.sleep(600)'])\n"
+        "inner = subprocess.Popen([sys.executable, '-c', 'import time; time.sleep(86400)'])\n"
         "threading.Thread(target=end_with, args=(0,), daemon=True).start()\n"
-        "print(inner.pid, flush=True); time.sleep(600)\n"
+        "print(inner.pid, flush=True); time.sleep(86400)\n"
     )
     command = subprocess.Popen(
         [sys.executable, "-c", code], stdin=subprocess.PIPE, stdout=subprocess.PIPE, start_new_session=True
@@ -321,7 +321,7 @@ def test_a_command_without_its_watcher_ends_with_all_that_it_has_started():
     with command:
         inner = int(command.stdout.readline())
         assert command.poll() is None
-        assert not gone(inner, 0.1)
+        assert alive(inner)
         command.stdin.close()
-        assert command.wait(60.0) == -9
+        assert command.wait(HANG_S) == -9
     assert gone(inner)

@@ -25,6 +25,7 @@ from microrad.studio import parse_process, reading
 from microrad.studio.names import NameRefusedError, safe_name, within
 from microrad.studio.reading import Columns, ReadingError, ReadingLimits, list_channels, view
 from microrad.studio.uploads import UploadError, UploadLimits, Uploads
+from waiting import HANG_S, gone, lines_of
 
 posix = pytest.mark.skipif(os.name != "posix", reason="POSIX keeps modes and limits")
 linux = pytest.mark.skipif(sys.platform != "linux", reason="the address space is bounded on Linux")
@@ -202,15 +203,16 @@ def test_files_on_their_way_count(tmp_path):
     uploads = Uploads(tmp_path, replace(LIMITS, files=1))
 
     async def both():
-        gate = asyncio.Event()
+        begun, gate = asyncio.Event(), asyncio.Event()
 
         async def slow():
             yield b"1"
+            begun.set()
             await gate.wait()
             yield b"2"
 
         first = asyncio.create_task(uploads.save("slow.csv", slow()))
-        await asyncio.sleep(0.05)
+        await begun.wait()
         assert uploads.listed() == ()
         with pytest.raises(UploadError, match="1 recordings are here already"):
             await uploads.save("second.csv", blocks(b"1"))
@@ -564,8 +566,8 @@ def test_an_archive_of_very_many_members_ends_at_the_computing_time(tmp_path, me
     locator = struct.pack("<4sIQI", b"PK\x06\x07", 0, at + len(directory), 1)
     last = struct.pack("<4s4H2IH", b"PK\x05\x06", 0, 0, 0xFFFF, 0xFFFF, 0xFFFFFFFF, 0xFFFFFFFF, 0)
     path.write_bytes(one[:at] + directory + tail64 + locator + last)
-    words = refused(path, cpu_s=1, wall_s=20)
-    assert "1 s of computing" in words or "not read within" in words
+    words = refused(path, cpu_s=1, wall_s=HANG_S)
+    assert "1 s of computing" in words
 
 
 def test_a_dataset_of_a_trillion_samples_is_refused_by_what_it_states(tmp_path):
@@ -637,19 +639,19 @@ def standing_in(monkeypatch, tmp_path, program):
 def test_a_reader_that_hangs_is_ended_with_what_it_started(tmp_path, monkeypatch):
     program = """
         import subprocess, sys, time
-        child = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(600)"])
-        open("PIDS", "w").write(str(child.pid))
-        time.sleep(600)
+        child = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(86400)"])
+        open("PIDS", "w").write(f"{child.pid}\\n")
+        time.sleep(86400)
     """.replace("\n        ", "\n").replace("PIDS", str(tmp_path / "pids"))
-    path = standing_in(monkeypatch, tmp_path, program)
-    assert "was not read within 6 s" in refused(path, wall_s=6.0)
-    child = int((tmp_path / "pids").read_text())
-    for _ in range(100):
-        if not Path(f"/proc/{child}").exists() or " Z " in Path(f"/proc/{child}/stat").read_text():
-            break
-        time.sleep(0.05)
-    else:
-        pytest.fail("the child lives on")
+    path, children = standing_in(monkeypatch, tmp_path, program), []
+
+    def hand_over(process, request, real=reading._hand_over):
+        real(process, request)
+        children.extend(lines_of(tmp_path / "pids"))  # its time begins when it has started the child
+
+    monkeypatch.setattr(reading, "_hand_over", hand_over)
+    assert "was not read within 0.5 s" in refused(path, wall_s=0.5)
+    assert gone(int(children[0]))
 
 
 @pytest.mark.parametrize(

@@ -1,32 +1,46 @@
 """Jobs on all cores: their order, and what is left of them after an error."""
 
 import threading
-import time
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 
 import pytest
 
+from microrad import threads
 from microrad.threads import in_threads
+from waiting import HANG_S
 
 
 def test_results_come_in_the_order_of_the_jobs():
-    heard = []
-    jobs = [lambda i=i: (time.sleep(0.01 * (3 - i)), i)[1] for i in range(4)]
-    assert in_threads(jobs, heard.append, workers=3) == [0, 1, 2, 3]
-    assert heard == [1, 2, 3, 4]
+    heard, ended, over = [], [], [threading.Event() for _ in range(3)]
+
+    def job(number):
+        assert number == 2 or over[number + 1].wait(HANG_S)
+        ended.append(number)
+        over[number].set()
+        return number
+
+    assert in_threads([partial(job, number) for number in range(3)], heard.append, workers=3) == [0, 1, 2]
+    assert (ended, heard) == ([2, 1, 0], [1, 2, 3])
 
 
-def test_jobs_that_have_not_begun_are_dropped_after_an_error():
-    begun, gate = [], threading.Event()
+def test_jobs_that_have_not_begun_are_dropped_after_an_error(monkeypatch):
+    begun, dropped = [], threading.Event()
+
+    class Pool(ThreadPoolExecutor):
+        def shutdown(self, wait=True, *, cancel_futures=False):
+            super().shutdown(wait=False, cancel_futures=cancel_futures)
+            dropped.set()
+            super().shutdown(wait)
 
     def first():
-        gate.wait(5)
         raise RuntimeError("broken")
 
     def other():
         begun.append(1)
-        time.sleep(0.05)
+        assert dropped.wait(HANG_S)
 
-    gate.set()
+    monkeypatch.setattr(threads, "ThreadPoolExecutor", Pool)
     with pytest.raises(RuntimeError, match="broken"):
         in_threads([first, *[other] * 50], workers=1)
-    assert len(begun) <= 2
+    assert len(begun) <= 1

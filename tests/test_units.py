@@ -2,7 +2,6 @@
 
 import math
 import re
-import time
 
 import pytest
 from astropy import units as au
@@ -12,6 +11,7 @@ from hypothesis import strategies as st
 
 from microrad import units
 from microrad.units import PLANCK_J_S, SPEED_OF_LIGHT_M_S, UnitError, format_quantity, parse_quantity
+from waiting import no_hang
 
 # our symbol: astropy's name for it; photon, bit and cycle are base dimensions in both
 ASTROPY = {"B": "byte", "min": "minute", "h": "hour", "deg": "degree"}
@@ -153,10 +153,8 @@ def test_what_is_read(text, unit, value):
     ],
 )
 def test_what_is_refused_and_how(text, unit, reason, advice):
-    before = time.perf_counter()
-    with pytest.raises(UnitError) as refused:
+    with no_hang(), pytest.raises(UnitError) as refused:
         parse_quantity(text, unit)
-    assert time.perf_counter() - before < 30.0  # it may not hang
     message = str(refused.value)
     assert reason in message
     assert "for example" in message

@@ -123,9 +123,10 @@ def end_when_stuck(stuck_s: float) -> None:
 
     def wind() -> None:
         while True:
-            faulthandler.dump_traceback_later(stuck_s, exit=True)
             time.sleep(stuck_s / 5.0)
+            faulthandler.dump_traceback_later(stuck_s, exit=True)
 
+    faulthandler.dump_traceback_later(stuck_s, exit=True)  # that thread may come too late
     threading.Thread(target=wind, daemon=True, name="alarm").start()
 
 

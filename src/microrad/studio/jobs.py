@@ -34,14 +34,13 @@ from microrad.studio.jobs_files import (
     output,
     read_job,
 )
-from microrad.studio.jobs_process import start_waiting
+from microrad.studio.jobs_process import QUEUE_S, start_waiting
 from microrad.studio.signing import SigningError
 
 __all__ = ["Job", "JobError", "Jobs", "Kind", "Order", "Progress", "State"]
 
 _LAST = "last"
 _LAST_FIGURES = 9  # of a last number that is believed
-_QUEUE_S = 60.0
 _NEW, _REMOVED = ".new-", ".removed-"  # folders that are a job not yet, and not any more
 _FORGOTTEN_S = 3600.0
 
@@ -106,7 +105,7 @@ class Jobs:
         try:
             write_whole(draft / JOB, description)
             write_whole(draft / CODE, code)
-            with held(self.folder / "lock", _QUEUE_S) as mine:
+            with held(self.folder / "lock", QUEUE_S) as mine:
                 if not mine:
                     raise JobError(f"the queue in {self.folder} is taken by another program; try again")
                 folder = self.folder / str(self._next_number())

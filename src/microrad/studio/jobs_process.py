@@ -31,14 +31,16 @@ from microrad.studio.jobs_files import (
     wait_for,
 )
 
-WAITS_S = (10.0, 10.0)
+WAITS_S = (30.0, 30.0)
 """How long a command that is to stop has behind SIGINT, and then behind SIGTERM, before SIGKILL ends it."""
+
+QUEUE_S = 360.0
+"""For the queue's lock, which is held while one job is started."""
 
 _OWN = "microrad.studio.jobs_process"  # spelled out: its name is another one while it runs
 _ENVIRONMENT = {"PYTHONIOENCODING": "utf-8:replace", "PYTHONUNBUFFERED": "1"}
 _LOOK_S = 0.2  # between two looks at whether the job is to stop
-_START_S = 30.0  # for a process of Python to begin, on a machine that is busy
-_QUEUE_S = 60.0  # for the queue's lock, which is held while one job is started
+_START_S = 300.0  # for a process of Python to begin, on a machine that is busy; one that ends is noticed at once
 _NICENESS = 5  # the pages stay quick while a study has every core
 _started: list[subprocess.Popen[bytes]] = []  # kept until they end: none is left a zombie
 
@@ -49,7 +51,7 @@ def start_waiting(jobs: Path, at_once: int) -> None:
     _started[:] = [each for each in _started if each.poll() is None]
     if not _waiting(jobs, at_once):
         return
-    with held(jobs / "lock", _QUEUE_S) as mine:
+    with held(jobs / "lock", QUEUE_S) as mine:
         while mine and (folder := _waiting(jobs, at_once)):
             _start(folder, at_once)
 

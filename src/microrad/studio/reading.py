@@ -39,7 +39,7 @@ class ReadingLimits:
     `samples` is that of one channel, `channels` how many are listed, `points` about how many of a channel are shown.
     """
 
-    wall_s: float = 60.0
+    wall_s: float = 300.0
     cpu_s: int = 30
     memory_bytes: int = 4_000_000_000
     answer_bytes: int = 4_000_000

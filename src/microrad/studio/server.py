@@ -32,7 +32,10 @@ PAGES = ("mission", "link", "pointing", "day", "mirror", "control", "runs", "com
 DOCUMENTS = "/results/"
 """Where finished documents are served, each in a sandbox: a job's number, then the place among its results."""
 
-_GRACE_S = 2
+_GRACE_S = 10  # for open pages to be closed, as a machine that is busy takes
+_RETURN_S = 60.0
+"""For a browser to come back to its page; it may be silent for 0.4 of that, as where it draws on a busy machine."""
+
 _SHOWN = 120
 _ANY = ("0.0.0.0", "::", "::ffff:0.0.0.0", "[::]", "*", "")
 
@@ -237,7 +240,12 @@ def application(workshop: Workshop, entrance: Entrance) -> Guard:
     inner.add_api_route(DOCUMENTS + "{number}/{place}", _documents(workshop), methods=["GET"])
     _add_pages(workshop)
     ui.run_with(
-        inner, title="microrad studio", language="en-US", show_welcome_message=False, gzip_middleware_factory=None
+        inner,
+        title="microrad studio",
+        language="en-US",
+        show_welcome_message=False,
+        gzip_middleware_factory=None,
+        reconnect_timeout=_RETURN_S,
     )
     return Guard(inner, entrance.names, address.origins(entrance.names), entrance.token, documents=(DOCUMENTS,))
 

@@ -268,7 +268,9 @@ class MirrorPage:
         for key, field in self.fields.items():
             value = getattr(setting, key)
             if key in ("drive", "output"):
-                field.set_options(options, value=value if value in options else None)
+                there = value if value in options else None
+                if (field.options, field.value) != (options, there):  # one that is just being chosen from stays open
+                    field.set_options(options, value=there)
             elif key == "accept":
                 field.value = list(value)
             elif field.value != value:
