@@ -4,7 +4,6 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import combinations
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,8 +15,8 @@ Floats = NDArray[np.float64]
 STEP = 1e-3
 """Step of the rough search's differences, over a parameter's range."""
 
-ROUGH_GAIN, ROUGH_ITERATIONS = 1e-6, 30
-"""Gain of cost and number of iterations at which the rough search ends."""
+ROUGH, EXACT = (1e-6, 30), (1e-20, 200)
+"""Gain of cost and number of iterations at which a program ends, of the candidates themselves and of their model."""
 
 NODE = 3e-3
 """Distance of the five points of an exact derivative: it errs by some 1e-10 of rounding and 3e-12 of the fifth one."""
@@ -47,7 +46,7 @@ class _Local:
     def __init__(self, search: Search) -> None:
         self._search = search
         self._known: dict[bytes, Trial] = {}
-        self._slopes: dict[bytes, tuple[Floats, Floats]] = {}
+        self._slopes: dict[bytes, Floats] = {}
 
     def at(self, place: Floats) -> Trial:
         key = place.tobytes()
@@ -55,16 +54,16 @@ class _Local:
             self._known[key] = self._search.at(place)
         return self._known[key]
 
-    def slopes(self, place: Floats) -> tuple[Floats, Floats]:
-        """Gradient of the cost, and of each constraint (rows), by a step to either side or two into the bounds."""
+    def slopes(self, place: Floats) -> Floats:
+        """Gradients of cost and constraints (rows), by a step to either side or as far as the bounds are."""
         key = place.tobytes()
         if key not in self._slopes:
-            rows, inside = [], np.clip(place, 0.0, 1.0)  # a line search may look beyond
+            columns, inside = [], np.clip(place, 0.0, 1.0)  # a line search may look beyond
             for i in range(place.size):
                 ends = np.clip(inside[i] + np.array([-STEP, STEP]), 0.0, 1.0)
                 below, above = (_numbers(self.at(_with(inside, i, end))) for end in ends)
-                rows.append((above - below) / (ends[1] - ends[0]))
-            self._slopes[key] = np.array(rows)[:, 0], np.array(rows)[:, 1:].T
+                columns.append((above - below) / (ends[1] - ends[0]))
+            self._slopes[key] = np.array(columns).T
         return self._slopes[key]
 
 
@@ -75,6 +74,7 @@ def _with(place: Floats, i: int, x: float) -> Floats:
 
 
 def _numbers(trial: Trial) -> Floats:
+    """Cost and excesses of a trial in one row."""
     return np.append(trial.cost, trial.excess)
 
 
@@ -83,50 +83,35 @@ def descend(search: Search, start: Trial) -> Trial:
     if not start.place.size:
         return start
     local = _Local(search)
-    found = _programmed(
-        lambda x: local.at(x).cost,
-        lambda x: local.slopes(x)[0],
-        lambda x: local.at(x).excess,
-        lambda x: local.slopes(x)[1],
-        start.place,
-        (0.0, 1.0),
-        ROUGH_GAIN,
-        ROUGH_ITERATIONS,
-    )
-    return local.at(found)
-
-
-Function = Callable[[Floats], Any]
+    return local.at(_programmed(lambda x: _numbers(local.at(x)), local.slopes, start.place, (0.0, 1.0), ROUGH))
 
 
 def _programmed(
-    cost: Function,
-    gradient: Function,
-    excess: Function,
-    slopes: Function,
+    numbers: Callable[[Floats], Floats],
+    slopes: Callable[[Floats], Floats],
     start: Floats,
     bounds: tuple[Floats | float, Floats | float],
-    least_gain: float,
-    iterations: int,
+    ending: tuple[float, int],
 ) -> Floats:
-    """Where the cost is least within bounds while no excess is below 0: SLSQP (Kraft, DFVLR-FB 88-28, 1988)."""
+    """Where the first of the numbers is least within bounds while none of the others is below 0.
+
+    By SLSQP: Kraft, DFVLR-FB 88-28, 1988. ``ending`` is `ROUGH` or `EXACT`.
+    """
     from scipy.optimize import minimize  # slow to import, not needed to show help
 
-    low, high = bounds
-    eye = np.eye(start.size)
+    (low, high), (gain, iterations), eye = bounds, ending, np.eye(start.size)
+    inside = {
+        "type": "ineq",
+        "fun": lambda x: np.concatenate([numbers(x)[1:], x - low, high - x]),
+        "jac": lambda x: np.vstack([slopes(x)[1:], eye, -eye]),
+    }
     found = minimize(
-        cost,
+        lambda x: numbers(x)[0],
         start,
-        jac=lambda x: np.array(gradient(x)),  # SLSQP writes into it
+        jac=lambda x: slopes(x)[0].copy(),  # SLSQP writes into it
         method="SLSQP",
-        constraints=[
-            {
-                "type": "ineq",
-                "fun": lambda x: np.concatenate([excess(x), x - low, high - x]),
-                "jac": lambda x: np.vstack([slopes(x), eye, -eye]),
-            }
-        ],
-        options={"maxiter": iterations, "ftol": least_gain},
+        constraints=[inside],
+        options={"maxiter": iterations, "ftol": gain},
     )
     return np.asarray(np.clip(found.x, low, high))
 
@@ -178,46 +163,34 @@ def _optimum(model: _Quadratic, place: Floats, reach: float) -> Floats:
     if np.any(model.value[1:] < 0.0) and reach < REACH:  # a constraint that is not met yet may need more than the reach
         reach = REACH
     bounds = np.maximum(-place, -reach), np.minimum(1.0 - place, reach)
-    return _programmed(
-        lambda x: model.at(x)[0] - model.value[0],
-        lambda x: model.gradient(x)[0],
-        lambda x: model.at(x)[1:],
-        lambda x: model.gradient(x)[1:],
-        np.zeros(place.size),
-        bounds,
-        1e-20,
-        200,
-    )
+    own = np.eye(model.value.size)[0] * model.value[0]  # the cost itself is large beside what a step gains
+    return _programmed(lambda x: model.at(x) - own, model.gradient, np.zeros(place.size), bounds, EXACT)
 
 
 def _model(search: Search, here: Trial) -> _Quadratic | None:
-    """Value, slope and bend by differences of the fourth order; None where a point beside ``here`` cannot be judged."""
+    """Value, slope and bend by differences of the fourth order; None where a candidate beside ``here`` is unstable."""
     place, d = here.place, here.place.size
     offsets = [_offsets(float(x)) for x in place]
-    near = np.concatenate([[True], here.excess < NEAR])
-    slope, bend = np.zeros((int(near.sum()), d)), np.zeros((int(near.sum()), d, d))
+    near = np.append(True, here.excess < NEAR)
+    value = _numbers(here)[near]
+    slope, bend = np.zeros((value.size, d)), np.zeros((value.size, d, d))
 
-    def numbers(*moves: tuple[int, float]) -> Floats | None:
+    def numbers(*moves: tuple[int, float]) -> Floats:
         there = place.copy()
         for i, offset in moves:
             there[i] += NODE * offset
         trial = search.at(there)
-        return _numbers(trial)[near] if math.isfinite(trial.verdict.pole) and trial.verdict.pole < 1.0 else None
+        return _numbers(trial)[near] if trial.verdict.pole < 1.0 else np.full(value.size, np.nan)
 
     for i in range(d):
-        first, second = (_weights(offsets[i], order) / NODE**order for order in (1, 2))
-        points = [_numbers(here)[near] if o == 0.0 else numbers((i, o)) for o in offsets[i]]
-        if any(p is None for p in points):
-            return None
-        slope[:, i], bend[:, i, i] = first @ np.array(points), second @ np.array(points)
+        points = np.array([value if offset == 0.0 else numbers((i, offset)) for offset in offsets[i]])
+        slope[:, i], bend[:, i, i] = (_weights(offsets[i], order) @ points / NODE**order for order in (1, 2))
     for i, j in combinations(range(d), 2):
-        ends = [(a, b) for a in offsets[i][[1, 3]] for b in offsets[j][[1, 3]]]
-        points = [numbers((i, a), (j, b)) for a, b in ends]
-        if any(p is None for p in points):
-            return None
-        area = NODE**2 * (offsets[i][3] - offsets[i][1]) * (offsets[j][3] - offsets[j][1])
-        bend[:, i, j] = bend[:, j, i] = np.array([1.0, -1.0, -1.0, 1.0]) @ np.array(points) / area
-    return _Quadratic(_numbers(here)[near], slope, bend)
+        (low, high), (left, right) = offsets[i][[1, 3]], offsets[j][[1, 3]]
+        rising = numbers((i, low), (j, left)) + numbers((i, high), (j, right))
+        falling = numbers((i, low), (j, right)) + numbers((i, high), (j, left))
+        bend[:, i, j] = bend[:, j, i] = (rising - falling) / (NODE**2 * (high - low) * (right - left))
+    return _Quadratic(value, slope, bend) if np.all(np.isfinite(bend)) else None
 
 
 def _offsets(x: float) -> Floats:
