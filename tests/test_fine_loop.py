@@ -25,7 +25,7 @@ from microrad.fine_loop.design import (
     residual_spectrum,
 )
 from microrad.fine_loop.ensemble import Span
-from microrad.fine_loop.loop import EXACT_BITS, LoopController, PointingLoop
+from microrad.fine_loop.loop import LoopController, PointingLoop
 from microrad.geometry import Geometry, line_of_sight_matrix
 from microrad.hysteresis import BoucWen, Play
 from microrad.missionfile import load_mission
@@ -971,7 +971,7 @@ def test_a_trace_adds_up():
     assert_allclose(traced.time_s, np.arange(5000) * 2e-4, rtol=1e-12)
     assert_allclose(traced.reference_rad, np.tile([7 * URAD, 0.0], (5000, 1)), rtol=1e-12)
     line_of_sight = traced.mirror_rad @ loop.optics.T
-    least = 2.0 ** (1 - EXACT_BITS) * np.max(np.abs(traced.error_rad))  # to that the kernel's optics are rounded
+    least = 2.0 ** (1 - lti.EXACT_BITS) * np.max(np.abs(traced.error_rad))  # to that the kernel's optics are rounded
     assert_allclose(traced.error_rad, traced.reference_rad + traced.disturbance_rad - line_of_sight, rtol=0, atol=least)
     noise = (traced.measured_rad[1:] - traced.error_rad[:-1]) / URAD
     assert_allclose(np.std(noise, axis=0), 1.0, rtol=0.04)  # 5000 numbers: 4 standard deviations

@@ -24,9 +24,6 @@ Complexes = NDArray[np.complex128]
 LIGHT_DAMPING = 0.3
 """Damping ratio below which a pole pair counts as a resonance."""
 
-DRIFT_BITS = 24
-"""Significant bits of how far a drift's pole or zero lies from 1: the last five of its digits are rounding."""
-
 SLOW_SHARE = 0.2
 """Share of the plant's corner below which its real poles and zeros are drift, which an inverse undoes."""
 
@@ -113,7 +110,7 @@ def drift(model: lti.StateSpace, below: float) -> list[tuple[float, float]]:
     found = []
     for roots in (np.linalg.eigvals(model.A).astype(complex), lti.zeros(model)):
         real = roots[(np.abs(roots.imag) < 1e-9) & (roots.real > math.exp(-2.0 * math.pi * below)) & (roots.real < 1.0)]
-        found.append(1.0 - lti.to_bits(1.0 - np.sort(real.real)[::-1], DRIFT_BITS))
+        found.append(lti.decay_to_bits(np.sort(real.real)[::-1], lti.DESIGN_BITS))
     return [(float(pole), float(zero)) for pole, zero in zip(*found, strict=False)]
 
 
@@ -368,7 +365,7 @@ def observer_filter(plant: DesignPlant, bandwidth_hz: float, lead_hz: float, dam
     """
     model = optical_model(plant)
     low_pass = filters.low_pass(bandwidth_hz, damping, plant.period_s, lead_hz)
-    slow = _slow(model)
+    slow = float(lti.to_bits(np.array(_slow(model)), lti.EXACT_BITS))
     for pole, zero in _drift(plant):
         gain = (1.0 - zero) / (1.0 - pole)
         undone = lti.StateSpace(

@@ -54,15 +54,17 @@ class Weights:
     walk: float = 1.0
 
 
-def lqg_controller(plant: DesignPlant, weights: Weights) -> AxisController:
+def lqg_controller(plant: DesignPlant, weights: Weights, *, coarse: bool = False) -> AxisController:
     """Optimal controller of the plant for these weights; it uses the measurement of its own sample.
 
     With x the prediction, K the predictor's gain and G the regulator's, v[k] - v[k-1] = -G (A x + K (m - C x), v[k-1]).
-    The observer and v[k-1] are driven by the clipped command: anti-windup is their input column. Raises ValueError
+    The observer and v[k-1] are driven by the clipped command: anti-windup is their input column. ``coarse`` rounds the
+    observer's gain and the matrices to what processors agree in (`OBSERVER_BITS`, `lti.EXACT_BITS`). Raises ValueError
     without an optical sensor, and where a Riccati equation has no solution.
     """
     model = observed(in_own_units(plant), weights)
-    K = lti.to_bits(filter_gain(model.A, model.noise, model.seen, model.seen_noise), OBSERVER_BITS)
+    K = filter_gain(model.A, model.noise, model.seen, model.seen_noise)
+    K = lti.to_bits(K, OBSERVER_BITS) if coarse else K
     G = regulator_gain(model, weights.command * plant.gain_rad_v**2)
     n, sensors = model.A.shape[0], model.sensors
     driven = np.vstack([model.command, [[1.0]]])  # observer and last command follow the command that is given
@@ -73,7 +75,8 @@ def lqg_controller(plant: DesignPlant, weights: Weights) -> AxisController:
     last = np.eye(1, n + 1, n)
     C = last - G @ (free + driven @ last)
     D = -G @ correction
-    return AxisController("LQG", lti.StateSpace(free + driven @ C, correction + driven @ D, C, D), driven)
+    system = lti.StateSpace(free + driven @ C, correction + driven @ D, C, D)
+    return AxisController("LQG", lti.system_to_bits(system, lti.EXACT_BITS) if coarse else system, driven)
 
 
 @dataclass(frozen=True, slots=True)
@@ -262,5 +265,9 @@ def _build(plant: DesignPlant, values: Floats) -> AxisController:
     return lqg_controller(plant, Weights(*(float(v) for v in values)))
 
 
-LQG = Family("LQG", _parameters, _build)
+def _coarse(plant: DesignPlant, values: Floats) -> AxisController:
+    return lqg_controller(plant, Weights(*(float(v) for v in values)), coarse=True)
+
+
+LQG = Family("LQG", _parameters, _build, final=_coarse)
 """Linear-quadratic-Gaussian control, tuned by the weights of `Weights`."""

@@ -104,7 +104,8 @@ class Family:
 
     ``parameters`` and ``build`` may raise ValueError with the reason when the plant has no such controller (no gauge to
     damp with, no wheel line to filter). A family that contains another names it as ``base``; ``extended`` turns the
-    values of that one into its own, for the same controller or the nearest that it has.
+    values of that one into its own, for the same controller or the nearest that it has. ``final`` builds what is used
+    in the end, where that has coarser numbers than what a search wants smooth.
     """
 
     name: str
@@ -112,3 +113,4 @@ class Family:
     build: Callable[[DesignPlant, Floats], AxisController]
     base: "Family | None" = None
     extended: Callable[[DesignPlant, Floats], Floats] | None = None
+    final: Callable[[DesignPlant, Floats], AxisController] | None = None

@@ -202,7 +202,8 @@ def _chosen(search: Search) -> Tuned:
 
 
 def _tuned(search: Search, trial: Trial) -> Tuned:
-    controller, margins = search.family.build(search.plants[0], trial.values), _margins(search, trial)
+    controller = (search.family.final or search.family.build)(search.plants[0], trial.values)
+    margins = [loop_margins(p, controller) for p in search.plants]
     variances = [float(np.sum(h2(close(p, controller))[RESIDUAL])) for p in search.plants]
     evaluations = search.count
     modulus, bandwidth = min(m.modulus for m in margins), min(m.bandwidth_hz for m in margins)

@@ -9,7 +9,7 @@ from microrad import lti
 from microrad.control import AxisController, DesignPlant
 from microrad.disturbance import Disturbance
 from microrad.fine_loop.linear import ClosedLoop, close, gauge_noise_rad, open_loop
-from microrad.fine_loop.loop import EXACT_BITS, PointingLoop, assemble, decoupling, nominal_axis_gain
+from microrad.fine_loop.loop import PointingLoop, assemble, decoupling, nominal_axis_gain
 
 Floats = NDArray[np.float64]
 
@@ -81,8 +81,9 @@ def design_plant(loop: PointingLoop) -> DesignPlant:
     has_gauge = loop.gauge is not None
     if not has_gauge:
         rows[2] = 0.0
-    system = lti.system_to_bits(lti.StateSpace(A, B, rows, D), EXACT_BITS)
-    np.fill_diagonal(system.A, lti.decay_to_bits(np.diag(A), EXACT_BITS))
+    B[:, 1:] = lti.to_bits(B[:, 1:], lti.EXACT_BITS)
+    B[:, 1:] = lti.to_bits(B[:, 1:], lti.EXACT_BITS)
+    system = lti.system_to_bits(lti.StateSpace(A, B, rows, D), lti.DESIGN_BITS)
     return DesignPlant(loop.timing.period_s, system, noises.shape[1], nominal_axis_gain(loop), True, has_gauge)
 
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from microrad import disturbance, kernels, lti, mirror
 from microrad.control import amplifier_factor, inverse_arrays, no_feedforward
-from microrad.fine_loop.loop import EXACT_BITS, LoopController, PointingLoop
+from microrad.fine_loop.loop import LoopController, PointingLoop
 from microrad.sensor import StrainGauge
 from microrad.threads import in_threads
 
@@ -128,7 +128,7 @@ def arrays(loop: PointingLoop, controller: LoopController, seed: int) -> kernels
     check_controller(loop, controller)
     drive, timing = loop.drive, loop.timing
     plant = mirror.discretise(loop.mirror, timing.step_s)
-    shaping, exact = combined_shaping(loop), partial(lti.to_bits, bits=EXACT_BITS)
+    shaping, exact = combined_shaping(loop), partial(lti.to_bits, bits=lti.EXACT_BITS)
     inverse = controller.inverse or no_feedforward(loop.mirror)
     row = [drive.minimum_v, drive.maximum_v, drive.drive_resolution_v, amplifier_factor(drive, timing.step_s)]
     row += [drive.slew_v_s * timing.step_s, *loop.drive_range_v]
@@ -137,7 +137,7 @@ def arrays(loop: PointingLoop, controller: LoopController, seed: int) -> kernels
     return kernels.Ensemble(
         step_s=timing.step_s,
         feedback=plant.feedback,
-        diagonal=lti.decay_to_bits(plant.diagonal, EXACT_BITS),
+        diagonal=lti.decay_to_bits(plant.diagonal, lti.EXACT_BITS),
         coupling=exact(plant.coupling),
         rest=plant.rest._replace(value=exact(plant.rest.value)),
         B0=exact(plant.B0),
@@ -264,8 +264,8 @@ def combined_shaping(loop: PointingLoop) -> Shaping:
         turning = 2 * model.line_amplitude_rad.size  # lines are turned by a sine and a cosine that no processor rounds
         kept = np.arange(n) < turning
         own, beside = np.diag(model.Ad), pairs[np.arange(n), partner]
-        diagonal[at : at + n] = np.where(kept, own, lti.decay_to_bits(own, EXACT_BITS))
-        coupling[at : at + n] = np.where(kept, beside, lti.to_bits(beside, EXACT_BITS))
+        diagonal[at : at + n] = np.where(kept, own, lti.decay_to_bits(own, lti.EXACT_BITS))
+        coupling[at : at + n] = np.where(kept, beside, lti.to_bits(beside, lti.EXACT_BITS))
         noise[at : at + n, source : source + w] = model.Bd
         output[axis, at : at + n] = model.C[0]
         purposes[source : source + w] = purpose + np.arange(w)
@@ -314,7 +314,7 @@ def start(loop: PointingLoop, p: kernels.Ensemble, first_run: int) -> kernels.En
         counts=rows(kernels.COUNT_FIELDS),
         histogram=np.zeros((LANES, kernels.BINS), dtype=np.int32),
     )
-    shaped = lti.to_bits(p.shaping_output @ state.shaping.reshape(-1, LANES)[: p.shaping_diagonal.size], EXACT_BITS)
+    shaped = lti.to_bits(p.shaping_output @ state.shaping.reshape(-1, LANES)[: p.shaping_diagonal.size], lti.EXACT_BITS)
     now = np.array([r.at(np.zeros(1))[0] for r in loop.references])
     state.disturbance[:] = shaped.ravel()
     state.error[:] = (shaped + now[:, None]).ravel()
@@ -331,7 +331,7 @@ def start_disturbance(loop: PointingLoop, p: kernels.Ensemble, runs: NDArray[np.
         kernels.gaussian_kernel(p.seed, runs, np.uint64(kernels.START_PURPOSE + purpose), 0, numbers)
         drawn = numbers.reshape(-1, LANES)
         begin = disturbance.initial_state(model, drawn[:n], uniform(drawn[n : 2 * n]))
-        states[at : at + n] = lti.to_bits(begin, EXACT_BITS)
+        states[at : at + n] = lti.to_bits(begin, lti.EXACT_BITS)
     return np.ascontiguousarray(states).ravel()
 
 

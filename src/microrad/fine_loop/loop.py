@@ -15,10 +15,6 @@ from microrad.sensor import OpticalSensor, StrainGauge
 
 Floats = NDArray[np.float64]
 
-EXACT_BITS = 32
-"""Significant bits (2e-10) of what a simulated loop is made of. Where its converters and reversals decide, a difference
-in the last bit of a matrix grows to one in a hundred thousand; so far before the last bit, processors agree."""
-
 
 @dataclass(frozen=True, slots=True)
 class PointingLoop:
@@ -110,12 +106,6 @@ def assemble(name: str, loop: PointingLoop, axis: AxisController) -> LoopControl
     A, C = np.asarray(np.kron(eye, s.A), dtype=float), to_drives @ np.kron(eye, s.C)
     system = lti.StateSpace(A, B, C, to_drives @ D)
     return LoopController(name, system, np.kron(eye, axis.anti_windup) @ np.linalg.pinv(to_drives))
-
-
-def exact(controller: LoopController) -> LoopController:
-    """The controller with matrices of `EXACT_BITS`."""
-    system = lti.system_to_bits(controller.system, EXACT_BITS)
-    return replace(controller, system=system, anti_windup=lti.to_bits(controller.anti_windup, EXACT_BITS))
 
 
 def with_inverse(

@@ -9,7 +9,7 @@ import numpy as np
 from microrad import control, mirror, mirror_spread
 from microrad.control import DesignPlant, Family, Specification, Tuned
 from microrad.fine_loop.design import behind_filter, design_plant
-from microrad.fine_loop.loop import LoopController, PointingLoop, ReferenceFilter, assemble, exact, with_inverse
+from microrad.fine_loop.loop import LoopController, PointingLoop, ReferenceFilter, assemble, with_inverse
 from microrad.fine_pointing.scenario import Scene, one_mirror, table
 from microrad.mission import Mission
 
@@ -111,9 +111,9 @@ def tune(name: str, m: Mission, of: Sequence[DesignPlant], known: Tuned | None =
 def build(name: str, scene: Scene, m: Mission, axis: control.AxisController) -> LoopController:
     """A tuned axis controller on all axes of the scene, with its inverse where its name says so."""
     if name not in _INVERSE_USED:
-        return exact(assemble(name, scene.loop, axis))
+        return assemble(name, scene.loop, axis)
     path, inverse = ReferenceFilter(table(m).reference_filter_hz), control.inverse(scene.loop.mirror)
-    return exact(with_inverse(name, scene.loop, axis, inverse, path, name == IN_SERIES))
+    return with_inverse(name, scene.loop, axis, inverse, path, name == IN_SERIES)
 
 
 def grid_baseline(of: Sequence[DesignPlant], wanted: Specification) -> Tuned:
