@@ -53,7 +53,7 @@ def _processor() -> str:
 def _instruction_sets() -> str:
     """Those that numpy uses, beyond any that were disabled."""
     found = np.show_config(mode="dicts")["SIMD Extensions"]
-    return " ".join([*found["baseline"], *found["found"]])
+    return " ".join([*found["baseline"], *found.get("found", [])])  # a plain processor has no more than the baseline
 
 
 def _scipy_blas() -> str:
