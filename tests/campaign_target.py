@@ -92,6 +92,9 @@ class Work:
     def hang_once(self, job, beat, mark):
         self.once(mark, lambda: self.hang(job, beat))
 
+    def endless_once(self, job, beat, mark):
+        self.once(mark, lambda: self.endless(job, beat))
+
     def killed_once(self, job, beat, mark):
         self.once(mark, lambda: os.kill(os.getpid(), signal.SIGKILL))
 
