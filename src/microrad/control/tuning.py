@@ -28,14 +28,15 @@ OVERSTATED = 4
 SURVEY = 100
 """Places of the Latin hypercube that a search begins with."""
 
-STARTS = 6
-"""Places that a local search sets out from: a family may have several optima."""
+STARTS, AGREE = 6, 3
+"""Places that a local search sets out from, as a family may have several optima; no more once so many of them have led
+to the best of them."""
 
 FINALISTS = 3
 """Optima that are followed to their last digit."""
 
-CLOSE = 1e-3
-"""Excess of cost over the best from which an optimum is not followed."""
+CLOSE = 1e-4
+"""Excess of cost over the best from which an optimum is not followed: a rough search ends within some 1e-5 of one."""
 
 SAME_COST = 6
 """Decimals of the cost to which two optima are as good as each other: then the smaller values are taken."""
@@ -101,6 +102,8 @@ def tune(
     for start in [*contained, *apart(sorted(surveyed, key=_score), STARTS - len(contained), 0.1)]:
         rough.append(descend(search, start))
         on_progress(survey + len(rough), total, what)
+        if sum(t.score < min(map(_score, rough)) + 0.1 * CLOSE for t in rough) >= AGREE:
+            break
     finalists = apart(sorted(rough, key=_score), FINALISTS, 0.02)
     found = _tuned(search, _settled(search, [t for t in finalists if t.score < finalists[0].score + CLOSE]))
     inner = [_tuned(search, t) for t in contained if _holds(search, t)]
