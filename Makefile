@@ -3,8 +3,9 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 DEMO := demo
+ENDURANCE := tests/test_campaign_run.py tests/test_report_browser.py tests/test_kept_study.py
 
-.PHONY: demo test unit lint types compiled contract numbers benchmark clean
+.PHONY: demo test unit lint types compiled contract numbers endurance benchmark clean
 .DELETE_ON_ERROR:
 
 demo: $(VENV)/.run
@@ -34,7 +35,11 @@ numbers: $(VENV)/.test
 	$(BIN)/python scripts/numbers check
 
 unit: $(VENV)/.test
-	$(BIN)/python -m pytest --numprocesses 2 --dist loadfile
+	$(BIN)/python -m pytest --numprocesses 2 --dist loadfile --durations 10
+
+# What `make test` does once, many times: kills, browser pages at all widths, every key of the mission. For a release.
+endurance: $(VENV)/.test
+	MICRORAD_ENDURANCE=1 $(BIN)/python -m pytest --numprocesses 2 --dist loadfile $(ENDURANCE)
 
 benchmark: $(VENV)/.test
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[benchmark]'
@@ -42,7 +47,7 @@ benchmark: $(VENV)/.test
 	$(BIN)/python benchmarks/ensemble.py
 	$(BIN)/python benchmarks/controllers.py
 	$(BIN)/python benchmarks/flight_step.py
-	$(BIN)/python benchmarks/start.py
+	$(BIN)/python benchmarks/answer.py
 	$(BIN)/python benchmarks/link_conventions.py
 	$(BIN)/python benchmarks/contacts.py
 	$(BIN)/python benchmarks/campaign.py

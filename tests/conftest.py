@@ -9,6 +9,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the command line does, 
 import pytest
 from hypothesis import settings
 
+import shared
 import waiting
 from command_line import Result, listing
 from microrad import cli
@@ -29,7 +30,8 @@ if os.environ.get("HYPOTHESIS_PROFILE", "gate") == "gate":
         providers._get_local_constants = nothing
 
 
-def pytest_configure():
+def pytest_configure(config):
+    shared.begin(config)
     waiting.told = os.dup(2)  # before what tests write is taken in
 
 
@@ -38,6 +40,7 @@ def own_state(tmp_path_factory):
     """What microrad keeps for its user outside of working folders goes to a folder of the tests."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("XDG_STATE_HOME", str(tmp_path_factory.mktemp("state")))
+        patch.setenv("MICRORAD_KEEP", "no")  # every number that a test sees is computed in it
         yield
 
 

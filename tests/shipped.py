@@ -5,8 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from microrad import study
+from microrad import report, study
 from microrad.missionfile import load_mission
+from shared import once
 
 SHIPPED = Path(__file__).parent.parent / "missions" / "leo-geo.toml"
 
@@ -23,25 +24,34 @@ def without_day(text):
 
 
 @cache
+def whole_study():
+    """The whole study of the shipped mission, and what it said of its progress; once for all tests."""
+    said = []
+    return once("whole study", lambda: (study.run(load_mission(SHIPPED), lambda *message: said.append(message)), said))
+
+
+@cache
 def plain_study():
-    """The study of the shipped mission but for its fine-pointing loop, once for all tests of a process."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(study.fine_pointing, "run", lambda *args: None)
-        return study.run(load_mission(SHIPPED))
+    """The study of the shipped mission but for its fine-pointing loop; once for all tests."""
+
+    def run():
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(study.fine_pointing, "run", lambda *args, **more: None)
+            return study.run(load_mission(SHIPPED))
+
+    return once("plain study", run)
+
+
+@cache
+def whole_drawn():
+    """The figures of the whole study as its page holds them; once for all tests."""
+    return once("whole drawn", lambda: report.draw(whole_study()[0]))
 
 
 @cache
 def plain_drawn():
-    """The figures of that study as its page holds them."""
-    from microrad.report import day_plots, figures, link_figures, page, paper_bench  # not for those who draw nothing
-
-    found = plain_study()
-    return page.Drawn(
-        figures.draw(found),
-        paper_bench.draw(found),
-        links=link_figures.draw(found.links),
-        day=day_plots.draw(found.day, found.contact),
-    )
+    """The figures of that study as its page holds them; once for all tests."""
+    return once("plain drawn", lambda: report.draw(plain_study()))
 
 
 def edited_file(folder, *changes, whole=False, day=True):

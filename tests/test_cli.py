@@ -19,9 +19,11 @@ import typer
 
 import microrad
 from command_line import listing
-from microrad import cli, doctor, identify, report, study
+from microrad import cli, control, doctor, identify, report, study
 from microrad.cli import frame, lab
-from shipped import without_fine_pointing
+from microrad.fine_pointing import designs
+from microrad.report import day_plots, figures, link_figures, paper_bench
+from shipped import plain_study, without_fine_pointing
 from waiting import HANG_S, lines_of, until
 
 ROOT = Path(__file__).parents[1]
@@ -197,7 +199,7 @@ def test_init_then_run(call, folder):
     assert sorted(p.name for p in folder.iterdir()) == ["leo-geo-study", "leo-geo.toml"]
 
 
-def test_identify_then_run_on_the_mirror_it_wrote(call, refused, folder, loop_mirror, plain):
+def test_identify_then_run_on_the_mirror_it_wrote(call, refused, folder, loop_mirror, plain, monkeypatch):
     args = ("run", plain, "--mirror", loop_mirror, "--json")
     result = call(*args)
     assert (result.code, result.err) == (0, "")
@@ -212,6 +214,8 @@ def test_identify_then_run_on_the_mirror_it_wrote(call, refused, folder, loop_mi
         assert r["limited_by"] == "dynamics of the mirror, which its model does not have"
 
     assert "replace them with --overwrite" in refused(*args)
+    for module in (day_plots, figures, link_figures, paper_bench):  # drawn above
+        monkeypatch.setattr(module, "draw", lambda *args: ())
     (folder / "leo-geo-study" / "report.html").write_text("old")
     assert call(*args, "--overwrite").code == 0
     assert (folder / "leo-geo-study" / "report.html").stat().st_size > 1000
@@ -225,6 +229,13 @@ def test_a_link_that_does_not_close_is_exit_1_and_has_its_report(call, folder, l
     assert (folder / "results" / "first" / "report.html").is_file()
 
 
+@pytest.fixture
+def few_controllers(monkeypatch):
+    """Designs of two families, and of each that goes without saying."""
+    monkeypatch.setattr(designs, "families", lambda m: (control.PI, control.LQG))
+
+
+@pytest.mark.usefixtures("few_controllers")
 def test_design_prints_each_controller_with_its_margins(call, folder):
     call("init")
     result = call("design", "leo-geo.toml")
@@ -238,7 +249,9 @@ def test_design_prints_each_controller_with_its_margins(call, folder):
     assert len(data["controllers"][0]["matrices"]["A"]) == 2  # an integrator an axis
 
 
-def test_design_says_when_nothing_is_known_of_the_mirrors_dynamics(call, folder, loop_mirror):
+def test_design_says_when_nothing_is_known_of_the_mirrors_dynamics(call, folder, loop_mirror, monkeypatch):
+    monkeypatch.setattr(designs, "names", lambda m: (designs.BASELINE,))
+    monkeypatch.setattr(designs, "DRAWS", 1)
     call("init")
     result = call("design", "leo-geo.toml", "--mirror", loop_mirror)
     assert result.code == 0
@@ -290,12 +303,33 @@ def test_run_refuses_an_unstable_loop_and_a_mirror_without_inverse(refused, fold
     assert "has no inverse" in refused("run", plain, "--mirror", stuck)
 
 
-def test_a_full_disk_during_run_leaves_nothing(refused, monkeypatch, loop_mirror, plain):
+def test_a_full_disk_during_run_leaves_nothing_but_the_verdict(call, folder, monkeypatch, loop_mirror, plain):
     def full(*args, **kwargs):
         raise OSError(errno.ENOSPC, "No space left on device")
 
+    before = listing(folder)
     monkeypatch.setattr(report, "write_columns", full)
-    assert "No space left on device; nothing was written" in refused("run", plain, "--mirror", loop_mirror)
+    result = call("run", plain, "--mirror", loop_mirror)
+    assert (result.code, result.err.count("\n")) == (2, 1)
+    assert "No space left on device; nothing was written" in result.err
+    assert result.out.startswith("The link closes")
+    assert listing(folder) == before
+
+
+def test_a_cache_folder_that_cannot_be_used_is_told_once_and_the_run_goes_on(call, folder, monkeypatch):
+    (folder / "cache").write_text("no folder", encoding="utf-8")
+    found = plain_study()
+    monkeypatch.delenv("MICRORAD_KEEP")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(folder / "cache"))
+    monkeypatch.setattr(study, "run", lambda *args: found)
+    for module in (day_plots, figures, link_figures, paper_bench):
+        monkeypatch.setattr(module, "draw", lambda *args: ())
+    result = call("run", PAPER)
+    assert result.code == 0
+    assert result.err.count("\n") == 1
+    assert str(folder / "cache") in result.err
+    assert "nothing is kept for a quicker next run" in result.err
+    assert (folder / "leo-geo-study" / "report.html").is_file()
 
 
 def test_an_unexpected_exception_asks_for_a_report(call, folder, monkeypatch):
@@ -346,7 +380,7 @@ def test_an_interrupt_during_run_leaves_nothing(folder, loop_mirror, plain, name
     lines_of(progress, 2 if module == "study" else 0)  # the study is in its second step
     process.send_signal(getattr(signal, name))
     out, err = process.communicate(timeout=HANG_S)
-    assert (process.returncode, out) == (130, "")
+    assert (process.returncode, out.startswith("The link closes")) == (130, module == "report"), out
     assert err.replace("here\n", "") == "microrad: interrupted, nothing was written\n"
     assert listing(folder) == {}
 

@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 import typer
 
-from microrad import cli, document
-from microrad.report import compared, interactive_style, machine, page, results, tolerances
+from microrad import cli, document, machine
+from microrad.report import compared, interactive_style, page, results, tolerances
 from microrad.studio import address, guard, jobs_process, reading, server, uploads, workshop
 
 ROOT = Path(__file__).parent.parent

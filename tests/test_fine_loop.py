@@ -1058,7 +1058,8 @@ def test_quantiles_from_the_histogram_are_those_of_the_trace_within_1_percent():
     for share in (0.01, 0.1, 0.5, 0.9, 0.99, 0.997):
         assert_allclose(found.quantile_rad(share), np.quantile(radial, share), rtol=0.01)
     assert found.quantile_rad(0.997) < found.largest_rad[0]
-    assert found.largest_rad[0] >= np.max(radial)
+    # Two compilations of one stable loop: without fused multiply-add they differ by a few roundings of 2e-16.
+    assert found.largest_rad[0] >= np.max(radial) * (1.0 - 1e-13)
 
 
 def test_the_quantile_of_a_uniform_square_is_its_share():

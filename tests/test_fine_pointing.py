@@ -15,7 +15,7 @@ from microrad.fine_loop.linear import close, stationary
 from microrad.fine_loop.loop import assemble
 from microrad.fine_pointing import designs, parts, results, scenario
 from microrad.missionfile import load_mission
-from shipped import SHIPPED
+from shipped import SHIPPED, whole_study
 from shipped import edited_file as edited_shipped
 
 WHEELS = """
@@ -50,17 +50,17 @@ def scene(file):
 
 
 @pytest.fixture(scope="module")
-def tuned(scene, file):
+def tuned():
     """Every design of the shipped mission, and what was said of the progress."""
-    said = []
-    return fine_pointing.design(scene, file.mission, lambda *message: said.append(message)), said
+    found, said = whole_study()
+    return [v.design for v in found.fine_pointing.verified], [each for each in said if "tun" in each[2]]
 
 
 @pytest.fixture(scope="module")
-def best(scene, file, tuned):
+def best():
     """LQG and the baseline, simulated on each variant of the mirror."""
-    chosen = [d for d in tuned[0] if d.name in (fine_pointing.BASELINE, "LQG")]
-    return {v.design.name: v for v in fine_pointing.verify(scene, file.mission, chosen)}
+    found = {v.design.name: v for v in whole_study()[0].fine_pointing.verified}
+    return {name: found[name] for name in (fine_pointing.BASELINE, "LQG")}
 
 
 def by_name(found):

@@ -36,7 +36,7 @@ from shipped import SHIPPED, edited_file, plain_study
 def no_fine_pointing():
     """The fine-pointing loop has tests of its own and takes the longest."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(study.fine_pointing, "run", lambda *args: None)
+        patch.setattr(study.fine_pointing, "run", lambda *args, **more: None)
         yield
 
 

@@ -40,7 +40,7 @@ def fine(file):
 def found(file, fine):
     """The study of the shipped mission without its fine-pointing loop, and one contact in time under a PI."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(study.fine_pointing, "run", lambda *args: None)
+        patch.setattr(study.fine_pointing, "run", lambda *args, **more: None)
         patch.setattr(study.paper, "applies", lambda mission: False)
         whole = study.run(file)
     run = contact_run.of_mission(file.mission, whole.day, whole.links.finding, fine)
@@ -58,7 +58,7 @@ def test_the_study_has_a_day_and_a_plan_but_no_contact_in_time_without_a_fine_lo
     assert found.day is not None
     assert found.plan is not None
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(study.fine_pointing, "run", lambda *args: None)
+        patch.setattr(study.fine_pointing, "run", lambda *args, **more: None)
         assert contact_run.of_mission(found.file.mission, found.day, found.links.finding, None) is None
 
 

@@ -57,7 +57,7 @@ class Place:
     def program(self, *words: object, ends: tuple[int, ...] = (0,)) -> str:
         """Any program, with the threads of the linear algebra as a user has them."""
         environment = {name: value for name, value in os.environ.items() if name != "OPENBLAS_NUM_THREADS"}
-        environment |= {"XDG_STATE_HOME": str(self.folder / "state")}
+        environment |= {"XDG_STATE_HOME": str(self.folder / "state"), "MICRORAD_KEEP": "no"}
         command = [str(word) for word in words]
         done = subprocess.run(command, cwd=self.folder, env=environment, capture_output=True, text=True, check=False)
         if done.returncode not in ends:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from microrad import link, pointing
+from microrad import kept, link, pointing
 from microrad.budget import Line
 from microrad.link_acquisition import Finding, Tracking, finding, tracking
 from microrad.link_performance import Performance, margin_under_jitter_db, of_jitter
@@ -91,7 +91,7 @@ def solve_rate(file: LinkFile) -> LinkFile:
     return replace(file, mission=mission, sources={**file.sources, "communication.data_rate": solved})
 
 
-def run(file: LinkFile) -> LinkStudy:
+def run(file: LinkFile, parts: kept.Kept = kept.NOTHING) -> LinkStudy:
     """Budgets of every link of a mission and what follows from them.
 
     Raises ValueError with the reason when a receiver does not take the data rate, or a scan has no time to detect.
@@ -118,7 +118,7 @@ def run(file: LinkFile) -> LinkStudy:
         under_jitter=of_jitter(m),
         tracking=light,
         point_ahead=point_ahead(m),
-        finding=finding(m, open_loop, beacon, answer, light),
+        finding=parts.part(finding, m, open_loop, beacon, answer, light),
     )
 
 

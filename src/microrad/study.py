@@ -13,6 +13,7 @@ from microrad import (
     control,
     day_study,
     fine_pointing,
+    kept,
     link,
     link_study,
     mirror_summary,
@@ -118,8 +119,12 @@ def _present(budget: link.LinkBudget | None) -> link.LinkBudget:
     return budget
 
 
-def run(file: MissionFile, on_progress: Progress = lambda done, total, what: None) -> Study:
+def run(
+    file: MissionFile, on_progress: Progress = lambda done, total, what: None, parts: kept.Kept = kept.NOTHING
+) -> Study:
     """The whole study of a mission: budgets, mirror, loops, and the link at the residual that the loop leaves.
+
+    ``parts`` are those of earlier runs that are kept: none by default.
 
     Raises ValueError with the reason when the loop is unstable, the mirror has no inverse or the receiver does not take
     the data rate.
@@ -127,7 +132,7 @@ def run(file: MissionFile, on_progress: Progress = lambda done, total, what: Non
     file = solve_rate(file)
     m, sources = file.mission, file.sources
     on_progress(0, 4, "budgets and acquisition")
-    links, fig2 = link_study.run(_links_of(file)), margin_map(file)
+    links, fig2 = link_study.run(_links_of(file), parts), margin_map(file)
 
     on_progress(1, 4, "mirror and tracking (the first run compiles for half a minute)")
     summary, loops = mirror_summary.summarise(m.mirror), tracking.hysteresis_loops(m)
@@ -139,11 +144,11 @@ def run(file: MissionFile, on_progress: Progress = lambda done, total, what: Non
     as_read = readings.others(m, residual)
 
     on_progress(2, 4, "claims of the paper")
-    scan = paper.scan(m, on_progress) if paper.applies(m) else None
-    fine = fine_pointing.run(file, on_progress) if m.fine_pointing is not None else None
+    scan = parts.part(paper.scan, m, on_progress=on_progress) if paper.applies(m) else None
+    fine = None if m.fine_pointing is None else parts.part(fine_pointing.run, file, on_progress=on_progress)
     on_progress(3, 4, "the day")
     found = performance.run(m, runs, fine)
-    day, contact, plan = delivered(file, links, found, fine, residual, achieved)
+    day, contact, plan = delivered(file, links, found, fine, residual, achieved, parts)
 
     on_progress(4, 4, "verdict")
     beacon, answer = _present(links.beacon), _present(links.answer)
@@ -204,6 +209,7 @@ def delivered(
     fine: fine_pointing.FinePointingStudy | None,
     residual: tracking.Run,
     achieved: link.LinkBudget,
+    parts: kept.Kept = kept.NOTHING,
 ) -> tuple[day_study.DayStudy | None, contact_run.ContactRun | None, constellation.ConstellationPlan | None]:
     """The day under the best controller of the fine-pointing loop, or under the worst of the sines without one.
 
@@ -217,10 +223,10 @@ def delivered(
         loss = day_study.PointingLoss(case.outage_loss_db, case.outage, f"{case.controller}, {case.source}")
     else:
         loss = day_study.loss_at(m, achieved.margin_db, f"simulated: {residual.trace.name}")
-    day = day_study.run(links, loss)
-    contact = contact_run.of_mission(m, day, links.finding, fine)
+    day = parts.part(day_study.run, links, loss)
+    contact = parts.part(contact_run.of_mission, m, day, links.finding, fine)
     planned = m.constellation is not None and orbit.repeats(m.constellation, m)
-    plan = constellation.run(_links_of(file), loss) if planned else None
+    plan = parts.part(constellation.run, _links_of(file), loss) if planned else None
     return day, contact, plan
 
 

@@ -20,6 +20,7 @@ from microrad import lti
 from microrad.campaign.file import CampaignFile, load_campaign
 from microrad.campaign.records import CampaignError
 from microrad.control import AxisController
+from microrad.machine import source_sha256
 from microrad.missionfile import named_files
 
 LIBRARIES = ("numpy", "scipy", "numba", "llvmlite", "sgp4", "skyfield")
@@ -32,11 +33,7 @@ def code_sha256() -> str:
     import platform
     from importlib.metadata import version
 
-    root = Path(__file__).resolve().parent.parent
-    digest = hashlib.sha256()
-    for path in sorted(p for p in root.rglob("*") if p.suffix in {".py", ".json"}):
-        digest.update(f"{path.relative_to(root).as_posix()}\0".encode())
-        digest.update(path.read_bytes())
+    digest = hashlib.sha256(source_sha256().encode())
     digest.update(repr([platform.python_version(), *((name, version(name)) for name in LIBRARIES)]).encode())
     return digest.hexdigest()
 

@@ -3,7 +3,7 @@
 import shlex
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -23,11 +23,14 @@ from microrad.cli.frame import (
     main,
     option,
     progress_bar,
+    say,
 )
 from microrad.folder import write_whole
 
 # Everything else is imported inside the commands: numpy, numba and pydantic take longer to load than help may take.
 if TYPE_CHECKING:
+    from microrad.kept import Kept
+    from microrad.missionfile import MissionFile
     from microrad.study import Study
 
 __all__ = ["app", "main"]
@@ -73,6 +76,7 @@ def _init_preset(file: Path, name: str) -> Outcome:
     return Outcome(f"{first}Next: {run_it}")
 
 
+Fresh = Annotated[bool, typer.Option("--fresh", help="Compute all of it, also what an earlier run has kept.")]
 _FOLDER = "Folder to write [default: <name of the mission file>-study in the current folder]."
 
 
@@ -90,43 +94,52 @@ def run(
     output: Annotated[Path | None, option("--output", "FOLDER", _FOLDER)] = None,
     mirror: Annotated[Path | None, option("--mirror", "FILE", "Mirror file in place of the mission's mirror.")] = None,
     overwrite: Overwrite = False,
+    fresh: Fresh = False,
     as_json: Json = False,
 ) -> Outcome:
     """Run the whole study of a mission.
 
-    Writes report.html, results.nc, manifest.json and figures/ into a folder, and prints the verdict. The exit code is 0
-    when the link closes and 1 when it does not.
+    Prints the verdict, then writes report.html, results.nc, manifest.json and figures/ into a folder. The exit code is
+    0 when the link closes and 1 when it does not. What an earlier run computed of the same inputs is taken from it.
     """
-    from microrad import report
+    from microrad import kept, report
     from microrad.missionfile import load_mission
 
     mission = load_mission(file, mirror)
     folder = output or Path(f"{file.stem}-study")
     report.check_folder(folder, overwrite)
+    parts = kept.NOTHING if fresh else kept.of_user(lambda: _contents(mission))
     with progress_bar() as progress:
-        study = _study(mission, progress)
-        outcome = _study_outcome(study, folder, as_json)
-        report.write(study, folder, overwrite=overwrite, on_progress=progress)
-    return outcome
+        study = _study(mission, progress, parts)
 
-
-def _study(mission: Any, progress: OnProgress) -> "Study":
-    from microrad import study
-
-    try:
-        return study.run(mission, progress)
-    except ValueError as error:  # an unstable loop, or a mirror without inverse
-        raise Refusal(f"{mission.path}: {error}") from error
-
-
-def _study_outcome(study: "Study", folder: Path, as_json: bool) -> Outcome:
-    from microrad import report
+    def write() -> str:
+        with progress_bar() as progress:
+            report.write(study, folder, overwrite=overwrite, on_progress=progress, parts=parts)
+        if parts.trouble:
+            say(parts.trouble)
+        return "\n".join(str(folder / name) for name in ("report.html", "results.nc", "manifest.json"))
 
     code = CLOSES if study.closes else DOES_NOT_CLOSE
     if as_json:
+        write()
         return Outcome(json_text({**report.summary(study), "folder": str(folder)}), code)
-    files = "\n".join(str(folder / name) for name in ("report.html", "results.nc", "manifest.json"))
-    return Outcome(f"{report.verdict_text(study)}\n\n{files}", code)
+    return Outcome(f"{report.verdict_text(study)}\n", code, afterwards=write)
+
+
+def _contents(mission: "MissionFile") -> dict[str, bytes]:
+    """The files that a mission names, which its parts read beside it."""
+    from microrad.missionfile import named_files
+
+    return {name: (mission.path.parent / name).read_bytes() for name in named_files(mission.mission)}
+
+
+def _study(mission: "MissionFile", progress: OnProgress, parts: "Kept") -> "Study":
+    from microrad import study
+
+    try:
+        return study.run(mission, progress, parts)
+    except ValueError as error:  # an unstable loop, or a mirror without inverse
+        raise Refusal(f"{mission.path}: {error}") from error
 
 
 @app.command(

@@ -45,10 +45,15 @@ class Refusal(ValueError):  # noqa: N818  a refusal is no error of the program
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """What a command found: the text for stdout and the exit code. It is printed when the work is done."""
+    """What a command found: the text for stdout and the exit code.
+
+    It is printed when the work is done. Work that the text does not depend on is done ``afterwards``: the text that it
+    returns is printed behind.
+    """
 
     text: str
     code: int = 0
+    afterwards: Callable[[], str] | None = None
 
 
 # ------------------------------------------------------------------------------------------------------------ the app
@@ -104,6 +109,8 @@ def command(body: Callable[_Arguments, Outcome]) -> Callable[_Arguments, NoRetur
     def wrapped(*args: _Arguments.args, **kwargs: _Arguments.kwargs) -> NoReturn:
         try:
             outcome = body(*args, **kwargs)
+            if outcome.afterwards and (code := _printed(outcome)) == outcome.code:
+                outcome = Outcome(outcome.afterwards(), code)
         except (Exception, KeyboardInterrupt) as error:
             raise typer.Exit(_failed(error)) from None
         raise typer.Exit(_printed(outcome))

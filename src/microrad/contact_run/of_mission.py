@@ -1,5 +1,7 @@
 """The contact that a mission names, run with its own orbits, acquisition and fine-pointing loop."""
 
+from functools import partial
+
 import numpy as np
 
 from microrad import orbit
@@ -36,9 +38,10 @@ def _contact(day: DayStudy, place: int) -> Contact:
     pair, chosen = day.view.pair, day.relay.contacts[place]
     free = day.relay.contacts[place - 1].end_s if place else pair.span_s[0]
 
-    def geometry(time_s: Floats) -> Sight:
-        found = orbit.sight(pair.leo.orbit, pair.geo.orbit, np.ravel(time_s))
-        shape = np.shape(time_s)
-        return Sight(*(each.reshape(shape) for each in (found.range_m, found.rate_rad_s, found.point_ahead_rad)))
+    return Contact(chosen.start_s, chosen.end_s, chosen.begins, chosen.ends, free, partial(_geometry, pair))
 
-    return Contact(chosen.start_s, chosen.end_s, chosen.begins, chosen.ends, free, geometry)
+
+def _geometry(pair: orbit.Pair, time_s: Floats) -> Sight:
+    found = orbit.sight(pair.leo.orbit, pair.geo.orbit, np.ravel(time_s))
+    shape = np.shape(time_s)
+    return Sight(*(each.reshape(shape) for each in (found.range_m, found.rate_rad_s, found.point_ahead_rad)))

@@ -82,7 +82,6 @@ def design_plant(loop: PointingLoop) -> DesignPlant:
     if not has_gauge:
         rows[2] = 0.0
     B[:, 1:] = lti.to_bits(B[:, 1:], lti.EXACT_BITS)
-    B[:, 1:] = lti.to_bits(B[:, 1:], lti.EXACT_BITS)
     system = lti.system_to_bits(lti.StateSpace(A, B, rows, D), lti.DESIGN_BITS)
     return DesignPlant(loop.timing.period_s, system, noises.shape[1], nominal_axis_gain(loop), True, has_gauge)
 

@@ -1,18 +1,21 @@
 """Reports of a study and of an identification: a page that opens offline, the verdict in words, plain data."""
 
 import csv
+import io
 from collections.abc import Callable, Mapping
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from microrad.folder import MANIFEST, FolderError, check_folder, whole_folder
+from microrad.kept import NOTHING, Kept
 from microrad.report.tables import Column, rows_of
 
 if TYPE_CHECKING:
     from microrad.constellation import ConstellationPlan
     from microrad.report.identification import ReportError, check_identification, write_identification
     from microrad.report.identification_words import identification_data, identification_text
+    from microrad.report.page import Drawn
     from microrad.report.words import summary, verdict_text
     from microrad.study import Study
 
@@ -21,6 +24,7 @@ __all__ = [
     "ReportError",
     "check_folder",
     "check_identification",
+    "draw",
     "identification_data",
     "identification_text",
     "summary",
@@ -50,38 +54,28 @@ def __getattr__(name: str) -> Any:
 
 
 def write(
-    study: "Study", folder: Path, *, overwrite: bool = False, on_progress: Progress = lambda done, total, what: None
+    study: "Study",
+    folder: Path,
+    *,
+    overwrite: bool = False,
+    on_progress: Progress = lambda done, total, what: None,
+    parts: Kept = NOTHING,
 ) -> Path:
     """Write report.html, results.nc, manifest.json and figures/ into ``folder``, all of them or none.
 
+    ``parts`` are those of earlier runs that are kept: none by default.
+
     Raises FolderError when the folder holds something that must not be replaced. Returns the page's path.
     """
-    # Drawing and writing libraries load here, not with the package: they take longer than help should.
-    from microrad.report import (
-        day_plots,
-        figures,
-        fine_pointing_figures,
-        link_figures,
-        page,
-        paper_bench,
-        results,
-        tails,
-    )
+    from microrad.report import page, results  # drawing and writing libraries take longer to load than help should
 
     with whole_folder(folder, overwrite) as draft:
         on_progress(0, 3, "figures")
-        drawn = page.Drawn(
-            figures.draw(study),
-            paper_bench.draw(study),
-            fine_pointing_figures.draw(study),
-            tails.draw(study),
-            link_figures.draw(study.links),
-            () if study.day is None else day_plots.draw(study.day, study.contact),
-        )
+        drawn = draw(study, parts)
         (draft / "figures").mkdir()
         for figure in drawn.every:
             (draft / "figures" / f"{figure.name}.svg").write_text(figure.svg, encoding="utf-8")
-            write_columns(figure.columns, draft / "figures" / f"{figure.name}.csv")
+            write_columns(figure.columns, draft / "figures" / f"{figure.name}.csv", parts)
         on_progress(1, 3, "page")
         made = results.manifest(study, draft)
         text = page.render(study, drawn, made)
@@ -89,10 +83,24 @@ def write(
         on_progress(2, 3, "results")
         if study.plan is not None:
             write_plan(study.plan, draft)
-        results.write_results(study, draft / "results.nc")
+        (draft / "results.nc").write_bytes(parts.part(results.netcdf, study))
         results.write_manifest(made, draft, MANIFEST)
         on_progress(3, 3, "done")
     return folder / "report.html"
+
+
+def draw(study: "Study", parts: Kept = NOTHING) -> "Drawn":
+    """The figures of a study's page, by its parts."""
+    from microrad.report import day_plots, figures, fine_pointing_figures, link_figures, page, paper_bench, tails
+
+    return page.Drawn(
+        figures.draw(study, parts),
+        paper_bench.draw(study, parts),
+        fine_pointing_figures.draw(study, parts),
+        tails.draw(study, parts),
+        link_figures.draw(study.links, parts),
+        () if study.day is None else day_plots.draw(study.day, study.contact, parts),
+    )
 
 
 def write_plan(plan: "ConstellationPlan", folder: Path) -> None:
@@ -103,9 +111,14 @@ def write_plan(plan: "ConstellationPlan", folder: Path) -> None:
     (folder / "contact-plan.ionrc").write_text(plan.contact_plan() + "\n", encoding="utf-8")
 
 
-def write_columns(columns: Mapping[str, Column], path: Path) -> None:
+def write_columns(columns: Mapping[str, Column], path: Path, parts: Kept = NOTHING) -> None:
     """Columns as CSV with a heading, numbers to nine digits; shorter columns end early."""
-    with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
-        writer.writerow(columns)
-        writer.writerows(rows_of(columns, 9))
+    path.write_bytes(parts.part(_csv, columns).encode())
+
+
+def _csv(columns: Mapping[str, Column]) -> str:
+    text = io.StringIO(newline="")
+    writer = csv.writer(text)
+    writer.writerow(columns)
+    writer.writerows(rows_of(columns, 9))
+    return text.getvalue()

@@ -13,6 +13,7 @@ from matplotlib.figure import Figure as Canvas
 from numpy.typing import NDArray
 
 from microrad import paper, simulate
+from microrad.kept import NOTHING, Kept
 from microrad.mission import Mission
 from microrad.report import interactive
 from microrad.report.inlined import inlined
@@ -78,14 +79,14 @@ class Figure:
         return rows_of(self.columns, digits)
 
 
-def draw(study: Study) -> tuple[Figure, ...]:
+def draw(study: Study, parts: Kept = NOTHING) -> tuple[Figure, ...]:
     """All figures of the study, in the order of the report."""
+    drawers = [margin_map, hysteresis_loops, tracking_errors, inverse]
+    drawers += [comparison] if any(r.mirror == "comparison" for r in study.runs) else []
     with rc_context(STYLE):
-        figures = [margin_map(study), hysteresis_loops(study), tracking_errors(study), inverse(study)]
-        if any(r.mirror == "comparison" for r in study.runs):
-            figures.append(comparison(study))
+        figures = [parts.part(drawer, study) for drawer in drawers]
         if study.scan is not None:
-            figures.append(scan(study.scan))
+            figures.append(parts.part(scan, study.scan))
     return tuple(figures)
 
 

@@ -11,6 +11,7 @@ from matplotlib.figure import Figure as Canvas
 
 from microrad.fine_loop.linear import close, sensitivity
 from microrad.fine_pointing import ErrorBudget, FinePointingStudy, Verified
+from microrad.kept import NOTHING, Kept
 from microrad.mission import Mission
 from microrad.report.figures import BLACK, BLUE, GREEN, ORANGE, SKY, STYLE, VERMILION, Figure, Floats, svg_of
 from microrad.report.fine_pointing_words import micro, share_of_time, source_name
@@ -46,16 +47,20 @@ class Shown:
         return {"color": self.colour, "marker": self.marker, "markevery": marks, "markersize": 5}
 
 
-def draw(study: Study) -> tuple[Figure, ...]:
+def draw(study: Study, parts: Kept = NOTHING) -> tuple[Figure, ...]:
     """The figures of the study's fine-pointing loop; none without one."""
     fine, m = study.fine_pointing, study.file.mission
     if fine is None:
         return ()
     controllers = shown(fine)
     with rc_context(STYLE):
-        figures = [spectra(fine, controllers), errors(fine, m), error_budget(fine.budget)]
+        figures = [
+            parts.part(spectra, fine, controllers),
+            parts.part(errors, fine, m),
+            parts.part(error_budget, fine.budget),
+        ]
         if fine.scene.loop.optical.every == 1:
-            figures.append(sensitivities(fine, m, controllers))
+            figures.append(parts.part(sensitivities, fine, m, controllers))
     return tuple(figures)
 
 

@@ -90,10 +90,10 @@ def render(
 ) -> str:
     """The page's HTML; every text that is not ours is escaped, and nothing is loaded from anywhere."""
     # Drawing libraries load here, not with the package: they take longer than help should.
+    from microrad.machine import versions
     from microrad.report import identification_figures as figures
     from microrad.report.interactive import with_scripts
     from microrad.report.page import pages
-    from microrad.report.results import versions
 
     everything = [*found.recordings, *words.shown_recordings(found, recordings)]
     context: dict[str, Any] = {

@@ -10,6 +10,7 @@ from matplotlib.figure import Figure as Canvas
 from matplotlib.patches import Patch
 
 from microrad.acquisition import Trade
+from microrad.kept import NOTHING, Kept
 from microrad.link import Swing, Tornado
 from microrad.link_acquisition import Finding
 from microrad.link_study import UNDER_JITTER, LinkStudy
@@ -28,13 +29,13 @@ _TITLES = {
 }
 
 
-def draw(study: LinkStudy) -> tuple[Figure, ...]:
+def draw(study: LinkStudy, parts: Kept = NOTHING) -> tuple[Figure, ...]:
     """The figures of the links, in the order of the page."""
     with rc_context(STYLE):
-        figures = [tornado(study)] if study.tornado else []
-        figures += [one_tornado(study, t) for t in study.tornados if t.swings]
+        figures = [parts.part(tornado, study)] if study.tornado else []
+        figures += [parts.part(one_tornado, study, t) for t in study.tornados if t.swings]
         if study.finding is not None and study.finding.trade is not None:
-            figures.append(trade(study, study.finding, study.finding.trade))
+            figures.append(parts.part(trade, study, study.finding, study.finding.trade))
     return tuple(figures)
 
 

@@ -10,6 +10,7 @@ from typing import Any
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from microrad import link
+from microrad.machine import versions
 from microrad.mission import Source
 from microrad.missionfile import assumptions, changed_from_shipped
 from microrad.performance import FINE
@@ -29,7 +30,6 @@ from microrad.report import (
 )
 from microrad.report.figures import Figure
 from microrad.report.quantities import quantity
-from microrad.report.results import versions
 from microrad.study import Study
 from microrad.units import format_quantity
 

@@ -13,6 +13,7 @@ from matplotlib.figure import Figure as Canvas
 from numpy.typing import NDArray
 
 from microrad import bench, identify
+from microrad.kept import NOTHING, Kept
 from microrad.recording import Recording
 from microrad.report.figures import BLACK, BLUE, GREEN, STYLE, VERMILION, Figure, svg_of, thin
 from microrad.study import Study
@@ -111,12 +112,16 @@ def _loop(fit: identify.BoucWenFit, record: Recording, freq_hz: float, fitted_hz
     return Loop(freq_hz, fitted_hz, record.drive[last, 0], found.measured_rad[last], found.model_rad[last], percent)
 
 
-def draw(study: Study) -> tuple[Figure, ...]:
+def draw(study: Study, parts: Kept = NOTHING) -> tuple[Figure, ...]:
     """Both figures for a mission with a mirror of the paper's kind; none for others."""
     if study.scan is None:
         return ()
     with rc_context(STYLE):
-        return draw_chirp(chirp()), draw_loops(loops())
+        return parts.part(_both)
+
+
+def _both() -> tuple[Figure, Figure]:
+    return draw_chirp(chirp()), draw_loops(loops())
 
 
 def draw_chirp(found: Chirp) -> Figure:

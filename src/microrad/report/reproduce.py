@@ -14,10 +14,10 @@ from markupsafe import escape
 
 from microrad import study
 from microrad.folder import MANIFEST
+from microrad.machine import ARCHITECTURE, as_stated
 from microrad.report import compared, tolerances
 from microrad.report.carried import Carried, ReproduceError, altered, held, read, shown_part, unpack
 from microrad.report.compared import Comparison, Difference, clipped
-from microrad.report.machine import ARCHITECTURE, as_stated
 from microrad.report.scale import Scale, scale_of
 
 Progress = Callable[[int, int, str], None]

@@ -4,10 +4,8 @@ import contextlib
 import hashlib
 import json
 import math
-import platform
+import tempfile
 from collections.abc import Callable, Mapping
-from functools import cache
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -16,29 +14,17 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from microrad.fine_pointing import COUNTERS, FinePointingStudy, Residual
+from microrad.machine import machine, versions
 from microrad.missionfile import MirrorFile, MissionFile, named_files
 from microrad.report import day_results, words
 from microrad.report.carried import hash_of_summary
 from microrad.report.fine_pointing_data import margins, rms_by_source, sources
-from microrad.report.machine import machine
 from microrad.report.paper_bench import PLAN, SEED
 from microrad.report.variables import coordinate, variable
 from microrad.study import Study
 from microrad.tracking import Run
 
 Floats = NDArray[np.float64]
-LIBRARIES = (
-    "microrad",
-    "numpy",
-    "scipy",
-    "numba",
-    "xarray",
-    "h5netcdf",
-    "matplotlib",
-    "pydantic",
-    "sgp4",
-    "skyfield",
-)
 
 
 MOST_INPUT_BYTES = 1_000_000
@@ -256,6 +242,14 @@ def _performance(study: Study) -> xr.Dataset:
     return xr.Dataset(data, attrs={"outage": study.performance.outage})
 
 
+def netcdf(study: Study) -> bytes:
+    """The content of results.nc, as `write_results` writes it."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "results.nc"
+        write_results(study, path)
+        return path.read_bytes()
+
+
 def write_results(study: Study, path: Path) -> None:
     """results.nc: margin map, hysteresis loops, traces, fine-pointing loop, the day; each variable with its unit."""
     groups = {"margin_map": _map(study), "link_performance": _performance(study), **_loops(study)}
@@ -342,13 +336,3 @@ def write_manifest(made: Mapping[str, Any], folder: Path, name: str) -> None:
     """A manifest with the hashes of all files, written last, so that its presence says that the folder is whole."""
     text = json.dumps({**made, "files_sha256": _hashes(folder)}, indent=2, ensure_ascii=False)
     (folder / name).write_text(text + "\n", encoding="utf-8")
-
-
-@cache
-def _versions() -> tuple[tuple[str, str], ...]:
-    return (("python", platform.python_version()), *((name, version(name)) for name in LIBRARIES))
-
-
-def versions() -> dict[str, str]:
-    """Versions of Python and of the libraries that the numbers depend on."""
-    return dict(_versions())

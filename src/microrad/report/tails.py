@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from microrad.fine_loop.ensemble import bin_edges_rad, histogram_beyond, histogram_quantile
 from microrad.fine_pointing import FinePointingStudy, Residual
+from microrad.kept import NOTHING, Kept
 from microrad.mission import Mission
 from microrad.report import fine_pointing_words as words
 from microrad.report.figures import BLACK, BLUE, GREEN, ORANGE, STYLE, Figure, svg_of
@@ -148,12 +149,12 @@ def sentences(fine: FinePointingStudy, m: Mission, samples: int) -> list[str]:
 
 
 # ------------------------------------------------------------------------------------------------------------- figure
-def draw(study: Study) -> tuple[Figure, ...]:
+def draw(study: Study, parts: Kept = NOTHING) -> tuple[Figure, ...]:
     """The figure of the tail; none for a mission without a fine-pointing loop."""
     if study.fine_pointing is None:
         return ()
     with rc_context(STYLE):
-        return (tail(study.fine_pointing, study.file.mission),)
+        return (parts.part(tail, study.fine_pointing, study.file.mission),)
 
 
 def tail(fine: FinePointingStudy, m: Mission) -> Figure:

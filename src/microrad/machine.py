@@ -1,8 +1,12 @@
-"""What of a machine changes the last digits of a result, and nothing that says whose machine it is."""
+"""What of a machine and of its libraries changes the last digits of a result, and nothing that says whose it is."""
 
+import hashlib
 import os
 import platform
 from collections.abc import Mapping
+from functools import cache
+from importlib.metadata import version
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -23,6 +27,20 @@ VARIABLES = (
 )
 """Variables of the environment that choose instructions, or in how many parts a sum is made."""
 ARCHITECTURE = "architecture"
+
+LIBRARIES = (
+    "microrad",
+    "numpy",
+    "scipy",
+    "numba",
+    "xarray",
+    "h5netcdf",
+    "matplotlib",
+    "pydantic",
+    "sgp4",
+    "skyfield",
+)
+"""Libraries that the numbers depend on."""
 
 
 def machine() -> dict[str, str]:
@@ -65,3 +83,22 @@ def _scipy_blas() -> str:
 def _blas(library: Any) -> str:
     found = library.show_config(mode="dicts")["Build Dependencies"]["blas"]
     return f"{found['name']} {found['version']}"
+
+
+@cache
+def _versions() -> tuple[tuple[str, str], ...]:
+    return (("python", platform.python_version()), *((name, version(name)) for name in LIBRARIES))
+
+
+def versions() -> dict[str, str]:
+    """Versions of Python and of the libraries that the numbers depend on."""
+    return dict(_versions())
+
+
+@cache
+def source_sha256() -> str:
+    """SHA-256 over the names and contents of all files of the package."""
+    root, digest = Path(__file__).resolve().parent, hashlib.sha256()
+    for path in sorted(p for p in root.rglob("*") if p.is_file() and "__pycache__" not in p.parts):
+        digest.update(f"{path.relative_to(root).as_posix()}\0".encode() + hashlib.sha256(path.read_bytes()).digest())
+    return digest.hexdigest()

@@ -1,0 +1,198 @@
+"""What a function reads of frozen records, told field by field."""
+
+import copy
+import functools
+import math
+import pickle
+import subprocess
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from enum import Enum
+from pathlib import Path
+
+import numpy as np
+import pytest
+from pydantic import BaseModel, ConfigDict
+
+from microrad.reads import Reads, UnknownValueError, digest, watched_call
+
+
+class Kind(Enum):
+    LEFT, RIGHT = "left", "right"
+
+
+@dataclass(frozen=True, slots=True)
+class Beam:
+    power_w: float
+    waist_m: float = 0.02
+
+    @property
+    def doubled_w(self):
+        return 2.0 * self.power_w
+
+
+class Table(BaseModel):
+    model_config = ConfigDict(frozen=True)
+    rate_hz: float
+    delay_s: float = 0.0
+    mode: str | None = None
+
+    @property
+    def period_s(self):
+        return 1.0 / self.rate_hz
+
+
+@dataclass(frozen=True, slots=True)
+class Mission:
+    beam: Beam
+    loop: Table
+    beams: tuple[Beam, ...] = ()
+    sources: Mapping[str, Beam] | None = None
+    samples: np.ndarray | None = None
+
+
+MISSION = Mission(
+    Beam(5.0), Table(rate_hz=1e3), (Beam(1.0), Beam(2.0)), {"a": Beam(3.0), "b": Beam(4.0)}, np.arange(3.0)
+)
+
+
+def agree(function, changed, mission=MISSION):
+    """Whether what a function has read of a mission is the same in a changed one."""
+    _, reads = watched_call(function, mission)
+    assert reads.agree((mission,))
+    return reads.agree((changed,))
+
+
+OTHER_POWER = replace(MISSION, beam=Beam(6.0))
+OTHER_WAIST = replace(MISSION, beam=Beam(5.0, 0.03))
+OTHER_RATE = replace(MISSION, loop=Table(rate_hz=2e3))
+OTHER_DELAY = replace(MISSION, loop=Table(rate_hz=1e3, delay_s=1e-3))
+OTHER_FIRST = replace(MISSION, beams=(Beam(9.0), Beam(2.0)))
+ONE_MORE = replace(MISSION, beams=(Beam(1.0), Beam(2.0), Beam(3.0)))
+OTHER_A = replace(MISSION, sources={"a": Beam(7.0), "b": Beam(4.0)})
+WITH_C = replace(MISSION, sources={"a": Beam(3.0), "b": Beam(4.0), "c": Beam(1.0)})
+OTHER_SAMPLES = replace(MISSION, samples=np.array([0.0, 1.0, 2.0000000001]))
+
+
+@pytest.mark.parametrize(
+    ("function", "seen", "unseen"),
+    [
+        (lambda m: m.beam.power_w, OTHER_POWER, OTHER_WAIST),
+        (lambda m: m.beam.doubled_w, OTHER_POWER, OTHER_WAIST),
+        (lambda m: m.loop.period_s, OTHER_RATE, OTHER_DELAY),
+        (lambda m: m.loop.mode is None, replace(MISSION, loop=Table(rate_hz=1e3, mode="x")), OTHER_DELAY),
+        (lambda m: m.beams[0].power_w, OTHER_FIRST, OTHER_POWER),
+        (lambda m: m.beams[1].power_w, ONE_MORE, OTHER_FIRST),
+        (lambda m: [b.waist_m for b in m.beams], ONE_MORE, OTHER_FIRST),
+        (lambda m: m.sources["a"].power_w, OTHER_A, WITH_C),
+        (lambda m: m.sources["b"].power_w, replace(MISSION, sources={"a": Beam(3.0)}), OTHER_A),
+        (lambda m: m.sources.get("c"), WITH_C, OTHER_A),
+        (lambda m: "c" in m.sources, WITH_C, OTHER_A),
+        (lambda m: len(m.sources), WITH_C, OTHER_A),
+        (lambda m: {**m.sources, "d": 1}["a"].power_w, OTHER_A, OTHER_POWER),
+        (lambda m: m.samples[0], OTHER_SAMPLES, OTHER_POWER),
+        (lambda m: isinstance(m.beam, Beam), replace(MISSION, beam=Table(rate_hz=1.0)), OTHER_POWER),
+        # what cannot be seen into is read whole
+        (lambda m: m.loop.model_copy(update={"rate_hz": 1.0}), OTHER_DELAY, OTHER_POWER),
+        (lambda m: m.loop.model_dump(), OTHER_DELAY, OTHER_POWER),
+        (lambda m: replace(m.beam, waist_m=1.0), OTHER_POWER, OTHER_RATE),
+        (lambda m: hash(m.beam), OTHER_WAIST, OTHER_RATE),
+        (lambda m: m.beam == Beam(5.0), OTHER_WAIST, OTHER_RATE),
+        (lambda m: m.loop == Table(rate_hz=1.0), OTHER_DELAY, OTHER_POWER),
+        (lambda m: copy.copy(m.loop), OTHER_DELAY, OTHER_POWER),
+        (lambda m: copy.deepcopy(m.beam), OTHER_WAIST, OTHER_RATE),
+    ],
+)
+def test_what_is_read_is_noted_and_nothing_else(function, seen, unseen):
+    assert not agree(function, seen)
+    assert agree(function, unseen)
+
+
+def test_a_result_that_holds_a_record_depends_on_all_of_it():
+    result, reads = watched_call(lambda m: {"beam": m.beam}, MISSION)
+    plain = pickle.loads(pickle.dumps(result))
+    assert type(plain["beam"]) is Beam
+    assert plain["beam"] == MISSION.beam
+    assert reads.agree((OTHER_RATE,))
+    assert not reads.agree((OTHER_WAIST,))
+
+
+def test_a_result_that_holds_a_mapping_depends_on_all_of_it():
+    result, reads = watched_call(lambda m: [m.sources], MISSION)
+    assert pickle.loads(pickle.dumps(result)) == [MISSION.sources]
+    assert not reads.agree((WITH_C,))
+
+
+def test_a_watched_record_stands_for_its_own():
+    def look(m):
+        return m.beam, type(m.beam).__name__, m.beam.__class__, repr(m.beam), m.beam is m.beam, m.beam == MISSION.beam
+
+    (beam, name, kind, text, same, equal), _ = watched_call(look, MISSION)
+    assert (name, kind, text, same, equal) == ("Beam", Beam, repr(MISSION.beam), True, True)
+    with pytest.raises(AttributeError):
+        beam.power_w = 1.0
+
+
+def test_arguments_that_are_no_records_are_read_as_they_are_given():
+    _, reads = watched_call(lambda a, b: None, 1.0, "x")
+    assert reads.agree((1.0, "x"))
+    assert not reads.agree((1.0, "y"))
+    assert not reads.agree((1.0,))
+
+
+@pytest.mark.parametrize(
+    ("one", "other"),
+    [
+        (0.0, -0.0),
+        (1, 1.0),
+        (1, True),
+        ("1", 1),
+        (b"1", "1"),
+        (None, "None"),
+        (0.1, math.nextafter(0.1, 1.0)),
+        ((1, 2), [1, 2]),
+        ((1, (2,)), ((1, 2),)),
+        ({"a": 1}, {"b": 1}),
+        (np.arange(6.0), np.arange(6.0).reshape(2, 3)),
+        (np.arange(3), np.arange(3.0)),
+        (np.float64(1.0), 1.0),
+        (Kind.LEFT, Kind.RIGHT),
+        (Path("a"), "a"),
+        (slice(1, 2), slice(1, 3)),
+        ({1, 2}, {1, 3}),
+        (Beam(1.0), Beam(1.0, 0.01)),
+        (math.sin, math.cos),
+        (functools.partial(math.pow, 1.0), functools.partial(math.pow, 2.0)),
+        (float, int),
+    ],
+)
+def test_values_that_differ_have_different_digests(one, other):
+    assert digest(one) != digest(other)
+    assert digest(one) == digest(copy.deepcopy(one))
+
+
+def test_another_process_finds_the_same_digests():
+    code = "from microrad.reads import digest; print(digest({'a': (1.5, {'x', 'y', 'z'}), 'b': None}).hex())"
+    found = {
+        subprocess.run(
+            [sys.executable, "-c", code], env={"PYTHONHASHSEED": seed}, capture_output=True, text=True, check=True
+        ).stdout
+        for seed in ("1", "2")
+    }
+    assert found == {digest({"a": (1.5, {"x", "y", "z"}), "b": None}).hex() + "\n"}
+
+
+def holds_a_value():
+    inside = 3.0
+    return lambda: inside
+
+
+@pytest.mark.parametrize("value", [object(), np.array([object()]), holds_a_value(), iter([])])
+def test_what_has_no_digest_is_refused(value):
+    with pytest.raises(UnknownValueError):
+        digest((1, value))
+
+
+def test_nothing_read_agrees_with_anything():
+    assert Reads().agree(("anything",))
