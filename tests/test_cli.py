@@ -332,6 +332,37 @@ def test_a_cache_folder_that_cannot_be_used_is_told_once_and_the_run_goes_on(cal
     assert (folder / "leo-geo-study" / "report.html").is_file()
 
 
+def test_a_report_is_written_although_nobody_reads_the_verdict(folder):
+    """As in `microrad run … | head -1`: the first print already finds a pipe that is closed."""
+    code = f"""
+import sys
+from microrad.cli import app, frame
+
+@app.command()
+@frame.command
+def late():
+    return frame.Outcome("verdict", 0, afterwards=lambda: open("report", "w").write("whole") and "written")
+
+sys.argv = ["microrad", "late"]
+frame.main()
+"""
+    reader, writer = os.pipe()
+    os.close(reader)
+    run = subprocess.run([sys.executable, "-c", code], stdout=writer, stderr=subprocess.PIPE, text=True, cwd=folder)
+    os.close(writer)
+    assert (run.returncode, run.stderr) == (141, "")
+    assert (folder / "report").read_text() == "whole"
+
+
+def test_a_named_file_that_is_missing_is_told_by_the_study_where_parts_are_kept_too(refused, folder, monkeypatch):
+    monkeypatch.delenv("MICRORAD_KEEP")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(folder.parent / "cache"))
+    text = without_fine_pointing(PAPER.read_text("utf-8"))
+    begin, end = text.index('kind = "circular"'), text.index("[orbit.leo.limits]")
+    Path("gone.toml").write_text(f'{text[:begin]}kind = "elements"\nfile = "absent.tle"\n\n{text[end:]}', "utf-8")
+    assert refused("run", "gone.toml").startswith("microrad: gone.toml: orbit.leo: absent.tle: there is no such file")
+
+
 def test_an_unexpected_exception_asks_for_a_report(call, folder, monkeypatch):
     def broken(*args):
         raise RuntimeError("a bolt fell off")

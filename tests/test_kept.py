@@ -6,7 +6,7 @@ import pickle
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pytest
@@ -82,6 +82,28 @@ def test_what_is_handed_out_is_the_same_when_it_is_made_and_when_it_is_kept(plac
     assert third.inputs.limit == 2.0
 
 
+@dataclass(frozen=True, slots=True)
+class Compiled:
+    """A record that holds what cannot be copied, as the orbit of an element set does, and says what it is made of."""
+
+    gain: float
+    handle: object = field(init=False, default_factory=object)
+
+    def __reduce__(self):
+        return Compiled, (self.gain,)
+
+
+def with_handle(inputs, compiled):
+    CALLS.append(inputs.gain)
+    return inputs.gain * compiled.gain, compiled.handle is not None
+
+
+def test_a_record_that_says_what_it_is_made_of_is_known_by_that(place):
+    for gain in (1.5, 1.5, 2.5):
+        assert Kept(place).part(with_handle, ONE, Compiled(gain)) == (2.0 * gain, True)
+    assert CALLS == [2.0, 2.0]
+
+
 def test_errors_are_not_kept(place):
     for _ in range(2):
         with pytest.raises(ValueError, match="no"):
@@ -92,11 +114,11 @@ def test_errors_are_not_kept(place):
 
 def test_what_cannot_be_told_from_another_value_is_computed(place):
     def local(inputs):
-        CALLS.append(inputs.gain)
-        return object()
+        CALLS.append("")
+        return inputs.gain is not None
 
     for _ in range(2):
-        Kept(place).part(local, Inputs(object()))
+        assert Kept(place).part(local, Inputs(object()))
     assert len(CALLS) == 2
     assert not files(place)
 
@@ -174,7 +196,7 @@ def test_parts_are_private(place):
 
 
 def test_a_full_disk_ends_the_keeping_and_nothing_else(place, monkeypatch):
-    def full(path, content):
+    def full(path, content, **_):
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))
 
     parts = Kept(place)

@@ -72,14 +72,18 @@ def _replace(draft: Path, folder: Path) -> None:
         shutil.rmtree(old, ignore_errors=True)
 
 
-def write_whole(path: Path, content: str | bytes) -> None:
-    """Write a file whole or not at all: beside its place first. Text is written in UTF-8, its line ends as they are."""
+def write_whole(path: Path, content: str | bytes, *, durable: bool = True) -> None:
+    """Write a file whole or not at all: beside its place first. Text is written in UTF-8, its line ends as they are.
+
+    What is not ``durable`` may be cut by a failure of the machine: a file that its readers check.
+    """
     part = path.with_name(f".microrad-{os.getpid()}-{threading.get_ident()}.part")
     try:
         with part.open("xb") as file:
             file.write(content.encode("utf-8") if isinstance(content, str) else content)
-            file.flush()
-            os.fsync(file.fileno())
+            if durable:
+                file.flush()
+                os.fsync(file.fileno())
         part.replace(path)
     finally:
         part.unlink(missing_ok=True)

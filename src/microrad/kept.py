@@ -17,7 +17,7 @@ from typing import Any, TypeVar, cast
 
 from microrad.folder import write_whole
 from microrad.machine import machine, source_sha256, versions
-from microrad.reads import Reads, UnknownValueError, digest, watched_call
+from microrad.reads import Reads, digest, watched_call
 
 _Result = TypeVar("_Result")
 
@@ -73,13 +73,10 @@ class Kept:
             found = _read(path, args)
             if found is not None:
                 return cast("_Result", found[0])
-        try:
-            result, reads = watched_call(function, *args, **beside)
-            whole = pickle.dumps(result, protocol=5)
-            text = pickle.dumps(reads.digests, protocol=5)
-        except UnknownValueError:
-            return function(*args, **beside)
-        if digest(self._beside()) == self._read_beside:
+        result, reads = watched_call(function, *args, **beside)
+        whole = pickle.dumps(result, protocol=5)
+        text = pickle.dumps(reads.digests, protocol=5)
+        if reads.known and digest(self._beside()) == self._read_beside:
             self._try(lambda: self._write(place, text, whole))
         return cast("_Result", pickle.loads(whole))  # as a later run will have it, and nothing in it is watched
 
@@ -96,7 +93,7 @@ class Kept:
         place.mkdir(mode=0o700, exist_ok=True)
         body = len(reads).to_bytes(8, "little") + reads + result
         path = place / f"{hashlib.sha256(reads).hexdigest()[:32]}.part"
-        write_whole(path, _MARK + hashlib.sha256(body).digest() + body)
+        write_whole(path, _MARK + hashlib.sha256(body).digest() + body, durable=False)
         _touch(path)
         for old in _latest_first(place)[MOST_OF_A_PART:]:
             old.unlink(missing_ok=True)

@@ -90,6 +90,8 @@ def _others(value: Any, kind: type) -> Iterator[bytes]:
         yield f"{_name(kind)} {len(value)}(".encode()
         for item in value:
             yield from _parts(item)
+    elif _says_what_it_is_made_of(kind):
+        yield from _parts(value.__reduce__())
     elif is_dataclass(value):
         yield f"{_name(kind)};".encode()
     else:
@@ -101,25 +103,33 @@ def _name(kind: type) -> str:
 
 
 def names_of(value: Any) -> tuple[str, ...]:
-    """The fields of a record; none for anything else."""
+    """The fields of a record; none for anything else, and for one that says itself what it is made of."""
     kind: Any = type(value)
     return _names(kind)
 
 
 @functools.cache
 def _names(kind: Any) -> tuple[str, ...]:
+    if _says_what_it_is_made_of(kind):
+        return ()
     if issubclass(kind, BaseModel):
         return tuple(kind.model_fields)
     return tuple(f.name for f in fields(kind)) if is_dataclass(kind) else ()
 
 
+def _says_what_it_is_made_of(kind: Any) -> bool:
+    """Whether a record has a ``__reduce__`` of its own, as one that holds what cannot be copied."""
+    return is_dataclass(kind) and kind.__reduce__ is not object.__reduce__
+
+
 # ------------------------------------------------------------------------------------------------ watching
 class Reads:
-    """Digests of what was read, by path."""
+    """Digests of what was read, by path; ``known`` is False where something read has no digest."""
 
     def __init__(self) -> None:
         """Nothing was read yet."""
         self.digests: dict[Path, bytes] = {}
+        self.known = True
 
     def watched(self, value: Any, path: Path = ()) -> Any:
         """The value where it is no record, noted as read; else one that notes what is read through it."""
@@ -146,8 +156,11 @@ class Reads:
         self._note((*path, KEY), tuple(keys))
 
     def _note(self, path: Path, value: Any) -> None:
-        if path not in self.digests:
-            self.digests[path] = digest(value)
+        try:
+            if path not in self.digests:
+                self.digests[path] = digest(value)
+        except UnknownValueError:
+            self.known = False
 
     def agree(self, value: Any) -> bool:
         """Whether all that was read is the same in another value."""

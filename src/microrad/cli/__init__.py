@@ -76,7 +76,6 @@ def _init_preset(file: Path, name: str) -> Outcome:
     return Outcome(f"{first}Next: {run_it}")
 
 
-Fresh = Annotated[bool, typer.Option("--fresh", help="Compute all of it, also what an earlier run has kept.")]
 _FOLDER = "Folder to write [default: <name of the mission file>-study in the current folder]."
 
 
@@ -94,7 +93,9 @@ def run(
     output: Annotated[Path | None, option("--output", "FOLDER", _FOLDER)] = None,
     mirror: Annotated[Path | None, option("--mirror", "FILE", "Mirror file in place of the mission's mirror.")] = None,
     overwrite: Overwrite = False,
-    fresh: Fresh = False,
+    fresh: Annotated[
+        bool, typer.Option("--fresh", help="Compute all of it, also what an earlier run has kept.")
+    ] = False,
     as_json: Json = False,
 ) -> Outcome:
     """Run the whole study of a mission.
@@ -126,11 +127,18 @@ def run(
     return Outcome(f"{report.verdict_text(study)}\n", code, afterwards=write)
 
 
-def _contents(mission: "MissionFile") -> dict[str, bytes]:
-    """The files that a mission names, which its parts read beside it."""
+def _contents(mission: "MissionFile") -> dict[str, bytes | None]:
+    """The files that a mission names, which its parts read beside it; None for one that is not there to be read."""
     from microrad.missionfile import named_files
 
-    return {name: (mission.path.parent / name).read_bytes() for name in named_files(mission.mission)}
+    return {name: _content(mission.path.parent / name) for name in named_files(mission.mission)}
+
+
+def _content(path: Path) -> bytes | None:
+    try:
+        return path.read_bytes()
+    except (OSError, ValueError):
+        return None
 
 
 def _study(mission: "MissionFile", progress: OnProgress, parts: "Kept") -> "Study":

@@ -109,19 +109,20 @@ def command(body: Callable[_Arguments, Outcome]) -> Callable[_Arguments, NoRetur
     def wrapped(*args: _Arguments.args, **kwargs: _Arguments.kwargs) -> NoReturn:
         try:
             outcome = body(*args, **kwargs)
-            if outcome.afterwards and (code := _printed(outcome)) == outcome.code:
-                outcome = Outcome(outcome.afterwards(), code)
+            code = _printed(outcome.text, outcome.code)
+            if outcome.afterwards and code != INTERRUPTED:
+                code = _printed(outcome.afterwards(), code)
         except (Exception, KeyboardInterrupt) as error:
             raise typer.Exit(_failed(error)) from None
-        raise typer.Exit(_printed(outcome))
+        raise typer.Exit(code)
 
     return wrapped
 
 
-def _printed(outcome: Outcome) -> int:
-    """Print the outcome and return its exit code, or the code for an output that nobody takes."""
+def _printed(text: str, code: int) -> int:
+    """Print a text and return the exit code that there was, or the one for an output that nobody takes."""
     try:
-        print(outcome.text, flush=True)
+        print(text, flush=True)
     except BrokenPipeError:
         _close_stdout()
         return UNREAD
@@ -133,7 +134,7 @@ def _printed(outcome: Outcome) -> int:
         _close_stdout()
         say("interrupted while printing")
         return INTERRUPTED
-    return outcome.code
+    return code
 
 
 def _close_stdout() -> None:
