@@ -90,10 +90,8 @@ def _others(value: Any, kind: type) -> Iterator[bytes]:
         yield f"{_name(kind)} {len(value)}(".encode()
         for item in value:
             yield from _parts(item)
-    elif _says_what_it_is_made_of(kind):
-        yield from _parts(value.__reduce__())
-    elif is_dataclass(value):
-        yield f"{_name(kind)};".encode()
+    elif is_dataclass(value):  # without fields, or it says itself what it is made of
+        yield from _parts(value.__reduce__()) if _says_what_it_is_made_of(kind) else [f"{_name(kind)};".encode()]
     else:
         raise UnknownValueError(f"a value of the type {_name(kind)}")
 
