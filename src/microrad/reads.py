@@ -14,7 +14,7 @@ from enum import Enum
 from hashlib import sha256
 from pathlib import PurePath
 from types import BuiltinFunctionType, FunctionType, MappingProxyType
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from pydantic import BaseModel
@@ -91,7 +91,9 @@ def _others(value: Any, kind: type) -> Iterator[bytes]:
         for item in value:
             yield from _parts(item)
     elif is_dataclass(value):  # without fields, or it says itself what it is made of
-        yield from _parts(value.__reduce__()) if _says_what_it_is_made_of(kind) else [f"{_name(kind)};".encode()]
+        yield from (
+            _parts(cast("Any", value).__reduce__()) if _says_what_it_is_made_of(kind) else [f"{_name(kind)};".encode()]
+        )
     else:
         raise UnknownValueError(f"a value of the type {_name(kind)}")
 
