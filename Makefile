@@ -3,7 +3,8 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 DEMO := demo
-ENDURANCE := tests/test_campaign_run.py tests/test_report_browser.py tests/test_kept_study.py
+# Three processes for two cores: some tests wait for a browser, a worker or a child.
+SIDE_BY_SIDE := --numprocesses 3 --dist loadfile --no-loadscope-reorder
 
 .PHONY: demo test unit lint types compiled contract numbers endurance benchmark clean
 .DELETE_ON_ERROR:
@@ -35,11 +36,12 @@ numbers: $(VENV)/.test
 	$(BIN)/python scripts/numbers check
 
 unit: $(VENV)/.test
-	$(BIN)/python -m pytest --numprocesses 2 --dist loadfile --durations 10
+	$(BIN)/python -m pytest $(SIDE_BY_SIDE) --durations 10
 
-# What `make test` does once, many times: kills, browser pages at all widths, every key of the mission. For a release.
+# All tests, and what `make test` does once, many times: kills, browser pages at all widths, every key of the mission.
+# For a release.
 endurance: $(VENV)/.test
-	MICRORAD_ENDURANCE=1 $(BIN)/python -m pytest --numprocesses 2 --dist loadfile $(ENDURANCE)
+	MICRORAD_ENDURANCE=1 $(BIN)/python -m pytest $(SIDE_BY_SIDE) --durations 10
 
 benchmark: $(VENV)/.test
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[benchmark]'

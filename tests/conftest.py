@@ -30,6 +30,33 @@ if os.environ.get("HYPOTHESIS_PROFILE", "gate") == "gate":
         providers._get_local_constants = nothing
 
 
+LONGEST = (
+    "test_studio_browser.py",
+    "test_report_browser.py",
+    "test_campaign_cluster.py",
+    "test_study.py",
+    "test_cli.py",
+    "test_ladder.py",
+    "test_docs_gallery.py",
+    "test_report.py",
+    "test_campaign_engines.py",
+    "test_studio_bench_browser.py",
+    "test_studio_design_browser.py",
+    "test_kept_study.py",
+    "test_kernels.py",
+)
+"""Files that processes are handed first: none of them is left with a long one when the others have ended."""
+
+
+def pytest_collection_modifyitems(config, items):
+    """The longest files first; repetitions only where they are asked for."""
+    if not os.environ.get("MICRORAD_ENDURANCE"):
+        repeated = [item for item in items if item.get_closest_marker("endurance")]
+        items[:] = [item for item in items if not item.get_closest_marker("endurance")]
+        config.hook.pytest_deselected(items=repeated)
+    items.sort(key=lambda item: LONGEST.index(item.path.name) if item.path.name in LONGEST else len(LONGEST))
+
+
 def pytest_configure(config):
     shared.begin(config)
     waiting.told = os.dup(2)  # before what tests write is taken in

@@ -199,7 +199,15 @@ def test_init_then_run(call, folder):
     assert sorted(p.name for p in folder.iterdir()) == ["leo-geo-study", "leo-geo.toml"]
 
 
-def test_identify_then_run_on_the_mirror_it_wrote(call, refused, folder, loop_mirror, plain, monkeypatch):
+@pytest.fixture
+def undrawn(monkeypatch):
+    """Reports without figures, which `test_init_then_run` draws."""
+    for module in (day_plots, figures, link_figures, paper_bench):
+        monkeypatch.setattr(module, "draw", lambda *args: ())
+
+
+@pytest.mark.usefixtures("undrawn")
+def test_identify_then_run_on_the_mirror_it_wrote(call, refused, folder, loop_mirror, plain):
     args = ("run", plain, "--mirror", loop_mirror, "--json")
     result = call(*args)
     assert (result.code, result.err) == (0, "")
@@ -214,13 +222,12 @@ def test_identify_then_run_on_the_mirror_it_wrote(call, refused, folder, loop_mi
         assert r["limited_by"] == "dynamics of the mirror, which its model does not have"
 
     assert "replace them with --overwrite" in refused(*args)
-    for module in (day_plots, figures, link_figures, paper_bench):  # drawn above
-        monkeypatch.setattr(module, "draw", lambda *args: ())
     (folder / "leo-geo-study" / "report.html").write_text("old")
     assert call(*args, "--overwrite").code == 0
     assert (folder / "leo-geo-study" / "report.html").stat().st_size > 1000
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_a_link_that_does_not_close_is_exit_1_and_has_its_report(call, folder, loop_mirror):
     dim = mission(folder / "dim.toml", ('required_power = "10 pW"', 'required_power = "1 nW"'))
     result = call("run", dim, "--mirror", loop_mirror, "--output", "results/first")
@@ -316,14 +323,13 @@ def test_a_full_disk_during_run_leaves_nothing_but_the_verdict(call, folder, mon
     assert listing(folder) == before
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_a_cache_folder_that_cannot_be_used_is_told_once_and_the_run_goes_on(call, folder, monkeypatch):
     (folder / "cache").write_text("no folder", encoding="utf-8")
     found = plain_study()
     monkeypatch.delenv("MICRORAD_KEEP")
     monkeypatch.setenv("XDG_CACHE_HOME", str(folder / "cache"))
     monkeypatch.setattr(study, "run", lambda *args: found)
-    for module in (day_plots, figures, link_figures, paper_bench):
-        monkeypatch.setattr(module, "draw", lambda *args: ())
     result = call("run", PAPER)
     assert result.code == 0
     assert result.err.count("\n") == 1

@@ -32,7 +32,7 @@ def told(path, name, machine):
     return ran.stdout
 
 
-@pytest.mark.parametrize("name", ["LQG", "PI + notch"])
+@pytest.mark.parametrize("name", ["LQG", pytest.param("PI + notch", marks=pytest.mark.endurance)])
 def test_the_shipped_loop_is_tuned_and_simulated_to_the_same_digits_on_another_processor(name):
     one, other = (told(SHIPPED, name, machine) for machine in ("Prescott", "Haswell"))
     assert one == other

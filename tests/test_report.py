@@ -434,7 +434,9 @@ def test_two_runs_write_the_same_page_and_figures(paper, written, tmp_path):
         assert (tmp_path / "again" / path.relative_to(written)).read_bytes() == path.read_bytes()
 
 
-def test_results_are_never_replaced_silently(small, tmp_path):
+def test_results_are_never_replaced_silently(small, tmp_path, monkeypatch):
+    for module in (figures, link_figures, paper_bench):
+        monkeypatch.setattr(module, "draw", lambda *args: ())
     target = tmp_path / "out"
     report.write(small, target)
     before = {p: p.read_bytes() for p in target.rglob("*") if p.is_file()}

@@ -1,6 +1,5 @@
 """The report in Chromium: nothing is loaded, no error, each figure comes alive and prints, and anyone can read it."""
 
-import os
 import re
 from pathlib import Path
 
@@ -16,13 +15,14 @@ from microrad.report import budget_views, campaign_page, day_views
 from shipped import plain_study
 from waiting import HANG_MS
 
-WIDTHS = (1280, 400)
 A4_PX = 680  # between the margins
 ALIVE = {"report": 20, "day": 6, "campaign": 6, "identification": 5}
 """Pages with interactive figures, and how many they have at least."""
-ENDURANCE = bool(os.environ.get("MICRORAD_ENDURANCE"))
 SEEN = [("report", 1280), ("report", 400), ("day", 400), ("campaign", 1280), ("identification", 400)]
-SEEN += [("day", 1280), ("campaign", 400), ("identification", 1280)] if ENDURANCE else []
+SEEN += [
+    pytest.param(*each, marks=pytest.mark.endurance)
+    for each in (("day", 1280), ("campaign", 400), ("identification", 1280))
+]
 """Pages and widths: each page once, and the report at both."""
 MOST_BYTES = 6_000_000
 
@@ -112,7 +112,7 @@ def test_each_figure_comes_alive_and_nothing_is_loaded_or_complained_of(opened, 
     assert here.page.evaluate("document.documentElement.scrollWidth") <= width
     ids = here.page.evaluate("[...document.querySelectorAll('[id]')].map(each => each.id)")
     assert len(ids) == len(set(ids)) > 30
-    if (name, width) != ("report", 400) or ENDURANCE:  # the longest page is looked at once
+    if (name, width) != ("report", 400):  # the longest page is looked at once
         assert_no_barrier(here.page)
 
 
@@ -123,7 +123,7 @@ def assert_no_barrier(page):
     assert [(each["id"], each["impact"], each["nodes"][0]["html"][:150]) for each in found] == []
 
 
-@pytest.mark.parametrize("width", WIDTHS)
+@pytest.mark.parametrize("width", [400, pytest.param(1280, marks=pytest.mark.endurance)])
 def test_the_page_of_budgets_is_pictures_with_their_numbers_below(opened, files, width):
     here = opened("budget", width)
     assert all(visible(figure, "svg[role=img]") for figure in here.figures("figure"))

@@ -294,7 +294,7 @@ def rows_in(ledger):
 def test_a_campaign_shows_its_figures_while_it_runs_goes_on_after_a_cancel_and_has_its_report(
     studio, tab, opened, pictures
 ):
-    rows, ledger = 4096, studio.folder / "campaign.ledger"
+    rows, ledger = 2048, studio.folder / "campaign.ledger"
     campaign_file(studio.folder, runs=rows, duration="1 s")
     tab.get_by_role("link", name="Runs").click()
     api.expect(tab.get_by_label("Ledger")).to_have_value("campaign.ledger")
@@ -347,5 +347,7 @@ def test_each_page_fits_and_has_no_serious_fault_for_those_who_do_not_see_it(ope
         settled(tab)
         tab.screenshot(path=pictures / f"{name}-{width}.png")
         assert tab.evaluate("document.documentElement.scrollWidth - document.documentElement.clientWidth") <= 0
+        if width != max(WIDTHS) and not os.environ.get("MICRORAD_ENDURANCE"):
+            continue  # what cannot be seen is the same at all widths
         serious = [each for each in violations(tab) if each["impact"] in ("serious", "critical")]
         assert [f"{each['id']}: {[node['html'][:150] for node in each['nodes']][:3]}" for each in serious] == []
