@@ -5,7 +5,6 @@ import os
 import random
 import subprocess
 import sys
-import tempfile
 import threading
 from pathlib import Path
 
@@ -154,12 +153,12 @@ def test_workers_killed_at_random_lose_and_double_nothing(engine, stuck):
 @pytest.mark.parametrize("deed", ["endless", "hog"])
 def test_close_stops_at_once_whatever_runs_and_leaves_nothing(deed, tmp_path, monkeypatch):
     """At once: its workers are killed before anything is waited for; what they do has no end of its own."""
-    folders = {p.name for p in Path(tempfile.gettempdir()).glob("microrad-dask-*")}
     table = {"else": f"{deed} {tmp_path}/begun", "0": "work"}
     one = DaskEngine(json.dumps(table).encode(), TARGET, workers=2, late_s=HANG_S)
-    own = one._cluster._cluster
+    own, place = one._cluster._cluster, Path(one._cluster._folder)
     workers = [nanny.pid for nanny in own.workers.values()]
     assert len(workers) == 2
+    assert place.is_dir()
     outcomes, calls = one.outcomes(iter(chunks(*range(9)))), []
     assert next(outcomes).kind == "done"
     until((tmp_path / "begun").exists, "the deed")
@@ -170,7 +169,7 @@ def test_close_stops_at_once_whatever_runs_and_leaves_nothing(deed, tmp_path, mo
         one.close()
     assert (sorted(calls[:2]), calls[2]) == (sorted(workers), "close")
     assert not any(map(alive, workers))
-    assert {p.name for p in Path(tempfile.gettempdir()).glob("microrad-dask-*")} <= folders
+    assert not place.exists()
     with pytest.raises(CampaignError, match="were stopped"):
         run(one, chunks(1))
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import pytest
 
-from microrad import kept
+from microrad import kept, machine
 from microrad.kept import Kept
 
 
@@ -269,3 +269,21 @@ def test_it_is_off_where_the_environment_says_so(monkeypatch, tmp_path):
     monkeypatch.delenv(kept.OFF)
     kept.of_user().part(samples, ONE, 3)
     assert len(files(tmp_path / "microrad" / "parts")) == 1
+
+
+def test_the_code_of_a_number_is_known_by_its_files_and_not_by_what_is_compiled_or_gives_a_page_its_looks(
+    monkeypatch, tmp_path
+):
+    for name in ("machine.py", "values.toml", "style.css", "__pycache__/machine.pyc"):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text("1")
+    monkeypatch.setattr(machine, "__file__", str(tmp_path / "machine.py"))
+    known = {machine.source_sha256.__wrapped__()}
+    (tmp_path / "__pycache__" / "loops.nbc").write_text("compiled meanwhile")
+    (tmp_path / "style.css").write_text("other looks")
+    known.add(machine.source_sha256.__wrapped__())
+    assert len(known) == 1
+    for name in ("machine.py", "values.toml"):
+        (tmp_path / name).write_text("2")
+        known.add(machine.source_sha256.__wrapped__())
+    assert len(known) == 3
