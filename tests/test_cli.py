@@ -423,6 +423,27 @@ def test_an_interrupt_during_run_leaves_nothing(folder, loop_mirror, plain, name
     assert listing(folder) == {}
 
 
+def test_after_an_interrupt_nothing_is_taken_apart(folder):
+    """What the compiler was loading is in pieces, and to dispose of it may crash."""
+    code = """
+import atexit
+from microrad.cli import app, frame
+
+@app.command()
+@frame.command
+def stopped():
+    print("half a line", end="")
+    raise KeyboardInterrupt
+
+atexit.register(print, "taken apart")
+frame.main()
+"""
+    run = [sys.executable, "-c", code, "stopped"]
+    ended = subprocess.run(run, capture_output=True, text=True, check=False)
+    assert (ended.returncode, ended.stdout) == (130, "half a line")
+    assert ended.stderr == "microrad: interrupted, nothing was written\n"
+
+
 @pytest.mark.usefixtures("interruptible")
 def test_an_interrupt_that_falls_into_a_call_back_is_not_lost(monkeypatch):
     @ctypes.CFUNCTYPE(None)

@@ -88,7 +88,24 @@ def main() -> None:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, TextIOWrapper):
             stream.reconfigure(errors="replace")  # a terminal without µ is no reason to fail
-    app(prog_name="microrad")
+    try:
+        app(prog_name="microrad")
+    except SystemExit as ended:
+        if ended.code == INTERRUPTED:
+            _leave(INTERRUPTED)
+        raise
+
+
+def _leave(code: int) -> NoReturn:
+    """End the process where it stands: an interrupt may have left half a module in the compiler.
+
+    The interpreter would take that apart at its end, and crash now and then (seen: llvmlite, in one of 100 interrupts
+    while loops are loaded). Files and folders are in order by then: what was open has been left by its own way out.
+    """
+    for stream in (sys.stdout, sys.stderr):
+        with contextlib.suppress(OSError, ValueError):
+            stream.flush()
+    os._exit(code)
 
 
 def interrupt_again(unraisable: "sys.UnraisableHookArgs") -> None:
