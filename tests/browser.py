@@ -164,9 +164,13 @@ def tab(opened):
 
 
 @pytest.fixture(scope="session")
-def pictures(tmp_path_factory):
-    """Where screenshots go: the folder that MICRORAD_SCREENSHOTS names, else a temporary one."""
+def picture():
+    """Keeps a screenshot where MICRORAD_SCREENSHOTS names a folder, and takes none elsewhere."""
     named = os.environ.get("MICRORAD_SCREENSHOTS")
-    folder = Path(named) if named else tmp_path_factory.mktemp("screenshots")
-    folder.mkdir(parents=True, exist_ok=True)
-    return folder
+
+    def take(page, name, **options):
+        if named:
+            Path(named).mkdir(parents=True, exist_ok=True)
+            page.screenshot(path=Path(named) / name, **options)
+
+    return take

@@ -126,28 +126,44 @@ def test_a_job_that_keeps_the_interpreter_to_itself_is_late(engine):
 
 def test_workers_killed_at_random_lose_and_double_nothing(engine, stuck):
     """Job 107 is endless until it is killed; so a kill hits a job, however the others fall between them."""
-    todo, done, died, hits, generator = chunks(107, *range(60)), {}, set(), [], random.Random(1)
+    todo, done, died, generator = chunks(107, *range(60)), {}, set(), random.Random(1)
     names = sorted(job.number for job in todo)
 
-    def kill():
+    def kill_all():
         until(stuck.exists, "the job that does not end")
+        for worker in workers_here():
+            worker.kill()
+
+    def kill():
         living = workers_here()
-        if not hits:
-            hits.extend(living)
-            for worker in living:
-                worker.kill()
-        elif len(engine._threads) == 2 and living:  # a cluster whose workers die as they start never works
+        if len(engine._threads) == 2 and living:  # a cluster whose workers die as they start never works
             generator.choice(living).kill()
 
     with killing(kill, 0.1) as heard:
+        killer = beside(kill_all)
         while todo:
             outcomes = list(map(heard, engine.outcomes(iter(todo))))
             assert sorted(o.job for o in outcomes) == sorted(todo)
             done |= {o.job.number: o.payload for o in outcomes if o.kind == "done"}
             todo = [o.job for o in outcomes if o.kind != "done"]
             died |= {job.number for job in todo}
+    killer.join(HANG_S)
     assert done == {n: f"0/{n}/-1".encode() for n in names}
     assert 107 in died
+
+
+def test_a_worker_that_was_given_up_is_started_anew(engine):
+    """As dask gives up one that is not back within 15 s, on a busy machine."""
+    own = engine._cluster._cluster
+    until(lambda: len(own.scheduler_info["workers"]) == 2, "two workers")
+    name, nanny = next(iter(own.workers.items()))
+    del own.workers[name]
+    own.sync(nanny.close)
+    until(lambda: len(own.scheduler_info["workers"]) == 1, "its end")
+    assert kinds(run(engine, chunks(*range(20)))) == {}
+    until(lambda: run(engine, chunks(0)) and len(own.scheduler_info["workers"]) == 2, "its successor")
+    assert nanny not in own.workers.values()
+    assert len(own.workers) == 2
 
 
 @pytest.mark.parametrize("deed", ["endless", "hog"])

@@ -107,7 +107,7 @@ def looped(path, unit, scale=1.0):
     return path
 
 
-def test_each_recording_has_its_own_units_and_one_that_cannot_be_read_says_so(opened, tmp_path, pictures):
+def test_each_recording_has_its_own_units_and_one_that_cannot_be_read_says_so(opened, tmp_path, picture):
     tab = opened("mirror")
     for name, unit, scale in (("a_mrad", "mrad", 1.0), ("b_urad", "urad", 1e3)):
         drop(tab, looped(tmp_path / f"{name}.csv", unit, scale))
@@ -128,7 +128,7 @@ def test_each_recording_has_its_own_units_and_one_that_cannot_be_read_says_so(op
     api.expect(figure_title(tab, "output (mrad)")).to_have_count(2)
     api.expect(tab.locator(".mirror-file .seen")).to_have_text("a_mrad.csv")
     api.expect(fault).to_contain_text("c_nan.csv: ")
-    tab.screenshot(path=pictures / "mirror-units.png", full_page=True)
+    picture(tab, "mirror-units.png", full_page=True)
     for name in ("c_nan.csv", "a_mrad.csv", "b_urad.csv"):
         tab.locator(".mirror-file", has_text=name).get_by_role("button", name="Remove").click()
         api.expect(tab.locator(".mirror-file", has_text=name)).to_have_count(0)
@@ -140,7 +140,7 @@ def figure_title(tab, words):
     return tab.locator(".js-plotly-plot text", has_text=words)
 
 
-def test_a_recording_is_dropped_identified_while_one_looks_on_and_its_mirror_used(studio, opened, recording, pictures):
+def test_a_recording_is_dropped_identified_while_one_looks_on_and_its_mirror_used(studio, opened, recording, picture):
     (file, says), tab = recording, opened("mirror")
     drop(tab, file)
     api.expect(tab.locator(".mirror-file .seen")).to_have_text(file.name)
@@ -163,7 +163,7 @@ def test_a_recording_is_dropped_identified_while_one_looks_on_and_its_mirror_use
     until(tab, lambda: (kept_form(kept).setting.name, kept_form(kept).setting.static) == ("stage", True), "the form")
     tab.get_by_role("button", name="Identify").click()
     tab.get_by_role("button", name="Cancel").wait_for()
-    tab.screenshot(path=pictures / "mirror-running.png", full_page=True)
+    picture(tab, "mirror-running.png", full_page=True)
     tab.reload()  # the job and the form outlive the page
     tab.get_by_role("link", name="Open the report").wait_for()
     assert tab.get_by_label("Name of the mirror").input_value() == "stage"
@@ -174,7 +174,7 @@ def test_a_recording_is_dropped_identified_while_one_looks_on_and_its_mirror_use
     chosen = tab.get_by_role("row").filter(has=tab.get_by_text("chosen", exact=True))
     api.expect(chosen).to_have_count(1)
     wait_for_traces(tab, "Measured loop and that of the model", 2)
-    tab.screenshot(path=pictures / "mirror-identified.png", full_page=True)
+    picture(tab, "mirror-identified.png", full_page=True)
     (_, measured), (_, model) = traces(tab, "Measured loop and that of the model").values()
     assert 0 < np.std(measured - model) < 0.05 * np.ptp(measured)
     before = studio.file.read_text("utf-8")
@@ -190,7 +190,7 @@ def test_a_recording_is_dropped_identified_while_one_looks_on_and_its_mirror_use
     mission.get_by_role("dialog").wait_for(state="hidden")
 
 
-def test_a_controller_is_chosen_and_its_loop_answers(opened, pictures):
+def test_a_controller_is_chosen_and_its_loop_answers(opened, picture):
     tab = opened("control")
     choose(tab, "Controller", "PID of [control]")
     tab.get_by_text(re.compile("^Error: with hysteresis")).wait_for()
@@ -205,7 +205,7 @@ def test_a_controller_is_chosen_and_its_loop_answers(opened, pictures):
     tab.get_by_label("Step", exact=True).fill("5 V")
     tab.get_by_text('step: "5 V" is in "V", another kind of quantity').wait_for()
     api.expect(tab.get_by_label("Step response")).to_have_class(re.compile(r"\bbehind\b"))
-    tab.screenshot(path=pictures / "control.png", full_page=True)
+    picture(tab, "control.png", full_page=True)
     tab.get_by_label("Step", exact=True).fill("50 urad")
     api.expect(tab.get_by_label("Step response")).not_to_have_class(re.compile(r"\bbehind\b"))
     assert tab.get_by_text("another kind of quantity").count() == 0

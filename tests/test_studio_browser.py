@@ -51,7 +51,7 @@ def field(page, key):
 
 
 # ------------------------------------------------------------------------------------------------------------ mission
-def test_an_aperture_is_changed_checked_saved_and_budgeted_by_the_command_line(studio, tab, call, pictures):
+def test_an_aperture_is_changed_checked_saved_and_budgeted_by_the_command_line(studio, tab, call, picture):
     """The way of a mission: changed in the form, refused with the command line's words, corrected, saved, run."""
     show_table(tab, "terminals")
     row = field(tab, "leo_aperture")
@@ -62,7 +62,7 @@ def test_an_aperture_is_changed_checked_saved_and_budgeted_by_the_command_line(s
     (fault,) = draft.problems
     assert note.inner_text() == f"{fault.reason}; expected: {fault.expected}"
     tab.get_by_text("not saved, 1 fault to correct").wait_for()
-    tab.screenshot(path=pictures / "mission-wrong-unit.png")
+    picture(tab, "mission-wrong-unit.png")
     row.get_by_label("leo_aperture").fill("6 cm")
     note.get_by_text("paper: Table 2").wait_for()
     assert "wrong" not in note.get_attribute("class")
@@ -91,7 +91,7 @@ def test_an_aperture_is_changed_checked_saved_and_budgeted_by_the_command_line(s
     tab.reload()
     tab.get_by_role("heading", name="Verdicts").wait_for()
     assert tab.get_by_label("Compare with").input_value() == "the paper's mission"
-    tab.screenshot(path=pictures / "compare.png", full_page=True)
+    picture(tab, "compare.png", full_page=True)
 
 
 def test_the_text_and_the_form_follow_each_other(studio, tab):
@@ -170,7 +170,7 @@ def test_a_second_tab_and_a_reload_see_what_the_first_has_changed(tab, opened):
     tab.wait_for_function("[...document.querySelectorAll('input')].every(e => e.value !== '3.5 W')")
 
 
-def test_a_table_is_added_from_its_example_and_saved_under_another_name(studio, tab, pictures):
+def test_a_table_is_added_from_its_example_and_saved_under_another_name(studio, tab, picture):
     tab.get_by_role("button", name="Add a table").click()
     dialog = tab.get_by_role("dialog")
     dialog.get_by_label("Table").click()
@@ -182,7 +182,7 @@ def test_a_table_is_added_from_its_example_and_saved_under_another_name(studio, 
     dialog.get_by_label("Name of the file").fill("../outside.toml")
     dialog.get_by_role("button", name="Save", exact=True).click()
     dialog.get_by_text("its name holds a path; choose another name").wait_for()
-    tab.screenshot(path=pictures / "save-as.png")
+    picture(tab, "save-as.png")
     dialog.get_by_label("Name of the file").fill("with-channel")
     dialog.get_by_role("button", name="Save", exact=True).click()
     dialog.wait_for(state="hidden")
@@ -239,13 +239,13 @@ def job(page, number):
     return page.get_by_role("article").filter(has=page.get_by_role("heading", name=re.compile(rf"^{number}\.")))
 
 
-def test_a_study_is_cancelled_in_mid_run_from_another_tab_after_a_reload(studio, tab, opened, pictures):
+def test_a_study_is_cancelled_in_mid_run_from_another_tab_after_a_reload(studio, tab, opened, picture):
     tab.get_by_role("link", name="Runs").click()
     tab.get_by_role("button", name="Run the study").click()
     running = job(tab, 1)
     running.get_by_text("running", exact=True).wait_for()
     running.get_by_text(re.compile(r"\d+ %, \d+ of \d+: ")).wait_for()
-    tab.screenshot(path=pictures / "runs-running.png")
+    picture(tab, "runs-running.png")
     tab.reload()
     running.get_by_text(re.compile(r"\d+ %, \d+ of \d+: ")).wait_for()
     second = opened("runs")
@@ -257,7 +257,7 @@ def test_a_study_is_cancelled_in_mid_run_from_another_tab_after_a_reload(studio,
     job(tab, 1).wait_for(state="detached")
 
 
-def test_a_study_ends_with_its_verdict_and_a_report_in_the_page(studio, tab, pictures):
+def test_a_study_ends_with_its_verdict_and_a_report_in_the_page(studio, tab, picture):
     tab.get_by_role("link", name="Runs").click()
     api.expect(tab.get_by_label("Folder for the results")).to_have_value(re.compile("leo-geo-study"))
     tab.get_by_label("Folder for the results").fill("found")
@@ -270,7 +270,7 @@ def test_a_study_ends_with_its_verdict_and_a_report_in_the_page(studio, tab, pic
     done.get_by_role("button", name="Show report.html here").click()
     report = tab.frame_locator("iframe")
     report.get_by_role("heading", level=1).wait_for()
-    tab.screenshot(path=pictures / "runs-report.png")
+    picture(tab, "runs-report.png")
     policy = "fetch(document.querySelector('iframe').src).then(r => r.headers.get('content-security-policy'))"
     assert tab.evaluate(policy).startswith("sandbox ")
     with tab.expect_download() as download:
@@ -292,7 +292,7 @@ def rows_in(ledger):
 
 
 def test_a_campaign_shows_its_figures_while_it_runs_goes_on_after_a_cancel_and_has_its_report(
-    studio, tab, opened, pictures
+    studio, tab, opened, picture
 ):
     rows, ledger = 2048, studio.folder / "campaign.ledger"
     campaign_file(studio.folder, runs=rows, duration="1 s")
@@ -310,7 +310,7 @@ def test_a_campaign_shows_its_figures_while_it_runs_goes_on_after_a_cancel_and_h
         card.get_by_text(f"Of {done} rows so far ({rows} are wanted)").wait_for()
         assert card.get_by_role("row").filter(has_text="margin ≥").get_by_text("%").count() == 2
         card.get_by_role("figure").locator(".main-svg").first.wait_for()
-        page.screenshot(path=pictures / "runs-campaign.png", full_page=True)
+        picture(page, "runs-campaign.png", full_page=True)
         page.reload()
     there.get_by_role("button", name="Cancel").click()
     until(tab, (studio.folder / ".microrad-studio" / "jobs" / str(number) / "cancel").exists, "the cancel")
@@ -332,12 +332,12 @@ def test_a_campaign_shows_its_figures_while_it_runs_goes_on_after_a_cancel_and_h
     again.get_by_role("button", name="Write its report").click()
     again.get_by_role("button", name="Show campaign.html here").click()
     second.frame_locator("iframe").get_by_text(headline).first.wait_for()
-    second.screenshot(path=pictures / "runs-campaign-report.png", full_page=True)
+    picture(second, "runs-campaign-report.png", full_page=True)
 
 
 # ---------------------------------------------------------------------------------------------------------- each page
 @pytest.mark.parametrize("name", server.PAGES)
-def test_each_page_fits_and_has_no_serious_fault_for_those_who_do_not_see_it(opened, pictures, name):
+def test_each_page_fits_and_has_no_serious_fault_for_those_who_do_not_see_it(opened, picture, name):
     module = import_module(f"microrad.studio.pages.{name}")
     tab = opened(module.PATH.removeprefix("/"))
     tab.get_by_role("heading", name=module.TITLE, level=1).wait_for()
@@ -345,7 +345,7 @@ def test_each_page_fits_and_has_no_serious_fault_for_those_who_do_not_see_it(ope
     for width in WIDTHS:
         tab.set_viewport_size({"width": width, "height": 900})
         settled(tab)
-        tab.screenshot(path=pictures / f"{name}-{width}.png")
+        picture(tab, f"{name}-{width}.png")
         assert tab.evaluate("document.documentElement.scrollWidth - document.documentElement.clientWidth") <= 0
         if width != max(WIDTHS) and not os.environ.get("MICRORAD_ENDURANCE"):
             continue  # what cannot be seen is the same at all widths

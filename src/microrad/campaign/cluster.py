@@ -150,6 +150,7 @@ class _Cluster:
         import dask
         from distributed import LocalCluster
 
+        self.workers = workers
         self._folder = tempfile.mkdtemp(prefix="microrad-dask-")
         with dask.config.set({"distributed.scheduler.allowed-failures": 0, "distributed.admin.event-loop": "tornado"}):
             self._cluster: Any = LocalCluster(  # type: ignore[no-untyped-call]
@@ -162,6 +163,10 @@ class _Cluster:
                 local_directory=self._folder,
             )
         self.address: str = self._cluster.scheduler_address
+
+    def refill(self) -> None:
+        """Have workers started in place of those given up: dask gives up one that takes long to come back."""
+        self._cluster.scale(self.workers)
 
     def close(self) -> None:
         """Kill the workers, whatever they do, then the rest."""
@@ -294,6 +299,8 @@ class DaskEngine:
             if self._client.status == "running" and not isinstance(error, TimeoutError):
                 return  # it is lost, or there again, at the next look
             raise self._gone(f"it did not answer for {_ANSWER_S:g} s") from None
+        if self._cluster and len(self._threads) < self._cluster.workers:
+            self._cluster.refill()
         self._installed &= set(self._threads)
         self._install([address for address in self._threads if address not in self._installed])
         for flight in self._flights.values():
