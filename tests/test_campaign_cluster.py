@@ -157,14 +157,15 @@ def test_workers_killed_at_random_lose_and_double_nothing(engine, stuck):
 
 def test_a_worker_that_was_given_up_is_started_anew(engine):
     """As dask gives up one that is not back within 15 s, on a busy machine."""
-    own = engine._cluster._cluster
-    until(lambda: len(own.scheduler_info["workers"]) == 2, "two workers")
+    own, known = engine._cluster._cluster, engine._cluster._cluster.scheduler.workers
+    until(lambda: sorted(known) == sorted(str(nanny.worker_address) for nanny in own.workers.values()), "two workers")
     name, nanny = next(iter(own.workers.items()))
+    address = nanny.worker_address
     del own.workers[name]
     own.sync(nanny.close)
-    until(lambda: len(own.scheduler_info["workers"]) == 1, "its end")
+    until(lambda: address not in known, "its end")
     assert kinds(run(engine, chunks(*range(20)))) == {}
-    until(lambda: run(engine, chunks(0)) and len(own.scheduler_info["workers"]) == 2, "its successor")
+    until(lambda: run(engine, chunks(0)) and len(known) == 2, "its successor")
     assert nanny not in own.workers.values()
     assert len(own.workers) == 2
 
