@@ -29,7 +29,6 @@ from shipped import SHIPPED
 from studio_jobs import written
 from waiting import HANG_S, lines_of, until
 
-MICRORAD = (sys.executable, "-m", "microrad")
 APERTURE = "terminals.leo_aperture"
 
 
@@ -344,11 +343,20 @@ def test_to_be_open_to_others_needs_the_flag_typed_out_with_an_address(refused):
     assert "0.0.0.0" in refused("studio", "--expose-to-network", "0.0.0.0", "--no-browser")
 
 
+# What was started by nohup ignores this signal, and so do its children.
+HEARD = """
+import signal
+from microrad.cli import main
+signal.signal(getattr(signal, "SIGHUP", signal.SIGTERM), signal.SIG_DFL)
+main()
+"""
+
+
 @contextmanager
 def running(folder, *args, browser=None):
     pytest.importorskip("nicegui")
     process = subprocess.Popen(
-        [*MICRORAD, "studio", *(["--no-browser"] if browser is None else []), *args],
+        [sys.executable, "-c", HEARD, "studio", *(["--no-browser"] if browser is None else []), *args],
         cwd=folder,
         env=os.environ | ({} if browser is None else {"BROWSER": str(browser)}),
         stdout=subprocess.PIPE,
