@@ -3,6 +3,7 @@
 import math
 from dataclasses import replace
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,6 +14,10 @@ from microrad import lti
 from microrad.control import analysis, classical, descent, judge, lqg, search, tuning
 from microrad.control.lqg import LQG
 from microrad.control.problem import RESIDUAL, AxisController, Family, Parameter, Specification
+from microrad.fine_pointing import designs
+from microrad.fine_pointing.scenario import scene
+from microrad.missionfile import load_mission
+from shipped import SHIPPED
 
 PERIOD = 2e-4
 HALF = Specification(modulus_margin=0.5)
@@ -187,7 +192,7 @@ def test_a_narrow_dip_beside_the_grid_does_not_cost_the_margin():
 def test_a_search_whose_grid_overstates_the_margin_goes_on_with_a_stricter_one(monkeypatch):
     fine = tuning.tune(PI, [RESONANT], HALF, seed=2)
     dips = judge.Judge._dips
-    monkeypatch.setattr(judge.Judge, "_dips", lambda self, controller, cuts: 1.04 * dips(self, controller, cuts))
+    monkeypatch.setattr(judge.Judge, "_dips", lambda *args: [1.04 * d for d in dips(*args)])
     assert np.min(judge.Judge([RESONANT])(fine.controller).moduli) > 1.03 * fine.least_modulus
     found = tuning.tune(PI, [RESONANT], HALF, seed=2)
     assert 0.5 <= found.least_modulus < 0.505
@@ -291,6 +296,25 @@ def test_a_family_that_contains_another_is_never_worse(monkeypatch):
     assert found.values["notch depth"] == 1.0
 
 
+def test_the_notch_is_sought_beside_the_pi_and_far_from_it():
+    """The best is a wide notch beside the tuned PI on the one plant, far from it on the other; LQG is the floor."""
+    shipped = load_mission(SHIPPED)
+    seed = shipped.mission.fine_pointing.seed
+    paper = designs.plants(scene(shipped), shipped.mission, seed)
+    wanted = Specification(shipped.mission.fine_pointing.modulus_margin)
+    assert 1.0715e-6 < tuning.tune(classical.PI_NOTCH, paper, wanted, seed=seed).mean_rms_rad < 1.0730e-6
+    assert 1.0259e-6 < tuning.tune(classical.PI_NOTCH, [PLAIN], HALF, seed=1).mean_rms_rad < 1.0269e-6
+
+
+def test_an_optimum_beside_a_kink_is_the_same_from_every_start():
+    """On this mirror the margin's constraint passes from one dip of |1 + L| to another beside the optimum."""
+    soft = load_mission(SHIPPED, Path("docs/gallery/long-stroke.toml"))
+    mirror = designs.plants(scene(soft), soft.mission, soft.mission.fine_pointing.seed)
+    first, second = (tuning.tune(classical.RESONANT_DAMPING, mirror, HALF, seed=seed) for seed in (2, 3))
+    assert first.values == second.values
+    assert (first.mean_rms_rad, first.least_modulus) == (second.mean_rms_rad, second.least_modulus)
+
+
 def test_progress_is_reported_up_to_its_total():
     told = []
     tuning.tune(PI, [PLAIN], HALF, seed=1, on_progress=lambda *args: told.append(args))
@@ -337,7 +361,7 @@ def test_the_best_of_a_grid_is_looked_at_closely(monkeypatch):
     honest = tuning.grid_best(INTEGRAL, [RESONANT], HALF, grid)
     assert 0.5 <= honest.least_modulus < 0.53
     dips = judge.Judge._dips
-    monkeypatch.setattr(judge.Judge, "_dips", lambda self, controller, cuts: 1.2 * dips(self, controller, cuts))
+    monkeypatch.setattr(judge.Judge, "_dips", lambda *args: [1.2 * d for d in dips(*args)])
     assert tuning.grid_best(INTEGRAL, [RESONANT], HALF, grid).values == honest.values
 
 

@@ -196,6 +196,11 @@ SEARCHED = Kind(
     {"rad": 1e-10, "rad/V": 1e-12, "": 1e-4},
     "searches along flat valleys end where they are: far within the standard errors of what is barely told apart",
 )
+BARELY = Kind(
+    0.03,
+    {"rad": 1e-10, "rad/V": 1e-12, "": 1e-3},
+    "errors of poles beyond the excited band, and parameters known to 9 % at best: a third of their standard errors",
+)
 INDEX = Kind(0.05, {"": 0.01}, "shares of a variance, known from so many rows to some per cent of the whole")
 
 _ORBITS = r"contacts|constellation|gallery-constellation"
@@ -221,6 +226,7 @@ KINDS: Sequence[tuple[str, str, Kind]] = (
     (r"campaign.*", r".*(miss|outage|tail).*", RARE),
     (r"campaign.*", r".*sensitivities.*", INDEX),
     (r"campaign.*", r".*", ENSEMBLE),
+    (r"identify-whole", r"parameters\.bouc_wen_.*|linear\.poles_and_zeros\..*_error.*", BARELY),
     (r"identify-whole|gallery-lab", r".*", SEARCHED),
     (r"identify-.*", r".*", FITTED),
     (r".*", r".*", CLOSED),

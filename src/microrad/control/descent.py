@@ -12,14 +12,14 @@ from microrad.control.search import Search, Trial
 
 Floats = NDArray[np.float64]
 
-STEP = 1e-3
-"""Step of the rough search's differences, over a parameter's range."""
+STEP = 1e-4
+"""Step of the rough search's differences, to one side, over a parameter's range: it ends half a step off an optimum."""
 
 ROUGH, EXACT = (1e-6, 30), (1e-20, 200)
 """Gain of cost and number of iterations at which a program ends, of the candidates themselves and of their model."""
 
 NODE = 3e-3
-"""Distance of the five points of an exact derivative: it errs by some 1e-10 of rounding and 3e-12 of the fifth one."""
+"""First distance of the five points of a derivative: it errs by some 1e-10 of rounding and 3e-12 of the fifth one."""
 
 REACH, LEAST_REACH = 0.1, 1e-4
 """How far the optimum of a quadratic model is trusted, at first and at last, over a parameter's range."""
@@ -55,14 +55,14 @@ class _Local:
         return self._known[key]
 
     def slopes(self, place: Floats) -> Floats:
-        """Gradients of cost and constraints (rows), by a step to either side or as far as the bounds are."""
+        """Gradients of cost and constraints (rows), by a step towards the middle of the bounds."""
         key = place.tobytes()
         if key not in self._slopes:
             columns, inside = [], np.clip(place, 0.0, 1.0)  # a line search may look beyond
             for i in range(place.size):
-                ends = np.clip(inside[i] + np.array([-STEP, STEP]), 0.0, 1.0)
-                below, above = (_numbers(self.at(_with(inside, i, end))) for end in ends)
-                columns.append((above - below) / (ends[1] - ends[0]))
+                step = STEP if inside[i] < 0.5 else -STEP
+                there = _numbers(self.at(_with(inside, i, inside[i] + step)))
+                columns.append((there - _numbers(self.at(place))) / step)
             self._slopes[key] = np.array(columns).T
         return self._slopes[key]
 
@@ -138,11 +138,12 @@ def settle(search: Search, start: Trial) -> Trial:
     """The optimum beside ``start``, by the optima of quadratic models until one stands still.
 
     A search that builds up its curvature as it goes stops where the cost hardly falls, which in a flat valley is
-    anywhere; the model's curvature is that of the valley.
+    anywhere; the model's curvature is that of the valley. Where a model has misled, the next one reaches less far and
+    lays its points closer: a constraint that changes from one dip of |1 + L| to another has a kink.
     """
-    here, reach, model = start, REACH, None
+    here, reach, node = start, REACH, NODE
     for _ in range(MODELS if start.place.size else 0):
-        model = model or _model(search, here)
+        model = _model(search, here, node)
         if model is None:
             break
         there = search.at(here.place + _optimum(model, here.place, reach))
@@ -150,11 +151,11 @@ def settle(search: Search, start: Trial) -> Trial:
         if moved < SAME_PLACE:
             return there
         if there.score <= here.score + SAME_SCORE:
-            here, model = there, None
+            here = there
         elif reach < LEAST_REACH:
             break
         else:
-            reach *= 0.25
+            reach, node = 0.25 * reach, 0.5 * node
     return here
 
 
@@ -167,10 +168,10 @@ def _optimum(model: _Quadratic, place: Floats, reach: float) -> Floats:
     return _programmed(lambda x: model.at(x) - own, model.gradient, np.zeros(place.size), bounds, EXACT)
 
 
-def _model(search: Search, here: Trial) -> _Quadratic | None:
+def _model(search: Search, here: Trial, node: float) -> _Quadratic | None:
     """Value, slope and bend by differences of the fourth order; None where a candidate beside ``here`` is unstable."""
     place, d = here.place, here.place.size
-    offsets = [_offsets(float(x)) for x in place]
+    offsets = [_offsets(float(x), node) for x in place]
     near = np.append(True, here.excess < NEAR)
     value = _numbers(here)[near]
     slope, bend = np.zeros((value.size, d)), np.zeros((value.size, d, d))
@@ -178,24 +179,24 @@ def _model(search: Search, here: Trial) -> _Quadratic | None:
     def numbers(*moves: tuple[int, float]) -> Floats:
         there = place.copy()
         for i, offset in moves:
-            there[i] += NODE * offset
+            there[i] += node * offset
         trial = search.at(there)
         return _numbers(trial)[near] if trial.verdict.pole < 1.0 else np.full(value.size, np.nan)
 
     for i in range(d):
         points = np.array([value if offset == 0.0 else numbers((i, offset)) for offset in offsets[i]])
-        slope[:, i], bend[:, i, i] = (_weights(offsets[i], order) @ points / NODE**order for order in (1, 2))
+        slope[:, i], bend[:, i, i] = (_weights(offsets[i], order) @ points / node**order for order in (1, 2))
     for i, j in combinations(range(d), 2):
         (low, high), (left, right) = offsets[i][[1, 3]], offsets[j][[1, 3]]
         rising = numbers((i, low), (j, left)) + numbers((i, high), (j, right))
         falling = numbers((i, low), (j, right)) + numbers((i, high), (j, left))
-        bend[:, i, j] = bend[:, j, i] = (rising - falling) / (NODE**2 * (high - low) * (right - left))
+        bend[:, i, j] = bend[:, j, i] = (rising - falling) / (node**2 * (high - low) * (right - left))
     return _Quadratic(value, slope, bend) if np.all(np.isfinite(bend)) else None
 
 
-def _offsets(x: float) -> Floats:
+def _offsets(x: float, node: float) -> Floats:
     """Five points about a coordinate, in nodes, all within the bounds."""
-    room = max(0.0, 2.0 - x / NODE) - max(0.0, 2.0 - (1.0 - x) / NODE)
+    room = max(0.0, 2.0 - x / node) - max(0.0, 2.0 - (1.0 - x) / node)
     return np.arange(-2.0, 3.0) + room
 
 

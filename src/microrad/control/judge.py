@@ -14,6 +14,12 @@ from microrad.control.problem import OPTICAL, RESIDUAL, AxisController, DesignPl
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 
+CUTS = ("command", "optical")
+"""Where a loop is cut for its margins; the second only where the controller uses both sensors."""
+
+BEYOND = 10.0
+"""What stands for |1 + L| at a cut that a loop does not have."""
+
 NEAR_LEAST = 1.3
 """Dips of |1 + L| within this factor of the deepest one are followed between the grid's points."""
 
@@ -25,8 +31,8 @@ CLOSER = (0.05, 0.0025)
 class Verdict:
     """What a candidate reaches on all plants; no more than ``pole`` is known of one that is unstable.
 
-    ``moduli`` are the least |1 + L| by plant and band of frequencies: each is a smooth function of the parameters where
-    the least of them all is not. ``bandwidths_hz`` are by plant.
+    ``moduli`` are the least |1 + L| by cut, plant and band of frequencies: each is a smooth function of the parameters
+    where the least of them all is not. ``bandwidths_hz`` are by plant.
     """
 
     pole: float
@@ -75,25 +81,28 @@ class Judge:
         command = K[:, :1] * self._seen[:, 0] + K[:, 1:] * self._seen[:, 1]
         command /= whole[:, None]
         residual = self._white + self._to_residual[:, None] * command
-        moduli = np.minimum.reduceat(self._dips(controller, cuts), self._bands)
-        return Verdict(pole, self._mean(residual), moduli, self._bandwidths(cuts.get("optical", cuts["command"])))
+        moduli = np.full((len(CUTS), self._bands.size), BEYOND)
+        for row, dips in zip(moduli, self._dips(controller, cuts), strict=False):
+            row[:] = np.minimum.reduceat(dips, self._bands)
+        bandwidths = self._bandwidths(cuts.get("optical", cuts["command"]))
+        return Verdict(pole, self._mean(residual), moduli.ravel(), bandwidths)
 
     def unstable(self, pole: float) -> Verdict:
         """What is said of a candidate that is unstable, or that could not be built."""
-        return Verdict(pole, math.inf, np.zeros(self._bands.size), np.zeros(len(self._plants)))
+        return Verdict(pole, math.inf, np.zeros(len(CUTS) * self._bands.size), np.zeros(len(self._plants)))
 
     def _mean(self, white: Complexes) -> float:
         """Mean over the plants of the variance that these responses to the white sequences leave."""
         spectrum = np.sum(white.real**2 + white.imag**2, axis=1)
         return float(np.mean(np.add.reduceat(self._weights * spectrum, self._edges[:-1])))
 
-    def _dips(self, controller: AxisController, cuts: dict[str, Floats]) -> Floats:
-        """The least distance over the cuts, each local minimum on the grid replaced by the least between its points.
+    def _dips(self, controller: AxisController, cuts: dict[str, Floats]) -> list[Floats]:
+        """The distances by cut, each local minimum on the grid replaced by the least between its points.
 
         A parabola through a minimum and its neighbours tells where it is; what is near the least of all is looked at
         again there, more closely each time, so that the least moves smoothly with the controller.
         """
-        least = np.full(self._freq.size, math.inf)
+        by_cut = []
         deepest = NEAR_LEAST * min(float(np.min(distance)) for distance in cuts.values())
         for broken_at, distance in cuts.items():
             found = distance.copy()
@@ -101,8 +110,8 @@ class Judge:
             found[at] = np.sqrt(np.maximum(squared, 0.0))
             near = found[at] < deepest
             found[at[near]] = self._closer(controller, broken_at, at[near], where[near])
-            least = np.minimum(least, found)
-        return least
+            by_cut.append(found)
+        return by_cut
 
     def _minima(self, distance: Floats) -> tuple[NDArray[np.intp], Floats, Floats]:
         """Places on the grid, frequencies and squares of the local minima, by parabolas through three points each."""

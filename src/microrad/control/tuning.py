@@ -28,7 +28,7 @@ OVERSTATED = 4
 SURVEY = 100
 """Places of the Latin hypercube that a search begins with."""
 
-STARTS, AGREE = 6, 3
+STARTS, AGREE = 8, 3
 """Places that a local search sets out from, as a family may have several optima; no more once so many of them have led
 to the best of them."""
 
@@ -93,13 +93,15 @@ def tune(
     search = Search(family, plants, specification)
     contained = _contained(search, seed, survey, base)
     surveyed = []
-    for place in _hypercube(len(search.parameters), survey, seed):
+    for place in _places(search, contained, survey, seed):
         surveyed.append(search.at(place))
         on_progress(len(surveyed), total, what)
     if not search.trials:
         raise ValueError(_no_stable(search))
     rough = []
-    for start in [*contained, *apart(sorted(surveyed, key=_score), STARTS - len(contained), 0.1)]:
+    halves = sorted(surveyed[::2], key=_score), sorted(surveyed[1::2], key=_score)
+    best = [trial for pair in zip(*halves, strict=False) for trial in pair]
+    for start in [*contained, *apart(best, STARTS - len(contained), 0.1)]:
         rough.append(descend(search, start))
         on_progress(survey + len(rough), total, what)
         if sum(t.score < min(map(_score, rough)) + 0.1 * CLOSE for t in rough) >= AGREE:
@@ -122,6 +124,15 @@ def _contained(search: Search, seed: int, survey: int, base: Tuned | None) -> li
         return []
     values = extended(search.plants[0], np.array(list(known.values.values())))
     return [search.of(np.array([rounded(v) for v in values]))]
+
+
+def _places(search: Search, contained: Sequence[Trial], survey: int, seed: int) -> Floats:
+    """Where a search looks first; half of it beside what it contains, with that one's values and any of its own."""
+    found = _hypercube(len(search.parameters), survey, seed)
+    if contained and search.family.base:
+        shared = len(search.family.base.parameters(search.plants[0]))
+        found[::2, :shared] = contained[0].place[:shared]
+    return found
 
 
 def _hypercube(dimensions: int, count: int, seed: int) -> Floats:
