@@ -96,11 +96,10 @@ def walk(folder, call, capsys):
 
 def run_once(monkeypatch):
     """What `reproduce` runs and draws again is what `run` found and drew; tests/test_reproduce.py does it twice."""
-    found, drawn, run, write = {}, [], study.run, report.write
+    found, drawn, run, write, shipped = {}, [], study.run, report.write, whole_study()[0]
 
     def remembered(file, on_progress, parts=None):
         if file.sha256 not in found:
-            shipped = whole_study()[0]
             same = shipped.file.text == file.text
             found[file.sha256] = replace(shipped, file=file) if same else run(file, on_progress)
         return found[file.sha256]
