@@ -9,6 +9,7 @@ import pytest
 from scipy.signal import lfilter
 
 from microrad import lti
+from microrad.identify import structure
 from microrad.identify.amplitude import amplitude_dependence
 from microrad.identify.linear import fit_linear, fit_percent, output_error
 from microrad.identify.linear_uncertainty import at, parameter_covariance, transmission_zeros
@@ -167,9 +168,10 @@ def mirror(seed=0):
 def multisines(model, count=4, noise=0.0, seed=0, period=1024, rate_hz=4000.0):
     rng = philox(seed)
     records = []
+    inputs = model.direct.shape[1]
     for k in range(count):
-        spectrum = np.zeros((period // 2 + 1, 2), dtype=complex)
-        spectrum[1:480] = np.exp(2j * np.pi * rng.random((479, 2)))
+        spectrum = np.zeros((period // 2 + 1, inputs), dtype=complex)
+        spectrum[1:480] = np.exp(2j * np.pi * rng.random((479, inputs)))
         drive = np.fft.irfft(spectrum, period, axis=0)
         drive = drive / np.std(drive)
         answer = np.tile(simulate_periodic(model, drive, rate_hz), (2, 1))
@@ -298,6 +300,28 @@ def test_exchanges_never_make_it_worse(crowded):
     assert with_exchanges.cost < 0.5 * with_exchanges.power
 
 
+def test_an_order_more_is_never_worse(monkeypatch):
+    """Also where its own start is a poor one: a pole at 0.01 Hz for a resonance at 700 Hz."""
+    slow, resonance = -2 * np.pi * 90.0, 2 * np.pi * 700.0 * (-0.05 + 1j)
+    truth = order_modes(
+        np.array([slow, resonance]), np.ones((2, 1)), np.array([[300.0, 900.0 - 200.0j]]), np.zeros((1, 1))
+    )
+    measured = response_from_periods(multisines(truth, count=1, noise=0.01))
+    smaller = fit_order(measured, 3, exchanges=0).model
+    poor = order_modes(
+        np.array([slow, -0.06, -0.07, -0.08], dtype=complex), np.ones((4, 1)), np.ones((1, 4)), truth.direct
+    )
+    monkeypatch.setattr(structure, "_start", lambda *args: poor)
+    lone, grown = (fit_order(measured, 4, exchanges=0, smaller=model) for model in (None, smaller))
+    assert grown.model.order == lone.model.order == 4
+    assert grown.cost <= polish_again(measured, smaller).cost < 0.1 * lone.cost
+
+
+def polish_again(measured, model):
+    weighed = (measured.freq_hz, measured.response, measured.drive_power)
+    return polish(FrequencyEquations(*weighed, measured.hold, measured.rate_hz), model)
+
+
 def test_standard_errors_are_those_of_repetition():
     truth = mirror()
     found, told = [], []
@@ -335,7 +359,7 @@ def test_fit_percent_is_that_of_matlab():
 
 def test_refusals():
     records = multisines(mirror())
-    with pytest.raises(IdentificationError, match="the order is 0; give at least one state"):
+    with pytest.raises(IdentificationError, match="the order is 0; give at least one pole"):
         fit_linear(records, 0)
     with pytest.raises(IdentificationError, match="479 frequencies cannot fix 500 poles"):
         fit_linear(records, 500)

@@ -18,6 +18,7 @@ from microrad.identify.polish import Polished, TimeEquations, polish
 from microrad.identify.records import IdentificationError, Progress, colour_inflation
 from microrad.identify.response import FrequencyResponse, response_from_periods, response_from_records
 from microrad.identify.structure import fit_order
+from microrad.identify.vector_fitting import check_order
 from microrad.lti import StateSpace
 from microrad.recording import Recording
 
@@ -112,15 +113,17 @@ def fit_linear(
     hold, direct = response.hold, not strictly_proper
     several = response.response[0].size > 1
     candidates = _candidates(response, orders)
-    total = len(candidates) + 2
-    scan = []
-    for done, order in enumerate(candidates, start=1):
-        if len(candidates) > 1:
-            trial = fit_order(response, order, direct=direct, exchanges=0, fine=not several)
-            scan.append(_score(response, trial, direct))
+    tried = candidates if several else range(1, candidates[-1] + 1)  # each sets out from the one before, too
+    total = len(tried) + 2
+    fits: dict[int, Polished] = {}
+    for done, order in enumerate(tried, start=1):
+        smaller = None if several or order == 1 else fits[order - 1].model
+        if len(tried) > 1 or not several:
+            fits[order] = fit_order(response, order, direct=direct, exchanges=0, fine=not several, smaller=smaller)
         _report(on_progress, done, total, f"order {order}")
+    scan = [_score(response, fits[order], direct) for order in candidates] if len(candidates) > 1 else []
     chosen, reason = _choose(scan) if scan else (candidates[0], f"order {candidates[0]} was given")
-    polished = fit_order(response, chosen, direct=direct, exchanges=exchanges if several else 0)
+    polished = fit_order(response, chosen, direct=direct, exchanges=exchanges) if several else fits[chosen]
     _report(on_progress, total - 1, total, "polish in frequency")
     if not periodic and hold != "band-limited":
         polished = polish(TimeEquations(records, hold, drop, direct=direct), polished.model, iterations=30)
@@ -136,10 +139,12 @@ def _report(on_progress: Progress | None, done: int, total: int, what: str) -> N
 # ---------------------------------------------------------------------------------------------------------------- order
 def _candidates(response: FrequencyResponse, orders: int | Sequence[int] | None) -> list[int]:
     if isinstance(orders, int):
-        return [orders]
+        orders = [orders]
     if orders is not None:
         if not orders:
             raise IdentificationError("no order was given to choose from; name at least one number of states.")
+        for order in (min(orders), max(orders)):
+            check_order(response.freq_hz, order)
         return sorted(set(orders))
     most = response.freq_hz.size - 1
     usual = _ORDERS_SINGLE if response.response[0].size == 1 else _ORDERS_SEVERAL

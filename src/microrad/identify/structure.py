@@ -15,9 +15,8 @@ import numpy as np
 
 from microrad.identify.modal import Complexes, Floats, ModalModel, order_modes
 from microrad.identify.polish import Equations, FrequencyEquations, Polished, behind_modes, fit_outputs, polish
-from microrad.identify.records import IdentificationError
 from microrad.identify.response import FrequencyResponse
-from microrad.identify.vector_fitting import vector_fit
+from microrad.identify.vector_fitting import check_order, vector_fit
 
 _COARSE_LINES = 900
 _DAMPING = (0.003, 0.01, 0.03, 0.1, 0.4)
@@ -26,6 +25,7 @@ _TRIED = 2
 _GAIN = 1e-3
 _LARGER = 1.4
 _CHUNK = 40
+_REAL_POLES = 60
 
 
 class Candidate(NamedTuple):
@@ -37,16 +37,23 @@ class Candidate(NamedTuple):
 
 
 def fit_order(
-    response: FrequencyResponse, order: int, *, direct: bool = True, exchanges: int = 12, fine: bool = True
+    response: FrequencyResponse,
+    order: int,
+    *,
+    direct: bool = True,
+    exchanges: int = 12,
+    fine: bool = True,
+    smaller: ModalModel | None = None,
 ) -> Polished:
     """Modal model with `order` states of least output error in a response: vector fit, reduction, exchanges, polish.
 
     The error is weighed by the power of the drives, so that the sum is the mean-square output error. `exchanges` is
     the largest number of modes exchanged from each of two starts (vector fits of `order` and of 1.4 `order` poles), 0
-    for one start and no exchange; without `fine` the last polish on all lines is left out.
+    for one start and no exchange; without `fine` the last polish on all lines is left out. `smaller` is a model of one
+    input with one state less: with a real pole more it is another start of the last polish, so that the fit is never
+    worse than it.
     """
-    if order < 1:
-        raise IdentificationError(f"the order is {order}; give at least one state.")
+    check_order(response.freq_hz, order)
     freq, values, power = _merged(response)
     coarse = FrequencyEquations(freq, values, power, response.hold, response.rate_hz, direct=direct)
     sizes = [order] if exchanges == 0 else [order, min(round(_LARGER * order), freq.size - 1)]
@@ -66,7 +73,8 @@ def fit_order(
         return result
     every = (response.freq_hz, response.response, response.drive_power)
     full = FrequencyEquations(*every, response.hold, response.rate_hz, direct=direct)
-    return polish(full, result.model, iterations=40, tolerance=1e-6)
+    starts = [result.model, *([_grown(full, smaller, response.excited_hz)] if smaller else [])]
+    return min((polish(full, m, iterations=40, tolerance=1e-6) for m in starts), key=lambda found: found.cost)
 
 
 def _start(
@@ -136,6 +144,15 @@ def _rank_one(poles: Complexes, b: Complexes, c: Complexes, direct: Floats) -> M
         outputs.append(left[:, 0] * np.sqrt(size[0]))
     columns = np.array(outputs, dtype=complex).T
     return order_modes(np.array(kept, dtype=complex), np.array(inputs, dtype=complex), columns, direct)
+
+
+# -------------------------------------------------------------------------------------------------------------- starts
+def _grown(equations: Equations, model: ModalModel, band: tuple[float, float]) -> ModalModel:
+    """A model of one input with one real pole more: the one of a grid, a decade beyond the band, that helps most."""
+    grid = -2 * np.pi * np.geomspace(0.1 * band[0], 10.0 * band[1], _REAL_POLES)
+    inputs = np.vstack([np.ones((1, 1)), model.input_vectors])
+    tried = (fit_outputs(equations, np.append(p, model.poles_rad_s), inputs) for p in grid.astype(complex))
+    return min(tried, key=lambda found: found[1])[0]
 
 
 # ------------------------------------------------------------------------------------------------------------- exchange

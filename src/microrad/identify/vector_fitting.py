@@ -111,13 +111,18 @@ def vector_fit(
     )
 
 
-def _check(freq: Floats, order: int, data: Complexes, hold: Hold, rate_hz: float | None) -> None:
+def check_order(freq: Floats, order: int) -> None:
+    """Raise `IdentificationError` for a number of poles below 1 or beyond what so many frequencies can fix."""
     if order < 1:
         raise IdentificationError(f"the order is {order}; give at least one pole.")
-    if 2 * freq.size < 2 * order + 2:
+    if freq.size < order + 1:
         raise IdentificationError(
             f"{freq.size} frequencies cannot fix {order} poles; give at least {order + 1} frequencies or a lower order."
         )
+
+
+def _check(freq: Floats, order: int, data: Complexes, hold: Hold, rate_hz: float | None) -> None:
+    check_order(freq, order)
     if not np.isfinite(data).all():
         raise IdentificationError(
             f"the response at {freq[int(np.argmin(np.isfinite(data).all(axis=1)))]:g} Hz is not finite; leave it out."
