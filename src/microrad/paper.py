@@ -119,7 +119,7 @@ def scan(m: mission.Mission, on_progress: Progress | None = None) -> Scan:
     grid = product(COMPOSITIONS, PROPORTIONAL_V_MRAD, INTEGRAL_V_MRAD_S)
     jobs = [partial(_point, m, model, coarse, *at) for at in grid]
     said = on_progress or (lambda done, total, what: None)
-    points = in_threads(jobs, lambda done: said(done, len(jobs), "scan of gains and compositions"))
+    points = in_threads(jobs, lambda done, total: said(done, total, "scan of gains and compositions"))
     return Scan(tuple(points))
 
 

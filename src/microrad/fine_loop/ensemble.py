@@ -375,7 +375,7 @@ def run(
         raise ValueError(f"an ensemble of {runs} runs has no statistics: ask for 1 run or more")
     p = arrays(loop, controller, span.seed)
     jobs = [partial(_batch, loop, p, span, first, beat) for first in range(first_run, first_run + runs, LANES)]
-    parts = in_threads(jobs, lambda done: on_progress(min(done * LANES, runs), runs, controller.name), threads)
+    parts = in_threads(jobs, lambda done, _: on_progress(min(done * LANES, runs), runs, controller.name), threads)
     return _joined(controller.name, loop, span, parts, runs)
 
 

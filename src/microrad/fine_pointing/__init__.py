@@ -8,7 +8,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from microrad import disturbance
-from microrad.fine_pointing.designs import BASELINE, Design, build, design, names, optimum_rms_rad, plants, tune
+from microrad.fine_pointing.designs import (
+    BASELINE,
+    Design,
+    build,
+    design,
+    in_turn,
+    names,
+    optimum_rms_rad,
+    plants,
+    tune,
+)
 from microrad.fine_pointing.results import (
     COUNTERS,
     Difference,
@@ -86,9 +96,8 @@ def run(file: MissionFile, on_progress: Progress = lambda done, total, what: Non
     Raises ValueError with the reason for a loop that cannot be built and a controller that cannot meet its margin.
     """
     m, built = file.mission, scene(file)
-    designs = design(built, m, on_progress)
-    verified = verify(built, m, designs, on_progress)
-    chosen = best(verified)
+    verified = verify(built, m, in_turn(built, m, on_progress), on_progress)
+    chosen, designs = best(verified), [v.design for v in verified]
     segment = 2 * (verified[0].spectrum_rad2_hz.shape[0] - 1)
     freq = np.asarray(np.fft.rfftfreq(segment, built.loop.timing.period_s), dtype=float)
     before = np.sum([disturbance.psd(each, freq) for each in built.loop.disturbances[0]], axis=0)

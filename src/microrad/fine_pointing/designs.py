@@ -1,7 +1,7 @@
 """The controllers of the study: each tuned for one axis of the mission's loop, then put on all axes."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -66,24 +66,35 @@ def names(m: Mission) -> tuple[str, ...]:
     return (*found, IN_SERIES)
 
 
+def in_turn(
+    scene: Scene,
+    m: Mission,
+    on_progress: Progress = lambda done, total, what: None,
+    only: Sequence[str] = (),
+) -> Iterator[Design]:
+    """Every controller of the study, the baseline first, or ``only`` some of them by name; tuned on the linear cost.
+
+    Each as soon as it is tuned. Raises ValueError for a name that `names` does not list, and with the reason when a
+    modulus margin cannot be met.
+    """
+    straight, wanted = plants(scene, m, table(m).seed), tuple(only) or names(m)
+    pi: Tuned | None = None
+    for done, name in enumerate(wanted):
+        on_progress(done, len(wanted), f"tuning {name}")
+        tuned = pi if pi and name == WITH_INVERSE else tune(name, m, straight, pi)
+        pi = tuned if name == control.PI.name else pi
+        yield Design(name, tuned, build(name, scene, m, tuned.controller), _INVERSE_USED.get(name, ""))
+    on_progress(len(wanted), len(wanted), "controllers tuned")
+
+
 def design(
     scene: Scene,
     m: Mission,
     on_progress: Progress = lambda done, total, what: None,
     only: Sequence[str] = (),
 ) -> tuple[Design, ...]:
-    """Every controller of the study, the baseline first, or ``only`` some of them by name; tuned on the linear cost.
-
-    Raises ValueError for a name that `names` does not list, and with the reason when a modulus margin cannot be met.
-    """
-    straight, wanted = plants(scene, m, table(m).seed), tuple(only) or names(m)
-    tuned: dict[str, Tuned] = {}
-    for done, name in enumerate(wanted):
-        on_progress(done, len(wanted), f"tuning {name}")
-        known = tuned.get(control.PI.name)
-        tuned[name] = known if known and name == WITH_INVERSE else tune(name, m, straight, known)
-    on_progress(len(wanted), len(wanted), "controllers tuned")
-    return tuple(Design(n, t, build(n, scene, m, t.controller), _INVERSE_USED.get(n, "")) for n, t in tuned.items())
+    """All that `in_turn` gives."""
+    return tuple(in_turn(scene, m, on_progress, only))
 
 
 def tune(name: str, m: Mission, of: Sequence[DesignPlant], known: Tuned | None = None) -> Tuned:

@@ -1,7 +1,7 @@
 """What the designs leave: in theory and simulated, on each variant of the mirror, part by part and on sines."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -145,16 +145,19 @@ def span(m: Mission) -> ensemble.Span:
 
 
 def verify(
-    scene: Scene, m: Mission, designs: Sequence[Design], on_progress: Progress = lambda done, total, what: None
+    scene: Scene, m: Mission, designs: Iterable[Design], on_progress: Progress = lambda done, total, what: None
 ) -> tuple[Verified, ...]:
-    """Simulate each design on each variant of the mirror, beside its linear theory."""
-    names = variants(m)
-    jobs = [(design, variant) for design in designs for variant in names]
-    runs = _several(
-        [_job(scene, m, design, variant) for design, variant in jobs], on_progress, "simulating controllers"
-    )
-    found = dict(zip([(d.name, v) for d, v in jobs], runs, strict=True))
-    return tuple(_verified(scene, m, d, {v: found[d.name, v] for v in names}) for d in designs)
+    """Simulate each design on each variant of the mirror, beside its linear theory; one as the next is being made."""
+    names, made = variants(m), []
+
+    def jobs() -> Iterator[Callable[[], ensemble.Ensemble]]:
+        for each in designs:
+            made.append(each)
+            for variant in names:
+                yield _job(scene, m, each, variant)
+
+    runs = iter(_several(jobs(), on_progress, "simulating controllers"))
+    return tuple(_verified(scene, m, d, {variant: next(runs) for variant in names}) for d in made)
 
 
 def _job(scene: Scene, m: Mission, design: Design, variant: str) -> Callable[[], ensemble.Ensemble]:
@@ -178,9 +181,9 @@ def for_mirror(controller: LoopController, loop: PointingLoop) -> LoopController
 
 
 def _several(
-    jobs: Sequence[Callable[[], ensemble.Ensemble]], on_progress: Progress, what: str
+    jobs: Iterable[Callable[[], ensemble.Ensemble]], on_progress: Progress, what: str
 ) -> list[ensemble.Ensemble]:
-    return in_threads(jobs, lambda done: on_progress(done, len(jobs), what))
+    return in_threads(jobs, lambda done, total: on_progress(done, total, what))
 
 
 def _verified(scene: Scene, m: Mission, design: Design, runs: dict[str, ensemble.Ensemble]) -> Verified:
