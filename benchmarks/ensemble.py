@@ -66,7 +66,7 @@ def ratio() -> None:
         arrays = ensemble.arrays(loop, c, 1)
         state, reference = ensemble.start(loop, arrays, 0), reference_of(PIECE)
         state.place[kernels.COUNTING] = 1
-        return lambda: kernels.ensemble_loop(arrays, state, reference, nothing, nothing, kernels.UNSHIFTED)
+        return lambda: kernels.ensemble_loop(arrays, state, reference[:, :, None], nothing, nothing, kernels.UNSHIFTED)
 
     def c_twin(samples: int) -> tuple[Callable[[], None], np.ndarray]:
         plant = mirror.discretise(p.mirror, setup.timing.step_s)

@@ -442,5 +442,6 @@ def run_kernel(case, first_run, shaping, reference, state=None, shift=kernels.UN
     channels = case.axes + kernels.DRIVE_FIELDS * case.actuators + len(case.mirror.C) + p.B.shape[1]
     residual = np.empty((len(reference) - 1, case.axes, kernels.LANES))
     trace = np.empty((len(reference) - 1, channels, kernels.LANES))
-    kernels.ensemble_loop(p, state, np.ascontiguousarray(reference, dtype=float), residual, trace, shift)
+    one_for_all = np.ascontiguousarray(reference, dtype=float)[..., None]
+    kernels.ensemble_loop(p, state, one_for_all, residual, trace, shift)
     return EnsembleRun(residual, trace, state)

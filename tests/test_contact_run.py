@@ -263,7 +263,7 @@ def test_references_of_a_window_begin_with_it_and_not_with_its_settling(sampler)
 
     for settle in (0.0, 0.3):
         s = sampler(contact(geometry=growing), settings(settle_s=settle))
-        moving = s._moving(growing(np.array([1000.0, 1000.4])), 0.4, settle).references[0]
+        moving = s._moving(growing(np.array([1000.0, 1000.4])), 0.4, settle)[0]
         w = 2 * math.pi * 0.1
         lag = [0.01 * (4e-6 * (10.0 + t) - 4e-6 / w) / w for t in (0.0, 0.4)]
         ahead = np.array([30e-6, 31.2e-6])
@@ -527,6 +527,11 @@ def test_a_contact_may_end_during_the_new_acquisition(run, losing, shaken):
         assert (found.log[-1].state, found.log[-1].cause) == (state, f"the contact ends: {LIMB}")
 
 
+def one_by_one(sampler, planned):
+    """The windows as `Sampler.window` gives them, each as it is asked for."""
+    return (sampler.window(number, *span) for number, span in enumerate(planned))
+
+
 def test_windows_that_a_new_acquisition_covers_are_left_out(run, whole, monkeypatch):
     """Windows of 1 s side by side, of which the one with this number, counted as they come, loses lock."""
     for losing_at in (0, 5, 20):
@@ -537,6 +542,7 @@ def test_windows_that_a_new_acquisition_covers_are_left_out(run, whole, monkeypa
             loss = contact_run.Loss(start_s + 0.3, start_s + 0.5, start_s + 0.75, "made up") if number == at else None
             return replace(whole.windows[0], start_s=start_s, seconds=0.5 if loss else length_s, loss=loss)
 
+        monkeypatch.setattr(Sampler, "windows", lambda *args: list(one_by_one(*args)))
         monkeypatch.setattr(Sampler, "window", window)
         found = run(contact(length_s=80.0), settings(windows=100, window_s=1.0))
         check_order(found)
@@ -555,6 +561,7 @@ def test_windows_without_a_gap_are_all_there(run, whole, finding, monkeypatch):
     def window(self, number, start_s, length_s):
         return replace(whole.windows[0], start_s=start_s, seconds=length_s)
 
+    monkeypatch.setattr(Sampler, "windows", one_by_one)
     monkeypatch.setattr(Sampler, "window", window)
     how, before = settings(windows=40, window_s=0.3, slew_angle_rad=0.0), 0
     for start in range(40):
@@ -576,7 +583,7 @@ def test_a_whole_window_ends_a_row_of_losses(run, whole, monkeypatch):
             loss = contact_run.Loss(start_s, start_s + 0.1, start_s + 0.1, "made up")
         return replace(whole.windows[0], start_s=start_s, seconds=0.1 if loss else length_s, loss=loss)
 
-    monkeypatch.setattr(Sampler, "windows", lambda self, plan: (self.window(n, *span) for n, span in enumerate(plan)))
+    monkeypatch.setattr(Sampler, "windows", one_by_one)
     monkeypatch.setattr(Sampler, "window", window)
     found = run(contact(length_s=2400.0), settings(windows=6))
     check_order(found)

@@ -844,7 +844,7 @@ def test_residual_and_trace_without_rows_are_left_out_and_change_nothing():
     whole = kernel(case, samples)
     p = pointing.build_ensemble(case)
     state = pointing.build_state(case, p, 100, make_start(case), reference[0])
-    kernels.ensemble_loop(p, state, reference, nothing, nothing, kernels.UNSHIFTED)
+    kernels.ensemble_loop(p, state, reference[..., None], nothing, nothing, kernels.UNSHIFTED)
     for name in kernels.EnsembleState._fields:
         assert_array_equal(getattr(state, name), getattr(whole.state, name), err_msg=name)
 
@@ -863,7 +863,7 @@ def test_nothing_is_written_beyond_the_arrays_of_the_state(seed):
         fenced[name][...] = values
     before = [np.array(field) for field in p if isinstance(field, np.ndarray)]
     nothing = np.empty((0, 0, 0))
-    kernels.ensemble_loop(p, state._replace(**fenced), reference, nothing, nothing, kernels.UNSHIFTED)
+    kernels.ensemble_loop(p, state._replace(**fenced), reference[..., None], nothing, nothing, kernels.UNSHIFTED)
     for name, buffer in buffers.items():
         assert np.all(buffer[:fence] == 77), name
         assert np.all(buffer[-fence:] == 77), name

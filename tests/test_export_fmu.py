@@ -421,7 +421,7 @@ def test_the_loop_follows_the_kernel_in_the_jitter(tmp_path, name, version):
     state = ensemble.start(loop, p, 0)
     by_sample = ensemble.reference(loop, 0, samples)
     by_sample[700:760] += 3e-4  # further than the narrow field of view
-    reference, disturbance = outside(loop, p, state, by_sample)
+    reference, disturbance = outside(loop, p, state, by_sample[:, :, 0])
     axes, m, outputs = loop.axes, loop.mirror.actuators, loop.mirror.axes
     trace = np.empty((samples, axes + kernels.DRIVE_FIELDS * m + outputs + p.B.shape[1], kernels.LANES))
     residual = np.empty((samples, axes, kernels.LANES))
@@ -489,8 +489,8 @@ def by_kernel(of, optics, drive, commands, steps, step_s):
     system = lti.StateSpace(np.zeros((0, 0)), np.zeros((0, inputs)), np.zeros((m, 0)), through)
     p = ensemble.arrays(loop, LoopController("through", system, np.zeros((0, m))), 0)
     state = ensemble.start(loop, p, 0)
-    reference = np.zeros((samples + 2, axes))
-    reference[:samples, :m] = commands
+    reference = np.zeros((samples + 2, axes, 1))
+    reference[:samples, :m, 0] = commands
     trace = np.empty((samples + 1, axes + kernels.DRIVE_FIELDS * m + of.axes + inputs, kernels.LANES))
     kernels.ensemble_loop(p, state, reference, np.empty((0, 0, 0)), trace, kernels.UNSHIFTED)
     at = axes + kernels.DRIVE_FIELDS * m

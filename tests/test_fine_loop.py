@@ -963,6 +963,24 @@ def test_the_mean_is_that_of_the_control_samples_and_the_rms_that_of_all_plant_s
     assert not np.allclose(found.rms_rad[0], np.sqrt(np.mean(errors**2, axis=0)), rtol=1e-9, atol=0)
 
 
+def test_runs_side_by_side_have_references_of_their_own():
+    """Each is the run of its number with those references, to the last bit; also where the controller sees them."""
+    loop, _ = VARIANTS["two coupled axes"]()
+    axis = pi_axis(fine.nominal_axis_gain(loop), loop.timing.period_s, 200.0, 1500.0)
+    path = fine.ReferenceFilter(300.0)
+    controller = fine.with_inverse("ahead", loop, axis, control.inverse(loop.mirror), path, in_series=False)
+    each = [
+        (Reference(k * 3 * URAD, k * URAD, 1.0 + k), Reference(-k * URAD, 0.0, 1.0)) for k in range(kernels.LANES + 2)
+    ]
+    span = Span(0.02, 0.0, 5)
+    errors, turned = ensemble.side_by_side(loop, controller, span, each, first_run=7)
+    for k in (0, 1, kernels.LANES - 1, kernels.LANES, kernels.LANES + 1):
+        alone = ensemble.trace(replace(loop, references=each[k]), controller, span, 7 + k)
+        assert_array_equal(errors[k], alone.error_rad)
+        assert_array_equal(turned[k], alone.mirror_rad)
+    assert not np.allclose(errors[0], errors[1], rtol=0.0, atol=URAD)
+
+
 def test_a_trace_adds_up():
     """Reference and disturbance less the mirror is the error; the sensor reads it with its noise, one sample late."""
     loop, controller = VARIANTS["two coupled axes"]()

@@ -1594,12 +1594,17 @@ def _ensemble_disturbance(p, s, shift):  # type: ignore[no-untyped-def]
 
 
 @_inline
-def _line_of_sight_error(p, s, i, reference):  # type: ignore[no-untyped-def]
-    """e = reference + disturbance - y of axis i."""
+def _line_of_sight_error(p, s, i, begin, end, share):  # type: ignore[no-untyped-def]
+    """e = reference + disturbance - y of axis i, the references at a share of the way from ``begin`` to ``end``."""
     at, error, disturbance, y = _at(i), s.error, s.disturbance, s.y
+    reference = begin[0] + share * (end[0] - begin[0])
     for o in range(p.optics.shape[1]):
         gain, source = -p.optics[i, o], _at(o)
-        if o == 0:
+        if o == 0 and begin.size > 1:
+            for r in range(_ROW):
+                own = begin[r] + share * (end[r] - begin[r])
+                error[at + r] = own + disturbance[at + r] + gain * y[source + r]
+        elif o == 0:
             for r in range(_ROW):
                 error[at + r] = reference + disturbance[at + r] + gain * y[source + r]
         elif gain != 0.0:
@@ -1653,9 +1658,10 @@ def _measure(p, s, reference, shift):  # type: ignore[no-untyped-def]
         if p.gauge_resolution > 0.0:
             for r in range(_ROW):
                 measured[at + r] = _quantised(measured[at + r], p.gauge_resolution)
+    own = np.uint64(1 if reference.shape[1] > 1 else 0)
     for i in range(axes):
         for r in range(_ROW):
-            s.measured[_at(axes + outputs + i) + r] = reference[i]
+            s.measured[_at(axes + outputs + i) + r] = reference[i, own * r]
 
 
 @_inline
@@ -1787,8 +1793,9 @@ def _record(k, rows, width, trace, channel):  # type: ignore[no-untyped-def]
 
 @_compile
 def ensemble_loop(p, s, reference, residual, trace, shift):  # type: ignore[no-untyped-def]
-    """Advance LANES runs over the control samples of ``reference`` (samples + 1, axes), linear between them.
+    """Advance LANES runs over the control samples of ``reference``, linear between them.
 
+    Its shape is (samples + 1, axes, 1), or with LANES in place of the 1 where each run has its own.
     Fills ``residual`` (samples, axes, LANES) with the line-of-sight error at the begin of each sample, if it has rows,
     and ``trace`` (samples, channels, LANES) likewise, once the sample has measured: disturbance by axis, drive before
     and now actuator by actuator, the plant's outputs, readings. Statistics are taken where ``place`` says so: squares
@@ -1818,7 +1825,7 @@ def ensemble_loop(p, s, reference, residual, trace, shift):  # type: ignore[no-u
             s.place[STEP] += 1
             share = (j + 1) / steps
             for i in range(axes):
-                _line_of_sight_error(p, s, i, reference[k, i] + share * (reference[k + 1, i] - reference[k, i]))
+                _line_of_sight_error(p, s, i, reference[k, i], reference[k + 1, i], share)
             if p.sensor_delay_steps > 0 or j == steps - 1:
                 _copy(s.error, s.error_ring, s.place[STEP] % ring_length * axes, axes)
             if s.place[COUNTING] == 1:

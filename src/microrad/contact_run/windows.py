@@ -2,8 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from functools import partial
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +14,6 @@ from microrad.fine_loop import ensemble
 from microrad.fine_loop.loop import LoopController, PointingLoop
 from microrad.fine_pointing.scenario import table
 from microrad.mission import Mission
-from microrad.threads import in_threads
 from microrad.units import SPEED_OF_LIGHT_M_S, format_quantity
 
 Floats = NDArray[np.float64]
@@ -87,26 +85,37 @@ class Sampler:
                 "fewer windows, or shorter ones"
             )
 
-    def windows(self, planned: Sequence[tuple[float, float]]) -> list[Window | None]:
-        """The planned windows, by their number in the plan; None for one without a control sample."""
-        return in_threads([partial(self.window, number, *span) for number, span in enumerate(planned)])
+    def windows(self, planned: Sequence[tuple[float, float]], first: int = 0) -> list[Window | None]:
+        """The planned windows, all of one length and numbered from ``first`` on; None for one without a control sample.
 
-    def window(self, number: int, start_s: float, length_s: float) -> Window | None:
-        """One window. Its random streams are those of the ensemble's run of that number with the settings' seed."""
-        period = self.loop.timing.period_s
+        Their random streams are those of the ensemble's runs of their numbers with the settings' seed.
+        """
+        period, length_s = self.loop.timing.period_s, planned[0][1]
         samples, settling = round(length_s / period), round(self.settings.settle_s / period)
         if samples < 1:
-            return None
+            return [None for _ in planned]
         span = ensemble.Span((settling + samples) * period, settling * period, self.settings.seed)
         # no later than the contact, not even by rounding: an ephemeris may end with it
-        ends = self.contact.sight(np.array([start_s, min(start_s + length_s, self.contact.end_s)]))
-        loop = self._moving(ends, length_s, settling * period)
-        trace = ensemble.trace(loop, self.controller, span, number)
-        time = start_s + period * np.arange(samples, dtype=np.float64)
-        radial = np.hypot.reduce(trace.error_rad[settling:], axis=1)
+        last_s = self.contact.end_s
+        ends = [self.contact.sight(np.array([begin, min(begin + length_s, last_s)])) for begin, _ in planned]
+        moving = [self._moving(each, length_s, settling * period) for each in ends]
+        errors, turned = ensemble.side_by_side(self.loop, self.controller, span, moving, first)
+        each = zip(planned, ends, errors, turned, strict=True)
+        return [self._of(begin, at, length_s, error, angle, settling) for (begin, _), at, error, angle in each]
+
+    def window(self, number: int, start_s: float, length_s: float) -> Window | None:
+        """One window by itself."""
+        return self.windows([(start_s, length_s)], number)[0]
+
+    def _of(
+        self, start_s: float, ends: Sight, length_s: float, error_rad: Floats, mirror_rad: Floats, settling: int
+    ) -> Window:
+        """The window of a run, whose settling time is left out."""
+        radial = np.hypot.reduce(error_rad[settling:], axis=1)
+        time = start_s + self.loop.timing.period_s * np.arange(radial.size, dtype=np.float64)
         margin = self.margin_db(radial, _between(ends, (time - start_s) / length_s))
         loss, kept = self._loss(time, radial, margin, ends, settling)
-        turned = trace.mirror_rad[settling : settling + kept] @ loop.optics.T
+        turned = mirror_rad[settling : settling + kept] @ self.loop.optics.T
         return self._window(ends, np.mean(turned, axis=0), loss, (time[:kept], radial[:kept], margin[:kept]))
 
     def _window(
@@ -131,8 +140,8 @@ class Sampler:
             margin_db=margin,
         )
 
-    def _moving(self, ends: Sight, length_s: float, settling_s: float) -> PointingLoop:
-        """The loop with the references of the moment on axis x, time 0 at the begin of the settling."""
+    def _moving(self, ends: Sight, length_s: float, settling_s: float) -> tuple[Reference, ...]:
+        """The loop's references with those of the moment on axis x, time 0 at the begin of the settling."""
         r = table(self.mission).reference
         left, carried = 1.0 - r.rate_feedforward, 1.0 if r.point_ahead_on_mirror else 0.0
         turning = float(np.diff(ends.rate_rad_s)[0]) / length_s * left
@@ -144,7 +153,7 @@ class Sampler:
             point_ahead_rate_rad_s=ahead_rate,
             acceleration_rad_s2=turning,
         )
-        return replace(self.loop, references=(moving, *self.loop.references[1:]))
+        return (moving, *self.loop.references[1:])
 
     def margin_db(self, radial_rad: Floats, sight: Sight) -> Floats:
         """Margin of the communication link at the mission's data rate, for radial errors and where they occur.

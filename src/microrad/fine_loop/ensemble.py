@@ -2,7 +2,7 @@
 
 import math
 import zlib
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, partial
 
@@ -16,6 +16,7 @@ from microrad.sensor import StrainGauge
 from microrad.threads import in_threads
 
 Floats = NDArray[np.float64]
+References = tuple[disturbance.Reference, ...]
 Progress = Callable[[int, int, str], None]
 
 SLICE_SAMPLES = 2048  # control samples between two returns from the kernel, and at most in a segment of the spectrum
@@ -273,8 +274,13 @@ def combined_shaping(loop: PointingLoop) -> Shaping:
     return Shaping(diagonal, coupling, noise, output, purposes, starts)
 
 
-def start(loop: PointingLoop, p: kernels.Ensemble, first_run: int) -> kernels.EnsembleState:
-    """Mirror and controller at rest, the disturbance drawn from its stationary distribution in the runs' streams."""
+def start(
+    loop: PointingLoop, p: kernels.Ensemble, first_run: int, references: Sequence[References] = ()
+) -> kernels.EnsembleState:
+    """Mirror and controller at rest, the disturbance drawn from its stationary distribution in the runs' streams.
+
+    ``references`` are those of each run where they are not the loop's.
+    """
     n, m, outputs, axes = p.diagonal.size, p.actuator.shape[0], p.Cy.shape[0], loop.axes
     runs = np.array([first_run], dtype=np.uint64)
     words = 4 * (-(-(axes + outputs) // 4))
@@ -315,9 +321,8 @@ def start(loop: PointingLoop, p: kernels.Ensemble, first_run: int) -> kernels.En
         histogram=np.zeros((LANES, kernels.BINS), dtype=np.int32),
     )
     shaped = lti.to_bits(p.shaping_output @ state.shaping.reshape(-1, LANES)[: p.shaping_diagonal.size], lti.EXACT_BITS)
-    now = np.array([r.at(np.zeros(1))[0] for r in loop.references])
     state.disturbance[:] = shaped.ravel()
-    state.error[:] = (shaped + now[:, None]).ravel()
+    state.error[:] = (shaped + reference(loop, 0, 0, references)[0]).ravel()
     state.error_ring[:] = np.tile(state.error, p.sensor_delay_steps + 1)
     return state
 
@@ -403,10 +408,15 @@ def _segment(loop: PointingLoop, span: Span) -> int:
     return min(SLICE_SAMPLES, 1 << (total - settle).bit_length() - 1)
 
 
-def reference(loop: PointingLoop, begin: int, end: int) -> Floats:
-    """Reference at the control samples ``begin`` to ``end``, both included: (samples, axes)."""
+def reference(loop: PointingLoop, begin: int, end: int, references: Sequence[References] = ()) -> Floats:
+    """Reference at the control samples ``begin`` to ``end``, both included: (samples, axes, 1), one for all runs.
+
+    Or (samples, axes, LANES), the ``references`` of each run; runs behind them have those of the last one.
+    """
     time: Floats = np.arange(begin, end + 1, dtype=float) * loop.timing.period_s
-    return np.ascontiguousarray(np.stack([r.at(time) for r in loop.references], axis=1))
+    each = [np.stack([r.at(time) for r in of], axis=1) for of in references or (loop.references,)]
+    each += each[-1:] * (LANES - len(each) if references else 0)
+    return np.ascontiguousarray(np.stack(each, axis=2))
 
 
 def _batch(loop: PointingLoop, p: kernels.Ensemble, span: Span, first_run: int, beat: Callable[[], None]) -> _Batch:
@@ -490,23 +500,57 @@ class PointingTrace:
 def trace(loop: PointingLoop, controller: LoopController, span: Span, run_number: int = 0) -> PointingTrace:
     """One run in full: the run of that number of an ensemble, to the last bit. The settling time is part of it."""
     p = arrays(loop, controller, span.seed)
-    state = start(loop, p, run_number)
     total, _ = control_samples(loop, span)
     axes, m, outputs = loop.axes, loop.mirror.actuators, loop.mirror.axes
-    channels = axes + kernels.DRIVE_FIELDS * m + outputs + p.B.shape[1]
-    errors, rest = np.empty((total, axes)), np.empty((total, channels))
-    for at in range(0, total, SLICE_SAMPLES):
-        end = min(at + SLICE_SAMPLES, total)
-        residual, recorded = np.empty((end - at, axes, LANES)), np.empty((end - at, channels, LANES))
-        kernels.ensemble_loop(p, state, reference(loop, at, end), residual, recorded, kernels.UNSHIFTED)
-        errors[at:end], rest[at:end] = residual[:, :, 0], recorded[:, :, 0]
+    errors, rest = np.empty((total, axes)), np.empty((total, _channels(loop, p)))
+    for part, residual, recorded in _recorded(loop, p, total, run_number):
+        errors[part], rest[part] = residual[:, :, 0], recorded[:, :, 0]
     drives = axes + kernels.DRIVE_FIELDS * m
     return PointingTrace(
         time_s=np.arange(total, dtype=float) * loop.timing.period_s,
-        reference_rad=reference(loop, 0, total)[:-1],
+        reference_rad=reference(loop, 0, total)[:-1, :, 0],
         disturbance_rad=rest[:, :axes],
         error_rad=errors,
         measured_rad=rest[:, drives + outputs : drives + outputs + axes],
         drive_v=rest[:, axes + kernels.DRIVE_NOW : drives : kernels.DRIVE_FIELDS],
         mirror_rad=rest[:, drives : drives + outputs],
     )
+
+
+def side_by_side(
+    loop: PointingLoop, controller: LoopController, span: Span, references: Sequence[References], first_run: int = 0
+) -> tuple[Floats, Floats]:
+    """Error and mirror's outputs of one run for each of the references, (runs, samples, axes) and (.., outputs).
+
+    The runs of the numbers from ``first_run`` on, at the control samples; the settling time is part of them.
+    """
+    p = arrays(loop, controller, span.seed)
+    total, _ = control_samples(loop, span)
+    axes, outputs = loop.axes, loop.mirror.axes
+    before = axes + kernels.DRIVE_FIELDS * loop.mirror.actuators
+    errors, turned = np.empty((len(references), total, axes)), np.empty((len(references), total, outputs))
+    for first in range(0, len(references), LANES):
+        own = references[first : first + LANES]
+        runs = slice(first, first + len(own))
+        for part, residual, recorded in _recorded(loop, p, total, first_run + first, own):
+            errors[runs, part] = np.moveaxis(residual[:, :, : len(own)], 2, 0)
+            turned[runs, part] = np.moveaxis(recorded[:, before : before + outputs, : len(own)], 2, 0)
+    return errors, turned
+
+
+def _channels(loop: PointingLoop, p: kernels.Ensemble) -> int:
+    """Channels of a recorded run beside its error: disturbance, drives, the mirror's outputs, readings."""
+    return loop.axes + kernels.DRIVE_FIELDS * loop.mirror.actuators + loop.mirror.axes + int(p.B.shape[1])
+
+
+def _recorded(
+    loop: PointingLoop, p: kernels.Ensemble, total: int, first_run: int, references: Sequence[References] = ()
+) -> Iterator[tuple[slice, Floats, Floats]]:
+    """Error and channels of LANES runs, (samples, axes, LANES) and (samples, channels, LANES), slice by slice."""
+    state = start(loop, p, first_run, references)
+    for at in range(0, total, SLICE_SAMPLES):
+        end = min(at + SLICE_SAMPLES, total)
+        residual, recorded = np.empty((end - at, loop.axes, LANES)), np.empty((end - at, _channels(loop, p), LANES))
+        driven = reference(loop, at, end, references)
+        kernels.ensemble_loop(p, state, driven, residual, recorded, kernels.UNSHIFTED)
+        yield slice(at, end), residual, recorded
