@@ -75,7 +75,7 @@ def write(
         (draft / "figures").mkdir()
         for figure in drawn.every:
             (draft / "figures" / f"{figure.name}.svg").write_text(figure.svg, encoding="utf-8")
-            write_columns(figure.columns, draft / "figures" / f"{figure.name}.csv", parts)
+            write_columns(figure.columns, draft / "figures" / f"{figure.name}.csv")
         on_progress(1, 3, "page")
         made = results.manifest(study, draft)
         text = page.render(study, drawn, made)
@@ -111,14 +111,10 @@ def write_plan(plan: "ConstellationPlan", folder: Path) -> None:
     (folder / "contact-plan.ionrc").write_text(plan.contact_plan() + "\n", encoding="utf-8")
 
 
-def write_columns(columns: Mapping[str, Column], path: Path, parts: Kept = NOTHING) -> None:
+def write_columns(columns: Mapping[str, Column], path: Path) -> None:
     """Columns as CSV with a heading, numbers to nine digits; shorter columns end early."""
-    path.write_bytes(parts.part(_csv, columns).encode())
-
-
-def _csv(columns: Mapping[str, Column]) -> str:
     text = io.StringIO(newline="")
     writer = csv.writer(text)
     writer.writerow(columns)
     writer.writerows(rows_of(columns, 9))
-    return text.getvalue()
+    path.write_bytes(text.getvalue().encode())

@@ -1,7 +1,6 @@
 """Tables for a terminal, and columns of data as rows of text."""
 
 import io
-import math
 from collections.abc import Mapping, Sequence
 from itertools import zip_longest
 from typing import NamedTuple
@@ -21,7 +20,8 @@ def rows_of(columns: Mapping[str, Column], digits: int) -> list[tuple[str, ...]]
 def _texts(column: Column, digits: int) -> Sequence[str]:
     if isinstance(column, tuple):
         return column
-    return ["" if math.isnan(value) else f"{value:.{digits}g}" for value in column.tolist()]
+    found = (f"%.{digits}g\n" * column.size % tuple(column.tolist())).split("\n")[:-1]  # all in one go
+    return ["" if text == "nan" else text for text in found] if "nan" in found else found
 
 
 class Table(NamedTuple):
