@@ -108,7 +108,7 @@ def wrong_way(model):
     """How far the output moves against a slow drive behind a settled branch, the worse of both, by simulation."""
     found = []
     for rising in SIGNS:
-        back = np.linspace(0.0, 12.0 / slowest_decay(model), 100_001)
+        back = 12.0 / slowest_decay(model) * np.linspace(0.0, 1.0, 10_001) ** 2  # closer where it turns
         y, _ = respond(replace(model, delta_s_v=0.0), -rising * back, 1e3, branch(model, rising))
         found.append(np.max(rising * (y - y[0])))
     return max(found)
@@ -146,7 +146,7 @@ def test_how_far_an_asymmetric_model_moves_the_wrong_way(exponent):
 # ------------------------------------------------------------------------------------------------ the steepest slope
 
 
-def steepest_found(model, rng, trials=400):
+def steepest_found(model, rng, trials=100):
     """Largest |dz/dq| at constant rate met by a random walk of rates within the limit, settled branches included."""
     row, little = np.array(model.row), 1e-6
     h, steepest = 0.0, 0.0

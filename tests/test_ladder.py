@@ -467,8 +467,12 @@ def test_eq_3_fitted_at_100_hz_predicts_60_and_80_hz(paper):
         assert np.std(beyond) < 1e-4 * np.ptp(exact)  # what is left is the sensor's noise
 
 
-def test_the_benchs_own_mirror_is_predicted_with_half_the_error_of_the_papers_model():
-    """A reduced plan; the truth is none of the models. Held out are a frequency and amplitude, and a multisine."""
+def test_the_benchs_own_mirror_is_predicted_with_half_the_error_of_the_papers_model(monkeypatch):
+    """A reduced plan; the truth is none of the models. Held out are a frequency and amplitude, and a multisine.
+
+    The winner stays as it is found: tests/test_docs_gallery.py polishes that of a whole plan.
+    """
+    monkeypatch.setattr(choice, "_polished", lambda fitter, judge, fits, predictions, *rest: (fits, predictions))
     plan = bench.load_plan("mirror-characterisation")
     names = ["small-multisine-1", "loops-40hz", "loops-100hz", "held-out-sine", "held-out-multisine"]
     played = list(bench.played(bench.only(plan, names), seed=1))

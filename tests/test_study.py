@@ -32,9 +32,9 @@ def shipped():
 
 @pytest.fixture
 def variant(coarse, monkeypatch, tmp_path):
-    """The study of the shipped mission with pieces of its text replaced, without a scan."""
+    """The study of the shipped mission with pieces of its text replaced, without a scan and without its day."""
     monkeypatch.setattr(paper, "applies", lambda mission: False)
-    return lambda *changes: study.run(edited_file(tmp_path, *changes))
+    return lambda *changes: study.run(edited_file(tmp_path, *changes, day=False))
 
 
 def requirement(result, name):
@@ -267,7 +267,7 @@ def plays(weights='"60 urad/V", "20 urad/V", "9 urad/V"'):
 
 
 def test_a_static_mirror_of_plays_runs_through(coarse, tmp_path):
-    result = study.run(edited_file(tmp_path, *plays()))
+    result = study.run(edited_file(tmp_path, *plays(), day=False))
     assert result.scan is None
     assert result.comparison is None
     claims = [(c.where, c.claim) for c in result.claims]
@@ -285,7 +285,7 @@ def test_a_static_mirror_of_plays_runs_through(coarse, tmp_path):
 
 def test_a_mirror_without_inverse_is_refused(coarse, tmp_path):
     with pytest.raises(ValueError, match="no weight at threshold 0"):
-        study.run(edited_file(tmp_path, *plays('"0 urad/V", "80 urad/V", "9 urad/V"')))
+        study.run(edited_file(tmp_path, *plays('"0 urad/V", "80 urad/V", "9 urad/V"'), day=False))
 
 
 def test_a_mechanical_angle_is_doubled_and_the_loop_stays(shipped, variant):
@@ -331,9 +331,8 @@ def test_a_receiver_slower_than_the_papers_rate_leaves_that_claim_unjudged(tmp_p
     text = SHIPPED.read_text(encoding="utf-8")
     sensitivity = next(line for line in text.splitlines() if line.startswith("receiver_sensitivity"))
     head = f"# {'-' * 97} what is required"
-    file = edited_file(
-        tmp_path, (sensitivity, ""), (head, receiver + head), ('data_rate = "300 Mbit/s"', 'data_rate = "largest"')
-    )
+    largest = ('data_rate = "300 Mbit/s"', 'data_rate = "largest"')
+    file = edited_file(tmp_path, (sensitivity, ""), (head, receiver + head), largest, day=False)
     result = study.run(file)
     claim = next(c for c in result.claims if c.where == "section 2.2, Fig. 2")
     assert (claim.agrees, claim.ours) == ("not judged", "the receiver takes less than 300 Mbit/s")
