@@ -1,5 +1,6 @@
 """The mission file that the package ships, as it is and with pieces of its text replaced, and its study."""
 
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -52,6 +53,21 @@ def whole_drawn():
 def plain_drawn():
     """The figures of that study as its page holds them; once for all tests."""
     return once("plain drawn", lambda: report.draw(plain_study()))
+
+
+def write_like_plain(of, folder):
+    """Write the report of the plain study with another loop or contact in it; only what shows these is drawn anew."""
+    from microrad.report import day_plots, fine_pointing_figures, tails  # not for every file of tests
+
+    plain = plain_drawn()
+
+    def draw(study, parts):
+        day = plain.day if study.contact is None else day_plots.draw(study.day, study.contact)
+        return replace(plain, fine=fine_pointing_figures.draw(study), tails=tails.draw(study), day=day)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(report, "draw", draw)
+        return report.write(of, folder)
 
 
 def edited_file(folder, *changes, whole=False, day=True):

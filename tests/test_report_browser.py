@@ -9,10 +9,9 @@ import test_identification_report as identified
 import test_report_campaign as campaigns
 import test_report_fine_pointing as fine_loops
 from browser import violations
-from microrad import report
 from microrad.identify import identify
 from microrad.report import budget_views, campaign_page, day_views
-from shipped import plain_study
+from shipped import plain_study, write_like_plain
 from waiting import HANG_MS
 
 A4_PX = 680  # between the margins
@@ -37,7 +36,7 @@ def files(found, tmp_path_factory):
     """Every kind of page that there is; the fine-pointing loop of the report is made up."""
     folder = tmp_path_factory.mktemp("browser")
     fine = fine_loops.made_up(found.file)
-    written = {"report": report.write(fine_loops.with_fine(found, fine), folder / "study")}
+    written = {"report": write_like_plain(fine_loops.with_fine(found, fine), folder / "study")}
     recordings = [identified.loop(60.0, 1, "60.csv"), identified.loop(100.0, 3, "100.csv"), identified.chirp()]
     mirror = identify(recordings, 0.5, models=("prandtl_ishlinskii", "linear"))
     written["identification"] = identified.write(mirror, folder / "identification.html", recordings=recordings)

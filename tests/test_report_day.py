@@ -17,7 +17,8 @@ from microrad.fine_pointing import designs
 from microrad.missionfile import load_mission
 from microrad.operations import OperationsError
 from microrad.report import contact_run_words, day_plots, day_words, results
-from shipped import SHIPPED, edited_file
+from microrad.report.page import Drawn
+from shipped import SHIPPED, edited_file, plain_study, write_like_plain
 
 FIGURES = ["day-timeline", "along-contact", "data-volume", "latency", "world-map", "assumptions"]
 
@@ -39,10 +40,7 @@ def fine(file):
 @pytest.fixture(scope="module")
 def found(file, fine):
     """The study of the shipped mission without its fine-pointing loop, and one contact in time under a PI."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(study.fine_pointing, "run", lambda *args, **more: None)
-        patch.setattr(study.paper, "applies", lambda mission: False)
-        whole = study.run(file)
+    whole = plain_study()
     run = contact_run.of_mission(file.mission, whole.day, whole.links.finding, fine)
     return replace(whole, contact=run)
 
@@ -50,7 +48,7 @@ def found(file, fine):
 @pytest.fixture(scope="module")
 def written(found, tmp_path_factory):
     target = tmp_path_factory.mktemp("day") / "study"
-    report.write(found, target)
+    write_like_plain(found, target)
     return target
 
 
@@ -216,6 +214,7 @@ def test_a_mission_without_orbits_has_no_day(tmp_path, monkeypatch):
     result = study.run(load_mission(mission))
     assert (result.day, result.contact, result.plan) == (None, None, None)
     assert not any("orbits a day" in c.claim for c in result.claims)
+    monkeypatch.setattr(report, "draw", lambda *args: Drawn())
     page = report.write(result, tmp_path / "out").read_text(encoding="utf-8")
     assert "What the link delivers" not in page
 

@@ -28,7 +28,7 @@ from microrad.report import fine_pointing as section
 from microrad.report import fine_pointing_figures as figures
 from microrad.report import fine_pointing_words as words
 from microrad.report import page as report_page
-from shipped import plain_study
+from shipped import plain_study, write_like_plain
 
 HEADING = "Fine pointing under vibration and noise"
 HEADINGS = ("h2", "h3", "h4")
@@ -144,7 +144,7 @@ def with_residual(fine, name, variant="given", **to):
 @pytest.fixture(scope="module")
 def written(plain, fine, tmp_path_factory):
     target = tmp_path_factory.mktemp("report") / "study"
-    report.write(with_fine(plain, fine), target)
+    write_like_plain(with_fine(plain, fine), target)
     return target
 
 
