@@ -50,8 +50,8 @@ class Judge:
 
     def __init__(self, plants: Sequence[DesignPlant]) -> None:
         """Raise ValueError for no plant, different periods, no disturbance, or one without stationary variance."""
-        self._plants = [moved(p) for p in plants]
         self._period = _one_period(plants)
+        self._A, self._B, self._C, self._D = _stacked([moved(p).from_command for p in plants])
         grids = [_grid(p) for p in plants]
         self._edges = np.cumsum([0, *(f.size for f in grids)])
         self._freq = np.concatenate(grids)
@@ -70,7 +70,7 @@ class Judge:
 
     def __call__(self, controller: AxisController) -> Verdict:
         """Judge one controller; its margins are those of the worst place to cut its loop, on the worst plant."""
-        pole = max(_spectral_radius(p, controller) for p in self._plants)
+        pole = self._spectral_radius(controller)
         if not pole < 1.0 - 1e-9:  # nearer than rounding can tell
             return self.unstable(pole)
         K = response(controller.system, self._points)
@@ -89,7 +89,15 @@ class Judge:
 
     def unstable(self, pole: float) -> Verdict:
         """What is said of a candidate that is unstable, or that could not be built."""
-        return Verdict(pole, math.inf, np.zeros(len(CUTS) * self._bands.size), np.zeros(len(self._plants)))
+        return Verdict(pole, math.inf, np.zeros(len(CUTS) * self._bands.size), np.zeros(len(self._A)))
+
+    def _spectral_radius(self, controller: AxisController) -> float:
+        """That of the closed loop on the worst plant."""
+        c, n = controller.system, self._A.shape[1]
+        whole = np.empty((len(self._A), n + c.order, n + c.order))
+        whole[:, :n, :n], whole[:, :n, n:] = self._A + self._B @ c.D @ self._C, self._B @ c.C
+        whole[:, n:, :n], whole[:, n:, n:] = c.B @ self._C, c.A
+        return float(np.max(np.abs(np.linalg.eigvals(whole)))) if np.all(np.isfinite(whole)) else math.inf
 
     def _mean(self, white: Complexes) -> float:
         """Mean over the plants of the variance that these responses to the white sequences leave."""
@@ -141,12 +149,11 @@ class Judge:
     def _distance(self, controller: AxisController, broken_at: str, plant: NDArray[np.intp], freq_hz: Floats) -> Floats:
         """|1 + L| of these plants (one for each row) at any frequencies."""
         K = lti.frequency_response(controller.system, freq_hz.ravel(), self._period).reshape(*freq_hz.shape, 2)
-        G = np.empty_like(K)
-        for i in np.unique(plant):
-            rows = plant == i
-            found = lti.frequency_response(self._plants[i].from_command, freq_hz[rows].ravel(), self._period)
-            G[rows] = found.reshape(-1, freq_hz.shape[1], 2)
-        return np.abs(1.0 + cut(K, G, broken_at))
+        points = np.exp(2j * math.pi * self._period * freq_hz)[..., None, None]
+        resolvent = points * np.eye(self._A.shape[1]) - self._A[plant, None]
+        driven = np.broadcast_to(self._B[plant, None], (*freq_hz.shape, *self._B.shape[1:]))
+        G = self._C[plant, None] @ np.linalg.solve(resolvent, driven) + self._D[plant, None]
+        return np.abs(1.0 + cut(K, np.asarray(G[..., 0], dtype=complex), broken_at))
 
     def _bandwidths(self, distance: Floats) -> Floats:
         parts = (slice(*edge) for edge in zip(self._edges[:-1], self._edges[1:], strict=True))
@@ -197,11 +204,14 @@ def _quadrature(f: Floats) -> Floats:
     return weights
 
 
-def _spectral_radius(plant: DesignPlant, controller: AxisController) -> float:
-    p, c = plant.system, controller.system
-    seen = p.C[OPTICAL:]
-    A = np.block([[p.A + p.B @ c.D @ seen, p.B @ c.C], [c.B @ seen, c.A]])
-    return float(np.max(np.abs(np.linalg.eigvals(A)))) if np.all(np.isfinite(A)) else math.inf
+def _stacked(systems: Sequence[lti.StateSpace]) -> tuple[Floats, Floats, Floats, Floats]:
+    """Matrices of several systems, each with a first index by system; states that one lacks are at rest in it."""
+    n, several = max(s.order for s in systems), len(systems)
+    inputs, outputs = systems[0].B.shape[1], systems[0].C.shape[0]
+    A, B, C = np.zeros((several, n, n)), np.zeros((several, n, inputs)), np.zeros((several, outputs, n))
+    for i, s in enumerate(systems):
+        A[i, : s.order, : s.order], B[i, : s.order], C[i, :, : s.order] = s.A, s.B, s.C
+    return A, B, C, np.array([s.D for s in systems])
 
 
 def response(system: lti.StateSpace, points: Complexes) -> Complexes:
