@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from microrad.control.analysis import refuse_misfit
+from microrad.control.analysis import LoopMargins, loop_margins, refuse_misfit
 from microrad.control.judge import Judge, Verdict
 from microrad.control.problem import DesignPlant, Family, Parameter, Specification
 
@@ -69,6 +69,7 @@ class Search:
         self.count = 0
         self.optimism = 1.0  # by how much the grid has been seen to overstate the modulus margin
         self.reason: ValueError | None = None
+        self._looked: dict[bytes, list[LoopMargins]] = {}
         self._gentle = np.array([0.0 if p.gentle is None else place_of(p, p.gentle) for p in self.parameters])
         self._pull = pull
 
@@ -94,6 +95,14 @@ class Search:
             self.trials.append(trial)
         self.count += 1
         return trial
+
+    def margins(self, trial: Trial) -> list[LoopMargins]:
+        """Margins of a stable trial on all plants, looked at closely; once for each."""
+        key = trial.values.tobytes()
+        if key not in self._looked:
+            controller = self.family.build(self.plants[0], trial.values)
+            self._looked[key] = [loop_margins(p, controller) for p in self.plants]
+        return self._looked[key]
 
     def _trial(self, place: Floats, values: Floats, verdict: Verdict) -> Trial:
         asked = self.specification

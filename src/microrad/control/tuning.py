@@ -186,17 +186,11 @@ def _candidates(search: Search) -> list[Trial]:
     return sorted(met, key=lambda t: t.cost)
 
 
-def _margins(search: Search, trial: Trial) -> list[LoopMargins]:
-    """Margins of a stable trial on all plants, looked at closely."""
-    controller = search.family.build(search.plants[0], trial.values)
-    return [loop_margins(p, controller) for p in search.plants]
-
-
 def _holds(search: Search, trial: Trial) -> bool:
     """Whether a trial keeps the specification when its margins are looked at closely."""
     asked = search.specification
     return trial.verdict.pole < 1.0 and all(
-        m.modulus >= asked.modulus_margin and m.bandwidth_hz >= asked.bandwidth_hz for m in _margins(search, trial)
+        m.modulus >= asked.modulus_margin and m.bandwidth_hz >= asked.bandwidth_hz for m in search.margins(trial)
     )
 
 
@@ -204,7 +198,7 @@ def _overstated(search: Search, trial: Trial) -> float:
     """By how much the search has overstated a trial's modulus margin, 1 for one that is unstable."""
     if trial.verdict.pole >= 1.0:
         return 1.0
-    return trial.modulus / min(m.modulus for m in _margins(search, trial))
+    return trial.modulus / min(m.modulus for m in search.margins(trial))
 
 
 def _chosen(search: Search) -> Tuned:
@@ -216,8 +210,9 @@ def _chosen(search: Search) -> Tuned:
 
 
 def _tuned(search: Search, trial: Trial) -> Tuned:
-    controller = (search.family.final or search.family.build)(search.plants[0], trial.values)
-    margins = [loop_margins(p, controller) for p in search.plants]
+    final = search.family.final
+    controller = (final or search.family.build)(search.plants[0], trial.values)
+    margins = [loop_margins(p, controller) for p in search.plants] if final else search.margins(trial)
     variances = [float(np.sum(h2(close(p, controller))[RESIDUAL])) for p in search.plants]
     evaluations = search.count
     modulus, bandwidth = min(m.modulus for m in margins), min(m.bandwidth_hz for m in margins)
@@ -281,7 +276,7 @@ def _no_stable(search: Search) -> str:
 
 def _out_of_reach(search: Search, best: Trial) -> str:
     asked = search.specification
-    margins = _margins(search, best)
+    margins = search.margins(best)
     bandwidth = f" and a bandwidth of {asked.bandwidth_hz:g} Hz" if asked.bandwidth_hz else ""
     reached = f" and {min(m.bandwidth_hz for m in margins):.4g} Hz" if asked.bandwidth_hz else ""
     return (
