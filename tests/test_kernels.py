@@ -1060,6 +1060,23 @@ def test_the_kernels_run_as_they_are_without_the_compiler(tmp_path):
             close(uncompiled[name.replace(" ", "_")], values, 1e-12)
 
 
+def features(**environment):
+    """The processor's features that the kernels are compiled for, under these variables."""
+    script = "from microrad import kernels; print(kernels.config.CPU_FEATURES)"
+    plain = {name: value for name, value in os.environ.items() if not name.startswith("NUMBA_CPU")}
+    done = subprocess.run(
+        [sys.executable, "-c", script], env=plain | environment, capture_output=True, text=True, check=True
+    )
+    return done.stdout.strip()
+
+
+def test_vectors_are_as_wide_as_pays_and_as_somebody_has_said():
+    wide = "+avx512vbmi2" in kernels.get_host_cpu_features()
+    assert features().endswith(",-prefer-256-bit") == wide
+    assert features(NUMBA_CPU_NAME="x86-64", NUMBA_CPU_FEATURES="+sse2") == "+sse2"
+    assert features(NUMBA_CPU_NAME="haswell") == "None"
+
+
 def test_machine_code_of_two_processes_never_shares_a_file(tmp_path, monkeypatch):
     """Each process saves with the index it has read before the other wrote: a count of files would name both alike."""
     first, second = (kernels._CacheFile(str(tmp_path), "kernel-1.py3", "stamp") for _ in range(2))
