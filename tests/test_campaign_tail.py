@@ -1,6 +1,7 @@
 """Tails of the radial error: how often their intervals hold the truth, of toy processes, of tilted draws, of a loop."""
 
 import math
+import os
 from dataclasses import asdict, replace
 from functools import partial
 from pathlib import Path
@@ -198,6 +199,7 @@ def test_beyond_all_draws_little_is_known_and_below_them_all() -> None:
 
 
 # -------------------------------------------------------------------------------------------------------- the real loop
+SEEDS = 100 if os.environ.get("MICRORAD_ENDURANCE") else 40
 CAMPAIGN = """
 mission = "mission.toml"
 seed = 1
@@ -259,11 +261,11 @@ def slow(tmp_path_factory: pytest.TempPathFactory) -> Slow:
 
 
 def test_interval_of_a_loops_tail_holds_rayleighs_quantile(slow: Slow) -> None:
-    """64 rows of 4 s each, seeds 0 to 99; some 50 excursions are in each repetition."""
+    """64 rows of 4 s each; some 50 excursions are in each repetition."""
     probability, samples = 1e-4, 64 * 20_000
     exact = rayleigh(probability, slow.sigma)
     campaign = slow.campaign("4.2 s")
-    chunks = in_threads([partial(slow.chunk, campaign, range(64), seed) for seed in range(100)], workers=2)
+    chunks = in_threads([partial(slow.chunk, campaign, range(64), seed) for seed in range(SEEDS)], workers=2)
     at = int(np.searchsorted(EDGES, exact))
     truth = math.exp(-0.5 * (EDGES[at] / slow.sigma) ** 2)
     held, naive, shares, events = {0.99: 0, 0.95: 0}, {0.99: 0, 0.95: 0}, [], []
@@ -277,10 +279,10 @@ def test_interval_of_a_loops_tail_holds_rayleighs_quantile(slow: Slow) -> None:
             naive[confidence] += band.low <= truth <= band.high
         shares.append(share)
         events.append(tail.effective_runs * probability)
-    assert held[0.99] >= 95
-    assert held[0.95] >= 88
-    assert naive[0.99] < 92
-    assert naive[0.95] < 80
+    assert held[0.99] >= 0.95 * SEEDS
+    assert held[0.95] >= 0.88 * SEEDS
+    assert naive[0.99] < 0.92 * SEEDS
+    assert naive[0.95] < 0.80 * SEEDS
     assert np.mean(shares) == pytest.approx(truth, rel=0.06)
     assert 30 < np.median(events) < 100
 

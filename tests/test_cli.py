@@ -23,7 +23,7 @@ from microrad import cli, control, doctor, identify, report, study
 from microrad.cli import frame, lab
 from microrad.fine_pointing import designs
 from microrad.report import day_plots, figures, link_figures, paper_bench
-from shipped import plain_study, without_fine_pointing
+from shipped import plain_study, without_day, without_fine_pointing
 from waiting import HANG_S, lines_of, until
 
 ROOT = Path(__file__).parents[1]
@@ -76,13 +76,13 @@ def loop_mirror(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def plain(tmp_path_factory):
-    """The paper's mission without its fine-pointing loop, which takes most of a study's time."""
+    """The paper's mission without its fine-pointing loop and its day, which take most of a study's time."""
     return mission(tmp_path_factory.mktemp("plain") / "leo-geo.toml")
 
 
 def mission(path, *changes):
-    """The paper's mission with texts replaced, without its fine-pointing loop."""
-    text = without_fine_pointing(PAPER.read_text(encoding="utf-8"))
+    """The paper's mission with texts replaced, without its fine-pointing loop and its day."""
+    text = without_day(without_fine_pointing(PAPER.read_text(encoding="utf-8")))
     for old, new in changes:
         assert text.count(old) == 1, old
         text = text.replace(old, new)

@@ -12,7 +12,7 @@ import pytest
 from microrad import fine_pointing, load_link, load_mirror, presets, report, study
 from microrad.report import identification_figures
 from microrad.units import parse_quantity
-from shipped import whole_study
+from shipped import whole_drawn, whole_study
 
 ROOT = Path(__file__).parent.parent
 GALLERY = ROOT / "docs" / "gallery"
@@ -112,6 +112,8 @@ def run_once(monkeypatch):
         return target / "report.html"
 
     monkeypatch.setattr(study, "run", remembered)
+    figures = whole_drawn()
+    monkeypatch.setattr(report, "draw", lambda *args: figures)
     monkeypatch.setattr(report, "write", copied)
     return found
 
