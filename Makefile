@@ -12,11 +12,11 @@ SIDE_BY_SIDE := --numprocesses 3 --dist loadfile --no-loadscope-reorder
 demo: $(VENV)/.run
 	$(BIN)/microrad run missions/leo-geo.toml --output $(DEMO) --overwrite
 
-# Types are checked on one core; what most tests wait for is compiled on another one.
+# Types are checked on one core; what most tests wait for is compiled on another one. The numbers are compared beside the
+# tests that wait: those are handed out first.
 test: contract lint
 	@$(MAKE) --no-print-directory --jobs=2 types compiled
-	@$(MAKE) --no-print-directory numbers
-	@$(MAKE) --no-print-directory unit
+	@$(MAKE) --no-print-directory --jobs=2 numbers unit
 
 contract: $(VENV)/.test
 	$(BIN)/lint-imports

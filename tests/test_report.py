@@ -18,7 +18,6 @@ from microrad import folder, missionfile, report, study
 from microrad.performance import Cost
 from microrad.report import (
     chain,
-    day_plots,
     drawings,
     figures,
     link_figures,
@@ -29,7 +28,7 @@ from microrad.report import (
     words,
 )
 from report_pages import assert_sound
-from shipped import SHIPPED, edited_file, plain_study, write_like_plain
+from shipped import SHIPPED, edited_file, plain_drawn, plain_study, write_like_plain
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -300,8 +299,8 @@ def test_table_2_sets_the_mission_beside_the_paper(written, paper):
 
 
 def test_each_figure_of_the_paper_is_the_one_of_ours_that_stands_for_it(paper):
-    drawn = (*figures.draw(paper), *paper_bench.draw(paper))
-    found = paper_views.context(paper, drawn)
+    drawn = plain_drawn()
+    found = paper_views.context(paper, (*drawn.study, *drawn.bench))
     assert {number: [f.name for f in several] for number, several in found["figures"].items()} == {
         "Fig. 2": ["fig2-margin-map"],
         "Fig. 4": ["fig4-chirp"],
@@ -313,7 +312,7 @@ def test_each_figure_of_the_paper_is_the_one_of_ours_that_stands_for_it(paper):
     assert all(figure.title.startswith(number) for number, several in found["figures"].items() for figure in several)
     assert [n for n, several in found["figures"].items() if "virtual bench" in several[0].title] == ["Fig. 4", "Fig. 5"]
     assert [*found["differs"]] == [f"Fig. {n}" for n in range(1, 9)]
-    without = paper_views.context(paper, figures.draw(paper))
+    without = paper_views.context(paper, drawn.study)
     assert without["differs"]["Fig. 4"].startswith("Not drawn: ")
 
 
@@ -346,13 +345,8 @@ def test_the_page_holds_what_the_paper_is_judged_by(written):
         assert claim in text
 
 
-def test_each_figure_is_an_svg_with_its_data(written, paper):
-    drawn = (
-        *figures.draw(paper),
-        *paper_bench.draw(paper),
-        *link_figures.draw(paper.links),
-        *day_plots.draw(paper.day),
-    )
+def test_each_figure_is_an_svg_with_its_data(written):
+    drawn = plain_drawn().every
     assert [f.name for f in drawn] == [
         "fig2-margin-map",
         "fig5-hysteresis-loops",
@@ -500,7 +494,7 @@ def test_text_of_the_mission_is_escaped(tmp_path):
 
 @pytest.mark.usefixtures("no_scan", "no_bench")
 def test_a_hopeless_link_is_reported_not_refused(tmp_path):
-    file = edited_file(tmp_path, ('data_rate = "300 Mbit/s"', 'data_rate = "30 Gbit/s"'))
+    file = edited_file(tmp_path, ('data_rate = "300 Mbit/s"', 'data_rate = "30 Gbit/s"'), day=False)
     hopeless = study.run(file)
     assert not hopeless.closes
     assert hopeless.communication.margin_db == pytest.approx(3.0 - 20.0, abs=0.02)
