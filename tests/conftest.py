@@ -5,6 +5,7 @@ import importlib
 import os
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the command line does, before numpy is loaded
+os.environ.pop("MAKEFLAGS", None)  # a make that tests call is not part of the one that calls them
 
 import pytest
 from hypothesis import settings

@@ -158,7 +158,7 @@ def test_a_second_process_on_a_ledger_is_refused_and_a_reader_is_not(long, tmp_p
 def short(tmp_path_factory):
     """A campaign of few chunks whose rows have loops of their own, and its table."""
     folder = tmp_path_factory.mktemp("short")
-    path = campaign_file(folder, runs=40, sampling="sobol", duration="0.4 s", worst=1, more=NOISE + GRID)
+    path = campaign_file(folder, runs=40, sampling="sobol", duration="2 s", worst=1, more=NOISE + GRID)
     return path, load_campaign(path), table(begun(folder))
 
 
