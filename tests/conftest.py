@@ -54,12 +54,13 @@ LONGEST = (
 
 
 def pytest_collection_modifyitems(config, items):
-    """The longest files first; repetitions only where they are asked for."""
+    """The longest files first where processes share them; repetitions only where they are asked for."""
     if not os.environ.get("MICRORAD_ENDURANCE"):
         repeated = [item for item in items if item.get_closest_marker("endurance")]
         items[:] = [item for item in items if not item.get_closest_marker("endurance")]
         config.hook.pytest_deselected(items=repeated)
-    items.sort(key=lambda item: LONGEST.index(item.path.name) if item.path.name in LONGEST else len(LONGEST))
+    if hasattr(config, "workerinput"):
+        items.sort(key=lambda item: LONGEST.index(item.path.name) if item.path.name in LONGEST else len(LONGEST))
 
 
 def pytest_configure(config):
