@@ -156,7 +156,7 @@ def render(of, drawn=()):
 
 def results_of(of, folder):
     """What results.nc holds, with one trace."""
-    results.write_results(replace(of, runs=of.runs[:1]), folder / "results.nc")
+    (folder / "results.nc").write_bytes(results.netcdf(replace(of, runs=of.runs[:1])))
     return xr.open_datatree(folder / "results.nc", engine="h5netcdf")
 
 

@@ -1,5 +1,8 @@
 """Jobs on all cores: their order, and what is left of them after an error."""
 
+import os
+import subprocess
+import sys
 import threading
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
@@ -7,7 +10,7 @@ from functools import partial
 import pytest
 
 from microrad import threads
-from microrad.threads import in_threads
+from microrad.threads import both, in_threads, shared_out
 from waiting import HANG_S
 
 
@@ -61,3 +64,65 @@ def test_jobs_that_have_not_begun_are_dropped_after_an_error(where, monkeypatch)
     with pytest.raises(RuntimeError, match="broken"):
         in_threads([first, *[other] * 50] if where == "in a job" else made(), workers=1)
     assert len(begun) <= 1
+
+
+FORKED = """
+import os, sys, time
+from microrad.threads import shared_out
+
+def own(number):
+    if os.getpid() != caller:
+        {helper}
+    return number, os.getpid()
+
+caller = os.getpid()
+with shared_out([lambda number=number: own(number) for number in range(40)]) as results:
+    {meanwhile}
+    found = results()
+assert [number for number, _ in found] == list(range(40))
+print(len({{pid for _, pid in found}} - {{caller}}), sum(pid != caller for _, pid in found))
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux" or os.cpu_count() == 1, reason="nothing is forked")
+@pytest.mark.parametrize(
+    ("helper", "meanwhile", "done_there"),
+    [
+        ("pass", "os.waitid(os.P_ALL, 0, os.WEXITED | os.WNOWAIT)", 40),  # the caller comes when all is done
+        ("raise RuntimeError", "os.waitid(os.P_ALL, 0, os.WEXITED | os.WNOWAIT)", 0),
+        ("os._exit(1)", "pass", 0),
+        ("os.kill(os.getpid(), 9)", "pass", 0),
+    ],
+)
+def test_forked_processes_do_jobs_and_what_they_leave_is_done_by_the_caller(helper, meanwhile, done_there):
+    code = FORKED.format(helper=helper, meanwhile=meanwhile)
+    ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert (ran.returncode, ran.stderr) == (0, "")
+    assert ran.stdout.split() == [str(min(done_there, 1)), str(done_there)]
+
+
+@pytest.mark.parametrize("forks", [True, False])
+def test_an_error_in_a_shared_job_is_the_callers(forks, monkeypatch):
+    def broken():
+        raise ValueError("broken")
+
+    monkeypatch.setattr(threads, "_may_fork", lambda: forks and sys.platform == "linux")
+    with shared_out([broken, lambda: 2]) as results, pytest.raises(ValueError, match="broken"):
+        results()
+    assert both(lambda: 1, lambda: "two") == (1, "two")
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="nothing is forked")
+def test_nothing_is_forked_beside_another_thread():
+    code = """
+import threading
+from microrad import threads
+assert threads._may_fork()
+end = threading.Event()
+other = threading.Thread(target=end.wait)
+other.start()
+assert not threads._may_fork()
+end.set()
+"""
+    ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert (ran.returncode, ran.stderr) == (0, "")

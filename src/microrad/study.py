@@ -28,6 +28,7 @@ from microrad import (
 )
 from microrad.mission import Mission
 from microrad.missionfile import LinkFile, MissionFile
+from microrad.threads import both
 
 Floats = NDArray[np.float64]
 Progress = Callable[[int, int, str], None]
@@ -131,26 +132,30 @@ def run(
     """
     file = solve_rate(file)
     m, sources = file.mission, file.sources
-    on_progress(0, 4, "budgets and acquisition")
-    links, fig2 = link_study.run(_links_of(file), parts), margin_map(file)
-
-    on_progress(1, 4, "mirror and tracking (the first run compiles for half a minute)")
-    summary, loops = mirror_summary.summarise(m.mirror), tracking.hysteresis_loops(m)
-    margins, runs = tracking.loop_margins(m), tracking.tracking_runs(m)
+    on_progress(0, 3, "budgets, acquisition, mirror and tracking (the first run compiles for half a minute)")
+    (summary, loops, margins, runs), (links, fig2) = both(
+        lambda: (
+            mirror_summary.summarise(m.mirror),
+            tracking.hysteresis_loops(m),
+            tracking.loop_margins(m),
+            tracking.tracking_runs(m),
+        ),
+        lambda: (link_study.run(_links_of(file), parts), margin_map(file)),
+    )
     residual = tracking.worst(m, runs)
     left_rad = tracking.residual_rad(m, residual.trace)
     simulated = f"simulated: {residual.trace.name}, {m.requirement.residual_statistic} ({m.conventions.residual})"
     achieved = link.communication_budget(m, sources, pointing_error_rad=left_rad, given_source=simulated)
     as_read = readings.others(m, residual)
 
-    on_progress(2, 4, "claims of the paper")
+    on_progress(1, 3, "claims of the paper")
     scan = parts.part(paper.scan, m, on_progress=on_progress) if paper.applies(m) else None
     fine = None if m.fine_pointing is None else parts.part(fine_pointing.run, file, on_progress=on_progress)
-    on_progress(3, 4, "the day")
+    on_progress(2, 3, "the day")
     found = performance.run(m, runs, fine)
     day, contact, plan = delivered(file, links, found, fine, residual, achieved, parts)
 
-    on_progress(4, 4, "verdict")
+    on_progress(3, 3, "verdict")
     beacon, answer = _present(links.beacon), _present(links.answer)
     evidence = verdict.Evidence(
         m, links.open_loop, beacon, links.communication, fig2.readings, fig2.ideal, loops, summary, runs, scan, day
@@ -223,10 +228,15 @@ def delivered(
         loss = day_study.PointingLoss(case.outage_loss_db, case.outage, f"{case.controller}, {case.source}")
     else:
         loss = day_study.loss_at(m, achieved.margin_db, f"simulated: {residual.trace.name}")
-    day = parts.part(day_study.run, links, loss)
-    contact = parts.part(contact_run.of_mission, m, day, links.finding, fine)
     planned = m.constellation is not None and orbit.repeats(m.constellation, m)
-    plan = parts.part(constellation.run, _links_of(file), loss) if planned else None
+
+    def in_time() -> tuple[day_study.DayStudy, contact_run.ContactRun | None]:
+        day = parts.part(day_study.run, links, loss)
+        return day, parts.part(contact_run.of_mission, m, day, links.finding, fine)
+
+    (day, contact), plan = both(
+        in_time, lambda: parts.part(constellation.run, _links_of(file), loss) if planned else None
+    )
     return day, contact, plan
 
 

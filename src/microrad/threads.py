@@ -1,11 +1,17 @@
-"""Jobs on all cores: threads suffice, since the compiled kernels run without the interpreter lock."""
+"""Jobs on all cores: threads suffice where compiled kernels run without the interpreter lock, else forked processes."""
 
+import contextlib
+import multiprocessing
 import os
-from collections.abc import Callable, Iterable
+import sys
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from typing import TypeVar
+from pathlib import Path
+from typing import Any, TypeVar
 
 _Result = TypeVar("_Result")
+_First = TypeVar("_First")
+_Second = TypeVar("_Second")
 
 
 def in_threads(
@@ -29,3 +35,63 @@ def in_threads(
             pool.shutdown(wait=False, cancel_futures=True)
             raise
     return results
+
+
+@contextlib.contextmanager
+def shared_out(jobs: Sequence[Callable[[], _Result]]) -> Iterator[Callable[[], list[_Result]]]:
+    """Jobs in Python that forked processes begin with, at most 256; the callable takes part and returns their results.
+
+    A result is pickled. A process that fails leaves its jobs to the caller, so an error is the one that the job raises
+    there. Where no process can be forked the callable does all of them: that is safe on Linux alone, while no other
+    thread runs.
+    """
+    helpers = min((os.cpu_count() or 1) - 1, len(jobs) - 1) if _may_fork() else 0
+    turns, given = os.pipe()
+    os.write(given, bytes(range(len(jobs))))
+    os.close(given)
+    context: Any = multiprocessing.get_context("fork" if helpers else None)
+    pipes = [context.Pipe(duplex=False) for _ in range(helpers)]
+    processes = [context.Process(target=_help, args=(jobs, turns, mouth), daemon=True) for _, mouth in pipes]
+
+    def results() -> list[_Result]:
+        done = _done(jobs, turns)
+        for ear, mouth in pipes:
+            mouth.close()
+            with contextlib.suppress(EOFError):
+                done |= ear.recv()
+        return [done[number] if number in done else job() for number, job in enumerate(jobs)]
+
+    try:
+        for process in processes:
+            process.start()
+        yield results
+    finally:
+        os.close(turns)
+        for process in processes:
+            if process.pid is not None:
+                process.kill()
+                process.join()
+        for end in (end for pipe in pipes for end in pipe):
+            end.close()
+
+
+def both(first: Callable[[], _First], second: Callable[[], _Second]) -> tuple[_First, _Second]:
+    """What two jobs in Python return, done side by side where that is possible (see `shared_out`)."""
+    jobs: tuple[Callable[[], Any], ...] = (first, second)
+    with shared_out(jobs) as results:
+        of_first, of_second = results()
+    return of_first, of_second
+
+
+def _may_fork() -> bool:
+    return sys.platform == "linux" and len(list(Path("/proc/self/task").iterdir())) == 1
+
+
+def _done(jobs: Sequence[Callable[[], _Result]], turns: int) -> dict[int, _Result]:
+    """The results of the jobs whose turns this process has taken, by number."""
+    return {turn[0]: jobs[turn[0]]() for turn in iter(lambda: os.read(turns, 1), b"")}
+
+
+def _help(jobs: Sequence[Callable[[], Any]], turns: int, mouth: Any) -> None:
+    with contextlib.suppress(BaseException):  # the caller does without
+        mouth.send(_done(jobs, turns))

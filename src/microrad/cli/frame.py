@@ -8,6 +8,7 @@ output.
 import _thread
 import contextlib
 import functools
+import gc
 import io
 import json
 import math
@@ -32,6 +33,7 @@ PROGRESS_FILE = "MICRORAD_PROGRESS"
 """Environment variable that names a file for progress, as JSON lines, in place of a bar or lines on stderr."""
 
 _WIDE = 160  # columns of a table that goes to a file
+_BAR_S = 0.05  # between two looks of the bar
 _PROGRESS_S = 0.2  # between two lines of a progress file, unless another phase begins
 _PROGRESS_BYTES = 1_000_000  # of a progress file, which begins anew beyond
 
@@ -81,6 +83,7 @@ app = typer.Typer(
 def main() -> None:
     """Run the command line and exit; a request to terminate is taken as Ctrl-C is."""
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # small matrices: its threads would get in the way of ours
+    gc.set_threshold(50_000, 20, 50)  # most objects stay: by default a tenth of a run goes into looking through them
     for number in (signal.SIGTERM, getattr(signal, "SIGHUP", signal.SIGTERM)):
         if signal.getsignal(number) is not signal.SIG_IGN:
             signal.signal(number, signal.default_int_handler)
@@ -246,6 +249,7 @@ def _progress_records(file: io.FileIO) -> OnProgress:
 def progress_bar(line_s: float = math.inf) -> Iterator[OnProgress]:
     """A bar on stderr while something is computed, where stderr is a terminal; a line every ``line_s`` elsewhere.
 
+    It moves with the progress alone: for more it would need a thread, beside which no process can be forked.
     Where the environment variable `PROGRESS_FILE` names a file, progress goes there and nowhere else.
     """
     if name := os.environ.get(PROGRESS_FILE):
@@ -258,9 +262,18 @@ def progress_bar(line_s: float = math.inf) -> Iterator[OnProgress]:
     from rich.console import Console
     from rich.progress import Progress
 
-    with Progress(console=Console(stderr=True), transient=True) as bar:
+    last_s = -math.inf
+    with Progress(console=Console(stderr=True), transient=True, auto_refresh=False) as bar:
         task = bar.add_task("reading", total=None)
-        yield lambda done, total, what: bar.update(task, completed=done, total=total, description=what)
+
+        def move(done: int, total: int, what: str) -> None:
+            nonlocal last_s
+            bar.update(task, completed=done, total=total, description=what)
+            if done == total or time.monotonic() - last_s >= _BAR_S:
+                last_s = time.monotonic()
+                bar.refresh()
+
+        yield move
 
 
 def width() -> int:

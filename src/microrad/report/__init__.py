@@ -2,7 +2,7 @@
 
 import csv
 import io
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,9 +10,11 @@ from typing import TYPE_CHECKING, Any
 from microrad.folder import MANIFEST, FolderError, check_folder, whole_folder
 from microrad.kept import NOTHING, Kept
 from microrad.report.tables import Column, rows_of
+from microrad.threads import shared_out
 
 if TYPE_CHECKING:
     from microrad.constellation import ConstellationPlan
+    from microrad.report.figures import Figure
     from microrad.report.identification import ReportError, check_identification, write_identification
     from microrad.report.identification_words import identification_data, identification_text
     from microrad.report.page import Drawn
@@ -71,7 +73,9 @@ def write(
 
     with whole_folder(folder, overwrite) as draft:
         on_progress(0, 3, "figures")
-        drawn = draw(study, parts)
+        with shared_out(_drawing(study, parts)) as figures:
+            numbers = parts.part(results.netcdf, study)
+            drawn = _drawn(figures(), parts)
         (draft / "figures").mkdir()
         for figure in drawn.every:
             (draft / "figures" / f"{figure.name}.svg").write_text(figure.svg, encoding="utf-8")
@@ -83,7 +87,7 @@ def write(
         on_progress(2, 3, "results")
         if study.plan is not None:
             write_plan(study.plan, draft)
-        (draft / "results.nc").write_bytes(parts.part(results.netcdf, study))
+        (draft / "results.nc").write_bytes(numbers)
         results.write_manifest(made, draft, MANIFEST)
         on_progress(3, 3, "done")
     return folder / "report.html"
@@ -91,16 +95,30 @@ def write(
 
 def draw(study: "Study", parts: Kept = NOTHING) -> "Drawn":
     """The figures of a study's page, by its parts."""
-    from microrad.report import day_plots, figures, fine_pointing_figures, link_figures, page, paper_bench, tails
+    with shared_out(_drawing(study, parts)) as figures:
+        return _drawn(figures(), parts)
 
-    return page.Drawn(
-        figures.draw(study, parts),
-        paper_bench.draw(study, parts),
-        fine_pointing_figures.draw(study, parts),
-        tails.draw(study, parts),
-        link_figures.draw(study.links, parts),
-        () if study.day is None else day_plots.draw(study.day, study.contact, parts),
-    )
+
+def _drawing(study: "Study", parts: Kept) -> list[Callable[[], tuple[tuple["Figure", ...], str]]]:
+    """What draws the figures of each part of the page, and returns them with what went wrong in keeping them."""
+    from microrad.report import day_plots, figures, fine_pointing_figures, link_figures, paper_bench, tails
+
+    each: list[Callable[[], tuple[Figure, ...]]] = [
+        lambda: figures.draw(study, parts),
+        lambda: paper_bench.draw(study, parts),
+        lambda: fine_pointing_figures.draw(study, parts),
+        lambda: tails.draw(study, parts),
+        lambda: link_figures.draw(study.links, parts),
+        lambda: () if study.day is None else day_plots.draw(study.day, study.contact, parts),
+    ]
+    return [lambda draw=draw: (draw(), parts.trouble) for draw in each]  # type: ignore[misc]
+
+
+def _drawn(found: "Sequence[tuple[tuple[Figure, ...], str]]", parts: Kept) -> "Drawn":
+    from microrad.report import page
+
+    parts.trouble = next(filter(None, (parts.trouble, *(trouble for _, trouble in found))), "")
+    return page.Drawn(*(figures for figures, _ in found))
 
 
 def write_plan(plan: "ConstellationPlan", folder: Path) -> None:

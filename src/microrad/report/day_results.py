@@ -1,19 +1,20 @@
-"""The numbers of a day as datasets: contacts, passes, the store by each way, one contact in time, sessions."""
+"""The numbers of a day as groups: contacts, passes, the store by each way, one contact in time, sessions."""
+
+from dataclasses import replace
 
 import numpy as np
-import xarray as xr
 from numpy.typing import NDArray
 
 from microrad.constellation import ConstellationPlan
 from microrad.contact_run import ContactRun
 from microrad.day_study import DayStudy, Way
 from microrad.orbit import Contact
-from microrad.report.variables import coordinate, variable
+from microrad.report.variables import Group, Variable, coordinate, variable
 
 Floats = NDArray[np.float64]
 
 
-def datasets(day: DayStudy, run: ContactRun | None, plan: ConstellationPlan | None) -> dict[str, xr.Dataset]:
+def groups(day: DayStudy, run: ContactRun | None, plan: ConstellationPlan | None) -> dict[str, Group]:
     """By group: "day/contacts", "day/relay" and the others that the study has."""
     found = {
         "day/contacts": _contacts(day),
@@ -28,16 +29,14 @@ def datasets(day: DayStudy, run: ContactRun | None, plan: ConstellationPlan | No
         found["day/contact_run"] = _run(run)
     if plan is not None:
         found["day/sessions"] = _sessions(plan)
-    for each in found.values():
-        each.attrs["epoch"] = day.view.pair.epoch.text
-    return found
+    return {name: replace(each, attributes={"epoch": day.view.pair.epoch.text}) for name, each in found.items()}
 
 
 def _group(way: Way) -> str:
     return way.name.replace(" ", "_")
 
 
-def _spans(contacts: tuple[Contact, ...]) -> dict[str, xr.Variable]:
+def _spans(contacts: tuple[Contact, ...]) -> dict[str, Variable]:
     dims = ("contact",)
     return {
         "start": variable(dims, [c.start_s for c in contacts], "s", "begin, since the epoch"),
@@ -47,7 +46,7 @@ def _spans(contacts: tuple[Contact, ...]) -> dict[str, xr.Variable]:
     }
 
 
-def _contacts(day: DayStudy) -> xr.Dataset:
+def _contacts(day: DayStudy) -> Group:
     dims, each = ("contact",), day.encounters
     quantities = {
         "range_least": ("m", "smallest range", [e.range_least_m for e in each]),
@@ -59,10 +58,10 @@ def _contacts(day: DayStudy) -> xr.Dataset:
         "could_carry": ("bit", "data that it could carry within the span, mean of the runs", day.relay.carried_bit),
     }
     data = {name: variable(dims, values, unit, what) for name, (unit, what, values) in quantities.items()}
-    return xr.Dataset({**_spans(tuple(e.contact for e in each)), **data})
+    return Group({**_spans(tuple(e.contact for e in each)), **data})
 
 
-def _line_of_sight(day: DayStudy) -> xr.Dataset:
+def _line_of_sight(day: DayStudy) -> Group:
     """Every contact in time, one after the other."""
     dims, each = ("sample",), day.encounters
     wavelength = day.mission.communication.wavelength_m
@@ -78,20 +77,20 @@ def _line_of_sight(day: DayStudy) -> xr.Dataset:
     number = [np.full(e.sight.time_s.size, float(k + 1)) for k, e in enumerate(each)]
     data = {"contact": variable(dims, _joined(number), "1", "number of the contact in the span, from 1")}
     data |= {name: variable(dims, _joined(parts), unit, what) for name, (unit, what, parts) in quantities.items()}
-    return xr.Dataset(data)
+    return Group(data)
 
 
 def _joined(parts: list[Floats]) -> Floats:
     return np.concatenate([np.zeros(0), *parts])
 
 
-def _passes(way: Way) -> xr.Dataset:
+def _passes(way: Way) -> Group:
     stations = variable(("contact",), np.array(way.stations, dtype=object), "1", "ground station")
     carried = variable(("contact",), way.carried_bit, "bit", "data that it could carry within the span")
-    return xr.Dataset({**_spans(way.contacts), "station": stations, "could_carry": carried})
+    return Group({**_spans(way.contacts), "station": stations, "could_carry": carried})
 
 
-def _way(way: Way) -> xr.Dataset:
+def _way(way: Way) -> Group:
     h, dims = way.history, ("moment",)
     data = {
         "time": variable(dims, h.time_s, "s", "time since the epoch; linear from one moment to the next"),
@@ -103,10 +102,10 @@ def _way(way: Way) -> xr.Dataset:
         "latency_median": variable((), way.median_s, "s", "median latency of the data kept, all runs"),
         "latency_99_percent": variable((), way.slow_s, "s", "latency within which 99 % of it arrived"),
     }
-    return xr.Dataset(data)
+    return Group(data)
 
 
-def _assumptions(day: DayStudy) -> xr.Dataset:
+def _assumptions(day: DayStudy) -> Group:
     found = {}
     for side in ("low", "high"):
         cases = [getattr(s, f"at_{side}") for s in day.swings]
@@ -116,10 +115,10 @@ def _assumptions(day: DayStudy) -> xr.Dataset:
             name = key.rpartition("_")[0].replace("slow", "latency_99_percent")
             words = f"{name.replace('_', ' ')} with the {side} side"
             found[f"{name}_{side}"] = variable(("assumption",), [getattr(c, key) for c in cases], unit, words)
-    return xr.Dataset(found, coordinate("assumption", [s.name for s in day.swings], "what is changed"))
+    return Group(found, coordinate("assumption", [s.name for s in day.swings], "what is changed"))
 
 
-def _run(run: ContactRun) -> xr.Dataset:
+def _run(run: ContactRun) -> Group:
     entry, window = ("transition",), ("window",)
     w = run.windows
     texts = {"state": "state that is left", "to": "state that follows", "cause": "why"}
@@ -138,10 +137,10 @@ def _run(run: ContactRun) -> xr.Dataset:
     }
     data["time"] = variable(entry, [t.time_s for t in run.log], "s", "time since the epoch")
     data |= {name: variable(window, values, unit, what) for name, (unit, what, values) in quantities.items()}
-    return xr.Dataset(data)
+    return Group(data)
 
 
-def _sessions(plan: ConstellationPlan) -> xr.Dataset:
+def _sessions(plan: ConstellationPlan) -> Group:
     dims, p = ("session",), plan.planned
     data = {
         "satellite": variable(dims, np.array([x.satellite for x in p], dtype=object), "1", "satellite"),
@@ -152,4 +151,4 @@ def _sessions(plan: ConstellationPlan) -> xr.Dataset:
         "data_rate": variable(dims, [x.rate_bit_s for x in p], "bit/s", "data rate"),
         "volume": variable(dims, [x.volume_bit for x in p], "bit", "volume"),
     }
-    return xr.Dataset(data)
+    return Group(data)

@@ -4,23 +4,21 @@ import contextlib
 import hashlib
 import json
 import math
-import tempfile
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import xarray as xr
 from numpy.typing import NDArray
 
 from microrad.fine_pointing import COUNTERS, FinePointingStudy, Residual
 from microrad.machine import machine, versions
 from microrad.missionfile import MirrorFile, MissionFile, named_files
-from microrad.report import day_results, words
+from microrad.report import day_results, variables, words
 from microrad.report.carried import hash_of_summary
 from microrad.report.fine_pointing_data import margins, rms_by_source, sources
 from microrad.report.paper_bench import PLAN, SEED
-from microrad.report.variables import coordinate, variable
+from microrad.report.variables import Group, Variable, coordinate, variable
 from microrad.study import Study
 from microrad.tracking import Run
 
@@ -31,7 +29,7 @@ MOST_INPUT_BYTES = 1_000_000
 """Length up to which a file that the mission names is carried in the manifest."""
 
 
-def _trace(run: Run) -> xr.Dataset:
+def _trace(run: Run) -> Group:
     t, c = run.trace, run.trace.counts
     data = {
         "reference": variable(("time",), t.reference_rad[:, 0], "rad", "pointing reference"),
@@ -52,12 +50,12 @@ def _trace(run: Run) -> xr.Dataset:
         "slew_limited_steps": c.slew_limited,
         "alternating_samples": c.alternating,
     }
-    return xr.Dataset(data, {"time": variable(("time",), t.time_s, "s", "time")}, attributes)
+    return Group(data, {"time": variable(("time",), t.time_s, "s", "time")}, attributes)
 
 
-def _map(study: Study) -> xr.Dataset:
+def _map(study: Study) -> Group:
     f = study.margin_map
-    return xr.Dataset(
+    return Group(
         {"margin": variable(("data_rate", "pointing_error"), f.margin_db, "dB", "margin of the communication link")},
         {
             "data_rate": variable(("data_rate",), f.data_rate_bit_s, "bit/s", "data rate"),
@@ -66,22 +64,22 @@ def _map(study: Study) -> xr.Dataset:
     )
 
 
-def _loops(study: Study) -> dict[str, xr.Dataset]:
+def _loops(study: Study) -> dict[str, Group]:
     bias = study.file.mission.mirror.bias_v
     return {
-        f"hysteresis_loops/{loop.freq_hz:g}_hz": xr.Dataset(
+        f"hysteresis_loops/{loop.freq_hz:g}_hz": Group(
             {
                 "drive": variable(("sample",), loop.drive_v + bias, "V", "drive"),
                 "output": variable(("sample",), loop.output_rad, "rad", "output about the bias"),
                 "hysteresis": variable(("sample",), loop.hysteresis_rad, "rad", "hysteresis h"),
             },
-            attrs={"frequency_hz": loop.freq_hz, "width": loop.width, "rate_clamped_samples": loop.clamped},
+            attributes={"frequency_hz": loop.freq_hz, "width": loop.width, "rate_clamped_samples": loop.clamped},
         )
         for loop in study.loops
     }
 
 
-def _fine_pointing(fine: FinePointingStudy) -> dict[str, xr.Dataset]:
+def _fine_pointing(fine: FinePointingStudy) -> dict[str, Group]:
     """Spectra, residuals, theory by source, margins, error budget and sines of the fine-pointing loop."""
     groups = {
         "spectra": _spectra(fine),
@@ -94,11 +92,11 @@ def _fine_pointing(fine: FinePointingStudy) -> dict[str, xr.Dataset]:
     return {f"fine_pointing/{name}": group for name, group in groups.items()}
 
 
-def _controllers(fine: FinePointingStudy) -> dict[str, xr.Variable]:
+def _controllers(fine: FinePointingStudy) -> dict[str, Variable]:
     return coordinate("controller", [v.design.name for v in fine.verified], "controller")
 
 
-def _spectra(fine: FinePointingStudy) -> xr.Dataset:
+def _spectra(fine: FinePointingStudy) -> Group:
     dims, unit = ("controller", "frequency", "axis"), "rad^2/Hz"
     after = np.stack([v.spectrum_rad2_hz for v in fine.verified])
     predicted = np.stack([v.predicted_rad2_hz for v in fine.verified])
@@ -110,14 +108,14 @@ def _spectra(fine: FinePointingStudy) -> xr.Dataset:
     }
     freq = {"frequency": variable(("frequency",), fine.freq_hz, "Hz", "frequency")}
     axes = coordinate("axis", _axes(fine), "axis of the line of sight")
-    return xr.Dataset(data, {**_controllers(fine), **freq, **axes})
+    return Group(data, {**_controllers(fine), **freq, **axes})
 
 
 def _axes(fine: FinePointingStudy) -> tuple[str, ...]:
     return ("x", "y")[: fine.scene.loop.axes]
 
 
-def _residuals(fine: FinePointingStudy) -> xr.Dataset:
+def _residuals(fine: FinePointingStudy) -> Group:
     variants = tuple(dict.fromkeys(name for v in fine.verified for name in v.simulated))
     limits = tuple(COUNTERS)
     table = [[v.simulated.get(name) for name in variants] for v in fine.verified]
@@ -140,10 +138,10 @@ def _residuals(fine: FinePointingStudy) -> xr.Dataset:
     }
     names = {**_controllers(fine), **coordinate("mirror", variants, "variant of the mirror")}
     names |= coordinate("axis", _axes(fine), "axis of the line of sight") | coordinate("limit", limits, "limit")
-    return xr.Dataset(data, names, {"quantile": fine.quantile, "best": fine.best.design.name})
+    return Group(data, names, {"quantile": fine.quantile, "best": fine.best.design.name})
 
 
-def _theory(fine: FinePointingStudy) -> xr.Dataset:
+def _theory(fine: FinePointingStudy) -> Group:
     names = sources(fine.verified)
     parts = [rms_by_source(v) for v in fine.verified]
     by_source = np.array([[part.get(name, math.nan) for name in names] for part in parts])
@@ -153,7 +151,7 @@ def _theory(fine: FinePointingStudy) -> xr.Dataset:
         "rms": variable(("controller",), total, "rad", "radial rms of all sources"),
         "bound": variable((), fine.optimum_rad, "rad", "radial rms below which no linear controller comes"),
     }
-    return xr.Dataset(data, {**_controllers(fine), **coordinate("source", names, "source of error")})
+    return Group(data, {**_controllers(fine), **coordinate("source", names, "source of error")})
 
 
 _MARGINS = {
@@ -167,16 +165,16 @@ _MARGINS = {
 }
 
 
-def _loop_margins(fine: FinePointingStudy) -> xr.Dataset:
+def _loop_margins(fine: FinePointingStudy) -> Group:
     found = [margins(v.design) for v in fine.verified]
     data = {
         key: variable(("controller",), np.array([each[key] for each in found]), unit, long_name)
         for key, (unit, long_name) in _MARGINS.items()
     }
-    return xr.Dataset(data, _controllers(fine))
+    return Group(data, _controllers(fine))
 
 
-def _error_budget(fine: FinePointingStudy) -> xr.Dataset:
+def _error_budget(fine: FinePointingStudy) -> Group:
     b = fine.budget
     alone, theory = ([getattr(p, key) for p in b.parts] for key in ("rms_rad", "theory_rad"))
     with_it, without = ([getattr(d, key) for d in b.differences] for key in ("with_rad", "without_rad"))
@@ -191,10 +189,10 @@ def _error_budget(fine: FinePointingStudy) -> xr.Dataset:
     }
     names = coordinate("part", [p.name for p in b.parts], "part of the error")
     names |= coordinate("left_out", [d.name for d in b.differences], "part that is left out")
-    return xr.Dataset(data, names, {"controller": b.controller})
+    return Group(data, names, {"controller": b.controller})
 
 
-def _sines(fine: FinePointingStudy) -> xr.Dataset:
+def _sines(fine: FinePointingStudy) -> Group:
     """One entry a run: not every controller need have run on every mirror."""
     s, run = fine.sines, ("run",)
     at = f"radial error that {fine.quantile:g} of the time stays below"
@@ -205,10 +203,10 @@ def _sines(fine: FinePointingStudy) -> xr.Dataset:
         "rms": variable(run, np.array([each.rms_rad for each in s]), "rad", "radial rms"),
         "quantile": variable(run, np.array([each.quantile_rad for each in s]), "rad", at),
     }
-    return xr.Dataset(data)
+    return Group(data)
 
 
-def _performance(study: Study) -> xr.Dataset:
+def _performance(study: Study) -> Group:
     """The communication link under each simulated residual, one entry a case."""
     cases, dims = study.performance.cases, ("case",)
     half = "half angle at 1/e2 with the most power at the outage loss"
@@ -239,19 +237,14 @@ def _performance(study: Study) -> xr.Dataset:
         )
     }
     data |= {name: variable(dims, np.array(values), unit, what) for name, (unit, what, values) in quantities.items()}
-    return xr.Dataset(data, attrs={"outage": study.performance.outage})
+    return Group(data, attributes={"outage": study.performance.outage})
 
 
 def netcdf(study: Study) -> bytes:
-    """The content of results.nc, as `write_results` writes it."""
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "results.nc"
-        write_results(study, path)
-        return path.read_bytes()
+    """The content of results.nc.
 
-
-def write_results(study: Study, path: Path) -> None:
-    """results.nc: margin map, hysteresis loops, traces, fine-pointing loop, the day; each variable with its unit."""
+    It has margin map, hysteresis loops, traces, fine-pointing loop and the day; each variable with its unit.
+    """
     groups = {"margin_map": _map(study), "link_performance": _performance(study), **_loops(study)}
     for run in study.runs:
         name = f"{run.mirror} {run.controller} {run.freq_hz:g}_hz".replace(" + ", "_").replace(" ", "_").lower()
@@ -259,10 +252,8 @@ def write_results(study: Study, path: Path) -> None:
     if study.fine_pointing is not None:
         groups |= _fine_pointing(study.fine_pointing)
     if study.day is not None:
-        groups |= day_results.datasets(study.day, study.contact, study.plan)
-    tree = xr.DataTree.from_dict({f"/{name}": group for name, group in groups.items()})
-    tree.attrs = {"title": study.file.mission.name, "mission_sha256": study.file.sha256}
-    tree.to_netcdf(path, engine="h5netcdf")
+        groups |= day_results.groups(study.day, study.contact, study.plan)
+    return variables.netcdf(groups, {"title": study.file.mission.name, "mission_sha256": study.file.sha256})
 
 
 def manifest(study: Study, folder: Path) -> dict[str, Any]:
