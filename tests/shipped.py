@@ -1,5 +1,6 @@
 """The mission file that the package ships, as it is and with pieces of its text replaced, and its study."""
 
+import contextlib
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -61,12 +62,14 @@ def write_like_plain(of, folder):
 
     plain = plain_drawn()
 
-    def draw(study, parts):
+    @contextlib.contextmanager
+    def drawing(study, parts):
         day = plain.day if study.contact is None else day_plots.draw(study.day, study.contact)
-        return replace(plain, fine=fine_pointing_figures.draw(study), tails=tails.draw(study), day=day)
+        fine = fine_pointing_figures.draw(study)
+        yield lambda: replace(plain, fine=fine, tails=tails.draw(study), day=day)
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(report, "draw", draw)
+        patch.setattr(report, "drawing", drawing)
         return report.write(of, folder)
 
 

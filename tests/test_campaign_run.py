@@ -57,10 +57,10 @@ def whole(book, campaign):
 
 @pytest.fixture(scope="module")
 def long(tmp_path_factory):
-    """A campaign of some sixteen chunks, and the table of an undisturbed run."""
+    """A campaign of 32 chunks, and the table of an undisturbed run."""
     folder = tmp_path_factory.mktemp("long")
     rates = ", ".join(f'"{100 + 10 * i} Mbit/s"' for i in range(16))
-    path = campaign_file(folder, runs=200, duration="0.3 s", more=f'[grid]\n"communication.data_rate" = [{rates}]\n')
+    path = campaign_file(folder, runs=96, duration="0.3 s", more=f'[grid]\n"communication.data_rate" = [{rates}]\n')
     book = begun(folder)
     return path, load_campaign(path), table(book)
 
@@ -81,6 +81,12 @@ def wait_for_a_chunk(process, book):
         return chunks_in(book)
 
     until(there, f"a chunk in {book}")
+
+
+def halt(process):
+    """Stop a campaign where it stands, until it is continued or killed."""
+    process.send_signal(signal.SIGSTOP)
+    until(lambda: psutil.Process(process.pid).status() == psutil.STATUS_STOPPED, "the campaign's halt")
 
 
 # --------------------------------------------------------------------------------------------------------------- kills
@@ -123,8 +129,7 @@ def test_ctrl_c_stops_at_once_and_says_how_to_go_on(long, tmp_path):
     process = started("run", path, "--ledger", book, cwd=tmp_path)
     wait_for_a_chunk(process, book)
     workers = children(process.pid)
-    process.send_signal(signal.SIGSTOP)
-    until(lambda: psutil.Process(process.pid).status() == psutil.STATUS_STOPPED, "the campaign's halt")
+    halt(process)
     before = len(chunks_in(book))
     process.send_signal(signal.SIGINT)
     process.send_signal(signal.SIGCONT)
@@ -144,6 +149,7 @@ def test_a_second_process_on_a_ledger_is_refused_and_a_reader_is_not(long, tmp_p
     process = started("run", path, "--ledger", book, cwd=tmp_path)
     try:
         wait_for_a_chunk(process, book)
+        halt(process)
         code, out, err = finished("resume", book, cwd=tmp_path)
         assert (code, out) == (2, "") and str(process.pid) in err and "Traceback" not in err
         code, out, _ = finished("status", book, cwd=tmp_path)
@@ -158,7 +164,7 @@ def test_a_second_process_on_a_ledger_is_refused_and_a_reader_is_not(long, tmp_p
 def short(tmp_path_factory):
     """A campaign of few chunks whose rows have loops of their own, and its table."""
     folder = tmp_path_factory.mktemp("short")
-    path = campaign_file(folder, runs=40, sampling="sobol", duration="2 s", worst=1, more=NOISE + GRID)
+    path = campaign_file(folder, runs=16, sampling="sobol", duration="2 s", worst=1, more=NOISE + GRID)
     return path, load_campaign(path), table(begun(folder))
 
 

@@ -4,6 +4,7 @@ import csv
 import hashlib
 import io
 import json
+from contextlib import nullcontext
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -214,7 +215,7 @@ def test_a_mission_without_orbits_has_no_day(tmp_path, monkeypatch):
     result = study.run(load_mission(mission))
     assert (result.day, result.contact, result.plan) == (None, None, None)
     assert not any("orbits a day" in c.claim for c in result.claims)
-    monkeypatch.setattr(report, "draw", lambda *args: Drawn())
+    monkeypatch.setattr(report, "drawing", lambda *args: nullcontext(Drawn))
     page = report.write(result, tmp_path / "out").read_text(encoding="utf-8")
     assert "What the link delivers" not in page
 

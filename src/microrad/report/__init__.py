@@ -1,8 +1,9 @@
 """Reports of a study and of an identification: a page that opens offline, the verdict in words, plain data."""
 
+import contextlib
 import csv
 import io
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -73,9 +74,9 @@ def write(
 
     with whole_folder(folder, overwrite) as draft:
         on_progress(0, 3, "figures")
-        with shared_out(_drawing(study, parts)) as figures:
+        with drawing(study, parts) as figures:
             numbers = parts.part(results.netcdf, study)
-            drawn = _drawn(figures(), parts)
+            drawn = figures()
         (draft / "figures").mkdir()
         for figure in drawn.every:
             (draft / "figures" / f"{figure.name}.svg").write_text(figure.svg, encoding="utf-8")
@@ -95,13 +96,14 @@ def write(
 
 def draw(study: "Study", parts: Kept = NOTHING) -> "Drawn":
     """The figures of a study's page, by its parts."""
-    with shared_out(_drawing(study, parts)) as figures:
-        return _drawn(figures(), parts)
+    with drawing(study, parts) as figures:
+        return figures()
 
 
-def _drawing(study: "Study", parts: Kept) -> list[Callable[[], tuple[tuple["Figure", ...], str]]]:
-    """What draws the figures of each part of the page, and returns them with what went wrong in keeping them."""
-    from microrad.report import day_plots, figures, fine_pointing_figures, link_figures, paper_bench, tails
+@contextlib.contextmanager
+def drawing(study: "Study", parts: Kept) -> "Iterator[Callable[[], Drawn]]":
+    """The same, begun beside what the caller does: the callable returns the figures."""
+    from microrad.report import day_plots, figures, fine_pointing_figures, link_figures, page, paper_bench, tails
 
     each: list[Callable[[], tuple[Figure, ...]]] = [
         lambda: figures.draw(study, parts),
@@ -111,14 +113,14 @@ def _drawing(study: "Study", parts: Kept) -> list[Callable[[], tuple[tuple["Figu
         lambda: link_figures.draw(study.links, parts),
         lambda: () if study.day is None else day_plots.draw(study.day, study.contact, parts),
     ]
-    return [lambda draw=draw: (draw(), parts.trouble) for draw in each]  # type: ignore[misc]
 
+    def drawn() -> page.Drawn:
+        found, troubles = zip(*shared(), strict=True)
+        parts.trouble = next(filter(None, (parts.trouble, *troubles)), "")
+        return page.Drawn(*found)
 
-def _drawn(found: "Sequence[tuple[tuple[Figure, ...], str]]", parts: Kept) -> "Drawn":
-    from microrad.report import page
-
-    parts.trouble = next(filter(None, (parts.trouble, *(trouble for _, trouble in found))), "")
-    return page.Drawn(*(figures for figures, _ in found))
+    with shared_out([lambda draw=draw: (draw(), parts.trouble) for draw in each]) as shared:  # type: ignore[misc]
+        yield drawn
 
 
 def write_plan(plan: "ConstellationPlan", folder: Path) -> None:
