@@ -3,6 +3,7 @@
 import copy
 import functools
 import math
+import os
 import pickle
 import subprocess
 import sys
@@ -196,3 +197,33 @@ def test_what_has_no_digest_is_refused(value):
 
 def test_nothing_read_agrees_with_anything():
     assert Reads().agree(("anything",))
+
+
+@pytest.mark.skipif(sys.platform != "linux" or os.cpu_count() == 1, reason="nothing is forked")
+def test_what_only_a_forked_process_would_read_is_read_here():
+    code = """
+import os
+from dataclasses import dataclass
+from microrad.reads import watched_call
+from microrad.threads import shared_out
+
+@dataclass(frozen=True)
+class Beam:
+    power_w: float
+    waist_m: float
+
+caller = os.getpid()
+
+def two(beam):
+    def job():
+        return beam.power_w, os.getpid()
+    with shared_out([job, job]) as results:
+        os.waitid(os.P_ALL, 0, os.WEXITED | os.WNOWAIT)  # the other process has had both turns
+        return results()
+
+found, reads = watched_call(two, Beam(2.0, 0.01))
+assert found == [(2.0, caller)] * 2, found
+assert [path[-1] for path in reads.digests if path[1:]] == ["power_w"], reads.digests
+"""
+    ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert (ran.returncode, ran.stderr) == (0, "")

@@ -28,19 +28,7 @@ def test_results_come_in_the_order_of_the_jobs():
     assert (ended, heard) == ([2, 1, 0], [(1, 3), (2, 3), (3, 3)])
 
 
-def test_a_job_begins_while_the_next_one_is_made():
-    begun = threading.Event()
-
-    def made():
-        yield lambda: begun.set() or 1
-        assert begun.wait(HANG_S)
-        yield lambda: 2
-
-    assert in_threads(made(), workers=1) == [1, 2]
-
-
-@pytest.mark.parametrize("where", ["in a job", "in making one"])
-def test_jobs_that_have_not_begun_are_dropped_after_an_error(where, monkeypatch):
+def test_jobs_that_have_not_begun_are_dropped_after_an_error(monkeypatch):
     begun, dropped = [], threading.Event()
 
     class Pool(ThreadPoolExecutor):
@@ -56,13 +44,9 @@ def test_jobs_that_have_not_begun_are_dropped_after_an_error(where, monkeypatch)
         begun.append(1)
         assert dropped.wait(HANG_S)
 
-    def made():
-        yield from [other] * 50
-        first()
-
     monkeypatch.setattr(threads, "ThreadPoolExecutor", Pool)
     with pytest.raises(RuntimeError, match="broken"):
-        in_threads([first, *[other] * 50] if where == "in a job" else made(), workers=1)
+        in_threads([first, *[other] * 50], workers=1)
     assert len(begun) <= 1
 
 

@@ -5,6 +5,7 @@ records in them watched in their turn. What it cannot see into, it notes as read
 """
 
 import functools
+import os
 import struct
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from collections.abc import Set as AbstractSet
@@ -130,6 +131,7 @@ class Reads:
         """Nothing was read yet."""
         self.digests: dict[Path, bytes] = {}
         self.known = True
+        self._process = os.getpid()
 
     def watched(self, value: Any, path: Path = ()) -> Any:
         """The value where it is no record, noted as read; else one that notes what is read through it."""
@@ -156,9 +158,12 @@ class Reads:
         self._note((*path, KEY), tuple(keys))
 
     def _note(self, path: Path, value: Any) -> None:
+        if path in self.digests:
+            return
+        if os.getpid() != self._process:
+            raise RuntimeError("something is read in a forked process that nobody watches")
         try:
-            if path not in self.digests:
-                self.digests[path] = digest(value)
+            self.digests[path] = digest(value)
         except UnknownValueError:
             self.known = False
 

@@ -4,7 +4,7 @@ import contextlib
 import multiprocessing
 import os
 import sys
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any, TypeVar
@@ -15,19 +15,18 @@ _Second = TypeVar("_Second")
 
 
 def in_threads(
-    jobs: Iterable[Callable[[], _Result]],
+    jobs: Sequence[Callable[[], _Result]],
     on_done: Callable[[int, int], None] = lambda done, total: None,
     workers: int | None = None,
 ) -> list[_Result]:
     """What each job returns, in their order; ``on_done`` hears how many are done, and of how many.
 
-    A job begins as soon as ``jobs`` gives it, while the next ones may still be made on the caller's thread. After an
-    error, or Ctrl-C, those that have not begun are dropped.
+    After an error, or Ctrl-C, those that have not begun are dropped.
     """
     results = []
     with ThreadPoolExecutor(max_workers=workers or os.cpu_count()) as pool:
+        futures = [pool.submit(job) for job in jobs]
         try:
-            futures = [pool.submit(job) for job in jobs]
             for done, future in enumerate(futures, 1):
                 results.append(future.result())
                 on_done(done, len(futures))
@@ -38,8 +37,12 @@ def in_threads(
 
 
 @contextlib.contextmanager
-def shared_out(jobs: Sequence[Callable[[], _Result]]) -> Iterator[Callable[[], list[_Result]]]:
+def shared_out(
+    jobs: Sequence[Callable[[], _Result]], on_turn: Callable[[int], None] = lambda number: None
+) -> Iterator[Callable[[], list[_Result]]]:
     """Jobs in Python that forked processes begin with, at most 256; the callable takes part and returns their results.
+
+    ``on_turn`` hears the number of each job that the callable itself begins.
 
     A result is pickled. A process that fails leaves its jobs to the caller, so an error is the one that the job raises
     there. Where no process can be forked the callable does all of them: that is safe on Linux alone, while no other
@@ -54,7 +57,7 @@ def shared_out(jobs: Sequence[Callable[[], _Result]]) -> Iterator[Callable[[], l
     processes = [context.Process(target=_help, args=(jobs, turns, mouth), daemon=True) for _, mouth in pipes]
 
     def results() -> list[_Result]:
-        done = _done(jobs, turns)
+        done = _done(jobs, turns, on_turn)
         for ear, mouth in pipes:
             mouth.close()
             with contextlib.suppress(EOFError):
@@ -87,9 +90,15 @@ def _may_fork() -> bool:
     return sys.platform == "linux" and len(list(Path("/proc/self/task").iterdir())) == 1
 
 
-def _done(jobs: Sequence[Callable[[], _Result]], turns: int) -> dict[int, _Result]:
+def _done(
+    jobs: Sequence[Callable[[], _Result]], turns: int, on_turn: Callable[[int], None] = lambda number: None
+) -> dict[int, _Result]:
     """The results of the jobs whose turns this process has taken, by number."""
-    return {turn[0]: jobs[turn[0]]() for turn in iter(lambda: os.read(turns, 1), b"")}
+    done = {}
+    for (number,) in iter(lambda: os.read(turns, 1), b""):
+        on_turn(number)
+        done[number] = jobs[number]()
+    return done
 
 
 def _help(jobs: Sequence[Callable[[], Any]], turns: int, mouth: Any) -> None:

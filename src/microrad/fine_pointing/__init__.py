@@ -13,7 +13,6 @@ from microrad.fine_pointing.designs import (
     Design,
     build,
     design,
-    in_turn,
     names,
     optimum_rms_rad,
     plants,
@@ -96,7 +95,7 @@ def run(file: MissionFile, on_progress: Progress = lambda done, total, what: Non
     Raises ValueError with the reason for a loop that cannot be built and a controller that cannot meet its margin.
     """
     m, built = file.mission, scene(file)
-    verified = verify(built, m, in_turn(built, m, on_progress), on_progress)
+    verified = verify(built, m, design(built, m, on_progress), on_progress)
     chosen, designs = best(verified), [v.design for v in verified]
     segment = 2 * (verified[0].spectrum_rad2_hz.shape[0] - 1)
     freq = np.asarray(np.fft.rfftfreq(segment, built.loop.timing.period_s), dtype=float)

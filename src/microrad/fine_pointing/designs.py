@@ -1,8 +1,9 @@
 """The controllers of the study: each tuned for one axis of the mission's loop, then put on all axes."""
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from microrad.fine_loop.design import behind_filter, design_plant
 from microrad.fine_loop.loop import LoopController, PointingLoop, ReferenceFilter, assemble, with_inverse
 from microrad.fine_pointing.scenario import Scene, one_mirror, table
 from microrad.mission import Mission
+from microrad.threads import shared_out
 
 Progress = Callable[[int, int, str], None]
 
@@ -66,56 +68,55 @@ def names(m: Mission) -> tuple[str, ...]:
     return (*found, IN_SERIES)
 
 
-def in_turn(
-    scene: Scene,
-    m: Mission,
-    on_progress: Progress = lambda done, total, what: None,
-    only: Sequence[str] = (),
-) -> Iterator[Design]:
-    """Every controller of the study, the baseline first, or ``only`` some of them by name; tuned on the linear cost.
-
-    Each as soon as it is tuned. Raises ValueError for a name that `names` does not list, and with the reason when a
-    modulus margin cannot be met.
-    """
-    straight, wanted = plants(scene, m, table(m).seed), tuple(only) or names(m)
-    pi: Tuned | None = None
-    for done, name in enumerate(wanted):
-        on_progress(done, len(wanted), f"tuning {name}")
-        tuned = pi if pi and name == WITH_INVERSE else tune(name, m, straight, pi)
-        pi = tuned if name == control.PI.name else pi
-        yield Design(name, tuned, build(name, scene, m, tuned.controller), _INVERSE_USED.get(name, ""))
-    on_progress(len(wanted), len(wanted), "controllers tuned")
-
-
 def design(
     scene: Scene,
     m: Mission,
     on_progress: Progress = lambda done, total, what: None,
     only: Sequence[str] = (),
 ) -> tuple[Design, ...]:
-    """All that `in_turn` gives."""
-    return tuple(in_turn(scene, m, on_progress, only))
+    """Every controller of the study, the baseline first, or ``only`` some of them by name; tuned on the linear cost.
+
+    Raises ValueError for a name that `names` does not list, and with the reason when a modulus margin cannot be met.
+    """
+    straight, wanted = plants(scene, m, table(m).seed), tuple(only) or names(m)
+    first = [name for name in wanted if name in {control.PI.name, WITH_INVERSE}]  # others begin with it
+    pi = _tuning(first[0], m, straight)() if first else None
+    others = [name for name in wanted if name not in first]
+    jobs = [_tuning(name, m, straight, pi) for name in others]
+    told = len(wanted) - len(others)
+    with shared_out(jobs, lambda turn: on_progress(told + turn, len(wanted), f"tuning {others[turn]}")) as results:
+        tuned = dict(zip(others, results(), strict=True))
+    on_progress(len(wanted), len(wanted), "controllers tuned")
+    if pi is not None:
+        tuned |= dict.fromkeys(first, pi)
+    return tuple(
+        Design(name, tuned[name], build(name, scene, m, tuned[name].controller), _INVERSE_USED.get(name, ""))
+        for name in wanted
+    )
 
 
-def tune(name: str, m: Mission, of: Sequence[DesignPlant], known: Tuned | None = None) -> Tuned:
+def tune(name: str, m: Mission, of: Sequence[DesignPlant]) -> Tuned:
     """One of the controllers that `names` lists, tuned for these plants of an axis (see `plants`).
-
-    ``known`` is the tuned PI, where there is one: families that contain it begin with it.
 
     Raises ValueError for another name, and with the reason when it cannot meet the modulus margin.
     """
+    return _tuning(name, m, of)()
+
+
+def _tuning(name: str, m: Mission, of: Sequence[DesignPlant], known: Tuned | None = None) -> Callable[[], Tuned]:
+    """What tunes one: it reads no mission. Families that contain the PI begin with the ``known`` one."""
     f = table(m)
     wanted = Specification(f.modulus_margin)
     if name == BASELINE:
-        return grid_baseline(of, wanted)
+        return partial(grid_baseline, of, wanted)
     if name == IN_SERIES:
         path = ReferenceFilter(f.reference_filter_hz)
         filtered = tuple(behind_filter(p, path.discrete(p.period_s)) for p in of)
-        return control.tune(control.PI, filtered, wanted, seed=f.seed)
+        return partial(control.tune, control.PI, filtered, wanted, seed=f.seed)
     wanted_family = control.PI.name if name == WITH_INVERSE else name
     for family in families(m):
         if family.name == wanted_family:
-            return control.tune(family, of, wanted, seed=f.seed, base=known)
+            return partial(control.tune, family, of, wanted, seed=f.seed, base=known)
     raise ValueError(f"{name!r} is no controller of this mission; it has {', '.join(names(m))}")
 
 

@@ -1,7 +1,7 @@
 """What the designs leave: in theory and simulated, on each variant of the mirror, part by part and on sines."""
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -145,23 +145,13 @@ def span(m: Mission) -> ensemble.Span:
 
 
 def verify(
-    scene: Scene, m: Mission, designs: Iterable[Design], on_progress: Progress = lambda done, total, what: None
+    scene: Scene, m: Mission, designs: Sequence[Design], on_progress: Progress = lambda done, total, what: None
 ) -> tuple[Verified, ...]:
-    """Simulate each design on each variant of the mirror, beside its linear theory; one as the next is being made."""
-    names, made = variants(m), []
-
-    def jobs() -> Iterator[Callable[[], ensemble.Ensemble]]:
-        for each in designs:
-            made.append(each)
-            for variant in names:
-                yield _job(scene, m, each, variant)
-
-    runs = iter(_several(jobs(), on_progress, "simulating controllers"))
-    return tuple(_verified(scene, m, d, {variant: next(runs) for variant in names}) for d in made)
-
-
-def _job(scene: Scene, m: Mission, design: Design, variant: str) -> Callable[[], ensemble.Ensemble]:
-    return _run(on_variant(scene.loop, m, variant), design.controller, m)
+    """Simulate each design on each variant of the mirror, beside its linear theory."""
+    names = variants(m)
+    jobs = [_run(on_variant(scene.loop, m, variant), d.controller, m) for d in designs for variant in names]
+    runs = iter(_several(jobs, on_progress, "simulating controllers"))
+    return tuple(_verified(scene, m, d, {variant: next(runs) for variant in names}) for d in designs)
 
 
 def on_variant(loop: PointingLoop, m: Mission, variant: str) -> PointingLoop:
@@ -181,7 +171,7 @@ def for_mirror(controller: LoopController, loop: PointingLoop) -> LoopController
 
 
 def _several(
-    jobs: Iterable[Callable[[], ensemble.Ensemble]], on_progress: Progress, what: str
+    jobs: Sequence[Callable[[], ensemble.Ensemble]], on_progress: Progress, what: str
 ) -> list[ensemble.Ensemble]:
     return in_threads(jobs, lambda done, total: on_progress(done, total, what))
 
