@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
-from microrad.identify.bouc_wen import fit_bouc_wen
+from microrad.identify.bouc_wen import BoucWenFit, fit_bouc_wen
 from microrad.identify.doubts import (
     ResidualTest,
     drift,
@@ -21,7 +22,7 @@ from microrad.identify.doubts import (
     score_warnings,
     set_aside_warnings,
 )
-from microrad.identify.joint import FORMS, JointFit, fit_joint, time_constants
+from microrad.identify.joint import FORMS, JointFit, fit_joint, static_fit, time_constants
 from microrad.identify.linear import LinearFit, fit_linear
 from microrad.identify.plant_structures import LinearPoles, poles_of
 from microrad.identify.prandtl_ishlinskii import PrandtlIshlinskiiFit, fit_prandtl_ishlinskii
@@ -329,8 +330,13 @@ class _Fitter:
             free_linear=free_linear,
             admissible=self.admissible,
             broadband=self.broadband if free_linear else (),
+            static=self._begin if FORMS[model].family == "bouc_wen" else None,
             seed=self.seed,
         )
+
+    @cached_property
+    def _begin(self) -> BoucWenFit:
+        return static_fit(self.heads, self.units, self.seed)
 
     def _poles(self) -> LinearPoles | None:
         return (

@@ -14,7 +14,7 @@ import numpy as np
 
 from microrad import kernels, mirror
 from microrad.hysteresis import NO_CREEP, BoucWen, Creep, Play, slow_gain
-from microrad.identify.bouc_wen import fit_bouc_wen
+from microrad.identify.bouc_wen import BoucWenFit, fit_bouc_wen
 from microrad.identify.plant_fit import PlantFit, Run, fit_plant, without
 from microrad.identify.plant_structures import AxisStructure, LinearPoles, one_axis
 from microrad.identify.prandtl_ishlinskii import threshold_grid
@@ -144,6 +144,7 @@ def fit_joint(  # noqa: PLR0913  all but the first three are named options
     free_linear: bool = False,
     admissible: bool = False,
     broadband: Sequence[Recording] = (),
+    static: BoucWenFit | None = None,
     starts: int = 2,
     seed: int = 0,
     on_progress: Progress | None = None,
@@ -152,8 +153,8 @@ def fit_joint(  # noqa: PLR0913  all but the first three are named options
 
     `linear` is that part, whose poles and zeros are moved with the rest where `free_linear` says so; the `broadband`
     recordings then belong to the fit, so that they keep hold of the poles. `admissible` bounds epsilon so that the
-    slope behind a slow reversal never turns. A Bouc-Wen form begins at its static fit and at `starts` - 1 points
-    scattered about it (Philox stream of `seed`). Raises `IdentificationError`.
+    slope behind a slow reversal never turns. A Bouc-Wen form begins at its `static` fit (`static_fit`, made where it is
+    not given) and at `starts` - 1 points scattered about it (Philox stream of `seed`). Raises `IdentificationError`.
     """
     form = FORMS[name]
     records = tuple(thinned(record) for record in prepare(recordings, units))
@@ -164,7 +165,7 @@ def fit_joint(  # noqa: PLR0913  all but the first three are named options
     if form.family != "bouc_wen":
         structure = start.plays(records, run_list)
     else:
-        structure, scattered = start.bouc_wen(records, recordings, units, starts, seed)
+        structure, scattered = start.bouc_wen(records, static or static_fit(recordings, units, seed), starts, seed)
     both = (
         [*run_list, *(_run(record, creep_times) for record in prepare([_shortened(r) for r in broadband], units))]
         if broadband
@@ -183,6 +184,18 @@ def fit_joint(  # noqa: PLR0913  all but the first three are named options
 
 
 # ---------------------------------------------------------------------------------------------------------- starts
+def static_fit(recordings: Sequence[Recording], units: Units, seed: int) -> BoucWenFit:
+    """The fit of Eq. 3 at which all Bouc-Wen forms begin."""
+    return fit_bouc_wen(
+        recordings,
+        starts=6,
+        seed=seed,
+        output_unit=units.output,
+        lever_arm_m=units.lever_arm_m,
+        input_unit=units.drive,
+    )
+
+
 def time_constants(records: Sequence[Prepared]) -> tuple[float, ...]:
     """Decades of creep that the records can show: from ten samples or 10 ms to three times the longest record."""
     longest = max(r.drive_v.size * r.step_s for r in records)
@@ -277,13 +290,9 @@ class _Start:
         return self.structure(*_play_start(records, run_list, self.linear, self.creep_times, operators))
 
     def bouc_wen(
-        self, records: tuple[Prepared, ...], recordings: Sequence[Recording], units: Units, starts: int, seed: int
+        self, records: tuple[Prepared, ...], static: BoucWenFit, starts: int, seed: int
     ) -> tuple[AxisStructure, list[FloatArray]]:
         """The static fit of Eq. 3, and the values of starts scattered about it."""
-        arm, unit = units.lever_arm_m, units.drive
-        static = fit_bouc_wen(
-            recordings, starts=6, seed=seed, output_unit=units.output, lever_arm_m=arm, input_unit=unit
-        )
         bias = float(np.mean([r.drive_v[0] for r in records]))
         d1, d2, epsilon, delta, alpha, beta = static.values.tolist()
         model = BoucWen(d1, d2, epsilon, delta, alpha, beta, static.rate_limit_v_per_s, bias)

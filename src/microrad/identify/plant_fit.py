@@ -23,7 +23,7 @@ from microrad.threads import in_threads
 
 Hold = Literal["linear", "zero-order", "band-limited"]
 
-_ROUGH = 1e-5  # relative change of cost or place from which a search goes on by central differences
+_ROUGH = 1e-8  # relative change of cost or place from which a search goes on by central differences
 _DIFFERENCE = 1e-5
 _AGREE = 1e-3
 _NOT_IDENTIFIED_ERROR = 0.5

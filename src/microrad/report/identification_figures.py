@@ -8,6 +8,7 @@ import math
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +26,7 @@ from microrad.identify.roles import roles
 from microrad.recording import Recording
 from microrad.report import identification_words as words
 from microrad.report.figures import BLACK, BLUE, GREEN, ORANGE, SKY, STYLE, VERMILION, Figure, Floats, svg_of, thin
+from microrad.threads import shared_out
 
 MOST_RECORDINGS = 12  # drawn, a row each
 VIRTUAL = "virtual bench"
@@ -83,12 +85,15 @@ def draw(found: Identification, recordings: Sequence[Recording], *, virtual: boo
     }
     with rc_context({**STYLE, "path.simplify_threshold": 0.2}), warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="Glyph")  # of a file name: the page's reader has the glyph
-        drawn = {name: maker() for name, maker in makers.items()}
-        return {name: _figure(name, drawing, virtual) for name, drawing in drawn.items() if drawing is not None}
+        with shared_out([partial(_figure, name, maker, virtual) for name, maker in makers.items()]) as figures:
+            return {figure.name: figure for figure in figures() if figure is not None}
 
 
-def _figure(name: str, drawing: Drawing, virtual: bool) -> Figure:
+def _figure(name: str, maker: Callable[[], Drawing | None], virtual: bool) -> Figure | None:
     """The finished figure; of the virtual bench it says so in the picture too, which may be copied by itself."""
+    drawing = maker()
+    if drawing is None:
+        return None
     if virtual:
         drawing.canvas.suptitle(VIRTUAL, x=0.995, horizontalalignment="right", fontsize=8, color=VERMILION)
     title = f"{drawing.title} ({VIRTUAL})" if virtual else drawing.title
