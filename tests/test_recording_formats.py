@@ -1,6 +1,7 @@
 """Recordings from binary and LabVIEW files: what is read, and each refusal of a damaged or contradictory file."""
 
 import io
+import itertools
 import pickle
 import struct
 import sys
@@ -532,21 +533,79 @@ def test_the_other_datasets_are_read(odd_hdf5):
     check(read_recording(odd_hdf5, "odd/drive", "run/output", RATE_HZ), ("odd/drive", "run/output"))
 
 
-def test_a_piece_that_unpacks_to_more_than_it_states(tmp_path, monkeypatch):
-    """The library itself would make room for all of it, and say nothing."""
-    monkeypatch.setattr("microrad.recording.hdf5_datasets._HARMLESS_BYTES", 1_000_000)
-    path = tmp_path / "a.h5"
-    with h5py.File(path, "w") as file:
-        drive = file.create_dataset("drive", (N,), "f8", chunks=(N // 2,), compression="gzip", shuffle=True)
-        output = file.create_dataset("output", data=OUTPUT, chunks=(N // 2,), compression="gzip", fletcher32=True)
-        drive[:] = DRIVE
-        drive.id.write_direct_chunk((N // 2,), zlib.compress(bytes(2_000_000)))
-        assert (file["drive"][-1], output[1]) == (0.0, OUTPUT[1])
+PIECE = bytes(range(250)) * 16  # 4000 bytes, a half of a channel
+
+
+def masked(file, data, mask):
+    """A channel's second half written as it is, with filters left out."""
+    file["drive"].id.write_direct_chunk((N // 2,), data, filter_mask=mask)
+
+
+@pytest.mark.parametrize(
+    ("packing", "mask", "data", "amount"),
+    [
+        ({"compression": "gzip", "shuffle": True}, 0, zlib.compress(bytes(2_000_000)), "more"),
+        ({"compression": "gzip"}, 0, zlib.compress(PIECE[:10]), "less"),
+        ({"compression": "gzip"}, 0, zlib.compress(PIECE)[:-9], "less"),  # cut off
+        ({"compression": "gzip"}, 0, b"no stream", "less"),
+        ({"compression": "gzip", "shuffle": True}, 0b10, PIECE[:10], "less"),  # not packed, by the mask
+        ({"compression": "gzip", "fletcher32": True}, 0b11, PIECE[:3999], "less"),
+        ({"fletcher32": True}, 0, PIECE[:100], "less"),
+        ({"compression": "lzf"}, 0, b"\x04abcde", "less"),
+        ({"compression": "lzf"}, 0, b"\x00a" + b"\xe0\xff\x00" * 100, "more"),
+        ({"compression": "lzf"}, 0, b"\x00a\x20\x05" + b"\xe0\xff\x00" * 15, "less"),  # copies from before its begin
+        ({"compression": "lzf"}, 1, PIECE[:100], "less"),
+    ],
+    ids=itertools.count(),
+)
+@pytest.mark.parametrize("kind", ["hdf5", "matlab73"])
+def test_a_piece_that_does_not_unpack_to_what_it_states(tmp_path, kind, packing, mask, data, amount):
+    """The library itself would make room for what is more, and read on in the memory where it is less."""
+    path = tmp_path / ("a.h5" if kind == "hdf5" else "a.mat")
+    if kind == "matlab73":
+        matlab73(path, other=DRIVE)
+    with h5py.File(path, "a") as file:
+        for name, values in (("drive", DRIVE), ("output", OUTPUT)):
+            made = file.create_dataset(name, data=values, chunks=(N // 2,), **packing)
+            if kind == "matlab73":
+                made.attrs["MATLAB_class"] = np.bytes_("double")
+        masked(file, data, mask)
     message = refusal(path, "drive", "output", RATE_HZ)
-    assert "'drive' has a piece, from sample (500,) on, that unpacks to more than the 4000 bytes that it" in message
+    assert (
+        f"'drive' has a piece, from sample (500,) on, that unpacks to {amount} than the 4000 bytes that it" in message
+    )
     with h5py.File(path, "a") as file:
         file["drive"][:] = DRIVE
     check(read_recording(path, "drive", "output", RATE_HZ))
+
+
+@pytest.mark.parametrize(
+    "packing",
+    [
+        {"compression": "gzip", "shuffle": True, "fletcher32": True},
+        {"compression": "lzf", "shuffle": True},
+        {"compression": "lzf", "fletcher32": True},
+        {"fletcher32": True},
+        {},
+    ],
+)
+def test_whole_pieces_are_read_however_they_are_packed(tmp_path, packing):
+    path = tmp_path / "a.h5"
+    still = np.round(OUTPUT, 3)
+    with h5py.File(path, "w") as file:
+        for name, values in (("drive", DRIVE), ("output", OUTPUT), ("still", np.zeros(N)), ("steps", still)):
+            file.create_dataset(name, data=values, chunks=(300,), **packing)  # the last piece is filled up
+    check(read_recording(path, "drive", "output", RATE_HZ))
+    np.testing.assert_array_equal(read_recording(path, "drive", "steps", RATE_HZ).output[:, 0], still)
+
+
+def test_a_filter_whose_pieces_cannot_be_checked(tmp_path):
+    path = hdf5(tmp_path / "a.h5")
+    with h5py.File(path, "a") as file:
+        file.create_dataset("packed", data=np.arange(N), chunks=(N // 2,), scaleoffset=0)
+    assert "is packed by the filter 6 (scaleoffset), whose pieces cannot be checked; pack it with gzip" in refusal(
+        path, 0, "packed"
+    )
 
 
 def test_matlab_v73_variables_that_are_no_channel(tmp_path):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import zlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,11 +13,11 @@ from microrad.recording.records import RecordingError
 
 ELSEWHERE = "and no other file is opened; copy the values into this one"
 """What is done about data that stand in another file."""
-_FILTERS = frozenset({1, 2, 3, 4, 5, 6, 32000})  # those of HDF5 itself, and LZF, which h5py brings
-_DEFLATE = 1
-_PACKERS = frozenset({_DEFLATE, 4, 32000})
-_MOST_PACKED = 1032  # times, by deflate
-_HARMLESS_BYTES = 64_000_000
+_DEFLATE, _SHUFFLE, _FLETCHER32, _LZF = 1, 2, 3, 32000
+_FILTERS = frozenset({_DEFLATE, _SHUFFLE, _FLETCHER32, _LZF})
+_UNCHECKED = frozenset({4, 5, 6})  # szip, n-bit and scale-offset: how much a piece holds is known once it is unpacked
+_PACKERS = frozenset({_DEFLATE, _LZF})
+_CHECKSUM_BYTES = 4
 _MATLAB_NUMBERS = frozenset(
     ["double", "single", "int8", "int16", "int32", "int64", "uint8", "uint16", "uint32", "uint64", "logical"]
 )
@@ -89,6 +89,8 @@ def _foreign_filter(item: Any) -> str:
 
     filters = _filters(item)
     for code, name in filters:
+        if code in _UNCHECKED:
+            return f"is packed by the filter {code} ({name}), whose pieces cannot be checked; {_REPACK}"
         if code not in _FILTERS or not h5py.h5z.filter_avail(code):
             return (
                 f"is packed by the filter {code}{f' ({name})' if name else ''}, which is none of HDF5's own; {_REPACK}"
@@ -108,25 +110,70 @@ def _too_large(path: Path, item: Any) -> str:
 
 
 def check_pieces(path: Path, name: str, item: Any) -> None:
-    """Refuse a piece that unpacks to more than it states; the library would make room for all of it.
+    """Refuse a piece that does not unpack to what it states.
+
+    Of one that holds more the library would make room for all; behind one that holds less it reads on in the memory.
 
     Raises `RecordingError`.
     """
-    if item.chunks is None or _DEFLATE not in [code for code, _ in _filters(item)]:
+    if item.chunks is None:
         return
+    codes = [code for code, _ in _filters(item)]
     stated = math.prod(item.chunks) * item.id.get_type().get_size()
-    doubtful: list[tuple[int, ...]] = []
-
-    def note(piece: Any) -> None:
-        if piece.size * _MOST_PACKED > max(stated, _HARMLESS_BYTES):
-            doubtful.append(piece.chunk_offset)
-
-    item.id.chunk_iter(note)
-    for offset in doubtful:
+    offsets: list[tuple[int, ...]] = []
+    item.id.chunk_iter(lambda piece: offsets.append(piece.chunk_offset))
+    for offset in offsets:
         mask, data = item.id.read_direct_chunk(offset)
         # A bit of the mask leaves a filter out.
-        if not mask and len(zlib.decompressobj().decompress(data, stated + 1)) > stated:
+        active = [code for number, code in enumerate(codes) if not mask >> number & 1]
+        found = _unpacked_bytes(data, active, stated)
+        if found != stated:
+            amount = "more" if found > stated else "less"
             raise RecordingError(
-                f"{path}: '{name}' has a piece, from sample {offset} on, that unpacks to more than the {stated} bytes "
-                "that it states; the file is damaged, or made to fill the memory: copy it again from its source."
+                f"{path}: '{name}' has a piece, from sample {offset} on, that unpacks to {amount} than the {stated} "
+                "bytes that it states; the file is damaged, or made to do harm: copy it again from its source."
             )
+
+
+def _unpacked_bytes(data: bytes, filters: Sequence[int], stated: int) -> int:
+    """Bytes that a piece unpacks to, counted up to one more than it states."""
+    size = len(data)
+    for code in reversed(filters):
+        if code == _FLETCHER32:
+            size -= _CHECKSUM_BYTES
+        elif code == _DEFLATE:
+            size = _inflated_bytes(data[: max(size, 0)], stated)
+        elif code == _LZF:
+            size = _lzf_bytes(data[: max(size, 0)])
+    return size
+
+
+def _inflated_bytes(data: bytes, stated: int) -> int:
+    stream = zlib.decompressobj()
+    try:
+        size = len(stream.decompress(data, stated + 1))
+    except zlib.error:
+        return 0
+    return size if stream.eof or size > stated else 0  # cut off: nobody knows how much it was
+
+
+def _lzf_bytes(data: bytes) -> int:
+    """Bytes that LZF unpacks to: runs of 1 to 32 bytes as they are, and copies of 3 to 264 bytes that were before."""
+    place = size = 0
+    while place < len(data):
+        control = data[place]
+        if control < 32:
+            place += control + 2
+            size += control + 1
+            continue
+        length, far = control >> 5, (control & 31) << 8
+        place += 1
+        if length == 7:
+            length += data[place] if place < len(data) else 0
+            place += 1
+        far += (data[place] if place < len(data) else 0) + 1
+        place += 1
+        if far > size:
+            return 0
+        size += length + 2
+    return size if place == len(data) else 0
