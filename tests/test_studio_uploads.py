@@ -15,11 +15,14 @@ import tempfile
 import time
 import zipfile
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.io import savemat
 
+import test_recording_formats as formats
 from microrad.recording import read_recording
 from microrad.studio import parse_process, reading
 from microrad.studio.names import NameRefusedError, safe_name, within
@@ -468,6 +471,52 @@ def test_a_recording_is_read_checked_and_thinned(tmp_path, loop):
     np.testing.assert_allclose(seen.output[0], whole.output[rows, 0], rtol=1e-6)
     assert max(seen.output[0]) == pytest.approx(whole.output.max(), rel=1e-6)
     assert len(view(path, Columns((1,), (2,)), ReadingLimits(points=N)).rows) == N
+
+
+def _matlab5(path):
+    savemat(path, {"drive": formats.DRIVE, "output": formats.OUTPUT, "fs": formats.RATE_HZ})
+
+
+def _npy(path):
+    np.save(path, np.column_stack((formats.DRIVE, formats.OUTPUT)))
+
+
+def _npz(path):
+    np.savez(path, drive=formats.DRIVE, output=formats.OUTPUT)
+
+
+def _text(path):
+    np.savetxt(
+        path, np.column_stack((formats.DRIVE, formats.OUTPUT)), delimiter=",", header="drive,output", comments=""
+    )
+
+
+@pytest.mark.parametrize(
+    ("name", "write", "drive", "output"),
+    [
+        ("a.csv", _text, 0, 1),
+        ("a.npy", _npy, 0, 1),
+        ("a.npz", _npz, "drive", "output"),
+        ("a.mat", _matlab5, "drive", "output"),
+        ("b.mat", lambda path: formats.matlab73(path, drive=formats.DRIVE, output=formats.OUTPUT), "drive", "output"),
+        ("a.h5", formats.hdf5, "run/drive", "run/output"),
+        ("a.tdms", formats.tdms, "bench/drive", "bench/output"),
+        ("a.lvm", formats.lvm, "drive", "output"),
+        ("b.lvm", partial(formats.lvm, segments=3), "drive", "output"),
+        ("c.lvm", partial(formats.lvm, segments=3, gap_s=0.1), "1/drive", "1/output"),
+        ("d.lvm", partial(formats.lvm, x_columns="Multi", comment="started"), "drive", "output"),
+    ],
+)
+def test_each_format_is_read_as_the_command_line_reads_it(tmp_path, name, write, drive, output):
+    path = tmp_path / name
+    write(path)
+    whole = read_recording(path, drive, output, formats.RATE_HZ)
+    listed = {c.name: c.samples for c in list_channels(path).channels}
+    seen = view(path, Columns((drive,), (output,), rate_hz=formats.RATE_HZ), ReadingLimits(points=formats.N))
+    stated = [listed[each] for each in (*whole.input_names, *whole.output_names)]
+    assert stated == [None if name == "a.csv" else whole.samples] * 2
+    assert (seen.sha256, seen.samples, seen.rate_hz) == (whole.sha256, whole.samples, whole.rate_hz)
+    np.testing.assert_allclose(seen.output[0], whole.output[np.array(seen.rows), 0], rtol=1e-6, atol=0)
 
 
 def test_refusals_are_those_of_the_reader(tmp_path, loop):

@@ -71,6 +71,11 @@ class LvmSource(Container):
                     parts.setdefault(k, []).append(values)
         return [parts[k][0] if len(parts[k]) == 1 else np.concatenate(parts[k]) for k in range(len(indices))]
 
+    def samples(self) -> tuple[int | None, ...]:
+        """The rows of the segments."""
+        rows = [segment.rows for segment in self._segments]
+        return tuple(sum(rows) if self._joined else rows[number] for number, _ in self._columns)
+
     def rates(self, indices: Sequence[int]) -> list[StatedRate]:
         """1 / Delta_X of the channels, where the header states it."""
         found = []

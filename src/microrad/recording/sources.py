@@ -68,6 +68,10 @@ class Source(ABC):
     def rates(self, indices: Sequence[int]) -> list[StatedRate]:
         """The sample rates that the file states for these channels."""
 
+    def samples(self) -> tuple[int | None, ...]:
+        """How many each channel has; None where that is known once they are read."""
+        return (None,) * len(self.names)
+
     def place(self, row: int) -> str:
         """Where a sample stands in the file, in the words of a message."""
         return f"sample {row}"
@@ -116,6 +120,10 @@ class Container(Source):
                 f"{self.path}: the {self.kind} file holds no channel of numbers"
                 f"{f' ({reasons})' if reasons else ''}; record again or name another file."
             )
+
+    def samples(self) -> tuple[int | None, ...]:
+        """Those that the channels state."""
+        return tuple(channel.samples for channel in self.channels)
 
     def _has_more(self) -> bool:
         """Whether names beyond those of the listed channels may be resolved."""

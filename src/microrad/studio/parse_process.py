@@ -93,22 +93,13 @@ def opened(path: Path, request: dict[str, Any]) -> Source:
 
     source = open_source(path)
     most = request["limits"]["samples"]
-    for name, samples in zip(source.names, counts(source), strict=True):
+    for name, samples in zip(source.names, source.samples(), strict=True):
         if samples is not None and samples > most:
             raise RefusedError(
                 f"{path}: '{name[:_TEXT]}' states {samples:.4g} samples, and at most {most:.4g} are read here; cut out "
                 "the part that you need, or keep every n-th sample."
             )
     return source
-
-
-def counts(source: Source) -> list[int | None]:
-    """Samples of each channel, None where the format does not state them."""
-    from microrad.recording.sources import Container
-
-    if not isinstance(source, Container):
-        return [None] * len(source.names)
-    return [channel.samples for channel in source.channels]
 
 
 def channels(path: Path, request: dict[str, Any]) -> dict[str, Any]:
@@ -118,7 +109,7 @@ def channels(path: Path, request: dict[str, Any]) -> dict[str, Any]:
 
     source = opened(path, request)
     most = request["limits"]["channels"]
-    listed = list(zip(source.names, source.units, counts(source), strict=True))[:most]
+    listed = list(zip(source.names, source.units, source.samples(), strict=True))[:most]
     unusable = list(getattr(source, "unusable", {}).items())[:_UNUSABLE]
     rates = dict.fromkeys(r.rate_hz for r in source.rates(range(len(listed))) if math.isfinite(r.rate_hz))
     return {
