@@ -353,6 +353,16 @@ def test_the_steps_follow_the_perigee():
     np.testing.assert_array_equal(coarse_times((10.0, 100.0), 60.0), [10.0, 32.5, 55.0, 77.5, 100.0])
     with pytest.raises(OrbitError, match="from 5 s to 5 s holds no time"):
         coarse_times((5.0, 5.0), 60.0)
+    with pytest.raises(OrbitError, match=r"in steps of 1e-06 s, more than 5e\+06 of them"):
+        coarse_times(DAY, 1e-6)
+
+
+@pytest.mark.parametrize("velocity", [[1.0, 0.0, 0.0], [0.0, 0.0, 0.0], [1e200, 0.0, 1.0], [math.nan, 0.0, 0.0]])
+def test_a_state_without_a_perigee_is_refused(velocity):
+    position_m = np.array([[7e6], [0.0], [0.0]])
+    orbit = SimpleNamespace(name="X", states=lambda time_s: States(position_m, np.array(velocity)[:, None]))
+    with pytest.raises(OrbitError, match="moves straight to or from the Earth's centre, or is no number"):
+        coarse_step_s(orbit, 0.0)
 
 
 def test_the_ends_of_the_span_are_ends_of_contacts():

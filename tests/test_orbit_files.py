@@ -511,6 +511,7 @@ OMM_FAULTS = {
     "JSON list": ("[1, 2]", "entry 1", "'1' is not an object"),
     "JSON empty": ("[]", "no element set"),
     "CSV": (comma(FIELDS) + "a,b\n", "line 3", "2 values"),
+    "drag": (kvn({**FIELDS, "BSTAR": "1e308"}), "B* is 1e+308", "less than 1 per radius of the Earth"),
     "SGP4-XP": (as_json({**FIELDS, "EPHEMERIS_TYPE": "4"}), "another theory than SGP4"),
 }  # fmt: skip
 
@@ -853,6 +854,75 @@ def with_word(index, column, word):
         return " ".join(words)
 
     return with_row(index, change)
+
+
+def moving(factor, method=(), grid=GRID):
+    """An ephemeris whose velocities are so many times those of its positions."""
+    position_m, velocity_m_s = truth(grid)
+    return HEAD + segment(grid, States(position_m, factor * velocity_m_s), **dict(method))
+
+
+LAGRANGE = (("INTERPOLATION", "LAGRANGE"), ("INTERPOLATION_DEGREE", "7"))
+
+
+@pytest.mark.parametrize("step_s", [1.0, 60.0, 600.0, 1100.0])
+@pytest.mark.parametrize("method", [(), LAGRANGE], ids=["hermite", "lagrange"])
+@pytest.mark.parametrize("factor", [1000.0, 1e-3, 0.01, -1.0, 0.0, 1e290])
+def test_velocities_that_are_not_those_of_the_positions(tmp_path, factor, method, step_s):
+    """In m/s, with a turned sign, too small or none; they were believed, with contacts and Doppler from them."""
+    grid = np.arange(0.0, 15 * step_s, step_s)
+    message = no_ephemeris(tmp_path, moving(factor, method, grid), "are not those at which the positions are passed")
+    assert f"from {stamp(0)} to {stamp(step_s)}" in message
+    ephemeris(tmp_path, moving(1.0, method, grid))
+
+
+@pytest.mark.parametrize("frame", ["ITRF2014", "GCRF"])
+def test_velocities_of_another_frame(tmp_path, frame):
+    """A geostationary satellite stands still in ITRF: the Earth's rotation belongs to velocities of GCRF alone."""
+    turn = 7.292115e-5
+    for rate in (0.0, turn):
+        angle = (0.0 if frame.startswith("ITRF") else turn) * GRID
+        still = States(
+            4.2164e7 * np.array([np.cos(angle), np.sin(angle), 0 * angle]),
+            4.2164e7 * rate * np.array([-np.sin(angle), np.cos(angle), 0 * angle]),
+        )
+        text = HEAD + segment(GRID, still, REF_FRAME=frame)
+        if (rate > 0.0) == (frame == "GCRF"):
+            ephemeris(tmp_path, text)
+        else:
+            no_ephemeris(tmp_path, text, "are not those at which the positions are passed")
+
+
+def test_positions_that_no_satellite_passes(tmp_path):
+    position_m, _ = truth(GRID)
+    there = position_m.copy()
+    there[:, 7:] *= -1.0
+    mean = np.gradient(there, GRID, axis=1)
+    no_ephemeris(
+        tmp_path, HEAD + segment(GRID, States(there, mean)), "positions are passed at 230", "at most 10.7", "line 23"
+    )
+
+
+@pytest.mark.parametrize("eccentricity", [0.0, 0.1, 0.5, 0.73])
+@pytest.mark.parametrize("steps", [20, 60, 600])
+def test_velocities_of_an_orbit_pass_at_any_usual_step(tmp_path, eccentricity, steps):
+    """Of Kepler's ellipse with its perigee at 6.7e6 m, in 20 steps a turn and more."""
+    semi_major_m = 6.7e6 / (1.0 - eccentricity)
+    rate = math.sqrt(3.986004418e14 / semi_major_m**3)
+    time_s = np.linspace(0.0, 2 * math.pi / rate, steps + 1)
+    anomaly = rate * time_s
+    for _ in range(60):
+        anomaly = anomaly - (anomaly - eccentricity * np.sin(anomaly) - rate * time_s) / (
+            1 - eccentricity * np.cos(anomaly)
+        )
+    c, s = np.cos(anomaly), np.sin(anomaly)
+    minor = math.sqrt(1 - eccentricity**2)
+    turning = rate / (1 - eccentricity * c)
+    states = States(
+        semi_major_m * np.array([c - eccentricity, minor * s, 0 * c]),
+        semi_major_m * turning * np.array([-s, minor * c, 0 * c]),
+    )
+    ephemeris(tmp_path, HEAD + segment(time_s, states))
 
 
 SHORT = GRID[:3]

@@ -21,6 +21,7 @@ EARTH = "Earth"
 RANGE = "range"
 
 _STEPS_PER_TURN = 85.0  # 60 s for every orbit with its perigee above 100 km
+_MOST_SAMPLES = 5_000_000
 
 
 # ------------------------------------------------------------------------------------------------------------ contacts
@@ -53,24 +54,37 @@ def coarse_step_s(orbit: Orbit, time_s: float) -> float:
 
     The perigee is that of the ellipse through the state at `time_s`: with the angular momentum h its radius is
     h^2 / (mu (1 + e)), and its rate h over that squared. Every low orbit has 60 s, so that samples can be shared.
+
+    Raises `OrbitError` for a state that falls straight to the Earth's centre.
     """
     position, velocity = (vector[:, 0] for vector in orbit.states(np.array([time_s])))
-    momentum = np.cross(position, velocity)
-    eccentricity = np.linalg.norm(np.cross(velocity, momentum) / MU_M3_S2 - position / np.linalg.norm(position))
-    square = float(momentum @ momentum)
-    perigee = square / (MU_M3_S2 * (1.0 + float(eccentricity)))
-    longest = 2.0 * math.pi * perigee**2 / math.sqrt(square) / _STEPS_PER_TURN
+    with np.errstate(over="ignore", invalid="ignore"):  # of a state that is none
+        momentum = np.cross(position, velocity)
+        eccentricity = np.linalg.norm(np.cross(velocity, momentum) / MU_M3_S2 - position / np.linalg.norm(position))
+        square = float(momentum @ momentum)
+        perigee = square / (MU_M3_S2 * (1.0 + float(eccentricity)))
+        longest = 2.0 * math.pi * perigee**2 / math.sqrt(square) / _STEPS_PER_TURN if square > 0.0 else 0.0
+    if not 0.0 < longest < math.inf:
+        raise OrbitError(
+            f"{orbit.name}: the state at {time_s:g} s moves straight to or from the Earth's centre, or is no number; "
+            "check its velocity"
+        )
     return 60.0 * 2.0 ** math.floor(math.log2(longest / 60.0))
 
 
 def coarse_times(span_s: Span, step_s: float) -> Floats:
     """Samples over the span, both ends among them, evenly, at most `step_s` apart and at least five.
 
-    Raises `OrbitError` for a span that does not end after its start.
+    Raises `OrbitError` for a span that does not end after its start, and for one of more than 5 million steps.
     """
     start, end = span_s
     if not (math.isfinite(start) and math.isfinite(end) and start < end):
         raise OrbitError(f"the span from {start:g} s to {end:g} s holds no time; give a start and a later end")
+    if not (end - start) / step_s <= _MOST_SAMPLES:
+        raise OrbitError(
+            f"the span from {start:g} s to {end:g} s would be searched in steps of {step_s:.3g} s, more than "
+            f"{_MOST_SAMPLES:.0e} of them; give a shorter span, or check the velocities of the orbits"
+        )
     return np.linspace(start, end, max(math.ceil((end - start) / step_s), 4) + 1)
 
 

@@ -72,6 +72,7 @@ def checked(elements: ElementSet) -> ElementSet:
         ("eccentricity", elements.eccentricity, 0.0, 1.0, "at least 0 and below 1"),
         ("inclination", math.degrees(elements.inclination_rad), 0.0, 180.0 + 1e-9, "0 to 180 deg"),
         ("mean motion", revolutions_per_day, 1e-3, 20.0, "0.001 to 20 revolutions a day"),
+        ("drag term B*", elements.drag_per_earth_radius, -1.0, 1.0, "less than 1 per radius of the Earth, either sign"),
     )
     for what, value, low, high, words in ranges:
         if not low <= value < high:

@@ -11,7 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
-from microrad.orbit.base import Floats, OrbitError
+from microrad.orbit.base import Floats, OrbitError, States
+from microrad.orbit.earth import MU_M3_S2
 from microrad.orbit.ephemeris import SLACK_S, EphemerisOrbit, Segment
 from microrad.orbit.epoch import Epoch
 from microrad.orbit.frames import FRAMES, frame_name, to_teme
@@ -58,8 +59,8 @@ def read_oem(path: Path, epoch: Epoch, name: str | None = None) -> EphemerisOrbi
     Time systems: UTC, TAI, TT, GPS. Frames: TEME, TOD, EME2000 (J2000), GCRF, ICRF, and ITRF without polar motion;
     velocities of ITRF gain the Earth's rotation. Interpolation: LAGRANGE (degree + 1 state vectors) or HERMITE
     ((degree + 1) / 2, rounded up); Hermite of degree 7 when the file names none. Covariances and accelerations are
-    passed over. Raises `OrbitError` with file, line and value for all else, and for a hole within the usable times of a
-    segment: a step of more than `MOST_STEPS` median ones.
+    passed over. Raises `OrbitError` with file, line and value for all else, for a hole within the usable times of a
+    segment (a step of more than `MOST_STEPS` median ones), and for velocities that are not those of the positions.
     """
     text = read_text(path)
     drafts = list(_xml_drafts(path, text) if text.lstrip().startswith("<") else _kvn_drafts(path, text))
@@ -229,6 +230,7 @@ def _segment(path: Path, draft: _Draft, epoch: Epoch) -> Segment:
     states = to_teme(_frame(draft.metadata), epoch, time, values)
     start, stop = _usable(path, draft, epoch, time)
     _check_holes(path, draft, time, (start, stop))
+    _check_velocities(path, draft, time, states)
     return Segment(time, states.position_m, states.velocity_m_s, method, points, start, stop)
 
 
@@ -255,6 +257,44 @@ def _check_rows(path: Path, draft: _Draft, time: Floats) -> None:
             f"{path}, {draft.places[bad[0]]}: {radius[bad[0]] / 1000.0:.6g} km from the Earth's centre, where no "
             "satellite of the Earth is; positions are in km and velocities in km/s"
         )
+
+
+def _check_velocities(path: Path, draft: _Draft, time: Floats, states: States) -> None:
+    """Refuse velocities that are not those of the positions, and positions that no satellite passes one by one.
+
+    On a circle of which a step covers the angle 2 x, half the sum of the velocities at its ends is the mean velocity
+    between them times x / tan x. Three times what that leaves, at the largest rate that a satellite has at this
+    distance (a parabola's at its perigee), is allowed for, and 1 % of the mean velocity; at most 90 % of it, so that
+    no turned sign and no other unit passes where steps are long. Steps over a hole say nothing.
+    """
+    step = np.diff(time)
+    with np.errstate(over="ignore", invalid="ignore"):
+        mean = np.diff(states.position_m) / step
+        speed = np.linalg.norm(mean, axis=0)
+        stated = 0.5 * (states.velocity_m_s[:, 1:] + states.velocity_m_s[:, :-1])
+        off = np.linalg.norm(stated - mean, axis=0)
+        told = np.linalg.norm(stated, axis=0)
+    radius = np.linalg.norm(states.position_m, axis=0)
+    nearest = np.minimum(radius[1:], radius[:-1])
+    fastest = np.sqrt(2.0 * MU_M3_S2 / nearest)
+    half = np.minimum(0.5 * step * fastest / nearest, 1.5)
+    allowed = np.minimum(0.01 + 3.0 * (1.0 - half / np.tan(half)), 0.9)
+    near = step <= MOST_STEPS * float(np.median(step))
+    if (bad := np.flatnonzero(near & (speed > 1.5 * fastest))).size:
+        k = int(bad[0])
+        why = (
+            f"the positions are passed at {speed[k] / 1e3:.6g} km/s, and a satellite of the Earth has at most "
+            f"{fastest[k] / 1e3:.3g} there; find the position, or the time, that is wrong"
+        )
+    elif (bad := np.flatnonzero(near & ~(off <= allowed * speed))).size:
+        k = int(bad[0])
+        why = (
+            f"the velocities, {told[k] / 1e3:.6g} km/s in the mean, are not those at which the positions are passed, "
+            f"{speed[k] / 1e3:.6g} km/s; velocities are in km/s, in the frame of the positions"
+        )
+    else:
+        return
+    raise OrbitError(f"{path}, {draft.places[k + 1]}: from {draft.times[k]} to {draft.times[k + 1]} {why}")
 
 
 def _check_holes(path: Path, draft: _Draft, time: Floats, usable: tuple[float, float]) -> None:
