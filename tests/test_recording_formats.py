@@ -17,6 +17,7 @@ from scipy.io import savemat
 from scipy.sparse import csc_array
 
 from microrad.recording import RecordingError, multisine_recordings, read_recording
+from microrad.recording import lvm as lvm_module
 
 N, RATE_HZ = 1000, 2000.0
 TIME_S = np.arange(N) / RATE_HZ
@@ -216,6 +217,35 @@ def test_lvm_segments(tmp_path):
     assert "'drive' may be '0/drive', '1/drive', '2/drive'" in refusal(path, "drive", "output")
     read = read_recording(path, "1/drive", "1/output")
     np.testing.assert_allclose(read.drive[:, 0], DRIVE[334:667], atol=1e-12)
+
+
+class Searched(bytes):
+    """Bytes that count how many were searched through."""
+
+    searched = 0
+
+    def find(self, wanted, start=0):
+        at = super().find(wanted, start)
+        self.searched += (len(self) if at < 0 else at) - start
+        return at
+
+
+def test_segments_of_lvm_are_found_in_one_pass():
+    """Each segment looked through the whole rest of the file for kinds of blank lines that are not in it."""
+    rows = b"1\t2\r\n" * 5 + b"\r\n"
+    head = b"***End_of_Header***\r\n"
+    data = Searched(head + rows * 300)
+    blanks = lvm_module._Blanks(data, "\t")
+    starts = range(len(head), len(data), len(rows))
+    assert [blanks.behind(start) for start in starts] == [start + len(rows) - 2 for start in starts]
+    assert data.searched <= 4 * len(data)
+
+
+def test_lvm_of_many_segments(tmp_path):
+    path = lvm(tmp_path / "a.lvm", segments=N // 2)
+    check(read_recording(path, "drive", "output"))
+    path = lvm(tmp_path / "b.lvm", segments=4, comma=True)
+    check(read_recording(path, "drive", "output"))
 
 
 @pytest.mark.parametrize(("bad", "words"), [("x", "'x' is not a finite number"), ("", "the cell is empty")])
@@ -435,6 +465,37 @@ def test_truncated_numpy(tmp_path):
     assert "damaged or truncated" in refusal(path, "drive", "output", RATE_HZ)
 
 
+def npy_header(text, version=(2, 0), length=None):
+    packed = struct.pack("<I" if version != (1, 0) else "<H", len(text) if length is None else length)
+    return b"\x93NUMPY" + bytes(version) + packed + text
+
+
+WHOLE = b"{'descr': '<f8', 'fortran_order': False, 'shape': (1000,), }"
+
+
+@pytest.mark.parametrize("archive", [False, True])
+@pytest.mark.parametrize(
+    ("header", "words"),
+    [
+        (npy_header(WHOLE, length=4_000_000_000), "a header of 4000000000 bytes, where 10000 are enough"),
+        (npy_header(WHOLE, version=(0, 0)), "version 0.0 of the format is not known"),
+        (npy_header(WHOLE.replace(b"(1000,)", b"(True,)")), "the shape (True,) is none"),
+        (npy_header(WHOLE.replace(b"(1000,)", b"(-1000,)")), "the shape (-1000,) is none"),
+    ],
+    ids=itertools.count(),
+)
+def test_headers_of_numpy_that_are_none(tmp_path, archive, header, words):
+    """1239 bytes of an archive made 4.4 GB: the length of a header was read, and all of it, before it was judged."""
+    path = tmp_path / ("a.npz" if archive else "a.npy")
+    content = header + DRIVE.tobytes()
+    if archive:
+        with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as file:
+            file.writestr("drive.npy", content)
+    else:
+        path.write_bytes(content)
+    assert words in refusal(path, 0, 0)
+
+
 def test_nan_in_an_array(tmp_path):
     path = tmp_path / "a.npz"
     np.savez(path, drive=DRIVE, output=np.where(np.arange(N) == 77, np.nan, OUTPUT))
@@ -597,6 +658,25 @@ def test_whole_pieces_are_read_however_they_are_packed(tmp_path, packing):
             file.create_dataset(name, data=values, chunks=(300,), **packing)  # the last piece is filled up
     check(read_recording(path, "drive", "output", RATE_HZ))
     np.testing.assert_array_equal(read_recording(path, "drive", "steps", RATE_HZ).output[:, 0], still)
+
+
+def test_groups_nested_too_deep(tmp_path):
+    """1200 of them took the library two minutes."""
+    path = hdf5(tmp_path / "a.h5")
+    with h5py.File(path, "a") as file:
+        file["/".join("d" * 50)] = DRIVE
+    check(read_recording(path, "run/drive", "run/output"), ("run/drive", "run/output"))
+    with h5py.File(path, "a") as file:
+        file.create_group("/".join("e" * 60))
+    assert "groups are nested more than 50 deep" in refusal(path, "run/drive", "run/output")
+
+
+def test_a_step_that_is_no_rate(tmp_path):
+    path = hdf5(tmp_path / "a.h5")
+    with h5py.File(path, "a") as file:
+        del file["run"].attrs["fs"]
+        file["run"].attrs["dt"] = 5e-324
+    assert "give the rate" in refusal(path, "run/drive", "run/output")
 
 
 def test_a_filter_whose_pieces_cannot_be_checked(tmp_path):

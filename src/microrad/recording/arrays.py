@@ -48,7 +48,7 @@ def stated_rate(name: str, value: Any) -> StatedRate | None:
         number = float(np.asarray(value).reshape(-1)[0]) if np.size(value) == 1 else math.nan
     except (TypeError, ValueError):
         return None
-    if not 0 < number < math.inf:
+    if not (0 < number < math.inf and 0 < 1 / number < math.inf):
         return None
     if key in RATE_NAMES:
         return StatedRate(number, f"{name} = {number:g} Hz")

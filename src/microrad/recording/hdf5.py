@@ -22,6 +22,8 @@ from microrad.recording.hdf5_datasets import ELSEWHERE, attribute, check_pieces,
 from microrad.recording.records import RecordingError
 from microrad.recording.sources import StatedRate, damaged, missing_library
 
+_MOST_DEEP = 50
+
 
 class Hdf5Source(ArraySource):
     """An HDF5 file. MATLAB stores arrays transposed: `matlab` turns their axes round."""
@@ -53,6 +55,7 @@ class Hdf5Source(ArraySource):
         import h5py
 
         def visit(name: str, item: Any) -> None:
+            _check_depth(path, name)
             if name.startswith("#"):  # MATLAB's store of cells and references
                 return
             _note_rates(stated, name, item.attrs, name)
@@ -68,6 +71,7 @@ class Hdf5Source(ArraySource):
                 _add(stated, name.rpartition("/")[0], stated_rate(name, item[()]))
 
         def visit_link(name: str, link: Any) -> None:
+            _check_depth(path, name)
             if isinstance(link, h5py.ExternalLink):
                 unusable[name] = f"is a link into another file, {ELSEWHERE}"
 
@@ -84,6 +88,15 @@ class Hdf5Source(ArraySource):
                 at = at.rpartition("/")[0]
             found.extend(self.stated.get(at, ()))
         return list(dict.fromkeys(found))
+
+
+def _check_depth(path: Path, name: str) -> None:
+    """Refuse what lies so deep that the library takes minutes to get there."""
+    if name.count("/") > _MOST_DEEP:
+        raise RecordingError(
+            f"{path}: groups are nested more than {_MOST_DEEP} deep, which no recording needs; copy the datasets into "
+            "a file of their own."
+        )
 
 
 def _add(stated: dict[str, list[StatedRate]], group: str, rate: StatedRate | None) -> None:

@@ -6,6 +6,7 @@ same compiled reader as other text, so that a bad cell is refused with its line 
 
 from __future__ import annotations
 
+import io
 import mmap
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -27,12 +28,13 @@ _ENCODING = "latin-1"
 
 @dataclass(frozen=True)
 class _Segment:
-    """One segment: its tags, the names of its columns, its rows, and where they stand."""
+    """One segment: its tags, the names of its columns, its rows, and where they stand in lines and in bytes."""
 
     tags: dict[str, list[str]]
     names: list[str]
     first_line: int
     rows: int
+    span: tuple[int, int]
 
 
 class LvmSource(Container):
@@ -155,15 +157,12 @@ class LvmSource(Container):
     # ----------------------------------------------------------------------------------------------------- reading
     def _parse(self, segment: _Segment, columns: list[int], indices: list[int]) -> list[FloatArray]:
         layout: dict[str, Any] = {"delimiter": self._separator, "comments": None, "usecols": tuple(columns), "ndmin": 2}
-        skipped = segment.first_line - 1
+        with self.path.open("rb") as file:
+            file.seek(segment.span[0])
+            rows = file.read(segment.span[1] - segment.span[0])
         try:
-            if self._comma:
-                with self.path.open(encoding=_ENCODING, newline="\n") as file:
-                    rows = (line.replace(",", ".") for line in islice(file, skipped, skipped + segment.rows))
-                    table = np.loadtxt(rows, **layout)
-            else:
-                path = str(self.path.resolve())
-                table = np.loadtxt(path, skiprows=skipped, max_rows=segment.rows, encoding=_ENCODING, **layout)
+            rows = rows.replace(b",", b".") if self._comma else rows
+            table = np.loadtxt(io.BytesIO(rows), encoding=_ENCODING, **layout)
         except (ValueError, IndexError):
             table = np.empty((0, 0))
         if len(table) != segment.rows or not np.isfinite(table).all():
@@ -208,10 +207,10 @@ def _structure(path: Path) -> tuple[dict[str, str], list[_Segment]]:
         separator = "," if any(line.casefold().startswith("separator,comma") for line in lines) else "\t"
         pairs = (line.split(separator) for line in lines)
         header = {cells[0]: cells[1] for cells in pairs if len(cells) > 1}
-        segments, position = [], _next_line(data, end)
+        segments, position, blanks = [], _next_line(data, end), _Blanks(data, separator)
         line = bytes(data[:position]).count(b"\n") + 1
         while (mark := data.find(_END, position)) >= 0:
-            segment, position, line = _segment(path, data, position, mark, line, separator)
+            segment, position, line = _segment(path, data, position, mark, line, separator, blanks)
             segments.append(segment)
     if not segments:
         raise RecordingError(
@@ -227,7 +226,7 @@ def _next_line(data: mmap.mmap, position: int) -> int:
 
 
 def _segment(
-    path: Path, data: mmap.mmap, position: int, mark: int, line: int, separator: str
+    path: Path, data: mmap.mmap, position: int, mark: int, line: int, separator: str, blanks: _Blanks
 ) -> tuple[_Segment, int, int]:
     tags = {}
     for row in bytes(data[position:mark]).decode(_ENCODING).splitlines():
@@ -239,21 +238,30 @@ def _segment(
     while names and not names[-1]:
         names.pop()
     first_line = line + bytes(data[position:rows_at]).count(b"\n")
-    end = _end_of_rows(data, rows_at, separator)
+    end = blanks.behind(rows_at)
     rows = _count_lines(data, rows_at, end)
     if names[:1] != ["X_Value"]:
         raise RecordingError(
             f"{path}: line {first_line - 1} should name the columns, beginning with 'X_Value', and reads "
             f"'{separator.join(names)[:40]}'; export the recording again from LabVIEW."
         )
-    return _Segment(tags, names, first_line, rows), end, first_line + rows
+    return _Segment(tags, names, first_line, rows, (rows_at, end)), end, first_line + rows
 
 
-def _end_of_rows(data: mmap.mmap, start: int, separator: str) -> int:
-    """Position behind the last row: a blank line, or the end of the file."""
-    blanks = (b"\n\r\n", b"\n\n", f"\n{separator}\r\n".encode(), f"\n{separator}\n".encode())
-    ends = [at + 1 for blank in blanks if (at := data.find(blank, start - 1)) >= 0]
-    return min(ends, default=len(data))
+class _Blanks:
+    """Where the rows of segments end: at a blank line, or at the end of the file. Each kind is searched for once."""
+
+    def __init__(self, data: mmap.mmap, separator: str) -> None:
+        self._data, self._kinds = data, (b"\n\r\n", b"\n\n", f"\n{separator}\r\n".encode(), f"\n{separator}\n".encode())
+        self._next = dict.fromkeys(self._kinds, -1)
+
+    def behind(self, start: int) -> int:
+        """Position behind the last of the rows that begin at `start`, which rises from call to call."""
+        for kind, at in self._next.items():
+            if at < start - 1:
+                found = self._data.find(kind, start - 1)
+                self._next[kind] = len(self._data) if found < 0 else found
+        return min(min(self._next.values()) + 1, len(self._data))
 
 
 def _count_lines(data: mmap.mmap, start: int, end: int) -> int:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import io
+import struct
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
@@ -14,6 +16,8 @@ from microrad.recording.files import sha256_of, too_large
 from microrad.recording.records import RecordingError
 from microrad.recording.sources import StatedRate, damaged
 
+_LENGTHS = {(1, 0): "<H", (2, 0): "<I", (3, 0): "<I"}
+_MOST_HEADER = 10_000  # NumPy's own bound, which it looks at once the header is read
 _NO_OBJECTS = (
     "holds Python objects, which are pickled and not read, because loading them could run code; save them as plain "
     "numbers, array.astype(float)"
@@ -55,9 +59,18 @@ def _rates(variables: list[Variable]) -> tuple[StatedRate, ...]:
 
 
 def _header(file: IO[bytes]) -> tuple[tuple[int, ...], np.dtype[Any]]:
+    """Shape and type; a header states its own length, which is bounded before it is read."""
     version = np.lib.format.read_magic(file)
+    if version not in _LENGTHS:
+        raise ValueError(f"version {version[0]}.{version[1]} of the format is not known")
+    stated = file.read(struct.calcsize(_LENGTHS[version]))
+    (length,) = struct.unpack(_LENGTHS[version], stated)
+    if length > _MOST_HEADER:
+        raise ValueError(f"a header of {length} bytes, where {_MOST_HEADER} are enough for any array")
     read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
-    shape, _, dtype = read(file)
+    shape, _, dtype = read(io.BytesIO(stated + file.read(length)))
+    if not all(type(axis) is int and axis >= 0 for axis in shape):
+        raise ValueError(f"the shape {shape} is none")
     return shape, dtype
 
 
