@@ -1,5 +1,6 @@
 """Plan files: what is read from a good one, and what a bad one is told, every fault at once."""
 
+import contextlib
 import hashlib
 import re
 from pathlib import Path
@@ -128,6 +129,29 @@ def test_a_fault_is_told_with_its_key_and_line(refuse, old, new, key, message):
     error = refuse(text)
     fault = next(f for f in error.faults if f.key == key)
     assert re.search(message, str(fault)), str(fault)
+
+
+NUMBER = re.compile(r'^(\w+ = )(?:"(-?[\d.]+) ([^"]+)"|(\d[\d.]*))(?=\s)', re.MULTILINE)
+
+
+@pytest.mark.parametrize("number", ["1e308", "1e-308", "-1e308", "0"])
+@pytest.mark.parametrize("plan", sorted(PLANS.glob("*.toml")), ids=lambda path: path.stem)
+def test_a_number_beyond_all_measure_is_told_or_borne(tmp_path, plan, number):
+    text, path = plan.read_text(encoding="utf-8"), tmp_path / "plan.toml"
+    places = list(NUMBER.finditer(text))
+    assert len(places) > 15
+    for place in places:
+        value = f'"{number} {place[3]}"' if place[3] else number
+        path.write_text(f"{text[: place.start()]}{place[1]}{value}{text[place.end() :]}", encoding="utf-8")
+        with contextlib.suppress(PlanError):
+            load_plan(path)
+
+
+@pytest.mark.parametrize("table", ["limits", "bench", "bench.sensor", "excitation.chirp"])
+def test_a_list_in_place_of_a_table_is_told(refuse, table):
+    text = changed(rf"^\[{re.escape(table)}\]", f"[[{table}]]")
+    fault = next(f for f in refuse(text).faults if f.key == table)
+    assert "expected: a table with the keys" in str(fault) or "is no table" in str(fault)
 
 
 @pytest.mark.parametrize(

@@ -336,6 +336,9 @@ class _Report:
             self._note_kind(key, location, value)
 
     def _note_kind(self, key: str, location: _Location, value: object) -> None:
+        if not location:
+            self.document.fault(key, shown(value), "is no table", f"[{key}], once, with its keys below it")
+            return
         table, name = self._table(location), str(location[-1])
         choices = _choices(table, name)
         nearest = _nearest(value, choices) if isinstance(value, str) else ""

@@ -22,6 +22,8 @@ MOST_SAMPLES = 20_000_000
 
 _WHOLE = 1e-6  # how far, in samples, a whole number of them may be off
 _ROUNDING = 1e-9  # how far, relatively, a limit may be passed by rounding
+_LEAST_TURN = 1e-3  # of the first period of a chirp
+_NO_VOLTS = 1e-12  # a room of less is none
 _DETECTION_GROUP = 4  # odd lines of which one is left out
 
 
@@ -116,6 +118,10 @@ def logarithmic_chirp(
         raise DesignError(
             name, Problem("stop", "is not above start", f"a frequency above {format_quantity(start_hz, 'Hz')}")
         )
+    if start_hz * duration_s < _LEAST_TURN:
+        least = format_quantity(_LEAST_TURN / start_hz, "s")
+        reason = f"holds less than a thousandth of a period of {format_quantity(start_hz, 'Hz')}"
+        raise DesignError(name, Problem("duration", reason, f"at least {least}, or a higher start"))
     growth = math.log(stop_hz / start_hz) / duration_s
     phase = 2 * math.pi * start_hz * np.expm1(growth * np.arange(samples) / limits.rate_hz) / growth
     problems = _too_fast(limits, "stop", stop_hz)
@@ -211,8 +217,9 @@ def staircase(
     """
     if len(levels_v) < 2:
         raise DesignError(name, Problem("levels", "has one item, which is no step", "at least two levels"))
+    for key, seconds in (("rise", rise_s), ("dwell", dwell_s + rise_s)):
+        _samples(limits, name, key, seconds * len(levels_v))
     dwell, rise = round(dwell_s * limits.rate_hz), max(round(rise_s * limits.rate_hz), 1)
-    _samples(limits, name, "dwell", (dwell + rise) * len(levels_v) / limits.rate_hz)
     if dwell < 1:
         step = format_quantity(1.0 / limits.rate_hz, "s")
         raise DesignError(name, Problem("dwell", "is shorter than half a sample", f"at least {step}"))
@@ -252,7 +259,7 @@ def _samples(limits: Limits, name: str, key: str, seconds: float) -> int:
 
 
 def _too_fast(limits: Limits, key: str, highest_hz: float) -> list[Problem]:
-    fewest = limits.samples_per_period
+    fewest, highest_hz = limits.samples_per_period, float(highest_hz)
     if highest_hz * fewest <= limits.rate_hz * (1 + _ROUNDING):
         return []
     reason = (
@@ -289,7 +296,7 @@ def _fitted(
 
 
 def _rounded_down(volts: float) -> str:
-    digits = 10.0 ** (3 - math.floor(math.log10(volts))) if volts > 0.0 else 1.0
+    digits = 10.0 ** (3 - math.floor(math.log10(volts))) if volts > _NO_VOLTS else 1.0
     return format_quantity(math.floor(volts * digits * (1 + _ROUNDING)) / digits, "V")
 
 
@@ -308,7 +315,8 @@ def _too_steep(limits: Limits, rise: int, levels: Floats) -> list[Problem]:
     slew = largest / rise * limits.rate_hz
     if slew <= limits.slew_v_s * (1 + _ROUNDING):
         return []
-    needed = format_quantity(math.ceil(largest / limits.slew_v_s * limits.rate_hz - _WHOLE) / limits.rate_hz, "s", 6)
+    fewest = min(largest / limits.slew_v_s * limits.rate_hz, 1e15)
+    needed = format_quantity(math.ceil(fewest - _WHOLE) / limits.rate_hz, "s", 6)
     shown, most = format_quantity(slew, "V/s"), format_quantity(limits.slew_v_s, "V/s")
     return [Problem("rise", f"makes the largest step one of {shown}, limits.slew is {most}", f"at least {needed}")]
 
@@ -325,6 +333,7 @@ def _on_axis(limits: Limits, name: str, column: Floats, rest_v: float, axis: int
 # -------------------------------------------------------------------------------------------------------- whole periods
 def _whole_block(limits: Limits, name: str, freq_hz: float, periods: int) -> int:
     """Samples in `periods` periods of a sine, refused where that is no whole number."""
+    _samples(limits, name, "periods", periods / freq_hz)
     exact = periods * limits.rate_hz / freq_hz
     block = round(exact)
     if block >= 1 and abs(exact - block) <= _WHOLE:
@@ -338,17 +347,19 @@ def _whole_block(limits: Limits, name: str, freq_hz: float, periods: int) -> int
 
 
 def _whole_period(limits: Limits, name: str, period_s: float) -> int:
+    _samples(limits, name, "period", period_s)
     exact = period_s * limits.rate_hz
     length = round(exact)
     if length >= 2 and abs(exact - length) <= _WHOLE:
-        return _samples(limits, name, "period", length / limits.rate_hz)
+        return length
     near = format_quantity(max(length, 2) / limits.rate_hz, "s", 9)
     raise DesignError(name, Problem("period", f"is {exact:.6g} samples, no whole number of at least 2", near))
 
 
 def _harmonics(lines: Lines, name: str, rng: np.random.Generator) -> NDArray[np.int64]:
-    first = max(math.ceil(lines.start_hz * lines.period_s - _WHOLE), 1)
-    last = math.floor(lines.stop_hz * lines.period_s + _WHOLE)
+    beyond = 2.0 * MOST_SAMPLES  # the lines of any record
+    first = max(math.ceil(min(lines.start_hz * lines.period_s, beyond) - _WHOLE), 1)
+    last = math.floor(min(lines.stop_hz * lines.period_s, beyond) + _WHOLE)
     harmonics = np.arange(first, last + 1, dtype=np.int64)
     if lines.choice != "all":
         harmonics = harmonics[harmonics % 2 == 1]
