@@ -373,6 +373,23 @@ def test_two_sensors_report_the_worse_of_both_cuts():
     assert analysis.loop_margins(plant, single) == analysis.margins_at(plant, single)
 
 
+@pytest.mark.parametrize("first", analysis.BREAKS)
+def test_each_margin_is_the_worse_one_of_both_cuts(first, monkeypatch):
+    """Of two sets of numbers, each of which is the worse one throughout: by hand, since few loops have a way down."""
+    plant = axis_plant()
+    real = analysis.margins_at(plant, both_sensors(plant))
+    worse = replace(real, gain_up=1.5, gain_down=0.8, phase_rad=0.3, delay_s=1e-4, modulus=0.4, disk=0.5)
+    better = replace(real, gain_up=3.0, gain_down=0.2, phase_rad=0.9, delay_s=9e-4, modulus=0.7, disk=0.9)
+
+    def cut(plant, controller, broken_at="command"):
+        return worse if broken_at == first else better
+
+    monkeypatch.setattr(analysis, "margins_at", cut)
+    found = analysis.loop_margins(plant, both_sensors(plant))
+    for name in ("gain_up", "gain_down", "phase_rad", "delay_s", "modulus", "disk"):
+        assert getattr(found, name) == getattr(worse, name), name
+
+
 def test_the_peak_is_the_largest_rejection_of_the_disturbance():
     """A sine on the line of sight, against the closed loop's own response from it to the residual."""
     plant = axis_plant(resonance=(900.0, 0.02))
