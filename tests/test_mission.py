@@ -17,7 +17,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from microrad import lti, mirror
-from microrad.document import scan
+from microrad.document import Document, scan
 from microrad.link_table import half_angle_rad
 from microrad.mirror_table import BoucWenTable
 from microrad.mission import Mission, Source, mission_schema, source_text
@@ -523,6 +523,9 @@ def test_a_duplicate_table_names_both_lines(refuse):
         ("[" * 100_000 + "]" * 100_000, "nested 100000 brackets deep"),
         ("[" * 100_000, "nested 100000 brackets deep"),
         ("{a=" * 1000 + "1" + "}" * 1000, "nested 1000 brackets deep"),
+        # These took the parser minutes: it goes through all parts for each part.
+        ("{a" + ".a" * 400_000 + " = 1}", "holds a key of more than 50 parts"),
+        ("[[{b = 1, " + "'a' . " * 100_000 + "a = 1}]]", "holds a key of more than 50 parts"),
     ],
 )
 def test_what_is_not_toml_names_its_line_and_key(refuse, broken, reason):
@@ -530,6 +533,11 @@ def test_what_is_not_toml_names_its_line_and_key(refuse, broken, reason):
     fault = the_fault(refuse(text))
     assert (fault.key, fault.line) == ("communication.transmit_power", line_of("communication.transmit_power", text))
     assert reason in fault.reason
+
+
+def test_dots_that_are_no_key_are_left_alone():
+    text = f'name = "{"a." * 60}"\nx = {{a.b.c = "{"a " * 60}", d = 1.5}}\n'
+    assert Document.of(text.encode(), Path("x.toml"), "mission file").data["x"]["a"]["b"]["c"] == "a " * 60
 
 
 @pytest.mark.parametrize("line", ["what is this", "= 5", "[answer", "[]", "[[", "]"])

@@ -21,6 +21,7 @@ _MAX_RETRIED_CHARACTERS = 100_000  # beyond it a file is parsed once: each synta
 _MAX_SYNTAX_FAULTS = 20
 _MAX_DEPTH = 16
 _MAX_KEY = 200
+_MAX_PARTS = re.compile(r"""(?<![\w-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){50}""")  # of a key
 _MAX_NUMBER = 400
 
 
@@ -395,6 +396,8 @@ def _oversize(statement: Statement) -> tuple[str, str] | None:
         return f"is nested {statement.depth} brackets deep", "a value, or a list of values"
     if len(statement.key) > _MAX_KEY:
         return f"is a key of {len(statement.key)} characters", "a key of the mission file"
+    if "{" in statement.value and _MAX_PARTS.search(statement.value):
+        return "holds a key of more than 50 parts", "a table with keys of its own"
     if len(statement.value) > _MAX_NUMBER and statement.value[0] in "+-0123456789":
         return f"is a number of {len(statement.value)} characters", "a number of at most 17 digits"
     return None
