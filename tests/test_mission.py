@@ -535,6 +535,16 @@ def test_what_is_not_toml_names_its_line_and_key(refuse, broken, reason):
     assert reason in fault.reason
 
 
+@pytest.mark.parametrize("name", ["k\\u001b[31mX", "a\\u202Eb", "a\\nb", "a\\u0000"])
+def test_a_name_that_would_steer_the_terminal_is_refused(refuse, name):
+    """It was printed as it stood, and written into tables."""
+    text = TEXT.replace("[operations.downlink.stations.kiruna]", f'[operations.downlink.stations."{name}"]')
+    assert text != TEXT
+    error = refuse(text)
+    assert any("with characters that cannot be printed" in fault.reason for fault in error.faults)
+    assert all(c.isprintable() or c == "\n" for c in str(error))
+
+
 def test_dots_that_are_no_key_are_left_alone():
     text = f'name = "{"a." * 60}"\nx = {{a.b.c = "{"a " * 60}", d = 1.5}}\n'
     assert Document.of(text.encode(), Path("x.toml"), "mission file").data["x"]["a"]["b"]["c"] == "a " * 60
@@ -629,8 +639,8 @@ def test_long_values_are_shortened_and_control_characters_escaped(refuse):
     assert len(long.value) < 100
     ringing = the_fault(refuse(edited("communication.transmit_power", '"5 W\\u0007\\u001b[31m\\u202e"')))
     assert ringing.value == '"5 W\\u0007\\u001b[31m\\u202e"'
-    key = the_fault(refuse(TEXT.replace("[scenario]\n", '[scenario]\n"\\u001bkey" = 1\n')))
-    assert key.key == "scenario.\\u001bkey"
+    of_name, of_key = refuse(TEXT.replace("[scenario]\n", '[scenario]\n"\\u001bkey" = 1\n')).faults
+    assert of_name.key == of_key.key == "scenario.\\u001bkey"
 
 
 # ---- mirrors

@@ -7,7 +7,7 @@ parser is noted as a fault and blanked out, so that the rest is parsed and every
 import hashlib
 import re
 import tomllib
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal, Self
@@ -320,6 +320,7 @@ class _Parser:
         for _ in range(tries):
             try:
                 self.document.data = tomllib.loads("\n".join(self.lines))
+                self._check_names(self.document.data, self.document.prefix)
                 return
             except tomllib.TOMLDecodeError as error:
                 self._note_syntax(error)
@@ -328,6 +329,17 @@ class _Parser:
                 self.document.fault("", "", reason, "simple values")
                 break
         raise MissionError(self.document.path, self.document.faults)
+
+    def _check_names(self, table: Mapping[str, Any], prefix: str) -> None:
+        """Note names that would steer a terminal, which they are printed to, or hide what stands beside them."""
+        for name, value in table.items():
+            key = _joined(prefix, name)
+            if not name.isprintable():
+                reason = f'has the name "{clipped(name)}", with characters that cannot be printed'
+                self.document.fault(key, "", reason, "a name of letters, digits and signs")
+            for item in value if isinstance(value, list) else [value]:
+                if isinstance(item, dict):
+                    self._check_names(item, key)
 
     def _set_aside(self) -> None:
         """Note and blank out what the scan alone shows to be wrong."""
