@@ -307,10 +307,10 @@ def test_what_is_no_file_of_text_is_refused_with_its_own_reason(tmp_path, monkey
                 read(path)
             assert str(caught.value).startswith(f"{path}: {reason}")
 
-    def locked(_):
+    def locked(*_):
         raise PermissionError(13, "Permission denied")
 
-    monkeypatch.setattr(Path, "read_bytes", locked)  # permissions do not stop every user
+    monkeypatch.setattr("microrad.orbit.messages.read_bytes", locked)  # permissions do not stop every user
     refused(tmp_path, NAMED, "cannot be read (Permission denied); check the permissions of the file and of its folders")
 
 

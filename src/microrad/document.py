@@ -12,6 +12,8 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal, Self
 
+from microrad.folder import read_bytes
+
 MAX_BYTES = 1_000_000
 MAX_LINES = 10_000
 _MAX_FAULTS_SHOWN = 50
@@ -276,8 +278,7 @@ def _content(path: Path) -> bytes:
             raise UnreadableError("is a directory", "the path of a file")
         if path.exists() and not path.is_file():  # a pipe or a device may never end
             raise UnreadableError("is not a regular file", "the path of a file on disk")
-        with path.open("rb") as stream:
-            content = stream.read(MAX_BYTES + 1)
+        content = read_bytes(path, MAX_BYTES + 1)
     except FileNotFoundError:
         raise UnreadableError("does not exist", "an existing file; `microrad init` writes one to start from") from None
     except (OSError, ValueError) as error:

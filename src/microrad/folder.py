@@ -1,4 +1,7 @@
-"""A folder or file of results appears whole or not at all, and never replaces what microrad did not write."""
+"""A folder or file of results appears whole or not at all, and never replaces what microrad did not write.
+
+And what a file holds, without a wait for one that never ends.
+"""
 
 import json
 import os
@@ -14,6 +17,22 @@ MANIFEST = "manifest.json"
 
 class FolderError(ValueError):
     """The output folder cannot be used; the message says why and what to do."""
+
+
+def read_bytes(path: Path, most: int) -> bytes:
+    """At most so many bytes of a file. Raises OSError, also where they are not there yet, as of a log of the kernel."""
+
+    def at_once(name: str, flags: int) -> int:
+        return os.open(name, flags | getattr(os, "O_NONBLOCK", 0))
+
+    with open(path, "rb", buffering=0, opener=at_once) as file:
+        parts: list[bytes] = []
+        while most > 0 and (part := file.read(most)) != b"":
+            if part is None:
+                raise BlockingIOError(0, "it is no file on disk: its content is not there yet")
+            parts.append(part)
+            most -= len(part)
+    return b"".join(parts)
 
 
 def check_folder(folder: Path, overwrite: bool, kind: str = "mission", what: str = "results") -> None:

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import NamedTuple
 from xml.parsers import expat
 
+from microrad.folder import read_bytes
 from microrad.orbit.base import OrbitError
 
 MOST_BYTES = 50_000_000
@@ -39,7 +40,7 @@ def read_text(path: Path) -> str:
     """Text of a file in UTF-8, lines ending in a newline; raises `OrbitError` for one that is none, or too large."""
     try:
         _check_file(path)
-        data = path.read_bytes()
+        data = read_bytes(path, MOST_BYTES + 1)
     except OrbitError:
         raise
     except (FileNotFoundError, NotADirectoryError, ValueError):  # the last for a name that holds a NUL
