@@ -146,6 +146,16 @@ def test_noise_and_distortion_are_told_apart():
     assert 0.8 < np.mean(scatter) / np.mean(told) < 1.25
 
 
+@pytest.mark.parametrize("periods", [2, 8])
+def test_the_noise_error_is_the_scatter_of_repetitions(periods):
+    """Of the mean over the periods: with more of them it is smaller."""
+    model, drives = mirror(), [(multisine(k),) for k in range(3)]
+    found = [response_from_periods(periodic(model, drives, noise=0.1, seed=s, periods=periods)) for s in range(40)]
+    scatter = np.var([f.response for f in found], axis=0, ddof=1)
+    told = np.mean([f.noise_standard_error**2 for f in found], axis=0)
+    assert 0.9 < np.mean(scatter) / np.mean(told) < 1.1
+
+
 def test_powers_add_up_to_the_mean_square():
     model = mirror(2)
     records = periodic(model, [(multisine(2 * k), multisine(2 * k + 1)) for k in range(4)], noise=0.3)

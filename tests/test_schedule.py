@@ -203,6 +203,13 @@ def test_the_longest_waiting_goes_first_not_the_lowest_index():
     assert (0, 0, 0, 30.0, 40.0) in got  # satellite 0 since 20 s, satellite 1 since 24 s
 
 
+def test_of_equally_long_waits_the_least_data_goes_first_and_overhead_is_none():
+    """Satellite 1 was served for longer, 10 s against 9.5 s, but in two sessions, with 6 s of data against 7.5 s."""
+    rows = [(0, 0, 1.5, 11.0), (1, 1, 0.0, 5.0), (1, 1, 6.0, 11.0), (0, 2, 20.0, 30.0), (1, 2, 20.0, 30.0)]
+    found = listed(schedule(opportunities(*rows), 2, 3, 1, RULES, 0.0))
+    assert next(each[0] for each in found if each[1] == 2) == 1
+
+
 def test_who_must_leave_may_take_a_free_terminal_elsewhere():
     views = ((0, 0, 0.0, 40.0), (1, 0, 5.0, 40.0), (0, 1, 8.0, 40.0))
     got = listed(schedule(opportunities(*views), 2, 2, 1, RULES, 0.0))
