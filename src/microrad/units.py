@@ -119,6 +119,22 @@ _FACTOR = re.compile(r"([A-Za-zµμ]+)(?:\^?([1-9]))?")
 _ROOT = re.compile(r"sqrt\(([A-Za-zµμ]+)\)|√([A-Za-zµμ]+)")
 
 
+_SPELLINGS = {
+    **{f"{prefix.lower()}bps": f"{prefix}bit/s" for prefix in ("", "k", "M", "G", "T")},
+    **dict.fromkeys(("watt", "watts"), "W"),
+    **dict.fromkeys(("meter", "meters", "metre", "metres"), "m"),
+    **dict.fromkeys(("micron", "microns", "micrometer", "micrometers", "micrometre", "micrometres"), "um"),
+    **dict.fromkeys(("degree", "degrees", "°"), "deg"),
+    **dict.fromkeys(("radian", "radians"), "rad"),
+    **dict.fromkeys(("microradian", "microradians"), "urad"),
+    **dict.fromkeys(("volt", "volts"), "V"),
+    **dict.fromkeys(("sec", "secs", "second", "seconds"), "s"),
+    **dict.fromkeys(("hertz", "cps"), "Hz"),
+    **dict.fromkeys(("bits/s", "bit/sec", "b/s"), "bit/s"),
+}
+"""Units as they are often written, in small letters, and as they are read here."""
+
+
 class UnitError(ValueError):
     """A quantity that cannot be read.
 
@@ -135,11 +151,11 @@ class UnitError(ValueError):
 
 
 class _RefusedError(ValueError):
-    """Why a text is no quantity, and the number that a corrected one begins with."""
+    """Why a text is no quantity, and the number that a corrected one begins with, with its unit where that is known."""
 
-    def __init__(self, reason: str, number: str = "5") -> None:
+    def __init__(self, reason: str, number: str = "5", unit: str = "") -> None:
         super().__init__(reason)
-        self.number = number
+        self.number, self.unit = number, unit
 
 
 def parse_quantity(text: object, unit: str, typical: str = "") -> float:
@@ -157,7 +173,7 @@ def parse_quantity(text: object, unit: str, typical: str = "") -> float:
         return _read(text, unit)
     except _RefusedError as refused:
         noun, usual = kind_of(unit)
-        example = f"{refused.number} {typical or usual}"
+        example = f"{refused.number} {refused.unit or typical or usual}"
         raise UnitError(text, str(refused), f"{noun} with its unit", example) from None
 
 
@@ -176,7 +192,7 @@ def _read(text: object, unit: str) -> float:
     number, symbol = _split(text)
     if symbol in _DECIBELS:
         return _from_decibel(float(number), symbol, unit)
-    scale = _scale_of_text(symbol)
+    scale = _scale_of_text(symbol, number, unit)
     if unit in _DECIBELS or scale.dimension != _scale(unit).dimension:
         raise _RefusedError(f"is in {_quoted(symbol)}, another kind of quantity")
     value = float(Decimal(number) * scale.factor / _scale(unit).factor)
@@ -206,10 +222,13 @@ def _from_decibel(value: float, symbol: str, unit: str) -> float:
     return value if unit == symbol else float(_LEVELS_W[symbol] * 10.0 ** (value / 10.0))
 
 
-def _scale_of_text(symbol: str) -> _Scale:
+def _scale_of_text(symbol: str, number: str, unit: str) -> _Scale:
     try:
         return _scale(symbol)
     except ValueError as error:
+        meant = "" if "B" in symbol else _SPELLINGS.get(symbol.lower(), "")  # bytes are not bits
+        if meant and unit not in _DECIBELS and _scale(meant).dimension == _scale(unit).dimension:
+            raise _RefusedError(f"has {_quoted(symbol)}, which is written {meant} here", number, meant) from None
         raise _RefusedError(f"has {_quoted(symbol)} where a unit should stand: {error}") from None
 
 
