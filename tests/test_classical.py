@@ -352,6 +352,15 @@ def test_anti_windup_changes_nothing_inside_the_limits(family, plant, values):
         assert np.array_equal(a, b)
 
 
+@pytest.mark.parametrize("drift", [[], [(0.9999, 0.9996)], [(0.9999, 0.9996), (0.9995, 0.9997)]])
+def test_the_observers_filter_is_the_inverse_at_rest(drift, monkeypatch):
+    """Also of a plant whose creep it undoes: F P = 1 at frequency 0, so that a constant disturbance is cancelled."""
+    monkeypatch.setattr(classical, "_drift", lambda plant: drift)
+    F = classical.observer_filter(PLAIN, 600.0, 700.0, 0.8)
+    slow = F.C @ np.linalg.solve(np.eye(F.order) - F.A, F.B) + F.D
+    assert_allclose(slow * PLAIN.gain_rad_v, 1.0, rtol=1e-6)  # the gain is kept to 32 bits
+
+
 def test_a_saturated_disturbance_observer_still_knows_the_disturbance():
     """With an exact model driven by the clipped command, what it asks for is F d, as if there were no limit."""
     controller = DISTURBANCE_OBSERVER.build(PLAIN, np.array([600.0, 700.0, 0.8]))

@@ -354,6 +354,7 @@ ONE_AXIS = {
     "Bouc-Wen of the paper": {"bouc_wen": (PAPER,)},
     "Bouc-Wen beside creep": {"bouc_wen": (ADMISSIBLE,), "lags": 3},
     "asymmetric Bouc-Wen": {"bouc_wen": (ASYMMETRIC, ASYMMETRIC._replace(gamma=-1.5, eta=0.4, epsilon=0.02))},
+    "Bouc-Wen with a drive term that depends on the rate": {"bouc_wen": (ADMISSIBLE._replace(d2=-1.6e-4),)},
     "Bouc-Wen that runs away from zero": {"bouc_wen": (PAPER._replace(alpha=3.0, beta=-9.0),)},
     "Bouc-Wen without decay": {"bouc_wen": (PAPER._replace(alpha=0.0, beta=0.0),)},
     "Bouc-Wen without forcing": {"bouc_wen": (PAPER._replace(epsilon=0.0),)},

@@ -1077,6 +1077,14 @@ def test_vectors_are_as_wide_as_pays_and_as_somebody_has_said():
     assert features(NUMBA_CPU_NAME="haswell") == "None"
 
 
+def test_machine_code_of_one_signature_stays_beside_that_of_another(tmp_path):
+    cache = kernels._CacheFile(str(tmp_path), "kernel-1.py3", "stamp")
+    for signature in ("one", "another"):
+        cache.save(signature, f"code of {signature}")
+    for signature in ("one", "another"):
+        assert kernels._CacheFile(str(tmp_path), "kernel-1.py3", "stamp").load(signature) == f"code of {signature}"
+
+
 def test_machine_code_of_two_processes_never_shares_a_file(tmp_path, monkeypatch):
     """Each process saves with the index it has read before the other wrote: a count of files would name both alike."""
     first, second = (kernels._CacheFile(str(tmp_path), "kernel-1.py3", "stamp") for _ in range(2))
