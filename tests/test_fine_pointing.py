@@ -244,6 +244,15 @@ def test_the_budget_takes_the_whole_from_what_is_simulated_already(scene, file, 
     assert (budget.differences[0].with_rad, budget.differences[0].without_rad) == (full, together)
 
 
+def test_a_loop_without_limits_has_none(scene):
+    drive, optical = scene.loop.drive, scene.loop.optical
+    free = parts.without(scene.loop, parts.LIMITS)
+    assert (free.drive.minimum_v, free.drive.maximum_v, free.drive.slew_v_s) == (-math.inf, math.inf, math.inf)
+    assert optical.field_of_view_rad < free.optical.field_of_view_rad == math.inf
+    kept = ("bandwidth_hz", "drive_resolution_v", "sensor_resolution_rad")
+    assert [getattr(free.drive, name) for name in kept] == [getattr(drive, name) for name in kept]
+
+
 PLAYS = """[mirror.prandtl_ishlinskii]
 thresholds = ["0 V", "1 V"]
 weights = ["59 urad/V", "30 urad/V"]

@@ -306,6 +306,17 @@ def test_the_notch_is_sought_beside_the_pi_and_far_from_it():
     assert 1.0259e-6 < tuning.tune(classical.PI_NOTCH, [PLAIN], HALF, seed=1).mean_rms_rad < 1.0269e-6
 
 
+@pytest.mark.parametrize("node", [1e-3, 0.02, 0.2])
+@pytest.mark.parametrize("x", [0.0, 1e-4, 0.03, 0.5, 0.99, 1.0])
+def test_the_points_of_a_slope_lie_within_the_bounds(x, node):
+    points = x + node * descent._offsets(x, node)
+    np.testing.assert_allclose(np.diff(points), node, rtol=1e-9)
+    assert points[0] >= -1e-12 and points[-1] <= 1.0 + 1e-12
+    assert points[0] - 1e-12 <= x <= points[-1] + 1e-12
+    if 2.0 * node <= x <= 1.0 - 2.0 * node:
+        assert points[2] == pytest.approx(x, abs=1e-12)
+
+
 def test_an_optimum_beside_a_kink_is_the_same_from_every_start():
     """On this mirror the margin's constraint passes from one dip of |1 + L| to another beside the optimum."""
     soft = load_mission(SHIPPED, Path("docs/gallery/long-stroke.toml"))
