@@ -1145,6 +1145,17 @@ def excursion(size, **changes):
     return loop, pi_for(loop)
 
 
+def test_each_counter_is_a_share_of_what_it_counts():
+    """Saturation and the inverse's rate by control sample, lost spots by reading, the rest by plant step."""
+    loop, controller = excursion(1.0)
+    found = ensemble.run(loop, controller, Span(0.01, 0.0, 1), 2)
+    found = replace(found, counts=np.full_like(found.counts, 60.0), samples=100, steps=500, readings=20)
+    of = {kernels.COUNT_SATURATED: 100, kernels.COUNT_INVERSE_CLAMPED: 100, kernels.COUNT_LOST: 20}
+    steps = (kernels.COUNT_SLEW, kernels.COUNT_CLAMPED, kernels.COUNT_OUTSIDE)
+    for counter, times in (of | dict.fromkeys(steps, 500)).items():
+        assert found.share(counter) == 60 / times, counter
+
+
 @pytest.mark.parametrize("size", [3.0, -30.0])
 def test_beyond_its_stroke_the_loop_counts_stays_bounded_and_recovers(size):
     """20 ms behind an excursion beyond the stroke the error is that of one that stays within; windup would not end."""
