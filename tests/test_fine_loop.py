@@ -1145,6 +1145,16 @@ def excursion(size, **changes):
     return loop, pi_for(loop)
 
 
+def test_the_interval_of_the_rms_is_that_of_the_scatter_of_its_square():
+    """Two runs with squares of 1 and 9: their mean is known to 4, the root of it to 4 / (2 sqrt 5)."""
+    loop, controller = excursion(1.0)
+    found = ensemble.run(loop, controller, Span(0.01, 0.0, 1), 2)
+    rms = np.zeros_like(found.rms_rad)
+    rms[:, 0] = 1.0, 3.0
+    assert replace(found, rms_rad=rms).radial_rms_interval_rad(1.0) == pytest.approx(2.0 / np.sqrt(5.0), rel=1e-12)
+    assert replace(found, rms_rad=rms[:1]).radial_rms_interval_rad() == inf
+
+
 def test_each_counter_is_a_share_of_what_it_counts():
     """Saturation and the inverse's rate by control sample, lost spots by reading, the rest by plant step."""
     loop, controller = excursion(1.0)

@@ -23,6 +23,7 @@ from microrad.identify import (
     mirror_file_text,
     predict,
 )
+from microrad.identify import bouc_wen as bouc_wen_fit
 from microrad.identify.choice import _best
 from microrad.identify.records import colour_inflation, fastest_rate, prepare, transient
 from microrad.kernels import bouc_wen_response, play_response
@@ -659,3 +660,16 @@ def test_falling_sensor_gives_a_rising_mirror(model):
     for key, values in up[model].items():
         for a, b in zip(np.atleast_1d(values), np.atleast_1d(down[model][key]), strict=True):
             assert float(a.split()[0]) == pytest.approx(float(b.split()[0]), rel=2e-3)
+
+
+@pytest.mark.parametrize("epsilon", [-0.03, 0.02])
+def test_the_gradient_of_the_bound_is_that_of_differences(epsilon):
+    """Of epsilon 2 alpha / (d1 (alpha + sign(epsilon) beta)), which an active bound holds constant."""
+    values = np.array([0.09, -3e-6, epsilon, 4e-4, 5.0, 1.2])
+
+    def bound(v):
+        return v[2] * 2 * v[4] / (v[0] * (v[4] + np.sign(v[2]) * v[5]))
+
+    steps = np.diag(1e-6 * np.abs(values))
+    slopes = [(bound(values + s) - bound(values - s)) / (2 * s.sum()) for s in steps]
+    np.testing.assert_allclose(bouc_wen_fit._bound_gradient(values), slopes, rtol=1e-7, atol=1e-12)

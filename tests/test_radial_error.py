@@ -9,7 +9,7 @@ from scipy.integrate import quad
 from scipy.special import erfc
 from scipy.stats import ncx2, norm
 
-from microrad.radial_error import Jitter, radial_cdf, radial_quantile, radial_survival
+from microrad.radial_error import Jitter, density_on_circle, radial_cdf, radial_quantile, radial_survival
 
 URAD = 1e-6
 EQUAL = Jitter((0.0, 0.0), (3.0 * URAD, 3.0 * URAD))
@@ -186,3 +186,19 @@ def test_nearly_equal_axes_join_the_equal_ones_and_a_thin_axis_leaves_a_line():
 def test_what_is_no_error_no_radius_and_no_probability_is_refused(call, message):
     with pytest.raises(ValueError, match=message):
         call()
+
+
+@pytest.mark.parametrize(
+    ("bias", "rms"),
+    [((1.0, 0.0), (0.7, 0.7)), ((0.0, 1.0), (0.7, 0.7)), ((0.3, -0.2), (0.4, 0.9)), ((0.3, 0.9), (0.9, 0.4))],
+)
+def test_directions_on_a_circle_belong_to_their_axes(bias, rms):
+    """Mean squared direction cosine towards x on a circle, by a sum over the angle; also where both axes are alike."""
+    radius = np.array([0.4, 1.1])
+    square_x, square_y, density = density_on_circle(Jitter(bias, rms), radius)
+    angle = np.linspace(0.0, 2.0 * np.pi, 20_001)[:-1]
+    x, y = radius[:, None] * np.cos(angle), radius[:, None] * np.sin(angle)
+    weight = np.exp(-0.5 * ((x - bias[0]) / rms[0]) ** 2 - 0.5 * ((y - bias[1]) / rms[1]) ** 2)
+    exact = np.sum(weight * np.cos(angle) ** 2, axis=1) / np.sum(weight, axis=1)
+    np.testing.assert_allclose(np.sum(square_x * density, axis=1) / np.sum(density, axis=1), exact, rtol=1e-9)
+    np.testing.assert_allclose(square_x + square_y, 1.0, rtol=1e-12)
