@@ -178,6 +178,9 @@ def test_rank_correlations() -> None:
         exact = stats.spearmanr(x[:, at], y).statistic
         assert found[f"x{at}"].value == pytest.approx(exact, abs=1e-12)
         assert found[f"x{at}"].low < exact < found[f"x{at}"].high
+        width = np.arctanh(found[f"x{at}"].high) - np.arctanh(found[f"x{at}"].low)
+        sigmas = stats.norm.ppf(0.5 + found[f"x{at}"].confidence / 2)
+        assert width == pytest.approx(2 * sigmas * math.sqrt((1 + exact**2 / 2) / 397), rel=1e-9)
     ties = of(x.round(1), y.round(0)).rank_correlation["x0"].value
     assert ties == pytest.approx(stats.spearmanr(x[:, 0].round(1), y.round(0)).statistic, abs=1e-12)
     falling = of(x, -x[:, 0]).rank_correlation["x0"]

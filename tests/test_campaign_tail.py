@@ -11,7 +11,7 @@ import pytest
 from scipy.signal import lfilter
 from scipy.special import i0e
 
-from microrad.campaign import loops, run, tilt
+from microrad.campaign import loops, run, tails, tilt
 from microrad.campaign.file import CampaignFile, load_campaign
 from microrad.campaign.inputs import Builder
 from microrad.campaign.ledger import Ledger
@@ -337,3 +337,10 @@ def test_a_campaign_says_how_likely_its_error_is(slow: Slow) -> None:
     none = replace(cell.tail, beyond={error: replace(past, value=0.0, low=0.0)})
     unseen = campaign_words.tail_sentences(found, replace(cell, tail=none))[1]
     assert unseen.startswith("No radial error beyond ") and "(0 to " in unseen
+
+
+def test_the_variance_of_a_weighted_share_is_that_of_its_mean() -> None:
+    """Of draws of which each counts its weight or nothing: their sample variance over their number."""
+    weight, draws = np.array([0.5, 2.0, 1.0]), 5
+    counted = np.array([*weight, 0.0, 0.0])
+    assert tails._variance(weight, draws) == pytest.approx(np.var(counted, ddof=1) / draws, rel=1e-12)

@@ -791,3 +791,11 @@ def test_a_contact_ends_where_the_partner_is_too_far():
             assert (cause == "range") == (abs(range_m - far) < 0.1), (cause, range_m)
         assert np.all(sight(*both, np.linspace(c.start_s, c.end_s, 500)).range_m <= far + 0.1)
     assert any("range" in (c.begins, c.ends) for c in near)
+
+
+@pytest.mark.parametrize("year", [1975, 2000, 2048])
+def test_the_suns_greatest_declination_is_the_obliquity_of_its_date(year):
+    """23.43928 deg in 2000, and 0.01300 deg less each century (IAU 2006)."""
+    sun = sun_direction(Epoch.from_text(f"{year}-06-18T00:00:00Z"), np.arange(0.0, 7 * 86400.0, 600.0))
+    highest = math.degrees(math.asin(float(np.max(sun[2]))))
+    assert highest == pytest.approx(23.43928 - 0.013004 * (year + 0.47 - 2000) / 100, abs=2e-3)

@@ -596,6 +596,7 @@ def oem_xml(time_s, version="3.0", **changes):
         ({}, 1e-4, 1e-6),
         ({"INTERPOLATION": "HERMITE", "INTERPOLATION_DEGREE": "7"}, 1e-4, 1e-6),
         ({"INTERPOLATION": "hermite", "INTERPOLATION_DEGREE": "3"}, 0.5, 0.05),
+        ({"INTERPOLATION": "HERMITE", "INTERPOLATION_DEGREE": "4"}, 2e-3, 2e-4),  # three points, as of degree 5
         ({"INTERPOLATION": "Lagrange", "INTERPOLATION_DEGREE": "7"}, 1e-3, 1e-5),
         ({"INTERPOLATION": "LAGRANGE", "INTERPOLATION_DEGREE": "8"}, 1e-4, 1e-5),
         ({"INTERPOLATION": "LAGRANGE", "INTERPOLATION_DEGREE": "12"}, 1e-4, 1e-4),
