@@ -1145,6 +1145,17 @@ def excursion(size, **changes):
     return loop, pi_for(loop)
 
 
+@pytest.mark.parametrize("samples", [2, 64, 128])
+def test_a_spectrum_holds_the_power_of_its_window(samples):
+    """Parseval, with the constant and the fastest line once and all others twice."""
+    residual = np.random.default_rng(samples).standard_normal((samples, 2, 3))
+    residual[:, 0, :] += 3.0 * (-1.0) ** np.arange(samples)[:, None]
+    found = ensemble._periodogram(residual, 2e-4)
+    window = np.hanning(samples + 1)[:-1]
+    power = np.mean(np.sum((residual * window[:, None, None]) ** 2, axis=0), axis=1) / np.sum(window**2)
+    assert_allclose(found.sum(axis=0) / (samples * 2e-4), power, rtol=1e-12)
+
+
 def test_the_interval_of_the_rms_is_that_of_the_scatter_of_its_square():
     """Two runs with squares of 1 and 9: their mean is known to 4, the root of it to 4 / (2 sqrt 5)."""
     loop, controller = excursion(1.0)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from microrad import control, fine_pointing, mirror_spread
+from microrad import control, fine_pointing, hysteresis, mirror, mirror_spread
 from microrad.fine_loop import ensemble
 from microrad.fine_loop.design import design_plant
 from microrad.fine_loop.linear import close, stationary
@@ -242,6 +242,24 @@ def test_the_budget_takes_the_whole_from_what_is_simulated_already(scene, file, 
     names = (parts.HYSTERESIS, parts.LIMITS, parts.QUANTISATION, parts.DELAY)
     assert tuple(d.name for d in budget.differences) == names
     assert (budget.differences[0].with_rad, budget.differences[0].without_rad) == (full, together)
+
+
+@pytest.mark.parametrize("travel", ["optical", "mechanical"])
+@pytest.mark.parametrize("output", ["optical", "mechanical"])
+def test_the_usable_travel_is_counted_as_the_travel_is(file, output, travel):
+    """A beam turns by twice the tilt: what the drive moves is doubled or halved where the two are counted apart."""
+    m = file.mission
+    f = m.fine_pointing.model_copy(
+        update={"geometry": m.fine_pointing.geometry.model_copy(update={"travel_angle": travel})}
+    )
+    wide = m.model_copy(update={"fine_pointing": f, "mirror": m.mirror.model_copy(update={"travel_rad": 1.0})})
+    chain = replace(scenario.optics(m), angle=output)
+    found = scenario.stroke(replace(file, mission=wide), chain, True)
+    model = mirror.hysteresis_model(m.mirror, m.mirror.rate_limit_v_s, m.mirror.bias_v)
+    swing = min(m.mirror.drive_max_v - m.mirror.bias_v, m.mirror.bias_v - m.mirror.drive_min_v)
+    moved = 2.0 * abs(hysteresis.slow_gain(model)) * swing
+    times = {("optical", "mechanical"): 0.5, ("mechanical", "optical"): 2.0}.get((output, travel), 1.0)
+    assert [each.usable_travel_rad for each in found] == pytest.approx([times * moved] * 2, rel=1e-12)
 
 
 def test_a_loop_without_limits_has_none(scene):

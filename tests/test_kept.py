@@ -172,9 +172,10 @@ def test_a_file_in_the_place_of_the_folder_is_told_once(place):
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no such permissions")
-def test_a_folder_into_which_others_may_write_is_not_used(place):
+@pytest.mark.parametrize("mode", [0o777, 0o770, 0o707])
+def test_a_folder_into_which_others_may_write_is_not_used(place, mode):
     place.mkdir(parents=True)
-    place.chmod(0o777)
+    place.chmod(mode)
     parts = Kept(place)
     assert "others may write" in parts.trouble
     parts.part(samples, ONE, 3)
