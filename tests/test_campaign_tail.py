@@ -5,13 +5,15 @@ import os
 from dataclasses import asdict, replace
 from functools import partial
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from scipy.signal import lfilter
 from scipy.special import i0e
 
-from microrad.campaign import loops, run, tails, tilt
+from microrad import link
+from microrad.campaign import evaluate, loops, run, tails, tilt
 from microrad.campaign.file import CampaignFile, load_campaign
 from microrad.campaign.inputs import Builder
 from microrad.campaign.ledger import Ledger
@@ -22,6 +24,7 @@ from microrad.campaign.tails import tail_of_time, tail_weighted
 from microrad.campaign.work import Evaluator
 from microrad.fine_loop import linear
 from microrad.fine_loop.ensemble import LANES, bin_edges_rad, histogram_quantile
+from microrad.missionfile import load_mission
 from microrad.report import campaign_words
 from microrad.report.quantities import quantity
 from microrad.threads import in_threads
@@ -344,3 +347,15 @@ def test_the_variance_of_a_weighted_share_is_that_of_its_mean() -> None:
     weight, draws = np.array([0.5, 2.0, 1.0]), 5
     counted = np.array([*weight, 0.0, 0.0])
     assert tails._variance(weight, draws) == pytest.approx(np.var(counted, ddof=1) / draws, rel=1e-12)
+
+
+def test_an_uncorrected_point_ahead_takes_its_part_of_what_the_link_bears(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Short is what errs beyond the error that the margin bears, less the point-ahead that stands beside it."""
+    m, ahead = load_mission(SHIPPED).mission, 3e-6
+    monkeypatch.setattr(evaluate.link, "point_ahead_rad", lambda m: ahead)
+    runs = SimpleNamespace(quantile_rad=lambda share: 4e-6, beyond=lambda radius_rad: radius_rad)
+    found = evaluate._simulated(m, runs)  # type: ignore[arg-type]
+    fall, on_axis = link.communication_beam(m).fall, evaluate._on_axis_db(m)
+    assert found.outage_loss_db == pytest.approx(float(fall.loss_db(7e-6)), rel=1e-12)
+    assert found.outage == pytest.approx(fall.error_rad(on_axis) - ahead, rel=1e-12)
+    assert found.short == pytest.approx(fall.error_rad(on_axis - m.requirement.margin_db) - ahead, rel=1e-12)

@@ -12,6 +12,7 @@ from scipy.special import erfc
 
 from microrad import link
 from microrad.budget import total_db
+from microrad.link_table import Channel
 from microrad.missionfile import load_mission
 
 FILE = load_mission(Path(__file__).parent.parent / "missions" / "leo-geo.toml")
@@ -143,6 +144,14 @@ def test_the_radiant_intensity_is_what_the_path_thins_out(budget_of):
     there = budget.radiant_intensity_w_sr / beam.distance_m**2
     assert budget.irradiance_w_m2 == pytest.approx(there * 10 ** (value_of(budget, "Pointing loss") / 10), rel=1e-9)
     assert value_of(budget, "Strehl loss") < 0.0  # counted in both
+
+
+@pytest.mark.parametrize("budget_of", BUDGETS)
+def test_the_radiant_intensity_is_that_before_the_air(budget_of):
+    sky = Channel.model_validate({"zenith_transmission": 0.5, "elevation": "30 deg"})
+    clear, hazy = (budget_of(MISSION.model_copy(update={"channel": c}), SOURCES) for c in (None, sky))
+    assert hazy.irradiance_w_m2 < 0.6 * clear.irradiance_w_m2
+    assert hazy.radiant_intensity_w_sr == pytest.approx(clear.radiant_intensity_w_sr, rel=1e-12)
 
 
 # ---- the shape of a budget

@@ -1,7 +1,7 @@
 """What follows from the tables of the links: against hand arithmetic, other libraries' distributions and simulation."""
 
 import math
-from dataclasses import fields
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
@@ -11,6 +11,7 @@ from scipy.stats import ncx2, norm
 from link_files import PATTERN, RECEIVERS, link_file, received_with
 from microrad import acquisition, link, link_acquisition, link_study, sensor
 from microrad.missionfile import LinkFile
+from microrad.radial_error import Jitter
 from microrad.report import budget_views, links
 from microrad.report.quantities import quantity
 from shipped import edited_file
@@ -589,3 +590,13 @@ def test_the_trade_counts_all_losses_but_those_off_axis(tmp_path, monkeypatch, c
     monkeypatch.setattr(link_acquisition, "TRADE_RAD", sigma)
     found = link_study.run(link_file(tmp_path, FEW, changes)).finding
     assert_allclose(found.trade.wide_time_s, wide_time_s(sigma, receive), rtol=1e-9)
+
+
+def test_the_uncertainty_of_a_search_is_that_of_the_worse_axis(tmp_path):
+    """With its bias, and whichever axis that is."""
+    study = link_study.run(link_file(tmp_path, {"acquisition.runs": 2000}))
+    for bias, rms in (((30e-6, 0.0), (40e-6, 20e-6)), ((0.0, 30e-6), (20e-6, 40e-6))):
+        off = replace(study.open_loop, error=Jitter(bias, rms))
+        m = study.file.mission
+        found = link_acquisition.finding(m, off, study.beacon, study.answer, study.tracking)
+        assert found.sigma_rad == pytest.approx(50e-6, rel=1e-12)
