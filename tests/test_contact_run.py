@@ -193,6 +193,18 @@ def test_the_margin_follows_the_range_and_the_error(whole, file):
             assert w.margin_db[k] == pytest.approx(budget.margin_db, abs=1e-6)
 
 
+def test_the_margin_of_a_window_that_is_cut_short_follows_the_range_of_its_own_time(sampler, file):
+    of = Contact(-HALF_S, HALF_S, LIMB, LIMB, -HALF_S - 1000.0, coplanar)
+    found = sampler(of, settings(windows=1, window_s=1.0)).window(0, -HALF_S / 2, 0.4)
+    assert found.seconds == pytest.approx(0.4)
+    for k in (0, 999, 1999):
+        distance_m = float(coplanar(found.time_s[k : k + 1]).range_m[0])
+        beam = file.mission.communication.model_copy(update={"distance_m": distance_m})
+        there = file.mission.model_copy(update={"communication": beam})
+        budget = link.communication_budget(there, file.sources, pointing_error_rad=float(found.radial_rad[k]))
+        assert found.margin_db[k] == pytest.approx(budget.margin_db, abs=1e-6)
+
+
 def test_the_residual_of_a_window_is_the_ensembles_with_the_same_references(file, scene, design, sampler):
     """To the last bit that of the run of its number, and about the rms of 64 runs."""
     how = settings(window_s=1.5, settle_s=0.5, seed=7)
