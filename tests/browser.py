@@ -17,6 +17,7 @@ import pytest
 
 import waiting
 from shipped import SHIPPED, without_fine_pointing
+from small_campaign import halting
 from waiting import HANG_MS, HANG_S
 
 MISSION = "leo-geo.toml"
@@ -33,7 +34,7 @@ _AXE = {"preload": False, "resultTypes": ["violations"]}  # requests of its own 
 class Studio:
     """`microrad studio` in a folder of its own with the paper's mission, but for its fine-pointing loop.
 
-    `url` has the token, `base` has not.
+    `url` has the token, `base` has not. A campaign halts behind its first chunk while the folder has a file `halt`.
     """
 
     def __init__(self, folder):
@@ -43,6 +44,7 @@ class Studio:
         self.process = subprocess.Popen(
             [sys.executable, "-m", "microrad", "studio", MISSION, "--no-browser"],
             cwd=folder,
+            env={**os.environ, **halting(folder / "halt")},
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,

@@ -6,11 +6,14 @@ import signal
 import subprocess
 import sys
 import threading
+import time
 from contextlib import contextmanager
 from pathlib import Path
 
+import psutil
+
 from shipped import SHIPPED
-from waiting import HANG_S, any_moment, beside
+from waiting import HANG_S, any_moment, beside, until
 
 LOOP = """
 mission = "mission.toml"
@@ -50,9 +53,21 @@ def campaign_file(
     return path
 
 
-def import_path():
-    """The folder of the tests, before what a program that is started here imports from anyway."""
-    return os.pathsep.join([str(Path(__file__).parent), *filter(None, [os.environ.get("PYTHONPATH")])])
+def import_path(folder="."):
+    """A folder in that of the tests, before what a program that is started here imports from anyway."""
+    return os.pathsep.join([str(Path(__file__).parent / folder), *filter(None, [os.environ.get("PYTHONPATH")])])
+
+
+def halting(flag):
+    """The environment in which a campaign's command halts behind its first chunk while the file ``flag`` is there."""
+    return {"PYTHONPATH": import_path("held"), "MICRORAD_TEST_HALT": str(flag)}
+
+
+def halted(process, pause=time.sleep):
+    """Wait until a command has halted; it has no end before it is continued or killed."""
+    stopped = psutil.STATUS_STOPPED, psutil.STATUS_ZOMBIE
+    until(lambda: psutil.Process(process).status() in stopped, "the campaign's halt", pause=pause)
+    assert psutil.Process(process).status() == psutil.STATUS_STOPPED
 
 
 def hears_ctrl_c():

@@ -9,7 +9,6 @@ import subprocess
 from pathlib import Path
 
 import numpy as np
-import psutil
 import pytest
 
 import microrad
@@ -22,7 +21,7 @@ from microrad.campaign.ledger import Ledger
 from microrad.campaign.ledger_file import is_written
 from microrad.campaign.records import CampaignError, Job, Outcome
 from microrad.campaign.summary import summarise
-from small_campaign import campaign_file, children, finished, kill, started
+from small_campaign import campaign_file, children, finished, halted, halting, kill, started
 from waiting import HANG_S, any_moment, gone, until
 
 KILLS = 20 if os.environ.get("MICRORAD_ENDURANCE") else 3
@@ -73,20 +72,13 @@ def chunks_in(book):
         return opened.done()
 
 
-def wait_for_a_chunk(process, book):
-    """Until the first chunk is in."""
-
-    def there():
-        assert process.poll() is None, process.communicate()
-        return chunks_in(book)
-
-    until(there, f"a chunk in {book}")
-
-
-def halt(process):
-    """Stop a campaign where it stands, until it is continued or killed."""
-    process.send_signal(signal.SIGSTOP)
-    until(lambda: psutil.Process(process.pid).status() == psutil.STATUS_STOPPED, "the campaign's halt")
+def held(path, book):
+    """A campaign's command that has halted behind its first chunk."""
+    flag = book.with_suffix(".halt")
+    flag.touch()
+    process = started("run", path, "--ledger", book, cwd=book.parent, **halting(flag))
+    halted(process.pid)
+    return process
 
 
 # --------------------------------------------------------------------------------------------------------------- kills
@@ -126,10 +118,8 @@ def test_ctrl_c_stops_at_once_and_says_how_to_go_on(long, tmp_path):
     """At once: of the chunks that workers finish from then on, no more is taken in than the one that was at hand."""
     path, campaign, undisturbed = long
     book = tmp_path / "c.ledger"
-    process = started("run", path, "--ledger", book, cwd=tmp_path)
-    wait_for_a_chunk(process, book)
+    process = held(path, book)
     workers = children(process.pid)
-    halt(process)
     before = len(chunks_in(book))
     process.send_signal(signal.SIGINT)
     process.send_signal(signal.SIGCONT)
@@ -146,10 +136,8 @@ def test_ctrl_c_stops_at_once_and_says_how_to_go_on(long, tmp_path):
 def test_a_second_process_on_a_ledger_is_refused_and_a_reader_is_not(long, tmp_path):
     path, _, _ = long
     book = tmp_path / "s.ledger"
-    process = started("run", path, "--ledger", book, cwd=tmp_path)
+    process = held(path, book)
     try:
-        wait_for_a_chunk(process, book)
-        halt(process)
         code, out, err = finished("resume", book, cwd=tmp_path)
         assert (code, out) == (2, "") and str(process.pid) in err and "Traceback" not in err
         code, out, _ = finished("status", book, cwd=tmp_path)

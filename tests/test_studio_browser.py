@@ -18,7 +18,7 @@ from microrad.campaign.summary import summarise
 from microrad.report import campaign_words
 from microrad.studio import server
 from microrad.studio.draft import Draft
-from small_campaign import campaign_file, children
+from small_campaign import campaign_file, children, halted
 
 api = pytest.importorskip("playwright.sync_api", reason="Playwright is not installed")
 
@@ -278,12 +278,12 @@ def test_a_study_ends_with_its_verdict_and_a_report_in_the_page(studio, tab, pic
     assert json.loads(Path(download.value.path()).read_text("utf-8"))["summary"] == summary
 
 
-def held_up(studio, tab, number, ledger):
-    """The group of a job's command, stopped as soon as its ledger has rows: it has no end while a test looks on."""
-    folder = studio.folder / ".microrad-studio" / "jobs" / str(number)
-    until(tab, lambda: ledger.is_file() and rows_in(ledger) > 0, "rows")
-    (command,) = children(json.loads((folder / "started.json").read_text("utf-8"))["pid"])
-    os.killpg(command, signal.SIGSTOP)
+def held_up(studio, tab, number):
+    """A job's command, which has halted behind its first chunk."""
+    started = studio.folder / ".microrad-studio" / "jobs" / str(number) / "started.json"
+    until(tab, started.is_file, "the job's start")
+    (command,) = until(tab, lambda: children(json.loads(started.read_text("utf-8"))["pid"]), "the job's command")
+    halted(command, pause=lambda seconds: tab.wait_for_timeout(1000.0 * seconds))
     return command
 
 
@@ -294,14 +294,15 @@ def rows_in(ledger):
 def test_a_campaign_shows_its_figures_while_it_runs_goes_on_after_a_cancel_and_has_its_report(
     studio, tab, opened, picture
 ):
-    rows, ledger = 1024, studio.folder / "campaign.ledger"
-    campaign_file(studio.folder, runs=rows, duration="1 s")
+    rows, ledger = 512, studio.folder / "campaign.ledger"
+    campaign_file(studio.folder, runs=rows, duration="4 s")  # in four chunks
+    (studio.folder / "halt").touch()
     tab.get_by_role("link", name="Runs").click()
     api.expect(tab.get_by_label("Ledger")).to_have_value("campaign.ledger")
     tab.get_by_role("button", name="Run the campaign").click()
     first = tab.get_by_role("article").filter(has_text="campaign run campaign.toml")
     number = int(first.get_by_role("heading").first.inner_text().partition(".")[0])
-    command = held_up(studio, tab, number, ledger)
+    command = held_up(studio, tab, number)
     first.get_by_text(re.compile(rf"\d+ %, \d+ of {rows} rows")).wait_for()
     second = opened("runs")
     there = job(second, number)
