@@ -6,6 +6,9 @@ DEMO := demo
 # Three processes for two cores: some tests wait for a browser, a worker or a child.
 SIDE_BY_SIDE := --numprocesses 3 --dist loadfile --no-loadscope-reorder
 
+# Without the bytecode of its modules each command of a test begins half a second later.
+unexport PYTHONDONTWRITEBYTECODE
+
 .PHONY: demo test unit lint types compiled contract numbers endurance benchmark clean
 .DELETE_ON_ERROR:
 

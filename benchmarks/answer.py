@@ -80,7 +80,8 @@ def real_loop() -> list[str]:
 
 def command(place: Path, *words: str) -> None:
     """A command of microrad in a folder, with its kept parts there."""
-    run([sys.executable, "-m", "microrad", *words], place, {**os.environ, "XDG_CACHE_HOME": str(place / "cache")})
+    as_usual = {key: value for key, value in os.environ.items() if key != "PYTHONDONTWRITEBYTECODE"}
+    run([sys.executable, "-m", "microrad", *words], place, {**as_usual, "XDG_CACHE_HOME": str(place / "cache")})
 
 
 def run(words: list[str], place: Path, environment: Mapping[str, str]) -> None:
