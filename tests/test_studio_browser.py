@@ -234,6 +234,21 @@ def test_what_is_done_can_be_copied_as_a_command_and_as_python(studio, tab):
     assert "margin" in ran.stdout
 
 
+def test_copied_is_said_once_the_browser_has_copied_and_a_refusal_as_one(tab):
+    held = "navigator.clipboard.writeText = () => new Promise((done, failed) => { window.told = { done, failed }; })"
+    tab.evaluate(f"() => {{ {held}; }}")
+    tab.get_by_role("button", name="Copy as command").click()
+    tab.wait_for_function("window.told")
+    assert not tab.get_by_text("Copied: ").count()
+    tab.evaluate("told.done()")
+    tab.get_by_text("Copied: microrad budget leo-geo.toml").wait_for()
+    tab.evaluate("told = undefined")
+    tab.get_by_role("button", name="Copy as command").click()
+    tab.wait_for_function("window.told")
+    tab.evaluate("told.failed(new Error('the user said no'))")
+    tab.get_by_text("Not copied, the user said no: microrad budget leo-geo.toml").wait_for()
+
+
 # --------------------------------------------------------------------------------------------------------------- runs
 def job(page, number):
     return page.get_by_role("article").filter(has=page.get_by_role("heading", name=re.compile(rf"^{number}\.")))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from importlib import resources
@@ -16,6 +17,15 @@ from microrad.studio.workshop import Workshop
 
 POLL_S = 0.5
 """Between two looks at what another tab or a job has changed."""
+
+COPY_S = 60.0
+"""In which a browser copies a text, or is asked by its user whether it may."""
+
+_COPY = """
+return navigator.clipboard
+    ? navigator.clipboard.writeText(TEXT).then(() => "", (error) => error.message)
+    : "the browser lets pages copy over https or from this machine only"
+"""
 
 _ON_DISK: dict[OnDisk, str] = {"": "", "changed": "changed on disk; open it again", "gone": "gone from disk"}
 
@@ -125,9 +135,13 @@ def copy_buttons(action: Callable[[], Action | None]) -> None:
         ui.button("Copy as Python", on_click=lambda: _copy(action(), python=True)).props("dense no-caps flat")
 
 
-def _copy(action: Action | None, python: bool) -> None:
+async def _copy(action: Action | None, python: bool) -> None:
+    """Say "Copied" once the browser has done it: a page that is not from this machine may not, nor an idle tab."""
     if action is None:
         return
     text = action.python if python else command(action)
-    ui.clipboard.write(text)
-    ui.notify(f"Copied: {text.splitlines()[0]}{' ...' if python else ''}", type="positive")
+    refused = await ui.run_javascript(_COPY.replace("TEXT", json.dumps(text)), timeout=COPY_S)
+    if refused:
+        ui.notify(f"Not copied, {refused}: {text}", type="negative", multi_line=True)
+    else:
+        ui.notify(f"Copied: {text.splitlines()[0]}{' ...' if python else ''}", type="positive")
