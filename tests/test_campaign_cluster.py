@@ -6,6 +6,7 @@ import random
 import subprocess
 import sys
 import threading
+from contextlib import suppress
 from pathlib import Path
 
 import psutil
@@ -15,6 +16,7 @@ from microrad.campaign import cluster
 from microrad.campaign.cluster import DaskEngine
 from microrad.campaign.records import CampaignError, Job
 from small_campaign import import_path, killing
+from small_campaign import kill as kill_process
 from waiting import HANG_S, alive, beside, gone, no_hang, until
 
 pytest.importorskip("distributed")
@@ -33,8 +35,13 @@ TABLE = {
 
 
 def workers_here(pid=None):
-    """Worker processes of clusters that a process (this one) has made."""
-    return [p for p in psutil.Process(pid).children(recursive=True) if "spawn_main" in " ".join(p.cmdline())]
+    """Worker processes of clusters that a process (this one) has made; each may end meanwhile."""
+    found = []
+    for process in psutil.Process(pid).children(recursive=True):
+        with suppress(psutil.Error):
+            if "spawn_main" in " ".join(process.cmdline()):
+                found.append(process)
+    return found
 
 
 def chunks(*numbers):
@@ -135,12 +142,12 @@ def test_workers_killed_at_random_lose_and_double_nothing(engine, stuck):
     def kill_all():
         until(lambda: stuck.exists() and begun(), "the job that does not end")
         for worker in workers_here():
-            worker.kill()
+            kill_process(worker.pid)  # one of them may just have been
 
     def kill():
         living = workers_here()
         if len(engine._threads) == 2 and living:  # a cluster whose workers die as they start never works
-            generator.choice(living).kill()
+            kill_process(generator.choice(living).pid)
 
     with killing(kill, 0.1) as heard:
         killer = beside(kill_all)
@@ -263,7 +270,7 @@ class Elsewhere:
     def close(self):
         for process in reversed(self.started):
             for child in psutil.Process(process.pid).children(recursive=True):
-                child.kill()
+                kill_process(child.pid)
             process.kill()
             process.wait()
 
