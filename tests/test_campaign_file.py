@@ -1,8 +1,10 @@
 """Campaign files: what they hold once read, every way in which one is refused, and the missions of their rows."""
 
+import json
 import math
 import pickle
 import re
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
@@ -10,11 +12,11 @@ import pytest
 
 from campaign_files import HEAD, IDENTIFIED, LOOP, NOISE, POWER, UNCERTAINTY, loaded, written
 from microrad import fine_pointing
-from microrad.campaign import keys, ledger_file, sampling
+from microrad.campaign import evaluate, keys, ledger_file, sampling
 from microrad.campaign.file import load_campaign
 from microrad.campaign.inputs import Builder
 from microrad.campaign.records import CampaignError
-from microrad.missionfile import MissionError, load_mission, named_files
+from microrad.missionfile import MissionError, load_mission, named_files, open_mission
 from shipped import SHIPPED
 
 QUAD_CELL = (
@@ -22,6 +24,8 @@ QUAD_CELL = (
     'quad_cell = { responsivity = "1 A/W", background_power = "0 pW", dark_current = "1 nA", '
     'thermal_noise = "0.05 pA/sqrt(Hz)", received_power = "100 pW", spot = "airy" } # rms per axis',
 )
+
+JITTER = '[jitter]\nbias = ["0 urad", "0 urad"]\nrms = ["3 urad", "3 urad"]\nbandwidth = "50 Hz"\n'
 
 
 def faults(folder, text, **how):
@@ -537,10 +541,8 @@ def test_draws_that_a_key_does_not_take_are_warned_of_with_their_share(tmp_path)
         "0.62 %" in loaded(tmp_path, beyond("0.2 W", instead=f'{drawn_as}mean = "5 W"\ndeviation = "2 W"')).warnings[0]
     )
     outage = distributed("requirement.outage", 'distribution = "normal"\nmean = 0.5\ndeviation = 0.5')
-    assert (
-        "31.7 % of the draws of requirement.outage are not above 0 or not below 1:"
-        in (loaded(tmp_path, HEAD + outage).warnings[0])
-    )
+    shaken = loaded(tmp_path, HEAD + outage, changes=(("[requirement]", JITTER + "[requirement]"),))
+    assert "31.7 % of the draws of requirement.outage are not above 0 or not below 1:" in shaken.warnings[0]
 
 
 def test_the_share_that_is_warned_of_is_that_of_rows_that_fail(tmp_path):
@@ -694,8 +696,73 @@ def test_words_of_a_table_are_drawn_by_their_place(tmp_path):
 
 
 def test_whole_numbers_of_a_table_stay_whole(tmp_path):
-    c = loaded(tmp_path, HEAD + distributed("constellation.terminals", TABLE + "values = [1, 2]"))
-    assert Builder(c).mission(0, {"constellation.terminals": 2.0}).mission.constellation.terminals == 2
+    c = loaded(tmp_path, 'keep = ["volume"]\n' + HEAD + distributed("acquisition.attempts", TABLE + "values = [1, 2]"))
+    assert Builder(c).mission(0, {"acquisition.attempts": 2.0}).mission.acquisition.attempts == 2
+
+
+@pytest.mark.parametrize(
+    ("key", "head", "jitter"),
+    [
+        ("constellation.satellites", "", False),
+        ("requirement.outage", "", False),
+        ("communication.pointing_error", "", True),
+        ("acquisition.detection_frames", "", False),
+        ("beacon.transmit_power", 'keep = ["margin", "answer_margin"]\n', False),
+        ("requirement.margin", 'keep = ["outage"]\n', False),
+    ],
+)
+def test_a_drawn_key_that_nothing_reads_is_refused_by_name(tmp_path, key, head, jitter):
+    whole = TABLE + "values = [2, 3]"
+    body = {"detection_frames": whole, "satellites": whole, "outage": TABLE + "values = [0.01, 0.02]"}
+    quantities = {"pointing_error": '"1 urad", "2 urad"', "transmit_power": '"1 W", "2 W"', "margin": '"1 dB", "2 dB"'}
+    last = key.rpartition(".")[2]
+    changes = [("[requirement]", JITTER + "[requirement]")] if jitter else []
+    (found,) = faults(
+        tmp_path,
+        head + HEAD + distributed(key, body.get(last) or f"{TABLE}values = [{quantities.get(last)}]"),
+        changes=tuple(changes),
+    )
+    assert found.key == f"inputs.{key}"
+    assert found.reason.startswith("is read by nothing that is kept (")
+    assert ("jitter.bias or jitter.rms" in found.expected) is jitter
+
+
+@pytest.mark.parametrize("jitter", [False, True], ids=["static", "jitter"])
+def test_every_drawable_key_moves_an_output_or_is_refused(tmp_path, jitter):
+    """Each quantity of the mission is drawn about its value; those that are refused are those that move nothing."""
+    changes = [("[requirement]", JITTER + "[requirement]")] if jitter else []
+    data = open_mission(written(tmp_path, HEAD, changes=tuple(changes)).parent / "mission.toml").data
+    found, inputs = {}, ""
+    for text, value in keys.flat(data).items():
+        with suppress(keys.UnknownKeyError, ValueError):
+            key = keys.find(text, data)
+            if key.numeric is not None:
+                at = key.numeric.read(value)
+                found[text] = at, 0.999 * at  # inside of its bounds
+                values = [json.dumps(key.written(each)) for each in (0.998 * at, at, 0.999 * at)][: 3 if at else 1]
+                inputs += distributed(text, f"{TABLE}values = [{', '.join(values)}]")
+    assert len(found) > 140
+    with pytest.raises(MissionError) as caught:
+        loaded(tmp_path, HEAD + inputs + '[limits.margin]\nleast = "2 dB"\n', changes=tuple(changes))
+    refused = {fault.key.removeprefix("inputs.") for fault in caught.value.faults}
+    assert {fault.reason.partition(" (")[0] for fault in caught.value.faults} == {"is read by nothing that is kept"}
+    plain = loaded(tmp_path, HEAD + POWER, changes=tuple(changes))
+    builder, names = Builder(plain), plain.keep
+    own, moved = evaluate.outputs(builder.mission(0, {}), None, names), {}
+    for text, (at, near) in found.items():
+        if at:
+            with suppress(CampaignError):  # a period that divides no other
+                other = evaluate.outputs(builder.mission(0, {text: near}), None, names)
+                moved[text] = other != pytest.approx(own, rel=1e-12)
+    assert len(moved) > 110
+    cancelled = {"beacon.wavelength", "answer.wavelength"}  # in a beam of given divergence
+    assert {text for text in moved if not moved[text]} == (refused & moved.keys()) | cancelled
+
+
+def test_a_drawn_key_is_read_where_one_cell_reads_it(tmp_path):
+    body = f'{TABLE}values = ["1 urad", "2 urad"]'
+    grid = '[grid]\n"conventions.pointing_loss" = ["gaussian", "gain"]\n'
+    assert loaded(tmp_path, HEAD + distributed("communication.pointing_error", body) + grid).draws
 
 
 def test_a_row_that_is_no_mission_says_key_value_and_reason(tmp_path):

@@ -12,7 +12,7 @@ import pytest
 from scipy.signal import lfilter
 from scipy.special import i0e
 
-from microrad import link
+from microrad import link, link_performance
 from microrad.campaign import evaluate, loops, run, tails, tilt
 from microrad.campaign.file import CampaignFile, load_campaign
 from microrad.campaign.inputs import Builder
@@ -352,10 +352,10 @@ def test_the_variance_of_a_weighted_share_is_that_of_its_mean() -> None:
 def test_an_uncorrected_point_ahead_takes_its_part_of_what_the_link_bears(monkeypatch: pytest.MonkeyPatch) -> None:
     """Short is what errs beyond the error that the margin bears, less the point-ahead that stands beside it."""
     m, ahead = load_mission(SHIPPED).mission, 3e-6
-    monkeypatch.setattr(evaluate.link, "point_ahead_rad", lambda m: ahead)
+    monkeypatch.setattr(link_performance.link, "point_ahead_rad", lambda m: ahead)
     runs = SimpleNamespace(quantile_rad=lambda share: 4e-6, beyond=lambda radius_rad: radius_rad)
     found = evaluate._simulated(m, runs)  # type: ignore[arg-type]
-    fall, on_axis = link.communication_beam(m).fall, evaluate._on_axis_db(m)
+    fall, on_axis = link.communication_beam(m).fall, link.communication_budget(m, {}, 0.0).margin_db
     assert found.outage_loss_db == pytest.approx(float(fall.loss_db(7e-6)), rel=1e-12)
-    assert found.outage == pytest.approx(fall.error_rad(on_axis) - ahead, rel=1e-12)
-    assert found.short == pytest.approx(fall.error_rad(on_axis - m.requirement.margin_db) - ahead, rel=1e-12)
+    assert found.short_of(0.0) == pytest.approx(fall.error_rad(on_axis) - ahead, rel=1e-9)
+    assert found.short_of(3.0) == pytest.approx(fall.error_rad(on_axis - 3.0) - ahead, rel=1e-9)

@@ -478,12 +478,9 @@ def test_a_receiver_slower_than_one_bit_in_a_second_has_its_own_highest(read):
 def test_a_rate_of_largest_is_solved_for_at_the_required_margin_and_error(read, name):
     file = read(kind(name), {"communication.data_rate": "largest"})
     assert read(kind(name)).mission.communication.data_rate_bit_s == RATE
-    assert link.solved(read(kind(name)).mission) == {}
     with pytest.raises(ValueError, match='"largest" has to be solved for first'):
         budget_of(file)
-    rate = link.solved(file.mission)["communication.data_rate"]
     known = link_study.solve_rate(file)
-    assert known.mission.communication.data_rate_bit_s == rate
     assert budget_of(known, file.mission.requirement.pointing_error_rad).margin_db == pytest.approx(3.0, abs=1e-6)
     assert known.sources["communication.data_rate"].comment.startswith("solved for: the largest with 3 dB at 10 ")
     assert link_study.solve_rate(known) is known

@@ -101,9 +101,9 @@ def test_warnings_are_those_of_every_budget_and_none_where_all_is_given(tmp_path
 
 
 def test_the_tornado_holds_each_input_with_the_largest_swing_first(plain):
-    swings = [each.swing_db for each in plain.tornado]
+    swings = [each.swing_db for each in plain.tornados[0].swings]
     assert swings == sorted(swings, reverse=True)
-    by_key = {each.key: each for each in plain.tornado}
+    by_key = {each.key: each for each in plain.tornados[0].swings}
     assert by_key["communication.transmit_power"].swing_db == pytest.approx(10 * math.log10(1.1 / 0.9), rel=1e-9)
     assert by_key["communication.distance"].swing_db == pytest.approx(20 * math.log10(1.1 / 0.9), rel=1e-9)
     assert {key.partition(".")[0] for key in by_key} == {"communication", "terminals"}
@@ -128,7 +128,7 @@ def test_each_preset_with_its_gaps_filled_is_studied(tmp_path, name):
     assert all(math.isfinite(each.margin_db) for each in found.budgets)
     assert len(found.budgets) == 1 + (m.beacon is not None) + (m.answer is not None)
     assert found.largest_rate_bit_s > 0.0
-    assert len(found.tornado) > 10
+    assert len(found.tornados[0].swings) > 10
     assert (found.under_jitter is None) == (m.jitter is None)
     assert (found.finding is None) == (name != "paper")
 

@@ -154,13 +154,13 @@ def test_each_requirement_stands_with_its_margin_and_its_contributor(written, pa
     assert f"{paper.residual.trace.peak_rad * 1e6:.1f} µrad with hysteresis" in residual
     assert f"{straight.trace.peak_rad * 1e6:.1f} µrad without" in residual
     lost = next(line.value for line in paper.achieved.lines if line.name == "Pointing loss")
-    assert f"pointing loss {-lost:.2f} dB; the margin moves most with {paper.links.tornado[0].key}" in link
+    assert f"pointing loss {-lost:.2f} dB; the margin moves most with {paper.links.tornados[0].swings[0].key}" in link
     visible = " ".join(parsed((written / "report.html").read_text(encoding="utf-8")).text)
     assert all(row["contributor"] in visible for row in rows)
 
 
 def test_a_requirement_moved_most_by_a_share_says_by_what_factor(paper):
-    swing = replace(paper.links.tornado[0], key="requirement.outage", margin_low_db=0.0, margin_high_db=9.0)
+    swing = replace(paper.links.tornados[0].swings[0], key="requirement.outage", margin_low_db=0.0, margin_high_db=9.0)
     beyond = replace(swing, margin_high_db=math.nan)
     level = replace(swing, key="channel.loss", unit="dB")
     said = requirement_views.most_sensitive

@@ -13,7 +13,6 @@ import pytest
 from link_files import RECEIVERS, data_with, link_file, received_with, written
 from microrad import link_study
 from microrad.link import Swing
-from microrad.link_study import UNDER_JITTER
 from microrad.missionfile import load_link
 from microrad.performance import FINE, NO_HYSTERESIS, Cost, LinkPerformance
 from microrad.report import budget_views, link_figures, links
@@ -23,7 +22,8 @@ from report_pages import without_scripts
 FEW = {"acquisition.runs": 100}
 NO_SCAN = {**FEW, "acquisition.scan": None}
 JITTER = {"jitter": {"bias": ["1 urad", "0 urad"], "rms": ["3 urad", "3 urad"], "bandwidth": "50 Hz"}}
-TORNADOS = ("tornado", "tornado-under-jitter", "tornado-beacon", "tornado-answer")
+TORNADOS = ("tornado", "tornado-beacon", "tornado-answer")
+UNDER_JITTER = budget_views.UNDER_JITTER
 YEAR_S = 365.25 * 86400.0
 SVG = "{http://www.w3.org/2000/svg}"
 
@@ -225,8 +225,6 @@ def test_the_rows_of_the_jitter_stand_in_the_csv(tmp_path, name):
     rows = {r[1]: r for r in csv.reader(io.StringIO(budget_views.csv_text(found))) if r[0] == UNDER_JITTER}
     expected = {
         "Mean pointing loss": -p.mean_loss_db,
-        "Pointing loss at outage": -p.outage_loss_db,
-        "Margin at outage": p.margin_db,
         "Outage": p.outage,
         "Below required margin": p.short,
     } | ({"Penalty without a code": -p.uncoded_penalty_db} if known else {})
@@ -292,7 +290,7 @@ def test_no_sentence_is_said_twice_on_the_page(plain):
         *budget_views.acquisition(plain.finding),
     ]
     assert sorted([*context["sentences"], *elsewhere]) == sorted(everywhere)
-    assert len(context["sentences"]) == 9
+    assert len(context["sentences"]) == 8
 
 
 # --------------------------------------------------------------------------------------------------------- acquisition
@@ -340,18 +338,20 @@ def texts(figure):
 def test_the_figures_are_svg_with_their_numbers_beside_them(plain):
     drawn = link_figures.draw(plain)
     assert [figure.name for figure in drawn] == [*TORNADOS, "wide-beam-or-scan"]
-    tornado, trade = drawn[0], drawn[-1]
+    trade = drawn[-1]
     for figure in drawn:
         assert ET.fromstring(figure.svg).tag == f"{SVG}svg"
         assert figure.title
         assert len({np.size(column) for column in figure.columns.values()}) == 1
         assert all(np.isfinite(column).all() for column in figure.columns.values() if not isinstance(column, tuple))
-    assert tornado.columns["input"] == tuple(s.key for s in plain.tornado)
-    assert tornado.columns["SI unit"] == tuple(s.unit for s in plain.tornado)
-    assert list(tornado.columns["margin lower (dB)"]) == [s.margin_low_db for s in plain.tornado]
-    for figure, each in zip(drawn[1:4], plain.tornados, strict=True):
+    for figure, each in zip(drawn[:3], plain.tornados, strict=True):
+        assert figure.columns["input"] == tuple(s.key for s in each.swings)
+        assert figure.columns["SI unit"] == tuple(s.unit for s in each.swings)
+        assert list(figure.columns["margin lower (dB)"]) == [s.margin_low_db for s in each.swings]
         assert list(figure.columns["margin higher (dB)"]) == [s.margin_high_db for s in each.swings]
-        assert ("required" in texts(figure)) is (each.of == UNDER_JITTER)
+        assert ("required" in texts(figure)) is (each.of == "Communication")
+    axis = "margin of the communication link, all but 0.3 % of the time (dB)"
+    assert [axis in texts(figure) for figure in drawn[:3]] == [True, False, False]
     assert all(re.search(r"\((rad|s)\)|probability", name) for name in trade.columns)
     assert np.array_equal(trade.columns["scan, whole time (s)"], plain.finding.trade.scan_time_s)
 
@@ -393,7 +393,8 @@ def swing(plain, low_db, high_db, **others):
     ids=["one", "too fast", "never", "several", "hardly any"],
 )
 def test_a_tornado_is_drawn_whatever_its_swings(plain, ends):
-    found = replace(plain, tornado=tuple(swing(plain, *each) for each in ends))
+    own, *others = plain.tornados
+    found = replace(plain, tornados=(replace(own, swings=tuple(swing(plain, *each) for each in ends)), *others))
     figure = link_figures.draw(found)[0]
     ET.fromstring(figure.svg)
     assert not re.search(r"\b(nan|inf)\b", figure.svg)
@@ -403,14 +404,12 @@ def test_a_tornado_is_drawn_whatever_its_swings(plain, ends):
 
 
 def test_no_swing_is_no_tornado(plain):
-    assert [figure.name for figure in link_figures.draw(replace(plain, tornado=(), tornados=()))] == [
-        "wide-beam-or-scan"
-    ]
+    assert [figure.name for figure in link_figures.draw(replace(plain, tornados=()))] == ["wide-beam-or-scan"]
 
 
 def test_a_receiver_near_its_bandwidth_is_drawn_and_listed(tmp_path):
     found = studied(tmp_path, NO_SCAN, received_with("preamplified dpsk"), {"communication.data_rate": "3.1 Gbit/s"})
-    assert math.isinf(found.tornado[0].swing_db)
+    assert math.isinf(found.tornados[0].swings[0].swing_db)
     figure = link_figures.draw(found)[0]
     assert texts(figure).count("< no margin: receiver too slow") == 3  # rate, code rate and bandwidth
     assert math.isinf(figure.columns["margin higher (dB)"].min())
@@ -421,7 +420,8 @@ def test_a_tornado_shows_its_longest_bars_and_names_assumptions(plain):
         swing(plain, 3 + x, 3 - x, key=f"communication.k{n}", kind="assumption" * (n == 1))
         for n, x in enumerate(np.linspace(2, 1, 30))
     ]
-    figure = link_figures.draw(replace(plain, tornado=tuple(many)))[0]
+    own, *others = plain.tornados
+    figure = link_figures.draw(replace(plain, tornados=(replace(own, swings=tuple(many)), *others)))[0]
     labels = [text for text in texts(figure) if text and text.startswith("k")]
     assert len(labels) == link_figures.MOST_BARS
     assert labels[0] == "k0 = 300 Mbit/s"
@@ -465,7 +465,7 @@ def test_the_page_holds_every_line_and_no_hyphen_for_a_minus(plain):
         assert f">{quantity(line.value, line.unit)}</td>" in page
     plain_text = re.sub(r"<(svg|style).*?</\1>|<[^>]*>", " ", page, flags=re.DOTALL)
     assert not re.search(r"(?<![\w-])-\d+\.\d\d dB", plain_text)
-    assert page.count("<figure") == page.count("</figure>") == 5
+    assert page.count("<figure") == page.count("</figure>") == 4
     assert page.count("<table") == page.count("</table>")
 
 

@@ -226,7 +226,7 @@ def test_the_study_of_the_links_gives_tables_sentences_and_what_moves_the_margin
     study = link_study.run(draft.link())
     drawn = link_view.tornado_plot(study)
     low, high = drawn["data"]
-    first = study.tornado[0]
+    first = study.tornados[0].swings[0]
     assert low["y"][0].startswith(first.key)
     assert low["base"] + low["x"][0] == pytest.approx(first.margin_low_db)
     assert high["base"] + high["x"][0] == pytest.approx(first.margin_high_db)

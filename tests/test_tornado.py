@@ -1,7 +1,8 @@
 """Each input of a link a little down and up: every swing by hand, within its bounds, the largest first."""
 
 import math
-import sys
+import random
+from dataclasses import replace
 
 import pytest
 
@@ -20,9 +21,13 @@ NO_BEAMS = dict.fromkeys(("beacon", "answer", "acquisition"))
 WAVEFRONT = {"communication.strehl": None, "communication.wavefront_error": "100 nm"}
 
 
+def of_communication(file):
+    """The tornado of the communication budget."""
+    return link_study.tornados(file, link_study.communication_budget(file.mission, file.sources), None, None)[0]
+
+
 def swings(folder, *changes):
-    file = link_file(folder, *changes)
-    return {each.key: each for each in link.tornado(file.mission, file.sources)}
+    return {each.key: each for each in of_communication(link_file(folder, *changes)).swings}
 
 
 def changed(mission, key, value):
@@ -91,8 +96,8 @@ CASES = {
 @pytest.mark.parametrize("name", CASES)
 def test_every_swing_is_the_budget_with_one_key_changed(tmp_path, name):
     file = link_file(tmp_path, *CASES[name])
-    found = link.tornado(file.mission, file.sources)
-    sizes = [each.swing_db for each in found]
+    found = of_communication(file).swings
+    sizes = [round(each.swing_db, 6) for each in found]
     assert sizes == sorted(sizes, reverse=True)
     assert len({each.key for each in found}) == len(found)
     for each in found:
@@ -117,9 +122,24 @@ def test_the_keys_that_matter_are_those_that_the_link_has(tmp_path):
     assert {"terminals.leo_obscuration", "terminals.geo_obscuration"} <= pattern.keys()
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_equal_swings_stand_as_the_mission_has_their_keys(tmp_path, seed):
+    file, draw = link_file(tmp_path, NO_BEAMS), random.Random(seed)
+
+    def as_a_processor_leaves_it(m):
+        return link_performance.margin_db(m) + draw.uniform(-1e-12, 1e-12)
+
+    found = link.swings(file.mission, file.sources, ("terminals", "communication"), as_a_processor_leaves_it)
+    aperture, distance = (
+        next(s for s in found if s.key == k) for k in ("terminals.geo_aperture", "communication.distance")
+    )
+    assert aperture.swing_db == pytest.approx(distance.swing_db, abs=1e-9)
+    assert found.index(distance) == found.index(aperture) + 1
+
+
 def test_what_does_not_move_the_margin_is_left_out(tmp_path):
-    # an obscuration, which no formula of an even light holds, and a jitter, which the budget of a static error has not
-    found = swings(tmp_path, {"terminals.leo_obscuration": 0.2}, JITTER)
+    # an obscuration, which no formula of an even light holds, and the outage, which a static error has not
+    found = swings(tmp_path, {"terminals.leo_obscuration": 0.2})
     others = ("beacon.", "answer.", "requirement.", "pointing.", "point_ahead.", "jitter.")
     assert not any(key.startswith(others) for key in found)
     assert "terminals.leo_obscuration" not in found
@@ -167,8 +187,8 @@ def test_no_beam_is_moved_below_diffraction(tmp_path, name, diameter):
 def test_the_margin_under_jitter_over_its_inputs(tmp_path, changes):
     file = link_file(tmp_path, JITTER, NO_BEAMS, *changes)
     m = file.mission
-    (under,) = link_study.tornados(file, None, None)
-    assert under.of == link_study.UNDER_JITTER
+    under = of_communication(file)
+    assert under.of == "Communication"
     assert under.margin_db == pytest.approx(link_performance.of_jitter(m).margin_db, abs=1e-9)
     found = {each.key: each for each in under.swings}
     assert {"jitter.bias x", "jitter.rms x", "jitter.rms y", "requirement.outage"} <= found.keys()
@@ -202,21 +222,20 @@ def test_the_margin_under_a_jitter_of_equal_axes_is_at_a_quantile_of_rayleigh(tm
     m = link_file(tmp_path, equal).mission
     loss = 8.685889638 * (3e-6 / HALF) ** 2 * 2 * math.log(1 / 0.003)
     on_axis = link.communication_budget(m, {}, pointing_error_rad=0.0).margin_db
-    assert link_performance.margin_under_jitter_db(m) == pytest.approx(on_axis - loss, abs=1e-8)
-    with pytest.raises(ValueError, match=r"no table \[jitter\]"):
-        link_performance.margin_under_jitter_db(link_file(tmp_path).mission)
+    assert link_performance.margin_db(m) == pytest.approx(on_axis - loss, abs=1e-8)
+    plain = link_file(tmp_path).mission
+    assert link_performance.margin_db(plain) == pytest.approx(link.communication_budget(plain, {}).margin_db, abs=1e-9)
 
 
 def test_a_study_holds_a_tornado_for_each_margin_that_there_is(tmp_path):
     file = link_file(tmp_path, {"acquisition": None}, JITTER)
     m, budgets = file.mission, (link.beacon_budget, link.answer_budget)
-    both = [budget(m, file.sources) for budget in budgets]
-    found = link_study.tornados(file, *both)
-    assert [each.of for each in found] == [link_study.UNDER_JITTER, "Beacon", "Answer"]
-    assert [each.margin_db for each in found[1:]] == [each.margin_db for each in both]
+    all_three = [link_study.communication_budget(m, file.sources), *(each(m, file.sources) for each in budgets)]
+    found = link_study.tornados(file, *all_three)
+    assert [each.of for each in found] == ["Communication", "Beacon", "Answer"]
+    assert [each.margin_db for each in found] == [each.margin_db for each in all_three]
     assert found[1].swings == link.beam_tornado(m, file.sources, "beacon")
     assert found[2].swings == link.beam_tornado(m, file.sources, "answer")
-    assert link_study.tornados(link_file(tmp_path), None, None) == ()
 
 
 @pytest.mark.parametrize("name", RECEIVERS)
@@ -306,14 +325,13 @@ def test_a_receiver_too_slow_for_the_rate_has_no_margin(tmp_path):
     }
 
 
-def test_only_a_receiver_too_slow_is_left_without_a_margin(tmp_path, monkeypatch):
-    def refused(mission, sources):
+def test_only_a_receiver_too_slow_is_left_without_a_margin(tmp_path):
+    def refused(mission):
         raise ValueError("a value without meaning")
 
     file = link_file(tmp_path)
-    monkeypatch.setattr(sys.modules["microrad.link.tornado"], "communication_budget", refused)
     with pytest.raises(ValueError, match="a value without meaning"):
-        link.tornado(file.mission, file.sources)
+        link.swings(file.mission, file.sources, link.LINK_TABLES, refused)
 
 
 def test_a_beam_moves_no_further_than_the_obscuration_lets_some_of_it_pass(tmp_path):
@@ -330,7 +348,7 @@ def test_a_beam_moves_no_further_than_the_obscuration_lets_some_of_it_pass(tmp_p
 # ---- what is said about an input
 def test_units_and_kinds_of_source_travel_along():
     file = load_link(SHIPPED)
-    found = {each.key: each for each in link.tornado(file.mission, file.sources)}
+    found = {each.key: each for each in of_communication(file).swings}
     assert found["communication.transmit_power"].kind == "paper"
     assert found["communication.receiver_sensitivity"].kind == "assumption"
     assert found["communication.distance"].unit == "m"
@@ -338,7 +356,7 @@ def test_units_and_kinds_of_source_travel_along():
     assert found["communication.strehl"].unit == "dB"  # read as a loss
     assert found["communication.transmit_optics_loss"].unit == "dB"
     assert found["communication.transmit_power"].source == "paper: Table 2"
-    without = link.tornado(file.mission, {})
+    without = of_communication(replace(file, sources={})).swings
     assert {each.kind for each in without} == {""}
     assert {each.source for each in without} == {"not stated"}
 

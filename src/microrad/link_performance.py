@@ -1,6 +1,7 @@
 """A communication link under a distribution of pointing errors: margin, outage, fades, best divergence."""
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,6 +18,56 @@ _RAREST = 1e-16
 
 
 @dataclass(frozen=True, slots=True)
+class Exposure:
+    """The communication link under radial pointing errors.
+
+    ``on_axis_db`` is its margin without any. ``ahead_rad`` is an uncorrected point-ahead, which is added to the length
+    of every error. ``quantile_rad`` is the error that is exceeded for the mission's outage, and ``beyond`` gives the
+    share of the time with a larger error than one in rad.
+    """
+
+    fall: link.OffAxis
+    on_axis_db: float
+    ahead_rad: float
+    quantile_rad: float
+    beyond: Callable[[float], float]
+
+    @classmethod
+    def of(cls, m: LinkMission, quantile_rad: float, beyond: Callable[[float], float]) -> "Exposure":
+        """The mission's link under errors of which these two are known.
+
+        Raises `ValueError` for a data rate that the receiver does not take.
+        """
+        on_axis_db = link.received_on_axis_dbm(m) - float(link.required_dbm(m, m.communication.data_rate_bit_s))
+        return cls(link.communication_beam(m).fall, on_axis_db, link.point_ahead_rad(m), quantile_rad, beyond)
+
+    @classmethod
+    def stated(cls, m: LinkMission) -> "Exposure":
+        """That of a mission whose loop is not simulated: under its jitter, or at its static error all the time."""
+        error = error_rad(m)
+        if m.jitter is None:
+            return cls.of(m, error, lambda reach_rad: float(error > reach_rad))
+        jitter = _given(m.jitter)
+        return cls.of(m, error, lambda reach_rad: float(pointing.radial_survival(jitter, reach_rad)))
+
+    @property
+    def outage_loss_db(self) -> float:
+        """Pointing loss that is not exceeded but for the outage."""
+        return float(self.fall.loss_db(self.quantile_rad + self.ahead_rad))
+
+    @property
+    def margin_db(self) -> float:
+        """Margin that is kept but for the outage."""
+        return self.on_axis_db - self.outage_loss_db
+
+    def short_of(self, margin_db: float) -> float:
+        """Share of the time with less than a margin."""
+        spare = self.on_axis_db - margin_db
+        reach = self.fall.error_rad(spare) - self.ahead_rad
+        return 1.0 if spare < 0.0 or reach < 0.0 else self.beyond(reach)
+
+
+@dataclass(frozen=True, slots=True)
 class Spread:
     """Radial pointing errors with the share of the time that each stands for; together 1."""
 
@@ -30,10 +81,14 @@ class Spread:
         place = min(int(np.searchsorted(total, probability * total[-1])), total.size - 1)
         return float(self.radius_rad[order][place])
 
+    def beyond(self, error_rad: float) -> float:
+        """Share of the time with a larger error."""
+        return float(np.sum(self.share[self.radius_rad > error_rad]))
+
 
 @dataclass(frozen=True, slots=True)
 class Known(Spread):
-    """The errors of a known distribution, in radial steps that are small against it; quantiles are exact."""
+    """The errors of a known distribution, in radial steps that are small against it; quantiles and shares are exact."""
 
     jitter: pointing.Jitter
 
@@ -45,11 +100,15 @@ class Known(Spread):
             return cls(np.array([reach]), np.ones(1), jitter)
         edges = np.linspace(0.0, reach, _STEPS + 1)
         share = np.maximum(-np.diff(pointing.radial_survival(jitter, edges)), 0.0)
-        return cls(edges[1:], share / np.sum(share), jitter)  # the upper edge: no error is made smaller
+        return cls((edges[1:] + edges[:-1]) / 2.0, share / np.sum(share), jitter)
 
     def quantile_rad(self, probability: float) -> float:
         """Error that a share of the time stays below."""
         return _exact_quantile_rad(self.jitter, 1.0 - probability)
+
+    def beyond(self, error_rad: float) -> float:
+        """Share of the time with a larger error."""
+        return float(pointing.radial_survival(self.jitter, error_rad))
 
 
 def _exact_quantile_rad(jitter: pointing.Jitter, exceeded: float) -> float:
@@ -106,24 +165,36 @@ def of_jitter(m: LinkMission) -> Performance | None:
     return performance(m, "jitter as given", "", "", Known.of(jitter), jitter, motion)
 
 
-def margin_under_jitter_db(m: LinkMission) -> float:
-    """Margin of the communication link but for the mission's outage under its own jitter, as `of_jitter` has it.
+def error_rad(m: LinkMission) -> float:
+    """Radial pointing error (rad) at which the communication link is judged where no loop is simulated.
 
-    Raises `ValueError` for a mission without a table `[jitter]`, and for a data rate that the receiver does not take.
+    Under a table `[jitter]` the one that is exceeded for the share `requirement.outage` of the time; the static
+    `communication.pointing_error` without.
     """
     if m.jitter is None:
-        raise ValueError("the mission has no table [jitter]")
-    error_rad = _exact_quantile_rad(_given(m.jitter), m.requirement.outage) + link.point_ahead_rad(m)
-    return _on_axis_margin_db(m) - float(link.communication_beam(m).fall.loss_db(error_rad))
+        return m.communication.pointing_error_rad
+    return _exact_quantile_rad(_given(m.jitter), m.requirement.outage)
+
+
+def required_error_rad(m: LinkMission) -> float:
+    """Radial pointing error (rad) at which the required margin is wanted where a data rate is solved for.
+
+    That of `error_rad` under a table `[jitter]`, `requirement.pointing_error` without.
+    """
+    return m.requirement.pointing_error_rad if m.jitter is None else error_rad(m)
+
+
+def margin_db(m: LinkMission) -> float:
+    """Margin (dB) of the communication link at `error_rad`: the one of its budget.
+
+    Raises `ValueError` for a data rate that the receiver does not take.
+    """
+    return Exposure.stated(m).margin_db
 
 
 def _given(table: JitterTable) -> pointing.Jitter:
     (bias_x, bias_y), (rms_x, rms_y) = table.bias_rad, table.rms_rad
     return pointing.Jitter((bias_x, bias_y), (rms_x, rms_y))
-
-
-def _on_axis_margin_db(m: LinkMission) -> float:
-    return link.received_on_axis_dbm(m) - float(link.required_dbm(m, m.communication.data_rate_bit_s))
 
 
 def performance(
@@ -136,23 +207,22 @@ def performance(
     motion: pointing.SpectralMotion | None,
 ) -> Performance:
     """The link under these errors; ``motion`` is what their spectrum says, None where it is not known."""
-    q, fall = m.requirement, link.communication_beam(m).fall
-    on_axis, ahead = _on_axis_margin_db(m), link.point_ahead_rad(m)
-    loss = fall.loss_db(spread.radius_rad + ahead)
-    outage_loss = float(fall.loss_db(spread.quantile_rad(1.0 - q.outage) + ahead))
+    q = m.requirement
+    under = Exposure.of(m, spread.quantile_rad(1.0 - q.outage), spread.beyond)
+    fall, ahead = under.fall, under.ahead_rad
     half, shifted = fall.half_angle_rad, with_point_ahead(jitter, ahead)
-    fades_per_s, fade_s, warning = _fades(shifted, motion, fall, on_axis - q.margin_db)
+    fades_per_s, fade_s, warning = _fades(shifted, motion, fall, under.on_axis_db - q.margin_db)
     return Performance(
         source=source,
         controller=controller,
         mirror=mirror,
         jitter=jitter,
-        mean_loss_db=_mean_loss_db(spread, loss),
-        outage_loss_db=outage_loss,
-        margin_db=on_axis - outage_loss,
-        outage=float(np.sum(spread.share[loss > on_axis])),
-        short=float(np.sum(spread.share[loss > on_axis - q.margin_db])),
-        data_rate_bit_s=_rate(m, outage_loss),
+        mean_loss_db=_mean_loss_db(spread, fall.loss_db(spread.radius_rad + ahead)),
+        outage_loss_db=under.outage_loss_db,
+        margin_db=under.margin_db,
+        outage=under.short_of(0.0),
+        short=under.short_of(q.margin_db),
+        data_rate_bit_s=_rate(m, under.outage_loss_db),
         best=_best(spread, 1.0 - q.outage, half, ahead),
         uncoded_penalty_db=_uncoded(m, shifted, half),
         fades_per_s=fades_per_s,

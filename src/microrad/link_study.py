@@ -1,6 +1,7 @@
 """The links of a mission and what follows from their tables: budgets, pointing, tracking light, acquisition."""
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -9,15 +10,15 @@ from numpy.typing import NDArray
 from microrad import kept, link, pointing
 from microrad.budget import Line
 from microrad.link_acquisition import Finding, Tracking, finding, tracking
-from microrad.link_performance import Performance, margin_under_jitter_db, of_jitter
-from microrad.mission import LinkMission
+from microrad.link_performance import Performance, error_rad, margin_db, of_jitter, required_error_rad
+from microrad.mission import LinkMission, Source, source_text
 from microrad.missionfile import LinkFile
 from microrad.units import format_quantity
 
 Floats = NDArray[np.float64]
 
-UNDER_JITTER = "Communication under jitter"
-"""What the margin of the communication link but for the outage is called."""
+STATIC_MARGIN = "Static margin"
+"""What the margin at the static pointing error is called where the margin is the one under a jitter."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,9 +40,10 @@ class PointAheadEffect:
 class LinkStudy:
     """Everything that follows from the tables of the links alone. The links that a mission lacks are None.
 
-    ``receiver_noise`` are the noise terms of the communication receiver at the received power, where it is given by
-    what it is made of. ``tornado`` is that of the communication budget, ``tornados`` those of the margin under jitter,
-    of the beacon and of the answer, as far as there are such.
+    The communication budget is made at the error of `link_performance.error_rad`: under a jitter its margin is the one
+    that is kept but for the outage, and the margin at the static pointing error stands below it. ``receiver_noise`` are
+    the noise terms of the communication receiver at the received power, where it is given by what it is made of.
+    ``tornados`` has one of each budget, in the same order.
     """
 
     file: LinkFile
@@ -51,7 +53,6 @@ class LinkStudy:
     answer: link.LinkBudget | None
     receiver_noise: tuple[Line, ...]
     largest_rate_bit_s: float
-    tornado: tuple[link.Swing, ...]
     tornados: tuple[link.Tornado, ...]
     under_jitter: Performance | None
     tracking: Tracking | None
@@ -79,15 +80,15 @@ def solve_rate(file: LinkFile) -> LinkFile:
 
     Raises `LinkError` when no rate has the required margin.
     """
-    found = link.solved(file.mission)
-    if not found:
+    m = file.mission
+    if not math.isnan(m.communication.data_rate_bit_s):
         return file
-    rate = found["communication.data_rate"]
-    beam = file.mission.communication.model_copy(update={"data_rate_bit_s": rate})
-    q, own = file.mission.requirement, file.sources["communication.data_rate"]
-    at = f"{q.margin_db:g} dB at {format_quantity(q.pointing_error_rad, 'rad')}"
+    q, own, error = m.requirement, file.sources["communication.data_rate"], required_error_rad(m)
+    rate = link.largest_data_rate(m, q.margin_db, error)
+    beam = m.communication.model_copy(update={"data_rate_bit_s": rate})
+    at = f"{q.margin_db:g} dB at {format_quantity(error, 'rad')}"
     solved = replace(own, value=format_quantity(rate, "bit/s"), comment=f"solved for: the largest with {at}")
-    mission = file.mission.model_copy(update={"communication": beam})
+    mission = m.model_copy(update={"communication": beam})
     return replace(file, mission=mission, sources={**file.sources, "communication.data_rate": solved})
 
 
@@ -102,7 +103,7 @@ def run(file: LinkFile, parts: kept.Kept = kept.NOTHING) -> LinkStudy:
     answer = None if m.answer is None else link.answer_budget(m, sources)
     open_loop = pointing.open_loop_budget(m, sources)
     light = tracking(file, answer)
-    communication, receiver = link.communication_budget(m, sources), link.receiver(m)
+    communication, receiver = communication_budget(m, sources), link.receiver(m)
     rate = m.communication.data_rate_bit_s
     noise = () if receiver is None else receiver.noise_lines(communication.received_power_w, rate)
     return LinkStudy(
@@ -113,8 +114,7 @@ def run(file: LinkFile, parts: kept.Kept = kept.NOTHING) -> LinkStudy:
         answer=answer,
         receiver_noise=noise,
         largest_rate_bit_s=largest_rate(m),
-        tornado=link.tornado(m, sources),
-        tornados=tornados(file, beacon, answer),
+        tornados=tornados(file, communication, beacon, answer),
         under_jitter=of_jitter(m),
         tracking=light,
         point_ahead=point_ahead(m),
@@ -122,15 +122,29 @@ def run(file: LinkFile, parts: kept.Kept = kept.NOTHING) -> LinkStudy:
     )
 
 
+def communication_budget(m: LinkMission, sources: Mapping[str, Source]) -> link.LinkBudget:
+    """The budget of the communication link at `link_performance.error_rad`, with the static margin under a jitter.
+
+    Raises `ValueError` for a data rate that the receiver does not take.
+    """
+    if m.jitter is None:
+        return link.communication_budget(m, sources)
+    stated = source_text(sources, "jitter.bias", "jitter.rms", "requirement.outage")
+    given = f"error that the jitter exceeds for {100 * m.requirement.outage:g} % of the time: {stated}"
+    found = link.communication_budget(m, sources, pointing_error_rad=error_rad(m), given_source=given)
+    static = link.communication_budget(m, sources)
+    basis = f"at {format_quantity(m.communication.pointing_error_rad, 'rad')} of pointing error, without the jitter"
+    line = replace(static.totals[-1], name=STATIC_MARGIN, basis=basis)
+    return replace(found, totals=(*found.totals, line))
+
+
 def tornados(
-    file: LinkFile, beacon: link.LinkBudget | None, answer: link.LinkBudget | None
+    file: LinkFile, communication: link.LinkBudget, beacon: link.LinkBudget | None, answer: link.LinkBudget | None
 ) -> tuple[link.Tornado, ...]:
-    """What moves the margins that stand in no communication budget: under jitter, of the beacon, of the answer."""
-    m, sources, found = file.mission, file.sources, []
-    if m.jitter is not None:
-        tables = ("jitter", "requirement", *link.LINK_TABLES)
-        swings = link.swings(m, sources, tables, margin_under_jitter_db)
-        found.append(link.Tornado(UNDER_JITTER, margin_under_jitter_db(m), swings))
+    """What moves the margin of each budget."""
+    m, sources = file.mission, file.sources
+    swings = link.swings(m, sources, ("jitter", "requirement", *link.LINK_TABLES), margin_db)
+    found = [link.Tornado(communication.name, communication.margin_db, swings)]
     for budget in (beacon, answer):
         if budget is not None:
             swings = link.beam_tornado(m, sources, "beacon" if budget is beacon else "answer")
@@ -139,9 +153,9 @@ def tornados(
 
 
 def largest_rate(m: LinkMission) -> float:
-    """Data rate with the required margin at the required pointing error, or nan when there is none."""
+    """Data rate with the required margin at `link_performance.required_error_rad`, or nan when there is none."""
     try:
-        return link.largest_data_rate(m, m.requirement.margin_db, m.requirement.pointing_error_rad)
+        return link.largest_data_rate(m, m.requirement.margin_db, required_error_rad(m))
     except link.LinkError:
         return math.nan
 

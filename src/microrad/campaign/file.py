@@ -207,7 +207,7 @@ class _Reader:
         if self.document.faults:
             return None
         texts = drawing.input_texts(draws, bases)
-        return CampaignFile(
+        found = CampaignFile(
             path=self.document.path,
             text=self.document.text,
             sha256=self.document.sha256,
@@ -235,6 +235,23 @@ class _Reader:
                 *self._unchecked(table, keep, nominal),
             ),
         )
+        self._check_read(found)
+        return None if self.document.faults else found
+
+    def _check_read(self, campaign: CampaignFile) -> None:
+        """What is drawn changes something of what is kept."""
+        from microrad.campaign.unread import unread  # with the loop: here, to keep the start quick
+
+        rows = (Builder(campaign).mission(cell, _medians(campaign.draws)) for cell in range(len(campaign.bases)))
+        for key in unread(campaign, rows):
+            reason = f"is read by nothing that is kept ({', '.join(campaign.keep)}): it would change no number"
+            m = campaign.mission.mission
+            expected = "a key that they depend on, or another output in `keep`"
+            if key == "communication.pointing_error" and campaign.table.loop is None and m.jitter is not None:
+                expected = (
+                    "jitter.bias or jitter.rms: under the table [jitter] the margin is that of requirement.outage"
+                )
+            self.on.fault(f"inputs.{key}", None, reason, expected)
 
     def _files(self, mission: Document, bases: tuple[Base, ...], draws: tuple[Draw, ...]) -> tuple[Path, ...]:
         """Every file that the campaign depends on; those that do not exist are noted."""
@@ -252,11 +269,7 @@ class _Reader:
 
     def _check_median(self, bases: tuple[Base, ...], draws: tuple[Draw, ...]) -> None:
         """A row in the middle of all distributions is a mission, in every cell."""
-        import numpy as np  # here, to keep the start quick
-
-        half = np.array([0.5])
-        values = {d.key: float(d.distribution.at(half)[0]) for d in draws if d.distribution is not None}
-        builder = Builder(_Drawing(bases, draws))
+        values, builder = _medians(draws), Builder(_Drawing(bases, draws))
         for cell, base in enumerate(bases):
             try:
                 builder.mission(cell, values)
@@ -266,6 +279,14 @@ class _Reader:
                 reason = f"leaves no mission in the middle of all distributions{where}: {error}"
                 self.on.fault(f"inputs{blamed}", None, reason, "distributions about a mission that works")
                 return
+
+
+def _medians(draws: tuple[Draw, ...]) -> dict[str, float]:
+    """The middle of each distribution by key."""
+    import numpy as np  # here, to keep the start quick
+
+    half = np.array([0.5])
+    return {d.key: float(d.distribution.at(half)[0]) for d in draws if d.distribution is not None}
 
 
 class _Drawing(NamedTuple):

@@ -60,7 +60,13 @@ def budget(
     from microrad.missionfile import load_link
     from microrad.report import budget_views
 
-    given = _changed(load_link(file), data_rate, pointing_error, solve_rate)
+    loaded = load_link(file)
+    if pointing_error is not None and loaded.mission.jitter is not None:
+        raise Refusal(
+            "--pointing-error changes no margin: under the table [jitter] of the mission the margin is the one at "
+            "requirement.outage. Change jitter.bias and jitter.rms, or take the table out."
+        )
+    given = _changed(loaded, data_rate, pointing_error, solve_rate)
     try:
         study = link_study.run(given)
     except ValueError as error:  # a rate that the receiver does not take, a scan without time to detect

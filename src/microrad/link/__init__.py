@@ -38,7 +38,6 @@ from microrad.link.maps import (
     margin_of_error,
     rate_at_loss,
     received_on_axis_dbm,
-    solved,
 )
 from microrad.link.model import (
     LinkError,
@@ -51,7 +50,7 @@ from microrad.link.model import (
     required_dbm,
     strehl_db,
 )
-from microrad.link.tornado import LINK_TABLES, Swing, Tornado, beam_tornado, swings, tornado
+from microrad.link.tornado import LINK_TABLES, Swing, Tornado, beam_tornado, swings
 
 __all__ = [
     "BEST_TRUNCATION",
@@ -100,10 +99,8 @@ __all__ = [
     "received_on_axis_dbm",
     "receiver",
     "required_dbm",
-    "solved",
     "strehl_db",
     "strehl_loss_db",
     "strehl_ratio",
     "swings",
-    "tornado",
 ]

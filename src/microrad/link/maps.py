@@ -154,17 +154,6 @@ def _instead(mission: LinkMission, margin_db: float) -> str:
     return f"up to {format_quantity(possible, 'bit/s')} it would be there, or "
 
 
-def solved(mission: LinkMission) -> dict[str, float]:
-    """What the mission leaves to be solved for, by key: a data rate of "largest", at the required margin and error.
-
-    Raises `LinkError` when no rate has the required margin.
-    """
-    if not math.isnan(mission.communication.data_rate_bit_s):
-        return {}
-    q = mission.requirement
-    return {"communication.data_rate": largest_data_rate(mission, q.margin_db, q.pointing_error_rad)}
-
-
 @dataclass(frozen=True, slots=True)
 class SensitivityReading:
     """Photons per bit that the receiver may need, under one reading of pointing loss and Strehl."""

@@ -8,7 +8,7 @@ from typing import Literal
 from pydantic.fields import FieldInfo
 
 from microrad.fields import Quantity, Several, Share, Table
-from microrad.link.budget import answer_budget, beacon_budget, communication_budget
+from microrad.link.budget import answer_budget, beacon_budget
 from microrad.link.model import lit_aperture
 from microrad.link.receivers import RateError
 from microrad.link_table import divergence_fits
@@ -30,6 +30,7 @@ LINK_TABLES = (
 """The tables with the inputs of the communication link."""
 _BY_TEN = ("bit_error_ratio", "outage")  # shares that are judged by their order of magnitude
 _AXES = ("x", "y")
+_TIE_DIGITS = 6  # of decibels: equal swings stand as the mission has their keys, not as a processor rounds them
 
 Margin = Callable[[LinkMission], float]
 
@@ -65,11 +66,6 @@ class Tornado:
     of: str
     margin_db: float
     swings: tuple[Swing, ...]
-
-
-def tornado(mission: LinkMission, sources: Mapping[str, Source]) -> tuple[Swing, ...]:
-    """The margin of the communication link over each of its inputs, as `swings` moves them."""
-    return swings(mission, sources, LINK_TABLES, lambda m: communication_budget(m, sources).margin_db)
 
 
 def beam_tornado(
@@ -112,7 +108,7 @@ def swings(
     obscuration stops the beam. Inputs that do not move the margin are left out.
     """
     found = [_swing(mission, sources, each, margin_db, possible) for name in tables for each in _inputs(mission, name)]
-    return tuple(sorted((s for s in found if s.swing_db > 1e-9), key=lambda swing: -swing.swing_db))
+    return tuple(sorted((s for s in found if s.swing_db > 1e-9), key=lambda swing: -round(swing.swing_db, _TIE_DIGITS)))
 
 
 @dataclass(frozen=True, slots=True)

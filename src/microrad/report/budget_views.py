@@ -11,13 +11,15 @@ from microrad import link
 from microrad.budget import Line
 from microrad.link import Swing
 from microrad.link_acquisition import Finding, Found, Tracking
-from microrad.link_performance import Performance
-from microrad.link_study import UNDER_JITTER, LinkStudy
+from microrad.link_performance import Performance, required_error_rad
+from microrad.link_study import LinkStudy
 from microrad.mission import source_text
 from microrad.operations import spreadsheet_text
 from microrad.pointing import OpenLoopPointing
 from microrad.report.quantities import quantity
 
+UNDER_JITTER = "Communication under jitter"
+"""The lines of what the jitter does to the communication link, beside its budget."""
 COLUMNS = ("budget", "line", "value", "unit", "basis", "source", "holds for", "warning")
 
 
@@ -34,19 +36,16 @@ def lines(study: LinkStudy) -> list[tuple[str, Line]]:
 
 
 def jitter_lines(study: LinkStudy) -> list[Line]:
-    """The link under its jitter as lines: what the errors cost, with and without a code, and the margin left."""
+    """What stands in no budget of the link under its jitter: costs with and without a code, shares of the time."""
     p = study.under_jitter
     if p is None:
         return []
     source = source_text(study.file.sources, "jitter.bias", "jitter.rms", "requirement.outage")
     regime, known = "Gaussian errors about the bias, two axes", math.isfinite(p.uncoded_penalty_db)
-    but_for = f"all but {100 * study.file.mission.requirement.outage:g} % of the time"
     back = "power that brings the mean bit error ratio back to its target"
     rows = [
         ("Mean pointing loss", 0.0 - p.mean_loss_db, "dB", "what a code pays whose interleaver spans many fades"),
-        ("Pointing loss at outage", 0.0 - p.outage_loss_db, "dB", f"{but_for}; what a code pays without interleaver"),
         ("Penalty without a code", 0.0 - p.uncoded_penalty_db, "dB", f"{back}, Gaussian beam"),
-        ("Margin at outage", p.margin_db, "dB", but_for),
         ("Outage", p.outage, "", "share of the time with a margin below 0 dB"),
         ("Below required margin", p.short, "", "share of the time"),
     ]
@@ -111,20 +110,18 @@ def sentences(study: LinkStudy) -> list[str]:
 
 def consequences(study: LinkStudy) -> list[str]:
     """What follows from the budgets that stands in no table: rates, swings, intensities, light, point-ahead."""
-    q, found = study.file.mission.requirement, []
+    m, found = study.file.mission, []
+    wanted = f"the required {m.requirement.margin_db:g} dB at {quantity(required_error_rad(m), 'rad')}"
     if math.isnan(study.largest_rate_bit_s):
-        found.append(f"No data rate has the required {q.margin_db:g} dB at {quantity(q.pointing_error_rad, 'rad')}.")
+        found.append(f"No data rate has {wanted}.")
     else:
-        found.append(
-            f"Largest data rate with the required {q.margin_db:g} dB at {quantity(q.pointing_error_rad, 'rad')}: "
-            f"{quantity(study.largest_rate_bit_s, 'bit/s')}{_rate_limit(study)}."
-        )
-    if study.tornado:
-        found.append(
-            "What moves the margin most, each input by 10 % (0.5 dB; a bit error ratio or an outage by a factor of "
-            f"ten) both ways: {_top(study.tornado)}."
-        )
-    found += [f"What moves the margin {_of(t)} most: {_top(t.swings)}." for t in study.tornados if t.swings]
+        rate = quantity(study.largest_rate_bit_s, "bit/s")
+        found.append(f"Largest data rate with {wanted}: {rate}{_rate_limit(study)}.")
+    by = "each input by 10 % (0.5 dB; a bit error ratio or an outage by a factor of ten) both ways"
+    own, *others = study.tornados
+    if own.swings:
+        found.append(f"What moves the margin most, {by}: {_top(own.swings)}.")
+    found += [f"What moves the margin of the {t.of.lower()} most: {_top(t.swings)}." for t in others if t.swings]
     intensities = ", ".join(f"{b.name.lower()} {quantity(b.radiant_intensity_w_sr, 'W/sr')}" for b in study.budgets)
     found.append(f"Radiant intensity on the axis, optics and Strehl counted: {intensities}.")
     if study.beacon is not None:
@@ -156,11 +153,6 @@ def verdict(study: LinkStudy) -> str:
 def signed_db(value_db: float) -> str:
     """A margin in decibels with its sign."""
     return f"{value_db:+.2f} dB".replace("-", "\u2212")
-
-
-def _of(t: link.Tornado) -> str:
-    """Whose margin a tornado moves, in a sentence."""
-    return "under jitter" if t.of == UNDER_JITTER else f"of the {t.of.lower()}"
 
 
 def _top(swings: Sequence[Swing]) -> str:
@@ -298,10 +290,10 @@ def data(study: LinkStudy) -> dict[str, Any]:
             for b in study.budgets
         ],
         "largest_data_rate_bit_s": study.largest_rate_bit_s,
-        "tornado": [_swing_data(s) for s in study.tornado],
+        "tornado": [_swing_data(s) for s in study.tornados[0].swings],
         "other_tornados": [
             {"of": t.of, "margin_db": t.margin_db, "tornado": [_swing_data(s) for s in t.swings]}
-            for t in study.tornados
+            for t in study.tornados[1:]
         ],
         "pointing": {
             "lines": [line_data(line) for line in p.lines],

@@ -13,17 +13,15 @@ from microrad.acquisition import Trade
 from microrad.kept import NOTHING, Kept
 from microrad.link import Swing, Tornado
 from microrad.link_acquisition import Finding
-from microrad.link_study import UNDER_JITTER, LinkStudy
+from microrad.link_study import LinkStudy
 from microrad.report.day_assumptions import swing_bars
 from microrad.report.figures import BLUE, ORANGE, STYLE, VERMILION, Figure, svg_of
 from microrad.report.tables import Column
 from microrad.units import format_quantity
 
 MOST_BARS = 14
-_LINKS = {"Communication": "communication link", UNDER_JITTER: "communication link but for the outage, under jitter"}
 _TITLES = {
     "Communication": ("tornado", "What moves the margin"),
-    UNDER_JITTER: ("tornado-under-jitter", "What moves the margin under jitter"),
     "Beacon": ("tornado-beacon", "What moves the margin of the beacon"),
     "Answer": ("tornado-answer", "What moves the margin of the answer"),
 }
@@ -32,19 +30,13 @@ _TITLES = {
 def draw(study: LinkStudy, parts: Kept = NOTHING) -> tuple[Figure, ...]:
     """The figures of the links, in the order of the page."""
     with rc_context(STYLE):
-        figures = [parts.part(tornado, study)] if study.tornado else []
-        figures += [parts.part(one_tornado, study, t) for t in study.tornados if t.swings]
+        figures = [parts.part(tornado, study, t) for t in study.tornados if t.swings]
         if study.finding is not None and study.finding.trade is not None:
             figures.append(parts.part(trade, study, study.finding, study.finding.trade))
     return tuple(figures)
 
 
-def tornado(study: LinkStudy) -> Figure:
-    """The margin of the communication link over each input, one at a time."""
-    return one_tornado(study, Tornado("Communication", study.communication.margin_db, study.tornado))
-
-
-def one_tornado(study: LinkStudy, of: Tornado) -> Figure:
+def tornado(study: LinkStudy, of: Tornado) -> Figure:
     """One margin over each of its inputs, one at a time."""
     shown, margin = of.swings[:MOST_BARS], of.margin_db
     canvas = Canvas(figsize=(6.4, 0.9 + 0.27 * len(shown)), layout="constrained")
@@ -56,12 +48,14 @@ def one_tornado(study: LinkStudy, of: Tornado) -> Figure:
         if not math.isfinite(swing.swing_db):
             ink = "white" if math.isinf(swing.margin_high_db) else "black"
             _say(axes, (lost_db, row), "< no margin: receiver too slow", ink, "center")
-    data, required = of.of.startswith("Communication"), study.file.mission.requirement.margin_db
+    m, data = study.file.mission, of.of == study.communication.name
+    required = m.requirement.margin_db
     low, high = axes.get_xlim()
     if data and low < required < high:
         axes.axvline(required, color=VERMILION, linestyle="--", linewidth=1.0)
         _say(axes, (required, -0.55), "required", VERMILION, "bottom")
-    axes.set(xlabel=f"margin of the {_LINKS.get(of.of, of.of.lower())} (dB)")
+    judged = f", all but {100 * m.requirement.outage:g} % of the time" if data and m.jitter is not None else ""
+    axes.set(xlabel=f"margin of the {'communication link' if data else of.of.lower()}{judged} (dB)")
     keys = [Patch(color=ORANGE, label="input lower"), Patch(color=BLUE, label="input higher")]
     axes.legend(handles=keys, loc="lower right", fontsize=8)
     assumed = [s.key for s in shown if s.kind == "assumption"]

@@ -6,7 +6,6 @@ from typing import Any
 
 from microrad import link
 from microrad.link.budget import FREE_SPACE_LOSS, POINTING_LOSS
-from microrad.link_study import UNDER_JITTER
 from microrad.performance import FINE, NO_HYSTERESIS
 from microrad.readings import Reading
 from microrad.report.fine_pointing_words import percent, source_name
@@ -124,7 +123,7 @@ def _residual(study: Study, cause: str) -> str:
 
 def _communication(study: Study, cause: str) -> str:
     lost = next(line.value for line in study.achieved.lines if line.name == POINTING_LOSS)
-    return f"{cause}, pointing loss {quantity(-lost, 'dB')}{most_sensitive(study.links.tornado)}"
+    return f"{cause}, pointing loss {quantity(-lost, 'dB')}{most_sensitive(_tornado(study, study.achieved.name))}"
 
 
 def _fine(study: Study, cause: str) -> str:
@@ -143,9 +142,9 @@ def _outage(study: Study, cause: str) -> str:
     assert fine is not None  # such a requirement has one
     case = study.performance.case(FINE, fine.best.design.name, "given")
     assert case is not None
-    swings = _tornado(study, UNDER_JITTER) or study.links.tornado
     lost = quantity(case.outage_loss_db, "dB")
-    return f"{source_name(cause)}, pointing loss {lost} at the outage{most_sensitive(swings)}"
+    most = most_sensitive(_tornado(study, study.achieved.name))
+    return f"{source_name(cause)}, pointing loss {lost} at the outage{most}"
 
 
 _CONTRIBUTORS: tuple[Callable[[Study, str], str], ...] = (

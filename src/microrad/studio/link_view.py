@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from microrad import link, link_study
 from microrad.budget import Line
+from microrad.link_performance import error_rad, required_error_rad
 from microrad.link_study import LinkStudy
 from microrad.mission import LinkMission
 from microrad.missionfile import LinkFile
@@ -54,7 +55,7 @@ class Frame:
 
     def holds(self, m: LinkMission) -> bool:
         """Whether the mission's working point and its required pointing error lie within."""
-        rate, error = m.communication.data_rate_bit_s, m.communication.pointing_error_rad
+        rate, error = m.communication.data_rate_bit_s, error_rad(m)
         within = self.data_rate_bit_s[0] <= rate <= self.data_rate_bit_s[-1]
         return bool(within and max(error, m.requirement.pointing_error_rad) <= self.pointing_error_rad[-1])
 
@@ -114,7 +115,7 @@ def view(file: LinkFile, frame: Frame | None = None) -> LinkView:
     file = link_study.solve_rate(file)
     m, sources = file.mission, file.sources
     frame = frame if frame is not None and frame.holds(m) else frame_of(m)
-    budgets = [link.communication_budget(m, sources)]
+    budgets = [link_study.communication_budget(m, sources)]
     budgets += [link.beacon_budget(m, sources)] if m.beacon is not None else []
     budgets += [link.answer_budget(m, sources)] if m.answer is not None else []
     margin = link.margin_map(m, frame.data_rate_bit_s, frame.pointing_error_rad)
@@ -127,7 +128,7 @@ def frame_of(m: LinkMission) -> Frame:
     built, rate = link.receiver(m), m.communication.data_rate_bit_s
     highest = math.inf if built is None else built.highest_data_rate_bit_s
     low, high = 10.0 ** math.floor(math.log10(rate) - 1.0), min(10.0 ** math.ceil(math.log10(rate) + 1.0), highest)
-    most = 3.0 * max(m.requirement.pointing_error_rad, m.communication.pointing_error_rad)
+    most = 3.0 * max(m.requirement.pointing_error_rad, error_rad(m))
     return Frame(np.geomspace(low, high, RATES), np.linspace(0.0, most, ERRORS))
 
 
@@ -239,7 +240,7 @@ def map_key(m: LinkMission) -> str:
 
 
 def _point(m: LinkMission) -> plots.Trace:
-    rate, error = m.communication.data_rate_bit_s, m.communication.pointing_error_rad
+    rate, error = m.communication.data_rate_bit_s, error_rad(m)
     said = f"{format_quantity(rate, 'bit/s')} at {format_quantity(error, 'rad')}"
     return {
         "type": "scatter",
@@ -283,7 +284,7 @@ def map_words(v: LinkView) -> str:
     q, c = m.requirement, m.communication
     there = _largest(m)
     return (
-        f"At {format_quantity(c.data_rate_bit_s, 'bit/s')} and {format_quantity(c.pointing_error_rad, 'rad')} the "
+        f"At {format_quantity(c.data_rate_bit_s, 'bit/s')} and {format_quantity(error_rad(m), 'rad')} the "
         f"communication link has {signed_db(v.budgets[0].margin_db)}. {there} for the required {q.margin_db:g} dB."
     )
 
@@ -292,7 +293,7 @@ def _largest(m: LinkMission) -> str:
     """The requirement solved in both directions, in words."""
     q, rate = m.requirement, m.communication.data_rate_bit_s
     fastest = link_study.largest_rate(m)
-    at = f"at {format_quantity(q.pointing_error_rad, 'rad')}"
+    at = f"at {format_quantity(required_error_rad(m), 'rad')}"
     most = f"No data rate will do {at}" if math.isnan(fastest) else f"At most {quantity(fastest, 'bit/s')} {at}"
     try:
         error = link.largest_pointing_error(m, q.margin_db, rate)
@@ -323,7 +324,7 @@ def consequences(study: LinkStudy) -> list[str]:
 
 def tornado_plot(study: LinkStudy, most: int = 12) -> plots.Plot:
     """What moves the margin of the communication link: one input at a time, the weightiest on top."""
-    shown, margin = study.tornado[:most], study.communication.margin_db
+    shown, margin = study.tornados[0].swings[:most], study.communication.margin_db
     if not shown:
         return plots.empty("no input moves the margin")
     names = [plots.plain(f"{s.key} = {format_quantity(s.value, s.unit, 3)}".rstrip(), 60) for s in shown]
