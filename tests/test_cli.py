@@ -189,9 +189,9 @@ def test_init_then_run(call, folder):
     """Without the fine-pointing loop, which takes most of the time: the whole is run by tests/test_docs_gallery.py."""
     call("init")
     Path("leo-geo.toml").write_text(without_fine_pointing(PAPER.read_text(encoding="utf-8")), encoding="utf-8")
-    result = call("run", "leo-geo.toml")
+    result = call("run", "leo-geo.toml", "--exit-on", "closes")
     assert (result.code, result.err) == (0, "")
-    assert result.out.startswith("The link closes")
+    assert result.out.startswith("Not every requirement is met: residual pointing error (")
     for name in ("report.html", "results.nc", "manifest.json"):
         path = Path("leo-geo-study") / name
         assert str(path) in result.out
@@ -210,9 +210,9 @@ def undrawn(monkeypatch):
 def test_identify_then_run_on_the_mirror_it_wrote(call, refused, folder, loop_mirror, plain):
     args = ("run", plain, "--mirror", loop_mirror, "--json")
     result = call(*args)
-    assert (result.code, result.err) == (0, "")
+    assert (result.code, result.err) == (1, "")
     summary = json.loads(result.out)
-    assert summary["closes"] is True
+    assert (summary["closes"], summary["met"]) == (True, False)
     assert summary["folder"] == "leo-geo-study"
     assert loop_mirror.name in (folder / "leo-geo-study" / "manifest.json").read_text(encoding="utf-8")
     *power, residual, margin = summary["requirements"]
@@ -223,7 +223,7 @@ def test_identify_then_run_on_the_mirror_it_wrote(call, refused, folder, loop_mi
 
     assert "replace them with --overwrite" in refused(*args)
     (folder / "leo-geo-study" / "report.html").write_text("old")
-    assert call(*args, "--overwrite").code == 0
+    assert call(*args, "--overwrite", "--exit-on", "closes").code == 0
     assert (folder / "leo-geo-study" / "report.html").stat().st_size > 1000
 
 
@@ -319,7 +319,7 @@ def test_a_full_disk_during_run_leaves_nothing_but_the_verdict(call, folder, mon
     result = call("run", plain, "--mirror", loop_mirror)
     assert (result.code, result.err.count("\n")) == (2, 1)
     assert "No space left on device; nothing was written" in result.err
-    assert result.out.startswith("The link closes")
+    assert result.out.startswith("Not every requirement is met: ")
     assert listing(folder) == before
 
 
@@ -331,7 +331,7 @@ def test_a_cache_folder_that_cannot_be_used_is_told_once_and_the_run_goes_on(cal
     monkeypatch.setenv("XDG_CACHE_HOME", str(folder / "cache"))
     monkeypatch.setattr(study, "run", lambda *args: found)
     result = call("run", PAPER)
-    assert result.code == 0
+    assert result.code == 1  # of the paper's loop
     assert result.err.count("\n") == 1
     assert str(folder / "cache") in result.err
     assert "nothing is kept for a quicker next run" in result.err
@@ -418,7 +418,7 @@ def test_an_interrupt_during_run_leaves_nothing(folder, loop_mirror, plain, name
     lines_of(progress, 2 if module == "study" else 0)  # the study is in its second step
     process.send_signal(getattr(signal, name))
     out, err = process.communicate(timeout=HANG_S)
-    assert (process.returncode, out.startswith("The link closes")) == (130, module == "report"), out
+    assert (process.returncode, out.startswith("Not every requirement is met: ")) == (130, module == "report"), out
     assert err.replace("here\n", "") == "microrad: interrupted, nothing was written\n"
     assert listing(folder) == {}
 

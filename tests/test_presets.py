@@ -138,7 +138,7 @@ def test_each_value_says_where_it_comes_from_and_no_unknown_one_claims_a_source(
             continue
         unknown = UNKNOWN in each.value
         kind, _, rest = each.comment.partition(": ")
-        assert kind == "unknown" if unknown else kind in ("literature", "paper", "assumption"), each.key
+        assert kind == "unknown" if unknown else kind in ("literature", "paper", "assumption", "derived"), each.key
         assert len(rest) > 5, each.key
         if kind == "literature":  # a year or a place to look it up
             assert re.search(r"\b(19|20)\d\d\b|eoPortal", rest), each.key
@@ -151,7 +151,7 @@ def test_a_preset_with_its_unknown_values_given_is_a_link(tmp_path, name):
     file = completed(tmp_path, name)
     assert math.isfinite(communication_budget(file.mission, file.sources).margin_db)
     kinds = {key: source.kind for key, source in file.sources.items() if key not in preset.unknown}
-    assert set(kinds.values()) <= {"literature", "paper", "assumption", ""}
+    assert set(kinds.values()) <= {"literature", "paper", "assumption", "derived", ""}
     assert [key for key, kind in kinds.items() if not kind] == ["name"]
 
 

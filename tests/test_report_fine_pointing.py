@@ -21,7 +21,7 @@ from microrad.fine_loop.ensemble import bin_edges_rad
 from microrad.fine_loop.linear import close, stationary
 from microrad.fine_loop.loop import ReferenceFilter, assemble, with_inverse
 from microrad.fine_pointing import Difference, ErrorBudget, FinePointingStudy, Part, Residual, Sine, Verified
-from microrad.report import chain, requirement_views, results
+from microrad.report import chain, requirement_views, requirements, results
 from microrad.report import fine_pointing as section
 from microrad.report import fine_pointing_figures as figures
 from microrad.report import fine_pointing_words as words
@@ -122,8 +122,8 @@ def verified_of(scene, design, i, freq):
 def with_fine(plain, fine):
     """The study with this fine-pointing loop in it, and its requirements."""
     found = performance.run(plain.file.mission, plain.runs, fine)
-    requirements = study.fine_requirements(plain.file.mission, fine, found)
-    return replace(plain, fine_pointing=fine, performance=found, requirements=(*plain.requirements, *requirements))
+    judged, papers_loop = study.judged(plain.file, plain.links, plain.requirements[-2:], fine, found)
+    return replace(plain, fine_pointing=fine, performance=found, requirements=judged, papers_loop=papers_loop)
 
 
 def changed(fine, name, **to):
@@ -340,9 +340,21 @@ def test_a_study_with_the_loop_does_not_say_that_it_leaves_out_vibration(page):
 # ------------------------------------------------------------------------------------------------ words
 
 
-def test_the_verdict_says_it_in_six_lines(plain, fine):
+def test_the_verdict_is_that_of_the_missions_own_loop(plain, fine):
     whole = with_fine(plain, fine)
-    added = [line for line in report.verdict_text(whole).splitlines() if line not in report.verdict_text(plain)]
+    assert (whole.met, plain.met) == (True, False)
+    assert [r.met for r in whole.papers_loop] == [False, False] == [r.met for r in plain.requirements[-2:]]
+    text = report.verdict_text(whole, 400, verbose=True)
+    assert text.startswith("The link closes, with a margin of +4.8")
+    assert "and every requirement is met, 2 of 5 by the choice of an input" in text.splitlines()[0]
+    said = report.verdict_text(plain, 400, verbose=True)
+    assert said.startswith("Not every requirement is met: residual pointing error (")
+    assert "closes" not in said.splitlines()[0]
+    brief = report.words.short(whole)
+    assert len(brief) == 6 and all(sentence.endswith(".") for sentence in brief)
+    assert brief[-1].startswith("The paper's loop, judged by itself (PID + inverse, sine of 25 Hz), misses residual")
+    assert len(report.words.short(plain)) == 5 and "judged by itself" not in said
+    added = [line for line in report.words.explanation(whole) if line not in report.words.explanation(plain)]
     assert added[0].startswith(f"{HEADING}: {SECOND} leaves 4.23 µrad radial at 99.7 %")
     assert "10 µrad is allowed" in added[0]
     assert added[1] == words.tracked(fine, 10e-6)
@@ -350,9 +362,10 @@ def test_the_verdict_says_it_in_six_lines(plain, fine):
     del added[1]
     assert "better (rms) than the best PI of the gain grid" in added[1]
     assert "axis x needs 623 µrad to either side and has 534 µrad" in added[2]
-    assert added[3].startswith(f"PASS  fine pointing at 99.7 % ({SECOND}): 4.23 µrad")
-    assert added[4].startswith(f"PASS  link margin but for 0.3 % of the time ({SECOND}): 4.8")
-    assert len(added) == 5
+    assert len(added) == 3
+    fine_row, margin_row = (" ".join(cells) for cells in requirements.table(whole.requirements).rows[-2:])
+    assert fine_row == f"fine pointing at 99.7 % ({SECOND}) 10 µrad 4.23 µrad +5.77 µrad PASS"
+    assert margin_row.startswith(f"link margin but for 0.3 % of the time ({SECOND}) 3.00 dB 4.8")
 
 
 def test_the_tail_stands_by_itself_with_its_intervals(page, fine, written):
@@ -372,18 +385,18 @@ def test_the_tail_stands_by_itself_with_its_intervals(page, fine, written):
 
 def test_fine_requirements_stand_with_their_dominant_part(plain, fine):
     rows = requirement_views.rows(with_fine(plain, fine))
-    assert rows[5]["contributor"] == "Vibration (OLYMPUS): 3 µrad of 3.05 µrad rms with hysteresis, 97 % of the squares"
+    assert rows[3]["contributor"] == "Vibration (OLYMPUS): 3 µrad of 3.05 µrad rms with hysteresis, 97 % of the squares"
     whole = with_fine(plain, fine)
     lost = whole.performance.case(performance.FINE, SECOND, "given").outage_loss_db
     own, *others = plain.links.tornados
     top = own.swings[0]
-    assert rows[6]["contributor"] == (
+    assert rows[4]["contributor"] == (
         f"Vibration (OLYMPUS), pointing loss {lost:.2f} dB at the outage; the margin moves most with {top.key}: "
         f"{top.swing_db:.2f} dB for 10 % both ways"
     )
     swing = replace(top, key="jitter.rms", margin_low_db=0.0, margin_high_db=1.5)
     moved = replace(plain.links, tornados=(replace(own, swings=(swing,)), *others))
-    said = requirement_views.rows(replace(whole, links=moved))[6]["contributor"]
+    said = requirement_views.rows(replace(whole, links=moved))[4]["contributor"]
     assert said.endswith("with jitter.rms: 1.50 dB for 10 % both ways")
 
 
@@ -511,8 +524,8 @@ def test_the_chain_marks_the_mirror_by_its_stroke(plain, fine):
     assert (mark, line) == ("PASS", f"stroke 623 of {roomy[0].travel_rad / 2 * 1e6:.0f} µrad (x)")
     assert box(plain)[0] == ""  # nothing says what it has to follow
     residual = next(stage for stage in chain.stages(with_fine(plain, enough)) if stage.name == "Residual")
-    assert residual.mark == "FAIL"  # of the sines, though the fine loop is within it
-    assert residual.lines == ("12.1 µrad peak, 25 Hz sine", "4.23 µrad at 99.7 %, vibration", "allowed 10 µrad")
+    assert residual.mark == "PASS"  # of the fine loop, which is judged; the sines are judged by themselves
+    assert residual.lines == ("4.23 µrad at 99.7 %, vibration", "(12.1 µrad peak, 25 Hz sine)", "allowed 10 µrad")
     words = "at the mirror, whether its stroke covers the worst case"
     assert (words in render(with_fine(plain, fine)), words in render(plain)) == (True, False)
 

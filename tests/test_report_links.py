@@ -456,7 +456,7 @@ def test_brackets_of_a_comment_are_no_markup_of_the_terminal(tmp_path):
         'transmit_power = "5 W"', 'transmit_power = "5 W" # paper: [bold] 2'
     )
     path.write_text(text, encoding="utf-8")
-    assert "paper: [bold] 2" in budget_views.text(link_study.run(load_link(path)), 160)
+    assert "paper: [bold] 2" in budget_views.text(link_study.run(load_link(path)), 160, verbose=True)
 
 
 def test_the_page_holds_every_line_and_no_hyphen_for_a_minus(plain):

@@ -178,8 +178,8 @@ def test_progress_in_words():
 
 def test_the_state_of_a_job_in_words(tmp_path):
     job = Job(1, tmp_path, "done", "study", code=1)
-    assert runs_view.state_words(job) == "done: the link does not close"
-    assert runs_view.state_words(replace(job, code=0)) == "done: the link closes; each requirement is judged below"
+    assert runs_view.state_words(job) == "done: not every requirement is met"
+    assert runs_view.state_words(replace(job, code=0)) == "done: every requirement is met"
     assert runs_view.state_words(replace(job, kind="campaign")) == "done: the rows do not keep the limits"
     assert runs_view.state_words(replace(job, kind="export", code=0)) == "done"
     assert runs_view.state_words(replace(job, state="running", code=None)) == "running"
@@ -350,7 +350,7 @@ def test_the_study_of_exactly_this_text_is_found(workshop, draft):
     assert compare_view.finished_study(workshop, draft) is None
     put("mine", draft.sha256, "of this text")
     found = compare_view.finished_study(workshop, draft)
-    assert (found.folder, found.verdict, found.closes) == ("mine", "of this text", True)
+    assert (found.folder, found.verdict, found.met) == ("mine", "of this text", False)
     assert [(each.text, each.required, each.met) for each in found.numbers] == [("2.00 dB", "3.00 dB", False)]
     assert compare_view.finished_study(workshop, draft.set("terminals.leo_aperture", "6 cm")) is None
 

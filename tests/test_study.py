@@ -2,6 +2,7 @@
 
 import re
 from math import log10, pi
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -38,7 +39,8 @@ def variant(coarse, monkeypatch, tmp_path):
 
 
 def requirement(result, name):
-    (line,) = [r for r in result.requirements if r.name.lower().startswith(name)]
+    rows = (*result.requirements, *result.papers_loop)
+    (line,) = [r for r in rows if r.name.lower().startswith(name)]
     return line
 
 
@@ -79,7 +81,9 @@ def test_the_achieved_margin_is_at_the_worst_residual(shipped):
 
 def test_the_lines_of_the_verdict(shipped):
     result, _ = shipped
-    found = [(r.unit, r.met, r.limited_by) for r in result.requirements]
+    rows = (*result.requirements[:3], *result.papers_loop, *result.requirements[3:])
+    assert (len(result.requirements), len(result.papers_loop)) == (5, 2)
+    found = [(r.unit, r.met, r.limited_by) for r in rows]
     cause = "hysteresis at the non-physical reversals at 25 Hz"
     assert found == [
         ("rad", True, "Body pointing"),
@@ -93,8 +97,10 @@ def test_the_lines_of_the_verdict(shipped):
     assert found[4][2].endswith(": " + cause)
     words = ("beacon cone", "beacon", "answer", "residual pointing error", "communication", "fine pointing")
     words += ("link margin but for 0.3 % of the time",)
-    assert all(r.name.lower().startswith(word) for r, word in zip(result.requirements, words, strict=True))
-    for line in result.requirements:
+    assert all(r.name.lower().startswith(word) for r, word in zip(rows, words, strict=True))
+    assert [r.mark for r in rows] == ["derived", "PASS", "PASS", "FAIL", "FAIL", "PASS", "derived"]
+    assert result.met and result.closes and result.margin_db == rows[-1].actual > rows[4].actual
+    for line in rows:
         sign = -1 if line.name.startswith(("residual pointing error", "fine pointing")) else 1
         assert_allclose(line.margin, sign * (line.actual - line.required), rtol=1e-9)
         assert line.met == (line.margin >= 0)
@@ -342,12 +348,19 @@ def test_a_receiver_slower_than_the_papers_rate_leaves_that_claim_unjudged(tmp_p
 def test_nothing_that_a_loop_must_do_is_met_by_a_mirror_without_dynamics():
     known = load_mission(SHIPPED).mission
     bare = known.model_copy(update={"mirror": known.mirror.model_copy(update={"linear": None})})
+
+    def judged(m, left_rad):
+        best = SimpleNamespace(
+            design=SimpleNamespace(name="PI"), simulated={"given": SimpleNamespace(quantile_rad=left_rad)}
+        )
+        fine = SimpleNamespace(best=best, quantile=0.997, budget=SimpleNamespace(dominant="Gauge"))
+        return verdict.of_fine_pointing(m, {}, fine, 5.0)
+
     for m, met in ((known, True), (bare, False)):
-        error = verdict.fine_pointing_requirement(m, 5e-6, 0.997, "PI", "Gauge")
-        for each in (error, verdict.outage_requirement(m, 5.0, "PI", "Gauge")):
+        for each in judged(m, 5e-6):
             assert (each.margin > 0, each.met) == (True, met)
             assert each.because == ("Gauge" if met else "dynamics of the mirror, which its model does not have")
-        assert not verdict.fine_pointing_requirement(m, 11e-6, 0.997, "PI", "Gauge").met
+        assert not judged(m, 11e-6)[0].met
         assert not_reliable(m) == ([] if met else [f"Not to be relied on: {unknown_dynamics(m.mirror)}."])
     assert "resonances and its lag are not known" in unknown_dynamics(bare.mirror)
     assert unknown_dynamics(bare.mirror) in summarise(bare.mirror).warnings

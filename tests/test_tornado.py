@@ -350,7 +350,7 @@ def test_units_and_kinds_of_source_travel_along():
     file = load_link(SHIPPED)
     found = {each.key: each for each in of_communication(file).swings}
     assert found["communication.transmit_power"].kind == "paper"
-    assert found["communication.receiver_sensitivity"].kind == "assumption"
+    assert found["communication.receiver_sensitivity"].kind == "derived"
     assert found["communication.distance"].unit == "m"
     assert found["communication.distance"].value == 42e6
     assert found["communication.strehl"].unit == "dB"  # read as a loss

@@ -67,7 +67,7 @@ class LinkStudy:
     @property
     def closes(self) -> bool:
         """Whether each budget has a margin of at least 0 dB."""
-        return all(budget.margin_db >= 0.0 for budget in self.budgets)
+        return all(budget.closes for budget in self.budgets)
 
     @property
     def warnings(self) -> tuple[str, ...]:

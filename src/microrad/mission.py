@@ -34,7 +34,7 @@ from microrad.units import format_quantity
 MOST_SAMPLES = 2_000_000
 """Control samples in a period of the scenario's sines beyond which a run would not fit into memory."""
 
-_KINDS = ("paper", "assumption", "standard", "measured", "identified", "literature", "unknown")
+_KINDS = ("paper", "assumption", "derived", "standard", "measured", "identified", "literature", "unknown")
 
 
 @dataclass(frozen=True, slots=True)

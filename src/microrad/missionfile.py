@@ -154,9 +154,9 @@ def load_mirror(path: str | Path) -> MirrorFile:
 
 
 def assumptions(mission_file: MissionFile | LinkFile) -> tuple[tuple[str, str, str], ...]:
-    """Key, raw value and source of every value whose comment calls it an assumption."""
+    """Key, raw value and source of every value whose comment calls it an assumption, or derived from others."""
     items = mission_file.sources.items()
-    return tuple((key, source.value, source.text) for key, source in items if source.kind == "assumption")
+    return tuple((key, source.value, source.text) for key, source in items if source.kind in ("assumption", "derived"))
 
 
 # --------------------------------------------------------------------------------------------------------------- files

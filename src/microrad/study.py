@@ -15,6 +15,7 @@ from microrad import (
     fine_pointing,
     kept,
     link,
+    link_performance,
     link_study,
     mirror_summary,
     orbit,
@@ -22,6 +23,7 @@ from microrad import (
     performance,
     pointing,
     readings,
+    requirement,
     simulate,
     tracking,
     verdict,
@@ -32,6 +34,7 @@ from microrad.threads import both
 
 Floats = NDArray[np.float64]
 Progress = Callable[[int, int, str], None]
+Requirements = tuple[requirement.Requirement, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,7 +66,9 @@ class Comparison:
 class Study:
     """Everything that a report shows, computed. ``achieved`` is the communication budget at the simulated residual.
 
-    ``other_readings`` are the verdict's numbers by other readings of what the paper leaves open.
+    ``requirements`` judge one terminal: with the mission's own fine-pointing loop, where it has one. The paper's loop
+    is then judged in ``papers_loop``, which is empty else. ``other_readings`` are its numbers by other readings of what
+    the paper leaves open.
     ``links`` holds what follows from the links' tables alone, ``performance`` what the simulated residuals cost them.
     ``day`` is what the link delivers under the best of those residuals, ``contact`` one of its contacts in time, and
     ``plan`` that of a constellation; each is None where the mission lacks a table for it.
@@ -86,7 +91,8 @@ class Study:
     day: day_study.DayStudy | None
     contact: contact_run.ContactRun | None
     plan: constellation.ConstellationPlan | None
-    requirements: tuple[verdict.Requirement, ...]
+    requirements: Requirements
+    papers_loop: Requirements
     claims: tuple[verdict.Claim, ...]
 
     @property
@@ -111,8 +117,24 @@ class Study:
 
     @property
     def closes(self) -> bool:
-        """Whether each of the three links has a margin of at least 0 dB, communication at the simulated residual."""
-        return min(self.beacon.margin_db, self.answer.margin_db, self.achieved.margin_db) >= 0.0
+        """Whether each of the three links has a margin of at least 0 dB, communication under the judged loop."""
+        return self.beacon.closes and self.answer.closes and self.achieved.possible and self.margin_db >= 0.0
+
+    @property
+    def met(self) -> bool:
+        """Whether every requirement is met."""
+        return all(r.met for r in self.requirements)
+
+    @property
+    def fine_case(self) -> link_performance.Performance | None:
+        """The link under the best controller of the fine-pointing loop, or None in a mission without that loop."""
+        return best_case(self.performance, self.fine_pointing)
+
+    @property
+    def margin_db(self) -> float:
+        """Margin of communication under the loop that is judged: but for the outage, or at the paper's residual."""
+        case = self.fine_case
+        return self.achieved.margin_db if case is None else case.margin_db
 
 
 def _present(budget: link.LinkBudget | None) -> link.LinkBudget:
@@ -153,12 +175,23 @@ def run(
     fine = None if m.fine_pointing is None else parts.part(fine_pointing.run, file, on_progress=on_progress)
     on_progress(2, 3, "the day")
     found = performance.run(m, runs, fine)
+    by_paper = verdict.of_residual(m, sources, achieved, residual, runs)
+    requirements, papers_loop = judged(file, links, by_paper, fine, found)
     day, contact, plan = delivered(file, links, found, fine, residual, achieved, parts)
 
     on_progress(3, 3, "verdict")
-    beacon, answer = _present(links.beacon), _present(links.answer)
     evidence = verdict.Evidence(
-        m, links.open_loop, beacon, links.communication, fig2.readings, fig2.ideal, loops, summary, runs, scan, day
+        m,
+        links.open_loop,
+        _present(links.beacon),
+        links.communication,
+        fig2.readings,
+        fig2.ideal,
+        loops,
+        summary,
+        runs,
+        scan,
+        day,
     )
     return Study(
         file=file,
@@ -178,10 +211,8 @@ def run(
         day=day,
         contact=contact,
         plan=plan,
-        requirements=(
-            *verdict.requirements(m, links.open_loop, beacon, answer, achieved, residual, runs),
-            *([] if fine is None else fine_requirements(m, fine, found)),
-        ),
+        requirements=requirements,
+        papers_loop=papers_loop,
         claims=verdict.against_paper(evidence),
     )
 
@@ -197,14 +228,25 @@ def _links_of(file: MissionFile) -> LinkFile:
     return LinkFile(file.mission, file.path, file.text, file.sha256, file.sources)
 
 
-def fine_requirements(
-    m: Mission, fine: fine_pointing.FinePointingStudy, found: performance.LinkPerformance
-) -> list[verdict.Requirement]:
-    """The best controller's radial error on the mission's mirror and the margin that it leaves the link."""
-    left, name, cause = fine.best.simulated["given"], fine.best.design.name, fine.budget.dominant
-    error = verdict.fine_pointing_requirement(m, left.quantile_rad, fine.quantile, name, cause)
-    case = found.case(performance.FINE, name, "given")
-    return [error] if case is None else [error, verdict.outage_requirement(m, case.margin_db, name, cause)]
+def judged(
+    file: MissionFile,
+    links: link_study.LinkStudy,
+    by_paper: Requirements,
+    fine: fine_pointing.FinePointingStudy | None,
+    found: performance.LinkPerformance,
+) -> tuple[Requirements, Requirements]:
+    """What the verdict judges, and what the paper's loop is held against beside it where it is not that."""
+    case, beams = best_case(found, fine), requirement.of_beams(links)
+    if fine is None or case is None:
+        return (*beams, *by_paper), ()
+    return (*beams, *verdict.of_fine_pointing(file.mission, file.sources, fine, case.margin_db)), by_paper
+
+
+def best_case(
+    found: performance.LinkPerformance, fine: fine_pointing.FinePointingStudy | None
+) -> link_performance.Performance | None:
+    """The link under the fine-pointing loop's best controller on the mission's mirror, or None without that loop."""
+    return None if fine is None else found.case(performance.FINE, fine.best.design.name, "given")
 
 
 def delivered(
@@ -223,7 +265,7 @@ def delivered(
     m = file.mission
     if m.orbit is None or m.operations is None:
         return None, None, None
-    case = None if fine is None else found.case(performance.FINE, fine.best.design.name, "given")
+    case = best_case(found, fine)
     if case is not None:
         loss = day_study.PointingLoss(case.outage_loss_db, case.outage, f"{case.controller}, {case.source}")
     else:

@@ -1,5 +1,6 @@
 """The verdict: each requirement with its margin and what limits it, and each claim of the paper beside our value."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -7,7 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from microrad import day_study, hysteresis, link, mirror_summary, paper, pointing, simulate
-from microrad.mission import Mission
+from microrad.fine_pointing import FinePointingStudy
+from microrad.mission import Mission, Source
+from microrad.requirement import Requirement, Subject, derived_from, outage_words
 from microrad.tracking import Run, mirror_model, residual_rad
 
 Floats = NDArray[np.float64]
@@ -16,78 +19,31 @@ CLAIMED_TRAVEL_RAD = 2.5e-3  # section 3.2
 PAPER_RATE_BIT_S = 300e6  # section 2.2
 
 
-@dataclass(frozen=True, slots=True)
-class Requirement:
-    """One line of the verdict, in one unit; ``margin`` is positive when it is met.
-
-    ``unknown`` says, where it is not empty, what would have to be known before the number may be relied on: such a
-    requirement is not met, whatever its margin.
-    """
-
-    name: str
-    unit: str
-    required: float
-    actual: float
-    margin: float
-    limited_by: str
-    unknown: str = ""
-
-    @property
-    def met(self) -> bool:
-        """Whether the requirement is met."""
-        return self.margin >= 0.0 and not self.unknown
-
-    @property
-    def because(self) -> str:
-        """What limits it, or what is not known."""
-        return self.unknown or self.limited_by
-
-
-def requirements(
-    m: Mission,
-    open_loop: pointing.OpenLoopPointing,
-    beacon: link.LinkBudget,
-    answer: link.LinkBudget,
-    achieved: link.LinkBudget,
-    worst: Run,
-    runs: tuple[Run, ...],
-) -> tuple[Requirement, ...]:
-    """The lines of the verdict, each with what limits it most."""
-    q, residual = m.requirement, residual_rad(m, worst.trace)
-    cause = residual_cause(m, worst, runs)
-    half = open_loop.beacon_half_angle_rad
-    largest = max(zip(open_loop.variance_shares, open_loop.lines, strict=True), key=lambda pair: pair[0])[1].name
-
-    def power(budget: link.LinkBudget, required_db: float = 0.0, by: str = "") -> Requirement:
-        # Free space is lost by everyone: name the largest loss that a design can change.
-        losses = [line for line in budget.lines if line.unit == "dB" and line.name != "Free-space loss"]
-        limit = by or min(losses, key=lambda line: line.value).name
-        return Requirement(
-            f"{budget.name.lower()} margin",
-            "dB",
-            required_db,
-            budget.margin_db,
-            budget.margin_db - required_db,
-            limit,
-            unknown(m) if by else "",
-        )
-
+# ------------------------------------------------------------------------------------------------------- requirements
+def of_residual(
+    m: Mission, sources: Mapping[str, Source], achieved: link.LinkBudget, worst: Run, runs: tuple[Run, ...]
+) -> tuple[Requirement, Requirement]:
+    """The error of the paper's loop in the worst of its sines, and the margin that it leaves communication."""
+    q, left, cause = m.requirement, residual_rad(m, worst.trace), residual_cause(m, worst, runs)
+    spare, derived = achieved.margin_db - q.margin_db, derived_from(sources, "communication.")
+    because, name = "the residual: " + cause, "communication margin"
     return (
-        Requirement(
-            "beacon cone over the root sum square", "rad", open_loop.rss_rad, half, half - open_loop.rss_rad, largest
-        ),
-        power(beacon),
-        power(answer),
-        Requirement(
-            "residual pointing error",
-            "rad",
-            q.pointing_error_rad,
-            residual,
-            q.pointing_error_rad - residual,
-            cause,
-            unknown(m),
-        ),
-        power(achieved, q.margin_db, "the residual: " + cause),
+        _error("residual", "residual pointing error", m, left, cause),
+        Requirement("communication", name, "dB", q.margin_db, achieved.margin_db, spare, because, unknown(m), derived),
+    )
+
+
+def of_fine_pointing(
+    m: Mission, sources: Mapping[str, Source], fine: FinePointingStudy, margin_db: float
+) -> tuple[Requirement, Requirement]:
+    """The error of the best controller for its share of the time, and the link's margin but for the outage."""
+    q, controller, cause = m.requirement, fine.best.design.name, fine.budget.dominant
+    left = fine.best.simulated["given"].quantile_rad
+    name, derived = f"link margin but for {outage_words(m)} ({controller})", derived_from(sources, "communication.")
+    spare = margin_db - q.margin_db
+    return (
+        _error("fine pointing", f"fine pointing at {100 * fine.quantile:g} % ({controller})", m, left, cause),
+        Requirement("communication", name, "dB", q.margin_db, margin_db, spare, cause, unknown(m), derived),
     )
 
 
@@ -97,20 +53,9 @@ def unknown(m: Mission) -> str:
     return "dynamics of the mirror, which its model does not have" if lacking else ""
 
 
-def fine_pointing_requirement(
-    m: Mission, quantile_rad: float, quantile: float, controller: str, cause: str
-) -> Requirement:
-    """The radial error of the fine-pointing loop, at its share of the time, against the same requirement."""
+def _error(subject: Subject, name: str, m: Mission, left_rad: float, cause: str) -> Requirement:
     allowed = m.requirement.pointing_error_rad
-    name = f"fine pointing at {100 * quantile:g} % ({controller})"
-    return Requirement(name, "rad", allowed, quantile_rad, allowed - quantile_rad, cause, unknown(m))
-
-
-def outage_requirement(m: Mission, margin_db: float, controller: str, cause: str) -> Requirement:
-    """The margin that the fine-pointing loop leaves the communication link but for its allowed outage."""
-    q = m.requirement
-    name = f"link margin but for {100 * q.outage:g} % of the time ({controller})"
-    return Requirement(name, "dB", q.margin_db, margin_db, margin_db - q.margin_db, cause, unknown(m))
+    return Requirement(subject, name, "rad", allowed, left_rad, allowed - left_rad, cause, unknown(m))
 
 
 def residual_cause(m: Mission, worst: Run, runs: tuple[Run, ...]) -> str:

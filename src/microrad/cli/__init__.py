@@ -8,13 +8,16 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from microrad.cli.frame import (
-    CLOSES,
-    DOES_NOT_CLOSE,
+    MET,
+    UNMET,
+    ExitOn,
     Json,
+    Judged,
     OnProgress,
     Outcome,
     Overwrite,
     Refusal,
+    Verbose,
     app,
     check_target,
     command,
@@ -24,6 +27,7 @@ from microrad.cli.frame import (
     option,
     progress_bar,
     say,
+    width,
 )
 from microrad.folder import write_whole
 
@@ -96,12 +100,15 @@ def run(
     fresh: Annotated[
         bool, typer.Option("--fresh", help="Compute all of it, also what an earlier run has kept.")
     ] = False,
+    verbose: Verbose = False,
+    exit_on: ExitOn = Judged.REQUIREMENTS,
     as_json: Json = False,
 ) -> Outcome:
     """Run the whole study of a mission.
 
     Prints the verdict, then writes report.html, results.nc, manifest.json and figures/ into a folder. The exit code is
-    0 when the link closes and 1 when it does not. What an earlier run computed of the same inputs is taken from it.
+    0 when every requirement is met and 1 when one is not. What an earlier run computed of the same inputs is taken
+    from it.
     """
     from microrad import kept, report
     from microrad.missionfile import load_mission
@@ -120,11 +127,11 @@ def run(
             say(parts.trouble)
         return "\n".join(str(folder / name) for name in ("report.html", "results.nc", "manifest.json"))
 
-    code = CLOSES if study.closes else DOES_NOT_CLOSE
+    code = exit_on.code(met=study.met, closes=study.closes)
     if as_json:
         write()
         return Outcome(json_text({**report.summary(study), "folder": str(folder)}), code)
-    return Outcome(f"{report.verdict_text(study)}\n", code, afterwards=write)
+    return Outcome(f"{report.verdict_text(study, width(), verbose=verbose)}\n", code, afterwards=write)
 
 
 def _contents(mission: "MissionFile") -> dict[str, bytes | None]:
@@ -176,7 +183,7 @@ def reproduce(
     with progress_bar() as progress:
         found = again.reproduce(report_file, progress)
     text = json_text(again.data(found)) if as_json else again.words(found)
-    return Outcome(text, CLOSES if found.same else DOES_NOT_CLOSE)
+    return Outcome(text, MET if found.same else UNMET)
 
 
 # ------------------------------------------------------------------------------------------------------- installation

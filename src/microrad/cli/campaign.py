@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from microrad.cli.frame import (
-    CLOSES,
-    DOES_NOT_CLOSE,
+    MET,
+    UNMET,
     Json,
     Outcome,
     Overwrite,
@@ -104,7 +104,7 @@ def _shown(path: Path, as_json: bool, output: str = "") -> Outcome:
     from microrad.report import campaign_words
 
     found = summarise(path)
-    code = CLOSES if campaign_words.verdict(found) == "pass" else DOES_NOT_CLOSE
+    code = MET if campaign_words.verdict(found) == "pass" else UNMET
     if as_json:
         return Outcome(json_text({**campaign_words.data(found), "ledger": str(path)}), code)
     return Outcome(f"{campaign_words.text(found, width())}\n\n{output or path}", code)
@@ -275,7 +275,7 @@ def optimise(file: _File, threads: _Threads = None, as_json: Json = False) -> Ou
 
     with progress_bar(_LINE_S) as progress:
         found = search.run(file, threads, progress)
-    code = CLOSES if found.confirmed else DOES_NOT_CLOSE
+    code = MET if found.confirmed else UNMET
     if as_json:
         return Outcome(json_text(campaign_optimum.data(found)), code)
     return Outcome(campaign_optimum.text(found), code)

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from microrad.cli.frame import (
-    CLOSES,
-    DOES_NOT_CLOSE,
+    MET,
+    UNMET,
     Json,
     Outcome,
     Refusal,
@@ -72,7 +72,7 @@ def contacts(
             day = day_study.run(links, on_progress=progress)
     except ValueError as error:  # a table that is missing, an orbit that does not hold
         raise Refusal(f"{file}: {error}") from error
-    code = CLOSES if day.relay.capacity_bit > 0.0 else DOES_NOT_CLOSE
+    code = MET if day.relay.capacity_bit > 0.0 else UNMET
     if as_json:
         return Outcome(json_text({"mission": links.file.mission.name, **day_tables.data(day)}), code)
     if as_csv:
@@ -113,7 +113,7 @@ def constellation(
     try:
         with progress_bar() as progress:
             plan = plans.run(links.file, day_study.given_loss(links), progress)
-        code = CLOSES if plan.volume_bit > 0.0 else DOES_NOT_CLOSE
+        code = MET if plan.volume_bit > 0.0 else UNMET
         if as_csv:
             return Outcome(operations.csv_text(plan.planned, plan.epoch.utc), code)
         if as_plan:

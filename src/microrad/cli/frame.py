@@ -1,8 +1,8 @@
 """The frame of every command: the application, failures in words, exit codes, output, files written whole.
 
-Data goes to stdout, progress and refusals to stderr. Exit codes: 0 done, 1 a study that does not close or an
-installation with a problem, 2 bad usage or a bad file, 70 a fault of microrad, 130 interrupted, 141 nobody read the
-output.
+Data goes to stdout, progress and refusals to stderr. Exit codes: 0 done, 1 a study whose requirements are not all met
+or an installation with a problem, 2 bad usage or a bad file, 70 a fault of microrad, 130 interrupted, 141 nobody read
+the output.
 """
 
 import _thread
@@ -21,24 +21,35 @@ import time
 import traceback
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from enum import StrEnum
 from io import TextIOWrapper
 from pathlib import Path
 from typing import Annotated, Any, NoReturn, ParamSpec
 
 import typer
 
-CLOSES, DOES_NOT_CLOSE, REFUSED, BUG, INTERRUPTED, UNREAD = 0, 1, 2, 70, 130, 141
+MET, UNMET, REFUSED, BUG, INTERRUPTED, UNREAD = 0, 1, 2, 70, 130, 141
 
 PROGRESS_FILE = "MICRORAD_PROGRESS"
 """Environment variable that names a file for progress, as JSON lines, in place of a bar or lines on stderr."""
 
-_WIDE = 160  # columns of a table that goes to a file
 _BAR_S = 0.05  # between two looks of the bar
 _PROGRESS_S = 0.2  # between two lines of a progress file, unless another phase begins
 _PROGRESS_BYTES = 1_000_000  # of a progress file, which begins anew beyond
 
 _Arguments = ParamSpec("_Arguments")
 OnProgress = Callable[[int, int, str], None]
+
+
+class Judged(StrEnum):
+    """What the exit code of a study says."""
+
+    REQUIREMENTS = "requirements"
+    CLOSES = "closes"
+
+    def code(self, *, met: bool, closes: bool) -> int:
+        """0 where that holds, else 1."""
+        return MET if (met if self is Judged.REQUIREMENTS else closes) else UNMET
 
 
 class Refusal(ValueError):  # noqa: N818  a refusal is no error of the program
@@ -277,9 +288,8 @@ def progress_bar(line_s: float = math.inf) -> Iterator[OnProgress]:
 
 
 def width() -> int:
-    """Columns for tables: those of the terminal, or of a file where the output goes to one; at least 80."""
-    own = shutil.get_terminal_size((_WIDE, 24)).columns if sys.stdout and sys.stdout.isatty() else _WIDE
-    return max(own, 80)
+    """Columns for tables: those of the terminal, of the variable COLUMNS, or 80, also where the output is piped."""
+    return max(shutil.get_terminal_size((80, 24)).columns, 80)
 
 
 def check_target(path: Path, advice: str, replace_if_begins: str = "") -> None:
@@ -295,14 +305,19 @@ def check_target(path: Path, advice: str, replace_if_begins: str = "") -> None:
             raise Refusal(f"{path} was not written by microrad and is left as it is; {advice}.")
 
 
-# ----------------------------------------------------------------------------------------------------------- commands
-Json = Annotated[bool, typer.Option("--json", help="Print one JSON document and nothing else.")]
-Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace what an earlier run wrote.")]
-
-
 def option(flag: str, metavar: str, text: str, **settings: Any) -> Any:
     """An option with the name of its value and its help."""
     return typer.Option(flag, metavar=metavar, help=text, **settings)
+
+
+# ----------------------------------------------------------------------------------------------------------- commands
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON document and nothing else.")]
+Verbose = Annotated[bool, typer.Option("--verbose", help="All of it: sources, other tables, every warning.")]
+ExitOn = Annotated[
+    Judged,
+    option("--exit-on", "WHAT", "What exit code 0 stands for: requirements, all are met; closes, the links do."),
+]
+Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace what an earlier run wrote.")]
 
 
 def _version(wanted: bool) -> None:

@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from microrad.cli.frame import (
-    CLOSES,
-    DOES_NOT_CLOSE,
+    ExitOn,
     Json,
+    Judged,
     Outcome,
     Refusal,
+    Verbose,
     app,
     command,
     examples,
@@ -35,7 +36,7 @@ if TYPE_CHECKING:
     )
 )
 @command
-def budget(
+def budget(  # noqa: PLR0913, PLR0917  each is an option
     file: Annotated[Path, typer.Argument(help="Mission file, or one with the tables of its links.", metavar="FILE")],
     data_rate: Annotated[str | None, option("--data-rate", "RATE", "In place of the mission's.")] = None,
     pointing_error: Annotated[str | None, option("--pointing-error", "ANGLE", "In place of the mission's.")] = None,
@@ -44,13 +45,15 @@ def budget(
     ] = False,
     as_csv: Annotated[bool, typer.Option("--csv", help="Print one line a row, for a spreadsheet.")] = False,
     as_html: Annotated[bool, typer.Option("--html", help="Print one page that loads nothing.")] = False,
+    verbose: Verbose = False,
+    exit_on: ExitOn = Judged.REQUIREMENTS,
     as_json: Json = False,
 ) -> Outcome:
     """Print the link budgets of a mission.
 
-    Communication, beacon and answer line by line with basis, source and where each line holds; the pointing budget, the
-    light on the tracking sensor, acquisition, and what moves the margin most. No loop is simulated. The exit code is 0
-    when each link has a margin of at least 0 dB and 1 when one has not.
+    The verdict, what limits the links, and communication, beacon and answer line by line; --verbose has the source of
+    each line and where it holds, the pointing budget, the light on the tracking sensor and acquisition, too. No loop is
+    simulated. The exit code is 0 when every requirement is met and 1 when one is not.
     """
     if sum((as_csv, as_html, as_json)) > 1:
         raise Refusal("--csv, --html and --json exclude each other; give one of them.")
@@ -59,6 +62,7 @@ def budget(
     from microrad import link_study
     from microrad.missionfile import load_link
     from microrad.report import budget_views
+    from microrad.requirement import met
 
     loaded = load_link(file)
     if pointing_error is not None and loaded.mission.jitter is not None:
@@ -71,14 +75,14 @@ def budget(
         study = link_study.run(given)
     except ValueError as error:  # a rate that the receiver does not take, a scan without time to detect
         raise Refusal(f"{file}: {error}") from error
-    code = CLOSES if study.closes else DOES_NOT_CLOSE
+    code = exit_on.code(met=met(study), closes=study.closes)
     if as_json:
         return Outcome(json_text(budget_views.data(study)), code)
     if as_csv:
         return Outcome(budget_views.csv_text(study), code)
     if as_html:
         return Outcome(budget_views.html(study), code)
-    return Outcome(budget_views.text(study, width()), code)
+    return Outcome(budget_views.text(study, width(), verbose=verbose), code)
 
 
 def _changed(file: "LinkFile", data_rate: str | None, pointing_error: str | None, solve_rate: bool) -> "LinkFile":

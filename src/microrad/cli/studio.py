@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from microrad.cli.frame import CLOSES, Outcome, app, command, examples, option, say
+from microrad.cli.frame import MET, Outcome, app, command, examples, option, say
 
 if TYPE_CHECKING:
     from microrad.studio.server import Entrance
@@ -54,7 +54,7 @@ def studio(
             server.serve(workshop, entrance, lambda: _ready(workshop, entrance, expose, not no_browser))
     running = sum(not job.finished for job in workshop.jobs.listed())
     going_on = f"; {running} of its jobs {'goes' if running == 1 else 'go'} on, and can be seen by starting it again"
-    return Outcome(f"the studio is closed{going_on if running else ''}", CLOSES)
+    return Outcome(f"the studio is closed{going_on if running else ''}", MET)
 
 
 def _ready(workshop: "Workshop", entrance: "Entrance", exposed: str | None, browser: bool) -> None:

@@ -43,6 +43,7 @@ _NOT_GIVEN = "not given"
 LEFT_AT_ZERO = "left at 0 dB"
 """The warning of a loss that is stated as nothing."""
 STREHL_LOSS, POINTING_LOSS, POINT_AHEAD_LOSS = "Strehl loss", "Pointing loss", "Point-ahead loss"
+_ROUNDING_DB = 1e-9  # of a link whose rate is solved for 0 dB
 FREE_SPACE_LOSS, CLEAR_SKY_LOSS = "Free-space loss", "Clear-sky loss"
 DEEPEST_DB = 20.0  # pointing loss beyond which side lobes and scatter decide, not the main lobe
 WIDEST_RAD = 0.1  # half angle or error beyond which a small angle is none
@@ -71,6 +72,16 @@ class LinkBudget:
     irradiance_on_axis_w_m2: float
     required_irradiance_w_m2: float
     radiant_intensity_w_sr: float
+
+    @property
+    def possible(self) -> bool:
+        """Whether no more light arrives than was sent: a far field taken far into the near field has more."""
+        return self.received_power_w <= gains.watt(self.lines[0].value)
+
+    @property
+    def closes(self) -> bool:
+        """Whether there is a margin of at least 0 dB, by a budget that may be relied on."""
+        return self.margin_db >= -_ROUNDING_DB and self.possible
 
     @property
     def at_zero(self) -> tuple[str, ...]:

@@ -11,15 +11,19 @@ from microrad import link
 from microrad.budget import Line
 from microrad.link import Swing
 from microrad.link_acquisition import Finding, Found, Tracking
-from microrad.link_performance import Performance, required_error_rad
+from microrad.link_performance import Performance, error_rad, required_error_rad
 from microrad.link_study import LinkStudy
 from microrad.mission import source_text
 from microrad.operations import spreadsheet_text
 from microrad.pointing import OpenLoopPointing
-from microrad.report.quantities import quantity
+from microrad.report import requirements
+from microrad.report.quantities import quantity, signed
+from microrad.report.tables import Table, table_text, tables_text
+from microrad.requirement import met, of_links, outage_words
 
 UNDER_JITTER = "Communication under jitter"
 """The lines of what the jitter does to the communication link, beside its budget."""
+_ROOM = 120  # columns for a table of all that a line has
 COLUMNS = ("budget", "line", "value", "unit", "basis", "source", "holds for", "warning")
 
 
@@ -67,35 +71,65 @@ def csv_text(study: LinkStudy) -> str:
     return buffer.getvalue().rstrip("\n")
 
 
-def text(study: LinkStudy, width: int) -> str:
-    """The budgets as tables of at most ``width`` columns, what follows from them, and the warnings."""
-    from rich import box
-    from rich.console import Console
-    from rich.table import Table
+def text(study: LinkStudy, width: int, verbose: bool = False) -> str:
+    """The verdict with a line for each requirement, what limits it, and the budgets, in at most ``width`` columns.
 
-    console = Console(file=io.StringIO(), width=width, color_system=None, highlight=False, markup=False)
-    groups: dict[str, list[Line]] = {}
-    for name, line in lines(study):
-        groups.setdefault(name, []).append(line)
-    for name, members in groups.items():
-        table = Table(title=name, title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False, expand=True)
-        table.add_column("line", width=max(width // 6, 14), overflow="fold")
-        table.add_column("value", justify="right", no_wrap=True, min_width=12)
-        for heading, ratio in (("basis", 5), ("source", 5), ("holds for", 4)):
-            table.add_column(heading, ratio=ratio, overflow="fold")
-        for line in members:
-            mark = " !" if line.warning else ""
-            table.add_row(line.name + mark, quantity(line.value, line.unit), line.basis, line.source, line.regime)
-        console.print(table)
-    for sentence in sentences(study):
-        console.print(sentence, soft_wrap=True)
+    ``verbose`` adds to the lines where they come from and hold, the other tables, every sentence and every warning.
+    """
+    judged = of_links(study)
+    blocks = [tables_text([], [verdict(study)], width), table_text(requirements.table(judged), width)]
+    if not verbose:
+        tables = [Table(b.name, ("line", "value", "basis"), _brief(b), (2,)) for b in study.budgets]
+        return "\n\n".join((*blocks, tables_text([], short(study), width), tables_text(tables, [], width)))
+    said = [*short(study), *sentences(study)[1:]]
+    blocks += [_tables(study, width), tables_text([], list(dict.fromkeys(said)), width)]
     if study.warnings:
-        console.print("\nWarnings (! in the tables)", soft_wrap=True)
-        for warning in study.warnings:
-            console.print(f"  {warning}", soft_wrap=True)
-    written = console.file
-    assert isinstance(written, io.StringIO)
-    return "\n".join(line.rstrip() for line in written.getvalue().splitlines())
+        blocks.append(tables_text([], ["Warnings (! in the tables)", *(f"- {w}" for w in study.warnings)], width))
+    return "\n\n".join(blocks)
+
+
+def short(study: LinkStudy) -> list[str]:
+    """What limits the links and what to do about it, in six sentences at most."""
+    m, found = study.file.mission, of_links(study)
+    at = f"at {quantity(m.communication.pointing_error_rad, 'rad')} of pointing error"
+    if m.jitter is not None:
+        at = f"but for {outage_words(m)} under the jitter, an error of {quantity(error_rad(m), 'rad')}"
+    said = [f"The margin is received over required power, for communication {at}.", *consequences(study)[:2]]
+    r = requirements.nearest(found)
+    said.append(f"{'Nearest to its limit is' if r.met else 'What limits it is'} the {r.name}, by {r.because}.")
+    said.append(requirements.derived_words(found))
+    if warned := study.warnings:
+        more = f" ({len(warned) - 1} more by --verbose)" if len(warned) > 1 else ""
+        said.append(f"Warning: {warned[0]}{more}.")
+    return list(filter(None, said))
+
+
+def _brief(budget: link.LinkBudget) -> list[tuple[str, ...]]:
+    found = (*budget.lines, *budget.totals)
+    return [(line.name + _mark(line), quantity(line.value, line.unit), line.basis) for line in found]
+
+
+def _mark(line: Line) -> str:
+    return " !" if line.warning else ""
+
+
+def _tables(study: LinkStudy, width: int) -> str:
+    """Every table with basis, source and where each line holds: in columns, or below each other in a narrow one."""
+    headings = ("line", "value", "basis", "source", "holds for")
+    groups: dict[str, list[tuple[str, ...]]] = {}
+    for name, line in lines(study):
+        texts = line.name + _mark(line), quantity(line.value, line.unit), line.basis, line.source, line.regime
+        groups.setdefault(name, []).append(texts)
+    if width >= _ROOM:
+        return tables_text([Table(name, headings, rows, (0, 2, 3, 4)) for name, rows in groups.items()], [], width)
+    tables = [Table(name, headings[:3], [_stacked(row) for row in rows], (2,)) for name, rows in groups.items()]
+    return tables_text(tables, [], width)
+
+
+def _stacked(row: tuple[str, ...]) -> tuple[str, ...]:
+    """Basis, source and where it holds, one below the other."""
+    name, value, basis, source, regime = row
+    return name, value, f"{basis}\nfrom: {source}\nholds for: {regime}"
 
 
 def sentences(study: LinkStudy) -> list[str]:
@@ -145,14 +179,14 @@ def _rate_limit(study: LinkStudy) -> str:
 
 
 def verdict(study: LinkStudy) -> str:
-    """Whether the links close, with each margin."""
-    margins = ", ".join(f"{b.name.lower()} {signed_db(b.margin_db)}" for b in study.budgets)
-    return f"The links {'close' if study.closes else 'do not close'}: {margins}."
-
-
-def signed_db(value_db: float) -> str:
-    """A margin in decibels with its sign."""
-    return f"{value_db:+.2f} dB".replace("-", "\u2212")
+    """Whether the links close and have what is required of them. "The links close" stands above no FAIL."""
+    margins = ", ".join(f"{b.name.lower()} {signed(b.margin_db, 'dB')}" for b in study.budgets)
+    failed = [r for r in of_links(study) if not r.met]
+    if not study.closes:
+        return f"The links do not close: {margins}."
+    if failed:
+        return f"Not every requirement is met: {' and '.join(r.name for r in failed)}; {margins}."
+    return f"The links close, and {requirements.met_words(of_links(study))}: {margins}."
 
 
 def _top(swings: Sequence[Swing]) -> str:
@@ -203,8 +237,9 @@ def performance(p: Performance, study: LinkStudy) -> str:
     narrowest = ", the narrowest of the aperture" if p.best.at_limit else ""
     return (
         f"Under the jitter: mean pointing loss {p.mean_loss_db:.2f} dB; {p.outage_loss_db:.2f} dB but for "
-        f"{100 * q.outage:g} % of the time, which leaves a margin of {signed_db(p.margin_db)}; below 0 dB for a share "
-        f"of {p.outage:.3g} of the time; best half angle {quantity(p.best.half_angle_rad, 'rad')}{narrowest}. "
+        f"{100 * q.outage:g} % of the time, which leaves a margin of {signed(p.margin_db, 'dB')}; below 0 dB for a "
+        f"share of {quantity(p.outage, '')} of the time; best half angle "
+        f"{quantity(p.best.half_angle_rad, 'rad')}{narrowest}. "
         f"Power that it costs: with a code {p.mean_loss_db:.2f} dB where its interleaver spans many fades, "
         f"{p.outage_loss_db:.2f} dB where it spans none; without a code {_uncoded(p)}."
     )
@@ -258,6 +293,8 @@ def html(study: LinkStudy) -> str:
         "study": study,
         "mission": study.file.mission,
         "verdict": verdict(study),
+        "met": met(study),
+        "paragraph": requirements.paragraph(of_links(study)),
         "links": links.context(study, budgets=budgets, figures=figures, files=False),
         "quantity": quantity,
         "angle": page.angle,
@@ -267,12 +304,17 @@ def html(study: LinkStudy) -> str:
 
 
 def data(study: LinkStudy) -> dict[str, Any]:
-    """The budgets and what follows from them as plain data, SI units in the keys."""
+    """The verdict on the links, their budgets and what follows from them as plain data, SI units in the keys."""
+    judged = [requirements.data(r) for r in of_links(study)]
+    return {"closes": study.closes, "met": met(study), "requirements": judged, **facts(study)}
+
+
+def facts(study: LinkStudy) -> dict[str, Any]:
+    """The budgets and what follows from them as plain data, without a verdict of their own."""
     p = study.open_loop
     return {
         "mission": study.file.mission.name,
         "mission_sha256": study.file.sha256,
-        "closes": study.closes,
         "budgets": [
             {
                 "name": b.name,

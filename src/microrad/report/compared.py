@@ -179,6 +179,8 @@ def _same(was: Any, now: Any, exactly: bool) -> bool:
 
 def _near_in_words(was: str, now: str) -> bool:
     """Whether two numbers of a sentence may be roundings of one: a whole number may be a count."""
+    if was == now:  # one beyond all floats has no distance from itself
+        return True
     a, b = _float(was), _float(now)
     digits = len(was.partition(".")[2]) if "e" not in was else 0
     last = 1.0001 * 10.0**-digits if digits else 0.0

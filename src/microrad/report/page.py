@@ -25,6 +25,7 @@ from microrad.report import (
     links,
     paper_views,
     requirement_views,
+    requirements,
     tails,
     words,
 )
@@ -94,10 +95,12 @@ def render(study: Study, drawn: Drawn, manifest: Mapping[str, Any]) -> str:
         "titles": dict(titles),
         "numbers": {id: place for place, (id, _) in enumerate(titles, start=1)},
         "headline": words.headline(study),
-        "paragraph": requirement_views.paragraph(study),
+        "paragraph": requirements.paragraph(study.requirements),
         "explanation": words.explanation(study),
         "warnings": words.warnings(study),
         "requirements": requirement_views.rows(study),
+        "papers_loop": requirement_views.papers_rows(study),
+        "papers_words": words.papers_loop(study),
         "other_readings": requirement_views.readings(study),
         "chain_wide": chain.layout(boxes, 4, 960.0, 26.0),
         "chain_narrow": chain.layout(boxes, 1, 340.0, 24.0),
@@ -107,7 +110,7 @@ def render(study: Study, drawn: Drawn, manifest: Mapping[str, Any]) -> str:
         "quantity": quantity,
         "angle": angle,
         "mirror_lines": [line for line in str(study.summary).splitlines() if not line.startswith("  warning")],
-        "sound": all(r.met for r in study.requirements) and not words.beyond_identified(study, study.residual),
+        "sound": study.met and (study.fine_case is not None or not words.beyond_identified(study, study.residual)),
         "changed": changed_from_shipped(study.file),
         "margins": _margins(study),
         "assumptions": assumptions(study.file),
@@ -215,7 +218,7 @@ def _loop_noise(study: Study) -> list[str]:
 def _inputs(sources: Any) -> list[tuple[str, Source]]:
     """What was given, but for the hundreds of numbers of a correlation, which stand in the mirror file."""
     shown = (item for item in sources.items() if item[0] != "mirror.uncertainty.correlation")
-    return [(key, source) for key, source in shown if source.kind != "assumption"]
+    return [(key, source) for key, source in shown if source.kind not in ("assumption", "derived")]
 
 
 def _margins(study: Study) -> list[tuple[str, str]]:

@@ -1,18 +1,20 @@
 """The verdict by requirement: its margin and what contributes most to it, with the numbers of the budgets."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from microrad import link
 from microrad.link.budget import FREE_SPACE_LOSS, POINTING_LOSS
-from microrad.performance import FINE, NO_HYSTERESIS
+from microrad.performance import NO_HYSTERESIS
 from microrad.readings import Reading
 from microrad.report.fine_pointing_words import percent, source_name
 from microrad.report.quantities import apart, quantity
+from microrad.report.requirements import signed
+from microrad.requirement import Requirement, Subject
 from microrad.study import Study
 from microrad.tracking import residual_rad
-from microrad.verdict import Requirement, unknown
+from microrad.verdict import unknown
 
 Row = dict[str, Any]
 _BY_TEN = ("bit_error_ratio", "outage")  # inputs that a tornado moves by their order of magnitude
@@ -20,13 +22,18 @@ _BY_TEN = ("bit_error_ratio", "outage")  # inputs that a tornado moves by their 
 
 def rows(study: Study) -> list[Row]:
     """Each requirement as text: mark, required, achieved, margin, and its dominant contributor."""
-    found = zip(study.requirements, contributors(study), strict=True)
-    return [_row(r, *apart(r.required, r.actual, r.unit), text) for r, text in found]
+    return [_row(r, contributor(study, r)) for r in study.requirements]
 
 
-def _row(r: Requirement, required: str, achieved: str, contributor: str) -> Row:
-    texts = {"required": required, "achieved": achieved, "margin": signed(r), "contributor": contributor}
-    return {"name": r.name, "mark": mark(r), **texts}
+def papers_rows(study: Study) -> list[Row]:
+    """What the paper's loop is held against, in the same form; nothing where it is what the verdict judges."""
+    return [_row(r, contributor(study, r)) for r in study.papers_loop]
+
+
+def _row(r: Requirement, text: str) -> Row:
+    required, achieved = apart(r.required, r.actual, r.unit)
+    texts = {"required": required, "achieved": achieved, "margin": signed(r), "contributor": text}
+    return {"name": r.name, "mark": r.mark, **texts}
 
 
 def readings(study: Study) -> list[Row]:
@@ -48,33 +55,10 @@ def readings(study: Study) -> list[Row]:
     ]
 
 
-def mark(r: Requirement) -> str:
-    """PASS or FAIL."""
-    return "PASS" if r.met else "FAIL"
-
-
-def signed(r: Requirement) -> str:
-    """The margin with its sign."""
-    text = quantity(r.margin, r.unit)
-    return f"+{text}" if r.margin >= 0.0 else text
-
-
-def paragraph(study: Study) -> str:
-    """What holds and what does not, a clause for each requirement."""
-    failed, passed = ([r for r in study.requirements if r.met == met] for met in (False, True))
-    count = f"{len(passed)} of {len(study.requirements)} requirements are met."
-    parts = [count]
-    if failed:
-        parts.append(f"FAIL: {'; '.join(f'{r.name} {signed(r)}, by {r.because}' for r in failed)}.")
-    if passed:
-        parts.append(f"PASS: {'; '.join(f'{r.name} {signed(r)}' for r in passed)}.")
-    return " ".join(parts)
-
-
-def contributors(study: Study) -> list[str]:
-    """The dominant contributor to each requirement, in the order of the study's requirements."""
-    named = zip(_CONTRIBUTORS, study.requirements, strict=False)
-    return [_capital(r.unknown or of(study, r.limited_by)) for of, r in named]
+def contributor(study: Study, r: Requirement) -> str:
+    """What contributes most to a requirement, with its numbers."""
+    fine = study.fine_case is not None and r in study.requirements
+    return _capital(r.unknown or (_OF_FINE if fine else _CONTRIBUTORS)[r.subject](study, r.limited_by))
 
 
 def _capital(text: str) -> str:
@@ -138,21 +122,19 @@ def _fine(study: Study, cause: str) -> str:
 
 
 def _outage(study: Study, cause: str) -> str:
-    fine = study.fine_pointing
-    assert fine is not None  # such a requirement has one
-    case = study.performance.case(FINE, fine.best.design.name, "given")
-    assert case is not None
+    case = study.fine_case
+    assert case is not None  # such a requirement has one
     lost = quantity(case.outage_loss_db, "dB")
     most = most_sensitive(_tornado(study, study.achieved.name))
     return f"{source_name(cause)}, pointing loss {lost} at the outage{most}"
 
 
-_CONTRIBUTORS: tuple[Callable[[Study, str], str], ...] = (
-    lambda study, cause: _cone(study),
-    lambda study, cause: _power(study, study.beacon),
-    lambda study, cause: _power(study, study.answer),
-    _residual,
-    _communication,
-    _fine,
-    _outage,
-)
+_CONTRIBUTORS: Mapping[Subject, Callable[[Study, str], str]] = {
+    "cone": lambda study, cause: _cone(study),
+    "beacon": lambda study, cause: _power(study, study.beacon),
+    "answer": lambda study, cause: _power(study, study.answer),
+    "residual": _residual,
+    "communication": _communication,
+    "fine pointing": _fine,
+}
+_OF_FINE = {**_CONTRIBUTORS, "communication": _outage}

@@ -52,3 +52,8 @@ def tables_text(tables: Sequence[Table], sentences: Sequence[str], width: int) -
     written = console.file
     assert isinstance(written, io.StringIO)
     return "\n".join(line.rstrip() for line in written.getvalue().splitlines())
+
+
+def table_text(table: Table, width: int) -> str:
+    """One table without blank lines around it."""
+    return tables_text([table], [], width).strip("\n")

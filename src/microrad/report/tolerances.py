@@ -174,8 +174,8 @@ SUMMARY: Mapping[str, tuple[str, ...]] = {
     "gain": ("fine_pointing.{rms_gained_over_baseline,rms_left_to_gain.baseline_with_hysteresis}",),
     "added": ("fine_pointing.error_budget.differences[].added_rms_rad",),
     "link": (
-        "margin_db.communication_at_residual",
-        "requirements[].{required,actual,margin}",
+        "margin_db.{judged,communication_at_residual}",
+        "{requirements,papers_loop}[].{required,actual,margin}",
         "other_readings[].margin_db",
         "performance[].{bias_rad[],rms_rad[],mean_loss_db,outage_loss_db,margin_db,outage,below_required_margin}",
         "performance[].{data_rate_bit_s,best_half_angle_rad,wanted_half_angle_rad,lost_against_best_db}",

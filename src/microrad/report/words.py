@@ -13,54 +13,103 @@ from microrad.report import (
     day_tables,
     day_words,
     fine_pointing_words,
+    requirement_views,
+    requirements,
 )
 from microrad.report.fine_pointing_data import data as fine_pointing_data
-from microrad.report.quantities import apart, quantity
+from microrad.report.quantities import quantity, signed
+from microrad.report.tables import table_text, tables_text
+from microrad.requirement import IMPOSSIBLE, outage_words
 from microrad.study import Study
 from microrad.tracking import Run, residual_rad
 from microrad.units import format_quantity
 
 
 def headline(study: Study) -> str:
-    """The verdict in one sentence."""
-    m, margin = study.file.mission, study.achieved.margin_db
-    left, rate = residual_rad(m, study.residual.trace), m.communication.data_rate_bit_s
-    statistic = m.requirement.residual_statistic
-    at = f"{format_quantity(rate, 'bit/s')} and a simulated residual of {format_quantity(left, 'rad', 3)} ({statistic})"
+    """The verdict in one sentence. "The link closes" stands above no requirement that is not met."""
+    at = _judged_at(study)
     if not study.closes:
-        links = {"beacon": study.beacon, "answer": study.answer, "communication": study.achieved}
-        failing = [f"{name} {b.margin_db:+.2f} dB" for name, b in links.items() if b.margin_db < 0.0]
-        return f"The link does not close: {', '.join(failing)}, at {at}."
-    met = all(r.met for r in study.requirements)
-    tail = "and every requirement is met" if met else "but not every requirement is met"
-    text = f"The link closes, with a margin of {margin:+.2f} dB at {at}, {tail}."
-    return f"{text} The mirror model is extrapolated." if beyond_identified(study, study.residual) else text
+        links = {"beacon": study.beacon.margin_db, "answer": study.answer.margin_db, "communication": study.margin_db}
+        failing = [f"{name} {signed(margin, 'dB')}" for name, margin in links.items() if margin < 0.0]
+        return f"The link does not close: {', '.join(failing) or IMPOSSIBLE}, at {at}."
+    margin, failed = signed(study.margin_db, "dB"), [r for r in study.requirements if not r.met]
+    if failed:
+        names = " and ".join(f"{r.name} ({r.unknown or requirements.signed(r)})" for r in failed)
+        return f"Not every requirement is met: {names}. The margin is {margin} at {at}.{_extrapolated(study)}"
+    met = requirements.met_words(study.requirements)
+    return f"The link closes, with a margin of {margin} at {at}, and {met}.{_extrapolated(study)}"
+
+
+def _judged_at(study: Study) -> str:
+    """The working point at which the verdict has its margin."""
+    m, case = study.file.mission, study.fine_case
+    rate = format_quantity(m.communication.data_rate_bit_s, "bit/s")
+    if case is not None:
+        return f"{rate} but for {outage_words(m)}"
+    left = format_quantity(residual_rad(m, study.residual.trace), "rad", 3)
+    return f"{rate} and a simulated residual of {left} ({m.requirement.residual_statistic})"
+
+
+def _extrapolated(study: Study) -> str:
+    return " The mirror model is extrapolated." if _judged_beyond(study) else ""
+
+
+def _judged_beyond(study: Study) -> str:
+    """How far the mirror of the judged loop is driven beyond where it was identified, or nothing."""
+    return beyond_identified(study, study.residual) if study.fine_case is None else ""
+
+
+def short(study: Study) -> list[str]:
+    """What limits the terminal and what to do about it, in six sentences at most."""
+    case = study.fine_case
+    under = "" if case is None else f", with what {case.controller} leaves of {case.source}"
+    found = [
+        f"The margin is received over required power of the communication link at {_judged_at(study)}{under}.",
+        _limit(study),
+        requirements.derived_words(study.requirements),
+        _largest_warning(study),
+        "" if study.day is None else day_words.headline(study.day)[0],
+        _papers_loop(study),
+    ]
+    return list(filter(None, found))
+
+
+def _limit(study: Study) -> str:
+    r = requirements.nearest(study.requirements)
+    said = requirement_views.contributor(study, r)
+    return f"{'Nearest to its limit is' if r.met else 'What limits it is'} the {r.name}: {said[:1].lower()}{said[1:]}."
+
+
+def _largest_warning(study: Study) -> str:
+    if beyond := _judged_beyond(study):
+        return f"Not to be relied on: {beyond}."
+    found = warnings(study)
+    more = f" ({len(found) - 1} more by --verbose)" if len(found) > 1 else ""
+    return f"Warning: {found[0]}{more}." if found else ""
+
+
+def _papers_loop(study: Study) -> str:
+    """How the paper's loop does, where it is not what the verdict judges, or nothing."""
+    failed = [r.name for r in study.papers_loop if not r.met]
+    if not study.papers_loop:
+        return ""
+    m, run = study.file.mission, study.residual
+    left = format_quantity(residual_rad(m, run.trace), "rad", 3)
+    judged = f"misses {' and '.join(failed)}" if failed else "meets what is required"
+    return (
+        f"The paper's loop, judged by itself ({run.controller}, sine of {run.freq_hz:g} Hz), {judged}: it leaves "
+        f"{left} ({m.requirement.residual_statistic}) and {signed(study.achieved.margin_db, 'dB')}."
+    )
 
 
 def explanation(study: Study) -> list[str]:
     """What the headline rests on, a sentence each."""
-    m, run = study.file.mission, study.residual
-    budget, trace, q = study.communication, run.trace, m.requirement
-    sentences = [
-        f"As budgeted, at {format_quantity(m.communication.pointing_error_rad, 'rad', 3)}, the margin is "
-        f"{budget.margin_db:+.2f} dB; {m.requirement.margin_db:g} dB is required.",
-        f"The loop ({run.controller}, {run.freq_hz:g} Hz) leaves {format_quantity(trace.peak_rad, 'rad', 3)} at its "
-        f"peaks and {format_quantity(trace.rms_rad, 'rad', 3)} rms on its axis{_two_axes(m)}; "
-        f"{format_quantity(q.pointing_error_rad, 'rad', 3)} ({q.residual_statistic}) is allowed.",
-    ]
-    if extrapolated := beyond_identified(study, run):
-        sentences.append(f"Not to be relied on: {extrapolated}.")
+    m = study.file.mission
+    sentences = []
     failed = [r for r in study.requirements if not r.met]
     if failed:
         causes = dict.fromkeys(r.because.removeprefix("the residual: ") for r in failed)
         sentences.append(f"What limits it: {'; '.join(causes)}.")
-    if study.comparison is not None:
-        left = residual_rad(m, study.comparison.residual.trace)
-        sentences.append(
-            f"On the mission's comparison model of the mirror the residual is {format_quantity(left, 'rad', 3)} and "
-            f"the margin {study.comparison.margin_db:+.2f} dB."
-        )
-    sentences += read_otherwise(study)
     if study.fine_pointing is not None:
         sentences += fine_pointing_words.short(study.fine_pointing, m)
     sentences += filter(None, (hysteresis_cost(study), found(study)))
@@ -68,6 +117,28 @@ def explanation(study: Study) -> list[str]:
         day = study.day
         sentences += [*day_words.headline(day), *day_words.latency_words(day), *day_words.assumption_words(day)[:1]]
     return sentences
+
+
+def papers_loop(study: Study) -> list[str]:
+    """What the paper's loop leaves in the worst of its sines, a sentence each."""
+    m, run = study.file.mission, study.residual
+    budget, trace, q = study.communication, run.trace, m.requirement
+    sentences = [
+        f"As budgeted, at {format_quantity(m.communication.pointing_error_rad, 'rad', 3)}, the margin is "
+        f"{signed(budget.margin_db, 'dB')}; {m.requirement.margin_db:g} dB is required.",
+        f"The loop ({run.controller}, {run.freq_hz:g} Hz) leaves {format_quantity(trace.peak_rad, 'rad', 3)} at its "
+        f"peaks and {format_quantity(trace.rms_rad, 'rad', 3)} rms on its axis{_two_axes(m)}; "
+        f"{format_quantity(q.pointing_error_rad, 'rad', 3)} ({q.residual_statistic}) is allowed.",
+    ]
+    if extrapolated := beyond_identified(study, run):
+        sentences.append(f"Not to be relied on: {extrapolated}.")
+    if study.comparison is not None:
+        left = residual_rad(m, study.comparison.residual.trace)
+        sentences.append(
+            f"On the mission's comparison model of the mirror the residual is {format_quantity(left, 'rad', 3)} and "
+            f"the margin {signed(study.comparison.margin_db, 'dB')}."
+        )
+    return [*sentences, *read_otherwise(study)]
 
 
 def read_otherwise(study: Study) -> list[str]:
@@ -126,14 +197,21 @@ def _two_axes(m: Mission) -> str:
     return ", times √2 for two equal axes" if m.conventions.residual == "radial" else ""
 
 
-def verdict_text(study: Study) -> str:
-    """The verdict as plain text: headline, reasons, and one line a requirement."""
-    lines = [headline(study), *explanation(study), ""]
-    for r in study.requirements:
-        mark = "PASS" if r.met else "FAIL"
-        actual, required = apart(r.actual, r.required, r.unit)
-        lines.append(f"{mark}  {r.name}: {actual} (required {required})")
-    return "\n".join(lines)
+def verdict_text(study: Study, width: int = 80, verbose: bool = False) -> str:
+    """The verdict as plain text: headline, a line for each requirement, and what limits them.
+
+    ``verbose`` adds everything else that the first part of the report says, and its warnings.
+    """
+    judged = [tables_text([], [headline(study)], width), table_text(requirements.table(study.requirements), width)]
+    if not verbose:
+        return "\n\n".join((*judged, tables_text([], short(study), width)))
+    blocks = [*judged, tables_text([], [*short(study), *explanation(study)], width)]
+    by_paper = tables_text([], ["The paper's loop", *papers_loop(study)], width)
+    own = study.papers_loop
+    blocks += [by_paper, table_text(requirements.table(own), width)] if own else [by_paper]
+    if said := warnings(study):
+        blocks.append(tables_text([], ["Warnings", *(f"- {each}" for each in said)], width))
+    return "\n\n".join(blocks)
 
 
 def beyond_identified(study: Study, run: Run) -> str:
@@ -210,8 +288,10 @@ def summary(study: Study) -> dict[str, Any]:
         "mission": m.name,
         "mission_sha256": study.file.sha256,
         "closes": study.closes,
+        "met": study.met,
         "verdict": headline(study),
         "margin_db": {
+            "judged": study.margin_db,
             "beacon": study.beacon.margin_db,
             "answer": study.answer.margin_db,
             "communication_as_budgeted": study.communication.margin_db,
@@ -229,18 +309,8 @@ def summary(study: Study) -> dict[str, Any]:
         "largest_data_rate_bit_s": study.margin_map.largest_rate_bit_s,
         "largest_pointing_error_rad": study.margin_map.largest_error_rad,
         "implied_sensitivity_photon_bit": [r.photons_per_bit for r in study.margin_map.readings],
-        "requirements": [
-            {
-                "name": r.name,
-                "unit": r.unit,
-                "required": r.required,
-                "actual": r.actual,
-                "margin": r.margin,
-                "met": r.met,
-                "limited_by": r.because,
-            }
-            for r in study.requirements
-        ],
+        "requirements": [requirements.data(r) for r in study.requirements],
+        "papers_loop": [requirements.data(r) for r in study.papers_loop],
         "runs": [
             {
                 "mirror": r.mirror,
@@ -269,7 +339,7 @@ def summary(study: Study) -> dict[str, Any]:
             }
             for r in study.other_readings
         ],
-        "links": budget_views.data(study.links),
+        "links": budget_views.facts(study.links),
         "performance": [budget_views.performance_data(each) for each in study.performance.cases],
         "hysteresis_costs": [
             {

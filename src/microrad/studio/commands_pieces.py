@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from pathlib import Path
 
-WIDTH = 160
+WIDTH = 80
 """Columns of a printed table that goes to a file, as the command line has them."""
 
 

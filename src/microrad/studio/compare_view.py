@@ -154,7 +154,7 @@ class Found:
 
     folder: str
     verdict: str
-    closes: bool
+    met: bool
     numbers: tuple[Number, ...]
 
 
@@ -183,4 +183,4 @@ def _found(path: Path, summary: dict[str, Any]) -> Found:
         for each in summary["requirements"]
         if each["actual"] is not None and each["required"] is not None
     )
-    return Found(path.parent.name, str(summary["verdict"]), bool(summary["closes"]), numbers)
+    return Found(path.parent.name, str(summary["verdict"]), all(r["met"] for r in summary["requirements"]), numbers)

@@ -16,8 +16,8 @@ from microrad.link_performance import error_rad, required_error_rad
 from microrad.link_study import LinkStudy
 from microrad.mission import LinkMission
 from microrad.missionfile import LinkFile
-from microrad.report.budget_views import jitter_lines, sentences, signed_db
-from microrad.report.quantities import quantity
+from microrad.report.budget_views import jitter_lines, sentences
+from microrad.report.quantities import quantity, signed
 from microrad.studio import plots
 from microrad.studio.dials import Dial, dial
 from microrad.studio.draft import Draft
@@ -76,7 +76,7 @@ class Margin:
     @property
     def words(self) -> str:
         """The margin with its sign."""
-        return signed_db(self.margin_db)
+        return signed(self.margin_db, "dB")
 
     @property
     def needs(self) -> str:
@@ -285,7 +285,7 @@ def map_words(v: LinkView) -> str:
     there = _largest(m)
     return (
         f"At {format_quantity(c.data_rate_bit_s, 'bit/s')} and {format_quantity(error_rad(m), 'rad')} the "
-        f"communication link has {signed_db(v.budgets[0].margin_db)}. {there} for the required {q.margin_db:g} dB."
+        f"communication link has {signed(v.budgets[0].margin_db, 'dB')}. {there} for the required {q.margin_db:g} dB."
     )
 
 

@@ -19,8 +19,8 @@ from microrad.studio.jobs import Job, JobError, Kind, Order, Progress
 from microrad.studio.workshop import Workshop
 
 _VERDICTS = {
-    ("study", 0): "the link closes; each requirement is judged below",
-    ("study", 1): "the link does not close",
+    ("study", 0): "every requirement is met",
+    ("study", 1): "not every requirement is met",
     ("campaign", 0): "the rows keep the limits",
     ("campaign", 1): "the rows do not keep the limits",
 }

@@ -181,7 +181,7 @@ def _studies(both: _Both, names: tuple[str, str]) -> None:
     layout.heading("Verdicts")
     for name, found in zip(names, both.studies, strict=True):
         words = f"{name}: {found.verdict} ({found.folder})" if found else _no_study(name)
-        ui.label(words).classes("soft" if found is None else "yes" if found.closes else "no")
+        ui.label(words).classes("soft" if found is None else "yes" if found.met else "no")
     if any(both.studies):
         ours, theirs = (() if found is None else found.numbers for found in both.studies)
         _table(compare_view.beside(ours, theirs), names)
