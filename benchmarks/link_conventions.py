@@ -26,7 +26,7 @@ from microrad.link_table import Receiver as ReceiverTable
 from microrad.mission import Mission
 from microrad.missionfile import load_mission
 
-FILE = load_mission(Path(__file__).resolve().parents[1] / "missions" / "leo-geo.toml")
+FILE = load_mission(Path(__file__).resolve().parents[1] / "missions" / "paper.toml")
 PAPER = FILE.mission
 ERROR_RAD = 10e-6  # required of the paper's fine pointing
 TO_INSTALL = "not installed: pip install ogs-linkbudget-live"

@@ -3,6 +3,7 @@
 import json
 import tomllib
 
+from microrad.mission import LinkMission
 from microrad.missionfile import load_link
 from microrad.presets import preset_text
 
@@ -45,7 +46,11 @@ def received_with(name, **others):
 
 def data_with(changes):
     """The tables of the paper's links with dotted keys given; None takes a key out."""
-    data = tomllib.loads(preset_text("paper"))
+    whole = tomllib.loads(preset_text("paper"))
+    data = {name: table for name, table in whole.items() if name in LinkMission.model_fields}
+    for key in ("conventions.residual", "conventions.mirror_angle", "requirement.residual_statistic"):
+        table, _, name = key.partition(".")
+        del data[table][name]  # of the loop
     for dotted, value in changes.items():
         *tables, key = dotted.split(".")
         table = data

@@ -1,4 +1,4 @@
-"""The mission file that the package ships, as it is and with pieces of its text replaced, and its study."""
+"""The paper's mission as the package ships it, as it is and with pieces of its text replaced, and its study."""
 
 import contextlib
 from dataclasses import replace
@@ -11,12 +11,20 @@ from microrad import report, study
 from microrad.missionfile import load_mission
 from shared import once
 
-SHIPPED = Path(__file__).parent.parent / "missions" / "leo-geo.toml"
+MISSIONS = Path(__file__).parent.parent / "missions"
+SHIPPED, DEFAULT = MISSIONS / "paper.toml", MISSIONS / "leo-geo.toml"
+"""The paper's mission, which most tests are about, and the one that `microrad init` writes."""
 
 
 def without_fine_pointing(text):
     """A mission's text without its fine-pointing loop, which takes most of a study's time."""
     return text[: text.index("# ---", text.index("loop_amplitude = "))]
+
+
+def links_alone(text):
+    """The links of a mission's text, up to its acquisition, as a file of their own."""
+    links = text[: text.index(f"# {'-' * 97} orbits")].splitlines(keepends=True)
+    return "".join(line for line in links if not line.startswith(("residual", "mirror_angle")))
 
 
 def without_day(text):

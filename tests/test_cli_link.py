@@ -129,7 +129,7 @@ def test_a_pointing_error_on_the_command_line_stands_in_place_of_the_missions(ca
     assert found["budgets"][1] == json.loads(call("budget", file_with(folder), "--json").out)["budgets"][1]
 
 
-@pytest.mark.parametrize("flags", [("--solve-rate",), ("--data-rate", "largest")])
+@pytest.mark.parametrize("flags", [("--solve", "communication.data_rate"), ("--data-rate", "largest")])
 def test_the_solved_rate_has_the_required_margin(call, folder, flags):
     path = file_with(folder, {"terminals.leo_aperture": "6 cm"})
     result = call("budget", path, *flags, "--json")
@@ -142,7 +142,7 @@ def test_the_solved_rate_has_the_required_margin(call, folder, flags):
 
 def test_a_solved_rate_ends_at_the_receivers_bandwidth(call, folder):
     path = file_with(folder, received_with("preamplified dpsk"))
-    found = json.loads(call("budget", path, "--solve-rate", "--json").out)
+    found = json.loads(call("budget", path, "--data-rate", "largest", "--json").out)
     assert found["largest_data_rate_bit_s"] == pytest.approx(4e9 * 0.8)
     assert found["budgets"][0]["margin_db"] > 3.0
 
@@ -394,9 +394,12 @@ def test_jitter_is_said_with_its_outage(call, folder):
         (("--pointing-error", "5"), '--pointing-error: "5" is a number without a unit; expected an angle'),
         (("--pointing-error", "-5 urad"), '--pointing-error: "-5 urad" is below 0 rad'),
         (("--pointing-error", "2 rad"), '--pointing-error: "2 rad" is above 1.571 rad'),
+        (("--solve", "leo_aperture"), 'a quantity "leo_aperture"; did you mean terminals.leo_aperture?'),
+        (("--solve", "communication.recieve_optics_loss"), "did you mean communication.receive_optics_loss"),
+        (("--solve", "zzz"), 'a quantity "zzz"; there are terminals.leo_aperture, '),
         (
-            ("--solve-rate", "--data-rate", "1 Gbit/s"),
-            "--solve-rate finds the data rate that --data-rate gives; give one",
+            ("--pointing-error", "0 urad", "--solve", "communication.pointing_error"),
+            "is 0, which no factor moves: give",
         ),
         (("--csv", "--json"), "--csv, --html and --json exclude each other; give one of them."),
         (("--csv", "--html"), "exclude each other"),
@@ -420,7 +423,7 @@ def test_a_rate_above_the_receivers_bandwidth_is_refused_with_the_most_it_takes(
 
 def test_a_rate_that_no_margin_leaves_is_refused_with_its_reason(refused, folder):
     path = file_with(folder, received_with("counting ppm"), {"requirement.margin": "200 dB"})
-    message = refused("budget", path, "--solve-rate")
+    message = refused("budget", path, "--data-rate", "largest")
     assert message.startswith(f"microrad: {path}: ")
     assert "200 dB" in message
 
@@ -459,7 +462,7 @@ def test_a_preset_is_written_and_its_budget_asks_for_each_unknown_key_once(call,
     result = call("init", "--preset", name, f"{name}.toml")
     assert (result.code, result.err) == (0, "")
     assert result.out.startswith(f"{name}.toml written. ")
-    assert result.out.endswith(f"Next: microrad budget {name}.toml\n")
+    assert result.out.endswith(f"Next: microrad {'run' if name == 'paper' else 'budget'} {name}.toml\n")
     assert (folder / f"{name}.toml").read_text(encoding="utf-8") == preset_text(name)
     assert all(key in result.out for key in EXAMPLES[name])
     before = listing(folder)
@@ -517,5 +520,5 @@ def test_the_examples_of_the_help_are_good_usage(call, command):
 
 def test_the_help_names_every_flag(call):
     text = call("budget", "--help").out
-    for flag in ("--data-rate RATE", "--pointing-error ANGLE", "--solve-rate", "--csv", "--html", "--json"):
+    for flag in ("--data-rate RATE", "--pointing-error ANGLE", "--solve KEY", "--csv", "--html", "--json"):
         assert flag in text

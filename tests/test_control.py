@@ -16,7 +16,7 @@ from microrad.control import IDEAL_DRIVE, Drive, Gains, Inverse, Timing
 from microrad.hysteresis import BoucWen, Play
 from microrad.missionfile import load_mission
 
-SHIPPED = Path(__file__).parent.parent / "missions" / "leo-geo.toml"
+SHIPPED = Path(__file__).parent.parent / "missions" / "paper.toml"
 PERIOD = 20e-6
 PI = Gains(1e3, 16e6, 0.0, 1e-4)
 PID = Gains(1.2e3, 9e6, 0.05, 2e-4)

@@ -73,6 +73,7 @@ def folder(tmp_path_factory):
     os.chdir(path)
     try:
         assert command("microrad", "campaign", "init").code == 0
+        assert command("microrad", "init", "--preset", "paper").code == 0
         for name, text in FILES.items():
             path.joinpath(name).write_text(text, encoding="utf-8")
         ran = command("microrad", "campaign", "run", "links.toml")

@@ -31,7 +31,7 @@ SAID = " ".join(re.sub(r"\n- ", " ", PAGE).split())
 TABLES = re.findall(r"```toml\n(.*?)```", PAGE, flags=re.DOTALL)
 ORBITS = TABLES[0].split("\n\n")
 LIMITS, OPERATIONS = TABLES[1:]
-TEXT = (ROOT / "missions" / "leo-geo.toml").read_text(encoding="utf-8")
+TEXT = (ROOT / "missions" / "paper.toml").read_text(encoding="utf-8")
 ELEMENTS = """DEMO
 1 90001U 26001A   26079.50000000  .00000000  00000-0  50000-4 0  9997
 2 90001  97.4000  95.0000 0010000  90.0000 270.0000 15.21960000    10
@@ -104,7 +104,7 @@ def view(replaced, folder):
 
 @pytest.fixture(scope="module")
 def links():
-    return link_study.run(missionfile.load_link(ROOT / "missions" / "leo-geo.toml"))
+    return link_study.run(missionfile.load_link(ROOT / "missions" / "paper.toml"))
 
 
 @pytest.fixture(scope="module")
@@ -253,7 +253,7 @@ def test_the_papers_claim(links, day):
 @pytest.fixture(scope="module")
 def lqg():
     """The shipped mission's scene and its LQG, tuned as `microrad run` tunes it."""
-    file = missionfile.load_mission(ROOT / "missions" / "leo-geo.toml")
+    file = missionfile.load_mission(ROOT / "missions" / "paper.toml")
     scene, f = fine_pointing.scene(file), file.mission.fine_pointing
     wanted = control.Specification(f.modulus_margin)
     tuned = control.tune(control.LQG, designs.plants(scene, file.mission, f.seed), wanted, seed=f.seed)

@@ -124,9 +124,9 @@ def test_the_papers_mission(walk, monkeypatch):
     found = run_once(monkeypatch)
     walk.through(EXAMPLES[PAPER])
     (results,) = re.findall(r"(?ms)^```python$.*?^```$\n\n^```text$.*?^```$", REPORT)
-    walk.through(results)
+    walk.through(results.replace("leo-geo-study", "paper-study"))
     (ran,) = found.values()
-    assert sorted(path.name for path in Path("leo-geo-study").iterdir() if path.stat().st_size) == WRITTEN
+    assert sorted(path.name for path in Path("paper-study").iterdir() if path.stat().st_size) == WRITTEN
     listed = {each.design.name: each for each in ran.fine_pointing.verified}
     alone = fine_pointing.run_one(ran.file, "PI")
     assert alone.simulated["given"].quantile_rad == listed["PI"].simulated["given"].quantile_rad

@@ -15,7 +15,7 @@ from microrad.fine_pointing_table import FinePointing, GeometryTable
 from microrad.mission import mission_schema
 from microrad.missionfile import MissionError, load_mission
 
-SHIPPED = Path(__file__).parent.parent / "missions" / "leo-geo.toml"
+SHIPPED = Path(__file__).parent.parent / "missions" / "paper.toml"
 TEXT = SHIPPED.read_text(encoding="utf-8")
 BEFORE, TABLE = re.fullmatch(r"(.*?)(\[fine_pointing\]\n.*)", TEXT, re.DOTALL).groups()
 

@@ -15,7 +15,7 @@ from microrad.budget import total_db
 from microrad.link_table import Channel
 from microrad.missionfile import load_mission
 
-FILE = load_mission(Path(__file__).parent.parent / "missions" / "leo-geo.toml")
+FILE = load_mission(Path(__file__).parent.parent / "missions" / "paper.toml")
 MISSION, SOURCES = FILE.mission, FILE.sources
 BUDGETS = [link.communication_budget, link.beacon_budget, link.answer_budget]
 half_a_hundredth_db = 0.005

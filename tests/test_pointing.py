@@ -14,7 +14,7 @@ from microrad.mission import LinkMission
 from microrad.missionfile import load_mission
 from microrad.pointing_table import PointAhead, PointingLine
 
-FILE = load_mission(Path(__file__).parent.parent / "missions" / "leo-geo.toml")
+FILE = load_mission(Path(__file__).parent.parent / "missions" / "paper.toml")
 MISSION, SOURCES = FILE.mission, FILE.sources
 URAD = 1e-6
 angles = st.floats(0.0, 1e-2)
@@ -112,7 +112,7 @@ def test_each_line_says_where_it_comes_from_and_what_it_means():
     assert list(lines) == ["Body pointing", "Orbit knowledge", "Misalignment", "Point-ahead"]
     assert lines["Body pointing"].source.startswith("paper: section 2.1")
     assert lines["Orbit knowledge"].source.startswith("assumption: 1 km")
-    assert lines["Misalignment"].source.startswith("assumption:")
+    assert lines["Misalignment"].source.startswith("derived: what beacon.divergence leaves")
     assert lines["Point-ahead"].source.startswith("assumption: orbit knowledge and calibration")
     assert all(line.unit == "rad" and line.basis and line.regime for line in lines.values())
     assert "random, 3-sigma, about each axis: mean 0, standard deviation error / 3" in lines["Body pointing"].basis

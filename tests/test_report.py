@@ -145,7 +145,8 @@ def test_each_requirement_stands_with_its_margin_and_its_contributor(written, pa
         assert row["margin"][0] == ("+" if r.met else "\u2212")
     cone, beacon, answer, residual, link = (row["contributor"] for row in rows)
     shares = paper.open_loop.variance_shares
-    assert cone == f"Body pointing: {100 * max(shares):.2g} % of the squares, 300 µrad half width"
+    widest = f"Body pointing: {100 * max(shares):.2g} % of the squares, 300 µrad half width"
+    assert cone == f"{widest}; the cone covers its partner with 0.53"
     for text, tornado in ((beacon, paper.links.tornados[-2]), (answer, paper.links.tornados[-1])):
         top = tornado.swings[0]
         assert text.endswith(f"the margin moves most with {top.key}: {top.swing_db:.2f} dB for 10 % both ways")

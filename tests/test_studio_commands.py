@@ -82,8 +82,7 @@ def once(compute):
     [
         Budget(MISSION),
         Budget(MISSION, data_rate="1 Gbit/s", pointing_error="5 urad"),
-        Budget(MISSION, pointing_error="12 urad", solve_rate=True),
-        Budget(MISSION, solve_rate=True),
+        Budget(MISSION, pointing_error="12 urad", data_rate="largest"),
         Contacts(MISSION),
     ],
 )

@@ -69,7 +69,7 @@ def test_every_position_of_every_dial_is_a_value_that_the_mission_takes(draft):
 
 
 def test_a_dial_in_decibels_is_linear_and_ends_at_the_bound_of_the_mission(draft):
-    loss = dial_of(draft, "communication.transmit_optics_loss")
+    loss = dial_of(draft.set("communication.transmit_optics_loss", "0 dB"), "communication.transmit_optics_loss")
     assert (loss.scale, loss.low, loss.high, loss.at(0), loss.at(5)) == ("linear", 0.0, 10.0, "0 dB", "0.5 dB")
     level = dial_of(draft.set("beacon.required_power", "-80 dBm"), "beacon.required_power")
     assert (level.scale, level.at(0), level.at(level.steps)) == ("linear", "-90 dBm", "-70 dBm")
@@ -208,7 +208,7 @@ def test_the_plots_are_plain_data_with_units_on_their_axes(view, draft, day):
 
 
 def test_the_words_of_the_map_name_both_ways_out_and_that_there_is_none(draft, view):
-    assert link_view.map_words(view).startswith("At 300 Mbit/s and 10 µrad the communication link has +3.00 dB.")
+    assert link_view.map_words(view).startswith("At 300 Mbit/s and 10 µrad the communication link has +3.43 dB.")
     dark = link_view.view(draft.set("communication.transmit_power", "10 mW").link())
     assert "no pointing error at 300 Mbit/s" in link_view.map_words(dark)
 
@@ -232,7 +232,9 @@ def test_the_study_of_the_links_gives_tables_sentences_and_what_moves_the_margin
     assert high["base"] + high["x"][0] == pytest.approx(first.margin_high_db)
     assert "Tracking sensor" in link_view.tables(study)
     assert any(sentence.startswith("The links close") for sentence in link_view.consequences(study))
-    assert any(sentence.startswith("Warning: ") for sentence in link_view.consequences(study))
+    assert not any(sentence.startswith("Warning: ") for sentence in link_view.consequences(study))
+    far = link_study.run(draft.set("communication.pointing_error", "60 urad").link())
+    assert any(sentence.startswith("Warning: ") for sentence in link_view.consequences(far))
 
 
 # ------------------------------------------------------------------------------------------------------------ pointing
@@ -247,16 +249,16 @@ def test_what_is_left_for_a_line_meets_the_beacon_by_either_rule(draft):
     assert total == pytest.approx(found.half_angle_rad, rel=1e-6)
 
 
-def test_the_tables_of_the_paper_s_mission_say_what_its_beacon_covers(draft):
+def test_the_tables_of_the_shipped_mission_say_what_its_beacon_covers(draft):
     found = pointing_view.view(draft.link())
     totals = {row["rule"].partition(":")[0]: row for row in pointing_view.total_rows(found)}
-    assert totals["root sum square"]["value"] == "390 µrad"
+    assert totals["root sum square"]["value"] == "317 µrad"
     assert totals["root sum square"]["beacon"].startswith("covered")
     assert "means add linearly" in totals["root sum square"]["caveat"]
     assert totals["ECSS, two axes"]["beacon"].endswith("short")
     lines = pointing_view.line_rows(found)
-    assert [row["left_ecss"] for row in lines] == ["nothing"] * 4
-    assert "0.53" in pointing_view.words(found)[0]
+    assert [row["left_ecss"] for row in lines] == ["164 µrad", *["nothing"] * 3]
+    assert "0.9822" in pointing_view.words(found)[0]
     ahead = {row["what"]: row["value"] for row in pointing_view.ahead_rows(found)}
     assert ahead["point-ahead angle, largest"] == "71 µrad"
 
@@ -318,7 +320,8 @@ def test_latencies_rise_to_what_arrives_and_pass_their_median(day):
     time_s, share = day_view.distribution(day.relay)
     assert np.all(np.diff(time_s) > 0.0)
     assert np.all(np.diff(share) >= -1e-12)
-    assert np.interp(day.relay.median_s, time_s, share) == pytest.approx(0.5, abs=0.01)
+    before, behind = np.interp(day.relay.median_s * (1.0 + np.array([-1e-6, 1e-6])), time_s, share)
+    assert before < 0.5 < behind  # at once, in one step, comes what is made in sight of the relay
     assert share[-1] == pytest.approx(1.0)
 
 
@@ -334,7 +337,8 @@ def test_the_tables_of_the_day_have_its_numbers(day):
 
 
 def test_a_mission_without_orbits_says_what_is_missing(draft, tmp_path):
-    bare = link_file(tmp_path, {key: None for key in ("orbit", "operations") if key in data_with({})})
+    gone = ("orbit", "operations", "constellation")
+    bare = link_file(tmp_path, {key: None for key in gone if key in data_with({})})
     assert "no [orbit] and no [operations]" in day_view.missing(bare)
     assert day_view.missing(draft.link()) == ""
 

@@ -7,7 +7,7 @@ import pytest
 from browser import check_quiet, until
 from microrad import link, pointing
 from microrad.link_study import largest_rate
-from microrad.report.budget_views import signed_db
+from microrad.report.quantities import signed
 from microrad.studio import link_view
 from microrad.studio.dials import dial
 from microrad.studio.draft import Draft
@@ -61,7 +61,7 @@ def mission_at(file, **changes):
 
 
 def margin_at(file, **changes):
-    return signed_db(link.communication_budget(*mission_at(file, **changes)).margin_db)
+    return signed(link.communication_budget(*mission_at(file, **changes)).margin_db, "dB")
 
 
 def written(studio):
@@ -152,7 +152,7 @@ def test_a_wrong_unit_is_told_beside_its_field_and_the_last_map_stays(studio, li
 
 
 def test_a_page_that_is_opened_on_a_faulty_mission_promises_nothing_in_grey(studio, links, context):
-    links.get_by_text("The links close: ").wait_for()
+    links.get_by_text("The links close, and ").wait_for()
     typed(links, APERTURE).fill("5 W")
     typed(links, APERTURE).press("Enter")
     until(links, lambda: 'leo_aperture = "5 W"' in written(studio), "the fault")
@@ -160,7 +160,7 @@ def test_a_page_that_is_opened_on_a_faulty_mission_promises_nothing_in_grey(stud
     opened_now.get_by_text("Nothing can be shown before the mission is corrected.").wait_for()
     assert opened_now.get_by_text("Shown in grey").count() == 0
     opened_now.get_by_text("Of the mission before this:").wait_for()
-    assert opened_now.locator(".behind").get_by_text("The links close: ").is_visible()
+    assert opened_now.locator(".behind").get_by_text("The links close, and ").is_visible()
     opened_now.close()
     check_quiet(opened_now, studio.base)
     typed(links, APERTURE).fill("5 cm")
@@ -170,7 +170,7 @@ def test_a_page_that_is_opened_on_a_faulty_mission_promises_nothing_in_grey(stud
 
 
 def test_the_budget_of_another_link_is_chosen_and_the_page_copied_as_a_command(studio, links):
-    links.get_by_text("The links close: ").wait_for()
+    links.get_by_text("The links close, and ").wait_for()
     links.get_by_role("button", name="Beacon", exact=True).click()
     beacon = link.beacon_budget(*mission_at(studio.file))
     row = links.locator("tr.total").filter(has_text="Margin")

@@ -12,7 +12,7 @@ from microrad.presets import preset_text
 from microrad.studio import draft as drafts
 from microrad.studio.draft import Draft, DraftError
 from microrad.studio.draft_keys import key_of, keys_in
-from shipped import SHIPPED, without_fine_pointing
+from shipped import DEFAULT, SHIPPED, without_fine_pointing
 
 TEXT = SHIPPED.read_text("utf-8")
 APERTURE = "terminals.leo_aperture"
@@ -34,8 +34,8 @@ def changed_lines(before, after):
 # -------------------------------------------------------------------------------------------------------------- values
 def test_the_shipped_mission_is_a_draft_without_faults(tmp_path):
     draft = Draft.shipped(tmp_path / "new.toml")
-    assert (draft.text, draft.problems, draft.report, draft.changed) == (TEXT, (), "", True)
-    assert draft.file().mission == load_mission(SHIPPED).mission
+    assert (draft.text, draft.problems, draft.report, draft.changed) == (DEFAULT.read_text("utf-8"), (), "", True)
+    assert draft.file().mission == load_mission(DEFAULT).mission
 
 
 def test_every_value_has_its_text_its_source_and_what_it_may_hold(draft):

@@ -19,7 +19,7 @@ from microrad.studio.draft import Draft, DraftError
 from microrad.studio.jobs import Job, JobError, Progress
 from microrad.studio.optional_tables import offered, with_table
 from microrad.studio.workshop import Workshop
-from shipped import SHIPPED
+from shipped import DEFAULT, SHIPPED, links_alone
 
 
 @pytest.fixture
@@ -70,16 +70,16 @@ def test_examples_that_need_nothing_else_leave_no_fault(draft, name):
 
 
 def test_an_outermost_table_comes_with_its_inner_ones(draft):
-    link = draft.with_text(preset_text("paper"))
+    link = draft.with_text(links_alone(SHIPPED.read_text("utf-8")))
     got = with_table(link, "orbit")
     tables = tomllib.loads(got.text)["orbit"]
-    shipped = tomllib.loads(SHIPPED.read_text("utf-8"))["orbit"]
+    shipped = tomllib.loads(DEFAULT.read_text("utf-8"))["orbit"]
     assert tables == shipped
     assert "orbit" not in tomllib.loads(link.text)
 
 
 def test_an_inner_table_without_its_outer_one_is_not_offered(draft):
-    found = offered(draft.with_text(preset_text("paper")))
+    found = offered(draft.with_text(links_alone(SHIPPED.read_text("utf-8"))))
     assert "fine_pointing" in found
     assert "fine_pointing.wheels" not in found
 

@@ -18,14 +18,13 @@ import pytest
 from command_line import listing
 from microrad.document import MissionError
 from microrad.missionfile import load_mission
-from microrad.presets import preset_text
 from microrad.studio import server
 from microrad.studio.address import ExposureError
 from microrad.studio.draft import Draft, DraftError
 from microrad.studio.jobs import Order
 from microrad.studio.names import NameRefusedError
 from microrad.studio.workshop import STUDIO, Workshop
-from shipped import SHIPPED
+from shipped import DEFAULT, SHIPPED, links_alone
 from studio_jobs import written
 from waiting import HANG_S, lines_of, until
 
@@ -49,9 +48,9 @@ def test_a_workshop_opens_the_file_that_it_is_given(file):
     assert Workshop(file.parent).draft.values[APERTURE].typed == "5 cm"
 
 
-def test_an_empty_folder_gets_the_papers_mission_unsaved(tmp_path):
+def test_an_empty_folder_gets_the_shipped_mission_unsaved(tmp_path):
     workshop = Workshop(tmp_path)
-    assert workshop.draft.text == SHIPPED.read_text("utf-8")
+    assert workshop.draft.text == DEFAULT.read_text("utf-8")
     assert workshop.draft.changed
     assert not (tmp_path / "leo-geo.toml").exists()
 
@@ -167,7 +166,7 @@ def test_a_mission_with_faults_is_none_and_says_the_words_of_the_command_line(fi
 
 def test_a_link_alone_has_a_budget_and_no_mission(file):
     workshop = Workshop(file.parent, file)
-    workshop.change(workshop.draft.with_text(preset_text("paper")))
+    workshop.change(workshop.draft.with_text(links_alone(SHIPPED.read_text("utf-8"))))
     assert workshop.link().mission.terminals.leo_aperture_m == 0.05
     assert workshop.mission() is None
     assert "mirror" in workshop.faults()

@@ -21,7 +21,7 @@ import numpy as np
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 GALLERY = ROOT / "docs" / "gallery"
-MISSION = (ROOT / "missions" / "leo-geo.toml").read_text(encoding="utf-8")
+MISSION = (ROOT / "missions" / "paper.toml").read_text(encoding="utf-8")
 EXPERIMENT = (ROOT / "plans" / "paper-experiment.toml").read_text(encoding="utf-8")
 
 
@@ -149,7 +149,7 @@ def budget(place: Place) -> Any:
     """Link, pointing and acquisition budgets of the shipped mission, with the rate that was solved for."""
     return {
         "budget": place.json("budget", "leo-geo.toml"),
-        "solved": place.json("budget", "leo-geo.toml", "--solve-rate")["largest_data_rate_bit_s"],
+        "solved": place.json("budget", "leo-geo.toml", "--data-rate", "largest")["largest_data_rate_bit_s"],
     }
 
 

@@ -60,7 +60,7 @@ class Quantity:
         if value == UNKNOWN:
             raise UnitError(value, NOT_PUBLISHED, self.wanted, self.example)
         number = parse_quantity(value, self.unit, self.typical) if self.unit else _plain_number(value)
-        if fault := self._out_of_bounds(number):
+        if fault := self.out_of_bounds(number):
             raise UnitError(value, fault, self.wanted, self.example)
         return number
 
@@ -71,7 +71,7 @@ class Quantity:
         for number in _EXAMPLES:
             text = f"{number:g} {unit}" if self.unit else f"{number:g}" if number % 1 else f"{number:.1f}"
             value = parse_quantity(text, self.unit) if self.unit else number
-            if not self._out_of_bounds(value):
+            if not self.out_of_bounds(value):
                 return text
         return f"5 {unit}" if self.unit else "1.0"
 
@@ -82,7 +82,8 @@ class Quantity:
         bounds = [("above", self.above), ("at least", self.least), ("at most", self.most)]
         return ", ".join([noun, *(f"{word} {self._show(bound)}" for word, bound in bounds if bound is not None)])
 
-    def _out_of_bounds(self, number: float) -> str:
+    def out_of_bounds(self, number: float) -> str:
+        """Why a number is not allowed, or nothing."""
         if self.above is not None and not number > self.above:
             return f"is not above {self._show(self.above)}"
         if self.least is not None and not number >= self.least:
@@ -118,7 +119,7 @@ class Whole(Quantity):
             raise UnitError(value, NOT_PUBLISHED, self.wanted, self.example)
         if isinstance(value, bool) or not isinstance(value, int):
             raise UnitError(value, "is not a whole number", self.wanted, self.example)
-        if fault := self._out_of_bounds(value):
+        if fault := self.out_of_bounds(value):
             raise UnitError(value, fault, self.wanted, self.example)
         return value
 

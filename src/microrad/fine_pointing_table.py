@@ -190,7 +190,7 @@ class BodyTable(Table):
 class QuadCellTable(Table):
     """Four photodiodes with an amplifier each, and the light on them, for the sensor's noise-equivalent angle.
 
-    The light is that of the answer, with its wavelength.
+    The light is that of the answer, with its wavelength, and with the power of its budget where none is given.
     """
 
     responsivity_a_w: Annotated[float, Quantity("A/W", above=0.0, most=1e3)] = Field(alias="responsivity")
@@ -201,7 +201,9 @@ class QuadCellTable(Table):
     thermal_noise_a_sqrt_hz: Annotated[float, Quantity("A/sqrt(Hz)", "pA/sqrt(Hz)", least=0.0, most=1e-3)] = Field(
         alias="thermal_noise", description="of one amplifier, one-sided, referred to its input"
     )
-    received_power_w: ReceivedPower = Field(alias="received_power", description="signal on all four together")
+    received_power_w: ReceivedPower | None = Field(
+        alias="received_power", default=None, description="signal on all four together; absent: as the answer's budget"
+    )
     spot: Literal["airy"] = Field(description="airy: focused by the whole aperture terminals.leo_aperture")
 
 

@@ -250,6 +250,11 @@ class StrokeBudget:
     usable_travel_rad: float
 
     @property
+    def label(self) -> str:
+        """What the output is: an axis, or an actuator of a tripod."""
+        return f"axis {self.name}" if self.name in ("x", "y") else self.name
+
+    @property
     def total_rad(self) -> float:
         """Half range at the line of sight, worst case."""
         return math.fsum(line.value for line in self.lines)

@@ -1,7 +1,8 @@
 """The links of a mission and what follows from their tables: budgets, pointing, tracking light, acquisition."""
 
+import difflib
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -90,6 +91,67 @@ def solve_rate(file: LinkFile) -> LinkFile:
     solved = replace(own, value=format_quantity(rate, "bit/s"), comment=f"solved for: the largest with {at}")
     mission = m.model_copy(update={"communication": beam})
     return replace(file, mission=mission, sources={**file.sources, "communication.data_rate": solved})
+
+
+@dataclass(frozen=True, slots=True)
+class Solution:
+    """The values of one key that leave what is required of a margin, in SI units, and the file with one of them.
+
+    ``file`` has ``value``: the least that leaves the margin, or the most where as little as was looked for leaves it.
+    Where none does, it is the given file with its own value.
+    """
+
+    key: str
+    unit: str
+    of: str
+    required_db: float
+    solved: link.Solved
+    value: float
+    file: LinkFile
+
+
+def solve(file: LinkFile, key: str) -> Solution:
+    """The values of a key of the links' tables that leave the required margin: of communication, but for the outage.
+
+    A key of the beacon's table is looked for at 0 dB of the beacon, one of the answer's at 0 dB of the answer. Raises
+    ValueError for a key that these tables do not have, and for one that is 0.
+    """
+    file = solve_rate(file)
+    m, sources = file.mission, file.sources
+    tables = ("jitter", *link.LINK_TABLES, *(name for name in ("beacon", "answer") if getattr(m, name) is not None))
+    every = [each for table in tables for each in link.inputs(m, table)]
+    found = tuple(each for each in every if key in (each.key, each.shown))
+    if not found:
+        raise ValueError(_no_such_key(key, dict.fromkeys(each.key for each in every)))
+    of, required = "communication", m.requirement.margin_db
+    if found[0].table == "beacon":
+        of, required = "beacon", 0.0
+        solved = link.solve(m, found, lambda n: link.beacon_budget(n, sources).margin_db, required, link.fits("beacon"))
+    elif found[0].table == "answer":
+        of, required = "answer", 0.0
+        solved = link.solve(m, found, lambda n: link.answer_budget(n, sources).margin_db, required, link.fits("answer"))
+    else:
+        solved = link.solve(m, found, margin_db, required, link.lit)
+    unit = link.unit_of(m, found[0].field, found[0].rule)
+    if not solved.intervals:
+        return Solution(key, unit, of, required, solved, max(each.value for each in found), file)
+    first, last = solved.intervals[0], solved.intervals[-1]
+    value = last.high if first.low_open else first.low
+    mission = link.moved(m, found, value)
+    assert mission is not None  # it leaves the margin
+    was = sources.get(found[0].key)
+    shown = format_quantity(value, unit) if unit else f"{value:.4g}"
+    comment = f"solved for: {required:g} dB of {of}"
+    given = replace(was, value=shown, comment=comment, was="") if was else Source(0, comment, shown)
+    changed = replace(file, mission=mission, sources={**sources, found[0].key: given})
+    return Solution(key, unit, of, required, solved, value, changed)
+
+
+def _no_such_key(key: str, keys: Iterable[str]) -> str:
+    last = key[:60].rpartition(".")[2]
+    near = [each for each in keys if each.rpartition(".")[2] == last] or difflib.get_close_matches(key[:60], keys, n=3)
+    hint = f"did you mean {' or '.join(near)}?" if near else f"there are {', '.join(keys)}"
+    return f'no table of the links has a quantity "{key[:60]}"; {hint}'
 
 
 def run(file: LinkFile, parts: kept.Kept = kept.NOTHING) -> LinkStudy:

@@ -8,7 +8,7 @@ from functools import cache
 from importlib import resources
 
 from microrad.document import scan
-from microrad.presets import presets
+from microrad.presets import PAPER, preset_text, presets
 from microrad.units import UnitError, parse_quantity
 
 
@@ -35,7 +35,7 @@ def of_paper(key: str, value: str) -> str:
 def _shipped() -> Mapping[tuple[str, str], tuple[str, ...]]:
     """Values by key and comment, of the paper's mission and every preset."""
     found: dict[tuple[str, str], tuple[str, ...]] = {}
-    for text in (_papers_mission(), *(preset.text for preset in presets())):
+    for text in (_shipped_mission(), *(preset.text for preset in presets())):
         for each in scan(text):
             if each.kind == "key" and each.comment:
                 where = each.key, each.comment
@@ -45,10 +45,10 @@ def _shipped() -> Mapping[tuple[str, str], tuple[str, ...]]:
 
 @cache
 def _paper() -> Mapping[str, str]:
-    return {each.key: each.value for each in scan(_papers_mission()) if each.kind == "key"}
+    return {each.key: each.value for each in scan(preset_text(PAPER)) if each.kind == "key"}
 
 
-def _papers_mission() -> str:
+def _shipped_mission() -> str:
     return (resources.files("microrad") / "missions" / "leo-geo.toml").read_text(encoding="utf-8")
 
 

@@ -8,13 +8,16 @@ and 25 µrad off the error at 15 and 25 Hz (Fig. 8); and the control reaches 10 
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cache, partial
 from itertools import product
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from microrad import control, hysteresis, mirror, mission, simulate
+from microrad.missionfile import LinkFile, load_link
+from microrad.presets import PAPER, preset_text
 from microrad.threads import in_threads
 from microrad.tracking import mirror_model
 
@@ -100,6 +103,12 @@ class Scan:
         held = [tuple(n for n, ok in p.holds().items() if ok) for p in self.points]
         names = max(held, key=len)
         return names, self.holding(names) if names else ()
+
+
+@cache
+def links() -> LinkFile:
+    """The paper's own links, as the preset has them."""
+    return load_link(Path(f"{PAPER}.toml"), text=preset_text(PAPER))
 
 
 def applies(m: mission.Mission) -> bool:

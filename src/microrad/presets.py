@@ -10,13 +10,17 @@ from typing import Any
 
 from microrad.fields import UNKNOWN
 
+PAPER = "paper"
+"""Name of the preset that holds the source paper's whole mission."""
+
 
 @dataclass(frozen=True, slots=True)
 class Preset:
     """A published link as the text of its link file.
 
     `title` is the first comment line of the text, `unknown` holds the dotted keys ("communication.distance") that have
-    to be given before the file can be loaded, and `known` counts the keys that hold a value.
+    to be given before the file can be loaded, and `known` counts the keys that hold a value. `whole` is one that has a
+    mirror and a loop, too: a mission.
     """
 
     name: str
@@ -24,6 +28,7 @@ class Preset:
     text: str
     unknown: tuple[str, ...]
     known: int
+    whole: bool
 
 
 def presets() -> tuple[Preset, ...]:
@@ -51,10 +56,11 @@ def _files() -> dict[str, Traversable]:
 
 def _preset(name: str, file: Traversable) -> Preset:
     text = file.read_text(encoding="utf-8")
-    values = dict(_leaves(tomllib.loads(text)))
+    data = tomllib.loads(text)
+    values = dict(_leaves(data))
     unknown = tuple(key for key, value in values.items() if value == UNKNOWN)
     title = text.partition("\n")[0].lstrip("#").strip()
-    return Preset(name, title, text, unknown, len(values) - len(unknown))
+    return Preset(name, title, text, unknown, len(values) - len(unknown), "mirror" in data)
 
 
 def _leaves(data: Mapping[str, Any], table: str = "") -> Iterator[tuple[str, object]]:

@@ -9,8 +9,8 @@ from microrad.link.budget import FREE_SPACE_LOSS
 from microrad.link_study import LinkStudy
 from microrad.mission import LinkMission, Source
 
-Subject = Literal["cone", "beacon", "answer", "communication", "residual", "fine pointing"]
-"""What a requirement is about: the beacon's cone, the margin of a link, or the error that a loop leaves."""
+Subject = Literal["cone", "beacon", "answer", "communication", "residual", "stroke", "fine pointing"]
+"""What a requirement is about: the beacon's cone, a margin, the error that a loop leaves, or the mirror's stroke."""
 
 ROUNDING = 1e-9
 """Share of a number, or decibels, that rounding may take from it."""

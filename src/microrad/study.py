@@ -180,19 +180,7 @@ def run(
     day, contact, plan = delivered(file, links, found, fine, residual, achieved, parts)
 
     on_progress(3, 3, "verdict")
-    evidence = verdict.Evidence(
-        m,
-        links.open_loop,
-        _present(links.beacon),
-        links.communication,
-        fig2.readings,
-        fig2.ideal,
-        loops,
-        summary,
-        runs,
-        scan,
-        day,
-    )
+    evidence = verdict.Evidence(m, loops, summary, runs, scan, day)
     return Study(
         file=file,
         links=links,

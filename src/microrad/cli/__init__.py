@@ -50,7 +50,7 @@ def init(
         str | None, option("--preset", "NAME", "A link from the literature; see microrad presets.")
     ] = None,
 ) -> Outcome:
-    """Write the paper's mission, ready to run.
+    """Write a LEO-to-GEO mission after the paper, ready to run.
 
     Each value carries its unit and a comment that says where it comes from. No file is ever overwritten.
     """
@@ -73,7 +73,7 @@ def _init_preset(file: Path, name: str) -> Outcome:
     except ValueError as error:
         raise Refusal(str(error)) from error
     chosen = next(each for each in presets.presets() if each.name == name)
-    run_it = f"microrad budget {shlex.quote(str(file))}"
+    run_it = f"microrad {'run' if chosen.whole else 'budget'} {shlex.quote(str(file))}"
     check_target(file, f"name another one: microrad init --preset {name} other.toml")
     write_whole(file, text)
     first = f"{file} written. " + (f"To be given first: {', '.join(chosen.unknown)}. " if chosen.unknown else "")

@@ -115,7 +115,7 @@ def _shown(path: Path, as_json: bool, output: str = "") -> Outcome:
 def init(
     file: Annotated[Path | None, typer.Argument(help="File to write [default: campaign.toml].")] = None,
 ) -> Outcome:
-    """Write a campaign file with the paper's mission, ready to run.
+    """Write a campaign file with a mission, ready to run.
 
     The mission is written beside it as leo-geo.toml where there is none. No file is ever overwritten.
     """

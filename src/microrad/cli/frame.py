@@ -79,7 +79,7 @@ app = typer.Typer(
     name="microrad",
     help="Design, identify and simulate the pointing chain of a small-satellite laser terminal.",
     epilog=examples(
-        "microrad init                    write the paper's mission, ready to run",
+        "microrad init                    write a mission, ready to run",
         "microrad run leo-geo.toml        the whole study: a verdict and a report",
         "microrad identify --help         a mirror model from your own recordings",
     )

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     epilog=examples(
         "microrad budget leo-geo.toml",
         'microrad budget leo-geo.toml --data-rate "1 Gbit/s" --pointing-error "5 urad"',
-        "microrad budget leo-geo.toml --solve-rate",
+        "microrad budget leo-geo.toml --solve communication.transmit_power",
         "microrad budget leo-geo.toml --csv > budget.csv",
         "microrad budget leo-geo.toml --html > budget.html",
     )
@@ -40,9 +40,9 @@ def budget(  # noqa: PLR0913, PLR0917  each is an option
     file: Annotated[Path, typer.Argument(help="Mission file, or one with the tables of its links.", metavar="FILE")],
     data_rate: Annotated[str | None, option("--data-rate", "RATE", "In place of the mission's.")] = None,
     pointing_error: Annotated[str | None, option("--pointing-error", "ANGLE", "In place of the mission's.")] = None,
-    solve_rate: Annotated[
-        bool, typer.Option("--solve-rate", help="The largest data rate with the required margin in its place.")
-    ] = False,
+    solve: Annotated[
+        str | None, option("--solve", "KEY", "Its values with the required margin, one in its place.")
+    ] = None,
     as_csv: Annotated[bool, typer.Option("--csv", help="Print one line a row, for a spreadsheet.")] = False,
     as_html: Annotated[bool, typer.Option("--html", help="Print one page that loads nothing.")] = False,
     verbose: Verbose = False,
@@ -57,8 +57,6 @@ def budget(  # noqa: PLR0913, PLR0917  each is an option
     """
     if sum((as_csv, as_html, as_json)) > 1:
         raise Refusal("--csv, --html and --json exclude each other; give one of them.")
-    if solve_rate and data_rate is not None:
-        raise Refusal("--solve-rate finds the data rate that --data-rate gives; give one of them.")
     from microrad import link_study
     from microrad.missionfile import load_link
     from microrad.report import budget_views
@@ -70,27 +68,29 @@ def budget(  # noqa: PLR0913, PLR0917  each is an option
             "--pointing-error changes no margin: under the table [jitter] of the mission the margin is the one at "
             "requirement.outage. Change jitter.bias and jitter.rms, or take the table out."
         )
-    given = _changed(loaded, data_rate, pointing_error, solve_rate)
+    given = _changed(loaded, data_rate, pointing_error)
     try:
-        study = link_study.run(given)
+        solution = None if solve is None else link_study.solve(given, solve)
+        study = link_study.run(given if solution is None else solution.file)
     except ValueError as error:  # a rate that the receiver does not take, a scan without time to detect
         raise Refusal(f"{file}: {error}") from error
     code = exit_on.code(met=met(study), closes=study.closes)
     if as_json:
-        return Outcome(json_text(budget_views.data(study)), code)
+        return Outcome(json_text(budget_views.data(study, solution)), code)
     if as_csv:
         return Outcome(budget_views.csv_text(study), code)
     if as_html:
         return Outcome(budget_views.html(study), code)
-    return Outcome(budget_views.text(study, width(), verbose=verbose), code)
+    said = "" if solution is None else budget_views.solution_text(solution, width()) + "\n\n"
+    return Outcome(said + budget_views.text(study, width(), verbose=verbose), code)
 
 
-def _changed(file: "LinkFile", data_rate: str | None, pointing_error: str | None, solve_rate: bool) -> "LinkFile":
+def _changed(file: "LinkFile", data_rate: str | None, pointing_error: str | None) -> "LinkFile":
     """The file with what the command line says in place of two of its values."""
     from microrad.link_table import Communication
     from microrad.mission import Source
 
-    raw = {"data_rate": "largest" if solve_rate else data_rate, "pointing_error": pointing_error}
+    raw = {"data_rate": data_rate, "pointing_error": pointing_error}
     values, sources = {}, dict(file.sources)
     for key, text in raw.items():
         if text is None:
@@ -102,10 +102,8 @@ def _changed(file: "LinkFile", data_rate: str | None, pointing_error: str | None
             raise Refusal(f"--{key.replace('_', '-')}: {error}") from error
         sources[f"communication.{key}"] = Source(0, "command line", text)
     m = file.mission
-    tables: dict[str, object] = {"communication": m.communication.model_copy(update=values)}
-    if solve_rate and "pointing_error_rad" in values:  # the rate is asked for at this error, not at the required one
-        tables["requirement"] = m.requirement.model_copy(update={"pointing_error_rad": values["pointing_error_rad"]})
-    return replace(file, mission=m.model_copy(update=tables), sources=sources)
+    changed = m.model_copy(update={"communication": m.communication.model_copy(update=values)})
+    return replace(file, mission=changed, sources=sources)
 
 
 @app.command(epilog=examples("microrad presets", "microrad init --preset click click.toml"))

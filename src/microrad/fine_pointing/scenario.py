@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from microrad import control, disturbance, geometry, hysteresis, mirror, sensor
+from microrad import control, disturbance, geometry, hysteresis, link, mirror, sensor
 from microrad.fine_loop import loop as fine
 from microrad.fine_pointing_table import FinePointing
 from microrad.mission import Mission, source_text
@@ -24,6 +24,10 @@ class Scene:
     axis: fine.PointingLoop
     stroke: tuple[geometry.StrokeBudget, ...]
     stroke_without_point_ahead: tuple[geometry.StrokeBudget, ...]
+
+    def own_stroke(self, m: Mission) -> tuple[geometry.StrokeBudget, ...]:
+        """The stroke budgets of the mission as it is: with the point-ahead on the mirror or not."""
+        return self.stroke if table(m).reference.point_ahead_on_mirror else self.stroke_without_point_ahead
 
 
 def scene(file: MissionFile) -> Scene:
@@ -148,7 +152,10 @@ def optical_sensor(file: MissionFile) -> sensor.OpticalSensor:
     if noise is None:
         assert o.quad_cell is not None  # the table's own check
         cell, spot = quad_cell(m)
-        ratio = cell.signal_to_noise(o.quad_cell.received_power_w, sensor.noise_bandwidth_hz(o.rate_hz))
+        power = o.quad_cell.received_power_w
+        if power is None:
+            power = link.answer_budget(m, file.sources).received_power_w
+        ratio = cell.signal_to_noise(power, sensor.noise_bandwidth_hz(o.rate_hz))
         noise = sensor.noise_equivalent_angle_rad(spot, ratio)
     return sensor.optical_sensor(
         noise,

@@ -25,6 +25,7 @@ from microrad.link.gains import (
     strehl_loss_db,
     strehl_ratio,
 )
+from microrad.link.inputs import LINK_TABLES, Input, fits, inputs, lit, margin_or_none, moved, unit_of
 from microrad.link.maps import (
     BIT_ERROR_RATIO,
     IdealReceiver,
@@ -50,7 +51,8 @@ from microrad.link.model import (
     required_dbm,
     strehl_db,
 )
-from microrad.link.tornado import LINK_TABLES, Swing, Tornado, beam_tornado, swings
+from microrad.link.solve import Interval, Solved, solve
+from microrad.link.tornado import Swing, Tornado, beam_tornado, swings
 
 __all__ = [
     "BEST_TRUNCATION",
@@ -60,11 +62,14 @@ __all__ = [
     "LINK_TABLES",
     "GaussianFall",
     "IdealReceiver",
+    "Input",
+    "Interval",
     "LinkBudget",
     "LinkError",
     "LitAperture",
     "OffAxis",
     "SensitivityReading",
+    "Solved",
     "Swing",
     "Tornado",
     "TransmittedBeam",
@@ -78,17 +83,22 @@ __all__ = [
     "communication_budget",
     "convention_maps",
     "far_field_m",
+    "fits",
     "free_space_loss_db",
     "gaussian_beam_gain_db",
     "gaussian_pointing_loss_db",
     "ideal_receivers",
     "implied_sensitivity",
     "implied_transmission_db",
+    "inputs",
     "largest_data_rate",
     "largest_pointing_error",
+    "lit",
     "lit_aperture",
     "margin_map",
     "margin_of_error",
+    "margin_or_none",
+    "moved",
     "obscuration_loss_db",
     "peak_radiant_intensity_w_sr",
     "photon_energy_j",
@@ -99,8 +109,10 @@ __all__ = [
     "received_on_axis_dbm",
     "receiver",
     "required_dbm",
+    "solve",
     "strehl_db",
     "strehl_loss_db",
     "strehl_ratio",
     "swings",
+    "unit_of",
 ]

@@ -1,35 +1,20 @@
 """Which input moves a margin most: each one alone, a little down and up."""
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Literal
 
-from pydantic.fields import FieldInfo
-
-from microrad.fields import Quantity, Several, Share, Table
+from microrad.fields import Quantity, Share
 from microrad.link.budget import answer_budget, beacon_budget
-from microrad.link.model import lit_aperture
-from microrad.link.receivers import RateError
-from microrad.link_table import divergence_fits
+from microrad.link.inputs import Input, fits, inputs, lit, margin_or_none, unit_of
 from microrad.mission import LinkMission, Source, source_text
 
 RELATIVE = 0.1
 """How far a quantity is moved, as a share of itself."""
 STEP_DB = 0.5
 """How far a quantity in decibels is moved."""
-LINK_TABLES = (
-    "terminals",
-    "communication",
-    "communication.receiver",
-    "communication.receiver.background",
-    "communication.beam",
-    "channel",
-    "point_ahead",
-)
-"""The tables with the inputs of the communication link."""
 _BY_TEN = ("bit_error_ratio", "outage")  # shares that are judged by their order of magnitude
-_AXES = ("x", "y")
 _TIE_DIGITS = 6  # of decibels: equal swings stand as the mission has their keys, not as a processor rounds them
 
 Margin = Callable[[LinkMission], float]
@@ -75,23 +60,9 @@ def beam_tornado(
 
     Raises `ValueError` for a beam that the mission has not.
     """
-    budget, end = (beacon_budget, "leo") if name == "beacon" else (answer_budget, "geo")
-    too_narrow, tables = divergence_fits(name, end), ("terminals", name, "channel", "point_ahead")
-
-    def possible(m: LinkMission) -> bool:
-        return not any(too_narrow(m.conventions, m.terminals, getattr(m, name)))
-
-    return swings(mission, sources, tables, lambda m: budget(m, sources).margin_db, possible)
-
-
-def _lit(mission: LinkMission) -> bool:
-    """Whether the obscuration lets some of the data's beam pass."""
-    if mission.conventions.pointing_loss == "pattern":
-        try:
-            lit_aperture(mission)
-        except ValueError:
-            return False
-    return True
+    budget = beacon_budget if name == "beacon" else answer_budget
+    tables = ("terminals", name, "channel", "point_ahead")
+    return swings(mission, sources, tables, lambda m: budget(m, sources).margin_db, fits(name))
 
 
 def swings(
@@ -99,7 +70,7 @@ def swings(
     sources: Mapping[str, Source],
     tables: tuple[str, ...],
     margin_db: Margin,
-    possible: Callable[[LinkMission], bool] = _lit,
+    possible: Callable[[LinkMission], bool] = lit,
 ) -> tuple[Swing, ...]:
     """A margin over each input of these tables, one at a time, the largest swing first.
 
@@ -107,39 +78,14 @@ def swings(
     ten; none beyond the bounds that its key has, nor to a mission that is not ``possible``, by default one whose
     obscuration stops the beam. Inputs that do not move the margin are left out.
     """
-    found = [_swing(mission, sources, each, margin_db, possible) for name in tables for each in _inputs(mission, name)]
+    found = [_swing(mission, sources, each, margin_db, possible) for name in tables for each in inputs(mission, name)]
     return tuple(sorted((s for s in found if s.swing_db > 1e-9), key=lambda swing: -round(swing.swing_db, _TIE_DIGITS)))
-
-
-@dataclass(frozen=True, slots=True)
-class _Input:
-    """One number of a mission: a field of a table, or an item of one that holds a list."""
-
-    key: str
-    table: str
-    field: str
-    item: int | None
-    value: float
-    rule: Quantity
-
-    @property
-    def shown(self) -> str:
-        """The key, with the axis of an item."""
-        return self.key if self.item is None else f"{self.key} {_AXES[self.item]}"
-
-    def moved(self, mission: LinkMission, value: float) -> LinkMission:
-        """The mission with this number replaced."""
-        if self.item is None:
-            return mission.with_value(f"{self.table}.{self.field}", value)
-        items = list(getattr(_table(mission, self.table), self.field))
-        items[self.item] = value
-        return mission.with_value(f"{self.table}.{self.field}", tuple(items))
 
 
 def _swing(
     mission: LinkMission,
     sources: Mapping[str, Source],
-    each: _Input,
+    each: Input,
     margin_db: Margin,
     possible: Callable[[LinkMission], bool],
 ) -> Swing:
@@ -147,42 +93,15 @@ def _swing(
     low, high = (_nearest(mission, each, end, possible) for end in ends)
     return Swing(
         key=each.shown,
-        unit=_unit(mission, each.field, each.rule),
+        unit=unit_of(mission, each.field, each.rule),
         value=each.value,
         low=low,
         high=high,
-        margin_low_db=_margin(each.moved(mission, low), margin_db),
-        margin_high_db=_margin(each.moved(mission, high), margin_db),
+        margin_low_db=margin_or_none(each.moved(mission, low), margin_db),
+        margin_high_db=margin_or_none(each.moved(mission, high), margin_db),
         kind=sources[each.key].kind if each.key in sources else "",
         source=source_text(sources, each.key),
     )
-
-
-def _inputs(mission: LinkMission, name: str) -> Iterator[_Input]:
-    """Every quantity of a table that has a value."""
-    table = _table(mission, name)
-    if table is None:
-        return
-    for field, info in type(table).model_fields.items():
-        value, key = getattr(table, field), f"{name}.{info.alias or field}"
-        rules = _rules(info)
-        if rules and isinstance(value, float):
-            yield _Input(key, name, field, None, value, rules[0])
-        for rule in (each for each in info.metadata if isinstance(each, Several)):
-            for item, number in enumerate(value):
-                yield _Input(key, name, field, item, number, rule.each)
-
-
-def _rules(info: FieldInfo) -> list[Quantity]:
-    """The rule of a quantity; that of one that may be left out stands inside the union."""
-    kinds = getattr(info.annotation, "__args__", ())
-    inner = [rule for kind in kinds for rule in getattr(kind, "__metadata__", ())]
-    return [rule for rule in (*info.metadata, *inner) if isinstance(rule, Quantity)]
-
-
-def _unit(mission: LinkMission, field: str, rule: Quantity) -> str:
-    """Unit of a field; a Strehl has one of its own where it is read as a loss."""
-    return "dB" if field == "strehl" and mission.conventions.strehl == "decibel" else rule.unit
 
 
 def _ends(field: str, value: float, rule: Quantity, strehl: str) -> tuple[float, float]:
@@ -199,23 +118,8 @@ def _ends(field: str, value: float, rule: Quantity, strehl: str) -> tuple[float,
     return max(low, least), min(high, most)
 
 
-def _table(mission: LinkMission, name: str) -> Table | None:
-    table: Table | None = mission
-    for part in name.split("."):
-        table = None if table is None else getattr(table, part)
-    return table
-
-
-def _nearest(mission: LinkMission, each: _Input, end: float, possible: Callable[[LinkMission], bool]) -> float:
+def _nearest(mission: LinkMission, each: Input, end: float, possible: Callable[[LinkMission], bool]) -> float:
     """The end of a swing, its step halved until there is such a mission."""
     while end != each.value and not possible(each.moved(mission, end)):
         end = (each.value + end) / 2.0
     return end
-
-
-def _margin(mission: LinkMission, margin_db: Margin) -> float:
-    """The margin; a receiver too slow for the rate has none."""
-    try:
-        return margin_db(mission)
-    except RateError:
-        return -math.inf

@@ -12,7 +12,7 @@ from microrad.budget import Line
 from microrad.link import Swing
 from microrad.link_acquisition import Finding, Found, Tracking
 from microrad.link_performance import Performance, error_rad, required_error_rad
-from microrad.link_study import LinkStudy
+from microrad.link_study import LinkStudy, Solution
 from microrad.mission import source_text
 from microrad.operations import spreadsheet_text
 from microrad.pointing import OpenLoopPointing
@@ -303,10 +303,38 @@ def html(study: LinkStudy) -> str:
     return interactive.with_scripts(page.pages().get_template("budget.html").render(context))
 
 
-def data(study: LinkStudy) -> dict[str, Any]:
+def data(study: LinkStudy, solution: Solution | None = None) -> dict[str, Any]:
     """The verdict on the links, their budgets and what follows from them as plain data, SI units in the keys."""
     judged = [requirements.data(r) for r in of_links(study)]
-    return {"closes": study.closes, "met": met(study), "requirements": judged, **facts(study)}
+    solved = {} if solution is None else {"solved": _solution_data(solution)}
+    return {"closes": study.closes, "met": met(study), "requirements": judged, **solved, **facts(study)}
+
+
+def _solution_data(s: Solution) -> dict[str, Any]:
+    ends = [[None if i.low_open else i.low, None if i.high_open else i.high] for i in s.solved.intervals]
+    best = {"value": s.solved.best, "margin_db": s.solved.best_db}
+    found = {"key": s.key, "unit": s.unit, "of": s.of, "required_db": s.required_db}
+    return {**found, "intervals": ends, "value": s.value, "best": best}
+
+
+def solution_text(s: Solution, width: int) -> str:
+    """The values of a key that leave the required margin, in a sentence."""
+    wanted = f"the required {s.required_db:g} dB of {s.of}"
+    if not s.solved.intervals:
+        most = f"the most is {signed(s.solved.best_db, 'dB')} at {quantity(s.solved.best, s.unit, 4)}"
+        return tables_text([], [f"No value of {s.key} leaves {wanted}: {most}."], width)
+    spans = " and ".join(_span(each, s.unit) for each in s.solved.intervals)
+    several = len(s.solved.intervals) > 1 or not (s.solved.intervals[0].low_open or s.solved.intervals[0].high_open)
+    best = f", most ({signed(s.solved.best_db, 'dB')}) near {quantity(s.solved.best, s.unit)}" if several else ""
+    here = f"The budgets below have {quantity(s.value, s.unit, 4)}."
+    return tables_text([], [f"{s.key} leaves {wanted} {spans}{best}. {here}"], width)
+
+
+def _span(i: link.Interval, unit: str) -> str:
+    low, high = quantity(i.low, unit, 4), quantity(i.high, unit, 4)
+    if i.low_open:
+        return "at any value" if i.high_open else f"up to {high}"
+    return f"from {low} on" if i.high_open else f"from {low} to {high}"
 
 
 def facts(study: LinkStudy) -> dict[str, Any]:

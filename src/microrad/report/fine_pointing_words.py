@@ -214,11 +214,11 @@ def short(fine: FinePointingStudy, m: Mission) -> list[str]:
             f"best PI of the gain grid; on the mission's mirror {fine.best.design.name} is {percent(abs(r.gained))} "
             f"{'better' if r.gained >= 0.0 else 'worse'}."
         )
-    short_of = [axis for axis in mission_stroke(fine, m) if not axis.fits]
+    short_of = [axis for axis in fine.scene.own_stroke(m) if not axis.fits]
     if short_of:
         worst = min(short_of, key=lambda axis: axis.margin_rad)
         lines.append(
-            f"The mirror's stroke does not cover the worst case: {_output(worst)} needs {angle(worst.needed_rad)} to "
+            f"The mirror's stroke does not cover the worst case: {worst.label} needs {angle(worst.needed_rad)} to "
             f"either side and has {angle(worst.available_rad)}."
         )
     return lines
@@ -239,17 +239,6 @@ def tracked(fine: FinePointingStudy, required_rad: float) -> str:
 
 
 # ------------------------------------------------------------------------------------------------ stroke
-
-
-def mission_stroke(fine: FinePointingStudy, m: Mission) -> tuple[StrokeBudget, ...]:
-    """The stroke budgets of the mission as it is: with the point-ahead on the mirror or not."""
-    table = m.fine_pointing
-    elsewhere = table is not None and not table.reference.point_ahead_on_mirror
-    return fine.scene.stroke_without_point_ahead if elsewhere else fine.scene.stroke
-
-
-def _output(axis: StrokeBudget) -> str:
-    return f"axis {axis.name}" if axis.name in ("x", "y") else axis.name  # or an actuator of a tripod
 
 
 def stroke(fine: FinePointingStudy, m: Mission) -> list[str]:
@@ -289,10 +278,10 @@ def stroke(fine: FinePointingStudy, m: Mission) -> list[str]:
 def _fit(where: str, several: tuple[StrokeBudget, ...]) -> str:
     worst = min(several, key=lambda axis: axis.margin_rad)
     if worst.fits:
-        return f"{_sentence(where)} the worst case fits, with {angle(worst.margin_rad)} to spare on {_output(worst)}."
+        return f"{_sentence(where)} the worst case fits, with {angle(worst.margin_rad)} to spare on {worst.label}."
     rss = "fits" if all(axis.fits_rss for axis in several) else "does not fit either"
     return (
-        f"{_sentence(where)} the worst case misses by {angle(-worst.margin_rad)} on {_output(worst)}; the root sum "
+        f"{_sentence(where)} the worst case misses by {angle(-worst.margin_rad)} on {worst.label}; the root sum "
         f"square {rss}."
     )
 
@@ -317,10 +306,10 @@ def warnings(fine: FinePointingStudy, m: Mission) -> list[str]:
 
 def _stroke_warnings(fine: FinePointingStudy, m: Mission) -> list[str]:
     return [
-        f"the stroke does not cover the worst case on {_output(axis)}: {angle(axis.needed_rad)} needed to either side, "
+        f"the stroke does not cover the worst case on {axis.label}: {angle(axis.needed_rad)} needed to either side, "
         f"{angle(axis.available_rad)} available (root sum square {angle(axis.needed_rss_rad)}); no simulated run has "
         "the static misalignment, so that they may stay within limits which the worst case exceeds"
-        for axis in mission_stroke(fine, m)
+        for axis in fine.scene.own_stroke(m)
         if not axis.fits
     ]
 

@@ -68,7 +68,8 @@ def _capital(text: str) -> str:
 def _cone(study: Study) -> str:
     p = study.open_loop
     share, line = max(zip(p.variance_shares, p.lines, strict=True), key=lambda pair: pair[0])
-    return f"{line.name}: {percent(share)} of the squares, {quantity(line.value, 'rad')} half width"
+    said = f"{line.name}: {percent(share)} of the squares, {quantity(line.value, 'rad')} half width"
+    return said if p.reading is None else f"{said}; the cone covers its partner with {p.reading.coverage:.2f}"
 
 
 def _tornado(study: Study, of: str) -> Sequence[link.Swing]:
@@ -94,6 +95,14 @@ def largest_loss(budget: link.LinkBudget) -> str:
 
 def _power(study: Study, budget: link.LinkBudget) -> str:
     return f"{largest_loss(budget)}{most_sensitive(_tornado(study, budget.name))}"
+
+
+def _stroke(study: Study, cause: str) -> str:
+    fine = study.fine_pointing
+    assert fine is not None  # such a requirement has one
+    axis = min(fine.scene.own_stroke(study.file.mission), key=lambda each: each.margin_rad)
+    line = max(axis.lines, key=lambda each: each.value)
+    return f"{cause}: {quantity(line.value, 'rad')} of {quantity(axis.total_rad, 'rad')} at the line of sight"
 
 
 def _residual(study: Study, cause: str) -> str:
@@ -134,6 +143,7 @@ _CONTRIBUTORS: Mapping[Subject, Callable[[Study, str], str]] = {
     "beacon": lambda study, cause: _power(study, study.beacon),
     "answer": lambda study, cause: _power(study, study.answer),
     "residual": _residual,
+    "stroke": _stroke,
     "communication": _communication,
     "fine pointing": _fine,
 }

@@ -61,7 +61,6 @@ class Budget:
     file: Path
     data_rate: str | None = None
     pointing_error: str | None = None
-    solve_rate: bool = False
     results: tuple[str, ...] = ()
 
     @property
@@ -72,14 +71,12 @@ class Budget:
             path_argument(self.file),
             *option("--data-rate", self.data_rate),
             *option("--pointing-error", self.pointing_error),
-            *flag("--solve-rate", self.solve_rate),
         )
 
     @property
     def python(self) -> str:
         """Lines of Python that do the same."""
-        rate = "largest" if self.solve_rate else self.data_rate
-        if rate is None and self.pointing_error is None:
+        if self.data_rate is None and self.pointing_error is None:
             return joined(
                 "from microrad import load_link, run_link_study",
                 "from microrad.report import budget_views",
@@ -96,24 +93,21 @@ class Budget:
             "",
             f"file = load_link({path_text(self.file)})",
             "tables, sources = {}, dict(file.sources)",
-            *self._changes(rate),
+            *self._changes(),
             "file = replace(file, mission=file.mission.model_copy(update=tables), sources=sources)",
             f"print(budget_views.text(run_link_study(file), {WIDTH}))",
         )
 
-    def _changes(self, rate: str | None) -> Iterable[str]:
+    def _changes(self) -> Iterable[str]:
         """Lines that put what was asked for in place of the mission's values."""
-        values = []
+        rate, values = self.data_rate, []
         if rate is not None:
             read = "float('nan')" if rate == "largest" else f"parse_quantity({rate!r}, 'bit/s')"  # nan is solved for
             values.append(f"'data_rate_bit_s': {read}")
             yield f"sources['communication.data_rate'] = Source(0, 'command line', {rate!r})"
         if self.pointing_error is not None:
-            error = f"'pointing_error_rad': parse_quantity({self.pointing_error!r}, 'rad')"
-            values.append(error)
+            values.append(f"'pointing_error_rad': parse_quantity({self.pointing_error!r}, 'rad')")
             yield f"sources['communication.pointing_error'] = Source(0, 'command line', {self.pointing_error!r})"
-            if rate == "largest":
-                yield f"tables['requirement'] = file.mission.requirement.model_copy(update={{{error}}})"
         yield f"tables['communication'] = file.mission.communication.model_copy(update={{{', '.join(values)}}})"
 
 

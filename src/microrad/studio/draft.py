@@ -80,7 +80,7 @@ class Draft:
 
     @classmethod
     def shipped(cls, path: str | Path) -> Draft:
-        """The paper's mission as `microrad init` writes it, to be saved at `path`."""
+        """The shipped mission as `microrad init` writes it, to be saved at `path`."""
         text = resources.files("microrad").joinpath("missions", "leo-geo.toml").read_text("utf-8")
         return _draft(text, Path(path), "")
 

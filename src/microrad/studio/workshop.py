@@ -41,7 +41,7 @@ class Workshop:
     """
 
     def __init__(self, folder: Path, file: Path | None = None) -> None:
-        """Open `file`, which lies in `folder`; else what was being edited there, or the paper's mission.
+        """Open `file`, which lies in `folder`; else what was being edited there, or the shipped mission.
 
         Raises `MissionError` for a file that cannot be read, `JobError` and `NameRefusedError` for a folder or file
         that cannot be used.
@@ -196,7 +196,7 @@ class Workshop:
         write_whole(self.studio / name, json.dumps(noted))
 
     def _begin(self, file: Path | None) -> Draft:
-        """The unsaved changes of `file` where there are some, else the file, else the paper's mission."""
+        """The unsaved changes of `file` where there are some, else the file, else the shipped mission."""
         found = self._kept(_KEPT, file)
         if found is not None:
             return found

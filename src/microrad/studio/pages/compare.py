@@ -21,7 +21,7 @@ from microrad.studio.workshop import Workshop
 TITLE = "Compare"
 PATH = "/compare"
 
-_PAPER, _SAVED = "the paper's mission", "saved file of this mission"
+_SHIPPED, _SAVED = "the shipped mission", "saved file of this mission"
 _PRESET = "the preset "
 """What missions that are no files of the folder are called in it: by no name that a file could have."""
 
@@ -64,7 +64,7 @@ class _Page:
             found[_SAVED] = f"{self.workshop.name_of(draft.path)} as it is saved"
         campaigns = campaign_files(self.workshop)
         files = (path.name for path in self.workshop.missions() if path != draft.path and path.name not in campaigns)
-        found |= {f"file {name}": name for name in files} | {_PAPER: _PAPER}
+        found |= {f"file {name}": name for name in files} | {_SHIPPED: _SHIPPED}
         return found | {_PRESET + each.name: f"{each.name}: {each.title}" for each in presets.presets()}
 
     def _compared(self, options: dict[str, str]) -> str | None:
@@ -90,8 +90,8 @@ class _Page:
             return Draft.open(self.workshop.draft.path)
         if name.startswith("file "):
             return Draft.open(self.workshop.inside(name.removeprefix("file ")))
-        paper = Draft.shipped(self.workshop.folder / name)
-        return paper if name == _PAPER else paper.with_text(presets.preset_text(name.removeprefix(_PRESET)))
+        shipped = Draft.shipped(self.workshop.folder / name)
+        return shipped if name == _SHIPPED else shipped.with_text(presets.preset_text(name.removeprefix(_PRESET)))
 
     def _action(self, other: bool) -> commands.Budget | None:
         draft = self.workshop.other if other else self.workshop.draft

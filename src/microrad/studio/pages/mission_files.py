@@ -13,7 +13,7 @@ from microrad.studio.optional_tables import offered, with_table
 from microrad.studio.pages import layout
 from microrad.studio.workshop import Workshop
 
-_PAPER = "paper's mission"
+_SHIPPED = "shipped mission"
 
 
 def file_buttons(workshop: Workshop, shown: Callable[[str], None]) -> None:
@@ -45,13 +45,13 @@ def _open(workshop: Workshop, shown: Callable[[str], None]) -> None:
 
 
 def _new(workshop: Workshop, shown: Callable[[str], None]) -> None:
-    texts = {_PAPER: "", **{each.name: f"{each.name}: {each.title}" for each in presets.presets()}}
-    texts[_PAPER] = "the paper's mission, with mirror, loop and orbit"
+    texts = {_SHIPPED: "", **{each.name: f"{each.name}: {each.title}" for each in presets.presets()}}
+    texts[_SHIPPED] = "the shipped mission, with mirror, loop and orbit"
 
     def do(name: str) -> None:
-        file = "leo-geo.toml" if name == _PAPER else f"{name}.toml"
+        file = "leo-geo.toml" if name == _SHIPPED else f"{name}.toml"
         draft = Draft.shipped(_free(workshop, file))
-        workshop.replace(draft if name == _PAPER else draft.with_text(presets.preset_text(name)))
+        workshop.replace(draft if name == _SHIPPED else draft.with_text(presets.preset_text(name)))
 
     _ask("Begin a new mission", "From", "Begin", texts, do, shown, _lost(workshop))
 

@@ -1,0 +1,122 @@
+"""The numbers of a mission's link tables, one at a time: found by their rules, replaced, and kept possible."""
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Literal
+
+from pydantic.fields import FieldInfo
+
+from microrad.fields import Quantity, Several, Share, Table
+from microrad.link.model import lit_aperture
+from microrad.link.receivers import RateError
+from microrad.link_table import divergence_fits
+from microrad.mission import LinkMission
+
+LINK_TABLES = (
+    "terminals",
+    "communication",
+    "communication.receiver",
+    "communication.receiver.background",
+    "communication.beam",
+    "channel",
+    "point_ahead",
+)
+"""The tables with the inputs of the communication link."""
+
+Beam = Literal["beacon", "answer"]
+_AXES = ("x", "y")
+
+
+@dataclass(frozen=True, slots=True)
+class Input:
+    """One number of a mission: a field of a table, or an item of one that holds a list."""
+
+    key: str
+    table: str
+    field: str
+    item: int | None
+    value: float
+    rule: Quantity
+
+    @property
+    def shown(self) -> str:
+        """The key, with the axis of an item."""
+        return self.key if self.item is None else f"{self.key} {_AXES[self.item]}"
+
+    def moved(self, mission: LinkMission, value: float) -> LinkMission:
+        """The mission with this number replaced."""
+        if self.item is None:
+            return mission.with_value(f"{self.table}.{self.field}", value)
+        items = list(getattr(_table(mission, self.table), self.field))
+        items[self.item] = value
+        return mission.with_value(f"{self.table}.{self.field}", tuple(items))
+
+
+def inputs(mission: LinkMission, name: str) -> Iterator[Input]:
+    """Every quantity of a table that has a value."""
+    table = _table(mission, name)
+    if table is None:
+        return
+    for field, info in type(table).model_fields.items():
+        value, key = getattr(table, field), f"{name}.{info.alias or field}"
+        rules = _rules(info)
+        if rules and isinstance(value, float):
+            yield Input(key, name, field, None, value, rules[0])
+        for rule in (each for each in info.metadata if isinstance(each, Several)):
+            for item, number in enumerate(value):
+                yield Input(key, name, field, item, number, rule.each)
+
+
+def moved(mission: LinkMission, found: tuple[Input, ...], value: float) -> LinkMission | None:
+    """The mission with the input at a value, its axes in proportion, or None where their rule does not allow it."""
+    largest = max(each.value for each in found)
+    for each in found:
+        own = value if each.value == largest else value * each.value / largest
+        if each.rule.out_of_bounds(own) or (isinstance(each.rule, Share) and not 0.0 < own < each.rule.below):
+            return None
+        mission = each.moved(mission, own)
+    return mission
+
+
+def _rules(info: FieldInfo) -> list[Quantity]:
+    """The rule of a quantity; that of one that may be left out stands inside the union."""
+    kinds = getattr(info.annotation, "__args__", ())
+    inner = [rule for kind in kinds for rule in getattr(kind, "__metadata__", ())]
+    return [rule for rule in (*info.metadata, *inner) if isinstance(rule, Quantity)]
+
+
+def unit_of(mission: LinkMission, field: str, rule: Quantity) -> str:
+    """Unit of a field; a Strehl has one of its own where it is read as a loss."""
+    return "dB" if field == "strehl" and mission.conventions.strehl == "decibel" else rule.unit
+
+
+def _table(mission: LinkMission, name: str) -> Table | None:
+    table: Table | None = mission
+    for part in name.split("."):
+        table = None if table is None else getattr(table, part)
+    return table
+
+
+def lit(mission: LinkMission) -> bool:
+    """Whether the obscuration lets some of the data's beam pass."""
+    if mission.conventions.pointing_loss == "pattern":
+        try:
+            lit_aperture(mission)
+        except ValueError:
+            return False
+    return True
+
+
+def margin_or_none(mission: LinkMission, margin_db: Callable[[LinkMission], float]) -> float:
+    """The margin; a receiver too slow for the rate has none."""
+    try:
+        return margin_db(mission)
+    except RateError:
+        return -math.inf
+
+
+def fits(name: Beam) -> Callable[[LinkMission], bool]:
+    """Whether the aperture of the beacon, or of the answer, can make its divergence."""
+    too_narrow = divergence_fits(name, "geo" if name == "answer" else "leo")
+    return lambda m: not any(too_narrow(m.conventions, m.terminals, getattr(m, name)))
