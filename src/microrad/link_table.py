@@ -6,9 +6,10 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
+from microrad.capacity import Code, excess_noise_factor
 from microrad.fields import OrWord, Problem, Quantity, Share, Table, Whole
 from microrad.mirror_table import ANGLE_MOST, Angle, Name
-from microrad.units import format_quantity
+from microrad.units import PLANCK_J_S, SPEED_OF_LIGHT_M_S, format_quantity
 
 LOWEST_ELEVATION_RAD = math.radians(10.0)
 """Elevation below which a plane-parallel atmosphere is no model of the path."""
@@ -230,6 +231,28 @@ class Receiver(Table):
         if self.order is not None and self.order & (self.order - 1):
             yield Problem("order", "is no power of two", "order = 16 would do")
 
+    def most_code_gain(self, data_rate_bit_s: float, wavelength_m: float) -> float:
+        """Largest net gain that a code can have on this receiver, as a ratio of power (see `capacity`).
+
+        The background of a counter is taken as it is where its power is given, and the rate; else as any.
+        """
+        code = Code(self.code_rate, self.bit_error_ratio)
+        if self.modulation == "ppm":
+            return code.ppm_counting()
+        if self.modulation == "bpsk":
+            return code.bpsk_homodyne()
+        if self.detector == "preamplified":
+            return code.dpsk_preamplified() if self.modulation == "dpsk" else code.ook_preamplified()
+        space = 2.0 / (10.0 ** (min(self.extinction_ratio_db or 0.0, 300.0) / 10.0) + 1.0)
+        if self.detector != "photon-counting":
+            excess = excess_noise_factor(self.avalanche_gain or 1.0, self.ionisation_ratio or 0.0)
+            return code.ook_current(2.0 - space, space, excess)
+        light = self.background_power_w
+        if light is None or not data_rate_bit_s > 0.0:
+            return code.ook_counting(2.0 - space, space)
+        counts = (self.efficiency or 0.0) * light * wavelength_m / (PLANCK_J_S * SPEED_OF_LIGHT_M_S)
+        return code.ook_counting(2.0 - space, space, (counts + (self.dark_count_rate_1_s or 0.0)) / data_rate_bit_s)
+
 
 class Communication(Beam):
     """The data link, diffraction-limited by its aperture."""
@@ -253,6 +276,21 @@ class Communication(Beam):
             yield Problem("receiver_sensitivity", "is missing, and so is the table receiver", advice)
         if self.receiver_sensitivity_photon_bit is not None and self.receiver is not None:
             yield Problem("receiver_sensitivity", "stands beside the table receiver", "one of the two removed")
+        if self.receiver is not None:
+            yield from self._gain_problems(self.receiver)
+
+    def _gain_problems(self, receiver: Receiver) -> Iterator[Problem]:
+        """A code that needs no less power than the channel's capacity asks for."""
+        limit_db = 10.0 * math.log10(receiver.most_code_gain(self.data_rate_bit_s, self.wavelength_m))
+        if receiver.code_gain_db > limit_db:
+            at = f"code_rate = {receiver.code_rate:g}"
+            ratio = format_quantity(receiver.bit_error_ratio, "").rstrip()
+            reason = (
+                f"is more than any code can gain: {limit_db:.3g} dB at {at} and bit_error_ratio = {ratio}, where "
+                f"{receiver.modulation} with {receiver.detector} is at its capacity"
+            )
+            advice = f'at most "{math.floor(limit_db * 100.0) / 100.0:.2f} dB" at {at}: the net gain, power per bit'
+            yield Problem("receiver.code_gain", reason, advice)
 
 
 class LinkRequirement(Table):

@@ -2,6 +2,7 @@
 
 import math
 
+from microrad import capacity
 from microrad.link.receivers.checks import require, require_zero_or_more
 from microrad.units import PLANCK_J_S, SPEED_OF_LIGHT_M_S
 
@@ -54,4 +55,4 @@ def apd_excess_noise_factor(gain: float, ionisation_ratio: float) -> float:
         "",
         "it lies from 0 to 1; take the inverse when the other carrier starts the avalanche",
     )
-    return ionisation_ratio * gain + (1.0 - ionisation_ratio) * (2.0 - 1.0 / gain)
+    return capacity.excess_noise_factor(gain, ionisation_ratio)

@@ -1,0 +1,146 @@
+"""Held against capacities that are summed and integrated here, and the receivers' own powers without a code."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy import integrate, optimize, stats
+
+from link_files import RECEIVERS, link_file, received_with
+from microrad.capacity import Code
+from microrad.document import MissionError
+from microrad.link import model, receivers
+
+RATE = 1e6
+COMMON = {"wavelength_m": 1.55e-6, "bandwidth_hz": 1e15, "detection_efficiency": 1.0}
+CODES = [(0.9, 1e-3), (0.5, 1e-6), (0.1, 1e-9), (1.0, 1e-6)]
+
+
+def entropy(share):
+    return float(stats.entropy([share, 1.0 - share], base=2))
+
+
+def least(told, code):
+    """Signal at which a capacity, rising in it, lets through what the code and its errors leave to say."""
+    rate, ratio = code
+    wanted = rate * (1.0 - entropy(ratio))
+    return math.exp(optimize.brentq(lambda x: told(math.exp(x)) - wanted, -9.0, 7.0, xtol=1e-10))
+
+
+def told_on_off(signal, mark, space, background):
+    """Bits in the Poisson counts of a mark or a space."""
+    counts = np.arange(0.0, mark * signal + background + 12.0 * math.sqrt(mark * signal + background) + 60.0)
+    laws = stats.poisson.pmf(counts, np.array([[mark], [space]]) * signal + background)
+    return entropies(laws.mean(axis=0)) - np.mean([entropies(law) for law in laws])
+
+
+def entropies(law):
+    return float(stats.entropy(law, base=2) * law.sum())
+
+
+def told_ppm(pulse, order):
+    """Bits in a word: each of its inputs, all slots empty or the pulse in its own."""
+    seen = np.hstack([np.eye(order) * -np.expm1(-pulse), np.full((order, 1), math.exp(-pulse))])
+    return (entropies(seen.mean(axis=0)) - entropies(seen[0])) / math.log2(order)
+
+
+def told_ppm_background(pulse, background):
+    """Bits in a word of two slots, both with background."""
+    counts = np.arange(0.0, pulse + background + 12.0 * math.sqrt(pulse + background) + 60.0)
+    first = np.outer(stats.poisson.pmf(counts, pulse + background), stats.poisson.pmf(counts, background))
+    return entropies((first + first.T).ravel() / 2.0) - entropies(first.ravel())
+
+
+def told_two_signs(snr):
+    """Bits in the sign of a real symbol in Gaussian noise."""
+    root = math.sqrt(snr)
+    lost = integrate.quad(
+        lambda y: stats.norm.pdf(y - root) * np.logaddexp(0.0, -2.0 * y * root) / math.log(2.0), root - 12, root + 12
+    )[0]
+    return 1.0 - lost
+
+
+@pytest.mark.parametrize("code", CODES)
+@pytest.mark.parametrize("order", [2, 16])
+def test_ppm_gains_what_its_erasures_leave(order, code):
+    uncoded = receivers.PpmCounting(**COMMON, bit_error_ratio=code[1], order=order).photons_per_bit(RATE)
+    coded = least(lambda n: told_ppm(n, order), code) / (code[0] * math.log2(order))
+    assert Code(*code).ppm_counting() == pytest.approx(float(uncoded) / coded, rel=1e-6)
+
+
+@pytest.mark.parametrize("code", CODES)
+def test_on_off_keying_with_dark_spaces_gains_what_its_misses_leave(code):
+    uncoded = receivers.OokCounting(**COMMON, bit_error_ratio=code[1]).photons_per_bit(RATE)
+    coded = least(lambda n: told_on_off(n, 2.0, 0.0, 0.0), code) / code[0]
+    assert Code(*code).ook_counting(2.0, 0.0, 0.0) == pytest.approx(float(uncoded) / coded, rel=1e-6)
+
+
+@pytest.mark.parametrize("code", CODES[:3])
+@pytest.mark.parametrize("background", [0.0, 0.01, 1.0, 30.0])
+@pytest.mark.parametrize("extinction", [1e6, 20.0, 3.0])
+def test_no_counter_gains_more_in_background_and_bright_spaces(extinction, background, code):
+    counter = receivers.OokCounting(
+        **COMMON, bit_error_ratio=code[1], extinction_ratio=extinction, dark_count_rate_hz=background * RATE
+    )
+    space = 2.0 / (extinction + 1.0)
+    coded = least(lambda n: told_on_off(n, 2.0 - space, space, code[0] * background), code) / code[0]
+    gain = float(counter.photons_per_bit(RATE)) / coded
+    bound = Code(*code).ook_counting(2.0 - space, space, background)
+    assert 0.55 * bound < gain < bound <= Code(*code).ook_counting(2.0 - space, space)
+
+
+@pytest.mark.parametrize("code", CODES[:3])
+@pytest.mark.parametrize("background", [0.01, 1.0])
+def test_ppm_gains_less_in_background(background, code):
+    counter = receivers.PpmCounting(
+        **COMMON, bit_error_ratio=code[1], order=2, dark_count_rate_hz=2.0 * background * RATE
+    )
+    coded = least(lambda n: told_ppm_background(n, code[0] * background), code) / code[0]
+    assert float(counter.photons_per_bit(RATE)) / coded < Code(*code).ppm_counting()
+
+
+@pytest.mark.parametrize("code", [(0.5, 1e-6), (0.1, 1e-9)])
+def test_phases_gain_less_than_shannons_bound_and_come_near_it_at_low_rates(code):
+    snr = least(told_two_signs, code) / code[0]
+    for bound, uncoded in (
+        (Code(*code).bpsk_homodyne(), stats.norm.isf(code[1]) ** 2),
+        (Code(*code).dpsk_preamplified(), 2.0 * math.log(0.5 / code[1])),
+    ):
+        assert 0.9 * bound < uncoded / snr < bound
+
+
+@pytest.mark.parametrize("name", RECEIVERS)
+def test_a_mission_takes_the_gain_that_a_code_can_have_and_no_more(tmp_path, name):
+    table = link_file(tmp_path, received_with(name)).mission.communication
+    limit = 10.0 * math.log10(table.receiver.most_code_gain(table.data_rate_bit_s, table.wavelength_m))
+    below = math.floor(limit * 100.0) / 100.0
+    taken = link_file(tmp_path, received_with(name, code_gain=f"{below:.2f} dB")).mission
+    assert np.isfinite(model.receiver(taken).required_power_w(1e8))
+    with pytest.raises(MissionError) as refused:
+        link_file(tmp_path, received_with(name, code_gain=f"{below + 0.01:.2f} dB"))
+    (fault,) = refused.value.faults
+    assert "communication.receiver.code_gain" in str(fault)
+    assert f"is more than any code can gain: {limit:.3g} dB at code_rate = 0.8 and bit_error_ratio = 1e-06" in str(
+        fault
+    )
+    assert f'at most "{below:.2f} dB" at code_rate = 0.8' in str(fault)
+
+
+@pytest.mark.parametrize("name", RECEIVERS)
+def test_a_link_without_a_code_is_never_refused(tmp_path, name):
+    for ratio in (1e-18, 0.499):
+        plain = received_with(name, code_gain="0 dB", code_rate=1.0, bit_error_ratio=ratio)
+        assert link_file(tmp_path, plain).mission.communication.receiver.code_gain_db == 0.0
+
+
+def test_the_background_that_is_not_known_yet_is_any(tmp_path):
+    def most(**others):
+        c = link_file(tmp_path, received_with("counting ook", **others) | rate).mission.communication
+        return c.receiver.most_code_gain(c.data_rate_bit_s, c.wavelength_m)
+
+    rate = {"communication.data_rate": "300 Mbit/s"}
+    known = most()
+    sky = {"spectral_radiance": "10 W/(m^2 sr um)", "field_of_view": "100 urad", "filter_bandwidth": "1 nm"}
+    assert most(background_power=None, background=sky) > known
+    rate = {"communication.data_rate": "largest"}
+    assert most() > known
