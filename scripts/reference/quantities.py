@@ -221,6 +221,7 @@ KINDS: Sequence[tuple[str, str, Kind]] = (
     (r"mission.*", r"day\.(contacts|passes|direct\w*|line_of_sight)\b(?!.*could_carry).*", ORBIT),
     (r"mission.*|gallery-mirrors", r"(.*\.)?(margins|theory|theory_\w+|bound|stroke)\b.*", LINEAR),
     (r"mission.*|gallery-mirrors", r".*", ENSEMBLE),
+    (r"design|export-c", r".*simulated_rms.*", ENSEMBLE),
     (r"design|export-.*", r".*", LINEAR),
     (r"campaign.*", r"rows\.(communication|fine_pointing)\..*", CLOSED),
     (r"campaign.*", r".*(miss|outage|tail).*", RARE),

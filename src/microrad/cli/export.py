@@ -44,6 +44,8 @@ _File = Annotated[Path, typer.Argument(help="Mission file; microrad init writes 
 _Mirror = Annotated[Path | None, option("--mirror", "FILE", "Mirror file in place of the mission's mirror.")]
 _CONTROLLER = "A controller of the mission, as microrad design names them, or PID, PID + inverse"
 
+_ACCEPT = "Write a controller, too, that leaves more than 1.5 times what linear theory says on the mission's mirror."
+
 
 class _Precision(StrEnum):
     DOUBLE = "double"
@@ -100,7 +102,7 @@ def _default_controller(mission: "MissionFile") -> str:
     )
 )
 @command
-def c(
+def c(  # noqa: PLR0913, PLR0917  each is an option
     file: _File,
     controller: _FlightController = None,
     name: _Begin = None,
@@ -108,6 +110,7 @@ def c(
     mirror: _Mirror = None,
     output: _Folder = None,
     overwrite: Overwrite = False,
+    accept: Annotated[bool, typer.Option("--accept", help=_ACCEPT)] = False,
     as_json: Json = False,
 ) -> Outcome:
     """Write a controller as C99 for a flight computer.
@@ -131,6 +134,7 @@ def c(
             name=name,
             precision=precision.value,
             overwrite=overwrite,
+            accept=accept,
             on_progress=progress,
         )
     if as_json:

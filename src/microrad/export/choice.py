@@ -97,6 +97,15 @@ def _pointing(file: MissionFile, name: str, on_progress: Progress) -> PointingCh
     return PointingChoice(file, scene, tuned, fine_pointing.build(name, scene, m, tuned.controller))
 
 
+def outlook(choice: Choice) -> fine_pointing.Outlook | None:
+    """What a controller of the fine-pointing loop leaves, linear and simulated; the loop of [control] has no theory."""
+    if isinstance(choice, TrackingChoice):
+        return None
+    design = fine_pointing.Design(choice.controller.name, choice.tuned, choice.controller)
+    (found,) = fine_pointing.outlook(choice.scene, choice.file.mission, [design])
+    return found
+
+
 def _tracking(file: MissionFile, name: str) -> TrackingChoice:
     m = file.mission
     model = tracking.mirror_model(m, m.mirror)
@@ -112,7 +121,10 @@ def flight_controller(choice: Choice) -> FlightController:
 
     A design that holds a model of its plant may have a mode that nothing drives or no output shows.
     """
-    return minimal(trimmed(_whole_controller(choice)))
+    try:
+        return minimal(trimmed(_whole_controller(choice)))
+    except ValueError as error:  # gains of [control] under which the loop is unstable
+        raise error if isinstance(error, ExportError) else ExportError(f"{choice.file.path}: {error}") from error
 
 
 def _whole_controller(choice: Choice) -> FlightController:

@@ -9,15 +9,16 @@ from pathlib import Path
 from typing import Any, Literal
 
 from microrad.export.build import BenchResult, compile_and_run, compiler
-from microrad.export.choice import Choice, flight_controller, vectors
+from microrad.export.choice import Choice, PointingChoice, flight_controller, outlook, vectors
 from microrad.export.fixed import FixedForm, fixed_code, quantised
 from microrad.export.fixed import report_text as quantisation_text
 from microrad.export.flight import flight_code, vectors_text, within_limits
 from microrad.export.identifiers import identifier, suggested
 from microrad.export.operations import FixedOperations, Operations, fixed_operations, operations
-from microrad.export.records import FlightController, Progress, Vectors
+from microrad.export.records import ExportError, FlightController, Progress, Vectors
 from microrad.export.rounding import RoundingBound, rounding_bound
 from microrad.export.sections import Sections, sections
+from microrad.fine_pointing import PROMISE, Outlook
 from microrad.folder import MANIFEST, check_folder, whole_folder
 from microrad.units import format_quantity
 
@@ -32,13 +33,15 @@ KIND, WHAT = "export", "exported code"
 class FlightExport:
     """What was written: the controller in its form, what a step costs, how exact it is, and what the bench found.
 
-    ``bench`` is None where there is no compiler. ``bound`` belongs to single precision, ``fixed`` to fixed point.
+    ``bench`` is None where there is no compiler. ``bound`` belongs to single precision, ``fixed`` to fixed point,
+    ``left`` to the fine-pointing loop.
     """
 
     folder: Path
     name: str
     precision: Precision
     controller: FlightController
+    left: Outlook | None
     form: Sections
     cost: Operations | FixedOperations
     bound: RoundingBound | None
@@ -60,15 +63,20 @@ def export_flight(
     precision: Precision = "double",
     samples: int = 5000,
     overwrite: bool = False,
+    accept: bool = False,
     on_progress: Progress = lambda done, total, what: None,
 ) -> FlightExport:
     """Write a controller as C99 with its test bench, ``samples`` recorded vectors, a report and a manifest.
 
     It is compiled and its bench run over the vectors where there is a C compiler, before the folder appears. Raises
-    ExportError for what cannot be exported and for code that strays from the kernel, and `FolderError` for a folder
-    that must not be replaced.
+    ExportError for what cannot be exported, for code that strays from the kernel and, but for ``accept``, for a
+    controller that leaves `PROMISE` times its linear residual on the mission's mirror; `FolderError` for a folder that
+    must not be replaced.
     """
     check_output(folder, overwrite)
+    left = outlook(choice)
+    if isinstance(choice, PointingChoice) and left is not None and not (left.holds or accept):
+        raise ExportError(_broken(choice, left))
     controller = flight_controller(choice)
     name = identifier(name if name is not None else suggested(controller.name))
     form = sections(controller)
@@ -83,7 +91,7 @@ def export_flight(
         bench = compile_and_run(draft, made.bench) if compiler() is not None else None
         _remove_built(draft, made.files)
         found = FlightExport(
-            folder, name, precision, controller, form, made.cost, made.bound, made.fixed, samples, bench
+            folder, name, precision, controller, left, form, made.cost, made.bound, made.fixed, samples, bench
         )
         on_progress(2, 3, "writing")
         (draft / "report.txt").write_text(report_text(found) + "\n", encoding="utf-8", newline="\n")
@@ -132,6 +140,20 @@ def _manifest(of: FlightExport, choice: Choice, folder: Path) -> dict[str, Any]:
 
 
 # ----------------------------------------------------------------------------------------------------------- in words
+def _broken(choice: PointingChoice, left: Outlook) -> str:
+    found, said, times = _rms(left.simulated_rad), _rms(left.linear_rad), left.simulated_rad / left.linear_rad
+    return (
+        f"{choice.file.path}: {choice.controller.name} leaves {found} on the mission's mirror, simulated with its "
+        f"hysteresis: {times:.1f} times the {said} of linear theory, where {PROMISE:g} times is the most. "
+        "Choose another controller by the simulated figures of microrad design, or write this one all the same with "
+        "--accept."
+    )
+
+
+def _rms(rad: float) -> str:
+    return f"{format_quantity(rad, 'rad', 4)} rms an axis"
+
+
 def report_text(of: FlightExport) -> str:
     """What was exported, what a step costs and how exact it is, in lines."""
     c = of.controller
@@ -146,6 +168,7 @@ def report_text(of: FlightExport) -> str:
         ("reads", inputs),
         ("commands", f"{c.actuators} x {_limits(c)}"),
         ("margins", ", ".join(f"{name} {_shown(value, unit)}" for name, value, unit in c.margins)),
+        *_residual(of),
         ("a step costs", of.cost.words),
         *_exactness(of),
         *_measured(of),
@@ -166,6 +189,12 @@ def _limits(c: FlightController) -> str:
     low, high, bias = (format_quantity(v, "V", 6) for v in (c.minimum_v, c.maximum_v, c.bias_v))
     counts = f", in counts of {format_quantity(c.resolution_v, 'V')}" if c.resolution_v else ""
     return f"{low} to {high} from the bias of {bias}{counts}"
+
+
+def _residual(of: FlightExport) -> list[tuple[str, str]]:
+    if of.left is None:
+        return []
+    return [("leaves", f"{_rms(of.left.linear_rad)} in linear theory, {_rms(of.left.simulated_rad)} simulated")]
 
 
 def _exactness(of: FlightExport) -> list[tuple[str, str]]:
@@ -201,6 +230,12 @@ def data(of: FlightExport) -> dict[str, Any]:
         "limits_v": [c.minimum_v, c.maximum_v],
         "bias_v": c.bias_v,
         "margins": {name: {"value": value, "unit": unit} for name, value, unit in c.margins},
+        "residual": None
+        if of.left is None
+        else {
+            "linear_rms_rad_per_axis": of.left.linear_rad,
+            "simulated_rms_rad_per_axis": of.left.simulated_rad,
+        },
         "operations": asdict(of.cost),
         "bound": None if of.bound is None else asdict(of.bound),
         "bench": None if of.bench is None else asdict(of.bench),

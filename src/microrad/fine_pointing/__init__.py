@@ -20,8 +20,10 @@ from microrad.fine_pointing.designs import (
 )
 from microrad.fine_pointing.results import (
     COUNTERS,
+    PROMISE,
     Difference,
     ErrorBudget,
+    Outlook,
     Part,
     Residual,
     Sine,
@@ -29,6 +31,7 @@ from microrad.fine_pointing.results import (
     best,
     error_budget,
     on_variant,
+    outlook,
     sines,
     verify,
 )
@@ -38,11 +41,13 @@ from microrad.missionfile import MissionFile
 __all__ = [
     "BASELINE",
     "COUNTERS",
+    "PROMISE",
     "VARIANTS",
     "Design",
     "Difference",
     "ErrorBudget",
     "FinePointingStudy",
+    "Outlook",
     "Part",
     "Residual",
     "Scene",
@@ -55,6 +60,7 @@ __all__ = [
     "names",
     "on_variant",
     "optimum_rms_rad",
+    "outlook",
     "plants",
     "run",
     "run_one",

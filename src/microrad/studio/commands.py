@@ -155,10 +155,13 @@ class Design:
             "from microrad import fine_pointing, load_mission",
             "",
             f"mission = {mission_call(self.file, self.mirror)}",
-            "designs = fine_pointing.design(fine_pointing.scene(mission), mission.mission)",
-            "for design in designs:",
-            "    rms_urad, margins = design.tuned.residual_rms_rad * 1e6, design.tuned.margins",
-            "    print(f'{design.name:28} {rms_urad:9.3f} µrad rms, modulus margin {margins.modulus:.3f}')",
+            "scene = fine_pointing.scene(mission)",
+            "designs = fine_pointing.design(scene, mission.mission)",
+            "for design, left in zip(designs, fine_pointing.outlook(scene, mission.mission, designs)):",
+            "    linear_urad, simulated_urad = left.linear_rad * 1e6, left.simulated_rad * 1e6",
+            "    margins = design.tuned.margins",
+            "    print(f'{design.name:28} {linear_urad:9.3f} {simulated_urad:9.3f} µrad rms, linear and simulated,'",
+            "          f' modulus margin {margins.modulus:.3f}')",
         )
 
 
