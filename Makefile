@@ -47,7 +47,7 @@ endurance: $(VENV)/.test
 	MICRORAD_ENDURANCE=1 $(BIN)/python -m pytest $(SIDE_BY_SIDE) --durations 10
 
 benchmark: $(VENV)/.test
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[benchmark]'
+	$(PIP) --constraint constraints.txt --editable '.[benchmark]'
 	$(BIN)/python benchmarks/loop.py
 	$(BIN)/python benchmarks/ensemble.py
 	$(BIN)/python benchmarks/controllers.py
@@ -73,10 +73,24 @@ $(VENV)/bin/python:
 	  { echo "microrad needs Python 3.11 or newer: $(PYTHON) is $$($(PYTHON) --version 2>&1); try make PYTHON=python3.12 $(MAKECMDGOALS)"; exit 1; }
 	@$(PYTHON) -m venv $(VENV) >/dev/null 2>&1 || { rm -rf $(VENV); sh scripts/install-venv "$(PYTHON)" && $(PYTHON) -m venv $(VENV); }
 
+# On Linux x86-64 each file that is installed is held against its hash, those that build the project among them; elsewhere its
+# version alone is (scripts/hashes.py).
+PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
+ifeq ($(shell uname -s)-$(shell uname -m),Linux-x86_64)
+$(VENV)/.run: $(VENV)/bin/python pyproject.toml hashes/lab.txt
+	$(PIP) --require-hashes --requirement hashes/lab.txt
+	$(PIP) --no-deps --no-build-isolation --editable .
+	@touch $@
+
+$(VENV)/.test: $(VENV)/.run hashes/test.txt
+	$(PIP) --require-hashes --requirement hashes/test.txt
+	@touch $@
+else
 $(VENV)/.run: $(VENV)/bin/python pyproject.toml constraints.txt
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[lab]'
+	$(PIP) --constraint constraints.txt --editable '.[lab]'
 	@touch $@
 
 $(VENV)/.test: $(VENV)/.run
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[test]'
+	$(PIP) --constraint constraints.txt --editable '.[test]'
 	@touch $@
+endif

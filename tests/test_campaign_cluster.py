@@ -359,5 +359,5 @@ def test_an_address_without_a_scheduler_is_told(monkeypatch, address):
 
 def test_without_distributed_the_extra_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "distributed", None)
-    with pytest.raises(CampaignError, match=r'pip install "microrad\[cluster\]"'):
+    with pytest.raises(CampaignError, match=r"constraints.txt '\.\[cluster\]'"):
         DaskEngine(b"{}", TARGET, workers=1)

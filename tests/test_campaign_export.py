@@ -268,7 +268,7 @@ def test_a_damaged_chunk_stops_the_export_and_leaves_the_old_file(tmp_path, kind
 def test_a_missing_pyarrow_is_told_by_what_to_install(tmp_path, monkeypatch):
     path = write(tmp_path)
     monkeypatch.setitem(sys.modules, "pyarrow", None)
-    assert 'pip install "microrad[parquet]"' in said(exported, path, tmp_path / "rows.parquet")
+    assert "pip install --constraint constraints.txt '.[parquet]'" in said(exported, path, tmp_path / "rows.parquet")
     assert exported(path, tmp_path / "rows.nc") == 5 * ROWS
     assert not (tmp_path / "rows.parquet").exists()
 

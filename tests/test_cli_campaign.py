@@ -162,11 +162,17 @@ def test_a_number_of_threads_is_at_least_one(there, refused, count):
 
 def test_a_missing_package_is_named_with_its_extra(there, call, refused, monkeypatch):
     monkeypatch.setitem(sys.modules, "pyarrow", None)
-    assert 'pip install "microrad[parquet]"' in refused("campaign", "export", "campaign.ledger", "rows.parquet")
+    assert "pip install --constraint constraints.txt '.[parquet]'" in refused(
+        "campaign", "export", "campaign.ledger", "rows.parquet"
+    )
     for name in ("dask", "distributed"):
         monkeypatch.setitem(sys.modules, name, None)
     shown = call("campaign", "run", "campaign.toml", "--ledger", "new.ledger", "--workers", 1)
-    assert shown.code == 2 and 'pip install "microrad[cluster]"' in shown.err and "Traceback" not in shown.err
+    assert (
+        shown.code == 2
+        and "pip install --constraint constraints.txt '.[cluster]'" in shown.err
+        and "Traceback" not in shown.err
+    )
 
 
 # ----------------------------------------------------------------------------------------------- the wrong kind of file

@@ -573,7 +573,7 @@ def test_other_objects_are_no_models():
 
 def test_without_python_control_the_extra_is_named(file, monkeypatch):
     monkeypatch.setitem(sys.modules, "control", None)
-    with pytest.raises(ExportError, match=r"not installed.*pip install 'microrad\[control\]'"):
+    with pytest.raises(ExportError, match=r"not installed.*constraints.txt '\.\[control\]'"):
         matrices.to_control(of(file, matrices.MIRROR))
 
 

@@ -314,7 +314,7 @@ def test_objects_that_are_no_linear_mirror_are_refused(system, why):
 
 def test_without_python_control_the_extra_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "control", None)
-    with pytest.raises(ExportError, match=r"pip install 'microrad\[control\]'"):
+    with pytest.raises(ExportError, match=r"constraints.txt '\.\[control\]'"):
         import_control(object(), GIVEN)
 
 

@@ -159,7 +159,7 @@ def test_missing_library(tmp_path, monkeypatch, library, suffix):
     path = tmp_path / f"a.{suffix}"
     tdms(path) if suffix == "tdms" else hdf5(path)
     monkeypatch.setitem(sys.modules, library, None)
-    assert "pip install 'microrad[lab]'" in refusal(path, 0, 1)
+    assert "pip install --constraint constraints.txt '.[lab]'" in refusal(path, 0, 1)
 
 
 # ----------------------------------------------------------------------------------------------------------------- LVM

@@ -329,8 +329,8 @@ def test_an_installation_without_the_studio_says_what_to_install(refused, monkey
     monkeypatch.setattr(server.util, "find_spec", lambda name: None)
     said = refused("studio")
     assert said == (
-        "microrad: the studio needs nicegui and uvicorn, which this installation does not have; install it with: "
-        'pip install "microrad[studio]"\n'
+        "microrad: the studio needs nicegui and uvicorn, which this installation does not have; install it "
+        "in the project's folder: pip install --constraint constraints.txt '.[studio]'\n"
     )
 
 

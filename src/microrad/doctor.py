@@ -3,6 +3,7 @@
 Libraries and our own modules are imported inside the probes: one that does not load is a line of the answer.
 """
 
+import contextlib
 import os
 import platform
 import re
@@ -14,6 +15,8 @@ from functools import partial
 from importlib import import_module, metadata, resources
 from pathlib import Path
 
+from microrad.installing import advice
+
 # The loop of Eq. 3 of SPIE 11852, 118523B, with the printed parameters and u = 6 sin(2 pi 100 Hz t) + 6 V at 50 kHz:
 # width in % of the peak-to-peak output and max|h| in µrad, found with an adaptive solver too.
 LOOP_WIDTH_PERCENT = 14.05
@@ -21,7 +24,8 @@ LARGEST_HYSTERESIS_URAD = 74.44
 _TOLERANCE = 0.01  # in the units above: the last printed digit
 
 _FLOOR = re.compile(r"([A-Za-z0-9_.-]+)\s*>=\s*([0-9.]+)")
-_REINSTALL = "install again: python -m pip install --force-reinstall microrad"
+_REINSTALL = f"install again {advice('', '--force-reinstall')}"
+_CONSTRAINTS = Path(__file__).resolve().parents[2] / "constraints.txt"
 _CACHE_ADVICE = "set NUMBA_CACHE_DIR to a folder that you may write to: without a cache every start compiles anew"
 
 
@@ -40,6 +44,7 @@ def run() -> tuple[Check, ...]:
     return (
         _check("python", _python, "use a Python that microrad supports"),
         *_libraries(),
+        _check("pinned versions", _pins, _REINSTALL),
         _check("kernels", _kernels, f"reinstall numba, or {_CACHE_ADVICE}"),
         _check("kernel cache", _cache, _CACHE_ADVICE),
         _check("packaged mission", _mission, _REINSTALL),
@@ -79,6 +84,18 @@ def _library(name: str, lowest: str) -> tuple[bool, str]:
     version = metadata.version(name)
     import_module(name)
     return _numbers(version) >= _numbers(lowest), f"{version}, wanted {lowest} or later"
+
+
+def _pins() -> tuple[bool, str]:
+    """What is installed in another version than the tested one: a note, the first suspect of a number that differs."""
+    if not _CONSTRAINTS.is_file():
+        return True, "not compared: installed without the project's folder, where constraints.txt stands"
+    pinned, other = dict(re.findall(r"(\S+)==(\S+)", _CONSTRAINTS.read_text(encoding="utf-8"))), []
+    for name, version in pinned.items():
+        with contextlib.suppress(metadata.PackageNotFoundError):
+            if (found := metadata.version(name)) != version:
+                other.append(f"{name} {found} (tested: {version})")
+    return True, f"not those of constraints.txt: {', '.join(other)}" if other else "those of constraints.txt"
 
 
 def _numbers(version: str) -> tuple[int, ...]:

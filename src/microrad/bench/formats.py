@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from microrad.bench.play import BenchError
+from microrad.installing import advice
 from microrad.recording import Recording
 
 Floats = NDArray[np.float64]
@@ -108,8 +109,8 @@ def _write_tdms(recording: Recording, path: Path) -> None:
         from nptdms import ChannelObject, GroupObject, RootObject, TdmsWriter
     except ImportError:
         raise BenchError(
-            f"{path.name}: writing TDMS needs npTDMS, which is not installed: pip install 'microrad[lab]', or choose "
-            "another of the plan's formats"
+            f"{path.name}: writing TDMS needs npTDMS, which is not installed: choose another of the plan's formats, or "
+            f"install it {advice('lab')}"
         ) from None
     group = "bench"
     waveform = {

@@ -23,6 +23,7 @@ from typing import Any
 from microrad.campaign.engines import SLICE_S, Clock, Flight, Waiting, late_flights, late_reason
 from microrad.campaign.records import CampaignError, Job, Outcome
 from microrad.campaign.worker import Beat, Kind, Work, beat_every_s, code_sha256, die_with_parent, open_target, words
+from microrad.installing import advice
 
 _ANSWER_S = 20.0  # a scheduler or worker that does not answer for so long is gone
 _CONNECT_S = 10.0
@@ -31,7 +32,6 @@ _NO_WORKERS_S = 60.0
 _LOOK_S = 1.0
 _AHEAD = 2
 _KILL = getattr(signal, "SIGKILL", signal.SIGTERM)  # on Windows the latter kills
-_EXTRA = 'pip install "microrad[cluster]"'
 
 
 # ------------------------------------------------------------------------------------------------------- on a worker
@@ -125,7 +125,9 @@ def _distributed() -> Any:
     try:
         import distributed
     except ImportError as error:
-        raise CampaignError(f"a cluster needs the package distributed ({error}): {_EXTRA}") from None
+        raise CampaignError(
+            f"a cluster needs the package distributed ({error}): install it {advice('cluster')}"
+        ) from None
     return distributed
 
 

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from microrad.campaign.blob import Head
 from microrad.campaign.ledger import Ledger
 from microrad.campaign.records import CampaignError, Chunk
+from microrad.installing import advice
 from microrad.operations import spreadsheet_text
 
 _ROWS = 16384  # written at once: a row group of Parquet, a chunk of netCDF
@@ -154,7 +155,7 @@ def _parquet(ledger: Ledger, part: Path) -> int:
         from pyarrow.parquet import ParquetWriter
     except ImportError:
         raise CampaignError(
-            'Parquet needs pyarrow: `pip install "microrad[parquet]"`, or export to .nc or .csv'
+            f"Parquet needs pyarrow: export to .nc or .csv, or install it {advice('parquet')}"
         ) from None
     fields = _fields(ledger.head)
     kinds = {"int": pa.int64(), "float": pa.float64(), "text": pa.string()}

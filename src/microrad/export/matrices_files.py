@@ -17,6 +17,7 @@ from microrad.export.matrices_forms import Forms, LinearModel, Port, forms
 from microrad.export.matrices_mat import Structure, load
 from microrad.export.records import ExportError, Origin
 from microrad.folder import write_whole
+from microrad.installing import advice
 
 FORMAT = "microrad linear models"
 """What a JSON text of models says that it is."""
@@ -229,8 +230,8 @@ def python_control() -> Any:
         return import_module("control")  # slow to import, and an extra
     except ImportError as error:
         raise ExportError(
-            "python-control is not installed, and its objects cannot be made or read without it: "
-            "pip install 'microrad[control]'"
+            "python-control is not installed, and its objects cannot be made or read without it: install it "
+            f"{advice('control')}"
         ) from error
 
 

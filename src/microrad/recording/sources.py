@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from microrad.installing import advice
 from microrad.recording.records import FloatArray, RecordingError
 
 _TIME_NAME = re.compile(
@@ -232,5 +233,5 @@ def damaged(path: Path, kind: str, error: BaseException) -> RecordingError:
 def missing_library(path: Path, kind: str, library: str) -> RecordingError:
     """The refusal where an optional library is not installed."""
     return RecordingError(
-        f"{path}: reading {kind} needs the library {library}, which is not installed; run: pip install 'microrad[lab]'"
+        f"{path}: reading {kind} needs the library {library}, which is not installed; install it {advice('lab')}"
     )

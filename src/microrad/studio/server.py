@@ -17,6 +17,7 @@ from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING, Any
 
+from microrad.installing import advice
 from microrad.studio import address, plain_files
 from microrad.studio.workshop import Workshop
 
@@ -71,8 +72,8 @@ def check_installed() -> None:
     missing = [name for name in ("nicegui", "uvicorn") if util.find_spec(name) is None]
     if missing:
         raise StudioError(
-            f"the studio needs {' and '.join(missing)}, which this installation does not have; install it with: "
-            'pip install "microrad[studio]"'
+            f"the studio needs {' and '.join(missing)}, which this installation does not have; install it "
+            f"{advice('studio')}"
         )
 
 
