@@ -296,7 +296,7 @@ ADDED = {
     "a list drawn from a range": (
         distributed("jitter.rms", 'distribution = "uniform"\nlow = "1 urad"\nhigh = "2 urad"'),
         "inputs.jitter.rms",
-        "is not a quantity that takes any value",
+        "is a list, whose items are drawn each by its own key",
     ),
     "a table without values": (
         distributed("terminals.leo_aperture", TABLE + "values = []"),

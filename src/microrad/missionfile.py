@@ -25,6 +25,8 @@ __all__ = [
     "MissionFile",
     "assumptions",
     "changed_from_shipped",
+    "either_file",
+    "kind_of",
     "load_link",
     "load_mirror",
     "load_mission",
@@ -63,17 +65,13 @@ class LinkFile:
 
 
 @dataclass(frozen=True, slots=True)
-class MissionFile:
+class MissionFile(LinkFile):
     """A mission with the path, text and SHA-256 of its file, and the source of each key, "communication.distance".
 
     `mirror_file` is the file that the mirror came from, when it has one of its own.
     """
 
     mission: Mission
-    path: Path
-    text: str
-    sha256: str
-    sources: Mapping[str, Source]
     mirror_file: MirrorFile | None = None
 
 
@@ -117,11 +115,30 @@ def mission_file(document: Document) -> MissionFile:
     return MissionFile(mission, document.path, document.text, document.sha256, sources, mirror_file)
 
 
-def named_files(m: Mission) -> tuple[str, ...]:
+def either_file(document: Document) -> LinkFile:
+    """The mission of a document: a `MissionFile`, or a `LinkFile` where it has no table but those of the links.
+
+    Raises `MissionError` with every fault of it and of its mirror file.
+    """
+    if kind_of(document.data) is Mission:
+        return mission_file(document)
+    mission = check_table(document, LinkMission, document.data)
+    if mission is None or document.faults:
+        raise MissionError(document.path, document.faults)
+    return LinkFile(mission, document.path, document.text, document.sha256, _sources(document))
+
+
+def kind_of(data: Mapping[str, Any]) -> type[LinkMission]:
+    """What the raw data of a file are read as: a whole mission, or its links alone."""
+    return Mission if _BEYOND_LINK & data.keys() else LinkMission
+
+
+def named_files(m: LinkMission) -> tuple[str, ...]:
     """Files that the mission names beside its mirror, as it names them: seen from the mission file."""
     tables = [] if m.orbit is None else [m.orbit.leo, m.orbit.geo]
     named = [t.file for t in tables] + [None if m.constellation is None else m.constellation.file]
-    named.append(None if m.fine_pointing is None else m.fine_pointing.vibration.file)
+    if isinstance(m, Mission) and m.fine_pointing is not None:
+        named.append(m.fine_pointing.vibration.file)
     return tuple(name for name in dict.fromkeys(named) if name is not None)
 
 
@@ -130,15 +147,8 @@ def load_link(path: str | Path, *, text: str | None = None) -> LinkFile:
 
     With `text`, the mission is that text, as if it stood at `path`. Raises `MissionError` with every fault of it.
     """
-    document = _open(Path(path), "mission file", "", text)
-    if _BEYOND_LINK & document.data.keys():
-        _take_in_mirror(document, None)
-        file = mission_file(document)
-        return LinkFile(file.mission, file.path, file.text, file.sha256, file.sources)
-    mission = check_table(document, LinkMission, document.data)
-    if mission is None or document.faults:
-        raise MissionError(document.path, document.faults)
-    return LinkFile(mission, document.path, document.text, document.sha256, _sources(document))
+    file = either_file(open_mission(path, text=text))
+    return LinkFile(file.mission, file.path, file.text, file.sha256, file.sources)
 
 
 def load_mirror(path: str | Path) -> MirrorFile:
@@ -153,7 +163,7 @@ def load_mirror(path: str | Path) -> MirrorFile:
     return _mirror_file(document, mirror)
 
 
-def assumptions(mission_file: MissionFile | LinkFile) -> tuple[tuple[str, str, str], ...]:
+def assumptions(mission_file: LinkFile) -> tuple[tuple[str, str, str], ...]:
     """Key, raw value and source of every value whose comment calls it an assumption, or derived from others."""
     items = mission_file.sources.items()
     return tuple((key, source.value, source.text) for key, source in items if source.kind in ("assumption", "derived"))

@@ -11,9 +11,10 @@ from microrad.campaign.keys import MIRROR, put
 from microrad.campaign.reading import FILE_WORD, Reading, text_of
 from microrad.document import Document, MissionError
 from microrad.mission import Source
-from microrad.missionfile import mission_file, with_values
+from microrad.missionfile import LinkFile, either_file, with_values
 
 MOST_CELLS = 1000
+_RATE = "communication.data_rate"
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,10 +86,13 @@ class CellReader:
         for key, value in given.items():
             if key != MIRROR:  # once more for those that stood in [set]: over the mirror of another file
                 document.data = put(document.data, key, value)
-        file = mission_file(document)
+        file = either_file(document)
         told = {k: self._source(k, "grid" if k in cell else "set", v) for k, v in given.items() if k != MIRROR}
+        file = replace(file, sources={**file.sources, **told})
+        if math.isnan(file.mission.communication.data_rate_bit_s):
+            file = _with_rate(document, file)
         texts = {key: text_of(value) for key, value in cell.items()}
-        return Base(texts, document.data, replace(file, sources={**file.sources, **told}))
+        return Base(texts, document.data, file)
 
     def _source(self, key: str, name: str, value: object) -> Source:
         found = self.on.document.statement(f"{name}.{key}")
@@ -114,3 +118,20 @@ class CellReader:
                 self.on.fault(f"{name}.{fault.key}", value, f"{fault.reason}{where}", fault.expected, fault.nearest)
             else:
                 self.on.document.faults.append(replace(fault, reason=f"{fault.reason}{where}"))
+
+
+def _with_rate(document: Document, file: LinkFile) -> LinkFile:
+    """The file, and its document, with a data rate of "largest" solved for: once for the cell, without draws.
+
+    Raises `MissionError` when no rate has the required margin.
+    """
+    from microrad import link, link_study  # here, to keep the start quick
+
+    try:
+        solved = link_study.solve_rate(LinkFile(file.mission, file.path, file.text, file.sha256, file.sources))
+    except link.LinkError as error:
+        document.fault(_RATE, file.sources[_RATE].value, str(error), "a data rate, or a link with that much more")
+        raise MissionError(document.path, document.faults) from None
+    rate = solved.mission.communication.data_rate_bit_s
+    document.data = put(document.data, _RATE, f"{rate!r} bit/s")  # read back to the same bits
+    return replace(file, mission=solved.mission, sources=solved.sources)

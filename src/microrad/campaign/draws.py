@@ -8,12 +8,12 @@ from typing import Any, NamedTuple
 from microrad.campaign import distributions
 from microrad.campaign.distributions import AnyTable, Distribution
 from microrad.campaign.inputs import Base, Draw
-from microrad.campaign.keys import MIRROR, Key, find
+from microrad.campaign.keys import MIRROR, Key, find, item_keys
 from microrad.campaign.reading import Reading, is_number, quoted_near
 from microrad.campaign.records import InputText
 from microrad.campaign.tables import VariableTable
 from microrad.document import shown
-from microrad.fields import MOST_ITEMS, Quantity, Share
+from microrad.fields import MOST_ITEMS, Quantity, Several, Share
 from microrad.missionfile import check_table
 
 
@@ -72,9 +72,11 @@ class DrawReader:
             self.on.fault(at, None, "does not go together with its distribution", expected)
             return None
         for base in self.bases:
-            m = base.file.mission.mirror
-            if m.uncertainty is None:
-                reason = f'is to be identified, but the mirror "{m.name}" has no table uncertainty'
+            m = base.mirror
+            if m is None or m.uncertainty is None:
+                reason = "is to be identified, but the mission has no mirror, only its links"
+                if m is not None:
+                    reason = f'is to be identified, but the mirror "{m.name}" has no table uncertainty'
                 expected = (
                     f'[set] with {MIRROR} = "FILE", or [grid] with {MIRROR} = ["FILE"]: a mirror file as microrad '
                     "identify writes it, seen from the campaign file"
@@ -113,6 +115,14 @@ class DrawReader:
         if isinstance(table, distributions.ListTable):
             return self._one_of(at, key, table)
         rule = key.numeric
+        if isinstance(key.rule, Several):
+            own = self.data
+            for part in key.text.split("."):
+                own = own.get(part, {})
+            items = " and ".join(item_keys(key.text, len(own)))
+            advice = f"{items or 'a list that the mission has'}, each with its distribution"
+            self.on.fault(at, None, "is a list, whose items are drawn each by its own key", advice)
+            return None
         if rule is None:
             advice = 'distribution = "table" with its values, or a grid of them'
             self.on.fault(at, None, "is not a quantity that takes any value in a range", advice)
@@ -136,6 +146,11 @@ class DrawReader:
         if len(fitting) < len(values):
             return None
         read: list[Any] = [value if key.rule is None else key.rule.read(value) for value in values]
+        if any(isinstance(value, float) and math.isnan(value) for value in read):
+            self.on.fault(
+                f"{at}.values", values, "has a word that is solved for", "values, or this word in the mission"
+            )
+            return None
         if any(read.count(value) > 1 for value in read):
             self.on.fault(f"{at}.values", values, "has a value twice", "each value once, with its weight")
             return None
@@ -258,8 +273,8 @@ def _identified_texts(bases: tuple[Base, ...]) -> list[InputText]:
 
     found: dict[str, InputText] = {}
     for base in bases:
-        table = base.file.mission.mirror
-        assert table.uncertainty is not None
+        table = base.mirror
+        assert table is not None and table.uncertainty is not None
         errors = table.uncertainty.standard_errors
         for (key, unit), error in zip(parameter_units(table).items(), errors, strict=True):
             text = f"identified, standard error {100.0 * error:.3g} %"

@@ -12,8 +12,8 @@ from microrad import fine_pointing, kernels, link
 from microrad.campaign.outputs import OUTPUTS
 from microrad.fine_loop import ensemble
 from microrad.link_performance import Exposure
-from microrad.mission import Mission
-from microrad.missionfile import LinkFile, MissionFile
+from microrad.mission import LinkMission, Mission
+from microrad.missionfile import LinkFile
 
 if TYPE_CHECKING:
     from microrad import day_study
@@ -21,13 +21,16 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 
-def outputs(file: MissionFile, runs: ensemble.Ensemble | None, keep: Collection[str]) -> dict[str, float]:
+def outputs(file: LinkFile, runs: ensemble.Ensemble | None, keep: Collection[str]) -> dict[str, float]:
     """The kept outputs of a row, by name in the order of `OUTPUTS`; nothing is computed, or read, for any other.
 
     ``runs`` is None in a campaign without a loop. A link that no rate closes has a data rate of 0.
     """
     m = file.mission
-    known: dict[str, Callable[[], float]] = {} if runs is None else _residual(m, runs)
+    known: dict[str, Callable[[], float]] = {}
+    if runs is not None:
+        assert isinstance(m, Mission)  # it has the loop
+        known = _residual(m, runs)
     under = cache(lambda: Exposure.stated(m) if runs is None else _simulated(m, runs))
     day = cache(lambda: _day(file, under()))
     known |= _links(file, under)
@@ -56,12 +59,12 @@ def _residual(m: Mission, runs: ensemble.Ensemble) -> dict[str, Callable[[], flo
 
 
 # --------------------------------------------------------------------------------------------------------------- links
-def _simulated(m: Mission, runs: ensemble.Ensemble) -> Exposure:
+def _simulated(m: LinkMission, runs: ensemble.Ensemble) -> Exposure:
     """From the histogram of the radial error alone."""
     return Exposure.of(m, runs.quantile_rad(1.0 - m.requirement.outage), runs.beyond)
 
 
-def _links(file: MissionFile, under: Callable[[], Exposure]) -> dict[str, Callable[[], float]]:
+def _links(file: LinkFile, under: Callable[[], Exposure]) -> dict[str, Callable[[], float]]:
     m = file.mission
     path = m.terminals, m.conventions, m.channel
     return {
@@ -80,7 +83,7 @@ class _Beam:
 
     name: str
     tables: tuple[object, ...]
-    file: MissionFile = field(compare=False)
+    file: LinkFile = field(compare=False)
 
 
 @lru_cache(maxsize=256)
@@ -89,7 +92,7 @@ def _beam_margin(of: _Beam) -> float:
     return budget(of.file.mission, of.file.sources).margin_db
 
 
-def _rate(m: Mission, loss_db: float) -> float:
+def _rate(m: LinkMission, loss_db: float) -> float:
     try:
         return link.rate_at_loss(m, m.requirement.margin_db, loss_db)
     except link.LinkError:
@@ -97,7 +100,7 @@ def _rate(m: Mission, loss_db: float) -> float:
 
 
 # ----------------------------------------------------------------------------------------------------------------- day
-def _day(file: MissionFile, under: Exposure) -> "day_study.Way":
+def _day(file: LinkFile, under: Exposure) -> "day_study.Way":
     """What the relay takes under this pointing; nothing where the link has no contact."""
     from microrad import day_study, link_study  # orbits: slow to load, and few campaigns ask for them
 

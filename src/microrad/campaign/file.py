@@ -18,7 +18,7 @@ from microrad.campaign.records import CampaignError, InputText, Limit
 from microrad.campaign.sampling import block_rows
 from microrad.campaign.tables import CampaignTable, LoopTable, VariableTable
 from microrad.document import Document, Fault, MissionError, UnreadableError, clipped
-from microrad.missionfile import MissionFile, check_table, named_files, open_mission
+from microrad.missionfile import LinkFile, MissionFile, check_table, named_files, open_mission
 
 __all__ = ["CampaignFile", "CampaignTable", "Dimension", "LoopTable", "Variable", "load_campaign"]
 
@@ -49,7 +49,7 @@ class CampaignFile:
     text: str
     sha256: str
     table: CampaignTable
-    mission: MissionFile
+    mission: LinkFile
     cells: tuple[dict[str, str], ...]
     bases: tuple[Base, ...]
     draws: tuple[Draw, ...]
@@ -147,6 +147,13 @@ class _Reader:
                     reason = f"stands in [{taken[key]}] too"
                     self.on.fault(f"{name}.{key}", None, reason, "the key in one of the two tables")
                 taken.setdefault(key, name)
+        order = list(tables)
+        for key, name in taken.items():
+            whole = key.rpartition(".")[0]
+            above = taken.get(whole)
+            if whole != MIRROR and above and (above not in ("set", "grid") or order.index(above) >= order.index(name)):
+                reason = f"is an item of {whole}, which stands in [{above}] as a whole"
+                self.on.fault(f"{name}.{key}", None, reason, "the list, or its items, in one of the two tables")
 
     def _mission(self) -> Document | None:
         name = self.document.data.get("mission")
@@ -163,7 +170,7 @@ class _Reader:
         found = [reader.draw(key, raw) for key, raw in self.inputs.items()]
         return tuple(draw for draw in found if draw is not None)
 
-    def _limits(self, table: CampaignTable, keep: tuple[str, ...], nominal: MissionFile) -> tuple[Limit, ...]:
+    def _limits(self, table: CampaignTable, keep: tuple[str, ...], nominal: LinkFile) -> tuple[Limit, ...]:
         if table.tail is not None:
             return ()
         if "limits" not in self.document.data:
@@ -172,7 +179,7 @@ class _Reader:
         found = [fits.limit(self.on, name, raw, keep) for name, raw in self.limits.items()]
         return tuple(limit for limit in found if limit is not None)
 
-    def _unchecked(self, table: CampaignTable, keep: tuple[str, ...], nominal: MissionFile) -> Iterator[str]:
+    def _unchecked(self, table: CampaignTable, keep: tuple[str, ...], nominal: LinkFile) -> Iterator[str]:
         if table.tail is None and "limits" in self.document.data:
             yield from fits.unchecked(self.limits, keep, nominal.mission, {*self.grid, *self.inputs})
 
@@ -180,13 +187,14 @@ class _Reader:
         self,
         table: CampaignTable,
         mission: Document,
-        nominal: MissionFile,
+        nominal: LinkFile,
         bases: tuple[Base, ...],
         draws: tuple[Draw, ...],
         keep: tuple[str, ...],
         variables: tuple[Variable, ...],
     ) -> CampaignFile | None:
         """The record, where everything in it fits together."""
+        keep = fits.with_tables(self.on, self.document.data.get("keep"), keep, bases)
         varying = [d.key for d in draws if any(touches_loop(d.key, b.file.mission) for b in bases)]
         if table.loop is not None:
             fits.check_loop(self.on, table.loop, bases)
@@ -263,7 +271,8 @@ class _Reader:
         for path in dict.fromkeys(named):
             if not path.is_file():
                 self.on.fault("mission", str(path), "is named by the mission and does not exist", "an existing file")
-        mirrors = [base.file.mirror_file.path for base in bases if base.file.mirror_file is not None]
+        inner = [base.file.mirror_file for base in bases if isinstance(base.file, MissionFile)]
+        mirrors = [each.path for each in inner if each is not None]
         own = [each.path for each in mission.inner.values()]
         return tuple(dict.fromkeys([self.document.path, mission.path, *own, *mirrors, *named]))
 
@@ -296,7 +305,7 @@ class _Drawing(NamedTuple):
     draws: tuple[Draw, ...]
 
 
-def _nominal(cells: CellReader, data: Mapping[str, Any], bases: tuple[Base, ...]) -> MissionFile:
+def _nominal(cells: CellReader, data: Mapping[str, Any], bases: tuple[Base, ...]) -> LinkFile:
     """The mission under [set] alone, or of the first cell where it is none by itself."""
     try:
         return cells.base(data, {}).file

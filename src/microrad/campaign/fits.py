@@ -12,7 +12,7 @@ from microrad.campaign.reading import FILE_WORD, Reading, quoted_near
 from microrad.campaign.records import Limit
 from microrad.campaign.tables import MOST_RUNS, CampaignTable, LimitTable, LoopTable
 from microrad.fields import Quantity
-from microrad.mission import Mission
+from microrad.mission import LinkMission, Mission
 from microrad.missionfile import check_table
 from microrad.units import format_quantity
 
@@ -21,7 +21,7 @@ def check_loop(on: Reading, table: LoopTable, bases: Sequence[Base]) -> None:
     """In every cell a mission with a loop, a controller of it, and time behind the settling."""
     for base in bases:
         m = base.file.mission
-        if m.fine_pointing is None:
+        if not isinstance(m, Mission) or m.fine_pointing is None:
             expected = "a mission with [fine_pointing], which microrad init writes, or [loop] removed"
             on.fault("loop", None, "needs a mission with the table [fine_pointing]", expected)
             return
@@ -66,6 +66,18 @@ def kept(on: Reading, raw: object, table: CampaignTable | None) -> tuple[str, ..
     return tuple(name for name in OUTPUTS if name in raw)
 
 
+def with_tables(on: Reading, raw: object, keep: tuple[str, ...], bases: Sequence[Base]) -> tuple[str, ...]:
+    """The outputs to keep, by default without the margin of a beam that the mission has not; it is refused if asked."""
+    for name in ("beacon", "answer"):
+        output = f"{name}_margin"
+        if output in keep and any(getattr(base.file.mission, name) is None for base in bases):
+            if raw is not None:
+                expected = f"a mission with [{name}], or this output left out"
+                on.fault("keep", output, f"needs the mission's table [{name}]", expected)
+            keep = tuple(each for each in keep if each != output)
+    return keep
+
+
 def check_day(on: Reading, keep: Sequence[str], bases: Sequence[Base]) -> None:
     """Outputs of the day only from missions that have a day."""
     day = [name for name in keep if OUTPUTS[name].group == "day"]
@@ -76,7 +88,7 @@ def check_day(on: Reading, keep: Sequence[str], bases: Sequence[Base]) -> None:
 
 # -------------------------------------------------------------------------------------------------------------- limits
 def default_limits(
-    on: Reading, keep: Sequence[str], m: Mission, varied: Mapping[str, Mapping[str, Any]]
+    on: Reading, keep: Sequence[str], m: LinkMission, varied: Mapping[str, Mapping[str, Any]]
 ) -> tuple[Limit, ...]:
     """The limits that the mission requires of the kept outputs; ``varied`` are keys that vary, by their table."""
     limits = _required(keep, m)
@@ -87,7 +99,7 @@ def default_limits(
     return limits
 
 
-def _required(keep: Sequence[str], m: Mission) -> tuple[Limit, ...]:
+def _required(keep: Sequence[str], m: LinkMission) -> tuple[Limit, ...]:
     r = m.requirement
     wanted = (
         Limit("margin", r.margin_db, None, "requirement.margin"),
@@ -96,7 +108,7 @@ def _required(keep: Sequence[str], m: Mission) -> tuple[Limit, ...]:
     return tuple(limit for limit in wanted if limit.output in keep)
 
 
-def unchecked(given: Collection[str], keep: Sequence[str], m: Mission, varied: Collection[str]) -> Iterator[str]:
+def unchecked(given: Collection[str], keep: Sequence[str], m: LinkMission, varied: Collection[str]) -> Iterator[str]:
     """Of limits that the mission requires and [limits] leaves out: that nothing checks them; ``varied`` are keys."""
     for limit in _required(keep, m):
         if limit.output in given or limit.source in varied:

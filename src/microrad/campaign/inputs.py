@@ -14,8 +14,8 @@ from microrad.campaign.records import CampaignError
 from microrad.document import Document
 from microrad.fields import Several
 from microrad.mirror_table import Mirror, place
-from microrad.mission import Mission, Source
-from microrad.missionfile import MissionFile, check_table
+from microrad.mission import LinkMission, Mission, Source
+from microrad.missionfile import LinkFile, check_table
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,7 +37,13 @@ class Base:
 
     values: dict[str, str]
     data: Mapping[str, Any]
-    file: MissionFile
+    file: LinkFile
+
+    @property
+    def mirror(self) -> Mirror | None:
+        """The mirror of its mission, None where that has links alone."""
+        m = self.file.mission
+        return m.mirror if isinstance(m, Mission) else None
 
 
 class _Campaign(Protocol):
@@ -57,7 +63,7 @@ class Builder:
         self._singles: dict[tuple[int, str], Key | None] = {}
         self._identified = any(d.distribution is None for d in campaign.draws)
 
-    def mission(self, cell: int, values: Mapping[str, float]) -> MissionFile:
+    def mission(self, cell: int, values: Mapping[str, float]) -> LinkFile:
         """The mission of a row of a cell from its drawn values by key, in SI units; without any the cell's own.
 
         Raises `CampaignError` with key, value and reason where that is no mission.
@@ -87,7 +93,8 @@ class Builder:
             return put(data, key, raw), str(raw)
         found = self._single(cell, key)
         if found is None:
-            nominal = self._bases[cell].file.mission.mirror
+            nominal = self._bases[cell].mirror
+            assert nominal is not None  # an identified one, as the campaign file's own check has seen
             return _with_parameter(data, nominal, key.partition(".")[2], value), f"{value!r}"
         raw = found.written(value)
         if self._identified and key.startswith(f"{MIRROR}."):
@@ -95,7 +102,7 @@ class Builder:
         return put(data, key, raw), str(raw)
 
     def _single(self, cell: int, key: str) -> Key | None:
-        """The key of a single value; None for an item of a list, or a whole one, of an identified mirror."""
+        """The key of a single value; None for a whole list of an identified mirror."""
         if (cell, key) not in self._singles:
             try:
                 found: Key | None = find(key, self._bases[cell].data)
@@ -106,15 +113,16 @@ class Builder:
         return self._singles[cell, key]
 
 
-def _validated(base: Base, data: dict[str, Any], texts: Mapping[str, str]) -> Mission:
+def _validated(base: Base, data: dict[str, Any], texts: Mapping[str, str]) -> LinkMission:
     """The mission of the data: tables that are those of the base are taken as they are."""
+    kind = type(base.file.mission)
     tables = {k: getattr(base.file.mission, k) if v is base.data.get(k) else v for k, v in data.items()}
     try:
-        return Mission.model_validate(tables)
+        return kind.model_validate(tables)
     except ValidationError:
         pass
     blank = Document(base.file.path, "mission file", "")
-    check_table(blank, Mission, data)
+    check_table(blank, kind, data)
     said = "; ".join(f"{f.key} = {f.value or texts.get(f.key, '?')} {f.reason}" for f in blank.faults[:3])
     raise CampaignError(f"the row is no mission: {said}")
 
@@ -125,17 +133,13 @@ def _without_uncertainty(data: dict[str, Any]) -> dict[str, Any]:
 
 
 def _with_parameter(data: dict[str, Any], nominal: Mirror, parameter: str, value: float) -> dict[str, Any]:
-    """The data with an uncertain parameter of the mirror, "linear.poles.1", set to a value.
-
-    Of a list that scales together the value is the factor of its items.
-    """
+    """The data with a list of the mirror's uncertain parameters, which scale together, times a factor."""
     at = place(nominal, parameter)
     table = getattr(nominal, at.table)
     info = type(table).model_fields[at.field]
     rule, items = rule_in(info), list(getattr(table, at.field))
     assert isinstance(rule, Several)
     raw = list(data[MIRROR][at.table][info.alias or at.field])
-    for i in range(len(items)) if at.item is None else (at.item,):
-        moved = items[i] * value if at.item is None else value
-        raw[i] = f"{moved!r} {rule.each.unit}" if rule.each.unit else moved
+    for i, item in enumerate(items):
+        raw[i] = f"{item * value!r} {rule.each.unit}" if rule.each.unit else item * value
     return put(_without_uncertainty(data), f"{MIRROR}.{at.table}.{info.alias or at.field}", raw)

@@ -8,7 +8,8 @@ from typing import Any, get_args, get_origin
 from pydantic.fields import FieldInfo
 
 from microrad.fields import OrWord, Quantity, Several, Share, Table, Whole
-from microrad.mission import Mission
+from microrad.mission import LinkMission, Mission
+from microrad.missionfile import kind_of
 
 MIRROR = "mirror"
 """What a campaign calls the mirror as a whole: the key of mirror files, and of the covariance of an identification."""
@@ -35,12 +36,14 @@ class UnknownKeyError(Exception):
 class Key:
     """A key of a mission: the table that it stands in, its name there, and its rule where it holds quantities.
 
-    ``numeric`` says that single values of it can be drawn: a quantity, or a plain number, that is not a list.
+    ``numeric`` says that single values of it can be drawn: a quantity, or a plain number, that is not a list. Of a list
+    each ``item`` has a key of its own, its place from 1 behind that of the list, and the rule of one item.
     """
 
     text: str
     table: type[Table]
     rule: Quantity | Several | None
+    item: int | None = None
 
     @property
     def name(self) -> str:
@@ -73,7 +76,7 @@ def find(key: str, data: Mapping[str, Any]) -> Key:
     Raises `UnknownKeyError`.
     """
     parts = tuple(key.split("."))
-    return _find(Mission, parts, 0, data)
+    return _find(kind_of(data), parts, 0, data)
 
 
 def _find(table: type[Table], parts: tuple[str, ...], at: int, data: object) -> Key:
@@ -90,14 +93,33 @@ def _find(table: type[Table], parts: tuple[str, ...], at: int, data: object) -> 
             raise _unknown(parts, at, names)
         inside = _at(inside, parts[at])
     is_last = at == len(parts) - 1
+    rule = None if kind is not None else rule_in(fields[parts[at]])
+    if isinstance(rule, Several) and at == len(parts) - 2:
+        return Key(".".join(parts), table, rule.each, _item(parts, inside))
     if kind is None and not is_last:
         raise UnknownKeyError(f"goes on behind {'.'.join(parts[: at + 1])}, which holds a value", "the key without it")
     if kind is None:
-        return Key(".".join(parts), table, rule_in(fields[parts[at]]))
+        return Key(".".join(parts), table, rule)
     if is_last:
         keys = [info.alias or name for name, info in kind.model_fields.items()]
         raise UnknownKeyError("is a table and no value", f"one of its keys {', '.join(keys)}")
     return _find(kind, parts, at + 1, inside)
+
+
+def _item(parts: tuple[str, ...], items: object) -> int:
+    """The place of an item, the last part of its key, in the list that the mission has there."""
+    last, count = parts[-1], len(items) if isinstance(items, list) else 0
+    if last.isdecimal() and last.isascii() and last[0] != "0" and len(last) <= len(str(count)) and int(last) <= count:
+        return int(last)
+    key = ".".join(parts[:-1])
+    expected = " or ".join(item_keys(key, count)) if count else "a list that the mission has"
+    raise UnknownKeyError(f"is no item of {key}, a list of {count}", expected)
+
+
+def item_keys(key: str, count: int) -> list[str]:
+    """The keys of the items of a list, of a long one the first and the last."""
+    places = range(1, count + 1) if count <= 3 else (1, count)
+    return [f"{key}.{place}" for place in places]
 
 
 def _at(data: object, name: str) -> object:
@@ -133,6 +155,8 @@ def put(data: Mapping[str, Any], key: str, value: object) -> dict[str, Any]:
     """The raw data with another value at a key; what is not on its way is shared."""
     name, _, rest = key.partition(".")
     inner = data.get(name)
+    if rest and isinstance(inner, list):
+        return {**data, name: [value if str(place) == rest else item for place, item in enumerate(inner, 1)]}
     return {**data, name: put(inner if isinstance(inner, Mapping) else {}, rest, value) if rest else value}
 
 
@@ -164,11 +188,13 @@ def flat_tables(data: Mapping[str, Any], inner: tuple[str, ...], prefix: str = "
 
 
 # --------------------------------------------------------------------------------------------------------------- loop
-def touches_loop(key: str, m: Mission) -> bool:
+def touches_loop(key: str, m: LinkMission) -> bool:
     """Whether the fine-pointing loop depends on a key: on all but those of the tables that it never looks into.
 
-    Aperture and wavelength matter to it where its optical sensor is a quad cell.
+    Aperture and wavelength matter to it where its optical sensor is a quad cell. Links alone have no loop.
     """
+    if not isinstance(m, Mission):
+        return False
     table = key.partition(".")[0]
     if table in _OF_THE_QUAD_CELL:
         return m.fine_pointing is not None and m.fine_pointing.optical_sensor.quad_cell is not None

@@ -9,23 +9,29 @@ from microrad.campaign.records import CampaignError
 from microrad.control import AxisController
 from microrad.fine_loop import ensemble
 from microrad.fine_loop.loop import LoopController, PointingLoop
-from microrad.missionfile import MissionFile
+from microrad.missionfile import LinkFile, MissionFile
 
 Beat = Callable[[], None]
 
 
-def scene(file: MissionFile, table: LoopTable) -> fine_pointing.Scene:
+def whole(file: LinkFile) -> MissionFile:
+    """The file of a mission that has a loop: the campaign file's own check has seen to it."""
+    assert isinstance(file, MissionFile)
+    return file
+
+
+def scene(file: LinkFile, table: LoopTable) -> fine_pointing.Scene:
     """The scene of a mission with the axes that the campaign simulates."""
-    built = fine_pointing.scene(file)
+    built = fine_pointing.scene(whole(file))
     return replace(built, loop=built.axis) if table.axes == "one" else built
 
 
-def tuned(file: MissionFile, table: LoopTable) -> AxisController:
+def tuned(file: LinkFile, table: LoopTable) -> AxisController:
     """The controller that the campaign names, tuned for this mission.
 
     Raises `CampaignError` for a name that the mission has no controller of, and with the reason when none can be tuned.
     """
-    m = file.mission
+    m = whole(file).mission
     if table.controller not in fine_pointing.names(m):
         names = ", ".join(f'"{name}"' for name in fine_pointing.names(m))
         raise CampaignError(f'loop.controller = "{table.controller}" is no controller of the mission; it has {names}')
@@ -36,21 +42,21 @@ def tuned(file: MissionFile, table: LoopTable) -> AxisController:
         raise CampaignError(f"the controller {table.controller!r} cannot be tuned: {error}") from error
 
 
-def held(file: MissionFile, table: LoopTable, axis: AxisController) -> LoopController:
+def held(file: LinkFile, table: LoopTable, axis: AxisController) -> LoopController:
     """The tuned controller on the axes of a cell's own mission: what all its rows are flown with."""
     built = scene(file, table)
-    built = replace(built, loop=fine_pointing.on_variant(built.loop, file.mission, table.mirror))
-    return fine_pointing.build(table.controller, built, file.mission, axis)
+    built = replace(built, loop=fine_pointing.on_variant(built.loop, whole(file).mission, table.mirror))
+    return fine_pointing.build(table.controller, built, whole(file).mission, axis)
 
 
-def row_loop(file: MissionFile, table: LoopTable) -> PointingLoop:
+def row_loop(file: LinkFile, table: LoopTable) -> PointingLoop:
     """The loop of a row's mission."""
-    return fine_pointing.on_variant(scene(file, table).loop, file.mission, table.mirror)
+    return fine_pointing.on_variant(scene(file, table).loop, whole(file).mission, table.mirror)
 
 
-def span(campaign: CampaignFile, file: MissionFile) -> ensemble.Span:
+def span(campaign: CampaignFile, file: LinkFile) -> ensemble.Span:
     """How long the runs of a campaign are: as its table `loop` says, else the mission; seeded by the campaign."""
-    f, table = fine_pointing.table(file.mission), campaign.table.loop
+    f, table = fine_pointing.table(whole(file).mission), campaign.table.loop
     assert table is not None
     duration = f.duration_s if table.duration_s is None else table.duration_s
     settle = f.settle_s if table.settle_s is None else table.settle_s

@@ -28,7 +28,7 @@ def chunk_rows(campaign: CampaignFile) -> int:
         return min(_DAY_ROWS, few)
     if campaign.table.loop is None:
         return min(_CHUNK_ROWS, few)
-    fine, own = campaign.mission.mission.fine_pointing, campaign.realisations
+    fine, own = loops.whole(campaign.mission).mission.fine_pointing, campaign.realisations
     assert fine is not None  # the campaign file's own check
     lanes = kernels.LANES * math.ceil(own / kernels.LANES) if campaign.loop_varies else own
     steps = loops.span(campaign, campaign.mission).duration_s / fine.plant_step_s * lanes

@@ -37,6 +37,9 @@ class Reading:
 
     def fits(self, at: str, key: Key, value: object) -> bool:
         """Whether a value fits a key by itself; what is wrong with it is noted at a key of the campaign."""
+        if key.item is not None:
+            assert isinstance(key.rule, Quantity)
+            return self.number(at, key.rule, value) is not None
         scratch = replace(self.document, faults=[], prefix=key.text.rpartition(".")[0])
         if check_value(scratch, key.table, key.name, value):
             return True

@@ -51,8 +51,8 @@ def rows(campaign: "CampaignFile", cell: int, first: int, count: int) -> tuple[d
 
 def _mirrors(campaign: "CampaignFile", cell: int, shares: dict[str, Floats], first: int) -> dict[str, Floats]:
     """Parameters of mirrors that the identification leaves possible; nan for those that the cell's mirror has not."""
-    table = campaign.bases[cell].file.mission.mirror
-    assert table.uncertainty is not None  # the campaign file's own check
+    table = campaign.bases[cell].mirror
+    assert table is not None and table.uncertainty is not None  # the campaign file's own check
     keys = table.uncertainty.parameters
     normals = standard_normal(np.column_stack([shares[f"mirror.{key}"] for key in keys]))
 

@@ -11,11 +11,11 @@ from microrad.campaign.file import CampaignFile
 from microrad.campaign.keys import MIRROR, touches_loop
 from microrad.fields import Table
 from microrad.fine_loop import ensemble
-from microrad.mission import Mission
-from microrad.missionfile import MissionFile
+from microrad.mission import LinkMission
+from microrad.missionfile import LinkFile
 
 
-def unread(campaign: CampaignFile, rows: Iterable[MissionFile]) -> Iterator[str]:
+def unread(campaign: CampaignFile, rows: Iterable[LinkFile]) -> Iterator[str]:
     """The drawn keys that are read in none of these rows, one of each cell."""
     left = [draw.key for draw in campaign.draws if draw.key != MIRROR]
     for file in rows:
@@ -31,7 +31,7 @@ def unread(campaign: CampaignFile, rows: Iterable[MissionFile]) -> Iterator[str]
     yield from left
 
 
-def _of_loop(campaign: CampaignFile, file: MissionFile) -> reads.Reads:
+def _of_loop(campaign: CampaignFile, file: LinkFile) -> reads.Reads:
     """What making the loop of a row reads; nothing in a campaign without one."""
     table = campaign.table.loop
     if table is None:
@@ -39,7 +39,7 @@ def _of_loop(campaign: CampaignFile, file: MissionFile) -> reads.Reads:
     return reads.watched_call(lambda f: (loops.row_loop(f, table), loops.span(campaign, f)), file)[1]
 
 
-def _of_outputs(campaign: CampaignFile, file: MissionFile) -> reads.Reads:
+def _of_outputs(campaign: CampaignFile, file: LinkFile) -> reads.Reads:
     """What the outputs of a row read, but for its runs."""
     names = [output.name for output in plan.outputs(campaign)]
     runs = None if campaign.table.loop is None else cast("ensemble.Ensemble", _Runs())
@@ -72,7 +72,7 @@ def _is_read(seen: reads.Reads, path: reads.Path) -> bool:
     return any((*path[:end], reads.WHOLE) in seen.digests for end in range(len(path)))
 
 
-def _path(m: Mission, key: str) -> reads.Path:
+def _path(m: LinkMission, key: str) -> reads.Path:
     """Where `reads` has a key of the mission of the file that it watches."""
     path: tuple[Any, ...] = (0, "mission")
     inside: object = m
@@ -82,4 +82,5 @@ def _path(m: Mission, key: str) -> reads.Path:
             inside, path = getattr(inside, field), (*path, field)
         elif isinstance(inside, Mapping):
             inside, path = inside[name], (*path, (reads.KEY, name))
+        # else: an item of a list, which is read as a whole
     return path

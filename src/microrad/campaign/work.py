@@ -20,7 +20,7 @@ from microrad.campaign.records import CampaignError, Chunk, Failed, Job, WorstTr
 from microrad.control import AxisController
 from microrad.fine_loop import ensemble
 from microrad.fine_loop.loop import LoopController, PointingLoop
-from microrad.missionfile import MissionFile
+from microrad.missionfile import LinkFile
 
 __all__ = ["Work", "code_sha256", "open_work"]
 
@@ -62,7 +62,7 @@ class _Rows:
     first: int
     columns: dict[str, Floats]
     weight: Floats
-    files: list[MissionFile | str]
+    files: list[LinkFile | str]
     keys: list[object]
 
 
@@ -118,7 +118,7 @@ class Evaluator:
 
     def _drawn(self, cell: int, rows: range) -> _Rows:
         columns, weight = sampling.rows(self.campaign, cell, rows.start, len(rows))
-        files: list[MissionFile | str] = []
+        files: list[LinkFile | str] = []
         keys: list[object] = []
         for i in range(len(rows)):
             values = dict(self.fixed) | {key: float(column[i]) for key, column in columns.items()}
@@ -169,8 +169,8 @@ class Evaluator:
 
     def _simulated(self, drawn: _Rows, group: range, watch: _Watch) -> "loops.Simulated | _Tilted | None":
         table = self.campaign.table.loop
-        file = next((drawn.files[i] for i in group if isinstance(drawn.files[i], MissionFile)), None)
-        if table is None or not isinstance(file, MissionFile):
+        file = next((drawn.files[i] for i in group if isinstance(drawn.files[i], LinkFile)), None)
+        if table is None or not isinstance(file, LinkFile):
             return None
         rows = range(drawn.first + group.start, drawn.first + group.stop)
         key = (drawn.keys[group.start], rows)
@@ -186,7 +186,7 @@ class Evaluator:
         return found
 
     def _outputs(
-        self, file: MissionFile | str, runs: "loops.Simulated | _Tilted | None", row: int
+        self, file: LinkFile | str, runs: "loops.Simulated | _Tilted | None", row: int
     ) -> tuple[dict[str, float], Floats | None]:
         if isinstance(file, str):
             raise CampaignError(file)
@@ -248,7 +248,7 @@ class Work:
     def _warm_up(self) -> None:
         table = self.campaign.table.loop
         assert table is not None
-        period = 1.0 / fine_pointing.table(self.campaign.mission.mission).rate_hz
+        period = 1.0 / fine_pointing.table(loops.whole(self.campaign.mission).mission).rate_hz
         loop, controller = loops.row_loop(self.campaign.mission, table), self.evaluator.controller(0)
         ensemble.trace(loop, controller, ensemble.Span(2.0 * period, 0.0, 0))
 
