@@ -3,12 +3,14 @@
 import numpy as np
 import pytest
 
+from microrad import radial_error
 from microrad.campaign import work
 from microrad.campaign.file import load_campaign
 from microrad.campaign.inputs import Builder
 from microrad.campaign.keys import find, flat
 from microrad.document import MissionError
 from microrad.fields import Several
+from microrad.link import LitAperture
 from microrad.link.tornado import LINK_TABLES
 from microrad.link_performance import Exposure
 from microrad.missionfile import load_link, open_mission
@@ -166,3 +168,23 @@ def test_each_item_of_a_list_has_its_own_key(tmp_path):
     assert np.ptp(rows(loaded(tmp_path, "crosslink", whole), 4)["margin"]) > 0.0
     (found,) = faults(tmp_path, "crosslink", whole + first)
     assert found.reason == "is an item of jitter.rms, which stands in [inputs] as a whole"
+
+
+# ------------------------------------------------------------------------------------------------ nothing done twice
+def test_rows_that_share_their_jitter_and_their_beam_share_what_follows_from_them(tmp_path, monkeypatch):
+    mission(tmp_path, "crosslink")
+    evaluated = []
+    own, field = radial_error._probability_of, LitAperture._field
+    monkeypatch.setattr(radial_error, "_probability_of", lambda *a, **k: evaluated.append(1) or own(*a, **k))
+    rows(loaded(tmp_path, "crosslink", POWER))
+    first = len(evaluated)
+    assert first > 4
+    rows(loaded(tmp_path, "crosslink", POWER))  # the same margins: nothing but the shares beyond them is asked again
+    assert len(evaluated) - first == 2 * (4 + 1)
+    asked = []
+    monkeypatch.setattr(LitAperture, "_field", lambda self, error: asked.append(error.size) or field(self, error))
+    lit = LitAperture(0.0401, 1.5e-6, 0.0, 0.0)
+    assert lit.loss_db(lit.error_rad(20.0)) == pytest.approx(20.0)
+    assert sum(asked) < 200  # of the 2001 errors within 40 half angles
+    asked.clear()
+    assert lit.loss_db(lit.error_rad(20.0)) == pytest.approx(20.0) and asked == [1]

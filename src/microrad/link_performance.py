@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -111,6 +112,7 @@ class Known(Spread):
         return float(pointing.radial_survival(self.jitter, error_rad))
 
 
+@lru_cache(maxsize=256)  # most rows of a campaign draw something else than the jitter
 def _exact_quantile_rad(jitter: pointing.Jitter, exceeded: float) -> float:
     """Error that is exceeded for a share of the time, which is told from none down to the last digit of 1."""
     return float(pointing.radial_quantile(jitter, max(exceeded, _RAREST)))

@@ -17,6 +17,7 @@ SMALLEST_PROBABILITY = 1e-20
 """Below it the quadrature of the tails is no longer relied on."""
 
 _REACH = 12.0  # standard deviations about the bias that are integrated; 4e-33 lies beyond
+_ROUNDING = 4.0 * float(np.finfo(np.float64).eps)
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(96)
 
 
@@ -186,14 +187,14 @@ def radial_quantile(jitter: Jitter, probability: ArrayLike) -> Floats:
         return np.full(p.shape, jitter.static_rad)
     if _is_rayleigh(jitter):
         return np.asarray(widest * np.sqrt(-2.0 * np.log(p)))
-    from scipy.optimize import elementwise  # here: slow to load
+    from scipy.optimize import brentq  # here: slow to load
 
-    def missed(radius: Floats, p: Floats) -> Floats:
-        return np.asarray(np.log(np.maximum(_probability_of(jitter, radius, beyond=True), 1e-300) / p))
+    def missed(radius: float, p: float) -> float:
+        return math.log(max(float(_probability_of(jitter, np.asarray(radius), beyond=True)), 1e-300) / p)
 
-    # r is at most the bias plus a Rayleigh variable of the wider axis
-    highest = (jitter.static_rad + widest * np.sqrt(-2.0 * np.log(p))) * (1.0 + 1e-6)
-    found = elementwise.find_root(missed, (np.zeros(p.shape), highest), args=(p,))
-    if not np.all(found.success):
-        raise RuntimeError(f"no radial error was found for the probabilities {p}")
-    return np.asarray(found.x, dtype=np.float64)
+    def root(p: float) -> float:
+        # r is at most the bias plus a Rayleigh variable of the wider axis
+        highest = (jitter.static_rad + widest * math.sqrt(-2.0 * math.log(p))) * (1.0 + 1e-6)
+        return float(brentq(missed, 0.0, highest, args=(p,), xtol=1e-300, rtol=_ROUNDING))
+
+    return np.array([root(each) for each in p.ravel().tolist()]).reshape(p.shape)

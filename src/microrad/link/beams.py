@@ -24,6 +24,7 @@ _ANYWHERE = 1e9  # argument that stands for all larger ones, infinite included
 _DARK = 40.0  # exponent of the field beyond which there is no light to integrate
 _FLOOR = 1e-15  # of the field: a null of the pattern is 300 dB deep and no more
 _ROUND_DB = 1e-6  # loss up to which every beam is the Gaussian of its curvature
+_FAR = (128, 512)  # of the errors at which it is looked for: where what comes last begins
 _CHUNK = 8192  # errors that the integral is held for at once
 
 
@@ -171,6 +172,17 @@ class LitAperture:
         # J0(x) = 1 - x^2/4: intensity falls as 1 - scale^2 <rho^2> error^2 / 2, a Gaussian's as 1 - 2 (error/theta)^2
         return 2.0 / (self._scale * math.sqrt(float(weight @ rho**2 / np.sum(weight))))
 
+    def _first_below(self, wanted: float, error_rad: Floats) -> int | None:
+        """Number of the first of rising errors with no more field than wanted, None where there is none."""
+        begin = 0
+        for part in np.split(error_rad, _FAR):  # most are not far out
+            below = np.flatnonzero(self._field(part) <= wanted)
+            if below.size:
+                return begin + int(below[0])
+            begin += part.size
+        return None
+
+    @lru_cache(maxsize=256)  # noqa: B019  not of beams, which are values: of what most rows of a campaign share
     def error_rad(self, loss_db: float) -> float:
         """Smallest error with this loss, within the main lobe; infinite beyond the 300 dB of a null."""
         from scipy.optimize import brentq
@@ -180,10 +192,10 @@ class LitAperture:
             return GaussianFall(half).error_rad(loss_db)
         # the field is above the one looked for up to there, and below it beyond, null or not
         wanted, outwards = 10.0 ** (-loss_db / 20.0), np.linspace(0.0, 40.0 * half, 2001)
-        beyond = np.flatnonzero(self._field(outwards) <= wanted)
-        if beyond.size == 0 or wanted < _FLOOR:
+        first = None if wanted < _FLOOR else self._first_below(wanted, outwards)
+        if first is None:
             return math.inf
-        lower, upper = outwards[beyond[0] - 1], outwards[beyond[0]]
+        lower, upper = outwards[first - 1], outwards[first]
         return float(brentq(lambda e: float(self._field(np.array([e]))[0]) - wanted, lower, upper, xtol=1e-13 * half))
 
 
