@@ -1,13 +1,20 @@
 """Campaigns of links alone: on every file that `microrad budget` takes, with every quantity drawn from anything."""
 
+import json
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from microrad import radial_error
-from microrad.campaign import work
+from microrad import radial_error, reads
+from microrad.campaign import bundle, plan, run, work
+from microrad.campaign.export import export
 from microrad.campaign.file import load_campaign
 from microrad.campaign.inputs import Builder
 from microrad.campaign.keys import find, flat
+from microrad.campaign.ledger import Ledger
+from microrad.campaign.records import CampaignError
+from microrad.campaign.summary import summarise
 from microrad.document import MissionError
 from microrad.fields import Several
 from microrad.link import LitAperture
@@ -188,3 +195,78 @@ def test_rows_that_share_their_jitter_and_their_beam_share_what_follows_from_the
     assert sum(asked) < 200  # of the 2001 errors within 40 half angles
     asked.clear()
     assert lit.loss_db(lit.error_rad(20.0)) == pytest.approx(20.0) and asked == [1]
+
+
+# ------------------------------------------------------------------------------------------------------------ chunks
+DRAWN = '[inputs."jitter.rms.1"]\ndistribution = "uniform"\nlow = "20 urad"\nhigh = "30 urad"\n'
+EVEN = HEAD.replace("random", "latin-hypercube").replace("runs = 4", "runs = 64")
+
+
+def begun(folder, book, monkeypatch, row_s, progress=lambda *_: None, **means):
+    """A campaign of 64 rows that are taken to last ``row_s`` each, run to its end."""
+    loaded(folder, "crosslink", DRAWN, EVEN)
+    monkeypatch.setattr(run, "row_s", lambda _: row_s)
+    run.begin(folder / "campaign-crosslink.toml", folder / book, run.Means(**(means or {"threads": 1})), progress)
+    return folder / book
+
+
+def content(book):
+    """Rows of each chunk, the exported rows, and all that they say but for the pace."""
+    with Ledger.open(book, write=False) as opened:
+        sizes = [chunk.columns["row"].size for chunk in opened.chunks(0)]
+        export(opened, book.with_suffix(".csv"))
+    said = replace(summarise(book), progress=None)
+    return sizes, book.with_suffix(".csv").read_bytes(), reads.digest(said)
+
+
+def test_chunks_are_cut_to_what_a_row_costs(tmp_path):
+    mission(tmp_path, "crosslink")
+    campaign = loaded(tmp_path, "crosslink", DRAWN, EVEN.replace("64", "4096"))
+    assert plan.is_timed(campaign) and plan.chunk_rows(campaign) == 1024
+    sizes = {row_s: plan.chunk_rows(plan.timed(campaign, row_s)) for row_s in (0.0, 1e-4, 0.01, 0.1, 0.9, 5.0)}
+    assert sizes == {0.0: 1024, 1e-4: 1024, 0.01: 128, 0.1: 16, 0.9: 2, 5.0: 1}
+    assert plan.rows_of(plan.timed(campaign, 0.1), 3) == range(48, 64)
+    precise = '[precision]\noutput = "margin"\nquantile = 0.1\nhalf_width = "1 dB"\nconfidence = 0.9\nat_most = 9999\n'
+    campaign = loaded(tmp_path, "crosslink", DRAWN + precise, EVEN.replace("64", "4096"))
+    assert plan.rounds(plan.timed(campaign, 0.1)) == plan.rounds(campaign)
+
+
+def test_a_row_costs_the_mean_of_some_without_the_first(tmp_path):
+    mission(tmp_path, "crosslink")
+    campaign = loaded(tmp_path, "crosslink", DRAWN + '[grid]\n"requirement.outage" = [0.01, 0.001]\n', EVEN)
+    times = iter([7.0, 7.05, 7.1, 7.25, 9.0])  # at the end of the first row, and of each behind it
+    assert run.row_s(campaign, lambda: next(times)) == pytest.approx(0.25 / 3)
+    assert list(times) == [9.0]
+    assert run.row_s(replace(campaign, rows=1), lambda: 7.0) == 0.0  # no more rows than there are
+
+
+def test_results_are_the_same_bits_whatever_a_row_costs(tmp_path, monkeypatch):
+    mission(tmp_path, "crosslink")
+    whole = content(begun(tmp_path, "whole.ledger", monkeypatch, 1e-6))
+    parts = content(begun(tmp_path, "parts.ledger", monkeypatch, 0.2, threads=2))
+    assert whole[0] == [64] and parts[0] == [8] * 8
+    assert parts[1:] == whole[1:]
+
+
+def test_a_campaign_that_is_resumed_keeps_its_chunks(tmp_path, monkeypatch):
+    mission(tmp_path, "crosslink")
+
+    def stop(done, total, what):
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt, match=r"^stopped; 8 rows are in"):
+        begun(tmp_path, "stopped.ledger", monkeypatch, 0.2, stop)
+    monkeypatch.setattr(run, "row_s", lambda _: 1e-6)
+    run.resume(tmp_path / "stopped.ledger", run.Means(threads=1))
+    whole = content(begun(tmp_path, "whole.ledger", monkeypatch, 1e-6))
+    sizes, *rest = content(tmp_path / "stopped.ledger")
+    assert sizes == [8] * 8 and tuple(rest) == whole[1:]
+
+
+@pytest.mark.parametrize("rows", [0, -8, 3, 2.0, True, "8"])
+def test_chunks_of_impossible_size_are_refused(tmp_path, rows):
+    mission(tmp_path, "crosslink")
+    spec = bundle.packed(loaded(tmp_path, "crosslink", DRAWN), ())
+    assert bundle.opened(spec).campaign.chunk_rows is None
+    with pytest.raises(CampaignError, match="which microrad never makes"):
+        bundle.opened(json.dumps(json.loads(spec) | {"chunk_rows": rows}).encode())

@@ -13,7 +13,7 @@ import pytest
 
 import microrad
 from microrad import kernels
-from microrad.campaign import blob, bundle, mending, plan, run, work
+from microrad.campaign import blob, bundle, mending, plan, records, run, work
 from microrad.campaign.export import export
 from microrad.campaign.file import load_campaign
 from microrad.campaign.inputs import Builder
@@ -181,7 +181,7 @@ def test_rows_by_themselves_and_in_any_chunk_are_the_same(short):
     evaluator = work.Evaluator(campaign, Builder(campaign), {}, dict(enumerate(run.controllers(campaign, _quiet))))
     together = evaluator.rows(1, range(5, 9), _still)
     apart = [evaluator.rows(1, range(row, row + 1), _still) for row in range(5, 9)]
-    joined = run.joined(Job(1, 0), apart)
+    joined = records.joined(Job(1, 0), apart)
     for name, column in together.columns.items():
         np.testing.assert_array_equal(column, joined.columns[name])
     np.testing.assert_array_equal(together.survival, joined.survival)

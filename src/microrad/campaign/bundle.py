@@ -8,7 +8,7 @@ import shutil
 import tempfile
 import weakref
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path, PurePosixPath
 from typing import Any
@@ -67,7 +67,8 @@ def packed(campaign: CampaignFile, controllers: Sequence[AxisController]) -> byt
     files = {name: base64.b64encode(path.read_bytes()).decode() for name, path in _named(campaign.files).items()}
     name = next(name for name, path in _named(campaign.files).items() if path == campaign.path)
     made = [_written(controller) for controller in controllers]
-    data = {"campaign": name, "files": files, "controllers": made, "code": code_sha256()}
+    own = {"campaign": name, "code": code_sha256(), "chunk_rows": campaign.chunk_rows}
+    data = {**own, "files": files, "controllers": made}
     return json.dumps(data, sort_keys=True).encode()
 
 
@@ -85,13 +86,21 @@ def opened(spec: bytes, any_code: bool = False) -> Opened:
             path = _inside(folder, name)
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_bytes(base64.b64decode(content))
-        campaign = load_campaign(_inside(folder, data["campaign"]))
+        campaign = replace(load_campaign(_inside(folder, data["campaign"])), chunk_rows=_chunk_rows(data))
         found = Opened(campaign, tuple(_read(each) for each in data["controllers"]))
     except BaseException:
         shutil.rmtree(folder, ignore_errors=True)
         raise
     weakref.finalize(found, shutil.rmtree, folder, ignore_errors=True)
     return found
+
+
+def _chunk_rows(data: dict[str, Any]) -> int | None:
+    """The rows of a chunk that a bundle states. Raises `CampaignError` for none of ours: anyone may make a ledger."""
+    rows = data.get("chunk_rows")
+    if rows is None or (type(rows) is int and rows > 0 and not rows & (rows - 1)):
+        return rows
+    raise CampaignError(f"the ledger has chunks of {rows!r} rows, which microrad never makes: leave it alone")
 
 
 def _inside(folder: Path, name: str) -> Path:

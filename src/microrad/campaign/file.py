@@ -43,6 +43,7 @@ class CampaignFile:
     for Latin hypercube and Sobol sampling; ``most_rows`` is where a precision ends at last, ``rows`` without one.
     ``half_width`` is that of the precision in its output's SI unit, nan without. ``fixed`` are the texts of [set].
     ``loop_varies``: the loop differs from row to row. ``files`` are all that the campaign depends on, itself first.
+    ``chunk_rows`` are the rows of a chunk where they were timed, None where their number follows from the rest.
     """
 
     path: Path
@@ -67,6 +68,7 @@ class CampaignFile:
     loop_varies: bool
     files: tuple[Path, ...]
     warnings: tuple[str, ...]
+    chunk_rows: int | None = None
 
 
 def load_campaign(path: Path) -> CampaignFile:

@@ -1,6 +1,11 @@
-"""Which rows a campaign has, in which chunks: it follows from the campaign file alone, whoever does the work."""
+"""Which rows a campaign has, in which chunks: whoever does the work.
+
+It follows from the campaign file alone, but for the chunks of links alone, which are cut to what their rows cost where
+the campaign begins. No number depends on that.
+"""
 
 import math
+from dataclasses import replace
 
 from microrad import kernels
 from microrad.campaign import loops
@@ -9,7 +14,8 @@ from microrad.campaign.outputs import OUTPUTS, TAIL_OUTPUTS, Output
 from microrad.campaign.records import Job
 
 _CHUNK_STEPS = 2e7  # plant steps of all runs in a chunk: about a second
-_CHUNK_ROWS = 1024  # at most, and without a loop
+_CHUNK_S = 2.0  # at most, of rows that were timed
+_CHUNK_ROWS = 1024  # at most
 _DAY_ROWS = 8  # with outputs of the day, which take a second each
 _GROWTH = 1.5  # of the rows from one round to the next, until the precision is reached
 
@@ -23,6 +29,22 @@ def outputs(campaign: CampaignFile) -> tuple[Output, ...]:
 
 def chunk_rows(campaign: CampaignFile) -> int:
     """Rows in a chunk: a power of two, about a second of work."""
+    return campaign.chunk_rows or largest_chunk(campaign)
+
+
+def is_timed(campaign: CampaignFile) -> bool:
+    """Whether what a row costs does not follow from the file: that of links alone, by their beams and receivers."""
+    return campaign.table.loop is None and all(output.group != "day" for output in outputs(campaign))
+
+
+def timed(campaign: CampaignFile, row_s: float) -> CampaignFile:
+    """The campaign with chunks of rows that take this long each."""
+    rows = 1 << int(math.log2(max(_CHUNK_S / max(row_s, 1e-9), 1.0)))
+    return replace(campaign, chunk_rows=min(rows, largest_chunk(campaign)))
+
+
+def largest_chunk(campaign: CampaignFile) -> int:
+    """Rows in a chunk as far as the file says it: a power of two, as `chunk_rows`, which holds whole ones of those."""
     few = 1 << int(math.log2(campaign.rows))
     if any(output.group == "day" for output in outputs(campaign)):
         return min(_DAY_ROWS, few)
@@ -46,7 +68,7 @@ def rounds(campaign: CampaignFile) -> tuple[int, ...]:
     wanted = campaign.table.precision
     if wanted is None:
         return (campaign.rows,)
-    unit = max(chunk_rows(campaign), campaign.block)  # powers of two, so the larger holds whole ones of the other
+    unit = max(largest_chunk(campaign), campaign.block)  # powers of two, so the larger holds whole ones of the other
     totals, most = [_whole(campaign.rows, unit)], wanted.at_most // unit * unit
     while totals[-1] < most:
         totals.append(min(_whole(math.ceil(_GROWTH * totals[-1]), unit), most))

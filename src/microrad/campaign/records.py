@@ -1,6 +1,6 @@
 """What the parts of a campaign hand to each other: rows, chunks, jobs and what is summed up of them."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Literal, NamedTuple, Protocol
 
@@ -245,3 +245,18 @@ class CampaignSummary:
     progress: Progress
     warnings: tuple[str, ...] = field(default=())
     findings: tuple[str, ...] = field(default=())
+
+
+def joined(job: Job, parts: Sequence[Chunk]) -> Chunk:
+    """The chunk that these chunks of consecutive rows make up."""
+    names = parts[0].columns
+    sums = [chunk for chunk in parts if chunk.survival.size]
+    zeros = np.zeros(sums[0].survival.size) if sums else np.zeros(0)
+    return Chunk(
+        job.cell,
+        job.number,
+        {name: np.concatenate([chunk.columns[name] for chunk in parts]) for name in names},
+        tuple(failed for chunk in parts for failed in chunk.failed),
+        sum((chunk.survival for chunk in sums), zeros),
+        sum((chunk.survival_square for chunk in sums), zeros),
+    )

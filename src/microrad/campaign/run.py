@@ -18,7 +18,7 @@ from microrad.campaign.file import CampaignFile, load_campaign
 from microrad.campaign.inputs import Builder
 from microrad.campaign.ledger import Ledger, check_same
 from microrad.campaign.ledger_file import argument, refuse_existing
-from microrad.campaign.records import CampaignError, Chunk, Engine, Failed, Job, Outcome
+from microrad.campaign.records import CampaignError, Chunk, Engine, Failed, Job, Outcome, joined
 from microrad.campaign.sketch import Sketch
 from microrad.control import AxisController
 from microrad.units import format_quantity
@@ -26,6 +26,7 @@ from microrad.units import format_quantity
 Progress = Callable[[int, int, str], None]
 
 TARGET = "microrad.campaign.work:open_work"
+_TIMED_S = 0.2  # of rows, before a campaign of links alone begins
 LATE_S = 30.0
 """Without a sign of life for this long beyond the campaign's row_limit, a worker is stopped."""
 
@@ -60,6 +61,8 @@ def begin(file: Path, path: Path, means: Means, on_progress: Progress = lambda d
     """
     campaign = load_campaign(file)
     refuse_existing(path)  # before the controllers are tuned
+    if plan.is_timed(campaign):
+        campaign = plan.timed(campaign, row_s(campaign))
     spec = bundle.packed(campaign, controllers(campaign, on_progress))
     with closing(_Workers(campaign, spec, means)) as workers:
         if means.scheduler is not None:
@@ -85,6 +88,22 @@ def resume(path: Path, means: Means, on_progress: Progress = lambda done, total,
         check_same(head.hashes, bundle.hashes(campaign), path)
         with closing(_Workers(opened.campaign, head.bundle, means)) as workers:
             _Run(opened.campaign, workers, book, on_progress).whole()
+
+
+def row_s(campaign: CampaignFile, clock: Callable[[], float] = time.perf_counter) -> float:
+    """Time (s) that a row of links alone takes here: the mean of some, those of all cells in turn.
+
+    The first one, which loads what it needs, does not count.
+    """
+    evaluator, cells = work.Evaluator(campaign, Builder(campaign), {}, {}), len(campaign.cells)
+    began = took = 0.0
+    for done in range(max(cells * campaign.rows, 2)):
+        row = done // cells % campaign.rows
+        evaluator.rows(done % cells, range(row, row + 1), lambda: None, attempts=1)
+        began, took = (clock(), 0.0) if done == 0 else (began, clock() - began)
+        if took >= _TIMED_S:
+            break
+    return took / done
 
 
 def controllers(campaign: CampaignFile, on_progress: Progress) -> tuple[AxisController, ...]:
@@ -325,18 +344,3 @@ class _Run:
             if not math.isnan(value)
         )
         return [(-row, sign * score) for score, row in heapq.nlargest(self.campaign.table.worst, scored)]
-
-
-def joined(job: Job, parts: Sequence[Chunk]) -> Chunk:
-    """The chunk that these chunks of one row make up."""
-    names = parts[0].columns
-    sums = [chunk for chunk in parts if chunk.survival.size]
-    zeros = np.zeros(sums[0].survival.size) if sums else np.zeros(0)
-    return Chunk(
-        job.cell,
-        job.number,
-        {name: np.concatenate([chunk.columns[name] for chunk in parts]) for name in names},
-        tuple(failed for chunk in parts for failed in chunk.failed),
-        sum((chunk.survival for chunk in sums), zeros),
-        sum((chunk.survival_square for chunk in sums), zeros),
-    )

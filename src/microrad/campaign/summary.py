@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from itertools import groupby
 from pathlib import Path
 
 import numpy as np
@@ -21,12 +22,14 @@ from microrad.campaign.records import (
     Failed,
     Floats,
     Interval,
+    Job,
     Limit,
     OutputSummary,
     Progress,
     Sensitivity,
     Tail,
     WorstTrace,
+    joined,
 )
 from microrad.campaign.statistics import Fold, Moments
 from microrad.fine_loop.ensemble import bin_edges_rad
@@ -106,9 +109,18 @@ def take(campaign: CampaignFile, cell: Folded, chunk: Chunk) -> None:
 
 def _read(campaign: CampaignFile, chunks: Iterator[Chunk]) -> Folded:
     cell = begun(campaign)
-    for chunk in chunks:
+    for chunk in _together(campaign, chunks):
         take(campaign, cell, chunk)
     return cell
+
+
+def _together(campaign: CampaignFile, chunks: Iterator[Chunk]) -> Iterator[Chunk]:
+    """Neighbouring chunks as one each, so that no last digit depends on the size that chunks have by the clock."""
+    several = plan.largest_chunk(campaign) // plan.chunk_rows(campaign)
+    neighbours = groupby(enumerate(chunks), lambda at: (at[1].number - at[0], at[1].number // several))
+    for _, group in neighbours:
+        parts = [chunk for _, chunk in group]
+        yield joined(Job(parts[0].cell, parts[0].number), parts) if len(parts) > 1 else parts[0]
 
 
 def _outputs(campaign: CampaignFile, cell: Folded, quantiles: tuple[float, ...]) -> dict[str, OutputSummary]:
@@ -283,7 +295,7 @@ def _sensitivities(campaign: CampaignFile, book: Ledger) -> tuple[Sensitivity, .
         return ()
     parts: list[dict[str, Floats]] = []
     rows = 0
-    for chunk in book.chunks(0):
+    for chunk in _together(campaign, book.chunks(0)):
         parts.append({name: chunk.columns[name] for name in ("weight", *drawn, *names)})
         rows += chunk.columns["row"].size
         if rows >= SENSITIVITY_ROWS:
