@@ -1,4 +1,4 @@
-"""Campaigns: pace, efficiency on two cores by threads and by Dask, the price of 100 000 runs, memory; in one run.
+"""Campaigns: rows of links, efficiency on two cores by threads and by Dask, the price of 100 000 runs, memory.
 
     python benchmarks/campaign.py            # everything, some minutes
     python benchmarks/campaign.py --quick    # a tenth of the runs
@@ -7,6 +7,9 @@ One axis of the shipped mission under PI, ten seconds a run, a drawn transmit po
 compiled kernel, the link budgeted under each. One thread, two threads of one worker process and two Dask workers do
 the same chunks in turn, several times; the start of the workers is left out, and told apart. Efficiency is the time on
 one thread over twice the time on two, median of the rounds.
+
+Rows of links alone under a jitter: the crosslink of docs/gallery, by the processor's time. The bar is 100 rows a second
+and core.
 """
 
 import resource
@@ -18,8 +21,9 @@ import time
 from contextlib import closing
 from pathlib import Path
 
-from microrad.campaign import bundle, plan, run
+from microrad.campaign import bundle, plan, run, work
 from microrad.campaign.file import load_campaign
+from microrad.campaign.inputs import Builder
 from microrad.campaign.records import Engine, Job
 
 HERE = Path(__file__).resolve().parent
@@ -112,7 +116,61 @@ def peak(path: Path) -> None:
     print(f"{own:.0f} MB and {child:.0f} MB")
 
 
+# what a row draws beside the rms of the jitter about x, with the bounds
+BESIDE = {
+    "": "",
+    "communication.transmit_power": 'low = "0.1 W"\nhigh = "0.3 W"',
+    "terminals.leo_aperture": 'low = "4 cm"\nhigh = "5 cm"',
+}
+COUNTER = """
+[communication.receiver]
+modulation = "ook"
+detector = "photon-counting"
+bit_error_ratio = 1e-9
+code_gain = "0 dB"
+code_rate = 1.0
+bandwidth = "10 GHz"
+extinction_ratio = "20 dB"
+efficiency = 0.5
+dark_count_rate = "1000 1/s"
+background_power = "1 pW"
+"""
+
+
+def crosslinks() -> dict[str, str]:
+    """The crosslink by its convention for the pointing loss, and with a receiver whose power has to be searched for."""
+    pattern = (HERE.parent / "docs" / "gallery" / "crosslink.toml").read_text(encoding="utf-8")
+    begin, end = pattern.index("[communication.beam]"), pattern.index("[requirement]")
+    gaussian = (pattern[:begin] + pattern[end:]).replace('pointing_loss = "pattern"', 'pointing_loss = "gaussian"')
+    lines = [line for line in gaussian.split("\n") if not line.startswith("receiver_sensitivity")]
+    counter = "\n".join(lines).replace("[requirement]", COUNTER + "[requirement]")
+    return {"gaussian": gaussian, "pattern": pattern, "gaussian, photon counter": counter}
+
+
+def links(rows: int) -> None:
+    """Rows a second and core of links alone under a jitter, all outputs but those of the day kept."""
+    print("\nlinks alone under a jitter, rows a second and core")
+    for name, text in crosslinks().items():
+        for key, bounds in BESIDE.items():
+            with tempfile.TemporaryDirectory() as folder:
+                Path(folder, "mission.toml").write_text(text, encoding="utf-8")
+                drawn = {"jitter.rms.1": 'low = "5 urad"\nhigh = "7 urad"', key: bounds}
+                tables = (f'[inputs."{k}"]\ndistribution = "uniform"\n{b}\n' for k, b in drawn.items() if k)
+                path = Path(folder, "campaign.toml")
+                head = f'mission = "mission.toml"\nseed = {len(name + key)}\nruns = {rows + 8}\nsampling = "random"\n'
+                path.write_text(head + "".join(tables), encoding="utf-8")
+                campaign = load_campaign(path)
+            evaluator = work.Evaluator(campaign, Builder(campaign), {}, {})
+            evaluator.rows(0, range(rows, rows + 8), lambda: None)  # whatever is slow to load
+            began = time.process_time()
+            chunk = evaluator.rows(0, range(rows), lambda: None)
+            took = time.process_time() - began
+            assert not chunk.failed, chunk.failed
+            print(f"  {name:24} rms{' and ' * bool(key) + key:36} {rows / took:6.0f}")
+
+
 if __name__ == "__main__":
     quick = "--quick" in sys.argv
+    links(200 if quick else 2000)
     efficiency(RUNS // 8 if quick else RUNS)
     memory(5_000 if quick else 50_000)
