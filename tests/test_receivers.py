@@ -574,3 +574,11 @@ def test_temmes_expansion_has_its_second_term(gamma, sign, monkeypatch):
     mean = 1000.0 + np.sqrt(1000.0) * np.linspace(-3.0, 3.0, 13)
     found = counting._tail(gamma, sign, count, mean)
     assert_allclose(found, gamma(count + 1.0, mean), rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("rates", [1e6, [1e6, 2e6]], ids=["one", "several"])
+def test_a_search_without_a_root_asks_for_a_report(monkeypatch, rates):
+    receiver = OokCounting(wavelength_m=1.5e-6, bit_error_ratio=1e-9, bandwidth_hz=1e9, detection_efficiency=1.0)
+    monkeypatch.setattr(OokCounting, "_ratio_of_counts", lambda self, counts, floor: np.full(counts.shape, 0.4))
+    with pytest.raises(ArithmeticError, match="please report the receiver"):
+        receiver.required_power_w(rates)

@@ -24,6 +24,7 @@ Floats = NDArray[np.float64]
 
 _MANY = 1e5  # counts from which asymptotic series are exact to 1e-11
 _ROUNDING = 4.0 * float(np.finfo(np.float64).eps)
+_NO_POWER = "no power was found for a bit error ratio; please report the receiver"
 _CHUNK = 4096  # rows of a table of counts held at once
 
 
@@ -264,9 +265,12 @@ def _counts_at(
     ends = np.log(lowest * 0.999), np.log(highest * 1.001)
     if row.size == 1:  # many at once cost little more than one, and one by itself costs a quarter this way
         low, high = (np.broadcast_to(end, row.shape).item() for end in ends)
-        log_counts = brentq(lambda x: excess(np.full(row.shape, x), row).item(), low, high, xtol=1e-300, rtol=_ROUNDING)
-        return np.full(row.shape, math.exp(log_counts))
+        try:
+            x = brentq(lambda x: excess(np.full(row.shape, x), row).item(), low, high, xtol=1e-300, rtol=_ROUNDING)
+        except ValueError:  # no root between them
+            raise ArithmeticError(_NO_POWER) from None
+        return np.full(row.shape, math.exp(x))
     found = elementwise.find_root(excess, ends, args=(row,))
     if not np.all(found.success):
-        raise ArithmeticError("no power was found for a bit error ratio; please report the receiver")
+        raise ArithmeticError(_NO_POWER)
     return np.asarray(np.exp(found.x), dtype=np.float64)
