@@ -129,6 +129,18 @@ def test_a_pointing_error_on_the_command_line_stands_in_place_of_the_missions(ca
     assert found["budgets"][1] == json.loads(call("budget", file_with(folder), "--json").out)["budgets"][1]
 
 
+@pytest.mark.parametrize(
+    ("change", "flags", "which"),
+    [
+        ({}, ("--pointing-error", "5 urad"), "the required 10 µrad"),
+        (JITTER, (), r"\d+\.\d+ µrad under the jitter"),
+    ],
+)
+def test_the_largest_rate_says_whose_error_it_is_for(call, folder, change, flags, which):
+    printed = call("budget", file_with(folder, change), *flags).out
+    assert re.search(rf"Largest data rate with the required 3 dB at {which}: \d+", " ".join(printed.split()))
+
+
 @pytest.mark.parametrize("flags", [("--solve", "communication.data_rate"), ("--data-rate", "largest")])
 def test_the_solved_rate_has_the_required_margin(call, folder, flags):
     path = file_with(folder, {"terminals.leo_aperture": "6 cm"})

@@ -82,7 +82,9 @@ def test_the_margin_and_the_map_follow_a_typed_aperture(studio, links):
     assert written(studio) == text.replace('leo_aperture = "5 cm"', 'leo_aperture = "6 cm"') != text
     rate = largest_rate(mission_at(studio.file, terminals__leo_aperture="6 cm")[0])
     links.get_by_text(f"At most {rate / 1e6:.3g} Mbit/s at 10 µrad").wait_for()
-    links.get_by_text(f"Largest data rate with the required 3 dB at 10 µrad: {rate / 1e6:.3g} Mbit/s.").wait_for()
+    links.get_by_text(
+        f"Largest data rate with the required 3 dB at the required 10 µrad: {rate / 1e6:.3g} Mbit/s."
+    ).wait_for()
     typed(links, APERTURE).fill("5 cm")
     typed(links, APERTURE).press("Enter")
     links.get_by_role("status").get_by_text("saved", exact=True).wait_for()

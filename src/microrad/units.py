@@ -120,7 +120,11 @@ _ROOT = re.compile(r"sqrt\(([A-Za-zµμ]+)\)|√([A-Za-zµμ]+)")
 
 
 _SPELLINGS = {
-    **{f"{prefix.lower()}bps": f"{prefix}bit/s" for prefix in ("", "k", "M", "G", "T")},
+    **{
+        f"{prefix.lower()}{rate}": f"{prefix}bit/s"
+        for prefix in ("", "k", "M", "G", "T")
+        for rate in ("bps", "b/s", "bit/s", "bits/s", "bit/sec", "bits/sec")
+    },
     **dict.fromkeys(("watt", "watts"), "W"),
     **dict.fromkeys(("meter", "meters", "metre", "metres"), "m"),
     **dict.fromkeys(("micron", "microns", "micrometer", "micrometers", "micrometre", "micrometres"), "um"),
@@ -130,7 +134,6 @@ _SPELLINGS = {
     **dict.fromkeys(("volt", "volts"), "V"),
     **dict.fromkeys(("sec", "secs", "second", "seconds"), "s"),
     **dict.fromkeys(("hertz", "cps"), "Hz"),
-    **dict.fromkeys(("bits/s", "bit/sec", "b/s"), "bit/s"),
 }
 """Units as they are often written, in small letters, and as they are read here."""
 

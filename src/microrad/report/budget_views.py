@@ -145,7 +145,9 @@ def sentences(study: LinkStudy) -> list[str]:
 def consequences(study: LinkStudy) -> list[str]:
     """What follows from the budgets that stands in no table: rates, swings, intensities, light, point-ahead."""
     m, found = study.file.mission, []
-    wanted = f"the required {m.requirement.margin_db:g} dB at {quantity(required_error_rad(m), 'rad')}"
+    error = quantity(required_error_rad(m), "rad")
+    at = f"the required {error}" if m.jitter is None else f"{error} under the jitter"
+    wanted = f"the required {m.requirement.margin_db:g} dB at {at}"
     if math.isnan(study.largest_rate_bit_s):
         found.append(f"No data rate has {wanted}.")
     else:
