@@ -292,7 +292,7 @@ OTHERWISE = {
     ),
     "misspelled": (
         {"orbit.leo.phases": "0 deg"},
-        ("orbit.leo.phases", '"0 deg"', "is no key of [orbit.leo]", "one of kind, altitude"),
+        ("orbit.leo.phases", "", "is no key of [orbit.leo]", "one of kind, altitude"),
     ),
 }
 

@@ -37,6 +37,27 @@ def the_fault(folder, *changes):
     return next(iter(found.items()))
 
 
+def test_a_fault_of_one_table_hides_none_of_what_lies_between_others(tmp_path):
+    holed = {**PATTERN, "terminals.leo_obscuration": 0.6, "communication.beam": {**GAUSSIAN, "radius": "2 mm"}}
+    found = faults(tmp_path, holed, received_with("preamplified dpsk", bandwidth="5 m"))
+    assert set(found) == {"communication.receiver.bandwidth", "communication.beam.radius"}
+    found = faults(tmp_path, holed, received_with("preamplified dpsk", detector="homodyne"))
+    assert set(found) == {"communication.receiver.detector", "communication.beam.radius"}
+    both = {"communication.receiver_sensitivity": "100 photon/bit", "communication.strehl": None}
+    found = faults(tmp_path, received_with("pin ook", bandwidth="5 m", dark_current=None), both)
+    assert set(found) == {
+        "communication.receiver.bandwidth",
+        "communication.receiver.dark_current",
+        "communication.receiver_sensitivity",
+        "communication.strehl",
+    }
+
+
+def test_a_misspelled_key_is_not_missed_as_well(tmp_path):
+    table = received_with("preamplified dpsk", noise_figure=None, noise_figur="4 dB")
+    assert the_fault(tmp_path, table)[0] == "communication.receiver.noise_figur"
+
+
 SLOW = "a number without quotes, at least 1e-18 and below 0.5"
 
 
@@ -341,6 +362,7 @@ def test_every_fault_of_a_file_is_told_at_once(tmp_path):
     assert set(found) == {
         "terminals.geo_obscuration",
         "conventions.pointing_loss",
+        "beacon.strehl",
         "beacon.transmit_power",
         "answer.strehl",
         "communication.strehl",

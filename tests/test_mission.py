@@ -403,7 +403,11 @@ def test_an_unknown_key_is_shown_with_the_nearest_and_not_missed_as_well(refuse)
 
 def test_an_unknown_key_like_no_other_lists_what_there_is(refuse):
     fault = the_fault(refuse(TEXT.replace("[scenario]\n", '[scenario]\nzzz = "1 V"\n')))
-    assert (fault.key, fault.nearest, fault.value) == ("scenario.zzz", "", '"1 V"')
+    assert (fault.key, fault.nearest, fault.value) == (
+        "scenario.zzz",
+        "",
+        "",
+    )  # what a file of ours does not have is not quoted
     assert "amplitude, pid_frequencies" in fault.expected
 
 
@@ -554,8 +558,49 @@ def test_dots_that_are_no_key_are_left_alone():
 def test_a_line_that_is_no_toml_is_named(refuse, line):
     text = TEXT.replace("[answer]\n", f"[answer]\n{line}\n") if line != "[answer" else TEXT.replace("[answer]", line)
     fault = the_fault(refuse(text))
-    assert fault.line == text.split("\n").index(line) + 1
-    assert line in fault.value
+    assert (fault.line, fault.value) == (text.split("\n").index(line) + 1, "")
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "hunter2\nroot:hunter2:0\n",
+        "PASSWORD=hunter2\nTOKEN = 'hunter2\n",
+        '[default]\nkey = "hunter2"\nkeys = [{a = "hunter2"}]\n',
+        "-----BEGIN KEY-----\nhunter2==\n[hunter2\n",
+    ],
+)
+def test_the_lines_of_a_file_that_is_none_of_ours_are_not_quoted(tmp_path, text):
+    """A mission names its mirror file, and whoever reads the faults need not be who may read that file."""
+    (tmp_path / "secret").write_text(text, encoding="utf-8")
+    with pytest.raises(MissionError) as refused:
+        load_mission(tmp_path / "m.toml", text=f'{NO_MIRROR}[mirror]\nfile = "secret"\n{REST}')
+    lines = {fault.line for fault in refused.value.faults if fault.line}
+    assert "hunter2" not in str(refused.value)
+    assert lines
+    assert all(f"secret, line {line}" in str(refused.value) for line in lines)
+
+
+@pytest.mark.parametrize(
+    ("given", "apart"),
+    [
+        ("r\u0430ndom", "holds U+0430 (CYRILLIC SMALL LETTER A)"),
+        ("random\ufe0f", "holds U+FE0F (VARIATION SELECTOR-16)"),
+        ("random ", "begins or ends with a blank"),
+    ],
+)
+def test_a_choice_that_looks_like_what_is_meant_is_told_apart(refuse, given, apart):
+    """The hint read: class = "random" is none of the choices, did you mean "random"?"""
+    fault = the_fault(refuse(TEXT.replace('class = "random"', f'class = "{given}"')))
+    assert (fault.reason, fault.nearest) == (f"is none of the choices, it {apart}", '"random"')
+
+
+def test_a_key_that_looks_like_what_is_meant_is_told_apart(refuse):
+    fault = the_fault(refuse(TEXT.replace("transverse_velocity = ", '"tr\u0430nsverse_velocity" = ')))
+    assert (fault.reason.partition(", ")[2], fault.nearest) == (
+        "it holds U+0430 (CYRILLIC SMALL LETTER A)",
+        "transverse_velocity",
+    )
 
 
 # ---- files that are none

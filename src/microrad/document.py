@@ -7,7 +7,8 @@ parser is noted as a fault and blanked out, so that the rest is parsed and every
 import hashlib
 import re
 import tomllib
-from collections.abc import Iterable, Mapping
+import unicodedata
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal, Self
@@ -25,6 +26,8 @@ _MAX_DEPTH = 16
 _MAX_KEY = 200
 _MAX_PARTS = re.compile(r"""(?<![\w-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){50}""")  # of a key
 _MAX_NUMBER = 400
+_NO_TOML = "is not TOML"
+_LINES = 'key = "value", [table] or # comment'
 
 
 # ------------------------------------------------------------------------------------------------------------- faults
@@ -85,6 +88,14 @@ def clipped(text: str) -> str:
     """Text fit for a report: shortened, control characters escaped."""
     short = text if len(text) <= _MAX_VALUE_SHOWN * 2 else text[:_MAX_VALUE_SHOWN] + "…"
     return "".join(c if c.isprintable() else f"\\u{ord(c):04x}" for c in short)
+
+
+def _apart(given: str, meant: str) -> str:
+    """What sets a text apart from one that it may look the same as: another script's letter, a blank at an end."""
+    other = next((c for c in given if not c.isascii() and c not in meant), "")
+    if other:
+        return f", it holds U+{ord(other):04X} ({unicodedata.name(other, 'a character without a name')})"
+    return "" if given == given.strip() else ", it begins or ends with a blank"
 
 
 # ------------------------------------------------------------------------------------------------------------ scanner
@@ -216,12 +227,14 @@ class Document:
 
     `label` is what a reader calls it ("mission file"). `prefix` is the table that the root of the file stands for, ""
     or "mirror"; keys are full ones everywhere. `damaged` keys were blanked out for a fault of their own and are not
-    missed again. `inner` holds the documents that stand for a whole table.
+    missed again. `inner` holds the documents that stand for a whole table. `names` are those of the keys that such a
+    file has; what stands behind another one is not quoted, as it may be no file of ours. None is any name.
     """
 
     path: Path
     label: str
     prefix: str
+    names: Collection[str] | None = None
     text: str = ""
     sha256: str = ""
     statements: dict[str, Statement] = field(default_factory=dict)
@@ -231,31 +244,42 @@ class Document:
     inner: "dict[str, Document]" = field(default_factory=dict)
 
     @classmethod
-    def read(cls, path: Path, label: str, prefix: str = "") -> Self:
+    def read(cls, path: Path, label: str, prefix: str = "", names: Collection[str] | None = None) -> Self:
         """Read, scan and parse a file.
 
         Raises `UnreadableError` when it is no text, and `MissionError` when nothing in it can be parsed.
         """
-        return cls.of(_content(path), path, label, prefix)
+        return cls.of(_content(path), path, label, prefix, names)
 
     @classmethod
-    def of(cls, content: bytes, path: Path, label: str, prefix: str = "") -> Self:
+    def of(cls, content: bytes, path: Path, label: str, prefix: str = "", names: Collection[str] | None = None) -> Self:
         """Scan and parse what a file holds, or would hold if it were written to `path`.
 
         Raises what `read` raises.
         """
-        document = cls(path, label, prefix, _decoded(content), hashlib.sha256(content).hexdigest())
+        document = cls(path, label, prefix, names, _decoded(content), hashlib.sha256(content).hexdigest())
         _Parser(document).run()
         return document
 
     def fault(self, key: str, value: str, reason: str, expected: str, *, line: int = 0, nearest: str = "") -> None:
-        """Note a fault on the line of its key, or of the nearest table above it."""
+        """Note a fault on the line of its key, or of the nearest table above it.
+
+        `nearest` is in quotes where it stands for the value.
+        """
         holder = self.holder(key)
+        if nearest:
+            given = value[1:-1] if nearest.startswith('"') else key.rpartition(".")[2]
+            reason += _apart(given, nearest)
         found = holder.statement(key)
         line = line or (found.line if found else 0)
         if len(holder.faults) < _MAX_FAULTS:
             file = clipped(str(holder.path))
-            holder.faults.append(Fault(clipped(key), value, line, reason, expected, nearest, file))
+            quoted = value if holder.has(key) else ""
+            holder.faults.append(Fault(clipped(key), quoted, line, reason, expected, nearest, file))
+
+    def has(self, key: str) -> bool:
+        """Whether a file of this kind has keys of this name."""
+        return self.names is None or key.rpartition(".")[2] in self.names
 
     def holder(self, key: str) -> "Document":
         """The document that a key stands in."""
@@ -360,6 +384,11 @@ class _Parser:
     def _note(self, statement: Statement, reason: str, expected: str) -> None:
         value = "" if statement.kind == "table" else clipped(statement.value)
         key = "" if statement.kind == "broken" else statement.key
+        if not self.document.has(statement.key):
+            own = key.removeprefix(f"{self.document.prefix}.")
+            key = key if any(map(self.document.has, own.split("."))) else ""
+            if statement.kind == "broken" or reason.startswith(_NO_TOML):  # both texts may quote the line
+                reason, expected = reason.partition(":")[0], _LINES
         self.document.fault(key, value, reason, expected, line=statement.line)
 
     def _blank(self, place: int) -> int:
@@ -380,7 +409,7 @@ class _Parser:
         # the parser stops behind an unclosed value: to blame is the last statement that began and still stands
         standing = [p for p, s in enumerate(self.statements) if s.line <= line and self.lines[s.line - 1].strip()]
         if not standing:
-            self.document.fault("", "", f"is not TOML: {error}", "lines of key = value", line=line)
+            self.document.fault("", "", f"{_NO_TOML}: {error}", "lines of key = value", line=line)
             raise MissionError(self.document.path, self.document.faults)
         statement = self.statements[standing[-1]]
         self._note(statement, *_syntax_advice(statement, re.sub(r" \(at .*\)$", "", str(error))))
@@ -397,7 +426,7 @@ def _trouble(statement: Statement, first: Statement) -> tuple[str, str] | None:
     if statement.kind == "broken":
         return "is no table header", f"[{clipped(statement.key)}]"
     if statement.kind == "junk":
-        return "is neither a key with its value nor a table header", 'key = "value", [table] or # comment'
+        return "is neither a key with its value nor a table header", _LINES
     if not statement.closed:
         return "has a bracket that is not closed", "a closing bracket before the next key"
     return None
@@ -422,5 +451,5 @@ def _syntax_advice(statement: Statement, detail: str) -> tuple[str, str]:
     if statement.kind == "key" and not statement.value:
         return "has no value", f'{name} = "value"'
     if statement.kind == "key" and re.match(r"[^\"'\[{]", statement.value):
-        return f"is not TOML: {detail}", f'text in quotes: {name} = "{clipped(statement.value)}"'
-    return f"is not TOML: {detail}", "quotes and brackets closed, and one key = value on a line"
+        return f"{_NO_TOML}: {detail}", f'text in quotes: {name} = "{clipped(statement.value)}"'
+    return f"{_NO_TOML}: {detail}", "quotes and brackets closed, and one key = value on a line"

@@ -220,13 +220,14 @@ class Receiver(Table):
                 wanted |= {"optical_bandwidth": '"20 GHz"', "amplifier_gain": '"35 dB"'}
         if self.background is None and self.detector not in ("homodyne", "preamplified"):
             wanted["background_power"] = '"0 pW"'
-        for name, info in type(self).model_fields.items():
+        optional = {name: info for name, info in type(self).model_fields.items() if not info.is_required()}
+        for name, info in optional.items():
             key, present = info.alias or name, getattr(self, name) is not None
             if key in wanted and not present:
                 yield Problem(key, f"is missing, and {what} needs it", f"{key} = {wanted[key]} would do")
             if key == "background_power" and present and self.background is not None:
                 yield Problem(key, "stands beside the table background", "one of the two removed")
-            elif not info.is_required() and present and key not in (*wanted, "background"):
+            elif present and key not in (*wanted, "background"):
                 yield Problem(key, f"does not belong to {what}", "this line removed")
         if self.order is not None and self.order & (self.order - 1):
             yield Problem("order", "is no power of two", "order = 16 would do")

@@ -2,12 +2,14 @@
 
 import contextlib
 import difflib
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
-from typing import Any, Literal, TypeVar, get_args, get_origin
+from types import UnionType
+from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin
 
-from pydantic import ValidationError
+from pydantic import TypeAdapter, ValidationError
 from pydantic.fields import FieldInfo
 
 from microrad.document import Document, Fault, MissionError, UnreadableError, clipped, shown
@@ -172,9 +174,10 @@ def assumptions(mission_file: LinkFile) -> tuple[tuple[str, str, str], ...]:
 # --------------------------------------------------------------------------------------------------------------- files
 def _open(path: Path, label: str, prefix: str, text: str | None = None) -> Document:
     try:
+        names = _names_within(Mirror if prefix else Mission) | {"file"}
         if text is not None:
-            return Document.of(text.encode("utf-8", "surrogatepass"), path, label, prefix)
-        return Document.read(path, label, prefix)
+            return Document.of(text.encode("utf-8", "surrogatepass"), path, label, prefix, names)
+        return Document.read(path, label, prefix, names)
     except UnreadableError as error:
         fault = Fault("", "", 0, f"the {label} {error.reason}", error.expected, file=clipped(str(path)))
         raise MissionError(path, [fault]) from None
@@ -259,23 +262,26 @@ def check_table(document: Document, model: type[_T], data: Mapping[str, Any]) ->
         return model.model_validate(data)
     except ValidationError as error:
         details = error.errors(include_url=False)
-    _Report(document, model).note(details)
-    if issubclass(model, LinkMission):
-        _check_relations(document, model, data)
+    report = _Report(document, model)
+    report.note(details)
+    if isinstance(data, dict):
+        sound = report.sound(model, data)
+        if issubclass(model, LinkMission):
+            _check_relations(document, model, sound)
     return None
 
 
-def _check_relations(document: Document, model: type[LinkMission], data: Mapping[str, Any]) -> None:
-    """Note what does not fit between those tables that are in order each by itself."""
-    tables: dict[str, Table] = {}
-    for name in {name for names, _ in model.relations() for name in names} & data.keys():
-        with contextlib.suppress(ValidationError):
-            tables[name] = _table_at(model, (name,)).model_validate(data[name])
-    absent = {name for name, info in model.model_fields.items() if not info.is_required()} - data.keys()
+def _check_relations(document: Document, model: type[LinkMission], sound: Table) -> None:
+    """Note what does not fit between tables, as far as they are in order."""
     for names, check in model.relations():
-        if all(name in tables or name in absent for name in names):
-            for problem in check(*(tables.get(name) for name in names)):
-                _note_problem(document, problem.key, problem, "")
+        for problem in _as_far(check, sound, names):
+            _note_problem(document, problem.key, problem, "")
+
+
+def _as_far(check: Callable[..., Iterator[Problem]], sound: Table, names: Iterable[str] = ()) -> Iterator[Problem]:
+    """The problems of what is in order, as far as they can be told: the rest is no attribute of it."""
+    with contextlib.suppress(AttributeError):
+        yield from check(*(getattr(sound, name) for name in names))
 
 
 def _note_problem(document: Document, key: str, problem: Problem, value: str) -> None:
@@ -304,6 +310,41 @@ class _Report:
             self.document.fault(key, "", "is missing", _expected(self._table(location), str(location[-1])))
         for detail in (detail for details in by_kind.values() for detail in details):
             self._note_value(detail)
+
+    def sound(self, table: type[Table], data: Mapping[str, Any], at: _Location = ()) -> Table:
+        """What of a table is in order; the rest is no attribute of it. What does not fit together there is noted.
+
+        Pydantic asks a table whether it fits together when all of its keys are in order, and no sooner.
+        """
+        try:
+            return table.model_validate(data)
+        except ValidationError as error:
+            details = error.errors(include_url=False)
+        wrong = {str(detail["loc"][0]) for detail in details if detail["loc"]}
+        absent = _keys_of(table) - data.keys()
+        meant = {_nearest(key, absent) for key in data.keys() - _keys_of(table)}
+        values: dict[str, Any] = {}
+        for name, info in table.model_fields.items():
+            key = info.alias or name
+            inner = _table_at(table, (key,))
+            if key in absent:
+                if not (info.is_required() or key in meant or self._is_damaged(self._key((*at, key)))):
+                    values[name] = info.get_default()
+            elif isinstance(data[key], dict) and inner in _kinds(info):
+                values[name] = self.sound(inner, data[key], (*at, key))
+            elif key not in wrong:
+                kind: Any = Annotated[info.annotation, *info.metadata] if info.metadata else info.annotation
+                values[name] = TypeAdapter(kind).validate_python(data[key])
+        found = table.model_construct()
+        found.__dict__.clear()
+        found.__dict__.update(values)
+        problems = [] if issubclass(table, LinkMission) else list(_as_far(found.problems, found))
+        for problem in problems:
+            key = problem.key.partition(".")[0]
+            found.__dict__.pop(next((n for n, i in table.model_fields.items() if (i.alias or n) == key), ""), None)
+            if wrong:  # else pydantic has told it
+                _note_problem(self.document, self._key((*at, *problem.key.split("."))), problem, "")
+        return found
 
     def _key(self, location: _Location) -> str:
         return _dotted(self.document.prefix, location)
@@ -336,9 +377,9 @@ class _Report:
                 self.model, LinkMission
             ):  # those of the whole mission are left to _check_relations
                 for problem in cause.problems:
-                    _note_problem(
-                        self.document, _dotted(key, (problem.key,)), problem, "" if problem.key else shown(value)
-                    )
+                    whole = _dotted(key, (problem.key,))
+                    if not self._is_damaged(whole):
+                        _note_problem(self.document, whole, problem, "" if problem.key else shown(value))
         elif isinstance(cause, UnitError):
             line = _line(location[-1], cause.example)
             self.document.fault(key, shown(value), cause.reason, f"{cause.expected}; for example {line}")
@@ -372,8 +413,20 @@ def _keys_of(table: type[Table]) -> list[str]:
     return [info.alias or name for name, info in table.model_fields.items()]
 
 
+@cache
+def _names_within(table: type[Table]) -> frozenset[str]:
+    """Every key of a table and of those within it."""
+    inner = (_table_at(table, (key,)) for key in _keys_of(table))
+    return frozenset(_keys_of(table)).union(*(_names_within(each) for each in inner if each is not table))
+
+
 def _info(table: type[Table], key: str) -> FieldInfo | None:
     return next((info for name, info in table.model_fields.items() if (info.alias or name) == key), None)
+
+
+def _kinds(info: FieldInfo) -> tuple[Any, ...]:
+    """What a key may hold: its kind, or those of a union."""
+    return get_args(info.annotation) if get_origin(info.annotation) in (Union, UnionType) else (info.annotation,)
 
 
 def _table_at(table: type[Table], location: _Location) -> type[Table]:
