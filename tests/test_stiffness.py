@@ -1,5 +1,6 @@
 """One mirror for all amplitudes: exact derivatives, recovery of a known mirror, the real CubeSpec mirror, refusals."""
 
+import itertools
 import os
 from dataclasses import replace
 from pathlib import Path
@@ -9,7 +10,7 @@ import pytest
 
 from microrad import kernels, mirror
 from microrad.hysteresis import Play
-from microrad.identify import fit_hysteretic_stiffness, fit_linear, output_error, predicted_error
+from microrad.identify import fit_hysteretic_stiffness, fit_linear, output_error, predicted_error, stiffness
 from microrad.identify import stiffness_tangents as tangents
 from microrad.identify.records import IdentificationError
 from microrad.identify.stiffness import StiffnessOptions, simulate_hysteretic_stiffness
@@ -225,6 +226,46 @@ def test_the_resonance_falls_with_the_amplitude_as_the_truth_does(known):
     assert gains(lambda drive: simulate_hysteretic_stiffness(known[0], drive)) == pytest.approx(
         rise, abs=0.2 * (rise - 1)
     )
+
+
+def growths(fit):
+    """Largest real part of a pole with the plays of each operator stuck or sliding."""
+    m, sums = fit.mirror, [sum(play.weights_rad_v) for play in fit.mirror.plays]
+    cases = itertools.product((0.0, 1.0), repeat=len(sums))
+    return [np.linalg.eigvals(m.A + m.E @ np.diag(np.multiply(case, sums)) @ m.F).real.max() for case in cases]
+
+
+def test_no_fit_runs_away_where_its_plays_slide(training):
+    """Two modes too many: one of them grew where one operator slid, and the fit was taken for converged."""
+    options = StiffnessOptions(delay_s=7e-4, exchanges=0)
+    fit = fit_hysteretic_stiffness(training, order=8, options=options, iterations=15)
+    assert len(growths(fit)) == 16
+    assert max(growths(fit)) < 0.0
+    assert fit.costs[-1] < 0.03 * fit.costs[0]
+
+
+def test_a_mirror_that_runs_away_is_refused(training, monkeypatch):
+    """The play that slides takes more than the stiffness there is: x' = (A + E W F) x has a pole above 0."""
+
+    def run(search, start, *_):
+        search.numbers = replace(start, weights=500 * start.weights)
+
+    monkeypatch.setattr(stiffness._Search, "run", run)
+    with pytest.raises(IdentificationError, match=r"runs away: where its plays slide it grows by \d.* 1/s.*order"):
+        fit_hysteretic_stiffness(training, order=4, options=StiffnessOptions(delay_s=7e-4, exchanges=0))
+
+
+def test_stuck_and_sliding_plays_in_all_their_combinations(numbers):
+    m, sums = numbers.mirror("m"), numbers.weights.sum(axis=1)
+    each = [
+        np.linalg.eigvals(m.A + m.E @ np.diag(sums * case) @ m.F).real.max()
+        for case in itertools.product((0, 1), repeat=4)
+    ]
+    assert numbers.growth_1_s == pytest.approx(max(each), rel=1e-9)
+    assert max(each) > max(each[0], each[-1])
+    none, wide = np.zeros((7, 3)), np.zeros((4, 7))
+    many = replace(numbers, weights=none, thresholds=none, E=wide, F=wide.T, G=np.zeros((7, 2)), K=np.zeros((2, 7)))
+    assert many.growth_1_s == pytest.approx(-30.0)
 
 
 def test_a_delay_that_is_given_is_kept(training):

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 from typing import Literal
 
 import numpy as np
@@ -29,6 +30,7 @@ FIELDS = ("decay", "frequency", "B", "E", "F", "G", "weights", "C", "D", "K")
 _DELAYS = np.arange(0.0, 2.01, 0.25)
 _FIRST_WEIGHT = 1e-3
 _QUASI_STATIC = 0.1
+_MOST_COMBINED = 6
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,6 +84,20 @@ class Numbers:
             parts[name] = vector[start : start + size].reshape(shape).copy()
             start += size
         return replace(self, **parts, delay_s=float(vector[start]))
+
+    @property
+    def growth_1_s(self) -> float:
+        """Largest real part of a pole, the plays of each operator all stuck or all sliding.
+
+        Plays that slide follow q, so that z = W q with W the sum of their weights and x' = (A + E W F) x. Above 0 a
+        large drive starts what no drive stops. All combinations are tried for up to `_MOST_COMBINED` operators, and
+        all stuck and all sliding beyond.
+        """
+        sums, A = self.weights.sum(axis=1), self.mirror("").A
+        each = product((0.0, 1.0), repeat=sums.size)
+        cases = list(each) if sums.size <= _MOST_COMBINED else [(0.0,) * sums.size, (1.0,) * sums.size]
+        sliding = A + (self.E * (np.array(cases) * sums)[:, None, :]) @ self.F
+        return float(np.linalg.eigvals(sliding).real.max())
 
     def mirror(self, name: str) -> Mirror:
         """The mirror in the plant form, without its delay."""
