@@ -13,9 +13,11 @@ import sys
 import time
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 import typer
+from nptdms import ChannelObject, TdmsWriter
 
 import microrad
 from command_line import listing
@@ -554,6 +556,39 @@ def test_identify_refusals(refused, folder, change, words):
     message = " ".join(refused("identify", write_recording(folder / "loop.csv"), *COLUMNS, *change).split())
     for word in words:
         assert word in message
+
+
+HOSTILE = "be\x1b[31mnch/dr\x9bive\u202e"
+
+
+def hostile_hdf5(path):
+    with h5py.File(path, "w") as file:
+        file[HOSTILE] = np.arange(100.0)
+
+
+def hostile_tdms(path):
+    with TdmsWriter(path) as file:
+        file.write_segment([ChannelObject(*HOSTILE.split("/"), np.arange(100.0), {"wf_increment": 0.001})])
+
+
+def hostile_csv(path):
+    path.write_text(HOSTILE + ",angle\n" + "".join(f"{k},{k}\n" for k in range(100)), "utf-8")
+
+
+@pytest.mark.parametrize(
+    ("write", "name"), [(hostile_hdf5, "a.h5"), (hostile_tdms, "a.tdms"), (hostile_csv, "a\x1b[31m.csv")]
+)
+def test_names_from_files_reach_the_terminal_spelled_out(refused, folder, write, name):
+    write(folder / name)
+    message = refused("identify", folder / name, "--input", "nope", "--output", "angle", "--static")
+    assert "ive\\u202e'" in message
+    assert all(c.isprintable() or c == "\n" for c in message)
+
+
+def test_what_is_printed_is_spelled_out_but_for_pages(capsys):
+    assert frame._printed("a\x1b[2J\tb\u00a0c\n", 0) == 0
+    assert frame._printed("<!doctype html>\x01\n", 0) == 0
+    assert capsys.readouterr().out == "a\\u001b[2J\tb\u00a0c\n\n<!doctype html>\x01\n\n"
 
 
 def test_identify_refuses_files_that_are_no_recordings(refused, folder):

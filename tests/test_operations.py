@@ -482,6 +482,11 @@ def test_names_come_back_from_the_csv_and_none_is_a_formula(name):
     assert row[0][0] not in "=+-@\t\r\n"
 
 
+def test_names_in_the_csv_steer_no_terminal():
+    row = list(csv.reader(io.StringIO(csv_text([planned(satellite="a\x1b[31m", relay="b\u202e")], utc))))[1]
+    assert row[:2] == ["a\\u001b[31m", "b\\u202e"]
+
+
 def read_plan(text):
     """Reference, contacts and ranges as ionadmin reads them: words between blanks, comments skipped, whole numbers."""
     reference, contacts, ranges = None, [], []

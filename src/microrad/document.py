@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any, Literal, Self
 
 from microrad.folder import read_bytes
+from microrad.units import printable
 
 MAX_BYTES = 1_000_000
 MAX_LINES = 10_000
@@ -86,8 +87,7 @@ def shown(value: object) -> str:
 
 def clipped(text: str) -> str:
     """Text fit for a report: shortened, control characters escaped."""
-    short = text if len(text) <= _MAX_VALUE_SHOWN * 2 else text[:_MAX_VALUE_SHOWN] + "…"
-    return "".join(c if c.isprintable() else f"\\u{ord(c):04x}" for c in short)
+    return printable(text if len(text) <= _MAX_VALUE_SHOWN * 2 else text[:_MAX_VALUE_SHOWN] + "…")
 
 
 def _apart(given: str, meant: str) -> str:

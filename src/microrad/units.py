@@ -19,6 +19,9 @@ PLANCK_J_S = 6.626_070_15e-34
 ELEMENTARY_CHARGE_C = 1.602_176_634e-19
 """Charge of one electron, exact by the definition of the ampere (SI brochure, 9th edition)."""
 
+BLANKS = "\t\n\u00a0\u202f"
+"""Blanks that do no harm where a text has several lines."""
+
 _MAX_CHARACTERS = 60
 _MAX_DECIBEL = 1000.0  # beyond it the linear value leaves the range of a float
 
@@ -235,9 +238,13 @@ def _scale_of_text(symbol: str, number: str, unit: str) -> _Scale:
         raise _RefusedError(f"has {_quoted(symbol)} where a unit should stand: {error}") from None
 
 
+def printable(text: str, kept: str = "") -> str:
+    """The text with every character spelled out that would steer a terminal or cannot be seen, but for those kept."""
+    return "".join(c if c.isprintable() or c in kept else f"\\u{ord(c):04x}" for c in text)
+
+
 def _quoted(text: str) -> str:
-    shown = text if len(text) <= _MAX_CHARACTERS else text[:_MAX_CHARACTERS] + "…"
-    return '"' + "".join(c if c.isprintable() else f"\\u{ord(c):04x}" for c in shown) + '"'
+    return f'"{printable(text if len(text) <= _MAX_CHARACTERS else text[:_MAX_CHARACTERS] + "…")}"'
 
 
 def _bare(value: object) -> str:

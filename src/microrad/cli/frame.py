@@ -28,6 +28,8 @@ from typing import Annotated, Any, NoReturn, ParamSpec
 
 import typer
 
+from microrad.units import BLANKS, printable
+
 MET, UNMET, REFUSED, BUG, INTERRUPTED, UNREAD = 0, 1, 2, 70, 130, 141
 
 PROGRESS_FILE = "MICRORAD_PROGRESS"
@@ -151,9 +153,12 @@ def command(body: Callable[_Arguments, Outcome]) -> Callable[_Arguments, NoRetur
 
 
 def _printed(text: str, code: int) -> int:
-    """Print a text and return the exit code that there was, or the one for an output that nobody takes."""
+    """Print a text and return the exit code that there was, or the one for an output that nobody takes.
+
+    A page is printed as it is; in all else is spelled out what a name from a file would do to a terminal.
+    """
     try:
-        print(text, flush=True)
+        print(text if text.startswith("<!") else printable(text, BLANKS), flush=True)
     except BrokenPipeError:
         _close_stdout()
         return UNREAD
@@ -176,7 +181,7 @@ def _close_stdout() -> None:
 # ------------------------------------------------------------------------------------------------------------ failures
 def say(message: str) -> None:
     """One line to the user, on stderr."""
-    print(f"microrad: {message}", file=sys.stderr)
+    print(f"microrad: {printable(message, BLANKS)}", file=sys.stderr)
 
 
 def _failed(error: BaseException) -> int:

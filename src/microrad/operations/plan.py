@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from microrad.operations.base import OperationsError, check_number, check_positive, check_span
-from microrad.units import SPEED_OF_LIGHT_M_S
+from microrad.units import BLANKS, SPEED_OF_LIGHT_M_S, printable
 
 Utc = Callable[[float], str]
 """ISO 8601 text in UTC, such as 2026-03-20T12:00:00.000Z, of a time in s since the mission's epoch."""
@@ -112,8 +112,11 @@ def _number(value: float) -> str:
 
 
 def spreadsheet_text(name: str) -> str:
-    """A name that no spreadsheet takes for a formula; an apostrophe in front can be taken off again."""
-    return "'" + name if name.startswith(_FORMULA) else name
+    """A name that no spreadsheet takes for a formula; an apostrophe in front can be taken off again.
+
+    What would steer a terminal is spelled out.
+    """
+    return printable("'" + name if name.startswith(_FORMULA) else name, BLANKS + "\r")
 
 
 def contact_plan(

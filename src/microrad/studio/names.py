@@ -7,6 +7,8 @@ import re
 import unicodedata
 from pathlib import Path
 
+from microrad.units import printable
+
 MAX_NAME_BYTES = 160
 
 _DEVICE = re.compile(r"(con|prn|aux|nul|conin\$|conout\$|(com|lpt)[0-9¹²³])\s*(\..*)?", re.IGNORECASE | re.DOTALL)
@@ -21,7 +23,7 @@ class NameRefusedError(ValueError):
 
 def shown(name: str) -> str:
     """The name for a message: what does not print is spelled out, and a long one is cut."""
-    text = "".join(c if c.isprintable() else f"\\u{ord(c):04x}" for c in name[:60])
+    text = printable(name[:60])
     return f"'{text}...'" if len(name) > 60 else f"'{text}'"
 
 
