@@ -13,6 +13,7 @@ import lvm_read
 import numpy as np
 import pytest
 from nptdms import ChannelObject, TdmsWriter
+from nptdms.log import log_manager
 from scipy.io import savemat
 from scipy.sparse import csc_array
 
@@ -56,6 +57,29 @@ def test_tdms(tmp_path):
     check(read, ("bench/drive", "bench/output"))
     assert read.input_units == ("V",)
     check(read_recording(path, 0, 1, RATE_HZ), ("bench/drive", "bench/output"))
+
+
+@pytest.fixture
+def library_says(monkeypatch):
+    """What npTDMS writes to stderr, which it keeps from when it is imported."""
+    monkeypatch.setattr(log_manager.console_handler, "stream", io.StringIO())
+    return log_manager.console_handler.stream
+
+
+def test_tdms_of_a_scale_that_is_not_known_is_refused(tmp_path, library_says):
+    """The library warns of it and gives the numbers of the converter in place of volts."""
+    scale = {"NI_Number_Of_Scales": 1, "NI_Scale[0]_Scale_Type": "Magic", "NI_Scaling_Status": "unscaled"}
+    message = refusal(tdms(tmp_path / "a.tdms", more={"drive": scale}), "drive", "output")
+    assert "not as they were recorded (Unsupported scale type: Magic)" in message
+    assert library_says.getvalue() == ""
+
+
+def test_tdms_with_a_name_that_is_no_text_is_read_in_silence(tmp_path, library_says):
+    """The library wrote to stderr for each such name, with bytes of the file."""
+    path = tdms(tmp_path / "a.tdms")
+    path.write_bytes(path.read_bytes().replace(b"unit_string", b"unit_\xfftring"))
+    check(read_recording(path, "drive", "output"), ("bench/drive", "bench/output"))
+    assert library_says.getvalue() == ""
 
 
 def test_tdms_ignores_a_stale_index(tmp_path):

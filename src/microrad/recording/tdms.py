@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import logging
 import struct
+import threading
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -22,6 +23,7 @@ _LEAD_IN = 28
 _INCOMPLETE = 0xFFFF_FFFF_FFFF_FFFF
 _VERSIONS = (4712, 4713)
 _BIG_ENDIAN = 1 << 6
+_OF_NUMBERS = ("Cropping data", "Data size", "Last segment", "Unsupported scale type")
 
 
 class TdmsSource(Container):
@@ -34,13 +36,14 @@ class TdmsSource(Container):
             import nptdms  # noqa: F401
         except ImportError:
             raise missing_library(path, "a TDMS file", "npTDMS") from None
-        logging.getLogger("nptdms").setLevel(logging.ERROR)
         unusable: dict[str, str] = {}
         try:
             with _opened(path) as tdms:
                 raw = dict(_channels(tdms, unusable))
                 channels = tuple(_channel(path, name, channel) for name, channel in raw.items())
                 self._starts = {name: _start(channel) for name, channel in raw.items()}
+        except RecordingError:
+            raise
         except Exception as error:  # the library raises whatever its parser stumbles over
             raise damaged(path, "a TDMS file", error) from None
         super().__init__(path, "TDMS", channels, sha256_of(path), unusable)
@@ -67,13 +70,42 @@ class TdmsSource(Container):
                 )
 
 
+class _Listener(logging.Handler):
+    """Keeps what the library warns of in this thread, where it says that numbers are not as they were recorded."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.thread = threading.get_ident()
+        self.heard: list[str] = []
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Take in a warning; those of names and versions change no number."""
+        if record.thread == self.thread and str(record.msg).startswith(_OF_NUMBERS):
+            self.heard.append(record.getMessage())
+
+
 @contextmanager
 def _opened(path: Path) -> Iterator[Any]:
-    """The file, opened: given its path, the library would believe an old .tdms_index beside it."""
-    from nptdms import TdmsFile
+    """The file, opened: given its path, the library would believe an old .tdms_index beside it.
 
-    with path.open("rb") as file, TdmsFile.open(file) as tdms:
-        yield tdms
+    Its warnings are not printed. Raises `RecordingError` at the end where one says that numbers are in doubt.
+    """
+    from nptdms import TdmsFile
+    from nptdms.log import log_manager
+
+    log_manager.console_handler.setLevel(logging.CRITICAL)
+    library, listener = logging.getLogger("nptdms"), _Listener()
+    library.addHandler(listener)
+    try:
+        with path.open("rb") as file, TdmsFile.open(file) as tdms, np.errstate(all="ignore"):
+            yield tdms
+    finally:
+        library.removeHandler(listener)
+    if listener.heard:
+        raise RecordingError(
+            f"{path}: the numbers of the TDMS file are not as they were recorded ({listener.heard[0]}); save it again "
+            "from LabVIEW with scaled numbers, or export it as text."
+        )
 
 
 def _start(channel: Any) -> tuple[np.datetime64, float] | None:
