@@ -1,10 +1,24 @@
-"""What a file holds, read without a wait for one that never ends."""
+"""What a file holds, read without a wait for one that never ends; what killed processes leave behind."""
 
 import os
+import subprocess
+import sys
+import tempfile
 
 import pytest
 
-from microrad.folder import read_bytes
+from microrad import folder
+from microrad.folder import read_bytes, scratch, whole_folder
+
+KILLED = """
+import os, signal, sys
+from pathlib import Path
+from microrad.folder import scratch, whole_folder
+with scratch("test") as one, whole_folder(Path(sys.argv[1]), False) as two:
+    (one / "a").write_text("a")
+    (two / "b").write_text("b")
+    os.kill(os.getpid(), signal.SIGKILL)
+"""
 
 
 def test_as_many_bytes_as_are_asked_for(tmp_path):
@@ -23,3 +37,34 @@ def test_a_file_whose_content_never_comes_is_refused_at_once(tmp_path):
         pytest.raises(BlockingIOError, match="no file on disk"),
     ):
         read_bytes(path, 10)
+
+
+@pytest.mark.skipif(os.name != "posix", reason="elsewhere no process can be asked for by its number without harm")
+def test_what_a_killed_process_left_is_gone_with_the_next_run(tmp_path, monkeypatch):
+    environment = {**os.environ, "TMPDIR": str(tmp_path)}
+    subprocess.run([sys.executable, "-c", KILLED, tmp_path / "results"], env=environment, check=False)
+    left = {path.name for path in tmp_path.iterdir()}
+    assert len(left) == 2
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    for name in ("microrad-other", "results", "microrad-test-x-1-y"):
+        (tmp_path / name).mkdir()
+    kept = {"microrad-other", "results", "microrad-test-x-1-y"}
+    with scratch("test") as own, scratch("test") as another, whole_folder(tmp_path / "results", False) as draft:
+        own_names = {own.name, another.name, draft.name}
+        assert {path.name for path in tmp_path.iterdir()} == own_names | kept  # its own are alive
+        assert not left & own_names
+    assert {path.name for path in tmp_path.iterdir()} == kept
+
+
+@pytest.mark.skipif(os.name != "posix", reason="elsewhere no process can be asked for by its number without harm")
+def test_only_folders_of_the_same_user_are_taken_for_left_behind(tmp_path, monkeypatch):
+    gone = subprocess.Popen([sys.executable, "-c", ""])
+    gone.wait()
+    (tmp_path / "folder").mkdir()
+    (tmp_path / "link").symlink_to(tmp_path / "folder")
+    assert folder._left_behind(tmp_path / "folder", gone.pid)
+    assert not folder._left_behind(tmp_path / "folder", os.getpid())
+    assert not folder._left_behind(tmp_path / "link", gone.pid)
+    assert not folder._left_behind(tmp_path / "lost", gone.pid)
+    monkeypatch.setattr(os, "getuid", lambda: -1)
+    assert not folder._left_behind(tmp_path / "folder", gone.pid)

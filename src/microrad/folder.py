@@ -5,11 +5,14 @@ And what a file holds, without a wait for one that never ends.
 
 import json
 import os
+import platform
+import re
 import shutil
+import stat
 import tempfile
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 MANIFEST = "manifest.json"
@@ -66,13 +69,50 @@ def whole_folder(folder: Path, overwrite: bool, kind: str = "mission", what: str
     """A folder beside ``folder`` to write into; it becomes ``folder`` at the end, or vanishes on any error."""
     check_folder(folder, overwrite, kind, what)
     folder.parent.mkdir(parents=True, exist_ok=True)
-    draft = Path(tempfile.mkdtemp(prefix=f".{folder.name}-", suffix=".part", dir=folder.parent))
+    draft = _new_folder(folder.parent, f".{folder.name}", ".part")
     try:
         yield draft
         draft.chmod(0o755)  # mkdtemp's 0700 is for secrets
         _replace(draft, folder)
     finally:
         shutil.rmtree(draft, ignore_errors=True)
+
+
+@contextmanager
+def scratch(what: str) -> Iterator[Path]:
+    """A folder among the temporary files, which vanishes at the end."""
+    folder = _new_folder(Path(tempfile.gettempdir()), f"microrad-{what}")
+    try:
+        yield folder
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+def _new_folder(parent: Path, name: str, suffix: str = "") -> Path:
+    """A new folder for this process; those of the name that processes left here when they were killed are removed."""
+    own = f"{name}-{re.sub(r'[^A-Za-z0-9]', '_', platform.node())}-"
+    form = re.compile(rf"{re.escape(own)}(\d{{1,9}})-\w+{re.escape(suffix)}")
+    with suppress(OSError):  # of a folder that may be written and not be read
+        for path in parent.iterdir():
+            if (found := form.fullmatch(path.name)) and _left_behind(path, int(found[1])):
+                shutil.rmtree(path, ignore_errors=True)
+    return Path(tempfile.mkdtemp(prefix=f"{own}{os.getpid()}-", suffix=suffix, dir=parent))
+
+
+def _left_behind(path: Path, process: int) -> bool:
+    """Whether this is a folder of the same user, and its process is gone; never where that cannot be asked."""
+    if os.name != "posix":
+        return False
+    try:
+        status = path.lstat()
+        if not stat.S_ISDIR(status.st_mode) or status.st_uid != os.getuid():
+            return False
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return True
+    except OSError:
+        return False
+    return False
 
 
 def _replace(draft: Path, folder: Path) -> None:

@@ -8,7 +8,6 @@ import hashlib
 import platform
 import subprocess
 import sys
-import tempfile
 import uuid
 import zipfile
 from collections.abc import Mapping
@@ -28,7 +27,7 @@ from microrad.export.identifiers import identifier
 from microrad.export.records import GAUGE, OPTICAL_ERROR, READING, REFERENCE, ExportError, LoopUnit, PlantUnit
 from microrad.export.sections import sections
 from microrad.export.templating import render
-from microrad.folder import write_whole
+from microrad.folder import scratch, write_whole
 
 SHARED = (*FLAGS, "-fPIC", "-shared", "-fvisibility=hidden")
 """What the library of a unit is compiled with."""
@@ -244,10 +243,10 @@ def _ending() -> str:
 
 def _library(texts: Mapping[str, str], version: Version, name: str) -> bytes:
     """The compiled library of a unit's sources."""
-    with tempfile.TemporaryDirectory(prefix="microrad-fmu-") as folder:
+    with scratch("fmu") as folder:
         for file, text in texts.items():
             if file.startswith("sources/"):
-                (Path(folder) / Path(file).name).write_text(text, encoding="utf-8", newline="\n")
+                (folder / Path(file).name).write_text(text, encoding="utf-8", newline="\n")
         sources = sorted(Path(file).name for file in texts if file.endswith(".c"))
         target = f"{name}{_ending()}"
         flags = [flag for flag in SHARED if flag != "-fPIC" or _ending() != ".dll"]
@@ -263,7 +262,7 @@ def _library(texts: Mapping[str, str], version: Version, name: str) -> bytes:
         if done.returncode != 0:
             first = "\n  ".join(done.stderr.splitlines()[:12])
             raise ExportError(f"the C compiler {command[0]!r} refuses the FMI {version} unit {name!r}:\n  {first}")
-        return (Path(folder) / target).read_bytes()
+        return (folder / target).read_bytes()
 
 
 def _archive(contents: Mapping[str, bytes]) -> bytes:
