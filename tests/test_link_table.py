@@ -5,6 +5,7 @@ import math
 import pytest
 
 from link_files import GAUSSIAN, PATTERN, RECEIVERS, SKY, data_with, link_file, received_with, written
+from microrad.link import LitAperture, gaussian_beam_gain_db
 from microrad.link_table import Receiver, half_angle_rad, narrowest_half_angle_rad
 from microrad.mission import LinkMission, Mission, mission_schema
 from microrad.missionfile import MissionError, load_link
@@ -219,10 +220,24 @@ def test_no_beam_is_narrower_than_diffraction_leaves_it(tmp_path, link, aperture
     assert f"is below diffraction at {aperture}_aperture = {diameter * 100:g} cm" in text.replace(
         "50 mm", "5 cm"
     ).replace("150 mm", "15 cm")
+    assert f"({convention.partition('-')[0]} angle at 1/e2)" in text
     named = text.rpartition('at least "')[2].partition('"')[0]
     assert parse_quantity(named, "rad") == pytest.approx(least, rel=2e-3)
     for enough in (f"{least * 1.000001e6:.6f} urad", named):
         assert link_file(tmp_path, conventions, {f"{link}.divergence": enough})
+
+
+def test_widths_of_an_aperture_lit_evenly_are_no_divergences_of_a_gaussian_beam():
+    """9.4 urad at 847 nm from 95 mm: the width at half maximum, and no full angle at 1/e2 by any reading."""
+    diameter, wavelength = 95e-3, 847e-9
+    even, least = LitAperture(diameter, wavelength, 0.0, 0.0), narrowest_half_angle_rad(diameter, wavelength)
+    at_e2, at_half = (even.error_rad(loss) for loss in (20 / math.log(10), 10 * math.log10(2)))
+    assert at_e2 * diameter / wavelength == pytest.approx(0.8225, abs=1e-4)
+    assert 2 * at_half * diameter / wavelength == pytest.approx(1.029, abs=1e-3)
+    assert 2 * at_half < 9.4e-6 < 2 * at_e2
+    assert gaussian_beam_gain_db(least) == pytest.approx(even.gain_db, abs=1e-9)
+    assert gaussian_beam_gain_db(at_e2) - even.gain_db == pytest.approx(0.79, abs=0.01)
+    assert gaussian_beam_gain_db(2 * wavelength / (math.pi * diameter)) - even.gain_db == pytest.approx(3.01, abs=0.01)
 
 
 def test_the_narrowest_gaussian_beam_has_the_gain_of_the_whole_aperture():

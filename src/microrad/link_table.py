@@ -310,7 +310,14 @@ def half_angle_rad(divergence_rad: float, convention: str) -> float:
 def narrowest_half_angle_rad(aperture_m: float, wavelength_m: float) -> float:
     """Half angle at 1/e2 of the Gaussian beam with the gain of the whole aperture, sqrt(8) lambda / (pi D).
 
-    Nothing that leaves the aperture has more gain than light that fills it evenly, so no Gaussian beam is narrower.
+    A Gaussian beam of half angle theta has the gain 8 / theta^2. Light that fills the aperture evenly has
+    (pi D / lambda)^2, and by the Schwarz inequality no light that leaves it has more. So no Gaussian beam is narrower
+    than 0.900 lambda / D; the full angle is twice that, 1.801 lambda / D.
+
+    It is a limit of the gain and not of the width: the light that fills the aperture evenly is itself at 1/e2 at
+    0.822 lambda / D, and 1.03 lambda / D wide at half maximum. Taken for Gaussian beams such widths would put more
+    light on the axis than there is (by 0.8 dB for 0.822), as would lambda / (pi w) = 0.637 lambda / D for w = D / 2,
+    the Gaussian beam that no aperture cuts (by 3 dB).
     """
     return math.sqrt(8.0) * wavelength_m / (math.pi * aperture_m)
 
@@ -343,7 +350,10 @@ def divergence_fits(name: str, end: str) -> Callable[..., Iterator[Problem]]:
         if half < least * (1.0 - 1e-9):
             limit = format_quantity(beam.divergence_rad / half * least * (1.0 + 1e-3), "rad")
             size = format_quantity(aperture, "m")
-            reason = f"is below diffraction at {end}_aperture = {size}, which leaves no less than {limit}"
+            words = f"{conventions.divergence.partition('-')[0]} angle"
+            reason = (
+                f"is below diffraction at {end}_aperture = {size}, which leaves no less than {limit} ({words} at 1/e2)"
+            )
             yield Problem(f"{name}.divergence", reason, f'at least "{limit}", or a larger aperture')
 
     return check
