@@ -18,7 +18,7 @@ import pytest
 from microrad.campaign import blob
 from microrad.campaign.blob import Column, Head
 from microrad.campaign.ledger import Ledger, check_same
-from microrad.campaign.ledger_file import FORMAT, is_written
+from microrad.campaign.ledger_file import FORMAT, argument, is_written, refuse_damaged_log
 from microrad.campaign.mending import mend, verify
 from microrad.campaign.records import CampaignError, Chunk, Failed, WorstTrace
 from waiting import any_moment
@@ -421,6 +421,91 @@ def test_damage_is_mended_with_what_only_the_log_has(path):
     assert not verify(path).sound
     lost = mended(path, payloads | late)
     assert (0, 7) in lost and len(lost) <= 8 and lost <= set(payloads)
+
+
+# ------------------------------------------------------------------------------------------- ledgers from anywhere
+ENDLESS = "WITH RECURSIVE c(n) AS (SELECT 0 UNION ALL SELECT n + 1 FROM c) SELECT 0 cell, n number, n sha256, n payload"
+
+
+@pytest.mark.parametrize(
+    "changes, named",
+    [
+        (["DROP TABLE chunks", f"CREATE VIEW chunks AS {ENDLESS} FROM c"], "the view 'chunks'"),
+        (["CREATE TRIGGER t AFTER INSERT ON notes BEGIN DELETE FROM chunks; END"], "the trigger 't'"),
+        (["CREATE TABLE birds(name)"], "the table 'birds'"),
+        (["DROP TABLE traces"], "not all tables of a ledger"),
+        (["ALTER TABLE notes ADD COLUMN more"], "the table 'notes'"),
+    ],
+)
+@pytest.mark.parametrize("logged", [False, True], ids=["in the file", "in the log"])
+def test_only_the_tables_of_a_ledger_are_read(path, changes, named, logged):
+    payloads = filled(path, 3)
+    with contextlib.closing(sqlite3.connect(path, isolation_level=None)) as other:
+        for change in changes:
+            other.execute(change)
+        files = {each: each.read_bytes() for each in path.parent.iterdir()}
+    for each, content in files.items() if logged else ():
+        each.write_bytes(content)
+    for write in (False, True):
+        message = said(Ledger.open, path, write=write)
+        assert f"{path} defines {named}" in message and f"`microrad campaign resume {argument(path)}`" in message
+    assert [named in fault for fault in verify(path).faults] == [True]
+    assert set(mended(path, payloads)) <= set(payloads)
+
+
+def left_behind(path, count):
+    """A ledger as a kill leaves it: its chunks are in the log alone; the bytes of each file and chunk."""
+    payloads = {(0, number): packed(number) for number in range(count)}
+    with Ledger.create(path, HEAD) as ledger:
+        for (cell, number), payload in payloads.items():
+            ledger.put(cell, number, payload)
+        files = {each: each.read_bytes() for each in path.parent.iterdir()}
+    for each, content in files.items():
+        each.write_bytes(content)
+    return files, payloads
+
+
+def test_a_damaged_log_of_a_killed_writer_is_told_and_costs_what_was_damaged(path):
+    files, payloads = left_behind(path, 8)
+    log = path.with_name(path.name + "-wal")
+    last = (log.stat().st_size - 32) // 4120 - 1
+    spots = [(at, 0) for at in (2, 5, 17, 27)]  # magic number, version, salt, sum
+    spots += [(32 + 4120 * frame + at, 3) for frame in (0, 9, last) for at in (3, 9, 17, 1000)]
+    for at, bit in spots:
+        for each, content in files.items():
+            each.write_bytes(content)
+        flip(log, at, bit)
+        message = said(Ledger.open, path, write=at % 2 == 0)
+        assert f"its log {log.name} is damaged from byte " in message and "finished transactions" in message
+        assert said(Ledger.create, path, HEAD) == message and verify(path).faults == (message,)
+        assert len(mended(path, payloads)) <= 1, at
+
+
+def test_a_log_whose_last_transaction_was_not_finished_is_whole(path):
+    files, payloads = left_behind(path, 8)
+    log = path.with_name(path.name + "-wal")
+    whole = files[log]
+    for size in (0, 20, 32, 1000, 32 + 4120, 32 + 4120 * 2 + 24, len(whole) - 4120, len(whole) - 1):
+        for each, content in files.items():
+            each.write_bytes(content)
+        log.write_bytes(whole[:size])
+        assert verify(path).sound
+        with Ledger.open(path, write=False) as ledger:
+            assert ledger.done() < payloads.keys()
+    for each, content in files.items():
+        each.write_bytes(content)
+    with log.open("ab") as file:  # what an earlier, longer log has left behind
+        file.write(bytes([0, 0, 0, 2, 0, 0, 0, 9]) + bytes(range(8)) + bytes(4104) + whole[-50:])
+    assert verify(path, payloads).missing == ()
+
+
+def test_a_log_that_begins_anew_while_it_is_read_is_no_damage(path, monkeypatch):
+    left_behind(path, 2)
+    flip(path.with_name(path.name + "-wal"), 100)
+    answers = iter([False, True])
+    monkeypatch.setattr("microrad.campaign.ledger_file.is_written", lambda path: next(answers))
+    refuse_damaged_log(path)
+    assert next(answers, None) is None
 
 
 # ----------------------------------------------------------------------------------------------- processes and disks

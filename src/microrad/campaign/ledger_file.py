@@ -10,17 +10,18 @@ import sqlite3
 from collections.abc import Iterator
 from contextlib import closing, contextmanager, suppress
 from datetime import UTC, datetime
+from functools import cache
 from pathlib import Path
 from typing import Any
 
-from microrad.campaign import blob
+from microrad.campaign import blob, ledger_log
 from microrad.campaign.blob import Head
+from microrad.campaign.ledger_log import PAGE
 from microrad.campaign.records import CampaignError
 
 FORMAT = blob.VERSION  # one number for both, so that what another microrad wrote is never mended into this format
 _APPLICATION = 0x6D726164  # "mrad": SQLite's application_id, so that another program's file is told from a ledger
 HEADS = ("head", "head_again")  # two tables, so that no page has both
-PAGE = 4096
 _GLANCE_S = 0.5  # longer than `is_written` holds the lock
 PATIENCE_S = 30.0  # how long another program may hold the file, such as a copy being made
 _TABLES = """
@@ -94,9 +95,10 @@ def refuse_existing(path: Path) -> None:
 
 
 def is_ledger(path: Path) -> bool:
-    """Whether a file is one of SQLite's."""
+    """Whether a file is one of SQLite's. Raises `CampaignError` where its log is damaged."""
     if not path.is_file() or not path.stat().st_size:
         return False
+    refuse_damaged_log(path)
     with suppress(sqlite3.Error), closing(sqlite3.connect(f"{path.absolute().as_uri()}?mode=rw", uri=True)) as probe:
         probe.execute("PRAGMA application_id")
         return True
@@ -126,6 +128,16 @@ def refuse_foreign(path: Path) -> None:
         raise CampaignError(f"{path} is text, not a ledger: {begin}name the file that `microrad campaign run` wrote")
 
 
+def refuse_damaged_log(path: Path) -> None:
+    """Raise `CampaignError` where a killed writer's log is damaged, before SQLite opens it and deletes what is left."""
+    if not path.is_file() or is_written(path) or not (damage := ledger_log.damage(files(path)[1])):
+        return
+    if not is_written(path):  # else it was begun anew while it was read
+        raise CampaignError(
+            f"{path}: {damage}. `microrad campaign resume {argument(path)}` keeps what is whole and does the rest again"
+        )
+
+
 def _is_text(data: bytes) -> bool:
     try:
         codecs.getincrementaldecoder("utf-8")().decode(data)  # the last character may be cut
@@ -149,9 +161,11 @@ def _opened(path: Path, mode: str, write: bool) -> sqlite3.Connection:
     connection = sqlite3.connect(f"{path.absolute().as_uri()}?{mode}", uri=True, timeout=PATIENCE_S)
     try:
         connection.isolation_level = None
-        for pragma in ("synchronous = FULL", "fullfsync = ON", f"query_only = {not write}"):  # fullfsync is for macOS
+        settings = "trusted_schema = OFF", "synchronous = FULL", "fullfsync = ON"  # the last is for macOS
+        for pragma in (*settings, f"query_only = {not write}"):
             connection.execute(f"PRAGMA {pragma}")
         _check_format(path, connection)
+        _check_schema(path, connection)
         return connection
     except BaseException:
         connection.close()
@@ -170,6 +184,29 @@ def _check_format(path: Path, connection: sqlite3.Connection) -> None:
     if version != FORMAT:
         raise CampaignError(
             f"{path} is a ledger of format {version}, and this microrad knows {FORMAT}: use the microrad that began it"
+        )
+
+
+_SCHEMA = "SELECT type, name, tbl_name, sql FROM sqlite_master ORDER BY name"
+
+
+@cache
+def _schema() -> tuple[tuple[str, ...], ...]:
+    """All that a ledger defines, in SQLite's words."""
+    with closing(sqlite3.connect(":memory:")) as empty:
+        empty.executescript(_TABLES)
+        return tuple(empty.execute(_SCHEMA))
+
+
+def _check_schema(path: Path, connection: sqlite3.Connection) -> None:
+    """Raise unless the file defines the tables of a ledger and nothing else: a view may compute without an end."""
+    found = connection.execute(_SCHEMA).fetchmany(len(_schema()) + 1)
+    if tuple(found) != _schema():
+        odd = next((row for row in found if row not in _schema()), None)
+        what = f"the {odd[0]} {str(odd[1])[:60]!r}, which no ledger has" if odd else "not all tables of a ledger"
+        raise CampaignError(
+            f"{path} defines {what}, so nothing in it is read: another program has changed it, or it is damaged; "
+            f"`microrad campaign resume {argument(path)}` moves every whole chunk into new tables"
         )
 
 

@@ -9,11 +9,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from microrad.campaign import blob
+from microrad.campaign import blob, ledger_log
 from microrad.campaign.ledger import Ledger
 from microrad.campaign.ledger_file import (
     HEADS,
-    PAGE,
     code_of,
     connected,
     digest,
@@ -23,10 +22,12 @@ from microrad.campaign.ledger_file import (
     locked,
     make_empty,
     put_head,
+    refuse_damaged_log,
     refuse_foreign,
     told,
     whole_head,
 )
+from microrad.campaign.ledger_log import LEAF, PAGE
 from microrad.campaign.records import CampaignError
 
 _NOT_DAMAGE = {
@@ -63,6 +64,10 @@ def verify(path: Path, expected: Iterable[tuple[int, int]] = ()) -> Verified:
     another reason than damage.
     """
     with told(path, "open the ledger"):
+        try:
+            refuse_damaged_log(path)
+        except CampaignError as error:
+            return Verified(0, (), (), (str(error),))
         refuse_foreign(path)
     try:
         with told(path, "open the ledger"), closing(connected(path, write=False)) as connection:
@@ -171,13 +176,12 @@ def _rebuild(path: Path) -> None:
     """Replace a ledger by a new one with all of it that is whole."""
     with tempfile.TemporaryDirectory(prefix=f".{path.name}-", suffix=".part", dir=path.parent) as folder:
         copy, draft = Path(folder, "damaged"), Path(folder, "mended")
-        for old, new in zip(files(path)[:2], files(copy)[:2], strict=True):  # the file and its log
-            if old.exists():
-                shutil.copyfile(old, new)
+        shutil.copyfile(path, copy)
+        ledger_log.replay(files(path)[1], copy)
         make_empty(draft)
         _renew_first_page(copy, draft)
         with closing(sqlite3.connect(copy, isolation_level=None)) as damaged:
-            for pragma in ("journal_mode = OFF", "synchronous = OFF"):  # the log goes into the copy here
+            for pragma in ("journal_mode = OFF", "synchronous = OFF"):
                 damaged.execute(f"PRAGMA {pragma}")
             leaves = _leaves(copy)
             payloads = [row[0] for table in HEADS for row in _rows(damaged, table, "payload", leaves)]
@@ -233,4 +237,4 @@ def _leaves(path: Path) -> list[int]:
     """Numbers of the pages that begin as a leaf of a table does (SQLite, Database File Format, 1.6)."""
     with path.open("rb") as file:
         pages = iter(lambda: file.read(PAGE), b"")
-        return [number for number, page in enumerate(pages, 1) if page[0] == 13 and number > 1]
+        return [number for number, page in enumerate(pages, 1) if page[0] == LEAF and number > 1]
