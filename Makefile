@@ -73,10 +73,11 @@ $(VENV)/bin/python:
 	  { echo "microrad needs Python 3.11 or newer: $(PYTHON) is $$($(PYTHON) --version 2>&1); try make PYTHON=python3.12 $(MAKECMDGOALS)"; exit 1; }
 	@$(PYTHON) -m venv $(VENV) >/dev/null 2>&1 || { rm -rf $(VENV); sh scripts/install-venv "$(PYTHON)" && $(PYTHON) -m venv $(VENV); }
 
-# On Linux x86-64 each file that is installed is held against its hash, those that build the project among them; elsewhere its
-# version alone is (scripts/hashes.py).
+# On the machines below each file that is installed is held against its hash, those that build the project among them;
+# elsewhere its version alone is (scripts/hashes.py).
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
-ifeq ($(shell uname -s)-$(shell uname -m),Linux-x86_64)
+MACHINE := $(shell $(PYTHON) -c 'import platform as p, sys; print(p.system(), p.machine(), p.libc_ver()[0], "3.%d" % sys.version_info[1], sep="-")' 2>/dev/null)
+ifneq ($(filter $(MACHINE),$(foreach minor,11 12 13 14,Linux-x86_64-glibc-3.$(minor))),)
 $(VENV)/.run: $(VENV)/bin/python pyproject.toml hashes/lab.txt
 	$(PIP) --require-hashes --requirement hashes/lab.txt
 	$(PIP) --no-deps --no-build-isolation --editable .

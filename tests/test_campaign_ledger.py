@@ -2,6 +2,7 @@
 
 import contextlib
 import hashlib
+import json
 import os
 import random
 import sqlite3
@@ -152,6 +153,42 @@ def test_columns_of_unequal_length_are_refused():
     message = said(blob.pack_chunk, Chunk(1, 2, columns, (), np.zeros(0), np.zeros(0)))
     assert "chunk 2 of cell 1" in message and "(3,)" in message and "(4,)" in message
     assert "shapes" in said(blob.pack_chunk, Chunk(1, 2, {"row": np.zeros((2, 2))}, (), np.zeros(0), np.zeros(0)))
+
+
+def forged(kind, header, table):
+    """Bytes of a record with the right checksum, whatever is in it."""
+    words = json.dumps({"arrays": table, "rest": 0, "header": header}).encode()
+    body = struct.pack("<8sHHI", b"microrad", 1, {"chunk": 1, "trace": 2, "head": 3}[kind], len(words)) + words
+    body += bytes(8)
+    return body + hashlib.sha256(body).digest()
+
+
+@pytest.mark.parametrize(
+    "table",
+    [
+        [["survival", [10**8], 10**8, 0]],
+        [["survival", [2**13, 2**13], 2**26, 0]],
+        [["survival", [2**25], 2**25, 0], ["survival_square", [1], 1, 0]],
+        [["survival", [-1], 0, 0]],
+        [["survival", [4], 4, 4]],
+        [["survival", [1.0], 1, 0]],
+        [["survival", [True], 1, 0]],
+        [["survival", "1", 1, 0]],
+        [["survival", [1]]],
+        [7],
+        {},
+    ],
+)
+def test_bytes_of_a_stranger_with_the_right_checksum_ask_for_no_memory_and_are_refused(table):
+    header = {"cell": 0, "number": 0, "columns": [], "failed": []}
+    assert "is laid out as microrad never does" in said(blob.unpack_chunk, forged("chunk", header, table))
+
+
+@pytest.mark.parametrize("header", [[], 7, {}, {"cell": 0, "number": 0, "columns": ["x"], "failed": []}])
+def test_a_header_of_a_stranger_is_refused(header):
+    assert "is laid out as microrad never does" in said(blob.unpack_chunk, forged("chunk", header, []))
+    assert "is laid out as microrad never does" in said(blob.unpack_trace, forged("trace", header, []))
+    assert "is laid out as microrad never does" in said(blob.unpack_head, forged("head", header, []))
 
 
 # ----------------------------------------------------------------------------------------------------------- the rows

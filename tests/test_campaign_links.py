@@ -18,7 +18,7 @@ from microrad.campaign.summary import summarise
 from microrad.document import MissionError
 from microrad.fields import Several
 from microrad.link import LitAperture
-from microrad.link.tornado import LINK_TABLES
+from microrad.link.inputs import LINK_TABLES
 from microrad.link_performance import Exposure
 from microrad.missionfile import load_link, open_mission
 from shipped import SHIPPED
@@ -270,3 +270,17 @@ def test_chunks_of_impossible_size_are_refused(tmp_path, rows):
     assert bundle.opened(spec).campaign.chunk_rows is None
     with pytest.raises(CampaignError, match="which microrad never makes"):
         bundle.opened(json.dumps(json.loads(spec) | {"chunk_rows": rows}).encode())
+
+
+@pytest.mark.parametrize(
+    "change",
+    [{"files": {"a\0b": ""}}, {"files": {"../a": ""}}, {"files": []}, {"controllers": [{}]}, {"files": {"a": 7}}],
+)
+def test_a_bundle_of_a_stranger_is_refused(tmp_path, change):
+    mission(tmp_path, "crosslink")
+    spec = bundle.packed(loaded(tmp_path, "crosslink", DRAWN), ())
+    with pytest.raises(CampaignError, match="never"):
+        bundle.opened(json.dumps(json.loads(spec) | change).encode())
+    for odd in (b"", b"7", b"{}", b"[" * 100_000):
+        with pytest.raises(CampaignError, match="never"):
+            bundle.opened(odd)

@@ -8,8 +8,10 @@ same record gives the same bytes on any machine: that is why nothing is compress
 
 import hashlib
 import json
+import math
 import struct
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field
 from typing import Any, NamedTuple
 
@@ -22,6 +24,7 @@ _MAGIC = b"microrad"
 _PREFIX = struct.Struct("<8sHHI")
 _DIGEST = 32
 _KINDS = {"chunk": 1, "trace": 2, "head": 3}
+_MOST_VALUES = 2**25  # in all arrays of one record: ten times a trace of as many samples as a mission may have
 
 
 class Column(NamedTuple):
@@ -64,26 +67,33 @@ class Blob(NamedTuple):
 
 def pack_chunk(chunk: Chunk) -> bytes:
     """The chunk as bytes. Raises `CampaignError` for columns of unequal length or more than one dimension."""
-    rows = {values.shape for values in chunk.columns.values()}
-    if len(rows) > 1 or any(len(shape) != 1 for shape in rows):
-        raise CampaignError(f"chunk {chunk.number} of cell {chunk.cell} has columns of shapes {sorted(rows)}, not one")
+    _check_columns(chunk)
     failed = [[each.row, each.seed, each.attempts, each.reason] for each in chunk.failed]
     header = {"cell": chunk.cell, "number": chunk.number, "columns": list(chunk.columns), "failed": failed}
     curves = {"survival": chunk.survival, "survival_square": chunk.survival_square}
     return pack("chunk", header, {f"column {name}": column for name, column in chunk.columns.items()} | curves)
 
 
+def _check_columns(chunk: Chunk) -> None:
+    rows = {values.shape for values in chunk.columns.values()}
+    if len(rows) > 1 or any(len(shape) != 1 for shape in rows):
+        raise CampaignError(f"chunk {chunk.number} of cell {chunk.cell} has columns of shapes {sorted(rows)}, not one")
+
+
 def unpack_chunk(data: bytes) -> Chunk:
     """The chunk that `pack_chunk` made bytes of. Raises `CampaignError` for any others."""
     header, arrays, _ = unpack("chunk", data)
-    return Chunk(
-        cell=header["cell"],
-        number=header["number"],
-        columns={name: arrays[f"column {name}"] for name in header["columns"]},
-        failed=tuple(Failed(*each) for each in header["failed"]),
-        survival=arrays["survival"],
-        survival_square=arrays["survival_square"],
-    )
+    with _ours("chunk"):
+        chunk = Chunk(
+            cell=header["cell"],
+            number=header["number"],
+            columns={name: arrays[f"column {name}"] for name in header["columns"]},
+            failed=tuple(Failed(*each) for each in header["failed"]),
+            survival=arrays["survival"],
+            survival_square=arrays["survival_square"],
+        )
+    _check_columns(chunk)
+    return chunk
 
 
 def pack_trace(trace: WorstTrace) -> bytes:
@@ -96,13 +106,14 @@ def pack_trace(trace: WorstTrace) -> bytes:
 def unpack_trace(data: bytes) -> WorstTrace:
     """The trace that `pack_trace` made bytes of. Raises `CampaignError` for any others."""
     header, arrays, _ = unpack("trace", data)
-    return WorstTrace(
-        **header,
-        value=float(arrays["value"]),
-        time_s=arrays["time"],
-        error_rad=arrays["error"],
-        drive_v=arrays["drive"],
-    )
+    with _ours("trace"):
+        return WorstTrace(
+            **header,
+            value=float(arrays["value"]),
+            time_s=arrays["time"],
+            error_rad=arrays["error"],
+            drive_v=arrays["drive"],
+        )
 
 
 def pack_head(head: Head) -> bytes:
@@ -116,8 +127,9 @@ def pack_head(head: Head) -> bytes:
 def unpack_head(data: bytes) -> Head:
     """The head that `pack_head` made bytes of. Raises `CampaignError` for any others."""
     header, _, bundle = unpack("head", data)
-    cells, columns = tuple(map(dict, header.pop("cells"))), tuple(Column(*each) for each in header.pop("columns"))
-    return Head(**header, cells=cells, columns=columns, bundle=bundle)
+    with _ours("head"):
+        cells, columns = tuple(map(dict, header.pop("cells"))), tuple(Column(*each) for each in header.pop("columns"))
+        return Head(**header, cells=cells, columns=columns, bundle=bundle)
 
 
 def pack(kind: str, header: Mapping[str, Any], arrays: Mapping[str, Floats], rest: bytes = b"") -> bytes:
@@ -139,14 +151,36 @@ def unpack(kind: str, data: bytes) -> Blob:
     body = memoryview(data)[:-_DIGEST]
     length = _PREFIX.unpack_from(body)[3]
     at = _PREFIX.size + length
-    table = json.loads(bytes(body[_PREFIX.size : at]).decode("utf-8", "surrogatepass"))
-    arrays = {}
-    for name, shape, lead, trail in table["arrays"]:
-        size = int(np.prod(shape))
-        stored = _stored(size, lead, trail)
-        arrays[name] = _whole(np.frombuffer(body, "<f8", stored, at), size, lead, trail).reshape(shape)
-        at += 8 * stored
-    return Blob(table["header"], arrays, bytes(body[at : at + table["rest"]]))
+    with _ours(kind):
+        table = json.loads(bytes(body[_PREFIX.size : at]).decode("utf-8", "surrogatepass"))
+        arrays = {}
+        _check_sizes(table["arrays"])
+        for name, shape, lead, trail in table["arrays"]:
+            size = math.prod(shape)
+            stored = _stored(size, lead, trail)
+            arrays[name] = _whole(np.frombuffer(body, "<f8", stored, at), size, lead, trail).reshape(shape)
+            at += 8 * stored
+        return Blob(dict(table["header"]), arrays, bytes(body[at : at + table["rest"]]))
+
+
+@contextmanager
+def _ours(kind: str) -> Iterator[None]:
+    """Anyone may write bytes with the right checksum: raises `CampaignError` where they are laid out otherwise."""
+    try:
+        yield
+    except (ArithmeticError, AttributeError, LookupError, RecursionError, TypeError, ValueError) as error:
+        raise CampaignError(f"a {kind} is laid out as microrad never does: leave its file alone") from error
+
+
+def _check_sizes(table: list[tuple[str, list[int], int, int]]) -> None:
+    """Raise `ValueError` for more values than a record has: runs of equal ones cost nothing where they are stored."""
+    left = _MOST_VALUES
+    for _, shape, lead, trail in table:
+        size = math.prod(shape)
+        whole = [type(each) is int and 0 <= each <= left for each in (*shape, lead, trail, size)]
+        if not all(whole) or lead + trail > size:
+            raise ValueError("sizes")
+        left -= size
 
 
 def _check(kind: str, data: bytes) -> None:

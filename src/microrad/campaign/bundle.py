@@ -74,20 +74,20 @@ def packed(campaign: CampaignFile, controllers: Sequence[AxisController]) -> byt
 
 def opened(spec: bytes, any_code: bool = False) -> Opened:
     """What `packed` put together. Raises `CampaignError` when it was packed by other code, if that is not allowed."""
-    data = json.loads(spec)
-    if data["code"] != code_sha256() and not any_code:
+    name, code, files, rows, controllers = _unpacked(spec)
+    if code != code_sha256() and not any_code:
         raise CampaignError(
-            f"this worker runs other code than the campaign: {code_sha256()} here, {data['code']} there; install the "
+            f"this worker runs other code than the campaign: {code_sha256()} here, {code} there; install the "
             "same microrad, Python and libraries on every worker"
         )
     folder = Path(tempfile.mkdtemp(prefix="microrad-campaign-"))
     try:
-        for name, content in data["files"].items():
-            path = _inside(folder, name)
+        for inside, content in files.items():
+            path = _inside(folder, inside)
             path.parent.mkdir(parents=True, exist_ok=True)
-            path.write_bytes(base64.b64decode(content))
-        campaign = replace(load_campaign(_inside(folder, data["campaign"])), chunk_rows=_chunk_rows(data))
-        found = Opened(campaign, tuple(_read(each) for each in data["controllers"]))
+            path.write_bytes(content)
+        campaign = replace(load_campaign(_inside(folder, name)), chunk_rows=rows)
+        found = Opened(campaign, controllers)
     except BaseException:
         shutil.rmtree(folder, ignore_errors=True)
         raise
@@ -95,18 +95,27 @@ def opened(spec: bytes, any_code: bool = False) -> Opened:
     return found
 
 
-def _chunk_rows(data: dict[str, Any]) -> int | None:
-    """The rows of a chunk that a bundle states. Raises `CampaignError` for none of ours: anyone may make a ledger."""
-    rows = data.get("chunk_rows")
+def _unpacked(spec: bytes) -> tuple[str, str, dict[str, bytes], int | None, tuple[AxisController, ...]]:
+    """Name of the campaign file, code, files by name, rows of a chunk and controllers of a bundle.
+
+    Raises `CampaignError` for one that is none of ours: anyone may make a ledger.
+    """
+    try:
+        data = json.loads(spec)
+        files = {name: base64.b64decode(content) for name, content in data["files"].items()}
+        controllers = tuple(_read(each) for each in data["controllers"])
+        name, code, rows = str(data["campaign"]), str(data["code"]), data.get("chunk_rows")
+    except (AttributeError, LookupError, RecursionError, TypeError, ValueError) as error:
+        raise CampaignError("the ledger holds a campaign as microrad never writes it: leave it alone") from error
     if rows is None or (type(rows) is int and rows > 0 and not rows & (rows - 1)):
-        return rows
+        return name, code, files, rows, controllers
     raise CampaignError(f"the ledger has chunks of {rows!r} rows, which microrad never makes: leave it alone")
 
 
 def _inside(folder: Path, name: str) -> Path:
     """The path of a file of a bundle. Raises `CampaignError` where it leaves the folder: anyone may make a ledger."""
     path = Path(os.path.abspath(folder.joinpath(*PurePosixPath(name).parts)))  # noqa: PTH100  nothing is there yet
-    if not path.is_relative_to(folder) or path == folder:
+    if not path.is_relative_to(folder) or path == folder or "\0" in name:
         raise CampaignError(f"the ledger holds a file {name!r}, which microrad never puts there: leave it alone")
     return path
 
