@@ -85,6 +85,15 @@ def folder(tmp_path, monkeypatch):
 
 
 @pytest.fixture
+def undrawn(monkeypatch):
+    """Reports without figures, which `test_init_then_run` draws."""
+    from microrad.report import day_plots, figures, link_figures, paper_bench  # not for every file of tests
+
+    for module in (day_plots, figures, link_figures, paper_bench):
+        monkeypatch.setattr(module, "draw", lambda *args: ())
+
+
+@pytest.fixture
 def call(capsys):
     """Run a command in this process."""
 

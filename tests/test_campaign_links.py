@@ -62,7 +62,7 @@ def faults(folder, name, body, head=HEAD):
 
 
 # ------------------------------------------------------------------------------------------------------- which files
-@pytest.mark.parametrize("name", [*PRESETS, "crosslink"])
+@pytest.mark.parametrize("name", [*PRESETS, "gallery"])
 def test_a_campaign_takes_what_a_budget_takes(tmp_path, name):
     own = load_link(mission(tmp_path, name)).mission
     campaign = loaded(tmp_path, name, POWER)
@@ -87,9 +87,9 @@ def test_what_links_alone_have_not_is_refused_once(tmp_path):
 
 
 def test_the_largest_rate_is_solved_for_once_for_each_cell(tmp_path):
-    mission(tmp_path, "crosslink")
+    mission(tmp_path, "gallery")
     fixed = '[set]\n"communication.data_rate" = "largest"\n[grid]\n"communication.distance" = ["500 km", "1000 km"]\n'
-    campaign = loaded(tmp_path, "crosslink", POWER + fixed)
+    campaign = loaded(tmp_path, "gallery", POWER + fixed)
     evaluator = work.Evaluator(campaign, Builder(campaign), {}, {})
     near, far = (evaluator.rows(cell, range(4), lambda: None).columns for cell in (0, 1))
     nominal = campaign.bases[0].file.mission
@@ -97,10 +97,10 @@ def test_the_largest_rate_is_solved_for_once_for_each_cell(tmp_path):
     np.testing.assert_allclose(near["margin"] - gained, nominal.requirement.margin_db, atol=1e-9)
     np.testing.assert_allclose(far["margin"], near["margin"], atol=1e-9)
     np.testing.assert_allclose(far["data_rate"] * 4.0, near["data_rate"])
-    (found,) = faults(tmp_path, "crosslink", POWER + fixed.replace("500 km", "1e9 km"))
+    (found,) = faults(tmp_path, "gallery", POWER + fixed.replace("500 km", "1e9 km"))
     assert found.key == "set.communication.data_rate" and "dB are missing" in found.reason
     table = '[inputs."communication.data_rate"]\ndistribution = "table"\nvalues = ["largest", "1 Mbit/s"]\n'
-    (found,) = faults(tmp_path, "crosslink", table)
+    (found,) = faults(tmp_path, "gallery", table)
     assert found.reason == "has a word that is solved for"
 
 
@@ -137,7 +137,7 @@ def distributed(key, value, kind):
 
 
 @pytest.mark.parametrize("kind", ["normal", "uniform", "log-uniform", "table"])
-@pytest.mark.parametrize("name", [*PRESETS, "crosslink"])
+@pytest.mark.parametrize("name", [*PRESETS, "gallery"])
 def test_every_quantity_is_drawn_from_any_distribution_or_read_by_nothing(tmp_path, name, kind):
     found = {key.text: distributed(key, value, kind) for key, value in drawable(mission(tmp_path, name))}
     refused = faults(tmp_path, name, "".join(found.values()) + LIMIT)
@@ -157,36 +157,36 @@ def test_every_quantity_is_drawn_from_any_distribution_or_read_by_nothing(tmp_pa
 
 
 def test_each_item_of_a_list_has_its_own_key(tmp_path):
-    mission(tmp_path, "crosslink")
+    mission(tmp_path, "gallery")
     first = '[inputs."jitter.rms.1"]\ndistribution = "uniform"\nlow = "1 urad"\nhigh = "9 urad"\n'
-    campaign = loaded(tmp_path, "crosslink", first)
+    campaign = loaded(tmp_path, "gallery", first)
     drawn = Builder(campaign).mission(0, {"jitter.rms.1": 5e-6}).mission
     assert drawn.jitter.rms_rad == (5e-6, 6e-6) and drawn.jitter.bias_rad == (4e-6, 0.0)
     assert (campaign.dimensions[0].key, campaign.dimensions[0].unit) == ("jitter.rms.1", "rad")
-    both = loaded(tmp_path, "crosslink", first + '[set]\n"jitter.rms.2" = "2 urad"\n')
+    both = loaded(tmp_path, "gallery", first + '[set]\n"jitter.rms.2" = "2 urad"\n')
     assert both.mission.mission.jitter.rms_rad == (6e-6, 2e-6)
-    (found,) = faults(tmp_path, "crosslink", first.replace("rms.1", "rms.3"))
+    (found,) = faults(tmp_path, "gallery", first.replace("rms.1", "rms.3"))
     assert (found.reason, found.expected) == ("is no item of jitter.rms, a list of 2", "jitter.rms.1 or jitter.rms.2")
-    (found,) = faults(tmp_path, "crosslink", first.replace("rms.1", "rms"))
+    (found,) = faults(tmp_path, "gallery", first.replace("rms.1", "rms"))
     assert found.expected == "jitter.rms.1 and jitter.rms.2, each with its distribution"
-    (found,) = faults(tmp_path, "crosslink", '[grid]\n"jitter.rms.1" = ["1 urad", "1 m"]\n')
+    (found,) = faults(tmp_path, "gallery", '[grid]\n"jitter.rms.1" = ["1 urad", "1 m"]\n')
     assert (found.key, found.value) == ("grid.jitter.rms.1", '"1 m"')
     whole = '[inputs."jitter.rms"]\ndistribution = "table"\nvalues = [["1 urad", "1 urad"], ["2 urad", "1 urad"]]\n'
-    assert np.ptp(rows(loaded(tmp_path, "crosslink", whole), 4)["margin"]) > 0.0
-    (found,) = faults(tmp_path, "crosslink", whole + first)
+    assert np.ptp(rows(loaded(tmp_path, "gallery", whole), 4)["margin"]) > 0.0
+    (found,) = faults(tmp_path, "gallery", whole + first)
     assert found.reason == "is an item of jitter.rms, which stands in [inputs] as a whole"
 
 
 # ------------------------------------------------------------------------------------------------ nothing done twice
 def test_rows_that_share_their_jitter_and_their_beam_share_what_follows_from_them(tmp_path, monkeypatch):
-    mission(tmp_path, "crosslink")
+    mission(tmp_path, "gallery")
     evaluated = []
     own, field = radial_error._probability_of, LitAperture._field
     monkeypatch.setattr(radial_error, "_probability_of", lambda *a, **k: evaluated.append(1) or own(*a, **k))
-    rows(loaded(tmp_path, "crosslink", POWER))
+    rows(loaded(tmp_path, "gallery", POWER))
     first = len(evaluated)
     assert first > 4
-    rows(loaded(tmp_path, "crosslink", POWER))  # the same margins: nothing but the shares beyond them is asked again
+    rows(loaded(tmp_path, "gallery", POWER))  # the same margins: nothing but the shares beyond them is asked again
     assert len(evaluated) - first == 2 * (4 + 1)
     asked = []
     monkeypatch.setattr(LitAperture, "_field", lambda self, error: asked.append(error.size) or field(self, error))
@@ -204,9 +204,9 @@ EVEN = HEAD.replace("random", "latin-hypercube").replace("runs = 4", "runs = 64"
 
 def begun(folder, book, monkeypatch, row_s, progress=lambda *_: None, **means):
     """A campaign of 64 rows that are taken to last ``row_s`` each, run to its end."""
-    loaded(folder, "crosslink", DRAWN, EVEN)
+    loaded(folder, "gallery", DRAWN, EVEN)
     monkeypatch.setattr(run, "row_s", lambda _: row_s)
-    run.begin(folder / "campaign-crosslink.toml", folder / book, run.Means(**(means or {"threads": 1})), progress)
+    run.begin(folder / "campaign-gallery.toml", folder / book, run.Means(**(means or {"threads": 1})), progress)
     return folder / book
 
 
@@ -220,20 +220,20 @@ def content(book):
 
 
 def test_chunks_are_cut_to_what_a_row_costs(tmp_path):
-    mission(tmp_path, "crosslink")
-    campaign = loaded(tmp_path, "crosslink", DRAWN, EVEN.replace("64", "4096"))
+    mission(tmp_path, "gallery")
+    campaign = loaded(tmp_path, "gallery", DRAWN, EVEN.replace("64", "4096"))
     assert plan.is_timed(campaign) and plan.chunk_rows(campaign) == 1024
     sizes = {row_s: plan.chunk_rows(plan.timed(campaign, row_s)) for row_s in (0.0, 1e-4, 0.01, 0.1, 0.9, 5.0)}
     assert sizes == {0.0: 1024, 1e-4: 1024, 0.01: 128, 0.1: 16, 0.9: 2, 5.0: 1}
     assert plan.rows_of(plan.timed(campaign, 0.1), 3) == range(48, 64)
     precise = '[precision]\noutput = "margin"\nquantile = 0.1\nhalf_width = "1 dB"\nconfidence = 0.9\nat_most = 9999\n'
-    campaign = loaded(tmp_path, "crosslink", DRAWN + precise, EVEN.replace("64", "4096"))
+    campaign = loaded(tmp_path, "gallery", DRAWN + precise, EVEN.replace("64", "4096"))
     assert plan.rounds(plan.timed(campaign, 0.1)) == plan.rounds(campaign)
 
 
 def test_a_row_costs_the_mean_of_some_without_the_first(tmp_path):
-    mission(tmp_path, "crosslink")
-    campaign = loaded(tmp_path, "crosslink", DRAWN + '[grid]\n"requirement.outage" = [0.01, 0.001]\n', EVEN)
+    mission(tmp_path, "gallery")
+    campaign = loaded(tmp_path, "gallery", DRAWN + '[grid]\n"requirement.outage" = [0.01, 0.001]\n', EVEN)
     times = iter([7.0, 7.05, 7.1, 7.25, 9.0])  # at the end of the first row, and of each behind it
     assert run.row_s(campaign, lambda: next(times)) == pytest.approx(0.25 / 3)
     assert list(times) == [9.0]
@@ -241,7 +241,7 @@ def test_a_row_costs_the_mean_of_some_without_the_first(tmp_path):
 
 
 def test_results_are_the_same_bits_whatever_a_row_costs(tmp_path, monkeypatch):
-    mission(tmp_path, "crosslink")
+    mission(tmp_path, "gallery")
     whole = content(begun(tmp_path, "whole.ledger", monkeypatch, 1e-6))
     parts = content(begun(tmp_path, "parts.ledger", monkeypatch, 0.2, threads=2))
     assert whole[0] == [64] and parts[0] == [8] * 8
@@ -249,7 +249,7 @@ def test_results_are_the_same_bits_whatever_a_row_costs(tmp_path, monkeypatch):
 
 
 def test_a_campaign_that_is_resumed_keeps_its_chunks(tmp_path, monkeypatch):
-    mission(tmp_path, "crosslink")
+    mission(tmp_path, "gallery")
 
     def stop(done, total, what):
         raise KeyboardInterrupt
@@ -265,8 +265,8 @@ def test_a_campaign_that_is_resumed_keeps_its_chunks(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("rows", [0, -8, 3, 2.0, True, "8"])
 def test_chunks_of_impossible_size_are_refused(tmp_path, rows):
-    mission(tmp_path, "crosslink")
-    spec = bundle.packed(loaded(tmp_path, "crosslink", DRAWN), ())
+    mission(tmp_path, "gallery")
+    spec = bundle.packed(loaded(tmp_path, "gallery", DRAWN), ())
     assert bundle.opened(spec).campaign.chunk_rows is None
     with pytest.raises(CampaignError, match="which microrad never makes"):
         bundle.opened(json.dumps(json.loads(spec) | {"chunk_rows": rows}).encode())
@@ -277,8 +277,8 @@ def test_chunks_of_impossible_size_are_refused(tmp_path, rows):
     [{"files": {"a\0b": ""}}, {"files": {"../a": ""}}, {"files": []}, {"controllers": [{}]}, {"files": {"a": 7}}],
 )
 def test_a_bundle_of_a_stranger_is_refused(tmp_path, change):
-    mission(tmp_path, "crosslink")
-    spec = bundle.packed(loaded(tmp_path, "crosslink", DRAWN), ())
+    mission(tmp_path, "gallery")
+    spec = bundle.packed(loaded(tmp_path, "gallery", DRAWN), ())
     with pytest.raises(CampaignError, match="never"):
         bundle.opened(json.dumps(json.loads(spec) | change).encode())
     for odd in (b"", b"7", b"{}", b"[" * 100_000):

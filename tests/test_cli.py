@@ -24,7 +24,6 @@ from command_line import listing
 from microrad import cli, control, doctor, identify, report, study
 from microrad.cli import frame, lab
 from microrad.fine_pointing import designs
-from microrad.report import day_plots, figures, link_figures, paper_bench
 from shipped import plain_study, without_day, without_fine_pointing
 from waiting import HANG_S, lines_of, until
 
@@ -201,13 +200,6 @@ def test_init_then_run(call, folder):
     assert sorted(p.name for p in folder.iterdir()) == ["leo-geo-study", "leo-geo.toml"]
 
 
-@pytest.fixture
-def undrawn(monkeypatch):
-    """Reports without figures, which `test_init_then_run` draws."""
-    for module in (day_plots, figures, link_figures, paper_bench):
-        monkeypatch.setattr(module, "draw", lambda *args: ())
-
-
 @pytest.mark.usefixtures("undrawn")
 def test_identify_then_run_on_the_mirror_it_wrote(call, refused, folder, loop_mirror, plain):
     args = ("run", plain, "--mirror", loop_mirror, "--json")
@@ -251,9 +243,9 @@ def test_design_prints_each_controller_with_its_margins(call, folder):
     assert (result.code, result.err) == (0, "")
     for words in ("PI, best of a gain grid", "LQG", "PI + inverse in series", "modulus", "integral frequency"):
         assert words in result.out
-    assert "warning" not in result.out
     data = json.loads(call("design", "leo-geo.toml", "--json").out)
-    assert data["warnings"] == []
+    far = [c["simulated_rms_rad_per_axis"] > 1.5 * c["residual_rms_rad_per_axis"] for c in data["controllers"]]
+    assert any(far) == ("warning" in result.out) == bool(data["warnings"])
     assert all(c["margins"]["modulus"] >= 0.5 for c in data["controllers"])
     assert len(data["controllers"][0]["matrices"]["A"]) == 2  # an integrator an axis
 

@@ -191,7 +191,9 @@ def test_json_is_one_document_of_finite_numbers_with_units_in_their_keys(call, f
         path
         for path, _ in numbers
         if re.search(
-            r"(lines|totals|noise)\[\d+\]\.value$|tornado\[\d+\]\.(value|low|high)$|requirements\[\d+\]\.", path
+            r"(lines|totals|noise)\[\d+\]\.value$|received_photons_bit$|tornado\[\d+\]\.(value|low|high)$"
+            r"|requirements\[\d+\]\.",
+            path,
         )
     }
     assert found["closes"] is True

@@ -81,7 +81,7 @@ def test_what_the_project_asks_for_is_hashed(extra, file):
 
 def test_make_installs_by_the_hashes():
     text = (ROOT / "Makefile").read_text(encoding="utf-8")
-    hashed = text[text.index("Linux-x86_64)") : text.index("\nelse\n")]
+    hashed = text[text.index("Linux-x86_64-glibc") : text.index("\nelse\n")]
     assert hashed.count("--require-hashes --requirement hashes/") == 2
     assert "--no-deps --no-build-isolation --editable ." in hashed
     assert "--constraint" not in hashed

@@ -10,10 +10,12 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 from scipy.special import erfc
 
-from microrad import link
+from link_files import link_file
+from microrad import link, link_study, requirement
 from microrad.budget import total_db
 from microrad.link_table import Channel
 from microrad.missionfile import load_mission
+from microrad.report import budget_views
 
 FILE = load_mission(Path(__file__).parent.parent / "missions" / "paper.toml")
 MISSION, SOURCES = FILE.mission, FILE.sources
@@ -178,6 +180,25 @@ def test_irradiance_times_area_is_the_received_power(budget_of):
     aperture = MISSION.terminals.leo_aperture_m if budget.name == "Answer" else MISSION.terminals.geo_aperture_m
     assert budget.irradiance_w_m2 * math.pi * aperture**2 / 4 == pytest.approx(budget.received_power_w, rel=1e-9)
     assert budget.irradiance_on_axis_w_m2 > budget.irradiance_w_m2
+
+
+def test_photons_received_for_each_bit_stand_in_the_budget():
+    budget, beam = link.communication_budget(MISSION, SOURCES, data_rate_bit_s=1e9), MISSION.communication
+    photons = budget.received_power_w * beam.wavelength_m / (6.62607015e-34 * 299_792_458.0) / 1e9
+    assert budget.received_photons_bit == pytest.approx(photons, rel=1e-12)
+    assert budget.totals[0].basis == f"sum of the lines above: {photons:.4g} photon/bit"
+    assert link.beacon_budget(MISSION, SOURCES).received_photons_bit is None
+
+
+def test_more_light_received_than_sent_is_no_margin(tmp_path):
+    near = link_file(tmp_path, {"communication.distance": "1 m"})
+    study = link_study.run(near)
+    assert study.communication.margin_db > 100.0
+    assert not study.communication.possible and not study.closes
+    (row,) = [r for r in requirement.of_links(study) if r.subject == "communication"]
+    assert (row.met, row.mark, row.because) == (False, "FAIL", requirement.IMPOSSIBLE)
+    assert "The links do not close" in budget_views.verdict(study)
+    assert link_study.run(link_file(tmp_path)).communication.possible
 
 
 def test_a_term_at_zero_decibel_is_a_line():

@@ -600,3 +600,33 @@ def test_the_uncertainty_of_a_search_is_that_of_the_worse_axis(tmp_path):
         m = study.file.mission
         found = link_acquisition.finding(m, off, study.beacon, study.answer, study.tracking)
         assert found.sigma_rad == pytest.approx(50e-6, rel=1e-12)
+
+
+# ------------------------------------------------------------------------------------------------- radius of the beam
+def lit_by(folder, radius, aperture="5 cm", error="0 urad"):
+    changes = {"communication.beam": {"profile": "gaussian", "radius": radius, "m_squared": 1.0}}
+    changes |= {"terminals.leo_aperture": aperture, "communication.pointing_error": error}
+    return link_study.run(link_file(folder, PATTERN, changes))
+
+
+def test_the_best_radius_of_a_beam_is_the_published_one(tmp_path):
+    """Klein and Degnan (1974): 1.12 radii of the beam to that of an unobscured aperture, on the axis."""
+    found = lit_by(tmp_path, "10 mm")
+    assert found.beam_radius.best_m == pytest.approx(25e-3 / 1.12, rel=0.06)
+    there = lit_by(tmp_path, f"{found.beam_radius.best_m * 1e3:.6f} mm")
+    assert there.communication.margin_db - found.communication.margin_db == pytest.approx(
+        found.beam_radius.gained_db, abs=1e-6
+    )
+
+
+def test_an_aperture_that_grows_around_an_unchanged_beam_is_pointed_out(tmp_path):
+    def told(aperture):
+        study = lit_by(tmp_path, "20 mm", aperture, "2 urad")
+        return study.communication.margin_db, [s for s in budget_views.short(study) if "radius" in s]
+
+    (filled, quiet), (hollow, said) = told("5 cm"), told("10 cm")
+    assert hollow - filled < 3.0  # where an aperture that is filled brings 6 dB at either end
+    assert quiet == []
+    (sentence,) = said
+    assert sentence.startswith("The beam's radius of 20 mm leaves ")
+    assert link_study.run(link_file(tmp_path)).beam_radius is None

@@ -415,11 +415,23 @@ def test_links_load_without_a_mirror_and_without_beacon_and_answer(tmp_path):
     assert (bare.beacon, bare.answer, bare.acquisition, bare.point_ahead) == (None, None, None, None)
 
 
-@pytest.mark.parametrize("table", ["pointing", "terminals", "conventions", "communication", "requirement"])
+@pytest.mark.parametrize("table", ["terminals", "conventions", "communication", "requirement"])
 def test_a_link_is_nothing_without_these_tables(tmp_path, table):
     found, text = the_fault(tmp_path, {table: None})
     assert found == table
     assert text.startswith("is missing: a table with the keys ")
+
+
+def test_what_nothing_reads_may_be_left_out(tmp_path):
+    gone = dict.fromkeys(("beacon", "answer", "acquisition", "pointing", "conventions.divergence"))
+    assert link_file(tmp_path, gone).mission.pointing is None
+    for key in ("pointing", "conventions.divergence", "conventions.strehl"):
+        found, text = the_fault(tmp_path, {key: None})
+        assert found == key
+        assert text.startswith("is missing, and ")
+    without = {**gone, "conventions.strehl": None, "communication.strehl": None}
+    m = link_file(tmp_path, {**without, "communication.wavefront_error": "60 nm"}).mission
+    assert (m.conventions.strehl, m.conventions.divergence) == ("unused", "unused")
 
 
 def test_a_whole_mission_is_read_for_its_links(tmp_path):

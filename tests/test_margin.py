@@ -8,7 +8,9 @@ import pytest
 
 from link_files import PATTERN, data_with, link_file, written
 from microrad import link, link_study
-from microrad.report.quantities import signed
+from microrad.missionfile import load_link
+from microrad.report.quantities import quantity, signed
+from shipped import SHIPPED, without_fine_pointing
 
 NO_BEAMS = dict.fromkeys(("beacon", "answer", "acquisition"))
 SHAKEN = {
@@ -71,6 +73,20 @@ def test_the_mean_loss_is_that_of_the_closed_form(tmp_path):
     assert f"{found.mean_loss_db:.4f}" == "3.0686"
 
 
+@pytest.mark.parametrize(
+    ("value", "unit", "text"),
+    [
+        (-1e-12, "dB", "0.00 dB"),
+        (-0.001, "dB", "\u22120.001 dB"),
+        (-2.0, "dB", "\u22122.00 dB"),
+        (1e-40, "", "below 1e-20"),
+        (1e-19, "", "1e-19"),
+    ],
+)
+def test_what_rounding_leaves_has_no_sign_and_no_share_is_smaller_than_it_can_be(value, unit, text):
+    assert quantity(value, unit).rstrip() == text
+
+
 # ------------------------------------------------------------------------------------------------------- by simulation
 def drawn(rng):
     """Changes to the links of the paper, at random, that leave a mission."""
@@ -109,3 +125,46 @@ def test_a_link_that_closes_keeps_its_margin_by_simulation(tmp_path, seed):
     else:
         assert short >= q - spread
     assert found.under_jitter.outage == pytest.approx(short, abs=5.0 * math.sqrt(max(short, 1e-4) / runs))
+
+
+# ----------------------------------------------------------------------------------------------------------- exit codes
+ONE_ROW = """
+mission = "link.toml"
+seed = 1
+runs = 1
+sampling = "random"
+[inputs."communication.transmit_power"]
+distribution = "uniform"
+low = "{low!r} W"
+high = "{high!r} W"
+"""
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_budget_and_a_campaign_of_one_row_end_alike(call, tmp_path, monkeypatch, seed):
+    monkeypatch.chdir(tmp_path)
+    path = written(tmp_path, data_with(drawn(np.random.default_rng(100 + seed))))
+    power_w = load_link(path).mission.communication.transmit_power_w
+    (tmp_path / "one.toml").write_text(ONE_ROW.format(low=power_w * (1 - 1e-9), high=power_w * (1 + 1e-9)))
+    budget = call("budget", path, "--json")
+    met = all(r["met"] for r in json.loads(budget.out)["requirements"])
+    assert budget.code == (0 if met else 1)
+    assert call("campaign", "run", "one.toml", "--threads", "1").code == budget.code
+
+
+@pytest.mark.usefixtures("undrawn")
+@pytest.mark.parametrize("power_w", [0.5, 7.0])
+def test_run_and_budget_at_its_residual_end_alike(call, tmp_path, power_w):
+    path = tmp_path / "mission.toml"
+    text = without_fine_pointing(SHIPPED.read_text(encoding="utf-8"))
+    assert text.count('transmit_power = "5 W"') == 1
+    path.write_text(text.replace('transmit_power = "5 W"', f'transmit_power = "{power_w} W"'), encoding="utf-8")
+    run = call("run", path, "--output", tmp_path / "out", "--json")
+    found = json.loads(run.out)
+    assert run.code == (0 if all(r["met"] for r in found["requirements"]) else 1)
+    given = "--pointing-error", f"{found['residual']['used_rad']!r} rad"
+    closes = call("budget", path, *given, "--exit-on", "closes").code
+    assert call("run", path, "--output", tmp_path / "again", "--exit-on", "closes").code == closes
+    assert found["closes"] is (closes == 0)
+    if run.code == 0:
+        assert call("budget", path, *given).code == 0

@@ -13,7 +13,7 @@ from microrad.presets import PAPER, preset_text, presets
 from microrad.units import UnitError
 from shipped import SHIPPED
 
-NAMES = ("click", "leo-hicali", "oicets-artemis", "paper", "sentinel1-edrs", "spot4-artemis", "tbird")
+NAMES = ("click", "crosslink", "leo-hicali", "oicets-artemis", "paper", "sentinel1-edrs", "spot4-artemis", "tbird")
 
 # values that let a file be read; they are no estimates of the terminals
 BODY = {"pointing.lines.body_pointing.error": '"300 urad"'}
@@ -24,6 +24,7 @@ ERROR = {"communication.pointing_error": '"2 urad"'}
 HOLE = {"terminals.geo_obscuration": "0.3"}
 EXAMPLES = {
     "paper": {},
+    "crosslink": {},
     "oicets-artemis": {**LOSSES, **SENSITIVITY, **ERROR, **HOLE},
     "spot4-artemis": {
         **BODY,
@@ -163,7 +164,7 @@ def test_one_value_left_unknown_is_still_refused(tmp_path, name):
         assert [fault.key for fault in caught.value.faults] == [key]
 
 
-@pytest.mark.parametrize("name", [name for name in NAMES if name != "paper"])
+@pytest.mark.parametrize("name", [name for name in NAMES if name not in ("paper", "crosslink")])
 def test_conventions_and_the_required_margin_are_no_facts(name):
     choices = ("conventions.", "requirement.margin", "requirement.outage", "pointing.confidence")
     found = [each for each in statements(preset_text(name)) if each.key.startswith(choices)]
@@ -227,7 +228,7 @@ def test_the_paper_is_a_whole_mission_whose_links_are_read_alone_too(tmp_path):
 
 
 def test_each_terminal_of_a_flown_link_has_its_own_name(tmp_path):
-    names = [completed(tmp_path, name).mission.terminals for name in NAMES if name != "paper"]
+    names = [completed(tmp_path, name).mission.terminals for name in NAMES if name not in ("paper", "crosslink")]
     assert [(each.called("leo"), each.called("geo")) for each in names] == [
         ("CLICK-B", "CLICK-C"),
         ("CubeSat", "HICALI"),

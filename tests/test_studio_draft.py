@@ -57,7 +57,7 @@ def test_every_value_has_its_text_its_source_and_what_it_may_hold(draft):
         ("beacon.strehl", "0.4", "number", "", 0.0, ()),
         ("acquisition.attempts", "5", "whole number", "", 1, ()),
         ("orbit.leo.limits.in_eclipse", "true", "switch", "", None, ()),
-        ("conventions.strehl", "decibel", "choice", "", None, ("decibel", "ratio")),
+        ("conventions.strehl", "decibel", "choice", "", None, ("decibel", "ratio", "unused")),
         ("name", "LEO-to-GEO relay of a 100 kg satellite", "text", "", None, ()),
         ("orbit.epoch", "2026-03-20T12:00:00Z", "text", "", None, ()),
         ("orbit.leo.inclination", "sun-synchronous", "quantity", "rad", 0.0, ()),
@@ -73,7 +73,9 @@ def test_a_form_is_built_from_the_models(draft, key, typed, kind, unit, least, c
     about = value.about
     assert (value.typed, about.kind, about.unit, about.choices) == (typed, kind, unit, choices)
     assert (about.quantity.least if about.quantity else None) == least
-    assert about.required == (key not in ("beacon.strehl", "orbit.leo.inclination", "mirror.linear.numerator"))
+    assert about.required == (
+        key not in ("conventions.strehl", "beacon.strehl", "orbit.leo.inclination", "mirror.linear.numerator")
+    )
 
 
 def test_a_key_has_its_description_and_its_words(draft):

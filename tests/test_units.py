@@ -10,7 +10,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from microrad import units
-from microrad.units import PLANCK_J_S, SPEED_OF_LIGHT_M_S, UnitError, format_quantity, parse_quantity
+from microrad.units import PLANCK_J_S, SPEED_OF_LIGHT_M_S, UnitError, format_input, format_quantity, parse_quantity
 from waiting import no_hang
 
 # our symbol: astropy's name for it; photon, bit and cycle are base dimensions in both
@@ -237,6 +237,22 @@ def test_a_readable_prefix_is_chosen(value, unit, text):
 def test_digits_are_kept_as_asked():
     assert format_quantity(1 / 3, "W", 2) == "330 mW"
     assert format_quantity(1 / 3, "W", 7) == "333.3333 mW"
+
+
+@pytest.mark.parametrize(
+    ("value", "unit", "text"),
+    [
+        (6.1336e12, "m", "6133600000 km"),
+        (42_164_170.0, "m", "42164.17 km"),
+        (1.55e-6, "m", "1.55 µm"),
+        (76.0, "photon/bit", "76 photon/bit"),
+        (331_541_911.34888077, "bit/s", "331.5 Mbit/s"),
+        (1.0 / 3.0, "W", "333.3 mW"),
+        (0.0, "rad", "0 rad"),
+    ],
+)
+def test_an_input_has_every_digit_that_it_was_given_with_and_a_computed_one_four(value, unit, text):
+    assert format_input(value, unit) == text
 
 
 @settings(deadline=None)  # the machine may be busy

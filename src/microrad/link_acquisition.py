@@ -142,7 +142,7 @@ def tracking(file: LinkFile, answer: link.LinkBudget | None) -> Tracking | None:
 
 def finding(
     m: LinkMission,
-    open_loop: pointing.OpenLoopPointing,
+    open_loop: pointing.OpenLoopPointing | None,
     beacon: link.LinkBudget | None,
     answer: link.LinkBudget | None,
     light: Tracking | None,
@@ -154,6 +154,7 @@ def finding(
     a = m.acquisition
     if a is None or m.beacon is None or m.answer is None or beacon is None or answer is None:
         return None
+    assert open_loop is not None  # the relations of the mission
     radii = (_reach(m, m.beacon, beacon), _reach(m, m.answer, answer), _return_reach(m))
     chances = acquisition.Chances(
         beacon_coverage=_coverage(open_loop.error, radii[0]),

@@ -21,6 +21,9 @@ Floats = NDArray[np.float64]
 STATIC_MARGIN = "Static margin"
 """What the margin at the static pointing error is called where the margin is the one under a jitter."""
 
+_OF_APERTURE = np.geomspace(0.1, 1.5, 28)
+"""Radii of the beam, over that of its aperture, of which the best is looked for: a tenth from one to the next."""
+
 
 @dataclass(frozen=True, slots=True)
 class PointAheadEffect:
@@ -38,17 +41,25 @@ class PointAheadEffect:
 
 
 @dataclass(frozen=True, slots=True)
+class BeamRadius:
+    """The radius of the data's beam with the largest margin in its aperture, and how much more margin that is (dB)."""
+
+    best_m: float
+    gained_db: float
+
+
+@dataclass(frozen=True, slots=True)
 class LinkStudy:
     """Everything that follows from the tables of the links alone. The links that a mission lacks are None.
 
     The communication budget is made at the error of `link_performance.error_rad`: under a jitter its margin is the one
     that is kept but for the outage, and the margin at the static pointing error stands below it. ``receiver_noise`` are
     the noise terms of the communication receiver at the received power, where it is given by what it is made of.
-    ``tornados`` has one of each budget, in the same order.
+    ``tornados`` has one of each budget, in the same order. ``beam_radius`` is None unless the mission has one.
     """
 
     file: LinkFile
-    open_loop: pointing.OpenLoopPointing
+    open_loop: pointing.OpenLoopPointing | None
     communication: link.LinkBudget
     beacon: link.LinkBudget | None
     answer: link.LinkBudget | None
@@ -58,6 +69,7 @@ class LinkStudy:
     under_jitter: Performance | None
     tracking: Tracking | None
     point_ahead: PointAheadEffect | None
+    beam_radius: BeamRadius | None
     finding: Finding | None
 
     @property
@@ -163,7 +175,7 @@ def run(file: LinkFile, parts: kept.Kept = kept.NOTHING) -> LinkStudy:
     m, sources = file.mission, file.sources
     beacon = None if m.beacon is None else link.beacon_budget(m, sources)
     answer = None if m.answer is None else link.answer_budget(m, sources)
-    open_loop = pointing.open_loop_budget(m, sources)
+    open_loop = None if m.pointing is None else pointing.open_loop_budget(m, sources)
     light = tracking(file, answer)
     communication, receiver = communication_budget(m, sources), link.receiver(m)
     rate = m.communication.data_rate_bit_s
@@ -180,6 +192,7 @@ def run(file: LinkFile, parts: kept.Kept = kept.NOTHING) -> LinkStudy:
         under_jitter=of_jitter(m),
         tracking=light,
         point_ahead=point_ahead(m),
+        beam_radius=beam_radius(m),
         finding=parts.part(finding, m, open_loop, beacon, answer, light),
     )
 
@@ -212,6 +225,25 @@ def tornados(
             swings = link.beam_tornado(m, sources, "beacon" if budget is beacon else "answer")
             found.append(link.Tornado(budget.name, budget.margin_db, swings))
     return tuple(found)
+
+
+def beam_radius(m: LinkMission) -> BeamRadius | None:
+    """What another radius of the data's beam would bring, or None where the mission gives none.
+
+    An aperture that grows while the radius stays gives no more light: the radius has to grow with it.
+    """
+    beam = m.communication.beam
+    if beam is None or beam.radius_m is None:
+        return None
+    radii = [*(m.terminals.leo_aperture_m / 2.0 * _OF_APERTURE), beam.radius_m]
+
+    def at(radius_m: float) -> float:
+        changed = m.with_value("communication.beam.radius_m", radius_m)
+        return link.margin_or_none(changed, margin_db) if link.lit(changed) else -math.inf
+
+    margins = [at(float(each)) for each in radii]
+    best = max(range(len(radii)), key=margins.__getitem__)
+    return BeamRadius(float(radii[best]), margins[best] - margins[-1])
 
 
 def largest_rate(m: LinkMission) -> float:

@@ -53,6 +53,10 @@ class Terminals(Table):
         return (self.leo_name if end == "leo" else self.geo_name) or end.upper()
 
 
+UNUSED: Literal["unused"] = "unused"
+"""A convention of what no beam states."""
+
+
 class LinkConventions(Table):
     """How numbers of a link are read that a source leaves ambiguous."""
 
@@ -60,8 +64,12 @@ class LinkConventions(Table):
         description="gaussian: beam with 1/e2 radius D/2 at the aperture; gain: exp(-G theta^2); "
         "pattern: the far field of communication.beam"
     )
-    strehl: Literal["decibel", "ratio"] = Field(description="decibel: a loss in dB; ratio: a number up to 1")
-    divergence: Literal["full-1/e2", "half-1/e2"] = Field(description="which angle a beam's divergence is")
+    strehl: Literal["decibel", "ratio", "unused"] = Field(
+        default=UNUSED, description="decibel: a loss in dB; ratio: a number up to 1; unused: no beam states one"
+    )
+    divergence: Literal["full-1/e2", "half-1/e2", "unused"] = Field(
+        default=UNUSED, description="which angle a beam's divergence is; unused: no beam states one"
+    )
 
 
 class Channel(Table):
@@ -331,6 +339,9 @@ def strehl_fits(name: str) -> Callable[..., Iterator[Problem]]:
     """Check that the Strehl of a beam is a ratio when it is read as one."""
 
     def check(conventions: LinkConventions, beam: Beam | None) -> Iterator[Problem]:
+        if beam and beam.strehl is not None and conventions.strehl == UNUSED:
+            reason = f"is missing, and {name}.strehl is read by it"
+            yield Problem("conventions.strehl", reason, 'strehl = "ratio" for a number up to 1, or "decibel"')
         if beam and beam.strehl is not None and conventions.strehl == "ratio" and not 0.0 < beam.strehl <= 1.0:
             reason = f'is no ratio, but conventions.strehl = "ratio" ({beam.strehl:g})'
             yield Problem(f"{name}.strehl", reason, 'above 0 and at most 1, or conventions.strehl = "decibel"')
@@ -343,6 +354,11 @@ def divergence_fits(name: str, end: str) -> Callable[..., Iterator[Problem]]:
 
     def check(conventions: LinkConventions, terminals: Terminals, beam: Beacon | None) -> Iterator[Problem]:
         if beam is None:
+            return
+        if conventions.divergence == UNUSED:
+            reason = f"is missing, and {name}.divergence is read by it"
+            advice = 'divergence = "full-1/e2" for the full angle at 1/e2, or "half-1/e2"'
+            yield Problem("conventions.divergence", reason, advice)
             return
         aperture = terminals.leo_aperture_m if end == "leo" else terminals.geo_aperture_m
         least = narrowest_half_angle_rad(aperture, beam.wavelength_m)

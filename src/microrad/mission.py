@@ -163,6 +163,13 @@ def _frequencies_fit(control: Control, scenario: Scenario) -> Iterator[Problem]:
             yield Problem(f"scenario.{name}", reason, f"frequencies below {half}")
 
 
+def _cone_fits(pointing: Pointing | None, beacon: Beacon | None) -> Iterator[Problem]:
+    """A beacon has to cover errors that are stated."""
+    if pointing is None and beacon is not None:
+        reason = "is missing, and the cone of the beacon is judged by its errors"
+        yield Problem("pointing", reason, "the table [pointing] with its lines, or no beacon")
+
+
 def _point_ahead_fits(point_ahead: PointAhead | None, fine: FinePointing | None) -> Iterator[Problem]:
     """One point-ahead: the mirror's largest is that of the largest velocity."""
     if point_ahead is None or fine is None:
@@ -208,6 +215,7 @@ LINK_RELATIONS: tuple[Relation, ...] = (
     (("conventions", "terminals", "answer"), divergence_fits("answer", "geo")),
     (("conventions", "communication"), pattern_fits),
     (("terminals", "communication"), obscuration_fits),
+    (("pointing", "beacon"), _cone_fits),
     (("orbit", "operations"), _needs_orbit("operations")),
     (("orbit", "constellation"), _needs_orbit("constellation")),
     (("operations", "acquisition"), _scan_there),
@@ -228,7 +236,7 @@ class LinkMission(Table):
     """What a link budget needs; a mission whose tables on mirror and loop are left out."""
 
     name: Name
-    pointing: Pointing
+    pointing: Pointing | None = None
     terminals: Terminals
     conventions: LinkConventions
     beacon: Beacon | None = None
@@ -257,6 +265,7 @@ class LinkMission(Table):
 class Mission(LinkMission):
     """Everything that a study needs."""
 
+    pointing: Pointing
     conventions: Conventions
     beacon: Beacon
     answer: Beacon

@@ -8,6 +8,7 @@ from typing import Any, get_args
 import numpy as np
 
 from microrad import link, tracking
+from microrad.link_table import UNUSED
 from microrad.mirror_table import Mirror
 from microrad.mission import Conventions, Mission, Requirement
 
@@ -61,7 +62,7 @@ def _choices(m: Mission) -> Iterator[tuple[str, str]]:
     for key, table in _OPEN:
         for other in get_args(table.model_fields[key.partition(".")[2]].annotation):
             as_read = m.with_value(key, other)
-            if other != _given(m, key) and not [*as_read.problems(), *as_read.mirror.problems()]:
+            if other not in (_given(m, key), UNUSED) and not [*as_read.problems(), *as_read.mirror.problems()]:
                 yield key, other
 
 

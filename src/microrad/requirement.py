@@ -95,6 +95,7 @@ def _bare(value: str) -> str:
 
 
 def _cone(study: LinkStudy) -> Requirement:
+    assert study.open_loop is not None  # it has a beacon
     p, derived = study.open_loop, derived_from(study.file.sources, "pointing.", "beacon.divergence")
     half, name = p.beacon_half_angle_rad, "beacon cone over the root sum square"
     largest = max(zip(p.variance_shares, p.lines, strict=True), key=lambda pair: pair[0])[1].name

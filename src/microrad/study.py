@@ -98,7 +98,9 @@ class Study:
     @property
     def open_loop(self) -> pointing.OpenLoopPointing:
         """The open-loop pointing budget."""
-        return self.links.open_loop
+        found = self.links.open_loop
+        assert found is not None  # a whole mission states its errors
+        return found
 
     @property
     def communication(self) -> link.LinkBudget:

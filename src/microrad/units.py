@@ -23,6 +23,7 @@ BLANKS = "\t\n\u00a0\u202f"
 """Blanks that do no harm where a text has several lines."""
 
 _MAX_CHARACTERS = 60
+_MOST_GIVEN = 10  # digits of a number that somebody wrote
 _MAX_DECIBEL = 1000.0  # beyond it the linear value leaves the range of a float
 
 _BASE = ("kg", "m", "s", "A", "K", "rad", "bit", "photon", "cycle")
@@ -295,6 +296,14 @@ def format_quantity(value: float, unit: str, digits: int = 4) -> str:
     prefix = _prefix(abs(rounded), re.split("[ /]", unit, maxsplit=1)[0])
     scaled = value / float(_PREFIXES[prefix]) if prefix else value
     return f"{float(f'{scaled:.{digits}g}'):.15g} {prefix}{unit}"
+
+
+def format_input(value: float, unit: str) -> str:
+    """`value` with every digit that it was given with; one that was computed, which has no end of them, with four."""
+    given = next(
+        (n for n in range(4, _MOST_GIVEN + 1) if math.isclose(float(f"{value:.{n}g}"), value, rel_tol=1e-14)), 4
+    )
+    return format_quantity(value, unit, given)
 
 
 def _prefix(magnitude: float, symbol: str) -> str:

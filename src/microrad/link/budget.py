@@ -21,7 +21,7 @@ from microrad.link.model import (
 )
 from microrad.link_table import Beacon, Communication, half_angle_rad
 from microrad.mission import LinkMission, Source, source_text
-from microrad.units import format_quantity
+from microrad.units import format_input, format_quantity
 
 _GIVEN = "whatever the pointing error and the data rate"
 _TRANSMITTING = (
@@ -59,7 +59,7 @@ class LinkBudget:
     `irradiance_on_axis_w_m2` is that of the same beam pointed without error and before Strehl.
     `required_irradiance_w_m2` is the irradiance there, pointing error and all, that leaves no margin.
     `radiant_intensity_w_sr` leaves the terminal along the beam's axis, optics and Strehl counted: what a far-field test
-    of the terminal measures.
+    of the terminal measures. `received_photons_bit` are the photons received for each bit; None without a data rate.
     """
 
     name: str
@@ -72,6 +72,7 @@ class LinkBudget:
     irradiance_on_axis_w_m2: float
     required_irradiance_w_m2: float
     radiant_intensity_w_sr: float
+    received_photons_bit: float | None
 
     @property
     def possible(self) -> bool:
@@ -126,7 +127,7 @@ def communication_budget(
         write.loss("Tracking split loss", "tracking_split_loss"),
         write.loss("Implementation loss", "implementation_loss"),
     )
-    return _budget("Communication", transmit, receive, _required_line(mission, rate, write, rate_source), beam)
+    return _budget("Communication", transmit, receive, _required_line(mission, rate, write, rate_source), beam, rate)
 
 
 def beacon_budget(mission: LinkMission, sources: Mapping[str, Source]) -> LinkBudget:
@@ -160,7 +161,7 @@ def _gaussian_budget(write: "Writer", beam: Beacon, receiver: str) -> LinkBudget
         _blocked(getattr(write.mission.terminals, f"{write.end}_obscuration") or 0.0),
     )
     gain = Line("Beam gain", gains.gaussian_beam_gain_db(half), "dB", f"8 / theta^2, {theta}", shape, far, doubts)
-    basis = f"exp(-2 (error / theta)^2), error = {format_quantity(error, 'rad')}, {theta}"
+    basis = f"exp(-2 (error / theta)^2), error = {format_input(error, 'rad')}, {theta}"
     loss = 0.0 - float(gains.gaussian_pointing_loss_db(error, half))
     doubts = _both(_wide("the error", error), _deep(loss))
     source, regime = write.source("pointing_error"), f"{far}; static error"
@@ -181,7 +182,7 @@ def _cut_by_aperture(half_angle_rad: float, aperture_m: float, wavelength_m: flo
         return ""
     return (
         f"a Gaussian beam this narrow is {format_quantity(2.0 * radius, 'm')} wide at 1/e2, and the aperture of "
-        f"{format_quantity(aperture_m, 'm')} cuts it: {lost:.2f} dB less gain than this, and a wider core"
+        f"{format_input(aperture_m, 'm')} cuts it: {lost:.2f} dB less gain than this, and a wider core"
     )
 
 
@@ -243,7 +244,7 @@ class Writer:
     def gain(self, end: str, regime: str) -> Line:
         """Gain of a whole, evenly lit aperture."""
         diameter, wavelength = self.aperture_m(end), self.beam.wavelength_m
-        shown = f"D = {format_quantity(diameter, 'm')}, lambda = {format_quantity(wavelength, 'm')}"
+        shown = f"D = {format_input(diameter, 'm')}, lambda = {format_input(wavelength, 'm')}"
         source = source_text(self.sources, f"terminals.{end}_aperture", f"{self.table}.wavelength")
         name = f"{self.mission.terminals.called(end)} aperture gain"
         return Line(
@@ -290,7 +291,7 @@ class Writer:
         ``with_ahead_db`` is the pointing loss once an uncorrected point-ahead is added to the error.
         """
         beam = self.beam
-        power = f"P = {format_quantity(beam.transmit_power_w, 'W')}"
+        power = f"P = {format_input(beam.transmit_power_w, 'W')}"
         channel = [] if self.mission.channel is None else [self._channel()]
         return (
             Line(
@@ -307,7 +308,7 @@ class Writer:
 
     def _space(self) -> Line:
         beam = self.beam
-        basis = f"(lambda / (4 pi R))^2, R = {format_quantity(beam.distance_m, 'm')}"
+        basis = f"(lambda / (4 pi R))^2, R = {format_input(beam.distance_m, 'm')}"
         value = -gains.free_space_loss_db(beam.distance_m, beam.wavelength_m)
         largest = max(self.mission.terminals.leo_aperture_m, self.mission.terminals.geo_aperture_m)
         far = gains.far_field_m(largest, beam.wavelength_m)
@@ -352,7 +353,7 @@ class Writer:
         regime = "on axis, small wavefront error (Marechal)"
         doubt = "" if loss <= _WORST_STREHL_DB else f"beyond {_WORST_STREHL_DB:g} dB a beam has no core to speak of"
         if beam.wavefront_error_m is not None:
-            basis = f"exp(-(2 pi s / lambda)^2), s = {format_quantity(beam.wavefront_error_m, 'm')} rms"
+            basis = f"exp(-(2 pi s / lambda)^2), s = {format_input(beam.wavefront_error_m, 'm')} rms"
             source = source_text(self.sources, f"{self.table}.wavefront_error")
         else:
             basis = "as given in dB" if convention == "decibel" else f"Strehl ratio {beam.strehl:g}"
@@ -363,16 +364,16 @@ class Writer:
 def _pointing_line(mission: LinkMission, error_rad: float, source: str) -> Line:
     loss = 0.0 - float(communication_beam(mission).fall.loss_db(error_rad))
     formula, regime = _POINTING_BASIS[mission.conventions.pointing_loss]
-    basis = f"{formula}, error = {format_quantity(error_rad, 'rad')}"
+    basis = f"{formula}, error = {format_input(error_rad, 'rad')}"
     doubts = _both(_wide("the error", error_rad), _deep(loss))
     return Line(POINTING_LOSS, loss, "dB", basis, source, f"{regime}; static error", doubts)
 
 
 def _required_line(mission: LinkMission, rate_bit_s: float, write: Writer, rate_source: str) -> Line:
     beam, level = mission.communication, float(required_dbm(mission, rate_bit_s))
-    rate = f"R = {format_quantity(rate_bit_s, 'bit/s')}"
+    rate = f"R = {format_input(rate_bit_s, 'bit/s')}"
     if beam.receiver is None:
-        sensitivity = format_quantity(beam.receiver_sensitivity_photon_bit or math.nan, "photon/bit")
+        sensitivity = format_input(beam.receiver_sensitivity_photon_bit or math.nan, "photon/bit")
         basis, key = f"n (h c / lambda) R, n = {sensitivity}, {rate}", "receiver_sensitivity"
         regime = "sensitivity the same at every data rate"
     else:
@@ -392,8 +393,13 @@ def _budget(
     receive: tuple[Line, ...],
     required: Line,
     beam: Beacon | Communication,
+    rate_bit_s: float | None = None,
 ) -> LinkBudget:
     received_dbm = total_db(transmit + receive)
+    photons, light = None, "sum of the lines above"
+    if rate_bit_s is not None:
+        photons = gains.watt(received_dbm) / gains.photon_energy_j(beam.wavelength_m) / rate_bit_s
+        light += f": {photons:.4g} photon/bit"
     margin = received_dbm - required.value
     mispointing = (STREHL_LOSS, POINTING_LOSS, POINT_AHEAD_LOSS)
     on_axis = [line for line in transmit if line.name not in mispointing]
@@ -403,7 +409,7 @@ def _budget(
         name=name,
         lines=transmit + receive,
         totals=(
-            Line("Received power", received_dbm, "dBm", "sum of the lines above", "computed", _AS_LINES),
+            Line("Received power", received_dbm, "dBm", light, "computed", _AS_LINES),
             required,
             Line("Margin", margin, "dB", "received power less required power", "computed", _AS_LINES),
         ),
@@ -414,6 +420,7 @@ def _budget(
         irradiance_on_axis_w_m2=_irradiance(total_db(on_axis), beam.wavelength_m),
         required_irradiance_w_m2=_irradiance(total_db(transmit) - margin, beam.wavelength_m),
         radiant_intensity_w_sr=gains.watt(total_db(leaving)) / (4.0 * math.pi),
+        received_photons_bit=photons,
     )
 
 

@@ -127,8 +127,11 @@ def open_loop_budget(
 
     One statistical interpretation holds for all lines. "temporal" asks for the mission's confidence as a share of the
     time of the worst-case satellite, "mixed" over the times of all satellites: see `error_term`. Point-ahead is a line
-    where the mission has it. Raises `ValueError` for a line of the mission that stands for it as well.
+    where the mission has it. Raises `ValueError` for a mission without pointing errors, and for a line that stands for
+    point-ahead as well.
     """
+    if mission.pointing is None:
+        raise ValueError("the mission states no pointing errors; give it the table [pointing]")
     ahead = None if mission.point_ahead is None else point_ahead(mission.point_ahead)
     entries = tuple(_entries(mission, ahead, sources, interpretation))
     lines, stated = tuple(line for line, _ in entries), tuple(error for _, error in entries)
@@ -168,6 +171,7 @@ def open_loop_budget(
 def _entries(
     mission: LinkMission, ahead: PointAheadAngle | None, sources: Mapping[str, Source], interpretation: Interpretation
 ) -> Iterator[tuple[Line, StatedError]]:
+    assert mission.pointing is not None
     for key, line in mission.pointing.lines.items():
         name = key.replace("_", " ").replace("-", " ").strip().capitalize()
         if ahead is not None and name.lower() == NAME.lower().replace("-", " "):

@@ -23,7 +23,7 @@ _LEAD_IN = 28
 _INCOMPLETE = 0xFFFF_FFFF_FFFF_FFFF
 _VERSIONS = (4712, 4713)
 _BIG_ENDIAN = 1 << 6
-_OF_NUMBERS = ("Cropping data", "Data size", "Last segment", "Unsupported scale type")
+_OF_NUMBERS = ("Cropping data", "Unsupported scale type")
 
 
 class TdmsSource(Container):

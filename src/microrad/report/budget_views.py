@@ -12,7 +12,7 @@ from microrad.budget import Line
 from microrad.link import Swing
 from microrad.link_acquisition import Finding, Found, Tracking
 from microrad.link_performance import Performance, error_rad, required_error_rad
-from microrad.link_study import LinkStudy, Solution
+from microrad.link_study import BeamRadius, LinkStudy, Solution
 from microrad.mission import source_text
 from microrad.operations import spreadsheet_text
 from microrad.pointing import OpenLoopPointing
@@ -20,10 +20,12 @@ from microrad.report import requirements
 from microrad.report.quantities import quantity, signed
 from microrad.report.tables import Table, table_text, tables_text
 from microrad.requirement import met, of_links, outage_words
+from microrad.units import format_input
 
 UNDER_JITTER = "Communication under jitter"
 """The lines of what the jitter does to the communication link, beside its budget."""
 _ROOM = 120  # columns for a table of all that a line has
+_WORTH_DB = 0.5  # of a margin: what another radius of the beam would have to bring
 COLUMNS = ("budget", "line", "value", "unit", "basis", "source", "holds for", "warning")
 
 
@@ -31,7 +33,8 @@ def lines(study: LinkStudy) -> list[tuple[str, Line]]:
     """Every line of every budget with the name of its budget, totals included, in the order of the page."""
     found = [(b.name, line) for b in study.budgets for line in (*b.lines, *b.totals)]
     found += [("Communication receiver", line) for line in study.receiver_noise]
-    found += [("Open-loop pointing", line) for line in study.open_loop.lines]
+    if study.open_loop is not None:
+        found += [("Open-loop pointing", line) for line in study.open_loop.lines]
     if study.tracking is not None:
         found += [("Tracking sensor", line) for line in study.tracking.noise_lines]
         if study.tracking.noise_equivalent_angle is not None:
@@ -134,7 +137,9 @@ def _stacked(row: tuple[str, ...]) -> tuple[str, ...]:
 
 def sentences(study: LinkStudy) -> list[str]:
     """What follows from the budgets, a sentence each."""
-    found = [verdict(study), *consequences(study), *pointing_sentences(study.open_loop)]
+    found = [verdict(study), *consequences(study)]
+    if study.open_loop is not None:
+        found += pointing_sentences(study.open_loop)
     if study.under_jitter is not None:
         found.append(performance(study.under_jitter, study))
     if study.finding is not None:
@@ -153,6 +158,8 @@ def consequences(study: LinkStudy) -> list[str]:
     else:
         rate = quantity(study.largest_rate_bit_s, "bit/s")
         found.append(f"Largest data rate with {wanted}: {rate}{_rate_limit(study)}.")
+    if study.beam_radius is not None and study.beam_radius.gained_db >= _WORTH_DB:
+        found.append(_radius(study, study.beam_radius))
     by = "each input by 10 % (0.5 dB; a bit error ratio or an outage by a factor of ten) both ways"
     own, *others = study.tornados
     if own.swings:
@@ -171,6 +178,16 @@ def consequences(study: LinkStudy) -> list[str]:
     if study.point_ahead is not None:
         found.append(point_ahead(study))
     return found
+
+
+def _radius(study: LinkStudy, other: BeamRadius) -> str:
+    m = study.file.mission
+    assert m.communication.beam is not None and m.communication.beam.radius_m is not None
+    own, aperture = (format_input(each, "m") for each in (m.communication.beam.radius_m, m.terminals.leo_aperture_m))
+    return (
+        f"The beam's radius of {own} leaves {quantity(other.gained_db, 'dB')} to gain in the aperture of {aperture}: "
+        f"some {quantity(other.best_m, 'm', 2)} would be best."
+    )
 
 
 def _rate_limit(study: LinkStudy) -> str:
@@ -341,7 +358,6 @@ def _span(i: link.Interval, unit: str) -> str:
 
 def facts(study: LinkStudy) -> dict[str, Any]:
     """The budgets and what follows from them as plain data, without a verdict of their own."""
-    p = study.open_loop
     return {
         "mission": study.file.mission.name,
         "mission_sha256": study.file.sha256,
@@ -351,6 +367,7 @@ def facts(study: LinkStudy) -> dict[str, Any]:
                 "margin_db": b.margin_db,
                 "received_power_w": b.received_power_w,
                 "required_power_w": b.required_power_w,
+                "received_photons_bit": b.received_photons_bit,
                 "irradiance_w_m2": b.irradiance_w_m2,
                 "irradiance_on_axis_w_m2": b.irradiance_on_axis_w_m2,
                 "radiant_intensity_w_sr": b.radiant_intensity_w_sr,
@@ -367,22 +384,26 @@ def facts(study: LinkStudy) -> dict[str, Any]:
             {"of": t.of, "margin_db": t.margin_db, "tornado": [_swing_data(s) for s in t.swings]}
             for t in study.tornados[1:]
         ],
-        "pointing": {
-            "lines": [line_data(line) for line in p.lines],
-            "confidence": p.confidence,
-            "totals": [
-                {"rule": s.rule, "of": s.of, "total_rad": s.total_rad, "authority": s.authority, "caveat": s.caveat}
-                for s in p.summations
-            ],
-            "beacon_coverage": None if p.reading is None else p.reading.coverage,
-            "left_for_each": _left(p),
-        },
+        "pointing": None if study.open_loop is None else _open_loop(study.open_loop),
         "point_ahead": None if study.point_ahead is None else asdict(study.point_ahead),
         "receiver_noise": [line_data(line) for line in study.receiver_noise],
         "tracking": None if study.tracking is None else _tracking(study),
         "acquisition": None if study.finding is None else finding_data(study.finding),
         "under_jitter": None if study.under_jitter is None else performance_data(study.under_jitter),
         "warnings": list(study.warnings),
+    }
+
+
+def _open_loop(p: OpenLoopPointing) -> dict[str, Any]:
+    return {
+        "lines": [line_data(line) for line in p.lines],
+        "confidence": p.confidence,
+        "totals": [
+            {"rule": s.rule, "of": s.of, "total_rad": s.total_rad, "authority": s.authority, "caveat": s.caveat}
+            for s in p.summations
+        ],
+        "beacon_coverage": None if p.reading is None else p.reading.coverage,
+        "left_for_each": _left(p),
     }
 
 

@@ -30,7 +30,7 @@ def context(
     cases = () if under is None else (under,)
     outage = links.file.mission.requirement.outage
     return {
-        "pointing": pointing(links.open_loop),
+        "pointing": None if links.open_loop is None else pointing(links.open_loop),
         "budgets": budgets,
         "warnings": links.warnings,
         "sentences": budget_views.consequences(links),

@@ -132,7 +132,8 @@ def link_numbers(draft: Draft) -> tuple[Number, ...]:
     rate = study.file.mission.communication.data_rate_bit_s
     found.append(Number("Data rate", float(rate), "bit/s"))
     found.append(Number("Largest data rate with the required margin", study.largest_rate_bit_s, "bit/s"))
-    found.append(Number("Open-loop pointing error, root sum square", study.open_loop.rss_rad, "rad"))
+    if study.open_loop is not None:
+        found.append(Number("Open-loop pointing error, root sum square", study.open_loop.rss_rad, "rad"))
     if study.finding is not None:
         outcome = study.finding.wide.outcome
         found.append(Number("Acquisition by the wide beacon: probability", outcome.success_probability, ""))
