@@ -1,4 +1,4 @@
-# `make demo` runs the paper's mission, `make test` checks everything; each sets up what it needs in .venv first.
+# `make demo` runs the shipped mission, `make test` checks everything; each sets up what it needs in .venv first.
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin

@@ -10,9 +10,11 @@ from pathlib import Path
 import pytest
 import typer
 
-from microrad import cli, document, machine
+from microrad import cli, document, machine, report, study
+from microrad.missionfile import load_mission
 from microrad.report import compared, interactive_style, page, results, tolerances
 from microrad.studio import address, guard, jobs_process, reading, server, uploads, workshop
+from shipped import DEFAULT
 
 ROOT = Path(__file__).parent.parent
 CONTRIBUTING = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
@@ -135,3 +137,9 @@ def test_files_that_are_named_exist(path):
 @pytest.mark.parametrize("target", re.findall(r"(?m)^    make (\w+)", CONTRIBUTING))
 def test_targets_of_make_exist(target):
     assert re.search(rf"(?m)^{target}:", (ROOT / "Makefile").read_text(encoding="utf-8"))
+
+
+def test_the_text_in_the_readme_is_what_the_shipped_mission_prints():
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    assert f"```text\n{report.verdict_text(study.run(load_mission(DEFAULT)), 80)}\n```\n" in text
+    assert all(len(line) <= 80 for line in text.partition("```text\n")[2].partition("```")[0].splitlines())

@@ -185,9 +185,9 @@ def test_irradiance_times_area_is_the_received_power(budget_of):
 def test_photons_received_for_each_bit_stand_in_the_budget():
     budget, beam = link.communication_budget(MISSION, SOURCES, data_rate_bit_s=1e9), MISSION.communication
     photons = budget.received_power_w * beam.wavelength_m / (6.62607015e-34 * 299_792_458.0) / 1e9
-    assert budget.received_photons_bit == pytest.approx(photons, rel=1e-12)
+    assert budget.received_photons_per_bit == pytest.approx(photons, rel=1e-12)
     assert budget.totals[0].basis == f"sum of the lines above: {photons:.4g} photon/bit"
-    assert link.beacon_budget(MISSION, SOURCES).received_photons_bit is None
+    assert link.beacon_budget(MISSION, SOURCES).received_photons_per_bit is None
 
 
 def test_more_light_received_than_sent_is_no_margin(tmp_path):

@@ -57,10 +57,10 @@ def test_design_shows_both_figures_and_warns_of_the_linear_one(light, call, monk
     (warning,) = found["warnings"]
     assert f"by {OBSERVER} ({ratio:.1f} times): choose by the simulated figure" in warning
     printed = call("design", "light.toml").out
-    row = next(line for line in printed.splitlines() if line.startswith(OBSERVER))
+    row = next(line for line in printed.splitlines() if line.split()[:1] == OBSERVER.split()[:1])
     assert f"{broken['residual_rms_rad_per_axis'] * 1e6:.3f} " in row
     assert f"{broken['simulated_rms_rad_per_axis'] * 1e6:.3f} " in row
-    assert f"warning: {warning}" in printed
+    assert f"Warning: {warning}." in " ".join(printed.split())
 
 
 def test_what_breaks_its_promise_is_exported_only_where_that_is_accepted(light, call, refused, monkeypatch):

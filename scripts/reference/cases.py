@@ -133,14 +133,20 @@ LOOPS = without(NO_DAY, "fine_pointing")
 
 
 def mission(place: Place) -> Any:
-    """The shipped mission, run; its links are those of the case `budget`."""
+    """The paper's mission, run; its links are those of the case `budget`."""
     summary = place.json("run", "leo-geo.toml")
     del summary["links"]
     return summary
 
 
+def mission_shipped(place: Place) -> Any:
+    """The mission that `microrad init` writes, run, with its links."""
+    place.run("init", "shipped.toml")
+    return place.json("run", "shipped.toml")
+
+
 def mission_results(place: Place) -> Any:
-    """What the shipped mission leaves in its results file."""
+    """What the paper's mission leaves in its results file."""
     place.run("run", "leo-geo.toml", "--output", "study")
     return arrays(place.folder / "study" / "results.nc")
 
@@ -384,7 +390,7 @@ def export_matrices(place: Place) -> Any:
 
 
 # ---------------------------------------------------------------------------------------------------------------- list
-PRESETS = ("click", "leo-hicali", "oicets-artemis", "paper", "sentinel1-edrs", "spot4-artemis", "tbird")
+PRESETS = ("click", "crosslink", "leo-hicali", "oicets-artemis", "paper", "sentinel1-edrs", "spot4-artemis", "tbird")
 
 CASES: Mapping[str, Case] = {
     "budget": Case(budget),
@@ -407,6 +413,7 @@ CASES: Mapping[str, Case] = {
     "mirror-prandtl-ishlinskii": Case(prandtl_ishlinskii),
     "mission": Case(mission, quick=False),
     "mission-results": Case(mission_results, quick=False),
+    "mission-shipped": Case(mission_shipped, quick=False),
     **{f"preset-{name}": Case(preset(name)) for name in PRESETS},
 }
 """All cases; a file reference/NAME.json each."""

@@ -52,6 +52,7 @@ _LEFT_OUT = re.compile("|".join(f"(?:{pattern})" for pattern in LEFT_OUT))
 # --------------------------------------------------------------------------------------------------------------- units
 UNITS = {
     "rad2_hz": "rad^2/Hz",
+    "photons_per_bit": "photon/bit",
     "photon_bit": "photon/bit",
     "rad_s2": "rad/s^2",
     "rad_v": "rad/V",

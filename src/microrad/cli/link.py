@@ -109,16 +109,17 @@ def _changed(file: "LinkFile", data_rate: str | None, pointing_error: str | None
 @app.command(epilog=examples("microrad presets", "microrad init --preset click click.toml"))
 @command
 def presets(as_json: Json = False) -> Outcome:
-    """List links from the literature to start from.
+    """List links and missions to start from.
 
-    Each is a file of link tables in which every value names its source; what no source prints is "unknown" and has to
+    Each is a file in which every value names its source; what no source prints is "unknown" and has to
     be given before a budget is made of it.
     """
     from microrad.presets import presets as all_presets
+    from microrad.report.tables import Table, table_text
 
     found = all_presets()
     if as_json:
         return Outcome(json_text([{"name": p.name, "title": p.title, "unknown": list(p.unknown)} for p in found]))
-    widest = max(len(p.name) for p in found)
-    lines = [f"{p.name:{widest}}  {p.title} ({len(p.unknown) or 'nothing'} to be given)" for p in found]
-    return Outcome("\n".join([*lines, "", "microrad init --preset NAME writes one."]))
+    rows = [(p.name, p.title, str(len(p.unknown) or "nothing")) for p in found]
+    table = Table("", ("preset", "what it is", "to be given"), rows, (1,))
+    return Outcome(f"{table_text(table, width())}\n\nmicrorad init --preset NAME writes one.")

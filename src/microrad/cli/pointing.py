@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from microrad.cli.frame import Json, Outcome, Refusal, app, command, examples, json_text, option, progress_bar
+from microrad.cli.frame import Json, Outcome, Refusal, app, command, examples, json_text, option, progress_bar, width
 
 # Everything else is imported inside the commands: it takes longer to load than help may take.
 if TYPE_CHECKING:
@@ -48,7 +48,7 @@ def design(
     if as_json:
         found = {"mission_sha256": mission.sha256, "controllers": list(map(_data, designs, left)), "warnings": warnings}
         return Outcome(json_text(found))
-    return Outcome("\n".join([*_lines(scene, designs, left), *(f"warning: {text}" for text in warnings)]))
+    return Outcome(_text(scene, designs, left, warnings))
 
 
 def _broken(designs: "tuple[Design, ...]", left: "tuple[Outlook, ...]") -> str:
@@ -68,27 +68,26 @@ def _broken(designs: "tuple[Design, ...]", left: "tuple[Outlook, ...]") -> str:
     )
 
 
-def _lines(scene: "Scene", designs: "tuple[Design, ...]", left: "tuple[Outlook, ...]") -> list[str]:
+def _text(scene: "Scene", designs: "tuple[Design, ...]", left: "tuple[Outlook, ...]", warnings: list[str]) -> str:
+    from microrad.report.tables import Table, tables_text
     from microrad.units import format_quantity
 
     rate = format_quantity(1.0 / scene.loop.timing.period_s, "Hz")
-    lines = [
-        f"one axis at {rate}: rms of the residual, linear and simulated on the mission's mirror with its hysteresis;",
-        "margins of the linear sampled loop with its delay",
-        "",
-        f"{'':28} {'rms µrad':^19}",
-        f"{'controller':28} {'linear':>9} {'simulated':>9} {'modulus':>8} {'phase °':>8} {'gain dB':>8} "
-        f"{'bandwidth':>10}  tuned to",
-    ]
+    about = (
+        f"One axis at {rate}: rms of the residual in µrad, linear and simulated on the mission's mirror with its "
+        "hysteresis; margins of the linear sampled loop with its delay."
+    )
+    rows, tuned = [], []
     for d, x in zip(designs, left, strict=True):
-        margins, values = _data(d, x)["margins"], ", ".join(f"{k} {v:.3g}" for k, v in d.tuned.values.items())
-        gain = f"{margins['gain_up_db']:8.1f}" if margins["gain_up_db"] is not None else "    none"
+        margins, rms = _data(d, x)["margins"], (f"{each * 1e6:.3f}" for each in (x.linear_rad, x.simulated_rad))
+        gain = "none" if margins["gain_up_db"] is None else f"{margins['gain_up_db']:.1f} dB"
         bandwidth = format_quantity(margins["bandwidth_hz"], "Hz", 3)
-        lines.append(
-            f"{d.name:28} {x.linear_rad * 1e6:9.3f} {x.simulated_rad * 1e6:9.3f} {margins['modulus']:8.3f} "
-            f"{margins['phase_deg']:8.0f} {gain} {bandwidth:>10}  {values}"
-        )
-    return lines
+        rows.append((d.name, *rms, f"{margins['modulus']:.3f}", f"{margins['phase_deg']:.0f}°", gain, bandwidth))
+        tuned.append((d.name, ", ".join(f"{k} {v:.3g}" for k, v in d.tuned.values.items())))
+    headings = ("controller", "linear", "simulated", "modulus", "phase", "gain", "bandwidth")
+    tables = [Table("", headings, rows, (0,)), Table("", ("controller", "tuned to"), tuned, (1,))]
+    said = tables_text([], [about], width()), tables_text(tables, [f"Warning: {each}." for each in warnings], width())
+    return "\n\n".join(text.strip("\n") for text in said)
 
 
 def _data(d: "Design", left: "Outlook") -> dict[str, Any]:

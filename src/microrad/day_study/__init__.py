@@ -11,6 +11,7 @@ from microrad.day_study.geometry import Encounter, View, beyond_the_mission, enc
 from microrad.link_acquisition import Found
 from microrad.link_study import LinkStudy
 from microrad.mission import LinkMission
+from microrad.requirement import derived_from
 from microrad.units import format_quantity
 
 Progress = Callable[[int, int, str], None]
@@ -42,7 +43,8 @@ class DayStudy:
     """The span of a mission by both ways, and the assumptions that move the comparison, the weightiest first.
 
     ``encounters`` are the contacts of the relay as it grants them, with what their line of sight reaches. ``closings``
-    are the laser's rates, highest first, with how far each reaches under ``loss``.
+    are the laser's rates, highest first, with how far each reaches under ``loss``; ``derived`` are the inputs of the
+    laser link that were chosen for its margin (`requirement.derived_from`), so that its reach follows from that choice.
     """
 
     mission: LinkMission
@@ -50,6 +52,7 @@ class DayStudy:
     encounters: tuple[Encounter, ...]
     loss: PointingLoss
     closings: tuple[Closing, ...]
+    derived: tuple[str, ...]
     relay: Way
     direct: Way | None
     swings: tuple[Swing, ...]
@@ -122,6 +125,7 @@ def run(
         view=seen,
         loss=loss,
         closings=closing,
+        derived=derived_from(links.file.sources, "communication."),
         encounters=tuple(encounter(m, seen.pair, contact) for contact in relay.contacts),
         relay=relay,
         direct=flow.direct(m, seen, heard),

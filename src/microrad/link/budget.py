@@ -59,7 +59,7 @@ class LinkBudget:
     `irradiance_on_axis_w_m2` is that of the same beam pointed without error and before Strehl.
     `required_irradiance_w_m2` is the irradiance there, pointing error and all, that leaves no margin.
     `radiant_intensity_w_sr` leaves the terminal along the beam's axis, optics and Strehl counted: what a far-field test
-    of the terminal measures. `received_photons_bit` are the photons received for each bit; None without a data rate.
+    of the terminal measures. `received_photons_per_bit` is None for a beam without a data rate.
     """
 
     name: str
@@ -72,7 +72,7 @@ class LinkBudget:
     irradiance_on_axis_w_m2: float
     required_irradiance_w_m2: float
     radiant_intensity_w_sr: float
-    received_photons_bit: float | None
+    received_photons_per_bit: float | None
 
     @property
     def possible(self) -> bool:
@@ -420,7 +420,7 @@ def _budget(
         irradiance_on_axis_w_m2=_irradiance(total_db(on_axis), beam.wavelength_m),
         required_irradiance_w_m2=_irradiance(total_db(transmit) - margin, beam.wavelength_m),
         radiant_intensity_w_sr=gains.watt(total_db(leaving)) / (4.0 * math.pi),
-        received_photons_bit=photons,
+        received_photons_per_bit=photons,
     )
 
 

@@ -367,7 +367,7 @@ def facts(study: LinkStudy) -> dict[str, Any]:
                 "margin_db": b.margin_db,
                 "received_power_w": b.received_power_w,
                 "required_power_w": b.required_power_w,
-                "received_photons_bit": b.received_photons_bit,
+                "received_photons_per_bit": b.received_photons_per_bit,
                 "irradiance_w_m2": b.irradiance_w_m2,
                 "irradiance_on_axis_w_m2": b.irradiance_on_axis_w_m2,
                 "radiant_intensity_w_sr": b.radiant_intensity_w_sr,

@@ -127,13 +127,17 @@ def rate_words(day: DayStudy) -> str:
         + ("at every range of the contacts" if reaches(c) else f"up to {kilometres(c.largest_range_m)} km")
         for c in day.closings
     )
+    ends = max((c.largest_range_m for c in day.closings), default=0.0)
+    circular = ""
+    if day.derived and 0.0 < ends < furthest:
+        circular = f" How far it reaches, and so the volume, follows from {'; '.join(day.derived)}."
     lost = f"; {100 * day.loss.outage:.2g} % of the time is lost in outage" if day.loss.outage else ""
     idle = ""
     if all(c.largest_range_m < furthest for c in day.closings):
         idle = f" Beyond that no data flow: the contacts reach {kilometres(furthest)} km."
     return (
         f"With a pointing loss of {day.loss.loss_db:.2f} dB ({day.loss.source}) the laser link has the demanded "
-        f"{o.margin_db:g} dB for {said}{lost}.{idle}"
+        f"{o.margin_db:g} dB for {said}{lost}.{idle}{circular}"
     )
 
 

@@ -113,7 +113,7 @@ SUMMARY: Mapping[str, tuple[str, ...]] = {
         "{largest_data_rate_bit_s,largest_pointing_error_rad}",
         "implied_sensitivity_photon_bit[]",
         "links.budgets[].{margin_db,received_power_w,required_power_w,irradiance_w_m2,irradiance_on_axis_w_m2}",
-        "links.budgets[].{radiant_intensity_w_sr,required_irradiance_w_m2,received_photons_bit}",
+        "links.budgets[].{radiant_intensity_w_sr,required_irradiance_w_m2,received_photons_per_bit}",
         "links.{budgets[].lines,budgets[].totals,pointing.lines,receiver_noise,tracking.lines}[].value",
         "links.largest_data_rate_bit_s",
         "links.{tornado,other_tornados[].tornado}[].{value,low,high,margin_low_db,margin_high_db}",
