@@ -3,6 +3,7 @@
 import contextlib
 import io
 import json
+import re
 import shlex
 import shutil
 import zipfile
@@ -120,11 +121,8 @@ def test_controllers_are_designed_alike(folder, capsys, monkeypatch):
     (folder / MISSION).write_text(SHIPPED.read_text("utf-8"), encoding="utf-8")
     out, code, _ = typed(command(Design(MISSION)), capsys)
     assert code == 0
-    listed = [(row[:28].strip(), *row[28:].split()[:3]) for row in out.splitlines()[5:]]
-    found = [
-        (row[:28].strip(), *row[28:].split()[:2], row.split()[-1])
-        for row in executed(Design(MISSION).python).splitlines()
-    ]
+    listed = re.findall(r"(\d+\.\d{3}) +(\d+\.\d{3}) +(\d\.\d{3}) ", out)
+    found = [(*row[28:].split()[:2], row.split()[-1]) for row in executed(Design(MISSION).python).splitlines()]
     assert found == listed
     assert len(found) > 3
 
