@@ -78,10 +78,15 @@ def whole_folder(folder: Path, overwrite: bool, kind: str = "mission", what: str
         shutil.rmtree(draft, ignore_errors=True)
 
 
+def scratch_folder(what: str) -> Path:
+    """A new folder among the temporary files, which whoever asks for it removes."""
+    return _new_folder(Path(tempfile.gettempdir()), f"microrad-{what}")
+
+
 @contextmanager
-def scratch(what: str) -> Iterator[Path]:
-    """A folder among the temporary files, which vanishes at the end."""
-    folder = _new_folder(Path(tempfile.gettempdir()), f"microrad-{what}")
+def scratch(what: str, beside: Path | None = None) -> Iterator[Path]:
+    """A folder among the temporary files, or ``beside`` a file and hidden there, which vanishes at the end."""
+    folder = scratch_folder(what) if beside is None else _new_folder(beside.parent, f".{beside.name}-{what}", ".part")
     try:
         yield folder
     finally:

@@ -5,7 +5,6 @@ import hashlib
 import json
 import os
 import shutil
-import tempfile
 import weakref
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -20,6 +19,7 @@ from microrad import lti
 from microrad.campaign.file import CampaignFile, load_campaign
 from microrad.campaign.records import CampaignError
 from microrad.control import AxisController
+from microrad.folder import scratch_folder
 from microrad.machine import source_sha256
 from microrad.missionfile import named_files
 
@@ -80,7 +80,7 @@ def opened(spec: bytes, any_code: bool = False) -> Opened:
             f"this worker runs other code than the campaign: {code_sha256()} here, {code} there; install the "
             "same microrad, Python and libraries on every worker"
         )
-    folder = Path(tempfile.mkdtemp(prefix="microrad-campaign-"))
+    folder = scratch_folder("campaign")
     try:
         for inside, content in files.items():
             path = _inside(folder, inside)

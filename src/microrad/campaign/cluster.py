@@ -9,7 +9,6 @@ import logging
 import os
 import shutil
 import signal
-import tempfile
 import threading
 import time
 import uuid
@@ -23,6 +22,7 @@ from typing import Any
 from microrad.campaign.engines import SLICE_S, Clock, Flight, Waiting, late_flights, late_reason
 from microrad.campaign.records import CampaignError, Job, Outcome
 from microrad.campaign.worker import Beat, Kind, Work, beat_every_s, code_sha256, die_with_parent, open_target, words
+from microrad.folder import scratch_folder
 from microrad.installing import advice
 
 _ANSWER_S = 20.0  # a scheduler or worker that does not answer for so long is gone
@@ -153,7 +153,7 @@ class _Cluster:
         from distributed import LocalCluster
 
         self.workers = workers
-        self._folder = tempfile.mkdtemp(prefix="microrad-dask-")
+        self._folder = str(scratch_folder("dask"))
         with dask.config.set({"distributed.scheduler.allowed-failures": 0, "distributed.admin.event-loop": "tornado"}):
             self._cluster: Any = LocalCluster(  # type: ignore[no-untyped-call]
                 n_workers=workers,

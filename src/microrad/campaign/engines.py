@@ -8,7 +8,6 @@ import shutil
 import signal
 import subprocess
 import sys
-import tempfile
 import threading
 import time
 from collections import deque
@@ -19,6 +18,7 @@ from queue import Empty, SimpleQueue
 
 from microrad.campaign.records import CampaignError, Job, Outcome
 from microrad.campaign.worker import Kind, Message, pack_job, read_message, write_message
+from microrad.folder import scratch_folder
 
 SLICE_S = 0.1  # a wait lasts this long at most, so that Ctrl-C is prompt on every system
 _START_S = 300.0  # the first start on a machine compiles
@@ -110,7 +110,7 @@ class _Child:
 
     def __init__(self, spec: bytes, target: str, threads: int, late_s: float, clock: Clock) -> None:
         arguments = [target, str(threads), str(late_s), str(os.getpid())]
-        self._folder = tempfile.mkdtemp(prefix="microrad-worker-")  # it is killed, and would leave its own behind
+        self._folder = str(scratch_folder("worker"))  # it is killed, and would leave its own behind
         self.process = subprocess.Popen(
             [sys.executable, "-P", "-X", "faulthandler", "-m", "microrad.campaign.worker", *arguments],
             stdin=subprocess.PIPE,

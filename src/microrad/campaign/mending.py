@@ -2,7 +2,6 @@
 
 import shutil
 import sqlite3
-import tempfile
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import closing, suppress
 from dataclasses import dataclass
@@ -29,6 +28,7 @@ from microrad.campaign.ledger_file import (
 )
 from microrad.campaign.ledger_log import LEAF, PAGE
 from microrad.campaign.records import CampaignError
+from microrad.folder import scratch
 
 _NOT_DAMAGE = {
     *(sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR, sqlite3.SQLITE_READONLY),
@@ -174,8 +174,8 @@ def mend(path: Path) -> int:
 
 def _rebuild(path: Path) -> None:
     """Replace a ledger by a new one with all of it that is whole."""
-    with tempfile.TemporaryDirectory(prefix=f".{path.name}-", suffix=".part", dir=path.parent) as folder:
-        copy, draft = Path(folder, "damaged"), Path(folder, "mended")
+    with scratch("mend", path) as folder:
+        copy, draft = folder / "damaged", folder / "mended"
         shutil.copyfile(path, copy)
         ledger_log.replay(files(path)[1], copy)
         make_empty(draft)

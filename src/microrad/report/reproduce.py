@@ -3,7 +3,6 @@
 import json
 import math
 import re
-import tempfile
 from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -13,7 +12,7 @@ from typing import Any
 from markupsafe import escape
 
 from microrad import study
-from microrad.folder import MANIFEST
+from microrad.folder import MANIFEST, scratch
 from microrad.machine import ARCHITECTURE, as_stated
 from microrad.report import compared, tolerances
 from microrad.report.carried import Carried, ReproduceError, altered, held, read, shown_part, unpack
@@ -74,13 +73,13 @@ def reproduce(path: Path, on_progress: Progress = lambda done, total, what: None
     from microrad import report  # this package draws: it takes longer to load than reading takes
 
     carried = read(path)
-    with tempfile.TemporaryDirectory(prefix="microrad-reproduce-") as folder:
-        file, moved = unpack(carried, Path(folder) / "study")
+    with scratch("reproduce") as folder:
+        file, moved = unpack(carried, folder / "study")
         try:
             ran = study.run(file, on_progress)
         except ValueError as error:  # an unstable loop, a mirror without inverse, a table that is none
             raise ReproduceError(f"{path}: the mission that it carries does not run: {error}") from error
-        page = report.write(ran, Path(folder) / "again", on_progress=on_progress)
+        page = report.write(ran, folder / "again", on_progress=on_progress)
         now = json.loads(restored((page.parent / MANIFEST).read_text(encoding="utf-8"), moved, _in_json))
         text = restored(page.read_text(encoding="utf-8"), moved, lambda name: str(escape(name)))
         return _compared(carried, Again(now, text, page.parent, scale_of(ran)))
