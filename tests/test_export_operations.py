@@ -379,7 +379,7 @@ def test_the_parts_make_the_whole() -> None:
     of = PLAIN["all"]
     form = sections(of)
     parts = operations.by_part(of, form, "single")
-    assert list(parts) == ["readings", "outputs", "inverse", "commands", "states"]
+    assert list(parts) == ["upsets", "readings", "outputs", "inverse", "commands", "states"]
     whole = operations.operations(of, form, "single")
     assert astuple(whole) == tuple(sum(astuple(each)[i] for each in parts.values()) for i in range(len(KINDS)))
     assert whole.total == sum(astuple(whole))
@@ -387,6 +387,7 @@ def test_the_parts_make_the_whole() -> None:
     assert parts["inverse"].exponentials == 3 * 4
     assert parts["inverse"].logarithms == 3
     assert list(operations.by_part(plain(None), sections(plain(None)), "double")) == [
+        "upsets",
         "readings",
         "outputs",
         "commands",
@@ -400,7 +401,7 @@ def test_a_controller_without_states_has_no_such_part() -> None:
     of = replace(of, system=lti.StateSpace(np.zeros((0, 0)), none, none.T, of.system.D), anti_windup=none)
     form = sections(of)
     assert isinstance(form, Sections)
-    assert list(operations.by_part(of, form, "double")) == ["readings", "outputs", "commands"]
+    assert list(operations.by_part(of, form, "double")) == ["upsets", "readings", "outputs", "commands"]
 
 
 def test_counts_add_up_and_are_said_in_words() -> None:

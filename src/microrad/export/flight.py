@@ -295,7 +295,9 @@ def _use(name: str) -> str:
         f"Use: one {name}_state for each loop, {name}_init() once, {name}_step() once a period. All memory is in the "
         "state, which is the caller's; a step calls nothing but <math.h>, and each of its loops has a fixed bound. A "
         "reading that is no number or beyond its limit is rejected: the last one that was accepted stands in for it. A "
-        "command is always a finite number within the limits. Mask floating-point traps where the processor has them: "
+        "command is always a finite number within the limits, whatever bits of the state an upset has turned: what is "
+        "no sound number begins anew when a step begins, and `upsets` counts; what is one still is a disturbance like "
+        "any other. Mask floating-point traps where the processor has them: "
         "nan and infinity are dealt with here. Do not compile with -ffast-math."
     )
 

@@ -71,11 +71,16 @@ def operations(of: FlightController, form: Sections, precision: Precision) -> Op
 def by_part(of: FlightController, form: Sections, precision: Precision) -> dict[str, Operations]:
     """`operations` by the part of a step that they belong to, in the order of the step.
 
-    "readings": whether they are accepted; "outputs": C x + D m; "inverse", where there is one; "commands": limits,
-    whether they are sound, the converter; "states": A x + B m + L times what the limits took off.
+    "upsets": whether the state is sound; "readings": whether they are accepted; "outputs": C x + D m; "inverse", where
+    there is one; "commands": limits, whether they are sound, the converter; "states": A x + B m + L times what the
+    limits took off.
     """
     numbers = sum(each.size for each in of.inputs)
-    found = {"readings": Operations(comparisons=2) * numbers, "outputs": _product(form.C) + _product(form.D)}
+    found = {
+        "upsets": _mended(of, form, precision),
+        "readings": Operations(comparisons=2) * numbers,
+        "outputs": _product(form.C) + _product(form.D),
+    }
     if of.inverse is not None:
         found["inverse"] = _inverse(of.inverse, of.actuators, precision)
     found["commands"] = _command(of.resolution_v > 0.0) * of.actuators
@@ -124,13 +129,13 @@ def fixed_operations(of: FlightController, fixed: FixedForm) -> FixedOperations:
     reads = int(np.any(A)) + int(np.any(C))  # the states are rounded for each of the two products
     shifts = [*(fixed.state_shift * reads), *fixed.output_shift, *(each.shift for each in fixed.converter)]
     up = sum(shift > 0 for shift in shifts)
-    held, clipped = m + outputs + states, 5 + (2 if fixed.converter else 0)
+    held, clipped = m + outputs + states * (1 + reads), 5 + (2 if fixed.converter else 0)
     windup = 2 * actuators if np.any(fixed.state.value[:, states + m :]) else 0
     added = 0 if of.inverse is None else actuators
     return FixedOperations(
         multiplications=terms + len(fixed.converter),
         additions=terms + up + states + actuators + added,
-        shifts=up + len(shifts) + states,
+        shifts=up + len(shifts) + states * (1 + reads),
         comparisons=len(shifts) + 3 * held + clipped * actuators + windup,
         **({} if of.inverse is None else _single(of.inverse, actuators, outputs - actuators)),
     )
@@ -140,6 +145,20 @@ def fixed_operations(of: FlightController, fixed: FixedForm) -> FixedOperations:
 _SOUND = Operations(comparisons=2)
 _CLAMP = Operations(comparisons=2)
 _COMPENSATED = _SOUND + Operations(additions=4)
+
+
+def _mended(of: FlightController, form: Sections, precision: Precision) -> Operations:
+    """Whether each number of the state is sound: states, what rounding left out, readings, commands, the inverse's."""
+    numbers = form.order + sum(each.size for each in of.inputs) + of.actuators
+    if precision == "single" and any(compensated_states(form)):
+        numbers += form.order
+    return _SOUND * (numbers if of.inverse is None else numbers + _kept(of.inverse, of.actuators, precision))
+
+
+def _kept(of: InverseLaw, actuators: int, precision: Precision) -> int:
+    """Numbers that an inverse keeps: targets, hysteresis of the elements, plays, lags."""
+    lags = of.lag_keep.size * (2 if precision == "single" else 1)
+    return int(actuators + of.bouc_wen.shape[0] + of.play_threshold.size + lags)
 
 
 def _product(matrix: NDArray[np.float64]) -> Operations:
@@ -237,4 +256,5 @@ def _single(of: InverseLaw, actuators: int, numbers: int) -> dict[str, Any]:
     there = Operations(multiplications=1) * numbers
     back = (_CLAMP + Operations(multiplications=1, additions=1, roundings=1)) * actuators
     step = (_SOUND + Operations(multiplications=1, additions=1)) * numbers + _inverse(of, actuators, "single")
+    step += _SOUND * (numbers + actuators + _kept(of, actuators, "single"))
     return {"conversions": numbers + actuators, "single": there + back + step + _command(converter=False) * actuators}
