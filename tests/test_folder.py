@@ -4,11 +4,12 @@ import os
 import subprocess
 import sys
 import tempfile
+import threading
 
 import pytest
 
 from microrad import folder
-from microrad.folder import read_bytes, scratch, whole_folder
+from microrad.folder import read_bytes, scratch, whole_folder, write_whole
 
 KILLED = """
 import os, signal, sys
@@ -68,3 +69,24 @@ def test_only_folders_of_the_same_user_are_taken_for_left_behind(tmp_path, monke
     assert not folder._left_behind(tmp_path / "lost", gone.pid)
     monkeypatch.setattr(os, "getuid", lambda: -1)
     assert not folder._left_behind(tmp_path / "folder", gone.pid)
+
+
+def test_two_threads_write_into_one_folder_at_once(tmp_path, monkeypatch):
+    failed, begun = [], []
+
+    def other():
+        try:
+            write_whole(tmp_path / "b", "of the other")
+        except OSError as error:
+            failed.append(error)
+
+    def sync(file):
+        if not begun:  # half way through the first file
+            begun.append(threading.Thread(target=other))
+            begun[0].start()
+            begun[0].join()
+
+    monkeypatch.setattr(folder.os, "fsync", sync)
+    write_whole(tmp_path / "a", "of the first")
+    assert failed == []
+    assert {path.name: path.read_text() for path in tmp_path.iterdir()} == {"a": "of the first", "b": "of the other"}
