@@ -18,7 +18,7 @@ from pathlib import Path
 import control as python_control
 import numpy as np
 
-from microrad import lti
+from microrad.core import lti
 from microrad.export import build, choice, fixed, flight, operations, records, rounding
 from microrad.export import sections as linear_part
 from microrad.export.templating import table

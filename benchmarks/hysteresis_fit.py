@@ -25,9 +25,9 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import OptimizeResult, least_squares
 
 from microrad import mirror
+from microrad.core.kernels import bouc_wen_response
 from microrad.identify.plant_fit import Run, simulate, upsampled
 from microrad.identify.plant_structures import hysteretic_oscillator
-from microrad.kernels import bouc_wen_response
 
 Model = Callable[[np.ndarray], np.ndarray]
 PAPER = np.array([0.089, -2.96e-7, -0.048, 0.00047, 38.421, 34.635])  # mrad, V and s

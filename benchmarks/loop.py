@@ -22,7 +22,8 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from microrad import control as microrad_control
-from microrad import hysteresis, kernels, mirror, missionfile, simulate, tracking
+from microrad import hysteresis, mirror, missionfile, simulate, tracking
+from microrad.core import kernels
 
 HERE = Path(__file__).resolve().parent
 REPEATS = 15

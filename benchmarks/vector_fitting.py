@@ -17,8 +17,8 @@ import numpy as np
 import skrf
 from skrf.vectorFitting import VectorFitting
 
+from microrad.core.lti import frequency_response, modal_from_polynomials
 from microrad.identify.vector_fitting import vector_fit
-from microrad.lti import frequency_response, modal_from_polynomials
 
 REPEATS = 7
 NOISE = 1e-3

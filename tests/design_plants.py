@@ -5,8 +5,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from microrad import lti
 from microrad.control.problem import DesignPlant
+from microrad.core import lti
 
 Floats = NDArray[np.float64]
 

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 import oracles
-from microrad import kernels
+from microrad.core import kernels
 
 # ------------------------------------------------------------------------------------------------ random numbers
 

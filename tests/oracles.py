@@ -14,7 +14,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
-from microrad import kernels
+from microrad.core import kernels
 
 
 class BoucWen(NamedTuple):

@@ -14,7 +14,7 @@ from nptdms import TdmsFile
 
 from microrad import bench
 from microrad.bench import BenchError, load_plan, only, play, true_output, write
-from microrad.folder import FolderError
+from microrad.core.folder import FolderError
 
 SEED = 5
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from microrad import radial_error, reads
+from microrad import radial_error
 from microrad.campaign import bundle, plan, run, work
 from microrad.campaign.export import export
 from microrad.campaign.file import load_campaign
@@ -15,6 +15,7 @@ from microrad.campaign.keys import find, flat
 from microrad.campaign.ledger import Ledger
 from microrad.campaign.records import CampaignError
 from microrad.campaign.summary import summarise
+from microrad.core import reads
 from microrad.document import MissionError
 from microrad.fields import Several
 from microrad.link import LitAperture

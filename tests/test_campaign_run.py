@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 
 import microrad
-from microrad import kernels
 from microrad.campaign import blob, bundle, mending, plan, records, run, work
 from microrad.campaign.export import export
 from microrad.campaign.file import load_campaign
@@ -21,6 +20,7 @@ from microrad.campaign.ledger import Ledger
 from microrad.campaign.ledger_file import is_written
 from microrad.campaign.records import CampaignError, Job, Outcome
 from microrad.campaign.summary import summarise
+from microrad.core import kernels
 from small_campaign import campaign_file, children, finished, halted, halting, kill, started
 from waiting import HANG_S, any_moment, gone, until
 

@@ -22,12 +22,12 @@ from microrad.campaign.statistics import proportion_interval
 from microrad.campaign.summary import summarise
 from microrad.campaign.tails import tail_of_time, tail_weighted
 from microrad.campaign.work import Evaluator
+from microrad.core.threads import in_threads
 from microrad.fine_loop import linear
 from microrad.fine_loop.ensemble import LANES, bin_edges_rad, histogram_quantile
 from microrad.missionfile import load_mission
 from microrad.report import campaign_words
 from microrad.report.quantities import quantity
-from microrad.threads import in_threads
 from shipped import SHIPPED
 from truths import philox
 

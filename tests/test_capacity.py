@@ -7,7 +7,7 @@ import pytest
 from scipy import integrate, optimize, stats
 
 from link_files import RECEIVERS, link_file, received_with
-from microrad.capacity import Code
+from microrad.core.capacity import Code
 from microrad.document import MissionError
 from microrad.link import model, receivers
 

@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from microrad import acquisition, contact_run, control, fine_pointing, kernels, link, link_study
+from microrad import acquisition, contact_run, control, fine_pointing, link, link_study
 from microrad.contact_run import Contact, MovingReference, Sampler, Settings, Sight, plan
 from microrad.contact_run.windows import first_run
+from microrad.core import kernels
 from microrad.disturbance import Reference
 from microrad.fine_loop import ensemble
 from microrad.fine_loop.loop import assemble

@@ -11,8 +11,9 @@ import pytest
 from numpy.testing import assert_allclose
 
 import oracles
-from microrad import control, hysteresis, lti, mirror, simulate
+from microrad import control, hysteresis, mirror, simulate
 from microrad.control import IDEAL_DRIVE, Drive, Gains, Inverse, Timing
+from microrad.core import lti
 from microrad.hysteresis import BoucWen, Play
 from microrad.missionfile import load_mission
 

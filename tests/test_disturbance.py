@@ -12,7 +12,8 @@ from scipy.integrate import quad, quad_vec, solve_ivp
 from scipy.linalg import expm
 from scipy.signal import welch
 
-from microrad import disturbance, lti
+from microrad import disturbance
+from microrad.core import lti
 from microrad.disturbance import (
     MICIUS_EDGES_HZ,
     MICIUS_RMS_RAD,

@@ -20,10 +20,10 @@ from microrad import (
     operations,
     orbit,
 )
+from microrad.core.units import SPEED_OF_LIGHT_M_S
 from microrad.day_study import flow
 from microrad.fine_loop.loop import assemble
 from microrad.fine_pointing import designs
-from microrad.units import SPEED_OF_LIGHT_M_S
 
 ROOT = Path(__file__).parent.parent
 PAGE = (ROOT / "docs" / "day.md").read_text(encoding="utf-8")

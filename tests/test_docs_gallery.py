@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 
 from microrad import fine_pointing, load_link, load_mirror, presets, report, study
+from microrad.core.units import parse_quantity
 from microrad.report import identification_figures
-from microrad.units import parse_quantity
 from shipped import whole_drawn, whole_study
 
 ROOT = Path(__file__).parent.parent

@@ -10,7 +10,8 @@ from pathlib import Path
 import pytest
 import typer
 
-from microrad import cli, document, machine, report, study
+from microrad import cli, document, report, study
+from microrad.core import machine
 from microrad.missionfile import load_mission
 from microrad.report import compared, interactive_style, page, results, tolerances
 from microrad.studio import address, guard, jobs_process, reading, server, uploads, workshop

@@ -14,7 +14,7 @@ from scipy.linalg import block_diag
 from scipy.stats import kstest
 
 import oracle_pointing as pointing
-from microrad import kernels
+from microrad.core import kernels
 from oracles import BoucWen, Operator, compose
 
 LANES = kernels.LANES

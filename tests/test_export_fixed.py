@@ -14,7 +14,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from microrad import lti
+from microrad.core import lti
 from microrad.export import double_run, fixed_form, fixed_report, fixed_step
 from microrad.export.fixed import fixed_code, quantised, report_text
 from microrad.export.flight import vectors_text

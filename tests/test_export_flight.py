@@ -12,8 +12,9 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 import designs
-from microrad import control, disturbance, kernels, lti, mirror
+from microrad import control, disturbance, mirror
 from microrad.control import AxisController, Drive, Timing
+from microrad.core import kernels, lti
 from microrad.export import choice, flight
 from microrad.export.modes import minimal
 from microrad.export.records import ExportError, Origin, Signal

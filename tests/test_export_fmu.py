@@ -20,7 +20,8 @@ from fmpy.validation import validate_fmu
 from packaging.requirements import Requirement
 
 import designs
-from microrad import control, hysteresis, kernels, lti, mirror, simulate
+from microrad import control, hysteresis, mirror, simulate
+from microrad.core import kernels, lti
 from microrad.export import choice, fmi_description, fmu
 from microrad.export.build import compiler
 from microrad.export.records import ExportError, Origin, PlantUnit, Signal

@@ -12,8 +12,9 @@ import pytest
 from scipy.io import loadmat, savemat
 
 import designs
-from microrad import control, lti, mirror, simulate
+from microrad import control, mirror, simulate
 from microrad.control.analysis import loop_response
+from microrad.core import lti
 from microrad.export import choice, matrices
 from microrad.export.matrices import LinearModel, Port
 from microrad.export.matrices_polynomials import polynomials

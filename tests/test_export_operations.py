@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import designs
-from microrad import lti
+from microrad.core import lti
 from microrad.export import fixed, flight, operations
 from microrad.export.fixed import FixedForm
 from microrad.export.operations import FixedOperations, Operations

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import designs
-from microrad import kernels, lti
+from microrad.core import kernels, lti
 from microrad.export import double_run, rounding
 from microrad.export.flight import compensated_states, flight_code, vectors_text
 from microrad.export.records import FlightController, InverseLaw, Origin, Signal, Vectors

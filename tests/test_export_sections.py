@@ -9,7 +9,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 import designs
-from microrad import lti
+from microrad.core import lti
 from microrad.export import choice
 from microrad.export.block_diagonal import block_diagonal
 from microrad.export.identifiers import LONGEST, identifier, suggested

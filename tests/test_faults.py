@@ -33,18 +33,18 @@ def test_each_fault_is_found_once_and_changes_the_code(faults):
     ("text", "message"), [("def not_there", "occurs 0 times"), ("e", "times in"), ("", "times in")]
 )
 def test_a_fault_that_is_not_there_once_is_told(faults, text, message):
-    fault = faults.Fault("x", "link", "sign", "microrad.threads:in_threads", text, "pass", "")
+    fault = faults.Fault("x", "link", "sign", "microrad.core.threads:in_threads", text, "pass", "")
     with pytest.raises(ValueError, match=message):
         fault.planted(fault.file(ROOT).read_text(encoding="utf-8"))
 
 
 def test_a_fault_that_changes_nothing_is_told(faults):
-    fault = faults.Fault("x", "link", "sign", "microrad.threads:in_threads", "results = []", "results  =  []", "")
+    fault = faults.Fault("x", "link", "sign", "microrad.core.threads:in_threads", "results = []", "results  =  []", "")
     with pytest.raises(ValueError, match="changes nothing"):
         fault.planted(fault.file(ROOT).read_text(encoding="utf-8"))
 
 
 def test_a_function_that_is_gone_is_told(faults):
-    fault = faults.Fault("x", "link", "sign", "microrad.threads:gone", "a", "b", "")
+    fault = faults.Fault("x", "link", "sign", "microrad.core.threads:gone", "a", "b", "")
     with pytest.raises(ValueError, match="0 definitions of microrad"):
         fault.planted(fault.file(ROOT).read_text(encoding="utf-8"))

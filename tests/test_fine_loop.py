@@ -11,8 +11,9 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.linalg import expm, solve_discrete_lyapunov
 from scipy.stats import kstest
 
-from microrad import control, disturbance, kernels, lti, mirror
+from microrad import control, disturbance, mirror
 from microrad.control import AxisController, Drive, Timing
+from microrad.core import kernels, lti
 from microrad.disturbance import Disturbance, Reference
 from microrad.fine_loop import ensemble, linear
 from microrad.fine_loop import loop as fine

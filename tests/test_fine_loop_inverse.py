@@ -8,8 +8,9 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.signal import StateSpace, lsim
 
-from microrad import control, disturbance, kernels, lti, mirror
+from microrad import control, disturbance, mirror
 from microrad.control import AxisController, Drive, Inverse, Timing
+from microrad.core import kernels, lti
 from microrad.disturbance import Reference
 from microrad.fine_loop import ensemble, linear
 from microrad.fine_loop import loop as fine

@@ -8,13 +8,13 @@ import threading
 
 import pytest
 
-from microrad import folder
-from microrad.folder import read_bytes, scratch, whole_folder, write_whole
+from microrad.core import folder
+from microrad.core.folder import read_bytes, scratch, whole_folder, write_whole
 
 KILLED = """
 import os, signal, sys
 from pathlib import Path
-from microrad.folder import scratch, whole_folder
+from microrad.core.folder import scratch, whole_folder
 with scratch("test") as one, whole_folder(Path(sys.argv[1]), False) as two:
     (one / "a").write_text("a")
     (two / "b").write_text("b")

@@ -14,8 +14,8 @@ import pytest
 from scipy.signal import cont2discrete, lfilter
 
 from microrad import report
+from microrad.core.kernels import play_response
 from microrad.identify import Refused, identify, mirror_file_text
-from microrad.kernels import play_response
 from microrad.recording import Finding, recording_from_arrays
 from microrad.report import identification_figures as figures
 from microrad.report import identification_words as words

@@ -12,6 +12,7 @@ import pytest
 import scipy.optimize
 from scipy.integrate import solve_ivp
 
+from microrad.core.kernels import bouc_wen_response, play_response
 from microrad.identify import (
     STATIC,
     BoucWenFit,
@@ -26,7 +27,6 @@ from microrad.identify import (
 from microrad.identify import bouc_wen as bouc_wen_fit
 from microrad.identify.choice import _best
 from microrad.identify.records import colour_inflation, fastest_rate, prepare, transient
-from microrad.kernels import bouc_wen_response, play_response
 from microrad.missionfile import load_mirror
 from microrad.recording import read_recording, recording_from_arrays
 

@@ -10,7 +10,7 @@ from packaging.utils import canonicalize_name
 
 import licences
 from microrad import doctor
-from microrad.installing import advice
+from microrad.core.installing import advice
 
 ROOT = Path(__file__).parent.parent
 PIN = re.compile(r"(?m)^(\S+)==([^\s;]+)")

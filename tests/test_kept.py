@@ -11,8 +11,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import pytest
 
-from microrad import kept, machine
-from microrad.kept import Kept
+from microrad.core import kept, machine
+from microrad.core.kept import Kept
 
 
 @dataclass(frozen=True, slots=True)
@@ -238,7 +238,7 @@ def test_many_at_once_do_no_harm(place):
 
 def test_another_process_takes_it(place):
     code = (
-        "import sys; from pathlib import Path; from microrad import kept, reads\n"
+        "import sys; from pathlib import Path; from microrad.core import kept, reads\n"
         "print(kept.Kept(Path(sys.argv[1])).part(reads.digest, (1.5, 'x')).hex())"
     )
     found = set()

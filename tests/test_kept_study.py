@@ -6,8 +6,8 @@ import pytest
 
 from microrad import study
 from microrad.control import PI
+from microrad.core.kept import NOTHING, Kept
 from microrad.fine_pointing import designs
-from microrad.kept import NOTHING, Kept
 from microrad.missionfile import MissionError, load_mission
 from microrad.report import words
 from shipped import SHIPPED

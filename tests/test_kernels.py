@@ -18,7 +18,7 @@ from scipy.linalg import block_diag, expm
 from scipy.signal import StateSpace, lsim
 
 import oracles
-from microrad import kernels
+from microrad.core import kernels
 from oracles import BoucWen, Operator, compose
 
 STEP = 20e-6
@@ -1062,7 +1062,7 @@ def test_the_kernels_run_as_they_are_without_the_compiler(tmp_path):
 
 def features(**environment):
     """The processor's features that the kernels are compiled for, under these variables."""
-    script = "from microrad import kernels; print(kernels.config.CPU_FEATURES)"
+    script = "from microrad.core import kernels; print(kernels.config.CPU_FEATURES)"
     plain = {name: value for name, value in os.environ.items() if not name.startswith("NUMBA_CPU")}
     done = subprocess.run(
         [sys.executable, "-c", script], env=plain | environment, capture_output=True, text=True, check=True

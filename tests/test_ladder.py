@@ -8,7 +8,8 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 import truths
-from microrad import bench, kernels, mirror
+from microrad import bench, mirror
+from microrad.core import kernels
 from microrad.hysteresis import Play
 from microrad.identify import (
     FORMS,

@@ -14,7 +14,8 @@ import pytest
 from scipy.io import loadmat, savemat
 from scipy.sparse import csc_array
 
-from microrad import lti, mirror
+from microrad import mirror
+from microrad.core import lti
 from microrad.export import linear_import, matrices
 from microrad.export.linear_import import Given, import_control, import_mat
 from microrad.export.records import ExportError

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from microrad import lti
+from microrad.core import lti
 from microrad.identify import structure
 from microrad.identify.amplitude import amplitude_dependence
 from microrad.identify.linear import fit_linear, fit_percent, output_error

@@ -12,7 +12,7 @@ from scipy.special import erfc
 
 from link_files import link_file
 from microrad import link, link_study, requirement
-from microrad.budget import total_db
+from microrad.core.budget import total_db
 from microrad.link_table import Channel
 from microrad.missionfile import load_mission
 from microrad.report import budget_views

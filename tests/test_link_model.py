@@ -11,8 +11,8 @@ from scipy.special import j0
 
 from link_files import GAUSSIAN, PATTERN, RECEIVERS, SKY, link_file, received_with
 from microrad import link, link_study
+from microrad.core.units import PLANCK_J_S, SPEED_OF_LIGHT_M_S
 from microrad.link import receivers
-from microrad.units import PLANCK_J_S, SPEED_OF_LIGHT_M_S
 
 WAVELENGTH, RATE = 1.55e-6, 300e6
 PHOTON_J = PLANCK_J_S * SPEED_OF_LIGHT_M_S / WAVELENGTH

@@ -11,7 +11,7 @@ from numpy.testing import assert_allclose
 from scipy.linalg import block_diag, solve_discrete_lyapunov
 from scipy.signal import cont2discrete, dlsim, lsim
 
-from microrad import lti
+from microrad.core import lti
 
 NUMERATOR = (1.979e11, 7.051e13, 2.973e13)  # Eq. 2 of the paper, powers of s in rad/s
 DENOMINATOR = (1.0, 2.15e4, 3.737e8, 2.615e12, 8.489e14, 1.829e14)

@@ -12,7 +12,7 @@ import scipy.io
 from scipy.io import loadmat, savemat
 from scipy.sparse import csc_array
 
-from microrad.matlab_file import Left, MatlabFile, MatlabFileError, Structure, Unread, reader, streams
+from microrad.core.matlab_file import Left, MatlabFile, MatlabFileError, Structure, Unread, reader, streams
 
 MOST_BYTES = 10_000_000
 N = 100

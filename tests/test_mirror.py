@@ -10,7 +10,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.signal import lsim
 
 import oracles
-from microrad import control, hysteresis, kernels, lti, mirror, mirror_summary, simulate
+from microrad import control, hysteresis, mirror, mirror_summary, simulate
+from microrad.core import kernels, lti
 from microrad.hysteresis import BoucWen, Creep, Play
 from microrad.mirror import Mirror
 from microrad.missionfile import load_mission

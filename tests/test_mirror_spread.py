@@ -12,6 +12,7 @@ from scipy.stats import truncnorm
 
 import truths
 from microrad import mirror_spread
+from microrad.core.lti import frequency_response
 from microrad.hysteresis import NO_CREEP, BoucWen, Creep, Play, slow_gain
 from microrad.identify import FORMS, Units, fit_joint, identify, mirror_file_text
 from microrad.identify.bouc_wen import PARAMETERS
@@ -19,7 +20,6 @@ from microrad.identify.joint import JointFit
 from microrad.identify.plant_fit import PlantFit
 from microrad.identify.plant_structures import LinearPoles, Roots, one_axis
 from microrad.identify.prandtl_ishlinskii import threshold_grid
-from microrad.lti import frequency_response
 from microrad.mirror import hysteresis_model, linear_part
 from microrad.mirror_table import place
 from microrad.missionfile import MissionError, load_mirror

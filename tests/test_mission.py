@@ -16,7 +16,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from microrad import lti, mirror
+from microrad import mirror
+from microrad.core import lti
 from microrad.document import Document, scan
 from microrad.link_table import half_angle_rad
 from microrad.mirror_table import BoucWenTable

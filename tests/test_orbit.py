@@ -19,10 +19,10 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
+from microrad.core.units import SPEED_OF_LIGHT_M_S
 from microrad.orbit import analytic, earth, ground, sun
 from microrad.orbit.base import OrbitError
 from microrad.orbit.epoch import Epoch
-from microrad.units import SPEED_OF_LIGHT_M_S
 
 START = Epoch.from_text("2026-03-20T12:00:00Z")
 DAY_S = 86400.0

@@ -41,7 +41,7 @@ def test_the_shipped_loop_is_tuned_and_simulated_to_the_same_digits_on_another_p
 
 def test_a_processor_without_vectors_is_named_by_what_it_has():
     environment = {**os.environ, "NPY_DISABLE_CPU_FEATURES": "X86_V3 X86_V4 AVX512_ICL AVX512_SPR"}
-    code = "from microrad.machine import machine; print(machine()['instruction sets'])"
+    code = "from microrad.core.machine import machine; print(machine()['instruction sets'])"
     ran = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)
     assert ran.stdout.strip()
     assert "AVX2" not in ran.stdout and "X86_V3" not in ran.stdout

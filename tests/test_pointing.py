@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from microrad import pointing
-from microrad.budget import Line, root_sum_square, total_db
+from microrad.core.budget import Line, root_sum_square, total_db
 from microrad.mission import LinkMission
 from microrad.missionfile import load_mission
 from microrad.pointing_table import PointAhead, PointingLine

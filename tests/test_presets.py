@@ -5,12 +5,12 @@ from importlib import resources
 
 import pytest
 
+from microrad.core.units import UnitError
 from microrad.document import MissionError, scan
 from microrad.fields import NOT_PUBLISHED, UNKNOWN, ProblemsError, Quantity, Several, Share, Switch, Whole
 from microrad.link.budget import communication_budget
 from microrad.missionfile import load_link, load_mission
 from microrad.presets import PAPER, preset_text, presets
-from microrad.units import UnitError
 from shipped import SHIPPED
 
 NAMES = ("click", "crosslink", "leo-hicali", "oicets-artemis", "paper", "sentinel1-edrs", "spot4-artemis", "tbird")

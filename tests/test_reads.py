@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 from pydantic import BaseModel, ConfigDict
 
-from microrad.reads import Reads, UnknownValueError, digest, watched_call
+from microrad.core.reads import Reads, UnknownValueError, digest, watched_call
 
 
 class Kind(Enum):
@@ -174,7 +174,7 @@ def test_values_that_differ_have_different_digests(one, other):
 
 
 def test_another_process_finds_the_same_digests():
-    code = "from microrad.reads import digest; print(digest({'a': (1.5, {'x', 'y', 'z'}), 'b': None}).hex())"
+    code = "from microrad.core.reads import digest; print(digest({'a': (1.5, {'x', 'y', 'z'}), 'b': None}).hex())"
     found = {
         subprocess.run(
             [sys.executable, "-c", code], env={"PYTHONHASHSEED": seed}, capture_output=True, text=True, check=True
@@ -204,8 +204,8 @@ def test_what_only_a_forked_process_would_read_is_read_here():
     code = """
 import os
 from dataclasses import dataclass
-from microrad.reads import watched_call
-from microrad.threads import shared_out
+from microrad.core.reads import watched_call
+from microrad.core.threads import shared_out
 
 @dataclass(frozen=True)
 class Beam:

@@ -7,6 +7,7 @@ from numpy.testing import assert_allclose
 from scipy import integrate, optimize, stats
 from scipy.special import gammainc, gammaincc
 
+from microrad.core.units import ELEMENTARY_CHARGE_C, PLANCK_J_S, SPEED_OF_LIGHT_M_S
 from microrad.link.gains import photon_energy_j
 from microrad.link.receivers import (
     BpskHomodyne,
@@ -23,7 +24,6 @@ from microrad.link.receivers import (
     background_power_w,
     counting,
 )
-from microrad.units import ELEMENTARY_CHARGE_C, PLANCK_J_S, SPEED_OF_LIGHT_M_S
 
 WAVELENGTH_M = 1.55e-6
 COMMON = {"wavelength_m": WAVELENGTH_M, "bit_error_ratio": 1e-9, "bandwidth_hz": 1e11}

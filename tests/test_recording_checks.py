@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from microrad.kernels import play_response
+from microrad.core.kernels import play_response
 from microrad.recording import (
     ACCEPTABLE,
     RecordingError,

@@ -399,7 +399,7 @@ def test_too_little_memory_is_no_damage(tmp_path, monkeypatch):
 
     path = tmp_path / "a.mat"
     savemat(path, {"drive": DRIVE, "output": OUTPUT})
-    monkeypatch.setattr("microrad.matlab_file.MatlabFile.numbers", full)
+    monkeypatch.setattr("microrad.core.matlab_file.MatlabFile.numbers", full)
     message = refusal(path, "drive", "output", RATE_HZ)
     assert "channel 0 ('drive') takes more memory than there is to read; cut out the part that you need" in message
     assert "damaged" not in message

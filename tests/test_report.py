@@ -14,7 +14,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from microrad import folder, missionfile, report, study
+from microrad import missionfile, report, study
+from microrad.core import folder
 from microrad.performance import Cost
 from microrad.report import (
     chain,

@@ -9,7 +9,8 @@ import shutil
 
 import pytest
 
-from microrad import cli, machine, missionfile, report, study
+from microrad import cli, missionfile, report, study
+from microrad.core import machine
 from microrad.report import carried, compared, page, reproduce, tolerances
 from shipped import SHIPPED, edited_file, without_fine_pointing
 

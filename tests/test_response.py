@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from microrad import lti
+from microrad.core import lti
 from microrad.identify.modal import order_modes, simulate
 from microrad.identify.records import IdentificationError
 from microrad.identify.response import response_from_periods, response_from_records

@@ -9,9 +9,9 @@ from scipy.integrate import quad
 from scipy.special import j1
 
 from microrad import sensor
-from microrad.budget import root_sum_square
+from microrad.core.budget import root_sum_square
+from microrad.core.units import parse_quantity
 from microrad.sensor import AirySpot, GaussianSpot, OpticalSensor, QuadCell, StrainGauge, optical_sensor
-from microrad.units import parse_quantity
 
 electron_c = 1.602176634e-19
 CELL = QuadCell(

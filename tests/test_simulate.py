@@ -9,7 +9,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.integrate import solve_ivp
 
 import oracles
-from microrad import control, hysteresis, kernels, lti, mirror, simulate, tracking
+from microrad import control, hysteresis, mirror, simulate, tracking
+from microrad.core import kernels, lti
 from microrad.hysteresis import BoucWen, Play
 from microrad.missionfile import load_mission
 from shipped import SHIPPED, edited

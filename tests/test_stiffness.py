@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from microrad import kernels, mirror
+from microrad import mirror
+from microrad.core import kernels
 from microrad.hysteresis import Play
 from microrad.identify import fit_hysteretic_stiffness, fit_linear, output_error, predicted_error, stiffness
 from microrad.identify import stiffness_tangents as tangents

@@ -9,8 +9,8 @@ from functools import partial
 
 import pytest
 
-from microrad import threads
-from microrad.threads import both, in_threads, shared_out
+from microrad.core import threads
+from microrad.core.threads import both, in_threads, shared_out
 from waiting import HANG_S
 
 
@@ -52,7 +52,7 @@ def test_jobs_that_have_not_begun_are_dropped_after_an_error(monkeypatch):
 
 FORKED = """
 import os, sys, time
-from microrad.threads import shared_out
+from microrad.core.threads import shared_out
 
 def own(number):
     if os.getpid() != caller:
@@ -100,7 +100,7 @@ def test_an_error_in_a_shared_job_is_the_callers(forks, monkeypatch):
 def test_nothing_is_forked_beside_another_thread():
     code = """
 import threading
-from microrad import threads
+from microrad.core import threads
 assert threads._may_fork()
 end = threading.Event()
 other = threading.Thread(target=end.wait)

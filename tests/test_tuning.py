@@ -10,10 +10,10 @@ import pytest
 from scipy.optimize import minimize_scalar
 
 from design_plants import axis_plant
-from microrad import lti
 from microrad.control import analysis, classical, descent, judge, lqg, search, tuning
 from microrad.control.lqg import LQG
 from microrad.control.problem import RESIDUAL, AxisController, Family, Parameter, Specification
+from microrad.core import lti
 from microrad.fine_pointing import designs
 from microrad.fine_pointing.scenario import scene
 from microrad.missionfile import load_mission

@@ -9,8 +9,8 @@ from astropy.constants import c, h
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from microrad import units
-from microrad.units import PLANCK_J_S, SPEED_OF_LIGHT_M_S, UnitError, format_input, format_quantity, parse_quantity
+from microrad.core import units
+from microrad.core.units import PLANCK_J_S, SPEED_OF_LIGHT_M_S, UnitError, format_input, format_quantity, parse_quantity
 from waiting import no_hang
 
 # our symbol: astropy's name for it; photon, bit and cycle are base dimensions in both

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from microrad import lti
+from microrad.core import lti
 from microrad.identify.modal import (
     ModalModel,
     filtered,

@@ -33,7 +33,7 @@ _PUBLIC = {
     "write_report": "report.write",
     "verdict_text": "report.verdict_text",
     "summary": "report.summary",
-    "FolderError": "folder.FolderError",
+    "FolderError": "core.folder.FolderError",
     "LinkError": "link.LinkError",
     "OrbitError": "orbit.OrbitError",
     "OperationsError": "operations.OperationsError",
@@ -45,9 +45,9 @@ _PUBLIC = {
     "mirror_file_text": "identify.mirror_file_text",
     "Identification": "identify.Identification",
     "IdentificationError": "identify.IdentificationError",
-    "parse_quantity": "units.parse_quantity",
-    "format_quantity": "units.format_quantity",
-    "UnitError": "units.UnitError",
+    "parse_quantity": "core.units.parse_quantity",
+    "format_quantity": "core.units.format_quantity",
+    "UnitError": "core.units.UnitError",
 }
 
 

@@ -15,7 +15,7 @@ from functools import partial
 from importlib import import_module, metadata, resources
 from pathlib import Path
 
-from microrad.installing import advice
+from microrad.core.installing import advice
 
 # The loop of Eq. 3 of SPIE 11852, 118523B, with the printed parameters and u = 6 sin(2 pi 100 Hz t) + 6 V at 50 kHz:
 # width in % of the peak-to-peak output and max|h| in µrad, found with an adaptive solver too.
@@ -117,7 +117,7 @@ def _kernels() -> tuple[bool, str]:
 
 
 def _cache() -> tuple[bool, str]:
-    from microrad import kernels
+    from microrad.core import kernels
 
     stats = getattr(kernels.closed_loop, "stats", None)
     if stats is None:

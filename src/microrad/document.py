@@ -13,8 +13,8 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal, Self
 
-from microrad.folder import read_bytes
-from microrad.units import printable
+from microrad.core.folder import read_bytes
+from microrad.core.units import printable
 
 MAX_BYTES = 1_000_000
 MAX_LINES = 10_000

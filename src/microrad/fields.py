@@ -12,7 +12,7 @@ from typing import Any, NamedTuple, Self
 from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler, GetJsonSchemaHandler, model_validator
 from pydantic_core import CoreSchema, core_schema
 
-from microrad.units import UnitError, format_quantity, kind_of, parse_quantity
+from microrad.core.units import UnitError, format_quantity, kind_of, parse_quantity
 
 MOST_ITEMS = 1000
 """Items of a list beyond which it is taken for a mistake."""

@@ -13,8 +13,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from microrad.budget import Line, root_sum_square
-from microrad.units import format_quantity
+from microrad.core.budget import Line, root_sum_square
+from microrad.core.units import format_quantity
 
 Floats = NDArray[np.float64]
 

@@ -8,7 +8,7 @@ import numpy as np
 from microrad import acquisition, link, pointing, sensor
 from microrad.acquisition_table import LEAST_OVERLAP, Acquisition
 from microrad.acquisition_table import Scan as ScanTable
-from microrad.budget import Line, total_db
+from microrad.core.budget import Line, total_db
 from microrad.link.budget import POINT_AHEAD_LOSS, POINTING_LOSS
 from microrad.link_table import Beacon, half_angle_rad, narrowest_half_angle_rad
 from microrad.mission import LinkMission, source_text

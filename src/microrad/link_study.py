@@ -8,13 +8,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from microrad import kept, link, pointing
-from microrad.budget import Line
+from microrad import link, pointing
+from microrad.core import kept
+from microrad.core.budget import Line
+from microrad.core.units import format_quantity
 from microrad.link_acquisition import Finding, Tracking, finding, tracking
 from microrad.link_performance import Performance, error_rad, margin_db, of_jitter, required_error_rad
 from microrad.mission import LinkMission, Source, source_text
 from microrad.missionfile import LinkFile
-from microrad.units import format_quantity
 
 Floats = NDArray[np.float64]
 

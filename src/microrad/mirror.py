@@ -11,7 +11,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from microrad import kernels, lti, mirror_table
+from microrad import mirror_table
+from microrad.core import kernels, lti
 from microrad.hysteresis import LINE_OF_SIGHT, NO_CREEP, BoucWen, Creep, Play, scaled, slow_gain, steepest_slope
 
 Floats = NDArray[np.float64]

@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic.fields import FieldInfo
 
-from microrad import lti
+from microrad.core import lti
+from microrad.core.units import UnitError
 from microrad.fields import ProblemsError, Quantity, Several, Table
 from microrad.mirror_table import Mirror, Place, Uncertainty, place
-from microrad.units import UnitError
 
 Floats = NDArray[np.float64]
 

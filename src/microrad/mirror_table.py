@@ -8,8 +8,8 @@ from typing import Annotated, Any, Literal, NamedTuple
 from pydantic import Field, GetJsonSchemaHandler
 from pydantic_core import CoreSchema
 
+from microrad.core.units import format_quantity
 from microrad.fields import MOST_ITEMS, Problem, ProblemsError, Quantity, Several, Table
-from microrad.units import format_quantity
 
 ANGLE_MOST = math.pi / 2  # beyond a quarter turn no pointing error, beam or mirror angle has a meaning here
 Name = Annotated[str, Field(min_length=1, max_length=200)]

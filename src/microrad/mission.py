@@ -11,6 +11,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 
 from microrad.acquisition_table import Acquisition
+from microrad.core.units import format_quantity
 from microrad.fields import Problem, Quantity, Several, Table
 from microrad.fine_pointing_table import FinePointing, clock_problems
 from microrad.link_table import (
@@ -29,7 +30,6 @@ from microrad.mirror_table import ANGLE_MOST, Angle, DurationOrZero, Frequency, 
 from microrad.operations_table import Constellation, Operations
 from microrad.orbit_table import Orbits
 from microrad.pointing_table import JitterTable, PointAhead, Pointing, point_ahead_rad
-from microrad.units import format_quantity
 
 MOST_SAMPLES = 2_000_000
 """Control samples in a period of the scenario's sines beyond which a run would not fit into memory."""

@@ -12,12 +12,12 @@ from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin
 from pydantic import TypeAdapter, ValidationError
 from pydantic.fields import FieldInfo
 
+from microrad.core.units import UnitError
 from microrad.document import Document, Fault, MissionError, UnreadableError, clipped, shown
 from microrad.fields import NOT_PUBLISHED, UNKNOWN, Problem, ProblemsError, Quantity, Several, Table
 from microrad.mirror_table import Mirror
 from microrad.mission import LinkMission, Mission, Source
 from microrad.origins import of_paper, written_for
-from microrad.units import UnitError
 
 __all__ = [
     "Fault",

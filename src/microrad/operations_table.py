@@ -6,10 +6,10 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
+from microrad.core.units import format_quantity
 from microrad.fields import Problem, Quantity, Several, Table, Whole
 from microrad.mirror_table import Name
 from microrad.orbit_table import HIGHEST_MASK_RAD, Seconds
-from microrad.units import format_quantity
 
 DataRate = Annotated[float, Quantity("bit/s", "Mbit/s", above=0.0)]
 Longitude = Annotated[float, Quantity("rad", "deg", least=-math.pi, most=2.0 * math.pi)]

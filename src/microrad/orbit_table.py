@@ -10,9 +10,9 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, GetJsonSchemaHandler
 from pydantic_core import CoreSchema
 
+from microrad.core.units import UnitError
 from microrad.fields import OrWord, Problem, Quantity, Several, Switch, Table
 from microrad.mirror_table import Name
-from microrad.units import UnitError
 
 HIGHEST_MASK_RAD = math.radians(89.0)
 """Mask above which hardly a pass is left: a satellite would have to cross the zenith."""

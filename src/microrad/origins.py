@@ -7,9 +7,9 @@ from contextlib import suppress
 from functools import cache
 from importlib import resources
 
+from microrad.core.units import UnitError, parse_quantity
 from microrad.document import scan
 from microrad.presets import PAPER, preset_text, presets
-from microrad.units import UnitError, parse_quantity
 
 
 def written_for(key: str, comment: str, value: str) -> str:

@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from microrad import control, hysteresis, mirror, mission, simulate
+from microrad.core.threads import in_threads
 from microrad.missionfile import LinkFile, load_link
 from microrad.presets import PAPER, preset_text
-from microrad.threads import in_threads
 from microrad.tracking import mirror_model
 
 Floats = NDArray[np.float64]

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from microrad.units import format_quantity
+from microrad.core.units import format_quantity
 
 Floats = NDArray[np.float64]
 

@@ -6,8 +6,8 @@ Angles are line-of-sight angles outside the telescope, per axis; noise is a stan
 import math
 from dataclasses import dataclass
 
-from microrad.budget import Line, root_sum_square
-from microrad.units import ELEMENTARY_CHARGE_C, format_quantity
+from microrad.core.budget import Line, root_sum_square
+from microrad.core.units import ELEMENTARY_CHARGE_C, format_quantity
 
 RATE_TOLERANCE = 1e-9
 """How far, relatively, a sensor's period or delay may lie from a whole number of control samples or plant steps."""

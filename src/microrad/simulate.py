@@ -6,8 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from microrad import control, hysteresis, kernels, lti, mirror, mission
+from microrad import control, hysteresis, mirror, mission
 from microrad.control import Drive, Inverse, Timing, amplifier_factor, anti_windup
+from microrad.core import kernels, lti
 
 Floats = NDArray[np.float64]
 

@@ -13,7 +13,6 @@ from microrad import (
     control,
     day_study,
     fine_pointing,
-    kept,
     link,
     link_performance,
     link_study,
@@ -28,9 +27,10 @@ from microrad import (
     tracking,
     verdict,
 )
+from microrad.core import kept
+from microrad.core.threads import both
 from microrad.mission import Mission
 from microrad.missionfile import LinkFile, MissionFile
-from microrad.threads import both
 
 Floats = NDArray[np.float64]
 Progress = Callable[[int, int, str], None]

@@ -2,7 +2,7 @@
 
 import math
 
-from microrad.units import format_quantity
+from microrad.core.units import format_quantity
 
 
 def require_positive(name: str, value: float, unit: str) -> None:

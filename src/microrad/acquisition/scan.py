@@ -14,7 +14,7 @@ from microrad.acquisition.limits import (
     require_positive,
     require_probability,
 )
-from microrad.units import format_quantity
+from microrad.core.units import format_quantity
 
 _Array = NDArray[np.float64]
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from microrad.acquisition.limits import require_count, require_not_negative, require_positive, require_probability
 from microrad.acquisition.times import TimeDistribution, fixed_time, joined
-from microrad.units import SPEED_OF_LIGHT_M_S, format_quantity
+from microrad.core.units import SPEED_OF_LIGHT_M_S, format_quantity
 
 LOCKED = "locked"
 LOST = "lost"

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from microrad.units import format_quantity
+from microrad.core.units import format_quantity
 
 _MOST = 4096  # times kept; more are merged into equal bins, each at its mean
 _FEW = 1024  # each of two distributions when they are convolved

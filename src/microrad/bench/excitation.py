@@ -12,8 +12,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from microrad.core.units import format_quantity
 from microrad.fields import Problem, ProblemsError
-from microrad.units import format_quantity
 
 Floats = NDArray[np.float64]
 

@@ -10,8 +10,8 @@ from typing import Any
 from microrad.bench.formats import write_file
 from microrad.bench.plan import Plan, Record
 from microrad.bench.play import BenchError, Progress, played
-from microrad.folder import MANIFEST, whole_folder
-from microrad.folder import check_folder as check
+from microrad.core.folder import MANIFEST, whole_folder
+from microrad.core.folder import check_folder as check
 from microrad.recording import Recording, read_recording
 
 PLAN = "plan.toml"

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from microrad.bench.play import BenchError
-from microrad.installing import advice
+from microrad.core.installing import advice
 from microrad.recording import Recording
 
 Floats = NDArray[np.float64]

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from microrad.bench.plan import ConvertersTable, Plan, Record
 from microrad.bench.truth import Amplifier, bench_output, bouc_wen_output, linear_output
+from microrad.core.units import format_quantity
 from microrad.recording import Recording
-from microrad.units import format_quantity
 
 Floats = NDArray[np.float64]
 Progress = Callable[[int, int, str], None]

@@ -20,7 +20,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from microrad.kernels import bouc_wen_response, play_response
+from microrad.core.kernels import bouc_wen_response, play_response
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]

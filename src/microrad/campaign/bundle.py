@@ -15,12 +15,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from microrad import lti
 from microrad.campaign.file import CampaignFile, load_campaign
 from microrad.campaign.records import CampaignError
 from microrad.control import AxisController
-from microrad.folder import scratch_folder
-from microrad.machine import source_sha256
+from microrad.core import lti
+from microrad.core.folder import scratch_folder
+from microrad.core.machine import source_sha256
 from microrad.missionfile import named_files
 
 LIBRARIES = ("numpy", "scipy", "numba", "llvmlite", "sgp4", "skyfield")

@@ -11,7 +11,7 @@ import numpy as np
 from microrad.campaign.outputs import OUTPUTS
 from microrad.campaign.records import CampaignError, Floats, Interval, Limit
 from microrad.campaign.statistics import moments, share_interval
-from microrad.units import format_quantity
+from microrad.core.units import format_quantity
 
 INTERVAL_CONFIDENCE = 0.95
 """Confidence of the interval of a share of rows."""

@@ -22,8 +22,8 @@ from typing import Any
 from microrad.campaign.engines import SLICE_S, Clock, Flight, Waiting, late_flights, late_reason
 from microrad.campaign.records import CampaignError, Job, Outcome
 from microrad.campaign.worker import Beat, Kind, Work, beat_every_s, code_sha256, die_with_parent, open_target, words
-from microrad.folder import scratch_folder
-from microrad.installing import advice
+from microrad.core.folder import scratch_folder
+from microrad.core.installing import advice
 
 _ANSWER_S = 20.0  # a scheduler or worker that does not answer for so long is gone
 _CONNECT_S = 10.0

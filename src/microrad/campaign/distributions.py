@@ -7,8 +7,8 @@ from typing import Any, Literal, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from microrad.core.units import format_quantity
 from microrad.fields import Table
-from microrad.units import format_quantity
 
 Floats = NDArray[np.float64]
 

@@ -18,7 +18,7 @@ from queue import Empty, SimpleQueue
 
 from microrad.campaign.records import CampaignError, Job, Outcome
 from microrad.campaign.worker import Kind, Message, pack_job, read_message, write_message
-from microrad.folder import scratch_folder
+from microrad.core.folder import scratch_folder
 
 SLICE_S = 0.1  # a wait lasts this long at most, so that Ctrl-C is prompt on every system
 _START_S = 300.0  # the first start on a machine compiles

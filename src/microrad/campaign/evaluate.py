@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from microrad import fine_pointing, kernels, link
+from microrad import fine_pointing, link
 from microrad.campaign.outputs import OUTPUTS
+from microrad.core import kernels
 from microrad.fine_loop import ensemble
 from microrad.link_performance import Exposure
 from microrad.mission import LinkMission, Mission

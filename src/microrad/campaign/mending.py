@@ -28,7 +28,7 @@ from microrad.campaign.ledger_file import (
 )
 from microrad.campaign.ledger_log import LEAF, PAGE
 from microrad.campaign.records import CampaignError
-from microrad.folder import scratch
+from microrad.core.folder import scratch
 
 _NOT_DAMAGE = {
     *(sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR, sqlite3.SQLITE_READONLY),

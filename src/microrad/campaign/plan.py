@@ -7,11 +7,11 @@ the campaign begins. No number depends on that.
 import math
 from dataclasses import replace
 
-from microrad import kernels
 from microrad.campaign import loops
 from microrad.campaign.file import CampaignFile
 from microrad.campaign.outputs import OUTPUTS, TAIL_OUTPUTS, Output
 from microrad.campaign.records import Job
+from microrad.core import kernels
 
 _CHUNK_STEPS = 2e7  # plant steps of all runs in a chunk: about a second
 _CHUNK_S = 2.0  # at most, of rows that were timed

@@ -21,7 +21,7 @@ from microrad.campaign.ledger_file import argument, refuse_existing
 from microrad.campaign.records import CampaignError, Chunk, Engine, Failed, Job, Outcome, joined
 from microrad.campaign.sketch import Sketch
 from microrad.control import AxisController
-from microrad.units import format_quantity
+from microrad.core.units import format_quantity
 
 Progress = Callable[[int, int, str], None]
 

@@ -16,7 +16,7 @@ from microrad.campaign.keys import touches_loop
 from microrad.campaign.optimise import Optimum, optimise
 from microrad.campaign.records import CampaignError
 from microrad.control import AxisController
-from microrad.threads import in_threads
+from microrad.core.threads import in_threads
 
 Floats = NDArray[np.float64]
 Progress = Callable[[int, int, str], None]

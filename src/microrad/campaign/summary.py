@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 
-from microrad import kernels
 from microrad.campaign import bundle, plan, statistics, tails
 from microrad.campaign.blob import Head
 from microrad.campaign.file import CampaignFile
@@ -32,8 +31,9 @@ from microrad.campaign.records import (
     joined,
 )
 from microrad.campaign.statistics import Fold, Moments
+from microrad.core import kernels
+from microrad.core.units import format_quantity
 from microrad.fine_loop.ensemble import bin_edges_rad
-from microrad.units import format_quantity
 
 CONFIDENCE = 0.95
 """Of every interval, but for those that the campaign file asks for."""

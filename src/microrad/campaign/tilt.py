@@ -22,7 +22,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from microrad import kernels, lti
+from microrad.core import kernels, lti
 from microrad.fine_loop import ensemble, linear
 from microrad.fine_loop.ensemble import LANES, SLICE_SAMPLES, Span
 from microrad.fine_loop.loop import LoopController, PointingLoop

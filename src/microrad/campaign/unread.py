@@ -5,10 +5,10 @@ from typing import Any, cast
 
 import numpy as np
 
-from microrad import reads
 from microrad.campaign import evaluate, loops, plan
 from microrad.campaign.file import CampaignFile
 from microrad.campaign.keys import MIRROR, touches_loop
+from microrad.core import reads
 from microrad.fields import Table
 from microrad.fine_loop import ensemble
 from microrad.mission import LinkMission

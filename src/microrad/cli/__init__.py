@@ -29,11 +29,11 @@ from microrad.cli.frame import (
     say,
     width,
 )
-from microrad.folder import write_whole
+from microrad.core.folder import write_whole
 
 # Everything else is imported inside the commands: numpy, numba and pydantic take longer to load than help may take.
 if TYPE_CHECKING:
-    from microrad.kept import Kept
+    from microrad.core.kept import Kept
     from microrad.missionfile import MissionFile
     from microrad.study import Study
 
@@ -110,7 +110,8 @@ def run(
     0 when every requirement is met and 1 when one is not. What an earlier run computed of the same inputs is taken
     from it.
     """
-    from microrad import kept, report
+    from microrad import report
+    from microrad.core import kept
     from microrad.missionfile import load_mission
 
     mission = load_mission(file, mirror)

@@ -26,7 +26,7 @@ from microrad.cli.frame import (
     progress_bar,
     width,
 )
-from microrad.folder import write_whole
+from microrad.core.folder import write_whole
 
 # Everything else is imported inside the commands: it takes longer to load than help may take.
 if TYPE_CHECKING:

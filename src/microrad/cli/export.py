@@ -20,7 +20,7 @@ from microrad.cli.frame import (
     option,
     progress_bar,
 )
-from microrad.folder import write_whole
+from microrad.core.folder import write_whole
 
 # Everything else is imported inside the commands: it takes longer to load than help may take.
 if TYPE_CHECKING:
@@ -280,7 +280,7 @@ def import_(  # noqa: PLR0913, PLR0917  what a linear model does not say has to 
 
 
 def _quantity(flag: str, text: str, unit: str) -> float:
-    from microrad.units import UnitError, parse_quantity
+    from microrad.core.units import UnitError, parse_quantity
 
     try:
         return parse_quantity(text, unit)

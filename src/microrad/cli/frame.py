@@ -28,7 +28,7 @@ from typing import Annotated, Any, NoReturn, ParamSpec
 
 import typer
 
-from microrad.units import BLANKS, printable
+from microrad.core.units import BLANKS, printable
 
 MET, UNMET, REFUSED, BUG, INTERRUPTED, UNREAD = 0, 1, 2, 70, 130, 141
 

@@ -25,7 +25,7 @@ from microrad.cli.frame import (
     option,
     progress_bar,
 )
-from microrad.folder import write_whole
+from microrad.core.folder import write_whole
 
 # Everything else is imported inside the commands: it takes longer to load than help may take.
 if TYPE_CHECKING:
@@ -57,7 +57,7 @@ def _quantity(unit: str) -> Callable[[str], float]:
     """A parser of an option's quantity, whose refusal typer shows with the name of the option."""
 
     def parse(text: str) -> float:
-        from microrad.units import UnitError, parse_quantity
+        from microrad.core.units import UnitError, parse_quantity
 
         try:
             return parse_quantity(text, unit)

@@ -69,8 +69,8 @@ def _broken(designs: "tuple[Design, ...]", left: "tuple[Outlook, ...]") -> str:
 
 
 def _text(scene: "Scene", designs: "tuple[Design, ...]", left: "tuple[Outlook, ...]", warnings: list[str]) -> str:
+    from microrad.core.units import format_quantity
     from microrad.report.tables import Table, tables_text
-    from microrad.units import format_quantity
 
     rate = format_quantity(1.0 / scene.loop.timing.period_s, "Hz")
     about = (

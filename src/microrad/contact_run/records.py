@@ -9,7 +9,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from microrad.units import format_quantity
+from microrad.core.units import format_quantity
 
 Floats = NDArray[np.float64]
 

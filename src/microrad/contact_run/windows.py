@@ -9,12 +9,12 @@ from numpy.typing import NDArray
 
 from microrad import link
 from microrad.contact_run.records import Contact, Loss, Settings, Sight, Window
+from microrad.core.units import SPEED_OF_LIGHT_M_S, format_quantity
 from microrad.disturbance import Reference
 from microrad.fine_loop import ensemble
 from microrad.fine_loop.loop import LoopController, PointingLoop
 from microrad.fine_pointing.scenario import table
 from microrad.mission import Mission
-from microrad.units import SPEED_OF_LIGHT_M_S, format_quantity
 
 Floats = NDArray[np.float64]
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from microrad import lti
 from microrad.control.problem import GAUGE, OPTICAL, AxisController, DesignPlant
+from microrad.core import lti
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]

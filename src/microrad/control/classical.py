@@ -13,10 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from microrad import lti
 from microrad.control import filters
 from microrad.control.problem import OPTICAL, AxisController, DesignPlant, Family, Parameter, once_per_plant
 from microrad.control.sampled import Gains, pid
+from microrad.core import lti
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from microrad import lti
+from microrad.core import lti
 
 
 def second_order(

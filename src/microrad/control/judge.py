@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from microrad import lti
 from microrad.control.analysis import around_poles, bandwidth_hz, cut, moved, uses_both
 from microrad.control.problem import OPTICAL, RESIDUAL, AxisController, DesignPlant
+from microrad.core import lti
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]

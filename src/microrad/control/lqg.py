@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from microrad import lti
 from microrad.control.analysis import reachable
 from microrad.control.problem import (
     GAUGE,
@@ -24,6 +23,7 @@ from microrad.control.problem import (
     Parameter,
     once_per_plant,
 )
+from microrad.core import lti
 
 Floats = NDArray[np.float64]
 

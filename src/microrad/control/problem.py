@@ -8,7 +8,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from microrad import lti
+from microrad.core import lti
 
 Floats = NDArray[np.float64]
 _Answer = TypeVar("_Answer")

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from microrad import link, operations, orbit
+from microrad.core.units import format_quantity
 from microrad.day_study import flow
 from microrad.day_study.assumptions import NOTHING, Numbers, Swing, swings
 from microrad.day_study.flow import DIRECT, RELAY, Closing, PointingLoss, Way
@@ -12,7 +13,6 @@ from microrad.link_acquisition import Found
 from microrad.link_study import LinkStudy
 from microrad.mission import LinkMission
 from microrad.requirement import derived_from
-from microrad.units import format_quantity
 
 Progress = Callable[[int, int, str], None]
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from microrad import lti
+from microrad.core import lti
 from microrad.disturbance.records import Disturbance, above_zero, covariance
 
 Floats = NDArray[np.float64]

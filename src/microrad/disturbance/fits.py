@@ -6,11 +6,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from microrad.core.units import format_quantity
 from microrad.disturbance.records import Convention, Disturbance, above_zero, band_rms, one_input, rising, share
 from microrad.disturbance.sources import from_terms
 from microrad.disturbance.tables import checked
 from microrad.disturbance.terms import Samples, Term, band_samples, fit_terms, table_samples
-from microrad.units import format_quantity
 
 Floats = NDArray[np.float64]
 

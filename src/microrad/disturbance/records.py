@@ -12,7 +12,7 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from microrad import lti
+from microrad.core import lti
 
 Floats = NDArray[np.float64]
 Convention = Literal["radial", "per-axis"]

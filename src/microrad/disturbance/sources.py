@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from microrad.core.units import format_quantity
 from microrad.disturbance.records import (
     Convention,
     Disturbance,
@@ -15,7 +16,6 @@ from microrad.disturbance.records import (
     share,
 )
 from microrad.disturbance.terms import Term, term_filter
-from microrad.units import format_quantity
 
 MICIUS_EDGES_HZ = (0.0, 1.0, 10.0, 50.0, 100.0)
 MICIUS_RMS_RAD = (8.6e-6, 2.8e-6, 1.9e-6, 0.6e-6)

@@ -7,7 +7,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from microrad import control, fine_pointing, hysteresis, kernels, lti, mirror, simulate, tracking
+from microrad import control, fine_pointing, hysteresis, mirror, simulate, tracking
+from microrad.core import kernels, lti
 from microrad.export.modes import minimal
 from microrad.export.records import (
     GAUGE,

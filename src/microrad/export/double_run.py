@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from microrad import kernels
+from microrad.core import kernels
 from microrad.export.records import FlightController, Floats, InverseLaw
 from microrad.export.sections import Sections
 

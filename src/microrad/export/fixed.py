@@ -6,7 +6,7 @@ from importlib.metadata import version
 
 import numpy as np
 
-from microrad import kernels, lti
+from microrad.core import kernels, lti
 from microrad.export.double_run import run
 from microrad.export.fixed_form import HEAD_ROOM, FixedForm, Poles, scaled
 from microrad.export.fixed_report import poles, report, report_text

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from microrad import kernels
+from microrad.core import kernels
 from microrad.export.double_run import Run
 from microrad.export.records import FlightController, Floats, Signal
 from microrad.export.rounding import responses

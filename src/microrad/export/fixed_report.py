@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from microrad import lti
+from microrad.core import lti
 from microrad.export.double_run import Run, run
 from microrad.export.fixed_form import FixedForm, OutputQuality, Poles, QuantisationReport, Whole, dequantised
 from microrad.export.fixed_step import FixedRun, Step, fixed_run

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from microrad import kernels
+from microrad.core import kernels
 from microrad.export.identifiers import identifier
 from microrad.export.records import ExportError, FlightController, Floats, InverseLaw, Signal, Vectors
 from microrad.export.sections import Sections

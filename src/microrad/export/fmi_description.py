@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from importlib.metadata import version as version_of
 from typing import Literal
 
-from microrad import kernels
+from microrad.core import kernels
 from microrad.export.records import LoopUnit, PlantUnit
 from microrad.export.templating import render
 

@@ -19,7 +19,8 @@ from typing import Any
 
 import numpy as np
 
-from microrad import kernels
+from microrad.core import kernels
+from microrad.core.folder import scratch, write_whole
 from microrad.export.build import FLAGS, compiler, compiler_words
 from microrad.export.flight import flight_code
 from microrad.export.fmi_description import Version, constants, exponent, model_description, plant_of, variables
@@ -27,7 +28,6 @@ from microrad.export.identifiers import identifier
 from microrad.export.records import GAUGE, OPTICAL_ERROR, READING, REFERENCE, ExportError, LoopUnit, PlantUnit
 from microrad.export.sections import sections
 from microrad.export.templating import render
-from microrad.folder import scratch, write_whole
 
 SHARED = (*FLAGS, "-fPIC", "-shared", "-fvisibility=hidden")
 """What the library of a unit is compiled with."""

@@ -17,10 +17,10 @@ from typing import Any, Literal
 import numpy as np
 
 from microrad import mirror
+from microrad.core.lti import frequency_response
 from microrad.export.linear_roots import Roots, checked, response, roots_of_control, roots_of_fields
 from microrad.export.linear_select import select
 from microrad.export.records import ExportError
-from microrad.lti import frequency_response
 from microrad.mirror_table import Mirror
 
 READ_BACK = 1e-9

@@ -7,14 +7,14 @@ from typing import Any
 
 import numpy as np
 
-from microrad import lti
+from microrad.core import lti
+from microrad.core.lti import Complexes
 from microrad.export.linear_select import form_of, numbers
 from microrad.export.matrices_files import python_control, sample_time_s
 from microrad.export.matrices_forms import LinearModel, Port, factored, zero_pole_gain
 from microrad.export.matrices_polynomials import roots
 from microrad.export.matrices_structure import pole_text
 from microrad.export.records import ExportError, Floats
-from microrad.lti import Complexes
 
 MOST_ORDER = 60
 """States of a mirror's linear part beyond which it is taken for a mistake."""

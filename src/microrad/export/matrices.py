@@ -8,9 +8,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from microrad import control, lti, mirror, simulate
+from microrad import control, mirror, simulate
 from microrad.control import GAUGE, OPTICAL, RESIDUAL
 from microrad.control.analysis import moved
+from microrad.core import lti
 from microrad.export.choice import Choice, PointingChoice, TrackingChoice, flight_controller, origin
 from microrad.export.matrices_files import from_control, json_text, read_mat, to_control, write_mat
 from microrad.export.matrices_forms import (

@@ -12,12 +12,12 @@ from typing import Any
 
 import numpy as np
 
-from microrad import lti
+from microrad.core import lti
+from microrad.core.folder import write_whole
+from microrad.core.installing import advice
 from microrad.export.matrices_forms import Forms, LinearModel, Port, forms
 from microrad.export.matrices_mat import Structure, load
 from microrad.export.records import ExportError, Origin
-from microrad.folder import write_whole
-from microrad.installing import advice
 
 FORMAT = "microrad linear models"
 """What a JSON text of models says that it is."""

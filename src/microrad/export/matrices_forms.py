@@ -6,11 +6,11 @@ from fractions import Fraction
 
 import numpy as np
 
-from microrad import lti
+from microrad.core import lti
+from microrad.core.lti import Complexes
 from microrad.export.matrices_polynomials import floats, polynomials, roots
 from microrad.export.matrices_structure import entry_of, refuse_hidden, refuse_unstable
 from microrad.export.records import ExportError, Floats, Origin
-from microrad.lti import Complexes
 
 _PROBES = 300
 

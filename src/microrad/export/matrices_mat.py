@@ -3,8 +3,8 @@
 from pathlib import Path
 from typing import Any
 
+from microrad.core.matlab_file import MatlabFile, MatlabFileError, Structure, Unread
 from microrad.export.records import ExportError
-from microrad.matlab_file import MatlabFile, MatlabFileError, Structure, Unread
 
 __all__ = ["MOST_BYTES", "Structure", "Unread", "load"]
 

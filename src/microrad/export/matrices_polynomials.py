@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from microrad import lti
+from microrad.core import lti
+from microrad.core.lti import Complexes
 from microrad.export.records import ExportError, Floats
-from microrad.lti import Complexes
 
 MOST_STATES = 100
 """States of an entry beyond which its coefficients leave the range of a float."""

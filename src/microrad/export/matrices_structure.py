@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 
-from microrad import lti
 from microrad.control.analysis import reachable
+from microrad.core import lti
 from microrad.export.records import ExportError, Floats
 
 LARGEST = 1e100

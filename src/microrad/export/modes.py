@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from microrad import lti
+from microrad.core import lti
 from microrad.export.block_diagonal import BlockDiagonal, block_diagonal
 from microrad.export.records import ExportError, FlightController, Floats
 

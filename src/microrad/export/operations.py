@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from microrad import kernels
+from microrad.core import kernels
 from microrad.export.fixed import FixedForm
 from microrad.export.flight import compensated_states
 from microrad.export.records import FlightController, InverseLaw

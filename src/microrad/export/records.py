@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from microrad import kernels, lti
+from microrad.core import kernels, lti
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.integer]

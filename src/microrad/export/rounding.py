@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from microrad import kernels
+from microrad.core import kernels
 from microrad.export.double_run import InverseRun, Run, run, widened
 from microrad.export.flight import compensated_states
 from microrad.export.records import FlightController, Floats, InverseLaw, Vectors

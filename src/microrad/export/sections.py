@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from microrad import kernels, lti
+from microrad.core import kernels, lti
 from microrad.export.block_diagonal import BlockDiagonal
 from microrad.export.modes import NEAR, Modes, hidden, modes, sizes
 from microrad.export.records import ExportError, FlightController, Floats

@@ -8,6 +8,8 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Literal
 
+from microrad.core.folder import MANIFEST, check_folder, whole_folder
+from microrad.core.units import format_quantity
 from microrad.export.build import BenchResult, compile_and_run, compiler
 from microrad.export.choice import Choice, PointingChoice, flight_controller, outlook, vectors
 from microrad.export.fixed import FixedForm, fixed_code, quantised
@@ -19,8 +21,6 @@ from microrad.export.records import ExportError, FlightController, Progress, Vec
 from microrad.export.rounding import RoundingBound, rounding_bound
 from microrad.export.sections import Sections, sections
 from microrad.fine_pointing import PROMISE, Outlook
-from microrad.folder import MANIFEST, check_folder, whole_folder
-from microrad.units import format_quantity
 
 Precision = Literal["double", "single", "fixed"]
 PRECISIONS: tuple[Precision, ...] = ("double", "single", "fixed")

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from microrad import lti
 from microrad.control import AxisController, DesignPlant
+from microrad.core import lti
 from microrad.disturbance import Disturbance
 from microrad.fine_loop.linear import ClosedLoop, close, gauge_noise_rad, open_loop
 from microrad.fine_loop.loop import PointingLoop, assemble, decoupling, nominal_axis_gain

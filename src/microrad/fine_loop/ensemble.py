@@ -9,11 +9,12 @@ from functools import cache, partial
 import numpy as np
 from numpy.typing import NDArray
 
-from microrad import disturbance, kernels, lti, mirror
+from microrad import disturbance, mirror
 from microrad.control import amplifier_factor, inverse_arrays, no_feedforward
+from microrad.core import kernels, lti
+from microrad.core.threads import in_threads
 from microrad.fine_loop.loop import LoopController, PointingLoop
 from microrad.sensor import StrainGauge
-from microrad.threads import in_threads
 
 Floats = NDArray[np.float64]
 References = tuple[disturbance.Reference, ...]

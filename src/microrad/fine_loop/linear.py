@@ -11,8 +11,9 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from microrad import disturbance, lti
+from microrad import disturbance
 from microrad.control import amplifier_factor
+from microrad.core import lti
 from microrad.fine_loop.loop import LoopController, PointingLoop, in_band_gain
 
 Floats = NDArray[np.float64]

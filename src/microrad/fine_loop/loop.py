@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from microrad import lti
 from microrad.control import AxisController, Drive, Inverse, Timing
+from microrad.core import lti
 from microrad.disturbance import Disturbance, Reference
 from microrad.hysteresis import BoucWen, Play, gain_only, slow_gain
 from microrad.mirror import Mirror

@@ -9,11 +9,11 @@ import numpy as np
 
 from microrad import control, mirror, mirror_spread
 from microrad.control import DesignPlant, Family, Specification, Tuned
+from microrad.core.threads import shared_out
 from microrad.fine_loop.design import behind_filter, design_plant
 from microrad.fine_loop.loop import LoopController, PointingLoop, ReferenceFilter, assemble, with_inverse
 from microrad.fine_pointing.scenario import Scene, one_mirror, table
 from microrad.mission import Mission
-from microrad.threads import shared_out
 
 Progress = Callable[[int, int, str], None]
 

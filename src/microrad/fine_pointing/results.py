@@ -8,8 +8,9 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from microrad import kernels
 from microrad.control import inverse
+from microrad.core import kernels
+from microrad.core.threads import in_threads
 from microrad.fine_loop import ensemble
 from microrad.fine_loop.design import residual_spectrum
 from microrad.fine_loop.linear import Stationary, close, stationary
@@ -18,7 +19,6 @@ from microrad.fine_pointing import parts
 from microrad.fine_pointing.designs import BASELINE, Design
 from microrad.fine_pointing.scenario import BODY_POINTING, Scene, table, variants, with_mirror
 from microrad.mission import Mission
-from microrad.threads import in_threads
 
 Floats = NDArray[np.float64]
 Progress = Callable[[int, int, str], None]

@@ -23,6 +23,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from microrad.core.kernels import bouc_wen_response
 from microrad.identify.projection import (
     SLOPE_TOLERANCE,
     Problem,
@@ -45,7 +46,6 @@ from microrad.identify.records import (
     prepare,
     split_by_record,
 )
-from microrad.kernels import bouc_wen_response
 from microrad.recording import Recording
 
 PARAMETERS = ("d1", "d2", "epsilon", "delta", "alpha", "beta")

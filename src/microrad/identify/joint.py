@@ -12,7 +12,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from microrad import kernels, mirror
+from microrad import mirror
+from microrad.core import kernels
 from microrad.hysteresis import NO_CREEP, BoucWen, Creep, Play, slow_gain
 from microrad.identify.bouc_wen import BoucWenFit, fit_bouc_wen
 from microrad.identify.plant_fit import PlantFit, Run, fit_plant, without

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from microrad.core.lti import StateSpace
 from microrad.identify.linear_uncertainty import Uncertainty, uncertainty
 from microrad.identify.modal import Complexes, Floats, Hold, ModalModel, simulate, simulate_periodic
 from microrad.identify.polish import Polished, TimeEquations, polish
@@ -19,7 +20,6 @@ from microrad.identify.records import IdentificationError, Progress, colour_infl
 from microrad.identify.response import FrequencyResponse, response_from_periods, response_from_records
 from microrad.identify.structure import fit_order
 from microrad.identify.vector_fitting import check_order
-from microrad.lti import StateSpace
 from microrad.recording import Recording
 
 _ORDERS_SINGLE = range(1, 9)

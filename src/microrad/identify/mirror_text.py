@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from microrad import kernels
+from microrad.core import kernels
 from microrad.hysteresis import BoucWen, Play, scaled, slow_gain
 from microrad.identify.bouc_wen import PARAMETERS, BoucWenFit
 from microrad.identify.choice import Identification

@@ -21,8 +21,8 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from microrad.core.lti import StateSpace
 from microrad.identify.records import IdentificationError
-from microrad.lti import StateSpace
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]

@@ -15,11 +15,12 @@ from typing import Any, Literal
 
 import numpy as np
 
-from microrad import kernels, mirror
+from microrad import mirror
+from microrad.core import kernels
+from microrad.core.threads import in_threads
 from microrad.identify.records import FloatArray, IdentificationError, Progress, colour_inflation, correlation
 from microrad.mirror import Mirror
 from microrad.recording import Recording
-from microrad.threads import in_threads
 
 Hold = Literal["linear", "zero-order", "band-limited"]
 

@@ -9,7 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from microrad import lti, mirror
+from microrad import mirror
+from microrad.core import lti
 from microrad.hysteresis import NO_CREEP, BoucWen, Creep, Play, slow_gain
 from microrad.identify.plant_fit import Parameter, Structure
 from microrad.identify.records import FloatArray

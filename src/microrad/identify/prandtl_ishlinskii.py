@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from microrad.core.kernels import play_response
 from microrad.identify.records import (
     FloatArray,
     IdentificationError,
@@ -26,7 +27,6 @@ from microrad.identify.records import (
     span,
     split_by_record,
 )
-from microrad.kernels import play_response
 from microrad.recording import Recording
 
 _LARGEST_THRESHOLD = 0.47

@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 
+from microrad.core.kernels import bouc_wen_response
 from microrad.hysteresis import BoucWen
 from microrad.identify.records import FloatArray, Prepared, Progress, centred, fastest_rate, span
-from microrad.kernels import bouc_wen_response
 
 SLOPE_TOLERANCE = 1e-3
 _LOWER = np.array([-1.0, -3.0, math.log(0.05), math.log(0.05)])

@@ -17,7 +17,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from microrad import kernels, mirror
+from microrad import mirror
+from microrad.core import kernels
 from microrad.identify import stiffness_tangents as tangents
 from microrad.identify.modal import Floats
 from microrad.identify.records import IdentificationError, Progress

@@ -12,7 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from microrad import kernels, mirror
+from microrad import mirror
+from microrad.core import kernels
 from microrad.identify.modal import Floats, hold_step
 from microrad.identify.stiffness_model import Numbers, delayed
 

@@ -9,7 +9,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from microrad.budget import Line, total_db
+from microrad.core.budget import Line, total_db
+from microrad.core.units import format_input, format_quantity
 from microrad.link import gains
 from microrad.link.model import (
     check_grid,
@@ -21,7 +22,6 @@ from microrad.link.model import (
 )
 from microrad.link_table import Beacon, Communication, half_angle_rad
 from microrad.mission import LinkMission, Source, source_text
-from microrad.units import format_input, format_quantity
 
 _GIVEN = "whatever the pointing error and the data rate"
 _TRANSMITTING = (

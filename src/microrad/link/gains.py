@@ -5,7 +5,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from microrad.units import PLANCK_J_S, SPEED_OF_LIGHT_M_S, format_quantity
+from microrad.core.units import PLANCK_J_S, SPEED_OF_LIGHT_M_S, format_quantity
 
 Floats = NDArray[np.float64]
 

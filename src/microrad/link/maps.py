@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from microrad.core.units import format_quantity
 from microrad.link import gains
 from microrad.link.budget import CHOSEN, given_or
 from microrad.link.model import (
@@ -21,7 +22,6 @@ from microrad.link.model import (
 )
 from microrad.link.receivers import BpskHomodyne, DpskPreamplified, OokCounting
 from microrad.mission import LinkMission, Source, source_text
-from microrad.units import format_quantity
 
 Floats = NDArray[np.float64]
 

@@ -8,8 +8,8 @@ import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+from microrad.core.units import BLANKS, SPEED_OF_LIGHT_M_S, printable
 from microrad.operations.base import OperationsError, check_number, check_positive, check_span
-from microrad.units import BLANKS, SPEED_OF_LIGHT_M_S, printable
 
 Utc = Callable[[float], str]
 """ISO 8601 text in UTC, such as 2026-03-20T12:00:00.000Z, of a time in s since the mission's epoch."""

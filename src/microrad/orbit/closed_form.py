@@ -3,9 +3,9 @@
 import math
 from typing import NamedTuple
 
+from microrad.core.units import format_quantity
 from microrad.orbit.base import OrbitError
 from microrad.orbit.earth import EARTH_RADIUS_M, GEOSTATIONARY_RADIUS_M, MU_M3_S2, ROTATION_RAD_S
-from microrad.units import format_quantity
 
 
 class CoplanarContact(NamedTuple):

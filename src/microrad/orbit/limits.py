@@ -7,6 +7,7 @@ from typing import NamedTuple, get_args
 
 import numpy as np
 
+from microrad.core.units import format_quantity
 from microrad.orbit.attitude import Attitude, body_axes, body_rate_rad_s, in_body
 from microrad.orbit.base import Floats, Orbit, OrbitError, States
 from microrad.orbit.earth import Earth
@@ -14,7 +15,6 @@ from microrad.orbit.epoch import Epoch
 from microrad.orbit.events import Function, Intervals, complement, positive, refined, union
 from microrad.orbit.line_of_sight import cross, dot
 from microrad.orbit.sun import shadow_rad, sun_direction
-from microrad.units import format_quantity
 
 Condition = tuple[str, Intervals]
 """What can stand in the way, and when it does not."""

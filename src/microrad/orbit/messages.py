@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import NamedTuple
 from xml.parsers import expat
 
-from microrad.folder import read_bytes
+from microrad.core.folder import read_bytes
 from microrad.orbit.base import OrbitError
 
 MOST_BYTES = 50_000_000

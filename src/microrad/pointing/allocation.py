@@ -4,9 +4,9 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from microrad.core.units import format_quantity
 from microrad.pointing.classes import Interpretation, StatedError, error_term
 from microrad.pointing.summation import TOTALS, Rule
-from microrad.units import format_quantity
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from microrad.core.units import format_quantity
 from microrad.pointing.statistics import outage_probability, radius_of_loss_rad, transmission
 from microrad.radial_error import Jitter, density_on_circle, radial_survival
-from microrad.units import format_quantity
 
 Floats = NDArray[np.float64]
 ErrorRatio = Callable[[Floats], Floats]

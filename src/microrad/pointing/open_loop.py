@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from microrad.budget import Line, root_sum_square
+from microrad.core.budget import Line, root_sum_square
 from microrad.link_table import half_angle_rad
 from microrad.mission import LinkMission, Source, source_text
 from microrad.pointing.allocation import Allocation, allocate

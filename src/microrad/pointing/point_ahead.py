@@ -2,9 +2,9 @@
 
 from dataclasses import dataclass
 
+from microrad.core.units import format_quantity
 from microrad.pointing.classes import StatedError
 from microrad.pointing_table import PointAhead, point_ahead_rad
-from microrad.units import format_quantity
 
 NAME = "Point-ahead"
 """What the budget calls its line."""

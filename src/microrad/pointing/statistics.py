@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from microrad.core.units import format_quantity
 from microrad.radial_error import Jitter, at_least_zero, radial_quantile, radial_survival
-from microrad.units import format_quantity
 
 Floats = NDArray[np.float64]
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from microrad.matlab_file import Left, MatlabFile, MatlabFileError, Structure, Unread
+from microrad.core.matlab_file import Left, MatlabFile, MatlabFileError, Structure, Unread
 from microrad.recording.arrays import ArraySource, Variable, channels_of, stated_rate
 from microrad.recording.files import most_unpacked, sha256_of
 from microrad.recording.records import RecordingError

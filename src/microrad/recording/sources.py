@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from microrad.installing import advice
+from microrad.core.installing import advice
 from microrad.recording.records import FloatArray, RecordingError
 
 _TIME_NAME = re.compile(

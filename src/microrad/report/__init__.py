@@ -8,10 +8,10 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from microrad.folder import MANIFEST, FolderError, check_folder, whole_folder
-from microrad.kept import NOTHING, Kept
+from microrad.core.folder import MANIFEST, FolderError, check_folder, whole_folder
+from microrad.core.kept import NOTHING, Kept
+from microrad.core.threads import shared_out
 from microrad.report.tables import Column, rows_of
-from microrad.threads import shared_out
 
 if TYPE_CHECKING:
     from microrad.constellation import ConstellationPlan

@@ -8,7 +8,8 @@ from dataclasses import asdict, replace
 from typing import Any
 
 from microrad import link
-from microrad.budget import Line
+from microrad.core.budget import Line
+from microrad.core.units import format_input
 from microrad.link import Swing
 from microrad.link_acquisition import Finding, Found, Tracking
 from microrad.link_performance import Performance, error_rad, required_error_rad
@@ -20,7 +21,6 @@ from microrad.report import requirements
 from microrad.report.quantities import quantity, signed
 from microrad.report.tables import Table, table_text, tables_text
 from microrad.requirement import met, of_links, outage_words
-from microrad.units import format_input
 
 UNDER_JITTER = "Communication under jitter"
 """The lines of what the jitter does to the communication link, beside its budget."""

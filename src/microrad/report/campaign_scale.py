@@ -5,8 +5,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from microrad.core.units import UnitError, format_quantity, parse_quantity
 from microrad.report.campaign_numbers import is_share
-from microrad.units import UnitError, format_quantity, parse_quantity
 
 
 class Scale(NamedTuple):

@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import Any
 
 from microrad import missionfile
+from microrad.core.folder import MANIFEST
 from microrad.document import Document, UnreadableError
-from microrad.folder import MANIFEST
 from microrad.report.compared import clipped
 
 MOST_BYTES = 64_000_000

@@ -6,10 +6,10 @@ import numpy as np
 
 from microrad import orbit
 from microrad.contact_run import ContactRun
+from microrad.core.kept import NOTHING as NOTHING_KEPT
+from microrad.core.kept import Kept
 from microrad.day_study import NOTHING, DayStudy, Swing, Way, times
 from microrad.day_study.ground_track import LONGEST_S, Outline, ground_track
-from microrad.kept import NOTHING as NOTHING_KEPT
-from microrad.kept import Kept
 from microrad.report import day_assumptions, day_figures, day_map
 from microrad.report.figures import Figure, Floats
 

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure as Canvas
 from numpy.typing import NDArray
 
 from microrad import paper, simulate
-from microrad.kept import NOTHING, Kept
+from microrad.core.kept import NOTHING, Kept
 from microrad.mission import Mission
 from microrad.report import interactive
 from microrad.report.inlined import inlined

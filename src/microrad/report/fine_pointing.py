@@ -5,6 +5,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from microrad.control import LoopMargins
+from microrad.core.units import format_quantity
 from microrad.fine_pointing import FinePointingStudy, Residual, Sine
 from microrad.fine_pointing.parts import DELAY
 from microrad.geometry import StrokeBudget
@@ -13,7 +14,6 @@ from microrad.mission import Mission
 from microrad.report import fine_pointing_words as words
 from microrad.report.figures import Figure
 from microrad.report.fine_pointing_data import parameter_units, rms_by_source, sources
-from microrad.units import format_quantity
 
 HEADINGS = {"given": "mission's mirror", "comparison": "comparison model", "no hysteresis": "no hysteresis"}
 """Variants of the mirror as headings."""

@@ -5,11 +5,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from microrad.control.tuning import MARGIN
+from microrad.core.units import format_quantity
 from microrad.fine_pointing import FinePointingStudy, Verified
 from microrad.geometry import StrokeBudget
 from microrad.mirror_summary import unknown_dynamics
 from microrad.mission import Mission
-from microrad.units import format_quantity
 
 VARIANTS = {
     "given": "on the mission's mirror",

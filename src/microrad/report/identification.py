@@ -7,13 +7,13 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from microrad.folder import write_whole
+from microrad.core.folder import write_whole
+from microrad.core.units import format_quantity
 from microrad.identify import Identification
 from microrad.identify.predictions import Fit
 from microrad.recording import Finding, Recording
 from microrad.report import identification_parameters as parameters
 from microrad.report import identification_words as words
-from microrad.units import format_quantity
 
 BEGINS = '<!DOCTYPE html>\n<html lang="en" data-made-by="microrad identify">'
 
@@ -90,7 +90,7 @@ def render(
 ) -> str:
     """The page's HTML; every text that is not ours is escaped, and nothing is loaded from anywhere."""
     # Drawing libraries load here, not with the package: they take longer than help should.
-    from microrad.machine import versions
+    from microrad.core.machine import versions
     from microrad.report import identification_figures as figures
     from microrad.report.interactive import with_scripts
     from microrad.report.page import pages

@@ -19,6 +19,7 @@ from matplotlib.figure import Figure as Canvas
 from matplotlib.ticker import LogFormatter
 from numpy.typing import NDArray
 
+from microrad.core.threads import shared_out
 from microrad.identify import Identification
 from microrad.identify.linear import LinearFit, fit_percent, output_error
 from microrad.identify.predictions import Prediction
@@ -26,7 +27,6 @@ from microrad.identify.roles import roles
 from microrad.recording import Recording
 from microrad.report import identification_words as words
 from microrad.report.figures import BLACK, BLUE, GREEN, ORANGE, SKY, STYLE, VERMILION, Figure, Floats, svg_of, thin
-from microrad.threads import shared_out
 
 MOST_RECORDINGS = 12  # drawn, a row each
 VIRTUAL = "virtual bench"

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from microrad.core.units import format_quantity
 from microrad.hysteresis import Play
 from microrad.identify import Identification, PrandtlIshlinskiiFit, Score
 from microrad.identify.doubts import fit_warnings
@@ -27,7 +28,6 @@ from microrad.report.identification_parameters import (
     starts_text,
     two_digits,
 )
-from microrad.units import format_quantity
 
 Floats = NDArray[np.float64]
 

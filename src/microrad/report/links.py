@@ -4,6 +4,7 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
+from microrad.core.units import format_quantity
 from microrad.link_acquisition import LONGEST_LOOK_S, Finding, Found, Scanned
 from microrad.link_performance import Performance
 from microrad.link_study import LinkStudy
@@ -12,7 +13,6 @@ from microrad.pointing import OpenLoopPointing
 from microrad.report import budget_views
 from microrad.report.figures import Figure
 from microrad.report.quantities import quantity
-from microrad.units import format_quantity
 
 Row = dict[str, Any]
 EARLY = 0.9

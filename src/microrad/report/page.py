@@ -10,7 +10,8 @@ from typing import Any
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from microrad import link
-from microrad.machine import versions
+from microrad.core.machine import versions
+from microrad.core.units import format_quantity
 from microrad.mission import Source
 from microrad.missionfile import assumptions, changed_from_shipped
 from microrad.performance import FINE
@@ -32,7 +33,6 @@ from microrad.report import (
 from microrad.report.figures import Figure
 from microrad.report.quantities import quantity
 from microrad.study import Study
-from microrad.units import format_quantity
 
 PARTS = (
     ("verdict", "Verdict"),

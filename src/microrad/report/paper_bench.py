@@ -13,7 +13,7 @@ from matplotlib.figure import Figure as Canvas
 from numpy.typing import NDArray
 
 from microrad import bench, identify
-from microrad.kept import NOTHING, Kept
+from microrad.core.kept import NOTHING, Kept
 from microrad.recording import Recording
 from microrad.report.figures import BLACK, BLUE, GREEN, STYLE, VERMILION, Figure, svg_of, thin
 from microrad.study import Study

@@ -3,11 +3,11 @@
 from collections.abc import Sequence
 from typing import Any
 
+from microrad.core.units import format_quantity
 from microrad.report import drawings
 from microrad.report.figures import Figure
 from microrad.report.quantities import quantity
 from microrad.study import Study
-from microrad.units import format_quantity
 
 # Table 1 of the paper: year, LEO satellite, its mass, rate in Mbit/s, GEO satellite
 PROJECTS = (

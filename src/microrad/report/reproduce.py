@@ -12,8 +12,8 @@ from typing import Any
 from markupsafe import escape
 
 from microrad import study
-from microrad.folder import MANIFEST, scratch
-from microrad.machine import ARCHITECTURE, as_stated
+from microrad.core.folder import MANIFEST, scratch
+from microrad.core.machine import ARCHITECTURE, as_stated
 from microrad.report import compared, tolerances
 from microrad.report.carried import Carried, ReproduceError, altered, held, read, shown_part, unpack
 from microrad.report.compared import Comparison, Difference, clipped

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from microrad.core.machine import machine, versions
 from microrad.fine_pointing import COUNTERS, FinePointingStudy, Residual
-from microrad.machine import machine, versions
 from microrad.missionfile import MirrorFile, MissionFile, named_files
 from microrad.report import day_results, variables, words
 from microrad.report.carried import hash_of_summary

@@ -10,9 +10,9 @@ from matplotlib import rc_context
 from matplotlib.figure import Figure as Canvas
 from numpy.typing import NDArray
 
+from microrad.core.kept import NOTHING, Kept
 from microrad.fine_loop.ensemble import bin_edges_rad, histogram_beyond, histogram_quantile
 from microrad.fine_pointing import FinePointingStudy, Residual
-from microrad.kept import NOTHING, Kept
 from microrad.mission import Mission
 from microrad.report import fine_pointing_words as words
 from microrad.report.figures import BLACK, BLUE, GREEN, ORANGE, STYLE, Figure, svg_of

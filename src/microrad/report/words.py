@@ -3,6 +3,7 @@
 import math
 from typing import Any
 
+from microrad.core.units import format_quantity
 from microrad.mission import Mission
 from microrad.missionfile import changed_from_shipped
 from microrad.performance import FINE, Cost
@@ -22,7 +23,6 @@ from microrad.report.tables import table_text, tables_text
 from microrad.requirement import IMPOSSIBLE, outage_words
 from microrad.study import Study
 from microrad.tracking import Run, residual_rad
-from microrad.units import format_quantity
 
 
 def headline(study: Study) -> str:

@@ -10,13 +10,13 @@ from pathlib import Path
 from typing import Any
 
 from microrad import link_study
-from microrad.folder import MANIFEST
+from microrad.core.folder import MANIFEST
+from microrad.core.units import UnitError, parse_quantity
 from microrad.report.quantities import quantity
 from microrad.studio.draft import Draft, Value
 from microrad.studio.draft_keys import value_of
 from microrad.studio.link_view import ROUNDING_DB
 from microrad.studio.workshop import Workshop
-from microrad.units import UnitError, parse_quantity
 
 _MOST_FOLDERS = 500
 _MOST_BYTES = 5_000_000

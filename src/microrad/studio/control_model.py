@@ -15,7 +15,8 @@ from functools import lru_cache, partial
 import numpy as np
 from numpy.typing import NDArray
 
-from microrad import control, fine_pointing, hysteresis, lti, mirror, simulate, tracking
+from microrad import control, fine_pointing, hysteresis, mirror, simulate, tracking
+from microrad.core import lti
 from microrad.disturbance import Reference
 from microrad.fine_loop import ensemble, linear
 from microrad.fine_loop.loop import LoopController, PointingLoop

@@ -11,9 +11,9 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import Literal
 
+from microrad.core.units import UnitError, parse_quantity
 from microrad.fields import Quantity, Share
 from microrad.studio.draft import Draft, Value
-from microrad.units import UnitError, parse_quantity
 
 STEPS = 240
 """The last position of a slider that is not in decibels."""

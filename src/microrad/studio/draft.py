@@ -17,8 +17,8 @@ from importlib import resources
 from pathlib import Path
 from typing import Literal
 
+from microrad.core.folder import write_whole
 from microrad.document import MAX_BYTES, Fault, MissionError, Statement, clipped, scan
-from microrad.folder import write_whole
 from microrad.mission import Source
 from microrad.missionfile import LinkFile, MissionFile, load_link, load_mission
 from microrad.origins import written_for

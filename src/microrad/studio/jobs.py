@@ -16,7 +16,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from microrad.folder import write_whole
+from microrad.core.folder import write_whole
 from microrad.studio import plain_files, signing
 from microrad.studio.jobs_files import (
     CANCEL,

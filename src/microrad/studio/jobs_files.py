@@ -23,7 +23,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Literal
 
-from microrad.folder import write_whole
+from microrad.core.folder import write_whole
 from microrad.studio import plain_files, signing
 from microrad.studio.signing import SigningError
 

@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from microrad import link, link_study
-from microrad.budget import Line
+from microrad.core.budget import Line
+from microrad.core.units import format_quantity
 from microrad.link_performance import error_rad, required_error_rad
 from microrad.link_study import LinkStudy
 from microrad.mission import LinkMission
@@ -21,7 +22,6 @@ from microrad.report.quantities import quantity, signed
 from microrad.studio import plots
 from microrad.studio.dials import Dial, dial
 from microrad.studio.draft import Draft
-from microrad.units import format_quantity
 
 Floats = NDArray[np.float64]
 Row = dict[str, Any]

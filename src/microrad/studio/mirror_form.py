@@ -10,14 +10,14 @@ from contextlib import suppress
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 
-from microrad.folder import write_whole
+from microrad.core.folder import write_whole
+from microrad.core.units import UnitError, parse_quantity
 from microrad.recording import ACCEPTABLE, stated_units
 from microrad.studio import plain_files
 from microrad.studio.commands import Identify
 from microrad.studio.jobs import Order
 from microrad.studio.names import NameRefusedError, safe_name, typed_words
 from microrad.studio.reading import Columns, Listing
-from microrad.units import UnitError, parse_quantity
 
 DRIVE_UNITS = ("V", "mV")
 OUTPUT_UNITS = ("mrad", "urad", "rad", "um", "mm", "m")

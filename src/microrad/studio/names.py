@@ -7,7 +7,7 @@ import re
 import unicodedata
 from pathlib import Path
 
-from microrad.units import printable
+from microrad.core.units import printable
 
 MAX_NAME_BYTES = 160
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from microrad.units import format_quantity
+from microrad.core.units import format_quantity
 
 Plot = dict[str, Any]
 Trace = dict[str, Any]

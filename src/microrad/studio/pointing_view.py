@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from microrad import link_study, pointing
+from microrad.core.units import format_quantity
 from microrad.link import DEEPEST_DB
 from microrad.link_study import PointAheadEffect
 from microrad.missionfile import LinkFile
@@ -17,7 +18,6 @@ from microrad.report.quantities import quantity
 from microrad.studio import plots
 from microrad.studio.dials import Dial, dial
 from microrad.studio.draft import Draft
-from microrad.units import format_quantity
 
 Row = dict[str, Any]
 

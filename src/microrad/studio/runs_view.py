@@ -11,8 +11,8 @@ from functools import lru_cache
 from importlib import resources
 from pathlib import Path
 
+from microrad.core.folder import write_whole
 from microrad.document import MAX_BYTES, scan
-from microrad.folder import write_whole
 from microrad.studio.commands import Action
 from microrad.studio.commands_pieces import path_argument
 from microrad.studio.jobs import Job, JobError, Kind, Order, Progress

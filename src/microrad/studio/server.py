@@ -17,7 +17,7 @@ from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING, Any
 
-from microrad.installing import advice
+from microrad.core.installing import advice
 from microrad.studio import address, plain_files
 from microrad.studio.workshop import Workshop
 

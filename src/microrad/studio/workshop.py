@@ -13,8 +13,8 @@ from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
+from microrad.core.folder import write_whole
 from microrad.document import MissionError
-from microrad.folder import write_whole
 from microrad.missionfile import LinkFile, MissionFile
 from microrad.studio import plain_files
 from microrad.studio.campaign_live import LiveCampaigns

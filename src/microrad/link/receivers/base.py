@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from microrad.budget import Line
+from microrad.core.budget import Line
 from microrad.link.gains import photon_energy_j
 from microrad.link.receivers.checks import (
     LEAST_RATIO,

@@ -6,7 +6,7 @@ from statistics import NormalDist
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from microrad.units import format_quantity
+from microrad.core.units import format_quantity
 
 Floats = NDArray[np.float64]
 

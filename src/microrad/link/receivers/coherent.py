@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from microrad.budget import Line
+from microrad.core.budget import Line
 from microrad.link.receivers.base import Receiver
 from microrad.link.receivers.checks import (
     SOURCE,

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from microrad.budget import Line
+from microrad.core.budget import Line
 from microrad.link.receivers.base import Receiver
 from microrad.link.receivers.checks import (
     LEAST_COUNT,

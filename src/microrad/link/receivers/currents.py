@@ -8,7 +8,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from microrad.budget import Line
+from microrad.core.budget import Line
+from microrad.core.units import ELEMENTARY_CHARGE_C
 from microrad.link.receivers.base import Receiver
 from microrad.link.receivers.checks import (
     SOURCE,
@@ -23,7 +24,6 @@ from microrad.link.receivers.checks import (
     spontaneous_photons,
 )
 from microrad.link.receivers.light import apd_excess_noise_factor
-from microrad.units import ELEMENTARY_CHARGE_C
 
 Floats = NDArray[np.float64]
 

@@ -2,9 +2,9 @@
 
 import math
 
-from microrad import capacity
+from microrad.core import capacity
+from microrad.core.units import PLANCK_J_S, SPEED_OF_LIGHT_M_S
 from microrad.link.receivers.checks import require, require_zero_or_more
-from microrad.units import PLANCK_J_S, SPEED_OF_LIGHT_M_S
 
 
 def background_power_w(

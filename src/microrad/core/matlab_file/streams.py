@@ -5,7 +5,7 @@ from __future__ import annotations
 import zlib
 from typing import IO
 
-from microrad.matlab_file.records import MatlabFileError
+from microrad.core.matlab_file.records import MatlabFileError
 
 _CHUNK, _MOST_CHUNK = 1 << 16, 1 << 20
 

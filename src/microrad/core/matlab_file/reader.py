@@ -13,8 +13,8 @@ from typing import IO, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from microrad.matlab_file.records import Left, MatlabFileError, Structure, Unread
-from microrad.matlab_file.streams import Packed, Stream, cut_off
+from microrad.core.matlab_file.records import Left, MatlabFileError, Structure, Unread
+from microrad.core.matlab_file.streams import Packed, Stream, cut_off
 
 MOST_DEPTH = 16
 """Structures and cells within each other."""

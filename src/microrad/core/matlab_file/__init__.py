@@ -5,7 +5,7 @@ some of them. Nothing in a file is executed; what a file may ask for in memory, 
 be left in the file and read one array at a time. Source of the format: MAT-File Format, MathWorks, chapter 1.
 """
 
-from microrad.matlab_file.reader import MOST_ARRAYS, MOST_DEPTH, MatlabFile
-from microrad.matlab_file.records import Left, MatlabFileError, Structure, Unread
+from microrad.core.matlab_file.reader import MOST_ARRAYS, MOST_DEPTH, MatlabFile
+from microrad.core.matlab_file.records import Left, MatlabFileError, Structure, Unread
 
 __all__ = ["MOST_ARRAYS", "MOST_DEPTH", "Left", "MatlabFile", "MatlabFileError", "Structure", "Unread"]

@@ -15,9 +15,9 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
-from microrad.folder import write_whole
-from microrad.machine import machine, source_sha256, versions
-from microrad.reads import Reads, digest, watched_call
+from microrad.core.folder import write_whole
+from microrad.core.machine import machine, source_sha256, versions
+from microrad.core.reads import Reads, digest, watched_call
 
 _Result = TypeVar("_Result")
 

@@ -98,7 +98,7 @@ def versions() -> dict[str, str]:
 @cache
 def source_sha256() -> str:
     """SHA-256 over the names and contents of the package's files, but for those that only give a page its looks."""
-    root, digest, looks = Path(__file__).resolve().parent, hashlib.sha256(), {".html", ".css", ".js"}
+    root, digest, looks = Path(__file__).resolve().parents[1], hashlib.sha256(), {".html", ".css", ".js"}
     files = (p for p in root.rglob("*") if p.is_file() and "__pycache__" not in p.parts and p.suffix not in looks)
     for path in sorted(files):
         digest.update(f"{path.relative_to(root).as_posix()}\0".encode() + hashlib.sha256(path.read_bytes()).digest())
