@@ -17,7 +17,7 @@ import numpy as np
 from skyfield.api import EarthSatellite, load, wgs84
 
 from microrad import constellation, operations, orbit
-from microrad.missionfile import load_mission
+from microrad.mission.file import load_mission
 
 FILE = load_mission(Path(__file__).resolve().parents[1] / "missions" / "leo-geo.toml")
 DAY_S = 86400.0

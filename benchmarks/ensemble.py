@@ -20,10 +20,11 @@ from pathlib import Path
 import numpy as np
 from loop import INTEGER, Counters, best, compiled_twin, twin_parameters
 
-from microrad import control, disturbance, mirror, missionfile, simulate, tracking
+from microrad import control, disturbance, mirror, simulate, tracking
 from microrad.core import kernels, lti
 from microrad.fine_loop import ensemble
 from microrad.fine_loop import loop as fine
+from microrad.mission import file as missionfile
 from microrad.sensor import OpticalSensor
 
 HERE = Path(__file__).resolve().parent

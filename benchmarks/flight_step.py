@@ -22,7 +22,7 @@ from microrad.core import lti
 from microrad.export import build, choice, fixed, flight, operations, records, rounding
 from microrad.export import sections as linear_part
 from microrad.export.templating import table
-from microrad.missionfile import load_mission
+from microrad.mission.file import load_mission
 
 MISSION = Path(__file__).resolve().parent.parent / "missions" / "leo-geo.toml"
 CONTROLLERS = ("PI + inverse", "PI + inverse in series", "LQG")

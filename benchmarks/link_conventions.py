@@ -21,10 +21,10 @@ from scipy.special import j0, j1
 
 from microrad import link
 from microrad.link.gains import dbm, photon_energy_j, watt
-from microrad.link_table import BeamShape, Terminals
-from microrad.link_table import Receiver as ReceiverTable
-from microrad.mission import Mission
-from microrad.missionfile import load_mission
+from microrad.mission.file import load_mission
+from microrad.mission.model import Mission
+from microrad.mission.tables.link import BeamShape, Terminals
+from microrad.mission.tables.link import Receiver as ReceiverTable
 
 FILE = load_mission(Path(__file__).resolve().parents[1] / "missions" / "paper.toml")
 PAPER = FILE.mission

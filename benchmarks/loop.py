@@ -22,8 +22,9 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from microrad import control as microrad_control
-from microrad import hysteresis, mirror, missionfile, simulate, tracking
+from microrad import hysteresis, mirror, simulate, tracking
 from microrad.core import kernels
+from microrad.mission import file as missionfile
 
 HERE = Path(__file__).resolve().parent
 REPEATS = 15

@@ -5,7 +5,7 @@ from functools import cache
 
 from microrad.export import choice
 from microrad.export.records import FlightController, Vectors
-from microrad.missionfile import MissionFile, load_mission
+from microrad.mission.file import MissionFile, load_mission
 from shipped import SHIPPED
 
 

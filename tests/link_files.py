@@ -3,9 +3,9 @@
 import json
 import tomllib
 
-from microrad.mission import LinkMission
-from microrad.missionfile import load_link
-from microrad.presets import preset_text
+from microrad.mission.file import load_link
+from microrad.mission.model import LinkMission
+from microrad.mission.presets import preset_text
 
 COMMON = {"bit_error_ratio": 1e-6, "code_gain": "5 dB", "code_rate": 0.8, "bandwidth": "4 GHz"}
 COUNTER = {"detector": "photon-counting", "efficiency": 0.4, "dark_count_rate": "2000 1/s", "background_power": "1 pW"}

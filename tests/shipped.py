@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from microrad import report, study
-from microrad.missionfile import load_mission
+from microrad.mission.file import load_mission
 from shared import once
 
 MISSIONS = Path(__file__).parent.parent / "missions"

@@ -16,7 +16,7 @@ from microrad.campaign import evaluate, keys, ledger_file, sampling
 from microrad.campaign.file import load_campaign
 from microrad.campaign.inputs import Builder
 from microrad.campaign.records import CampaignError
-from microrad.missionfile import MissionError, load_mission, named_files, open_mission
+from microrad.mission.file import MissionError, load_mission, named_files, open_mission
 from shipped import SHIPPED
 
 QUAD_CELL = (

@@ -16,12 +16,12 @@ from microrad.campaign.ledger import Ledger
 from microrad.campaign.records import CampaignError
 from microrad.campaign.summary import summarise
 from microrad.core import reads
-from microrad.document import MissionError
-from microrad.fields import Several
 from microrad.link import LitAperture
 from microrad.link.inputs import LINK_TABLES
 from microrad.link_performance import Exposure
-from microrad.missionfile import load_link, open_mission
+from microrad.mission.fields import Several
+from microrad.mission.file import load_link, open_mission
+from microrad.mission.toml import MissionError
 from shipped import SHIPPED
 from test_presets import NAMES as PRESETS
 from test_presets import completed

@@ -12,8 +12,8 @@ from microrad import link
 from microrad.campaign.candidates import Problem, Variable
 from microrad.campaign.optimise import optimise
 from microrad.campaign.records import CampaignError, Limit
-from microrad.missionfile import load_link
-from microrad.presets import preset_text
+from microrad.mission.file import load_link
+from microrad.mission.presets import preset_text
 from microrad.report import campaign_optimum
 
 MARGIN = Limit("margin", 3.0, None, "test")

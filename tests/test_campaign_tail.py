@@ -25,7 +25,7 @@ from microrad.campaign.work import Evaluator
 from microrad.core.threads import in_threads
 from microrad.fine_loop import linear
 from microrad.fine_loop.ensemble import LANES, bin_edges_rad, histogram_quantile
-from microrad.missionfile import load_mission
+from microrad.mission.file import load_mission
 from microrad.report import campaign_words
 from microrad.report.quantities import quantity
 from shipped import SHIPPED

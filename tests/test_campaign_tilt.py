@@ -14,7 +14,7 @@ from microrad.fine_loop import ensemble, linear
 from microrad.fine_loop.ensemble import LANES, Span
 from microrad.fine_loop.loop import assemble
 from microrad.fine_pointing import designs, parts, scenario
-from microrad.missionfile import load_mission
+from microrad.mission.file import load_mission
 from shipped import SHIPPED
 
 SPAN = Span(0.4, 0.05, 3)

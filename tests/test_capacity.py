@@ -8,8 +8,8 @@ from scipy import integrate, optimize, stats
 
 from link_files import RECEIVERS, link_file, received_with
 from microrad.core.capacity import Code
-from microrad.document import MissionError
 from microrad.link import model, receivers
+from microrad.mission.toml import MissionError
 
 RATE = 1e6
 COMMON = {"wavelength_m": 1.55e-6, "bandwidth_hz": 1e15, "detection_efficiency": 1.0}

@@ -28,7 +28,7 @@ from shipped import plain_study, without_day, without_fine_pointing
 from waiting import HANG_S, lines_of, until
 
 ROOT = Path(__file__).parents[1]
-PAPER = ROOT / "src" / "microrad" / "missions" / "leo-geo.toml"
+PAPER = ROOT / "src" / "microrad" / "mission" / "missions" / "leo-geo.toml"
 COMMANDS = (
     "init",
     "run",

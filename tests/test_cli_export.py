@@ -9,7 +9,7 @@ import zipfile
 import pytest
 
 from microrad.export import build
-from microrad.missionfile import load_mirror
+from microrad.mission.file import load_mirror
 from shipped import SHIPPED, without_fine_pointing
 
 needs_a_compiler = pytest.mark.skipif(build.compiler() is None, reason="no C compiler")

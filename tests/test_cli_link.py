@@ -13,8 +13,8 @@ import typer
 from command_line import listing
 from link_files import PATTERN, RECEIVERS, data_with, received_with, written
 from microrad import cli, link_study
-from microrad.missionfile import load_link
-from microrad.presets import preset_text
+from microrad.mission.file import load_link
+from microrad.mission.presets import preset_text
 from microrad.report import budget_views
 from report_pages import assert_sound, without_scripts
 from shipped import SHIPPED, without_fine_pointing

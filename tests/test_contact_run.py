@@ -17,7 +17,7 @@ from microrad.disturbance import Reference
 from microrad.fine_loop import ensemble
 from microrad.fine_loop.loop import assemble
 from microrad.fine_pointing import designs
-from microrad.missionfile import LinkFile, load_mission
+from microrad.mission.file import LinkFile, load_mission
 from shipped import SHIPPED, edited_file
 
 C_M_S = 299_792_458.0

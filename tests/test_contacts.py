@@ -11,6 +11,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
+from microrad.mission.tables.pointing import point_ahead_rad
 from microrad.orbit import attitude, events
 from microrad.orbit.analytic import GeostationarySlot, KeplerOrbit, circular
 from microrad.orbit.base import OrbitError, States
@@ -29,7 +30,6 @@ from microrad.orbit.ground import Station, elevation_rad
 from microrad.orbit.limits import UNLIMITED, Limits, Terminal
 from microrad.orbit.line_of_sight import sight
 from microrad.orbit.sun import shadow_rad, sun_direction
-from microrad.pointing_table import point_ahead_rad
 
 DAY = (0.0, 86400.0)
 WEEK = (0.0, 7.0 * 86400.0)

@@ -15,7 +15,7 @@ from microrad import control, hysteresis, mirror, simulate
 from microrad.control import IDEAL_DRIVE, Drive, Gains, Inverse, Timing
 from microrad.core import lti
 from microrad.hysteresis import BoucWen, Play
-from microrad.missionfile import load_mission
+from microrad.mission.file import load_mission
 
 SHIPPED = Path(__file__).parent.parent / "missions" / "paper.toml"
 PERIOD = 20e-6

@@ -11,8 +11,8 @@ import pytest
 
 from link_files import written
 from microrad import constellation, orbit
-from microrad.missionfile import MissionError, load_link, load_mission
-from microrad.operations_table import Constellation, Downlink
+from microrad.mission.file import MissionError, load_link, load_mission
+from microrad.mission.tables.operations import Constellation, Downlink
 from shipped import SHIPPED, edited_file, without_fine_pointing
 
 TABLES = ("mirror", "amplifier", "control", "scenario", "fine_pointing")

@@ -8,22 +8,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from microrad import (
-    constellation,
-    contact_run,
-    control,
-    day_study,
-    fine_pointing,
-    link,
-    link_study,
-    missionfile,
-    operations,
-    orbit,
-)
+from microrad import constellation, contact_run, control, day_study, fine_pointing, link, link_study, operations, orbit
 from microrad.core.units import SPEED_OF_LIGHT_M_S
 from microrad.day_study import flow
 from microrad.fine_loop.loop import assemble
 from microrad.fine_pointing import designs
+from microrad.mission import file as missionfile
 
 ROOT = Path(__file__).parent.parent
 PAGE = (ROOT / "docs" / "day.md").read_text(encoding="utf-8")

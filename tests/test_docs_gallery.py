@@ -10,8 +10,9 @@ from pathlib import Path
 
 import pytest
 
-from microrad import fine_pointing, load_link, load_mirror, presets, report, study
+from microrad import fine_pointing, load_link, load_mirror, report, study
 from microrad.core.units import parse_quantity
+from microrad.mission import presets
 from microrad.report import identification_figures
 from shipped import whole_drawn, whole_study
 

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from microrad import mirror_table
-from microrad.missionfile import load_mirror
+from microrad.mission.file import load_mirror
+from microrad.mission.tables import mirror as mirror_table
 
 PAGE = (Path(__file__).parent.parent / "docs" / "mirror-file.md").read_text(encoding="utf-8")
 EXAMPLES = re.findall(r"```toml\n(.*?)```", PAGE, flags=re.DOTALL)

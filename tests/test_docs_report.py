@@ -10,9 +10,10 @@ from pathlib import Path
 import pytest
 import typer
 
-from microrad import cli, document, report, study
+from microrad import cli, report, study
 from microrad.core import machine
-from microrad.missionfile import load_mission
+from microrad.mission import toml as document
+from microrad.mission.file import load_mission
 from microrad.report import compared, interactive_style, page, results, tolerances
 from microrad.studio import address, guard, jobs_process, reading, server, uploads, workshop
 from shipped import DEFAULT

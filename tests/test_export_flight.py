@@ -24,7 +24,7 @@ from microrad.export.templating import comment, real, render, table, terms
 from microrad.fine_loop import loop as fine
 from microrad.fine_loop.loop import PointingLoop, ReferenceFilter, with_inverse
 from microrad.hysteresis import NO_CREEP, BoucWen, Creep, Play
-from microrad.missionfile import load_mission
+from microrad.mission.file import load_mission
 from microrad.sensor import OpticalSensor
 from shipped import SHIPPED, without_fine_pointing
 from waiting import HANG_S

@@ -21,7 +21,7 @@ from microrad.export.matrices_polynomials import polynomials
 from microrad.export.matrices_structure import without_copies
 from microrad.export.records import ExportError, Origin
 from microrad.fine_loop.design import design_plant
-from microrad.missionfile import load_mission
+from microrad.mission.file import load_mission
 from shipped import SHIPPED
 
 NINE_DIGITS = 1e-9

@@ -18,7 +18,7 @@ from numpy.testing import assert_allclose
 from microrad import acquisition, disturbance, link, link_study, pointing, sensor
 from microrad.geometry import Geometry, line_of_sight_matrix
 from microrad.link.receivers import PpmCounting
-from microrad.missionfile import load_mission
+from microrad.mission.file import load_mission
 from shipped import SHIPPED
 
 FILE = load_mission(SHIPPED)

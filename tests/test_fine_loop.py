@@ -29,7 +29,7 @@ from microrad.fine_loop.ensemble import Span
 from microrad.fine_loop.loop import LoopController, PointingLoop
 from microrad.geometry import Geometry, line_of_sight_matrix
 from microrad.hysteresis import BoucWen, Play
-from microrad.missionfile import load_mission
+from microrad.mission.file import load_mission
 from microrad.sensor import OpticalSensor, StrainGauge
 from shipped import SHIPPED
 

@@ -14,7 +14,7 @@ from microrad.fine_loop.design import design_plant
 from microrad.fine_loop.linear import close, stationary
 from microrad.fine_loop.loop import assemble
 from microrad.fine_pointing import designs, parts, results, scenario
-from microrad.missionfile import load_mission
+from microrad.mission.file import load_mission
 from shipped import SHIPPED, whole_study
 from shipped import edited_file as edited_shipped
 

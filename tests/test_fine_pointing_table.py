@@ -9,11 +9,12 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from microrad import disturbance, fine_pointing_table, geometry, sensor
-from microrad.document import scan
-from microrad.fine_pointing_table import FinePointing, GeometryTable
-from microrad.mission import mission_schema
-from microrad.missionfile import MissionError, load_mission
+from microrad import disturbance, geometry, sensor
+from microrad.mission.file import MissionError, load_mission
+from microrad.mission.model import mission_schema
+from microrad.mission.tables import fine_pointing as fine_pointing_table
+from microrad.mission.tables.fine_pointing import FinePointing, GeometryTable
+from microrad.mission.toml import scan
 
 SHIPPED = Path(__file__).parent.parent / "missions" / "paper.toml"
 TEXT = SHIPPED.read_text(encoding="utf-8")

@@ -27,7 +27,7 @@ from microrad.identify import (
 from microrad.identify import bouc_wen as bouc_wen_fit
 from microrad.identify.choice import _best
 from microrad.identify.records import colour_inflation, fastest_rate, prepare, transient
-from microrad.missionfile import load_mirror
+from microrad.mission.file import load_mirror
 from microrad.recording import read_recording, recording_from_arrays
 
 RATE_HZ = 50_000.0

@@ -8,7 +8,7 @@ from microrad import study
 from microrad.control import PI
 from microrad.core.kept import NOTHING, Kept
 from microrad.fine_pointing import designs
-from microrad.missionfile import MissionError, load_mission
+from microrad.mission.file import MissionError, load_mission
 from microrad.report import words
 from shipped import SHIPPED
 

@@ -28,7 +28,7 @@ from microrad.identify import (
 )
 from microrad.identify.choice import _best, _polished
 from microrad.identify.plant_structures import LinearPoles, Roots, propagated
-from microrad.missionfile import load_mirror
+from microrad.mission.file import load_mirror
 from truths import behind_resonance, bouc_wen, philox, plays, recorded, small_multisine
 
 RATE = 4000.0

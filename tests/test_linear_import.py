@@ -19,7 +19,7 @@ from microrad.core import lti
 from microrad.export import linear_import, matrices
 from microrad.export.linear_import import Given, import_control, import_mat
 from microrad.export.records import ExportError
-from microrad.missionfile import load_mirror, load_mission
+from microrad.mission.file import load_mirror, load_mission
 from shipped import SHIPPED
 
 NINE_DIGITS = 1e-9

@@ -13,8 +13,8 @@ from scipy.special import erfc
 from link_files import link_file
 from microrad import link, link_study, requirement
 from microrad.core.budget import total_db
-from microrad.link_table import Channel
-from microrad.missionfile import load_mission
+from microrad.mission.file import load_mission
+from microrad.mission.tables.link import Channel
 from microrad.report import budget_views
 
 FILE = load_mission(Path(__file__).parent.parent / "missions" / "paper.toml")

@@ -12,7 +12,7 @@ from scipy.special import j0, j1, jn_zeros
 
 from microrad import link
 from microrad.link import BEST_TRUNCATION, GaussianFall, LitAperture
-from microrad.link_table import narrowest_radius
+from microrad.mission.tables.link import narrowest_radius
 
 D, WAVELENGTH = 0.05, 1.55e-6
 UNIFORM_DB = 20 * math.log10(math.pi * D / WAVELENGTH)

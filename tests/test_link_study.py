@@ -10,7 +10,7 @@ from scipy.stats import ncx2, norm
 
 from link_files import PATTERN, RECEIVERS, link_file, received_with
 from microrad import acquisition, link, link_acquisition, link_study, sensor
-from microrad.missionfile import LinkFile
+from microrad.mission.file import LinkFile
 from microrad.radial_error import Jitter
 from microrad.report import budget_views, links
 from microrad.report.quantities import quantity

@@ -7,9 +7,9 @@ import pytest
 from link_files import GAUSSIAN, PATTERN, RECEIVERS, SKY, data_with, link_file, received_with, written
 from microrad.core.units import parse_quantity
 from microrad.link import LitAperture, gaussian_beam_gain_db
-from microrad.link_table import Receiver, half_angle_rad, narrowest_half_angle_rad
-from microrad.mission import LinkMission, Mission, mission_schema
-from microrad.missionfile import MissionError, load_link
+from microrad.mission.file import MissionError, load_link
+from microrad.mission.model import LinkMission, Mission, mission_schema
+from microrad.mission.tables.link import Receiver, half_angle_rad, narrowest_half_angle_rad
 from shipped import SHIPPED, without_fine_pointing
 
 

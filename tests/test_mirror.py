@@ -14,7 +14,7 @@ from microrad import control, hysteresis, mirror, mirror_summary, simulate
 from microrad.core import kernels, lti
 from microrad.hysteresis import BoucWen, Creep, Play
 from microrad.mirror import Mirror
-from microrad.missionfile import load_mission
+from microrad.mission.file import load_mission
 from shipped import SHIPPED, edited
 
 STEP = 20e-6

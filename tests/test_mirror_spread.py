@@ -21,8 +21,8 @@ from microrad.identify.plant_fit import PlantFit
 from microrad.identify.plant_structures import LinearPoles, Roots, one_axis
 from microrad.identify.prandtl_ishlinskii import threshold_grid
 from microrad.mirror import hysteresis_model, linear_part
-from microrad.mirror_table import place
-from microrad.missionfile import MissionError, load_mirror
+from microrad.mission.file import MissionError, load_mirror
+from microrad.mission.tables.mirror import place
 from truths import philox
 
 MIRROR = """

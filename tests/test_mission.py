@@ -18,11 +18,11 @@ from hypothesis import strategies as st
 
 from microrad import mirror
 from microrad.core import lti
-from microrad.document import Document, scan
-from microrad.link_table import half_angle_rad
-from microrad.mirror_table import BoucWenTable
-from microrad.mission import Mission, Source, mission_schema, source_text
-from microrad.missionfile import MissionError, assumptions, load_mirror, load_mission
+from microrad.mission.file import MissionError, assumptions, load_mirror, load_mission
+from microrad.mission.model import Mission, Source, mission_schema, source_text
+from microrad.mission.tables.link import half_angle_rad
+from microrad.mission.tables.mirror import BoucWenTable
+from microrad.mission.toml import Document, scan
 from waiting import no_hang
 
 PAPER = Path(__file__).parent.parent / "missions" / "paper.toml"
@@ -908,7 +908,7 @@ def _table(schema, rule):
 
 
 def test_importing_the_mission_loads_no_numerics():
-    code = "import sys, microrad.missionfile; print([m for m in ('numpy', 'scipy', 'numba') if m in sys.modules])"
+    code = "import sys, microrad.mission.file; print([m for m in ('numpy', 'scipy', 'numba') if m in sys.modules])"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
 

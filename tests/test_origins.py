@@ -2,11 +2,11 @@
 
 import pytest
 
-from microrad import origins
-from microrad.document import scan
 from microrad.link import communication_budget
-from microrad.missionfile import assumptions, changed_from_shipped, load_link, load_mission
-from microrad.presets import preset_text, presets
+from microrad.mission import origins
+from microrad.mission.file import assumptions, changed_from_shipped, load_link, load_mission
+from microrad.mission.presets import preset_text, presets
+from microrad.mission.toml import scan
 from microrad.studio.draft import Draft
 from shipped import SHIPPED
 

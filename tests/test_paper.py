@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from microrad import control, hysteresis, mirror, paper, simulate, tracking
-from microrad.missionfile import load_mission
+from microrad.mission.file import load_mission
 from shipped import SHIPPED, edited
 
 ACCURATE = "PID + inverse stays within 10 µrad at its peaks"

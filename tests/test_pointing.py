@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 
 from microrad import pointing
 from microrad.core.budget import Line, root_sum_square, total_db
-from microrad.mission import LinkMission
-from microrad.missionfile import load_mission
-from microrad.pointing_table import PointAhead, PointingLine
+from microrad.mission.file import load_mission
+from microrad.mission.model import LinkMission
+from microrad.mission.tables.pointing import PointAhead, PointingLine
 
 FILE = load_mission(Path(__file__).parent.parent / "missions" / "paper.toml")
 MISSION, SOURCES = FILE.mission, FILE.sources

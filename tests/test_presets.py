@@ -6,11 +6,11 @@ from importlib import resources
 import pytest
 
 from microrad.core.units import UnitError
-from microrad.document import MissionError, scan
-from microrad.fields import NOT_PUBLISHED, UNKNOWN, ProblemsError, Quantity, Several, Share, Switch, Whole
 from microrad.link.budget import communication_budget
-from microrad.missionfile import load_link, load_mission
-from microrad.presets import PAPER, preset_text, presets
+from microrad.mission.fields import NOT_PUBLISHED, UNKNOWN, ProblemsError, Quantity, Several, Share, Switch, Whole
+from microrad.mission.file import load_link, load_mission
+from microrad.mission.presets import PAPER, preset_text, presets
+from microrad.mission.toml import MissionError, scan
 from shipped import SHIPPED
 
 NAMES = ("click", "crosslink", "leo-hicali", "oicets-artemis", "paper", "sentinel1-edrs", "spot4-artemis", "tbird")
@@ -94,7 +94,7 @@ def value_of(name, key):
 
 
 def test_presets_stand_by_name_and_their_names_are_those_of_their_files():
-    folder = resources.files("microrad") / "missions" / "presets"
+    folder = resources.files("microrad.mission") / "missions" / "presets"
     assert tuple(each.name for each in presets()) == NAMES
     assert {f"{name}.toml" for name in NAMES} == {each.name for each in folder.iterdir()}
     assert all(each.text == preset_text(each.name) for each in presets())

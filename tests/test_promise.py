@@ -10,7 +10,7 @@ from microrad.export import choice, write
 from microrad.export.records import ExportError
 from microrad.fine_loop import ensemble
 from microrad.fine_pointing import designs
-from microrad.missionfile import load_mission
+from microrad.mission.file import load_mission
 from shipped import SHIPPED
 
 OBSERVER = "disturbance observer"

@@ -14,8 +14,9 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from microrad import missionfile, report, study
+from microrad import report, study
 from microrad.core import folder
+from microrad.mission import file as missionfile
 from microrad.performance import Cost
 from microrad.report import (
     chain,

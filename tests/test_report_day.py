@@ -16,7 +16,7 @@ import xarray as xr
 from microrad import contact_run, control, day_study, fine_pointing, report, study
 from microrad.fine_loop.loop import assemble
 from microrad.fine_pointing import designs
-from microrad.missionfile import load_mission
+from microrad.mission.file import load_mission
 from microrad.operations import OperationsError
 from microrad.report import contact_run_words, day_plots, day_words, results
 from microrad.report.page import Drawn

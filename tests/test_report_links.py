@@ -13,7 +13,7 @@ import pytest
 from link_files import RECEIVERS, data_with, link_file, received_with, written
 from microrad import link_study
 from microrad.link import Swing
-from microrad.missionfile import load_link
+from microrad.mission.file import load_link
 from microrad.performance import FINE, NO_HYSTERESIS, Cost, LinkPerformance
 from microrad.report import budget_views, link_figures, links
 from microrad.report.quantities import apart, quantity

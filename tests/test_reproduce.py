@@ -9,8 +9,9 @@ import shutil
 
 import pytest
 
-from microrad import cli, missionfile, report, study
+from microrad import cli, report, study
 from microrad.core import machine
+from microrad.mission import file as missionfile
 from microrad.report import carried, compared, page, reproduce, tolerances
 from shipped import SHIPPED, edited_file, without_fine_pointing
 

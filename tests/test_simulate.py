@@ -12,7 +12,7 @@ import oracles
 from microrad import control, hysteresis, mirror, simulate, tracking
 from microrad.core import kernels, lti
 from microrad.hysteresis import BoucWen, Play
-from microrad.missionfile import load_mission
+from microrad.mission.file import load_mission
 from shipped import SHIPPED, edited
 
 PRINTED = BoucWen(0.089e-3, -2.96e-7, -0.048e-3, 4.7e-4, 38.421, 34.635, 3770.0, 6.0)

@@ -16,8 +16,8 @@ import pytest
 import microrad
 from microrad import cli, control, fine_pointing, report, study
 from microrad.core.folder import FolderError
-from microrad.document import MissionError
 from microrad.fine_pointing import designs
+from microrad.mission.toml import MissionError
 from microrad.recording import RecordingError, read_in, read_recording
 from microrad.report.page import Drawn
 from microrad.studio.commands import (

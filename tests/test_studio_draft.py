@@ -6,9 +6,9 @@ import tomllib
 
 import pytest
 
-from microrad.mission import Mission
-from microrad.missionfile import MissionError, load_mission
-from microrad.presets import preset_text
+from microrad.mission.file import MissionError, load_mission
+from microrad.mission.model import Mission
+from microrad.mission.presets import preset_text
 from microrad.studio import draft as drafts
 from microrad.studio.draft import Draft, DraftError
 from microrad.studio.draft_keys import key_of, keys_in

@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 from microrad import link_study
-from microrad.missionfile import load_link
-from microrad.presets import preset_text
+from microrad.mission.file import load_link
+from microrad.mission.presets import preset_text
 from microrad.studio import compare_view, runs_view
 from microrad.studio.commands import CampaignRun, command
 from microrad.studio.compare_view import Beside, Number

@@ -16,8 +16,8 @@ from pathlib import Path
 import pytest
 
 from command_line import listing
-from microrad.document import MissionError
-from microrad.missionfile import load_mission
+from microrad.mission.file import load_mission
+from microrad.mission.toml import MissionError
 from microrad.studio import server
 from microrad.studio.address import ExposureError
 from microrad.studio.draft import Draft, DraftError

@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from microrad import fine_pointing, paper, simulate, study, verdict
 from microrad.mirror_summary import summarise, unknown_dynamics
-from microrad.missionfile import load_mission
+from microrad.mission.file import load_mission
 from microrad.report import links
 from microrad.report.fine_pointing_words import not_reliable
 from shipped import SHIPPED, edited_file, whole_study

@@ -8,9 +8,9 @@ import pytest
 
 from link_files import GAUSSIAN, PATTERN, RECEIVERS, SKY, link_file, received_with
 from microrad import link, link_performance, link_study
-from microrad.fields import Quantity
 from microrad.link.tornado import RELATIVE, STEP_DB
-from microrad.missionfile import load_link
+from microrad.mission.fields import Quantity
+from microrad.mission.file import load_link
 from shipped import SHIPPED
 
 HALF = 2 * 1.55e-6 / (math.pi * 0.05)

@@ -16,7 +16,7 @@ from microrad.control.problem import RESIDUAL, AxisController, Family, Parameter
 from microrad.core import lti
 from microrad.fine_pointing import designs
 from microrad.fine_pointing.scenario import scene
-from microrad.missionfile import load_mission
+from microrad.mission.file import load_mission
 from shipped import SHIPPED
 
 PERIOD = 2e-4

@@ -8,13 +8,13 @@ from importlib import import_module
 from typing import Any
 
 _PUBLIC = {
-    "load_mission": "missionfile.load_mission",
-    "load_mirror": "missionfile.load_mirror",
-    "load_link": "missionfile.load_link",
-    "mission_schema": "mission.mission_schema",
-    "MissionFile": "missionfile.MissionFile",
-    "LinkFile": "missionfile.LinkFile",
-    "MissionError": "missionfile.MissionError",
+    "load_mission": "mission.file.load_mission",
+    "load_mirror": "mission.file.load_mirror",
+    "load_link": "mission.file.load_link",
+    "mission_schema": "mission.model.mission_schema",
+    "MissionFile": "mission.file.MissionFile",
+    "LinkFile": "mission.file.LinkFile",
+    "MissionError": "mission.file.MissionError",
     "run_study": "study.run",
     "Study": "study.Study",
     "run_link_study": "link_study.run",

@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from microrad import operations, orbit
 from microrad.day_study.flow import PointingLoss, closings, rate_table
-from microrad.mission import LinkMission
-from microrad.missionfile import LinkFile
-from microrad.operations_table import Constellation
+from microrad.mission.file import LinkFile
+from microrad.mission.model import LinkMission
+from microrad.mission.tables.operations import Constellation
 
 Floats = NDArray[np.float64]
 Progress = Callable[[int, int, str], None]

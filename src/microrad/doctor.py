@@ -129,8 +129,8 @@ def _cache() -> tuple[bool, str]:
 
 
 def _mission() -> tuple[bool, str]:
-    from microrad.missionfile import load_mission
+    from microrad.mission.file import load_mission
 
-    packaged = resources.files("microrad").joinpath("missions", "leo-geo.toml")
+    packaged = resources.files("microrad.mission").joinpath("missions", "leo-geo.toml")
     with resources.as_file(packaged) as path:
         return True, f"{os.fspath(path)}: {load_mission(path).mission.name}"

@@ -6,13 +6,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from microrad import acquisition, link, pointing, sensor
-from microrad.acquisition_table import LEAST_OVERLAP, Acquisition
-from microrad.acquisition_table import Scan as ScanTable
 from microrad.core.budget import Line, total_db
 from microrad.link.budget import POINT_AHEAD_LOSS, POINTING_LOSS
-from microrad.link_table import Beacon, half_angle_rad, narrowest_half_angle_rad
-from microrad.mission import LinkMission, source_text
-from microrad.missionfile import LinkFile
+from microrad.mission.file import LinkFile
+from microrad.mission.model import LinkMission, source_text
+from microrad.mission.tables.acquisition import LEAST_OVERLAP, Acquisition
+from microrad.mission.tables.acquisition import Scan as ScanTable
+from microrad.mission.tables.link import Beacon, half_angle_rad, narrowest_half_angle_rad
 
 THRESHOLD = 5.0
 """Threshold of the quad cell over its rms noise: a false alarm in 3.5 million readings."""

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from microrad import link, pointing
-from microrad.mission import LinkMission
-from microrad.pointing_table import JitterTable
+from microrad.mission.model import LinkMission
+from microrad.mission.tables.pointing import JitterTable
 
 Floats = NDArray[np.float64]
 

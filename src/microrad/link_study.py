@@ -14,8 +14,8 @@ from microrad.core.budget import Line
 from microrad.core.units import format_quantity
 from microrad.link_acquisition import Finding, Tracking, finding, tracking
 from microrad.link_performance import Performance, error_rad, margin_db, of_jitter, required_error_rad
-from microrad.mission import LinkMission, Source, source_text
-from microrad.missionfile import LinkFile
+from microrad.mission.file import LinkFile
+from microrad.mission.model import LinkMission, Source, source_text
 
 Floats = NDArray[np.float64]
 

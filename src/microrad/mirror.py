@@ -11,9 +11,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from microrad import mirror_table
 from microrad.core import kernels, lti
 from microrad.hysteresis import LINE_OF_SIGHT, NO_CREEP, BoucWen, Creep, Play, scaled, slow_gain, steepest_slope
+from microrad.mission.tables import mirror as mirror_table
 
 Floats = NDArray[np.float64]
 

@@ -10,8 +10,8 @@ from pydantic.fields import FieldInfo
 
 from microrad.core import lti
 from microrad.core.units import UnitError
-from microrad.fields import ProblemsError, Quantity, Several, Table
-from microrad.mirror_table import Mirror, Place, Uncertainty, place
+from microrad.mission.fields import ProblemsError, Quantity, Several, Table
+from microrad.mission.tables.mirror import Mirror, Place, Uncertainty, place
 
 Floats = NDArray[np.float64]
 

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from microrad import mirror_table
 from microrad.core import lti
 from microrad.hysteresis import BoucWen, Creep, Play, slow_gain
 from microrad.mirror import creep_model, hysteresis_model, linear_part
+from microrad.mission.tables import mirror as mirror_table
 
 
 @dataclass(frozen=True, slots=True)

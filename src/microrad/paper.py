@@ -15,10 +15,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from microrad import control, hysteresis, mirror, mission, simulate
+from microrad import control, hysteresis, mirror, simulate
 from microrad.core.threads import in_threads
-from microrad.missionfile import LinkFile, load_link
-from microrad.presets import PAPER, preset_text
+from microrad.mission import model as mission
+from microrad.mission.file import LinkFile, load_link
+from microrad.mission.presets import PAPER, preset_text
 from microrad.tracking import mirror_model
 
 Floats = NDArray[np.float64]

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from microrad import fine_pointing, link, pointing, tracking
 from microrad.fine_loop.ensemble import bin_edges_rad, histogram_quantile
 from microrad.link_performance import Performance, Spread, performance
-from microrad.mission import Mission
+from microrad.mission.model import Mission
 
 NO_HYSTERESIS = "no hysteresis"
 

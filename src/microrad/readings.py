@@ -8,9 +8,9 @@ from typing import Any, get_args
 import numpy as np
 
 from microrad import link, tracking
-from microrad.link_table import UNUSED
-from microrad.mirror_table import Mirror
-from microrad.mission import Conventions, Mission, Requirement
+from microrad.mission.model import Conventions, Mission, Requirement
+from microrad.mission.tables.link import UNUSED
+from microrad.mission.tables.mirror import Mirror
 
 _OPEN: tuple[tuple[str, type[Any]], ...] = (
     ("conventions.residual", Conventions),

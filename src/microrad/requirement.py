@@ -7,7 +7,7 @@ from typing import Literal
 from microrad import link
 from microrad.link.budget import FREE_SPACE_LOSS
 from microrad.link_study import LinkStudy
-from microrad.mission import LinkMission, Source
+from microrad.mission.model import LinkMission, Source
 
 Subject = Literal["cone", "beacon", "answer", "communication", "residual", "stroke", "fine pointing"]
 """What a requirement is about: the beacon's cone, a margin, the error that a loop leaves, or the mirror's stroke."""

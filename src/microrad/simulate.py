@@ -6,9 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from microrad import control, hysteresis, mirror, mission
+from microrad import control, hysteresis, mirror
 from microrad.control import Drive, Inverse, Timing, amplifier_factor, anti_windup
 from microrad.core import kernels, lti
+from microrad.mission import model as mission
 
 Floats = NDArray[np.float64]
 

@@ -29,8 +29,8 @@ from microrad import (
 )
 from microrad.core import kept
 from microrad.core.threads import both
-from microrad.mission import Mission
-from microrad.missionfile import LinkFile, MissionFile
+from microrad.mission.file import LinkFile, MissionFile
+from microrad.mission.model import Mission
 
 Floats = NDArray[np.float64]
 Progress = Callable[[int, int, str], None]

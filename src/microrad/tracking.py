@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from microrad import control, hysteresis, mirror, simulate
-from microrad.mirror_table import Comparison
-from microrad.mirror_table import Mirror as MirrorTable
-from microrad.mission import Mission
+from microrad.mission.model import Mission
+from microrad.mission.tables.mirror import Comparison
+from microrad.mission.tables.mirror import Mirror as MirrorTable
 
 VARIANTS = ("given", "no hysteresis", "comparison")
 """The mission's mirror, the same with a gain in place of its hysteresis, and its comparison model."""

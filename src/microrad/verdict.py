@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from microrad import day_study, hysteresis, link, mirror_summary, paper, pointing, simulate
 from microrad.fine_pointing import FinePointingStudy
-from microrad.mission import Mission, Source
-from microrad.missionfile import LinkFile
+from microrad.mission.file import LinkFile
+from microrad.mission.model import Mission, Source
 from microrad.requirement import Requirement, Subject, derived_from, outage_words
 from microrad.tracking import Run, mirror_model, residual_rad
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from microrad.core.units import format_quantity
-from microrad.fields import Problem, ProblemsError
+from microrad.mission.fields import Problem, ProblemsError
 
 Floats = NDArray[np.float64]
 

@@ -23,10 +23,10 @@ from microrad.bench.excitation import (
     staircase,
 )
 from microrad.core.units import UnitError, format_quantity
-from microrad.fields import Problem, Quantity, Several, Table, Whole
-from microrad.mirror_table import Frequency, Name, Rate, Voltage
-from microrad.mission import Amplifier as AmplifierTable
-from microrad.mission import AngleOrZero, Duration, Frequencies
+from microrad.mission.fields import Problem, Quantity, Several, Table, Whole
+from microrad.mission.model import Amplifier as AmplifierTable
+from microrad.mission.model import AngleOrZero, Duration, Frequencies
+from microrad.mission.tables.mirror import Frequency, Name, Rate, Voltage
 
 FORMATS = ("csv", "lvm", "tdms", "mat", "mat73", "npz", "hdf5")
 """File formats that the bench writes; mat is MATLAB's version 5, mat73 its version 7.3."""

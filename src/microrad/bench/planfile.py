@@ -8,8 +8,8 @@ from pathlib import Path
 
 from microrad.bench.excitation import DesignError
 from microrad.bench.plan import KINDS, MOST_AXES, ExcitationTable, LimitsTable, Plan, PlanTable, Record, limits_of
-from microrad.document import Document, Fault, MissionError, UnreadableError, clipped, shown
-from microrad.missionfile import check_table
+from microrad.mission.file import check_table
+from microrad.mission.toml import Document, Fault, MissionError, UnreadableError, clipped, shown
 
 _NAME = set("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789-_")
 _MOST_EXCITATIONS = 200

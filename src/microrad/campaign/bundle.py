@@ -21,7 +21,7 @@ from microrad.control import AxisController
 from microrad.core import lti
 from microrad.core.folder import scratch_folder
 from microrad.core.machine import source_sha256
-from microrad.missionfile import named_files
+from microrad.mission.file import named_files
 
 LIBRARIES = ("numpy", "scipy", "numba", "llvmlite", "sgp4", "skyfield")
 """Libraries whose version may move the last digits of a row."""

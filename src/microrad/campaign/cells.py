@@ -9,9 +9,9 @@ from typing import Any
 from microrad.campaign.inputs import Base
 from microrad.campaign.keys import MIRROR, put
 from microrad.campaign.reading import FILE_WORD, Reading, text_of
-from microrad.document import Document, MissionError
-from microrad.mission import Source
-from microrad.missionfile import LinkFile, either_file, with_values
+from microrad.mission.file import LinkFile, either_file, with_values
+from microrad.mission.model import Source
+from microrad.mission.toml import Document, MissionError
 
 MOST_CELLS = 1000
 _RATE = "communication.data_rate"

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from microrad.core.units import format_quantity
-from microrad.fields import Table
+from microrad.mission.fields import Table
 
 Floats = NDArray[np.float64]
 

@@ -12,9 +12,9 @@ from microrad.campaign.keys import MIRROR, Key, find, item_keys
 from microrad.campaign.reading import Reading, is_number, quoted_near
 from microrad.campaign.records import InputText
 from microrad.campaign.tables import VariableTable
-from microrad.document import shown
-from microrad.fields import MOST_ITEMS, Quantity, Several, Share
-from microrad.missionfile import check_table
+from microrad.mission.fields import MOST_ITEMS, Quantity, Several, Share
+from microrad.mission.file import check_table
+from microrad.mission.toml import shown
 
 
 class Variable(NamedTuple):

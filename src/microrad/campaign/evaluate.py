@@ -13,8 +13,8 @@ from microrad.campaign.outputs import OUTPUTS
 from microrad.core import kernels
 from microrad.fine_loop import ensemble
 from microrad.link_performance import Exposure
-from microrad.mission import LinkMission, Mission
-from microrad.missionfile import LinkFile
+from microrad.mission.file import LinkFile
+from microrad.mission.model import LinkMission, Mission
 
 if TYPE_CHECKING:
     from microrad import day_study

@@ -17,8 +17,8 @@ from microrad.campaign.reading import FILE_WORD, Reading, text_of
 from microrad.campaign.records import CampaignError, InputText, Limit
 from microrad.campaign.sampling import block_rows
 from microrad.campaign.tables import CampaignTable, LoopTable, VariableTable
-from microrad.document import Document, Fault, MissionError, UnreadableError, clipped
-from microrad.missionfile import LinkFile, MissionFile, check_table, named_files, open_mission
+from microrad.mission.file import LinkFile, MissionFile, check_table, named_files, open_mission
+from microrad.mission.toml import Document, Fault, MissionError, UnreadableError, clipped
 
 __all__ = ["CampaignFile", "CampaignTable", "Dimension", "LoopTable", "Variable", "load_campaign"]
 

@@ -12,9 +12,9 @@ from microrad.campaign.reading import FILE_WORD, Reading, quoted_near
 from microrad.campaign.records import Limit
 from microrad.campaign.tables import MOST_RUNS, CampaignTable, LimitTable, LoopTable
 from microrad.core.units import format_quantity
-from microrad.fields import Quantity
-from microrad.mission import LinkMission, Mission
-from microrad.missionfile import check_table
+from microrad.mission.fields import Quantity
+from microrad.mission.file import check_table
+from microrad.mission.model import LinkMission, Mission
 
 
 def check_loop(on: Reading, table: LoopTable, bases: Sequence[Base]) -> None:

@@ -11,11 +11,11 @@ from microrad.campaign.distributions import Distribution, OneOf
 from microrad.campaign.keys import MIRROR, Key, UnknownKeyError, find, put, rule_in, touches_loop
 from microrad.campaign.reading import FILE_WORD
 from microrad.campaign.records import CampaignError
-from microrad.document import Document
-from microrad.fields import Several
-from microrad.mirror_table import Mirror, place
-from microrad.mission import LinkMission, Mission, Source
-from microrad.missionfile import LinkFile, check_table
+from microrad.mission.fields import Several
+from microrad.mission.file import LinkFile, check_table
+from microrad.mission.model import LinkMission, Mission, Source
+from microrad.mission.tables.mirror import Mirror, place
+from microrad.mission.toml import Document
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,9 +7,9 @@ from typing import Any, get_args, get_origin
 
 from pydantic.fields import FieldInfo
 
-from microrad.fields import OrWord, Quantity, Several, Share, Table, Whole
-from microrad.mission import LinkMission, Mission
-from microrad.missionfile import kind_of
+from microrad.mission.fields import OrWord, Quantity, Several, Share, Table, Whole
+from microrad.mission.file import kind_of
+from microrad.mission.model import LinkMission, Mission
 
 MIRROR = "mirror"
 """What a campaign calls the mirror as a whole: the key of mirror files, and of the covariance of an identification."""

@@ -9,7 +9,7 @@ from microrad.campaign.records import CampaignError
 from microrad.control import AxisController
 from microrad.fine_loop import ensemble
 from microrad.fine_loop.loop import LoopController, PointingLoop
-from microrad.missionfile import LinkFile, MissionFile
+from microrad.mission.file import LinkFile, MissionFile
 
 Beat = Callable[[], None]
 

@@ -9,9 +9,9 @@ from typing import Any
 from microrad.campaign.keys import Key, UnknownKeyError, find
 from microrad.campaign.outputs import OUTPUTS
 from microrad.core.units import UnitError
-from microrad.document import Document, shown
-from microrad.fields import Quantity
-from microrad.missionfile import check_value
+from microrad.mission.fields import Quantity
+from microrad.mission.file import check_value
+from microrad.mission.toml import Document, shown
 
 FILE_WORD = "campaign file"
 """What messages call it."""

@@ -5,8 +5,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from microrad.fields import Quantity, Share, Table, Whole
-from microrad.mirror_table import Name
+from microrad.mission.fields import Quantity, Share, Table, Whole
+from microrad.mission.tables.mirror import Name
 
 MOST_RUNS = 2**32
 """Runs of a cell, rows times realisations: the number of a run is one word of its noise stream's counter."""

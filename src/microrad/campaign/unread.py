@@ -9,10 +9,10 @@ from microrad.campaign import evaluate, loops, plan
 from microrad.campaign.file import CampaignFile
 from microrad.campaign.keys import MIRROR, touches_loop
 from microrad.core import reads
-from microrad.fields import Table
 from microrad.fine_loop import ensemble
-from microrad.mission import LinkMission
-from microrad.missionfile import LinkFile
+from microrad.mission.fields import Table
+from microrad.mission.file import LinkFile
+from microrad.mission.model import LinkMission
 
 
 def unread(campaign: CampaignFile, rows: Iterable[LinkFile]) -> Iterator[str]:

@@ -21,7 +21,7 @@ from microrad.control import AxisController
 from microrad.core import kernels
 from microrad.fine_loop import ensemble
 from microrad.fine_loop.loop import LoopController, PointingLoop
-from microrad.missionfile import LinkFile
+from microrad.mission.file import LinkFile
 
 __all__ = ["Work", "code_sha256", "open_work"]
 

@@ -34,7 +34,7 @@ from microrad.core.folder import write_whole
 # Everything else is imported inside the commands: numpy, numba and pydantic take longer to load than help may take.
 if TYPE_CHECKING:
     from microrad.core.kept import Kept
-    from microrad.missionfile import MissionFile
+    from microrad.mission.file import MissionFile
     from microrad.study import Study
 
 __all__ = ["app", "main"]
@@ -61,12 +61,12 @@ def init(
     file = file or Path("leo-geo.toml")
     run_it = f"microrad run {shlex.quote(str(file))}"
     check_target(file, f"name another one (microrad init other.toml) or go on with: {run_it}")
-    write_whole(file, resources.files("microrad").joinpath("missions", "leo-geo.toml").read_text("utf-8"))
+    write_whole(file, resources.files("microrad.mission").joinpath("missions", "leo-geo.toml").read_text("utf-8"))
     return Outcome(f"{file} written. Next: {run_it}")
 
 
 def _init_preset(file: Path, name: str) -> Outcome:
-    from microrad import presets
+    from microrad.mission import presets
 
     try:
         text = presets.preset_text(name)
@@ -112,7 +112,7 @@ def run(
     """
     from microrad import report
     from microrad.core import kept
-    from microrad.missionfile import load_mission
+    from microrad.mission.file import load_mission
 
     mission = load_mission(file, mirror)
     folder = output or Path(f"{file.stem}-study")
@@ -137,7 +137,7 @@ def run(
 
 def _contents(mission: "MissionFile") -> dict[str, bytes | None]:
     """The files that a mission names, which its parts read beside it; None for one that is not there to be read."""
-    from microrad.missionfile import named_files
+    from microrad.mission.file import named_files
 
     return {name: _content(mission.path.parent / name) for name in named_files(mission.mission)}
 
@@ -215,7 +215,7 @@ def schema() -> Outcome:
 
     Editors check and complete a mission file by it as you type.
     """
-    from microrad.mission import mission_schema
+    from microrad.mission.model import mission_schema
 
     return Outcome(json_text(mission_schema()))
 

@@ -125,7 +125,7 @@ def init(
 
     file = file or Path("campaign.toml")
     check_target(file, "name another one: microrad campaign init other.toml")
-    shipped, mission = resources.files("microrad").joinpath("missions"), file.with_name("leo-geo.toml")
+    shipped, mission = resources.files("microrad.mission").joinpath("missions"), file.with_name("leo-geo.toml")
     if not mission.exists():
         write_whole(mission, shipped.joinpath("leo-geo.toml").read_text("utf-8"))
     write_whole(file, shipped.joinpath("campaign.toml").read_text("utf-8"))

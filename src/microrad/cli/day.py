@@ -31,7 +31,7 @@ _File = Annotated[
 def _links(file: Path) -> "LinkStudy":
     """The links of a mission, whose losses and acquisition the day needs."""
     from microrad import link_study
-    from microrad.missionfile import load_link
+    from microrad.mission.file import load_link
 
     given = load_link(file)
     try:

@@ -24,7 +24,7 @@ from microrad.core.folder import write_whole
 
 # Everything else is imported inside the commands: it takes longer to load than help may take.
 if TYPE_CHECKING:
-    from microrad.missionfile import MissionFile
+    from microrad.mission.file import MissionFile
 
 exports = typer.Typer(
     name="export",
@@ -84,7 +84,7 @@ _Folder = Annotated[Path | None, option("--output", "FOLDER", "Folder to write [
 
 
 def _mission(file: Path, mirror: Path | None) -> "MissionFile":
-    from microrad.missionfile import load_mission
+    from microrad.mission.file import load_mission
 
     return load_mission(file, mirror)
 

@@ -23,7 +23,7 @@ from microrad.cli.frame import (
 
 # Everything else is imported inside the commands: it takes longer to load than help may take.
 if TYPE_CHECKING:
-    from microrad.missionfile import LinkFile
+    from microrad.mission.file import LinkFile
 
 
 @app.command(
@@ -58,7 +58,7 @@ def budget(  # noqa: PLR0913, PLR0917  each is an option
     if sum((as_csv, as_html, as_json)) > 1:
         raise Refusal("--csv, --html and --json exclude each other; give one of them.")
     from microrad import link_study
-    from microrad.missionfile import load_link
+    from microrad.mission.file import load_link
     from microrad.report import budget_views
     from microrad.requirement import met
 
@@ -87,8 +87,8 @@ def budget(  # noqa: PLR0913, PLR0917  each is an option
 
 def _changed(file: "LinkFile", data_rate: str | None, pointing_error: str | None) -> "LinkFile":
     """The file with what the command line says in place of two of its values."""
-    from microrad.link_table import Communication
-    from microrad.mission import Source
+    from microrad.mission.model import Source
+    from microrad.mission.tables.link import Communication
 
     raw = {"data_rate": data_rate, "pointing_error": pointing_error}
     values, sources = {}, dict(file.sources)
@@ -114,7 +114,7 @@ def presets(as_json: Json = False) -> Outcome:
     Each is a file in which every value names its source; what no source prints is "unknown" and has to
     be given before a budget is made of it.
     """
-    from microrad.presets import presets as all_presets
+    from microrad.mission.presets import presets as all_presets
     from microrad.report.tables import Table, table_text
 
     found = all_presets()

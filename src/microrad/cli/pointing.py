@@ -32,7 +32,7 @@ def design(
     run simulates all of it. --json also prints their matrices.
     """
     from microrad.mirror_summary import unknown_dynamics
-    from microrad.missionfile import load_mission
+    from microrad.mission.file import load_mission
 
     mission = load_mission(file, mirror)
     with progress_bar() as progress:

@@ -10,7 +10,7 @@ from microrad.contact_run.sequence import run
 from microrad.day_study import DayStudy
 from microrad.fine_pointing import FinePointingStudy
 from microrad.link_acquisition import Finding
-from microrad.mission import Mission
+from microrad.mission.model import Mission
 
 
 def of_mission(m: Mission, day: DayStudy, finding: Finding | None, fine: FinePointingStudy | None) -> ContactRun | None:

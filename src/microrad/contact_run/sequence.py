@@ -23,7 +23,7 @@ from microrad.contact_run.windows import Sampler, plan
 from microrad.core.units import format_quantity
 from microrad.fine_pointing import Design, Scene
 from microrad.link_acquisition import Finding, Found
-from microrad.mission import Mission
+from microrad.mission.model import Mission
 
 _STATE_OF_STAGE = (BEACON, BEACON, DETECT, ANSWER, ANSWER, ANSWER, LOCK, LOCK, LOCK, LOCK, LOCK)
 """Of the stages of an acquisition, wide or scanned: three to the detection, eight from the answer on."""

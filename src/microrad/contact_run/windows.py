@@ -14,7 +14,7 @@ from microrad.disturbance import Reference
 from microrad.fine_loop import ensemble
 from microrad.fine_loop.loop import LoopController, PointingLoop
 from microrad.fine_pointing.scenario import table
-from microrad.mission import Mission
+from microrad.mission.model import Mission
 
 Floats = NDArray[np.float64]
 

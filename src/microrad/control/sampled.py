@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from microrad import mission
 from microrad.core import kernels, lti
 from microrad.hysteresis import LINE_OF_SIGHT, BoucWen, Creep, Play, slow_gain
 from microrad.mirror import Mirror
+from microrad.mission import model as mission
 
 Floats = NDArray[np.float64]
 

@@ -11,7 +11,7 @@ from microrad.day_study.flow import DIRECT, RELAY, Closing, PointingLoss, Way
 from microrad.day_study.geometry import Encounter, View, beyond_the_mission, encounter, short_tail, times, view
 from microrad.link_acquisition import Found
 from microrad.link_study import LinkStudy
-from microrad.mission import LinkMission
+from microrad.mission.model import LinkMission
 from microrad.requirement import derived_from
 
 Progress = Callable[[int, int, str], None]

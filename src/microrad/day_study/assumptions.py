@@ -8,10 +8,10 @@ from pathlib import Path
 from microrad import link, orbit
 from microrad.core.units import format_quantity
 from microrad.day_study import flow, geometry
-from microrad.fields import Table
 from microrad.link_acquisition import Found
-from microrad.mission import LinkMission
-from microrad.orbit_table import HIGHEST_MASK_RAD, VisibilityLimits
+from microrad.mission.fields import Table
+from microrad.mission.model import LinkMission
+from microrad.mission.tables.orbit import HIGHEST_MASK_RAD, VisibilityLimits
 
 _RUNS = 4  # of each case: what an acquisition takes is little beside what is varied
 NOTHING = "as it is"

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from microrad import link, operations, orbit
 from microrad.day_study.geometry import View, cut_at, longest_gap_s
 from microrad.link_acquisition import Found
-from microrad.mission import LinkMission
-from microrad.operations_table import Downlink, Operations
+from microrad.mission.model import LinkMission
+from microrad.mission.tables.operations import Downlink, Operations
 
 Floats = NDArray[np.float64]
 

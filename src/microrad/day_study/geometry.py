@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from microrad import orbit
 from microrad.core.units import SPEED_OF_LIGHT_M_S, format_quantity
-from microrad.mission import LinkMission
+from microrad.mission.model import LinkMission
 
 Floats = NDArray[np.float64]
 _C = TypeVar("_C", bound=orbit.Contact)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from microrad import orbit
 from microrad.day_study.flow import Way
 from microrad.day_study.geometry import View
-from microrad.operations_table import Downlink
+from microrad.mission.tables.operations import Downlink
 
 Floats = NDArray[np.float64]
 

@@ -27,7 +27,7 @@ from microrad.export.records import (
 )
 from microrad.fine_loop.loop import LoopController
 from microrad.fine_loop.replay import replay
-from microrad.missionfile import MissionFile
+from microrad.mission.file import MissionFile
 
 Progress = Callable[[int, int, str], None]
 

@@ -21,7 +21,7 @@ from microrad.core.lti import frequency_response
 from microrad.export.linear_roots import Roots, checked, response, roots_of_control, roots_of_fields
 from microrad.export.linear_select import select
 from microrad.export.records import ExportError
-from microrad.mirror_table import Mirror
+from microrad.mission.tables.mirror import Mirror
 
 READ_BACK = 1e-9
 """Largest relative difference of the mirror file's frequency response from the model's; one with more is refused."""

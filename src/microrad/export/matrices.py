@@ -30,7 +30,7 @@ from microrad.fine_loop.design import behind_filter, design_plant
 from microrad.fine_loop.loop import ReferenceFilter
 from microrad.fine_pointing import table
 from microrad.fine_pointing.designs import IN_SERIES
-from microrad.missionfile import MissionFile
+from microrad.mission.file import MissionFile
 from microrad.sensor import StrainGauge
 
 __all__ = [

@@ -36,7 +36,7 @@ from microrad.fine_pointing.results import (
     verify,
 )
 from microrad.fine_pointing.scenario import VARIANTS, Scene, scene, table
-from microrad.missionfile import MissionFile
+from microrad.mission.file import MissionFile
 
 __all__ = [
     "BASELINE",

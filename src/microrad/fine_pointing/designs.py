@@ -13,7 +13,7 @@ from microrad.core.threads import shared_out
 from microrad.fine_loop.design import behind_filter, design_plant
 from microrad.fine_loop.loop import LoopController, PointingLoop, ReferenceFilter, assemble, with_inverse
 from microrad.fine_pointing.scenario import Scene, one_mirror, table
-from microrad.mission import Mission
+from microrad.mission.model import Mission
 
 Progress = Callable[[int, int, str], None]
 

@@ -18,7 +18,7 @@ from microrad.fine_loop.loop import LoopController, PointingLoop
 from microrad.fine_pointing import parts
 from microrad.fine_pointing.designs import BASELINE, Design
 from microrad.fine_pointing.scenario import BODY_POINTING, Scene, table, variants, with_mirror
-from microrad.mission import Mission
+from microrad.mission.model import Mission
 
 Floats = NDArray[np.float64]
 Progress = Callable[[int, int, str], None]

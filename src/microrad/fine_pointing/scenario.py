@@ -7,9 +7,9 @@ import numpy as np
 
 from microrad import control, disturbance, geometry, hysteresis, link, mirror, sensor
 from microrad.fine_loop import loop as fine
-from microrad.fine_pointing_table import FinePointing
-from microrad.mission import Mission, source_text
-from microrad.missionfile import MissionFile
+from microrad.mission.file import MissionFile
+from microrad.mission.model import Mission, source_text
+from microrad.mission.tables.fine_pointing import FinePointing
 
 BODY_POINTING = "body pointing"
 VARIANTS = ("given", "comparison", "no hysteresis")

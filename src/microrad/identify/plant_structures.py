@@ -15,7 +15,7 @@ from microrad.hysteresis import NO_CREEP, BoucWen, Creep, Play, slow_gain
 from microrad.identify.plant_fit import Parameter, Structure
 from microrad.identify.records import FloatArray
 from microrad.mirror import Mirror
-from microrad.mirror_table import roots_from_damping
+from microrad.mission.tables.mirror import roots_from_damping
 
 _RATIO = 0.999  # of alpha, at most: beyond it h would grow without bound
 _DAMPING = (1e-4, 0.9999)

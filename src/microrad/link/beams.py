@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from microrad.link.gains import DB_PER_NEPER, aperture_gain_db
-from microrad.link_table import narrowest_radius
+from microrad.mission.tables.link import narrowest_radius
 
 Floats = NDArray[np.float64]
 

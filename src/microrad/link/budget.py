@@ -20,8 +20,8 @@ from microrad.link.model import (
     required_dbm,
     strehl_db,
 )
-from microrad.link_table import Beacon, Communication, half_angle_rad
-from microrad.mission import LinkMission, Source, source_text
+from microrad.mission.model import LinkMission, Source, source_text
+from microrad.mission.tables.link import Beacon, Communication, half_angle_rad
 
 _GIVEN = "whatever the pointing error and the data rate"
 _TRANSMITTING = (

@@ -7,11 +7,11 @@ from typing import Literal
 
 from pydantic.fields import FieldInfo
 
-from microrad.fields import Quantity, Several, Share, Table
 from microrad.link.model import lit_aperture
 from microrad.link.receivers import RateError
-from microrad.link_table import divergence_fits
-from microrad.mission import LinkMission
+from microrad.mission.fields import Quantity, Several, Share, Table
+from microrad.mission.model import LinkMission
+from microrad.mission.tables.link import divergence_fits
 
 LINK_TABLES = (
     "terminals",

@@ -21,7 +21,7 @@ from microrad.link.model import (
     strehl_db,
 )
 from microrad.link.receivers import BpskHomodyne, DpskPreamplified, OokCounting
-from microrad.mission import LinkMission, Source, source_text
+from microrad.mission.model import LinkMission, Source, source_text
 
 Floats = NDArray[np.float64]
 

@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from microrad import pointing_table
 from microrad.link import gains, receivers
 from microrad.link.beams import GaussianFall, LitAperture, OffAxis
-from microrad.link_table import Beam, Communication
-from microrad.link_table import Receiver as ReceiverTable
-from microrad.mission import LinkMission
+from microrad.mission.model import LinkMission
+from microrad.mission.tables import pointing as pointing_table
+from microrad.mission.tables.link import Beam, Communication
+from microrad.mission.tables.link import Receiver as ReceiverTable
 
 Floats = NDArray[np.float64]
 

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from microrad.link.inputs import Input, margin_or_none, moved, unit_of
-from microrad.mission import LinkMission
+from microrad.mission.model import LinkMission
 
 DECADES = 6
 """How far from its own value an input is looked for, up and down."""

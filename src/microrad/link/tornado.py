@@ -5,10 +5,10 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Literal
 
-from microrad.fields import Quantity, Share
 from microrad.link.budget import answer_budget, beacon_budget
 from microrad.link.inputs import Input, fits, inputs, lit, margin_or_none, unit_of
-from microrad.mission import LinkMission, Source, source_text
+from microrad.mission.fields import Quantity, Share
+from microrad.mission.model import LinkMission, Source, source_text
 
 RELATIVE = 0.1
 """How far a quantity is moved, as a share of itself."""

@@ -6,8 +6,9 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from microrad.mission import LinkMission
-from microrad.operations_table import Constellation, Downlink
+from microrad.mission.model import LinkMission
+from microrad.mission.tables.operations import Constellation, Downlink
+from microrad.mission.tables.orbit import Orbits, OrbitTable, VisibilityLimits
 from microrad.orbit.analytic import GeostationarySlot, KeplerOrbit, node_of_local_time, sun_synchronous_inclination_rad
 from microrad.orbit.base import Orbit, OrbitError
 from microrad.orbit.earth import EARTH_RADIUS_M, Earth
@@ -18,7 +19,6 @@ from microrad.orbit.epoch import Epoch
 from microrad.orbit.ground import Station
 from microrad.orbit.limits import UNLIMITED, Limits, Terminal
 from microrad.orbit.oem import read_oem
-from microrad.orbit_table import Orbits, OrbitTable, VisibilityLimits
 
 TAIL_S = 86400.0
 """Time behind the span in which data of the span may still arrive."""

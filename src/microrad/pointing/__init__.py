@@ -1,5 +1,6 @@
 """Pointing: the budget of the open-loop errors, by every rule that a reviewer asks for; what jitter does to a link."""
 
+from microrad.mission.tables.pointing import point_ahead_rad
 from microrad.pointing.allocation import Allocation, allocate
 from microrad.pointing.classes import Axes, ErrorTerm, Interpretation, StatedError, basis, error_term
 from microrad.pointing.fading import (
@@ -43,7 +44,6 @@ from microrad.pointing.summation import (
     sigma_multiple,
     summations,
 )
-from microrad.pointing_table import point_ahead_rad
 from microrad.radial_error import Jitter, radial_cdf, radial_quantile, radial_survival
 
 __all__ = [

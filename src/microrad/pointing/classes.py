@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
 from microrad.core.units import format_quantity
-from microrad.pointing_table import ErrorClass, Statistic
+from microrad.mission.tables.pointing import ErrorClass, Statistic
 
 Axes = Literal["per-axis", "radial", "x"]
 """per-axis: the same about x and y; radial: off the line of sight; x: about one axis, nothing about the other."""

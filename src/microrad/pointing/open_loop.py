@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from microrad.core.budget import Line, root_sum_square
-from microrad.link_table import half_angle_rad
-from microrad.mission import LinkMission, Source, source_text
+from microrad.mission.model import LinkMission, Source, source_text
+from microrad.mission.tables.link import half_angle_rad
 from microrad.pointing.allocation import Allocation, allocate
 from microrad.pointing.classes import ErrorTerm, Interpretation, StatedError, basis, error_term
 from microrad.pointing.point_ahead import NAME, PointAheadAngle, point_ahead

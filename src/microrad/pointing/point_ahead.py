@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 
 from microrad.core.units import format_quantity
+from microrad.mission.tables.pointing import PointAhead, point_ahead_rad
 from microrad.pointing.classes import StatedError
-from microrad.pointing_table import PointAhead, point_ahead_rad
 
 NAME = "Point-ahead"
 """What the budget calls its line."""

@@ -14,7 +14,7 @@ from microrad.link import Swing
 from microrad.link_acquisition import Finding, Found, Tracking
 from microrad.link_performance import Performance, error_rad, required_error_rad
 from microrad.link_study import BeamRadius, LinkStudy, Solution
-from microrad.mission import source_text
+from microrad.mission.model import source_text
 from microrad.operations import spreadsheet_text
 from microrad.pointing import OpenLoopPointing
 from microrad.report import requirements

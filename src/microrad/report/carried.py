@@ -13,9 +13,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from microrad import missionfile
 from microrad.core.folder import MANIFEST
-from microrad.document import Document, UnreadableError
+from microrad.mission import file as missionfile
+from microrad.mission.toml import Document, UnreadableError
 from microrad.report.compared import clipped
 
 MOST_BYTES = 64_000_000

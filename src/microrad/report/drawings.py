@@ -5,7 +5,7 @@ from typing import Any
 
 from microrad import bench
 from microrad.core.units import format_quantity
-from microrad.mission import Mission
+from microrad.mission.model import Mission
 from microrad.report.quantities import quantity
 from microrad.study import Study
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from microrad import paper, simulate
 from microrad.core.kept import NOTHING, Kept
-from microrad.mission import Mission
+from microrad.mission.model import Mission
 from microrad.report import interactive
 from microrad.report.inlined import inlined
 from microrad.report.svg_text import svg_text

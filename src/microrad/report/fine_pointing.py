@@ -10,7 +10,7 @@ from microrad.fine_pointing import FinePointingStudy, Residual, Sine
 from microrad.fine_pointing.parts import DELAY
 from microrad.geometry import StrokeBudget
 from microrad.mirror_summary import unknown_dynamics
-from microrad.mission import Mission
+from microrad.mission.model import Mission
 from microrad.report import fine_pointing_words as words
 from microrad.report.figures import Figure
 from microrad.report.fine_pointing_data import parameter_units, rms_by_source, sources

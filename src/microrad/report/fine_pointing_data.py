@@ -11,7 +11,7 @@ from microrad.fine_loop.design import design_plant
 from microrad.fine_pointing import Design, ErrorBudget, FinePointingStudy, Residual, Verified
 from microrad.geometry import StrokeBudget
 from microrad.mirror_summary import unknown_dynamics
-from microrad.mission import Mission
+from microrad.mission.model import Mission
 from microrad.report.fine_pointing_words import room
 
 

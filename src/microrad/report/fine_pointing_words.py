@@ -9,7 +9,7 @@ from microrad.core.units import format_quantity
 from microrad.fine_pointing import FinePointingStudy, Verified
 from microrad.geometry import StrokeBudget
 from microrad.mirror_summary import unknown_dynamics
-from microrad.mission import Mission
+from microrad.mission.model import Mission
 
 VARIANTS = {
     "given": "on the mission's mirror",

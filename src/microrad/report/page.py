@@ -12,8 +12,8 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from microrad import link
 from microrad.core.machine import versions
 from microrad.core.units import format_quantity
-from microrad.mission import Source
-from microrad.missionfile import assumptions, changed_from_shipped
+from microrad.mission.file import assumptions, changed_from_shipped
+from microrad.mission.model import Source
 from microrad.performance import FINE
 from microrad.report import (
     carried,

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from microrad.core.machine import machine, versions
 from microrad.fine_pointing import COUNTERS, FinePointingStudy, Residual
-from microrad.missionfile import MirrorFile, MissionFile, named_files
+from microrad.mission.file import MirrorFile, MissionFile, named_files
 from microrad.report import day_results, variables, words
 from microrad.report.carried import hash_of_summary
 from microrad.report.fine_pointing_data import margins, rms_by_source, sources

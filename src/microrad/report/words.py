@@ -4,8 +4,8 @@ import math
 from typing import Any
 
 from microrad.core.units import format_quantity
-from microrad.mission import Mission
-from microrad.missionfile import changed_from_shipped
+from microrad.mission.file import changed_from_shipped
+from microrad.mission.model import Mission
 from microrad.performance import FINE, Cost
 from microrad.report import (
     budget_views,

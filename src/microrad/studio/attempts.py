@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
-from microrad.missionfile import LinkFile
+from microrad.mission.file import LinkFile
 from microrad.studio.draft import Draft
 
 T = TypeVar("T")

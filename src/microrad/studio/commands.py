@@ -88,7 +88,7 @@ class Budget:
             "from dataclasses import replace",
             "",
             "from microrad import load_link, parse_quantity, run_link_study",
-            "from microrad.mission import Source",
+            "from microrad.mission.model import Source",
             "from microrad.report import budget_views",
             "",
             f"file = load_link({path_text(self.file)})",

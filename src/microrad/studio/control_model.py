@@ -24,8 +24,8 @@ from microrad.fine_pointing import parts
 from microrad.fine_pointing.designs import families
 from microrad.fine_pointing.results import for_mirror
 from microrad.fine_pointing.scenario import BODY_POINTING, with_mirror
-from microrad.mission import Mission
-from microrad.missionfile import MissionFile
+from microrad.mission.file import MissionFile
+from microrad.mission.model import Mission
 
 Floats = NDArray[np.float64]
 

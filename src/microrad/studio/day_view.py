@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from microrad import day_study, link_study
 from microrad.day_study import DayStudy, Way
-from microrad.missionfile import LinkFile
+from microrad.mission.file import LinkFile
 from microrad.orbit import Contact
 from microrad.report import day_tables, day_words
 from microrad.studio import plots

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from microrad.core.units import UnitError, parse_quantity
-from microrad.fields import Quantity, Share
+from microrad.mission.fields import Quantity, Share
 from microrad.studio.draft import Draft, Value
 
 STEPS = 240

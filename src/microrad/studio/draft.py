@@ -18,10 +18,10 @@ from pathlib import Path
 from typing import Literal
 
 from microrad.core.folder import write_whole
-from microrad.document import MAX_BYTES, Fault, MissionError, Statement, clipped, scan
-from microrad.mission import Source
-from microrad.missionfile import LinkFile, MissionFile, load_link, load_mission
-from microrad.origins import written_for
+from microrad.mission.file import LinkFile, MissionFile, load_link, load_mission
+from microrad.mission.model import Source
+from microrad.mission.origins import written_for
+from microrad.mission.toml import MAX_BYTES, Fault, MissionError, Statement, clipped, scan
 from microrad.studio.draft_keys import Key, key_of, keys_in, loose_toml, typed_from, value_of
 
 _MARK = "\ufeff"
@@ -81,7 +81,7 @@ class Draft:
     @classmethod
     def shipped(cls, path: str | Path) -> Draft:
         """The shipped mission as `microrad init` writes it, to be saved at `path`."""
-        text = resources.files("microrad").joinpath("missions", "leo-geo.toml").read_text("utf-8")
+        text = resources.files("microrad.mission").joinpath("missions", "leo-geo.toml").read_text("utf-8")
         return _draft(text, Path(path), "")
 
     @property

@@ -11,9 +11,9 @@ from typing import Annotated, Any, Literal, cast, get_args, get_origin
 
 from pydantic.fields import FieldInfo
 
-from microrad.document import scan
-from microrad.fields import Quantity, Several, Table
-from microrad.mission import Mission
+from microrad.mission.fields import Quantity, Several, Table
+from microrad.mission.model import Mission
+from microrad.mission.toml import scan
 
 Kind = Literal["quantity", "number", "whole number", "switch", "choice", "text", "list"]
 

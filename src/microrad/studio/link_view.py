@@ -15,8 +15,8 @@ from microrad.core.budget import Line
 from microrad.core.units import format_quantity
 from microrad.link_performance import error_rad, required_error_rad
 from microrad.link_study import LinkStudy
-from microrad.mission import LinkMission
-from microrad.missionfile import LinkFile
+from microrad.mission.file import LinkFile
+from microrad.mission.model import LinkMission
 from microrad.report.budget_views import jitter_lines, sentences
 from microrad.report.quantities import quantity, signed
 from microrad.studio import plots

@@ -7,7 +7,7 @@ import os
 import re
 from pathlib import Path
 
-from microrad.document import Statement, scan
+from microrad.mission.toml import Statement, scan
 from microrad.studio.draft import Draft
 
 _HEADERS = ("table", "tables", "broken")

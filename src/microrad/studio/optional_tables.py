@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from functools import cache
 from importlib import resources
 
-from microrad.document import scan
+from microrad.mission.toml import scan
 from microrad.studio.draft import Draft, DraftError
 from microrad.studio.draft_keys import keys_in
 
@@ -83,7 +83,7 @@ def _revived(text: str, name: str) -> str | None:
 def _examples() -> dict[str, str]:
     """Each table that there is an example of, with its text; an outermost one with all that it holds."""
     own = resources.files(__package__).joinpath("optional_tables.toml").read_text("utf-8")
-    shipped = resources.files("microrad").joinpath("missions", "leo-geo.toml").read_text("utf-8")
+    shipped = resources.files("microrad.mission").joinpath("missions", "leo-geo.toml").read_text("utf-8")
     active = dict(_blocks(shipped))
     found = {name: _whole(name, active) for name in active} | dict(_blocks(own)) | _uncommented(shipped)
     return {name: found[name] for name in sorted(found, key=lambda name: name.count("."))}

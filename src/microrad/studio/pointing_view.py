@@ -12,7 +12,7 @@ from microrad import link_study, pointing
 from microrad.core.units import format_quantity
 from microrad.link import DEEPEST_DB
 from microrad.link_study import PointAheadEffect
-from microrad.missionfile import LinkFile
+from microrad.mission.file import LinkFile
 from microrad.pointing import OpenLoopPointing
 from microrad.report.quantities import quantity
 from microrad.studio import plots

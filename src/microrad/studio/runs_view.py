@@ -12,7 +12,7 @@ from importlib import resources
 from pathlib import Path
 
 from microrad.core.folder import write_whole
-from microrad.document import MAX_BYTES, scan
+from microrad.mission.toml import MAX_BYTES, scan
 from microrad.studio.commands import Action
 from microrad.studio.commands_pieces import path_argument
 from microrad.studio.jobs import Job, JobError, Kind, Order, Progress
@@ -119,7 +119,7 @@ def write_campaign(workshop: Workshop) -> Path:
     mission = workshop.draft.path
     if not mission.is_file():
         raise JobError(f"{workshop.name_of(mission)} is not saved yet, and a campaign reads it from its file; save it")
-    text = resources.files("microrad").joinpath("missions", "campaign.toml").read_text("utf-8")
+    text = resources.files("microrad.mission").joinpath("missions", "campaign.toml").read_text("utf-8")
     path = workshop.inside(free_name(workshop, "campaign", ".toml"))
     named = json.dumps(workshop.name_of(mission), ensure_ascii=False)  # with quotes in the name escaped
     write_whole(path, text.replace('mission = "leo-geo.toml"', f"mission = {named}", 1))

@@ -14,8 +14,8 @@ from dataclasses import replace
 from pathlib import Path
 
 from microrad.core.folder import write_whole
-from microrad.document import MissionError
-from microrad.missionfile import LinkFile, MissionFile
+from microrad.mission.file import LinkFile, MissionFile
+from microrad.mission.toml import MissionError
 from microrad.studio import plain_files
 from microrad.studio.campaign_live import LiveCampaigns
 from microrad.studio.draft import Draft, DraftError, OnDisk

@@ -9,7 +9,7 @@ from typing import Any
 
 from nicegui import ui
 
-from microrad import presets
+from microrad.mission import presets
 from microrad.studio import commands, compare_view
 from microrad.studio.compare_view import Beside, Found, Number
 from microrad.studio.draft import Draft

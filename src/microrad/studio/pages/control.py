@@ -8,7 +8,7 @@ from typing import Any
 
 from nicegui import background_tasks, ui
 
-from microrad.missionfile import MissionFile
+from microrad.mission.file import MissionFile
 from microrad.studio.commands import Design
 from microrad.studio.pages import layout
 from microrad.studio.pages.aside import aside, stay

@@ -9,7 +9,7 @@ from typing import Generic, TypeVar
 from nicegui import background_tasks, ui
 from nicegui.element import Element
 
-from microrad.missionfile import LinkFile
+from microrad.mission.file import LinkFile
 from microrad.studio.attempts import Attempt, attempt, seen
 from microrad.studio.dials import Dial, faulty
 from microrad.studio.draft import Draft

@@ -10,7 +10,7 @@ from nicegui import ui
 
 from microrad import link_study
 from microrad.link_study import LinkStudy
-from microrad.missionfile import LinkFile
+from microrad.mission.file import LinkFile
 from microrad.studio import link_view
 from microrad.studio.commands import Budget
 from microrad.studio.dials import Dial

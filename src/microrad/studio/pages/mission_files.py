@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from nicegui import ui
 
-from microrad import presets
+from microrad.mission import presets
 from microrad.studio.draft import Draft
 from microrad.studio.names import NameRefusedError, safe_name, typed_words
 from microrad.studio.optional_tables import offered, with_table

@@ -9,7 +9,7 @@ from typing import Any
 from nicegui import ui
 from nicegui.elements.mixins.text_element import TextElement
 
-from microrad.document import Fault
+from microrad.mission.toml import Fault
 from microrad.studio.draft import Draft, DraftError, Value
 from microrad.studio.draft_keys import Key, typed_from
 from microrad.studio.pages import layout

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from nicegui import background_tasks, ui
 
-from microrad.missionfile import LinkFile
+from microrad.mission.file import LinkFile
 from microrad.studio import pointing_view
 from microrad.studio.commands import Budget
 from microrad.studio.dials import Dial

@@ -7,8 +7,8 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from microrad.core.units import SPEED_OF_LIGHT_M_S, format_quantity
-from microrad.fields import Problem, Quantity, Several, Share, Switch, Table
-from microrad.mirror_table import ANGLE_MOST, Frequency
+from microrad.mission.fields import Problem, Quantity, Several, Share, Switch, Table
+from microrad.mission.tables.mirror import ANGLE_MOST, Frequency
 
 AngleOrZero = Annotated[float, Quantity("rad", "urad", least=0.0, most=ANGLE_MOST)]
 TwoAngles = Annotated[tuple[float, ...], Several(Quantity("rad", "urad", least=0.0, most=ANGLE_MOST))]

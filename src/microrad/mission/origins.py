@@ -8,8 +8,8 @@ from functools import cache
 from importlib import resources
 
 from microrad.core.units import UnitError, parse_quantity
-from microrad.document import scan
-from microrad.presets import PAPER, preset_text, presets
+from microrad.mission.presets import PAPER, preset_text, presets
+from microrad.mission.toml import scan
 
 
 def written_for(key: str, comment: str, value: str) -> str:
@@ -49,7 +49,7 @@ def _paper() -> Mapping[str, str]:
 
 
 def _shipped_mission() -> str:
-    return (resources.files("microrad") / "missions" / "leo-geo.toml").read_text(encoding="utf-8")
+    return (resources.files("microrad.mission") / "missions" / "leo-geo.toml").read_text(encoding="utf-8")
 
 
 def _same(value: str, other: str) -> bool:

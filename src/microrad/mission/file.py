@@ -13,11 +13,11 @@ from pydantic import TypeAdapter, ValidationError
 from pydantic.fields import FieldInfo
 
 from microrad.core.units import UnitError
-from microrad.document import Document, Fault, MissionError, UnreadableError, clipped, shown
-from microrad.fields import NOT_PUBLISHED, UNKNOWN, Problem, ProblemsError, Quantity, Several, Table
-from microrad.mirror_table import Mirror
-from microrad.mission import LinkMission, Mission, Source
-from microrad.origins import of_paper, written_for
+from microrad.mission.fields import NOT_PUBLISHED, UNKNOWN, Problem, ProblemsError, Quantity, Several, Table
+from microrad.mission.model import LinkMission, Mission, Source
+from microrad.mission.origins import of_paper, written_for
+from microrad.mission.tables.mirror import Mirror
+from microrad.mission.toml import Document, Fault, MissionError, UnreadableError, clipped, shown
 
 __all__ = [
     "Fault",

@@ -7,9 +7,9 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from microrad.core.units import format_quantity
-from microrad.fields import Problem, Quantity, Several, Table, Whole
-from microrad.mirror_table import Name
-from microrad.orbit_table import HIGHEST_MASK_RAD, Seconds
+from microrad.mission.fields import Problem, Quantity, Several, Table, Whole
+from microrad.mission.tables.mirror import Name
+from microrad.mission.tables.orbit import HIGHEST_MASK_RAD, Seconds
 
 DataRate = Annotated[float, Quantity("bit/s", "Mbit/s", above=0.0)]
 Longitude = Annotated[float, Quantity("rad", "deg", least=-math.pi, most=2.0 * math.pi)]

@@ -10,8 +10,8 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from microrad.core.units import format_quantity
-from microrad.fields import Problem, Quantity, Several, Share, Switch, Table, Whole
-from microrad.mirror_table import ANGLE_MOST, Angle, DurationOrZero, Frequency, Name
+from microrad.mission.fields import Problem, Quantity, Several, Share, Switch, Table, Whole
+from microrad.mission.tables.mirror import ANGLE_MOST, Angle, DurationOrZero, Frequency, Name
 
 STEP_TOLERANCE = 1e-9
 """How far, relatively, a period or a delay may lie from a whole number of plant steps or control samples."""

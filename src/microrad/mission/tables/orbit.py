@@ -11,8 +11,8 @@ from pydantic import Field, GetJsonSchemaHandler
 from pydantic_core import CoreSchema
 
 from microrad.core.units import UnitError
-from microrad.fields import OrWord, Problem, Quantity, Several, Switch, Table
-from microrad.mirror_table import Name
+from microrad.mission.fields import OrWord, Problem, Quantity, Several, Switch, Table
+from microrad.mission.tables.mirror import Name
 
 HIGHEST_MASK_RAD = math.radians(89.0)
 """Mask above which hardly a pass is left: a satellite would have to cross the zenith."""

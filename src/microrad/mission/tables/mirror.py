@@ -9,7 +9,7 @@ from pydantic import Field, GetJsonSchemaHandler
 from pydantic_core import CoreSchema
 
 from microrad.core.units import format_quantity
-from microrad.fields import MOST_ITEMS, Problem, ProblemsError, Quantity, Several, Table
+from microrad.mission.fields import MOST_ITEMS, Problem, ProblemsError, Quantity, Several, Table
 
 ANGLE_MOST = math.pi / 2  # beyond a quarter turn no pointing error, beam or mirror angle has a meaning here
 Name = Annotated[str, Field(min_length=1, max_length=200)]

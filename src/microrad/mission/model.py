@@ -10,11 +10,11 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from microrad.acquisition_table import Acquisition
 from microrad.core.units import format_quantity
-from microrad.fields import Problem, Quantity, Several, Table
-from microrad.fine_pointing_table import FinePointing, clock_problems
-from microrad.link_table import (
+from microrad.mission.fields import Problem, Quantity, Several, Table
+from microrad.mission.tables.acquisition import Acquisition
+from microrad.mission.tables.fine_pointing import FinePointing, clock_problems
+from microrad.mission.tables.link import (
     Beacon,
     Channel,
     Communication,
@@ -26,10 +26,20 @@ from microrad.link_table import (
     pattern_fits,
     strehl_fits,
 )
-from microrad.mirror_table import ANGLE_MOST, Angle, DurationOrZero, Frequency, Mirror, MirrorGain, Name, Rate, Voltage
-from microrad.operations_table import Constellation, Operations
-from microrad.orbit_table import Orbits
-from microrad.pointing_table import JitterTable, PointAhead, Pointing, point_ahead_rad
+from microrad.mission.tables.mirror import (
+    ANGLE_MOST,
+    Angle,
+    DurationOrZero,
+    Frequency,
+    Mirror,
+    MirrorGain,
+    Name,
+    Rate,
+    Voltage,
+)
+from microrad.mission.tables.operations import Constellation, Operations
+from microrad.mission.tables.orbit import Orbits
+from microrad.mission.tables.pointing import JitterTable, PointAhead, Pointing, point_ahead_rad
 
 MOST_SAMPLES = 2_000_000
 """Control samples in a period of the scenario's sines beyond which a run would not fit into memory."""

@@ -8,8 +8,8 @@ from pydantic import Field
 
 from microrad.core.capacity import Code, excess_noise_factor
 from microrad.core.units import PLANCK_J_S, SPEED_OF_LIGHT_M_S, format_quantity
-from microrad.fields import OrWord, Problem, Quantity, Share, Table, Whole
-from microrad.mirror_table import ANGLE_MOST, Angle, Name
+from microrad.mission.fields import OrWord, Problem, Quantity, Share, Table, Whole
+from microrad.mission.tables.mirror import ANGLE_MOST, Angle, Name
 
 LOWEST_ELEVATION_RAD = math.radians(10.0)
 """Elevation below which a plane-parallel atmosphere is no model of the path."""

@@ -5,8 +5,8 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from microrad.fields import Problem, Quantity, Share, Table, Whole
-from microrad.mirror_table import ANGLE_MOST, Angle, Frequency
+from microrad.mission.fields import Problem, Quantity, Share, Table, Whole
+from microrad.mission.tables.mirror import ANGLE_MOST, Angle, Frequency
 
 Seconds = Annotated[float, Quantity("s", "s", least=0.0, most=1e6)]
 Frame = Annotated[float, Quantity("s", "ms", above=0.0, most=1e6)]

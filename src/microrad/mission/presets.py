@@ -8,7 +8,7 @@ from importlib import resources
 from importlib.resources.abc import Traversable
 from typing import Any
 
-from microrad.fields import UNKNOWN
+from microrad.mission.fields import UNKNOWN
 
 PAPER = "paper"
 """Name of the preset that holds the source paper's whole mission."""
@@ -50,7 +50,7 @@ def preset_text(name: str) -> str:
 
 
 def _files() -> dict[str, Traversable]:
-    folder = resources.files("microrad") / "missions" / "presets"
+    folder = resources.files("microrad.mission") / "missions" / "presets"
     return {each.name.removesuffix(".toml"): each for each in folder.iterdir() if each.name.endswith(".toml")}
 
 

@@ -1,0 +1,1 @@
+"""The tables of a mission file: their keys, units and bounds, and what must fit within each."""
