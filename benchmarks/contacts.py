@@ -16,8 +16,9 @@ from pathlib import Path
 import numpy as np
 from skyfield.api import EarthSatellite, load, wgs84
 
-from microrad import constellation, operations, orbit
+from microrad import orbit
 from microrad.mission.file import load_mission
+from microrad.orbit import constellation, operations
 
 FILE = load_mission(Path(__file__).resolve().parents[1] / "missions" / "leo-geo.toml")
 DAY_S = 86400.0

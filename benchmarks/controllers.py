@@ -14,7 +14,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests"))
 
 from design_plants import axis_plant
-from microrad import control
+from microrad.loop import control
 
 PLANTS = {
     "plain": {},

@@ -14,8 +14,8 @@ from pathlib import Path
 
 import numpy as np
 
-from microrad.identify import fit_hysteretic_stiffness, predicted_error
-from microrad.recording import Recording, multisine_recordings
+from microrad.lab.identify import fit_hysteretic_stiffness, predicted_error
+from microrad.lab.recording import Recording, multisine_recordings
 
 DATA = Path(os.environ.get("MICRORAD_DATA") or Path(__file__).resolve().parents[2] / "shared" / "data") / "cubespec"
 RATE_HZ = 6400.0

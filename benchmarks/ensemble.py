@@ -20,12 +20,15 @@ from pathlib import Path
 import numpy as np
 from loop import INTEGER, Counters, best, compiled_twin, twin_parameters
 
-from microrad import control, disturbance, mirror, simulate, tracking
 from microrad.core import kernels, lti
-from microrad.fine_loop import ensemble
-from microrad.fine_loop import loop as fine
+from microrad.loop import control, disturbance
+from microrad.loop import paper_cases as tracking
+from microrad.loop import sine_run as simulate
+from microrad.loop.fine_loop import ensemble
+from microrad.loop.fine_loop import loop as fine
+from microrad.loop.sensor import OpticalSensor
+from microrad.mirror import model as mirror
 from microrad.mission import file as missionfile
-from microrad.sensor import OpticalSensor
 
 HERE = Path(__file__).resolve().parent
 PERIOD_S, STEPS = 200e-6, 10

@@ -24,10 +24,10 @@ import numpy as np
 from scipy.integrate import solve_ivp
 from scipy.optimize import OptimizeResult, least_squares
 
-from microrad import mirror
 from microrad.core.kernels import bouc_wen_response
-from microrad.identify.plant_fit import Run, simulate, upsampled
-from microrad.identify.plant_structures import hysteretic_oscillator
+from microrad.lab.identify.plant_fit import Run, simulate, upsampled
+from microrad.lab.identify.plant_structures import hysteretic_oscillator
+from microrad.mirror import model as mirror
 
 Model = Callable[[np.ndarray], np.ndarray]
 PAPER = np.array([0.089, -2.96e-7, -0.048, 0.00047, 38.421, 34.635])  # mrad, V and s
@@ -116,7 +116,7 @@ def oscillator() -> Case:
     """One period, from rest, 20 steps a sample, and the measured mean of the periods behind a run-in of one period."""
     factor, step = 20, 1 / 750 / 20
     if DATA.exists():
-        from microrad.recording import read_recording
+        from microrad.lab.recording import read_recording
 
         record = read_recording(DATA, "multisine/u", "multisine/y", 750.0, period_samples=8192)
         one = record.drive[:8192]

@@ -21,9 +21,12 @@ import control as python_control
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from microrad import control as microrad_control
-from microrad import hysteresis, mirror, simulate, tracking
 from microrad.core import kernels
+from microrad.loop import control as microrad_control
+from microrad.loop import paper_cases as tracking
+from microrad.loop import sine_run as simulate
+from microrad.mirror import hysteresis
+from microrad.mirror import model as mirror
 from microrad.mission import file as missionfile
 
 HERE = Path(__file__).resolve().parent

@@ -64,7 +64,7 @@ def write(path: Path, samples: int) -> None:
 
 
 def measure(path: Path) -> None:
-    from microrad.recording import read_recording
+    from microrad.lab.recording import read_recording
 
     by_number = path.suffix == ".npy"
     stated = path.suffix not in (".npy", ".csv")

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
-from microrad import fine_pointing, load_mission
+from microrad import load_mission
+from microrad.loop import fine_pointing
 
 fine_pointing.run_one(load_mission(Path(__file__).parent.parent / "missions" / "leo-geo.toml"), "PI")

@@ -5,8 +5,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from microrad.control.problem import DesignPlant
 from microrad.core import lti
+from microrad.loop.control.problem import DesignPlant
 
 Floats = NDArray[np.float64]
 

@@ -7,8 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from microrad import report, study
+from microrad import report
 from microrad.mission.file import load_mission
+from microrad.study import story as study
 from shared import once
 
 MISSIONS = Path(__file__).parent.parent / "missions"

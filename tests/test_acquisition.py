@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from microrad.acquisition import (
+from microrad.link.acquisition import (
     LOCKED,
     LOST,
     Beams,

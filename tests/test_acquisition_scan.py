@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from microrad.acquisition import (
+from microrad.link.acquisition import (
     Detector,
     Raster,
     Search,

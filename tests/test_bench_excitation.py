@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from microrad.bench import (
+from microrad.lab.bench import (
     DesignError,
     Limits,
     Lines,

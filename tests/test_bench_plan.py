@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from microrad import bench
-from microrad.bench import PlanError, load_plan, packaged_plans
+from microrad.lab import bench
+from microrad.lab.bench import PlanError, load_plan, packaged_plans
 
 PLANS = Path(bench.__file__).parent.parent / "plans"
 PAPER = PLANS / "paper-experiment.toml"

@@ -12,9 +12,9 @@ import pytest
 import scipy.io
 from nptdms import TdmsFile
 
-from microrad import bench
-from microrad.bench import BenchError, load_plan, only, play, true_output, write
 from microrad.core.folder import FolderError
+from microrad.lab import bench
+from microrad.lab.bench import BenchError, load_plan, only, play, true_output, write
 
 SEED = 5
 

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 
 from campaign_files import HEAD, IDENTIFIED, LOOP, NOISE, POWER, UNCERTAINTY, loaded, written
-from microrad import fine_pointing
 from microrad.campaign import evaluate, keys, ledger_file, sampling
 from microrad.campaign.file import load_campaign
 from microrad.campaign.inputs import Builder
 from microrad.campaign.records import CampaignError
+from microrad.loop import fine_pointing
 from microrad.mission.file import MissionError, load_mission, named_files, open_mission
 from shipped import SHIPPED
 

@@ -6,7 +6,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from microrad import radial_error
 from microrad.campaign import bundle, plan, run, work
 from microrad.campaign.export import export
 from microrad.campaign.file import load_campaign
@@ -16,9 +15,9 @@ from microrad.campaign.ledger import Ledger
 from microrad.campaign.records import CampaignError
 from microrad.campaign.summary import summarise
 from microrad.core import reads
-from microrad.link import LitAperture
+from microrad.link import LitAperture, radial_error
 from microrad.link.inputs import LINK_TABLES
-from microrad.link_performance import Exposure
+from microrad.link.under_jitter import Exposure
 from microrad.mission.fields import Several
 from microrad.mission.file import load_link, open_mission
 from microrad.mission.toml import MissionError

@@ -7,11 +7,11 @@ import pytest
 from scipy import stats
 
 from campaign_files import HEAD, IDENTIFIED, LOOP, POWER, loaded, written
-from microrad import mirror_spread
 from microrad.campaign import distributions, sampling
 from microrad.campaign.distributions import LogUniform, Normal, OneOf, Uniform
 from microrad.campaign.file import load_campaign
 from microrad.core import lti
+from microrad.mirror import spread as mirror_spread
 
 METHODS = ("random", "latin-hypercube", "sobol")
 WIDE = (

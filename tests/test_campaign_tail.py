@@ -12,7 +12,7 @@ import pytest
 from scipy.signal import lfilter
 from scipy.special import i0e
 
-from microrad import link, link_performance
+from microrad import link
 from microrad.campaign import evaluate, loops, run, tails, tilt
 from microrad.campaign.file import CampaignFile, load_campaign
 from microrad.campaign.inputs import Builder
@@ -23,8 +23,9 @@ from microrad.campaign.summary import summarise
 from microrad.campaign.tails import tail_of_time, tail_weighted
 from microrad.campaign.work import Evaluator
 from microrad.core.threads import in_threads
-from microrad.fine_loop import linear
-from microrad.fine_loop.ensemble import LANES, bin_edges_rad, histogram_quantile
+from microrad.link import under_jitter as link_performance
+from microrad.loop.fine_loop import linear
+from microrad.loop.fine_loop.ensemble import LANES, bin_edges_rad, histogram_quantile
 from microrad.mission.file import load_mission
 from microrad.report import campaign_words
 from microrad.report.quantities import quantity

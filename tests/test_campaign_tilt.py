@@ -8,12 +8,12 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy import stats
 
-from microrad import disturbance
 from microrad.campaign.tilt import PLAIN, Tilt, drawn, end_covariance, level_of, radius_of, tilt, tilted
-from microrad.fine_loop import ensemble, linear
-from microrad.fine_loop.ensemble import LANES, Span
-from microrad.fine_loop.loop import assemble
-from microrad.fine_pointing import designs, parts, scenario
+from microrad.loop import disturbance
+from microrad.loop.fine_loop import ensemble, linear
+from microrad.loop.fine_loop.ensemble import LANES, Span
+from microrad.loop.fine_loop.loop import assemble
+from microrad.loop.fine_pointing import designs, parts, scenario
 from microrad.mission.file import load_mission
 from shipped import SHIPPED
 

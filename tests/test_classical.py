@@ -9,10 +9,18 @@ from numpy.testing import assert_allclose
 from scipy.linalg import solve_discrete_lyapunov
 
 from design_plants import axis_plant
-from microrad.control import classical, filters
-from microrad.control.classical import DISTURBANCE_OBSERVER, FAMILIES, PI, PI_NOTCH, PID, RESONANT_DAMPING, peak_family
-from microrad.control.problem import DesignPlant
 from microrad.core import lti
+from microrad.loop.control import classical, filters
+from microrad.loop.control.classical import (
+    DISTURBANCE_OBSERVER,
+    FAMILIES,
+    PI,
+    PI_NOTCH,
+    PID,
+    RESONANT_DAMPING,
+    peak_family,
+)
+from microrad.loop.control.problem import DesignPlant
 
 PERIOD = 2e-4
 GAIN = 0.089e-3

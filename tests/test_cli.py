@@ -21,9 +21,12 @@ from nptdms import ChannelObject, TdmsWriter
 
 import microrad
 from command_line import listing
-from microrad import cli, control, doctor, identify, report, study
-from microrad.cli import frame, lab
-from microrad.fine_pointing import designs
+from microrad import cli, report
+from microrad.cli import doctor, frame, lab
+from microrad.lab import identify
+from microrad.loop import control
+from microrad.loop.fine_pointing import designs
+from microrad.study import story as study
 from shipped import plain_study, without_day, without_fine_pointing
 from waiting import HANG_S, lines_of, until
 
@@ -843,7 +846,7 @@ def test_bench_refusals(refused, folder):
 
 
 def test_the_models_of_the_command_are_those_of_the_ladder():
-    from microrad.identify import MODELS
+    from microrad.lab.identify import MODELS
 
     assert {m.value.replace("-", "_") for m in lab.Model} == {"best", *MODELS}
 

@@ -9,9 +9,9 @@ import pytest
 
 from command_line import listing
 from link_files import written
-from microrad import link_study
+from microrad.link import study as link_study
 from microrad.mission.file import load_link
-from microrad.operations import COLUMNS
+from microrad.orbit.operations import COLUMNS
 from report_pages import assert_sound, without_scripts
 from test_day_tables import ALONE, BY_FILE, HELD, LIMITS, day_data, day_path, element_set
 

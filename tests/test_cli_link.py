@@ -12,7 +12,8 @@ import typer
 
 from command_line import listing
 from link_files import PATTERN, RECEIVERS, data_with, received_with, written
-from microrad import cli, link_study
+from microrad import cli
+from microrad.link import study as link_study
 from microrad.mission.file import load_link
 from microrad.mission.presets import preset_text
 from microrad.report import budget_views

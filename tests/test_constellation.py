@@ -8,8 +8,11 @@ import math
 import numpy as np
 import pytest
 
-from microrad import constellation, day_study, link_study, operations, orbit
-from microrad.constellation import opportunities
+from microrad import orbit
+from microrad.link import study as link_study
+from microrad.orbit import constellation, operations
+from microrad.orbit import day as day_study
+from microrad.orbit.constellation import opportunities
 from microrad.report import constellation_views
 from test_day_tables import BY_FILE, day_file, element_set
 

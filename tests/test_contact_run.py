@@ -9,15 +9,19 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from microrad import acquisition, contact_run, control, fine_pointing, link, link_study
-from microrad.contact_run import Contact, MovingReference, Sampler, Settings, Sight, plan
-from microrad.contact_run.windows import first_run
+from microrad import link
 from microrad.core import kernels
-from microrad.disturbance import Reference
-from microrad.fine_loop import ensemble
-from microrad.fine_loop.loop import assemble
-from microrad.fine_pointing import designs
+from microrad.link import acquisition
+from microrad.link import study as link_study
+from microrad.loop import control, fine_pointing
+from microrad.loop.disturbance import Reference
+from microrad.loop.fine_loop import ensemble
+from microrad.loop.fine_loop.loop import assemble
+from microrad.loop.fine_pointing import designs
 from microrad.mission.file import LinkFile, load_mission
+from microrad.study import contact_run
+from microrad.study.contact_run import Contact, MovingReference, Sampler, Settings, Sight, plan
+from microrad.study.contact_run.windows import first_run
 from shipped import SHIPPED, edited_file
 
 C_M_S = 299_792_458.0

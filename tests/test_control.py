@@ -11,10 +11,13 @@ import pytest
 from numpy.testing import assert_allclose
 
 import oracles
-from microrad import control, hysteresis, mirror, simulate
-from microrad.control import IDEAL_DRIVE, Drive, Gains, Inverse, Timing
 from microrad.core import lti
-from microrad.hysteresis import BoucWen, Play
+from microrad.loop import control
+from microrad.loop import sine_run as simulate
+from microrad.loop.control import IDEAL_DRIVE, Drive, Gains, Inverse, Timing
+from microrad.mirror import hysteresis
+from microrad.mirror import model as mirror
+from microrad.mirror.hysteresis import BoucWen, Play
 from microrad.mission.file import load_mission
 
 SHIPPED = Path(__file__).parent.parent / "missions" / "paper.toml"

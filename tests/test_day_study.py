@@ -7,9 +7,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from microrad import day_study, link_study, orbit
-from microrad.day_study import NOTHING, Numbers, PointingLoss, Swing, assumptions, flow, geometry, given_loss
+from microrad import orbit
+from microrad.link import study as link_study
 from microrad.orbit import EARTH_RADIUS_M
+from microrad.orbit import day as day_study
+from microrad.orbit.day import NOTHING, Numbers, PointingLoss, Swing, assumptions, flow, geometry, given_loss
 from test_day_tables import ALONE, HELD, LIMITS, day_file, ephemeris
 
 C_M_S = 299_792_458.0
@@ -632,7 +634,7 @@ def test_the_longest_time_without_contact_is_followed_beyond_the_span(day):
 
 # ------------------------------------------------------------------------------------------------------------- the map
 def test_the_track_is_open_where_the_contacts_are(day, seconds):
-    from microrad.day_study.ground_track import ground_track
+    from microrad.orbit.day.ground_track import ground_track
 
     track = ground_track(day.view, (day.relay, day.direct), day.mission.operations.downlink)
     at = track.time_s.astype(int)

@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 
 from link_files import written
-from microrad import constellation, orbit
+from microrad import orbit
 from microrad.mission.file import MissionError, load_link, load_mission
 from microrad.mission.tables.operations import Constellation, Downlink
+from microrad.orbit import constellation
 from shipped import SHIPPED, edited_file, without_fine_pointing
 
 TABLES = ("mirror", "amplifier", "control", "scenario", "fine_pointing")

@@ -12,9 +12,9 @@ from scipy.integrate import quad, quad_vec, solve_ivp
 from scipy.linalg import expm
 from scipy.signal import welch
 
-from microrad import disturbance
 from microrad.core import lti
-from microrad.disturbance import (
+from microrad.loop import disturbance
+from microrad.loop.disturbance import (
     MICIUS_EDGES_HZ,
     MICIUS_RMS_RAD,
     Disturbance,

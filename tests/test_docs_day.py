@@ -8,12 +8,17 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from microrad import constellation, contact_run, control, day_study, fine_pointing, link, link_study, operations, orbit
+from microrad import link, orbit
 from microrad.core.units import SPEED_OF_LIGHT_M_S
-from microrad.day_study import flow
-from microrad.fine_loop.loop import assemble
-from microrad.fine_pointing import designs
+from microrad.link import study as link_study
+from microrad.loop import control, fine_pointing
+from microrad.loop.fine_loop.loop import assemble
+from microrad.loop.fine_pointing import designs
 from microrad.mission import file as missionfile
+from microrad.orbit import constellation, operations
+from microrad.orbit import day as day_study
+from microrad.orbit.day import flow
+from microrad.study import contact_run
 
 ROOT = Path(__file__).parent.parent
 PAGE = (ROOT / "docs" / "day.md").read_text(encoding="utf-8")

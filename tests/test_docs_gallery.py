@@ -10,10 +10,12 @@ from pathlib import Path
 
 import pytest
 
-from microrad import fine_pointing, load_link, load_mirror, report, study
+from microrad import load_link, load_mirror, report
 from microrad.core.units import parse_quantity
+from microrad.loop import fine_pointing
 from microrad.mission import presets
 from microrad.report import identification_figures
+from microrad.study import story as study
 from shipped import whole_drawn, whole_study
 
 ROOT = Path(__file__).parent.parent

@@ -4,24 +4,24 @@ import re
 import shlex
 import tomllib
 from importlib import import_module, util
-from itertools import pairwise
 from pathlib import Path
 
 import pytest
 import typer
 
-from microrad import cli, report, study
+from microrad import cli, report
 from microrad.core import machine
 from microrad.mission import toml as document
 from microrad.mission.file import load_mission
 from microrad.report import compared, interactive_style, page, results, tolerances
 from microrad.studio import address, guard, jobs_process, reading, server, uploads, workshop
+from microrad.study import story as study
 from shipped import DEFAULT
 
 ROOT = Path(__file__).parent.parent
 CONTRIBUTING = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
 REPORT, STUDIO = ((ROOT / "docs" / f"{name}.md").read_text(encoding="utf-8") for name in ("report", "studio"))
-NAMED = r"`((?:src|tests|benchmarks|docs|studio|report|link|control|identify|disturbance)/[\w/.*-]+)`"
+NAMED = r"`((?:src|tests|benchmarks|docs|studio|report|link|loop|lab|mirror|mission|core)/[\w/.*-]+)`"
 
 
 def told(text, *sentences):
@@ -110,19 +110,11 @@ def contracts():
     return tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["importlinter"]["contracts"]
 
 
-def test_the_table_of_floors_names_each_module_in_the_order_of_the_contract():
-    rows = re.findall(r"(?m)^\| (\d) \| (.*?) \|", CONTRIBUTING)
-    assert [int(number) for number, _ in rows] == [*range(8, 0, -1)]
-    layers = [layer.split(" | ") for layer in contracts()[0]["layers"]]
-    layer = {name: place for place, names in enumerate(layers) for name in names if name != "__main__"}
-    named = [re.findall(r"`(\w+)`", cell) for _, cell in rows]
-    assert {name for names in named for name in names} == set(layer)
-    for upper, lower in pairwise(named):
-        assert max(layer[name] for name in upper) < min(layer[name] for name in lower), (upper, lower)
-    for chain in (part for _, cell in rows for part in cell.split(";")):
-        steps = [[layer[name] for name in re.findall(r"`(\w+)`", step)] for step in chain.split("→")]
-        for below, above in pairwise(steps):
-            assert min(below) > max(above), chain
+def test_the_table_of_rooms_is_the_contract():
+    rows = re.findall(r"(?m)^\| `(\w+)` \|", CONTRIBUTING)
+    assert ["__main__", *rows] == contracts()[0]["layers"]
+    packages = {path.parent.name for path in (ROOT / "src" / "microrad").glob("*/__init__.py")}
+    assert packages == set(rows)
 
 
 def test_each_heavy_library_has_the_door_that_is_named():

@@ -12,8 +12,6 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 import designs
-from microrad import control, disturbance, mirror
-from microrad.control import AxisController, Drive, Timing
 from microrad.core import kernels, lti
 from microrad.export import choice, flight
 from microrad.export.modes import minimal
@@ -21,11 +19,14 @@ from microrad.export.records import ExportError, Origin, Signal
 from microrad.export.rounding import RoundingBound, rounding_bound
 from microrad.export.sections import sections
 from microrad.export.templating import comment, real, render, table, terms
-from microrad.fine_loop import loop as fine
-from microrad.fine_loop.loop import PointingLoop, ReferenceFilter, with_inverse
-from microrad.hysteresis import NO_CREEP, BoucWen, Creep, Play
+from microrad.loop import control, disturbance
+from microrad.loop.control import AxisController, Drive, Timing
+from microrad.loop.fine_loop import loop as fine
+from microrad.loop.fine_loop.loop import PointingLoop, ReferenceFilter, with_inverse
+from microrad.loop.sensor import OpticalSensor
+from microrad.mirror import model as mirror
+from microrad.mirror.hysteresis import NO_CREEP, BoucWen, Creep, Play
 from microrad.mission.file import load_mission
-from microrad.sensor import OpticalSensor
 from shipped import SHIPPED, without_fine_pointing
 from waiting import HANG_S
 

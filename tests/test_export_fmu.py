@@ -20,13 +20,16 @@ from fmpy.validation import validate_fmu
 from packaging.requirements import Requirement
 
 import designs
-from microrad import control, hysteresis, mirror, simulate
 from microrad.core import kernels, lti
 from microrad.export import choice, fmi_description, fmu
 from microrad.export.build import compiler
 from microrad.export.records import ExportError, Origin, PlantUnit, Signal
-from microrad.fine_loop import ensemble
-from microrad.fine_loop.loop import LoopController, PointingLoop
+from microrad.loop import control
+from microrad.loop import sine_run as simulate
+from microrad.loop.fine_loop import ensemble
+from microrad.loop.fine_loop.loop import LoopController, PointingLoop
+from microrad.mirror import hysteresis
+from microrad.mirror import model as mirror
 
 VERSIONS = ("2.0", "3.0")
 AGREEMENT = 1e-9

@@ -12,15 +12,17 @@ import pytest
 from scipy.io import loadmat, savemat
 
 import designs
-from microrad import control, mirror, simulate
-from microrad.control.analysis import loop_response
 from microrad.core import lti
 from microrad.export import choice, matrices
 from microrad.export.matrices import LinearModel, Port
 from microrad.export.matrices_polynomials import polynomials
 from microrad.export.matrices_structure import without_copies
 from microrad.export.records import ExportError, Origin
-from microrad.fine_loop.design import design_plant
+from microrad.loop import control
+from microrad.loop import sine_run as simulate
+from microrad.loop.control.analysis import loop_response
+from microrad.loop.fine_loop.design import design_plant
+from microrad.mirror import model as mirror
 from microrad.mission.file import load_mission
 from shipped import SHIPPED
 

@@ -15,9 +15,12 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from microrad import acquisition, disturbance, link, link_study, pointing, sensor
-from microrad.geometry import Geometry, line_of_sight_matrix
+from microrad import link
+from microrad.link import acquisition, pointing
+from microrad.link import study as link_study
 from microrad.link.receivers import PpmCounting
+from microrad.loop import disturbance, sensor
+from microrad.mirror.geometry import Geometry, line_of_sight_matrix
 from microrad.mission.file import load_mission
 from shipped import SHIPPED
 

@@ -11,13 +11,13 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.linalg import expm, solve_discrete_lyapunov
 from scipy.stats import kstest
 
-from microrad import control, disturbance, mirror
-from microrad.control import AxisController, Drive, Timing
 from microrad.core import kernels, lti
-from microrad.disturbance import Disturbance, Reference
-from microrad.fine_loop import ensemble, linear
-from microrad.fine_loop import loop as fine
-from microrad.fine_loop.design import (
+from microrad.loop import control, disturbance
+from microrad.loop.control import AxisController, Drive, Timing
+from microrad.loop.disturbance import Disturbance, Reference
+from microrad.loop.fine_loop import ensemble, linear
+from microrad.loop.fine_loop import loop as fine
+from microrad.loop.fine_loop.design import (
     LINE_DAMPING,
     behind_filter,
     close_axis,
@@ -25,12 +25,13 @@ from microrad.fine_loop.design import (
     narrow_band,
     residual_spectrum,
 )
-from microrad.fine_loop.ensemble import Span
-from microrad.fine_loop.loop import LoopController, PointingLoop
-from microrad.geometry import Geometry, line_of_sight_matrix
-from microrad.hysteresis import BoucWen, Play
+from microrad.loop.fine_loop.ensemble import Span
+from microrad.loop.fine_loop.loop import LoopController, PointingLoop
+from microrad.loop.sensor import OpticalSensor, StrainGauge
+from microrad.mirror import model as mirror
+from microrad.mirror.geometry import Geometry, line_of_sight_matrix
+from microrad.mirror.hysteresis import BoucWen, Play
 from microrad.mission.file import load_mission
-from microrad.sensor import OpticalSensor, StrainGauge
 from shipped import SHIPPED
 
 URAD = 1e-6

@@ -8,17 +8,18 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.signal import StateSpace, lsim
 
-from microrad import control, disturbance, mirror
-from microrad.control import AxisController, Drive, Inverse, Timing
 from microrad.core import kernels, lti
-from microrad.disturbance import Reference
-from microrad.fine_loop import ensemble, linear
-from microrad.fine_loop import loop as fine
-from microrad.fine_loop.ensemble import Span
-from microrad.fine_loop.loop import PointingLoop, ReferenceFilter, with_inverse
-from microrad.geometry import Geometry, line_of_sight_matrix
-from microrad.hysteresis import NO_CREEP, BoucWen, Creep, Play, slow_gain
-from microrad.sensor import OpticalSensor
+from microrad.loop import control, disturbance
+from microrad.loop.control import AxisController, Drive, Inverse, Timing
+from microrad.loop.disturbance import Reference
+from microrad.loop.fine_loop import ensemble, linear
+from microrad.loop.fine_loop import loop as fine
+from microrad.loop.fine_loop.ensemble import Span
+from microrad.loop.fine_loop.loop import PointingLoop, ReferenceFilter, with_inverse
+from microrad.loop.sensor import OpticalSensor
+from microrad.mirror import model as mirror
+from microrad.mirror.geometry import Geometry, line_of_sight_matrix
+from microrad.mirror.hysteresis import NO_CREEP, BoucWen, Creep, Play, slow_gain
 
 URAD = 1e-6
 RATE_LIMIT_V_S = 3770.0

@@ -8,12 +8,15 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from microrad import control, fine_pointing, hysteresis, mirror, mirror_spread
-from microrad.fine_loop import ensemble
-from microrad.fine_loop.design import design_plant
-from microrad.fine_loop.linear import close, stationary
-from microrad.fine_loop.loop import assemble
-from microrad.fine_pointing import designs, parts, results, scenario
+from microrad.loop import control, fine_pointing
+from microrad.loop.fine_loop import ensemble
+from microrad.loop.fine_loop.design import design_plant
+from microrad.loop.fine_loop.linear import close, stationary
+from microrad.loop.fine_loop.loop import assemble
+from microrad.loop.fine_pointing import designs, parts, results, scenario
+from microrad.mirror import hysteresis
+from microrad.mirror import model as mirror
+from microrad.mirror import spread as mirror_spread
 from microrad.mission.file import load_mission
 from shipped import SHIPPED, whole_study
 from shipped import edited_file as edited_shipped

@@ -9,7 +9,8 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from microrad import disturbance, geometry, sensor
+from microrad.loop import disturbance, sensor
+from microrad.mirror import geometry
 from microrad.mission.file import MissionError, load_mission
 from microrad.mission.model import mission_schema
 from microrad.mission.tables import fine_pointing as fine_pointing_table

@@ -6,8 +6,8 @@ import math
 import numpy as np
 import pytest
 
-from microrad import geometry
-from microrad.geometry import Geometry, StrokeDemand, stroke_budget
+from microrad.mirror import geometry
+from microrad.mirror.geometry import Geometry, StrokeDemand, stroke_budget
 
 small_tilt_rad = 1e-5
 second_order = 1e-9  # a few times the square of that tilt

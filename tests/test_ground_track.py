@@ -6,10 +6,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from microrad import day_study, link_study, orbit
-from microrad.day_study import NOTHING, Numbers, Swing
-from microrad.day_study.ground_track import LONGEST_S, STEP_S, ground_track
+from microrad import orbit
+from microrad.link import study as link_study
 from microrad.orbit import EARTH_RADIUS_M, GEOSTATIONARY_RADIUS_M
+from microrad.orbit import day as day_study
+from microrad.orbit.day import NOTHING, Numbers, Swing
+from microrad.orbit.day.ground_track import LONGEST_S, STEP_S, ground_track
 from microrad.report import day_plots
 from test_day_tables import ALONE, EPOCH, KEPLERIAN, day_file, ephemeris
 

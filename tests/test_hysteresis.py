@@ -8,9 +8,12 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from microrad import control, hysteresis, mirror, simulate
 from microrad.core import kernels
-from microrad.hysteresis import NO_CREEP, BoucWen, Creep, Play
+from microrad.loop import control
+from microrad.loop import sine_run as simulate
+from microrad.mirror import hysteresis
+from microrad.mirror import model as mirror
+from microrad.mirror.hysteresis import NO_CREEP, BoucWen, Creep, Play
 
 PRINTED = BoucWen(0.089e-3, -2.96e-7, -0.048e-3, 4.7e-4, 38.421, 34.635, 3770.0, 6.0)  # section 3.3 of the paper
 ADMISSIBLE = replace(PRINTED, epsilon_rad_v=-0.022e-3, alpha_1_v=2.4, beta_1_v=0.6)

@@ -15,8 +15,8 @@ from scipy.signal import cont2discrete, lfilter
 
 from microrad import report
 from microrad.core.kernels import play_response
-from microrad.identify import Refused, identify, mirror_file_text
-from microrad.recording import Finding, recording_from_arrays
+from microrad.lab.identify import Refused, identify, mirror_file_text
+from microrad.lab.recording import Finding, recording_from_arrays
 from microrad.report import identification_figures as figures
 from microrad.report import identification_words as words
 from microrad.report.figures import MOST_POINTS

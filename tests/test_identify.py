@@ -13,7 +13,7 @@ import scipy.optimize
 from scipy.integrate import solve_ivp
 
 from microrad.core.kernels import bouc_wen_response, play_response
-from microrad.identify import (
+from microrad.lab.identify import (
     STATIC,
     BoucWenFit,
     IdentificationError,
@@ -24,11 +24,11 @@ from microrad.identify import (
     mirror_file_text,
     predict,
 )
-from microrad.identify import bouc_wen as bouc_wen_fit
-from microrad.identify.choice import _best
-from microrad.identify.records import colour_inflation, fastest_rate, prepare, transient
+from microrad.lab.identify import bouc_wen as bouc_wen_fit
+from microrad.lab.identify.choice import _best
+from microrad.lab.identify.records import colour_inflation, fastest_rate, prepare, transient
+from microrad.lab.recording import read_recording, recording_from_arrays
 from microrad.mission.file import load_mirror
-from microrad.recording import read_recording, recording_from_arrays
 
 RATE_HZ = 50_000.0
 D1, D2, EPSILON, DELTA, ALPHA, BETA = PAPER = (0.089e-3, -2.96e-7, -0.048e-3, 0.00047, 38.421, 34.635)

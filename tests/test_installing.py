@@ -9,7 +9,7 @@ import pytest
 from packaging.utils import canonicalize_name
 
 import licences
-from microrad import doctor
+from microrad.cli import doctor
 from microrad.core.installing import advice
 
 ROOT = Path(__file__).parent.parent

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from microrad import bench, mirror
-from microrad.identify import (
+from microrad.lab import bench
+from microrad.lab.identify import (
     FORMS,
     IdentificationError,
     Units,
@@ -20,12 +20,13 @@ from microrad.identify import (
     joint,
     predict,
 )
-from microrad.identify.joint import thinned, time_constants
-from microrad.identify.plant_fit import fit_plant, runs
-from microrad.identify.plant_structures import LinearPoles, Roots, poles_of, propagated
-from microrad.identify.prandtl_ishlinskii import threshold_grid
-from microrad.identify.records import prepare
-from microrad.recording import read_recording
+from microrad.lab.identify.joint import thinned, time_constants
+from microrad.lab.identify.plant_fit import fit_plant, runs
+from microrad.lab.identify.plant_structures import LinearPoles, Roots, poles_of, propagated
+from microrad.lab.identify.prandtl_ishlinskii import threshold_grid
+from microrad.lab.identify.records import prepare
+from microrad.lab.recording import read_recording
+from microrad.mirror import model as mirror
 from truths import behind_resonance, bouc_wen, creep, plays, recorded, small_multisine, two_sines
 
 UNITS = Units()
@@ -134,7 +135,7 @@ def test_phase_lag_is_not_counted_twice():
 
 
 def fit_like(thresholds, weights):
-    from microrad.hysteresis import Play
+    from microrad.mirror.hysteresis import Play
 
     return Play(tuple(thresholds), tuple(weights))
 

@@ -4,12 +4,12 @@ import re
 
 import pytest
 
-from microrad import study
-from microrad.control import PI
 from microrad.core.kept import NOTHING, Kept
-from microrad.fine_pointing import designs
+from microrad.loop.control import PI
+from microrad.loop.fine_pointing import designs
 from microrad.mission.file import MissionError, load_mission
 from microrad.report import words
+from microrad.study import story as study
 from shipped import SHIPPED
 
 SHORTER = {"runs": "4", "duration": '"0.5 s"', "settle": '"0.1 s"'}  # of the fine-pointing loop

@@ -8,10 +8,9 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 import truths
-from microrad import bench, mirror
 from microrad.core import kernels
-from microrad.hysteresis import Play
-from microrad.identify import (
+from microrad.lab import bench
+from microrad.lab.identify import (
     FORMS,
     MODELS,
     STATIC,
@@ -26,8 +25,10 @@ from microrad.identify import (
     mirror_file_text,
     predict,
 )
-from microrad.identify.choice import _best, _polished
-from microrad.identify.plant_structures import LinearPoles, Roots, propagated
+from microrad.lab.identify.choice import _best, _polished
+from microrad.lab.identify.plant_structures import LinearPoles, Roots, propagated
+from microrad.mirror import model as mirror
+from microrad.mirror.hysteresis import Play
 from microrad.mission.file import load_mirror
 from truths import behind_resonance, bouc_wen, philox, plays, recorded, small_multisine
 

@@ -14,11 +14,11 @@ import pytest
 from scipy.io import loadmat, savemat
 from scipy.sparse import csc_array
 
-from microrad import mirror
 from microrad.core import lti
 from microrad.export import linear_import, matrices
 from microrad.export.linear_import import Given, import_control, import_mat
 from microrad.export.records import ExportError
+from microrad.mirror import model as mirror
 from microrad.mission.file import load_mirror, load_mission
 from shipped import SHIPPED
 

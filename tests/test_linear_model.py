@@ -9,17 +9,17 @@ import pytest
 from scipy.signal import lfilter
 
 from microrad.core import lti
-from microrad.identify import structure
-from microrad.identify.amplitude import amplitude_dependence
-from microrad.identify.linear import fit_linear, fit_percent, output_error
-from microrad.identify.linear_uncertainty import at, parameter_covariance, transmission_zeros
-from microrad.identify.modal import ModalModel, order_modes, simulate, simulate_periodic
-from microrad.identify.polish import FrequencyEquations, TimeEquations, normal_equations, pack, polish, unpack
-from microrad.identify.records import IdentificationError
-from microrad.identify.response import response_from_periods
-from microrad.identify.structure import fit_order, reduced
-from microrad.identify.vector_fitting import vector_fit
-from microrad.recording import Recording, multisine_recordings
+from microrad.lab.identify import structure
+from microrad.lab.identify.amplitude import amplitude_dependence
+from microrad.lab.identify.linear import fit_linear, fit_percent, output_error
+from microrad.lab.identify.linear_uncertainty import at, parameter_covariance, transmission_zeros
+from microrad.lab.identify.modal import ModalModel, order_modes, simulate, simulate_periodic
+from microrad.lab.identify.polish import FrequencyEquations, TimeEquations, normal_equations, pack, polish, unpack
+from microrad.lab.identify.records import IdentificationError
+from microrad.lab.identify.response import response_from_periods
+from microrad.lab.identify.structure import fit_order, reduced
+from microrad.lab.identify.vector_fitting import vector_fit
+from microrad.lab.recording import Recording, multisine_recordings
 
 EQ2 = ((1.979e11, 7.051e13, 2.973e13), (1, 2.15e4, 3.737e8, 2.615e12, 8.489e14, 1.829e14))
 POINTS_HZ = np.geomspace(1, 5000, 300)

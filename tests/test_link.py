@@ -11,8 +11,10 @@ from scipy.integrate import quad
 from scipy.special import erfc
 
 from link_files import link_file
-from microrad import link, link_study, requirement
+from microrad import link
 from microrad.core.budget import total_db
+from microrad.link import requirement
+from microrad.link import study as link_study
 from microrad.mission.file import load_mission
 from microrad.mission.tables.link import Channel
 from microrad.report import budget_views

@@ -10,9 +10,10 @@ from scipy.integrate import quad
 from scipy.special import j0
 
 from link_files import GAUSSIAN, PATTERN, RECEIVERS, SKY, link_file, received_with
-from microrad import link, link_study
+from microrad import link
 from microrad.core.units import PLANCK_J_S, SPEED_OF_LIGHT_M_S
 from microrad.link import receivers
+from microrad.link import study as link_study
 
 WAVELENGTH, RATE = 1.55e-6, 300e6
 PHOTON_J = PLANCK_J_S * SPEED_OF_LIGHT_M_S / WAVELENGTH

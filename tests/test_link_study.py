@@ -9,9 +9,13 @@ from numpy.testing import assert_allclose
 from scipy.stats import ncx2, norm
 
 from link_files import PATTERN, RECEIVERS, link_file, received_with
-from microrad import acquisition, link, link_acquisition, link_study, sensor
+from microrad import link
+from microrad.link import acquisition
+from microrad.link import partner_search as link_acquisition
+from microrad.link import study as link_study
+from microrad.link.radial_error import Jitter
+from microrad.loop import sensor
 from microrad.mission.file import LinkFile
-from microrad.radial_error import Jitter
 from microrad.report import budget_views, links
 from microrad.report.quantities import quantity
 from shipped import edited_file

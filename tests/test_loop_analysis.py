@@ -12,9 +12,9 @@ from numpy.testing import assert_allclose
 from scipy.linalg import solve_discrete_lyapunov
 
 from design_plants import axis_plant
-from microrad.control import analysis
-from microrad.control.problem import GAUGE, OPTICAL, RESIDUAL, AxisController, DesignPlant
 from microrad.core import lti
+from microrad.loop.control import analysis
+from microrad.loop.control.problem import GAUGE, OPTICAL, RESIDUAL, AxisController, DesignPlant
 
 PERIOD = 2e-4
 near = partial(pytest.approx, abs=0.0, rel=1e-6)  # variances are far below the default of 1e-12

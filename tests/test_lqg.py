@@ -10,10 +10,10 @@ from numpy.testing import assert_allclose
 from scipy.linalg import block_diag, solve_discrete_are, solve_discrete_lyapunov
 
 from design_plants import axis_plant
-from microrad.control import analysis, lqg
-from microrad.control.lqg import LQG, Weights
-from microrad.control.problem import GAUGE, OPTICAL, RESIDUAL, AxisController
 from microrad.core import lti
+from microrad.loop.control import analysis, lqg
+from microrad.loop.control.lqg import LQG, Weights
+from microrad.loop.control.problem import GAUGE, OPTICAL, RESIDUAL, AxisController
 
 PERIOD = 2e-4
 near = partial(pytest.approx, abs=0.0, rel=1e-6)  # variances are far below the default of 1e-12

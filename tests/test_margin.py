@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from link_files import PATTERN, data_with, link_file, written
-from microrad import link, link_study
+from microrad import link
+from microrad.link import study as link_study
 from microrad.mission.file import load_link
 from microrad.report.quantities import quantity, signed
 from shipped import SHIPPED, without_fine_pointing

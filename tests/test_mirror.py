@@ -10,10 +10,14 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.signal import lsim
 
 import oracles
-from microrad import control, hysteresis, mirror, mirror_summary, simulate
 from microrad.core import kernels, lti
-from microrad.hysteresis import BoucWen, Creep, Play
-from microrad.mirror import Mirror
+from microrad.loop import control
+from microrad.loop import sine_run as simulate
+from microrad.mirror import hysteresis
+from microrad.mirror import model as mirror
+from microrad.mirror import summary as mirror_summary
+from microrad.mirror.hysteresis import BoucWen, Creep, Play
+from microrad.mirror.model import Mirror
 from microrad.mission.file import load_mission
 from shipped import SHIPPED, edited
 

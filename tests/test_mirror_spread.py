@@ -11,16 +11,16 @@ from numpy.testing import assert_allclose
 from scipy.stats import truncnorm
 
 import truths
-from microrad import mirror_spread
 from microrad.core.lti import frequency_response
-from microrad.hysteresis import NO_CREEP, BoucWen, Creep, Play, slow_gain
-from microrad.identify import FORMS, Units, fit_joint, identify, mirror_file_text
-from microrad.identify.bouc_wen import PARAMETERS
-from microrad.identify.joint import JointFit
-from microrad.identify.plant_fit import PlantFit
-from microrad.identify.plant_structures import LinearPoles, Roots, one_axis
-from microrad.identify.prandtl_ishlinskii import threshold_grid
-from microrad.mirror import hysteresis_model, linear_part
+from microrad.lab.identify import FORMS, Units, fit_joint, identify, mirror_file_text
+from microrad.lab.identify.bouc_wen import PARAMETERS
+from microrad.lab.identify.joint import JointFit
+from microrad.lab.identify.plant_fit import PlantFit
+from microrad.lab.identify.plant_structures import LinearPoles, Roots, one_axis
+from microrad.lab.identify.prandtl_ishlinskii import threshold_grid
+from microrad.mirror import spread as mirror_spread
+from microrad.mirror.hysteresis import NO_CREEP, BoucWen, Creep, Play, slow_gain
+from microrad.mirror.model import hysteresis_model, linear_part
 from microrad.mission.file import MissionError, load_mirror
 from microrad.mission.tables.mirror import place
 from truths import philox

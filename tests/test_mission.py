@@ -16,8 +16,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from microrad import mirror
 from microrad.core import lti
+from microrad.mirror import model as mirror
 from microrad.mission.file import MissionError, assumptions, load_mirror, load_mission
 from microrad.mission.model import Mission, Source, mission_schema, source_text
 from microrad.mission.tables.link import half_angle_rad

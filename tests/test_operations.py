@@ -12,8 +12,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from microrad import operations
-from microrad.operations import (
+from microrad.orbit import operations
+from microrad.orbit.operations import (
     COLUMNS,
     Latency,
     OperationsError,

@@ -10,7 +10,7 @@ from shipped import SHIPPED
 
 _CASE = """
 import numpy as np
-from microrad import fine_pointing, load_mission
+from microrad import load_mission; from microrad.loop import fine_pointing
 
 found = fine_pointing.run_one(load_mission({path!r}), {name!r})
 print(found.design.tuned.values)

@@ -6,8 +6,13 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from microrad import control, hysteresis, mirror, paper, simulate, tracking
+from microrad.loop import control
+from microrad.loop import paper_cases as tracking
+from microrad.loop import sine_run as simulate
+from microrad.mirror import hysteresis
+from microrad.mirror import model as mirror
 from microrad.mission.file import load_mission
+from microrad.study import paper
 from shipped import SHIPPED, edited
 
 ACCURATE = "PID + inverse stays within 10 µrad at its peaks"

@@ -10,10 +10,15 @@ from scipy.integrate import quad
 from scipy.special import ive
 
 from link_files import PATTERN, RECEIVERS, link_file, received_with
-from microrad import link, link_performance, performance, pointing, simulate, tracking
-from microrad.fine_loop.ensemble import bin_edges_rad
-from microrad.fine_pointing import FinePointingStudy, Residual, Verified
-from microrad.link_performance import Spread
+from microrad import link
+from microrad.link import pointing
+from microrad.link import under_jitter as link_performance
+from microrad.link.under_jitter import Spread
+from microrad.loop import paper_cases as tracking
+from microrad.loop import sine_run as simulate
+from microrad.loop.fine_loop.ensemble import bin_edges_rad
+from microrad.loop.fine_pointing import FinePointingStudy, Residual, Verified
+from microrad.study import pointing_cost as performance
 from shipped import edited
 
 URAD = 1e-6

@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from microrad import mirror
-from microrad.identify import IdentificationError
-from microrad.identify.plant_fit import (
+from microrad.lab.identify import IdentificationError
+from microrad.lab.identify.plant_fit import (
     Parameter,
     Problem,
     Run,
@@ -21,8 +20,9 @@ from microrad.identify.plant_fit import (
     simulate,
     upsampled,
 )
-from microrad.identify.plant_structures import hysteretic_oscillator
-from microrad.recording import read_recording, recording_from_arrays
+from microrad.lab.identify.plant_structures import hysteretic_oscillator
+from microrad.lab.recording import read_recording, recording_from_arrays
+from microrad.mirror import model as mirror
 
 DATA = Path(os.environ.get("MICRORAD_DATA") or Path(__file__).parents[2] / "shared" / "data")
 BENCHMARK = DATA / "boucwen" / "train.h5"

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from microrad import pointing
 from microrad.core.budget import Line, root_sum_square, total_db
+from microrad.link import pointing
 from microrad.mission.file import load_mission
 from microrad.mission.model import LinkMission
 from microrad.mission.tables.pointing import PointAhead, PointingLine

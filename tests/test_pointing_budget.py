@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import ncx2
 
-from microrad import pointing
-from microrad.pointing import ErrorTerm, Jitter, StatedError, error_term, radial_cdf
+from microrad.link import pointing
+from microrad.link.pointing import ErrorTerm, Jitter, StatedError, error_term, radial_cdf
 
 URAD = 1e-6
 ARCSEC = math.radians(1.0) / 3600.0

@@ -11,9 +11,9 @@ from scipy.special import erfc, gammainc
 from scipy.stats import norm
 from scipy.stats import t as student
 
-from microrad.pointing import fading as pf
-from microrad.pointing import statistics as ps
-from microrad.radial_error import Jitter
+from microrad.link.pointing import fading as pf
+from microrad.link.pointing import statistics as ps
+from microrad.link.radial_error import Jitter
 
 URAD = 1e-6
 THETA = 10.0 * URAD

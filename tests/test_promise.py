@@ -5,11 +5,11 @@ import math
 
 import pytest
 
-from microrad import fine_pointing
 from microrad.export import choice, write
 from microrad.export.records import ExportError
-from microrad.fine_loop import ensemble
-from microrad.fine_pointing import designs
+from microrad.loop import fine_pointing
+from microrad.loop.fine_loop import ensemble
+from microrad.loop.fine_pointing import designs
 from microrad.mission.file import load_mission
 from shipped import SHIPPED
 

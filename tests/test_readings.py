@@ -5,8 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from microrad import link, readings, report, tracking
+from microrad import link, report
+from microrad.loop import paper_cases as tracking
 from microrad.report import requirement_views, words
+from microrad.study import alternatives as readings
 from shipped import edited, plain_study
 
 

@@ -5,7 +5,7 @@ import hashlib
 import numpy as np
 import pytest
 
-from microrad.recording import MIN_SAMPLES, RecordingError, files, read_recording, recording_from_arrays
+from microrad.lab.recording import MIN_SAMPLES, RecordingError, files, read_recording, recording_from_arrays
 
 N = 400
 TIME = np.arange(N) / 100.0

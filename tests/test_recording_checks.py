@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from microrad.core.kernels import play_response
-from microrad.recording import (
+from microrad.lab.recording import (
     ACCEPTABLE,
     RecordingError,
     levels,

@@ -17,8 +17,8 @@ from nptdms.log import log_manager
 from scipy.io import savemat
 from scipy.sparse import csc_array
 
-from microrad.recording import RecordingError, multisine_recordings, read_recording
-from microrad.recording import lvm as lvm_module
+from microrad.lab.recording import RecordingError, multisine_recordings, read_recording
+from microrad.lab.recording import lvm as lvm_module
 
 N, RATE_HZ = 1000, 2000.0
 TIME_S = np.arange(N) / RATE_HZ
@@ -376,14 +376,14 @@ def test_damaged_matlab_names_the_variable(tmp_path):
     ],
 )
 def test_matlab_variables_that_are_no_channel(tmp_path, monkeypatch, value, words):
-    monkeypatch.setattr("microrad.recording.arrays._MOST_COLUMNS", 100)
+    monkeypatch.setattr("microrad.lab.recording.arrays._MOST_COLUMNS", 100)
     path = tmp_path / "a.mat"
     savemat(path, {"x": value, "output": OUTPUT}, do_compression=True)
     assert words.replace("10000", "100") in refusal(path, "x", "output", RATE_HZ)
 
 
 def test_a_matlab_file_that_unpacks_to_too_much(tmp_path, monkeypatch):
-    monkeypatch.setattr("microrad.recording.files._UNPACKED_BYTES", 100_000)
+    monkeypatch.setattr("microrad.lab.recording.files._UNPACKED_BYTES", 100_000)
     path = tmp_path / "a.mat"
     savemat(path, {"drive": DRIVE, "output": np.zeros(100_000)}, do_compression=True)
     message = refusal(path, "drive", "output", RATE_HZ)
@@ -470,8 +470,8 @@ def test_numpy_arrays_that_are_no_channel(tmp_path, monkeypatch):
     )
     check(read_recording(path, "drive", "output", RATE_HZ))
     assert "'table' holds records of t, y; save each of these" in refusal(path, "drive", "table", RATE_HZ)
-    monkeypatch.setattr("microrad.recording.files._UNPACKED_BYTES", 100_000)
-    monkeypatch.setattr("microrad.recording.files._UNPACKED_TIMES", 1)
+    monkeypatch.setattr("microrad.lab.recording.files._UNPACKED_BYTES", 100_000)
+    monkeypatch.setattr("microrad.lab.recording.files._UNPACKED_TIMES", 1)
     message = refusal(path, "drive", "big", RATE_HZ)
     assert "'big' states 4e+04 samples, 0.32 MB in a file of 0.0" in message
     assert "at most 0.1 MB are unpacked from that; cut out the part that you need" in message

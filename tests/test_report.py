@@ -14,10 +14,9 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from microrad import report, study
+from microrad import report
 from microrad.core import folder
 from microrad.mission import file as missionfile
-from microrad.performance import Cost
 from microrad.report import (
     chain,
     drawings,
@@ -30,6 +29,8 @@ from microrad.report import (
     requirements,
     words,
 )
+from microrad.study import story as study
+from microrad.study.pointing_cost import Cost
 from report_pages import assert_sound
 from shipped import SHIPPED, edited_file, plain_drawn, plain_study, write_like_plain
 

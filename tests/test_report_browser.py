@@ -9,7 +9,7 @@ import test_identification_report as identified
 import test_report_campaign as campaigns
 import test_report_fine_pointing as fine_loops
 from browser import violations
-from microrad.identify import identify
+from microrad.lab.identify import identify
 from microrad.report import budget_views, campaign_page, day_views
 from shipped import plain_study, write_like_plain
 from waiting import HANG_MS

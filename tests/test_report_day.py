@@ -13,13 +13,17 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from microrad import contact_run, control, day_study, fine_pointing, report, study
-from microrad.fine_loop.loop import assemble
-from microrad.fine_pointing import designs
+from microrad import report
+from microrad.loop import control, fine_pointing
+from microrad.loop.fine_loop.loop import assemble
+from microrad.loop.fine_pointing import designs
 from microrad.mission.file import load_mission
-from microrad.operations import OperationsError
+from microrad.orbit import day as day_study
+from microrad.orbit.operations import OperationsError
 from microrad.report import contact_run_words, day_plots, day_words, results
 from microrad.report.page import Drawn
+from microrad.study import contact_run
+from microrad.study import story as study
 from shipped import SHIPPED, edited_file, plain_study, write_like_plain
 
 FIGURES = ["day-timeline", "along-contact", "data-volume", "latency", "world-map", "assumptions"]

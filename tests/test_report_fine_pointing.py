@@ -14,18 +14,21 @@ import pytest
 import xarray as xr
 from numpy.testing import assert_allclose, assert_array_equal
 
-from microrad import control, fine_pointing, performance, report, study
-from microrad.control.tuning import MARGIN
-from microrad.fine_loop.design import design_plant, residual_spectrum
-from microrad.fine_loop.ensemble import bin_edges_rad
-from microrad.fine_loop.linear import close, stationary
-from microrad.fine_loop.loop import ReferenceFilter, assemble, with_inverse
-from microrad.fine_pointing import Difference, ErrorBudget, FinePointingStudy, Part, Residual, Sine, Verified
+from microrad import report
+from microrad.loop import control, fine_pointing
+from microrad.loop.control.tuning import MARGIN
+from microrad.loop.fine_loop.design import design_plant, residual_spectrum
+from microrad.loop.fine_loop.ensemble import bin_edges_rad
+from microrad.loop.fine_loop.linear import close, stationary
+from microrad.loop.fine_loop.loop import ReferenceFilter, assemble, with_inverse
+from microrad.loop.fine_pointing import Difference, ErrorBudget, FinePointingStudy, Part, Residual, Sine, Verified
 from microrad.report import chain, requirement_views, requirements, results
 from microrad.report import fine_pointing as section
 from microrad.report import fine_pointing_figures as figures
 from microrad.report import fine_pointing_words as words
 from microrad.report import page as report_page
+from microrad.study import pointing_cost as performance
+from microrad.study import story as study
 from shipped import plain_study, write_like_plain
 
 HEADING = "Fine pointing under vibration and noise"

@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 
 from link_files import RECEIVERS, data_with, link_file, received_with, written
-from microrad import link_study
 from microrad.link import Swing
+from microrad.link import study as link_study
 from microrad.mission.file import load_link
-from microrad.performance import FINE, NO_HYSTERESIS, Cost, LinkPerformance
 from microrad.report import budget_views, link_figures, links
 from microrad.report.quantities import apart, quantity
+from microrad.study.pointing_cost import FINE, NO_HYSTERESIS, Cost, LinkPerformance
 from report_pages import without_scripts
 
 FEW = {"acquisition.runs": 100}

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from microrad.core import lti
-from microrad.identify.modal import order_modes, simulate
-from microrad.identify.records import IdentificationError
-from microrad.identify.response import response_from_periods, response_from_records
-from microrad.recording import Recording
+from microrad.lab.identify.modal import order_modes, simulate
+from microrad.lab.identify.records import IdentificationError
+from microrad.lab.identify.response import response_from_periods, response_from_records
+from microrad.lab.recording import Recording
 
 RATE_HZ = 10_000.0
 PERIOD = 512

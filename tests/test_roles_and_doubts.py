@@ -9,11 +9,11 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.signal import lfilter
 
 import truths
-from microrad.identify import doubts, identify
-from microrad.identify.doubts import ResidualTest, residual_test, residual_warnings
-from microrad.identify.predictions import Prediction, Score
-from microrad.identify.roles import is_broadband, roles, whole_periods
-from microrad.recording import Recording, recording_from_arrays
+from microrad.lab.identify import doubts, identify
+from microrad.lab.identify.doubts import ResidualTest, residual_test, residual_warnings
+from microrad.lab.identify.predictions import Prediction, Score
+from microrad.lab.identify.roles import is_broadband, roles, whole_periods
+from microrad.lab.recording import Recording, recording_from_arrays
 from truths import philox
 
 TIME = np.arange(8000) / 2000.0
@@ -187,7 +187,7 @@ def test_scores_that_speak_against_a_model():
 def test_held_out_samples_beyond_the_fitted_drives_are_counted():
     record = recording(np.concatenate([np.linspace(0, 10, 100), [10.1, 10.3, -0.5], np.zeros(97)]))
     seen = Prediction(np.zeros(200), np.zeros(200), 0, 100, 0)
-    from microrad.identify import Units
+    from microrad.lab.identify import Units
 
     (text,) = doubts.held_out_warnings([record], Units(), (0.0, 10.0), [seen])
     assert text.startswith("2 held-out samples")  # 10.1 is within the margin of 2 %

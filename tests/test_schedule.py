@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from microrad.operations import (
+from microrad.orbit.operations import (
     OperationsError,
     Opportunities,
     Rules,

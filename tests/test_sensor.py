@@ -8,10 +8,10 @@ import pytest
 from scipy.integrate import quad
 from scipy.special import j1
 
-from microrad import sensor
 from microrad.core.budget import root_sum_square
 from microrad.core.units import parse_quantity
-from microrad.sensor import AirySpot, GaussianSpot, OpticalSensor, QuadCell, StrainGauge, optical_sensor
+from microrad.loop import sensor
+from microrad.loop.sensor import AirySpot, GaussianSpot, OpticalSensor, QuadCell, StrainGauge, optical_sensor
 
 electron_c = 1.602176634e-19
 CELL = QuadCell(

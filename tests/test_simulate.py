@@ -9,9 +9,13 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.integrate import solve_ivp
 
 import oracles
-from microrad import control, hysteresis, mirror, simulate, tracking
 from microrad.core import kernels, lti
-from microrad.hysteresis import BoucWen, Play
+from microrad.loop import control
+from microrad.loop import paper_cases as tracking
+from microrad.loop import sine_run as simulate
+from microrad.mirror import hysteresis
+from microrad.mirror import model as mirror
+from microrad.mirror.hysteresis import BoucWen, Play
 from microrad.mission.file import load_mission
 from shipped import SHIPPED, edited
 

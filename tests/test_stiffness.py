@@ -8,16 +8,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from microrad import mirror
 from microrad.core import kernels
-from microrad.hysteresis import Play
-from microrad.identify import fit_hysteretic_stiffness, fit_linear, output_error, predicted_error, stiffness
-from microrad.identify import stiffness_tangents as tangents
-from microrad.identify.records import IdentificationError
-from microrad.identify.stiffness import StiffnessOptions, simulate_hysteretic_stiffness
-from microrad.identify.stiffness_model import FIELDS, Numbers, balanced, delayed, scaled
-from microrad.mirror import Mirror
-from microrad.recording import Recording, multisine_recordings
+from microrad.lab.identify import fit_hysteretic_stiffness, fit_linear, output_error, predicted_error, stiffness
+from microrad.lab.identify import stiffness_tangents as tangents
+from microrad.lab.identify.records import IdentificationError
+from microrad.lab.identify.stiffness import StiffnessOptions, simulate_hysteretic_stiffness
+from microrad.lab.identify.stiffness_model import FIELDS, Numbers, balanced, delayed, scaled
+from microrad.lab.recording import Recording, multisine_recordings
+from microrad.mirror import model as mirror
+from microrad.mirror.hysteresis import Play
+from microrad.mirror.model import Mirror
 
 CUBESPEC = Path(os.environ.get("MICRORAD_DATA") or Path(__file__).parents[2] / "shared" / "data") / "cubespec"
 needs_cubespec = pytest.mark.skipif(not CUBESPEC.exists(), reason=f"real recording cubespec absent: {CUBESPEC}")

@@ -7,12 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from microrad import fine_pointing, tracking
 from microrad.core.kernels import bouc_wen_response
-from microrad.fine_loop import linear
-from microrad.identify import STATIC, identify
+from microrad.lab.identify import STATIC, identify
+from microrad.lab.recording import RecordingError, read_recording, recording_from_arrays
+from microrad.loop import fine_pointing
+from microrad.loop import paper_cases as tracking
+from microrad.loop.fine_loop import linear
 from microrad.mission.file import load_mission
-from microrad.recording import RecordingError, read_recording, recording_from_arrays
 from microrad.studio import control_model, control_view, live_fit, mirror_form, mirror_view
 from microrad.studio.control_model import PID, PID_INVERSE, WITH, WITHOUT
 from microrad.studio.draft import Draft

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from browser import until
-from microrad import bench
+from microrad.lab import bench
 from microrad.studio.live_fit import read_fits
 from microrad.studio.mirror_form import kept_form
 from test_cli import write_recording

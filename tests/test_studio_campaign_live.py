@@ -14,7 +14,7 @@ from microrad.campaign.interim import Interim
 from microrad.campaign.ledger import Ledger
 from microrad.campaign.records import CampaignError, Chunk, Failed
 from microrad.campaign.summary import summarise
-from microrad.fine_loop.ensemble import bin_edges_rad
+from microrad.loop.fine_loop.ensemble import bin_edges_rad
 from microrad.report import campaign_words
 from microrad.studio import campaign_live, campaign_view
 from microrad.studio.campaign_live import Live, LiveCampaigns

@@ -14,11 +14,12 @@ from pathlib import Path
 import pytest
 
 import microrad
-from microrad import cli, control, fine_pointing, report, study
+from microrad import cli, report
 from microrad.core.folder import FolderError
-from microrad.fine_pointing import designs
+from microrad.lab.recording import RecordingError, read_in, read_recording
+from microrad.loop import control, fine_pointing
+from microrad.loop.fine_pointing import designs
 from microrad.mission.toml import MissionError
-from microrad.recording import RecordingError, read_in, read_recording
 from microrad.report.page import Drawn
 from microrad.studio.commands import (
     Budget,
@@ -33,6 +34,7 @@ from microrad.studio.commands import (
     Run,
     command,
 )
+from microrad.study import story as study
 from shipped import SHIPPED, without_day, without_fine_pointing
 from small_campaign import campaign_file
 from test_cli import write_recording

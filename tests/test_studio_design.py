@@ -11,7 +11,9 @@ import numpy as np
 import pytest
 
 from link_files import RECEIVERS, data_with, link_file, received_with
-from microrad import day_study, link, link_study
+from microrad import link
+from microrad.link import study as link_study
+from microrad.orbit import day as day_study
 from microrad.report import day_plots, figures
 from microrad.studio import attempts, day_view, dials, link_view, plots, pointing_view
 from microrad.studio.draft import Draft

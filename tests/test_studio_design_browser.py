@@ -5,8 +5,9 @@ import json
 import pytest
 
 from browser import check_quiet, until
-from microrad import link, pointing
-from microrad.link_study import largest_rate
+from microrad import link
+from microrad.link import pointing
+from microrad.link.study import largest_rate
 from microrad.report.quantities import signed
 from microrad.studio import link_view
 from microrad.studio.dials import dial

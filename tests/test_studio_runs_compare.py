@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from microrad import link_study
+from microrad.link import study as link_study
 from microrad.mission.file import load_link
 from microrad.mission.presets import preset_text
 from microrad.studio import compare_view, runs_view

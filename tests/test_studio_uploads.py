@@ -23,7 +23,7 @@ import pytest
 from scipy.io import savemat
 
 import test_recording_formats as formats
-from microrad.recording import read_recording
+from microrad.lab.recording import read_recording
 from microrad.studio import parse_process, reading
 from microrad.studio.names import NameRefusedError, safe_name, within
 from microrad.studio.reading import Columns, ReadingError, ReadingLimits, list_channels, view

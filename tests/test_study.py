@@ -8,11 +8,14 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from microrad import fine_pointing, paper, simulate, study, verdict
-from microrad.mirror_summary import summarise, unknown_dynamics
+from microrad.loop import fine_pointing
+from microrad.loop import sine_run as simulate
+from microrad.mirror.summary import summarise, unknown_dynamics
 from microrad.mission.file import load_mission
 from microrad.report import links
 from microrad.report.fine_pointing_words import not_reliable
+from microrad.study import paper, verdict
+from microrad.study import story as study
 from shipped import SHIPPED, edited_file, whole_study
 
 

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from microrad.fine_loop.ensemble import bin_edges_rad
-from microrad.fine_pointing import Residual
+from microrad.loop.fine_loop.ensemble import bin_edges_rad
+from microrad.loop.fine_pointing import Residual
 from microrad.report import tails
 
 RUNS, SAMPLES, KEPT = 48, 1500, 0.9

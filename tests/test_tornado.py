@@ -7,7 +7,9 @@ from dataclasses import replace
 import pytest
 
 from link_files import GAUSSIAN, PATTERN, RECEIVERS, SKY, link_file, received_with
-from microrad import link, link_performance, link_study
+from microrad import link
+from microrad.link import study as link_study
+from microrad.link import under_jitter as link_performance
 from microrad.link.tornado import RELATIVE, STEP_DB
 from microrad.mission.fields import Quantity
 from microrad.mission.file import load_link

@@ -10,12 +10,12 @@ import pytest
 from scipy.optimize import minimize_scalar
 
 from design_plants import axis_plant
-from microrad.control import analysis, classical, descent, judge, lqg, search, tuning
-from microrad.control.lqg import LQG
-from microrad.control.problem import RESIDUAL, AxisController, Family, Parameter, Specification
 from microrad.core import lti
-from microrad.fine_pointing import designs
-from microrad.fine_pointing.scenario import scene
+from microrad.loop.control import analysis, classical, descent, judge, lqg, search, tuning
+from microrad.loop.control.lqg import LQG
+from microrad.loop.control.problem import RESIDUAL, AxisController, Family, Parameter, Specification
+from microrad.loop.fine_pointing import designs
+from microrad.loop.fine_pointing.scenario import scene
 from microrad.mission.file import load_mission
 from shipped import SHIPPED
 

@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.signal import lsim
 
-from microrad.recording import recording_from_arrays
+from microrad.lab.recording import recording_from_arrays
 
 RESONANCE = (150.0, 0.35)  # Hz, damping ratio
 

@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 
 from microrad.campaign.file import CampaignFile, load_campaign
 from microrad.campaign.records import CampaignError
-from microrad.control import AxisController
 from microrad.core import lti
 from microrad.core.folder import scratch_folder
 from microrad.core.machine import source_sha256
+from microrad.loop.control import AxisController
 from microrad.mission.file import named_files
 
 LIBRARIES = ("numpy", "scipy", "numba", "llvmlite", "sgp4", "skyfield")

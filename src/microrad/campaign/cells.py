@@ -125,7 +125,8 @@ def _with_rate(document: Document, file: LinkFile) -> LinkFile:
 
     Raises `MissionError` when no rate has the required margin.
     """
-    from microrad import link, link_study  # here, to keep the start quick
+    from microrad import link  # here, to keep the start quick
+    from microrad.link import study as link_study
 
     try:
         solved = link_study.solve_rate(LinkFile(file.mission, file.path, file.text, file.sha256, file.sources))

@@ -269,7 +269,7 @@ def input_texts(draws: tuple[Draw, ...], bases: tuple[Base, ...]) -> tuple[Input
 
 
 def _identified_texts(bases: tuple[Base, ...]) -> list[InputText]:
-    from microrad.mirror_spread import parameter_units  # here, to keep the start quick
+    from microrad.mirror.spread import parameter_units  # here, to keep the start quick
 
     found: dict[str, InputText] = {}
     for base in bases:

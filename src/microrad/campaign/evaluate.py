@@ -8,16 +8,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from microrad import fine_pointing, link
+from microrad import link
 from microrad.campaign.outputs import OUTPUTS
 from microrad.core import kernels
-from microrad.fine_loop import ensemble
-from microrad.link_performance import Exposure
+from microrad.link.under_jitter import Exposure
+from microrad.loop import fine_pointing
+from microrad.loop.fine_loop import ensemble
 from microrad.mission.file import LinkFile
 from microrad.mission.model import LinkMission, Mission
 
 if TYPE_CHECKING:
-    from microrad import day_study
+    from microrad.orbit import day as day_study
 
 Floats = NDArray[np.float64]
 
@@ -103,7 +104,8 @@ def _rate(m: LinkMission, loss_db: float) -> float:
 # ----------------------------------------------------------------------------------------------------------------- day
 def _day(file: LinkFile, under: Exposure) -> "day_study.Way":
     """What the relay takes under this pointing; nothing where the link has no contact."""
-    from microrad import day_study, link_study  # orbits: slow to load, and few campaigns ask for them
+    from microrad.link import study as link_study
+    from microrad.orbit import day as day_study  # orbits: slow to load, and few campaigns ask for them
 
     links = link_study.run(LinkFile(file.mission, file.path, file.text, file.sha256, file.sources))
     loss = day_study.PointingLoss(under.outage_loss_db, under.short_of(0.0), "campaign")

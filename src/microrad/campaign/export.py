@@ -22,7 +22,7 @@ from microrad.campaign.blob import Head
 from microrad.campaign.ledger import Ledger
 from microrad.campaign.records import CampaignError, Chunk
 from microrad.core.installing import advice
-from microrad.operations import spreadsheet_text
+from microrad.orbit.operations import spreadsheet_text
 
 _ROWS = 16384  # written at once: a row group of Parquet, a chunk of netCDF
 

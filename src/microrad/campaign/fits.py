@@ -40,7 +40,7 @@ def check_loop(on: Reading, table: LoopTable, bases: Sequence[Base]) -> None:
 
 
 def _has_controller(on: Reading, table: LoopTable, m: Mission) -> bool:
-    from microrad import fine_pointing  # here, to keep the start quick
+    from microrad.loop import fine_pointing  # here, to keep the start quick
 
     names = fine_pointing.names(m)
     if table.controller in names:

@@ -3,12 +3,12 @@
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from microrad import fine_pointing
 from microrad.campaign.file import CampaignFile, LoopTable
 from microrad.campaign.records import CampaignError
-from microrad.control import AxisController
-from microrad.fine_loop import ensemble
-from microrad.fine_loop.loop import LoopController, PointingLoop
+from microrad.loop import fine_pointing
+from microrad.loop.control import AxisController
+from microrad.loop.fine_loop import ensemble
+from microrad.loop.fine_loop.loop import LoopController, PointingLoop
 from microrad.mission.file import LinkFile, MissionFile
 
 Beat = Callable[[], None]

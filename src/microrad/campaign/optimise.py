@@ -24,10 +24,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from microrad import control
 from microrad.campaign.candidates import Candidate, Problem, judged, percent, quantity_text
 from microrad.campaign.outputs import OUTPUTS
 from microrad.campaign.records import CampaignError, Floats, Limit
+from microrad.loop import control
 
 Evaluate = Callable[[Floats], dict[str, Floats]]
 Progress = Callable[[int, int, str], None]

@@ -20,8 +20,8 @@ from microrad.campaign.ledger import Ledger, check_same
 from microrad.campaign.ledger_file import argument, refuse_existing
 from microrad.campaign.records import CampaignError, Chunk, Engine, Failed, Job, Outcome, joined
 from microrad.campaign.sketch import Sketch
-from microrad.control import AxisController
 from microrad.core.units import format_quantity
+from microrad.loop.control import AxisController
 
 Progress = Callable[[int, int, str], None]
 

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from microrad import mirror_spread
 from microrad.campaign.distributions import standard_normal
+from microrad.mirror import spread as mirror_spread
 
 if TYPE_CHECKING:  # only for its name
     from microrad.campaign.file import CampaignFile

@@ -15,8 +15,8 @@ from microrad.campaign.inputs import Builder
 from microrad.campaign.keys import touches_loop
 from microrad.campaign.optimise import Optimum, optimise
 from microrad.campaign.records import CampaignError
-from microrad.control import AxisController
 from microrad.core.threads import in_threads
+from microrad.loop.control import AxisController
 
 Floats = NDArray[np.float64]
 Progress = Callable[[int, int, str], None]

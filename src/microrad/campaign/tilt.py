@@ -23,10 +23,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from microrad.core import kernels, lti
-from microrad.fine_loop import ensemble, linear
-from microrad.fine_loop.ensemble import LANES, SLICE_SAMPLES, Span
-from microrad.fine_loop.loop import LoopController, PointingLoop
-from microrad.fine_pointing import parts
+from microrad.loop.fine_loop import ensemble, linear
+from microrad.loop.fine_loop.ensemble import LANES, SLICE_SAMPLES, Span
+from microrad.loop.fine_loop.loop import LoopController, PointingLoop
+from microrad.loop.fine_pointing import parts
 
 Floats = NDArray[np.float64]
 

@@ -11,16 +11,16 @@ from itertools import groupby
 import numpy as np
 from numpy.typing import NDArray
 
-from microrad import fine_pointing
 from microrad.campaign import blob, bundle, evaluate, loops, plan, sampling, tilt
 from microrad.campaign.bundle import code_sha256
 from microrad.campaign.file import CampaignFile
 from microrad.campaign.inputs import Builder
 from microrad.campaign.records import CampaignError, Chunk, Failed, Job, WorstTrace
-from microrad.control import AxisController
 from microrad.core import kernels
-from microrad.fine_loop import ensemble
-from microrad.fine_loop.loop import LoopController, PointingLoop
+from microrad.loop import fine_pointing
+from microrad.loop.control import AxisController
+from microrad.loop.fine_loop import ensemble
+from microrad.loop.fine_loop.loop import LoopController, PointingLoop
 from microrad.mission.file import LinkFile
 
 __all__ = ["Work", "code_sha256", "open_work"]

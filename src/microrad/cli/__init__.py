@@ -35,7 +35,7 @@ from microrad.core.folder import write_whole
 if TYPE_CHECKING:
     from microrad.core.kept import Kept
     from microrad.mission.file import MissionFile
-    from microrad.study import Study
+    from microrad.study.story import Study
 
 __all__ = ["app", "main"]
 
@@ -150,7 +150,7 @@ def _content(path: Path) -> bytes | None:
 
 
 def _study(mission: "MissionFile", progress: OnProgress, parts: "Kept") -> "Study":
-    from microrad import study
+    from microrad.study import story as study
 
     try:
         return study.run(mission, progress, parts)
@@ -196,7 +196,7 @@ def doctor(as_json: Json = False) -> Outcome:
     Versions, the compiled kernels against a known number, their cache, the packaged mission. The exit code is 1 when
     something is wrong.
     """
-    from microrad import doctor as checks
+    from microrad.cli import doctor as checks
 
     found = checks.run()
     ok = all(check.ok for check in found)

@@ -21,7 +21,7 @@ from microrad.cli.frame import (
 
 # Everything else is imported inside the commands: it takes longer to load than help may take.
 if TYPE_CHECKING:
-    from microrad.link_study import LinkStudy
+    from microrad.link.study import LinkStudy
 
 _File = Annotated[
     Path, typer.Argument(help="Mission file with the tables orbit and operations.", metavar="FILE", show_default=False)
@@ -30,7 +30,7 @@ _File = Annotated[
 
 def _links(file: Path) -> "LinkStudy":
     """The links of a mission, whose losses and acquisition the day needs."""
-    from microrad import link_study
+    from microrad.link import study as link_study
     from microrad.mission.file import load_link
 
     given = load_link(file)
@@ -63,7 +63,7 @@ def contacts(
     """
     if sum((as_csv, as_html, as_json)) > 1:
         raise Refusal("--csv, --html and --json exclude each other; give one of them.")
-    from microrad import day_study
+    from microrad.orbit import day as day_study
     from microrad.report import day_tables, day_views
 
     links = _links(file)
@@ -105,8 +105,9 @@ def constellation(
     """
     if sum((as_csv, as_plan, as_json)) > 1:
         raise Refusal("--csv, --contact-plan and --json exclude each other; give one of them.")
-    from microrad import constellation as plans
-    from microrad import day_study, operations
+    from microrad.orbit import constellation as plans
+    from microrad.orbit import day as day_study
+    from microrad.orbit import operations
     from microrad.report import constellation_views
 
     links = _links(file)

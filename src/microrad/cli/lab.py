@@ -29,8 +29,8 @@ from microrad.core.folder import write_whole
 
 # Everything else is imported inside the commands: it takes longer to load than help may take.
 if TYPE_CHECKING:
-    from microrad.identify import Identification
-    from microrad.recording import Recording
+    from microrad.lab.identify import Identification
+    from microrad.lab.recording import Recording
 
 MIRROR_FILE_BEGINS = "# Mirror identified from"
 
@@ -129,9 +129,9 @@ def identify(  # noqa: PLR0913  every argument is a named option
     to part of the samples and judges them on the rest. The best one is written as a mirror file, and everything as a
     report. A column is given by its name or by its number, counted from 0.
     """
-    from microrad import identify as identification
     from microrad import report
-    from microrad.recording import stated_units
+    from microrad.lab import identify as identification
+    from microrad.lab.recording import stated_units
     from microrad.studio.live_fit import looker_on
 
     target = mirror_file or Path(f"{files[0].stem}-mirror.toml")
@@ -208,10 +208,10 @@ def _recordings(
     files: list[Path], validate: list[Path], columns: _Columns
 ) -> tuple[list["Recording"], list["Recording"], bool]:
     """Recordings to fit, recordings for validation, and whether they come from the virtual bench."""
-    from microrad.recording import read_recording
+    from microrad.lab.recording import read_recording
 
     if len(files) == 1 and files[0].is_dir():
-        from microrad import bench
+        from microrad.lab import bench
 
         found = bench.read_folder(files[0], columns.accept)
         uses = {use: [r for r, of in found if of == use] for use in ("identification", "validation")}
@@ -282,7 +282,7 @@ def bench(
     Designs the excitations of a plan within the limits that it states, plays them into a mirror that is none of the
     models that microrad fits, and writes the files that a laboratory would have.
     """
-    from microrad import bench as virtual
+    from microrad.lab import bench as virtual
 
     found = virtual.load_plan(plan)
     folder = output or Path(f"{Path(plan).stem}-bench")

@@ -57,10 +57,10 @@ def budget(  # noqa: PLR0913, PLR0917  each is an option
     """
     if sum((as_csv, as_html, as_json)) > 1:
         raise Refusal("--csv, --html and --json exclude each other; give one of them.")
-    from microrad import link_study
+    from microrad.link import study as link_study
+    from microrad.link.requirement import met
     from microrad.mission.file import load_link
     from microrad.report import budget_views
-    from microrad.requirement import met
 
     loaded = load_link(file)
     if pointing_error is not None and loaded.mission.jitter is not None:

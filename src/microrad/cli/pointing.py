@@ -9,7 +9,7 @@ from microrad.cli.frame import Json, Outcome, Refusal, app, command, examples, j
 
 # Everything else is imported inside the commands: it takes longer to load than help may take.
 if TYPE_CHECKING:
-    from microrad.fine_pointing import Design, Outlook, Scene
+    from microrad.loop.fine_pointing import Design, Outlook, Scene
 
 
 @app.command(
@@ -31,13 +31,13 @@ def design(
     theory (linear), and shown with what it leaves there and, in a few runs, on the mirror with its hysteresis; microrad
     run simulates all of it. --json also prints their matrices.
     """
-    from microrad.mirror_summary import unknown_dynamics
+    from microrad.mirror.summary import unknown_dynamics
     from microrad.mission.file import load_mission
 
     mission = load_mission(file, mirror)
     with progress_bar() as progress:
         try:
-            from microrad import fine_pointing
+            from microrad.loop import fine_pointing
 
             scene = fine_pointing.scene(mission)
             designs = fine_pointing.design(scene, mission.mission, progress)
@@ -53,7 +53,7 @@ def design(
 
 def _broken(designs: "tuple[Design, ...]", left: "tuple[Outlook, ...]") -> str:
     """The designs whose linear figure the mirror does not keep, in a sentence."""
-    from microrad.fine_pointing import PROMISE
+    from microrad.loop.fine_pointing import PROMISE
 
     named = [
         f"{d.name} ({x.simulated_rad / x.linear_rad:.1f} times)"

@@ -7,7 +7,6 @@ from itertools import pairwise
 
 import numpy as np
 
-from microrad import control, fine_pointing, hysteresis, mirror, simulate, tracking
 from microrad.core import kernels, lti
 from microrad.export.modes import minimal
 from microrad.export.records import (
@@ -25,8 +24,13 @@ from microrad.export.records import (
     Signal,
     Vectors,
 )
-from microrad.fine_loop.loop import LoopController
-from microrad.fine_loop.replay import replay
+from microrad.loop import control, fine_pointing
+from microrad.loop import paper_cases as tracking
+from microrad.loop import sine_run as simulate
+from microrad.loop.fine_loop.loop import LoopController
+from microrad.loop.fine_loop.replay import replay
+from microrad.mirror import hysteresis
+from microrad.mirror import model as mirror
 from microrad.mission.file import MissionFile
 
 Progress = Callable[[int, int, str], None]

@@ -16,11 +16,11 @@ from typing import Any, Literal
 
 import numpy as np
 
-from microrad import mirror
 from microrad.core.lti import frequency_response
 from microrad.export.linear_roots import Roots, checked, response, roots_of_control, roots_of_fields
 from microrad.export.linear_select import select
 from microrad.export.records import ExportError
+from microrad.mirror import model as mirror
 from microrad.mission.tables.mirror import Mirror
 
 READ_BACK = 1e-9

@@ -8,9 +8,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from microrad import control, mirror, simulate
-from microrad.control import GAUGE, OPTICAL, RESIDUAL
-from microrad.control.analysis import moved
 from microrad.core import lti
 from microrad.export.choice import Choice, PointingChoice, TrackingChoice, flight_controller, origin
 from microrad.export.matrices_files import from_control, json_text, read_mat, to_control, write_mat
@@ -26,12 +23,17 @@ from microrad.export.matrices_forms import (
 )
 from microrad.export.matrices_structure import without_copies, without_state
 from microrad.export.records import ExportError, FlightController
-from microrad.fine_loop.design import behind_filter, design_plant
-from microrad.fine_loop.loop import ReferenceFilter
-from microrad.fine_pointing import table
-from microrad.fine_pointing.designs import IN_SERIES
+from microrad.loop import control
+from microrad.loop import sine_run as simulate
+from microrad.loop.control import GAUGE, OPTICAL, RESIDUAL
+from microrad.loop.control.analysis import moved
+from microrad.loop.fine_loop.design import behind_filter, design_plant
+from microrad.loop.fine_loop.loop import ReferenceFilter
+from microrad.loop.fine_pointing import table
+from microrad.loop.fine_pointing.designs import IN_SERIES
+from microrad.loop.sensor import StrainGauge
+from microrad.mirror import model as mirror
 from microrad.mission.file import MissionFile
-from microrad.sensor import StrainGauge
 
 __all__ = [
     "CONTROLLER",

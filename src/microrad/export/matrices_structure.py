@@ -4,9 +4,9 @@ import math
 
 import numpy as np
 
-from microrad.control.analysis import reachable
 from microrad.core import lti
 from microrad.export.records import ExportError, Floats
+from microrad.loop.control.analysis import reachable
 
 LARGEST = 1e100
 """Numbers beyond it leave the range of a float as soon as they are multiplied."""

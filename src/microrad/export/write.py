@@ -20,7 +20,7 @@ from microrad.export.operations import FixedOperations, Operations, fixed_operat
 from microrad.export.records import ExportError, FlightController, Progress, Vectors
 from microrad.export.rounding import RoundingBound, rounding_bound
 from microrad.export.sections import Sections, sections
-from microrad.fine_pointing import PROMISE, Outlook
+from microrad.loop.fine_pointing import PROMISE, Outlook
 
 Precision = Literal["double", "single", "fixed"]
 PRECISIONS: tuple[Precision, ...] = ("double", "single", "fixed")

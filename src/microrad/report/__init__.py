@@ -14,13 +14,13 @@ from microrad.core.threads import shared_out
 from microrad.report.tables import Column, rows_of
 
 if TYPE_CHECKING:
-    from microrad.constellation import ConstellationPlan
+    from microrad.orbit.constellation import ConstellationPlan
     from microrad.report.figures import Figure
     from microrad.report.identification import ReportError, check_identification, write_identification
     from microrad.report.identification_words import identification_data, identification_text
     from microrad.report.page import Drawn
     from microrad.report.words import summary, verdict_text
-    from microrad.study import Study
+    from microrad.study.story import Study
 
 __all__ = [
     "FolderError",
@@ -125,7 +125,7 @@ def drawing(study: "Study", parts: Kept) -> "Iterator[Callable[[], Drawn]]":
 
 def write_plan(plan: "ConstellationPlan", folder: Path) -> None:
     """The sessions of a constellation for a spreadsheet, and as a contact plan."""
-    from microrad.operations import csv_text
+    from microrad.orbit.operations import csv_text
 
     (folder / "sessions.csv").write_text(csv_text(plan.planned, plan.epoch.utc) + "\n", encoding="utf-8")
     (folder / "contact-plan.ionrc").write_text(plan.contact_plan() + "\n", encoding="utf-8")

@@ -11,16 +11,16 @@ from microrad import link
 from microrad.core.budget import Line
 from microrad.core.units import format_input
 from microrad.link import Swing
-from microrad.link_acquisition import Finding, Found, Tracking
-from microrad.link_performance import Performance, error_rad, required_error_rad
-from microrad.link_study import BeamRadius, LinkStudy, Solution
+from microrad.link.partner_search import Finding, Found, Tracking
+from microrad.link.pointing import OpenLoopPointing
+from microrad.link.requirement import met, of_links, outage_words
+from microrad.link.study import BeamRadius, LinkStudy, Solution
+from microrad.link.under_jitter import Performance, error_rad, required_error_rad
 from microrad.mission.model import source_text
-from microrad.operations import spreadsheet_text
-from microrad.pointing import OpenLoopPointing
+from microrad.orbit.operations import spreadsheet_text
 from microrad.report import requirements
 from microrad.report.quantities import quantity, signed
 from microrad.report.tables import Table, table_text, tables_text
-from microrad.requirement import met, of_links, outage_words
 
 UNDER_JITTER = "Communication under jitter"
 """The lines of what the jitter does to the communication link, beside its budget."""

@@ -9,13 +9,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
-from microrad import link, pointing
+from microrad import link
 from microrad.core.units import format_quantity
-from microrad.hysteresis import output_amplitude
+from microrad.link import pointing
+from microrad.loop.paper_cases import residual_rad
+from microrad.mirror.hysteresis import output_amplitude
 from microrad.report.fine_pointing_words import micro, share_of_time
 from microrad.report.quantities import quantity, signed
-from microrad.study import Study
-from microrad.tracking import residual_rad
+from microrad.study.story import Study
 
 _TITLE_HEIGHT, _LINE_HEIGHT, _PAD = 30, 18, 12
 _CHARACTER_WIDTH = 6.5  # of the text, in the mean of a line

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from microrad.constellation import ConstellationPlan
+from microrad.orbit.constellation import ConstellationPlan
 from microrad.report.day_words import duration, volume
 from microrad.report.tables import Table, tables_text
 

@@ -2,9 +2,9 @@
 
 from typing import Any
 
-from microrad.contact_run import DATA, LOCK, ContactRun
 from microrad.report.day_words import duration, volume
 from microrad.report.quantities import quantity
+from microrad.study.contact_run import DATA, LOCK, ContactRun
 
 WINDOW_HEADINGS = (
     "since rise (min)",

@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from microrad.constellation import ConstellationPlan
-from microrad.contact_run import ContactRun
-from microrad.day_study import DayStudy, Way
 from microrad.orbit import Contact
+from microrad.orbit.constellation import ConstellationPlan
+from microrad.orbit.day import DayStudy, Way
 from microrad.report.variables import Group, Variable, coordinate, variable
+from microrad.study.contact_run import ContactRun
 
 Floats = NDArray[np.float64]
 

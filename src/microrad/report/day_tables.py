@@ -3,8 +3,8 @@
 import math
 from typing import Any
 
-from microrad.day_study import NOTHING, DayStudy, Encounter, Numbers, Way
 from microrad.orbit import Contact, Pass
+from microrad.orbit.day import NOTHING, DayStudy, Encounter, Numbers, Way
 from microrad.report.day_words import contact_time, duration, kilometres, ratio_text, sentences, volume
 
 CONTACT_COLUMNS = (

@@ -5,9 +5,9 @@ import io
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from microrad.day_study import DayStudy
-from microrad.link_study import LinkStudy
-from microrad.operations import spreadsheet_text
+from microrad.link.study import LinkStudy
+from microrad.orbit.day import DayStudy
+from microrad.orbit.operations import spreadsheet_text
 from microrad.report import day_tables, day_words
 from microrad.report.tables import Table, tables_text
 

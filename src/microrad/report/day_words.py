@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from microrad.report.quantities import quantity
 
 if TYPE_CHECKING:  # slow to load, and others take a length of time from here
-    from microrad.day_study import Closing, DayStudy, Numbers, Swing, Way
+    from microrad.orbit.day import Closing, DayStudy, Numbers, Swing, Way
 
 MATTERS = 1.1
 """Factor by which an assumption has to change the comparison to be named."""

@@ -12,15 +12,16 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Canvas
 from numpy.typing import NDArray
 
-from microrad import paper, simulate
 from microrad.core.kept import NOTHING, Kept
+from microrad.loop import sine_run as simulate
+from microrad.loop.paper_cases import Run, residual_rad
 from microrad.mission.model import Mission
 from microrad.report import interactive
 from microrad.report.inlined import inlined
 from microrad.report.svg_text import svg_text
 from microrad.report.tables import Column, rows_of
-from microrad.study import Study
-from microrad.tracking import Run, residual_rad
+from microrad.study import paper
+from microrad.study.story import Study
 
 Floats = NDArray[np.float64]
 

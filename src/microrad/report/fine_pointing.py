@@ -4,12 +4,12 @@ import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from microrad.control import LoopMargins
 from microrad.core.units import format_quantity
-from microrad.fine_pointing import FinePointingStudy, Residual, Sine
-from microrad.fine_pointing.parts import DELAY
-from microrad.geometry import StrokeBudget
-from microrad.mirror_summary import unknown_dynamics
+from microrad.loop.control import LoopMargins
+from microrad.loop.fine_pointing import FinePointingStudy, Residual, Sine
+from microrad.loop.fine_pointing.parts import DELAY
+from microrad.mirror.geometry import StrokeBudget
+from microrad.mirror.summary import unknown_dynamics
 from microrad.mission.model import Mission
 from microrad.report import fine_pointing_words as words
 from microrad.report.figures import Figure

@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from microrad import control
-from microrad.fine_loop.design import design_plant
-from microrad.fine_pointing import Design, ErrorBudget, FinePointingStudy, Residual, Verified
-from microrad.geometry import StrokeBudget
-from microrad.mirror_summary import unknown_dynamics
+from microrad.loop import control
+from microrad.loop.fine_loop.design import design_plant
+from microrad.loop.fine_pointing import Design, ErrorBudget, FinePointingStudy, Residual, Verified
+from microrad.mirror.geometry import StrokeBudget
+from microrad.mirror.summary import unknown_dynamics
 from microrad.mission.model import Mission
 from microrad.report.fine_pointing_words import room
 

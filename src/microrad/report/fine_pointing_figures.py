@@ -10,12 +10,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Canvas
 
 from microrad.core.kept import NOTHING, Kept
-from microrad.fine_loop.linear import close, sensitivity
-from microrad.fine_pointing import ErrorBudget, FinePointingStudy, Verified
+from microrad.loop.fine_loop.linear import close, sensitivity
+from microrad.loop.fine_pointing import ErrorBudget, FinePointingStudy, Verified
 from microrad.mission.model import Mission
 from microrad.report.figures import BLACK, BLUE, GREEN, ORANGE, SKY, STYLE, VERMILION, Figure, Floats, svg_of
 from microrad.report.fine_pointing_words import micro, share_of_time, source_name
-from microrad.study import Study
+from microrad.study.story import Study
 
 _COLOURS = (VERMILION, BLUE, GREEN)
 _SHAPES = ("o", "s", "^")  # beside the colours, for print in grey

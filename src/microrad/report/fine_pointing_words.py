@@ -4,11 +4,11 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from microrad.control.tuning import MARGIN
 from microrad.core.units import format_quantity
-from microrad.fine_pointing import FinePointingStudy, Verified
-from microrad.geometry import StrokeBudget
-from microrad.mirror_summary import unknown_dynamics
+from microrad.loop.control.tuning import MARGIN
+from microrad.loop.fine_pointing import FinePointingStudy, Verified
+from microrad.mirror.geometry import StrokeBudget
+from microrad.mirror.summary import unknown_dynamics
 from microrad.mission.model import Mission
 
 VARIANTS = {

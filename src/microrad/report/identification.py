@@ -9,9 +9,9 @@ from typing import Any
 
 from microrad.core.folder import write_whole
 from microrad.core.units import format_quantity
-from microrad.identify import Identification
-from microrad.identify.predictions import Fit
-from microrad.recording import Finding, Recording
+from microrad.lab.identify import Identification
+from microrad.lab.identify.predictions import Fit
+from microrad.lab.recording import Finding, Recording
 from microrad.report import identification_parameters as parameters
 from microrad.report import identification_words as words
 

@@ -20,11 +20,11 @@ from matplotlib.ticker import LogFormatter
 from numpy.typing import NDArray
 
 from microrad.core.threads import shared_out
-from microrad.identify import Identification
-from microrad.identify.linear import LinearFit, fit_percent, output_error
-from microrad.identify.predictions import Prediction
-from microrad.identify.roles import roles
-from microrad.recording import Recording
+from microrad.lab.identify import Identification
+from microrad.lab.identify.linear import LinearFit, fit_percent, output_error
+from microrad.lab.identify.predictions import Prediction
+from microrad.lab.identify.roles import roles
+from microrad.lab.recording import Recording
 from microrad.report import identification_words as words
 from microrad.report.figures import BLACK, BLUE, GREEN, ORANGE, SKY, STYLE, VERMILION, Figure, Floats, svg_of, thin
 

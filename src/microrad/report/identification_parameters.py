@@ -3,10 +3,10 @@
 import math
 from dataclasses import dataclass
 
-from microrad.identify import BoucWenFit, PrandtlIshlinskiiFit
-from microrad.identify.bouc_wen import PARAMETER_UNITS, PARAMETERS
-from microrad.identify.joint import JointFit
-from microrad.identify.predictions import Fit
+from microrad.lab.identify import BoucWenFit, PrandtlIshlinskiiFit
+from microrad.lab.identify.bouc_wen import PARAMETER_UNITS, PARAMETERS
+from microrad.lab.identify.joint import JointFit
+from microrad.lab.identify.predictions import Fit
 
 HIGH_CORRELATION = 0.95
 

@@ -11,13 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from microrad.core.units import format_quantity
-from microrad.hysteresis import Play
-from microrad.identify import Identification, PrandtlIshlinskiiFit, Score
-from microrad.identify.doubts import fit_warnings
-from microrad.identify.joint import JointFit
-from microrad.identify.linear import LinearFit
-from microrad.identify.predictions import Fit, Prediction
-from microrad.recording import Recording
+from microrad.lab.identify import Identification, PrandtlIshlinskiiFit, Score
+from microrad.lab.identify.doubts import fit_warnings
+from microrad.lab.identify.joint import JointFit
+from microrad.lab.identify.linear import LinearFit
+from microrad.lab.identify.predictions import Fit, Prediction
+from microrad.lab.recording import Recording
+from microrad.mirror.hysteresis import Play
 from microrad.report.identification_parameters import (
     admissible,
     colour,

@@ -9,12 +9,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Canvas
 from matplotlib.patches import Patch
 
-from microrad.acquisition import Trade
 from microrad.core.kept import NOTHING, Kept
 from microrad.core.units import format_quantity
 from microrad.link import Swing, Tornado
-from microrad.link_acquisition import Finding
-from microrad.link_study import LinkStudy
+from microrad.link.acquisition import Trade
+from microrad.link.partner_search import Finding
+from microrad.link.study import LinkStudy
 from microrad.report.day_assumptions import swing_bars
 from microrad.report.figures import BLUE, ORANGE, STYLE, VERMILION, Figure, svg_of
 from microrad.report.tables import Column

@@ -5,14 +5,14 @@ from collections.abc import Sequence
 from typing import Any
 
 from microrad.core.units import format_quantity
-from microrad.link_acquisition import LONGEST_LOOK_S, Finding, Found, Scanned
-from microrad.link_performance import Performance
-from microrad.link_study import LinkStudy
-from microrad.performance import FINE, Cost, LinkPerformance
-from microrad.pointing import OpenLoopPointing
+from microrad.link.partner_search import LONGEST_LOOK_S, Finding, Found, Scanned
+from microrad.link.pointing import OpenLoopPointing
+from microrad.link.study import LinkStudy
+from microrad.link.under_jitter import Performance
 from microrad.report import budget_views
 from microrad.report.figures import Figure
 from microrad.report.quantities import quantity
+from microrad.study.pointing_cost import FINE, Cost, LinkPerformance
 
 Row = dict[str, Any]
 EARLY = 0.9

@@ -14,7 +14,6 @@ from microrad.core.machine import versions
 from microrad.core.units import format_quantity
 from microrad.mission.file import assumptions, changed_from_shipped
 from microrad.mission.model import Source
-from microrad.performance import FINE
 from microrad.report import (
     carried,
     chain,
@@ -32,7 +31,8 @@ from microrad.report import (
 )
 from microrad.report.figures import Figure
 from microrad.report.quantities import quantity
-from microrad.study import Study
+from microrad.study.pointing_cost import FINE
+from microrad.study.story import Study
 
 PARTS = (
     ("verdict", "Verdict"),

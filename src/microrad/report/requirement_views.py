@@ -6,15 +6,15 @@ from typing import Any
 
 from microrad import link
 from microrad.link.budget import FREE_SPACE_LOSS, POINTING_LOSS
-from microrad.performance import NO_HYSTERESIS
-from microrad.readings import Reading
+from microrad.link.requirement import Requirement, Subject
+from microrad.loop.paper_cases import residual_rad
 from microrad.report.fine_pointing_words import percent, source_name
 from microrad.report.quantities import apart, quantity
 from microrad.report.requirements import signed
-from microrad.requirement import Requirement, Subject
-from microrad.study import Study
-from microrad.tracking import residual_rad
-from microrad.verdict import unknown
+from microrad.study.alternatives import Reading
+from microrad.study.pointing_cost import NO_HYSTERESIS
+from microrad.study.story import Study
+from microrad.study.verdict import unknown
 
 Row = dict[str, Any]
 _BY_TEN = ("bit_error_ratio", "outage")  # inputs that a tornado moves by their order of magnitude

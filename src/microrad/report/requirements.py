@@ -3,10 +3,10 @@
 from collections.abc import Sequence
 from typing import Any
 
+from microrad.link.requirement import DERIVED, Requirement
 from microrad.report import quantities
 from microrad.report.quantities import apart
 from microrad.report.tables import Table
-from microrad.requirement import DERIVED, Requirement
 
 
 def table(found: Sequence[Requirement]) -> Table:

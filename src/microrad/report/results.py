@@ -12,15 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from microrad.core.machine import machine, versions
-from microrad.fine_pointing import COUNTERS, FinePointingStudy, Residual
+from microrad.loop.fine_pointing import COUNTERS, FinePointingStudy, Residual
+from microrad.loop.paper_cases import Run
 from microrad.mission.file import MirrorFile, MissionFile, named_files
 from microrad.report import day_results, variables, words
 from microrad.report.carried import hash_of_summary
 from microrad.report.fine_pointing_data import margins, rms_by_source, sources
 from microrad.report.paper_bench import PLAN, SEED
 from microrad.report.variables import Group, Variable, coordinate, variable
-from microrad.study import Study
-from microrad.tracking import Run
+from microrad.study.story import Study
 
 Floats = NDArray[np.float64]
 

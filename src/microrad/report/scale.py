@@ -4,8 +4,8 @@ import math
 from dataclasses import dataclass
 
 from microrad import link
-from microrad.hysteresis import slow_gain
-from microrad.study import Study
+from microrad.mirror.hysteresis import slow_gain
+from microrad.study.story import Study
 
 APART = 2.0
 """Steps by which a statistic of one run may move: 3.5 standard deviations of what two roundings differ by.

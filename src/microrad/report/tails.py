@@ -11,12 +11,12 @@ from matplotlib.figure import Figure as Canvas
 from numpy.typing import NDArray
 
 from microrad.core.kept import NOTHING, Kept
-from microrad.fine_loop.ensemble import bin_edges_rad, histogram_beyond, histogram_quantile
-from microrad.fine_pointing import FinePointingStudy, Residual
+from microrad.loop.fine_loop.ensemble import bin_edges_rad, histogram_beyond, histogram_quantile
+from microrad.loop.fine_pointing import FinePointingStudy, Residual
 from microrad.mission.model import Mission
 from microrad.report import fine_pointing_words as words
 from microrad.report.figures import BLACK, BLUE, GREEN, ORANGE, STYLE, Figure, svg_of
-from microrad.study import Study
+from microrad.study.story import Study
 
 Floats = NDArray[np.float64]
 

@@ -4,9 +4,10 @@ import math
 from typing import Any
 
 from microrad.core.units import format_quantity
+from microrad.link.requirement import IMPOSSIBLE, outage_words
+from microrad.loop.paper_cases import Run, residual_rad
 from microrad.mission.file import changed_from_shipped
 from microrad.mission.model import Mission
-from microrad.performance import FINE, Cost
 from microrad.report import (
     budget_views,
     constellation_views,
@@ -20,9 +21,8 @@ from microrad.report import (
 from microrad.report.fine_pointing_data import data as fine_pointing_data
 from microrad.report.quantities import quantity, signed
 from microrad.report.tables import table_text, tables_text
-from microrad.requirement import IMPOSSIBLE, outage_words
-from microrad.study import Study
-from microrad.tracking import Run, residual_rad
+from microrad.study.pointing_cost import FINE, Cost
+from microrad.study.story import Study
 
 
 def headline(study: Study) -> str:

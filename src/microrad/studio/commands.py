@@ -152,7 +152,8 @@ class Design:
     def python(self) -> str:
         """Lines of Python that do the same."""
         return joined(
-            "from microrad import fine_pointing, load_mission",
+            "from microrad import load_mission",
+            "from microrad.loop import fine_pointing",
             "",
             f"mission = {mission_call(self.file, self.mirror)}",
             "scene = fine_pointing.scene(mission)",

@@ -13,7 +13,7 @@ from microrad.studio.commands_pieces import as_path, joined, named, option, path
 class Identify:
     """A mirror from recordings, into a mirror file and its report; columns are names or numbers counted from 0.
 
-    `model` is one of `microrad.identify.MODELS`, or None for the best one; `static` fits the hysteresis alone.
+    `model` is one of `microrad.lab.identify.MODELS`, or None for the best one; `static` fits the hysteresis alone.
     """
 
     files: tuple[Path, ...]
@@ -69,7 +69,8 @@ class Identify:
         return joined(
             "from pathlib import Path",
             "",
-            "from microrad import identify, read_recording, recording, report",
+            "from microrad import read_recording, report",
+            "from microrad.lab import identify, recording",
             "",
             f"target, page = {as_path(self.mirror_file)}, {as_path(self._page)}",
             *([] if self.overwrite else ["if target.exists():", "    raise FileExistsError(target)"]),

@@ -9,9 +9,9 @@ from decimal import Decimal
 from pathlib import Path
 from typing import Any
 
-from microrad import link_study
 from microrad.core.folder import MANIFEST
 from microrad.core.units import UnitError, parse_quantity
+from microrad.link import study as link_study
 from microrad.report.quantities import quantity
 from microrad.studio.draft import Draft, Value
 from microrad.studio.draft_keys import value_of

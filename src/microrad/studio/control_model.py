@@ -15,15 +15,19 @@ from functools import lru_cache, partial
 import numpy as np
 from numpy.typing import NDArray
 
-from microrad import control, fine_pointing, hysteresis, mirror, simulate, tracking
 from microrad.core import lti
-from microrad.disturbance import Reference
-from microrad.fine_loop import ensemble, linear
-from microrad.fine_loop.loop import LoopController, PointingLoop
-from microrad.fine_pointing import parts
-from microrad.fine_pointing.designs import families
-from microrad.fine_pointing.results import for_mirror
-from microrad.fine_pointing.scenario import BODY_POINTING, with_mirror
+from microrad.loop import control, fine_pointing
+from microrad.loop import paper_cases as tracking
+from microrad.loop import sine_run as simulate
+from microrad.loop.disturbance import Reference
+from microrad.loop.fine_loop import ensemble, linear
+from microrad.loop.fine_loop.loop import LoopController, PointingLoop
+from microrad.loop.fine_pointing import parts
+from microrad.loop.fine_pointing.designs import families
+from microrad.loop.fine_pointing.results import for_mirror
+from microrad.loop.fine_pointing.scenario import BODY_POINTING, with_mirror
+from microrad.mirror import hysteresis
+from microrad.mirror import model as mirror
 from microrad.mission.file import MissionFile
 from microrad.mission.model import Mission
 

@@ -11,10 +11,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from microrad import day_study, link_study
-from microrad.day_study import DayStudy, Way
+from microrad.link import study as link_study
 from microrad.mission.file import LinkFile
 from microrad.orbit import Contact
+from microrad.orbit import day as day_study
+from microrad.orbit.day import DayStudy, Way
 from microrad.report import day_tables, day_words
 from microrad.studio import plots
 from microrad.studio.latest import Progress

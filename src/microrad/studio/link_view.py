@@ -10,11 +10,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from microrad import link, link_study
+from microrad import link
 from microrad.core.budget import Line
 from microrad.core.units import format_quantity
-from microrad.link_performance import error_rad, required_error_rad
-from microrad.link_study import LinkStudy
+from microrad.link import study as link_study
+from microrad.link.study import LinkStudy
+from microrad.link.under_jitter import error_rad, required_error_rad
 from microrad.mission.file import LinkFile
 from microrad.mission.model import LinkMission
 from microrad.report.budget_views import jitter_lines, sentences

@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING
 from microrad.studio import plain_files
 
 if TYPE_CHECKING:
-    from microrad.identify.predictions import Judged, Prediction
-    from microrad.recording import Recording
+    from microrad.lab.identify.predictions import Judged, Prediction
+    from microrad.lab.recording import Recording
 
 FITS = "fits"
 """Name of the file, beside that of the progress."""

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from microrad.core.folder import write_whole
 from microrad.core.units import UnitError, parse_quantity
-from microrad.recording import ACCEPTABLE, stated_units
+from microrad.lab.recording import ACCEPTABLE, stated_units
 from microrad.studio import plain_files
 from microrad.studio.commands import Identify
 from microrad.studio.jobs import Order

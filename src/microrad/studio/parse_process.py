@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from microrad.recording.sources import Source
+    from microrad.lab.recording.sources import Source
 
 _TEXT = 200
 _UNUSABLE = 50
@@ -66,8 +66,8 @@ def limit(limits: dict[str, Any]) -> None:
 
 def answer_to(request: dict[str, Any]) -> dict[str, Any]:
     """The answer, or the refusal in words."""
-    from microrad.recording import RecordingError
-    from microrad.recording.files import check_file
+    from microrad.lab.recording import RecordingError
+    from microrad.lab.recording.files import check_file
 
     name = request["name"]
     try:
@@ -89,7 +89,7 @@ def _memory(request: dict[str, Any]) -> str:
 
 def opened(path: Path, request: dict[str, Any]) -> Source:
     """The file as channels, none of which claims more samples than may be read."""
-    from microrad.recording.reader import open_source
+    from microrad.lab.recording.reader import open_source
 
     source = open_source(path)
     most = request["limits"]["samples"]
@@ -104,8 +104,8 @@ def opened(path: Path, request: dict[str, Any]) -> Source:
 
 def channels(path: Path, request: dict[str, Any]) -> dict[str, Any]:
     """Names, units and lengths; see `reading.Listing`."""
-    from microrad.recording.files import file_format
-    from microrad.recording.sources import is_time_name
+    from microrad.lab.recording.files import file_format
+    from microrad.lab.recording.sources import is_time_name
 
     source = opened(path, request)
     most = request["limits"]["channels"]
@@ -125,7 +125,7 @@ def channels(path: Path, request: dict[str, Any]) -> dict[str, Any]:
 
 def view(path: Path, request: dict[str, Any]) -> dict[str, Any]:
     """The recording, checked and thinned; see `reading.View`."""
-    from microrad.recording import read_recording
+    from microrad.lab.recording import read_recording
 
     opened(path, request)
     chosen = request["columns"]

@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from microrad import link_study, pointing
 from microrad.core.units import format_quantity
-from microrad.link import DEEPEST_DB
-from microrad.link_study import PointAheadEffect
+from microrad.link import DEEPEST_DB, pointing
+from microrad.link import study as link_study
+from microrad.link.pointing import OpenLoopPointing
+from microrad.link.study import PointAheadEffect
 from microrad.mission.file import LinkFile
-from microrad.pointing import OpenLoopPointing
 from microrad.report.quantities import quantity
 from microrad.studio import plots
 from microrad.studio.dials import Dial, dial

@@ -7,8 +7,8 @@ from typing import Any, NamedTuple
 
 from nicegui import ui
 
-from microrad.day_study import DayStudy
 from microrad.mission.file import LinkFile
+from microrad.orbit.day import DayStudy
 from microrad.studio import day_view, plots
 from microrad.studio.commands import Contacts
 from microrad.studio.latest import Latest, State, shared

@@ -8,8 +8,8 @@ from functools import partial
 
 from nicegui import ui
 
-from microrad import link_study
-from microrad.link_study import LinkStudy
+from microrad.link import study as link_study
+from microrad.link.study import LinkStudy
 from microrad.mission.file import LinkFile
 from microrad.studio import link_view
 from microrad.studio.commands import Budget

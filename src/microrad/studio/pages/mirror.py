@@ -10,7 +10,7 @@ from typing import Any
 
 from nicegui import ui
 
-from microrad.recording import ACCEPTABLE
+from microrad.lab.recording import ACCEPTABLE
 from microrad.studio import mirror_form, mirror_view, reading
 from microrad.studio.commands import Identify
 from microrad.studio.jobs import JobError

@@ -1,0 +1,1 @@
+"""Recordings, the virtual bench, and a mirror model out of them."""

@@ -1,0 +1,356 @@
+"""The plan of an experiment as frozen, checked data: limits, the bench, and the excitations to be played.
+
+Every quantity is text with a unit in the file (`duration = "10 s"`) and an SI float with the unit in its name here.
+`planfile` reads the file and reports the faults.
+"""
+
+import zlib
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, GetCoreSchemaHandler
+from pydantic_core import CoreSchema, core_schema
+
+from microrad.core.units import UnitError, format_quantity
+from microrad.lab.bench.excitation import (
+    Excitation,
+    Limits,
+    Lines,
+    growing_sines,
+    logarithmic_chirp,
+    multisine,
+    staircase,
+)
+from microrad.mission.fields import Problem, Quantity, Several, Table, Whole
+from microrad.mission.model import Amplifier as AmplifierTable
+from microrad.mission.model import AngleOrZero, Duration, Frequencies
+from microrad.mission.tables.mirror import Frequency, Name, Rate, Voltage
+
+FORMATS = ("csv", "lvm", "tdms", "mat", "mat73", "npz", "hdf5")
+"""File formats that the bench writes; mat is MATLAB's version 5, mat73 its version 7.3."""
+
+TRUTHS = ("bench", "linear", "bouc-wen")
+"""Mirrors that the bench can play: its own, Eq. 2 and Eq. 3 of SPIE 11852, 118523B."""
+
+Truth = Literal["bench", "linear", "bouc-wen"]
+
+MOST_AXES = 4
+"""Axes of a bench; a mirror has two."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Choices(Quantity):
+    """A list of distinct formats."""
+
+    def read(self, value: object) -> Any:
+        items = value if isinstance(value, list | tuple) else []
+        known = all(isinstance(item, str) and item in FORMATS for item in items)
+        if not items or not known or len(set(items)) < len(items):
+            raise UnitError("formats", "is no list of different file formats", self.wanted, self.example)
+        return tuple(items)
+
+    @property
+    def wanted(self) -> str:
+        return "a list with some of " + ", ".join(FORMATS)
+
+    @property
+    def example(self) -> str:
+        return '["csv"]'
+
+    def __get_pydantic_core_schema__(self, source: object, handler: GetCoreSchemaHandler) -> CoreSchema:
+        return core_schema.no_info_plain_validator_function(self.read)
+
+
+Count = Annotated[int, Whole("", least=1, most=1_000_000)]
+Share = Annotated[float, Quantity("", least=0.0, most=10.0)]
+Amplitude = Annotated[float, Quantity("V", "V", above=0.0)]
+Amplitudes = Annotated[tuple[float, ...], Several(Quantity("V", above=0.0), rising=True)]
+
+
+# ------------------------------------------------------------------------------------------------------ the whole bench
+class LimitsTable(Table):
+    """What every excitation has to keep, in volts before the amplifier; the rate is that of the converters."""
+
+    rate_hz: Frequency = Field(alias="rate", description="sample rate; an excitation may have its own")
+    drive_min_v: Voltage = Field(alias="drive_min")
+    drive_max_v: Voltage = Field(alias="drive_max")
+    slew_v_s: Rate = Field(alias="slew", description="fastest change of the drive between samples")
+    samples_per_period: Annotated[float, Quantity("", above=2.0)] = Field(description="at the highest frequency")
+
+    def problems(self) -> Iterator[Problem]:
+        """A range that goes up."""
+        if not self.drive_min_v < self.drive_max_v:
+            low = format_quantity(self.drive_min_v, "V")
+            yield Problem("drive_max", f"is not above drive_min ({low})", f"a voltage above {low}")
+
+
+class ConvertersTable(Table):
+    """Converters both ways: `bits` over each range, drive in volts and sensor in angle; both are sampled together."""
+
+    bits: Annotated[int, Whole("", least=4, most=32)]
+    drive_min_v: Voltage = Field(alias="drive_min")
+    drive_max_v: Voltage = Field(alias="drive_max")
+    output_min_rad: Annotated[float, Quantity("rad", "mrad")] = Field(alias="output_min")
+    output_max_rad: Annotated[float, Quantity("rad", "mrad")] = Field(alias="output_max")
+
+    def problems(self) -> Iterator[Problem]:
+        """Ranges that go up."""
+        for name, low, high, unit in (
+            ("drive", self.drive_min_v, self.drive_max_v, "V"),
+            ("output", self.output_min_rad, self.output_max_rad, "rad"),
+        ):
+            if not low < high:
+                yield Problem(f"{name}_max", f"is not above {name}_min", f"above {format_quantity(low, unit)}")
+
+
+class SensorTable(Table):
+    """Strain gauge: white noise (absolute rms, or a share of the output's rms about its mean), mains, drift of zero."""
+
+    noise_rad: AngleOrZero | None = Field(None, alias="noise", description="rms of white noise")
+    noise_share: Share | None = Field(None, description="rms of white noise over the output's rms about its mean")
+    mains_rad: AngleOrZero = Field(alias="mains", description="amplitude of the mains line")
+    mains_frequency_hz: Frequency = Field(alias="mains_frequency")
+    drift_rad_s: Annotated[float, Quantity("rad/s", "nrad/s")] = Field(alias="drift", description="of the zero")
+
+    def problems(self) -> Iterator[Problem]:
+        """Noise said once."""
+        if (self.noise_rad is None) == (self.noise_share is None):
+            found = "are both missing" if self.noise_rad is None else "are both given"
+            yield Problem("", f"noise and noise_share {found}", 'one of them: noise = "1 urad" or noise_share = 0.03')
+
+
+class BenchTable(Table):
+    """The virtual bench: which mirror is played, its drives and axes, and what stands before and behind it.
+
+    Axis i moves with drive i, and with `crosstalk` times every other one.
+    """
+
+    truth: Truth
+    axes: Annotated[int, Whole("", least=1, most=MOST_AXES)] = 1
+    crosstalk: Annotated[float, Quantity("", least=-0.5, most=0.5)] = 0.0
+    amplifier: AmplifierTable
+    converters: ConvertersTable
+    sensor: SensorTable
+
+
+# ---------------------------------------------------------------------------------------------------------- excitations
+class ExcitationTable(Table):
+    """What every excitation may say: what its record is for, and where it differs from the bench."""
+
+    use: Literal["identification", "validation"] = Field(
+        "identification", description="validation: held out of every fit"
+    )
+    rate_hz: Frequency | None = Field(None, alias="rate", description="instead of limits.rate")
+    truth: Literal["plan", "bench", "linear", "bouc-wen"] = Field("plan", description="plan: as bench.truth says")
+    noise_share: Share | None = Field(None, description="instead of the noise of bench.sensor")
+
+    def design(self, name: str, limits: Limits) -> tuple[Excitation, ...]:
+        """The records of this excitation; raises `DesignError`."""
+        raise NotImplementedError
+
+
+class ChirpTable(ExcitationTable):
+    """Logarithmic chirp of one drive."""
+
+    kind: Literal["chirp"]
+    start_hz: Frequency = Field(alias="start")
+    stop_hz: Frequency = Field(alias="stop")
+    duration_s: Duration = Field(alias="duration")
+    amplitude_v: Amplitude = Field(alias="amplitude")
+    offset_v: Voltage = Field(alias="offset")
+    axis: Count = 1
+
+    def design(self, name: str, limits: Limits) -> tuple[Excitation, ...]:
+        """One record."""
+        return (
+            logarithmic_chirp(
+                limits,
+                start_hz=self.start_hz,
+                stop_hz=self.stop_hz,
+                duration_s=self.duration_s,
+                amplitude_v=self.amplitude_v,
+                offset_v=self.offset_v,
+                axis=self.axis - 1,
+                name=name,
+            ),
+        )
+
+
+class MultisineTable(ExcitationTable):
+    """Random-phase multisines, orthogonal where the bench has several axes; `seed` is that of the phases."""
+
+    kind: Literal["multisine"]
+    lines: Literal["all", "odd", "odd-random"]
+    start_hz: Frequency = Field(alias="start")
+    stop_hz: Frequency = Field(alias="stop")
+    period_s: Duration = Field(alias="period")
+    rms_v: Amplitude = Field(alias="rms", description="of each drive about the offset")
+    offset_v: Voltage = Field(alias="offset")
+    periods: Count
+    realisations: Count
+    seed: Annotated[int, Whole("", least=0, most=2**63 - 1)]
+
+    def design(self, name: str, limits: Limits) -> tuple[Excitation, ...]:
+        """One record for each realisation."""
+        return multisine(
+            limits,
+            Lines(self.period_s, self.start_hz, self.stop_hz, self.lines),
+            rms_v=self.rms_v,
+            offset_v=self.offset_v,
+            periods=self.periods,
+            realisations=self.realisations,
+            seed=self.seed,
+            name=name,
+        )
+
+
+class SinesTable(ExcitationTable):
+    """Sines of one or more rising amplitudes, one record for each frequency."""
+
+    kind: Literal["sines"]
+    frequencies_hz: Frequencies = Field(alias="frequencies")
+    amplitudes_v: Amplitudes = Field(alias="amplitudes")
+    periods: Count = Field(description="at each amplitude")
+    offset_v: Voltage = Field(alias="offset")
+    axis: Count = 1
+
+    def design(self, name: str, limits: Limits) -> tuple[Excitation, ...]:
+        """One record for each frequency, named with it where there are several."""
+        several = len(self.frequencies_hz) > 1
+        return tuple(
+            growing_sines(
+                limits,
+                freq_hz=freq_hz,
+                amplitudes_v=self.amplitudes_v,
+                periods=self.periods,
+                offset_v=self.offset_v,
+                axis=self.axis - 1,
+                name=f"{name}-{freq_hz:g}hz" if several else name,
+            )
+            for freq_hz in self.frequencies_hz
+        )
+
+
+class StaircaseTable(ExcitationTable):
+    """Steps between levels, held for creep to show."""
+
+    kind: Literal["staircase"]
+    levels_v: Annotated[tuple[float, ...], Several(Quantity("V"))] = Field(alias="levels")
+    dwell_s: Duration = Field(alias="dwell", description="time at each level")
+    rise_s: Duration = Field(alias="rise", description="time from one level to the next")
+    axis: Count = 1
+
+    def design(self, name: str, limits: Limits) -> tuple[Excitation, ...]:
+        """One record."""
+        return (
+            staircase(
+                limits,
+                levels_v=self.levels_v,
+                dwell_s=self.dwell_s,
+                rise_s=self.rise_s,
+                axis=self.axis - 1,
+                name=name,
+            ),
+        )
+
+
+KINDS: dict[str, type[ExcitationTable]] = {
+    "chirp": ChirpTable,
+    "multisine": MultisineTable,
+    "sines": SinesTable,
+    "staircase": StaircaseTable,
+}
+"""The kinds of excitation by the word that a plan calls them."""
+
+
+# ------------------------------------------------------------------------------------------------------------- the plan
+class PlanTable(Table):
+    """The root of a plan file; each table of `excitation` is checked against its own kind."""
+
+    name: Name
+    formats: Annotated[tuple[str, ...], _Choices("")]
+    limits: LimitsTable
+    bench: BenchTable
+    excitation: dict[str, Any] = Field(description="tables [excitation.NAME], each with its kind")
+
+    def problems(self) -> Iterator[Problem]:
+        """Drives that converters and amplifier can follow."""
+        limits, converters, amplifier = self.limits, self.bench.converters, self.bench.amplifier
+        ranges = (
+            ("the converters", converters.drive_min_v, converters.drive_max_v),
+            ("the amplifier", amplifier.output_min_v / amplifier.gain, amplifier.output_max_v / amplifier.gain),
+        )
+        for what, low, high in ranges:
+            span = f"{format_quantity(low, 'V')} to {format_quantity(high, 'V')}"
+            if limits.drive_min_v < low:
+                yield Problem(
+                    "limits.drive_min", f"is below the range of {what}, {span} at the drive", f"within {span}"
+                )
+            if limits.drive_max_v > high:
+                yield Problem(
+                    "limits.drive_max", f"is above the range of {what}, {span} at the drive", f"within {span}"
+                )
+
+
+@dataclass(frozen=True, slots=True)
+class Record:
+    """One record of a plan: its excitation, what it is for, the mirror that answers, and the noise on its output.
+
+    `noise_share` replaces the noise of the bench's sensor where it is not None. `kind` is that of the excitation.
+    """
+
+    excitation: Excitation
+    kind: str
+    use: str
+    truth: str
+    noise_share: float | None
+
+    @property
+    def stream(self) -> int:
+        """What tells the random numbers of this record from those of another one: a checksum of its name."""
+        return zlib.crc32(self.excitation.name.encode())
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """A plan that keeps its limits, with its designed records in the order of the file, and path, text and SHA-256."""
+
+    name: str
+    formats: tuple[str, ...]
+    limits: LimitsTable
+    bench: BenchTable
+    records: tuple[Record, ...]
+    path: Path
+    text: str
+    sha256: str
+
+
+def limits_of(limits: LimitsTable, axes: int, rate_hz: float | None = None) -> Limits:
+    """The limits as the designs take them, for each of the bench's axes, at the plan's rate or another."""
+    return Limits(
+        rate_hz=rate_hz or limits.rate_hz,
+        drive_min_v=limits.drive_min_v,
+        drive_max_v=limits.drive_max_v,
+        slew_v_s=limits.slew_v_s,
+        samples_per_period=limits.samples_per_period,
+        inputs=axes,
+    )
+
+
+def with_truth(plan: Plan, truth: Truth) -> Plan:
+    """The same plan played by one mirror throughout."""
+    return replace(plan, records=tuple(replace(record, truth=truth) for record in plan.records))
+
+
+def only(plan: Plan, names: Sequence[str]) -> Plan:
+    """The plan cut down to some of its records, by name; their noise stays the same.
+
+    Raises ValueError for a name that the plan does not have.
+    """
+    known = [record.excitation.name for record in plan.records]
+    for name in names:
+        if name not in known:
+            raise ValueError(f"{plan.path}: no record is named '{name}'; the plan has {', '.join(known)}.")
+    return replace(plan, records=tuple(r for r in plan.records if r.excitation.name in names))

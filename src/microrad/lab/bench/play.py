@@ -1,0 +1,141 @@
+"""Playing a plan: converter, mirror, sensor and converter again, for each record of it."""
+
+import hashlib
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from microrad.core.units import format_quantity
+from microrad.lab.bench.plan import ConvertersTable, Plan, Record
+from microrad.lab.bench.truth import Amplifier, bench_output, bouc_wen_output, linear_output
+from microrad.lab.recording import Recording
+
+Floats = NDArray[np.float64]
+Progress = Callable[[int, int, str], None]
+
+_MRAD = 1e3  # recordings are in volts and mrad
+
+
+class BenchError(ValueError):
+    """A plan that the bench cannot play, or a folder that it cannot write; the message says what to do."""
+
+
+@dataclass(frozen=True, slots=True)
+class Converter:
+    """A converter with a code every `step` from `low` on, `codes` of them; beyond its range it holds the last code."""
+
+    low: float
+    step: float
+    codes: int
+
+    def convert(self, values: Floats) -> Floats:
+        """The nearest code of each value, in the unit of the values."""
+        code = np.clip(np.round((values - self.low) / self.step), 0, self.codes - 1)
+        return np.asarray(self.low + code * self.step)
+
+
+def converters(table: ConvertersTable) -> tuple[Converter, Converter]:
+    """The converters of drive (V) and sensor (mrad)."""
+    codes = 2**table.bits
+    drive = Converter(table.drive_min_v, (table.drive_max_v - table.drive_min_v) / codes, codes)
+    low, high = table.output_min_rad * _MRAD, table.output_max_rad * _MRAD
+    return drive, Converter(low, (high - low) / codes, codes)
+
+
+def play(plan: Plan, seed: int, on_progress: Progress | None = None) -> tuple[Recording, ...]:
+    """What the bench records when it plays the plan: one recording a record, drives in V and outputs in mrad.
+
+    The drive is what the converter of the function generator gave out, the output what the converter of the sensor
+    took in at the same instants; true values are not in it. Each record has its own random stream, told by `seed` and
+    the record's name, so that it does not depend on the others. Raises `BenchError` when an output leaves the range of
+    its converter.
+    """
+    return tuple(recording for _, recording in played(plan, seed, on_progress))
+
+
+def played(plan: Plan, seed: int, on_progress: Progress | None = None) -> Iterator[tuple[Record, Recording]]:
+    """Each record with its recording, one after the other, see `play`."""
+    if seed < 0:
+        raise BenchError(f"the seed is {seed}; give a whole number of at least 0")
+    for done, record in enumerate(plan.records):
+        if on_progress:
+            on_progress(done, len(plan.records), record.excitation.name)
+        yield record, _recorded(plan, record, seed)
+    if on_progress:
+        on_progress(len(plan.records), len(plan.records), plan.name)
+
+
+def true_output(plan: Plan, record: Record) -> tuple[Floats, Floats]:
+    """Drive given out by the converter (V) and angle (mrad) without sensor, both of shape (samples, axes)."""
+    excitation, bench = record.excitation, plan.bench
+    drive = converters(bench.converters)[0].convert(excitation.drive)
+    rest_v = float(converters(bench.converters)[0].convert(np.array(excitation.rest_v)))
+    amplifier = Amplifier(bench.amplifier.bandwidth_hz, bench.amplifier.slew_v_s / bench.amplifier.gain)
+    columns = []
+    for column in np.ascontiguousarray(drive.T):
+        if record.truth == "linear":
+            columns.append(linear_output(column, rest_v, excitation.rate_hz))
+        elif record.truth == "bouc-wen":
+            columns.append(bouc_wen_output(column, rest_v, excitation.rate_hz))
+        else:
+            columns.append(bench_output(column, rest_v, excitation.rate_hz, amplifier))
+    mixing = np.where(np.eye(bench.axes, dtype=bool), 1.0, bench.crosstalk)
+    return drive, np.stack(columns, axis=1) @ mixing.T
+
+
+def _recorded(plan: Plan, record: Record, seed: int) -> Recording:
+    drive, angle = true_output(plan, record)
+    measured = angle + _sensor_error(plan, record, angle, seed)
+    _check_range(plan, record, measured)
+    output = converters(plan.bench.converters)[1].convert(measured)
+    drive, output = (np.ascontiguousarray(values) for values in (drive, output))
+    for values in (drive, output):
+        values.flags.writeable = False
+    return Recording(
+        path=record.excitation.name,
+        sha256=hashlib.sha256(drive.tobytes() + output.tobytes()).hexdigest(),
+        drive=drive,
+        output=output,
+        rate_hz=record.excitation.rate_hz,
+        input_names=channel_names("drive", plan.bench.axes),
+        output_names=channel_names("angle", plan.bench.axes),
+        period_samples=record.excitation.period_samples,
+        input_units=("V",) * plan.bench.axes,
+        output_units=("mrad",) * plan.bench.axes,
+    )
+
+
+def channel_names(word: str, count: int) -> tuple[str, ...]:
+    """The name of the channels: the word, numbered from 1 where there are several."""
+    return (word,) if count == 1 else tuple(f"{word}{i + 1}" for i in range(count))
+
+
+def _sensor_error(plan: Plan, record: Record, angle: Floats, seed: int) -> Floats:
+    """White noise, mains and drift (mrad) of each axis; the mains have the same phase on all."""
+    sensor = plan.bench.sensor
+    rng = np.random.Generator(np.random.Philox(np.random.SeedSequence(seed, spawn_key=(record.stream,))))
+    share = sensor.noise_share if record.noise_share is None else record.noise_share
+    rms = np.full(angle.shape[1], (sensor.noise_rad or 0.0) * _MRAD) if share is None else share * angle.std(axis=0)
+    time_s = np.arange(angle.shape[0]) / record.excitation.rate_hz
+    phase = 2 * math.pi * rng.random()
+    mains = sensor.mains_rad * _MRAD * np.sin(2 * math.pi * sensor.mains_frequency_hz * time_s + phase)
+    common = mains + sensor.drift_rad_s * _MRAD * time_s
+    return np.asarray(common[:, None] + rms * rng.standard_normal(angle.shape))
+
+
+def _check_range(plan: Plan, record: Record, measured: Floats) -> None:
+    """Refuse an output that its converter would clip: a clipped record is of no use."""
+    table = plan.bench.converters
+    low, high = float(measured.min()) / _MRAD, float(measured.max()) / _MRAD
+    if low < table.output_min_rad or high > table.output_max_rad:
+        reached, allowed = (
+            f"{format_quantity(a, 'rad')} to {format_quantity(b, 'rad')}"
+            for a, b in ((low, high), (table.output_min_rad, table.output_max_rad))
+        )
+        raise BenchError(
+            f"{plan.path}: excitation '{record.excitation.name}' moves the mirror over {reached}, but "
+            f"bench.converters take in {allowed}; widen output_min and output_max, or drive less"
+        )

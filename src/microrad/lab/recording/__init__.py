@@ -1,0 +1,23 @@
+"""Laboratory recordings: read from the formats of a laboratory, checked, and refused with the place that is wrong.
+
+Columns are named or numbered from 0. Lines of a text are counted from 1, as a text editor counts them, samples from 0.
+The values keep the units of the file; `identify` is told what they are.
+"""
+
+from microrad.lab.recording.reader import multisine_recordings, read_recording, recording_from_arrays
+from microrad.lab.recording.records import ACCEPTABLE, MIN_SAMPLES, Finding, FloatArray, Recording, RecordingError
+from microrad.lab.recording.stated import read_in, stated_units
+
+__all__ = [
+    "ACCEPTABLE",
+    "MIN_SAMPLES",
+    "Finding",
+    "FloatArray",
+    "Recording",
+    "RecordingError",
+    "multisine_recordings",
+    "read_in",
+    "read_recording",
+    "recording_from_arrays",
+    "stated_units",
+]

@@ -1,0 +1,179 @@
+"""Which datasets of an HDF5 file are not read, and why: told by what is said of them, before any of their values."""
+
+from __future__ import annotations
+
+import math
+import zlib
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from microrad.lab.recording.files import too_large
+from microrad.lab.recording.records import RecordingError
+
+ELSEWHERE = "and no other file is opened; copy the values into this one"
+"""What is done about data that stand in another file."""
+_DEFLATE, _SHUFFLE, _FLETCHER32, _LZF = 1, 2, 3, 32000
+_FILTERS = frozenset({_DEFLATE, _SHUFFLE, _FLETCHER32, _LZF})
+_UNCHECKED = frozenset({4, 5, 6})  # szip, n-bit and scale-offset: how much a piece holds is known once it is unpacked
+_PACKERS = frozenset({_DEFLATE, _LZF})
+_CHECKSUM_BYTES = 4
+_MATLAB_NUMBERS = frozenset(
+    ["double", "single", "int8", "int16", "int32", "int64", "uint8", "uint16", "uint32", "uint64", "logical"]
+)
+
+
+def unusable_dataset(path: Path, item: Any) -> str:
+    """Why a dataset is no channel and what to do, in words that follow its name; empty for one that may be."""
+    # The order matters: the shape of a virtual dataset may ask for its files.
+    if item.external or item.is_virtual:
+        return f"takes its values from other files, {ELSEWHERE}"
+    return _by_matlab(item) or _by_type(item) or _foreign_filter(item) or _too_large(path, item)
+
+
+def attribute(attributes: Mapping[str, Any], name: str) -> Any:
+    """An attribute's value; None where there is none or it is of a type that NumPy does not know."""
+    try:
+        return attributes.get(name)
+    except TypeError:
+        return None
+
+
+def matlab_class(item: Any) -> str:
+    """The class that MATLAB's version 7.3 states of a variable, else nothing."""
+    value = attribute(item.attrs, "MATLAB_class")
+    return value.decode("ascii", "replace") if isinstance(value, bytes) else str(value or "")
+
+
+def _by_matlab(item: Any) -> str:
+    """By what MATLAB states beside its values."""
+    if attribute(item.attrs, "MATLAB_empty"):
+        return _EMPTY
+    if attribute(item.parent.attrs, "MATLAB_sparse") is not None:
+        return "is part of a sparse matrix; save it as full"
+    kind = matlab_class(item)
+    return "" if not kind or kind in _MATLAB_NUMBERS else _MATLAB_WORDS.get(kind, _OBJECT)
+
+
+def _by_type(item: Any) -> str:
+    import h5py
+
+    try:
+        dtype = item.dtype
+    except TypeError as error:
+        return f"has a type that is not read ({error}); save it as floating-point numbers"
+    if h5py.check_string_dtype(dtype):
+        return _TEXT
+    if h5py.check_ref_dtype(dtype):
+        return "holds references to other data (cells, or an array of structures, in MATLAB); save these as arrays"
+    if dtype.hasobject:
+        return "holds rows of different lengths; save each as an array"
+    return _EMPTY if item.shape is None or 0 in item.shape else ""
+
+
+_EMPTY = "holds no samples; record again, or name another"
+_TEXT = "holds text, not real numbers; save numbers, or name another"
+_OBJECT = "is an object of MATLAB, which only MATLAB reads; save its numbers as arrays"
+_MATLAB_WORDS = {"char": _TEXT, "cell": "holds cells; save the numbers of each cell as an array"}
+
+
+def _filters(item: Any) -> list[tuple[int, str]]:
+    """Numbers and names of the filters that pack a dataset, in their order."""
+    made = item.id.get_create_plist()
+    found = (made.get_filter(number) for number in range(made.get_nfilters()))
+    return [(code, name.decode("ascii", "replace").split(";")[0]) for code, _, _, name in found]
+
+
+def _foreign_filter(item: Any) -> str:
+    import h5py
+
+    filters = _filters(item)
+    for code, name in filters:
+        if code in _UNCHECKED:
+            return f"is packed by the filter {code} ({name}), whose pieces cannot be checked; {_REPACK}"
+        if code not in _FILTERS or not h5py.h5z.filter_avail(code):
+            return (
+                f"is packed by the filter {code}{f' ({name})' if name else ''}, which is none of HDF5's own; {_REPACK}"
+            )
+    return f"is packed twice over; {_REPACK}" if sum(code in _PACKERS for code, _ in filters) > 1 else ""
+
+
+_REPACK = "pack it with gzip or not at all (h5repack -f GZIP=1 old.h5 new.h5)"
+
+
+def _too_large(path: Path, item: Any) -> str:
+    """Of the values, and of the pieces that they are stored in: a piece is unpacked whole."""
+    size = item.dtype.itemsize
+    whole = too_large(path, item.shape, size)
+    piece = too_large(path, item.chunks, size) if item.chunks else ""
+    return whole or (f"is stored in pieces, each of which {piece}" if piece else "")
+
+
+def check_pieces(path: Path, name: str, item: Any) -> None:
+    """Refuse a piece that does not unpack to what it states.
+
+    Of one that holds more the library would make room for all; behind one that holds less it reads on in the memory.
+
+    Raises `RecordingError`.
+    """
+    if item.chunks is None:
+        return
+    codes = [code for code, _ in _filters(item)]
+    stated = math.prod(item.chunks) * item.id.get_type().get_size()
+    offsets: list[tuple[int, ...]] = []
+    item.id.chunk_iter(lambda piece: offsets.append(piece.chunk_offset))
+    for offset in offsets:
+        mask, data = item.id.read_direct_chunk(offset)
+        # A bit of the mask leaves a filter out.
+        active = [code for number, code in enumerate(codes) if not mask >> number & 1]
+        found = _unpacked_bytes(data, active, stated)
+        if found != stated:
+            amount = "more" if found > stated else "less"
+            raise RecordingError(
+                f"{path}: '{name}' has a piece, from sample {offset} on, that unpacks to {amount} than the {stated} "
+                "bytes that it states; the file is damaged, or made to do harm: copy it again from its source."
+            )
+
+
+def _unpacked_bytes(data: bytes, filters: Sequence[int], stated: int) -> int:
+    """Bytes that a piece unpacks to, counted up to one more than it states."""
+    size = len(data)
+    for code in reversed(filters):
+        if code == _FLETCHER32:
+            size -= _CHECKSUM_BYTES
+        elif code == _DEFLATE:
+            size = _inflated_bytes(data[: max(size, 0)], stated)
+        elif code == _LZF:
+            size = _lzf_bytes(data[: max(size, 0)])
+    return size
+
+
+def _inflated_bytes(data: bytes, stated: int) -> int:
+    stream = zlib.decompressobj()
+    try:
+        size = len(stream.decompress(data, stated + 1))
+    except zlib.error:
+        return 0
+    return size if stream.eof or size > stated else 0  # cut off: nobody knows how much it was
+
+
+def _lzf_bytes(data: bytes) -> int:
+    """Bytes that LZF unpacks to: runs of 1 to 32 bytes as they are, and copies of 3 to 264 bytes that were before."""
+    place = size = 0
+    while place < len(data):
+        control = data[place]
+        if control < 32:
+            place += control + 2
+            size += control + 1
+            continue
+        length, far = control >> 5, (control & 31) << 8
+        place += 1
+        if length == 7:
+            length += data[place] if place < len(data) else 0
+            place += 1
+        far += (data[place] if place < len(data) else 0) + 1
+        place += 1
+        if far > size:
+            return 0
+        size += length + 2
+    return size if place == len(data) else 0

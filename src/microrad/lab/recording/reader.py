@@ -1,0 +1,298 @@
+"""From a file, or from arrays, to a checked `Recording`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from microrad.lab.recording.checks import Signals, check_signals
+from microrad.lab.recording.files import check_file, file_format
+from microrad.lab.recording.rates import agreed_rate, check_rate, rate_of_time
+from microrad.lab.recording.records import (
+    ACCEPTABLE,
+    MIN_SAMPLES,
+    Finding,
+    FloatArray,
+    Recording,
+    RecordingError,
+    digest_of,
+    frozen,
+)
+from microrad.lab.recording.sources import SECONDS, Source, StatedRate, time_unit
+
+Column = int | str
+
+
+def read_recording(
+    path: str | Path,
+    inputs: Column | Sequence[Column],
+    outputs: Column | Sequence[Column],
+    rate_hz: float | None = None,
+    *,
+    time: Column | None = None,
+    period_samples: int | None = None,
+    accept: Sequence[str] = (),
+) -> Recording:
+    """Read drives and outputs from a laboratory file and check them.
+
+    Text (CSV, TSV, ...), LabVIEW .lvm and .tdms, MATLAB .mat (v5 to v7.3), NumPy .npy and .npz, and HDF5 are told
+    apart by their content. A channel is a name or a number counted from 0; `group/channel` in TDMS and HDF5,
+    `structure/field` in MATLAB, `variable[2]` for a column of an array; a sequence gives several channels.
+
+    `rate_hz` is the sample rate where the file states none; where both are known they must agree to 0.1 %. `time`
+    names the time column, else one that is plainly called so is used. `period_samples` is the length of one period
+    of a periodic excitation. `accept` names findings of degree (`jitter`, `clipping`, `dead`, `quantisation`,
+    `drift`, `unexcited`, `lead`) that are to be carried in `Recording.findings` instead of refused.
+
+    Raises `RecordingError`, naming file, channel, row and remedy, for anything that cannot be relied upon.
+    """
+    path = Path(path)
+    if rate_hz is not None:
+        rate_hz = check_rate(str(path), rate_hz)
+    _check_accept(str(path), accept)
+    check_file(path)
+    source = open_source(path)
+    ins, outs = _columns(source, inputs, "input"), _columns(source, outputs, "output")
+    _check_distinct(source, ins, outs)
+    clock = _clock(source, [*ins, *outs], time)
+    optional = time is None and rate_hz is not None
+    columns, rates, findings = _load(source, [*ins, *outs], clock, optional)
+    place = source.place
+    rate = agreed_rate(str(path), rate_hz, [*source.rates([*ins, *outs]), *rates])
+    _check_lengths(source, [*ins, *outs], columns)
+    labels = [f"the input, {source.label(i)}" for i in ins], [f"the output, {source.label(i)}" for i in outs]
+    signals = Signals(str(path), columns[: len(ins)], columns[len(ins) :], labels[0], labels[1], rate, place)
+    findings = [*findings, *check_signals(signals)]
+    drive, output = _table(columns[: len(ins)]), _table(columns[len(ins) :])
+    return Recording(
+        str(path),
+        source.sha256,
+        drive,
+        output,
+        rate,
+        tuple(source.names[i] for i in ins),
+        tuple(source.names[i] for i in outs),
+        _checked_period(str(path), period_samples, drive.shape[0]),
+        tuple(source.units[i] for i in ins),
+        tuple(source.units[i] for i in outs),
+        _judged(str(path), findings, accept),
+    )
+
+
+def recording_from_arrays(
+    drive: ArrayLike,
+    output: ArrayLike,
+    rate_hz: float,
+    name: str = "arrays",
+    period_samples: int | None = None,
+    *,
+    accept: Sequence[str] = (),
+) -> Recording:
+    """Make a recording from arrays of shape (samples,) or (samples, channels), under the same checks as a file.
+
+    `name` stands where the path of a file would. Raises `RecordingError`.
+    """
+    rate_hz = check_rate(name, rate_hz)
+    _check_accept(name, accept)
+    u, y = (np.array(a, dtype=np.float64) for a in (drive, output))
+    if u.ndim not in (1, 2) or y.ndim not in (1, 2) or len(u) != len(y) or 0 in (u.size, y.size):
+        raise RecordingError(
+            f"{name}: drive has shape {u.shape} and output {y.shape}; give arrays of shape (samples,) or (samples, "
+            "channels) with equally many samples."
+        )
+    u, y = (a.reshape(len(a), -1) for a in (u, y))
+    inputs, outputs = ([np.ascontiguousarray(c) for c in a.T] for a in (u, y))
+    signals = Signals(
+        name, inputs, outputs, _array_labels("drive", inputs), _array_labels("output", outputs), rate_hz, _sample
+    )
+    findings = check_signals(signals)
+    return Recording(
+        name,
+        digest_of(u, y),
+        frozen(u),
+        frozen(y),
+        rate_hz,
+        _array_names("drive", inputs),
+        _array_names("output", outputs),
+        _checked_period(name, period_samples, len(u)),
+        findings=_judged(name, findings, accept),
+    )
+
+
+def multisine_recordings(
+    drive: ArrayLike, output: ArrayLike, rate_hz: float, name: str = "multisine", *, accept: Sequence[str] = ()
+) -> tuple[Recording, ...]:
+    """One recording per realisation of a periodic multisine experiment.
+
+    `drive` has the shape (samples of one period, inputs, realisations, periods) and `output` (samples of one period,
+    outputs, realisations, periods). The periods are joined in time and `period_samples` is set. Raises
+    `RecordingError`.
+    """
+    u, y = (np.asarray(a) for a in (drive, output))
+    if u.ndim != 4 or y.ndim != 4 or (u.shape[0], *u.shape[2:]) != (y.shape[0], *y.shape[2:]):
+        raise RecordingError(
+            f"{name}: drive has shape {u.shape} and output {y.shape}; give (samples, channels, realisations, periods) "
+            "with the same samples, realisations and periods."
+        )
+
+    def joined(array: np.ndarray, realisation: int) -> np.ndarray:
+        return np.concatenate([array[:, :, realisation, p] for p in range(array.shape[3])])
+
+    return tuple(
+        recording_from_arrays(
+            joined(u, r), joined(y, r), rate_hz, f"{name} realisation {r}", period_samples=u.shape[0], accept=accept
+        )
+        for r in range(u.shape[2])
+    )
+
+
+# ---------------------------------------------------------------------------------------------------------- opening
+def open_source(path: Path) -> Source:
+    """The file as named channels; libraries are imported only for the format at hand."""
+    # One import per format: each pulls a library that the others do not need.
+    kind = file_format(path)
+    if kind == "tdms":
+        from microrad.lab.recording.tdms import TdmsSource
+
+        return TdmsSource(path)
+    if kind == "lvm":
+        from microrad.lab.recording.lvm import LvmSource
+
+        return LvmSource(path)
+    if kind == "mat":
+        from microrad.lab.recording.matlab import MatlabSource
+
+        return MatlabSource(path)
+    if kind in ("hdf5", "mat73"):
+        from microrad.lab.recording.hdf5 import Hdf5Source
+
+        return Hdf5Source(path, matlab=kind == "mat73")
+    if kind in ("npy", "npz"):
+        from microrad.lab.recording.numpyfiles import NumpySource
+
+        return NumpySource(path, archive=kind == "npz")
+    from microrad.lab.recording.text import TextSource
+
+    return TextSource(path)
+
+
+def _columns(source: Source, wanted: Column | Sequence[Column], role: str) -> list[int]:
+    several = [wanted] if isinstance(wanted, (int, str)) else list(wanted)
+    if not several:
+        raise RecordingError(f"{source.path}: no {role} channel was given; name at least one.")
+    return [source.resolve(column, role) for column in several]
+
+
+def _check_distinct(source: Source, ins: Sequence[int], outs: Sequence[int]) -> None:
+    for index in ins:
+        if index in outs:
+            raise RecordingError(
+                f"{source.path}: input and output are both {source.label(index)}, so there is nothing to identify; "
+                "give the drive as input and the sensor as output."
+            )
+    for role, several in (("input", ins), ("output", outs)):
+        twice = next((i for i in several if list(several).count(i) > 1), None)
+        if twice is not None:
+            raise RecordingError(f"{source.path}: {source.label(twice)} is given twice as {role}; name it once.")
+
+
+def _clock(source: Source, used: Sequence[int], time: Column | None) -> int | None:
+    """Number of the time channel: the one named, else one that is plainly called time."""
+    if time is None:
+        return source.find_time(used)
+    index = source.resolve(time, "time")
+    if index in used:
+        raise RecordingError(f"{source.path}: {source.label(index)} is the time and a signal; name another one.")
+    return index
+
+
+def _load(
+    source: Source, used: list[int], clock: int | None, optional: bool
+) -> tuple[list[FloatArray], list[StatedRate], list[Finding]]:
+    """Columns of the channels, and what the time column says; `optional` lets one pass that is not made of numbers."""
+    if clock is None:
+        return source.load(used), [], []
+    label = source.label(clock)
+    try:
+        columns = source.load([*used, clock])
+    except RecordingError:
+        if not optional:
+            raise
+        columns = source.load(used)  # raises where the fault is in the signals
+        text = f"{label} is called time and is not a column of numbers; the rate given was believed"
+        return columns, [], [Finding("time", source.names[clock], None, text, False)]
+    _check_lengths(source, [*used, clock], columns)
+    time, unit = columns.pop(), time_unit(source.names[clock], source.units[clock])
+    if unit not in SECONDS:
+        raise RecordingError(
+            f"{source.path}: {label}: the time is in '{unit}'; convert it to one of {', '.join(SECONDS)}, or name no "
+            "time column and give the rate."
+        )
+    if time.size < MIN_SAMPLES:
+        return columns, [], []  # refused for its length
+    rate, findings = rate_of_time(str(source.path), label, time * SECONDS[unit], source.place)
+    return columns, [rate], findings
+
+
+def _check_lengths(source: Source, indices: Sequence[int], columns: Sequence[FloatArray]) -> None:
+    for index, column in zip(indices, columns, strict=True):
+        if column.size != columns[0].size:
+            raise RecordingError(
+                f"{source.path}: {source.label(indices[0])} has {columns[0].size} samples and {source.label(index)} "
+                f"{column.size}; name channels that were sampled together, or cut them to their common time."
+            )
+
+
+# ---------------------------------------------------------------------------------------------------------- judging
+def _check_accept(where: str, accept: Sequence[str]) -> None:
+    names = [accept] if isinstance(accept, str) else list(accept)
+    unknown = [name for name in names if name not in ACCEPTABLE]
+    if unknown or isinstance(accept, str):
+        raise RecordingError(
+            f"{where}: accept = {accept!r}; give a sequence of {', '.join(ACCEPTABLE)}. Other faults, such as gaps or "
+            "nan, cannot be accepted."
+        )
+
+
+def _judged(where: str, findings: Sequence[Finding], accept: Sequence[str]) -> tuple[Finding, ...]:
+    refused = [f for f in findings if f.refused and f.kind not in accept]
+    if refused:
+        kinds = list(dict.fromkeys(f.kind for f in refused))
+        options = " ".join(f"--accept {kind}" for kind in kinds)
+        text = ". Also: ".join(f.message for f in refused)
+        raise RecordingError(
+            f"{where}: {text}. To take it on as it is: {options} (in Python accept={tuple(kinds)!r}).", refused
+        )
+    return tuple(findings)
+
+
+def _checked_period(where: str, period_samples: int | None, samples: int) -> int | None:
+    if period_samples is None:
+        return None
+    if isinstance(period_samples, bool) or not isinstance(period_samples, (int, np.integer)):
+        raise RecordingError(f"{where}: period_samples is {period_samples!r}; give a whole number of samples.")
+    if not 2 <= period_samples <= samples:
+        raise RecordingError(
+            f"{where}: a period of {period_samples} samples does not fit into {samples} samples; give the length of "
+            "one period in samples."
+        )
+    return int(period_samples)
+
+
+def _table(columns: Sequence[FloatArray]) -> FloatArray:
+    return frozen(columns[0][:, None] if len(columns) == 1 else np.column_stack(columns))
+
+
+def _sample(row: int) -> str:
+    return f"sample {row}"
+
+
+def _array_names(role: str, columns: Sequence[FloatArray]) -> tuple[str, ...]:
+    return (role,) if len(columns) == 1 else tuple(f"{role} {k}" for k in range(len(columns)))
+
+
+def _array_labels(role: str, columns: Sequence[FloatArray]) -> list[str]:
+    return [f"the {name}" for name in _array_names(role, columns)]

@@ -1,0 +1,261 @@
+"""Acquisition as a chain of timed stages with retries: probability and time until both terminals lock."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from microrad.core.units import SPEED_OF_LIGHT_M_S, format_quantity
+from microrad.link.acquisition.limits import require_count, require_not_negative, require_positive, require_probability
+from microrad.link.acquisition.times import TimeDistribution, fixed_time, joined
+
+LOCKED = "locked"
+LOST = "lost"
+
+
+@dataclass(frozen=True, slots=True)
+class Stage:
+    """One stage: it lasts `duration_s` and succeeds, or fails and has then cost `timeout_s`.
+
+    A `duration_s` that is a distribution is that of success, whatever its sum. Left out, the time-out is the duration,
+    the longest one. After a failure the chain goes back to the stage named `on_failure`, or repeats this one.
+    """
+
+    name: str
+    duration_s: float | TimeDistribution
+    success_probability: float = 1.0
+    timeout_s: float | None = None
+    on_failure: str = ""
+
+    def __post_init__(self) -> None:
+        """Refuse a probability outside (0, 1], a negative time and a time-out shorter than the stage."""
+        require_probability(f'the probability of success of the stage "{self.name}"', self.success_probability)
+        require_not_negative(f'the duration of the stage "{self.name}"', self.longest_s, "s")
+        require_not_negative(f'the time-out of the stage "{self.name}"', self.failure_s, "s")
+        if self.failure_s < self.longest_s:
+            raise ValueError(
+                f'the stage "{self.name}" lasts {format_quantity(self.longest_s, "s")} and its time-out is'
+                f" {format_quantity(self.failure_s, 's')}: the time-out must not be shorter"
+            )
+
+    @property
+    def longest_s(self) -> float:
+        """Longest duration of success."""
+        if isinstance(self.duration_s, TimeDistribution):
+            return float(self.duration_s.time_s[-1]) if self.duration_s.time_s.size else 0.0
+        return self.duration_s
+
+    @property
+    def failure_s(self) -> float:
+        """Time that a failure costs."""
+        return self.longest_s if self.timeout_s is None else self.timeout_s
+
+    @property
+    def success_times(self) -> TimeDistribution:
+        """Duration of success, with probabilities that sum to that of success."""
+        if isinstance(self.duration_s, TimeDistribution):
+            return self.duration_s.given_success().scaled(self.success_probability)
+        return fixed_time(self.duration_s, self.success_probability)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Outcome:
+    """What a sequence comes to: the time until lock and the time until it is given up; their probabilities sum to 1."""
+
+    locked: TimeDistribution
+    lost: TimeDistribution
+
+    @property
+    def success_probability(self) -> float:
+        """Probability of lock."""
+        return self.locked.probability
+
+    @property
+    def failure_probability(self) -> float:
+        """Probability that the sequence is given up."""
+        return self.lost.probability
+
+    @property
+    def mean_time_s(self) -> float:
+        """Mean time until lock, given lock."""
+        return self.locked.mean_s
+
+
+@dataclass(frozen=True, slots=True)
+class Timing:
+    """Times of the paper's sequence; the range gives the light time.
+
+    GEO looks for the beacon in `frames` frames of `frame_time_s`. `geo_response_s` is the time GEO needs to turn and
+    answer, `leo_detection_s` that of LEO's measurement of the answer, `lock_time_s` that of each terminal to lock.
+    `own_name` and `partner_name` are what the stages call LEO and GEO.
+    """
+
+    range_m: float
+    body_settling_s: float
+    frame_time_s: float
+    frames: int
+    geo_response_s: float
+    leo_detection_s: float
+    mirror_settling_s: float
+    lock_time_s: float
+    own_name: str = "LEO"
+    partner_name: str = "GEO"
+
+    def __post_init__(self) -> None:
+        """Refuse negative times, a range that is not positive and less than one frame."""
+        require_positive("the range", self.range_m, "m")
+        require_positive("the time of a frame", self.frame_time_s, "s")
+        require_count("the number of frames", self.frames)
+        for name in ("body_settling_s", "geo_response_s", "leo_detection_s", "mirror_settling_s", "lock_time_s"):
+            require_not_negative(name, getattr(self, name), "s")
+
+    @property
+    def light_time_s(self) -> float:
+        """Time of the light from one terminal to the other."""
+        return self.range_m / SPEED_OF_LIGHT_M_S
+
+
+@dataclass(frozen=True, slots=True)
+class Chances:
+    """Probabilities of the paper's sequence, each in (0, 1].
+
+    Coverage is the probability that a beam lands: `beacon_coverage` that of LEO's body pointing within the beacon,
+    `answer_coverage` that of GEO's pointing within its narrow beam, `return_coverage` that of LEO's narrow beam under
+    its sensor noise and point-ahead error. `frame_detection` is the detection in one frame of a beacon that lands,
+    `answer_detection` that of LEO's sensor, `lock` that of each terminal on a beam that lands.
+    """
+
+    beacon_coverage: float
+    frame_detection: float
+    answer_coverage: float
+    answer_detection: float
+    return_coverage: float
+    lock: float = 1.0
+
+    def __post_init__(self) -> None:
+        """Refuse a probability outside (0, 1]."""
+        for name in self.__slots__:
+            require_probability(name, getattr(self, name))
+
+
+def frame_detection_probability(signal_to_noise: float, threshold_to_noise: float) -> float:
+    """Probability that a frame's signal with unit Gaussian noise exceeds the threshold, both in rms of the noise.
+
+    The probability of a false alarm in a frame without signal is the same with a signal of zero.
+    """
+    require_not_negative("the signal-to-noise ratio", signal_to_noise, "")
+    if not math.isfinite(threshold_to_noise):
+        raise ValueError(f"the threshold is {threshold_to_noise:g} times the noise: it must be finite")
+    return 0.5 * math.erfc((threshold_to_noise - signal_to_noise) / math.sqrt(2.0))
+
+
+def frames_detection_probability(frame_probability: float, frames: int) -> float:
+    """Probability of detection in at least one of independent frames, 1 - (1 - p)^n."""
+    require_probability("the probability of detection in a frame", frame_probability)
+    require_count("the number of frames", frames)
+    return 1.0 - (1.0 - frame_probability) ** frames
+
+
+def beacon_stages(timing: Timing, chances: Chances) -> tuple[Stage, ...]:
+    """First stages with the wide beacon: LEO's body settles, light time, GEO detects.
+
+    Where the beacon does not land, no frame helps: coverage times the probability of the frames. A failure costs LEO
+    the wait for an answer, and its body points anew.
+    """
+    detect_s = timing.frames * timing.frame_time_s
+    detected = chances.beacon_coverage * frames_detection_probability(chances.frame_detection, timing.frames)
+    wait_s = detect_s + timing.geo_response_s + timing.light_time_s + timing.leo_detection_s
+    first = f"{timing.own_name} points the beacon"
+    return (
+        Stage(first, timing.body_settling_s),
+        Stage("beacon travels", timing.light_time_s),
+        Stage(f"{timing.partner_name} detects", detect_s, detected, wait_s, first),
+    )
+
+
+def scan_stages(timing: Timing, scan: TimeDistribution, duration_s: float) -> tuple[Stage, ...]:
+    """First stages with a scan by a narrow beam: `scan` is the time to detection in one scan of `duration_s`.
+
+    A scan without detection is repeated after the wait for an answer, and LEO's body points anew.
+    """
+    wait_s = duration_s + timing.geo_response_s + timing.light_time_s + timing.leo_detection_s
+    probability = min(scan.probability, 1.0)
+    first = f"{timing.own_name} points the scan"
+    return (
+        Stage(first, timing.body_settling_s),
+        Stage("beam travels", timing.light_time_s),
+        Stage(f"{timing.partner_name} detects", scan.given_success(), probability, wait_s, first),
+    )
+
+
+def answer_stages(timing: Timing, chances: Chances) -> tuple[Stage, ...]:
+    """Stages from GEO's answer to lock.
+
+    When the answer does not land, GEO answers again; when LEO's narrow beam does not, or a lock fails, LEO measures
+    the answer again. LEO learns that GEO has not locked only after the light time back.
+    """
+    light_s, lock_s = timing.light_time_s, timing.lock_time_s
+    answered = chances.answer_coverage * chances.answer_detection
+    own, partner = timing.own_name, timing.partner_name
+    answer, again = f"{partner} turns and answers", f"{own} detects the answer"
+    return (
+        Stage(answer, timing.geo_response_s),
+        Stage("answer travels", light_s),
+        Stage(again, timing.leo_detection_s, answered, timing.leo_detection_s + light_s, answer),
+        Stage(f"{own}'s mirror turns", timing.mirror_settling_s),
+        Stage("narrow beam travels", light_s),
+        Stage(f"{partner} locks", lock_s, chances.return_coverage * chances.lock, lock_s + light_s, again),
+        Stage(f"{partner}'s beam travels", light_s),
+        Stage(f"{own} locks", lock_s, chances.lock, lock_s, again),
+    )
+
+
+def paper_sequence(timing: Timing, chances: Chances) -> tuple[Stage, ...]:
+    """The sequence of the paper's section 2.1: wide beacon, narrow answer, narrow beam back, both lock.
+
+    The paper gives the order alone; what follows a failure is the choice of `beacon_stages` and `answer_stages`.
+    """
+    return (*beacon_stages(timing, chances), *answer_stages(timing, chances))
+
+
+def solve(stages: Sequence[Stage], attempts: int) -> Outcome:
+    """Distribution of the time until lock when every failure takes one of `attempts`; the last one gives up.
+
+    Exact: all orders of failures are summed; times that are distributions are convolved. Raises `ValueError` for no
+    attempt, no stage, two stages of one name and a failure that goes back to a stage that is not there or comes later.
+    """
+    back = check_sequence(stages, attempts)
+    locked: list[TimeDistribution] = []
+    lost: list[TimeDistribution] = []
+    arrivals: list[list[TimeDistribution]] = [[] for _ in stages]
+    arrivals[0].append(fixed_time(0.0))
+    for attempt in range(attempts):
+        failed: list[list[TimeDistribution]] = [[] for _ in stages]
+        for index, stage in enumerate(stages):
+            if not arrivals[index]:
+                continue
+            here = joined(arrivals[index])
+            after = arrivals[index + 1] if index + 1 < len(stages) else locked
+            after.append(here.followed_by(stage.success_times))
+            if stage.success_probability < 1.0:
+                fail = here.shifted(stage.failure_s).scaled(1.0 - stage.success_probability)
+                (lost if attempt == attempts - 1 else failed[back[index]]).append(fail)
+        arrivals = failed
+    none = fixed_time(0.0, 0.0)
+    return Outcome(joined([*locked, none]), joined([*lost, none]))
+
+
+def check_sequence(stages: Sequence[Stage], attempts: int) -> tuple[int, ...]:
+    """Index of the stage to which each stage goes back; raises `ValueError` as `solve` does."""
+    require_count("the number of attempts", attempts)
+    names = [stage.name for stage in stages]
+    if not names:
+        raise ValueError("the sequence has no stage: give at least one")
+    if len(set(names)) < len(names):
+        raise ValueError(f"two stages have the same name among {', '.join(names)}: name each differently")
+    for index, stage in enumerate(stages):
+        if stage.on_failure and stage.on_failure not in names[: index + 1]:
+            raise ValueError(
+                f'"{stage.name}" goes back to "{stage.on_failure}" on failure: it must be itself or an earlier stage,'
+                f" one of {', '.join(names[: index + 1])}"
+            )
+    return tuple(names.index(s.on_failure) if s.on_failure else i for i, s in enumerate(stages))

@@ -1,0 +1,140 @@
+"""A wide beacon against a scan by a narrow beam: time and probability over the uncertainty."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from microrad.link.acquisition.detection import detection_times
+from microrad.link.acquisition.limits import require_angle, require_not_negative, require_positive
+from microrad.link.acquisition.scan import Detector, Search, Spiral, highest_speed
+
+_Array = NDArray[np.float64]
+
+
+_WIDE_PER_RADIUS = math.sqrt(2.0)
+"""Half angle at 1/e2 of the beam with the most irradiance at a radius that it has to cover, over that radius."""
+
+
+@dataclass(frozen=True, slots=True)
+class Receiver:
+    """The partner's acquisition receiver: it detects `power_w` behind its aperture within `time_s`.
+
+    Its noise is white and does not depend on the light: the time falls with the square of the power. A one-sided
+    noise-equivalent power N in W/sqrt(Hz) and a needed ratio r of signal to rms noise are r N / sqrt(2) in 1 s.
+    """
+
+    aperture_area_m2: float
+    power_w: float
+    time_s: float
+    shortest_s: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Refuse values that are not positive."""
+        require_positive("the receiver's aperture area", self.aperture_area_m2, "m^2")
+        require_positive("the power that the receiver needs", self.power_w, "W")
+        require_positive("the time in which it does", self.time_s, "s")
+        require_not_negative("the shortest detection time", self.shortest_s, "s")
+
+    def detection_time_s(self, power_w: ArrayLike) -> _Array:
+        """Time to detection at each received power, at least `shortest_s`."""
+        less = self.power_w / np.asarray(power_w, dtype=np.float64)
+        return np.asarray(np.maximum(self.time_s * less**2, self.shortest_s))
+
+
+@dataclass(frozen=True, slots=True)
+class Beams:
+    """The transmitter and its two beams at one range.
+
+    `power_w` is the power that leaves the terminal, losses taken off. The narrow beam has the half angle
+    `narrow_half_angle_rad` at 1/e2 and is used out to `beam_radius_rad`; its tracks overlap by the share `overlap`
+    of its diameter.
+    """
+
+    power_w: float
+    range_m: float
+    narrow_half_angle_rad: float
+    beam_radius_rad: float
+    overlap: float
+
+    def __post_init__(self) -> None:
+        """Refuse values that are not positive, and an overlap that is no share."""
+        require_positive("the transmitted power", self.power_w, "W")
+        require_positive("the range", self.range_m, "m")
+        require_angle("the narrow beam's half angle", self.narrow_half_angle_rad)
+        require_angle("the beam's radius", self.beam_radius_rad)
+        if not 0.0 <= self.overlap < 1.0:
+            raise ValueError(
+                f"the overlap is {self.overlap:g}: it must be 0 or more and below 1, a share of a diameter"
+            )
+
+    @property
+    def edge_irradiance_w_m2(self) -> float:
+        """Irradiance at the partner where the narrow beam is just used."""
+        return float(self.irradiance_w_m2(self.narrow_half_angle_rad, self.beam_radius_rad))
+
+    def irradiance_w_m2(self, half_angle_rad: ArrayLike, off_axis_rad: ArrayLike) -> _Array:
+        """Irradiance of a Gaussian beam at the partner: 2 P / (pi w^2 L^2) exp(-2 (angle / w)^2), w at 1/e2."""
+        half = np.asarray(half_angle_rad, dtype=np.float64)
+        off = np.asarray(off_axis_rad, dtype=np.float64)
+        on_axis = 2.0 * self.power_w / (math.pi * (half * self.range_m) ** 2)
+        return np.asarray(on_axis * np.exp(-2.0 * (off / half) ** 2))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Trade:
+    """Both ways over the uncertainty, (n,) arrays; times without settling and light time.
+
+    The wide beacon takes `wide_time_s` and succeeds with `wide_probability`, the coverage; the scan lasts at most
+    `scan_time_s`, detects with `scan_probability` and then takes `scan_mean_time_s` in the mean, at `speed_rad_s`.
+    """
+
+    sigma_rad: _Array
+    radius_rad: _Array
+    wide_full_angle_rad: _Array
+    wide_time_s: _Array
+    wide_probability: _Array
+    scan_time_s: _Array
+    scan_mean_time_s: _Array
+    scan_probability: _Array
+    speed_rad_s: float
+
+
+def wide_against_scan(
+    sigma_rad: ArrayLike,
+    coverage: float,
+    beams: Beams,
+    receiver: Receiver,
+    jitter_rms_rad: float = 0.0,
+) -> Trade:
+    """Time and probability of the wide beacon and of a spiral scan for each uncertainty per axis (paper, section 2.1).
+
+    Both are dimensioned at the edge: the wide beacon integrates until a target on the radius of `coverage` is
+    detected, the scan is as slow as a target half way between two tracks and `beam_radius_rad` off the axis needs. The
+    wide beam's half angle at 1/e2 is sqrt(2) times the radius: no other is brighter there. It sees no `jitter_rms_rad`,
+    which is small against it. Raises `ValueError` for tracks that do not overlap.
+    """
+    sigma = np.atleast_1d(np.asarray(sigma_rad, dtype=np.float64))
+    if beams.overlap == 0.0:
+        raise ValueError("the overlap is 0: it must be above 0, or a target between two tracks is seen for no time")
+    searches = [Search(float(s), beams.beam_radius_rad, beams.overlap, coverage) for s in sigma]
+    radius = np.array([search.radius_rad for search in searches])
+    wide = _WIDE_PER_RADIUS * radius
+    area = receiver.aperture_area_m2
+    wide_time = receiver.detection_time_s(area * beams.irradiance_w_m2(wide, radius))
+    detector = Detector(float(receiver.detection_time_s(area * beams.edge_irradiance_w_m2)))
+    speed = highest_speed(searches[0], detector.detection_time_s)
+    scans = [Spiral(search, detector, speed) for search in searches]
+    found = [detection_times(scan, jitter_rms_rad) for scan in scans]
+    return Trade(
+        sigma_rad=sigma,
+        radius_rad=radius,
+        wide_full_angle_rad=2.0 * wide,
+        wide_time_s=wide_time,
+        wide_probability=np.full(sigma.size, coverage),
+        scan_time_s=np.array([scan.duration_s for scan in scans]),
+        scan_mean_time_s=np.array([times.mean_s for times in found]),
+        scan_probability=np.array([times.probability for times in found]),
+        speed_rad_s=speed,
+    )

@@ -1,0 +1,204 @@
+"""What a static bias and jitter of the pointing do to the link of a Gaussian beam, far field.
+
+Transmission h = exp(-2 r^2 / theta^2), theta the half angle at 1/e^2 of the intensity, r the radial pointing error.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from microrad.core.units import format_quantity
+from microrad.link.radial_error import Jitter, at_least_zero, radial_quantile, radial_survival
+
+Floats = NDArray[np.float64]
+
+_DB_PER_SQUARE = 20.0 / math.log(10.0)  # loss in dB is 8.686 (r / theta)^2
+
+
+# ------------------------------------------------------------------------------------------------------------- checks
+def _half_angle(values: ArrayLike) -> Floats:
+    array = np.asarray(values, dtype=np.float64)
+    wrong = array[~(np.isfinite(array) & (array > 0.0))]
+    if wrong.size:
+        shown = format_quantity(wrong[0], "rad")
+        raise ValueError(f"a half angle of {shown} is no beam; give the half angle at 1/e^2, above 0 rad")
+    return array
+
+
+# ---------------------------------------------------------------------------------------------------------------- mean
+def transmission(radius_rad: ArrayLike, half_angle_rad: ArrayLike) -> Floats:
+    """h = exp(-2 r^2 / theta^2), the power on axis taken as 1; radial error and half angle are broadcast."""
+    radius = at_least_zero(radius_rad, "radial error", "rad")
+    return np.asarray(np.exp(-2.0 * (radius / _half_angle(half_angle_rad)) ** 2))
+
+
+def _squares(jitter: Jitter, half_angle_rad: ArrayLike) -> tuple[Floats, Floats]:
+    """4 rms^2 / theta^2 and 2 bias^2 / theta^2 per axis, the axis last."""
+    theta = _half_angle(half_angle_rad)[..., None]
+    return 4.0 * (np.asarray(jitter.rms_rad) / theta) ** 2, 2.0 * (np.asarray(jitter.bias_rad) / theta) ** 2
+
+
+def mean_loss_db(jitter: Jitter, half_angle_rad: ArrayLike) -> Floats:
+    """Loss of mean power in dB against a beam pointed without error, -10 lg E[h]; see `mean_transmission`."""
+    spread, offset = _squares(jitter, half_angle_rad)
+    nepers = np.sum(0.5 * np.log1p(spread) + offset / (1.0 + spread), axis=-1)
+    return np.asarray(10.0 / math.log(10.0) * nepers)
+
+
+def mean_transmission(jitter: Jitter, half_angle_rad: ArrayLike) -> Floats:
+    """Mean E[h]: the product over the axes of exp(-2 b^2 / (theta^2 + 4 s^2)) / sqrt(1 + 4 s^2 / theta^2).
+
+    b is the bias and s the rms of the axis (the Gaussian integral, done). Equal axes without bias give
+    1 / (1 + 4 s^2 / theta^2), as the density beta h^(beta - 1), beta = theta^2 / (4 s^2), of Toyoshima et al. (2002).
+    Raises `ValueError` for a half angle that is not above 0.
+    """
+    return np.asarray(10.0 ** (-0.1 * mean_loss_db(jitter, half_angle_rad)))
+
+
+# -------------------------------------------------------------------------------------------------------- distribution
+def outage_probability(jitter: Jitter, half_angle_rad: ArrayLike, margin_db: ArrayLike) -> Floats:
+    """P(pointing loss > margin): the share of time that a fade margin above the power on axis does not cover.
+
+    Half angle and margin are broadcast. Equal axes without bias give P(h < x) = x^beta, beta as in
+    `mean_transmission`. Raises `ValueError` for a negative margin or a half angle not above 0.
+    """
+    return radial_survival(jitter, radius_of_loss_rad(half_angle_rad, margin_db))
+
+
+def outage_loss_db(jitter: Jitter, half_angle_rad: ArrayLike, probability: ArrayLike) -> Floats:
+    """Pointing loss in dB not exceeded but for `probability`: the fade margin that this outage needs."""
+    return np.asarray(_DB_PER_SQUARE * (radial_quantile(jitter, probability) / _half_angle(half_angle_rad)) ** 2)
+
+
+def radius_of_loss_rad(half_angle_rad: ArrayLike, loss_db: ArrayLike) -> Floats:
+    """Radial error (rad) at which the pointing loss is `loss_db`, from loss = 8.686 dB (r / theta)^2."""
+    loss = at_least_zero(loss_db, "loss", "dB")
+    return np.asarray(_half_angle(half_angle_rad) * np.sqrt(loss / _DB_PER_SQUARE))
+
+
+# ----------------------------------------------------------------------------------------------------- best divergence
+@dataclass(frozen=True, slots=True)
+class BestDivergence:
+    """Half angle at 1/e^2 that gives the most received power under a criterion.
+
+    `loss_db` is the pointing loss that the criterion counts, at this half angle; `gain_db` the transmit gain 8/theta^2
+    less that loss. `wanted_half_angle_rad` is the best one without a smallest: what a larger aperture would allow, 0
+    where there is no error to be wide for. `at_limit` says that the smallest half angle binds: the beam would be
+    narrower if it could. `current_excess_db` is what the current half angle loses against the best, if one was given.
+    """
+
+    half_angle_rad: float
+    loss_db: float
+    gain_db: float
+    wanted_half_angle_rad: float
+    at_limit: bool
+    current_excess_db: float | None
+
+
+def best_divergence_for_outage(
+    jitter: Jitter,
+    probability: float,
+    *,
+    smallest_half_angle_rad: float = 0.0,
+    current_half_angle_rad: float | None = None,
+) -> BestDivergence:
+    """Half angle with the most power at the loss exceeded with `probability`: sqrt(2) times that radial error.
+
+    The loss there is 4.343 dB whatever the bias and the axes, unless the limit binds. Equal axes s without bias give
+    2 s sqrt(ln(1/p)). Raises `ValueError` as `best_divergence_for_static_error` and `radial_quantile`.
+    """
+    radius = float(radial_quantile(jitter, probability))
+    return best_divergence_for_static_error(
+        radius, smallest_half_angle_rad=smallest_half_angle_rad, current_half_angle_rad=current_half_angle_rad
+    )
+
+
+def best_divergence_for_static_error(
+    error_rad: float, *, smallest_half_angle_rad: float = 0.0, current_half_angle_rad: float | None = None
+) -> BestDivergence:
+    """Half angle with the most power at a static radial error: sqrt(2) times it, where 8/theta^2 h is largest.
+
+    Raises `ValueError` for a negative error, a current half angle below the smallest, or no error and no limit.
+    """
+    error = float(at_least_zero(error_rad, "radial error", "rad"))
+    limit = float(at_least_zero(smallest_half_angle_rad, "smallest half angle", "rad"))
+    wanted = math.sqrt(2.0) * error
+
+    def loss_db(half_angle: float) -> float:
+        return _DB_PER_SQUARE * (error / half_angle) ** 2
+
+    return _best(max(wanted, limit), wanted, loss_db, limit, current_half_angle_rad)
+
+
+def best_divergence_for_mean(
+    jitter: Jitter, *, smallest_half_angle_rad: float = 0.0, current_half_angle_rad: float | None = None
+) -> BestDivergence:
+    """Half angle with the most mean power, the largest 8/theta^2 E[h].
+
+    Without bias the mean power grows as the beam narrows, down to the smallest half angle: jitter alone has no best
+    divergence by this criterion. Equal axes s have one for a radial bias b above sqrt(2) s, at
+    theta^2 = 2 b^2 - 4 s^2. Raises `ValueError` when there is none and no limit, or the current half angle is below it.
+    """
+    limit = float(at_least_zero(smallest_half_angle_rad, "smallest half angle", "rad"))
+    squares = _stationary_squares(jitter)
+
+    def best_from(smallest: float) -> float:
+        candidates = [smallest**2, *(square for square in squares if square > smallest**2)]
+        return math.sqrt(max(candidates, key=lambda square: _log_mean_gain(jitter, square)))
+
+    def loss_db(half_angle: float) -> float:
+        return float(mean_loss_db(jitter, half_angle))
+
+    return _best(max(best_from(limit), limit), best_from(0.0), loss_db, limit, current_half_angle_rad)
+
+
+def _stationary_squares(jitter: Jitter) -> list[float]:
+    """theta^2 > 0 where the mean gain is stationary: the sum of (2 b^2 - T / 2) / T^2 over the axes is 0.
+
+    T = theta^2 + 4 s^2, so it is a cubic in theta^2. It is solved in units of the largest angle.
+    """
+    unit = max(*(abs(bias) for bias in jitter.bias_rad), *jitter.rms_rad)
+    if unit == 0.0:
+        return []
+    polynomial = np.polynomial.Polynomial
+    t_x, t_y = (polynomial([4.0 * (rms / unit) ** 2, 1.0]) for rms in jitter.rms_rad)
+    b_x, b_y = (polynomial([2.0 * (bias / unit) ** 2]) for bias in jitter.bias_rad)
+    cubic = (b_x - 0.5 * t_x) * t_y**2 + (b_y - 0.5 * t_y) * t_x**2
+    roots = [complex(root) for root in cubic.roots()]
+    # real parts will do: a candidate that is no maximum is outdone by one that is
+    return [root.real * unit**2 for root in roots if root.real > 0.0]
+
+
+def _log_mean_gain(jitter: Jitter, square: float) -> float:
+    """ln of E[h] / theta^2 at theta^2 = `square`, its limit where that is 0 and an axis does not jitter."""
+    total = 0.0
+    for bias, rms in zip(jitter.bias_rad, jitter.rms_rad, strict=True):
+        width = square + 4.0 * rms**2
+        if width == 0.0 and bias != 0.0:
+            return -math.inf
+        total += math.inf if width == 0.0 else -0.5 * math.log(width) - 2.0 * bias**2 / width
+    return total
+
+
+def _best(
+    best: float, wanted: float, loss_db: Callable[[float], float], limit: float, current: float | None
+) -> BestDivergence:
+    if best == 0.0:
+        raise ValueError(
+            "the received power grows without end as the beam narrows (half angle 0 rad); "
+            "give the smallest half angle, the diffraction limit of the aperture"
+        )
+    if current is not None and float(_half_angle(current)) < limit:
+        raise ValueError(
+            f"the current half angle of {format_quantity(current, 'rad')} is below the smallest, "
+            f"{format_quantity(limit, 'rad')}; correct one of them"
+        )
+
+    def gain_db(half_angle: float) -> float:
+        return 10.0 * math.log10(8.0 / half_angle**2) - loss_db(half_angle)
+
+    excess = None if current is None else gain_db(best) - gain_db(current)
+    return BestDivergence(best, loss_db(best), gain_db(best), wanted, best == limit, excess)

@@ -1,0 +1,114 @@
+"""What is required of a mission's links: a line for each requirement, with its margin and what limits it."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+from microrad import link
+from microrad.link.budget import FREE_SPACE_LOSS
+from microrad.link.study import LinkStudy
+from microrad.mission.model import LinkMission, Source
+
+Subject = Literal["cone", "beacon", "answer", "communication", "residual", "stroke", "fine pointing"]
+"""What a requirement is about: the beacon's cone, a margin, the error that a loop leaves, or the mirror's stroke."""
+
+ROUNDING = 1e-9
+"""Share of a number, or decibels, that rounding may take from it."""
+
+DERIVED = "derived"
+"""Mark of a requirement that is met by the choice of an input."""
+
+IMPOSSIBLE = "how strong the link is in its near field: this budget has more light arrive than was sent"
+
+
+@dataclass(frozen=True, slots=True)
+class Requirement:
+    """One line of the verdict, in one unit; ``margin`` is positive when it is met.
+
+    ``unknown`` says, where it is not empty, what would have to be known before the number may be relied on: such a
+    requirement is not met, whatever its margin. ``derived`` are inputs of it that were chosen so that something is met,
+    with what they were derived from: that such a requirement is met says nothing of the terminal.
+    """
+
+    subject: Subject
+    name: str
+    unit: str
+    required: float
+    actual: float
+    margin: float
+    limited_by: str
+    unknown: str = ""
+    derived: tuple[str, ...] = ()
+
+    @property
+    def met(self) -> bool:
+        """Whether the requirement is met; a rate that was solved for meets it but for rounding."""
+        size = max(abs(self.required), abs(self.actual), 1.0 if self.unit == "dB" else 0.0)
+        return self.margin >= -ROUNDING * size and not self.unknown
+
+    @property
+    def mark(self) -> str:
+        """PASS or FAIL, or `DERIVED` where it is met by the choice of an input."""
+        return "FAIL" if not self.met else DERIVED if self.derived else "PASS"
+
+    @property
+    def because(self) -> str:
+        """What limits it, or what is not known."""
+        return self.unknown or self.limited_by
+
+
+def of_links(study: LinkStudy) -> tuple[Requirement, ...]:
+    """What the budgets alone are held against: what is required of the beacon, the answer and communication."""
+    m = study.file.mission
+    name = "communication margin" + ("" if m.jitter is None else f" but for {outage_words(m)}")
+    return (*of_beams(study), _of_budget(study, "communication", study.communication, m.requirement.margin_db, name))
+
+
+def met(study: LinkStudy) -> bool:
+    """Whether the links meet all that is required of them."""
+    return all(r.met for r in of_links(study))
+
+
+def of_beams(study: LinkStudy) -> tuple[Requirement, ...]:
+    """What is required of beacon and answer, where the mission has them: the beacon's cone, and 0 dB of each."""
+    found = [] if study.beacon is None else [_cone(study), _of_budget(study, "beacon", study.beacon)]
+    found += [] if study.answer is None else [_of_budget(study, "answer", study.answer)]
+    return tuple(found)
+
+
+def outage_words(m: LinkMission) -> str:
+    """The share of the time that the required margin may be missed."""
+    return f"{100 * m.requirement.outage:g} % of the time"
+
+
+def derived_from(sources: Mapping[str, Source], *keys: str) -> tuple[str, ...]:
+    """The inputs under these keys whose source calls them derived, each with its value and what from.
+
+    A value that was changed since is none of them.
+    """
+    found = [(key, s) for key, s in sources.items() if s.kind == "derived" and not s.was and key.startswith(keys)]
+    return tuple(f"{key} = {_bare(s.value)} ({s.comment.partition(': ')[2]})" for key, s in found)
+
+
+def _bare(value: str) -> str:
+    return value.strip('"')
+
+
+def _cone(study: LinkStudy) -> Requirement:
+    assert study.open_loop is not None  # it has a beacon
+    p, derived = study.open_loop, derived_from(study.file.sources, "pointing.", "beacon.divergence")
+    half, name = p.beacon_half_angle_rad, "beacon cone over the root sum square"
+    largest = max(zip(p.variance_shares, p.lines, strict=True), key=lambda pair: pair[0])[1].name
+    return Requirement("cone", name, "rad", p.rss_rad, half, half - p.rss_rad, largest, derived=derived)
+
+
+def _of_budget(
+    study: LinkStudy, subject: Subject, budget: link.LinkBudget, required_db: float = 0.0, name: str = ""
+) -> Requirement:
+    # Free space is lost by everyone: name the largest loss that a design can change.
+    losses = [line for line in budget.lines if line.unit == "dB" and line.name != FREE_SPACE_LOSS]
+    limit, spare = min(losses, key=lambda line: line.value).name, budget.margin_db - required_db
+    doubt, derived = "" if budget.possible else IMPOSSIBLE, derived_from(study.file.sources, f"{subject}.")
+    return Requirement(
+        subject, name or f"{subject} margin", "dB", required_db, budget.margin_db, spare, limit, doubt, derived
+    )

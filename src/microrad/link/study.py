@@ -1,0 +1,266 @@
+"""The links of a mission and what follows from their tables: budgets, pointing, tracking light, acquisition."""
+
+import difflib
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from microrad import link
+from microrad.core import kept
+from microrad.core.budget import Line
+from microrad.core.units import format_quantity
+from microrad.link import pointing
+from microrad.link.partner_search import Finding, Tracking, finding, tracking
+from microrad.link.under_jitter import Performance, error_rad, margin_db, of_jitter, required_error_rad
+from microrad.mission.file import LinkFile
+from microrad.mission.model import LinkMission, Source, source_text
+
+Floats = NDArray[np.float64]
+
+STATIC_MARGIN = "Static margin"
+"""What the margin at the static pointing error is called where the margin is the one under a jitter."""
+
+_OF_APERTURE = np.geomspace(0.1, 1.5, 28)
+"""Radii of the beam, over that of its aperture, of which the best is looked for: a tenth from one to the next."""
+
+
+@dataclass(frozen=True, slots=True)
+class PointAheadEffect:
+    """Point-ahead by its three faces: an angle of the beam, a range of the mirror, and a loss when left out.
+
+    `beam_half_angles` counts the communication beam's half angles at 1/e2; `loss_db` is what leaving it out costs at
+    the mission's pointing error, and `mirror_range_rad` what a mirror ahead of no telescope has to cover both ways.
+    """
+
+    angle_rad: float
+    corrected: bool
+    beam_half_angles: float
+    loss_db: float
+    mirror_range_rad: float
+
+
+@dataclass(frozen=True, slots=True)
+class BeamRadius:
+    """The radius of the data's beam with the largest margin in its aperture, and how much more margin that is (dB)."""
+
+    best_m: float
+    gained_db: float
+
+
+@dataclass(frozen=True, slots=True)
+class LinkStudy:
+    """Everything that follows from the tables of the links alone. The links that a mission lacks are None.
+
+    The communication budget is made at the error of `link_performance.error_rad`: under a jitter its margin is the one
+    that is kept but for the outage, and the margin at the static pointing error stands below it. ``receiver_noise`` are
+    the noise terms of the communication receiver at the received power, where it is given by what it is made of.
+    ``tornados`` has one of each budget, in the same order. ``beam_radius`` is None unless the mission has one.
+    """
+
+    file: LinkFile
+    open_loop: pointing.OpenLoopPointing | None
+    communication: link.LinkBudget
+    beacon: link.LinkBudget | None
+    answer: link.LinkBudget | None
+    receiver_noise: tuple[Line, ...]
+    largest_rate_bit_s: float
+    tornados: tuple[link.Tornado, ...]
+    under_jitter: Performance | None
+    tracking: Tracking | None
+    point_ahead: PointAheadEffect | None
+    beam_radius: BeamRadius | None
+    finding: Finding | None
+
+    @property
+    def budgets(self) -> tuple[link.LinkBudget, ...]:
+        """The budgets that there are, communication first."""
+        return tuple(b for b in (self.communication, self.beacon, self.answer) if b is not None)
+
+    @property
+    def closes(self) -> bool:
+        """Whether each budget has a margin of at least 0 dB."""
+        return all(budget.closes for budget in self.budgets)
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What a reader of the budgets must not overlook."""
+        return tuple(warning for budget in self.budgets for warning in budget.warnings)
+
+
+def solve_rate(file: LinkFile) -> LinkFile:
+    """The file with a data rate of "largest" replaced by the rate that it stands for.
+
+    Raises `LinkError` when no rate has the required margin.
+    """
+    m = file.mission
+    if not math.isnan(m.communication.data_rate_bit_s):
+        return file
+    q, own, error = m.requirement, file.sources["communication.data_rate"], required_error_rad(m)
+    rate = link.largest_data_rate(m, q.margin_db, error)
+    beam = m.communication.model_copy(update={"data_rate_bit_s": rate})
+    at = f"{q.margin_db:g} dB at {format_quantity(error, 'rad')}"
+    solved = replace(own, value=format_quantity(rate, "bit/s"), comment=f"solved for: the largest with {at}")
+    mission = m.model_copy(update={"communication": beam})
+    return replace(file, mission=mission, sources={**file.sources, "communication.data_rate": solved})
+
+
+@dataclass(frozen=True, slots=True)
+class Solution:
+    """The values of one key that leave what is required of a margin, in SI units, and the file with one of them.
+
+    ``file`` has ``value``: the least that leaves the margin, or the most where as little as was looked for leaves it.
+    Where none does, it is the given file with its own value.
+    """
+
+    key: str
+    unit: str
+    of: str
+    required_db: float
+    solved: link.Solved
+    value: float
+    file: LinkFile
+
+
+def solve(file: LinkFile, key: str) -> Solution:
+    """The values of a key of the links' tables that leave the required margin: of communication, but for the outage.
+
+    A key of the beacon's table is looked for at 0 dB of the beacon, one of the answer's at 0 dB of the answer. Raises
+    ValueError for a key that these tables do not have, and for one that is 0.
+    """
+    file = solve_rate(file)
+    m, sources = file.mission, file.sources
+    tables = ("jitter", *link.LINK_TABLES, *(name for name in ("beacon", "answer") if getattr(m, name) is not None))
+    every = [each for table in tables for each in link.inputs(m, table)]
+    found = tuple(each for each in every if key in (each.key, each.shown))
+    if not found:
+        raise ValueError(_no_such_key(key, dict.fromkeys(each.key for each in every)))
+    of, required = "communication", m.requirement.margin_db
+    if found[0].table == "beacon":
+        of, required = "beacon", 0.0
+        solved = link.solve(m, found, lambda n: link.beacon_budget(n, sources).margin_db, required, link.fits("beacon"))
+    elif found[0].table == "answer":
+        of, required = "answer", 0.0
+        solved = link.solve(m, found, lambda n: link.answer_budget(n, sources).margin_db, required, link.fits("answer"))
+    else:
+        solved = link.solve(m, found, margin_db, required, link.lit)
+    unit = link.unit_of(m, found[0].field, found[0].rule)
+    if not solved.intervals:
+        return Solution(key, unit, of, required, solved, max(each.value for each in found), file)
+    first, last = solved.intervals[0], solved.intervals[-1]
+    value = last.high if first.low_open else first.low
+    mission = link.moved(m, found, value)
+    assert mission is not None  # it leaves the margin
+    was = sources.get(found[0].key)
+    shown = format_quantity(value, unit) if unit else f"{value:.4g}"
+    comment = f"solved for: {required:g} dB of {of}"
+    given = replace(was, value=shown, comment=comment, was="") if was else Source(0, comment, shown)
+    changed = replace(file, mission=mission, sources={**sources, found[0].key: given})
+    return Solution(key, unit, of, required, solved, value, changed)
+
+
+def _no_such_key(key: str, keys: Iterable[str]) -> str:
+    last = key[:60].rpartition(".")[2]
+    near = [each for each in keys if each.rpartition(".")[2] == last] or difflib.get_close_matches(key[:60], keys, n=3)
+    hint = f"did you mean {' or '.join(near)}?" if near else f"there are {', '.join(keys)}"
+    return f'no table of the links has a quantity "{key[:60]}"; {hint}'
+
+
+def run(file: LinkFile, parts: kept.Kept = kept.NOTHING) -> LinkStudy:
+    """Budgets of every link of a mission and what follows from them.
+
+    Raises ValueError with the reason when a receiver does not take the data rate, or a scan has no time to detect.
+    """
+    file = solve_rate(file)
+    m, sources = file.mission, file.sources
+    beacon = None if m.beacon is None else link.beacon_budget(m, sources)
+    answer = None if m.answer is None else link.answer_budget(m, sources)
+    open_loop = None if m.pointing is None else pointing.open_loop_budget(m, sources)
+    light = tracking(file, answer)
+    communication, receiver = communication_budget(m, sources), link.receiver(m)
+    rate = m.communication.data_rate_bit_s
+    noise = () if receiver is None else receiver.noise_lines(communication.received_power_w, rate)
+    return LinkStudy(
+        file=file,
+        open_loop=open_loop,
+        communication=communication,
+        beacon=beacon,
+        answer=answer,
+        receiver_noise=noise,
+        largest_rate_bit_s=largest_rate(m),
+        tornados=tornados(file, communication, beacon, answer),
+        under_jitter=of_jitter(m),
+        tracking=light,
+        point_ahead=point_ahead(m),
+        beam_radius=beam_radius(m),
+        finding=parts.part(finding, m, open_loop, beacon, answer, light),
+    )
+
+
+def communication_budget(m: LinkMission, sources: Mapping[str, Source]) -> link.LinkBudget:
+    """The budget of the communication link at `link_performance.error_rad`, with the static margin under a jitter.
+
+    Raises `ValueError` for a data rate that the receiver does not take.
+    """
+    if m.jitter is None:
+        return link.communication_budget(m, sources)
+    stated = source_text(sources, "jitter.bias", "jitter.rms", "requirement.outage")
+    given = f"error that the jitter exceeds for {100 * m.requirement.outage:g} % of the time: {stated}"
+    found = link.communication_budget(m, sources, pointing_error_rad=error_rad(m), given_source=given)
+    static = link.communication_budget(m, sources)
+    basis = f"at {format_quantity(m.communication.pointing_error_rad, 'rad')} of pointing error, without the jitter"
+    line = replace(static.totals[-1], name=STATIC_MARGIN, basis=basis)
+    return replace(found, totals=(*found.totals, line))
+
+
+def tornados(
+    file: LinkFile, communication: link.LinkBudget, beacon: link.LinkBudget | None, answer: link.LinkBudget | None
+) -> tuple[link.Tornado, ...]:
+    """What moves the margin of each budget."""
+    m, sources = file.mission, file.sources
+    swings = link.swings(m, sources, ("jitter", "requirement", *link.LINK_TABLES), margin_db)
+    found = [link.Tornado(communication.name, communication.margin_db, swings)]
+    for budget in (beacon, answer):
+        if budget is not None:
+            swings = link.beam_tornado(m, sources, "beacon" if budget is beacon else "answer")
+            found.append(link.Tornado(budget.name, budget.margin_db, swings))
+    return tuple(found)
+
+
+def beam_radius(m: LinkMission) -> BeamRadius | None:
+    """What another radius of the data's beam would bring, or None where the mission gives none.
+
+    An aperture that grows while the radius stays gives no more light: the radius has to grow with it.
+    """
+    beam = m.communication.beam
+    if beam is None or beam.radius_m is None:
+        return None
+    radii = [*(m.terminals.leo_aperture_m / 2.0 * _OF_APERTURE), beam.radius_m]
+
+    def at(radius_m: float) -> float:
+        changed = m.with_value("communication.beam.radius_m", radius_m)
+        return link.margin_or_none(changed, margin_db) if link.lit(changed) else -math.inf
+
+    margins = [at(float(each)) for each in radii]
+    best = max(range(len(radii)), key=margins.__getitem__)
+    return BeamRadius(float(radii[best]), margins[best] - margins[-1])
+
+
+def largest_rate(m: LinkMission) -> float:
+    """Data rate with the required margin at `link_performance.required_error_rad`, or nan when there is none."""
+    try:
+        return link.largest_data_rate(m, m.requirement.margin_db, required_error_rad(m))
+    except link.LinkError:
+        return math.nan
+
+
+def point_ahead(m: LinkMission) -> PointAheadEffect | None:
+    """What the mission's point-ahead is to its beam and its mirror, or None where it is not given."""
+    if m.point_ahead is None:
+        return None
+    angle = pointing.point_ahead_rad(m.point_ahead.transverse_velocity_m_s)
+    fall, error = link.communication_beam(m).fall, m.communication.pointing_error_rad
+    loss = float(fall.loss_db(error + angle) - fall.loss_db(error))
+    return PointAheadEffect(angle, m.point_ahead.corrected, angle / fall.half_angle_rad, loss, 2.0 * angle)

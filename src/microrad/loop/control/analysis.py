@@ -1,0 +1,423 @@
+"""What a linear loop does: closed loop, stability, stationary variances, and what its margins are."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from microrad.core import lti
+from microrad.loop.control.problem import GAUGE, OPTICAL, AxisController, DesignPlant
+
+Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
+Flags = NDArray[np.bool_]
+Response = Callable[[Floats], Complexes]
+Distance = Callable[[Complexes], Floats]
+
+COMMAND = 3
+"""Output of a closed loop behind those of the plant (residual, optical, gauge): the command (V)."""
+
+BREAKS = ("command", "optical")
+"""Where a loop is cut: at the command all paths at once, at the optical sensor with the gauge's loop closed."""
+
+_POINTS = 3000
+
+
+# ------------------------------------------------------------------------------------------------ closed loop
+
+
+def refuse_misfit(plant: DesignPlant, controller: AxisController, period_s: float | None = None) -> None:
+    """Raise ValueError where a controller cannot close this plant's loop.
+
+    Wrong numbers of inputs, outputs or states, a number that is not finite, a plant that answers the command of its own
+    sample, or a controller made for another control period (``period_s``, where it is known).
+    """
+    s, name = controller.system, controller.name
+    n = s.order
+    shapes = {"A": (n, n), "B": (n, 2), "C": (1, n), "D": (1, 2)}
+    found = {key: getattr(s, key) for key in shapes} | {"anti-windup": controller.anti_windup}
+    for key, shape in (shapes | {"anti-windup": (n, 1)}).items():
+        if found[key].shape != shape:
+            raise ValueError(
+                f"controller {name!r}: {key} has shape {found[key].shape}, not {shape}: a controller of one axis has "
+                "the inputs optical and gauge, one output, and one row and column for a state"
+            )
+        if not np.all(np.isfinite(found[key])):
+            raise ValueError(
+                f"controller {name!r}: {key} holds a number that is not finite; look for a gain that is nan or infinite"
+            )
+    if np.any(plant.system.D[:, 0] != 0.0):
+        raise ValueError("the plant answers the command of its own sample: give it its delay before a loop is closed")
+    if period_s is not None and not math.isclose(period_s, plant.period_s, rel_tol=1e-9):
+        raise ValueError(
+            f"controller {name!r} is made for a period of {period_s:g} s, the plant is sampled every "
+            f"{plant.period_s:g} s: design it again for this rate"
+        )
+
+
+def refuse_improper(numerator: tuple[float, ...], denominator: tuple[float, ...], name: str) -> None:
+    """Raise ValueError where a transfer function (powers of s or z, highest first) would need its input's future."""
+    orders = [len(np.trim_zeros(np.asarray(c, dtype=float), "f")) - 1 for c in (numerator, denominator)]
+    if orders[1] < 0:
+        raise ValueError(f"{name}: the denominator is zero; give it at least one coefficient other than 0")
+    if orders[0] > orders[1]:
+        raise ValueError(
+            f"{name} is not causal: a numerator of order {orders[0]} over a denominator of order {orders[1]} needs its "
+            f"input's future; add {orders[0] - orders[1]} or more poles (a low-pass above the band)"
+        )
+
+
+def close(plant: DesignPlant, controller: AxisController) -> lti.StateSpace:
+    """Discrete closed loop from the plant's white sequences to residual, optical, gauge (rad) and command (V).
+
+    States: plant, controller. The command is not clipped. Raises ValueError as `refuse_misfit` does; an unstable loop
+    is returned as it is.
+    """
+    refuse_misfit(plant, controller)
+    p, c = plant.system, controller.system
+    command, white = p.B[:, :1], p.B[:, 1:]
+    seen, noise = p.C[OPTICAL:], p.D[OPTICAL:, 1:]
+    A = np.block([[p.A + command @ c.D @ seen, command @ c.C], [c.B @ seen, c.A]])
+    B = np.vstack([white + command @ c.D @ noise, c.B @ noise])
+    C = np.block([[p.C, np.zeros((3, c.order))], [c.D @ seen, c.C]])
+    return lti.StateSpace(A, B, C, np.vstack([p.D[:, 1:], c.D @ noise]))
+
+
+def reachable(A: Floats, B: Floats) -> Flags:
+    """States that an input reaches through the entries other than 0 of A and B.
+
+    For a plant built from blocks these are the states that a command moves; the rest is the disturbance's own.
+    """
+    reached = np.any(B != 0.0, axis=1)
+    for _ in range(A.shape[0]):
+        reached = reached | np.any((A != 0.0) & reached, axis=1)
+    return np.asarray(reached)
+
+
+def moved(plant: DesignPlant) -> DesignPlant:
+    """The plant without the states that its command does not reach, and without disturbance and noise."""
+    s = plant.system
+    r = reachable(s.A, s.B[:, :1])
+    part = lti.StateSpace(s.A[np.ix_(r, r)], s.B[r][:, :1], s.C[:, r], s.D[:, :1])
+    return DesignPlant(plant.period_s, part, 0, plant.gain_rad_v, plant.has_optical, plant.has_gauge)
+
+
+def loop_poles(plant: DesignPlant, controller: AxisController) -> Complexes:
+    """Poles z of the closed loop, largest first, without those that belong to the disturbance alone."""
+    found = np.linalg.eigvals(close(moved(plant), controller).A)
+    return np.asarray(found[np.argsort(-np.abs(found), kind="stable")], dtype=complex)
+
+
+def refuse_unstable(plant: DesignPlant, controller: AxisController) -> None:
+    """Raise ValueError where the closed loop is unstable, with its worst pole and by how far it misses a margin."""
+    worst = loop_poles(plant, controller)[0]
+    if abs(worst) < 1.0:
+        return
+    response, f = _respond(plant, controller, "command"), _frequencies(plant, controller)
+    least, _ = _least(_modulus, response, f, response(f))
+    raise ValueError(
+        f"controller {controller.name!r} makes the loop unstable: a pole at |z| = {abs(worst):.6f} (the limit is 1), "
+        f"{abs(np.angle(worst)) / (2 * math.pi * plant.period_s):.4g} Hz, at a control period of {plant.period_s:g} s. "
+        f"Its loop gain passes -1 on the wrong side, with a modulus min |1 + L| of {least:.3g}; "
+        "lower its gains, shorten the delay, or tune it for a modulus margin"
+    )
+
+
+# ------------------------------------------------------------------------------------------------ variances
+
+
+def h2(closed: lti.StateSpace) -> Floats:
+    """Stationary variance of each output (row) that each white sequence of unit variance (column) causes.
+
+    The sequences are independent: an output's variance is the sum of its row. Raises ValueError where a pole lies on or
+    outside the unit circle, for which there is no stationary variance.
+    """
+    worst = float(np.max(np.abs(np.linalg.eigvals(closed.A)), initial=0.0))
+    if worst >= 1.0:
+        raise ValueError(
+            f"no stationary variance: a pole at |z| = {worst:.9f} (the limit is 1); give the disturbance some damping "
+            "where it is the disturbance's own, else lower the controller's gains"
+        )
+    X = lti.gramian(closed.A, closed.C[:, :, None] * closed.C[:, None, :])
+    return np.asarray(np.einsum("ij,oik,kj->oj", closed.B, X, closed.B) + closed.D**2)
+
+
+def by_source(plant: DesignPlant, controller: AxisController, output: int = 0) -> dict[str, float]:
+    """Variance of one output of the closed loop (the residual, rad^2) from disturbance, optical and gauge noise."""
+    row = h2(close(plant, controller))[output]
+    n = plant.disturbances
+    parts = (row[:n], row[n : n + 1], row[n + 1 :])
+    return dict(zip(("disturbance", "optical noise", "gauge noise"), (float(np.sum(p)) for p in parts), strict=True))
+
+
+# ------------------------------------------------------------------------------------------------ margins
+
+
+@dataclass(frozen=True, slots=True)
+class LoopMargins:
+    """Margins of one stable loop, and how far it reaches.
+
+    ``gain_up`` and ``gain_down`` are the factors nearest 1 that make it unstable (infinite and 0 without one),
+    ``phase_rad`` the smallest phase margin in either direction, ``delay_s`` the smallest additional delay, ``modulus``
+    is min |1 + L|, ``disk`` the symmetric disk margin 2 / max |S - T|. ``crossover_hz`` is the highest frequency with
+    |L| = 1 (nan without one), ``bandwidth_hz`` the lowest with |S| = 1, ``peak`` the largest |S|.
+    """
+
+    gain_up: float
+    gain_down: float
+    phase_rad: float
+    delay_s: float
+    modulus: float
+    disk: float
+    crossover_hz: float
+    bandwidth_hz: float
+    peak: float
+    peak_hz: float
+
+    @property
+    def disk_gain(self) -> tuple[float, float]:
+        """Range of gain that the disk contains; see `disk_gain`."""
+        return disk_gain(self.disk)
+
+    @property
+    def disk_phase_rad(self) -> float:
+        """Phase, in either direction, that the disk contains; see `disk_phase_rad`."""
+        return disk_phase_rad(self.disk)
+
+
+def disk_gain(disk: float) -> tuple[float, float]:
+    """Factors on the loop's gain, lowest and highest, within a symmetric disk margin.
+
+    (1 - disk/2) / (1 + disk/2) and its reciprocal. Source: Seiler, Packard and Gahinet, An introduction to disk
+    margins, IEEE Control Systems Magazine 40 (2020) 78.
+    """
+    lowest = max(0.0, (2.0 - disk) / (2.0 + disk)) if math.isfinite(disk) else 0.0
+    return lowest, 1.0 / lowest if lowest else math.inf
+
+
+def disk_phase_rad(disk: float) -> float:
+    """Change of the loop's phase, in either direction, within a symmetric disk margin: 2 atan(disk / 2), as there."""
+    return 2.0 * math.atan(disk / 2.0)
+
+
+def loop_response(
+    plant: DesignPlant, controller: AxisController, freq_hz: Floats, broken_at: str = "command"
+) -> Complexes:
+    """Loop gain L, shape (frequencies,), of the loop cut at one of `BREAKS`; 1 + L = 0 is the limit of stability.
+
+    Frequencies up to half the control rate. Raises ValueError above it, and as `refuse_misfit` does.
+    """
+    refuse_misfit(plant, controller)
+    freq_hz = np.atleast_1d(np.asarray(freq_hz, dtype=float))
+    if np.any(freq_hz > 0.5 / plant.period_s * (1 + 1e-12)):
+        raise ValueError(
+            f"{np.max(freq_hz):g} Hz lies above half the control rate, {0.5 / plant.period_s:g} Hz: a sampled loop "
+            "has no response of its own there"
+        )
+    return _respond(plant, controller, broken_at)(freq_hz)
+
+
+def cut(K: Complexes, G: Complexes, broken_at: str) -> Complexes:
+    """Loop gain from the responses of controller (sensor to command) and plant (command to sensor), shape (..., 2).
+
+    At the command -(K_o G_o + K_g G_g); at the optical sensor, with the gauge's loop closed, -K_o G_o / (1 - K_g G_g).
+    """
+    parts = K * G
+    if broken_at == "command":
+        return np.asarray(-parts[..., 0] - parts[..., 1])
+    return np.asarray(-parts[..., 0] / (1.0 - parts[..., 1]))
+
+
+def _respond(plant: DesignPlant, controller: AxisController, broken_at: str) -> Response:
+    mirror = moved(plant).from_command
+
+    def response(freq_hz: Floats) -> Complexes:
+        K = lti.frequency_response(controller.system, freq_hz, plant.period_s)[:, 0, :]
+        G = lti.frequency_response(mirror, freq_hz, plant.period_s)[:, :, 0]
+        L = cut(K, G, broken_at)
+        return np.asarray(np.where(freq_hz * plant.period_s > 0.5 - 1e-9, L.real, L))  # at half the rate L is real
+
+    return response
+
+
+def around_poles(poles: Complexes, period_s: float, ratio: float) -> Floats:
+    """Frequencies (Hz) around discrete poles: from a fifth of the half width away, then each ``ratio`` farther."""
+    s = np.log(poles[np.abs(poles) > 1e-3].astype(complex)) / (2 * math.pi * period_s)
+    found = []
+    for pole in s[s.imag > 0.0]:
+        centre, width = pole.imag, max(abs(pole.real), 1e-6 * pole.imag)
+        reach = math.log(max(5.0 * centre / width, 2.0))
+        away = 0.2 * width * np.exp(np.linspace(0.0, reach, math.ceil(reach / math.log(ratio)) + 1))
+        found += [centre - away, [centre], centre + away]
+    near = np.unique(np.concatenate([[], *found]))
+    return near[(near > 0.0) & (near < 0.5 / period_s)]
+
+
+def _frequencies(plant: DesignPlant, controller: AxisController) -> Floats:
+    """Grid that resolves every resonance of the open and the closed loop."""
+    whole = np.geomspace(1e-7, 0.5, _POINTS) / plant.period_s
+    poles = [loop_poles(plant, controller), *(np.linalg.eigvals(s.A) for s in (moved(plant).system, controller.system))]
+    near = around_poles(np.unique(np.concatenate(poles)), plant.period_s, 1.3)
+    near = near * (1.0 + 1e-9)  # an undamped filter has no response at its own frequency
+    return np.unique(np.concatenate([whole, near]).clip(max=0.5 / plant.period_s))
+
+
+def margins_at(plant: DesignPlant, controller: AxisController, broken_at: str = "command") -> LoopMargins:
+    """Margins of the loop cut at one of `BREAKS`. Raises ValueError as `refuse_misfit` and `refuse_unstable` do."""
+    refuse_misfit(plant, controller)
+    refuse_unstable(plant, controller)
+    response = _respond(plant, controller, broken_at)
+    f = _frequencies(plant, controller)
+    f, L = _closer(f, response(f), response)
+    up, down = _gain_margins(L)
+    crossing, phase = _crossings(f, L)
+    modulus, where = _least(_modulus, response, f, L)
+    both_ways = np.minimum(phase, 2 * math.pi - phase)
+    return LoopMargins(
+        gain_up=up,
+        gain_down=down,
+        phase_rad=float(np.min(both_ways, initial=math.inf)),
+        delay_s=float(np.min(phase / (2 * math.pi * crossing), initial=math.inf)),
+        modulus=modulus,
+        disk=2.0 * _least(_balanced, response, f, L)[0],
+        crossover_hz=float(np.max(crossing)) if crossing.size else math.nan,
+        bandwidth_hz=bandwidth_hz(f, np.abs(1.0 + L)),
+        peak=1.0 / modulus,
+        peak_hz=where,
+    )
+
+
+def loop_margins(plant: DesignPlant, controller: AxisController) -> LoopMargins:
+    """Worst margins over the places where the loop can be cut; reach and peak are of the disturbance's rejection.
+
+    A disturbance is rejected by 1 / (1 + L) of the loop cut at the optical sensor, or at the command where there is
+    but one sensor. Raises ValueError as `margins_at` does.
+    """
+    whole = margins_at(plant, controller)
+    if not uses_both(controller):
+        return whole
+    optical = margins_at(plant, controller, "optical")
+    return LoopMargins(
+        gain_up=min(whole.gain_up, optical.gain_up),
+        gain_down=max(whole.gain_down, optical.gain_down),
+        phase_rad=min(whole.phase_rad, optical.phase_rad),
+        delay_s=min(whole.delay_s, optical.delay_s),
+        modulus=min(whole.modulus, optical.modulus),
+        disk=min(whole.disk, optical.disk),
+        crossover_hz=optical.crossover_hz,
+        bandwidth_hz=optical.bandwidth_hz,
+        peak=optical.peak,
+        peak_hz=optical.peak_hz,
+    )
+
+
+def uses_both(controller: AxisController) -> bool:
+    """Whether a controller feeds back both the optical sensor and the gauge."""
+    s = controller.system
+    used = np.any(s.B != 0.0, axis=0) | np.any(s.D != 0.0, axis=0)
+    return bool(np.all(used[[OPTICAL - 1, GAUGE - 1]]))
+
+
+def bandwidth_hz(freq_hz: Floats, distance: Floats) -> float:
+    """Lowest frequency at which |S| = 1 / ``distance`` reaches 1 from below; 0 where it never lies below."""
+    if distance[0] <= 1.0:
+        return 0.0
+    at = int(np.argmax(distance <= 1.0))
+    if distance[at] > 1.0:
+        return float(freq_hz[-1])
+    above, below = math.log(distance[at - 1]), math.log(distance[at])
+    return float(freq_hz[at - 1] * (freq_hz[at] / freq_hz[at - 1]) ** (above / (above - below)))
+
+
+def _modulus(L: Complexes) -> Floats:
+    """|1 + L|."""
+    return np.abs(1.0 + L)
+
+
+def _balanced(L: Complexes) -> Floats:
+    """1 / |S - T| = |1 + L| / |1 - L|, cut off where it is large."""
+    return np.asarray(np.abs(1.0 + L) / np.maximum(np.abs(1.0 - L), 1e-9))
+
+
+def _least(distance: Distance, response: Response, f: Floats, L: Complexes) -> tuple[float, float]:
+    """Smallest distance and its frequency, the grid made finer around it."""
+    found = distance(L)
+    for _ in range(3):
+        at = int(np.argmin(found))
+        f = np.linspace(f[max(at - 1, 0)], f[min(at + 1, f.size - 1)], 41)
+        found = distance(response(f))
+    at = int(np.argmin(found))
+    return float(found[at]), float(f[at])
+
+
+def _closer(f: Floats, L: Complexes, response: Response) -> tuple[Floats, Complexes]:
+    """Grid and loop with more points where L crosses the real axis or the unit circle, so that straight lines do."""
+    beyond, below = np.abs(L) >= 1.0, L.imag < 0.0
+    at = np.flatnonzero((beyond[:-1] != beyond[1:]) | (below[:-1] != below[1:]))
+    more = np.linspace(f[at], f[at + 1], 33)[1:-1].ravel()
+    whole, first = np.unique(np.concatenate([f, more]), return_index=True)
+    return whole, np.concatenate([L, response(more)])[first]
+
+
+def _crossings(f: Floats, L: Complexes) -> tuple[Floats, Floats]:
+    """Frequencies with |L| = 1, and there the lag in (0, 2 pi) that would bring L to -1."""
+    size = np.log(np.maximum(np.abs(L), 1e-300))
+    at = np.flatnonzero((size[:-1] >= 0.0) != (size[1:] >= 0.0))
+    share = size[at] / (size[at] - size[at + 1])
+    turned = np.angle(L[at + 1] * L[at].conj())
+    phase = np.angle(-L[at]) + share * turned
+    return f[at] * (f[at + 1] / f[at]) ** share, np.mod(phase, 2 * math.pi)
+
+
+def _gain_margins(L: Complexes) -> tuple[float, float]:
+    """Factors nearest 1, above and below, that bring the loop to -1: where it crosses the negative real axis."""
+    imag, real = L.imag, L.real
+    at = np.flatnonzero((imag[:-1] * imag[1:] <= 0.0) & (imag[:-1] != imag[1:]))
+    share = imag[at] / (imag[at] - imag[at + 1])
+    crossing = -(real[at] + share * (real[at + 1] - real[at]))
+    still = abs(imag[0]) < 1e-3 * abs(real[0])
+    size = np.append(crossing, -real[0] if still else 0.0)
+    size = size[size > 0.0]
+    return float(np.min(1.0 / size[size < 1.0], initial=math.inf)), float(np.max(1.0 / size[size > 1.0], initial=0.0))
+
+
+@dataclass(frozen=True, slots=True)
+class MultiloopMargin:
+    """Disk margin of two loops whose gain and phase change at once, each on its own, and where it is smallest."""
+
+    disk: float
+    freq_hz: float
+
+    @property
+    def disk_gain(self) -> tuple[float, float]:
+        """Factors on both loops' gains at once; see `disk_gain`."""
+        return disk_gain(self.disk)
+
+    @property
+    def disk_phase_rad(self) -> float:
+        """Phase of both loops at once; see `disk_phase_rad`."""
+        return disk_phase_rad(self.disk)
+
+
+def multiloop_disk_margin(freq_hz: Floats, L: Complexes) -> MultiloopMargin:
+    """Disk margin of a two-axis loop gain L, shape (frequencies, 2, 2), against simultaneous independent changes.
+
+    2 / min over real diagonal D of the largest singular value of D (S - T) D^-1, which for two loops is the structured
+    singular value itself. Source: Seiler, Packard and Gahinet, IEEE Control Systems Magazine 40 (2020) 78. Raises
+    ValueError for another shape.
+
+    Scaling keeps the determinant, the product of both singular values, so the larger one is smallest where the sum of
+    squares is: where both entries off the diagonal have the same size.
+    """
+    if L.shape != (freq_hz.size, 2, 2):
+        raise ValueError(
+            f"a loop gain of shape {L.shape} is not two loops at {freq_hz.size} frequencies: give two axes"
+        )
+    M = 2.0 * np.linalg.inv(np.eye(2) + L) - np.eye(2)
+    squares = np.abs(M[:, 0, 0]) ** 2 + np.abs(M[:, 1, 1]) ** 2 + 2.0 * np.abs(M[:, 0, 1] * M[:, 1, 0])
+    product = np.abs(np.linalg.det(M)) ** 2
+    largest = np.sqrt(0.5 * (squares + np.sqrt(np.maximum(squares**2 - 4.0 * product, 0.0))))
+    at = int(np.argmax(largest))
+    return MultiloopMargin(2.0 / float(largest[at]), float(freq_hz[at]))

@@ -1,0 +1,273 @@
+"""LQG: steady Kalman filter of mirror, delays and disturbance, with state feedback, in one discrete controller.
+
+The regulator minimises the variance of the residual plus that of the command's increments; weighting increments, not
+the command itself, lets a constant error be driven to 0. The filter is told of two things that the plant does not have:
+a slow random walk on the line of sight, which gives integral action, and noise on the command, which buys robustness of
+the loop at the command (Doyle and Stein, IEEE Transactions on Automatic Control 24 (1979) 607).
+"""
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from microrad.core import lti
+from microrad.loop.control.analysis import reachable
+from microrad.loop.control.problem import (
+    GAUGE,
+    OPTICAL,
+    RESIDUAL,
+    AxisController,
+    DesignPlant,
+    Family,
+    Parameter,
+    once_per_plant,
+)
+
+Floats = NDArray[np.float64]
+
+WALK_CORNER = 1e-4
+"""Frequency, over the control rate, below which the random walk exceeds the plant's own disturbance and noise."""
+
+
+REFINED = 2
+"""Refinements of the observer's gain."""
+
+OBSERVER_BITS = 24
+"""Significant bits (6e-8) of the observer's gain: how it shares an error among like disturbances is left to rounding to
+some 1e-11, and a gain beside the optimum costs the square of how far it is off."""
+
+
+@dataclass(frozen=True, slots=True)
+class Weights:
+    """What the design trades.
+
+    ``command`` is the cost of an increment of the command against the residual it makes at the slow gain,
+    ``sensor_noise`` a factor on both sensors' noise, ``command_noise_v`` the rms of the noise put on the command (V a
+    sample), ``walk`` a factor on the random walk (0: none, and no integral action).
+    """
+
+    command: float
+    sensor_noise: float
+    command_noise_v: float
+    walk: float = 1.0
+
+
+def lqg_controller(plant: DesignPlant, weights: Weights, *, coarse: bool = False) -> AxisController:
+    """Optimal controller of the plant for these weights; it uses the measurement of its own sample.
+
+    With x the prediction, K the predictor's gain and G the regulator's, v[k] - v[k-1] = -G (A x + K (m - C x), v[k-1]).
+    The observer and v[k-1] are driven by the clipped command: anti-windup is their input column. ``coarse`` rounds the
+    observer's gain and the matrices to what processors agree in (`OBSERVER_BITS`, `lti.EXACT_BITS`). Raises ValueError
+    without an optical sensor, and where a Riccati equation has no solution.
+    """
+    model = observed(in_own_units(plant), weights)
+    K = filter_gain(model.A, model.noise, model.seen, model.seen_noise)
+    K = lti.to_bits(K, OBSERVER_BITS) if coarse else K
+    G = regulator_gain(model, weights.command * plant.gain_rad_v**2)
+    n, sensors = model.A.shape[0], model.sensors
+    driven = np.vstack([model.command, [[1.0]]])  # observer and last command follow the command that is given
+    free = np.zeros((n + 1, n + 1))
+    free[:n, :n] = model.A - K @ model.seen
+    correction = np.zeros((n + 1, 2))
+    correction[:n, sensors] = K
+    last = np.eye(1, n + 1, n)
+    C = last - G @ (free + driven @ last)
+    D = -G @ correction
+    system = lti.StateSpace(free + driven @ C, correction + driven @ D, C, D)
+    return AxisController("LQG", lti.system_to_bits(system, lti.EXACT_BITS) if coarse else system, driven)
+
+
+@dataclass(frozen=True, slots=True)
+class Model:
+    """What the design knows: states (plant, walk), and rows and noise of the sensors that it uses.
+
+    ``noise`` and ``seen_noise`` are driven by the same white sequences of unit variance. ``moved`` are the states that
+    the command reaches, ``sensors`` the controller's inputs that belong to the rows of ``seen``.
+    """
+
+    A: Floats
+    command: Floats
+    residual: Floats
+    seen: Floats
+    noise: Floats
+    seen_noise: Floats
+    sensors: list[int]
+    moved: NDArray[np.bool_]
+
+
+@once_per_plant
+def in_own_units(plant: DesignPlant) -> DesignPlant:
+    """The plant with each state in a unit (a power of 2) of its own size under the white sequences and one of 1 V.
+
+    States in volts beside states in radians cost the Riccati equations eight digits. The sizes are those that some
+    thousand samples build up: a state may drift for ever.
+    """
+    s = plant.system
+    size = np.sqrt(np.diag(lti.gramian(0.999 * s.A.T, s.B @ s.B.T)))
+    unit = 2.0 ** np.round(np.log2(np.where(size > 0.0, size, 1.0)))
+    scaled = lti.StateSpace(s.A * unit / unit[:, None], s.B / unit[:, None], s.C * unit, s.D)
+    return replace(plant, system=scaled)
+
+
+def observed(plant: DesignPlant, weights: Weights) -> Model:
+    """The plant with walk and noise on the command, its unused sensors left out and the noise of the others scaled."""
+    _refuse(plant, weights)
+    s, n = plant.system, plant.system.order
+    sensors = [OPTICAL, GAUGE] if plant.has_gauge else [OPTICAL]
+    walk, floor = _walk(plant)
+    walk *= 0.0 if _has_integrator(plant) else weights.walk
+    kept = n + int(walk > 0.0)
+    scale = np.where(np.arange(s.B.shape[1] - 1) < plant.disturbances, 1.0, weights.sensor_noise)
+    A, command, noise = np.eye(n + 1), np.zeros((n + 1, 1)), np.zeros((n + 1, scale.size + 2))
+    A[:n, :n], command[:n] = s.A, s.B[:, :1]
+    noise[:n, :-2], noise[:n, -2], noise[n, -1] = s.B[:, 1:] * scale, s.B[:, 0] * weights.command_noise_v, walk
+    C = np.hstack([s.C, [[1.0], [1.0], [0.0]]])  # the walk is too slow for the sensor's delay to matter
+    return Model(
+        A[:kept, :kept],
+        command[:kept],
+        C[[RESIDUAL], :kept],
+        C[sensors, :kept],
+        np.hstack([noise[:kept], np.zeros((kept, len(sensors)))]),
+        np.hstack([s.D[sensors, 1:] * scale, np.zeros((len(sensors), 2)), floor * np.eye(len(sensors))]),
+        [i - OPTICAL for i in sensors],
+        reachable(A, command)[:kept],
+    )
+
+
+def _refuse(plant: DesignPlant, weights: Weights) -> None:
+    if not plant.has_optical:
+        raise ValueError(
+            "LQG needs the optical sensor: without it nothing shows the disturbance that the mirror has to follow; "
+            "add one, or close the loop on the gauge with another controller"
+        )
+    if not (weights.command > 0.0 and weights.sensor_noise > 0.0):
+        raise ValueError(
+            f"LQG: a command weight of {weights.command:g} and a sensor noise factor of {weights.sensor_noise:g} have "
+            "no optimum: both have to be above 0"
+        )
+
+
+@once_per_plant
+def _walk(plant: DesignPlant) -> tuple[float, float]:
+    """Step of the random walk (rad a sample), and a floor for the sensors' noise (rad), far below either."""
+    there = _slow_response(plant)
+    level = max(float(np.linalg.norm(there[RESIDUAL])), float(np.linalg.norm(there[OPTICAL])))
+    return 2 * math.pi * WALK_CORNER * level, 1e-6 * level
+
+
+@once_per_plant
+def _slow_response(plant: DesignPlant) -> NDArray[np.complex128]:
+    """Response from the white sequences to residual and sensors where the walk takes over."""
+    corner = np.array([WALK_CORNER / plant.period_s])
+    return lti.frequency_response(plant.system, corner, plant.period_s)[0, :, 1:]
+
+
+@once_per_plant
+def _has_integrator(plant: DesignPlant) -> bool:
+    """Whether the disturbance itself holds a constant, beside which a walk could not be told apart."""
+    own = ~reachable(plant.system.A, plant.system.B[:, :1])
+    poles = np.linalg.eigvals(plant.system.A[np.ix_(own, own)])
+    return bool(np.any(np.abs(poles - 1.0) < 1e-9))
+
+
+def filter_gain(A: Floats, noise: Floats, seen: Floats, seen_noise: Floats) -> Floats:
+    """Gain K of the steady one-step predictor x+ = A x + K (m - C x) under one white sequence in states and sensors.
+
+    K = (A P C' + N) (C P C' + R)^-1 with P from the Riccati equation, N and R the noise's cross-covariance and the
+    sensors' covariance (Anderson and Moore, Optimal Filtering, 1979, section 5.4), then refined: the covariance that
+    K leaves is a sum of squares, and hardly depends on the errors of a K near the best (Kleinman, IEEE Transactions on
+    Automatic Control 13 (1968) 114). Raises ValueError without one.
+    """
+    R, N = seen_noise @ seen_noise.T, noise @ seen_noise.T
+    whitened = np.linalg.solve(R, N.T)
+    P = riccati(
+        (A - whitened.T @ seen).T,
+        seen.T,
+        noise @ noise.T - N @ whitened,
+        R,
+        "the sensors do not see every state that drifts",
+    )
+    K = np.linalg.solve(seen @ P @ seen.T + R, seen @ P @ A.T + N.T).T
+    for _ in range(REFINED):
+        P = lti.gramian((A - K @ seen).T, (noise - K @ seen_noise) @ (noise - K @ seen_noise).T)
+        K = np.linalg.solve(seen @ P @ seen.T + R, seen @ P @ A.T + N.T).T
+    return np.asarray(K)
+
+
+def regulator_gain(model: Model, weight: float) -> Floats:
+    """Gain G of v[k] - v[k-1] = -G (A x, v[k-1]) that minimises residual^2 + weight (v[k] - v[k-1])^2.
+
+    A Riccati equation where the command reaches, and a Stein equation for what it does not: states of the disturbance
+    may be undamped, no pole of theirs has to be moved. Raises ValueError without a solution.
+    """
+    m, own = np.append(model.moved, True), np.append(~model.moved, False)
+    n = model.A.shape[0]
+    A = np.block([[model.A, model.command], [np.zeros((1, n)), np.ones((1, 1))]])
+    b, c = np.vstack([model.command, [[1.0]]])[m], np.append(model.residual, [[0.0]], axis=1)
+    inside, across = A[np.ix_(m, m)], A[np.ix_(m, own)]
+    X = riccati(inside, b, c[:, m].T @ c[:, m], np.array([[weight]]), "the command does not reach the residual")
+    gain = np.linalg.solve(b.T @ X @ b + weight, b.T @ X)
+    closed = inside - b @ (gain @ inside)
+    Z = stein(closed, A[np.ix_(own, own)], closed.T @ X @ across + c[:, m].T @ c[:, own])
+    G = np.zeros((1, n + 1))
+    G[:, m], G[:, own] = gain, np.linalg.solve(b.T @ X @ b + weight, b.T @ Z)
+    return G
+
+
+def riccati(A: Floats, B: Floats, Q: Floats, R: Floats, otherwise: str) -> Floats:
+    """Stabilising solution X = A' X (I + B R^-1 B' X)^-1 A + Q of the discrete Riccati equation, R positive definite.
+
+    Structure-preserving doubling: Chu, Fan, Lin and Wang, International Journal of Control 77 (2004) 767. Raises
+    ValueError, saying ``otherwise``, where it does not settle.
+    """
+    power, G, X = A, B @ np.linalg.solve(R, B.T), Q
+    identity = np.eye(A.shape[0])
+    for _ in range(60):
+        middle = np.linalg.solve(identity + G @ X, np.hstack([power, G]))
+        first, second = middle[:, : A.shape[0]], middle[:, A.shape[0] :]
+        more = power.T @ X @ first
+        G = G + power @ second @ power.T
+        X, power = X + 0.5 * (more + more.T), power @ first
+        G = 0.5 * (G + G.T)
+        if not np.max(np.abs(X)) < 1e150:
+            break
+        if not np.any(np.abs(np.diagonal(more)) > 1e-14 * np.diagonal(X)):
+            return X
+    raise ValueError(f"LQG: the Riccati equation has no stabilising solution: {otherwise}; add damping or a sensor")
+
+
+def stein(left: Floats, right: Floats, Q: Floats) -> Floats:
+    """Solution Z = left' Z right + Q by doubling; poles of ``right`` may lie on the unit circle, not of ``left``."""
+    slowest = math.prod(float(np.max(np.abs(np.linalg.eigvals(M)), initial=0.0)) for M in (left, right))
+    if slowest >= 1.0:
+        raise ValueError("LQG: the disturbance grows faster than the loop settles; give its model some damping")
+    for _ in range(6 + math.ceil(math.log2(max(1.0, -1.0 / math.log(max(slowest, 1e-3)))))):
+        Q = Q + left.T @ Q @ right
+        left, right = left @ left, right @ right
+    return Q
+
+
+def _parameters(plant: DesignPlant) -> tuple[Parameter, ...]:
+    """Command weight, sensor noise and command noise, the last one around what the optical noise is worth in volts."""
+    _refuse(plant, Weights(1.0, 1.0, 0.0))
+    sensor = float(np.linalg.norm(_slow_response(plant)[OPTICAL, plant.disturbances :]))
+    unit = max(sensor, _walk(plant)[1]) / abs(plant.gain_rad_v)
+    return (
+        Parameter("command weight", "", 1e-4, 1e2, gentle=1e2),
+        Parameter("sensor noise factor", "", 0.1, 30.0, gentle=30.0),
+        Parameter("command noise", "V", 1e-3 * unit, 10.0 * unit),
+    )
+
+
+def _build(plant: DesignPlant, values: Floats) -> AxisController:
+    return lqg_controller(plant, Weights(*(float(v) for v in values)))
+
+
+def _coarse(plant: DesignPlant, values: Floats) -> AxisController:
+    return lqg_controller(plant, Weights(*(float(v) for v in values)), coarse=True)
+
+
+LQG = Family("LQG", _parameters, _build, final=_coarse)
+"""Linear-quadratic-Gaussian control, tuned by the weights of `Weights`."""

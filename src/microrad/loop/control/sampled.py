@@ -1,0 +1,336 @@
+"""The sampled loop: amplifier, clock, PID, the inverse of a hysteresis model, and margins of one axis.
+
+Every controller is one discrete state-space form, xc[k+1] = A xc + B e, v = C xc + D e, so a loop is data.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from microrad.core import kernels, lti
+from microrad.mirror.hysteresis import LINE_OF_SIGHT, BoucWen, Creep, Play, slow_gain
+from microrad.mirror.model import Mirror
+from microrad.mission import model as mission
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Drive:
+    """Amplifier and converters between controller and mirror, seen at the amplifier's input (volts, about the bias).
+
+    ``bandwidth_hz`` and ``slew_v_s`` may be infinite: the ideal amplifier, behind which rate-dependent hysteresis
+    depends on the numerical step. A resolution of 0 is an ideal converter.
+    """
+
+    minimum_v: float
+    maximum_v: float
+    bandwidth_hz: float
+    slew_v_s: float
+    drive_resolution_v: float
+    sensor_resolution_rad: float
+
+
+IDEAL_DRIVE = Drive(-math.inf, math.inf, math.inf, math.inf, 0.0, 0.0)
+
+
+def drive_from_mission(m: mission.Mission) -> Drive:
+    """The mission's amplifier and converters, referred to the amplifier's input and counted from the mirror's bias."""
+    a = m.amplifier
+    return Drive(
+        minimum_v=a.output_min_v / a.gain - m.mirror.bias_v,
+        maximum_v=a.output_max_v / a.gain - m.mirror.bias_v,
+        bandwidth_hz=a.bandwidth_hz,
+        slew_v_s=a.slew_v_s / a.gain,
+        drive_resolution_v=m.control.drive_resolution_v,
+        sensor_resolution_rad=m.control.sensor_resolution_rad * LINE_OF_SIGHT[m.conventions.mirror_angle],
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Timing:
+    """The sampled loop's clock: control period, plant steps in it, and computation delay in plant steps."""
+
+    period_s: float
+    steps_per_sample: int
+    delay_steps: int
+
+    @property
+    def step_s(self) -> float:
+        """The plant's step."""
+        return self.period_s / self.steps_per_sample
+
+
+def timing_from_mission(control: mission.Control) -> Timing:
+    """Whole numbers of plant steps; the mission file has already refused anything else."""
+    period = 1.0 / control.rate_hz
+    return Timing(period, round(period / control.plant_step_s), round(control.delay_s / control.plant_step_s))
+
+
+@dataclass(frozen=True, slots=True)
+class Gains:
+    """PID gains: volts per radian, volts per radian second, volt seconds per radian, and the derivative's filter."""
+
+    proportional: float
+    integral: float
+    derivative: float
+    derivative_filter_s: float
+
+
+def gains_from_mission(control: mission.Control, mirror_gain_rad_v: float) -> Gains:
+    """The mission's gains, scaled to keep the loop gain for a mirror of another gain than they are given for."""
+    scale = control.for_mirror_gain_rad_v / mirror_gain_rad_v
+    return Gains(
+        control.proportional_v_rad * scale,
+        control.integral_v_rad_s * scale,
+        control.derivative_v_s_rad * scale,
+        control.derivative_filter_s,
+    )
+
+
+def pid(gains: Gains, period_s: float) -> lti.StateSpace:
+    """Digital PID of one axis: v = Kp e + Ki T sum(e) + Kd filtered difference, all by backward differences.
+
+    States, where their gains are not 0: the integral part in volts, and e behind the derivative's first-order filter.
+    """
+    step = gains.integral * period_s
+    keep = gains.derivative_filter_s / (gains.derivative_filter_s + period_s)
+    edge = gains.derivative / (gains.derivative_filter_s + period_s)
+    used = np.array([step != 0.0, edge != 0.0])
+    return lti.StateSpace(
+        A=np.diag([1.0, keep])[np.ix_(used, used)],
+        B=np.array([[step], [1.0 - keep]])[used],
+        C=np.array([[1.0, -edge]])[:, used],
+        D=np.array([[gains.proportional + step + edge]]),
+    )
+
+
+def side_by_side(*controllers: lti.StateSpace) -> lti.StateSpace:
+    """One controller an axis, without coupling."""
+    from scipy.linalg import block_diag  # slow to import, not needed to show help
+
+    return lti.StateSpace(*(block_diag(*(getattr(c, key) for c in controllers)) for key in "ABCD"))
+
+
+def anti_windup(controller: lti.StateSpace) -> Floats:
+    """Conditioning gain L = B D^-1: the states follow the error that would just have reached the limit.
+
+    Source: Hanus, Kinnaert and Henrotte, Automatica 23 (1987) 729. Zero where the controller has no direct path.
+    """
+    return np.asarray(controller.B @ np.linalg.pinv(controller.D))
+
+
+@dataclass(frozen=True, slots=True)
+class Inverse:
+    """Feedforward by actuator: a direct gain (V/rad), Bouc-Wen models for Eq. 4, and play operators on the reference.
+
+    Play thresholds are in radians and weights in V/rad; ``*_actuator`` says which drive an element belongs to.
+    ``widening`` holds, by actuator, the growth of the thresholds with the reference's rate (s) and the rate in rad/s
+    where it ends; none where it is empty. ``creep`` is taken off the reference, by actuator.
+    """
+
+    direct: tuple[float, ...]
+    bouc_wen: tuple[BoucWen, ...] = ()
+    bouc_wen_actuator: tuple[int, ...] = ()
+    play_thresholds: tuple[float, ...] = ()
+    play_weights: tuple[float, ...] = ()
+    play_actuator: tuple[int, ...] = ()
+    widening: tuple[tuple[float, float], ...] = ()
+    creep: tuple[Creep, ...] = ()
+
+
+def no_feedforward(m: Mirror) -> Inverse:
+    """Feedback alone."""
+    return Inverse(direct=(0.0,) * m.actuators)
+
+
+def inverse(m: Mirror) -> Inverse:
+    """Inverse of the mirror's hysteresis and creep: Eq. 4 for Bouc-Wen, the closed form for Prandtl-Ishlinskii.
+
+    The rate that widens a rate-dependent operator is that of the reference over the slow gain. Raises ValueError for a
+    Prandtl-Ishlinskii model without weight at threshold 0: it stands still after a reversal.
+    """
+    direct = [0.0] * m.actuators
+    bouc_wen, plays = [], []
+    widening = [(0.0, math.inf)] * m.actuators
+    for j, model in enumerate(m.inverse):
+        if isinstance(model, BoucWen):
+            bouc_wen.append((model, j))
+        else:
+            direct[j], thresholds, weights = play_inverse(model)
+            slow = slow_gain(model)
+            widening[j] = (model.weights_rad_v[0] * model.widening_s / slow, model.rate_limit_v_s * slow)
+            plays += [(r, w, j) for r, w in zip(thresholds, weights, strict=True)]
+    return Inverse(
+        tuple(direct),
+        tuple(b for b, _ in bouc_wen),
+        tuple(j for _, j in bouc_wen),
+        tuple(r for r, _, _ in plays),
+        tuple(w for _, w, _ in plays),
+        tuple(j for _, _, j in plays),
+        tuple(widening),
+        m.inverse_creep,
+    )
+
+
+def inverse_arrays(of: Inverse, period_s: float) -> dict[str, Any]:
+    """The inverse as the kernels' arrays, by field of `kernels.Loop` and `kernels.Ensemble`, for a control period."""
+    lags = [
+        (weight, tau, a)
+        for a, creep in enumerate(of.creep)
+        for weight, tau in zip(creep.weights_rad_v, creep.time_constants_s, strict=True)
+    ]
+    return {
+        "inverse_direct": np.array(of.direct),
+        "inverse_bouc_wen": kernels.bouc_wen_rows([b.row for b in of.bouc_wen]),
+        "inverse_bouc_wen_actuator": np.array(of.bouc_wen_actuator, dtype=np.uint64),
+        "inverse_play_threshold": np.array(of.play_thresholds, dtype=float),
+        "inverse_play_weight": np.array(of.play_weights, dtype=float),
+        "inverse_play_actuator": np.array(of.play_actuator, dtype=np.uint64),
+        "inverse_widening": np.array(of.widening or [(0.0, math.inf)] * len(of.direct)),
+        "inverse_lag_keep": np.array([math.exp(-period_s / tau) for _, tau, _ in lags]),
+        "inverse_lag_weight": np.array([weight for weight, _, _ in lags]),
+        "inverse_lag_actuator": np.array([a for _, _, a in lags], dtype=np.uint64),
+    }
+
+
+def play_inverse(model: Play) -> tuple[float, tuple[float, ...], tuple[float, ...]]:
+    """Inverse of a Prandtl-Ishlinskii model as (direct gain, thresholds in rad, weights in V/rad).
+
+    Source: Kuhnen, European Journal of Control 9 (2003) 407: r'_j = sum_{i<j} w_i (r_j - r_i), and w' from the
+    differences of the reciprocals of the cumulated weights. Thresholds above 0 that widen by s widen the inverse's by
+    w_0 s (Al Janaideh and Krejci 2013), which `inverse` looks after. Raises ValueError without weight at threshold 0.
+    """
+    r, w = np.array(model.thresholds_v), np.array(model.weights_rad_v)
+    slope = np.cumsum(w)
+    if r[0] != 0.0 or np.min(slope) <= 0.0:
+        raise ValueError(
+            "the Prandtl-Ishlinskii model has no weight at threshold 0: it stands still after each reversal and has no "
+            "inverse; identify it again with more samples near the reversals"
+        )
+    thresholds = np.array([np.sum(w[:j] * (r[j] - r[:j])) for j in range(1, r.size)])
+    weights = np.diff(1.0 / slope)
+    return float(1.0 / slope[0]), tuple(map(float, thresholds)), tuple(map(float, weights))
+
+
+def sampled_plant(m: Mirror, drive: Drive, timing: Timing) -> lti.StateSpace:
+    """Delay, amplifier and linear mirror of one axis as the controller sees them: discrete, at the control period.
+
+    The same recursion as the simulation's, at the plant's step, with the hysteresis replaced by its slow gain.
+    States: mirror, amplifier output, commands on their way. Raises ValueError for more than one axis.
+    """
+    if (m.actuators, m.axes) != (1, 1):
+        raise ValueError(f"mirror {m.name!r} has {m.actuators} actuators and {m.axes} axes: give one axis at a time")
+    linear = m.linear_loop
+    n, d = linear.order, timing.delay_steps
+    Ad, B0, B1 = lti.first_order_hold(linear.A, linear.B, timing.step_s)
+    follow = amplifier_factor(drive, timing.step_s)
+    A, B = np.zeros((n + 1 + d, n + 1 + d)), np.zeros((n + 1 + d, 1))
+    A[:n, :n], A[:n, n] = Ad, (B0 + B1 * (1.0 - follow))[:, 0]
+    A[n, n] = 1.0 - follow
+    source = A[:, -1] if d else B[:, 0]  # what the amplifier follows: the oldest command, or the new one
+    source[:n] += B1[:, 0] * follow
+    source[n] += follow
+    if d:
+        B[n + 1, 0] = 1.0
+        A[n + 2 :, n + 1 : -1] += np.eye(d - 1)
+    power, held = np.eye(n + 1 + d), np.zeros_like(B)
+    for _ in range(timing.steps_per_sample):
+        held = A @ held + B
+        power = A @ power
+    return lti.StateSpace(power, held, np.hstack([linear.C, linear.D, np.zeros((1, d))]), np.zeros((1, 1)))
+
+
+def amplifier_factor(drive: Drive, step_s: float) -> float:
+    """Share of the way to its target that a first-order amplifier covers in one step; 1 when ideal."""
+    return 1.0 if math.isinf(drive.bandwidth_hz) else -math.expm1(-2.0 * math.pi * drive.bandwidth_hz * step_s)
+
+
+@dataclass(frozen=True, slots=True)
+class Margins:
+    """Margins of one sampled loop: gain as a ratio, phase in radians, delay in seconds, modulus = min |1 + L|.
+
+    ``crossover_hz`` is the highest frequency at which |L| is 1; nan, with infinite margins, without one. ``delay_s`` is
+    the smallest phase margin at that frequency: a bound where there are several crossovers.
+    """
+
+    gain: float
+    phase_rad: float
+    delay_s: float
+    modulus: float
+    crossover_hz: float
+    slowest_pole: float
+
+
+def margins(controller: lti.StateSpace, plant: lti.StateSpace, period_s: float) -> Margins:
+    """Margins of controller and sampled plant (one axis, both discrete) under unit negative feedback.
+
+    Raises ValueError with the offending pole when the closed loop is unstable.
+    """
+    loop = lti.series(controller, plant)
+    worst = slowest_pole(loop)
+    if worst >= 1.0:
+        raise ValueError(
+            f"the closed loop is unstable: a pole at |z| = {worst:.6f} (the limit is 1) for a control period of "
+            f"{period_s:g} s; lower the gains in [control]{_advice(controller, plant)}, or shorten its delay"
+        )
+    f = np.geomspace(1e-6, 0.5, 4000) / period_s
+    response = lti.frequency_response(loop, f, period_s)[:, 0, 0]
+    response[-1] = response[-1].real  # at half the sample rate
+    crossover, phase = _crossover(f, response)
+    return Margins(
+        gain=_gain_margin(response),
+        phase_rad=phase,
+        delay_s=math.inf if math.isnan(crossover) else phase / (2 * math.pi * crossover),
+        modulus=float(np.min(np.abs(1.0 + response))),
+        crossover_hz=crossover,
+        slowest_pole=worst,
+    )
+
+
+def _advice(controller: lti.StateSpace, plant: lti.StateSpace) -> str:
+    """By how much, for 6 dB of gain margin; nothing where no smaller gain makes the loop stable."""
+
+    def stable(share: float) -> bool:
+        less = lti.StateSpace(controller.A, controller.B, share * controller.C, share * controller.D)
+        return slowest_pole(lti.series(less, plant)) < 1.0
+
+    share = next((float(s) for s in 0.95 ** np.arange(1, 200) if stable(s) and stable(s / 2)), 0.0)
+    return f" (with all of them at {share / 2:.2g} of what they are it has 6 dB of gain margin)" if share else ""
+
+
+def slowest_pole(loop: lti.StateSpace) -> float:
+    """Largest |z| among the poles of the discrete ``loop`` closed with unit negative feedback; unstable from 1 up."""
+    return float(np.max(np.abs(lti.feedback_poles(loop)), initial=0.0))
+
+
+def sensitivity(loop: lti.StateSpace, freq_hz: float, period_s: float) -> complex:
+    """Error over reference, 1 / (1 + L), of the closed discrete ``loop`` (one axis) at one frequency."""
+    return complex(1.0 / (1.0 + lti.frequency_response(loop, np.array([freq_hz]), period_s)[0, 0, 0]))
+
+
+def _crossover(f: Floats, response: NDArray[np.complex128]) -> tuple[float, float]:
+    """Highest gain crossover, up or down, and the smallest phase margin over all crossovers."""
+    size = np.log(np.abs(response))
+    at_unity = np.flatnonzero((size[:-1] >= 0.0) != (size[1:] >= 0.0))
+    if not at_unity.size:
+        return math.nan, math.inf
+    share = size[at_unity] / (size[at_unity] - size[at_unity + 1])
+    crossing = f[at_unity] * (f[at_unity + 1] / f[at_unity]) ** share
+    phase = np.pi + np.unwrap(np.angle(response))
+    at = phase[at_unity] + share * (phase[at_unity + 1] - phase[at_unity])
+    wrapped = np.abs((at + np.pi) % (2 * np.pi) - np.pi)
+    return float(crossing[-1]), float(np.min(wrapped))
+
+
+def _gain_margin(response: NDArray[np.complex128]) -> float:
+    """Smallest factor above 1 that brings the loop to -1, interpolated where it crosses the negative real axis."""
+    imag, real = response.imag, response.real
+    at = np.flatnonzero((imag[:-1] * imag[1:] <= 0.0) & (imag[:-1] != imag[1:]))
+    share = imag[at] / (imag[at] - imag[at + 1])
+    crossing = -(real[at] + share * (real[at + 1] - real[at]))
+    below = crossing[(crossing > 0) & (crossing < 1)]
+    return float(1.0 / below.max()) if below.size else math.inf

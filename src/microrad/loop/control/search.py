@@ -1,0 +1,147 @@
+"""The search that a tuning does: candidates built, judged and counted, and their places within the bounds."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from microrad.loop.control.analysis import LoopMargins, loop_margins, refuse_misfit
+from microrad.loop.control.judge import Judge, Verdict
+from microrad.loop.control.problem import DesignPlant, Family, Parameter, Specification
+
+Floats = NDArray[np.float64]
+
+HEADROOM = 1e-3
+"""Relative excess over what is asked for that a search aims at: rounding what it finds takes a little of it."""
+
+PULL = 1e-3
+"""Share of the rms that the most vigorous value of a parameter counts for: where less than that tells two candidates
+apart, the gentler one is chosen (see `Parameter`), and the optimum is one point however flat the residual is."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Trial:
+    """One candidate: its place within the bounds (each coordinate in 0..1), what it reaches and by what it falls short.
+
+    ``cost`` is the logarithm of the rms with the pull to gentle values. ``excess`` is relative to what is asked for,
+    one number for each constraint, below 0 where it is not met.
+    """
+
+    place: Floats
+    values: Floats
+    verdict: Verdict
+    cost: float
+    excess: Floats
+
+    @property
+    def modulus(self) -> float:
+        """Least modulus margin over the plants."""
+        return float(np.min(self.verdict.moduli))
+
+    @property
+    def violation(self) -> float:
+        """By how much the worst constraint is missed, 0 where everything is met."""
+        return max(0.0, -float(np.min(self.excess)))
+
+    @property
+    def score(self) -> float:
+        """Cost and, well above what any gain in cost can outweigh, the violation."""
+        return self.cost + 10.0 * self.violation
+
+
+class Search:
+    """One tuning: builds, judges and counts candidates; `trials` are those that could be built."""
+
+    def __init__(
+        self,
+        family: Family,
+        plants: Sequence[DesignPlant],
+        specification: Specification,
+        pull: float = PULL,
+    ) -> None:
+        """Raise ValueError where the plants do not fit together or the family has no controller for the nominal one."""
+        self.family, self.plants, self.specification = family, plants, specification
+        self.parameters = family.parameters(plants[0]) if plants else ()
+        self.judge = Judge(plants)
+        self.trials: list[Trial] = []
+        self.count = 0
+        self.optimism = 1.0  # by how much the grid has been seen to overstate the modulus margin
+        self.reason: ValueError | None = None
+        self._looked: dict[bytes, list[LoopMargins]] = {}
+        self._gentle = np.array([0.0 if p.gentle is None else place_of(p, p.gentle) for p in self.parameters])
+        self._pull = pull
+
+    def at(self, place: Floats) -> Trial:
+        """Judge the candidate at a place, its coordinates clipped to the bounds."""
+        place = np.clip(place, 0.0, 1.0)
+        return self.of(np.array([value(p, x) for p, x in zip(self.parameters, place, strict=True)]), place)
+
+    def of(self, values: Floats, place: Floats | None = None) -> Trial:
+        """Judge the candidate of these values; one that cannot be built counts as unstable."""
+        if place is None:
+            place = np.array([place_of(p, v) for p, v in zip(self.parameters, values, strict=True)])
+        try:
+            controller = self.family.build(self.plants[0], values)
+            refuse_misfit(self.plants[0], controller)
+        except ValueError as error:
+            self.reason = self.reason or error
+            verdict = self.judge.unstable(math.inf)
+        else:
+            verdict = self.judge(controller)
+        trial = self._trial(place, values, verdict)
+        if math.isfinite(verdict.pole):
+            self.trials.append(trial)
+        self.count += 1
+        return trial
+
+    def margins(self, trial: Trial) -> list[LoopMargins]:
+        """Margins of a stable trial on all plants, looked at closely; once for each."""
+        key = trial.values.tobytes()
+        if key not in self._looked:
+            controller = self.family.build(self.plants[0], trial.values)
+            self._looked[key] = [loop_margins(p, controller) for p in self.plants]
+        return self._looked[key]
+
+    def _trial(self, place: Floats, values: Floats, verdict: Verdict) -> Trial:
+        asked = self.specification
+        ceiling = 0.5 * math.log(self.judge.open_rad2) + 1.0
+        beyond = min(verdict.pole - 1.0, 1.0) if verdict.pole >= 1.0 else 0.0
+        cost = ceiling + beyond if verdict.pole >= 1.0 else min(0.5 * math.log(verdict.mean_rad2), ceiling)
+        margin = asked.modulus_margin * self.optimism * (1.0 + HEADROOM)
+        excess = (verdict.moduli - margin) / max(asked.modulus_margin, 0.1) - beyond
+        if asked.bandwidth_hz > 0.0:
+            reached = verdict.bandwidths_hz / asked.bandwidth_hz / (1.0 + HEADROOM)
+            excess = np.append(excess, np.log(np.maximum(reached, 0.1)) - beyond)
+        return Trial(place, values, verdict, cost + self._pull * float(np.sum((place - self._gentle) ** 2)), excess)
+
+
+def value(parameter: Parameter, place: float) -> float:
+    """Value of a parameter at a place from 0 (its least) to 1 (its most), on its own scale."""
+    if parameter.log:
+        return float(parameter.least * (parameter.most / parameter.least) ** place)
+    return float(parameter.least + place * (parameter.most - parameter.least))
+
+
+def place_of(parameter: Parameter, number: float) -> float:
+    """The reverse of `value`; 0 below the least."""
+    if number <= parameter.least:
+        return 0.0
+    if parameter.log:
+        return math.log(number / parameter.least) / math.log(parameter.most / parameter.least)
+    return (number - parameter.least) / (parameter.most - parameter.least)
+
+
+def rounded(number: float) -> float:
+    """The number to four significant digits, as tuned values are used: what is printed is what runs."""
+    return float(f"{number:.3e}")
+
+
+def apart(trials: Sequence[Trial], most: int, distance: float) -> list[Trial]:
+    """The first trials that lie at least this part of the bounds apart from each other."""
+    found: list[Trial] = []
+    for t in trials:
+        if len(found) < most and all(np.max(np.abs(t.place - other.place), initial=0.0) > distance for other in found):
+            found.append(t)
+    return found

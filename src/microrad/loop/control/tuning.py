@@ -1,0 +1,287 @@
+"""Tuning: the parameters of a family of controllers that leave the least residual, under a margin, on every plant."""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from microrad.loop.control.analysis import LoopMargins, close, h2, loop_margins
+from microrad.loop.control.descent import descend, settle
+from microrad.loop.control.problem import RESIDUAL, AxisController, DesignPlant, Family, Specification
+from microrad.loop.control.search import HEADROOM, Search, Trial, apart, rounded
+
+Floats = NDArray[np.float64]
+Progress = Callable[[int, int, str], None]
+
+MARGIN, BANDWIDTH = "modulus margin", "bandwidth"
+"""What a tuned design can be bound by, beside the bounds of its parameters."""
+
+CLOSE_LOOKS = 30
+"""Trials whose margins are looked at closely before the specification is called out of reach."""
+
+OVERSTATED = 4
+"""Times that an optimum is sought with a stricter margin, where its grid has missed a narrow dip of |1 + L|."""
+
+SURVEY = 100
+"""Places of the Latin hypercube that a search begins with."""
+
+STARTS, AGREE = 8, 3
+"""Places that a local search sets out from, as a family may have several optima; no more once so many of them have led
+to the best of them."""
+
+FINALISTS = 3
+"""Optima that are followed to their last digit."""
+
+CLOSE = 1e-4
+"""Excess of cost over the best from which an optimum is not followed: a rough search ends within some 1e-5 of one."""
+
+SAME_COST = 6
+"""Decimals of the cost to which two optima are as good as each other: then the smaller values are taken."""
+
+
+@dataclass(frozen=True, slots=True)
+class Tuned:
+    """A controller and what it was chosen for.
+
+    ``values`` are its parameters by name. ``residual_rms_rad`` and ``margins`` belong to the nominal plant; ``mean`` is
+    the root of the mean variance over all plants and ``worst`` the largest rms. ``least_modulus`` and
+    ``least_bandwidth_hz`` are the smallest over all plants. ``bound_by`` names what keeps the residual from being
+    smaller: `MARGIN`, `BANDWIDTH`, or a parameter "at its least" or "at its most"; empty inside all bounds.
+    """
+
+    controller: AxisController
+    values: dict[str, float]
+    residual_rms_rad: float
+    mean_rms_rad: float
+    worst_rms_rad: float
+    margins: LoopMargins
+    least_modulus: float
+    least_bandwidth_hz: float
+    evaluations: int
+    bound_by: tuple[str, ...]
+
+
+# ------------------------------------------------------------------------------------------------ search
+
+
+def tune(
+    family: Family,
+    plants: Sequence[DesignPlant],
+    specification: Specification,
+    *,
+    seed: int,
+    on_progress: Progress = lambda done, total, what: None,
+    survey: int = SURVEY,
+    base: Tuned | None = None,
+) -> Tuned:
+    """The controller of a family, built for the first plant, that leaves the least mean variance over all plants.
+
+    Every plant has to be stable with it, have the modulus margin, cut at the command and at the optical sensor, and the
+    bandwidth that ``specification`` asks for. The first plant is the nominal one, the others are what it could also be.
+    A Latin hypercube of ``survey`` places drawn from ``seed``, then local searches from its best places and, where the
+    family contains another, from that one's optimum, ``base`` where it is known: the result is never worse than that.
+    The best optima are followed until they stand still; the values are used to four significant digits.
+    ``on_progress(done, total, what)`` counts the survey's places and the local searches.
+
+    Raises ValueError where the family has no controller for the nominal plant, none was stable on every plant, or the
+    specification is not met, with the best that was reached.
+    """
+    total, what = survey + STARTS + FINALISTS, f"tune {family.name}"
+    search = Search(family, plants, specification)
+    contained = _contained(search, seed, survey, base)
+    surveyed = []
+    for place in _places(search, contained, survey, seed):
+        surveyed.append(search.at(place))
+        on_progress(len(surveyed), total, what)
+    if not search.trials:
+        raise ValueError(_no_stable(search))
+    rough = []
+    halves = sorted(surveyed[::2], key=_score), sorted(surveyed[1::2], key=_score)
+    best = [trial for pair in zip(*halves, strict=False) for trial in pair]
+    for start in [*contained, *apart(best, STARTS - len(contained), 0.1)]:
+        rough.append(descend(search, start))
+        on_progress(survey + len(rough), total, what)
+        if sum(t.score < min(map(_score, rough)) + 0.1 * CLOSE for t in rough) >= AGREE:
+            break
+    finalists = apart(sorted(rough, key=_score), FINALISTS, 0.02)
+    found = _tuned(search, _settled(search, [t for t in finalists if t.score < finalists[0].score + CLOSE]))
+    inner = [_tuned(search, t) for t in contained if _holds(search, t)]
+    on_progress(total, total, what)
+    return min([found, *inner], key=lambda t: t.mean_rms_rad)
+
+
+def _contained(search: Search, seed: int, survey: int, base: Tuned | None) -> list[Trial]:
+    """The optimum of the family that this one contains; none where it contains no other or that one has none."""
+    inner, extended = search.family.base, search.family.extended
+    if inner is None or extended is None:
+        return []
+    try:
+        known = base or tune(inner, search.plants, search.specification, seed=seed, survey=survey)
+    except ValueError:
+        return []
+    values = extended(search.plants[0], np.array(list(known.values.values())))
+    return [search.of(np.array([rounded(v) for v in values]))]
+
+
+def _places(search: Search, contained: Sequence[Trial], survey: int, seed: int) -> Floats:
+    """Where a search looks first; half of it beside what it contains, with that one's values and any of its own."""
+    found = _hypercube(len(search.parameters), survey, seed)
+    if contained and search.family.base:
+        shared = len(search.family.base.parameters(search.plants[0]))
+        found[::2, :shared] = contained[0].place[:shared]
+    return found
+
+
+def _hypercube(dimensions: int, count: int, seed: int) -> Floats:
+    """Places (count, dimensions) of a Latin hypercube."""
+    rng = np.random.Generator(np.random.Philox(seed))
+    strata = np.array([rng.permutation(count) for _ in range(dimensions)]).reshape(dimensions, count).T
+    return np.asarray((strata + rng.random((count, dimensions))) / count)
+
+
+def _score(trial: Trial) -> float:
+    return trial.score
+
+
+def _settled(search: Search, optima: Sequence[Trial]) -> Trial:
+    """The best of some optima, its values rounded. Raises ValueError where it does not keep the specification."""
+    for _ in range(OVERSTATED):
+        optima = [settle(search, t) for t in optima]
+        best = min(optima, key=lambda t: (round(t.score, SAME_COST), *t.values))
+        found = search.of(np.array([rounded(v) for v in best.values]), best.place)
+        if _holds(search, found):
+            return found
+        search.optimism = max(search.optimism, _overstated(search, found)) * (1.0 + HEADROOM)
+    raise ValueError(_refusal(search))
+
+
+def grid_best(
+    family: Family, plants: Sequence[DesignPlant], specification: Specification, grid: Sequence[Sequence[float]]
+) -> Tuned:
+    """The best controller of an explicit grid, one row of values for each parameter; as `tune` for everything else."""
+    search = Search(family, plants, specification, pull=0.0)
+    if len(grid) != len(search.parameters):
+        names = ", ".join(p.name for p in search.parameters)
+        raise ValueError(
+            f"{len(grid)} rows of values for the parameters of {family.name} ({names}): give each one its row"
+        )
+    for values in product(*grid):
+        search.of(np.array(values, dtype=float))
+    return _chosen(search)
+
+
+def _candidates(search: Search) -> list[Trial]:
+    """Trials that meet the specification as far as the grid can tell, the cheapest first."""
+    asked = search.specification
+    met = (
+        t
+        for t in search.trials
+        if t.verdict.pole < 1.0
+        and t.modulus >= asked.modulus_margin
+        and np.min(t.verdict.bandwidths_hz) >= asked.bandwidth_hz
+    )
+    return sorted(met, key=lambda t: t.cost)
+
+
+def _holds(search: Search, trial: Trial) -> bool:
+    """Whether a trial keeps the specification when its margins are looked at closely."""
+    asked = search.specification
+    return trial.verdict.pole < 1.0 and all(
+        m.modulus >= asked.modulus_margin and m.bandwidth_hz >= asked.bandwidth_hz for m in search.margins(trial)
+    )
+
+
+def _overstated(search: Search, trial: Trial) -> float:
+    """By how much the search has overstated a trial's modulus margin, 1 for one that is unstable."""
+    if trial.verdict.pole >= 1.0:
+        return 1.0
+    return trial.modulus / min(m.modulus for m in search.margins(trial))
+
+
+def _chosen(search: Search) -> Tuned:
+    """The cheapest trial that holds when its margins are looked at closely. Raises ValueError where none does."""
+    for trial in _candidates(search)[:CLOSE_LOOKS]:
+        if _holds(search, trial):
+            return _tuned(search, trial)
+    raise ValueError(_refusal(search))
+
+
+def _tuned(search: Search, trial: Trial) -> Tuned:
+    final = search.family.final
+    controller = (final or search.family.build)(search.plants[0], trial.values)
+    margins = [loop_margins(p, controller) for p in search.plants] if final else search.margins(trial)
+    variances = [float(np.sum(h2(close(p, controller))[RESIDUAL])) for p in search.plants]
+    evaluations = search.count
+    modulus, bandwidth = min(m.modulus for m in margins), min(m.bandwidth_hz for m in margins)
+    asked = search.specification
+    bound = [MARGIN] if modulus <= 1.01 * asked.modulus_margin else []
+    bound += [BANDWIDTH] if bandwidth <= 1.01 * asked.bandwidth_hz else []
+    for i, p in enumerate(search.parameters):
+        bound += [f"{p.name} at its {side}" for side in _pressed(search, trial, i)]
+    return Tuned(
+        controller=controller,
+        values=_named(search, trial),
+        residual_rms_rad=math.sqrt(variances[0]),
+        mean_rms_rad=math.sqrt(float(np.mean(variances))),
+        worst_rms_rad=math.sqrt(max(variances)),
+        margins=margins[0],
+        least_modulus=modulus,
+        least_bandwidth_hz=bandwidth,
+        evaluations=evaluations,
+        bound_by=tuple(bound),
+    )
+
+
+def _pressed(search: Search, trial: Trial, index: int) -> list[str]:
+    """The bound of a parameter that a trial is pressed against: a step away from it costs, or breaks a constraint."""
+    x = trial.place[index]
+    if 1e-3 <= x <= 1.0 - 1e-3:
+        return []
+    away = trial.place.copy()
+    away[index] = abs(x - 0.05)
+    return ["least" if x < 0.5 else "most"] if search.at(away).score > trial.cost + 1e-3 else []
+
+
+def _named(search: Search, trial: Trial) -> dict[str, float]:
+    return {p.name: float(v) for p, v in zip(search.parameters, trial.values, strict=True)}
+
+
+def _with(search: Search, trial: Trial) -> str:
+    named = zip(search.parameters, trial.values, strict=True)
+    return ", ".join(f"{p.name} {v:.4g} {p.unit}".rstrip() for p, v in named)
+
+
+def _everywhere(search: Search) -> str:
+    return f" on all {len(search.plants)} plants" if len(search.plants) > 1 else ""
+
+
+def _refusal(search: Search) -> str:
+    stable = [t for t in search.trials if t.verdict.pole < 1.0]
+    return _out_of_reach(search, min(stable, key=lambda t: (t.violation, t.cost))) if stable else _no_stable(search)
+
+
+def _no_stable(search: Search) -> str:
+    if not search.trials:
+        return f"no {search.family.name} could be built in {search.count} tries; the first was refused: {search.reason}"
+    nearest = min(search.trials, key=lambda t: t.verdict.pole)
+    return (
+        f"no {search.family.name} of {search.count} tried is stable{_everywhere(search)}: the nearest "
+        f"has a pole at |z| = {nearest.verdict.pole:.6f} (the limit is 1) with {_with(search, nearest)}; shorten the "
+        "delay, narrow what is unknown of the plant, or take another controller"
+    )
+
+
+def _out_of_reach(search: Search, best: Trial) -> str:
+    asked = search.specification
+    margins = search.margins(best)
+    bandwidth = f" and a bandwidth of {asked.bandwidth_hz:g} Hz" if asked.bandwidth_hz else ""
+    reached = f" and {min(m.bandwidth_hz for m in margins):.4g} Hz" if asked.bandwidth_hz else ""
+    return (
+        f"no {search.family.name} of {search.count} tried meets the specification{_everywhere(search)}: "
+        f"a modulus margin of {asked.modulus_margin:g}{bandwidth} is asked for, the nearest reaches "
+        f"{min(m.modulus for m in margins):.3g}{reached} with {_with(search, best)}; ask for less, shorten the delay, "
+        "or take another controller"
+    )

@@ -1,0 +1,50 @@
+"""Disturbances of the line of sight: one-sided spectra as data, shaping filters that realise them, references."""
+
+from microrad.loop.disturbance.discrete import Discrete, discrete_psd, discretise, initial_state
+from microrad.loop.disturbance.fits import Fit, bands, fit_bands, fit_table, table
+from microrad.loop.disturbance.records import (
+    Convention,
+    Disturbance,
+    SpectralLine,
+    band_rms,
+    combine,
+    one_input,
+    psd,
+)
+from microrad.loop.disturbance.reference import Reference
+from microrad.loop.disturbance.sources import (
+    MICIUS_EDGES_HZ,
+    MICIUS_RMS_RAD,
+    body_pointing,
+    first_order,
+    olympus,
+    wheels,
+)
+from microrad.loop.disturbance.tables import read_table
+
+__all__ = [
+    "MICIUS_EDGES_HZ",
+    "MICIUS_RMS_RAD",
+    "Convention",
+    "Discrete",
+    "Disturbance",
+    "Fit",
+    "Reference",
+    "SpectralLine",
+    "band_rms",
+    "bands",
+    "body_pointing",
+    "combine",
+    "discrete_psd",
+    "discretise",
+    "first_order",
+    "fit_bands",
+    "fit_table",
+    "initial_state",
+    "olympus",
+    "one_input",
+    "psd",
+    "read_table",
+    "table",
+    "wheels",
+]

@@ -1,0 +1,46 @@
+"""The known part of the pointing error of one axis: what the loop must follow and no filter has to guess."""
+
+import math
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import NDArray
+
+from microrad.loop.disturbance.records import above_zero, at_least_zero
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Reference:
+    """Point-ahead, what the body leaves of the orbital motion of the line of sight, and a sine; one axis.
+
+    The body follows the line of sight's rate with a loop of first order and one bandwidth, from rest at time 0. Raises
+    ValueError for a number that is not finite, a bandwidth not above zero and a negative frequency of the sine.
+    """
+
+    point_ahead_rad: float
+    line_of_sight_rate_rad_s: float
+    body_bandwidth_hz: float
+    sine_amplitude_rad: float = 0.0
+    sine_freq_hz: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Check each number."""
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if not math.isfinite(value):
+                raise ValueError(f"{field.name} of a pointing reference is {value}; give a finite number")
+        above_zero(self.body_bandwidth_hz, "bandwidth of the body's loop in a pointing reference", "Hz")
+        at_least_zero(self.sine_freq_hz, "frequency of the sine in a pointing reference", "Hz")
+
+    def at(self, time_s: Floats) -> Floats:
+        """Reference (rad) at these times (s).
+
+        point-ahead + rate / (2 pi f_b) (1 - exp(-2 pi f_b t)) + amplitude sin(2 pi f t): the lag of a first-order loop.
+        """
+        time = np.asarray(time_s, dtype=float)
+        body = 2.0 * math.pi * self.body_bandwidth_hz
+        lag = -self.line_of_sight_rate_rad_s / body * np.expm1(-body * time)
+        sine = self.sine_amplitude_rad * np.sin(2.0 * math.pi * self.sine_freq_hz * time)
+        return np.asarray(self.point_ahead_rad + lag + sine)

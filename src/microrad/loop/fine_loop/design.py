@@ -1,0 +1,123 @@
+"""The plant that a controller of one axis is designed for, and the spectrum that a loop leaves."""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from microrad.core import lti
+from microrad.loop.control import AxisController, DesignPlant
+from microrad.loop.disturbance import Disturbance
+from microrad.loop.fine_loop.linear import ClosedLoop, close, gauge_noise_rad, open_loop
+from microrad.loop.fine_loop.loop import PointingLoop, assemble, decoupling, nominal_axis_gain
+
+Floats = NDArray[np.float64]
+
+
+def residual_spectrum(closed: ClosedLoop, freq_hz: Floats) -> Floats:
+    """One-sided spectrum of the residual at the control samples, (frequencies, axes), lines left out."""
+    o, loop = closed.open, closed.open.loop
+    whole = closed.step_noise.shape[0]
+    if loop.optical.every != 1:
+        raise ValueError("a residual spectrum needs an optical reading at every control sample")
+    monodromy = closed.monodromy
+    reading = np.zeros((loop.axes, whole))
+    reading[:, : o.at.order] = o.error
+    keep = np.ones(whole, dtype=bool)
+    for line in o.lines:
+        keep[line.states] = False
+    # From every state to the error, then the covariance: its factor would lose what is small in other units.
+    # By the dual system, with a right-hand side for each axis in place of one for each state.
+    every = np.eye(int(keep.sum()))
+    dual = lti.StateSpace(
+        monodromy[np.ix_(keep, keep)].T, reading[:, keep].T, every, np.zeros((every.shape[0], loop.axes))
+    )
+    response = lti.frequency_response(dual, freq_hz, loop.timing.period_s)
+    added = _added_in_a_period(closed)[np.ix_(keep, keep)]
+    power = np.einsum("fia,ij,fja->fa", response, added, response.conj()).real
+    return np.asarray(2.0 * loop.timing.period_s * power)
+
+
+def _added_in_a_period(closed: ClosedLoop) -> Floats:
+    """Covariance that the noises of one control period add to the state at its end."""
+    (sample_noise,) = closed.sample_noise
+    P = sample_noise @ sample_noise.T
+    for step in closed.steps:
+        P = step @ P @ step.T + closed.step_noise @ closed.step_noise.T
+    return P
+
+
+def design_plant(loop: PointingLoop) -> DesignPlant:
+    """What a controller of one axis of this loop is designed for. ``loop`` has one axis.
+
+    A sensor slower than the control is taken as one that delivers every sample, later by half of what its hold adds and
+    with the noise that it spreads to low frequencies; disturbance lines are taken as narrow bands of noise.
+    """
+    if loop.axes != 1 or loop.mirror.actuators != 1:
+        raise ValueError(f"a design needs a loop of one axis, not of {loop.axes}: design each axis by itself")
+    held = loop.optical.every
+    extra = round(0.5 * (held - 1) * loop.timing.steps_per_sample)
+    optical = replace(loop.optical, every=1, delay_steps=loop.optical.delay_steps + extra)
+    random = tuple(tuple(narrow_band(each) for each in several) for several in loop.disturbances)
+    loop = replace(loop, optical=optical, disturbances=random)
+    o = open_loop(loop)
+    keep = np.ones(o.at.order, dtype=bool)
+    keep[o.at.held] = False
+    shift = o.shift.copy()
+    shift[o.newest] = 0.0
+    period, command, factor = np.eye(o.at.order), np.zeros((o.at.order, 1)), np.zeros((o.at.order, o.at.order))
+    for step in o.steps:
+        period = step @ period
+        factor = step @ factor @ step.T + o.noise @ o.noise.T
+    command[o.newest] = decoupling(loop)
+    root = lti.covariance_root(factor)
+    noises = root[:, np.any(root != 0.0, axis=0)]
+    B = np.hstack([(period @ command), noises, np.zeros((o.at.order, 2))])[keep]
+    A = (period @ shift)[np.ix_(keep, keep)]
+    rows = np.vstack([o.error, o.reading, loop.optics @ o.mirror])[:, keep]
+    gauge = gauge_noise_rad(loop) * abs(float(loop.optics[0, 0]))
+    D = np.zeros((3, B.shape[1]))
+    D[1, -2], D[2, -1] = loop.optical.noise_rad * np.sqrt(held), gauge
+    has_gauge = loop.gauge is not None
+    if not has_gauge:
+        rows[2] = 0.0
+    B[:, 1:] = lti.to_bits(B[:, 1:], lti.EXACT_BITS)
+    system = lti.system_to_bits(lti.StateSpace(A, B, rows, D), lti.DESIGN_BITS)
+    return DesignPlant(loop.timing.period_s, system, noises.shape[1], nominal_axis_gain(loop), True, has_gauge)
+
+
+def close_axis(loop: PointingLoop, controller: AxisController) -> ClosedLoop:
+    """The linear loop of one axis under an axis controller."""
+    return close(loop, assemble(controller.name, loop, controller))
+
+
+LINE_DAMPING = 1e-3
+"""Damping ratio of the narrow band that stands for a line in a design: a wheel's speed is known to about that."""
+
+
+def narrow_band(each: Disturbance) -> Disturbance:
+    """The disturbance with each line replaced by noise of the same power in a narrow band about its frequency."""
+    size = each.A.shape[0] + 2 * len(each.lines)
+    A, B = np.zeros((size, size)), np.zeros((size, each.B.shape[1] + 2 * len(each.lines)))
+    C = np.zeros((1, size))
+    n, w = each.B.shape
+    A[:n, :n], B[:n, :w], C[:, :n] = each.A, each.B, each.C
+    for i, line in enumerate(each.lines):
+        here, natural = slice(n + 2 * i, n + 2 * i + 2), 2.0 * np.pi * line.freq_hz
+        A[here, here] = natural * np.array([[-LINE_DAMPING, 1.0], [-1.0, -LINE_DAMPING]])
+        B[here, w + 2 * i : w + 2 * i + 2] = line.amplitude_rad * np.sqrt(LINE_DAMPING * natural) * np.eye(2)
+        C[0, n + 2 * i] = 1.0
+    return replace(each, A=A, B=B, C=C, lines=())
+
+
+def behind_filter(plant: DesignPlant, low_pass: lti.StateSpace) -> DesignPlant:
+    """The plant with a filter in its command path, of which the first output counts: for an inverse in series."""
+    s, f = plant.system, low_pass
+    first = lti.StateSpace(f.A, f.B, f.C[:1], f.D[:1])
+    n, k = s.order, f.order
+    through = s.B[:, :1] @ first.C
+    A = np.block([[s.A, through], [np.zeros((k, n)), f.A]])
+    B = np.vstack([s.B, np.zeros((k, s.B.shape[1]))])
+    B[:n, :1], B[n:, :1] = s.B[:, :1] @ first.D, f.B
+    C = np.hstack([s.C, np.zeros((s.C.shape[0], k))])
+    return replace(plant, system=lti.StateSpace(A, B, C, s.D))

@@ -1,0 +1,166 @@
+"""A fine-pointing loop as data: mirror, optics, amplifier, clock, disturbances, sensors, reference; its controller."""
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from microrad.core import lti
+from microrad.loop.control import AxisController, Drive, Inverse, Timing
+from microrad.loop.disturbance import Disturbance, Reference
+from microrad.loop.sensor import OpticalSensor, StrainGauge
+from microrad.mirror.hysteresis import BoucWen, Play, gain_only, slow_gain
+from microrad.mirror.model import Mirror
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class PointingLoop:
+    """What a pointing controller works in. All angles are line-of-sight angles outside the telescope, in rad.
+
+    ``optics`` (axes, outputs) turns the mirror's outputs into line-of-sight angles. ``disturbances`` has, by axis, what
+    adds to the error; ``references`` the known part of it. ``drive_range_v`` is the range about the bias in which the
+    mirror was identified. The error is reference + disturbance - mirror.
+    """
+
+    mirror: Mirror
+    optics: Floats
+    drive: Drive
+    timing: Timing
+    disturbances: tuple[tuple[Disturbance, ...], ...]
+    optical: OpticalSensor
+    gauge: StrainGauge | None
+    references: tuple[Reference, ...]
+    drive_range_v: tuple[float, float] = (-math.inf, math.inf)
+
+    @property
+    def axes(self) -> int:
+        """Number of line-of-sight axes."""
+        return int(self.optics.shape[0])
+
+
+def in_band_gain(m: Mirror) -> Floats:
+    """Slow gain from drives to outputs without what creep adds, shape (outputs, actuators).
+
+    A mirror whose hysteresis lies in a stiffness names no model to invert: its gain at rest counts.
+    """
+    if m.inverse:
+        return np.diag([slow_gain(model) for model in m.inverse])
+    linear = m.linear_loop
+    return np.asarray(linear.D - linear.C @ np.linalg.solve(linear.A, linear.B))
+
+
+def without_hysteresis(loop: PointingLoop) -> PointingLoop:
+    """The loop with each hysteresis element replaced by its slow gain."""
+    m = loop.mirror
+    bank: tuple[BoucWen | Play, ...] = (*m.bouc_wen, *m.plays)
+    straight = tuple(gain_only(model) for model in bank)
+    inverse = tuple(gain_only(model) for model in m.inverse)
+    return replace(loop, mirror=replace(m, bouc_wen=straight, plays=(), inverse=inverse))
+
+
+@dataclass(frozen=True, slots=True)
+class LoopController:
+    """A controller of all axes: x[k+1] = A x + B m + L (clip(v) - v), as `kernels.Ensemble` takes it.
+
+    ``system`` has the inputs optical error by axis, gauge reading by mirror output, reference by axis (all rad), and
+    the outputs v by actuator (V) and, with an ``inverse``, the inverse's target (rad at the mirror's output) and its
+    rate (rad/s) by actuator. ``anti_windup`` is L, (states, actuators).
+    """
+
+    name: str
+    system: lti.StateSpace
+    anti_windup: Floats
+    inverse: Inverse | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class ReferenceFilter:
+    """Second-order low-pass that the inverse's target and its rate are taken from, critically damped.
+
+    Its state is the target and the rate, so the rate is never a difference of noisy samples.
+    """
+
+    bandwidth_hz: float
+
+    def discrete(self, period_s: float) -> lti.StateSpace:
+        """Input: wanted angle; outputs: target and its rate, at the control period, for an input held over it."""
+        w = 2.0 * math.pi * self.bandwidth_hz
+        A, B = np.array([[0.0, 1.0], [-w * w, -2.0 * w]]), np.array([[0.0], [w * w]])
+        Ad, Bd = lti.zero_order_hold(A, B, period_s)
+        # Outputs are those at the end of the sample: the input of a sample acts in it, without a sample's delay.
+        return lti.StateSpace(Ad, Bd, Ad, Bd)
+
+
+def assemble(name: str, loop: PointingLoop, axis: AxisController) -> LoopController:
+    """The same controller on each axis, with commands and gauge readings decoupled by the loop's optics."""
+    axes = loop.axes
+    eye, s, to_drives = np.eye(axes), axis.system, decoupling(loop)
+    by_gauge = np.kron(loop.optics, s.B[:, 1:2]), s.D[0, 1] * loop.optics
+    if loop.gauge is None and (np.any(s.B[:, 1]) or np.any(s.D[:, 1])):
+        raise ValueError(f"controller {name!r} reads a strain gauge, and this loop has none: give it one, or another")
+    B = np.hstack([np.kron(eye, s.B[:, :1]), by_gauge[0], np.zeros((axes * s.order, axes))])
+    D = np.hstack([s.D[0, 0] * eye, by_gauge[1], np.zeros((axes, axes))])
+    A, C = np.asarray(np.kron(eye, s.A), dtype=float), to_drives @ np.kron(eye, s.C)
+    system = lti.StateSpace(A, B, C, to_drives @ D)
+    return LoopController(name, system, np.kron(eye, axis.anti_windup) @ np.linalg.pinv(to_drives))
+
+
+def with_inverse(
+    name: str, loop: PointingLoop, axis: AxisController, inverse: Inverse, path: ReferenceFilter, in_series: bool
+) -> LoopController:
+    """The controller with an inverse of the mirror's hysteresis, driven through the reference filter.
+
+    Raises ValueError for an inverse that inverts nothing (a mirror whose hysteresis lies in a stiffness has none).
+
+    Without ``in_series`` the reference alone drives it (feedforward, as in the paper). With it, the controller's own
+    command goes through it too, as an angle: the inverse then straightens the mirror inside the loop.
+    """
+    if not any(inverse.direct) and not inverse.bouc_wen:
+        raise ValueError(
+            f"controller {name!r}: mirror {loop.mirror.name!r} has no inverse: its hysteresis lies in a stiffness, "
+            "inside the resonance, and not ahead of it; use feedback alone"
+        )
+    feedback = assemble(name, loop, axis)
+    f, m, axes = feedback.system, loop.mirror.actuators, loop.axes
+    to_mirror, share = np.linalg.pinv(loop.optics), 1.0 if in_series else 0.0
+    # Wanted mirror angles (outputs): the reference's, and what the command would move a straight mirror by.
+    gains = in_band_gain(loop.mirror)
+    reference = np.hstack([np.zeros((gains.shape[0], f.B.shape[1] - axes)), to_mirror])
+    into, through = share * gains @ f.C, reference + share * gains @ f.D
+    low_pass = path.discrete(loop.timing.period_s)
+    eye = np.eye(gains.shape[0])
+    A, B = np.kron(eye, low_pass.A), np.kron(eye, low_pass.B)
+    outputs = [np.kron(eye, row) for row in np.eye(2)[:, None, :]]  # the target, then its rate
+    volts = 1.0 - share
+    system = lti.StateSpace(
+        np.block([[f.A, np.zeros((f.order, A.shape[0]))], [B @ into, A]]),
+        np.vstack([f.B, B @ through]),
+        np.vstack(
+            [
+                np.hstack([volts * f.C, np.zeros((m, A.shape[0]))]),
+                *(np.hstack([row @ B @ into, row @ A]) for row in outputs),
+            ]
+        ),
+        np.vstack([volts * f.D, *(row @ B @ through for row in outputs)]),
+    )
+    windup = np.vstack([feedback.anti_windup, np.zeros((A.shape[0], m))])
+    return LoopController(name, system, windup, inverse)
+
+
+def decoupling(loop: PointingLoop) -> Floats:
+    """Axis commands (V) to drives, (actuators, axes): each moves its axis by `nominal_axis_gain`, and no piston."""
+    return np.asarray(
+        nominal_axis_gain(loop) * np.linalg.pinv(loop.optics) / np.diag(in_band_gain(loop.mirror))[:, None]
+    )
+
+
+def nominal_axis_gain(loop: PointingLoop) -> float:
+    """Slow gain from an axis command (V) to its line-of-sight angle (rad/V): what axis controllers are designed for.
+
+    The largest with which no drive gets more than the axis command.
+    """
+    to_drives = np.linalg.pinv(loop.optics) / np.diag(in_band_gain(loop.mirror))[:, None]
+    return float(1.0 / np.max(np.abs(to_drives)))

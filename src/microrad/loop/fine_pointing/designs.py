@@ -1,0 +1,147 @@
+"""The controllers of the study: each tuned for one axis of the mission's loop, then put on all axes."""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+
+from microrad.core.threads import shared_out
+from microrad.loop import control
+from microrad.loop.control import DesignPlant, Family, Specification, Tuned
+from microrad.loop.fine_loop.design import behind_filter, design_plant
+from microrad.loop.fine_loop.loop import LoopController, PointingLoop, ReferenceFilter, assemble, with_inverse
+from microrad.loop.fine_pointing.scenario import Scene, one_mirror, table
+from microrad.mirror import model as mirror
+from microrad.mirror import spread as mirror_spread
+from microrad.mission.model import Mission
+
+Progress = Callable[[int, int, str], None]
+
+BASELINE = "PI, best of a gain grid"
+WITH_INVERSE = f"{control.PI.name} + inverse"
+IN_SERIES = "PI + inverse in series"
+_INVERSE_USED = {WITH_INVERSE: "of the reference", IN_SERIES: "in series"}
+DRAWS = 8
+"""Mirrors drawn from the identification's covariance that a tuned controller has to hold for."""
+
+GRID = 24
+"""Values of each gain on the grid of the baseline."""
+
+
+@dataclass(frozen=True, slots=True)
+class Design:
+    """One controller of the study: what it was tuned to, on all axes; ``in_series`` names how an inverse is used."""
+
+    name: str
+    tuned: Tuned
+    controller: LoopController
+    inverse: str = ""
+
+
+def families(m: Mission) -> tuple[Family, ...]:
+    """Kinds of controller that fit the mission: peak filters where it has wheels, damping where it has a gauge."""
+    f = table(m)
+    lines = () if f.wheels is None else tuple(h * f.wheels.speed_hz for h in f.wheels.harmonics)
+    below = tuple(line for line in lines if line < 0.4 * f.rate_hz)
+    found = [control.PI, control.PI_NOTCH]
+    found += [control.RESONANT_DAMPING] if f.strain_gauge is not None else []
+    found += [control.DISTURBANCE_OBSERVER, control.LQG]
+    return (*found, *([control.peak_family(below)] if below else []))
+
+
+def plants(scene: Scene, m: Mission, seed: int) -> tuple[DesignPlant, ...]:
+    """The nominal plant of an axis, then one for each mirror drawn from the identification's covariance."""
+    drawn = mirror_spread.draws(m.mirror, DRAWS, seed) if m.mirror.uncertainty is not None else ()
+    loops = [scene.axis, *(replace(scene.axis, mirror=_drawn(m, t)) for t in drawn)]
+    return tuple(design_plant(loop) for loop in loops)
+
+
+def _drawn(m: Mission, of: object) -> mirror.Mirror:
+    return one_mirror(m.model_copy(update={"mirror": of}), "given")
+
+
+def names(m: Mission) -> tuple[str, ...]:
+    """The controllers that the study of a mission designs, the baseline first."""
+    found = [BASELINE]
+    for family in families(m):
+        found += [family.name, WITH_INVERSE] if family is control.PI else [family.name]
+    return (*found, IN_SERIES)
+
+
+def design(
+    scene: Scene,
+    m: Mission,
+    on_progress: Progress = lambda done, total, what: None,
+    only: Sequence[str] = (),
+) -> tuple[Design, ...]:
+    """Every controller of the study, the baseline first, or ``only`` some of them by name; tuned on the linear cost.
+
+    Raises ValueError for a name that `names` does not list, and with the reason when a modulus margin cannot be met.
+    """
+    straight, wanted = plants(scene, m, table(m).seed), tuple(only) or names(m)
+    first = [name for name in wanted if name in {control.PI.name, WITH_INVERSE}]  # others begin with it
+    pi = _tuning(first[0], m, straight)() if first else None
+    others = [name for name in wanted if name not in first]
+    jobs = [_tuning(name, m, straight, pi) for name in others]
+    told = len(wanted) - len(others)
+    with shared_out(jobs, lambda turn: on_progress(told + turn, len(wanted), f"tuning {others[turn]}")) as results:
+        tuned = dict(zip(others, results(), strict=True))
+    on_progress(len(wanted), len(wanted), "controllers tuned")
+    if pi is not None:
+        tuned |= dict.fromkeys(first, pi)
+    return tuple(
+        Design(name, tuned[name], build(name, scene, m, tuned[name].controller), _INVERSE_USED.get(name, ""))
+        for name in wanted
+    )
+
+
+def tune(name: str, m: Mission, of: Sequence[DesignPlant]) -> Tuned:
+    """One of the controllers that `names` lists, tuned for these plants of an axis (see `plants`).
+
+    Raises ValueError for another name, and with the reason when it cannot meet the modulus margin.
+    """
+    return _tuning(name, m, of)()
+
+
+def _tuning(name: str, m: Mission, of: Sequence[DesignPlant], known: Tuned | None = None) -> Callable[[], Tuned]:
+    """What tunes one: it reads no mission. Families that contain the PI begin with the ``known`` one."""
+    f = table(m)
+    wanted = Specification(f.modulus_margin)
+    if name == BASELINE:
+        return partial(grid_baseline, of, wanted)
+    if name == IN_SERIES:
+        path = ReferenceFilter(f.reference_filter_hz)
+        filtered = tuple(behind_filter(p, path.discrete(p.period_s)) for p in of)
+        return partial(control.tune, control.PI, filtered, wanted, seed=f.seed)
+    wanted_family = control.PI.name if name == WITH_INVERSE else name
+    for family in families(m):
+        if family.name == wanted_family:
+            return partial(control.tune, family, of, wanted, seed=f.seed, base=known)
+    raise ValueError(f"{name!r} is no controller of this mission; it has {', '.join(names(m))}")
+
+
+def build(name: str, scene: Scene, m: Mission, axis: control.AxisController) -> LoopController:
+    """A tuned axis controller on all axes of the scene, with its inverse where its name says so."""
+    if name not in _INVERSE_USED:
+        return assemble(name, scene.loop, axis)
+    path, inverse = ReferenceFilter(table(m).reference_filter_hz), control.inverse(scene.loop.mirror)
+    return with_inverse(name, scene.loop, axis, inverse, path, name == IN_SERIES)
+
+
+def grid_baseline(of: Sequence[DesignPlant], wanted: Specification) -> Tuned:
+    """The best PI on a grid of both its parameters over their whole range: what the tuned ones are held against."""
+    parameters = control.PI.parameters(of[0])
+    axes = [np.geomspace(p.least, p.most, GRID) if p.log else np.linspace(p.least, p.most, GRID) for p in parameters]
+    return control.grid_best(control.PI, of, wanted, [[control.rounded(v) for v in axis] for axis in axes])
+
+
+def optimum_rms_rad(axis: PointingLoop) -> float:
+    """Rms of one axis under the controller that leaves least of all linear ones: LQG without a price on anything else.
+
+    Integral action and margins are left out, so it is a bound and no design.
+    """
+    plant = design_plant(axis)
+    best = control.lqg_controller(plant, control.Weights(command=1e-6, sensor_noise=1.0, command_noise_v=0.0, walk=0.0))
+    return math.sqrt(sum(control.by_source(plant, best).values()))

@@ -1,0 +1,308 @@
+"""What the designs leave: in theory and simulated, on each variant of the mirror, part by part and on sines."""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from microrad.core import kernels
+from microrad.core.threads import in_threads
+from microrad.loop.control import inverse
+from microrad.loop.fine_loop import ensemble
+from microrad.loop.fine_loop.design import residual_spectrum
+from microrad.loop.fine_loop.linear import Stationary, close, stationary
+from microrad.loop.fine_loop.loop import LoopController, PointingLoop
+from microrad.loop.fine_pointing import parts
+from microrad.loop.fine_pointing.designs import BASELINE, Design
+from microrad.loop.fine_pointing.scenario import BODY_POINTING, Scene, table, variants, with_mirror
+from microrad.mission.model import Mission
+
+Floats = NDArray[np.float64]
+Progress = Callable[[int, int, str], None]
+
+COUNTERS = {
+    "saturated samples": kernels.COUNT_SATURATED,
+    "slew-limited steps": kernels.COUNT_SLEW,
+    "steps beyond the identified rate": kernels.COUNT_CLAMPED,
+    "inverse beyond the identified rate": kernels.COUNT_INVERSE_CLAMPED,
+    "steps outside the identified drive range": kernels.COUNT_OUTSIDE,
+    "samples without the spot": kernels.COUNT_LOST,
+}
+
+PROMISE = 1.5
+"""How many times its linear rms a design may leave when it is simulated, before that figure is no promise."""
+
+FEW_SAMPLES = 2_500
+"""Control samples behind the settling in the runs of an `outlook`, at most: the rms of 64 runs to some 2 %."""
+
+
+@dataclass(frozen=True, slots=True)
+class Outlook:
+    """Rms that a design leaves an axis: as it was tuned, linear, and simulated on the mission's mirror."""
+
+    linear_rad: float
+    simulated_rad: float
+
+    @property
+    def holds(self) -> bool:
+        """Whether the linear figure is a promise."""
+        return self.simulated_rad <= PROMISE * self.linear_rad
+
+
+@dataclass(frozen=True, slots=True)
+class Residual:
+    """What one controller leaves on one variant of the mirror: radial, at the line of sight.
+
+    ``rms_interval_rad`` is the half width of the 99 % interval over the runs, infinite where there is but one.
+    ``quantile_rad`` is the error that the mission's share of the time stays below; ``shares`` say how often each limit
+    was met, by name, where it was. ``axis_rms_rad`` is about zero; ``radial_counts`` counts the control samples by
+    radial error, in the bins of `fine_loop.ensemble.bin_edges_rad`.
+    """
+
+    rms_rad: float
+    rms_interval_rad: float
+    axis_rms_rad: tuple[float, ...]
+    axis_mean_rad: tuple[float, ...]
+    radial_counts: NDArray[np.int64]
+    quantile_rad: float
+    largest_rad: float
+    shares: dict[str, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Verified:
+    """A design with what it leaves: ``theory`` without hysteresis and limits, ``simulated`` by variant of the mirror.
+
+    ``spectrum_rad2_hz`` (frequencies, axes) is of the simulated residual on the mission's mirror; ``predicted_rad2_hz``
+    of the linear one, at the same frequencies.
+    """
+
+    design: Design
+    theory: Stationary
+    simulated: dict[str, Residual]
+    spectrum_rad2_hz: Floats
+    predicted_rad2_hz: Floats
+
+    def meets(self, required_rad: float, variant: str = "given") -> bool:
+        """Whether the quantile stays within the requirement."""
+        return self.simulated[variant].quantile_rad <= required_rad
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """One line of the error budget: radial rms with this part alone, simulated without hysteresis, and in theory."""
+
+    name: str
+    rms_rad: float
+    theory_rad: float
+
+
+@dataclass(frozen=True, slots=True)
+class Difference:
+    """What a part changes when it alone is left out of everything: radial rms with it and without it."""
+
+    name: str
+    with_rad: float
+    without_rad: float
+
+    @property
+    def added_rad(self) -> float:
+        """Root of the difference of the squares, negative where the part helps."""
+        square = self.with_rad**2 - self.without_rad**2
+        return math.copysign(math.sqrt(abs(square)), square)
+
+
+@dataclass(frozen=True, slots=True)
+class ErrorBudget:
+    """What makes up the residual of one controller: each source alone and together, and what the rest changes.
+
+    ``together_rad`` is simulated without hysteresis; the root sum square of the parts has to come to it where the loop
+    is linear. ``differences`` hold what hysteresis, limits, delay and quantisation change in the full loop.
+    """
+
+    controller: str
+    parts: tuple[Part, ...]
+    together_rad: float
+    full_rad: float
+    differences: tuple[Difference, ...]
+
+    @property
+    def combined_rad(self) -> float:
+        """Root sum square of the parts: they are independent of each other."""
+        return math.hypot(*(part.rms_rad for part in self.parts))
+
+    @property
+    def dominant(self) -> str:
+        """The part, or difference, that makes up most of the residual."""
+        sizes = {part.name: part.rms_rad for part in self.parts}
+        sizes |= {d.name: d.added_rad for d in self.differences if d.name != parts.DELAY}
+        return max(sizes, key=lambda name: sizes[name])
+
+    @property
+    def linear(self) -> bool:
+        """Whether the parts combine to the whole within 10 %, hysteresis included."""
+        return abs(self.combined_rad / self.full_rad - 1.0) <= 0.1
+
+
+@dataclass(frozen=True, slots=True)
+class Sine:
+    """Fig. 6 and 8 under vibration and noise: axis error while tracking a sine on x, on one variant of the mirror."""
+
+    controller: str
+    variant: str
+    freq_hz: float
+    rms_rad: float
+    quantile_rad: float
+
+
+def span(m: Mission) -> ensemble.Span:
+    """How long the mission's runs are."""
+    f = table(m)
+    return ensemble.Span(f.duration_s, f.settle_s, f.seed)
+
+
+def verify(
+    scene: Scene, m: Mission, designs: Sequence[Design], on_progress: Progress = lambda done, total, what: None
+) -> tuple[Verified, ...]:
+    """Simulate each design on each variant of the mirror, beside its linear theory."""
+    names = variants(m)
+    jobs = [_run(on_variant(scene.loop, m, variant), d.controller, m) for d in designs for variant in names]
+    runs = iter(_several(jobs, on_progress, "simulating controllers"))
+    return tuple(_verified(scene, m, d, {variant: next(runs) for variant in names}) for d in designs)
+
+
+def outlook(
+    scene: Scene, m: Mission, designs: Sequence[Design], on_progress: Progress = lambda done, total, what: None
+) -> tuple[Outlook, ...]:
+    """Each design beside its linear figure, simulated in one batch of the mission's runs with its hysteresis."""
+    whole, runs = span(m), min(table(m).runs, ensemble.LANES)
+    few = replace(whole, duration_s=min(whole.duration_s, whole.settle_s + FEW_SAMPLES * scene.loop.timing.period_s))
+    jobs = [partial(ensemble.run, scene.loop, d.controller, few, runs, threads=1) for d in designs]
+    found = _several(jobs, on_progress, "simulating controllers")
+    return tuple(
+        Outlook(d.tuned.residual_rms_rad, each.radial_rms_rad / math.sqrt(scene.loop.axes))
+        for d, each in zip(designs, found, strict=True)
+    )
+
+
+def on_variant(loop: PointingLoop, m: Mission, variant: str) -> PointingLoop:
+    """The loop on one of `scenario.VARIANTS` of its mirror."""
+    straight = variant == "no hysteresis"  # each element its slow gain, as in theory and in the error budget
+    return parts.without(loop, parts.HYSTERESIS) if straight else with_mirror(loop, m, variant)
+
+
+def _run(loop: PointingLoop, controller: LoopController, m: Mission) -> Callable[[], ensemble.Ensemble]:
+    controller = for_mirror(controller, loop)
+    return lambda: ensemble.run(loop, controller, span(m), table(m).runs, threads=1)
+
+
+def for_mirror(controller: LoopController, loop: PointingLoop) -> LoopController:
+    """The controller with its inverse, where it has one, that of this loop's mirror."""
+    return controller if controller.inverse is None else replace(controller, inverse=inverse(loop.mirror))
+
+
+def _several(
+    jobs: Sequence[Callable[[], ensemble.Ensemble]], on_progress: Progress, what: str
+) -> list[ensemble.Ensemble]:
+    return in_threads(jobs, lambda done, total: on_progress(done, total, what))
+
+
+def _verified(scene: Scene, m: Mission, design: Design, runs: dict[str, ensemble.Ensemble]) -> Verified:
+    closed = close(scene.loop, design.controller)
+    given = runs["given"]
+    inner = given.freq_hz[1:-1]
+    predicted = np.full((given.freq_hz.size, scene.loop.axes), np.nan)
+    if scene.loop.optical.every == 1:
+        predicted[1:-1] = residual_spectrum(closed, inner)
+    return Verified(
+        design,
+        stationary(closed),
+        {name: residual(run, table(m).quantile) for name, run in runs.items()},
+        given.psd_rad2_hz,
+        predicted,
+    )
+
+
+def residual(run: ensemble.Ensemble, quantile: float) -> Residual:
+    """An ensemble's statistics as a record."""
+    shares = {name: run.share(counter) for name, counter in COUNTERS.items()}
+    return Residual(
+        run.radial_rms_rad,
+        run.radial_rms_interval_rad(),
+        tuple(float(v) for v in run.axis_rms_rad),
+        tuple(float(v) for v in np.mean(run.mean_rad, axis=0)),
+        run.histogram.sum(axis=0, dtype=np.int64),
+        run.quantile_rad(quantile),
+        float(np.max(run.largest_rad)),
+        {name: share for name, share in shares.items() if share},
+    )
+
+
+def best(verified: Sequence[Verified]) -> Verified:
+    """The design that leaves the smallest quantile on the mission's mirror, the baseline aside."""
+    tuned = [v for v in verified if v.design.name != BASELINE]
+    return min(tuned, key=lambda v: v.simulated["given"].quantile_rad)
+
+
+def error_budget(
+    scene: Scene, m: Mission, of: Verified, on_progress: Progress = lambda done, total, what: None
+) -> ErrorBudget:
+    """Each source of error alone, together, and what is not a source left out of the whole; all with the same seeds.
+
+    The whole, with hysteresis and without, is what `verify` has simulated.
+    """
+    fine = parts.without(scene.loop, parts.HYSTERESIS, parts.QUANTISATION)
+    names = parts.sources(fine)
+    left_out = (parts.LIMITS, parts.QUANTISATION, parts.DELAY)
+    alone = [parts.without(fine, *(other for other in names if other != name)) for name in names]
+    fewer = [parts.without(scene.loop, name) for name in left_out]
+    runs = _several([_run(loop, of.design.controller, m) for loop in (*alone, *fewer)], on_progress, "error budget")
+    rms = [run.radial_rms_rad for run in runs]
+    theory = of.theory.error_by_source
+    lines = tuple(
+        Part(name, value, math.sqrt(float(np.sum(theory[name]))) if name in theory else math.nan)
+        for name, value in zip(names, rms[: len(names)], strict=True)
+    )
+    full, together = of.simulated["given"].rms_rad, of.simulated["no hysteresis"].rms_rad
+    without = {parts.HYSTERESIS: together, **dict(zip(left_out, rms[len(names) :], strict=True))}
+    differences = tuple(Difference(name, full, value) for name, value in without.items())
+    return ErrorBudget(of.design.name, lines, together, full, differences)
+
+
+def _tracking(loop: PointingLoop, amplitude_rad: float, freq_hz: float) -> PointingLoop:
+    alone = parts.without(loop, parts.REFERENCE, BODY_POINTING)
+    first = replace(alone.references[0], sine_amplitude_rad=amplitude_rad, sine_freq_hz=freq_hz)
+    return replace(alone, references=(first, *alone.references[1:]))
+
+
+SINE_S, SINE_SETTLE_S = 1.4, 0.4
+"""Length of a run that tracks a sine, and what is left out at its begin."""
+
+
+def sines(
+    scene: Scene, m: Mission, designs: Sequence[Design], on_progress: Progress = lambda done, total, what: None
+) -> tuple[Sine, ...]:
+    """The paper's sines (Fig. 6 and 8) on axis x, with vibration and sensor noise, for all controllers.
+
+    Body pointing and point-ahead are left out: with them the sine would not fit into the stroke.
+    """
+    freqs = sorted({*m.scenario.pid_frequencies_hz, *m.scenario.inverse_frequencies_hz})
+    f = table(m)
+    jobs, what = [], []
+    for variant in ("given", "comparison") if "comparison" in variants(m) else ("given",):
+        loop = with_mirror(scene.loop, m, variant)
+        for design in designs:
+            for freq in freqs:
+                tracking = _tracking(loop, m.scenario.amplitude_rad, freq)
+                short = ensemble.Span(SINE_S, SINE_SETTLE_S, f.seed)
+                controller = for_mirror(design.controller, tracking)
+                jobs.append(lambda a=tracking, c=controller, s=short: ensemble.run(a, c, s, ensemble.LANES, threads=1))
+                what.append((design.name, variant, freq))
+    runs = _several(jobs, on_progress, "sines under vibration and noise")
+    return tuple(
+        Sine(name, variant, freq, run.radial_rms_rad, run.quantile_rad(f.quantile))
+        for (name, variant, freq), run in zip(what, runs, strict=True)
+    )

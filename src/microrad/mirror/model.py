@@ -1,0 +1,306 @@
+"""The fast steering mirror: one plant form for every mirror, a linear system with a bank of hysteresis operators.
+
+    x' = A x + B u + E z        q = F x + G u        z = H[q, q']        y = C x + D u + K z
+
+Drive u in volts at the amplifier's input, output y in radians. All are deviations from rest at the bias voltage.
+"""
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from microrad.core import kernels, lti
+from microrad.mirror.hysteresis import LINE_OF_SIGHT, NO_CREEP, BoucWen, Creep, Play, scaled, slow_gain, steepest_slope
+from microrad.mission.tables import mirror as mirror_table
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Mirror:
+    """A mirror in the plant form of this module, continuous in time, with its arrays named as there.
+
+    Bouc-Wen elements come first in the rows of F and G and the columns of E and K, Prandtl-Ishlinskii operators after
+    them. ``inverse`` names, by actuator, the hysteresis that a feedforward inverts, and ``inverse_creep`` the creep.
+    """
+
+    name: str
+    A: Floats
+    B: Floats
+    E: Floats
+    F: Floats
+    G: Floats
+    C: Floats
+    D: Floats
+    K: Floats
+    bouc_wen: tuple[BoucWen, ...]
+    plays: tuple[Play, ...]
+    inverse: tuple[BoucWen | Play, ...]
+    inverse_creep: tuple[Creep, ...] = ()
+
+    @property
+    def actuators(self) -> int:
+        """Number of drives."""
+        return int(self.B.shape[1])
+
+    @property
+    def axes(self) -> int:
+        """Number of outputs."""
+        return int(self.C.shape[0])
+
+    @property
+    def linear_loop(self) -> lti.StateSpace:
+        """The mirror with each element replaced by its slow gain, for margins (Bouc-Wen: d1, plays: sum of weights)."""
+        bank: tuple[BoucWen | Play, ...] = (*self.bouc_wen, *self.plays)
+        slopes = np.array([slow_gain(model) for model in bank])
+        through = slopes[:, None]
+        return lti.StateSpace(
+            self.A + self.E @ (through * self.F),
+            self.B + self.E @ (through * self.G),
+            self.C + self.K @ (through * self.F),
+            self.D + self.K @ (through * self.G),
+        )
+
+
+def linear_part(table: mirror_table.LinearPart) -> tuple[lti.StateSpace, float]:
+    """Linear part divided by its gain at the normalising frequency, and that gain: magnitude, with the sign of Re.
+
+    The gain of the mirror belongs to its hysteresis model; cascading two models with a gain each squares it.
+    """
+    if table.numerator is None or table.denominator is None:
+        zeros, poles = (np.array(roots, dtype=complex) for roots in table.roots)
+        return lti.modal_from_roots(zeros, poles, table.normalise_at_hz), 1.0
+    system = lti.modal_from_polynomials(table.numerator, table.denominator)
+    response = complex(lti.frequency_response(system, np.array([table.normalise_at_hz]))[0, 0, 0])
+    gain = math.copysign(abs(response), response.real)
+    return replace(system, C=system.C / gain), gain
+
+
+def hysteresis_model(
+    table: mirror_table.Mirror | mirror_table.Comparison, rate_limit_v_s: float, bias_v: float
+) -> BoucWen | Play:
+    """The hysteresis model of a mirror table, as a record."""
+    if table.bouc_wen is not None:
+        b = table.bouc_wen
+        return BoucWen(
+            b.d1_rad_v,
+            b.d2_s_v,
+            b.epsilon_rad_v,
+            b.delta_s_v,
+            b.alpha_1_v,
+            b.beta_1_v,
+            rate_limit_v_s,
+            bias_v,
+            b.gamma_1_v,
+            b.eta_1_v,
+            b.exponent,
+        )
+    p = table.prandtl_ishlinskii
+    assert p is not None  # the mission's own check
+    return Play(p.thresholds_v, p.weights_rad_v, p.widening_s, rate_limit_v_s if p.widening_s else math.inf)
+
+
+def creep_model(table: mirror_table.Mirror) -> Creep:
+    """The creep of a mirror table, as a record; without one, none."""
+    return NO_CREEP if table.creep is None else Creep(table.creep.weights_rad_v, table.creep.time_constants_s)
+
+
+def line_of_sight(model: BoucWen | Play, convention: str) -> BoucWen | Play:
+    """The model with its output as an angle of the line of sight.
+
+    "mechanical" is doubled (reflection, per axis at normal incidence); "line-of-sight" is as it stands.
+    """
+    return scaled(model, LINE_OF_SIGHT[convention])
+
+
+def from_mission(
+    table: mirror_table.Mirror, model: BoucWen | Play, composition: str | None = None, times: float = 1.0
+) -> Mirror:
+    """Assemble one axis of the mission's linear part, creep and a hysteresis model.
+
+    The composition is the mission's or another: cascade: the hysteresis drives the linear part (q = u, B = 0).
+    additive: the linear gain drives the linear part and the hysteresis is added behind it through K. static: no linear
+    part. Creep is added to the output in each of them, ``times`` what the table says, for an output that is counted
+    otherwise than there (see `line_of_sight`).
+    """
+    system = None if table.linear is None else linear_part(table.linear)[0]
+    creep = creep_model(table)
+    creep = replace(creep, weights_rad_v=tuple(times * w for w in creep.weights_rad_v))
+    return assemble(table.name, composition or table.composition, system, model, creep)
+
+
+def assemble(
+    name: str, composition: str, system: lti.StateSpace | None, model: BoucWen | Play, creep: Creep = NO_CREEP
+) -> Mirror:
+    """One axis from a linear part of unit gain (none for "static"), a hysteresis model and the creep beside it.
+
+    Raises ValueError for a composition that lacks its linear part.
+    """
+    if composition != "static" and system is None:
+        raise ValueError(f'composition "{composition}" needs a linear part; give one or choose "static"')
+    if system is None or composition == "static":
+        system = lti.StateSpace(np.zeros((0, 0)), np.zeros((0, 1)), np.zeros((1, 0)), np.zeros((1, 1)))
+    bouc_wen, plays = _elements(model, split=composition == "additive")
+    through_linear, direct = _routes(composition, len(bouc_wen) + len(plays))
+    n, lags, elements = system.order, len(creep.weights_rad_v), through_linear.size
+    A, E = np.zeros((n + lags, n + lags)), np.zeros((n + lags, elements))
+    A[:n, :n], E[:n] = system.A, system.B @ through_linear[None, :]
+    per_second = 1.0 / np.array(creep.time_constants_s)
+    A[range(n, n + lags), range(n, n + lags)] = -per_second
+    return Mirror(
+        name=name,
+        A=A,
+        B=np.concatenate([np.zeros(n), per_second])[:, None],
+        E=E,
+        F=np.zeros((elements, n + lags)),
+        G=np.ones((elements, 1)),
+        C=np.hstack([system.C, np.array(creep.weights_rad_v)[None, :]]),
+        D=np.zeros((1, 1)),
+        K=direct[None, :],
+        bouc_wen=bouc_wen,
+        plays=plays,
+        inverse=(model,),
+        inverse_creep=(creep,),
+    )
+
+
+def _elements(model: BoucWen | Play, split: bool) -> tuple[tuple[BoucWen, ...], tuple[Play, ...]]:
+    """Bank of one model; split into its linear gain first and its hysteresis after it."""
+    if isinstance(model, Play):
+        if not split or len(model.weights_rad_v) < 2 or model.thresholds_v[0] > 0.0:
+            return (), (model,)
+        first = Play(model.thresholds_v[:1], model.weights_rad_v[:1])
+        return (), (first, replace(model, thresholds_v=model.thresholds_v[1:], weights_rad_v=model.weights_rad_v[1:]))
+    if not split:
+        return (model,), ()
+    return (replace(model, epsilon_rad_v=0.0), replace(model, d1_rad_v=0.0)), ()
+
+
+def _routes(composition: str, elements: int) -> tuple[Floats, Floats]:
+    """Which elements drive the linear part, and which are added to the output."""
+    ones, first = np.ones(elements), np.eye(elements)[0]
+    if composition == "cascade":
+        return ones, 0.0 * ones
+    return (first, ones - first) if composition == "additive" else (0.0 * ones, ones)
+
+
+def combine(*mirrors: Mirror) -> Mirror:
+    """Independent mirrors side by side: the axes, actuators and elements of the first, then of the next."""
+    from scipy.linalg import block_diag  # slow to import, not needed to show help
+
+    bw = [len(m.bouc_wen) for m in mirrors]
+    total = np.cumsum([0] + [len(m.bouc_wen) + len(m.plays) for m in mirrors])
+    order = [int(t) + i for t, n in zip(total, bw, strict=False) for i in range(n)]
+    order += [i for i in range(int(total[-1])) if i not in order]  # Bouc-Wen elements first
+    blocks = {key: block_diag(*(getattr(m, key) for m in mirrors)) for key in "ABEFGCDK"}
+    return Mirror(
+        name=" + ".join(m.name for m in mirrors),
+        A=blocks["A"],
+        B=blocks["B"],
+        E=blocks["E"][:, order],
+        F=blocks["F"][order],
+        G=blocks["G"][order],
+        C=blocks["C"],
+        D=blocks["D"],
+        K=blocks["K"][:, order],
+        bouc_wen=sum((m.bouc_wen for m in mirrors), ()),
+        plays=sum((m.plays for m in mirrors), ()),
+        inverse=sum((m.inverse for m in mirrors), ()),
+        inverse_creep=sum((m.inverse_creep for m in mirrors), ()),
+    )
+
+
+def discretise(mirror: Mirror, step_s: float) -> kernels.Plant:
+    """The mirror for a fixed step with u and z linear over it.
+
+    Raises ValueError, naming a step that would do, when q = F x closes a loop through one step that is no contraction.
+    """
+    inputs = np.hstack([mirror.B, mirror.E])
+    Ad, start, end = lti.first_order_hold(mirror.A, inputs, step_s)
+    m = mirror.actuators
+    if contraction(mirror, step_s) >= 1.0:
+        usable = step_s
+        while contraction(mirror, usable) >= 0.5:
+            usable /= 2.0
+        raise ValueError(
+            f"mirror {mirror.name!r}: the loop through F is no contraction at a step of {step_s:g} s; "
+            f"use a step of at most {usable:.3g} s, or move the mean slope of the hysteresis into A"
+        )
+    B0, E0, B1, E1 = start[:, :m], start[:, m:], end[:, :m], end[:, m:]
+    return plant_arrays(step_s, (Ad, B0, B1, E0, E1), mirror)
+
+
+def plant_arrays(step_s: float, discrete: tuple[Floats, ...], mirror: Mirror) -> kernels.Plant:
+    """The kernel's arrays from the discrete matrices Ad, B0, B1, E0, E1 and the mirror's F, G, C, D, K and bank."""
+    Ad, B0, B1, E0, E1 = discrete
+    n, odd = Ad.shape[0], Ad.shape[0] % 2  # the kernel pairs the states: an odd one gets an idle partner
+    Ad = np.pad(Ad, (0, odd))
+    neighbour = np.arange(n + odd) ^ 1
+    near = np.eye(n + odd, dtype=bool) | (np.arange(n + odd)[:, None] == neighbour)
+
+    def count(size: int) -> kernels.Count:
+        return (0,) * size
+
+    def below(matrix: Floats) -> Floats:
+        return np.pad(matrix.astype(float), ((0, odd), (0, 0)))
+
+    def beside(matrix: Floats) -> Floats:
+        return np.pad(matrix.astype(float), ((0, 0), (0, odd)))
+
+    return kernels.Plant(
+        step_s=float(step_s),
+        states=count(n),
+        actuators=count(mirror.actuators),
+        outputs=count(mirror.axes),
+        elements=count(len(mirror.bouc_wen)),
+        operators=count(len(mirror.plays)),
+        feedback=bool(np.any(mirror.F)),
+        direct=bool(np.any(mirror.B) or np.any(mirror.D)),
+        diagonal=np.diag(Ad).copy(),
+        coupling=Ad[np.arange(n + odd), neighbour],
+        rest=kernels.rows(np.where(near, 0.0, Ad)),
+        B0=below(B0),
+        B1=below(B1),
+        E_held=below(E0 + E1),
+        E1=below(E1),
+        F=beside(mirror.F),
+        G=mirror.G.astype(float),
+        C=beside(mirror.C),
+        D=mirror.D.astype(float),
+        CE1=mirror.C @ E1,
+        K=mirror.K.astype(float),
+        bouc_wen=kernels.bouc_wen_rows([b.row for b in mirror.bouc_wen]),
+        operator=np.array([(p.widening_s, p.rate_limit_v_s) for p in mirror.plays], dtype=float).reshape(-1, 2),
+        play_start=np.cumsum([0] + [len(p.thresholds_v) for p in mirror.plays]).astype(np.uint64),
+        play_threshold=np.array([r for p in mirror.plays for r in p.thresholds_v], dtype=float),
+        play_weight=np.array([w for p in mirror.plays for w in p.weights_rad_v], dtype=float),
+    )
+
+
+def contraction(mirror: Mirror, step_s: float) -> float:
+    """Bound on how much of an error in z at the end of a step returns through F and the steepest slope of the bank."""
+    fed = np.any(mirror.F, axis=1)
+    if not np.any(fed):
+        return 0.0
+    end = lti.first_order_hold(mirror.A, mirror.E, step_s)[2]
+    bank: tuple[BoucWen | Play, ...] = (*mirror.bouc_wen, *mirror.plays)
+    steepest = [steepest_slope(model) for model, is_fed in zip(bank, fed, strict=True) if is_fed]
+    returning = (mirror.F @ end)[np.ix_(fed, fed)]  # what is not fed cannot return
+    return float(np.linalg.norm(returning * np.array(steepest)[None, :], np.inf))
+
+
+def at_rest(plant: kernels.Plant) -> kernels.PlantState:
+    """A fresh state of the plant: everything zero, which is rest at the bias."""
+    m, bouc_wen = len(plant.actuators), len(plant.elements)
+    return kernels.PlantState(
+        x=np.zeros(plant.diagonal.size),
+        x_next=np.zeros(plant.diagonal.size),
+        u=np.zeros(m),
+        u_next=np.zeros(m),
+        y=np.zeros(len(plant.outputs)),
+        bank=np.zeros((bouc_wen + len(plant.operators), 4)),
+        play=np.zeros(plant.play_threshold.size),
+        clamped=np.zeros(bouc_wen + len(plant.operators), dtype=np.int64),
+    )

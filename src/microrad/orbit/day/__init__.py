@@ -1,0 +1,135 @@
+"""What a link delivers in a day: contacts, acquisition, rates, volume and latency, by relay and by direct downlink."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from microrad import link, orbit
+from microrad.core.units import format_quantity
+from microrad.link.partner_search import Found
+from microrad.link.requirement import derived_from
+from microrad.link.study import LinkStudy
+from microrad.mission.model import LinkMission
+from microrad.orbit import operations
+from microrad.orbit.day import flow
+from microrad.orbit.day.assumptions import NOTHING, Numbers, Swing, swings
+from microrad.orbit.day.flow import DIRECT, RELAY, Closing, PointingLoss, Way
+from microrad.orbit.day.geometry import Encounter, View, beyond_the_mission, encounter, short_tail, times, view
+
+Progress = Callable[[int, int, str], None]
+
+__all__ = [
+    "DIRECT",
+    "NOTHING",
+    "RELAY",
+    "Closing",
+    "DayStudy",
+    "Encounter",
+    "Numbers",
+    "PointingLoss",
+    "Swing",
+    "View",
+    "Way",
+    "acquired",
+    "given_loss",
+    "loss_at",
+    "relay",
+    "run",
+    "times",
+    "view",
+]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DayStudy:
+    """The span of a mission by both ways, and the assumptions that move the comparison, the weightiest first.
+
+    ``encounters`` are the contacts of the relay as it grants them, with what their line of sight reaches. ``closings``
+    are the laser's rates, highest first, with how far each reaches under ``loss``; ``derived`` are the inputs of the
+    laser link that were chosen for its margin (`requirement.derived_from`), so that its reach follows from that choice.
+    """
+
+    mission: LinkMission
+    view: View
+    encounters: tuple[Encounter, ...]
+    loss: PointingLoss
+    closings: tuple[Closing, ...]
+    derived: tuple[str, ...]
+    relay: Way
+    direct: Way | None
+    swings: tuple[Swing, ...]
+    warnings: tuple[str, ...]
+
+    @property
+    def ratio(self) -> float:
+        """Volume that the relay could carry over that of the direct downlink (`flow.ratio`); nan without one."""
+        return float("nan") if self.direct is None else flow.ratio(self.relay.capacity_bit, self.direct.capacity_bit)
+
+
+def given_loss(links: LinkStudy) -> PointingLoss:
+    """The pointing loss of a mission whose loop is not simulated: that of its jitter, else of its pointing error."""
+    m = links.file.mission
+    if links.under_jitter is not None:
+        return PointingLoss(links.under_jitter.outage_loss_db, links.under_jitter.outage, "jitter as given")
+    error = format_quantity(m.communication.pointing_error_rad, "rad")
+    return loss_at(m, links.communication.margin_db, f"communication.pointing_error, {error}")
+
+
+def loss_at(m: LinkMission, margin_db: float, source: str) -> PointingLoss:
+    """The pointing loss, an uncorrected point-ahead in it, that leaves a margin at the budgeted rate and distance."""
+    needed = float(link.required_dbm(m, m.communication.data_rate_bit_s))
+    return PointingLoss(link.received_on_axis_dbm(m) - needed - margin_db, 0.0, source)
+
+
+def _check_contact(m: LinkMission, seen: View) -> None:
+    """Refuse a contact beyond those of the span."""
+    asked = None if m.operations is None else m.operations.contact
+    if asked is not None and seen.encounters and asked.number > len(seen.encounters):
+        raise operations.OperationsError(
+            f"operations.contact.number is {asked.number}, and the span has {len(seen.encounters)} contacts: give a "
+            "number up to that, or a longer orbit.duration"
+        )
+
+
+def acquired(links: LinkStudy) -> Found | None:
+    """The acquisition by which the mission's partner is found, or None where it has none."""
+    o, finding = links.file.mission.operations, links.finding
+    if finding is None or o is None:
+        return None
+    return finding.wide if o.acquisition == "wide beacon" else finding.scan
+
+
+def relay(links: LinkStudy, loss: PointingLoss) -> Way:
+    """The way by the relay alone: what `run` finds of it, without the rest of the day."""
+    m = links.file.mission
+    seen, rates = view(m, orbit.pair(m, links.file.path.parent)), flow.rate_table(flow.closings(m, loss))
+    return flow.relay(m, seen, rates, loss.outage, acquired(links), 1.0)
+
+
+def run(
+    links: LinkStudy, loss: PointingLoss | None = None, on_progress: Progress = lambda done, total, what: None
+) -> DayStudy:
+    """The day of a mission that has the tables `orbit` and `operations`.
+
+    ``loss`` is what pointing costs the laser link, by default what the mission states. Raises `orbit.OrbitError` and
+    `operations.OperationsError` for tables that are missing and orbits that do not hold.
+    """
+    m, folder = links.file.mission, links.file.path.parent
+    loss = given_loss(links) if loss is None else loss
+    seen = view(m, orbit.pair(m, folder))
+    _check_contact(m, seen)
+    found = acquired(links)
+    closing = flow.closings(m, loss)
+    rates, heard = flow.rate_table(closing), flow.heard(m, seen)
+    relay = flow.relay(m, seen, rates, loss.outage, found, 1.0)
+    return DayStudy(
+        mission=m,
+        view=seen,
+        loss=loss,
+        closings=closing,
+        derived=derived_from(links.file.sources, "communication."),
+        encounters=tuple(encounter(m, seen.pair, contact) for contact in relay.contacts),
+        relay=relay,
+        direct=flow.direct(m, seen, heard),
+        swings=swings(m, folder, seen, heard, loss, found, on_progress),
+        warnings=(*beyond_the_mission(m, seen), *short_tail(seen.pair)),
+    )

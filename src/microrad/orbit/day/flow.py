@@ -1,0 +1,280 @@
+"""From contacts to data: rates that the link closes at, acquisitions drawn, the store, volumes and latencies."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from microrad import link, orbit
+from microrad.link.partner_search import Found
+from microrad.mission.model import LinkMission
+from microrad.mission.tables.operations import Downlink, Operations
+from microrad.orbit import operations
+from microrad.orbit.day.geometry import View, cut_at, longest_gap_s
+
+Floats = NDArray[np.float64]
+
+RELAY, DIRECT = "relay", "direct downlink"
+
+
+@dataclass(frozen=True, slots=True)
+class PointingLoss:
+    """What pointing costs the laser link: the loss in dB, the share of time in outage, and where both come from.
+
+    Both are those at the budgeted rate and distance, and are taken for every range and rate.
+    """
+
+    loss_db: float
+    outage: float
+    source: str
+
+
+@dataclass(frozen=True, slots=True)
+class Closing:
+    """A data rate with the margin that it has at the budgeted distance, and the largest range at which it closes."""
+
+    rate_bit_s: float
+    margin_db: float
+    largest_range_m: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Way:
+    """One way down: its contacts, what they could carry, and what happened to the instrument's data.
+
+    ``contacts`` are those of the span, cut at its end, passes over ``stations`` for a downlink; ``carried_bit`` is what
+    each could carry, and ``capacity_bit`` their sum, both the mean of the runs; ``capacity_spread_bit`` the least and
+    the most of a run. ``contact_s`` is the time in contact, ``gap_s`` the longest time without one, begun in the span.
+    ``history`` is the store in the first run; volumes are means over the runs, and ``latency`` is that of all runs
+    together.
+    """
+
+    name: str
+    contacts: tuple[orbit.Contact, ...]
+    stations: tuple[str, ...]
+    contact_s: float
+    gap_s: float
+    carried_bit: Floats
+    capacity_bit: float
+    capacity_spread_bit: tuple[float, float]
+    generated_bit: float
+    lost_bit: float
+    on_board_bit: float
+    failed_contacts: float
+    history: operations.StoreHistory
+    latency: operations.Latency
+
+    @property
+    def arrived_bit(self) -> float:
+        """The instrument's data that arrive."""
+        return max(self.generated_bit - self.lost_bit - self.on_board_bit, 0.0)
+
+    @property
+    def median_s(self) -> float:
+        """Median latency of the data that was kept; infinite when less than half arrived."""
+        return self.latency.quantile(0.5)
+
+    @property
+    def slow_s(self) -> float:
+        """Latency within which 99 % of the data that was kept arrived; infinite when less did."""
+        return self.latency.quantile(0.99)
+
+
+def closings(m: LinkMission, loss: PointingLoss) -> tuple[Closing, ...]:
+    """The rates of the mission, highest first, each with how far it reaches; what the receiver refuses is left out.
+
+    It closes with a margin of `operations.margin`; the margin falls by 20 log10 of the range.
+    """
+    o = table(m)
+    rates = (m.communication.data_rate_bit_s,) if o.rates_bit_s is None else o.rates_bit_s
+    built, found = link.receiver(m), []
+    available = link.received_on_axis_dbm(m) - loss.loss_db
+    for rate in sorted(rates, reverse=True):
+        if built is not None and rate > built.highest_data_rate_bit_s:
+            continue
+        margin = available - float(link.required_dbm(m, rate))
+        spare = margin - o.margin_db
+        found.append(Closing(rate, margin, m.communication.distance_m * 10.0 ** (spare / 20.0)))
+    return tuple(found)
+
+
+def table(m: LinkMission) -> Operations:
+    """The mission's table of operations; `operations.OperationsError` without one."""
+    if m.operations is None:
+        raise operations.OperationsError("the mission has no table [operations]: microrad init writes one")
+    return m.operations
+
+
+def rate_table(found: tuple[Closing, ...]) -> operations.RateTable | None:
+    """The rates as steps of range; None where the receiver takes none."""
+    steps: list[operations.Step] = []
+    for c in found:  # a lower rate that reaches less far never serves
+        if not steps or c.largest_range_m > steps[-1].largest_range_m:
+            steps.append(operations.Step(c.rate_bit_s, c.largest_range_m))
+    return operations.RateTable(tuple(steps)) if steps else None
+
+
+def ratio(relay_bit: float, direct_bit: float) -> float:
+    """A volume by relay over one direct: 0 where the relay carries nothing, infinite where the other alone does."""
+    if direct_bit == 0.0:
+        return math.inf if relay_bit > 0.0 else 0.0
+    return relay_bit / direct_bit
+
+
+# --------------------------------------------------------------------------------------------------------------- relay
+def relay(
+    m: LinkMission, seen: View, rates: operations.RateTable | None, outage: float, found: Found | None, slower: float
+) -> Way:
+    """The way by the relay: each run draws an acquisition for each contact; ``slower`` stretches their times."""
+    o = table(m)
+    granted = _granted(seen, o.relay_share)
+    whole = tuple(contact for contact, _ in granted)
+    bases = [_whole_service(contact, range_m, rates, 1.0 - outage) for contact, range_m in granted]
+    locks = np.array([_locks(found, len(whole), o.seed, run, slower) for run in range(o.runs)])
+    runs = [[delayed(base, base.start_s + lock) for base, lock in zip(bases, row, strict=True)] for row in locks]
+    failed = float(np.mean(np.isinf(locks[:, : _of_span(whole, seen)]).sum(axis=1)))
+    return _way(RELAY, whole, (), runs, o, seen, o.relay_delay_s, failed)
+
+
+def _of_span(contacts: tuple[orbit.Contact, ...], seen: View) -> int:
+    return sum(c.start_s < seen.duration_s for c in contacts)
+
+
+_Range = Callable[[Floats], Floats]
+
+
+def _granted(seen: View, share: float) -> list[tuple[orbit.Contact, _Range]]:
+    """The part of each contact that the relay grants, with its range over time.
+
+    A contact that goes on behind the span is granted in two parts: what it has in the span counts by itself.
+    """
+    pairs = list(zip(seen.contacts, seen.range_m, strict=True))
+    if share == 1.0:
+        return pairs
+    found, end = [], seen.duration_s
+    for c, range_m in pairs:
+        parts = [(c.start_s, c.end_s)] if not c.start_s < end < c.end_s else [(c.start_s, end), (end, c.end_s)]
+        for first, last in parts:
+            cut = orbit.Contact(first, first + share * (last - first), c.begins, "end of the relay's share")
+            found.append((cut, range_m))
+    return found
+
+
+def _whole_service(
+    contact: orbit.Contact,
+    range_m: _Range,
+    rates: operations.RateTable | None,
+    availability: float,
+) -> operations.Service:
+    """What a contact would carry if it were locked from its beginning."""
+    span = contact.start_s, contact.end_s
+    if rates is None:
+        return operations.Service(np.array(span), np.zeros(1), availability)
+    return operations.service(rates, span, contact.start_s, range_m, availability)
+
+
+def _locks(found: Found | None, contacts: int, seed: int, run: int, slower: float) -> Floats:
+    """Seconds from the beginning of each contact to lock, infinite where acquisition is given up; drawn from its runs.
+
+    Without an acquisition in the mission lock is there at once.
+    """
+    if found is None:
+        return np.zeros(contacts)
+    draw = np.random.Generator(np.random.Philox(key=[seed, run]))
+    chosen = draw.integers(0, found.simulated.time_s.size, contacts)
+    return np.where(found.simulated.locked[chosen], slower * found.simulated.time_s[chosen], math.inf)
+
+
+def delayed(service: operations.Service, lock_s: float) -> operations.Service:
+    """The same contact without data before lock."""
+    if lock_s <= service.start_s:
+        return service
+    if lock_s >= service.end_s:
+        return operations.Service(np.array([service.start_s, service.end_s]), np.zeros(1), service.availability)
+    after = service.edges_s > lock_s
+    first = int(np.argmax(after))
+    edges = np.concatenate(([service.start_s, lock_s], service.edges_s[after]))
+    return operations.Service(edges, np.concatenate(([0.0], service.rate_bit_s[first - 1 :])), service.availability)
+
+
+# -------------------------------------------------------------------------------------------------------------- direct
+Heard = tuple[orbit.Pass, str]
+"""A pass and the station that hears it."""
+
+
+def heard(m: LinkMission, seen: View) -> tuple[Heard, ...]:
+    """Every pass over every station of the direct downlink; none without one."""
+    down, pair = table(m).downlink, seen.pair
+    if down is None:
+        return ()
+    return tuple(
+        (each, station.name)
+        for station in orbit.stations(down)
+        for each in orbit.passes(pair.leo.orbit, station, pair.epoch, pair.whole_s)
+    )
+
+
+def direct(m: LinkMission, seen: View, passes: tuple[Heard, ...]) -> Way | None:
+    """The radio downlink, or None without one. The station that rises first is kept until the satellite sets there."""
+    o = table(m)
+    if o.downlink is None:
+        return None
+    kept, names = [], []
+    until = -math.inf
+    for each, name in sorted(passes, key=lambda item: (item[0].start_s, item[0].end_s)):
+        start, begins = max(each.start_s, until), each.begins if each.start_s >= until else "station free"
+        if each.end_s > start:
+            kept.append(replace(each, start_s=start, begins=begins))
+            names.append(name)
+            until = each.end_s
+    down = o.downlink
+    services = [_radio(contact, down) for contact in kept]
+    return _way(DIRECT, tuple(kept), tuple(names), [services], o, seen, down.delay_s, 0.0)
+
+
+def _radio(contact: orbit.Contact, down: Downlink) -> operations.Service:
+    span = np.array([contact.start_s, contact.end_s])
+    return delayed(operations.Service(span, np.array([down.data_rate_bit_s]), 1.0), contact.start_s + down.setup_s)
+
+
+# ----------------------------------------------------------------------------------------------------------------- way
+def _way(
+    name: str,
+    contacts: tuple[orbit.Contact, ...],
+    stations: tuple[str, ...],
+    runs: list[list[operations.Service]],
+    o: Operations,
+    seen: View,
+    delay_s: float,
+    failed: float,
+) -> Way:
+    span, whole = seen.pair.span_s, seen.pair.whole_s
+    made = operations.Production(o.instrument_rate_bit_s, *span)
+    histories = [operations.deliver(made, o.store_bit, services, whole, delay_s) for services in runs]
+    inside = _of_span(contacts, seen)
+    carried = np.array([[_until(s, span[1]) for s in services[:inside]] for services in runs]).reshape(len(runs), -1)
+    total, shown = carried.sum(axis=1), tuple(cut_at(c, span[1]) for c in contacts[:inside])
+    return Way(
+        name=name,
+        contacts=shown,
+        stations=stations[:inside],
+        contact_s=sum(c.duration_s for c in shown),
+        gap_s=longest_gap_s(contacts, seen.pair),
+        carried_bit=carried.mean(axis=0),
+        capacity_bit=float(total.mean()),
+        capacity_spread_bit=(float(total.min()), float(total.max())),
+        generated_bit=histories[0].total_generated_bit,
+        lost_bit=float(np.mean([h.total_lost_bit for h in histories])),
+        on_board_bit=float(np.mean([h.not_delivered_bit for h in histories])),
+        failed_contacts=failed,
+        history=histories[0],
+        latency=operations.pool([h.latency for h in histories]),
+    )
+
+
+def _until(service: operations.Service, end_s: float) -> float:
+    """What a contact could carry before the end of the span."""
+    edges = np.minimum(service.edges_s, end_s)
+    return float(np.dot(service.mean_rate_bit_s, np.diff(edges)))

@@ -1,0 +1,286 @@
+"""A constellation shares the terminals of its relays: who is served when, and how evenly."""
+
+import heapq
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from microrad.orbit.operations.base import (
+    Floats,
+    Integers,
+    OperationsError,
+    check_number,
+    check_positive,
+    vector,
+)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Opportunities:
+    """Spans in which a satellite could use a relay, all of shape (n,), in order of `start_s`; indices count from 0.
+
+    Raises `OperationsError` for rows of different lengths, indices that are negative or not whole, times that are not
+    finite, an end that is not after its start, starts out of order, and two that overlap for one satellite and relay.
+    """
+
+    satellite: Integers
+    relay: Integers
+    start_s: Floats
+    end_s: Floats
+
+    def __post_init__(self) -> None:
+        """Refuse what is not a sorted list of spans."""
+        satellite, relay = _indices(self.satellite, "satellite"), _indices(self.relay, "relay")
+        start, end = vector(self.start_s, "the starts"), vector(self.end_s, "the ends")
+        if len({satellite.size, relay.size, start.size, end.size}) > 1:
+            raise OperationsError(
+                f"{satellite.size} satellites, {relay.size} relays, {start.size} starts and {end.size} ends do not "
+                "fit; give one of each for every opportunity"
+            )
+        _check_order(satellite, relay, start, end)
+        for name, values in (("satellite", satellite), ("relay", relay), ("start_s", start), ("end_s", end)):
+            object.__setattr__(self, name, values)
+
+
+def _indices(values: ArrayLike, what: str) -> Integers:
+    found = vector(values, f"the {what} indices")
+    bad = np.flatnonzero((found < 0.0) | (found != np.floor(found)))
+    if bad.size:
+        raise OperationsError(f"{what} index {bad[0]} is {found[bad[0]]:g}; give whole numbers from 0")
+    return found.astype(np.int64)
+
+
+def _check_order(satellite: Integers, relay: Integers, start: Floats, end: Floats) -> None:
+    bad = np.flatnonzero(end <= start)
+    if bad.size:
+        raise OperationsError(
+            f"opportunity {bad[0]} ends at {end[bad[0]]:.9g} s, not after its start at {start[bad[0]]:.9g} s; "
+            "give the start first"
+        )
+    bad = np.flatnonzero(np.diff(start) < 0.0)
+    if bad.size:
+        raise OperationsError(
+            f"opportunity {bad[0] + 1} starts at {start[bad[0] + 1]:.9g} s, before the one ahead of it "
+            f"({start[bad[0]]:.9g} s); sort them by their start"
+        )
+    order = np.lexsort((start, relay, satellite))
+    pair = (np.diff(satellite[order]) == 0) & (np.diff(relay[order]) == 0)
+    bad = np.flatnonzero(pair & (start[order][1:] < end[order][:-1]))
+    if bad.size:
+        first, second = order[bad[0]], order[bad[0] + 1]
+        raise OperationsError(
+            f"opportunities {first} and {second} of satellite {satellite[first]} and relay {relay[first]} overlap: one "
+            f"starts at {start[second]:.9g} s, the other ends at {end[first]:.9g} s; join them"
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Rules:
+    """How a terminal is shared; each duration counts from the start of a session, its overhead in it.
+
+    `overhead_s` is slew and acquisition: the terminal is busy and no data flows. After `longest_s` a session ends if
+    another satellite waits for that relay then, else it goes on for as long again. A session that the geometry would
+    end before `shortest_s` is not begun.
+
+    Raises `OperationsError` for values that are not finite (`longest_s` may be inf), a negative overhead, a shortest
+    session that is not longer than the overhead, and a longest one shorter than the shortest.
+    """
+
+    overhead_s: float
+    shortest_s: float
+    longest_s: float
+
+    def __post_init__(self) -> None:
+        """Refuse durations that leave no time for data."""
+        check_number(self.overhead_s, "the overhead of a session", "s")
+        check_positive(self.shortest_s, "the shortest session", "s")
+        check_positive(self.longest_s, "the longest session", "s", infinite=True)
+        if self.shortest_s <= self.overhead_s:
+            raise OperationsError(
+                f"the shortest session, {self.shortest_s:g} s, is not longer than its overhead of "
+                f"{self.overhead_s:g} s: it would carry no data; lengthen it"
+            )
+        if self.longest_s < self.shortest_s:
+            raise OperationsError(
+                f"the longest session, {self.longest_s:g} s, is shorter than the shortest, {self.shortest_s:g} s; "
+                "exchange them or lengthen it"
+            )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sessions:
+    """Sessions in order of their start, all of shape (n,): data flows from `locked_s` to `end_s`.
+
+    `terminal` counts from 0 on each relay.
+    """
+
+    satellite: Integers
+    relay: Integers
+    terminal: Integers
+    start_s: Floats
+    locked_s: Floats
+    end_s: Floats
+
+
+_Waiting = tuple[float, float, int, int]  # end of the last data, data so far in s, satellite, opportunity
+
+
+class _Plan:
+    """The state while the schedule is built; every list is indexed by satellite, relay or session.
+
+    A satellite's places in the queues are not taken out when it is served: a place is good only while its satellite is
+    unserved and has had no data since. So each place is pushed and popped once.
+    """
+
+    def __init__(self, opportunities: Opportunities, size: tuple[int, int, int], rules: Rules, start_s: float) -> None:
+        satellites, relays, terminals = size
+        self.rules = rules
+        self.satellite: list[int] = opportunities.satellite.tolist()
+        self.relay: list[int] = opportunities.relay.tolist()
+        self.end: list[float] = opportunities.end_s.tolist()
+        self.last_data = [start_s] * satellites
+        self.data_s = [0.0] * satellites  # had so far
+        self.served = [False] * satellites
+        self.visible: list[list[int]] = [[] for _ in range(satellites)]  # opportunities under way
+        self.queue: list[list[_Waiting]] = [[] for _ in range(relays)]
+        self.free = [list(range(terminals)) for _ in range(relays)]
+        self.events: list[tuple[float, int, int, int]] = []  # time, relay, terminal, session
+        self.rows: list[list[float]] = []  # satellite, relay, terminal, start, end
+        self.until: list[float] = []  # end of each session's opportunity
+
+    def see(self, opportunity: int) -> int:
+        """An opportunity begins; its relay."""
+        satellite, relay = self.satellite[opportunity], self.relay[opportunity]
+        self.visible[satellite].append(opportunity)
+        if not self.served[satellite]:
+            self.wait(satellite, opportunity)
+        return relay
+
+    def wait(self, satellite: int, opportunity: int) -> None:
+        """A satellite has a place in the queue of its opportunity's relay."""
+        place = (self.last_data[satellite], self.data_s[satellite], satellite, opportunity)
+        heapq.heappush(self.queue[self.relay[opportunity]], place)
+
+    def next_waiting(self, relay: int, now: float) -> _Waiting | None:
+        """The place of the satellite that has waited longest and has time enough left, or None."""
+        queue = self.queue[relay]
+        while queue:
+            last, _, satellite, opportunity = queue[0]
+            current = not self.served[satellite] and self.last_data[satellite] == last
+            if current and self.end[opportunity] - now >= self.rules.shortest_s:
+                return queue[0]
+            heapq.heappop(queue)
+        return None
+
+    def begin(self, relay: int, terminal: int, now: float) -> None:
+        """The satellite at the head of the queue takes a terminal."""
+        _, _, satellite, opportunity = heapq.heappop(self.queue[relay])
+        self.served[satellite] = True
+        self.rows.append([satellite, relay, terminal, now, now])
+        self.until.append(self.end[opportunity])
+        self.watch(len(self.rows) - 1, now)
+
+    def watch(self, session: int, now: float) -> None:
+        """Note when a session is to be looked at next: at its longest, or where the geometry ends it."""
+        _, relay, terminal, _, _ = self.rows[session]
+        heapq.heappush(
+            self.events, (min(now + self.rules.longest_s, self.until[session]), int(relay), int(terminal), session)
+        )
+
+    def finish(self, session: int, now: float) -> set[int]:
+        """End a session; its satellite waits wherever it is visible. The relays concerned."""
+        satellite = int(self.rows[session][0])
+        self.rows[session][4] = now
+        self.data_s[satellite] += now - self.rows[session][3] - self.rules.overhead_s
+        self.served[satellite], self.last_data[satellite] = False, now
+        self.visible[satellite] = [o for o in self.visible[satellite] if self.end[o] > now]
+        for opportunity in self.visible[satellite]:
+            self.wait(satellite, opportunity)
+        return {self.relay[o] for o in self.visible[satellite]}
+
+    def release(self, session: int) -> int:
+        """The terminal of a session is free; its relay."""
+        _, relay, terminal, _, _ = self.rows[session]
+        heapq.heappush(self.free[int(relay)], int(terminal))
+        return int(relay)
+
+    def fill(self, relays: set[int], now: float) -> None:
+        """Free terminals take who has waited longest, the lowest relay and terminal first."""
+        for relay in sorted(relays):
+            while self.free[relay] and self.next_waiting(relay, now) is not None:
+                self.begin(relay, heapq.heappop(self.free[relay]), now)
+
+    def reconsider(self, session: int, now: float) -> set[int]:
+        """A session has had its longest: another takes its terminal, or it goes on. The relays concerned."""
+        _, relay, terminal, _, _ = self.rows[session]
+        if self.next_waiting(int(relay), now) is None:
+            self.watch(session, now)
+            return set()
+        self.begin(int(relay), int(terminal), now)
+        return self.finish(session, now)
+
+    def at(self, now: float, begins: list[int]) -> None:
+        """Everything that happens at one moment: ends, begins, free terminals, then sessions at their longest."""
+        due = []
+        while self.events and self.events[0][0] == now:
+            due.append(heapq.heappop(self.events)[3])
+        over = [s for s in due if self.until[s] <= now]
+        concerned = {relay for s in over for relay in (self.finish(s, now) | {self.release(s)})}
+        concerned |= {self.see(opportunity) for opportunity in begins}
+        self.fill(concerned, now)
+        cut: set[int] = set()
+        for session in due:
+            if self.until[session] > now:
+                cut |= self.reconsider(session, now)
+        self.fill(cut, now)
+
+
+def schedule(
+    opportunities: Opportunities, satellites: int, relays: int, terminals: int, rules: Rules, start_s: float
+) -> Sessions:
+    """Share `terminals` terminals on each of `relays` relays among `satellites` satellites of one terminal each.
+
+    A free terminal takes, of the satellites in view that are unserved and have `rules.shortest_s` left there, the one
+    whose last data ended longest ago; one never served has waited since `start_s`. Ties go to the one that has had the
+    least data so far, then to the lowest index of the satellite, the relay and the terminal: by index alone, those cut
+    at the same moment would come round unevenly. A terminal never idles while such a satellite is in view. A session
+    that has had its longest ends if another satellite waits for its relay at that moment, else it goes on for as long
+    again; the satellite that leaves may take a terminal that is free elsewhere. The same input gives the same
+    schedule; the effort grows as the number of opportunities and sessions.
+
+    This is a rule that is fair and simple to announce, not the schedule of the most data.
+
+    Raises `OperationsError` for counts that are not above 0, an index beyond its count, and a start that is not finite
+    or after the first opportunity.
+    """
+    for count, what in ((satellites, "satellites"), (relays, "relays"), (terminals, "terminals on each relay")):
+        if count < 1:
+            raise OperationsError(f"the number of {what} is {count}; give at least 1")
+    _check_counts(opportunities, satellites, relays, start_s)
+    plan = _Plan(opportunities, (satellites, relays, terminals), rules, start_s)
+    starts, place = opportunities.start_s.tolist(), 0
+    while place < len(starts) or plan.events:
+        first, now = place, min([*starts[place : place + 1], *(event[0] for event in plan.events[:1])])
+        while place < len(starts) and starts[place] == now:
+            place += 1
+        plan.at(now, list(range(first, place)))
+    rows = np.array(plan.rows, dtype=np.float64).reshape(-1, 5)
+    satellite, relay, terminal = (rows[:, column].astype(np.int64) for column in range(3))
+    return Sessions(satellite, relay, terminal, rows[:, 3].copy(), rows[:, 3] + rules.overhead_s, rows[:, 4].copy())
+
+
+def _check_counts(opportunities: Opportunities, satellites: int, relays: int, start_s: float) -> None:
+    for index, count, what in (
+        (opportunities.satellite, satellites, "satellite"),
+        (opportunities.relay, relays, "relay"),
+    ):
+        if index.size and index.max() >= count:
+            raise OperationsError(
+                f"an opportunity names {what} {index.max()}, but there are {count}, counted from 0; correct the "
+                f"index or the number of {what}s"
+            )
+    if (opportunities.start_s.size and not start_s <= opportunities.start_s[0]) or not np.isfinite(start_s):
+        raise OperationsError(
+            f"the schedule starts at {start_s:.9g} s; give a finite time not after the first opportunity"
+        )

@@ -1,0 +1,84 @@
+"""What the verdict would be by other readings of what the paper leaves open, each changed alone."""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any, get_args
+
+import numpy as np
+
+from microrad import link
+from microrad.loop import paper_cases as tracking
+from microrad.mission.model import Conventions, Mission, Requirement
+from microrad.mission.tables.link import UNUSED
+from microrad.mission.tables.mirror import Mirror
+
+_OPEN: tuple[tuple[str, type[Any]], ...] = (
+    ("conventions.residual", Conventions),
+    ("conventions.pointing_loss", Conventions),
+    ("conventions.strehl", Conventions),
+    ("conventions.mirror_angle", Conventions),
+    ("requirement.residual_statistic", Requirement),
+    ("mirror.composition", Mirror),
+)
+"""Keys with a few readings to choose from, and the table that names them."""
+_SIMULATED = ("conventions.mirror_angle", "mirror.composition")
+
+
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """One key read in another way, all else as it is: the residual (rad) and the margin of the communication link (dB).
+
+    ``failure`` says why there are none, where the loop cannot be run so; both are nan then.
+    """
+
+    key: str
+    given: str
+    other: str
+    residual_rad: float
+    margin_db: float
+    failure: str = ""
+
+    @property
+    def closes(self) -> bool:
+        """Whether the communication link has a margin of 0 dB at least."""
+        return self.margin_db >= 0.0
+
+    def meets(self, m: Mission) -> bool:
+        """Whether both requirements that rest on the residual are met."""
+        q = m.requirement
+        return self.residual_rad <= q.pointing_error_rad and self.margin_db >= q.margin_db
+
+
+def others(m: Mission, residual: tracking.Run) -> tuple[Reading, ...]:
+    """Every other reading that fits the mission; ``residual`` is the run that the verdict rests on.
+
+    Those of the loop are simulated (PID + inverse at the mission's frequencies); the others read the same run anew.
+    """
+    return tuple(_reading(m, key, other, residual) for key, other in _choices(m))
+
+
+def _choices(m: Mission) -> Iterator[tuple[str, str]]:
+    """Keys with what else they could be, where that fits the other tables."""
+    for key, table in _OPEN:
+        for other in get_args(table.model_fields[key.partition(".")[2]].annotation):
+            as_read = m.with_value(key, other)
+            if other not in (_given(m, key), UNUSED) and not [*as_read.problems(), *as_read.mirror.problems()]:
+                yield key, other
+
+
+def _given(m: Mission, key: str) -> str:
+    table, _, name = key.partition(".")
+    return str(getattr(getattr(m, table), name))
+
+
+def _reading(m: Mission, key: str, other: str, residual: tracking.Run) -> Reading:
+    as_read, run = m.with_value(key, other), residual
+    try:
+        if key in _SIMULATED:
+            run = tracking.worst(as_read, tracking.tracking_runs(as_read, ("given",)))
+        left = tracking.residual_rad(as_read, run.trace)
+        margin_db = float(link.margin_of_error(as_read, np.array([left]))[0])
+    except ValueError as error:  # an unstable loop, a mirror without an inverse
+        return Reading(key, _given(m, key), other, math.nan, math.nan, str(error))
+    return Reading(key, _given(m, key), other, left, margin_db)

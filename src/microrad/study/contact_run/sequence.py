@@ -1,0 +1,185 @@
+"""The order of a contact: slew, acquisition, data, and what follows a loss of lock; each step with its cause."""
+
+from microrad.core.units import format_quantity
+from microrad.link import acquisition
+from microrad.link.partner_search import Finding, Found
+from microrad.loop.fine_pointing import Design, Scene
+from microrad.mission.model import Mission
+from microrad.study.contact_run.records import (
+    ANSWER,
+    BEACON,
+    DATA,
+    DETECT,
+    END,
+    IDLE,
+    LOCK,
+    LOSS,
+    REACQUIRE,
+    SLEW,
+    Contact,
+    ContactRun,
+    Loss,
+    Settings,
+    Transition,
+    Window,
+)
+from microrad.study.contact_run.windows import Sampler, plan
+
+_STATE_OF_STAGE = (BEACON, BEACON, DETECT, ANSWER, ANSWER, ANSWER, LOCK, LOCK, LOCK, LOCK, LOCK)
+"""Of the stages of an acquisition, wide or scanned: three to the detection, eight from the answer on."""
+
+
+def run(m: Mission, finding: Finding, scene: Scene, design: Design, contact: Contact, settings: Settings) -> ContactRun:
+    """One contact from the slew to its end, under one controller of the mission's fine-pointing loop; seeded.
+
+    The slew ends when the contact begins, or later where the body is not free early enough. Lock is lost where the
+    margin stays below 0 dB for longer than the settings hold it, which the terminal learns after the light time there
+    and back, or where the spot leaves its own optical sensor, which it knows at once. It then acquires again from the
+    beacon on, in the state "re-acquire". The contact is over when an acquisition is given up after as many failures as
+    the mission has attempts, or the data after as many losses in windows that follow each other.
+
+    Raises ValueError for a mission without `[acquisition]` or `[fine_pointing]`, a scan that it does not have, a data
+    rate that is still to be solved for, and a geometry that gives no numbers.
+    """
+    sampler = Sampler(m, scene.loop, design.controller, contact, settings)
+    log = Log(contact)
+    acquire = _Acquisitions(log, _way(finding, settings), _attempts(m), settings.seed)
+    windows: list[Window] = []
+    if _turn(log, settings) and acquire():
+        windows = _data(log, acquire, sampler)
+    log.finish()
+    return ContactRun(contact, tuple(log.entries), tuple(windows))
+
+
+def _attempts(m: Mission) -> int:
+    if m.acquisition is None:
+        raise ValueError("the mission has no table [acquisition]: a contact has to begin with one")
+    return m.acquisition.attempts
+
+
+def _way(finding: Finding, settings: Settings) -> Found:
+    found = finding.wide if settings.way == "wide beacon" else finding.scan
+    if found is None:
+        raise ValueError(
+            'the mission has no table [acquisition.scan]: give it one, or run the contact by "wide beacon"'
+        )
+    return found
+
+
+class Log:
+    """The transitions of a contact, which ends with its last one."""
+
+    def __init__(self, contact: Contact) -> None:
+        """Idle until the first transition."""
+        self.contact = contact
+        self.entries: list[Transition] = []
+        self.state = IDLE
+
+    @property
+    def since_s(self) -> float:
+        """When the present state began."""
+        return self.entries[-1].time_s
+
+    def go(self, time_s: float, to: str, cause: str) -> bool:
+        """Change the state, unless the contact ends before; whether it goes on."""
+        if self.state == END:
+            return False
+        if time_s >= self.contact.end_s:
+            time_s, to, cause = self.contact.end_s, END, f"the contact ends: {self.contact.ends}"
+        self.entries.append(Transition(float(time_s), self.state, to, cause))
+        self.state = to
+        return to != END
+
+    def finish(self) -> None:
+        """The end of the contact, where nothing else has ended it."""
+        self.go(self.contact.end_s, END, "")
+
+
+def _turn(log: Log, settings: Settings) -> bool:
+    """The slew, ending with the begin of the contact where the body is free in time; whether the contact goes on."""
+    contact, lasts = log.contact, settings.slew_angle_rad / settings.slew_rate_rad_s
+    begin = max(contact.start_s - lasts, contact.free_from_s)
+    late = max(begin + lasts - contact.start_s, 0.0)
+    how = f"{format_quantity(settings.slew_angle_rad, 'rad')} at {format_quantity(settings.slew_rate_rad_s, 'rad/s')}"
+    if late <= 1e-9 * max(lasts, 1.0):
+        goes_on = log.go(begin, SLEW, f"{how}, so that the slew ends when the contact begins")
+        return goes_on and log.go(contact.start_s, BEACON, f"the contact begins: {contact.begins}")
+    goes_on = log.go(begin, SLEW, f"{how}, as soon as the body is free")
+    after = f"{format_quantity(late, 's')} after the contact began: {contact.begins}"
+    return goes_on and log.go(begin + lasts, BEACON, f"the slew ends {after}")
+
+
+class _Acquisitions:
+    """The acquisitions of a contact, each with random numbers of its own."""
+
+    def __init__(self, log: Log, found: Found, attempts: int, seed: int) -> None:
+        if len(found.stages) != len(_STATE_OF_STAGE):
+            raise ValueError(
+                f'the acquisition by "{found.name}" has {len(found.stages)} stages, a contact run knows the '
+                f"{len(_STATE_OF_STAGE)} of the mission's sequence"
+            )
+        self.log, self.found, self.attempts, self.seed = log, found, attempts, seed
+        self.place = {stage.name: i for i, stage in enumerate(found.stages)}
+        self.number = 0
+
+    def __call__(self) -> bool:
+        """One acquisition from now on; whether it ends in data before the contact ends."""
+        key = self.seed + (self.number << 64)  # Philox takes 128 bits; number 0 is the run of that seed by itself
+        begin, again = self.log.since_s, self.number > 0
+        self.number += 1
+        for entry in acquisition.simulate_log(self.found.stages, self.attempts, key):
+            if not self._step(begin + entry.time_s, entry, again):
+                return False
+        return True
+
+    def _step(self, time_s: float, entry: acquisition.Transition, again: bool) -> bool:
+        """Log one stage's end where it fails or changes the state; whether the contact goes on."""
+        cause = f"{entry.stage}: {entry.cause}"
+        if entry.to == acquisition.LOST:
+            return self.log.go(time_s, END, f"acquisition given up after {self.attempts} failures; {cause}")
+        if entry.to == acquisition.LOCKED:
+            return self.log.go(time_s, DATA, cause)
+        at, to = self.place[entry.stage], self.place[entry.to]
+        before, after = _STATE_OF_STAGE[at], _STATE_OF_STAGE[to]
+        if to > at and before == after:
+            return time_s < self.log.contact.end_s or self.log.go(time_s, after, cause)
+        if again:
+            return self.log.go(time_s, REACQUIRE, f"{before} to {after}; {cause}")
+        return self.log.go(time_s, after, cause)
+
+
+def _data(log: Log, acquire: _Acquisitions, sampler: Sampler) -> list[Window]:
+    """The windows of the data phase: those planned, and behind each loss of lock one at the begin of the new data.
+
+    A planned window that would begin before the one behind a loss has ended is left out.
+    """
+    settings, end_s = sampler.settings, log.contact.end_s
+    planned = plan(log.since_s, end_s, settings)
+    found: list[Window] = []
+    further, free_s = len(planned), log.since_s
+    for (start, _), first in zip(planned, sampler.windows(planned), strict=True):
+        window, losses = first, 0
+        if start < free_s - 0.5 * sampler.loop.timing.period_s:
+            continue
+        while window is not None:
+            found.append(window)
+            free_s = window.start_s + settings.window_s
+            if window.loss is None:
+                break
+            losses += 1
+            if not _regain(log, acquire, window.loss, losses):
+                return found
+            window = sampler.window(further, log.since_s, min(settings.window_s, end_s - log.since_s))
+            further += 1
+    return found
+
+
+def _regain(log: Log, acquire: _Acquisitions, lost: Loss, losses: int) -> bool:
+    """Loss and re-acquisition; whether there is data again. As many losses in a row as attempts end the contact."""
+    waited = format_quantity(lost.known_s - lost.time_s, "s", 3)
+    known = f"the light has gone there and back, {waited}" if lost.known_s > lost.time_s else "seen by its own sensor"
+    if not log.go(lost.time_s, LOSS, lost.cause):
+        return False
+    if losses >= acquire.attempts:
+        return log.go(lost.known_s, END, f"given up after {losses} losses of lock in as many windows in a row; {known}")
+    return log.go(lost.known_s, REACQUIRE, known) and acquire()
