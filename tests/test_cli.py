@@ -22,7 +22,7 @@ from nptdms import ChannelObject, TdmsWriter
 import microrad
 from command_line import listing
 from microrad import cli, report
-from microrad.cli import doctor, frame, lab
+from microrad.cli import frame, installation, lab
 from microrad.lab import identify
 from microrad.loop import control
 from microrad.loop.fine_pointing import designs
@@ -383,7 +383,8 @@ def test_an_unexpected_exception_asks_for_a_report(call, folder, monkeypatch):
 # A run that says when it has come to a function.
 MARKED = """
 import sys
-from microrad import cli, {module}
+from microrad import cli
+from {package} import {module}
 real = {module}.{function}
 def marked(*args):
     print("here", file=sys.stderr, flush=True)
@@ -403,17 +404,20 @@ def interruptible():
 
 @pytest.mark.usefixtures("interruptible")
 @pytest.mark.parametrize(
-    ("name", "module", "function"), [("SIGINT", "study", "run"), ("SIGTERM", "report", "write_columns")]
+    ("name", "package", "module", "function"),
+    [("SIGINT", "microrad.study", "story", "run"), ("SIGTERM", "microrad", "report", "write_columns")],
 )
-def test_an_interrupt_during_run_leaves_nothing(folder, loop_mirror, plain, name, module, function, tmp_path_factory):
-    code = MARKED.format(module=module, function=function)
+def test_an_interrupt_during_run_leaves_nothing(
+    folder, loop_mirror, plain, name, package, module, function, tmp_path_factory
+):
+    code = MARKED.format(package=package, module=module, function=function)
     args = [sys.executable, "-c", code, "run", str(plain)]
     args += ["--mirror", str(loop_mirror)] if module == "report" else []
     progress = tmp_path_factory.mktemp("progress") / "progress"
     environment = os.environ | {frame.PROGRESS_FILE: str(progress)}
     process = subprocess.Popen(args, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     assert process.stderr.readline() == "here\n"
-    lines_of(progress, 2 if module == "study" else 0)  # the study is in its second step
+    lines_of(progress, 2 if module == "story" else 0)  # the study is in its second step
     process.send_signal(getattr(signal, name))
     out, err = process.communicate(timeout=HANG_S)
     assert (process.returncode, out.startswith("Not every requirement is met: ")) == (130, module == "report"), out
@@ -699,8 +703,8 @@ def test_doctor_names_what_is_wrong_and_what_to_do(call, monkeypatch):
     def gone():
         raise ImportError("no module named yesterday")
 
-    monkeypatch.setattr(doctor, "LOOP_WIDTH_PERCENT", 14.0)
-    monkeypatch.setattr(doctor, "_mission", gone)
+    monkeypatch.setattr(installation, "LOOP_WIDTH_PERCENT", 14.0)
+    monkeypatch.setattr(installation, "_mission", gone)
     result = call("doctor", "--json")
     assert (result.code, result.err) == (1, "")
     found = json.loads(result.out)
@@ -715,9 +719,9 @@ def test_doctor_names_what_is_wrong_and_what_to_do(call, monkeypatch):
 
 def test_doctor_finds_an_old_library(monkeypatch):
     monkeypatch.setattr(
-        doctor.metadata, "requires", lambda name: ["numpy>=99.1", "notthere>=1", 'ruff>=1; extra == "test"']
+        installation.metadata, "requires", lambda name: ["numpy>=99.1", "notthere>=1", 'ruff>=1; extra == "test"']
     )
-    old, absent = list(doctor._libraries())[1:]
+    old, absent = list(installation._libraries())[1:]
     assert (old.ok, absent.ok) == (False, False)
     assert "wanted 99.1" in old.found
     assert old.advice == "python -m pip install 'numpy>=99.1'"

@@ -9,7 +9,7 @@ import pytest
 from packaging.utils import canonicalize_name
 
 import licences
-from microrad.cli import doctor
+from microrad.cli import installation
 from microrad.core.installing import advice
 
 ROOT = Path(__file__).parent.parent
@@ -89,14 +89,14 @@ def test_make_installs_by_the_hashes():
 
 def test_doctor_notes_other_versions_than_the_tested_ones(tmp_path, monkeypatch):
     pinned = tmp_path / "constraints.txt"
-    monkeypatch.setattr(doctor, "_CONSTRAINTS", pinned)
-    ok, found = doctor._pins()
+    monkeypatch.setattr(installation, "_CONSTRAINTS", pinned)
+    ok, found = installation._pins()
     assert ok and found.startswith("not compared")
     numpy = metadata.version("numpy")
     pinned.write_text(f"numpy=={numpy}\nnot-there==1.0\n")
-    assert doctor._pins() == (True, "those of constraints.txt")
+    assert installation._pins() == (True, "those of constraints.txt")
     pinned.write_text("numpy==1.0.1\nnot-there==1.0\n")
-    assert doctor._pins() == (True, f"not those of constraints.txt: numpy {numpy} (tested: 1.0.1)")
+    assert installation._pins() == (True, f"not those of constraints.txt: numpy {numpy} (tested: 1.0.1)")
 
 
 # --------------------------------------------------------------------------------------------------------- the licences

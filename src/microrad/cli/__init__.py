@@ -196,7 +196,7 @@ def doctor(as_json: Json = False) -> Outcome:
     Versions, the compiled kernels against a known number, their cache, the packaged mission. The exit code is 1 when
     something is wrong.
     """
-    from microrad.cli import doctor as checks
+    from microrad.cli import installation as checks
 
     found = checks.run()
     ok = all(check.ok for check in found)
