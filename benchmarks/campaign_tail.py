@@ -20,7 +20,8 @@ from pathlib import Path
 import numpy as np
 
 from microrad.campaign import loops
-from microrad.campaign.file import CampaignFile, load_campaign
+from microrad.campaign.definition import CampaignFile
+from microrad.campaign.file import load_campaign
 from microrad.campaign.inputs import Builder
 from microrad.campaign.records import Chunk, Interval, Tail
 from microrad.campaign.tails import tail_of_time, tail_weighted

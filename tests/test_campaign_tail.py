@@ -14,7 +14,8 @@ from scipy.special import i0e
 
 from microrad import link
 from microrad.campaign import evaluate, loops, run, tails, tilt
-from microrad.campaign.file import CampaignFile, load_campaign
+from microrad.campaign.definition import CampaignFile
+from microrad.campaign.file import load_campaign
 from microrad.campaign.inputs import Builder
 from microrad.campaign.ledger import Ledger
 from microrad.campaign.records import Chunk, Floats, Interval

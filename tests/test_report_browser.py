@@ -10,7 +10,7 @@ import test_report_campaign as campaigns
 import test_report_fine_pointing as fine_loops
 from browser import violations
 from microrad.lab.identify import identify
-from microrad.report import budget_views, campaign_page, day_views
+from microrad.report import campaign_page, single_pages
 from shipped import plain_study, write_like_plain
 from waiting import HANG_MS
 
@@ -41,8 +41,8 @@ def files(found, tmp_path_factory):
     mirror = identify(recordings, 0.5, models=("prandtl_ishlinskii", "linear"))
     written["identification"] = identified.write(mirror, folder / "identification.html", recordings=recordings)
     texts = {
-        "day": day_views.html(found.day, found.links),
-        "budget": budget_views.html(found.links),
+        "day": single_pages.day(found.day, found.links),
+        "budget": single_pages.budget(found.links),
         "campaign": campaign_page.html(campaigns.CASES["two inputs"]()),
     }
     for name, text in texts.items():

@@ -14,7 +14,7 @@ from link_files import RECEIVERS, data_with, link_file, received_with, written
 from microrad.link import Swing
 from microrad.link import study as link_study
 from microrad.mission.file import load_link
-from microrad.report import budget_views, link_figures, links
+from microrad.report import budget_views, link_figures, links, single_pages
 from microrad.report.quantities import apart, quantity
 from microrad.study.pointing_cost import FINE, NO_HYSTERESIS, Cost, LinkPerformance
 from report_pages import without_scripts
@@ -211,7 +211,7 @@ def test_the_penalty_is_said_with_a_code_and_without_however_rare_the_fades(plai
 
 def test_a_receiver_that_is_known_has_its_penalty_on_the_page_although_no_fade_is_as_deep(tmp_path):
     found = studied(tmp_path, NO_SCAN, JITTER, received_with("preamplified dpsk"))
-    page = budget_views.html(found)
+    page = single_pages.budget(found)
     assert "less than one a year" in page
     assert 0.5 < found.under_jitter.uncoded_penalty_db < 2.0
     assert f'<td class="number">{found.under_jitter.uncoded_penalty_db:.2f}</td>' in page
@@ -443,7 +443,7 @@ def test_every_text_of_the_mission_is_escaped(tmp_path):
     line = 'transmit_power = "5 W"'
     assert text.count(line) == 1
     path.write_text(text.replace(line, f"{line} # literature: <img src=x onerror=y> 2021"), encoding="utf-8")
-    page = without_scripts(budget_views.html(link_study.run(load_link(path))))
+    page = without_scripts(single_pages.budget(link_study.run(load_link(path))))
     assert "<script" not in page
     assert "<img" not in page
     assert page.count("&lt;script&gt;alert(1)&lt;/script&gt; &amp; co") == 3  # title, heading and inputs
@@ -460,7 +460,7 @@ def test_brackets_of_a_comment_are_no_markup_of_the_terminal(tmp_path):
 
 
 def test_the_page_holds_every_line_and_no_hyphen_for_a_minus(plain):
-    page = without_scripts(budget_views.html(plain))
+    page = without_scripts(single_pages.budget(plain))
     for _, line in budget_views.lines(plain):
         assert f">{quantity(line.value, line.unit)}</td>" in page
     plain_text = re.sub(r"<(svg|style).*?</\1>|<[^>]*>", " ", page, flags=re.DOTALL)
@@ -474,10 +474,10 @@ def test_the_noise_of_a_receiver_has_its_table(tmp_path, plain, name):
     assert name in RECEIVERS
     found = studied(tmp_path, NO_SCAN, received_with(name))
     heading = "Noise of the communication receiver"
-    assert (heading in budget_views.html(found)) is bool(found.receiver_noise)
-    assert heading not in budget_views.html(plain)
+    assert (heading in single_pages.budget(found)) is bool(found.receiver_noise)
+    assert heading not in single_pages.budget(plain)
 
 
 def test_figures_name_their_data_only_where_they_stand_beside_the_page(plain):
-    assert "figures/tornado.csv" not in budget_views.html(plain)
+    assert "figures/tornado.csv" not in single_pages.budget(plain)
     assert links.context(plain, budgets=(), figures=(), files=True)["files"] is True

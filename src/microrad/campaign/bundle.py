@@ -15,7 +15,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from microrad.campaign.file import CampaignFile, load_campaign
+from microrad.campaign.definition import CampaignFile
+from microrad.campaign.file import load_campaign
 from microrad.campaign.records import CampaignError
 from microrad.core import lti
 from microrad.core.folder import scratch_folder

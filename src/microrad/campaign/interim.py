@@ -8,7 +8,7 @@ from typing import Any
 
 from microrad.campaign import bundle, plan, summary
 from microrad.campaign.blob import Head
-from microrad.campaign.file import CampaignFile
+from microrad.campaign.definition import CampaignFile
 from microrad.campaign.ledger import Ledger
 from microrad.campaign.records import CampaignSummary, CellSummary
 from microrad.campaign.summary import Folded

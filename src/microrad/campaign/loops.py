@@ -3,8 +3,9 @@
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from microrad.campaign.file import CampaignFile, LoopTable
+from microrad.campaign.definition import CampaignFile
 from microrad.campaign.records import CampaignError
+from microrad.campaign.tables import LoopTable
 from microrad.loop import fine_pointing
 from microrad.loop.control import AxisController
 from microrad.loop.fine_loop import ensemble

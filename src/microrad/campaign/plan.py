@@ -8,7 +8,7 @@ import math
 from dataclasses import replace
 
 from microrad.campaign import loops
-from microrad.campaign.file import CampaignFile
+from microrad.campaign.definition import CampaignFile
 from microrad.campaign.outputs import OUTPUTS, TAIL_OUTPUTS, Output
 from microrad.campaign.records import Job
 from microrad.core import kernels

@@ -14,7 +14,8 @@ import numpy as np
 
 from microrad.campaign import blob, bundle, loops, mending, plan, sampling, summary, work
 from microrad.campaign.blob import Column, Head
-from microrad.campaign.file import CampaignFile, load_campaign
+from microrad.campaign.definition import CampaignFile
+from microrad.campaign.file import load_campaign
 from microrad.campaign.inputs import Builder
 from microrad.campaign.ledger import Ledger, check_same
 from microrad.campaign.ledger_file import argument, refuse_existing

@@ -11,7 +11,7 @@ from microrad.campaign.distributions import standard_normal
 from microrad.mirror import spread as mirror_spread
 
 if TYPE_CHECKING:  # only for its name
-    from microrad.campaign.file import CampaignFile
+    from microrad.campaign.definition import CampaignFile
 
 Floats = NDArray[np.float64]
 

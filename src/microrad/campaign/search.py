@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from microrad.campaign import loops, plan, work
 from microrad.campaign.candidates import Problem, Variable
-from microrad.campaign.file import CampaignFile, load_campaign
+from microrad.campaign.definition import CampaignFile
+from microrad.campaign.file import load_campaign
 from microrad.campaign.inputs import Builder
 from microrad.campaign.keys import touches_loop
 from microrad.campaign.optimise import Optimum, optimise

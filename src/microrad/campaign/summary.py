@@ -10,7 +10,7 @@ import numpy as np
 
 from microrad.campaign import bundle, plan, statistics, tails
 from microrad.campaign.blob import Head
-from microrad.campaign.file import CampaignFile
+from microrad.campaign.definition import CampaignFile
 from microrad.campaign.ledger import Ledger
 from microrad.campaign.ledger_file import is_written
 from microrad.campaign.outputs import OUTPUTS, RADIUS

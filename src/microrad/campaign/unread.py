@@ -6,7 +6,7 @@ from typing import Any, cast
 import numpy as np
 
 from microrad.campaign import evaluate, loops, plan
-from microrad.campaign.file import CampaignFile
+from microrad.campaign.definition import CampaignFile
 from microrad.campaign.keys import MIRROR, touches_loop
 from microrad.core import reads
 from microrad.loop.fine_loop import ensemble

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from microrad.campaign import blob, bundle, evaluate, loops, plan, sampling, tilt
 from microrad.campaign.bundle import code_sha256
-from microrad.campaign.file import CampaignFile
+from microrad.campaign.definition import CampaignFile
 from microrad.campaign.inputs import Builder
 from microrad.campaign.records import CampaignError, Chunk, Failed, Job, WorstTrace
 from microrad.core import kernels

@@ -78,7 +78,9 @@ def contacts(
     if as_csv:
         return Outcome(day_views.csv_text(day), code)
     if as_html:
-        return Outcome(day_views.html(day, links), code)
+        from microrad.report import single_pages  # drawing takes longer to load than a table needs
+
+        return Outcome(single_pages.day(day, links), code)
     return Outcome(day_views.text(day, width()), code)
 
 

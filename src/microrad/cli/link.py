@@ -80,7 +80,9 @@ def budget(  # noqa: PLR0913, PLR0917  each is an option
     if as_csv:
         return Outcome(budget_views.csv_text(study), code)
     if as_html:
-        return Outcome(budget_views.html(study), code)
+        from microrad.report import single_pages  # drawing takes longer to load than a table needs
+
+        return Outcome(single_pages.budget(study), code)
     said = "" if solution is None else budget_views.solution_text(solution, width()) + "\n\n"
     return Outcome(said + budget_views.text(study, width(), verbose=verbose), code)
 

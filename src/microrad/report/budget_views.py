@@ -297,31 +297,6 @@ def simulated_mean(w: Found) -> str:
     return "none locks" if math.isnan(w.simulated_mean_s) else quantity(w.simulated_mean_s, "s")
 
 
-def html(study: LinkStudy) -> str:
-    """The budgets as one page that loads nothing, with their figures.
-
-    They are bars and a few curves, with their numbers in tables below them: no reason to carry a drawing library eight
-    times as long as the page.
-    """
-    # drawing takes longer to load than a table needs
-    from microrad.report import interactive, link_figures, links, page
-
-    figures = [figure.static for figure in link_figures.draw(study)]
-    budgets = [(budget, "") for budget in study.budgets]
-    context = {
-        "study": study,
-        "mission": study.file.mission,
-        "verdict": verdict(study),
-        "met": met(study),
-        "paragraph": requirements.paragraph(of_links(study)),
-        "links": links.context(study, budgets=budgets, figures=figures, files=False),
-        "quantity": quantity,
-        "angle": page.angle,
-        "inputs": list(study.file.sources.items()),
-    }
-    return interactive.with_scripts(page.pages().get_template("budget.html").render(context))
-
-
 def data(study: LinkStudy, solution: Solution | None = None) -> dict[str, Any]:
     """The verdict on the links, their budgets and what follows from them as plain data, SI units in the keys."""
     judged = [requirements.data(r) for r in of_links(study)]

@@ -5,7 +5,6 @@ import io
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from microrad.link.study import LinkStudy
 from microrad.orbit.day import DayStudy
 from microrad.orbit.operations import spreadsheet_text
 from microrad.report import day_tables, day_words
@@ -101,21 +100,3 @@ def context(day: DayStudy, figures: Sequence["Figure"], *, files: bool, run: Any
         "run": run,
         "constellation": None,
     }
-
-
-def html(day: DayStudy, links: LinkStudy) -> str:
-    """The day as one page that loads nothing, with its figures."""
-    from microrad.report import day_plots, interactive, page
-
-    figures = day_plots.draw(day)
-    text = (
-        page.pages()
-        .get_template("day_page.html")
-        .render(
-            study=links,
-            mission=day.mission,
-            day=context(day, figures, files=False),
-            inputs=list(links.file.sources.items()),
-        )
-    )
-    return interactive.with_scripts(text)
