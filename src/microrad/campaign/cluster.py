@@ -438,7 +438,7 @@ class DaskEngine:
             yield Outcome(self._drop(serial).job, "raised", reason=words(error))
             return
         flight, address = self._flights[serial], error.last_worker.address
-        if serial in self._forgiven or not (flight.begun and flight.where == address):
+        if serial in self._forgiven or flight.where != address:  # it had not begun there
             self._again(serial, waiting)
             return
         times = error.allowed_failures + 1
@@ -447,22 +447,24 @@ class DaskEngine:
 
     def _stop_the_late(self) -> Iterator[Outcome]:
         """Kill the workers of late jobs, to be restarted by their nannies; what else is there starts again."""
-        late = late_flights(self._flights, self._clock.now(), self._late_s)
-        if not late:
+        if not late_flights(self._flights, self._clock.now(), self._late_s):
             return
+        self._looked_s = float("-inf")
+        self._look()  # a job is not late whose worker ended: what became of it is still to land
+        late = late_flights(self._flights, self._clock.now(), self._late_s)
         flights = [self._drop(serial) for serial in late]
         addresses = {flight.where for flight in flights}
         self._forgiven |= {serial for serial, flight in self._flights.items() if flight.where in addresses}
         for address in sorted(addresses):
             self._kill(address)
-        self._looked_s = float("-inf")
+        self._looked_s = float("-inf")  # those killed are to be missed, and their successors found
         for flight in flights:
             yield Outcome(flight.job, "late", reason=late_reason(self._late_s))
 
     def _kill(self, address: str) -> None:
-        """Kill a worker through its nanny; one without a nanny is sent away by the scheduler."""
+        """Kill a worker through its nanny; one without a nanny is sent away by the scheduler, one unknown is gone."""
         try:
             self._call(self._client._run, kill, workers=[address], nanny=True)
-        except (OSError, TimeoutError, ValueError, AttributeError, TypeError):
+        except (OSError, TimeoutError, ValueError, AttributeError, TypeError, KeyError):
             with suppress(OSError, TimeoutError):
                 self._call(self._client.scheduler.retire_workers, workers=[address], close_workers=True, remove=True)
