@@ -207,7 +207,7 @@ def test_the_map_of_the_margin_meets_the_budget(shipped):
 
 
 STEPS = (
-    "budgets, acquisition, mirror and tracking (the first run compiles for half a minute)",
+    "budgets, acquisition, mirror and tracking",
     "claims of the paper",
     "the day",
     "verdict",

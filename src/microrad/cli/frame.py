@@ -28,6 +28,7 @@ from typing import Annotated, Any, NoReturn, ParamSpec
 
 import typer
 
+from microrad.core import compiling
 from microrad.core.units import BLANKS, printable
 
 MET, UNMET, REFUSED, BUG, INTERRUPTED, UNREAD = 0, 1, 2, 70, 130, 141
@@ -101,6 +102,7 @@ def main() -> None:
         if signal.getsignal(number) is not signal.SIG_IGN:
             signal.signal(number, signal.default_int_handler)
     sys.unraisablehook = interrupt_again
+    compiling.on_first(lambda: say("compiling the loops for this processor: once, for about half a minute"))
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, TextIOWrapper):
             stream.reconfigure(errors="replace")  # a terminal without µ is no reason to fail

@@ -149,7 +149,7 @@ def run(
     """
     file = solve_rate(file)
     m, sources = file.mission, file.sources
-    on_progress(0, 3, "budgets, acquisition, mirror and tracking (the first run compiles for half a minute)")
+    on_progress(0, 3, "budgets, acquisition, mirror and tracking")
     (summary, loops, margins, runs), (links, fig2) = both(
         lambda: (
             mirror_summary.summarise(m.mirror),
