@@ -2,8 +2,8 @@
 
 python benchmarks/answer.py            the commands of a user
 python benchmarks/answer.py --suite    and `make test`, with what it keeps in place
-python benchmarks/answer.py --clone    those of a stranger alone, in a clone with empty caches: the first `make demo`, with
-                                       the packages installed before, then a second clone's `make test` and `.ci/run`
+python benchmarks/answer.py --clone    those of a stranger alone, in clones with empty caches: the first `make demo`,
+                                       its packages installed before, `make test` and `.ci/run`
 
 Seconds by the clock, and of all processors together. MICRORAD_DATA names the folder of recordings; what needs one that
 is not there is left out by name.
