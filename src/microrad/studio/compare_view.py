@@ -12,9 +12,9 @@ from typing import Any
 from microrad.core.folder import MANIFEST
 from microrad.core.units import UnitError, parse_quantity
 from microrad.link import study as link_study
+from microrad.mission.toml import value_of
 from microrad.report.quantities import quantity
 from microrad.studio.draft import Draft, Value
-from microrad.studio.draft_keys import value_of
 from microrad.studio.link_view import ROUNDING_DB
 from microrad.studio.workshop import Workshop
 

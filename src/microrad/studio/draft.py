@@ -21,8 +21,8 @@ from microrad.core.folder import write_whole
 from microrad.mission.file import LinkFile, MissionFile, load_link, load_mission
 from microrad.mission.model import Source
 from microrad.mission.origins import written_for
-from microrad.mission.toml import MAX_BYTES, Fault, MissionError, Statement, clipped, scan
-from microrad.studio.draft_keys import Key, key_of, keys_in, loose_toml, typed_from, value_of
+from microrad.mission.toml import MAX_BYTES, Fault, MissionError, Statement, clipped, scan, value_of
+from microrad.studio.draft_keys import Key, key_of, keys_in, loose_toml, typed_from
 
 _MARK = "\ufeff"
 _HEADERS = ("table", "tables", "broken")
