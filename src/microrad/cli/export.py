@@ -20,7 +20,7 @@ from microrad.cli.frame import (
     option,
     progress_bar,
 )
-from microrad.core.folder import write_whole
+from microrad.core.folder import read_bytes, write_whole
 
 # Everything else is imported inside the commands: it takes longer to load than help may take.
 if TYPE_CHECKING:
@@ -293,5 +293,5 @@ def _check_file(path: Path, overwrite: bool, begins: bytes) -> None:
     if not overwrite or not path.exists():
         check_target(path, "choose another --output, or replace it with --overwrite")
         return
-    if path.is_dir() or not path.read_bytes()[: len(begins)].startswith(begins):
+    if path.is_dir() or read_bytes(path, len(begins)) != begins:
         raise Refusal(f"{path} was not written by microrad and is left as it is; choose another --output.")

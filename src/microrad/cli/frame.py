@@ -28,6 +28,7 @@ from typing import Annotated, Any, NoReturn, ParamSpec
 
 import typer
 
+from microrad.core.folder import read_bytes
 from microrad.core.units import BLANKS, printable
 
 MET, UNMET, REFUSED, BUG, INTERRUPTED, UNREAD = 0, 1, 2, 70, 130, 141
@@ -305,9 +306,8 @@ def check_target(path: Path, advice: str, replace_if_begins: str = "") -> None:
         return
     if not replace_if_begins:
         raise Refusal(f"{path} exists and is left as it is; {advice}.")
-    with path.open("rb") as file:
-        if file.read(len(replace_if_begins)) != replace_if_begins.encode():
-            raise Refusal(f"{path} was not written by microrad and is left as it is; {advice}.")
+    if read_bytes(path, len(replace_if_begins)) != replace_if_begins.encode():
+        raise Refusal(f"{path} was not written by microrad and is left as it is; {advice}.")
 
 
 def option(flag: str, metavar: str, text: str, **settings: Any) -> Any:
