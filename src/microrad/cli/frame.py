@@ -322,6 +322,8 @@ ExitOn = Annotated[
     Judged,
     option("--exit-on", "WHAT", "What exit code 0 stands for: requirements, all are met; closes, the links do."),
 ]
+_ACCEPT = "Take a controller, too, that leaves more than 1.5 times its linear residual when it is simulated."
+Accept = Annotated[bool, typer.Option("--accept", help=_ACCEPT)]
 Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace what an earlier run wrote.")]
 
 
