@@ -115,6 +115,7 @@ def test_the_examples_are_good_usage(command):
 
 def test_help_lists_every_command_and_completion(call):
     result = call("--help")
+    assert "Exit code: 0 done, 1 a requirement is not met, 2 bad usage or a bad file." in " ".join(result.out.split())
     assert result.code == 0
     listed = {line.split()[0] for line in result.out.partition("Commands:")[2].splitlines() if line.startswith("  ")}
     assert set(COMMANDS) <= listed

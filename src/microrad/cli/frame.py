@@ -86,7 +86,7 @@ app = typer.Typer(
         "microrad run leo-geo.toml        the whole study: a verdict and a report",
         "microrad identify --help         a mirror model from your own recordings",
     )
-    + "\n\nExit code: 0 done, 1 the study does not close, 2 bad usage or a bad file.",
+    + "\n\nExit code: 0 done, 1 a requirement is not met, 2 bad usage or a bad file.",
     context_settings={"help_option_names": ["-h", "--help"]},
     no_args_is_help=True,
     pretty_exceptions_enable=False,
