@@ -29,7 +29,7 @@ from microrad.cli.frame import (
     say,
     width,
 )
-from microrad.core.folder import write_whole
+from microrad.core.folder import read_bytes, write_whole
 
 # Everything else is imported inside the commands: numpy, numba and pydantic take longer to load than help may take.
 if TYPE_CHECKING:
@@ -135,6 +135,9 @@ def run(
     return Outcome(f"{report.verdict_text(study, width(), verbose=verbose)}\n", code, afterwards=write)
 
 
+_MOST_BYTES = 1_000_000_000  # of a file that a mission names: more than any of those who read it take
+
+
 def _contents(mission: "MissionFile") -> dict[str, bytes | None]:
     """The files that a mission names, which its parts read beside it; None for one that is not there to be read."""
     from microrad.mission.file import named_files
@@ -144,7 +147,7 @@ def _contents(mission: "MissionFile") -> dict[str, bytes | None]:
 
 def _content(path: Path) -> bytes | None:
     try:
-        return path.read_bytes()
+        return read_bytes(path, _MOST_BYTES)
     except (OSError, ValueError):
         return None
 
