@@ -337,6 +337,21 @@ def test_a_cache_folder_that_cannot_be_used_is_told_once_and_the_run_goes_on(cal
     assert (folder / "leo-geo-study" / "report.html").is_file()
 
 
+@pytest.mark.usefixtures("undrawn")
+def test_a_cache_folder_that_cannot_be_written_is_told_once_and_the_run_goes_on(call, folder, monkeypatch):
+    found, access = plain_study(), os.access
+    monkeypatch.delenv("MICRORAD_KEEP")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(folder / "cache"))
+    monkeypatch.setattr(study, "run", lambda *args: found)
+    monkeypatch.setattr(os, "access", lambda path, mode: Path(path).name != "parts" and access(path, mode))
+    result = call("run", PAPER)
+    place = folder / "cache" / "microrad" / "parts"
+    said = f"microrad: {place}: the folder cannot be written: nothing is kept for a quicker next run\n"
+    assert (result.code, result.err) == (1, said)
+    assert (folder / "leo-geo-study" / "report.html").is_file()
+    assert list(place.iterdir()) == []
+
+
 def test_a_report_is_written_although_nobody_reads_the_verdict(folder):
     """As in `microrad run … | head -1`: the first print already finds a pipe that is closed."""
     code = """

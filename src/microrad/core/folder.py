@@ -7,16 +7,19 @@ import json
 import os
 import platform
 import re
+import secrets
 import shutil
 import stat
 import tempfile
-import threading
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
 MANIFEST = "manifest.json"
 _MOST_MANIFEST = 64_000_000
+
+DRAFT = ".draft"
+"""End of the name of a file that is not whole yet."""
 
 
 class FolderError(ValueError):
@@ -143,15 +146,16 @@ def _replace(draft: Path, folder: Path) -> None:
 def write_whole(path: Path, content: str | bytes, *, durable: bool = True) -> None:
     """Write a file whole or not at all: beside its place first. Text is written in UTF-8, its line ends as they are.
 
+    The draft beside it has a name that no other process ever takes, as a killed one may have left its own there.
     What is not ``durable`` may be cut by a failure of the machine: a file that its readers check.
     """
-    part = path.with_name(f".microrad-{os.getpid()}-{threading.get_ident()}.part")
+    draft = path.with_name(f".microrad-{secrets.token_hex(8)}{DRAFT}")
     try:
-        with part.open("xb") as file:
+        with draft.open("xb") as file:
             file.write(content.encode("utf-8") if isinstance(content, str) else content)
             if durable:
                 file.flush()
                 os.fsync(file.fileno())
-        part.replace(path)
+        draft.replace(path)
     finally:
-        part.unlink(missing_ok=True)
+        draft.unlink(missing_ok=True)

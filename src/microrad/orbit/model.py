@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from microrad.mission.file import NamedFile, content_of
 from microrad.mission.model import LinkMission
 from microrad.mission.tables.operations import Constellation, Downlink
 from microrad.mission.tables.orbit import Orbits, OrbitTable, VisibilityLimits
@@ -19,6 +20,8 @@ from microrad.orbit.epoch import Epoch
 from microrad.orbit.ground import Station
 from microrad.orbit.limits import UNLIMITED, Limits, Terminal
 from microrad.orbit.oem import read_oem
+
+Contents = tuple[NamedFile, ...]
 
 TAIL_S = 86400.0
 """Time behind the span in which data of the span may still arrive."""
@@ -41,8 +44,8 @@ class Pair:
         return self.span_s[0], self.span_s[1] + self.tail_s
 
 
-def pair(m: LinkMission, folder: Path) -> Pair:
-    """The terminals of a mission with a table `orbit`; files are looked for in ``folder``.
+def pair(m: LinkMission, folder: Path, contents: Contents = ()) -> Pair:
+    """The terminals of a mission with a table `orbit`; files are looked for in ``contents``, and then in ``folder``.
 
     Raises `OrbitError` for an orbit that is none, or that does not hold over the mission's span.
     """
@@ -54,7 +57,7 @@ def pair(m: LinkMission, folder: Path) -> Pair:
     found, tail = [], TAIL_S
     for end, name in zip(("leo", "geo"), names, strict=True):
         try:
-            one = terminal(getattr(orbits, end), name, epoch, folder)
+            one = terminal(getattr(orbits, end), name, epoch, folder, contents)
             tail = min(tail, _tail(one.orbit, epoch, orbits.duration_s))
         except OrbitError as error:
             raise OrbitError(f"orbit.{end}: {error}") from None
@@ -105,22 +108,23 @@ def _tabulated(epoch: Epoch, time_s: float) -> bool:
     return True
 
 
-def terminal(t: OrbitTable, name: str, epoch: Epoch, folder: Path) -> Terminal:
+def terminal(t: OrbitTable, name: str, epoch: Epoch, folder: Path, contents: Contents = ()) -> Terminal:
     """A terminal on its orbit, with what it can point at."""
-    return Terminal(orbit_of(t, name, epoch, folder), limits(t.limits), name)
+    return Terminal(orbit_of(t, name, epoch, folder, contents), limits(t.limits), name)
 
 
-def orbit_of(t: OrbitTable, name: str, epoch: Epoch, folder: Path) -> Orbit:
+def orbit_of(t: OrbitTable, name: str, epoch: Epoch, folder: Path, contents: Contents = ()) -> Orbit:
     """The orbit that a table describes; its own checks have seen to the keys."""
     if t.kind == "geostationary":
         assert t.longitude_rad is not None
         return GeostationarySlot(name, epoch, t.longitude_rad)
     if t.kind == "ephemeris":
         assert t.file is not None
-        return read_oem(folder / t.file, epoch, t.object)
+        return read_oem(folder / t.file, epoch, t.object, content_of(t.file, contents))
     if t.kind == "elements":
         assert t.file is not None
-        return sgp4_orbit(closest_elements(read_elements(folder / t.file, t.object), epoch), epoch)
+        sets = read_elements(folder / t.file, t.object, content_of(t.file, contents))
+        return sgp4_orbit(closest_elements(sets, epoch), epoch)
     return _kepler(t, name, epoch)
 
 
@@ -189,7 +193,9 @@ def repeats(c: Constellation, m: LinkMission) -> bool:
     return c.pattern == "file" or table(m).leo.kind in ("circular", "keplerian")
 
 
-def satellites(c: Constellation, m: LinkMission, epoch: Epoch, folder: Path) -> Iterator[Terminal]:
+def satellites(
+    c: Constellation, m: LinkMission, epoch: Epoch, folder: Path, contents: Contents = ()
+) -> Iterator[Terminal]:
     """The satellites of a constellation, one after the other, each limited as the mission's own is.
 
     Walker's patterns i: t/p/f: plane k of p has its node 2 pi k / p further ("star": pi k / p), and satellite j of it
@@ -198,7 +204,7 @@ def satellites(c: Constellation, m: LinkMission, epoch: Epoch, folder: Path) -> 
     shared = limits(table(m).leo.limits)
     if c.pattern == "file":
         assert c.file is not None
-        sets = read_elements(folder / c.file)
+        sets = read_elements(folder / c.file, data=content_of(c.file, contents))
         for elements, name in zip(sets, _names(sets, folder / c.file), strict=True):
             own = sgp4_orbit(elements, epoch)
             own.require(0.0, table(m).duration_s)

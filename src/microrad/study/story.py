@@ -17,7 +17,7 @@ from microrad.loop import control, fine_pointing
 from microrad.loop import paper_cases as tracking
 from microrad.loop import sine_run as simulate
 from microrad.mirror import summary as mirror_summary
-from microrad.mission.file import LinkFile, MissionFile
+from microrad.mission.file import LinkFile, MissionFile, with_contents
 from microrad.mission.model import Mission
 from microrad.orbit import constellation
 from microrad.orbit import day as day_study
@@ -147,7 +147,9 @@ def run(
     Raises ValueError with the reason when the loop is unstable, the mirror has no inverse or the receiver does not take
     the data rate.
     """
-    file = solve_rate(file)
+    file = with_contents(solve_rate(file))
+    if any(each.content is None for each in file.contents):  # it may be there when it is read
+        parts = kept.NOTHING
     m, sources = file.mission, file.sources
     on_progress(0, 3, "budgets, acquisition, mirror and tracking")
     (summary, loops, margins, runs), (links, fig2) = both(
@@ -208,7 +210,7 @@ def solve_rate(file: MissionFile) -> MissionFile:
 
 
 def _links_of(file: MissionFile) -> LinkFile:
-    return LinkFile(file.mission, file.path, file.text, file.sha256, file.sources)
+    return LinkFile(file.mission, file.path, file.text, file.sha256, file.sources, file.contents)
 
 
 def judged(

@@ -10,7 +10,7 @@ from microrad.loop import control, disturbance, sensor
 from microrad.loop.fine_loop import loop as fine
 from microrad.mirror import geometry, hysteresis
 from microrad.mirror import model as mirror
-from microrad.mission.file import MissionFile
+from microrad.mission.file import MissionFile, content_of
 from microrad.mission.model import Mission, source_text
 from microrad.mission.tables.fine_pointing import FinePointing
 
@@ -143,7 +143,8 @@ def vibration(file: MissionFile) -> disturbance.Disturbance:
         assert v.edges_hz is not None and v.rms_rad is not None
         return disturbance.bands(v.edges_hz, v.rms_rad, convention=v.convention, name="vibration")
     assert v.file is not None
-    freq_hz, density = disturbance.read_table(file.path.parent / v.file)
+    data = content_of(v.file, file.contents)
+    freq_hz, density = disturbance.read_table(file.path.parent / v.file, data=data)
     return disturbance.table(freq_hz, density, convention=v.convention, name="vibration")
 
 

@@ -98,10 +98,15 @@ def acquired(links: LinkStudy) -> Found | None:
     return finding.wide if o.acquisition == "wide beacon" else finding.scan
 
 
+def _pair(links: LinkStudy, m: LinkMission) -> orbit.Pair:
+    """The terminals of a mission whose files are those of the links'."""
+    return orbit.pair(m, links.file.path.parent, links.file.contents)
+
+
 def relay(links: LinkStudy, loss: PointingLoss) -> Way:
     """The way by the relay alone: what `run` finds of it, without the rest of the day."""
     m = links.file.mission
-    seen, rates = view(m, orbit.pair(m, links.file.path.parent)), flow.rate_table(flow.closings(m, loss))
+    seen, rates = view(m, _pair(links, m)), flow.rate_table(flow.closings(m, loss))
     return flow.relay(m, seen, rates, loss.outage, acquired(links), 1.0)
 
 
@@ -113,9 +118,9 @@ def run(
     ``loss`` is what pointing costs the laser link, by default what the mission states. Raises `orbit.OrbitError` and
     `operations.OperationsError` for tables that are missing and orbits that do not hold.
     """
-    m, folder = links.file.mission, links.file.path.parent
+    m = links.file.mission
     loss = given_loss(links) if loss is None else loss
-    seen = view(m, orbit.pair(m, folder))
+    seen = view(m, _pair(links, m))
     _check_contact(m, seen)
     found = acquired(links)
     closing = flow.closings(m, loss)
@@ -130,6 +135,6 @@ def run(
         encounters=tuple(encounter(m, seen.pair, contact) for contact in relay.contacts),
         relay=relay,
         direct=flow.direct(m, seen, heard),
-        swings=swings(m, folder, seen, heard, loss, found, on_progress),
+        swings=swings(m, lambda other: _pair(links, other), seen, heard, loss, found, on_progress),
         warnings=(*beyond_the_mission(m, seen), *short_tail(seen.pair)),
     )

@@ -3,7 +3,6 @@
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 from microrad import link, orbit
 from microrad.core.units import format_quantity
@@ -15,6 +14,8 @@ from microrad.orbit.day import flow, geometry
 
 _RUNS = 4  # of each case: what an acquisition takes is little beside what is varied
 NOTHING = "as it is"
+
+PairOf = Callable[[LinkMission], orbit.Pair]
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,9 +81,9 @@ class _Known:
     seen: geometry.View
     heard: tuple[flow.Heard, ...]
 
-    def view(self, m: LinkMission, folder: Path) -> geometry.View:
+    def view(self, m: LinkMission, pair_of: PairOf) -> geometry.View:
         """The contacts of a mission."""
-        return self.seen if m.orbit is self.mission.orbit else geometry.view(m, orbit.pair(m, folder))
+        return self.seen if m.orbit is self.mission.orbit else geometry.view(m, pair_of(m))
 
     def passes(self, m: LinkMission, seen: geometry.View) -> tuple[flow.Heard, ...]:
         """The passes of a mission."""
@@ -91,10 +92,10 @@ class _Known:
         return self.heard if same and seen is self.seen else flow.heard(m, seen)
 
 
-def numbers(case: _Case, folder: Path, found: Found | None) -> Numbers:
+def numbers(case: _Case, pair_of: PairOf, found: Found | None) -> Numbers:
     """Volumes and latencies of one case."""
     m = case.mission
-    seen = case.known.view(m, folder)
+    seen = case.known.view(m, pair_of)
     rates = flow.rate_table(flow.closings(m, case.loss))
     relay = flow.relay(m, seen, rates, case.loss.outage, found, case.slower)
     direct = flow.direct(m, seen, case.known.passes(m, seen))
@@ -109,7 +110,7 @@ def numbers(case: _Case, folder: Path, found: Found | None) -> Numbers:
 
 def swings(
     m: LinkMission,
-    folder: Path,
+    pair_of: PairOf,
     seen: geometry.View,
     heard: tuple[flow.Heard, ...],
     loss: flow.PointingLoss,
@@ -125,12 +126,12 @@ def swings(
     """
     m = m.with_value("operations.runs", min(flow.table(m).runs, _RUNS))
     own = _Case(m, loss, _Known(m, seen, heard))
-    here = numbers(own, folder, found)
+    here = numbers(own, pair_of, found)
     made = []
     cases = list(_changes(own, found))
     for done, (name, low, high) in enumerate(cases):
         on_progress(done, len(cases), "each assumption changed alone")
-        ends = [_end(side, here, folder, found) for side in (low, high)]
+        ends = [_end(side, here, pair_of, found) for side in (low, high)]
         made.append(Swing(name, ends[0][0], ends[1][0], ends[0][1], ends[1][1], here))
     return tuple(sorted(made, key=lambda swing: -swing.factor))
 
@@ -138,11 +139,11 @@ def swings(
 _Side = tuple[str, _Case] | None
 
 
-def _end(side: _Side, here: Numbers, folder: Path, found: Found | None) -> tuple[str, Numbers]:
+def _end(side: _Side, here: Numbers, pair_of: PairOf, found: Found | None) -> tuple[str, Numbers]:
     if side is None:
         return NOTHING, here
     try:
-        return side[0], numbers(side[1], folder, found)
+        return side[0], numbers(side[1], pair_of, found)
     except orbit.OrbitError:  # the changed orbit is none
         return NOTHING, here
 
