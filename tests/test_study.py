@@ -8,12 +8,14 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
+from microrad.link.requirement import IMPOSSIBLE
 from microrad.loop import fine_pointing
 from microrad.loop import sine_run as simulate
 from microrad.mirror.summary import summarise, unknown_dynamics
 from microrad.mission.file import load_mission
 from microrad.report import links
 from microrad.report.fine_pointing_words import not_reliable
+from microrad.report.words import headline
 from microrad.study import paper, verdict
 from microrad.study import story as study
 from shipped import SHIPPED, edited_file, whole_study
@@ -333,6 +335,22 @@ def test_the_residual_in_the_budget_says_which_run_it_is_from(shipped):
     assert line.source == "simulated: given, PID + inverse, 25 Hz, peak (per-axis)"
 
 
+def test_a_link_with_more_light_received_than_sent_does_not_close(tmp_path):
+    """The paper's terminals at 1 m, without a fine-pointing loop and with one."""
+    far, near = (
+        study.run(edited_file(tmp_path, ('distance = "42000 km"', f'distance = "{text}"'), day=False))
+        for text in ("42000 km", "1 m")
+    )
+    assert (far.achieved.possible, far.closes, far.requirements[-1].unknown) == (True, True, "")
+    row = near.requirements[-1]
+    assert near.margin_db > 100.0 and row.margin > 100.0
+    assert (row.met, row.because) == (False, IMPOSSIBLE)
+    assert not near.met and not near.closes
+    assert headline(near).startswith(f"The link does not close: {IMPOSSIBLE}, at ")
+    assert [case.possible for case in far.performance.cases] == [True] * len(far.performance.cases)
+    assert not any(case.possible for case in near.performance.cases)
+
+
 def test_claims_of_the_links_are_judged_on_the_papers_numbers_whatever_the_receiver(tmp_path):
     receiver = (
         '[communication.receiver]\nmodulation = "dpsk"\ndetector = "preamplified"\nbit_error_ratio = 1e-9\n'
@@ -355,12 +373,13 @@ def test_nothing_that_a_loop_must_do_is_met_by_a_mirror_without_dynamics():
     bare = known.model_copy(update={"mirror": known.mirror.model_copy(update={"linear": None})})
     scene = fine_pointing.scene(load_mission(SHIPPED))
 
-    def judged(m, left_rad):
+    def judged(m, left_rad, possible=True):
         best = SimpleNamespace(
             design=SimpleNamespace(name="PI"), simulated={"given": SimpleNamespace(quantile_rad=left_rad)}
         )
         fine = SimpleNamespace(best=best, quantile=0.997, budget=SimpleNamespace(dominant="Gauge"), scene=scene)
-        return verdict.of_fine_pointing(m, {}, fine, 5.0)[1:]
+        case = SimpleNamespace(margin_db=5.0, possible=possible)
+        return verdict.of_fine_pointing(m, {}, fine, case)[1:]
 
     for m, met in ((known, True), (bare, False)):
         for each in judged(m, 5e-6):
@@ -368,6 +387,7 @@ def test_nothing_that_a_loop_must_do_is_met_by_a_mirror_without_dynamics():
             assert each.because == ("Gauge" if met else "dynamics of the mirror, which its model does not have")
         assert not judged(m, 11e-6)[0].met
         assert not_reliable(m) == ([] if met else [f"Not to be relied on: {unknown_dynamics(m.mirror)}."])
+    assert [each.because for each in judged(known, 5e-6, possible=False)] == ["Gauge", IMPOSSIBLE]
     assert "resonances and its lag are not known" in unknown_dynamics(bare.mirror)
     assert unknown_dynamics(bare.mirror) in summarise(bare.mirror).warnings
     assert not any("linear part" in text for text in summarise(known.mirror).warnings)

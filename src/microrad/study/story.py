@@ -113,7 +113,8 @@ class Study:
     @property
     def closes(self) -> bool:
         """Whether each of the three links has a margin of at least 0 dB, communication under the judged loop."""
-        return self.beacon.closes and self.answer.closes and self.achieved.possible and self.margin_db >= 0.0
+        possible = self.achieved.possible if self.fine_case is None else self.fine_case.possible
+        return self.beacon.closes and self.answer.closes and possible and self.margin_db >= -requirement.ROUNDING
 
     @property
     def met(self) -> bool:
@@ -222,7 +223,7 @@ def judged(
     case, beams = best_case(found, fine), requirement.of_beams(links)
     if fine is None or case is None:
         return (*beams, *by_paper), ()
-    return (*beams, *verdict.of_fine_pointing(file.mission, file.sources, fine, case.margin_db)), by_paper
+    return (*beams, *verdict.of_fine_pointing(file.mission, file.sources, fine, case)), by_paper
 
 
 def best_case(
