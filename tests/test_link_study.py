@@ -1,6 +1,7 @@
 """What follows from the tables of the links: against hand arithmetic, other libraries' distributions and simulation."""
 
 import math
+import re
 from dataclasses import fields, replace
 
 import numpy as np
@@ -10,7 +11,7 @@ from scipy.stats import ncx2, norm
 
 from link_files import PATTERN, RECEIVERS, link_file, received_with
 from microrad import link
-from microrad.link import acquisition
+from microrad.link import acquisition, requirement
 from microrad.link import partner_search as link_acquisition
 from microrad.link import study as link_study
 from microrad.link.radial_error import Jitter
@@ -48,6 +49,34 @@ def test_the_shipped_mission_has_the_study_of_its_links(tmp_path, plain):
     assert found.finding.chances == plain.finding.chances
     assert found.finding.wide.outcome.mean_time_s == plain.finding.wide.outcome.mean_time_s
     assert "paper: Table 2" in next(line.source for line in found.communication.lines if line.name == "Transmit power")
+
+
+def test_the_beacon_is_judged_by_how_often_it_covers_its_partner(tmp_path):
+    """By a million draws: 100 µrad constant about both axes, 100 µrad rms about each, in a cone of 390 µrad."""
+    lines = {"pointing.lines.misalignment.error": "100 urad", "pointing.lines.orbit_knowledge.error": "0 urad"}
+    drawn = np.random.default_rng(1).normal(100 * URAD, 100 * URAD, (1_000_000, 2))
+    share = np.mean(np.hypot(*drawn.T) < 390 * URAD)
+    for confidence, mark in ((0.95, "PASS"), (0.99, "FAIL")):
+        found = studied(tmp_path, lines, {"pointing.confidence": confidence, "point_ahead.error": "0 urad"})
+        row = requirement.of_beams(found)[0]
+        assert (row.name, row.unit, row.mark) == ("beacon covers its partner", "%", mark)
+        assert row.actual == pytest.approx(100 * share, abs=0.1)
+        assert row.required == 100 * confidence
+        assert row.margin == row.actual - row.required
+        assert re.search(rf"covers its partner +{100 * confidence:g} % +98\.\d %", budget_views.text(found, 80))
+
+
+def test_errors_that_were_derived_from_the_cone_are_held_against_their_root_sum_square_alone(tmp_path):
+    def row(*change):
+        file = edited_file(tmp_path, ("runs = 4000 ", "runs = 100 "), *change)
+        links = LinkFile(file.mission, file.path, file.text, file.sha256, file.sources)
+        return requirement.of_beams(link_study.run(links))[0]
+
+    own, other = row(), row(('error = "248 urad"', 'error = "247 urad"'))
+    assert (own.name, own.unit, own.mark) == ("beacon cone over the root sum square", "rad", "derived")
+    assert own.derived[0].startswith("pointing.lines.misalignment.error = 248 urad")
+    assert (other.name, other.mark) == ("beacon covers its partner", "FAIL")
+    assert other.actual == pytest.approx(53.5, abs=0.5)
 
 
 def test_all_three_budgets_are_there_and_communication_is_the_first(plain):

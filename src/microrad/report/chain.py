@@ -112,13 +112,19 @@ def _pointing(study: Study) -> Stage:
     cone = next(r for r in study.requirements if r.subject == "cone")
     lines = [
         f"open loop {_angle(p.rss_rad)} (rss)",
-        f"beacon's cone {_angle(p.beacon_half_angle_rad)}",
+        f"beacon's cone {_angle(p.beacon_half_angle_rad)}, covers {quantity(100.0 * _covered(study), '%')}",
     ]
     if fine is not None:
         before = math.hypot(*(d.rms_rad for several in fine.scene.loop.disturbances for d in several))
         lines.append(f"disturbed by {_angle(before)} rms")
     lines.append(f"fine: {_angle(study.file.mission.requirement.pointing_error_rad)} allowed")
     return Stage("Pointing", tuple(lines), cone.mark)
+
+
+def _covered(study: Study) -> float:
+    reading = study.open_loop.reading
+    assert reading is not None  # a whole mission has a beacon
+    return reading.coverage
 
 
 def _mirror(study: Study) -> Stage:

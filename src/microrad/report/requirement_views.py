@@ -68,8 +68,10 @@ def _capital(text: str) -> str:
 def _cone(study: Study) -> str:
     p = study.open_loop
     share, line = max(zip(p.variance_shares, p.lines, strict=True), key=lambda pair: pair[0])
+    assert p.reading is not None  # a whole mission has a beacon
     said = f"{line.name}: {percent(share)} of the squares, {quantity(line.value, 'rad')} half width"
-    return said if p.reading is None else f"{said}; the cone covers its partner with {p.reading.coverage:.2f}"
+    half = quantity(p.reading.half_angle_rad, "rad")
+    return f"{said}; the cone of {half} half angle covers its partner with {p.reading.coverage:.2f}"
 
 
 def _tornado(study: Study, of: str) -> Sequence[link.Swing]:
