@@ -144,7 +144,8 @@ class Performance:
     What the pointing error costs a coded link in power lies between two of these: ``mean_loss_db`` where its
     interleaver spans many fades, ``outage_loss_db`` where it spans none. ``uncoded_penalty_db`` is what it costs
     without a code; nan for a receiver of which only the measured sensitivity is known, infinite where no power makes
-    up for it. ``possible`` says that no more light arrives than was sent.
+    up for it. ``error_rad`` is the radial error that is exceeded for the outage; ``possible`` says that no more light
+    arrives than was sent there.
 
     An uncorrected point-ahead is added to the length of every error, as if it had the direction of each. The fades and
     the penalty have it as a bias, of one direction: see `with_point_ahead`. What a correction leaves is in none.
@@ -154,6 +155,7 @@ class Performance:
     controller: str
     mirror: str
     jitter: pointing.Jitter
+    error_rad: float
     mean_loss_db: float
     outage_loss_db: float
     margin_db: float
@@ -230,6 +232,7 @@ def performance(
         controller=controller,
         mirror=mirror,
         jitter=jitter,
+        error_rad=under.quantile_rad,
         mean_loss_db=_mean_loss_db(spread, fall.loss_db(spread.radius_rad + ahead)),
         outage_loss_db=under.outage_loss_db,
         margin_db=under.margin_db,

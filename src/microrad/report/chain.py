@@ -94,14 +94,15 @@ def _orbit(study: Study) -> Stage:
 
 
 def _link(study: Study) -> Stage:
-    c, budget = study.file.mission.communication, study.communication
-    beam = link.communication_beam(study.file.mission).fall.half_angle_rad
+    m = study.file.mission
+    c, kind = m.communication, "margin" if m.jitter is None else "static margin"
+    beam = link.communication_beam(m).fall.half_angle_rad
     return Stage(
         "Link",
         (
             f"{format_quantity(c.data_rate_bit_s, 'bit/s')} with {format_quantity(c.transmit_power_w, 'W')}",
             f"beam {_angle(beam)} (half, 1/e²)",
-            f"margin {signed(budget.margin_db, 'dB')} as budgeted,",
+            f"{kind} {signed(study.static.margin_db, 'dB')} as budgeted,",
             f"at {_angle(c.pointing_error_rad)} off axis",
         ),
     )
