@@ -58,6 +58,15 @@ def test_a_margin_that_was_solved_for_is_met_whatever_rounding_leaves():
     assert solved.needs == "needs 3 dB: met"
 
 
+def test_a_link_with_more_light_received_than_sent_is_missed(draft):
+    near = draft.set("communication.distance", "1 m")
+    far, close = (link_view.view(each.link()).margins for each in (draft, near))
+    assert (far[0].met, far[0].needs) == (True, "needs 3 dB: met")
+    assert close[0].margin_db > 100.0
+    assert (close[0].met, close[0].needs) == (False, "MISSED: more light arrives than was sent")
+    assert [each.met for each in close[1:]] == [each.met for each in far[1:]] == [True, True]
+
+
 def test_every_position_of_every_dial_is_a_value_that_the_mission_takes(draft):
     groups = link_view.dials(draft) | pointing_view.dials(draft)
     every = [dial for group in groups.values() for dial in group]

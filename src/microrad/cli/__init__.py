@@ -29,7 +29,7 @@ from microrad.cli.frame import (
     say,
     width,
 )
-from microrad.core.folder import read_bytes, write_whole
+from microrad.core.folder import write_whole
 
 # Everything else is imported inside the commands: numpy, numba and pydantic take longer to load than help may take.
 if TYPE_CHECKING:

@@ -18,7 +18,7 @@ from microrad.link.study import BeamRadius, LinkStudy, Solution
 from microrad.link.under_jitter import Performance, error_rad, required_error_rad
 from microrad.mission.model import source_text
 from microrad.orbit.operations import spreadsheet_text
-from microrad.report import requirements
+from microrad.report import advice, requirements
 from microrad.report.quantities import quantity, signed
 from microrad.report.tables import Table, table_text, tables_text
 
@@ -68,8 +68,8 @@ def csv_text(study: LinkStudy, solution: Solution | None = None) -> str:
     buffer = io.StringIO()
     writer = csv.writer(buffer, lineterminator="\n")
     writer.writerow(COLUMNS)
-    for name, value, unit, basis in [] if solution is None else _solution_rows(solution):
-        writer.writerow([SOLVED, spreadsheet_text(name), repr(float(value)), unit, basis, "", "", ""])
+    for name, solved, unit, basis in [] if solution is None else _solution_rows(solution):
+        writer.writerow([SOLVED, spreadsheet_text(name), repr(float(solved)), unit, basis, "", "", ""])
     jitter = [(UNDER_JITTER, line) for line in jitter_lines(study)]
     for name, line in (*lines(study), *jitter):
         value = repr(float(line.value))  # every digit, as JSON has it
@@ -105,7 +105,8 @@ def short(study: LinkStudy) -> list[str]:
         at = f"but for {outage_words(m)} under the jitter, an error of {quantity(error_rad(m), 'rad')}"
     said = [f"The margin is received over required power, for communication {at}.", *consequences(study)[:2]]
     r = requirements.nearest(found)
-    said.append(f"{'Nearest to its limit is' if r.met else 'What limits it is'} the {r.name}, by {r.because}.")
+    which = "Nearest to its limit is" if r.met else "What limits it is"
+    said.append(f"{which} the {r.name}, by {r.because}{advice.of_links(study, r)}.")
     said.append(requirements.derived_words(found))
     if warned := study.warnings:
         more = f" ({len(warned) - 1} more by --verbose)" if len(warned) > 1 else ""
