@@ -3,16 +3,16 @@
 import contextlib
 from dataclasses import replace
 from functools import cache
-from pathlib import Path
 
 import pytest
 
 from microrad import report
 from microrad.mission.file import load_mission
 from microrad.study import story as study
+from places import ROOT
 from shared import once
 
-MISSIONS = Path(__file__).parent.parent / "missions"
+MISSIONS = ROOT / "missions"
 SHIPPED, DEFAULT = MISSIONS / "paper.toml", MISSIONS / "leo-geo.toml"
 """The paper's mission, which most tests are about, and the one that `microrad init` writes."""
 

@@ -5,13 +5,13 @@
 
 import gzip
 import shutil
-from pathlib import Path
 
 import pytest
 
+from places import TESTS
 from shipped import SHIPPED
 
-CORPUS = Path(__file__).parent / "corpus"
+CORPUS = TESTS / "corpus"
 FILES = sorted(path for path in CORPUS.glob("*/*/*") if path.is_file())
 BESIDE = {"mission.toml"}
 """Files that others name."""

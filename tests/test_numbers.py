@@ -2,14 +2,13 @@
 
 import json
 import runpy
-from pathlib import Path
 
 import pytest
 
+from places import ROOT
 from reference import cases, comparing
 from reference.quantities import MOST, Quantity, flatten, quantities
 
-ROOT = Path(__file__).parent.parent
 REFERENCE = ROOT / "reference"
 WAS = {
     "margin_db": Quantity(4.456, "dB", 0.01),

@@ -1,13 +1,12 @@
 """The tests themselves: none measures time, and none has a limit of its own for what may take long."""
 
 import ast
-from pathlib import Path
 
 import pytest
 
 import waiting
+from places import TESTS
 
-HERE = Path(__file__).parent
 CLOCKS = {"perf_counter", "monotonic", "process_time", "thread_time", "perf_counter_ns", "monotonic_ns", "timeit"}
 LIMITED = {
     "wait",
@@ -59,7 +58,7 @@ def is_number(node):
     )
 
 
-@pytest.mark.parametrize("path", sorted(HERE.glob("*.py")), ids=lambda path: path.name)
+@pytest.mark.parametrize("path", sorted(TESTS.rglob("*.py")), ids=lambda path: path.name)
 def test_no_test_asserts_a_time_or_has_a_limit_of_its_own(path):
     found = [] if path.name in EXEMPT else faults(path.read_text("utf-8"), path.name)
     assert found == [], "wait for an event by waiting.until, or with waiting.HANG_S"

@@ -16,6 +16,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 MANIFEST = "manifest.json"
+_MOST_MANIFEST = 64_000_000
 
 DRAFT = ".draft"
 """End of the name of a file that is not whole yet."""
@@ -26,7 +27,10 @@ class FolderError(ValueError):
 
 
 def read_bytes(path: Path, most: int) -> bytes:
-    """At most so many bytes of a file. Raises OSError, also where they are not there yet, as of a log of the kernel."""
+    """At most so many bytes of a file. Raises OSError, also where they are not there yet, as of a log of the kernel.
+
+    Whatever a user names is read by this: /proc/kmsg is a regular file to all who ask, and waits for ever.
+    """
 
     def at_once(name: str, flags: int) -> int:
         return os.open(name, flags | getattr(os, "O_NONBLOCK", 0))
@@ -35,7 +39,7 @@ def read_bytes(path: Path, most: int) -> bytes:
         parts: list[bytes] = []
         while most > 0 and (part := file.read(most)) != b"":
             if part is None:
-                raise BlockingIOError(0, "it is no file on disk: its content is not there yet")
+                raise BlockingIOError(0, "it is no file on disk: its content is not there yet", str(path))
             parts.append(part)
             most -= len(part)
     return b"".join(parts)
@@ -61,7 +65,7 @@ def check_folder(folder: Path, overwrite: bool, kind: str = "mission", what: str
 def _ours(manifest: Path, kind: str) -> bool:
     """Whether this is a manifest that microrad wrote for this kind of folder."""
     try:
-        data = json.loads(manifest.read_text(encoding="utf-8"))
+        data = json.loads(read_bytes(manifest, _MOST_MANIFEST))
         return "microrad" in data["versions"] and kind in data
     except (OSError, ValueError, KeyError, TypeError):
         return False

@@ -8,6 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from microrad.core import kernels, lti
+from microrad.core.units import format_quantity
 from microrad.export.modes import minimal
 from microrad.export.records import (
     GAUGE,
@@ -109,6 +110,29 @@ def outlook(choice: Choice) -> fine_pointing.Outlook | None:
     design = fine_pointing.Design(choice.controller.name, choice.tuned, choice.controller)
     (found,) = fine_pointing.outlook(choice.scene, choice.file.mission, [design])
     return found
+
+
+def promised(choice: Choice, accept: bool = False) -> fine_pointing.Outlook | None:
+    """What a controller leaves; raises ExportError, but for ``accept``, where its linear figure is no promise."""
+    left = outlook(choice)
+    if isinstance(choice, PointingChoice) and left is not None and not (left.holds or accept):
+        raise ExportError(_broken(choice, left))
+    return left
+
+
+def _broken(choice: PointingChoice, left: fine_pointing.Outlook) -> str:
+    found, said = rms_text(left.simulated_rad), rms_text(left.linear_rad)
+    return (
+        f"{choice.file.path}: {choice.controller.name} leaves {found} on the mission's mirror, simulated with its "
+        f"hysteresis: {left.times:.2f} times the {said} of linear theory, where {fine_pointing.PROMISE:g} times is the "
+        "most. Choose another controller by the simulated figures of microrad design, or write this one all the same "
+        "with --accept."
+    )
+
+
+def rms_text(rad: float) -> str:
+    """An rms of one axis in words."""
+    return f"{format_quantity(rad, 'rad', 4)} rms an axis"
 
 
 def _tracking(file: MissionFile, name: str) -> TrackingChoice:

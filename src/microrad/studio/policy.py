@@ -1,6 +1,6 @@
 """What the studio's answers tell the browser: where code, styles and data come from, who may embed and read them.
 
-Measured with NiceGUI 3.18 in Chromium (`tests/test_studio_guard.py` repeats it): its pages need eval, because Vue
+Measured with NiceGUI 3.18 in Chromium, which `tests/studio/test_studio_guard.py` repeats. Its pages need eval: Vue
 compiles templates in the browser, and inline styles, because Tailwind, charts and editors write style elements. Inline
 scripts pass by a nonce that only the page's own template carries: a script that slips in with a name does not run.
 """

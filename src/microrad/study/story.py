@@ -18,7 +18,7 @@ from microrad.loop import paper_cases as tracking
 from microrad.loop import sine_run as simulate
 from microrad.mirror import summary as mirror_summary
 from microrad.mission.file import LinkFile, MissionFile, with_contents
-from microrad.mission.model import Mission
+from microrad.mission.model import LinkMission, Mission
 from microrad.orbit import constellation
 from microrad.orbit import day as day_study
 from microrad.study import alternatives as readings
@@ -63,6 +63,7 @@ class Study:
     is then judged in ``papers_loop``, which is empty else. ``other_readings`` are its numbers by other readings of what
     the paper leaves open.
     ``links`` holds what follows from the links' tables alone, ``performance`` what the simulated residuals cost them.
+    ``tornado`` is what moves the judged margin, at the error that its loop leaves.
     ``day`` is what the link delivers under the best of those residuals, ``contact`` one of its contacts in time, and
     ``plan`` that of a constellation; each is None where the mission lacks a table for it.
     """
@@ -81,6 +82,7 @@ class Study:
     scan: paper.Scan | None
     fine_pointing: fine_pointing.FinePointingStudy | None
     performance: performance.LinkPerformance
+    tornado: link.Tornado
     day: day_study.DayStudy | None
     contact: contact_run.ContactRun | None
     plan: constellation.ConstellationPlan | None
@@ -97,8 +99,13 @@ class Study:
 
     @property
     def communication(self) -> link.LinkBudget:
-        """The communication link as budgeted."""
+        """The communication link as budgeted: under a table `[jitter]` but for the outage."""
         return self.links.communication
+
+    @property
+    def static(self) -> link.LinkBudget:
+        """The communication link at its static pointing error, whatever jitter there is."""
+        return link.communication_budget(self.file.mission, self.file.sources)
 
     @property
     def beacon(self) -> link.LinkBudget:
@@ -113,7 +120,8 @@ class Study:
     @property
     def closes(self) -> bool:
         """Whether each of the three links has a margin of at least 0 dB, communication under the judged loop."""
-        return self.beacon.closes and self.answer.closes and self.achieved.possible and self.margin_db >= 0.0
+        possible = self.achieved.possible if self.fine_case is None else self.fine_case.possible
+        return self.beacon.closes and self.answer.closes and possible and self.margin_db >= -requirement.ROUNDING
 
     @property
     def met(self) -> bool:
@@ -151,7 +159,7 @@ def run(
     if any(each.content is None for each in file.contents):  # it may be there when it is read
         parts = kept.NOTHING
     m, sources = file.mission, file.sources
-    on_progress(0, 3, "budgets, acquisition, mirror and tracking (the first run compiles for half a minute)")
+    on_progress(0, 3, "budgets, acquisition, mirror and tracking")
     (summary, loops, margins, runs), (links, fig2) = both(
         lambda: (
             mirror_summary.summarise(m.mirror),
@@ -172,6 +180,7 @@ def run(
     fine = None if m.fine_pointing is None else parts.part(fine_pointing.run, file, on_progress=on_progress)
     on_progress(2, 3, "the day")
     found = performance.run(m, runs, fine)
+    case = best_case(found, fine)
     by_paper = verdict.of_residual(m, sources, achieved, residual, runs)
     requirements, papers_loop = judged(file, links, by_paper, fine, found)
     day, contact, plan = delivered(file, links, found, fine, residual, achieved, parts)
@@ -193,6 +202,7 @@ def run(
         scan=scan,
         fine_pointing=fine,
         performance=found,
+        tornado=tornado(file, left_rad if case is None else case.error_rad),
         day=day,
         contact=contact,
         plan=plan,
@@ -224,7 +234,7 @@ def judged(
     case, beams = best_case(found, fine), requirement.of_beams(links)
     if fine is None or case is None:
         return (*beams, *by_paper), ()
-    return (*beams, *verdict.of_fine_pointing(file.mission, file.sources, fine, case.margin_db)), by_paper
+    return (*beams, *verdict.of_fine_pointing(file.mission, file.sources, fine, case)), by_paper
 
 
 def best_case(
@@ -232,6 +242,16 @@ def best_case(
 ) -> link_performance.Performance | None:
     """The link under the fine-pointing loop's best controller on the mission's mirror, or None without that loop."""
     return None if fine is None else found.case(performance.FINE, fine.best.design.name, "given")
+
+
+def tornado(file: MissionFile, error_rad: float) -> link.Tornado:
+    """What moves the margin of the communication link at a pointing error that stays as it is."""
+
+    def margin_db(m: LinkMission) -> float:
+        return float(link.margin_of_error(m, np.array([error_rad]))[0])
+
+    m = file.mission
+    return link.Tornado("Communication", margin_db(m), link.swings(m, file.sources, link.LINK_TABLES, margin_db))
 
 
 def delivered(

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from microrad import link
 from microrad.link import pointing
-from microrad.link.requirement import Requirement, Subject, derived_from, outage_words
+from microrad.link.requirement import IMPOSSIBLE, Requirement, Subject, derived_from, outage_words
+from microrad.link.under_jitter import Performance
 from microrad.loop import sine_run as simulate
 from microrad.loop.fine_pointing import FinePointingStudy
 from microrad.loop.paper_cases import Run, mirror_model, residual_rad
@@ -33,25 +34,28 @@ def of_residual(
     """The error of the paper's loop in the worst of its sines, and the margin that it leaves communication."""
     q, left, cause = m.requirement, residual_rad(m, worst.trace), residual_cause(m, worst, runs)
     spare, derived = achieved.margin_db - q.margin_db, derived_from(sources, "communication.")
-    because, name = "the residual: " + cause, "communication margin"
+    because, name, doubt = "the residual: " + cause, "communication margin", _doubt(m, achieved.possible)
     return (
         _error("residual", "residual pointing error", m, left, cause),
-        Requirement("communication", name, "dB", q.margin_db, achieved.margin_db, spare, because, unknown(m), derived),
+        Requirement("communication", name, "dB", q.margin_db, achieved.margin_db, spare, because, doubt, derived),
     )
 
 
 def of_fine_pointing(
-    m: Mission, sources: Mapping[str, Source], fine: FinePointingStudy, margin_db: float
+    m: Mission, sources: Mapping[str, Source], fine: FinePointingStudy, case: Performance
 ) -> tuple[Requirement, ...]:
-    """The mirror's stroke; the best controller's error for its share of the time, and the margin but for the outage."""
+    """The mirror's stroke; the best controller's error for its share of the time, and the margin but for the outage.
+
+    ``case`` is the link under that controller.
+    """
     q, controller, cause = m.requirement, fine.best.design.name, fine.budget.dominant
     left = fine.best.simulated["given"].quantile_rad
     name, derived = f"link margin but for {outage_words(m)} ({controller})", derived_from(sources, "communication.")
-    spare = margin_db - q.margin_db
+    spare, doubt = case.margin_db - q.margin_db, _doubt(m, case.possible)
     return (
         _stroke(m, sources, fine),
         _error("fine pointing", f"fine pointing at {100 * fine.quantile:g} % ({controller})", m, left, cause),
-        Requirement("communication", name, "dB", q.margin_db, margin_db, spare, cause, unknown(m), derived),
+        Requirement("communication", name, "dB", q.margin_db, case.margin_db, spare, cause, doubt, derived),
     )
 
 
@@ -59,6 +63,11 @@ def unknown(m: Mission) -> str:
     """What would have to be known of the mission's mirror before a loop around it may be relied on, or nothing."""
     lacking = mirror_summary.unknown_dynamics(m.mirror)
     return "dynamics of the mirror, which its model does not have" if lacking else ""
+
+
+def _doubt(m: Mission, possible: bool) -> str:
+    """Why a margin of the simulated link may not be relied on, or nothing; it is ``possible`` by its power."""
+    return unknown(m) if possible else IMPOSSIBLE
 
 
 def _stroke(m: Mission, sources: Mapping[str, Source], fine: FinePointingStudy) -> Requirement:

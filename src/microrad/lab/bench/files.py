@@ -7,12 +7,14 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from microrad.core.folder import MANIFEST, whole_folder
+from microrad.core.folder import MANIFEST, read_bytes, whole_folder
 from microrad.core.folder import check_folder as check
 from microrad.lab.bench.formats import write_file
 from microrad.lab.bench.plan import Plan, Record
 from microrad.lab.bench.play import BenchError, Progress, played
 from microrad.lab.recording import Recording, read_recording
+
+_MOST_MANIFEST = 16_000_000
 
 PLAN = "plan.toml"
 
@@ -84,7 +86,7 @@ def read_folder(folder: Path, accept: tuple[str, ...] = ()) -> tuple[tuple[Recor
     """
     manifest = folder / MANIFEST
     try:
-        entries = json.loads(manifest.read_text(encoding="utf-8"))["records"]
+        entries = json.loads(read_bytes(manifest, _MOST_MANIFEST))["records"]
         wanted = [(folder / e["files"][0], e["inputs"], e["outputs"], e["period_samples"], e["use"]) for e in entries]
     except (OSError, ValueError, KeyError, TypeError, IndexError):
         raise BenchError(

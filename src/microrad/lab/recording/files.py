@@ -8,6 +8,7 @@ import math
 from collections.abc import Sequence
 from pathlib import Path
 
+from microrad.core.folder import read_bytes
 from microrad.lab.recording.records import RecordingError
 
 MAX_BYTES = 2_000_000_000
@@ -80,8 +81,7 @@ def _nearest_file(path: Path) -> str:
 def read_head(path: Path, size: int) -> bytes:
     """The first bytes of the file."""
     try:
-        with path.open("rb") as file:
-            return file.read(size)
+        return read_bytes(path, size)
     except OSError as error:
         raise RecordingError(f"{path}: the file cannot be read ({error}); check its permissions.") from None
 

@@ -9,6 +9,8 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from microrad.core.folder import read_bytes
+
 Floats = NDArray[np.float64]
 Unit = Literal["rad^2/Hz", "mrad^2/Hz", "urad^2/Hz", "nrad^2/Hz"]
 
@@ -42,9 +44,10 @@ def _lines(path: Path, data: bytes | None) -> list[tuple[int, str]]:
     if (path.stat().st_size if data is None else len(data)) > _MAX_BYTES:
         raise ValueError(f"{path}: more than {_MAX_BYTES // 10**6} MB; average the spectrum to fewer rows")
     try:
-        text = (path.read_bytes() if data is None else data).decode("utf-8-sig")
+        text = (read_bytes(path, _MAX_BYTES) if data is None else data).decode("utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
-        raise ValueError(f"{path}: the table cannot be read as text ({error}); save it as CSV in UTF-8") from None
+        reason = getattr(error, "strerror", error)
+        raise ValueError(f"{path}: the table cannot be read as text ({reason}); save it as CSV in UTF-8") from None
     return [(i, line.strip()) for i, line in enumerate(text.splitlines(), 1) if line.strip()]
 
 

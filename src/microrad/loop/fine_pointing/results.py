@@ -47,9 +47,18 @@ class Outlook:
     simulated_rad: float
 
     @property
+    def times(self) -> float:
+        """How many times the linear rms is left when it is simulated."""
+        return self.simulated_rad / self.linear_rad
+
+    @property
     def holds(self) -> bool:
         """Whether the linear figure is a promise."""
-        return self.simulated_rad <= PROMISE * self.linear_rad
+        return self.times <= PROMISE
+
+    def mark(self, accept: bool) -> str:
+        """Refused where the linear figure is no promise, or accepted where the user says so; else nothing."""
+        return "" if self.holds else "accepted" if accept else "refused"
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,0 +1,700 @@
+"""The ledger against kills, full and read-only disks, flipped bits and a second writer; and chunks as bytes."""
+
+import contextlib
+import hashlib
+import json
+import os
+import random
+import sqlite3
+import struct
+import subprocess
+import sys
+import textwrap
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from microrad.campaign import blob
+from microrad.campaign.blob import Column, Head
+from microrad.campaign.ledger import Ledger, check_same
+from microrad.campaign.ledger_file import FORMAT, argument, is_written, refuse_damaged_log
+from microrad.campaign.mending import mend, verify
+from microrad.campaign.records import CampaignError, Chunk, Failed, WorstTrace
+from places import TESTS
+from waiting import any_moment
+
+COLUMNS = (Column("row", "", "number"), Column("weight", "", "weight"), Column("margin", "dB", "margin"))
+HEAD = Head(
+    campaign_name="campaign.toml",
+    campaign_text='mission = "leo-geo.toml"\n',
+    mission_name="paper",
+    seed=2**64 - 1,
+    hashes={"campaign": "aa", "mission": "bb", "code": "cc"},
+    versions={"numpy": "2"},
+    created="2026-01-01T00:00:00+00:00",
+    cells=({"mirror": "a.toml"}, {"mirror": "b.toml"}),
+    columns=COLUMNS,
+    bundle=bytes(range(256)),
+)
+
+
+def chunk(number, cell=0, rows=16, reason="raised ValueError: no µ"):
+    """A chunk whose values follow from its number and cell, with one failed row."""
+    draw = np.random.default_rng([cell, number])
+    margin = draw.normal(size=rows)
+    margin[3] = np.nan
+    columns = {"row": np.arange(rows) + float(rows * number), "weight": np.ones(rows), "margin": margin}
+    curve = np.concatenate([np.full(500, float(rows)), np.sort(draw.random(250))[::-1], np.zeros(306)])
+    return Chunk(cell, number, columns, (Failed(rows * number + 3, 2**64 - 1, 2, reason),), curve, curve**2)
+
+
+def packed(number, cell=0):
+    return blob.pack_chunk(chunk(number, cell))
+
+
+def filled(path, count=20):
+    """A closed ledger with this many chunks in cell 0 and one in cell 1; the bytes of each."""
+    payloads = {(0, number): packed(number) for number in range(count)} | {(1, 0): packed(0, 1)}
+    with Ledger.create(path, HEAD) as ledger:
+        for (cell, number), payload in payloads.items():
+            ledger.put(cell, number, payload)
+        ledger.note("rounds", 2)
+        ledger.put_trace(TRACE)
+    return payloads
+
+
+TRACE = WorstTrace(
+    0, 17, "margin", -1.5, np.arange(50.0), np.random.default_rng(1).normal(size=(50, 2)), np.zeros((50, 2))
+)
+
+
+@pytest.fixture
+def path(tmp_path):
+    return tmp_path / "a ledger, 100 % #1?.ledger"  # characters that an address would take otherwise
+
+
+def said(call, *args, **kwargs):
+    """The words of the error that a call must raise."""
+    with pytest.raises(CampaignError) as caught:
+        call(*args, **kwargs)
+    return str(caught.value)
+
+
+# ------------------------------------------------------------------------------------------------------------- bytes
+def same_bits(a, b):
+    return a.shape == b.shape and a.tobytes() == b.tobytes()
+
+
+def test_a_chunk_comes_back_bit_by_bit_with_its_columns_in_order():
+    odd = np.array([-0.0, np.inf, -np.inf, struct.unpack("<d", b"\1\0\0\0\0\0\xf8\x7f")[0], 5e-324])
+    for rows in (0, 1, 5):
+        columns = {"z": odd[:rows], "row": np.arange(float(rows)), "a": np.full(rows, np.nan)}
+        sent = Chunk(3, 7, columns, (Failed(2, 2**64 - 1, 2, "half \udc80 of a pair"),), np.zeros(1056), np.zeros(0))
+        got = blob.unpack_chunk(blob.pack_chunk(sent))
+        assert (got.cell, got.number, got.failed, list(got.columns)) == (3, 7, sent.failed, ["z", "row", "a"])
+        assert all(same_bits(got.columns[name], columns[name]) for name in columns)
+        assert same_bits(got.survival, sent.survival) and same_bits(got.survival_square, sent.survival_square)
+        assert not same_bits(got.survival, sent.survival_square)
+
+
+@pytest.mark.parametrize(
+    "values", [[1, 1, 2, 3, 3, 3], [1, 2], [2, 2], [1], [0.0, -0.0], [1, 1, 2], [1, 2, 2]], ids=str
+)
+def test_runs_at_the_ends_are_left_out_and_put_back(values):
+    sent = np.array(values, dtype=float)
+    got = blob.unpack("trace", blob.pack("trace", {}, {"x": sent, "next": np.arange(3.0)}))
+    assert same_bits(got.arrays["x"], sent) and same_bits(got.arrays["next"], np.arange(3.0))
+    long = np.concatenate([np.full(1000, sent[0]), sent, np.full(1000, sent[-1])])
+    data = blob.pack("trace", {}, {"x": long})
+    assert same_bits(blob.unpack("trace", data).arrays["x"], long)
+    assert len(data) < 300
+
+
+def test_a_trace_and_a_head_come_back():
+    got = blob.unpack_trace(blob.pack_trace(replace(TRACE, value=np.nan)))
+    assert (got.cell, got.row, got.output) == (0, 17, "margin") and np.isnan(got.value)
+    assert same_bits(got.error_rad, TRACE.error_rad) and same_bits(got.drive_v, TRACE.drive_v)
+    keys = {"z": "1", "a": "2"}
+    head = blob.unpack_head(blob.pack_head(replace(HEAD, cells=(keys,))))
+    assert head == replace(HEAD, cells=(keys,)) != HEAD and list(head.cells[0]) == ["z", "a"]
+
+
+def test_the_same_chunk_gives_the_same_bytes_on_any_machine():
+    columns = {"row": np.arange(4.0), "weight": np.ones(4), "margin": np.array([0.1, np.nan, 3.0, -0.0])}
+    data = blob.pack_chunk(Chunk(0, 0, columns, (Failed(1, 9, 2, "why"),), np.array([4.0, 2.5, 0.0]), np.zeros(3)))
+    assert data == blob.pack_chunk(blob.unpack_chunk(data))
+    assert hashlib.sha256(data).hexdigest() == "03960011ee16b928ebaa57956de692445ea838dcc57a37c245365dd9b9526bee"
+
+
+def test_a_flipped_bit_anywhere_in_a_chunk_is_refused():
+    data = packed(0)
+    draw = random.Random(1)
+    for at in [*range(80), *range(80, len(data), 37), *range(len(data) - 40, len(data))]:
+        bad = bytearray(data)
+        bad[at] ^= 1 << draw.randrange(8)
+        with pytest.raises(CampaignError, match=r"damaged|is no chunk"):
+            blob.unpack_chunk(bytes(bad))
+    assert blob.unpack_chunk(data).number == 0
+
+
+def test_other_bytes_are_refused_by_what_they_are():
+    data = packed(0)
+    assert "is no chunk of microrad" in said(blob.unpack_chunk, b"")
+    assert "is no chunk of microrad" in said(blob.unpack_chunk, b"PK" + data)
+    assert "damaged" in said(blob.unpack_chunk, data[:-1])
+    assert "these bytes are a trace, not a chunk" in said(blob.unpack_chunk, blob.pack_trace(TRACE))
+    newer = data[:8] + (2).to_bytes(2, "little") + data[10:-32]
+    assert "format 2, and this microrad reads 1" in said(blob.unpack_chunk, newer + hashlib.sha256(newer).digest())
+
+
+def test_columns_of_unequal_length_are_refused():
+    columns = {"row": np.arange(4.0), "margin": np.arange(3.0)}
+    message = said(blob.pack_chunk, Chunk(1, 2, columns, (), np.zeros(0), np.zeros(0)))
+    assert "chunk 2 of cell 1" in message and "(3,)" in message and "(4,)" in message
+    assert "shapes" in said(blob.pack_chunk, Chunk(1, 2, {"row": np.zeros((2, 2))}, (), np.zeros(0), np.zeros(0)))
+
+
+def forged(kind, header, table):
+    """Bytes of a record with the right checksum, whatever is in it."""
+    words = json.dumps({"arrays": table, "rest": 0, "header": header}).encode()
+    body = struct.pack("<8sHHI", b"microrad", 1, {"chunk": 1, "trace": 2, "head": 3}[kind], len(words)) + words
+    body += bytes(8)
+    return body + hashlib.sha256(body).digest()
+
+
+@pytest.mark.parametrize(
+    "table",
+    [
+        [["survival", [10**8], 10**8, 0]],
+        [["survival", [2**13, 2**13], 2**26, 0]],
+        [["survival", [2**25], 2**25, 0], ["survival_square", [1], 1, 0]],
+        [["survival", [-1], 0, 0]],
+        [["survival", [4], 4, 4]],
+        [["survival", [1.0], 1, 0]],
+        [["survival", [True], 1, 0]],
+        [["survival", "1", 1, 0]],
+        [["survival", [1]]],
+        [7],
+        {},
+    ],
+)
+def test_bytes_of_a_stranger_with_the_right_checksum_ask_for_no_memory_and_are_refused(table):
+    header = {"cell": 0, "number": 0, "columns": [], "failed": []}
+    assert "is laid out as microrad never does" in said(blob.unpack_chunk, forged("chunk", header, table))
+
+
+@pytest.mark.parametrize("header", [[], 7, {}, {"cell": 0, "number": 0, "columns": ["x"], "failed": []}])
+def test_a_header_of_a_stranger_is_refused(header):
+    assert "is laid out as microrad never does" in said(blob.unpack_chunk, forged("chunk", header, []))
+    assert "is laid out as microrad never does" in said(blob.unpack_trace, forged("trace", header, []))
+    assert "is laid out as microrad never does" in said(blob.unpack_head, forged("head", header, []))
+
+
+# ----------------------------------------------------------------------------------------------------------- the rows
+def test_chunks_come_in_order_however_they_were_put(path):
+    with Ledger.create(path, HEAD) as ledger:
+        assert ledger.done() == set() and list(ledger.chunks(0)) == []
+        for number in (4, 0, 2):
+            ledger.put(0, number, packed(number))
+        ledger.put(1, 0, packed(0, 1))
+        assert [each.number for each in ledger.chunks(0)] == [0, 2, 4]
+    with Ledger.open(path, write=False) as ledger:
+        assert ledger.head == HEAD
+        assert ledger.done() == {(0, 0), (0, 2), (0, 4), (1, 0)}
+        assert ledger.get(0, 2) == packed(2) and ledger.get(0, 1) is None
+        assert [each.cell for each in ledger.chunks(1)] == [1]
+        found = verify(path, [(0, 0), (0, 1), (0, 2)])
+        assert (found.checked, found.damaged, found.missing, found.faults, found.sound) == (4, (), ((0, 1),), (), True)
+
+
+def test_a_chunk_twice_is_one_chunk_and_with_other_content_is_refused(path):
+    other = replace(chunk(0), failed=())
+    with Ledger.create(path, HEAD) as ledger:
+        ledger.put(0, 0, packed(0))
+        ledger.put(0, 0, packed(0))
+        message = said(ledger.put, 0, 0, blob.pack_chunk(other))
+        assert "chunk 0 of cell 0 came out otherwise" in message and "same microrad" in message
+        assert ledger.get(0, 0) == packed(0)
+        ledger.drop(0, 0)
+        assert ledger.done() == set()
+        ledger.put(0, 0, blob.pack_chunk(other))
+        assert ledger.get(0, 0) == blob.pack_chunk(other)
+
+
+def test_what_is_no_chunk_of_this_campaign_is_refused(path):
+    renamed = replace(chunk(0), columns={"row": np.zeros(2), "margin": np.zeros(2)})
+    with Ledger.create(path, HEAD) as ledger:
+        assert "chunk 1 of cell 0 came for chunk 0 of cell 0" in said(ledger.put, 0, 0, packed(1))
+        assert "damaged" in said(ledger.put, 0, 0, packed(0)[:-1])
+        message = said(ledger.put, 0, 0, blob.pack_chunk(renamed))
+        assert "columns row, margin" in message and "row, weight, margin" in message
+        assert ledger.done() == set()
+        ledger.put(0, 0, packed(0))
+        assert ledger.done() == {(0, 0)}
+
+
+def test_notes_and_traces_are_kept_and_replaced(path):
+    with Ledger.create(path, HEAD) as ledger:
+        ledger.note("seconds", 1.5)
+        ledger.note("seconds", 2.5)
+        ledger.note("state", {"rounds": [1, 2]})
+        ledger.put_trace(TRACE)
+        ledger.put_trace(replace(TRACE, value=-2.0))
+        ledger.put_trace(replace(TRACE, row=3))
+    with Ledger.open(path, write=True) as ledger:
+        notes = ledger.notes()
+        assert (notes["seconds"], notes["state"], notes["writer"]["pid"]) == (2.5, {"rounds": [1, 2]}, os.getpid())
+        assert [(trace.row, trace.value) for trace in ledger.traces()] == [(3, -1.5), (17, -2.0)]
+        ledger.drop_trace(TRACE)
+        assert [trace.row for trace in ledger.traces()] == [3]
+
+
+def test_a_still_ledger_is_read_as_it_was(path):
+    filled(path, 2)
+    with Ledger.open(path, write=True) as writer, Ledger.open(path, write=False) as reader:
+        with reader.still():
+            before = reader.done()
+            writer.put(0, 2, packed(2))
+            assert reader.done() == before == {(0, 0), (0, 1), (1, 0)}
+        assert reader.done() == before | {(0, 2)}
+
+
+def test_other_hashes_are_refused_with_both(path):
+    now = HEAD.hashes | {"code": "dd", "mission": "ee"}
+    check_same(HEAD.hashes, dict(HEAD.hashes), path)
+    message = said(check_same, HEAD.hashes, now, path)
+    assert "another code and mission" in message
+    assert "code: cc in the ledger, dd now" in message and "mission: bb in the ledger, ee now" in message
+    assert "aa" not in message
+
+
+# --------------------------------------------------------------------------------------------------------- refusals
+def test_a_ledger_is_never_begun_over_a_file_nor_opened_where_none_is(path, tmp_path):
+    assert "there is no ledger" in said(Ledger.open, path, write=True)
+    assert "there is no ledger" in said(verify, path)
+    assert list(tmp_path.iterdir()) == []
+    path.write_text("my notes")
+    assert "there is already" in said(Ledger.create, path, HEAD)
+    assert path.read_text() == "my notes"
+    assert "there is no folder" in said(Ledger.create, tmp_path / "none" / "x.ledger", HEAD)
+    assert list(tmp_path.iterdir()) == [path]
+
+
+@pytest.mark.parametrize("write", [True, False])
+def test_files_that_are_no_ledger_are_refused(path, write):
+    path.write_text("my notes, which are long enough for SQLite to look at\n" * 100)
+    assert "is text, not a ledger" in said(Ledger.open, path, write=write)
+    path.write_bytes(bytes([0xA5]) * 5000)
+    assert "it is no ledger, or its first page is damaged" in said(Ledger.open, path, write=write)
+    path.unlink()
+    with contextlib.closing(sqlite3.connect(path)) as other, other:
+        other.execute("CREATE TABLE birds(name)")
+    assert "no ledger of microrad" in said(Ledger.open, path, write=write)
+    before = path.read_bytes()
+    assert "no copy of its head is whole" in said(mend, path)
+    assert path.read_bytes() == before
+
+
+def test_another_format_of_the_ledger_is_refused(path):
+    filled(path, 1)
+    with contextlib.closing(sqlite3.connect(path)) as ledger:
+        ledger.execute("PRAGMA user_version = 7")
+    assert "a ledger of format 7, and this microrad knows 1" in said(Ledger.open, path, write=True)
+
+
+def test_a_ledger_of_a_later_microrad_is_not_mended_into_this_format(path, monkeypatch):
+    assert blob.VERSION == FORMAT  # else the head of a later ledger could be read
+    with monkeypatch.context() as later:
+        later.setattr("microrad.campaign.blob.VERSION", 2)
+        later.setattr("microrad.campaign.ledger_file.FORMAT", 2)
+        filled(path, 2)
+        assert verify(path).sound
+    whole = path.read_bytes()
+    assert "format 2" in verify(path).faults[0]
+    assert "no copy of its head is whole" in said(mend, path)
+    assert path.read_bytes() == whole
+
+
+def test_nothing_is_written_through_a_ledger_open_for_reading(path):
+    filled(path, 1)
+    with Ledger.open(path, write=False) as ledger:
+        assert "is open for reading" in said(ledger.put, 0, 1, packed(1))
+        assert "is open for reading" in said(ledger.drop, 0, 0)
+        with pytest.raises(sqlite3.OperationalError, match="readonly"):
+            ledger._connection.execute("DELETE FROM chunks")
+        assert ledger.done() == {(0, 0), (1, 0)}
+
+
+# ----------------------------------------------------------------------------------------------------------- damage
+def flip(path, at, bit=0):
+    with path.open("r+b") as file:
+        file.seek(at)
+        byte = file.read(1)[0]
+        file.seek(at)
+        file.write(bytes([byte ^ 1 << bit]))
+
+
+def mended(path, payloads):
+    """Mend, see that only whole chunks are left, do the others again, and see that all is as it was; what was lost."""
+    kept = mend(path)
+    assert verify(path).sound
+    with Ledger.open(path, write=True) as ledger:
+        assert ledger.head == HEAD
+        lost = set(payloads) - ledger.done()
+        assert kept == len(payloads) - len(lost) == len(ledger.done())
+        for cell, number in lost:
+            ledger.put(cell, number, payloads[cell, number])
+        assert {key: ledger.get(*key) for key in ledger.done()} == payloads
+        assert verify(path, payloads).checked == len(payloads)
+    return lost
+
+
+def test_a_bit_flipped_in_a_payload_or_its_checksum_costs_one_chunk(path):
+    payloads = filled(path)
+    whole = path.read_bytes()
+    middle = whole.index(payloads[0, 7][-600:-500])
+    checksum = whole.index(payloads[0, 7][:400]) - 10
+    for at in (middle, checksum):
+        path.write_bytes(whole)
+        flip(path, at, 5)
+        found = verify(path, payloads)
+        assert (found.damaged, found.missing, found.faults, found.sound) == (((0, 7),), (), (), False)
+        with Ledger.open(path, write=False) as ledger:
+            assert "chunk 7 of cell 0 is damaged" in said(ledger.get, 0, 7)
+            assert "chunk 7 of cell 0 is damaged" in said(list, ledger.chunks(0))
+            assert ledger.get(0, 6) == payloads[0, 6]
+        assert mended(path, payloads) == {(0, 7)}
+
+
+def test_a_bit_flipped_in_one_copy_of_the_head_costs_nothing_and_in_both_is_told(path):
+    payloads = filled(path)
+    first = path.read_bytes().index(b'b.toml"]')
+    flip(path, first)
+    found = verify(path)
+    assert len(found.faults) == 1 and "of the head" in found.faults[0] and not found.sound
+    assert mended(path, payloads) == set()
+    whole = path.read_bytes()
+    first = whole.index(b'b.toml"]')
+    for at in (first, whole.index(b'b.toml"]', first + 1)):
+        flip(path, at)
+    damaged = path.read_bytes()
+    assert "both copies of its head are damaged" in said(Ledger.open, path, write=True)
+    assert "both copies of its head are damaged" in verify(path).faults[0]
+    assert "no copy of its head is whole" in said(mend, path)
+    assert path.read_bytes() == damaged
+
+
+def test_a_bit_flipped_in_a_note_or_a_trace_costs_that_alone(path):
+    payloads = filled(path)
+    with Ledger.open(path, write=True) as ledger:
+        ledger.note("story", "once upon a time")
+    flip(path, path.read_bytes().index(b"upon"))
+    flip(path, path.read_bytes().index(TRACE.error_rad.tobytes()))
+    found = verify(path)
+    assert sorted(found.faults) == [
+        "damaged among the notes: ('story',)",
+        "damaged among the traces: (0, 17, 'margin')",
+    ]
+    with Ledger.open(path, write=False) as ledger:
+        assert "story" not in ledger.notes() and ledger.notes()["rounds"] == 2
+    assert mended(path, payloads) == set()
+    with Ledger.open(path, write=False) as ledger:
+        assert ledger.traces() == () and ledger.notes()["rounds"] == 2
+
+
+def test_wherever_a_bit_flips_it_is_found_or_harmless_and_all_that_is_whole_is_kept(path):
+    payloads = filled(path)
+    whole = path.read_bytes()
+    draw = random.Random(2)
+    lost, found = [], 0
+    spots = [*range(0, 100, 3), *(page + draw.randrange(4096) for page in range(0, len(whole), 4096))]
+    spots += [page + draw.randrange(12) for page in range(0, len(whole), 4096)]  # where SQLite keeps a page's order
+    for at in spots:
+        path.write_bytes(whole)
+        flip(path, at, draw.randrange(8))
+        sound = verify(path, payloads)
+        if sound.sound and not sound.missing:
+            with Ledger.open(path, write=False) as ledger:
+                assert {key: ledger.get(*key) for key in ledger.done()} == payloads
+        else:
+            found += 1
+            lost.append(len(mended(path, payloads)))
+    assert found > len(spots) / 2
+    assert sum(each <= 1 for each in lost) > 0.8 * len(lost)
+    assert max(lost) <= 8  # what a page of the tree has
+
+
+def test_a_page_overwritten_by_another_program_costs_what_was_on_it(path):
+    payloads = filled(path)
+    whole = path.read_bytes()
+    for page in range(len(whole) // 4096):
+        path.write_bytes(whole[: 4096 * page] + b"\xa5" * 4096 + whole[4096 * (page + 1) :])
+        assert not verify(path).sound, page
+        assert len(mended(path, payloads)) <= 8, page
+
+
+def test_a_file_cut_short_keeps_what_is_left_of_it(path):
+    payloads = filled(path)
+    whole = path.read_bytes()
+    path.write_bytes(whole[: len(whole) * 2 // 3 + 100])
+    assert not verify(path).sound
+    assert 0 < len(mended(path, payloads)) < len(payloads) / 2
+
+
+def test_damage_is_mended_with_what_only_the_log_has(path):
+    payloads = filled(path)
+    late = {(1, number): packed(number, 1) for number in range(1, 20)}
+    with Ledger.open(path, write=True) as ledger:
+        for (cell, number), payload in late.items():
+            ledger.put(cell, number, payload)
+        files = {each: each.read_bytes() for each in path.parent.iterdir()}
+    for each, content in files.items():  # as a kill leaves them
+        each.write_bytes(content)
+    assert sorted(each.suffix for each in files) == [".ledger", ".ledger-shm", ".ledger-wal", ".lock"]
+    leaf = path.read_bytes().index(payloads[0, 7][:400]) // 4096
+    for at in range(4096 * leaf, 4096 * leaf + 8):  # the beginning of a page that the log does not have
+        flip(path, at, 1)
+    assert not verify(path).sound
+    lost = mended(path, payloads | late)
+    assert (0, 7) in lost and len(lost) <= 8 and lost <= set(payloads)
+
+
+# ------------------------------------------------------------------------------------------- ledgers from anywhere
+ENDLESS = "WITH RECURSIVE c(n) AS (SELECT 0 UNION ALL SELECT n + 1 FROM c) SELECT 0 cell, n number, n sha256, n payload"
+
+
+@pytest.mark.parametrize(
+    "changes, named",
+    [
+        (["DROP TABLE chunks", f"CREATE VIEW chunks AS {ENDLESS} FROM c"], "the view 'chunks'"),
+        (["CREATE TRIGGER t AFTER INSERT ON notes BEGIN DELETE FROM chunks; END"], "the trigger 't'"),
+        (["CREATE TABLE birds(name)"], "the table 'birds'"),
+        (["DROP TABLE traces"], "not all tables of a ledger"),
+        (["ALTER TABLE notes ADD COLUMN more"], "the table 'notes'"),
+    ],
+)
+@pytest.mark.parametrize("logged", [False, True], ids=["in the file", "in the log"])
+def test_only_the_tables_of_a_ledger_are_read(path, changes, named, logged):
+    payloads = filled(path, 3)
+    with contextlib.closing(sqlite3.connect(path, isolation_level=None)) as other:
+        for change in changes:
+            other.execute(change)
+        files = {each: each.read_bytes() for each in path.parent.iterdir()}
+    for each, content in files.items() if logged else ():
+        each.write_bytes(content)
+    for write in (False, True):
+        message = said(Ledger.open, path, write=write)
+        assert f"{path} defines {named}" in message and f"`microrad campaign resume {argument(path)}`" in message
+    assert [named in fault for fault in verify(path).faults] == [True]
+    assert set(mended(path, payloads)) <= set(payloads)
+
+
+def left_behind(path, count):
+    """A ledger as a kill leaves it: its chunks are in the log alone; the bytes of each file and chunk."""
+    payloads = {(0, number): packed(number) for number in range(count)}
+    with Ledger.create(path, HEAD) as ledger:
+        for (cell, number), payload in payloads.items():
+            ledger.put(cell, number, payload)
+        files = {each: each.read_bytes() for each in path.parent.iterdir()}
+    for each, content in files.items():
+        each.write_bytes(content)
+    return files, payloads
+
+
+def test_a_damaged_log_of_a_killed_writer_is_told_and_costs_what_was_damaged(path):
+    files, payloads = left_behind(path, 8)
+    log = path.with_name(path.name + "-wal")
+    last = (log.stat().st_size - 32) // 4120 - 1
+    spots = [(at, 0) for at in (2, 5, 17, 27)]  # magic number, version, salt, sum
+    spots += [(32 + 4120 * frame + at, 3) for frame in (0, 9, last) for at in (3, 9, 17, 1000)]
+    for at, bit in spots:
+        for each, content in files.items():
+            each.write_bytes(content)
+        flip(log, at, bit)
+        message = said(Ledger.open, path, write=at % 2 == 0)
+        assert f"its log {log.name} is damaged from byte " in message and "finished transactions" in message
+        assert said(Ledger.create, path, HEAD) == message and verify(path).faults == (message,)
+        assert len(mended(path, payloads)) <= 1, at
+
+
+def test_a_log_whose_last_transaction_was_not_finished_is_whole(path):
+    files, payloads = left_behind(path, 8)
+    log = path.with_name(path.name + "-wal")
+    whole = files[log]
+    for size in (0, 20, 32, 1000, 32 + 4120, 32 + 4120 * 2 + 24, len(whole) - 4120, len(whole) - 1):
+        for each, content in files.items():
+            each.write_bytes(content)
+        log.write_bytes(whole[:size])
+        assert verify(path).sound
+        with Ledger.open(path, write=False) as ledger:
+            assert ledger.done() < payloads.keys()
+    for each, content in files.items():
+        each.write_bytes(content)
+    with log.open("ab") as file:  # what an earlier, longer log has left behind
+        file.write(bytes([0, 0, 0, 2, 0, 0, 0, 9]) + bytes(range(8)) + bytes(4104) + whole[-50:])
+    assert verify(path, payloads).missing == ()
+
+
+def test_a_log_that_begins_anew_while_it_is_read_is_no_damage(path, monkeypatch):
+    left_behind(path, 2)
+    flip(path.with_name(path.name + "-wal"), 100)
+    answers = iter([False, True])
+    monkeypatch.setattr("microrad.campaign.ledger_file.is_written", lambda path: next(answers))
+    refuse_damaged_log(path)
+    assert next(answers, None) is None
+
+
+# ----------------------------------------------------------------------------------------------- processes and disks
+WRITER = """
+    import sys
+    from pathlib import Path
+    from campaign.test_campaign_ledger import HEAD, packed
+    from microrad.campaign.ledger import Ledger
+    path = Path(sys.argv[1])
+    with Ledger.open(path, write=True) if path.exists() else Ledger.create(path, HEAD) as ledger:
+        print("open", flush=True)
+        for number in range(len(ledger.done()), int(sys.argv[2])):
+            ledger.put(0, number, packed(number))
+            print(number, flush=True)
+        sys.stdin.read()
+"""
+
+
+@contextlib.contextmanager
+def process(path, count):
+    """A process that writes chunks until it has this many, and then holds the ledger until it is stopped."""
+    arguments = [sys.executable, "-W", "error", "-c", textwrap.dedent(WRITER), str(path), str(count)]
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(TESTS), *sys.path])}
+    pipe = subprocess.PIPE
+    with subprocess.Popen(arguments, stdin=pipe, stdout=pipe, text=True, env=environment) as child:
+        try:
+            yield child
+        finally:
+            child.kill()
+            child.stdout.read()
+
+
+def test_a_second_process_may_read_but_not_write_until_the_first_is_gone(path):
+    with process(path, 3) as child:
+        assert [child.stdout.readline().strip() for _ in range(4)] == ["open", "0", "1", "2"]
+        assert is_written(path)
+        refusals = [said(Ledger.open, path, write=True), said(mend, path)]
+        for message in refusals:
+            assert f"process {child.pid} on " in message and "since 20" in message and "already writes to" in message
+        with Ledger.open(path, write=False) as ledger:
+            assert ledger.done() == {(0, 0), (0, 1), (0, 2)}
+        assert "there is already" in said(Ledger.create, path, HEAD)
+        child.kill()
+        child.wait()
+        assert not is_written(path)
+        with Ledger.open(path, write=True) as ledger:
+            ledger.put(0, 3, packed(3))
+            assert ledger.notes()["writer"]["pid"] == os.getpid()
+            assert "already writes to" in said(Ledger.open, path, write=True) and is_written(path)
+    assert verify(path).checked == 4
+
+
+def test_kills_at_any_moment_lose_and_double_nothing(path):
+    draw, acknowledged = random.Random(3), 0
+    for _ in range(10):
+        with process(path, 10**6) as child:
+            while child.stdout.readline().strip() != "open":
+                pass
+            lines = [child.stdout.readline() for _ in range(draw.randrange(5))]
+            any_moment(draw, 0.03)
+            child.kill()
+            numbers = "".join([*lines, child.stdout.read()]).split()
+        acknowledged = int(numbers[-1]) + 1 if numbers else acknowledged
+        with Ledger.open(path, write=False) as ledger:
+            count = len(ledger.done())
+            assert acknowledged <= count <= acknowledged + 1
+            assert verify(path, ((0, number) for number in range(count))).sound
+            assert ledger.done() == {(0, number) for number in range(count)}
+            assert all(ledger.get(0, number) == packed(number) for number in range(count))
+        acknowledged = count
+    assert acknowledged > 10
+
+
+def test_a_creation_that_was_killed_leaves_nothing_in_the_way(path):
+    draft = path.with_name(f".{path.name}.part")
+    draft.write_bytes(b"half a ledger")
+    draft.with_name(draft.name + "-wal").write_bytes(b"half a log")
+    filled(path, 2)
+    assert verify(path).checked == 3
+    assert sorted(each.name for each in path.parent.iterdir()) == [path.name, path.name + ".lock"]
+
+
+@pytest.fixture
+def small_disk(tmp_path):
+    """A file system of 1 MB."""
+    folder = tmp_path / "small"
+    folder.mkdir()
+    made = subprocess.run(["mount", "-t", "tmpfs", "-o", "size=1m", "tmpfs", folder], capture_output=True, check=False)
+    if made.returncode:
+        pytest.skip("this machine does not allow to mount a small disk")
+    yield folder
+    subprocess.run(["umount", "-l", folder], check=True)
+
+
+def test_a_full_disk_costs_only_the_chunk_being_written(small_disk):
+    path, ballast = small_disk / "c.ledger", small_disk / "ballast"
+    ballast.write_bytes(bytes(400_000))
+    with Ledger.create(path, HEAD) as ledger:
+        count, message = 0, ""
+        while not message and count < 1000:
+            try:
+                ledger.put(0, count, packed(count))
+                count += 1
+            except CampaignError as error:
+                message = str(error)
+        assert 10 < count < 1000
+        assert f"could not keep chunk {count} of cell 0: the disk is full. {count} chunks are in and stay" in message
+        assert f"Free space, then go on with `microrad campaign resume {path}`" in message
+        assert len(ledger.done()) == count and ledger.get(0, count - 1) == packed(count - 1)
+        assert "the disk is full" in said(ledger.note, "story", "x" * 500_000)
+    assert verify(path, [(0, number) for number in range(count + 1)]).missing == ((0, count),)
+    ballast.unlink()
+    with Ledger.open(path, write=True) as ledger:
+        ledger.put(0, count, packed(count))
+        assert [each.number for each in ledger.chunks(0)] == list(range(count + 1))
+        assert verify(path).sound
+
+
+def test_a_disk_that_is_full_from_the_start_leaves_no_half_ledger(small_disk):
+    (small_disk / "ballast").write_bytes(bytes(1_000_000))
+    path = small_disk / "c.ledger"
+    assert "could not create the ledger: the disk is full" in said(Ledger.create, path, HEAD)
+    assert not path.exists()
+    (small_disk / "ballast").unlink()
+    filled(path, 1)
+    assert verify(path).checked == 2
+
+
+def test_a_read_only_disk_can_be_read_and_verified_but_not_written(small_disk):
+    path = small_disk / "c.ledger"
+    payloads = filled(path, 3)
+    subprocess.run(["mount", "-o", "remount,ro", small_disk], check=True)
+    with Ledger.open(path, write=False) as ledger:
+        assert {key: ledger.get(*key) for key in ledger.done()} == payloads
+        assert verify(path, payloads).checked == 4
+    message = said(Ledger.open, path, write=True)
+    assert "could not open the ledger" in message and "Make file and folder" in message
+    assert "4 chunks are in and stay" in message
+
+
+def test_a_program_that_holds_the_file_is_told(path, monkeypatch):
+    monkeypatch.setattr("microrad.campaign.ledger_file.PATIENCE_S", 0.1)
+    filled(path, 1)
+    with Ledger.open(path, write=True) as ledger, contextlib.closing(sqlite3.connect(path)) as other:
+        other.execute("BEGIN IMMEDIATE")
+        message = said(ledger.put, 0, 1, packed(1))
+        assert "another program held the file for longer than 0.1 s. 2 chunks are in and stay" in message
+        other.execute("ROLLBACK")
+        ledger.put(0, 1, packed(1))
+    with contextlib.closing(sqlite3.connect(path)) as other:
+        other.execute("PRAGMA locking_mode = EXCLUSIVE")
+        other.execute("BEGIN EXCLUSIVE")
+        assert "another program held the file" in said(verify, path)  # which is no damage
+    with Ledger.open(path, write=False) as ledger:
+        assert len(ledger.done()) == 3

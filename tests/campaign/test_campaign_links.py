@@ -1,0 +1,286 @@
+"""Campaigns of links alone: on every file that `microrad budget` takes, with every quantity drawn from anything."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from microrad.campaign import bundle, plan, run, work
+from microrad.campaign.export import export
+from microrad.campaign.file import load_campaign
+from microrad.campaign.inputs import Builder
+from microrad.campaign.keys import find, flat
+from microrad.campaign.ledger import Ledger
+from microrad.campaign.records import CampaignError
+from microrad.campaign.summary import summarise
+from microrad.core import reads
+from microrad.link import LitAperture, radial_error
+from microrad.link.inputs import LINK_TABLES
+from microrad.link.under_jitter import Exposure
+from microrad.mission.fields import Several
+from microrad.mission.file import load_link, open_mission
+from microrad.mission.toml import MissionError
+from preset_files import NAMES as PRESETS
+from preset_files import completed
+from shipped import SHIPPED
+
+CROSSLINK = SHIPPED.parent.parent / "docs" / "gallery" / "crosslink.toml"
+HEAD = 'mission = "{name}.toml"\nseed = 1\nruns = 4\nsampling = "random"\n'
+LIMIT = '[limits.margin]\nleast = "1 dB"\n'
+TABLES = (*LINK_TABLES, "jitter", "requirement", "beacon", "answer")
+POWER = '[inputs."communication.transmit_power"]\ndistribution = "uniform"\nlow = "0.1 W"\nhigh = "0.3 W"\n'
+
+
+def mission(folder, name):
+    """A link file by its name, without what is not known of it left."""
+    if name in PRESETS:
+        return completed(folder, name).path
+    text = CROSSLINK.read_text(encoding="utf-8")
+    path = folder / f"{name}.toml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def loaded(folder, name, body, head=HEAD):
+    path = folder / f"campaign-{name}.toml"
+    path.write_text(head.format(name=name) + body, encoding="utf-8")
+    return load_campaign(path)
+
+
+def rows(campaign, count=4):
+    """The first rows of a campaign, all of which have results."""
+    chunk = work.Evaluator(campaign, Builder(campaign), {}, {}).rows(0, range(count), lambda: None)
+    assert chunk.failed == ()
+    return chunk.columns
+
+
+def faults(folder, name, body, head=HEAD):
+    with pytest.raises(MissionError) as caught:
+        loaded(folder, name, body, head)
+    return caught.value.faults
+
+
+# ------------------------------------------------------------------------------------------------------- which files
+@pytest.mark.parametrize("name", [*PRESETS, "gallery"])
+def test_a_campaign_takes_what_a_budget_takes(tmp_path, name):
+    own = load_link(mission(tmp_path, name)).mission
+    campaign = loaded(tmp_path, name, POWER)
+    columns = rows(campaign)
+    assert ("beacon_margin" in columns, "answer_margin" in columns) == (own.beacon is not None, own.answer is not None)
+    gained = 10.0 * np.log10(columns["communication.transmit_power"] / own.communication.transmit_power_w)
+    np.testing.assert_allclose(columns["margin"] - gained, Exposure.stated(own).margin_db, atol=1e-9)
+
+
+def test_what_links_alone_have_not_is_refused_once(tmp_path):
+    mission(tmp_path, "tbird")
+    loop = '[loop]\ncontroller = "PI"\n'
+    (found,) = faults(tmp_path, "tbird", POWER + loop)
+    assert (found.key, found.reason) == ("loop", "needs a mission with the table [fine_pointing]")
+    keep = HEAD + 'keep = ["margin", "answer_margin"]\n'
+    (found,) = faults(tmp_path, "tbird", POWER, keep)
+    assert (found.key, found.reason) == ("keep", "needs the mission's table [answer]")
+    (found,) = faults(tmp_path, "tbird", '[inputs.mirror]\ndistribution = "identified"\n')
+    assert found.reason == "is to be identified, but the mission has no mirror, only its links"
+    (found,) = faults(tmp_path, "tbird", POWER + '[set]\n"control.rate" = "1 kHz"\n')
+    assert (found.key, found.reason) == ("set.control.rate", "is no key of the mission")
+
+
+def test_the_largest_rate_is_solved_for_once_for_each_cell(tmp_path):
+    mission(tmp_path, "gallery")
+    fixed = '[set]\n"communication.data_rate" = "largest"\n[grid]\n"communication.distance" = ["500 km", "1000 km"]\n'
+    campaign = loaded(tmp_path, "gallery", POWER + fixed)
+    evaluator = work.Evaluator(campaign, Builder(campaign), {}, {})
+    near, far = (evaluator.rows(cell, range(4), lambda: None).columns for cell in (0, 1))
+    nominal = campaign.bases[0].file.mission
+    gained = 10.0 * np.log10(near["communication.transmit_power"] / nominal.communication.transmit_power_w)
+    np.testing.assert_allclose(near["margin"] - gained, nominal.requirement.margin_db, atol=1e-9)
+    np.testing.assert_allclose(far["margin"], near["margin"], atol=1e-9)
+    np.testing.assert_allclose(far["data_rate"] * 4.0, near["data_rate"])
+    (found,) = faults(tmp_path, "gallery", POWER + fixed.replace("500 km", "1e9 km"))
+    assert found.key == "set.communication.data_rate" and "dB are missing" in found.reason
+    table = '[inputs."communication.data_rate"]\ndistribution = "table"\nvalues = ["largest", "1 Mbit/s"]\n'
+    (found,) = faults(tmp_path, "gallery", table)
+    assert found.reason == "has a word that is solved for"
+
+
+# ---------------------------------------------------------------------------------------------------- every quantity
+def drawable(path):
+    """Each quantity of the links' tables that has a value: its key and its value in SI units."""
+    data = open_mission(path).data
+    for text, value in flat(data).items():
+        key = find(text, data) if text.rpartition(".")[0] in TABLES else None
+        if key is not None and isinstance(key.rule, Several):
+            for place, item in enumerate(value, 1):
+                yield find(f"{text}.{place}", data), key.rule.each.read(item)
+        elif key is not None and key.numeric is not None:
+            yield key, key.numeric.read(value)
+
+
+def distributed(key, value, kind):
+    """A distribution of a kind a little below a value, above one that is 0 or the least that there is."""
+    low, high = (1e-9, 2e-9) if not value else (1.01 * value, 1.02 * value)
+    if value and (key.numeric.least is None or 0.98 * value >= key.numeric.least):
+        low, high = 0.98 * value, 0.99 * value
+
+    def written(number):
+        return f'"{number!r} {key.unit}"' if key.unit else repr(number)
+
+    def table(**numbers):
+        return "".join(f"{name} = {written(number)}\n" for name, number in numbers.items())
+
+    normal = table(mean=(low + high) / 2.0, deviation=(high - low) / 20.0)
+    drawn_as = f'[inputs."{key.text}".drawn_as]\ndistribution = "normal"\n{normal}'
+    listed = f"values = [{written(low)}, {written(high)}]\n"
+    body = {"normal": normal, "table": listed}.get(kind) or table(low=low, high=high)
+    return f'[inputs."{key.text}"]\ndistribution = "{kind}"\n{body}{drawn_as if kind == "normal" else ""}'
+
+
+@pytest.mark.parametrize("kind", ["normal", "uniform", "log-uniform", "table"])
+@pytest.mark.parametrize("name", [*PRESETS, "gallery"])
+def test_every_quantity_is_drawn_from_any_distribution_or_read_by_nothing(tmp_path, name, kind):
+    found = {key.text: distributed(key, value, kind) for key, value in drawable(mission(tmp_path, name))}
+    refused = faults(tmp_path, name, "".join(found.values()) + LIMIT)
+    assert {fault.reason.partition(" (")[0] for fault in refused} == {"is read by nothing that is kept"}
+    for fault in refused:
+        del found[fault.key.removeprefix("inputs.")]
+    unread = {fault.key.removeprefix("inputs.") for fault in refused}
+    assert unread <= {"communication.pointing_error", "jitter.bandwidth", "requirement.pointing_error"} | {
+        "requirement.outage",
+        "point_ahead.transverse_velocity",
+        "point_ahead.error",
+    }
+    even = HEAD.replace("random", "latin-hypercube")  # both values of a table
+    columns = rows(loaded(tmp_path, name, "".join(found.values()) + LIMIT, even), 16)
+    assert all(np.ptp(columns[key]) > 0.0 for key in found)
+    assert np.ptp(columns["margin"]) > 0.0 and len(found) >= 14
+
+
+def test_each_item_of_a_list_has_its_own_key(tmp_path):
+    mission(tmp_path, "gallery")
+    first = '[inputs."jitter.rms.1"]\ndistribution = "uniform"\nlow = "1 urad"\nhigh = "9 urad"\n'
+    campaign = loaded(tmp_path, "gallery", first)
+    drawn = Builder(campaign).mission(0, {"jitter.rms.1": 5e-6}).mission
+    assert drawn.jitter.rms_rad == (5e-6, 6e-6) and drawn.jitter.bias_rad == (4e-6, 0.0)
+    assert (campaign.dimensions[0].key, campaign.dimensions[0].unit) == ("jitter.rms.1", "rad")
+    both = loaded(tmp_path, "gallery", first + '[set]\n"jitter.rms.2" = "2 urad"\n')
+    assert both.mission.mission.jitter.rms_rad == (6e-6, 2e-6)
+    (found,) = faults(tmp_path, "gallery", first.replace("rms.1", "rms.3"))
+    assert (found.reason, found.expected) == ("is no item of jitter.rms, a list of 2", "jitter.rms.1 or jitter.rms.2")
+    (found,) = faults(tmp_path, "gallery", first.replace("rms.1", "rms"))
+    assert found.expected == "jitter.rms.1 and jitter.rms.2, each with its distribution"
+    (found,) = faults(tmp_path, "gallery", '[grid]\n"jitter.rms.1" = ["1 urad", "1 m"]\n')
+    assert (found.key, found.value) == ("grid.jitter.rms.1", '"1 m"')
+    whole = '[inputs."jitter.rms"]\ndistribution = "table"\nvalues = [["1 urad", "1 urad"], ["2 urad", "1 urad"]]\n'
+    assert np.ptp(rows(loaded(tmp_path, "gallery", whole), 4)["margin"]) > 0.0
+    (found,) = faults(tmp_path, "gallery", whole + first)
+    assert found.reason == "is an item of jitter.rms, which stands in [inputs] as a whole"
+
+
+# ------------------------------------------------------------------------------------------------ nothing done twice
+def test_rows_that_share_their_jitter_and_their_beam_share_what_follows_from_them(tmp_path, monkeypatch):
+    mission(tmp_path, "gallery")
+    evaluated = []
+    own, field = radial_error._probability_of, LitAperture._field
+    monkeypatch.setattr(radial_error, "_probability_of", lambda *a, **k: evaluated.append(1) or own(*a, **k))
+    rows(loaded(tmp_path, "gallery", POWER))
+    first = len(evaluated)
+    assert first > 4
+    rows(loaded(tmp_path, "gallery", POWER))  # the same margins: nothing but the shares beyond them is asked again
+    assert len(evaluated) - first == 2 * (4 + 1)
+    asked = []
+    monkeypatch.setattr(LitAperture, "_field", lambda self, error: asked.append(error.size) or field(self, error))
+    lit = LitAperture(0.0401, 1.5e-6, 0.0, 0.0)
+    assert lit.loss_db(lit.error_rad(20.0)) == pytest.approx(20.0)
+    assert sum(asked) < 200  # of the 2001 errors within 40 half angles
+    asked.clear()
+    assert lit.loss_db(lit.error_rad(20.0)) == pytest.approx(20.0) and asked == [1]
+
+
+# ------------------------------------------------------------------------------------------------------------ chunks
+DRAWN = '[inputs."jitter.rms.1"]\ndistribution = "uniform"\nlow = "20 urad"\nhigh = "30 urad"\n'
+EVEN = HEAD.replace("random", "latin-hypercube").replace("runs = 4", "runs = 64")
+
+
+def begun(folder, book, monkeypatch, row_s, progress=lambda *_: None, **means):
+    """A campaign of 64 rows that are taken to last ``row_s`` each, run to its end."""
+    loaded(folder, "gallery", DRAWN, EVEN)
+    monkeypatch.setattr(run, "row_s", lambda _: row_s)
+    run.begin(folder / "campaign-gallery.toml", folder / book, run.Means(**(means or {"threads": 1})), progress)
+    return folder / book
+
+
+def content(book):
+    """Rows of each chunk, the exported rows, and all that they say but for the pace."""
+    with Ledger.open(book, write=False) as opened:
+        sizes = [chunk.columns["row"].size for chunk in opened.chunks(0)]
+        export(opened, book.with_suffix(".csv"))
+    said = replace(summarise(book), progress=None)
+    return sizes, book.with_suffix(".csv").read_bytes(), reads.digest(said)
+
+
+def test_chunks_are_cut_to_what_a_row_costs(tmp_path):
+    mission(tmp_path, "gallery")
+    campaign = loaded(tmp_path, "gallery", DRAWN, EVEN.replace("64", "4096"))
+    assert plan.is_timed(campaign) and plan.chunk_rows(campaign) == 1024
+    sizes = {row_s: plan.chunk_rows(plan.timed(campaign, row_s)) for row_s in (0.0, 1e-4, 0.01, 0.1, 0.9, 5.0)}
+    assert sizes == {0.0: 1024, 1e-4: 1024, 0.01: 128, 0.1: 16, 0.9: 2, 5.0: 1}
+    assert plan.rows_of(plan.timed(campaign, 0.1), 3) == range(48, 64)
+    precise = '[precision]\noutput = "margin"\nquantile = 0.1\nhalf_width = "1 dB"\nconfidence = 0.9\nat_most = 9999\n'
+    campaign = loaded(tmp_path, "gallery", DRAWN + precise, EVEN.replace("64", "4096"))
+    assert plan.rounds(plan.timed(campaign, 0.1)) == plan.rounds(campaign)
+
+
+def test_a_row_costs_the_mean_of_some_without_the_first(tmp_path):
+    mission(tmp_path, "gallery")
+    campaign = loaded(tmp_path, "gallery", DRAWN + '[grid]\n"requirement.outage" = [0.01, 0.001]\n', EVEN)
+    times = iter([7.0, 7.05, 7.1, 7.25, 9.0])  # at the end of the first row, and of each behind it
+    assert run.row_s(campaign, lambda: next(times)) == pytest.approx(0.25 / 3)
+    assert list(times) == [9.0]
+    assert run.row_s(replace(campaign, rows=1), lambda: 7.0) == 0.0  # no more rows than there are
+
+
+def test_results_are_the_same_bits_whatever_a_row_costs(tmp_path, monkeypatch):
+    mission(tmp_path, "gallery")
+    whole = content(begun(tmp_path, "whole.ledger", monkeypatch, 1e-6))
+    parts = content(begun(tmp_path, "parts.ledger", monkeypatch, 0.2, threads=2))
+    assert whole[0] == [64] and parts[0] == [8] * 8
+    assert parts[1:] == whole[1:]
+
+
+def test_a_campaign_that_is_resumed_keeps_its_chunks(tmp_path, monkeypatch):
+    mission(tmp_path, "gallery")
+
+    def stop(done, total, what):
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt, match=r"^stopped; 8 rows are in"):
+        begun(tmp_path, "stopped.ledger", monkeypatch, 0.2, stop)
+    monkeypatch.setattr(run, "row_s", lambda _: 1e-6)
+    run.resume(tmp_path / "stopped.ledger", run.Means(threads=1))
+    whole = content(begun(tmp_path, "whole.ledger", monkeypatch, 1e-6))
+    sizes, *rest = content(tmp_path / "stopped.ledger")
+    assert sizes == [8] * 8 and tuple(rest) == whole[1:]
+
+
+@pytest.mark.parametrize("rows", [0, -8, 3, 2.0, True, "8"])
+def test_chunks_of_impossible_size_are_refused(tmp_path, rows):
+    mission(tmp_path, "gallery")
+    spec = bundle.packed(loaded(tmp_path, "gallery", DRAWN), ())
+    assert bundle.opened(spec).campaign.chunk_rows is None
+    with pytest.raises(CampaignError, match="which microrad never makes"):
+        bundle.opened(json.dumps(json.loads(spec) | {"chunk_rows": rows}).encode())
+
+
+@pytest.mark.parametrize(
+    "change",
+    [{"files": {"a\0b": ""}}, {"files": {"../a": ""}}, {"files": []}, {"controllers": [{}]}, {"files": {"a": 7}}],
+)
+def test_a_bundle_of_a_stranger_is_refused(tmp_path, change):
+    mission(tmp_path, "gallery")
+    spec = bundle.packed(loaded(tmp_path, "gallery", DRAWN), ())
+    with pytest.raises(CampaignError, match="never"):
+        bundle.opened(json.dumps(json.loads(spec) | change).encode())
+    for odd in (b"", b"7", b"{}", b"[" * 100_000):
+        with pytest.raises(CampaignError, match="never"):
+            bundle.opened(odd)

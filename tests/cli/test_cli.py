@@ -1,0 +1,925 @@
+"""The command line: exit codes, what is printed and where, each refusal's message, and that it writes nothing."""
+
+import ctypes
+import errno
+import importlib
+import json
+import os
+import pkgutil
+import shlex
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+import typer
+from nptdms import ChannelObject, TdmsWriter
+
+import microrad
+from command_line import listing
+from microrad import cli, report
+from microrad.cli import frame, installation, lab
+from microrad.lab import identify
+from microrad.loop import control
+from microrad.loop.fine_pointing import designs
+from microrad.study import story as study
+from places import ROOT
+from shipped import plain_study, without_day, without_fine_pointing
+from waiting import HANG_S, lines_of, until
+
+PAPER = ROOT / "src" / "microrad" / "mission" / "missions" / "leo-geo.toml"
+COMMANDS = (
+    "init",
+    "run",
+    "reproduce",
+    "budget",
+    "contacts",
+    "constellation",
+    "presets",
+    "design",
+    "identify",
+    "import",
+    "bench",
+    "doctor",
+    "studio",
+    "schema",
+)
+MICRORAD = (sys.executable, "-m", "microrad")
+COLUMNS = ("--input", "drive", "--output", "angle", "--rate", "1000", "--static")
+
+
+def write_recording(path, reverse=False):
+    """One second and a half of a loop with hysteresis, 1500 samples at 1 kHz, a header and three columns."""
+    time_s = np.arange(1500) / 1000.0
+    drive = 6.0 - 6.0 * np.cos(2 * np.pi * 4.0 * time_s)
+    play, angle = 0.0, []
+    for u in drive:
+        play = max(u - 1.0, min(u + 1.0, play))
+        angle.append(0.06 * u + 0.03 * play)
+    sign = -1.0 if reverse else 1.0
+    noise = 1e-3 * np.random.default_rng(1).standard_normal(time_s.size)
+    table = np.column_stack((time_s, drive, sign * (np.array(angle) + noise)))
+    np.savetxt(path, table, delimiter=",", header="time,drive,angle", comments="", fmt="%.9g")
+    return path
+
+
+@pytest.fixture(scope="module")
+def loop_mirror(tmp_path_factory):
+    """A recording, and the mirror file that `identify` made of it."""
+    home = tmp_path_factory.mktemp("identified")
+    recording, mirror = write_recording(home / "loop.csv"), home / "loop-mirror.toml"
+    with pytest.raises(SystemExit) as stop:
+        cli.app(args=["identify", str(recording), *COLUMNS, "--mirror-file", str(mirror)], prog_name="microrad")
+    assert not stop.value.code
+    return mirror
+
+
+@pytest.fixture(scope="module")
+def plain(tmp_path_factory):
+    """The paper's mission without its fine-pointing loop and its day, which take most of a study's time."""
+    return mission(tmp_path_factory.mktemp("plain") / "leo-geo.toml")
+
+
+def mission(path, *changes):
+    """The paper's mission with texts replaced, without its fine-pointing loop and its day."""
+    text = without_day(without_fine_pointing(PAPER.read_text(encoding="utf-8")))
+    for old, new in changes:
+        assert text.count(old) == 1, old
+        text = text.replace(old, new)
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+# --------------------------------------------------------------------------------------------------------------- help
+@pytest.mark.parametrize("command", COMMANDS)
+def test_help_of_each_command_shows_a_worked_example(call, command):
+    result = call(command, "--help")
+    assert result.code == 0
+    assert "Examples:" in result.out
+    assert f"  microrad {command}" in result.out.partition("Examples:")[2]
+    assert "--help" in result.out
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_the_examples_are_good_usage(command):
+    group = typer.main.get_command(cli.app)
+    lines = [line.partition(" > ")[0] for line in group.commands[command].epilog.splitlines() if "microrad" in line]
+    for line in lines:
+        _, name, *args = shlex.split(line)
+        group.commands[name].make_context(name, args)
+
+
+def test_help_lists_every_command_and_completion(call):
+    result = call("--help")
+    assert "Exit code: 0 done, 1 a requirement is not met, 2 bad usage or a bad file." in " ".join(result.out.split())
+    assert result.code == 0
+    listed = {line.split()[0] for line in result.out.partition("Commands:")[2].splitlines() if line.startswith("  ")}
+    assert set(COMMANDS) <= listed
+    assert {c.name or c.callback.__name__ for c in cli.app.registered_commands} == set(COMMANDS)
+    for text in ("--install-completion", "--show-completion", "--version", "Examples:", "Exit code"):
+        assert text in result.out
+
+
+def test_identify_says_how_columns_are_counted(call):
+    assert "counted from 0" in " ".join(call("identify", "--help").out.split())
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_readme_names_every_command(command):
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    if not text.strip():
+        pytest.skip("README.md has no content yet")
+    assert f"microrad {command}" in text
+
+
+def test_help_loads_nothing_heavy():
+    heavy = ["numpy", "scipy", "numba", "pydantic", "xarray", "matplotlib", "h5py", "rich", "jinja2"]
+    code = f"import sys, microrad, microrad.cli; print([m for m in {heavy} if m in sys.modules])"
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "[]\n"
+
+
+def test_version(call):
+    assert call("--version") == (0, f"microrad {microrad.__version__}\n", "")
+
+
+@pytest.mark.parametrize(
+    ("args", "words"),
+    [
+        (["simulat"], "No such command"),
+        (["idenfity"], "identify"),
+        (["run"], "Missing argument"),
+        (["run", "a.toml", "--ouput", "x"], "--output"),
+        (["identify", "a.csv", "--input", "0"], "--output"),
+    ],
+)
+def test_bad_usage_is_refused(refused, args, words):
+    assert words in refused(*args)
+
+
+# --------------------------------------------------------------------------------------------------------------- init
+def test_init_writes_the_packaged_mission_and_the_next_command(call, folder):
+    assert call("init") == (0, "leo-geo.toml written. Next: microrad run leo-geo.toml\n", "")
+    assert listing(folder) == {"leo-geo.toml": PAPER.read_bytes()}
+    assert "microrad run 'my mission.toml'" in call("init", "my mission.toml").out
+
+
+def test_init_never_overwrites(refused, folder):
+    (folder / "leo-geo.toml").write_text("mine")
+    message = refused("init")
+    for words in ("leo-geo.toml exists and is left as it is", "microrad init other.toml", "microrad run leo-geo.toml"):
+        assert words in message
+
+
+def test_init_refuses_a_folder_that_is_not_there_or_is_one(refused, folder):
+    assert "there is no folder nowhere; create it first" in refused("init", "nowhere/a.toml")
+    (folder / "here").mkdir()
+    assert "here exists and is left as it is" in refused("init", "here")
+
+
+def test_a_full_disk_leaves_no_part_of_a_file(refused, monkeypatch):
+    def full(self, target):
+        raise OSError(errno.ENOSPC, "No space left on device", str(target))
+
+    monkeypatch.setattr(Path, "replace", full)
+    message = refused("init")
+    assert "leo-geo.toml: No space left on device; nothing was written" in message
+
+
+# ---------------------------------------------------------------------------------------------------------------- run
+def test_init_then_run(call, folder):
+    """Without the fine-pointing loop, which takes most of the time: the whole is run by tests/test_docs_gallery.py."""
+    call("init")
+    Path("leo-geo.toml").write_text(without_fine_pointing(PAPER.read_text(encoding="utf-8")), encoding="utf-8")
+    result = call("run", "leo-geo.toml", "--exit-on", "closes")
+    assert (result.code, result.err) == (0, "")
+    assert result.out.startswith("Not every requirement is met: residual pointing error (")
+    for name in ("report.html", "results.nc", "manifest.json"):
+        path = Path("leo-geo-study") / name
+        assert str(path) in result.out
+        assert path.stat().st_size > 0
+    assert sorted(p.name for p in folder.iterdir()) == ["leo-geo-study", "leo-geo.toml"]
+
+
+@pytest.mark.usefixtures("undrawn")
+def test_identify_then_run_on_the_mirror_it_wrote(call, refused, folder, loop_mirror, plain):
+    args = ("run", plain, "--mirror", loop_mirror, "--json")
+    result = call(*args)
+    assert (result.code, result.err) == (1, "")
+    summary = json.loads(result.out)
+    assert (summary["closes"], summary["met"]) == (True, False)
+    assert summary["folder"] == "leo-geo-study"
+    assert loop_mirror.name in (folder / "leo-geo-study" / "manifest.json").read_text(encoding="utf-8")
+    *power, residual, margin = summary["requirements"]
+    assert all(r["met"] == (r["margin"] >= 0) for r in power)
+    for r in (residual, margin):  # of a loop around a mirror whose dynamics were not recorded
+        assert (r["margin"] > 0, r["met"]) == (True, False)
+        assert r["limited_by"] == "dynamics of the mirror, which its model does not have"
+
+    assert "replace them with --overwrite" in refused(*args)
+    (folder / "leo-geo-study" / "report.html").write_text("old")
+    assert call(*args, "--overwrite", "--exit-on", "closes").code == 0
+    assert (folder / "leo-geo-study" / "report.html").stat().st_size > 1000
+
+
+@pytest.mark.usefixtures("undrawn")
+def test_a_link_that_does_not_close_is_exit_1_and_has_its_report(call, folder, loop_mirror):
+    dim = mission(folder / "dim.toml", ('required_power = "10 pW"', 'required_power = "1 nW"'))
+    result = call("run", dim, "--mirror", loop_mirror, "--output", "results/first")
+    assert result.code == 1
+    assert "does not close" in result.out
+    assert (folder / "results" / "first" / "report.html").is_file()
+
+
+@pytest.fixture
+def few_controllers(monkeypatch):
+    """Designs of two families, and of each that goes without saying."""
+    monkeypatch.setattr(designs, "families", lambda m: (control.PI, control.LQG))
+
+
+@pytest.mark.usefixtures("few_controllers")
+def test_design_prints_each_controller_with_its_margins(call, folder):
+    call("init")
+    result = call("design", "leo-geo.toml")
+    for words in ("PI, best of a gain grid", "LQG", "PI + inverse in series", "modulus", "integral frequency"):
+        assert words in result.out
+    data = json.loads(call("design", "leo-geo.toml", "--json").out)
+    far = [c["simulated_rms_rad_per_axis"] > 1.5 * c["residual_rms_rad_per_axis"] for c in data["controllers"]]
+    assert any(far) == ("Warning" in result.out) == bool(data["warnings"])
+    assert (result.code, result.err) == (any(far), "")
+    assert all(c["margins"]["modulus"] >= 0.5 for c in data["controllers"])
+    assert len(data["controllers"][0]["matrices"]["A"]) == 2  # an integrator an axis
+
+
+def test_design_says_when_nothing_is_known_of_the_mirrors_dynamics(call, folder, loop_mirror, monkeypatch):
+    monkeypatch.setattr(designs, "names", lambda m: (designs.BASELINE,))
+    monkeypatch.setattr(designs, "DRAWS", 1)
+    call("init")
+    result = call("design", "leo-geo.toml", "--mirror", loop_mirror)
+    assert result.code == 0
+    said = " ".join(result.out.split())
+    assert "Warning: the model of the mirror has no linear part, so its resonances and its lag are not" in said
+    assert len(json.loads(call("design", "leo-geo.toml", "--mirror", loop_mirror, "--json").out)["warnings"]) == 1
+
+
+def test_design_refuses_what_it_cannot_design(refused, folder, plain):
+    assert "no table [fine_pointing]: microrad init writes one" in refused("design", plain)
+    text = PAPER.read_text(encoding="utf-8").replace("modulus_margin = 0.5 ", "modulus_margin = 0.99 ")
+    (folder / "hard.toml").write_text(text, encoding="utf-8")
+    message = refused("design", "hard.toml")
+    assert "hard.toml" in message and "modulus margin" in message
+
+
+def test_run_refuses_missing_and_faulty_files(refused, folder):
+    assert "no-such.toml" in refused("run", "no-such.toml")
+    faulty = mission(
+        folder / "faulty.toml", ('error = "300 urad"                    # paper: section 2.1', "error = 300 # paper")
+    )
+    message = refused("run", faulty)
+    for words in ("pointing.lines.body_pointing.error", "line ", "without a unit"):
+        assert words in message
+    assert "no-mirror.toml" in refused("run", PAPER, "--mirror", "no-mirror.toml")
+
+
+def test_run_never_replaces_what_it_did_not_write_and_says_so_before_computing(refused, folder, monkeypatch):
+    monkeypatch.setattr(study, "run", lambda *args: pytest.fail("computed first"))
+    (folder / "photos").mkdir()
+    (folder / "photos" / "a.jpg").write_text("mine")
+    for extra in ([], ["--overwrite"]):
+        assert "photos holds files that are not results of microrad" in refused(
+            "run", PAPER, "--output", "photos", *extra
+        )
+    assert "a.jpg is a file, not a folder" in refused("run", PAPER, "--output", "photos/a.jpg")
+
+
+def test_run_refuses_an_unstable_loop_and_a_mirror_without_inverse(refused, folder, plain):
+    unstable = mission(folder / "wild.toml", ('integral = "16000 V/(mrad s)"', 'integral = "1600000 V/(mrad s)"'))
+    message = refused("run", unstable)
+    assert "wild.toml: the closed loop is unstable" in message
+    assert "lower the gains" in message
+    stuck = folder / "stuck.toml"
+    stuck.write_text(
+        'name = "stuck"\ntravel = "1 mrad"\ncomposition = "static"\nrate_limit = "100 V/s"\n'
+        'bias = "6 V"\ndrive_min = "0 V"\ndrive_max = "12 V"\n'
+        '[prandtl_ishlinskii]\nthresholds = ["0 V", "1 V"]\nweights = ["0 mrad/V", "0.089 mrad/V"]\n'
+    )
+    assert "has no inverse" in refused("run", plain, "--mirror", stuck)
+
+
+def test_a_full_disk_during_run_leaves_nothing_but_the_verdict(call, folder, monkeypatch, loop_mirror, plain):
+    def full(*args, **kwargs):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    before = listing(folder)
+    monkeypatch.setattr(report, "write_columns", full)
+    result = call("run", plain, "--mirror", loop_mirror)
+    assert (result.code, result.err.count("\n")) == (2, 1)
+    assert "No space left on device; nothing was written" in result.err
+    assert result.out.startswith("Not every requirement is met: ")
+    assert listing(folder) == before
+
+
+@pytest.mark.usefixtures("undrawn")
+def test_a_cache_folder_that_cannot_be_used_is_told_once_and_the_run_goes_on(call, folder, monkeypatch):
+    (folder / "cache").write_text("no folder", encoding="utf-8")
+    found = plain_study()
+    monkeypatch.delenv("MICRORAD_KEEP")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(folder / "cache"))
+    monkeypatch.setattr(study, "run", lambda *args: found)
+    result = call("run", PAPER)
+    assert result.code == 1  # of the paper's loop
+    assert result.err.count("\n") == 1
+    assert str(folder / "cache") in result.err
+    assert "nothing is kept for a quicker next run" in result.err
+    assert (folder / "leo-geo-study" / "report.html").is_file()
+
+
+@pytest.mark.usefixtures("undrawn")
+def test_a_cache_folder_that_cannot_be_written_is_told_once_and_the_run_goes_on(call, folder, monkeypatch):
+    found, access = plain_study(), os.access
+    monkeypatch.delenv("MICRORAD_KEEP")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(folder / "cache"))
+    monkeypatch.setattr(study, "run", lambda *args: found)
+    monkeypatch.setattr(os, "access", lambda path, mode: Path(path).name != "parts" and access(path, mode))
+    result = call("run", PAPER)
+    place = folder / "cache" / "microrad" / "parts"
+    said = f"microrad: {place}: the folder cannot be written: nothing is kept for a quicker next run\n"
+    assert (result.code, result.err) == (1, said)
+    assert (folder / "leo-geo-study" / "report.html").is_file()
+    assert list(place.iterdir()) == []
+
+
+def test_a_report_is_written_although_nobody_reads_the_verdict(folder):
+    """As in `microrad run … | head -1`: the first print already finds a pipe that is closed."""
+    code = """
+import sys
+from microrad.cli import app, frame
+
+@app.command()
+@frame.command
+def late():
+    return frame.Outcome("verdict", 0, afterwards=lambda: open("report", "w").write("whole") and "written")
+
+sys.argv = ["microrad", "late"]
+frame.main()
+"""
+    reader, writer = os.pipe()
+    os.close(reader)
+    late = [sys.executable, "-c", code]
+    run = subprocess.run(late, stdout=writer, stderr=subprocess.PIPE, text=True, cwd=folder, check=False)
+    os.close(writer)
+    assert (run.returncode, run.stderr) == (141, "")
+    assert (folder / "report").read_text() == "whole"
+
+
+def test_a_named_file_that_is_missing_is_told_by_the_study_where_parts_are_kept_too(refused, folder, monkeypatch):
+    monkeypatch.delenv("MICRORAD_KEEP")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(folder.parent / "cache"))
+    text = without_fine_pointing(PAPER.read_text("utf-8"))
+    begin, end = text.index('kind = "circular"'), text.index("[orbit.leo.limits]")
+    Path("gone.toml").write_text(f'{text[:begin]}kind = "elements"\nfile = "absent.tle"\n\n{text[end:]}', "utf-8")
+    assert refused("run", "gone.toml").startswith("microrad: gone.toml: orbit.leo: absent.tle: there is no such file")
+
+
+def test_an_unexpected_exception_asks_for_a_report(call, folder, monkeypatch):
+    def broken(*args):
+        raise RuntimeError("a bolt fell off")
+
+    monkeypatch.setattr(study, "run", broken)
+    result = call("run", PAPER)
+    assert (result.code, result.out) == (70, "")
+    for words in ("Traceback", "a bolt fell off", "microrad doctor", "report the lines above"):
+        assert words in result.err
+    assert listing(folder) == {}
+
+
+# A run that says when it has come to a function.
+MARKED = """
+import sys
+from microrad import cli
+from {package} import {module}
+real = {module}.{function}
+def marked(*args):
+    print("here", file=sys.stderr, flush=True)
+    return real(*args)
+{module}.{function} = marked
+cli.main()
+"""
+
+
+@pytest.fixture
+def interruptible():
+    """Take interrupts here and in what is started, also where the tests themselves run in the background."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.usefixtures("interruptible")
+@pytest.mark.parametrize(
+    ("name", "package", "module", "function"),
+    [("SIGINT", "microrad.study", "story", "run"), ("SIGTERM", "microrad", "report", "write_columns")],
+)
+def test_an_interrupt_during_run_leaves_nothing(
+    folder, loop_mirror, plain, name, package, module, function, tmp_path_factory
+):
+    code = MARKED.format(package=package, module=module, function=function)
+    args = [sys.executable, "-c", code, "run", str(plain)]
+    args += ["--mirror", str(loop_mirror)] if module == "report" else []
+    progress = tmp_path_factory.mktemp("progress") / "progress"
+    environment = os.environ | {frame.PROGRESS_FILE: str(progress)}
+    process = subprocess.Popen(args, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    assert process.stderr.readline() == "here\n"
+    lines_of(progress, 2 if module == "story" else 0)  # the study is in its second step
+    process.send_signal(getattr(signal, name))
+    out, err = process.communicate(timeout=HANG_S)
+    assert (process.returncode, out.startswith("Not every requirement is met: ")) == (130, module == "report"), out
+    assert err.replace("here\n", "") == "microrad: interrupted, nothing was written\n"
+    assert listing(folder) == {}
+
+
+def test_after_an_interrupt_nothing_is_taken_apart(folder):
+    """What the compiler was loading is in pieces, and to dispose of it may crash."""
+    code = """
+import atexit
+from microrad.cli import app, frame
+
+@app.command()
+@frame.command
+def stopped():
+    print("half a line", end="")
+    raise KeyboardInterrupt
+
+atexit.register(print, "taken apart")
+frame.main()
+"""
+    run = [sys.executable, "-c", code, "stopped"]
+    ended = subprocess.run(run, capture_output=True, text=True, check=False)
+    assert (ended.returncode, ended.stdout) == (130, "half a line")
+    assert ended.stderr == "microrad: interrupted, nothing was written\n"
+
+
+@pytest.mark.usefixtures("interruptible")
+def test_an_interrupt_that_falls_into_a_call_back_is_not_lost(monkeypatch):
+    @ctypes.CFUNCTYPE(None)
+    def call_back():
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(sys, "unraisablehook", frame.interrupt_again)
+    call_back()  # what ctypes cannot raise it hands to the hook
+    with pytest.raises(KeyboardInterrupt):  # it falls between two steps of Python, and wakes nobody
+        until(lambda: False, "the interrupt")
+
+
+def test_what_else_cannot_be_raised_is_reported(monkeypatch, capsys):
+    @ctypes.CFUNCTYPE(None)
+    def call_back():
+        raise ValueError("from below")
+
+    monkeypatch.setattr(sys, "unraisablehook", frame.interrupt_again)
+    call_back()
+    assert "ValueError: from below" in capsys.readouterr().err
+
+
+def test_an_interrupt_behind_another_error_is_an_interrupt(call, folder, monkeypatch):
+    def interrupted(*args):
+        try:
+            raise KeyboardInterrupt
+        except KeyboardInterrupt:
+            raise ImportError("half a module") from None
+
+    monkeypatch.setattr(study, "run", interrupted)
+    assert call("run", PAPER) == (130, "", "microrad: interrupted, nothing was written\n")
+
+
+# ----------------------------------------------------------------------------------------------------------- identify
+def test_identify_prints_both_models_and_writes_the_mirror(call, folder):
+    result = call("identify", write_recording(folder / "loop.csv"), *COLUMNS)
+    assert (result.code, result.err) == (0, "")
+    for words in ("prandtl_ishlinskii (written)", "bouc_wen", "straight line", "held-out", "±", "d1", "warning: Valid"):
+        assert words in result.out
+    assert "loop-mirror.toml written (prandtl_ishlinskii)" in result.out
+    assert "microrad run leo-geo.toml --mirror loop-mirror.toml --output loop-mirror-study" in result.out
+    text = (folder / "loop-mirror.toml").read_text(encoding="utf-8")
+    assert text.startswith(lab.MIRROR_FILE_BEGINS)
+    assert 'name = "loop"' in text
+    assert sorted(p.name for p in folder.iterdir()) == ["loop-mirror.html", "loop-mirror.toml", "loop.csv"]
+
+
+def test_identify_json_names_and_models(call, folder):
+    path = write_recording(folder / "loop.csv", reverse=True)
+    options = (
+        "--static",
+        "--model",
+        "bouc-wen",
+        "--admissible",
+        "--name",
+        "lab mirror",
+        "--mirror-file",
+        "lab.toml",
+        "--json",
+    )
+    result = call("identify", path, "--input", 1, "--output", 2, "--rate", "1 kHz", "--output-unit", "um",
+                  "--lever-arm", "50 mm", *options)  # fmt: skip
+    assert (result.code, result.err) == (0, "")
+    found = json.loads(result.out)
+    assert (found["model"], found["mirror_file"]) == ("bouc_wen_admissible", "lab.toml")
+    assert [score["model"] for score in found["scores"]] == [
+        "prandtl_ishlinskii",
+        "bouc_wen_admissible",
+        "straight line",
+    ]
+    parameters = found["parameters"]["bouc_wen_admissible"]
+    # about 0.09 um/V over 50 mm, falling with the drive
+    assert -2.1e-6 < parameters["d1"]["value"] < -1.5e-6
+    assert parameters["d1"]["unit"] == "rad/V"
+    assert parameters["admissible"] is True
+    assert 'name = "lab mirror"' in (folder / "lab.toml").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("text", "rate_hz"), [("200", 200.0), ("200 Hz", 200.0), ("50 kHz", 50e3), ("1e3", 1e3), ("0.5MHz", 5e5)]
+)
+def test_rates_with_and_without_unit(text, rate_hz):
+    assert lab._rate(text) == rate_hz
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (["--rate", "5 m"], ["--rate", "another kind of quantity"]),
+        (["--rate", "fast"], ["--rate", "plain number"]),
+        (["--rate", "-5"], ["sample rate is -5.0"]),
+        (["--rate", "nan"], ["--rate", "plain number"]),
+        (["--input", "drvie"], ["no input column is named 'drvie'", "nearest is 'drive'"]),
+        (["--output", "7"], ["no output column 7", "numbered from 0 to 2"]),
+        (["--output", "drive"], ["input and output are both"]),
+        (["--output-unit", "um"], ["lever"]),
+        (["--output-unit", "grad"], ["output unit 'grad' is not known"]),
+        (["--lever-arm", "50"], ["--lever-arm", "without a unit", "50 m"]),
+        (["--lever-arm", "50 mm"], ["already an angle"]),
+        (["--hold-out", "1.5"], ["--hold-out (hold_out) is 1.5", "between 0 and 1"]),
+        (["--model", "magic"], ["magic", "bouc-wen"]),
+        (["--seed", "-1"], ["--seed", "0"]),
+        (["--name", " "], ["has no name"]),
+        (["--mirror-file", "nowhere/m.toml"], ["there is no folder nowhere"]),
+    ],
+)
+def test_identify_refusals(refused, folder, change, words):
+    message = " ".join(refused("identify", write_recording(folder / "loop.csv"), *COLUMNS, *change).split())
+    for word in words:
+        assert word in message
+
+
+HOSTILE = "be\x1b[31mnch/dr\x9bive\u202e"
+
+
+def hostile_hdf5(path):
+    with h5py.File(path, "w") as file:
+        file[HOSTILE] = np.arange(100.0)
+
+
+def hostile_tdms(path):
+    with TdmsWriter(path) as file:
+        file.write_segment([ChannelObject(*HOSTILE.split("/"), np.arange(100.0), {"wf_increment": 0.001})])
+
+
+def hostile_csv(path):
+    path.write_text(HOSTILE + ",angle\n" + "".join(f"{k},{k}\n" for k in range(100)), "utf-8")
+
+
+@pytest.mark.parametrize(
+    ("write", "name"), [(hostile_hdf5, "a.h5"), (hostile_tdms, "a.tdms"), (hostile_csv, "a\x1b[31m.csv")]
+)
+def test_names_from_files_reach_the_terminal_spelled_out(refused, folder, write, name):
+    write(folder / name)
+    message = refused("identify", folder / name, "--input", "nope", "--output", "angle", "--static")
+    assert "ive\\u202e'" in message
+    assert all(c.isprintable() or c == "\n" for c in message)
+
+
+def test_what_is_printed_is_spelled_out_but_for_pages(capsys):
+    assert frame._printed("a\x1b[2J\tb\u00a0c\n", 0) == 0
+    assert frame._printed("<!doctype html>\x01\n", 0) == 0
+    assert capsys.readouterr().out == "a\\u001b[2J\tb\u00a0c\n\n<!doctype html>\x01\n\n"
+
+
+def test_identify_refuses_files_that_are_no_recordings(refused, folder):
+    assert "there is no such file" in refused("identify", "lost.csv", *COLUMNS)
+    path = write_recording(folder / "loop.csv")
+    lines = path.read_text().splitlines()
+    lines[9] = "0.008,nan,0.1"
+    path.write_text("\n".join(lines))
+    assert "line 10" in refused("identify", path, *COLUMNS)
+
+
+def test_identify_replaces_only_mirror_files_and_only_when_told(call, refused, folder):
+    path = write_recording(folder / "loop.csv")
+    mine = folder / "loop-mirror.toml"
+    mine.write_text("# written by hand\n")
+    assert "replace it with --overwrite" in refused("identify", path, *COLUMNS)
+    assert "was not written by microrad" in refused("identify", path, *COLUMNS, "--overwrite")
+    assert "was not written by microrad" in refused("identify", path, *COLUMNS, "--overwrite", "--mirror-file", path)
+    mine.write_text(f"{lab.MIRROR_FILE_BEGINS} an older recording\n")
+    assert call("identify", path, *COLUMNS, "--overwrite").code == 0
+    assert "loop.csv" in mine.read_text(encoding="utf-8")
+
+
+def test_identify_looks_at_the_mirror_file_before_and_after_fitting(call, refused, folder, monkeypatch):
+    (folder / "lost-mirror.toml").write_text("mine")
+    assert "lost-mirror.toml exists" in refused("identify", "lost.csv", *COLUMNS)
+
+    def meanwhile(*args, **kwargs):
+        (folder / "loop-mirror.toml").write_text("mine")
+        return "text"
+
+    path = write_recording(folder / "loop.csv")
+    monkeypatch.setattr(identify, "mirror_file_text", meanwhile)
+    result = call("identify", path, *COLUMNS)
+    assert (result.code, result.out) == (2, "")
+    assert "loop-mirror.toml exists" in result.err
+    assert (folder / "loop-mirror.toml").read_text() == "mine"
+
+
+def test_progress_goes_to_a_terminal_and_never_to_stdout(call, folder, monkeypatch):
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+    monkeypatch.setenv("TERM", "xterm")
+    result = call("identify", write_recording(folder / "loop.csv"), *COLUMNS, "--json")
+    assert result.code == 0
+    assert json.loads(result.out)["model"]
+    assert "Bouc-Wen starts" in result.err
+
+
+def test_progress_goes_to_a_file_that_the_environment_names(call, folder, monkeypatch):
+    monkeypatch.setenv(frame.PROGRESS_FILE, str(folder / "progress"))
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+    (folder / "progress").write_text('{"of": "a run before"}\n')
+    began_s = time.time()
+    result = call("identify", write_recording(folder / "loop.csv"), *COLUMNS, "--json")
+    assert (result.code, result.err) == (0, "")
+    before, *notes = [json.loads(line) for line in (folder / "progress").read_text("utf-8").splitlines()]
+    assert before == {"of": "a run before"}
+    assert notes[-1]["done"] == notes[-1]["total"]
+    assert "Bouc-Wen starts" in {note["what"] for note in notes}
+    times = [began_s - 1.0, *(note["at"] for note in notes), time.time() + 1.0]
+    assert times == sorted(times)
+
+
+def test_a_file_of_progress_has_a_line_for_each_phase_and_no_flood(folder, monkeypatch):
+    monkeypatch.setenv(frame.PROGRESS_FILE, str(folder / "progress"))
+    monkeypatch.setattr(frame, "_PROGRESS_S", 3600.0)
+    with frame.progress_bar() as progress:
+        for done in range(1, 101):
+            progress(done, 100, "rows")
+        progress(0, 100, "µ")
+        progress(1, 100, "µ")
+        progress(0, 4, "µ")
+    notes = [json.loads(line) for line in (folder / "progress").read_text("utf-8").splitlines()]
+    assert [(note["done"], note["total"], note["what"]) for note in notes] == [
+        (1, 100, "rows"),
+        (100, 100, "rows"),
+        (0, 100, "µ"),
+        (0, 4, "µ"),
+    ]
+
+
+def test_a_file_of_progress_begins_anew_before_it_fills_the_disk(folder, monkeypatch):
+    monkeypatch.setenv(frame.PROGRESS_FILE, str(folder / "progress"))
+    monkeypatch.setattr(frame, "_PROGRESS_BYTES", 1000)
+    with frame.progress_bar() as progress:
+        for done in range(200):
+            progress(done, 200, f"row {done}")
+            assert (folder / "progress").stat().st_size < 1200
+    lines = (folder / "progress").read_text("utf-8").splitlines()
+    assert json.loads(lines[-1])["done"] == 199
+    assert 1 <= len(lines) < 20
+
+
+def test_a_file_of_progress_that_cannot_be_written_is_refused(call, folder, monkeypatch):
+    monkeypatch.setenv(frame.PROGRESS_FILE, str(folder / "none" / "progress"))
+    result = call("identify", write_recording(folder / "loop.csv"), *COLUMNS)
+    assert (result.code, result.out) == (2, "")
+    assert f"microrad: {folder / 'none' / 'progress'}: No such file or directory; nothing was written." in result.err
+
+
+# --------------------------------------------------------------------------------------------------- doctor and schema
+@pytest.mark.skipif("NUMBA_DISABLE_JIT" in os.environ, reason="doctor calls switched-off compilation a problem")
+def test_doctor_finds_this_installation_in_order(call):
+    result = call("doctor")
+    assert (result.code, result.err) == (0, ""), result.out
+    assert all(line.startswith("ok ") for line in result.out.splitlines())
+    for words in ("python", "numba", "loop width 14.05 %", "74.44 µrad", "is writable", "leo-geo.toml"):
+        assert words in result.out
+
+
+def test_doctor_names_what_is_wrong_and_what_to_do(call, monkeypatch):
+    def gone():
+        raise ImportError("no module named yesterday")
+
+    monkeypatch.setattr(installation, "LOOP_WIDTH_PERCENT", 14.0)
+    monkeypatch.setattr(installation, "_mission", gone)
+    result = call("doctor", "--json")
+    assert (result.code, result.err) == (1, "")
+    found = json.loads(result.out)
+    assert found["ok"] is False
+    wrong = {check["name"]: check for check in found["checks"] if not check["ok"]}
+    assert {"kernels", "packaged mission"} <= set(wrong)
+    assert not {"python", "microrad", "numpy"} & set(wrong)
+    assert "NUMBA_CACHE_DIR" in wrong["kernels"]["advice"]
+    assert wrong["packaged mission"]["found"] == "ImportError: no module named yesterday"
+    assert "problem  kernels" in call("doctor").out
+
+
+def test_doctor_finds_an_old_library(monkeypatch):
+    monkeypatch.setattr(
+        installation.metadata, "requires", lambda name: ["numpy>=99.1", "notthere>=1", 'ruff>=1; extra == "test"']
+    )
+    old, absent = list(installation._libraries())[1:]
+    assert (old.ok, absent.ok) == (False, False)
+    assert "wanted 99.1" in old.found
+    assert old.advice == "python -m pip install 'numpy>=99.1'"
+    assert "notthere" in absent.found
+
+
+def test_schema_is_one_json_document(call):
+    result = call("schema")
+    assert (result.code, result.err) == (0, "")
+    assert "data_rate" in json.loads(result.out)["$defs"]["Communication"]["properties"]
+
+
+def test_a_closed_pipe_is_silent_and_a_full_one_is_not():
+    closed = subprocess.run(
+        ["/bin/sh", "-c", f"{sys.executable} -m microrad schema | head -c 1"],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert (closed.stdout, closed.stderr) == ("{", "")
+    if not Path("/dev/full").exists():
+        return
+    with Path("/dev/full").open("w") as full:
+        result = subprocess.run([*MICRORAD, "schema"], stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+    assert (result.returncode, result.stderr) == (
+        2,
+        "microrad: the output cannot be written: No space left on device\n",
+    )
+
+
+# ------------------------------------------------------------------------------------------------------- public screen
+def test_every_public_name_exists_once():
+    modules = {module.name for module in pkgutil.iter_modules(microrad.__path__)}
+    assert not modules & set(microrad._PUBLIC), "a public name would hide the module of that name"
+    assert len(set(microrad._PUBLIC.values())) == len(microrad._PUBLIC)
+    for name, place in microrad._PUBLIC.items():
+        module, _, attribute = place.rpartition(".")
+        assert getattr(microrad, name) is getattr(importlib.import_module(f"microrad.{module}"), attribute)
+    assert dir(microrad) == sorted([*microrad._PUBLIC, "__version__"])
+
+
+def test_an_unknown_public_name_says_what_there_is():
+    with pytest.raises(AttributeError, match=r"no public name 'launch'; it has load_mission"):
+        microrad.launch  # noqa: B018
+
+
+# -------------------------------------------------------------------------------------------------------------- bench
+PLAN = """name = "two loops"
+formats = ["npz"]
+
+[limits]
+rate = "5 kHz"
+drive_min = "0 V"
+drive_max = "12 V"
+slew = "20 V/ms"
+samples_per_period = 10
+
+[bench]
+truth = "bouc-wen"
+
+[bench.amplifier]
+gain = 15
+output_min = "0 V"
+output_max = "180 V"
+bandwidth = "5 kHz"
+slew = "1 V/us"
+
+[bench.converters]
+bits = 16
+drive_min = "-4 V"
+drive_max = "16 V"
+output_min = "-1 mrad"
+output_max = "2 mrad"
+
+[bench.sensor]
+noise = "1 urad"
+mains = "0 urad"
+mains_frequency = "50 Hz"
+drift = "0 nrad/s"
+
+[excitation.loop]
+kind = "sines"
+frequencies = ["60 Hz", "80 Hz"]
+amplitudes = ["6 V"]
+periods = 12
+offset = "6 V"
+
+[excitation.unseen]
+kind = "sines"
+use = "validation"
+frequencies = ["70 Hz"]
+amplitudes = ["5 V"]
+periods = 14
+offset = "6 V"
+"""
+
+
+def test_bench_writes_recordings_that_identify_takes_as_a_folder(call, folder):
+    (folder / "plan.toml").write_text(PLAN)
+    made = call("bench", "plan.toml", "--seed", "3")
+    assert (made.code, made.err) == (0, "")
+    assert "3 files written. Next: microrad identify plan-bench" in made.out
+    found = call("identify", "plan-bench", "--static", "--json")
+    assert (found.code, found.err) == (0, "")
+    data = json.loads(found.out)
+    roles = {Path(r["path"]).stem: r["role"] for r in data["recordings"]}
+    assert roles == {"loop-60hz": "loops", "loop-80hz": "loops", "unseen": "validation"}
+    assert data["best_model"] == "bouc_wen"
+    assert "virtual bench" in (folder / "plan-bench-mirror.html").read_text(encoding="utf-8")
+    listed = json.loads(call("bench", "plan.toml", "--seed", "3", "--overwrite", "--json").out)
+    assert [Path(f).name for f in listed["files"]] == ["loop-60hz.npz", "loop-80hz.npz", "unseen.npz"]
+
+
+def test_bench_refusals(refused, folder):
+    (folder / "plan.toml").write_text(PLAN)
+    assert "or one of mirror-characterisation, paper-experiment" in refused("bench", "paper-experimnt")
+    (folder / "bad.toml").write_text(PLAN.replace('amplitudes = ["6 V"]', 'amplitudes = ["9 V"]'))
+    message = refused("bench", "bad.toml")
+    assert "loop" in message
+    assert "12 V" in message
+    (folder / "plan-bench").mkdir()
+    (folder / "plan-bench" / "mine.txt").write_text("mine")
+    assert "holds files that are not recordings of microrad" in refused("bench", "plan.toml", "--overwrite")
+    assert "no manifest.json of microrad bench in it" in refused("identify", "plan-bench")
+    assert "--input is missing" in refused("identify", "plan.toml")
+
+
+def test_the_models_of_the_command_are_those_of_the_ladder():
+    from microrad.lab.identify import MODELS
+
+    assert {m.value.replace("-", "_") for m in lab.Model} == {"best", *MODELS}
+
+
+# ---------------------------------------------------------------------------------- what the files say of themselves
+def with_units(folder, header):
+    path = write_recording(folder / "units.csv")
+    path.write_text(path.read_text().replace("time,drive,angle", header))
+    return path
+
+
+def test_units_in_the_header_are_taken_and_said(call, folder):
+    path = with_units(folder, "time,Drive (mV),Tilt (urad)")
+    result = call("identify", path, "--input", 1, "--output", 2, "--rate", 1000, "--static")
+    assert (result.code, result.err) == (0, "")
+    assert "drive in mV (stated in the files), output in urad (stated in the files)" in result.out
+    assert 'drive_max = "0.012 V"' in (folder / "units-mirror.toml").read_text(encoding="utf-8")
+
+
+def test_units_that_nobody_states_are_assumed_and_said(call, folder):
+    result = call("identify", write_recording(folder / "loop.csv"), *COLUMNS)
+    assert "drive in V (assumed, --input-unit says otherwise)" in result.out
+    assert "output in mrad (assumed, --output-unit says otherwise)" in result.out
+
+
+def test_units_that_contradict_each_other_are_refused(refused, folder):
+    path = with_units(folder, "time,Drive (mV),Tilt (urad)")
+    message = refused(
+        "identify", path, "--input", 1, "--output", 2, "--rate", 1000, "--static", "--output-unit", "mrad"
+    )
+    assert "--output-unit is mrad and the files say urad" in message
+
+
+def test_one_recording_for_fit_and_validation_is_refused(refused, folder):
+    path = write_recording(folder / "loop.csv")
+    message = refused("identify", path, *COLUMNS, "--validate", path)
+    assert "the same data as" in message
+    assert "one that is not fitted" in message
+
+
+def test_one_file_for_mirror_and_report_is_refused(refused, folder):
+    path = write_recording(folder / "loop.csv")
+    assert "both the mirror file and the report" in refused(
+        "identify", path, *COLUMNS, "--mirror-file", "x.toml", "--report", "x.toml"
+    )
+
+
+def test_a_model_that_explains_nothing_unseen_is_refused(refused, folder):
+    path = write_recording(folder / "loop.csv")
+    rows = path.read_text().splitlines()
+    noise = np.random.default_rng(5).standard_normal(len(rows))
+    rows[751:] = [f"{r.rpartition(',')[0]},{n:.6g}" for r, n in zip(rows[751:], noise[751:], strict=True)]
+    path.write_text("\n".join(rows))
+    message = refused("identify", path, *COLUMNS)
+    assert "do not support a model" in message
+    assert "at most 50 % is a model" in message

@@ -1,0 +1,312 @@
+"""The commands of the day: contacts and constellation in each of their forms, and what each refuses, in words."""
+
+import csv
+import io
+import json
+import re
+
+import pytest
+
+from command_line import listing
+from day_files import ALONE, BY_FILE, HELD, LIMITS, day_data, day_path, element_set
+from link_files import written
+from microrad.link import study as link_study
+from microrad.mission.file import load_link
+from microrad.orbit.operations import COLUMNS
+from report_pages import assert_sound, without_scripts
+
+QUICK = {"orbit.duration": "6 h", "operations.runs": 3}
+BLIND = {LIMITS: {**HELD, "boresight": [0.0, 0.0, 1.0], "field_of_regard": "5 deg"}}  # at the Earth
+DEAF = {"operations.downlink.stations.kiruna.mask": "88 deg"}
+NO_DOWNLINK = {"operations.downlink": None, "operations.contact": None}
+ALWAYS = {"orbit.leo": {"kind": "geostationary", "longitude": "100 deg"}, "orbit.geo.limits": None, **ALONE}
+NO_NUMBER = re.compile(r"\b(nan|inf|NaN|Infinity|None)\b")
+MISSIONS = {
+    "plain": {},
+    "no contact": BLIND,
+    "nothing direct": DEAF,
+    "nothing at all": {**BLIND, **DEAF},
+    "no downlink": NO_DOWNLINK,
+    "no acquisition": {"acquisition": None},
+    "always in view": ALWAYS,
+    "a share": {"operations.relay_share": 0.5},
+}
+
+
+def path_of(folder, *changes):
+    return day_path(folder, QUICK, *changes)
+
+
+def words_of(page):
+    """What a reader of a page sees, without its figures."""
+    page = re.sub(r"<svg.*?</svg>|<style.*?</style>|<script.*?</script>", " ", page, flags=re.DOTALL)
+    return " ".join(re.sub(r"<[^>]+>", " ", page).split())
+
+
+# ------------------------------------------------------------------------------------------------------------ contacts
+@pytest.mark.parametrize("name", MISSIONS)
+def test_contacts_in_words_without_a_number_that_is_none(call, folder, name):
+    result = call("contacts", path_of(folder, MISSIONS[name]))
+    assert (result.code, result.err) == (1 if name in ("no contact", "nothing at all") else 0, "")
+    titles = ("Contacts", "Relay and direct downlink", "One assumption changed")
+    assert [line for line in result.out.splitlines() if line in titles] == list(titles)
+    assert not NO_NUMBER.search(result.out)
+    assert max(len(line) for line in result.out[: result.out.index("In 6 h")].splitlines()) <= 160
+    said = result.out[result.out.index("In 6 h") :]
+    assert ("There is no contact: within the span" in said) == (result.code == 1)
+    assert ("grants the link" in said) == (name == "a share")
+    assert ("at every range of the contacts" in said) is False or name == "always in view"
+    assert ("at a time (median)" in said) == (name not in ("no contact", "nothing at all", "always in view"))
+
+
+def test_the_words_of_a_day(call, folder):
+    said = call("contacts", path_of(folder)).out
+    data = json.loads(call("contacts", path_of(folder), "--json").out)
+    relay, direct = data["relay"], data["direct"]
+    said = " ".join(said.split())
+    head = f"In 6 h the relay is in view {relay['contacts']} times, {relay['contact_s'] / 60:.0f} min in all"
+    assert head in said
+    volume, a_day = (f"{n * relay['could_carry_bit'] / 8e9:.3g}" for n in (1, 4))
+    assert re.search(rf"could take {volume} GB( \({float(a_day) / 1e3:.3g} TB a day\))?; the ground", said)
+    heard = f"{direct['contacts']} times" if direct["contacts"] else "never"
+    assert f"the ground (kiruna) {heard}" in said
+    assert f"in view for {100 * data['visible_share']:.1f} % of the time" in said
+    assert "Over the equator a contact would take 56.72 min" in said
+    assert "Warning: communication.distance is 42000 km" in said
+    for sentence in data["verdict"]:
+        assert sentence in said
+
+
+def test_words_of_a_share_keep_the_view_apart_from_what_is_granted(call, folder):
+    whole, half = (call("contacts", path_of(folder, each)).out for each in ({}, MISSIONS["a share"]))
+    view = re.compile(r"The relay is in view for .*? at most\.", re.DOTALL)
+    assert view.search(whole).group() == view.search(half).group()
+
+
+def test_contacts_as_csv(call, folder):
+    result = call("contacts", path_of(folder, {"orbit.duration": "12 h"}), "--csv")
+    assert (result.code, result.err) == (0, "")
+    rows = list(csv.DictReader(io.StringIO(result.out)))
+    data = json.loads(call("contacts", path_of(folder, {"orbit.duration": "12 h"}), "--json").out)
+    assert {row["by"] for row in rows} == {"relay", "direct downlink"}
+    starts = [float(row["rise (s)"]) for row in rows]
+    assert starts == sorted(starts)
+    relay = [row for row in rows if row["by"] == "relay"]
+    assert len(relay) == len(data["contacts"])
+    for row, each in zip(relay, data["contacts"], strict=True):
+        assert (row["rise (UTC)"], row["ends by"]) == (each["start_utc"], each["ends"])
+        assert float(row["largest range (m)"]) == each["range_most_m"]
+        assert float(row["largest Doppler shift (Hz)"]) == each["doppler_most_hz"]
+        assert float(row["could carry (bit)"]) == each["could_carry_bit"]
+    direct = [row for row in rows if row["by"] != "relay"]
+    assert {row["with"] for row in direct} == {"kiruna"}
+    assert {row["largest range (m)"] for row in direct} == {""}
+
+
+def finite(data):
+    """Every number of a document."""
+    if isinstance(data, dict):
+        return [x for value in data.values() for x in finite(value)]
+    if isinstance(data, list):
+        return [x for value in data for x in finite(value)]
+    return [data] if isinstance(data, float) else []
+
+
+def no_constant(text):
+    raise AssertionError(text)
+
+
+@pytest.mark.parametrize("name", ["plain", "nothing at all", "no downlink", "always in view"])
+def test_contacts_as_json(call, folder, name):
+    result = call("contacts", path_of(folder, MISSIONS[name]), "--json")
+    data = json.loads(result.out, parse_constant=no_constant)
+    assert result.err == ""
+    assert finite(data)
+    assert (data["epoch"], data["duration_s"]) == ("2026-03-20T12:00:00Z", 21600.0)
+    assert len(data["contacts"]) == data["relay"]["contacts"]
+    assert sum(c["could_carry_bit"] for c in data["contacts"]) == pytest.approx(data["relay"]["could_carry_bit"])
+    assert (data["direct"] is None) == (name == "no downlink")
+    assert (data["median_contact_s"] is None) == (name in ("nothing at all", "always in view"))
+    assert (data["closed_form_contact_s"] is None) == (name in ("nothing at all", "always in view"))
+    if name == "plain":
+        assert data["relay"]["could_carry_least_bit"] <= data["relay"]["could_carry_most_bit"]
+        factors = [each["factor"] for each in data["assumptions"]]
+        assert factors[0] is None  # infinite: at twice the rate nothing flows
+        known = [factor for factor in factors if factor is not None]
+        assert factors[-len(known) :] == known == sorted(known, reverse=True)
+
+
+@pytest.mark.parametrize("name", ["plain", "nothing at all"])
+def test_contacts_as_a_page_that_loads_nothing(call, folder, name):
+    result = call("contacts", path_of(folder, MISSIONS[name]), "--html")
+    assert (result.code, result.err) == (int(name != "plain"), "")
+    assert_sound(result.out)
+    page = without_scripts(result.out)
+    assert page.lstrip().lower().startswith("<!doctype html>")
+    for load in re.findall(r"""(?:src|href|xlink:href|action|data)\s*=\s*["']([^"']*)""", page):
+        assert load.startswith("#"), load
+    assert not re.findall(r"url\((?!\s*[\"']?#)[^)]*\)|@import|<script[^>]*src|<link\b|<iframe", page)
+    assert page.count("<svg") >= 5
+    words = words_of(page)
+    assert not NO_NUMBER.search(words)
+    assert "In 6 h the relay is in view" in words
+    assert listing(folder).keys() == {"day.toml"}
+
+
+def test_a_name_is_no_markup(call, folder):
+    path = path_of(folder, {"terminals.geo_name": "<b>&G"})
+    page = call("contacts", path, "--html").out
+    assert "<b>&G" not in page
+    assert page.count("&lt;b&gt;&amp;G") > 5
+    assert ",'=GEO," in call("contacts", path_of(folder, {"terminals.geo_name": "=GEO"}), "--csv").out
+
+
+# ------------------------------------------------------------------------------------------------------- constellation
+def test_a_constellation_in_words(call, folder):
+    result = call("constellation", path_of(folder))
+    assert (result.code, result.err) == (0, "")
+    assert "What each satellite gets" in result.out
+    assert "12 satellites share 2 relays of one terminal each: in 6 h" in result.out
+    assert not NO_NUMBER.search(result.out)
+
+
+def test_a_constellation_as_csv_plan_and_json(call, folder):
+    path = path_of(folder)
+    rows = list(csv.DictReader(io.StringIO(call("constellation", path, "--csv").out)))
+    data = json.loads(call("constellation", path, "--json").out, parse_constant=no_constant)
+    plan = call("constellation", path, "--contact-plan").out.splitlines()
+    assert tuple(rows[0]) == COLUMNS
+    assert len(rows) == data["sessions"]
+    assert sum(float(row["volume (bit)"]) for row in rows) == pytest.approx(data["volume_bit"])
+    assert {row["relay"] for row in rows} == {relay["name"] for relay in data["relays"]} == {"east", "west"}
+    assert {row["satellite"] for row in rows} == {one["name"] for one in data["satellites"]}
+    with_data = [row for row in rows if float(row["rate (bit/s)"]) > 0.0]
+    assert len([line for line in plan if line.startswith("a contact ")]) == len(with_data)
+    assert "@ 2026/03/20-12:00:00" in plan
+
+
+def test_a_constellation_that_carries_nothing_is_exit_code_1(call, folder):
+    for form in ((), ("--csv",), ("--json",), ("--contact-plan",)):
+        result = call("constellation", path_of(folder, BLIND), *form)
+        assert (result.code, result.err) == (1, "")
+        assert not NO_NUMBER.search(result.out)
+    assert call("constellation", path_of(folder, BLIND), "--csv").out == ",".join(COLUMNS) + "\n"
+
+
+def test_a_constellation_of_a_file(call, folder):
+    (folder / "a.tle").write_text(element_set() + element_set(name="EXAMPLE 2", number="70002"), encoding="utf-8")
+    result = call("constellation", path_of(folder, {"constellation": BY_FILE}))
+    assert result.code == 0
+    assert "EXAMPLE 1" in result.out
+    assert "2 satellites share 1 relay of one terminal: in" in result.out
+
+
+# ------------------------------------------------------------------------------------------------------------ refusals
+@pytest.mark.parametrize(
+    ("command", "flags"),
+    [
+        ("contacts", ("--csv", "--json")),
+        ("contacts", ("--html", "--csv")),
+        ("contacts", ("--html", "--csv", "--json")),
+        ("constellation", ("--csv", "--contact-plan")),
+        ("constellation", ("--json", "--contact-plan")),
+    ],
+)
+def test_forms_exclude_each_other(refused, folder, command, flags):
+    said = refused(command, path_of(folder), *flags)
+    assert "exclude each other; give one of them." in said
+
+
+@pytest.mark.parametrize(
+    ("command", "changes", "words"),
+    [
+        ("contacts", {"orbit.geo.longitude": None}, ("orbit.geo.longitude", 'kind = "geostationary" needs it')),
+        ("contacts", {"operations.downlink.stations.kiruna.mask": "95 deg"}, ('mask = "95 deg"', "is above")),
+        ("contacts", {"orbit.epoch": "2026-02-30T12:00:00Z"}, ("is no date", "expected:")),
+        ("contacts", {"orbit.leo.altitude": "110 km"}, ("day.toml: orbit.leo:", "it has decayed", "raise")),
+        ("contacts", {"orbit.epoch": "1950-01-01T00:00:00Z"}, ("day.toml: orbit.epoch:", "take an instant")),
+        ("contacts", {"orbit.leo": {"kind": "elements", "file": "a.tle"}, **ALONE}, ("a.tle", "no such file")),
+        ("contacts", {"orbit": None, "operations": None, **ALONE}, ("no table [orbit]", "microrad init writes one")),
+        ("contacts", {"operations": None, **ALONE}, ("no table [operations]", "microrad init writes one")),
+        ("constellation", ALONE, ("no table [constellation]", "microrad init writes one")),
+        ("constellation", {"operations": None}, ("stands without the table operations", "microrad init writes")),
+        ("constellation", {"constellation.planes": 5}, ("planes = 5", "does not divide satellites = 12")),
+        ("constellation", {"constellation": BY_FILE}, ("a.tle", "no such file")),
+    ],
+)
+def test_what_does_not_hold_is_refused_in_words(refused, folder, command, changes, words):
+    said = refused(command, day_path(folder, QUICK, changes))
+    for word in words:
+        assert word in said, said
+
+
+def test_expired_elements_are_refused_by_both_commands(refused, folder):
+    (folder / "a.tle").write_text(element_set(day=20.0), encoding="utf-8")
+    leo = {"orbit.leo": {"kind": "elements", "file": "a.tle"}, **ALONE}
+    assert "the elements are expired" in refused("contacts", path_of(folder, leo))
+    assert "the elements are expired" in refused("constellation", path_of(folder, {"constellation": BY_FILE}))
+
+
+def test_a_file_that_is_not_there(refused, folder):
+    for command in ("contacts", "constellation"):
+        assert "nowhere.toml" in refused(command, "nowhere.toml")
+    path = folder / "broken.toml"
+    path.write_text("[orbit\n", encoding="utf-8")
+    assert "broken.toml" in refused("contacts", path)
+
+
+def test_a_rate_that_the_receiver_does_not_take_is_refused(refused, folder):
+    path = path_of(folder, {"communication.data_rate": "5 Gbit/s"})
+    data = day_data(QUICK, {"communication.data_rate": "5 Gbit/s"})
+    del data["communication"]["receiver_sensitivity"]
+    receiver = {"modulation": "bpsk", "detector": "homodyne", "efficiency": 0.7, "bit_error_ratio": 1e-6}
+    data["communication"]["receiver"] = {**receiver, "code_gain": "5 dB", "code_rate": 0.8, "bandwidth": "1 GHz"}
+    written(path.parent, data, path.name)
+    assert "5 Gbit/s" in refused("contacts", path)
+
+
+def test_rates_that_the_receiver_does_not_take_are_left_out(call, folder):
+    receiver = {"modulation": "bpsk", "detector": "homodyne", "efficiency": 0.7, "bit_error_ratio": 1e-6}
+    receiver = {**receiver, "code_gain": "5 dB", "code_rate": 0.8, "bandwidth": "1 GHz"}
+    given = {"communication.receiver_sensitivity": None, "communication.receiver": receiver}
+    fast = {"operations.rates": ["20 Gbit/s", "30 Gbit/s"]}
+    result = call("contacts", path_of(folder, given, fast))
+    assert result.code == 1
+    assert "The receiver takes none of the mission's data rates." in result.out
+    slow = {"operations.rates": ["10 Mbit/s", "30 Gbit/s"]}
+    data = json.loads(call("contacts", path_of(folder, given, slow), "--json").out)
+    assert [rate["rate_bit_s"] for rate in data["rates"]] == [10e6]
+
+
+def test_help_lists_both_commands(call, folder):
+    said = call("--help").out
+    assert re.search(r"^ *contacts +Print when the link has contact", said, flags=re.MULTILINE)
+    assert re.search(r"^ *constellation +Plan who is served when", said, flags=re.MULTILINE)
+    for command, flags in (("contacts", ("--csv", "--html", "--json")), ("constellation", ("--csv", "--contact-plan"))):
+        text = call(command, "--help").out
+        assert f"microrad {command} leo-geo.toml" in text
+        for flag in flags:
+            assert flag in text
+
+
+def test_the_loss_is_the_jitters_where_the_mission_has_one(call, folder):
+    jitter = {"jitter": {"bias": ["1 urad", "0 urad"], "rms": ["3 urad", "3 urad"], "bandwidth": "50 Hz"}}
+    path = path_of(folder, jitter)
+    data = json.loads(call("contacts", path, "--json").out)
+    found = link_study.run(load_link(path)).under_jitter
+    assert (data["pointing_loss_db"], data["outage"]) == (found.outage_loss_db, found.outage)
+    assert data["pointing_loss_source"] == "jitter as given"
+    plain = json.loads(call("contacts", path_of(folder), "--json").out)
+    assert plain["pointing_loss_source"].startswith("communication.pointing_error, 10 ")
+    # the loss of the budget itself: a Gaussian beam 10 urad off its axis
+    assert plain["pointing_loss_db"] == pytest.approx(2.23, abs=0.01)
+
+
+def test_where_nothing_goes_direct_the_relays_volume_is_what_matters(call, folder):
+    said = " ".join(call("contacts", path_of(folder, {"operations.downlink.setup": "1 h"})).out.split())
+    assert "could take 0 B" in said
+    assert (
+        "What matters most to the relay's volume, each assumption changed alone: laser data rate (150 Mbit/s:" in said
+    )
+    assert "nothing direct" not in said
+    assert "nothing arrives by the direct downlink" in said

@@ -1,0 +1,202 @@
+"""docs/gallery.md: each example is walked through as it stands, prints what stands there, and has no other figure."""
+
+import math
+import re
+import shlex
+import shutil
+from contextlib import nullcontext
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from microrad import load_link, load_mirror, report
+from microrad.core.units import parse_quantity
+from microrad.loop import fine_pointing
+from microrad.mission import presets
+from microrad.report import identification_figures
+from microrad.study import story as study
+from places import ROOT
+from shipped import whole_drawn, whole_study
+
+GALLERY = ROOT / "docs" / "gallery"
+PAGE, REPORT = ((ROOT / "docs" / name).read_text(encoding="utf-8") for name in ("gallery.md", "report.md"))
+EXAMPLES = {text.partition("\n")[0]: text.partition("\n")[2] for text in PAGE.split("\n## ")[1:]}
+PAPER, LAB, CHOICE, CROSSLINK, CONSTELLATION = EXAMPLES
+BLOCK = re.compile(r"(?ms)^```(\w+)\n(.*?)^```|((?:^    \S[^\n]*\n)+)")
+FIGURE = re.compile(r"\d+(?:\.\d+)?(?: (?:%|dB|deg|min|h|cm|[µmMkGT]?(?:rad|bit|m|W|V|Hz|s|B))(?:/s)?(?!\w))?")
+DERIVED = {
+    PAPER: {"0.60 dB": 3.60 - 3.00},
+    LAB: {"2542 Hz": 2542.1, "2 %": 100 * 0.0013 / 0.065431, "12 %": 100 * 0.0022 / 0.018172},
+    CHOICE: {"29 %": 100 * (5.66 / 4.40 - 1.0), "5 %": 100 * 0.05},
+    CROSSLINK: {"1081 km": 580 * 10 ** (5.41 / 20), "80 mm": 5 * 16, "0.96 deg/s": math.degrees(16.8e-3)},
+    CONSTELLATION: {},
+}
+"""What the prose works out from the figures that it shows, as it is written."""
+REQUIRED = {"10 µrad", "3 dB"}
+GIVEN = {
+    PAPER: set(),
+    LAB: {*REQUIRED, "40 Hz", "25 Hz"},
+    CHOICE: {*REQUIRED, "99.7 %"},
+    CROSSLINK: {"45 deg", "1 deg/s"},
+    CONSTELLATION: {"100 Mbit/s", "300 Mbit/s"},
+}
+"""What the prose takes from the files."""
+
+
+WRITTEN = ["contact-plan.ionrc", "figures", "manifest.json", "report.html", "results.nc", "sessions.csv"]
+
+
+class Walk:
+    """An example on its way: what was printed last, and what its Python knows so far."""
+
+    def __init__(self, call, capsys):
+        self.call, self.capsys = call, capsys
+        self.printed, self.known = "", {}
+
+    def through(self, example):
+        for kind, body, commands in BLOCK.findall(example):
+            getattr(self, kind or "shell")(body or commands)
+
+    def shell(self, lines):
+        """Commands, in this process."""
+        self.printed = ""
+        for line in lines.splitlines():
+            program, *words = shlex.split(line, comments=True)
+            assert program == "microrad", line
+            done = self.call(*words)
+            assert (done.code, done.err) == (0, ""), done
+            self.printed += done.out
+
+    def python(self, code):
+        exec(code, self.known)
+        self.printed = self.capsys.readouterr().out
+
+    def text(self, shown):
+        """What was printed, in its order, whatever the line breaks; dots stand for what is left out."""
+        rest = " ".join(self.printed.split())
+        for part in re.split(r"(?m)^\.\.\.$", shown):
+            wanted = " ".join(part.split())
+            assert wanted in rest, (wanted, self.printed)
+            rest = rest.partition(wanted)[2]
+
+    def diff(self, change):
+        """A line of a file replaced, which is there once, or lines put behind its last."""
+        name, *lines = change.splitlines()
+        path = Path(name.removeprefix("--- "))
+        old, new = ("".join(f"{line[1:]}\n" for line in lines if line[0] == sign) for sign in "-+")
+        text = path.read_text(encoding="utf-8")
+        assert text.count(old) == 1 or not old, old
+        path.write_text(text.replace(old, new) if old else text + new, encoding="utf-8")
+
+
+@pytest.fixture
+def walk(folder, call, capsys):
+    """The project's folder, as far as the examples go into it."""
+    shutil.copytree(GALLERY, folder / "docs" / "gallery")
+    shutil.copytree(ROOT / "missions", folder / "missions")
+    return Walk(call, capsys)
+
+
+def run_once(monkeypatch):
+    """What `reproduce` runs and draws again is what `run` found and drew; tests/test_reproduce.py does it twice."""
+    found, drawn, run, write, shipped = {}, [], study.run, report.write, whole_study()[0]
+
+    def remembered(file, on_progress, parts=None):
+        if file.sha256 not in found:
+            same = shipped.file.text == file.text
+            found[file.sha256] = replace(shipped, file=file) if same else run(file, on_progress)
+        return found[file.sha256]
+
+    def copied(of, target, **settings):
+        if not drawn:
+            drawn.append(shutil.copytree(write(of, target, **settings).parent, target.parent / "drawn"))
+        else:
+            shutil.copytree(drawn[0], target)
+        return target / "report.html"
+
+    monkeypatch.setattr(study, "run", remembered)
+    figures = whole_drawn()
+    monkeypatch.setattr(report, "drawing", lambda *args: nullcontext(lambda: figures))
+    monkeypatch.setattr(report, "write", copied)
+    return found
+
+
+# ------------------------------------------------------------------------------------------------------------ examples
+def test_the_papers_mission(walk, monkeypatch):
+    found = run_once(monkeypatch)
+    walk.through(EXAMPLES[PAPER])
+    (results,) = re.findall(r"(?ms)^```python$.*?^```$\n\n^```text$.*?^```$", REPORT)
+    walk.through(results.replace("leo-geo-study", "paper-study"))
+    (ran,) = found.values()
+    assert sorted(path.name for path in Path("paper-study").iterdir() if path.stat().st_size) == WRITTEN
+    listed = {each.design.name: each for each in ran.fine_pointing.verified}
+    alone = fine_pointing.run_one(ran.file, "PI")
+    assert alone.simulated["given"].quantile_rad == listed["PI"].simulated["given"].quantile_rad
+    assert alone.design.tuned.values == listed["PI"].design.tuned.values != listed["PI + notch"].design.tuned.values
+    with pytest.raises(ValueError, match="'PID' is no controller of this mission; it has PI, best"):
+        fine_pointing.run_one(ran.file, "PID")
+
+
+def test_a_lab_identifies_its_mirror(walk, monkeypatch):
+    monkeypatch.setattr(identification_figures, "draw", lambda *args, **kwargs: {})  # drawing has tests of its own
+    walk.through(EXAMPLES[LAB])
+    m = walk.known["file"].mission
+    assert (m.requirement.pointing_error_rad, m.requirement.margin_db) == (10e-6, 3.0)
+    assert m.fine_pointing.quantile == 0.997 == 1.0 - m.requirement.outage
+    assert {path.name for path in Path("lab").glob("*.tdms")} >= {"loops-40hz.tdms", "held-out.tdms"}
+    assert 'frequencies = ["25 Hz"]' in Path("docs/gallery/lab-plan.toml").read_text(encoding="utf-8")
+    assert (GALLERY / "loops.png").stat().st_size < 1e5
+
+
+def test_choosing_a_mirror(walk):
+    walk.through(EXAMPLES[CHOICE])
+
+
+def test_a_crosslink(walk):
+    walk.through(EXAMPLES[CROSSLINK])
+
+
+def test_a_constellations_day(walk):
+    walk.through(EXAMPLES[CONSTELLATION])
+    for rate in GIVEN[CONSTELLATION]:
+        assert f'"{rate}"' in re.search(r"(?m)^# rates = .*$", walk.known["text"])[0]
+
+
+# --------------------------------------------------------------------------------------------------------- the figures
+@pytest.mark.parametrize("title", EXAMPLES)
+def test_the_prose_has_no_figure_of_its_own(title):
+    blocks = " ".join("".join(found) for found in BLOCK.findall(EXAMPLES[title]))
+    prose = re.sub(r"(?m)^\|.*$|\]\([^)]*\)", "", BLOCK.sub("", EXAMPLES[title]))
+    alone = set(FIGURE.findall(" ".join(prose.split()))) - set(FIGURE.findall(blocks))
+    assert alone == DERIVED[title].keys() | GIVEN[title]
+    for written, value in DERIVED[title].items():
+        digits, _, unit = written.partition(" ")
+        assert f"{value:.{len(digits.partition('.')[2])}f} {unit}" == written
+
+
+def test_the_table_of_mirrors_is_that_of_their_files():
+    rows = re.findall(r"(?m)^\| \[([\w-]+\.toml)\]\S+ \| (.*?) \| (.*?) \| (\d+) % \|$", EXAMPLES[CHOICE])
+    assert sorted(name for name, *_ in rows) == sorted(path.name for path in GALLERY.glob("*-stroke.toml"))
+    for name, travel, resonance, hysteresis in rows:
+        m = load_mirror(GALLERY / name).mirror
+        assert m.travel_rad == pytest.approx(parse_quantity(travel, "rad"))
+        assert m.linear.poles_hz[0] == pytest.approx(parse_quantity(resonance, "Hz"))
+        weights = m.prandtl_ishlinskii.weights_rad_v
+        assert 100 * (1.0 - weights[0] / sum(weights)) == pytest.approx(float(hysteresis), abs=0.5)
+
+
+def test_the_crosslink_keeps_all_that_its_preset_knows():
+    file = load_link(GALLERY / "crosslink.toml")
+    m, given = file.mission, file.sources
+    lines = re.findall(r"(?m)^(\w+ = (?!\"unknown\").*)$", presets.preset_text("click"))
+    assert len(lines) > 25
+    text = (GALLERY / "crosslink.toml").read_text(encoding="utf-8").splitlines()
+    assert {line for line in lines if line not in text} == {
+        line for line in lines if line.startswith(("name = ", "leo_name = ", "geo_name = "))
+    }
+    (click,) = (each for each in presets.presets() if each.name == "click")
+    assert {given[key].comment.partition(":")[0] for key in click.unknown} == {"example"}
+    ends = m.orbit.leo, m.orbit.geo
+    apart, slewing = ends[1].node_rad - ends[0].node_rad, {end.limits.slew_limit_rad_s for end in ends}
+    assert {f"{math.degrees(apart):g} deg", *(f"{math.degrees(each):g} deg/s" for each in slewing)} == GIVEN[CROSSLINK]

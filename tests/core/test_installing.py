@@ -1,0 +1,112 @@
+"""What is installed and what is said of it: from the project's folder, in pinned versions, each file by its hash."""
+
+import re
+import tomllib
+from importlib import metadata
+
+import pytest
+from packaging.utils import canonicalize_name
+
+import licences
+from microrad.cli import installation
+from microrad.core.installing import advice
+from places import ROOT
+
+PIN = re.compile(r"(?m)^(\S+)==([^\s;]+)")
+
+
+def pins(name):
+    """Version by name, of a file of pins."""
+    found = PIN.findall((ROOT / name).read_text(encoding="utf-8"))
+    assert len(dict(found)) == len(found)
+    return {canonicalize_name(each): version for each, version in found}
+
+
+# ------------------------------------------------------------------------------------------------------ what is advised
+def test_nothing_advises_to_install_by_a_name_that_no_registry_has():
+    texts = [ROOT / name for name in ("README.md", "CONTRIBUTING.md", "Makefile")]
+    for folder, kind in (("src", "*.py"), ("docs", "*.md"), ("scripts", "*"), ("benchmarks", "*.py"), (".ci", "*")):
+        texts += [path for path in (ROOT / folder).rglob(kind) if path.is_file() and path.suffix != ".pyc"]
+    by_name = re.compile(
+        r"pip3? +(?:install|download)[^\n`;]*?[\s\"']microrad(?=[\s\"'`,.;:)\[]|$)|microrad\[\w", re.MULTILINE
+    )
+    assert by_name.search("pip install microrad") and by_name.search("pip install --upgrade 'microrad[lab]'")
+    assert not by_name.search("pip install '.[lab]'") and not by_name.search("pip install .; microrad run a.toml")
+    assert [str(path) for path in texts if by_name.search(path.read_text(encoding="utf-8"))] == []
+
+
+def test_the_advice_is_a_command_for_the_projects_folder_with_an_extra_that_there_is():
+    assert advice() == "in the project's folder: pip install --constraint constraints.txt ."
+    assert advice("lab") == "in the project's folder: pip install --constraint constraints.txt '.[lab]'"
+    extras = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["optional-dependencies"]
+    said = {
+        extra
+        for path in (ROOT / "src").rglob("*.py")
+        for extra in re.findall(r"""\badvice\(["'](\w+)""", path.read_text(encoding="utf-8"))
+    }
+    assert {"lab", "cluster", "parquet", "control", "studio"} == said <= set(extras)
+
+
+# ------------------------------------------------------------------------------------------------------------- the pins
+def test_the_build_backend_is_pinned():
+    built = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["build-system"]["requires"]
+    assert dict(PIN.findall("\n".join(built))).items() <= pins("constraints.txt").items()
+    assert len(built) == 1 and "==" in built[0]
+
+
+def test_the_hashed_versions_are_the_pinned_ones():
+    lab, test, pinned = (pins(name) for name in ("hashes/lab.txt", "hashes/test.txt", "constraints.txt"))
+    assert not lab.keys() & test.keys()
+    assert (lab | test).items() <= pinned.items()
+    assert pinned.keys() - lab.keys() - test.keys() == {"ogs-linkbudget-live", "netcdf4", "cftime"}, "of a benchmark"
+    assert {"hatchling", "editables", "numpy", "nptdms"} <= lab.keys()
+    assert {"pytest", "nicegui"} <= test.keys()
+
+
+def test_every_hashed_version_has_hashes_and_no_address():
+    for name, head in (("lab", ""), ("test", "--requirement lab.txt\n")):
+        text = (ROOT / "hashes" / f"{name}.txt").read_text(encoding="utf-8")
+        block = r"[\w.-]+==[\w.]+(?: ; python_version == '3\.\d+'(?: or python_version == '3\.\d+')*)?"
+        assert re.fullmatch(rf"{head}(?:{block}(?: \\\n    --hash=sha256:[0-9a-f]{{64}})+\n)+", text), name
+
+
+@pytest.mark.parametrize(("extra", "file"), [("lab", "lab"), ("test", "test")])
+def test_what_the_project_asks_for_is_hashed(extra, file):
+    described = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    asked = [*described["dependencies"], *described["optional-dependencies"][extra]]
+    names = {canonicalize_name(re.split(r"[\[><=]", text)[0]) for text in asked} - {"microrad"}
+    assert names <= pins("hashes/lab.txt").keys() | (pins("hashes/test.txt").keys() if file == "test" else set())
+
+
+def test_make_installs_by_the_hashes():
+    text = (ROOT / "Makefile").read_text(encoding="utf-8")
+    hashed = text[text.index("Linux-x86_64-glibc") : text.index("\nelse\n")]
+    assert hashed.count("--require-hashes --requirement hashes/") == 2
+    assert "--no-deps --no-build-isolation --editable ." in hashed
+    assert "--constraint" not in hashed
+
+
+def test_doctor_notes_other_versions_than_the_tested_ones(tmp_path, monkeypatch):
+    pinned = tmp_path / "constraints.txt"
+    monkeypatch.setattr(installation, "_CONSTRAINTS", pinned)
+    ok, found = installation._pins()
+    assert ok and found.startswith("not compared")
+    numpy = metadata.version("numpy")
+    pinned.write_text(f"numpy=={numpy}\nnot-there==1.0\n")
+    assert installation._pins() == (True, "those of constraints.txt")
+    pinned.write_text("numpy==1.0.1\nnot-there==1.0\n")
+    assert installation._pins() == (True, f"not those of constraints.txt: numpy {numpy} (tested: 1.0.1)")
+
+
+# --------------------------------------------------------------------------------------------------------- the licences
+def test_the_page_of_licences_is_what_the_packages_state():
+    page = licences.PAGE.read_text(encoding="utf-8")
+    assert page.startswith(licences.HEAD)
+    listed = {canonicalize_name(row.split(" | ")[0][2:]): row for row in page.removeprefix(licences.HEAD).splitlines()}
+    pinned, stated = pins("constraints.txt"), dict(licences.rows())
+    for name in pinned.keys() & stated.keys():
+        if metadata.version(name) == pinned[name]:
+            assert listed[name] == stated[name]
+    assert stated.keys() & pinned.keys() <= listed.keys() <= pinned.keys()
+    assert listed["nptdms"] == "| npTDMS | LGPL-3.0-only | lab |"
+    assert not [row for row in listed.values() if "GPL" in row and row.endswith("| microrad |")]

@@ -1,0 +1,542 @@
+"""The fixed-point form: the C code equals whole numbers of Python to the last bit, and its report is true.
+
+The twin below knows the numbers of a `FixedForm` alone. Its whole numbers have no end, so that a sum beyond 64 bits
+shows in it.
+"""
+
+import math
+import shutil
+import subprocess
+import tempfile
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from export.test_export_rounding import shipped, vectors_of
+from microrad.core import lti
+from microrad.export import double_run, fixed_form, fixed_report, fixed_step
+from microrad.export.fixed import fixed_code, quantised, report_text
+from microrad.export.flight import vectors_text
+from microrad.export.records import ExportError, FlightController, Origin, Signal
+from microrad.export.sections import sections
+
+SHIPPED = ("LQG", "PI + inverse", "PI + inverse in series", "PID + inverse")
+LARGEST, SMALLEST = 2**31 - 1, -(2**31)
+FLAGS = [
+    "-std=c99",
+    "-O2",
+    "-Wall",
+    "-Wextra",
+    "-Werror",
+    "-pedantic",
+    "-Wconversion",
+    "-Wdouble-promotion",
+    "-Wshadow",
+]
+TRAPS = ["-g", "-fsanitize=undefined", "-fno-sanitize-recover=all"]
+
+
+def links(compiler):
+    """Whether a compiler is here with the library of its sanitizer, which is a package of its own."""
+    if shutil.which(compiler) is None:
+        return False
+    with tempfile.TemporaryDirectory() as folder:
+        words = [compiler, *TRAPS, "-x", "c", "-", "-o", f"{folder}/empty"]
+        empty = "int main(void) { return 0; }"
+        return not subprocess.run(words, input=empty, text=True, capture_output=True, check=False).returncode
+
+
+COMPILERS = [each for each in ("gcc", "clang") if links(each)]
+PERIOD_S = 2e-4
+
+
+@cache
+def form_of(name):
+    of, form, v = shipped(name)
+    return quantised(of, form, v)
+
+
+# ------------------------------------------------------------------------------------------------------------- the twin
+def rounded(x, shift):
+    return (x + (1 << (shift - 1)) >> shift) if shift > 0 else x
+
+
+def within(x, low, high):
+    return min(max(x, low), high)
+
+
+def weights(matrix):
+    """By row, the places and the values of the numbers that are not 0, as whole numbers of Python."""
+    return [[(j, weight) for j, weight in enumerate(row) if weight] for row in matrix.tolist()]
+
+
+def dot(row, numbers):
+    total = 0
+    for place, weight in row:
+        total += weight * numbers[place]
+        assert -(2**63) <= total < 2**63
+    return total
+
+
+class Twin:
+    """The step in Python's whole numbers."""
+
+    def __init__(self, of):
+        self.of = of
+        self.x = [0] * len(of.state_scale)
+        self.read = [0] * len(of.input_scale)
+        self.outputs, self.moves = weights(of.output.value), weights(of.state.value)
+
+    def words(self):
+        return [rounded(x, s) for x, s in zip(self.x, self.of.state_shift, strict=True)]
+
+    def output(self, reading):
+        word, signals = self.of.word, self.words()
+        self.read = [within(int(r), -word, word) for r in reading]
+        sums = [dot(row, signals + self.read) for row in self.outputs]
+        return [within(rounded(y, s), -word, word) for y, s in zip(sums, self.of.output_shift, strict=True)]
+
+    def update(self, excess):
+        word = self.of.word
+        signals = self.words() + self.read + [within(int(e), -word, word) for e in excess]
+        moved = [x + dot(row, signals) for x, row in zip(self.x, self.moves, strict=True)]
+        assert all(-(2**63) <= x < 2**63 for x in moved)
+        self.x = [within(x, -(word << s), word << s) for x, s in zip(moved, self.of.state_shift, strict=True)]
+
+    def step(self, reading):
+        """Commands, without an inverse."""
+        commands, excess = [], []
+        for a, v in enumerate(self.output(reading)[: len(self.of.minimum)]):
+            clipped = within(v, self.of.minimum[a], self.of.maximum[a])
+            excess.append(clipped - v)
+            if self.of.converter:
+                c = self.of.converter[a]
+                clipped = within(rounded(clipped * c.factor, c.shift), c.lowest, c.highest)
+            commands.append(clipped)
+        self.update(excess)
+        return commands
+
+
+def drive_the_linear_part(of, readings, excesses):
+    twin, found = Twin(of), []
+    for reading, excess in zip(readings, excesses, strict=True):
+        found.append(twin.output(reading))
+        twin.update(excess)
+    return np.array(found)
+
+
+# ----------------------------------------------------------------------------------------------------------- compiled C
+DRIVER = """
+#include "code_fixed.h"
+#include <stdio.h>
+#include <inttypes.h>
+#include <string.h>
+static int32_t number(void) { int64_t x = 0; if (scanf("%" SCNd64, &x) != 1) { return 0; } return (int32_t)x; }
+int main(int count, char **argument)
+{
+    code_fixed_state state;
+    int32_t in[CODE_FIXED_READINGS], out[CODE_FIXED_OUTPUTS], excess[CODE_FIXED_ACTUATORS];
+    const int parts = count > 1 && strcmp(argument[1], "parts") == 0;
+    const long samples = number();
+    code_fixed_init(&state);
+    for (long k = 0; k < samples; k++) {
+        for (int i = 0; i < CODE_FIXED_READINGS; i++) { in[i] = number(); }
+        for (int a = 0; a < CODE_FIXED_ACTUATORS; a++) { excess[a] = number(); }
+        if (parts) {
+            code_fixed_output(&state, in, out);
+            code_fixed_update(&state, excess);
+        } else {
+            code_fixed_step(&state, in, out);
+        }
+        for (int i = 0; i < (parts ? CODE_FIXED_OUTPUTS : CODE_FIXED_ACTUATORS); i++) {
+            printf("%" PRId32 " ", out[i]);
+        }
+        printf("\\n");
+    }
+    printf("%" PRIu32 " %" PRIu32 "\\n", state.saturated, state.overflowed);
+    return 0;
+}
+"""
+
+
+class Compiled:
+    """The code of a fixed-point form with a driver, compiled in a folder."""
+
+    def __init__(self, of, form, fixed, folder, compiler="gcc", options=TRAPS):
+        files = fixed_code(of, form, fixed, "code")
+        for file, text in files.items():
+            (folder / file).write_text(text)
+        (folder / "driver.c").write_text(DRIVER)
+        sources = [file for file in files if file.endswith(".c") and not file.endswith("_bench.c")]
+        call = [compiler, *FLAGS, *options, "-o", "driver", "driver.c", *sources, "-lm"]
+        done = subprocess.run(call, cwd=folder, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stderr
+        self.folder = folder
+
+    def run(self, readings, excesses, what):
+        rows = np.hstack([readings, excesses])
+        text = "\n".join([str(len(rows)), *(" ".join(map(str, row)) for row in rows.tolist())])
+        done = subprocess.run(
+            ["./driver", what], cwd=self.folder, input=text, capture_output=True, text=True, check=False
+        )
+        assert (done.returncode, done.stderr) == (0, "")
+        *lines, counts = [[int(x) for x in line.split()] for line in done.stdout.splitlines()]
+        return np.array(lines), counts
+
+
+def extremes(rng, shape):
+    """Whole numbers of 32 bits of every size, with the ends among them."""
+    sizes = np.ldexp(rng.uniform(-1.0, 1.0, shape), rng.integers(0, 32, shape))
+    found = np.clip(np.rint(sizes), SMALLEST, LARGEST).astype(np.int64)
+    chosen = rng.integers(0, 8, shape)
+    return np.where(chosen == 0, SMALLEST, np.where(chosen == 1, LARGEST, found))
+
+
+def held_extremes(rng, samples, width):
+    """As `extremes`, held for up to a hundred samples, so that integrators reach their ends."""
+    return np.repeat(extremes(rng, (samples // 100 + 1, width)), 100, axis=0)[:samples]
+
+
+needs_compiler = pytest.mark.skipif(not COMPILERS, reason="no gcc or clang here")
+
+
+@needs_compiler
+@pytest.mark.parametrize("name", SHIPPED)
+def test_the_compiled_code_equals_the_twin_to_the_last_bit(name, tmp_path):
+    of, form, v = shipped(name)
+    fixed, rng = form_of(name), np.random.default_rng(5)
+    code = Compiled(of, form, fixed, tmp_path, COMPILERS[-1])
+    recorded = fixed_step.readings(fixed, v.inputs)
+    fuzzed = extremes(rng, (300, recorded.shape[1]))
+    readings = np.vstack([recorded[:300], fuzzed, held_extremes(rng, 500, recorded.shape[1]), recorded[:100]])
+    calm = [np.zeros((count, of.actuators), int) for count in (300, 600)]
+    excesses = np.vstack([calm[0], extremes(rng, (300, of.actuators)), calm[1]])
+    expected = drive_the_linear_part(fixed, readings, excesses)
+    found, (_, overflowed) = code.run(readings, excesses, "parts")
+    assert np.array_equal(found, expected)
+    assert len(np.unique(found[:300])) > 250
+    assert np.max(np.abs(found)) > fixed.word / 4
+    assert overflowed > 100
+
+
+@needs_compiler
+@pytest.mark.parametrize("bits", [32, 24])
+def test_a_step_without_an_inverse_equals_the_twin_and_stays_within_the_limits(bits, tmp_path):
+    of, form, v = shipped("LQG")
+    fixed, rng = quantised(of, form, v, bits, beyond_a_count=True), np.random.default_rng(7)
+    code = Compiled(of, form, fixed, tmp_path)
+    recorded = fixed_step.readings(fixed, v.inputs)
+    width = recorded.shape[1]
+    readings = np.vstack([recorded[:500], extremes(rng, (500, width)), held_extremes(rng, 500, width)])
+    twin = Twin(fixed)
+    expected = np.array([twin.step(reading) for reading in readings])
+    found, (saturated, _) = code.run(readings, np.zeros((len(readings), of.actuators), int), "steps")
+    assert np.array_equal(found, expected)
+    commands = found * of.resolution_v
+    assert np.max(commands) <= of.maximum_v
+    assert np.min(commands) >= of.minimum_v
+    assert saturated > 100
+    assert np.max(commands) > of.maximum_v - of.resolution_v
+    assert np.min(commands) < of.minimum_v + of.resolution_v
+
+
+@needs_compiler
+@pytest.mark.parametrize("name", ["PI + inverse in series", "PID + inverse"])
+def test_a_step_with_an_inverse_stays_within_the_limits_for_any_readings(name, tmp_path):
+    of, form, v = shipped(name)
+    fixed, rng = form_of(name), np.random.default_rng(9)
+    code = Compiled(of, form, fixed, tmp_path)
+    recorded = fixed_step.readings(fixed, v.inputs)
+    width = recorded.shape[1]
+    readings = np.vstack([recorded[:500], extremes(rng, (700, width)), held_extremes(rng, 700, width)])
+    found, (saturated, _) = code.run(readings, np.zeros((len(readings), of.actuators), int), "steps")
+    commands = found * of.resolution_v
+    assert np.max(np.abs(commands[:500] - v.commands[:500])) <= fixed.report.bound_v
+    assert np.max(commands) <= of.maximum_v
+    assert np.min(commands) >= of.minimum_v
+    assert saturated > 100
+    assert np.max(commands) > of.maximum_v - of.resolution_v
+
+
+@needs_compiler
+@pytest.mark.parametrize("name", SHIPPED)
+def test_the_bench_holds_the_recorded_run(name, tmp_path):
+    of, form, v = shipped(name)
+    fixed = form_of(name)
+    for file, text in fixed_code(of, form, fixed, "code").items():
+        (tmp_path / file).write_text(text)
+    sources = [path.name for path in sorted(tmp_path.glob("*.c"))]
+    (tmp_path / "vectors.csv").write_text(vectors_text(of, v))
+    subprocess.run([COMPILERS[0], *FLAGS, "-o", "bench", *sources, "-lm"], cwd=tmp_path, check=True)
+    done = subprocess.run(["./bench", "vectors.csv", "2"], cwd=tmp_path, capture_output=True, text=True, check=False)
+    told = {key: float(value) for key, value in map(str.split, done.stdout.splitlines())}
+    assert done.returncode == 0, done.stdout
+    assert told["largest_difference_v"] <= fixed.report.bound_v <= 2.01 * of.resolution_v
+    assert told["noise_rms_v"] < 0.1 * of.resolution_v
+    assert (told["samples"], told["rejected"], told["faults"], told["overflowed"]) == (len(v.inputs), 0, 0, 0)
+    assert {"worst_step_ns", "median_step_ns", "clock_ns", "peak_command_v", "saturated", "rate_clamped"} < set(told)
+    make = (tmp_path / "Makefile").read_text()
+    assert all(source in make for source in sources)
+
+    changed = v.commands.copy()
+    changed[100, 0] += 3.0 * of.resolution_v
+    (tmp_path / "vectors.csv").write_text(vectors_text(of, replace(v, commands=changed)))
+    done = subprocess.run(["./bench", "vectors.csv"], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert "worst_step_ns" not in done.stdout
+
+
+# ----------------------------------------------------------------------------------------------------------- the report
+@pytest.mark.parametrize("name", SHIPPED)
+def test_the_report_is_true(name):
+    of, form, v = shipped(name)
+    fixed, r = form_of(name), form_of(name).report
+    read, n = fixed_step.readings(fixed, v.inputs), of.actuators
+    near = fixed_form.dequantised(form, fixed)
+    exact = double_run.run(of, near, v.inputs)
+    found = drive_the_linear_part(fixed, read, np.zeros((len(read), n), int)) * np.exp2(-np.array(fixed.output_scale))
+    assert not np.any(exact.excess)
+    for i, o in enumerate(r.outputs):
+        measured = np.sqrt(np.mean((found[:, i] - exact.outputs[:, i]) ** 2))
+        assert o.noise_measured == pytest.approx(measured, rel=1e-6, abs=1e-18)
+        assert measured <= 2.0 * o.noise_predicted
+        assert 0.0 <= o.cycle_found <= o.cycle_bound
+    assert any(o.noise_measured > 0.3 * o.noise_predicted for o in r.outputs)
+    ranges = fixed.word * np.exp2(-np.array(fixed.state_scale))
+    peaks = np.max(np.abs(double_run.run(of, form, v.inputs).states), axis=0)
+    moving = peaks > 0.0
+    assert np.array(r.head_room_bits)[moving] == pytest.approx(np.log2(ranges[moving] / peaks[moving]))
+    assert np.all(np.array(r.head_room_bits) >= 2.0)
+    assert np.min(r.head_room_bits) < 3.0
+    assert r.samples == len(v.inputs)
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_the_poles_and_the_response_are_those_of_the_coefficients(name):
+    of, form, _ = shipped(name)
+    fixed = form_of(name)
+    near = fixed_form.dequantised(form, fixed)
+    before, after = (np.sort(np.abs(np.linalg.eigvals(each.A))) for each in (form, near))
+    assert np.sort([abs(a) for a, _ in fixed.report.poles]) == pytest.approx(before, abs=1e-7)
+    assert np.sort([abs(b) for _, b in fixed.report.poles]) == pytest.approx(after, abs=1e-7)
+    assert np.all(after <= 1.0)
+    worst = max(fixed.report.outputs, key=lambda o: o.response_error)
+    i = fixed.report.outputs.index(worst)
+    of_form, of_near = (
+        lti.frequency_response(lti.StateSpace(s.A, s.B, s.C, s.D), np.array([worst.at_hz]), of.period_s)[0, i]
+        for s in (form, near)
+    )
+    error = np.linalg.norm(of_near - of_form) / np.linalg.norm(of_form)
+    assert worst.response_error == pytest.approx(error, rel=1e-6, abs=1e-15)
+    assert error < 1e-4
+
+
+def test_the_coefficients_are_within_half_a_step_and_rows_within_a_word():
+    _, form, _ = shipped("LQG")
+    fixed = form_of("LQG")
+    near, columns = (
+        fixed_form.dequantised(form, fixed),
+        np.array([*fixed.state_scale, *fixed.input_scale, *fixed.output_scale]),
+    )
+    for a, b, rows in (
+        (np.hstack([form.A, form.B, form.L]), np.hstack([near.A, near.B, near.L]), fixed.state),
+        (np.hstack([form.C, form.D]), np.hstack([near.C, near.D]), fixed.output),
+    ):
+        step = np.exp2(columns[None, : a.shape[1]] - np.array(rows.scale)[:, None])
+        assert np.all(np.abs(a - b) <= 0.5 * step + 1e-15)
+        sums = np.sum(np.abs(rows.value), axis=1)
+        assert np.all(sums <= fixed.word)
+        assert np.median(sums) > fixed.word / 4
+    assert np.any(near.A != form.A)
+    assert min(fixed.state_shift) >= 0
+    assert max(fixed.state_shift) <= fixed.bits - 1
+
+
+def test_a_row_that_rounds_up_beyond_a_word_takes_a_coarser_scale():
+    rows = fixed_form._rows(np.array([[63.5, 63.5], [63.0, 64.0]]), (0, 0), 127, [9, 9])
+    assert rows.scale == (-1, 0)
+    assert rows.value.tolist() == [[32, 32], [63, 64]]
+
+
+def test_the_text_of_the_report_has_units():
+    text = report_text(form_of("PI + inverse"))
+    units = ("rad/s", " rad ", " Hz", " dB", " bits", " V  ")
+    for part in ("Words of 32 bits", "4 times", " V over them", "at rest", "2^-", *units):
+        assert part in text
+    assert "e-0" in text.splitlines()[1]
+    assert max(map(len, text.splitlines())) <= 120
+    assert "inverse" in text
+    assert "inverse" not in report_text(form_of("LQG"))
+
+
+# ---------------------------------------------------------------------------------------------------- other controllers
+def one_axis(A, B, C, D, *, limit_v=10.0, resolution_v=1e-3, windup=0.0):
+    system = lti.StateSpace(*(np.array(m, dtype=float) for m in (A, B, C, D)))
+    return FlightController(
+        name="a design",
+        origin=Origin("a mission", "0" * 64, "a mirror"),
+        period_s=PERIOD_S,
+        inputs=(Signal("reading_rad", system.B.shape[1], "rad", "reading", 0.1),),
+        actuators=1,
+        system=system,
+        anti_windup=np.full((system.order, 1), windup),
+        inverse=None,
+        minimum_v=-limit_v,
+        maximum_v=limit_v,
+        resolution_v=resolution_v,
+        bias_v=0.0,
+        margins=(),
+    )
+
+
+def slow_design(pole=1.0 - 1e-7, **changes):
+    return one_axis([[pole]], [[100.0]], [[1.0]], [[3000.0]], **changes)
+
+
+def noise(samples=1500, size=1e-4):
+    return size * np.random.default_rng(2).standard_normal((samples, 1))
+
+
+def made(of, inputs, *args, **options):
+    form = sections(of)
+    return quantised(of, form, vectors_of(inputs), *args, **options)
+
+
+def test_an_integrator_adds_up_the_smallest_reading():
+    of = one_axis([[1.0]], [[100.0]], [[1.0]], [[3000.0]])
+    fixed = made(of, noise())
+    step = fixed_step.Step(fixed)
+    least = 2.0 ** -fixed.input_scale[0]
+    for _ in range(4000):
+        step.output(np.array([1]))
+        step.update(np.array([0]))
+    wanted = 4000 * 100.0 * least
+    scale = sections(of).C[0, 0]
+    assert step.x[0] * 2.0 ** -fixed.state.scale[0] * scale == pytest.approx(wanted, rel=1e-6)
+    assert step.x[0] > 0
+
+
+def test_a_resting_signal_is_scaled_by_its_limit_and_its_states_by_what_it_can_do():
+    of = replace(
+        one_axis([[0.9, 0.0], [0.0, 0.5]], np.eye(2), [[1.0, 2.0]], [[0.0, 0.0]]),
+        inputs=(Signal("first_rad", 1, "rad", "first", 0.1), Signal("second_rad", 1, "rad", "second", 0.3)),
+    )
+    inputs = np.hstack([noise(), np.zeros((1500, 1))])
+    fixed = made(of, inputs)
+    ranges = fixed.word * np.exp2(-np.array(fixed.input_scale))
+    assert 4.0 * np.max(np.abs(inputs)) <= ranges[0] <= 8.0 * np.max(np.abs(inputs))
+    assert 4.0 * 0.3 <= ranges[1] <= 8.0 * 0.3
+    still = np.argmax(fixed.report.head_room_bits)
+    reach = 4.0 * 0.3 / (1.0 - 0.5) * np.abs(sections(of).B[still, 1])
+    assert reach <= fixed.word * 2.0 ** -fixed.state_scale[still] <= 2.0 * reach * (1 + 1e-9)
+    assert "at rest" in report_text(fixed)
+
+
+@needs_compiler
+def test_without_converter_and_limits_commands_are_words(tmp_path):
+    of = slow_design(0.99, limit_v=math.inf, resolution_v=0.0)
+    form, fixed = sections(of), made(of, noise())
+    readings = fixed_step.readings(fixed, noise(200))
+    twin = Twin(fixed)
+    expected = np.array([twin.step(reading) for reading in readings])
+    found, (saturated, _) = Compiled(of, form, fixed, tmp_path).run(readings, np.zeros((200, 1), int), "steps")
+    assert np.array_equal(found, expected)
+    ideal = double_run.run(of, form, noise(200)).free
+    assert found * 2.0 ** -fixed.output_scale[0] == pytest.approx(ideal, abs=1e-6 * np.max(np.abs(ideal)))
+    assert saturated == 0
+    assert fixed.converter == ()
+
+
+@needs_compiler
+def test_a_controller_without_states_is_a_gain(tmp_path):
+    of = one_axis(np.zeros((0, 0)), np.zeros((0, 1)), np.zeros((1, 0)), [[3000.0]])
+    form, inputs = sections(of), noise(300)
+    fixed = made(of, inputs)
+    readings = fixed_step.readings(fixed, inputs)
+    found, _ = Compiled(of, form, fixed, tmp_path).run(readings, np.zeros((300, 1), int), "steps")
+    assert np.max(np.abs(found * 1e-3 - 3000.0 * inputs)) <= 0.5001e-3
+    assert np.max(np.abs(found)) > 100
+
+
+def test_the_anti_windup_holds_the_state_at_the_limit():
+    of = one_axis([[1.0]], [[300.0]], [[1.0]], [[3000.0]], limit_v=1.0, windup=0.09)
+    inputs = np.full((400, 1), 8e-4)
+    fixed = made(of, inputs)
+    twin, ideal = Twin(fixed), double_run.run(of, sections(of), inputs)
+    for reading in fixed_step.readings(fixed, inputs):
+        command = twin.step(reading)
+    assert command == [1000]
+    state = twin.x[0] * 2.0 ** -fixed.state.scale[0]
+    assert state == pytest.approx(ideal.states[-1, 0], rel=1e-3)
+    assert np.count_nonzero(ideal.excess) > 300
+    assert fixed.report.error_v < 1e-6
+
+
+# ------------------------------------------------------------------------------------------------------------- refusals
+@pytest.mark.parametrize("bits", [7, 33])
+def test_other_words_are_refused(bits):
+    with pytest.raises(ExportError, match=rf"^{bits} bits in fixed point: give 8 to 32"):
+        made(slow_design(0.99), noise(), bits)
+
+
+@pytest.mark.parametrize("room", [0.5, math.nan, math.inf])
+def test_less_room_than_the_run_needs_is_refused(room):
+    with pytest.raises(ExportError, match=rf"^a head room of {room:g} over the recorded run: give 1 or more"):
+        made(slow_design(0.99), noise(), head_room=room)
+
+
+def test_poles_that_reach_the_circle_are_refused():
+    of = slow_design(1.0 - 1e-9)
+    with pytest.raises(ExportError) as told:
+        made(of, noise(), 16, beyond_a_count=True)
+    poles = ("|z| = 0.999999999 at 0 Hz", "|z| = 1.000000000")
+    for part in ("'a design'", "16 bits", *poles, "limit is 1", "more bits"):
+        assert part in str(told.value)
+    ((before, after),) = made(of, noise(), 32, beyond_a_count=True).report.poles
+    assert after.real == pytest.approx(before.real, abs=1e-10)
+    assert after.real < 1.0
+
+
+def test_commands_that_stray_by_more_than_a_count_are_refused_unless_said():
+    of = slow_design(0.999, resolution_v=1e-5)
+    with pytest.raises(ExportError) as told:
+        made(of, noise(), 12)
+    for part in ("'a design'", "12 bits", " V off double precision over 1500 samples", "1e-05 V", "more bits"):
+        assert part in str(told.value)
+    said = made(of, noise(), 12, beyond_a_count=True)
+    assert said.report.error_v > of.resolution_v
+    assert said.report.bound_v > said.report.error_v
+    assert made(of, noise(), 32).report.error_v < 0.01 * of.resolution_v
+
+
+def test_numbers_that_do_not_fit_are_refused():
+    of = one_axis([[0.9]], [[1.0]], [[1.0]], [[1.0]], resolution_v=1e-30)
+    with pytest.raises(ExportError, match=r"'a design' does not fit into words of 32 bits.*single precision"):
+        made(of, noise())
+    assert made(replace(of, resolution_v=1e-3), noise()).converter[0].shift <= 62
+
+
+def test_names_are_identifiers():
+    of = slow_design(0.99)
+    form, fixed = sections(of), made(of, noise())
+    with pytest.raises(ExportError, match="2fast"):
+        fixed_code(of, form, fixed, "2fast")
+    assert set(fixed_code(of, form, fixed, "fast")) == {
+        "fast_fixed.h",
+        "fast_fixed.c",
+        "fast_fixed_bench.c",
+        "Makefile",
+    }
+
+
+def test_the_report_measures_the_swing_of_a_rest():
+    """A coarse oscillation keeps swinging at rest, by no more than the report says is possible."""
+    z = 0.9995 * np.exp(0.5j)
+    of = one_axis([[z.real, -z.imag], [z.imag, z.real]], [[1.0], [0.5]], [[100.0, 30.0]], [[0.0]])
+    fixed = made(of, noise(), 12, beyond_a_count=True)
+    assert 0.0 < fixed.report.outputs[0].cycle_found <= fixed.report.outputs[0].cycle_bound
+    assert fixed_report.report_text(fixed) == report_text(fixed)
+    fine = made(of, noise(), 32)
+    assert fine.report.outputs[0].cycle_bound < 1e-4 * fixed.report.outputs[0].cycle_bound

@@ -1,0 +1,135 @@
+"""What a controller leaves on the mirror with its hysteresis, beside the linear figure; it may hold back an export."""
+
+import json
+import math
+
+import pytest
+
+from microrad.export import choice, write
+from microrad.export.records import ExportError
+from microrad.loop import fine_pointing
+from microrad.loop.fine_loop import ensemble
+from microrad.loop.fine_pointing import designs
+from microrad.mission.file import load_mission
+from shipped import SHIPPED
+
+OBSERVER = "disturbance observer"
+WORDS = ("export", "c", "light.toml", "--controller", OBSERVER)
+
+
+@pytest.fixture
+def light(folder):
+    """The shipped mission on a mirror with one light resonance, in a few short runs."""
+    text = SHIPPED.read_text(encoding="utf-8")
+    begin, end = text.index("[mirror.linear]"), text.index("[mirror.bouc_wen]")
+    turn = 2.0 * math.pi * 250.0
+    linear = f"[mirror.linear]\nnumerator = [{turn**2!r}]\ndenominator = [1.0, {0.04 * turn!r}, {turn**2!r}]\n"
+    band = 'normalise_at = "2 Hz"\nexcited_from = "1 Hz"\nexcited_to = "5 kHz"\n\n'
+    text = text[:begin] + linear + band + text[end:]
+    for old, new in (("runs = 64 ", "runs = 4 "), ('duration = "2 s" ', 'duration = "0.4 s" ')):
+        assert text.count(old) == 1
+        text = text.replace(old, new)
+    text = text.replace('settle = "0.5 s" ', 'settle = "0.1 s" ')
+    (folder / "light.toml").write_text(text, encoding="utf-8")
+    return folder / "light.toml"
+
+
+def test_the_simulated_figure_is_that_of_the_missions_runs(light):
+    file = load_mission(light)
+    scene = fine_pointing.scene(file)
+    (made,) = fine_pointing.design(scene, file.mission, only=(fine_pointing.BASELINE,))
+    (left,) = fine_pointing.outlook(scene, file.mission, [made])
+    run = ensemble.run(scene.loop, made.controller, ensemble.Span(0.4, 0.1, file.mission.fine_pointing.seed), 4)
+    assert left.simulated_rad == pytest.approx(math.sqrt((run.axis_rms_rad**2).mean()), rel=1e-12)
+    assert left.linear_rad == made.tuned.residual_rms_rad
+    assert fine_pointing.Outlook(1.0, 1.5).holds
+    assert not fine_pointing.Outlook(1.0, 1.51).holds
+    assert not fine_pointing.Outlook(1.0, math.nan).holds
+
+
+def test_design_shows_both_figures_and_refuses_by_the_simulated_one(light, call, monkeypatch):
+    monkeypatch.setattr(designs, "names", lambda m: (fine_pointing.BASELINE, OBSERVER))
+    done = call("design", "light.toml", "--json")
+    assert done.code == 1
+    found = json.loads(done.out)
+    kept, broken = found["controllers"]
+    assert (kept["mark"], broken["mark"]) == ("", "refused")
+    for each, times in ((kept, (1.0, 1.5)), (broken, (3.0, 20.0))):
+        ratio = each["simulated_rms_rad_per_axis"] / each["residual_rms_rad_per_axis"]
+        assert times[0] < ratio < times[1], each["name"]
+    (warning,) = found["warnings"]
+    assert f"by {OBSERVER} ({ratio:.2f} times): refused, here and by microrad export; choose by the sim" in warning
+    printed = call("design", "light.toml")
+    assert printed.code == 1
+    row = row_of(printed.out, OBSERVER)
+    assert f"{broken['residual_rms_rad_per_axis'] * 1e6:.3f} " in row
+    assert f"{broken['simulated_rms_rad_per_axis'] * 1e6:.3f} refused " in row
+    assert "refused" not in row_of(printed.out, fine_pointing.BASELINE)
+    assert f"Warning: {warning}." in " ".join(printed.out.split())
+    taken = call("design", "light.toml", "--accept")
+    assert taken.code == 0
+    assert f"{broken['simulated_rms_rad_per_axis'] * 1e6:.3f} accepted " in row_of(taken.out, OBSERVER)
+    assert f"by {OBSERVER} ({ratio:.2f} times): accepted as they are." in " ".join(taken.out.split())
+
+
+def test_design_ends_well_where_each_figure_is_a_promise(light, call, monkeypatch):
+    monkeypatch.setattr(designs, "names", lambda m: (fine_pointing.BASELINE,))
+    done = call("design", "light.toml")
+    assert done.code == 0
+    assert "refused" not in done.out and "Warning" not in done.out
+
+
+def row_of(printed, name):
+    """The line of a table that begins with the first word of the name."""
+    return next(line for line in printed.splitlines() if line.split()[:1] == name.split()[:1])
+
+
+def test_what_breaks_its_promise_is_exported_only_where_that_is_accepted(light, call, refused, monkeypatch):
+    monkeypatch.setattr(write, "compiler", lambda: None)
+    said = refused(*WORDS)
+    assert "light.toml: disturbance observer leaves " in said and "1.5 times is the most" in said
+    assert "microrad design" in said and "--accept" in said
+    assert [path.name for path in light.parent.iterdir()] == ["light.toml"]
+    done = call(*WORDS, "--accept")
+    assert done.code == 0, done.err
+    (line,) = (line for line in done.out.splitlines() if line.startswith("  leaves "))
+    linear, simulated = (part.split(" rms")[0] for part in line.removeprefix("  leaves ").split(" linear theory, "))
+    assert f"leaves {simulated} rms an axis on the mission's mirror" in said
+    assert f"times the {linear.strip()} rms an axis of linear theory" in said
+
+
+@pytest.mark.parametrize("what", ["matrices", "fmu"])
+def test_matrices_and_units_are_held_to_it_too(light, call, refused, what):
+    said = refused("export", what, *WORDS[2:])
+    assert "light.toml: disturbance observer leaves " in said and "1.5 times is the most" in said
+    done = call("export", what, *WORDS[2:], "--accept")
+    assert done.code == 0, done.err
+    assert len(list(light.parent.iterdir())) == 2
+    assert call("export", what, "light.toml", "--overwrite").code == 0  # without a controller there is no figure
+
+
+def test_a_controller_that_keeps_its_promise_is_exported_and_says_both(light, call, monkeypatch):
+    monkeypatch.setattr(write, "compiler", lambda: None)
+    done = call("export", "c", "light.toml", "--controller", "PI", "--json")
+    assert done.code == 0, done.err
+    residual = json.loads(done.out)["residual"]
+    ratio = residual["simulated_rms_rad_per_axis"] / residual["linear_rms_rad_per_axis"]
+    assert 1.0 < ratio < 1.5
+
+
+def test_the_loop_of_the_table_control_has_no_linear_figure(folder, monkeypatch):
+    monkeypatch.setattr(write, "compiler", lambda: None)
+    made = write.export_flight(choice.choose(load_mission(SHIPPED), choice.PID), folder / "pid", samples=100)
+    assert made.left is None
+    assert "leaves" not in write.report_text(made)
+
+
+def test_python_refuses_as_the_command_does(light, folder):
+    with pytest.raises(ExportError, match="linear theory"):
+        write.export_flight(choice.choose(load_mission(light), OBSERVER), folder / "flight")
+    assert not (folder / "flight").exists()
+
+
+def test_gains_under_which_the_loop_of_the_table_control_is_unstable_are_refused(light, refused):
+    assert "light.toml: the closed loop is unstable" in refused("export", "c", "light.toml", "--controller", "PID")
+    assert [path.name for path in light.parent.iterdir()] == ["light.toml"]

@@ -1,0 +1,223 @@
+"""The joint fit on the Bouc-Wen benchmark, against an oracle that knows nothing of the kernels, and its uncertainty."""
+
+from math import pi
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from microrad.lab.identify import IdentificationError
+from microrad.lab.identify.plant_fit import (
+    Parameter,
+    Problem,
+    Run,
+    Structure,
+    _covariance,
+    fit_plant,
+    runs,
+    simulate,
+    upsampled,
+)
+from microrad.lab.identify.plant_structures import hysteretic_oscillator
+from microrad.lab.recording import read_recording, recording_from_arrays
+from microrad.mirror import model as mirror
+from places import DATA
+
+BENCHMARK = DATA / "boucwen" / "train.h5"
+needs_benchmark = pytest.mark.skipif(not BENCHMARK.exists(), reason=f"recording boucwen absent: {BENCHMARK}")
+
+# Noël and Schoukens (2016): m, c, k, alpha, beta gamma, beta delta with exponent 1
+PUBLISHED = np.array([2.0, 10.0, 5e4, 5e4, 800.0, -1100.0])
+RATE_HZ, FINE = 750.0, 20
+NAMES = ("mass", "damping", "stiffness", "slope", "decay", "asymmetry")
+
+
+def started(factors):
+    return hysteretic_oscillator(**dict(zip(NAMES, (PUBLISHED * factors).tolist(), strict=True)))
+
+
+def runge_kutta(drive_at_half_steps, step_s, parameters=PUBLISHED):
+    """The oscillator by the classical Runge-Kutta method, scalar by scalar; the drive is given twice a step."""
+    m, c, k, a, bg, bd = (float(p) for p in parameters)
+
+    def slope(y, v, z, u):
+        return v, (u - c * v - k * y - z) / m, a * v - bg * abs(v) * z - bd * v * abs(z)
+
+    y = v = z = 0.0
+    found = [y]
+    u = drive_at_half_steps.tolist()
+    for i in range(0, len(u) - 2, 2):
+        y1, v1, z1 = slope(y, v, z, u[i])
+        y2, v2, z2 = slope(y + step_s / 2 * y1, v + step_s / 2 * v1, z + step_s / 2 * z1, u[i + 1])
+        y3, v3, z3 = slope(y + step_s / 2 * y2, v + step_s / 2 * v2, z + step_s / 2 * z2, u[i + 1])
+        y4, v4, z4 = slope(y + step_s * y3, v + step_s * v3, z + step_s * z3, u[i + 2])
+        y += step_s / 6 * (y1 + 2 * y2 + 2 * y3 + y4)
+        v += step_s / 6 * (v1 + 2 * v2 + 2 * v3 + v4)
+        z += step_s / 6 * (z1 + 2 * z2 + 2 * z3 + z4)
+        found.append(y)
+    return np.array(found)
+
+
+def multisine(samples, seed):
+    """A random-phase multisine of 50 N rms, 5 to 150 Hz, over one period of ``samples`` at the record's rate."""
+    rng = np.random.Generator(np.random.Philox(seed))
+    f = np.fft.rfftfreq(samples, 1 / RATE_HZ)
+    drive = np.fft.irfft(np.where((f >= 5) & (f <= 150), np.exp(2j * pi * rng.random(f.size)), 0.0))
+    return 50.0 * drive / drive.std()
+
+
+def fine_multisine(samples, times, seed):
+    spectrum = np.fft.rfft(multisine(samples, seed))
+    return np.fft.irfft(spectrum, samples * times) * times
+
+
+def predicted(fit, drive, step_s):
+    run = Run("unseen", drive[:, None].copy(), np.zeros((drive.size, 1)), step_s, 1, 0, np.zeros((drive.size, 0)))
+    return simulate(mirror.discretise(fit.mirror, step_s), run)[:, 0]
+
+
+@pytest.fixture(scope="module")
+def benchmark():
+    return runs([read_benchmark()], factor=FINE, hold="band-limited")
+
+
+def read_benchmark():
+    return read_recording(BENCHMARK, "multisine/u", "multisine/y", RATE_HZ, period_samples=8192)
+
+
+@needs_benchmark
+@pytest.mark.parametrize("seed", [0, 1])
+def test_the_benchmark_is_fitted_to_its_noise_and_predicts_what_it_has_not_seen(benchmark, seed):
+    """From starts off by ± 30 %; the noise is what differs between periods that share their drive."""
+    factors = 1 + 0.3 * np.random.Generator(np.random.Philox(seed)).choice([-1.0, 1.0], 6)
+    fit = fit_plant(started(factors), benchmark)
+
+    record = read_benchmark()
+    periods = record.output[:, 0].reshape(5, 8192)
+    noise = np.sqrt(np.mean((periods - periods.mean(axis=0)) ** 2) * 5 / 4)
+    modelled = periods[1:].mean(axis=0) - fit.residuals[0][:, 0]
+    left = np.sqrt(np.mean((periods[1:] - modelled - np.mean(periods[1:] - modelled)) ** 2))
+    assert 7.2e-6 < noise < 7.6e-6
+    assert 0.97 * noise < left < 1.003 * noise
+    assert_allclose(fit.values, PUBLISHED, rtol=0.01)
+    assert np.all(np.abs(fit.values - PUBLISHED) < 4 * fit.standard_errors)
+
+    twice = 2 * FINE
+    unseen = fine_multisine(2048, twice, seed=77)
+    step = 1 / RATE_HZ / FINE
+    oracle = runge_kutta(np.append(unseen, unseen[0]), step)[:-1]
+    error = oracle - predicted(fit, unseen[::2], step)
+    assert 1e-8 < np.sqrt(np.mean(error**2)) <= 1e-6
+    assert np.sqrt(np.mean(oracle**2)) > 5e-4
+
+    time = np.arange(2 * 60_000 + 1) * step / 2
+    sweep = 40.0 * np.sin(2 * pi * (20.0 * time + 30.0 / time[-1] * time**2 / 2))
+    oracle = runge_kutta(sweep, step)
+    error = oracle - predicted(fit, sweep[::2], step)
+    assert 1e-8 < np.sqrt(np.mean(error**2)) <= 1e-6
+    assert np.sqrt(np.mean(oracle**2)) > 3e-4
+
+
+def test_the_oracle_has_converged():
+    drive = fine_multisine(512, 8 * FINE, seed=3)
+    step = 1 / RATE_HZ / FINE
+    coarse = runge_kutta(drive[::4], step)
+    fine = runge_kutta(drive, step / 4)[::4][: coarse.size]
+    assert 1e-12 < np.sqrt(np.mean((coarse - fine) ** 2)) < 3e-8
+
+
+# ------------------------------------------------------------------------------------------------- a small problem
+def low_pass(seed=0, noise=1e-3, samples=2000):
+    """A mass on a linear spring, recorded with noise; slope 0 leaves no hysteresis."""
+    rng = np.random.Generator(np.random.Philox(seed))
+    drive = np.cumsum(rng.standard_normal(samples)) * 0.3
+    drive -= drive[0]
+    truth = hysteretic_oscillator(2.0, 300.0, 5e4, 2e4, 300.0, 100.0)
+    run = Run("", drive[:, None].copy(), np.zeros((samples, 1)), 1e-3, 1, 0, np.zeros((samples, 0)))
+    plant = mirror.discretise(truth.build(np.array([p.start for p in truth.parameters])), 1e-3)
+    output = simulate(plant, run)[:, 0]
+    return recording_from_arrays(drive, output + 5.0 + noise * output.std() * rng.standard_normal(samples), 1000.0)
+
+
+def test_standard_errors_match_the_scatter():
+    truth = np.array([2.0, 300.0, 5e4, 2e4, 300.0, 100.0])
+    structure = hysteretic_oscillator(*(1.1 * truth).tolist())
+    fits = [fit_plant(structure, runs([low_pass(seed, 0.01)], drop=20)) for seed in range(12)]
+    scatter = (np.array([f.values for f in fits]) - truth) / np.array([f.standard_errors for f in fits])
+    assert 0.5 < np.sqrt(np.mean(scatter**2)) < 1.6
+    assert all(f.agreeing_starts == 1 for f in fits)
+
+
+def test_the_offset_of_a_sensor_is_no_parameter_and_drops_out():
+    structure = hysteretic_oscillator(2.2, 270.0, 5.5e4, 1.8e4, 330.0, 90.0)
+    with_offset = fit_plant(structure, runs([low_pass(1, 0.0)]))
+    assert_allclose(with_offset.values, [2.0, 300.0, 5e4, 2e4, 300.0, 100.0], rtol=1e-4)
+    held = fit_plant(structure, runs([low_pass(1, 0.0)], offset=False))
+    assert np.max(np.abs(held.values / with_offset.values - 1)) > 0.01
+
+
+def test_what_is_not_identified_is_named():
+    """Two parameters that only appear as a sum."""
+    base = hysteretic_oscillator(2.0, 300.0, 5e4, 2e4, 300.0, 100.0)
+
+    def build(values):
+        return base.build(np.array([*values[:2], values[2] + values[6], *values[3:6]]))
+
+    twins = Structure("twins", (*base.parameters, Parameter("second stiffness", "N/m", 1e3)), build)
+    fit = fit_plant(twins, runs([low_pass(2)]))
+    named = dict(fit.not_identified)
+    assert "second stiffness" in named
+    assert fit.condition_number > 1e5
+    single = fit_plant(base, runs([low_pass(2)]))
+    assert "mass" not in dict(single.not_identified)
+    assert single.condition_number < 1e3
+
+
+def test_several_starts_are_counted():
+    structure = hysteretic_oscillator(2.0, 300.0, 5e4, 2e4, 300.0, 100.0)
+    near = np.array([2.1, 290.0, 5.2e4, 1.9e4, 320.0, 90.0])
+    calls = []
+    fit = fit_plant(structure, runs([low_pass(3)]), starts=[near, 1.05 * near], on_progress=lambda *a: calls.append(a))
+    assert len(fit.start_costs) == 3
+    assert fit.agreeing_starts == 3
+    assert [c[:2] for c in calls] == [(1, 3), (2, 3), (3, 3)]
+
+
+def test_a_start_that_cannot_be_simulated_is_refused():
+    structure = hysteretic_oscillator(1e-9, 1.0, 5e4, 5e9, 300.0, 100.0)
+    frozen = Structure(
+        structure.name,
+        tuple(Parameter(p.name, p.unit, p.start) for p in structure.parameters[:0]),
+        lambda _: structure.build(np.array([p.start for p in structure.parameters])),
+    )
+    with pytest.raises(
+        IdentificationError, match=r"cannot be simulated from any start at a step of 0\.001 s; begin nearer"
+    ):
+        fit_plant(Structure("stiff", structure.parameters, lambda _: frozen.build(np.zeros(0))), runs([low_pass(4)]))
+
+
+def test_a_slope_that_is_no_number_is_refused_and_no_fault_of_the_program():
+    problem = Problem(hysteretic_oscillator(2.0, 300.0, 5e4, 2e4, 300.0, 100.0), runs([low_pass(3)]))
+    slopes = np.ones((20, 6))
+    assert np.isfinite(_covariance(slopes, np.ones(20), problem)[0]).all()
+    slopes[3, 2] = 1e200
+    with pytest.raises(IdentificationError, match="nothing can be said of their errors; record loops over the whole"):
+        _covariance(slopes, np.ones(20), problem)
+
+
+def test_nothing_left_to_fit_is_refused():
+    with pytest.raises(IdentificationError, match="2000 samples, of which the first 2000 are left out"):
+        runs([low_pass(0)], drop=2000)
+
+
+@pytest.mark.parametrize("hold", ["linear", "zero-order", "band-limited"])
+def test_a_drive_between_its_samples(hold):
+    coarse = np.sin(2 * pi * np.arange(16) / 16)[:, None]
+    fine = upsampled(coarse, 4, hold)[:, 0]
+    assert_allclose(fine[4], coarse[0 if hold == "zero-order" else 1, 0], atol=1e-12)
+    expected = {
+        "linear": (coarse[0, 0] + coarse[1, 0]) / 2,
+        "zero-order": coarse[0, 0],
+        "band-limited": np.sin(pi / 16),
+    }
+    assert_allclose(fine[2], expected[hold], atol=1e-12)

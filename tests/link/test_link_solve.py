@@ -1,0 +1,187 @@
+"""What a key may be at the required margin: against formulas, at both ends of each interval, and in words."""
+
+import csv
+import io
+import json
+import math
+
+import pytest
+
+from link_files import GAUSSIAN, PATTERN, data_with, link_file, received_with, written
+from microrad import link
+from microrad.link import study as link_study
+from microrad.link import under_jitter as link_performance
+
+NO_BEAMS = dict.fromkeys(("beacon", "answer", "acquisition"))
+JITTER = {"jitter": {"bias": ["0 urad", "0 urad"], "rms": ["3 urad", "3 urad"], "bandwidth": "50 Hz"}}
+UNLIKE = {"jitter": {"bias": ["1 urad", "0 urad"], "rms": ["3 urad", "2 urad"], "bandwidth": "50 Hz"}}
+
+
+def solved(folder, key, *changes):
+    return link_study.solve(link_file(folder, *changes), key)
+
+
+def only(solution):
+    (interval,) = solution.solved.intervals
+    return interval
+
+
+def test_power_rate_and_distance_are_those_of_the_formulas(tmp_path):
+    margin = link_performance.margin_db(link_file(tmp_path).mission)
+    spare = 10.0 ** ((margin - 3.0) / 10.0)
+    power = only(solved(tmp_path, "communication.transmit_power"))
+    assert power.low == pytest.approx(5.0 / spare, rel=1e-9) and (power.low_open, power.high_open) == (False, True)
+    rate = only(solved(tmp_path, "communication.data_rate"))
+    assert rate.high == pytest.approx(300e6 * spare, rel=1e-9) and (rate.low_open, rate.high_open) == (True, False)
+    assert only(solved(tmp_path, "communication.distance")).high == pytest.approx(42e6 * math.sqrt(spare), rel=1e-9)
+
+
+def test_a_loss_in_decibels_is_what_is_to_spare(tmp_path):
+    less = {"communication.data_rate": "100 Mbit/s"}
+    margin = link_performance.margin_db(link_file(tmp_path, less).mission)
+    loss = only(solved(tmp_path, "communication.transmit_optics_loss", less))
+    assert loss.low_open and loss.high == pytest.approx(margin - 3.0, abs=1e-9)
+
+
+def test_an_aperture_has_a_least_and_a_most(tmp_path):
+    """Its gain grows by the square, and the pointing loss of its narrower beam by the square in decibels."""
+    solution = solved(tmp_path, "terminals.leo_aperture")
+    found = only(solution)
+    assert not (found.low_open or found.high_open)
+    half = 2.0 * 1.55e-6 / math.pi
+    margin = link_performance.margin_db(link_file(tmp_path).mission)
+    for d in (found.low, found.high):
+        gain, lost = 20.0 * math.log10(d / 0.05), 20.0 * math.log10(math.e) * (1e-5 / half) ** 2 * (d**2 - 0.05**2)
+        assert margin + gain - lost == pytest.approx(3.0, abs=1e-9)
+    assert found.low < solution.solved.best < found.high and solution.solved.best_db > 3.5
+    assert solution.value == found.low == solution.file.mission.terminals.leo_aperture_m
+    assert solution.file.sources["terminals.leo_aperture"].comment == "solved for: 3 dB of communication"
+
+
+def test_a_jitter_of_equal_axes_is_that_of_rayleigh(tmp_path):
+    file = link_file(tmp_path, NO_BEAMS, JITTER)
+    m = file.mission
+    on_axis = link.communication_budget(m, {}, pointing_error_rad=0.0).margin_db
+    half = 2.0 * 1.55e-6 / (math.pi * 0.05)
+    allowed = half * math.sqrt((on_axis - 3.0) / (20.0 * math.log10(math.e)))
+    found = only(link_study.solve(file, "jitter.rms"))
+    assert found.high == pytest.approx(allowed / math.sqrt(-2.0 * math.log(m.requirement.outage)), rel=1e-6)
+    assert link_study.run(link_study.solve(file, "jitter.rms").file).communication.margin_db == pytest.approx(3.0)
+
+
+def test_a_key_of_two_axes_keeps_their_proportion_and_an_axis_stands_by_itself(tmp_path):
+    both = solved(tmp_path, "jitter.rms", NO_BEAMS, UNLIKE)
+    x, y = both.file.mission.jitter.rms_rad
+    assert y == pytest.approx(x * 2.0 / 3.0, rel=1e-12) and x == both.value == only(both).high
+    one = solved(tmp_path, "jitter.rms y", NO_BEAMS, UNLIKE)
+    assert one.file.mission.jitter.rms_rad == (3e-6, only(one).high)
+
+
+def test_a_beam_is_looked_for_at_its_own_margin_and_above_diffraction(tmp_path):
+    solution = solved(tmp_path, "answer.divergence")
+    found = only(solution)
+    assert (solution.of, solution.required_db) == ("answer", 0.0)
+    m = solution.file.mission
+    assert link.answer_budget(m.with_value("answer.divergence_rad", found.high), {}).margin_db == pytest.approx(
+        0.0, abs=1e-9
+    )
+    assert link.fits("answer")(m) and not link.fits("answer")(m.with_value("answer.divergence_rad", found.low * 0.999))
+
+
+@pytest.mark.parametrize(
+    "changes", [{}, PATTERN, received_with("preamplified dpsk")], ids=["gain", "pattern", "receiver"]
+)
+def test_every_key_has_its_margin_inside_and_not_beyond_its_ends(tmp_path, changes):
+    file = link_file(tmp_path, changes, UNLIKE, {"communication.data_rate": "100 Mbit/s"})
+    m = file.mission
+    tables = ("terminals", "communication", "communication.receiver", "communication.beam", "jitter")
+    keys = [each.shown for table in tables for each in link.inputs(m, table) if each.value != 0.0]
+    assert len(keys) > 10
+    for key in keys:
+        try:
+            solution = link_study.solve(file, key)
+        except ValueError as error:
+            assert "moves this margin by nothing" in str(error), key
+            continue
+        found = tuple(each for table in tables for each in link.inputs(m, table) if each.shown == key)
+        for interval in solution.solved.intervals:
+            for end, outside, is_open in (
+                (interval.low, 1.0 - 1e-6, interval.low_open),
+                (interval.high, 1.0 + 1e-6, interval.high_open),
+            ):
+                there = link.moved(m, found, end)
+                assert link_performance.margin_db(there) >= 3.0, key
+                beyond = link.moved(m, found, end * outside)
+                if not is_open and beyond is not None and link.lit(beyond):
+                    assert link.margin_or_none(beyond, link_performance.margin_db) < 3.0, key
+
+
+def test_what_no_value_leaves_is_said_with_the_most(call, tmp_path):
+    far = written(tmp_path, data_with(NO_BEAMS | {"communication.data_rate": "100 Gbit/s"}))
+    result = call("budget", far, "--solve", "terminals.leo_aperture")
+    said = " ".join(result.out.partition("\n\n")[0].split())
+    assert said.startswith(
+        "No value of terminals.leo_aperture from 50 nm to 100 m leaves the required 3 dB of communication: the most is "
+        "\u221221."
+    )
+    assert said.endswith("dB at 66.68 mm. No other was looked at.")
+    data = json.loads(call("budget", far, "--solve", "terminals.leo_aperture", "--json").out)["solved"]
+    assert (data["intervals"], data["value"], result.code) == ([], 0.05, 1)
+
+
+def test_the_solution_stands_first_and_the_budgets_have_it(call, tmp_path):
+    path = written(tmp_path, data_with(NO_BEAMS))
+    result = call("budget", path, "--solve", "terminals.leo_aperture")
+    first, second, *_ = result.out.split("\n\n")
+    assert " ".join(first.split()).startswith(
+        "terminals.leo_aperture leaves the required 3 dB of communication from 50 mm to 91.66 mm, most (+3.76 dB) near "
+    )
+    assert " ".join(first.split()).endswith("Looked at: 50 nm to 100 m. The budgets below have 50 mm.")
+    assert "communication +3.00 dB" in second
+    data = json.loads(call("budget", path, "--solve", "communication.transmit_power", "--json").out)
+    (low, high), *_ = data["solved"]["intervals"]
+    assert high is None and low == data["solved"]["value"] == pytest.approx(5.0, rel=1e-3)
+    assert data["solved"]["searched"] == pytest.approx([5e-6, 1e6], rel=1e-9)  # the rule ends before six decades do
+    assert data["budgets"][0]["margin_db"] == pytest.approx(3.0, abs=1e-9)
+
+
+def test_what_holds_as_far_as_was_looked_says_how_far(call, tmp_path):
+    """It said "at any value", and the margin ends at four times the largest that was looked at."""
+    near = written(tmp_path, data_with(NO_BEAMS | {"communication.distance": "10 m"}))
+    said = " ".join(call("budget", near, "--solve", "communication.distance").out.partition("\n\n")[0].split())
+    assert said == (
+        "communication.distance leaves the required 3 dB of communication wherever it was looked at. "
+        "Looked at: 10 \u00b5m to 10000 km. The budgets below have 10000 km."
+    )
+
+
+def test_the_table_and_the_page_say_what_was_solved_for(call, tmp_path):
+    path = written(tmp_path, data_with(NO_BEAMS))
+    words = ("budget", path, "--solve", "communication.transmit_power")
+    solved = json.loads(call(*words, "--json").out)["solved"]
+    rows = [row for row in csv.DictReader(io.StringIO(call(*words, "--csv").out)) if row["budget"] == "Solved"]
+    found = {row["line"].removeprefix("communication.transmit_power "): row for row in rows}
+    assert float(found["from"]["value"]) == float(found["in the budgets below"]["value"]) == solved["value"]
+    assert found["from"]["basis"] == "leaves the required 3 dB of communication"
+    assert found["to"]["basis"] == "leaves the required 3 dB of communication, as far as was looked"
+    assert [float(found[f"looked at {end}"]["value"]) for end in ("from", "to")] == solved["searched"]
+    assert {row["unit"] for row in rows} == {"W", "dB"}
+    page = call(*words, "--html").out
+    said = " ".join(call(*words).out.partition("\n\n")[0].split())
+    assert said.startswith("communication.transmit_power leaves the required 3 dB of communication from ")
+    assert said in page
+    assert "Solved" not in call("budget", path, "--csv").out
+    assert "Looked at" not in call("budget", path, "--html").out
+
+
+def test_a_key_that_moves_nothing_is_refused(refused, tmp_path):
+    path = written(tmp_path, data_with(NO_BEAMS | UNLIKE))
+    assert "communication.pointing_error moves this margin by nothing" in refused(
+        "budget", path, "--solve", "communication.pointing_error"
+    )
+
+
+def test_a_wider_beam_in_the_same_aperture_has_its_own_best(tmp_path):
+    beam = {"conventions.pointing_loss": "pattern", "communication.beam": {**GAUSSIAN, "radius": "8 mm"}}
+    solution = solved(tmp_path, "communication.beam.radius", NO_BEAMS, beam, {"communication.data_rate": "100 Mbit/s"})
+    assert 8e-3 < solution.solved.best < 0.05

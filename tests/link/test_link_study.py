@@ -1,0 +1,711 @@
+"""What follows from the tables of the links: against hand arithmetic, other libraries' distributions and simulation."""
+
+import math
+import re
+from dataclasses import fields, replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.stats import ncx2, norm
+
+from link_files import PATTERN, RECEIVERS, link_file, received_with
+from microrad import link
+from microrad.core.units import parse_quantity
+from microrad.link import acquisition, requirement
+from microrad.link import partner_search as link_acquisition
+from microrad.link import study as link_study
+from microrad.link.radial_error import Jitter
+from microrad.loop import sensor
+from microrad.mission.file import LinkFile
+from microrad.report import budget_views, links, requirements
+from microrad.report.quantities import quantity
+from preset_files import NAMES, completed
+from shipped import edited_file
+
+URAD, LIGHT_M_S, CHARGE_C = 1e-6, 299_792_458.0, 1.602176634e-19
+NORMAL_99 = float(norm.ppf(0.995))
+FEW = {"acquisition.runs": 100}
+NO_SCAN = {**FEW, "acquisition.scan": None}
+UNCORRECTED = {"point_ahead.corrected": False}
+SHAKEN = {"jitter": {"bias": ["0 urad", "0 urad"], "rms": ["10 urad", "10 urad"], "bandwidth": "50 Hz"}}
+WEAK = {"answer.transmit_power": "4 mW"}  # an answer that the quad cell hardly sees
+
+
+def studied(folder, *changes):
+    """The paper's links with changes, with few simulated acquisitions and no scan, unless they are asked for."""
+    return link_study.run(link_file(folder, NO_SCAN, *changes))
+
+
+@pytest.fixture(scope="module")
+def plain(tmp_path_factory):
+    """The paper's links, with scan, as they are but for the count of runs."""
+    return link_study.run(link_file(tmp_path_factory.mktemp("plain"), {"acquisition.runs": 2000}))
+
+
+# ------------------------------------------------------------------------------------------------- budgets
+def test_the_shipped_mission_has_the_study_of_its_links(tmp_path, plain):
+    file = edited_file(tmp_path, ("runs = 4000 ", "runs = 2000 "))
+    found = link_study.run(LinkFile(file.mission, file.path, file.text, file.sha256, file.sources))
+    assert [each.margin_db for each in found.budgets] == [each.margin_db for each in plain.budgets]
+    assert found.finding.chances == plain.finding.chances
+    assert found.finding.wide.outcome.mean_time_s == plain.finding.wide.outcome.mean_time_s
+    assert "paper: Table 2" in next(line.source for line in found.communication.lines if line.name == "Transmit power")
+
+
+def test_the_beacon_is_judged_by_how_often_it_covers_its_partner(tmp_path):
+    """By a million draws: 100 µrad constant about both axes, 100 µrad rms about each, in a cone of 390 µrad."""
+    lines = {"pointing.lines.misalignment.error": "100 urad", "pointing.lines.orbit_knowledge.error": "0 urad"}
+    drawn = np.random.default_rng(1).normal(100 * URAD, 100 * URAD, (1_000_000, 2))
+    share = np.mean(np.hypot(*drawn.T) < 390 * URAD)
+    for confidence, mark in ((0.95, "PASS"), (0.99, "FAIL")):
+        found = studied(tmp_path, lines, {"pointing.confidence": confidence, "point_ahead.error": "0 urad"})
+        row = requirement.of_beams(found)[0]
+        assert (row.name, row.unit, row.mark) == ("beacon covers its partner", "%", mark)
+        assert row.actual == pytest.approx(100 * share, abs=0.1)
+        assert row.required == 100 * confidence
+        assert row.margin == row.actual - row.required
+        assert re.search(rf"covers its partner +{100 * confidence:g} % +98\.\d %", budget_views.text(found, 80))
+
+
+def test_errors_that_were_derived_from_the_cone_are_held_against_their_root_sum_square_alone(tmp_path):
+    def row(*change):
+        file = edited_file(tmp_path, ("runs = 4000 ", "runs = 100 "), *change)
+        links = LinkFile(file.mission, file.path, file.text, file.sha256, file.sources)
+        return requirement.of_beams(link_study.run(links))[0]
+
+    own, other = row(), row(('error = "248 urad"', 'error = "247 urad"'))
+    assert (own.name, own.unit, own.mark) == ("beacon cone over the root sum square", "rad", "derived")
+    assert own.derived[0].startswith("pointing.lines.misalignment.error = 248 urad")
+    assert (other.name, other.mark) == ("beacon covers its partner", "FAIL")
+    assert other.actual == pytest.approx(53.5, abs=0.5)
+
+
+RATHER = (
+    r"; to (?:move it, change|meet it, take) (\S+?)(?:, which may be| =) (\S+ \S+) (?:at|or) (least|most|more|less)"
+)
+
+
+@pytest.mark.parametrize(
+    ("changes", "key", "unit", "word"),
+    [
+        ({"pointing.confidence": 0.5}, "communication.transmit_power", "W", "least"),
+        (
+            {"pointing.confidence": 0.5, "communication.transmit_power": "3 W"},
+            "communication.transmit_power",
+            "W",
+            "more",
+        ),
+        ({"pointing.confidence": 0.5, "requirement.margin": "0 dB"}, "beacon.divergence", "rad", "least"),
+        ({"pointing.confidence": 0.6}, "beacon.divergence", "rad", "more"),
+        ({"answer.transmit_power": "50 mW", "pointing.confidence": 0.5}, "answer.transmit_power", "W", "more"),
+        ({"pointing.confidence": 0.5, **SHAKEN}, "jitter.rms", "rad", "less"),
+    ],
+)
+def test_what_to_change_just_meets_the_requirement(tmp_path, changes, key, unit, word):
+    found = studied(tmp_path, changes)
+    judged = requirement.of_links(found)
+    row = requirements.nearest(judged)
+    (said,) = [re.search(RATHER, sentence) for sentence in budget_views.short(found) if RATHER[:5] in sentence]
+    assert (said[1], said[3]) == (key, word) and row.met is (word == "least")
+    value = parse_quantity(said[2], unit)
+    side = -1 if word == "less" else 1
+    for factor, met in ((1.0, True), (1.0 - 0.01 * side, False)):
+        there = f"{value * factor} {unit}"
+        changed = {**changes, key: there}
+        if key == "jitter.rms":
+            changed = {**changes, "jitter": SHAKEN["jitter"] | {"rms": [there, there]}}
+        (again,) = [r for r in requirement.of_links(studied(tmp_path, changed)) if r.subject == row.subject]
+        assert again.met is met
+
+
+def test_far_more_power_than_there_is_is_no_advice(tmp_path):
+    found = studied(tmp_path, {"pointing.confidence": 0.5, "communication.distance": "400000 km"})
+    (said,) = [sentence for sentence in budget_views.short(found) if "; to meet it, " in sentence]
+    assert said.endswith(f"; to meet it, change {found.tornados[0].swings[0].key}.")
+
+
+def test_all_three_budgets_are_there_and_communication_is_the_first(plain):
+    assert [each.name for each in plain.budgets] == ["Communication", "Beacon", "Answer"]
+    m, sources = plain.file.mission, plain.file.sources
+    assert plain.budgets == (
+        link.communication_budget(m, sources),
+        link.beacon_budget(m, sources),
+        link.answer_budget(m, sources),
+    )
+
+
+@pytest.mark.parametrize(
+    ("absent", "names"),
+    [
+        (("beacon",), ["Communication", "Answer"]),
+        (("answer",), ["Communication", "Beacon"]),
+        (("beacon", "answer", "acquisition", "point_ahead"), ["Communication"]),
+    ],
+)
+def test_a_link_that_is_not_there_has_no_budget_and_nothing_finds_the_partner(tmp_path, absent, names):
+    found = link_study.run(link_file(tmp_path, dict.fromkeys(absent)))
+    assert [each.name for each in found.budgets] == names
+    assert found.finding is None
+    assert (found.tracking is None) == ("answer" in absent)
+    assert (found.point_ahead is None) == ("point_ahead" in absent)
+    assert (found.open_loop.reading is None) == ("beacon" in absent)
+
+
+def test_links_close_when_each_of_them_does(tmp_path, plain):
+    assert plain.closes
+    spare = {each.name: 10 ** (each.margin_db / 10) for each in plain.budgets}
+    for name, nanowatts in (("Beacon", 0.01), ("Answer", 0.1)):
+        for factor, closes in ((0.999, True), (1.001, False)):
+            power = {f"{name.lower()}.required_power": f"{nanowatts * spare[name] * factor} nW"}
+            assert studied(tmp_path, power, {"acquisition": None}).closes is closes
+    assert not studied(tmp_path, {"communication.data_rate": "601 Mbit/s"}, {"acquisition": None}).closes
+
+
+def test_warnings_are_those_of_every_budget_and_none_where_all_is_given(tmp_path, plain):
+    assert len(plain.warnings) == 3
+    assert all(link.LEFT_AT_ZERO in warning for warning in plain.warnings)
+    assert [warning.partition(" ")[0] for warning in plain.warnings] == ["Communication", "Beacon", "Answer"]
+    assert "Transmit optics loss, Receive optics loss, Tracking split loss" in plain.warnings[0]
+    losses = {
+        f"{table}.{key}": "0.1 dB"
+        for table in ("communication", "beacon", "answer")
+        for key in ("transmit_optics_loss", "receive_optics_loss", "tracking_split_loss", "implementation_loss")
+        if table == "communication" or key.endswith("optics_loss")
+    }
+    assert studied(tmp_path, losses).warnings == ()
+    deep = studied(tmp_path, losses, UNCORRECTED).warnings
+    assert [warning.partition(":")[0] for warning in deep] == ["Communication budget", "Answer budget"]
+    assert all("Point-ahead loss: beyond 20 dB" in warning for warning in deep)
+
+
+def test_the_tornado_holds_each_input_with_the_largest_swing_first(plain):
+    swings = [each.swing_db for each in plain.tornados[0].swings]
+    assert swings == sorted(swings, reverse=True)
+    by_key = {each.key: each for each in plain.tornados[0].swings}
+    assert by_key["communication.transmit_power"].swing_db == pytest.approx(10 * math.log10(1.1 / 0.9), rel=1e-9)
+    assert by_key["communication.distance"].swing_db == pytest.approx(20 * math.log10(1.1 / 0.9), rel=1e-9)
+    assert {key.partition(".")[0] for key in by_key} == {"communication", "terminals"}
+
+
+def test_jitter_of_the_mission_is_studied_where_it_is_given(tmp_path, plain):
+    assert plain.under_jitter is None
+    jitter = {"jitter": {"bias": ["0 urad", "0 urad"], "rms": ["2 urad", "2 urad"], "bandwidth": "50 Hz"}}
+    found = studied(tmp_path, jitter).under_jitter
+    assert found.source == "jitter as given"
+    assert found.jitter.rms_rad == pytest.approx((2 * URAD, 2 * URAD))
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_each_preset_with_its_gaps_filled_is_studied(tmp_path, name):
+    file = completed(tmp_path, name)
+    m = file.mission
+    if m.acquisition is not None:
+        few = m.acquisition.model_copy(update={"runs": 100, "scan": None})
+        m = m.model_copy(update={"acquisition": few})
+    found = link_study.run(LinkFile(m, file.path, file.text, file.sha256, file.sources))
+    assert all(math.isfinite(each.margin_db) for each in found.budgets)
+    assert len(found.budgets) == 1 + (m.beacon is not None) + (m.answer is not None)
+    assert found.largest_rate_bit_s > 0.0
+    assert len(found.tornados[0].swings) > 10
+    assert (found.under_jitter is None) == (m.jitter is None)
+    assert (found.finding is None) == (name != "paper")
+
+
+# ---------------------------------------------------------------------------------------------- data rate solved for
+def test_the_largest_data_rate_leaves_the_required_margin(tmp_path, plain):
+    found = studied(tmp_path, {"communication.data_rate": "largest"})
+    rate = found.file.mission.communication.data_rate_bit_s
+    assert found.communication.margin_db == pytest.approx(3.0, abs=1e-9)  # both errors are 10 urad
+    assert rate == pytest.approx(plain.largest_rate_bit_s, rel=1e-12)
+    assert found.largest_rate_bit_s == pytest.approx(rate, rel=1e-12)
+    source = found.file.sources["communication.data_rate"]
+    assert source.value == "300 Mbit/s"
+    assert source.comment == "solved for: the largest with 3 dB at 10 µrad"
+    line = next(line for line in found.communication.totals if line.name == "Required power")
+    assert "solved for" in line.source
+
+
+def test_the_largest_data_rate_is_judged_at_the_required_error_and_not_at_the_budgeted_one(tmp_path):
+    stricter = {"communication.data_rate": "largest", "requirement.pointing_error": "15 urad"}
+    found = studied(tmp_path, stricter)
+    half = 1.55e-6 / (math.pi * 0.025)
+    more_db = 20 / math.log(10) * (15e-6**2 - 10e-6**2) / half**2
+    assert found.communication.margin_db == pytest.approx(3.0 + more_db, abs=1e-9)
+
+
+def test_a_data_rate_that_is_given_is_left_alone(tmp_path):
+    file = link_file(tmp_path, NO_SCAN)
+    assert link_study.solve_rate(file) is file
+
+
+def test_no_data_rate_is_found_where_noise_is_too_much(tmp_path):
+    far = {**received_with("pin ook"), "requirement.margin": "60 dB", "communication.data_rate": "1 Mbit/s"}
+    assert math.isnan(studied(tmp_path, far).largest_rate_bit_s)
+    with pytest.raises(link.LinkError, match="not even 1 bit/s leaves a margin of 60 dB"):
+        studied(tmp_path, far, {"communication.data_rate": "largest"})
+    near = studied(tmp_path, far, {"requirement.margin": "1 dB", "communication.data_rate": "largest"})
+    assert near.largest_rate_bit_s > 1e6
+
+
+def test_a_receiver_that_does_not_take_the_rate_is_refused_with_the_highest_that_it_takes(tmp_path):
+    highest = 4e9 * RECEIVERS["homodyne bpsk"]["code_rate"]
+    studied(tmp_path, received_with("homodyne bpsk"), {"communication.data_rate": f"{highest / 1e9} Gbit/s"})
+    with pytest.raises(ValueError, match=r"3\.2 Gbit/s"):
+        studied(tmp_path, received_with("homodyne bpsk"), {"communication.data_rate": "3.3 Gbit/s"})
+
+
+# ------------------------------------------------------------------------------------------------- tracking light
+def by_hand(power_w, rate_hz=5e3):
+    """Signal-to-noise ratio and noise-equivalent angle of the paper's quad cell and aperture, by their formulas."""
+    bandwidth = rate_hz / 2
+    square = 2 * CHARGE_C * (power_w + 4 * 1e-9) * bandwidth + 4 * bandwidth * 0.05e-12**2
+    ratio = power_w / math.sqrt(square)
+    return ratio, 3 * math.pi / 16 * 1.55e-6 / 0.05 / ratio
+
+
+@pytest.mark.parametrize("changes", [{}, WEAK], ids=["as is", "weak"])
+def test_the_answers_light_gives_the_noise_equivalent_angle(tmp_path, changes):
+    found = studied(tmp_path, changes)
+    tracked, ratio_and_angle = found.tracking, by_hand(found.answer.received_power_w)
+    assert tracked.power_w == found.answer.received_power_w
+    assert (tracked.signal_to_noise, tracked.noise_equivalent_angle.value) == pytest.approx(ratio_and_angle, rel=1e-9)
+    cell = sensor.QuadCell(1.0, 0.0, 1e-9, 0.05e-12)
+    bandwidth = sensor.noise_bandwidth_hz(5e3)
+    assert tracked.signal_to_noise == pytest.approx(cell.signal_to_noise(tracked.power_w, bandwidth), rel=1e-12)
+    assert [line.value for line in tracked.noise_lines] == pytest.approx(
+        [line.value for line in cell.noise_lines(tracked.power_w, bandwidth)]
+    )
+    assert all(line.source.startswith("answer budget; ") for line in tracked.noise_lines)
+    assert "Tyler and Fried" in tracked.noise_equivalent_angle.basis
+
+
+def test_without_a_quad_cell_no_light_is_tracked(tmp_path):
+    found = studied(tmp_path, {"acquisition.sensor": None})
+    assert found.tracking is None
+    assert found.finding.chances.answer_detection == 0.9  # acquisition.detection_probability
+    assert found.finding.chances.return_coverage == pytest.approx(1.0)
+    assert studied(tmp_path, {"acquisition": None}).tracking is None
+
+
+# ---------------------------------------------------------------------------------------------------- point-ahead
+def test_point_ahead_is_71_microradians_and_3_6_half_angles_of_the_beam(plain):
+    effect, half = plain.point_ahead, 1.55e-6 / (math.pi * 0.025)
+    angle = 2 * 10_650 / LIGHT_M_S
+    assert f"{effect.angle_rad / URAD:.0f}" == "71"
+    assert f"{effect.beam_half_angles:.1f}" == "3.6"
+    assert effect.corrected
+    assert (effect.angle_rad, effect.beam_half_angles) == pytest.approx((angle, angle / half), rel=1e-12)
+    assert effect.mirror_range_rad == pytest.approx(2 * angle, rel=1e-12)
+    left_out = 20 / math.log(10) * ((10e-6 + angle) ** 2 - 10e-6**2) / half**2
+    assert effect.loss_db == pytest.approx(left_out, rel=1e-12)
+
+
+@pytest.mark.parametrize("changes", [{}, PATTERN, {"conventions.pointing_loss": "gain"}], ids=["w", "pattern", "gain"])
+def test_point_ahead_left_out_costs_the_budget_what_the_study_says(tmp_path, changes):
+    corrected, not_corrected = studied(tmp_path, changes), studied(tmp_path, changes, UNCORRECTED)
+    lost = corrected.communication.margin_db - not_corrected.communication.margin_db
+    assert corrected.point_ahead.loss_db == pytest.approx(lost, rel=1e-9)
+    assert not_corrected.point_ahead.loss_db == pytest.approx(lost, rel=1e-9)
+    assert not not_corrected.point_ahead.corrected
+
+
+# ---------------------------------------------------------------------------------------------------- acquisition
+def reach_rad(power_w, half_rad, aperture_m, needed_w):
+    """Angle off a Gaussian beam's axis at which an aperture at 44 000 km still receives what is needed."""
+    on_axis = power_w * 10**-0.04 * 2 / (math.pi * (half_rad * 44e6) ** 2) * math.pi / 4 * aperture_m**2
+    return half_rad * math.sqrt(math.log(on_axis / needed_w) / 2)
+
+
+def within(radius_rad, bias_rad, rms_rad):
+    """Probability that two equal Gaussian axes with a bias stay within a radius, by the non-central chi-squared law."""
+    return float(ncx2.cdf((radius_rad / rms_rad) ** 2, 2, (bias_rad / rms_rad) ** 2))
+
+
+def test_each_beam_suffices_as_far_off_its_axis_as_it_brings_the_power_that_is_needed(plain):
+    found = plain.finding
+    assert found.beacon_radius_rad == pytest.approx(reach_rad(4.0, 390 * URAD, 0.15, 10e-12), rel=1e-6)
+    assert found.answer_radius_rad == pytest.approx(reach_rad(1.0, 20 * URAD, 0.05, 100e-12), rel=1e-6)
+    half = 1.55e-6 / (math.pi * 0.025)
+    on_axis_db = plain.communication.margin_db + 20 / math.log(10) * (10e-6 / half) ** 2
+    assert on_axis_db < 20 / math.log(10)  # its margin ends before 1/e2
+    assert found.return_radius_rad == pytest.approx(half * math.sqrt(on_axis_db / (20 / math.log(10))), rel=1e-9)
+    assert f"{found.chances.return_coverage:.4f}" == "1.0000"
+
+
+def test_the_narrow_beam_back_suffices_to_its_1_e2_at_most_and_nowhere_without_margin_on_its_axis(tmp_path):
+    half = 1.55e-6 / (math.pi * 0.025)
+    strong = studied(tmp_path, {"communication.transmit_power": "100 W"}).finding
+    assert strong.return_radius_rad == pytest.approx(half, rel=1e-12)
+    weak = studied(tmp_path, {"communication.transmit_power": "1 W"}).finding  # 1.8 dB short on its axis
+    assert weak.return_radius_rad == 0.0
+    assert not weak.wide.possible
+    assert strong.wide.possible
+    uncorrected = studied(tmp_path, {"communication.transmit_power": "100 W"}, UNCORRECTED).finding
+    assert uncorrected.return_radius_rad == pytest.approx(half, rel=1e-12)
+
+
+def test_a_beam_with_power_to_spare_is_counted_on_down_to_20_db(tmp_path):
+    strong = studied(tmp_path, {"beacon.required_power": "0.01 pW"}).finding
+    assert strong.beacon_radius_rad == pytest.approx(390 * URAD * math.sqrt(20.0 / (20 / math.log(10))), rel=1e-9)
+
+
+def drawn(radius_rad, ahead_rad=0.0, count=1_000_000):
+    """Share of drawn open-loop errors, worst satellite, within a radius, and the half width of its 99 % interval."""
+    draw = np.random.Generator(np.random.Philox(key=7))
+    corrected = 1.0 / math.sqrt(2) if ahead_rad == 0.0 else 0.0
+    axes = [draw.normal(0.0, 100.0, count) + 248.0 + 12.0 + corrected for _ in range(2)]
+    axes = [axis + draw.normal(0.0, 24.0 / math.sqrt(12), count) for axis in axes]
+    share = float(np.mean(np.hypot(axes[0] + ahead_rad / URAD, axes[1]) < radius_rad / URAD))
+    return share, NORMAL_99 * math.sqrt(share * (1 - share) / count)
+
+
+def test_the_chances_are_those_of_draws_and_of_textbook_distributions(tmp_path, plain):
+    chances = plain.finding.chances
+    share, interval = drawn(reach_rad(4.0, 390 * URAD, 0.15, 10e-12))
+    assert abs(chances.beacon_coverage - share) < interval
+    assert plain.finding.sigma_rad == pytest.approx(
+        math.hypot(260.7071, 100 * math.hypot(1, 0.0692820)) * URAD, rel=1e-6
+    )
+    assert (chances.frame_detection, chances.lock) == (0.9, 0.95)
+
+    weak = studied(tmp_path, WEAK, {"answer.required_power": "0.7 pW", "point_ahead.error": "19 urad"})
+    ratio, angle = by_hand(weak.answer.received_power_w)
+    found, half = weak.finding.chances, weak.finding.return_radius_rad
+    reach = reach_rad(4e-3, 20 * URAD, 0.05, 0.7e-12)
+    assert found.answer_coverage == pytest.approx(within(reach, 0.0, 10e-6 / 3), rel=1e-9)
+    assert found.answer_detection == pytest.approx(norm.sf(5.0 - ratio * math.sqrt(50)), rel=1e-9)  # 50 readings
+    assert 0.05 < found.answer_detection < 0.95
+    assert found.return_coverage == pytest.approx(within(half, 19e-6, angle), rel=1e-6)
+    assert 0.05 < found.return_coverage < 0.95
+
+
+def test_point_ahead_left_out_moves_the_beams_and_not_their_radii(tmp_path, plain):
+    found, angle = studied(tmp_path, UNCORRECTED).finding, 2 * 10_650 / LIGHT_M_S
+    assert found.beacon_radius_rad == pytest.approx(plain.finding.beacon_radius_rad, rel=1e-9)
+    assert found.answer_radius_rad == pytest.approx(plain.finding.answer_radius_rad, rel=1e-9)
+    share, interval = drawn(found.beacon_radius_rad, angle)
+    assert abs(found.chances.beacon_coverage - share) < interval
+    assert found.chances.answer_coverage == 1e-12  # 71 urad off a beam that suffices to 23
+    wide = studied(tmp_path, UNCORRECTED, {"answer.divergence": "200 urad", "answer.required_power": "1 pW"})
+    reach = reach_rad(1.0, 100 * URAD, 0.05, 1e-12)
+    assert reach > angle
+    assert wide.finding.chances.answer_coverage == pytest.approx(within(reach, angle, 10e-6 / 3), rel=1e-9)
+
+
+def test_a_beam_that_brings_too_little_power_even_on_its_axis_finds_nobody(tmp_path):
+    found = studied(tmp_path, {"answer.required_power": "1 uW"}).finding
+    assert found.answer_radius_rad == 0.0
+    assert found.chances.answer_coverage == 1e-12
+    assert found.wide.outcome.success_probability < 1e-10
+    assert found.wide.simulated_probability == 0.0
+    assert math.isnan(found.wide.simulated_mean_s)
+    assert found.wide.log[-1].to == acquisition.LOST
+
+
+def test_a_partner_that_points_without_error_is_hit(tmp_path):
+    assert studied(tmp_path, {"answer.pointing_error": "0 urad"}).finding.chances.answer_coverage == 1.0
+
+
+def test_stages_take_the_times_of_the_mission(plain):
+    light = 44e6 / LIGHT_M_S
+    stages = {stage.name: stage for stage in plain.finding.wide.stages}
+    wanted = {
+        "LEO points the beacon": 10.0,
+        "beacon travels": light,
+        "GEO detects": 1.0,
+        "GEO turns and answers": 2.0,
+        "answer travels": light,
+        "LEO detects the answer": 0.01,
+        "LEO's mirror turns": 0.1,
+        "narrow beam travels": light,
+        "GEO locks": 1.0,
+        "GEO's beam travels": light,
+        "LEO locks": 1.0,
+    }
+    assert {name: stage.duration_s for name, stage in stages.items()} == pytest.approx(wanted)
+    chances = plain.finding.chances
+    assert stages["GEO detects"].success_probability == pytest.approx(chances.beacon_coverage * (1 - 0.1**100))
+    assert stages["LEO locks"].success_probability == 0.95
+    without_failure = sum(wanted.values())
+    assert plain.finding.wide.outcome.locked.quantile(0.05) == pytest.approx(without_failure, rel=1e-9)
+
+
+def agrees(found):
+    """Whether the simulation of a process agrees with its closed form within 99 %, each of probability and mean."""
+    p, runs = found.outcome.success_probability, found.simulated.locked.size
+    near = abs(found.simulated_probability - p) <= NORMAL_99 * math.sqrt(p * (1 - p) / runs) + 0.5 / runs
+    interval = NORMAL_99 * found.outcome.locked.std_s / math.sqrt(p * runs)
+    return near and abs(found.simulated_mean_s - found.outcome.mean_time_s) <= interval
+
+
+def test_the_closed_form_and_the_simulation_agree_and_the_log_is_the_first_run(tmp_path, plain):
+    assert plain.finding.wide.name == "wide beacon"
+    twice = link_study.run(link_file(tmp_path, {"acquisition.runs": 2000, "acquisition.attempts": 2})).finding
+    assert 0.8 < twice.wide.outcome.success_probability < 0.95
+    for found in (plain.finding.wide, plain.finding.scan, twice.wide, twice.scan):
+        assert agrees(found)
+        assert found.simulated.locked.size == 2000
+        assert found.log[-1].time_s == found.simulated.time_s[0]
+        assert found.log[-1].to == (acquisition.LOCKED if found.simulated.locked[0] else acquisition.LOST)
+        assert found.outcome.success_probability + found.outcome.failure_probability == pytest.approx(1.0)
+
+
+def test_the_seed_decides_the_runs(tmp_path):
+    first, same, other = (
+        studied(tmp_path, {"acquisition.seed": seed}).finding.wide.simulated.time_s for seed in (1, 1, 2)
+    )
+    assert np.array_equal(first, same)
+    assert not np.array_equal(first, other)
+
+
+# ----------------------------------------------------------------------------------------------------------- scan
+RADIUS_RAD = 279.3138e-6 * math.sqrt(-2 * math.log(0.005))
+SPEED_RAD_S = 2 * 20e-6 * math.sqrt(1 - 0.75**2) / 1e-3
+PITCH_RAD = 30e-6
+
+
+def hexagons():
+    """Places of a hexagonal grid of the pitch within the radius, counted."""
+    i, j = np.meshgrid(np.arange(-80, 81), np.arange(-80, 81))
+    x, y = PITCH_RAD * (i + j / 2), PITCH_RAD * math.sqrt(3) / 2 * j
+    return int(np.sum(np.hypot(x, y) <= RADIUS_RAD))
+
+
+def rows():
+    return math.ceil(2 * RADIUS_RAD / PITCH_RAD)
+
+
+@pytest.mark.parametrize(
+    ("pattern", "duration_s", "speed_rad_s"),
+    [
+        ("spiral", math.pi * RADIUS_RAD**2 / (PITCH_RAD * SPEED_RAD_S), SPEED_RAD_S),
+        ("raster", rows() * 2 * RADIUS_RAD / SPEED_RAD_S + (rows() - 1) * 1e-3, SPEED_RAD_S),
+        ("step-stare", hexagons() * 2e-3 - 1e-3, None),
+    ],
+)
+def test_each_kind_of_scan_is_as_fast_as_its_detector_allows(tmp_path, monkeypatch, pattern, duration_s, speed_rad_s):
+    monkeypatch.setattr(link_acquisition, "TRADE_RAD", np.array([1e-4]))
+    found = link_study.run(link_file(tmp_path, {"acquisition.runs": 1000, "acquisition.scan.pattern": pattern})).finding
+    scanned = found.scanned
+    assert scanned.radius_rad == pytest.approx(RADIUS_RAD, rel=1e-6)
+    assert scanned.duration_s == pytest.approx(duration_s, rel=1e-5)
+    assert scanned.speed_rad_s == (None if speed_rad_s is None else pytest.approx(speed_rad_s, rel=1e-12))
+    assert found.scan is scanned.found
+    assert found.scan.name == f"{pattern} scan"
+    assert [stage.name for stage in found.scan.stages[:2]] == ["LEO points the scan", "beam travels"]
+    assert [stage.name for stage in found.scan.stages[3:]] == [stage.name for stage in found.wide.stages[3:]]
+    detects = found.scan.stages[2]
+    assert detects.longest_s <= duration_s * (1 + 1e-6)
+    assert 0.9 < detects.success_probability <= 0.995 + 1e-3
+    assert agrees(found.scan)
+
+
+@pytest.mark.parametrize("pattern", ["spiral", "raster"])
+@pytest.mark.parametrize(("overlap", "allowed"), [(0.0, False), (0.0009, False), (0.001, True)])
+def test_tracks_must_overlap(tmp_path, pattern, overlap, allowed):
+    changes = {"acquisition.scan.overlap": overlap, "acquisition.scan.pattern": pattern}
+    if allowed:
+        assert link_file(tmp_path, FEW, changes).mission.acquisition.scan.overlap == overlap
+        return
+    with pytest.raises(ValueError, match=rf'(?s)overlap.*pattern = "{pattern}".*overlap = 0.25 or pattern = "step-st'):
+        link_file(tmp_path, FEW, changes)
+
+
+def test_dwells_need_no_overlap_and_have_no_trade_then(tmp_path):
+    dwells = {"acquisition.scan.overlap": 0.0, "acquisition.scan.pattern": "step-stare"}
+    found = link_study.run(link_file(tmp_path, FEW, dwells)).finding
+    assert 0.5 < found.scan.stages[2].success_probability < 0.995
+    assert found.trade is None
+
+
+def test_a_direction_that_is_known_without_error_is_not_scanned(tmp_path):
+    lines = ("body_pointing", "orbit_knowledge", "misalignment")
+    sure = {f"pointing.lines.{name}.error": "0 urad" for name in lines} | {"point_ahead": None}
+    with pytest.raises(ValueError, match=r"pointing\.lines: every error is 0 rad"):
+        link_study.run(link_file(tmp_path, FEW, sure))
+    assert studied(tmp_path, sure).finding.chances.beacon_coverage == 1.0
+
+
+def test_the_scan_waits_for_the_light_that_the_sensor_needs(tmp_path, monkeypatch, plain):
+    monkeypatch.setattr(link_acquisition, "TRADE_RAD", np.array([1e-4]))
+    half = math.sqrt(8) * 1.55e-6 / (math.pi * 0.05)  # of diffraction at the aperture, wider than 20 urad
+    on_axis = 4.0 * 10**-0.04 * 2 / (math.pi * (half * 44e6) ** 2) * math.pi / 4 * 0.15**2
+    edge = on_axis * math.exp(-2 * (20 * URAD / half) ** 2)
+    assert plain.finding.scanned.half_angle_rad == pytest.approx(half, rel=1e-12)
+    assert plain.finding.scanned.needed_detection_s == pytest.approx(0.01 * (10e-12 / edge) ** 2, rel=1e-9)
+    assert plain.finding.scanned.needed_detection_s < plain.finding.scanned.stated_detection_s == 1e-3
+    assert "needs" not in links.acquisition_words(plain.finding)[1]
+
+    dim = link_study.run(link_file(tmp_path, FEW, {"beacon.required_power": "10 nW"})).finding
+    needed = 0.01 * (10e-9 / edge) ** 2
+    assert dim.scanned.needed_detection_s == pytest.approx(needed, rel=1e-9)
+    assert needed > 1e-3
+    assert dim.scanned.duration_s == pytest.approx(plain.finding.scanned.duration_s * needed / 1e-3, rel=1e-9)
+    assert dim.scanned.speed_rad_s == pytest.approx(dim.trade.speed_rad_s, rel=1e-9)
+    assert f"needs {quantity(needed, 's')} in place of the 1 ms" in links.acquisition_words(dim)[1]
+    data = budget_views.finding_data(dim)
+    assert (data["scan_stated_detection_s"], data["scan_needed_detection_s"]) == pytest.approx((1e-3, needed))
+
+
+@pytest.mark.parametrize("used_urad", [1, 27, 28, 60])
+def test_no_beam_of_a_scan_is_brighter_than_its_aperture_makes_it(tmp_path, used_urad):
+    changes = {"acquisition.scan.beam_radius": f"{used_urad} urad", "beacon.required_power": "10 nW"}
+    file = link_file(tmp_path, FEW, changes)
+    m, scan = file.mission, file.mission.acquisition.scan
+    beacon = link.beacon_budget(m, file.sources)
+    beams, receiver = link_acquisition._sender(m, m.beacon, beacon, m.acquisition, scan)
+    most = 4.0 * 10**-0.04 * math.pi / 4 * 0.05**2 / (1.55e-6 * 44e6) ** 2  # P A / (lambda R)^2
+    on_axis = float(beams.irradiance_w_m2(beams.narrow_half_angle_rad, 0.0))
+    assert on_axis == pytest.approx(most if used_urad < 27.9 else most * (27.9098 / used_urad) ** 2, rel=1e-4)
+    assert beams.edge_irradiance_w_m2 < on_axis
+    needed = float(receiver.detection_time_s(receiver.aperture_area_m2 * beams.edge_irradiance_w_m2))
+    assert needed > 0.01 * (10e-9 / (most * receiver.aperture_area_m2)) ** 2
+
+
+@pytest.mark.parametrize("changes", [{"beacon.required_power": "1 mW"}, {"beacon.transmit_optics_loss": "900 dB"}])
+def test_a_scan_with_too_little_light_never_finds(tmp_path, changes):
+    found = link_study.run(link_file(tmp_path, FEW, changes)).finding
+    assert not found.scanned.detects
+    assert not any(way.possible for way in found.ways)
+    assert found.trade is None
+    assert "It detects nothing" in links.acquisition_words(found)[1]
+    assert all("never" in sentence for sentence in budget_views.acquisition(found))
+    assert [budget_views.finding_data(found)[key] for key in ("scan_s", "scan_needed_detection_s")] == [None, None]
+
+
+def test_a_way_that_never_locks_has_no_times(tmp_path):
+    found = studied(tmp_path, {"answer.required_power": "1 uW"}).finding
+    (row,) = links.acquisition(found)["ways"]
+    assert row["cells"] == ["never", "0.0000", "\u2013", "none locks", "\u2013"]
+    assert budget_views.acquisition(found) == ["Acquisition by wide beacon: never (simulated 0.0000)."]
+    (way,) = budget_views.finding_data(found)["ways"]
+    assert (way["mean_time_s"], way["simulated_mean_time_s"]) == (None, None)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [{"answer.pointing_error": "600 urad"}, {"answer.transmit_optics_loss": "200 dB"}],
+    ids=["off its axis", "lossy"],
+)
+def test_an_answer_without_light_is_a_result_and_no_refusal(tmp_path, changes):
+    found = studied(tmp_path, changes)
+    assert not found.closes
+    assert found.tracking.noise_equivalent_angle is None
+    assert found.tracking.signal_to_noise < 1e-6
+    assert found.finding.chances.answer_detection == pytest.approx(norm.sf(5.0), rel=1e-3)
+    assert not found.finding.wide.possible
+    assert any("less than its noise" in sentence for sentence in budget_views.sentences(found))
+    assert budget_views.data(found)["tracking"]["noise_equivalent_angle_rad"] is None
+    names = [line.name for name, line in budget_views.lines(found) if name == "Tracking sensor"]
+    assert names == [line.name for line in found.tracking.noise_lines]
+
+
+def test_an_answer_in_the_noise_keeps_its_angle_down_to_the_least_signal(tmp_path, plain):
+    per_watt = by_hand(1e-20)[0] / 1e-20 * plain.tracking.power_w  # ratio over transmitted power, which is 1 W there
+    for ratio, seen in ((1.01e-6, True), (0.99e-6, False)):
+        tracked = studied(tmp_path, {"answer.transmit_power": f"{ratio / per_watt} W"}).tracking
+        assert tracked.signal_to_noise == pytest.approx(ratio, rel=1e-6)
+        assert (tracked.noise_equivalent_angle is not None) == seen
+
+
+def test_stages_have_the_names_of_the_terminals(tmp_path):
+    named = {"terminals.leo_name": "OICETS", "terminals.geo_name": "ARTEMIS"}
+    names = [stage.name for stage in studied(tmp_path, named).finding.wide.stages]
+    assert names[0] == "OICETS points the beacon"
+    assert not any("LEO" in name or "GEO" in name for name in names)
+    twins = studied(tmp_path, {"terminals.leo_name": "LCT", "terminals.geo_name": "LCT"}).finding.wide.stages
+    assert [stage.name for stage in twins][-3::2] == ["LCT (partner) locks", "LCT (own) locks"]
+
+
+def test_a_mission_without_a_scan_is_found_by_its_beacon_alone(tmp_path):
+    found = studied(tmp_path).finding
+    assert (found.scanned, found.scan, found.trade) == (None, None, None)
+    assert found.ways == (found.wide,)
+    assert found.wide.outcome.success_probability > 0.99
+
+
+# ---------------------------------------------------------------------------------------------------------- trade
+def wide_time_s(sigma_rad, receive=1.0):
+    """Time of a beacon as wide as the uncertainty: 10 ms at 10 pW, four times as long at half the power, by hand."""
+    radius = sigma_rad * np.sqrt(-2 * np.log(0.005))
+    edge = 4.0 * 10**-0.04 * 2 / (np.pi * 2 * (radius * 44e6) ** 2) * np.exp(-1.0) * np.pi / 4 * 0.15**2 * receive
+    return np.maximum(0.01 * (10e-12 / edge) ** 2, 1e-3)
+
+
+def test_the_trade_spreads_the_beacons_power_or_leads_it_over_the_uncertainty(plain):
+    trade, sigma = plain.finding.trade, link_acquisition.TRADE_RAD
+    assert_allclose(trade.sigma_rad, sigma)
+    assert {np.shape(getattr(trade, each.name)) for each in fields(trade)} == {sigma.shape, ()}
+    assert_allclose(trade.radius_rad, sigma * math.sqrt(-2 * math.log(0.005)), rtol=1e-12)
+    assert_allclose(trade.wide_time_s, wide_time_s(sigma), rtol=1e-9)
+    assert trade.wide_time_s[0] == 1e-3
+    assert trade.wide_time_s[-1] > 0.01
+    # the narrow beam is bright enough for the shortest look: as fast as the mission's own scan
+    assert trade.speed_rad_s == pytest.approx(SPEED_RAD_S, rel=1e-9)
+    assert_allclose(trade.scan_time_s, np.pi * trade.radius_rad**2 / (PITCH_RAD * SPEED_RAD_S), rtol=1e-9)
+    assert np.all(trade.scan_mean_time_s < trade.scan_time_s)
+    search = acquisition.Search(float(sigma[3]), 20 * URAD, 0.25, 0.995)
+    scan = acquisition.Spiral(search, acquisition.Detector(1e-3), trade.speed_rad_s)
+    shaken = acquisition.detection_times(scan, 5 * URAD)  # acquisition.scan.jitter
+    assert trade.scan_probability[3] == pytest.approx(shaken.probability, rel=1e-9)
+    assert trade.scan_mean_time_s[3] == pytest.approx(shaken.mean_s, rel=1e-9)
+    assert shaken.probability < acquisition.detection_times(scan).probability
+
+
+@pytest.mark.parametrize(
+    ("changes", "receive"),
+    [
+        ({"beacon.receive_optics_loss": "3 dB", "terminals.geo_obscuration": 0.5}, 10**-0.3 * 0.75),
+        ({"beacon.pointing_error": "100 urad"}, 1.0),
+        (UNCORRECTED, 1.0),
+        ({"beacon.pointing_error": "50 mrad"}, 1.0),
+        ({"beacon.divergence": "60 urad", "beacon.pointing_error": "600 urad"}, 1.0),
+    ],
+    ids=["lossy receiver", "another error", "no point-ahead", "far off its axis", "narrow and off its axis"],
+)
+def test_the_trade_counts_all_losses_but_those_off_axis(tmp_path, monkeypatch, changes, receive):
+    sigma = np.array([3e-4, 1e-3])
+    monkeypatch.setattr(link_acquisition, "TRADE_RAD", sigma)
+    found = link_study.run(link_file(tmp_path, FEW, changes)).finding
+    assert_allclose(found.trade.wide_time_s, wide_time_s(sigma, receive), rtol=1e-9)
+
+
+def test_the_uncertainty_of_a_search_is_that_of_the_worse_axis(tmp_path):
+    """With its bias, and whichever axis that is."""
+    study = link_study.run(link_file(tmp_path, {"acquisition.runs": 2000}))
+    for bias, rms in (((30e-6, 0.0), (40e-6, 20e-6)), ((0.0, 30e-6), (20e-6, 40e-6))):
+        off = replace(study.open_loop, error=Jitter(bias, rms))
+        m = study.file.mission
+        found = link_acquisition.finding(m, off, study.beacon, study.answer, study.tracking)
+        assert found.sigma_rad == pytest.approx(50e-6, rel=1e-12)
+
+
+# ------------------------------------------------------------------------------------------------- radius of the beam
+def lit_by(folder, radius, aperture="5 cm", error="0 urad"):
+    changes = {"communication.beam": {"profile": "gaussian", "radius": radius, "m_squared": 1.0}}
+    changes |= {"terminals.leo_aperture": aperture, "communication.pointing_error": error}
+    return link_study.run(link_file(folder, PATTERN, changes))
+
+
+def test_the_best_radius_of_a_beam_is_the_published_one(tmp_path):
+    """Klein and Degnan (1974): 1.12 radii of the beam to that of an unobscured aperture, on the axis."""
+    found = lit_by(tmp_path, "10 mm")
+    assert found.beam_radius.best_m == pytest.approx(25e-3 / 1.12, rel=0.06)
+    there = lit_by(tmp_path, f"{found.beam_radius.best_m * 1e3:.6f} mm")
+    assert there.communication.margin_db - found.communication.margin_db == pytest.approx(
+        found.beam_radius.gained_db, abs=1e-6
+    )
+
+
+def test_an_aperture_that_grows_around_an_unchanged_beam_is_pointed_out(tmp_path):
+    def told(aperture):
+        study = lit_by(tmp_path, "20 mm", aperture, "2 urad")
+        return study.communication.margin_db, [s for s in budget_views.short(study) if "radius" in s]
+
+    (filled, quiet), (hollow, said) = told("5 cm"), told("10 cm")
+    assert hollow - filled < 3.0  # where an aperture that is filled brings 6 dB at either end
+    assert quiet == []
+    (sentence,) = said
+    assert sentence.startswith("The beam's radius of 20 mm leaves ")
+    assert link_study.run(link_file(tmp_path)).beam_radius is None

@@ -1,0 +1,520 @@
+"""The [fine_pointing] table: what a good one holds, and what a bad one is told, with a value that would do."""
+
+import math
+import re
+
+import numpy as np
+import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+
+from microrad.loop import disturbance, sensor
+from microrad.mirror import geometry
+from microrad.mission.file import MissionError, load_mission
+from microrad.mission.model import mission_schema
+from microrad.mission.tables import fine_pointing as fine_pointing_table
+from microrad.mission.tables.fine_pointing import FinePointing, GeometryTable
+from microrad.mission.toml import scan
+from places import ROOT
+
+SHIPPED = ROOT / "missions" / "paper.toml"
+TEXT = SHIPPED.read_text(encoding="utf-8")
+BEFORE, TABLE = re.fullmatch(r"(.*?)(\[fine_pointing\]\n.*)", TEXT, re.DOTALL).groups()
+
+
+def edited(*changes, text=TEXT):
+    """The text with keys below fine_pointing given another value, taken out (None), or added to their table."""
+    for key, value in changes:
+        statements = [s for s in scan(text) if s.key == f"fine_pointing.{key}" and s.kind == "key"]
+        lines = text.split("\n")
+        name = key.rpartition(".")[2]
+        if statements:
+            lines[statements[0].line - 1] = "" if value is None else f"{name} = {value}"
+        else:
+            header = f"[fine_pointing.{key.rpartition('.')[0]}]".replace(".]", "]")
+            lines.insert(lines.index(header) + 1, f"{name} = {value}")
+        text = "\n".join(lines)
+    return text
+
+
+def uncommented(header):
+    """The shipped text with a table that is commented out put into force."""
+    lines = TEXT.split("\n")
+    place = lines.index(f"# [{header}]")
+    while lines[place].startswith("# "):
+        lines[place] = lines[place].removeprefix("# ")
+        place += 1
+    return "\n".join(lines)
+
+
+@pytest.fixture
+def load(tmp_path):
+    """Write a text and read its table."""
+
+    def read(text):
+        path = tmp_path / "mission.toml"
+        path.write_text(text, encoding="utf-8")
+        return load_mission(path).mission.fine_pointing
+
+    return read
+
+
+@pytest.fixture
+def refuse(load):
+    """Write a text with one fault, and return that fault."""
+
+    def read(text):
+        with pytest.raises(MissionError) as refused:
+            load(text)
+        (fault,) = refused.value.faults
+        assert all(part in str(refused.value) for part in (fault.key, fault.value, fault.reason, fault.expected))
+        return fault
+
+    return read
+
+
+# ---- a good table
+def test_the_shipped_table_is_read_in_si(load):
+    table = load(TEXT)
+    assert (table.rate_hz, table.delay_s, table.plant_step_s) == (5e3, 200e-6, 40e-6)
+    assert (table.amplifier_bandwidth_hz, table.drive_resolution_v, table.reference_filter_hz) == (1e3, 0.305e-3, 1e3)
+    assert (table.modulus_margin, table.quantile) == (0.5, 0.997)
+    assert (table.runs, table.duration_s, table.settle_s, table.seed) == (64, 2.0, 0.5, 1)
+    assert (table.geometry.layout, table.geometry.travel_angle) == ("two-axis", "optical")
+    assert (table.geometry.incidence_rad, table.geometry.magnification, table.geometry.rotation_rad) == (0.0, 1.0, 0.0)
+    assert (table.geometry.coupling_rows, table.geometry.actuator_radius_m) == (((1.0, 0.0), (0.0, 1.0)), None)
+    assert (table.vibration.spectrum, table.vibration.convention) == ("olympus", "radial")
+    assert (table.body.error_rad, table.body.sigmas, table.body.bandwidth_hz) == (300e-6, 3.0, 0.1)
+    assert table.body.convention == "per-axis"
+    optical, gauge, reference = table.optical_sensor, table.strain_gauge, table.reference
+    assert (optical.noise_rad, optical.field_of_view_rad, optical.resolution_rad) == (1e-6, 2e-3, 0.0)
+    assert (optical.rate_hz, optical.delay_s, optical.quad_cell) == (5e3, 0.0, None)
+    assert (gauge.noise_rad, gauge.resolution_rad) == (0.1e-6, 0.027e-6)
+    assert (reference.point_ahead_rad, reference.line_of_sight_rate_rad_s) == (71e-6, 255e-6)
+    assert (reference.point_ahead_on_mirror, reference.rate_feedforward) == (True, 0.99)
+    assert table.wheels is None
+
+
+def test_whole_numbers_and_switches_keep_their_kind(load):
+    table = load(edited(("seed", str(2**63 - 1)), ("runs", "1"), ("reference.point_ahead_on_mirror", "false")))
+    assert table.seed == 2**63 - 1  # no float holds it
+    assert (type(table.seed), type(table.runs), table.runs) == (int, int, 1)
+    assert table.reference.point_ahead_on_mirror is False
+
+
+def test_every_value_of_the_shipped_table_says_where_it_comes_from():
+    sources = {k: s for k, s in load_mission(SHIPPED).sources.items() if k.startswith("fine_pointing.")}
+    assert len(sources) == len(re.findall(r"^\w+ = ", TABLE, re.MULTILINE)) > 30
+    assert {source.kind for source in sources.values()} == {"paper", "assumption"}
+
+
+def test_a_mission_does_without_the_table_and_is_the_same_otherwise(tmp_path):
+    path = tmp_path / "mission.toml"
+    path.write_text(BEFORE, encoding="utf-8")
+    mission = load_mission(path).mission
+    assert mission.fine_pointing is None
+    assert mission.model_dump(exclude={"fine_pointing"}) == load_mission(SHIPPED).mission.model_dump(
+        exclude={"fine_pointing"}
+    )
+
+
+def test_only_wheels_strain_gauge_and_quad_cell_may_be_left_out(refuse, load):
+    for name in ("geometry", "vibration", "body", "optical_sensor", "reference"):
+        fault = refuse(re.sub(rf"\[fine_pointing\.{name}\]\n(?:[^\[]*=.*\n)*", "", TEXT))
+        assert (fault.key, fault.reason) == (f"fine_pointing.{name}", "is missing")
+        assert "a table with the keys" in fault.expected
+    assert load(re.sub(r"\[fine_pointing\.strain_gauge\]\n.*\n.*\n", "", TEXT)).strain_gauge is None
+
+
+def test_what_is_optional_has_no_other_default():
+    optional = {name for name, field in FinePointing.model_fields.items() if not field.is_required()}
+    assert optional == {"wheels", "strain_gauge"}
+    shipped = {key.removeprefix("fine_pointing.") for key in load_mission(SHIPPED).sources if "fine_pointing" in key}
+    assert {key for key in shipped if "." not in key} == {
+        field.alias or name
+        for name, field in FinePointing.model_fields.items()
+        if not hasattr(field.annotation, "model_fields") and name not in optional
+    }
+
+
+@pytest.mark.parametrize(
+    ("keys", "expected"),
+    [
+        ({"spectrum": '"first-order"', "level": '"160 urad^2/Hz"', "corner": '"2 Hz"'}, (160e-12, 2.0)),
+        ({"spectrum": '"bands"', "edges": '["0 Hz", "1 Hz", "10 Hz"]', "rms": '["8.6 urad", "2.8 urad"]'},
+         ((0.0, 1.0, 10.0), (8.6e-6, 2.8e-6))),
+        ({"spectrum": '"table"', "file": '"lab/spectrum.csv"'}, ("lab/spectrum.csv",)),
+    ],
+)  # fmt: skip
+def test_each_spectrum_has_its_own_keys(load, keys, expected):
+    vibration = load(edited(*((f"vibration.{key}", value) for key, value in keys.items()))).vibration
+    attributes = {"level": "level_rad2_hz", "corner": "corner_hz", "edges": "edges_hz", "rms": "rms_rad"}
+    read = {key: getattr(vibration, attributes.get(key, key)) for key in ("level", "corner", "edges", "rms", "file")}
+    assert tuple(read[key] for key in keys if key != "spectrum") == expected
+    assert all(value is None for key, value in read.items() if key not in keys)
+
+
+def test_a_tripod_has_a_radius(load):
+    table = load(edited(("geometry.layout", '"tripod"'), ("geometry.actuator_radius", '"10 mm"'))).geometry
+    assert (table.layout, table.actuator_radius_m) == ("tripod", 0.01)
+
+
+# ---- the parts that the table is for take it as it is
+def test_the_shipped_disturbances_have_the_rms_that_their_comments_say(load):
+    table = load(TEXT)
+    shaken = disturbance.olympus(convention=table.vibration.convention)
+    assert math.sqrt(2.0) * shaken.rms_rad == pytest.approx(15.9e-6, rel=5e-3)
+    body = table.body
+    slow = disturbance.body_pointing(body.error_rad, body.sigmas, body.bandwidth_hz, convention=body.convention)
+    assert slow.rms_rad == pytest.approx(100e-6, rel=1e-9)
+
+
+def test_the_wheel_that_is_commented_out_has_the_lines_that_it_says(load):
+    wheels = load(uncommented("fine_pointing.wheels")).wheels
+    made = disturbance.wheels(
+        wheels.speed_hz, wheels.harmonics, wheels.coefficients_rad_hz2, convention=wheels.convention
+    )
+    lines = [(line.freq_hz, line.amplitude_rad) for line in made.lines]
+    np.testing.assert_allclose(lines, [(50.0, 0.25e-6), (100.0, 0.1e-6)], rtol=1e-12)
+
+
+def test_the_quad_cell_that_is_commented_out_has_the_noise_that_it_says(load):
+    text = uncommented("fine_pointing.optical_sensor.quad_cell")
+    table = load(edited(("optical_sensor.noise", None), text=text))
+    quad, mission = table.optical_sensor.quad_cell, load_mission(SHIPPED).mission
+    cell = sensor.QuadCell(
+        quad.responsivity_a_w, quad.background_power_w, quad.dark_current_a, quad.thermal_noise_a_sqrt_hz
+    )
+    spot = sensor.AirySpot(mission.answer.wavelength_m, mission.terminals.leo_aperture_m)
+    line = sensor.noise_equivalent_angle_line(cell, spot, quad.received_power_w, table.optical_sensor.rate_hz)
+    assert line.value == pytest.approx(0.97e-6, rel=5e-3)
+    assert quad.received_power_w == mission.answer.required_power_w
+    assert quad.spot == "airy"
+
+
+def _seen(table, angle="optical"):
+    return geometry.Geometry(
+        angle,
+        table.incidence_rad,
+        table.magnification,
+        table.rotation_rad,
+        table.coupling_rows,
+        table.layout,
+        table.actuator_radius_m,
+    )
+
+
+@settings(deadline=None, max_examples=60)
+@given(
+    st.lists(
+        st.sampled_from([0.0, 1.0, -1.0, 0.5, 2e-4, 1e-4]) | st.floats(-2.0, 2.0).map(lambda x: round(x, 9)),
+        min_size=4,
+        max_size=4,
+    ),
+    st.sampled_from([0.0, 45.0, 89.0, 89.99, 89.999, 90.0]),
+    st.sampled_from(["two-axis", "tripod"]),
+)
+@example([1.0, 0.0, 0.0, 1.01e-4], 0.0, "two-axis")
+@example([1.0, 0.0, 0.0, 0.99e-4], 0.0, "two-axis")
+@example([1.0, 1.0, -1.0, -1.0], 0.0, "tripod")
+@example([1e-4, 0.0, 0.0, 1.0], 89.999, "two-axis")
+@example([1e-12, 0.0, 0.0, 1.0], 90.0, "two-axis")
+def test_a_geometry_is_taken_exactly_where_its_decoupling_exists(coupling, degrees, layout):
+    given_keys = {"layout": layout, "incidence": f"{degrees} deg", "magnification": 3.0, "rotation": "30 deg"}
+    given_keys |= {"coupling": coupling, "travel_angle": "optical"}
+    given_keys |= {"actuator_radius": "10 mm"} if layout == "tripod" else {}
+    rows = (tuple(coupling[:2]), tuple(coupling[2:]))
+    try:
+        radius = 0.01 if layout == "tripod" else None
+        made = geometry.Geometry("optical", math.radians(degrees), 3.0, math.radians(30.0), rows, layout, radius)
+        geometry.outputs_matrix(made)
+        decouples = True
+    except (ValueError, np.linalg.LinAlgError):
+        decouples = False
+    try:
+        table = GeometryTable.model_validate(given_keys)
+    except ValueError as error:
+        assert not decouples, error
+        return
+    assert decouples
+    np.testing.assert_allclose(geometry.line_of_sight_matrix(_seen(table)), geometry.line_of_sight_matrix(made))
+
+
+def test_coupling_and_incidence_are_told_apart_where_a_geometry_is_singular(load):
+    for coupling, incidence, keys in [
+        ("[1.0, 1.0, 1.0, 1.0]", '"0 deg"', {"coupling"}),
+        ("[1.0, 0.0, 0.0, 1.0]", '"89.999 deg"', {"incidence"}),
+        ("[1.0, 1.0, 1.0, 1.0]", '"89.999 deg"', {"coupling", "incidence"}),
+        ("[1.0, 0.0, 0.0, 0.01]", '"89.9 deg"', {"coupling"}),  # each by itself would do
+    ]:
+        with pytest.raises(MissionError) as refused:
+            load(edited(("geometry.coupling", coupling), ("geometry.incidence", incidence)))
+        assert {fault.key.rpartition(".")[2] for fault in refused.value.faults} == keys
+
+
+def test_a_geometry_is_singular_here_where_it_is_there():
+    assert fine_pointing_table.WORST_CONDITION == geometry.WORST_CONDITION
+
+
+# ---- one value wrong
+ONE_WRONG = [
+    ("rate", "5000", "number without a unit", 'rate = "5000 Hz"'),
+    ("rate", '"0 Hz"', "not above 0 Hz", "above 0 Hz"),
+    ("delay", '"190 us"', "no whole number of plant_step", "would do"),
+    ("delay", '"-20 us"', "below 0 s", "at least 0 s"),
+    ("plant_step", '"30 us"', "does not divide the control period 1 / fine_pointing.rate (200 µs)", "would do"),
+    ("plant_step", '"1e-300 s"', "more than 1000000 times", "nearer to 1 / fine_pointing.rate"),
+    ("amplifier_bandwidth", '"0 Hz"', "not above 0 Hz", "above 0 Hz"),
+    ("drive_resolution", '"-1 mV"', "below 0 V", 'drive_resolution = "5 mV"'),
+    ("reference_filter", '"2.5 kHz"', "not below half of fine_pointing.rate (2.5 kHz)", "would do"),
+    ("modulus_margin", "0", "not above 0 and below 1", "modulus_margin = 0.5"),
+    ("modulus_margin", "1", "not above 0 and below 1", "modulus_margin = 0.5"),
+    ("modulus_margin", '"0.5"', "not a plain number", "without quotes"),
+    ("quantile", "99.7", "not above 0 and below 1", "quantile = 0.5"),
+    ("quantile", "nan", "not a finite number", "quantile = "),
+    ("runs", "0", "below 1", "from 1 to 100000; for example runs = 2"),
+    ("runs", "100001", "above 100000", "from 1 to 100000"),
+    ("runs", "64.0", "not a whole number", "a whole number without quotes"),
+    ("runs", "true", "not a whole number", "a whole number without quotes"),
+    ("runs", '"64"', "not a whole number", "without quotes"),
+    ("seed", "-1", "below 0", "from 0 to 9223372036854775807"),
+    ("seed", "9223372036854775808", "above 9223372036854775807", "from 0 to 9223372036854775807"),
+    ("duration", "10", "number without a unit", 'duration = "10 s"'),
+    ("duration", '"1e8 s"', "more than 100000000 samples of fine_pointing.rate", "would do"),
+    ("settle", '"2 s"', "not less than duration (2 s)", "would do"),
+    ("settle", '"1.99999 s"', "leaves no control sample behind settle", "would do"),
+    ("geometry.layout", '"tripods"', "none of the choices", 'layout = "tripod"'),
+    ("geometry.incidence", '"90 deg"', "grazes the mirror", "would do"),
+    ("geometry.incidence", '"-1 deg"', "below 0 deg", 'incidence = "5 deg"'),
+    ("geometry.magnification", "0", "not above 0", "above 0"),
+    ("geometry.magnification", '"10"', "not a plain number", "without quotes"),
+    ("geometry.rotation", "90", "number without a unit", 'rotation = "90 deg"'),
+    ("geometry.coupling", "[1.0, 0.0, 1.0]", "has 3 items", "would do"),
+    ("geometry.coupling", "[1.0, 1.0, 2.0, 2.0]", "is singular: it moves the line of sight over 10000 times", "would"),
+    ("geometry.coupling", "[0.0, 0.0, 0.0, 0.0]", "is singular", "would do"),
+    ("geometry.coupling", '["1", 0.0, 0.0, 1.0]', "item 1", "a list"),
+    ("geometry.actuator_radius", '"10 mm"', 'does not belong to layout = "two-axis"', 'or layout = "tripod"'),
+    ("geometry.travel_angle", '"electrical"', "none of the choices", 'travel_angle = "optical"'),
+    ("vibration.spectrum", '"olympic"', "none of the choices", 'spectrum = "olympus"'),
+    ("vibration.convention", '"both"', "none of the choices", 'convention = "radial" or convention = "per-axis"'),
+    ("vibration.level", '"160 urad^2/Hz"', 'does not belong to spectrum = "olympus"', 'or spectrum = "first-order"'),
+    ("vibration.level", '"160 urad"', "another kind of quantity", 'level = "5 urad^2/Hz"'),
+    ("vibration.level", '"160 rad^2/Hz"', "is above 1 rad^2/Hz", "at most 1 rad^2/Hz"),
+    ("vibration.corner", '"1 Hz"', 'does not belong to spectrum = "olympus"', 'or spectrum = "first-order"'),
+    ("vibration.edges", '["0 Hz", "1 Hz"]', 'does not belong to spectrum = "olympus"', 'or spectrum = "bands"'),
+    ("vibration.rms", '["1 urad"]', 'does not belong to spectrum = "olympus"', 'or spectrum = "bands"'),
+    ("vibration.rms", '["0 urad"]', "item 1", "above 0 rad"),
+    ("vibration.file", '"a.csv"', 'does not belong to spectrum = "olympus"', 'or spectrum = "table"'),
+    ("vibration.file", '""', "wrong kind", "text in quotes"),
+    ("body.error", '"-1 urad"', "below 0 rad", 'error = "5 urad"'),
+    ("body.sigmas", "0", "not above 0", "above 0"),
+    ("body.bandwidth", '"12.5 kHz"', "not below half of 1 / fine_pointing.plant_step (12.5 kHz)", "would do"),
+    ("body.convention", '"3-sigma"', "none of the choices", 'convention = "per-axis"'),
+    ("optical_sensor.noise", None, "is missing, and so is the table quad_cell", "would do"),
+    ("optical_sensor.field_of_view", '"0 mrad"', "not above 0 rad", "above 0 rad"),
+    ("optical_sensor.rate", '"10 kHz"', "above fine_pointing.rate (5 kHz)", "would do"),
+    ("optical_sensor.rate", '"3 kHz"', "does not divide fine_pointing.rate (5 kHz)", 'rate = "2.5 kHz" would do'),
+    ("optical_sensor.rate", '"2 kHz"', "does not divide", 'rate = "1.66666666667 kHz" would do'),
+    ("optical_sensor.rate", '"1 mHz"', "less than fine_pointing.rate (5 kHz) divided by 1000000", "would do"),
+    ("optical_sensor.delay", '"90 us"', "no whole number of plant_step", 'delay = "80 µs" would do'),
+    ("optical_sensor.delay", '"1e9 s"', "more than 1000000 times fine_pointing.plant_step", "would do"),
+    ("strain_gauge.noise", "0.1", "number without a unit", '"0.1 urad"'),
+    ("reference.point_ahead", '"-71 urad"', "below 0 rad", "at least 0 rad"),
+    ("reference.point_ahead_on_mirror", '"yes"', "neither true nor false", "point_ahead_on_mirror = true"),
+    ("reference.point_ahead_on_mirror", "1", "neither true nor false", "without quotes"),
+    ("reference.point_ahead_on_mirror", None, "is missing", "true or false, without quotes"),
+    ("reference.line_of_sight_rate", '"255 urad"', "another kind", 'line_of_sight_rate = "5 urad/s"'),
+    ("reference.rate_feedforward", "99", "above 1", "at most 1"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("key", "value", "reason", "expected"), ONE_WRONG)
+def test_one_bad_value_is_one_fault_and_what_would_do_does(refuse, load, key, value, reason, expected):
+    text = edited((key, value))
+    fault = refuse(text)
+    assert fault.key == f"fine_pointing.{key}" or (key, fault.key) == ("settle", "fine_pointing.duration")
+    assert value is None or value.startswith("[") or fault.value == value or fault.key.endswith("duration")
+    assert reason in fault.reason
+    assert expected in fault.expected
+    assert fault.line
+    if "would do" in fault.expected:
+        _check_advice(load, text, fault)
+
+
+def _check_advice(load, text, fault):
+    """The lines that the advice names make a good file."""
+    table = fault.key.rpartition(".")[0].removeprefix("fine_pointing").lstrip(".")
+    named = re.findall(r'(\w+) = ("[^"]*"|\[[^\]]*\])', fault.expected.partition("would do")[0])
+    assert named, fault.expected
+    changes = [(f"{table}.{name}".lstrip("."), value) for name, value in named]
+    assert isinstance(load(edited(*changes, text=text)), FinePointing)
+
+
+@pytest.mark.parametrize(
+    ("changes", "key", "reason"),
+    [
+        ([("spectrum", '"first-order"'), ("corner", '"1 Hz"')], "level", 'spectrum = "first-order" needs it'),
+        ([("spectrum", '"first-order"'), ("level", '"1 urad^2/Hz"')], "corner", 'spectrum = "first-order" needs it'),
+        ([("spectrum", '"bands"'), ("edges", '["0 Hz", "1 Hz"]')], "rms", 'spectrum = "bands" needs it'),
+        ([("spectrum", '"bands"'), ("rms", '["1 urad"]')], "edges", 'spectrum = "bands" needs it'),
+        ([("spectrum", '"table"')], "file", 'spectrum = "table" needs it'),
+        ([("spectrum", '"first-order"'), ("level", '"1 urad^2/Hz"'), ("corner", '"12.5 kHz"')], "corner", "not below"),
+        ([("spectrum", '"bands"'), ("edges", '["1 Hz"]'), ("rms", '["1 urad"]')], "edges", "has 1 item"),
+    ],
+)
+def test_a_spectrum_that_lacks_a_key_names_a_line_that_would_do(refuse, load, changes, key, reason):
+    text = edited(*((f"vibration.{name}", value) for name, value in changes))
+    fault = refuse(text)
+    assert fault.key == f"fine_pointing.vibration.{key}"
+    assert reason in fault.reason
+    assert "would do" in fault.expected
+    _check_advice(load, text, fault)
+
+
+@pytest.mark.parametrize(
+    ("edges", "rms", "key", "reason", "expected"),
+    [
+        ('["0 Hz", "1 Hz"]', '["1 urad", "2 urad"]', "rms", "has 2 items where edges has 2", "1 item, for the one"),
+        ('["0 Hz", "1 Hz", "2 Hz"]', '["1 urad"]', "rms", "has 1 item where edges has 3", "2 items, one for each band"),
+        ('["1 Hz", "0 Hz"]', '["1 urad"]', "edges", "does not rise", "rising"),
+        ('["-1 Hz", "0 Hz"]', '["1 urad"]', "edges", "item 1", "at least 0 Hz"),
+        ('["1 Hz", "30 kHz"]', '["1 urad"]', "edges", "reaches 30 kHz, not below half of 1 / fine_pointing.plant_step",
+         "edges that end below 12.5 kHz, at 2.5 kHz for example"),
+    ],
+)  # fmt: skip
+def test_bands_have_edges_that_rise_and_an_rms_each(refuse, edges, rms, key, reason, expected):
+    changes = [("vibration.spectrum", '"bands"'), ("vibration.edges", edges), ("vibration.rms", rms)]
+    fault = refuse(edited(*changes))
+    assert fault.key == f"fine_pointing.vibration.{key}"
+    assert reason in fault.reason
+    assert expected in fault.expected
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "reason", "expected"),
+    [
+        ("speed", '"0 Hz"', "not above 0 Hz", "above 0 Hz"),
+        ("speed", '"20 kHz"', "puts harmonic 2 at 40 kHz, not below half of 1 / fine_pointing.plant_step", "would do"),
+        ("harmonics", "[1.0, 0.0]", "item 2", "above 0"),
+        ("harmonics", "[1.0]", "has 2 items where harmonics has 1", "1 of them, one coefficient for each harmonic"),
+        ("coefficients", '["1 nrad/Hz^2"]', "has 1 item where harmonics has 2", "2 of them"),
+        ("coefficients", '["1 nrad/Hz^2", "1 nrad/Hz"]', "item 2", "squared frequency"),
+        ("convention", '"total"', "none of the choices", 'convention = "radial"'),
+        ("convention", None, "is missing", 'convention = "radial"'),
+    ],
+)
+def test_a_wheel_has_a_coefficient_for_each_harmonic_below_the_plants_rate(refuse, load, key, value, reason, expected):
+    text = edited((f"wheels.{key}", value), text=uncommented("fine_pointing.wheels"))
+    fault = refuse(text)
+    counts = key == "harmonics" and "where" in reason
+    assert fault.key == f"fine_pointing.wheels.{'coefficients' if counts else key}"
+    assert reason in fault.reason
+    assert expected in fault.expected
+    if "would do" in fault.expected:
+        _check_advice(load, text, fault)
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "reason", "expected"),
+    [
+        ("responsivity", '"1 V/W"', "another kind", 'responsivity = "5 A/W"'),
+        ("background_power", '"-1 pW"', "below 0 W", "at least 0 W"),
+        ("dark_current", '"1 nW"', "another kind", 'dark_current = "5 nA"'),
+        ("thermal_noise", '"1 pA^2/Hz"', "another kind", 'thermal_noise = "5 pA/sqrt(Hz)"'),
+        ("thermal_noise", '"1 pA/rtHz"', 'no unit is called "rtHz"', 'thermal_noise = "5 pA/sqrt(Hz)"'),
+        ("received_power", '"0 pW"', "not above 0 W", "above 0 W"),
+        ("spot", '"gaussian"', "none of the choices", 'spot = "airy"'),
+    ],
+)
+def test_a_quad_cell_is_described_in_the_units_of_its_data_sheet(refuse, key, value, reason, expected):
+    text = edited(("optical_sensor.noise", None), text=uncommented("fine_pointing.optical_sensor.quad_cell"))
+    fault = refuse(edited((f"optical_sensor.quad_cell.{key}", value), text=text))
+    assert fault.key == f"fine_pointing.optical_sensor.quad_cell.{key}"
+    assert reason in fault.reason
+    assert expected in fault.expected
+
+
+def test_the_sensors_noise_is_said_once(refuse):
+    fault = refuse(uncommented("fine_pointing.optical_sensor.quad_cell"))
+    assert (fault.key, fault.value) == ("fine_pointing.optical_sensor.noise", '"1 urad"')
+    assert "stands beside the table quad_cell" in fault.reason
+    assert "one of the two removed" in fault.expected
+
+
+def test_a_tripod_without_a_radius_names_one_that_would_do(refuse, load):
+    text = edited(("geometry.layout", '"tripod"'))
+    fault = refuse(text)
+    assert (fault.key, fault.reason) == (
+        "fine_pointing.geometry.actuator_radius", 'is missing, and layout = "tripod" needs it'
+    )  # fmt: skip
+    _check_advice(load, text, fault)
+
+
+def test_faults_of_several_tables_are_told_at_once(load):
+    text = edited(("reference_filter", '"5 kHz"'), ("delay", '"190 us"'), ("optical_sensor.rate", '"3 kHz"'))
+    with pytest.raises(MissionError) as refused:
+        load(text.replace('distance = "44000 km"', "distance = 44000", 1))
+    assert {fault.key for fault in refused.value.faults} == {
+        "fine_pointing.reference_filter", "fine_pointing.delay", "fine_pointing.optical_sensor.rate", "beacon.distance"
+    }  # fmt: skip
+
+
+def test_an_unknown_key_is_shown_with_the_nearest(refuse):
+    fault = refuse(TEXT.replace("modulus_margin = 0.5", "modulus_margins = 0.5"))
+    assert (fault.key, fault.nearest) == ("fine_pointing.modulus_margins", "modulus_margin")
+
+
+@pytest.mark.parametrize(("rate", "readings"), [("5 kHz", 1), ("2.5 kHz", 2), ("1.66666666667 kHz", 3), ("1 Hz", 5000)])
+def test_a_rate_that_divides_is_taken_and_is_a_sensors(load, rate, readings):
+    table = load(edited(("optical_sensor.rate", f'"{rate}"'), ("optical_sensor.delay", '"40 us"')))
+    optical = table.optical_sensor
+    made = sensor.optical_sensor(
+        optical.noise_rad,
+        optical.field_of_view_rad,
+        rate_hz=optical.rate_hz,
+        delay_s=optical.delay_s,
+        control_rate_hz=table.rate_hz,
+        plant_step_s=table.plant_step_s,
+    )
+    assert (made.every, made.delay_steps) == (readings, 1)
+
+
+@settings(deadline=None)
+@given(st.floats(1e-3, 6e3))
+def test_a_rate_is_refused_exactly_where_a_sensor_refuses_it(rate_hz):
+    table = load_mission(SHIPPED).mission.fine_pointing
+    sensed = table.optical_sensor.model_copy(update={"rate_hz": rate_hz})
+    told = list(table.model_copy(update={"optical_sensor": sensed}).problems())
+    clocks = {"rate_hz": rate_hz, "delay_s": 0.0, "control_rate_hz": 5e3, "plant_step_s": 40e-6}
+    try:
+        sensor.optical_sensor(1e-6, 2e-3, **clocks)
+    except ValueError:
+        assert [problem.key for problem in told] == ["optical_sensor.rate"]
+    else:
+        assert not told or rate_hz < 5e-3
+
+
+def test_extreme_numbers_are_refused_and_raise_nothing_else(load):
+    for key in ("rate", "plant_step", "optical_sensor.rate", "optical_sensor.delay", "duration", "delay"):
+        unit = "Hz" if "rate" in key else "s"
+        for number in ("1e-320", "1e-300", "1e11", "1e300"):
+            with pytest.raises(MissionError):
+                load(edited((key, f'"{number} {unit}"')))
+
+
+# ---- schema
+def test_the_schema_has_the_kinds_of_plain_values():
+    tables = mission_schema()["$defs"]
+    table = tables["FinePointing"]["properties"]
+    assert table["runs"] == {"title": "Runs", "type": "integer", "minimum": 1, "maximum": 100_000}
+    assert (table["seed"]["type"], table["seed"]["maximum"]) == ("integer", 2**63 - 1)
+    assert (table["quantile"]["exclusiveMinimum"], table["quantile"]["exclusiveMaximum"]) == (0.0, 1.0)
+    assert tables["ReferenceTable"]["properties"]["point_ahead_on_mirror"]["type"] == "boolean"
+    assert tables["VibrationTable"]["properties"]["spectrum"]["enum"] == ["olympus", "first-order", "bands", "table"]
+    level = next(rule for rule in tables["VibrationTable"]["properties"]["level"]["anyOf"] if "x-si-unit" in rule)
+    assert (level["x-si-unit"], bool(re.search(level["pattern"], "160 urad^2/Hz"))) == ("rad^2/Hz", True)
+    noise = tables["QuadCellTable"]["properties"]["thermal_noise"]
+    assert (noise["x-si-unit"], noise["examples"]) == ("A/sqrt(Hz)", ["5 pA/sqrt(Hz)"])
+    assert not {"wheels", "strain_gauge"} & set(tables["FinePointing"]["required"])
+    for name in ("FinePointing", "GeometryTable", "VibrationTable", "WheelsTable", "BodyTable", "ReferenceTable"):
+        assert tables[name]["additionalProperties"] is False

@@ -1,0 +1,516 @@
+"""What a file about links may hold: each refusal with its limit, all of them at once, and what is taken."""
+
+import math
+
+import pytest
+
+from link_files import GAUSSIAN, PATTERN, RECEIVERS, SKY, data_with, link_file, received_with, written
+from microrad.core.units import parse_quantity
+from microrad.link import LitAperture, gaussian_beam_gain_db
+from microrad.mission.file import MissionError, load_link
+from microrad.mission.model import LinkMission, Mission, mission_schema
+from microrad.mission.tables.link import Receiver, half_angle_rad, narrowest_half_angle_rad
+from shipped import SHIPPED, without_fine_pointing
+
+
+def faults(folder, *changes):
+    """The faults of the paper's links with changes, by key."""
+    merged = {}
+    for each in changes:
+        merged |= each
+    return faults_of(written(folder, data_with(merged)))
+
+
+def faults_of(path):
+    with pytest.raises(MissionError) as refused:
+        load_link(path)
+    found = {}
+    for fault in refused.value.faults:
+        assert fault.reason in str(refused.value)
+        assert fault.expected
+        found.setdefault(fault.key, []).append(f"{fault.reason}: {fault.expected}")
+    return {key: " | ".join(texts) for key, texts in found.items()}
+
+
+def the_fault(folder, *changes):
+    found = faults(folder, *changes)
+    assert len(found) == 1, found
+    return next(iter(found.items()))
+
+
+def test_a_fault_of_one_table_hides_none_of_what_lies_between_others(tmp_path):
+    holed = {**PATTERN, "terminals.leo_obscuration": 0.6, "communication.beam": {**GAUSSIAN, "radius": "2 mm"}}
+    found = faults(tmp_path, holed, received_with("preamplified dpsk", bandwidth="5 m"))
+    assert set(found) == {"communication.receiver.bandwidth", "communication.beam.radius"}
+    found = faults(tmp_path, holed, received_with("preamplified dpsk", detector="homodyne"))
+    assert set(found) == {"communication.receiver.detector", "communication.beam.radius"}
+    both = {"communication.receiver_sensitivity": "100 photon/bit", "communication.strehl": None}
+    found = faults(tmp_path, received_with("pin ook", bandwidth="5 m", dark_current=None), both)
+    assert set(found) == {
+        "communication.receiver.bandwidth",
+        "communication.receiver.dark_current",
+        "communication.receiver_sensitivity",
+        "communication.strehl",
+    }
+
+
+def test_a_misspelled_key_is_not_missed_as_well(tmp_path):
+    table = received_with("preamplified dpsk", noise_figure=None, noise_figur="4 dB")
+    assert the_fault(tmp_path, table)[0] == "communication.receiver.noise_figur"
+
+
+SLOW = "a number without quotes, at least 1e-18 and below 0.5"
+
+
+# ---- one value out of its bounds
+@pytest.mark.parametrize(
+    ("key", "value", "said"),
+    [
+        ("communication.strehl", -0.1, "is below 0"),
+        ("communication.transmit_optics_loss", "-1 dB", "is below 0 dB"),
+        ("communication.receive_optics_loss", "-0.1 dB", "is below 0 dB"),
+        ("communication.tracking_split_loss", "-1 dB", "is below 0 dB"),
+        ("communication.implementation_loss", "-1 dB", "is below 0 dB"),
+        ("beacon.transmit_optics_loss", "-1 dB", "is below 0 dB"),
+        ("answer.receive_optics_loss", "-1 dB", "is below 0 dB"),
+        ("requirement.margin", "-1 dB", "is below 0 dB"),
+        ("requirement.outage", 0.0, "is not above 0 and below 1"),
+        ("requirement.outage", 1.0, "is not above 0 and below 1"),
+        ("terminals.leo_obscuration", 1.0, "is above 0.95: a number without quotes, at least 0, at most 0.95"),
+        ("terminals.geo_obscuration", 1, "is above 0.95"),
+        ("terminals.geo_obscuration", -0.1, "is below 0"),
+        ("terminals.leo_aperture", "0 cm", "is not above 0 m"),
+        ("terminals.leo_aperture", "5 km", "is above 100 m"),
+        ("communication.wavelength", "1.55 m", "is above 10 mm"),
+        ("communication.data_rate", "0 bit/s", "is not above 0 bit/s"),
+        ("communication.data_rate", "fastest", 'or "largest" for what the required margin leaves'),
+        ("communication.receiver_sensitivity", "0 photon/bit", "is not above 0 photon/bit"),
+        ("communication.pointing_error", "-1 urad", "is below 0 rad"),
+        ("communication.transmit_power", "0 W", "is not above 0 W"),
+        ("beacon.required_power", "0 pW", "is not above 0 W"),
+        ("point_ahead.corrected", "yes", "is neither true nor false"),
+        ("conventions.pointing_loss", "top-hat", 'pointing_loss = "pattern"'),
+    ],
+)
+def test_a_value_out_of_bounds_is_refused_with_the_bound(tmp_path, key, value, said):
+    found, text = the_fault(tmp_path, {key: value})
+    assert found == key
+    assert said in text
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "said"),
+    [
+        ("bit_error_ratio", 0.5, f"is not above 0 and below 0.5: {SLOW}"),
+        ("bit_error_ratio", 0.0, f"is below 1e-18: {SLOW}"),
+        ("bit_error_ratio", 1e-19, f"is below 1e-18: {SLOW}"),
+        ("code_rate", 1.01, "is above 1"),
+        ("code_rate", 0.0, "is not above 0"),
+        ("code_gain", "-1 dB", "is below 0 dB"),
+        ("bandwidth", "0 Hz", "is not above 0 Hz"),
+        ("efficiency", 1.1, "is above 1"),
+        ("efficiency", 0.0, "is not above 0"),
+        ("dark_count_rate", "-1 1/s", "is below 0 1/s"),
+        ("background_power", "-1 pW", "is below 0 W"),
+        ("order", 12, "is no power of two: order = 16 would do"),
+        ("order", 1, "is below 2: a whole number without quotes, from 2 to 1048576"),
+        ("order", 16.0, "is not a whole number: a whole number without quotes"),
+        ("order", "16", "is not a whole number: a whole number without quotes"),
+    ],
+)
+def test_a_receivers_value_out_of_bounds_is_refused_with_the_bound(tmp_path, key, value, said):
+    found, text = the_fault(tmp_path, received_with("counting ppm", **{key: value}))
+    assert found == f"communication.receiver.{key}"
+    assert said in text
+
+
+@pytest.mark.parametrize(
+    ("name", "key", "value", "said"),
+    [
+        ("preamplified dpsk", "noise_figure", "2.9 dB", "is below 3 dB"),
+        ("preamplified ook", "amplifier_gain", "9 dB", "is below 10 dB"),
+        ("preamplified ook", "optical_bandwidth", "0 GHz", "is not above 0 Hz"),
+        ("counting ook", "extinction_ratio", "0 dB", "is not above 0 dB"),
+        ("apd ook", "avalanche_gain", 0.9, "is below 1"),
+        ("apd ook", "ionisation_ratio", 1.1, "is above 1"),
+        ("apd ook", "dark_current", "-1 nA", "is below 0 A"),
+        ("pin ook", "thermal_noise", "-1 pA/sqrt(Hz)", "is below 0 A/sqrt(Hz)"),
+    ],
+)
+def test_what_only_some_receivers_have_is_bounded_too(tmp_path, name, key, value, said):
+    found, text = the_fault(tmp_path, received_with(name, **{key: value}))
+    assert found == f"communication.receiver.{key}"
+    assert said in text
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "said"),
+    [
+        ("spectral_radiance", "-1 W/(m^2 sr um)", "is below 0"),
+        ("field_of_view", "0 urad", "is not above 0 rad"),
+        ("filter_bandwidth", "0 nm", "is not above 0 m"),
+        ("filter_bandwidth", "1 mm", "is above 10 µm"),
+    ],
+)
+def test_a_background_is_bounded(tmp_path, key, value, said):
+    receiver = received_with("pin ook", background_power=None, background={**SKY, key: value})
+    found, text = the_fault(tmp_path, receiver)
+    assert found == f"communication.receiver.background.{key}"
+    assert said in text
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "said"),
+    [
+        ("zenith_transmission", 0.0, "is not above 0"),
+        ("zenith_transmission", 1.1, "is above 1"),
+        ("elevation", "9.9 deg", "is below 10 deg"),
+        ("elevation", "91 deg", "is above 90 deg"),
+    ],
+)
+def test_a_channel_is_a_clear_sky_from_ten_degrees_up(tmp_path, key, value, said):
+    found, text = the_fault(tmp_path, {"channel": {"zenith_transmission": 0.8, "elevation": "30 deg", key: value}})
+    assert found == f"channel.{key}"
+    assert said in text
+
+
+def test_ten_degrees_and_the_zenith_are_taken(tmp_path):
+    for degrees in (10, 90):
+        channel = {"channel": {"zenith_transmission": 1.0, "elevation": f"{degrees} deg"}}
+        assert link_file(tmp_path, channel).mission.channel.elevation_rad == pytest.approx(math.radians(degrees))
+
+
+# ---- what belongs together
+@pytest.mark.parametrize("link", ["communication", "beacon", "answer"])
+def test_the_quality_of_a_beam_is_said_once(tmp_path, link):
+    found, text = the_fault(tmp_path, {f"{link}.strehl": None})
+    assert (found, text) == (f"{link}.strehl", "is missing, and so is wavefront_error: strehl = 0.4 would do")
+    found, text = the_fault(tmp_path, {f"{link}.wavefront_error": "50 nm"})
+    assert (found, text) == (f"{link}.strehl", "stands beside wavefront_error: one of the two removed")
+    read = link_file(tmp_path, {f"{link}.strehl": None, f"{link}.wavefront_error": "50 nm"}).mission
+    assert getattr(read, link).wavefront_error_m == pytest.approx(50e-9)
+
+
+@pytest.mark.parametrize("link", ["communication", "beacon", "answer"])
+def test_a_wavefront_error_is_at_most_a_quarter_of_a_wave(tmp_path, link):
+    change = {f"{link}.strehl": None, f"{link}.wavefront_error": "388 nm"}
+    found, text = the_fault(tmp_path, change)
+    assert found == f"{link}.wavefront_error"
+    assert "is above a quarter of the wavelength (387.5 nm): such a beam has no core to point" in text
+    assert link_file(tmp_path, {**change, f"{link}.wavefront_error": "387.5 nm"})
+
+
+@pytest.mark.parametrize("link", ["communication", "beacon", "answer"])
+@pytest.mark.parametrize("strehl", [1.01, 0.0])
+def test_a_strehl_ratio_is_above_zero_and_at_most_one(tmp_path, link, strehl):
+    found, text = the_fault(tmp_path, {"conventions.strehl": "ratio", f"{link}.strehl": strehl})
+    assert found == f"{link}.strehl"
+    assert f'is no ratio, but conventions.strehl = "ratio" ({strehl:g}): above 0 and at most 1' in text
+    assert link_file(tmp_path, {"conventions.strehl": "ratio", f"{link}.strehl": 1.0})
+    assert link_file(tmp_path, {"conventions.strehl": "decibel", f"{link}.strehl": strehl})
+
+
+@pytest.mark.parametrize(("link", "aperture", "diameter"), [("beacon", "leo", 0.05), ("answer", "geo", 0.15)])
+@pytest.mark.parametrize(("convention", "factor"), [("full-1/e2", 2.0), ("half-1/e2", 1.0)])
+def test_no_beam_is_narrower_than_diffraction_leaves_it(tmp_path, link, aperture, diameter, convention, factor):
+    least = factor * math.sqrt(8) * 1.55e-6 / (math.pi * diameter)
+    conventions = {"conventions.divergence": convention}
+    found, text = the_fault(tmp_path, conventions, {f"{link}.divergence": f"{least * 0.999e6:.6f} urad"})
+    assert found == f"{link}.divergence"
+    assert f"is below diffraction at {aperture}_aperture = {diameter * 100:g} cm" in text.replace(
+        "50 mm", "5 cm"
+    ).replace("150 mm", "15 cm")
+    assert f"({convention.partition('-')[0]} angle at 1/e2)" in text
+    named = text.rpartition('at least "')[2].partition('"')[0]
+    assert parse_quantity(named, "rad") == pytest.approx(least, rel=2e-3)
+    for enough in (f"{least * 1.000001e6:.6f} urad", named):
+        assert link_file(tmp_path, conventions, {f"{link}.divergence": enough})
+
+
+def test_widths_of_an_aperture_lit_evenly_are_no_divergences_of_a_gaussian_beam():
+    """9.4 urad at 847 nm from 95 mm: the width at half maximum, and no full angle at 1/e2 by any reading."""
+    diameter, wavelength = 95e-3, 847e-9
+    even, least = LitAperture(diameter, wavelength, 0.0, 0.0), narrowest_half_angle_rad(diameter, wavelength)
+    at_e2, at_half = (even.error_rad(loss) for loss in (20 / math.log(10), 10 * math.log10(2)))
+    assert at_e2 * diameter / wavelength == pytest.approx(0.8225, abs=1e-4)
+    assert 2 * at_half * diameter / wavelength == pytest.approx(1.029, abs=1e-3)
+    assert 2 * at_half < 9.4e-6 < 2 * at_e2
+    assert gaussian_beam_gain_db(least) == pytest.approx(even.gain_db, abs=1e-9)
+    assert gaussian_beam_gain_db(at_e2) - even.gain_db == pytest.approx(0.79, abs=0.01)
+    assert gaussian_beam_gain_db(2 * wavelength / (math.pi * diameter)) - even.gain_db == pytest.approx(3.01, abs=0.01)
+    assert gaussian_beam_gain_db(9.4e-6 / 2) - even.gain_db == pytest.approx(4.65, abs=0.01)
+
+
+def test_a_width_that_is_a_half_angle_and_no_full_one(tmp_path):
+    """9.4 urad at 847 nm from 95 mm, as docs/link.md has it."""
+    terminal = {"terminals.geo_aperture": "95 mm", "answer.wavelength": "847 nm", "answer.divergence": "9.4 urad"}
+    found, text = the_fault(tmp_path, terminal, {"conventions.divergence": "full-1/e2"})
+    assert found == "answer.divergence"
+    assert "is below diffraction at geo_aperture = 95 mm, which leaves no less than 16.07 µrad (full angle" in text
+    assert (
+        link_file(tmp_path, terminal, {"conventions.divergence": "half-1/e2"}).mission.answer.divergence_rad == 9.4e-6
+    )
+
+
+def test_the_narrowest_gaussian_beam_has_the_gain_of_the_whole_aperture():
+    half = narrowest_half_angle_rad(0.05, 1.55e-6)
+    assert 8 / half**2 == pytest.approx((math.pi * 0.05 / 1.55e-6) ** 2, rel=1e-12)
+    assert half_angle_rad(780e-6, "full-1/e2") == 390e-6
+    assert half_angle_rad(780e-6, "half-1/e2") == 780e-6
+
+
+def test_a_pattern_needs_a_beam_and_a_beam_a_pattern(tmp_path):
+    found, text = the_fault(tmp_path, {"conventions.pointing_loss": "pattern"})
+    assert found == "conventions.pointing_loss"
+    assert "needs the table communication.beam, which is missing" in text
+    for convention in ("gaussian", "gain"):
+        beam = {"communication.beam": GAUSSIAN, "conventions.pointing_loss": convention}
+        found, text = the_fault(tmp_path, beam)
+        assert found == "conventions.pointing_loss"
+        assert f'does not take communication.beam into account ("{convention}"): pointing_loss = "pattern"' in text
+    assert link_file(tmp_path, PATTERN).mission.communication.beam.radius_m == pytest.approx(0.02)
+
+
+@pytest.mark.parametrize(
+    ("beam", "expected"),
+    [
+        ({"radius": None}, {"radius": 'is missing, and profile = "gaussian" needs it: radius = "2 cm" would do'}),
+        ({"m_squared": None}, {"m_squared": 'is missing, and profile = "gaussian" needs it: m_squared = 1.1 would do'}),
+        ({"m_squared": 0.9}, {"m_squared": "is below 1: a number without quotes, at least 1, at most 1000"}),
+        ({"radius": "0 cm"}, {"radius": "is not above 0 m"}),
+        (
+            {"profile": "uniform"},
+            {"radius": 'does not belong to profile = "uniform"', "m_squared": 'does not belong to profile = "uniform"'},
+        ),
+        ({"profile": "flat"}, {"profile": 'is none of the choices: profile = "uniform" or profile = "gaussian"'}),
+    ],
+)
+def test_a_beam_has_what_its_profile_needs(tmp_path, beam, expected):
+    table = {key: value for key, value in {**GAUSSIAN, **beam}.items() if value is not None}
+    found = faults(tmp_path, PATTERN, {"communication.beam": table})
+    assert set(found) == {f"communication.beam.{key}" for key in expected}
+    assert all(said in found[f"communication.beam.{key}"] for key, said in expected.items())
+
+
+def test_a_beam_that_its_obscuration_stops_is_refused(tmp_path):
+    holed = {**PATTERN, "terminals.leo_obscuration": 0.6}
+    narrow = {"communication.beam": {**GAUSSIAN, "radius": "9 mm"}}
+    found, text = the_fault(tmp_path, holed, narrow)
+    assert found == "communication.beam.radius"
+    assert 'leaves less than 1 % of the beam beside leo_obscuration = 0.6: at least "9.895 mm"' in text
+    assert link_file(tmp_path, holed, {"communication.beam": {**GAUSSIAN, "radius": "9.895 mm"}})
+
+
+def test_one_receiver_is_said(tmp_path):
+    found, text = the_fault(tmp_path, {"communication.receiver_sensitivity": None})
+    assert found == "communication.receiver_sensitivity"
+    assert "is missing, and so is the table receiver" in text
+    assert 'receiver_sensitivity = "100 photon/bit" would do, or a table receiver' in text
+    found, text = the_fault(tmp_path, {"communication.receiver": RECEIVERS["pin ook"]})
+    assert (found, text) == (
+        "communication.receiver_sensitivity",
+        "stands beside the table receiver: one of the two removed",
+    )
+
+
+FITTING = {
+    "ook": {"photon-counting", "pin", "apd", "preamplified"},
+    "dpsk": {"preamplified"},
+    "bpsk": {"homodyne"},
+    "ppm": {"photon-counting"},
+}
+
+
+@pytest.mark.parametrize("modulation", FITTING)
+@pytest.mark.parametrize("name", RECEIVERS)
+def test_a_detector_that_does_not_receive_the_modulation_is_refused_with_those_that_do(tmp_path, name, modulation):
+    detector = RECEIVERS[name]["detector"]
+    if detector in FITTING[modulation]:
+        return
+    found, text = the_fault(tmp_path, received_with(name, modulation=modulation))
+    assert found == "communication.receiver.detector"
+    assert text.startswith(f'does not receive modulation = "{modulation}": ')
+    assert {each for each in FITTING["ook"] | {"homodyne"} if f'detector = "{each}"' in text} == FITTING[modulation]
+
+
+@pytest.mark.parametrize("name", RECEIVERS)
+def test_each_key_that_a_receiver_needs_is_missed(tmp_path, name):
+    assert link_file(tmp_path, received_with(name)).mission.communication.receiver is not None
+    for key in RECEIVERS[name]:
+        found, text = the_fault(tmp_path, received_with(name, **{key: None}))
+        assert found == f"communication.receiver.{key}"
+        assert text.startswith("is missing")
+
+
+@pytest.mark.parametrize("name", RECEIVERS)
+def test_each_key_that_a_receiver_has_no_use_for_is_refused(tmp_path, name):
+    every = {key: value for table in RECEIVERS.values() for key, value in table.items()}
+    surplus = {key: value for key, value in every.items() if key not in RECEIVERS[name]}
+    found = faults(tmp_path, received_with(name, **surplus))  # all of them at once
+    assert set(found) == {f"communication.receiver.{key}" for key in surplus}
+    table = RECEIVERS[name]
+    what = f'does not belong to modulation = "{table["modulation"]}", detector = "{table["detector"]}"'
+    assert all(what in text for text in found.values())
+
+
+@pytest.mark.parametrize("name", RECEIVERS)
+def test_a_sky_stands_in_place_of_a_background_power(tmp_path, name):
+    sky = received_with(
+        name, background=SKY, **({"background_power": None} if "background_power" in RECEIVERS[name] else {})
+    )
+    assert link_file(tmp_path, sky).mission.communication.receiver.background.filter_bandwidth_m == pytest.approx(1e-9)
+    found, text = the_fault(tmp_path, received_with(name, background=SKY, background_power="1 pW"))
+    assert found == "communication.receiver.background_power"
+    assert text == "stands beside the table background: one of the two removed"
+
+
+def test_every_problem_of_a_receiver_is_told_at_once(tmp_path):
+    found = faults(tmp_path, received_with("counting ppm", order=12, efficiency=None, noise_figure="4 dB"))
+    assert set(found) == {f"communication.receiver.{key}" for key in ("order", "efficiency", "noise_figure")}
+
+
+def test_every_fault_of_a_file_is_told_at_once(tmp_path):
+    found = faults(
+        tmp_path,
+        {
+            "terminals.geo_obscuration": 1.0,
+            "conventions.strehl": "ratio",
+            "conventions.pointing_loss": "pattern",
+            "beacon.strehl": 1.2,
+            "beacon.transmit_power": "0 W",
+            "answer.strehl": 1.3,
+            "communication.strehl": 1.4,
+            "requirement.outage": 1.0,
+            "requirement.margn": "3 dB",
+            "channel": {"zenith_transmission": 2.0, "elevation": "5 deg"},
+            "point_ahead.corrected": 1,
+        },
+    )
+    assert set(found) == {
+        "terminals.geo_obscuration",
+        "conventions.pointing_loss",
+        "beacon.strehl",
+        "beacon.transmit_power",
+        "answer.strehl",
+        "communication.strehl",
+        "requirement.outage",
+        "requirement.margn",
+        "channel.zenith_transmission",
+        "channel.elevation",
+        "point_ahead.corrected",
+    }
+
+
+def test_what_does_not_fit_between_tables_is_all_told_at_once(tmp_path):
+    found = faults(
+        tmp_path,
+        {
+            "conventions.strehl": "ratio",
+            "conventions.pointing_loss": "pattern",
+            "beacon.strehl": 1.2,
+            "beacon.divergence": "10 urad",
+            "answer.strehl": 1.3,
+            "answer.divergence": "5 urad",
+            "communication.strehl": 1.4,
+        },
+    )
+    named = {f"{link}.{key}" for link in ("beacon", "answer") for key in ("strehl", "divergence")}
+    assert set(found) == named | {"communication.strehl", "conventions.pointing_loss"}
+
+
+# ---- which file is read as what
+def test_links_load_without_a_mirror_and_without_beacon_and_answer(tmp_path):
+    file = link_file(tmp_path)
+    assert type(file.mission) is LinkMission
+    assert file.sources["communication.distance"].value == '"42000 km"'
+    bare = link_file(tmp_path, dict.fromkeys(("beacon", "answer", "acquisition", "point_ahead"))).mission
+    assert (bare.beacon, bare.answer, bare.acquisition, bare.point_ahead) == (None, None, None, None)
+
+
+@pytest.mark.parametrize("table", ["terminals", "conventions", "communication", "requirement"])
+def test_a_link_is_nothing_without_these_tables(tmp_path, table):
+    found, text = the_fault(tmp_path, {table: None})
+    assert found == table
+    assert text.startswith("is missing: a table with the keys ")
+
+
+def test_what_nothing_reads_may_be_left_out(tmp_path):
+    gone = dict.fromkeys(("beacon", "answer", "acquisition", "pointing", "conventions.divergence"))
+    assert link_file(tmp_path, gone).mission.pointing is None
+    for key in ("pointing", "conventions.divergence", "conventions.strehl"):
+        found, text = the_fault(tmp_path, {key: None})
+        assert found == key
+        assert text.startswith("is missing, and ")
+    without = {**gone, "conventions.strehl": None, "communication.strehl": None}
+    m = link_file(tmp_path, {**without, "communication.wavefront_error": "60 nm"}).mission
+    assert (m.conventions.strehl, m.conventions.divergence) == ("unused", "unused")
+
+
+def test_a_whole_mission_is_read_for_its_links(tmp_path):
+    file = load_link(SHIPPED)
+    assert isinstance(file.mission, Mission)
+    assert file.path == SHIPPED
+    assert file.sources["communication.transmit_power"].kind == "paper"
+
+
+def test_a_file_with_some_of_the_mirrors_tables_is_checked_as_a_whole_mission(tmp_path):
+    amplifier = {"gain": 12.0, "output_min": "0 V", "output_max": "150 V", "bandwidth": "1 kHz", "slew": "1 V/us"}
+    found = faults(tmp_path, {"amplifier": amplifier})
+    assert {"mirror", "control", "scenario"} <= set(found)
+    assert {"conventions.residual", "conventions.mirror_angle", "requirement.residual_statistic"} <= set(found)
+    assert all("is missing" in text for text in found.values())
+
+
+def test_a_whole_missions_keys_are_no_keys_of_links_alone(tmp_path):
+    found, text = the_fault(tmp_path, {"conventions.residual": "per-axis"})
+    assert found == "conventions.residual"
+    assert text.startswith("is no key of [conventions]")
+
+
+def test_point_ahead_of_the_link_and_of_the_mirror_agree(tmp_path):
+    text = SHIPPED.read_text(encoding="utf-8")
+    path = tmp_path / "mission.toml"
+    for velocity, fits in (("10.65 km/s", True), ("10.5 km/s", True), ("9 km/s", False), ("0 m/s", False)):
+        path.write_text(text.replace('"10.65 km/s"', f'"{velocity}"'), encoding="utf-8")
+        if fits:
+            assert load_link(path).mission.point_ahead is not None
+            continue
+        found = faults_of(path)
+        assert set(found) == {"fine_pointing.reference.point_ahead"}
+        assert "is not 2 v / c of point_ahead.transverse_velocity" in found["fine_pointing.reference.point_ahead"]
+    path.write_text(without_fine_pointing(text).replace('"10.65 km/s"', '"9 km/s"'), encoding="utf-8")
+    assert load_link(path).mission.fine_pointing is None
+
+
+def test_the_largest_data_rate_is_read_as_one_to_be_solved_for(tmp_path):
+    assert math.isnan(link_file(tmp_path, {"communication.data_rate": "largest"}).mission.communication.data_rate_bit_s)
+
+
+# ---- for editors
+@pytest.mark.parametrize("schema", [LinkMission.model_json_schema(by_alias=True), mission_schema()])
+def test_the_schema_describes_the_links_keys(schema):
+    tables = schema["$defs"]
+    assert {"channel", "jitter", "point_ahead", "acquisition"} <= schema["properties"].keys()
+    assert not {"channel", "jitter", "point_ahead", "acquisition"} & set(schema["required"])
+    assert {"receiver", "beam", "wavefront_error", "receiver_sensitivity"} <= tables["Communication"][
+        "properties"
+    ].keys()
+    assert {"leo_obscuration", "geo_obscuration", "leo_name"} <= tables["Terminals"]["properties"].keys()
+    assert {"zenith_transmission", "elevation"} == tables["Channel"]["properties"].keys()
+    receiver = tables["Receiver"]["properties"]
+    assert {key for table in RECEIVERS.values() for key in table} | {"background"} == receiver.keys()
+    assert receiver["detector"]["enum"] == ["photon-counting", "pin", "apd", "preamplified", "homodyne"]
+    assert receiver["bit_error_ratio"]["exclusiveMaximum"] == 0.5
+    assert receiver["bit_error_ratio"]["minimum"] == 1e-18
+    assert {"const": "largest"} in tables["Communication"]["properties"]["data_rate"]["anyOf"]
+    assert all(
+        "description" in each or "$ref" in str(each) or "enum" in each
+        for key, each in tables["Communication"]["properties"].items()
+        if key in ("receiver", "beam", "data_rate", "wavefront_error")
+    )
+
+
+def test_the_example_of_a_bit_error_ratio_is_one_that_links_have():
+    name, rule = Receiver.rule_of("bit_error_ratio")
+    assert (name, rule.example) == ("bit_error_ratio", "1e-09")
+    assert rule.wanted == "a number without quotes, at least 1e-18 and below 0.5"

@@ -1,0 +1,973 @@
+"""Mission files: what is read from a good one, and what a bad one is told. Nothing but `MissionError` may come out."""
+
+import hashlib
+import json
+import os
+import pickle
+import re
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pydantic
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from microrad.core import lti
+from microrad.mirror import model as mirror
+from microrad.mission.file import MissionError, assumptions, load_mirror, load_mission
+from microrad.mission.model import Mission, Source, mission_schema, source_text
+from microrad.mission.tables.link import half_angle_rad
+from microrad.mission.tables.mirror import BoucWenTable
+from microrad.mission.toml import Document, scan
+from places import ROOT
+from waiting import no_hang
+
+PAPER = ROOT / "missions" / "paper.toml"
+TEXT = PAPER.read_text(encoding="utf-8")
+NO_MIRROR, MIRROR, REST = re.fullmatch(r"(.*)(\[mirror\]\n.*)(\[amplifier\]\n.*)", TEXT, re.DOTALL).groups()
+MIRROR_TEXT = MIRROR.removeprefix("[mirror]\n").replace("[mirror.", "[")
+
+
+def edited(key, value, text=TEXT, *, renamed=None):
+    """The text with the value of a dotted key replaced, or with its line taken out (None), its comment kept."""
+    lines = text.split("\n")
+    place = next(s.line for s in scan(text) if s.key == key and s.kind == "key") - 1
+    comment = lines[place].partition("  # ")[2]
+    name = renamed or key.rpartition(".")[2]
+    lines[place] = "" if value is None else f"{name} = {value}  # {comment}"
+    return "\n".join(lines)
+
+
+def line_of(key, text):
+    return next(s.line for s in scan(text) if s.key == key)
+
+
+@pytest.fixture
+def refuse(tmp_path):
+    """Write a text or bytes, load it, and return the error, checked for what every error owes its reader."""
+
+    def load(content, mirror=None):
+        path = tmp_path / "bad.toml"
+        path.write_bytes(content if isinstance(content, bytes) else content.encode())
+        with no_hang(), pytest.raises(MissionError) as refused:
+            load_mission(path, mirror)
+        error, report = refused.value, str(refused.value)
+        assert error.path == path
+        assert error.faults
+        for fault in error.faults[:50]:
+            assert fault.reason in report
+            assert fault.expected
+            assert fault.expected in report
+            assert fault.key in report
+            assert fault.value in report
+            assert len(fault.value) < 200
+        assert report.replace("\n", "").isprintable()
+        assert "Traceback" not in report
+        assert "pydantic" not in report
+        return error
+
+    return load
+
+
+def the_fault(error):
+    assert len(error.faults) == 1, str(error)
+    return error.faults[0]
+
+
+# ---- a good file
+def test_the_papers_mission_is_read_in_si():
+    mission = load_mission(PAPER).mission
+    assert mission.communication.transmit_power_w == 5.0
+    assert mission.communication.wavelength_m == 1.55e-6
+    assert mission.communication.data_rate_bit_s == 300e6
+    assert mission.beacon.divergence_rad == 780e-6
+    assert mission.answer.required_power_w == 1e-10
+    assert mission.terminals.geo_aperture_m == 0.15
+    assert mission.mirror.travel_rad == 2.5e-3
+    assert mission.mirror.bouc_wen.epsilon_rad_v == -48e-6
+    assert mission.mirror.bouc_wen.alpha_1_v == 38.421
+    assert mission.mirror.comparison.bouc_wen.beta_1_v == 0.6
+    assert mission.mirror.linear.numerator == (1.979e11, 7.051e13, 2.973e13)
+    assert mission.mirror.linear.denominator[0] == 1.0
+    assert mission.mirror.prandtl_ishlinskii is None
+    assert mission.amplifier.slew_v_s == 1e6
+    assert mission.control.proportional_v_rad == 1e3
+    assert mission.control.integral_v_rad_s == 16e6
+    assert mission.control.for_mirror_gain_rad_v == 89e-6
+    assert mission.scenario.loop_frequencies_hz == (1.0, 60.0, 80.0, 100.0)
+    assert mission.requirement.residual_statistic == "peak"
+
+
+def test_a_mission_file_keeps_its_origin():
+    file = load_mission(str(PAPER))
+    assert file.path == PAPER
+    assert file.text == TEXT
+    assert file.sha256 == hashlib.sha256(PAPER.read_bytes()).hexdigest()
+    assert file.mirror_file is None
+
+
+def test_every_value_has_a_source_with_its_line():
+    file = load_mission(PAPER)
+    lines = TEXT.split("\n")
+    for key, source in file.sources.items():
+        assert lines[source.line - 1].startswith(key.rpartition(".")[2] + " ="), key
+    assert set(file.sources) == {s.key for s in scan(TEXT) if s.kind == "key"}
+    source = file.sources["communication.transmit_power"]
+    assert (source.comment, source.value, source.kind) == ("paper: Table 2", '"5 W"', "paper")
+    assert source.text == "paper: Table 2"
+    assert file.sources["name"].text == f"mission file, line {line_of('name', TEXT)}"
+
+
+def test_assumptions_are_exactly_the_lines_marked_so():
+    listed = assumptions(load_mission(PAPER))
+    assert len(listed) == sum("# assumption:" in line or "# derived:" in line for line in TEXT.split("\n"))
+    assert ("beacon.required_power", '"10 pW"') in [entry[:2] for entry in listed]
+    assert all(comment.startswith(("assumption:", "derived:")) for _, _, comment in listed)
+
+
+def test_sources_name_each_comment_once_and_the_lack_of_one():
+    sources = {"a": Source(1, "paper: Table 2"), "b": Source(2, "paper: Table 2"), "c": Source(3, "see: there")}
+    assert source_text(sources, "a", "b") == "paper: Table 2"
+    assert source_text(sources, "a", "x") == "paper: Table 2; not stated"
+    assert [sources[k].kind for k in "abc"] == ["paper", "paper", ""]
+    assert Source(3, "paper").kind == ""
+
+
+def test_a_mission_is_frozen_and_can_be_copied_and_pickled():
+    mission = load_mission(PAPER).mission
+    with pytest.raises(pydantic.ValidationError):
+        mission.communication.distance_m = 1.0
+    assert pickle.loads(pickle.dumps(mission)) == mission
+    assert hash(mission) == hash(mission.model_copy(deep=True))
+
+
+def test_half_angle_by_convention():
+    assert half_angle_rad(780e-6, "full-1/e2") == 390e-6
+    assert half_angle_rad(780e-6, "half-1/e2") == 780e-6
+
+
+def test_windows_line_ends_and_a_byte_order_mark_change_nothing(tmp_path):
+    path = tmp_path / "windows.toml"
+    path.write_bytes(b"\xef\xbb\xbf" + TEXT.replace("\n", "\r\n").encode())
+    file = load_mission(path)
+    assert file.mission == load_mission(PAPER).mission
+    assert file.sources == load_mission(PAPER).sources
+
+
+def test_toml_in_other_dress_is_the_same_mission(tmp_path):
+    text = edited("scenario.pid_frequencies", '[ # paper: first\n  "1 Hz", # "one" ]\n  "15 Hz",\n]')
+    text = text.replace("[mirror.bouc_wen]", '["mirror" . bouc_wen]')
+    text = edited("pointing.lines.misalignment.error", "'248 urad'", text)
+    text = "terminals.leo_aperture = '''5 cm'''\nterminals.geo_aperture = \"15\\u0020cm\"\n" + text.replace(
+        re.search(r"\[terminals\]\n.*\n.*\n", text)[0], ""
+    )
+    path = tmp_path / "dress.toml"
+    path.write_text(text, encoding="utf-8")
+    file = load_mission(path)
+    assert file.mission == load_mission(PAPER).mission
+    assert file.sources["terminals.leo_aperture"].line == 1
+    assert file.sources["scenario.inverse_frequencies"].line == line_of("scenario.inverse_frequencies", text)
+    assert file.sources["mirror.bouc_wen.d1"].kind == "paper"
+
+
+def test_a_key_in_an_inline_table_has_the_source_of_the_table(tmp_path):
+    block = re.search(r"\[terminals\]\n.*\n.*\n", TEXT)[0]
+    text = 'terminals = { leo_aperture = "5 cm", geo_aperture = "15 cm" } # standard: ours\n' + TEXT.replace(block, "")
+    path = tmp_path / "inline.toml"
+    path.write_text(text, encoding="utf-8")
+    source = load_mission(path).sources["terminals.geo_aperture"]
+    assert (source.line, source.kind) == (1, "standard")
+
+
+def test_the_comment_behind_a_list_counts_before_those_inside():
+    inside, behind = scan("a = [ # one\n 1, # two\n]\nb = [ # one\n] # behind\n")
+    assert (inside.comment, inside.line, inside.last_line) == ("one", 1, 3)
+    assert (behind.comment, behind.line, behind.last_line) == ("behind", 4, 5)
+
+
+def test_a_resolution_of_zero_is_an_ideal_converter(tmp_path):
+    path = tmp_path / "ideal.toml"
+    text = edited("control.drive_resolution", '"0 V"', edited("control.sensor_resolution", '"0 rad"'))
+    path.write_text(text, encoding="utf-8")
+    control = load_mission(path).mission.control
+    assert (control.drive_resolution_v, control.sensor_resolution_rad) == (0.0, 0.0)
+
+
+# ---- one value wrong
+@pytest.mark.parametrize(
+    ("key", "value", "reason", "expected"),
+    [
+        ("communication.transmit_power", "5", "number without a unit", 'transmit_power = "5 W"'),
+        ("terminals.leo_aperture", "5", "number without a unit", 'leo_aperture = "5 cm"'),
+        ("communication.distance", "42000", "number without a unit", 'distance = "42000 km"'),
+        ("terminals.leo_aperture", '"5"', "number without a unit", 'leo_aperture = "5 cm"'),
+        ("terminals.leo_aperture", '"-5 cm"', "not above 0 m", "above 0 m"),
+        ("terminals.leo_aperture", '"0 cm"', "not above 0 m", "above 0 m"),
+        ("terminals.leo_aperture", '"5 km"', "is above 100 m", "at most 100 m"),
+        ("terminals.leo_aperture", '"5 urad"', "another kind of quantity", "a length"),
+        ("communication.transmit_power", "nan", "number without a unit", '"5 W"'),
+        ("communication.transmit_power", '"nan W"', "plain number", '"5 W"'),
+        ("communication.transmit_power", '"1,5 W"', "comma", '"1.5 W"'),
+        ("communication.transmit_power", "true", "not a quantity", '"5 W"'),
+        ("communication.transmit_power", '["5 W"]', "not a quantity", '"5 W"'),
+        ("communication.transmit_power", "2021-03-30", "not a quantity", '"5 W"'),
+        ("communication.implementation_loss", '"-1 dB"', "below 0 dB", "at least 0 dB"),
+        ("communication.strehl", "nan", "not a finite number", "strehl = "),
+        ("communication.strehl", "-0.1", "below 0", "at least 0"),
+        ("communication.strehl", '"0.4 dB"', "not a plain number", "without quotes"),
+        ("amplifier.gain", "true", "not a plain number", "without quotes"),
+        ("amplifier.gain", "0", "not above 0", "above 0"),
+        ("amplifier.bandwidth", '"0 Hz"', "not above 0 Hz", "above 0 Hz"),
+        ("amplifier.bandwidth", "inf", "number without a unit", '"5 Hz"'),
+        ("amplifier.output_max", '"0 V"', "not above output_min", "above 0 V"),
+        ("conventions.strehl", '"decibels"', "none of the choices", 'strehl = "decibel" or strehl = "ratio"'),
+        ("conventions.strehl", "1", "none of the choices", 'strehl = "decibel"'),
+        ("mirror.composition", '"cascaded"', "none of the choices", 'composition = "cascade"'),
+        ("mirror.name", '""', "wrong kind", "text in quotes"),
+        ("mirror.name", "7", "wrong kind", "text in quotes"),
+        ("mirror.bouc_wen.d1", '"0 mrad/V"', "not above 0 rad/V", "above 0"),
+        ("mirror.bouc_wen.d2", '"1 V/s"', "another kind", "s/V"),
+        ("mirror.linear.numerator", "[]", "not a list with something in it", "a list"),
+        ("mirror.linear.numerator", "[0, 0.0]", "zero throughout", "other than 0"),
+        ("mirror.linear.numerator", "[1, 2, 3, 4, 5, 6]", "no lower order than denominator", "fewer"),
+        ("mirror.linear.numerator", '[1, "2"]', "item 2", "without quotes"),
+        ("mirror.linear.denominator", "[0, 1, 2, 3, 4, 5]", "begins with 0", "highest power"),
+        ("mirror.linear.denominator", "5", "not a list", "a list"),
+        ("mirror.linear.normalise_at", '"10 kHz"', "outside excited_from to excited_to (1 Hz to 5 kHz)", "1 Hz to"),
+        ("mirror.linear.excited_to", '"0.5 Hz"', "not above excited_from", "goes up"),
+        ("control.rate", '"0 Hz"', "not above 0 Hz", "above 0 Hz"),
+        ("control.plant_step", '"7 us"', "does not divide the control period", "would do"),
+        ("control.plant_step", '"1e-300 s"', "more than 1000000 times", "nearer"),
+        ("control.delay", '"25 us"', "no whole number of plant_step", 'delay = "20 µs" would do'),
+        ("control.delay", '"-20 us"', "below 0 s", "at least 0 s"),
+        ("scenario.pid_frequencies", '["15 Hz", "1 Hz"]', "does not rise", "rising"),
+        ("scenario.pid_frequencies", '["1 Hz", "1 Hz"]', "does not rise", "rising"),
+        ("scenario.pid_frequencies", '["0 Hz", "1 Hz"]', "item 1", "above 0 Hz"),
+        ("scenario.pid_frequencies", "[]", "not a list with something in it", "a list"),
+        ("scenario.loop_frequencies", '["1 Hz", "25 kHz"]', "half of control.rate is 25 kHz", "below 25 kHz"),
+        ("requirement.residual_statistic", '"mean"', "none of the choices", 'residual_statistic = "peak"'),
+    ],
+)
+def test_one_bad_value_is_one_fault_with_key_value_line_and_advice(refuse, key, value, reason, expected):
+    text = edited(key, value)
+    fault = the_fault(refuse(text))
+    assert (fault.key, fault.line) == (key, line_of(key, text))
+    assert fault.value[:10] == value[:10]
+    assert reason in fault.reason
+    assert expected in fault.expected
+
+
+def test_a_whole_number_beyond_floats_is_no_gain(refuse):
+    fault = the_fault(refuse(edited("amplifier.gain", "0x" + "f" * 300)))
+    assert (fault.key, fault.value, fault.reason) == (
+        "amplifier.gain", "(a whole number of 1200 bits)", "is not a finite number"
+    )  # fmt: skip
+
+
+def test_a_static_mirror_has_no_linear_part(refuse):
+    text = edited("mirror.composition", '"static"')
+    fault = the_fault(refuse(text))
+    assert (fault.key, fault.line) == ("mirror.linear", line_of("mirror.linear", text))
+    assert 'composition = "static"' in fault.reason
+    assert 'composition = "cascade"' in fault.expected
+
+
+def test_a_bias_outside_the_amplifier_names_both(refuse):
+    text = edited("mirror.bias", '"11 V"', edited("amplifier.output_max", '"150 V"'))
+    fault = the_fault(refuse(text))
+    assert (fault.key, fault.value, fault.line) == ("mirror.bias", '"11 V"', line_of("mirror.bias", text))
+    assert "amplifier.output_min to amplifier.output_max divided by amplifier.gain" in fault.reason
+    assert fault.expected == "0 V to 10 V"
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "fault_key", "reason"),
+    [
+        ("mirror.bias", '"13 V"', "mirror.bias", "is outside drive_min to drive_max (0 V to 12 V)"),
+        ("mirror.drive_max", '"-1 V"', "mirror.drive_max", "is not above drive_min (0 V)"),
+        (
+            "mirror.bouc_wen.alpha",
+            '"34 1/V"',
+            "mirror.bouc_wen.alpha",
+            "not above the size of beta (34.63 1/V), so h would grow without bound",
+        ),
+        (
+            "mirror.bouc_wen.beta",
+            '"34.635 1/V"\ngamma = "5 1/V"',
+            "mirror.bouc_wen.alpha",
+            "not above the size of what beta, gamma and eta take off it (39.63 1/V), so h would grow without bound",
+        ),
+        (
+            "mirror.bouc_wen.beta",
+            '"34.635 1/V"\neta = "-4 1/V"',
+            "mirror.bouc_wen.alpha",
+            "not above the size of what beta, gamma and eta take off it (38.63 1/V), so h would grow without bound",
+        ),
+        ("mirror.bouc_wen.beta", '"34.635 1/V"\nexponent = 0.9', "mirror.bouc_wen.exponent", "below 1"),
+        ("mirror.bouc_wen.beta", '"34.635 1/V"\nexponent = 101', "mirror.bouc_wen.exponent", "above 100"),
+        ("mirror.bouc_wen.beta", '"34.635 1/V"\ngamma = 1', "mirror.bouc_wen.gamma", "number without a unit"),
+    ],
+)
+def test_what_a_mirror_was_identified_for_fits_together(refuse, key, value, fault_key, reason):
+    fault = the_fault(refuse(edited(key, value)))
+    assert fault.key == fault_key
+    assert reason in fault.reason
+
+
+def test_the_asymmetry_that_is_taken_is_the_one_that_keeps_h_bounded():
+    """In both directions and on both sides of zero the decay of |h| is above 0, and nothing else is asked for."""
+    rng, taken = np.random.default_rng(1), 0
+    for beta, gamma, eta in rng.uniform(-1.5, 1.5, (300, 3)):
+        given = {"d1": "1 mrad/V", "d2": "0 s/V", "epsilon": "-1 mrad/V", "delta": "0 s/V", "alpha": "1 1/V"}
+        given |= {"beta": f"{beta} 1/V", "gamma": f"{gamma} 1/V", "eta": f"{eta} 1/V"}
+        decays = [1.0 + beta * r * s + gamma * s + eta * r for r in (1, -1) for s in (1, -1)]
+        if min(decays) > 0.0:
+            taken += BoucWenTable.model_validate(given).gamma_1_v == gamma
+            continue
+        with pytest.raises(pydantic.ValidationError, match=r"alpha is not above.*so h would grow without bound"):
+            BoucWenTable.model_validate(given)
+    assert 30 < taken < 270
+
+
+def test_what_generalises_a_model_may_be_left_out(tmp_path):
+    plain = load_mission(PAPER).mission.mirror
+    assert (plain.bouc_wen.gamma_1_v, plain.bouc_wen.eta_1_v, plain.bouc_wen.exponent) == (0.0, 0.0, 1.0)
+    assert plain.creep is None
+    text = edited("mirror.bouc_wen.beta", '"30 1/V"\ngamma = "5 1/V"\neta = "-2 1/V"\nexponent = 1.5')
+    path = tmp_path / "asymmetric.toml"
+    path.write_text(text + CREEP, encoding="utf-8")
+    mirror = load_mission(path).mission.mirror
+    assert (mirror.bouc_wen.gamma_1_v, mirror.bouc_wen.eta_1_v, mirror.bouc_wen.exponent) == (5.0, -2.0, 1.5)
+    assert mirror.creep.time_constants_s == (0.1, 1.0)
+    assert mirror.creep.weights_rad_v == (2e-6, -1e-6)
+
+
+CREEP = """
+[mirror.creep]
+time_constants = ["100 ms", "1 s"]
+weights = ["2 urad/V", "-1 urad/V"]
+"""
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "key", "reason", "expected"),
+    [
+        ('"100 ms", "1 s"', '"1 s"', "weights", "has 2 items where time_constants has 1", "one weight for each"),
+        ('"-1 urad/V"', '"1 urad"', "weights", "item 2", "angle per voltage"),
+        ('"100 ms"', '"0 s"', "time_constants", "item 1", "above 0"),
+        ('"100 ms"', '"2 s"', "time_constants", "does not rise", "rising"),
+    ],
+)
+def test_creep_has_a_weight_for_each_lag(refuse, old, new, key, reason, expected):
+    assert CREEP.count(old) == 1
+    fault = the_fault(refuse(TEXT + CREEP.replace(old, new)))
+    assert fault.key == f"mirror.creep.{key}"
+    assert reason in fault.reason
+    assert expected in fault.expected
+
+
+@pytest.mark.parametrize("value", ["0", "1.2"])
+def test_a_strehl_ratio_is_above_zero_and_at_most_one(refuse, value):
+    text = edited("conventions.strehl", '"ratio"', edited("beacon.strehl", value))
+    fault = the_fault(refuse(text))
+    assert (fault.key, fault.value) == ("beacon.strehl", value)
+    assert 'conventions.strehl = "ratio"' in fault.reason
+    assert 'conventions.strehl = "decibel"' in fault.expected
+
+
+def test_the_plant_step_named_would_indeed_do(refuse, tmp_path):
+    text = edited("control.delay", '"0 s"', edited("control.plant_step", '"7 us"'))
+    better = re.search(r'plant_step = ("[^"]+")', the_fault(refuse(text)).expected)[1]
+    path = tmp_path / "better.toml"
+    path.write_text(edited("control.plant_step", better, text), encoding="utf-8")
+    assert load_mission(path).mission.control.plant_step_s == pytest.approx(20e-6 / 3, rel=1e-9)
+
+
+@pytest.mark.parametrize("step", ['"10.000000001 us"', '"20 us"', '"5000 ns"'])
+def test_steps_within_the_tolerance_are_taken(tmp_path, step):
+    path = tmp_path / "step.toml"
+    path.write_text(edited("control.plant_step", step), encoding="utf-8")
+    assert load_mission(path).mission.control.plant_step_s > 0.0
+
+
+# ---- keys and tables
+def test_an_unknown_key_is_shown_with_the_nearest_and_not_missed_as_well(refuse):
+    text = edited("communication.wavelength", '"1.55 um"', renamed="wavelenght")
+    fault = the_fault(refuse(text))
+    assert (fault.key, fault.nearest) == ("communication.wavelenght", "wavelength")
+    assert fault.line == line_of("communication.wavelenght", text)
+    assert "transmit_power" in fault.expected
+
+
+def test_an_unknown_key_like_no_other_lists_what_there_is(refuse):
+    fault = the_fault(refuse(TEXT.replace("[scenario]\n", '[scenario]\nzzz = "1 V"\n')))
+    assert (fault.key, fault.nearest, fault.value) == (
+        "scenario.zzz",
+        "",
+        "",
+    )  # what a file of ours does not have is not quoted
+    assert "amplitude, pid_frequencies" in fault.expected
+
+
+def test_a_key_that_is_missing_is_the_likelier_one_to_have_been_meant(refuse):
+    text = edited("amplifier.output_max", '"180 V"', renamed="output_mi")  # nearer to output_min, which is there
+    fault = the_fault(refuse(text))
+    assert (fault.key, fault.nearest) == ("amplifier.output_mi", "output_max")
+
+
+def test_a_missing_key_is_told_with_its_table_and_an_example(refuse):
+    text = edited("communication.data_rate", None)
+    fault = the_fault(refuse(text))
+    assert (fault.key, fault.value, fault.reason) == ("communication.data_rate", "", "is missing")
+    assert fault.line == line_of("communication", text)
+    assert 'data_rate = "5 Mbit/s"' in fault.expected
+
+
+def test_no_quantity_of_a_mission_has_a_default(refuse):
+    for key in load_mission(PAPER).sources:
+        found = [fault.key for fault in refuse(edited(key, None)).faults]
+        # a linear part lacks one of its two forms, so that its table is named
+        form = key in ("mirror.linear.numerator", "mirror.linear.denominator")
+        # and an orbit lacks its node, however that is given
+        named = "mirror.linear" if form else key.replace("local_time", "node")
+        assert named in found, key
+
+
+def test_a_missing_table_is_one_fault(refuse):
+    block = re.search(r"\[answer\]\n.*?\n\n", TEXT, re.DOTALL)[0]
+    fault = the_fault(refuse(TEXT.replace(block, "")))
+    assert (fault.key, fault.reason) == ("answer", "is missing")
+    assert "a table with the keys transmit_power" in fault.expected
+
+
+def test_a_misspelled_table_is_one_fault(refuse):
+    text = TEXT.replace("[amplifier]", "[amplifyer]")
+    fault = the_fault(refuse(text))
+    assert (fault.key, fault.nearest) == ("amplifyer", "amplifier")
+    assert fault.line == line_of("amplifyer", text)
+
+
+@pytest.mark.parametrize("value", ["5", '"x"', "[1]", "[[1]]"])
+def test_a_value_where_a_table_belongs(refuse, value):
+    block = re.search(r"\[answer\]\n.*?\n\n", TEXT, re.DOTALL)[0]
+    fault = the_fault(refuse(f"answer = {value}\n" + TEXT.replace(block, "")))
+    assert (fault.key, fault.line, fault.value) == ("answer", 1, value)
+    assert "a table with the keys" in fault.expected
+
+
+def test_a_list_of_tables_where_a_table_belongs(refuse):
+    fault = the_fault(refuse(TEXT.replace("[answer]", "[[answer]]")))
+    assert fault.key == "answer"
+    assert "wrong kind" in fault.reason
+
+
+def test_a_table_where_a_value_belongs(refuse):
+    text = edited("communication.distance", '{ value = "1 km" }')
+    fault = the_fault(refuse(text))
+    assert (fault.key, fault.value) == ("communication.distance", "(a table)")
+
+
+# ---- everything at once
+def test_all_faults_are_reported_at_once_in_the_order_of_the_file(refuse):
+    text = edited("pointing.lines.body_pointing.error", '"-1 urad"')
+    text = edited("terminals.leo_aperture", "5 cm", text)  # no quotes: not TOML
+    text = edited("conventions.divergence", '"full"', text)
+    text = edited("beacon.distance", "44000", text)
+    text = edited("communication.wavelength", '"1.55 um"', text, renamed="wavelenght")
+    text = edited("communication.data_rate", None, text)
+    text = edited("mirror.bias", '"6 V"\nbias = "7 V"', text)
+    text = edited("control.plant_step", '"7 us"', text)
+    text = edited("scenario.pid_frequencies", '["1 Hz", "15 Hz"', text)  # not closed
+    text = edited("scenario.loop_amplitude", '"6 V', text)  # not closed
+    error = refuse(text.replace("[requirement]", "[requirement"))
+    keys = [
+        "pointing.lines.body_pointing.error", "terminals.leo_aperture", "conventions.divergence", "beacon.distance",
+        "communication.data_rate", "communication.wavelenght", "", "mirror.bias", "control.plant_step",
+        "scenario.pid_frequencies", "scenario.loop_amplitude",
+    ]  # fmt: skip
+    assert sorted(fault.key for fault in error.faults) == sorted(keys)
+    assert [fault.line for fault in error.faults] == sorted(fault.line for fault in error.faults)
+    assert f"{len(keys)} faults to correct" in str(error)
+
+
+def test_relations_are_checked_beside_other_faults(refuse):
+    text = edited("mirror.bias", '"13 V"', edited("beacon.distance", "44000"))
+    assert {fault.key for fault in refuse(text).faults} == {"mirror.bias", "beacon.distance"}
+
+
+def test_a_duplicate_key_names_both_lines_beside_other_faults(refuse):
+    text = edited("mirror.bias", '"6 V"\nbias = "7 V"', edited("beacon.distance", "44000"))
+    faults = {fault.key: fault for fault in refuse(text).faults}
+    first = line_of("mirror.bias", text)
+    assert set(faults) == {"mirror.bias", "beacon.distance"}
+    assert faults["mirror.bias"].line == first + 1
+    assert faults["mirror.bias"].value == '"7 V"'
+    assert f"on lines {first} and {first + 1}" in faults["mirror.bias"].reason
+
+
+def test_a_duplicate_table_names_both_lines(refuse):
+    text = TEXT + '\n[beacon]\ntransmit_power = "4 W"\n'
+    fault = the_fault(refuse(text))
+    assert f"on lines {line_of('beacon', TEXT)} and {len(TEXT.split(chr(10))) + 1}" in fault.reason
+
+
+@pytest.mark.parametrize(
+    ("broken", "reason"),
+    [
+        ("5 W", "not TOML"),
+        ("", "has no value"),
+        ('"5 W', "not TOML"),
+        ('"5 \\q W"', "not TOML"),
+        ('["5 W"', "not closed"),
+        ("2020-13-40", "not TOML"),
+        ("9" * 5000, "number of 5000 characters"),
+        ("[" * 40 + "]" * 40, "nested 40 brackets deep"),
+        ("[" * 100_000 + "]" * 100_000, "nested 100000 brackets deep"),
+        ("[" * 100_000, "nested 100000 brackets deep"),
+        ("{a=" * 1000 + "1" + "}" * 1000, "nested 1000 brackets deep"),
+        # These took the parser minutes: it goes through all parts for each part.
+        ("{a" + ".a" * 400_000 + " = 1}", "holds a key of more than 50 parts"),
+        ("[[{b = 1, " + "'a' . " * 100_000 + "a = 1}]]", "holds a key of more than 50 parts"),
+    ],
+)
+def test_what_is_not_toml_names_its_line_and_key(refuse, broken, reason):
+    text = edited("communication.transmit_power", broken)
+    fault = the_fault(refuse(text))
+    assert (fault.key, fault.line) == ("communication.transmit_power", line_of("communication.transmit_power", text))
+    assert reason in fault.reason
+
+
+@pytest.mark.parametrize("name", ["k\\u001b[31mX", "a\\u202Eb", "a\\nb", "a\\u0000"])
+def test_a_name_that_would_steer_the_terminal_is_refused(refuse, name):
+    """It was printed as it stood, and written into tables."""
+    text = TEXT.replace("[operations.downlink.stations.kiruna]", f'[operations.downlink.stations."{name}"]')
+    assert text != TEXT
+    error = refuse(text)
+    assert any("with characters that cannot be printed" in fault.reason for fault in error.faults)
+    assert all(c.isprintable() or c == "\n" for c in str(error))
+
+
+def test_dots_that_are_no_key_are_left_alone():
+    text = f'name = "{"a." * 60}"\nx = {{a.b.c = "{"a " * 60}", d = 1.5}}\n'
+    assert Document.of(text.encode(), Path("x.toml"), "mission file").data["x"]["a"]["b"]["c"] == "a " * 60
+
+
+@pytest.mark.parametrize("line", ["what is this", "= 5", "[answer", "[]", "[[", "]"])
+def test_a_line_that_is_no_toml_is_named(refuse, line):
+    text = TEXT.replace("[answer]\n", f"[answer]\n{line}\n") if line != "[answer" else TEXT.replace("[answer]", line)
+    fault = the_fault(refuse(text))
+    assert (fault.line, fault.value) == (text.split("\n").index(line) + 1, "")
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "hunter2\nroot:hunter2:0\n",
+        "PASSWORD=hunter2\nTOKEN = 'hunter2\n",
+        '[default]\nkey = "hunter2"\nkeys = [{a = "hunter2"}]\n',
+        "-----BEGIN KEY-----\nhunter2==\n[hunter2\n",
+    ],
+)
+def test_the_lines_of_a_file_that_is_none_of_ours_are_not_quoted(tmp_path, text):
+    """A mission names its mirror file, and whoever reads the faults need not be who may read that file."""
+    (tmp_path / "secret").write_text(text, encoding="utf-8")
+    with pytest.raises(MissionError) as refused:
+        load_mission(tmp_path / "m.toml", text=f'{NO_MIRROR}[mirror]\nfile = "secret"\n{REST}')
+    lines = {fault.line for fault in refused.value.faults if fault.line}
+    assert "hunter2" not in str(refused.value)
+    assert lines
+    assert all(f"secret, line {line}" in str(refused.value) for line in lines)
+
+
+@pytest.mark.parametrize(
+    ("given", "apart"),
+    [
+        ("r\u0430ndom", "holds U+0430 (CYRILLIC SMALL LETTER A)"),
+        ("random\ufe0f", "holds U+FE0F (VARIATION SELECTOR-16)"),
+        ("random ", "begins or ends with a blank"),
+    ],
+)
+def test_a_choice_that_looks_like_what_is_meant_is_told_apart(refuse, given, apart):
+    """The hint read: class = "random" is none of the choices, did you mean "random"?"""
+    fault = the_fault(refuse(TEXT.replace('class = "random"', f'class = "{given}"')))
+    assert (fault.reason, fault.nearest) == (f"is none of the choices, it {apart}", '"random"')
+
+
+def test_a_key_that_looks_like_what_is_meant_is_told_apart(refuse):
+    fault = the_fault(refuse(TEXT.replace("transverse_velocity = ", '"tr\u0430nsverse_velocity" = ')))
+    assert (fault.reason.partition(", ")[2], fault.nearest) == (
+        "it holds U+0430 (CYRILLIC SMALL LETTER A)",
+        "transverse_velocity",
+    )
+
+
+# ---- files that are none
+@pytest.mark.parametrize(
+    ("content", "reason"),
+    [
+        (b"", "is empty"),
+        (b" \n\t\n", "is empty"),
+        (bytes(range(256)) * 10, "binary"),
+        (TEXT.encode("utf-16"), "binary"),
+        (TEXT.replace("urad", "µrad").encode("latin-1"), "not UTF-8 text (line 1)"),
+        (b"a = 1\n" * 10_001, "more than 10000 lines"),
+        (b"#" * 1_000_001, "larger than 1000 kB"),
+        (b"x = [\n" * 2_000_000, "larger than 1000 kB"),
+    ],
+    ids=["empty", "blank", "binary", "utf-16", "latin-1", "lines", "megabyte", "ten megabytes"],
+)
+def test_what_is_no_text_file_is_refused_whole(refuse, content, reason):
+    fault = the_fault(refuse(content))
+    assert reason in fault.reason
+    assert (fault.key, fault.line) == ("", 0)
+
+
+@pytest.mark.parametrize("load", [load_mission, load_mirror])
+@pytest.mark.parametrize(
+    ("path", "reason"),
+    [
+        ("missing.toml", "does not exist"),
+        (".", "is a directory"),
+        ("a\0b", "null"),
+        ("x" * 5000, "cannot be read"),
+        ("\x1b[2J", "exist"),
+    ],
+)
+def test_a_path_that_leads_to_no_file(tmp_path, load, path, reason):
+    with pytest.raises(MissionError, match=reason) as refused:
+        load(tmp_path / path)
+    assert str(refused.value).replace("\n", "").isprintable()
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs named pipes")
+def test_a_pipe_is_not_waited_for(tmp_path):
+    os.mkfifo(tmp_path / "pipe")
+    with pytest.raises(MissionError, match="is not a regular file"):
+        load_mission(tmp_path / "pipe")
+
+
+LARGE_NONSENSE = {
+    "one key again and again": lambda: "a = 1\n" * 9_000,
+    "one table again and again": lambda: "[a]\n" * 9_000,
+    "one list of tables": lambda: "[[a]]\n" * 9_000,
+    "unknown keys": lambda: "\n".join(f"k{i} = 1" for i in range(9_000)),
+    "unknown tables": lambda: "\n".join(f"[k{i}]" for i in range(9_000)),
+    "lines of junk": lambda: "junk\n" * 9_000,
+    "a dotted key": lambda: "a." * 100_000 + "b = 1",
+    "a dotted header": lambda: "[" + "a." * 100_000 + "b]",
+    "a long key": lambda: "a" * 900_000,
+    "lines": lambda: "a = 1\n" * 160_000,
+    "a long list": lambda: "a = [" + "1,\n" * 9_000 + "]",
+    "a long list of numbers for a key": lambda: edited("mirror.linear.numerator", "[" + "1," * 60_000 + "1]"),
+    "a long list of texts for a key": lambda: edited("scenario.pid_frequencies", "[" + '"x",' * 30_000 + "1]"),
+    "quotes in a text": lambda: 'a = """' + '\\"""' * 100_000,
+    "quotes in a literal text": lambda: "a = '''" + "''" * 300_000,
+    "quotes alone": lambda: '"' * 900_000,
+    "nested tables": lambda: "a = {" * 150_000,
+    "lists opened and not closed": lambda: "a = [\n" * 9_000,
+    "a hexadecimal number": lambda: "a = 0x" + "f" * 900_000,
+    "a decimal number in a list": lambda: "a = [" + "9" * 900_000 + "]",
+    "headers cut short": lambda: "[a\n" * 9_000,
+}
+
+
+@pytest.mark.parametrize("name", LARGE_NONSENSE)
+def test_a_megabyte_of_nonsense_is_refused_in_little_time_and_few_words(refuse, name):
+    assert len(str(refuse(LARGE_NONSENSE[name]()))) < 40_000
+
+
+def test_long_values_are_shortened_and_control_characters_escaped(refuse):
+    long = the_fault(refuse(edited("communication.transmit_power", '"' + "x" * 90_000 + '"')))
+    assert long.value.endswith('…"')
+    assert len(long.value) < 100
+    ringing = the_fault(refuse(edited("communication.transmit_power", '"5 W\\u0007\\u001b[31m\\u202e"')))
+    assert ringing.value == '"5 W\\u0007\\u001b[31m\\u202e"'
+    of_name, of_key = refuse(TEXT.replace("[scenario]\n", '[scenario]\n"\\u001bkey" = 1\n')).faults
+    assert of_name.key == of_key.key == "scenario.\\u001bkey"
+
+
+# ---- mirrors
+PLAY = """
+[prandtl_ishlinskii]
+thresholds = ["0 V", "0.5 V", "1 V"]
+weights = ["60 urad/V", "20 urad/V", "0 urad/V"]
+"""
+MIRROR_WITHOUT_MODEL = re.sub(r"\[bouc_wen\].*", "", MIRROR_TEXT, flags=re.DOTALL)
+
+
+def test_a_mirror_file_stands_for_the_mirror_table(tmp_path):
+    (tmp_path / "lab").mkdir()
+    (tmp_path / "lab" / "mirror.toml").write_text(MIRROR_TEXT, encoding="utf-8")
+    path = tmp_path / "mission.toml"
+    path.write_text(f'{NO_MIRROR}[mirror]\nfile = "lab/mirror.toml"\n{REST}', encoding="utf-8")
+    file = load_mission(path)
+    assert file.mission == load_mission(PAPER).mission
+    assert file.mirror_file.path == tmp_path / "lab" / "mirror.toml"
+    assert file.mirror_file.text == MIRROR_TEXT
+    assert file.mirror_file.sha256 == hashlib.sha256(MIRROR_TEXT.encode()).hexdigest()
+    assert file.sources["mirror.bouc_wen.d1"].line == line_of("bouc_wen.d1", MIRROR_TEXT)
+    assert file.sources["mirror.bouc_wen.d1"].file == "mirror file"
+    assert "mirror.file" not in file.sources
+    assert set(file.sources) == set(load_mission(PAPER).sources)
+    assert file.mirror_file.sources["mirror.travel"] == file.sources["mirror.travel"]
+
+
+def test_a_mirror_from_the_command_line_replaces_the_missions(tmp_path):
+    mirror = tmp_path / "play.toml"
+    mirror.write_text(MIRROR_WITHOUT_MODEL.replace('"2.5 mrad"', '"2 mrad"  #') + PLAY, encoding="utf-8")
+    file = load_mission(PAPER, mirror)
+    assert file.mission.mirror.travel_rad == 2e-3
+    assert file.mission.mirror.bouc_wen is None
+    assert file.mission.mirror.prandtl_ishlinskii.thresholds_v == (0.0, 0.5, 1.0)
+    assert file.mission.mirror.prandtl_ishlinskii.weights_rad_v == (60e-6, 20e-6, 0.0)
+    assert file.mirror_file.path == mirror
+    assert load_mirror(mirror).mirror == file.mission.mirror
+    assert not any(key.startswith("mirror.bouc_wen") for key in file.sources)
+
+
+def test_plays_widen_where_the_file_says_so(refuse, tmp_path):
+    mirror = tmp_path / "play.toml"
+    mirror.write_text(MIRROR_WITHOUT_MODEL + PLAY, encoding="utf-8")
+    assert load_mission(PAPER, mirror).mission.mirror.prandtl_ishlinskii.widening_s == 0.0
+    mirror.write_text(MIRROR_WITHOUT_MODEL + PLAY + 'widening = "0.1 ms"\n', encoding="utf-8")
+    assert load_mission(PAPER, mirror).mission.mirror.prandtl_ishlinskii.widening_s == pytest.approx(1e-4)
+    mirror.write_text(MIRROR_WITHOUT_MODEL + PLAY + 'widening = "-0.1 ms"\n', encoding="utf-8")
+    fault = the_fault(refuse(TEXT, mirror))
+    assert (fault.key, fault.value) == ("mirror.prandtl_ishlinskii.widening", '"-0.1 ms"')
+    assert "below 0" in fault.reason
+
+
+def test_faults_of_a_mirror_file_name_that_file_beside_those_of_the_mission(refuse, tmp_path):
+    mirror = tmp_path / "mirror.toml"
+    text = edited("bouc_wen.d1", "0.089", edited("travel", '"2.5 m"', MIRROR_TEXT))
+    mirror.write_text(text, encoding="utf-8")
+    error = refuse(edited("beacon.distance", "44000"), mirror)
+    found = {(fault.file, fault.key, fault.line) for fault in error.faults}
+    assert found == {
+        (str(tmp_path / "bad.toml"), "beacon.distance", line_of("beacon.distance", TEXT)),
+        (str(mirror), "mirror.travel", line_of("travel", text)),
+        (str(mirror), "mirror.bouc_wen.d1", line_of("bouc_wen.d1", text)),
+    }
+    assert f"{mirror}, line {line_of('travel', text)}: mirror.travel" in str(error)
+
+
+@pytest.mark.parametrize(
+    ("table", "reason"),
+    [
+        ('file = "nowhere.toml"\n', "the mirror file does not exist"),
+        ('file = "."\n', "the mirror file is a directory"),
+        ("file = 5\n", "is no path"),
+        ('file = ""\n', "is no path"),
+        ('file = "mirror.toml"\nbias = "6 V"\n', "stands beside other keys"),
+    ],
+)
+def test_a_mirror_file_that_is_not_there_is_one_fault_beside_others(refuse, table, reason):
+    text = edited("beacon.distance", "44000", f"{NO_MIRROR}[mirror]\n{table}{REST}")
+    faults = refuse(text).faults
+    assert len(faults) == 2
+    assert any(reason in fault.reason for fault in faults)
+    assert any(fault.key == "beacon.distance" for fault in faults)
+
+
+def test_a_mirror_file_that_is_no_toml(refuse, tmp_path):
+    mirror = tmp_path / "mirror.toml"
+    mirror.write_text(edited("travel", "2.5 mrad", MIRROR_TEXT), encoding="utf-8")
+    fault = the_fault(refuse(TEXT, mirror))
+    assert (fault.file, fault.key, fault.line) == (str(mirror), "mirror.travel", line_of("travel", MIRROR_TEXT))
+    with pytest.raises(MissionError, match=r"mirror\.travel = 2\.5 mrad"):
+        load_mirror(mirror)
+
+
+@pytest.mark.parametrize(
+    ("body", "key", "reason"),
+    [
+        ("", "mirror", "no hysteresis model"),
+        (PLAY + MIRROR_TEXT[MIRROR_TEXT.index("[bouc_wen]") :], "mirror", "two hysteresis models"),
+        (PLAY + "[comparison]\n", "mirror.comparison", "no hysteresis model"),
+        (PLAY.replace('"0 V", ', ""), "mirror.prandtl_ishlinskii.thresholds", "does not begin at 0 V"),
+        (PLAY.replace('"0 V", ', ""), "mirror.prandtl_ishlinskii.weights", "3 items where thresholds has 2"),
+        (PLAY.replace('"1 V"', '"0.5 V"'), "mirror.prandtl_ishlinskii.thresholds", "does not rise"),
+        (PLAY.replace('"20 u', '"-20 u'), "mirror.prandtl_ishlinskii.weights", "item 2"),
+        (PLAY.replace("60", "0").replace("20 ", "0 "), "mirror.prandtl_ishlinskii.weights", "zero throughout"),
+    ],
+)
+def test_what_a_mirror_must_hold(tmp_path, body, key, reason):
+    path = tmp_path / "mirror.toml"
+    path.write_text(MIRROR_WITHOUT_MODEL + body, encoding="utf-8")
+    with pytest.raises(MissionError) as refused:
+        load_mirror(path)
+    assert any(fault.key == key and reason in fault.reason for fault in refused.value.faults), str(refused.value)
+
+
+def test_a_cascade_needs_its_linear_part(tmp_path):
+    path = tmp_path / "mirror.toml"
+    text = re.sub(r"\[linear\].*?(?=\[bouc_wen\])", "", MIRROR_TEXT, flags=re.DOTALL)
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(MissionError) as refused:
+        load_mirror(path)
+    fault = the_fault(refused.value)
+    assert (fault.key, fault.line) == ("mirror.composition", line_of("composition", text))
+    assert 'composition = "static"' in fault.expected
+    path.write_text(text.replace('"cascade"', '"static"'), encoding="utf-8")
+    assert load_mirror(path).mirror.linear is None
+
+
+# ---- whatever is typed
+SIGNS = [*"[]{}\"'=.,#\\ \n\t\x7fé", "[[", "\r\n", '"""', "'''", "\\u0000"]
+WORDS = [
+    "[mirror]",
+    "[beacon]",
+    "name",
+    "bias = ",
+    "file = ",
+    '"6 V"',
+    "5 W",
+    "nan",
+    "1e999",
+    "true",
+    "1979-05-27",
+    "a.b",
+]
+FRAGMENTS = st.sampled_from(SIGNS + WORDS)
+
+
+@settings(deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=80)
+@given(st.integers(0, len(TEXT)), st.integers(0, 60), st.lists(FRAGMENTS, max_size=6))
+def test_a_file_damaged_anywhere_raises_nothing_else(tmp_path, start, length, fragments):
+    path = tmp_path / "fuzz.toml"
+    path.write_bytes((TEXT[:start] + "".join(fragments) + TEXT[start + length :]).encode())
+    try:
+        file = load_mission(path)
+    except MissionError as error:
+        assert error.faults
+        assert len(str(error)) < 20_000
+        return
+    assert isinstance(file.mission, Mission)
+
+
+@settings(deadline=None)
+@given(st.lists(FRAGMENTS, max_size=30))
+def test_the_scanner_covers_what_the_parser_reads(fragments):
+    text = "".join(fragments)
+    statements = scan(text)
+    assert [s.line for s in statements] == sorted(s.line for s in statements)
+    try:
+        data = tomllib.loads(text)
+    except (tomllib.TOMLDecodeError, ValueError):
+        return
+    named = {s.key.partition(".")[0].partition("#")[0] for s in statements}
+    assert {key for key in data if key and "." not in key and "#" not in key and key.isprintable()} <= named | {
+        "\\u0000"
+    }
+
+
+# ---- schema and start-up
+OPTIONAL = {"fine_pointing", "point_ahead", "acquisition", "orbit", "operations", "constellation"}
+
+
+def test_the_schema_describes_every_key():
+    schema = mission_schema()
+    json.dumps(schema)
+    power = schema["$defs"]["Communication"]["properties"]["transmit_power"]
+    assert power["type"] == "string"
+    assert power["x-si-unit"] == "W"
+    assert re.search(power["pattern"], "5 W")
+    assert re.search(power["pattern"], "37 dBm")
+    assert not re.search(power["pattern"], "5")
+    assert not re.search(power["pattern"], "1,5 W")
+    assert schema["$defs"]["Amplifier"]["properties"]["gain"]["exclusiveMinimum"] == 0.0
+    assert schema["properties"]["mirror"]["anyOf"][1]["required"] == ["file"]
+    assert schema["additionalProperties"] is False
+    tables = {key.partition(".")[0] for key in load_mission(PAPER).sources}
+    assert set(schema["required"]) == tables - OPTIONAL
+    assert "fine_pointing" in schema["properties"]
+    for key, source in load_mission(PAPER).sources.items():
+        table, name = schema, key.rpartition(".")[2]
+        for part in key.split(".")[:-1]:
+            table = _table(schema, table["properties"][part])
+        rule = table["properties"][name]
+        if "pattern" in rule:
+            assert re.search(rule["pattern"], source.value.strip('"')), key
+
+
+class _Named(dict):
+    """Tables that each have a name of their own."""
+
+    def __missing__(self, name):
+        return self["any"]
+
+
+def _table(schema, rule):
+    if rule.get("type") == "object":
+        return {"properties": _Named(any=rule["additionalProperties"])}
+    reference = next(r["$ref"] for r in (rule, *rule.get("anyOf", [])) if "$ref" in r)
+    return schema["$defs"][reference.rpartition("/")[2]]
+
+
+def test_importing_the_mission_loads_no_numerics():
+    code = "import sys, microrad.mission.file; print([m for m in ('numpy', 'scipy', 'numba') if m in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
+
+
+# --------------------------------------------------------------------------------------- a linear part by its roots
+ROOTS = """[mirror.linear]
+poles = ["0.0343 Hz", "54.22 Hz", "1552.7 Hz", "2542.7 Hz"]
+pole_dampings = [1, 1, 1, 0.357]
+zeros = ["0.0672 Hz", "56.64 Hz"]
+zero_dampings = [1, 1]
+normalise_at = "2 Hz"
+excited_from = "1 Hz"
+excited_to = "5 kHz"
+
+"""
+
+
+def with_roots(*changes):
+    """The paper's mission with its linear part by roots, and texts in it replaced."""
+    table = ROOTS
+    for old, new in changes:
+        assert table.count(old) == 1, old
+        table = table.replace(old, new)
+    start, end = TEXT.index("[mirror.linear]"), TEXT.index("[mirror.bouc_wen]")
+    return TEXT[:start] + table + TEXT[end:]
+
+
+def test_a_linear_part_by_roots_is_the_one_by_coefficients(tmp_path):
+    path = tmp_path / "roots.toml"
+    path.write_text(with_roots(), encoding="utf-8")
+    by_roots, by_coefficients = (load_mission(p).mission.mirror.linear for p in (path, PAPER))
+    for ours, printed in zip(by_roots.roots, by_coefficients.roots, strict=True):
+        size = np.sort(np.abs(ours)), np.sort(np.abs(printed))
+        np.testing.assert_allclose(*size, rtol=2e-3)
+        assert len(ours) == len(printed)
+    freq = np.geomspace(1.0, 5e3, 20)
+    responses = [lti.frequency_response(mirror.linear_part(each)[0], freq) for each in (by_roots, by_coefficients)]
+    np.testing.assert_allclose(responses[0], responses[1], rtol=5e-3)
+
+
+@pytest.mark.parametrize(
+    ("changes", "key", "reason"),
+    [
+        ([('poles = ["0.0343 Hz", ', "poles = [")], "pole_dampings", "has 4 items where poles has 3"),
+        ([("pole_dampings = [1, 1, 1, 0.357]", "pole_dampings = [1, 1, 1, -0.357]")], "pole_dampings", "unstable pole"),
+        ([("zero_dampings = [1, 1]", "zero_dampings = [1, 2]")], "zero_dampings", "is above 1"),
+        (
+            [
+                ('zeros = ["0.0672 Hz", "56.64 Hz"]', 'zeros = ["1 Hz", "2 Hz", "3 Hz"]'),
+                ("zero_dampings = [1, 1]", "zero_dampings = [0.5, 0.5, 0.5]"),
+            ],
+            "zeros",
+            "makes 6 zeros over 5 poles",
+        ),
+        ([("zeros = [", "numerator = [1]\nzeros = [")], "numerator", "stands beside poles"),
+        ([('poles = ["0.0343 Hz", "54.22 Hz", "1552.7 Hz", "2542.7 Hz"]\n', "")], "zeros", "stands without poles"),
+    ],
+)
+def test_roots_that_do_not_fit_are_told(refuse, changes, key, reason):
+    faults = refuse(with_roots(*changes)).faults
+    assert any(f.key == f"mirror.linear.{key}" and reason in f.reason for f in faults), faults

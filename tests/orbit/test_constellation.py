@@ -1,0 +1,306 @@
+"""Many satellites and a few relays: the pattern they fly in, who sees whom, who is served, and the plan of it."""
+
+import csv
+import io
+import itertools
+import math
+
+import numpy as np
+import pytest
+
+from day_files import BY_FILE, day_file, element_set
+from microrad import orbit
+from microrad.link import study as link_study
+from microrad.orbit import constellation, operations
+from microrad.orbit import day as day_study
+from microrad.orbit.constellation import opportunities
+from microrad.report import constellation_views
+
+SIX_HOURS = {"orbit.duration": "6 h"}
+TWO_TERMINALS = {"constellation.terminals": 2}
+FILED = {"constellation": BY_FILE, "orbit.leo": {"kind": "elements", "file": "a.tle", "object": "70001"}}
+
+
+def made(folder, *changes):
+    """The terminals of a mission's constellation and what they share."""
+    file = day_file(folder, *changes)
+    m = file.mission
+    pair = orbit.pair(m, folder)
+    c = constellation.table(m)
+    return pair, tuple(orbit.satellites(c, m, pair.epoch, folder)), orbit.relays(c, m, pair.epoch)
+
+
+def planned(folder, *changes):
+    links = link_study.run(day_file(folder, *changes))
+    return constellation.run(links.file, day_study.given_loss(links)), links
+
+
+@pytest.fixture(scope="module")
+def plan(tmp_path_factory):
+    """The plan of the shipped mission over six hours."""
+    return planned(tmp_path_factory.mktemp("plan"), SIX_HOURS)[0]
+
+
+@pytest.fixture(scope="module")
+def two_terminals(tmp_path_factory):
+    return planned(tmp_path_factory.mktemp("plan"), SIX_HOURS, TWO_TERMINALS)[0]
+
+
+# ------------------------------------------------------------------------------------------------------------- pattern
+def turned(angle_rad):
+    """An angle within half a turn of 0."""
+    return math.remainder(angle_rad, 2.0 * math.pi)
+
+
+@pytest.mark.parametrize(("pattern", "round_deg"), [("delta", 360.0), ("star", 180.0)])
+@pytest.mark.parametrize(("satellites", "planes", "phasing"), [(12, 3, 1), (15, 5, 3), (4, 1, 0), (6, 6, 5)])
+def test_walkers_pattern(tmp_path, pattern, round_deg, satellites, planes, phasing):
+    given = {"pattern": pattern, "satellites": satellites, "planes": planes, "phasing": phasing}
+    pair, own, _ = made(tmp_path, {f"constellation.{key}": value for key, value in given.items()})
+    base, each = pair.leo.orbit, satellites // planes
+    assert [s.name for s in own] == [f"{p}-{k}" for p in range(1, planes + 1) for k in range(1, each + 1)]
+    assert {s.limits for s in own} == {pair.leo.limits}
+    for s in own:
+        plane, place = (int(part) - 1 for part in s.name.split("-"))
+        one = s.orbit
+        assert (one.semi_major_axis_m, one.inclination_rad) == (base.semi_major_axis_m, base.inclination_rad)
+        node = math.radians(round_deg / planes) * plane
+        phase = math.radians(360.0 / each) * place + math.radians(360.0 / satellites) * phasing * plane
+        assert turned(one.node_rad - base.node_rad - node) == pytest.approx(0.0, abs=1e-12)
+        assert turned(one.mean_anomaly_rad - base.mean_anomaly_rad - phase) == pytest.approx(0.0, abs=1e-12)
+    first = own[0].orbit.states(np.array([0.0, 1000.0])).position_m
+    np.testing.assert_allclose(first, base.states(np.array([0.0, 1000.0])).position_m, atol=1e-6)
+
+
+def test_the_phase_of_a_delta_goes_round_to_itself(tmp_path):
+    """One plane further than the last is the first again, p nodes on: what phasing in units of 360 deg / t is for."""
+    _, own, _ = made(tmp_path, {"constellation.phasing": 2})
+    angles = {
+        (round(math.degrees(turned(s.orbit.node_rad - own[0].orbit.node_rad)), 6) % 360.0,
+         round(math.degrees(turned(s.orbit.mean_anomaly_rad - own[0].orbit.mean_anomaly_rad)), 6) % 90.0)
+        for s in own
+    }  # fmt: skip
+    assert angles == {(0.0, 0.0), (120.0, 60.0), (240.0, 30.0)}
+
+
+def test_relays_stand_at_their_longitudes_with_the_limits_of_the_partner(tmp_path):
+    pair, _, relays = made(tmp_path)
+    assert [r.name for r in relays] == ["east", "west"]
+    assert [math.degrees(r.orbit.longitude_rad) for r in relays] == pytest.approx([143.0, -37.0])
+    assert {r.limits for r in relays} == {pair.geo.limits}
+
+
+# ------------------------------------------------------------------------------------------------------- opportunities
+def as_rows(found):
+    return list(
+        zip(found.satellite.tolist(), found.relay.tolist(), found.start_s.tolist(), found.end_s.tolist(), strict=True)
+    )
+
+
+def test_every_opportunity_is_a_contact_of_its_pair(tmp_path):
+    pair, own, relays = made(tmp_path, SIX_HOURS)
+    rows = as_rows(opportunities(own, relays, pair.earth, pair.epoch, pair.span_s))
+    assert [row[2] for row in rows] == sorted(row[2] for row in rows)
+    for (k, satellite), (j, relay) in itertools.product(enumerate(own), enumerate(relays)):
+        alone = orbit.contacts(satellite, relay, pair.earth, pair.epoch, pair.span_s)
+        mine = [(start, end) for s, r, start, end in rows if (s, r) == (k, j)]
+        np.testing.assert_allclose(np.array(mine), np.array([(c.start_s, c.end_s) for c in alone]), rtol=0, atol=1e-5)
+
+
+def test_opportunities_of_a_plan_are_the_seconds_in_which_the_link_closes(tmp_path, plan):
+    pair, own, relays = made(tmp_path, SIX_HOURS)
+    rows, time_s = as_rows(plan.opportunities), np.arange(0.0, 21600.0) + 0.5
+    for (k, satellite), (j, relay) in itertools.product(enumerate(own[:4]), enumerate(relays)):
+        first, second = (t.orbit.states(time_s).position_m for t in (satellite, relay))
+        within = np.linalg.norm(second - first, axis=0) < 42_002e3
+        seen = np.zeros(time_s.size, dtype=bool)
+        for c in orbit.contacts(satellite, relay, pair.earth, pair.epoch, pair.span_s):
+            seen |= (c.start_s < time_s) & (time_s < c.end_s)
+        edge = np.flatnonzero(np.diff(np.concatenate(([0], (within & seen).astype(int), [0]))))
+        mine = sorted(row[2:] for row in rows if row[:2] == (k, j))
+        np.testing.assert_allclose(np.ravel(mine), edge, rtol=0, atol=1.5)
+
+
+def test_twice_the_satellites_have_the_opportunities_of_both_halves(tmp_path):
+    big = {"constellation.satellites": 40, "constellation.planes": 4, **SIX_HOURS}
+    pair, own, relays = made(tmp_path, big)
+    given = pair.earth, pair.epoch, pair.span_s
+    whole = as_rows(opportunities(own, relays, *given))
+    halves = []
+    for first in (0, 20):
+        halves += [(s + first, *row) for s, *row in as_rows(opportunities(own[first : first + 20], relays, *given))]
+    assert whole == sorted(halves, key=lambda row: (row[2], row[0], row[1]))
+    assert {row[0] for row in whole} == set(range(40))
+
+
+def test_progress_counts_satellites_to_the_last(tmp_path):
+    pair, own, relays = made(tmp_path, {"orbit.duration": "1 h"}, {"constellation.satellites": 18})
+    told = []
+    opportunities(own, relays, pair.earth, pair.epoch, pair.span_s, on_progress=told.append)
+    assert told == list(range(1, 19))
+
+
+def test_no_satellite_has_no_opportunity(tmp_path):
+    pair, own, relays = made(tmp_path)
+    for sets in (((), relays), (own[:1], ())):
+        assert opportunities(*sets, pair.earth, pair.epoch, pair.span_s).start_s.shape == (0,)
+
+
+# ------------------------------------------------------------------------------------------------------------ sessions
+@pytest.mark.parametrize("terminals", [1, 2])
+def test_a_terminal_serves_one_satellite_at_a_time_and_a_satellite_has_one(plan, two_terminals, terminals):
+    p = plan if terminals == 1 else two_terminals
+    s = p.sessions
+    assert p.terminals == terminals
+    assert s.start_s.size == len(p.planned) > 20
+    assert set(s.terminal.tolist()) == set(range(terminals))
+    for key in (list(zip(s.relay, s.terminal, strict=True)), list(s.satellite)):
+        for one in set(key):
+            mine = sorted((s.start_s[k], s.end_s[k]) for k, other in enumerate(key) if other == one)
+            assert all(second[0] >= first[1] for first, second in itertools.pairwise(mine))
+    for k in range(s.start_s.size):
+        within = [
+            (start, end)
+            for satellite, relay, start, end in as_rows(p.opportunities)
+            if (satellite, relay) == (s.satellite[k], s.relay[k]) and start <= s.start_s[k] and s.end_s[k] <= end
+        ]
+        assert len(within) == 1
+        assert s.end_s[k] - s.start_s[k] >= 180.0 - 1e-6
+        assert s.locked_s[k] == s.start_s[k] + 60.0
+
+
+def test_more_terminals_serve_more(plan, two_terminals):
+    assert two_terminals.volume_bit > 1.1 * plan.volume_bit
+    assert np.all((plan.use > 0.3) & (plan.use <= 1.0))
+    for p in (plan, two_terminals):
+        busy = [
+            sum(e - b for r, b, e in zip(p.sessions.relay, p.sessions.start_s, p.sessions.end_s, strict=True) if r == k)
+            for k in range(2)
+        ]
+        assert p.use == pytest.approx(np.array(busy) / (p.terminals * 21600.0))
+
+
+def test_a_planned_session_has_the_rate_that_its_largest_range_leaves(tmp_path, plan):
+    pair, own, relays = made(tmp_path, SIX_HOURS)
+    by_name = {t.name: t for t in (*own, *relays)}
+    for one in plan.planned:
+        time_s = np.linspace(one.locked_s, one.end_s, 400)
+        first, second = (by_name[n].orbit.states(time_s).position_m for n in (one.satellite, one.relay))
+        range_m = np.linalg.norm(second - first, axis=0)
+        assert one.range_min_m == pytest.approx(np.min(range_m), abs=40e3)
+        assert one.range_max_m == pytest.approx(np.max(range_m), abs=40e3)
+        assert one.range_max_m < 42_003e3
+        assert one.rate_bit_s == 300e6
+        assert one.volume_bit == pytest.approx(one.rate_bit_s * (one.end_s - one.locked_s))
+    assert max(one.range_max_m for one in plan.planned) > 42_000e3
+    assert plan.volume_bit == pytest.approx(float(np.sum(plan.by_satellite.volume_bit)))
+    assert plan.volume_bit == pytest.approx(float(np.sum(plan.by_relay.volume_bit)))
+    assert pair.span_s == plan.span_s
+
+
+def test_a_session_over_several_rates_has_the_one_that_closes_throughout(tmp_path):
+    rates = {"operations.rates": ["200 Mbit/s", "300 Mbit/s", "350 Mbit/s"]}
+    plan, _ = planned(tmp_path, SIX_HOURS, rates)
+    reach = {rate: 42_002e3 * math.sqrt(300e6 / rate) for rate in (350e6, 300e6, 200e6)}
+    for one in plan.planned:
+        closing = [rate for rate, furthest in reach.items() if one.range_max_m < furthest - 1e3]
+        assert one.rate_bit_s == max(closing, default=200e6) or abs(one.range_max_m - reach[one.rate_bit_s]) < 2e3
+    assert {one.rate_bit_s for one in plan.planned} == set(reach)
+
+
+def test_an_outage_takes_its_share_of_the_volume(tmp_path, plan):
+    links = link_study.run(day_file(tmp_path, SIX_HOURS))
+    loss = day_study.given_loss(links)
+    worse = constellation.run(links.file, day_study.PointingLoss(loss.loss_db, 0.2, "test"))
+    assert worse.volume_bit == pytest.approx(0.8 * plan.volume_bit)
+
+
+# --------------------------------------------------------------------------------------------------- a file of elements
+def with_elements(folder, text):
+    (folder / "a.tle").write_text(text, encoding="utf-8")
+    return planned(folder, SIX_HOURS, FILED)[0]
+
+
+def test_a_file_of_elements_is_a_constellation(tmp_path):
+    text = "".join(element_set(name=f"EXAMPLE {k}", number=f"7000{k}", inclination=40.0 + 10 * k) for k in (1, 2, 3))
+    plan = with_elements(tmp_path, text)
+    assert plan.satellites == ("EXAMPLE 1", "EXAMPLE 2", "EXAMPLE 3")
+    assert {one.satellite for one in plan.planned} == set(plan.satellites)
+    sets = orbit.model.read_elements(tmp_path / "a.tle")
+    pair, own, relays = made(tmp_path, SIX_HOURS, FILED)
+    for elements, satellite in zip(sets, own, strict=True):
+        alone = orbit.model.sgp4_orbit(elements, pair.epoch)
+        time_s = np.array([0.0, 7000.0])
+        np.testing.assert_array_equal(satellite.orbit.states(time_s).position_m, alone.states(time_s).position_m)
+        assert satellite.limits == pair.leo.limits
+    assert [r.name for r in relays] == ["east"]
+
+
+def test_satellites_of_one_name_are_told_apart_by_their_number(tmp_path):
+    text = element_set(name="DEBRIS") + element_set(name="DEBRIS", number="70002", inclination=60.0)
+    text += element_set(name="OTHER", number="70003", inclination=70.0)
+    assert with_elements(tmp_path, text).satellites == ("DEBRIS (70001)", "DEBRIS (70002)", "OTHER")
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        (element_set() + element_set(day=78.0), r"a\.tle: several element sets are of EXAMPLE 1 \(70001\); leave one"),
+        (element_set() + element_set(name="OLD", number="70002", day=20.0), r"\(OLD\): the elements are expired"),
+        (element_set() + element_set(name="east", number="70002"), 'two terminals are called "east"'),
+    ],
+)
+def test_a_file_of_elements_that_is_none_is_refused(tmp_path, text, words):
+    with pytest.raises(orbit.OrbitError, match=words):
+        with_elements(tmp_path, text)
+
+
+# ------------------------------------------------------------------------------------------------------------ in words
+def test_the_csv_has_every_session(plan):
+    rows = list(csv.DictReader(io.StringIO(operations.csv_text(plan.planned, plan.epoch.utc))))
+    assert len(rows) == len(plan.planned)
+    for row, one in zip(rows, plan.planned, strict=True):
+        assert (row["satellite"], row["relay"]) == (one.satellite, one.relay)
+        assert float(row["start (s)"]) == one.start_s
+        assert float(row["volume (bit)"]) == one.volume_bit
+        assert row["end (UTC)"] == plan.epoch.utc(one.end_s)
+
+
+def test_the_contact_plan_has_every_session_with_data_in_whole_seconds(plan):
+    lines = operations.contact_plan(plan.planned, plan.epoch.utc).splitlines()
+    contacts = [line.split() for line in lines if line.startswith("a contact")]
+    ranges = [line.split() for line in lines if line.startswith("a range")]
+    assert len(contacts) == len(ranges) == len(plan.planned)
+    assert {int(words[-1]) for words in contacts} == {300_000_000 // 8}
+    spans = sorted((int(words[2].removeprefix("+")), int(words[3].removeprefix("+"))) for words in contacts)
+    assert spans == sorted((math.ceil(one.locked_s), math.floor(one.end_s)) for one in plan.planned)
+    assert {int(words[-1]) for words in ranges} == {1}  # 0.14 s of light, in whole seconds
+
+
+def test_the_words_add_up(plan):
+    first, second, third = constellation_views.sentences(plan)
+    seen = float(np.sum(plan.opportunities.end_s - plan.opportunities.start_s)) / 3600.0
+    assert f"12 satellites share 2 relays of one terminal each: in 6 h {len(plan.opportunities.start_s)} conta" in first
+    assert f"{seen:.0f} h in all" in first
+    assert f"{len(plan.planned)} sessions" in first
+    assert all(f"{name} {100 * use:.0f} %" in second for name, use in zip(plan.relays, plan.use, strict=True))
+    assert third.endswith(f" a pointing loss of {plan.loss.loss_db:.2f} dB ({plan.loss.source}).")
+    data = constellation_views.data(plan)
+    assert sum(s["sessions"] for s in data["satellites"]) == data["sessions"] == len(plan.planned)
+    assert sum(s["volume_bit"] for s in data["satellites"]) == pytest.approx(data["volume_bit"])
+    assert len(constellation_views.rows(plan)) == 12
+
+
+def test_a_long_table_is_cut_and_says_so(tmp_path):
+    plan, _ = planned(tmp_path, {"orbit.duration": "1 h", "constellation.satellites": 45})
+    text = constellation_views.text(plan, 120)
+    assert "The first 40 of 45 satellites; --csv has every session." in text
+    assert " 3-10 " in text.replace("\n", " ")
+    assert "3-11" not in text
+
+
+def test_the_tables_that_a_plan_needs(tmp_path):
+    loss = day_study.PointingLoss(1.0, 0.0, "test")
+    links = link_study.run(day_file(tmp_path, {"constellation": None}))
+    with pytest.raises(operations.OperationsError, match=r"no table \[constellation\]"):
+        constellation.run(links.file, loss)

@@ -1,0 +1,683 @@
+"""A day of the link against what one sees second by second: contacts, volumes, latencies, and what moves them."""
+
+import itertools
+import math
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from day_files import ALONE, HELD, LIMITS, day_file, ephemeris
+from microrad import orbit
+from microrad.link import study as link_study
+from microrad.orbit import EARTH_RADIUS_M
+from microrad.orbit import day as day_study
+from microrad.orbit.day import NOTHING, Numbers, PointingLoss, Swing, assumptions, flow, geometry, given_loss
+
+C_M_S = 299_792_458.0
+EARTH_POLAR_M = EARTH_RADIUS_M * (1.0 - 1.0 / 298.257223563)
+SIX_HOURS = {"orbit.duration": "6 h", **ALONE}
+NO_SEARCH = {"acquisition": None}
+BLIND = {LIMITS: {**HELD, "boresight": [0.0, 0.0, 1.0], "field_of_regard": "5 deg"}}  # at the Earth
+DEAF = {"operations.downlink.stations.kiruna.mask": "88 deg"}
+TROMSO = {"latitude": "69.66 deg", "longitude": "18.94 deg", "height": "100 m", "mask": "5 deg"}
+RATES = {"operations.rates": ["50 Mbit/s", "280 Mbit/s", "320 Mbit/s", "400 Mbit/s"], "operations.margin": "3 dB"}
+
+
+@pytest.fixture(scope="module")
+def links(tmp_path_factory):
+    """The links of the shipped mission, its acquisition simulated a hundred times."""
+    return link_study.run(day_file(tmp_path_factory.mktemp("shipped"), ALONE))
+
+
+@pytest.fixture(scope="module")
+def day(links):
+    return day_study.run(links)
+
+
+@pytest.fixture
+def quick(tmp_path, monkeypatch):
+    """A day without its assumptions changed, by changes of the mission."""
+    monkeypatch.setattr(day_study, "swings", lambda *given: ())
+
+    def run(*changes, loss=None):
+        return day_study.run(link_study.run(day_file(tmp_path, ALONE, *changes)), loss)
+
+    return run
+
+
+# ------------------------------------------------------------------------------------------- second by second, by hand
+class Seconds:
+    """Each second of a day and its tail, looked at in its middle; nothing here knows of contacts."""
+
+    def __init__(self, day):
+        pair, m = day.view.pair, day.mission
+        self.span_s = pair.span_s[1]
+        self.time_s = np.arange(0.0, pair.whole_s[1]) + 0.5
+        self.own, self.far = (t.orbit.states(self.time_s).position_m for t in (pair.leo, pair.geo))
+        self.range_m = np.sqrt(np.sum((self.far - self.own) ** 2, axis=0))
+        self.epoch, self.operations, self.day = pair.epoch, m.operations, day
+        self.inside = self.time_s < self.span_s
+        grazing = m.orbit.grazing_height_m
+        self.seen = self.clear(grazing) & self.off_sun(5.0) & self.below_geo(10.5)
+
+    def clear(self, height_m):
+        """Whether the line passes the ellipsoid: the nearest point of the line in coordinates that make it round."""
+        scale = np.array([[1.0], [1.0], [(EARTH_RADIUS_M + height_m) / (EARTH_POLAR_M + height_m)]])
+        first, second = self.own * scale, self.far * scale
+        along = second - first
+        nearest = np.clip(-np.sum(first * along, axis=0) / np.sum(along**2, axis=0), 0.0, 1.0)
+        return np.linalg.norm(first + nearest * along, axis=0) > EARTH_RADIUS_M + height_m
+
+    def off_sun(self, least_deg):
+        """Whether either end sees the Sun further away than that, or not at all: behind a round Earth."""
+        sun = orbit.sun_direction(self.epoch, self.time_s)
+        look = (self.far - self.own) / self.range_m
+        fine = np.ones(self.time_s.size, dtype=bool)
+        for place, direction in ((self.own, look), (self.far, -look)):
+            angle = np.degrees(np.arccos(np.clip(np.sum(direction * sun, axis=0), -1.0, 1.0)))
+            towards = np.sum(place * sun, axis=0)
+            dark = (towards < 0.0) & (np.linalg.norm(place - towards * sun, axis=0) < EARTH_RADIUS_M)
+            fine &= (angle >= least_deg) | dark
+        return fine
+
+    def below_geo(self, most_deg):
+        down = -self.far / np.linalg.norm(self.far, axis=0)
+        look = (self.own - self.far) / self.range_m
+        return np.degrees(np.arccos(np.sum(down * look, axis=0))) <= most_deg
+
+    def contacts(self):
+        """First and last second of each contact."""
+        edge = np.diff(np.concatenate(([0], self.seen.astype(int), [0])))
+        return np.flatnonzero(edge == 1), np.flatnonzero(edge == -1)
+
+    def rate_bit_s(self, links, rates_bit_s, margin_db):
+        """The highest rate whose margin at the range of the second is enough, by the budget at its own distance."""
+        c = links.file.mission.communication
+        best = np.zeros(self.time_s.size)
+        for rate in sorted(rates_bit_s):
+            margin = links.communication.margin_db + 10.0 * np.log10(c.data_rate_bit_s / rate)
+            margin = margin - 20.0 * np.log10(self.range_m / c.distance_m)
+            best[margin >= margin_db] = rate
+        return np.where(self.seen, best, 0.0)
+
+
+def packets(sent_bit, made_bit, room_bit, delay_s):
+    """Latency and size of what each second made and sent, first in, first out; what found no room; what is left."""
+    queue, held, lost, found = [], 0.0, 0.0, []
+    for second, (sent, new) in enumerate(zip(sent_bit, made_bit, strict=True)):
+        room, kept = sent, min(new, room_bit - held + sent)
+        lost += new - kept
+        if kept > 0.0:
+            queue.append([second + 0.5, kept])
+            held += kept
+        while room > 0.0 and queue:
+            made_s, size = queue[0]
+            part = min(size, room)
+            found.append((max(second + 0.5 - made_s, 0.0) + delay_s, part))
+            room, held, queue[0][1] = room - part, held - part, size - part
+            if queue[0][1] <= 0.0:
+                queue.pop(0)
+    return np.array(found).reshape(-1, 2), lost, held
+
+
+def share_within(found, left, latency_s):
+    return float(np.sum(found[found[:, 0] <= latency_s, 1])) / (float(np.sum(found[:, 1])) + left)
+
+
+def same_latencies(way, found, left, tolerance_s):
+    """Both distributions, one inside the other moved by a tolerance to either side."""
+    for latency_s in np.concatenate((np.linspace(0.0, 3.0, 7), np.geomspace(5.0, 5e4, 60))):
+        low, high = (share_within(found, left, latency_s + off) for off in (-tolerance_s, tolerance_s))
+        assert low - 1e-3 <= float(way.latency.cdf(latency_s)) <= high + 1e-3, latency_s
+
+
+# ------------------------------------------------------------------------------------------------- the shipped mission
+def test_the_shipped_day_has_the_contacts_of_its_facts(day):
+    v = day.view
+    assert len(v.encounters) == 15
+    assert v.visible_share == pytest.approx(0.634, abs=0.001)
+    assert 50.0 < v.median_s / 60.0 < 60.0
+    assert v.closed_form.duration_s / 60.0 == pytest.approx(56.72, abs=0.005)
+    assert min(e.range_least_m for e in v.encounters) == pytest.approx(35_290e3, abs=20e3)
+    assert v.largest("range_most_m") == pytest.approx(44_036e3, abs=5e3)
+    assert v.largest("point_ahead_most_rad") == pytest.approx(71e-6, abs=0.5e-6)
+    assert v.largest("rate_most_rad_s") == pytest.approx(255e-6, abs=1e-6)
+    assert v.largest("doppler_most_hz") == pytest.approx(4.95e9, abs=0.02e9)
+    assert day.relay.gap_s == v.gap_s
+
+
+@pytest.fixture(scope="module")
+def seconds(day):
+    return Seconds(day)
+
+
+def test_the_contacts_are_those_of_every_second(day, seconds):
+    first, last = seconds.contacts()
+    found = day.view.contacts
+    assert len(found) == first.size
+    np.testing.assert_allclose([c.start_s for c in found], first, atol=1.001)
+    np.testing.assert_allclose([c.end_s for c in found], last, atol=1.001)
+    assert day.view.visible_share == pytest.approx(float(np.mean(seconds.seen[seconds.inside])), abs=3e-4)
+    edges = np.concatenate(([0.0], *zip(first, last, strict=True)))
+    gaps = [b - a for a, b in zip(edges[::2], edges[1::2], strict=False) if a < 86400.0]
+    assert day.view.gap_s == pytest.approx(max(gaps), abs=2.0)
+
+
+def test_what_a_contact_reaches_is_what_its_seconds_reach(day, seconds):
+    speed = np.diff(seconds.far - seconds.own, axis=1)
+    middle = ((seconds.far - seconds.own)[:, 1:] + (seconds.far - seconds.own)[:, :-1]) / 2.0
+    reach = np.linalg.norm(middle, axis=0)
+    radial = np.sum(speed * middle, axis=0) / reach
+    across = np.sqrt(np.sum(speed**2, axis=0) - radial**2)
+    for e in day.view.encounters:
+        at = slice(math.ceil(e.contact.start_s), math.floor(e.contact.end_s) - 1)
+        assert e.range_least_m == pytest.approx(np.min(reach[at]), abs=16e3)
+        assert e.range_most_m == pytest.approx(np.max(reach[at]), abs=16e3)
+        assert e.point_ahead_most_rad == pytest.approx(2.0 * np.max(across[at]) / C_M_S, rel=3e-3)
+        assert e.rate_most_rad_s == pytest.approx(np.max(across[at] / reach[at]), rel=3e-3)
+        assert e.doppler_most_hz == pytest.approx(np.max(np.abs(radial[at])) / 1.55e-6, rel=3e-3)
+        turn = np.cross(middle[:, at], speed[:, at], axis=0) / reach[at] ** 2
+        change = np.linalg.norm(np.diff(turn, axis=1), axis=0)
+        assert e.acceleration_most_rad_s2 == pytest.approx(np.max(change), rel=0.02)
+
+
+def test_the_range_between_samples_is_the_orbits(day, seconds):
+    for contact, range_m in zip(day.view.contacts, day.view.range_m, strict=True):
+        chosen = (contact.start_s < seconds.time_s) & (seconds.time_s < contact.end_s)
+        assert np.max(np.abs(range_m(seconds.time_s[chosen]) - seconds.range_m[chosen])) < 1.0
+
+
+def test_without_acquisition_volume_and_latency_are_those_of_packets(quick, seconds, links):
+    found = quick(NO_SEARCH)
+    o, way = found.mission.operations, found.relay
+    rate = seconds.rate_bit_s(links, [300e6], 3.0)
+    inside = rate[seconds.inside]
+    assert way.capacity_bit == pytest.approx(np.sum(inside), rel=1e-3)
+    assert way.capacity_spread_bit == pytest.approx((way.capacity_bit, way.capacity_bit), rel=1e-12)
+    for c, bit in zip(way.contacts, way.carried_bit, strict=True):
+        part = rate[int(c.start_s) : min(math.ceil(c.end_s), 86400)]
+        assert bit == pytest.approx(np.sum(part), abs=4 * 300e6)
+    made = np.where(seconds.inside, o.instrument_rate_bit_s, 0.0)
+    sent, lost, left = packets(rate, made, o.store_bit, o.relay_delay_s)
+    assert (lost, left, way.lost_bit) == (0.0, 0.0, 0.0)
+    assert way.generated_bit == pytest.approx(3e6 * 86400)
+    assert way.on_board_bit == pytest.approx(0.0, abs=1.0)
+    same_latencies(way, sent, left, 2.0)
+    order = np.argsort(sent[:, 0])
+    shares = np.cumsum(sent[order, 1]) / np.sum(sent[:, 1])
+    for wanted, got in ((0.5, way.median_s), (0.99, way.slow_s)):
+        assert got == pytest.approx(sent[order, 0][np.searchsorted(shares, wanted)], abs=3.0)
+
+
+def test_a_contact_at_the_end_of_the_span_counts_up_to_it(quick, seconds, links):
+    found = quick(NO_SEARCH, {"orbit.duration": "6.8 h"})  # in the long contact about half past seven
+    cut, last = found.view.encounters[-1].contact, found.view.contacts[len(found.view.encounters) - 1]
+    assert last.start_s < 6.8 * 3600.0 < last.end_s
+    assert (cut.start_s, cut.end_s, cut.ends) == (last.start_s, 6.8 * 3600.0, "end of the span")
+    assert found.relay.contacts[-1] == cut
+    until = seconds.time_s < 6.8 * 3600.0
+    rate = seconds.rate_bit_s(links, [300e6], 3.0)
+    assert found.relay.capacity_bit == pytest.approx(np.sum(rate[until]), rel=2e-3)
+    assert np.sum(rate[seconds.time_s < last.end_s]) > 1.05 * found.relay.capacity_bit
+    assert found.view.contact_s == found.relay.contact_s == pytest.approx(np.sum(seconds.seen[until]), abs=10.0)
+
+
+def test_delays_add_to_every_latency(quick):
+    delayed = {"operations.relay_delay": "101 s", "operations.downlink.delay": "51 s"}
+    short, long = quick(SIX_HOURS, NO_SEARCH), quick(SIX_HOURS, NO_SEARCH, delayed)
+    assert long.relay.median_s - short.relay.median_s == pytest.approx(100.0)
+    assert long.relay.slow_s - short.relay.slow_s == pytest.approx(100.0)
+    assert long.direct.slow_s - short.direct.slow_s == pytest.approx(50.0)
+
+
+def test_the_time_to_lock_is_drawn_from_the_acquisitions(day, links, seconds):
+    rate = seconds.rate_bit_s(links, [300e6], 3.0)
+    o, simulated = day.mission.operations, links.finding.wide.simulated
+    volumes = []
+    for run in range(o.runs):
+        draw = np.random.Generator(np.random.Philox(key=[o.seed, run]))
+        chosen = draw.integers(0, simulated.time_s.size, len(day.view.contacts))
+        total = 0.0
+        for c, k in zip(day.view.encounters, chosen, strict=False):
+            lock = c.contact.start_s + (simulated.time_s[k] if simulated.locked[k] else math.inf)
+            on = (seconds.time_s > max(lock, c.contact.start_s)) & (seconds.time_s < min(c.contact.end_s, 86400.0))
+            total += float(np.sum(rate[on]))
+        volumes.append(total)
+    assert day.relay.capacity_bit == pytest.approx(np.mean(volumes), rel=1e-3)
+    assert day.relay.capacity_spread_bit == pytest.approx((min(volumes), max(volumes)), rel=1e-3)
+    assert day.relay.capacity_spread_bit[0] <= day.relay.capacity_bit <= day.relay.capacity_spread_bit[1]
+
+
+def test_acquisitions_that_fail_are_counted_and_carry_nothing(quick, tmp_path):
+    hard = {"acquisition.lock_probability": 0.5, "acquisition.attempts": 1, "operations.runs": 200}
+    found, easy = quick(SIX_HOURS, hard), quick(SIX_HOURS, NO_SEARCH)
+    found_share = link_study.run(day_file(tmp_path, SIX_HOURS, hard)).finding.wide.simulated_probability
+    share = found.relay.failed_contacts / len(found.relay.contacts)
+    assert 0.3 < share < 0.9
+    assert share == pytest.approx(1.0 - found_share, abs=0.06)
+    assert found.relay.capacity_bit / easy.relay.capacity_bit == pytest.approx(1.0 - share, abs=0.06)
+    assert found.relay.capacity_spread_bit[0] < 0.6 * found.relay.capacity_spread_bit[1]
+
+
+def test_rates_stepped_with_range(quick, seconds, links):
+    found = quick(NO_SEARCH, RATES)
+    rates = found.mission.operations.rates_bit_s
+    rate = seconds.rate_bit_s(links, rates, 3.0)
+    assert set(np.unique(rate)) == {0.0, 50e6, 280e6, 320e6, 400e6}
+    assert found.relay.capacity_bit == pytest.approx(np.sum(rate[seconds.inside]), rel=1e-3)
+    assert [c.rate_bit_s for c in found.closings] == [400e6, 320e6, 280e6, 50e6]
+    for c in found.closings:
+        margin = links.communication.margin_db + 10.0 * math.log10(300e6 / c.rate_bit_s)
+        assert c.margin_db == pytest.approx(margin, abs=1e-9)
+        assert c.largest_range_m == pytest.approx(42_000e3 * 10.0 ** ((margin - 3.0) / 20.0), rel=1e-9)
+
+
+def test_a_loss_and_an_outage_of_the_simulated_loop_take_their_share(quick, links):
+    plain = quick(SIX_HOURS, NO_SEARCH)
+    stated = given_loss(links)
+    assert plain.loss == stated
+    worse = quick(SIX_HOURS, NO_SEARCH, loss=PointingLoss(stated.loss_db, 0.25, "test"))
+    assert worse.relay.capacity_bit == pytest.approx(0.75 * plain.relay.capacity_bit)
+    assert worse.direct.capacity_bit == plain.direct.capacity_bit
+    deaf = quick(SIX_HOURS, NO_SEARCH, loss=PointingLoss(stated.loss_db + 3.0, 0.0, "test"))
+    assert deaf.relay.capacity_bit == 0.0
+    assert deaf.closings[0].largest_range_m == pytest.approx(plain.closings[0].largest_range_m * 10.0**-0.15)
+
+
+def test_the_relays_share_is_granted_from_the_beginning(quick, seconds, links):
+    found = quick(NO_SEARCH, {"operations.relay_share": 0.4})
+    rate = seconds.rate_bit_s(links, [300e6], 3.0)
+    total = 0.0
+    for granted, c in zip(found.relay.contacts, found.view.encounters, strict=True):
+        whole = c.contact
+        assert (granted.start_s, granted.begins) == (whole.start_s, whole.begins)
+        assert granted.end_s == pytest.approx(whole.start_s + 0.4 * whole.duration_s)
+        assert granted.ends == "end of the relay's share"
+        on = (seconds.time_s > granted.start_s) & (seconds.time_s < min(granted.end_s, 86400.0))
+        total += float(np.sum(rate[on]))
+    assert found.relay.capacity_bit == pytest.approx(total, rel=1e-3)
+    assert found.relay.gap_s > found.view.gap_s
+    assert found.relay.contact_s == pytest.approx(0.4 * sum(c.contact.duration_s for c in found.view.encounters))
+
+
+def test_a_full_store_loses_the_newest(quick, seconds, links):
+    found = quick(NO_SEARCH, {"operations.store": "0.6 GB"})
+    o, rate = found.mission.operations, seconds.rate_bit_s(links, [300e6], 3.0)
+    made = np.where(seconds.inside, o.instrument_rate_bit_s, 0.0)
+    sent, lost, left = packets(rate, made, o.store_bit, o.relay_delay_s)
+    assert lost > 1e9
+    assert found.relay.lost_bit == pytest.approx(lost, rel=2e-3)
+    assert found.relay.on_board_bit == pytest.approx(left, abs=1.0)
+    same_latencies(found.relay, sent, left, 3.0)
+    assert found.relay.history.largest_stored_bit == pytest.approx(0.6 * 8e9)
+
+
+# ------------------------------------------------------------------------------------------------------ direct downlink
+def stations_by_second(day, setup_s):
+    """Rate of the radio in each second: the station that rose first is kept until the satellite sets there."""
+    down, pair = day.mission.operations.downlink, day.view.pair
+    time_s = np.arange(0.0, pair.whole_s[1]) + 0.5
+    own = pair.leo.orbit.states(time_s).position_m
+    seen = {s.name: orbit.elevation_rad(s, pair.epoch, time_s, own) > s.mask_rad for s in orbit.stations(down)}
+    rose: dict[str, int] = {}
+    serving, since, rate, log = "", 0, np.zeros(time_s.size), []
+    for second in range(time_s.size):
+        for name, up in seen.items():
+            if up[second]:
+                rose.setdefault(name, second)
+            else:
+                rose.pop(name, None)
+        if serving not in rose:
+            serving = min(rose, key=lambda name: rose[name], default="")
+            since = second
+            if serving:
+                log.append((serving, second))
+        if serving and second + 0.5 - since >= setup_s:
+            rate[second] = down.data_rate_bit_s
+    return rate, log
+
+
+@pytest.mark.parametrize("stations", [{}, {"operations.downlink.stations.tromso": TROMSO}])
+def test_the_direct_downlink_has_one_station_at_a_time(quick, seconds, stations):
+    found = quick(NO_SEARCH, stations)
+    way, o = found.direct, found.mission.operations
+    rate, log = stations_by_second(found, 20.0)
+    log = [(name, at) for name, at in log if at < 86400]
+    assert list(way.stations) == [name for name, _ in log]
+    np.testing.assert_allclose([c.start_s for c in way.contacts], [at for _, at in log], atol=1.0)
+    assert way.capacity_bit == pytest.approx(np.sum(rate[seconds.inside]), abs=2 * 100e6 * len(log))
+    for first, second in zip(way.contacts[:-1], way.contacts[1:], strict=True):
+        assert second.start_s >= first.end_s
+    handed = [c for c in way.contacts if c.begins == "station free"]
+    assert bool(handed) == bool(stations)
+    made = np.where(seconds.inside, o.instrument_rate_bit_s, 0.0)
+    sent, lost, left = packets(rate, made, o.store_bit, o.downlink.delay_s)
+    assert (lost, way.lost_bit) == (0.0, 0.0)
+    assert way.on_board_bit == pytest.approx(left, abs=2 * 100e6)
+    same_latencies(way, sent, left, 120.0)
+
+
+def test_a_pass_shorter_than_the_setup_carries_nothing(quick):
+    found = quick(NO_SEARCH, {"operations.downlink.setup": "600 s", "orbit.duration": "12 h"})
+    assert found.direct.contacts
+    assert found.direct.capacity_bit == 0.0
+    assert found.ratio == math.inf
+
+
+# ---------------------------------------------------------------------------------------- missions that lack something
+def test_a_mission_without_downlink(quick):
+    found = quick(SIX_HOURS, {"operations.downlink": None})
+    assert found.direct is None
+    assert math.isnan(found.ratio)
+    assert found.relay.capacity_bit > 0.0
+
+
+@pytest.mark.parametrize(
+    "changes", [BLIND, {"orbit.duration": "60 s"}, {"orbit.leo": {"kind": "geostationary", "longitude": "-37 deg"}}]
+)
+def test_a_day_without_any_contact_is_a_day_all_the_same(quick, changes):
+    found = quick(SIX_HOURS, changes)
+    v, way = found.view, found.relay
+    assert (v.encounters, v.contact_s, v.visible_share, v.largest("range_most_m")) == ((), 0.0, 0.0, 0.0)
+    assert math.isnan(v.median_s)
+    assert (way.contacts, way.capacity_bit, way.capacity_spread_bit, way.failed_contacts) == ((), 0.0, (0.0, 0.0), 0.0)
+    assert way.carried_bit.shape == (0,)
+    first = v.contacts[0].start_s if v.contacts else v.duration_s  # behind the minute there are some
+    assert v.gap_s == way.gap_s == first >= v.duration_s
+    assert found.warnings == ()
+    assert (found.ratio == 0.0) == (found.relay.capacity_bit == 0.0)
+    if not v.contacts:
+        assert way.slow_s == math.inf
+        assert way.on_board_bit == pytest.approx(way.generated_bit)
+
+
+def test_a_contact_that_never_ends_has_no_median(quick):
+    found = quick(SIX_HOURS, {"orbit.leo": {"kind": "geostationary", "longitude": "100 deg"}, "orbit.geo.limits": None})
+    (encounter,) = found.view.encounters
+    assert (encounter.contact.begins, encounter.contact.ends) == ("start of the span", "end of the span")
+    assert math.isnan(found.view.median_s)
+    assert (found.view.visible_share, found.view.gap_s) == (1.0, 0.0)
+    # a chord of a circle, 43 deg
+    assert encounter.range_most_m == pytest.approx(2 * 42_164_170 * math.sin(math.radians(21.5)), rel=1e-5)
+
+
+def test_two_satellites_in_one_slot_are_refused(quick):
+    with pytest.raises(orbit.OrbitError, match="are at the same place"):
+        quick(SIX_HOURS, {"orbit.leo": {"kind": "geostationary", "longitude": "143 deg"}, "orbit.geo.limits": None})
+
+
+def test_the_seed_makes_the_day(quick):
+    hard = {"acquisition.lock_probability": 0.6, "operations.runs": 5}
+    one, same, other = (quick(SIX_HOURS, hard, {"operations.seed": seed}) for seed in (3, 3, 4))
+    np.testing.assert_array_equal(one.relay.carried_bit, same.relay.carried_bit)
+    assert (one.relay.capacity_spread_bit, one.relay.slow_s) == (same.relay.capacity_spread_bit, same.relay.slow_s)
+    assert not np.array_equal(one.relay.carried_bit, other.relay.carried_bit)
+    np.testing.assert_array_equal(one.direct.carried_bit, other.direct.carried_bit)
+
+
+def test_an_ephemeris_of_the_same_orbit_has_the_same_contacts(quick, day, tmp_path):
+    own = day.view.pair.leo.orbit
+    (tmp_path / "a.oem").write_text(ephemeris(own, np.arange(0.0, 172801.0, 60.0)), encoding="utf-8")
+    limits = {"attitude": "free", "slew_limit": "0.5 deg/s", "sun_exclusion": "5 deg", "in_eclipse": True}
+    found = quick({"orbit.leo": {"kind": "ephemeris", "file": "a.oem", "limits": limits}})
+    assert isinstance(found.view.pair.leo.orbit, orbit.EphemerisOrbit)
+    assert len(found.view.contacts) == len(day.view.contacts)
+    for one, other in zip(found.view.contacts, day.view.contacts, strict=True):
+        assert (one.begins, one.ends) == (other.begins, other.ends)
+        assert one.start_s == pytest.approx(other.start_s, abs=0.1)
+        assert one.end_s == pytest.approx(other.end_s, abs=0.1)
+    assert found.view.closed_form is None
+    assert found.relay.capacity_bit == pytest.approx(day.relay.capacity_bit, rel=1e-4)
+    assert len(found.direct.contacts) == len(day.direct.contacts)
+
+
+# -------------------------------------------------------------------------------------------- constants of the mission
+def test_constants_that_the_contacts_exceed_are_said(quick):
+    beyond = {
+        "communication.distance": "40000 km",
+        "beacon.distance": "41000 km",
+        "answer.distance": "43999 km",
+        "point_ahead.transverse_velocity": "10 km/s",
+    }
+    said = quick({"orbit.duration": "8 h"}, beyond).warnings
+    assert [text.split(" is ")[0] for text in said] == [
+        "communication.distance",
+        "beacon.distance",
+        "point_ahead.transverse_velocity",
+    ]
+    assert said[0].startswith("communication.distance is 40000 km, and the contacts reach a range of 440")
+    assert said[0].endswith(f" km, which costs {20.0 * math.log10(44036.0 / 40000.0):.2f} dB more")
+    assert "velocity across the line of sight of 10.6" in said[2]
+    enough = {"communication.distance": "44100 km", "point_ahead.transverse_velocity": "10.7 km/s"}
+    assert quick({"orbit.duration": "8 h"}, enough).warnings == ()
+
+
+# --------------------------------------------------------------------------------------------------------- assumptions
+def flat(table, start=""):
+    """Each value of a table by its dotted name."""
+    found = {}
+    for name, value in table.items():
+        found |= flat(value, f"{start}{name}.") if isinstance(value, dict) else {f"{start}{name}": value}
+    return found
+
+
+CHANGED = {
+    "laser data rate": "communication.data_rate_bit_s",
+    "margin demanded of the laser link": "operations.margin_db",
+    "time of acquisition": "",
+    "pointing loss": "",
+    "eclipse": "orbit.leo.limits.in_eclipse",
+    "share of each contact that the relay grants": "operations.relay_share",
+    "grazing height": "orbit.grazing_height_m",
+    "attitude of the satellite": "orbit.leo.limits",
+    "orbit altitude": "orbit.leo.altitude_m",
+    "local time of the node": "orbit.leo.local_time_s",
+    "instrument data rate": "operations.instrument_rate_bit_s",
+    "radio data rate": "operations.downlink.data_rate_bit_s",
+    "ground stations": "operations.downlink.stations",
+    "elevation mask": "operations.downlink.stations",
+}
+
+
+def test_each_side_changes_just_its_own_key(links, day, monkeypatch):
+    cases = {}
+
+    def noted(case, pair_of, found):
+        mark = Numbers(float(len(cases) + 1), 1.0, 1.0, 1.0)
+        cases[mark.relay_bit] = case
+        return mark
+
+    monkeypatch.setattr(assumptions, "numbers", noted)
+    m = links.file.mission
+    found = assumptions.swings(
+        m, lambda other: day.view.pair, day.view, (), day.loss, links.finding.wide, lambda *said: None
+    )
+    assert {s.name for s in found} == CHANGED.keys()
+    before = flat(m.model_dump()) | {"operations.runs": 4}
+    for s in found:
+        for text, mark in ((s.low, s.at_low), (s.high, s.at_high)):
+            case = cases[mark.relay_bit]
+            after = flat(case.mission.model_dump())
+            differs = {k for k in before.keys() | after.keys() if before.get(k, "") != after.get(k, "")}
+            if text == NOTHING:
+                assert (differs, case.slower) == (set(), 1.0)
+                continue
+            key = CHANGED[s.name]
+            assert all(k.startswith(key) for k in differs) and bool(differs) == bool(key), (s.name, differs)
+            assert (case.slower == 1.0) == (s.name != "time of acquisition")
+            assert (case.loss == day.loss) == (s.name != "pointing loss")
+            if s.name == "attitude of the satellite":  # slew, Sun and eclipse stay
+                assert {k.rpartition(".")[2] for k in differs} == {"attitude", "boresight", "field_of_regard_rad"}
+
+
+SIDES = {
+    ("laser data rate", 0): {"communication.data_rate": "150 Mbit/s"},
+    ("margin demanded of the laser link", 0): {"operations.margin": "0 dB"},
+    ("margin demanded of the laser link", 1): {"operations.margin": "6 dB"},
+    ("share of each contact that the relay grants", 0): {"operations.relay_share": 0.5},
+    ("grazing height", 0): {"orbit.grazing_height": "0 km"},
+    ("grazing height", 1): {"orbit.grazing_height": "200 km"},
+    ("orbit altitude", 0): {"orbit.leo.altitude": "400 km"},
+    ("orbit altitude", 1): {"orbit.leo.altitude": "600 km"},
+    ("local time of the node", 0): {"orbit.leo.local_time": "16.5 h"},
+    ("instrument data rate", 1): {"operations.instrument_rate": "6 Mbit/s"},
+    ("radio data rate", 1): {"operations.downlink.data_rate": "200 Mbit/s"},
+    ("elevation mask", 0): {"operations.downlink.stations.kiruna.mask": "0 deg"},
+    ("elevation mask", 1): {"operations.downlink.stations.kiruna.mask": "10 deg"},
+    ("ground stations", 1): {
+        "operations.downlink.stations.south": {
+            "latitude": "-67.85713 deg",
+            "longitude": "-159.03567 deg",
+            "height": "402.2 m",
+            "mask": "5 deg",
+        }
+    },
+}
+
+
+def test_each_side_is_the_day_of_a_mission_edited_so(quick, tmp_path, monkeypatch):
+    with monkeypatch.context() as whole:
+        whole.setattr(day_study, "swings", assumptions.swings)
+        given = quick(SIX_HOURS, NO_SEARCH)
+    by_name = {s.name: s for s in given.swings}
+    for (name, side), changes in SIDES.items():
+        numbers = (by_name[name].at_low, by_name[name].at_high)[side]
+        # the pointing loss stays as it is: that of the mission as given
+        edited = quick(SIX_HOURS, NO_SEARCH, changes, loss=given.loss)
+        relay, direct = edited.relay, edited.direct
+        expected = (relay.capacity_bit, direct.capacity_bit, relay.slow_s, direct.slow_s)
+        got = (numbers.relay_bit, numbers.direct_bit, numbers.relay_slow_s, numbers.direct_slow_s)
+        assert got == pytest.approx(expected, rel=1e-9), (name, side)
+    factors = [s.factor for s in given.swings]
+    assert factors == sorted(factors, reverse=True)
+
+
+@pytest.mark.parametrize(
+    ("changes", "name", "sides"),
+    [
+        ({"orbit.grazing_height": "300 km"}, "grazing height", ("0 m", NOTHING)),  # 600 km is above the satellite
+        ({"orbit.leo.altitude": "145 km", "orbit.grazing_height": "0 km"}, "orbit altitude", (NOTHING, "174 km")),
+        ({"orbit.leo.altitude": "5500 km"}, "orbit altitude", ("4400 km", NOTHING)),  # 6600 km: not sun-synchronous
+    ],
+)
+def test_an_assumption_that_leaves_no_orbit_is_left_as_it_is(tmp_path, changes, name, sides):
+    found = day_study.run(link_study.run(day_file(tmp_path, SIX_HOURS, NO_SEARCH, changes)))
+    (swing,) = [s for s in found.swings if s.name == name]
+    assert (swing.low, swing.high) == sides
+    unchanged = swing.at_low if sides[0] == NOTHING else swing.at_high
+    assert unchanged.relay_bit == pytest.approx(found.relay.capacity_bit)
+
+
+@pytest.mark.parametrize(
+    ("relay", "direct", "ratio"), [(6.0, 2.0, 3.0), (6.0, 0.0, math.inf), (0.0, 2.0, 0.0), (0.0, 0.0, 0.0)]
+)
+def test_the_ratio_with_nothing_on_either_side(relay, direct, ratio):
+    assert Numbers(relay, direct, 1.0, 1.0).ratio == ratio
+    assert flow.ratio(relay, direct) == ratio
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "factor"),
+    [
+        ((6.0, 2.0), (12.0, 2.0), 2.0),
+        ((12.0, 2.0), (6.0, 2.0), 2.0),
+        ((6.0, 2.0), (6.0, 2.0), 1.0),
+        ((0.0, 2.0), (6.0, 2.0), math.inf),
+        ((6.0, 0.0), (6.0, 2.0), math.inf),
+        ((6.0, 0.0), (12.0, 0.0), 2.0),  # nothing direct: the relay's volume
+        ((0.0, 0.0), (12.0, 0.0), math.inf),
+        ((0.0, 0.0), (0.0, 0.0), 1.0),
+        ((0.0, 0.0), (0.0, 2.0), 1.0),  # nothing by relay either way
+        ((6.0, math.nan), (18.0, math.nan), 3.0),  # no direct downlink
+        ((0.0, math.nan), (18.0, math.nan), math.inf),
+    ],
+)
+def test_the_factor_between_two_sides(low, high, factor):
+    ends = [Numbers(relay, direct, 1.0, 1.0) for relay, direct in (low, high)]
+    assert Swing("an assumption", "low", "high", *ends, ends[0]).factor == pytest.approx(factor)
+
+
+def test_what_lowers_the_ratio_on_both_sides_counts_from_where_it_is():
+    low, high, here = (Numbers(relay, 2.0, 1.0, 1.0) for relay in (6.0, 2.0, 12.0))
+    assert Swing("an assumption", "low", "high", low, high, here).factor == pytest.approx(6.0)
+    assert Swing("an assumption", "low", "high", low, high, low).factor == pytest.approx(3.0)
+
+
+@pytest.mark.parametrize(
+    ("contacts", "gap_s"),
+    [
+        ([], 100.0),
+        ([(10.0, 20.0)], 130.0),  # to the end of what is known
+        ([(10.0, 20.0), (120.0, 130.0)], 100.0),
+        ([(60.0, 95.0), (98.0, 105.0)], 60.0),  # what begins behind the span does not count
+    ],
+)
+def test_the_longest_gap_by_hand(contacts, gap_s):
+    pair = SimpleNamespace(span_s=(0.0, 100.0), whole_s=(0.0, 150.0))
+    given = [SimpleNamespace(start_s=start, end_s=end) for start, end in contacts]
+    assert geometry.longest_gap_s(given, pair) == gap_s
+
+
+def test_the_longest_time_without_contact_is_followed_beyond_the_span(day):
+    """Nothing is heard from the last pass of the day on until the first one of the next day."""
+    passes, span, whole = day.direct.contacts, day.view.pair.span_s, day.view.pair.whole_s
+    later = min(
+        each.start_s
+        for station in orbit.stations(day.mission.operations.downlink)
+        for each in orbit.passes(day.view.pair.leo.orbit, station, day.view.pair.epoch, whole)
+        if each.start_s > passes[-1].end_s
+    )
+    inside = max(b.start_s - a.end_s for a, b in itertools.pairwise(passes))
+    assert later > span[1]
+    assert day.direct.gap_s == pytest.approx(max(passes[0].start_s - span[0], inside, later - passes[-1].end_s))
+    assert day.direct.gap_s > max(inside, span[1] - passes[-1].end_s)
+
+
+# ------------------------------------------------------------------------------------------------------------- the map
+def test_the_track_is_open_where_the_contacts_are(day, seconds):
+    from microrad.orbit.day.ground_track import ground_track
+
+    track = ground_track(day.view, (day.relay, day.direct), day.mission.operations.downlink)
+    at = track.time_s.astype(int)
+    near_edge = np.array([np.any(np.diff(seconds.seen[max(k - 3, 0) : k + 3].astype(int))) for k in at])
+    np.testing.assert_array_equal(track.open["relay"][~near_edge], seconds.seen[at][~near_edge])
+    assert float(np.mean(track.open["direct downlink"])) == pytest.approx(day.direct.contact_s / 86400.0, abs=2e-3)
+    assert np.max(np.abs(track.latitude_rad)) < math.radians(83.0)
+    assert track.relay.longitude_rad == pytest.approx(math.radians(143.0), abs=1e-9)
+    assert track.relay.latitude_rad == pytest.approx(0.0, abs=1e-9)
+    (kiruna,) = track.stations
+    # the outline is where a satellite at the mean height stands at the mask
+    station = orbit.stations(day.mission.operations.downlink)[0]
+    assert (kiruna.latitude_rad, kiruna.longitude_rad) == (station.latitude_rad, station.longitude_rad)
+
+
+def test_nothing_about_a_day_is_asked_of_a_mission_without_its_tables(tmp_path):
+    links = link_study.run(day_file(tmp_path, ALONE, {"operations": None}))
+    with pytest.raises(ValueError, match=r"no table \[operations\]: microrad init writes one"):
+        day_study.run(links)
+    assert geometry.view(links.file.mission, orbit.pair(links.file.mission, tmp_path)).encounters
+
+
+def test_an_uncorrected_point_ahead_is_in_the_loss_and_so_in_the_reach(tmp_path):
+    links = link_study.run(day_file(tmp_path, SIX_HOURS, {"point_ahead.corrected": False}))
+    loss = day_study.given_loss(links)
+    assert loss.loss_db > 100.0
+    (closing,) = flow.closings(links.file.mission, loss)
+    assert closing.margin_db == pytest.approx(links.communication.margin_db, abs=1e-9)
+    again = day_study.loss_at(links.file.mission, links.communication.margin_db, "")
+    assert again.loss_db == loss.loss_db
+
+
+def test_orbits_that_end_with_the_span_are_said_to(quick, tmp_path):
+    assert not any("behind the span" in w for w in quick(SIX_HOURS).warnings)
+    found = quick({"orbit.epoch": "2050-12-31T12:00:00Z", "orbit.duration": "6 h"})
+    assert found.view.pair.tail_s == 0.0
+    assert any(w.startswith("the orbits hold for 0 s behind the span") for w in found.warnings)
+
+
+def test_a_contact_cut_by_the_sun_counts_as_one_rise(quick):
+    found = quick({})
+    assert (len(found.view.encounters), found.view.rises) == (15, 14)
+    free = quick({"orbit.leo.limits.sun_exclusion": "0 deg", "orbit.geo.limits.sun_exclusion": "0 deg"})
+    assert (len(free.view.encounters), free.view.rises) == (14, 14)

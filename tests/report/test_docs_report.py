@@ -1,0 +1,138 @@
+"""docs/report.md, docs/studio.md, CONTRIBUTING.md: commands exist, names are there, numbers are those of the code."""
+
+import re
+import shlex
+import tomllib
+from importlib import import_module, util
+
+import pytest
+import typer
+
+from microrad import cli, report
+from microrad.core import machine
+from microrad.mission import toml as document
+from microrad.mission.file import load_mission
+from microrad.report import compared, interactive_style, page, results, tolerances
+from microrad.studio import address, guard, jobs_process, reading, server, uploads, workshop
+from microrad.study import story as study
+from places import ROOT
+from shipped import DEFAULT
+
+CONTRIBUTING = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+REPORT, STUDIO = ((ROOT / "docs" / f"{name}.md").read_text(encoding="utf-8") for name in ("report", "studio"))
+NAMED = r"`((?:src|tests|benchmarks|docs|studio|report|link|loop|lab|mirror|mission|core)/[\w/.*-]+)`"
+
+
+def told(text, *sentences):
+    """These words stand on the page, wherever its lines break."""
+    said = " ".join(re.sub(r"\n- ", " ", text).split())
+    for sentence in sentences:
+        assert sentence in said, sentence
+
+
+# ------------------------------------------------------------------------------------------------------------ commands
+def commands(text):
+    """Command lines of a page: in blocks by themselves, and between backticks."""
+    blocks = re.findall(r"(?m)^    (?:.*: )?microrad (.*?)(?: +#.*)?$", text)
+    return sorted({*blocks, *re.findall(r"`microrad ([^`]+)`", text)})
+
+
+@pytest.mark.parametrize("line", [*commands(REPORT), *commands(STUDIO)])
+def test_each_command_and_option_exists(line):
+    command, words = typer.main.get_command(cli.app), shlex.split(line)
+    while hasattr(command, "commands") and words and words[0] in command.commands:
+        command, words = command.commands[words[0]], words[1:]
+    assert command.name != "root"
+    assert not hasattr(command, "commands") or not words, words
+    known = {each for parameter in command.params for each in parameter.opts}
+    assert {word for word in words if word.startswith("-")} <= known
+
+
+def test_the_pages_have_commands():
+    assert {"reproduce leo-geo-study/report.html", "budget --html"} <= set(commands(REPORT))
+    assert {"studio leo-geo.toml", "studio --expose-to-network 192.168.1.7"} <= set(commands(STUDIO))
+
+
+@pytest.mark.parametrize("text", [REPORT, STUDIO], ids=["report", "studio"])
+def test_pages_that_are_linked_exist(text):
+    links = re.findall(r"\]\((?!https?:)([^)#]+)", text)
+    assert all((ROOT / "docs" / link).is_file() for link in links)
+
+
+# -------------------------------------------------------------------------------------------------------------- report
+def test_the_parts_of_the_report_are_those_of_the_page():
+    parts = re.findall(r"(?m)^\| (\d) (.+?) \|", REPORT)
+    assert parts == [(str(number), title) for number, (_, title) in enumerate(page.PARTS, start=1)]
+
+
+def test_the_numbers_of_the_report_are_those_of_the_code():
+    told(
+        REPORT, f"in words to {100 * compared.WORDS_SHARE:g} %", f"at most {interactive_style.MOST_POINTS} points there"
+    )
+    assert set(re.findall(r"`([A-Z0-9_]+)`", REPORT)) == set(machine.VARIABLES)
+    told(REPORT, f"up to {results.MOST_INPUT_BYTES / 1e6:g} MB each")
+
+
+def test_each_kind_of_tolerance_has_its_row():
+    section = REPORT.split("## Run it again")[1]
+    assert re.findall(r"(?m)^\| (\w[\w ]+) \| .* \| .* \| .* \|$", section)[1:] == [*tolerances.SUMMARY, "spectrum"]
+
+
+# -------------------------------------------------------------------------------------------------------------- studio
+def test_the_limits_of_the_studio_are_those_of_the_code():
+    files, read = uploads.UploadLimits(), reading.ReadingLimits()
+    rows = dict(re.findall(r"(?m)^\| (.+?) \| (.+?) \|$", STUDIO))
+    assert files.file_bytes == guard.UPLOAD_BYTES == 200e6
+    assert rows["a recording"].startswith("200 MB")
+    assert rows["recordings in the folder"] == f"{files.files}, and {files.total_bytes / 1e9:g} GB together"
+    assert rows["any other message to the server"] == f"{address.MESSAGE_BYTES / 1e6:g} MB"
+    assert rows["reading one: time, computing, memory"] == (
+        f"{read.wall_s:g} s, {read.cpu_s} s, {read.memory_bytes / 1e9:g} GB of address space"
+    )
+    assert rows["reading one: samples of a channel"] == f"{read.samples / 1e6:g} million"
+    assert document.MAX_BYTES == 1_000_000
+    told(STUDIO, "A file of more than 1 MB is no mission.", f"Its own things stand in `{workshop.STUDIO}` there")
+    first, second = jobs_process.WAITS_S
+    told(STUDIO, f"gets SIGTERM {first:g} s later, and SIGKILL {second:g} s behind that")
+
+
+def test_the_pages_of_the_studio_are_those_of_its_navigation():
+    if util.find_spec("nicegui") is None:
+        pytest.skip("the studio is not installed (nicegui)")
+    titles = [import_module(f"microrad.studio.pages.{name}").TITLE for name in server.PAGES]
+    section = STUDIO.split("## The pages")[1].split("\n## ")[0]
+    assert re.findall(r"(?m)^\| (\w+) \| .* \| `microrad", section) == titles
+
+
+# -------------------------------------------------------------------------------------------------------- CONTRIBUTING
+def contracts():
+    return tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["importlinter"]["contracts"]
+
+
+def test_the_table_of_rooms_is_the_contract():
+    rows = re.findall(r"(?m)^\| `(\w+)` \|", CONTRIBUTING)
+    assert ["__main__", *rows] == contracts()[0]["layers"]
+    packages = {path.parent.name for path in (ROOT / "src" / "microrad").glob("*/__init__.py")}
+    assert packages == set(rows)
+
+
+def test_each_heavy_library_has_the_door_that_is_named():
+    doors = re.search(r"(?s)Heavy libraries have one door each: (.*?);", CONTRIBUTING)[1]
+    said = {each["name"].rpartition(": ")[2] for each in contracts() if "one door" in each["name"]}
+    assert said == set(re.findall(r"in\s+`(\w+)`", doors))
+
+
+@pytest.mark.parametrize("path", sorted(set(re.findall(NAMED, CONTRIBUTING))))
+def test_files_that_are_named_exist(path):
+    assert [*ROOT.glob(path), *(ROOT / "src" / "microrad").glob(path)]
+
+
+@pytest.mark.parametrize("target", re.findall(r"(?m)^    make (\w+)", CONTRIBUTING))
+def test_targets_of_make_exist(target):
+    assert re.search(rf"(?m)^{target}:", (ROOT / "Makefile").read_text(encoding="utf-8"))
+
+
+def test_the_text_in_the_readme_is_what_the_shipped_mission_prints():
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    assert f"```text\n{report.verdict_text(study.run(load_mission(DEFAULT)), 80)}\n```\n" in text
+    assert all(len(line) <= 80 for line in text.partition("```text\n")[2].partition("```")[0].splitlines())

@@ -1,0 +1,236 @@
+"""The report in Chromium: nothing is loaded, no error, each figure comes alive and prints, and anyone can read it."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from browser import violations
+from microrad.lab.identify import identify
+from microrad.report import campaign_page, single_pages
+from report import test_identification_report as identified
+from report import test_report_campaign as campaigns
+from report import test_report_fine_pointing as fine_loops
+from shipped import plain_study, write_like_plain
+from waiting import HANG_MS
+
+A4_PX = 680  # between the margins
+ALIVE = {"report": 20, "day": 6, "campaign": 6, "identification": 5}
+"""Pages with interactive figures, and how many they have at least."""
+SEEN = [("report", 1280), ("report", 400), ("day", 400), ("campaign", 1280), ("identification", 400)]
+SEEN += [
+    pytest.param(*each, marks=pytest.mark.endurance)
+    for each in (("day", 1280), ("campaign", 400), ("identification", 1280))
+]
+"""Pages and widths: each page once, and the report at both."""
+MOST_BYTES = 6_000_000
+
+
+@pytest.fixture(scope="module")
+def found():
+    return plain_study()
+
+
+@pytest.fixture(scope="module")
+def files(found, tmp_path_factory):
+    """Every kind of page that there is; the fine-pointing loop of the report is made up."""
+    folder = tmp_path_factory.mktemp("browser")
+    fine = fine_loops.made_up(found.file)
+    written = {"report": write_like_plain(fine_loops.with_fine(found, fine), folder / "study")}
+    recordings = [identified.loop(60.0, 1, "60.csv"), identified.loop(100.0, 3, "100.csv"), identified.chirp()]
+    mirror = identify(recordings, 0.5, models=("prandtl_ishlinskii", "linear"))
+    written["identification"] = identified.write(mirror, folder / "identification.html", recordings=recordings)
+    texts = {
+        "day": single_pages.day(found.day, found.links),
+        "budget": single_pages.budget(found.links),
+        "campaign": campaign_page.html(campaigns.CASES["two inputs"]()),
+    }
+    for name, text in texts.items():
+        written[name] = folder / f"{name}.html"
+        written[name].write_text(text, encoding="utf-8")
+    return written
+
+
+class Opened:
+    """A page with what it said and asked for."""
+
+    def __init__(self, browser, file, width=1280, **options):
+        self.page = browser.new_page(viewport={"width": width, "height": 900}, **options)
+        self.page.set_default_timeout(HANG_MS)
+        self.said, self.asked = [], []
+        self.page.on("console", lambda message: self.said.append(message.text))
+        self.page.on("pageerror", lambda error: self.said.append(str(error)))
+        self.page.on("request", lambda request: self.asked.append(request.url))
+        self.page.goto(file.as_uri())
+
+    def figures(self, kind="figure:has(> script.plot)"):
+        return self.page.query_selector_all(kind)
+
+    def ready(self, figure):
+        """Bring a figure into view and wait until it is interactive."""
+        figure.scroll_into_view_if_needed()
+        self.page.wait_for_function("figure => figure.classList.contains('ready')", arg=figure)
+        return figure
+
+    def figure(self, title):
+        return self.ready(self.page.query_selector(f"figure[aria-label^='{title}']"))
+
+
+@pytest.fixture
+def opened(browser, files):
+    made = []
+
+    def open_(name="report", width=1280, **options):
+        made.append(Opened(browser, files[name], width, **options))
+        return made[-1]
+
+    yield open_
+    for each in made:
+        each.page.close()
+
+
+def visible(figure, selector):
+    return figure.query_selector(selector).is_visible()
+
+
+@pytest.mark.parametrize(("name", "width"), SEEN)
+def test_each_figure_comes_alive_and_nothing_is_loaded_or_complained_of(opened, files, name, width):
+    assert files[name].stat().st_size < MOST_BYTES
+    here = opened(name, width)
+    figures = here.figures()
+    assert len(figures) >= ALIVE[name]
+    first = figures[-1]
+    assert visible(first, ".picture svg")  # before it comes into view
+    for figure in figures:
+        here.ready(figure)
+        assert visible(figure, ".interactive .main-svg")
+        assert not visible(figure, ".picture")
+        assert figure.query_selector_all(".tools button")
+    assert here.said == []
+    assert set(here.asked) == {files[name].as_uri()}
+    assert here.page.evaluate("document.documentElement.scrollWidth") <= width
+    ids = here.page.evaluate("[...document.querySelectorAll('[id]')].map(each => each.id)")
+    assert len(ids) == len(set(ids)) > 30
+    if (name, width) != ("report", 400):  # the longest page is looked at once
+        assert_no_barrier(here.page)
+
+
+def assert_no_barrier(page):
+    """That axe finds nothing, what is folded opened."""
+    page.evaluate("document.querySelectorAll('details').forEach(each => { each.open = true })")
+    found = violations(page)
+    assert [(each["id"], each["impact"], each["nodes"][0]["html"][:150]) for each in found] == []
+
+
+@pytest.mark.parametrize("width", [400, pytest.param(1280, marks=pytest.mark.endurance)])
+def test_the_page_of_budgets_is_pictures_with_their_numbers_below(opened, files, width):
+    here = opened("budget", width)
+    assert all(visible(figure, "svg[role=img]") for figure in here.figures("figure"))
+    assert len(here.figures("figure")) == len(here.figures("figure + details")) == 4
+    assert len(here.figures("script")) == 1  # for the keyboard
+    assert here.said == []
+    assert set(here.asked) == {files["budget"].as_uri()}
+    assert here.page.evaluate("document.documentElement.scrollWidth") <= width
+    assert_no_barrier(here.page)
+
+
+def test_a_legend_switches_a_curve_by_the_keyboard(opened):
+    here = opened()
+    figure = here.figure("Fig. 8")
+    button = figure.query_selector(".keys button")
+    shown = "figure => figure.querySelectorAll('.scatterlayer .trace').length"
+    before = here.page.evaluate(shown, figure)
+    assert button.get_attribute("aria-pressed") == "true"
+    button.focus()
+    here.page.keyboard.press("Enter")
+    here.page.wait_for_function(f"([figure, count]) => ({shown})(figure) === count", arg=[figure, before - 1])
+    assert button.get_attribute("aria-pressed") == "false"
+    here.page.keyboard.press("Space")
+    here.page.wait_for_function(f"([figure, count]) => ({shown})(figure) === count", arg=[figure, before])
+
+
+def test_hovering_gives_values_with_units(opened):
+    here = opened()
+    figure = here.figure("Fig. 2")
+    box = figure.query_selector(".nsewdrag").bounding_box()
+    here.page.mouse.move(box["x"] + 0.3 * box["width"], box["y"] + 0.8 * box["height"])
+    here.page.wait_for_function("figure => figure.querySelector('.hoverlayer text')", arg=figure)
+    said = " ".join(each.text_content() for each in figure.query_selector_all(".hoverlayer text"))
+    assert re.search(r"data rate: [\d.]+ Mbit/s.*pointing error: [\d.]+ µrad.*link margin: [\d.−]+ dB", said)
+
+
+def test_zoom_and_reset(opened):
+    here = opened()
+    figure = here.figure("Fig. 5")
+    limits = "figure => { const drawn = figure.querySelector('.js-plotly-plot').layout; return drawn.xaxis.range }"
+    first = here.page.evaluate(limits, figure)
+    zoom_in, zoom_out, drags, reset = figure.query_selector_all(".tools button")[:4]
+    zoom_in.click()
+    near = here.page.evaluate(limits, figure)
+    assert near[1] - near[0] == pytest.approx((first[1] - first[0]) / 2)
+    zoom_out.click()
+    assert here.page.evaluate(limits, figure) == pytest.approx(first)
+    zoom_out.click()
+    reset.click()
+    assert here.page.evaluate(limits, figure) == first
+    drags.click()
+    assert drags.get_attribute("aria-pressed") == "true"
+
+
+def test_a_figure_follows_the_width_of_the_page(opened):
+    here = opened()
+    figure = here.figure("Fig. 8")
+    here.page.set_viewport_size({"width": 420, "height": 900})
+    narrow = "figure => figure.querySelector('.main-svg').getBoundingClientRect().width < 420"
+    here.page.wait_for_function(narrow, arg=figure)
+    layout = here.page.evaluate("figure => figure.querySelector('.js-plotly-plot').layout", figure)
+    upper, lower = layout["yaxis"]["domain"], layout["yaxis2"]["domain"]
+    assert lower[1] < upper[0]  # one below the other
+    assert here.said == []
+
+
+def test_the_pictures_print_and_the_buttons_do_not(opened, tmp_path):
+    here = opened()
+    for figure in here.figures()[:3]:
+        here.ready(figure)
+    here.page.emulate_media(media="print")
+    for figure in here.figures():
+        assert visible(figure, ".picture svg")
+        assert figure.query_selector(".interactive") is None or not visible(figure, ".interactive")
+    printed = tmp_path / "report.pdf"
+    here.page.pdf(path=str(printed))
+    assert printed.stat().st_size > 200_000
+
+
+SHOWN = "each => each.getBoundingClientRect().height > 2 * each.querySelector('summary').getBoundingClientRect().height"
+
+
+@pytest.mark.parametrize("name", [*ALIVE, "budget"])
+def test_paper_is_wide_enough_and_shows_what_is_folded(opened, name):
+    here = opened(name, A4_PX)
+    folded = here.figures("details:not([open]):not(.data)")
+    assert folded
+    here.page.emulate_media(media="print")
+    assert here.page.evaluate("document.documentElement.scrollWidth") <= A4_PX  # else all of it would print smaller
+    assert [each.inner_text()[:50] for each in folded if not here.page.evaluate(SHOWN, each)] == []
+    assert not any(each.is_visible() for each in here.figures("nav, button, details.data"))
+
+
+def test_without_scripts_every_figure_is_its_picture(opened):
+    here = opened(java_script_enabled=False)
+    figures = here.figures("figure")
+    assert len(figures) > 10
+    assert all(visible(figure, "svg[role=img]") for figure in here.figures("figure:has(> script.plot)"))
+    assert here.page.query_selector(".interactive") is None
+
+
+def test_points_are_saved_as_a_table_where_there_is_no_folder(opened):
+    here = opened("day")
+    figure = here.figure("From recording to delivery")
+    with here.page.expect_download() as download:
+        figure.query_selector(".tools button:last-child").click()
+    rows = Path(download.value.path()).read_text(encoding="utf-8").splitlines()
+    assert download.value.suggested_filename == "latency.csv"
+    assert rows[0] == "curve,x,y,z"
+    assert len(rows) > 100
+    assert here.figure("Contacts").query_selector("a") is None

@@ -1,0 +1,291 @@
+"""What the studio offers to copy: the command and the lines of Python do the same, and give the same numbers."""
+
+import contextlib
+import io
+import json
+import re
+import shlex
+import shutil
+import zipfile
+from contextlib import nullcontext
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+import microrad
+from cli.test_cli import write_recording
+from microrad import cli, report
+from microrad.core.folder import FolderError
+from microrad.lab.recording import RecordingError, read_in, read_recording
+from microrad.loop import control, fine_pointing
+from microrad.loop.fine_pointing import designs
+from microrad.mission.toml import MissionError
+from microrad.report.page import Drawn
+from microrad.studio.commands import (
+    Budget,
+    CampaignResume,
+    CampaignRun,
+    Contacts,
+    Design,
+    ExportCode,
+    ExportMatrices,
+    ExportUnit,
+    Identify,
+    Run,
+    command,
+)
+from microrad.study import story as study
+from shipped import SHIPPED, without_day, without_fine_pointing
+from small_campaign import campaign_file
+
+MISSION = Path("my mission.toml")
+
+
+@pytest.fixture
+def home(folder):
+    """A current folder with the paper's mission in it, without its fine-pointing loop and its day."""
+    (folder / MISSION).write_text(without_day(without_fine_pointing(SHIPPED.read_text("utf-8"))), encoding="utf-8")
+    return folder
+
+
+def typed(line, capsys):
+    """What a line prints that is typed into a shell, and its exit code."""
+    program, *arguments = shlex.split(line)
+    assert program == "microrad"
+    with pytest.raises(SystemExit) as stop:
+        cli.app(args=arguments, prog_name="microrad")
+    out, err = capsys.readouterr()
+    return out, int(stop.value.code or 0), err
+
+
+def executed(text):
+    """What lines of Python print."""
+    with contextlib.redirect_stdout(io.StringIO()) as out:
+        exec(compile(text, "copied.py", "exec"), {"__name__": "copied"})
+    return out.getvalue()
+
+
+def once(compute):
+    """The same computation, which takes long, once for the same mission."""
+    known = {}
+
+    def found(of, *rest):
+        key = rest[0] if rest and not callable(rest[0]) else of.sha256
+        if key not in known:
+            known[key] = compute(of, *rest)
+        return known[key]
+
+    return found
+
+
+# ------------------------------------------------------------------------------------------------------- same numbers
+@pytest.mark.parametrize(
+    "action",
+    [
+        Budget(MISSION),
+        Budget(MISSION, data_rate="1 Gbit/s", pointing_error="5 urad"),
+        Budget(MISSION, pointing_error="12 urad", data_rate="largest"),
+        Contacts(MISSION),
+    ],
+)
+def test_what_prints_prints_the_same(home, capsys, action):
+    if isinstance(action, Contacts):
+        shutil.copyfile(SHIPPED, home / MISSION)
+    out, code, err = typed(command(action), capsys)
+    assert (code in (0, 1), err) == (True, "")
+    assert executed(action.python) == out
+    assert len(out.splitlines()) > 20
+
+
+def test_a_change_of_the_budget_is_in_both(home, capsys):
+    plain, changed = Budget(MISSION), Budget(MISSION, data_rate="1 Gbit/s")
+    assert "R = 300 Mbit/s" in executed(plain.python) and "R = 1 Gbit/s" in executed(changed.python)
+
+
+def test_a_study_gives_the_same_verdict_and_the_same_files(home, capsys, monkeypatch):
+    monkeypatch.setattr(study, "run", once(study.run))
+    monkeypatch.setattr(microrad, "run_study", study.run, raising=False)
+    monkeypatch.setattr(report, "drawing", lambda *args: nullcontext(Drawn))
+    action, again = Run(MISSION, Path("out")), Run(MISSION, Path("out again"), overwrite=True)
+    out, _, _ = typed(command(action), capsys)
+    assert executed(again.python).strip() == out[: out.index("\n\nout/report.html")]
+    first, second = (json.loads((home / each.output / "manifest.json").read_text("utf-8")) for each in (action, again))
+    assert first["mission"] == second["mission"]
+    assert all(Path(name).is_file() for name in (*action.results, *again.results))
+    with pytest.raises(FolderError, match="already holds results"):
+        executed(action.python)
+
+
+def test_controllers_are_designed_alike(folder, capsys, monkeypatch):
+    monkeypatch.setattr(fine_pointing, "design", once(fine_pointing.design))
+    monkeypatch.setattr(designs, "families", lambda m: (control.PI, control.LQG))
+    (folder / MISSION).write_text(SHIPPED.read_text("utf-8"), encoding="utf-8")
+    out, code, _ = typed(command(Design(MISSION)), capsys)
+    assert code == ("refused" in out)
+    listed = re.findall(r"(\d+\.\d{3}) +(\d+\.\d{3}) (?:refused)? +(\d\.\d{3}) ", out)
+    found = [(*row[28:].split()[:2], row.split()[-1]) for row in executed(Design(MISSION).python).splitlines()]
+    assert found == listed
+    assert len(found) > 3
+
+
+def test_a_mirror_is_identified_alike(folder, capsys):
+    write_recording(folder / "a loop.csv")
+    action = Identify(
+        (Path("a loop.csv"),), "drive", "angle", Path("one.toml"), rate_hz=1000.0, static=True, hold_out=0.4, seed=3
+    )
+    out, code, err = typed(command(action), capsys)
+    assert code == 0, err
+    mirror, page = map(Path, action.results)
+    written = mirror.read_bytes()
+    assert page.is_file()
+    with pytest.raises(FileExistsError):
+        executed(action.python)
+    mirror.unlink()
+    page.unlink()
+    printed = executed(action.python)
+    assert (mirror.read_bytes(), page.is_file()) == (written, True)
+    assert printed.strip() == out.partition("\n\n")[2].strip()
+
+
+def test_every_choice_of_an_identification_is_in_both(folder, capsys):
+    for name in ("a.csv", "-b.csv"):
+        write_recording(folder / name, reverse=False)
+    text = (folder / "-b.csv").read_text("utf-8").splitlines()
+    (folder / "-b.csv").write_text("\n".join([text[0], *text[101:]]), encoding="utf-8")
+    action = Identify(
+        (Path("a.csv"),),
+        "1",
+        "2",
+        Path("two.toml"),
+        output_unit="um",
+        rate_hz=1000.0,
+        period_samples=250,
+        validate=(Path("-b.csv"),),
+        lever_arm_m=0.05,
+        static=True,
+        model="bouc_wen",
+        admissible=True,
+        name='it\'s "mine"',
+        overwrite=True,
+    )
+    out, code, err = typed(command(action), capsys)
+    assert code == 0, err
+    written = Path("two.toml").read_bytes()
+    Path("two.toml").unlink()
+    assert executed(action.python).strip() == out.partition("\n\n")[2].strip()
+    assert Path("two.toml").read_bytes() == written
+    assert b"it's" in written
+
+
+@pytest.mark.parametrize(
+    ("header", "drive", "output", "words"),
+    [
+        ("time [s],drive [V],angle [urad]", "V", "urad", None),
+        ("time [s],drive [V],angle [µrad]", "V", "mrad", "the output is to be read in mrad and the file says urad"),
+        ("time [s],drive [mV],angle [urad]", "V", "urad", "the drive is to be read in V and the file says mV"),
+    ],
+)
+def test_units_that_the_file_denies_are_refused_in_both(folder, capsys, header, drive, output, words):
+    write_recording(folder / "a.csv")
+    _, *rows = (folder / "a.csv").read_text("utf-8").splitlines()
+    (folder / "a.csv").write_text("\n".join([header, *rows]), encoding="utf-8")
+    action = Identify((Path("a.csv"),), "1", "2", Path("m.toml"), drive, output, rate_hz=1000.0, static=True)
+    if words is None:
+        assert read_in(read_recording("a.csv", "1", "2", 1000.0), drive, output).samples == len(rows)
+        return
+    with pytest.raises(RecordingError, match=f"^a.csv: {words}; give the unit that the file says"):
+        executed(action.python)
+    _, code, err = typed(command(action), capsys)
+    assert code != 0
+    assert "give what the files say" in err
+
+
+def test_a_campaign_gives_the_same_rows(folder, capsys):
+    campaign_file(folder, runs=32)
+    action = CampaignRun(Path("campaign.toml"), Path("one.ledger"), threads=1)
+    out, code, err = typed(command(action), capsys)
+    assert (code in (0, 1), err) == (True, "")
+    assert all(Path(name).is_file() for name in action.results)
+    printed = executed(replace(action, ledger=Path("two.ledger")).python)
+    assert rows(printed) == rows(out)
+    assert rows(typed(command(CampaignResume(Path("one.ledger"))), capsys)[0]) == rows(out)
+    assert rows(executed(CampaignResume(Path("two.ledger"), threads=2).python)) == rows(out)
+    assert len(rows(out)) > 5
+
+
+def rows(text):
+    """What a campaign's words say, but for the name of the ledger and the time that it took."""
+    return [line for line in text.splitlines() if line.strip() and "ledger" not in line and " s" not in line]
+
+
+@pytest.mark.parametrize(
+    "action",
+    [
+        ExportCode(MISSION, "PID + inverse", Path("code"), precision="single"),
+        ExportUnit(MISSION, Path("unit.fmu"), name="my_mirror", fmi="3.0"),
+        ExportUnit(MISSION, Path("loop.fmu"), name="my_loop", controller="PID"),
+        ExportMatrices(MISSION, Path("m.mat")),
+        ExportMatrices(MISSION, Path("m.mat"), controller="PID"),
+    ],
+)
+def test_an_export_writes_the_same_files(home, capsys, action):
+    _, code, err = typed(command(action), capsys)
+    assert code == 0, err
+    (target,) = map(Path, action.results)
+    before = content(target)
+    assert before
+    with pytest.raises((FileExistsError, FolderError)):
+        executed(action.python)
+    executed(replace(action, overwrite=True).python)
+    assert content(target) == before
+    assert typed(command(replace(action, overwrite=True)), capsys)[1] == 0
+
+
+def content(target):
+    """The files that tell a design: no compiled library, nothing with a time in it, and so not the head of MATLAB's."""
+    if target.is_dir():
+        return {path.name: path.read_bytes() for path in target.iterdir() if path.suffix in (".c", ".h", ".csv")}
+    if target.suffix == ".mat":
+        return target.read_bytes()[128:]
+    with zipfile.ZipFile(target) as unit:
+        return {name: unit.read(name) for name in unit.namelist() if name.endswith((".c", ".h", ".xml"))}
+
+
+# ------------------------------------------------------------------------------------------------------ as it is typed
+@pytest.mark.parametrize(
+    ("action", "line"),
+    [
+        (Budget(Path("-x.toml")), "microrad budget ./-x.toml"),
+        (Budget(Path("a.toml"), data_rate="1 Gbit/s"), "microrad budget a.toml --data-rate '1 Gbit/s'"),
+        (Budget(Path("a.toml"), data_rate="-1 bit/s"), "microrad budget a.toml '--data-rate=-1 bit/s'"),
+        (Contacts(Path("a b.toml")), "microrad contacts 'a b.toml'"),
+        (Design(Path("a.toml"), Path("$(rm).toml")), "microrad design a.toml --mirror '$(rm).toml'"),
+        (CampaignResume(Path("c.ledger"), threads=2), "microrad campaign resume c.ledger --threads 2"),
+        (
+            ExportUnit(Path("a.toml"), Path("u.fmu")),
+            "microrad export fmu a.toml --loop control --fmi 2.0 --name mirror --output u.fmu",
+        ),
+        (
+            Identify((Path("l.csv"),), "0", "-1", Path("m.toml"), accept=("a", "b")),
+            "microrad identify l.csv --input 0 --output=-1 --accept a --accept b --input-unit V --output-unit mrad "
+            "--mirror-file m.toml",
+        ),
+    ],
+)
+def test_a_line_is_safe_to_paste(action, line):
+    assert command(action) == line
+    assert shlex.split(line) == ["microrad", *action.arguments]
+
+
+@pytest.mark.parametrize("name", ["a'b", 'a"b', "a\\b", "a\nb", "'); raise SystemExit('x"])
+def test_a_name_stays_a_name_in_python(folder, name):
+    for action in (Budget(Path(name)), Design(Path(name), Path(name)), Run(Path(name), Path(name))):
+        with pytest.raises(MissionError, match="does not exist"):
+            executed(action.python)
+
+
+def test_only_what_writes_has_results():
+    assert Budget(MISSION).results == Contacts(MISSION).results == Design(MISSION).results == ()
+    assert Run(MISSION, Path("o")).results == ("o/report.html", "o/results.nc", "o/manifest.json")
+    assert CampaignRun(Path("c.toml"), Path("c.ledger")).results == CampaignResume(Path("c.ledger")).results

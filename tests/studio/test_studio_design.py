@@ -1,0 +1,444 @@
+"""What the studio's pages of links, pointing and day compute, without a browser."""
+
+import base64
+import json
+import math
+import re
+import threading
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from link_files import RECEIVERS, data_with, link_file, received_with
+from microrad import link
+from microrad.link import study as link_study
+from microrad.orbit import day as day_study
+from microrad.report import day_plots, figures
+from microrad.studio import attempts, day_view, dials, link_view, plots, pointing_view
+from microrad.studio.draft import Draft
+from microrad.studio.latest import Latest, shared
+from waiting import HANG_S
+
+
+@pytest.fixture(scope="module")
+def draft(tmp_path_factory):
+    return Draft.shipped(tmp_path_factory.mktemp("studio") / "mission.toml")
+
+
+@pytest.fixture(scope="module")
+def view(draft):
+    return link_view.view(draft.link())
+
+
+@pytest.fixture(scope="module")
+def day(draft):
+    return day_view.run(draft.set("operations.runs", "2").link(), lambda done, total, what: None)
+
+
+def dial_of(draft, key):
+    return dials.dial(draft.values[key])
+
+
+# --------------------------------------------------------------------------------------------------------------- dials
+def test_a_dial_stands_at_its_value_and_writes_its_unit(draft):
+    aperture = dial_of(draft, "terminals.leo_aperture")
+    assert (aperture.label, aperture.typed, aperture.unit) == ("LEO aperture", "5 cm", "cm")
+    assert aperture.at(aperture.position) == "5 cm"
+    assert (aperture.at(0), aperture.at(aperture.steps)) == ("1 cm", "20 cm")
+    assert aperture.at(aperture.position + 1).endswith(" cm")
+    assert 5.0 < float(aperture.at(aperture.position + 1).split()[0]) < 5.2
+
+
+def test_a_margin_that_was_solved_for_is_met_whatever_rounding_leaves():
+    missed, solved, short = (
+        link_view.Margin("communication", margin_db, 3.0) for margin_db in (2.9, 3.0 - 1e-12, 2.999)
+    )
+    assert (missed.met, solved.met, short.met) == (False, True, False)
+    assert solved.needs == "needs 3 dB: met"
+
+
+def test_a_link_with_more_light_received_than_sent_is_missed(draft):
+    near = draft.set("communication.distance", "1 m")
+    far, close = (link_view.view(each.link()).margins for each in (draft, near))
+    assert (far[0].met, far[0].needs) == (True, "needs 3 dB: met")
+    assert close[0].margin_db > 100.0
+    assert (close[0].met, close[0].needs) == (False, "MISSED: more light arrives than was sent")
+    assert [each.met for each in close[1:]] == [each.met for each in far[1:]] == [True, True]
+
+
+def test_every_position_of_every_dial_is_a_value_that_the_mission_takes(draft):
+    groups = link_view.dials(draft) | pointing_view.dials(draft)
+    every = [dial for group in groups.values() for dial in group]
+    assert len(every) > 30
+    for dial in every:
+        about = draft.values[dial.key].about
+        for position in (0, dial.steps // 3, dial.position, dial.steps) if dial.scale != "none" else ():
+            typed = dial.at(position)
+            value = about.quantity.read(typed if about.unit else float(typed))  # raises where it is refused
+            assert math.isfinite(value), (dial.key, typed)
+
+
+def test_a_dial_in_decibels_is_linear_and_ends_at_the_bound_of_the_mission(draft):
+    loss = dial_of(draft.set("communication.transmit_optics_loss", "0 dB"), "communication.transmit_optics_loss")
+    assert (loss.scale, loss.low, loss.high, loss.at(0), loss.at(5)) == ("linear", 0.0, 10.0, "0 dB", "0.5 dB")
+    level = dial_of(draft.set("beacon.required_power", "-80 dBm"), "beacon.required_power")
+    assert (level.scale, level.at(0), level.at(level.steps)) == ("linear", "-90 dBm", "-70 dBm")
+
+
+def test_a_dial_grows_for_a_value_outside_and_keeps_its_range_for_one_inside(draft):
+    aperture = dial_of(draft, "terminals.leo_aperture")
+    inside, outside = aperture.holding("7 cm"), aperture.holding("90 cm")
+    assert (inside.low, inside.high, inside.value) == (aperture.low, aperture.high, 7.0)
+    assert (outside.low, outside.high, outside.position) == (aperture.low, 90.0, outside.steps)
+    other = aperture.holding("70 mm")
+    assert (other.unit, other.at(other.position)) == ("mm", "70 mm")
+
+
+@pytest.mark.parametrize("typed", ["largest", "", "5,2 cm", "5"])
+def test_what_is_no_quantity_has_no_slider(draft, typed):
+    rate = dial_of(draft, "communication.data_rate")
+    assert rate.scale == "logarithmic"
+    assert rate.holding(typed).scale == "none"
+
+
+def test_a_share_near_one_has_no_slider_and_a_small_one_does_not_reach_one(draft):
+    assert dial_of(draft, "pointing.confidence").scale == "none"
+    outage = dial_of(draft, "requirement.outage")
+    assert outage.scale == "logarithmic"
+    assert float(outage.at(outage.steps)) < 1.0
+
+
+def test_a_fault_is_told_beside_its_dial_in_the_words_of_the_command_line(draft):
+    wrong = draft.set("terminals.leo_aperture", "5")
+    told = dials.faulty(wrong, ["terminals.leo_aperture", "terminals.geo_aperture"])
+    assert [*told] == ["terminals.leo_aperture"]
+    assert "without a unit" in told["terminals.leo_aperture"]
+    assert "a length with its unit" in told["terminals.leo_aperture"]
+    assert wrong.problems[0].reason in told["terminals.leo_aperture"]
+    assert dials.faulty(draft, ["terminals.leo_aperture"]) == {}
+
+
+# ------------------------------------------------------------------------------------------------------------ attempts
+def test_an_attempt_is_the_study_of_the_changed_file_and_leaves_the_draft(draft):
+    found = attempts.attempt(draft, "terminals.leo_aperture", "6 cm", link_view.view)
+    margin = found.view.margins[0]
+    alone = link_study.run(draft.set("terminals.leo_aperture", "6 cm").link())
+    assert margin.margin_db == alone.communication.margin_db
+    assert margin.margin_db > link_view.view(draft.link()).margins[0].margin_db + 0.5
+    assert draft.values["terminals.leo_aperture"].typed == "5 cm"
+
+
+def test_an_attempt_with_a_fault_has_no_view_and_one_that_cannot_be_budgeted_says_why(draft):
+    wrong = attempts.attempt(draft, "terminals.leo_aperture", "5 W", link_view.view)
+    assert wrong.view is None
+    assert wrong.refusal == ""
+    assert wrong.draft.problems
+    hopeless = draft.set("communication.data_rate", "largest").set("communication.transmit_power", "1 pW")
+    refused = attempts.attempt(hopeless, "requirement.margin", "300 dB", link_view.view)
+    assert refused.view is None
+    assert "not even" in refused.refusal
+    assert not refused.draft.problems
+
+
+# --------------------------------------------------------------------------------------------------------------- links
+def test_the_map_is_the_margin_of_the_link_and_its_contour_has_the_margin_that_it_names(view):
+    m, frame = view.file.mission, view.frame
+    assert np.array_equal(view.margin_db, link.margin_map(m, frame.data_rate_bit_s, frame.pointing_error_rad))
+    for level, rates in view.contours.items():
+        there = np.isfinite(rates)
+        assert there.any()
+        errors = frame.pointing_error_rad[there]
+        found = [link.margin_map(m, rate, error)[0, 0] for rate, error in zip(rates[there], errors, strict=True)]
+        assert np.allclose(found, level, atol=1e-6)
+        outside = link.margin_map(m, frame.data_rate_bit_s[[0, -1]], frame.pointing_error_rad[~there])
+        assert np.all((outside[0] < level) | (outside[1] > level))
+
+
+def test_the_required_contour_goes_through_the_largest_rate(view):
+    m = view.file.mission
+    rates = view.contours[m.requirement.margin_db]
+    at = np.interp(m.requirement.pointing_error_rad, view.frame.pointing_error_rad, np.log(rates))
+    assert np.exp(at) == pytest.approx(link_study.largest_rate(m), rel=2e-3)
+
+
+@pytest.mark.parametrize("name", sorted(RECEIVERS))
+def test_the_contour_of_a_built_receiver_has_its_margin(tmp_path, name):
+    found = link_view.view(link_file(tmp_path, received_with(name)))
+    m, frame = found.file.mission, found.frame
+    for level, rates in found.contours.items():
+        for place in np.flatnonzero(np.isfinite(rates))[:3]:
+            margin = link.margin_map(m, rates[place], frame.pointing_error_rad[place])[0, 0]
+            assert margin == pytest.approx(level, abs=2e-3)
+    assert frame.data_rate_bit_s[-1] <= link.receiver(m).highest_data_rate_bit_s
+
+
+def test_the_frame_stands_still_until_the_working_point_leaves_it(draft, view):
+    near = link_view.view(draft.set("communication.data_rate", "500 Mbit/s").link(), view.frame)
+    far = link_view.view(draft.set("communication.data_rate", "90 Gbit/s").link(), view.frame)
+    assert near.frame is view.frame
+    assert far.frame is not view.frame
+    assert far.frame.data_rate_bit_s[0] < 90e9 < far.frame.data_rate_bit_s[-1]
+
+
+def test_margins_say_whether_they_are_met(draft):
+    names = [(m.name, m.required_db, m.met) for m in link_view.view(draft.link()).margins]
+    assert names == [("Communication", 3.0, True), ("Beacon", 0.0, True), ("Answer", 0.0, True)]
+    short = link_view.view(draft.set("terminals.leo_aperture", "4 cm").link()).margins[0]
+    assert not short.met
+    assert "needs 3 dB: MISSED" in short.needs
+
+
+def test_rows_of_a_budget_are_its_lines_and_its_sums(view):
+    budget = view.budgets[0]
+    rows = link_view.rows_of(budget)
+    assert [row["total"] for row in rows] == [False] * len(budget.lines) + [True] * len(budget.totals)
+    assert rows[-1]["line"] == "Margin"
+    assert rows[-1]["value"] == f"{budget.margin_db:.2f} dB"
+
+
+def test_the_plots_are_plain_data_with_units_on_their_axes(view, draft, day):
+    pointed = pointing_view.view(draft.link())
+    drawn = {
+        "map": link_view.map_plot(view),
+        "lines": pointing_view.lines_plot(pointed),
+        "coverage": pointing_view.coverage_plot(pointed),
+        "timeline": day_view.timeline_plot(day),
+        "volume": day_view.volume_plot(day),
+    }
+    units = {"map": "µrad", "lines": "µrad", "coverage": "µrad", "timeline": "hours", "volume": "GB"}
+    for name, figure in drawn.items():
+        json.dumps(figure, allow_nan=False)
+        titles = [figure["layout"][axis]["title"]["text"] for axis in ("xaxis", "yaxis")]
+        assert any(units[name] in title for title in titles), name
+        assert figure["config"]["displaylogo"] is False
+    # the data rates of the map carry their unit at each tick
+    assert "300 Mbit/s" in link_view.map_words(view)
+    assert all(text.endswith("bit/s") for text in drawn["map"]["layout"]["xaxis"]["ticktext"])
+    assert drawn["map"]["data"][0]["z"][0][0] == pytest.approx(view.margin_db[0, 0], abs=0.006)
+
+
+def test_the_words_of_the_map_name_both_ways_out_and_that_there_is_none(draft, view):
+    assert link_view.map_words(view).startswith("At 300 Mbit/s and 10 µrad the communication link has +3.43 dB.")
+    dark = link_view.view(draft.set("communication.transmit_power", "10 mW").link())
+    assert "no pointing error at 300 Mbit/s" in link_view.map_words(dark)
+
+
+def test_dials_are_those_of_the_links_and_the_seldom_moved_stand_behind(draft):
+    found = link_view.dials(draft)
+    assert [*found] == ["Telescopes", "Communication", "Beacon", "Answer", "Required"]
+    keys = [dial.key for group in found.values() for dial in group]
+    assert "fine_pointing.body.error" not in keys
+    assert next(key for key in keys if link_view.second(key)) == "communication.wavelength"
+    assert not link_view.second("terminals.leo_aperture")
+
+
+def test_the_study_of_the_links_gives_tables_sentences_and_what_moves_the_margin(draft):
+    study = link_study.run(draft.link())
+    drawn = link_view.tornado_plot(study)
+    low, high = drawn["data"]
+    first = study.tornados[0].swings[0]
+    assert low["y"][0].startswith(first.key)
+    assert low["base"] + low["x"][0] == pytest.approx(first.margin_low_db)
+    assert high["base"] + high["x"][0] == pytest.approx(first.margin_high_db)
+    assert "Tracking sensor" in link_view.tables(study)
+    assert any(sentence.startswith("The links close") for sentence in link_view.consequences(study))
+    assert not any(sentence.startswith("Warning: ") for sentence in link_view.consequences(study))
+    far = link_study.run(draft.set("communication.pointing_error", "60 urad").link())
+    assert any(sentence.startswith("Warning: ") for sentence in link_view.consequences(far))
+
+
+# ------------------------------------------------------------------------------------------------------------ pointing
+def test_what_is_left_for_a_line_meets_the_beacon_by_either_rule(draft):
+    wide = draft.set("beacon.divergence", "2000 urad")
+    found = pointing_view.view(wide.link())
+    for by_rss, by_ecss in found.left:
+        assert by_rss.largest_rad > by_ecss.largest_rad > 0.0
+    body = found.left[0][1].largest_rad
+    again = wide.set("pointing.lines.body_pointing.error", f"{body * 1e6:.9f} urad")
+    total = pointing_view.view(again.link()).budget.total_rad("ecss-radial")
+    assert total == pytest.approx(found.half_angle_rad, rel=1e-6)
+
+
+def test_the_tables_of_the_shipped_mission_say_what_its_beacon_covers(draft):
+    found = pointing_view.view(draft.link())
+    totals = {row["rule"].partition(":")[0]: row for row in pointing_view.total_rows(found)}
+    assert totals["root sum square"]["value"] == "317 µrad"
+    assert totals["root sum square"]["beacon"].startswith("covered")
+    assert "means add linearly" in totals["root sum square"]["caveat"]
+    assert totals["ECSS, two axes"]["beacon"].endswith("short")
+    lines = pointing_view.line_rows(found)
+    assert [row["left_ecss"] for row in lines] == ["164 µrad", *["nothing"] * 3]
+    assert "0.9822" in pointing_view.words(found)[0]
+    ahead = {row["what"]: row["value"] for row in pointing_view.ahead_rows(found)}
+    assert ahead["point-ahead angle, largest"] == "71 µrad"
+
+
+def test_without_beacon_and_point_ahead_the_page_says_so(tmp_path):
+    gone = dict.fromkeys(("beacon", "answer", "acquisition", "point_ahead"))
+    bare = link_file(tmp_path, {key: None for key in gone if key in data_with({})})
+    found = pointing_view.view(bare)
+    assert pointing_view.words(found) == ["The mission has no beacon, so nothing is to be covered."]
+    assert pointing_view.ahead_rows(found) == []
+    assert {row["beacon"] for row in pointing_view.total_rows(found)} == {"no beacon"}
+    names = [trace["name"] for trace in pointing_view.coverage_plot(found)["data"]]
+    assert names[0] == "inside this angle"
+    assert not any("beacon" in name for name in names)
+    assert len(link_view.view(bare).margins) == 1
+
+
+def test_the_curve_of_coverage_is_the_budget_s(draft):
+    found = pointing_view.view(draft.link())
+    curve = pointing_view.coverage_plot(found)["data"][0]
+    radius = np.array(curve["x"]) * 1e-6
+    assert np.allclose(np.array(curve["y"]) / 100.0, found.budget.coverage(radius), atol=1e-5)
+    assert curve["y"][0] == 0.0
+    assert curve["y"][-1] > 99.0
+
+
+# ----------------------------------------------------------------------------------------------------------------- day
+def test_the_timeline_has_every_contact_of_either_way(day):
+    rows = day_view.timeline_rows(day)
+    assert [name for name, _, _ in rows] == ["relay", "direct: kiruna", "eclipse of LEO"]
+    assert len(rows[0][2]) == len(day.relay.contacts)
+    assert float(np.sum(rows[0][2][:, 1] - rows[0][2][:, 0])) == pytest.approx(day.relay.contact_s, rel=1e-9)
+    bars = day_view.timeline_plot(day)["data"][1]
+    assert bars["base"][0] == pytest.approx(day.direct.contacts[0].start_s / 3600.0, abs=1e-5)
+
+
+def test_the_map_is_that_of_the_report_and_loads_nothing(day):
+    address, words = day_view.ground_map(day)
+    kind, _, data = address.partition(",")
+    drawn = base64.b64decode(data, validate=True).decode()
+    assert kind == "data:image/svg+xml;base64"
+    assert drawn == day_plots.ground_map(day).svg
+    assert drawn.startswith("<svg ")
+    assert 'xmlns="http://www.w3.org/2000/svg"' in drawn
+    assert not re.search(r'(?:href="|url\()(?!#)', drawn)
+    assert words.startswith("Ground track of the satellite, thick where it is in contact.")
+
+
+def test_volumes_end_where_the_ways_do(day):
+    drawn = {trace["name"]: trace for trace in day_view.volume_plot(day)["data"]}
+    assert [*drawn][:2] == ["made by the instrument", "delivered, relay"]
+    assert drawn["delivered, relay"]["y"][-1] == pytest.approx(day.relay.history.delivered_bit[-1] / 8e9, rel=1e-4)
+    assert max(drawn["on board, direct downlink"]["y"]) == pytest.approx(
+        day.direct.history.largest_stored_bit / 8e9, rel=0.05
+    )
+
+
+def test_latencies_rise_to_what_arrives_and_pass_their_median(day):
+    time_s, share = day_view.distribution(day.relay)
+    assert np.all(np.diff(time_s) > 0.0)
+    assert np.all(np.diff(share) >= -1e-12)
+    before, behind = np.interp(day.relay.median_s * (1.0 + np.array([-1e-6, 1e-6])), time_s, share)
+    assert before < 0.5 < behind  # at once, in one step, comes what is made in sight of the relay
+    assert share[-1] == pytest.approx(1.0)
+
+
+def test_the_tables_of_the_day_have_its_numbers(day):
+    ways = {row["what"]: row for row in day_view.way_rows(day)}
+    assert ways["contacts"]["relay"] == str(len(day.relay.contacts))
+    assert ways["contacts"]["direct"] == str(len(day.direct.contacts))
+    contacts = day_view.contact_rows(day)
+    assert len(contacts) == len(day.relay.contacts) + len(day.direct.contacts)
+    assert len(day_view.contact_headings()) == len(contacts[0]) - 1
+    assert len(day_view.swing_rows(day)) >= len(day.swings)
+    assert day_view.words(day)[-1].startswith("Warning: communication.distance")
+
+
+def test_a_mission_without_orbits_says_what_is_missing(draft, tmp_path):
+    gone = ("orbit", "operations", "constellation")
+    bare = link_file(tmp_path, {key: None for key in gone if key in data_with({})})
+    assert "no [orbit] and no [operations]" in day_view.missing(bare)
+    assert day_view.missing(draft.link()) == ""
+
+
+# --------------------------------------------------------------------------------------------------------------- plots
+def test_the_palette_is_the_report_s():
+    names = ("BLACK", "ORANGE", "SKY", "GREEN", "BLUE", "VERMILION")
+    assert [getattr(plots, name) for name in names] == [getattr(figures, name) for name in names]
+
+
+def test_a_name_in_a_plot_is_no_markup():
+    assert plots.plain("<b>x</b>\n<img src=//evil>") == "&lt;b&gt;x&lt;/b&gt; &lt;img src=//evil&gt;"
+    assert plots.plain("a" * 100) == "a" * 39 + "…"
+
+
+def test_ticks_of_data_rates_are_round_and_within():
+    places, words = plots.decades(1e7, 1e10, "bit/s")
+    assert words == ["10 Mbit/s", "30 Mbit/s", "100 Mbit/s", "300 Mbit/s", "1 Gbit/s", "3 Gbit/s", "10 Gbit/s"]
+    assert np.allclose(places[:3], np.log10([1e7, 3e7, 1e8]))
+    assert plots.decades(1e8, 5e8, "bit/s")[1] == ["100 Mbit/s", "200 Mbit/s", "500 Mbit/s"]
+    assert len(plots.decades(1.0, 1e10, "bit/s")[0]) == 11
+
+
+# -------------------------------------------------------------------------------------------------------------- latest
+def test_the_latest_question_is_answered_once_and_kept():
+    latest, calls = Latest(), []
+
+    def work(progress):
+        progress(1, 2, "half")
+        calls.append(1)
+        return 42
+
+    latest.ask("a", work)
+    assert latest.wait(HANG_S).result == 42
+    latest.ask("a", work)
+    state = latest.wait(HANG_S)
+    assert (len(calls), state.done, state.total, state.what, state.running) == (1, 1, 2, "half", False)
+
+
+def test_an_older_question_is_dropped_for_a_newer_one():
+    latest, begun, go, ended = Latest(), threading.Event(), threading.Event(), []
+
+    def slow(progress):
+        begun.set()
+        go.wait(HANG_S)
+        progress(1, 2, "late")
+        ended.append("slow")
+        return "slow"
+
+    latest.ask("a", slow)
+    assert begun.wait(HANG_S)
+    first = latest._thread
+    latest.ask("b", lambda progress: "quick")
+    assert latest.wait(HANG_S).result == "quick"
+    go.set()
+    first.join(HANG_S)
+    assert ended == []
+    assert latest.state.result == "quick"
+
+
+def test_a_cancelled_question_can_be_asked_again_and_an_error_is_kept():
+    latest, go = Latest(), threading.Event()
+    latest.ask("a", lambda progress: (go.wait(HANG_S), progress(0, 0, ""))[0])
+    latest.cancel()
+    go.set()
+    assert latest.state.key == ""
+    assert not latest.state.running
+
+    def refuse(progress):
+        raise day_study.flow.operations.OperationsError("no day; give it an orbit")
+
+    latest.ask("a", refuse)
+    state = latest.wait(HANG_S)
+    assert (state.error, state.result) == ("no day; give it an orbit", None)
+
+
+def test_what_pages_share_belongs_to_its_owner():
+    class Owner:
+        pass
+
+    one, two = Owner(), Owner()
+    assert shared(one, "day") is shared(one, "day")
+    assert shared(one, "day") is not shared(two, "day")
+    assert shared(one, "day") is not shared(one, "links")
+
+
+def test_nothing_of_this_needs_a_browser():
+    folder = Path(link_view.__file__).parent
+    names = ("link_view", "pointing_view", "day_view", "dials", "plots", "latest", "attempts")
+    texts = [(folder / f"{name}.py").read_text("utf-8") for name in names]
+    assert len(texts) == 7
+    assert not any("nicegui" in text for text in texts)

@@ -1,0 +1,469 @@
+"""A mission being edited: one value changes and no other byte, and the faults are those of the command line."""
+
+import hashlib
+import stat
+import tomllib
+
+import pytest
+
+from microrad.mission.file import MissionError, load_mission
+from microrad.mission.model import Mission
+from microrad.mission.presets import preset_text
+from microrad.mission.toml import value_of
+from microrad.studio import draft as drafts
+from microrad.studio.draft import Draft, DraftError
+from microrad.studio.draft_keys import key_of, keys_in
+from shipped import DEFAULT, SHIPPED, without_fine_pointing
+
+TEXT = SHIPPED.read_text("utf-8")
+APERTURE = "terminals.leo_aperture"
+
+
+@pytest.fixture
+def draft(tmp_path):
+    """The paper's mission, read from a file."""
+    (tmp_path / "m.toml").write_bytes(TEXT.encode())
+    return Draft.open(tmp_path / "m.toml")
+
+
+def changed_lines(before, after):
+    """Numbers and new texts of the lines that differ between texts of as many lines."""
+    pairs = zip(before.split("\n"), after.split("\n"), strict=True)
+    return {number: new for number, (old, new) in enumerate(pairs, 1) if old != new}
+
+
+# -------------------------------------------------------------------------------------------------------------- values
+def test_the_shipped_mission_is_a_draft_without_faults(tmp_path):
+    draft = Draft.shipped(tmp_path / "new.toml")
+    assert (draft.text, draft.problems, draft.report, draft.changed) == (DEFAULT.read_text("utf-8"), (), "", True)
+    assert draft.file().mission == load_mission(DEFAULT).mission
+
+
+def test_every_value_has_its_text_its_source_and_what_it_may_hold(draft):
+    sources = load_mission(SHIPPED).sources
+    assert list(draft.values) == list(sources)
+    for key, value in draft.values.items():
+        source = sources[key]
+        assert (value.comment, value.line) == (source.comment, source.line)
+        assert " ".join(value.raw.split()) == source.value
+        assert value.about is not None, key
+        assert value.about.wanted
+        assert value.problems == ()
+
+
+@pytest.mark.parametrize(
+    ("key", "typed", "kind", "unit", "least", "choices"),
+    [
+        ("terminals.leo_aperture", "5 cm", "quantity", "m", None, ()),
+        ("beacon.strehl", "0.4", "number", "", 0.0, ()),
+        ("acquisition.attempts", "5", "whole number", "", 1, ()),
+        ("orbit.leo.limits.in_eclipse", "true", "switch", "", None, ()),
+        ("conventions.strehl", "decibel", "choice", "", None, ("decibel", "ratio", "unused")),
+        ("name", "LEO-to-GEO relay of a 100 kg satellite", "text", "", None, ()),
+        ("orbit.epoch", "2026-03-20T12:00:00Z", "text", "", None, ()),
+        ("orbit.leo.inclination", "sun-synchronous", "quantity", "rad", 0.0, ()),
+        ("scenario.pid_frequencies", "1 Hz, 15 Hz", "list", "Hz", None, ()),
+        ("fine_pointing.geometry.coupling", "1.0, 0.0, 0.0, 1.0", "list", "", -100.0, ()),
+        ("mirror.linear.numerator", "1.979e11, 7.051e13, 2.973e13", "list", "", None, ()),
+        ("pointing.lines.misalignment.error", "248 urad", "quantity", "rad", 0.0, ()),
+        ("operations.downlink.stations.kiruna.mask", "5 deg", "quantity", "rad", 0.0, ()),
+    ],
+)
+def test_a_form_is_built_from_the_models(draft, key, typed, kind, unit, least, choices):
+    value = draft.values[key]
+    about = value.about
+    assert (value.typed, about.kind, about.unit, about.choices) == (typed, kind, unit, choices)
+    assert (about.quantity.least if about.quantity else None) == least
+    assert about.required == (
+        key not in ("conventions.strehl", "beacon.strehl", "orbit.leo.inclination", "mirror.linear.numerator")
+    )
+
+
+def test_a_key_has_its_description_and_its_words(draft):
+    about = draft.values["control.delay"].about
+    assert about.description == "from sampling to the changed output"
+    assert about.wanted == "a time with its unit, at least 0 s"
+    assert key_of("requirement.residual_statistic").wanted == '"peak" or "rms"'
+    assert (key_of("name").wanted, key_of("name").example) == ("text", "")
+    assert key_of("terminals.leo_obscuration").required is False
+
+
+@pytest.mark.parametrize("key", ["terminals", "terminals.leo", "pointing.lines", "a.b.c", "", "name.x", "mirror.file"])
+def test_what_is_no_key_has_no_form(key):
+    assert key_of(key) is None
+
+
+def test_each_key_of_the_models_is_found_by_its_table():
+    assert {key.key for key in keys_in("terminals")} >= {
+        APERTURE,
+        "terminals.geo_aperture",
+        "terminals.leo_obscuration",
+    }
+    assert [key.key for key in keys_in("")] == ["name"]
+    assert [key.key for key in keys_in("constellation.relays.anywhere")] == ["constellation.relays.anywhere.longitude"]
+    assert keys_in("constellation.relays") == keys_in("nowhere") == ()
+
+
+def test_absent_keys_are_those_that_a_table_may_still_have(draft):
+    absent = {key.key for key in draft.absent}
+    assert "terminals.leo_obscuration" in absent
+    assert not absent & set(draft.values)
+    assert not any(key.startswith("fine_pointing.wheels") for key in absent)
+    assert APERTURE in {key.key for key in draft.without(APERTURE).absent}
+
+
+# ----------------------------------------------------------------------------------------------------------------- set
+@pytest.mark.parametrize(
+    ("key", "typed", "raw"),
+    [
+        (APERTURE, "8 cm", '"8 cm"'),
+        (APERTURE, '  "8 cm" ', '"8 cm"'),
+        (APERTURE, "'8 cm'", "'8 cm'"),
+        ("beacon.strehl", "0.5", "0.5"),
+        ("beacon.strehl", "1", "1"),
+        ("acquisition.attempts", "7", "7"),
+        ("orbit.leo.limits.in_eclipse", "false", "false"),
+        ("conventions.strehl", "ratio", '"ratio"'),
+        ("name", 'a "b" \\ c', '"a \\"b\\" \\\\ c"'),
+        ("name", "12", '"12"'),
+        ("communication.data_rate", "largest", '"largest"'),
+        ("orbit.epoch", "2026-04-20T12:00:00Z", '"2026-04-20T12:00:00Z"'),
+        ("orbit.leo.inclination", "97.4 deg", '"97.4 deg"'),
+        ("scenario.pid_frequencies", "1 Hz, 20 Hz", '["1 Hz", "20 Hz"]'),
+        ("scenario.pid_frequencies", "[1 Hz, 20 Hz]", '["1 Hz", "20 Hz"]'),
+        ("scenario.pid_frequencies", '["1 Hz", "20 Hz"]', '["1 Hz", "20 Hz"]'),
+        ("scenario.pid_frequencies", '"1 Hz", "20 Hz"', '["1 Hz", "20 Hz"]'),
+        ("fine_pointing.geometry.coupling", "1, 0.1, 0, 1", "[1, 0.1, 0, 1]"),
+    ],
+)
+def test_one_value_changes_and_no_other_byte(draft, key, typed, raw):
+    old = draft.values[key]
+    new = draft.set(key, typed)
+    assert new.problems == ()
+    ((number, line),) = changed_lines(draft.text, new.text).items()
+    assert number == old.line
+    assert line == draft.text.split("\n")[number - 1].replace(old.raw, raw, 1)
+    assert new.values[key].raw == raw
+    assert new.set(key, old.raw).text == draft.text
+    assert (draft.changed, new.changed) == (False, True)
+
+
+def test_what_is_typed_as_it_stands_changes_nothing(draft):
+    for key, value in draft.values.items():
+        assert draft.set(key, value.typed) is draft
+        assert draft.set(key, f" {value.raw} ") is draft
+
+
+@pytest.mark.parametrize(
+    ("key", "typed"),
+    [
+        (APERTURE, "8"),
+        (APERTURE, "8 potatoes"),
+        (APERTURE, ""),
+        (APERTURE, '8" # no'),
+        (APERTURE, '8 cm"\n[terminals.evil]\nx = "1'),
+        ("beacon.strehl", "0,4"),
+        ("beacon.strehl", "0.4 # a comment"),
+        ("beacon.strehl", "1\nx = 2"),
+        ("beacon.strehl", "nan"),
+        ("acquisition.attempts", "2.5"),
+        ("orbit.leo.limits.in_eclipse", "yes"),
+        ("conventions.strehl", "decibels"),
+        ("scenario.pid_frequencies", "20 Hz, 1 Hz"),
+        ("scenario.pid_frequencies", '"1 Hz", 15 Hz'),
+        ("scenario.pid_frequencies", ""),
+        ("fine_pointing.geometry.coupling", "1 2 3 4"),
+        ("name", "\x7f\x00"),
+        ("name", ""),
+    ],
+)
+def test_a_wrong_value_is_one_fault_on_its_line_in_the_words_of_the_command_line(draft, call, tmp_path, key, typed):
+    new = draft.set(key, typed)
+    value = new.values.get(key)
+    if key == "name" and typed:
+        assert (new.problems, value.typed) == ((), typed)  # escaped; a name may be anything
+        return
+    (fault,) = new.problems
+    assert (fault.key, fault.line) == (key, draft.values[key].line)
+    assert value.problems == (fault,)
+    assert list(new.values) == list(draft.values)
+    assert value.comment == draft.values[key].comment
+    new.save()
+    result = call("run", tmp_path / "m.toml")
+    assert (result.code, result.err) == (2, f"microrad: {new.report}\n")
+
+
+def test_a_comment_behind_an_edited_list_stays_and_one_inside_it_is_not_lost(tmp_path):
+    text = TEXT.replace('["1 Hz", "15 Hz"] ', '[\n  "1 Hz", # slow\n  "15 Hz",\n] ')
+    draft = Draft.shipped(tmp_path / "m.toml").with_text(text)
+    assert draft.problems == ()
+    with pytest.raises(DraftError, match=r"scenario.pid_frequencies holds comments between its items \(line \d+\)"):
+        draft.set("scenario.pid_frequencies", "1 Hz")
+    open_end = draft.with_text(TEXT.replace('["1 Hz", "15 Hz"]', '["1 Hz", "15 Hz"'))
+    assert len(open_end.problems) == 1
+    assert open_end.set("scenario.pid_frequencies", "1 Hz, 15 Hz").text == TEXT
+    plain = draft.with_text(text.replace(" # slow", ""))
+    assert plain.set("scenario.pid_frequencies", "1 Hz").text == TEXT.replace('["1 Hz", "15 Hz"] ', '["1 Hz"] ')
+
+
+@pytest.mark.parametrize("mark", ["", "\ufeff"])
+@pytest.mark.parametrize("ends", ["\n", "\r\n"])
+def test_line_ends_and_a_byte_order_mark_stay(tmp_path, mark, ends):
+    content = (mark + TEXT.replace("\n", ends)).encode()
+    (tmp_path / "m.toml").write_bytes(content)
+    draft = Draft.open(tmp_path / "m.toml")
+    assert (draft.problems, draft.changed) == ((), False)
+    draft.set(APERTURE, "8 cm").set("terminals.leo_obscuration", "0.2").save()
+    added = f"leo_obscuration = 0.2{ends}".encode()
+    after = (tmp_path / "m.toml").read_bytes()
+    assert after.count(added) == 1
+    assert after.replace(added, b"") == content.replace(b'leo_aperture = "5 cm"', b'leo_aperture = "8 cm"')
+    assert draft.with_text(TEXT) is draft
+
+
+def test_mixed_line_ends_stay_too(tmp_path):
+    lines = TEXT.split("\n")
+    content = "".join(line + ("\r\n" if n % 3 else "\n") for n, line in enumerate(lines[:-1])).encode()
+    (tmp_path / "m.toml").write_bytes(content)
+    Draft.open(tmp_path / "m.toml").set("scenario.loop_amplitude", "5 V").save()
+    wanted = content.replace(b'loop_amplitude = "6 V"', b'loop_amplitude = "5 V"')
+    assert (tmp_path / "m.toml").read_bytes() == wanted != content
+
+
+def test_a_key_that_its_table_may_have_gets_a_line_of_its_own(draft):
+    new = draft.set("terminals.leo_obscuration", "0.2")
+    assert new.problems == ()
+    assert new.text == TEXT.replace(
+        'geo_aperture = "15 cm"                # paper: Table 2\n',
+        'geo_aperture = "15 cm"                # paper: Table 2\nleo_obscuration = 0.2\n',
+    )
+    assert new.without("terminals.leo_obscuration").text == TEXT
+
+
+def test_a_line_is_added_at_the_end_of_a_text_that_has_no_last_line_end(tmp_path):
+    draft = Draft.shipped(tmp_path / "m.toml").with_text('name = "x"\n[terminals]\nleo_aperture = "5 cm"')
+    assert draft.set("terminals.geo_aperture", "5 cm").text.endswith('"5 cm"\ngeo_aperture = "5 cm"\n')
+    assert draft.with_text("[terminals]").set("name", "x").text == 'name = "x"\n[terminals]'
+    assert draft.with_text("").set("name", "x").text == 'name = "x"\n'
+
+
+@pytest.mark.parametrize(
+    ("key", "words"),
+    [
+        ("terminals.leo_apertur", r"terminals.leo_apertur is no key of \[terminals\], which has leo_aperture, geo_"),
+        ("terminal.x", "terminal.x is no key of the mission"),
+        ("fine_pointing.wheels.speed", r"needs the table \[fine_pointing.wheels\], which has no header in .*m.toml"),
+    ],
+)
+def test_a_key_without_a_place_is_refused(draft, key, words):
+    with pytest.raises(DraftError, match=words):
+        draft.set(key, "1")
+
+
+def test_a_key_in_an_inline_table_is_changed_in_the_text(tmp_path):
+    start, end = TEXT.index("[orbit.geo.limits]"), TEXT.index("# ---", TEXT.index("[orbit.geo.limits]"))
+    inline = TEXT[:start].rstrip() + '\nlimits = {attitude = "free"}\n' + TEXT[end:]
+    draft = Draft.shipped(tmp_path / "m.toml").with_text(inline)
+    assert {fault.key for fault in draft.problems} == {
+        f"orbit.geo.limits.{key}" for key in ("slew_limit", "sun_exclusion", "in_eclipse")
+    }
+    with pytest.raises(DraftError, match=r"needs the table \[orbit.geo.limits\]"):
+        draft.set("orbit.geo.limits.attitude", "nadir")
+    value = draft.values["orbit.geo.limits"]
+    assert (value.typed, value.about) == ('{attitude = "free"}', None)
+    whole = '{attitude = "free", slew_limit = "1 deg/s", sun_exclusion = "5 deg", in_eclipse = true}'
+    assert draft.set("orbit.geo.limits", whole).problems == ()
+
+
+def test_a_list_may_be_typed_over_several_lines(draft):
+    new = draft.set("scenario.pid_frequencies", '[\r\n  "1 Hz",\r\n  "20 Hz",\r\n]')
+    assert new.problems == ()
+    assert new.text == TEXT.replace('["1 Hz", "15 Hz"] ', '[\n  "1 Hz",\n  "20 Hz",\n] ')
+    bare = draft.set("scenario.pid_frequencies", "1 Hz,\n20 Hz").values["scenario.pid_frequencies"]
+    assert bare.raw == '["1 Hz", "20 Hz"]'
+
+
+def test_an_unknown_key_of_the_text_can_be_put_right_or_removed(draft):
+    text = TEXT.replace("leo_aperture = ", "leo_apertur = ")
+    wrong = draft.with_text(text)
+    (fault,) = wrong.problems
+    assert fault.nearest == "leo_aperture"
+    assert wrong.values["terminals.leo_apertur"].problems == (fault,)
+    mended = wrong.without("terminals.leo_apertur").set(APERTURE, "5 cm")
+    assert mended.problems == ()
+    with pytest.raises(DraftError, match=r"x\.y has no line of its own"):
+        draft.without("x.y")
+
+
+def test_a_key_of_hundreds_of_thousands_of_parts_is_shown_as_it_stands(draft):
+    """Parsing goes through all parts for each part: this took minutes, each time a page asked for the values."""
+    long, allowed = "{a" + ".a" * 400_000 + " = 1}", "{a" + ".a" * 49 + " = 1}"
+    assert value_of(long) is None
+    assert list(value_of(allowed)) == ["a"]
+    broken = draft.with_text(f"{TEXT}[more]\nx = {long}\n")
+    assert broken.values["more.x"].typed == long
+    assert broken.set("more.x", "1").values["more.x"].raw == "1"
+    assert draft.set(APERTURE, long).values[APERTURE].raw == f'"{long}"'
+
+
+def test_a_text_with_a_broken_line_is_edited_elsewhere(draft):
+    broken = draft.with_text(TEXT.replace("[beacon]", "[beacon"))
+    assert broken.problems
+    with pytest.raises(MissionError) as refusal:
+        broken.file()
+    assert str(refusal.value) == broken.report
+    new = broken.set(APERTURE, "8 cm")
+    assert new.text == broken.text.replace('leo_aperture = "5 cm"', 'leo_aperture = "8 cm"')
+    assert new.problems == broken.problems
+
+
+def test_tables_come_and_go_by_text(draft):
+    wheels = (
+        '\n[fine_pointing.wheels]\nspeed = "50 Hz"\nharmonics = [1.0]\ncoefficients = ["0.1 nrad/Hz^2"]\n'
+        'convention = "per-axis"\n'
+    )
+    more = draft.with_text(draft.text + wheels)
+    assert more.problems == ()
+    assert more.set("fine_pointing.wheels.speed", "60 Hz").file().mission.fine_pointing.wheels.speed_hz == 60.0
+    assert more.with_text(TEXT).file().mission.fine_pointing.wheels is None
+
+
+# ------------------------------------------------------------------------------------------------------------ problems
+def test_faults_of_many_kinds_are_those_of_the_command_line(draft, call, tmp_path):
+    text = (
+        TEXT.replace('leo_aperture = "5 cm"', "leo_aperture = 5")
+        .replace("[amplifier]", "[amplifer]")
+        .replace('divergence = "780 urad"', 'divergence = "1 urad"')
+        .replace('rate = "50 kHz"', "rate = 50 kHz")
+    )
+    new = draft.with_text(text)
+    assert len(new.problems) == 3
+    new.save()
+    for command in ("run", "budget"):
+        assert call(command, tmp_path / "m.toml").err == f"microrad: {new.report}\n"
+    with pytest.raises(MissionError) as refusal:
+        load_mission(tmp_path / "m.toml")
+    assert refusal.value.faults == new.problems
+
+
+def test_a_mirror_file_is_looked_for_beside_the_mission(draft, tmp_path):
+    start, end = TEXT.index("[mirror]"), TEXT.index("[amplifier]")
+    new = draft.with_text(TEXT[:start] + '[mirror]\nfile = "lab.toml"\n\n' + TEXT[end:])
+    (fault,) = new.problems
+    assert fault.file == str(tmp_path / "lab.toml")
+    (tmp_path / "lab.toml").write_text(TEXT[start:end].replace("[mirror]\n", "").replace("[mirror.", "["))
+    assert new.set("mirror.file", "./lab.toml").problems == ()
+    assert new.set("mirror.file", "./lab.toml").file().mission == load_mission(SHIPPED).mission
+
+
+def test_a_text_of_links_alone_is_in_order_as_for_the_budget(tmp_path):
+    draft = Draft.shipped(tmp_path / "m.toml").with_text(preset_text("click"))
+    unknown = {fault.key for fault in draft.problems}
+    assert unknown
+    for key in unknown:
+        draft = draft.set(key, key_of(key).example)
+    with pytest.raises(MissionError, match="is missing"):
+        draft.file()
+    if not draft.problems:
+        assert not isinstance(draft.link().mission, Mission)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [("", "is empty"), ("\0", "holds binary data"), ("x = 1\n" * 10_001, "has more than 10000 lines")],
+)
+def test_a_text_that_is_no_mission_at_all_is_a_draft_that_says_so(draft, text, words):
+    (fault,) = draft.with_text(text).problems
+    assert words in str(fault)
+    assert (fault.key, fault.line) == ("", 0)
+
+
+# ---------------------------------------------------------------------------------------------------------------- disk
+def test_a_saved_draft_is_the_file_that_the_command_line_reads(draft, tmp_path):
+    new = draft.set(APERTURE, "8 cm").save()
+    assert (new.changed, new.path) == (False, tmp_path / "m.toml")
+    file = load_mission(tmp_path / "m.toml")
+    assert file.text == new.text
+    assert file.sha256 == new.sha256 == new.disk_sha256 == new.file().sha256
+    assert file.mission == new.file().mission
+    assert file.mission.terminals.leo_aperture_m == pytest.approx(0.08)
+    assert tomllib.loads(new.text)["terminals"]["leo_aperture"] == "8 cm"
+
+
+def test_the_last_of_two_tabs_is_told(draft, tmp_path):
+    one, two = draft.set(APERTURE, "8 cm"), draft.set(APERTURE, "9 cm")
+    saved = one.save()
+    with pytest.raises(DraftError, match=r"m.toml was changed since it was opened here, in another tab or by another"):
+        two.save()
+    assert load_mission(tmp_path / "m.toml").mission.terminals.leo_aperture_m == pytest.approx(0.08)
+    assert not saved.set(APERTURE, "10 cm").save().changed
+    elsewhere = two.save(tmp_path / "two.toml")
+    assert elsewhere.path == tmp_path / "two.toml"
+    assert not elsewhere.set(APERTURE, "11 cm").save().changed
+
+
+def test_what_both_tabs_say_alike_is_saved_by_both(draft):
+    one, two = draft.set(APERTURE, "8 cm"), draft.set(APERTURE, "8 cm")
+    one.save()
+    assert two.save().disk_sha256 == one.sha256
+
+
+def test_a_file_that_is_there_is_not_replaced_by_another_name(draft, tmp_path):
+    (tmp_path / "other.toml").write_text("mine")
+    with pytest.raises(DraftError, match=r"other\.toml exists and is left as it is; choose another name"):
+        draft.save(tmp_path / "other.toml")
+    with pytest.raises(DraftError, match=r"other\.toml exists and is left as it is"):
+        Draft.shipped(tmp_path / "other.toml").save()
+    assert (tmp_path / "other.toml").read_text() == "mine"
+
+
+def test_a_file_that_is_gone_is_written_again(draft, tmp_path):
+    (tmp_path / "m.toml").unlink()
+    draft.save()
+    assert (tmp_path / "m.toml").read_text("utf-8") == TEXT
+
+
+def test_who_may_read_a_file_stays_and_so_does_a_link(draft, tmp_path):
+    (tmp_path / "m.toml").chmod(0o600)
+    (tmp_path / "link.toml").symlink_to("m.toml")
+    Draft.open(tmp_path / "link.toml").set(APERTURE, "8 cm").save()
+    assert (tmp_path / "link.toml").is_symlink()
+    assert stat.S_IMODE((tmp_path / "m.toml").stat().st_mode) == 0o600
+    assert 'leo_aperture = "8 cm"' in (tmp_path / "m.toml").read_text("utf-8")
+
+
+@pytest.mark.parametrize("name", ["none/m.toml", "."])
+def test_a_place_that_cannot_be_written_is_told(draft, tmp_path, name):
+    with pytest.raises(DraftError, match=r"cannot be written: (No such file|Is a directory)"):
+        draft.save(tmp_path / name)
+
+
+def test_a_full_disk_leaves_the_file_as_it_was(draft, tmp_path, monkeypatch):
+    def full(path, text):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(drafts, "write_whole", full)
+    with pytest.raises(DraftError, match="No space left on device; check free space and permissions, or save under"):
+        draft.set(APERTURE, "8 cm").save()
+    assert hashlib.sha256((tmp_path / "m.toml").read_bytes()).hexdigest() == draft.sha256
+
+
+@pytest.mark.parametrize("content", [None, b"\xff\xfe", b"a\0b", b"#" * 1_000_001])
+def test_a_file_that_is_no_text_is_refused_as_on_the_command_line(tmp_path, call, content):
+    if content is not None:
+        (tmp_path / "m.toml").write_bytes(content)
+    with pytest.raises(MissionError) as refusal:
+        Draft.open(tmp_path / "m.toml")
+    assert call("run", tmp_path / "m.toml").err == f"microrad: {refusal.value}\n"
+
+
+def test_half_a_character_is_refused(draft):
+    for change in (lambda: draft.set("name", "a\ud800"), lambda: draft.with_text("\ud800")):
+        with pytest.raises(DraftError, match="holds half of a character"):
+            change()
+
+
+def test_a_mission_without_fine_pointing_is_a_draft_too(tmp_path):
+    draft = Draft.shipped(tmp_path / "m.toml").with_text(without_fine_pointing(TEXT))
+    assert draft.problems == ()
+    assert not any(key.startswith("fine_pointing") for key in draft.values)

@@ -1,0 +1,776 @@
+"""Recordings dropped into the studio: odd names, floods and bombs are refused in words, and the studio goes on."""
+
+import asyncio
+import importlib
+import io
+import json
+import math
+import os
+import shutil
+import stat
+import struct
+import subprocess
+import sys
+import tempfile
+import time
+import zipfile
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.io import savemat
+
+from lab import test_recording_formats as formats
+from microrad.lab.recording import read_recording
+from microrad.studio import parse_process, reading
+from microrad.studio.names import NameRefusedError, safe_name, within
+from microrad.studio.reading import Columns, ReadingError, ReadingLimits, list_channels, view
+from microrad.studio.uploads import UploadError, UploadLimits, Uploads
+from waiting import HANG_S, gone, lines_of
+
+posix = pytest.mark.skipif(os.name != "posix", reason="POSIX keeps modes and limits")
+linux = pytest.mark.skipif(sys.platform != "linux", reason="the address space is bounded on Linux")
+
+HTML = "<img src=x onerror=alert(1)>"
+LIMITS = UploadLimits(file_bytes=1000, files=3, total_bytes=2500)
+
+
+# -------------------------------------------------------------------------------------------------------------- names
+@pytest.mark.parametrize(
+    "name",
+    [
+        "run 7.csv",
+        "Bode (2).tdms",
+        "2026-01-02T10:11:12.npz",
+        "µrad.csv",
+        "名前.mat",
+        f"{HTML}.csv",
+        "-rf.csv",
+        "a.b.c",
+        "x",
+    ],
+)
+@posix
+def test_names_of_a_laboratory_are_taken_as_they_are(name):
+    assert safe_name(name) == name
+
+
+def test_a_decomposed_name_is_composed():
+    assert safe_name("u\u0308.csv") == "\u00fc.csv"
+
+
+@pytest.mark.parametrize(
+    ("name", "why"),
+    [
+        ("../x.csv", "holds a path"),
+        ("..", "holds a path|dot"),
+        (".", "dot"),
+        ("/etc/passwd", "holds a path"),
+        ("..\\x.csv", "holds a path"),
+        ("C:\\x.csv", "holds a path"),
+        ("a/b.csv", "holds a path"),
+        ("", "has no name"),
+        ("   ", "has no name"),
+        ("x\0.csv", "do not print"),
+        ("x\n.csv", "do not print"),
+        ("x\x1b[31m.csv", "do not print"),
+        ("x\u202evsc.exe", "do not print"),
+        ("x\ud800.csv", "do not print"),
+        ("x\u2028.csv", "do not print"),
+        (".bashrc", "dot"),
+        (".part", "dot"),
+        ("x.csv.", "dot"),
+        ("x.csv ", "dot or a blank"),
+        (" x.csv", "dot or a blank"),
+        ("CON", "device"),
+        ("nul.csv", "device"),
+        ("Com7.tar.gz", "device"),
+        ("LPT\u00b9.csv", "device"),
+        ("aux .csv", "device"),
+        ("x" * 161, "160 bytes"),
+        ("µ" * 81, "160 bytes"),
+    ],
+)
+def test_odd_names_are_refused_in_words(name, why):
+    with pytest.raises(NameRefusedError, match=why) as caught:
+        safe_name(name)
+    message = str(caught.value)
+    assert message.isprintable()
+    assert "rename it" in message
+    assert len(message) < 300
+
+
+def test_names_beside_the_refused_ones_are_taken():
+    for name in ("..x.csv"[2:], "x..csv", "console.csv", "com.csv", "com10.csv", "x" * 160, "µ" * 80):
+        assert safe_name(name) == name
+
+
+@posix
+def test_paths_stay_within_their_folder(tmp_path):
+    root, outside = tmp_path / "root", tmp_path / "outside.toml"
+    (root / "sub").mkdir(parents=True)
+    outside.touch()
+    (root / "link.toml").symlink_to(outside)
+    (root / "inner.toml").symlink_to(root / "sub")
+    (root / "loop").symlink_to(root / "loop")
+    for name in ("a.toml", "sub/a.toml", "sub/../a.toml", root / "a.toml", "inner.toml/a.toml", "."):
+        assert within(root, name).is_relative_to(root.resolve())
+    assert within(root, "sub/../a.toml") == root.resolve() / "a.toml"
+    for name in ("../outside.toml", "sub/../../outside.toml", str(outside), "/etc/passwd", "link.toml", "../root2/a"):
+        with pytest.raises(NameRefusedError, match="is outside of"):
+            within(root, name)
+    with pytest.raises(NameRefusedError, match="no path that can be opened"):
+        within(root, "a\0b")
+
+
+# ------------------------------------------------------------------------------------------------------------ storing
+def blocks(*parts):
+    async def stream():
+        for part in parts:
+            if isinstance(part, BaseException):
+                raise part
+            yield part
+
+    return stream()
+
+
+def save(uploads, name, *parts):
+    return asyncio.run(uploads.save(name, blocks(*parts)))
+
+
+def everything(folder):
+    return sorted(str(p.relative_to(folder)) for p in folder.rglob("*"))
+
+
+def mode(path):
+    return stat.S_IMODE(path.stat().st_mode)
+
+
+@posix
+def test_a_file_is_stored_as_it_came_for_its_owner_only(tmp_path):
+    uploads = Uploads(tmp_path / "a" / "uploads", LIMITS)
+    old = os.umask(0)
+    try:
+        first = save(uploads, f"{HTML}.csv", b"ab", b"", b"c" * 900)
+    finally:
+        os.umask(old)
+    second = save(uploads, f"{HTML}.csv", b"2")
+    assert first.path.read_bytes() == b"ab" + b"c" * 900
+    assert (first.name, first.size, second.path.read_bytes()) == (f"{HTML}.csv", 902, b"2")
+    assert [mode(p) for p in (uploads.folder, first.path.parent, first.path)] == [0o700, 0o700, 0o600]
+    assert first.path.parent.parent == uploads.folder
+    assert Uploads(uploads.folder).listed() == (first, second)  # a second tab, or after a new start
+    assert uploads.get(second.key) == second
+    uploads.remove(first.key)
+    assert uploads.listed() == (second,)
+    for key in (first.key, "", "..", second.key + "/..", "*"):
+        for use in (uploads.get, uploads.remove):
+            with pytest.raises(UploadError, match="drop the file again"):
+                use(key)
+    assert uploads.listed() == (second,)
+
+
+def test_a_file_over_the_limit_stops_the_sender_and_leaves_nothing(tmp_path):
+    uploads = Uploads(tmp_path, LIMITS)
+    sent = 0
+
+    async def flood():
+        nonlocal sent
+        while True:
+            sent += 300
+            yield bytes(300)
+
+    with pytest.raises(UploadError, match=r"'flood.csv' has more than 0.001 MB; cut out"):
+        asyncio.run(uploads.save("flood.csv", flood()))
+    assert (sent, everything(tmp_path)) == (1200, [])
+    assert save(uploads, "just.csv", bytes(1000)).size == 1000
+
+
+def test_number_and_sum_of_the_files_are_bounded(tmp_path):
+    uploads = Uploads(tmp_path, LIMITS)
+    for k in range(2):
+        save(uploads, f"{k}.csv", bytes(1000))
+    with pytest.raises(UploadError, match=r"together may have 0.0025 MB; remove one first"):
+        save(uploads, "third.csv", bytes(501))
+    save(uploads, "third.csv", bytes(500))
+    with pytest.raises(UploadError, match="3 recordings are here already; remove one first"):
+        save(uploads, "fourth.csv", b"")
+    assert [each.name for each in uploads.listed()] == ["0.csv", "1.csv", "third.csv"]
+    uploads.remove(uploads.listed()[0].key)
+    assert save(uploads, "fourth.csv", b"1").size == 1
+
+
+def test_files_on_their_way_count(tmp_path):
+    uploads = Uploads(tmp_path, replace(LIMITS, files=1))
+
+    async def both():
+        begun, gate = asyncio.Event(), asyncio.Event()
+
+        async def slow():
+            yield b"1"
+            begun.set()
+            await gate.wait()
+            yield b"2"
+
+        first = asyncio.create_task(uploads.save("slow.csv", slow()))
+        await begun.wait()
+        assert uploads.listed() == ()
+        with pytest.raises(UploadError, match="1 recordings are here already"):
+            await uploads.save("second.csv", blocks(b"1"))
+        gate.set()
+        return await first
+
+    assert asyncio.run(both()).path.read_bytes() == b"12"
+
+
+@pytest.mark.parametrize("fault", [ConnectionError("gone"), asyncio.CancelledError()])
+def test_what_breaks_off_leaves_nothing(tmp_path, fault):
+    uploads = Uploads(tmp_path, LIMITS)
+    with pytest.raises((UploadError, asyncio.CancelledError)):
+        save(uploads, "x.csv", b"1", fault)
+    assert everything(tmp_path) == []
+
+
+def test_a_full_disk_is_said(tmp_path):
+    with pytest.raises(UploadError, match=r"'x.csv' could not be stored: No space left on device"):
+        save(Uploads(tmp_path, LIMITS), "x.csv", b"1", OSError(28, "No space left on device"))
+    assert everything(tmp_path) == []
+
+
+def test_a_disk_that_is_full_before_a_file_is_there_is_said(tmp_path):
+    """The form around it is kept in a temporary file first."""
+    pytest.importorskip("nicegui")
+    from microrad.studio.pages.drop import Drop
+
+    class Full:
+        def form(self, **limits):
+            raise OSError(28, "No space left on device")
+
+    said = []
+    drop = Drop.__new__(Drop)
+    drop._refused = said.append
+    asyncio.run(drop._take(Full()))
+    assert said == ["the file could not be stored: No space left on device; check free space and permissions"]
+
+
+def uploaded(tmp_path, monkeypatch, receive, turns=2):
+    """What is said of an upload, by a field whose browser sends `receive`."""
+    drop = pytest.importorskip("nicegui") and importlib.import_module("microrad.studio.pages.drop")
+    said, taken = [], []
+    field = drop.Drop.__new__(drop.Drop)
+    field._uploads, field._refused = Uploads(tmp_path / "uploads", LIMITS), said.append
+
+    async def take(upload):
+        taken.append(upload.name)
+
+    async def send():
+        monkeypatch.setattr(drop, "_TURNS", asyncio.Semaphore(turns))  # of this loop
+        head = [(b"content-type", b"multipart/form-data; boundary=b")]
+        requests = [drop.Request({"type": "http", "headers": head}, each) for each in receive]
+        await asyncio.gather(*map(field._take, requests))
+
+    field._taken = take
+    asyncio.run(send())
+    return said, taken
+
+
+FORM = b'--b\r\nContent-Disposition: form-data; name="file"; filename="a.csv"\r\n\r\n1,2\r\n--b--\r\n'
+
+
+def sender(*messages):
+    """A browser that sends these, and then nothing for ever."""
+    left = iter(messages)
+
+    async def receive():
+        for message in left:
+            return message
+        return await asyncio.Future()
+
+    return receive
+
+
+def body(data, more=False):
+    return {"type": "http.request", "body": data, "more_body": more}
+
+
+def test_an_upload_that_is_broken_off_is_no_fault_of_the_studio(tmp_path, monkeypatch):
+    broken = sender(body(FORM[:40], more=True), {"type": "http.disconnect"})
+    assert uploaded(tmp_path, monkeypatch, [broken, sender(body(FORM))], turns=1) == ([], ["a.csv"])
+    assert len(everything(tmp_path / "uploads")) == 2  # the file in its folder
+
+
+def test_an_upload_that_hangs_is_ended_and_those_behind_it_are_not_read_before(tmp_path, monkeypatch):
+    drop = pytest.importorskip("nicegui") and importlib.import_module("microrad.studio.pages.drop")
+    read = []
+
+    async def behind():
+        read.append(len(list((tmp_path / "spool").iterdir())))
+        return body(FORM)
+
+    class Spooled(drop.Request):
+        async def form(self, **limits):
+            waiting = tmp_path / "spool" / str(id(self))
+            waiting.touch()
+            try:
+                return await super().form(**limits)
+            finally:
+                waiting.unlink()
+
+    (tmp_path / "spool").mkdir()
+    monkeypatch.setattr(drop, "Request", Spooled)
+    monkeypatch.setattr(drop, "_MOST_S", 0.3)
+    hanging = [sender(body(FORM[:40], more=True)) for _ in range(2)]
+    said, taken = uploaded(tmp_path, monkeypatch, [*hanging, behind])
+    assert read in ([1], [2])  # on their way as the third is read, itself among them
+    assert taken == ["a.csv"]
+    assert [words[:62] for words in said] == ["the file is not taken: it was not here after 0.005 min; cut ou"] * 2
+
+
+def test_a_bad_name_stores_nothing(tmp_path):
+    uploads = Uploads(tmp_path / "in" / "ner", LIMITS)
+    for name in ("../../x.csv", str(tmp_path / "x.csv"), ".part"):
+        with pytest.raises(NameRefusedError):
+            save(uploads, name, b"1")
+    assert everything(tmp_path) == ["in", str(Path("in", "ner"))]
+
+
+@posix
+def test_the_folder_is_made_private_and_no_link(tmp_path):
+    (tmp_path / "open").mkdir(mode=0o755)
+    assert mode(Uploads(tmp_path / "open").folder) == 0o700
+    (tmp_path / "link").symlink_to(tmp_path / "open")
+    with pytest.raises(UploadError, match="is a link or belongs to somebody else"):
+        Uploads(tmp_path / "link")
+
+
+def test_what_a_killed_studio_left_is_cleared_away_after_an_hour(tmp_path):
+    uploads = Uploads(tmp_path, LIMITS)
+    kept = save(uploads, "kept.csv", b"1")
+    for key, age_s in (("0" * 16, 7200), ("1" * 16, 60)):
+        (tmp_path / key).mkdir()
+        (tmp_path / key / ".part").touch()
+        for path in (tmp_path / key / ".part", tmp_path / key):
+            os.utime(path, (time.time() - age_s,) * 2)
+    os.utime(kept.path, (0, 0))
+    os.utime(kept.path.parent, (0, 0))
+    (tmp_path / "other").mkdir()
+    assert Uploads(tmp_path).listed() == (kept,)
+    assert {p.name for p in tmp_path.iterdir()} == {kept.key, "1" * 16, "other"}
+
+
+@posix
+def test_a_link_among_the_uploads_is_no_recording(tmp_path):
+    """It came with the folder, and names a file elsewhere."""
+    secret, uploads = tmp_path / "secret.csv", Uploads(tmp_path / "uploads", LIMITS)
+    secret.write_text("1,2", "utf-8")
+    planted = uploads.folder / ("0" * 16)
+    planted.mkdir()
+    (planted / "x.csv").symlink_to(secret)
+    assert uploads.listed() == ()
+    with pytest.raises(UploadError, match="drop the file again"):
+        uploads.get(planted.name)
+    (planted / "x.csv").unlink()
+    secret.rename(planted / "x.csv")
+    assert [each.key for each in uploads.listed()] == [planted.name]
+
+
+def test_a_folder_that_was_removed_meanwhile_is_made_again(tmp_path):
+    uploads = Uploads(tmp_path / "uploads", LIMITS)
+    uploads.folder.rmdir()
+    assert uploads.listed() == ()
+    assert save(uploads, "x.csv", b"1").path.read_bytes() == b"1"
+    shutil.rmtree(uploads.folder)
+    uploads.folder.write_text("a file", "utf-8")
+    with pytest.raises(UploadError, match=r"'x.csv' could not be stored: "):
+        save(uploads, "x.csv", b"1")
+
+
+def test_what_no_recording_is_in_is_cleared_away_at_the_start(tmp_path, monkeypatch):
+    """Twenty of them, a minute old, and no recording could be dropped any more."""
+    monkeypatch.setattr(tempfile, "tempdir", tempfile.gettempdir())
+    uploads = Uploads(tmp_path, LIMITS)
+    kept = save(uploads, "kept.csv", b"1")
+    for key in "012":
+        (tmp_path / (key * 16)).mkdir()
+        (tmp_path / (key * 16) / ".part").touch()
+    with pytest.raises(UploadError, match="4 recordings are here already; remove one first"):
+        save(uploads, "x.csv", b"1")
+    Uploads(tmp_path, LIMITS).hold_temporary_files()
+    assert {p.name for p in tmp_path.iterdir()} == {kept.key, "spool"}
+    assert save(uploads, "x.csv", b"1").size == 1
+
+
+def test_temporary_files_lie_in_the_private_folder(tmp_path, monkeypatch):
+    monkeypatch.setattr(tempfile, "tempdir", tempfile.gettempdir())
+    uploads = Uploads(tmp_path / "uploads", LIMITS)
+    uploads.hold_temporary_files()
+    with tempfile.NamedTemporaryFile() as file:
+        assert Path(file.name).parent == uploads.folder / "spool"
+        os.utime(file.name, (0, 0))
+        left = Path(tempfile.mkdtemp())  # with a campaign's files, by a studio that was killed
+        (left / "campaign.toml").touch()
+        os.utime(left, (0, 0))
+        (uploads.folder / "spool" / "new").touch()
+        uploads.hold_temporary_files()
+        assert [p.name for p in (uploads.folder / "spool").iterdir()] == ["new"]
+        Path(file.name).touch()
+    assert uploads.listed() == ()
+    for _ in range(LIMITS.files):
+        save(uploads, "x.csv", b"1")
+
+
+# ------------------------------------------------------------------------------------------------------------ reading
+N = 6000
+TIME_S = np.arange(N) / 1000
+
+
+@pytest.fixture(scope="module")
+def loop():
+    noise = np.random.Generator(np.random.Philox(1)).standard_normal(N)
+    drive = 5 + 5 * np.sin(2 * np.pi * 7.3 * TIME_S)
+    return drive, drive - 0.6 * np.cos(2 * np.pi * 7.3 * TIME_S) + 0.01 * noise
+
+
+def csv(path, loop, names=("time", "drive (V)", "output (urad)")):
+    np.savetxt(path, np.column_stack([TIME_S, *loop]), delimiter=",", header=",".join(names), comments="", fmt="%.9g")
+    return path
+
+
+def refused(path, columns=None, **limits):
+    """The words that refuse a file, listed or read."""
+    bounds = ReadingLimits(**limits)
+    with pytest.raises(ReadingError) as caught:
+        list_channels(path, bounds) if columns is None else view(path, columns, bounds)
+    assert str(path.parent) not in str(caught.value)
+    assert path.name in str(caught.value)
+    return str(caught.value)
+
+
+def test_channels_are_listed(tmp_path, loop):
+    path = csv(tmp_path / f"{HTML}.csv", loop, ("time", HTML, "output (urad)"))
+    found = list_channels(path)
+    assert [c.name for c in found.channels] == ["time", HTML, "output (urad)"]
+    assert [c.unit for c in found.channels] == ["", "", "urad"]
+    assert (found.format, found.more, found.time, found.rates_hz) == ("text", 0, 0, ())
+    assert found.sha256 == read_recording(path, 1, 2).sha256
+
+
+def test_a_recording_is_read_checked_and_thinned(tmp_path, loop):
+    path = csv(tmp_path / "loop.csv", loop)
+    whole = read_recording(path, 1, 2)
+    seen = view(path, Columns((1,), ("output (urad)",)), ReadingLimits(points=400))
+    assert (seen.sha256, seen.samples, seen.rate_hz) == (whole.sha256, N, whole.rate_hz)
+    assert (seen.input_names, seen.output_names, seen.output_units) == (("drive (V)",), ("output (urad)",), ("urad",))
+    assert [f.message for f in seen.findings] == [f.message for f in whole.findings]
+    rows = np.array(seen.rows)
+    assert 200 <= len(rows) <= 4 * 200 + 2
+    assert np.all(np.diff(rows) > 0)
+    np.testing.assert_allclose(seen.drive[0], whole.drive[rows, 0], rtol=1e-6)
+    np.testing.assert_allclose(seen.output[0], whole.output[rows, 0], rtol=1e-6)
+    assert max(seen.output[0]) == pytest.approx(whole.output.max(), rel=1e-6)
+    assert len(view(path, Columns((1,), (2,)), ReadingLimits(points=N)).rows) == N
+
+
+def _matlab5(path):
+    savemat(path, {"drive": formats.DRIVE, "output": formats.OUTPUT, "fs": formats.RATE_HZ})
+
+
+def _npy(path):
+    np.save(path, np.column_stack((formats.DRIVE, formats.OUTPUT)))
+
+
+def _npz(path):
+    np.savez(path, drive=formats.DRIVE, output=formats.OUTPUT)
+
+
+def _text(path):
+    np.savetxt(
+        path, np.column_stack((formats.DRIVE, formats.OUTPUT)), delimiter=",", header="drive,output", comments=""
+    )
+
+
+@pytest.mark.parametrize(
+    ("name", "write", "drive", "output"),
+    [
+        ("a.csv", _text, 0, 1),
+        ("a.npy", _npy, 0, 1),
+        ("a.npz", _npz, "drive", "output"),
+        ("a.mat", _matlab5, "drive", "output"),
+        ("b.mat", lambda path: formats.matlab73(path, drive=formats.DRIVE, output=formats.OUTPUT), "drive", "output"),
+        ("a.h5", formats.hdf5, "run/drive", "run/output"),
+        ("a.tdms", formats.tdms, "bench/drive", "bench/output"),
+        ("a.lvm", formats.lvm, "drive", "output"),
+        ("b.lvm", partial(formats.lvm, segments=3), "drive", "output"),
+        ("c.lvm", partial(formats.lvm, segments=3, gap_s=0.1), "1/drive", "1/output"),
+        ("d.lvm", partial(formats.lvm, x_columns="Multi", comment="started"), "drive", "output"),
+    ],
+)
+def test_each_format_is_read_as_the_command_line_reads_it(tmp_path, name, write, drive, output):
+    path = tmp_path / name
+    write(path)
+    whole = read_recording(path, drive, output, formats.RATE_HZ)
+    listed = {c.name: c.samples for c in list_channels(path).channels}
+    seen = view(path, Columns((drive,), (output,), rate_hz=formats.RATE_HZ), ReadingLimits(points=formats.N))
+    stated = [listed[each] for each in (*whole.input_names, *whole.output_names)]
+    assert stated == [None if name == "a.csv" else whole.samples] * 2
+    assert (seen.sha256, seen.samples, seen.rate_hz) == (whole.sha256, whole.samples, whole.rate_hz)
+    np.testing.assert_allclose(seen.output[0], whole.output[np.array(seen.rows), 0], rtol=1e-6, atol=0)
+
+
+def test_refusals_are_those_of_the_reader(tmp_path, loop):
+    path = csv(tmp_path / "loop.csv", loop)
+    with pytest.raises(ValueError, match="no input column") as caught:
+        read_recording(path, "nothing", 2)
+    assert refused(path, Columns(("nothing",), (2,))) == str(caught.value).replace(str(path), "loop.csv")
+    assert "give a sequence of jitter" in refused(path, Columns((1,), (2,), accept=("everything",)))
+    assert "5 Hz" in refused(path, Columns((1,), (2,), rate_hz=5.0))
+    empty = tmp_path / "empty.csv"
+    empty.touch()
+    assert "the file is empty" in refused(empty)
+
+
+def test_many_channels_and_long_names_are_cut(tmp_path):
+    path = tmp_path / "many.npz"
+    np.savez(path, **{f"c{k}{'x' * 300}": np.arange(3.0) for k in range(30)})
+    found = list_channels(path, ReadingLimits(channels=20))
+    assert (len(found.channels), found.more) == (20, 10)
+    assert {len(c.name) for c in found.channels} == {200}
+    assert [c.samples for c in found.channels] == [3] * 20
+
+
+class Opened:
+    """A pickle that leaves a trace when it is loaded."""
+
+    def __init__(self, path):
+        self.path = str(path)
+
+    def __reduce__(self):
+        return Path.touch, (Path(self.path),)
+
+
+@pytest.mark.parametrize("suffix", ["npy", "npz"])
+def test_pickles_are_not_loaded(tmp_path, suffix):
+    trace, path = tmp_path / "trace", tmp_path / f"evil.{suffix}"
+    evil = np.array([Opened(trace) for _ in range(300)], dtype=object)
+    (np.save if suffix == "npy" else np.savez)(path, evil)
+    assert "Python objects" in refused(path)
+    assert "Python objects" in refused(path, Columns((0,), (1,)))
+    assert not trace.exists()
+    np.load(path, allow_pickle=True)["arr_0"] if suffix == "npz" else np.load(path, allow_pickle=True)
+    assert trace.exists()  # it would have
+
+
+# -------------------------------------------------------------------------------------------------------------- bombs
+def npy_header(count, descr="<f8"):
+    file = io.BytesIO()
+    np.lib.format.write_array_header_2_0(file, {"descr": descr, "fortran_order": False, "shape": (count,)})
+    return file.getvalue()
+
+
+def bomb(path, header, megabytes):
+    """An archive with two arrays of zeros, a thousandth of their size."""
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name in ("u.npy", "y.npy"):
+            with archive.open(name, "w", force_zip64=True) as member:
+                member.write(header)
+                for _ in range(megabytes):
+                    member.write(bytes(1_000_000))
+    assert path.stat().st_size < megabytes * 10_000
+    return path
+
+
+def test_a_zip_bomb_is_refused_by_what_it_states(tmp_path):
+    path = bomb(tmp_path / "bomb.npz", npy_header(25_000_000), 200)
+    for columns in (None, Columns((0,), (1,), rate_hz=1e3)):
+        assert "'u' states 2.5e+07 samples, and at most 2e+07 are read here; cut out" in refused(path, columns)
+
+
+@linux
+def test_a_zip_bomb_within_the_samples_ends_at_the_memory(tmp_path):
+    path = bomb(tmp_path / "bomb.npz", npy_header(20_000_000), 160)
+    words = refused(path, Columns((0,), (1,), rate_hz=1e3), memory_bytes=320_000_000)
+    assert "allocate" in words or "memory" in words
+    assert "constant" in refused(path, Columns((0,), (1,), rate_hz=1e3))  # with more memory it is read, and judged
+
+
+@linux
+def test_the_header_of_an_array_that_is_a_bomb_ends_at_the_memory(tmp_path):
+    path = bomb(tmp_path / "head.npz", b"\x93NUMPY\x02\x00" + struct.pack("<I", 300_000_000), 300)
+    assert "cannot be read" in refused(path, memory_bytes=300_000_000)
+
+
+@pytest.mark.parametrize("members", [200_000])
+def test_an_archive_of_very_many_members_ends_at_the_computing_time(tmp_path, members):
+    path = tmp_path / "members.npz"
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("0.npy", npy_header(1) + bytes(8))
+    one = path.read_bytes()
+    at = one.index(b"PK\x01\x02")
+    end = one.index(b"PK\x05\x06")
+    record = one[at:end]
+    directory = record * members
+    tail64 = struct.pack("<4sQHHIIQQQQ", b"PK\x06\x06", 44, 45, 45, 0, 0, members, members, len(directory), at)
+    locator = struct.pack("<4sIQI", b"PK\x06\x07", 0, at + len(directory), 1)
+    last = struct.pack("<4s4H2IH", b"PK\x05\x06", 0, 0, 0xFFFF, 0xFFFF, 0xFFFFFFFF, 0xFFFFFFFF, 0)
+    path.write_bytes(one[:at] + directory + tail64 + locator + last)
+    words = refused(path, cpu_s=1, wall_s=HANG_S)
+    assert "1 s of computing" in words
+
+
+def test_a_dataset_of_a_trillion_samples_is_refused_by_what_it_states(tmp_path):
+    h5py = pytest.importorskip("h5py")
+    path = tmp_path / "huge.h5"
+    with h5py.File(path, "w") as file:
+        file.create_dataset("u", shape=(10**12,), chunks=(1024,), dtype="f8")
+        file.create_dataset("y", shape=(10**12,), chunks=(1024,), dtype="f8")
+    assert path.stat().st_size < 10_000
+    assert "'u' states 1e+12 samples" in refused(path)
+    assert "'u' states 1e+12 samples" in refused(path, Columns((0,), (1,)))
+
+
+def test_a_tdms_file_that_states_a_trillion_samples_counts_for_what_it_holds(tmp_path):
+    nptdms = pytest.importorskip("nptdms")
+    path = tmp_path / "huge.tdms"
+    with nptdms.TdmsWriter(str(path)) as writer:
+        writer.write_segment([nptdms.ChannelObject("bench", name, np.arange(300.0)) for name in "uy"])
+    data = path.read_bytes()
+    assert data.count(struct.pack("<Q", 300)) == 2
+    path.write_bytes(data.replace(struct.pack("<Q", 300), struct.pack("<Q", 10**12)))
+    assert [c.samples for c in list_channels(path).channels] == [300, 300]
+    lead = bytearray(data)
+    lead[12:20] = struct.pack("<Q", 10**12)
+    path.write_bytes(lead)
+    assert "bytes are missing" in refused(path)
+
+
+@posix
+@pytest.mark.parametrize("how", ["external", "virtual", "link"])
+def test_data_of_other_files_are_not_read(tmp_path, how):
+    h5py = pytest.importorskip("h5py")
+    secret = tmp_path / "secret.bin"
+    secret.write_bytes(np.arange(400.0).tobytes())
+    path = tmp_path / "thief.h5"
+    with h5py.File(tmp_path / "other.h5", "w") as other:
+        other["x"] = np.arange(400.0)
+    with h5py.File(path, "w") as file:
+        file["mine"] = np.arange(400.0)
+        group = file.create_group("deep")
+        if how == "external":
+            group.create_dataset("u", (400,), "f8", external=[(str(secret), 0, 3200)])
+        elif how == "link":
+            group["u"] = h5py.ExternalLink(str(tmp_path / "other.h5"), "x")
+        else:
+            layout = h5py.VirtualLayout(shape=(400,), dtype="f8")
+            layout[:] = h5py.VirtualSource(str(tmp_path / "other.h5"), "x", shape=(400,))
+            group.create_virtual_dataset("u", layout)
+    with h5py.File(path) as file:
+        assert file["deep/u"][7] == 7.0  # the library would
+    found = list_channels(path)
+    assert [c.name for c in found.channels] == ["mine"]
+    assert found.unusable[0][0] == "deep/u"
+    for words in (found.unusable[0][1], refused(path, Columns(("mine",), ("deep/u",)))):
+        assert "and no other file is opened; copy the values into this one" in words
+
+
+# ------------------------------------------------------------------------------------------------------- the process
+def standing_in(monkeypatch, tmp_path, program):
+    """Another program in the place of the reader's."""
+    (tmp_path / "stand_in.py").write_text(program)
+    monkeypatch.setattr(reading, "_PROCESS", "stand_in")
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    path = tmp_path / "x.csv"
+    path.touch()
+    return path
+
+
+def test_a_reader_that_hangs_is_ended_with_what_it_started(tmp_path, monkeypatch):
+    program = """
+        import subprocess, sys, time
+        child = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(86400)"])
+        open("PIDS", "w").write(f"{child.pid}\\n")
+        time.sleep(86400)
+    """.replace("\n        ", "\n").replace("PIDS", str(tmp_path / "pids"))
+    path, children = standing_in(monkeypatch, tmp_path, program), []
+
+    def hand_over(process, request, real=reading._hand_over):
+        real(process, request)
+        children.extend(lines_of(tmp_path / "pids"))  # its time begins when it has started the child
+
+    monkeypatch.setattr(reading, "_hand_over", hand_over)
+    assert "was not read within 0.5 s" in refused(path, wall_s=0.5)
+    assert gone(int(children[0]))
+
+
+@pytest.mark.parametrize(
+    ("program", "words"),
+    [
+        ("import os; os.abort()", "broke the program that reads it"),
+        ("import os, signal; os.kill(os.getpid(), signal.SIGSEGV)", r"broke the program that reads it \(code -11\)"),
+        ("import os, signal; os.kill(os.getpid(), signal.SIGKILL)", "too much memory"),
+        ("raise SystemExit(3)", r"\(code 3\)"),
+        ("import os, time; os.close(1); time.sleep(0.3); os._exit(3)", r"\(code 3\)"),
+        ("print('[]')", "broke the program"),
+        ("print('nothing')", "broke the program"),
+        ("print('{\"format\": 3}')", "broke the program"),
+        ("print('NaN')", "broke the program"),
+        ("print('x' * 5_000_000)", "more to say than 4 MB"),
+        ("print('[' * 900_000)", "broke the program"),
+    ],
+)
+@posix
+def test_a_reader_that_breaks_is_said(tmp_path, monkeypatch, program, words):
+    path = standing_in(monkeypatch, tmp_path, program)
+    with pytest.raises(ReadingError, match=words):
+        list_channels(path)
+
+
+def test_the_reader_loads_no_plugins_and_starts_no_threads(tmp_path, monkeypatch):
+    program = "import json, os; print(json.dumps({'refused': 'x.csv' + os.environ[%r]}))"
+    for name, value in (("HDF5_PLUGIN_PRELOAD", "::"), ("OPENBLAS_NUM_THREADS", "1")):
+        monkeypatch.setenv(name, "other")
+        assert refused(standing_in(monkeypatch, tmp_path, program % name)) == "x.csv" + value
+
+
+def test_the_current_folder_is_no_place_to_import_from(tmp_path, monkeypatch, loop):
+    path = csv(tmp_path / "numpy.py", loop)
+    (tmp_path / "h5py.py").write_text("raise SystemExit(9)")
+    (tmp_path / "json.py").write_text("raise SystemExit(9)")
+    monkeypatch.chdir(tmp_path)
+    path = path.rename(tmp_path / "loop.csv")
+    (tmp_path / "numpy.py").write_text("raise SystemExit(9)")
+    assert len(list_channels(path).channels) == 3
+
+
+def test_names_too_long_for_a_request_are_refused(tmp_path, loop):
+    path = csv(tmp_path / "loop.csv", loop)
+    assert "give their numbers instead" in refused(path, Columns(("x" * 40_000,), (2,)))
+
+
+@linux
+def test_the_process_bounds_itself_before_it_reads(tmp_path):
+    limits = {"memory_bytes": 3_000_000_000, "cpu_s": 20, "wall_s": 40}
+    program = (
+        "import json, resource, sys; from microrad.studio.parse_process import limit; limit(json.loads(sys.argv[1]));"
+        "names = ['RLIMIT_' + n for n in ('AS', 'CPU', 'FSIZE', 'CORE')];"
+        "print(json.dumps([resource.getrlimit(getattr(resource, n)) for n in names]));"
+        "sys.stdout.flush(); import os; os.write(os.open('written', os.O_CREAT | os.O_WRONLY), b'x')"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program, json.dumps(limits)], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert json.loads(done.stdout) == [[3_000_000_000] * 2, [20, 21], [0, 0], [0, 0]]
+    assert "File too large" in done.stderr
+    assert (tmp_path / "written").read_bytes() == b""
+
+
+def test_extremes_keep_order_ends_and_peaks():
+    wave = np.sin(np.linspace(0, 300, 10_000))
+    wave[4321], wave[77] = 9.0, -9.0
+    rows = parse_process.extremes([wave, -wave], 100)
+    assert {0, 77, 4321, 9999} <= set(rows.tolist())
+    assert np.all(np.diff(rows) > 0)
+    assert 100 <= len(rows) <= 102 + 100
+    assert parse_process.extremes([wave[:50]], 100).tolist() == list(range(50))
+    assert math.isclose(len(parse_process.extremes([wave[:101]], 100)), 101, abs_tol=1)
