@@ -147,6 +147,24 @@ def test_a_number_beyond_all_measure_is_told_or_borne(tmp_path, plan, number):
             load_plan(path)
 
 
+THOUSAND = ".a" * 999
+
+
+@pytest.mark.parametrize(
+    ("kind", "reason"),
+    [
+        (f'kind{THOUSAND} = "chirp"', "is a key of 2019 characters"),
+        (f"kind = {{a{THOUSAND} = 1}}", "holds a key of more than 50 parts"),
+        (f"kind = [[{{'a'{THOUSAND} = 1}}]]", "holds a key of more than 50 parts"),
+        (f'kind = "a{THOUSAND}"', "is none of the choices"),
+    ],
+    ids=["key", "table", "list", "text"],
+)
+def test_a_kind_of_a_thousand_parts_is_told(refuse, kind, reason):
+    """It was a traceback."""
+    assert reason in {fault.reason for fault in refuse(changed('^kind = "chirp"', kind)).faults}
+
+
 @pytest.mark.parametrize("table", ["limits", "bench", "bench.sensor", "excitation.chirp"])
 def test_a_list_in_place_of_a_table_is_told(refuse, table):
     text = changed(rf"^\[{re.escape(table)}\]", f"[[{table}]]")
