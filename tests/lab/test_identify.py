@@ -22,9 +22,9 @@ from microrad.lab.identify import (
     mirror_file_text,
     predict,
 )
-from microrad.lab.identify import bouc_wen as bouc_wen_fit
-from microrad.lab.identify.choice import _best
-from microrad.lab.identify.records import colour_inflation, fastest_rate, prepare, transient
+from microrad.lab.identify.hysteresis.bouc_wen import _bound_gradient
+from microrad.lab.identify.ladder.choice import _best
+from microrad.lab.identify.prepared import colour_inflation, fastest_rate, prepare, transient
 from microrad.lab.recording import read_recording, recording_from_arrays
 from microrad.mission.file import load_mirror
 from places import DATA
@@ -669,4 +669,4 @@ def test_the_gradient_of_the_bound_is_that_of_differences(epsilon):
 
     steps = np.diag(1e-6 * np.abs(values))
     slopes = [(bound(values + s) - bound(values - s)) / (2 * s.sum()) for s in steps]
-    np.testing.assert_allclose(bouc_wen_fit._bound_gradient(values), slopes, rtol=1e-7, atol=1e-12)
+    np.testing.assert_allclose(_bound_gradient(values), slopes, rtol=1e-7, atol=1e-12)

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 from microrad.studio import plain_files
 
 if TYPE_CHECKING:
-    from microrad.lab.identify.predictions import Judged, Prediction
+    from microrad.lab.identify.ladder.predictions import Judged, Prediction
     from microrad.lab.recording import Recording
 
 FITS = "fits"

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from microrad.lab.recording.sources import Source
+    from microrad.lab.recording.formats.source import Source
 
 _TEXT = 200
 _UNUSABLE = 50
@@ -105,7 +105,7 @@ def opened(path: Path, request: dict[str, Any]) -> Source:
 def channels(path: Path, request: dict[str, Any]) -> dict[str, Any]:
     """Names, units and lengths; see `reading.Listing`."""
     from microrad.lab.recording.files import file_format
-    from microrad.lab.recording.sources import is_time_name
+    from microrad.lab.recording.formats.source import is_time_name
 
     source = opened(path, request)
     most = request["limits"]["channels"]

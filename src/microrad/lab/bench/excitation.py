@@ -74,13 +74,6 @@ class Excitation:
         """Number of samples."""
         return int(self.drive.shape[0])
 
-    @property
-    def crest_factor(self) -> tuple[float, ...]:
-        """Peak over rms of each input about its rest; nan for an input that rests throughout."""
-        moved = self.drive - self.rest_v
-        rms = np.sqrt(np.mean(moved**2, axis=0))
-        return tuple(float(p / r) if r > 0.0 else math.nan for p, r in zip(np.abs(moved).max(axis=0), rms, strict=True))
-
 
 @dataclass(frozen=True, slots=True)
 class Lines:
@@ -233,12 +226,6 @@ def staircase(
     rest = float(levels[0])
     steps = tuple(int(c) for c in corners[1:])
     return Excitation(name, _on_axis(limits, name, drive, rest, axis), limits.rate_hz, rest, step_samples=steps)
-
-
-def log_spaced(samples: int, per_decade: int) -> NDArray[np.int64]:
-    """Distinct sample numbers from 0 to `samples` - 1, about `per_decade` in each decade: where creep is observed."""
-    count = max(2, math.ceil(per_decade * math.log10(max(samples, 2))) + 1)
-    return np.unique(np.round(np.geomspace(1, samples, count)).astype(np.int64) - 1)
 
 
 # --------------------------------------------------------------------------------------------------------------- limits

@@ -4,9 +4,11 @@ Every quantity is text with a unit in the file (`duration = "10 s"`) and an SI f
 `planfile` reads the file and reports the faults.
 """
 
+import difflib
 import zlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -15,6 +17,7 @@ from pydantic_core import CoreSchema, core_schema
 
 from microrad.core.units import UnitError, format_quantity
 from microrad.lab.bench.excitation import (
+    DesignError,
     Excitation,
     Limits,
     Lines,
@@ -24,17 +27,15 @@ from microrad.lab.bench.excitation import (
     staircase,
 )
 from microrad.mission.fields import Problem, Quantity, Several, Table, Whole
+from microrad.mission.file import check_table
 from microrad.mission.model import Amplifier as AmplifierTable
 from microrad.mission.model import AngleOrZero, Duration, Frequencies
 from microrad.mission.tables.mirror import Frequency, Name, Rate, Voltage
+from microrad.mission.toml import Document, Fault, MissionError, UnreadableError, clipped, shown
 
 FORMATS = ("csv", "lvm", "tdms", "mat", "mat73", "npz", "hdf5")
 """File formats that the bench writes; mat is MATLAB's version 5, mat73 its version 7.3."""
 
-TRUTHS = ("bench", "linear", "bouc-wen")
-"""Mirrors that the bench can play: its own, Eq. 2 and Eq. 3 of SPIE 11852, 118523B."""
-
-Truth = Literal["bench", "linear", "bouc-wen"]
 
 MOST_AXES = 4
 """Axes of a bench; a mirror has two."""
@@ -124,10 +125,11 @@ class SensorTable(Table):
 class BenchTable(Table):
     """The virtual bench: which mirror is played, its drives and axes, and what stands before and behind it.
 
-    Axis i moves with drive i, and with `crosstalk` times every other one.
+    `truth` is the bench's own mirror, or Eq. 2 ("linear") or Eq. 3 ("bouc-wen") of SPIE 11852, 118523B. Axis i
+    moves with drive i, and with `crosstalk` times every other one.
     """
 
-    truth: Truth
+    truth: Literal["bench", "linear", "bouc-wen"]
     axes: Annotated[int, Whole("", least=1, most=MOST_AXES)] = 1
     crosstalk: Annotated[float, Quantity("", least=-0.5, most=0.5)] = 0.0
     amplifier: AmplifierTable
@@ -339,11 +341,6 @@ def limits_of(limits: LimitsTable, axes: int, rate_hz: float | None = None) -> L
     )
 
 
-def with_truth(plan: Plan, truth: Truth) -> Plan:
-    """The same plan played by one mirror throughout."""
-    return replace(plan, records=tuple(replace(record, truth=truth) for record in plan.records))
-
-
 def only(plan: Plan, names: Sequence[str]) -> Plan:
     """The plan cut down to some of its records, by name; their noise stays the same.
 
@@ -354,3 +351,131 @@ def only(plan: Plan, names: Sequence[str]) -> Plan:
         if name not in known:
             raise ValueError(f"{plan.path}: no record is named '{name}'; the plan has {', '.join(known)}.")
     return replace(plan, records=tuple(r for r in plan.records if r.excitation.name in names))
+
+
+_NAME = set("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789-_")
+_MOST_EXCITATIONS = 200
+
+
+class PlanError(MissionError):
+    """A plan file that cannot be used: `path`, and every fault found in `faults`, by line."""
+
+
+def packaged_plans() -> tuple[str, ...]:
+    """Names of the plans that come with the package; `load_plan` takes them."""
+    files = resources.files("microrad.lab").joinpath("plans").iterdir()
+    return tuple(sorted(Path(file.name).stem for file in files if file.name.endswith(".toml")))
+
+
+def load_plan(path: str | Path) -> Plan:
+    """Read a plan file, or a packaged plan by its name where no such file exists, and design its excitations.
+
+    Raises `PlanError` with every fault: what is no TOML, no key, no quantity, and each excitation that leaves a limit.
+    """
+    if not Path(path).exists() and str(path) in packaged_plans():
+        with resources.as_file(resources.files("microrad.lab") / "plans" / f"{path}.toml") as packaged:
+            return _load(packaged)
+    return _load(Path(path))
+
+
+def _load(path: Path) -> Plan:
+    try:
+        document = Document.read(path, "plan file")
+    except UnreadableError as error:
+        expected = error.expected if path.exists() else f"a plan file, or one of {', '.join(packaged_plans())}"
+        fault = Fault("", "", 0, f"the plan file {error.reason}", expected, file=clipped(str(path)))
+        raise PlanError(path, [fault]) from None
+    except MissionError as error:
+        raise PlanError(path, error.faults) from None
+    tables = _excitation_tables(document)
+    root = check_table(document, PlanTable, document.data)
+    excitations = {name: _excitation(document, name, table) for name, table in tables.items()}
+    truth = "" if root is None else root.bench.truth
+    records = _records(document, excitations, _frame(document, root), truth)
+    if root is None or document.faults:
+        raise PlanError(path, document.faults)
+    return Plan(root.name, root.formats, root.limits, root.bench, records, path, document.text, document.sha256)
+
+
+def _excitation_tables(document: Document) -> dict[str, object]:
+    """The tables [excitation.NAME]; anything else under that name is noted, and what is left can be checked."""
+    found = document.data.get("excitation")
+    expected = "a table [excitation.NAME] for each, NAME of letters, digits, - and _"
+    if not isinstance(found, dict) or not found:
+        if "excitation" not in document.damaged and not any(d.startswith("excitation.") for d in document.damaged):
+            reason = "is missing" if found is None else "is not a group of named tables"
+            document.fault("excitation", "", reason, expected)
+        document.data["excitation"] = {}
+        return {}
+    if len(found) > _MOST_EXCITATIONS:
+        document.fault("excitation", "", f"has {len(found)} tables", f"at most {_MOST_EXCITATIONS}")
+        return {}
+    for name in [name for name in found if not name or not set(name) <= _NAME or len(name) > 60]:
+        document.fault(f"excitation.{name}", "", "is no name that a file can have", expected)
+    return dict(found)
+
+
+def _excitation(document: Document, name: str, table: object) -> ExcitationTable | None:
+    """One excitation, or None with every fault in it noted."""
+    key = f"excitation.{name}"
+    if not isinstance(table, dict):
+        document.fault(key, shown(table), "is no table", f"[{key}] with a kind and its parameters")
+        return None
+    kind = table.get("kind")
+    if not isinstance(kind, str) or kind not in KINDS:
+        if f"{key}.kind" not in document.damaged:
+            choices = " or ".join(f'kind = "{each}"' for each in KINDS)
+            near = next(iter(difflib.get_close_matches(str(kind)[:60], KINDS, n=1)), "")
+            reason = "is missing" if kind is None else "is none of the choices"
+            value = "" if kind is None else shown(kind)
+            document.fault(f"{key}.kind", value, reason, choices, nearest=near and f'"{near}"')
+        return None
+    return check_table(replace(document, prefix=key), KINDS[kind], table)
+
+
+def _frame(document: Document, root: PlanTable | None) -> tuple[LimitsTable, int] | None:
+    """Limits and number of axes where they are in order, also when something else in the file is not."""
+    if root is not None:
+        return root.limits, root.bench.axes
+    silent = replace(document, faults=[], prefix="limits")  # what is wrong with them has been said
+    limits = check_table(silent, LimitsTable, document.data.get("limits", {}))
+    bench = document.data.get("bench", {})
+    axes = bench.get("axes", 1) if isinstance(bench, dict) else 1
+    return (limits, axes) if limits is not None and axes in range(1, MOST_AXES + 1) else None
+
+
+def _records(
+    document: Document, tables: dict[str, ExcitationTable | None], frame: tuple[LimitsTable, int] | None, truth: str
+) -> tuple[Record, ...]:
+    """Every record of every excitation that can be designed; the others are noted. `truth` is that of the bench."""
+    if frame is None:
+        return ()
+    records: list[Record] = []
+    for name, table in tables.items():
+        if table is None:
+            continue
+        try:
+            designs = table.design(name, limits_of(*frame, table.rate_hz))
+        except DesignError as error:
+            _note(document, name, error)
+            continue
+        kind = document.data["excitation"][name]["kind"]
+        played = truth if table.truth == "plan" else table.truth
+        records += [Record(design, kind, table.use, played, table.noise_share) for design in designs]
+    _note_same_names(document, [record.excitation.name for record in records])
+    return tuple(records)
+
+
+def _note(document: Document, name: str, error: DesignError) -> None:
+    for problem in error.problems:
+        key = f"excitation.{name}.{problem.key}"
+        found = document.statements.get(key)
+        document.fault(key, clipped(found.value) if found else "", problem.reason, problem.expected)
+
+
+def _note_same_names(document: Document, names: Iterable[str]) -> None:
+    seen: set[str] = set()
+    for name in names:
+        if name.lower() in seen:
+            document.fault("excitation", "", f'makes two records named "{name}"', "names that stay different")
+        seen.add(name.lower())
