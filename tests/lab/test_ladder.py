@@ -27,6 +27,7 @@ from microrad.lab.identify import (
 )
 from microrad.lab.identify.hysteresis.axis import LinearPoles, Roots, propagated
 from microrad.lab.identify.ladder import choice
+from microrad.lab.identify.ladder import choice
 from microrad.lab.identify.ladder.choice import _best, _polished
 from microrad.mirror import model as mirror
 from microrad.mirror.hysteresis import Play

@@ -1,7 +1,5 @@
 """What every identification shares: units, prepared records, the initial transient, the fastest rate, noise colour."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """The file before its numbers: does it exist, how big is it, and what is it in truth?"""
 
-from __future__ import annotations
-
 import difflib
 import hashlib
 import math

@@ -1,7 +1,5 @@
 """From a file, or from arrays, to a checked `Recording`."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 

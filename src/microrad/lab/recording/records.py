@@ -1,7 +1,5 @@
 """What a recording is, what a check found in it, and the error that refuses it."""
 
-from __future__ import annotations
-
 import hashlib
 import re
 from collections.abc import Sequence

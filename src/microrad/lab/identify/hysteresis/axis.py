@@ -1,7 +1,5 @@
 """Structures for the joint fit: one axis of a mirror (hysteresis, linear part, creep), and a hysteretic oscillator."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
@@ -34,7 +32,7 @@ class Roots:
         return np.array(roots_from_damping(self.frequencies_hz, self.dampings), dtype=complex)
 
     @classmethod
-    def of(cls, roots: Iterable[complex]) -> Roots:
+    def of(cls, roots: Iterable[complex]) -> "Roots":
         """Natural frequencies and dampings of roots in rad/s; of a conjugate pair one is looked at."""
         kept = [complex(r) for r in roots if complex(r).imag >= 0.0]
         kept.sort(key=abs)

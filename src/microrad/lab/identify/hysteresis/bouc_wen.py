@@ -14,8 +14,6 @@ Both positive is alpha > |beta|, hence a bounded h, whatever the signs. At a rat
     dh/du = epsilon exp(delta |u'|) + sign(epsilon) k_reversal |h| = epsilon exp(delta |u'|) 2 alpha / k_settled
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

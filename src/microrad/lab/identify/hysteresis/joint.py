@@ -4,8 +4,6 @@ The start comes from fits that are linear in most of their numbers; `plant_fit` 
 recording counts alike, whatever its length and size: its residual is divided by its rms output.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

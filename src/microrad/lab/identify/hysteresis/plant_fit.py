@@ -6,8 +6,6 @@ trust-region least squares. So phase lag is counted once, and a hysteretic stiff
 element.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -62,7 +60,7 @@ class Structure:
     parameters: tuple[Parameter, ...]
     build: Callable[[FloatArray], Mirror]
 
-    def at(self, values: Sequence[float] | FloatArray) -> Structure:
+    def at(self, values: Sequence[float] | FloatArray) -> "Structure":
         """The same structure with the search beginning elsewhere."""
         pairs = zip(self.parameters, values, strict=True)
         return replace(self, parameters=tuple(replace(p, start=float(v), size=p.scale) for p, v in pairs))

@@ -5,8 +5,6 @@
 Linear in the weights: non-negative least squares, with one unconstrained offset per record.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

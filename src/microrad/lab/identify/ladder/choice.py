@@ -1,7 +1,5 @@
 """Many models on the same recordings, judged on samples that none of them has seen."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -354,7 +352,7 @@ def _shifted(on_progress: Progress | None, before: int, total: int) -> Progress:
 
 def _polished(
     fitter: _Fitter,
-    judge: _Judge,
+    judge: "_Judge",
     fits: list[Fit],
     predictions: list[tuple[Prediction, ...]],
     best: int,
@@ -413,7 +411,7 @@ class _Judge:
 
 
 def _identification(
-    judge: _Judge,
+    judge: "_Judge",
     prepared: tuple[Prepared, ...],
     fits: Sequence[Fit],
     predictions: Sequence[tuple[Prediction, ...]],

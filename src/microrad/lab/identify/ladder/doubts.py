@@ -1,7 +1,5 @@
 """What speaks against a fitted model: its range, its rate, drift, residuals that are not noise, what it cannot do."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -3,8 +3,6 @@
 Behind the values stands the table `uncertainty`, their covariance in a form that `mirror_spread` draws mirrors from.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Sequence
 from dataclasses import replace

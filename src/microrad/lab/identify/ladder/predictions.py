@@ -1,7 +1,5 @@
 """A fitted model run over a recording, beside the straight line through the same samples."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

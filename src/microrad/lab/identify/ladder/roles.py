@@ -1,7 +1,5 @@
 """What a recording can serve for, judged by its drive: broadband for the linear part, or loops for the hysteresis."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """How gain and main resonance change with the amplitude of the drive: the first sign of hysteresis in a linear fit."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -4,8 +4,6 @@
 fitted samples exactly behind the hold that was named.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

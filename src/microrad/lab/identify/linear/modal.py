@@ -12,8 +12,6 @@ rank is several modes with poles nearby. The drive between two samples is what `
 a = p T, phi1 = (e^a - 1)/a, phi2 = (phi1 - 1)/a. The first two are exact at the samples.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Literal, NamedTuple

@@ -7,8 +7,6 @@ there ends in a local minimum, for it cannot move a mode across the band. So the
 time, for the mode that would take most of what is left, for as long as that helps.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -9,8 +9,6 @@ Each mode is written with real filters, R = phi(p) + phi(p*) and I = i (phi(p) -
 Re(c b) R + Im(c b) I. `phi` is the sampled response of 1/(s - p) behind the hold.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple, Protocol

@@ -9,8 +9,6 @@ The response is that between samples of drive and output: a hold between them is
 model is fitted.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple

@@ -9,8 +9,6 @@ A sampled response behind a hold is rational in z, not in s. Its poles are moved
 response of 1/(s - p). The result is the continuous system, exact for the hold.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

@@ -7,8 +7,6 @@ derivatives along the simulated path), and `predicted_error` says how well the r
 seen.
 """
 
-from __future__ import annotations
-
 import math
 import os
 from collections.abc import Sequence

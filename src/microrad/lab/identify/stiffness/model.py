@@ -8,8 +8,6 @@ of small strain and of the drive that act on every mode, which is hysteresis in 
 Two scales are not: that of each mode (its state) and that of each operator (z). `balanced` fixes them.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import product
@@ -76,7 +74,7 @@ class Numbers:
         """All free numbers in the order of `FIELDS`, and the delay."""
         return np.concatenate([*(getattr(self, name).ravel() for name in FIELDS), [self.delay_s]])
 
-    def at(self, vector: Floats) -> Numbers:
+    def at(self, vector: Floats) -> "Numbers":
         """The same model with other numbers."""
         parts, start = {}, 0
         for name in FIELDS:

@@ -4,8 +4,6 @@ The path comes from the kernel's own step, the derivatives by the modes, the ope
 sensitivities along it, those by C, D and K from what the path holds, and that by the delay from a second path.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """What one channel's values say about themselves: the quantisation step and the drift."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 

@@ -1,7 +1,5 @@
 """What drive and output say together: the excited band, whether the output follows, and whether it leads."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

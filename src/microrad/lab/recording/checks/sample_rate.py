@@ -1,7 +1,5 @@
 """The sample rate: given, stated by the file, or told by a time column, which is checked for gaps and jitter."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

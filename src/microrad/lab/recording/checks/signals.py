@@ -1,7 +1,5 @@
 """All checks of the values of a recording, in order: what cannot be used at all, then what is a matter of degree."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Variables of array files (NumPy, MATLAB, HDF5) as channels, and scalars that state the sample rate."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """HDF5 files, MATLAB's version 7.3 among them; datasets are named `group/dataset`. No other file is ever opened."""
 
-from __future__ import annotations
-
 import math
 import zlib
 from collections.abc import Mapping, Sequence

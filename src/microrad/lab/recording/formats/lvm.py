@@ -4,8 +4,6 @@ The format is National Instruments' "Specification for the LabVIEW Measurement F
 same compiled reader as other text, so that a bad cell is refused with its line instead of becoming nan.
 """
 
-from __future__ import annotations
-
 import io
 import mmap
 from collections.abc import Iterator, Sequence
@@ -226,7 +224,7 @@ def _next_line(data: mmap.mmap, position: int) -> int:
 
 
 def _segment(
-    path: Path, data: mmap.mmap, position: int, mark: int, line: int, separator: str, blanks: _Blanks
+    path: Path, data: mmap.mmap, position: int, mark: int, line: int, separator: str, blanks: "_Blanks"
 ) -> tuple[_Segment, int, int]:
     tags = {}
     for row in bytes(data[position:mark]).decode(_ENCODING).splitlines():

@@ -3,8 +3,6 @@
 The structures of an array are numbered from 0, `structure[1]/field`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """NumPy arrays (.npy) and archives of them (.npz); pickled objects are never loaded."""
 
-from __future__ import annotations
-
 import io
 import struct
 import zipfile

@@ -1,7 +1,5 @@
 """What every format delivers: named channels, their units, the rates that the file states, and values on demand."""
 
-from __future__ import annotations
-
 import difflib
 import re
 from abc import ABC, abstractmethod

@@ -3,8 +3,6 @@
 The lead-in of a segment is described in National Instruments' "TDMS File Format Internal Structure".
 """
 
-from __future__ import annotations
-
 import logging
 import struct
 import threading

@@ -1,7 +1,5 @@
 """Columns of a text file: read fast where every line is regular, else line by line to name the cell that is wrong."""
 
-from __future__ import annotations
-
 import csv
 import difflib
 import hashlib
