@@ -18,7 +18,6 @@ from microrad.lab.identify import (
     predict,
 )
 from microrad.lab.identify.hysteresis import joint
-from microrad.lab.identify.hysteresis import joint
 from microrad.lab.identify.hysteresis.axis import LinearPoles, Roots, poles_of, propagated
 from microrad.lab.identify.hysteresis.joint import thinned, time_constants
 from microrad.lab.identify.hysteresis.plant_fit import fit_plant, runs

@@ -27,7 +27,6 @@ from microrad.lab.identify import (
 )
 from microrad.lab.identify.hysteresis.axis import LinearPoles, Roots, propagated
 from microrad.lab.identify.ladder import choice
-from microrad.lab.identify.ladder import choice
 from microrad.lab.identify.ladder.choice import _best, _polished
 from microrad.mirror import model as mirror
 from microrad.mirror.hysteresis import Play
@@ -139,7 +138,7 @@ def test_the_polish_is_kept_only_where_it_is_no_worse(loops, wide, monkeypatch):
     assert result.fit().samples_used > 0
     assert "pole 1" not in [p.name for p in result.fit().structure.parameters]
     static = fit_bouc_wen(loops, starts=1)
-    assert _polished(None, None, [static], [()], 0, None) == ([static], [()])  # nothing to be freed
+    assert _polished(None, static, (), None) == (static, ())  # nothing to be freed
 
 
 @pytest.mark.parametrize("extra", [0.0, 1e-3, 0.5])
@@ -476,7 +475,7 @@ def test_the_benchs_own_mirror_is_predicted_with_half_the_error_of_the_papers_mo
 
     The winner stays as it is found: tests/test_docs_gallery.py polishes that of a whole plan.
     """
-    monkeypatch.setattr(choice, "_polished", lambda fitter, judge, fits, predictions, *rest: (fits, predictions))
+    monkeypatch.setattr(choice, "_polished", lambda ladder, winner, predictions, *rest: (winner, predictions))
     plan = bench.load_plan("mirror-characterisation")
     names = ["small-multisine-1", "loops-40hz", "loops-100hz", "held-out-sine", "held-out-multisine"]
     pairs = list(played(bench.only(plan, names), seed=1))

@@ -24,9 +24,6 @@ FITS = "fits"
 """Name of the file, beside that of the progress."""
 
 _LOOPS = 6  # recordings that are kept; a bench writes a dozen
-_PERIODS = 2.0
-_LOOP_POINTS = 600
-_RESIDUAL_POINTS = 600
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,9 +80,9 @@ def _loop(recording: Recording, prediction: Prediction) -> Loop:
     import numpy as np
 
     drive, step_s = recording.drive[:, 0], recording.step_s
-    last = drive.size - min(drive.size, round(_PERIODS * _period(recording)))
-    shown = np.unique(np.linspace(last, drive.size - 1, _LOOP_POINTS).astype(int))
-    rows = prediction.start + extremes([prediction.residual_rad[prediction.start :]], _RESIDUAL_POINTS)
+    last = drive.size - min(drive.size, round(2.0 * _period(recording)))
+    shown = np.unique(np.linspace(last, drive.size - 1, 600).astype(int))
+    rows = prediction.start + extremes([prediction.residual_rad[prediction.start :]], 600)
     return Loop(
         Path(recording.path).name,
         _digits(drive[shown]),

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from microrad.core.units import format_quantity
+from microrad.lab.recording.records import frozen
 from microrad.mission.fields import Problem, ProblemsError
 
 Floats = NDArray[np.float64]
@@ -158,7 +159,7 @@ def multisine(
     return tuple(
         Excitation(
             each,
-            _frozen(np.tile(drives[:, part], (periods, 1))),
+            frozen(np.tile(drives[:, part], (periods, 1))),
             limits.rate_hz,
             offset_v,
             length,
@@ -229,12 +230,6 @@ def staircase(
 
 
 # --------------------------------------------------------------------------------------------------------------- limits
-def _frozen(values: Floats) -> Floats:
-    values = np.ascontiguousarray(values)
-    values.flags.writeable = False
-    return values
-
-
 def _samples(limits: Limits, name: str, key: str, seconds: float) -> int:
     """Number of samples in a time, refused before anything of that size is allocated."""
     most = MOST_SAMPLES / limits.inputs / limits.rate_hz
@@ -314,7 +309,7 @@ def _on_axis(limits: Limits, name: str, column: Floats, rest_v: float, axis: int
         raise DesignError(name, Problem("axis", reason, f"1 to {limits.inputs}"))
     drive = np.full((column.shape[0], limits.inputs), rest_v)
     drive[:, axis] = column[:, 0]
-    return _frozen(drive)
+    return frozen(drive)
 
 
 # -------------------------------------------------------------------------------------------------------- whole periods

@@ -152,6 +152,14 @@ class ExcitationTable(Table):
         """The records of this excitation; raises `DesignError`."""
         raise NotImplementedError
 
+    def parameters(self) -> dict[str, Any]:
+        """What the kind has of its own, as the function that designs it takes it; axes count from 0 there."""
+        own = {
+            name: getattr(self, name) for name in type(self).model_fields if name not in ExcitationTable.model_fields
+        }
+        del own["kind"]
+        return {**own, "axis": own["axis"] - 1} if "axis" in own else own
+
 
 class ChirpTable(ExcitationTable):
     """Logarithmic chirp of one drive."""
@@ -166,18 +174,7 @@ class ChirpTable(ExcitationTable):
 
     def design(self, name: str, limits: Limits) -> tuple[Excitation, ...]:
         """One record."""
-        return (
-            logarithmic_chirp(
-                limits,
-                start_hz=self.start_hz,
-                stop_hz=self.stop_hz,
-                duration_s=self.duration_s,
-                amplitude_v=self.amplitude_v,
-                offset_v=self.offset_v,
-                axis=self.axis - 1,
-                name=name,
-            ),
-        )
+        return (logarithmic_chirp(limits, **self.parameters(), name=name),)
 
 
 class MultisineTable(ExcitationTable):
@@ -196,16 +193,9 @@ class MultisineTable(ExcitationTable):
 
     def design(self, name: str, limits: Limits) -> tuple[Excitation, ...]:
         """One record for each realisation."""
-        return multisine(
-            limits,
-            Lines(self.period_s, self.start_hz, self.stop_hz, self.lines),
-            rms_v=self.rms_v,
-            offset_v=self.offset_v,
-            periods=self.periods,
-            realisations=self.realisations,
-            seed=self.seed,
-            name=name,
-        )
+        parameters = self.parameters()
+        lines = Lines(*(parameters.pop(key) for key in ("period_s", "start_hz", "stop_hz", "lines")))
+        return multisine(limits, lines, **parameters, name=name)
 
 
 class SinesTable(ExcitationTable):
@@ -220,18 +210,12 @@ class SinesTable(ExcitationTable):
 
     def design(self, name: str, limits: Limits) -> tuple[Excitation, ...]:
         """One record for each frequency, named with it where there are several."""
-        several = len(self.frequencies_hz) > 1
+        parameters = self.parameters()
+        frequencies_hz = parameters.pop("frequencies_hz")
+        names = [f"{name}-{f:g}hz" for f in frequencies_hz] if len(frequencies_hz) > 1 else [name]
         return tuple(
-            growing_sines(
-                limits,
-                freq_hz=freq_hz,
-                amplitudes_v=self.amplitudes_v,
-                periods=self.periods,
-                offset_v=self.offset_v,
-                axis=self.axis - 1,
-                name=f"{name}-{freq_hz:g}hz" if several else name,
-            )
-            for freq_hz in self.frequencies_hz
+            growing_sines(limits, **parameters, freq_hz=freq_hz, name=each)
+            for freq_hz, each in zip(frequencies_hz, names, strict=True)
         )
 
 
@@ -246,16 +230,7 @@ class StaircaseTable(ExcitationTable):
 
     def design(self, name: str, limits: Limits) -> tuple[Excitation, ...]:
         """One record."""
-        return (
-            staircase(
-                limits,
-                levels_v=self.levels_v,
-                dwell_s=self.dwell_s,
-                rise_s=self.rise_s,
-                axis=self.axis - 1,
-                name=name,
-            ),
-        )
+        return (staircase(limits, **self.parameters(), name=name),)
 
 
 KINDS: dict[str, type[ExcitationTable]] = {
@@ -327,18 +302,6 @@ class Plan:
     path: Path
     text: str
     sha256: str
-
-
-def limits_of(limits: LimitsTable, axes: int, rate_hz: float | None = None) -> Limits:
-    """The limits as the designs take them, for each of the bench's axes, at the plan's rate or another."""
-    return Limits(
-        rate_hz=rate_hz or limits.rate_hz,
-        drive_min_v=limits.drive_min_v,
-        drive_max_v=limits.drive_max_v,
-        slew_v_s=limits.slew_v_s,
-        samples_per_period=limits.samples_per_period,
-        inputs=axes,
-    )
 
 
 def only(plan: Plan, names: Sequence[str]) -> Plan:
@@ -455,7 +418,8 @@ def _records(
         if table is None:
             continue
         try:
-            designs = table.design(name, limits_of(*frame, table.rate_hz))
+            rate_hz = table.rate_hz or frame[0].rate_hz
+            designs = table.design(name, Limits(**{**dict(frame[0]), "rate_hz": rate_hz}, inputs=frame[1]))
         except DesignError as error:
             _note(document, name, error)
             continue

@@ -12,11 +12,14 @@ from microrad.lab.recording import Recording
 FloatArray = NDArray[np.float64]
 Progress = Callable[[int, int, str], None]
 
+
+def unheard(done: int, total: int, what: str) -> None:
+    """The progress that nobody listens to."""
+
+
 _VOLTS = {"V": 1.0, "mV": 1e-3}
 _RADIANS = {"rad": 1.0, "mrad": 1e-3, "urad": 1e-6}
 _METRES = {"m": 1.0, "mm": 1e-3, "um": 1e-6}
-_SWEPT = 0.01
-_SAME_RATE = 1.25
 
 
 class IdentificationError(ValueError):
@@ -64,6 +67,9 @@ class Units:
     def radians(self) -> float:
         """Radians per unit of the output column."""
         return _RADIANS.get(self.output) or _METRES[self.output] / (self.lever_arm_m or math.nan)
+
+
+DEFAULT_UNITS = Units()
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,7 +121,7 @@ def transient(drive: FloatArray) -> int:
     a Bouc-Wen term when the drive has travelled a few times 1 / (alpha - |beta|), which is less in practice.
     """
     low, high = float(drive.min()), float(drive.max())
-    margin = _SWEPT * (high - low)
+    margin = 0.01 * (high - low)
     swept = max(int(np.argmax(drive >= high - margin)), int(np.argmax(drive <= low + margin)))
     return min(swept + 1, drive.size // 2)
 
@@ -169,7 +175,7 @@ def loop_rates(records: Sequence[Prepared]) -> tuple[float, float]:
 def one_rate_only(records: Sequence[Prepared]) -> bool:
     """True where all loops have the same peak rate within a quarter, so that rate dependence rests on one rate."""
     slowest, fastest = loop_rates(records)
-    return fastest < _SAME_RATE * slowest
+    return fastest < 1.25 * slowest
 
 
 def colour_inflation(residuals: Sequence[FloatArray]) -> float:

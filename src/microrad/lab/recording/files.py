@@ -10,8 +10,6 @@ from microrad.lab.recording.records import RecordingError
 
 MAX_BYTES = 2_000_000_000
 _UNPACKED_BYTES, _UNPACKED_TIMES = 256_000_000, 20
-_HEAD_BYTES = 1024
-
 _HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
 _FORMAT_NAMES = {
     "tdms": "a LabVIEW TDMS file",
@@ -113,7 +111,7 @@ def file_format(path: Path) -> str:
     Raises `RecordingError` where the content and the suffix of the name contradict each other, and for an index file,
     an old or a compressed one.
     """
-    head = read_head(path, _HEAD_BYTES)
+    head = read_head(path, 1024)
     found = _content(path, head)
     suffix = path.suffix.lower()
     expected = _SUFFIXES.get(suffix)

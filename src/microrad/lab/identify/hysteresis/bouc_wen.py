@@ -16,13 +16,14 @@ Both positive is alpha > |beta|, hence a bounded h, whatever the signs. At a rat
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from microrad.core.kernels import bouc_wen_response
 from microrad.lab.identify.prepared import (
+    DEFAULT_UNITS,
     FloatArray,
     IdentificationError,
     Prepared,
@@ -37,6 +38,7 @@ from microrad.lab.identify.prepared import (
     prepare,
     span,
     split_by_record,
+    unheard,
 )
 from microrad.lab.recording import Recording
 from microrad.mirror.hysteresis import BoucWen
@@ -44,10 +46,6 @@ from microrad.mirror.hysteresis import BoucWen
 SLOPE_TOLERANCE = 1e-3
 _LOWER = np.array([-1.0, -3.0, math.log(0.05), math.log(0.05)])
 _UPPER = np.array([1.0, 10.0, math.log(1e5), math.log(1e5)])
-_GRID_DELTA = (0.0, 1.0, 2.0, 4.0)
-_GRID_SETTLED = (2.0, 8.0, 30.0, 120.0)
-_GRID_REVERSAL = (0.3, 1.0, 4.0, 20.0)
-_SCREEN_SAMPLES = 12_000
 
 
 class Problem:
@@ -123,7 +121,7 @@ class Problem:
 
 def _thinned(problem: Problem) -> Problem:
     """The same problem on at most about 12 000 samples: the kernel is exact for a drive linear between any samples."""
-    stride = math.ceil(sum(r.drive_v.size for r in problem.records) / _SCREEN_SAMPLES)
+    stride = math.ceil(sum(r.drive_v.size for r in problem.records) / 12_000)
     if stride == 1:
         return problem
     records = tuple(
@@ -135,9 +133,7 @@ def _thinned(problem: Problem) -> Problem:
 
 
 # ----------------------------------------------------------------------------------------------------------- search
-def multi_start(
-    problem: Problem, starts: int, seed: int, on_progress: Progress | None
-) -> tuple[FloatArray, FloatArray]:
+def multi_start(problem: Problem, starts: int, seed: int, on_progress: Progress) -> tuple[FloatArray, FloatArray]:
     """Cost reached from each start, and the best point polished on all samples."""
     screen = _thinned(problem)
     points, costs = [], []
@@ -145,8 +141,7 @@ def multi_start(
         solution = _search(screen, start)
         points.append(solution.x)
         costs.append(float(solution.cost))
-        if on_progress is not None:
-            on_progress(done, starts, "Bouc-Wen starts")
+        on_progress(done, starts, "Bouc-Wen starts")
     return np.array(costs), _search(problem, points[int(np.argmin(costs))]).x
 
 
@@ -154,9 +149,9 @@ def _starts(problem: Problem, starts: int, seed: int) -> list[FloatArray]:
     """The four best points of a coarse grid in turn, the first as it is and the rest scattered by a factor e^0.4."""
     grid = [
         np.array([0.0, delta, math.log(settled), math.log(settled * ratio)])
-        for delta in _GRID_DELTA
-        for settled in _GRID_SETTLED
-        for ratio in _GRID_REVERSAL
+        for delta in (0.0, 1.0, 2.0, 4.0)
+        for settled in (2.0, 8.0, 30.0, 120.0)
+        for ratio in (0.3, 1.0, 4.0, 20.0)
     ]
     centres = sorted(grid, key=lambda theta: float(np.sum(problem.residual(theta) ** 2)))[:4]
     rng = np.random.Generator(np.random.Philox(seed))
@@ -216,11 +211,20 @@ def k_settled(values: FloatArray) -> float:
     return float(values[4] + math.copysign(1.0, values[2]) * values[5])
 
 
-def slope_after_reversal(values: FloatArray) -> float:
-    """dy/du just after a slow reversal of a settled loop, positive in the direction of d1 (see hysteresis.BoucWen)."""
-    d1, d2, epsilon, delta, alpha, beta = (float(v) for v in values)
-    falling = math.copysign(1.0, d1)
-    return BoucWen(falling * d1, d2, falling * epsilon, delta, alpha, falling * beta).reversal_slope_rad_v()
+def turned_over(model: BoucWen) -> BoucWen:
+    """The model of a sensor turned over: -h has the terms of h with the signs of epsilon, beta and gamma changed."""
+    return replace(
+        model,
+        d1_rad_v=-model.d1_rad_v,
+        epsilon_rad_v=-model.epsilon_rad_v,
+        beta_1_v=-model.beta_1_v,
+        gamma_1_v=-model.gamma_1_v,
+    )
+
+
+def rising(model: BoucWen) -> BoucWen:
+    """The model, turned over where its d1 is negative."""
+    return model if model.d1_rad_v > 0.0 else turned_over(model)
 
 
 def lowest_slope(problem: Problem, values: FloatArray) -> float:
@@ -242,14 +246,10 @@ def lowest_slope(problem: Problem, values: FloatArray) -> float:
 PARAMETERS = ("d1", "d2", "epsilon", "delta", "alpha", "beta")
 PARAMETER_UNITS = ("rad/V", "s/V", "rad/V", "s/V", "1/V", "1/V")
 
-_AGREE = 1e-3
 _SAME_COST = 0.5e-12  # a residual of one millionth of the peak-to-peak is no residual
-_NOT_IDENTIFIED_ERROR = 0.5
-_NOT_IDENTIFIED_CORRELATION = 0.95
 
 
-@dataclass(frozen=True)
-class NotIdentified:
+class NotIdentified(NamedTuple):
     """A parameter that the recordings do not fix, and why."""
 
     name: str
@@ -258,7 +258,7 @@ class NotIdentified:
 
 @dataclass(frozen=True, eq=False)
 class BoucWenFit:
-    """Parameters of Eq. 3 in SI units, with what is known about their uncertainty.
+    """A model of Eq. 3 in SI units, with what is known about the uncertainty of its six parameters.
 
     The signs follow the recordings: d1 is negative where the output falls with the drive. `covariance` (6 x 6, order
     of `PARAMETERS`) is estimated from the residuals and inflated by `colour_inflation`, because residuals of
@@ -269,14 +269,8 @@ class BoucWenFit:
     small lag or lead that d2 gives is none of it: both slopes are taken at constant rate.)
     """
 
-    d1_rad_per_v: float
-    d2_s_per_v: float
-    epsilon_rad_per_v: float
-    delta_s_per_v: float
-    alpha_per_v: float
-    beta_per_v: float
+    model: BoucWen
     offsets_rad: tuple[float, ...]
-    rate_limit_v_per_s: float
     units: Units
     covariance: FloatArray
     colour_inflation: float
@@ -298,21 +292,12 @@ class BoucWenFit:
     @property
     def values(self) -> FloatArray:
         """The six parameters in the order of `PARAMETERS`, SI units."""
-        return np.array(
-            [
-                self.d1_rad_per_v,
-                self.d2_s_per_v,
-                self.epsilon_rad_per_v,
-                self.delta_s_per_v,
-                self.alpha_per_v,
-                self.beta_per_v,
-            ]
-        )
+        return np.array(self.model.row[:6])
 
     @property
-    def kernel_parameters(self) -> FloatArray:
-        """Row for `kernels.bouc_wen_response`: the six parameters, the rate limit, bias 0."""
-        return np.array([*self.values, self.rate_limit_v_per_s, 0.0])
+    def rate_limit_v_per_s(self) -> float:
+        """Fastest rate of the drive that the fit has seen."""
+        return self.model.rate_limit_v_s
 
     @property
     def standard_errors(self) -> FloatArray:
@@ -328,18 +313,18 @@ class BoucWenFit:
     def settled_hysteresis_rad(self) -> tuple[float, float]:
         """|h| of a slow settled loop, |epsilon| / k_settled, and its standard error; better fixed than its parts."""
         settled = k_settled(self.values)
-        value = abs(self.epsilon_rad_per_v) / settled
-        sign = math.copysign(1.0, self.epsilon_rad_per_v)
+        value = abs(self.model.epsilon_rad_v) / settled
+        sign = math.copysign(1.0, self.model.epsilon_rad_v)
         gradient = np.array([0, 0, sign / settled, 0, -value / settled, -sign * value / settled])
         return value, float(math.sqrt(max(0.0, gradient @ self.covariance @ gradient)))
 
     def response(self, drive_v: FloatArray, step_s: float) -> tuple[FloatArray, int]:
         """Output (rad) without offset for a drive (V) from h = 0, and the number of rate-clamped samples."""
-        output, _, clamped = bouc_wen_response(drive_v, step_s, self.kernel_parameters, 0.0)
+        output, _, clamped = bouc_wen_response(drive_v, step_s, np.array(self.model.row[:8]), 0.0)
         return output, int(clamped)
 
 
-def fit_bouc_wen(  # noqa: PLR0913  all but the first are named options
+def fit_bouc_wen(
     recordings: Sequence[Recording],
     *,
     starts: int = 12,
@@ -347,9 +332,7 @@ def fit_bouc_wen(  # noqa: PLR0913  all but the first are named options
     admissible: bool = False,
     free_offset: bool = True,
     on_progress: Progress | None = None,
-    output_unit: str = "mrad",
-    lever_arm_m: float | None = None,
-    input_unit: str = "V",
+    units: Units = DEFAULT_UNITS,
 ) -> BoucWenFit:
     """Fit Eq. 3 with one offset per record to all recordings at once, every sample with equal weight.
 
@@ -362,9 +345,8 @@ def fit_bouc_wen(  # noqa: PLR0913  all but the first are named options
     """
     if starts < 1:
         raise IdentificationError(f"{starts} starts were asked for; give at least 1, better 10 or more.")
-    units = Units(input_unit, output_unit, lever_arm_m)
     problem = Problem(prepare(recordings, units), 1.0 if admissible else math.inf, free_offset)
-    costs, best = multi_start(problem, starts, seed, on_progress)
+    costs, best = multi_start(problem, starts, seed, on_progress or unheard)
     if admissible:
         problem, best = tightened(problem, best)
     return _report(problem, problem.solve(best), units, costs, admissible)
@@ -375,27 +357,33 @@ def _report(problem: Problem, values: FloatArray, units: Units, costs: FloatArra
     residual = problem.measured - stacked(problem, values)
     offsets = tuple(problem.free_offset * float(part.mean()) for part in split_by_record(residual, problem.records))
     residual = problem.centred(residual)
-    uncertainty = _uncertainty(problem, values, residual, constrained)
+    colour = colour_inflation(split_by_record(residual, problem.records))
+    variance = (
+        colour
+        * float(residual @ residual)
+        / max(1, residual.size - values.size - len(problem.records) * problem.free_offset)
+    )
+    share = -float(values[2] * 2 * values[4] / values[0]) / k_settled(values)
+    at_bound = constrained and share > 0.999 * problem.share
+    sizes = _sizes(problem, values)
+    jacobian = _jacobian(problem, values, sizes)
+    covariance = _covariance(jacobian, sizes, variance, values if at_bound else None)
     rms, _ = percent(residual, problem.output_span_rad)
-    slope, lowest = slope_after_reversal(values), lowest_slope(problem, values)
+    d1, d2, epsilon, delta, alpha, beta = values.tolist()
+    model = BoucWen(d1, d2, epsilon, delta, alpha, beta, problem.rate_limit)
+    slope, lowest = rising(model).reversal_slope_rad_v(), lowest_slope(problem, values)
     return BoucWenFit(
-        d1_rad_per_v=float(values[0]),
-        d2_s_per_v=float(values[1]),
-        epsilon_rad_per_v=float(values[2]),
-        delta_s_per_v=float(values[3]),
-        alpha_per_v=float(values[4]),
-        beta_per_v=float(values[5]),
+        model=model,
         offsets_rad=offsets,
-        rate_limit_v_per_s=problem.rate_limit,
         units=units,
-        covariance=uncertainty.covariance,
-        colour_inflation=uncertainty.colour,
-        condition_number=uncertainty.condition,
-        not_identified=_not_identified(problem, values, uncertainty),
+        covariance=covariance,
+        colour_inflation=colour,
+        condition_number=float(np.linalg.cond(jacobian * sizes)),
+        not_identified=_not_identified(values, covariance, one_rate_only(problem.records), at_bound),
         residual_rms_rad=rms * problem.output_span_rad / 100,
         residual_rms_percent=rms,
         start_rms_percent=tuple(100 * math.sqrt(2 * cost) for cost in costs),
-        agreeing_starts=int(np.sum(costs <= costs.min() * (1 + _AGREE) + _SAME_COST)),
+        agreeing_starts=int(np.sum(costs <= costs.min() * (1 + 1e-3) + _SAME_COST)),
         slope_after_reversal_rad_per_v=slope,
         lowest_slope_rad_per_v=lowest,
         admissible=bool(min(slope, lowest) >= -SLOPE_TOLERANCE * abs(values[0])),
@@ -403,25 +391,6 @@ def _report(problem: Problem, values: FloatArray, units: Units, costs: FloatArra
         free_offset=problem.free_offset,
         samples_used=residual.size,
     )
-
-
-class _Uncertainty(NamedTuple):
-    covariance: FloatArray
-    colour: float
-    condition: float
-    at_bound: bool
-
-
-def _uncertainty(problem: Problem, values: FloatArray, residual: FloatArray, constrained: bool) -> _Uncertainty:
-    """Covariance from residuals, their colour, and the condition number for relative changes of the parameters."""
-    colour = colour_inflation(split_by_record(residual, problem.records))
-    offsets = problem.free_offset * len(problem.records)
-    variance = colour * float(residual @ residual) / max(1, residual.size - values.size - offsets)
-    share = -float(values[2] * 2 * values[4] / values[0]) / k_settled(values)
-    at_bound = constrained and share > 0.999 * problem.share
-    jacobian, sizes = _jacobian(problem, values), _sizes(problem, values)
-    covariance = _covariance(jacobian, sizes, variance, values if at_bound else None)
-    return _Uncertainty(covariance, colour, float(np.linalg.cond(jacobian * sizes)), at_bound)
 
 
 def _sizes(problem: Problem, values: FloatArray) -> FloatArray:
@@ -432,10 +401,10 @@ def _sizes(problem: Problem, values: FloatArray) -> FloatArray:
     return np.asarray(np.maximum(np.abs(values), least))
 
 
-def _jacobian(problem: Problem, values: FloatArray) -> FloatArray:
+def _jacobian(problem: Problem, values: FloatArray, sizes: FloatArray) -> FloatArray:
     """d output / d parameter by central differences, less the mean in each record (the offsets are marginalised)."""
     columns = []
-    for i, size in enumerate(1e-4 * _sizes(problem, values)):
+    for i, size in enumerate(1e-4 * sizes):
         step = np.zeros(6)
         step[i] = size
         columns.append((stacked(problem, values + step) - stacked(problem, values - step)) / (2 * size))
@@ -463,21 +432,22 @@ def _bound_gradient(values: FloatArray) -> FloatArray:
     return np.array([-share / d1, 0, share / epsilon, 0, share / alpha - share / settled, -sign * share / settled])
 
 
-def _not_identified(problem: Problem, values: FloatArray, uncertainty: _Uncertainty) -> tuple[NotIdentified, ...]:
+def _not_identified(
+    values: FloatArray, covariance: FloatArray, one_rate: bool, at_bound: bool
+) -> tuple[NotIdentified, ...]:
     """Parameters with a relative standard error above 0.5 or a correlation above 0.95, each with its reason."""
-    error = np.sqrt(np.diag(uncertainty.covariance)) / np.maximum(np.abs(values), 1e-300)
-    between = np.abs(correlation(uncertainty.covariance)) - np.eye(6)
-    one_rate = one_rate_only(problem.records)
+    error = np.sqrt(np.diag(covariance)) / np.maximum(np.abs(values), 1e-300)
+    between = np.abs(correlation(covariance)) - np.eye(6)
     found = []
     for i, name in enumerate(PARAMETERS):
         partner = int(np.argmax(between[i]))
-        if error[i] > _NOT_IDENTIFIED_ERROR:
+        if error[i] > 0.5:
             fact = f"relative standard error {100 * error[i]:.0f} %"
-        elif between[i, partner] > _NOT_IDENTIFIED_CORRELATION:
+        elif between[i, partner] > 0.95:
             fact = f"correlation {between[i, partner]:.3f} with {PARAMETERS[partner]}"
         else:
             continue
-        found.append(NotIdentified(name, f"{fact}: {_reason(name, one_rate, uncertainty.at_bound)}"))
+        found.append(NotIdentified(name, f"{fact}: {_reason(name, one_rate, at_bound)}"))
     return tuple(found)
 
 

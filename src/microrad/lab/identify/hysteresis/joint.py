@@ -12,9 +12,9 @@ import numpy as np
 
 from microrad.core import kernels
 from microrad.lab.identify.hysteresis.axis import AxisStructure, LinearPoles, one_axis
-from microrad.lab.identify.hysteresis.bouc_wen import BoucWenFit, fit_bouc_wen
+from microrad.lab.identify.hysteresis.bouc_wen import BoucWenFit, fit_bouc_wen, rising
 from microrad.lab.identify.hysteresis.plant_fit import PlantFit, Run, fit_plant, without
-from microrad.lab.identify.hysteresis.prandtl_ishlinskii import threshold_grid
+from microrad.lab.identify.hysteresis.prandtl_ishlinskii import non_negative, threshold_grid
 from microrad.lab.identify.prepared import FloatArray, Prepared, Progress, Units, fastest_rate, prepare, span
 from microrad.lab.recording import Recording
 from microrad.mirror import model as mirror
@@ -23,8 +23,6 @@ from microrad.mirror.model import Mirror
 
 OPERATORS = 15
 _MOST_SAMPLES = 20_000
-_BENT = 2e-3
-_SCATTER = 0.3
 _EVALUATIONS = 200
 _POLISHING = 60  # each is long: the broadband recordings belong to it
 
@@ -82,8 +80,7 @@ class JointFit:
         """Whether the modelled mirror never moves against its drive just after a slow reversal."""
         if isinstance(self.model, Play):
             return all(w * slow_gain(self.model) >= 0.0 for w in self.model.weights_rad_v)
-        rising = math.copysign(1.0, self.model.d1_rad_v)
-        turned = self.model if rising > 0.0 else turned_over(self.model)
+        turned = rising(self.model)
         return turned.reversal_slope_rad_v() >= -1e-3 * turned.d1_rad_v
 
     @property
@@ -121,17 +118,6 @@ _WHY = {
 def _why(name: str) -> str:
     reversals = "loops fix the settled hysteresis, only the samples behind a reversal its parts; record small loops"
     return _WHY.get(name.partition(" ")[0], reversals)
-
-
-def turned_over(model: BoucWen) -> BoucWen:
-    """The model of a sensor turned over: -h has the terms of h with the signs of epsilon, beta and gamma changed."""
-    return replace(
-        model,
-        d1_rad_v=-model.d1_rad_v,
-        epsilon_rad_v=-model.epsilon_rad_v,
-        beta_1_v=-model.beta_1_v,
-        gamma_1_v=-model.gamma_1_v,
-    )
 
 
 def fit_joint(  # noqa: PLR0913  all but the first three are named options
@@ -185,14 +171,7 @@ def fit_joint(  # noqa: PLR0913  all but the first three are named options
 # ---------------------------------------------------------------------------------------------------------- starts
 def static_fit(recordings: Sequence[Recording], units: Units, seed: int) -> BoucWenFit:
     """The fit of Eq. 3 at which all Bouc-Wen forms begin."""
-    return fit_bouc_wen(
-        recordings,
-        starts=6,
-        seed=seed,
-        output_unit=units.output,
-        lever_arm_m=units.lever_arm_m,
-        input_unit=units.drive,
-    )
+    return fit_bouc_wen(recordings, starts=6, seed=seed, units=units)
 
 
 def time_constants(records: Sequence[Prepared]) -> tuple[float, ...]:
@@ -222,7 +201,7 @@ def thinned(record: Prepared) -> Prepared:
     while stride > 1:
         kept = np.arange(0, size, stride)
         bent = np.interp(np.arange(kept[-1] + 1), kept, record.drive_v[kept]) - record.drive_v[: kept[-1] + 1]
-        if float(np.sqrt(np.mean(bent**2))) <= _BENT * spread:
+        if float(np.sqrt(np.mean(bent**2))) <= 2e-3 * spread:
             break
         stride //= 2
     return replace(
@@ -293,15 +272,14 @@ class _Start:
     ) -> tuple[AxisStructure, list[FloatArray]]:
         """The static fit of Eq. 3, and the values of starts scattered about it."""
         bias = float(np.mean([r.drive_v[0] for r in records]))
-        d1, d2, epsilon, delta, alpha, beta = static.values.tolist()
-        model = BoucWen(d1, d2, epsilon, delta, alpha, beta, static.rate_limit_v_per_s, bias)
+        model = replace(static.model, bias_v=bias)
         if "delta" not in self.form.free:
             model = replace(model, d2_s_v=0.0, delta_s_v=0.0)
         structure = self.structure(model, 1e-3 * model.d1_rad_v)
         own = np.array([p.start for p in structure.parameters])
         rng = np.random.Generator(np.random.Philox(seed))
         shaken = np.array([p.name in ("epsilon", "alpha", "epsilon over its limit") for p in structure.parameters])
-        return structure, [own * np.exp(_SCATTER * shaken * rng.standard_normal(own.size)) for _ in range(starts - 1)]
+        return structure, [own * np.exp(0.3 * shaken * rng.standard_normal(own.size)) for _ in range(starts - 1)]
 
 
 def _play_start(
@@ -312,8 +290,6 @@ def _play_start(
     operators: int,
 ) -> tuple[Play, float]:
     """Weights >= 0 of plays and creep by non-negative least squares, the linear part held; idle plays are dropped."""
-    from scipy.optimize import nnls  # here, to keep start-up cheap
-
     thresholds = threshold_grid(max(float(np.ptp(r.drive_v)) for r in records), operators)
     columns, targets = [], []
     for record, run in zip(records, run_list, strict=True):
@@ -324,10 +300,8 @@ def _play_start(
         columns.append(run.weight * without(run.nuisance, both[run.first :]))
         targets.append(run.weight * run.target[:, 0])
     matrix, target = np.concatenate(columns), np.concatenate(targets)
-    rising = 1.0 if float(matrix[:, 0] @ target) >= 0.0 else -1.0
-    triangle = np.asarray(np.linalg.qr(np.column_stack([matrix, rising * target]), mode="r"))
-    size = float(np.abs(triangle).max())
-    weights = rising * nnls(triangle[:, :-1] / size, triangle[:, -1] / size)[0]
+    sign = 1.0 if float(matrix[:, 0] @ target) >= 0.0 else -1.0
+    weights = sign * non_negative(matrix, sign * target)
     kept = np.abs(weights[:operators]) > 0.0
     kept[0] = True
     limit = fastest_rate(records)

@@ -9,25 +9,29 @@ element.
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import lru_cache, partial
 from typing import Any, Literal
 
 import numpy as np
 
 from microrad.core import kernels
 from microrad.core.threads import in_threads
-from microrad.lab.identify.prepared import FloatArray, IdentificationError, Progress, colour_inflation, correlation
+from microrad.lab.identify.prepared import (
+    FloatArray,
+    IdentificationError,
+    Progress,
+    colour_inflation,
+    correlation,
+    unheard,
+)
 from microrad.lab.recording import Recording
 from microrad.mirror import model as mirror
 from microrad.mirror.model import Mirror
 
-Hold = Literal["linear", "zero-order", "band-limited"]
+Hold = Literal["linear", "band-limited"]
 
 _ROUGH = 1e-8  # relative change of cost or place from which a search goes on by central differences
 _DIFFERENCE = 1e-5
-_AGREE = 1e-3
-_NOT_IDENTIFIED_ERROR = 0.5
-_NOT_IDENTIFIED_CORRELATION = 0.95
 _SLICE = 2_000_000
 _FAR = 1e3  # times the largest output: a model further off is as good as none
 
@@ -99,13 +103,9 @@ def without(nuisance: FloatArray, signal: FloatArray) -> FloatArray:
 def upsampled(drive: FloatArray, factor: int, hold: Hold) -> FloatArray:
     """A drive (samples, inputs) at `factor` times the rate; row factor * k belongs to sample k.
 
-    "linear": straight between samples. "zero-order": held by a converter; the jump takes the first fine step behind the
-    sample. "band-limited": trigonometric, for a drive of whole periods.
+    "linear": straight between samples. "band-limited": trigonometric, for a drive of whole periods.
     """
     samples = drive.shape[0]
-    if hold == "zero-order":
-        held = np.repeat(drive, factor, axis=0)
-        return np.concatenate([drive[:1], held[: factor * (samples - 1)]])
     if factor == 1:
         return drive
     if hold == "linear":
@@ -116,48 +116,32 @@ def upsampled(drive: FloatArray, factor: int, hold: Hold) -> FloatArray:
 
 
 def runs(
-    recordings: Sequence[Recording],
-    *,
-    factor: int = 1,
-    hold: Hold = "linear",
-    drop: int | Sequence[int] = 0,
-    offset: bool = True,
-    weights: Sequence[float] | None = None,
-    run_in: int | None = None,
+    recordings: Sequence[Recording], *, factor: int = 1, hold: Hold = "linear", drop: int = 0, offset: bool = True
 ) -> tuple[Run, ...]:
     """Recordings as runs of the plant, `factor` plant steps a sample, the first `drop` samples left out of the fit.
 
     A periodic recording (period_samples) whose periods share their drive is reduced to one period, the mean of its
-    periods from the second on, behind a run-in of `run_in` samples of the same drive (default: one period). Others
-    start at rest at their first drive value. Raises `IdentificationError` where nothing is left.
+    periods from the second on, behind a run-in of one period of the same drive. Others start at rest at their first
+    drive value. Without `offset` no output has a free zero. Raises `IdentificationError` where nothing is left.
     """
-    drops = [drop] * len(recordings) if isinstance(drop, int) else list(drop)
-    shares = weights if weights is not None else [1.0] * len(recordings)
     made = []
-    for recording, skip, weight in zip(recordings, drops, shares, strict=True):
-        repeats = _repeats(recording)
-        if repeats:
-            made.append(_periodic_run(recording, factor, hold, offset, weight, run_in))
-            continue
-        if skip >= recording.samples - 1:
+    for recording in recordings:
+        if _repeats(recording):
+            drive, output, first = _one_period(recording, factor, hold)
+        elif drop >= recording.samples - 1:
             raise IdentificationError(
-                f"{recording.path}: {recording.samples} samples, of which the first {skip} are left out: nothing is "
+                f"{recording.path}: {recording.samples} samples, of which the first {drop} are left out: nothing is "
                 "left to fit; leave out fewer or record longer."
             )
-        drive = upsampled(recording.drive - recording.drive[:1], factor, hold)
-        nuisance = _offset(recording.samples - skip) if offset else np.zeros((recording.samples - skip, 0))
-        made.append(
-            Run(
-                recording.path,
-                drive.copy(),
+        else:
+            drive, output, first = (
+                upsampled(recording.drive - recording.drive[:1], factor, hold),
                 recording.output,
-                recording.step_s / factor,
-                factor,
-                skip,
-                nuisance,
-                weight,
+                drop,
             )
-        )
+        used = len(output) - first
+        nuisance = np.full((used, 1), 1.0 / math.sqrt(used)) if offset else np.zeros((used, 0))
+        made.append(Run(recording.path, drive.copy(), output, recording.step_s / factor, factor, first, nuisance))
     return tuple(made)
 
 
@@ -169,28 +153,17 @@ def _repeats(recording: Recording) -> bool:
     return bool(spread <= 1e-6 * np.abs(recording.drive).max())
 
 
-def _periodic_run(
-    recording: Recording, factor: int, hold: Hold, offset: bool, weight: float, run_in: int | None
-) -> Run:
+def _one_period(recording: Recording, factor: int, hold: Hold) -> tuple[FloatArray, FloatArray, int]:
+    """Two periods of the drive, the output with its mean period as the second one, and the first sample of that."""
     period = recording.period_samples or recording.samples
-    lead = min(period, period if run_in is None else run_in)
     whole = recording.samples // period
-    one = upsampled(recording.drive[:period], factor, hold if hold != "zero-order" else "linear")
-    if hold == "zero-order":  # around the corner: the period's last value is held before its first
-        held = np.repeat(recording.drive[:period], factor, axis=0)
-        one = np.roll(held, 1, axis=0)
-    elif hold == "linear":
+    if hold == "linear":
         wrapped = np.concatenate([recording.drive[:period], recording.drive[:1]])
-        one = upsampled(wrapped, factor, hold)[:-1]
+        one = upsampled(wrapped, factor, hold)[: period * factor]
+    else:
+        one = upsampled(recording.drive[:period], factor, hold)
     mean = recording.output[period : whole * period].reshape(whole - 1, period, -1).mean(axis=0)
-    drive = np.concatenate([one[one.shape[0] - lead * factor :], one]).copy()
-    output = np.concatenate([np.zeros((lead, mean.shape[1])), mean])
-    nuisance = _offset(period) if offset else np.zeros((period, 0))
-    return Run(recording.path, drive, output, recording.step_s / factor, factor, lead, nuisance, weight)
-
-
-def _offset(samples: int) -> FloatArray:
-    return np.full((samples, 1), 1.0 / math.sqrt(samples))
+    return np.concatenate([one, one]), np.concatenate([np.zeros((period, mean.shape[1])), mean]), period
 
 
 def simulate(plant: kernels.Plant, run: Run) -> FloatArray:
@@ -258,6 +231,9 @@ class Problem:
         self.size = sum(target.size for target in self.targets)
         largest = [run.weight * float(np.max(np.abs(t))) for run, t in zip(self.runs, self.targets, strict=True)]
         self.far = _FAR * max(largest)
+        self.measured = np.concatenate([r.weight * t.ravel() for r, t in zip(self.runs, self.targets, strict=True)])
+        # A point is asked for up to three times: by the search, by the derivatives there and by the report.
+        self.simulated = lru_cache(maxsize=2 * self.scale.size + 2)(self._simulate)
 
     def outputs(self, values: FloatArray) -> list[FloatArray]:
         """Used outputs of each run without their nuisance, weighted."""
@@ -267,8 +243,11 @@ class Problem:
 
     def modelled(self, point: FloatArray) -> FloatArray:
         """All used outputs as one vector, at a scaled point; far off where the plant cannot be stepped or runs away."""
+        return self.simulated(point.tobytes())
+
+    def _simulate(self, point: bytes) -> FloatArray:
         try:
-            parts = self.outputs(point * self.scale)
+            parts = self.outputs(np.frombuffer(point) * self.scale)
         except ValueError:
             return np.full(self.size, self.far)
         whole = np.concatenate([part.ravel() for part in parts])
@@ -276,8 +255,7 @@ class Problem:
 
     def residual(self, point: FloatArray) -> FloatArray:
         """Modelled less measured, weighted."""
-        measured = [run.weight * target.ravel() for run, target in zip(self.runs, self.targets, strict=True)]
-        return np.asarray(self.modelled(point) - np.concatenate(measured))
+        return np.asarray(self.modelled(point) - self.measured)
 
     def slopes(self, point: FloatArray) -> FloatArray:
         """Derivative of the residual by differences to one side, for the way to an optimum: half the simulations."""
@@ -328,8 +306,7 @@ def fit_plant(
     solutions = []
     for done, start in enumerate([own, *starts], 1):
         solutions.append(_search(problem, start / problem.scale, tolerance, most_evaluations))
-        if on_progress is not None:
-            on_progress(done, 1 + len(starts), structure.name)
+        (on_progress or unheard)(done, 1 + len(starts), structure.name)
     best = min(solutions, key=lambda s: float(s.cost))
     if best.cost >= 0.4 * problem.size * problem.far**2:
         raise IdentificationError(
@@ -365,9 +342,12 @@ def _search(problem: Problem, start: FloatArray, tolerance: float, most_evaluati
 # ---------------------------------------------------------------------------------------------------------- report
 def _report(problem: Problem, best: Any, costs: list[float]) -> PlantFit:
     values = best.x * problem.scale
-    simulated = problem.outputs(values)
+    edges = np.cumsum([target.size for target in problem.targets])[:-1]
     residuals = tuple(
-        target - out / run.weight for run, target, out in zip(problem.runs, problem.targets, simulated, strict=True)
+        target - out.reshape(target.shape) / run.weight
+        for run, target, out in zip(
+            problem.runs, problem.targets, np.split(problem.modelled(best.x), edges), strict=True
+        )
     )
     colours = [colour_inflation(list(residual.T)) for residual in residuals]
     lost = best.fun.size / max(1, best.fun.size - values.size - sum(r.nuisance.shape[1] for r in problem.runs))
@@ -376,6 +356,7 @@ def _report(problem: Problem, best: Any, costs: list[float]) -> PlantFit:
         for r, colour, run in zip(residuals, colours, problem.runs, strict=True)
     ]
     covariance, condition = _covariance(best.jac, np.concatenate(variances), problem)
+    problem.simulated.cache_clear()
     return PlantFit(
         structure=problem.structure,
         values=values,
@@ -386,7 +367,7 @@ def _report(problem: Problem, best: Any, costs: list[float]) -> PlantFit:
         residual_rms=np.array([np.sqrt(np.mean(r**2, axis=0)) for r in residuals]),
         residuals=residuals,
         start_costs=tuple(costs),
-        agreeing_starts=int(np.sum(np.array(costs) <= min(costs) * (1 + _AGREE))),
+        agreeing_starts=int(np.sum(np.array(costs) <= min(costs) * (1 + 1e-3))),
         evaluations=int(best.nfev),
         converged=best.status > 0,
     )
@@ -420,9 +401,9 @@ def _not_identified(structure: Structure, values: FloatArray, covariance: FloatA
             found.append((p.name, f"at its bound, {values[i]:g} {p.unit}".rstrip()))
         elif errors[i] > abs(values[i]):
             found.append((p.name, f"not told from 0: standard error {errors[i]:.2g} {p.unit}".rstrip()))
-        elif errors[i] > _NOT_IDENTIFIED_ERROR * abs(values[i]):
+        elif errors[i] > 0.5 * abs(values[i]):
             found.append((p.name, f"relative standard error {100 * errors[i] / abs(values[i]):.0f} %"))
-        elif between[i, partner] > _NOT_IDENTIFIED_CORRELATION:
+        elif between[i, partner] > 0.95:
             other = structure.parameters[partner].name
             found.append((p.name, f"correlation {between[i, partner]:.3f} with {other}"))
     return found

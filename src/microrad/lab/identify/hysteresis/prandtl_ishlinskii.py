@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 
 from microrad.core.kernels import play_response
 from microrad.lab.identify.prepared import (
+    DEFAULT_UNITS,
     FloatArray,
     IdentificationError,
     Prepared,
@@ -26,8 +27,6 @@ from microrad.lab.identify.prepared import (
     split_by_record,
 )
 from microrad.lab.recording import Recording
-
-_LARGEST_THRESHOLD = 0.47
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,9 +67,7 @@ def fit_prandtl_ishlinskii(
     thresholds_v: ArrayLike | None = None,
     operators: int = 15,
     *,
-    output_unit: str = "mrad",
-    lever_arm_m: float | None = None,
-    input_unit: str = "V",
+    units: Units = DEFAULT_UNITS,
 ) -> PrandtlIshlinskiiFit:
     """Fit the weights of play operators to all recordings at once, every sample with equal weight.
 
@@ -78,14 +75,13 @@ def fit_prandtl_ishlinskii(
     largest peak-to-peak drive: an operator of half of it would never move both ways. States are carried through each
     record; samples before the drive has swept its range once are left out. Raises `IdentificationError`.
     """
-    units = Units(input_unit, output_unit, lever_arm_m)
     records = prepare(recordings, units)
     thresholds = _thresholds(records, thresholds_v, operators)
     stacked = np.concatenate([_states(r.drive_v, thresholds)[r.start :] for r in records])
     measured = np.concatenate([r.output_rad[r.start :] for r in records])
     states, output = centred(stacked, records), centred(measured, records)
     sign = 1 if float(states[:, 0] @ output) >= 0 else -1
-    weights = _solve(states, sign * output)
+    weights = non_negative(states, sign * output)
     residual = measured - sign * stacked @ weights
     offsets = tuple(float(part.mean()) for part in split_by_record(residual, records))
     residual = centred(residual, records)
@@ -115,7 +111,7 @@ def _states(drive_v: FloatArray, thresholds_v: FloatArray) -> FloatArray:
 
 def threshold_grid(drive_span: float, operators: int) -> FloatArray:
     """Thresholds spread evenly from 0 to 0.47 of the peak-to-peak drive."""
-    return np.linspace(0.0, _LARGEST_THRESHOLD * drive_span, operators)
+    return np.linspace(0.0, 0.47 * drive_span, operators)
 
 
 def _thresholds(records: Sequence[Prepared], given: ArrayLike | None, operators: int) -> FloatArray:
@@ -134,8 +130,8 @@ def _thresholds(records: Sequence[Prepared], given: ArrayLike | None, operators:
     return thresholds
 
 
-def _solve(states: FloatArray, output: FloatArray) -> FloatArray:
-    """Non-negative weights; the triangle of a QR decomposition holds the same problem in a few rows."""
+def non_negative(states: FloatArray, output: FloatArray) -> FloatArray:
+    """Weights >= 0 by least squares; the triangle of a QR decomposition holds the same problem in a few rows."""
     from scipy.optimize import nnls  # here, to keep start-up cheap
 
     triangle = np.asarray(np.linalg.qr(np.column_stack((states, output)), mode="r"))

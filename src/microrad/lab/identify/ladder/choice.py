@@ -36,6 +36,7 @@ from microrad.lab.identify.prepared import (
     percent,
     prepare,
     span,
+    unheard,
 )
 from microrad.lab.recording import Recording
 
@@ -55,9 +56,6 @@ _OTHER_MOTION = (
     "drowns in noise or drift: record loops of several periods, a chirp or multisine beside them for the dynamics, and "
     "another recording to judge by."
 )
-_BETTER = 0.9
-_CREEP_S = 1.0
-_POLISH = "linear part, hysteresis and creep together"
 
 
 @dataclass(frozen=True)
@@ -161,8 +159,9 @@ def identify(  # noqa: PLR0913  all but the first are named options in practice
     `on_progress(done, total, what)` counts fits, and `on_fit` is given each model as soon as it is fitted, the winner
     again when everything was free. Raises `IdentificationError`, also where not even the best model follows the output.
     """
-    units = Units(input_unit, output_unit, lever_arm_m)
-    _check_models(models)
+    units, on_progress = Units(input_unit, output_unit, lever_arm_m), on_progress or unheard
+    if not models or not set(models) <= set(MODELS) or len(set(models)) != len(models):
+        raise IdentificationError(f"models {tuple(models)} cannot be used; name each once, out of {', '.join(MODELS)}.")
     if admissible:
         models = tuple(dict.fromkeys("bouc_wen_admissible" if m == "bouc_wen" else m for m in models))
     if not recordings:
@@ -176,22 +175,32 @@ def identify(  # noqa: PLR0913  all but the first are named options in practice
     response = [whole_periods(seen[id(r)]) if id(r) in seen else r for r in response]
     linear = _linear(response, units, models, on_progress)
     names, refused = _supported(models, prepared, linear)
-    fitter = _Fitter(heads, response[:1], linear, units, seed, admissible)
-    judge = _Judge(loops, splits, tuple(validation), units, span(prepared))
+    ladder = _Ladder(
+        loops=loops,
+        splits=splits,
+        heads=heads,
+        validation=tuple(validation),
+        broadband=response[:1],
+        linear=linear,
+        units=units,
+        span_rad=span(prepared),
+        seed=seed,
+        admissible=admissible,
+    )
     predictions: list[tuple[Prediction, ...]] = []
 
     def look(fit: Fit) -> None:
-        predictions.append(judge.predictions(fit))
-        on_fit(judge.judged(fit, predictions[-1]))
+        predictions.append(ladder.predictions(fit))
+        on_fit(ladder.judged(fit, predictions[-1]))
 
-    fits, failed = fitter.all(names, on_progress, look)
+    fits, failed = ladder.fits(names, on_progress, look)
     best = _best(fits, [[r for p in each if (r := p.residual_rad[p.split :]).size] for each in predictions])
     winner = fits[best]
-    fits, predictions = _polished(fitter, judge, fits, predictions, best, on_progress)
+    fits[best], predictions[best] = _polished(ladder, winner, predictions[best], on_progress)
     if fits[best] is not winner:
-        on_fit(judge.judged(fits[best], predictions[best]))
-    sources = _sources(judge, broadband, response if linear is not None else ())
-    return _identification(judge, prepared, fits, predictions, best, [*refused, *failed], linear, sources)
+        on_fit(ladder.judged(fits[best], predictions[best]))
+    sources = _sources(ladder, broadband, response if linear is not None else ())
+    return _identification(ladder, prepared, fits, predictions, best, [*refused, *failed], sources)
 
 
 # ---------------------------------------------------------------------------------------------------------- fitting
@@ -225,14 +234,8 @@ def _check_distinct(recordings: Sequence[Recording], validation: Sequence[Record
         seen[key] = recording.path
 
 
-def _check_models(models: Sequence[str]) -> None:
-    unknown = [m for m in models if m not in MODELS]
-    if unknown or not models or len(set(models)) != len(models):
-        raise IdentificationError(f"models {tuple(models)} cannot be used; name each once, out of {', '.join(MODELS)}.")
-
-
 def _linear(
-    response: Sequence[Recording], units: Units, models: Sequence[str], on_progress: Progress | None
+    response: Sequence[Recording], units: Units, models: Sequence[str], on_progress: Progress
 ) -> LinearFit | None:
     """The linear part of the broadband recordings, in volts and radians, where a model asks for it."""
     if not response or not set(models) & set(FORMS):
@@ -251,7 +254,7 @@ def _supported(
     longest = max(r.drive_v.size * r.step_s for r in records)
     for model in models:
         form = FORMS.get(model)
-        if form is not None and form.creep and (longest < _CREEP_S or len(time_constants(records)) < 2):
+        if form is not None and form.creep and (longest < 1.0 or len(time_constants(records)) < 2):
             why = (
                 f"the longest recording lasts {longest:.3g} s, and creep shows over seconds; record a staircase of 10 s"
             )
@@ -267,45 +270,52 @@ def _supported(
 
 
 @dataclass(frozen=True, eq=False)
-class _Fitter:
+class _Ladder:
+    """The recordings to fit and to judge by, and how: `heads` are the fitted parts of `loops`, up to `splits`."""
+
+    loops: Sequence[Recording]
+    splits: Sequence[int]
     heads: Sequence[Recording]
+    validation: tuple[Recording, ...]
     broadband: Sequence[Recording]
     linear: LinearFit | None
     units: Units
+    span_rad: float
     seed: int
     admissible: bool
 
-    def all(
-        self, models: Sequence[str], on_progress: Progress | None, on_fit: Callable[[Fit], None]
+    def fits(
+        self, models: Sequence[str], on_progress: Progress, on_fit: Callable[[Fit], None]
     ) -> tuple[list[Fit], list[Refused]]:
         """One fit a model; a joint fit that fails is refused with its reason, a static one raises."""
+        poles = None
+        if self.linear is not None:
+            poles = poles_of(self.linear.system, self.linear.excited_hz, self.linear.rate_hz)
         efforts = [1 if model not in ("bouc_wen", "bouc_wen_admissible") else _STARTS for model in models]
         fits: list[Fit] = []
         failed = []
         for i, model in enumerate(models):
-            progress = _shifted(on_progress, sum(efforts[:i]), sum(efforts))
-            if model in STATIC:
-                fits.append(self.static(model, progress))
-                on_fit(fits[-1])
-                continue
-            progress(0, 1, f"fitting {model}")
+
+            def progress(done: int, _total: int, what: str, before: int = sum(efforts[:i])) -> None:
+                on_progress(before + done, sum(efforts), what)
+
             try:
-                fits.append(self.joint(model, self._poles(), free_linear=False))
+                fits.append(self.static(model, progress) if model in STATIC else self.joint(model, poles, progress))
             except IdentificationError as error:
+                if model in STATIC:
+                    raise
                 failed.append(Refused(model, str(error)))
             else:
                 on_fit(fits[-1])
-            progress(1, 1, model)
+            if model not in STATIC:
+                progress(1, 1, model)
         if not fits:
             raise IdentificationError(failed[0].reason)
         return fits, failed
 
     def static(self, model: str, progress: Progress) -> Fit:
-        u = self.units
         if model == "prandtl_ishlinskii":
-            plays = fit_prandtl_ishlinskii(
-                self.heads, output_unit=u.output, lever_arm_m=u.lever_arm_m, input_unit=u.drive
-            )
+            plays = fit_prandtl_ishlinskii(self.heads, units=self.units)
             progress(1, 1, "play operators")
             return plays
         return fit_bouc_wen(
@@ -314,12 +324,13 @@ class _Fitter:
             seed=self.seed,
             admissible=model == "bouc_wen_admissible",
             on_progress=progress,
-            output_unit=u.output,
-            lever_arm_m=u.lever_arm_m,
-            input_unit=u.drive,
+            units=self.units,
         )
 
-    def joint(self, model: str, poles: LinearPoles | None, *, free_linear: bool) -> JointFit:
+    def joint(
+        self, model: str, poles: LinearPoles | None, progress: Progress, *, free_linear: bool = False
+    ) -> JointFit:
+        progress(0, 1, "linear part, hysteresis and creep together" if free_linear else f"fitting {model}")
         return fit_joint(
             self.heads,
             model,
@@ -328,68 +339,22 @@ class _Fitter:
             free_linear=free_linear,
             admissible=self.admissible,
             broadband=self.broadband if free_linear else (),
-            static=self._begin if FORMS[model].family == "bouc_wen" else None,
+            static=self._static_start if FORMS[model].family == "bouc_wen" else None,
             seed=self.seed,
         )
 
     @cached_property
-    def _begin(self) -> BoucWenFit:
+    def _static_start(self) -> BoucWenFit:
         return static_fit(self.heads, self.units, self.seed)
-
-    def _poles(self) -> LinearPoles | None:
-        return (
-            None if self.linear is None else poles_of(self.linear.system, self.linear.excited_hz, self.linear.rate_hz)
-        )
-
-
-def _shifted(on_progress: Progress | None, before: int, total: int) -> Progress:
-    def progress(done: int, _total: int, what: str) -> None:
-        if on_progress is not None:
-            on_progress(before + done, total, what)
-
-    return progress
-
-
-def _polished(
-    fitter: _Fitter,
-    judge: "_Judge",
-    fits: list[Fit],
-    predictions: list[tuple[Prediction, ...]],
-    best: int,
-    on_progress: Progress | None,
-) -> tuple[list[Fit], list[tuple[Prediction, ...]]]:
-    """The winner with all its numbers free, its linear part among them, where that is no worse on the held-out part."""
-    winner = fits[best]
-    if not isinstance(winner, JointFit) or winner.linear is None:
-        return fits, predictions
-    if on_progress is not None:
-        on_progress(0, 1, _POLISH)
-    free = fitter.joint(winner.name, winner.linear, free_linear=True)
-    seen = judge.predictions(free)
-    if _held_out(seen) > _held_out(predictions[best]):
-        return fits, predictions
-    return [*fits[:best], free, *fits[best + 1 :]], [*predictions[:best], seen, *predictions[best + 1 :]]
-
-
-def _held_out(predictions: Sequence[Prediction]) -> float:
-    return float(sum(np.sum(p.residual_rad[p.split :] ** 2) for p in predictions))
-
-
-# ---------------------------------------------------------------------------------------------------------- judging
-@dataclass(frozen=True, eq=False)
-class _Judge:
-    loops: Sequence[Recording]
-    splits: Sequence[int]
-    validation: tuple[Recording, ...]
-    units: Units
-    span_rad: float
 
     @property
     def recordings(self) -> tuple[Recording, ...]:
+        """All that is judged by."""
         return (*self.loops, *self.validation)
 
     @property
     def all_splits(self) -> list[int]:
+        """First sample of each of them that no fit has seen."""
         return [*self.splits, *(0 for _ in self.validation)]
 
     def predictions(self, fit: Fit) -> tuple[Prediction, ...]:
@@ -410,29 +375,50 @@ class _Judge:
         )
 
 
+def _polished(
+    ladder: _Ladder, winner: Fit, predictions: tuple[Prediction, ...], on_progress: Progress
+) -> tuple[Fit, tuple[Prediction, ...]]:
+    """The winner with all its numbers free, its linear part among them, where that is no worse on the held-out part."""
+    if not isinstance(winner, JointFit) or winner.linear is None:
+        return winner, predictions
+    free = ladder.joint(winner.name, winner.linear, on_progress, free_linear=True)
+    seen = ladder.predictions(free)
+    return (free, seen) if _held_out(seen) <= _held_out(predictions) else (winner, predictions)
+
+
+def _held_out(predictions: Sequence[Prediction]) -> float:
+    return float(sum(np.sum(p.residual_rad[p.split :] ** 2) for p in predictions))
+
+
+# ---------------------------------------------------------------------------------------------------------- judging
 def _identification(
-    judge: "_Judge",
+    ladder: _Ladder,
     prepared: tuple[Prepared, ...],
     fits: Sequence[Fit],
     predictions: Sequence[tuple[Prediction, ...]],
     best: int,
     refused: Sequence[Refused],
-    linear: LinearFit | None,
     sources: tuple[Source, ...],
 ) -> Identification:
-    scores = tuple(judge.score(fit_name(f), p) for f, p in zip(fits, predictions, strict=True))
-    straight = straight_line(prepared, judge.recordings, judge.all_splits, judge.units)
-    line = judge.score("straight line", straight)
-    fit, chosen = fits[best], predictions[best]
-    _check_explained(scores[best], chosen[: len(judge.loops)])
+    scores = tuple(ladder.score(fit_name(f), p) for f, p in zip(fits, predictions, strict=True))
+    straight = straight_line(prepared, ladder.recordings, ladder.all_splits, ladder.units)
+    line = ladder.score("straight line", straight)
+    fit, chosen, linear = fits[best], predictions[best], ladder.linear
+    of_loops = chosen[: len(ladder.loops)]
+    fitted = [(p.measured_rad[p.start : p.split], p.residual_rad[p.start : p.split]) for p in of_loops]
+    if text := _unexplained(scores[best], fitted, "on the very samples it was fitted to"):
+        raise IdentificationError(f"{text} {_HARDLY}")
     low, high = min(float(r.drive_v.min()) for r in prepared), max(float(r.drive_v.max()) for r in prepared)
-    drift_rad, drift_warnings = drift(chosen, judge.recordings, judge.span_rad)
-    test = _residual_test(judge, chosen)
+    drift_rad, drift_warnings = drift(chosen, ladder.recordings, ladder.span_rad)
+    # Of the longest held-out part: correlations across the joint of two records would mean nothing.
+    pairs = zip(ladder.recordings, chosen, strict=True)
+    recording, longest = max(pairs, key=lambda pair: pair[1].residual_rad.size - pair[1].split)
+    test = residual_test(longest.residual_rad[longest.split :], recording.drive[longest.split :, 0])
     warnings = [
         *range_warnings((low, high), fit.rate_limit_v_per_s),
         *rate_warnings(prepared, fit),
-        *set_aside_warnings(judge.loops, chosen[: len(judge.loops)]),
-        *held_out_warnings(judge.recordings, judge.units, (low, high), chosen),
+        *set_aside_warnings(ladder.loops, of_loops),
+        *held_out_warnings(ladder.recordings, ladder.units, (low, high), chosen),
         *score_warnings(scores[best], line),
         *fit_warnings(fit),
         *drift_warnings,
@@ -449,13 +435,13 @@ def _identification(
         refused=tuple(refused),
         unsupported=_unsupported(scores[best], line, chosen),
         sources=sources,
-        recordings=judge.recordings,
+        recordings=ladder.recordings,
         predictions=tuple(predictions),
         linear=linear,
         residual=test,
-        units=judge.units,
-        span_rad=judge.span_rad,
-        travel_rad=max(float(np.ptp(p.model_rad[p.start : p.split])) for p in chosen[: len(judge.loops)]),
+        units=ladder.units,
+        span_rad=ladder.span_rad,
+        travel_rad=max(float(np.ptp(p.model_rad[p.start : p.split])) for p in of_loops),
         drive_min_v=low,
         drive_max_v=high,
         rate_limit_v_per_s=fit.rate_limit_v_per_s,
@@ -468,32 +454,18 @@ def fit_name(fit: Fit) -> str:
     return "bouc_wen_admissible" if getattr(fit, "constrained", False) else fit.name
 
 
-def _sources(judge: _Judge, broadband: Sequence[Recording], response: Sequence[Recording]) -> tuple[Source, ...]:
+def _sources(ladder: _Ladder, broadband: Sequence[Recording], response: Sequence[Recording]) -> tuple[Source, ...]:
     """What each recording served for; a broadband one counts where the linear part was fitted to it."""
-    loops = [Source(r.path, r.sha256, k, r.samples - k) for r, k in zip(judge.loops, judge.splits, strict=True)]
-    both, used = {id(r) for r in judge.loops}, {id(r) for r in response}
+    loops = [Source(r.path, r.sha256, k, r.samples - k) for r, k in zip(ladder.loops, ladder.splits, strict=True)]
+    both, used = {id(r) for r in ladder.loops}, {id(r) for r in response}
     others = [r for r in broadband if id(r) not in both]
     wide = [Source(r.path, r.sha256, r.samples * (id(r) in used), 0, "broadband") for r in others]
-    return (*loops, *wide, *(Source(r.path, r.sha256, 0, r.samples, "validation") for r in judge.validation))
-
-
-def _residual_test(judge: _Judge, predictions: Sequence[Prediction]) -> ResidualTest:
-    """Of the longest held-out part: correlations across the joint of two records would mean nothing."""
-    pairs = zip(judge.recordings, predictions, strict=True)
-    recording, longest = max(pairs, key=lambda pair: pair[1].residual_rad.size - pair[1].split)
-    return residual_test(longest.residual_rad[longest.split :], recording.drive[longest.split :, 0])
-
-
-def _check_explained(score: Score, predictions: Sequence[Prediction]) -> None:
-    """Refuse recordings whose output even the best model does not follow where it was fitted."""
-    fitted = [(p.measured_rad[p.start : p.split], p.residual_rad[p.start : p.split]) for p in predictions]
-    if text := _unexplained(score, fitted, "on the very samples it was fitted to"):
-        raise IdentificationError(f"{text} {_HARDLY}")
+    return (*loops, *wide, *(Source(r.path, r.sha256, 0, r.samples, "validation") for r in ladder.validation))
 
 
 def _unsupported(score: Score, line: Score, predictions: Sequence[Prediction]) -> str:
     """Why the chosen model should not be used at all, judged by the held-out samples; nothing where it may be."""
-    if score.held_out_rms_percent <= _BETTER * line.held_out_rms_percent:
+    if score.held_out_rms_percent <= 0.9 * line.held_out_rms_percent:
         return ""
     unseen = [(p.measured_rad[p.split :], p.residual_rad[p.split :]) for p in predictions]
     text = _unexplained(score, unseen, "on the held-out samples, where a straight line does as well")

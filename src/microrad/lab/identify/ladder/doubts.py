@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from microrad.lab.identify.hysteresis.bouc_wen import BoucWenFit
-from microrad.lab.identify.hysteresis.joint import JointFit, turned_over
+from microrad.lab.identify.hysteresis.bouc_wen import BoucWenFit, rising
+from microrad.lab.identify.hysteresis.joint import JointFit
 from microrad.lab.identify.hysteresis.prandtl_ishlinskii import PrandtlIshlinskiiFit
 from microrad.lab.identify.ladder.predictions import Fit, Prediction, Score
 from microrad.lab.identify.prepared import (
@@ -22,10 +22,7 @@ from microrad.lab.identify.prepared import (
 from microrad.lab.recording import Recording
 from microrad.mirror.hysteresis import BoucWen, slow_gain
 
-_DRIFT_PERCENT = 0.2
-_NOISY_RATE = 0.2
 _LAGS = 50
-_SET_ASIDE = 0.2
 _FLIPPED = (
     "The sensor's sign was flipped: its reading falls with the drive, and the mirror that is written rises. Turn the "
     "reading as well before a controller that was designed for this mirror gets it, or it drives the mirror away."
@@ -51,7 +48,7 @@ def set_aside_warnings(recordings: Sequence[Recording], predictions: Sequence[Pr
         f"{recording.path}: the first {p.start} of {p.split} samples are set aside, until the drive has swept its "
         "range once, because what the mirror remembers from before is not known; begin a record with its largest sweep."
         for recording, p in zip(recordings, predictions, strict=True)
-        if p.start > _SET_ASIDE * p.split
+        if p.start > 0.2 * p.split
     ]
 
 
@@ -75,7 +72,7 @@ def rate_warnings(records: Sequence[Prepared], fit: Fit) -> list[str]:
             f"The loops have peak rates from {slowest:.4g} V/s to {fastest:.4g} V/s, and the model does not depend "
             "on rate: one average loop stands for all."
         )
-    if noisiness(records) > _NOISY_RATE:
+    if noisiness(records) > 0.2:
         warnings.append(
             f"The drive is noisy: its rate from sample to sample scatters by {100 * noisiness(records):.0f} % of the "
             "fastest rate; use the commanded drive, or filter it, before trusting rate-dependent parameters."
@@ -120,7 +117,7 @@ def falling(fit: Fit) -> bool:
     """Whether the output falls with the drive."""
     if isinstance(fit, JointFit):
         return slow_gain(fit.model) < 0
-    return fit.d1_rad_per_v < 0 if isinstance(fit, BoucWenFit) else fit.sign < 0
+    return fit.model.d1_rad_v < 0 if isinstance(fit, BoucWenFit) else fit.sign < 0
 
 
 def _convergence_warnings(fit: Fit) -> list[str]:
@@ -137,7 +134,7 @@ def _slope_warnings(fit: Fit) -> list[str]:
         return []
     if isinstance(fit, JointFit):
         assert isinstance(fit.model, BoucWen)
-        turned = fit.model if fit.model.d1_rad_v > 0.0 else turned_over(fit.model)
+        turned = rising(fit.model)
         return [
             "Not admissible: just after a slow reversal the modelled mirror first moves the wrong way "
             f"({1e3 * turned.reversal_slope_rad_v():.3g} mrad/V against d1 = {1e3 * turned.d1_rad_v:.3g} mrad/V); "
@@ -146,7 +143,7 @@ def _slope_warnings(fit: Fit) -> list[str]:
     lowest = min(fit.slope_after_reversal_rad_per_v, fit.lowest_slope_rad_per_v)
     return [
         "Not admissible: just after a reversal the modelled mirror first moves the wrong way "
-        f"({1e3 * lowest:.3g} mrad/V against d1 = {1e3 * abs(fit.d1_rad_per_v):.3g} mrad/V); "
+        f"({1e3 * lowest:.3g} mrad/V against d1 = {1e3 * abs(fit.model.d1_rad_v):.3g} mrad/V); "
         "the model bouc_wen_admissible excludes it."
     ]
 
@@ -167,7 +164,7 @@ def drift(
         error = math.sqrt(colour_inflation([rest]) * float(rest @ rest) / rest.size / float(time @ time))
         if abs(trend) > abs(largest):
             largest = trend
-        if abs(trend) > max(3 * error, _DRIFT_PERCENT / 100 * span_rad):
+        if abs(trend) > max(3 * error, 0.2 / 100 * span_rad):
             warnings.append(
                 f"{recording.path}: the residual drifts by {1e6 * trend:.3g} ± {1e6 * error:.2g} urad "
                 f"({100 * trend / span_rad:.2g} % of the peak-to-peak output) in "

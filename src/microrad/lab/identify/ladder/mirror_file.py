@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from microrad.core import kernels
 from microrad.lab.identify.hysteresis.axis import LinearPoles, propagated
-from microrad.lab.identify.hysteresis.bouc_wen import PARAMETERS, BoucWenFit
-from microrad.lab.identify.hysteresis.joint import JointFit, turned_over
+from microrad.lab.identify.hysteresis.bouc_wen import PARAMETERS, BoucWenFit, turned_over
+from microrad.lab.identify.hysteresis.joint import JointFit
 from microrad.lab.identify.hysteresis.prandtl_ishlinskii import PrandtlIshlinskiiFit
 from microrad.lab.identify.ladder.choice import Identification
 from microrad.lab.identify.ladder.doubts import falling, fit_warnings
@@ -49,7 +49,7 @@ def mirror_file_text(identification: Identification, name: str, *, model: str | 
         *_header(identification, fit, model or identification.chosen),
         f"name = {_quoted(name)}",
         _line("travel", _text(float(f"{1e3 * identification.travel_rad:.4g}"), "mrad"), f"fitted range, from {source}"),
-        *_composition(fit, identification),
+        _composition(fit, identification),
         _line("rate_limit", _text(fit.rate_limit_v_per_s, "V/s"), f"fastest rate of the drive, from {source}"),
         _line("bias", _text(identification.bias_v, "V"), f"middle of the drive range, from {source}"),
         _line("drive_min", _text(identification.drive_min_v, "V"), f"lowest drive, from {source}"),
@@ -79,9 +79,7 @@ def _header(identification: Identification, fit: Fit, model: str) -> list[str]:
     of_chosen = fit_warnings(identification.fit())
     general = [warning for warning in identification.warnings if warning not in of_chosen]
     lines += [f"Warning: {warning}" for warning in (*general, *fit_warnings(fit))]
-    if isinstance(fit, BoucWenFit):
-        lines += [f"Not identified: {item.name}, {item.reason}" for item in fit.not_identified]
-    if isinstance(fit, JointFit):
+    if not isinstance(fit, PrandtlIshlinskiiFit):
         lines += [f"Not identified: {parameter}, {why}" for parameter, why in fit.not_identified]
     return [f"# {_one_line(text)}" for text in lines]
 
@@ -92,16 +90,17 @@ def _names(paths: Sequence[str]) -> str:
     return ", ".join(names) if len(names) <= 3 else f"{names[0]} and {len(names) - 1} more"
 
 
-def _composition(fit: Fit, identification: Identification) -> list[str]:
+def _composition(fit: Fit, identification: Identification) -> str:
     if isinstance(fit, JointFit) and fit.linear is not None:
-        return [_line("composition", "cascade", "hysteresis drives the linear part below; both were fitted together")]
+        return _line("composition", "cascade", "hysteresis drives the linear part below; both were fitted together")
     why = "were not identified" if identification.linear is None else "are not used by this model"
-    return [_line("composition", "static", f"the linear dynamics of the mirror {why}")]
+    return _line("composition", "static", f"the linear dynamics of the mirror {why}")
 
 
 def _tables(fit: Fit, identification: Identification, source: str) -> list[str]:
     if isinstance(fit, BoucWenFit):
-        return _bouc_wen(fit, source)
+        numbers = _bouc_wen_numbers(_upright(fit, fit.model))
+        return _bouc_wen(_SCALES * numbers, np.append(_SCALES[:6] * fit.standard_errors, [0.0] * 3), (), source)
     if isinstance(fit, PrandtlIshlinskiiFit):
         return _prandtl_ishlinskii(fit, source)
     return _joint(fit, identification, source)
@@ -110,7 +109,15 @@ def _tables(fit: Fit, identification: Identification, source: str) -> list[str]:
 # ----------------------------------------------------------------------------------------------------- joint models
 def _joint(fit: JointFit, identification: Identification, source: str) -> list[str]:
     turned = -1.0 if falling(fit) else 1.0
-    lines = _joint_bouc_wen(fit, source) if isinstance(fit.model, BoucWen) else _joint_plays(fit, source)
+    if isinstance(fit.model, BoucWen):
+
+        def values(at: FloatArray) -> FloatArray:
+            return np.asarray(_SCALES * _bouc_wen_numbers(_upright(fit, fit.structure.parts(at).model)))
+
+        errors = propagated(values, fit.fit.values, fit.fit.covariance)
+        lines = _bouc_wen(values(fit.fit.values), errors, fit.form.free, source)
+    else:
+        lines = _joint_plays(fit, source)
     if fit.creep.weights_rad_v:
         error = fit.fit.standard_errors[[p.name for p in fit.structure.parameters].index("creep")]
         weights = [_quoted(_text(turned * 1e3 * w, "mrad/V")) for w in fit.creep.weights_rad_v]
@@ -127,19 +134,16 @@ def _joint(fit: JointFit, identification: Identification, source: str) -> list[s
     return lines
 
 
-def _joint_bouc_wen(fit: JointFit, source: str) -> list[str]:
-    units = ("mrad/V", "s/V", "mrad/V", "s/V", "1/V", "1/V", "1/V", "1/V", "")
-    scales = np.array([1e3, 1.0, 1e3, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0])
+_BOUC_WEN_KEYS = (*PARAMETERS, "gamma", "eta", "exponent")
+_UNITS = ("mrad/V", "s/V", "mrad/V", "s/V", "1/V", "1/V", "1/V", "1/V", "")
+_SCALES = np.array([1e3, 1.0, 1e3, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0])
 
-    def values(at: FloatArray) -> FloatArray:
-        model = _upright(fit, fit.structure.parts(at).model)
-        assert isinstance(model, BoucWen)
-        return scales * _bouc_wen_numbers(model)
 
-    errors = propagated(values, fit.fit.values, fit.fit.covariance)
+def _bouc_wen(values: FloatArray, errors: FloatArray, free: Sequence[str], source: str) -> list[str]:
+    """The table of the numbers and errors as the file counts them; gamma, eta and exponent only where they are free."""
     lines = ["[bouc_wen]"]
-    for key, unit, value, error in zip(_BOUC_WEN_KEYS, units, values(fit.fit.values), errors, strict=True):
-        if key in ("gamma", "eta", "exponent") and key not in fit.form.free:
+    for key, unit, value, error in zip(_BOUC_WEN_KEYS, _UNITS, values, errors, strict=True):
+        if key in ("gamma", "eta", "exponent") and key not in free:
             continue
         given = f"± standard error {error:.2g} {unit}".rstrip() if error > 0.0 else "held, not fitted"
         text = _quoted(_text(float(value), unit)) if unit else repr(float(value))
@@ -147,15 +151,12 @@ def _joint_bouc_wen(fit: JointFit, source: str) -> list[str]:
     return lines
 
 
-_BOUC_WEN_KEYS = (*PARAMETERS, "gamma", "eta", "exponent")
+def _bouc_wen_numbers(m: BoucWen | Play) -> FloatArray:
+    assert isinstance(m, BoucWen)
+    return np.array([*m.row[:6], m.gamma_1_v, m.eta_1_v, m.exponent])
 
 
-def _bouc_wen_numbers(m: BoucWen) -> FloatArray:
-    linear = (m.d1_rad_v, m.d2_s_v, m.epsilon_rad_v, m.delta_s_v)
-    return np.array([*linear, m.alpha_1_v, m.beta_1_v, m.gamma_1_v, m.eta_1_v, m.exponent])
-
-
-def _upright(fit: JointFit, model: BoucWen | Play) -> BoucWen | Play:
+def _upright(fit: Fit, model: BoucWen | Play) -> BoucWen | Play:
     """The model with its output counted as the mirror file counts it: rising with the drive."""
     if not falling(fit):
         return model
@@ -207,24 +208,6 @@ def _linear(fit: JointFit, linear: LinearPoles, identification: Identification) 
     ]
 
 
-def _bouc_wen(fit: BoucWenFit, source: str) -> list[str]:
-    """Turning the output over turns d1, epsilon and beta: h' of -h has the terms of h with -epsilon and -beta."""
-    signs = _signs(fit)
-    units = ("mrad/V", "s/V", "mrad/V", "s/V", "1/V", "1/V")
-    scales = (1e3, 1.0, 1e3, 1.0, 1.0, 1.0)
-    lines = ["[bouc_wen]"]
-    for key, unit, scale, value, error in zip(
-        PARAMETERS, units, scales, signs * fit.values, fit.standard_errors, strict=True
-    ):
-        comment = f"± standard error {scale * error:.2g} {unit}, from {source}"
-        lines.append(_line(key, _text(scale * float(value), unit), comment))
-    return lines
-
-
-def _signs(fit: BoucWenFit) -> FloatArray:
-    return np.array([-1.0, 1.0, -1.0, 1.0, 1.0, -1.0]) if falling(fit) else np.ones(6)
-
-
 def _prandtl_ishlinskii(fit: PrandtlIshlinskiiFit, source: str) -> list[str]:
     """Operators without weight are left out, but the threshold 0 stays first, as a mirror file wants it."""
     keep = _kept(fit)
@@ -248,7 +231,7 @@ def _uncertainty(fit: Fit, identification: Identification, source: str) -> list[
     if isinstance(fit, JointFit):
         numbers, covariance = _joint_covariance(fit)
     elif isinstance(fit, BoucWenFit):
-        signs = _signs(fit)
+        signs = np.array([-1.0, 1.0, -1.0, 1.0, 1.0, -1.0]) if falling(fit) else np.ones(6)
         numbers = dict(zip([f"bouc_wen.{key}" for key in PARAMETERS], (signs * fit.values).tolist(), strict=True))
         covariance = signs[:, None] * fit.covariance * signs
     else:

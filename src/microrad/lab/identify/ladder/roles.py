@@ -8,13 +8,6 @@ import numpy as np
 
 from microrad.lab.recording import Recording
 
-_PER_DECADE = 10
-_LEVEL = 1e-3
-_DECADES = 1.0
-_AT_REST = 0.5
-_LEVELS = 20
-_SMALL = 0.5
-
 
 class Roles(NamedTuple):
     """Recordings by what they serve for; ``response`` is the part of ``broadband`` that can be averaged together."""
@@ -32,7 +25,7 @@ def roles(recordings: Sequence[Recording]) -> Roles:
     """
     largest = max(float(np.ptp(r.drive)) for r in recordings)
     wide = [r for r in recordings if is_broadband(r)]
-    broadband = [r for r in wide if float(np.ptp(r.drive)) <= _SMALL * largest] if len(wide) < len(recordings) else wide
+    broadband = [r for r in wide if float(np.ptp(r.drive)) <= 0.5 * largest] if len(wide) < len(recordings) else wide
     chosen = {id(r) for r in broadband}
     loops = [r for r in recordings if id(r) not in chosen] or list(recordings)
     best = max(((r.rate_hz, r.period_samples or 0) for r in broadband), default=(0.0, 0))
@@ -58,15 +51,15 @@ def is_broadband(recording: Recording) -> bool:
     """
     drive = recording.drive[:, 0] - recording.drive[:, 0].mean()
     levels = np.sort(np.histogram(drive, bins=1000)[0])
-    if levels[-_LEVELS:].sum() > _AT_REST * drive.size:
+    if levels[-20:].sum() > 0.5 * drive.size:
         return False
     spectrum = np.abs(np.fft.rfft(drive * np.hanning(drive.size))) ** 2
     frequency = np.arange(1, spectrum.size)
-    band = np.floor(_PER_DECADE * np.log10(frequency)).astype(int)
+    band = np.floor(10 * np.log10(frequency)).astype(int)
     power = np.bincount(band, weights=spectrum[1:])
-    filled = power > _LEVEL * power.max()
+    filled = power > 1e-3 * power.max()
     longest = run = 0
     for one in filled:
         run = run + 1 if one else 0
         longest = max(longest, run)
-    return longest > _PER_DECADE * _DECADES
+    return longest > 10

@@ -16,26 +16,29 @@ from microrad.lab.identify.linear.order import fit_order
 from microrad.lab.identify.linear.polish import Polished, TimeEquations, pack, polish, unpack
 from microrad.lab.identify.linear.response import FrequencyResponse, response_from_periods, response_from_records
 from microrad.lab.identify.linear.vector_fitting import check_order
-from microrad.lab.identify.prepared import IdentificationError, Progress, colour_inflation
+from microrad.lab.identify.prepared import IdentificationError, Progress, colour_inflation, unheard
 from microrad.lab.recording import Recording
 
-_NULL = 1e-11
 _STEP = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
 class Uncertainty:
-    """Poles and zeros (rad/s) and gains (outputs, inputs) with standard errors of the (complex) value."""
+    """Poles, zeros and gains with standard errors of the complex value.
 
-    poles: Complexes
-    poles_error: Floats
-    zeros: Complexes
-    zeros_error: Floats
+    `poles_rad_s` and `zeros_rad_s` (transmission zeros below half the sample rate, square systems only) are arrays
+    (poles,) and (zeros,); `dc_gain` and `edge_gain` (outputs, inputs) are the gains at zero frequency and at the lowest
+    excited one.
+    """
+
+    poles_rad_s: Complexes
+    poles_error_rad_s: Floats
+    zeros_rad_s: Complexes
+    zeros_error_rad_s: Floats
     dc_gain: Floats
     dc_gain_error: Floats
     edge_gain: Floats
     edge_gain_error: Floats
-    covariance: Floats
 
 
 def uncertainty(polished: Polished, response: FrequencyResponse, direct: bool, inflation: float) -> Uncertainty:
@@ -65,7 +68,6 @@ def uncertainty(polished: Polished, response: FrequencyResponse, direct: bool, i
         errors[0],
         np.abs(values[1]),
         errors[1],
-        covariance,
     )
 
 
@@ -73,7 +75,7 @@ def parameter_covariance(polished: Polished) -> Floats:
     """Covariance of the parameters of `pack`."""
     size = np.sqrt(np.maximum(np.diag(polished.normal), 1e-300))
     values, vectors = np.linalg.eigh(polished.normal / np.outer(size, size))
-    kept = values > _NULL * values[-1]
+    kept = values > 1e-11 * values[-1]
     inverse = (vectors[:, kept] / values[kept]) @ vectors[:, kept].T / np.outer(size, size)
     freedom = max(polished.rows - int(np.count_nonzero(kept)), 1)
     return np.asarray(inverse * polished.cost / freedom)
@@ -81,11 +83,7 @@ def parameter_covariance(polished: Polished) -> Floats:
 
 def at(model: ModalModel, points: Complexes) -> Complexes:
     """Transfer matrix at any complex frequencies (rad/s), shape (points, outputs, inputs)."""
-    pairs = slice(model.real_poles, None)
-    b = np.vstack([model.input_vectors, model.input_vectors[pairs].conj()])
-    c = np.hstack([model.output_vectors, model.output_vectors[:, pairs].conj()])
-    basis = 1.0 / (np.asarray(points)[:, None] - model.all_poles_rad_s)
-    return np.asarray((c * basis[:, None, :]) @ b + model.direct)
+    return model.combined(1.0 / (np.asarray(points)[:, None] - model.all_poles_rad_s))
 
 
 def transmission_zeros(model: ModalModel, below_rad_s: float) -> Complexes:
@@ -145,10 +143,6 @@ def _zero_errors(model: ModalModel, zeros: Complexes, slopes: Complexes, covaria
     return errors
 
 
-_ORDERS_SINGLE = range(1, 9)
-_ORDERS_SEVERAL = range(4, 29, 4)
-_GAIN_DIFFERS = 0.05
-# Spare poles that are fitted to noise have at most 0.2 of the rms of the residual, those fitted to a tone 0.3 and more,
 # and both decay in ten times the recording or more. A true resonance, however sharp, was fitted by at most twice.
 _RINGS, _CYCLES, _TONE = 5.0, 3.0, 0.25
 _STEADY = "most likely a steady tone that the drive has not made (mains, a wheel)"
@@ -174,14 +168,12 @@ class OrderScore:
 
 
 @dataclass(frozen=True, eq=False)
-class LinearFit:
-    """A linear model with its evidence.
+class LinearFit(Uncertainty):
+    """A linear model with its evidence, and with its poles, zeros and gains (see `Uncertainty`).
 
     `system` is continuous, real and block-diagonal; `modes` the same as poles and vectors. `fit_percent` (outputs,) is
     100 (1 - |y - yhat| / |y - mean y|) over the recordings, offsets removed: from rest, or in steady state where the
-    recordings are periodic. `poles_rad_s` and `zeros_rad_s` (transmission zeros below half the sample rate, square
-    systems only) come with the standard errors of the complex value; `dc_gain` and `edge_gain` (outputs, inputs) are
-    the gains at zero frequency and at `excited_hz[0]`. `residual` (frequencies, outputs, inputs) is measured less
+    recordings are periodic. `residual` (frequencies, outputs, inputs) is measured less
     modelled response. `scan` is empty where the order was given; `reason` says in words why this order.
     """
 
@@ -195,14 +187,6 @@ class LinearFit:
     residual_rms: Floats
     scan: tuple[OrderScore, ...]
     reason: str
-    poles_rad_s: Complexes
-    poles_error_rad_s: Floats
-    zeros_rad_s: Complexes
-    zeros_error_rad_s: Floats
-    dc_gain: Floats
-    dc_gain_error: Floats
-    edge_gain: Floats
-    edge_gain_error: Floats
     warnings: tuple[str, ...]
     response: FrequencyResponse
     residual: Complexes
@@ -237,26 +221,21 @@ def fit_linear(
     several = response.response[0].size > 1
     candidates = _candidates(response, orders)
     tried = candidates if several else range(1, candidates[-1] + 1)  # each sets out from the one before, too
-    total = len(tried) + 2
+    total, report = len(tried) + 2, on_progress or unheard
     fits: dict[int, Polished] = {}
     for done, order in enumerate(tried, start=1):
         smaller = None if several or order == 1 else fits[order - 1].model
         if len(tried) > 1 or not several:
             fits[order] = fit_order(response, order, direct=direct, exchanges=0, fine=not several, smaller=smaller)
-        _report(on_progress, done, total, f"order {order}")
+        report(done, total, f"order {order}")
     scan = [_score(response, fits[order], direct) for order in candidates] if len(candidates) > 1 else []
     chosen, reason = _choose(scan) if scan else (candidates[0], f"order {candidates[0]} was given")
     polished = fit_order(response, chosen, direct=direct, exchanges=exchanges) if several else fits[chosen]
-    _report(on_progress, total - 1, total, "polish in frequency")
+    report(total - 1, total, "polish in frequency")
     if not periodic and hold != "band-limited":
         polished = polish(TimeEquations(records, hold, drop, direct=direct), polished.model, iterations=30)
-    _report(on_progress, total, total, "polish in time")
-    return _finish(records, response, polished, (tuple(scan), reason), drop, direct)
-
-
-def _report(on_progress: Progress | None, done: int, total: int, what: str) -> None:
-    if on_progress is not None:
-        on_progress(done, total, what)
+    report(total, total, "polish in time")
+    return _finish(records, response, polished, scan, reason, drop, direct)
 
 
 # ---------------------------------------------------------------------------------------------------------------- order
@@ -270,7 +249,7 @@ def _candidates(response: FrequencyResponse, orders: int | Sequence[int] | None)
             check_order(response.freq_hz, order)
         return sorted(set(orders))
     most = response.freq_hz.size - 1
-    usual = _ORDERS_SINGLE if response.response[0].size == 1 else _ORDERS_SEVERAL
+    usual = range(1, 9) if response.response[0].size == 1 else range(4, 29, 4)
     return [order for order in usual if order <= most] or [1]
 
 
@@ -354,7 +333,8 @@ def _finish(
     records: Sequence[Recording],
     response: FrequencyResponse,
     polished: Polished,
-    choice: tuple[tuple[OrderScore, ...], str],
+    scan: Sequence[OrderScore],
+    reason: str,
     drop: int,
     direct: bool,
 ) -> LinearFit:
@@ -365,7 +345,8 @@ def _finish(
         if (steady or response.hold != "band-limited")
         else []
     )
-    known = uncertainty(polished, response, direct, _inflation(errors))
+    inflation = colour_inflation([column for error in errors for column in error.T]) if errors else 1.0
+    known = uncertainty(polished, response, direct, inflation)
     residual = response.response - model.response(response.freq_hz, response.hold, response.rate_hz)
     outputs = response.response.shape[1]
     percent, rms = np.full(outputs, np.nan), np.full(outputs, np.nan)
@@ -384,16 +365,9 @@ def _finish(
         excited_hz=response.excited_hz,
         fit_percent=percent,
         residual_rms=rms,
-        scan=choice[0],
-        reason=choice[1],
-        poles_rad_s=known.poles,
-        poles_error_rad_s=known.poles_error,
-        zeros_rad_s=known.zeros,
-        zeros_error_rad_s=known.zeros_error,
-        dc_gain=known.dc_gain,
-        dc_gain_error=known.dc_gain_error,
-        edge_gain=known.edge_gain,
-        edge_gain_error=known.edge_gain_error,
+        scan=tuple(scan),
+        reason=reason,
+        **vars(known),
         warnings=(*(_tones(model, records, rms, response.hold) if errors else ()), *_warnings(known, response)),
         response=response,
         residual=residual,
@@ -427,15 +401,10 @@ def _share(model: ModalModel, k: int, records: Sequence[Recording], hold: Hold, 
     return float(np.max(own.std(axis=0) / residual_rms))
 
 
-def _inflation(errors: Sequence[Floats]) -> float:
-    columns = [error[:, q] for error in errors for q in range(error.shape[1])]
-    return colour_inflation(columns) if columns else 1.0
-
-
 def _warnings(known: Uncertainty, response: FrequencyResponse) -> tuple[str, ...]:
     low, high = response.excited_hz
     found = []
-    for name, values in (("pole", known.poles), ("zero", known.zeros)):
+    for name, values in (("pole", known.poles_rad_s), ("zero", known.zeros_rad_s)):
         freq = np.abs(values) / (2 * np.pi)
         outside = sorted({float(f"{f:.3g}") for f in freq[(freq < low) | (freq > high)]})
         if outside:
@@ -447,7 +416,7 @@ def _warnings(known: Uncertainty, response: FrequencyResponse) -> tuple[str, ...
             )
     q, i = np.unravel_index(int(np.argmax(np.abs(known.edge_gain))), known.edge_gain.shape)
     dc, edge = float(known.dc_gain[q, i]), float(known.edge_gain[q, i])
-    if abs(abs(dc) / edge - 1) > _GAIN_DIFFERS:
+    if abs(abs(dc) / edge - 1) > 0.05:
         found.append(
             f"the gain at zero frequency, {dc:.4g} ± {known.dc_gain_error[q, i]:.2g}, is extrapolated: at "
             f"{low:.3g} Hz, the lowest excited frequency, it is {edge:.4g} ± {known.edge_gain_error[q, i]:.2g}; use "

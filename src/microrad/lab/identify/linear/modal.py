@@ -13,6 +13,7 @@ a = p T, phi1 = (e^a - 1)/a, phi2 = (phi1 - 1)/a. The first two are exact at the
 """
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
@@ -25,9 +26,6 @@ from microrad.lab.identify.prepared import IdentificationError
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 Hold = Literal["zero-order", "first-order", "band-limited"]
-
-_SERIES_BELOW = 0.5
-_TERMS = 14
 
 
 class Step(NamedTuple):
@@ -73,11 +71,18 @@ class ModalModel:
         """Sampled response behind the hold, shape (frequencies, outputs, inputs); band-limited is the continuous
         one.
         """
-        pairs = slice(self.real_poles, None)
-        inputs = np.vstack([self.input_vectors, self.input_vectors[pairs].conj()])
-        outputs = np.hstack([self.output_vectors, self.output_vectors[:, pairs].conj()])
-        basis = hold_basis(self.all_poles_rad_s, freq_hz, hold, rate_hz)[0]
+        return self.combined(hold_basis(self.all_poles_rad_s, freq_hz, hold, rate_hz)[0])
+
+    def combined(self, basis: Complexes) -> Complexes:
+        """The direct term and the sum of all modes, each times its column of a basis (points, all poles)."""
+        inputs, outputs = self.all_vectors
         return np.asarray((outputs * basis[:, None, :]) @ inputs + self.direct)
+
+    @property
+    def all_vectors(self) -> tuple[Complexes, Complexes]:
+        """Input vectors (all poles, inputs) and output vectors (outputs, all poles), conjugates included."""
+        b, c = self.input_vectors, self.output_vectors
+        return np.vstack([b, b[self.real_poles :].conj()]), np.hstack([c, c[:, self.real_poles :].conj()])
 
     def state_space(self) -> StateSpace:
         """Real modal (block-diagonal) continuous state space."""
@@ -108,6 +113,34 @@ def order_modes(poles: Complexes, inputs: Complexes, outputs: Complexes, direct:
     return ModalModel(poles[rank], scaled_in[rank], scaled_out[:, rank], np.asarray(direct, dtype=float))
 
 
+def rank_one_modes(
+    poles: Complexes, residues: Iterable[Complexes], direct: Floats, most: int | None = None
+) -> ModalModel:
+    """Modes with the singular vectors of each residue, as many as its rank and at most `most`.
+
+    Conjugate poles are left out of `poles`, and `residues` are matrices (outputs, inputs), one for each pole.
+    """
+    kept, inputs, outputs = [], [], []
+    for pole, residue in zip(poles, residues, strict=True):
+        left, size, right = np.linalg.svd(residue if pole.imag > 0 else residue.real)
+        for k in np.flatnonzero(size > 1e-12 * max(size[0], 1e-300))[:most]:
+            kept.append(pole)
+            inputs.append(right[k] * np.sqrt(size[k]))
+            outputs.append(left[:, k] * np.sqrt(size[k]))
+    b, c = (np.array(v, dtype=complex).reshape(-1, n) for v, n in ((inputs, direct.shape[1]), (outputs, len(direct))))
+    return order_modes(np.array(kept, dtype=complex), b, c.T, direct)
+
+
+def real_columns(basis: Complexes, real: int) -> Complexes:
+    """Columns with real coefficients: those of the real poles, then sums and turned differences of each pair.
+
+    The columns of `basis` belong to `real` real poles, then the upper halves of the pairs, then the lower ones.
+    """
+    pairs = (basis.shape[1] - real) // 2
+    upper, lower = basis[:, real : real + pairs], basis[:, real + pairs :]
+    return np.concatenate([basis[:, :real], upper + lower, 1j * (upper - lower)], axis=1)
+
+
 # ---------------------------------------------------------------------------------------------------------- the hold
 def hold_step(poles_rad_s: Complexes, hold: Hold, rate_hz: float) -> Step:
     """One exact step of each mode for a drive held as `hold` says; band-limited has none (`IdentificationError`)."""
@@ -133,14 +166,14 @@ def hold_step(poles_rad_s: Complexes, hold: Hold, rate_hz: float) -> Step:
 
 def _phi(a: Complexes) -> tuple[Complexes, Complexes, Complexes, Complexes, Complexes]:
     """e^a, phi1, d phi1 / da, phi2, d phi2 / da; by their series near zero, where the formulas cancel."""
-    small = np.abs(a) < _SERIES_BELOW
+    small = np.abs(a) < 0.5
     safe = np.where(small, 1.0, a)
     keep = np.exp(a)
     one = np.expm1(safe) / safe
     one_rate = (np.exp(safe) - one) / safe
     two = (one - 1.0) / safe
     two_rate = (one_rate - two) / safe
-    k = np.arange(_TERMS)
+    k = np.arange(14)
     first = np.array([1.0 / math.factorial(j + 1) for j in k])
     second = np.array([1.0 / math.factorial(j + 2) for j in k])
     near = np.where(small, a, 0.0)[..., None]

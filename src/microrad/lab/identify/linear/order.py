@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from microrad.lab.identify.linear.modal import Complexes, Floats, ModalModel, order_modes
+from microrad.lab.identify.linear.modal import Complexes, Floats, ModalModel, order_modes, rank_one_modes
 from microrad.lab.identify.linear.polish import (
     Equations,
     FrequencyEquations,
@@ -23,14 +23,8 @@ from microrad.lab.identify.linear.polish import (
 from microrad.lab.identify.linear.response import FrequencyResponse
 from microrad.lab.identify.linear.vector_fitting import check_order, vector_fit
 
-_COARSE_LINES = 900
 _DAMPING = (0.003, 0.01, 0.03, 0.1, 0.4)
-_WEAKEST = 2
-_TRIED = 2
-_GAIN = 1e-3
-_LARGER = 1.4
 _CHUNK = 40
-_REAL_POLES = 60
 
 
 class Candidate(NamedTuple):
@@ -61,7 +55,7 @@ def fit_order(
     check_order(response.freq_hz, order)
     freq, values, power = _merged(response)
     coarse = FrequencyEquations(freq, values, power, response.hold, response.rate_hz, direct=direct)
-    sizes = [order] if exchanges == 0 else [order, min(round(_LARGER * order), freq.size - 1)]
+    sizes = [order] if exchanges == 0 else [order, min(round(1.4 * order), freq.size - 1)]
     results = []
     for size in sizes:
         result = polish(
@@ -103,7 +97,7 @@ def _start(
 def _merged(response: FrequencyResponse) -> tuple[Floats, Complexes, Complexes]:
     """The response with neighbouring lines merged to about 900, each weighed by its drive power."""
     freq, values, power = response.freq_hz, response.response, response.drive_power
-    size = max(1, freq.size // _COARSE_LINES)
+    size = max(1, freq.size // 900)
     if size == 1:
         return freq, values, power
     marks = np.arange(0, freq.size, size)
@@ -117,10 +111,7 @@ def reduced(model: ModalModel, order: int) -> ModalModel:
     """Balanced truncation to `order` states, as rank-one modes; the model itself where it has no more."""
     if model.order <= order:
         return model
-    pairs = slice(model.real_poles, None)
-    p = model.all_poles_rad_s
-    b = np.vstack([model.input_vectors, model.input_vectors[pairs].conj()])
-    c = np.hstack([model.output_vectors, model.output_vectors[:, pairs].conj()])
+    p, (b, c) = model.all_poles_rad_s, model.all_vectors
     reach = _root(-(b @ b.conj().T) / (p[:, None] + p.conj()[None, :]))
     seen = _root(-(c.conj().T @ c) / (p.conj()[:, None] + p[None, :]))
     left, size, right = np.linalg.svd(seen.conj().T @ reach)
@@ -128,7 +119,11 @@ def reduced(model: ModalModel, order: int) -> ModalModel:
     to_small = (seen @ left[:, :order] / root).conj().T
     to_large = reach @ right[:order].conj().T / root
     poles, vectors = np.linalg.eig(to_small @ (p[:, None] * to_large))
-    return _rank_one(poles, np.linalg.solve(vectors, to_small @ b), c @ to_large @ vectors, model.direct)
+    b, c = np.linalg.solve(vectors, to_small @ b), c @ to_large @ vectors
+    real = np.abs(poles.imag) <= 1e-7 * np.abs(poles)
+    upper = np.flatnonzero(real | (poles.imag > 0))
+    residues = [np.outer(c[:, k], b[k]) for k in upper]
+    return rank_one_modes(np.where(real, poles.real, poles)[upper], residues, model.direct, most=1)
 
 
 def _root(gramian: Complexes) -> Complexes:
@@ -136,25 +131,10 @@ def _root(gramian: Complexes) -> Complexes:
     return np.asarray(vectors * np.sqrt(np.maximum(values, 0.0)))
 
 
-def _rank_one(poles: Complexes, b: Complexes, c: Complexes, direct: Floats) -> ModalModel:
-    """Modes of a diagonal realisation of a real system, conjugates dropped."""
-    real = np.abs(poles.imag) <= 1e-7 * np.abs(poles)
-    chosen = np.flatnonzero(real | (poles.imag > 0))
-    kept, inputs, outputs = [], [], []
-    for k in chosen:
-        residue = np.outer(c[:, k], b[k])
-        left, size, right = np.linalg.svd(residue.real if real[k] else residue)
-        kept.append(complex(poles[k].real) if real[k] else complex(poles[k]))
-        inputs.append(right[0] * np.sqrt(size[0]))
-        outputs.append(left[:, 0] * np.sqrt(size[0]))
-    columns = np.array(outputs, dtype=complex).T
-    return order_modes(np.array(kept, dtype=complex), np.array(inputs, dtype=complex), columns, direct)
-
-
 # -------------------------------------------------------------------------------------------------------------- starts
 def _grown(equations: Equations, model: ModalModel, band: tuple[float, float]) -> ModalModel:
     """A model of one input with one real pole more: the one of a grid, a decade beyond the band, that helps most."""
-    grid = -2 * np.pi * np.geomspace(0.1 * band[0], 10.0 * band[1], _REAL_POLES)
+    grid = -2 * np.pi * np.geomspace(0.1 * band[0], 10.0 * band[1], 60)
     inputs = np.vstack([np.ones((1, 1)), model.input_vectors])
     tried = (fit_outputs(equations, np.append(p, model.poles_rad_s), inputs) for p in grid.astype(complex))
     return min(tried, key=lambda found: found[1])[0]
@@ -180,12 +160,12 @@ def _exchanged(equations: Equations, now: Polished, band: tuple[float, float]) -
             trial = polish(equations, grown, iterations=12, tolerance=1e-4)
             if best is None or trial.cost < best.cost:
                 best = trial
-            if len(tried) == _TRIED:
+            if len(tried) == 2:
                 break
     if best is None or best.cost > 1.05 * now.cost:
         return None
     best = polish(equations, best.model, iterations=40, tolerance=3e-5)
-    return best if best.cost < (1 - _GAIN) * now.cost else None
+    return best if best.cost < (1 - 1e-3) * now.cost else None
 
 
 def _without_weakest(equations: Equations, model: ModalModel) -> list[tuple[Complexes, Complexes]]:
@@ -197,7 +177,7 @@ def _without_weakest(equations: Equations, model: ModalModel) -> list[tuple[Comp
         if poles.size:
             costs.append((fit_outputs(equations, poles, inputs)[1], poles, inputs))
     costs.sort(key=lambda item: item[0])
-    return [(poles, inputs) for _, poles, inputs in costs[:_WEAKEST]]
+    return [(poles, inputs) for _, poles, inputs in costs[:2]]
 
 
 def _candidates(equations: Equations, model: ModalModel, band: tuple[float, float]) -> list[Candidate]:

@@ -15,7 +15,16 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from microrad.lab.identify.linear.modal import Complexes, Floats, Hold, ModalModel, filtered, hold_basis, order_modes
+from microrad.lab.identify.linear.modal import (
+    Complexes,
+    Floats,
+    Hold,
+    ModalModel,
+    filtered,
+    hold_basis,
+    order_modes,
+    real_columns,
+)
 from microrad.lab.recording import Recording
 
 _LOWEST_DECAY = 0.01  # of the lowest frequency that the data resolve
@@ -94,10 +103,9 @@ class FrequencyEquations:
         yield Block(self._rows(basis, real), self._rows(slope, real) if rates else None, self._drive, self._target)
 
     def _rows(self, basis: Complexes, real: int) -> Floats:
-        pairs = (basis.shape[1] - real) // 2
-        upper, lower = basis[:, real : real + pairs], basis[:, real + pairs :]
-        columns = np.concatenate([basis[:, :real], upper + lower, 1j * (upper - lower)], axis=1)
-        return _real_rows(np.asarray(columns.T[:, None, :, None] * self._factor.transpose(1, 0, 2)[None]))
+        return _real_rows(
+            np.asarray(real_columns(basis, real).T[:, None, :, None] * self._factor.transpose(1, 0, 2)[None])
+        )
 
 
 def _real_rows(values: Complexes) -> Floats:

@@ -11,17 +11,14 @@ model is fitted.
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from microrad.lab.identify.linear.modal import Hold
+from microrad.lab.identify.linear.modal import Complexes, Floats, Hold
 from microrad.lab.identify.prepared import IdentificationError
 from microrad.lab.recording import Recording
-
-Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
 
 BANDS = 300
 MIN_LINES = 8
@@ -109,12 +106,17 @@ def response_from_records(
 def _check(records: Sequence[Recording]) -> None:
     if not records:
         raise IdentificationError("no recording was given; name at least one.")
+    check_alike(records, "used")
+
+
+def check_alike(records: Sequence[Recording], done: str) -> None:
+    """Raises `IdentificationError` for records of different rates or channels; `done` is what is done to them."""
     first = records[0]
     for other in records[1:]:
         if other.rate_hz != first.rate_hz:
             raise IdentificationError(
                 f"{other.path}: the sample rate is {other.rate_hz:g} Hz and that of {first.path} {first.rate_hz:g} Hz; "
-                "records that are used together must share one rate."
+                f"records that are {done} together must share one rate."
             )
         if other.drive.shape[1] != first.drive.shape[1] or other.output.shape[1] != first.output.shape[1]:
             raise IdentificationError(
@@ -199,8 +201,20 @@ def _banded(
         weights = np.sum(np.abs(u) ** 2, axis=0)
         freq[k] = float(weights @ np.tile(spectra.freq_hz[slice(*edges[k])], len(records)) / weights.sum())
     excited = (float(spectra.freq_hz[edges[0][0]]), float(spectra.freq_hz[edges[-1][1] - 1]))
-    values, powers = (response, error, None, None, coherence), (auto / len(records), left)
-    return _record(records, freq, values, powers, "band-averaged cross-spectrum", hold, excited)
+    return FrequencyResponse(
+        freq_hz=freq,
+        response=response,
+        standard_error=error,
+        noise_standard_error=None,
+        distortion_standard_error=None,
+        coherence=coherence,
+        drive_power=auto / len(records),
+        residual_power=left,
+        excited_hz=excited,
+        method="band-averaged cross-spectrum",
+        hold=hold,
+        **_common(records),
+    )
 
 
 def _independent(auto: Complexes, freq_hz: Floats) -> Complexes:
@@ -226,35 +240,13 @@ def _independent(auto: Complexes, freq_hz: Floats) -> Complexes:
     return np.asarray(np.linalg.pinv(auto / scale, hermitian=True) / scale)
 
 
-def _record(
-    records: Sequence[Recording],
-    freq: Floats,
-    values: tuple[Complexes, Floats, Floats | None, Floats | None, Floats],
-    powers: tuple[Complexes, Floats],
-    method: str,
-    hold: Hold,
-    excited_hz: tuple[float, float],
-) -> FrequencyResponse:
-    first = records[0]
+def _common(records: Sequence[Recording]) -> dict[str, Any]:
+    """What a response takes from its records as it is."""
     drive_rms = np.sqrt(np.mean([np.var(r.drive, axis=0) for r in records], axis=0))
-    response, error, noise, distortion, coherence = values
-    return FrequencyResponse(
-        freq,
-        response,
-        error,
-        noise,
-        distortion,
-        coherence,
-        powers[0],
-        powers[1],
-        drive_rms,
-        excited_hz,
-        method,
-        first.rate_hz,
-        hold,
-        first.input_names,
-        first.output_names,
-    )
+    return {
+        "drive_rms": drive_rms,
+        **{name: getattr(records[0], name) for name in ("rate_hz", "input_names", "output_names")},
+    }
 
 
 def _lines_left(spectra: _Spectra, edges: list[tuple[int, int]], samples: int) -> Floats:
@@ -316,9 +308,20 @@ def response_from_periods(
     spread = np.diagonal(inverse, axis1=1, axis2=2).real[:, None, :]
     total, noise, distortion = _levels(total_variance, noise_variance, spread, m > inputs)
     coherence = 1.0 - total_variance * m / np.maximum(np.sum(np.abs(y) ** 2, axis=0), 1e-300)
-    values = (response, total, noise, distortion, np.clip(coherence, 0.0, 1.0))
-    method = f"best linear approximation, realisations: {m}, periods of each: {p}"
-    return _record(records, freq, values, (auto / m, total_variance), method, hold, (float(freq[0]), float(freq[-1])))
+    return FrequencyResponse(
+        freq_hz=freq,
+        response=response,
+        standard_error=total,
+        noise_standard_error=noise,
+        distortion_standard_error=distortion,
+        coherence=np.clip(coherence, 0.0, 1.0),
+        drive_power=auto / m,
+        residual_power=total_variance,
+        excited_hz=(float(freq[0]), float(freq[-1])),
+        method=f"best linear approximation, realisations: {m}, periods of each: {p}",
+        hold=hold,
+        **_common(records),
+    )
 
 
 def _period(records: Sequence[Recording]) -> int:

@@ -9,15 +9,20 @@ A sampled response behind a hold is rational in z, not in s. Its poles are moved
 response of 1/(s - p). The result is the continuous system, exact for the hold.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
-from microrad.lab.identify.linear.modal import Complexes, Floats, Hold, ModalModel, hold_basis, order_modes
+from microrad.lab.identify.linear.modal import (
+    Complexes,
+    Floats,
+    Hold,
+    ModalModel,
+    hold_basis,
+    rank_one_modes,
+    real_columns,
+)
 from microrad.lab.identify.prepared import IdentificationError
-
-Map = Callable[[Complexes], Complexes]
 
 _REAL = 1e-9
 
@@ -47,22 +52,8 @@ class VectorFit:
 
     def modes(self) -> ModalModel:
         """The same system as rank-one modes: singular vectors of each residue, as many as its rank."""
-        poles, inputs, outputs = [], [], []
-        for pole, residue in zip(self.poles_rad_s, self.residues, strict=True):
-            if pole.imag < 0:
-                continue
-            left, size, right = np.linalg.svd(residue if pole.imag > 0 else residue.real)
-            for k in np.flatnonzero(size > 1e-12 * max(size[0], 1e-300)):
-                poles.append(pole)
-                inputs.append(right[k] * np.sqrt(size[k]))
-                outputs.append(left[:, k] * np.sqrt(size[k]))
-        shape = self.direct.shape
-        return order_modes(
-            np.array(poles, dtype=complex),
-            np.array(inputs, dtype=complex).reshape(-1, shape[1]),
-            np.array(outputs, dtype=complex).reshape(-1, shape[0]).T,
-            self.direct,
-        )
+        upper = self.poles_rad_s.imag >= 0
+        return rank_one_modes(self.poles_rad_s[upper], self.residues[upper], self.direct)
 
 
 def vector_fit(
@@ -87,14 +78,14 @@ def vector_fit(
     outputs, inputs = (*np.shape(response), 1, 1)[1:3]
     _check(freq, order, data, hold, rate_hz)
     scale = np.ones(data.shape) if weight is None else _weights(weight, data.shape)
-    to_plane, to_pole = _plane(hold, rate_hz)
-    points = to_plane(2j * np.pi * freq)
+    plane_hz = None if hold == "band-limited" else rate_hz
+    points = _to_plane(2j * np.pi * freq, plane_hz)
     size = float(np.linalg.norm(scale * data)) / np.sqrt(data.size)
     poles = starting_poles(freq, order)
     best, last, done, converged = None, np.inf, 0, False
     while done < iterations and not converged:
         done += 1
-        moved = to_pole(_relocate(points, data, scale, to_plane(poles)))
+        moved = _to_pole(_relocate(points, data, scale, _to_plane(poles, plane_hz)), plane_hz)
         poles = _symmetric(np.where(moved.real > 0, -moved.real + 1j * moved.imag, moved))
         residues, direct, error = _residues(freq, data, scale, poles, (hold, rate_hz, strictly_proper))
         if best is None or error < best[3]:
@@ -148,27 +139,18 @@ def starting_poles(freq_hz: Floats, order: int) -> Complexes:
     return np.concatenate([np.array(real, dtype=complex), pairs, pairs.conj()])
 
 
-class _Plane:
-    """Between s and the variable in which the response is rational."""
-
-    def __init__(self, rate_hz: float) -> None:
-        self.rate_hz = rate_hz
-
-    def forward(self, s: Complexes) -> Complexes:
-        return np.asarray(np.expm1(s / self.rate_hz) * self.rate_hz)
-
-    def back(self, w: Complexes) -> Complexes:
-        z = 1.0 + w / self.rate_hz
-        # A negative real z has no real continuous pole: keep its decay.
-        z = np.where((z.real < 0) & (np.abs(z.imag) <= _REAL * np.abs(z)), np.abs(z), z)
-        return np.asarray(np.log(np.where(z == 0, 1e-12, z)) * self.rate_hz)
+def _to_plane(s: Complexes, rate_hz: float | None) -> Complexes:
+    """From s to the variable in which the response is rational; without a rate that is s."""
+    return s if rate_hz is None else np.asarray(np.expm1(s / rate_hz) * rate_hz)
 
 
-def _plane(hold: Hold, rate_hz: float | None) -> tuple[Map, Map]:
-    if hold == "band-limited" or rate_hz is None:
-        return (lambda s: s), (lambda s: s)
-    plane = _Plane(rate_hz)
-    return plane.forward, plane.back
+def _to_pole(w: Complexes, rate_hz: float | None) -> Complexes:
+    if rate_hz is None:
+        return w
+    z = 1.0 + w / rate_hz
+    # A negative real z has no real continuous pole: keep its decay.
+    z = np.where((z.real < 0) & (np.abs(z.imag) <= _REAL * np.abs(z)), np.abs(z), z)
+    return np.asarray(np.log(np.where(z == 0, 1e-12, z)) * rate_hz)
 
 
 def _symmetric(poles: Complexes) -> Complexes:
@@ -182,12 +164,6 @@ def _halves(poles: Complexes) -> tuple[Floats, Complexes]:
     return poles[poles.imag == 0].real, poles[poles.imag > 0]
 
 
-def _real_columns(basis: Complexes, real: int, pairs: int) -> Complexes:
-    """Columns with real coefficients: those of the real poles, then sums and turned differences of each pair."""
-    upper, lower = basis[:, real : real + pairs], basis[:, real + pairs :]
-    return np.concatenate([basis[:, :real], upper + lower, 1j * (upper - lower)], axis=1)
-
-
 def _stacked(values: Complexes) -> Floats:
     return np.concatenate([values.real, values.imag], axis=-2)
 
@@ -196,7 +172,7 @@ def _relocate(points: Complexes, data: Complexes, scale: Floats, poles: Complexe
     """One relaxed step: zeros of the fitted scaling function sigma, the new poles."""
     real, upper = _halves(poles)
     ordered = np.concatenate([real.astype(complex), upper, upper.conj()])
-    columns = _real_columns(1.0 / (points[:, None] - ordered), real.size, upper.size)
+    columns = real_columns(1.0 / (points[:, None] - ordered), real.size)
     columns = np.concatenate([columns, np.ones((points.size, 1))], axis=1)
     size = columns.shape[1]
     weighted = scale.T[:, :, None]
@@ -227,7 +203,7 @@ def _residues(
     """Least-squares residues (poles, elements) and direct term for fixed poles, and the weighted rms error."""
     hold, rate_hz, strictly_proper = form
     real, upper = _halves(poles)
-    columns = _real_columns(hold_basis(poles, freq, hold, rate_hz)[0], real.size, upper.size)
+    columns = real_columns(hold_basis(poles, freq, hold, rate_hz)[0], real.size)
     if not strictly_proper:
         columns = np.concatenate([columns, np.ones((freq.size, 1))], axis=1)
     blocks = _stacked(scale.T[:, :, None] * columns)

@@ -17,8 +17,8 @@ import numpy as np
 
 from microrad.core import kernels
 from microrad.lab.identify.linear.modal import Floats
-from microrad.lab.identify.linear.response import response_from_periods
-from microrad.lab.identify.prepared import IdentificationError, Progress
+from microrad.lab.identify.linear.response import check_alike, response_from_periods
+from microrad.lab.identify.prepared import IdentificationError, Progress, unheard
 from microrad.lab.identify.stiffness import tangents
 from microrad.lab.identify.stiffness.model import (
     FIELDS,
@@ -38,13 +38,9 @@ from microrad.mirror.model import Mirror
 SOURCES: tuple[Source, ...] = ("strain", "drive")
 THRESHOLDS = tuple(np.geomspace(0.006, 0.6, 6).tolist())
 
-_SAME_AMPLITUDE = 1.1
 _DAMPING = 1e-2
-_LEAST_DAMPING = 1e-6
 _TRIALS = 8
-_FLOOR = 0.03
 _PATIENCE = 3
-_NULL = 1e-6
 
 
 @dataclass(frozen=True, slots=True)
@@ -175,7 +171,7 @@ def fit_hysteretic_stiffness(
     levels = _levels(groups, outputs, units[1], skip_periods)
     search = _Search(steady, classes, levels, fixed_delay=options.delay_s is not None)
     with ThreadPoolExecutor(min(len(steady), os.cpu_count() or 1)) as pool:
-        search.run(balanced(start), pool, iterations, options.tolerance, on_progress)
+        search.run(balanced(start), pool, iterations, options.tolerance, on_progress or unheard)
     if (growth := search.numbers.growth_1_s) >= 0.0:
         raise IdentificationError(
             f"the fitted mirror runs away: where its plays slide it grows by {growth:.3g} 1/s, whatever the drive; fit "
@@ -204,7 +200,6 @@ def _start(
 def _check(records: Sequence[Recording], skip_periods: int) -> None:
     if not records:
         raise IdentificationError("no recording was given; name records of at least two amplitudes.")
-    first = records[0]
     for other in records:
         whole = other.samples // other.period_samples if other.period_samples else 0
         if whole <= max(skip_periods, 0):
@@ -213,16 +208,7 @@ def _check(records: Sequence[Recording], skip_periods: int) -> None:
                 "fit needs periodic excitation (multisines) in its steady state: give period_samples, or record more "
                 "periods."
             )
-        if other.rate_hz != first.rate_hz:
-            raise IdentificationError(
-                f"{other.path}: the sample rate is {other.rate_hz:g} Hz and that of {first.path} {first.rate_hz:g} Hz; "
-                "records that are fitted together must share one rate."
-            )
-        if other.drive.shape[1] != first.drive.shape[1] or other.output.shape[1] != first.output.shape[1]:
-            raise IdentificationError(
-                f"{other.path}: {other.drive.shape[1]} inputs and {other.output.shape[1]} outputs, where {first.path} "
-                f"has {first.drive.shape[1]} and {first.output.shape[1]}; choose the same channels in each record."
-            )
+    check_alike(records, "fitted")
 
 
 def _check_options(options: StiffnessOptions) -> None:
@@ -243,7 +229,7 @@ def _classes(records: Sequence[Recording]) -> tuple[tuple[float, ...], tuple[int
             f"{records[int(np.argmin(size))].path}: the drive does not change; excite the mirror."
         )
     rank = np.argsort(size, kind="stable")
-    jumps = np.concatenate([[False], size[rank][1:] > _SAME_AMPLITUDE * size[rank][:-1]])
+    jumps = np.concatenate([[False], size[rank][1:] > 1.1 * size[rank][:-1]])
     classes = np.empty(size.size, dtype=int)
     classes[rank] = np.cumsum(jumps)
     amplitudes = tuple(float(np.mean(size[classes == c])) for c in range(int(classes.max()) + 1))
@@ -313,7 +299,7 @@ class _Search:
         """Whether a trial of the last step was refused because it would run away."""
 
     def run(
-        self, start: Numbers, pool: ThreadPoolExecutor, iterations: int, tolerance: float, on_progress: Progress | None
+        self, start: Numbers, pool: ThreadPoolExecutor, iterations: int, tolerance: float, on_progress: Progress
     ) -> None:
         """From a start to the end; the result is in `numbers` and `parts`."""
         self.numbers, damping, small = start, _DAMPING, 0
@@ -324,8 +310,7 @@ class _Search:
             if gained:
                 self._linearise(pool)
             small = small + 1 if not gained or math.log(self.costs[-2] / self.costs[-1]) < tolerance else 0
-            if on_progress is not None:
-                on_progress(done, iterations, f"error {self.costs[-1]:.4f} from {self.costs[0]:.4f}")
+            on_progress(done, iterations, f"error {self.costs[-1]:.4f} from {self.costs[0]:.4f}")
             if not gained or small >= _PATIENCE:
                 self.converged = not self.held
                 break
@@ -364,7 +349,7 @@ class _Search:
             trial = self.numbers.at(self.numbers.vector() + move)
             if self._cost(trial, pool) < cost:
                 self.numbers = balanced(trial)
-                return max(damping / 4, _LEAST_DAMPING), True
+                return max(damping / 4, 1e-6), True
             damping *= 4
         return damping, False
 
@@ -386,7 +371,7 @@ class _Search:
         floors, start = np.full(diagonal.size, 1e-12 * float(diagonal.max())), 0
         for name in FIELDS:
             part = slice(start, start + getattr(self.numbers, name).size)
-            floors[part] += _FLOOR * float(diagonal[part].mean()) if part.stop > part.start else 0.0
+            floors[part] += 0.03 * float(diagonal[part].mean()) if part.stop > part.start else 0.0
             start = part.stop
         return floors
 
@@ -426,7 +411,7 @@ def _standard_errors(search: _Search) -> tuple[Floats, Floats, float]:
         return np.full(modes, np.nan), np.full(pairs, np.nan), math.nan
     matrix, total = search.system()
     size = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
-    inverse = np.linalg.pinv(matrix / np.outer(size, size), rcond=_NULL, hermitian=True) / np.outer(size, size)
+    inverse = np.linalg.pinv(matrix / np.outer(size, size), rcond=1e-6, hermitian=True) / np.outer(size, size)
     pulls = np.array(
         [w * p.gradient - total / len(search.parts) for w, p in zip(search.weights, search.parts, strict=True)]
     )

@@ -25,9 +25,6 @@ from microrad.mirror.model import Mirror
 Source = Literal["strain", "drive"]
 
 FIELDS = ("decay", "frequency", "B", "E", "F", "G", "weights", "C", "D", "K")
-_DELAYS = np.arange(0.0, 2.01, 0.25)
-_FIRST_WEIGHT = 1e-3
-_QUASI_STATIC = 0.1
 _MOST_COMBINED = 6
 
 
@@ -168,7 +165,7 @@ def linear_start(
         return replace(response, response=values, hold="first-order", rate_hz=sub_steps * response.rate_hz)
 
     if delay_s is None:
-        tried = [late / response.rate_hz for late in _DELAYS]
+        tried = [late / response.rate_hz for late in np.arange(0.0, 2.01, 0.25)]
         costs = [fit_order(behind(late), order, exchanges=0, fine=False).cost for late in tried]
         delay_s = tried[int(np.argmin(costs))]
     return fit_order(behind(delay_s), order, exchanges=exchanges).model, delay_s
@@ -188,7 +185,7 @@ def first_numbers(
     B = np.concatenate([np.stack([b[pairs].real, b[pairs].imag], axis=1).reshape(-1, b.shape[1]), b[real].real])
     twice = np.stack([2 * c[:, pairs].real, -2 * c[:, pairs].imag], axis=2).reshape(c.shape[0], -1)
     C = np.concatenate([twice, c[:, real].real], axis=1)
-    highest_hz = max(_QUASI_STATIC * float(np.abs(poles).min()) / (2 * np.pi), 2 * lowest_hz)
+    highest_hz = max(0.1 * float(np.abs(poles).min()) / (2 * np.pi), 2 * lowest_hz)
     static = model.response(np.linspace(lowest_hz, highest_hz, 16)).real.mean(axis=0)
     strain, inputs = np.linalg.pinv(static), b.shape[1]
     blocks = {"strain": (strain @ C, strain @ model.direct), "drive": (np.zeros((inputs, C.shape[1])), np.eye(inputs))}
@@ -200,7 +197,7 @@ def first_numbers(
         E=np.hstack([B] * count),
         F=np.vstack([blocks[s][0] for s in sources]),
         G=np.vstack([blocks[s][1] for s in sources]),
-        weights=np.full((count * inputs, plays), _FIRST_WEIGHT),
+        weights=np.full((count * inputs, plays), 1e-3),
         C=C,
         D=model.direct.copy(),
         K=np.hstack([model.direct] * count),

@@ -17,7 +17,6 @@ from microrad.mirror import model as mirror
 
 _CHUNK = 128
 _STATE, _DRIVE, _BANK = range(3)  # where a parameter enters: the order of a chunk's columns
-_TIME_CONSTANTS = 7.0
 _LATER = 1e-5
 
 
@@ -114,7 +113,7 @@ def jacobian(
     path, drive = way
     period = drive.shape[0] // 2
     if lead < 0:
-        lead = math.ceil(_TIME_CONSTANTS / -float(numbers.decay.max()) * record.rate_hz)
+        lead = math.ceil(7.0 / -float(numbers.decay.max()) * record.rate_hz)
     lead = min(lead * record.sub_steps, period - 1)
     cut = slice(period - lead - 1, None)  # one step more: what enters needs the step before
     part = kernels.Path(path.output[cut], path.x[cut], path.state[cut], path.z[cut], path.play[cut], path.moved[cut])

@@ -15,7 +15,6 @@ _LEVELS_REFUSED, _LEVELS_NOTE = 50, 500
 # A smooth drive visits ten places for each level of the output; one that steps visits about one.
 _SMOOTH = 5
 _DRIFT_NOTE, _DRIFT_REFUSED = 0.005, 0.5
-_DRIFT_SIGNIFICANT = 5.0
 _BLOCKS = 8
 # Half a loop of hysteresis looks like a drift: two full cycles of the drive tell them apart.
 _CROSSINGS = 4
@@ -99,7 +98,7 @@ def drift(label: str, values: FloatArray, drives: Sequence[FloatArray]) -> list[
     y, *u = (_block_means(column, stride) for column in (values, *drives))
     trend, error = _trend(y, u)
     share = abs(trend) / float(np.ptp(values))
-    if share < _DRIFT_NOTE or abs(trend) < _DRIFT_SIGNIFICANT * error:
+    if share < _DRIFT_NOTE or abs(trend) < 5.0 * error:
         return []
     refused = share > _DRIFT_REFUSED and abs(_trend(y, [*u, *_slow(u)])[0]) / float(np.ptp(values)) > _DRIFT_REFUSED
     if not refused and max(_crossings(c) for c in u) < _CROSSINGS:
@@ -158,8 +157,6 @@ BoolArray = NDArray[np.bool_]
 IntArray = NDArray[np.int_]
 
 _MIN_RUN = 3
-_MIN_PEAKS = 2
-# A rounded peak of a quantised signal rests on its top code while it rises by one step; seen from its flanks it would
 # have gone two steps higher (parabola). Six steps cannot be rounding.
 _QUANTA = 6.0
 # What is cut off must matter: 0.4 % of peak-to-peak is below the residual of any hysteresis model known here.
@@ -192,7 +189,7 @@ def clipping(
         if at.size <= 1.5 * resting:
             continue
         rows, hidden = _flat_tops(values, at, sign, step, high - low, drives)
-        if rows.size >= _MIN_PEAKS:
+        if rows.size >= 2:
             share = 100 * float(np.median(hidden)) / (high - low)
             text = (
                 f"{label} is clipped at {limit:.6g}: {rows.size} flat tops, the first at {place(int(rows[0]))}, "

@@ -18,13 +18,8 @@ _OUTSIDE = 5e-4
 # A drive whose motion is 1e-5 of its offset is the flicker of a constant; one with 1e-6 of the strongest input's power
 # (60 dB less) moves the mirror less than that input's noise does.
 _STILL, _FAINT = 1e-5, 1e-6
-_FALSE_ALARM = 1e-6
 _SHORT_RECORD, _ORDER = 20_000, 8
-_COHERENT = 0.8
-# A multiplexed converter reads its channels up to one step apart in time, typically half of one.
 _LEAD_SAMPLES = 0.75
-_LEAD_SIGNIFICANT = 5.0
-# Hysteresis turns a sine by at most 15 degrees or so; swapped channels show that as a lead.
 _NARROW_RAD = math.radians(25)
 
 
@@ -119,7 +114,7 @@ def _unrelated(label: str, slow: Sequence[FloatArray], found: _Response, long: _
     """
     best = float(found.coherence.max())
     # Unrelated noise: P(coherence > x) = (1 - x)^(averages - inputs) in each bin (Carter 1987).
-    chance = 1 - (_FALSE_ALARM / found.coherence.size) ** (1 / max(found.averages - len(slow) + 1, 1.0))
+    chance = 1 - (1e-6 / found.coherence.size) ** (1 / max(found.averages - len(slow) + 1, 1.0))
     if best >= chance:
         return ""
     usual = (len(slow) - 1) / long.averages  # mean coherence of unrelated noise, and about its scatter
@@ -222,7 +217,7 @@ def _lead(
     alone cannot tell a lead from a longer lag, nor from an inverted output: only small leads are judged there.
     """
     column = int(np.argmax(found.share.sum(axis=0)))
-    good = (found.coherence > _COHERENT) & (found.freq_hz >= 0.9 * band[0]) & (found.freq_hz <= 1.1 * band[1])
+    good = (found.coherence > 0.8) & (found.freq_hz >= 0.9 * band[0]) & (found.freq_hz <= 1.1 * band[1])
     if not good.any():
         return []
     freq, phase = found.freq_hz[good], np.angle(found.response[good, column])
@@ -244,7 +239,7 @@ def _lead(
     falls = broad and top < 0.5 * bottom
     at_hz, lead, lead_error = (low_hz, bottom, low_error) if falls else (at_hz, top, top_error)
     samples = lead / (2 * math.pi * at_hz) * rate_hz
-    certain = lead > _LEAD_SIGNIFICANT * lead_error
+    certain = lead > 5.0 * lead_error
     if not certain or samples < _LEAD_SAMPLES or (not broad and lead > _NARROW_RAD):
         return []
     text = (

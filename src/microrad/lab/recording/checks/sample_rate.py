@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -47,14 +46,6 @@ def agreed_rate(where: str, rate_hz: float | None, stated: Sequence[StatedRate])
     return first.rate_hz
 
 
-@dataclass(frozen=True)
-class _Axis:
-    """What a time column says: mean step, its printed resolution, both in seconds."""
-
-    step_s: float
-    resolution_s: float
-
-
 def rate_of_time(
     where: str, label: str, time_s: FloatArray, place: Callable[[int], str]
 ) -> tuple[StatedRate, list[Finding]]:
@@ -71,10 +62,10 @@ def rate_of_time(
             f"{where}: {place(row + 1)}, {label}: time runs back from {time_s[row]:.9g} to {time_s[row + 1]:.9g} s; "
             "two recordings may have been joined: cut them apart."
         )
-    axis = _Axis(span / steps.size, _resolution(time_s))
-    findings = _steps(where, label, steps, axis, place)
-    rate_hz = float(f"{1 / axis.step_s:.9g}")
-    return StatedRate(rate_hz, f"{label}: {time_s.size} samples in {span:.9g} s"), findings
+    findings = _steps(where, label, steps, span / steps.size, _resolution(time_s), place)
+    return StatedRate(
+        float(f"{1 / (span / steps.size):.9g}"), f"{label}: {time_s.size} samples in {span:.9g} s"
+    ), findings
 
 
 def _resolution(time_s: FloatArray) -> float:
@@ -91,22 +82,25 @@ def _resolution(time_s: FloatArray) -> float:
     return rounding
 
 
-def _slack(steps: FloatArray, axis: _Axis) -> float:
+def _slack(steps: FloatArray, step_s: float, resolution_s: float) -> float:
     """How far rounding of the digits alone can move a step: nothing where the step is a multiple of the last digit.
 
     A grid with a constant step strays from its own straight line by one unit of the last digit at most; what strays
     farther is no rounding.
     """
-    parts = axis.step_s / axis.resolution_s if axis.resolution_s else math.inf
+    parts = step_s / resolution_s if resolution_s else math.inf
     if parts > 100 or (parts > 0.5 and abs(parts - round(parts)) < 1e-6):
         return 0.0
-    astray = np.cumsum(steps - axis.step_s)
-    return axis.resolution_s if float(np.ptp(astray)) <= 2.02 * axis.resolution_s else 0.0
+    astray = np.cumsum(steps - step_s)
+    return resolution_s if float(np.ptp(astray)) <= 2.02 * resolution_s else 0.0
 
 
-def _steps(where: str, label: str, steps: FloatArray, axis: _Axis, place: Callable[[int], str]) -> list[Finding]:
-    usual = float(np.median(steps)) or axis.step_s
-    slack = _slack(steps, axis)
+def _steps(
+    where: str, label: str, steps: FloatArray, step_s: float, resolution_s: float, place: Callable[[int], str]
+) -> list[Finding]:
+    """Findings of the steps of a time column: `step_s` is their mean, `resolution_s` what its digits can show."""
+    usual = float(np.median(steps)) or step_s
+    slack = _slack(steps, step_s, resolution_s)
     gaps = np.flatnonzero(steps > _GAP * usual + slack)
     stops = np.flatnonzero(steps < (2 - _GAP) * usual - slack) if slack < usual else np.empty(0, int)
     if gaps.size and not (stops.size and stops[0] < gaps[0]):
@@ -123,12 +117,12 @@ def _steps(where: str, label: str, steps: FloatArray, axis: _Axis, place: Callab
             f"{where}: {place(row + 1)}, {label}: {steps[row]:.6g} s since the sample before, where {usual:.6g} s is "
             f"usual, {stops.size} times in all; samples were written twice or late: remove them or record again."
         )
-    deviation = steps - axis.step_s
+    deviation = steps - step_s
     square = float(deviation @ deviation) / steps.size - slack**2 / 6
-    jitter = math.sqrt(max(square, 0.0)) / axis.step_s
+    jitter = math.sqrt(max(square, 0.0)) / step_s
     if slack >= usual:
         text = (
-            f"{label} is printed to {axis.resolution_s:.3g} s, coarser than the step of {axis.step_s:.3g} s; gaps "
+            f"{label} is printed to {resolution_s:.3g} s, coarser than the step of {step_s:.3g} s; gaps "
             "shorter than that would not show"
         )
         return [Finding("jitter", label, None, text, False)]
@@ -136,7 +130,7 @@ def _steps(where: str, label: str, steps: FloatArray, axis: _Axis, place: Callab
         return []
     row = int(np.argmax(np.abs(deviation)))
     text = (
-        f"{label}: the steps scatter by {100 * jitter:.2g} % rms of {axis.step_s:.6g} s, most at {place(row + 1)} "
+        f"{label}: the steps scatter by {100 * jitter:.2g} % rms of {step_s:.6g} s, most at {place(row + 1)} "
         f"({steps[row]:.6g} s); record with a hardware clock, or resample to a constant step"
     )
     return [Finding("jitter", label, row + 1, text, jitter > _JITTER_REFUSED)]

@@ -53,6 +53,17 @@ def stated_rate(name: str, value: Any) -> StatedRate | None:
     return StatedRate(1 / number, f"{name} = {number:g} s")
 
 
+def rates_of(variables: list[Variable]) -> dict[str, tuple[StatedRate, ...]]:
+    """The rates that scalars state, by the group that they stand in ('' for the file)."""
+    found: dict[str, tuple[StatedRate, ...]] = {}
+    for variable in variables:
+        scalar = variable.dtype.kind in "iuf" and all(n == 1 for n in variable.shape)
+        if scalar and (rate := stated_rate(variable.name, variable.load((0,) * len(variable.shape)))):
+            group = variable.name.rpartition("/")[0]
+            found[group] = (*found.get(group, ()), rate)
+    return found
+
+
 def channels_of(variables: list[Variable], unusable: dict[str, str]) -> tuple[Channel, ...]:
     """Each vector is a channel, each column of a matrix another, named `variable[column]`.
 

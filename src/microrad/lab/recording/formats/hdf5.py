@@ -27,7 +27,6 @@ _DEFLATE, _SHUFFLE, _FLETCHER32, _LZF = 1, 2, 3, 32000
 _FILTERS = frozenset({_DEFLATE, _SHUFFLE, _FLETCHER32, _LZF})
 _UNCHECKED = frozenset({4, 5, 6})  # szip, n-bit and scale-offset: how much a piece holds is known once it is unpacked
 _PACKERS = frozenset({_DEFLATE, _LZF})
-_CHECKSUM_BYTES = 4
 _MATLAB_NUMBERS = frozenset(
     ["double", "single", "int8", "int16", "int32", "int64", "uint8", "uint16", "uint32", "uint64", "logical"]
 )
@@ -150,7 +149,7 @@ def _unpacked_bytes(data: bytes, filters: Sequence[int], stated: int) -> int:
     size = len(data)
     for code in reversed(filters):
         if code == _FLETCHER32:
-            size -= _CHECKSUM_BYTES
+            size -= 4
         elif code == _DEFLATE:
             size = _inflated_bytes(data[: max(size, 0)], stated)
         elif code == _LZF:
@@ -245,16 +244,6 @@ class Hdf5Source(ArraySource):
         _note_rates(stated, "", file.attrs, "")
         file.visititems(visit)
         file.visititems_links(visit_link)
-
-    def rates(self, indices: Any) -> list[StatedRate]:
-        """Rates of the dataset's own attributes, else of the nearest group above it."""
-        found: list[StatedRate] = []
-        for index in indices:
-            at = self.names[index].partition("[")[0]
-            while at and at not in self.stated:
-                at = at.rpartition("/")[0]
-            found.extend(self.stated.get(at, ()))
-        return list(dict.fromkeys(found))
 
 
 def _check_depth(path: Path, name: str) -> None:

@@ -11,8 +11,8 @@ import numpy as np
 
 from microrad.core.matlab_file import Left, MatlabFile, MatlabFileError, Structure, Unread
 from microrad.lab.recording.files import most_unpacked, sha256_of
-from microrad.lab.recording.formats.arrays import ArraySource, Variable, channels_of, stated_rate
-from microrad.lab.recording.formats.source import StatedRate, damaged
+from microrad.lab.recording.formats.arrays import ArraySource, Variable, channels_of, rates_of
+from microrad.lab.recording.formats.source import damaged
 from microrad.lab.recording.records import RecordingError
 
 
@@ -30,23 +30,7 @@ class MatlabSource(ArraySource):
         unusable: dict[str, str] = {}
         self.variables = [v for name, value in file.variables.items() for v in _variables(file, name, value, unusable)]
         channels = channels_of(self.variables, unusable)
-        stated: dict[str, tuple[StatedRate, ...]] = {}
-        for variable in self.variables:
-            if variable.dtype.kind in "iuf" and all(n == 1 for n in variable.shape):
-                rate = stated_rate(variable.name, variable.load((0,) * len(variable.shape)))
-                group = variable.name.rpartition("/")[0]
-                stated[group] = (*stated.get(group, ()), *([rate] if rate else []))
-        super().__init__(path, "MATLAB", channels, sha256_of(path), unusable, stated)
-
-    def rates(self, indices: Any) -> list[StatedRate]:
-        """Rates of the channels' structure, else of the file."""
-        found: list[StatedRate] = []
-        for index in indices:
-            group = self.names[index].rpartition("/")[0]
-            while group and not self.stated.get(group):
-                group = group.rpartition("/")[0]
-            found.extend(self.stated.get(group, ()))
-        return list(dict.fromkeys(found))
+        super().__init__(path, "MATLAB", channels, sha256_of(path), unusable, rates_of(self.variables))
 
 
 def _refused(path: Path, error: MatlabFileError) -> RecordingError:

@@ -10,7 +10,7 @@ from typing import IO, Any
 import numpy as np
 
 from microrad.lab.recording.files import sha256_of, too_large
-from microrad.lab.recording.formats.arrays import ArraySource, Variable, channels_of, stated_rate
+from microrad.lab.recording.formats.arrays import ArraySource, Variable, channels_of, rates_of
 from microrad.lab.recording.formats.source import StatedRate, damaged
 from microrad.lab.recording.records import RecordingError
 
@@ -34,26 +34,11 @@ class NumpySource(ArraySource):
             raise
         except Exception as error:  # zipfile and numpy raise many kinds for a damaged file
             raise damaged(path, "a NumPy file", error) from None
-        self.variables = [v for v in self.variables if not _refused(v, unusable)]
-        kind = "NumPy"
+        unusable |= {v.name: _NO_OBJECTS for v in self.variables if v.dtype.hasobject}
+        self.variables = [v for v in self.variables if not v.dtype.hasobject]
         channels = channels_of(self.variables, unusable)
-        super().__init__(path, kind, channels, sha256_of(path), unusable, {"": _rates(self.variables)})
-
-    def rates(self, indices: Any) -> list[StatedRate]:
-        """The rate stated by a scalar of the archive."""
-        return list(self.stated[""])
-
-
-def _refused(variable: Variable, unusable: dict[str, str]) -> bool:
-    if variable.dtype.hasobject:
-        unusable[variable.name] = _NO_OBJECTS
-    return variable.dtype.hasobject
-
-
-def _rates(variables: list[Variable]) -> tuple[StatedRate, ...]:
-    scalars = [v for v in variables if all(n == 1 for n in v.shape)]
-    found = (stated_rate(v.name, v.load((0,) * len(v.shape))) for v in scalars if v.dtype.kind in "iuf")
-    return tuple(rate for rate in found if rate is not None)
+        rates: tuple[StatedRate, ...] = sum(rates_of(self.variables).values(), ())
+        super().__init__(path, "NumPy", channels, sha256_of(path), unusable, {"": rates})
 
 
 def _header(file: IO[bytes]) -> tuple[tuple[int, ...], np.dtype[Any]]:

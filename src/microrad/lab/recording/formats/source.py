@@ -14,6 +14,7 @@ _TIME_NAME = re.compile(
     r"(?i:time|zeit|temps|tiempo|x_value|time_?stamp|seconds|sec|(?-i:t))(_?(s|ms|us|ns))?\s*([(\[].*[)\]])?"
 )
 _BRACKETED = re.compile(r"[(\[]\s*([^()\[\]]*?)\s*[)\]]\s*$")
+_COLUMN = re.compile(r"\[[\d, ]*\]$")
 SECONDS = {"s": 1.0, "sec": 1.0, "seconds": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "μs": 1e-6, "ns": 1e-9}
 
 
@@ -201,17 +202,13 @@ class Container(Source):
         return None
 
     def rates(self, indices: Sequence[int]) -> list[StatedRate]:
-        """Rates of the channels, else of their nearest group that states one."""
-        found = []
-        for index in indices:
-            channel = self.channels[index]
-            if channel.rate is not None:
-                found.append(channel.rate)
-                continue
-            group = channel.name.rpartition("/")[0]
+        """Rates of the channels, else of the nearest of the variable and the groups around it that states one."""
+        found: list[StatedRate] = []
+        for channel in (self.channels[index] for index in indices):
+            group = channel.name if channel.name in self.stated else _COLUMN.sub("", channel.name)
             while group and group not in self.stated:
                 group = group.rpartition("/")[0]
-            found.extend(self.stated.get(group, ()))
+            found.extend([channel.rate] if channel.rate else self.stated.get(group, ()))
         return list(dict.fromkeys(found))
 
 

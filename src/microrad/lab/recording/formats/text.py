@@ -17,7 +17,6 @@ from microrad.lab.recording.formats.source import Source, StatedRate, bracketed_
 from microrad.lab.recording.records import FloatArray, RecordingError
 
 _HEAD_BYTES = 1_000_000
-_TYPICAL_LINES = 200
 COMMENT = ("#", "%")
 DECIMAL_COMMA = re.compile(r"[+-]?\d+,\d+([eE][+-]?\d+)?")
 _CONTROL = re.compile(rb"[\x00-\x08\x0e-\x1a\x1c-\x1f]")
@@ -78,7 +77,7 @@ def layout_of(path: Path) -> Layout:
     if not content:
         reason = "holds only blank lines and comments" if complete else "has no line break in its first megabyte"
         raise RecordingError(f"{path}: the file {reason}; export the recording as rows of numbers, one per sample.")
-    typical = content[-_TYPICAL_LINES:]
+    typical = content[-200:]
     delimiter = Counter(_guess_delimiter(line) for line in typical).most_common(1)[0][0]
     columns = Counter(len(split(line, delimiter)) for line in typical).most_common(1)[0][0]
     first, headers = _header(path, lines, delimiter, columns)
@@ -232,9 +231,6 @@ def _unknown_name(path: Path, layout: Layout, wanted: str, role: str) -> str:
     )
 
 
-_CHUNK_BYTES = 1 << 24
-
-
 class TextSource(Source):
     """A text of numbers: CSV, or columns separated by semicolon, tab or white space."""
 
@@ -292,7 +288,7 @@ def _blocks(path: Path) -> Iterator[bytes]:
     """Blocks of the file that end with a line."""
     parts: list[bytes] = []
     with path.open("rb") as file:
-        while chunk := file.read(_CHUNK_BYTES):
+        while chunk := file.read(1 << 24):
             head, newline, tail = chunk.rpartition(b"\n")
             if newline:
                 yield b"".join([*parts, head, newline])
