@@ -12,7 +12,7 @@ from microrad.cli import frame
 from microrad.core.folder import FolderError, check_folder
 from microrad.export import matrices_mat
 from microrad.export.records import ExportError
-from microrad.lab.bench import files as bench_files
+from microrad.lab.bench import folder
 from microrad.lab.bench.play import BenchError
 from microrad.loop import disturbance
 from microrad.mission import file as mission_file
@@ -60,7 +60,7 @@ def of_campaign(path):
         ("m.toml", Draft.open, MissionError, f"cannot be read: {MISSING}"),
         ("m.toml", lambda path: Draft.shipped(path).save(), DraftError, "cannot be written: it is no file on disk"),
         ("old/manifest.json", lambda p: check_folder(p.parent, True), FolderError, "are not results of microrad"),
-        ("old/manifest.json", lambda p: bench_files.read_folder(p.parent), BenchError, "no manifest.json of microrad"),
+        ("old/manifest.json", lambda p: folder.read_folder(p.parent), BenchError, "no manifest.json of microrad"),
         ("page.html", lambda p: frame.check_target(p, "choose another", "<!"), BlockingIOError, MISSING),
         ("page.html", lambda p: cli_campaign._check_output(p, True), BlockingIOError, MISSING),
         ("model.mat", lambda p: cli_export._check_file(p, True, b"MATLAB"), BlockingIOError, MISSING),
