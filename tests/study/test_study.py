@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from microrad.loop import fine_pointing
 from microrad.loop import sine_run as simulate
 from microrad.mirror.summary import summarise, unknown_dynamics
 from microrad.mission.file import load_mission
@@ -16,6 +15,7 @@ from microrad.report import links
 from microrad.report.fine_pointing_words import not_reliable
 from microrad.study import paper, verdict
 from microrad.study import story as study
+from scenes import scene_of
 from shipped import SHIPPED, edited_file, whole_study
 
 
@@ -353,7 +353,7 @@ def test_claims_of_the_links_are_judged_on_the_papers_numbers_whatever_the_recei
 def test_nothing_that_a_loop_must_do_is_met_by_a_mirror_without_dynamics():
     known = load_mission(SHIPPED).mission
     bare = known.model_copy(update={"mirror": known.mirror.model_copy(update={"linear": None})})
-    scene = fine_pointing.scene(load_mission(SHIPPED))
+    scene = scene_of(load_mission(SHIPPED))
 
     def judged(m, left_rad):
         best = SimpleNamespace(

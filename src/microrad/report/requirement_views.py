@@ -8,11 +8,11 @@ from microrad import link
 from microrad.link.budget import FREE_SPACE_LOSS, POINTING_LOSS
 from microrad.link.requirement import Requirement, Subject
 from microrad.loop.paper_cases import residual_rad
+from microrad.mirror import Variant
 from microrad.report.fine_pointing_words import percent, source_name
 from microrad.report.quantities import apart, quantity
 from microrad.report.requirements import signed
 from microrad.study.alternatives import Reading
-from microrad.study.pointing_cost import NO_HYSTERESIS
 from microrad.study.story import Study
 from microrad.study.verdict import unknown
 
@@ -100,7 +100,7 @@ def _power(study: Study, budget: link.LinkBudget) -> str:
 def _stroke(study: Study, cause: str) -> str:
     fine = study.fine_pointing
     assert fine is not None  # such a requirement has one
-    axis = min(fine.scene.own_stroke(study.file.mission), key=lambda each: each.margin_rad)
+    axis = min(fine.scene.own_stroke, key=lambda each: each.margin_rad)
     line = max(axis.lines, key=lambda each: each.value)
     return f"{cause}: {quantity(line.value, 'rad')} of {quantity(axis.total_rad, 'rad')} at the line of sight"
 
@@ -108,7 +108,7 @@ def _stroke(study: Study, cause: str) -> str:
 def _residual(study: Study, cause: str) -> str:
     m, run = study.file.mission, study.residual
     straight = next(
-        r for r in study.runs if (r.mirror, r.controller, r.freq_hz) == (NO_HYSTERESIS, run.controller, run.freq_hz)
+        r for r in study.runs if (r.mirror, r.controller, r.freq_hz) == (Variant.STRAIGHT, run.controller, run.freq_hz)
     )
     with_it, without = (quantity(residual_rad(m, r.trace), "rad") for r in (run, straight))
     return f"{cause}: {with_it} with hysteresis, {without} without"
