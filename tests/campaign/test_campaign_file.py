@@ -15,8 +15,8 @@ from microrad.campaign import evaluate, keys, ledger_file, sampling
 from microrad.campaign.file import load_campaign
 from microrad.campaign.inputs import Builder
 from microrad.campaign.records import CampaignError
-from microrad.loop import fine_pointing
 from microrad.mission.file import MissionError, load_mission, named_files, open_mission
+from scenes import scene_of
 from shipped import SHIPPED
 
 QUAD_CELL = (
@@ -854,7 +854,7 @@ def test_only_keys_that_touch_the_loop_change_it(tmp_path, sensor):
     file = load_mission(tmp_path / "mission.toml")
 
     def loop_of(m):
-        scene = fine_pointing.scene(replace(file, mission=m))
+        scene = scene_of(replace(file, mission=m))
         return pickle.dumps((scene.loop, scene.axis, m.fine_pointing.modulus_margin, m.fine_pointing.seed))
 
     same, changed = loop_of(file.mission), []

@@ -11,6 +11,7 @@ from microrad.loop import fine_pointing
 from microrad.loop.fine_loop import ensemble
 from microrad.loop.fine_pointing import designs
 from microrad.mission.file import load_mission
+from scenes import scene_of
 from shipped import SHIPPED
 
 OBSERVER = "disturbance observer"
@@ -36,9 +37,9 @@ def light(folder):
 
 def test_the_simulated_figure_is_that_of_the_missions_runs(light):
     file = load_mission(light)
-    scene = fine_pointing.scene(file)
-    (made,) = fine_pointing.design(scene, file.mission, only=(fine_pointing.BASELINE,))
-    (left,) = fine_pointing.outlook(scene, file.mission, [made])
+    scene = scene_of(file)
+    (made,) = fine_pointing.design(scene, only=(fine_pointing.BASELINE,))
+    (left,) = fine_pointing.outlook(scene, [made])
     run = ensemble.run(scene.loop, made.controller, ensemble.Span(0.4, 0.1, file.mission.fine_pointing.seed), 4)
     assert left.simulated_rad == pytest.approx(math.sqrt((run.axis_rms_rad**2).mean()), rel=1e-12)
     assert left.linear_rad == made.tuned.residual_rms_rad

@@ -24,6 +24,7 @@ from microrad.report import contact_run_words, day_plots, day_words, results
 from microrad.report.page import Drawn
 from microrad.study import contact_run
 from microrad.study import story as study
+from scenes import scene_of
 from shipped import SHIPPED, edited_file, plain_study, write_like_plain
 
 FIGURES = ["day-timeline", "along-contact", "data-volume", "latency", "world-map", "assumptions"]
@@ -37,8 +38,8 @@ def file():
 @pytest.fixture(scope="module")
 def fine(file):
     """A fine-pointing study as far as a contact asks for it: the PI of the grid, made in half a second."""
-    scene = fine_pointing.scene(file)
-    tuned = designs.grid_baseline(designs.plants(scene, file.mission, 1)[:1], control.Specification(0.5))
+    scene = scene_of(file)
+    tuned = designs.grid_baseline(designs.plants(scene, 1)[:1], control.Specification(0.5))
     design = fine_pointing.Design("PI", tuned, assemble("PI", scene.loop, tuned.controller))
     return SimpleNamespace(scene=scene, best=SimpleNamespace(design=design), quantile=0.997)
 

@@ -22,6 +22,7 @@ from microrad.studio.jobs_files import Job, Progress
 from microrad.studio.mirror_form import Dropped, Form, Setting, SettingError
 from microrad.studio.mirror_use import with_mirror_file
 from microrad.studio.reading import ChannelInfo, Listing, Note, View
+from scenes import cases_of, scene_of
 from shipped import SHIPPED
 
 PAPER = np.array([0.089e-3, -2.96e-7, -0.048e-3, 0.00047, 38.421, 34.635, math.inf, 0.0])
@@ -450,7 +451,7 @@ def answers(pi):
 
 def test_the_controllers_are_those_of_the_study_and_of_control(mission):
     names = control_model.names(mission)
-    assert names == (*fine_pointing.names(mission.mission), PID, PID_INVERSE)
+    assert names == (*fine_pointing.names(mission.mission.fine_pointing), PID, PID_INVERSE)
     bare = replace(mission, mission=mission.mission.model_copy(update={"fine_pointing": None}))
     assert control_model.names(bare) == (PID, PID_INVERSE)
     with pytest.raises(ValueError, match="'none' is no controller of this mission"):
@@ -458,14 +459,14 @@ def test_the_controllers_are_those_of_the_study_and_of_control(mission):
 
 
 def test_a_tuned_controller_has_the_numbers_of_the_study(mission, pi):
-    m, scene = mission.mission, fine_pointing.scene(mission)
-    tuned = fine_pointing.tune("PI", m, fine_pointing.plants(scene, m, m.fine_pointing.seed))
+    scene = scene_of(mission)
+    tuned = fine_pointing.tune("PI", scene.table, fine_pointing.plants(scene, scene.table.seed))
     assert pi.residual_rad == tuned.residual_rms_rad
     assert (pi.margins["modulus"], pi.margins["gain"]) == (tuned.margins.modulus, tuned.margins.gain_up)
-    assert pi.margins["modulus"] >= pi.asked_modulus == m.fine_pointing.modulus_margin
+    assert pi.margins["modulus"] >= pi.asked_modulus == scene.table.modulus_margin
     assert {name: value for name, (value, _) in pi.values.items()} == tuned.values
     assert {unit for _, unit in pi.values.values()} == {"Hz"}
-    closed = linear.close(scene.loop, fine_pointing.build("PI", scene, m, tuned.controller))
+    closed = linear.close(scene.loop, fine_pointing.build("PI", scene, tuned.controller))
     at = np.array([10.0, 100.0, 1000.0])
     expected = np.abs(linear.sensitivity(closed, at)[:, 0, 0])
     np.testing.assert_allclose(np.interp(at, pi.freq_hz, pi.sensitivity), expected, rtol=2e-3)
@@ -511,12 +512,12 @@ def test_only_the_variants_that_are_asked_for_are_simulated(pi):
 @pytest.mark.parametrize("name", [PID, PID_INVERSE])
 def test_the_paper_s_loop_has_the_numbers_of_the_study(mission, name):
     found = control_model.controller(mission, name)
-    margins = tracking.loop_margins(mission.mission)
+    margins = tracking.loop_margins(cases_of(mission.mission))
     assert found.margins["modulus"] == margins.modulus
     assert found.margins["crossover"] == margins.crossover_hz
     assert found.margins["bandwidth"] == pytest.approx(358, rel=0.02)
     asked = found.ask(control_view.ask_of("100 urad", "300 urad", "15 Hz", 5000.0), (WITH, WITHOUT))
-    runs = tracking.tracking_runs(mission.mission)
+    runs = tracking.tracking_runs(cases_of(mission.mission))
     kind = "PID" if name == PID else "PID + inverse"
     for variant, which in ((WITH, "given"), (WITHOUT, "no hysteresis")):
         run = next(r for r in runs if (r.mirror, r.controller, r.freq_hz) == (which, kind, 15.0))

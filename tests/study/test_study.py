@@ -9,7 +9,6 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from microrad.link.requirement import IMPOSSIBLE
-from microrad.loop import fine_pointing
 from microrad.loop import sine_run as simulate
 from microrad.mirror.summary import summarise, unknown_dynamics
 from microrad.mission.file import load_mission
@@ -18,6 +17,7 @@ from microrad.report.fine_pointing_words import not_reliable
 from microrad.report.words import headline
 from microrad.study import paper, verdict
 from microrad.study import story as study
+from scenes import scene_of
 from shipped import DEFAULT, SHIPPED, edited_file, whole_study
 
 
@@ -394,7 +394,7 @@ def test_what_to_change_for_the_stroke_just_meets_it(tmp_path, shipped):
     def stroke():
         file = load_mission(tmp_path / "mission.toml")
         fine = SimpleNamespace(
-            scene=fine_pointing.scene(file),
+            scene=scene_of(file),
             quantile=0.997,
             budget=SimpleNamespace(dominant=""),
             best=SimpleNamespace(
@@ -449,7 +449,7 @@ def test_claims_of_the_links_are_judged_on_the_papers_numbers_whatever_the_recei
 def test_nothing_that_a_loop_must_do_is_met_by_a_mirror_without_dynamics():
     known = load_mission(SHIPPED).mission
     bare = known.model_copy(update={"mirror": known.mirror.model_copy(update={"linear": None})})
-    scene = fine_pointing.scene(load_mission(SHIPPED))
+    scene = scene_of(load_mission(SHIPPED))
 
     def judged(m, left_rad, possible=True):
         best = SimpleNamespace(

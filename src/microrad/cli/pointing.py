@@ -53,11 +53,13 @@ def design(
     mission = load_mission(file, mirror)
     with progress_bar() as progress:
         try:
+            from microrad import mirror as mirror_room
+            from microrad.link.tracking_light import tracking_light_w
             from microrad.loop import fine_pointing
 
-            scene = fine_pointing.scene(mission)
-            designs = fine_pointing.design(scene, mission.mission, progress)
-            left = fine_pointing.outlook(scene, mission.mission, designs, progress)
+            scene = fine_pointing.scene(mission, mirror_room.of(mission.mission), tracking_light_w(mission))
+            designs = fine_pointing.design(scene, progress)
+            left = fine_pointing.outlook(scene, designs, progress)
         except ValueError as error:  # a loop that cannot be built, a margin out of reach
             raise Refusal(f"{mission.path}: {error}") from error
     marks = [each.mark(accept) for each in left]

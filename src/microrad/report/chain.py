@@ -139,7 +139,7 @@ def _mirror(study: Study) -> Stage:
         lines.append(f"{100 * high.width:.1f} % at {high.freq_hz:g} Hz")
     if study.fine_pointing is None:
         return Stage("Mirror", tuple(lines))
-    axis = min(study.fine_pointing.scene.own_stroke(m), key=lambda a: a.margin_rad)
+    axis = min(study.fine_pointing.scene.own_stroke, key=lambda a: a.margin_rad)
     lines.append(f"stroke {micro(axis.needed_rad)} of {micro(axis.available_rad)} µrad ({axis.name})")
     return Stage("Mirror", tuple(lines), next(r.mark for r in study.requirements if r.subject == "stroke"))
 

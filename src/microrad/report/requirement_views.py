@@ -9,13 +9,13 @@ from microrad.link.budget import FREE_SPACE_LOSS, POINTING_LOSS
 from microrad.link.requirement import Requirement, Subject
 from microrad.loop.fine_pointing.parts import GAUGE_NOISE, OPTICAL_NOISE
 from microrad.loop.paper_cases import residual_rad
+from microrad.mirror import Variant
 from microrad.mirror.geometry import StrokeBudget
 from microrad.report import advice as advise
 from microrad.report.fine_pointing_words import percent, source_name
 from microrad.report.quantities import apart, quantity
 from microrad.report.requirements import signed
 from microrad.study.alternatives import Reading
-from microrad.study.pointing_cost import NO_HYSTERESIS
 from microrad.study.story import Study
 from microrad.study.verdict import unknown
 
@@ -114,7 +114,7 @@ def _of_stroke(study: Study, r: Requirement) -> str:
 def _worst_axis(study: Study) -> StrokeBudget:
     fine = study.fine_pointing
     assert fine is not None  # such a requirement has one
-    return min(fine.scene.own_stroke(study.file.mission), key=lambda each: each.margin_rad)
+    return min(fine.scene.own_stroke, key=lambda each: each.margin_rad)
 
 
 def _tornado(study: Study, of: str) -> Sequence[link.Swing]:
@@ -151,7 +151,7 @@ def _stroke(study: Study, cause: str) -> str:
 def _residual(study: Study, cause: str) -> str:
     m, run = study.file.mission, study.residual
     straight = next(
-        r for r in study.runs if (r.mirror, r.controller, r.freq_hz) == (NO_HYSTERESIS, run.controller, run.freq_hz)
+        r for r in study.runs if (r.mirror, r.controller, r.freq_hz) == (Variant.STRAIGHT, run.controller, run.freq_hz)
     )
     with_it, without = (quantity(residual_rad(m, r.trace), "rad") for r in (run, straight))
     return f"{cause}: {with_it} with hysteresis, {without} without"

@@ -38,7 +38,7 @@ def _trace(run: Run) -> Group:
         "drive": variable(("time",), t.drive_v[:, 0], "V", "amplifier output over its gain, about the bias"),
     }
     attributes = {
-        "mirror": run.mirror,
+        "mirror": str(run.mirror),
         "controller": run.controller,
         "frequency_hz": run.freq_hz,
         "peak_error_rad": t.peak_rad,
