@@ -20,6 +20,25 @@ with scratch("test") as one, whole_folder(Path(sys.argv[1]), False) as two:
     (two / "b").write_text("b")
     os.kill(os.getpid(), signal.SIGKILL)
 """
+REPLACING = """
+import os, shutil, signal, sys
+from pathlib import Path
+from microrad.core.folder import whole_folder
+
+def killed_at(call, of):
+    def called(path, *rest, **how):
+        if str(path).endswith(of):
+            os.kill(os.getpid(), signal.SIGKILL)
+        return call(path, *rest, **how)
+    return called
+
+if sys.argv[2] == "rename":
+    Path.rename = killed_at(Path.rename, ".part")
+else:
+    shutil.rmtree = killed_at(shutil.rmtree, ".old")
+with whole_folder(Path(sys.argv[1]), True):
+    pass
+"""
 
 
 def test_as_many_bytes_as_are_asked_for(tmp_path):
@@ -55,6 +74,29 @@ def test_what_a_killed_process_left_is_gone_with_the_next_run(tmp_path, monkeypa
         assert {path.name for path in tmp_path.iterdir()} == own_names | kept  # its own are alive
         assert not left & own_names
     assert {path.name for path in tmp_path.iterdir()} == kept
+
+
+@pytest.mark.skipif(os.name != "posix", reason="elsewhere no process can be asked for by its number without harm")
+@pytest.mark.parametrize("moment", ["rename", "rmtree"])
+def test_what_a_replacement_that_was_killed_left_goes_once_there_is_another_in_its_place(tmp_path, moment):
+    """Killed before the new one is in its place, or before the old one is removed."""
+    results = tmp_path / "results"
+    results.mkdir()
+    (results / "manifest.json").write_text('{"versions": {"microrad": "0"}, "mission": 1, "a": "old"}', "utf-8")
+    subprocess.run([sys.executable, "-c", REPLACING, results, moment], check=False)
+    (left,) = tmp_path.glob(".*.old")
+    assert '"old"' in (left / "results" / "manifest.json").read_text("utf-8")  # until then it is all that there is
+    assert results.exists() == (moment == "rmtree")
+    for name in (".results-other.old", ".else-x-1-y.old"):
+        (tmp_path / name).mkdir()
+    with pytest.raises(KeyError), whole_folder(results, True):
+        raise KeyError
+    assert left.exists()
+    with whole_folder(results, True) as draft:
+        (draft / "b").write_text("b")
+        assert left.exists()
+    assert {path.name for path in tmp_path.iterdir()} == {"results", ".results-other.old", ".else-x-1-y.old"}
+    assert [path.name for path in results.iterdir()] == ["b"]
 
 
 @pytest.mark.skipif(os.name != "posix", reason="elsewhere no process can be asked for by its number without harm")

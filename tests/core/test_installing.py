@@ -86,16 +86,36 @@ def test_make_installs_by_the_hashes():
     assert "--constraint" not in hashed
 
 
-def test_doctor_notes_other_versions_than_the_tested_ones(tmp_path, monkeypatch):
+def test_doctor_refuses_other_versions_than_the_tested_ones(tmp_path, monkeypatch, call):
     pinned = tmp_path / "constraints.txt"
     monkeypatch.setattr(installation, "_CONSTRAINTS", pinned)
-    ok, found = installation._pins()
-    assert ok and found.startswith("not compared")
-    numpy = metadata.version("numpy")
+    assert installation._pins().ok and installation._pins().found.startswith("not compared")
+    numpy, scipy = metadata.version("numpy"), metadata.version("scipy")
     pinned.write_text(f"numpy=={numpy}\nnot-there==1.0\n")
-    assert installation._pins() == (True, "those of constraints.txt")
-    pinned.write_text("numpy==1.0.1\nnot-there==1.0\n")
-    assert installation._pins() == (True, f"not those of constraints.txt: numpy {numpy} (tested: 1.0.1)")
+    assert installation._pins() == installation.Check("pinned versions", True, "those of constraints.txt")
+    pinned.write_text("numpy==1.0.1\nnot-there==1.0\nscipy==1.0.2\n")
+    found = installation._pins()
+    assert not found.ok
+    assert found.found == (
+        f"not those of constraints.txt: numpy {numpy} (tested: 1.0.1), scipy {scipy} (tested: 1.0.2)"
+    )
+    assert found.advice == ("in the project's folder: python -m pip install --constraint constraints.txt numpy scipy")
+    result = call("doctor")
+    assert result.code == 1
+    assert f"problem pinned versions {found.found}; {found.advice} ok kernels " in " ".join(result.out.split())
+
+
+def test_doctor_keeps_to_80_columns_and_cuts_no_word():
+    path = f"/{'folder' * 20}"
+    checks = (
+        installation.Check("python", True, "3.11"),
+        installation.Check("kernels", False, f"{path} is not writable", "set NUMBA_CACHE_DIR " * 5),
+    )
+    lines = installation.text(checks, 80).splitlines()
+    assert lines[:3] == ["ok       python            3.11", "problem  kernels", f"{' ' * 9}{path}"]
+    assert len(lines) > 4
+    assert all(len(line) <= 80 or line.split() == [path] for line in lines)
+    assert all(line.startswith(("ok ", "problem ", " " * 9)) for line in lines)
 
 
 # --------------------------------------------------------------------------------------------------------- the licences

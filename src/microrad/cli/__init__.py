@@ -179,8 +179,8 @@ def reproduce(
 def doctor(as_json: Json = False) -> Outcome:
     """Check the installation.
 
-    Versions, the compiled kernels against a known number, their cache, the packaged mission. The exit code is 1 when
-    something is wrong.
+    Versions, those of the libraries against the tested ones, the compiled kernels against a known number, their cache,
+    the packaged mission. The exit code is 1 when something is wrong.
     """
     from microrad.cli import installation as checks
 
@@ -188,10 +188,7 @@ def doctor(as_json: Json = False) -> Outcome:
     ok = all(check.ok for check in found)
     if as_json:
         return Outcome(json_text({"ok": ok, "checks": [asdict(c) for c in found]}), int(not ok))
-    lines = [
-        f"{'ok' if c.ok else 'problem':8} {c.name:17} {'; '.join(filter(None, (c.found, c.advice)))}" for c in found
-    ]
-    return Outcome("\n".join(lines), int(not ok))
+    return Outcome(checks.text(found, width()), int(not ok))
 
 
 @app.command(epilog=examples("microrad schema > mission.schema.json"))

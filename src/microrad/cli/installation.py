@@ -9,7 +9,8 @@ import platform
 import re
 import sys
 import tempfile
-from collections.abc import Callable, Iterator
+import textwrap
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import partial
 from importlib import import_module, metadata, resources
@@ -26,6 +27,7 @@ _TOLERANCE = 0.01  # in the units above: the last printed digit
 _FLOOR = re.compile(r"([A-Za-z0-9_.-]+)\s*>=\s*([0-9.]+)")
 _REINSTALL = f"install again {advice('', '--force-reinstall')}"
 _CONSTRAINTS = Path(__file__).resolve().parents[3] / "constraints.txt"
+_PINNED = "pinned versions"
 _CACHE_ADVICE = "set NUMBA_CACHE_DIR to a folder that you may write to: without a cache every start compiles anew"
 
 
@@ -44,11 +46,20 @@ def run() -> tuple[Check, ...]:
     return (
         _check("python", _python, "use a Python that microrad supports"),
         *_libraries(),
-        _check("pinned versions", _pins, _REINSTALL),
+        _pins(),
         _check("kernels", _kernels, f"reinstall numba, or {_CACHE_ADVICE}"),
         _check("kernel cache", _cache, _CACHE_ADVICE),
         _check("packaged mission", _mission, _REINSTALL),
     )
+
+
+def text(checks: Iterable[Check], width: int) -> str:
+    """A line for each check, in at most ``width`` columns but for a single word; what goes on is set in."""
+    lines = (
+        f"{'ok' if c.ok else 'problem':8} {c.name:17} {'; '.join(filter(None, (c.found, c.advice)))}" for c in checks
+    )
+    whole = textwrap.TextWrapper(width, subsequent_indent=" " * 9, break_long_words=False, break_on_hyphens=False)
+    return "\n".join("\n".join(whole.wrap(line)) for line in lines)
 
 
 def _check(name: str, probe: Callable[[], tuple[bool, str]], advice: str) -> Check:
@@ -86,16 +97,21 @@ def _library(name: str, lowest: str) -> tuple[bool, str]:
     return _numbers(version) >= _numbers(lowest), f"{version}, wanted {lowest} or later"
 
 
-def _pins() -> tuple[bool, str]:
-    """What is installed in another version than the tested one: a note, the first suspect of a number that differs."""
+def _pins() -> Check:
+    """Whether all that is installed has the version that was tested: the first suspect of a number that differs."""
     if not _CONSTRAINTS.is_file():
-        return True, "not compared: installed without the project's folder, where constraints.txt stands"
-    pinned, other = dict(re.findall(r"(\S+)==(\S+)", _CONSTRAINTS.read_text(encoding="utf-8"))), []
+        return Check(
+            _PINNED, True, "not compared: installed without the project's folder, where constraints.txt stands"
+        )
+    pinned, other = dict(re.findall(r"(\S+)==(\S+)", _CONSTRAINTS.read_text(encoding="utf-8"))), {}
     for name, version in pinned.items():
         with contextlib.suppress(metadata.PackageNotFoundError):
             if (found := metadata.version(name)) != version:
-                other.append(f"{name} {found} (tested: {version})")
-    return True, f"not those of constraints.txt: {', '.join(other)}" if other else "those of constraints.txt"
+                other[name] = f"{name} {found} (tested: {version})"
+    if not other:
+        return Check(_PINNED, True, "those of constraints.txt")
+    command = f"in the project's folder: python -m pip install --constraint constraints.txt {' '.join(other)}"
+    return Check(_PINNED, False, f"not those of constraints.txt: {', '.join(other.values())}", command)
 
 
 def _numbers(version: str) -> tuple[int, ...]:

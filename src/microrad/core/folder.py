@@ -17,6 +17,7 @@ from pathlib import Path
 
 MANIFEST = "manifest.json"
 _MOST_MANIFEST = 64_000_000
+_OLD = ".old"
 
 DRAFT = ".draft"
 """End of the name of a file that is not whole yet."""
@@ -102,13 +103,21 @@ def scratch(what: str, beside: Path | None = None) -> Iterator[Path]:
 
 def _new_folder(parent: Path, name: str, suffix: str = "") -> Path:
     """A new folder for this process; those of the name that processes left here when they were killed are removed."""
-    own = f"{name}-{re.sub(r'[^A-Za-z0-9]', '_', platform.node())}-"
-    form = re.compile(rf"{re.escape(own)}(\d{{1,9}})-\w+{re.escape(suffix)}")
+    _sweep(parent, name, suffix)
+    return Path(tempfile.mkdtemp(prefix=f"{_on_this_machine(name)}{os.getpid()}-", suffix=suffix, dir=parent))
+
+
+def _sweep(parent: Path, name: str, suffix: str) -> None:
+    """Remove the folders of the name that processes left here when they were killed."""
+    form = re.compile(rf"{re.escape(_on_this_machine(name))}(\d{{1,9}})-\w+{re.escape(suffix)}")
     with suppress(OSError):  # of a folder that may be written and not be read
         for path in parent.iterdir():
             if (found := form.fullmatch(path.name)) and _left_behind(path, int(found[1])):
                 shutil.rmtree(path, ignore_errors=True)
-    return Path(tempfile.mkdtemp(prefix=f"{own}{os.getpid()}-", suffix=suffix, dir=parent))
+
+
+def _on_this_machine(name: str) -> str:
+    return f"{name}-{re.sub(r'[^A-Za-z0-9]', '_', platform.node())}-"
 
 
 def _left_behind(path: Path, process: int) -> bool:
@@ -128,11 +137,15 @@ def _left_behind(path: Path, process: int) -> bool:
 
 
 def _replace(draft: Path, folder: Path) -> None:
-    """Put ``draft`` where ``folder`` is; the old one is put back when that fails."""
+    """Put ``draft`` where ``folder`` is; the old one is put back when that fails.
+
+    A kill between the two leaves the old one aside. It goes once there is another in its place.
+    """
     if not folder.exists():
         draft.rename(folder)
+        _sweep(folder.parent, f".{folder.name}", _OLD)
         return
-    old = Path(tempfile.mkdtemp(prefix=f".{folder.name}-", suffix=".old", dir=folder.parent))
+    old = _new_folder(folder.parent, f".{folder.name}", _OLD)
     folder.rename(old / folder.name)
     try:
         draft.rename(folder)
