@@ -5,7 +5,6 @@ from pathlib import Path
 
 import pytest
 
-from microrad import cli
 from microrad.campaign import bundle
 from microrad.cli import campaign as cli_campaign
 from microrad.cli import export as cli_export
@@ -13,9 +12,10 @@ from microrad.cli import frame
 from microrad.core.folder import FolderError, check_folder
 from microrad.export import matrices_mat
 from microrad.export.records import ExportError
-from microrad.lab.bench import files as bench_files
+from microrad.lab.bench import folder
 from microrad.lab.bench.play import BenchError
 from microrad.loop import disturbance
+from microrad.mission import file as mission_file
 from microrad.mission.file import MissionError
 from microrad.report import carried
 from microrad.studio import compare_view, runs_view
@@ -60,7 +60,7 @@ def of_campaign(path):
         ("m.toml", Draft.open, MissionError, f"cannot be read: {MISSING}"),
         ("m.toml", lambda path: Draft.shipped(path).save(), DraftError, "cannot be written: it is no file on disk"),
         ("old/manifest.json", lambda p: check_folder(p.parent, True), FolderError, "are not results of microrad"),
-        ("old/manifest.json", lambda p: bench_files.read_folder(p.parent), BenchError, "no manifest.json of microrad"),
+        ("old/manifest.json", lambda p: folder.read_folder(p.parent), BenchError, "no manifest.json of microrad"),
         ("page.html", lambda p: frame.check_target(p, "choose another", "<!"), BlockingIOError, MISSING),
         ("page.html", lambda p: cli_campaign._check_output(p, True), BlockingIOError, MISSING),
         ("model.mat", lambda p: cli_export._check_file(p, True, b"MATLAB"), BlockingIOError, MISSING),
@@ -79,7 +79,7 @@ def test_what_never_comes_is_none_of_what_is_looked_for(never, tmp_path):
     workshop = Workshop(tmp_path)
     assert compare_view.finished_study(workshop, workshop.draft) is None
     assert not runs_view._of_campaign(never("c.toml"), 0, 0)
-    assert cli._content(never("named.csv")) is None
+    assert mission_file._content(never("named.csv")) is None
 
 
 def test_a_mission_that_names_a_spectrum_which_never_comes_is_refused(never, tmp_path, call):

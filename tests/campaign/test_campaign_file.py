@@ -216,6 +216,7 @@ REFUSED = {
     "a table as key": ("communication.transmit_power", "communication", "inputs.communication", "is a table"),
     "a key behind a value": ("transmit_power", "transmit_power.x", "inputs.communication.transmit_power.x", "goes on"),
 }
+THOUSAND = ".a" * 999
 ADDED = {
     "a key in set and inputs": (
         '[set]\n"communication.transmit_power" = "4 W"',
@@ -461,6 +462,22 @@ def test_what_does_not_fit_is_refused_with_its_key(tmp_path, what):
     assert reason in found[0].reason
     assert found[0].expected
     assert found[0].line > 0
+
+
+@pytest.mark.parametrize(
+    ("added", "reason"),
+    [
+        (f"[set]\na{THOUSAND} = 1", "is a key of 2003 characters"),
+        (f"set.a{THOUSAND} = 1", "is a key of 2003 characters"),
+        (f"[set.a{THOUSAND}]\nb = 1", "is a key of 2003 characters"),
+        (f'[set]\n"a{THOUSAND}" = 1', "is a key of 2003 characters"),
+        (f"[set]\na = {{b{THOUSAND} = 1}}", "holds a key of more than 50 parts"),
+    ],
+    ids=["key", "keys", "table", "quoted", "inline"],
+)
+def test_a_set_of_a_thousand_parts_is_told(tmp_path, added, reason):
+    """It was a traceback."""
+    assert [fault.reason for fault in faults(tmp_path, placed(HEAD + POWER, added))] == [reason]
 
 
 @pytest.mark.parametrize(

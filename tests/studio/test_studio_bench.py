@@ -9,6 +9,7 @@ import pytest
 
 from microrad.core.kernels import bouc_wen_response
 from microrad.lab.identify import STATIC, identify
+from microrad.lab.live_fit import FITS, LiveFit, Loop, looker_on, thinned
 from microrad.lab.recording import RecordingError, read_recording, recording_from_arrays
 from microrad.loop import fine_pointing
 from microrad.loop import paper_cases as tracking
@@ -18,7 +19,6 @@ from microrad.studio import control_model, control_view, live_fit, mirror_form, 
 from microrad.studio.control_model import PID, PID_INVERSE, WITH, WITHOUT
 from microrad.studio.draft import Draft
 from microrad.studio.jobs_files import Job, Progress
-from microrad.studio.live_fit import LiveFit, Loop
 from microrad.studio.mirror_form import Dropped, Form, Setting, SettingError
 from microrad.studio.mirror_use import with_mirror_file
 from microrad.studio.reading import ChannelInfo, Listing, Note, View
@@ -53,13 +53,13 @@ def test_each_model_is_handed_over_as_it_is_scored_in_the_end(identified):
 
 def test_fits_are_read_as_they_were_written(identified, tmp_path):
     _, seen = identified
-    look = live_fit.looker_on(str(tmp_path / "progress"))
+    look = looker_on(str(tmp_path / "progress"))
     assert live_fit.read_fits(tmp_path) == ()
     for n, each in enumerate(seen, start=1):
         look(each)
         assert len(live_fit.read_fits(tmp_path)) == n
     fits = live_fit.read_fits(tmp_path)
-    assert fits == tuple(live_fit.live_fit(each) for each in seen)
+    assert fits == tuple(thinned(each) for each in seen)
     loop = fits[1].loops[0]
     assert loop.name == "50Hz.csv"
     assert len(loop.drive) == len(loop.model_rad) == len(loop.measured_rad) == 200  # two periods of 100 samples
@@ -71,19 +71,19 @@ def test_fits_are_read_as_they_were_written(identified, tmp_path):
 
 
 def test_a_line_that_is_being_written_is_left_out(identified, tmp_path):
-    look = live_fit.looker_on(str(tmp_path / "progress"))
+    look = looker_on(str(tmp_path / "progress"))
     look(identified[1][0])
-    with (tmp_path / live_fit.FITS).open("a") as file:
+    with (tmp_path / FITS).open("a") as file:
         file.write('{"model": "bouc_w')
     assert [each.model for each in live_fit.read_fits(tmp_path)] == ["prandtl_ishlinskii"]
 
 
 def test_nobody_looks_on_without_a_file_and_a_disk_that_refuses_does_not_end_the_fit(identified, tmp_path):
-    live_fit.looker_on(None)(identified[1][0])
-    (tmp_path / live_fit.FITS).mkdir()
-    live_fit.looker_on(str(tmp_path / "progress"))(identified[1][0])
+    looker_on(None)(identified[1][0])
+    (tmp_path / FITS).mkdir()
+    looker_on(str(tmp_path / "progress"))(identified[1][0])
     assert live_fit.read_fits(tmp_path) == ()
-    assert [each.name for each in tmp_path.iterdir()] == [live_fit.FITS]
+    assert [each.name for each in tmp_path.iterdir()] == [FITS]
 
 
 def test_the_command_writes_its_fits_beside_its_progress(call, folder, monkeypatch):
