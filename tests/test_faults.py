@@ -2,6 +2,8 @@
 
 import importlib.machinery
 import importlib.util
+import queue
+import subprocess
 import sys
 from collections import Counter
 
@@ -47,3 +49,51 @@ def test_a_function_that_is_gone_is_told(faults):
     fault = faults.Fault("x", "link", "sign", "microrad.core.threads:gone", "a", "b", "")
     with pytest.raises(ValueError, match="0 definitions of microrad"):
         fault.planted(fault.file(ROOT).read_text(encoding="utf-8"))
+
+
+def test_the_table_is_that_of_the_results(faults):
+    assert faults.table() in (ROOT / "faults" / "README.md").read_text(encoding="utf-8")
+
+
+TWICE = "def in_threads(n):\n    return n * 2\n"
+A_TEST = "from microrad.core.threads import in_threads\n\n\ndef test_{0}():\n    assert in_threads({0}) {1}\n"
+
+
+@pytest.fixture
+def tiny(faults, tmp_path, monkeypatch):
+    """The script works on a tree of one module and two files of tests. Returns a mistake in it: n + 2 for 2 n."""
+    tree, core = tmp_path / "tree", tmp_path / "tree" / "src" / "microrad" / "core"
+    core.mkdir(parents=True)
+    for file, text in {core.parent / "__init__.py": "", core / "__init__.py": "", core / "threads.py": TWICE}.items():
+        file.write_text(text, encoding="utf-8")
+    (tree / "tests").mkdir()
+    (tree / "pytest.ini").write_text("[pytest]\n", encoding="utf-8")
+    (tree / "tests" / "test_blunt.py").write_text(A_TEST.format(2, "== 4"), encoding="utf-8")
+    (tree / "tests" / "test_sharp.py").write_text(A_TEST.format(3, "== 6"), encoding="utf-8")
+    for words in (["init", "-q"], ["add", "."]):
+        subprocess.run(["git", *words], cwd=tree, check=True)
+    monkeypatch.setattr(faults, "ROOT", tree)
+    monkeypatch.setattr(faults, "SUITE", ())
+    return faults.Fault("sum", "link", "sign", "microrad.core.threads:in_threads", "n * 2", "n + 2", "")
+
+
+def test_the_file_that_catches_a_fault_is_named_and_the_code_is_as_before(faults, tiny, tmp_path):
+    calling = faults.callers([tiny], tmp_path)["sum"]
+    assert sorted(calling) == ["tests/test_blunt.py::test_2", "tests/test_sharp.py::test_3"]
+    trees = queue.SimpleQueue()
+    trees.put(faults.copied(tmp_path / "copy"))
+    (tmp_path / "chosen.py").write_text(faults.CHOSEN, encoding="utf-8")
+    blunt = {name: s for name, s in calling.items() if "blunt" in name}
+    met = [faults.meet(trees, tiny, tests) for tests in (blunt, calling, None)]
+    assert [(each.caught_by, each.whole_suite) for each in met] == [
+        ("", False),
+        ("test_sharp.py", False),
+        ("test_sharp.py", True),
+    ]
+    assert (tmp_path / "copy/src/microrad/core/threads.py").read_text(encoding="utf-8") == TWICE
+
+
+def test_tests_that_fail_without_a_fault_are_told(faults, tiny, tmp_path):
+    (faults.ROOT / "tests" / "test_sharp.py").write_text(A_TEST.format(3, "== 7"), encoding="utf-8")
+    with pytest.raises(SystemExit, match=r"without a mistake these fail already: tests/test_sharp\.py::test_3$"):
+        faults.callers([tiny], tmp_path)

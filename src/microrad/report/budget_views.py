@@ -68,8 +68,8 @@ def csv_text(study: LinkStudy, solution: Solution | None = None) -> str:
     buffer = io.StringIO()
     writer = csv.writer(buffer, lineterminator="\n")
     writer.writerow(COLUMNS)
-    for name, solved, unit, basis in [] if solution is None else _solution_rows(solution):
-        writer.writerow([SOLVED, spreadsheet_text(name), repr(float(solved)), unit, basis, "", "", ""])
+    for solved in [] if solution is None else _solution_rows(solution):
+        writer.writerow([SOLVED, *solved, "", "", ""])
     jitter = [(UNDER_JITTER, line) for line in jitter_lines(study)]
     for name, line in (*lines(study), *jitter):
         value = repr(float(line.value))  # every digit, as JSON has it
@@ -318,17 +318,17 @@ def _solution_data(s: Solution) -> dict[str, Any]:
     return {**found, "intervals": ends, "searched": list(s.solved.searched), "value": s.value, "best": best}
 
 
-def _solution_rows(s: Solution) -> Iterator[tuple[str, float, str, str]]:
-    """Name, value, unit and basis of what was solved for."""
+def _solution_rows(s: Solution) -> Iterator[tuple[str, str, str, str]]:
+    """Name, value in full, unit and basis of what was solved for."""
     leaves = f"leaves the required {s.required_db:g} dB of {s.of}"
     for each in s.solved.intervals:
         for name, value, is_open in (("from", each.low, each.low_open), ("to", each.high, each.high_open)):
-            yield f"{s.key} {name}", value, s.unit, leaves + (", as far as was looked" if is_open else "")
+            yield f"{s.key} {name}", repr(value), s.unit, leaves + (", as far as was looked" if is_open else "")
     for name, value in zip(("from", "to"), s.solved.searched, strict=True):
-        yield f"{s.key} looked at {name}", value, s.unit, ""
-    yield f"{s.key} with the largest margin", s.solved.best, s.unit, ""
-    yield "Largest margin", s.solved.best_db, "dB", ""
-    yield f"{s.key} in the budgets below", s.value, s.unit, ""
+        yield f"{s.key} looked at {name}", repr(value), s.unit, ""
+    yield f"{s.key} with the largest margin", repr(s.solved.best), s.unit, ""
+    yield "Largest margin", repr(float(s.solved.best_db)), "dB", ""
+    yield f"{s.key} in the budgets below", repr(s.value), s.unit, ""
 
 
 def solution_text(s: Solution) -> str:
