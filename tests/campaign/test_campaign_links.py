@@ -15,7 +15,7 @@ from microrad.campaign.ledger import Ledger
 from microrad.campaign.records import CampaignError
 from microrad.campaign.summary import summarise
 from microrad.core import reads
-from microrad.link import LitAperture, radial_error
+from microrad.link import LitAperture, radial_error, under_jitter
 from microrad.link.inputs import LINK_TABLES
 from microrad.link.under_jitter import Exposure
 from microrad.mission.fields import Several
@@ -167,14 +167,32 @@ def test_each_item_of_a_list_has_its_own_key(tmp_path):
     assert both.mission.mission.jitter.rms_rad == (6e-6, 2e-6)
     (found,) = faults(tmp_path, "gallery", first.replace("rms.1", "rms.3"))
     assert (found.reason, found.expected) == ("is no item of jitter.rms, a list of 2", "jitter.rms.1 or jitter.rms.2")
-    (found,) = faults(tmp_path, "gallery", first.replace("rms.1", "rms"))
-    assert found.expected == "jitter.rms.1 and jitter.rms.2, each with its distribution"
     (found,) = faults(tmp_path, "gallery", '[grid]\n"jitter.rms.1" = ["1 urad", "1 m"]\n')
     assert (found.key, found.value) == ("grid.jitter.rms.1", '"1 m"')
     whole = '[inputs."jitter.rms"]\ndistribution = "table"\nvalues = [["1 urad", "1 urad"], ["2 urad", "1 urad"]]\n'
     assert np.ptp(rows(loaded(tmp_path, "gallery", whole), 4)["margin"]) > 0.0
     (found,) = faults(tmp_path, "gallery", whole + first)
     assert found.reason == "is an item of jitter.rms, which stands in [inputs] as a whole"
+
+
+def test_a_list_is_drawn_as_one_number_which_its_items_follow_in_proportion(tmp_path):
+    """As in --solve, the number is the largest item; the drawn margin is that of the mission with both items."""
+    path = mission(tmp_path, "gallery")
+    text = path.read_text(encoding="utf-8").replace('rms = ["6 urad", "6 urad"]', 'rms = ["6 urad", "3 urad"]')
+    path.write_text(text.replace('bias = ["4 urad", "0 urad"]', 'bias = ["4 urad", "-2 urad"]'), encoding="utf-8")
+    both = '[inputs."jitter.rms"]\ndistribution = "uniform"\nlow = "1 urad"\nhigh = "9 urad"\n'
+    campaign = loaded(tmp_path, "gallery", both)
+    assert (campaign.dimensions[0].key, campaign.dimensions[0].unit) == ("jitter.rms", "rad")
+    found = rows(campaign, 4)
+    assert np.ptp(found["jitter.rms"]) > 1e-6
+    for drawn_rad, margin_db in zip(found["jitter.rms"], found["margin"], strict=True):
+        m = Builder(campaign).mission(0, {"jitter.rms": float(drawn_rad)}).mission
+        assert m.jitter.rms_rad == (drawn_rad, drawn_rad / 2)
+        assert margin_db == pytest.approx(under_jitter.margin_db(m), abs=1e-12)
+    (wrong,) = faults(tmp_path, "gallery", both.replace('"9 urad"', '"9 W"'))
+    assert wrong.key == "inputs.jitter.rms.high"
+    (signed,) = faults(tmp_path, "gallery", both.replace("rms", "bias"))
+    assert signed.expected == "jitter.bias.1 and jitter.bias.2, each with its distribution"
 
 
 # ------------------------------------------------------------------------------------------------ nothing done twice

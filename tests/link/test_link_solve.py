@@ -73,7 +73,7 @@ def test_a_key_of_two_axes_keeps_their_proportion_and_an_axis_stands_by_itself(t
     both = solved(tmp_path, "jitter.rms", NO_BEAMS, UNLIKE)
     x, y = both.file.mission.jitter.rms_rad
     assert y == pytest.approx(x * 2.0 / 3.0, rel=1e-12) and x == both.value == only(both).high
-    one = solved(tmp_path, "jitter.rms y", NO_BEAMS, UNLIKE)
+    one = solved(tmp_path, "jitter.rms.2", NO_BEAMS, UNLIKE)
     assert one.file.mission.jitter.rms_rad == (3e-6, only(one).high)
 
 

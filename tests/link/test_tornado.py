@@ -193,20 +193,20 @@ def test_the_margin_under_jitter_over_its_inputs(tmp_path, changes):
     assert under.of == "Communication"
     assert under.margin_db == pytest.approx(link_performance.of_jitter(m).margin_db, abs=1e-9)
     found = {each.key: each for each in under.swings}
-    assert {"jitter.bias x", "jitter.rms x", "jitter.rms y", "requirement.outage"} <= found.keys()
+    assert {"jitter.bias.1", "jitter.rms.1", "jitter.rms.2", "requirement.outage"} <= found.keys()
     assert {"communication.transmit_power", "terminals.leo_aperture"} <= found.keys()
     # a bias of 0 has no share to be moved by; the static error and how fast it moves are not in it
     assert (
-        not {"jitter.bias y", "jitter.bandwidth", "communication.pointing_error", "requirement.margin"} & found.keys()
+        not {"jitter.bias.2", "jitter.bandwidth", "communication.pointing_error", "requirement.margin"} & found.keys()
     )
     outage = found["requirement.outage"]
     assert (outage.low, outage.high) == pytest.approx((0.0003, 0.03), rel=1e-12)
     assert outage.margin_low_db < under.margin_db < outage.margin_high_db
     assert outage.source.startswith("mission file, line")
     for key, place, item in (
-        ("jitter.bias x", "bias_rad", 0),
-        ("jitter.rms x", "rms_rad", 0),
-        ("jitter.rms y", "rms_rad", 1),
+        ("jitter.bias.1", "bias_rad", 0),
+        ("jitter.rms.1", "rms_rad", 0),
+        ("jitter.rms.2", "rms_rad", 1),
     ):
         each = found[key]
         assert (each.low, each.high) == pytest.approx((0.9 * each.value, 1.1 * each.value), rel=1e-12)

@@ -441,6 +441,11 @@ def test_what_nothing_reads_may_be_left_out(tmp_path):
         found, text = the_fault(tmp_path, {key: None})
         assert found == key
         assert text.startswith("is missing, and ")
+    assert link_file(tmp_path, {"requirement.outage": None}).mission.requirement.outage is None
+    jitter = {"jitter": {"bias": ["0 urad", "0 urad"], "rms": ["5 urad", "5 urad"], "bandwidth": "50 Hz"}}
+    found, text = the_fault(tmp_path, {"requirement.outage": None, **jitter})
+    assert found == "requirement.outage"
+    assert text.startswith("is missing, and the margin under the table jitter is the one that is kept but for it")
     without = {**gone, "conventions.strehl": None, "communication.strehl": None}
     m = link_file(tmp_path, {**without, "communication.wavefront_error": "60 nm"}).mission
     assert (m.conventions.strehl, m.conventions.divergence) == ("unused", "unused")

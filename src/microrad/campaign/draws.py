@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 from microrad.campaign import distributions
 from microrad.campaign.distributions import AnyTable, Distribution
 from microrad.campaign.inputs import Base, Draw
-from microrad.campaign.keys import MIRROR, Key, find, item_keys
+from microrad.campaign.keys import MIRROR, Key, as_one, find, item_keys, within
 from microrad.campaign.reading import Reading, is_number, quoted_near
 from microrad.campaign.records import InputText
 from microrad.campaign.tables import VariableTable
@@ -44,6 +44,8 @@ class DrawReader:
         if key == MIRROR or isinstance(table, distributions.IdentifiedTable):
             return self._identified(at, key, table)
         found = self.on.key("inputs", key, None, self.data)
+        if found is not None and not isinstance(table, distributions.ListTable):
+            found = as_one(found, within(self.data, key))
         distribution = None if found is None else self._mostly_inside(at, found, table)
         if found is None or distribution is None:
             return None
@@ -116,10 +118,8 @@ class DrawReader:
             return self._one_of(at, key, table)
         rule = key.numeric
         if isinstance(key.rule, Several):
-            own = self.data
-            for part in key.text.split("."):
-                own = own.get(part, {})
-            items = " and ".join(item_keys(key.text, len(own)))
+            own = within(self.data, key.text)
+            items = " and ".join(item_keys(key.text, len(own))) if isinstance(own, list) else ""
             advice = f"{items or 'a list that the mission has'}, each with its distribution"
             self.on.fault(at, None, "is a list, whose items are drawn each by its own key", advice)
             return None
@@ -209,7 +209,7 @@ def failing(draws: tuple[Draw, ...], data: Mapping[str, Any], rows: int) -> Iter
         drawn = draw.drawn_as or draw.distribution
         if drawn is None:
             continue  # an identification draws again what is no mirror
-        share, where = outside_of(find(draw.key, data), drawn)
+        share, where = outside_of(as_one(find(draw.key, data), within(data, draw.key)), drawn)
         if share * rows >= _HARDLY:
             yield (
                 f"{_percent(share)} of the draws of {draw.key} are {where}: those rows will fail, and the results will "

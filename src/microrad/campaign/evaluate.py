@@ -12,7 +12,7 @@ from microrad import link
 from microrad.campaign.outputs import OUTPUTS
 from microrad.core import kernels
 from microrad.link.requirement import IMPOSSIBLE
-from microrad.link.under_jitter import Exposure
+from microrad.link.under_jitter import Exposure, stated_outage
 from microrad.loop import fine_pointing
 from microrad.loop.fine_loop import ensemble
 from microrad.mission.file import LinkFile
@@ -65,7 +65,7 @@ def _residual(m: Mission, runs: ensemble.Ensemble) -> dict[str, Callable[[], flo
 # --------------------------------------------------------------------------------------------------------------- links
 def _simulated(m: LinkMission, runs: ensemble.Ensemble) -> Exposure:
     """From the histogram of the radial error alone."""
-    return Exposure.of(m, runs.quantile_rad(1.0 - m.requirement.outage), runs.beyond)
+    return Exposure.of(m, runs.quantile_rad(1.0 - stated_outage(m)), runs.beyond)
 
 
 def _possible(under: Exposure) -> Exposure:

@@ -8,7 +8,7 @@ from typing import Any, Protocol
 from pydantic import ValidationError
 
 from microrad.campaign.distributions import Distribution, OneOf
-from microrad.campaign.keys import MIRROR, Key, UnknownKeyError, find, put, rule_in, touches_loop
+from microrad.campaign.keys import MIRROR, Key, UnknownKeyError, as_one, find, put, rule_in, touches_loop, within
 from microrad.campaign.reading import FILE_WORD
 from microrad.campaign.records import CampaignError
 from microrad.mission.fields import Several
@@ -102,12 +102,15 @@ class Builder:
         return put(data, key, raw), str(raw)
 
     def _single(self, cell: int, key: str) -> Key | None:
-        """The key of a single value; None for a whole list of an identified mirror."""
+        """The key of a single value, or of a list as one; None for a whole list of an identified mirror."""
         if (cell, key) not in self._singles:
+            data = self._bases[cell].data
             try:
-                found: Key | None = find(key, self._bases[cell].data)
+                found: Key | None = find(key, data)
             except UnknownKeyError:
                 found = None
+            if found is not None and not (self._identified and key.startswith(f"{MIRROR}.")):
+                found = as_one(found, within(data, key))
             is_list = found is not None and isinstance(found.rule, Several)
             self._singles[cell, key] = None if is_list else found
         return self._singles[cell, key]

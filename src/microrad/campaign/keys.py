@@ -2,7 +2,7 @@
 
 import difflib
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, get_args, get_origin
 
 from pydantic.fields import FieldInfo
@@ -37,13 +37,15 @@ class Key:
     """A key of a mission: the table that it stands in, its name there, and its rule where it holds quantities.
 
     ``numeric`` says that single values of it can be drawn: a quantity, or a plain number, that is not a list. Of a list
-    each ``item`` has a key of its own, its place from 1 behind that of the list, and the rule of one item.
+    each ``item`` has a key of its own, its place from 1 behind that of the list, and the rule of one item. A list as
+    one number (`as_one`) has the ``shares`` that its items are of the largest.
     """
 
     text: str
     table: type[Table]
     rule: Quantity | Several | None
     item: int | None = None
+    shares: tuple[float, ...] = ()
 
     @property
     def name(self) -> str:
@@ -67,6 +69,8 @@ class Key:
         """A value in SI units as a mission file has it; it is read back to the same bits."""
         if isinstance(self.rule, Whole):
             return int(value)
+        if self.shares:
+            return [replace(self, shares=()).written(value * share) for share in self.shares]
         return f"{value!r} {self.unit}" if self.unit else value
 
 
@@ -104,6 +108,30 @@ def _find(table: type[Table], parts: tuple[str, ...], at: int, data: object) -> 
         keys = [info.alias or name for name, info in kind.model_fields.items()]
         raise UnknownKeyError("is a table and no value", f"one of its keys {', '.join(keys)}")
     return _find(kind, parts, at + 1, inside)
+
+
+def as_one(key: Key, items: object) -> Key:
+    """The key of a list as one number, its largest item, which the others follow in proportion, as in `--solve`.
+
+    ``items`` are those of the mission. Any other key, and a list with a negative item or nothing but 0, stays as it is.
+    """
+    if not isinstance(key.rule, Several) or type(key.rule.each) is not Quantity or not isinstance(items, list):
+        return key
+    try:
+        values = [key.rule.each.read(item) for item in items]
+    except ValueError:
+        return key
+    largest = max(values, default=0.0)
+    if largest <= 0.0 or min(values) < 0.0:
+        return key
+    return replace(key, rule=key.rule.each, shares=tuple(value / largest for value in values))
+
+
+def within(data: object, key: str) -> object:
+    """What raw data have at a key, or None."""
+    for name in key.split("."):
+        data = _at(data, name)
+    return data
 
 
 def _item(parts: tuple[str, ...], items: object) -> int:

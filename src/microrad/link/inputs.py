@@ -25,7 +25,6 @@ LINK_TABLES = (
 """The tables with the inputs of the communication link."""
 
 Beam = Literal["beacon", "answer"]
-_AXES = ("x", "y")
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,8 +40,8 @@ class Input:
 
     @property
     def shown(self) -> str:
-        """The key, with the axis of an item."""
-        return self.key if self.item is None else f"{self.key} {_AXES[self.item]}"
+        """The key, of an item with its place from 1 behind it, as campaigns name it."""
+        return self.key if self.item is None else f"{self.key}.{self.item + 1}"
 
     def moved(self, mission: LinkMission, value: float) -> LinkMission:
         """The mission with this number replaced."""

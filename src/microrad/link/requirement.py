@@ -7,6 +7,7 @@ from typing import Literal
 from microrad import link
 from microrad.link.budget import FREE_SPACE_LOSS
 from microrad.link.study import LinkStudy
+from microrad.link.under_jitter import stated_outage
 from microrad.mission.model import LinkMission, Source
 
 Subject = Literal["cone", "beacon", "answer", "communication", "residual", "stroke", "fine pointing"]
@@ -78,7 +79,7 @@ def of_beams(study: LinkStudy) -> tuple[Requirement, ...]:
 
 def outage_words(m: LinkMission) -> str:
     """The share of the time that the required margin may be missed."""
-    return f"{100 * m.requirement.outage:g} % of the time"
+    return f"{100 * stated_outage(m):g} % of the time"
 
 
 def derived_from(sources: Mapping[str, Source], *keys: str) -> tuple[str, ...]:

@@ -14,7 +14,7 @@ from microrad.core.budget import Line
 from microrad.core.units import format_quantity
 from microrad.link import pointing
 from microrad.link.partner_search import Finding, Tracking, finding, tracking
-from microrad.link.under_jitter import Performance, error_rad, margin_db, of_jitter, required_error_rad
+from microrad.link.under_jitter import Performance, error_rad, margin_db, of_jitter, required_error_rad, stated_outage
 from microrad.mission.file import LinkFile
 from microrad.mission.model import LinkMission, Source, source_text
 
@@ -207,7 +207,7 @@ def communication_budget(m: LinkMission, sources: Mapping[str, Source]) -> link.
     if m.jitter is None:
         return link.communication_budget(m, sources)
     stated = source_text(sources, "jitter.bias", "jitter.rms", "requirement.outage")
-    given = f"error that the jitter exceeds for {100 * m.requirement.outage:g} % of the time: {stated}"
+    given = f"error that the jitter exceeds for {100 * stated_outage(m):g} % of the time: {stated}"
     found = link.communication_budget(m, sources, pointing_error_rad=error_rad(m), given_source=given)
     static = link.communication_budget(m, sources)
     basis = f"at {format_quantity(m.communication.pointing_error_rad, 'rad')} of pointing error, without the jitter"

@@ -24,8 +24,8 @@ Margin = Callable[[LinkMission], float]
 class Swing:
     """The margin with one input moved down to ``low`` and up to ``high``, both in ``unit``, all others as they are.
 
-    ``kind`` is the kind of source that the input has, "assumption" for one. An item of a list has its axis behind the
-    key.
+    ``kind`` is the kind of source that the input has, "assumption" for one. An item of a list has its place
+    from 1 behind the key.
     """
 
     key: str

@@ -188,7 +188,14 @@ def error_rad(m: LinkMission) -> float:
     """
     if m.jitter is None:
         return m.communication.pointing_error_rad
-    return _exact_quantile_rad(_given(m.jitter), m.requirement.outage)
+    return _exact_quantile_rad(_given(m.jitter), stated_outage(m))
+
+
+def stated_outage(m: LinkMission) -> float:
+    """Share of the time that the required margin may be missed, in a mission that has a jitter or a loop."""
+    share = m.requirement.outage
+    assert share is not None  # such a mission has to state it
+    return share
 
 
 def required_error_rad(m: LinkMission) -> float:
@@ -222,8 +229,8 @@ def performance(
     motion: pointing.SpectralMotion | None,
 ) -> Performance:
     """The link under these errors; ``motion`` is what their spectrum says, None where it is not known."""
-    q = m.requirement
-    under = Exposure.of(m, spread.quantile_rad(1.0 - q.outage), spread.beyond)
+    q, kept = m.requirement, 1.0 - stated_outage(m)
+    under = Exposure.of(m, spread.quantile_rad(kept), spread.beyond)
     fall, ahead = under.fall, under.ahead_rad
     half, shifted = fall.half_angle_rad, with_point_ahead(jitter, ahead)
     fades_per_s, fade_s, warning = _fades(shifted, motion, fall, under.on_axis_db - q.margin_db)
@@ -240,7 +247,7 @@ def performance(
         outage=under.short_of(0.0),
         short=under.short_of(q.margin_db),
         data_rate_bit_s=_rate(m, under.outage_loss_db),
-        best=_best(spread, 1.0 - q.outage, half, ahead),
+        best=_best(spread, kept, half, ahead),
         uncoded_penalty_db=_uncoded(m, shifted, half),
         fades_per_s=fades_per_s,
         fade_s=fade_s,

@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 
 from microrad.core.units import format_quantity
-from microrad.mission.fields import Problem, Quantity, Several, Table
+from microrad.mission.fields import Problem, Quantity, Several, Share, Table
 from microrad.mission.tables.acquisition import Acquisition
 from microrad.mission.tables.fine_pointing import FinePointing, clock_problems
 from microrad.mission.tables.link import (
@@ -101,6 +101,7 @@ class Conventions(LinkConventions):
 class Requirement(LinkRequirement):
     """What has to be met."""
 
+    outage: Annotated[float, Share("")] = Field(description="share of the time that the required margin may be missed")
     residual_statistic: Literal["peak", "rms"] = Field(description="which number of the residual has to meet it")
 
 
@@ -180,6 +181,13 @@ def _cone_fits(pointing: Pointing | None, beacon: Beacon | None) -> Iterator[Pro
         yield Problem("pointing", reason, "the table [pointing] with its lines, or no beacon")
 
 
+def _outage_given(jitter: JitterTable | None, requirement: LinkRequirement) -> Iterator[Problem]:
+    """Under a jitter the margin is judged at an outage."""
+    if jitter is not None and requirement.outage is None:
+        reason = "is missing, and the margin under the table jitter is the one that is kept but for it"
+        yield Problem("requirement.outage", reason, "a share of the time, outage = 0.003 for 0.3 %")
+
+
 def _point_ahead_fits(point_ahead: PointAhead | None, fine: FinePointing | None) -> Iterator[Problem]:
     """One point-ahead: the mirror's largest is that of the largest velocity."""
     if point_ahead is None or fine is None:
@@ -226,6 +234,7 @@ LINK_RELATIONS: tuple[Relation, ...] = (
     (("conventions", "communication"), pattern_fits),
     (("terminals", "communication"), obscuration_fits),
     (("pointing", "beacon"), _cone_fits),
+    (("jitter", "requirement"), _outage_given),
     (("orbit", "operations"), _needs_orbit("operations")),
     (("orbit", "constellation"), _needs_orbit("constellation")),
     (("operations", "acquisition"), _scan_there),

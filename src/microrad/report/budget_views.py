@@ -259,11 +259,10 @@ def pointing_sentences(p: OpenLoopPointing) -> list[str]:
 
 def performance(p: Performance, study: LinkStudy) -> str:
     """The link under its jitter, in two sentences."""
-    q = study.file.mission.requirement
     narrowest = ", the narrowest of the aperture" if p.best.at_limit else ""
     return (
         f"Under the jitter: mean pointing loss {p.mean_loss_db:.2f} dB; {p.outage_loss_db:.2f} dB but for "
-        f"{100 * q.outage:g} % of the time, which leaves a margin of {signed(p.margin_db, 'dB')}; below 0 dB for a "
+        f"{outage_words(study.file.mission)}, which leaves a margin of {signed(p.margin_db, 'dB')}; below 0 dB for a "
         f"share of {quantity(p.outage, '')} of the time; best half angle "
         f"{quantity(p.best.half_angle_rad, 'rad')}{narrowest}. "
         f"Power that it costs: with a code {p.mean_loss_db:.2f} dB where its interleaver spans many fades, "

@@ -14,6 +14,7 @@ from microrad.core.units import format_quantity
 from microrad.link import Swing, Tornado
 from microrad.link.acquisition import Trade
 from microrad.link.partner_search import Finding
+from microrad.link.requirement import outage_words
 from microrad.link.study import LinkStudy
 from microrad.report.day_assumptions import swing_bars
 from microrad.report.figures import BLUE, ORANGE, STYLE, VERMILION, Figure, svg_of
@@ -54,7 +55,7 @@ def tornado(study: LinkStudy, of: Tornado) -> Figure:
     if data and low < required < high:
         axes.axvline(required, color=VERMILION, linestyle="--", linewidth=1.0)
         _say(axes, (required, -0.55), "required", VERMILION, "bottom")
-    judged = f", all but {100 * m.requirement.outage:g} % of the time" if data and m.jitter is not None else ""
+    judged = f", all but {outage_words(m)}" if data and m.jitter is not None else ""
     axes.set(xlabel=f"margin of the {'communication link' if data else of.of.lower()}{judged} (dB)")
     keys = [Patch(color=ORANGE, label="input lower"), Patch(color=BLUE, label="input higher")]
     axes.legend(handles=keys, loc="lower right", fontsize=8)

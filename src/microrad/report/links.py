@@ -8,7 +8,7 @@ from microrad.core.units import format_quantity
 from microrad.link.partner_search import LONGEST_LOOK_S, Finding, Found, Scanned
 from microrad.link.pointing import OpenLoopPointing
 from microrad.link.study import LinkStudy
-from microrad.link.under_jitter import Performance
+from microrad.link.under_jitter import Performance, stated_outage
 from microrad.report import budget_views
 from microrad.report.figures import Figure
 from microrad.report.quantities import quantity
@@ -28,7 +28,6 @@ def context(
     """What the template needs of the links alone; ``files`` says whether the figures' data stand beside the page."""
     under = links.under_jitter
     cases = () if under is None else (under,)
-    outage = links.file.mission.requirement.outage
     return {
         "pointing": None if links.open_loop is None else pointing(links.open_loop),
         "budgets": budgets,
@@ -41,7 +40,7 @@ def context(
         "performance": performance_rows(cases, ""),
         "performance_words": [budget_views.performance(each, links) for each in cases],
         "performance_note": note(costs=False),
-        "outage": f"{100 * outage:g} %",
+        "outage": "" if under is None else f"{100 * stated_outage(links.file.mission):g} %",
         "costs": [],
         "fades": fades(cases),
         "acquisition": None if links.finding is None else acquisition(links.finding),

@@ -307,7 +307,9 @@ class LinkRequirement(Table):
 
     margin_db: Loss = Field(alias="margin", description="margin of the communication link")
     pointing_error_rad: Angle = Field(alias="pointing_error", description="residual that the fine pointing may leave")
-    outage: Annotated[float, Share("")] = Field(description="share of the time that the required margin may be missed")
+    outage: Annotated[float, Share("")] | None = Field(
+        default=None, description="share of the time that the required margin may be missed; asked for under a jitter"
+    )
 
 
 def half_angle_rad(divergence_rad: float, convention: str) -> float:
