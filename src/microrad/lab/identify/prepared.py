@@ -217,8 +217,7 @@ def span(records: Sequence[Prepared]) -> float:
 
 def centred(columns: FloatArray, records: Sequence[Prepared]) -> FloatArray:
     """Stacked columns less their mean in each record: solving without them is solving with one offset per record."""
-    edges = np.cumsum([r.used for r in records])[:-1]
-    return np.concatenate([part - part.mean(axis=0) for part in np.split(columns, edges)])
+    return np.concatenate([part - part.mean(axis=0) for part in split_by_record(columns, records)])
 
 
 def split_by_record(values: FloatArray, records: Sequence[Prepared]) -> list[FloatArray]:

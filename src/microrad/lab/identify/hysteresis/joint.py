@@ -73,7 +73,6 @@ class JointFit:
     residual_rms_rad: float
     residual_rms_percent: float
     samples_used: int
-    free_offset: bool = True
 
     @property
     def admissible(self) -> bool:
@@ -86,7 +85,9 @@ class JointFit:
     @property
     def not_identified(self) -> tuple[tuple[str, str], ...]:
         """Parameters that the recordings do not fix: name, and the number that says so with what would help."""
-        return tuple((name, f"{fact}; {_why(name)}") for name, fact in self.fit.not_identified)
+        reversals = "loops fix the settled hysteresis, only the samples behind a reversal its parts; record small loops"
+        found = self.fit.not_identified
+        return tuple((name, f"{fact}; {_WHY.get(name.partition(' ')[0], reversals)}") for name, fact in found)
 
     def response(self, drive_v: FloatArray, step_s: float) -> tuple[FloatArray, int]:
         """Output (rad) without offset for a drive (V), at rest at the first drive value, and the clamped samples."""
@@ -113,11 +114,6 @@ _WHY = {
     "pole": "a pole and a zero side by side nearly cancel, and one beyond the band is a flank only",
     "zero": "a pole and a zero side by side nearly cancel, and one beyond the band is a flank only",
 }
-
-
-def _why(name: str) -> str:
-    reversals = "loops fix the settled hysteresis, only the samples behind a reversal its parts; record small loops"
-    return _WHY.get(name.partition(" ")[0], reversals)
 
 
 def fit_joint(  # noqa: PLR0913  all but the first three are named options

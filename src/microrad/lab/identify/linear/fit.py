@@ -143,6 +143,7 @@ def _zero_errors(model: ModalModel, zeros: Complexes, slopes: Complexes, covaria
     return errors
 
 
+# Spare poles that are fitted to noise have at most 0.2 of the rms of the residual, those fitted to a tone 0.3 and more,
 # and both decay in ten times the recording or more. A true resonance, however sharp, was fitted by at most twice.
 _RINGS, _CYCLES, _TONE = 5.0, 3.0, 0.25
 _STEADY = "most likely a steady tone that the drive has not made (mains, a wheel)"
