@@ -35,7 +35,7 @@ class Units:
     lever_arm_m: float | None = None
 
     def __post_init__(self) -> None:
-        """Refuse unknown units, a length without lever arm and an angle with one."""
+        """Raises `IdentificationError` for unknown units, a length without lever arm and an angle with one."""
         if self.drive not in _VOLTS:
             raise IdentificationError(f"input unit '{self.drive}' is not known; use one of {', '.join(_VOLTS)}.")
         if self.output not in _RADIANS | _METRES:

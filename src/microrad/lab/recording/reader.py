@@ -40,12 +40,18 @@ def read_recording(
     apart by their content. A channel is a name or a number counted from 0; `group/channel` in TDMS and HDF5,
     `structure/field` in MATLAB, `variable[2]` for a column of an array; a sequence gives several channels.
 
-    `rate_hz` is the sample rate where the file states none; where both are known they must agree to 0.1 %. `time`
-    names the time column, else one that is plainly called so is used. `period_samples` is the length of one period
-    of a periodic excitation. `accept` names findings of degree (`jitter`, `clipping`, `dead`, `quantisation`,
-    `drift`, `unexcited`, `lead`) that are to be carried in `Recording.findings` instead of refused.
+    Args:
+        path: The file.
+        inputs: The drive channel, or several.
+        outputs: The sensor channel, or several.
+        rate_hz: Sample rate where the file states none; where both are known they must agree to 0.1 %.
+        time: The time column (s); by default one that is plainly called so.
+        period_samples: Length of one period of a periodic excitation.
+        accept: Findings of degree (`jitter`, `clipping`, `dead`, `quantisation`, `drift`, `unexcited`, `lead`) that are
+            to be carried in `Recording.findings` instead of refused.
 
-    Raises `RecordingError`, naming file, channel, row and remedy, for anything that cannot be relied upon.
+    Raises:
+        RecordingError: For anything that cannot be relied upon, naming file, channel, row and remedy.
     """
     path = Path(path)
     if rate_hz is not None:
@@ -90,7 +96,16 @@ def recording_from_arrays(
 ) -> Recording:
     """Make a recording from arrays of shape (samples,) or (samples, channels), under the same checks as a file.
 
-    `name` stands where the path of a file would. Raises `RecordingError`.
+    Args:
+        drive: The drives.
+        output: The outputs, sampled together with them.
+        rate_hz: Samples per second.
+        name: Stands where the path of a file would.
+        period_samples: Length of one period of a periodic excitation.
+        accept: Findings of degree to take on, see `read_recording`.
+
+    Raises:
+        RecordingError: For anything that cannot be relied upon.
     """
     rate_hz = check_rate(name, rate_hz)
     _check_accept(name, accept)

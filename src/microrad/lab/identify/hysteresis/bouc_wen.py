@@ -326,11 +326,20 @@ def fit_bouc_wen(
 ) -> BoucWenFit:
     """Fit Eq. 3 with one offset per record to all recordings at once, every sample with equal weight.
 
-    Trust-region-reflective least squares from `starts` starts: the best points of a coarse grid, scattered log-normally
-    by the Philox stream of `seed`. h starts at zero and the residuals before the drive has swept its range once are
-    left out. `admissible` keeps the local slope after reversals from turning against d1. The rate in the exponents is
-    clamped at the fastest rate of the recordings, as it is in simulation.
-    `on_progress(done, total, what)` is called after each start. Raises `IdentificationError`.
+    Trust-region-reflective least squares from several starts: the best points of a coarse grid, scattered log-normally.
+    h starts at zero, and the residuals before the drive has swept its range once are left out. The rate in the
+    exponents is clamped at the fastest rate of the recordings, as it is in simulation.
+
+    Args:
+        recordings: Loops of one drive and one output each.
+        starts: Number of starts, at least 1.
+        seed: Seed of the Philox stream that scatters them.
+        admissible: Whether the local slope behind a reversal is kept from turning against d1.
+        on_progress: Called with the starts done, their number and what is done.
+        units: Units of the recordings.
+
+    Raises:
+        IdentificationError: For recordings without a reversal, with several channels, or without a start.
     """
     if starts < 1:
         raise IdentificationError(f"{starts} starts were asked for; give at least 1, better 10 or more.")

@@ -119,11 +119,9 @@ def _too_large(path: Path, item: Any) -> str:
 
 
 def check_pieces(path: Path, name: str, item: Any) -> None:
-    """Refuse a piece that does not unpack to what it states.
+    """Raises `RecordingError` for a piece that does not unpack to the number of bytes that it states.
 
     Of one that holds more the library would make room for all; behind one that holds less it reads on in the memory.
-
-    Raises `RecordingError`.
     """
     if item.chunks is None:
         return
@@ -254,7 +252,7 @@ class Hdf5Source(ArraySource):
 
 
 def _check_depth(path: Path, name: str) -> None:
-    """Refuse what lies so deep that the library takes minutes to get there."""
+    """Raises `RecordingError` for groups so deep that the library takes minutes to get there."""
     if name.count("/") > _MOST_DEEP:
         raise RecordingError(
             f"{path}: groups are nested more than {_MOST_DEEP} deep, which no recording needs; copy the datasets into "

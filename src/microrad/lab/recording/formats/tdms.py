@@ -47,7 +47,7 @@ class TdmsSource(Container):
         super().__init__(path, "TDMS", channels, sha256_of(path), unusable)
 
     def load(self, indices: Sequence[int]) -> list[FloatArray]:
-        """Scaled values of the channels; refuses channels that were not sampled together."""
+        """Scaled values of the channels; raises `RecordingError` for channels that were not sampled together."""
         self._check_together(indices)
         return super().load(indices)
 
