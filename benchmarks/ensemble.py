@@ -18,8 +18,8 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-
 from loop import INTEGER, Counters, best, compiled_twin, twin_parameters
+
 from microrad.core import kernels, lti
 from microrad.loop import control, disturbance
 from microrad.loop import paper_cases as tracking
