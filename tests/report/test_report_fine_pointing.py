@@ -435,16 +435,17 @@ def test_a_distant_bound_leaves_the_question_open_and_a_bound_above_theory_is_no
 
 def test_the_missions_own_stroke_counts(fine, mission):
     table = mission.fine_pointing
-    elsewhere = table.reference.model_copy(update={"point_ahead_on_mirror": False})
-    other = table.model_copy(update={"reference": elsewhere})
+    reference = table.reference.model_copy(update={"point_ahead_on_mirror": False})
+    other = table.model_copy(update={"reference": reference})
     m = mission.model_copy(update={"fine_pointing": other})
+    elsewhere = replace(fine, scene=replace(fine.scene, table=other))
     assert fine.scene.own_stroke is fine.scene.stroke
-    assert replace(fine.scene, table=other).own_stroke is fine.scene.stroke_without_point_ahead
-    assert section.stroke(fine, m)["groups"] == [
+    assert elsewhere.scene.own_stroke is fine.scene.stroke_without_point_ahead
+    assert section.stroke(elsewhere, m)["groups"] == [
         ("Point-ahead on the mirror", 2),
         ("Point-ahead elsewhere (this mission)", 2),
     ]
-    assert any("needs 552 µrad to either side" in line for line in words.short(fine, m))
+    assert any("needs 552 µrad to either side" in line for line in words.short(elsewhere, m))
 
 
 def test_two_sets_of_hardware_are_told_apart(fine, mission):

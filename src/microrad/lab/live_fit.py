@@ -13,10 +13,10 @@ from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
+import numpy as np
+from numpy.typing import NDArray
 
+if TYPE_CHECKING:
     from microrad.lab.identify.ladder.predictions import Judged, Prediction
     from microrad.lab.recording import Recording
 
@@ -77,10 +77,10 @@ def thinned(judged: Judged) -> LiveFit:
 
 
 def _loop(recording: Recording, prediction: Prediction) -> Loop:
-    import numpy as np
-
     drive, step_s = recording.drive[:, 0], recording.step_s
-    last = drive.size - min(drive.size, round(2.0 * _period(recording)))
+    spectrum = np.abs(np.fft.rfft(drive - drive.mean()))
+    period = float(drive.size / max(int(np.argmax(spectrum)), 1))  # of the strongest line of the drive, in samples
+    last = drive.size - min(drive.size, round(2.0 * period))
     shown = np.unique(np.linspace(last, drive.size - 1, 600).astype(int))
     rows = prediction.start + extremes([prediction.residual_rad[prediction.start :]], 600)
     return Loop(
@@ -94,18 +94,7 @@ def _loop(recording: Recording, prediction: Prediction) -> Loop:
     )
 
 
-def _period(recording: Recording) -> float:
-    """Samples in a period of the strongest line of the drive."""
-    import numpy as np
-
-    drive = recording.drive[:, 0]
-    spectrum = np.abs(np.fft.rfft(drive - drive.mean()))
-    return float(drive.size / max(int(np.argmax(spectrum)), 1))
-
-
 def _digits(values: object) -> tuple[float, ...]:
-    import numpy as np
-
     return tuple(float(f"{value:.7g}") for value in np.asarray(values, dtype=float))
 
 
@@ -114,8 +103,6 @@ def extremes(columns: list[NDArray[np.float64]], points: int) -> NDArray[np.intp
 
     A recording of at most `points` samples is kept whole.
     """
-    import numpy as np
-
     samples = len(columns[0])
     if samples <= points:
         return np.arange(samples)

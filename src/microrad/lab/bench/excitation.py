@@ -231,7 +231,7 @@ def staircase(
 
 # --------------------------------------------------------------------------------------------------------------- limits
 def _samples(limits: Limits, name: str, key: str, seconds: float) -> int:
-    """Number of samples in a time, refused before anything of that size is allocated."""
+    """Number of samples in a time; raises `DesignError` for too many, before they are allocated."""
     most = MOST_SAMPLES / limits.inputs / limits.rate_hz
     if seconds > most:
         reason = f"makes a record of {format_quantity(seconds, 's')} at {format_quantity(limits.rate_hz, 'Hz')}"
@@ -314,7 +314,7 @@ def _on_axis(limits: Limits, name: str, column: Floats, rest_v: float, axis: int
 
 # -------------------------------------------------------------------------------------------------------- whole periods
 def _whole_block(limits: Limits, name: str, freq_hz: float, periods: int) -> int:
-    """Samples in `periods` periods of a sine, refused where that is no whole number."""
+    """Samples in `periods` periods of a sine; raises `DesignError` where that is no whole number."""
     _samples(limits, name, "periods", periods / freq_hz)
     exact = periods * limits.rate_hz / freq_hz
     block = round(exact)

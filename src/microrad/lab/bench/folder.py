@@ -189,9 +189,21 @@ def write(
 ) -> tuple[Path, ...]:
     """Play a plan into a folder: the files of its records in the plan's formats, plan.toml and manifest.json.
 
-    Returns the files of the records, in the order of the plan. The manifest has seed, versions, and of each record its
-    use (identification or validation), rate, period and files. The folder appears whole or not at all. Raises
-    `FolderError` for a folder that is there already, unless `overwrite` is true and a bench wrote it.
+    The manifest has seed, versions, and of each record its use (identification or validation), rate, period and files.
+    The folder appears whole or not at all.
+
+    Args:
+        plan: The plan to play.
+        folder: The folder to write.
+        seed: Seed of the sensor's noise, 0 or more.
+        overwrite: Whether a folder that a bench wrote may be replaced.
+        on_progress: Called with the records done, their number and the name of the next one.
+
+    Returns:
+        The files of the records, in the order of the plan.
+
+    Raises:
+        FolderError: For a folder that is there already and must stay.
     """
     folder = Path(folder)
     entries: list[dict[str, Any]] = []
@@ -246,8 +258,15 @@ def check_folder(folder: Path, overwrite: bool) -> None:
 def read_folder(folder: Path, accept: tuple[str, ...] = ()) -> tuple[tuple[Recording, str], ...]:
     """Recordings of a folder that `write` made, each with its use ("identification" or "validation").
 
-    Of several formats the first is read. Raises `BenchError` for a folder without the manifest of a bench, and
-    `RecordingError` for a file that cannot be read.
+    Of several formats the first is read.
+
+    Args:
+        folder: The folder.
+        accept: Findings of degree to take on, see `read_recording`.
+
+    Raises:
+        BenchError: For a folder without the manifest of a bench.
+        RecordingError: For a file that cannot be read.
     """
     manifest = folder / MANIFEST
     try:

@@ -1,7 +1,7 @@
 """The plan of an experiment as frozen, checked data: limits, the bench, and the excitations to be played.
 
 Every quantity is text with a unit in the file (`duration = "10 s"`) and an SI float with the unit in its name here.
-`planfile` reads the file and reports the faults.
+`load_plan` reads the file, checks it against these tables and reports all faults at once.
 """
 
 import difflib
@@ -305,9 +305,14 @@ class Plan:
 
 
 def only(plan: Plan, names: Sequence[str]) -> Plan:
-    """The plan cut down to some of its records, by name; their noise stays the same.
+    """The plan cut down to some of its records; their noise stays the same.
 
-    Raises ValueError for a name that the plan does not have.
+    Args:
+        plan: The whole plan.
+        names: Names of the records to keep.
+
+    Raises:
+        ValueError: For a name that the plan does not have.
     """
     known = [record.excitation.name for record in plan.records]
     for name in names:

@@ -48,9 +48,16 @@ def play(plan: Plan, seed: int, on_progress: Progress | None = None) -> tuple[Re
     """What the bench records when it plays the plan: one recording a record, drives in V and outputs in mrad.
 
     The drive is what the converter of the function generator gave out, the output what the converter of the sensor
-    took in at the same instants; true values are not in it. Each record has its own random stream, told by `seed` and
-    the record's name, so that it does not depend on the others. Raises `BenchError` when an output leaves the range of
-    its converter.
+    took in at the same instants; true values are not in it. Each record has its own random stream, told by the seed and
+    the record's name, so that it does not depend on the others.
+
+    Args:
+        plan: The plan to play.
+        seed: Seed of the sensor's noise, 0 or more.
+        on_progress: Called with the records done, their number and the name of the next one.
+
+    Raises:
+        BenchError: When an output leaves the range of its converter.
     """
     return tuple(recording for _, recording in played(plan, seed, on_progress))
 
@@ -119,7 +126,7 @@ def _sensor_error(plan: Plan, record: Record, angle: Floats, seed: int) -> Float
 
 
 def _check_range(plan: Plan, record: Record, measured: Floats) -> None:
-    """Refuse an output that its converter would clip: a clipped record is of no use."""
+    """Raises `BenchError` for an output that its converter would clip: a clipped record is of no use."""
     table = plan.bench.converters
     low, high = float(measured.min()) / _MRAD, float(measured.max()) / _MRAD
     if low < table.output_min_rad or high > table.output_max_rad:

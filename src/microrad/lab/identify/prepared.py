@@ -35,7 +35,7 @@ class Units:
     lever_arm_m: float | None = None
 
     def __post_init__(self) -> None:
-        """Refuse unknown units, a length without lever arm and an angle with one."""
+        """Raises `IdentificationError` for unknown units, a length without lever arm and an angle with one."""
         if self.drive not in _VOLTS:
             raise IdentificationError(f"input unit '{self.drive}' is not known; use one of {', '.join(_VOLTS)}.")
         if self.output not in _RADIANS | _METRES:
@@ -217,8 +217,7 @@ def span(records: Sequence[Prepared]) -> float:
 
 def centred(columns: FloatArray, records: Sequence[Prepared]) -> FloatArray:
     """Stacked columns less their mean in each record: solving without them is solving with one offset per record."""
-    edges = np.cumsum([r.used for r in records])[:-1]
-    return np.concatenate([part - part.mean(axis=0) for part in np.split(columns, edges)])
+    return np.concatenate([part - part.mean(axis=0) for part in split_by_record(columns, records)])
 
 
 def split_by_record(values: FloatArray, records: Sequence[Prepared]) -> list[FloatArray]:

@@ -43,7 +43,7 @@ _STARTS = {
 
 
 def check_file(path: Path) -> None:
-    """Refuse what is not a regular, readable file with a content of at most `MAX_BYTES`."""
+    """Raises `RecordingError` for what is not a readable file, is empty, or has more than `MAX_BYTES`."""
     try:
         if path.is_dir():
             raise RecordingError(f"{path}: this is a directory; name one file in it.")

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from microrad.lab.recording.checks.sample_rate import agreed_rate, check_rate, rate_of_time
-from microrad.lab.recording.checks.signals import Signals, check_signals
+from microrad.lab.recording.checks.signals import check_signals
 from microrad.lab.recording.files import check_file, file_format
 from microrad.lab.recording.formats.source import SECONDS, Source, StatedRate, time_unit
 from microrad.lab.recording.records import (
@@ -40,12 +40,18 @@ def read_recording(
     apart by their content. A channel is a name or a number counted from 0; `group/channel` in TDMS and HDF5,
     `structure/field` in MATLAB, `variable[2]` for a column of an array; a sequence gives several channels.
 
-    `rate_hz` is the sample rate where the file states none; where both are known they must agree to 0.1 %. `time`
-    names the time column, else one that is plainly called so is used. `period_samples` is the length of one period
-    of a periodic excitation. `accept` names findings of degree (`jitter`, `clipping`, `dead`, `quantisation`,
-    `drift`, `unexcited`, `lead`) that are to be carried in `Recording.findings` instead of refused.
+    Args:
+        path: The file.
+        inputs: The drive channel, or several.
+        outputs: The sensor channel, or several.
+        rate_hz: Sample rate where the file states none; where both are known they must agree to 0.1 %.
+        time: The time column (s); by default one that is plainly called so.
+        period_samples: Length of one period of a periodic excitation.
+        accept: Findings of degree (`jitter`, `clipping`, `dead`, `quantisation`, `drift`, `unexcited`, `lead`) that are
+            to be carried in `Recording.findings` instead of refused.
 
-    Raises `RecordingError`, naming file, channel, row and remedy, for anything that cannot be relied upon.
+    Raises:
+        RecordingError: For anything that cannot be relied upon, naming file, channel, row and remedy.
     """
     path = Path(path)
     if rate_hz is not None:
@@ -58,12 +64,11 @@ def read_recording(
     clock = _clock(source, [*ins, *outs], time)
     optional = time is None and rate_hz is not None
     columns, rates, findings = _load(source, [*ins, *outs], clock, optional)
-    place = source.place
     rate = agreed_rate(str(path), rate_hz, [*source.rates([*ins, *outs]), *rates])
     _check_lengths(source, [*ins, *outs], columns)
-    labels = [f"the input, {source.label(i)}" for i in ins], [f"the output, {source.label(i)}" for i in outs]
-    signals = Signals(str(path), columns[: len(ins)], columns[len(ins) :], labels[0], labels[1], rate, place)
-    findings = [*findings, *check_signals(signals)]
+    drives = {f"the input, {source.label(i)}": column for i, column in zip(ins, columns, strict=False)}
+    sensors = {f"the output, {source.label(i)}": column for i, column in zip(outs, columns[len(ins) :], strict=True)}
+    findings = [*findings, *check_signals(str(path), drives, sensors, rate, source.place)]
     drive, output = _table(columns[: len(ins)]), _table(columns[len(ins) :])
     return Recording(
         str(path),
@@ -91,7 +96,16 @@ def recording_from_arrays(
 ) -> Recording:
     """Make a recording from arrays of shape (samples,) or (samples, channels), under the same checks as a file.
 
-    `name` stands where the path of a file would. Raises `RecordingError`.
+    Args:
+        drive: The drives.
+        output: The outputs, sampled together with them.
+        rate_hz: Samples per second.
+        name: Stands where the path of a file would.
+        period_samples: Length of one period of a periodic excitation.
+        accept: Findings of degree to take on, see `read_recording`.
+
+    Raises:
+        RecordingError: For anything that cannot be relied upon.
     """
     rate_hz = check_rate(name, rate_hz)
     _check_accept(name, accept)
@@ -102,19 +116,23 @@ def recording_from_arrays(
             "channels) with equally many samples."
         )
     u, y = (a.reshape(len(a), -1) for a in (u, y))
-    inputs, outputs = ([np.ascontiguousarray(c) for c in a.T] for a in (u, y))
-    signals = Signals(
-        name, inputs, outputs, _array_labels("drive", inputs), _array_labels("output", outputs), rate_hz, _sample
+    input_names, output_names = (
+        (role,) if a.shape[1] == 1 else tuple(f"{role} {k}" for k in range(a.shape[1]))
+        for role, a in (("drive", u), ("output", y))
     )
-    findings = check_signals(signals)
+    inputs, outputs = (
+        {f"the {channel}": np.ascontiguousarray(column) for channel, column in zip(names, a.T, strict=True)}
+        for names, a in ((input_names, u), (output_names, y))
+    )
+    findings = check_signals(name, inputs, outputs, rate_hz, lambda row: f"sample {row}")
     return Recording(
         name,
         digest_of(u, y),
         frozen(u),
         frozen(y),
         rate_hz,
-        _array_names("drive", inputs),
-        _array_names("output", outputs),
+        input_names,
+        output_names,
         _checked_period(name, period_samples, len(u)),
         findings=_judged(name, findings, accept),
     )
@@ -135,15 +153,11 @@ def multisine_recordings(
             f"{name}: drive has shape {u.shape} and output {y.shape}; give (samples, channels, realisations, periods) "
             "with the same samples, realisations and periods."
         )
-
-    def joined(array: np.ndarray, realisation: int) -> np.ndarray:
-        return np.concatenate([array[:, :, realisation, p] for p in range(array.shape[3])])
-
+    # (periods, samples, channels) of each realisation, one period behind the other
+    joined = [np.moveaxis(a, (2, 3), (0, 1)).reshape(a.shape[2], -1, a.shape[1]) for a in (u, y)]
     return tuple(
-        recording_from_arrays(
-            joined(u, r), joined(y, r), rate_hz, f"{name} realisation {r}", period_samples=u.shape[0], accept=accept
-        )
-        for r in range(u.shape[2])
+        recording_from_arrays(drives, outputs, rate_hz, f"{name} realisation {r}", u.shape[0], accept=accept)
+        for r, (drives, outputs) in enumerate(zip(*joined, strict=True))
     )
 
 
@@ -282,15 +296,3 @@ def _checked_period(where: str, period_samples: int | None, samples: int) -> int
 
 def _table(columns: Sequence[FloatArray]) -> FloatArray:
     return frozen(columns[0][:, None] if len(columns) == 1 else np.column_stack(columns))
-
-
-def _sample(row: int) -> str:
-    return f"sample {row}"
-
-
-def _array_names(role: str, columns: Sequence[FloatArray]) -> tuple[str, ...]:
-    return (role,) if len(columns) == 1 else tuple(f"{role} {k}" for k in range(len(columns)))
-
-
-def _array_labels(role: str, columns: Sequence[FloatArray]) -> list[str]:
-    return [f"the {name}" for name in _array_names(role, columns)]

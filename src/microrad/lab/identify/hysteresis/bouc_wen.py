@@ -51,23 +51,16 @@ _UPPER = np.array([1.0, 10.0, math.log(1e5), math.log(1e5)])
 class Problem:
     """The projected residual of a set of records as a function of the four searched numbers, scaled to order one."""
 
-    def __init__(
-        self, records: tuple[Prepared, ...], share: float, free_offset: bool = True, rate_limit: float | None = None
-    ) -> None:
+    def __init__(self, records: tuple[Prepared, ...], share: float, rate_limit: float | None = None) -> None:
         """`share` is the largest part of d1 that epsilon may take back after a slow reversal; inf leaves it free."""
         self.records = records
-        self.free_offset = free_offset
         self.share = share
         self.rate_limit = rate_limit or fastest_rate(records)
         self.drive_span_v = max(float(np.ptp(r.drive_v)) for r in records)
         self.output_span_rad = span(records)
         self.measured = np.concatenate([r.output_rad[r.start :] for r in records])
-        self.target = self.centred(self.measured)
+        self.target = centred(self.measured, records)
         self.scale = 1.0 / (self.output_span_rad * math.sqrt(self.target.size))
-
-    def centred(self, columns: FloatArray) -> FloatArray:
-        """Columns less their mean in each record, which marginalises the offsets; unchanged where there is none."""
-        return centred(columns, self.records) if self.free_offset else columns
 
     def physical(self, theta: FloatArray) -> tuple[float, float, float, float]:
         """d2, delta (s/V), k_settled and k_reversal (1/V)."""
@@ -87,7 +80,7 @@ class Problem:
         for record in self.records:
             output, h, _ = bouc_wen_response(record.drive_v, record.step_s, row, 0.0)
             parts.append(np.column_stack((output - h, h))[record.start :])
-        return self.centred(np.concatenate(parts))
+        return centred(np.concatenate(parts), self.records)
 
     def linear(self, columns: FloatArray, theta: FloatArray) -> FloatArray:
         """The best d1 and epsilon; where epsilon takes back more of d1 than allowed, the best on that bound."""
@@ -129,7 +122,7 @@ def _thinned(problem: Problem) -> Problem:
         for r in problem.records
         for start in (-(-r.start // stride),)
     )
-    return Problem(records, problem.share, problem.free_offset, problem.rate_limit)
+    return Problem(records, problem.share, problem.rate_limit)
 
 
 # ----------------------------------------------------------------------------------------------------------- search
@@ -276,7 +269,6 @@ class BoucWenFit:
     colour_inflation: float
     condition_number: float
     not_identified: tuple[NotIdentified, ...]
-    residual_rms_rad: float
     residual_rms_percent: float
     start_rms_percent: tuple[float, ...]
     agreeing_starts: int
@@ -284,7 +276,6 @@ class BoucWenFit:
     lowest_slope_rad_per_v: float
     admissible: bool
     constrained: bool
-    free_offset: bool
     samples_used: int
 
     name = "bouc_wen"
@@ -330,22 +321,29 @@ def fit_bouc_wen(
     starts: int = 12,
     seed: int = 0,
     admissible: bool = False,
-    free_offset: bool = True,
     on_progress: Progress | None = None,
     units: Units = DEFAULT_UNITS,
 ) -> BoucWenFit:
     """Fit Eq. 3 with one offset per record to all recordings at once, every sample with equal weight.
 
-    Trust-region-reflective least squares from `starts` starts: the best points of a coarse grid, scattered log-normally
-    by the Philox stream of `seed`. h starts at zero and the residuals before the drive has swept its range once are
-    left out. `admissible` keeps the local slope after reversals from turning against d1. The rate in the exponents is
-    clamped at the fastest rate of the recordings, as it is in simulation. `free_offset=False` says that the sensor
-    reads zero at zero drive, as in Eq. 3: on the paper's 100 Hz record that fixes d1 seven times better.
-    `on_progress(done, total, what)` is called after each start. Raises `IdentificationError`.
+    Trust-region-reflective least squares from several starts: the best points of a coarse grid, scattered log-normally.
+    h starts at zero, and the residuals before the drive has swept its range once are left out. The rate in the
+    exponents is clamped at the fastest rate of the recordings, as it is in simulation.
+
+    Args:
+        recordings: Loops of one drive and one output each.
+        starts: Number of starts, at least 1.
+        seed: Seed of the Philox stream that scatters them.
+        admissible: Whether the local slope behind a reversal is kept from turning against d1.
+        on_progress: Called with the starts done, their number and what is done.
+        units: Units of the recordings.
+
+    Raises:
+        IdentificationError: For recordings without a reversal, with several channels, or without a start.
     """
     if starts < 1:
         raise IdentificationError(f"{starts} starts were asked for; give at least 1, better 10 or more.")
-    problem = Problem(prepare(recordings, units), 1.0 if admissible else math.inf, free_offset)
+    problem = Problem(prepare(recordings, units), 1.0 if admissible else math.inf)
     costs, best = multi_start(problem, starts, seed, on_progress or unheard)
     if admissible:
         problem, best = tightened(problem, best)
@@ -355,14 +353,10 @@ def fit_bouc_wen(
 # ---------------------------------------------------------------------------------------------------------- report
 def _report(problem: Problem, values: FloatArray, units: Units, costs: FloatArray, constrained: bool) -> BoucWenFit:
     residual = problem.measured - stacked(problem, values)
-    offsets = tuple(problem.free_offset * float(part.mean()) for part in split_by_record(residual, problem.records))
-    residual = problem.centred(residual)
+    offsets = tuple(float(part.mean()) for part in split_by_record(residual, problem.records))
+    residual = centred(residual, problem.records)
     colour = colour_inflation(split_by_record(residual, problem.records))
-    variance = (
-        colour
-        * float(residual @ residual)
-        / max(1, residual.size - values.size - len(problem.records) * problem.free_offset)
-    )
+    variance = colour * float(residual @ residual) / max(1, residual.size - values.size - len(problem.records))
     share = -float(values[2] * 2 * values[4] / values[0]) / k_settled(values)
     at_bound = constrained and share > 0.999 * problem.share
     sizes = _sizes(problem, values)
@@ -380,7 +374,6 @@ def _report(problem: Problem, values: FloatArray, units: Units, costs: FloatArra
         colour_inflation=colour,
         condition_number=float(np.linalg.cond(jacobian * sizes)),
         not_identified=_not_identified(values, covariance, one_rate_only(problem.records), at_bound),
-        residual_rms_rad=rms * problem.output_span_rad / 100,
         residual_rms_percent=rms,
         start_rms_percent=tuple(100 * math.sqrt(2 * cost) for cost in costs),
         agreeing_starts=int(np.sum(costs <= costs.min() * (1 + 1e-3) + _SAME_COST)),
@@ -388,7 +381,6 @@ def _report(problem: Problem, values: FloatArray, units: Units, costs: FloatArra
         lowest_slope_rad_per_v=lowest,
         admissible=bool(min(slope, lowest) >= -SLOPE_TOLERANCE * abs(values[0])),
         constrained=constrained,
-        free_offset=problem.free_offset,
         samples_used=residual.size,
     )
 
@@ -408,7 +400,7 @@ def _jacobian(problem: Problem, values: FloatArray, sizes: FloatArray) -> FloatA
         step = np.zeros(6)
         step[i] = size
         columns.append((stacked(problem, values + step) - stacked(problem, values - step)) / (2 * size))
-    return problem.centred(np.column_stack(columns))
+    return centred(np.column_stack(columns), problem.records)
 
 
 def _covariance(jacobian: FloatArray, sizes: FloatArray, variance: float, bounded: FloatArray | None) -> FloatArray:

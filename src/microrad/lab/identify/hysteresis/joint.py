@@ -21,7 +21,7 @@ from microrad.mirror import model as mirror
 from microrad.mirror.hysteresis import NO_CREEP, BoucWen, Creep, Play, slow_gain
 from microrad.mirror.model import Mirror
 
-OPERATORS = 15
+_OPERATORS = 15
 _MOST_SAMPLES = 20_000
 _EVALUATIONS = 200
 _POLISHING = 60  # each is long: the broadband recordings belong to it
@@ -73,7 +73,6 @@ class JointFit:
     residual_rms_rad: float
     residual_rms_percent: float
     samples_used: int
-    free_offset: bool = True
 
     @property
     def admissible(self) -> bool:
@@ -86,7 +85,9 @@ class JointFit:
     @property
     def not_identified(self) -> tuple[tuple[str, str], ...]:
         """Parameters that the recordings do not fix: name, and the number that says so with what would help."""
-        return tuple((name, f"{fact}; {_why(name)}") for name, fact in self.fit.not_identified)
+        reversals = "loops fix the settled hysteresis, only the samples behind a reversal its parts; record small loops"
+        found = self.fit.not_identified
+        return tuple((name, f"{fact}; {_WHY.get(name.partition(' ')[0], reversals)}") for name, fact in found)
 
     def response(self, drive_v: FloatArray, step_s: float) -> tuple[FloatArray, int]:
         """Output (rad) without offset for a drive (V), at rest at the first drive value, and the clamped samples."""
@@ -115,11 +116,6 @@ _WHY = {
 }
 
 
-def _why(name: str) -> str:
-    reversals = "loops fix the settled hysteresis, only the samples behind a reversal its parts; record small loops"
-    return _WHY.get(name.partition(" ")[0], reversals)
-
-
 def fit_joint(  # noqa: PLR0913  all but the first three are named options
     recordings: Sequence[Recording],
     name: str,
@@ -144,28 +140,50 @@ def fit_joint(  # noqa: PLR0913  all but the first three are named options
     form = FORMS[name]
     records = tuple(thinned(record) for record in prepare(recordings, units))
     creep_times = time_constants(records) if form.creep else ()
-    start = _Start(name, form, linear, free_linear, admissible, creep_times)
-    run_list = tuple(_run(record, creep_times) for record in records)
-    scattered: list[FloatArray] = []
-    if form.family != "bouc_wen":
-        structure = start.plays(records, run_list)
+    run_list = [_run(record, creep_times) for record in records]
+    model: BoucWen | Play
+    if form.family == "bouc_wen":
+        model = _bouc_wen_start(form, records, static or static_fit(recordings, units, seed))
+        creep_rad_v = 1e-3 * model.d1_rad_v
     else:
-        structure, scattered = start.bouc_wen(records, static or static_fit(recordings, units, seed), starts, seed)
-    both = (
-        [*run_list, *(_run(record, creep_times) for record in prepare([_shortened(r) for r in broadband], units))]
-        if broadband
-        else run_list
+        model, creep_rad_v = _play_start(form, records, run_list, linear, creep_times)
+    structure = one_axis(
+        name,
+        model,
+        linear=linear,
+        creep=Creep((creep_rad_v,) * len(creep_times), creep_times) if creep_times else NO_CREEP,
+        free=form.free,
+        free_linear=free_linear,
+        admissible=admissible,
     )
-    tolerance = 1e-12 if free_linear else 1e-9  # a candidate is only compared
+    if broadband:
+        run_list += [_run(record, creep_times) for record in prepare([_shortened(r) for r in broadband], units)]
     fit = fit_plant(
         structure,
-        both,
-        starts=scattered,
-        tolerance=tolerance,
+        run_list,
+        starts=_scattered(structure, starts, seed) if form.family == "bouc_wen" else (),
+        tolerance=1e-12 if free_linear else 1e-9,  # a candidate is only compared
         most_evaluations=_POLISHING if free_linear else _EVALUATIONS,
         on_progress=on_progress,
     )
-    return _joint_fit(structure, form, fit, records, units)
+    axis = structure.parts(fit.values)
+    residual = np.concatenate([r[:, 0] for r in fit.residuals[: len(records)]])  # the broadband ones come behind
+    rms = float(np.sqrt(np.mean(residual**2)))
+    return JointFit(
+        name=name,
+        form=form,
+        structure=structure,
+        fit=fit,
+        mirror=fit.mirror,
+        model=axis.model,
+        creep=axis.creep,
+        linear=axis.linear,
+        rate_limit_v_per_s=axis.model.rate_limit_v_s,
+        units=units,
+        residual_rms_rad=rms,
+        residual_rms_percent=100 * rms / span(records),
+        samples_used=residual.size,
+    )
 
 
 # ---------------------------------------------------------------------------------------------------------- starts
@@ -239,57 +257,29 @@ def _run(record: Prepared, creep_times: Sequence[float]) -> Run:
     )
 
 
-@dataclass(frozen=True, slots=True)
-class _Start:
-    """Where a form begins."""
+def _bouc_wen_start(form: Form, records: tuple[Prepared, ...], static: BoucWenFit) -> BoucWen:
+    """The static fit of Eq. 3, about the mean drive at which the records begin."""
+    model = replace(static.model, bias_v=float(np.mean([r.drive_v[0] for r in records])))
+    return model if "delta" in form.free else replace(model, d2_s_v=0.0, delta_s_v=0.0)
 
-    name: str
-    form: Form
-    linear: LinearPoles | None
-    free_linear: bool
-    admissible: bool
-    creep_times: tuple[float, ...]
 
-    def structure(self, model: BoucWen | Play, creep_rad_v: float) -> AxisStructure:
-        creep = Creep((creep_rad_v,) * len(self.creep_times), self.creep_times) if self.creep_times else NO_CREEP
-        return one_axis(
-            self.name,
-            model,
-            linear=self.linear,
-            creep=creep,
-            free=self.form.free,
-            free_linear=self.free_linear,
-            admissible=self.admissible,
-        )
-
-    def plays(self, records: tuple[Prepared, ...], run_list: Sequence[Run]) -> AxisStructure:
-        """Weights and creep by non-negative least squares."""
-        operators = 1 if self.form.family == "linear" else OPERATORS
-        return self.structure(*_play_start(records, run_list, self.linear, self.creep_times, operators))
-
-    def bouc_wen(
-        self, records: tuple[Prepared, ...], static: BoucWenFit, starts: int, seed: int
-    ) -> tuple[AxisStructure, list[FloatArray]]:
-        """The static fit of Eq. 3, and the values of starts scattered about it."""
-        bias = float(np.mean([r.drive_v[0] for r in records]))
-        model = replace(static.model, bias_v=bias)
-        if "delta" not in self.form.free:
-            model = replace(model, d2_s_v=0.0, delta_s_v=0.0)
-        structure = self.structure(model, 1e-3 * model.d1_rad_v)
-        own = np.array([p.start for p in structure.parameters])
-        rng = np.random.Generator(np.random.Philox(seed))
-        shaken = np.array([p.name in ("epsilon", "alpha", "epsilon over its limit") for p in structure.parameters])
-        return structure, [own * np.exp(0.3 * shaken * rng.standard_normal(own.size)) for _ in range(starts - 1)]
+def _scattered(structure: AxisStructure, starts: int, seed: int) -> list[FloatArray]:
+    """Values of `starts` - 1 more starts, epsilon and alpha scattered about those of the structure."""
+    own = np.array([p.start for p in structure.parameters])
+    rng = np.random.Generator(np.random.Philox(seed))
+    shaken = np.array([p.name in ("epsilon", "alpha", "epsilon over its limit") for p in structure.parameters])
+    return [own * np.exp(0.3 * shaken * rng.standard_normal(own.size)) for _ in range(starts - 1)]
 
 
 def _play_start(
+    form: Form,
     records: tuple[Prepared, ...],
     run_list: Sequence[Run],
     linear: LinearPoles | None,
     creep_times: Sequence[float],
-    operators: int,
 ) -> tuple[Play, float]:
     """Weights >= 0 of plays and creep by non-negative least squares, the linear part held; idle plays are dropped."""
+    operators = 1 if form.family == "linear" else _OPERATORS
     thresholds = threshold_grid(max(float(np.ptp(r.drive_v)) for r in records), operators)
     columns, targets = [], []
     for record, run in zip(records, run_list, strict=True):
@@ -335,27 +325,3 @@ def filtered(columns: FloatArray, linear: LinearPoles | None, step_s: float) -> 
         kernels.open_loop(plant, mirror.at_rest(plant), column[:, None].copy(), output, bank)
         behind[:, j] = output[:, 0]
     return behind
-
-
-# ---------------------------------------------------------------------------------------------------------- result
-def _joint_fit(
-    structure: AxisStructure, form: Form, fit: PlantFit, records: tuple[Prepared, ...], units: Units
-) -> JointFit:
-    axis = structure.parts(fit.values)
-    residual = np.concatenate([r[:, 0] for r in fit.residuals[: len(records)]])  # the broadband ones come behind
-    rms = float(np.sqrt(np.mean(residual**2)))
-    return JointFit(
-        name=structure.name,
-        form=form,
-        structure=structure,
-        fit=fit,
-        mirror=fit.mirror,
-        model=axis.model,
-        creep=axis.creep,
-        linear=axis.linear,
-        rate_limit_v_per_s=axis.model.rate_limit_v_s,
-        units=units,
-        residual_rms_rad=rms,
-        residual_rms_percent=100 * rms / span(records),
-        samples_used=residual.size,
-    )

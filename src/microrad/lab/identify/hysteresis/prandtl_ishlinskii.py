@@ -48,12 +48,10 @@ class PrandtlIshlinskiiFit:
     units: Units
     colour_inflation: float
     condition_number: float
-    residual_rms_rad: float
     residual_rms_percent: float
     samples_used: int
 
     name = "prandtl_ishlinskii"
-    free_offset = True
 
     def response(self, drive_v: FloatArray, step_s: float) -> tuple[FloatArray, int]:
         """Output (rad) without offset for a drive (V), every operator starting at the first drive value; 0 clamped."""
@@ -99,7 +97,6 @@ def fit_prandtl_ishlinskii(
         units=units,
         colour_inflation=colour,
         condition_number=condition,
-        residual_rms_rad=rms * span(records) / 100,
         residual_rms_percent=rms,
         samples_used=residual.size,
     )

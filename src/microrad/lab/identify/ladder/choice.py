@@ -150,14 +150,27 @@ def identify(  # noqa: PLR0913  all but the first are named options in practice
 ) -> Identification:
     """Fit the models on the first part of each recording and choose the one that is better on the rest.
 
-    Broadband recordings (chirps, multisines; see `roles.roles`) give the linear part, which the joint models have in
-    cascade; they are not split. Of the others `hold_out` is the share, at the end, that no fit sees (default 0.5; 0
-    where there are `validation` recordings, which no fit sees at all); states are carried through into it. The lowest
-    residual rms over all held-out samples wins; where the difference may be chance an admissible model goes before one
-    that is not, and fewer parameters before more. A winner with a linear part is fitted once more with everything free.
-    `admissible` keeps the slope of each Bouc-Wen model behind a reversal from turning against its gain.
-    `on_progress(done, total, what)` counts fits, and `on_fit` is given each model as soon as it is fitted, the winner
-    again when everything was free. Raises `IdentificationError`, also where not even the best model follows the output.
+    Broadband recordings (chirps, multisines; see `roles`) give the linear part, which the joint models have in cascade;
+    they are not split. The lowest residual rms over all held-out samples wins; where the difference may be chance an
+    admissible model goes before one that is not, and fewer parameters before more. A winner with a linear part is
+    fitted once more with everything free.
+
+    Args:
+        recordings: One drive and one output each.
+        hold_out: Share at the end of each loop that no fit sees; states are carried through into it. By default 0.5,
+            and 0 where there are recordings for validation.
+        seed: Seed of the scattered starts of the Bouc-Wen fits.
+        models: The models to fit, out of `MODELS`.
+        on_progress: Called with the fits done, their number and what is done.
+        validation: Recordings that no fit sees at all.
+        admissible: Whether each Bouc-Wen model is kept from moving against its gain behind a reversal.
+        output_unit: Unit of the outputs: rad, mrad, urad, or m, mm, um with a lever arm.
+        lever_arm_m: Distance from the axis of rotation to the point measured, where that is a length.
+        input_unit: Unit of the drives: V or mV.
+        on_fit: Given each model as soon as it is fitted, and the winner again when everything was free.
+
+    Raises:
+        IdentificationError: For what cannot be fitted as asked, and where not even the best model follows the output.
     """
     units, on_progress = Units(input_unit, output_unit, lever_arm_m), on_progress or unheard
     if not models or not set(models) <= set(MODELS) or len(set(models)) != len(models):
@@ -222,7 +235,7 @@ def _splits(recordings: Sequence[Recording], hold_out: float | None, validated: 
 
 
 def _check_distinct(recordings: Sequence[Recording], validation: Sequence[Recording]) -> None:
-    """A recording given twice would count twice, and one that is fitted and validated would praise itself."""
+    """Raises `IdentificationError` for a recording that is given twice, or to fit and for validation."""
     seen: dict[str, str] = {}
     for recording in (*recordings, *validation):
         key = f"{recording.sha256} {recording.rate_hz}"

@@ -110,7 +110,15 @@ def score_warnings(score: Score, line: Score) -> list[str]:
 
 def fit_warnings(fit: Fit) -> list[str]:
     """Warnings that belong to one fit, whichever model is chosen."""
-    return [*_convergence_warnings(fit), *_slope_warnings(fit), *([_FLIPPED] if falling(fit) else [])]
+    found = []
+    if isinstance(fit, JointFit) and not fit.fit.converged:
+        found.append(
+            f"The search for the parameters stopped after {fit.fit.evaluations} evaluations, before it had settled: "
+            "the model is what the scores say, but its standard errors are those of a point that is no minimum."
+        )
+    if not (isinstance(fit, PrandtlIshlinskiiFit) or fit.admissible):
+        found.append(_wrong_way(fit))
+    return [*found, *([_FLIPPED] if falling(fit) else [])]
 
 
 def falling(fit: Fit) -> bool:
@@ -120,32 +128,18 @@ def falling(fit: Fit) -> bool:
     return fit.model.d1_rad_v < 0 if isinstance(fit, BoucWenFit) else fit.sign < 0
 
 
-def _convergence_warnings(fit: Fit) -> list[str]:
-    if not isinstance(fit, JointFit) or fit.fit.converged:
-        return []
-    return [
-        f"The search for the parameters stopped after {fit.fit.evaluations} evaluations, before it had settled: the "
-        "model is what the scores say, but its standard errors are those of a point that is no minimum."
-    ]
-
-
-def _slope_warnings(fit: Fit) -> list[str]:
-    if isinstance(fit, PrandtlIshlinskiiFit) or fit.admissible:
-        return []
+def _wrong_way(fit: BoucWenFit | JointFit) -> str:
+    assert isinstance(fit.model, BoucWen)
+    turned = rising(fit.model)
     if isinstance(fit, JointFit):
-        assert isinstance(fit.model, BoucWen)
-        turned = rising(fit.model)
-        return [
-            "Not admissible: just after a slow reversal the modelled mirror first moves the wrong way "
-            f"({1e3 * turned.reversal_slope_rad_v():.3g} mrad/V against d1 = {1e3 * turned.d1_rad_v:.3g} mrad/V); "
-            "a Prandtl-Ishlinskii model never does."
-        ]
-    lowest = min(fit.slope_after_reversal_rad_per_v, fit.lowest_slope_rad_per_v)
-    return [
-        "Not admissible: just after a reversal the modelled mirror first moves the wrong way "
-        f"({1e3 * lowest:.3g} mrad/V against d1 = {1e3 * abs(fit.model.d1_rad_v):.3g} mrad/V); "
-        "the model bouc_wen_admissible excludes it."
-    ]
+        slope, slow, advice = turned.reversal_slope_rad_v(), "slow ", "a Prandtl-Ishlinskii model never does."
+    else:
+        slope, slow = min(fit.slope_after_reversal_rad_per_v, fit.lowest_slope_rad_per_v), ""
+        advice = "the model bouc_wen_admissible excludes it."
+    return (
+        f"Not admissible: just after a {slow}reversal the modelled mirror first moves the wrong way "
+        f"({1e3 * slope:.3g} mrad/V against d1 = {1e3 * turned.d1_rad_v:.3g} mrad/V); {advice}"
+    )
 
 
 def drift(

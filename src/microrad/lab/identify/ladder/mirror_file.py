@@ -33,8 +33,15 @@ def mirror_file_text(identification: Identification, name: str, *, model: str | 
 
     The keys stand at the root, without a [mirror] header. Values are printed so that they read back to 1e-12. Where
     the sensor falls with the drive the signs are turned, and a comment says so: a mirror file describes a mirror whose
-    angle rises with its drive. Raises `IdentificationError` for a blank name, a model that was not fitted,
-    and one that does not move.
+    angle rises with its drive.
+
+    Args:
+        identification: What was found.
+        name: Name of the mirror.
+        model: The model to write, one of `MODELS`; by default the one chosen.
+
+    Raises:
+        IdentificationError: For a blank name, a model that was not fitted, and one that does not move.
     """
     if not name.strip():
         raise IdentificationError("the mirror has no name; give one, it stands in the mirror file and in the report.")

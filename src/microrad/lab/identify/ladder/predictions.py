@@ -58,9 +58,16 @@ class Judged:
 def predict(fit: Fit, recording: Recording, split: int | None = None) -> Prediction:
     """Run a fitted model over a recording with the units of the fit, states carried through from the first sample.
 
-    A sensor's zero is not part of the model: the offset is taken from the samples before `split` (default: all), or is
-    zero where the fit was made without one. A `split` of 0 says that the whole record is unseen: its offset is then its
-    own. Raises `IdentificationError` for a split outside the recording.
+    A sensor's zero is not part of the model: the offset is taken from the samples before `split`.
+
+    Args:
+        fit: A fitted model.
+        recording: The recording, in the units of the fit.
+        split: First sample that the fit has not seen; None where it has seen all (the default), 0 where it has seen
+            none: then the offset is taken from all samples, too.
+
+    Raises:
+        IdentificationError: For a split outside the recording.
     """
     drive, measured = recording.drive[:, 0] * fit.units.volts, recording.output[:, 0] * fit.units.radians
     whole = split is None or split == 0
@@ -81,7 +88,7 @@ def _added(fit: Fit, difference: FloatArray, step_s: float, known: slice) -> Flo
         columns = fit.nuisance(difference.size, step_s)
         share = np.linalg.lstsq(columns[known], difference[known], rcond=None)[0]
         return np.asarray(columns @ share)
-    return float(np.mean(difference[known])) if fit.free_offset else 0.0
+    return float(np.mean(difference[known]))
 
 
 def straight_line(

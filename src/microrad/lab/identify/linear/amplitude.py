@@ -45,8 +45,9 @@ def amplitude_dependence(fits: Sequence[LinearFit]) -> AmplitudeDependence:
         raise IdentificationError(f"{len(fits)} amplitude given; at least two are needed to see a dependence.")
     ordered = sorted(fits, key=lambda fit: float(fit.response.drive_rms.mean()))
     main = _main_resonance(ordered[0].modes, ordered[0].excited_hz)
-    found = [int(np.argmin(_distance(fit.modes, main))) for fit in ordered]
-    poles = np.array([fit.modes.poles_rad_s[k] for fit, k in zip(ordered, found, strict=True)])
+    every = [fit.modes.poles_rad_s for fit in ordered]
+    found = [int(np.argmin(np.where(own.imag > 0, np.abs(own - main), np.inf))) for own in every]
+    poles = np.array([own[k] for own, k in zip(every, found, strict=True)])
     errors = [fit.poles_error_rad_s[k] for fit, k in zip(ordered, found, strict=True)]
     return AmplitudeDependence(
         np.array([float(fit.response.drive_rms.mean()) for fit in ordered]),
@@ -65,10 +66,6 @@ def _main_resonance(modes: ModalModel, excited_hz: tuple[float, float]) -> compl
     if not height.any():
         raise IdentificationError("the model has no resonance in the excited band, so there is none to follow.")
     return complex(modes.poles_rad_s[int(np.argmax(height))])
-
-
-def _distance(modes: ModalModel, pole: complex) -> Floats:
-    return np.where(modes.poles_rad_s.imag > 0, np.abs(modes.poles_rad_s - pole), np.inf)
 
 
 def _low_gain(fit: LinearFit, resonance_hz: float) -> float:

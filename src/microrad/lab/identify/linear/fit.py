@@ -143,6 +143,7 @@ def _zero_errors(model: ModalModel, zeros: Complexes, slopes: Complexes, covaria
     return errors
 
 
+# Spare poles that are fitted to noise have at most 0.2 of the rms of the residual, those fitted to a tone 0.3 and more,
 # and both decay in ten times the recording or more. A true resonance, however sharp, was fitted by at most twice.
 _RINGS, _CYCLES, _TONE = 5.0, 3.0, 0.25
 _STEADY = "most likely a steady tone that the drive has not made (mains, a wheel)"
@@ -196,8 +197,6 @@ def fit_linear(
     records: Sequence[Recording],
     orders: int | Sequence[int] | None = None,
     *,
-    response: FrequencyResponse | None = None,
-    hold: Hold = "zero-order",
     strictly_proper: bool = False,
     drop: int = 0,
     exchanges: int = 12,
@@ -208,16 +207,15 @@ def fit_linear(
     `orders` is a number of states, or several to compare; by default 1 to 8, or 4, 8, ... 28 with several channels.
     Periodic recordings are fitted in frequency, where the error at the excited lines is the output error of the steady
     state; others first in frequency and then as output error in time from rest, the first `drop` samples not counted.
-    `strictly_proper` leaves out the direct term. `response` replaces the response computed here. `exchanges` is the
-    largest number of weak modes exchanged for better ones (several channels only; see `structure`).
+    `strictly_proper` leaves out the direct term. `exchanges` is the largest number of weak modes exchanged for better
+    ones (several channels only; see `order`).
 
     Raises `IdentificationError` for what `response_from_records` and `response_from_periods` refuse, and for an order
     below 1 or beyond what the response can fix.
     """
     periodic = bool(records) and all(r.period_samples is not None for r in records)
-    if response is None:
-        response = response_from_periods(records, hold=hold) if periodic else response_from_records(records, hold=hold)
-    hold, direct = response.hold, not strictly_proper
+    response = response_from_periods(records) if periodic else response_from_records(records)
+    direct = not strictly_proper
     several = response.response[0].size > 1
     candidates = _candidates(response, orders)
     tried = candidates if several else range(1, candidates[-1] + 1)  # each sets out from the one before, too
@@ -232,8 +230,8 @@ def fit_linear(
     chosen, reason = _choose(scan) if scan else (candidates[0], f"order {candidates[0]} was given")
     polished = fit_order(response, chosen, direct=direct, exchanges=exchanges) if several else fits[chosen]
     report(total - 1, total, "polish in frequency")
-    if not periodic and hold != "band-limited":
-        polished = polish(TimeEquations(records, hold, drop, direct=direct), polished.model, iterations=30)
+    if not periodic:
+        polished = polish(TimeEquations(records, response.hold, drop, direct=direct), polished.model, iterations=30)
     report(total, total, "polish in time")
     return _finish(records, response, polished, scan, reason, drop, direct)
 
@@ -340,22 +338,13 @@ def _finish(
 ) -> LinearFit:
     model = polished.model
     steady = all(r.period_samples is not None for r in records)
-    errors = (
-        [output_error(model, r, response.hold, steady=steady, drop=drop) for r in records]
-        if (steady or response.hold != "band-limited")
-        else []
-    )
-    inflation = colour_inflation([column for error in errors for column in error.T]) if errors else 1.0
+    errors = [output_error(model, r, response.hold, steady=steady, drop=drop) for r in records]
+    inflation = colour_inflation([column for error in errors for column in error.T])
     known = uncertainty(polished, response, direct, inflation)
     residual = response.response - model.response(response.freq_hz, response.hold, response.rate_hz)
-    outputs = response.response.shape[1]
-    percent, rms = np.full(outputs, np.nan), np.full(outputs, np.nan)
-    if errors:
-        error = np.concatenate(errors)
-        measured = [
-            r.output[-len(e) :] - r.output[-len(e) :].mean(axis=0) for r, e in zip(records, errors, strict=True)
-        ]
-        percent, rms = fit_percent(np.concatenate(measured), error), np.sqrt(np.mean(error**2, axis=0))
+    error = np.concatenate(errors)
+    measured = [r.output[-len(e) :] - r.output[-len(e) :].mean(axis=0) for r, e in zip(records, errors, strict=True)]
+    rms = np.sqrt(np.mean(error**2, axis=0))
     return LinearFit(
         system=model.state_space(),
         modes=model,
@@ -363,12 +352,12 @@ def _finish(
         hold=response.hold,
         rate_hz=response.rate_hz,
         excited_hz=response.excited_hz,
-        fit_percent=percent,
+        fit_percent=fit_percent(np.concatenate(measured), error),
         residual_rms=rms,
         scan=tuple(scan),
         reason=reason,
         **vars(known),
-        warnings=(*(_tones(model, records, rms, response.hold) if errors else ()), *_warnings(known, response)),
+        warnings=(*_tones(model, records, rms, response.hold), *_warnings(known, response)),
         response=response,
         residual=residual,
     )

@@ -37,7 +37,8 @@ class FrequencyResponse:
     (frequencies, outputs) is the multiple coherence. `drive_power` (frequencies, inputs, inputs) is the one-sided
     power of the drives in each band with cross terms, the mean over the records: trace(E P E^H) is the mean-square
     output of a model error E. `residual_power` (frequencies, outputs) is what the response leaves of the outputs,
-    corrected for the numbers fitted. `excited_hz` is the excited band.
+    corrected for the numbers fitted. `excited_hz` is the excited band. `hold` is
+    what stands between the samples of the drive: a converter's, unless a model says otherwise.
     """
 
     freq_hz: Floats
@@ -52,9 +53,9 @@ class FrequencyResponse:
     excited_hz: tuple[float, float]
     method: str
     rate_hz: float
-    hold: Hold
     input_names: tuple[str, ...]
     output_names: tuple[str, ...]
+    hold: Hold = "zero-order"
 
 
 class _Spectra(NamedTuple):
@@ -71,7 +72,6 @@ def response_from_records(
     *,
     band_hz: tuple[float, float] | None = None,
     bands: int = BANDS,
-    hold: Hold = "zero-order",
     detrend: bool = True,
 ) -> FrequencyResponse:
     """Band-averaged cross-spectrum, solved for all inputs at once; needs as many records as inputs, or broadband
@@ -100,7 +100,7 @@ def response_from_records(
         slopes = _lines_left(spectra, edges, records[0].samples)
         outputs = [r.output - line * slope for r, slope in zip(records, slopes, strict=True)]
         spectra = _transform(records, outputs)
-    return _banded(records, spectra, edges, hold)
+    return _banded(records, spectra, edges)
 
 
 def _check(records: Sequence[Recording]) -> None:
@@ -183,9 +183,7 @@ def _inverses(spectra: _Spectra, edges: list[tuple[int, int]]) -> tuple[Complexe
     return auto, _independent(auto, spectra.freq_hz[[begin for begin, _ in edges]])
 
 
-def _banded(
-    records: Sequence[Recording], spectra: _Spectra, edges: list[tuple[int, int]], hold: Hold
-) -> FrequencyResponse:
+def _banded(records: Sequence[Recording], spectra: _Spectra, edges: list[tuple[int, int]]) -> FrequencyResponse:
     inputs, outputs = spectra.drive.shape[2], spectra.output.shape[2]
     auto, inverse = _inverses(spectra, edges)
     response = np.empty((len(edges), outputs, inputs), dtype=complex)
@@ -212,7 +210,6 @@ def _banded(
         residual_power=left,
         excited_hz=excited,
         method="band-averaged cross-spectrum",
-        hold=hold,
         **_common(records),
     )
 
@@ -268,9 +265,7 @@ def _lines_left(spectra: _Spectra, edges: list[tuple[int, int]], samples: int) -
 
 
 # ---------------------------------------------------------------------------------------------------- periodic drives
-def response_from_periods(
-    records: Sequence[Recording], *, skip_periods: int = 0, hold: Hold = "zero-order"
-) -> FrequencyResponse:
+def response_from_periods(records: Sequence[Recording], *, skip_periods: int = 0) -> FrequencyResponse:
     """Best linear approximation from periodic records, one realisation of the same lines each, period_samples set.
 
     The first `skip_periods` of each record are dropped as transient. At each excited line the outputs of all
@@ -319,7 +314,6 @@ def response_from_periods(
         residual_power=total_variance,
         excited_hz=(float(freq[0]), float(freq[-1])),
         method=f"best linear approximation, realisations: {m}, periods of each: {p}",
-        hold=hold,
         **_common(records),
     )
 

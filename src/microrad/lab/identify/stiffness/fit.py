@@ -159,8 +159,7 @@ def fit_hysteretic_stiffness(
     different rates or channels, without a period, for thresholds that do not ascend from 0, and for a mirror that runs
     away all the same.
     """
-    _check(records, skip_periods)
-    _check_options(options)
+    _check(records, skip_periods, options)
     amplitudes, classes = _classes(records)
     units = _unit(records, "drive"), _unit(records, "output")
     steady = [_steady(r, units, options.sub_steps, skip_periods) for r in records]
@@ -197,7 +196,7 @@ def _start(
 
 
 # --------------------------------------------------------------------------------------------------------- the records
-def _check(records: Sequence[Recording], skip_periods: int) -> None:
+def _check(records: Sequence[Recording], skip_periods: int, options: StiffnessOptions) -> None:
     if not records:
         raise IdentificationError("no recording was given; name records of at least two amplitudes.")
     for other in records:
@@ -209,9 +208,6 @@ def _check(records: Sequence[Recording], skip_periods: int) -> None:
                 "periods."
             )
     check_alike(records, "fitted")
-
-
-def _check_options(options: StiffnessOptions) -> None:
     thresholds = options.thresholds
     if not thresholds or thresholds[0] < 0 or np.any(np.diff(thresholds) <= 0):
         raise IdentificationError(f"the thresholds {list(thresholds)} do not ascend from 0; sort them, each once.")

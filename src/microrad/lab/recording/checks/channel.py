@@ -1,4 +1,7 @@
-"""What one channel's values say about themselves: the quantisation step and the drift."""
+"""What one channel's values say about themselves: quantisation, drift and clipping.
+
+Clipping shows as flat tops that a moving mirror cannot make, and as pile-up at the extremes of fast signals.
+"""
 
 import math
 from collections.abc import Callable, Sequence
@@ -7,6 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from microrad.lab.recording.records import Finding, FloatArray
+
+BoolArray = NDArray[np.bool_]
+IntArray = NDArray[np.int_]
 
 _SUBSAMPLE = 20_000
 # The narrowest loops of piezo mirrors are about 2 % of peak-to-peak wide. With fewer than 50 levels such a loop is
@@ -93,9 +99,8 @@ def drift(label: str, values: FloatArray, drives: Sequence[FloatArray]) -> list[
     drift is the larger part of what was recorded, unless drives seen through slow low-passes explain it: then the
     mirror is still answering a step.
     """
-    stride = max(1, values.size // 50_000)
     # Block means instead of every n-th sample: they do not alias.
-    y, *u = (_block_means(column, stride) for column in (values, *drives))
+    y, *u = (block_means(column, max(1, values.size // 50_000)) for column in (values, *drives))
     trend, error = _trend(y, u)
     share = abs(trend) / float(np.ptp(values))
     if share < _DRIFT_NOTE or abs(trend) < 5.0 * error:
@@ -138,25 +143,19 @@ def _slow(drives: Sequence[FloatArray]) -> list[FloatArray]:
     """The drives behind first-order low-passes with time constants of 1, 3 and 10 % of the record."""
     from scipy.signal import lfilter
 
-    slow = []
-    for drive in drives:
-        for share in (0.01, 0.03, 0.1):
-            pole = math.exp(-1 / (share * drive.size))
-            slow.append(lfilter([1 - pole], [1, -pole], drive - drive[0]))
-    return slow
+    poles = [(drive, math.exp(-1 / (share * drive.size))) for drive in drives for share in (0.01, 0.03, 0.1)]
+    return [lfilter([1 - pole], [1, -pole], drive - drive[0]) for drive, pole in poles]
 
 
-def _block_means(values: FloatArray, length: int) -> FloatArray:
+def block_means(values: FloatArray, length: int) -> FloatArray:
+    """Means of blocks of `length` samples; what is left at the end is left out."""
     if length == 1:
         return values
-    means: FloatArray = values[: values.size // length * length].reshape(-1, length).mean(axis=1)
-    return means
+    return np.asarray(values[: values.size // length * length].reshape(-1, length).mean(axis=1))
 
-
-BoolArray = NDArray[np.bool_]
-IntArray = NDArray[np.int_]
 
 _MIN_RUN = 3
+# A rounded peak of a quantised signal rests on its top code while it rises by one step; seen from its flanks it would
 # have gone two steps higher (parabola). Six steps cannot be rounding.
 _QUANTA = 6.0
 # What is cut off must matter: 0.4 % of peak-to-peak is below the residual of any hysteresis model known here.
@@ -183,6 +182,11 @@ def clipping(
     if max(at.size for _, at, _ in extremes) < 2 * _MIN_RUN:
         return []
     step = quantum(values)
+    remedy = (
+        "lower the drive, or widen the range of the converter that recorded it"
+        if drives is None
+        else "widen the sensor's or the converter's range, or lower the drive"
+    )
     # Where the drive rests at its limits, an output may do so for about as long.
     resting = max((_resting(drive) for drive in drives), default=0) if drives else 0
     for limit, at, sign in extremes:
@@ -193,23 +197,16 @@ def clipping(
             share = 100 * float(np.median(hidden)) / (high - low)
             text = (
                 f"{label} is clipped at {limit:.6g}: {rows.size} flat tops, the first at {place(int(rows[0]))}, "
-                f"{at.size} samples at exactly that value, about {share:.2g} % of peak-to-peak cut off; "
-                f"{_remedy(drives)}"
+                f"{at.size} samples at exactly that value, about {share:.2g} % of peak-to-peak cut off; {remedy}"
             )
             found.append(Finding("clipping", label, int(rows[0]), text, True))
         elif drives is not None and _piles_up(values, at, limit, step, high - low):
             text = (
                 f"{label} is clipped at {limit:.6g}: {at.size} samples are exactly there and hardly any just beside "
-                f"it, the first at {place(int(at[0]))}; {_remedy(drives)}"
+                f"it, the first at {place(int(at[0]))}; {remedy}"
             )
             found.append(Finding("clipping", label, int(at[0]), text, True))
     return found
-
-
-def _remedy(drives: Sequence[FloatArray] | None) -> str:
-    if drives is None:
-        return "lower the drive, or widen the range of the converter that recorded it"
-    return "widen the sensor's or the converter's range, or lower the drive"
 
 
 def _flat_tops(

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from microrad.lab.recording.checks.channel import block_means
 from microrad.lab.recording.records import Finding, FloatArray
 
 ComplexArray = NDArray[np.complex128]
@@ -19,7 +20,9 @@ _OUTSIDE = 5e-4
 # (60 dB less) moves the mirror less than that input's noise does.
 _STILL, _FAINT = 1e-5, 1e-6
 _SHORT_RECORD, _ORDER = 20_000, 8
+# A multiplexed converter reads its channels up to one step apart in time, typically half of one.
 _LEAD_SAMPLES = 0.75
+# Hysteresis turns a sine by at most 15 degrees or so; swapped channels show that as a lead.
 _NARROW_RAD = math.radians(25)
 
 
@@ -86,7 +89,8 @@ def follows(
     """Whether an output has anything to do with the inputs, and whether it answers before they ask."""
     factor = max(1, int(rate_hz / (16 * band[1])))
     factor = min(factor, max(1, output.size // 4096))
-    slow = [_decimated(column, factor) for column in (*inputs, output)]
+    slow = [block_means(column, factor) for column in (*inputs, output)]
+    slow = [column - column.mean() for column in slow]
     samples, slow_hz = slow[-1].size, rate_hz / factor
     # Many short segments decide whether there is a response at all, few long ones with four periods of the slowest
     # line each resolve its phase.
@@ -168,12 +172,6 @@ def _predicts(inputs: Sequence[FloatArray], output: FloatArray) -> bool:
     added = both.shape[1] - past.shape[1]
     # Chi-squared with `added` degrees of freedom for unrelated inputs (likelihood ratio).
     return joint <= 0 or rows * math.log(alone / joint) > added + 6 * math.sqrt(2 * added)
-
-
-def _decimated(values: FloatArray, factor: int) -> FloatArray:
-    values = values[: values.size // factor * factor].reshape(-1, factor).mean(axis=1) if factor > 1 else values
-    centred: FloatArray = values - values.mean()
-    return centred
 
 
 def _response(inputs: Sequence[FloatArray], output: FloatArray, rate_hz: float, wanted: float) -> _Response | None:

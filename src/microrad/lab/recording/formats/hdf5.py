@@ -119,11 +119,9 @@ def _too_large(path: Path, item: Any) -> str:
 
 
 def check_pieces(path: Path, name: str, item: Any) -> None:
-    """Refuse a piece that does not unpack to what it states.
+    """Raises `RecordingError` for a piece that does not unpack to the number of bytes that it states.
 
     Of one that holds more the library would make room for all; behind one that holds less it reads on in the memory.
-
-    Raises `RecordingError`.
     """
     if item.chunks is None:
         return
@@ -203,7 +201,7 @@ class Hdf5Source(ArraySource):
         kind = "a MATLAB v7.3 file" if matlab else "an HDF5 file"
         self.variables = []
         unusable: dict[str, str] = {}
-        stated: dict[str, list[StatedRate]] = {}
+        stated: dict[str, tuple[StatedRate, ...]] = {}
         try:
             with h5py.File(path, "r") as file:
                 self._search(file, path, matlab, unusable, stated)
@@ -212,58 +210,54 @@ class Hdf5Source(ArraySource):
         except Exception as error:  # a damaged file may raise OSError, KeyError, RuntimeError and more
             raise damaged(path, kind, error) from None
         channels = channels_of(self.variables, unusable)
-        rates = {group: tuple(found) for group, found in stated.items()}
-        super().__init__(path, kind.split(" ", 1)[1].removesuffix(" file"), channels, sha256_of(path), unusable, rates)
+        super().__init__(path, kind.split(" ", 1)[1].removesuffix(" file"), channels, sha256_of(path), unusable, stated)
 
     def _search(
-        self, file: Any, path: Path, matlab: bool, unusable: dict[str, str], stated: dict[str, list[StatedRate]]
+        self, file: Any, path: Path, matlab: bool, unusable: dict[str, str], stated: dict[str, tuple[StatedRate, ...]]
     ) -> None:
         import h5py
+
+        def note(group: str, name: str, value: Any) -> None:
+            if rate := stated_rate(name, value):
+                stated[group] = (*stated.get(group, ()), rate)
+
+        def note_attributes(group: str, attributes: Mapping[str, Any]) -> None:
+            for name in attributes:
+                if name.casefold() in RATE_NAMES | STEP_NAMES:
+                    note(group, f"{group}/{name}" if group else name, attribute(attributes, name))
 
         def visit(name: str, item: Any) -> None:
             _check_depth(path, name)
             if name.startswith("#"):  # MATLAB's store of cells and references
                 return
-            _note_rates(stated, name, item.attrs, name)
+            note_attributes(name, item.attrs)
             if not isinstance(item, h5py.Dataset):
                 return
-            reason = unusable_dataset(path, item)
-            if reason:
+            if reason := unusable_dataset(path, item):
                 unusable[name] = reason
                 return
             self.variables.append(_variable(path, name, item, matlab))
             if item.size == 1 and item.dtype.kind in "iuf":
                 check_pieces(path, name, item)
-                _add(stated, name.rpartition("/")[0], stated_rate(name, item[()]))
+                note(name.rpartition("/")[0], name, item[()])
 
         def visit_link(name: str, link: Any) -> None:
             _check_depth(path, name)
             if isinstance(link, h5py.ExternalLink):
                 unusable[name] = f"is a link into another file, {ELSEWHERE}"
 
-        _note_rates(stated, "", file.attrs, "")
+        note_attributes("", file.attrs)
         file.visititems(visit)
         file.visititems_links(visit_link)
 
 
 def _check_depth(path: Path, name: str) -> None:
-    """Refuse what lies so deep that the library takes minutes to get there."""
+    """Raises `RecordingError` for groups so deep that the library takes minutes to get there."""
     if name.count("/") > _MOST_DEEP:
         raise RecordingError(
             f"{path}: groups are nested more than {_MOST_DEEP} deep, which no recording needs; copy the datasets into "
             "a file of their own."
         )
-
-
-def _add(stated: dict[str, list[StatedRate]], group: str, rate: StatedRate | None) -> None:
-    if rate is not None:
-        stated.setdefault(group, []).append(rate)
-
-
-def _note_rates(stated: dict[str, list[StatedRate]], group: str, attributes: Mapping[str, Any], where: str) -> None:
-    for name in attributes:
-        if name.casefold() in RATE_NAMES | STEP_NAMES:
-            _add(stated, group, stated_rate(f"{where}/{name}" if where else name, attribute(attributes, name)))
 
 
 def _unit(attributes: Mapping[str, Any]) -> str:

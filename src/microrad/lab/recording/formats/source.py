@@ -111,7 +111,7 @@ class Container(Source):
     stated: Mapping[str, tuple[StatedRate, ...]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        """Take names and units from the channels, and refuse a file without any."""
+        """Take names and units from the channels; raises `RecordingError` for a file without any."""
         self.names = tuple(channel.name for channel in self.channels)
         self.units = tuple(channel.unit for channel in self.channels)
         if not self.channels and not self._has_more():
@@ -175,7 +175,7 @@ class Container(Source):
         )
 
     def load(self, indices: Sequence[int]) -> list[FloatArray]:
-        """Load channels; a fault of the file that shows only now is refused like the others."""
+        """Load channels; raises `RecordingError` for a fault of the file that shows only now."""
         values = []
         for index in indices:
             try:

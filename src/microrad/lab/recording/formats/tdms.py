@@ -47,7 +47,7 @@ class TdmsSource(Container):
         super().__init__(path, "TDMS", channels, sha256_of(path), unusable)
 
     def load(self, indices: Sequence[int]) -> list[FloatArray]:
-        """Scaled values of the channels; refuses channels that were not sampled together."""
+        """Scaled values of the channels; raises `RecordingError` for channels that were not sampled together."""
         self._check_together(indices)
         return super().load(indices)
 
@@ -113,16 +113,14 @@ def _start(channel: Any) -> tuple[np.datetime64, float] | None:
 
 
 def _channels(tdms: Any, unusable: dict[str, str]) -> Iterator[tuple[str, Any]]:
-    for group in tdms.groups():
-        for channel in group.channels():
-            name = f"{group.name}/{channel.name}"
-            dtype = channel.dtype
-            if len(channel) == 0:
-                unusable[name] = "holds no samples; record again, or name another"
-            elif dtype.kind not in "iuf":
-                unusable[name] = f"holds {dtype}, not real numbers; save numbers, or name another"
-            else:
-                yield name, channel
+    for channel in (channel for group in tdms.groups() for channel in group.channels()):
+        name = f"{channel.group_name}/{channel.name}"
+        if len(channel) == 0:
+            unusable[name] = "holds no samples; record again, or name another"
+        elif channel.dtype.kind not in "iuf":
+            unusable[name] = f"holds {channel.dtype}, not real numbers; save numbers, or name another"
+        else:
+            yield name, channel
 
 
 def _channel(path: Path, name: str, channel: Any) -> Channel:
@@ -147,14 +145,12 @@ def check_structure(path: Path) -> None:
     with path.open("rb") as file:
         while position < size:
             file.seek(position)
-            lead = file.read(_LEAD_IN)
-            _check_lead_in(path, lead, number, position, size)
-            order = ">" if struct.unpack("<l", lead[4:8])[0] & _BIG_ENDIAN else "<"
-            position += _LEAD_IN + struct.unpack(f"{order}Q", lead[12:20])[0]
+            position += _LEAD_IN + _following(path, file.read(_LEAD_IN), number, position, size)
             number += 1
 
 
-def _check_lead_in(path: Path, lead: bytes, number: int, position: int, size: int) -> None:
+def _following(path: Path, lead: bytes, number: int, position: int, size: int) -> int:
+    """Bytes of a segment behind its lead-in; raises `RecordingError` for a lead-in that cannot be true."""
     where = f"{path}: segment {number} of the TDMS file, at byte {position},"
     again = "copy the file again from its source, or open and save it in LabVIEW"
     if len(lead) >= 4 and lead[:4] != b"TDSm":
@@ -174,3 +170,4 @@ def _check_lead_in(path: Path, lead: bytes, number: int, position: int, size: in
         raise RecordingError(f"{where} is truncated: {missing} of its {following} bytes are missing; {again}.")
     if raw > following:
         raise RecordingError(f"{where} places its data at byte {raw} of {following}; {again}.")
+    return int(following)

@@ -53,26 +53,22 @@ class Layout:
     @property
     def units(self) -> tuple[str, ...]:
         """Units in a row of their own, or in brackets behind the names; '' where there is none."""
-        for row in self.headers[1:]:
-            cells = tuple(cell.strip("()[] ") for cell in row)
-            if _are_units(cells):
-                return cells
-        return tuple(bracketed_unit(name) for name in self.names)
+        own = next((row for row in self.headers[1:] if _are_units(row)), None)
+        return tuple(cell.strip("()[] ") for cell in own) if own else tuple(map(bracketed_unit, self.names))
 
 
 def _are_units(cells: Sequence[str]) -> bool:
-    filled = [cell for cell in cells if cell.strip("()[] ")]
-    return bool(filled) and all(cell.strip("()[] ") in _UNITS for cell in filled)
+    filled = {cell.strip("()[] ") for cell in cells} - {""}
+    return bool(filled) and filled <= _UNITS
 
 
 def layout_of(path: Path) -> Layout:
     """Judge the layout from the first megabyte; raises `RecordingError` where it is no table of numbers."""
-    head, complete = _read_start(path)
+    head = read_head(path, _HEAD_BYTES + 1)
+    head, complete = head[:_HEAD_BYTES], len(head) <= _HEAD_BYTES
     encoding = _encoding(path, head)
     text = head.decode(encoding, errors="replace").replace("\r\n", "\n").replace("\r", "\n")
-    lines = text.split("\n")
-    if not complete:
-        lines = lines[:-1]
+    lines = text.split("\n")[: None if complete else -1]
     content = [line for line in lines if line.strip() and not line.lstrip().startswith(COMMENT)]
     if not content:
         reason = "holds only blank lines and comments" if complete else "has no line break in its first megabyte"
@@ -89,11 +85,6 @@ def layout_of(path: Path) -> Layout:
     return Layout(delimiter, columns, headers, first, encoding)
 
 
-def _read_start(path: Path) -> tuple[bytes, bool]:
-    head = read_head(path, _HEAD_BYTES + 1)
-    return head[:_HEAD_BYTES], len(head) <= _HEAD_BYTES
-
-
 def _encoding(path: Path, head: bytes) -> str:
     if _CONTROL.search(head):
         refuse_binary(path, head)
@@ -106,7 +97,7 @@ def _encoding(path: Path, head: bytes) -> str:
 
 
 def refuse_binary(path: Path, chunk: bytes) -> None:
-    """Refuse what is no text, by the name of what it is."""
+    """Raises `RecordingError`, which names what the file is instead of text."""
     what = "UTF-16 text" if chunk[:2] in (b"\xff\xfe", b"\xfe\xff") else "a binary file, not text"
     raise RecordingError(f"{path}: this is {what}; export the recording as plain text (CSV, UTF-8).")
 
@@ -156,7 +147,8 @@ def _header(
             commented.append(tuple(split(stripped.lstrip("#% \t"), delimiter)))
             continue
         cells = split(line, delimiter)
-        if not _is_preamble(cells, columns):
+        words = any(cell and not _is_number(cell) for cell in cells)
+        if not words or (len(cells) == columns and any(_is_number(cell) for cell in cells)):
             _check_comma_pairs(path, names, columns, delimiter, cells)
             rows = [row for row in names or commented[::-1] if len(row) == columns]
             return number, tuple(sorted(rows, key=_are_units))
@@ -167,20 +159,11 @@ def _header(
     )
 
 
-def _is_preamble(cells: Sequence[str], columns: int) -> bool:
-    words = any(cell and not _is_number(cell) for cell in cells)
-    return words and (len(cells) != columns or not any(_is_number(cell) for cell in cells))
-
-
 def _check_comma_pairs(
     path: Path, names: Sequence[tuple[str, ...]], columns: int, delimiter: str | None, cells: Sequence[str]
 ) -> None:
-    if (
-        delimiter == ","
-        and names
-        and 2 * len(names[-1]) == columns
-        and all(re.fullmatch(r"[+-]?\d+", c) for c in cells)
-    ):
+    twice = bool(names) and 2 * len(names[-1]) == columns
+    if delimiter == "," and twice and all(re.fullmatch(r"[+-]?\d+", c) for c in cells):
         raise RecordingError(
             f"{path}: the header names {len(names[-1])} columns and the rows have {columns}: decimal commas, which "
             "cannot be told from separating commas here; export with decimal points."
