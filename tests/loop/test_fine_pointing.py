@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from microrad import mirror
 from microrad.loop import control, fine_pointing
 from microrad.loop.fine_loop import ensemble
 from microrad.loop.fine_loop.design import design_plant
 from microrad.loop.fine_loop.linear import close, stationary
 from microrad.loop.fine_loop.loop import assemble
 from microrad.loop.fine_pointing import designs, parts, results, scenario
-from microrad import mirror
 from microrad.mirror import hysteresis
 from microrad.mirror import spread as mirror_spread
 from microrad.mission.file import load_mission

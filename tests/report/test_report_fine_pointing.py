@@ -436,9 +436,11 @@ def test_a_distant_bound_leaves_the_question_open_and_a_bound_above_theory_is_no
 def test_the_missions_own_stroke_counts(fine, mission):
     table = mission.fine_pointing
     elsewhere = table.reference.model_copy(update={"point_ahead_on_mirror": False})
-    m = mission.model_copy(update={"fine_pointing": table.model_copy(update={"reference": elsewhere})})
-    assert fine.scene.own_stroke(mission) is fine.scene.stroke
-    assert fine.scene.own_stroke(m) is fine.scene.stroke_without_point_ahead
+    other = table.model_copy(update={"reference": elsewhere})
+    m = mission.model_copy(update={"fine_pointing": other})
+    assert fine.scene.own_stroke is fine.scene.stroke
+    fine = replace(fine, scene=replace(fine.scene, table=other))
+    assert fine.scene.own_stroke is fine.scene.stroke_without_point_ahead
     assert section.stroke(fine, m)["groups"] == [
         ("Point-ahead on the mirror", 2),
         ("Point-ahead elsewhere (this mission)", 2),
