@@ -20,6 +20,7 @@ from fmpy.validation import validate_fmu
 from packaging.requirements import Requirement
 
 import designs
+from loops import IDEAL_DRIVE
 from microrad.core import kernels, lti
 from microrad.export import choice, fmi_description, fmu
 from microrad.export.build import compiler
@@ -84,7 +85,7 @@ def everything():
 def rich_unit():
     step = 2e-5
     plant = mirror.discretise(everything(), step)
-    follow = control.amplifier_factor(replace(control.IDEAL_DRIVE, bandwidth_hz=2000.0), step)
+    follow = control.amplifier_factor(replace(IDEAL_DRIVE, bandwidth_hz=2000.0), step)
     origin = Origin('a <mission> & "more"', "0" * 64, "all\x07 there */ is")
     return PlantUnit(origin, plant, OPTICS, 2000.0, follow, 0.02, 6.0)
 
@@ -503,7 +504,7 @@ def by_kernel(of, optics, drive, commands, steps, step_s):
 
 
 def rich_by_kernel(commands, steps=1, of=None, bandwidth_hz=2000.0):
-    drive = replace(control.IDEAL_DRIVE, bandwidth_hz=bandwidth_hz, slew_v_s=1000.0)
+    drive = replace(IDEAL_DRIVE, bandwidth_hz=bandwidth_hz, slew_v_s=1000.0)
     return by_kernel(of or everything(), OPTICS, drive, commands, steps, 2e-5)
 
 
@@ -540,7 +541,7 @@ def test_a_plant_with_all_there_is_follows_the_kernel(slave, version):
 @pytest.mark.parametrize("version", VERSIONS)
 def test_a_plant_without_states_follows_the_kernel(slave, version):
     one, commands = slave("plays", version), walk(1)
-    output, _, _ = by_kernel(play_mirror(), np.eye(1), control.IDEAL_DRIVE, commands, 2, 1e-5)
+    output, _, _ = by_kernel(play_mirror(), np.eye(1), IDEAL_DRIVE, commands, 2, 1e-5)
     assert_follows(driven(one, commands, 2e-5), output)
 
 

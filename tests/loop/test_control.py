@@ -10,10 +10,11 @@ import pytest
 from numpy.testing import assert_allclose
 
 import oracles
+from loops import IDEAL_DRIVE
 from microrad.core import lti
 from microrad.loop import control
 from microrad.loop import sine_run as simulate
-from microrad.loop.control import IDEAL_DRIVE, Drive, Gains, Inverse, Timing
+from microrad.loop.control import Drive, Gains, Inverse, Timing
 from microrad.mirror import hysteresis
 from microrad.mirror import model as mirror
 from microrad.mirror.hysteresis import BoucWen, Play
@@ -118,13 +119,6 @@ def test_anti_windup_takes_the_error_that_just_reaches_the_limit(gains):
 def test_anti_windup_without_direct_path_is_zero():
     integrator = lti.StateSpace(np.eye(1), np.ones((1, 1)), np.ones((1, 1)), np.zeros((1, 1)))
     assert_allclose(control.anti_windup(integrator), 0.0)
-
-
-def test_controllers_side_by_side_do_not_know_each_other():
-    both = control.side_by_side(control.pid(PI, PERIOD), control.pid(PID, PERIOD))
-    response = lti.frequency_response(both, np.array([40.0]), PERIOD)[0]
-    alone = [lti.frequency_response(control.pid(g, PERIOD), np.array([40.0]), PERIOD)[0, 0, 0] for g in (PI, PID)]
-    assert_allclose(response, np.diag(alone), rtol=1e-12)
 
 
 # ------------------------------------------------------------------------------------------------ inverses

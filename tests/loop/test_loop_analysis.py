@@ -518,14 +518,3 @@ def test_a_plant_without_delay_is_refused():
     quick = DesignPlant(PERIOD, replace(plant.system, D=D), 1, 1e-4)
     with pytest.raises(ValueError, match="answers the command of its own sample: give it its delay"):
         analysis.close(quick, integrator(1.0))
-
-
-def test_a_transfer_function_that_needs_the_future_is_refused():
-    analysis.refuse_improper((1.0, 2.0), (3.0, 1.0), "lead")
-    analysis.refuse_improper((0.0, 1.0, 2.0), (3.0, 1.0), "leading zeros do not count")
-    with pytest.raises(
-        ValueError, match=r"lead is not causal: a numerator of order 3 over .* order 1 .* add 2 or more"
-    ):
-        analysis.refuse_improper((1.0, 0.0, 0.0, 2.0), (3.0, 1.0), "lead")
-    with pytest.raises(ValueError, match="lead: the denominator is zero"):
-        analysis.refuse_improper((1.0,), (0.0, 0.0), "lead")

@@ -9,6 +9,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.integrate import solve_ivp
 
 import oracles
+from loops import IDEAL_DRIVE
 from microrad.core import kernels, lti
 from microrad.loop import control
 from microrad.loop import paper_cases as tracking
@@ -27,9 +28,7 @@ DENOMINATOR = (1.0, 2.15e4, 3.737e8, 2.615e12, 8.489e14, 1.829e14)
 PERIOD = 20e-6
 KP, KI = 1e3, 16e6  # V/rad, V/(rad s)
 AMPLITUDE = 0.3e-3
-IDEAL = simulate.Setup(
-    control.IDEAL_DRIVE, control.Timing(PERIOD, 1, 0), control.pid(control.Gains(KP, KI, 0.0, 1e-4), PERIOD)
-)
+IDEAL = simulate.Setup(IDEAL_DRIVE, control.Timing(PERIOD, 1, 0), control.pid(control.Gains(KP, KI, 0.0, 1e-4), PERIOD))
 
 
 @pytest.fixture(scope="module")

@@ -84,79 +84,14 @@ def test_a_pushed_actuator_sends_the_beam_away_from_it_and_piston_moves_nothing(
 
 
 @pytest.mark.parametrize("angle", ["mechanical", "optical"])
-def test_the_strokes_for_a_line_of_sight_in_metres_make_it_and_sum_to_zero(angle):
+def test_the_outputs_of_a_tripod_for_a_line_of_sight_make_it_and_sum_to_zero(angle):
     tripod = Geometry(angle, magnification=10.0, layout="tripod", actuator_radius_m=0.02)
-    wanted = np.array([[100e-6, 0.0], [0.0, -50e-6]])
-    strokes = geometry.tripod_strokes_m(tripod, wanted)
+    outputs = geometry.outputs_matrix(tripod)
     # 100 µrad outside is 1 mrad of beam, 0.5 mrad of tilt: actuator 1, 20 mm out, draws back by 10 µm
-    np.testing.assert_allclose(strokes[0], [-10e-6, 5e-6, 5e-6], rtol=1e-12)
-    np.testing.assert_allclose(strokes.sum(axis=1), 0.0, atol=1e-20)
-    outputs = strokes / 0.02 * {"mechanical": 1.0, "optical": 2.0}[angle]
-    np.testing.assert_allclose(outputs @ geometry.line_of_sight_matrix(tripod).T, wanted, atol=1e-18)
-    with pytest.raises(ValueError, match='layout "two-axis" has no strokes; only a "tripod" has actuators to extend'):
-        geometry.tripod_strokes_m(Geometry("optical"), wanted)
-
-
-# ---------------------------------------------------------------------------------------------- decoupling
-def random_geometry(rng, layout):
-    return Geometry(
-        angle=("optical", "mechanical")[rng.integers(2)],
-        incidence_rad=rng.uniform(0.0, 1.2),
-        magnification=rng.uniform(0.5, 40.0),
-        rotation_rad=rng.uniform(-np.pi, np.pi),
-        coupling=((rng.uniform(0.8, 1.2), rng.uniform(-0.4, 0.4)), (rng.uniform(-0.4, 0.4), rng.uniform(0.8, 1.2))),
-        layout=layout,
-        actuator_radius_m=0.01 if layout == "tripod" else None,
-    )
-
-
-@pytest.mark.parametrize("layout", ["two-axis", "tripod"])
-def test_random_coupled_geometries_are_decoupled_to_two_equal_gains(layout):
-    rng, cases = random_cases(seed=2)
-    for _ in cases:
-        g = random_geometry(rng, layout)
-        gains = rng.uniform(0.5e-4, 2e-4, g.outputs) * rng.choice([-1.0, 1.0], g.outputs)
-        seen = geometry.line_of_sight_matrix(g) * gains
-        gain = geometry.decoupled_gain_rad_v(g, gains)
-        commands = geometry.decoupling(g, gains)
-        np.testing.assert_allclose(seen @ commands, gain * np.eye(2), atol=1e-12 * gain)
-        assert gain > 0.0
-        assert np.linalg.det(commands.T @ commands) == pytest.approx(1.0, rel=1e-9)  # neither grows nor shrinks
-        chosen = geometry.decoupling(g, gains, axis_gain_rad_v=1e-4)
-        # independent of the closed form: solve for the commands with the absence of piston as a third equation
-        conditions, wanted = seen, 1e-4 * np.eye(2)
-        if layout == "tripod":
-            conditions, wanted = np.vstack([seen, gains]), np.vstack([wanted, np.zeros(2)])
-        np.testing.assert_allclose(chosen, np.linalg.solve(conditions, wanted), rtol=1e-9, atol=1e-9)
-
-
-def test_an_ideal_two_axis_mirror_needs_no_decoupling_and_keeps_its_gain():
-    gains = (0.089e-3, 0.089e-3)
-    np.testing.assert_allclose(geometry.decoupling(Geometry("optical"), gains), np.eye(2), atol=1e-15)
-    assert geometry.decoupled_gain_rad_v(Geometry("optical"), gains) == pytest.approx(0.089e-3, rel=1e-12)
-    turned = Geometry("mechanical", magnification=8.0, rotation_rad=0.3)
-    c, s = math.cos(0.3), math.sin(0.3)
-    np.testing.assert_allclose(geometry.decoupling(turned, gains), [[c, s], [-s, c]], atol=1e-15)
-    assert geometry.decoupled_gain_rad_v(turned, gains) == pytest.approx(0.089e-3 / 4.0, rel=1e-12)
-
-
-def test_an_ideal_tripod_has_orthonormal_commands_without_piston():
-    tripod = Geometry("mechanical", layout="tripod", actuator_radius_m=0.01)
-    commands = geometry.decoupling(tripod, (1e-4, 1e-4, 1e-4))
-    np.testing.assert_allclose(commands.T @ commands, np.eye(2), atol=1e-15)
-    np.testing.assert_allclose(np.ones(3) @ commands, 0.0, atol=1e-15)
-    root = math.sqrt(2.0 / 3.0)
-    np.testing.assert_allclose(commands, -root * np.column_stack([np.cos(THIRDS), np.sin(THIRDS)]), atol=1e-15)
-    # strokes of sqrt(2/3) cos x 0.1 mrad tilt the plate by sqrt(2/3) x 0.1 mrad, and the beam by twice that
-    assert geometry.decoupled_gain_rad_v(tripod, (1e-4, 1e-4, 1e-4)) == pytest.approx(2 * root * 1e-4, rel=1e-12)
-
-
-def test_unlike_actuators_of_a_tripod_share_strokes_and_not_volts():
-    gains = np.array([1e-4, 2e-4, 0.5e-4])
-    tripod = Geometry("mechanical", layout="tripod", actuator_radius_m=0.01)
-    commands = geometry.decoupling(tripod, gains)
-    np.testing.assert_allclose(gains @ commands, 0.0, atol=1e-18)
-    assert np.max(np.abs(np.ones(3) @ commands)) > 0.1
+    strokes_m = outputs @ [100e-6, 0.0] * 0.02 / {"mechanical": 1.0, "optical": 2.0}[angle]
+    np.testing.assert_allclose(strokes_m, [-10e-6, 5e-6, 5e-6], rtol=1e-12)
+    np.testing.assert_allclose(outputs.sum(axis=0), 0.0, atol=1e-14)
+    np.testing.assert_allclose(geometry.line_of_sight_matrix(tripod) @ outputs, np.eye(2), atol=1e-14)
 
 
 # ------------------------------------------------------------------------------------------------ refusals
@@ -167,33 +102,13 @@ def test_a_singular_coupling_is_refused_with_the_direction_that_is_not_driven():
         match=r"two-axis mirror is singular: at 135\.0 degrees from x towards y it moves the line of sight "
         r"4e\+06 times less .*at most 10000.* check coupling and incidence_rad",
     ):
-        geometry.decoupling(both_move_the_diagonal, (1e-4, 1e-4))
+        geometry.outputs_matrix(both_move_the_diagonal)
     with pytest.raises(ValueError, match=r"tripod mirror is singular: at 90\.0 degrees .* inf times less"):
         geometry.outputs_matrix(
             Geometry("optical", coupling=((1.0, 0.0), (0.0, 0.0)), layout="tripod", actuator_radius_m=0.01)
         )
     nearly = Geometry("optical", coupling=((1.0, 0.0), (0.0, 2e-4)))  # 5000 times, still invertible
     assert geometry.outputs_matrix(nearly)[1, 1] == pytest.approx(5000.0, rel=1e-9)
-
-
-@pytest.mark.parametrize(
-    ("gains", "message"),
-    [
-        ((1e-4, 0.0), r"gains_rad_v is \(0.0001, 0.0\); give one finite gain other than 0 rad/V for each of the 2"),
-        ((1e-4, math.nan), "gains_rad_v is .*nan"),
-        ((1e-4, 1e-4, 1e-4), "each of the 2 actuators of the two-axis mirror"),
-        ((1e-4, 1e-9), r"actuator 2 moves the mirror 1e\+05 times less per volt than the strongest"),
-    ],
-)
-def test_gains_that_leave_an_axis_without_drive_are_refused(gains, message):
-    with pytest.raises(ValueError, match=message):
-        geometry.decoupling(Geometry("optical"), gains)
-
-
-@pytest.mark.parametrize("gain", [0.0, math.nan, math.inf])
-def test_no_gain_cannot_be_asked_for(gain):
-    with pytest.raises(ValueError, match=f"axis_gain_rad_v is {gain:g}; give a finite gain other than 0 rad/V"):
-        geometry.decoupling(Geometry("optical"), (1e-4, 1e-4), gain)
 
 
 @pytest.mark.parametrize(
@@ -216,6 +131,18 @@ def test_no_gain_cannot_be_asked_for(gain):
 def test_what_is_no_geometry_is_refused(values, message):
     with pytest.raises(ValueError, match=f"^geometry: {message}"):
         Geometry(**({"angle": "optical"} | values))
+
+
+def random_geometry(rng, layout):
+    return Geometry(
+        angle=("optical", "mechanical")[rng.integers(2)],
+        incidence_rad=rng.uniform(0.0, 1.2),
+        magnification=rng.uniform(0.5, 40.0),
+        rotation_rad=rng.uniform(-np.pi, np.pi),
+        coupling=((rng.uniform(0.8, 1.2), rng.uniform(-0.4, 0.4)), (rng.uniform(-0.4, 0.4), rng.uniform(0.8, 1.2))),
+        layout=layout,
+        actuator_radius_m=0.01 if layout == "tripod" else None,
+    )
 
 
 # ------------------------------------------------------------------------------------------- stroke budget

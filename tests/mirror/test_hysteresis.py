@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from loops import IDEAL_DRIVE, side_by_side
 from microrad.core import kernels
 from microrad.loop import control
 from microrad.loop import sine_run as simulate
@@ -232,7 +233,7 @@ def feedforward_alone(model, reference, inverse=True, creep=NO_CREEP, invert_cre
         kept = creep if invert_creep else NO_CREEP
         feedforward = control.inverse(replace(m, inverse=(inverted,), inverse_creep=(kept,)))
     setup = simulate.Setup(
-        control.IDEAL_DRIVE, control.Timing(PERIOD, 1, 0), control.pid(control.Gains(0.0, 0.0, 0.0, 1e-4), PERIOD)
+        IDEAL_DRIVE, control.Timing(PERIOD, 1, 0), control.pid(control.Gains(0.0, 0.0, 0.0, 1e-4), PERIOD)
     )
     trace = simulate.track("alone", m, setup, feedforward, np.asarray(reference)[:, None], slice(None))
     return trace.output_rad[1:, 0] - trace.reference_rad[:-1, 0], trace
@@ -378,9 +379,9 @@ def test_the_inverse_of_a_mirror_carries_creep_and_widening_by_actuator():
     loop = simulate.assemble(
         mirror.combine(*parts),
         simulate.Setup(
-            control.IDEAL_DRIVE,
+            IDEAL_DRIVE,
             control.Timing(PERIOD, 1, 0),
-            control.side_by_side(*[control.pid(control.Gains(0.0, 1.0, 0.0, 1e-4), PERIOD)] * 3),
+            side_by_side(*[control.pid(control.Gains(0.0, 1.0, 0.0, 1e-4), PERIOD)] * 3),
         ),
         inverse,
     )

@@ -10,6 +10,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.signal import lsim
 
 import oracles
+from loops import side_by_side
 from microrad.core import kernels, lti
 from microrad.loop import control
 from microrad.loop import sine_run as simulate
@@ -272,7 +273,7 @@ def test_two_axes_track_in_one_loop_as_in_two():
     pids = [control.pid(control.Gains(1e3, ki, 1e-2, 1e-4), timing.period_s) for ki in (16e6, 9e6)]
     references = [4e-4 * np.sin(2 * pi * f * timing.period_s * np.arange(3000)) for f in (30.0, 45.0)]
     both = mirror.combine(*parts)
-    setup = simulate.Setup(drive, timing, control.side_by_side(*pids))
+    setup = simulate.Setup(drive, timing, side_by_side(*pids))
     every = slice(None)
     together = simulate.track("both", both, setup, control.inverse(both), np.column_stack(references), every)
     counts = []

@@ -34,7 +34,7 @@ class OpticalSensor:
     delay_steps: int
 
     def __post_init__(self) -> None:
-        """Refuse what is no sensor."""
+        """Check each value."""
         _zero_or_more("optical sensor: noise_rad", self.noise_rad, "rad", "0 rad switches the noise off")
         if not self.field_of_view_rad > 0.0:
             raise ValueError(
@@ -57,7 +57,7 @@ class StrainGauge:
     resolution_rad: float
 
     def __post_init__(self) -> None:
-        """Refuse what is no gauge."""
+        """Check each value."""
         _zero_or_more("strain gauge: noise_rad", self.noise_rad, "rad", "0 rad switches the noise off")
         _zero_or_more("strain gauge: resolution_rad", self.resolution_rad, "rad", "0 rad is an ideal converter")
 
@@ -136,7 +136,7 @@ class QuadCell:
     thermal_noise_a_sqrt_hz: float
 
     def __post_init__(self) -> None:
-        """Refuse what is no detector."""
+        """Check each value."""
         _above_zero("quad cell: responsivity_a_w", self.responsivity_a_w, "A/W")
         _zero_or_more("quad cell: background_power_w", self.background_power_w, "W", "0 W is a dark sky")
         _zero_or_more("quad cell: dark_current_a", self.dark_current_a, "A", "0 A is an ideal cell")
@@ -197,7 +197,7 @@ class AirySpot:
     source_angle_rad: float = 0.0
 
     def __post_init__(self) -> None:
-        """Refuse what is no spot."""
+        """Check each value."""
         _above_zero("spot: wavelength_m", self.wavelength_m, "m")
         _above_zero("spot: aperture_m", self.aperture_m, "m")
         _zero_or_more("spot: source_angle_rad", self.source_angle_rad, "rad", "0 rad is a point source")
@@ -234,7 +234,7 @@ class GaussianSpot:
     focal_length_m: float
 
     def __post_init__(self) -> None:
-        """Refuse what is no spot."""
+        """Check each value."""
         _above_zero("spot: radius_m", self.radius_m, "m")
         _above_zero("spot: focal_length_m", self.focal_length_m, "m")
 

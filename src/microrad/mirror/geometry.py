@@ -6,7 +6,7 @@ plane of incidence and the mirror's surface. Reflection: k' = k - 2 (k n) n.
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -57,7 +57,7 @@ class Geometry:
     actuator_radius_m: float | None = None
 
     def __post_init__(self) -> None:
-        """Refuse what is no geometry."""
+        """Check each value."""
         _one_of("angle", self.angle, _ANGLES)
         _one_of("layout", self.layout, _LAYOUTS)
         if not 0.0 <= self.incidence_rad < math.pi / 2.0:
@@ -110,75 +110,11 @@ def outputs_matrix(geometry: Geometry) -> Floats:
 
     Raises ValueError for a singular geometry.
     """
-    return _without_piston(geometry, np.ones(geometry.outputs))
-
-
-def tripod_strokes_m(geometry: Geometry, line_of_sight_rad: Floats) -> Floats:
-    """Extensions of the tripod's three actuators for line-of-sight angles (..., 2), shape (..., 3): they sum to zero.
-
-    Raises ValueError for another layout and for a singular geometry.
-    """
-    if geometry.actuator_radius_m is None or geometry.layout != "tripod":
-        raise ValueError(
-            f'geometry: layout "{geometry.layout}" has no strokes; only a "tripod" has actuators to extend'
-        )
-    metres = geometry.actuator_radius_m / _PER_TILT[geometry.angle]
-    return np.asarray(line_of_sight_rad @ outputs_matrix(geometry).T * metres)
-
-
-def decoupling(geometry: Geometry, gains_rad_v: Sequence[float], axis_gain_rad_v: float | None = None) -> Floats:
-    """Commands of the actuators from commands of the line-of-sight axes, shape (actuators, 2), V per V.
-
-    ``gains_rad_v`` are the slow gains of the actuators, each from its drive to its own output. With D the result,
-    line_of_sight_matrix @ diag(gains) @ D is ``axis_gain_rad_v`` times the identity; for a tripod the strokes
-    diag(gains) @ D sum to zero. Without a gain given, the one at which D neither grows nor shrinks the command overall
-    (`decoupled_gain_rad_v`): D is then the identity, a rotation or has orthonormal columns where the mirror is ideal.
-
-    Raises ValueError for gains or a geometry that leave a direction of the line of sight without drive.
-    """
-    per_rad = _without_piston(geometry, _checked_gains(geometry, gains_rad_v))
-    wanted = _overall(per_rad) if axis_gain_rad_v is None else axis_gain_rad_v
-    if not 0.0 < abs(wanted) < math.inf:
-        raise ValueError(f"decoupling: axis_gain_rad_v is {wanted:g}; give a finite gain other than 0 rad/V")
-    return np.asarray(wanted * per_rad)
-
-
-def decoupled_gain_rad_v(geometry: Geometry, gains_rad_v: Sequence[float]) -> float:
-    """Slow gain of either line-of-sight axis behind `decoupling`, rad/V: the geometric mean over the two directions.
-
-    Raises ValueError as `decoupling` does.
-    """
-    return _overall(_without_piston(geometry, _checked_gains(geometry, gains_rad_v)))
-
-
-def _overall(per_rad: Floats) -> float:
-    """Reciprocal of the geometric mean of the two singular values."""
-    return float(np.prod(np.linalg.svd(per_rad, compute_uv=False)) ** -0.5)
-
-
-def _checked_gains(geometry: Geometry, gains_rad_v: Sequence[float]) -> Floats:
-    gains = np.asarray(gains_rad_v, dtype=np.float64)
-    if gains.shape != (geometry.outputs,) or not np.all(np.isfinite(gains)) or np.any(gains == 0.0):
-        raise ValueError(
-            f"decoupling: gains_rad_v is {gains_rad_v}; give one finite gain other than 0 rad/V for each of the "
-            f"{geometry.outputs} actuators of the {geometry.layout} mirror"
-        )
-    weakest, spread = int(np.argmin(np.abs(gains))), float(np.max(np.abs(gains)) / np.min(np.abs(gains)))
-    if spread > WORST_CONDITION:
-        raise ValueError(
-            f"decoupling: actuator {weakest + 1} moves the mirror {spread:.3g} times less per volt than the strongest "
-            f"(at most {WORST_CONDITION:g} can be decoupled); check gains_rad_v"
-        )
-    return gains
-
-
-def _without_piston(geometry: Geometry, gains: Floats) -> Floats:
-    """Drives for the line of sight, (actuators, 2), with strokes that sum to zero where there are three of them."""
     seen = line_of_sight_matrix(geometry)
     _refuse_singular(geometry, seen)
     # Of a tripod's strokes that make a tilt, the pseudo-inverse takes the smallest, those without piston.
     strokes = np.linalg.pinv(_tilts(geometry))
-    return np.asarray(strokes @ np.linalg.inv(seen @ strokes) / gains[:, None])
+    return np.asarray(strokes @ np.linalg.inv(seen @ strokes))
 
 
 def _refuse_singular(geometry: Geometry, seen: Floats) -> None:
@@ -220,7 +156,7 @@ class StrokeDemand:
     point_ahead_on_mirror: bool
 
     def __post_init__(self) -> None:
-        """Refuse what is no half range."""
+        """Check each half range."""
         for key in _DEMANDS:
             pair = getattr(self, key)
             if np.shape(pair) != (2,) or not all(0.0 <= value < math.inf for value in pair):

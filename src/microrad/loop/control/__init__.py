@@ -28,7 +28,6 @@ from microrad.loop.control.problem import (
     Specification,
 )
 from microrad.loop.control.sampled import (
-    IDEAL_DRIVE,
     Drive,
     Gains,
     Inverse,
@@ -46,7 +45,6 @@ from microrad.loop.control.sampled import (
     play_inverse,
     sampled_plant,
     sensitivity,
-    side_by_side,
     slowest_pole,
     timing_from_mission,
 )
@@ -57,7 +55,6 @@ __all__ = [
     "DISTURBANCE_OBSERVER",
     "FAMILIES",
     "GAUGE",
-    "IDEAL_DRIVE",
     "LQG",
     "OPTICAL",
     "PI",
@@ -98,7 +95,6 @@ __all__ = [
     "rounded",
     "sampled_plant",
     "sensitivity",
-    "side_by_side",
     "slowest_pole",
     "timing_from_mission",
     "tune",

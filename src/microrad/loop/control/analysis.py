@@ -57,18 +57,6 @@ def refuse_misfit(plant: DesignPlant, controller: AxisController, period_s: floa
         )
 
 
-def refuse_improper(numerator: tuple[float, ...], denominator: tuple[float, ...], name: str) -> None:
-    """Raise ValueError where a transfer function (powers of s or z, highest first) would need its input's future."""
-    orders = [len(np.trim_zeros(np.asarray(c, dtype=float), "f")) - 1 for c in (numerator, denominator)]
-    if orders[1] < 0:
-        raise ValueError(f"{name}: the denominator is zero; give it at least one coefficient other than 0")
-    if orders[0] > orders[1]:
-        raise ValueError(
-            f"{name} is not causal: a numerator of order {orders[0]} over a denominator of order {orders[1]} needs its "
-            f"input's future; add {orders[0] - orders[1]} or more poles (a low-pass above the band)"
-        )
-
-
 def close(plant: DesignPlant, controller: AxisController) -> lti.StateSpace:
     """Discrete closed loop from the plant's white sequences to residual, optical, gauge (rad) and command (V).
 
@@ -271,8 +259,8 @@ def margins_at(plant: DesignPlant, controller: AxisController, broken_at: str = 
     response = _respond(plant, controller, broken_at)
     f = _frequencies(plant, controller)
     f, L = _closer(f, response(f), response)
-    up, down = _gain_margins(L)
-    crossing, phase = _crossings(f, L)
+    up, down = gain_margins(L)
+    crossing, phase = crossings(f, L)
     modulus, where = _least(_modulus, response, f, L)
     both_ways = np.minimum(phase, 2 * math.pi - phase)
     return LoopMargins(
@@ -361,7 +349,7 @@ def _closer(f: Floats, L: Complexes, response: Response) -> tuple[Floats, Comple
     return whole, np.concatenate([L, response(more)])[first]
 
 
-def _crossings(f: Floats, L: Complexes) -> tuple[Floats, Floats]:
+def crossings(f: Floats, L: Complexes) -> tuple[Floats, Floats]:
     """Frequencies with |L| = 1, and there the lag in (0, 2 pi) that would bring L to -1."""
     size = np.log(np.maximum(np.abs(L), 1e-300))
     at = np.flatnonzero((size[:-1] >= 0.0) != (size[1:] >= 0.0))
@@ -371,7 +359,7 @@ def _crossings(f: Floats, L: Complexes) -> tuple[Floats, Floats]:
     return f[at] * (f[at + 1] / f[at]) ** share, np.mod(phase, 2 * math.pi)
 
 
-def _gain_margins(L: Complexes) -> tuple[float, float]:
+def gain_margins(L: Complexes) -> tuple[float, float]:
     """Factors nearest 1, above and below, that bring the loop to -1: where it crosses the negative real axis."""
     imag, real = L.imag, L.real
     at = np.flatnonzero((imag[:-1] * imag[1:] <= 0.0) & (imag[:-1] != imag[1:]))

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from microrad.core import lti
 from microrad.loop.control import filters
+from microrad.loop.control.analysis import reachable
 from microrad.loop.control.problem import OPTICAL, AxisController, DesignPlant, Family, Parameter, once_per_plant
 from microrad.loop.control.sampled import Gains, pid
 
@@ -61,22 +62,13 @@ def optical_model(plant: DesignPlant) -> lti.StateSpace:
             "sensor, or use a controller on the gauge"
         )
     s = plant.system
-    moved = _connected(s.A, s.B[:, 0])
-    between = moved & _connected(s.A.T, s.C[OPTICAL])
+    between = reachable(s.A, s.B[:, :1]) & reachable(s.A.T, s.C[[OPTICAL]].T)
     return lti.StateSpace(
         s.A[np.ix_(between, between)],
         s.B[between, :1],
         -s.C[OPTICAL : OPTICAL + 1, between],
         np.zeros((1, 1)),
     )
-
-
-def _connected(A: Floats, start: Floats) -> NDArray[np.bool_]:
-    """States that a signal entering at the entries other than 0 of ``start`` reaches."""
-    reached = start != 0.0
-    for _ in range(A.shape[0]):
-        reached = reached | (A[:, reached] != 0.0).any(axis=1)
-    return np.asarray(reached)
 
 
 @once_per_plant

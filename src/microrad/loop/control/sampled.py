@@ -11,9 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from microrad.core import kernels, lti
+from microrad.loop.control.analysis import crossings, gain_margins
 from microrad.mirror.hysteresis import LINE_OF_SIGHT, BoucWen, Creep, Play, slow_gain
 from microrad.mirror.model import Mirror
-from microrad.mission import model as mission
+from microrad.mission.model import Control, Mission
 
 Floats = NDArray[np.float64]
 
@@ -34,10 +35,7 @@ class Drive:
     sensor_resolution_rad: float
 
 
-IDEAL_DRIVE = Drive(-math.inf, math.inf, math.inf, math.inf, 0.0, 0.0)
-
-
-def drive_from_mission(m: mission.Mission) -> Drive:
+def drive_from_mission(m: Mission) -> Drive:
     """The mission's amplifier and converters, referred to the amplifier's input and counted from the mirror's bias."""
     a = m.amplifier
     return Drive(
@@ -64,7 +62,7 @@ class Timing:
         return self.period_s / self.steps_per_sample
 
 
-def timing_from_mission(control: mission.Control) -> Timing:
+def timing_from_mission(control: Control) -> Timing:
     """Whole numbers of plant steps; the mission file has already refused anything else."""
     period = 1.0 / control.rate_hz
     return Timing(period, round(period / control.plant_step_s), round(control.delay_s / control.plant_step_s))
@@ -80,7 +78,7 @@ class Gains:
     derivative_filter_s: float
 
 
-def gains_from_mission(control: mission.Control, mirror_gain_rad_v: float) -> Gains:
+def gains_from_mission(control: Control, mirror_gain_rad_v: float) -> Gains:
     """The mission's gains, scaled to keep the loop gain for a mirror of another gain than they are given for."""
     scale = control.for_mirror_gain_rad_v / mirror_gain_rad_v
     return Gains(
@@ -106,13 +104,6 @@ def pid(gains: Gains, period_s: float) -> lti.StateSpace:
         C=np.array([[1.0, -edge]])[:, used],
         D=np.array([[gains.proportional + step + edge]]),
     )
-
-
-def side_by_side(*controllers: lti.StateSpace) -> lti.StateSpace:
-    """One controller an axis, without coupling."""
-    from scipy.linalg import block_diag  # slow to import, not needed to show help
-
-    return lti.StateSpace(*(block_diag(*(getattr(c, key) for c in controllers)) for key in "ABCD"))
 
 
 def anti_windup(controller: lti.StateSpace) -> Floats:
@@ -280,13 +271,14 @@ def margins(controller: lti.StateSpace, plant: lti.StateSpace, period_s: float) 
     f = np.geomspace(1e-6, 0.5, 4000) / period_s
     response = lti.frequency_response(loop, f, period_s)[:, 0, 0]
     response[-1] = response[-1].real  # at half the sample rate
-    crossover, phase = _crossover(f, response)
+    crossing, lag = crossings(f, response)
+    crossover, phase = max(crossing, default=math.nan), min(np.minimum(lag, 2 * math.pi - lag), default=math.inf)
     return Margins(
-        gain=_gain_margin(response),
-        phase_rad=phase,
-        delay_s=math.inf if math.isnan(crossover) else phase / (2 * math.pi * crossover),
+        gain=gain_margins(response)[0],
+        phase_rad=float(phase),
+        delay_s=math.inf if math.isnan(crossover) else float(phase / (2 * math.pi * crossover)),
         modulus=float(np.min(np.abs(1.0 + response))),
-        crossover_hz=crossover,
+        crossover_hz=float(crossover),
         slowest_pole=worst,
     )
 
@@ -310,27 +302,3 @@ def slowest_pole(loop: lti.StateSpace) -> float:
 def sensitivity(loop: lti.StateSpace, freq_hz: float, period_s: float) -> complex:
     """Error over reference, 1 / (1 + L), of the closed discrete ``loop`` (one axis) at one frequency."""
     return complex(1.0 / (1.0 + lti.frequency_response(loop, np.array([freq_hz]), period_s)[0, 0, 0]))
-
-
-def _crossover(f: Floats, response: NDArray[np.complex128]) -> tuple[float, float]:
-    """Highest gain crossover, up or down, and the smallest phase margin over all crossovers."""
-    size = np.log(np.abs(response))
-    at_unity = np.flatnonzero((size[:-1] >= 0.0) != (size[1:] >= 0.0))
-    if not at_unity.size:
-        return math.nan, math.inf
-    share = size[at_unity] / (size[at_unity] - size[at_unity + 1])
-    crossing = f[at_unity] * (f[at_unity + 1] / f[at_unity]) ** share
-    phase = np.pi + np.unwrap(np.angle(response))
-    at = phase[at_unity] + share * (phase[at_unity + 1] - phase[at_unity])
-    wrapped = np.abs((at + np.pi) % (2 * np.pi) - np.pi)
-    return float(crossing[-1]), float(np.min(wrapped))
-
-
-def _gain_margin(response: NDArray[np.complex128]) -> float:
-    """Smallest factor above 1 that brings the loop to -1, interpolated where it crosses the negative real axis."""
-    imag, real = response.imag, response.real
-    at = np.flatnonzero((imag[:-1] * imag[1:] <= 0.0) & (imag[:-1] != imag[1:]))
-    share = imag[at] / (imag[at] - imag[at + 1])
-    crossing = -(real[at] + share * (real[at + 1] - real[at]))
-    below = crossing[(crossing > 0) & (crossing < 1)]
-    return float(1.0 / below.max()) if below.size else math.inf

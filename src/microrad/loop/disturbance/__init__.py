@@ -1,6 +1,6 @@
 """Disturbances of the line of sight: one-sided spectra as data, shaping filters that realise them, references."""
 
-from microrad.loop.disturbance.discrete import Discrete, discrete_psd, discretise, initial_state
+from microrad.loop.disturbance.discrete import Discrete, discretise, initial_state
 from microrad.loop.disturbance.fits import Fit, bands, fit_bands, fit_table, table
 from microrad.loop.disturbance.records import (
     Convention,
@@ -35,7 +35,6 @@ __all__ = [
     "bands",
     "body_pointing",
     "combine",
-    "discrete_psd",
     "discretise",
     "first_order",
     "fit_bands",

@@ -119,22 +119,3 @@ def initial_state(discrete: Discrete, gaussians: Floats, phases: Floats) -> Floa
     for i, amplitude in enumerate(discrete.line_amplitude_rad):
         start[2 * i], start[2 * i + 1] = amplitude * np.sin(phases[i]), amplitude * np.cos(phases[i])
     return np.asarray(start)
-
-
-def discrete_psd(discrete: Discrete, freq_hz: Floats, step_s: float) -> Floats:
-    """One-sided density (rad^2/Hz) of the sampled sequence, 2 step |C (z - Ad)^-1 Bd|^2; lines are not in it.
-
-    What the continuous density has above half the sample rate is folded into it.
-
-    Raises ValueError for a step that is not above zero and a frequency outside 0 to half the sample rate.
-    """
-    above_zero(step_s, "step of a sampled disturbance", "s")
-    freq = np.atleast_1d(np.asarray(freq_hz, dtype=float))
-    if not np.all((freq >= 0.0) & (freq * step_s <= 0.5)):
-        raise ValueError(f"a sequence sampled every {step_s:g} s has a density from 0 to {0.5 / step_s:g} Hz only")
-    noise = slice(2 * discrete.line_amplitude_rad.size, None)
-    system = lti.StateSpace(
-        discrete.Ad[noise, noise], discrete.Bd[noise], discrete.C[:, noise], np.zeros((1, discrete.Bd.shape[1]))
-    )
-    response = lti.frequency_response(system, freq, step_s)[:, 0, :]
-    return np.asarray(2.0 * step_s * np.sum(np.abs(response) ** 2, axis=1))

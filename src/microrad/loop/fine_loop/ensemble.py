@@ -9,13 +9,13 @@ from functools import cache, partial
 import numpy as np
 from numpy.typing import NDArray
 
+from microrad import mirror
 from microrad.core import kernels, lti
 from microrad.core.threads import in_threads
 from microrad.loop import disturbance
 from microrad.loop.control import amplifier_factor, inverse_arrays, no_feedforward
 from microrad.loop.fine_loop.loop import LoopController, PointingLoop
 from microrad.loop.sensor import StrainGauge
-from microrad.mirror import model as mirror
 
 Floats = NDArray[np.float64]
 References = tuple[disturbance.Reference, ...]
@@ -187,7 +187,7 @@ def arrays(loop: PointingLoop, controller: LoopController, seed: int) -> kernels
 
 
 def check_controller(loop: PointingLoop, controller: LoopController) -> None:
-    """Refuse a controller with numbers that are not finite, or of another size than the loop's."""
+    """Raise ValueError if the controller has numbers that are not finite, or another size than the loop's."""
     s, m = controller.system, loop.mirror
     inputs = loop.axes + m.axes + loop.axes
     outputs = m.actuators * (3 if controller.inverse else 1)

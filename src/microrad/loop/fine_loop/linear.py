@@ -375,9 +375,7 @@ def sensitivity(closed: ClosedLoop, freq_hz: Floats) -> Complexes:
 
     For an optical sensor that delivers at every control sample; a slower one folds frequencies and raises ValueError.
     """
-    loop_gain = loop_response(closed, freq_hz)
-    eye = np.eye(closed.open.loop.axes)
-    return np.asarray(np.linalg.inv(eye + loop_gain))
+    return np.asarray(np.linalg.inv(np.eye(closed.open.loop.axes) + loop_response(closed, freq_hz)))
 
 
 def loop_response(closed: ClosedLoop, freq_hz: Floats) -> Complexes:
@@ -404,8 +402,7 @@ def loop_response(closed: ClosedLoop, freq_hz: Floats) -> Complexes:
     step_map = np.eye(whole)
     for step in closed.steps:
         step_map = step @ step_map
-    keep = np.ones(whole, dtype=bool)
-    keep[o.at.shaping] = False
+    keep = _without_disturbances(closed)
     A, B = (step_map @ act)[np.ix_(keep, keep)], (step_map @ into)[keep]
     system = lti.StateSpace(A, B, -reading[:, keep], np.zeros((axes, axes)))
     return lti.frequency_response(system, freq_hz, loop.timing.period_s)
