@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from microrad.export import build
+from microrad.export.flight import build
 from microrad.export.records import ExportError
 from waiting import gone, lines_of
 

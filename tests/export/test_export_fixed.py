@@ -16,11 +16,11 @@ import pytest
 
 from export.test_export_rounding import shipped, vectors_of
 from microrad.core import lti
-from microrad.export import double_run, fixed_form, fixed_report, fixed_step
-from microrad.export.fixed import fixed_code, quantised, report_text
-from microrad.export.flight import vectors_text
+from microrad.export.flight import double_run, fixed_form, fixed_report, fixed_step
+from microrad.export.flight.c_code import vectors_text
+from microrad.export.flight.fixed import fixed_code, quantised, report_text
+from microrad.export.linear_part.sections import sections
 from microrad.export.records import ExportError, FlightController, Origin, Signal
-from microrad.export.sections import sections
 
 SHIPPED = ("LQG", "PI + inverse", "PI + inverse in series", "PID + inverse")
 LARGEST, SMALLEST = 2**31 - 1, -(2**31)

@@ -12,12 +12,12 @@ import pytest
 
 import designs
 from microrad.core import lti
-from microrad.export import fixed, flight, operations
-from microrad.export.fixed import FixedForm
-from microrad.export.operations import FixedOperations, Operations
+from microrad.export.flight import c_code, fixed, operations
+from microrad.export.flight.fixed import FixedForm
+from microrad.export.flight.operations import FixedOperations, Operations
+from microrad.export.flight.rounding import RoundingBound
+from microrad.export.linear_part.sections import Sections, sections
 from microrad.export.records import FlightController, Floats, InverseLaw, Origin, Signal, Vectors
-from microrad.export.rounding import RoundingBound
-from microrad.export.sections import Sections, sections
 from waiting import HANG_S
 
 KINDS = tuple(each.name for each in fields(Operations))
@@ -154,7 +154,7 @@ def compiled(folder: Path, files: dict[str, str], of: FlightController, precisio
 def counted(folder: Path, of: FlightController, precision: str, trials: int | None = None) -> Counted:
     """The generated code with a class for its real numbers, at the most ``trials`` of its own."""
     bound = RoundingBound(1.0, 1, 0.0, "none")
-    files = flight.flight_code(of, sections(of), "code", precision, bound if precision == "single" else None)
+    files = c_code.flight_code(of, sections(of), "code", precision, bound if precision == "single" else None)
     base, changed = "float" if precision == "single" else "double", {}
     for file in set(files) - {"Makefile", "code_bench.c"}:
         changed[file] = files[file].replace(f"typedef {base} code_real;", "typedef number code_real;")
@@ -309,7 +309,7 @@ def test_an_exponent_other_than_1_costs_its_trials(
 
 def test_the_trials_are_those_of_the_code() -> None:
     of = plain(law(power=0.7, plays=False))
-    header = flight.flight_code(of, sections(of), "code", "double")["code_hysteresis.h"]
+    header = c_code.flight_code(of, sections(of), "code", "double")["code_hysteresis.h"]
     assert re.findall(r"#define CODE_MOST_TRIALS (\d+)", header) == [str(operations.MOST_TRIALS)]
     powers = operations.operations(of, sections(of), "double").powers
     assert powers == 3 * 8 * operations.MOST_TRIALS  # three elements; seven slopes and the next length a trial

@@ -14,10 +14,10 @@ import pytest
 
 import designs
 from microrad.core import kernels, lti
-from microrad.export import double_run, rounding
-from microrad.export.flight import compensated_states, flight_code, vectors_text
+from microrad.export.flight import double_run, rounding
+from microrad.export.flight.c_code import flight_code, vectors_text
+from microrad.export.linear_part.sections import compensated_states, sections
 from microrad.export.records import FlightController, InverseLaw, Origin, Signal, Vectors
-from microrad.export.sections import sections
 
 SAMPLES = 2000
 f = np.float32

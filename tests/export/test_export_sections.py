@@ -11,11 +11,11 @@ from numpy.testing import assert_allclose, assert_array_equal
 import designs
 from microrad.core import lti
 from microrad.export import choice
-from microrad.export.block_diagonal import block_diagonal
 from microrad.export.identifiers import LONGEST, identifier, suggested
-from microrad.export.modes import minimal
+from microrad.export.linear_part.block_diagonal import block_diagonal
+from microrad.export.linear_part.modes import minimal
+from microrad.export.linear_part.sections import MODAL, TRIANGULAR, sections
 from microrad.export.records import ExportError, FlightController, Origin, Signal
-from microrad.export.sections import MODAL, TRIANGULAR, sections
 
 PERIOD = 1e-3
 RECORDED, LONG = 2000, 30_000

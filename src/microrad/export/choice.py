@@ -1,14 +1,18 @@
-"""From a mission to what is exported: one of its controllers, the loop around it, and a run of it in the kernel."""
+"""The room's door: from a mission to one of its controllers, the loop around it, and a run of it in the kernel.
+
+`choose` and `plant_unit` take the mission; what they give holds its parts, and no mission.
+"""
 
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 
 from microrad.core import kernels, lti
-from microrad.export.modes import minimal
+from microrad.export.linear_part.modes import minimal
 from microrad.export.records import (
     GAUGE,
     OPTICAL_ERROR,
@@ -21,19 +25,18 @@ from microrad.export.records import (
     LoopUnit,
     Origin,
     PlantUnit,
+    Progress,
     Signal,
     Vectors,
 )
-from microrad.loop import control, fine_pointing
-from microrad.loop import paper_cases as tracking
-from microrad.loop import sine_run as simulate
+from microrad.loop import control, fine_pointing, paper_cases, sine_run
 from microrad.loop.fine_loop.loop import LoopController
 from microrad.loop.fine_loop.replay import replay
-from microrad.mirror import hysteresis
-from microrad.mirror import model as mirror
+from microrad.mirror import hysteresis, model
 from microrad.mission.file import MissionFile
-
-Progress = Callable[[int, int, str], None]
+from microrad.mission.model import Scenario
+from microrad.mission.tables.fine_pointing import FinePointing
+from microrad.mission.tables.mirror import Mirror as MirrorTable
 
 PID, PID_WITH_INVERSE = "PID", "PID + inverse"
 """The controllers of the table [control], as the study names them."""
@@ -46,23 +49,35 @@ INPUT_LIMIT_RAD = 0.1
 
 
 @dataclass(frozen=True, slots=True)
-class PointingChoice:
-    """A controller of the fine-pointing loop."""
+class Source:
+    """The mission file that something was made from, and the table of its mirror."""
 
-    file: MissionFile
+    path: Path
+    origin: Origin
+    mirror: MirrorTable
+
+
+@dataclass(frozen=True, slots=True)
+class PointingChoice:
+    """A controller of the fine-pointing loop. ``outlook`` simulates what it leaves beside what linear theory says."""
+
+    source: Source
+    table: FinePointing
     scene: fine_pointing.Scene
     tuned: control.Tuned
     controller: LoopController
+    outlook: Callable[[], fine_pointing.Outlook]
 
 
 @dataclass(frozen=True, slots=True)
 class TrackingChoice:
-    """A controller of the table [control]: one axis that tracks sines, the paper's Fig. 6 and 8."""
+    """A controller of the table [control]: one axis that tracks the scenario's sines, the paper's Fig. 6 and 8."""
 
-    file: MissionFile
+    source: Source
+    scenario: Scenario
     name: str
-    mirror: mirror.Mirror
-    setup: simulate.Setup
+    mirror: model.Mirror
+    setup: sine_run.Setup
     inverse: control.Inverse
 
 
@@ -75,49 +90,49 @@ def names(file: MissionFile) -> tuple[str, ...]:
     return (*pointing, PID, PID_WITH_INVERSE)
 
 
-def choose(
-    file: MissionFile, name: str, on_progress: Progress = lambda done, total, what: None
-) -> PointingChoice | TrackingChoice:
-    """A controller of a mission, tuned where it belongs to the fine-pointing loop; `names` lists them.
+def source(file: MissionFile) -> Source:
+    """What an export says of the mission that it was made from."""
+    table = file.mission.mirror
+    return Source(file.path, Origin(file.mission.name, file.sha256, table.name), table)
 
-    Raises ExportError with the reason for a name that the mission does not have, and for a controller that cannot be
-    built on its mirror.
+
+def choose(file: MissionFile, name: str, on_progress: Progress = lambda done, total, what: None) -> Choice:
+    """A controller of a mission, tuned where it belongs to the fine-pointing loop.
+
+    Args:
+        file: the mission.
+        name: one of its `names`.
+        on_progress: is told what is being tuned.
+
+    Raises:
+        ExportError: the mission has no such controller, or it cannot be built on the mission's mirror.
     """
     if name not in names(file):
         raise ExportError(f"{file.path} has no controller {name!r}; it has: {'; '.join(names(file))}")
     try:
         return _tracking(file, name) if name in (PID, PID_WITH_INVERSE) else _pointing(file, name, on_progress)
-    except ExportError:
-        raise
     except ValueError as error:
         raise ExportError(f"{file.path}: {error}") from error
 
 
 def _pointing(file: MissionFile, name: str, on_progress: Progress) -> PointingChoice:
-    m = file.mission
+    m, table = file.mission, fine_pointing.table(file.mission)
     on_progress(0, 2, f"tuning {name}")
     scene = fine_pointing.scene(file)
-    tuned = fine_pointing.tune(name, m, fine_pointing.plants(scene, m, fine_pointing.table(m).seed))
+    tuned = fine_pointing.tune(name, m, fine_pointing.plants(scene, m, table.seed))
     on_progress(1, 2, f"{name} tuned")
-    return PointingChoice(file, scene, tuned, fine_pointing.build(name, scene, m, tuned.controller))
-
-
-def outlook(choice: Choice) -> fine_pointing.Outlook | None:
-    """What a controller of the fine-pointing loop leaves, linear and simulated; the loop of [control] has no theory."""
-    if isinstance(choice, TrackingChoice):
-        return None
-    design = fine_pointing.Design(choice.controller.name, choice.tuned, choice.controller)
-    (found,) = fine_pointing.outlook(choice.scene, choice.file.mission, [design])
-    return found
+    made = fine_pointing.build(name, scene, m, tuned.controller)
+    design = fine_pointing.Design(made.name, tuned, made)
+    return PointingChoice(source(file), table, scene, tuned, made, lambda: fine_pointing.outlook(scene, m, [design])[0])
 
 
 def _tracking(file: MissionFile, name: str) -> TrackingChoice:
     m = file.mission
-    model = tracking.mirror_model(m, m.mirror)
-    setup = simulate.setup_from_mission(m, hysteresis.secant_gain(model, m.scenario.amplitude_rad))
-    plant = mirror.from_mission(m.mirror, model, times=hysteresis.LINE_OF_SIGHT[m.conventions.mirror_angle])
+    bank = paper_cases.mirror_model(m, m.mirror)
+    setup = sine_run.setup_from_mission(m, hysteresis.secant_gain(bank, m.scenario.amplitude_rad))
+    plant = model.from_mission(m.mirror, bank, times=hysteresis.LINE_OF_SIGHT[m.conventions.mirror_angle])
     inverse = control.inverse(plant) if name == PID_WITH_INVERSE else control.no_feedforward(plant)
-    return TrackingChoice(file, name, plant, setup, inverse)
+    return TrackingChoice(source(file), m.scenario, name, plant, setup, inverse)
 
 
 # ------------------------------------------------------------------------------------------------------ the controller
@@ -129,7 +144,7 @@ def flight_controller(choice: Choice) -> FlightController:
     try:
         return minimal(trimmed(_whole_controller(choice)))
     except ValueError as error:  # gains of [control] under which the loop is unstable
-        raise error if isinstance(error, ExportError) else ExportError(f"{choice.file.path}: {error}") from error
+        raise error if isinstance(error, ExportError) else ExportError(f"{choice.source.path}: {error}") from error
 
 
 def _whole_controller(choice: Choice) -> FlightController:
@@ -158,11 +173,6 @@ def trimmed(of: FlightController) -> FlightController:
     )
 
 
-def origin(file: MissionFile) -> Origin:
-    """Where an export of a mission comes from."""
-    return Origin(file.mission.name, file.sha256, file.mission.mirror.name)
-
-
 def inverse_law(of: control.Inverse, period_s: float, by_difference: bool) -> InverseLaw:
     """An inverse at a control period."""
     arrays = control.inverse_arrays(of, period_s)
@@ -182,7 +192,7 @@ def _pointing_controller(choice: PointingChoice) -> FlightController:
     )
     return FlightController(
         name=made.name,
-        origin=origin(choice.file),
+        origin=choice.source.origin,
         period_s=period,
         inputs=inputs,
         actuators=loop.mirror.actuators,
@@ -192,7 +202,7 @@ def _pointing_controller(choice: PointingChoice) -> FlightController:
         minimum_v=loop.drive.minimum_v,
         maximum_v=loop.drive.maximum_v,
         resolution_v=loop.drive.drive_resolution_v,
-        bias_v=choice.file.mission.mirror.bias_v,
+        bias_v=choice.source.mirror.bias_v,
         margins=(
             ("modulus margin", margins.modulus, ""),
             ("gain margin", 20.0 * math.log10(margins.gain_up), "dB"),
@@ -205,7 +215,7 @@ def _pointing_controller(choice: PointingChoice) -> FlightController:
 
 def _tracking_controller(choice: TrackingChoice) -> FlightController:
     setup, s, axes = choice.setup, choice.setup.controller, choice.mirror.axes
-    margins = simulate.margins(choice.mirror, setup)
+    margins = sine_run.margins(choice.mirror, setup)
     inverse = None
     D = np.hstack([-s.D, s.D])
     C = s.C
@@ -215,7 +225,7 @@ def _tracking_controller(choice: TrackingChoice) -> FlightController:
         C = np.vstack([C, np.zeros((axes, s.order))])
     return FlightController(
         name=choice.name,
-        origin=origin(choice.file),
+        origin=choice.source.origin,
         period_s=setup.timing.period_s,
         inputs=(
             Signal(READING, axes, "rad", "line of sight as the mirror's sensor reads it", INPUT_LIMIT_RAD),
@@ -228,7 +238,7 @@ def _tracking_controller(choice: TrackingChoice) -> FlightController:
         minimum_v=setup.drive.minimum_v,
         maximum_v=setup.drive.maximum_v,
         resolution_v=setup.drive.drive_resolution_v,
-        bias_v=choice.file.mission.mirror.bias_v,
+        bias_v=choice.source.mirror.bias_v,
         margins=(
             ("modulus margin", margins.modulus, ""),
             ("gain margin", 20.0 * math.log10(margins.gain), "dB"),
@@ -249,24 +259,24 @@ def plant_unit(file: MissionFile, loop: str) -> PlantUnit:
     try:
         if loop == LOOPS[0]:
             made = fine_pointing.scene(file).loop
-            return _plant_unit(file, made.mirror, made.optics, made.drive, made.timing)
-        chosen = _tracking(file, PID)
-        return _plant_unit(file, chosen.mirror, np.eye(chosen.mirror.axes), chosen.setup.drive, chosen.setup.timing)
+            return _plant_unit(source(file), made.mirror, made.optics, made.drive, made.timing)
+        one = _tracking(file, PID)
+        return _plant_unit(one.source, one.mirror, np.eye(one.mirror.axes), one.setup.drive, one.setup.timing)
     except ValueError as error:
         raise ExportError(f"{file.path}: {error}") from error
 
 
 def _plant_unit(
-    file: MissionFile, of: mirror.Mirror, optics: Floats, drive: control.Drive, timing: control.Timing
+    of: Source, mirror: model.Mirror, optics: Floats, drive: control.Drive, timing: control.Timing
 ) -> PlantUnit:
     return PlantUnit(
-        origin(file),
-        mirror.discretise(of, timing.step_s),
+        of.origin,
+        model.discretise(mirror, timing.step_s),
         optics,
         drive.bandwidth_hz,
         control.amplifier_factor(drive, timing.step_s),
         drive.slew_v_s * timing.step_s,
-        file.mission.mirror.bias_v,
+        of.mirror.bias_v,
     )
 
 
@@ -276,7 +286,7 @@ def loop_unit(choice: Choice) -> LoopUnit:
     if isinstance(choice, PointingChoice):
         loop = choice.scene.loop
         return LoopUnit(
-            plant=_plant_unit(choice.file, loop.mirror, loop.optics, loop.drive, loop.timing),
+            plant=_plant_unit(choice.source, loop.mirror, loop.optics, loop.drive, loop.timing),
             controller=made,
             steps_per_sample=loop.timing.steps_per_sample,
             delay_steps=loop.timing.delay_steps,
@@ -288,7 +298,7 @@ def loop_unit(choice: Choice) -> LoopUnit:
         )
     setup = choice.setup
     return LoopUnit(
-        plant=_plant_unit(choice.file, choice.mirror, np.eye(choice.mirror.axes), setup.drive, setup.timing),
+        plant=_plant_unit(choice.source, choice.mirror, np.eye(choice.mirror.axes), setup.drive, setup.timing),
         controller=made,
         steps_per_sample=setup.timing.steps_per_sample,
         delay_steps=setup.timing.delay_steps,
@@ -316,7 +326,7 @@ def vectors(choice: Choice, samples: int, *, freq_hz: float | None = None) -> Ve
 
 
 def _pointing_vectors(choice: PointingChoice, samples: int) -> Vectors:
-    found = replay(choice.scene.loop, choice.controller, samples, fine_pointing.table(choice.file.mission).seed)
+    found = replay(choice.scene.loop, choice.controller, samples, choice.table.seed)
     return Vectors(
         found.inputs,
         found.commands,
@@ -328,11 +338,11 @@ def _pointing_vectors(choice: PointingChoice, samples: int) -> Vectors:
 
 
 def _tracking_vectors(choice: TrackingChoice, samples: int, freq_hz: float | None) -> Vectors:
-    scenario, setup = choice.file.mission.scenario, choice.setup
+    scenario, setup = choice.scenario, choice.setup
     f = freq_hz if freq_hz is not None else max(scenario.inverse_frequencies_hz)
     time: Floats = np.arange(samples, dtype=float) * setup.timing.period_s
     reference = scenario.amplitude_rad * np.sin(2.0 * np.pi * f * time)[:, None]
-    trace = simulate.track(choice.name, choice.mirror, setup, choice.inverse, reference, slice(0, samples))
+    trace = sine_run.track(choice.name, choice.mirror, setup, choice.inverse, reference, slice(0, samples))
     resolution, reading = setup.drive.sensor_resolution_rad, trace.output_rad
     if resolution > 0.0:
         reading = np.floor(reading / resolution + 0.5) * resolution

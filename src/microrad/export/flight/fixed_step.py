@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from microrad.export.double_run import Inverse
-from microrad.export.fixed_form import FixedForm, Whole
+from microrad.export.flight.double_run import Inverse
+from microrad.export.flight.fixed_form import FixedForm, Whole
 from microrad.export.records import FlightController, Floats
 
 

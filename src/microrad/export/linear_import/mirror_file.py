@@ -17,8 +17,8 @@ from typing import Any, Literal
 import numpy as np
 
 from microrad.core.lti import frequency_response
-from microrad.export.linear_roots import Roots, checked, response, roots_of_control, roots_of_fields
-from microrad.export.linear_select import select
+from microrad.export.linear_import.matlab import select
+from microrad.export.linear_import.roots import Roots, checked, response, roots_of_control, roots_of_fields
 from microrad.export.records import ExportError
 from microrad.mirror import model as mirror
 from microrad.mission.tables.mirror import Mirror
@@ -90,7 +90,7 @@ def _text(model: Roots, given: Given, source: str, said_of: tuple[str, ...]) -> 
     """``said_of`` is what the file's comments call the source, then further lines of its head."""
     _check_given(given, source)
     gain = _gain(model, given, source)
-    said = f"imported from {_one_line(said_of[0])}"
+    said = "imported from " + "".join(c if c.isprintable() else " " for c in said_of[0])
     stated = "given on import, no linear model says it"
     lines = [
         f"# Mirror {said}: linear, without hysteresis or creep.",
@@ -208,7 +208,3 @@ def _line(key: str, value: str, comment: str) -> str:
 
 def _quoted(text: str) -> str:
     return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
-
-
-def _one_line(text: str) -> str:
-    return "".join(c if c.isprintable() else " " for c in text)

@@ -14,10 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from microrad.core import kernels
-from microrad.export.double_run import InverseRun, Run, run, widened
-from microrad.export.flight import compensated_states
+from microrad.export.flight.double_run import InverseRun, Run, run, widened
+from microrad.export.linear_part.sections import Sections, compensated_states
 from microrad.export.records import FlightController, Floats, InverseLaw, Vectors
-from microrad.export.sections import Sections
 
 UNIT = 2.0**-24
 """Largest relative error of rounding to single precision."""

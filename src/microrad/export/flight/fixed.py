@@ -7,14 +7,14 @@ from importlib.metadata import version
 import numpy as np
 
 from microrad.core import kernels, lti
-from microrad.export.double_run import run
-from microrad.export.fixed_form import HEAD_ROOM, FixedForm, Poles, scaled
-from microrad.export.fixed_report import poles, report, report_text
-from microrad.export.flight import flight_code, start_words
+from microrad.export.flight.c_code import flight_code, start_words
+from microrad.export.flight.double_run import run
+from microrad.export.flight.fixed_form import HEAD_ROOM, FixedForm, Poles, scaled
+from microrad.export.flight.fixed_report import poles, report, report_text
+from microrad.export.flight.rounding import RoundingBound
 from microrad.export.identifiers import identifier
+from microrad.export.linear_part.sections import Sections
 from microrad.export.records import ExportError, FlightController, Signal, Vectors
-from microrad.export.rounding import RoundingBound
-from microrad.export.sections import Sections
 from microrad.export.templating import render
 
 __all__ = ["FixedForm", "fixed_code", "quantised", "report_text"]

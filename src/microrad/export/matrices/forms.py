@@ -1,15 +1,17 @@
 """Linear models with names, units and origin; their zero-pole-gain and coefficient forms, entry by entry."""
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
+from typing import TypeVar
 
 import numpy as np
 
 from microrad.core import lti
 from microrad.core.lti import Complexes
-from microrad.export.matrices_polynomials import floats, polynomials, roots
-from microrad.export.matrices_structure import entry_of, refuse_hidden, refuse_unstable
+from microrad.export.matrices.polynomials import floats, polynomials, roots
+from microrad.export.matrices.structure import entry_of, refuse_hidden, refuse_unstable
 from microrad.export.records import ExportError, Floats, Origin
 
 _PROBES = 300
@@ -79,59 +81,51 @@ class Forms:
     transfer_function: tuple[tuple[TransferFunction, ...], ...] | str
 
 
-# ------------------------------------------------------------------------------------------------------- what is asked
-def zero_pole_gain(model: LinearModel, output: int = 0, number: int = 0) -> ZeroPoleGain:
-    """Zeros, poles and gain from input ``number`` to ``output``, both counted from 0; nothing is cancelled.
-
-    Raises ExportError for a model with a mode that no input drives or no output shows: it would vanish, or stand as a
-    pole with its zero upon it.
-    """
-    refuse_hidden(model.system, model.period_s, model.name)
-    return _by_roots(model, output, number)
-
-
-def transfer_function(model: LinearModel, output: int = 0, number: int = 0) -> TransferFunction:
-    """Coefficients from input ``number`` to ``output``, both counted from 0.
-
-    Raises ExportError as `zero_pole_gain` does, and for an unstable model: coefficients hide where its poles lie.
-    """
-    refuse_hidden(model.system, model.period_s, model.name)
-    refuse_unstable(model.system, model.period_s, model.name)
-    return _by_powers(model, output, number)
-
-
 def forms(model: LinearModel) -> Forms:
-    """Both forms of every entry of a model, or why it is refused in them."""
-    places = [[(o, i) for i in range(len(model.inputs))] for o in range(len(model.outputs))]
+    """Both forms of every entry of a model; nothing is cancelled.
+
+    A model with a mode that no input drives or no output shows is refused in both: the mode would vanish, or stand as a
+    pole with its zero upon it. An unstable model is refused in coefficients, which hide where its poles lie.
+    """
     try:
         refuse_hidden(model.system, model.period_s, model.name)
-        by_roots = tuple(tuple(_by_roots(model, *place) for place in row) for row in places)
+        by_roots = _of_entries(model, _zero_pole_gain)
     except ExportError as refusal:
         return Forms(str(refusal), str(refusal))
     try:
         refuse_unstable(model.system, model.period_s, model.name)
-        return Forms(by_roots, tuple(tuple(_by_powers(model, *place) for place in row) for row in places))
+        return Forms(by_roots, _of_entries(model, _transfer_function))
     except ExportError as refusal:
         return Forms(by_roots, str(refusal))
 
 
-def _by_roots(model: LinearModel, output: int, number: int) -> ZeroPoleGain:
-    entry = entry_of(model.system, output, number)
-    return _zero_pole_gain(entry, *polynomials(entry), model.period_s)
+_Form = TypeVar("_Form")
 
 
-def _by_powers(model: LinearModel, output: int, number: int) -> TransferFunction:
-    entry = entry_of(model.system, output, number)
-    return _transfer_function(entry, *polynomials(entry), model.period_s)
+def _of_entries(
+    model: LinearModel, make: Callable[[lti.StateSpace, list[Fraction], list[Fraction], float], _Form]
+) -> tuple[tuple[_Form, ...], ...]:
+    rows = []
+    for output in range(len(model.outputs)):
+        row = [entry_of(model.system, output, number) for number in range(len(model.inputs))]
+        rows.append(tuple(make(entry, *polynomials(entry), model.period_s) for entry in row))
+    return tuple(rows)
+
+
+def factors(numerator: list[Fraction], denominator: list[Fraction]) -> tuple[Complexes, Complexes, float]:
+    """Zeros, poles and gain of the `polynomials` of an entry; no zeros and no poles where the numerator is 0."""
+    if not numerator:
+        return np.zeros(0, complex), np.zeros(0, complex), 0.0
+    return roots(numerator), roots(denominator), float(floats(numerator[:1])[0])
 
 
 # ----------------------------------------------------------------------------------------------------------- responses
 def _zero_pole_gain(
     entry: lti.StateSpace, numerator: list[Fraction], denominator: list[Fraction], period_s: float
 ) -> ZeroPoleGain:
+    zeros, poles, gain = factors(numerator, denominator)
     if not numerator:
-        return ZeroPoleGain(np.zeros(0, complex), np.zeros(0, complex), 0.0, 0.0, 0.0)
-    zeros, poles, gain = roots(numerator), roots(denominator), float(floats(numerator[:1])[0])
+        return ZeroPoleGain(zeros, poles, gain, 0.0, 0.0)
     freq, s = _probes(np.concatenate([zeros, poles]), period_s)
     return ZeroPoleGain(zeros, poles, gain, *_error(entry, factored(zeros, poles, gain, s), freq, period_s))
 
@@ -156,14 +150,10 @@ def _transfer_function(
     with np.errstate(all="ignore"):
         response = np.polyval(num, s) / np.polyval(den, s)
     slow = np.trim_zeros(den, "b")  # poles at 0 make it singular, and cost no digits
-    condition = float(np.linalg.cond(_companion(slow))) if slow.size > 1 else 1.0
+    companion = np.eye(slow.size - 1, k=-1)
+    companion[:1] = -slow[1:]
+    condition = float(np.linalg.cond(companion)) if slow.size > 1 else 1.0
     return TransferFunction(num, den, *_error(entry, response, freq, period_s), condition)
-
-
-def _companion(denominator: Floats) -> Floats:
-    matrix = np.eye(denominator.size - 1, k=-1)
-    matrix[0] = -denominator[1:]
-    return matrix
 
 
 def _probes(roots: Complexes, period_s: float) -> tuple[Floats, Complexes]:

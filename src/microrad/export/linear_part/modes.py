@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from microrad.core import lti
-from microrad.export.block_diagonal import BlockDiagonal, block_diagonal
+from microrad.export.linear_part.block_diagonal import BlockDiagonal, block_diagonal
 from microrad.export.records import ExportError, FlightController, Floats
 
 Complexes = NDArray[np.complex128]

@@ -14,10 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from microrad.core import kernels
-from microrad.export.fixed import FixedForm
-from microrad.export.flight import compensated_states
+from microrad.export.flight.fixed import FixedForm
+from microrad.export.linear_part.sections import Sections, compensated_states
 from microrad.export.records import FlightController, InverseLaw
-from microrad.export.sections import Sections
 from microrad.export.templating import Precision
 
 MOST_TRIALS = 256

@@ -4,28 +4,23 @@ import math
 import re
 from dataclasses import dataclass, replace
 from importlib.metadata import version
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from microrad.core import kernels
+from microrad.export.flight.rounding import RoundingBound
 from microrad.export.identifiers import identifier
+from microrad.export.linear_part.sections import Sections, compensated_states
 from microrad.export.records import ExportError, FlightController, Floats, InverseLaw, Signal, Vectors
-from microrad.export.sections import Sections
 from microrad.export.templating import Precision, Terms, render
-
-if TYPE_CHECKING:
-    from microrad.export.rounding import RoundingBound
 
 BOUND_SHARE = 1e-12
 """In double precision the code agrees with the kernel within this share of the largest command."""
 
 POWER_BOUND_SHARE = 1e-10
 """The same where an exponent of Bouc-Wen is not 1: each of the two integrates to 1e-11 of h's size a step."""
-
-SLOW = 0.99
-"""Blocks of a larger spectral radius move by little a sample: in single precision they are compensated sums."""
 
 ELEMENT_KEYS = (
     "d1",
@@ -45,7 +40,7 @@ ELEMENT_KEYS = (
 
 
 def flight_code(
-    of: FlightController, form: Sections, name: str, precision: Precision, bound: "RoundingBound | None" = None
+    of: FlightController, form: Sections, name: str, precision: Precision, bound: RoundingBound | None = None
 ) -> dict[str, str]:
     """The controller with its linear part in ``form`` as C99: file names and texts.
 
@@ -161,15 +156,6 @@ def bound_share(of: FlightController) -> float:
     return POWER_BOUND_SHARE if power else BOUND_SHARE
 
 
-def compensated_states(form: Sections) -> list[bool]:
-    """By state, whether single precision keeps what rounding leaves out of it: slow blocks and integrators."""
-    found, A = [False] * form.order, form.A
-    for first, size in form.blocks:
-        at = slice(first, first + size)
-        found[at] = [float(np.max(np.abs(np.linalg.eigvals(A[at, at])))) > SLOW] * size
-    return found
-
-
 def _tables(of: FlightController, form: Sections, kept: NDArray[np.bool_]) -> dict[str, Table]:
     kinds = ["v (V)", "target (rad)", "rate of the target (rad/s)"][: form.C.shape[0] // of.actuators]
     outputs = f"Rows: {_places(kinds, [of.actuators] * len(kinds))}"
@@ -257,7 +243,7 @@ def _inverse_values(of: InverseLaw | None) -> dict[str, Any]:
     }
 
 
-def _facts(of: FlightController, form: Sections, values: dict[str, Any], bound: "RoundingBound | None") -> list[str]:
+def _facts(of: FlightController, form: Sections, values: dict[str, Any], bound: RoundingBound | None) -> list[str]:
     """Lines of the header: what the code holds, and how exact it is."""
     precision = (
         f"Double precision: within {values['bound_share']:g} of the largest command of what the simulation commands."
@@ -267,7 +253,7 @@ def _facts(of: FlightController, form: Sections, values: dict[str, Any], bound: 
     elif bound is not None:
         precision = (
             f"Single precision: within {bound.command_v:.3g} V of double precision over {bound.samples} recorded "
-            "samples. A longer run has a larger bound (microrad.export.rounding works it out)."
+            "samples. A longer run has a larger bound (microrad.export.flight.rounding works it out)."
         )
     inverse = []
     if of.inverse is not None:

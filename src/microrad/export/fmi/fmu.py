@@ -21,12 +21,12 @@ import numpy as np
 
 from microrad.core import kernels
 from microrad.core.folder import scratch, write_whole
-from microrad.export.build import FLAGS, compiler, compiler_words
-from microrad.export.flight import flight_code
-from microrad.export.fmi_description import Version, constants, exponent, model_description, plant_of, variables
+from microrad.export.flight.build import FLAGS, compiler, compiler_words
+from microrad.export.flight.c_code import flight_code
+from microrad.export.fmi.description import Version, constants, exponent, model_description, plant_of, variables
 from microrad.export.identifiers import identifier
+from microrad.export.linear_part.sections import sections
 from microrad.export.records import GAUGE, OPTICAL_ERROR, READING, REFERENCE, ExportError, LoopUnit, PlantUnit
-from microrad.export.sections import sections
 from microrad.export.templating import render
 
 SHARED = (*FLAGS, "-fPIC", "-shared", "-fvisibility=hidden")
@@ -112,7 +112,7 @@ def _texts(unit: PlantUnit | LoopUnit, version: Version, name: str) -> tuple[dic
         }
 
     rest = {f"sources/{file}": text for file, text in code.items()}
-    headers = files("microrad.export") / "fmi"
+    headers = files("microrad.export.fmi") / "headers"
     rest |= {f"sources/{file}": (headers / file).read_text(encoding="utf-8") for file in HEADERS[version]}
     rest["documentation/licenses/license.txt"] = render("fmi_licence.txt.j2")
     if version == "3.0":

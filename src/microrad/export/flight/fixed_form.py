@@ -20,10 +20,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from microrad.core import kernels
-from microrad.export.double_run import Run
+from microrad.export.flight.double_run import Run
+from microrad.export.flight.rounding import responses
+from microrad.export.linear_part.sections import Sections
 from microrad.export.records import FlightController, Floats, Signal
-from microrad.export.rounding import responses
-from microrad.export.sections import Sections
 
 Whole = NDArray[np.int64]
 Poles = tuple[tuple[complex, complex], ...]

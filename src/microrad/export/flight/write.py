@@ -10,16 +10,16 @@ from typing import Any, Literal
 
 from microrad.core.folder import MANIFEST, check_folder, whole_folder
 from microrad.core.units import format_quantity
-from microrad.export.build import BenchResult, compile_and_run, compiler
-from microrad.export.choice import Choice, PointingChoice, flight_controller, outlook, vectors
-from microrad.export.fixed import FixedForm, fixed_code, quantised
-from microrad.export.fixed import report_text as quantisation_text
-from microrad.export.flight import flight_code, vectors_text, within_limits
+from microrad.export.choice import Choice, PointingChoice, Source, flight_controller, vectors
+from microrad.export.flight.build import BenchResult, compile_and_run, compiler
+from microrad.export.flight.c_code import flight_code, vectors_text, within_limits
+from microrad.export.flight.fixed import FixedForm, fixed_code, quantised
+from microrad.export.flight.fixed import report_text as quantisation_text
+from microrad.export.flight.operations import FixedOperations, Operations, fixed_operations, operations
+from microrad.export.flight.rounding import RoundingBound, rounding_bound
 from microrad.export.identifiers import identifier, suggested
-from microrad.export.operations import FixedOperations, Operations, fixed_operations, operations
+from microrad.export.linear_part.sections import Sections, sections
 from microrad.export.records import ExportError, FlightController, Progress, Vectors
-from microrad.export.rounding import RoundingBound, rounding_bound
-from microrad.export.sections import Sections, sections
 from microrad.loop.fine_pointing import PROMISE, Outlook
 
 Precision = Literal["double", "single", "fixed"]
@@ -74,65 +74,50 @@ def export_flight(
     must not be replaced.
     """
     check_output(folder, overwrite)
-    left = outlook(choice)
-    if isinstance(choice, PointingChoice) and left is not None and not (left.holds or accept):
-        raise ExportError(_broken(choice, left))
+    left = None
+    if isinstance(choice, PointingChoice):
+        left = choice.outlook()
+        if not (left.holds or accept):
+            raise ExportError(f"{choice.source.path}: {_broken(choice.controller.name, left)}")
     controller = flight_controller(choice)
     name = identifier(name if name is not None else suggested(controller.name))
     form = sections(controller)
     on_progress(0, 3, f"recording {samples} samples of the loop")
     run = within_limits(controller, vectors(choice, samples))
-    made = _code(controller, form, run, name, precision)
+    files, cost, bound, fixed = _code(controller, form, run, name, precision)
     with whole_folder(folder, overwrite, KIND, WHAT) as draft:
-        for file, text in made.files.items():
+        for file, text in {**files, "vectors.csv": vectors_text(controller, run)}.items():
             (draft / file).write_text(text, encoding="utf-8", newline="\n")
-        (draft / "vectors.csv").write_text(vectors_text(controller, run), encoding="utf-8", newline="\n")
         on_progress(1, 3, "compiling and running the bench")
-        bench = compile_and_run(draft, made.bench) if compiler() is not None else None
-        _remove_built(draft, made.files)
-        found = FlightExport(
-            folder, name, precision, controller, left, form, made.cost, made.bound, made.fixed, samples, bench
-        )
+        bench = compile_and_run(draft, name if fixed is None else f"{name}_fixed") if compiler() is not None else None
+        for path in draft.iterdir():  # what the compiler left: the folder holds text, for any machine
+            if path.name not in files and path.name != "vectors.csv":
+                path.unlink()
+        found = FlightExport(folder, name, precision, controller, left, form, cost, bound, fixed, samples, bench)
         on_progress(2, 3, "writing")
         (draft / "report.txt").write_text(report_text(found) + "\n", encoding="utf-8", newline="\n")
-        text = json.dumps(_manifest(found, choice, draft), indent=2, ensure_ascii=False)
+        text = json.dumps(_manifest(found, choice.source, draft), indent=2, ensure_ascii=False)
         (draft / MANIFEST).write_text(text + "\n", encoding="utf-8")
     return found
 
 
-@dataclass(frozen=True, slots=True)
-class _Made:
-    """The code of one precision, and the name that its bench goes by."""
-
-    files: dict[str, str]
-    bench: str
-    cost: Operations | FixedOperations
-    bound: RoundingBound | None
-    fixed: FixedForm | None
-
-
-def _code(of: FlightController, form: Sections, run: Vectors, name: str, precision: Precision) -> _Made:
+def _code(
+    of: FlightController, form: Sections, run: Vectors, name: str, precision: Precision
+) -> tuple[dict[str, str], Operations | FixedOperations, RoundingBound | None, FixedForm | None]:
+    """Files of one precision, what a step costs, and what the precision costs."""
     if precision == "fixed":
         fixed = quantised(of, form, run)
-        return _Made(fixed_code(of, form, fixed, name), f"{name}_fixed", fixed_operations(of, fixed), None, fixed)
+        return fixed_code(of, form, fixed, name), fixed_operations(of, fixed), None, fixed
     bound = rounding_bound(of, form, run) if precision == "single" else None
-    files = flight_code(of, form, name, precision, bound)
-    return _Made(files, name, operations(of, form, precision), bound, None)
+    return flight_code(of, form, name, precision, bound), operations(of, form, precision), bound, None
 
 
-def _remove_built(folder: Path, sources: dict[str, str]) -> None:
-    """Take away what the compiler left: the folder holds text, for any machine."""
-    for path in folder.iterdir():
-        if path.name not in sources and path.name != "vectors.csv":
-            path.unlink()
-
-
-def _manifest(of: FlightExport, choice: Choice, folder: Path) -> dict[str, Any]:
+def _manifest(of: FlightExport, source: Source, folder: Path) -> dict[str, Any]:
     files = sorted(path for path in folder.iterdir() if path.is_file())
     libraries = ("microrad", "numpy", "scipy", "numba", "jinja2")
     return {
         KIND: {"kind": "flight code", "name": of.name, "controller": of.controller.name, "precision": of.precision},
-        "mission": {"file": choice.file.path.name, "sha256": choice.file.sha256, "name": of.controller.origin.mission},
+        "mission": {"file": source.path.name, "sha256": source.origin.mission_sha256, "name": source.origin.mission},
         "samples": of.samples,
         "versions": {"python": platform.python_version(), **{each: version(each) for each in libraries}},
         "files_sha256": {path.name: hashlib.sha256(path.read_bytes()).hexdigest() for path in files},
@@ -140,10 +125,10 @@ def _manifest(of: FlightExport, choice: Choice, folder: Path) -> dict[str, Any]:
 
 
 # ----------------------------------------------------------------------------------------------------------- in words
-def _broken(choice: PointingChoice, left: Outlook) -> str:
+def _broken(name: str, left: Outlook) -> str:
     found, said, times = _rms(left.simulated_rad), _rms(left.linear_rad), left.simulated_rad / left.linear_rad
     return (
-        f"{choice.file.path}: {choice.controller.name} leaves {found} on the mission's mirror, simulated with its "
+        f"{name} leaves {found} on the mission's mirror, simulated with its "
         f"hysteresis: {times:.1f} times the {said} of linear theory, where {PROMISE:g} times is the most. "
         "Choose another controller by the simulated figures of microrad design, or write this one all the same with "
         "--accept."
@@ -157,7 +142,7 @@ def _rms(rad: float) -> str:
 def report_text(of: FlightExport) -> str:
     """What was exported, what a step costs and how exact it is, in lines."""
     c = of.controller
-    inputs = ", ".join(f"{each.name}[{each.size}]" for each in c.inputs)
+    inputs, left = ", ".join(f"{each.name}[{each.size}]" for each in c.inputs), of.left
     lines = [
         ("from", f"{c.origin.mission}, sha256 {c.origin.mission_sha256[:16]}"),
         ("mirror", c.origin.mirror),
@@ -168,12 +153,12 @@ def report_text(of: FlightExport) -> str:
         ("reads", inputs),
         ("commands", f"{c.actuators} x {_limits(c)}"),
         ("margins", ", ".join(f"{name} {_shown(value, unit)}" for name, value, unit in c.margins)),
-        *_residual(of),
+        ("leaves", left and f"{_rms(left.linear_rad)} in linear theory, {_rms(left.simulated_rad)} simulated"),
         ("a step costs", of.cost.words),
-        *_exactness(of),
-        *_measured(of),
+        ("single", of.bound and of.bound.words),
+        *_measured(of.bench),
     ]
-    text = "\n".join(f"  {name:13} {words}" for name, words in lines)
+    text = "\n".join(f"  {name:13} {words}" for name, words in lines if words)
     quantisation = "" if of.fixed is None else f"\n\n{quantisation_text(of.fixed)}"
     return f"{of.name}: {c.name} in {_IN[of.precision]}\n{text}{quantisation}"
 
@@ -191,20 +176,9 @@ def _limits(c: FlightController) -> str:
     return f"{low} to {high} from the bias of {bias}{counts}"
 
 
-def _residual(of: FlightExport) -> list[tuple[str, str]]:
-    if of.left is None:
-        return []
-    return [("leaves", f"{_rms(of.left.linear_rad)} in linear theory, {_rms(of.left.simulated_rad)} simulated")]
-
-
-def _exactness(of: FlightExport) -> list[tuple[str, str]]:
-    return [] if of.bound is None else [("single", of.bound.words)]
-
-
-def _measured(of: FlightExport) -> list[tuple[str, str]]:
-    if of.bench is None:
+def _measured(b: BenchResult | None) -> list[tuple[str, str]]:
+    if b is None:
         return [("not compiled", "there is no C compiler here (cc, gcc, clang); make in the folder builds the bench")]
-    b = of.bench
     counted = {"saturated": b.saturated, "rate-clamped": b.rate_clamped, "rejected": b.rejected, "faults": b.faults}
     counts = ", ".join(f"{count} {name}" for name, count in counted.items())
     difference, allowed = (format_quantity(v, "V", 3) for v in (b.largest_difference_v, b.bound_v))

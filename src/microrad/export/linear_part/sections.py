@@ -11,14 +11,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from microrad.core import kernels, lti
-from microrad.export.block_diagonal import BlockDiagonal
-from microrad.export.modes import NEAR, Modes, hidden, modes, sizes
+from microrad.export.linear_part.block_diagonal import BlockDiagonal
+from microrad.export.linear_part.modes import NEAR, Modes, hidden, modes, sizes
 from microrad.export.records import ExportError, FlightController, Floats
 
 Complexes = NDArray[np.complex128]
 
 MODAL, TRIANGULAR = "modal", "triangular"
 """Forms: blocks of one and two states alone; or some larger upper quasi-triangular ones beside them."""
+
+SLOW = 0.99
+"""Blocks of a larger spectral radius move by little a sample: in single precision they are compensated sums."""
 
 MOST_OUTSIDE = 1e-9
 """Poles further outside the unit circle than this are unstable."""
@@ -84,10 +87,19 @@ def sections(of: FlightController) -> Sections:
     if (lack := hidden(found)) is not None:
         raise ExportError(
             f"controller {of.name!r} is not minimal: {lack[0]} its mode with {_pole(of, lack[1])}, so that the code "
-            "would compute it for nothing; take a minimal realisation (`microrad.export.modes.minimal` makes one), or "
-            "take out the filter or input that the mode belongs to"
+            "would compute it for nothing; take a minimal realisation (`microrad.export.linear_part.modes.minimal` "
+            "makes one), or take out the filter or input that the mode belongs to"
         )
     return _sections(found, of.system.D)
+
+
+def compensated_states(form: Sections) -> list[bool]:
+    """By state, whether single precision keeps what rounding leaves out of it: slow blocks and integrators."""
+    found, A = [False] * form.order, form.A
+    for first, size in form.blocks:
+        at = slice(first, first + size)
+        found[at] = [float(np.max(np.abs(np.linalg.eigvals(A[at, at])))) > SLOW] * size
+    return found
 
 
 # ------------------------------------------------------------------------------------------------------------ refusals

@@ -5,12 +5,12 @@ import math
 import numpy as np
 
 from microrad.core import lti
-from microrad.export.double_run import Run, run
-from microrad.export.fixed_form import FixedForm, OutputQuality, Poles, QuantisationReport, Whole, dequantised
-from microrad.export.fixed_step import FixedRun, Step, fixed_run
+from microrad.export.flight.double_run import Run, run
+from microrad.export.flight.fixed_form import FixedForm, OutputQuality, Poles, QuantisationReport, Whole, dequantised
+from microrad.export.flight.fixed_step import FixedRun, Step, fixed_run
+from microrad.export.flight.rounding import behind_converter, errors_of_inverse, responses
+from microrad.export.linear_part.sections import Sections
 from microrad.export.records import FlightController, Floats
-from microrad.export.rounding import behind_converter, errors_of_inverse, responses
-from microrad.export.sections import Sections
 
 _REST_SAMPLES = 4096
 

@@ -9,11 +9,11 @@ import numpy as np
 
 from microrad.core import lti
 from microrad.core.lti import Complexes
-from microrad.export.linear_select import form_of, numbers
-from microrad.export.matrices_files import python_control, sample_time_s
-from microrad.export.matrices_forms import LinearModel, Port, factored, zero_pole_gain
-from microrad.export.matrices_polynomials import roots
-from microrad.export.matrices_structure import pole_text
+from microrad.export.linear_import.matlab import form_of, numbers
+from microrad.export.matrices.files import python_control
+from microrad.export.matrices.forms import factored, factors
+from microrad.export.matrices.polynomials import polynomials, roots
+from microrad.export.matrices.structure import entry_of, pole_text, refuse_hidden
 from microrad.export.records import ExportError, Floats
 
 MOST_ORDER = 60
@@ -87,7 +87,7 @@ def _row(values: Any, key: str, source: str) -> Any:
 
 
 def roots_of_states(system: lti.StateSpace, source: str) -> Roots:
-    """Roots of a continuous state space. Raises ExportError for shapes that do not fit, and as `zero_pole_gain`."""
+    """Roots of a continuous state space. Raises ExportError for shapes that do not fit, and for hidden modes."""
     n = system.A.shape[0]
     inputs, outputs = system.B.shape[1], system.C.shape[0]
     shapes = {"A": (n, n), "B": (n, inputs), "C": (outputs, n), "D": (outputs, inputs)}
@@ -100,9 +100,9 @@ def roots_of_states(system: lti.StateSpace, source: str) -> Roots:
         )
     if n > MOST_ORDER:
         raise ExportError(f"{source}: {n} states, and a mirror has at most {MOST_ORDER}; reduce the model (balred)")
-    ports = (Port("drive_v", "V"),), (Port("mirror", ""),), tuple(Port(f"x_{i}", "") for i in range(n))
-    found = zero_pole_gain(LinearModel(source, "", system, 0.0, *ports, None))
-    return Roots(paired(found.zeros, "zeros", source), paired(found.poles, "poles", source), found.gain)
+    refuse_hidden(system, 0.0, source)
+    zeros, poles, gain = factors(*polynomials(entry_of(system, 0, 0)))
+    return Roots(paired(zeros, "zeros", source), paired(poles, "poles", source), gain)
 
 
 def roots_of_coefficients(numerator: Floats, denominator: Floats, source: str) -> Roots:
@@ -116,11 +116,8 @@ def roots_of_coefficients(numerator: Floats, denominator: Floats, source: str) -
         raise ExportError(
             f"{source}: order {den.size - 1}, and a mirror has at most {MOST_ORDER}; reduce the model (balred)"
         )
-    return Roots(_exact(num), _exact(den), float(num[0] / den[0]))
-
-
-def _exact(coefficients: Floats) -> Complexes:
-    return roots([Fraction(float(each)) for each in coefficients])
+    zeros, poles = (roots([Fraction(float(each)) for each in coefficients]) for coefficients in (num, den))
+    return Roots(zeros, poles, float(num[0] / den[0]))
 
 
 def roots_of_control(system: Any, source: str) -> Roots:
@@ -130,12 +127,18 @@ def roots_of_control(system: Any, source: str) -> Roots:
         raise ExportError(
             f"{source}: a {type(system).__name__}; give a control.StateSpace or a control.TransferFunction"
         )
-    _refuse_sampled(sample_time_s(system), source)
+    if system.dt is None or system.dt is True:
+        raise ExportError(
+            f"{system.name} has dt = {system.dt}: continuous, or sampled how fast? Give it dt = 0 or its period in s"
+        )
+    _refuse_sampled(float(system.dt), source)
     if (system.ninputs, system.noutputs) != (1, 1):
         found = f"{system.ninputs} inputs and {system.noutputs} outputs"
         raise ExportError(f"{source}: {found}; a mirror file has one drive and one angle: choose")
-    arrays = {key: getattr(system, key) for key in "ABCD"} if isinstance(system, library.StateSpace) else {}
-    arrays = arrays or {"num": system.num_array[0, 0][None], "den": system.den_array[0, 0][None]}
+    if isinstance(system, library.StateSpace):
+        arrays = {key: getattr(system, key) for key in "ABCD"}
+    else:
+        arrays = {"num": system.num_array[0, 0], "den": system.den_array[0, 0]}
     return roots_of_fields({key: np.atleast_2d(np.asarray(value)) for key, value in arrays.items()}, source)
 
 
@@ -148,18 +151,16 @@ def paired(found: Complexes, key: str, source: str) -> Complexes:
     for root in upper:
         nearest = min(lower, key=lambda r: abs(r - root.conjugate()), default=None)
         if nearest is None or abs(nearest - root.conjugate()) > _CONJUGATE * abs(root):
-            raise _single(root, key, source)
+            lower.insert(0, root)
+            break
         lower.remove(nearest)
         both += [complex(root), complex(root.conjugate())]
     if lower:
-        raise _single(lower[0], key, source)
+        raise ExportError(
+            f"{source}: {key} has the complex root {lower[0]:.6g} without its conjugate; a mirror's response is real: "
+            "give both"
+        )
     return np.array(both, dtype=complex)
-
-
-def _single(root: complex, key: str, source: str) -> ExportError:
-    return ExportError(
-        f"{source}: {key} has the complex root {root:.6g} without its conjugate; a mirror's response is real: give both"
-    )
 
 
 def checked(of: Roots, source: str) -> Roots:
