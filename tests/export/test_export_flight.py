@@ -639,7 +639,7 @@ def test_it_is_called_from_c_plus_plus(shipped, tmp_path):
 
 def test_a_unit_with_a_stroke_makes_a_constant():
     (found,) = c_code._readings((Signal("wanted_rad_s", 2, "rad/s", "rate", 3.0),))
-    assert (found.NAME, found.UNIT) == ("WANTED", "RAD_S")
+    assert (found["NAME"], found["UNIT"]) == ("WANTED", "RAD_S")
 
 
 def test_a_bound_that_is_none_is_said_in_the_header(shipped):

@@ -1,6 +1,7 @@
 """Names in exported code: what C99 and C++ take for an identifier and no header in use has taken already."""
 
 import re
+import unicodedata
 
 from microrad.export.records import ExportError
 
@@ -82,16 +83,10 @@ def suggested(text: str) -> str:
     Accents are dropped, what is too long is cut behind a word where that leaves half of it, and a name that is taken
     gets an ending. A text without letters and digits becomes "controller".
     """
-    import unicodedata  # only where a name is made up
-
     plain = unicodedata.normalize("NFKD", text).encode("ascii", "ignore").decode().lower()
     found = "_".join(re.findall(r"[a-z0-9]+", plain)) or "controller"
-    found = _cut(found if found[0].isalpha() else f"c_{found}", LONGEST - len("_code"))
+    found, longest = found if found[0].isalpha() else f"c_{found}", LONGEST - len("_code")
+    if len(found) > longest:
+        whole = found[: longest + 1].rpartition("_")[0]
+        found = whole if len(whole) >= longest // 2 else found[:longest]
     return f"{found}_code" if _trouble(found) else found
-
-
-def _cut(name: str, longest: int) -> str:
-    if len(name) <= longest:
-        return name
-    whole = name[: longest + 1].rpartition("_")[0]
-    return whole if len(whole) >= longest // 2 else name[:longest]

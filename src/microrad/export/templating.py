@@ -1,16 +1,15 @@
 """The templates of exported code: C, make files and XML with the numbers of a design in them."""
 
 import math
+import textwrap
 from collections.abc import Iterable
 from functools import cache
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
+from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from microrad.export.records import ExportError
-
-if TYPE_CHECKING:
-    from jinja2 import Environment
 
 Precision = Literal["double", "single"]
 
@@ -52,17 +51,13 @@ def table(matrix: Any, precision: Precision = "double") -> str:
     """Numbers as a C initialiser: ``{a, b}`` of one dimension, a braced line for each row of two."""
     numbers = np.asarray(matrix, dtype=float)
     if numbers.ndim == 1:
-        return _braced(real(float(x), precision) for x in numbers)
+        return "{" + ", ".join(real(float(x), precision) for x in numbers) + "}"
     return "{\n    " + ",\n    ".join(table(row, precision) for row in numbers) + ",\n}"
-
-
-def _braced(items: Iterable[str]) -> str:
-    return "{" + ", ".join(items) + "}"
 
 
 def whole(numbers: Iterable[int]) -> str:
     """Whole numbers as a C initialiser."""
-    return _braced(str(int(n)) for n in numbers)
+    return "{" + ", ".join(str(int(n)) for n in numbers) + "}"
 
 
 def terms(of: Terms, precision: Precision = "double") -> str:
@@ -79,10 +74,13 @@ def terms(of: Terms, precision: Precision = "double") -> str:
     return "\n    ".join(lines)
 
 
+def entries(matrix: Any) -> list[tuple[int, int, Any]]:
+    """Row, column and value of each number of a matrix that is not 0, row by row."""
+    return [(int(i), int(j), matrix[i, j].item()) for i, j in np.argwhere(matrix)]
+
+
 def comment(text: str, prefix: str = "") -> str:
     """Text for a comment of C, in lines that begin with ``prefix``: nothing in it can end the comment or hide code."""
-    import textwrap  # only where code is made
-
     plain = "".join(c if c.isprintable() else " " for c in text).replace("\\", "/").replace("??", "? ?")
     while "*/" in plain or "/*" in plain:
         plain = plain.replace("*/", "* /").replace("/*", "/ *")
@@ -95,9 +93,7 @@ def render(template: str, **values: Any) -> str:
 
 
 @cache
-def _environment() -> "Environment":
-    from jinja2 import Environment, PackageLoader, StrictUndefined  # slow to import, not needed to show help
-
+def _environment() -> Environment:
     made = Environment(
         loader=PackageLoader("microrad.export", "templates"),
         undefined=StrictUndefined,

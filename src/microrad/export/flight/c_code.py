@@ -2,7 +2,7 @@
 
 import math
 import re
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from importlib.metadata import version
 from typing import Any
 
@@ -13,8 +13,8 @@ from microrad.core import kernels
 from microrad.export.flight.rounding import RoundingBound
 from microrad.export.identifiers import identifier
 from microrad.export.linear_part.sections import Sections, compensated_states
-from microrad.export.records import ExportError, FlightController, Floats, InverseLaw, Signal, Vectors
-from microrad.export.templating import Precision, Terms, render
+from microrad.export.records import ExportError, FlightController, InverseLaw, Signal, Vectors
+from microrad.export.templating import Precision, Terms, entries, render
 
 BOUND_SHARE = 1e-12
 """In double precision the code agrees with the kernel within this share of the largest command."""
@@ -58,17 +58,15 @@ def flight_code(
             )
         values |= {"bound_v": bound.command_v, "bound_samples": bound.samples}
     values["facts"] = _facts(of, form, values, bound if precision == "single" else None)
-    headers = [f"{name}.h"] + ([f"{name}_hysteresis.h"] if of.inverse is not None else [])
     templates = {
         f"{name}.h": "controller.h.j2",
         f"{name}.c": "controller.c.j2",
-        f"{name}_hysteresis.h": "hysteresis.h.j2",
         f"{name}_bench.c": "bench.c.j2",
         "Makefile": "Makefile.j2",
     }
-    if of.inverse is None:
-        del templates[f"{name}_hysteresis.h"]
-    sources = [f"{name}.c", f"{name}_bench.c"]
+    if of.inverse is not None:
+        templates[f"{name}_hysteresis.h"] = "hysteresis.h.j2"
+    headers, sources = ([file for file in templates if file.endswith(end)] for end in (".h", ".c"))
     return {file: render(template, headers=headers, sources=sources, **values) for file, template in templates.items()}
 
 
@@ -104,20 +102,6 @@ class Limits:
 
 
 @dataclass(frozen=True, slots=True)
-class Reading:
-    """An input as the templates write it: its place among the readings, and its name and unit in constants."""
-
-    name: str
-    size: int
-    unit: str
-    meaning: str
-    limit: float
-    first: int
-    NAME: str
-    UNIT: str
-
-
-@dataclass(frozen=True, slots=True)
 class Table:
     """A matrix as its numbers that are not 0, with its name in C and what it does, in words."""
 
@@ -133,7 +117,6 @@ def _values(of: FlightController, form: Sections, name: str, precision: Precisio
         "name": name,
         "precision": precision,
         "version": version("microrad"),
-        "use": (_use(name), start_words(of)),
         "of": of,
         "limits": _limits(of, precision),
         "signals": _readings(of.inputs),
@@ -160,12 +143,15 @@ def _tables(of: FlightController, form: Sections, kept: NDArray[np.bool_]) -> di
     kinds = ["v (V)", "target (rad)", "rate of the target (rad/s)"][: form.C.shape[0] // of.actuators]
     outputs = f"Rows: {_places(kinds, [of.actuators] * len(kinds))}"
     readings = f"Columns: {_places([each.name for each in of.inputs], [each.size for each in of.inputs])}"
+    sizes = [size for _, size in form.blocks]
+    counts = ", ".join(f"{sizes.count(n)} of {n}" for n in sorted(set(sizes)))
+    blocks = f"A, block-diagonal. Blocks: {counts} state{'' if max(sizes, default=1) == 1 else 's'}."
     return {
-        "C": Table("OUTPUT_OF_STATES", f"C. {outputs}. Columns: the states.", terms(form.C)),
-        "D": Table("OUTPUT_OF_READINGS", f"D. {outputs}. {readings}.", terms(form.D)),
-        "A": Table("STATE_OF_STATES", _words_of_a(form), terms(form.A - np.diag(kept.astype(float)))),
-        "B": Table("STATE_OF_READINGS", f"B. Rows: the states. {readings}.", terms(form.B)),
-        "L": Table("STATE_OF_EXCESS", "L, the anti-windup gain, per V. Columns: the actuators.", terms(form.L)),
+        "C": Table("OUTPUT_OF_STATES", f"C. {outputs}. Columns: the states.", entries(form.C)),
+        "D": Table("OUTPUT_OF_READINGS", f"D. {outputs}. {readings}.", entries(form.D)),
+        "A": Table("STATE_OF_STATES", blocks, entries(form.A - np.diag(kept.astype(float)))),
+        "B": Table("STATE_OF_READINGS", f"B. Rows: the states. {readings}.", entries(form.B)),
+        "L": Table("STATE_OF_EXCESS", "L, the anti-windup gain, per V. Columns: the actuators.", entries(form.L)),
     }
 
 
@@ -178,23 +164,13 @@ def _places(names: list[str], sizes: list[int]) -> str:
     )
 
 
-def _words_of_a(form: Sections) -> str:
-    sizes = [size for _, size in form.blocks]
-    counts = [f"{sizes.count(n)} of {n}" for n in sorted(set(sizes))]
-    return f"A, block-diagonal. Blocks: {', '.join(counts)} state{'' if max(sizes, default=1) == 1 else 's'}."
-
-
-def terms(matrix: Floats) -> Terms:
-    """Row, column and value of each number that is not 0, row by row."""
-    return [(int(i), int(j), float(matrix[i, j])) for i, j in np.argwhere(matrix)]
-
-
-def _readings(inputs: tuple[Signal, ...]) -> list[Reading]:
+def _readings(inputs: tuple[Signal, ...]) -> list[dict[str, Any]]:
+    """The inputs as the templates write them: place among the readings, name and unit in constants beside the rest."""
     found, first = [], 0
     for s in inputs:
         unit = re.sub(r"[^A-Z0-9]+", "_", s.unit.upper())  # rad/s: RAD_S
         plain = s.name.upper().removesuffix(f"_{unit}")
-        found.append(Reading(s.name, s.size, s.unit, s.meaning, s.limit, first, plain, unit))
+        found.append({**asdict(s), "first": first, "NAME": plain, "UNIT": unit})
         first += s.size
     return found
 
@@ -229,17 +205,17 @@ def _inwards(limit: float, towards: float, precision: Precision) -> float:
 def _inverse_values(of: InverseLaw | None) -> dict[str, Any]:
     if of is None:
         return {"inverse": None, "elements": 0, "plays": 0, "lags": 0, "widening": False, "direct": False}
-    widening = bool(np.any(of.widening[:, 0]))
     elements, plays = of.bouc_wen.shape[0], of.play_threshold.size
+    widening = plays > 0 and bool(np.any(of.widening[:, 0]))
     return {
         "inverse": of,
         "elements": elements,
         "plays": plays,
         "lags": of.lag_keep.size,
         "lag_share": 1.0 - of.lag_keep,
-        "widening": widening and plays > 0,
+        "widening": widening,
         "direct": bool(np.any(of.direct)),
-        "uses_rate": elements > 0 or (widening and plays > 0),
+        "uses_rate": elements > 0 or widening,
     }
 
 
@@ -257,47 +233,13 @@ def _facts(of: FlightController, form: Sections, values: dict[str, Any], bound: 
         )
     inverse = []
     if of.inverse is not None:
-        inverse = [f"Inverse of hysteresis: {_counted(values)}; taken at the target's rate, {_rate_words(of.inverse)}."]
+        counts = {"Bouc-Wen element(s)": "elements", "play operator(s)": "plays", "lag(s) of creep": "lags"}
+        held = ", ".join(f"{values[key]} {words}" for words, key in counts.items() if values[key]) or "a direct gain"
+        rate = "the difference of two samples" if of.inverse.by_difference else "from the linear part"
+        inverse = [f"Inverse of hysteresis: {held}; taken at the target's rate, {rate}."]
     return [
         f"Period: {of.period_s:.9g} s ({1.0 / of.period_s:.9g} Hz).",
         f"Linear part: {form.order} states in {len(form.blocks)} blocks ({form.form} form).",
         *inverse,
         precision,
     ]
-
-
-def _counted(values: dict[str, Any]) -> str:
-    counts = {"Bouc-Wen element(s)": "elements", "play operator(s)": "plays", "lag(s) of creep": "lags"}
-    found = [f"{values[key]} {words}" for words, key in counts.items() if values[key]]
-    return ", ".join(found) or "a direct gain"
-
-
-def _rate_words(of: InverseLaw) -> str:
-    return "the difference of two samples" if of.by_difference else "from the linear part"
-
-
-def _use(name: str) -> str:
-    return (
-        f"Use: one {name}_state for each loop, {name}_init() once, {name}_step() once a period. All memory is in the "
-        "state, which is the caller's; a step calls nothing but <math.h>, and each of its loops has a fixed bound. A "
-        "reading that is no number or beyond its limit is rejected: the last one that was accepted stands in for it. A "
-        "command is always a finite number within the limits, whatever bits of the state an upset has turned: what is "
-        "no sound number begins anew when a step begins, and `upsets` counts; what is one still is a disturbance like "
-        "any other. Mask floating-point traps where the processor has them: "
-        "nan and infinity are dealt with here. Do not compile with -ffast-math."
-    )
-
-
-def start_words(of: FlightController, rejects: bool = True) -> str:
-    """How to begin, and what to do while the loop is open; ``rejects``: the code holds off readings that are faults."""
-    words = (
-        "Drives and modes: the amplifier's input is the bias plus the command, and the mirror's angle rises with it. "
-        "The initial state is that of a mirror at rest at the bias; the first command answers the first readings. "
-        "While there is no error signal, go on stepping with an error of 0 (a reading equal to its reference): "
-        "integrators then stay where they are, and to close the loop again makes no jump."
-    )
-    if of.inverse is not None:
-        words += " The inverse keeps track of the mirror's hysteresis only as long as each command is applied."
-    if rejects:
-        words += " A reading that goes on being rejected goes on driving the integrators: watch `rejected`."
-    return words + " After any other drive, bring the mirror back to rest at the bias and initialise."

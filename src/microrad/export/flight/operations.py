@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from microrad.core import kernels
-from microrad.export.flight.fixed import FixedForm
+from microrad.export.flight.fixed_form import FixedForm
 from microrad.export.linear_part.sections import Sections, compensated_states
 from microrad.export.records import FlightController, InverseLaw
 from microrad.export.templating import Precision
@@ -50,11 +50,6 @@ class Operations:
     def __or__(self, other: "Operations") -> "Operations":
         """The worse of two branches, kind by kind."""
         return Operations(*(max(a, b) for a, b in zip(astuple(self), astuple(other), strict=True)))
-
-    @property
-    def total(self) -> int:
-        """All of them."""
-        return int(sum(astuple(self)))
 
     @property
     def words(self) -> str:
@@ -105,14 +100,11 @@ class FixedOperations:
     @property
     def words(self) -> str:
         """The counts in a line, without those that are 0."""
-        found = f"{_counts(self, INTEGERS)} of whole numbers"
+        whole = ("multiplications", "additions", "shifts", "comparisons")
+        found = f"{_counts(self, whole)} of whole numbers"
         if self.single == Operations():
             return found
         return f"{found}; {_counts(self, ('conversions',))}; in single precision {self.single.words}"
-
-
-INTEGERS = ("multiplications", "additions", "shifts", "comparisons")
-"""Fields of `FixedOperations` that count operations of whole numbers."""
 
 
 def _counts(of: Operations | FixedOperations, names: Iterable[str]) -> str:
@@ -193,21 +185,12 @@ def _inverse(of: InverseLaw, actuators: int, precision: Precision) -> Operations
     if widening:
         found += (_CLAMP + Operations(multiplications=1, comparisons=1)) * actuators
         found += Operations(comparisons=1) * int(np.count_nonzero(widens))
+        found += Operations(comparisons=1) * plays + Operations(additions=1) * int(np.sum(of.play_threshold > 0.0))
     for row in of.bouc_wen:
         found += _element(power=float(row[kernels.POWER]) != 0.0)
-    for threshold in of.play_threshold:
-        found += _play(widening, bool(threshold > 0.0))
-    return found + _lag(precision) * lags
-
-
-def _play(widening: bool, wide: bool) -> Operations:
-    found = _CLAMP + Operations(multiplications=1, additions=3)
-    return found + Operations(additions=1 if wide else 0, comparisons=1) if widening else found
-
-
-def _lag(precision: Precision) -> Operations:
-    found = Operations(multiplications=1, additions=1)
-    return found + (_COMPENSATED if precision == "single" else _SOUND + Operations(additions=1))
+    found += (_CLAMP + Operations(multiplications=1, additions=3)) * plays
+    lag = _COMPENSATED if precision == "single" else _SOUND + Operations(additions=1)
+    return found + (Operations(multiplications=1, additions=1) + lag) * lags
 
 
 def _element(power: bool) -> Operations:

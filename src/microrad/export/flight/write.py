@@ -13,8 +13,8 @@ from microrad.core.units import format_quantity
 from microrad.export.choice import Choice, PointingChoice, Source, flight_controller, vectors
 from microrad.export.flight.build import BenchResult, compile_and_run, compiler
 from microrad.export.flight.c_code import flight_code, vectors_text, within_limits
-from microrad.export.flight.fixed import FixedForm, fixed_code, quantised
-from microrad.export.flight.fixed import report_text as quantisation_text
+from microrad.export.flight.fixed import fixed_code, quantisation_text, quantised
+from microrad.export.flight.fixed_form import FixedForm
 from microrad.export.flight.operations import FixedOperations, Operations, fixed_operations, operations
 from microrad.export.flight.rounding import RoundingBound, rounding_bound
 from microrad.export.identifiers import identifier, suggested

@@ -4,13 +4,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import block_diag
 
 from microrad.core import lti
-from microrad.export.linear_part.block_diagonal import BlockDiagonal, block_diagonal
+from microrad.core.lti import Complexes
+from microrad.export.linear_part.block_diagonal import BlockDiagonal, Wide, block_diagonal
 from microrad.export.records import ExportError, FlightController, Floats
-
-Complexes = NDArray[np.complex128]
-Wide = NDArray[np.longdouble]
 
 BOUNDS = (100.0, 10.0, 1.0, 0.0)
 """How far a basis may lean to part two blocks, from the finest form to the coarsest one."""
@@ -47,13 +46,8 @@ def modes(of: FlightController) -> Modes:
 
     Raises ExportError where the controller has a number that is not finite.
     """
-    _refuse_not_finite(of)
     s = of.system
-    return _parted(s.A, s.B, of.anti_windup, s.C)
-
-
-def _refuse_not_finite(of: FlightController) -> None:
-    matrices = {**{key: getattr(of.system, key) for key in "ABCD"}, "anti-windup gain L": of.anti_windup}
+    matrices = {**{key: getattr(s, key) for key in "ABCD"}, "anti-windup gain L": of.anti_windup}
     for key, matrix in matrices.items():
         bad = np.argwhere(~np.isfinite(matrix))
         if bad.size:
@@ -62,6 +56,7 @@ def _refuse_not_finite(of: FlightController) -> None:
                 f"controller {of.name!r}: {key} is {matrix[i, j]} in row {i}, column {j} (from 0); code cannot be made "
                 "from a number that is not finite: tune the controller anew, or mend its matrices"
             )
+    return _parted(s.A, s.B, of.anti_windup, s.C)
 
 
 def _parted(A: Floats | Wide, B: Floats | Wide, L: Floats | Wide, C: Floats | Wide) -> Modes:
@@ -149,8 +144,6 @@ def minimal(of: FlightController) -> FlightController:
     the outputs stay the same, but for a share of LEAST_SHARE of such a mode. Modes that hide in several blocks at once
     (equal poles side by side) are left in. Raises ExportError where the controller has a number that is not finite.
     """
-    from scipy.linalg import block_diag  # slow to import, not needed to show help
-
     found = modes(of)
     kept = [_kept(found, np.arange(at.start, at.stop)) for at in found.found.slices]
     if sum(len(block) for block, _, _ in kept) == of.system.order:
@@ -173,7 +166,8 @@ def _kept(of: Modes, at: NDArray[np.intp]) -> tuple[Wide, Wide, Wide]:
     part = _local(of, inner)
     for reached in (True, False):
         Q, count = _staircase(part.A, part.B) if reached else _staircase(part.A.T, part.C.T)
-        part = _within(part, Q[:, :count])
+        Q = Q[:, :count]
+        part = _Local(Q.T @ part.A @ Q, Q.T @ part.B, part.C @ Q, part.basis @ Q, Q.T @ part.inverse)
     if len(part.A) == len(block):
         return block, into, back
     return part.A.astype(np.longdouble), part.inverse @ into, back @ part.basis
@@ -191,11 +185,6 @@ def _stripped(of: Modes, at: NDArray[np.intp]) -> NDArray[np.intp]:
         else:
             break
     return at
-
-
-def _within(of: _Local, Q: Floats) -> _Local:
-    """The part in the space of the orthonormal columns."""
-    return _Local(Q.T @ of.A @ Q, Q.T @ of.B, of.C @ Q, of.basis @ Q, Q.T @ of.inverse)
 
 
 def _local(of: Modes, at: NDArray[np.intp]) -> _Local:

@@ -8,14 +8,12 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from microrad.core import kernels, lti
+from microrad.core.lti import Complexes
 from microrad.export.linear_part.block_diagonal import BlockDiagonal
 from microrad.export.linear_part.modes import NEAR, Modes, hidden, modes, sizes
 from microrad.export.records import ExportError, FlightController, Floats
-
-Complexes = NDArray[np.complex128]
 
 MODAL, TRIANGULAR = "modal", "triangular"
 """Forms: blocks of one and two states alone; or some larger upper quasi-triangular ones beside them."""
@@ -40,8 +38,7 @@ class Sections:
 
     with ``coupling`` between the neighbours 0 and 1, 2 and 3, ... (0 at the last state of an odd number) and ``rest``
     by rows for what is neither. ``form`` is MODAL where there is no rest, else TRIANGULAR. States are scaled by powers
-    of two to sizes near 1 for white noise of 1 at each input. ``condition`` is that of the transformation from the
-    controller's own states, each of the size that this noise gives it.
+    of two to sizes near 1 for white noise of 1 at each input.
     """
 
     form: str
@@ -53,7 +50,6 @@ class Sections:
     C: Floats
     D: Floats
     L: Floats
-    condition: float
 
     @property
     def order(self) -> int:
@@ -137,8 +133,11 @@ def _defective(block: Floats, poles: Complexes) -> complex | None:
 
 # --------------------------------------------------------------------------------------------------------- the sections
 def _sections(of: Modes, D: Floats) -> Sections:
-    size = _block_sizes(of)
-    A = _without_dust(of) * size / size[:, None]
+    size, A = _block_sizes(of), of.found.blocks.astype(float)
+    for at in of.found.slices:
+        block = A[at, at]
+        block[np.abs(block) < DUST * np.max(np.abs(block))] = 0.0
+    A = A * size / size[:, None]
     n = A.shape[0]
     row, column = np.indices(A.shape)
     beside = (row ^ 1) == column
@@ -156,17 +155,7 @@ def _sections(of: Modes, D: Floats) -> Sections:
         C=of.C.astype(float) * size,
         D=D.astype(float),
         L=of.L.astype(float) / size[:, None],
-        condition=of.found.condition,
     )
-
-
-def _without_dust(of: Modes) -> Floats:
-    """A with 0 for what is rounding of a block's largest number."""
-    A = of.found.blocks.astype(float)
-    for at in of.found.slices:
-        block = A[at, at]
-        block[np.abs(block) < DUST * np.max(np.abs(block))] = 0.0
-    return A
 
 
 def _block_sizes(of: Modes) -> Floats:

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.io import savemat
 
 from microrad.core.folder import write_whole
 from microrad.core.installing import advice
@@ -38,8 +39,6 @@ def write_mat(models: Sequence[LinearModel], path: Path) -> None:
     zpkRefused and tfRefused (why a form is missing), meaning, Mission MissionSha256 Mirror. Raises ExportError for
     names that MATLAB does not take, the same name twice, and a file that cannot be written.
     """
-    from scipy.io import savemat  # slow to import, not needed to show help
-
     _check_names(models)
     draft = io.BytesIO()
     savemat(draft, {each.name: _structure(each) for each in models}, format="5", oned_as="row")

@@ -3,6 +3,7 @@
 import math
 
 import numpy as np
+from scipy.linalg import matrix_balance
 
 from microrad.core import lti
 from microrad.export.records import ExportError, Floats
@@ -78,8 +79,6 @@ def refuse_hidden(system: lti.StateSpace, period_s: float, name: str) -> None:
 
 def _balanced(system: lti.StateSpace) -> tuple[Floats, Floats, Floats]:
     """A, B and C with states scaled so that rows and columns of [[A, B], [C, 0]] are of like size."""
-    from scipy.linalg import matrix_balance  # slow to import, not needed to show help
-
     n = system.order
     sizes = np.linalg.norm(system.B, axis=1)[:, None], np.linalg.norm(system.C, axis=0)[None]
     whole = np.block([[system.A, sizes[0]], [sizes[1], np.zeros((1, 1))]])
