@@ -22,22 +22,6 @@ BOUND_SHARE = 1e-12
 POWER_BOUND_SHARE = 1e-10
 """The same where an exponent of Bouc-Wen is not 1: each of the two integrates to 1e-11 of h's size a step."""
 
-ELEMENT_KEYS = (
-    "d1",
-    "d2",
-    "epsilon",
-    "delta",
-    "alpha",
-    "beta",
-    "rate_limit",
-    "bias",
-    "gamma",
-    "eta",
-    "power",
-    "per_size",
-)
-"""Fields of a Bouc-Wen element in C, in the order of the columns of `kernels.bouc_wen_rows`."""
-
 
 def flight_code(
     of: FlightController, form: Sections, name: str, precision: Precision, bound: RoundingBound | None = None
@@ -56,8 +40,7 @@ def flight_code(
                 f"controller {of.name!r} in single precision: no bound on its rounding is given, so that the bench has "
                 "nothing to hold it to; find it with rounding_bound, or export double precision"
             )
-        values |= {"bound_v": bound.command_v, "bound_samples": bound.samples}
-    values["facts"] = _facts(of, form, values, bound if precision == "single" else None)
+        values |= {"bound": bound, "unbounded": bound.command_v >= of.maximum_v - of.minimum_v}
     templates = {
         f"{name}.h": "controller.h.j2",
         f"{name}.c": "controller.c.j2",
@@ -122,13 +105,13 @@ def _values(of: FlightController, form: Sections, name: str, precision: Precisio
         "signals": _readings(of.inputs),
         "readings": sum(each.size for each in of.inputs),
         "outputs": form.C.shape[0],
+        "form": form,
         "states": form.order,
         "compensated": kept.tolist() if np.any(kept) else [],
         "all_compensated": bool(np.any(kept) and np.all(kept)),
         "tables": tuple(tables.values()),
         "has": {key: bool(table.terms) for key, table in tables.items()},
         "bound_share": bound_share(of),
-        "element_keys": ELEMENT_KEYS,
         **_inverse_values(of.inverse),
     }
 
@@ -217,29 +200,3 @@ def _inverse_values(of: InverseLaw | None) -> dict[str, Any]:
         "direct": bool(np.any(of.direct)),
         "uses_rate": elements > 0 or widening,
     }
-
-
-def _facts(of: FlightController, form: Sections, values: dict[str, Any], bound: RoundingBound | None) -> list[str]:
-    """Lines of the header: what the code holds, and how exact it is."""
-    precision = (
-        f"Double precision: within {values['bound_share']:g} of the largest command of what the simulation commands."
-    )
-    if bound is not None and bound.command_v >= of.maximum_v - of.minimum_v:
-        precision = f"Single precision. {bound.words}"
-    elif bound is not None:
-        precision = (
-            f"Single precision: within {bound.command_v:.3g} V of double precision over {bound.samples} recorded "
-            "samples. A longer run has a larger bound (microrad.export.flight.rounding works it out)."
-        )
-    inverse = []
-    if of.inverse is not None:
-        counts = {"Bouc-Wen element(s)": "elements", "play operator(s)": "plays", "lag(s) of creep": "lags"}
-        held = ", ".join(f"{values[key]} {words}" for words, key in counts.items() if values[key]) or "a direct gain"
-        rate = "the difference of two samples" if of.inverse.by_difference else "from the linear part"
-        inverse = [f"Inverse of hysteresis: {held}; taken at the target's rate, {rate}."]
-    return [
-        f"Period: {of.period_s:.9g} s ({1.0 / of.period_s:.9g} Hz).",
-        f"Linear part: {form.order} states in {len(form.blocks)} blocks ({form.form} form).",
-        *inverse,
-        precision,
-    ]

@@ -1,12 +1,13 @@
 """Fixed point: the linear part of a controller as whole numbers, what that costs, refusals, and its C code."""
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from importlib.metadata import version
+from typing import Any
 
 import numpy as np
 
-from microrad.core import kernels, lti
+from microrad.core import lti
 from microrad.export.flight.c_code import flight_code
 from microrad.export.flight.double_run import Run, run
 from microrad.export.flight.fixed_form import (
@@ -206,7 +207,8 @@ def quantisation_text(fixed: FixedForm) -> str:
     for o in r.outputs:
         noise = (f"{x:.2e} {o.unit}" for x in (o.noise_predicted, o.noise_measured))
         swing = (f"{x:.2e} {o.unit}" for x in (o.cycle_bound, o.cycle_found))
-        outputs.append((o.name, _decibels(o.response_error), f"{o.at_hz:.4g} Hz", *noise, *swing))
+        response = f"{20.0 * math.log10(1.0 + o.response_error):.1e} dB"
+        outputs.append((o.name, response, f"{o.at_hz:.4g} Hz", *noise, *swing))
     poles_table: list[tuple[str, ...]] = [("pole", "|z| as designed", "|z| as quantised")]
     for before, after in r.poles:
         hz = abs(np.angle(before)) / (2.0 * math.pi * r.period_s)
@@ -218,10 +220,6 @@ def quantisation_text(fixed: FixedForm) -> str:
     return "\n".join([*lines, "", *_table(outputs), "", *_table(poles_table), "", *_table(states)])
 
 
-def _decibels(error: float) -> str:
-    return f"{20.0 * math.log10(1.0 + error):.1e} dB"
-
-
 def _table(rows: list[tuple[str, ...]]) -> list[str]:
     """Rows in columns two blanks apart, numbers to the right."""
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
@@ -229,21 +227,10 @@ def _table(rows: list[tuple[str, ...]]) -> list[str]:
 
 
 # ----------------------------------------------------------------------------------------------------------------- code
-@dataclass(frozen=True, slots=True)
-class Constant:
-    """A scale with its name: ``NAME`` in C, the first and number of its numbers, unit, and SI units a whole number."""
-
-    NAME: str
-    first: int
-    size: int
-    unit: str
-    words: str
-    scale: int
-
-    @property
-    def value(self) -> float:
-        """SI units to a whole number."""
-        return math.ldexp(1.0, -self.scale)
+def _constant(name: str, first: int, size: int, unit: str, words: str, scale: int) -> dict[str, Any]:
+    """A scale for the templates: name in C, the first and number of its numbers, unit, SI units a whole number."""
+    value = math.ldexp(1.0, -scale)
+    return {"NAME": name, "first": first, "size": size, "unit": unit, "words": words, "scale": scale, "value": value}
 
 
 def fixed_code(of: FlightController, form: Sections, fixed: FixedForm, name: str) -> dict[str, str]:
@@ -274,16 +261,16 @@ def fixed_code(of: FlightController, form: Sections, fixed: FixedForm, name: str
     return {**files, **inverse, "Makefile": make}
 
 
-def _input_constants(of: FlightController, fixed: FixedForm) -> list[Constant]:
+def _input_constants(of: FlightController, fixed: FixedForm) -> list[dict[str, Any]]:
     found, first = [], 0
     for s in of.inputs:
         scale = fixed.input_scale[first]
-        found.append(Constant(s.name.upper(), first, s.size, s.unit, f"{s.name}: {s.meaning}", scale))
+        found.append(_constant(s.name.upper(), first, s.size, s.unit, f"{s.name}: {s.meaning}", scale))
         first += s.size
     return found
 
 
-def _output_constants(of: FlightController, fixed: FixedForm) -> list[Constant]:
+def _output_constants(of: FlightController, fixed: FixedForm) -> list[dict[str, Any]]:
     n, rows = of.actuators, len(fixed.output_scale) // of.actuators
     kinds = [
         ("V", "V", "v: the command" + ("" if of.inverse is None else " without what the inverse adds")),
@@ -291,7 +278,7 @@ def _output_constants(of: FlightController, fixed: FixedForm) -> list[Constant]:
         ("RATE_RAD_S", "rad/s", "rate of the inverse's target"),
     ]
     scales = fixed.output_scale[::n]
-    return [Constant(key, j * n, n, unit, words, scales[j]) for j, (key, unit, words) in enumerate(kinds[:rows])]
+    return [_constant(key, j * n, n, unit, words, scales[j]) for j, (key, unit, words) in enumerate(kinds[:rows])]
 
 
 def _tables(form: Sections, fixed: FixedForm) -> dict[str, list[tuple[int, int, int]]]:
@@ -318,14 +305,14 @@ def _inverse_code(of: FlightController, fixed: FixedForm, name: str) -> dict[str
     )
     D = np.vstack([np.zeros((n, rows - n)), np.eye(rows - n)])
     nothing = np.zeros((0, 0))
-    form = Sections("modal", (), np.zeros(0), np.zeros(0), kernels.rows(nothing), np.zeros((0, rows - n)),
-        np.zeros((rows, 0)), D, np.zeros((0, n)))  # fmt: skip
+    B, C, L = np.zeros((0, rows - n)), np.zeros((rows, 0)), np.zeros((0, n))
+    form = Sections("modal", (), nothing, B, C, D, L)
     alone = replace(
         of,
         name=f"inverse of {of.name}",
         inputs=signals,
-        system=lti.StateSpace(nothing, form.B, form.C, D),
-        anti_windup=form.L,
+        system=form.system,
+        anti_windup=L,
         minimum_v=-math.inf,
         maximum_v=math.inf,
         resolution_v=0.0,

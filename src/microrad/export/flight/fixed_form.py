@@ -18,7 +18,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from microrad.core import kernels
 from microrad.export.flight.double_run import Inverse, Run
 from microrad.export.flight.rounding import responses
 from microrad.export.linear_part.sections import Sections
@@ -214,14 +213,9 @@ def dequantised(form: Sections, made: FixedForm) -> Sections:
     columns = np.array([*made.state_scale, *made.input_scale, *made.output_scale[: form.L.shape[1]]])
     step = _values(made.state, columns)
     output = _values(made.output, columns[: n + m])
-    A = step[:, :n] + np.eye(n)
-    row, column = np.indices(A.shape)
-    beside = ((row ^ 1) == column) & (np.maximum(row, column) < n - n % 2)
     return replace(
         form,
-        diagonal=np.diag(A).copy(),
-        coupling=np.array([A[i, i ^ 1] if i < n - n % 2 else 0.0 for i in range(n)]),
-        rest=kernels.rows(np.where((row == column) | beside, 0.0, A)),
+        A=step[:, :n] + np.eye(n),
         B=step[:, n : n + m],
         L=step[:, n + m :],
         C=output[:, :n],

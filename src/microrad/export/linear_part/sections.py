@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from microrad.core import kernels, lti
+from microrad.core import lti
 from microrad.core.lti import Complexes
 from microrad.export.linear_part.block_diagonal import BlockDiagonal
 from microrad.export.linear_part.modes import NEAR, Modes, hidden, modes, sizes
@@ -32,20 +32,14 @@ DUST = 4.0 * float(np.finfo(float).eps)
 class Sections:
     """x[k+1] = A x + B m + L (clip(v) - v), outputs C x + D m, with a block-diagonal A (see FlightController for m, v).
 
-    ``blocks`` are (first state, size). A is stored for the kernel's way to multiply by it,
-
-        x_i[k+1] = diagonal_i x_i + coupling_i x_(i^1) + sum of rest + ...,
-
-    with ``coupling`` between the neighbours 0 and 1, 2 and 3, ... (0 at the last state of an odd number) and ``rest``
-    by rows for what is neither. ``form`` is MODAL where there is no rest, else TRIANGULAR. States are scaled by powers
-    of two to sizes near 1 for white noise of 1 at each input.
+    ``blocks`` are (first state, size). ``form`` is MODAL where A has nothing but its diagonal and what joins the
+    neighbours 0 and 1, 2 and 3, ..., else TRIANGULAR. States are scaled by powers of two to sizes near 1 for white
+    noise of 1 at each input.
     """
 
     form: str
     blocks: tuple[tuple[int, int], ...]
-    diagonal: Floats
-    coupling: Floats
-    rest: kernels.Rows
+    A: Floats
     B: Floats
     C: Floats
     D: Floats
@@ -54,17 +48,7 @@ class Sections:
     @property
     def order(self) -> int:
         """Number of states."""
-        return int(self.diagonal.size)
-
-    @property
-    def A(self) -> Floats:  # noqa: N802
-        """The dense matrix."""
-        n, dense = self.order, np.diag(self.diagonal)
-        paired = np.arange(n - n % 2)
-        dense[paired, paired ^ 1] = self.coupling[paired]
-        start = self.rest.start.astype(int)
-        dense[np.repeat(np.arange(n), np.diff(start)), self.rest.column.astype(int)] += self.rest.value
-        return dense
+        return len(self.A)
 
     @property
     def system(self) -> lti.StateSpace:
@@ -138,19 +122,12 @@ def _sections(of: Modes, D: Floats) -> Sections:
         block = A[at, at]
         block[np.abs(block) < DUST * np.max(np.abs(block))] = 0.0
     A = A * size / size[:, None]
-    n = A.shape[0]
     row, column = np.indices(A.shape)
-    beside = (row ^ 1) == column
-    paired = np.arange(n - n % 2)
-    coupling = np.zeros(n)
-    coupling[paired] = A[paired, paired ^ 1]
-    rest = kernels.rows(np.where((row == column) | beside, 0.0, A))
+    beyond = (row != column) & ((row ^ 1) != column)
     return Sections(
-        form=TRIANGULAR if rest.value.size else MODAL,
+        form=TRIANGULAR if np.any(A[beyond]) else MODAL,
         blocks=tuple((at.start, at.stop - at.start) for at in of.found.slices),
-        diagonal=np.diag(A).copy(),
-        coupling=coupling,
-        rest=rest,
+        A=A,
         B=of.B.astype(float) / size[:, None],
         C=of.C.astype(float) * size,
         D=D.astype(float),
