@@ -16,9 +16,8 @@ import designs
 from microrad.core import lti
 from microrad.export import choice, matrices
 from microrad.export.linear_import.matlab import load
-from microrad.export.matrices.forms import LinearModel, Port, forms
+from microrad.export.matrices.forms import LinearModel, Port, forms, polynomials
 from microrad.export.matrices.models import CONTROLLER, LINEAR_PART, LOOP, MIRROR, SAMPLED_PLANT, axis_plant
-from microrad.export.matrices.polynomials import polynomials
 from microrad.export.matrices.structure import without_copies
 from microrad.export.records import ExportError, Origin
 from microrad.loop import control

@@ -328,7 +328,7 @@ def run_of(of: FlightController) -> Vectors:
     """A small swinging run, which sets the scales of fixed point."""
     inputs = 0.2 * swinging(of)[:1500]
     nothing = np.zeros((inputs.shape[0], of.actuators))
-    return Vectors(inputs, nothing, nothing, nothing, 0, 0)
+    return Vectors(inputs, nothing, 0, 0)
 
 
 def whole(made: FixedForm, readings: Floats) -> Floats:

@@ -311,46 +311,29 @@ def loop_unit(choice: Choice) -> LoopUnit:
 
 
 # ------------------------------------------------------------------------------------------------------------- vectors
-def vectors(choice: Choice, samples: int, *, freq_hz: float | None = None) -> Vectors:
+def vectors(choice: Choice, samples: int) -> Vectors:
     """A run of the chosen loop in the kernel, from rest, with what its controller read and commanded.
 
-    The fine-pointing loop runs in its mission's jitter (run 0 of its seed). The loop of [control] tracks the scenario's
-    sine of ``freq_hz`` (its fastest one with an inverse if None).
+    The fine-pointing loop runs in its mission's jitter (run 0 of its seed). The loop of [control] tracks the fastest
+    sine that the scenario has for an inverse.
     """
     if isinstance(choice, PointingChoice):
-        found = _pointing_vectors(choice, samples)
+        run = replay(choice.scene.loop, choice.controller, samples, choice.table.seed)
+        saturated, clamped = (int(run.counts[c]) for c in (kernels.COUNT_SATURATED, kernels.COUNT_INVERSE_CLAMPED))
+        found = Vectors(run.inputs, run.commands, saturated, clamped)
     else:
-        found = _tracking_vectors(choice, samples, freq_hz)
+        found = _tracking_vectors(choice, samples)
     kept = _looked_at(_whole_controller(choice)).values()
     return replace(found, inputs=np.hstack([found.inputs[:, at] for at in kept]))
 
 
-def _pointing_vectors(choice: PointingChoice, samples: int) -> Vectors:
-    found = replay(choice.scene.loop, choice.controller, samples, choice.table.seed)
-    return Vectors(
-        found.inputs,
-        found.commands,
-        found.disturbance_rad,
-        found.error_rad,
-        int(found.counts[kernels.COUNT_SATURATED]),
-        int(found.counts[kernels.COUNT_INVERSE_CLAMPED]),
-    )
-
-
-def _tracking_vectors(choice: TrackingChoice, samples: int, freq_hz: float | None) -> Vectors:
+def _tracking_vectors(choice: TrackingChoice, samples: int) -> Vectors:
     scenario, setup = choice.scenario, choice.setup
-    f = freq_hz if freq_hz is not None else max(scenario.inverse_frequencies_hz)
     time: Floats = np.arange(samples, dtype=float) * setup.timing.period_s
-    reference = scenario.amplitude_rad * np.sin(2.0 * np.pi * f * time)[:, None]
+    reference = scenario.amplitude_rad * np.sin(2.0 * np.pi * max(scenario.inverse_frequencies_hz) * time)[:, None]
     trace = sine_run.track(choice.name, choice.mirror, setup, choice.inverse, reference, slice(0, samples))
     resolution, reading = setup.drive.sensor_resolution_rad, trace.output_rad
     if resolution > 0.0:
         reading = np.floor(reading / resolution + 0.5) * resolution
-    return Vectors(
-        np.hstack([reading, reference]),
-        trace.command_v,
-        np.zeros_like(reference),
-        trace.error_rad,
-        trace.counts.saturated,
-        trace.counts.inverse_clamped,
-    )
+    counts = trace.counts
+    return Vectors(np.hstack([reading, reference]), trace.command_v, counts.saturated, counts.inverse_clamped)

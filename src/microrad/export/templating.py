@@ -19,13 +19,6 @@ Terms = list[tuple[int, int, float]]
 LINE = 112
 """Longest line of a table or of words."""
 
-LARGEST = {"double": float(np.finfo(np.float64).max), "single": float(np.finfo(np.float32).max)}
-SMALLEST = {
-    "double": float(np.finfo(np.float64).smallest_normal),
-    "single": float(np.finfo(np.float32).smallest_normal),
-}
-"""What a number of exported code can hold, by precision."""
-
 
 def real(x: float, precision: Precision = "double") -> str:
     """A number as the shortest C literal that reads back to it; infinity becomes the largest finite number.
@@ -33,7 +26,8 @@ def real(x: float, precision: Precision = "double") -> str:
     At most 17 significant digits; in single precision 9, with the suffix f. What is too small for the precision becomes
     0 (a compiler warns of such a literal). Raises ExportError for nan, and for a finite number that is too large.
     """
-    largest = LARGEST[precision]
+    range_of = np.finfo(np.float64 if precision == "double" else np.float32)
+    largest = float(range_of.max)
     if math.isnan(x):
         raise ExportError("a number of the exported code is nan: no literal of C stands for it; look for its origin")
     if abs(x) > largest and not math.isinf(x):
@@ -41,7 +35,7 @@ def real(x: float, precision: Precision = "double") -> str:
             f"{float(x)!r} is beyond single precision, which ends at {largest:.4g}: export double precision"
         )
     held = min(max(float(x), -largest), largest)
-    held = 0.0 if abs(held) < SMALLEST[precision] else held
+    held = 0.0 if abs(held) < float(range_of.smallest_normal) else held
     text = repr(held) if precision == "double" else str(np.float32(held))
     text = text if "." in text or "e" in text else text + ".0"
     return text if precision == "double" else text + "f"

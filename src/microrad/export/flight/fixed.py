@@ -240,6 +240,14 @@ def fixed_code(of: FlightController, form: Sections, fixed: FixedForm, name: str
     name that is no identifier.
     """
     whole = identifier(f"{identifier(name)}_fixed")
+    n, m = form.order, form.B.shape[1]
+    parts = {
+        "C": fixed.output.value[:, :n],
+        "D": fixed.output.value[:, n:],
+        "A": fixed.state.value[:, :n],
+        "B": fixed.state.value[:, n : n + m],
+        "L": fixed.state.value[:, n + m :],
+    }
     values = {
         "name": name,
         "version": version("microrad"),
@@ -247,14 +255,10 @@ def fixed_code(of: FlightController, form: Sections, fixed: FixedForm, name: str
         "fixed": fixed,
         "inputs": _input_constants(of, fixed),
         "outputs": _output_constants(of, fixed),
-        "tables": _tables(form, fixed),
+        "tables": {key: entries(part) for key, part in parts.items()},
         "report": quantisation_text(fixed).splitlines(),
     }
-    files = {
-        f"{whole}.h": render("fixed.h.j2", **values),
-        f"{whole}.c": render("fixed.c.j2", **values),
-        f"{whole}_bench.c": render("fixed_bench.c.j2", **values),
-    }
+    files = {f"{name}_{file}": render(f"{file}.j2", **values) for file in ("fixed.h", "fixed.c", "fixed_bench.c")}
     inverse = {} if of.inverse is None else _inverse_code(of, fixed, identifier(f"{name}_inverse"))
     headers, sources = ([file for file in (*files, *inverse) if file.endswith(end)] for end in (".h", ".c"))
     make = render("Makefile.j2", name=whole, version=version("microrad"), headers=headers, sources=sources)
@@ -279,19 +283,6 @@ def _output_constants(of: FlightController, fixed: FixedForm) -> list[dict[str, 
     ]
     scales = fixed.output_scale[::n]
     return [_constant(key, j * n, n, unit, words, scales[j]) for j, (key, unit, words) in enumerate(kinds[:rows])]
-
-
-def _tables(form: Sections, fixed: FixedForm) -> dict[str, list[tuple[int, int, int]]]:
-    """Numbers that are not 0, as (row, column, weight), by matrix."""
-    n, m = form.order, form.B.shape[1]
-    parts = {
-        "C": fixed.output.value[:, :n],
-        "D": fixed.output.value[:, n:],
-        "A": fixed.state.value[:, :n],
-        "B": fixed.state.value[:, n : n + m],
-        "L": fixed.state.value[:, n + m :],
-    }
-    return {key: entries(part) for key, part in parts.items()}
 
 
 def _inverse_code(of: FlightController, fixed: FixedForm, name: str) -> dict[str, str]:

@@ -213,14 +213,8 @@ def dequantised(form: Sections, made: FixedForm) -> Sections:
     columns = np.array([*made.state_scale, *made.input_scale, *made.output_scale[: form.L.shape[1]]])
     step = _values(made.state, columns)
     output = _values(made.output, columns[: n + m])
-    return replace(
-        form,
-        A=step[:, :n] + np.eye(n),
-        B=step[:, n : n + m],
-        L=step[:, n + m :],
-        C=output[:, :n],
-        D=output[:, n:],
-    )
+    A, B, L = step[:, :n] + np.eye(n), step[:, n : n + m], step[:, n + m :]
+    return replace(form, A=A, B=B, C=output[:, :n], D=output[:, n:], L=L)
 
 
 def _values(rows: Rows, columns: NDArray[np.integer[Any]]) -> Floats:

@@ -23,7 +23,7 @@ from microrad.export.records import ExportError, FlightController, Progress, Vec
 from microrad.loop.fine_pointing import PROMISE, Outlook
 
 Precision = Literal["double", "single", "fixed"]
-PRECISIONS: tuple[Precision, ...] = ("double", "single", "fixed")
+PRECISIONS: dict[Precision, str] = {"double": "double precision", "single": "single precision", "fixed": "fixed point"}
 
 KIND, WHAT = "export", "exported code"
 """Key of the manifest, and what the folder holds, in words."""
@@ -160,10 +160,7 @@ def report_text(of: FlightExport) -> str:
     ]
     text = "\n".join(f"  {name:13} {words}" for name, words in lines if words)
     quantisation = "" if of.fixed is None else f"\n\n{quantisation_text(of.fixed)}"
-    return f"{of.name}: {c.name} in {_IN[of.precision]}\n{text}{quantisation}"
-
-
-_IN = {"double": "double precision", "single": "single precision", "fixed": "fixed point"}
+    return f"{of.name}: {c.name} in {PRECISIONS[of.precision]}\n{text}{quantisation}"
 
 
 def _shown(value: float, unit: str) -> str:

@@ -133,17 +133,15 @@ def _loop_signals(unit: LoopUnit) -> list[Variable]:
         seen = (f"reference_rad[{i + 1}]", f"disturbance_rad[{i + 1}]")
         found.append(Variable(f"error_rad[{i + 1}]", f"error_rad[{i}]", "output", text, "rad", dependencies=seen))
     text = "command that the last control sample gave actuator {}, from the bias"
-    return found + _row("command_v", actuators, "output", text, "V", within="loop.")
+    return found + _row("command_v", actuators, "output", text, "V", "loop.command_v")
 
 
 def _plant_outputs(of: PlantUnit) -> list[Variable]:
     plant, axes = of.plant, of.optics.shape[0]
     found = _row("line_of_sight_rad", axes, "output", "line of sight, axis {}", "rad")
-    found += _row(
-        "mirror_rad", len(plant.outputs), "output", "output {} of the mirror", "rad", within="plant.", field="y"
-    )
+    found += _row("mirror_rad", len(plant.outputs), "output", "output {} of the mirror", "rad", "plant.y")
     text = "drive of actuator {} behind the amplifier, as seen at its input, from the bias"
-    return found + _row("drive_v", len(plant.actuators), "output", text, "V", within="plant.", field="u")
+    return found + _row("drive_v", len(plant.actuators), "output", text, "V", "plant.u")
 
 
 def _parameters(of: PlantUnit) -> list[Variable]:
@@ -207,19 +205,11 @@ def _constants(unit: PlantUnit | LoopUnit) -> list[Variable]:
 
 
 def _row(
-    name: str,
-    size: int,
-    causality: Causality,
-    text: str,
-    unit: str,
-    *,
-    start: float | None = None,
-    within: str = "",
-    field: str = "",
+    name: str, size: int, causality: Causality, text: str, unit: str, place: str = "", start: float | None = None
 ) -> list[Variable]:
-    """The elements of an array, each a variable by itself."""
+    """The elements of an array, each a variable by itself; ``place`` is that of the array where it is not ``name``."""
     return [
-        Variable(f"{name}[{i + 1}]", f"{within}{field or name}[{i}]", causality, text.format(i + 1), unit, start)
+        Variable(f"{name}[{i + 1}]", f"{place or name}[{i}]", causality, text.format(i + 1), unit, start)
         for i in range(size)
     ]
 
@@ -228,7 +218,7 @@ def _parameter(name: str, place: str, text: str, unit: str, start: float, allowe
     return Variable(name, place, "parameter", text, unit, float(start), range=allowed)  # type: ignore[arg-type]
 
 
-def described(unit: PlantUnit | LoopUnit) -> tuple[str, str]:
+def _described(unit: PlantUnit | LoopUnit) -> tuple[str, str]:
     """Name and description of a unit in words, on one line each, of characters that XML can hold."""
     origin = plant_of(unit).origin
     step = f"internal step {plant_of(unit).plant.step_s:g} s"
@@ -251,7 +241,7 @@ def model_description(
     listed = variables(unit)
     places = {v.name: i for i, v in enumerate(listed)}
     unknowns = [(i, [places[d] for d in v.dependencies]) for i, v in enumerate(listed) if v.causality == "output"]
-    model, text = described(unit)
+    model, text = _described(unit)
     step_s = plant_of(unit).plant.step_s
     return render(
         f"model_description_{version[0]}.xml.j2",

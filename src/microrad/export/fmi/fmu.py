@@ -22,7 +22,7 @@ import numpy as np
 
 from microrad.core import kernels
 from microrad.core.folder import scratch, write_whole
-from microrad.export.flight.build import FLAGS, compiler, compiler_words
+from microrad.export.flight.build import FLAGS, TIME_LIMIT_S, compiler, compiler_words
 from microrad.export.flight.c_code import flight_code
 from microrad.export.fmi.description import Version, exponent, model_description, plant_of, variables
 from microrad.export.identifiers import identifier
@@ -41,9 +41,6 @@ HEADERS: Mapping[str, tuple[str, ...]] = {
 
 LONGEST_NAME = 27
 """Characters of a unit's name: the controller inside has the name with an ending, in at most 31."""
-
-TIME_LIMIT_S = 300.0
-"""A compiler that takes longer is ended."""
 
 EPOCH = (1980, 1, 1, 0, 0, 0)
 """Time stamp of all files in the archive, so that the same unit is the same file."""

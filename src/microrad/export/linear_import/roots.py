@@ -11,8 +11,7 @@ from microrad.core import lti
 from microrad.core.lti import Complexes
 from microrad.export.linear_import.matlab import form_of, numbers
 from microrad.export.matrices.files import python_control
-from microrad.export.matrices.forms import factored, factors
-from microrad.export.matrices.polynomials import polynomials, roots
+from microrad.export.matrices.forms import factored, factors, polynomials, roots
 from microrad.export.matrices.structure import entry_of, pole_text, refuse_hidden
 from microrad.export.records import ExportError, Floats
 
@@ -43,7 +42,12 @@ def response(of: Roots, freq_hz: Floats) -> Complexes:
 # --------------------------------------------------------------------------------------------------------------- forms
 def roots_of_fields(fields: dict[str, Any], source: str) -> Roots:
     """Roots from a MATLAB file's fields. Raises ExportError with the reason for what is not one continuous system."""
-    _refuse_units(fields, source)
+    stated = fields.get("InputUnit")  # an export of microrad names its input's unit: a mirror takes volts
+    unit = stated.item() if isinstance(stated, np.ndarray) and stated.size == 1 else ""
+    if isinstance(unit, str) and unit not in ("V", ""):
+        raise ExportError(
+            f"{source}: its input is in {unit}, and a mirror's drive is in V; choose the one from drive to angle"
+        )
     if "Ts" in fields:
         value = numbers(fields, "Ts", source)
         _refuse_sampled(float(value.item()) if value.size == 1 else math.nan, source)
@@ -58,16 +62,6 @@ def roots_of_fields(fields: dict[str, Any], source: str) -> Roots:
         raise ExportError(f"{source}: k has {gain.size} gains; choose one input and one output")
     zeros, poles = (_row(numbers(fields, key, source, is_complex=True), key, source) for key in "zp")
     return Roots(paired(zeros, "z", source), paired(poles, "p", source), float(gain.item()))
-
-
-def _refuse_units(fields: dict[str, Any], source: str) -> None:
-    """An export of microrad names its input's unit: a mirror takes volts."""
-    stated = fields.get("InputUnit")
-    unit = stated.item() if isinstance(stated, np.ndarray) and stated.size == 1 else ""
-    if isinstance(unit, str) and unit not in ("V", ""):
-        raise ExportError(
-            f"{source}: its input is in {unit}, and a mirror's drive is in V; choose the one from drive to angle"
-        )
 
 
 def _refuse_sampled(period_s: float, source: str) -> None:
@@ -175,7 +169,15 @@ def checked(of: Roots, source: str) -> Roots:
     for pole in of.poles:
         _check_pole(pole, float(np.max(np.abs(of.poles))), source)
     for number, pole in enumerate(of.poles):
-        _check_distances(of, number, pole, source)
+        if np.any(np.abs(np.delete(of.poles, number) - pole) <= COINCIDING * abs(pole)):
+            raise ExportError(
+                f"{source}: two poles coincide at {pole_text(pole, 0.0)}; a mirror file has no modal form for them: "
+                "set them apart, or reduce the model"
+            )
+        if np.any(np.abs(of.zeros - pole) <= CANCELLING * abs(pole)):
+            raise ExportError(
+                f"{source}: not minimal, a zero cancels the pole at {pole_text(pole, 0.0)}; remove both (minreal)"
+            )
     if np.any(of.zeros == 0.0):
         raise ExportError(
             f"{source}: a zero at 0 Hz: the mirror does not hold an angle; a mirror file has zeros above 0 Hz, so give "
@@ -193,17 +195,4 @@ def _check_pole(pole: complex, largest: float, source: str) -> None:
     if pole.real >= 0.0:
         raise ExportError(
             f"{source}: unstable, a pole at {pole_text(pole, 0.0)}; a mirror is stable: identify it again"
-        )
-
-
-def _check_distances(of: Roots, number: int, pole: complex, source: str) -> None:
-    others = np.delete(of.poles, number)
-    if np.any(np.abs(others - pole) <= COINCIDING * abs(pole)):
-        raise ExportError(
-            f"{source}: two poles coincide at {pole_text(pole, 0.0)}; a mirror file has no modal form for them: set "
-            "them apart, or reduce the model"
-        )
-    if np.any(np.abs(of.zeros - pole) <= CANCELLING * abs(pole)):
-        raise ExportError(
-            f"{source}: not minimal, a zero cancels the pole at {pole_text(pole, 0.0)}; remove both (minreal)"
         )

@@ -74,10 +74,9 @@ def block_diagonal(A: Floats | Wide, C: Floats | Wide, bound: float) -> BlockDia
     """
     if not A.size:
         return BlockDiagonal(*(np.zeros(A.shape, dtype=np.longdouble),) * 3, ())
-    parts = sorted(
-        _parts(A.astype(float), C.astype(float), bound), key=lambda part: (part.size == 1, part.size % 2, part.size)
-    )
-    sizes = tuple(part.size for part in parts)
+    found = _parts(A.astype(float), C.astype(float), bound)
+    parts = sorted(found, key=lambda part: (len(part.kept) == 1, len(part.kept) % 2, len(part.kept)))
+    sizes = tuple(len(part.kept) for part in parts)
     kept = np.zeros(A.shape, dtype=bool)
     for each, part in zip(slices(sizes), parts, strict=True):
         kept[each, each] = part.kept
@@ -97,10 +96,6 @@ class _Part:
 
     basis: Floats
     kept: Mask
-
-    @property
-    def size(self) -> int:
-        return int(self.kept.shape[0])
 
 
 def _parts(A: Floats, C: Floats, bound: float) -> list[_Part]:

@@ -117,9 +117,12 @@ def _defective(block: Floats, poles: Complexes) -> complex | None:
 
 # --------------------------------------------------------------------------------------------------------- the sections
 def _sections(of: Modes, D: Floats) -> Sections:
-    size, A = _block_sizes(of), of.found.blocks.astype(float)
+    A = of.found.blocks.astype(float)
+    size = sizes(A, of.driven)
     for at in of.found.slices:
         block = A[at, at]
+        if len(block) == 2 and block[1, 0] != 0.0:  # a rotation has one size, so that it stays one
+            size[at] = np.max(size[at])
         block[np.abs(block) < DUST * np.max(np.abs(block))] = 0.0
     A = A * size / size[:, None]
     row, column = np.indices(A.shape)
@@ -133,13 +136,3 @@ def _sections(of: Modes, D: Floats) -> Sections:
         D=D.astype(float),
         L=of.L.astype(float) / size[:, None],
     )
-
-
-def _block_sizes(of: Modes) -> Floats:
-    """Sizes of the states, the same one for the two of a rotation, so that it stays one."""
-    blocks = of.found.blocks.astype(float)
-    size = sizes(blocks, of.driven)
-    for at in of.found.slices:
-        if at.stop - at.start == 2 and blocks[at.start + 1, at.start] != 0.0:
-            size[at] = np.max(size[at])
-    return size
