@@ -4,7 +4,7 @@ import ctypes
 import re
 import shutil
 import subprocess
-from dataclasses import astuple, dataclass, fields, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +16,7 @@ from microrad.export.flight import c_code, fixed, operations
 from microrad.export.flight.fixed_form import FixedForm
 from microrad.export.flight.operations import FixedOperations, Operations
 from microrad.export.flight.rounding import RoundingBound
-from microrad.export.linear_part.sections import Sections, sections
+from microrad.export.linear_part.sections import sections
 from microrad.export.records import FlightController, Floats, InverseLaw, Origin, Signal, Vectors
 from waiting import HANG_S
 
@@ -375,32 +375,16 @@ def test_fixed_point_is_said_in_words() -> None:
 
 
 # ------------------------------------------------------------------------------------------------------- the records
-def test_the_parts_make_the_whole() -> None:
-    of = PLAIN["all"]
-    form = sections(of)
-    parts = operations.by_part(of, form, "single")
-    assert list(parts) == ["upsets", "readings", "outputs", "inverse", "commands", "states"]
-    whole = operations.operations(of, form, "single")
-    assert astuple(whole) == tuple(sum(astuple(each)[i] for each in parts.values()) for i in range(len(KINDS)))
-    assert parts["readings"] == Operations(comparisons=8)
-    assert parts["inverse"].exponentials == 3 * 4
-    assert parts["inverse"].logarithms == 3
-    assert list(operations.by_part(plain(None), sections(plain(None)), "double")) == [
-        "upsets",
-        "readings",
-        "outputs",
-        "commands",
-        "states",
-    ]
-
-
-def test_a_controller_without_states_has_no_such_part() -> None:
+def test_a_controller_without_states_costs_nothing_for_them() -> None:
     of = plain(None)
     none = np.zeros((0, 2))
-    of = replace(of, system=lti.StateSpace(np.zeros((0, 0)), none, none.T, of.system.D), anti_windup=none)
+    of = replace(
+        of, system=lti.StateSpace(np.zeros((0, 0)), none, none.T, of.system.D), anti_windup=none, resolution_v=0.0
+    )
     form = sections(of)
-    assert isinstance(form, Sections)
-    assert list(operations.by_part(of, form, "double")) == ["upsets", "readings", "outputs", "commands"]
+    found = operations.operations(of, form, "double")
+    assert found.multiplications == np.count_nonzero(of.system.D)
+    assert found.additions == np.count_nonzero(of.system.D) + of.actuators  # what the limits took off
 
 
 def test_counts_add_up_and_are_said_in_words() -> None:

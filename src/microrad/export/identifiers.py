@@ -8,8 +8,6 @@ from microrad.export.records import ExportError
 LONGEST = 31
 """Characters that C99 tells apart in a name with external linkage (5.2.4.1)."""
 
-_FORM = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
-
 _KEYWORDS = """
     auto break case char const continue default do double else enum extern float for goto if inline int long register
     restrict return short signed sizeof static struct switch typedef union unsigned void volatile while
@@ -62,7 +60,7 @@ def _trouble(name: str) -> str:
     checks = (
         (name.startswith("_"), "C keeps names that begin with an underscore for itself"),
         (
-            not _FORM.fullmatch(name),
+            not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", name),
             "a name has letters from A to Z and a to z, digits and underscores, and begins with a letter",
         ),
         (

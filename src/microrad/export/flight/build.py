@@ -111,7 +111,11 @@ def compile_and_run(folder: Path, name: str, passes: int = 20) -> BenchResult:
         )
     if code != 0:
         raise _failure(f"the bench of {name} in {folder} {_ending(code)}", text)
-    return _result(found, f"the bench of {name} in {folder}", text)
+    kinds = {each.name: each.type for each in fields(BenchResult)}
+    missing = [key for key in kinds if key not in found]
+    if missing:
+        raise _failure(f"the bench of {name} in {folder} printed no {', no '.join(missing)}", text)
+    return BenchResult(**{key: int(found[key]) if kind is int else found[key] for key, kind in kinds.items()})  # type: ignore[arg-type]
 
 
 def _compile(folder: Path, name: str) -> Path:
@@ -151,21 +155,16 @@ def _run(command: Sequence[str], folder: Path) -> tuple[int, str]:
         try:
             text, _ = process.communicate(timeout=TIME_LIMIT_S)
         except BaseException as error:
-            _end(process)
+            if hasattr(os, "killpg"):  # with what it started: make's compiler
+                with suppress(ProcessLookupError):
+                    os.killpg(process.pid, signal.SIGKILL)
+            else:
+                process.kill()
             if isinstance(error, subprocess.TimeoutExpired):
                 what = f"{shlex.join(command)} in {folder} did not end within {TIME_LIMIT_S:g} s and was stopped"
                 raise ExportError(what) from error
             raise
     return process.returncode, text
-
-
-def _end(process: "subprocess.Popen[str]") -> None:
-    """Ends the program and what it started (make's compiler)."""
-    if hasattr(os, "killpg"):
-        with suppress(ProcessLookupError):
-            os.killpg(process.pid, signal.SIGKILL)
-    else:
-        process.kill()
 
 
 def _ending(code: int) -> str:
@@ -188,12 +187,3 @@ def _numbers(text: str) -> dict[str, float]:
             except ValueError:
                 continue
     return found
-
-
-def _result(found: dict[str, float], what: str, text: str) -> BenchResult:
-    names = {each.name: each.type for each in fields(BenchResult)}
-    missing = [name for name in names if name not in found]
-    if missing:
-        raise _failure(f"{what} printed no {', no '.join(missing)}", text)
-    values = {name: int(found[name]) if kind is int else found[name] for name, kind in names.items()}
-    return BenchResult(**values)  # type: ignore[arg-type]

@@ -7,14 +7,13 @@ from importlib.metadata import version
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from microrad.core import kernels
 from microrad.export.flight.rounding import RoundingBound
 from microrad.export.identifiers import identifier
 from microrad.export.linear_part.sections import Sections, compensated_states
 from microrad.export.records import ExportError, FlightController, InverseLaw, Signal, Vectors
-from microrad.export.templating import Precision, Terms, entries, render
+from microrad.export.templating import Precision, entries, render
 
 BOUND_SHARE = 1e-12
 """In double precision the code agrees with the kernel within this share of the largest command."""
@@ -84,18 +83,12 @@ class Limits:
         return min(max(0.0, self.lowest), self.highest)
 
 
-@dataclass(frozen=True, slots=True)
-class Table:
-    """A matrix as its numbers that are not 0, with its name in C and what it does, in words."""
-
-    name: str
-    words: str
-    terms: Terms
-
-
 def _values(of: FlightController, form: Sections, name: str, precision: Precision) -> dict[str, Any]:
     kept = np.array(compensated_states(form), dtype=bool) & (precision == "single")
-    tables = _tables(of, form, kept)
+    kinds = ["v (V)", "target (rad)", "rate of the target (rad/s)"][: form.C.shape[0] // of.actuators]
+    sizes = [size for _, size in form.blocks]
+    moves = form.A - np.diag(kept.astype(float))
+    matrices = {"A": moves, "B": form.B, "C": form.C, "D": form.D, "L": form.L}
     return {
         "name": name,
         "precision": precision,
@@ -109,8 +102,10 @@ def _values(of: FlightController, form: Sections, name: str, precision: Precisio
         "states": form.order,
         "compensated": kept.tolist() if np.any(kept) else [],
         "all_compensated": bool(np.any(kept) and np.all(kept)),
-        "tables": tuple(tables.values()),
-        "has": {key: bool(table.terms) for key, table in tables.items()},
+        "rows": _places(kinds, [of.actuators] * len(kinds)),
+        "columns": _places([each.name for each in of.inputs], [each.size for each in of.inputs]),
+        "block_sizes": [(n, sizes.count(n)) for n in sorted(set(sizes))],
+        "weights": {key: entries(matrix) for key, matrix in matrices.items()},
         "bound_share": bound_share(of),
         **_inverse_values(of.inverse),
     }
@@ -120,22 +115,6 @@ def bound_share(of: FlightController) -> float:
     """Largest difference of a command in double precision from the kernel's, over the largest command of the run."""
     power = of.inverse is not None and bool(np.any(of.inverse.bouc_wen[:, kernels.POWER]))
     return POWER_BOUND_SHARE if power else BOUND_SHARE
-
-
-def _tables(of: FlightController, form: Sections, kept: NDArray[np.bool_]) -> dict[str, Table]:
-    kinds = ["v (V)", "target (rad)", "rate of the target (rad/s)"][: form.C.shape[0] // of.actuators]
-    outputs = f"Rows: {_places(kinds, [of.actuators] * len(kinds))}"
-    readings = f"Columns: {_places([each.name for each in of.inputs], [each.size for each in of.inputs])}"
-    sizes = [size for _, size in form.blocks]
-    counts = ", ".join(f"{sizes.count(n)} of {n}" for n in sorted(set(sizes)))
-    blocks = f"A, block-diagonal. Blocks: {counts} state{'' if max(sizes, default=1) == 1 else 's'}."
-    return {
-        "C": Table("OUTPUT_OF_STATES", f"C. {outputs}. Columns: the states.", entries(form.C)),
-        "D": Table("OUTPUT_OF_READINGS", f"D. {outputs}. {readings}.", entries(form.D)),
-        "A": Table("STATE_OF_STATES", blocks, entries(form.A - np.diag(kept.astype(float)))),
-        "B": Table("STATE_OF_READINGS", f"B. Rows: the states. {readings}.", entries(form.B)),
-        "L": Table("STATE_OF_EXCESS", "L, the anti-windup gain, per V. Columns: the actuators.", entries(form.L)),
-    }
 
 
 def _places(names: list[str], sizes: list[int]) -> str:

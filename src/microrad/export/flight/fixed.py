@@ -63,7 +63,13 @@ def quantised(
     moved = _poles(form, made)
     _refuse_poles(of, made, moved)
     found = replace(made, report=_report(of, form, made, v.inputs, ideal, moved))
-    _refuse_strays(of, found, beyond_a_count)
+    r = found.report
+    if of.resolution_v > 0.0 and r.error_v > of.resolution_v and not beyond_a_count:
+        raise ExportError(
+            f"controller {of.name!r} in words of {found.bits} bits commands up to {r.error_v:.3g} V off double "
+            f"precision over {r.samples} samples, more than a count of the converter ({of.resolution_v:.3g} V); give "
+            f"more bits (up to {MOST_BITS}), or say that more than a count will do"
+        )
     return found
 
 
@@ -87,16 +93,6 @@ def _refuse_poles(of: FlightController, made: FixedForm, moved: Poles) -> None:
                 f"Hz moves to |z| = {abs(after):.9f}, and the limit is 1; give more bits (up to {MOST_BITS}) or less "
                 "head room, or export single precision"
             )
-
-
-def _refuse_strays(of: FlightController, found: FixedForm, beyond_a_count: bool) -> None:
-    r = found.report
-    if of.resolution_v > 0.0 and r.error_v > of.resolution_v and not beyond_a_count:
-        raise ExportError(
-            f"controller {of.name!r} in words of {found.bits} bits commands up to {r.error_v:.3g} V off double "
-            f"precision over {r.samples} samples, more than a count of the converter ({of.resolution_v:.3g} V); give "
-            f"more bits (up to {MOST_BITS}), or say that more than a count will do"
-        )
 
 
 # -------------------------------------------------------------------------------------------------------- what it costs
@@ -140,18 +136,15 @@ def _qualities(
 ) -> tuple[OutputQuality, ...]:
     """By output; ``wrong`` are its errors over the run, and ``states`` those at the end of it."""
     response, cycles = _response_errors(of, form, near), _cycles(near, made, states)
-    qualities = []
-    for i, (name, unit) in enumerate(_output_names(of)):
+    kinds, qualities = [("v", "V"), ("target", "rad"), ("target's rate", "rad/s")], []
+    for i in range(len(made.output_scale)):
+        kind, unit = kinds[i // of.actuators]
         noise, bound = _noise(near, made, i, len(wrong))
         measured = float(np.sqrt(np.mean(wrong[:, i] ** 2)))
-        qualities.append(OutputQuality(name, unit, *response[i], noise, measured, bound, float(cycles[i])))
+        qualities.append(
+            OutputQuality(f"{kind} {i % of.actuators}", unit, *response[i], noise, measured, bound, float(cycles[i]))
+        )
     return tuple(qualities)
-
-
-def _output_names(of: FlightController) -> list[tuple[str, str]]:
-    kinds = [("v", "V"), ("target", "rad"), ("target's rate", "rad/s")]
-    rows = 1 if of.inverse is None else 2 if of.inverse.by_difference else 3
-    return [(f"{name} {a}", unit) for name, unit in kinds[:rows] for a in range(of.actuators)]
 
 
 def _response_errors(of: FlightController, form: Sections, near: Sections) -> list[tuple[float, float]]:
@@ -248,12 +241,19 @@ def fixed_code(of: FlightController, form: Sections, fixed: FixedForm, name: str
         "B": fixed.state.value[:, n : n + m],
         "L": fixed.state.value[:, n + m :],
     }
+    inputs: list[dict[str, Any]] = []
+    first = 0
+    for s in of.inputs:
+        inputs.append(
+            _constant(s.name.upper(), first, s.size, s.unit, f"{s.name}: {s.meaning}", fixed.input_scale[first])
+        )
+        first += s.size
     values = {
         "name": name,
         "version": version("microrad"),
         "of": of,
         "fixed": fixed,
-        "inputs": _input_constants(of, fixed),
+        "inputs": inputs,
         "outputs": _output_constants(of, fixed),
         "tables": {key: entries(part) for key, part in parts.items()},
         "report": quantisation_text(fixed).splitlines(),
@@ -263,15 +263,6 @@ def fixed_code(of: FlightController, form: Sections, fixed: FixedForm, name: str
     headers, sources = ([file for file in (*files, *inverse) if file.endswith(end)] for end in (".h", ".c"))
     make = render("Makefile.j2", name=whole, version=version("microrad"), headers=headers, sources=sources)
     return {**files, **inverse, "Makefile": make}
-
-
-def _input_constants(of: FlightController, fixed: FixedForm) -> list[dict[str, Any]]:
-    found, first = [], 0
-    for s in of.inputs:
-        scale = fixed.input_scale[first]
-        found.append(_constant(s.name.upper(), first, s.size, s.unit, f"{s.name}: {s.meaning}", scale))
-        first += s.size
-    return found
 
 
 def _output_constants(of: FlightController, fixed: FixedForm) -> list[dict[str, Any]]:

@@ -126,7 +126,11 @@ class FixedForm:
 def scaled(of: FlightController, form: Sections, inputs: Floats, ideal: Run, bits: int) -> FixedForm:
     """The controller in words of ``bits``, scaled by a recorded run; its report is empty yet."""
     word = 2 ** (bits - 1) - 1
-    sizes = _input_peaks(of, inputs) * HEAD_ROOM
+    peaks: list[float] = []  # of the inputs, the same for all numbers of a signal; its limit where it rests
+    for s in of.inputs:
+        peak = float(np.max(np.abs(inputs[:, len(peaks) : len(peaks) + s.size]), initial=0.0))
+        peaks += [peak or s.limit] * s.size
+    sizes = np.array(peaks) * HEAD_ROOM
     states = _or_reachable(np.max(np.abs(ideal.states), axis=0) * HEAD_ROOM, np.eye(form.order), form, sizes)
     ranges = _output_ranges(of, form, ideal, sizes)
     read, kept, given = (tuple(_scale(float(x), word) for x in most) for most in (sizes, states, ranges))
@@ -134,25 +138,16 @@ def scaled(of: FlightController, form: Sections, inputs: Floats, ideal: Run, bit
     from_v = given[: of.actuators]
     state = _rows(step, (*kept, *read, *from_v), word, [s + bits - 1 for s in kept])
     output = _rows(np.hstack([form.C, form.D]), (*kept, *read), word, [s + 61 for s in given])
-    limits = [_limits(of, s, word) for s in from_v]
+    low = tuple(-word if math.isinf(of.minimum_v) else math.ceil(math.ldexp(of.minimum_v, s)) for s in from_v)
+    high = tuple(word if math.isinf(of.maximum_v) else math.floor(math.ldexp(of.maximum_v, s)) for s in from_v)
     converters = tuple(_converter(of, s) for s in from_v) if of.resolution_v > 0.0 else ()
     empty = QuantisationReport(0, of.period_s, (), (), (), 0.0, 0.0, of.resolution_v, 0.0)
-    low, high = zip(*limits, strict=True)
     return FixedForm(bits, read, kept, given, state, output, low, high, converters, empty)
 
 
 def _scale(size: float, word: int) -> int:
     """Finest power of two at which numbers up to ``size`` fit into a word."""
     return math.floor(math.log2(word / size))
-
-
-def _input_peaks(of: FlightController, inputs: Floats) -> Floats:
-    """Largest size in the run by signal, for each of its numbers; the signal's limit where it rests."""
-    found: list[float] = []
-    for s in of.inputs:
-        peak = float(np.max(np.abs(inputs[:, len(found) : len(found) + s.size]), initial=0.0))
-        found += [peak or s.limit] * s.size
-    return np.array(found)
 
 
 def _or_reachable(peaks: Floats, rows: Floats, form: Sections, inputs: Floats) -> Floats:
@@ -186,13 +181,6 @@ def _rows(matrix: Floats, columns: tuple[int, ...], word: int, most: list[int]) 
         values[i] = np.rint(np.ldexp(weights, scale)).astype(np.int64)
         scales.append(scale)
     return Rows(values, tuple(scales))
-
-
-def _limits(of: FlightController, scale: int, word: int) -> tuple[int, int]:
-    """The command's limits in its scale, rounded inwards."""
-    low = -word if math.isinf(of.minimum_v) else math.ceil(math.ldexp(of.minimum_v, scale))
-    high = word if math.isinf(of.maximum_v) else math.floor(math.ldexp(of.maximum_v, scale))
-    return low, high
 
 
 def _converter(of: FlightController, scale: int) -> Converter:

@@ -58,29 +58,20 @@ class Operations:
 
 
 def operations(of: FlightController, form: Sections, precision: Precision) -> Operations:
-    """The most that one call of {name}_step costs in floating point, whatever it reads; see `by_part`."""
-    return sum(by_part(of, form, precision).values(), start=Operations())
+    """The most that one call of {name}_step costs in floating point, whatever it reads.
 
-
-def by_part(of: FlightController, form: Sections, precision: Precision) -> dict[str, Operations]:
-    """`operations` by the part of a step that they belong to, in the order of the step.
-
-    "upsets": whether the state is sound; "readings": whether they are accepted; "outputs": C x + D m; "inverse", where
-    there is one; "commands": limits, whether they are sound, the converter; "states": A x + B m + L times what the
-    limits took off.
+    Args:
+        of: the controller.
+        form: its linear part.
+        precision: of the code.
     """
-    numbers = sum(each.size for each in of.inputs)
-    found = {
-        "upsets": _mended(of, form, precision),
-        "readings": Operations(comparisons=2) * numbers,
-        "outputs": _product(form.C) + _product(form.D),
-    }
+    found = _mended(of, form, precision)  # whether the state is sound, then whether the readings are accepted
+    found += Operations(comparisons=2) * sum(each.size for each in of.inputs)
+    found += _product(form.C) + _product(form.D)
     if of.inverse is not None:
-        found["inverse"] = _inverse(of.inverse, of.actuators, precision)
-    found["commands"] = _command(of.resolution_v > 0.0) * of.actuators
-    if form.order:
-        found["states"] = _states(form, precision)
-    return found
+        found += _inverse(of.inverse, of.actuators, precision)
+    found += _command(of.resolution_v > 0.0) * of.actuators
+    return found + _states(form, precision) if form.order else found
 
 
 @dataclass(frozen=True, slots=True)
@@ -196,14 +187,10 @@ def _inverse(of: InverseLaw, actuators: int, precision: Precision) -> Operations
 def _element(power: bool) -> Operations:
     """A Bouc-Wen element of the inverse: travel and rate, h, and Eq. 4; its share of the drive."""
     travel = _CLAMP + Operations(additions=1, divisions=2, comparisons=1)
+    # {name}_bouc_wen_advance: the forcing, a decay for each sign of h, h at the end, and whether it is finite.
+    advance = Operations(multiplications=7, additions=6, exponentials=1, comparisons=3)
     equation = Operations(multiplications=3, additions=4, divisions=1, exponentials=1)
-    return travel + _advance(power) + equation
-
-
-def _advance(power: bool) -> Operations:
-    """{name}_bouc_wen_advance: the forcing, a decay for each sign of h, h at the end, and whether it is finite."""
-    flow = Operations(multiplications=7, additions=6, exponentials=1)
-    return flow + Operations(comparisons=3) + (_power_step() if power else _linear_step())
+    return travel + advance + (_power_step() if power else _linear_step()) + equation
 
 
 _RELAXED = Operations(multiplications=2, additions=2, divisions=1, comparisons=1, exponentials=1)

@@ -23,8 +23,6 @@ UNIT = 2.0**-24
 
 _HIGHER_ORDERS = 1.01  # what a first-order analysis leaves out, generously
 _POWER_TOLERANCE = 4e-6  # of h's size: the numerical integration for exponents other than 1, in single precision
-_MOST_ROUNDS = 500
-_ROUND_OFF = 1e-5
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,14 +99,14 @@ def _settled(of: FlightController, form: Sections, r: Run, states: Floats, outpu
     response = _Response(form, len(states))
     lags = 0 if of.inverse is None else of.inverse.lag_keep.size
     error, lag = np.zeros_like(r.free), np.zeros((len(states), lags))
-    for _ in range(_MOST_ROUNDS):
+    for _ in range(500):
         # Errors reach the states through the anti-windup where a command is clipped, or might be in single precision.
         clipped = (r.free - of.minimum_v <= error) | (of.maximum_v - r.free <= error)
         linear = response.bound(states + (clipped * error) @ np.abs(form.L).T) + outputs
         new, lag = _through_inverse(of, r, linear, lag)
         if not np.all(np.isfinite(new)) or np.max(new, initial=0.0) > of.maximum_v - of.minimum_v:
             break
-        if np.max(np.abs(new - error), initial=0.0) <= _ROUND_OFF * np.max(new, initial=0.0):
+        if np.max(np.abs(new - error), initial=0.0) <= 1e-5 * np.max(new, initial=0.0):
             return _HIGHER_ORDERS * new
         error = new
     return np.full_like(error, math.inf)

@@ -142,6 +142,12 @@ def _rms(rad: float) -> str:
 def report_text(of: FlightExport) -> str:
     """What was exported, what a step costs and how exact it is, in lines."""
     c = of.controller
+    low, high, bias = (format_quantity(v, "V", 6) for v in (c.minimum_v, c.maximum_v, c.bias_v))
+    counts = f", in counts of {format_quantity(c.resolution_v, 'V')}" if c.resolution_v else ""
+    margins = [
+        f"{name} {format_quantity(value, unit, 3) if unit in ('s', 'Hz') else f'{value:.3g} {unit}'.strip()}"
+        for name, value, unit in c.margins
+    ]
     inputs, left = ", ".join(f"{each.name}[{each.size}]" for each in c.inputs), of.left
     lines = [
         ("from", f"{c.origin.mission}, sha256 {c.origin.mission_sha256[:16]}"),
@@ -151,8 +157,8 @@ def report_text(of: FlightExport) -> str:
             f"{c.name}, {format_quantity(1.0 / c.period_s, 'Hz')}, {of.form.order} states in {of.form.form} form",
         ),
         ("reads", inputs),
-        ("commands", f"{c.actuators} x {_limits(c)}"),
-        ("margins", ", ".join(f"{name} {_shown(value, unit)}" for name, value, unit in c.margins)),
+        ("commands", f"{c.actuators} x {low} to {high} from the bias of {bias}{counts}"),
+        ("margins", ", ".join(margins)),
         ("leaves", left and f"{_rms(left.linear_rad)} in linear theory, {_rms(left.simulated_rad)} simulated"),
         ("a step costs", of.cost.words),
         ("single", of.bound and of.bound.words),
@@ -161,16 +167,6 @@ def report_text(of: FlightExport) -> str:
     text = "\n".join(f"  {name:13} {words}" for name, words in lines if words)
     quantisation = "" if of.fixed is None else f"\n\n{quantisation_text(of.fixed)}"
     return f"{of.name}: {c.name} in {PRECISIONS[of.precision]}\n{text}{quantisation}"
-
-
-def _shown(value: float, unit: str) -> str:
-    return format_quantity(value, unit, 3) if unit in ("s", "Hz") else f"{value:.3g} {unit}".strip()
-
-
-def _limits(c: FlightController) -> str:
-    low, high, bias = (format_quantity(v, "V", 6) for v in (c.minimum_v, c.maximum_v, c.bias_v))
-    counts = f", in counts of {format_quantity(c.resolution_v, 'V')}" if c.resolution_v else ""
-    return f"{low} to {high} from the bias of {bias}{counts}"
 
 
 def _measured(b: BenchResult | None) -> list[tuple[str, str]]:

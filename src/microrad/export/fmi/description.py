@@ -117,10 +117,13 @@ def variables(unit: PlantUnit | LoopUnit) -> tuple[Variable, ...]:
     else:
         text = "command to actuator {}, from the bias, held over the communication step"
         found += _row("command_v", len(unit.plant.actuators), "input", text, "V", start=0.0)
-    plant = plant_of(unit)
-    found += _plant_outputs(plant)
+    of = plant_of(unit)
+    found += _row("line_of_sight_rad", len(of.optics), "output", "line of sight, axis {}", "rad")
+    found += _row("mirror_rad", len(of.plant.outputs), "output", "output {} of the mirror", "rad", "plant.y")
+    text = "drive of actuator {} behind the amplifier, as seen at its input, from the bias"
+    found += _row("drive_v", len(of.plant.actuators), "output", text, "V", "plant.u")
     found += [Variable(name, place, "output", text, counts=True) for name, place, text in counters]
-    return (*found, *_parameters(plant), *_constants(unit))
+    return (*found, *_parameters(of), *_constants(unit))
 
 
 def _loop_signals(unit: LoopUnit) -> list[Variable]:
@@ -134,14 +137,6 @@ def _loop_signals(unit: LoopUnit) -> list[Variable]:
         found.append(Variable(f"error_rad[{i + 1}]", f"error_rad[{i}]", "output", text, "rad", dependencies=seen))
     text = "command that the last control sample gave actuator {}, from the bias"
     return found + _row("command_v", actuators, "output", text, "V", "loop.command_v")
-
-
-def _plant_outputs(of: PlantUnit) -> list[Variable]:
-    plant, axes = of.plant, of.optics.shape[0]
-    found = _row("line_of_sight_rad", axes, "output", "line of sight, axis {}", "rad")
-    found += _row("mirror_rad", len(plant.outputs), "output", "output {} of the mirror", "rad", "plant.y")
-    text = "drive of actuator {} behind the amplifier, as seen at its input, from the bias"
-    return found + _row("drive_v", len(plant.actuators), "output", text, "V", "plant.u")
 
 
 def _parameters(of: PlantUnit) -> list[Variable]:

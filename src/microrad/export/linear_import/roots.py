@@ -167,7 +167,15 @@ def checked(of: Roots, source: str) -> Roots:
     if not (math.isfinite(of.gain) and of.gain != 0.0):
         raise ExportError(f"{source}: a gain of {of.gain}; the mirror does not move: check the model")
     for pole in of.poles:
-        _check_pole(pole, float(np.max(np.abs(of.poles))), source)
+        if abs(pole) <= _INTEGRATOR * float(np.max(np.abs(of.poles))):
+            raise ExportError(
+                f"{source}: an integrator, a pole at {abs(pole) / (2.0 * math.pi):.3g} Hz; a mirror comes to rest: "
+                "take drift off the records and identify again"
+            )
+        if pole.real >= 0.0:
+            raise ExportError(
+                f"{source}: unstable, a pole at {pole_text(pole, 0.0)}; a mirror is stable: identify it again"
+            )
     for number, pole in enumerate(of.poles):
         if np.any(np.abs(np.delete(of.poles, number) - pole) <= COINCIDING * abs(pole)):
             raise ExportError(
@@ -184,15 +192,3 @@ def checked(of: Roots, source: str) -> Roots:
             "the model with its answer to a constant drive"
         )
     return of
-
-
-def _check_pole(pole: complex, largest: float, source: str) -> None:
-    if abs(pole) <= _INTEGRATOR * largest:
-        raise ExportError(
-            f"{source}: an integrator, a pole at {abs(pole) / (2.0 * math.pi):.3g} Hz; a mirror comes to rest: take "
-            "drift off the records and identify again"
-        )
-    if pole.real >= 0.0:
-        raise ExportError(
-            f"{source}: unstable, a pole at {pole_text(pole, 0.0)}; a mirror is stable: identify it again"
-        )

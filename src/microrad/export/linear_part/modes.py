@@ -93,18 +93,17 @@ def _cancellation(of: Modes) -> float:
     """Largest size of what the blocks add to an output, over the largest size of the sum, over frequency and inputs."""
     points = np.exp(1j * np.pi * np.geomspace(1e-6, 1.0, 80))
     blocks, C = of.found.blocks.astype(float), of.C.astype(float)
-    parts = [_response(blocks[at, at], of.driven[at], C[:, at], points) for at in of.found.slices]
+    parts = []
+    for at in of.found.slices:
+        resolvent = points[:, None, None] * np.eye(at.stop - at.start) - blocks[at, at]
+        driven = np.broadcast_to(of.driven[at], (points.size, *of.driven[at].shape))
+        parts.append(C[:, at] @ np.linalg.solve(resolvent, driven))
     if not parts:
         return 1.0
     whole = np.max(np.abs(sum(parts)), axis=0)
     added = np.max(sum(np.abs(part) for part in parts), axis=0)
     at = whole > 0.0
     return float(np.max(added[at] / whole[at], initial=1.0))
-
-
-def _response(A: Floats, B: Floats, C: Floats, points: Complexes) -> Complexes:
-    resolvent = points[:, None, None] * np.eye(A.shape[0]) - A
-    return np.asarray(C @ np.linalg.solve(resolvent, np.broadcast_to(B, (points.size, *B.shape))))
 
 
 # ----------------------------------------------------------------------------------------------------- hidden modes

@@ -238,14 +238,11 @@ def roots(coefficients: Sequence[Fraction]) -> Complexes:
     size = abs(coefficients[-1] / coefficients[0])  # the roots' product; a scale near them keeps floats within range
     binary = round((size.numerator.bit_length() - size.denominator.bit_length()) / degree)
     scaled = [each / coefficients[0] * Fraction(2) ** (-binary * k) for k, each in enumerate(coefficients)]
-    found = [_polished(_integers(scaled), complex(r)) for r in np.roots(floats(scaled)) if r.imag >= 0.0]
+    below = math.lcm(*(each.denominator for each in scaled))
+    whole = [int(each * below) for each in scaled]
+    found = [_polished(whole, complex(r)) for r in np.roots(floats(scaled)) if r.imag >= 0.0]
     both = [r for each in found for r in ((each, each.conjugate()) if each.imag else (each,))]
     return np.asarray(np.array(both + [0j] * at_zero) * 2.0**binary, dtype=complex)
-
-
-def _integers(coefficients: Sequence[Fraction]) -> list[int]:
-    below = math.lcm(*(each.denominator for each in coefficients))
-    return [int(each * below) for each in coefficients]
 
 
 def _polished(coefficients: list[int], root: complex) -> complex:
