@@ -250,9 +250,14 @@ def _tracking_controller(choice: TrackingChoice) -> FlightController:
 
 # ---------------------------------------------------------------------------------------------------- plants and loops
 def plant_unit(file: MissionFile, loop: str) -> PlantUnit:
-    """Amplifier and mirror of one of the `LOOPS` of a mission, at the loop's plant step.
+    """Amplifier and mirror of a mission, at the plant step of one of its loops.
 
-    Raises ExportError with the reason for a loop that the mission does not have or that cannot be built.
+    Args:
+        file: the mission.
+        loop: one of `LOOPS`.
+
+    Raises:
+        ExportError: the mission has no such loop, or it cannot be built.
     """
     if loop not in LOOPS or (loop == LOOPS[0] and file.mission.fine_pointing is None):
         raise ExportError(f"{file.path} has no loop {loop!r}: one of {', '.join(LOOPS)} that is a table of the mission")
@@ -316,6 +321,10 @@ def vectors(choice: Choice, samples: int) -> Vectors:
 
     The fine-pointing loop runs in its mission's jitter (run 0 of its seed). The loop of [control] tracks the fastest
     sine that the scenario has for an inverse.
+
+    Args:
+        choice: the controller.
+        samples: length of the run, in control periods.
     """
     if isinstance(choice, PointingChoice):
         run = replay(choice.scene.loop, choice.controller, samples, choice.table.seed)

@@ -28,9 +28,18 @@ def flight_code(
     """The controller with its linear part in ``form`` as C99: file names and texts.
 
     Files: the code, {name}.h and {name}.c, with {name}_hysteresis.h where it has an inverse; a test bench that replays
-    a recorded run (`vectors_text`), and a Makefile. ``bound`` is what single precision may differ by over that run.
-    Raises ExportError for a name that is no identifier, for limits between which no command lies, for numbers beyond
-    the precision, and for single precision without a bound.
+    a recorded run (`vectors_text`), and a Makefile.
+
+    Args:
+        of: the controller.
+        form: its linear part.
+        name: what the code is called, an identifier of C.
+        precision: "double" or "single".
+        bound: what single precision may differ by over the recorded run.
+
+    Raises:
+        ExportError: a name that is no identifier; limits between which no command lies; numbers beyond the precision;
+            single precision without a bound.
     """
     values = _values(of, form, identifier(name), precision)
     if precision == "single":

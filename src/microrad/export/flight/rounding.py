@@ -41,7 +41,13 @@ class RoundingBound:
 
 
 def rounding_bound(of: FlightController, form: Sections, v: Vectors) -> RoundingBound:
-    """The bound for a controller in this form over a recorded run of it."""
+    """The bound on what single precision does to the commands of a controller.
+
+    Args:
+        of: the controller.
+        form: its linear part.
+        v: a recorded run of it.
+    """
     error = errors_before_converter(of, form, v)
     largest = float(np.max(error, initial=0.0))
     command = float(np.max(behind_converter(of, np.max(error, axis=0, initial=0.0)), initial=0.0))

@@ -51,7 +51,7 @@ class FlightExport:
 
 
 def check_output(folder: Path, overwrite: bool) -> None:
-    """Raise `FolderError` when ``folder`` holds something that must not be replaced."""
+    """Raises FolderError if ``folder`` holds something that must not be replaced (``overwrite``: by another export)."""
     check_folder(folder, overwrite, KIND, WHAT)
 
 
@@ -66,12 +66,24 @@ def export_flight(
     accept: bool = False,
     on_progress: Progress = lambda done, total, what: None,
 ) -> FlightExport:
-    """Write a controller as C99 with its test bench, ``samples`` recorded vectors, a report and a manifest.
+    """Write a controller as C99 with its test bench, a recorded run, a report and a manifest.
 
-    It is compiled and its bench run over the vectors where there is a C compiler, before the folder appears. Raises
-    ExportError for what cannot be exported, for code that strays from the kernel and, but for ``accept``, for a
-    controller that leaves `PROMISE` times its linear residual on the mission's mirror; `FolderError` for a folder that
-    must not be replaced.
+    Where there is a C compiler, the code is compiled and its bench run over the recorded run before the folder appears.
+
+    Args:
+        choice: the controller, see `choice.choose`.
+        folder: where to write; it appears whole or not at all.
+        name: what the code is called, an identifier of C; None makes one of the controller's name.
+        precision: of the code: "double", "single" or "fixed" point.
+        samples: length of the recorded run, in control periods.
+        overwrite: replace an earlier export in the folder.
+        accept: write also a controller that leaves more than `PROMISE` times its linear residual on the mission's
+            mirror.
+        on_progress: is told what is being done.
+
+    Raises:
+        ExportError: the controller cannot be exported, its code strays from the kernel, or it leaves too much.
+        FolderError: the folder must not be replaced.
     """
     check_output(folder, overwrite)
     left = None

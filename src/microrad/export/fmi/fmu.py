@@ -77,9 +77,17 @@ def write_unit(unit: PlantUnit | LoopUnit, path: Path, version: Version, name: s
     are scalars ``command_v[1]``. A communication step is a whole number of plant steps; another one is an error of the
     call, and changes nothing. Parameters act until the initialisation ends.
 
-    The library inside is compiled here, if there is a C compiler. The same unit gives the same file. Raises ExportError
-    for another version, a name that is no identifier or too long, a controller that cannot be exported (see
-    `sections`), and a compiler that fails.
+    The library inside is compiled here, if there is a C compiler. The same unit gives the same file.
+
+    Args:
+        unit: the mirror with its amplifier, or a closed loop.
+        path: the file to write.
+        version: of the interface, "2.0" or "3.0".
+        name: what the unit calls itself, an identifier of C.
+
+    Raises:
+        ExportError: another version; a name that is no identifier or too long; a controller that cannot be exported
+            (see `sections`); a compiler that fails.
     """
     if version not in HEADERS:
         raise ExportError(f"FMI {version!r} is not written here: choose {' or '.join(HEADERS)}")

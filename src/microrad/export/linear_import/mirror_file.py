@@ -49,11 +49,17 @@ class Given:
 
 
 def import_mat(path: Path, given: Given, variable: str | None = None) -> str:
-    """The text of a mirror file from a MATLAB file: A B C D, z p k or num den, with Ts where it is sampled.
+    """The text of a mirror file from a MATLAB file that has A B C D, z p k or num den, with Ts where it is sampled.
 
-    They are variables of their own or fields of one structure, whose name is ``variable`` where the file has several
-    (what `matrices.write_mat` wrote); A B C D count where there are several forms. Raises ExportError with the reason
-    for what cannot be read, chosen or said in a mirror file.
+    They are variables of their own or fields of one structure. Where there are several forms, A B C D count.
+
+    Args:
+        path: the MATLAB file, version 5 to 7.
+        given: what a linear model does not say.
+        variable: name of the structure, where the file has several.
+
+    Raises:
+        ExportError: what cannot be read, chosen or said in a mirror file, with the reason.
     """
     path = Path(path)
     chosen, found = select(path, variable)
@@ -65,9 +71,15 @@ def import_mat(path: Path, given: Given, variable: str | None = None) -> str:
 
 
 def import_control(system: Any, given: Given, source: str = "python-control") -> str:
-    """The text of a mirror file from a `control.StateSpace` or `control.TransferFunction`; ``source`` names it.
+    """The text of a mirror file from an object of python-control.
 
-    Raises ExportError with the reason for what cannot be said in a mirror file.
+    Args:
+        system: a `control.StateSpace` or a `control.TransferFunction`.
+        given: what a linear model does not say.
+        source: what the file's comments and messages call the model.
+
+    Raises:
+        ExportError: what cannot be said in a mirror file, with the reason.
     """
     return _text(_factored(lambda: roots_of_control(system, source), source), given, source, (source,))
 
@@ -169,7 +181,7 @@ def _roots(kind: str, roots: Any, said: str) -> list[str]:
 
 
 def _check_read_back(text: str, model: Roots, given: Given, source: str) -> None:
-    """Raise ExportError where the file is refused as a mirror, or says something else than the model."""
+    """Raises ExportError if the file is refused as a mirror, or says something else than the model."""
     try:
         table = Mirror.model_validate(tomllib.loads(text))
         made = mirror.from_mission(

@@ -36,8 +36,14 @@ def write_mat(models: Sequence[LinearModel], path: Path) -> None:
     Fields: A B C D Ts (0: continuous), InputName InputUnit OutputName OutputUnit StateName StateUnit, L (anti-windup,
     empty without), z p k and num den (arrays of one input and output, else cells [output, input]) with the largest
     error of the response that they give and its frequency (zpkError zpkErrorHz, tfError tfErrorHz), tfCondition,
-    zpkRefused and tfRefused (why a form is missing), meaning, Mission MissionSha256 Mirror. Raises ExportError for
-    names that MATLAB does not take, the same name twice, and a file that cannot be written.
+    zpkRefused and tfRefused (why a form is missing), meaning, Mission MissionSha256 Mirror.
+
+    Args:
+        models: what to write.
+        path: the file.
+
+    Raises:
+        ExportError: a name that MATLAB does not take, the same name twice, or a file that cannot be written.
     """
     _check_names(models)
     draft = io.BytesIO()

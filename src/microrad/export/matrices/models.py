@@ -27,7 +27,7 @@ def models(of: MissionFile | Choice) -> tuple[LinearModel, ...]:
     """The linear models of a mission, or of a chosen controller (see `choice.choose`) and its loop.
 
     Angles are line-of-sight angles in the sampled plant, the controller and the loop, and the mirror file's own in the
-    first two. Raises ExportError for a mission whose loop cannot be built.
+    first two. Raises ExportError if the mission's loop cannot be built.
     """
     start = source(of) if isinstance(of, MissionFile) else of.source
     controller = None if isinstance(of, MissionFile) else _controller(start, flight_controller(of))
