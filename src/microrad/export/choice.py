@@ -175,10 +175,8 @@ def trimmed(of: FlightController) -> FlightController:
 
 def inverse_law(of: control.Inverse, period_s: float, by_difference: bool) -> InverseLaw:
     """An inverse at a control period."""
-    arrays = control.inverse_arrays(of, period_s)
-    return InverseLaw(
-        **{key.removeprefix("inverse_"): value for key, value in arrays.items()}, by_difference=by_difference
-    )
+    arrays = {key.removeprefix("inverse_"): value for key, value in control.inverse_arrays(of, period_s).items()}
+    return InverseLaw(**arrays, by_difference=by_difference)
 
 
 def _pointing_controller(choice: PointingChoice) -> FlightController:
@@ -289,30 +287,16 @@ def loop_unit(choice: Choice) -> LoopUnit:
     """The chosen controller with the loop around it; sensors without their noise."""
     made = flight_controller(choice)
     if isinstance(choice, PointingChoice):
-        loop = choice.scene.loop
-        return LoopUnit(
-            plant=_plant_unit(choice.source, loop.mirror, loop.optics, loop.drive, loop.timing),
-            controller=made,
-            steps_per_sample=loop.timing.steps_per_sample,
-            delay_steps=loop.timing.delay_steps,
-            optical_delay_steps=loop.optical.delay_steps,
-            optical_every=loop.optical.every,
-            field_of_view_rad=loop.optical.field_of_view_rad,
-            optical_resolution_rad=loop.optical.resolution_rad,
-            gauge_resolution_rad=0.0 if loop.gauge is None else loop.gauge.resolution_rad,
-        )
-    setup = choice.setup
-    return LoopUnit(
-        plant=_plant_unit(choice.source, choice.mirror, np.eye(choice.mirror.axes), setup.drive, setup.timing),
-        controller=made,
-        steps_per_sample=setup.timing.steps_per_sample,
-        delay_steps=setup.timing.delay_steps,
-        optical_delay_steps=0,
-        optical_every=1,
-        field_of_view_rad=math.inf,
-        optical_resolution_rad=setup.drive.sensor_resolution_rad,
-        gauge_resolution_rad=0.0,
-    )
+        loop, optical = choice.scene.loop, choice.scene.loop.optical
+        plant = _plant_unit(choice.source, loop.mirror, loop.optics, loop.drive, loop.timing)
+        gauge_rad = 0.0 if loop.gauge is None else loop.gauge.resolution_rad
+        sensors = (optical.delay_steps, optical.every, optical.field_of_view_rad, optical.resolution_rad, gauge_rad)
+        timing = loop.timing
+    else:
+        drive, timing = choice.setup.drive, choice.setup.timing
+        plant = _plant_unit(choice.source, choice.mirror, np.eye(choice.mirror.axes), drive, timing)
+        sensors = (0, 1, math.inf, drive.sensor_resolution_rad, 0.0)  # one that is read at each sample, without delay
+    return LoopUnit(plant, made, timing.steps_per_sample, timing.delay_steps, *sensors)
 
 
 # ------------------------------------------------------------------------------------------------------------- vectors

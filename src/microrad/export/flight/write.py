@@ -140,10 +140,9 @@ def _manifest(of: FlightExport, source: Source, folder: Path) -> dict[str, Any]:
 def _broken(name: str, left: Outlook) -> str:
     found, said, times = _rms(left.simulated_rad), _rms(left.linear_rad), left.simulated_rad / left.linear_rad
     return (
-        f"{name} leaves {found} on the mission's mirror, simulated with its "
-        f"hysteresis: {times:.1f} times the {said} of linear theory, where {PROMISE:g} times is the most. "
-        "Choose another controller by the simulated figures of microrad design, or write this one all the same with "
-        "--accept."
+        f"{name} leaves {found} on the mission's mirror, simulated with its hysteresis: {times:.1f} times the {said} "
+        f"of linear theory, where {PROMISE:g} times is the most. Choose another controller by the simulated figures of "
+        "microrad design, or write this one all the same with --accept."
     )
 
 
@@ -153,7 +152,7 @@ def _rms(rad: float) -> str:
 
 def report_text(of: FlightExport) -> str:
     """What was exported, what a step costs and how exact it is, in lines."""
-    c = of.controller
+    c, rate = of.controller, format_quantity(1.0 / of.controller.period_s, "Hz")
     low, high, bias = (format_quantity(v, "V", 6) for v in (c.minimum_v, c.maximum_v, c.bias_v))
     counts = f", in counts of {format_quantity(c.resolution_v, 'V')}" if c.resolution_v else ""
     margins = [
@@ -164,10 +163,7 @@ def report_text(of: FlightExport) -> str:
     lines = [
         ("from", f"{c.origin.mission}, sha256 {c.origin.mission_sha256[:16]}"),
         ("mirror", c.origin.mirror),
-        (
-            "controller",
-            f"{c.name}, {format_quantity(1.0 / c.period_s, 'Hz')}, {of.form.order} states in {of.form.form} form",
-        ),
+        ("controller", f"{c.name}, {rate}, {of.form.order} states in {of.form.form} form"),
         ("reads", inputs),
         ("commands", f"{c.actuators} x {low} to {high} from the bias of {bias}{counts}"),
         ("margins", ", ".join(margins)),

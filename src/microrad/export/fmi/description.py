@@ -24,9 +24,6 @@ UNITS = (
 )
 """Units of the variables: name, powers of the base units of the SI, and units to show it in, with their factors."""
 
-STOP_S = 0.2
-"""End of the experiment that a tool proposes."""
-
 BOUC_WEN = (
     ("d1_rad_v", "d1", kernels.D1, "rad/V", "any", "linear gain"),
     ("d2_s_v", "d2", kernels.D2, "s/V", "any", "change of the linear gain with the rate of the drive"),
@@ -251,5 +248,4 @@ def model_description(
         compiled=compiled,
         plant_step_s=step_s,
         step_s=unit.controller.period_s if isinstance(unit, LoopUnit) else step_s,
-        stop_s=STOP_S,
     )
