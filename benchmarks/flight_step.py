@@ -19,8 +19,9 @@ import control as python_control
 import numpy as np
 
 from microrad.core import lti
-from microrad.export import build, choice, fixed, flight, operations, records, rounding
-from microrad.export import sections as linear_part
+from microrad.export import choice, records
+from microrad.export.flight import build, c_code, fixed, operations, rounding
+from microrad.export.linear_part import sections
 from microrad.export.templating import table
 from microrad.mission.file import load_mission
 
@@ -128,7 +129,7 @@ def twin(of: records.FlightController) -> str:
 
 def ran(of: records.FlightController, run: records.Vectors, files: dict[str, str], name: str) -> build.BenchResult:
     with tempfile.TemporaryDirectory() as folder:
-        for file, text in {**files, "vectors.csv": flight.vectors_text(of, run)}.items():
+        for file, text in {**files, "vectors.csv": c_code.vectors_text(of, run)}.items():
             (Path(folder) / file).write_text(text)
         return build.compile_and_run(Path(folder), name, PASSES)
 
@@ -155,12 +156,12 @@ def line(what: str, found: build.BenchResult, dense: build.BenchResult) -> None:
 def compare(name: str, samples: int) -> None:
     chosen = choice.choose(load_mission(MISSION), name)
     of, run = choice.flight_controller(chosen), choice.vectors(chosen, samples)
-    designed, form = as_designed(chosen, of), linear_part.sections(of)
+    designed, form = as_designed(chosen, of), sections.sections(of)
     whole, bound = fixed.quantised(of, form, run), rounding.rounding_bound(of, form, run)
-    double = flight.flight_code(of, form, "code", "double")
+    double = c_code.flight_code(of, form, "code", "double")
     made = {
         "double": (double, "code"),
-        "single": (flight.flight_code(of, form, "code", "single", bound), "code"),
+        "single": (c_code.flight_code(of, form, "code", "single", bound), "code"),
         "fixed point": (fixed.fixed_code(of, form, whole, "code"), "code_fixed"),
     }
     print(f"\n{name}: {form.order} states, {sum(each.size for each in of.inputs)} readings, {of.actuators} commands")

@@ -10,7 +10,7 @@ from microrad.cli import campaign as cli_campaign
 from microrad.cli import export as cli_export
 from microrad.cli import frame
 from microrad.core.folder import FolderError, check_folder
-from microrad.export import matrices_mat
+from microrad.export.linear_import import matlab
 from microrad.export.records import ExportError
 from microrad.lab.bench import folder
 from microrad.lab.bench.play import BenchError
@@ -56,7 +56,7 @@ def of_campaign(path):
         ("table.csv", disturbance.read_table, ValueError, f"cannot be read as text \\({MISSING}\\); save it as CSV"),
         ("report.html", carried.read, carried.ReproduceError, f"cannot be read: {MISSING}; name a report.html"),
         ("manifest.json", carried.read, carried.ReproduceError, f"cannot be read: {MISSING}; name a report.html"),
-        ("model.mat", matrices_mat.load, ExportError, f"cannot be read \\({MISSING}\\); check the path"),
+        ("model.mat", matlab.load, ExportError, f"cannot be read \\({MISSING}\\); check the path"),
         ("m.toml", Draft.open, MissionError, f"cannot be read: {MISSING}"),
         ("m.toml", lambda path: Draft.shipped(path).save(), DraftError, "cannot be written: it is no file on disk"),
         ("old/manifest.json", lambda p: check_folder(p.parent, True), FolderError, "are not results of microrad"),

@@ -8,7 +8,7 @@ import zipfile
 
 import pytest
 
-from microrad.export import build
+from microrad.export.flight import build
 from microrad.mission.file import load_mirror
 from shipped import SHIPPED, without_fine_pointing
 

@@ -6,7 +6,7 @@ import shlex
 
 import pytest
 
-from microrad.export import build
+from microrad.export.flight import build
 from places import ROOT
 from shipped import SHIPPED
 

@@ -13,11 +13,12 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 import designs
 from microrad.core import kernels, lti
-from microrad.export import choice, flight
-from microrad.export.modes import minimal
+from microrad.export import choice
+from microrad.export.flight import c_code
+from microrad.export.flight.rounding import RoundingBound, rounding_bound
+from microrad.export.linear_part.modes import minimal
+from microrad.export.linear_part.sections import sections
 from microrad.export.records import ExportError, Origin, Signal
-from microrad.export.rounding import RoundingBound, rounding_bound
-from microrad.export.sections import sections
 from microrad.export.templating import comment, real, render, table, terms
 from microrad.loop import control, disturbance
 from microrad.loop.control import AxisController, Drive, Timing
@@ -72,7 +73,7 @@ class Code:
     def __init__(self, folder, of, precision="double", name="flown", compiler="gcc", bound=GENEROUS):
         self.folder, self.of, self.name, self.number = folder, of, name, NUMBER[precision]
         folder.mkdir(parents=True, exist_ok=True)
-        self.files = flight.flight_code(of, sections(of), name, precision, bound)
+        self.files = c_code.flight_code(of, sections(of), name, precision, bound)
         for file, text in self.files.items():
             (folder / file).write_text(text, encoding="utf-8")
         places = np.cumsum([0, *(each.size for each in of.inputs)])
@@ -111,7 +112,7 @@ class Code:
 
 def bench(code, vectors, target="check", passes=1):
     """Status and numbers of the bench that the Makefile builds, over these vectors."""
-    (code.folder / "vectors.csv").write_text(flight.vectors_text(code.of, vectors), encoding="utf-8")
+    (code.folder / "vectors.csv").write_text(c_code.vectors_text(code.of, vectors), encoding="utf-8")
     words = ["make", "-s", "-C", code.folder, target, "CC=gcc", f"PASSES={passes}"]
     done = subprocess.run(words, check=False, capture_output=True, text=True, timeout=HANG_S)
     lines = [line.split() for line in done.stdout.splitlines()]
@@ -260,7 +261,7 @@ def test_every_model_of_hysteresis_and_creep_on_several_actuators(name, shipped,
     assert vectors.saturated > 50
     assert (vectors.rate_clamped > 50) == (("exponent" not in name and "generalised" not in name) or "gen" in name)
     off, counters = difference(Code(tmp_path / "double", of), vectors)
-    assert off < flight.bound_share(of) == (1e-10 if "exponent" in name else EXACT)
+    assert off < c_code.bound_share(of) == (1e-10 if "exponent" in name else EXACT)
     assert counters == Counters(vectors.saturated, vectors.rate_clamped, 0, 0)
     off, counters = difference(Code(tmp_path / "single", of, "single"), vectors)
     assert 1e-8 < off < 2e-5
@@ -471,7 +472,7 @@ def test_garbage_is_held_off_and_never_leaves_the_limits(name, precision, shippe
     assert (numbers["rejected"], numbers["faults"]) == (rejected, counters.faults)
     if "exponent" not in name and precision == "double":  # the recorded run, whose counts leave the limits
         assert np.max(np.abs(vectors.commands)) > 2.5
-        assert difference(code, flight.within_limits(of, vectors))[0] < EXACT < difference(code, vectors)[0]
+        assert difference(code, c_code.within_limits(of, vectors))[0] < EXACT < difference(code, vectors)[0]
 
 
 def test_the_sanitizers_would_see_it(shipped, tmp_path):
@@ -637,14 +638,14 @@ def test_it_is_called_from_c_plus_plus(shipped, tmp_path):
 
 
 def test_a_unit_with_a_stroke_makes_a_constant():
-    (found,) = flight._readings((Signal("wanted_rad_s", 2, "rad/s", "rate", 3.0),))
-    assert (found.NAME, found.UNIT) == ("WANTED", "RAD_S")
+    (found,) = c_code._readings((Signal("wanted_rad_s", 2, "rad/s", "rate", 3.0),))
+    assert (found["NAME"], found["UNIT"]) == ("WANTED", "RAD_S")
 
 
 def test_a_bound_that_is_none_is_said_in_the_header(shipped):
     of = choice.flight_controller(shipped)
     none = RoundingBound(command_v=of.maximum_v - of.minimum_v, samples=1, per_sample_v=0.0, words="It is not bounded.")
-    header = flight.flight_code(of, sections(of), "flown", "single", none)["flown.h"]
+    header = c_code.flight_code(of, sections(of), "flown", "single", none)["flown.h"]
     assert "Single precision. It is not bounded." in header
 
 
@@ -687,7 +688,7 @@ def test_the_bench_finds_what_is_off_and_times_the_steps(shipped, tmp_path):
 
 def test_vectors_keep_all_their_digits(shipped):
     of, vectors = choice.flight_controller(shipped), choice.vectors(shipped, 5)
-    lines = flight.vectors_text(of, vectors).splitlines()
+    lines = c_code.vectors_text(of, vectors).splitlines()
     assert lines[0].split(",") == [
         *(f"{name}_{i}" for name in ("optical_error_rad", "reference_rad") for i in range(2)),
         "command_v_0",
@@ -701,7 +702,7 @@ def test_vectors_keep_all_their_digits(shipped):
 
 
 def code_of(of, name="flown", precision="double", bound=None):
-    return flight.flight_code(of, sections(of), name, precision, bound)
+    return c_code.flight_code(of, sections(of), name, precision, bound)
 
 
 def test_what_cannot_become_code_is_refused(shipped):

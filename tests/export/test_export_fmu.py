@@ -22,8 +22,10 @@ from packaging.requirements import Requirement
 import designs
 from loops import IDEAL_DRIVE
 from microrad.core import kernels, lti
-from microrad.export import choice, fmi_description, fmu
-from microrad.export.build import compiler
+from microrad.export import choice
+from microrad.export.flight.build import compiler
+from microrad.export.fmi import fmu
+from microrad.export.fmi.description import variables
 from microrad.export.records import ExportError, Origin, PlantUnit, Signal
 from microrad.loop import control
 from microrad.loop import sine_run as simulate
@@ -217,7 +219,7 @@ def test_fmpy_finds_no_fault(archive, name, version):
     description = fmpy.read_model_description(path, validate=True)
     assert description.fmiVersion == version
     assert description.coSimulation.canGetAndSetFMUstate and description.coSimulation.canSerializeFMUstate
-    listed = fmi_description.variables(UNITS[name]())
+    listed = variables(UNITS[name]())
     assert [v.name for v in description.modelVariables] == [v.name for v in listed]
     if name == "rich":
         assert description.modelName == "all there */ is"

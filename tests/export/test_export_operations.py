@@ -4,7 +4,7 @@ import ctypes
 import re
 import shutil
 import subprocess
-from dataclasses import astuple, dataclass, fields, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -12,12 +12,12 @@ import pytest
 
 import designs
 from microrad.core import lti
-from microrad.export import fixed, flight, operations
-from microrad.export.fixed import FixedForm
-from microrad.export.operations import FixedOperations, Operations
+from microrad.export.flight import c_code, fixed, operations
+from microrad.export.flight.fixed_form import FixedForm
+from microrad.export.flight.operations import FixedOperations, Operations
+from microrad.export.flight.rounding import RoundingBound
+from microrad.export.linear_part.sections import sections
 from microrad.export.records import FlightController, Floats, InverseLaw, Origin, Signal, Vectors
-from microrad.export.rounding import RoundingBound
-from microrad.export.sections import Sections, sections
 from waiting import HANG_S
 
 KINDS = tuple(each.name for each in fields(Operations))
@@ -154,7 +154,7 @@ def compiled(folder: Path, files: dict[str, str], of: FlightController, precisio
 def counted(folder: Path, of: FlightController, precision: str, trials: int | None = None) -> Counted:
     """The generated code with a class for its real numbers, at the most ``trials`` of its own."""
     bound = RoundingBound(1.0, 1, 0.0, "none")
-    files = flight.flight_code(of, sections(of), "code", precision, bound if precision == "single" else None)
+    files = c_code.flight_code(of, sections(of), "code", precision, bound if precision == "single" else None)
     base, changed = "float" if precision == "single" else "double", {}
     for file in set(files) - {"Makefile", "code_bench.c"}:
         changed[file] = files[file].replace(f"typedef {base} code_real;", "typedef number code_real;")
@@ -309,7 +309,7 @@ def test_an_exponent_other_than_1_costs_its_trials(
 
 def test_the_trials_are_those_of_the_code() -> None:
     of = plain(law(power=0.7, plays=False))
-    header = flight.flight_code(of, sections(of), "code", "double")["code_hysteresis.h"]
+    header = c_code.flight_code(of, sections(of), "code", "double")["code_hysteresis.h"]
     assert re.findall(r"#define CODE_MOST_TRIALS (\d+)", header) == [str(operations.MOST_TRIALS)]
     powers = operations.operations(of, sections(of), "double").powers
     assert powers == 3 * 8 * operations.MOST_TRIALS  # three elements; seven slopes and the next length a trial
@@ -328,7 +328,7 @@ def run_of(of: FlightController) -> Vectors:
     """A small swinging run, which sets the scales of fixed point."""
     inputs = 0.2 * swinging(of)[:1500]
     nothing = np.zeros((inputs.shape[0], of.actuators))
-    return Vectors(inputs, nothing, nothing, nothing, 0, 0)
+    return Vectors(inputs, nothing, 0, 0)
 
 
 def whole(made: FixedForm, readings: Floats) -> Floats:
@@ -375,33 +375,16 @@ def test_fixed_point_is_said_in_words() -> None:
 
 
 # ------------------------------------------------------------------------------------------------------- the records
-def test_the_parts_make_the_whole() -> None:
-    of = PLAIN["all"]
-    form = sections(of)
-    parts = operations.by_part(of, form, "single")
-    assert list(parts) == ["upsets", "readings", "outputs", "inverse", "commands", "states"]
-    whole = operations.operations(of, form, "single")
-    assert astuple(whole) == tuple(sum(astuple(each)[i] for each in parts.values()) for i in range(len(KINDS)))
-    assert whole.total == sum(astuple(whole))
-    assert parts["readings"] == Operations(comparisons=8)
-    assert parts["inverse"].exponentials == 3 * 4
-    assert parts["inverse"].logarithms == 3
-    assert list(operations.by_part(plain(None), sections(plain(None)), "double")) == [
-        "upsets",
-        "readings",
-        "outputs",
-        "commands",
-        "states",
-    ]
-
-
-def test_a_controller_without_states_has_no_such_part() -> None:
+def test_a_controller_without_states_costs_nothing_for_them() -> None:
     of = plain(None)
     none = np.zeros((0, 2))
-    of = replace(of, system=lti.StateSpace(np.zeros((0, 0)), none, none.T, of.system.D), anti_windup=none)
+    of = replace(
+        of, system=lti.StateSpace(np.zeros((0, 0)), none, none.T, of.system.D), anti_windup=none, resolution_v=0.0
+    )
     form = sections(of)
-    assert isinstance(form, Sections)
-    assert list(operations.by_part(of, form, "double")) == ["upsets", "readings", "outputs", "commands"]
+    found = operations.operations(of, form, "double")
+    assert found.multiplications == np.count_nonzero(of.system.D)
+    assert found.additions == np.count_nonzero(of.system.D) + of.actuators  # what the limits took off
 
 
 def test_counts_add_up_and_are_said_in_words() -> None:

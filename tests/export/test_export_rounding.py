@@ -14,10 +14,10 @@ import pytest
 
 import designs
 from microrad.core import kernels, lti
-from microrad.export import double_run, rounding
-from microrad.export.flight import compensated_states, flight_code, vectors_text
+from microrad.export.flight import double_run, rounding
+from microrad.export.flight.c_code import flight_code, vectors_text
+from microrad.export.linear_part.sections import compensated_states, sections
 from microrad.export.records import FlightController, InverseLaw, Origin, Signal, Vectors
-from microrad.export.sections import sections
 
 SAMPLES = 2000
 f = np.float32
@@ -222,9 +222,7 @@ def test_the_compiled_code_stays_within_it(name, tmp_path):
 
 def test_what_integrators_lose_grows_with_the_samples():
     of, form, v = shipped("PI + inverse")
-    half = Vectors(
-        *(getattr(v, key)[: SAMPLES // 2] for key in ("inputs", "commands", "disturbance_rad", "error_rad")), 0, 0
-    )
+    half = Vectors(*(getattr(v, key)[: SAMPLES // 2] for key in ("inputs", "commands")), 0, 0)
     whole, early = rounding.rounding_bound(of, form, v), rounding.rounding_bound(of, form, half)
     assert whole.per_sample_v > 0.0 < early.per_sample_v
     ahead = np.max(rounding.errors_before_converter(of, form, v))
@@ -257,7 +255,7 @@ def one_axis(system, *, windup=0.0, inverse=None, limit_v=math.inf, resolution_v
 
 def vectors_of(inputs):
     nothing = np.zeros((len(inputs), 1))
-    return Vectors(inputs, nothing, nothing, nothing, 0, 0)
+    return Vectors(inputs, nothing, 0, 0)
 
 
 def integral(gain=3000.0, step=300.0):

@@ -11,11 +11,11 @@ from numpy.testing import assert_allclose, assert_array_equal
 import designs
 from microrad.core import lti
 from microrad.export import choice
-from microrad.export.block_diagonal import block_diagonal
 from microrad.export.identifiers import LONGEST, identifier, suggested
-from microrad.export.modes import minimal
+from microrad.export.linear_part.block_diagonal import block_diagonal
+from microrad.export.linear_part.modes import minimal, modes
+from microrad.export.linear_part.sections import MODAL, TRIANGULAR, sections
 from microrad.export.records import ExportError, FlightController, Origin, Signal
-from microrad.export.sections import MODAL, TRIANGULAR, sections
 
 PERIOD = 1e-3
 RECORDED, LONG = 2000, 30_000
@@ -61,21 +61,15 @@ def replay(system, windup, inputs, limit, first=0):
 
 
 def by_sections(form, inputs, limit, first=0):
-    """The same as the code does it: the state's own term, its neighbour's, and the rows of the rest."""
-    n, commands = form.diagonal.size, slice(first, first + form.L.shape[1])
-    neighbour = np.minimum(np.arange(n) ^ 1, max(n - 1, 0))
-    start, column, value = form.rest.start.astype(int), form.rest.column.astype(int), form.rest.value
-    row = np.repeat(np.arange(n), np.diff(start))
-    x, outputs = np.zeros(n), np.empty((len(inputs), len(form.D)))
+    """The same with the blocks."""
+    commands = slice(first, first + form.L.shape[1])
+    x, outputs = np.zeros(form.order), np.empty((len(inputs), len(form.D)))
     drive, direct = inputs @ form.B.T, inputs @ form.D.T
     for k in range(len(inputs)):
         outputs[k] = y = form.C @ x + direct[k]
         v = y[commands]
         clipped = np.minimum(np.maximum(v, -limit), limit) - v
-        after = form.diagonal * x + form.coupling * x[neighbour] + drive[k] + form.L @ clipped
-        if value.size:
-            after += np.bincount(row, value * x[column], n)
-        x = after
+        x = form.A @ x + drive[k] + form.L @ clipped
     return outputs
 
 
@@ -186,11 +180,11 @@ def test_blocks_are_as_small_as_the_poles_allow():
 
 
 def test_integrators_and_delays_keep_poles_of_exactly_one_and_zero():
-    assert sections(SYSTEMS["integrator"]).diagonal.tolist() == [1.0]
-    assert sections(SYSTEMS["integrator behind a filter"]).diagonal.tolist() == [1.0, 0.9]
-    assert sections(SYSTEMS["slow beside an integrator"]).diagonal.tolist() == [0.99999, 1.0]
-    assert sections(SYSTEMS["delays"]).diagonal.tolist() == [0.0] * 5
-    filled = sections(SYSTEMS["two integrators, mixed"]).diagonal  # rounding of its entries is all that is left
+    assert np.diag(sections(SYSTEMS["integrator"]).A).tolist() == [1.0]
+    assert np.diag(sections(SYSTEMS["integrator behind a filter"]).A).tolist() == [1.0, 0.9]
+    assert np.diag(sections(SYSTEMS["slow beside an integrator"]).A).tolist() == [0.99999, 1.0]
+    assert np.diag(sections(SYSTEMS["delays"]).A).tolist() == [0.0] * 5
+    filled = np.diag(sections(SYSTEMS["two integrators, mixed"]).A)  # rounding of its entries is all that is left
     assert_allclose(filled, [0.5, 1.0, 1.0], rtol=0.0, atol=1e-15)
     assert np.any(filled != [0.5, 1.0, 1.0])
 
@@ -202,7 +196,7 @@ def test_delays_between_filters_keep_poles_of_exactly_zero():
     order = np.random.default_rng(4).permutation(10)
     form = sections(controller(A[np.ix_(order, order)], np.eye(10)[0][order], np.eye(10)[9][order]))
     assert [size for _, size in form.blocks] == [2, 2, 6]
-    assert form.diagonal[4:].tolist() == [0.0] * 6 and np.min(np.abs(form.diagonal[:4])) > 0.6
+    assert np.diag(form.A)[4:].tolist() == [0.0] * 6 and np.min(np.abs(np.diag(form.A)[:4])) > 0.6
     assert np.max(np.abs(np.linalg.eigvals(form.A[4:, 4:]))) == 0.0
 
 
@@ -223,8 +217,8 @@ def test_a_complex_pair_turns_in_a_rotation():
     pairs = [at for at, size in form.blocks if size == 2]
     assert pairs == [0] and np.count_nonzero(poles.imag > 0.0) == 1
     for at in pairs:
-        assert form.diagonal[at] == form.diagonal[at + 1]
-        assert form.coupling[at] == -form.coupling[at + 1] != 0.0
+        assert form.A[at, at] == form.A[at + 1, at + 1]
+        assert form.A[at, at + 1] == -form.A[at + 1, at] != 0.0
     assert_allclose(np.sort_complex(np.linalg.eigvals(form.A)), np.sort_complex(poles), rtol=1e-12)
 
 
@@ -237,7 +231,7 @@ def test_the_dense_matrix_is_block_diagonal_and_has_the_poles():
             np.ones((1, 5)),
         )
     )
-    assert [size for _, size in form.blocks] == [2, 3] and form.coupling[4] == 0.0 and form.rest.value.size > 0
+    assert [size for _, size in form.blocks] == [2, 3] and form.form == TRIANGULAR
     inside = np.zeros((5, 5), dtype=bool)
     for at, size in form.blocks:
         inside[at : at + size, at : at + size] = True
@@ -342,7 +336,7 @@ def test_numbers_that_are_not_finite_are_refused_by_their_place(matrix, named):
 
 
 def test_poles_on_the_circle_pass_up_to_rounding():
-    assert sections(controller([[1.0 + 5e-10]], [1], [1])).diagonal[0] > 1.0
+    assert np.diag(sections(controller([[1.0 + 5e-10]], [1], [1])).A)[0] > 1.0
     with pytest.raises(ExportError, match="unstable"):
         sections(controller([[1.0 + 2e-9]], [1], [1]))
 
@@ -430,7 +424,8 @@ def test_a_mission_s_controllers_come_in_blocks_of_one_and_two(flying):
     for name in ("LQG", "disturbance observer"):
         with pytest.raises(ExportError, match="not minimal"):
             sections(flying[name][0])
-    conditions = [form.condition for _, _, form, _ in flying.values()]
+    bases = [modes(less).found.basis.astype(float) for _, less, _, _ in flying.values()]
+    conditions = [np.linalg.cond(basis / np.linalg.norm(basis, axis=0)) for basis in bases]
     assert 1.0 <= min(conditions) <= max(conditions) < 100.0
 
 

@@ -8,9 +8,9 @@ import pytest
 
 import designs
 from export.test_export_flight import PAIRS, pair
-from microrad.export import fixed, flight
-from microrad.export.rounding import RoundingBound
-from microrad.export.sections import sections
+from microrad.export.flight import c_code, fixed
+from microrad.export.flight.rounding import RoundingBound
+from microrad.export.linear_part.sections import sections
 
 FLIPS = 10_000
 BEHIND = 6  # samples that are looked at behind each flip
@@ -100,7 +100,7 @@ def flown(name):
 @pytest.mark.parametrize("name", ["PI + inverse", "LQG", *PAIRS])
 def test_no_bit_of_the_state_takes_a_command_beyond_the_limits(tmp_path, name, precision):
     of, run = flown(name)
-    files = flight.flight_code(of, sections(of), "flown", precision, BOUND)
+    files = c_code.flight_code(of, sections(of), "flown", precision, BOUND)
     number = np.float64 if precision == "double" else np.float32
     limits = "FLOWN_COMMAND_MIN_V", "FLOWN_COMMAND_MAX_V"
     values = run.inputs[:300].astype(number)

@@ -15,8 +15,8 @@ from scipy.io import loadmat, savemat
 from scipy.sparse import csc_array
 
 from microrad.core import lti
-from microrad.export import linear_import, matrices
-from microrad.export.linear_import import Given, import_control, import_mat
+from microrad.export import matrices
+from microrad.export.linear_import import Given, import_control, import_mat, mirror_file
 from microrad.export.records import ExportError
 from microrad.mirror import model as mirror
 from microrad.mission.file import load_mirror, load_mission
@@ -322,7 +322,7 @@ def test_without_python_control_the_extra_is_named(monkeypatch):
 def test_a_mirror_file_that_says_something_else_is_never_returned(tmp_path, monkeypatch):
     path = save(tmp_path, **SHAPES["roots"])
     assert import_mat(path, GIVEN)
-    monkeypatch.setattr(linear_import, "READ_BACK", 1e-18)
+    monkeypatch.setattr(mirror_file, "READ_BACK", 1e-18)
     with pytest.raises(ExportError, match="the mirror file would differ from the model"):
         import_mat(path, GIVEN)
 

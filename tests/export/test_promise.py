@@ -5,7 +5,8 @@ import math
 
 import pytest
 
-from microrad.export import choice, write
+from microrad.export import choice
+from microrad.export.flight import write
 from microrad.export.records import ExportError
 from microrad.loop import fine_pointing
 from microrad.loop.fine_loop import ensemble

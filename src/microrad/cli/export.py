@@ -119,7 +119,8 @@ def c(  # noqa: PLR0913, PLR0917  each is an option
     With its inverse, limits and counters, a test bench, a recorded run of the loop and a Makefile; compiled and run
     over that run where there is a C compiler.
     """
-    from microrad.export import choice, write
+    from microrad.export import choice
+    from microrad.export.flight import write
     from microrad.export.identifiers import identifier, suggested
 
     mission = _mission(file, mirror)
@@ -172,7 +173,7 @@ def fmu(  # noqa: PLR0913, PLR0917  each is an option
     Simulink, Modelica tools, Basilisk and whatever else imports an FMU.
     """
     from microrad.export import choice
-    from microrad.export.fmu import write_unit
+    from microrad.export.fmi.fmu import write_unit
     from microrad.export.identifiers import identifier, suggested
 
     if controller is not None and loop is not None:

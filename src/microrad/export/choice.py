@@ -1,16 +1,19 @@
-"""From a mission to what is exported: one of its controllers, the loop around it, and a run of it in the kernel."""
+"""The room's door: from a mission to one of its controllers, the loop around it, and a run of it in the kernel.
+
+`choose` and `plant_unit` take the mission; what they give holds its parts, and no mission.
+"""
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 
 from microrad import mirror
 from microrad.core import kernels, lti
 from microrad.core.units import format_quantity
-from microrad.export.modes import minimal
+from microrad.export.linear_part.modes import minimal
 from microrad.export.records import (
     GAUGE,
     OPTICAL_ERROR,
@@ -23,18 +26,18 @@ from microrad.export.records import (
     LoopUnit,
     Origin,
     PlantUnit,
+    Progress,
     Signal,
     Vectors,
 )
 from microrad.link.tracking_light import tracking_light_w
-from microrad.loop import control, fine_pointing, paper_cases
-from microrad.loop import sine_run as simulate
+from microrad.loop import control, fine_pointing, paper_cases, sine_run
 from microrad.loop.fine_loop.loop import LoopController
 from microrad.loop.fine_loop.replay import replay
-from microrad.mirror import Variant
+from microrad.mirror import Variant, model
 from microrad.mission.file import MissionFile
-
-Progress = Callable[[int, int, str], None]
+from microrad.mission.model import Scenario
+from microrad.mission.tables.mirror import Mirror as MirrorTable
 
 PID, PID_WITH_INVERSE = "PID", "PID + inverse"
 """The controllers of the table [control], as the study names them."""
@@ -47,10 +50,19 @@ INPUT_LIMIT_RAD = 0.1
 
 
 @dataclass(frozen=True, slots=True)
+class Source:
+    """The mission file that something was made from, and the table of its mirror."""
+
+    path: Path
+    origin: Origin
+    mirror: MirrorTable
+
+
+@dataclass(frozen=True, slots=True)
 class PointingChoice:
     """A controller of the fine-pointing loop."""
 
-    file: MissionFile
+    source: Source
     scene: fine_pointing.Scene
     tuned: control.Tuned
     controller: LoopController
@@ -58,12 +70,13 @@ class PointingChoice:
 
 @dataclass(frozen=True, slots=True)
 class TrackingChoice:
-    """A controller of the table [control]: one axis that tracks sines, the paper's Fig. 6 and 8."""
+    """A controller of the table [control]: one axis that tracks the scenario's sines, the paper's Fig. 6 and 8."""
 
-    file: MissionFile
+    source: Source
+    scenario: Scenario
     name: str
-    mirror: mirror.Mirror
-    setup: simulate.Setup
+    mirror: model.Mirror
+    setup: sine_run.Setup
     inverse: control.Inverse
 
 
@@ -76,20 +89,27 @@ def names(file: MissionFile) -> tuple[str, ...]:
     return (*pointing, PID, PID_WITH_INVERSE)
 
 
-def choose(
-    file: MissionFile, name: str, on_progress: Progress = lambda done, total, what: None
-) -> PointingChoice | TrackingChoice:
-    """A controller of a mission, tuned where it belongs to the fine-pointing loop; `names` lists them.
+def source(file: MissionFile) -> Source:
+    """What an export says of the mission that it was made from."""
+    table = file.mission.mirror
+    return Source(file.path, Origin(file.mission.name, file.sha256, table.name), table)
 
-    Raises ExportError with the reason for a name that the mission does not have, and for a controller that cannot be
-    built on its mirror.
+
+def choose(file: MissionFile, name: str, on_progress: Progress = lambda done, total, what: None) -> Choice:
+    """A controller of a mission, tuned where it belongs to the fine-pointing loop.
+
+    Args:
+        file: the mission.
+        name: one of its `names`.
+        on_progress: is told what is being tuned.
+
+    Raises:
+        ExportError: the mission has no such controller, or it cannot be built on the mission's mirror.
     """
     if name not in names(file):
         raise ExportError(f"{file.path} has no controller {name!r}; it has: {'; '.join(names(file))}")
     try:
         return _tracking(file, name) if name in (PID, PID_WITH_INVERSE) else _pointing(file, name, on_progress)
-    except ExportError:
-        raise
     except ValueError as error:
         raise ExportError(f"{file.path}: {error}") from error
 
@@ -99,7 +119,7 @@ def _pointing(file: MissionFile, name: str, on_progress: Progress) -> PointingCh
     scene = _scene(file)
     tuned = fine_pointing.tune(name, scene.table, fine_pointing.plants(scene, scene.table.seed))
     on_progress(1, 2, f"{name} tuned")
-    return PointingChoice(file, scene, tuned, fine_pointing.build(name, scene, tuned.controller))
+    return PointingChoice(source(file), scene, tuned, fine_pointing.build(name, scene, tuned.controller))
 
 
 def _scene(file: MissionFile) -> fine_pointing.Scene:
@@ -126,7 +146,7 @@ def promised(choice: Choice, accept: bool = False) -> fine_pointing.Outlook | No
 def _broken(choice: PointingChoice, left: fine_pointing.Outlook) -> str:
     found, said = rms_text(left.simulated_rad), rms_text(left.linear_rad)
     return (
-        f"{choice.file.path}: {choice.controller.name} leaves {found} on the mission's mirror, simulated with its "
+        f"{choice.source.path}: {choice.controller.name} leaves {found} on the mission's mirror, simulated with its "
         f"hysteresis: {left.times:.2f} times the {said} of linear theory, where {fine_pointing.PROMISE:g} times is the "
         "most. Choose another controller by the simulated figures of microrad design, or write this one all the same "
         "with --accept."
@@ -142,7 +162,7 @@ def _tracking(file: MissionFile, name: str) -> TrackingChoice:
     cases = paper_cases.of(file.mission, mirror.of(file.mission))
     plant = cases.mirrors.line_of_sight[Variant.GIVEN].plant
     inverse = control.inverse(plant) if name == PID_WITH_INVERSE else control.no_feedforward(plant)
-    return TrackingChoice(file, name, plant, cases.setup, inverse)
+    return TrackingChoice(source(file), file.mission.scenario, name, plant, cases.setup, inverse)
 
 
 # ------------------------------------------------------------------------------------------------------ the controller
@@ -154,7 +174,7 @@ def flight_controller(choice: Choice) -> FlightController:
     try:
         return minimal(trimmed(_whole_controller(choice)))
     except ValueError as error:  # gains of [control] under which the loop is unstable
-        raise error if isinstance(error, ExportError) else ExportError(f"{choice.file.path}: {error}") from error
+        raise error if isinstance(error, ExportError) else ExportError(f"{choice.source.path}: {error}") from error
 
 
 def _whole_controller(choice: Choice) -> FlightController:
@@ -183,17 +203,10 @@ def trimmed(of: FlightController) -> FlightController:
     )
 
 
-def origin(file: MissionFile) -> Origin:
-    """Where an export of a mission comes from."""
-    return Origin(file.mission.name, file.sha256, file.mission.mirror.name)
-
-
 def inverse_law(of: control.Inverse, period_s: float, by_difference: bool) -> InverseLaw:
     """An inverse at a control period."""
-    arrays = control.inverse_arrays(of, period_s)
-    return InverseLaw(
-        **{key.removeprefix("inverse_"): value for key, value in arrays.items()}, by_difference=by_difference
-    )
+    arrays = {key.removeprefix("inverse_"): value for key, value in control.inverse_arrays(of, period_s).items()}
+    return InverseLaw(**arrays, by_difference=by_difference)
 
 
 def _pointing_controller(choice: PointingChoice) -> FlightController:
@@ -207,7 +220,7 @@ def _pointing_controller(choice: PointingChoice) -> FlightController:
     )
     return FlightController(
         name=made.name,
-        origin=origin(choice.file),
+        origin=choice.source.origin,
         period_s=period,
         inputs=inputs,
         actuators=loop.mirror.actuators,
@@ -217,7 +230,7 @@ def _pointing_controller(choice: PointingChoice) -> FlightController:
         minimum_v=loop.drive.minimum_v,
         maximum_v=loop.drive.maximum_v,
         resolution_v=loop.drive.drive_resolution_v,
-        bias_v=choice.file.mission.mirror.bias_v,
+        bias_v=choice.source.mirror.bias_v,
         margins=(
             ("modulus margin", margins.modulus, ""),
             ("gain margin", 20.0 * math.log10(margins.gain_up), "dB"),
@@ -230,7 +243,7 @@ def _pointing_controller(choice: PointingChoice) -> FlightController:
 
 def _tracking_controller(choice: TrackingChoice) -> FlightController:
     setup, s, axes = choice.setup, choice.setup.controller, choice.mirror.axes
-    margins = simulate.margins(choice.mirror, setup)
+    margins = sine_run.margins(choice.mirror, setup)
     inverse = None
     D = np.hstack([-s.D, s.D])
     C = s.C
@@ -240,7 +253,7 @@ def _tracking_controller(choice: TrackingChoice) -> FlightController:
         C = np.vstack([C, np.zeros((axes, s.order))])
     return FlightController(
         name=choice.name,
-        origin=origin(choice.file),
+        origin=choice.source.origin,
         period_s=setup.timing.period_s,
         inputs=(
             Signal(READING, axes, "rad", "line of sight as the mirror's sensor reads it", INPUT_LIMIT_RAD),
@@ -253,7 +266,7 @@ def _tracking_controller(choice: TrackingChoice) -> FlightController:
         minimum_v=setup.drive.minimum_v,
         maximum_v=setup.drive.maximum_v,
         resolution_v=setup.drive.drive_resolution_v,
-        bias_v=choice.file.mission.mirror.bias_v,
+        bias_v=choice.source.mirror.bias_v,
         margins=(
             ("modulus margin", margins.modulus, ""),
             ("gain margin", 20.0 * math.log10(margins.gain), "dB"),
@@ -265,33 +278,38 @@ def _tracking_controller(choice: TrackingChoice) -> FlightController:
 
 # ---------------------------------------------------------------------------------------------------- plants and loops
 def plant_unit(file: MissionFile, loop: str) -> PlantUnit:
-    """Amplifier and mirror of one of the `LOOPS` of a mission, at the loop's plant step.
+    """Amplifier and mirror of a mission, at the plant step of one of its loops.
 
-    Raises ExportError with the reason for a loop that the mission does not have or that cannot be built.
+    Args:
+        file: the mission.
+        loop: one of `LOOPS`.
+
+    Raises:
+        ExportError: the mission has no such loop, or it cannot be built.
     """
     if loop not in LOOPS or (loop == LOOPS[0] and file.mission.fine_pointing is None):
         raise ExportError(f"{file.path} has no loop {loop!r}: one of {', '.join(LOOPS)} that is a table of the mission")
     try:
         if loop == LOOPS[0]:
             made = _scene(file).loop
-            return _plant_unit(file, made.mirror, made.optics, made.drive, made.timing)
-        chosen = _tracking(file, PID)
-        return _plant_unit(file, chosen.mirror, np.eye(chosen.mirror.axes), chosen.setup.drive, chosen.setup.timing)
+            return _plant_unit(source(file), made.mirror, made.optics, made.drive, made.timing)
+        one = _tracking(file, PID)
+        return _plant_unit(one.source, one.mirror, np.eye(one.mirror.axes), one.setup.drive, one.setup.timing)
     except ValueError as error:
         raise ExportError(f"{file.path}: {error}") from error
 
 
 def _plant_unit(
-    file: MissionFile, of: mirror.Mirror, optics: Floats, drive: control.Drive, timing: control.Timing
+    of: Source, mirror: model.Mirror, optics: Floats, drive: control.Drive, timing: control.Timing
 ) -> PlantUnit:
     return PlantUnit(
-        origin(file),
-        mirror.discretise(of, timing.step_s),
+        of.origin,
+        model.discretise(mirror, timing.step_s),
         optics,
         drive.bandwidth_hz,
         control.amplifier_factor(drive, timing.step_s),
         drive.slew_v_s * timing.step_s,
-        file.mission.mirror.bias_v,
+        of.mirror.bias_v,
     )
 
 
@@ -299,73 +317,46 @@ def loop_unit(choice: Choice) -> LoopUnit:
     """The chosen controller with the loop around it; sensors without their noise."""
     made = flight_controller(choice)
     if isinstance(choice, PointingChoice):
-        loop = choice.scene.loop
-        return LoopUnit(
-            plant=_plant_unit(choice.file, loop.mirror, loop.optics, loop.drive, loop.timing),
-            controller=made,
-            steps_per_sample=loop.timing.steps_per_sample,
-            delay_steps=loop.timing.delay_steps,
-            optical_delay_steps=loop.optical.delay_steps,
-            optical_every=loop.optical.every,
-            field_of_view_rad=loop.optical.field_of_view_rad,
-            optical_resolution_rad=loop.optical.resolution_rad,
-            gauge_resolution_rad=0.0 if loop.gauge is None else loop.gauge.resolution_rad,
-        )
-    setup = choice.setup
-    return LoopUnit(
-        plant=_plant_unit(choice.file, choice.mirror, np.eye(choice.mirror.axes), setup.drive, setup.timing),
-        controller=made,
-        steps_per_sample=setup.timing.steps_per_sample,
-        delay_steps=setup.timing.delay_steps,
-        optical_delay_steps=0,
-        optical_every=1,
-        field_of_view_rad=math.inf,
-        optical_resolution_rad=setup.drive.sensor_resolution_rad,
-        gauge_resolution_rad=0.0,
-    )
+        loop, optical = choice.scene.loop, choice.scene.loop.optical
+        plant = _plant_unit(choice.source, loop.mirror, loop.optics, loop.drive, loop.timing)
+        gauge_rad = 0.0 if loop.gauge is None else loop.gauge.resolution_rad
+        sensors = (optical.delay_steps, optical.every, optical.field_of_view_rad, optical.resolution_rad, gauge_rad)
+        timing = loop.timing
+    else:
+        drive, timing = choice.setup.drive, choice.setup.timing
+        plant = _plant_unit(choice.source, choice.mirror, np.eye(choice.mirror.axes), drive, timing)
+        sensors = (0, 1, math.inf, drive.sensor_resolution_rad, 0.0)  # one that is read at each sample, without delay
+    return LoopUnit(plant, made, timing.steps_per_sample, timing.delay_steps, *sensors)
 
 
 # ------------------------------------------------------------------------------------------------------------- vectors
-def vectors(choice: Choice, samples: int, *, freq_hz: float | None = None) -> Vectors:
+def vectors(choice: Choice, samples: int) -> Vectors:
     """A run of the chosen loop in the kernel, from rest, with what its controller read and commanded.
 
-    The fine-pointing loop runs in its mission's jitter (run 0 of its seed). The loop of [control] tracks the scenario's
-    sine of ``freq_hz`` (its fastest one with an inverse if None).
+    The fine-pointing loop runs in its mission's jitter (run 0 of its seed). The loop of [control] tracks the fastest
+    sine that the scenario has for an inverse.
+
+    Args:
+        choice: the controller.
+        samples: length of the run, in control periods.
     """
     if isinstance(choice, PointingChoice):
-        found = _pointing_vectors(choice, samples)
+        run = replay(choice.scene.loop, choice.controller, samples, choice.scene.table.seed)
+        saturated, clamped = (int(run.counts[c]) for c in (kernels.COUNT_SATURATED, kernels.COUNT_INVERSE_CLAMPED))
+        found = Vectors(run.inputs, run.commands, saturated, clamped)
     else:
-        found = _tracking_vectors(choice, samples, freq_hz)
+        found = _tracking_vectors(choice, samples)
     kept = _looked_at(_whole_controller(choice)).values()
     return replace(found, inputs=np.hstack([found.inputs[:, at] for at in kept]))
 
 
-def _pointing_vectors(choice: PointingChoice, samples: int) -> Vectors:
-    found = replay(choice.scene.loop, choice.controller, samples, choice.scene.table.seed)
-    return Vectors(
-        found.inputs,
-        found.commands,
-        found.disturbance_rad,
-        found.error_rad,
-        int(found.counts[kernels.COUNT_SATURATED]),
-        int(found.counts[kernels.COUNT_INVERSE_CLAMPED]),
-    )
-
-
-def _tracking_vectors(choice: TrackingChoice, samples: int, freq_hz: float | None) -> Vectors:
-    scenario, setup = choice.file.mission.scenario, choice.setup
-    f = freq_hz if freq_hz is not None else max(scenario.inverse_frequencies_hz)
+def _tracking_vectors(choice: TrackingChoice, samples: int) -> Vectors:
+    scenario, setup = choice.scenario, choice.setup
     time: Floats = np.arange(samples, dtype=float) * setup.timing.period_s
-    reference = scenario.amplitude_rad * np.sin(2.0 * np.pi * f * time)[:, None]
-    trace = simulate.track(choice.name, choice.mirror, setup, choice.inverse, reference, slice(0, samples))
+    reference = scenario.amplitude_rad * np.sin(2.0 * np.pi * max(scenario.inverse_frequencies_hz) * time)[:, None]
+    trace = sine_run.track(choice.name, choice.mirror, setup, choice.inverse, reference, slice(0, samples))
     resolution, reading = setup.drive.sensor_resolution_rad, trace.output_rad
     if resolution > 0.0:
         reading = np.floor(reading / resolution + 0.5) * resolution
-    return Vectors(
-        np.hstack([reading, reference]),
-        trace.command_v,
-        np.zeros_like(reference),
-        trace.error_rad,
-        trace.counts.saturated,
-        trace.counts.inverse_clamped,
-    )
+    counts = trace.counts
+    return Vectors(np.hstack([reading, reference]), trace.command_v, counts.saturated, counts.inverse_clamped)

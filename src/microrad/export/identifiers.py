@@ -1,13 +1,12 @@
 """Names in exported code: what C99 and C++ take for an identifier and no header in use has taken already."""
 
 import re
+import unicodedata
 
 from microrad.export.records import ExportError
 
 LONGEST = 31
 """Characters that C99 tells apart in a name with external linkage (5.2.4.1)."""
-
-_FORM = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 
 _KEYWORDS = """
     auto break case char const continue default do double else enum extern float for goto if inline int long register
@@ -61,7 +60,7 @@ def _trouble(name: str) -> str:
     checks = (
         (name.startswith("_"), "C keeps names that begin with an underscore for itself"),
         (
-            not _FORM.fullmatch(name),
+            not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", name),
             "a name has letters from A to Z and a to z, digits and underscores, and begins with a letter",
         ),
         (
@@ -82,16 +81,10 @@ def suggested(text: str) -> str:
     Accents are dropped, what is too long is cut behind a word where that leaves half of it, and a name that is taken
     gets an ending. A text without letters and digits becomes "controller".
     """
-    import unicodedata  # only where a name is made up
-
     plain = unicodedata.normalize("NFKD", text).encode("ascii", "ignore").decode().lower()
     found = "_".join(re.findall(r"[a-z0-9]+", plain)) or "controller"
-    found = _cut(found if found[0].isalpha() else f"c_{found}", LONGEST - len("_code"))
+    found, longest = found if found[0].isalpha() else f"c_{found}", LONGEST - len("_code")
+    if len(found) > longest:
+        whole = found[: longest + 1].rpartition("_")[0]
+        found = whole if len(whole) >= longest // 2 else found[:longest]
     return f"{found}_code" if _trouble(found) else found
-
-
-def _cut(name: str, longest: int) -> str:
-    if len(name) <= longest:
-        return name
-    whole = name[: longest + 1].rpartition("_")[0]
-    return whole if len(whole) >= longest // 2 else name[:longest]

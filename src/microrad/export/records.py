@@ -131,13 +131,10 @@ class LoopUnit:
 @dataclass(frozen=True, slots=True)
 class Vectors:
     """A run of the loop in the kernel as a controller sees it: ``inputs`` (samples, numbers), ``commands`` (samples,
-    actuators; V). ``disturbance_rad`` (samples, axes) is what acted, ``error_rad`` what was left, at the samples.
-    ``saturated`` and ``rate_clamped`` are counted over all samples and actuators (elements).
+    actuators; V). ``saturated`` and ``rate_clamped`` are counted over all samples and actuators (elements).
     """
 
     inputs: Floats
     commands: Floats
-    disturbance_rad: Floats
-    error_rad: Floats
     saturated: int
     rate_clamped: int

@@ -1,16 +1,15 @@
 """The templates of exported code: C, make files and XML with the numbers of a design in them."""
 
 import math
+import textwrap
 from collections.abc import Iterable
 from functools import cache
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
+from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from microrad.export.records import ExportError
-
-if TYPE_CHECKING:
-    from jinja2 import Environment
 
 Precision = Literal["double", "single"]
 
@@ -20,13 +19,6 @@ Terms = list[tuple[int, int, float]]
 LINE = 112
 """Longest line of a table or of words."""
 
-LARGEST = {"double": float(np.finfo(np.float64).max), "single": float(np.finfo(np.float32).max)}
-SMALLEST = {
-    "double": float(np.finfo(np.float64).smallest_normal),
-    "single": float(np.finfo(np.float32).smallest_normal),
-}
-"""What a number of exported code can hold, by precision."""
-
 
 def real(x: float, precision: Precision = "double") -> str:
     """A number as the shortest C literal that reads back to it; infinity becomes the largest finite number.
@@ -34,7 +26,8 @@ def real(x: float, precision: Precision = "double") -> str:
     At most 17 significant digits; in single precision 9, with the suffix f. What is too small for the precision becomes
     0 (a compiler warns of such a literal). Raises ExportError for nan, and for a finite number that is too large.
     """
-    largest = LARGEST[precision]
+    range_of = np.finfo(np.float64 if precision == "double" else np.float32)
+    largest = float(range_of.max)
     if math.isnan(x):
         raise ExportError("a number of the exported code is nan: no literal of C stands for it; look for its origin")
     if abs(x) > largest and not math.isinf(x):
@@ -42,7 +35,7 @@ def real(x: float, precision: Precision = "double") -> str:
             f"{float(x)!r} is beyond single precision, which ends at {largest:.4g}: export double precision"
         )
     held = min(max(float(x), -largest), largest)
-    held = 0.0 if abs(held) < SMALLEST[precision] else held
+    held = 0.0 if abs(held) < float(range_of.smallest_normal) else held
     text = repr(held) if precision == "double" else str(np.float32(held))
     text = text if "." in text or "e" in text else text + ".0"
     return text if precision == "double" else text + "f"
@@ -52,17 +45,13 @@ def table(matrix: Any, precision: Precision = "double") -> str:
     """Numbers as a C initialiser: ``{a, b}`` of one dimension, a braced line for each row of two."""
     numbers = np.asarray(matrix, dtype=float)
     if numbers.ndim == 1:
-        return _braced(real(float(x), precision) for x in numbers)
+        return "{" + ", ".join(real(float(x), precision) for x in numbers) + "}"
     return "{\n    " + ",\n    ".join(table(row, precision) for row in numbers) + ",\n}"
-
-
-def _braced(items: Iterable[str]) -> str:
-    return "{" + ", ".join(items) + "}"
 
 
 def whole(numbers: Iterable[int]) -> str:
     """Whole numbers as a C initialiser."""
-    return _braced(str(int(n)) for n in numbers)
+    return "{" + ", ".join(str(int(n)) for n in numbers) + "}"
 
 
 def terms(of: Terms, precision: Precision = "double") -> str:
@@ -79,10 +68,13 @@ def terms(of: Terms, precision: Precision = "double") -> str:
     return "\n    ".join(lines)
 
 
+def entries(matrix: Any) -> list[tuple[int, int, Any]]:
+    """Row, column and value of each number of a matrix that is not 0, row by row."""
+    return [(int(i), int(j), matrix[i, j].item()) for i, j in np.argwhere(matrix)]
+
+
 def comment(text: str, prefix: str = "") -> str:
     """Text for a comment of C, in lines that begin with ``prefix``: nothing in it can end the comment or hide code."""
-    import textwrap  # only where code is made
-
     plain = "".join(c if c.isprintable() else " " for c in text).replace("\\", "/").replace("??", "? ?")
     while "*/" in plain or "/*" in plain:
         plain = plain.replace("*/", "* /").replace("/*", "/ *")
@@ -95,9 +87,7 @@ def render(template: str, **values: Any) -> str:
 
 
 @cache
-def _environment() -> "Environment":
-    from jinja2 import Environment, PackageLoader, StrictUndefined  # slow to import, not needed to show help
-
+def _environment() -> Environment:
     made = Environment(
         loader=PackageLoader("microrad.export", "templates"),
         undefined=StrictUndefined,

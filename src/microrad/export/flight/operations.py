@@ -14,10 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from microrad.core import kernels
-from microrad.export.fixed import FixedForm
-from microrad.export.flight import compensated_states
+from microrad.export.flight.fixed_form import FixedForm
+from microrad.export.linear_part.sections import Sections, compensated_states
 from microrad.export.records import FlightController, InverseLaw
-from microrad.export.sections import Sections
 from microrad.export.templating import Precision
 
 MOST_TRIALS = 256
@@ -53,40 +52,26 @@ class Operations:
         return Operations(*(max(a, b) for a, b in zip(astuple(self), astuple(other), strict=True)))
 
     @property
-    def total(self) -> int:
-        """All of them."""
-        return int(sum(astuple(self)))
-
-    @property
     def words(self) -> str:
         """The counts in a line, without those that are 0."""
         return _counts(self, (each.name for each in fields(self)))
 
 
 def operations(of: FlightController, form: Sections, precision: Precision) -> Operations:
-    """The most that one call of {name}_step costs in floating point, whatever it reads; see `by_part`."""
-    return sum(by_part(of, form, precision).values(), start=Operations())
+    """The most that one call of {name}_step costs in floating point, whatever it reads.
 
-
-def by_part(of: FlightController, form: Sections, precision: Precision) -> dict[str, Operations]:
-    """`operations` by the part of a step that they belong to, in the order of the step.
-
-    "upsets": whether the state is sound; "readings": whether they are accepted; "outputs": C x + D m; "inverse", where
-    there is one; "commands": limits, whether they are sound, the converter; "states": A x + B m + L times what the
-    limits took off.
+    Args:
+        of: the controller.
+        form: its linear part.
+        precision: of the code.
     """
-    numbers = sum(each.size for each in of.inputs)
-    found = {
-        "upsets": _mended(of, form, precision),
-        "readings": Operations(comparisons=2) * numbers,
-        "outputs": _product(form.C) + _product(form.D),
-    }
+    found = _mended(of, form, precision)  # whether the state is sound, then whether the readings are accepted
+    found += Operations(comparisons=2) * sum(each.size for each in of.inputs)
+    found += _product(form.C) + _product(form.D)
     if of.inverse is not None:
-        found["inverse"] = _inverse(of.inverse, of.actuators, precision)
-    found["commands"] = _command(of.resolution_v > 0.0) * of.actuators
-    if form.order:
-        found["states"] = _states(form, precision)
-    return found
+        found += _inverse(of.inverse, of.actuators, precision)
+    found += _command(of.resolution_v > 0.0) * of.actuators
+    return found + _states(form, precision) if form.order else found
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,14 +91,11 @@ class FixedOperations:
     @property
     def words(self) -> str:
         """The counts in a line, without those that are 0."""
-        found = f"{_counts(self, INTEGERS)} of whole numbers"
+        whole = ("multiplications", "additions", "shifts", "comparisons")
+        found = f"{_counts(self, whole)} of whole numbers"
         if self.single == Operations():
             return found
         return f"{found}; {_counts(self, ('conversions',))}; in single precision {self.single.words}"
-
-
-INTEGERS = ("multiplications", "additions", "shifts", "comparisons")
-"""Fields of `FixedOperations` that count operations of whole numbers."""
 
 
 def _counts(of: Operations | FixedOperations, names: Iterable[str]) -> str:
@@ -194,34 +176,21 @@ def _inverse(of: InverseLaw, actuators: int, precision: Precision) -> Operations
     if widening:
         found += (_CLAMP + Operations(multiplications=1, comparisons=1)) * actuators
         found += Operations(comparisons=1) * int(np.count_nonzero(widens))
+        found += Operations(comparisons=1) * plays + Operations(additions=1) * int(np.sum(of.play_threshold > 0.0))
     for row in of.bouc_wen:
         found += _element(power=float(row[kernels.POWER]) != 0.0)
-    for threshold in of.play_threshold:
-        found += _play(widening, bool(threshold > 0.0))
-    return found + _lag(precision) * lags
-
-
-def _play(widening: bool, wide: bool) -> Operations:
-    found = _CLAMP + Operations(multiplications=1, additions=3)
-    return found + Operations(additions=1 if wide else 0, comparisons=1) if widening else found
-
-
-def _lag(precision: Precision) -> Operations:
-    found = Operations(multiplications=1, additions=1)
-    return found + (_COMPENSATED if precision == "single" else _SOUND + Operations(additions=1))
+    found += (_CLAMP + Operations(multiplications=1, additions=3)) * plays
+    lag = _COMPENSATED if precision == "single" else _SOUND + Operations(additions=1)
+    return found + (Operations(multiplications=1, additions=1) + lag) * lags
 
 
 def _element(power: bool) -> Operations:
     """A Bouc-Wen element of the inverse: travel and rate, h, and Eq. 4; its share of the drive."""
     travel = _CLAMP + Operations(additions=1, divisions=2, comparisons=1)
+    # {name}_bouc_wen_advance: the forcing, a decay for each sign of h, h at the end, and whether it is finite.
+    advance = Operations(multiplications=7, additions=6, exponentials=1, comparisons=3)
     equation = Operations(multiplications=3, additions=4, divisions=1, exponentials=1)
-    return travel + _advance(power) + equation
-
-
-def _advance(power: bool) -> Operations:
-    """{name}_bouc_wen_advance: the forcing, a decay for each sign of h, h at the end, and whether it is finite."""
-    flow = Operations(multiplications=7, additions=6, exponentials=1)
-    return flow + Operations(comparisons=3) + (_power_step() if power else _linear_step())
+    return travel + advance + (_power_step() if power else _linear_step()) + equation
 
 
 _RELAXED = Operations(multiplications=2, additions=2, divisions=1, comparisons=1, exponentials=1)

@@ -24,9 +24,6 @@ UNITS = (
 )
 """Units of the variables: name, powers of the base units of the SI, and units to show it in, with their factors."""
 
-STOP_S = 0.2
-"""End of the experiment that a tool proposes."""
-
 BOUC_WEN = (
     ("d1_rad_v", "d1", kernels.D1, "rad/V", "any", "linear gain"),
     ("d2_s_v", "d2", kernels.D2, "s/V", "any", "change of the linear gain with the rate of the drive"),
@@ -40,6 +37,21 @@ BOUC_WEN = (
     ("bias_v", "bias", kernels.BIAS, "V", "any", "drive at rest"),
 )
 """Parameters of a Bouc-Wen element: name, field in C, column of the kernel, unit, range, meaning."""
+
+
+PLANT_COUNTERS = [
+    ("rate_clamped", "plant.rate_clamped", "elements and plant steps beyond the identified rate"),
+    ("slew_limited", "plant.slew_limited", "actuators and plant steps at the amplifier's slew limit"),
+    ("faults", "plant.faults", "elements and plant steps whose hysteresis could not be advanced"),
+]
+CONTROLLER_COUNTERS = [
+    ("saturated", "loop.controller.saturated", "commands that the limits cut off"),
+    ("inverse_rate_clamped", "loop.controller.rate_clamped", "samples of the inverse beyond the identified rate"),
+    ("rejected", "loop.controller.rejected", "readings that the controller did not accept"),
+    ("controller_faults", "loop.controller.faults", "results that the controller did not give out"),
+    ("lost", "loop.lost", "optical readings with the spot beyond the field of view"),
+]
+"""Counters of a plant, and those that a loop has beside them: name, place in C, meaning."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,17 +107,20 @@ def exponent(row: kernels.Floats) -> float:
 
 def variables(unit: PlantUnit | LoopUnit) -> tuple[Variable, ...]:
     """The variables of a unit by value reference."""
-    found = [Variable("time", "time_s", "independent", "simulation time", "s")]
-    loop = isinstance(unit, LoopUnit)
-    plant = plant_of(unit)
-    found += _loop_signals(unit) if isinstance(unit, LoopUnit) else _commands(unit)
-    found += _plant_outputs(plant) + (_controller_counters() if loop else [])
-    return (*found, *_parameters(plant), *_constants(unit))
-
-
-def _commands(unit: PlantUnit) -> list[Variable]:
-    text = "command to actuator {}, from the bias, held over the communication step"
-    return _row("command_v", len(unit.plant.actuators), "input", text, "V", start=0.0)
+    found, counters = [Variable("time", "time_s", "independent", "simulation time", "s")], PLANT_COUNTERS
+    if isinstance(unit, LoopUnit):
+        found += _loop_signals(unit)
+        counters = PLANT_COUNTERS + CONTROLLER_COUNTERS
+    else:
+        text = "command to actuator {}, from the bias, held over the communication step"
+        found += _row("command_v", len(unit.plant.actuators), "input", text, "V", start=0.0)
+    of = plant_of(unit)
+    found += _row("line_of_sight_rad", len(of.optics), "output", "line of sight, axis {}", "rad")
+    found += _row("mirror_rad", len(of.plant.outputs), "output", "output {} of the mirror", "rad", "plant.y")
+    text = "drive of actuator {} behind the amplifier, as seen at its input, from the bias"
+    found += _row("drive_v", len(of.plant.actuators), "output", text, "V", "plant.u")
+    found += [Variable(name, place, "output", text, counts=True) for name, place, text in counters]
+    return (*found, *_parameters(of), *_constants(unit))
 
 
 def _loop_signals(unit: LoopUnit) -> list[Variable]:
@@ -113,46 +128,22 @@ def _loop_signals(unit: LoopUnit) -> list[Variable]:
     held = "taken at the begin of the communication step and held over it"
     found = _row("reference_rad", axes, "input", f"reference of axis {{}}, {held}", "rad", start=0.0)
     found += _row("disturbance_rad", axes, "input", f"disturbance of axis {{}}, {held}", "rad", start=0.0)
-    text = "error of axis {}: reference + disturbance - line of sight"
-    for axis in range(axes):
-        seen = (f"reference_rad[{axis + 1}]", f"disturbance_rad[{axis + 1}]")
-        found.append(_output(f"error_rad[{axis + 1}]", f"error_rad[{axis}]", text.format(axis + 1), "rad", seen))
+    for i in range(axes):
+        text = f"error of axis {i + 1}: reference + disturbance - line of sight"
+        seen = (f"reference_rad[{i + 1}]", f"disturbance_rad[{i + 1}]")
+        found.append(Variable(f"error_rad[{i + 1}]", f"error_rad[{i}]", "output", text, "rad", dependencies=seen))
     text = "command that the last control sample gave actuator {}, from the bias"
-    return found + _row("command_v", actuators, "output", text, "V", within="loop.")
-
-
-def _plant_outputs(of: PlantUnit) -> list[Variable]:
-    plant, axes = of.plant, of.optics.shape[0]
-    found = _row("line_of_sight_rad", axes, "output", "line of sight, axis {}", "rad")
-    found += _row(
-        "mirror_rad", len(plant.outputs), "output", "output {} of the mirror", "rad", within="plant.", field="y"
-    )
-    text = "drive of actuator {} behind the amplifier, as seen at its input, from the bias"
-    found += _row("drive_v", len(plant.actuators), "output", text, "V", within="plant.", field="u")
-    return [
-        *found,
-        _counter("rate_clamped", "plant.rate_clamped", "elements and plant steps beyond the identified rate"),
-        _counter("slew_limited", "plant.slew_limited", "actuators and plant steps at the amplifier's slew limit"),
-        _counter("faults", "plant.faults", "elements and plant steps whose hysteresis could not be advanced"),
-    ]
-
-
-def _controller_counters() -> list[Variable]:
-    of = "loop.controller."
-    return [
-        _counter("saturated", f"{of}saturated", "commands that the limits cut off"),
-        _counter("inverse_rate_clamped", f"{of}rate_clamped", "samples of the inverse beyond the identified rate"),
-        _counter("rejected", f"{of}rejected", "readings that the controller did not accept"),
-        _counter("controller_faults", f"{of}faults", "results that the controller did not give out"),
-        _counter("lost", "loop.lost", "optical readings with the spot beyond the field of view"),
-    ]
+    return found + _row("command_v", actuators, "output", text, "V", "loop.command_v")
 
 
 def _parameters(of: PlantUnit) -> list[Variable]:
     p, slew = of.plant, of.slew_step_v / of.plant.step_s
     found = [
-        _number("amplifier_bandwidth_hz", "first-order bandwidth of the amplifier", "Hz", of.bandwidth_hz, "positive"),
-        _number("amplifier_slew_v_s", "slew limit of the amplifier, as seen at its input", "V/s", slew, "positive"),
+        _parameter(name, f"plant.{name}", text, unit, start, "positive")
+        for name, text, unit, start in (
+            ("amplifier_bandwidth_hz", "first-order bandwidth of the amplifier", "Hz", of.bandwidth_hz),
+            ("amplifier_slew_v_s", "slew limit of the amplifier, as seen at its input", "V/s", slew),
+        )
     ]
     for e, row in enumerate(p.bouc_wen):
         within = f"bouc_wen[{e + 1}]."
@@ -184,66 +175,42 @@ def _operator_parameters(p: kernels.Plant, o: int) -> list[Variable]:
     return found
 
 
-def constants(unit: PlantUnit | LoopUnit) -> tuple[tuple[str, str, float, str], ...]:
-    """What a unit was made for and cannot be changed in it: name, unit, value, meaning."""
-    plant = plant_of(unit)
-    found: tuple[tuple[str, str, float, str], ...] = (
+def _constants(unit: PlantUnit | LoopUnit) -> list[Variable]:
+    """What a unit was made for and cannot be changed in it."""
+    plant, step = plant_of(unit), plant_of(unit).plant.step_s
+    found = [
         ("bias_v", "V", plant.bias_v, "bias that commands and drives count from"),
-        ("plant_step_s", "s", plant.plant.step_s, "internal step: a communication step is a multiple of it"),
-    )
+        ("plant_step_s", "s", step, "internal step: a communication step is a multiple of it"),
+    ]
     if isinstance(unit, LoopUnit):
-        of, step = unit.controller, plant.plant.step_s
-        found += (
+        of = unit.controller
+        found += [
             ("control_period_s", "s", of.period_s, "period of the controller"),
             ("computation_delay_s", "s", unit.delay_steps * step, "from a control sample to its command"),
             ("command_minimum_v", "V", of.minimum_v, "lowest command, from the bias"),
             ("command_maximum_v", "V", of.maximum_v, "highest command, from the bias"),
-        )
-    return found
-
-
-def _constants(unit: PlantUnit | LoopUnit) -> list[Variable]:
+        ]
     return [
         Variable(name, f"constants[{i}]", "local", meaning, unit_name, value, constant=True)
-        for i, (name, unit_name, value, meaning) in enumerate(constants(unit))
+        for i, (name, unit_name, value, meaning) in enumerate(found)
     ]
 
 
 def _row(
-    name: str,
-    size: int,
-    causality: Causality,
-    text: str,
-    unit: str,
-    *,
-    start: float | None = None,
-    within: str = "",
-    field: str = "",
+    name: str, size: int, causality: Causality, text: str, unit: str, place: str = "", start: float | None = None
 ) -> list[Variable]:
-    """The elements of an array, each a variable by itself."""
+    """The elements of an array, each a variable by itself; ``place`` is that of the array where it is not ``name``."""
     return [
-        Variable(f"{name}[{i + 1}]", f"{within}{field or name}[{i}]", causality, text.format(i + 1), unit, start)
+        Variable(f"{name}[{i + 1}]", f"{place or name}[{i}]", causality, text.format(i + 1), unit, start)
         for i in range(size)
     ]
-
-
-def _output(name: str, place: str, text: str, unit: str, dependencies: tuple[str, ...]) -> Variable:
-    return Variable(name, place, "output", text, unit, dependencies=dependencies)
-
-
-def _counter(name: str, place: str, text: str) -> Variable:
-    return Variable(name, place, "output", text, counts=True)
-
-
-def _number(name: str, text: str, unit: str, start: float, allowed: Range) -> Variable:
-    return _parameter(name, f"plant.{name}", text, unit, start, allowed)
 
 
 def _parameter(name: str, place: str, text: str, unit: str, start: float, allowed: str) -> Variable:
     return Variable(name, place, "parameter", text, unit, float(start), range=allowed)  # type: ignore[arg-type]
 
 
-def described(unit: PlantUnit | LoopUnit) -> tuple[str, str]:
+def _described(unit: PlantUnit | LoopUnit) -> tuple[str, str]:
     """Name and description of a unit in words, on one line each, of characters that XML can hold."""
     origin = plant_of(unit).origin
     step = f"internal step {plant_of(unit).plant.step_s:g} s"
@@ -266,7 +233,7 @@ def model_description(
     listed = variables(unit)
     places = {v.name: i for i, v in enumerate(listed)}
     unknowns = [(i, [places[d] for d in v.dependencies]) for i, v in enumerate(listed) if v.causality == "output"]
-    model, text = described(unit)
+    model, text = _described(unit)
     step_s = plant_of(unit).plant.step_s
     return render(
         f"model_description_{version[0]}.xml.j2",
@@ -281,5 +248,4 @@ def model_description(
         compiled=compiled,
         plant_step_s=step_s,
         step_s=unit.controller.period_s if isinstance(unit, LoopUnit) else step_s,
-        stop_s=STOP_S,
     )

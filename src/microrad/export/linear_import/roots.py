@@ -9,11 +9,10 @@ import numpy as np
 
 from microrad.core import lti
 from microrad.core.lti import Complexes
-from microrad.export.linear_select import form_of, numbers
-from microrad.export.matrices_files import python_control, sample_time_s
-from microrad.export.matrices_forms import LinearModel, Port, factored, zero_pole_gain
-from microrad.export.matrices_polynomials import roots
-from microrad.export.matrices_structure import pole_text
+from microrad.export.linear_import.matlab import form_of, numbers
+from microrad.export.matrices.files import python_control
+from microrad.export.matrices.forms import factored, factors, polynomials, roots
+from microrad.export.matrices.structure import entry_of, pole_text, refuse_hidden
 from microrad.export.records import ExportError, Floats
 
 MOST_ORDER = 60
@@ -43,7 +42,12 @@ def response(of: Roots, freq_hz: Floats) -> Complexes:
 # --------------------------------------------------------------------------------------------------------------- forms
 def roots_of_fields(fields: dict[str, Any], source: str) -> Roots:
     """Roots from a MATLAB file's fields. Raises ExportError with the reason for what is not one continuous system."""
-    _refuse_units(fields, source)
+    stated = fields.get("InputUnit")  # an export of microrad names its input's unit: a mirror takes volts
+    unit = stated.item() if isinstance(stated, np.ndarray) and stated.size == 1 else ""
+    if isinstance(unit, str) and unit not in ("V", ""):
+        raise ExportError(
+            f"{source}: its input is in {unit}, and a mirror's drive is in V; choose the one from drive to angle"
+        )
     if "Ts" in fields:
         value = numbers(fields, "Ts", source)
         _refuse_sampled(float(value.item()) if value.size == 1 else math.nan, source)
@@ -58,16 +62,6 @@ def roots_of_fields(fields: dict[str, Any], source: str) -> Roots:
         raise ExportError(f"{source}: k has {gain.size} gains; choose one input and one output")
     zeros, poles = (_row(numbers(fields, key, source, is_complex=True), key, source) for key in "zp")
     return Roots(paired(zeros, "z", source), paired(poles, "p", source), float(gain.item()))
-
-
-def _refuse_units(fields: dict[str, Any], source: str) -> None:
-    """An export of microrad names its input's unit: a mirror takes volts."""
-    stated = fields.get("InputUnit")
-    unit = stated.item() if isinstance(stated, np.ndarray) and stated.size == 1 else ""
-    if isinstance(unit, str) and unit not in ("V", ""):
-        raise ExportError(
-            f"{source}: its input is in {unit}, and a mirror's drive is in V; choose the one from drive to angle"
-        )
 
 
 def _refuse_sampled(period_s: float, source: str) -> None:
@@ -87,7 +81,7 @@ def _row(values: Any, key: str, source: str) -> Any:
 
 
 def roots_of_states(system: lti.StateSpace, source: str) -> Roots:
-    """Roots of a continuous state space. Raises ExportError for shapes that do not fit, and as `zero_pole_gain`."""
+    """Roots of a continuous state space. Raises ExportError for shapes that do not fit, and for hidden modes."""
     n = system.A.shape[0]
     inputs, outputs = system.B.shape[1], system.C.shape[0]
     shapes = {"A": (n, n), "B": (n, inputs), "C": (outputs, n), "D": (outputs, inputs)}
@@ -100,9 +94,9 @@ def roots_of_states(system: lti.StateSpace, source: str) -> Roots:
         )
     if n > MOST_ORDER:
         raise ExportError(f"{source}: {n} states, and a mirror has at most {MOST_ORDER}; reduce the model (balred)")
-    ports = (Port("drive_v", "V"),), (Port("mirror", ""),), tuple(Port(f"x_{i}", "") for i in range(n))
-    found = zero_pole_gain(LinearModel(source, "", system, 0.0, *ports, None))
-    return Roots(paired(found.zeros, "zeros", source), paired(found.poles, "poles", source), found.gain)
+    refuse_hidden(system, 0.0, source)
+    zeros, poles, gain = factors(*polynomials(entry_of(system, 0, 0)))
+    return Roots(paired(zeros, "zeros", source), paired(poles, "poles", source), gain)
 
 
 def roots_of_coefficients(numerator: Floats, denominator: Floats, source: str) -> Roots:
@@ -116,11 +110,8 @@ def roots_of_coefficients(numerator: Floats, denominator: Floats, source: str) -
         raise ExportError(
             f"{source}: order {den.size - 1}, and a mirror has at most {MOST_ORDER}; reduce the model (balred)"
         )
-    return Roots(_exact(num), _exact(den), float(num[0] / den[0]))
-
-
-def _exact(coefficients: Floats) -> Complexes:
-    return roots([Fraction(float(each)) for each in coefficients])
+    zeros, poles = (roots([Fraction(float(each)) for each in coefficients]) for coefficients in (num, den))
+    return Roots(zeros, poles, float(num[0] / den[0]))
 
 
 def roots_of_control(system: Any, source: str) -> Roots:
@@ -130,12 +121,18 @@ def roots_of_control(system: Any, source: str) -> Roots:
         raise ExportError(
             f"{source}: a {type(system).__name__}; give a control.StateSpace or a control.TransferFunction"
         )
-    _refuse_sampled(sample_time_s(system), source)
+    if system.dt is None or system.dt is True:
+        raise ExportError(
+            f"{system.name} has dt = {system.dt}: continuous, or sampled how fast? Give it dt = 0 or its period in s"
+        )
+    _refuse_sampled(float(system.dt), source)
     if (system.ninputs, system.noutputs) != (1, 1):
         found = f"{system.ninputs} inputs and {system.noutputs} outputs"
         raise ExportError(f"{source}: {found}; a mirror file has one drive and one angle: choose")
-    arrays = {key: getattr(system, key) for key in "ABCD"} if isinstance(system, library.StateSpace) else {}
-    arrays = arrays or {"num": system.num_array[0, 0][None], "den": system.den_array[0, 0][None]}
+    if isinstance(system, library.StateSpace):
+        arrays = {key: getattr(system, key) for key in "ABCD"}
+    else:
+        arrays = {"num": system.num_array[0, 0], "den": system.den_array[0, 0]}
     return roots_of_fields({key: np.atleast_2d(np.asarray(value)) for key, value in arrays.items()}, source)
 
 
@@ -148,18 +145,16 @@ def paired(found: Complexes, key: str, source: str) -> Complexes:
     for root in upper:
         nearest = min(lower, key=lambda r: abs(r - root.conjugate()), default=None)
         if nearest is None or abs(nearest - root.conjugate()) > _CONJUGATE * abs(root):
-            raise _single(root, key, source)
+            lower.insert(0, root)
+            break
         lower.remove(nearest)
         both += [complex(root), complex(root.conjugate())]
     if lower:
-        raise _single(lower[0], key, source)
+        raise ExportError(
+            f"{source}: {key} has the complex root {lower[0]:.6g} without its conjugate; a mirror's response is real: "
+            "give both"
+        )
     return np.array(both, dtype=complex)
-
-
-def _single(root: complex, key: str, source: str) -> ExportError:
-    return ExportError(
-        f"{source}: {key} has the complex root {root:.6g} without its conjugate; a mirror's response is real: give both"
-    )
 
 
 def checked(of: Roots, source: str) -> Roots:
@@ -172,37 +167,28 @@ def checked(of: Roots, source: str) -> Roots:
     if not (math.isfinite(of.gain) and of.gain != 0.0):
         raise ExportError(f"{source}: a gain of {of.gain}; the mirror does not move: check the model")
     for pole in of.poles:
-        _check_pole(pole, float(np.max(np.abs(of.poles))), source)
+        if abs(pole) <= _INTEGRATOR * float(np.max(np.abs(of.poles))):
+            raise ExportError(
+                f"{source}: an integrator, a pole at {abs(pole) / (2.0 * math.pi):.3g} Hz; a mirror comes to rest: "
+                "take drift off the records and identify again"
+            )
+        if pole.real >= 0.0:
+            raise ExportError(
+                f"{source}: unstable, a pole at {pole_text(pole, 0.0)}; a mirror is stable: identify it again"
+            )
     for number, pole in enumerate(of.poles):
-        _check_distances(of, number, pole, source)
+        if np.any(np.abs(np.delete(of.poles, number) - pole) <= COINCIDING * abs(pole)):
+            raise ExportError(
+                f"{source}: two poles coincide at {pole_text(pole, 0.0)}; a mirror file has no modal form for them: "
+                "set them apart, or reduce the model"
+            )
+        if np.any(np.abs(of.zeros - pole) <= CANCELLING * abs(pole)):
+            raise ExportError(
+                f"{source}: not minimal, a zero cancels the pole at {pole_text(pole, 0.0)}; remove both (minreal)"
+            )
     if np.any(of.zeros == 0.0):
         raise ExportError(
             f"{source}: a zero at 0 Hz: the mirror does not hold an angle; a mirror file has zeros above 0 Hz, so give "
             "the model with its answer to a constant drive"
         )
     return of
-
-
-def _check_pole(pole: complex, largest: float, source: str) -> None:
-    if abs(pole) <= _INTEGRATOR * largest:
-        raise ExportError(
-            f"{source}: an integrator, a pole at {abs(pole) / (2.0 * math.pi):.3g} Hz; a mirror comes to rest: take "
-            "drift off the records and identify again"
-        )
-    if pole.real >= 0.0:
-        raise ExportError(
-            f"{source}: unstable, a pole at {pole_text(pole, 0.0)}; a mirror is stable: identify it again"
-        )
-
-
-def _check_distances(of: Roots, number: int, pole: complex, source: str) -> None:
-    others = np.delete(of.poles, number)
-    if np.any(np.abs(others - pole) <= COINCIDING * abs(pole)):
-        raise ExportError(
-            f"{source}: two poles coincide at {pole_text(pole, 0.0)}; a mirror file has no modal form for them: set "
-            "them apart, or reduce the model"
-        )
-    if np.any(np.abs(of.zeros - pole) <= CANCELLING * abs(pole)):
-        raise ExportError(
-            f"{source}: not minimal, a zero cancels the pole at {pole_text(pole, 0.0)}; remove both (minreal)"
-        )

@@ -4,13 +4,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import block_diag
 
 from microrad.core import lti
-from microrad.export.block_diagonal import BlockDiagonal, block_diagonal
+from microrad.core.lti import Complexes
+from microrad.export.linear_part.block_diagonal import BlockDiagonal, Wide, block_diagonal
 from microrad.export.records import ExportError, FlightController, Floats
-
-Complexes = NDArray[np.complex128]
-Wide = NDArray[np.longdouble]
 
 BOUNDS = (100.0, 10.0, 1.0, 0.0)
 """How far a basis may lean to part two blocks, from the finest form to the coarsest one."""
@@ -47,13 +46,8 @@ def modes(of: FlightController) -> Modes:
 
     Raises ExportError where the controller has a number that is not finite.
     """
-    _refuse_not_finite(of)
     s = of.system
-    return _parted(s.A, s.B, of.anti_windup, s.C)
-
-
-def _refuse_not_finite(of: FlightController) -> None:
-    matrices = {**{key: getattr(of.system, key) for key in "ABCD"}, "anti-windup gain L": of.anti_windup}
+    matrices = {**{key: getattr(s, key) for key in "ABCD"}, "anti-windup gain L": of.anti_windup}
     for key, matrix in matrices.items():
         bad = np.argwhere(~np.isfinite(matrix))
         if bad.size:
@@ -62,6 +56,7 @@ def _refuse_not_finite(of: FlightController) -> None:
                 f"controller {of.name!r}: {key} is {matrix[i, j]} in row {i}, column {j} (from 0); code cannot be made "
                 "from a number that is not finite: tune the controller anew, or mend its matrices"
             )
+    return _parted(s.A, s.B, of.anti_windup, s.C)
 
 
 def _parted(A: Floats | Wide, B: Floats | Wide, L: Floats | Wide, C: Floats | Wide) -> Modes:
@@ -98,18 +93,17 @@ def _cancellation(of: Modes) -> float:
     """Largest size of what the blocks add to an output, over the largest size of the sum, over frequency and inputs."""
     points = np.exp(1j * np.pi * np.geomspace(1e-6, 1.0, 80))
     blocks, C = of.found.blocks.astype(float), of.C.astype(float)
-    parts = [_response(blocks[at, at], of.driven[at], C[:, at], points) for at in of.found.slices]
+    parts = []
+    for at in of.found.slices:
+        resolvent = points[:, None, None] * np.eye(at.stop - at.start) - blocks[at, at]
+        driven = np.broadcast_to(of.driven[at], (points.size, *of.driven[at].shape))
+        parts.append(C[:, at] @ np.linalg.solve(resolvent, driven))
     if not parts:
         return 1.0
     whole = np.max(np.abs(sum(parts)), axis=0)
     added = np.max(sum(np.abs(part) for part in parts), axis=0)
     at = whole > 0.0
     return float(np.max(added[at] / whole[at], initial=1.0))
-
-
-def _response(A: Floats, B: Floats, C: Floats, points: Complexes) -> Complexes:
-    resolvent = points[:, None, None] * np.eye(A.shape[0]) - A
-    return np.asarray(C @ np.linalg.solve(resolvent, np.broadcast_to(B, (points.size, *B.shape))))
 
 
 # ----------------------------------------------------------------------------------------------------- hidden modes
@@ -149,8 +143,6 @@ def minimal(of: FlightController) -> FlightController:
     the outputs stay the same, but for a share of LEAST_SHARE of such a mode. Modes that hide in several blocks at once
     (equal poles side by side) are left in. Raises ExportError where the controller has a number that is not finite.
     """
-    from scipy.linalg import block_diag  # slow to import, not needed to show help
-
     found = modes(of)
     kept = [_kept(found, np.arange(at.start, at.stop)) for at in found.found.slices]
     if sum(len(block) for block, _, _ in kept) == of.system.order:
@@ -173,7 +165,8 @@ def _kept(of: Modes, at: NDArray[np.intp]) -> tuple[Wide, Wide, Wide]:
     part = _local(of, inner)
     for reached in (True, False):
         Q, count = _staircase(part.A, part.B) if reached else _staircase(part.A.T, part.C.T)
-        part = _within(part, Q[:, :count])
+        Q = Q[:, :count]
+        part = _Local(Q.T @ part.A @ Q, Q.T @ part.B, part.C @ Q, part.basis @ Q, Q.T @ part.inverse)
     if len(part.A) == len(block):
         return block, into, back
     return part.A.astype(np.longdouble), part.inverse @ into, back @ part.basis
@@ -191,11 +184,6 @@ def _stripped(of: Modes, at: NDArray[np.intp]) -> NDArray[np.intp]:
         else:
             break
     return at
-
-
-def _within(of: _Local, Q: Floats) -> _Local:
-    """The part in the space of the orthonormal columns."""
-    return _Local(Q.T @ of.A @ Q, Q.T @ of.B, of.C @ Q, of.basis @ Q, Q.T @ of.inverse)
 
 
 def _local(of: Modes, at: NDArray[np.intp]) -> _Local:

@@ -10,20 +10,20 @@ from typing import Any, Literal
 
 from microrad.core.folder import MANIFEST, check_folder, whole_folder
 from microrad.core.units import format_quantity
-from microrad.export.build import BenchResult, compile_and_run, compiler
-from microrad.export.choice import Choice, flight_controller, promised, rms_text, vectors
-from microrad.export.fixed import FixedForm, fixed_code, quantised
-from microrad.export.fixed import report_text as quantisation_text
-from microrad.export.flight import flight_code, vectors_text, within_limits
+from microrad.export.choice import Choice, Source, flight_controller, promised, rms_text, vectors
+from microrad.export.flight.build import BenchResult, compile_and_run, compiler
+from microrad.export.flight.c_code import flight_code, vectors_text, within_limits
+from microrad.export.flight.fixed import fixed_code, quantisation_text, quantised
+from microrad.export.flight.fixed_form import FixedForm
+from microrad.export.flight.operations import FixedOperations, Operations, fixed_operations, operations
+from microrad.export.flight.rounding import RoundingBound, rounding_bound
 from microrad.export.identifiers import identifier, suggested
-from microrad.export.operations import FixedOperations, Operations, fixed_operations, operations
+from microrad.export.linear_part.sections import Sections, sections
 from microrad.export.records import FlightController, Progress, Vectors
-from microrad.export.rounding import RoundingBound, rounding_bound
-from microrad.export.sections import Sections, sections
 from microrad.loop.fine_pointing import Outlook
 
 Precision = Literal["double", "single", "fixed"]
-PRECISIONS: tuple[Precision, ...] = ("double", "single", "fixed")
+PRECISIONS: dict[Precision, str] = {"double": "double precision", "single": "single precision", "fixed": "fixed point"}
 
 KIND, WHAT = "export", "exported code"
 """Key of the manifest, and what the folder holds, in words."""
@@ -51,7 +51,7 @@ class FlightExport:
 
 
 def check_output(folder: Path, overwrite: bool) -> None:
-    """Raise `FolderError` when ``folder`` holds something that must not be replaced."""
+    """Raises FolderError if ``folder`` holds something that must not be replaced (``overwrite``: by another export)."""
     check_folder(folder, overwrite, KIND, WHAT)
 
 
@@ -66,11 +66,23 @@ def export_flight(
     accept: bool = False,
     on_progress: Progress = lambda done, total, what: None,
 ) -> FlightExport:
-    """Write a controller as C99 with its test bench, ``samples`` recorded vectors, a report and a manifest.
+    """Write a controller as C99 with its test bench, a recorded run, a report and a manifest.
 
-    It is compiled and its bench run over the vectors where there is a C compiler, before the folder appears. Raises
-    ExportError for what cannot be exported, for code that strays from the kernel and for what `choice.promised`
-    refuses; `FolderError` for a folder that must not be replaced.
+    Where there is a C compiler, the code is compiled and its bench run over the recorded run before the folder appears.
+
+    Args:
+        choice: the controller, see `choice.choose`.
+        folder: where to write; it appears whole or not at all.
+        name: what the code is called, an identifier of C; None makes one of the controller's name.
+        precision: of the code: "double", "single" or "fixed" point.
+        samples: length of the recorded run, in control periods.
+        overwrite: replace an earlier export in the folder.
+        accept: write also what `choice.promised` refuses.
+        on_progress: is told what is being done.
+
+    Raises:
+        ExportError: the controller cannot be exported, its code strays from the kernel, or it leaves too much.
+        FolderError: the folder must not be replaced.
     """
     check_output(folder, overwrite)
     left = promised(choice, accept)
@@ -79,57 +91,40 @@ def export_flight(
     form = sections(controller)
     on_progress(0, 3, f"recording {samples} samples of the loop")
     run = within_limits(controller, vectors(choice, samples))
-    made = _code(controller, form, run, name, precision)
+    files, cost, bound, fixed = _code(controller, form, run, name, precision)
     with whole_folder(folder, overwrite, KIND, WHAT) as draft:
-        for file, text in made.files.items():
+        for file, text in {**files, "vectors.csv": vectors_text(controller, run)}.items():
             (draft / file).write_text(text, encoding="utf-8", newline="\n")
-        (draft / "vectors.csv").write_text(vectors_text(controller, run), encoding="utf-8", newline="\n")
         on_progress(1, 3, "compiling and running the bench")
-        bench = compile_and_run(draft, made.bench) if compiler() is not None else None
-        _remove_built(draft, made.files)
-        found = FlightExport(
-            folder, name, precision, controller, left, form, made.cost, made.bound, made.fixed, samples, bench
-        )
+        bench = compile_and_run(draft, name if fixed is None else f"{name}_fixed") if compiler() is not None else None
+        for path in draft.iterdir():  # what the compiler left: the folder holds text, for any machine
+            if path.name not in files and path.name != "vectors.csv":
+                path.unlink()
+        found = FlightExport(folder, name, precision, controller, left, form, cost, bound, fixed, samples, bench)
         on_progress(2, 3, "writing")
         (draft / "report.txt").write_text(report_text(found) + "\n", encoding="utf-8", newline="\n")
-        text = json.dumps(_manifest(found, choice, draft), indent=2, ensure_ascii=False)
+        text = json.dumps(_manifest(found, choice.source, draft), indent=2, ensure_ascii=False)
         (draft / MANIFEST).write_text(text + "\n", encoding="utf-8")
     return found
 
 
-@dataclass(frozen=True, slots=True)
-class _Made:
-    """The code of one precision, and the name that its bench goes by."""
-
-    files: dict[str, str]
-    bench: str
-    cost: Operations | FixedOperations
-    bound: RoundingBound | None
-    fixed: FixedForm | None
-
-
-def _code(of: FlightController, form: Sections, run: Vectors, name: str, precision: Precision) -> _Made:
+def _code(
+    of: FlightController, form: Sections, run: Vectors, name: str, precision: Precision
+) -> tuple[dict[str, str], Operations | FixedOperations, RoundingBound | None, FixedForm | None]:
+    """Files of one precision, what a step costs, and what the precision costs."""
     if precision == "fixed":
         fixed = quantised(of, form, run)
-        return _Made(fixed_code(of, form, fixed, name), f"{name}_fixed", fixed_operations(of, fixed), None, fixed)
+        return fixed_code(of, form, fixed, name), fixed_operations(of, fixed), None, fixed
     bound = rounding_bound(of, form, run) if precision == "single" else None
-    files = flight_code(of, form, name, precision, bound)
-    return _Made(files, name, operations(of, form, precision), bound, None)
+    return flight_code(of, form, name, precision, bound), operations(of, form, precision), bound, None
 
 
-def _remove_built(folder: Path, sources: dict[str, str]) -> None:
-    """Take away what the compiler left: the folder holds text, for any machine."""
-    for path in folder.iterdir():
-        if path.name not in sources and path.name != "vectors.csv":
-            path.unlink()
-
-
-def _manifest(of: FlightExport, choice: Choice, folder: Path) -> dict[str, Any]:
+def _manifest(of: FlightExport, source: Source, folder: Path) -> dict[str, Any]:
     files = sorted(path for path in folder.iterdir() if path.is_file())
     libraries = ("microrad", "numpy", "scipy", "numba", "jinja2")
     return {
         KIND: {"kind": "flight code", "name": of.name, "controller": of.controller.name, "precision": of.precision},
-        "mission": {"file": choice.file.path.name, "sha256": choice.file.sha256, "name": of.controller.origin.mission},
+        "mission": {"file": source.path.name, "sha256": source.origin.mission_sha256, "name": source.origin.mission},
         "samples": of.samples,
         "versions": {"python": platform.python_version(), **{each: version(each) for each in libraries}},
         "files_sha256": {path.name: hashlib.sha256(path.read_bytes()).hexdigest() for path in files},
@@ -139,55 +134,34 @@ def _manifest(of: FlightExport, choice: Choice, folder: Path) -> dict[str, Any]:
 # ----------------------------------------------------------------------------------------------------------- in words
 def report_text(of: FlightExport) -> str:
     """What was exported, what a step costs and how exact it is, in lines."""
-    c = of.controller
-    inputs = ", ".join(f"{each.name}[{each.size}]" for each in c.inputs)
+    c, rate = of.controller, format_quantity(1.0 / of.controller.period_s, "Hz")
+    low, high, bias = (format_quantity(v, "V", 6) for v in (c.minimum_v, c.maximum_v, c.bias_v))
+    counts = f", in counts of {format_quantity(c.resolution_v, 'V')}" if c.resolution_v else ""
+    margins = [
+        f"{name} {format_quantity(value, unit, 3) if unit in ('s', 'Hz') else f'{value:.3g} {unit}'.strip()}"
+        for name, value, unit in c.margins
+    ]
+    inputs, left = ", ".join(f"{each.name}[{each.size}]" for each in c.inputs), of.left
     lines = [
         ("from", f"{c.origin.mission}, sha256 {c.origin.mission_sha256[:16]}"),
         ("mirror", c.origin.mirror),
-        (
-            "controller",
-            f"{c.name}, {format_quantity(1.0 / c.period_s, 'Hz')}, {of.form.order} states in {of.form.form} form",
-        ),
+        ("controller", f"{c.name}, {rate}, {of.form.order} states in {of.form.form} form"),
         ("reads", inputs),
-        ("commands", f"{c.actuators} x {_limits(c)}"),
-        ("margins", ", ".join(f"{name} {_shown(value, unit)}" for name, value, unit in c.margins)),
-        *_residual(of),
+        ("commands", f"{c.actuators} x {low} to {high} from the bias of {bias}{counts}"),
+        ("margins", ", ".join(margins)),
+        ("leaves", left and f"{rms_text(left.linear_rad)} in linear theory, {rms_text(left.simulated_rad)} simulated"),
         ("a step costs", of.cost.words),
-        *_exactness(of),
-        *_measured(of),
+        ("single", of.bound and of.bound.words),
+        *_measured(of.bench),
     ]
-    text = "\n".join(f"  {name:13} {words}" for name, words in lines)
+    text = "\n".join(f"  {name:13} {words}" for name, words in lines if words)
     quantisation = "" if of.fixed is None else f"\n\n{quantisation_text(of.fixed)}"
-    return f"{of.name}: {c.name} in {_IN[of.precision]}\n{text}{quantisation}"
+    return f"{of.name}: {c.name} in {PRECISIONS[of.precision]}\n{text}{quantisation}"
 
 
-_IN = {"double": "double precision", "single": "single precision", "fixed": "fixed point"}
-
-
-def _shown(value: float, unit: str) -> str:
-    return format_quantity(value, unit, 3) if unit in ("s", "Hz") else f"{value:.3g} {unit}".strip()
-
-
-def _limits(c: FlightController) -> str:
-    low, high, bias = (format_quantity(v, "V", 6) for v in (c.minimum_v, c.maximum_v, c.bias_v))
-    counts = f", in counts of {format_quantity(c.resolution_v, 'V')}" if c.resolution_v else ""
-    return f"{low} to {high} from the bias of {bias}{counts}"
-
-
-def _residual(of: FlightExport) -> list[tuple[str, str]]:
-    if of.left is None:
-        return []
-    return [("leaves", f"{rms_text(of.left.linear_rad)} in linear theory, {rms_text(of.left.simulated_rad)} simulated")]
-
-
-def _exactness(of: FlightExport) -> list[tuple[str, str]]:
-    return [] if of.bound is None else [("single", of.bound.words)]
-
-
-def _measured(of: FlightExport) -> list[tuple[str, str]]:
-    if of.bench is None:
+def _measured(b: BenchResult | None) -> list[tuple[str, str]]:
+    if b is None:
         return [("not compiled", "there is no C compiler here (cc, gcc, clang); make in the folder builds the bench")]
-    b = of.bench
     counted = {"saturated": b.saturated, "rate-clamped": b.rate_clamped, "rejected": b.rejected, "faults": b.faults}
     counts = ", ".join(f"{count} {name}" for name, count in counted.items())
     difference, allowed = (format_quantity(v, "V", 3) for v in (b.largest_difference_v, b.bound_v))

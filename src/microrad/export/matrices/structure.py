@@ -3,6 +3,7 @@
 import math
 
 import numpy as np
+from scipy.linalg import matrix_balance
 
 from microrad.core import lti
 from microrad.export.records import ExportError, Floats
@@ -54,7 +55,7 @@ def without_state(system: lti.StateSpace, state: int, equals: Floats) -> lti.Sta
 
 
 def refuse_hidden(system: lti.StateSpace, period_s: float, name: str) -> None:
-    """Raise ExportError where a mode is not driven by any input or not shown by any output, or a number is too large.
+    """Raises ExportError if no input drives a mode, if no output shows one, or if a number is too large.
 
     The test of Popov, Belevitch and Hautus on the balanced system: [A - s, B] and [A - s; C] keep their rank at every
     pole. What loses it has vanished from the transfer function.
@@ -78,8 +79,6 @@ def refuse_hidden(system: lti.StateSpace, period_s: float, name: str) -> None:
 
 def _balanced(system: lti.StateSpace) -> tuple[Floats, Floats, Floats]:
     """A, B and C with states scaled so that rows and columns of [[A, B], [C, 0]] are of like size."""
-    from scipy.linalg import matrix_balance  # slow to import, not needed to show help
-
     n = system.order
     sizes = np.linalg.norm(system.B, axis=1)[:, None], np.linalg.norm(system.C, axis=0)[None]
     whole = np.block([[system.A, sizes[0]], [sizes[1], np.zeros((1, 1))]])
@@ -89,7 +88,7 @@ def _balanced(system: lti.StateSpace) -> tuple[Floats, Floats, Floats]:
 
 
 def refuse_unstable(system: lti.StateSpace, period_s: float, name: str) -> None:
-    """Raise ExportError with the worst pole where one lies outside the region of stability; integrators do not."""
+    """Raises ExportError with the worst pole if one lies outside the region of stability; integrators do not."""
     poles = np.linalg.eigvals(system.A)
     beyond = np.abs(poles) - 1.0 if period_s else poles.real / np.maximum(np.abs(poles), 1e-300)
     if not poles.size or np.max(beyond) <= _OUTSIDE:

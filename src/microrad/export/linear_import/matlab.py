@@ -1,16 +1,40 @@
-"""Which linear system of a MATLAB file is meant: variables of their own, or the fields of a structure."""
+"""MATLAB files of version 5 to 7: which linear system is meant, variables of their own or the fields of a structure."""
 
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from microrad.export.matrices_mat import Structure, Unread, load
-from microrad.export.matrices_structure import LARGEST
+from microrad.core.folder import read_bytes
+from microrad.core.matlab_file import MatlabFile, MatlabFileError, Structure, Unread
+from microrad.export.matrices.structure import LARGEST
 from microrad.export.records import ExportError
 
 FORMS = (("A", "B", "C", "D"), ("z", "p", "k"), ("num", "den"))
 """What makes a linear system, the first one that is whole counts."""
+
+MOST_BYTES = 64_000_000
+"""Bytes of a file, and of what it unpacks to, beyond which it holds no linear model."""
+_SAVE = "s = struct('A', sys.A, 'B', sys.B, 'C', sys.C, 'D', sys.D, 'Ts', sys.Ts); save('model.mat', 's', '-v7')"
+
+
+def load(path: Path) -> dict[str, Any]:
+    """Variables by name: arrays of numbers, arrays of objects for cells, str, `Structure` and `Unread`.
+
+    Raises ExportError for a file that cannot be read: missing, too large, damaged, nested too deep, version 7.3.
+    """
+    try:
+        size = path.stat().st_size
+        if size > MOST_BYTES:
+            raise ExportError(f"{path} has {size} bytes; a linear model has at most {MOST_BYTES}: is it a recording?")
+        head = read_bytes(path, 10)
+        if head == b"MATLAB 7.3" or head[:8] == b"\x89HDF\r\n\x1a\n":
+            raise ExportError(f"{path} is of version 7.3; save it as version 7: {_SAVE}")
+        return MatlabFile(path, MOST_BYTES, whole=True).variables
+    except OSError as error:
+        raise ExportError(f"{path} cannot be read ({error.strerror or error}); check the path") from error
+    except MatlabFileError as error:
+        raise ExportError(f"{path} is no MATLAB file that can be read: {error}. Save it again: {_SAVE}") from error
 
 
 def select(path: Path, variable: str | None) -> tuple[str, dict[str, Any]]:
@@ -43,14 +67,14 @@ def _what_it_has(systems: dict[str, Any], variables: dict[str, Any]) -> str:
 
 def _systems(path: Path, variables: dict[str, Any]) -> dict[str, dict[str, Any]]:
     """Systems by the name of their structure, "" for variables of their own."""
-    found = {"": variables} if _form(variables) else {}
+    found = {"": variables} if form_of(variables) else {}
     for name, value in variables.items():
         if isinstance(value, Unread) and value.kind == "an object of MATLAB":
             raise ExportError(
                 f"{path}: variable {name!r} is {value.kind}, which only MATLAB can read; save its matrices: "
                 f"s = struct('A', {name}.A, 'B', {name}.B, 'C', {name}.C, 'D', {name}.D, 'Ts', {name}.Ts)"
             )
-        if not isinstance(value, Structure) or not _form(value.fields):
+        if not isinstance(value, Structure) or not form_of(value.fields):
             continue
         if value.size != 1:
             raise ExportError(f"{path}: variable {name!r} is an array of {value.size} structures; save one of them")
@@ -58,13 +82,9 @@ def _systems(path: Path, variables: dict[str, Any]) -> dict[str, dict[str, Any]]
     return found
 
 
-def _form(fields: dict[str, Any]) -> tuple[str, ...]:
-    return next((form for form in FORMS if all(key in fields for key in form)), ())
-
-
 def form_of(fields: dict[str, Any]) -> tuple[str, ...]:
-    """Names of the fields that make the system."""
-    return _form(fields)
+    """Names of the fields that make the system; none where they make no system."""
+    return next((form for form in FORMS if all(key in fields for key in form)), ())
 
 
 def numbers(fields: dict[str, Any], key: str, source: str, *, is_complex: bool = False) -> Any:

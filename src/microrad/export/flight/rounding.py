@@ -14,18 +14,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from microrad.core import kernels
-from microrad.export.double_run import InverseRun, Run, run, widened
-from microrad.export.flight import compensated_states
+from microrad.export.flight.double_run import InverseRun, Run, run, widened
+from microrad.export.linear_part.sections import Sections, compensated_states
 from microrad.export.records import FlightController, Floats, InverseLaw, Vectors
-from microrad.export.sections import Sections
 
 UNIT = 2.0**-24
 """Largest relative error of rounding to single precision."""
 
 _HIGHER_ORDERS = 1.01  # what a first-order analysis leaves out, generously
 _POWER_TOLERANCE = 4e-6  # of h's size: the numerical integration for exponents other than 1, in single precision
-_MOST_ROUNDS = 500
-_ROUND_OFF = 1e-5
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +41,13 @@ class RoundingBound:
 
 
 def rounding_bound(of: FlightController, form: Sections, v: Vectors) -> RoundingBound:
-    """The bound for a controller in this form over a recorded run of it."""
+    """The bound on what single precision does to the commands of a controller.
+
+    Args:
+        of: the controller.
+        form: its linear part.
+        v: a recorded run of it.
+    """
     error = errors_before_converter(of, form, v)
     largest = float(np.max(error, initial=0.0))
     command = float(np.max(behind_converter(of, np.max(error, axis=0, initial=0.0)), initial=0.0))
@@ -102,14 +105,14 @@ def _settled(of: FlightController, form: Sections, r: Run, states: Floats, outpu
     response = _Response(form, len(states))
     lags = 0 if of.inverse is None else of.inverse.lag_keep.size
     error, lag = np.zeros_like(r.free), np.zeros((len(states), lags))
-    for _ in range(_MOST_ROUNDS):
+    for _ in range(500):
         # Errors reach the states through the anti-windup where a command is clipped, or might be in single precision.
         clipped = (r.free - of.minimum_v <= error) | (of.maximum_v - r.free <= error)
         linear = response.bound(states + (clipped * error) @ np.abs(form.L).T) + outputs
         new, lag = _through_inverse(of, r, linear, lag)
         if not np.all(np.isfinite(new)) or np.max(new, initial=0.0) > of.maximum_v - of.minimum_v:
             break
-        if np.max(np.abs(new - error), initial=0.0) <= _ROUND_OFF * np.max(new, initial=0.0):
+        if np.max(np.abs(new - error), initial=0.0) <= 1e-5 * np.max(new, initial=0.0):
             return _HIGHER_ORDERS * new
         error = new
     return np.full_like(error, math.inf)

@@ -21,8 +21,12 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import schur, solve_sylvester
+from scipy.linalg.lapack import dtrexc, dtrsyl
+from scipy.sparse.csgraph import connected_components
 
-Floats = NDArray[np.float64]
+from microrad.export.records import Floats
+
 Wide = NDArray[np.longdouble]
 Mask = NDArray[np.bool_]
 
@@ -54,14 +58,6 @@ class BlockDiagonal:
         """Where each block stands."""
         return slices(self.sizes)
 
-    @property
-    def condition(self) -> float:
-        """Condition number of the basis with columns of length 1."""
-        if not self.sizes:
-            return 1.0
-        basis = self.basis.astype(float)
-        return float(np.linalg.cond(basis / np.linalg.norm(basis, axis=0)))
-
 
 def slices(sizes: tuple[int, ...]) -> list[slice]:
     """Where blocks of these sizes stand, one behind the other."""
@@ -78,10 +74,9 @@ def block_diagonal(A: Floats | Wide, C: Floats | Wide, bound: float) -> BlockDia
     """
     if not A.size:
         return BlockDiagonal(*(np.zeros(A.shape, dtype=np.longdouble),) * 3, ())
-    parts = sorted(
-        _parts(A.astype(float), C.astype(float), bound), key=lambda part: (part.size == 1, part.size % 2, part.size)
-    )
-    sizes = tuple(part.size for part in parts)
+    found = _parts(A.astype(float), C.astype(float), bound)
+    parts = sorted(found, key=lambda part: (len(part.kept) == 1, len(part.kept) % 2, len(part.kept)))
+    sizes = tuple(len(part.kept) for part in parts)
     kept = np.zeros(A.shape, dtype=bool)
     for each, part in zip(slices(sizes), parts, strict=True):
         kept[each, each] = part.kept
@@ -102,15 +97,9 @@ class _Part:
     basis: Floats
     kept: Mask
 
-    @property
-    def size(self) -> int:
-        return int(self.kept.shape[0])
-
 
 def _parts(A: Floats, C: Floats, bound: float) -> list[_Part]:
     """The blocks, for each connected part of A by itself."""
-    from scipy.sparse.csgraph import connected_components  # slow to import, not needed to show help
-
     found = []
     number, label = connected_components(A != 0.0, connection="weak")
     for own in range(number):
@@ -125,8 +114,6 @@ def _parts(A: Floats, C: Floats, bound: float) -> list[_Part]:
 
 def _schur(A: Floats) -> tuple[Floats, Floats]:
     """T quasi-triangular and Q orthogonal with A = Q T Q', from the Schur forms of the strongly connected parts."""
-    from scipy.linalg import schur  # slow to import, not needed to show help
-
     parts = _strong_parts(A)
     places = slices(tuple(at.size for at in parts))
     forms = [schur(A[np.ix_(at, at)]) if at.size > 1 else (A[np.ix_(at, at)], np.ones((1, 1))) for at in parts]
@@ -143,8 +130,6 @@ def _schur(A: Floats) -> tuple[Floats, Floats]:
 
 def _strong_parts(A: Floats) -> list[NDArray[np.intp]]:
     """States by strongly connected part, in an order that makes A block upper triangular."""
-    from scipy.sparse.csgraph import connected_components  # slow to import, not needed to show help
-
     number, label = connected_components(A != 0.0, connection="strong")
     before: dict[int, set[int]] = {part: set() for part in range(number)}
     for i, j in zip(*np.nonzero(A), strict=True):
@@ -180,8 +165,6 @@ def _split(T: Floats, Q: Floats, C: Floats, bound: float) -> tuple[Floats, Float
 
 def _parting(T11: Floats, T12: Floats, T22: Floats) -> Floats:
     """X of T11 X - X T22 = -T12 for quasi-triangular T11 and T22; infinite where there is none."""
-    from scipy.linalg.lapack import dtrsyl  # slow to import, not needed to show help
-
     if not np.any(T12):
         return np.zeros_like(T12)
     X, scale, info = dtrsyl(T11, T22, -T12, isgn=-1)
@@ -219,8 +202,6 @@ def _ordered(T: Floats, Q: Floats, C: Floats, block: slice) -> tuple[Floats, Flo
 
 def _moved(T: Floats, Q: Floats, place: int, to: int) -> tuple[Floats, Floats]:
     """T and Q with the diagonal block that begins at a place moved up; where a swap fails, as far as it came."""
-    from scipy.linalg.lapack import dtrexc  # slow to import, not needed to show help
-
     return dtrexc(T, Q, place + 1, to + 1)[:2] if place != to else (T, Q)
 
 
@@ -236,8 +217,6 @@ def _refined(A: Floats | Wide, basis: Floats, kept: Mask, sizes: tuple[int, ...]
 
 def _correction(M: Wide, kept: Mask, sizes: tuple[int, ...]) -> Wide:
     """First-order change of the basis, in itself, that takes away what M has beside and below its blocks."""
-    from scipy.linalg import solve_sylvester  # slow to import, not needed to show help
-
     change, near = np.zeros_like(M), M.astype(float)
     for a in slices(sizes):
         for b in slices(sizes):

@@ -36,7 +36,7 @@ class BenchResult:
     ``largest_difference_v`` is the largest difference of a command from the recorded one, ``bound_v`` what is allowed,
     ``peak_command_v`` the largest recorded command. ``saturated`` and the counters behind it are those of the code's
     state at the end. Times are of one step: each sample's least time over the passes, then the largest (worst) and the
-    median of the samples, less ``clock_ns``, what reading the clock takes. ``others``: what else it printed.
+    median of the samples, less ``clock_ns``, what reading the clock takes.
     """
 
     samples: int
@@ -50,7 +50,6 @@ class BenchResult:
     worst_step_ns: float
     median_step_ns: float
     clock_ns: float
-    others: tuple[tuple[str, float], ...] = ()
 
 
 def compiler() -> str | None:
@@ -90,18 +89,19 @@ def _words(text: str) -> tuple[str, ...]:
         raise ExportError(f"the environment variable CC is {text!r}: {str(error).lower()}") from error
 
 
-def compile_and_run(folder: Path, name: str, passes: int = 20, *, time_limit_s: float = TIME_LIMIT_S) -> BenchResult:
+def compile_and_run(folder: Path, name: str, passes: int = 20) -> BenchResult:
     """Compiles the exported code ``name`` in a folder and runs its bench over ``vectors.csv`` there.
 
     With a Makefile (and make on this machine) by ``make``, else by the compiler directly. The steps are timed in
     ``passes`` passes, at least 1. Raises ExportError where there is no compiler or no such code, where it does not
-    compile, and where the bench fails, takes longer than ``time_limit_s`` or finds a difference beyond its bound.
+    compile, and where the bench fails, takes longer than `TIME_LIMIT_S` or finds a difference beyond its bound.
     """
     if passes < 1:
         raise ExportError(f"{passes} passes of the bench: it takes at least 1 to time a step")
-    _require(folder, (f"{name}.c", f"{name}_bench.c", "vectors.csv"))
-    bench = _compile(folder, name, time_limit_s)
-    code, text = _run((str(bench), "vectors.csv", str(passes)), folder, time_limit_s)
+    missing = [each for each in (f"{name}.c", f"{name}_bench.c", "vectors.csv") if not (folder / each).is_file()]
+    if missing:
+        raise ExportError(f"{folder} has no {', no '.join(missing)}: export the code there first (microrad export c)")
+    code, text = _run((str(_compile(folder, name)), "vectors.csv", str(passes)), folder)
     found = _numbers(text)
     if code == 1 and found.get("largest_difference_v", 0.0) > found.get("bound_v", math.inf):
         raise ExportError(
@@ -111,16 +111,14 @@ def compile_and_run(folder: Path, name: str, passes: int = 20, *, time_limit_s: 
         )
     if code != 0:
         raise _failure(f"the bench of {name} in {folder} {_ending(code)}", text)
-    return _result(found, f"the bench of {name} in {folder}", text)
-
-
-def _require(folder: Path, files: Sequence[str]) -> None:
-    missing = [each for each in files if not (folder / each).is_file()]
+    kinds = {each.name: each.type for each in fields(BenchResult)}
+    missing = [key for key in kinds if key not in found]
     if missing:
-        raise ExportError(f"{folder} has no {', no '.join(missing)}: export the code there first (microrad export c)")
+        raise _failure(f"the bench of {name} in {folder} printed no {', no '.join(missing)}", text)
+    return BenchResult(**{key: int(found[key]) if kind is int else found[key] for key, kind in kinds.items()})  # type: ignore[arg-type]
 
 
-def _compile(folder: Path, name: str, time_limit_s: float) -> Path:
+def _compile(folder: Path, name: str) -> Path:
     """The compiled bench."""
     words, target = compiler_words(), folder / f"{name}_bench"
     if (folder / "Makefile").is_file() and shutil.which("make"):
@@ -128,13 +126,13 @@ def _compile(folder: Path, name: str, time_limit_s: float) -> Path:
     else:
         sources = sorted(each.name for each in folder.glob("*.c") if not each.name.endswith("_bench.c"))
         command = (*words, *FLAGS, "-o", target.name, *sources, f"{name}_bench.c", "-lm")
-    code, text = _run(command, folder, time_limit_s)
+    code, text = _run(command, folder)
     if code != 0:
         raise _failure(f"{shlex.join(command)} in {folder} {_ending(code)}", text)
     return target.resolve()
 
 
-def _run(command: Sequence[str], folder: Path, time_limit_s: float) -> tuple[int, str]:
+def _run(command: Sequence[str], folder: Path) -> tuple[int, str]:
     """Exit status and what the program wrote; whatever ends the wait ends the program and all that it started."""
     # A make that this runs under would pass its own options on, and its locale would translate messages.
     environment = {key: value for key, value in os.environ.items() if key not in ("MAKEFLAGS", "MFLAGS", "MAKELEVEL")}
@@ -155,23 +153,18 @@ def _run(command: Sequence[str], folder: Path, time_limit_s: float) -> tuple[int
         raise ExportError(f"{command[0]} cannot be run in {folder}: {error.strerror}") from error
     with process:
         try:
-            text, _ = process.communicate(timeout=time_limit_s)
+            text, _ = process.communicate(timeout=TIME_LIMIT_S)
         except BaseException as error:
-            _end(process)
+            if hasattr(os, "killpg"):  # with what it started: make's compiler
+                with suppress(ProcessLookupError):
+                    os.killpg(process.pid, signal.SIGKILL)
+            else:
+                process.kill()
             if isinstance(error, subprocess.TimeoutExpired):
-                what = f"{shlex.join(command)} in {folder} did not end within {time_limit_s:g} s and was stopped"
+                what = f"{shlex.join(command)} in {folder} did not end within {TIME_LIMIT_S:g} s and was stopped"
                 raise ExportError(what) from error
             raise
     return process.returncode, text
-
-
-def _end(process: "subprocess.Popen[str]") -> None:
-    """Ends the program and what it started (make's compiler)."""
-    if hasattr(os, "killpg"):
-        with suppress(ProcessLookupError):
-            os.killpg(process.pid, signal.SIGKILL)
-    else:
-        process.kill()
 
 
 def _ending(code: int) -> str:
@@ -194,12 +187,3 @@ def _numbers(text: str) -> dict[str, float]:
             except ValueError:
                 continue
     return found
-
-
-def _result(found: dict[str, float], what: str, text: str) -> BenchResult:
-    names = {each.name: each.type for each in fields(BenchResult) if each.name != "others"}
-    missing = [name for name in names if name not in found]
-    if missing:
-        raise _failure(f"{what} printed no {', no '.join(missing)}", text)
-    values = {name: int(found[name]) if kind is int else found[name] for name, kind in names.items()}
-    return BenchResult(**values, others=tuple((k, v) for k, v in found.items() if k not in names))  # type: ignore[arg-type]

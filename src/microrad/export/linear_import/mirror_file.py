@@ -18,9 +18,8 @@ import numpy as np
 
 from microrad.core.folder import read_bytes
 from microrad.core.lti import frequency_response
-from microrad.export.linear_roots import Roots, checked, response, roots_of_control, roots_of_fields
-from microrad.export.linear_select import select
-from microrad.export.matrices_mat import MOST_BYTES
+from microrad.export.linear_import.matlab import MOST_BYTES, select
+from microrad.export.linear_import.roots import Roots, checked, response, roots_of_control, roots_of_fields
 from microrad.export.records import ExportError
 from microrad.mirror import model as mirror
 from microrad.mission.tables.mirror import Mirror
@@ -51,11 +50,17 @@ class Given:
 
 
 def import_mat(path: Path, given: Given, variable: str | None = None) -> str:
-    """The text of a mirror file from a MATLAB file: A B C D, z p k or num den, with Ts where it is sampled.
+    """The text of a mirror file from a MATLAB file that has A B C D, z p k or num den, with Ts where it is sampled.
 
-    They are variables of their own or fields of one structure, whose name is ``variable`` where the file has several
-    (what `matrices.write_mat` wrote); A B C D count where there are several forms. Raises ExportError with the reason
-    for what cannot be read, chosen or said in a mirror file.
+    They are variables of their own or fields of one structure. Where there are several forms, A B C D count.
+
+    Args:
+        path: the MATLAB file, version 5 to 7.
+        given: what a linear model does not say.
+        variable: name of the structure, where the file has several.
+
+    Raises:
+        ExportError: what cannot be read, chosen or said in a mirror file, with the reason.
     """
     path = Path(path)
     chosen, found = select(path, variable)
@@ -67,9 +72,15 @@ def import_mat(path: Path, given: Given, variable: str | None = None) -> str:
 
 
 def import_control(system: Any, given: Given, source: str = "python-control") -> str:
-    """The text of a mirror file from a `control.StateSpace` or `control.TransferFunction`; ``source`` names it.
+    """The text of a mirror file from an object of python-control.
 
-    Raises ExportError with the reason for what cannot be said in a mirror file.
+    Args:
+        system: a `control.StateSpace` or a `control.TransferFunction`.
+        given: what a linear model does not say.
+        source: what the file's comments and messages call the model.
+
+    Raises:
+        ExportError: what cannot be said in a mirror file, with the reason.
     """
     return _text(_factored(lambda: roots_of_control(system, source), source), given, source, (source,))
 
@@ -92,7 +103,7 @@ def _text(model: Roots, given: Given, source: str, said_of: tuple[str, ...]) -> 
     """``said_of`` is what the file's comments call the source, then further lines of its head."""
     _check_given(given, source)
     gain = _gain(model, given, source)
-    said = f"imported from {_one_line(said_of[0])}"
+    said = "imported from " + "".join(c if c.isprintable() else " " for c in said_of[0])
     stated = "given on import, no linear model says it"
     lines = [
         f"# Mirror {said}: linear, without hysteresis or creep.",
@@ -171,7 +182,7 @@ def _roots(kind: str, roots: Any, said: str) -> list[str]:
 
 
 def _check_read_back(text: str, model: Roots, given: Given, source: str) -> None:
-    """Raise ExportError where the file is refused as a mirror, or says something else than the model."""
+    """Raises ExportError if the file is refused as a mirror, or says something else than the model."""
     try:
         table = Mirror.model_validate(tomllib.loads(text))
         made = mirror.from_mission(
@@ -210,7 +221,3 @@ def _line(key: str, value: str, comment: str) -> str:
 
 def _quoted(text: str) -> str:
     return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
-
-
-def _one_line(text: str) -> str:
-    return "".join(c if c.isprintable() else " " for c in text)

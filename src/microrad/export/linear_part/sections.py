@@ -8,17 +8,18 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from microrad.core import kernels, lti
-from microrad.export.block_diagonal import BlockDiagonal
-from microrad.export.modes import NEAR, Modes, hidden, modes, sizes
+from microrad.core import lti
+from microrad.core.lti import Complexes
+from microrad.export.linear_part.block_diagonal import BlockDiagonal
+from microrad.export.linear_part.modes import NEAR, Modes, hidden, modes, sizes
 from microrad.export.records import ExportError, FlightController, Floats
-
-Complexes = NDArray[np.complex128]
 
 MODAL, TRIANGULAR = "modal", "triangular"
 """Forms: blocks of one and two states alone; or some larger upper quasi-triangular ones beside them."""
+
+SLOW = 0.99
+"""Blocks of a larger spectral radius move by little a sample: in single precision they are compensated sums."""
 
 MOST_OUTSIDE = 1e-9
 """Poles further outside the unit circle than this are unstable."""
@@ -31,41 +32,23 @@ DUST = 4.0 * float(np.finfo(float).eps)
 class Sections:
     """x[k+1] = A x + B m + L (clip(v) - v), outputs C x + D m, with a block-diagonal A (see FlightController for m, v).
 
-    ``blocks`` are (first state, size). A is stored for the kernel's way to multiply by it,
-
-        x_i[k+1] = diagonal_i x_i + coupling_i x_(i^1) + sum of rest + ...,
-
-    with ``coupling`` between the neighbours 0 and 1, 2 and 3, ... (0 at the last state of an odd number) and ``rest``
-    by rows for what is neither. ``form`` is MODAL where there is no rest, else TRIANGULAR. States are scaled by powers
-    of two to sizes near 1 for white noise of 1 at each input. ``condition`` is that of the transformation from the
-    controller's own states, each of the size that this noise gives it.
+    ``blocks`` are (first state, size). ``form`` is MODAL where A has nothing but its diagonal and what joins the
+    neighbours 0 and 1, 2 and 3, ..., else TRIANGULAR. States are scaled by powers of two to sizes near 1 for white
+    noise of 1 at each input.
     """
 
     form: str
     blocks: tuple[tuple[int, int], ...]
-    diagonal: Floats
-    coupling: Floats
-    rest: kernels.Rows
+    A: Floats
     B: Floats
     C: Floats
     D: Floats
     L: Floats
-    condition: float
 
     @property
     def order(self) -> int:
         """Number of states."""
-        return int(self.diagonal.size)
-
-    @property
-    def A(self) -> Floats:  # noqa: N802
-        """The dense matrix."""
-        n, dense = self.order, np.diag(self.diagonal)
-        paired = np.arange(n - n % 2)
-        dense[paired, paired ^ 1] = self.coupling[paired]
-        start = self.rest.start.astype(int)
-        dense[np.repeat(np.arange(n), np.diff(start)), self.rest.column.astype(int)] += self.rest.value
-        return dense
+        return len(self.A)
 
     @property
     def system(self) -> lti.StateSpace:
@@ -84,10 +67,19 @@ def sections(of: FlightController) -> Sections:
     if (lack := hidden(found)) is not None:
         raise ExportError(
             f"controller {of.name!r} is not minimal: {lack[0]} its mode with {_pole(of, lack[1])}, so that the code "
-            "would compute it for nothing; take a minimal realisation (`microrad.export.modes.minimal` makes one), or "
-            "take out the filter or input that the mode belongs to"
+            "would compute it for nothing; take a minimal realisation (`microrad.export.linear_part.modes.minimal` "
+            "makes one), or take out the filter or input that the mode belongs to"
         )
     return _sections(found, of.system.D)
+
+
+def compensated_states(form: Sections) -> list[bool]:
+    """By state, whether single precision keeps what rounding leaves out of it: slow blocks and integrators."""
+    found, A = [False] * form.order, form.A
+    for first, size in form.blocks:
+        at = slice(first, first + size)
+        found[at] = [float(np.max(np.abs(np.linalg.eigvals(A[at, at])))) > SLOW] * size
+    return found
 
 
 # ------------------------------------------------------------------------------------------------------------ refusals
@@ -125,43 +117,22 @@ def _defective(block: Floats, poles: Complexes) -> complex | None:
 
 # --------------------------------------------------------------------------------------------------------- the sections
 def _sections(of: Modes, D: Floats) -> Sections:
-    size = _block_sizes(of)
-    A = _without_dust(of) * size / size[:, None]
-    n = A.shape[0]
+    A = of.found.blocks.astype(float)
+    size = sizes(A, of.driven)
+    for at in of.found.slices:
+        block = A[at, at]
+        if len(block) == 2 and block[1, 0] != 0.0:  # a rotation has one size, so that it stays one
+            size[at] = np.max(size[at])
+        block[np.abs(block) < DUST * np.max(np.abs(block))] = 0.0
+    A = A * size / size[:, None]
     row, column = np.indices(A.shape)
-    beside = (row ^ 1) == column
-    paired = np.arange(n - n % 2)
-    coupling = np.zeros(n)
-    coupling[paired] = A[paired, paired ^ 1]
-    rest = kernels.rows(np.where((row == column) | beside, 0.0, A))
+    beyond = (row != column) & ((row ^ 1) != column)
     return Sections(
-        form=TRIANGULAR if rest.value.size else MODAL,
+        form=TRIANGULAR if np.any(A[beyond]) else MODAL,
         blocks=tuple((at.start, at.stop - at.start) for at in of.found.slices),
-        diagonal=np.diag(A).copy(),
-        coupling=coupling,
-        rest=rest,
+        A=A,
         B=of.B.astype(float) / size[:, None],
         C=of.C.astype(float) * size,
         D=D.astype(float),
         L=of.L.astype(float) / size[:, None],
-        condition=of.found.condition,
     )
-
-
-def _without_dust(of: Modes) -> Floats:
-    """A with 0 for what is rounding of a block's largest number."""
-    A = of.found.blocks.astype(float)
-    for at in of.found.slices:
-        block = A[at, at]
-        block[np.abs(block) < DUST * np.max(np.abs(block))] = 0.0
-    return A
-
-
-def _block_sizes(of: Modes) -> Floats:
-    """Sizes of the states, the same one for the two of a rotation, so that it stays one."""
-    blocks = of.found.blocks.astype(float)
-    size = sizes(blocks, of.driven)
-    for at in of.found.slices:
-        if at.stop - at.start == 2 and blocks[at.start + 1, at.start] != 0.0:
-            size[at] = np.max(size[at])
-    return size

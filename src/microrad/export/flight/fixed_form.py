@@ -1,4 +1,4 @@
-"""The linear part of a controller in fixed point: whole numbers with powers of two as units, and their scales.
+"""The linear part of a controller in fixed point: whole numbers with powers of two as units, and a step of it.
 
 A number of the code stands for ``integer 2^-scale``. States move by their change,
 
@@ -13,17 +13,15 @@ readings, no sum leaves 64 bits, and what grows beyond its range stays at its en
 
 import math
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from microrad.core import kernels
-from microrad.export.double_run import Run
-from microrad.export.records import FlightController, Floats, Signal
-from microrad.export.rounding import responses
-from microrad.export.sections import Sections
+from microrad.export.flight.double_run import Inverse, Run
+from microrad.export.flight.rounding import responses
+from microrad.export.linear_part.sections import Sections
+from microrad.export.records import FlightController, Floats
 
 Whole = NDArray[np.int64]
 Poles = tuple[tuple[complex, complex], ...]
@@ -99,7 +97,6 @@ class FixedForm:
     """
 
     bits: int
-    head_room: float
     input_scale: tuple[int, ...]
     state_scale: tuple[int, ...]
     output_scale: tuple[int, ...]
@@ -126,36 +123,31 @@ class FixedForm:
         return tuple(a - b for a, b in zip(self.output.scale, self.output_scale, strict=True))
 
 
-def scaled(of: FlightController, form: Sections, inputs: Floats, ideal: Run, bits: int, head_room: float) -> FixedForm:
+def scaled(of: FlightController, form: Sections, inputs: Floats, ideal: Run, bits: int) -> FixedForm:
     """The controller in words of ``bits``, scaled by a recorded run; its report is empty yet."""
     word = 2 ** (bits - 1) - 1
-    sizes = _input_peaks(of.inputs, inputs) * head_room
-    states = _or_reachable(np.max(np.abs(ideal.states), axis=0) * head_room, np.eye(form.order), form, sizes)
-    ranges = _output_ranges(of, form, ideal, sizes, head_room)
+    peaks: list[float] = []  # of the inputs, the same for all numbers of a signal; its limit where it rests
+    for s in of.inputs:
+        peak = float(np.max(np.abs(inputs[:, len(peaks) : len(peaks) + s.size]), initial=0.0))
+        peaks += [peak or s.limit] * s.size
+    sizes = np.array(peaks) * HEAD_ROOM
+    states = _or_reachable(np.max(np.abs(ideal.states), axis=0) * HEAD_ROOM, np.eye(form.order), form, sizes)
+    ranges = _output_ranges(of, form, ideal, sizes)
     read, kept, given = (tuple(_scale(float(x), word) for x in most) for most in (sizes, states, ranges))
     step = np.hstack([form.A - np.eye(form.order), form.B, form.L])
     from_v = given[: of.actuators]
     state = _rows(step, (*kept, *read, *from_v), word, [s + bits - 1 for s in kept])
     output = _rows(np.hstack([form.C, form.D]), (*kept, *read), word, [s + 61 for s in given])
-    limits = [_limits(of, s, word) for s in from_v]
+    low = tuple(-word if math.isinf(of.minimum_v) else math.ceil(math.ldexp(of.minimum_v, s)) for s in from_v)
+    high = tuple(word if math.isinf(of.maximum_v) else math.floor(math.ldexp(of.maximum_v, s)) for s in from_v)
     converters = tuple(_converter(of, s) for s in from_v) if of.resolution_v > 0.0 else ()
     empty = QuantisationReport(0, of.period_s, (), (), (), 0.0, 0.0, of.resolution_v, 0.0)
-    low, high = tuple(a for a, _ in limits), tuple(b for _, b in limits)
-    return FixedForm(bits, head_room, read, kept, given, state, output, low, high, converters, empty)
+    return FixedForm(bits, read, kept, given, state, output, low, high, converters, empty)
 
 
 def _scale(size: float, word: int) -> int:
     """Finest power of two at which numbers up to ``size`` fit into a word."""
     return math.floor(math.log2(word / size))
-
-
-def _input_peaks(signals: tuple[Signal, ...], inputs: Floats) -> Floats:
-    """Largest size in the run by signal, for each of its numbers; the signal's limit where it rests."""
-    ends, found = np.cumsum([0] + [s.size for s in signals]), []
-    for s, (a, b) in zip(signals, pairwise(ends), strict=True):
-        peak = float(np.max(np.abs(inputs[:, a:b]), initial=0.0))
-        found += [peak or s.limit] * s.size
-    return np.array(found)
 
 
 def _or_reachable(peaks: Floats, rows: Floats, form: Sections, inputs: Floats) -> Floats:
@@ -167,13 +159,13 @@ def _or_reachable(peaks: Floats, rows: Floats, form: Sections, inputs: Floats) -
     return found
 
 
-def _output_ranges(of: FlightController, form: Sections, ideal: Run, inputs: Floats, head_room: float) -> Floats:
+def _output_ranges(of: FlightController, form: Sections, ideal: Run, inputs: Floats) -> Floats:
     """Ranges of the outputs, the same for all actuators: of v, that of the commands and of their limits."""
     n = of.actuators
     peaks = np.max(np.abs(ideal.outputs), axis=0).reshape(-1, n).max(axis=1)
     limits = [abs(x) for x in (of.minimum_v, of.maximum_v) if math.isfinite(x)]
     peaks[0] = max(*limits, peaks[0], float(np.max(np.abs(ideal.free)))) if limits else np.max(np.abs(ideal.free))
-    groups = _or_reachable(peaks * head_room, form.C[::n], form, inputs)
+    groups = _or_reachable(peaks * HEAD_ROOM, form.C[::n], form, inputs)
     return np.repeat(groups, n)
 
 
@@ -183,19 +175,12 @@ def _rows(matrix: Floats, columns: tuple[int, ...], word: int, most: list[int]) 
     for i, row in enumerate(matrix):
         weights = row * np.exp2(-np.array(columns, dtype=float))
         size = float(np.sum(np.abs(weights)))
-        scale = most[i] if size == 0.0 else min(most[i], math.floor(math.log2(word / size)))
+        scale = most[i] if size == 0.0 else min(most[i], _scale(size, word))
         while np.sum(np.abs(np.rint(np.ldexp(weights, scale)))) > word:
             scale -= 1
         values[i] = np.rint(np.ldexp(weights, scale)).astype(np.int64)
         scales.append(scale)
     return Rows(values, tuple(scales))
-
-
-def _limits(of: FlightController, scale: int, word: int) -> tuple[int, int]:
-    """The command's limits in its scale, rounded inwards."""
-    low = -word if math.isinf(of.minimum_v) else math.ceil(math.ldexp(of.minimum_v, scale))
-    high = word if math.isinf(of.maximum_v) else math.floor(math.ldexp(of.maximum_v, scale))
-    return low, high
 
 
 def _converter(of: FlightController, scale: int) -> Converter:
@@ -216,21 +201,68 @@ def dequantised(form: Sections, made: FixedForm) -> Sections:
     columns = np.array([*made.state_scale, *made.input_scale, *made.output_scale[: form.L.shape[1]]])
     step = _values(made.state, columns)
     output = _values(made.output, columns[: n + m])
-    A = step[:, :n] + np.eye(n)
-    row, column = np.indices(A.shape)
-    beside = ((row ^ 1) == column) & (np.maximum(row, column) < n - n % 2)
-    return replace(
-        form,
-        diagonal=np.diag(A).copy(),
-        coupling=np.array([A[i, i ^ 1] if i < n - n % 2 else 0.0 for i in range(n)]),
-        rest=kernels.rows(np.where((row == column) | beside, 0.0, A)),
-        B=step[:, n : n + m],
-        L=step[:, n + m :],
-        C=output[:, :n],
-        D=output[:, n:],
-    )
+    A, B, L = step[:, :n] + np.eye(n), step[:, n : n + m], step[:, n + m :]
+    return replace(form, A=A, B=B, C=output[:, :n], D=output[:, n:], L=L)
 
 
 def _values(rows: Rows, columns: NDArray[np.integer[Any]]) -> Floats:
     exponents = columns[None, :] - np.array(rows.scale, dtype=int)[:, None]
     return np.asarray(np.ldexp(rows.value.astype(float), exponents))
+
+
+# ------------------------------------------------------------------------------------------------------------- the step
+class Step:
+    """The step in whole numbers, as the C code has it: states are kept with the scales of their rows."""
+
+    def __init__(self, made: FixedForm, states: Whole | None = None) -> None:
+        """At rest, or with ``states``."""
+        n = len(made.state_scale)
+        self.of, self.x = made, np.zeros(n, dtype=np.int64) if states is None else states.copy()
+        self.shift, self.out_shift = np.array(made.state_shift, dtype=int), np.array(made.output_shift, dtype=int)
+        self.end = np.int64(made.word) << self.shift.astype(np.int64)
+        self.read = np.zeros(len(made.input_scale), dtype=np.int64)
+
+    def output(self, reading: Whole) -> Whole:
+        """Outputs for the readings of a sample; `update` has to follow."""
+        self.read = np.clip(reading, -self.of.word, self.of.word)
+        total = self.of.output.value @ np.concatenate([_rounded(self.x, self.shift), self.read])
+        return np.asarray(np.clip(_rounded(total, self.out_shift), -self.of.word, self.of.word))
+
+    def update(self, excess: Whole) -> None:
+        """Move the states on; ``excess`` is what the limits took off the commands."""
+        excess = np.clip(excess, -self.of.word, self.of.word)
+        signals = np.concatenate([_rounded(self.x, self.shift), self.read, excess])
+        self.x = np.clip(self.x + self.of.state.value @ signals, -self.end, self.end)
+
+
+def _rounded(x: Whole, shift: NDArray[np.integer[Any]]) -> Whole:
+    """x / 2^shift to the nearest, ties up."""
+    half = np.where(shift > 0, np.int64(1) << np.maximum(shift - 1, 0).astype(np.int64), 0)
+    return np.asarray((x + half) >> shift.astype(np.int64))
+
+
+def readings(made: FixedForm, inputs: Floats) -> Whole:
+    """Inputs as whole numbers of their scales, at the end of the range where they are beyond it."""
+    counts = np.floor(np.ldexp(inputs, np.array(made.input_scale, dtype=int)) + 0.5)
+    return np.asarray(np.clip(counts, -made.word, made.word).astype(np.int64))
+
+
+def fixed_run(of: FlightController, made: FixedForm, inputs: Floats) -> tuple[Floats, Floats, Whole]:
+    """Outputs and commands ahead of the clip (SI units) over a recorded run in fixed point, and the states at its end.
+
+    What an inverse adds is taken in double precision.
+    """
+    read, step, n = readings(made, inputs), Step(made), of.actuators
+    outputs, free = np.empty((len(read), len(made.output_scale))), np.empty((len(read), n))
+    inverse = None if of.inverse is None else Inverse(of, len(read))
+    down, up = -np.array(made.output_scale, dtype=int), np.array(made.output_scale[:n], dtype=int)
+    low, high = np.array(made.minimum), np.array(made.maximum)
+    for k, reading in enumerate(read):
+        y = step.output(reading)
+        outputs[k] = np.ldexp(y.astype(float), down)
+        command = y[:n]
+        if inverse is not None:
+            command = command + np.floor(np.ldexp(inverse.step(outputs[k]), up) + 0.5).astype(np.int64)
+        free[k] = np.ldexp(command.astype(float), down[:n])
+        step.update(np.clip(command, low, high) - command)
+    return outputs, free, step.x

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from microrad.core import kernels
+from microrad.export.linear_part.sections import Sections
 from microrad.export.records import FlightController, Floats, InverseLaw
-from microrad.export.sections import Sections
 
 
 @dataclass(frozen=True, slots=True)

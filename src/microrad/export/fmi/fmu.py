@@ -5,6 +5,7 @@ Source: Modelica Association, "Functional Mock-up Interface for Model Exchange a
 """
 
 import hashlib
+import io
 import platform
 import subprocess
 import sys
@@ -21,12 +22,12 @@ import numpy as np
 
 from microrad.core import kernels
 from microrad.core.folder import scratch, write_whole
-from microrad.export.build import FLAGS, compiler, compiler_words
-from microrad.export.flight import flight_code
-from microrad.export.fmi_description import Version, constants, exponent, model_description, plant_of, variables
+from microrad.export.flight.build import FLAGS, TIME_LIMIT_S, compiler, compiler_words
+from microrad.export.flight.c_code import flight_code
+from microrad.export.fmi.description import Version, exponent, model_description, plant_of, variables
 from microrad.export.identifiers import identifier
+from microrad.export.linear_part.sections import sections
 from microrad.export.records import GAUGE, OPTICAL_ERROR, READING, REFERENCE, ExportError, LoopUnit, PlantUnit
-from microrad.export.sections import sections
 from microrad.export.templating import render
 
 SHARED = (*FLAGS, "-fPIC", "-shared", "-fvisibility=hidden")
@@ -40,9 +41,6 @@ HEADERS: Mapping[str, tuple[str, ...]] = {
 
 LONGEST_NAME = 27
 """Characters of a unit's name: the controller inside has the name with an ending, in at most 31."""
-
-TIME_LIMIT_S = 300.0
-"""A compiler that takes longer is ended."""
 
 EPOCH = (1980, 1, 1, 0, 0, 0)
 """Time stamp of all files in the archive, so that the same unit is the same file."""
@@ -79,9 +77,17 @@ def write_unit(unit: PlantUnit | LoopUnit, path: Path, version: Version, name: s
     are scalars ``command_v[1]``. A communication step is a whole number of plant steps; another one is an error of the
     call, and changes nothing. Parameters act until the initialisation ends.
 
-    The library inside is compiled here, if there is a C compiler. The same unit gives the same file. Raises ExportError
-    for another version, a name that is no identifier or too long, a controller that cannot be exported (see
-    `sections`), and a compiler that fails.
+    The library inside is compiled here, if there is a C compiler. The same unit gives the same file.
+
+    Args:
+        unit: the mirror with its amplifier, or a closed loop.
+        path: the file to write.
+        version: of the interface, "2.0" or "3.0".
+        name: what the unit calls itself, an identifier of C.
+
+    Raises:
+        ExportError: another version; a name that is no identifier or too long; a controller that cannot be exported
+            (see `sections`); a compiler that fails.
     """
     if version not in HEADERS:
         raise ExportError(f"FMI {version!r} is not written here: choose {' or '.join(HEADERS)}")
@@ -112,20 +118,16 @@ def _texts(unit: PlantUnit | LoopUnit, version: Version, name: str) -> tuple[dic
         }
 
     rest = {f"sources/{file}": text for file, text in code.items()}
-    headers = files("microrad.export") / "fmi"
+    headers = files("microrad.export.fmi") / "headers"
     rest |= {f"sources/{file}": (headers / file).read_text(encoding="utf-8") for file in HEADERS[version]}
     rest["documentation/licenses/license.txt"] = render("fmi_licence.txt.j2")
     if version == "3.0":
         rest["sources/buildDescription.xml"] = render("build_description.xml.j2", name=name, compiled=compiled)
-    guid = _guid({**rest, **around("")})
-    return {**around(guid), **rest}, guid
-
-
-def _guid(texts: Mapping[str, str]) -> str:
     digest = hashlib.sha256()
-    for file in sorted(texts):
-        digest.update(f"{file}\n{len(texts[file])}\n{texts[file]}".encode())
-    return f"{{{uuid.UUID(bytes=digest.digest()[:16], version=5)}}}"
+    for file, text in sorted({**rest, **around("")}.items()):
+        digest.update(f"{file}\n{len(text)}\n{text}".encode())
+    guid = f"{{{uuid.UUID(bytes=digest.digest()[:16], version=5)}}}"
+    return {**around(guid), **rest}, guid
 
 
 # -------------------------------------------------------------------------------------------------------------- sources
@@ -133,7 +135,7 @@ def unit_code(unit: PlantUnit | LoopUnit, name: str) -> dict[str, str]:
     """The C of a unit without the functions of the standard: file names and texts. Raises ExportError as `sections`."""
     plant, loop, control = f"{name}_plant", f"{name}_loop", f"{name}_ctl"
     code = {f"{plant}_hysteresis.h": render("hysteresis.h.j2", name=plant, precision="double")}
-    values = plant_values(plant_of(unit))
+    values = _plant_values(plant_of(unit))
     code |= {f"{plant}.{kind}": render(f"plant.{kind}.j2", name=plant, **values) for kind in ("h", "c")}
     if isinstance(unit, LoopUnit):
         flight = flight_code(unit.controller, sections(unit.controller), control, "double")
@@ -145,49 +147,27 @@ def unit_code(unit: PlantUnit | LoopUnit, name: str) -> dict[str, str]:
         "plant": plant,
         "loop": loop if isinstance(unit, LoopUnit) else "",
         "variables": variables(unit),
-        "constants": [value for _, _, value, _ in constants(unit)],
+        "constants": [each.start for each in variables(unit) if each.constant],
     }
     return code | {f"{name}_unit.{kind}": render(f"fmi_unit.{kind}.j2", **shown) for kind in ("h", "c")}
 
 
-def plant_values(unit: PlantUnit) -> dict[str, Any]:
+def _plant_values(unit: PlantUnit) -> dict[str, Any]:
     """What the templates of a plant are filled with, but for its name."""
-    p = unit.plant
-    n, elements = len(p.states), len(p.elements) + len(p.operators)
-    arrays = ("diagonal", "coupling", "B0", "B1", "E_held", "E1", "F", "G", "C", "D", "CE1", "K", "play_start")
+    p, count = unit.plant, np.diff(unit.plant.rest.start.astype(int))
+    row = np.repeat(np.arange(count.size), count)
     return {
-        "mission": unit.origin.mission,
-        "mirror": unit.origin.mirror,
+        "of": unit,
+        "p": p,
         "version": version_of("microrad"),
-        "step_s": p.step_s,
-        "bias_v": unit.bias_v,
-        "bandwidth_hz": unit.bandwidth_hz,
         "slew_v_s": unit.slew_step_v / p.step_s,
-        "actuators": len(p.actuators),
-        "outputs": len(p.outputs),
-        "axes": unit.optics.shape[0],
-        "optics": unit.optics,
-        "states": p.diagonal.size if n else 0,
-        "elements": elements,
-        "direct": p.direct,
-        "feedback": p.feedback and elements > 0,
-        "rest": _entries(p.rest),
+        "states": p.diagonal.size if len(p.states) else 0,
+        "elements": len(p.elements) + len(p.operators),
+        "rest": [(int(i), int(j), float(v)) for i, j, v in zip(row, p.rest.column, p.rest.value, strict=True)],
         "bouc_wen": [row[: kernels.POWER] for row in p.bouc_wen],
         "exponent": np.array([exponent(row) for row in p.bouc_wen]),
         "operator": list(p.operator),
-        "widening": p.operator[:, kernels.WIDENING],
-        "operator_limit": p.operator[:, kernels.WIDENING_LIMIT],
-        "play_threshold": list(p.play_threshold),
-        "play_weight": p.play_weight,
-        **{key: getattr(p, key) for key in arrays},
     }
-
-
-def _entries(rows: kernels.Rows) -> list[tuple[int, int, float]]:
-    """Row, column and value of each number."""
-    count: Any = np.diff(rows.start.astype(np.int64))
-    at = np.repeat(np.arange(count.size), count)
-    return [(int(i), int(j), float(v)) for i, j, v in zip(at, rows.column, rows.value, strict=True)]
 
 
 def _loop_values(unit: LoopUnit) -> dict[str, Any]:
@@ -205,16 +185,9 @@ def _loop_values(unit: LoopUnit) -> dict[str, Any]:
             f"{', '.join(sources)}"
         )
     return {
-        "mission": unit.plant.origin.mission,
-        "controller_name": unit.controller.name,
+        "of": unit,
         "version": version_of("microrad"),
-        "steps_per_sample": unit.steps_per_sample,
-        "delay_steps": unit.delay_steps,
-        "optical_delay_steps": unit.optical_delay_steps,
-        "optical_every": unit.optical_every,
         "field_of_view_rad2": min(unit.field_of_view_rad**2, sys.float_info.max),
-        "optical_resolution_rad": unit.optical_resolution_rad,
-        "gauge_resolution_rad": unit.gauge_resolution_rad,
         "optical": OPTICAL_ERROR in names,
         "gauge": GAUGE in names,
         "reading": READING in names,
@@ -267,8 +240,6 @@ def _library(texts: Mapping[str, str], version: Version, name: str) -> bytes:
 
 def _archive(contents: Mapping[str, bytes]) -> bytes:
     """A zip file with the model description first, that depends on nothing but its contents."""
-    import io
-
     file = io.BytesIO()
     with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
         for name in sorted(contents, key=lambda each: (each != "modelDescription.xml", each)):

@@ -1,0 +1,1 @@
+"""The mirror, or a closed loop with it, as a co-simulation unit (FMU)."""

@@ -1,0 +1,148 @@
+"""The linear models of a mission: mirror, sampled plant, controller and loop, with names, units and origin."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from microrad.core import lti
+from microrad.export.choice import Choice, PointingChoice, Source, TrackingChoice, flight_controller, source
+from microrad.export.matrices.forms import LinearModel, Port
+from microrad.export.matrices.structure import without_copies, without_state
+from microrad.export.records import ExportError, FlightController
+from microrad.loop import control, sine_run
+from microrad.loop.control import GAUGE, OPTICAL, RESIDUAL
+from microrad.loop.control.analysis import moved
+from microrad.loop.fine_loop.design import behind_filter, design_plant
+from microrad.loop.fine_loop.loop import ReferenceFilter
+from microrad.loop.fine_pointing.designs import IN_SERIES
+from microrad.loop.sensor import StrainGauge
+from microrad.mirror import model as mirror
+from microrad.mission.file import MissionFile
+
+LINEAR_PART, MIRROR, SAMPLED_PLANT, CONTROLLER, LOOP = "linear_part", "mirror", "sampled_plant", "controller", "loop"
+"""Names of the models, valid as names of variables in MATLAB."""
+
+
+def models(of: MissionFile | Choice) -> tuple[LinearModel, ...]:
+    """The linear models of a mission, or of a chosen controller (see `choice.choose`) and its loop.
+
+    Angles are line-of-sight angles in the sampled plant, the controller and the loop, and the mirror file's own in the
+    first two. Raises ExportError if the mission's loop cannot be built.
+    """
+    start = source(of) if isinstance(of, MissionFile) else of.source
+    controller = None if isinstance(of, MissionFile) else _controller(start, flight_controller(of))
+    try:
+        found = _mirror_models(start)
+        if isinstance(of, MissionFile) or controller is None:
+            return tuple(found)
+        plant, loop = _pointing_models(of) if isinstance(of, PointingChoice) else _tracking_models(of)
+        return (*found, plant, controller, loop)
+    except ValueError as error:
+        raise ExportError(f"{start.path}: {error}") from error
+
+
+_STATES = {
+    LINEAR_PART: "mode",
+    MIRROR: "mirror_state",
+    SAMPLED_PLANT: "plant_state",
+    CONTROLLER: "controller_state",
+    LOOP: "loop_state",
+}
+"""What the states of each model are called, with their number behind it."""
+
+_Units = dict[str, str]
+"""Units of inputs or outputs by name."""
+
+
+def _model(
+    of: Source, name: str, meaning: str, system: lti.StateSpace, period_s: float, inputs: _Units, outputs: _Units
+) -> LinearModel:
+    states = tuple(Port(f"{_STATES[name]}_{i}", "1") for i in range(system.order))
+    read, given = (tuple(Port(*each) for each in ports.items()) for ports in (inputs, outputs))
+    return LinearModel(name, meaning, system, period_s, read, given, states, of.origin)
+
+
+def _mirror_models(of: Source) -> list[LinearModel]:
+    """The mirror's linear part, where it has one, and the mirror."""
+    table, found = of.mirror, []
+    if table.linear is not None:
+        system, gain = mirror.linear_part(table.linear)
+        meaning = (
+            f"linear part of the mirror, divided by its gain at {table.linear.normalise_at_hz:g} Hz ({gain:.6g}); it "
+            "takes what the hysteresis makes of the drive"
+        )
+        found.append(_model(of, LINEAR_PART, meaning, system, 0.0, {"hysteresis_rad": "rad"}, {"mirror_rad": "rad"}))
+    made = mirror.from_mission(table, mirror.hysteresis_model(table, table.rate_limit_v_s, table.bias_v))
+    meaning = f"mirror from drive to angle, its hysteresis at its slow gain; both count from rest at {table.bias_v:g} V"
+    return [*found, _model(of, MIRROR, meaning, made.linear_loop, 0.0, {"drive_v": "V"}, {"mirror_rad": "rad"})]
+
+
+def _tracking_models(of: TrackingChoice) -> tuple[LinearModel, LinearModel]:
+    """Sampled plant and loop of a controller of [control]."""
+    setup, angle = of.setup, {"line_of_sight_rad": "rad"}
+    plant = without_copies(control.sampled_plant(of.mirror, setup.drive, setup.timing))
+    loop = without_copies(sine_run.sampled_loop(of.mirror, setup))
+    behind = "computation delay, amplifier and mirror, its hysteresis at its slow gain, at the control samples"
+    transfer = (
+        "loop transfer L, controller and sampled plant in series; the closed loop is L / (1 + L). An inverse "
+        "acts on the reference and is no part of it"
+    )
+    return (
+        _model(of.source, SAMPLED_PLANT, behind, plant, setup.timing.period_s, {"command_v": "V"}, angle),
+        _model(of.source, LOOP, transfer, loop, setup.timing.period_s, {"error_rad": "rad"}, angle),
+    )
+
+
+def axis_plant(of: PointingChoice) -> control.DesignPlant:
+    """The plant that the chosen controller of one axis was designed for: its command and what comes of it alone.
+
+    Outputs as in `control.DesignPlant`, without noise; the gauge reads the line of sight whether the loop has it or
+    not. The filter of an inverse in series is part of it.
+    """
+    axis = of.scene.axis
+    plant = design_plant(replace(axis, gauge=axis.gauge or StrainGauge(0.0, 0.0)))
+    if of.controller.name == IN_SERIES:
+        plant = behind_filter(plant, ReferenceFilter(of.scene.table.reference_filter_hz).discrete(plant.period_s))
+    plant = moved(plant)
+    newest = int(np.argmax(np.abs(plant.system.C[RESIDUAL])))  # the state that holds the residual: minus the angle
+    system = without_state(plant.system, newest, -plant.system.C[GAUGE : GAUGE + 1])
+    return replace(plant, system=without_copies(system), has_gauge=axis.gauge is not None)
+
+
+def _pointing_models(of: PointingChoice) -> tuple[LinearModel, LinearModel]:
+    """Sampled plant and loop of an axis of the fine-pointing loop."""
+    plant, every, command = axis_plant(of), of.scene.loop.optical.every, {"axis_command_v": "V"}
+    s, rows, outputs = plant.system, [GAUGE, OPTICAL], {"line_of_sight_rad": "rad", "optical_error_rad": "rad"}
+    if plant.has_gauge:
+        rows, outputs = [*rows, GAUGE], {**outputs, "gauge_rad": "rad"}
+    slow = "" if every == 1 else f"; a sensor that delivers every {every} samples counts as one of more delay"
+    behind = "reference filter, " if of.controller.name == IN_SERIES else ""
+    meaning = (
+        f"one axis: computation delay, {behind}amplifier and mirror, its hysteresis at its slow gain, at the "
+        f"control samples; the optical error as its sensor delivers it{slow}"
+    )
+    whole = lti.series(plant.from_command, of.tuned.controller.system)
+    loop = without_copies(lti.StateSpace(whole.A, whole.B, -whole.C, -whole.D))
+    transfer = (
+        "loop transfer L of one axis, cut at its command: plant, then controller, with the sign that makes the "
+        "closed loop 1 / (1 + L). An inverse counts as the reciprocal of the slow gain"
+    )
+    sampled = lti.StateSpace(s.A, s.B, s.C[rows], s.D[rows])
+    return (
+        _model(of.source, SAMPLED_PLANT, meaning, sampled, plant.period_s, command, outputs),
+        _model(of.source, LOOP, transfer, loop, plant.period_s, command, {"returned_command_v": "V"}),
+    )
+
+
+def _controller(source: Source, of: FlightController) -> LinearModel:
+    kinds, behind = {"command_v": "V"}, ""
+    if of.inverse is not None:
+        kinds["target_rad"] = "rad"
+        behind = "; the inverse of the hysteresis, which is not linear, takes its targets behind it"
+        if not of.inverse.by_difference:
+            kinds["target_rate_rad_s"] = "rad/s"
+    meaning = f"{of.name}, as it flies{behind}; its commands are clipped to {of.minimum_v:g} .. {of.maximum_v:g} V"
+    inputs = {f"{each.name}_{i}": each.unit for each in of.inputs for i in range(each.size)}
+    outputs = {f"{name}_{i}": unit for name, unit in kinds.items() for i in range(of.actuators)}
+    made = _model(source, CONTROLLER, meaning, of.system, of.period_s, inputs, outputs)
+    return replace(made, anti_windup=of.anti_windup)
