@@ -22,10 +22,10 @@ from microrad.orbit.elements import Sgp4Orbit, sgp4_orbit
 from microrad.orbit.ephemeris import EphemerisOrbit
 from microrad.orbit.epoch import Epoch
 from microrad.orbit.events import positive
+from microrad.orbit.from_mission import TAIL_S, Pair, pair, relays, repeats, satellites, stations, table
 from microrad.orbit.ground import Station, elevation_rad
 from microrad.orbit.limits import UNLIMITED, Limits, Terminal
 from microrad.orbit.line_of_sight import LineOfSight, sight
-from microrad.orbit.model import TAIL_S, Pair, pair, relays, repeats, satellites, stations
 from microrad.orbit.oem import read_oem
 from microrad.orbit.sun import shadow_rad, sun_direction
 
@@ -77,4 +77,5 @@ __all__ = [
     "subpoint",
     "sun_direction",
     "sun_synchronous_inclination_rad",
+    "table",
 ]

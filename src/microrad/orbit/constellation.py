@@ -5,16 +5,15 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from microrad import orbit
 from microrad.mission.file import LinkFile
 from microrad.mission.model import LinkMission
 from microrad.mission.tables.operations import Constellation
 from microrad.orbit import operations
+from microrad.orbit.base import Floats
 from microrad.orbit.day.flow import PointingLoss, closings, rate_table
 
-Floats = NDArray[np.float64]
 Progress = Callable[[int, int, str], None]
 Span = tuple[float, float]
 
@@ -83,7 +82,8 @@ def opportunities(
         on_progress(place + 1)
     table = np.array(rows, dtype=np.float64).reshape(-1, 4)
     order = np.lexsort((table[:, 1], table[:, 0], table[:, 2]))
-    return operations.Opportunities(*(table[order, column] for column in range(4)))
+    who, when = table[order, :2].astype(np.int64), table[order, 2:]
+    return operations.Opportunities(who[:, 0], who[:, 1], when[:, 0], when[:, 1])
 
 
 def run(
@@ -97,9 +97,9 @@ def run(
     """
     m, folder = file.mission, file.path.parent
     c, rates = table(m), rate_table(closings(m, loss))
-    pair = orbit.pair(m, folder)
-    own = tuple(orbit.satellites(c, m, pair.epoch, folder))
-    relays = orbit.relays(c, m, pair.epoch)
+    orbits, pair = orbit.table(m), orbit.pair(m, folder)
+    own = tuple(orbit.satellites(c, orbits, pair.epoch, folder))
+    relays = orbit.relays(c, orbits, pair.epoch)
     furthest = 0.0 if rates is None else rates.steps[-1].largest_range_m
     found = opportunities(
         own,

@@ -37,7 +37,7 @@ class Limits:
     """
 
     attitude: Attitude
-    boresight: tuple[float, float, float]
+    boresight: tuple[float, ...]
     field_of_regard_rad: float
     slew_limit_rad_s: float
     sun_exclusion_rad: float

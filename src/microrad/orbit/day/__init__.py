@@ -80,16 +80,6 @@ def loss_at(m: LinkMission, margin_db: float, source: str) -> PointingLoss:
     return PointingLoss(link.received_on_axis_dbm(m) - needed - margin_db, 0.0, source)
 
 
-def _check_contact(m: LinkMission, seen: View) -> None:
-    """Refuse a contact beyond those of the span."""
-    asked = None if m.operations is None else m.operations.contact
-    if asked is not None and seen.encounters and asked.number > len(seen.encounters):
-        raise operations.OperationsError(
-            f"operations.contact.number is {asked.number}, and the span has {len(seen.encounters)} contacts: give a "
-            "number up to that, or a longer orbit.duration"
-        )
-
-
 def acquired(links: LinkStudy) -> Found | None:
     """The acquisition by which the mission's partner is found, or None where it has none."""
     o, finding = links.file.mission.operations, links.finding
@@ -101,8 +91,9 @@ def acquired(links: LinkStudy) -> Found | None:
 def relay(links: LinkStudy, loss: PointingLoss) -> Way:
     """The way by the relay alone: what `run` finds of it, without the rest of the day."""
     m = links.file.mission
-    seen, rates = view(m, orbit.pair(m, links.file.path.parent)), flow.rate_table(flow.closings(m, loss))
-    return flow.relay(m, seen, rates, loss.outage, acquired(links), 1.0)
+    seen = view(orbit.pair(m, links.file.path.parent), m.communication.wavelength_m)
+    rates = flow.rate_table(flow.closings(m, loss))
+    return flow.relay(flow.table(m), seen, rates, loss.outage, acquired(links), 1.0)
 
 
 def run(
@@ -111,25 +102,29 @@ def run(
     """The day of a mission that has the tables `orbit` and `operations`.
 
     ``loss`` is what pointing costs the laser link, by default what the mission states. Raises `orbit.OrbitError` and
-    `operations.OperationsError` for tables that are missing and orbits that do not hold.
+    `operations.OperationsError` for tables that are missing, orbits that do not hold and a contact that is asked for
+    beyond those of the span.
     """
     m, folder = links.file.mission, links.file.path.parent
     loss = given_loss(links) if loss is None else loss
-    seen = view(m, orbit.pair(m, folder))
-    _check_contact(m, seen)
-    found = acquired(links)
-    closing = flow.closings(m, loss)
-    rates, heard = flow.rate_table(closing), flow.heard(m, seen)
-    relay = flow.relay(m, seen, rates, loss.outage, found, 1.0)
+    seen, o = view(orbit.pair(m, folder), m.communication.wavelength_m), flow.table(m)
+    if o.contact is not None and seen.encounters and o.contact.number > len(seen.encounters):
+        raise operations.OperationsError(
+            f"operations.contact.number is {o.contact.number}, and the span has {len(seen.encounters)} contacts: give "
+            "a number up to that, or a longer orbit.duration"
+        )
+    found, closing = acquired(links), flow.closings(m, loss)
+    heard = flow.heard(o.downlink, seen.pair)
+    relay = flow.relay(o, seen, flow.rate_table(closing), loss.outage, found, 1.0)
     return DayStudy(
         mission=m,
         view=seen,
         loss=loss,
         closings=closing,
         derived=derived_from(links.file.sources, "communication."),
-        encounters=tuple(encounter(m, seen.pair, contact) for contact in relay.contacts),
+        encounters=tuple(encounter(seen.pair, contact, m.communication.wavelength_m) for contact in relay.contacts),
         relay=relay,
-        direct=flow.direct(m, seen, heard),
+        direct=flow.direct(o, seen, heard),
         swings=swings(m, folder, seen, heard, loss, found, on_progress),
         warnings=(*beyond_the_mission(m, seen), *short_tail(seen.pair)),
     )

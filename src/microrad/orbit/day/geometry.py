@@ -6,13 +6,12 @@ from dataclasses import dataclass, replace
 from typing import TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from microrad import orbit
 from microrad.core.units import SPEED_OF_LIGHT_M_S, format_quantity
 from microrad.mission.model import LinkMission
+from microrad.orbit.base import Floats
 
-Floats = NDArray[np.float64]
 _C = TypeVar("_C", bound=orbit.Contact)
 
 SAMPLE_S = 10.0
@@ -121,16 +120,15 @@ def cut_at(contact: _C, end_s: float) -> _C:
     return contact if contact.end_s <= end_s else replace(contact, end_s=end_s, ends=orbit.END)
 
 
-def view(m: LinkMission, pair: orbit.Pair) -> View:
-    """The contacts of the mission's pair of terminals; raises `orbit.OrbitError`."""
+def view(pair: orbit.Pair, wavelength_m: float) -> View:
+    """The contacts of a pair of terminals, with the Doppler shift at a wavelength; raises `orbit.OrbitError`."""
     found = orbit.contacts(pair.leo, pair.geo, pair.earth, pair.epoch, pair.whole_s)
     end = pair.span_s[1]
-    sights = [_sight(pair, c) for c in found]
     return View(
         pair=pair,
-        encounters=tuple(encounter(m, pair, cut_at(c, end)) for c in found if c.start_s < end),
+        encounters=tuple(encounter(pair, cut_at(c, end), wavelength_m) for c in found if c.start_s < end),
         contacts=found,
-        range_m=tuple(_range(s) for s in sights),
+        range_m=tuple(_range(_sight(pair, c)) for c in found),
         umbra_s=_umbra(pair),
         closed_form=_closed_form(pair),
     )
@@ -153,7 +151,7 @@ def _sight(pair: orbit.Pair, contact: orbit.Contact) -> orbit.LineOfSight:
     return orbit.sight(pair.leo.orbit, pair.geo.orbit, times(contact))
 
 
-def encounter(m: LinkMission, pair: orbit.Pair, contact: orbit.Contact) -> Encounter:
+def encounter(pair: orbit.Pair, contact: orbit.Contact, wavelength_m: float) -> Encounter:
     """A contact with what its line of sight reaches."""
     seen = _sight(pair, contact)
     return Encounter(
@@ -165,7 +163,7 @@ def encounter(m: LinkMission, pair: orbit.Pair, contact: orbit.Contact) -> Encou
         float(np.max(seen.rate_rad_s)),
         float(np.max(seen.acceleration_rad_s2)),
         float(np.max(np.abs(seen.range_rate_m_s))),
-        float(np.max(np.abs(seen.doppler_hz(m.communication.wavelength_m)))),
+        float(np.max(np.abs(seen.doppler_hz(wavelength_m)))),
     )
 
 

@@ -3,7 +3,7 @@
 import math
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from microrad.mission.model import LinkMission
@@ -22,6 +22,8 @@ from microrad.orbit.oem import read_oem
 
 TAIL_S = 86400.0
 """Time behind the span in which data of the span may still arrive."""
+REPEATED = ("circular", "keplerian")
+"""Kinds of orbits that the pattern of a constellation can repeat."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,19 +49,24 @@ def pair(m: LinkMission, folder: Path) -> Pair:
     Raises `OrbitError` for an orbit that is none, or that does not hold over the mission's span.
     """
     orbits = table(m)
-    epoch = _epoch(orbits)
+    try:
+        epoch = Epoch(orbits.epoch)
+    except OrbitError as error:
+        raise OrbitError(f"orbit.epoch: {error}") from None
     names = m.terminals.called("leo"), m.terminals.called("geo")
     if names[0] == names[1]:  # two terminals of one make
         names = f"{names[0]} (own)", f"{names[1]} (partner)"
     found, tail = [], TAIL_S
     for end, name in zip(("leo", "geo"), names, strict=True):
+        given = getattr(orbits, end)
         try:
-            one = terminal(getattr(orbits, end), name, epoch, folder)
-            tail = min(tail, _tail(one.orbit, epoch, orbits.duration_s))
+            own = _orbit(given, name, epoch, folder)
+            tail = min(tail, _tail(own, epoch, orbits.duration_s))
         except OrbitError as error:
             raise OrbitError(f"orbit.{end}: {error}") from None
-        found.append(one)
-    return Pair(epoch, earth(orbits), found[0], found[1], (0.0, orbits.duration_s), tail)
+        found.append(Terminal(own, _limits(given.limits), name))
+    earth = Earth(orbits.earth, orbits.grazing_height_m)
+    return Pair(epoch, earth, found[0], found[1], (0.0, orbits.duration_s), tail)
 
 
 def table(m: LinkMission) -> Orbits:
@@ -69,90 +76,58 @@ def table(m: LinkMission) -> Orbits:
     return m.orbit
 
 
-def _epoch(orbits: Orbits) -> Epoch:
-    try:
-        return Epoch.from_text(orbits.epoch)
-    except OrbitError as error:
-        raise OrbitError(f"orbit.epoch: {error}") from None
-
-
-def earth(orbits: Orbits) -> Earth:
-    """What hides a partner."""
-    return Earth(orbits.earth, orbits.grazing_height_m)
-
-
 def _tail(orbit: Orbit, epoch: Epoch, duration_s: float) -> float:
     """How far behind the span an orbit holds; raises `OrbitError` where it does not hold over it."""
-    if not isinstance(orbit, Sgp4Orbit | EphemerisOrbit):
-        return TAIL_S if _tabulated(epoch, duration_s + TAIL_S) else 0.0
-    orbit.require(0.0, duration_s)
+    if isinstance(orbit, EphemerisOrbit):
+        orbit.require(0.0, duration_s)
+        return min(TAIL_S, max(orbit.span_s[1] - duration_s, 0.0))
+    tail = TAIL_S
     if isinstance(orbit, Sgp4Orbit):
+        orbit.require(0.0, duration_s)
         tail = min(TAIL_S, max(MOST_ELEMENTS_AGE_S - orbit.elements_age_s - duration_s, 0.0))
-        try:
-            orbit.require(0.0, duration_s + tail)
-        except OrbitError:  # it decays behind the span
-            return 0.0
-        return tail
-    return min(TAIL_S, max(orbit.span_s[1] - duration_s, 0.0))
-
-
-def _tabulated(epoch: Epoch, time_s: float) -> bool:
-    """Whether the rotation of the Earth is known at that time."""
     try:
-        epoch.utc(time_s)
-    except OrbitError:
-        return False
-    return True
+        if isinstance(orbit, Sgp4Orbit):
+            orbit.require(0.0, duration_s + tail)
+        else:
+            epoch.utc(duration_s + tail)
+    except OrbitError:  # it decays behind the span, or the rotation of the Earth is not known there
+        return 0.0
+    return tail
 
 
-def terminal(t: OrbitTable, name: str, epoch: Epoch, folder: Path) -> Terminal:
-    """A terminal on its orbit, with what it can point at."""
-    return Terminal(orbit_of(t, name, epoch, folder), limits(t.limits), name)
-
-
-def orbit_of(t: OrbitTable, name: str, epoch: Epoch, folder: Path) -> Orbit:
-    """The orbit that a table describes; its own checks have seen to the keys."""
-    if t.kind == "geostationary":
-        assert t.longitude_rad is not None
+def _orbit(t: OrbitTable, name: str, epoch: Epoch, folder: Path) -> Orbit:
+    """The orbit that a table describes, whose own checks have seen to the keys of each kind."""
+    if t.longitude_rad is not None:
         return GeostationarySlot(name, epoch, t.longitude_rad)
+    if t.file is None:
+        return _kepler(t, name, epoch)
     if t.kind == "ephemeris":
-        assert t.file is not None
         return read_oem(folder / t.file, epoch, t.object)
-    if t.kind == "elements":
-        assert t.file is not None
-        return sgp4_orbit(closest_elements(read_elements(folder / t.file, t.object), epoch), epoch)
-    return _kepler(t, name, epoch)
+    return sgp4_orbit(closest_elements(read_elements(folder / t.file, t.object), epoch), epoch)
 
 
 def _kepler(t: OrbitTable, name: str, epoch: Epoch) -> KeplerOrbit:
+    """The orbit of a table with elements; a circular one has an altitude and a phase, and not what is 0 then."""
     assert t.inclination_rad is not None
-    if t.kind == "circular":
-        assert t.altitude_m is not None and t.phase_rad is not None
-        axis, eccentricity, perigee, anomaly = EARTH_RADIUS_M + t.altitude_m, 0.0, 0.0, t.phase_rad
-    else:
-        assert t.semi_major_axis_m is not None and t.eccentricity is not None
-        assert t.argument_of_perigee_rad is not None and t.mean_anomaly_rad is not None
-        axis, eccentricity, perigee = t.semi_major_axis_m, t.eccentricity, t.argument_of_perigee_rad
-        anomaly = t.mean_anomaly_rad
-    inclination = t.inclination_rad
+    axis = t.semi_major_axis_m or EARTH_RADIUS_M + (t.altitude_m or 0.0)
+    eccentricity, perigee = t.eccentricity or 0.0, t.argument_of_perigee_rad or 0.0
+    inclination, node = t.inclination_rad, t.node_rad
     if isinstance(inclination, str):
         inclination = sun_synchronous_inclination_rad(axis - EARTH_RADIUS_M, eccentricity)
-    node = t.node_rad
     if node is None:
-        assert t.local_time_s is not None
-        node = node_of_local_time(epoch, t.local_time_s / 3600.0 % 24.0)
+        node = node_of_local_time(epoch, (t.local_time_s or 0.0) / 3600.0 % 24.0)
+    anomaly = t.phase_rad or t.mean_anomaly_rad or 0.0
     return KeplerOrbit(name, epoch, axis, eccentricity, inclination, node, perigee, anomaly, t.gravity == "j2")
 
 
-def limits(t: VisibilityLimits | None) -> Limits:
+def _limits(t: VisibilityLimits | None) -> Limits:
     """What a terminal can point at; anything without the table."""
     if t is None:
         return UNLIMITED
-    boresight = UNLIMITED.boresight if t.boresight is None else (t.boresight[0], t.boresight[1], t.boresight[2])
     return Limits(
         attitude=t.attitude,
-        boresight=boresight,
-        field_of_regard_rad=math.pi if t.field_of_regard_rad is None else t.field_of_regard_rad,
+        boresight=t.boresight or UNLIMITED.boresight,
+        field_of_regard_rad=t.field_of_regard_rad or math.pi,
         slew_limit_rad_s=t.slew_limit_rad_s,
         sun_exclusion_rad=t.sun_exclusion_rad,
         in_eclipse=t.in_eclipse,
@@ -166,9 +141,9 @@ def stations(downlink: Downlink) -> tuple[Station, ...]:
     )
 
 
-def relays(c: Constellation, m: LinkMission, epoch: Epoch) -> tuple[Terminal, ...]:
+def relays(c: Constellation, orbits: Orbits, epoch: Epoch) -> tuple[Terminal, ...]:
     """The relays of a constellation, each limited as the mission's own partner is."""
-    shared = limits(table(m).geo.limits)
+    shared = _limits(orbits.geo.limits)
     return tuple(
         Terminal(GeostationarySlot(name, epoch, relay.longitude_rad), shared, name) for name, relay in c.relays.items()
     )
@@ -186,45 +161,42 @@ def _names(sets: Sequence[ElementSet], path: Path) -> list[str]:
 
 def repeats(c: Constellation, m: LinkMission) -> bool:
     """Whether the constellation has satellites: from a file, or from elements that its pattern can repeat."""
-    return c.pattern == "file" or table(m).leo.kind in ("circular", "keplerian")
+    return c.pattern == "file" or table(m).leo.kind in REPEATED
 
 
-def satellites(c: Constellation, m: LinkMission, epoch: Epoch, folder: Path) -> Iterator[Terminal]:
+def satellites(c: Constellation, orbits: Orbits, epoch: Epoch, folder: Path) -> Iterator[Terminal]:
     """The satellites of a constellation, one after the other, each limited as the mission's own is.
 
     Walker's patterns i: t/p/f: plane k of p has its node 2 pi k / p further ("star": pi k / p), and satellite j of it
     its phase 2 pi (j p / t + f k / t) further (J. G. Walker, J. Br. Interplanet. Soc. 37, 1984).
+
+    Args:
+        c: the mission's table of its constellation.
+        orbits: the mission's table of orbits, whose own satellite the pattern repeats.
+        epoch: from which times count.
+        folder: where files are looked for.
+
+    Raises `OrbitError` for a file that is refused, and an orbit that no pattern can repeat.
     """
-    shared = limits(table(m).leo.limits)
-    if c.pattern == "file":
-        assert c.file is not None
+    shared = _limits(orbits.leo.limits)
+    if c.file is not None:
         sets = read_elements(folder / c.file)
         for elements, name in zip(sets, _names(sets, folder / c.file), strict=True):
             own = sgp4_orbit(elements, epoch)
-            own.require(0.0, table(m).duration_s)
+            own.require(0.0, orbits.duration_s)
             yield Terminal(own, shared, name)
         return
     assert c.satellites is not None and c.planes is not None and c.phasing is not None
-    if not repeats(c, m):
+    if orbits.leo.kind not in REPEATED:
         raise OrbitError(
-            f'constellation.pattern is "{c.pattern}", and orbit.leo of kind "{table(m).leo.kind}" has nothing to '
-            'repeat: give pattern = "file", or an orbit.leo of kind "circular" or "keplerian"'
+            f'constellation.pattern is "{c.pattern}", and orbit.leo of kind "{orbits.leo.kind}" has nothing to repeat: '
+            'give pattern = "file", or an orbit.leo of kind "circular" or "keplerian"'
         )
-    base, turn = _kepler(table(m).leo, "", epoch), 2.0 * math.pi
+    base, turn = _kepler(orbits.leo, "", epoch), 2.0 * math.pi
     each, round_rad = c.satellites // c.planes, turn if c.pattern == "delta" else turn / 2.0
     for plane in range(c.planes):
+        node = base.node_rad + round_rad * plane / c.planes
         for place in range(each):
             phase = turn * (place * c.planes + c.phasing * plane) / c.satellites
-            name = f"{plane + 1}-{place + 1}"
-            orbit = KeplerOrbit(
-                name,
-                epoch,
-                base.semi_major_axis_m,
-                base.eccentricity,
-                base.inclination_rad,
-                base.node_rad + round_rad * plane / c.planes,
-                base.argument_of_perigee_rad,
-                base.mean_anomaly_rad + phase,
-                base.j2,
-            )
-            yield Terminal(orbit, shared, name)
+            name, anomaly = f"{plane + 1}-{place + 1}", base.mean_anomaly_rad + phase
+            yield Terminal(replace(base, name=name, node_rad=node, mean_anomaly_rad=anomaly), shared, name)
