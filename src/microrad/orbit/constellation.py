@@ -12,7 +12,9 @@ from microrad.mission.model import LinkMission
 from microrad.mission.tables.operations import Constellation
 from microrad.orbit import operations
 from microrad.orbit.base import Floats
+from microrad.orbit.contacts import Sampled, coarse_step_s, contacts_with_each
 from microrad.orbit.day.flow import PointingLoss, closings, rate_table
+from microrad.orbit.from_mission import orbits_table
 
 Progress = Callable[[int, int, str], None]
 Span = tuple[float, float]
@@ -72,12 +74,12 @@ def opportunities(
     `orbit.contacts`.
     """
     rows: list[tuple[int, int, float, float]] = []
-    sampled: dict[float, list[orbit.Sampled]] = {}
+    sampled: dict[float, list[Sampled]] = {}
     for place, satellite in enumerate(satellites):
-        step = orbit.coarse_step_s(satellite.orbit, span_s[0])
+        step = coarse_step_s(satellite.orbit, span_s[0])
         if step not in sampled:
-            sampled[step] = [orbit.Sampled.over(relay.orbit, span_s, step) for relay in relays]
-        each = orbit.contacts_with_each(satellite, relays, earth, epoch, span_s, sampled[step], furthest_m)
+            sampled[step] = [Sampled.over(relay.orbit, span_s, step) for relay in relays]
+        each = contacts_with_each(satellite, relays, earth, epoch, span_s, sampled[step], furthest_m)
         rows += [(place, which, c.start_s, c.end_s) for which, found in enumerate(each) for c in found]
         on_progress(place + 1)
     table = np.array(rows, dtype=np.float64).reshape(-1, 4)
@@ -97,7 +99,7 @@ def run(
     """
     m, folder = file.mission, file.path.parent
     c, rates = table(m), rate_table(closings(m, loss))
-    orbits, pair = orbit.table(m), orbit.pair(m, folder)
+    orbits, pair = orbits_table(m), orbit.pair(m, folder)
     own = tuple(orbit.satellites(c, orbits, pair.epoch, folder))
     relays = orbit.relays(c, orbits, pair.epoch)
     furthest = 0.0 if rates is None else rates.steps[-1].largest_range_m

@@ -11,14 +11,12 @@ from microrad.mission.tables.operations import Constellation, Downlink
 from microrad.mission.tables.orbit import Orbits, OrbitTable, VisibilityLimits
 from microrad.orbit.analytic import GeostationarySlot, KeplerOrbit, node_of_local_time, sun_synchronous_inclination_rad
 from microrad.orbit.base import Orbit, OrbitError
-from microrad.orbit.earth import EARTH_RADIUS_M, Earth
-from microrad.orbit.element_files import read_elements
-from microrad.orbit.elements import MOST_ELEMENTS_AGE_S, ElementSet, Sgp4Orbit, closest_elements, sgp4_orbit
+from microrad.orbit.earth import EARTH_RADIUS_M, Earth, Station
 from microrad.orbit.ephemeris import EphemerisOrbit
 from microrad.orbit.epoch import Epoch
-from microrad.orbit.ground import Station
+from microrad.orbit.files import read_elements, read_oem
 from microrad.orbit.limits import UNLIMITED, Limits, Terminal
-from microrad.orbit.oem import read_oem
+from microrad.orbit.mean_elements import MOST_ELEMENTS_AGE_S, ElementSet, Sgp4Orbit, closest_elements, sgp4_orbit
 
 TAIL_S = 86400.0
 """Time behind the span in which data of the span may still arrive."""
@@ -48,7 +46,7 @@ def pair(m: LinkMission, folder: Path) -> Pair:
 
     Raises `OrbitError` for an orbit that is none, or that does not hold over the mission's span.
     """
-    orbits = table(m)
+    orbits = orbits_table(m)
     try:
         epoch = Epoch(orbits.epoch)
     except OrbitError as error:
@@ -69,7 +67,7 @@ def pair(m: LinkMission, folder: Path) -> Pair:
     return Pair(epoch, earth, found[0], found[1], (0.0, orbits.duration_s), tail)
 
 
-def table(m: LinkMission) -> Orbits:
+def orbits_table(m: LinkMission) -> Orbits:
     """The mission's table of orbits; `OrbitError` without one."""
     if m.orbit is None:
         raise OrbitError("the mission has no table [orbit]: microrad init writes one")
@@ -161,7 +159,7 @@ def _names(sets: Sequence[ElementSet], path: Path) -> list[str]:
 
 def repeats(c: Constellation, m: LinkMission) -> bool:
     """Whether the constellation has satellites: from a file, or from elements that its pattern can repeat."""
-    return c.pattern == "file" or table(m).leo.kind in REPEATED
+    return c.pattern == "file" or orbits_table(m).leo.kind in REPEATED
 
 
 def satellites(c: Constellation, orbits: Orbits, epoch: Epoch, folder: Path) -> Iterator[Terminal]:

@@ -11,7 +11,7 @@ from microrad.link.partner_search import Found
 from microrad.mission.model import LinkMission
 from microrad.mission.tables.orbit import HIGHEST_MASK_RAD, VisibilityLimits
 from microrad.orbit.day import flow, geometry
-from microrad.orbit.from_mission import table
+from microrad.orbit.from_mission import orbits_table
 
 _RUNS = 4  # of each case: what an acquisition takes is little beside what is varied
 NOTHING = "as it is"
@@ -138,7 +138,7 @@ _Side = tuple[str, _Case] | None
 def _changes(own: _Case, found: Found | None) -> Iterator[tuple[str, _Side, _Side]]:
     """Name, low side and high side of each assumption that the mission has."""
     m = own.mission
-    o, orbits, leo, rate = flow.table(m), table(m), table(m).leo, m.communication.data_rate_bit_s
+    o, orbits, leo, rate = flow.table(m), orbits_table(m), orbits_table(m).leo, m.communication.data_rate_bit_s
 
     def edited(text: str, key: str, value: object) -> tuple[str, _Case]:
         return text, replace(own, mission=m.with_value(key, value))

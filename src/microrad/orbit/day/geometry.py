@@ -11,6 +11,10 @@ from microrad import orbit
 from microrad.core.units import SPEED_OF_LIGHT_M_S, format_quantity
 from microrad.mission.model import LinkMission
 from microrad.orbit.base import Floats
+from microrad.orbit.contacts import EARTH, END, START, coarse_step_s, coarse_times
+from microrad.orbit.events import positive
+from microrad.orbit.from_mission import TAIL_S
+from microrad.orbit.sun import shadow_rad
 
 _C = TypeVar("_C", bound=orbit.Contact)
 
@@ -86,7 +90,7 @@ class View:
 
         A contact that the Sun or a limit cuts in two counts once.
         """
-        return sum(orbit.EARTH in e.contact.begins or orbit.START in e.contact.begins for e in self.encounters)
+        return sum(EARTH in e.contact.begins or START in e.contact.begins for e in self.encounters)
 
     @property
     def median_s(self) -> float:
@@ -112,12 +116,12 @@ def longest_gap_s(contacts: Sequence[orbit.Contact], pair: orbit.Pair) -> float:
 
 
 def _cut(contact: orbit.Contact) -> bool:
-    return orbit.START in contact.begins or orbit.END in contact.ends
+    return START in contact.begins or END in contact.ends
 
 
 def cut_at(contact: _C, end_s: float) -> _C:
     """The contact up to the end of the span."""
-    return contact if contact.end_s <= end_s else replace(contact, end_s=end_s, ends=orbit.END)
+    return contact if contact.end_s <= end_s else replace(contact, end_s=end_s, ends=END)
 
 
 def view(pair: orbit.Pair, wavelength_m: float) -> View:
@@ -169,13 +173,13 @@ def encounter(pair: orbit.Pair, contact: orbit.Contact, wavelength_m: float) -> 
 
 def _umbra(pair: orbit.Pair) -> Floats:
     own = pair.leo.orbit
-    step = orbit.coarse_step_s(own, pair.span_s[0])
+    step = coarse_step_s(own, pair.span_s[0])
 
     def depth(time_s: Floats) -> Floats:
         sun = orbit.sun_direction(pair.epoch, time_s)
-        return orbit.shadow_rad(own.states(time_s).position_m, sun, pair.earth.shape)
+        return shadow_rad(own.states(time_s).position_m, sun, pair.earth.shape)
 
-    return orbit.positive(depth, orbit.coarse_times(pair.span_s, step))
+    return positive(depth, coarse_times(pair.span_s, step))
 
 
 def _closed_form(pair: orbit.Pair) -> orbit.CoplanarContact | None:
@@ -193,7 +197,7 @@ def _closed_form(pair: orbit.Pair) -> orbit.CoplanarContact | None:
 
 def short_tail(pair: orbit.Pair) -> tuple[str, ...]:
     """That the orbits do not hold for long enough behind the span to deliver all of its data."""
-    if pair.tail_s >= orbit.TAIL_S:
+    if pair.tail_s >= TAIL_S:
         return ()
     held = format_quantity(pair.tail_s, "s")
     return (f"the orbits hold for {held} behind the span: data still on board then count as never arrived",)

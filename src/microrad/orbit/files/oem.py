@@ -15,9 +15,19 @@ from microrad.orbit.base import Floats, OrbitError, States
 from microrad.orbit.earth import MU_M3_S2
 from microrad.orbit.ephemeris import SLACK_S, EphemerisOrbit, Segment
 from microrad.orbit.epoch import Epoch
-from microrad.orbit.frames import FRAMES, frame_name, to_teme
-from microrad.orbit.instants import TIME_SYSTEMS, elapsed_s, instant, plain_instant
-from microrad.orbit.messages import Field, add_field, finite, kvn_field, read_text, xml_fields
+from microrad.orbit.files.frames import FRAMES, frame_name, to_teme
+from microrad.orbit.files.messages import (
+    TIME_SYSTEMS,
+    Field,
+    add_field,
+    elapsed_s,
+    finite,
+    instant,
+    kvn_field,
+    plain_instant,
+    read_text,
+    xml_fields,
+)
 
 DEFAULT_DEGREE = 7
 """Degree of the Hermite interpolation of a file that names no method: four state vectors around each time."""
