@@ -135,8 +135,7 @@ def eccentric_anomaly_rad(mean_anomaly_rad: Floats, eccentricity: float) -> Floa
         guess = guess - step
         if np.max(np.abs(step), initial=0.0) <= _NEWTON_STEP_RAD:
             break
-    solved: Floats = turns + np.copysign(guess, signed)
-    return solved
+    return turns + np.copysign(guess, signed)
 
 
 def circular(

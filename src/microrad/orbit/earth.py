@@ -72,7 +72,7 @@ class Earth:
         """Height of positions of shape (3, n) over the figure itself: geodetic over the oblate Earth."""
         if self.shape == "oblate":
             return subpoint(position_m, np.zeros(())).height_m
-        return np.asarray(np.sqrt(_square(np.asarray(position_m, dtype=np.float64))) - EARTH_RADIUS_M)
+        return np.sqrt(_square(np.asarray(position_m, dtype=np.float64))) - EARTH_RADIUS_M
 
     def clearance_rad(self, first_m: Floats, second_m: Floats) -> Floats:
         """Angle by which the line of sight between two terminals clears the surface: above 0 it is free.
@@ -92,8 +92,7 @@ class Earth:
         # products and sums written out: a library's dot product may round differently when the two are swapped
         dot = (first[0] * second[0] + first[1] * second[1]) + first[2] * second[2]
         horizons = _horizon_rad(first) + _horizon_rad(second)
-        clearance: Floats = horizons - np.arctan2(cross, dot)
-        return clearance
+        return np.asarray(horizons - np.arctan2(cross, dot))
 
     def _scaled(self, position_m: Floats, which: str) -> Floats:
         """The position in units of the raised semi-axes, refused below the surface."""
@@ -118,8 +117,7 @@ def to_unit_sphere(position_m: Floats, equatorial_m: float, polar_m: float) -> F
 
 def _square(vector: Floats) -> Floats:
     """Square of the length of each vector."""
-    square: Floats = (vector[0] * vector[0] + vector[1] * vector[1]) + vector[2] * vector[2]
-    return square
+    return np.asarray((vector[0] * vector[0] + vector[1] * vector[1]) + vector[2] * vector[2])
 
 
 def _horizon_rad(scaled: Floats) -> Floats:
@@ -141,8 +139,7 @@ def gravity(position_m: Floats, j2: bool) -> Floats:
     sine_square = position[2] * position[2] / square
     equatorial = 1.0 + oblate * (1.0 - 5.0 * sine_square)
     factor = np.stack((equatorial, equatorial, equatorial + 2.0 * oblate))
-    acceleration: Floats = central * factor * position
-    return acceleration
+    return np.asarray(central * factor * position)
 
 
 def subpoint(position_m: Floats, rotation_rad: Floats) -> Subpoint:
@@ -236,5 +233,4 @@ def elevation_rad(station: Station, epoch: Epoch, time_s: Floats, position_m: Fl
     up = station.vertical(epoch, time_s)
     rise = np.sum(line * up, axis=0)
     level = line - rise * up
-    elevation: Floats = np.arctan2(rise, np.sqrt(np.sum(level * level, axis=0)))
-    return elevation
+    return np.asarray(np.arctan2(rise, np.sqrt(np.sum(level * level, axis=0))))

@@ -41,8 +41,10 @@ class Segment:
             window = first + np.arange(self.points)[:, np.newaxis]
             weights = weigh(self.time_s[window], time_s[part])
             x, v = self.position_m[:, window], self.velocity_m_s[:, window]
-            position[:, part] = _sum(weights[0], x) + _sum(weights[1], v)
-            velocity[:, part] = _sum(weights[2], x) + _sum(weights[3], v)
+            for k, of in enumerate((position, velocity)):
+                of[:, part] = np.einsum("pn,kpn->kn", weights[2 * k], x) + np.einsum(
+                    "pn,kpn->kn", weights[2 * k + 1], v
+                )
         return States(position, velocity)
 
 
@@ -78,12 +80,6 @@ def _hermite(node: Floats, time: Floats) -> tuple[Floats, Floats, Floats, Floats
     square, square_rate = value * value, 2.0 * value * slope
     tilt = 1.0 - 2.0 * since * own
     return tilt * square, since * square, tilt * square_rate - 2.0 * own * square, square + since * square_rate
-
-
-def _sum(weight: Floats, vectors: Floats) -> Floats:
-    """Weighted sum over the points of each time's window, of shape (3, n)."""
-    total: Floats = np.einsum("pn,kpn->kn", weight, vectors)
-    return total
 
 
 # --------------------------------------------------------------------------------------------------------------- orbit

@@ -113,8 +113,7 @@ class Epoch:
         tai_s = time + (second + _tai_minus_utc_s(day))
         ut1_s = tai_s + _ut1_minus_tai_s(day, tai_s)
         zero, first, second_order, third = _sidereal_polynomial(day)
-        angle: Floats = zero + ut1_s * (first + ut1_s * (second_order + ut1_s * third))
-        return angle
+        return zero + ut1_s * (first + ut1_s * (second_order + ut1_s * third))
 
     def terrestrial_centuries(self, time_s: Floats) -> Floats:
         """Julian centuries of Terrestrial Time from J2000, `time_s` after this instant."""

@@ -9,9 +9,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from microrad.orbit.base import OrbitError
+from microrad.orbit.base import Floats, OrbitError
 
-Floats = NDArray[np.float64]
 Rows = NDArray[np.intp]
 Intervals = NDArray[np.float64]
 Function = Callable[[Floats], Floats]

@@ -8,10 +8,9 @@ from numpy.typing import NDArray
 
 from microrad import orbit
 from microrad.mission.tables.operations import Downlink
+from microrad.orbit.base import Floats
 from microrad.orbit.day.flow import Way
 from microrad.orbit.day.geometry import View
-
-Floats = NDArray[np.float64]
 
 STEP_S = 30.0
 LONGEST_S = 86400.0

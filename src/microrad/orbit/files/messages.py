@@ -285,8 +285,7 @@ def elapsed_s(system: str, epoch: Epoch, instants: list[tuple[int, float]], wher
         if system == "UTC":  # by days, since a leap second makes one longer
             unique, index = np.unique(days, return_inverse=True)
             zero = [epoch.seconds_to(Epoch.from_text(f"{date.fromordinal(int(d))}T00:00:00Z")) for d in unique]
-            of_utc: Floats = np.array(zero)[index] + seconds
-            return of_utc
+            return np.asarray(np.array(zero)[index] + seconds)
         midnight = Epoch.from_text(f"{epoch.text[:10]}T00:00:00Z")
     except OrbitError as error:
         raise OrbitError(f"{where}: {error}") from None
@@ -294,5 +293,4 @@ def elapsed_s(system: str, epoch: Epoch, instants: list[tuple[int, float]], wher
     whole_days_s = (day - date(2000, 1, 1).toordinal()) * DAY_S
     tai_minus_utc_s = _Y2K_TAI_MINUS_UTC_S + _Y2K.seconds_to(midnight) - whole_days_s
     after_midnight = (days - day) * DAY_S + (seconds - tai_minus_utc_s - _AHEAD_OF_TAI_S[system])
-    elapsed: Floats = after_midnight + epoch.seconds_to(midnight)
-    return elapsed
+    return after_midnight + epoch.seconds_to(midnight)
