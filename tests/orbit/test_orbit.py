@@ -120,7 +120,6 @@ def test_elapsed_seconds_and_julian_dates_are_those_of_astropy(one, other):
     whole, fraction = first.julian_date
     assert whole % 1.0 == 0.5
     assert ((whole - a.jd1) + (fraction - a.jd2)) * DAY_S == pytest.approx(0.0, abs=1.0)  # ERFA stretches leap days
-    assert Epoch.from_julian_date(whole, fraction).seconds_to(first) == pytest.approx(0.0, abs=2e-9)
     written = Epoch(first.utc(first.seconds_to(second)))
     assert written.seconds_to(second) == pytest.approx(0.0, abs=5.01e-4)  # half a millisecond
 
@@ -136,13 +135,6 @@ def test_seconds_through_a_leap_second_are_counted_and_written():
     inside = Epoch("2016-12-31T23:59:60.5Z")
     assert inside.utc(0.5) == "2017-01-01T00:00:00.000Z"
     assert inside.utc(0.0) == "2016-12-31T23:59:60.500Z"
-
-
-def test_a_julian_date_outside_the_tables_is_refused():
-    with pytest.raises(OrbitError, match=r"Julian date 2400000\.5 is outside"):
-        Epoch.from_julian_date(2400000.5)
-    with pytest.raises(OrbitError, match="is not a number"):
-        Epoch.from_julian_date(math.nan)
 
 
 @pytest.mark.parametrize("time_s", [math.nan, math.inf])
@@ -482,7 +474,6 @@ def test_two_bodies_move_as_integration_says(name):
     assert np.max(length(states.position_m - position)) < 0.05
     assert np.max(length(states.velocity_m_s - velocity)) < one_millimetre
     assert length(states.position_m[:, 0]) >= orbit.semi_major_axis_m * (1.0 - orbit.eccentricity) * (1.0 - 1e-12)
-    assert orbit.period_s == pytest.approx(2.0 * math.pi / orbit.mean_motion_rad_s)
 
 
 def elements(r, v):

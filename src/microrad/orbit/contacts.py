@@ -1,8 +1,9 @@
 """When two terminals can see each other, and a ground station a satellite; and what begins and ends each contact."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -148,106 +149,81 @@ def contacts_with_each(
 
     Raises `OrbitError` as `contacts`.
     """
-    _check_names(satellite, relays)
+    for relay in relays:
+        if relay.name == satellite.name:
+            raise OrbitError(f'two terminals are called "{relay.name}"; give each a name of its own')
     own = coarse_step_s(satellite.orbit, span_s[0])
     others = tuple(sampled) or tuple(Sampled.over(relay.orbit, span_s, own) for relay in relays)
     time_s = coarse_times(span_s, min(own, *(other.step_s for other in others), math.inf))
-    clear = _clear_of_earth((satellite, *relays), others, earth, time_s)
-    near = _in_reach(satellite.orbit, others, furthest_m, time_s)
+    if not relays:
+        return ()
+    both = partial(_when, satellite.orbit, others, time_s)
+    shared = [(EARTH, both(partial(_clearance_rad, (satellite, *relays), earth)))]
+    if furthest_m < math.inf:
+        shared.append((RANGE, both(partial(_spare, furthest_m))))
     found = []
     for place, relay in enumerate(relays):
-        kept = [(EARTH, clear[place]), *((RANGE, each[place]) for each in near)]
+        kept = [(cause, intervals[place]) for cause, intervals in shared]
         for one, other in ((satellite, relay), (relay, satellite)):
             kept.extend(conditions(Side(one, other, earth, epoch), time_s))
         found.append(_combined(kept, span_s))
     return tuple(found)
 
 
-def _check_names(satellite: Terminal, relays: Sequence[Terminal]) -> None:
-    for relay in relays:
-        if relay.name == satellite.name:
-            raise OrbitError(f'two terminals are called "{relay.name}"; give each a name of its own')
+def _clearance_rad(
+    terminals: Sequence[Terminal], earth: Earth, time_s: Floats, row: Rows, first_m: Floats, second_m: Floats
+) -> Floats:
+    """By how much the line from the first terminal to that of each row clears the Earth; raises `OrbitError`."""
+    try:
+        return earth.clearance_rad(first_m, second_m)
+    except OrbitError:
+        heights = np.stack((earth.height_m(first_m), earth.height_m(second_m)))
+        which, worst = np.unravel_index(np.argmin(heights), heights.shape)  # argmin finds nan first
+        name = terminals[0 if which == 0 else row[worst] + 1].name
+        height_m, when_s = float(heights[which, worst]), float(time_s[worst])
+        if math.isnan(height_m):
+            raise OrbitError(f"the position of {name} at {when_s:.9g} s is not a number; check its orbit") from None
+        raise OrbitError(
+            f"{name} is {height_m / 1e3:.3f} km over the Earth at {when_s:.9g} s, not above the "
+            f"{earth.grazing_height_m / 1e3:.6g} km that lines of sight must clear; lower orbit.grazing_height, or "
+            "raise the orbit"
+        ) from None
 
 
-def _clear_of_earth(
-    terminals: Sequence[Terminal], others: Sequence[Sampled], earth: Earth, time_s: Floats
+def _spare(furthest_m: float, _time_s: Floats, _row: Rows, first_m: Floats, second_m: Floats) -> Floats:
+    """One less the square of the range in units of the largest."""
+    apart = second_m - first_m
+    return np.asarray(1.0 - dot(apart, apart) / furthest_m**2)
+
+
+def _when(
+    orbit: Orbit, others: Sequence[Sampled], time_s: Floats, function: Callable[[Floats, Rows, Floats, Floats], Floats]
 ) -> tuple[Intervals, ...]:
-    """When the Earth is not in the way from the first of the terminals to each of the others."""
-    if not others:
-        return ()
-    orbit = terminals[0].orbit
+    """When a function of time, row, and the places of an orbit and of that row's other is positive: for each row."""
 
-    def checked(time: Floats, row: Rows, first: Floats, second: Floats) -> Floats:
-        try:
-            return earth.clearance_rad(first, second)
-        except OrbitError:
-            heights = np.stack((earth.height_m(first), earth.height_m(second)))
-            which, worst = np.unravel_index(np.argmin(heights), heights.shape)  # argmin finds nan first
-            low = terminals[0 if which == 0 else row[worst] + 1]
-            raise _too_low(low.name, float(time[worst]), float(heights[which, worst]), earth) from None
+    def along(time: Floats, row: Rows) -> Floats:
+        second = np.empty((3, time.size))
+        for index in np.unique(row):
+            chosen = row == index
+            second[:, chosen] = others[index].orbit.states(time[chosen]).position_m
+        return function(time, row, orbit.states(time).position_m, second)
 
-    def clearance(time: Floats, row: Rows) -> Floats:
-        return checked(time, row, *_places(orbit, others, time, row))
-
-    first = orbit.states(time_s).position_m
-    values = np.empty((len(others), time_s.size))
+    first, values = orbit.states(time_s).position_m, np.empty((len(others), time_s.size))
     for index, other in enumerate(others):
-        values[index] = checked(time_s, np.full(time_s.size, index), first, other.at(time_s).position_m)
-    return positive_rows(clearance, time_s, values)
-
-
-def _places(orbit: Orbit, others: Sequence[Sampled], time: Floats, row: Rows) -> tuple[Floats, Floats]:
-    """Where an orbit is at each time, and where the other of that row is."""
-    first = orbit.states(time).position_m
-    second = np.empty_like(first)
-    for index in np.unique(row):
-        chosen = row == index
-        second[:, chosen] = others[index].orbit.states(time[chosen]).position_m
-    return first, second
-
-
-def _in_reach(
-    orbit: Orbit, others: Sequence[Sampled], furthest_m: float, time_s: Floats
-) -> tuple[tuple[Intervals, ...], ...]:
-    """When each of the others is nearer than the limit: one set of intervals for each, or none without a limit."""
-    if furthest_m == math.inf or not others:
-        return ()
-
-    def spare(first: Floats, second: Floats) -> Floats:
-        apart = second - first
-        return np.asarray(1.0 - dot(apart, apart) / furthest_m**2)
-
-    first = orbit.states(time_s).position_m
-    values = np.stack([spare(first, other.at(time_s).position_m) for other in others])
-    return (positive_rows(lambda time, row: spare(*_places(orbit, others, time, row)), time_s, values),)
-
-
-def _too_low(name: str, time_s: float, height_m: float, earth: Earth) -> OrbitError:
-    if math.isnan(height_m):
-        return OrbitError(f"the position of {name} at {time_s:.9g} s is not a number; check its orbit")
-    return OrbitError(
-        f"{name} is {height_m / 1e3:.3f} km over the Earth at {time_s:.9g} s, not above the "
-        f"{earth.grazing_height_m / 1e3:.6g} km that lines of sight must clear; lower orbit.grazing_height, or raise "
-        "the orbit"
-    )
+        values[index] = function(time_s, np.full(time_s.size, index), first, other.at(time_s).position_m)
+    return positive_rows(along, time_s, values)
 
 
 def _combined(kept: Sequence[Condition], span_s: Span) -> tuple[Contact, ...]:
     """The contacts in which all conditions hold."""
-    both = intersection(*(intervals for _, intervals in kept))
-    return tuple(
-        Contact(
-            float(start),
-            float(end),
-            START if start == span_s[0] else _causes(kept, start, 0),
-            END if end == span_s[1] else _causes(kept, end, 1),
-        )
-        for start, end in both
-    )
 
+    def cause(time_s: float, edge: int) -> str:
+        if time_s == span_s[edge]:
+            return (START, END)[edge]
+        return " and ".join(sorted(each for each, intervals in kept if np.any(intervals[:, edge] == time_s)))
 
-def _causes(kept: Sequence[Condition], time_s: float, edge: int) -> str:
-    return " and ".join(sorted(cause for cause, intervals in kept if np.any(intervals[:, edge] == time_s)))
+    both = intersection(*(intervals for _, intervals in kept)).tolist()
+    return tuple(Contact(start, end, cause(start, 0), cause(end, 1)) for start, end in both)
 
 
 # --------------------------------------------------------------------------------------------------------------- passes
@@ -264,17 +240,11 @@ def passes(orbit: Orbit, station: Station, epoch: Epoch, span_s: Span) -> tuple[
         return elevation_rad(station, epoch, time, orbit.states(time).position_m)
 
     windows = positive(lambda time: elevation(time) - station.mask_rad, time_s)
-    return tuple(
-        Pass(
-            float(start),
-            float(end),
-            START if start == span_s[0] else mask,
-            END if end == span_s[1] else mask,
-            float(highest),
-            float(when),
-        )
-        for (start, end), when, highest in zip(windows, *largest(elevation, windows, step), strict=True)
-    )
+    found = []
+    for (start, end), when, highest in zip(windows.tolist(), *largest(elevation, windows, step), strict=True):
+        begins, ends = START if start == span_s[0] else mask, END if end == span_s[1] else mask
+        found.append(Pass(start, end, begins, ends, float(highest), float(when)))
+    return tuple(found)
 
 
 # -------------------------------------------------------------------------------------------------------------- by hand

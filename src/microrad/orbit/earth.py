@@ -60,7 +60,7 @@ class Earth:
     grazing_height_m: float
 
     def __post_init__(self) -> None:
-        """Refuse what is no surface."""
+        """Check shape and height."""
         semi_axes_m(self.shape)
         if not 0.0 <= self.grazing_height_m <= 1e6:
             raise OrbitError(
@@ -182,10 +182,17 @@ class Station:
     mask_rad: float
 
     def __post_init__(self) -> None:
-        """Refuse what is no place on the Earth."""
-        self._require(abs(self.latitude_rad) <= math.pi / 2, "latitude", self.latitude_rad, "from -90 to 90 deg")
-        self._require(abs(self.longitude_rad) <= 2 * math.pi, "longitude", self.longitude_rad, "from -360 to 360 deg")
-        self._require(0.0 <= self.mask_rad < math.pi / 2, "elevation mask", self.mask_rad, "from 0 to below 90 deg")
+        """Check the place."""
+        for what, angle_rad, holds, wanted in (
+            ("latitude", self.latitude_rad, abs(self.latitude_rad) <= math.pi / 2, "from -90 to 90 deg"),
+            ("longitude", self.longitude_rad, abs(self.longitude_rad) <= 2 * math.pi, "from -360 to 360 deg"),
+            ("elevation mask", self.mask_rad, 0.0 <= self.mask_rad < math.pi / 2, "from 0 to below 90 deg"),
+        ):
+            if not holds:
+                raise OrbitError(
+                    f"station {self.name}: its {what} of {math.degrees(angle_rad):.6g} deg is not {wanted}; check its "
+                    "sign and its unit"
+                )
         if not -1e3 <= self.height_m <= 5e4:
             raise OrbitError(
                 f"station {self.name}: its height of {self.height_m:.6g} m is not from -1 to 50 km; give the height "
@@ -194,7 +201,11 @@ class Station:
 
     def position(self, epoch: Epoch, time_s: Floats) -> States:
         """Position and velocity of the station in TEME, `time_s` after `epoch`; it turns with the Earth."""
-        across, z = self._meridian_m()
+        square = FLATTENING * (2.0 - FLATTENING)
+        sine = math.sin(self.latitude_rad)
+        normal = EARTH_RADIUS_M / math.sqrt(1.0 - square * sine * sine)
+        across = (normal + self.height_m) * math.cos(self.latitude_rad)
+        z = (normal * (1.0 - square) + self.height_m) * sine
         angle = epoch.earth_rotation_rad(time_s) + self.longitude_rad
         x, y = across * np.cos(angle), across * np.sin(angle)
         velocity = np.stack((-ROTATION_RAD_S * y, ROTATION_RAD_S * x, np.zeros_like(x)))
@@ -205,22 +216,6 @@ class Station:
         angle = epoch.earth_rotation_rad(time_s) + self.longitude_rad
         level, rise = math.cos(self.latitude_rad), math.sin(self.latitude_rad)
         return np.stack((level * np.cos(angle), level * np.sin(angle), np.full_like(angle, rise)))
-
-    def _meridian_m(self) -> tuple[float, float]:
-        """Distance from the axis of the Earth and height over its equator."""
-        square = FLATTENING * (2.0 - FLATTENING)
-        sine = math.sin(self.latitude_rad)
-        normal = EARTH_RADIUS_M / math.sqrt(1.0 - square * sine * sine)
-        across = (normal + self.height_m) * math.cos(self.latitude_rad)
-        return across, (normal * (1.0 - square) + self.height_m) * sine
-
-    def _require(self, holds: bool, what: str, angle_rad: float, wanted: str) -> None:
-        """Refuse an angle outside its bounds."""
-        if not holds:
-            raise OrbitError(
-                f"station {self.name}: its {what} of {math.degrees(angle_rad):.6g} deg is not {wanted}; check its sign "
-                "and its unit"
-            )
 
 
 def elevation_rad(station: Station, epoch: Epoch, time_s: Floats, position_m: Floats) -> Floats:

@@ -51,27 +51,27 @@ class Limits:
     in_eclipse: bool
 
     def __post_init__(self) -> None:
-        """Refuse limits that mean nothing."""
+        """Check the limits."""
         if self.attitude not in get_args(Attitude):
             raise OrbitError(f"the attitude {self.attitude!r} is not known; write nadir, sun or free")
         size = math.hypot(*self.boresight)
         if len(self.boresight) != 3 or not (math.isfinite(size) and size > 0.0):
             raise OrbitError(f"the boresight {self.boresight} has no direction; give three numbers, such as (0, 0, 1)")
-        self._require("field of regard", self.field_of_regard_rad, "rad", 0.0 < self.field_of_regard_rad <= math.pi)
-        self._require("slew limit", self.slew_limit_rad_s, "rad/s", self.slew_limit_rad_s > 0.0)
-        self._require("Sun exclusion", self.sun_exclusion_rad, "rad", 0.0 <= self.sun_exclusion_rad < math.pi)
+        field, slew, sun = self.field_of_regard_rad, self.slew_limit_rad_s, self.sun_exclusion_rad
+        for what, value, unit, holds in (
+            ("field of regard", field, "rad", 0.0 < field <= math.pi),
+            ("slew limit", slew, "rad/s", slew > 0.0),
+            ("Sun exclusion", sun, "rad", 0.0 <= sun < math.pi),
+        ):
+            if not holds:
+                raise OrbitError(
+                    f"a {what} of {format_quantity(value, unit)} is out of range; give the half angle of a field of "
+                    "regard above 0 to pi, a slew limit above 0, a Sun exclusion from 0 to below pi"
+                )
         if self.attitude == "free" and self.field_of_regard_rad < math.pi:
             raise OrbitError(
                 'a field of regard means nothing with the attitude "free": the body turns its boresight onto the '
                 'partner; leave it out, or hold the body "nadir" or "sun"'
-            )
-
-    @staticmethod
-    def _require(what: str, value: float, unit: str, holds: bool) -> None:
-        if not holds:
-            raise OrbitError(
-                f"a {what} of {format_quantity(value, unit)} is out of range; give the half angle of a field of regard "
-                "above 0 to pi, a slew limit above 0, a Sun exclusion from 0 to below pi"
             )
 
 
@@ -126,7 +126,7 @@ class Side:
         look, attitude = self.look(time_s), self.terminal.limits.attitude
         if attitude == "free":
             return look.direction
-        return in_body(body_axes(attitude, look.own, look.sun), look.direction)
+        return np.stack([dot(axis, look.direction) for axis in body_axes(attitude, look.own, look.sun)])
 
     def field_of_regard(self, time_s: Floats) -> Floats:
         """Cosine of the angle off the boresight, above that of the half angle."""
@@ -205,11 +205,6 @@ def body_rate_rad_s(attitude: Attitude, states: States, sun: Floats) -> Floats:
     up = _unit(position)
     sink = -(velocity - dot(up, velocity) * up) / np.sqrt(dot(position, position))
     return np.asarray(-dot(sink, cross(z, sun)) / share * sun)
-
-
-def in_body(axes: Floats, direction: Floats) -> Floats:
-    """Components of directions (3, n) along the axes of the body."""
-    return np.stack([dot(axis, direction) for axis in axes])
 
 
 def _towards_nadir(states: States, sun: Floats) -> tuple[Floats, Floats]:

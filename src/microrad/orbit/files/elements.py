@@ -48,14 +48,14 @@ def _parsed(path: Path, text: str) -> Iterator[ElementSet]:
     """Element sets in the format that the first characters tell."""
     first = next(line.strip() for line in text.split("\n") if line.strip())
     if first.startswith("<"):
-        return xml_elements(path, text)
+        return _messages(path, _xml_messages(path, text), complete=True)
     if first.startswith(("{", "[")):
-        return json_elements(path, text)
+        return _messages(path, _json_messages(path, text), complete=False)
     if re.match(r"[A-Z_]+\s*=", first) or first.startswith("COMMENT"):
-        return kvn_elements(path, text)
+        return _messages(path, _kvn_messages(path, text), complete=True)
     if first.count(",") >= 5:  # a name has fewer
-        return csv_elements(path, text)
-    return two_lines(path, text)
+        return _messages(path, _csv_messages(path, text), complete=False)
+    return _two_lines(path, text)
 
 
 # ------------------------------------------------------------------------------------------------------------ two lines
@@ -87,7 +87,7 @@ def checksum(line: str) -> int:
     return sum(int(c) if c in "0123456789" else c == "-" for c in line[:68]) % 10
 
 
-def two_lines(path: Path, text: str) -> Iterator[ElementSet]:
+def _two_lines(path: Path, text: str) -> Iterator[ElementSet]:
     """Element sets of two lines each, with or without a line before them that holds the name.
 
     Raises `OrbitError` for the first fault, with its line.
@@ -156,26 +156,25 @@ def _element_set(
         )
     check_theory(where, one[62].strip())
     catalogue = one[2:7].strip().lstrip("0") or "0"
+    drag = one[53:61]  # such as "-12345-6", which is -0.12345e-6
     degrees = [math.radians(float(two[a:b])) for a, b in ((8, 16), (17, 25), (34, 42), (43, 51))]
-    elements = ElementSet(
-        name=name[1] if name else catalogue,
-        catalogue_number=catalogue,
-        epoch=_tle_epoch(where, one[18:20], one[20:32].strip()),
-        mean_motion_rad_s=float(two[52:63]) * REVOLUTION_RAD / DAY_S,
-        eccentricity=float("0." + two[26:33].replace(" ", "0")),
-        inclination_rad=degrees[0],
-        node_rad=degrees[1],
-        argument_of_perigee_rad=degrees[2],
-        mean_anomaly_rad=degrees[3],
-        drag_per_earth_radius=_with_exponent(one[53:61]),
-        place=where,
+    return checked(
+        ElementSet(
+            name=name[1] if name else catalogue,
+            catalogue_number=catalogue,
+            epoch=_tle_epoch(where, one[18:20], one[20:32].strip()),
+            mean_motion_rad_s=float(two[52:63]) * REVOLUTION_RAD / DAY_S,
+            eccentricity=float("0." + two[26:33].replace(" ", "0")),
+            inclination_rad=degrees[0],
+            node_rad=degrees[1],
+            argument_of_perigee_rad=degrees[2],
+            mean_anomaly_rad=degrees[3],
+            drag_per_earth_radius=float(
+                f"{drag[0].strip()}.{drag[1:6].replace(' ', '0')}e{drag[6:].replace(' ', '+')}"
+            ),
+            place=where,
+        )
     )
-    return checked(elements)
-
-
-def _with_exponent(text: str) -> float:
-    """Number of a field such as "-12345-6", which is -0.12345e-6."""
-    return float(f"{text[0].strip()}.{text[1:6].replace(' ', '0')}e{text[6:].replace(' ', '+')}")
 
 
 def _tle_epoch(where: str, year: str, day: str) -> Epoch:
@@ -209,26 +208,6 @@ _UNITS = {
 _NEEDED = ("OBJECT_NAME", "NORAD_CAT_ID", "EPOCH", "ECCENTRICITY", *_UNITS)
 
 
-def kvn_elements(path: Path, text: str) -> Iterator[ElementSet]:
-    """Element sets of messages in keywords and values; raises `OrbitError` for the first fault, with its line."""
-    return _messages(path, _kvn_messages(path, text), complete=True)
-
-
-def xml_elements(path: Path, text: str) -> Iterator[ElementSet]:
-    """Element sets of messages in XML; raises `OrbitError` for the first fault, with its line."""
-    return _messages(path, _xml_messages(path, text), complete=True)
-
-
-def json_elements(path: Path, text: str) -> Iterator[ElementSet]:
-    """Element sets of messages in JSON; raises `OrbitError` for the first fault, with its entry."""
-    return _messages(path, _json_messages(path, text), complete=False)
-
-
-def csv_elements(path: Path, text: str) -> Iterator[ElementSet]:
-    """Element sets of messages in CSV; raises `OrbitError` for the first fault, with its line."""
-    return _messages(path, _csv_messages(path, text), complete=False)
-
-
 def _messages(path: Path, found: Iterator[tuple[str, dict[str, Field]]], complete: bool) -> Iterator[ElementSet]:
     """Element sets of messages, each with its place; the metadata may be absent unless `complete`.
 
@@ -249,26 +228,21 @@ def _messages(path: Path, found: Iterator[tuple[str, dict[str, Field]]], complet
             if given[key].unit.lower() not in ("", unit.lower()):
                 raise OrbitError(f"{path}, {given[key].place}: {key} is in {given[key].unit!r}; write it in {unit!r}")
         check_theory(where, given["EPHEMERIS_TYPE"].value if "EPHEMERIS_TYPE" in given else "")
-        yield checked(_of_message(path, where, given))
-
-
-def _of_message(path: Path, where: str, given: dict[str, Field]) -> ElementSet:
-    def degrees(key: str) -> float:
-        return math.radians(finite(path, given[key]))
-
-    return ElementSet(
-        name=given["OBJECT_NAME"].value,
-        catalogue_number=given["NORAD_CAT_ID"].value.lstrip("0") or "0",
-        epoch=utc_epoch(path, given["EPOCH"]),
-        mean_motion_rad_s=finite(path, given["MEAN_MOTION"]) * REVOLUTION_RAD / DAY_S,
-        eccentricity=finite(path, given["ECCENTRICITY"]),
-        inclination_rad=degrees("INCLINATION"),
-        node_rad=degrees("RA_OF_ASC_NODE"),
-        argument_of_perigee_rad=degrees("ARG_OF_PERICENTER"),
-        mean_anomaly_rad=degrees("MEAN_ANOMALY"),
-        drag_per_earth_radius=finite(path, given["BSTAR"]),
-        place=where,
-    )
+        yield checked(
+            ElementSet(
+                name=given["OBJECT_NAME"].value,
+                catalogue_number=given["NORAD_CAT_ID"].value.lstrip("0") or "0",
+                epoch=utc_epoch(path, given["EPOCH"]),
+                mean_motion_rad_s=finite(path, given["MEAN_MOTION"]) * REVOLUTION_RAD / DAY_S,
+                eccentricity=finite(path, given["ECCENTRICITY"]),
+                inclination_rad=math.radians(finite(path, given["INCLINATION"])),
+                node_rad=math.radians(finite(path, given["RA_OF_ASC_NODE"])),
+                argument_of_perigee_rad=math.radians(finite(path, given["ARG_OF_PERICENTER"])),
+                mean_anomaly_rad=math.radians(finite(path, given["MEAN_ANOMALY"])),
+                drag_per_earth_radius=finite(path, given["BSTAR"]),
+                place=where,
+            )
+        )
 
 
 def _kvn_messages(path: Path, text: str) -> Iterator[tuple[str, dict[str, Field]]]:
@@ -320,14 +294,8 @@ def _json_messages(path: Path, text: str) -> Iterator[tuple[str, dict[str, Field
             raise OrbitError(
                 f"{path}, {place}: {str(record)[:40]!r} is not an object with the keys of an OMM; repair it"
             )
-        yield (
-            place,
-            {
-                k.upper(): Field(k, str(v), "", place)
-                for k, v in record.items()
-                if isinstance(v, str | int | float) and not isinstance(v, bool)
-            },
-        )
+        plain = {k: v for k, v in record.items() if isinstance(v, str | int | float) and not isinstance(v, bool)}
+        yield place, {k.upper(): Field(k, str(v), "", place) for k, v in plain.items()}
 
 
 def _csv_messages(path: Path, text: str) -> Iterator[tuple[str, dict[str, Field]]]:

@@ -53,7 +53,13 @@ class _Draft:
     values: list[list[float]] = field(default_factory=list)
 
     def add(self, path: Path, place: str, time: str, words: list[str]) -> None:
-        """Take a state vector; raises `OrbitError` for what is not a number."""
+        """Take a state vector; raises `OrbitError` for too many or too few words, and what is not a number."""
+        if len(words) not in (6, 9):
+            raise OrbitError(
+                f"{path}, {place}: {len(words) + 1} columns; a state vector has a time, three of position in km and "
+                "three of velocity in km/s, and may have three of acceleration"
+            )
+        words = words[:6]
         try:
             numbers = list(map(float, words))
         except ValueError:
@@ -114,36 +120,22 @@ def _kvn_drafts(path: Path, text: str) -> Iterator[_Draft]:
                 draft = _Draft(f"line {number}")
         elif block == "head":
             add_field(header, kvn_field(path, number, line), path)
-            _check_version(path, header)
+            first = next(iter(header.values()))
+            if first.key != "CCSDS_OEM_VERS" or first.value.partition(".")[0] not in ("1", "2", "3"):
+                raise OrbitError(
+                    f"{path}, {first.place}: the file begins with {first.key} = {first.shown}, not with CCSDS_OEM_VERS "
+                    "= 1, 2 or 3; give a CCSDS Orbit Ephemeris Message"
+                )
         elif block == "meta":
             add_field(draft.metadata, kvn_field(path, number, line), path)
         elif block == "data":
-            _kvn_row(path, draft, number, words)
+            draft.add(path, f"line {number}", words[0], words[1:])
     if block in ("meta", "covariance"):
         raise OrbitError(
             f"{path}: the file ends before {block.upper()}_STOP; it is cut off: download or export it again"
         )
     if draft.place:
         yield draft
-
-
-def _kvn_row(path: Path, draft: _Draft, number: int, words: list[str]) -> None:
-    if len(words) not in (7, 10):
-        raise OrbitError(
-            f"{path}, line {number}: {len(words)} columns; a state vector has a time, three of position in km and "
-            "three of velocity in km/s, and may have three of acceleration"
-        )
-    draft.add(path, f"line {number}", words[0], words[1:7])
-
-
-def _check_version(path: Path, header: dict[str, Field]) -> None:
-    """Refuse what does not begin as an OEM of a version that is read."""
-    first = next(iter(header.values()))
-    if first.key != "CCSDS_OEM_VERS" or first.value.partition(".")[0] not in ("1", "2", "3"):
-        raise OrbitError(
-            f"{path}, {first.place}: the file begins with {first.key} = {first.shown}, not with CCSDS_OEM_VERS = 1, 2 "
-            "or 3; give a CCSDS Orbit Ephemeris Message"
-        )
 
 
 def _xml_drafts(path: Path, text: str) -> Iterator[_Draft]:
@@ -190,21 +182,20 @@ def _check_metadata(path: Path, draft: _Draft) -> None:
     for key in _REQUIRED:
         if not given.get(key, Field(key, "", "", "")).value:
             raise OrbitError(f"{path}, {draft.place}: {key} is missing in this segment's metadata; add it")
-    if given["CENTER_NAME"].value.upper() != "EARTH":
-        raise _unread(path, given["CENTER_NAME"], "EARTH")
-    if _system(given) not in TIME_SYSTEMS:
-        raise _unread(path, given["TIME_SYSTEM"], "UTC, TAI, TT, GPS")
-    if not FRAMES.fullmatch(_frame(given)):
-        raise _unread(path, given["REF_FRAME"], "TEME, TOD, EME2000, GCRF, ICRF, ITRF")
+    for key, read, allowed in (
+        ("CENTER_NAME", given["CENTER_NAME"].value.upper() == "EARTH", "EARTH"),
+        ("TIME_SYSTEM", _system(given) in TIME_SYSTEMS, "UTC, TAI, TT, GPS"),
+        ("REF_FRAME", FRAMES.fullmatch(_frame(given)), "TEME, TOD, EME2000, GCRF, ICRF, ITRF"),
+    ):
+        if not read:
+            raise OrbitError(
+                f"{path}, {given[key].place}: {key} is {given[key].shown}; read are {allowed}: export one of these"
+            )
     if "REF_FRAME_EPOCH" in given and _frame(given) in ("TEME", "TOD"):
         raise OrbitError(
             f"{path}, {given['REF_FRAME_EPOCH'].place}: REF_FRAME_EPOCH holds {_frame(given)} still at "
             f"{given['REF_FRAME_EPOCH'].value}, and only the frame of date is read; export in EME2000 or GCRF"
         )
-
-
-def _unread(path: Path, given: Field, allowed: str) -> OrbitError:
-    return OrbitError(f"{path}, {given.place}: {given.key} is {given.shown}; read are {allowed}: export one of these")
 
 
 def _system(metadata: dict[str, Field]) -> str:
