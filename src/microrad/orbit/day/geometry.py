@@ -47,9 +47,9 @@ class View:
     """The contacts of the mission's two terminals.
 
     ``encounters`` are those of the span of ``pair``, cut at its end. ``contacts`` are all of them whole, those behind
-    the span too, in which its data may still be sent, and ``range_m`` has the range over time for each. ``umbra_s``
-    (n, 2) are the eclipses of the lower satellite in the span, and ``closed_form`` is the contact of an orbit of the
-    same radius over the equator, where that orbit and no field of regard decide.
+    the span too, in which its data may still be sent. ``range_m`` has the range over time for each, a spline that is
+    exact to a millimetre. ``umbra_s`` (n, 2) are the eclipses of the lower satellite in the span. ``closed_form`` is
+    the contact of an orbit of the same radius over the equator, where that orbit and no field of regard decide.
     """
 
     pair: orbit.Pair
@@ -95,7 +95,8 @@ class View:
     @property
     def median_s(self) -> float:
         """Median duration of the contacts that neither end of what is looked at cuts; nan without one."""
-        whole = [e.contact.duration_s for e in self.encounters if not _cut(e.contact)]
+        inside = (e.contact for e in self.encounters if START not in e.contact.begins and END not in e.contact.ends)
+        whole = [contact.duration_s for contact in inside]
         return float(np.median(whole)) if whole else math.nan
 
     def largest(self, name: str) -> float:
@@ -115,10 +116,6 @@ def longest_gap_s(contacts: Sequence[orbit.Contact], pair: orbit.Pair) -> float:
     return max(b - a for a, b in zip(edges[::2], edges[1::2], strict=True) if a < end_s)
 
 
-def _cut(contact: orbit.Contact) -> bool:
-    return START in contact.begins or END in contact.ends
-
-
 def cut_at(contact: _C, end_s: float) -> _C:
     """The contact up to the end of the span."""
     return contact if contact.end_s <= end_s else replace(contact, end_s=end_s, ends=END)
@@ -126,14 +123,21 @@ def cut_at(contact: _C, end_s: float) -> _C:
 
 def view(pair: orbit.Pair, wavelength_m: float) -> View:
     """The contacts of a pair of terminals, with the Doppler shift at a wavelength; raises `orbit.OrbitError`."""
+    from scipy.interpolate import CubicHermiteSpline  # late: it loads slowly
+
     found = orbit.contacts(pair.leo, pair.geo, pair.earth, pair.epoch, pair.whole_s)
-    end = pair.span_s[1]
+    sights, own, end = [_sight(pair, c) for c in found], pair.leo.orbit, pair.span_s[1]
+
+    def depth_rad(time_s: Floats) -> Floats:
+        sun = orbit.sun_direction(pair.epoch, time_s)
+        return shadow_rad(own.states(time_s).position_m, sun, pair.earth.shape)
+
     return View(
         pair=pair,
         encounters=tuple(encounter(pair, cut_at(c, end), wavelength_m) for c in found if c.start_s < end),
         contacts=found,
-        range_m=tuple(_range(_sight(pair, c)) for c in found),
-        umbra_s=_umbra(pair),
+        range_m=tuple(CubicHermiteSpline(s.time_s, s.range_m, s.range_rate_m_s) for s in sights),
+        umbra_s=positive(depth_rad, coarse_times(pair.span_s, coarse_step_s(own, pair.span_s[0]))),
         closed_form=_closed_form(pair),
     )
 
@@ -141,14 +145,6 @@ def view(pair: orbit.Pair, wavelength_m: float) -> View:
 def times(contact: orbit.Contact) -> Floats:
     """Moments of a contact, both ends among them."""
     return np.linspace(contact.start_s, contact.end_s, max(math.ceil(contact.duration_s / SAMPLE_S), 20) + 1)
-
-
-def _range(seen: orbit.LineOfSight) -> Callable[[Floats], Floats]:
-    """Range over time between samples, by its rate at each: exact to a millimetre at 10 s, and quick to ask for."""
-    from scipy.interpolate import CubicHermiteSpline
-
-    spline: Callable[[Floats], Floats] = CubicHermiteSpline(seen.time_s, seen.range_m, seen.range_rate_m_s)
-    return spline
 
 
 def _sight(pair: orbit.Pair, contact: orbit.Contact) -> orbit.LineOfSight:
@@ -169,17 +165,6 @@ def encounter(pair: orbit.Pair, contact: orbit.Contact, wavelength_m: float) -> 
         float(np.max(np.abs(seen.range_rate_m_s))),
         float(np.max(np.abs(seen.doppler_hz(wavelength_m)))),
     )
-
-
-def _umbra(pair: orbit.Pair) -> Floats:
-    own = pair.leo.orbit
-    step = coarse_step_s(own, pair.span_s[0])
-
-    def depth(time_s: Floats) -> Floats:
-        sun = orbit.sun_direction(pair.epoch, time_s)
-        return shadow_rad(own.states(time_s).position_m, sun, pair.earth.shape)
-
-    return positive(depth, coarse_times(pair.span_s, step))
 
 
 def _closed_form(pair: orbit.Pair) -> orbit.CoplanarContact | None:

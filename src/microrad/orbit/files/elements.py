@@ -187,7 +187,7 @@ def _tle_epoch(where: str, year: str, day: str) -> Epoch:
             raise OrbitError("the day of the year must be from 1 to 366")
         hours, rest = divmod(second, 3600)
         clock = f"{int(hours):02d}:{int(rest // 60):02d}:{rest % 60:012.9f}"
-        return Epoch.from_text(f"{date(full, 1, 1) + timedelta(int(whole) - 1)}T{clock}Z")
+        return Epoch(f"{date(full, 1, 1) + timedelta(int(whole) - 1)}T{clock}Z")
     except OrbitError as error:
         raise OrbitError(
             f"{where}: the epoch, day {day} of {full}, is refused: {error}; download the elements again"

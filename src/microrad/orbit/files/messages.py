@@ -41,6 +41,10 @@ class Field(NamedTuple):
         """The value for a message, in quotes and not longer than a line."""
         return repr(self.value if len(self.value) <= 60 else self.value[:57] + "...")
 
+    def refused(self, path: Path, why: str) -> OrbitError:
+        """The refusal of the value: where it is, what it is, and `why` behind it."""
+        return OrbitError(f"{path}, {self.place}: {self.key} is {self.shown}{why}")
+
 
 def read_text(path: Path) -> str:
     """Text of a file in UTF-8, lines ending in a newline; raises `OrbitError` for one that is none, or too large."""
@@ -108,9 +112,7 @@ def add_field(fields: dict[str, Field], new: Field, path: Path) -> None:
         return
     old = fields.setdefault(new.key, new)
     if old.value != new.value:
-        raise OrbitError(
-            f"{path}, {new.place}: {new.key} is {new.shown}, but {old.place} has {old.shown}; keep one of them"
-        )
+        raise new.refused(path, f", but {old.place} has {old.shown}; keep one of them")
 
 
 class _XmlReader:
@@ -179,10 +181,7 @@ def finite(path: Path, given: Field) -> float:
     except ValueError:
         number = math.nan
     if not math.isfinite(number):
-        raise OrbitError(
-            f"{path}, {given.place}: {given.key} is {given.shown}, not a finite number; write one such as 12.5 or "
-            "1.25e1"
-        )
+        raise given.refused(path, ", not a finite number; write one such as 12.5 or 1.25e1")
     return number
 
 
@@ -218,17 +217,18 @@ def instant(path: Path, given: Field, system: str) -> tuple[int, float]:
     except ValueError:
         match = None
     if match is None or int(match[1]) > 23 or int(match[2]) > 59 or float(match[3]) >= 61.0:
-        raise OrbitError(
-            f"{path}, {given.place}: {given.key} is {given.shown}, not a date and time; write it as "
-            "2026-03-20T12:00:00.000 or 2026-079T12:00:00.000"
-        )
+        example = "2026-03-20T12:00:00.000 or 2026-079T12:00:00.000"
+        raise given.refused(path, f", not a date and time; write it as {example}")
     if match[4] and system != "UTC":
-        raise OrbitError(
-            f"{path}, {given.place}: {given.key} is {given.shown} and ends in Z, which means UTC, but TIME_SYSTEM is "
-            f"{system}; remove the Z or correct TIME_SYSTEM"
-        )
+        but = f"which means UTC, but TIME_SYSTEM is {system}; remove the Z or correct TIME_SYSTEM"
+        raise given.refused(path, f" and ends in Z, {but}")
     if float(match[3]) >= 60.0:
-        _check_leap_second(path, given, ordinal, match, system)
+        try:
+            if system != "UTC":
+                raise OrbitError(f"{system} has no leap seconds")
+            Epoch(f"{date.fromordinal(ordinal)}T{match[1]}:{match[2]}:60Z")
+        except OrbitError as error:
+            raise given.refused(path, f", a second that does not exist: {error}") from None
     return ordinal, int(match[1]) * 3600 + int(match[2]) * 60 + float(match[3])
 
 
@@ -252,24 +252,12 @@ def _minutes(text: str) -> int:
     return 60 * int(text[:2]) + int(text[3:])
 
 
-def _check_leap_second(path: Path, given: Field, day: int, match: re.Match[str], system: str) -> None:
-    """Refuse second 60 but in a leap second of UTC."""
-    try:
-        if system != "UTC":
-            raise OrbitError(f"{system} has no leap seconds")
-        Epoch.from_text(f"{date.fromordinal(day)}T{match[1]}:{match[2]}:60Z")
-    except OrbitError as error:
-        raise OrbitError(
-            f"{path}, {given.place}: {given.key} is {given.shown}, a second that does not exist: {error}"
-        ) from None
-
-
 def utc_epoch(path: Path, given: Field) -> Epoch:
     """The instant of a field in UTC; raises `OrbitError` with its place."""
     day, _ = instant(path, given, "UTC")
     clock = given.value.partition("T")[2].rstrip("Z").rstrip(".")
     try:
-        return Epoch.from_text(f"{date.fromordinal(day)}T{clock}Z")
+        return Epoch(f"{date.fromordinal(day)}T{clock}Z")
     except OrbitError as error:
         raise OrbitError(f"{path}, {given.place}: {given.key}: {error}") from None
 
@@ -284,9 +272,9 @@ def elapsed_s(system: str, epoch: Epoch, instants: list[tuple[int, float]], wher
     try:
         if system == "UTC":  # by days, since a leap second makes one longer
             unique, index = np.unique(days, return_inverse=True)
-            zero = [epoch.seconds_to(Epoch.from_text(f"{date.fromordinal(int(d))}T00:00:00Z")) for d in unique]
+            zero = [epoch.seconds_to(Epoch(f"{date.fromordinal(int(d))}T00:00:00Z")) for d in unique]
             return np.asarray(np.array(zero)[index] + seconds)
-        midnight = Epoch.from_text(f"{epoch.text[:10]}T00:00:00Z")
+        midnight = Epoch(f"{epoch.text[:10]}T00:00:00Z")
     except OrbitError as error:
         raise OrbitError(f"{where}: {error}") from None
     day = date.fromisoformat(epoch.text[:10]).toordinal()

@@ -188,9 +188,7 @@ def _check_metadata(path: Path, draft: _Draft) -> None:
         ("REF_FRAME", FRAMES.fullmatch(_frame(given)), "TEME, TOD, EME2000, GCRF, ICRF, ITRF"),
     ):
         if not read:
-            raise OrbitError(
-                f"{path}, {given[key].place}: {key} is {given[key].shown}; read are {allowed}: export one of these"
-            )
+            raise given[key].refused(path, f"; read are {allowed}: export one of these")
     if "REF_FRAME_EPOCH" in given and _frame(given) in ("TEME", "TOD"):
         raise OrbitError(
             f"{path}, {given['REF_FRAME_EPOCH'].place}: REF_FRAME_EPOCH holds {_frame(given)} still at "
@@ -322,16 +320,11 @@ def _method(path: Path, draft: _Draft) -> tuple[str, int]:
         raise OrbitError(f"{path}, {method.place}: INTERPOLATION stands without INTERPOLATION_DEGREE; add the degree")
     kind = method.value.upper()
     if kind not in ("HERMITE", "LAGRANGE"):
-        raise OrbitError(
-            f"{path}, {method.place}: INTERPOLATION is {method.shown}; an orbit is read with HERMITE or LAGRANGE, "
-            "because other curves miss it by kilometres or jump in velocity: export with one of these"
-        )
+        why = "other curves miss it by kilometres or jump in velocity: export with one of these"
+        raise method.refused(path, f"; an orbit is read with HERMITE or LAGRANGE, because {why}")
     number = DEFAULT_DEGREE if degree is None else finite(path, degree)
     if degree is not None and not (number == int(number) and DEGREES[0] <= number <= DEGREES[1]):
-        raise OrbitError(
-            f"{path}, {degree.place}: INTERPOLATION_DEGREE is {degree.shown}; take a whole number from {DEGREES[0]} "
-            f"to {DEGREES[1]}"
-        )
+        raise degree.refused(path, f"; take a whole number from {DEGREES[0]} to {DEGREES[1]}")
     points = int(number) + 1 if kind == "LAGRANGE" else (int(number) + 2) // 2
     if len(draft.times) < points:
         raise OrbitError(

@@ -144,24 +144,18 @@ def _samples(contact: tuple[float, float], range_m: Range, limits: Floats) -> Fl
     reach = float(np.max(np.abs(np.diff(ranges))))
     if not np.any((np.min(ranges) - reach <= limits) & (limits <= np.max(ranges) + reach)):
         return time
-    turns = [
-        _turning_points(low, high, range_m, sign)
-        for sign in (1.0, -1.0)
-        for low, high in [_brackets(time, sign * ranges)]
-    ]
+    turns = [_turning_points(time, sign * ranges, range_m, sign) for sign in (1.0, -1.0)]
     return np.unique(np.concatenate((time, *turns)))
 
 
-def _brackets(time: Floats, value: Floats) -> tuple[Floats, Floats]:
-    """Spans that may hold a minimum: about each sample that is one, and the first and the last interval."""
+def _turning_points(time: Floats, value: Floats, range_m: Range, sign: float) -> Floats:
+    """Minima of `sign` times the range, of which `value` are samples, by golden-section search of all at once.
+
+    A minimum may lie about each sample that is one, and in the first and the last interval.
+    """
     lowest = np.flatnonzero((value[1:-1] <= value[:-2]) & (value[1:-1] <= value[2:])) + 1
     low = np.concatenate((time[lowest - 1], time[[0, -2]]))
     high = np.concatenate((time[lowest + 1], time[[1, -1]]))
-    return low, high
-
-
-def _turning_points(low: Floats, high: Floats, range_m: Range, sign: float) -> Floats:
-    """Minimum of `sign` times the range in each span, by golden-section search of all at once."""
     while np.any(high - low > _FINE_S):
         width = _GOLDEN * (high - low)
         left, right = high - width, low + width
