@@ -14,8 +14,8 @@ from pathlib import Path
 
 import numpy as np
 
-from microrad.lab.identify.amplitude import amplitude_dependence
-from microrad.lab.identify.linear import fit_linear, output_error
+from microrad.lab.identify.linear.amplitude import amplitude_dependence
+from microrad.lab.identify.linear.fit import fit_linear, output_error
 from microrad.lab.recording import Recording, multisine_recordings
 
 DATA = Path(os.environ.get("MICRORAD_DATA") or Path(__file__).resolve().parents[2] / "shared" / "data") / "cubespec"

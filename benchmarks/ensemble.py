@@ -18,16 +18,15 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from loop import INTEGER, Counters, best, compiled_twin, twin_parameters
 
+from loop import INTEGER, Counters, best, compiled_twin, twin_parameters
+from microrad import mirror
 from microrad.core import kernels, lti
 from microrad.loop import control, disturbance
-from microrad.loop import paper_cases as tracking
 from microrad.loop import sine_run as simulate
 from microrad.loop.fine_loop import ensemble
 from microrad.loop.fine_loop import loop as fine
 from microrad.loop.sensor import OpticalSensor
-from microrad.mirror import model as mirror
 from microrad.mission import file as missionfile
 
 HERE = Path(__file__).resolve().parent
@@ -40,8 +39,7 @@ PIECE, ROUNDS = 150, 20  # control samples in a timed piece, and how often fifte
 def scene() -> tuple[fine.PointingLoop, fine.LoopController, simulate.Setup]:
     """The loop without noise, its controller, and the same for the scalar kernel that the twin is made from."""
     mission = missionfile.load_mission(HERE.parent / "missions" / "leo-geo.toml").mission
-    model = tracking.mirror_model(mission, mission.mirror)
-    m = mirror.from_mission(mission.mirror, model)
+    m = mirror.of(mission).line_of_sight[mirror.Variant.GIVEN].plant
     drive = control.Drive(-6.0, 6.0, 1e3, 1e6 / 15.0, 0.305e-3, 0.0)
     timing = control.Timing(PERIOD_S, STEPS, STEPS)
     gain = m.bouc_wen[0].d1_rad_v

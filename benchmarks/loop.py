@@ -21,12 +21,12 @@ import control as python_control
 import numpy as np
 from scipy.integrate import solve_ivp
 
+from microrad import mirror
 from microrad.core import kernels
 from microrad.loop import control as microrad_control
-from microrad.loop import paper_cases as tracking
+from microrad.loop import paper_cases
 from microrad.loop import sine_run as simulate
 from microrad.mirror import hysteresis
-from microrad.mirror import model as mirror
 from microrad.mission import file as missionfile
 
 HERE = Path(__file__).resolve().parent
@@ -205,11 +205,11 @@ def peers(m: mirror.Mirror, time_s: np.ndarray, drive: np.ndarray) -> dict[str, 
 
 def main() -> None:
     mission = missionfile.load_mission(HERE.parent / "missions" / "leo-geo.toml").mission
-    model = tracking.mirror_model(mission, mission.mirror)
-    m = mirror.from_mission(mission.mirror, model)
-    setup = simulate.setup_from_mission(mission, hysteresis.slow_gain(model))
+    cases = paper_cases.of(mission, mirror.of(mission))
+    given, setup = cases.mirrors.line_of_sight[mirror.Variant.GIVEN], cases.setup
+    m = given.plant
     period = setup.timing.period_s
-    gains = microrad_control.gains_from_mission(mission.control, hysteresis.slow_gain(model))
+    gains = microrad_control.gains_from_mission(mission.control, hysteresis.slow_gain(given.model))
     controller = microrad_control.pid(replace(gains, derivative=DERIVATIVE_V_S_RAD), period)
     setup = replace(setup, timing=microrad_control.Timing(period, 1, 1), controller=controller)
     reference, _ = simulate.sine(mission.scenario.amplitude_rad, 15.0, period, settle_s=2.0)

@@ -18,7 +18,7 @@ import skrf
 from skrf.vectorFitting import VectorFitting
 
 from microrad.core.lti import frequency_response, modal_from_polynomials
-from microrad.lab.identify.vector_fitting import vector_fit
+from microrad.lab.identify.linear.vector_fitting import vector_fit
 
 REPEATS = 7
 NOISE = 1e-3

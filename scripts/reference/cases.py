@@ -47,7 +47,7 @@ class Place:
         return name
 
     def run(self, *words: object) -> str:
-        """A command of microrad, which may also end with "does not close"; returns what it prints."""
+        """A command of microrad, which may also end with 1, a requirement not met; returns what it prints."""
         return self.program(sys.executable, "-m", "microrad", *words, ends=(0, 1))
 
     def json(self, *words: object) -> Any:

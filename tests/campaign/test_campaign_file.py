@@ -15,8 +15,8 @@ from microrad.campaign import evaluate, keys, ledger_file, sampling
 from microrad.campaign.file import load_campaign
 from microrad.campaign.inputs import Builder
 from microrad.campaign.records import CampaignError
-from microrad.loop import fine_pointing
 from microrad.mission.file import MissionError, load_mission, named_files, open_mission
+from scenes import scene_of
 from shipped import SHIPPED
 
 QUAD_CELL = (
@@ -216,6 +216,7 @@ REFUSED = {
     "a table as key": ("communication.transmit_power", "communication", "inputs.communication", "is a table"),
     "a key behind a value": ("transmit_power", "transmit_power.x", "inputs.communication.transmit_power.x", "goes on"),
 }
+THOUSAND = ".a" * 999
 ADDED = {
     "a key in set and inputs": (
         '[set]\n"communication.transmit_power" = "4 W"',
@@ -461,6 +462,22 @@ def test_what_does_not_fit_is_refused_with_its_key(tmp_path, what):
     assert reason in found[0].reason
     assert found[0].expected
     assert found[0].line > 0
+
+
+@pytest.mark.parametrize(
+    ("added", "reason"),
+    [
+        (f"[set]\na{THOUSAND} = 1", "is a key of 2003 characters"),
+        (f"set.a{THOUSAND} = 1", "is a key of 2003 characters"),
+        (f"[set.a{THOUSAND}]\nb = 1", "is a key of 2003 characters"),
+        (f'[set]\n"a{THOUSAND}" = 1', "is a key of 2003 characters"),
+        (f"[set]\na = {{b{THOUSAND} = 1}}", "holds a key of more than 50 parts"),
+    ],
+    ids=["key", "keys", "table", "quoted", "inline"],
+)
+def test_a_set_of_a_thousand_parts_is_told(tmp_path, added, reason):
+    """It was a traceback."""
+    assert [fault.reason for fault in faults(tmp_path, placed(HEAD + POWER, added))] == [reason]
 
 
 @pytest.mark.parametrize(
@@ -837,7 +854,7 @@ def test_only_keys_that_touch_the_loop_change_it(tmp_path, sensor):
     file = load_mission(tmp_path / "mission.toml")
 
     def loop_of(m):
-        scene = fine_pointing.scene(replace(file, mission=m))
+        scene = scene_of(replace(file, mission=m))
         return pickle.dumps((scene.loop, scene.axis, m.fine_pointing.modulus_margin, m.fine_pointing.seed))
 
     same, changed = loop_of(file.mission), []

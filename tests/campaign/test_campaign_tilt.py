@@ -15,6 +15,7 @@ from microrad.loop.fine_loop.ensemble import LANES, Span
 from microrad.loop.fine_loop.loop import assemble
 from microrad.loop.fine_pointing import designs, parts, scenario
 from microrad.mission.file import load_mission
+from scenes import scene_of
 from shipped import SHIPPED
 
 SPAN = Span(0.4, 0.05, 3)
@@ -28,17 +29,17 @@ def mission():
 
 @pytest.fixture(scope="module")
 def scene(mission):
-    return scenario.scene(mission)
+    return scene_of(mission)
 
 
 @pytest.fixture(scope="module")
 def tuned(scene, mission):
-    return designs.tune("PI", mission.mission, designs.plants(scene, mission.mission, 1)).controller
+    return designs.tune("PI", scene.table, designs.plants(scene, 1)).controller
 
 
 @pytest.fixture(scope="module")
 def controller(scene, mission, tuned):
-    return designs.build("PI", scene, mission.mission, tuned)
+    return designs.build("PI", scene, tuned)
 
 
 @pytest.fixture(scope="module")
@@ -251,7 +252,7 @@ def test_the_tail_with_a_line(gaussian, controller):
 
 
 def test_with_hysteresis_and_limits_the_tail_is_that_of_plain_runs(scene, mission, controller):
-    loop = scenario.with_mirror(scene.loop, mission.mission, "comparison")
+    loop = scenario.with_mirror(scene.loop, scene.mirrors, "comparison")
     plain = ensemble.run(loop, controller, Span(1.6, 0.5, 8), 3 * LANES)
     counts = plain.histogram.astype(float)
     span = Span(1.0, 0.5, 3)

@@ -115,6 +115,7 @@ def test_the_examples_are_good_usage(command):
 
 def test_help_lists_every_command_and_completion(call):
     result = call("--help")
+    assert "Exit code: 0 done, 1 a requirement is not met, 2 bad usage or a bad file." in " ".join(result.out.split())
     assert result.code == 0
     listed = {line.split()[0] for line in result.out.partition("Commands:")[2].splitlines() if line.startswith("  ")}
     assert set(COMMANDS) <= listed
@@ -243,12 +244,12 @@ def few_controllers(monkeypatch):
 def test_design_prints_each_controller_with_its_margins(call, folder):
     call("init")
     result = call("design", "leo-geo.toml")
-    assert (result.code, result.err) == (0, "")
     for words in ("PI, best of a gain grid", "LQG", "PI + inverse in series", "modulus", "integral frequency"):
         assert words in result.out
     data = json.loads(call("design", "leo-geo.toml", "--json").out)
     far = [c["simulated_rms_rad_per_axis"] > 1.5 * c["residual_rms_rad_per_axis"] for c in data["controllers"]]
     assert any(far) == ("Warning" in result.out) == bool(data["warnings"])
+    assert (result.code, result.err) == (any(far), "")
     assert all(c["margins"]["modulus"] >= 0.5 for c in data["controllers"])
     assert len(data["controllers"][0]["matrices"]["A"]) == 2  # an integrator an axis
 
@@ -334,6 +335,21 @@ def test_a_cache_folder_that_cannot_be_used_is_told_once_and_the_run_goes_on(cal
     assert str(folder / "cache") in result.err
     assert "nothing is kept for a quicker next run" in result.err
     assert (folder / "leo-geo-study" / "report.html").is_file()
+
+
+@pytest.mark.usefixtures("undrawn")
+def test_a_cache_folder_that_cannot_be_written_is_told_once_and_the_run_goes_on(call, folder, monkeypatch):
+    found, access = plain_study(), os.access
+    monkeypatch.delenv("MICRORAD_KEEP")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(folder / "cache"))
+    monkeypatch.setattr(study, "run", lambda *args: found)
+    monkeypatch.setattr(os, "access", lambda path, mode: Path(path).name != "parts" and access(path, mode))
+    result = call("run", PAPER)
+    place = folder / "cache" / "microrad" / "parts"
+    said = f"microrad: {place}: the folder cannot be written: nothing is kept for a quicker next run\n"
+    assert (result.code, result.err) == (1, said)
+    assert (folder / "leo-geo-study" / "report.html").is_file()
+    assert list(place.iterdir()) == []
 
 
 def test_a_report_is_written_although_nobody_reads_the_verdict(folder):

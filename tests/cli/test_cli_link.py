@@ -144,7 +144,7 @@ def test_the_largest_rate_says_whose_error_it_is_for(call, folder, change, flags
 
 @pytest.mark.parametrize("flags", [("--solve", "communication.data_rate"), ("--data-rate", "largest")])
 def test_the_solved_rate_has_the_required_margin(call, folder, flags):
-    path = file_with(folder, {"terminals.leo_aperture": "6 cm"})
+    path = file_with(folder, {"terminals.leo_aperture": "6 cm", "pointing.confidence": 0.5})
     result = call("budget", path, *flags, "--json")
     found = json.loads(result.out)
     assert result.code == 0

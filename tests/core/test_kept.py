@@ -3,8 +3,11 @@
 import errno
 import os
 import pickle
+import shutil
+import stat
 import subprocess
 import sys
+import time
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 
@@ -12,6 +15,7 @@ import numpy as np
 import pytest
 
 from microrad.core import kept, machine
+from microrad.core.folder import DRAFT
 from microrad.core.kept import Kept
 
 
@@ -41,6 +45,11 @@ def with_inputs(inputs):
     return Result(np.zeros(1), inputs)
 
 
+def is_given(inputs):
+    CALLS.append(inputs.gain if isinstance(inputs.gain, float) else "?")
+    return isinstance(inputs.gain, float)
+
+
 def refused(inputs):
     CALLS.append(inputs.gain)
     raise ValueError("no")
@@ -58,6 +67,10 @@ def place(tmp_path):
 
 def files(place):
     return sorted(place.rglob("*.part"))
+
+
+def drafts(place):
+    return sorted(place.rglob(f".microrad-*{DRAFT}"))
 
 
 ONE = Inputs(2.0, "one")
@@ -123,6 +136,13 @@ def test_what_cannot_be_told_from_another_value_is_computed(place):
     assert not files(place)
 
 
+def test_a_kept_part_does_not_end_a_run_with_values_that_have_no_digest(place):
+    assert Kept(place).part(is_given, ONE)
+    parts = Kept(place)
+    assert not parts.part(is_given, Inputs(object()))
+    assert (CALLS, parts.trouble) == ([2.0, "?"], "")
+
+
 @pytest.mark.parametrize("spoil", ["cut", "empty", "flipped", "other"])
 def test_a_damaged_part_is_made_again_without_a_word(place, spoil, capfd):
     Kept(place).part(samples, ONE, 3)
@@ -146,18 +166,6 @@ def test_parts_of_other_code_libraries_or_machines_are_not_taken(place, monkeypa
     monkeypatch.setattr(kept, of, lambda: "another")
     Kept(place).part(samples, ONE, 3)
     assert CALLS == [2.0, 2.0]
-
-
-def test_parts_depend_on_the_files_beside_them(place):
-    contents = ["a"]
-    Kept(place, lambda: contents).part(samples, ONE, 3)
-    Kept(place, lambda: ["b"]).part(samples, ONE, 3)
-    assert CALLS == [2.0, 2.0]
-    parts = Kept(place, lambda: list(contents))
-    contents[0] = "changed while it runs"
-    parts.part(samples, replace(ONE, gain=5.0), 3)
-    Kept(place, lambda: ["a"]).part(samples, replace(ONE, gain=5.0), 3)
-    assert CALLS[2:] == [5.0, 5.0]
 
 
 def test_a_file_in_the_place_of_the_folder_is_told_once(place):
@@ -187,6 +195,72 @@ def test_the_folder_of_another_user_is_not_used(place, monkeypatch):
     place.mkdir(parents=True, mode=0o700)
     monkeypatch.setattr(os, "getuid", lambda: place.stat().st_uid + 1)
     assert "others may write" in Kept(place).trouble
+
+
+@pytest.fixture
+def entered(monkeypatch):
+    """Folders as if others might enter each of them, but for those in the list; a link in it is another user's."""
+    lstat, but = kept.Path.lstat, []
+
+    def seen(path):
+        found = lstat(path)
+        mode = found.st_mode | (0 if path in but else 0o011)
+        own = found.st_uid + (path in but and stat.S_ISLNK(mode))
+        return os.stat_result((mode, *found[1:4], own, *found[5:]))
+
+    monkeypatch.setattr(kept.Path, "lstat", seen)
+    return but
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no such permissions")
+def test_a_folder_below_one_that_others_may_write_into_is_not_used(tmp_path, entered):
+    shared = tmp_path / "shared"
+    place = shared / "cache" / "parts"
+    shared.mkdir()
+    for mode, taken in ((0o777, False), (0o770, False), (0o1777, True), (0o755, True)):
+        shared.chmod(mode)
+        parts = Kept(place)
+        parts.part(samples, ONE, 3)
+        said = f"{place}: others may write into {shared}: nothing is kept for a quicker next run"
+        assert parts.trouble == ("" if taken else said)
+    assert CALLS == [2.0] * 3  # the last one was kept by the one before
+    shared.chmod(0o777)
+    entered.append(tmp_path)  # nobody else comes that far
+    assert Kept(place).trouble == ""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no such links")
+def test_a_folder_behind_a_link_of_another_user_is_not_used(tmp_path, entered):
+    link, behind = tmp_path / "link", tmp_path / "shared" / "behind"
+    behind.mkdir(parents=True)
+    link.symlink_to("shared/behind")
+    place = link / "cache" / "parts"
+    parts = Kept(place)
+    parts.part(samples, ONE, 3)
+    assert parts.trouble == ""
+    assert len(files(behind)) == 1
+    behind.parent.chmod(0o777)
+    assert f"others may write into {behind.parent}" in Kept(place).trouble
+    behind.parent.chmod(0o755)
+    entered.append(link)
+    assert f"{link} is another user's" in Kept(place).trouble
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no such permissions")
+def test_the_folders_that_are_made_are_private(tmp_path):
+    Kept(tmp_path / "new" / "microrad" / "parts")
+    made = [tmp_path / "new", tmp_path / "new" / "microrad", tmp_path / "new" / "microrad" / "parts"]
+    assert [each.stat().st_mode & 0o777 for each in made] == [0o700] * 3
+
+
+def test_a_folder_that_cannot_be_written_is_told_once(place, monkeypatch):
+    asked = []
+    monkeypatch.setattr(os, "access", lambda path, mode: asked.append((path, mode)))
+    parts = Kept(place)
+    for _ in range(2):
+        assert parts.part(samples, ONE, 3).samples.size == 3
+    assert parts.trouble == f"{place}: the folder cannot be written: nothing is kept for a quicker next run"
+    assert (asked, CALLS, files(place)) == ([(place, os.W_OK | os.X_OK)], [2.0, 2.0], [])
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no such permissions")
@@ -228,12 +302,98 @@ def test_only_the_latest_results_of_a_part_are_kept(place):
 
 def test_many_at_once_do_no_harm(place):
     def run(number):
-        return [Kept(place).part(samples, Inputs(float(g % 3)), 50).samples[-1] for g in range(number, number + 6)]
+        parts = Kept(place)
+        last = [parts.part(samples, Inputs(float(g % 3)), 50).samples[-1] for g in range(number, number + 6)]
+        return last, parts.trouble
 
     with ThreadPoolExecutor(8) as pool:
         for number, found in enumerate(pool.map(run, range(16))):
-            assert found == [49.0 * (g % 3) for g in range(number, number + 6)]
-    assert [f for f in place.rglob("*") if f.suffix == ".part" and f.name.startswith(".")] == []
+            assert found == ([49.0 * (g % 3) for g in range(number, number + 6)], "")
+    assert drafts(place) == []
+
+
+AT_ONCE = """
+import sys
+from pathlib import Path
+from microrad.core import kept
+
+kept.LONGEST_EMPTY_S = -1.0  # folders vanish beneath whoever is about to write into them
+kept.machine = dict  # quick
+parts = kept.Kept(Path(sys.argv[1]), most_bytes=2_000_000)  # four of nine, so that each is soon deleted
+print("ready", flush=True)
+sys.stdin.readline()
+for number in range(150):
+    size = 499_000 + number * int(sys.argv[2]) % 9
+    assert parts.part(bytes, size) == bytes(size)
+print(repr(parts.trouble))
+"""
+
+
+def test_two_processes_at_once_do_no_harm(place):
+    piped = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    runs = [subprocess.Popen([sys.executable, "-c", AT_ONCE, place, step], **piped) for step in "25"]
+    for run in runs:
+        assert run.stdout.readline() == "ready\n", run.stderr.read()
+    for run in runs:
+        run.stdin.write("go\n")
+        run.stdin.flush()
+    for run in runs:
+        assert run.communicate() == ("''\n", "")
+        assert run.returncode == 0
+    assert drafts(place) == []
+
+
+def test_a_draft_of_another_run_is_left_alone_and_one_of_a_run_that_was_killed_goes(place, monkeypatch):
+    """The other run has half of its part written when this one looks for parts, writes its own and makes room."""
+    parts = Kept(place)
+    parts.part(samples, ONE, 3)
+    (file,) = files(place)
+    half = file.read_bytes()[:50]
+    others = [file.with_name(f".microrad-{name}{DRAFT}") for name in (os.getpid(), f"{os.getpid()}-1", "0" * 16)]
+    for other in others:
+        other.write_bytes(half)
+    for gain in range(4):
+        Kept(place, most_bytes=1).part(samples, Inputs(float(gain)), 3)
+        parts.part(samples, Inputs(float(gain)), 3)
+    assert [other.read_bytes() for other in others] == [half] * 3
+    assert parts.trouble == ""
+    old = time.time() - kept.LONGEST_DRAFT_S - 1.0
+    os.utime(others[0], (old, old))
+    parts.part(samples, Inputs(9.0), 3)
+    assert drafts(place) == sorted(others[1:])
+
+
+@pytest.mark.parametrize("of", ["_latest_first", "_touch", "write_whole"])
+def test_a_folder_that_vanishes_meanwhile_ends_nothing(place, monkeypatch, of):
+    """As another run makes room in it, or the user deletes it: each step finds the folder gone."""
+    parts, step = Kept(place), getattr(kept, of)
+
+    def gone(*args, **more):
+        shutil.rmtree(place, ignore_errors=True)
+        return step(*args, **more)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(kept, of, gone)
+        assert parts.part(samples, ONE, 3).samples.size == 3
+    assert parts.trouble == ""
+    place.mkdir(mode=0o700, exist_ok=True)
+    parts.part(samples, ONE, 3)
+    assert len(files(place)) == 1  # kept again where it can be
+
+
+def test_what_else_stands_in_the_folder_is_left_alone(place):
+    place.mkdir(parents=True, mode=0o700)
+    (place / "notes.txt").write_text("a file")
+    (place / "mine").mkdir()
+    (place / "mine" / "keep.txt").write_text("another")
+    Kept(place).part(samples, ONE, 3)
+    folder = files(place)[0].with_name("folder.part")
+    folder.mkdir()
+    parts = Kept(place, most_bytes=1)
+    parts.part(samples, Inputs(3.0), 3)
+    assert parts.trouble == ""
+    assert files(place) == [folder]
+    assert [(place / name).read_text() for name in ("notes.txt", "mine/keep.txt")] == ["a file", "another"]
 
 
 def test_another_process_takes_it(place):

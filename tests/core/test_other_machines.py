@@ -10,9 +10,13 @@ from shipped import SHIPPED
 
 _CASE = """
 import numpy as np
-from microrad import load_mission; from microrad.loop import fine_pointing
+from microrad import load_mission, mirror
+from microrad.link.tracking_light import tracking_light_w
+from microrad.loop import fine_pointing
 
-found = fine_pointing.run_one(load_mission({path!r}), {name!r})
+file = load_mission({path!r})
+scene = fine_pointing.scene(file, mirror.of(file.mission), tracking_light_w(file))
+found = fine_pointing.run_one(scene, {name!r})
 print(found.design.tuned.values)
 for variant, of in sorted(found.simulated.items()):
     print(variant, of.rms_rad, of.quantile_rad, of.largest_rad)

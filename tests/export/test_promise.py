@@ -11,6 +11,7 @@ from microrad.loop import fine_pointing
 from microrad.loop.fine_loop import ensemble
 from microrad.loop.fine_pointing import designs
 from microrad.mission.file import load_mission
+from scenes import scene_of
 from shipped import SHIPPED
 
 OBSERVER = "disturbance observer"
@@ -36,9 +37,9 @@ def light(folder):
 
 def test_the_simulated_figure_is_that_of_the_missions_runs(light):
     file = load_mission(light)
-    scene = fine_pointing.scene(file)
-    (made,) = fine_pointing.design(scene, file.mission, only=(fine_pointing.BASELINE,))
-    (left,) = fine_pointing.outlook(scene, file.mission, [made])
+    scene = scene_of(file)
+    (made,) = fine_pointing.design(scene, only=(fine_pointing.BASELINE,))
+    (left,) = fine_pointing.outlook(scene, [made])
     run = ensemble.run(scene.loop, made.controller, ensemble.Span(0.4, 0.1, file.mission.fine_pointing.seed), 4)
     assert left.simulated_rad == pytest.approx(math.sqrt((run.axis_rms_rad**2).mean()), rel=1e-12)
     assert left.linear_rad == made.tuned.residual_rms_rad
@@ -47,20 +48,41 @@ def test_the_simulated_figure_is_that_of_the_missions_runs(light):
     assert not fine_pointing.Outlook(1.0, math.nan).holds
 
 
-def test_design_shows_both_figures_and_warns_of_the_linear_one(light, call, monkeypatch):
+def test_design_shows_both_figures_and_refuses_by_the_simulated_one(light, call, monkeypatch):
     monkeypatch.setattr(designs, "names", lambda m: (fine_pointing.BASELINE, OBSERVER))
-    found = json.loads(call("design", "light.toml", "--json").out)
+    done = call("design", "light.toml", "--json")
+    assert done.code == 1
+    found = json.loads(done.out)
     kept, broken = found["controllers"]
+    assert (kept["mark"], broken["mark"]) == ("", "refused")
     for each, times in ((kept, (1.0, 1.5)), (broken, (3.0, 20.0))):
         ratio = each["simulated_rms_rad_per_axis"] / each["residual_rms_rad_per_axis"]
         assert times[0] < ratio < times[1], each["name"]
     (warning,) = found["warnings"]
-    assert f"by {OBSERVER} ({ratio:.1f} times): choose by the simulated figure" in warning
-    printed = call("design", "light.toml").out
-    row = next(line for line in printed.splitlines() if line.split()[:1] == OBSERVER.split()[:1])
+    assert f"by {OBSERVER} ({ratio:.2f} times): refused, here and by microrad export; choose by the sim" in warning
+    printed = call("design", "light.toml")
+    assert printed.code == 1
+    row = row_of(printed.out, OBSERVER)
     assert f"{broken['residual_rms_rad_per_axis'] * 1e6:.3f} " in row
-    assert f"{broken['simulated_rms_rad_per_axis'] * 1e6:.3f} " in row
-    assert f"Warning: {warning}." in " ".join(printed.split())
+    assert f"{broken['simulated_rms_rad_per_axis'] * 1e6:.3f} refused " in row
+    assert "refused" not in row_of(printed.out, fine_pointing.BASELINE)
+    assert f"Warning: {warning}." in " ".join(printed.out.split())
+    taken = call("design", "light.toml", "--accept")
+    assert taken.code == 0
+    assert f"{broken['simulated_rms_rad_per_axis'] * 1e6:.3f} accepted " in row_of(taken.out, OBSERVER)
+    assert f"by {OBSERVER} ({ratio:.2f} times): accepted as they are." in " ".join(taken.out.split())
+
+
+def test_design_ends_well_where_each_figure_is_a_promise(light, call, monkeypatch):
+    monkeypatch.setattr(designs, "names", lambda m: (fine_pointing.BASELINE,))
+    done = call("design", "light.toml")
+    assert done.code == 0
+    assert "refused" not in done.out and "Warning" not in done.out
+
+
+def row_of(printed, name):
+    """The line of a table that begins with the first word of the name."""
+    return next(line for line in printed.splitlines() if line.split()[:1] == name.split()[:1])
 
 
 def test_what_breaks_its_promise_is_exported_only_where_that_is_accepted(light, call, refused, monkeypatch):
@@ -75,6 +97,16 @@ def test_what_breaks_its_promise_is_exported_only_where_that_is_accepted(light, 
     linear, simulated = (part.split(" rms")[0] for part in line.removeprefix("  leaves ").split(" linear theory, "))
     assert f"leaves {simulated} rms an axis on the mission's mirror" in said
     assert f"times the {linear.strip()} rms an axis of linear theory" in said
+
+
+@pytest.mark.parametrize("what", ["matrices", "fmu"])
+def test_matrices_and_units_are_held_to_it_too(light, call, refused, what):
+    said = refused("export", what, *WORDS[2:])
+    assert "light.toml: disturbance observer leaves " in said and "1.5 times is the most" in said
+    done = call("export", what, *WORDS[2:], "--accept")
+    assert done.code == 0, done.err
+    assert len(list(light.parent.iterdir())) == 2
+    assert call("export", what, "light.toml", "--overwrite").code == 0  # without a controller there is no figure
 
 
 def test_a_controller_that_keeps_its_promise_is_exported_and_says_both(light, call, monkeypatch):

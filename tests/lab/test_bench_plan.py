@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from microrad.lab import bench
-from microrad.lab.bench import PlanError, load_plan, packaged_plans
+from microrad.lab.bench import load_plan
+from microrad.lab.bench.plan import PlanError, packaged_plans
 
 PLANS = Path(bench.__file__).parent.parent / "plans"
 PAPER = PLANS / "paper-experiment.toml"
@@ -85,9 +86,8 @@ def test_the_characterisation_holds_records_out():
     assert len(creep.step_samples) == 5
 
 
-def test_a_plan_can_be_played_by_another_mirror_and_cut_down():
+def test_a_plan_can_be_cut_down():
     plan = load_plan(PAPER)
-    assert {record.truth for record in bench.with_truth(plan, "bench").records} == {"bench"}
     assert [r.excitation.name for r in bench.only(plan, ["loop-60hz", "chirp"]).records] == ["chirp", "loop-60hz"]
     with pytest.raises(ValueError, match=r"no record is named 'loop'; the plan has chirp, loop-60hz"):
         bench.only(plan, ["loop"])
@@ -145,6 +145,24 @@ def test_a_number_beyond_all_measure_is_told_or_borne(tmp_path, plan, number):
         path.write_text(f"{text[: place.start()]}{place[1]}{value}{text[place.end() :]}", encoding="utf-8")
         with contextlib.suppress(PlanError):
             load_plan(path)
+
+
+THOUSAND = ".a" * 999
+
+
+@pytest.mark.parametrize(
+    ("kind", "reason"),
+    [
+        (f'kind{THOUSAND} = "chirp"', "is a key of 2019 characters"),
+        (f"kind = {{a{THOUSAND} = 1}}", "holds a key of more than 50 parts"),
+        (f"kind = [[{{'a'{THOUSAND} = 1}}]]", "holds a key of more than 50 parts"),
+        (f'kind = "a{THOUSAND}"', "is none of the choices"),
+    ],
+    ids=["key", "table", "list", "text"],
+)
+def test_a_kind_of_a_thousand_parts_is_told(refuse, kind, reason):
+    """It was a traceback."""
+    assert reason in {fault.reason for fault in refuse(changed('^kind = "chirp"', kind)).faults}
 
 
 @pytest.mark.parametrize("table", ["limits", "bench", "bench.sensor", "excitation.chirp"])

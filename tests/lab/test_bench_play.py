@@ -13,8 +13,9 @@ import scipy.io
 from nptdms import TdmsFile
 
 from microrad.core.folder import FolderError
-from microrad.lab import bench
-from microrad.lab.bench import BenchError, load_plan, only, play, true_output, write
+from microrad.lab.bench import load_plan, only, play, write
+from microrad.lab.bench.plan import FORMATS, PlanError
+from microrad.lab.bench.play import BenchError, true_output
 
 SEED = 5
 
@@ -150,7 +151,7 @@ def test_axes_answer_their_own_drive_and_some_of_the_others(tmp_path, paper):
     clean = true_output(plan, plan.records[2])[1]
     assert np.allclose(clean[:, 0] - clean[0, 0], 0.05 * (clean[:, 1] - clean[0, 1]))
     (tmp_path / "three.toml").write_text(text.replace("axis = 2", "axis = 3"), encoding="utf-8")
-    with pytest.raises(bench.PlanError, match=r"(?s)excitation.s.axis = 3.*bench has 2 inputs"):
+    with pytest.raises(PlanError, match=r"(?s)excitation.s.axis = 3.*bench has 2 inputs"):
         load_plan(tmp_path / "three.toml")
 
 
@@ -239,12 +240,12 @@ READERS = {
 @pytest.fixture(scope="module")
 def folder(short, tmp_path_factory):
     folder = tmp_path_factory.mktemp("bench") / "records"
-    files = write(replace(short, formats=bench.FORMATS), folder, SEED)
-    assert [path.name for path in files] == [READERS[form][0] for form in bench.FORMATS]
+    files = write(replace(short, formats=FORMATS), folder, SEED)
+    assert [path.name for path in files] == [READERS[form][0] for form in FORMATS]
     return folder
 
 
-@pytest.mark.parametrize("form", bench.FORMATS)
+@pytest.mark.parametrize("form", FORMATS)
 def test_a_file_holds_what_was_played(folder, short, form):
     name, read = READERS[form]
     drive, angle = read(folder / name)

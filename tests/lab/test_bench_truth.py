@@ -6,8 +6,17 @@ import numpy as np
 import pytest
 
 from microrad.core import lti
-from microrad.lab.bench import Amplifier, BenchMirror, bench_output, bouc_wen_output, linear_output
-from microrad.lab.bench.truth import EQ2_DENOMINATOR, EQ2_NUMERATOR, EQ3, FINE_STEP_S
+from microrad.lab.bench.truth import (
+    EQ2_DENOMINATOR,
+    EQ2_NUMERATOR,
+    EQ3,
+    FINE_STEP_S,
+    Amplifier,
+    BenchMirror,
+    bench_output,
+    bouc_wen_output,
+    linear_output,
+)
 
 RATE_HZ = 50e3
 AMPLIFIER = Amplifier(5e3, 1e6 / 15)

@@ -22,9 +22,9 @@ from microrad.lab.identify import (
     mirror_file_text,
     predict,
 )
-from microrad.lab.identify import bouc_wen as bouc_wen_fit
-from microrad.lab.identify.choice import _best
-from microrad.lab.identify.records import colour_inflation, fastest_rate, prepare, transient
+from microrad.lab.identify.hysteresis.bouc_wen import _bound_gradient
+from microrad.lab.identify.ladder.choice import _best
+from microrad.lab.identify.prepared import colour_inflation, fastest_rate, prepare, transient
 from microrad.lab.recording import read_recording, recording_from_arrays
 from microrad.mission.file import load_mirror
 from places import DATA
@@ -93,12 +93,12 @@ def identification():
 
 # -------------------------------------------------------------------------------------------------- recovery, Bouc-Wen
 def test_recovers_the_paper_from_100_hz(fit_100hz):
-    assert abs(fit_100hz.d1_rad_per_v / D1 - 1) < 0.002
-    assert abs(fit_100hz.delta_s_per_v / DELTA - 1) < 0.05
-    ratio = abs(fit_100hz.epsilon_rad_per_v) / (fit_100hz.alpha_per_v - fit_100hz.beta_per_v)
+    assert abs(fit_100hz.model.d1_rad_v / D1 - 1) < 0.002
+    assert abs(fit_100hz.model.delta_s_v / DELTA - 1) < 0.05
+    ratio = abs(fit_100hz.model.epsilon_rad_v) / (fit_100hz.model.alpha_1_v - fit_100hz.model.beta_1_v)
     assert abs(ratio / SETTLED - 1) < 0.08
     assert fit_100hz.settled_hysteresis_rad[0] == pytest.approx(ratio, rel=1e-12)
-    assert fit_100hz.epsilon_rad_per_v < 0 < fit_100hz.d1_rad_per_v
+    assert fit_100hz.model.epsilon_rad_v < 0 < fit_100hz.model.d1_rad_v
     assert 0.9 < fit_100hz.residual_rms_percent < 1.0  # the noise is 1 % of the clean span, which noise widens
     np.testing.assert_array_less(abs(fit_100hz.values - PAPER) / fit_100hz.standard_errors, 3.5)
 
@@ -116,8 +116,8 @@ def test_recovers_from_an_independent_generator():
     output = 1e3 * independent_output_rad(100)
     noisy = output + 0.01 * np.ptp(output) * philox(7).standard_normal(output.size)
     fit = fit_bouc_wen([recording_from_arrays(sine(100), noisy, RATE_HZ)], starts=3)
-    assert abs(fit.d1_rad_per_v / D1 - 1) < 3.5 * fit.standard_errors[0] / D1 < 0.01
-    assert abs(fit.delta_s_per_v / DELTA - 1) < 0.05
+    assert abs(fit.model.d1_rad_v / D1 - 1) < 3.5 * fit.standard_errors[0] / D1 < 0.01
+    assert abs(fit.model.delta_s_v / DELTA - 1) < 0.05
     assert abs(fit.settled_hysteresis_rad[0] / SETTLED - 1) < 0.08
     for freq_hz in (60, 80):
         truth = 1e3 * independent_output_rad(freq_hz)
@@ -139,13 +139,13 @@ def test_known_zero_fixes_d1_better(fit_100hz):
     assert fit.offsets_rad == (0.0,)
     assert fit.standard_errors[0] < 0.2 * fit_100hz.standard_errors[0]
     assert fit.standard_errors[0] / D1 == pytest.approx(3.0e-4, rel=0.2)  # Cramer-Rao bound
-    assert abs(fit.d1_rad_per_v / D1 - 1) < 0.001
+    assert abs(fit.model.d1_rad_v / D1 - 1) < 0.001
 
 
 def test_several_records_know_more(fit_100hz, fit_trio):
     np.testing.assert_array_less(fit_trio.standard_errors, fit_100hz.standard_errors)
     np.testing.assert_array_less(abs(fit_trio.values - PAPER) / fit_trio.standard_errors, 3.5)
-    assert abs(fit_trio.d1_rad_per_v / D1 - 1) < 0.002
+    assert abs(fit_trio.model.d1_rad_v / D1 - 1) < 0.002
     assert len(fit_trio.offsets_rad) == 3
     assert fit_trio.samples_used < 15_000
 
@@ -168,7 +168,7 @@ def test_falling_output_turns_the_signs(fit_100hz):
 
 def test_bounded_hysteresis(fit_100hz, fit_trio):
     for fit in (fit_100hz, fit_trio):
-        assert fit.alpha_per_v > abs(fit.beta_per_v) > 0
+        assert fit.model.alpha_1_v > abs(fit.model.beta_1_v) > 0
 
 
 # ---------------------------------------------------------------------------------------------------- starts and seeds
@@ -258,7 +258,7 @@ def test_slope_after_reversal_against_a_slow_loop():
     exact = D1 - 2 * ALPHA * SETTLED
     assert fit.slope_after_reversal_rad_per_v == pytest.approx(exact, rel=5e-3)
     drive = np.concatenate([np.linspace(0, 12, 200_001), np.linspace(12, 11.9, 100_001)])
-    output, _ = replace(fit, delta_s_per_v=0.0).response(drive, 1.0)
+    output, _ = replace(fit, model=replace(fit.model, delta_s_v=0.0)).response(drive, 1.0)
     measured = (output[200_100] - output[200_000]) / (drive[200_100] - drive[200_000])
     assert measured == pytest.approx(exact, rel=0.02)
     assert not fit.admissible
@@ -287,7 +287,9 @@ def test_admissible_fit_never_turns_against_the_drive(freqs):
         start = transient(drive)
         lowest = []
         for fit in (free, bound):
-            model, _ = replace(fit, d2_s_per_v=0.0).response(drive, r.step_s)  # d2 is a lag, not a wrong way
+            model, _ = replace(fit, model=replace(fit.model, d2_s_v=0.0)).response(
+                drive, r.step_s
+            )  # d2 is a lag, not a wrong way
             travel = np.diff(drive[start:])
             moving = np.abs(travel) > 1e-9
             lowest.append(np.min(np.diff(model[start:])[moving] / travel[moving]))
@@ -366,7 +368,7 @@ def test_output_units(fit_100hz, unit, factor):
     original = record(100)
     scaled = replace(original, output=original.output * factor, drive=original.drive * 1e3)
     arm = 0.02 if unit in ("m", "mm", "um") else None
-    fit = fit_bouc_wen([scaled], starts=1, output_unit=unit, lever_arm_m=arm, input_unit="mV")
+    fit = fit_bouc_wen([scaled], starts=1, units=Units("mV", unit, arm))
     np.testing.assert_allclose(fit.values, fit_100hz.values, rtol=1e-3)
 
 
@@ -382,9 +384,8 @@ def test_output_units(fit_100hz, unit, factor):
     ],
 )
 def test_units_are_refused(words, message):
-    for function in (fit_bouc_wen, fit_prandtl_ishlinskii, identify):
-        with pytest.raises(IdentificationError, match=message):
-            function([record(100)], **words)
+    with pytest.raises(IdentificationError, match=message):
+        identify([record(100)], **words)
 
 
 @pytest.mark.parametrize(
@@ -642,7 +643,7 @@ def test_a_mission_accepts_the_mirror_file(identification, model, tmp_path):
     assert mirror.bias_v == identification.bias_v
     assert (mirror.bouc_wen is None) == (model == "prandtl_ishlinskii")
     if mirror.bouc_wen is not None:
-        assert mirror.bouc_wen.epsilon_rad_v == pytest.approx(identification.fit(model).epsilon_rad_per_v, rel=1e-12)
+        assert mirror.bouc_wen.epsilon_rad_v == pytest.approx(identification.fit(model).model.epsilon_rad_v, rel=1e-12)
 
 
 @pytest.mark.parametrize("model", STATIC[:2])
@@ -669,4 +670,4 @@ def test_the_gradient_of_the_bound_is_that_of_differences(epsilon):
 
     steps = np.diag(1e-6 * np.abs(values))
     slopes = [(bound(values + s) - bound(values - s)) / (2 * s.sum()) for s in steps]
-    np.testing.assert_allclose(bouc_wen_fit._bound_gradient(values), slopes, rtol=1e-7, atol=1e-12)
+    np.testing.assert_allclose(_bound_gradient(values), slopes, rtol=1e-7, atol=1e-12)

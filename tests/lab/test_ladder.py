@@ -10,6 +10,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 import truths
 from microrad.core import kernels
 from microrad.lab import bench
+from microrad.lab.bench.play import played, true_output
 from microrad.lab.identify import (
     FORMS,
     MODELS,
@@ -17,7 +18,6 @@ from microrad.lab.identify import (
     IdentificationError,
     JointFit,
     Units,
-    choice,
     fit_bouc_wen,
     fit_joint,
     fit_linear,
@@ -25,8 +25,9 @@ from microrad.lab.identify import (
     mirror_file_text,
     predict,
 )
-from microrad.lab.identify.choice import _best, _polished
-from microrad.lab.identify.plant_structures import LinearPoles, Roots, propagated
+from microrad.lab.identify.hysteresis.axis import LinearPoles, Roots, propagated
+from microrad.lab.identify.ladder import choice
+from microrad.lab.identify.ladder.choice import _best, _polished
 from microrad.mirror import model as mirror
 from microrad.mirror.hysteresis import Play
 from microrad.mission.file import load_mirror
@@ -137,7 +138,7 @@ def test_the_polish_is_kept_only_where_it_is_no_worse(loops, wide, monkeypatch):
     assert result.fit().samples_used > 0
     assert "pole 1" not in [p.name for p in result.fit().structure.parameters]
     static = fit_bouc_wen(loops, starts=1)
-    assert _polished(None, None, [static], [()], 0, None) == ([static], [()])  # nothing to be freed
+    assert _polished(None, static, (), None) == (static, ())  # nothing to be freed
 
 
 @pytest.mark.parametrize("extra", [0.0, 1e-3, 0.5])
@@ -464,7 +465,7 @@ def test_eq_3_fitted_at_100_hz_predicts_60_and_80_hz(paper):
         residual = prediction.residual_rad[prediction.start :]
         assert 0 < np.sqrt(np.mean(residual**2)) < 0.01 * np.ptp(prediction.measured_rad)
         (record,) = (r for r in plan.records if r.excitation.name == name)
-        exact = 1e-3 * bench.true_output(plan, record)[1][:, 0]
+        exact = 1e-3 * true_output(plan, record)[1][:, 0]
         beyond = (exact - prediction.model_rad)[prediction.start :]
         assert np.std(beyond) < 1e-4 * np.ptp(exact)  # what is left is the sensor's noise
 
@@ -474,12 +475,12 @@ def test_the_benchs_own_mirror_is_predicted_with_half_the_error_of_the_papers_mo
 
     The winner stays as it is found: tests/test_docs_gallery.py polishes that of a whole plan.
     """
-    monkeypatch.setattr(choice, "_polished", lambda fitter, judge, fits, predictions, *rest: (fits, predictions))
+    monkeypatch.setattr(choice, "_polished", lambda ladder, winner, predictions, *rest: (winner, predictions))
     plan = bench.load_plan("mirror-characterisation")
     names = ["small-multisine-1", "loops-40hz", "loops-100hz", "held-out-sine", "held-out-multisine"]
-    played = list(bench.played(bench.only(plan, names), seed=1))
-    known = [recording for record, recording in played if record.use == "identification"]
-    unseen = [recording for record, recording in played if record.use == "validation"]
+    pairs = list(played(bench.only(plan, names), seed=1))
+    known = [recording for record, recording in pairs if record.use == "identification"]
+    unseen = [recording for record, recording in pairs if record.use == "validation"]
     assert (len(known), len(unseen)) == (3, 2)
     models = ("bouc_wen", "prandtl_ishlinskii_joint")
     result = identify(known, models=models, validation=unseen)

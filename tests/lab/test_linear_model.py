@@ -7,16 +7,29 @@ import pytest
 from scipy.signal import lfilter
 
 from microrad.core import lti
-from microrad.lab.identify import structure
-from microrad.lab.identify.amplitude import amplitude_dependence
-from microrad.lab.identify.linear import fit_linear, fit_percent, output_error
-from microrad.lab.identify.linear_uncertainty import at, parameter_covariance, transmission_zeros
-from microrad.lab.identify.modal import ModalModel, order_modes, simulate, simulate_periodic
-from microrad.lab.identify.polish import FrequencyEquations, TimeEquations, normal_equations, pack, polish, unpack
-from microrad.lab.identify.records import IdentificationError
-from microrad.lab.identify.response import response_from_periods
-from microrad.lab.identify.structure import fit_order, reduced
-from microrad.lab.identify.vector_fitting import vector_fit
+from microrad.lab.identify.linear import order
+from microrad.lab.identify.linear.amplitude import amplitude_dependence
+from microrad.lab.identify.linear.fit import (
+    at,
+    fit_linear,
+    fit_percent,
+    output_error,
+    parameter_covariance,
+    transmission_zeros,
+)
+from microrad.lab.identify.linear.modal import ModalModel, order_modes, simulate, simulate_periodic
+from microrad.lab.identify.linear.order import fit_order, reduced
+from microrad.lab.identify.linear.polish import (
+    FrequencyEquations,
+    TimeEquations,
+    normal_equations,
+    pack,
+    polish,
+    unpack,
+)
+from microrad.lab.identify.linear.response import response_from_periods
+from microrad.lab.identify.linear.vector_fitting import vector_fit
+from microrad.lab.identify.prepared import IdentificationError
 from microrad.lab.recording import Recording, multisine_recordings
 from places import DATA
 
@@ -310,7 +323,7 @@ def test_an_order_more_is_never_worse(monkeypatch):
     poor = order_modes(
         np.array([slow, -0.06, -0.07, -0.08], dtype=complex), np.ones((4, 1)), np.ones((1, 4)), truth.direct
     )
-    monkeypatch.setattr(structure, "_start", lambda *args: poor)
+    monkeypatch.setattr(order, "_start", lambda *args: poor)
     lone, grown = (fit_order(measured, 4, exchanges=0, smaller=model) for model in (None, smaller))
     assert grown.model.order == lone.model.order == 4
     assert grown.cost <= polish_again(measured, smaller).cost < 0.1 * lone.cost

@@ -18,7 +18,7 @@ from scipy.io import savemat
 from scipy.sparse import csc_array
 
 from microrad.lab.recording import RecordingError, multisine_recordings, read_recording
-from microrad.lab.recording import lvm as lvm_module
+from microrad.lab.recording.formats.lvm import _Blanks
 
 N, RATE_HZ = 1000, 2000.0
 TIME_S = np.arange(N) / RATE_HZ
@@ -259,7 +259,7 @@ def test_segments_of_lvm_are_found_in_one_pass():
     rows = b"1\t2\r\n" * 5 + b"\r\n"
     head = b"***End_of_Header***\r\n"
     data = Searched(head + rows * 300)
-    blanks = lvm_module._Blanks(data, "\t")
+    blanks = _Blanks(data, "\t")
     starts = range(len(head), len(data), len(rows))
     assert [blanks.behind(start) for start in starts] == [start + len(rows) - 2 for start in starts]
     assert data.searched <= 4 * len(data)
@@ -376,7 +376,7 @@ def test_damaged_matlab_names_the_variable(tmp_path):
     ],
 )
 def test_matlab_variables_that_are_no_channel(tmp_path, monkeypatch, value, words):
-    monkeypatch.setattr("microrad.lab.recording.arrays._MOST_COLUMNS", 100)
+    monkeypatch.setattr("microrad.lab.recording.formats.arrays._MOST_COLUMNS", 100)
     path = tmp_path / "a.mat"
     savemat(path, {"x": value, "output": OUTPUT}, do_compression=True)
     assert words.replace("10000", "100") in refusal(path, "x", "output", RATE_HZ)

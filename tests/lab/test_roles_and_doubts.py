@@ -9,10 +9,11 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.signal import lfilter
 
 import truths
-from microrad.lab.identify import doubts, identify
-from microrad.lab.identify.doubts import ResidualTest, residual_test, residual_warnings
-from microrad.lab.identify.predictions import Prediction, Score
-from microrad.lab.identify.roles import is_broadband, roles, whole_periods
+from microrad.lab.identify import identify
+from microrad.lab.identify.ladder import doubts
+from microrad.lab.identify.ladder.doubts import ResidualTest, residual_test, residual_warnings
+from microrad.lab.identify.ladder.predictions import Prediction, Score
+from microrad.lab.identify.ladder.roles import is_broadband, roles, whole_periods
 from microrad.lab.recording import Recording, recording_from_arrays
 from truths import philox
 

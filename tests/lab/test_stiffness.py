@@ -7,11 +7,12 @@ import numpy as np
 import pytest
 
 from microrad.core import kernels
-from microrad.lab.identify import fit_hysteretic_stiffness, fit_linear, output_error, predicted_error, stiffness
-from microrad.lab.identify import stiffness_tangents as tangents
-from microrad.lab.identify.records import IdentificationError
-from microrad.lab.identify.stiffness import StiffnessOptions, simulate_hysteretic_stiffness
-from microrad.lab.identify.stiffness_model import FIELDS, Numbers, balanced, delayed, scaled
+from microrad.lab.identify import fit_hysteretic_stiffness, fit_linear, output_error, predicted_error
+from microrad.lab.identify.prepared import IdentificationError
+from microrad.lab.identify.stiffness import fit as stiffness_fit
+from microrad.lab.identify.stiffness import tangents
+from microrad.lab.identify.stiffness.fit import StiffnessOptions, simulate_hysteretic_stiffness
+from microrad.lab.identify.stiffness.model import FIELDS, Numbers, balanced, delayed, scaled
 from microrad.lab.recording import Recording, multisine_recordings
 from microrad.mirror import model as mirror
 from microrad.mirror.hysteresis import Play
@@ -250,7 +251,7 @@ def test_a_mirror_that_runs_away_is_refused(training, monkeypatch):
     def run(search, start, *_):
         search.numbers = replace(start, weights=500 * start.weights)
 
-    monkeypatch.setattr(stiffness._Search, "run", run)
+    monkeypatch.setattr(stiffness_fit._Search, "run", run)
     with pytest.raises(IdentificationError, match=r"runs away: where its plays slide it grows by \d.* 1/s.*order"):
         fit_hysteretic_stiffness(training, order=4, options=StiffnessOptions(delay_s=7e-4, exchanges=0))
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from microrad.core import lti
-from microrad.lab.identify.modal import (
+from microrad.lab.identify.linear.modal import (
     ModalModel,
     filtered,
     hold_basis,
@@ -13,8 +13,8 @@ from microrad.lab.identify.modal import (
     simulate,
     simulate_periodic,
 )
-from microrad.lab.identify.records import IdentificationError
-from microrad.lab.identify.vector_fitting import vector_fit
+from microrad.lab.identify.linear.vector_fitting import vector_fit
+from microrad.lab.identify.prepared import IdentificationError
 
 EQ2 = ((1.979e11, 7.051e13, 2.973e13), (1, 2.15e4, 3.737e8, 2.615e12, 8.489e14, 1.829e14))
 RATE_HZ = 50_000.0

@@ -1,5 +1,7 @@
 """What a key may be at the required margin: against formulas, at both ends of each interval, and in words."""
 
+import csv
+import io
 import json
 import math
 
@@ -119,8 +121,10 @@ def test_what_no_value_leaves_is_said_with_the_most(call, tmp_path):
     result = call("budget", far, "--solve", "terminals.leo_aperture")
     said = " ".join(result.out.partition("\n\n")[0].split())
     assert said.startswith(
-        "No value of terminals.leo_aperture leaves the required 3 dB of communication: the most is \u221221."
+        "No value of terminals.leo_aperture from 50 nm to 100 m leaves the required 3 dB of communication: the most is "
+        "\u221221."
     )
+    assert said.endswith("dB at 66.68 mm. No other was looked at.")
     data = json.loads(call("budget", far, "--solve", "terminals.leo_aperture", "--json").out)["solved"]
     assert (data["intervals"], data["value"], result.code) == ([], 0.05, 1)
 
@@ -132,12 +136,42 @@ def test_the_solution_stands_first_and_the_budgets_have_it(call, tmp_path):
     assert " ".join(first.split()).startswith(
         "terminals.leo_aperture leaves the required 3 dB of communication from 50 mm to 91.66 mm, most (+3.76 dB) near "
     )
-    assert first.endswith("The budgets below have 50 mm.")
+    assert " ".join(first.split()).endswith("Looked at: 50 nm to 100 m. The budgets below have 50 mm.")
     assert "communication +3.00 dB" in second
     data = json.loads(call("budget", path, "--solve", "communication.transmit_power", "--json").out)
     (low, high), *_ = data["solved"]["intervals"]
     assert high is None and low == data["solved"]["value"] == pytest.approx(5.0, rel=1e-3)
+    assert data["solved"]["searched"] == pytest.approx([5e-6, 1e6], rel=1e-9)  # the rule ends before six decades do
     assert data["budgets"][0]["margin_db"] == pytest.approx(3.0, abs=1e-9)
+
+
+def test_what_holds_as_far_as_was_looked_says_how_far(call, tmp_path):
+    """It said "at any value", and the margin ends at four times the largest that was looked at."""
+    near = written(tmp_path, data_with(NO_BEAMS | {"communication.distance": "10 m"}))
+    said = " ".join(call("budget", near, "--solve", "communication.distance").out.partition("\n\n")[0].split())
+    assert said == (
+        "communication.distance leaves the required 3 dB of communication wherever it was looked at. "
+        "Looked at: 10 \u00b5m to 10000 km. The budgets below have 10000 km."
+    )
+
+
+def test_the_table_and_the_page_say_what_was_solved_for(call, tmp_path):
+    path = written(tmp_path, data_with(NO_BEAMS))
+    words = ("budget", path, "--solve", "communication.transmit_power")
+    solved = json.loads(call(*words, "--json").out)["solved"]
+    rows = [row for row in csv.DictReader(io.StringIO(call(*words, "--csv").out)) if row["budget"] == "Solved"]
+    found = {row["line"].removeprefix("communication.transmit_power "): row for row in rows}
+    assert float(found["from"]["value"]) == float(found["in the budgets below"]["value"]) == solved["value"]
+    assert found["from"]["basis"] == "leaves the required 3 dB of communication"
+    assert found["to"]["basis"] == "leaves the required 3 dB of communication, as far as was looked"
+    assert [float(found[f"looked at {end}"]["value"]) for end in ("from", "to")] == solved["searched"]
+    assert {row["unit"] for row in rows} == {"W", "dB"}
+    page = call(*words, "--html").out
+    said = " ".join(call(*words).out.partition("\n\n")[0].split())
+    assert said.startswith("communication.transmit_power leaves the required 3 dB of communication from ")
+    assert said in page
+    assert "Solved" not in call("budget", path, "--csv").out
+    assert "Looked at" not in call("budget", path, "--html").out
 
 
 def test_a_key_that_moves_nothing_is_refused(refused, tmp_path):

@@ -1,6 +1,7 @@
 """What follows from the tables of the links: against hand arithmetic, other libraries' distributions and simulation."""
 
 import math
+import re
 from dataclasses import fields, replace
 
 import numpy as np
@@ -10,13 +11,14 @@ from scipy.stats import ncx2, norm
 
 from link_files import PATTERN, RECEIVERS, link_file, received_with
 from microrad import link
-from microrad.link import acquisition
+from microrad.core.units import parse_quantity
+from microrad.link import acquisition, requirement
 from microrad.link import partner_search as link_acquisition
 from microrad.link import study as link_study
 from microrad.link.radial_error import Jitter
 from microrad.loop import sensor
 from microrad.mission.file import LinkFile
-from microrad.report import budget_views, links
+from microrad.report import budget_views, links, requirements
 from microrad.report.quantities import quantity
 from preset_files import NAMES, completed
 from shipped import edited_file
@@ -26,6 +28,7 @@ NORMAL_99 = float(norm.ppf(0.995))
 FEW = {"acquisition.runs": 100}
 NO_SCAN = {**FEW, "acquisition.scan": None}
 UNCORRECTED = {"point_ahead.corrected": False}
+SHAKEN = {"jitter": {"bias": ["0 urad", "0 urad"], "rms": ["10 urad", "10 urad"], "bandwidth": "50 Hz"}}
 WEAK = {"answer.transmit_power": "4 mW"}  # an answer that the quad cell hardly sees
 
 
@@ -48,6 +51,78 @@ def test_the_shipped_mission_has_the_study_of_its_links(tmp_path, plain):
     assert found.finding.chances == plain.finding.chances
     assert found.finding.wide.outcome.mean_time_s == plain.finding.wide.outcome.mean_time_s
     assert "paper: Table 2" in next(line.source for line in found.communication.lines if line.name == "Transmit power")
+
+
+def test_the_beacon_is_judged_by_how_often_it_covers_its_partner(tmp_path):
+    """By a million draws: 100 µrad constant about both axes, 100 µrad rms about each, in a cone of 390 µrad."""
+    lines = {"pointing.lines.misalignment.error": "100 urad", "pointing.lines.orbit_knowledge.error": "0 urad"}
+    drawn = np.random.default_rng(1).normal(100 * URAD, 100 * URAD, (1_000_000, 2))
+    share = np.mean(np.hypot(*drawn.T) < 390 * URAD)
+    for confidence, mark in ((0.95, "PASS"), (0.99, "FAIL")):
+        found = studied(tmp_path, lines, {"pointing.confidence": confidence, "point_ahead.error": "0 urad"})
+        row = requirement.of_beams(found)[0]
+        assert (row.name, row.unit, row.mark) == ("beacon covers its partner", "%", mark)
+        assert row.actual == pytest.approx(100 * share, abs=0.1)
+        assert row.required == 100 * confidence
+        assert row.margin == row.actual - row.required
+        assert re.search(rf"covers its partner +{100 * confidence:g} % +98\.\d %", budget_views.text(found, 80))
+
+
+def test_errors_that_were_derived_from_the_cone_are_held_against_their_root_sum_square_alone(tmp_path):
+    def row(*change):
+        file = edited_file(tmp_path, ("runs = 4000 ", "runs = 100 "), *change)
+        links = LinkFile(file.mission, file.path, file.text, file.sha256, file.sources)
+        return requirement.of_beams(link_study.run(links))[0]
+
+    own, other = row(), row(('error = "248 urad"', 'error = "247 urad"'))
+    assert (own.name, own.unit, own.mark) == ("beacon cone over the root sum square", "rad", "derived")
+    assert own.derived[0].startswith("pointing.lines.misalignment.error = 248 urad")
+    assert (other.name, other.mark) == ("beacon covers its partner", "FAIL")
+    assert other.actual == pytest.approx(53.5, abs=0.5)
+
+
+RATHER = (
+    r"; to (?:move it, change|meet it, take) (\S+?)(?:, which may be| =) (\S+ \S+) (?:at|or) (least|most|more|less)"
+)
+
+
+@pytest.mark.parametrize(
+    ("changes", "key", "unit", "word"),
+    [
+        ({"pointing.confidence": 0.5}, "communication.transmit_power", "W", "least"),
+        (
+            {"pointing.confidence": 0.5, "communication.transmit_power": "3 W"},
+            "communication.transmit_power",
+            "W",
+            "more",
+        ),
+        ({"pointing.confidence": 0.5, "requirement.margin": "0 dB"}, "beacon.divergence", "rad", "least"),
+        ({"pointing.confidence": 0.6}, "beacon.divergence", "rad", "more"),
+        ({"answer.transmit_power": "50 mW", "pointing.confidence": 0.5}, "answer.transmit_power", "W", "more"),
+        ({"pointing.confidence": 0.5, **SHAKEN}, "jitter.rms", "rad", "less"),
+    ],
+)
+def test_what_to_change_just_meets_the_requirement(tmp_path, changes, key, unit, word):
+    found = studied(tmp_path, changes)
+    judged = requirement.of_links(found)
+    row = requirements.nearest(judged)
+    (said,) = [re.search(RATHER, sentence) for sentence in budget_views.short(found) if RATHER[:5] in sentence]
+    assert (said[1], said[3]) == (key, word) and row.met is (word == "least")
+    value = parse_quantity(said[2], unit)
+    side = -1 if word == "less" else 1
+    for factor, met in ((1.0, True), (1.0 - 0.01 * side, False)):
+        there = f"{value * factor} {unit}"
+        changed = {**changes, key: there}
+        if key == "jitter.rms":
+            changed = {**changes, "jitter": SHAKEN["jitter"] | {"rms": [there, there]}}
+        (again,) = [r for r in requirement.of_links(studied(tmp_path, changed)) if r.subject == row.subject]
+        assert again.met is met
+
+
+def test_far_more_power_than_there_is_is_no_advice(tmp_path):
+    found = studied(tmp_path, {"pointing.confidence": 0.5, "communication.distance": "400000 km"})
+    (said,) = [sentence for sentence in budget_views.short(found) if "; to meet it, " in sentence]
+    assert said.endswith(f"; to meet it, change {found.tornados[0].swings[0].key}.")
 
 
 def test_all_three_budgets_are_there_and_communication_is_the_first(plain):

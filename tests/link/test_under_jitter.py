@@ -366,7 +366,7 @@ def test_hysteresis_costs_the_difference_between_the_same_controller_with_it_and
         assert cost.margin_db == pytest.approx(loss_db(9 * peak) - loss_db(size * peak), rel=1e-3)
         assert cost.margin_db < 0.0
         with_it = found.case(cost.source, cost.controller, cost.mirror)
-        without = found.case(cost.source, cost.controller, performance.NO_HYSTERESIS)
+        without = found.case(cost.source, cost.controller, "no hysteresis")
         assert cost.margin_db == with_it.margin_db - without.margin_db
         assert cost.data_rate_bit_s == with_it.data_rate_bit_s - without.data_rate_bit_s
 
@@ -403,7 +403,7 @@ def residual(bias_urad, rms_urad, axes=2):
 
 def fine_study(spectrum_rad2_hz, **simulated):
     """A study of one controller, that left these residuals."""
-    names = {"given": "given", "comparison": "comparison", "none": performance.NO_HYSTERESIS}
+    names = {"given": "given", "comparison": "comparison", "none": "no hysteresis"}
     residuals = {names[name]: each for name, each in simulated.items()}
     verified = Verified(SimpleNamespace(name="PI"), None, residuals, spectrum_rad2_hz, spectrum_rad2_hz)
     return FinePointingStudy(None, (verified,), verified, None, (), FREQ_HZ, np.zeros(FREQ_HZ.size), 0.997, 0.0)
@@ -435,7 +435,7 @@ def test_fades_are_known_on_the_mirror_whose_spectrum_is_known(mission):
     same = residual((0, 0), (2, 3))
     found = performance.run(mission, (), fine_study(spectrum, given=same, comparison=same, none=same))
     known = {case.mirror: math.isfinite(case.fades_per_s) for case in found.cases}
-    assert known == {"given": True, "comparison": False, performance.NO_HYSTERESIS: False}
+    assert known == {"given": True, "comparison": False, "no hysteresis": False}
     case = found.case(performance.FINE, "PI", "given")
     speed = [math.sqrt(np.trapezoid((2 * np.pi * FREQ_HZ) ** 2 * axis, FREQ_HZ)) for axis in spectrum.T]
     radius = HALF_RAD * math.sqrt((ON_AXIS_DB - REQUIRED_DB) / DB_PER_SQUARE)

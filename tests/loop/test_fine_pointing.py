@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from microrad import mirror
 from microrad.loop import control, fine_pointing
 from microrad.loop.fine_loop import ensemble
 from microrad.loop.fine_loop.design import design_plant
@@ -15,9 +16,9 @@ from microrad.loop.fine_loop.linear import close, stationary
 from microrad.loop.fine_loop.loop import assemble
 from microrad.loop.fine_pointing import designs, parts, results, scenario
 from microrad.mirror import hysteresis
-from microrad.mirror import model as mirror
 from microrad.mirror import spread as mirror_spread
 from microrad.mission.file import load_mission
+from scenes import scene_of
 from shipped import SHIPPED, whole_study
 from shipped import edited_file as edited_shipped
 
@@ -49,7 +50,7 @@ def file():
 
 @pytest.fixture(scope="module")
 def scene(file):
-    return fine_pointing.scene(file)
+    return scene_of(file)
 
 
 @pytest.fixture(scope="module")
@@ -95,7 +96,7 @@ def test_a_telescope_and_a_mechanical_angle_scale_the_line_of_sight(tmp_path):
         ('mirror_angle = "line-of-sight"', 'mirror_angle = "mechanical"'),
         ("magnification = 1.0 ", "magnification = 4.0 "),
     )
-    scene = fine_pointing.scene(changed)
+    scene = scene_of(changed)
     assert_allclose(scene.loop.optics, 0.5 * np.eye(2), atol=1e-15)
     assert_allclose(design_plant(scene.axis).gain_rad_v, 0.5 * 0.089e-3, rtol=1e-12)
 
@@ -103,7 +104,7 @@ def test_a_telescope_and_a_mechanical_angle_scale_the_line_of_sight(tmp_path):
 def test_a_line_of_sight_angle_behind_a_telescope_is_refused(tmp_path):
     changed = edited_file(tmp_path, ("magnification = 1.0 ", "magnification = 4.0 "))
     with pytest.raises(ValueError, match=r'magnification = 4.*"line-of-sight".*"optical" or "mechanical"'):
-        fine_pointing.scene(changed)
+        scene_of(changed)
 
 
 def test_the_stroke_of_the_papers_mission_with_and_without_point_ahead(scene):
@@ -143,7 +144,7 @@ def test_theory_allows_no_20_percent_in_the_shipped_scenario(scene, tuned):
 def test_with_wheel_lines_the_tuned_loop_beats_the_best_pi_by_20_percent(tmp_path):
     """Lines of 4.5 and 1.3 µrad at 80 and 160 Hz: simulated without hysteresis, as the linear theory says."""
     changed = edited_file(tmp_path, ("\n[fine_pointing.body]", WHEELS))
-    scene, m = fine_pointing.scene(changed), changed.mission
+    scene, m = scene_of(changed), changed.mission
     plant, wanted = [design_plant(scene.axis)], control.Specification(0.5)
     baseline = designs.grid_baseline(plant, wanted)
     straight = parts.without(scene.loop, parts.HYSTERESIS)
@@ -155,7 +156,7 @@ def test_with_wheel_lines_the_tuned_loop_beats_the_best_pi_by_20_percent(tmp_pat
     }.items():
         assert found.margins.modulus >= 0.5
         controller = assemble(name, straight, found.controller)
-        run = ensemble.run(straight, controller, results.span(m), 64)
+        run = ensemble.run(straight, controller, results.span(m.fine_pointing), 64)
         theory = stationary(close(straight, controller)).radial_rms_rad
         assert_allclose(run.radial_rms_rad, theory, rtol=0.02)
         rms[name] = run.radial_rms_rad
@@ -170,11 +171,11 @@ def test_wheels_and_a_sensor_at_half_the_rate_of_the_control_are_verified_also_w
         ('rate = "5 kHz"                        # assumption: one reading', 'rate = "2.5 kHz" # one reading'),
         ("runs = 64 ", "runs = 1 "),
     )
-    scene, m = fine_pointing.scene(changed), changed.mission
+    scene = scene_of(changed)
     assert scene.loop.optical.every == 2
     tuned = designs.grid_baseline([design_plant(scene.axis)], control.Specification(0.5))
     design = designs.Design("PI", tuned, assemble("PI", scene.loop, tuned.controller))
-    (found,) = fine_pointing.verify(scene, m, [design])
+    (found,) = fine_pointing.verify(scene, [design])
     straight = found.simulated["no hysteresis"]
     assert straight.rms_interval_rad == math.inf
     assert_allclose(straight.rms_rad, found.theory.radial_rms_rad, rtol=0.1)  # one run
@@ -208,7 +209,7 @@ def test_halving_the_plant_step_moves_no_residual_by_one_percent(scene, file, tu
 
 
 def test_the_parts_of_the_error_budget_combine_where_the_loop_is_linear(scene, file, best):
-    budget = fine_pointing.error_budget(scene, file.mission, best["LQG"])
+    budget = fine_pointing.error_budget(scene, best["LQG"])
     assert [p.name for p in budget.parts][:3] == ["OLYMPUS", "body pointing", "optical sensor noise"]
     assert_allclose(budget.combined_rad, budget.together_rad, rtol=0.02)
     for part in budget.parts:
@@ -225,7 +226,7 @@ def test_the_parts_of_the_error_budget_combine_where_the_loop_is_linear(scene, f
 @pytest.mark.parametrize("name", [fine_pointing.BASELINE, "PI + inverse"])
 def test_the_budget_takes_the_whole_from_what_is_simulated_already(scene, file, tuned, monkeypatch, name):
     """To the bit the rms that the whole loop and the one without hysteresis leave when they are simulated again."""
-    (verified,) = fine_pointing.verify(scene, file.mission, [by_name(tuned[0])[name]])
+    (verified,) = fine_pointing.verify(scene, [by_name(tuned[0])[name]])
     simulate, simulated = ensemble.run, []
 
     def counted(loop, *rest, **options):
@@ -233,9 +234,9 @@ def test_the_budget_takes_the_whole_from_what_is_simulated_already(scene, file, 
         return simulate(loop, *rest, **options)
 
     monkeypatch.setattr(ensemble, "run", counted)
-    budget = fine_pointing.error_budget(scene, file.mission, verified)
+    budget = fine_pointing.error_budget(scene, verified)
     assert len(simulated) == len(budget.parts) + len(budget.differences) - 1
-    span, runs = results.span(file.mission), file.mission.fine_pointing.runs
+    span, runs = results.span(file.mission.fine_pointing), file.mission.fine_pointing.runs
     straight = parts.without(scene.loop, parts.HYSTERESIS)
     full, together = (
         simulate(loop, results.for_mirror(verified.design.controller, loop), span, runs).radial_rms_rad
@@ -256,8 +257,8 @@ def test_the_usable_travel_is_counted_as_the_travel_is(file, output, travel):
         update={"geometry": m.fine_pointing.geometry.model_copy(update={"travel_angle": travel})}
     )
     wide = m.model_copy(update={"fine_pointing": f, "mirror": m.mirror.model_copy(update={"travel_rad": 1.0})})
-    chain = replace(scenario.optics(m), angle=output)
-    found = scenario.stroke(replace(file, mission=wide), chain, True)
+    chain = replace(scenario.optics(f, m.conventions.mirror_angle), angle=output)
+    found = scenario.stroke(f, mirror.of(wide), chain, m.pointing, file.sources, True)
     model = mirror.hysteresis_model(m.mirror, m.mirror.rate_limit_v_s, m.mirror.bias_v)
     swing = min(m.mirror.drive_max_v - m.mirror.bias_v, m.mirror.bias_v - m.mirror.drive_min_v)
     moved = 2.0 * abs(hysteresis.slow_gain(model)) * swing
@@ -287,11 +288,11 @@ def test_without_hysteresis_each_play_of_an_additive_mirror_keeps_its_own_route(
     begin = text.index("[mirror.bouc_wen]")
     model = text[begin : text.index("# A set with the same slow loop", begin)]
     changed = edited_file(tmp_path, (composition, 'composition = "additive"'), (model, PLAYS))
-    scene, m = fine_pointing.scene(changed), changed.mission
+    scene, m = scene_of(changed), changed.mission
     tuned = designs.grid_baseline([design_plant(scene.axis)], control.Specification(0.5))
     controller = assemble("PI", scene.loop, tuned.controller)
-    (found,) = fine_pointing.verify(scene, m, [designs.Design("PI", tuned, controller)])
-    straight = ensemble.run(parts.without(scene.loop, parts.HYSTERESIS), controller, results.span(m), 64)
+    (found,) = fine_pointing.verify(scene, [designs.Design("PI", tuned, controller)])
+    straight = ensemble.run(parts.without(scene.loop, parts.HYSTERESIS), controller, results.span(m.fine_pointing), 64)
     assert found.simulated["no hysteresis"].rms_rad == straight.radial_rms_rad
     assert_allclose(straight.radial_rms_rad, found.theory.radial_rms_rad, rtol=0.01)
 
@@ -317,7 +318,7 @@ def test_an_unknown_part_is_refused_with_those_there_are(scene):
 
 def test_a_sine_is_tracked_better_with_the_inverse(scene, file, tuned):
     found = by_name(tuned[0])
-    runs = fine_pointing.sines(scene, file.mission, [found["PI"], found["PI + inverse"]])
+    runs = fine_pointing.sines(scene, [found["PI"], found["PI + inverse"]])
     rms = {(s.controller, s.variant, s.freq_hz): s.rms_rad for s in runs}
     assert {f for _, _, f in rms} == {1.0, 15.0, 25.0}
     for variant in ("given", "comparison"):
@@ -327,8 +328,8 @@ def test_a_sine_is_tracked_better_with_the_inverse(scene, file, tuned):
 def test_an_uncertain_mirror_is_tuned_for_its_draws(tmp_path):
     """A gain known to 10 %: the margin holds for each drawn mirror, at a price."""
     changed = edited_file(tmp_path, ("\n[mirror.comparison.bouc_wen]", UNCERTAIN))
-    scene, m = fine_pointing.scene(changed), changed.mission
-    plants = designs.plants(scene, m, seed=1)
+    scene, m = scene_of(changed), changed.mission
+    plants = designs.plants(scene, seed=1)
     assert len(plants) == 1 + designs.DRAWS
     drawn = [t.bouc_wen.d1_rad_v for t in mirror_spread.draws(m.mirror, designs.DRAWS, 1)]
     assert_allclose([p.gain_rad_v for p in plants], [0.089e-3, *drawn], rtol=1e-12)
@@ -347,13 +348,13 @@ def test_a_mission_without_the_table_has_no_scene(tmp_path):
     file = load_mission(path)
     assert file.mission.fine_pointing is None
     with pytest.raises(ValueError, match=r"no table \[fine_pointing\]"):
-        fine_pointing.scene(file)
+        scene_of(file)
 
 
 def test_a_margin_out_of_reach_is_refused_with_the_best_there_is(tmp_path):
     changed = edited_file(tmp_path, ("modulus_margin = 0.5 ", "modulus_margin = 0.999 "))
     with pytest.raises(ValueError, match=r"modulus margin"):
-        fine_pointing.design(fine_pointing.scene(changed), changed.mission)
+        fine_pointing.design(scene_of(changed))
 
 
 def test_designs_are_plain_data_for_other_tools(scene, tuned):
@@ -363,4 +364,4 @@ def test_designs_are_plain_data_for_other_tools(scene, tuned):
         again = json.loads(json.dumps(_data(d, fine_pointing.Outlook(1e-6, 2e-6))))
         assert_allclose(again["matrices"]["A"], d.controller.system.A)
         assert again["margins"]["modulus"] >= 0.5
-    assert scenario.variants(load_mission(SHIPPED).mission) == scenario.VARIANTS
+    assert tuple(scene.mirrors.own) == ("given", "comparison", "no hysteresis")

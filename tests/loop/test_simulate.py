@@ -17,6 +17,7 @@ from microrad.mirror import hysteresis
 from microrad.mirror import model as mirror
 from microrad.mirror.hysteresis import BoucWen, Play
 from microrad.mission.file import load_mission
+from scenes import cases_of
 from shipped import SHIPPED, edited
 
 PRINTED = BoucWen(0.089e-3, -2.96e-7, -0.048e-3, 4.7e-4, 38.421, 34.635, 3770.0, 6.0)
@@ -38,7 +39,7 @@ def mission():
 
 @pytest.fixture(scope="module")
 def runs(mission):
-    return tracking.tracking_runs(mission)
+    return tracking.tracking_runs(cases_of(mission))
 
 
 def papers_mirror(model):
@@ -54,8 +55,8 @@ def track(model, freq_hz, setup=IDEAL):
 
 def mission_setup(mission):
     """The given mirror of a mission, and what stands around it."""
-    model = tracking.mirror_model(mission, mission.mirror)
-    return mirror.from_mission(mission.mirror, model), simulate.setup_from_mission(mission, hysteresis.slow_gain(model))
+    cases = cases_of(mission)
+    return cases.mirrors.line_of_sight["given"].plant, cases.setup
 
 
 # ------------------------------------------------------------------------------------------------ the paper's loop
@@ -163,7 +164,7 @@ def test_the_runs_are_those_of_the_scenario(runs):
 
 
 def test_halving_the_plant_step_moves_no_error_by_one_percent(tmp_path, runs):
-    halved = tracking.tracking_runs(edited(tmp_path, ('plant_step = "10 us"', 'plant_step = "5 us"')))
+    halved = tracking.tracking_runs(cases_of(edited(tmp_path, ('plant_step = "10 us"', 'plant_step = "5 us"'))))
     moved = []
     for coarse, fine in zip(runs, halved, strict=True):
         assert coarse.trace.name == fine.trace.name
@@ -178,7 +179,7 @@ def test_halving_the_plant_step_moves_no_error_by_one_percent(tmp_path, runs):
     [(1.0, 2.43, 0.012905), (60.0, 6.92, 0.036671), (80.0, 9.86, 0.052248), (100.0, 14.05, 0.074443)],
 )
 def test_hysteresis_loops(mission, freq_hz, width_percent, peak_mrad):
-    loops = {loop.freq_hz: loop for loop in tracking.hysteresis_loops(mission)}
+    loops = {loop.freq_hz: loop for loop in tracking.hysteresis_loops(cases_of(mission))}
     loop = loops[freq_hz]
     print(f"{freq_hz:g} Hz: {100 * loop.width:.4f} %, max|h| {1e3 * np.max(np.abs(loop.hysteresis_rad)):.6f} mrad")
     assert_allclose(100 * loop.width, width_percent, rtol=2e-3)

@@ -15,8 +15,8 @@ from microrad.loop.control import analysis, classical, descent, judge, lqg, sear
 from microrad.loop.control.lqg import LQG
 from microrad.loop.control.problem import RESIDUAL, AxisController, Family, Parameter, Specification
 from microrad.loop.fine_pointing import designs
-from microrad.loop.fine_pointing.scenario import scene
 from microrad.mission.file import load_mission
+from scenes import scene_of
 from shipped import SHIPPED
 
 PERIOD = 2e-4
@@ -300,7 +300,7 @@ def test_the_notch_is_sought_beside_the_pi_and_far_from_it():
     """The best is a wide notch beside the tuned PI on the one plant, far from it on the other; LQG is the floor."""
     shipped = load_mission(SHIPPED)
     seed = shipped.mission.fine_pointing.seed
-    paper = designs.plants(scene(shipped), shipped.mission, seed)
+    paper = designs.plants(scene_of(shipped), seed)
     wanted = Specification(shipped.mission.fine_pointing.modulus_margin)
     assert 1.0715e-6 < tuning.tune(classical.PI_NOTCH, paper, wanted, seed=seed).mean_rms_rad < 1.0730e-6
     assert 1.0259e-6 < tuning.tune(classical.PI_NOTCH, [PLAIN], HALF, seed=1).mean_rms_rad < 1.0269e-6
@@ -320,7 +320,7 @@ def test_the_points_of_a_slope_lie_within_the_bounds(x, node):
 def test_an_optimum_beside_a_kink_is_the_same_from_every_start():
     """On this mirror the margin's constraint passes from one dip of |1 + L| to another beside the optimum."""
     soft = load_mission(SHIPPED, Path("docs/gallery/long-stroke.toml"))
-    mirror = designs.plants(scene(soft), soft.mission, soft.mission.fine_pointing.seed)
+    mirror = designs.plants(scene_of(soft), soft.mission.fine_pointing.seed)
     first, second = (tuning.tune(classical.RESONANT_DAMPING, mirror, HALF, seed=seed) for seed in (2, 3))
     assert first.values == second.values
     assert (first.mean_rms_rad, first.least_modulus) == (second.mean_rms_rad, second.least_modulus)

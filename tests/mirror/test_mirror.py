@@ -325,12 +325,11 @@ def test_the_linear_loop_of_a_fed_back_bank_is_its_response_without_thresholds()
 def test_the_line_of_sight_moves_by_twice_the_mechanical_angle(model):
     drive = zigzag(8, 300)
     mechanical, optical = (
-        run(mirror.assemble("axis", "static", None, mirror.line_of_sight(model, c)), drive)[0]
+        run(mirror.assemble("axis", "static", None, hysteresis.scaled(model, hysteresis.LINE_OF_SIGHT[c])), drive)[0]
         for c in ("line-of-sight", "mechanical")
     )
     assert_allclose(optical, 2 * mechanical, rtol=1e-13, atol=one_femtoradian)
-    assert mirror.line_of_sight(model, "line-of-sight") == model
-    assert hysteresis.slow_gain(mirror.line_of_sight(model, "mechanical")) == 2 * hysteresis.slow_gain(model)
+    assert hysteresis.slow_gain(hysteresis.scaled(model, 2.0)) == 2 * hysteresis.slow_gain(model)
 
 
 @pytest.mark.parametrize("model", [PRINTED, PLAYS], ids=["Bouc-Wen", "plays"])

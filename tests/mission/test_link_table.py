@@ -238,6 +238,18 @@ def test_widths_of_an_aperture_lit_evenly_are_no_divergences_of_a_gaussian_beam(
     assert gaussian_beam_gain_db(least) == pytest.approx(even.gain_db, abs=1e-9)
     assert gaussian_beam_gain_db(at_e2) - even.gain_db == pytest.approx(0.79, abs=0.01)
     assert gaussian_beam_gain_db(2 * wavelength / (math.pi * diameter)) - even.gain_db == pytest.approx(3.01, abs=0.01)
+    assert gaussian_beam_gain_db(9.4e-6 / 2) - even.gain_db == pytest.approx(4.65, abs=0.01)
+
+
+def test_a_width_that_is_a_half_angle_and_no_full_one(tmp_path):
+    """9.4 urad at 847 nm from 95 mm, as docs/link.md has it."""
+    terminal = {"terminals.geo_aperture": "95 mm", "answer.wavelength": "847 nm", "answer.divergence": "9.4 urad"}
+    found, text = the_fault(tmp_path, terminal, {"conventions.divergence": "full-1/e2"})
+    assert found == "answer.divergence"
+    assert "is below diffraction at geo_aperture = 95 mm, which leaves no less than 16.07 µrad (full angle" in text
+    assert (
+        link_file(tmp_path, terminal, {"conventions.divergence": "half-1/e2"}).mission.answer.divergence_rad == 9.4e-6
+    )
 
 
 def test_the_narrowest_gaussian_beam_has_the_gain_of_the_whole_aperture():

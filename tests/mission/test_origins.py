@@ -36,6 +36,13 @@ def test_a_comment_belongs_to_the_value_that_it_was_shipped_with(key, comment, v
     assert origins.written_for(key, comment, value) == was
 
 
+def test_a_value_with_a_key_of_hundreds_of_thousands_of_parts_is_another_one_at_once():
+    """Parsing it takes minutes."""
+    long = "{a" + ".a" * 400_000 + " = 1}"
+    assert origins.written_for("terminals.leo_aperture", TABLE_2, long) == '"5 cm"'
+    assert origins.of_paper("terminals.leo_aperture", long) == '"5 cm"'
+
+
 def test_lists_and_switches_are_compared_by_what_they_mean():
     shipped = {s.key: s for s in scan(TEXT) if s.kind == "key"}
 

@@ -94,6 +94,16 @@ def test_one_value_left_unknown_is_still_refused(tmp_path, name):
         assert [fault.key for fault in caught.value.faults] == [key]
 
 
+def test_a_crosslink_begins_with_less_than_25_lines(tmp_path):
+    """Whole, with its comments: it is the file that one changes into one's own link."""
+    text = preset_text("crosslink")
+    assert len(text.splitlines()) < 25
+    path = tmp_path / "crosslink.toml"
+    path.write_text(text, encoding="utf-8")
+    terminals = load_link(path).mission.terminals
+    assert (terminals.leo_name, terminals.geo_name) == ("A", "B")
+
+
 @pytest.mark.parametrize("name", [name for name in NAMES if name not in ("paper", "crosslink")])
 def test_conventions_and_the_required_margin_are_no_facts(name):
     choices = ("conventions.", "requirement.margin", "requirement.outage", "pointing.confidence")

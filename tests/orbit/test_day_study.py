@@ -489,8 +489,10 @@ def test_each_side_changes_just_its_own_key(links, day, monkeypatch):
         return mark
 
     monkeypatch.setattr(assumptions, "numbers", noted)
-    m, folder = links.file.mission, links.file.path.parent
-    found = assumptions.swings(m, folder, day.view, (), day.loss, links.finding.wide, lambda *said: None)
+    m = links.file.mission
+    found = assumptions.swings(
+        m, lambda other: day.view.pair, day.view, (), day.loss, links.finding.wide, lambda *said: None
+    )
     assert {s.name for s in found} == CHANGED.keys()
     before = flat(m.model_dump()) | {"operations.runs": 4}
     for s in found:

@@ -19,6 +19,7 @@ from microrad.orbit import day as day_study
 from microrad.orbit.day import flow, geometry
 from microrad.study import contact_run
 from places import ROOT
+from scenes import scene_of
 
 PAGE = (ROOT / "docs" / "day.md").read_text(encoding="utf-8")
 SAID = " ".join(re.sub(r"\n- ", " ", PAGE).split())
@@ -251,15 +252,15 @@ def test_the_papers_claim(links, day):
 def lqg():
     """The shipped mission's scene and its LQG, tuned as `microrad run` tunes it."""
     file = missionfile.load_mission(ROOT / "missions" / "paper.toml")
-    scene, f = fine_pointing.scene(file), file.mission.fine_pointing
+    scene, f = scene_of(file), file.mission.fine_pointing
     wanted = control.Specification(f.modulus_margin)
-    tuned = control.tune(control.LQG, designs.plants(scene, file.mission, f.seed), wanted, seed=f.seed)
+    tuned = control.tune(control.LQG, designs.plants(scene, f.seed), wanted, seed=f.seed)
     return file.mission, scene, fine_pointing.Design("LQG", tuned, assemble("LQG", scene.loop, tuned.controller))
 
 
 def test_what_the_simulated_loop_leaves(lqg, links, day):
     m, scene, design = lqg
-    (verified,) = fine_pointing.verify(scene, m, (design,))
+    (verified,) = fine_pointing.verify(scene, (design,))
     left = verified.simulated["given"].quantile_rad
     loss = float(link.communication_beam(links.file.mission).fall.loss_db(left))
     told(f"{left * 1e6:.2f} µrad at 99.7 %, a pointing loss of {loss:.2f} dB in place of {day.loss.loss_db:.2f} dB")

@@ -65,6 +65,18 @@ def test_the_parts_of_the_report_are_those_of_the_page():
     assert parts == [(str(number), title) for number, (_, title) in enumerate(page.PARTS, start=1)]
 
 
+def test_each_requirement_stands_in_the_table():
+    """As the shipped mission has them: with a share of the time for its "a share", and without what varies behind."""
+    measured = (ROOT / "reference" / "mission-shipped.json").read_text(encoding="utf-8")
+    names = set(re.findall(r'"requirements\.([^"]*)\.mark"', measured))
+    rows = re.search(r"(?s)\| requirement \|.*?\n\n", REPORT)[0].splitlines()[2:]
+    listed = [name for row in rows if (cell := row.split("|")[1:2]) for name in cell[0].strip().split(", ")]
+    assert len(names) == 6
+    for name in names:
+        begin = re.sub(r" [\d.]+ %.*| \(.*", "", name)
+        assert any(each.startswith(begin) for each in listed), name
+
+
 def test_the_numbers_of_the_report_are_those_of_the_code():
     told(
         REPORT, f"in words to {100 * compared.WORDS_SHARE:g} %", f"at most {interactive_style.MOST_POINTS} points there"

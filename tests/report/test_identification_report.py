@@ -205,8 +205,8 @@ def test_parameters_are_shown_in_their_units(page, full):
     rows = rows_of(part[part.index("<summary>bouc_wen") :])
     d1, alpha = (next(row for row in rows if row[0] == name) for name in ("d1", "alpha"))
     errors = fit.standard_errors
-    assert d1[1:4] == [f"{1e3 * fit.d1_rad_per_v:.5g}", f"{float(f'{1e3 * errors[0]:.2g}'):g}", "mrad/V"]
-    assert alpha[1:4] == [f"{fit.alpha_per_v:.5g}", f"{float(f'{errors[4]:.2g}'):g}", "1/V"]
+    assert d1[1:4] == [f"{1e3 * fit.model.d1_rad_v:.5g}", f"{float(f'{1e3 * errors[0]:.2g}'):g}", "mrad/V"]
+    assert alpha[1:4] == [f"{fit.model.alpha_1_v:.5g}", f"{float(f'{errors[4]:.2g}'):g}", "1/V"]
 
 
 def test_poles_order_and_gains_are_those_of_the_linear_fit(page, full):
@@ -469,7 +469,7 @@ def test_the_data_are_json_with_finite_numbers_or_null(full):
     assert held == [w == 0 for w in plays["weights_rad_v"]]
     assert any(held)
     assert bouc_wen["d1"] == {
-        "value": full.fit("bouc_wen").d1_rad_per_v,
+        "value": full.fit("bouc_wen").model.d1_rad_v,
         "standard_error": float(full.fit("bouc_wen").standard_errors[0]),
         "unit": "rad/V",
     }

@@ -17,13 +17,14 @@ from microrad import report
 from microrad.loop import control, fine_pointing
 from microrad.loop.fine_loop.loop import assemble
 from microrad.loop.fine_pointing import designs
-from microrad.mission.file import load_mission
+from microrad.mission.file import load_mission, with_contents
 from microrad.orbit import day as day_study
 from microrad.orbit.operations import OperationsError
 from microrad.report import contact_run_words, day_plots, day_words, results
 from microrad.report.page import Drawn
 from microrad.study import contact_run
 from microrad.study import story as study
+from scenes import scene_of
 from shipped import SHIPPED, edited_file, plain_study, write_like_plain
 
 FIGURES = ["day-timeline", "along-contact", "data-volume", "latency", "world-map", "assumptions"]
@@ -37,8 +38,8 @@ def file():
 @pytest.fixture(scope="module")
 def fine(file):
     """A fine-pointing study as far as a contact asks for it: the PI of the grid, made in half a second."""
-    scene = fine_pointing.scene(file)
-    tuned = designs.grid_baseline(designs.plants(scene, file.mission, 1)[:1], control.Specification(0.5))
+    scene = scene_of(file)
+    tuned = designs.grid_baseline(designs.plants(scene, 1)[:1], control.Specification(0.5))
     design = fine_pointing.Design("PI", tuned, assemble("PI", scene.loop, tuned.controller))
     return SimpleNamespace(scene=scene, best=SimpleNamespace(design=design), quantile=0.997)
 
@@ -233,14 +234,16 @@ def test_a_mission_without_orbits_has_no_day(tmp_path, monkeypatch):
     assert "What the link delivers" not in page
 
 
-def test_the_manifest_has_the_hash_of_each_file_that_the_mission_names(found, tmp_path):
+def test_the_manifest_has_the_hash_of_each_file_that_the_mission_names_as_it_was_read(found, tmp_path):
     (tmp_path / "a.tle").write_bytes(b"elements")
     m = found.file.mission
     leo = m.orbit.leo.model_copy(update={"kind": "elements", "file": "a.tle"})
     m = m.model_copy(update={"orbit": m.orbit.model_copy(update={"leo": leo})})
-    study = replace(found, file=replace(found.file, mission=m, path=tmp_path / "mission.toml"))
+    study = replace(found, file=with_contents(replace(found.file, mission=m, path=tmp_path / "mission.toml")))
+    (tmp_path / "a.tle").write_bytes(b"others")
     (tmp_path / "out").mkdir()
     made = results.manifest(study, tmp_path / "out")
     assert made["inputs_sha256"] == {"a.tle": hashlib.sha256(b"elements").hexdigest()}
+    assert made["inputs"] == {"a.tle": "elements"}
     assert "seed 1 of [operations], 20 runs" in made["randomness"]
     assert results.manifest(found, tmp_path / "out")["inputs_sha256"] == {}

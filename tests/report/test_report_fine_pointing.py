@@ -29,6 +29,7 @@ from microrad.report import fine_pointing_words as words
 from microrad.report import page as report_page
 from microrad.study import pointing_cost as performance
 from microrad.study import story as study
+from scenes import scene_of
 from shipped import plain_study, write_like_plain
 
 HEADING = "Fine pointing under vibration and noise"
@@ -60,7 +61,7 @@ def fine(file):
 
 def made_up(file):
     """A study of three controllers in the mission's own loop; what they leave is made up, each number unlike others."""
-    scene = fine_pointing.scene(file)
+    scene = scene_of(file)
     freq = np.linspace(0.0, 0.5 / scene.loop.timing.period_s, 129)
     plant, path, made = design_plant(scene.axis), ReferenceFilter(1000.0), []
     for name, gains in ((fine_pointing.BASELINE, (150.0, 400.0)), (SECOND, (120.0, 300.0)), (THIRD, (190.0, 500.0))):
@@ -435,9 +436,10 @@ def test_a_distant_bound_leaves_the_question_open_and_a_bound_above_theory_is_no
 def test_the_missions_own_stroke_counts(fine, mission):
     table = mission.fine_pointing
     elsewhere = table.reference.model_copy(update={"point_ahead_on_mirror": False})
-    m = mission.model_copy(update={"fine_pointing": table.model_copy(update={"reference": elsewhere})})
-    assert fine.scene.own_stroke(mission) is fine.scene.stroke
-    assert fine.scene.own_stroke(m) is fine.scene.stroke_without_point_ahead
+    other = table.model_copy(update={"reference": elsewhere})
+    m = mission.model_copy(update={"fine_pointing": other})
+    assert fine.scene.own_stroke is fine.scene.stroke
+    assert replace(fine.scene, table=other).own_stroke is fine.scene.stroke_without_point_ahead
     assert section.stroke(fine, m)["groups"] == [
         ("Point-ahead on the mirror", 2),
         ("Point-ahead elsewhere (this mission)", 2),

@@ -16,7 +16,7 @@ from microrad.link import study as link_study
 from microrad.mission.file import load_link
 from microrad.report import budget_views, link_figures, links, single_pages
 from microrad.report.quantities import apart, quantity
-from microrad.study.pointing_cost import FINE, NO_HYSTERESIS, Cost, LinkPerformance
+from microrad.study.pointing_cost import FINE, Cost, LinkPerformance
 from report_pages import without_scripts
 
 FEW = {"acquisition.runs": 100}
@@ -126,7 +126,7 @@ def test_costs_stand_in_the_row_of_their_case_and_the_best_controller_is_marked(
 
 def test_the_reference_without_hysteresis_has_no_row_and_the_missions_own_jitter_stands_first(plain):
     shown = case(plain, source="sine of 1 Hz", controller="PID", mirror="given")
-    cases = (shown, replace(shown, mirror=NO_HYSTERESIS))
+    cases = (shown, replace(shown, mirror="no hysteresis"))
     cost = Cost("sine of 1 Hz", "PID", "given", -1.0, -2e6)
     context = links.performance(LinkPerformance(0.003, 20e-6, cases, (cost,)), "", None)
     assert [(row["source"], row["mirror"]) for row in context["performance"]] == [("sine of 1 Hz", "given")]

@@ -9,6 +9,7 @@ import pytest
 
 from microrad.core.kernels import bouc_wen_response
 from microrad.lab.identify import STATIC, identify
+from microrad.lab.live_fit import FITS, LiveFit, Loop, looker_on, thinned
 from microrad.lab.recording import RecordingError, read_recording, recording_from_arrays
 from microrad.loop import fine_pointing
 from microrad.loop import paper_cases as tracking
@@ -18,10 +19,10 @@ from microrad.studio import control_model, control_view, live_fit, mirror_form, 
 from microrad.studio.control_model import PID, PID_INVERSE, WITH, WITHOUT
 from microrad.studio.draft import Draft
 from microrad.studio.jobs_files import Job, Progress
-from microrad.studio.live_fit import LiveFit, Loop
 from microrad.studio.mirror_form import Dropped, Form, Setting, SettingError
 from microrad.studio.mirror_use import with_mirror_file
 from microrad.studio.reading import ChannelInfo, Listing, Note, View
+from scenes import cases_of, scene_of
 from shipped import SHIPPED
 
 PAPER = np.array([0.089e-3, -2.96e-7, -0.048e-3, 0.00047, 38.421, 34.635, math.inf, 0.0])
@@ -53,13 +54,13 @@ def test_each_model_is_handed_over_as_it_is_scored_in_the_end(identified):
 
 def test_fits_are_read_as_they_were_written(identified, tmp_path):
     _, seen = identified
-    look = live_fit.looker_on(str(tmp_path / "progress"))
+    look = looker_on(str(tmp_path / "progress"))
     assert live_fit.read_fits(tmp_path) == ()
     for n, each in enumerate(seen, start=1):
         look(each)
         assert len(live_fit.read_fits(tmp_path)) == n
     fits = live_fit.read_fits(tmp_path)
-    assert fits == tuple(live_fit.live_fit(each) for each in seen)
+    assert fits == tuple(thinned(each) for each in seen)
     loop = fits[1].loops[0]
     assert loop.name == "50Hz.csv"
     assert len(loop.drive) == len(loop.model_rad) == len(loop.measured_rad) == 200  # two periods of 100 samples
@@ -71,19 +72,19 @@ def test_fits_are_read_as_they_were_written(identified, tmp_path):
 
 
 def test_a_line_that_is_being_written_is_left_out(identified, tmp_path):
-    look = live_fit.looker_on(str(tmp_path / "progress"))
+    look = looker_on(str(tmp_path / "progress"))
     look(identified[1][0])
-    with (tmp_path / live_fit.FITS).open("a") as file:
+    with (tmp_path / FITS).open("a") as file:
         file.write('{"model": "bouc_w')
     assert [each.model for each in live_fit.read_fits(tmp_path)] == ["prandtl_ishlinskii"]
 
 
 def test_nobody_looks_on_without_a_file_and_a_disk_that_refuses_does_not_end_the_fit(identified, tmp_path):
-    live_fit.looker_on(None)(identified[1][0])
-    (tmp_path / live_fit.FITS).mkdir()
-    live_fit.looker_on(str(tmp_path / "progress"))(identified[1][0])
+    looker_on(None)(identified[1][0])
+    (tmp_path / FITS).mkdir()
+    looker_on(str(tmp_path / "progress"))(identified[1][0])
     assert live_fit.read_fits(tmp_path) == ()
-    assert [each.name for each in tmp_path.iterdir()] == [live_fit.FITS]
+    assert [each.name for each in tmp_path.iterdir()] == [FITS]
 
 
 def test_the_command_writes_its_fits_beside_its_progress(call, folder, monkeypatch):
@@ -450,7 +451,7 @@ def answers(pi):
 
 def test_the_controllers_are_those_of_the_study_and_of_control(mission):
     names = control_model.names(mission)
-    assert names == (*fine_pointing.names(mission.mission), PID, PID_INVERSE)
+    assert names == (*fine_pointing.names(mission.mission.fine_pointing), PID, PID_INVERSE)
     bare = replace(mission, mission=mission.mission.model_copy(update={"fine_pointing": None}))
     assert control_model.names(bare) == (PID, PID_INVERSE)
     with pytest.raises(ValueError, match="'none' is no controller of this mission"):
@@ -458,14 +459,14 @@ def test_the_controllers_are_those_of_the_study_and_of_control(mission):
 
 
 def test_a_tuned_controller_has_the_numbers_of_the_study(mission, pi):
-    m, scene = mission.mission, fine_pointing.scene(mission)
-    tuned = fine_pointing.tune("PI", m, fine_pointing.plants(scene, m, m.fine_pointing.seed))
+    scene = scene_of(mission)
+    tuned = fine_pointing.tune("PI", scene.table, fine_pointing.plants(scene, scene.table.seed))
     assert pi.residual_rad == tuned.residual_rms_rad
     assert (pi.margins["modulus"], pi.margins["gain"]) == (tuned.margins.modulus, tuned.margins.gain_up)
-    assert pi.margins["modulus"] >= pi.asked_modulus == m.fine_pointing.modulus_margin
+    assert pi.margins["modulus"] >= pi.asked_modulus == scene.table.modulus_margin
     assert {name: value for name, (value, _) in pi.values.items()} == tuned.values
     assert {unit for _, unit in pi.values.values()} == {"Hz"}
-    closed = linear.close(scene.loop, fine_pointing.build("PI", scene, m, tuned.controller))
+    closed = linear.close(scene.loop, fine_pointing.build("PI", scene, tuned.controller))
     at = np.array([10.0, 100.0, 1000.0])
     expected = np.abs(linear.sensitivity(closed, at)[:, 0, 0])
     np.testing.assert_allclose(np.interp(at, pi.freq_hz, pi.sensitivity), expected, rtol=2e-3)
@@ -511,12 +512,12 @@ def test_only_the_variants_that_are_asked_for_are_simulated(pi):
 @pytest.mark.parametrize("name", [PID, PID_INVERSE])
 def test_the_paper_s_loop_has_the_numbers_of_the_study(mission, name):
     found = control_model.controller(mission, name)
-    margins = tracking.loop_margins(mission.mission)
+    margins = tracking.loop_margins(cases_of(mission.mission))
     assert found.margins["modulus"] == margins.modulus
     assert found.margins["crossover"] == margins.crossover_hz
     assert found.margins["bandwidth"] == pytest.approx(358, rel=0.02)
     asked = found.ask(control_view.ask_of("100 urad", "300 urad", "15 Hz", 5000.0), (WITH, WITHOUT))
-    runs = tracking.tracking_runs(mission.mission)
+    runs = tracking.tracking_runs(cases_of(mission.mission))
     kind = "PID" if name == PID else "PID + inverse"
     for variant, which in ((WITH, "given"), (WITHOUT, "no hysteresis")):
         run = next(r for r in runs if (r.mirror, r.controller, r.freq_hz) == (which, kind, 15.0))

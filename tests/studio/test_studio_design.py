@@ -13,6 +13,7 @@ import pytest
 from link_files import RECEIVERS, data_with, link_file, received_with
 from microrad import link
 from microrad.link import study as link_study
+from microrad.link import under_jitter
 from microrad.orbit import day as day_study
 from microrad.report import day_plots, figures
 from microrad.studio import attempts, day_view, dials, link_view, plots, pointing_view
@@ -56,6 +57,15 @@ def test_a_margin_that_was_solved_for_is_met_whatever_rounding_leaves():
     )
     assert (missed.met, solved.met, short.met) == (False, True, False)
     assert solved.needs == "needs 3 dB: met"
+
+
+def test_a_link_with_more_light_received_than_sent_is_missed(draft):
+    near = draft.set("communication.distance", "1 m")
+    far, close = (link_view.view(each.link()).margins for each in (draft, near))
+    assert (far[0].met, far[0].needs) == (True, "needs 3 dB: met")
+    assert close[0].margin_db > 100.0
+    assert (close[0].met, close[0].needs) == (False, "MISSED: more light arrives than was sent")
+    assert [each.met for each in close[1:]] == [each.met for each in far[1:]] == [True, True]
 
 
 def test_every_position_of_every_dial_is_a_value_that_the_mission_takes(draft):
@@ -162,6 +172,25 @@ def test_the_contour_of_a_built_receiver_has_its_margin(tmp_path, name):
             margin = link.margin_map(m, rates[place], frame.pointing_error_rad[place])[0, 0]
             assert margin == pytest.approx(level, abs=2e-3)
     assert frame.data_rate_bit_s[-1] <= link.receiver(m).highest_data_rate_bit_s
+
+
+def test_under_a_jitter_the_page_has_the_margin_of_the_outage(tmp_path):
+    """As the budget of the command line, whatever the static pointing error is."""
+    shaken = {"jitter": {"bias": ["0 urad", "0 urad"], "rms": ["4 urad", "4 urad"], "bandwidth": "50 Hz"}}
+    still, found = (link_view.view(link_file(tmp_path, *each)) for each in ((), (shaken,)))
+    m = found.file.mission
+    error = 4e-6 * math.sqrt(-2.0 * math.log(m.requirement.outage))  # Rayleigh
+    there = link.communication_budget(still.file.mission, {}, pointing_error_rad=error).margin_db
+    margin, needed = found.margins[0].margin_db, found.margins[0].required_db
+    assert margin == found.budgets[0].margin_db == pytest.approx(under_jitter.margin_db(m), abs=1e-12)
+    assert margin == pytest.approx(there, abs=1e-6)
+    assert (still.margins[0].met, found.margins[0].met) == (True, False)
+    assert still.margins[0].margin_db == pytest.approx(needed, abs=1e-3) and margin < needed - 0.5
+    assert f"{error * 1e6:.2f}" in link_view.map_words(found) and "10 \u00b5rad" in link_view.map_words(still)
+    assert link.margin_map(m, m.communication.data_rate_bit_s, error)[0, 0] == pytest.approx(margin, abs=1e-6)
+    assert found.frame.pointing_error_rad[-1] > error
+    shown = {row["line"] for row in link_view.tables(link_study.run(found.file))["Under jitter"]}
+    assert {"Mean pointing loss", "Outage", "Below required margin"} <= {name.removesuffix(" !") for name in shown}
 
 
 def test_the_frame_stands_still_until_the_working_point_leaves_it(draft, view):

@@ -9,6 +9,7 @@ import pytest
 from microrad.mission.file import MissionError, load_mission
 from microrad.mission.model import Mission
 from microrad.mission.presets import preset_text
+from microrad.mission.toml import value_of
 from microrad.studio import draft as drafts
 from microrad.studio.draft import Draft, DraftError
 from microrad.studio.draft_keys import key_of, keys_in
@@ -292,6 +293,17 @@ def test_an_unknown_key_of_the_text_can_be_put_right_or_removed(draft):
     assert mended.problems == ()
     with pytest.raises(DraftError, match=r"x\.y has no line of its own"):
         draft.without("x.y")
+
+
+def test_a_key_of_hundreds_of_thousands_of_parts_is_shown_as_it_stands(draft):
+    """Parsing goes through all parts for each part: this took minutes, each time a page asked for the values."""
+    long, allowed = "{a" + ".a" * 400_000 + " = 1}", "{a" + ".a" * 49 + " = 1}"
+    assert value_of(long) is None
+    assert list(value_of(allowed)) == ["a"]
+    broken = draft.with_text(f"{TEXT}[more]\nx = {long}\n")
+    assert broken.values["more.x"].typed == long
+    assert broken.set("more.x", "1").values["more.x"].raw == "1"
+    assert draft.set(APERTURE, long).values[APERTURE].raw == f'"{long}"'
 
 
 def test_a_text_with_a_broken_line_is_edited_elsewhere(draft):

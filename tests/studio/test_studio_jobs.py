@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pytest
 
+from microrad.core import kept
 from microrad.studio import jobs as jobs_module
 from microrad.studio import jobs_files, jobs_process
 from microrad.studio.jobs import JobError, Jobs, Order
@@ -72,6 +73,19 @@ def test_a_failed_job_says_what_the_command_line_said(studio, tmp_path, call, mo
     monkeypatch.chdir(tmp_path)
     assert f"microrad: {job.words}\n" == call("run", "none.toml").err
     assert "the mission file does not exist" in job.words
+
+
+def test_a_job_takes_what_the_command_line_has_kept_unless_the_environment_says_no(tmp_path, monkeypatch):
+    """The part is the number of the process that made it."""
+    code = "import os; from microrad.core import kept; print(kept.of_user().part(os.getpid))"
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    for keep in ("yes", "no"):
+        monkeypatch.setenv("MICRORAD_KEEP", keep)
+        assert kept.of_user().part(os.getpid) == os.getpid()
+        folder = written(tmp_path / keep, cwd=str(tmp_path))
+        jobs_process.run_job(folder, python(code))
+        made_here = jobs_files.output(folder, "stdout") == f"{os.getpid()}\n"
+        assert made_here == (keep == "yes")
 
 
 def test_a_job_that_ends_with_1_is_done(tmp_path):

@@ -23,8 +23,9 @@ import pytest
 from scipy.io import savemat
 
 from lab import test_recording_formats as formats
+from microrad.lab.live_fit import extremes
 from microrad.lab.recording import read_recording
-from microrad.studio import parse_process, reading
+from microrad.studio import reading
 from microrad.studio.names import NameRefusedError, safe_name, within
 from microrad.studio.reading import Columns, ReadingError, ReadingLimits, list_channels, view
 from microrad.studio.uploads import UploadError, UploadLimits, Uploads
@@ -768,9 +769,9 @@ def test_the_process_bounds_itself_before_it_reads(tmp_path):
 def test_extremes_keep_order_ends_and_peaks():
     wave = np.sin(np.linspace(0, 300, 10_000))
     wave[4321], wave[77] = 9.0, -9.0
-    rows = parse_process.extremes([wave, -wave], 100)
+    rows = extremes([wave, -wave], 100)
     assert {0, 77, 4321, 9999} <= set(rows.tolist())
     assert np.all(np.diff(rows) > 0)
     assert 100 <= len(rows) <= 102 + 100
-    assert parse_process.extremes([wave[:50]], 100).tolist() == list(range(50))
-    assert math.isclose(len(parse_process.extremes([wave[:101]], 100)), 101, abs_tol=1)
+    assert extremes([wave[:50]], 100).tolist() == list(range(50))
+    assert math.isclose(len(extremes([wave[:101]], 100)), 101, abs_tol=1)

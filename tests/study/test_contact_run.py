@@ -22,6 +22,7 @@ from microrad.mission.file import LinkFile, load_mission
 from microrad.study import contact_run
 from microrad.study.contact_run import Contact, MovingReference, Sampler, Settings, Sight, plan
 from microrad.study.contact_run.windows import first_run
+from scenes import scene_of
 from shipped import SHIPPED, edited_file
 
 C_M_S = 299_792_458.0
@@ -75,13 +76,13 @@ def file():
 
 @pytest.fixture(scope="module")
 def scene(file):
-    return fine_pointing.scene(file)
+    return scene_of(file)
 
 
 @pytest.fixture(scope="module")
 def design(file, scene):
     """The PI controller of the grid, for the nominal mirror alone: made in half a second."""
-    tuned = designs.grid_baseline(designs.plants(scene, file.mission, 1)[:1], control.Specification(0.5))
+    tuned = designs.grid_baseline(designs.plants(scene, 1)[:1], control.Specification(0.5))
     return fine_pointing.Design("PI", tuned, assemble("PI", scene.loop, tuned.controller))
 
 
@@ -107,7 +108,7 @@ def shaken(tmp_path_factory):
     def made(level, corner_hz):
         text = SHAKEN.format(level, corner_hz)
         folder = tmp_path_factory.mktemp("shaken")
-        return fine_pointing.scene(edited_file(folder, ('\nspectrum = "olympus"', "\n" + text), whole=True))
+        return scene_of(edited_file(folder, ('\nspectrum = "olympus"', "\n" + text), whole=True))
 
     return made
 

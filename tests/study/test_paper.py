@@ -7,12 +7,12 @@ import pytest
 from numpy.testing import assert_allclose
 
 from microrad.loop import control
-from microrad.loop import paper_cases as tracking
 from microrad.loop import sine_run as simulate
 from microrad.mirror import hysteresis
 from microrad.mirror import model as mirror
 from microrad.mission.file import load_mission
 from microrad.study import paper
+from scenes import cases_of
 from shipped import SHIPPED, edited
 
 ACCURATE = "PID + inverse stays within 10 µrad at its peaks"
@@ -27,7 +27,7 @@ def mission():
 def scanned(mission):
     """The scan of the shipped mission, and what it said of its progress."""
     said = []
-    return paper.scan(mission, lambda *message: said.append(message)), said
+    return paper.scan(cases_of(mission), lambda *message: said.append(message)), said
 
 
 def at(scan, composition, integral, proportional=1e3):
@@ -71,7 +71,7 @@ def test_points_of_the_scan_against_runs_with_the_fine_step(mission, scanned, co
     assert timing.steps_per_sample == 2
     pid = control.pid(control.Gains(proportional, integral, 0.0, 1e-4), timing.period_s)
     setup = simulate.Setup(control.drive_from_mission(mission), timing, pid)
-    model = tracking.mirror_model(mission, mission.mirror)
+    model = cases_of(mission).mirrors.line_of_sight["given"].model
     hysteretic = mirror.from_mission(mission.mirror, model, composition)
     straight = mirror.from_mission(mission.mirror, hysteresis.gain_only(model), composition)
 
@@ -102,7 +102,7 @@ def test_an_unstable_point_holds_no_claim(monkeypatch, mission):
     monkeypatch.setattr(paper, "PROPORTIONAL_V_MRAD", (1.0,))
     monkeypatch.setattr(paper, "INTEGRAL_V_MRAD_S", (16e3, 50 * 16e3))
     monkeypatch.setattr(paper, "COMPOSITIONS", ("cascade",))
-    stable, unstable = paper.scan(mission).points
+    stable, unstable = paper.scan(cases_of(mission)).points
     assert (stable.stable, unstable.stable) == (True, False)
     assert sum(stable.holds().values()) == 4
     assert not any(unstable.holds().values())
@@ -160,5 +160,5 @@ def test_the_scan_keeps_its_loop_gain_on_a_mirror_of_another_gain(monkeypatch, t
     monkeypatch.setattr(paper, "INTEGRAL_V_MRAD_S", (16e3,))
     monkeypatch.setattr(paper, "COMPOSITIONS", ("cascade",))
     doubled = edited(tmp_path, ('mirror_angle = "line-of-sight"', 'mirror_angle = "mechanical"'))
-    (usual,), (other,) = paper.scan(mission).points, paper.scan(doubled).points
+    (usual,), (other,) = paper.scan(cases_of(mission)).points, paper.scan(cases_of(doubled)).points
     assert_allclose(other.linear_rms[15.0], usual.linear_rms[15.0], rtol=1e-3)

@@ -19,11 +19,12 @@ from microrad.campaign.definition import CampaignFile
 from microrad.campaign.file import load_campaign
 from microrad.campaign.records import CampaignError
 from microrad.core import lti
-from microrad.core.folder import scratch_folder
+from microrad.core.folder import read_bytes, scratch_folder
 from microrad.core.machine import source_sha256
 from microrad.loop.control import AxisController
 from microrad.mission.file import named_files
 
+_MOST_BYTES = 1_000_000_000  # of a file: more than any of those who read it take
 LIBRARIES = ("numpy", "scipy", "numba", "llvmlite", "sgp4", "skyfield")
 """Libraries whose version may move the last digits of a row."""
 
@@ -53,7 +54,7 @@ def mission_sha256(campaign: CampaignFile) -> str:
     for name, path in sorted(_named(campaign.files).items()):
         if path != campaign.path:
             digest.update(f"{name}\0".encode())
-            digest.update(hashlib.sha256(path.read_bytes()).digest())
+            digest.update(hashlib.sha256(read_bytes(path, _MOST_BYTES)).digest())
     return digest.hexdigest()
 
 
@@ -65,8 +66,9 @@ def hashes(campaign: CampaignFile) -> dict[str, str]:
 def packed(campaign: CampaignFile, controllers: Sequence[AxisController]) -> bytes:
     """The files of a campaign and its controllers, one for each cell (none without a loop), as bytes."""
     _refuse_absolute(campaign)
-    files = {name: base64.b64encode(path.read_bytes()).decode() for name, path in _named(campaign.files).items()}
-    name = next(name for name, path in _named(campaign.files).items() if path == campaign.path)
+    named = _named(campaign.files)
+    files = {name: base64.b64encode(read_bytes(path, _MOST_BYTES)).decode() for name, path in named.items()}
+    name = next(name for name, path in named.items() if path == campaign.path)
     made = [_written(controller) for controller in controllers]
     own = {"campaign": name, "code": code_sha256(), "chunk_rows": campaign.chunk_rows}
     data = {**own, "files": files, "controllers": made}

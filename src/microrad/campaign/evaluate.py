@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from microrad import link
 from microrad.campaign.outputs import OUTPUTS
 from microrad.core import kernels
+from microrad.link.requirement import IMPOSSIBLE
 from microrad.link.under_jitter import Exposure
 from microrad.loop import fine_pointing
 from microrad.loop.fine_loop import ensemble
@@ -26,14 +27,15 @@ Floats = NDArray[np.float64]
 def outputs(file: LinkFile, runs: ensemble.Ensemble | None, keep: Collection[str]) -> dict[str, float]:
     """The kept outputs of a row, by name in the order of `OUTPUTS`; nothing is computed, or read, for any other.
 
-    ``runs`` is None in a campaign without a loop. A link that no rate closes has a data rate of 0.
+    ``runs`` is None in a campaign without a loop. A link that no rate closes has a data rate of 0. Raises `LinkError`
+    for a link by whose budget more light arrives than was sent.
     """
     m = file.mission
     known: dict[str, Callable[[], float]] = {}
     if runs is not None:
         assert isinstance(m, Mission)  # it has the loop
         known = _residual(m, runs)
-    under = cache(lambda: Exposure.stated(m) if runs is None else _simulated(m, runs))
+    under = cache(lambda: _possible(Exposure.stated(m) if runs is None else _simulated(m, runs)))
     day = cache(lambda: _day(file, under()))
     known |= _links(file, under)
     known |= {"volume": lambda: day().capacity_bit, "contact_time": lambda: day().contact_s}
@@ -66,6 +68,12 @@ def _simulated(m: LinkMission, runs: ensemble.Ensemble) -> Exposure:
     return Exposure.of(m, runs.quantile_rad(1.0 - m.requirement.outage), runs.beyond)
 
 
+def _possible(under: Exposure) -> Exposure:
+    if not under.possible:
+        raise link.LinkError(f"not known is {IMPOSSIBLE}")
+    return under
+
+
 def _links(file: LinkFile, under: Callable[[], Exposure]) -> dict[str, Callable[[], float]]:
     m = file.mission
     path = m.terminals, m.conventions, m.channel
@@ -91,7 +99,10 @@ class _Beam:
 @lru_cache(maxsize=256)
 def _beam_margin(of: _Beam) -> float:
     budget = link.beacon_budget if of.name == "beacon" else link.answer_budget
-    return budget(of.file.mission, of.file.sources).margin_db
+    found = budget(of.file.mission, of.file.sources)
+    if not found.possible:
+        raise link.LinkError(f"{of.name}: not known is {IMPOSSIBLE}")
+    return found.margin_db
 
 
 def _rate(m: LinkMission, loss_db: float) -> float:

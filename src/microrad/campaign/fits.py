@@ -42,7 +42,7 @@ def check_loop(on: Reading, table: LoopTable, bases: Sequence[Base]) -> None:
 def _has_controller(on: Reading, table: LoopTable, m: Mission) -> bool:
     from microrad.loop import fine_pointing  # here, to keep the start quick
 
-    names = fine_pointing.names(m)
+    names = fine_pointing.names(fine_pointing.table(m))
     if table.controller in names:
         return True
     expected = " or ".join(f'"{name}"' for name in names)

@@ -18,6 +18,7 @@ from microrad.campaign import blob, ledger_log
 from microrad.campaign.blob import Head
 from microrad.campaign.ledger_log import PAGE
 from microrad.campaign.records import CampaignError
+from microrad.core.folder import read_bytes
 
 FORMAT = blob.VERSION  # one number for both, so that what another microrad wrote is never mended into this format
 _APPLICATION = 0x6D726164  # "mrad": SQLite's application_id, so that another program's file is told from a ledger
@@ -121,8 +122,7 @@ def refuse_foreign(path: Path) -> None:
         return
     if is_ledger(path):
         return
-    with path.open("rb") as file:
-        first = file.read(PAGE)
+    first = read_bytes(path, PAGE)
     if _is_text(first):
         begin = f"begin it with `microrad campaign run {argument(path)}`, or " if path.suffix == ".toml" else ""
         raise CampaignError(f"{path} is text, not a ledger: {begin}name the file that `microrad campaign run` wrote")

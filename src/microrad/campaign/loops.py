@@ -3,13 +3,16 @@
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
+from microrad import mirror
 from microrad.campaign.definition import CampaignFile
 from microrad.campaign.records import CampaignError
 from microrad.campaign.tables import LoopTable
+from microrad.link.tracking_light import tracking_light_w
 from microrad.loop import fine_pointing
 from microrad.loop.control import AxisController
 from microrad.loop.fine_loop import ensemble
 from microrad.loop.fine_loop.loop import LoopController, PointingLoop
+from microrad.mirror import Variant
 from microrad.mission.file import LinkFile, MissionFile
 
 Beat = Callable[[], None]
@@ -23,7 +26,8 @@ def whole(file: LinkFile) -> MissionFile:
 
 def scene(file: LinkFile, table: LoopTable) -> fine_pointing.Scene:
     """The scene of a mission with the axes that the campaign simulates."""
-    built = fine_pointing.scene(whole(file))
+    mission = whole(file)
+    built = fine_pointing.scene(mission, mirror.of(mission.mission), tracking_light_w(mission))
     return replace(built, loop=built.axis) if table.axes == "one" else built
 
 
@@ -32,13 +36,13 @@ def tuned(file: LinkFile, table: LoopTable) -> AxisController:
 
     Raises `CampaignError` for a name that the mission has no controller of, and with the reason when none can be tuned.
     """
-    m = whole(file).mission
-    if table.controller not in fine_pointing.names(m):
-        names = ", ".join(f'"{name}"' for name in fine_pointing.names(m))
+    f = fine_pointing.table(whole(file).mission)
+    if table.controller not in fine_pointing.names(f):
+        names = ", ".join(f'"{name}"' for name in fine_pointing.names(f))
         raise CampaignError(f'loop.controller = "{table.controller}" is no controller of the mission; it has {names}')
     try:
-        of = fine_pointing.plants(scene(file, table), m, fine_pointing.table(m).seed)
-        return fine_pointing.tune(table.controller, m, of).controller
+        of = fine_pointing.plants(scene(file, table), f.seed)
+        return fine_pointing.tune(table.controller, f, of).controller
     except ValueError as error:
         raise CampaignError(f"the controller {table.controller!r} cannot be tuned: {error}") from error
 
@@ -46,13 +50,13 @@ def tuned(file: LinkFile, table: LoopTable) -> AxisController:
 def held(file: LinkFile, table: LoopTable, axis: AxisController) -> LoopController:
     """The tuned controller on the axes of a cell's own mission: what all its rows are flown with."""
     built = scene(file, table)
-    built = replace(built, loop=fine_pointing.on_variant(built.loop, whole(file).mission, table.mirror))
-    return fine_pointing.build(table.controller, built, whole(file).mission, axis)
+    built = replace(built, loop=fine_pointing.on_variant(built, Variant(table.mirror)))
+    return fine_pointing.build(table.controller, built, axis)
 
 
 def row_loop(file: LinkFile, table: LoopTable) -> PointingLoop:
     """The loop of a row's mission."""
-    return fine_pointing.on_variant(scene(file, table).loop, whole(file).mission, table.mirror)
+    return fine_pointing.on_variant(scene(file, table), Variant(table.mirror))
 
 
 def span(campaign: CampaignFile, file: LinkFile) -> ensemble.Span:

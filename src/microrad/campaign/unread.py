@@ -21,7 +21,10 @@ def unread(campaign: CampaignFile, rows: Iterable[LinkFile]) -> Iterator[str]:
     for file in rows:
         if not left:
             return
-        m, of_loop, of_outputs = file.mission, _of_loop(campaign, file), _of_outputs(campaign, file)
+        try:
+            m, of_loop, of_outputs = file.mission, _of_loop(campaign, file), _of_outputs(campaign, file)
+        except ValueError:
+            return  # a row that fails does not tell what the others read
         left = [
             key
             for key in left

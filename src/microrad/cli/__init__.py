@@ -117,7 +117,7 @@ def run(
     mission = load_mission(file, mirror)
     folder = output or Path(f"{file.stem}-study")
     report.check_folder(folder, overwrite)
-    parts = kept.NOTHING if fresh else kept.of_user(lambda: _contents(mission))
+    parts = kept.NOTHING if fresh else kept.of_user()
     with progress_bar() as progress:
         study = _study(mission, progress, parts)
 
@@ -133,20 +133,6 @@ def run(
         write()
         return Outcome(json_text({**report.summary(study), "folder": str(folder)}), code)
     return Outcome(f"{report.verdict_text(study, width(), verbose=verbose)}\n", code, afterwards=write)
-
-
-def _contents(mission: "MissionFile") -> dict[str, bytes | None]:
-    """The files that a mission names, which its parts read beside it; None for one that is not there to be read."""
-    from microrad.mission.file import named_files
-
-    return {name: _content(mission.path.parent / name) for name in named_files(mission.mission)}
-
-
-def _content(path: Path) -> bytes | None:
-    try:
-        return path.read_bytes()
-    except (OSError, ValueError):
-        return None
 
 
 def _study(mission: "MissionFile", progress: OnProgress, parts: "Kept") -> "Study":

@@ -26,7 +26,7 @@ from microrad.cli.frame import (
     progress_bar,
     width,
 )
-from microrad.core.folder import write_whole
+from microrad.core.folder import read_bytes, write_whole
 
 # Everything else is imported inside the commands: it takes longer to load than help may take.
 if TYPE_CHECKING:
@@ -77,8 +77,7 @@ def _check_output(file: Path, overwrite: bool) -> None:
     if not overwrite:
         check_target(file, "choose another name, or replace it with --overwrite")
     elif file.is_file():
-        with file.open("rb") as old:
-            first = old.read(16)
+        first = read_bytes(file, 16)
         if first and not first.startswith(_BEGINS.get(file.suffix.lower(), _PAGE)):
             raise Refusal(f"{file} was not written by microrad and is left as it is; choose another name.")
 

@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from microrad.cli.frame import (
+    Accept,
     Json,
+    OnProgress,
     Outcome,
     Overwrite,
     Refusal,
@@ -20,10 +22,11 @@ from microrad.cli.frame import (
     option,
     progress_bar,
 )
-from microrad.core.folder import write_whole
+from microrad.core.folder import read_bytes, write_whole
 
 # Everything else is imported inside the commands: it takes longer to load than help may take.
 if TYPE_CHECKING:
+    from microrad.export.choice import Choice
     from microrad.mission.file import MissionFile
 
 exports = typer.Typer(
@@ -43,8 +46,6 @@ app.add_typer(exports)
 _File = Annotated[Path, typer.Argument(help="Mission file; microrad init writes one.", metavar="FILE")]
 _Mirror = Annotated[Path | None, option("--mirror", "FILE", "Mirror file in place of the mission's mirror.")]
 _CONTROLLER = "A controller of the mission, as microrad design names them, or PID, PID + inverse"
-
-_ACCEPT = "Write a controller, too, that leaves more than 1.5 times what linear theory says on the mission's mirror."
 
 
 class _Precision(StrEnum):
@@ -110,7 +111,7 @@ def c(  # noqa: PLR0913, PLR0917  each is an option
     mirror: _Mirror = None,
     output: _Folder = None,
     overwrite: Overwrite = False,
-    accept: Annotated[bool, typer.Option("--accept", help=_ACCEPT)] = False,
+    accept: Accept = False,
     as_json: Json = False,
 ) -> Outcome:
     """Write a controller as C99 for a flight computer.
@@ -150,7 +151,7 @@ def c(  # noqa: PLR0913, PLR0917  each is an option
     )
 )
 @command
-def fmu(
+def fmu(  # noqa: PLR0913, PLR0917  each is an option
     file: _File,
     controller: Annotated[
         str | None, option("--controller", "NAME", f"{_CONTROLLER}: the closed loop with it [default: the mirror].")
@@ -163,6 +164,7 @@ def fmu(
     mirror: _Mirror = None,
     output: Annotated[Path | None, option("--output", "FILE", "File to write [default: <mission>-<name>.fmu].")] = None,
     overwrite: Overwrite = False,
+    accept: Accept = False,
 ) -> Outcome:
     """Write the mirror with its amplifier, or the closed loop, as a co-simulation unit (FMI).
 
@@ -181,7 +183,7 @@ def fmu(
     _check_file(path, overwrite, b"PK")
     with progress_bar() as progress:
         if controller is not None:
-            unit: Any = choice.loop_unit(choice.choose(mission, controller, progress))
+            unit: Any = choice.loop_unit(_promised(mission, controller, accept, progress))
         else:
             table = loop.value if loop else choice.LOOPS[0 if mission.mission.fine_pointing is not None else 1]
             unit = choice.plant_unit(mission, table)
@@ -205,6 +207,7 @@ def matrices(
     mirror: _Mirror = None,
     output: Annotated[Path | None, option("--output", "FILE", "File to write [default: <mission>.mat].")] = None,
     overwrite: Overwrite = False,
+    accept: Accept = False,
     as_json: Json = False,
 ) -> Outcome:
     """Write linear models to a MATLAB file: state space, zeros and poles, transfer functions.
@@ -213,7 +216,6 @@ def matrices(
     sampled, the controller and the loop. --json prints them instead; in Python, microrad.export.matrices.to_control
     makes objects of python-control.
     """
-    from microrad.export import choice
     from microrad.export import matrices as linear
 
     mission = _mission(file, mirror)
@@ -221,11 +223,20 @@ def matrices(
     if not as_json:
         _check_file(path, overwrite, b"MATLAB 5.0")
     with progress_bar() as progress:
-        found = linear.models(mission if controller is None else choice.choose(mission, controller, progress))
+        found = linear.models(mission if controller is None else _promised(mission, controller, accept, progress))
     if as_json:
         return Outcome(linear.json_text(found))
     linear.write_mat(found, path)
     return Outcome(f"{path} written: {', '.join(each.name for each in found)}")
+
+
+def _promised(mission: "MissionFile", name: str, accept: bool, on_progress: OnProgress) -> "Choice":
+    """A controller of the mission, refused where its linear figure is no promise."""
+    from microrad.export import choice
+
+    chosen = choice.choose(mission, name, on_progress)
+    choice.promised(chosen, accept)
+    return chosen
 
 
 @app.command(
@@ -293,5 +304,5 @@ def _check_file(path: Path, overwrite: bool, begins: bytes) -> None:
     if not overwrite or not path.exists():
         check_target(path, "choose another --output, or replace it with --overwrite")
         return
-    if path.is_dir() or not path.read_bytes()[: len(begins)].startswith(begins):
+    if path.is_dir() or read_bytes(path, len(begins)) != begins:
         raise Refusal(f"{path} was not written by microrad and is left as it is; choose another --output.")

@@ -28,6 +28,8 @@ from typing import Annotated, Any, NoReturn, ParamSpec
 
 import typer
 
+from microrad.core import compiling
+from microrad.core.folder import read_bytes
 from microrad.core.units import BLANKS, printable
 
 MET, UNMET, REFUSED, BUG, INTERRUPTED, UNREAD = 0, 1, 2, 70, 130, 141
@@ -85,7 +87,7 @@ app = typer.Typer(
         "microrad run leo-geo.toml        the whole study: a verdict and a report",
         "microrad identify --help         a mirror model from your own recordings",
     )
-    + "\n\nExit code: 0 done, 1 the study does not close, 2 bad usage or a bad file.",
+    + "\n\nExit code: 0 done, 1 a requirement is not met, 2 bad usage or a bad file.",
     context_settings={"help_option_names": ["-h", "--help"]},
     no_args_is_help=True,
     pretty_exceptions_enable=False,
@@ -101,6 +103,7 @@ def main() -> None:
         if signal.getsignal(number) is not signal.SIG_IGN:
             signal.signal(number, signal.default_int_handler)
     sys.unraisablehook = interrupt_again
+    compiling.on_first(lambda: say("compiling the loops for this processor: once, for about half a minute"))
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, TextIOWrapper):
             stream.reconfigure(errors="replace")  # a terminal without µ is no reason to fail
@@ -305,9 +308,8 @@ def check_target(path: Path, advice: str, replace_if_begins: str = "") -> None:
         return
     if not replace_if_begins:
         raise Refusal(f"{path} exists and is left as it is; {advice}.")
-    with path.open("rb") as file:
-        if file.read(len(replace_if_begins)) != replace_if_begins.encode():
-            raise Refusal(f"{path} was not written by microrad and is left as it is; {advice}.")
+    if read_bytes(path, len(replace_if_begins)) != replace_if_begins.encode():
+        raise Refusal(f"{path} was not written by microrad and is left as it is; {advice}.")
 
 
 def option(flag: str, metavar: str, text: str, **settings: Any) -> Any:
@@ -322,6 +324,8 @@ ExitOn = Annotated[
     Judged,
     option("--exit-on", "WHAT", "What exit code 0 stands for: requirements, all are met; closes, the links do."),
 ]
+_ACCEPT = "Take a controller, too, that leaves more than 1.5 times its linear residual when it is simulated."
+Accept = Annotated[bool, typer.Option("--accept", help=_ACCEPT)]
 Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace what an earlier run wrote.")]
 
 

@@ -131,8 +131,8 @@ def identify(  # noqa: PLR0913  every argument is a named option
     """
     from microrad import report
     from microrad.lab import identify as identification
+    from microrad.lab.live_fit import looker_on
     from microrad.lab.recording import stated_units
-    from microrad.studio.live_fit import looker_on
 
     target = mirror_file or Path(f"{files[0].stem}-mirror.toml")
     page = report_file or target.with_suffix(".html")

@@ -78,13 +78,12 @@ def budget(  # noqa: PLR0913, PLR0917  each is an option
     if as_json:
         return Outcome(json_text(budget_views.data(study, solution)), code)
     if as_csv:
-        return Outcome(budget_views.csv_text(study), code)
+        return Outcome(budget_views.csv_text(study, solution), code)
     if as_html:
         from microrad.report import single_pages  # drawing takes longer to load than a table needs
 
-        return Outcome(single_pages.budget(study), code)
-    said = "" if solution is None else budget_views.solution_text(solution, width()) + "\n\n"
-    return Outcome(said + budget_views.text(study, width(), verbose=verbose), code)
+        return Outcome(single_pages.budget(study, solution), code)
+    return Outcome(budget_views.text(study, width(), verbose=verbose, solution=solution), code)
 
 
 def _changed(file: "LinkFile", data_rate: str | None, pointing_error: str | None) -> "LinkFile":

@@ -5,7 +5,21 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from microrad.cli.frame import Json, Outcome, Refusal, app, command, examples, json_text, option, progress_bar, width
+from microrad.cli.frame import (
+    MET,
+    UNMET,
+    Accept,
+    Json,
+    Outcome,
+    Refusal,
+    app,
+    command,
+    examples,
+    json_text,
+    option,
+    progress_bar,
+    width,
+)
 
 # Everything else is imported inside the commands: it takes longer to load than help may take.
 if TYPE_CHECKING:
@@ -23,13 +37,15 @@ if TYPE_CHECKING:
 def design(
     file: Annotated[Path, typer.Argument(help="Mission file with a table [fine_pointing].", metavar="FILE")],
     mirror: Annotated[Path | None, option("--mirror", "FILE", "Mirror file in place of the mission's mirror.")] = None,
+    accept: Accept = False,
     as_json: Json = False,
 ) -> Outcome:
     """Design controllers for a mission's fine-pointing loop.
 
     Each is tuned for the mission's mirror, disturbances, noise and delay under its modulus margin, for one axis, in
     theory (linear), and shown with what it leaves there and, in a few runs, on the mirror with its hysteresis; microrad
-    run simulates all of it. --json also prints their matrices.
+    run simulates all of it. --json also prints their matrices. The exit code is 1 when one of them is refused: its
+    simulated figure is more than 1.5 times its linear one.
     """
     from microrad.mirror.summary import unknown_dynamics
     from microrad.mission.file import load_mission
@@ -37,38 +53,46 @@ def design(
     mission = load_mission(file, mirror)
     with progress_bar() as progress:
         try:
+            from microrad import mirror as mirror_room
+            from microrad.link.tracking_light import tracking_light_w
             from microrad.loop import fine_pointing
 
-            scene = fine_pointing.scene(mission)
-            designs = fine_pointing.design(scene, mission.mission, progress)
-            left = fine_pointing.outlook(scene, mission.mission, designs, progress)
+            scene = fine_pointing.scene(mission, mirror_room.of(mission.mission), tracking_light_w(mission))
+            designs = fine_pointing.design(scene, progress)
+            left = fine_pointing.outlook(scene, designs, progress)
         except ValueError as error:  # a loop that cannot be built, a margin out of reach
             raise Refusal(f"{mission.path}: {error}") from error
-    warnings = list(filter(None, [unknown_dynamics(mission.mission.mirror), _broken(designs, left)]))
+    marks = [each.mark(accept) for each in left]
+    warnings = list(filter(None, [unknown_dynamics(mission.mission.mirror), _broken(designs, left, accept)]))
+    code = UNMET if "refused" in marks else MET
     if as_json:
-        found = {"mission_sha256": mission.sha256, "controllers": list(map(_data, designs, left)), "warnings": warnings}
-        return Outcome(json_text(found))
-    return Outcome(_text(scene, designs, left, warnings))
+        controllers = list(map(_data, designs, left, marks))
+        found = {"mission_sha256": mission.sha256, "controllers": controllers, "warnings": warnings}
+        return Outcome(json_text(found), code)
+    return Outcome(_text(scene, designs, left, marks, warnings), code)
 
 
-def _broken(designs: "tuple[Design, ...]", left: "tuple[Outlook, ...]") -> str:
+def _broken(designs: "tuple[Design, ...]", left: "tuple[Outlook, ...]", accept: bool) -> str:
     """The designs whose linear figure the mirror does not keep, in a sentence."""
     from microrad.loop.fine_pointing import PROMISE
 
-    named = [
-        f"{d.name} ({x.simulated_rad / x.linear_rad:.1f} times)"
-        for d, x in zip(designs, left, strict=True)
-        if not x.holds
-    ]
+    named = [f"{d.name} ({x.times:.2f} times)" for d, x in zip(designs, left, strict=True) if not x.holds]
     if not named:
         return ""
+    advice = (
+        "accepted as they are"
+        if accept
+        else "refused, here and by microrad export; choose by the simulated figure, or take these with --accept"
+    )
     return (
         f"more than {PROMISE:g} times as much as linear theory says is left, simulated on the mission's mirror, by "
-        f"{', '.join(named)}: choose by the simulated figure, microrad export c writes these with --accept alone"
+        f"{', '.join(named)}: {advice}"
     )
 
 
-def _text(scene: "Scene", designs: "tuple[Design, ...]", left: "tuple[Outlook, ...]", warnings: list[str]) -> str:
+def _text(
+    scene: "Scene", designs: "tuple[Design, ...]", left: "tuple[Outlook, ...]", marks: list[str], warnings: list[str]
+) -> str:
     from microrad.core.units import format_quantity
     from microrad.report.tables import Table, tables_text
 
@@ -78,8 +102,9 @@ def _text(scene: "Scene", designs: "tuple[Design, ...]", left: "tuple[Outlook, .
         "hysteresis; margins of the linear sampled loop with its delay."
     )
     rows, tuned = [], []
-    for d, x in zip(designs, left, strict=True):
-        margins, rms = _data(d, x)["margins"], (f"{each * 1e6:.3f}" for each in (x.linear_rad, x.simulated_rad))
+    for d, x, mark in zip(designs, left, marks, strict=True):
+        margins = _data(d, x, mark)["margins"]
+        rms = f"{x.linear_rad * 1e6:.3f}", f"{x.simulated_rad * 1e6:.3f} {mark}".strip()
         gain = "none" if margins["gain_up_db"] is None else f"{margins['gain_up_db']:.1f} dB"
         bandwidth = format_quantity(margins["bandwidth_hz"], "Hz", 3)
         rows.append((d.name, *rms, f"{margins['modulus']:.3f}", f"{margins['phase_deg']:.0f}°", gain, bandwidth))
@@ -90,7 +115,7 @@ def _text(scene: "Scene", designs: "tuple[Design, ...]", left: "tuple[Outlook, .
     return "\n\n".join(text.strip("\n") for text in said)
 
 
-def _data(d: "Design", left: "Outlook") -> dict[str, Any]:
+def _data(d: "Design", left: "Outlook", mark: str) -> dict[str, Any]:
     import math
 
     m, system = d.tuned.margins, d.controller.system
@@ -101,6 +126,7 @@ def _data(d: "Design", left: "Outlook") -> dict[str, Any]:
         "bound_by": list(d.tuned.bound_by),
         "residual_rms_rad_per_axis": left.linear_rad,
         "simulated_rms_rad_per_axis": left.simulated_rad,
+        "mark": mark,
         "margins": {
             "modulus": m.modulus,
             "gain_up_db": 20.0 * math.log10(m.gain_up) if math.isfinite(m.gain_up) else None,

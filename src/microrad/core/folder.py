@@ -7,15 +7,19 @@ import json
 import os
 import platform
 import re
+import secrets
 import shutil
 import stat
 import tempfile
-import threading
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
 MANIFEST = "manifest.json"
+_MOST_MANIFEST = 64_000_000
+
+DRAFT = ".draft"
+"""End of the name of a file that is not whole yet."""
 
 
 class FolderError(ValueError):
@@ -23,7 +27,10 @@ class FolderError(ValueError):
 
 
 def read_bytes(path: Path, most: int) -> bytes:
-    """At most so many bytes of a file. Raises OSError, also where they are not there yet, as of a log of the kernel."""
+    """At most so many bytes of a file. Raises OSError, also where they are not there yet, as of a log of the kernel.
+
+    Whatever a user names is read by this: /proc/kmsg is a regular file to all who ask, and waits for ever.
+    """
 
     def at_once(name: str, flags: int) -> int:
         return os.open(name, flags | getattr(os, "O_NONBLOCK", 0))
@@ -32,7 +39,7 @@ def read_bytes(path: Path, most: int) -> bytes:
         parts: list[bytes] = []
         while most > 0 and (part := file.read(most)) != b"":
             if part is None:
-                raise BlockingIOError(0, "it is no file on disk: its content is not there yet")
+                raise BlockingIOError(0, "it is no file on disk: its content is not there yet", str(path))
             parts.append(part)
             most -= len(part)
     return b"".join(parts)
@@ -58,7 +65,7 @@ def check_folder(folder: Path, overwrite: bool, kind: str = "mission", what: str
 def _ours(manifest: Path, kind: str) -> bool:
     """Whether this is a manifest that microrad wrote for this kind of folder."""
     try:
-        data = json.loads(manifest.read_text(encoding="utf-8"))
+        data = json.loads(read_bytes(manifest, _MOST_MANIFEST))
         return "microrad" in data["versions"] and kind in data
     except (OSError, ValueError, KeyError, TypeError):
         return False
@@ -139,15 +146,16 @@ def _replace(draft: Path, folder: Path) -> None:
 def write_whole(path: Path, content: str | bytes, *, durable: bool = True) -> None:
     """Write a file whole or not at all: beside its place first. Text is written in UTF-8, its line ends as they are.
 
+    The draft beside it has a name that no other process ever takes, as a killed one may have left its own there.
     What is not ``durable`` may be cut by a failure of the machine: a file that its readers check.
     """
-    part = path.with_name(f".microrad-{os.getpid()}-{threading.get_ident()}.part")
+    draft = path.with_name(f".microrad-{secrets.token_hex(8)}{DRAFT}")
     try:
-        with part.open("xb") as file:
+        with draft.open("xb") as file:
             file.write(content.encode("utf-8") if isinstance(content, str) else content)
             if durable:
                 file.flush()
                 os.fsync(file.fileno())
-        part.replace(path)
+        draft.replace(path)
     finally:
-        part.unlink(missing_ok=True)
+        draft.unlink(missing_ok=True)

@@ -5,6 +5,7 @@ A part is a function of frozen records. What it returned is taken again where ev
 or was written by other code, is made again without a word. The folder may be deleted at any time.
 """
 
+import contextlib
 import hashlib
 import os
 import pickle
@@ -15,9 +16,9 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
-from microrad.core.folder import write_whole
+from microrad.core.folder import DRAFT, write_whole
 from microrad.core.machine import machine, source_sha256, versions
-from microrad.core.reads import Reads, digest, watched_call
+from microrad.core.reads import Reads, UnknownValueError, digest, watched_call
 
 _Result = TypeVar("_Result")
 
@@ -29,6 +30,12 @@ MOST_OF_A_PART = 40
 
 OFF = "MICRORAD_KEEP"
 """Variable of the environment that turns it off where it is "no"."""
+
+LONGEST_DRAFT_S = 3600.0
+"""Age from which a file that is not whole is one that a killed run has left."""
+
+LONGEST_EMPTY_S = 60.0
+"""Age from which the folder of a part that holds nothing is deleted."""
 
 _MARK = b"microrad part 1\n"
 _DIGEST = 32
@@ -46,18 +53,12 @@ def folder_of_user() -> Path | None:
 class Kept:
     """The kept parts of one run. ``trouble`` says, in one sentence, why nothing can be kept; it is empty otherwise."""
 
-    def __init__(
-        self, folder: Path | None, beside: Callable[[], Any] = lambda: None, most_bytes: int = MOST_BYTES
-    ) -> None:
-        """Keep parts in a folder, or none without one; ``beside`` returns what all of them read beside their arguments.
-
-        That is the content of files. It is asked again when a part was made: none is kept of files that have changed.
-        """
+    def __init__(self, folder: Path | None, most_bytes: int = MOST_BYTES) -> None:
+        """Keep parts in a folder, or none without one."""
         self.trouble = ""
-        self._folder, self._most_bytes, self._beside = folder, most_bytes, beside
+        self._folder, self._most_bytes = folder, most_bytes
         if folder is not None:
-            self._read_beside = digest(beside())
-            self._stamp = digest((source_sha256(), machine(), versions(), self._read_beside)).hex()
+            self._stamp = digest((source_sha256(), machine(), versions())).hex()
             self._try(lambda: _prepare(folder))
 
     def part(self, function: Callable[..., _Result], *args: Any, **beside: Any) -> _Result:
@@ -65,10 +66,11 @@ class Kept:
 
         The function reads its arguments alone, and returns what can be pickled.
         """
-        if self._folder is None:
+        folder = self._folder
+        if folder is None:
             return function(*args, **beside)
         name = f"{function.__module__}.{function.__qualname__}".removeprefix("microrad.")
-        place = self._folder / f"{name}-{self._stamp}"
+        place = folder / f"{name}-{self._stamp}"
         for path in _latest_first(place):
             found = _read(path, args)
             if found is not None:
@@ -76,8 +78,8 @@ class Kept:
         result, reads = watched_call(function, *args, **beside)
         whole = pickle.dumps(result, protocol=5)
         text = pickle.dumps(reads.digests, protocol=5)
-        if reads.known and digest(self._beside()) == self._read_beside:
-            self._try(lambda: self._write(place, text, whole))
+        if reads.known:
+            self._try(lambda: _write(place, text, whole, self._most_bytes))
         return cast("_Result", pickle.loads(whole))  # as a later run will have it, and nothing in it is watched
 
     def _try(self, do: Callable[[], None]) -> None:
@@ -89,40 +91,83 @@ class Kept:
             self.trouble = f"{self._folder}: {reason}: nothing is kept for a quicker next run"
             self._folder = None
 
-    def _write(self, place: Path, reads: bytes, result: bytes) -> None:
-        place.mkdir(mode=0o700, exist_ok=True)
-        body = len(reads).to_bytes(8, "little") + reads + result
-        path = place / f"{hashlib.sha256(reads).hexdigest()[:32]}.part"
-        write_whole(path, _MARK + hashlib.sha256(body).digest() + body, durable=False)
-        _touch(path)
-        for old in _latest_first(place)[MOST_OF_A_PART:]:
-            old.unlink(missing_ok=True)
-        assert self._folder is not None
-        _make_room(self._folder, self._most_bytes)
-
 
 NOTHING = Kept(None)
 """Keeps nothing: each part is computed."""
 
 
-def of_user(beside: Callable[[], Any] = lambda: None) -> Kept:
+def of_user() -> Kept:
     """The parts of this user; nothing is kept where the environment says so."""
-    return NOTHING if os.environ.get(OFF) == "no" else Kept(folder_of_user(), beside)
+    return NOTHING if os.environ.get(OFF) == "no" else Kept(folder_of_user())
 
 
 def _prepare(folder: Path) -> None:
     """Make the folder. Raises OSError where it cannot be written, or where somebody else could have written into it."""
-    folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+    for place in (*reversed(folder.parents), folder):
+        place.mkdir(mode=0o700, exist_ok=True)
     if sys.platform != "win32":
-        found = folder.stat()
-        if found.st_uid != os.getuid() or found.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
-            raise PermissionError(0, "others may write into this folder", str(folder))
+        _refuse_others(folder)
     if not os.access(folder, os.W_OK | os.X_OK):
         raise PermissionError(0, "the folder cannot be written", str(folder))
 
 
+def _refuse_others(folder: Path) -> None:
+    """Raise PermissionError where another user may change what is in the folder, or put another one in its place.
+
+    Above it a folder that all may write into will do where nobody can take away what is another's, as among the
+    temporary files; and any will do below a folder of the user's that nobody else may enter.
+    """
+    found = folder.stat()
+    if found.st_uid != os.getuid() or found.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
+        raise PermissionError(0, "others may write into this folder")
+    ways = [folder.absolute()]
+    for way in ways:
+        reason = ""
+        for place in (way, *way.parents):
+            found = place.lstat()
+            mine = found.st_uid == os.getuid()
+            if not mine and found.st_uid != 0:
+                reason = f"{place} is another user's"
+            elif stat.S_ISLNK(found.st_mode):
+                reason = ""
+                ways.append(place.parent / place.readlink() / way.relative_to(place))
+            elif mine and not found.st_mode & (stat.S_IXGRP | stat.S_IXOTH):
+                reason = ""
+            elif found.st_mode & (stat.S_IWGRP | stat.S_IWOTH) and not found.st_mode & stat.S_ISVTX:
+                reason = f"others may write into {place}"
+        if reason:
+            raise PermissionError(0, reason)
+
+
+def _write(place: Path, reads: bytes, result: bytes, most_bytes: int) -> None:
+    """Write a part; it is not kept where another run, or the user, deletes its folder meanwhile."""
+    body = len(reads).to_bytes(8, "little") + reads + result
+    path = place / f"{hashlib.sha256(reads).hexdigest()[:32]}.part"
+    with contextlib.suppress(FileNotFoundError):
+        place.mkdir(mode=0o700, exist_ok=True)
+        write_whole(path, _MARK + hashlib.sha256(body).digest() + body, durable=False)
+        _touch(path)
+    for old in _latest_first(place)[MOST_OF_A_PART:]:
+        _delete(old)
+    _make_room(place.parent, most_bytes)
+
+
+def _in(folder: Path) -> list[Path]:
+    """What stands in a folder; nothing where it is none, or is no longer there."""
+    try:
+        return list(folder.iterdir())
+    except OSError:
+        return []
+
+
+def _delete(path: Path) -> None:
+    """Delete a file; it stays where that is not possible."""
+    with contextlib.suppress(OSError):
+        path.unlink()
+
+
 def _latest_first(place: Path) -> list[Path]:
-    return sorted(place.glob("*.part"), key=_used, reverse=True)
+    return sorted((path for path in _in(place) if path.suffix == ".part"), key=_used, reverse=True)
 
 
 def _touch(path: Path) -> None:
@@ -138,6 +183,13 @@ def _used(path: Path) -> int:
         return 0
 
 
+def _size(path: Path) -> int:
+    try:
+        return path.stat().st_size
+    except OSError:
+        return 0
+
+
 def _read(path: Path, args: Sequence[Any]) -> tuple[Any] | None:
     """The result in a file, in a tuple; None where it is damaged or belongs to other arguments."""
     try:
@@ -145,7 +197,7 @@ def _read(path: Path, args: Sequence[Any]) -> tuple[Any] | None:
         start = len(_MARK) + _DIGEST
         body = content[start:]
         if content[:start] != _MARK + hashlib.sha256(body).digest():
-            path.unlink(missing_ok=True)
+            _delete(path)
             return None
         reads, end = Reads(), 8 + int.from_bytes(body[:8], "little")
         reads.digests = pickle.loads(body[8:end])  # written by this user, and whole
@@ -153,21 +205,22 @@ def _read(path: Path, args: Sequence[Any]) -> tuple[Any] | None:
             return None
         _touch(path)
         return (pickle.loads(body[end:]),)
-    except OSError:
+    except (OSError, UnknownValueError):  # deleted meanwhile, or one of the values now has no digest
         return None
 
 
 def _make_room(folder: Path, most_bytes: int) -> None:
-    """Delete what was not used for longest until the folder is within its size."""
-    found = sorted(((_used(path), path) for path in folder.glob("*/*.part")), reverse=True)
+    """Delete what was not used for longest until the folder is within its size, and what killed runs have left."""
+    places = [place for place in _in(folder) if not place.is_symlink()]
     size = 0
-    for _, path in found:
-        try:
-            size += path.stat().st_size
-        except OSError:
-            continue
-        if size > most_bytes:
-            path.unlink(missing_ok=True)
-    for place in folder.iterdir():
-        if not any(place.iterdir()) and time.time() - place.stat().st_mtime > 60.0:
-            place.rmdir()
+    for path in sorted((path for place in places for path in _in(place)), key=_used, reverse=True):
+        if path.suffix == DRAFT and time.time() - _used(path) / 1e9 > LONGEST_DRAFT_S:
+            _delete(path)
+        elif path.suffix == ".part":
+            size += _size(path)
+            if size > most_bytes:
+                _delete(path)
+    for place in places:
+        with contextlib.suppress(OSError):  # it is another's file, or another run has deleted it or writes into it
+            if time.time() - place.stat().st_mtime > LONGEST_EMPTY_S:
+                place.rmdir()

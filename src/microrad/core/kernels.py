@@ -14,11 +14,13 @@ from typing import Any, NamedTuple
 
 import numba
 import numpy as np
-from numba.core import config, types
+from numba.core import config, event, types
 from numba.core.caching import IndexDataCacheFile
 from numba.core.codegen import get_host_cpu_features
 from numba.extending import intrinsic
 from numpy.typing import NDArray
+
+from microrad.core import compiling
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -42,6 +44,19 @@ _numba: Any = config
 _features: str = get_host_cpu_features()  # type: ignore[no-untyped-call]
 if _numba.CPU_NAME is None and _numba.CPU_FEATURES is None and "+avx512vbmi2" in _features:
     _numba.CPU_FEATURES = f"{_features},-prefer-256-bit"
+
+
+class _Compiling(event.Listener):
+    """Says that a loop is compiled; what is loaded from the cache is none."""
+
+    def on_start(self, event: Any) -> None:
+        compiling.begins()
+
+    def on_end(self, event: Any) -> None:
+        pass
+
+
+event.register("numba:compile", _Compiling())  # type: ignore[no-untyped-call]
 
 
 class _CacheFile(IndexDataCacheFile):

@@ -33,14 +33,17 @@ LIBRARIES = (
     "numpy",
     "scipy",
     "numba",
+    "llvmlite",
     "xarray",
     "h5netcdf",
+    "h5py",
     "matplotlib",
+    "contourpy",
     "pydantic",
     "sgp4",
     "skyfield",
 )
-"""Libraries that the numbers depend on."""
+"""Libraries that the numbers depend on, and the bytes that they are written in."""
 
 
 def machine() -> dict[str, str]:

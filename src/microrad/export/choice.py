@@ -7,7 +7,9 @@ from itertools import pairwise
 
 import numpy as np
 
+from microrad import mirror
 from microrad.core import kernels, lti
+from microrad.core.units import format_quantity
 from microrad.export.modes import minimal
 from microrad.export.records import (
     GAUGE,
@@ -24,13 +26,12 @@ from microrad.export.records import (
     Signal,
     Vectors,
 )
-from microrad.loop import control, fine_pointing
-from microrad.loop import paper_cases as tracking
+from microrad.link.tracking_light import tracking_light_w
+from microrad.loop import control, fine_pointing, paper_cases
 from microrad.loop import sine_run as simulate
 from microrad.loop.fine_loop.loop import LoopController
 from microrad.loop.fine_loop.replay import replay
-from microrad.mirror import hysteresis
-from microrad.mirror import model as mirror
+from microrad.mirror import Variant
 from microrad.mission.file import MissionFile
 
 Progress = Callable[[int, int, str], None]
@@ -71,7 +72,7 @@ Choice = PointingChoice | TrackingChoice
 
 def names(file: MissionFile) -> tuple[str, ...]:
     """The controllers that a mission has."""
-    pointing = fine_pointing.names(file.mission) if file.mission.fine_pointing is not None else ()
+    pointing = fine_pointing.names(f) if (f := file.mission.fine_pointing) is not None else ()
     return (*pointing, PID, PID_WITH_INVERSE)
 
 
@@ -94,12 +95,15 @@ def choose(
 
 
 def _pointing(file: MissionFile, name: str, on_progress: Progress) -> PointingChoice:
-    m = file.mission
     on_progress(0, 2, f"tuning {name}")
-    scene = fine_pointing.scene(file)
-    tuned = fine_pointing.tune(name, m, fine_pointing.plants(scene, m, fine_pointing.table(m).seed))
+    scene = _scene(file)
+    tuned = fine_pointing.tune(name, scene.table, fine_pointing.plants(scene, scene.table.seed))
     on_progress(1, 2, f"{name} tuned")
-    return PointingChoice(file, scene, tuned, fine_pointing.build(name, scene, m, tuned.controller))
+    return PointingChoice(file, scene, tuned, fine_pointing.build(name, scene, tuned.controller))
+
+
+def _scene(file: MissionFile) -> fine_pointing.Scene:
+    return fine_pointing.scene(file, mirror.of(file.mission), tracking_light_w(file))
 
 
 def outlook(choice: Choice) -> fine_pointing.Outlook | None:
@@ -107,17 +111,38 @@ def outlook(choice: Choice) -> fine_pointing.Outlook | None:
     if isinstance(choice, TrackingChoice):
         return None
     design = fine_pointing.Design(choice.controller.name, choice.tuned, choice.controller)
-    (found,) = fine_pointing.outlook(choice.scene, choice.file.mission, [design])
+    (found,) = fine_pointing.outlook(choice.scene, [design])
     return found
 
 
+def promised(choice: Choice, accept: bool = False) -> fine_pointing.Outlook | None:
+    """What a controller leaves; raises ExportError, but for ``accept``, where its linear figure is no promise."""
+    left = outlook(choice)
+    if isinstance(choice, PointingChoice) and left is not None and not (left.holds or accept):
+        raise ExportError(_broken(choice, left))
+    return left
+
+
+def _broken(choice: PointingChoice, left: fine_pointing.Outlook) -> str:
+    found, said = rms_text(left.simulated_rad), rms_text(left.linear_rad)
+    return (
+        f"{choice.file.path}: {choice.controller.name} leaves {found} on the mission's mirror, simulated with its "
+        f"hysteresis: {left.times:.2f} times the {said} of linear theory, where {fine_pointing.PROMISE:g} times is the "
+        "most. Choose another controller by the simulated figures of microrad design, or write this one all the same "
+        "with --accept."
+    )
+
+
+def rms_text(rad: float) -> str:
+    """An rms of one axis in words."""
+    return f"{format_quantity(rad, 'rad', 4)} rms an axis"
+
+
 def _tracking(file: MissionFile, name: str) -> TrackingChoice:
-    m = file.mission
-    model = tracking.mirror_model(m, m.mirror)
-    setup = simulate.setup_from_mission(m, hysteresis.secant_gain(model, m.scenario.amplitude_rad))
-    plant = mirror.from_mission(m.mirror, model, times=hysteresis.LINE_OF_SIGHT[m.conventions.mirror_angle])
+    cases = paper_cases.of(file.mission, mirror.of(file.mission))
+    plant = cases.mirrors.line_of_sight[Variant.GIVEN].plant
     inverse = control.inverse(plant) if name == PID_WITH_INVERSE else control.no_feedforward(plant)
-    return TrackingChoice(file, name, plant, setup, inverse)
+    return TrackingChoice(file, name, plant, cases.setup, inverse)
 
 
 # ------------------------------------------------------------------------------------------------------ the controller
@@ -248,7 +273,7 @@ def plant_unit(file: MissionFile, loop: str) -> PlantUnit:
         raise ExportError(f"{file.path} has no loop {loop!r}: one of {', '.join(LOOPS)} that is a table of the mission")
     try:
         if loop == LOOPS[0]:
-            made = fine_pointing.scene(file).loop
+            made = _scene(file).loop
             return _plant_unit(file, made.mirror, made.optics, made.drive, made.timing)
         chosen = _tracking(file, PID)
         return _plant_unit(file, chosen.mirror, np.eye(chosen.mirror.axes), chosen.setup.drive, chosen.setup.timing)
@@ -316,7 +341,7 @@ def vectors(choice: Choice, samples: int, *, freq_hz: float | None = None) -> Ve
 
 
 def _pointing_vectors(choice: PointingChoice, samples: int) -> Vectors:
-    found = replay(choice.scene.loop, choice.controller, samples, fine_pointing.table(choice.file.mission).seed)
+    found = replay(choice.scene.loop, choice.controller, samples, choice.scene.table.seed)
     return Vectors(
         found.inputs,
         found.commands,

@@ -16,9 +16,11 @@ from typing import Any, Literal
 
 import numpy as np
 
+from microrad.core.folder import read_bytes
 from microrad.core.lti import frequency_response
 from microrad.export.linear_roots import Roots, checked, response, roots_of_control, roots_of_fields
 from microrad.export.linear_select import select
+from microrad.export.matrices_mat import MOST_BYTES
 from microrad.export.records import ExportError
 from microrad.mirror import model as mirror
 from microrad.mission.tables.mirror import Mirror
@@ -59,7 +61,7 @@ def import_mat(path: Path, given: Given, variable: str | None = None) -> str:
     chosen, found = select(path, variable)
     place = f"{path}, {chosen}" if chosen else str(path)
     said = f"{path.name}, {chosen}" if chosen else path.name
-    digest = hashlib.sha256(path.read_bytes()).hexdigest()
+    digest = hashlib.sha256(read_bytes(path, MOST_BYTES)).hexdigest()
     model = _factored(lambda: roots_of_fields(found, place), place)
     return _text(model, given, place, (said, f"#   sha256 {digest}"))
 

@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import Any
 
+from microrad.core.folder import read_bytes
 from microrad.core.matlab_file import MatlabFile, MatlabFileError, Structure, Unread
 from microrad.export.records import ExportError
 
@@ -22,8 +23,7 @@ def load(path: Path) -> dict[str, Any]:
         size = path.stat().st_size
         if size > MOST_BYTES:
             raise ExportError(f"{path} has {size} bytes; a linear model has at most {MOST_BYTES}: is it a recording?")
-        with path.open("rb") as file:
-            head = file.read(10)
+        head = read_bytes(path, 10)
         if head == b"MATLAB 7.3" or head[:8] == b"\x89HDF\r\n\x1a\n":
             raise ExportError(f"{path} is of version 7.3; save it as version 7: {_SAVE}")
         return MatlabFile(path, MOST_BYTES, whole=True).variables

@@ -11,16 +11,16 @@ from typing import Any, Literal
 from microrad.core.folder import MANIFEST, check_folder, whole_folder
 from microrad.core.units import format_quantity
 from microrad.export.build import BenchResult, compile_and_run, compiler
-from microrad.export.choice import Choice, PointingChoice, flight_controller, outlook, vectors
+from microrad.export.choice import Choice, flight_controller, promised, rms_text, vectors
 from microrad.export.fixed import FixedForm, fixed_code, quantised
 from microrad.export.fixed import report_text as quantisation_text
 from microrad.export.flight import flight_code, vectors_text, within_limits
 from microrad.export.identifiers import identifier, suggested
 from microrad.export.operations import FixedOperations, Operations, fixed_operations, operations
-from microrad.export.records import ExportError, FlightController, Progress, Vectors
+from microrad.export.records import FlightController, Progress, Vectors
 from microrad.export.rounding import RoundingBound, rounding_bound
 from microrad.export.sections import Sections, sections
-from microrad.loop.fine_pointing import PROMISE, Outlook
+from microrad.loop.fine_pointing import Outlook
 
 Precision = Literal["double", "single", "fixed"]
 PRECISIONS: tuple[Precision, ...] = ("double", "single", "fixed")
@@ -69,14 +69,11 @@ def export_flight(
     """Write a controller as C99 with its test bench, ``samples`` recorded vectors, a report and a manifest.
 
     It is compiled and its bench run over the vectors where there is a C compiler, before the folder appears. Raises
-    ExportError for what cannot be exported, for code that strays from the kernel and, but for ``accept``, for a
-    controller that leaves `PROMISE` times its linear residual on the mission's mirror; `FolderError` for a folder that
-    must not be replaced.
+    ExportError for what cannot be exported, for code that strays from the kernel and for what `choice.promised`
+    refuses; `FolderError` for a folder that must not be replaced.
     """
     check_output(folder, overwrite)
-    left = outlook(choice)
-    if isinstance(choice, PointingChoice) and left is not None and not (left.holds or accept):
-        raise ExportError(_broken(choice, left))
+    left = promised(choice, accept)
     controller = flight_controller(choice)
     name = identifier(name if name is not None else suggested(controller.name))
     form = sections(controller)
@@ -140,20 +137,6 @@ def _manifest(of: FlightExport, choice: Choice, folder: Path) -> dict[str, Any]:
 
 
 # ----------------------------------------------------------------------------------------------------------- in words
-def _broken(choice: PointingChoice, left: Outlook) -> str:
-    found, said, times = _rms(left.simulated_rad), _rms(left.linear_rad), left.simulated_rad / left.linear_rad
-    return (
-        f"{choice.file.path}: {choice.controller.name} leaves {found} on the mission's mirror, simulated with its "
-        f"hysteresis: {times:.1f} times the {said} of linear theory, where {PROMISE:g} times is the most. "
-        "Choose another controller by the simulated figures of microrad design, or write this one all the same with "
-        "--accept."
-    )
-
-
-def _rms(rad: float) -> str:
-    return f"{format_quantity(rad, 'rad', 4)} rms an axis"
-
-
 def report_text(of: FlightExport) -> str:
     """What was exported, what a step costs and how exact it is, in lines."""
     c = of.controller
@@ -194,7 +177,7 @@ def _limits(c: FlightController) -> str:
 def _residual(of: FlightExport) -> list[tuple[str, str]]:
     if of.left is None:
         return []
-    return [("leaves", f"{_rms(of.left.linear_rad)} in linear theory, {_rms(of.left.simulated_rad)} simulated")]
+    return [("leaves", f"{rms_text(of.left.linear_rad)} in linear theory, {rms_text(of.left.simulated_rad)} simulated")]
 
 
 def _exactness(of: FlightExport) -> list[tuple[str, str]]:

@@ -84,6 +84,10 @@ class LinkBudget:
         """Whether there is a margin of at least 0 dB, by a budget that may be relied on."""
         return self.margin_db >= -_ROUNDING_DB and self.possible
 
+    def loss_db(self, *names: str) -> float:
+        """The loss of these lines together, positive; 0 for those that the budget has not."""
+        return 0.0 - math.fsum(line.value for line in self.lines if line.name in names)
+
     @property
     def at_zero(self) -> tuple[str, ...]:
         """Names of the losses that are stated as 0 dB, or not given at all."""

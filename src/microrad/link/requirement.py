@@ -23,7 +23,7 @@ IMPOSSIBLE = "how strong the link is in its near field: this budget has more lig
 
 @dataclass(frozen=True, slots=True)
 class Requirement:
-    """One line of the verdict, in one unit; ``margin`` is positive when it is met.
+    """One line of the verdict, in one unit, "%" for a share; ``margin`` is positive when it is met.
 
     ``unknown`` says, where it is not empty, what would have to be known before the number may be relied on: such a
     requirement is not met, whatever its margin. ``derived`` are inputs of it that were chosen so that something is met,
@@ -95,11 +95,20 @@ def _bare(value: str) -> str:
 
 
 def _cone(study: LinkStudy) -> Requirement:
+    """How often the beacon has its partner inside its cone: the exact share, both axes and biases counted.
+
+    Errors that were derived from the cone by their root sum square, as in the paper, are held against that alone: it
+    is one axis, and meeting it proves nothing.
+    """
     assert study.open_loop is not None  # it has a beacon
+    assert study.open_loop.reading is not None
     p, derived = study.open_loop, derived_from(study.file.sources, "pointing.", "beacon.divergence")
-    half, name = p.beacon_half_angle_rad, "beacon cone over the root sum square"
     largest = max(zip(p.variance_shares, p.lines, strict=True), key=lambda pair: pair[0])[1].name
-    return Requirement("cone", name, "rad", p.rss_rad, half, half - p.rss_rad, largest, derived=derived)
+    if derived:
+        half, name = p.beacon_half_angle_rad, "beacon cone over the root sum square"
+        return Requirement("cone", name, "rad", p.rss_rad, half, half - p.rss_rad, largest, derived=derived)
+    wanted, covered = 100.0 * p.confidence, 100.0 * study.open_loop.reading.coverage
+    return Requirement("cone", "beacon covers its partner", "%", wanted, covered, covered - wanted, largest)
 
 
 def _of_budget(

@@ -34,10 +34,12 @@ class Interval:
 class Solved:
     """The intervals of an input that leave a margin, and the value with the largest one, with that margin.
 
-    Values of an input of two axes are those of the larger one.
+    ``searched`` are the least and the most value that was looked at: `DECADES` from its own, or as far as its rule
+    allows. Values of an input of two axes are those of the larger one.
     """
 
     intervals: tuple[Interval, ...]
+    searched: tuple[float, float]
     best: float
     best_db: float
 
@@ -89,7 +91,15 @@ def solve(
             intervals.append(Interval(at(begin), at(end), low_open, high_open))
             begin = None
     best = max(range(len(margins)), key=margins.__getitem__)
-    return Solved(tuple(intervals), at(float(best - count)), margins[best])
+    searched = at(_farthest(-count, allowed)), at(_farthest(count, allowed))
+    return Solved(tuple(intervals), searched, at(float(best - count)), margins[best])
+
+
+def _farthest(last: int, allowed: Callable[[float], bool]) -> float:
+    """The step farthest from 0 that is allowed, between 0 and the last one."""
+    outward = 1 if last > 0 else -1
+    step = next((each for each in range(0, last, outward) if not allowed(float(each + outward))), last)
+    return float(step) if step == last else _edge(float(step), float(step + outward), allowed)
 
 
 def _edge(inside: float, outside: float, enough: Callable[[float], bool]) -> float:

@@ -54,7 +54,7 @@ class BeamRadius:
 class LinkStudy:
     """Everything that follows from the tables of the links alone. The links that a mission lacks are None.
 
-    The communication budget is made at the error of `link_performance.error_rad`: under a jitter its margin is the one
+    The communication budget is made at the error of `under_jitter.error_rad`: under a jitter its margin is the one
     that is kept but for the outage, and the margin at the static pointing error stands below it. ``receiver_noise`` are
     the noise terms of the communication receiver at the received power, where it is given by what it is made of.
     ``tornados`` has one of each budget, in the same order. ``beam_radius`` is None unless the mission has one.
@@ -200,7 +200,7 @@ def run(file: LinkFile, parts: kept.Kept = kept.NOTHING) -> LinkStudy:
 
 
 def communication_budget(m: LinkMission, sources: Mapping[str, Source]) -> link.LinkBudget:
-    """The budget of the communication link at `link_performance.error_rad`, with the static margin under a jitter.
+    """The budget of the communication link at `under_jitter.error_rad`, with the static margin under a jitter.
 
     Raises `ValueError` for a data rate that the receiver does not take.
     """
@@ -249,7 +249,7 @@ def beam_radius(m: LinkMission) -> BeamRadius | None:
 
 
 def largest_rate(m: LinkMission) -> float:
-    """Data rate with the required margin at `link_performance.required_error_rad`, or nan when there is none."""
+    """Data rate with the required margin at `under_jitter.required_error_rad`, or nan when there is none."""
     try:
         return link.largest_data_rate(m, m.requirement.margin_db, required_error_rad(m))
     except link.LinkError:

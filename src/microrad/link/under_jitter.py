@@ -25,11 +25,12 @@ class Exposure:
 
     ``on_axis_db`` is its margin without any. ``ahead_rad`` is an uncorrected point-ahead, which is added to the length
     of every error. ``quantile_rad`` is the error that is exceeded for the mission's outage, and ``beyond`` gives the
-    share of the time with a larger error than one in rad.
+    share of the time with a larger error than one in rad. ``lost_db`` is sent over received power without any error.
     """
 
     fall: link.OffAxis
     on_axis_db: float
+    lost_db: float
     ahead_rad: float
     quantile_rad: float
     beyond: Callable[[float], float]
@@ -40,8 +41,11 @@ class Exposure:
 
         Raises `ValueError` for a data rate that the receiver does not take.
         """
-        on_axis_db = link.received_on_axis_dbm(m) - float(link.required_dbm(m, m.communication.data_rate_bit_s))
-        return cls(link.communication_beam(m).fall, on_axis_db, link.point_ahead_rad(m), quantile_rad, beyond)
+        received_dbm = link.received_on_axis_dbm(m)
+        on_axis_db = received_dbm - float(link.required_dbm(m, m.communication.data_rate_bit_s))
+        lost_db = link.dbm(m.communication.transmit_power_w) - received_dbm
+        fall, ahead_rad = link.communication_beam(m).fall, link.point_ahead_rad(m)
+        return cls(fall, on_axis_db, lost_db, ahead_rad, quantile_rad, beyond)
 
     @classmethod
     def stated(cls, m: LinkMission) -> "Exposure":
@@ -61,6 +65,11 @@ class Exposure:
     def margin_db(self) -> float:
         """Margin that is kept but for the outage."""
         return self.on_axis_db - self.outage_loss_db
+
+    @property
+    def possible(self) -> bool:
+        """Whether no more light arrives than was sent, but for the outage: see `LinkBudget.possible`."""
+        return self.lost_db + self.outage_loss_db >= 0.0
 
     def short_of(self, margin_db: float) -> float:
         """Share of the time with less than a margin."""
@@ -135,7 +144,8 @@ class Performance:
     What the pointing error costs a coded link in power lies between two of these: ``mean_loss_db`` where its
     interleaver spans many fades, ``outage_loss_db`` where it spans none. ``uncoded_penalty_db`` is what it costs
     without a code; nan for a receiver of which only the measured sensitivity is known, infinite where no power makes
-    up for it.
+    up for it. ``error_rad`` is the radial error that is exceeded for the outage; ``possible`` says that no more light
+    arrives than was sent there.
 
     An uncorrected point-ahead is added to the length of every error, as if it had the direction of each. The fades and
     the penalty have it as a bias, of one direction: see `with_point_ahead`. What a correction leaves is in none.
@@ -145,9 +155,11 @@ class Performance:
     controller: str
     mirror: str
     jitter: pointing.Jitter
+    error_rad: float
     mean_loss_db: float
     outage_loss_db: float
     margin_db: float
+    possible: bool
     outage: float
     short: float
     data_rate_bit_s: float
@@ -220,9 +232,11 @@ def performance(
         controller=controller,
         mirror=mirror,
         jitter=jitter,
+        error_rad=under.quantile_rad,
         mean_loss_db=_mean_loss_db(spread, fall.loss_db(spread.radius_rad + ahead)),
         outage_loss_db=under.outage_loss_db,
         margin_db=under.margin_db,
+        possible=under.possible,
         outage=under.short_of(0.0),
         short=under.short_of(q.margin_db),
         data_rate_bit_s=_rate(m, under.outage_loss_db),

@@ -1,32 +1,47 @@
-"""The paper's tracking cases on the mission's mirror (Fig. 5, 6 and 8), and the residual that the link lives with."""
+"""The paper's tracking cases on the mission's mirror (Fig. 5, 6 and 8), and the residual that they leave."""
 
 import math
+from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
 
 from microrad.loop import control
-from microrad.loop import sine_run as simulate
-from microrad.mirror import hysteresis
-from microrad.mirror import model as mirror
-from microrad.mission.model import Mission
-from microrad.mission.tables.mirror import Comparison
-from microrad.mission.tables.mirror import Mirror as MirrorTable
+from microrad.loop.sine_run import HysteresisLoop, Setup, Trace, hysteresis_loop, margins, track_sine
+from microrad.mirror import MirrorParts, Variant
+from microrad.mirror.hysteresis import secant_gain
+from microrad.mission.model import Control, Mission, Scenario
 
-VARIANTS = ("given", "no hysteresis", "comparison")
-"""The mission's mirror, the same with a gain in place of its hysteresis, and its comparison model."""
 
-Model = hysteresis.BoucWen | hysteresis.Play
+@dataclass(frozen=True, slots=True)
+class PaperCases:
+    """The loop of `[control]` around the mission's mirror and the sines that it tracks; one axis, line of sight.
+
+    The controller's gains are scaled for the mirror's gain at the amplitude of the sines.
+    """
+
+    mirrors: MirrorParts
+    setup: Setup
+    control: Control
+    scenario: Scenario
+
+
+def of(m: Mission, mirrors: MirrorParts) -> PaperCases:
+    """Assemble the loop of `[control]` around the mission's mirror, which is `mirror.of` the mission."""
+    gain = secant_gain(mirrors.line_of_sight[Variant.GIVEN].model, m.scenario.amplitude_rad)
+    timing = control.timing_from_mission(m.control)
+    pid = control.pid(control.gains_from_mission(m.control, gain), timing.period_s)
+    return PaperCases(mirrors, Setup(control.drive_from_mission(m), timing, pid), m.control, m.scenario)
 
 
 @dataclass(frozen=True, slots=True)
 class Run:
     """One tracked sine: which mirror, which controller, and what came out, at the line of sight."""
 
-    mirror: str  # "given", "comparison" or "no hysteresis"
+    mirror: Variant
     controller: str  # "PID" or "PID + inverse"
     freq_hz: float
-    trace: simulate.Trace
+    trace: Trace
 
     @property
     def at_limits(self) -> str:
@@ -48,68 +63,46 @@ class Run:
         return float(np.max(np.abs(np.diff(self.trace.drive_v, axis=0))) / period)
 
 
-def mirror_model(m: Mission, table: MirrorTable | Comparison) -> Model:
-    """The hysteresis of the mission's mirror, or of its comparison, with its output at the line of sight."""
-    model = mirror.hysteresis_model(table, m.mirror.rate_limit_v_s, m.mirror.bias_v)
-    return mirror.line_of_sight(model, m.conventions.mirror_angle)
-
-
-def _times(m: Mission) -> float:
-    """What turns the angle of the mirror table into the line of sight's."""
-    return hysteresis.LINE_OF_SIGHT[m.conventions.mirror_angle]
-
-
-def hysteresis_loops(m: Mission) -> tuple[simulate.HysteresisLoop, ...]:
+def hysteresis_loops(cases: PaperCases) -> tuple[HysteresisLoop, ...]:
     """Fig. 5: settled loops of the static model at the mission's frequencies, in the mirror's own angle."""
-    model = mirror.hysteresis_model(m.mirror, m.mirror.rate_limit_v_s, m.mirror.bias_v)
-    s = m.scenario
+    model, s = cases.mirrors.own[Variant.GIVEN].model, cases.scenario
     return tuple(
-        simulate.hysteresis_loop(model, f, s.loop_amplitude_v, 1.0 / m.control.rate_hz) for f in s.loop_frequencies_hz
+        hysteresis_loop(model, f, s.loop_amplitude_v, 1.0 / cases.control.rate_hz) for f in s.loop_frequencies_hz
     )
 
 
-def loop_margins(m: Mission) -> control.Margins:
-    """Margins of the mission's loop as it is sampled; raises ValueError when it is unstable."""
-    model = mirror_model(m, m.mirror)
-    setup = simulate.setup_from_mission(m, hysteresis.secant_gain(model, m.scenario.amplitude_rad))
-    return simulate.margins(mirror.from_mission(m.mirror, model, times=_times(m)), setup)
+def loop_margins(cases: PaperCases) -> control.Margins:
+    """Margins of the loop as it is sampled; raises ValueError when it is unstable."""
+    return margins(cases.mirrors.line_of_sight[Variant.GIVEN].plant, cases.setup)
 
 
-def tracking_runs(m: Mission, variants: tuple[str, ...] = VARIANTS) -> tuple[Run, ...]:
+def tracking_runs(cases: PaperCases, variants: Collection[Variant] = tuple(Variant)) -> tuple[Run, ...]:
     """Fig. 6 and 8: the sines of the scenario under PID and PID + inverse, on variants of the mirror that it has.
 
     Raises ValueError when the mirror has no inverse.
     """
-    model = mirror_model(m, m.mirror)
-    amplitude = m.scenario.amplitude_rad
-    setup = simulate.setup_from_mission(m, hysteresis.secant_gain(model, amplitude))
-    models = {"given": model, "no hysteresis": hysteresis.gain_only(model, amplitude)}
-    if m.mirror.comparison is not None:
-        models["comparison"] = mirror_model(m, m.mirror.comparison)
-    runs = []
-    for which, variant in ((name, models[name]) for name in models if name in variants):
-        plant = mirror.from_mission(m.mirror, variant, times=_times(m))
+    s, runs = cases.scenario, []
+    both = sorted({*s.pid_frequencies_hz, *s.inverse_frequencies_hz})
+    tracked = [("PID", f) for f in both] + [("PID + inverse", f) for f in s.inverse_frequencies_hz]
+    for variant in (Variant.GIVEN, Variant.STRAIGHT, Variant.COMPARISON):
+        if variant not in variants or variant not in cases.mirrors.line_of_sight:
+            continue
+        plant = cases.mirrors.line_of_sight[variant].plant
         controllers = {"PID": control.no_feedforward(plant), "PID + inverse": control.inverse(plant)}
-        for controller, f in _cases(m):
-            trace = simulate.track_sine(
-                f"{which}, {controller}, {f:g} Hz", plant, setup, controllers[controller], m.scenario.amplitude_rad, f
-            )
-            runs.append(Run(which, controller, f, trace))
+        for controller, f in tracked:
+            name = f"{variant}, {controller}, {f:g} Hz"
+            trace = track_sine(name, plant, cases.setup, controllers[controller], s.amplitude_rad, f)
+            runs.append(Run(variant, controller, f, trace))
     return tuple(runs)
 
 
-def _cases(m: Mission) -> list[tuple[str, float]]:
-    both = sorted({*m.scenario.pid_frequencies_hz, *m.scenario.inverse_frequencies_hz})
-    return [("PID", f) for f in both] + [("PID + inverse", f) for f in m.scenario.inverse_frequencies_hz]
+def worst(runs: tuple[Run, ...], statistic: str, variant: Variant = Variant.GIVEN) -> Run:
+    """The run of PID + inverse on one variant of the mirror that leaves the largest error, by "peak" or "rms"."""
+    candidates = [r for r in runs if (r.mirror, r.controller) == (variant, "PID + inverse")]
+    return max(candidates, key=lambda r: r.trace.left_rad(statistic))
 
 
-def worst(m: Mission, runs: tuple[Run, ...], which: str = "given") -> Run:
-    """The run of PID + inverse on one variant of the mirror that leaves the largest residual."""
-    candidates = [r for r in runs if (r.mirror, r.controller) == (which, "PID + inverse")]
-    return max(candidates, key=lambda r: residual_rad(m, r.trace))
-
-
-def residual_rad(m: Mission, trace: simulate.Trace) -> float:
+def residual_rad(m: Mission, trace: Trace) -> float:
     """The residual that the link sees, in the mission's statistic and convention (per axis, or radial)."""
-    one_axis = trace.peak_rad if m.requirement.residual_statistic == "peak" else trace.rms_rad
+    one_axis = trace.left_rad(m.requirement.residual_statistic)
     return one_axis * math.sqrt(2.0) if m.conventions.residual == "radial" else one_axis

@@ -6,12 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from microrad import mirror
 from microrad.core import kernels, lti
 from microrad.loop import control
 from microrad.loop.control import Drive, Inverse, Timing, amplifier_factor, anti_windup
-from microrad.mirror import hysteresis
-from microrad.mirror import model as mirror
-from microrad.mission import model as mission
+from microrad.mirror import Mirror, hysteresis
 
 Floats = NDArray[np.float64]
 
@@ -67,6 +66,10 @@ class Trace:
         """Root mean square of the error in the steady part, over all axes."""
         return float(np.sqrt(np.mean(self.error_rad[self.steady] ** 2)))
 
+    def left_rad(self, statistic: str) -> float:
+        """The error that is left in the steady part, by its "peak" or by its "rms"."""
+        return self.peak_rad if statistic == "peak" else self.rms_rad
+
 
 @dataclass(frozen=True, slots=True)
 class Setup:
@@ -77,25 +80,18 @@ class Setup:
     controller: lti.StateSpace
 
 
-def setup_from_mission(m: mission.Mission, mirror_gain_rad_v: float) -> Setup:
-    """The mission's loop around a mirror of this gain."""
-    timing = control.timing_from_mission(m.control)
-    gains = control.gains_from_mission(m.control, mirror_gain_rad_v)
-    return Setup(control.drive_from_mission(m), timing, control.pid(gains, timing.period_s))
-
-
-def sampled_loop(m: mirror.Mirror, setup: Setup) -> lti.StateSpace:
+def sampled_loop(m: Mirror, setup: Setup) -> lti.StateSpace:
     """Controller and sampled mirror in series, with each hysteresis element replaced by its slow gain."""
     return lti.series(setup.controller, control.sampled_plant(m, setup.drive, setup.timing))
 
 
-def margins(m: mirror.Mirror, setup: Setup) -> control.Margins:
+def margins(m: Mirror, setup: Setup) -> control.Margins:
     """Margins of the loop as it is sampled; raises ValueError when it is unstable."""
     plant = control.sampled_plant(m, setup.drive, setup.timing)
     return control.margins(setup.controller, plant, setup.timing.period_s)
 
 
-def assemble(m: mirror.Mirror, setup: Setup, inverse: Inverse) -> kernels.Loop:
+def assemble(m: Mirror, setup: Setup, inverse: Inverse) -> kernels.Loop:
     """The loop around a mirror as the kernel's arrays. Axis i commands actuator i."""
     drive, timing, controller = setup.drive, setup.timing, setup.controller
     actuators = m.actuators
@@ -143,7 +139,7 @@ def at_rest(loop: kernels.Loop) -> kernels.LoopState:
     )
 
 
-def track(name: str, m: mirror.Mirror, setup: Setup, inverse: Inverse, reference_rad: Floats, steady: slice) -> Trace:
+def track(name: str, m: Mirror, setup: Setup, inverse: Inverse, reference_rad: Floats, steady: slice) -> Trace:
     """Run the sampled loop from rest over ``reference_rad`` (samples, axes) at the control period."""
     drive, timing = setup.drive, setup.timing
     plant = mirror.discretise(m, timing.step_s)
@@ -187,9 +183,7 @@ def alternations(command: Floats, threshold: float) -> int:
     return count
 
 
-def track_sine(
-    name: str, m: mirror.Mirror, setup: Setup, inverse: Inverse, amplitude_rad: float, freq_hz: float
-) -> Trace:
+def track_sine(name: str, m: Mirror, setup: Setup, inverse: Inverse, amplitude_rad: float, freq_hz: float) -> Trace:
     """Track a sine on one axis, with statistics over the last period."""
     return track(name, m, setup, inverse, *sine(amplitude_rad, freq_hz, setup.timing.period_s))
 

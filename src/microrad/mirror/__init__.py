@@ -1,1 +1,36 @@
-"""The mirror as one plant form: its model, hysteresis, geometry, what it can do and how well it is known."""
+"""The mirror as one plant form: `of` takes a mission and assembles its mirror once, in each of its variants."""
+
+from microrad.mirror.model import (
+    Mirror,
+    assemble,
+    at_rest,
+    combine,
+    contraction,
+    creep_model,
+    discretise,
+    from_mission,
+    from_table,
+    hysteresis_model,
+    linear_part,
+    plant_arrays,
+)
+from microrad.mirror.variants import MirrorAxis, MirrorParts, Variant, of
+
+__all__ = [
+    "Mirror",
+    "MirrorAxis",
+    "MirrorParts",
+    "Variant",
+    "assemble",
+    "at_rest",
+    "combine",
+    "contraction",
+    "creep_model",
+    "discretise",
+    "from_mission",
+    "from_table",
+    "hysteresis_model",
+    "linear_part",
+    "of",
+    "plant_arrays",
+]

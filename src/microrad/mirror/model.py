@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from microrad.core import kernels, lti
-from microrad.mirror.hysteresis import LINE_OF_SIGHT, NO_CREEP, BoucWen, Creep, Play, scaled, slow_gain, steepest_slope
+from microrad.mirror.hysteresis import NO_CREEP, BoucWen, Creep, Play, slow_gain, steepest_slope
 from microrad.mission.tables import mirror as mirror_table
 
 Floats = NDArray[np.float64]
@@ -102,17 +102,14 @@ def hysteresis_model(
     return Play(p.thresholds_v, p.weights_rad_v, p.widening_s, rate_limit_v_s if p.widening_s else math.inf)
 
 
+def from_table(table: mirror_table.Mirror) -> Mirror:
+    """One axis of a mirror table as it is, its output in the mirror's own angle."""
+    return from_mission(table, hysteresis_model(table, table.rate_limit_v_s, table.bias_v))
+
+
 def creep_model(table: mirror_table.Mirror) -> Creep:
     """The creep of a mirror table, as a record; without one, none."""
     return NO_CREEP if table.creep is None else Creep(table.creep.weights_rad_v, table.creep.time_constants_s)
-
-
-def line_of_sight(model: BoucWen | Play, convention: str) -> BoucWen | Play:
-    """The model with its output as an angle of the line of sight.
-
-    "mechanical" is doubled (reflection, per axis at normal incidence); "line-of-sight" is as it stands.
-    """
-    return scaled(model, LINE_OF_SIGHT[convention])
 
 
 def from_mission(
@@ -122,8 +119,8 @@ def from_mission(
 
     The composition is the mission's or another: cascade: the hysteresis drives the linear part (q = u, B = 0).
     additive: the linear gain drives the linear part and the hysteresis is added behind it through K. static: no linear
-    part. Creep is added to the output in each of them, ``times`` what the table says, for an output that is counted
-    otherwise than there (see `line_of_sight`).
+    part. Creep is added to the output in each of them, ``times`` what the table says: 2 where the model counts the line
+    of sight and the table a mechanical angle.
     """
     system = None if table.linear is None else linear_part(table.linear)[0]
     creep = creep_model(table)

@@ -12,6 +12,7 @@ from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin
 from pydantic import TypeAdapter, ValidationError
 from pydantic.fields import FieldInfo
 
+from microrad.core.folder import read_bytes
 from microrad.core.units import UnitError
 from microrad.mission.fields import NOT_PUBLISHED, UNKNOWN, Problem, ProblemsError, Quantity, Several, Table
 from microrad.mission.model import LinkMission, Mission, Source
@@ -25,8 +26,10 @@ __all__ = [
     "MirrorFile",
     "MissionError",
     "MissionFile",
+    "NamedFile",
     "assumptions",
     "changed_from_shipped",
+    "content_of",
     "either_file",
     "kind_of",
     "load_link",
@@ -35,6 +38,7 @@ __all__ = [
     "mission_file",
     "named_files",
     "open_mission",
+    "with_contents",
     "with_values",
 ]
 
@@ -42,6 +46,10 @@ _BEYOND_LINK = Mission.model_fields.keys() - LinkMission.model_fields.keys()
 _MOST_UNKNOWN = 100  # unknown keys of one file for which a near one is looked up
 _Location = tuple[int | str, ...]
 _T = TypeVar("_T", bound=Table)
+_File = TypeVar("_File", bound="LinkFile")
+
+MOST_NAMED_BYTES = 100_000_000
+"""Largest file that a mission names and a study reads."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,14 +64,26 @@ class MirrorFile:
 
 
 @dataclass(frozen=True, slots=True)
+class NamedFile:
+    """A file by the name that a mission gives it, with its bytes; None where they could not be read."""
+
+    name: str
+    content: bytes | None
+
+
+@dataclass(frozen=True, slots=True)
 class LinkFile:
-    """What a link budget needs, with the path, text and SHA-256 of its file and the source of each key."""
+    """What a link budget needs, with the path, text and SHA-256 of its file and the source of each key.
+
+    `contents` are those of the files that it names, once they are read (`with_contents`).
+    """
 
     mission: LinkMission
     path: Path
     text: str
     sha256: str
     sources: Mapping[str, Source]
+    contents: tuple[NamedFile, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,7 +134,7 @@ def mission_file(document: Document) -> MissionFile:
     inner = document.inner.get("mirror")
     mirror_file = _mirror_file(inner, mission.mirror) if inner else None
     sources = _sources(document)
-    return MissionFile(mission, document.path, document.text, document.sha256, sources, mirror_file)
+    return MissionFile(mission, document.path, document.text, document.sha256, sources, mirror_file=mirror_file)
 
 
 def either_file(document: Document) -> LinkFile:
@@ -142,6 +162,28 @@ def named_files(m: LinkMission) -> tuple[str, ...]:
     if isinstance(m, Mission) and m.fine_pointing is not None:
         named.append(m.fine_pointing.vibration.file)
     return tuple(name for name in dict.fromkeys(named) if name is not None)
+
+
+def with_contents(file: _File) -> _File:
+    """The file with what the files hold that its mission names: each is read once, whatever becomes of it later.
+
+    One that cannot be read, or is too large, is left to whoever needs it, who says what is wrong.
+    """
+    names = named_files(file.mission)
+    return replace(file, contents=tuple(NamedFile(name, _content(file.path.parent / name)) for name in names))
+
+
+def _content(path: Path) -> bytes | None:
+    try:
+        data = read_bytes(path, MOST_NAMED_BYTES + 1) if path.is_file() else None
+    except (OSError, ValueError):  # the last for a name that holds a NUL
+        return None
+    return data if data is not None and len(data) <= MOST_NAMED_BYTES else None
+
+
+def content_of(name: str, contents: tuple[NamedFile, ...]) -> bytes | None:
+    """What a file held that a mission names; None where it is to be read now."""
+    return next((each.content for each in contents if each.name == name), None)
 
 
 def load_link(path: str | Path, *, text: str | None = None) -> LinkFile:

@@ -1,7 +1,6 @@
 """Whether a comment still stands behind the value that it was written for."""
 
 import math
-import tomllib
 from collections.abc import Mapping
 from contextlib import suppress
 from functools import cache
@@ -9,7 +8,7 @@ from importlib import resources
 
 from microrad.core.units import UnitError, parse_quantity
 from microrad.mission.presets import PAPER, preset_text, presets
-from microrad.mission.toml import scan
+from microrad.mission.toml import scan, value_of
 
 
 def written_for(key: str, comment: str, value: str) -> str:
@@ -55,11 +54,8 @@ def _shipped_mission() -> str:
 def _same(value: str, other: str) -> bool:
     if value == other:
         return True
-    try:
-        ours, theirs = (tomllib.loads(f"x = {raw}")["x"] for raw in (value, other))
-    except (ValueError, RecursionError):
-        return False
-    return _equal(ours, theirs)
+    ours, theirs = value_of(value), value_of(other)
+    return ours is not None and theirs is not None and _equal(ours, theirs)
 
 
 def _equal(ours: object, theirs: object) -> bool:

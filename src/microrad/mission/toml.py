@@ -8,7 +8,7 @@ import hashlib
 import re
 import tomllib
 import unicodedata
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal, Self
@@ -438,11 +438,26 @@ def _oversize(statement: Statement) -> tuple[str, str] | None:
         return f"is nested {statement.depth} brackets deep", "a value, or a list of values"
     if len(statement.key) > _MAX_KEY:
         return f"is a key of {len(statement.key)} characters", "a key of the mission file"
-    if "{" in statement.value and _MAX_PARTS.search(statement.value):
+    if _has_long_key(statement.value):
         return "holds a key of more than 50 parts", "a table with keys of its own"
     if len(statement.value) > _MAX_NUMBER and statement.value[0] in "+-0123456789":
         return f"is a number of {len(statement.value)} characters", "a number of at most 17 digits"
     return None
+
+
+def _has_long_key(raw: str) -> bool:
+    """Whether a value holds an inline table with a key of so many parts that parsing it takes minutes."""
+    return "{" in raw and _MAX_PARTS.search(raw) is not None
+
+
+def value_of(raw: str, parse_float: Callable[[str], Any] = float) -> object:
+    """A raw value of TOML as data; None where it is none, or holds a key of more than 50 parts."""
+    if _has_long_key(raw):
+        return None
+    try:
+        return tomllib.loads(f"x = {raw}", parse_float=parse_float)["x"]
+    except (ValueError, RecursionError):
+        return None
 
 
 def _syntax_advice(statement: Statement, detail: str) -> tuple[str, str]:

@@ -97,10 +97,10 @@ def run(
     at its largest range. Volumes leave out the share of time in outage. Raises `operations.OperationsError` without the
     tables `constellation` and `operations`, and `orbit.OrbitError` for orbits that do not hold.
     """
-    m, folder = file.mission, file.path.parent
+    m, folder, contents = file.mission, file.path.parent, file.contents
     c, rates = table(m), rate_table(closings(m, loss))
-    orbits, pair = orbits_table(m), orbit.pair(m, folder)
-    own = tuple(orbit.satellites(c, orbits, pair.epoch, folder))
+    orbits, pair = orbits_table(m), orbit.pair(m, folder, contents)
+    own = tuple(orbit.satellites(c, orbits, pair.epoch, folder, contents))
     relays = orbit.relays(c, orbits, pair.epoch)
     furthest = 0.0 if rates is None else rates.steps[-1].largest_range_m
     found = opportunities(

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from microrad.mission.file import NamedFile, content_of
 from microrad.mission.model import LinkMission
 from microrad.mission.tables.operations import Constellation, Downlink
 from microrad.mission.tables.orbit import Orbits, OrbitTable, VisibilityLimits
@@ -17,6 +18,9 @@ from microrad.orbit.epoch import Epoch
 from microrad.orbit.files import read_elements, read_oem
 from microrad.orbit.limits import UNLIMITED, Limits, Terminal
 from microrad.orbit.mean_elements import MOST_ELEMENTS_AGE_S, ElementSet, Sgp4Orbit, closest_elements, sgp4_orbit
+
+Contents = tuple[NamedFile, ...]
+"""The files that a mission names, read once with it."""
 
 TAIL_S = 86400.0
 """Time behind the span in which data of the span may still arrive."""
@@ -41,8 +45,8 @@ class Pair:
         return self.span_s[0], self.span_s[1] + self.tail_s
 
 
-def pair(m: LinkMission, folder: Path) -> Pair:
-    """The terminals of a mission with a table `orbit`; files are looked for in ``folder``.
+def pair(m: LinkMission, folder: Path, contents: Contents = ()) -> Pair:
+    """The terminals of a mission with a table `orbit`; files are looked for in ``contents``, and then in ``folder``.
 
     Raises `OrbitError` for an orbit that is none, or that does not hold over the mission's span.
     """
@@ -58,7 +62,7 @@ def pair(m: LinkMission, folder: Path) -> Pair:
     for end, name in zip(("leo", "geo"), names, strict=True):
         given = getattr(orbits, end)
         try:
-            own = _orbit(given, name, epoch, folder)
+            own = _orbit(given, name, epoch, folder, contents)
             tail = min(tail, _tail(own, epoch, orbits.duration_s))
         except OrbitError as error:
             raise OrbitError(f"orbit.{end}: {error}") from None
@@ -93,15 +97,16 @@ def _tail(orbit: Orbit, epoch: Epoch, duration_s: float) -> float:
     return tail
 
 
-def _orbit(t: OrbitTable, name: str, epoch: Epoch, folder: Path) -> Orbit:
+def _orbit(t: OrbitTable, name: str, epoch: Epoch, folder: Path, contents: Contents) -> Orbit:
     """The orbit that a table describes, whose own checks have seen to the keys of each kind."""
     if t.longitude_rad is not None:
         return GeostationarySlot(name, epoch, t.longitude_rad)
     if t.file is None:
         return _kepler(t, name, epoch)
+    path, data = folder / t.file, content_of(t.file, contents)
     if t.kind == "ephemeris":
-        return read_oem(folder / t.file, epoch, t.object)
-    return sgp4_orbit(closest_elements(read_elements(folder / t.file, t.object), epoch), epoch)
+        return read_oem(path, epoch, t.object, data)
+    return sgp4_orbit(closest_elements(read_elements(path, t.object, data), epoch), epoch)
 
 
 def _kepler(t: OrbitTable, name: str, epoch: Epoch) -> KeplerOrbit:
@@ -162,7 +167,9 @@ def repeats(c: Constellation, m: LinkMission) -> bool:
     return c.pattern == "file" or orbits_table(m).leo.kind in REPEATED
 
 
-def satellites(c: Constellation, orbits: Orbits, epoch: Epoch, folder: Path) -> Iterator[Terminal]:
+def satellites(
+    c: Constellation, orbits: Orbits, epoch: Epoch, folder: Path, contents: Contents = ()
+) -> Iterator[Terminal]:
     """The satellites of a constellation, one after the other, each limited as the mission's own is.
 
     Walker's patterns i: t/p/f: plane k of p has its node 2 pi k / p further ("star": pi k / p), and satellite j of it
@@ -172,13 +179,14 @@ def satellites(c: Constellation, orbits: Orbits, epoch: Epoch, folder: Path) -> 
         c: the mission's table of its constellation.
         orbits: the mission's table of orbits, whose own satellite the pattern repeats.
         epoch: from which times count.
-        folder: where files are looked for.
+        folder: where files are looked for that are not among the contents.
+        contents: the files that the mission names.
 
     Raises `OrbitError` for a file that is refused, and an orbit that no pattern can repeat.
     """
     shared = _limits(orbits.leo.limits)
     if c.file is not None:
-        sets = read_elements(folder / c.file)
+        sets = read_elements(folder / c.file, data=content_of(c.file, contents))
         for elements, name in zip(sets, _names(sets, folder / c.file), strict=True):
             own = sgp4_orbit(elements, epoch)
             own.require(0.0, orbits.duration_s)

@@ -3,7 +3,7 @@
 import csv
 import io
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, replace
 from typing import Any
 
@@ -18,12 +18,14 @@ from microrad.link.study import BeamRadius, LinkStudy, Solution
 from microrad.link.under_jitter import Performance, error_rad, required_error_rad
 from microrad.mission.model import source_text
 from microrad.orbit.operations import spreadsheet_text
-from microrad.report import requirements
+from microrad.report import advice, requirements
 from microrad.report.quantities import quantity, signed
 from microrad.report.tables import Table, table_text, tables_text
 
 UNDER_JITTER = "Communication under jitter"
 """The lines of what the jitter does to the communication link, beside its budget."""
+SOLVED = "Solved"
+"""The values of a key that leave the required margin, ahead of the budgets."""
 _ROOM = 120  # columns for a table of all that a line has
 _WORTH_DB = 0.5  # of a margin: what another radius of the beam would have to bring
 COLUMNS = ("budget", "line", "value", "unit", "basis", "source", "holds for", "warning")
@@ -61,11 +63,13 @@ def jitter_lines(study: LinkStudy) -> list[Line]:
     return [replace(found[0], warning=doubt), *found[1:]]
 
 
-def csv_text(study: LinkStudy) -> str:
-    """Every line with its value in full, for a spreadsheet."""
+def csv_text(study: LinkStudy, solution: Solution | None = None) -> str:
+    """Every line with its value in full, for a spreadsheet; first the values that were solved for."""
     buffer = io.StringIO()
     writer = csv.writer(buffer, lineterminator="\n")
     writer.writerow(COLUMNS)
+    for name, solved, unit, basis in [] if solution is None else _solution_rows(solution):
+        writer.writerow([SOLVED, spreadsheet_text(name), repr(float(solved)), unit, basis, "", "", ""])
     jitter = [(UNDER_JITTER, line) for line in jitter_lines(study)]
     for name, line in (*lines(study), *jitter):
         value = repr(float(line.value))  # every digit, as JSON has it
@@ -74,13 +78,15 @@ def csv_text(study: LinkStudy) -> str:
     return buffer.getvalue().rstrip("\n")
 
 
-def text(study: LinkStudy, width: int, verbose: bool = False) -> str:
+def text(study: LinkStudy, width: int, verbose: bool = False, solution: Solution | None = None) -> str:
     """The verdict with a line for each requirement, what limits it, and the budgets, in at most ``width`` columns.
 
     ``verbose`` adds to the lines where they come from and hold, the other tables, every sentence and every warning.
+    The values that were solved for stand first.
     """
     judged = of_links(study)
-    blocks = [tables_text([], [verdict(study)], width), table_text(requirements.table(judged), width)]
+    blocks = [] if solution is None else [tables_text([], [solution_text(solution)], width)]
+    blocks += [tables_text([], [verdict(study)], width), table_text(requirements.table(judged), width)]
     if not verbose:
         tables = [Table(b.name, ("line", "value", "basis"), _brief(b), (2,)) for b in study.budgets]
         return "\n\n".join((*blocks, tables_text([], short(study), width), tables_text(tables, [], width)))
@@ -99,7 +105,8 @@ def short(study: LinkStudy) -> list[str]:
         at = f"but for {outage_words(m)} under the jitter, an error of {quantity(error_rad(m), 'rad')}"
     said = [f"The margin is received over required power, for communication {at}.", *consequences(study)[:2]]
     r = requirements.nearest(found)
-    said.append(f"{'Nearest to its limit is' if r.met else 'What limits it is'} the {r.name}, by {r.because}.")
+    which = "Nearest to its limit is" if r.met else "What limits it is"
+    said.append(f"{which} the {r.name}, by {r.because}{advice.of_links(study, r)}.")
     said.append(requirements.derived_words(found))
     if warned := study.warnings:
         more = f" ({len(warned) - 1} more by --verbose)" if len(warned) > 1 else ""
@@ -308,26 +315,40 @@ def _solution_data(s: Solution) -> dict[str, Any]:
     ends = [[None if i.low_open else i.low, None if i.high_open else i.high] for i in s.solved.intervals]
     best = {"value": s.solved.best, "margin_db": s.solved.best_db}
     found = {"key": s.key, "unit": s.unit, "of": s.of, "required_db": s.required_db}
-    return {**found, "intervals": ends, "value": s.value, "best": best}
+    return {**found, "intervals": ends, "searched": list(s.solved.searched), "value": s.value, "best": best}
 
 
-def solution_text(s: Solution, width: int) -> str:
-    """The values of a key that leave the required margin, in a sentence."""
+def _solution_rows(s: Solution) -> Iterator[tuple[str, float, str, str]]:
+    """Name, value, unit and basis of what was solved for."""
+    leaves = f"leaves the required {s.required_db:g} dB of {s.of}"
+    for each in s.solved.intervals:
+        for name, value, is_open in (("from", each.low, each.low_open), ("to", each.high, each.high_open)):
+            yield f"{s.key} {name}", value, s.unit, leaves + (", as far as was looked" if is_open else "")
+    for name, value in zip(("from", "to"), s.solved.searched, strict=True):
+        yield f"{s.key} looked at {name}", value, s.unit, ""
+    yield f"{s.key} with the largest margin", s.solved.best, s.unit, ""
+    yield "Largest margin", s.solved.best_db, "dB", ""
+    yield f"{s.key} in the budgets below", s.value, s.unit, ""
+
+
+def solution_text(s: Solution) -> str:
+    """The values of a key that leave the required margin, and how far they were looked for, in sentences."""
     wanted = f"the required {s.required_db:g} dB of {s.of}"
+    low, high = (quantity(each, s.unit, 4) for each in s.solved.searched)
     if not s.solved.intervals:
         most = f"the most is {signed(s.solved.best_db, 'dB')} at {quantity(s.solved.best, s.unit, 4)}"
-        return tables_text([], [f"No value of {s.key} leaves {wanted}: {most}."], width)
+        return f"No value of {s.key} from {low} to {high} leaves {wanted}: {most}. No other was looked at."
     spans = " and ".join(_span(each, s.unit) for each in s.solved.intervals)
     several = len(s.solved.intervals) > 1 or not (s.solved.intervals[0].low_open or s.solved.intervals[0].high_open)
     best = f", most ({signed(s.solved.best_db, 'dB')}) near {quantity(s.solved.best, s.unit)}" if several else ""
     here = f"The budgets below have {quantity(s.value, s.unit, 4)}."
-    return tables_text([], [f"{s.key} leaves {wanted} {spans}{best}. {here}"], width)
+    return f"{s.key} leaves {wanted} {spans}{best}. Looked at: {low} to {high}. {here}"
 
 
 def _span(i: link.Interval, unit: str) -> str:
     low, high = quantity(i.low, unit, 4), quantity(i.high, unit, 4)
     if i.low_open:
-        return "at any value" if i.high_open else f"up to {high}"
+        return "wherever it was looked at" if i.high_open else f"up to {high}"
     return f"from {low} on" if i.high_open else f"from {low} to {high}"
 
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from microrad.core.folder import MANIFEST
+from microrad.core.folder import MANIFEST, read_bytes
 from microrad.mission import file as missionfile
 from microrad.mission.toml import Document, UnreadableError
 from microrad.report.compared import clipped
@@ -69,13 +69,15 @@ def _text_of(path: Path) -> str:
             raise ReproduceError(
                 f"{path}: is {size / 1e6:.0f} MB long; a report of microrad has at most {MOST_BYTES / 1e6:.0f} MB"
             )
-        return path.read_bytes().decode("utf-8")
+        return read_bytes(path, MOST_BYTES).decode("utf-8")
     except FileNotFoundError:
         raise ReproduceError(f"{path}: there is no such file; name a report.html or a folder of results") from None
     except IsADirectoryError:
         raise ReproduceError(
             f"{path}: is a folder without a {MANIFEST}; name a report.html or a folder of results"
         ) from None
+    except OSError as error:
+        raise ReproduceError(f"{path}: cannot be read: {error.strerror}; name a report.html") from None
     except UnicodeDecodeError:
         raise ReproduceError(f"{path}: is no text, so no report of microrad; name a report.html") from None
 
@@ -185,7 +187,7 @@ def held(carried: Carried, name: str) -> bytes | None:
     """What stands in a file beside the report, as the manifest names it; None without such a file."""
     path = carried.path.parent / name
     fits = plain(name) and path.is_file() and path.stat().st_size <= MOST_BYTES
-    return path.read_bytes() if fits else None
+    return read_bytes(path, MOST_BYTES) if fits else None
 
 
 def hash_of_summary(summary: Mapping[str, Any]) -> str:

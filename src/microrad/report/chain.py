@@ -94,14 +94,15 @@ def _orbit(study: Study) -> Stage:
 
 
 def _link(study: Study) -> Stage:
-    c, budget = study.file.mission.communication, study.communication
-    beam = link.communication_beam(study.file.mission).fall.half_angle_rad
+    m = study.file.mission
+    c, kind = m.communication, "margin" if m.jitter is None else "static margin"
+    beam = link.communication_beam(m).fall.half_angle_rad
     return Stage(
         "Link",
         (
             f"{format_quantity(c.data_rate_bit_s, 'bit/s')} with {format_quantity(c.transmit_power_w, 'W')}",
             f"beam {_angle(beam)} (half, 1/e²)",
-            f"margin {signed(budget.margin_db, 'dB')} as budgeted,",
+            f"{kind} {signed(study.static.margin_db, 'dB')} as budgeted,",
             f"at {_angle(c.pointing_error_rad)} off axis",
         ),
     )
@@ -112,13 +113,19 @@ def _pointing(study: Study) -> Stage:
     cone = next(r for r in study.requirements if r.subject == "cone")
     lines = [
         f"open loop {_angle(p.rss_rad)} (rss)",
-        f"beacon's cone {_angle(p.beacon_half_angle_rad)}",
+        f"beacon's cone {_angle(p.beacon_half_angle_rad)}, covers {quantity(100.0 * _covered(study), '%')}",
     ]
     if fine is not None:
         before = math.hypot(*(d.rms_rad for several in fine.scene.loop.disturbances for d in several))
         lines.append(f"disturbed by {_angle(before)} rms")
     lines.append(f"fine: {_angle(study.file.mission.requirement.pointing_error_rad)} allowed")
     return Stage("Pointing", tuple(lines), cone.mark)
+
+
+def _covered(study: Study) -> float:
+    reading = study.open_loop.reading
+    assert reading is not None  # a whole mission has a beacon
+    return reading.coverage
 
 
 def _mirror(study: Study) -> Stage:
@@ -132,7 +139,7 @@ def _mirror(study: Study) -> Stage:
         lines.append(f"{100 * high.width:.1f} % at {high.freq_hz:g} Hz")
     if study.fine_pointing is None:
         return Stage("Mirror", tuple(lines))
-    axis = min(study.fine_pointing.scene.own_stroke(m), key=lambda a: a.margin_rad)
+    axis = min(study.fine_pointing.scene.own_stroke, key=lambda a: a.margin_rad)
     lines.append(f"stroke {micro(axis.needed_rad)} of {micro(axis.available_rad)} µrad ({axis.name})")
     return Stage("Mirror", tuple(lines), next(r.mark for r in study.requirements if r.subject == "stroke"))
 

@@ -13,6 +13,7 @@ from matplotlib.figure import Figure as Canvas
 from numpy.typing import NDArray
 
 from microrad.core.kept import NOTHING, Kept
+from microrad.link.under_jitter import required_error_rad
 from microrad.loop import sine_run as simulate
 from microrad.loop.paper_cases import Run, residual_rad
 from microrad.mission.model import Mission
@@ -124,6 +125,8 @@ def margin_map(study: Study) -> Figure:
     lines = axes.contour(rate, error, f.margin_db.T, levels=[0.0, m.requirement.margin_db], colors="white")
     axes.clabel(lines, fmt=lambda level: f"{level:g} dB", fontsize=8)
     rate_mbit = m.communication.data_rate_bit_s * 1e-6
+    budgeted = "budget" if m.jitter is None else "static error"
+    under = "" if m.jitter is None else " (exceeded by the jitter for the outage)"
     axes.plot(
         [rate_mbit],
         [m.communication.pointing_error_rad * 1e6],
@@ -131,7 +134,7 @@ def margin_map(study: Study) -> Figure:
         color=VERMILION,
         markeredgecolor="white",
         markersize=8,
-        label=f"budget: {rate_mbit:g} Mbit/s at {m.communication.pointing_error_rad * 1e6:g} µrad",
+        label=f"{budgeted}: {rate_mbit:g} Mbit/s at {m.communication.pointing_error_rad * 1e6:g} µrad",
     )
     left = residual_urad(study)
     axes.plot(
@@ -153,7 +156,7 @@ def margin_map(study: Study) -> Figure:
     largest = f"at most {f.largest_error_rad * 1e6:.2f} µrad" if f.largest_error_rad > 0 else "not even on axis"
     caption = (
         f"Margin of the communication link ({convention}). For {m.requirement.margin_db:g} dB: at most "
-        f"{f.largest_rate_bit_s * 1e-6:.1f} Mbit/s at {m.requirement.pointing_error_rad * 1e6:g} µrad, or {largest} "
+        f"{f.largest_rate_bit_s * 1e-6:.1f} Mbit/s at {required_error_rad(m) * 1e6:.4g} µrad{under}, or {largest} "
         f"at {m.communication.data_rate_bit_s * 1e-6:g} Mbit/s (both solved). "
         f"Hatched between dotted lines: the band in which the {m.requirement.margin_db:g} dB contour lies over the "
         f"{len(counts)} readings of pointing loss and Strehl, the receiver unchanged. The same point implies a "

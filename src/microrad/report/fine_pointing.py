@@ -238,7 +238,7 @@ def budget_sentences(fine: FinePointingStudy) -> list[str]:
 
 def stroke(fine: FinePointingStudy, m: Mission) -> Row:
     """The stroke budgets side by side, a column for each output of the mirror with and without the point-ahead."""
-    ours = fine.scene.own_stroke(m)
+    ours = fine.scene.own_stroke
     groups = (
         ("Point-ahead on the mirror", fine.scene.stroke),
         ("Point-ahead elsewhere", fine.scene.stroke_without_point_ahead),

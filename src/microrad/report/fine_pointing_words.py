@@ -214,7 +214,7 @@ def short(fine: FinePointingStudy, m: Mission) -> list[str]:
             f"best PI of the gain grid; on the mission's mirror {fine.best.design.name} is {percent(abs(r.gained))} "
             f"{'better' if r.gained >= 0.0 else 'worse'}."
         )
-    short_of = [axis for axis in fine.scene.own_stroke(m) if not axis.fits]
+    short_of = [axis for axis in fine.scene.own_stroke if not axis.fits]
     if short_of:
         worst = min(short_of, key=lambda axis: axis.margin_rad)
         lines.append(
@@ -309,7 +309,7 @@ def _stroke_warnings(fine: FinePointingStudy, m: Mission) -> list[str]:
         f"the stroke does not cover the worst case on {axis.label}: {angle(axis.needed_rad)} needed to either side, "
         f"{angle(axis.available_rad)} available (root sum square {angle(axis.needed_rss_rad)}); no simulated run has "
         "the static misalignment, so that they may stay within limits which the worst case exceeds"
-        for axis in fine.scene.own_stroke(m)
+        for axis in fine.scene.own_stroke
         if not axis.fits
     ]
 

@@ -21,9 +21,9 @@ from numpy.typing import NDArray
 
 from microrad.core.threads import shared_out
 from microrad.lab.identify import Identification
-from microrad.lab.identify.linear import LinearFit, fit_percent, output_error
-from microrad.lab.identify.predictions import Prediction
-from microrad.lab.identify.roles import roles
+from microrad.lab.identify.ladder.predictions import Prediction
+from microrad.lab.identify.ladder.roles import roles
+from microrad.lab.identify.linear.fit import LinearFit, fit_percent, output_error
 from microrad.lab.recording import Recording
 from microrad.report import identification_words as words
 from microrad.report.figures import BLACK, BLUE, GREEN, ORANGE, SKY, STYLE, VERMILION, Figure, Floats, svg_of, thin

@@ -4,9 +4,9 @@ import math
 from dataclasses import dataclass
 
 from microrad.lab.identify import BoucWenFit, PrandtlIshlinskiiFit
-from microrad.lab.identify.bouc_wen import PARAMETER_UNITS, PARAMETERS
-from microrad.lab.identify.joint import JointFit
-from microrad.lab.identify.predictions import Fit
+from microrad.lab.identify.hysteresis.bouc_wen import PARAMETER_UNITS, PARAMETERS
+from microrad.lab.identify.hysteresis.joint import JointFit
+from microrad.lab.identify.ladder.predictions import Fit
 
 HIGH_CORRELATION = 0.95
 

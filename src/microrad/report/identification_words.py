@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 
 from microrad.core.units import format_quantity
 from microrad.lab.identify import Identification, PrandtlIshlinskiiFit, Score
-from microrad.lab.identify.doubts import fit_warnings
-from microrad.lab.identify.joint import JointFit
-from microrad.lab.identify.linear import LinearFit
-from microrad.lab.identify.predictions import Fit, Prediction
+from microrad.lab.identify.hysteresis.joint import JointFit
+from microrad.lab.identify.ladder.doubts import fit_warnings
+from microrad.lab.identify.ladder.predictions import Fit, Prediction
+from microrad.lab.identify.linear.fit import LinearFit
 from microrad.lab.recording import Recording
 from microrad.mirror.hysteresis import Play
 from microrad.report.identification_parameters import (

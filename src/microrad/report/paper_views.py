@@ -89,7 +89,7 @@ def link_table(study: Study) -> list[tuple[str, ...]]:
     power, wavelength = both(b.transmit_power_w, c.transmit_power_w, "W"), both(b.wavelength_m, c.wavelength_m, "m")
     error, distance = both(b.pointing_error_rad, c.pointing_error_rad, "rad"), both(b.distance_m, c.distance_m, "m")
     leo, geo = (format_quantity(a, "m") for a in (t.leo_aperture_m, t.geo_aperture_m))
-    margins = quantity(study.beacon.margin_db, "dB"), quantity(study.communication.margin_db, "dB")
+    margins = quantity(study.beacon.margin_db, "dB"), quantity(study.static.margin_db, "dB")
     return [
         ("Transmit power", "4 W", power[0], "5 W", power[1]),
         ("Wavelength", "1.55 µm", wavelength[0], "1.55 µm", wavelength[1]),

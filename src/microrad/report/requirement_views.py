@@ -7,16 +7,20 @@ from typing import Any
 from microrad import link
 from microrad.link.budget import FREE_SPACE_LOSS, POINTING_LOSS
 from microrad.link.requirement import Requirement, Subject
+from microrad.loop.fine_pointing.parts import GAUGE_NOISE, OPTICAL_NOISE
 from microrad.loop.paper_cases import residual_rad
+from microrad.mirror import Variant
+from microrad.mirror.geometry import StrokeBudget
+from microrad.report import advice as advise
 from microrad.report.fine_pointing_words import percent, source_name
 from microrad.report.quantities import apart, quantity
 from microrad.report.requirements import signed
 from microrad.study.alternatives import Reading
-from microrad.study.pointing_cost import NO_HYSTERESIS
 from microrad.study.story import Study
 from microrad.study.verdict import unknown
 
 Row = dict[str, Any]
+_OF_NOISE = {OPTICAL_NOISE: "fine_pointing.optical_sensor", GAUGE_NOISE: "fine_pointing.strain_gauge"}
 _BY_TEN = ("bit_error_ratio", "outage")  # inputs that a tornado moves by their order of magnitude
 
 
@@ -68,8 +72,49 @@ def _capital(text: str) -> str:
 def _cone(study: Study) -> str:
     p = study.open_loop
     share, line = max(zip(p.variance_shares, p.lines, strict=True), key=lambda pair: pair[0])
+    assert p.reading is not None  # a whole mission has a beacon
     said = f"{line.name}: {percent(share)} of the squares, {quantity(line.value, 'rad')} half width"
-    return said if p.reading is None else f"{said}; the cone covers its partner with {p.reading.coverage:.2f}"
+    half = quantity(p.reading.half_angle_rad, "rad")
+    return f"{said}; the cone of {half} half angle covers its partner with {p.reading.coverage:.2f}"
+
+
+def advice(study: Study, r: Requirement) -> str:
+    """What to change for a requirement that the verdict judges, as the end of a sentence, or nothing."""
+    m = study.file.mission
+    if r.unknown:
+        return ""
+    if r.subject == "communication":
+        return advise.of_power(m, r, study.tornado)
+    if r.subject == "stroke":
+        return _of_stroke(study, r)
+    if r.subject == "fine pointing":
+        noise = _OF_NOISE.get(r.limited_by)
+        return advise.change(r, noise) if noise else advise.change(r, "fine_pointing.rate", "raise")
+    if r.subject == "residual":
+        held = "amplifier.slew" if "slew limit" in r.limited_by else "amplifier.output_max"
+        return advise.change(r, held if r.limited_by.startswith("the amplifier") else "control.integral", "raise")
+    return advise.of_links(study.links, r)
+
+
+def _of_stroke(study: Study, r: Requirement) -> str:
+    m, axis = study.file.mission, _worst_axis(study)
+    assert m.fine_pointing is not None  # such a requirement has it
+    own = {
+        "Body pointing": ("fine_pointing.body.error", m.fine_pointing.body.error_rad),
+        "Point-ahead": ("fine_pointing.reference.point_ahead", m.fine_pointing.reference.point_ahead_rad),
+    }
+    line = max(axis.lines, key=lambda each: each.value)
+    left = line.value + axis.margin_rad / axis.mirror_per_line_of_sight
+    if line.name not in own or left <= 0.0:
+        return advise.change(r, "mirror.travel", "raise")
+    key, value = own[line.name]
+    return advise.at_most(r, key, value * left / line.value, "rad")
+
+
+def _worst_axis(study: Study) -> StrokeBudget:
+    fine = study.fine_pointing
+    assert fine is not None  # such a requirement has one
+    return min(fine.scene.own_stroke, key=lambda each: each.margin_rad)
 
 
 def _tornado(study: Study, of: str) -> Sequence[link.Swing]:
@@ -98,9 +143,7 @@ def _power(study: Study, budget: link.LinkBudget) -> str:
 
 
 def _stroke(study: Study, cause: str) -> str:
-    fine = study.fine_pointing
-    assert fine is not None  # such a requirement has one
-    axis = min(fine.scene.own_stroke(study.file.mission), key=lambda each: each.margin_rad)
+    axis = _worst_axis(study)
     line = max(axis.lines, key=lambda each: each.value)
     return f"{cause}: {quantity(line.value, 'rad')} of {quantity(axis.total_rad, 'rad')} at the line of sight"
 
@@ -108,15 +151,16 @@ def _stroke(study: Study, cause: str) -> str:
 def _residual(study: Study, cause: str) -> str:
     m, run = study.file.mission, study.residual
     straight = next(
-        r for r in study.runs if (r.mirror, r.controller, r.freq_hz) == (NO_HYSTERESIS, run.controller, run.freq_hz)
+        r for r in study.runs if (r.mirror, r.controller, r.freq_hz) == (Variant.STRAIGHT, run.controller, run.freq_hz)
     )
     with_it, without = (quantity(residual_rad(m, r.trace), "rad") for r in (run, straight))
     return f"{cause}: {with_it} with hysteresis, {without} without"
 
 
 def _communication(study: Study, cause: str) -> str:
-    lost = next(line.value for line in study.achieved.lines if line.name == POINTING_LOSS)
-    return f"{cause}, pointing loss {quantity(-lost, 'dB')}{most_sensitive(_tornado(study, study.achieved.name))}"
+    lost = study.achieved.loss_db(POINTING_LOSS)
+    judged = study.fine_case is None
+    return f"{cause}, pointing loss {quantity(lost, 'dB')}{most_sensitive(study.tornado.swings) if judged else ''}"
 
 
 def _fine(study: Study, cause: str) -> str:
@@ -134,8 +178,7 @@ def _outage(study: Study, cause: str) -> str:
     case = study.fine_case
     assert case is not None  # such a requirement has one
     lost = quantity(case.outage_loss_db, "dB")
-    most = most_sensitive(_tornado(study, study.achieved.name))
-    return f"{source_name(cause)}, pointing loss {lost} at the outage{most}"
+    return f"{source_name(cause)}, pointing loss {lost} at the outage{most_sensitive(study.tornado.swings)}"
 
 
 _CONTRIBUTORS: Mapping[Subject, Callable[[Study, str], str]] = {

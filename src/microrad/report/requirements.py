@@ -42,7 +42,7 @@ def derived_words(found: Sequence[Requirement]) -> str:
 
 
 def nearest(found: Sequence[Requirement]) -> Requirement:
-    """The requirement that is missed by most or met by least, as a ratio of powers or angles.
+    """The requirement that is missed by most or met by least, as a ratio of powers, of angles or of shares missed.
 
     Missed ones come first, and behind all others those that are met by the choice of an input.
     """
@@ -50,6 +50,8 @@ def nearest(found: Sequence[Requirement]) -> Requirement:
     def order(r: Requirement) -> tuple[bool, bool, float]:
         if r.unit == "dB":
             spare = 10.0 ** (r.margin / 10.0)
+        elif r.unit == "%":
+            spare = (100.0 - r.required) / max(100.0 - r.actual, 1e-12)
         else:
             small, large = (abs(each) or 1e-12 for each in (r.required, r.actual))
             spare = large / small if (r.margin >= 0.0) == (large > small) else small / large

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from microrad.core.machine import machine, versions
 from microrad.loop.fine_pointing import COUNTERS, FinePointingStudy, Residual
 from microrad.loop.paper_cases import Run
-from microrad.mission.file import MirrorFile, MissionFile, named_files
+from microrad.mission.file import MirrorFile, MissionFile
 from microrad.report import day_results, variables, words
 from microrad.report.carried import hash_of_summary
 from microrad.report.fine_pointing_data import margins, rms_by_source, sources
@@ -38,7 +38,7 @@ def _trace(run: Run) -> Group:
         "drive": variable(("time",), t.drive_v[:, 0], "V", "amplifier output over its gain, about the bias"),
     }
     attributes = {
-        "mirror": run.mirror,
+        "mirror": str(run.mirror),
         "controller": run.controller,
         "frequency_hz": run.freq_hz,
         "peak_error_rad": t.peak_rad,
@@ -259,8 +259,9 @@ def netcdf(study: Study) -> bytes:
 def manifest(study: Study, folder: Path) -> dict[str, Any]:
     """What made the results, with the numbers of the summary and a hash of each file written so far.
 
-    The mission's text and hash, those of the files that it names, and versions. Random numbers are drawn for the
-    fine-pointing loop, for acquisition and for the day, from the mission's seeds, and for Fig. 4 and 5.
+    The mission's text and hash and those of the files that it names, as they were read, and versions. Random numbers
+    are drawn for the fine-pointing loop, for acquisition and for the day, from the mission's seeds, and for Fig. 4 and
+    5.
     """
     mirror, m = study.file.mirror_file, study.file.mission
     drawn = [
@@ -273,11 +274,12 @@ def manifest(study: Study, folder: Path) -> dict[str, Any]:
         if table is not None
     ]
     summary = finite(words.summary(study))
+    named = {each.name: each.content for each in study.file.contents if each.content is not None}
     drawn += [f"seed {SEED} of the virtual bench, {PLAN}"] if study.scan is not None else []
     return {
         "mission": _text_file(study.file),
-        "inputs_sha256": {name: _sha256(study.file.path.parent / name) for name in named_files(m)},
-        "inputs": _input_texts(study),
+        "inputs_sha256": {name: hashlib.sha256(content).hexdigest() for name, content in named.items()},
+        "inputs": _input_texts(named),
         "mirror": None if mirror is None else _text_file(mirror),
         "versions": versions(),
         "machine": machine(),
@@ -294,14 +296,13 @@ def _text_file(file: MissionFile | MirrorFile) -> dict[str, str]:
     return {"file": file.path.name, "sha256": file.sha256, "text_sha256": text_sha256, "text": file.text}
 
 
-def _input_texts(study: Study) -> dict[str, str]:
+def _input_texts(named: Mapping[str, bytes]) -> dict[str, str]:
     """The text of each file that the mission names, but for those too long to be carried along."""
     found = {}
-    for name in named_files(study.file.mission):
-        path = study.file.path.parent / name
-        if path.stat().st_size <= MOST_INPUT_BYTES:
+    for name, content in named.items():
+        if len(content) <= MOST_INPUT_BYTES:
             with contextlib.suppress(UnicodeDecodeError):  # no text: left to its hash
-                found[name] = path.read_bytes().decode("utf-8")
+                found[name] = content.decode("utf-8")
     return found
 
 

@@ -1,14 +1,14 @@
 """The budgets and the day each as one page that loads nothing."""
 
 from microrad.link.requirement import met, of_links
-from microrad.link.study import LinkStudy
+from microrad.link.study import LinkStudy, Solution
 from microrad.orbit.day import DayStudy
 from microrad.report import budget_views, day_plots, day_views, interactive, link_figures, links, page, requirements
 from microrad.report.quantities import quantity
 
 
-def budget(study: LinkStudy) -> str:
-    """The budgets as one page that loads nothing, with their figures.
+def budget(study: LinkStudy, solution: Solution | None = None) -> str:
+    """The budgets as one page that loads nothing, with their figures, and what was solved for.
 
     They are bars and a few curves, with their numbers in tables below them: no reason to carry a drawing library eight
     times as long as the page.
@@ -20,6 +20,7 @@ def budget(study: LinkStudy) -> str:
         "mission": study.file.mission,
         "verdict": budget_views.verdict(study),
         "met": met(study),
+        "solved": "" if solution is None else budget_views.solution_text(solution),
         "paragraph": requirements.paragraph(of_links(study)),
         "links": links.context(study, budgets=budgets, figures=figures, files=False),
         "quantity": quantity,

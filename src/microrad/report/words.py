@@ -4,6 +4,7 @@ import math
 from typing import Any
 
 from microrad.core.units import format_quantity
+from microrad.link.budget import DEEPEST_DB, POINT_AHEAD_LOSS, POINTING_LOSS
 from microrad.link.requirement import IMPOSSIBLE, outage_words
 from microrad.loop.paper_cases import Run, residual_rad
 from microrad.mission.file import changed_from_shipped
@@ -77,7 +78,8 @@ def short(study: Study) -> list[str]:
 def _limit(study: Study) -> str:
     r = requirements.nearest(study.requirements)
     said = requirement_views.contributor(study, r)
-    return f"{'Nearest to its limit is' if r.met else 'What limits it is'} the {r.name}: {said[:1].lower()}{said[1:]}."
+    which, todo = "Nearest to its limit is" if r.met else "What limits it is", requirement_views.advice(study, r)
+    return f"{which} the {r.name}: {said[:1].lower()}{said[1:]}{todo}."
 
 
 def _largest_warning(study: Study) -> str:
@@ -122,10 +124,10 @@ def explanation(study: Study) -> list[str]:
 def papers_loop(study: Study) -> list[str]:
     """What the paper's loop leaves in the worst of its sines, a sentence each."""
     m, run = study.file.mission, study.residual
-    budget, trace, q = study.communication, run.trace, m.requirement
+    trace, q, kind = run.trace, m.requirement, "margin" if m.jitter is None else "static margin"
     sentences = [
-        f"As budgeted, at {format_quantity(m.communication.pointing_error_rad, 'rad', 3)}, the margin is "
-        f"{signed(budget.margin_db, 'dB')}; {m.requirement.margin_db:g} dB is required.",
+        f"As budgeted, at {format_quantity(m.communication.pointing_error_rad, 'rad', 3)}, the {kind} is "
+        f"{signed(study.static.margin_db, 'dB')}; {m.requirement.margin_db:g} dB is required.",
         f"The loop ({run.controller}, {run.freq_hz:g} Hz) leaves {format_quantity(trace.peak_rad, 'rad', 3)} at its "
         f"peaks and {format_quantity(trace.rms_rad, 'rad', 3)} rms on its axis{_two_axes(m)}; "
         f"{format_quantity(q.pointing_error_rad, 'rad', 3)} ({q.residual_statistic}) is allowed.",
@@ -234,8 +236,7 @@ def warnings(study: Study) -> list[str]:
         f"{key} = {value} names the paper as its source, but the paper's mission has {shipped}"
         for key, value, shipped in changed_from_shipped(study.file)
     ]
-    found += study.summary.warnings
-    found += study.links.warnings
+    found = [*_of_verdict(study), *found, *study.summary.warnings, *study.links.warnings]
     if study.day is not None:
         found += study.day.warnings
         found += _not_run(study)
@@ -270,6 +271,24 @@ def warnings(study: Study) -> list[str]:
     return found
 
 
+def _of_verdict(study: Study) -> list[str]:
+    """What the judged margin leaves out, or may not be relied on for."""
+    m, case, found = study.file.mission, study.fine_case, []
+    if m.jitter is not None:
+        found.append(
+            "[jitter] is not in this verdict, which judges the pointing error that the simulated loop leaves: the two "
+            f"are not summed. Under [jitter] alone the margin is {signed(study.communication.margin_db, 'dB')} but for "
+            f"{outage_words(m)}, as microrad budget judges it"
+        )
+    lost = study.achieved.loss_db(POINTING_LOSS, POINT_AHEAD_LOSS) if case is None else case.outage_loss_db
+    if lost > DEEPEST_DB:
+        found.append(
+            f"the verdict's pointing loss of {quantity(lost, 'dB')} is beyond {DEEPEST_DB:g} dB, where the wings and "
+            "the scatter of a real beam decide, not the formula of its main lobe"
+        )
+    return found
+
+
 def _not_run(study: Study) -> list[str]:
     """Tables of the day that this study has no use for, and why."""
     m, found = study.file.mission, []
@@ -295,6 +314,7 @@ def summary(study: Study) -> dict[str, Any]:
             "beacon": study.beacon.margin_db,
             "answer": study.answer.margin_db,
             "communication_as_budgeted": study.communication.margin_db,
+            "communication_static": study.static.margin_db,
             "communication_at_residual": study.achieved.margin_db,
         },
         "residual": {

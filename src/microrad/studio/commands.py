@@ -152,13 +152,14 @@ class Design:
     def python(self) -> str:
         """Lines of Python that do the same."""
         return joined(
-            "from microrad import load_mission",
+            "from microrad import load_mission, mirror",
+            "from microrad.link.tracking_light import tracking_light_w",
             "from microrad.loop import fine_pointing",
             "",
             f"mission = {mission_call(self.file, self.mirror)}",
-            "scene = fine_pointing.scene(mission)",
-            "designs = fine_pointing.design(scene, mission.mission)",
-            "for design, left in zip(designs, fine_pointing.outlook(scene, mission.mission, designs)):",
+            "scene = fine_pointing.scene(mission, mirror.of(mission.mission), tracking_light_w(mission))",
+            "designs = fine_pointing.design(scene)",
+            "for design, left in zip(designs, fine_pointing.outlook(scene, designs)):",
             "    linear_urad, simulated_urad = left.linear_rad * 1e6, left.simulated_rad * 1e6",
             "    margins = design.tuned.margins",
             "    print(f'{design.name:28} {linear_urad:9.3f} {simulated_urad:9.3f} µrad rms, linear and simulated,'",

@@ -9,12 +9,12 @@ from decimal import Decimal
 from pathlib import Path
 from typing import Any
 
-from microrad.core.folder import MANIFEST
+from microrad.core.folder import MANIFEST, read_bytes
 from microrad.core.units import UnitError, parse_quantity
 from microrad.link import study as link_study
+from microrad.mission.toml import value_of
 from microrad.report.quantities import quantity
 from microrad.studio.draft import Draft, Value
-from microrad.studio.draft_keys import value_of
 from microrad.studio.link_view import ROUNDING_DB
 from microrad.studio.workshop import Workshop
 
@@ -166,7 +166,7 @@ def finished_study(workshop: Workshop, draft: Draft) -> Found | None:
         with suppress(OSError, ValueError, KeyError, TypeError):
             if path.stat().st_size > _MOST_BYTES:
                 continue
-            data = json.loads(path.read_text("utf-8"))
+            data = json.loads(read_bytes(path, _MOST_BYTES))
             if data["mission"]["sha256"] == draft.sha256:
                 found.append((path.stat().st_mtime_ns, _found(path, data["summary"])))
     return max(found, key=lambda pair: pair[0])[1] if found else None

@@ -15,9 +15,10 @@ from functools import lru_cache, partial
 import numpy as np
 from numpy.typing import NDArray
 
+from microrad import mirror
 from microrad.core import lti
-from microrad.loop import control, fine_pointing
-from microrad.loop import paper_cases as tracking
+from microrad.link.tracking_light import tracking_light_w
+from microrad.loop import control, fine_pointing, paper_cases
 from microrad.loop import sine_run as simulate
 from microrad.loop.disturbance import Reference
 from microrad.loop.fine_loop import ensemble, linear
@@ -26,10 +27,8 @@ from microrad.loop.fine_pointing import parts
 from microrad.loop.fine_pointing.designs import families
 from microrad.loop.fine_pointing.results import for_mirror
 from microrad.loop.fine_pointing.scenario import BODY_POINTING, with_mirror
-from microrad.mirror import hysteresis
-from microrad.mirror import model as mirror
+from microrad.mirror import Variant
 from microrad.mission.file import MissionFile
-from microrad.mission.model import Mission
 
 Floats = NDArray[np.float64]
 
@@ -119,7 +118,7 @@ class Controller:
 
 def names(file: MissionFile) -> tuple[str, ...]:
     """The controllers that a mission has: of its fine-pointing loop, where it has one, and of [control]."""
-    fine = fine_pointing.names(file.mission) if file.mission.fine_pointing is not None else ()
+    fine = fine_pointing.names(f) if (f := file.mission.fine_pointing) is not None else ()
     return (*fine, PID, PID_INVERSE)
 
 
@@ -157,13 +156,13 @@ def _controller(of: _Keyed, name: str) -> Controller:
 
 # ------------------------------------------------------------------------------------------- the fine-pointing loop
 def _fine(file: MissionFile, name: str) -> Controller:
-    m = file.mission
-    scene, table = fine_pointing.scene(file), fine_pointing.table(m)
-    plants = fine_pointing.plants(scene, m, table.seed)
-    tuned = fine_pointing.tune(name, m, plants)
-    family = next((each for each in families(m) if each.name == name), control.PI)
+    scene = fine_pointing.scene(file, mirror.of(file.mission), tracking_light_w(file))
+    table = scene.table
+    plants = fine_pointing.plants(scene, table.seed)
+    tuned = fine_pointing.tune(name, table, plants)
+    family = next((each for each in families(table) if each.name == name), control.PI)
     units = {each.name: each.unit for each in family.parameters(plants[0])}
-    built = fine_pointing.build(name, scene, m, tuned.controller)
+    built = fine_pointing.build(name, scene, tuned.controller)
     half = 0.5 / scene.loop.timing.period_s
     freq = np.geomspace(half * 1e-4, half * 0.999, _POINTS)
     gain, sensitivity = _responses(scene.loop, built, freq)
@@ -182,7 +181,7 @@ def _fine(file: MissionFile, name: str) -> Controller:
         1.0 / scene.loop.timing.period_s,
         scene.loop.optical.field_of_view_rad,
         mirror_warnings(file),
-        partial(_fine_answers, scene.loop, m, built, tuned.margins.bandwidth_hz),
+        partial(_fine_answers, scene, built, tuned.margins.bandwidth_hz),
     )
 
 
@@ -216,10 +215,10 @@ def _responses(loop: PointingLoop, of: LoopController, freq: Floats) -> tuple[Fl
 
 
 def _fine_answers(
-    loop: PointingLoop, m: Mission, of: LoopController, bandwidth_hz: float, wanted: Ask, variants: tuple[str, ...]
+    scene: fine_pointing.Scene, of: LoopController, bandwidth_hz: float, wanted: Ask, variants: tuple[str, ...]
 ) -> Answers:
-    table = fine_pointing.table(m)
-    loops = {WITH: loop, WITHOUT: with_mirror(loop, m, "no hysteresis")}
+    table = scene.table
+    loops = {WITH: scene.loop, WITHOUT: with_mirror(scene.loop, scene.mirrors, Variant.STRAIGHT)}
     chosen = {v: (loops[v], for_mirror(of, loops[v])) for v in variants}
     return Answers(
         {v: _step(*each, wanted, bandwidth_hz) for v, each in chosen.items()},
@@ -268,11 +267,9 @@ def _curve(loop: PointingLoop, of: LoopController, span: ensemble.Span, from_s: 
 # ------------------------------------------------------------------------------------------- the loop of [control]
 def _pid(file: MissionFile, name: str) -> Controller:
     m = file.mission
-    model = tracking.mirror_model(m, m.mirror)
-    setup = simulate.setup_from_mission(m, hysteresis.secant_gain(model, m.scenario.amplitude_rad))
-    models = {WITH: model, WITHOUT: hysteresis.gain_only(model, m.scenario.amplitude_rad)}
-    turned = hysteresis.LINE_OF_SIGHT[m.conventions.mirror_angle]
-    plants = {v: mirror.from_mission(m.mirror, each, times=turned) for v, each in models.items()}
+    cases = paper_cases.of(m, mirror.of(m))
+    setup, turned = cases.setup, cases.mirrors.line_of_sight
+    plants = {WITH: turned[Variant.GIVEN].plant, WITHOUT: turned[Variant.STRAIGHT].plant}
     found, period = simulate.margins(plants[WITH], setup), setup.timing.period_s
     freq = np.geomspace(0.5e-5 / period, 0.4995 / period, _POINTS)
     L = lti.frequency_response(simulate.sampled_loop(plants[WITH], setup), freq, period)[:, 0, 0]
@@ -296,7 +293,7 @@ def _pid(file: MissionFile, name: str) -> Controller:
         np.abs(L),
         sensitivity,
         (setup.drive.minimum_v, setup.drive.maximum_v),
-        (m.mirror.drive_min_v - m.mirror.bias_v, m.mirror.drive_max_v - m.mirror.bias_v),
+        cases.mirrors.drive_range_v,
         1.0 / period,
         math.inf,
         mirror_warnings(file),

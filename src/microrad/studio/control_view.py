@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from microrad.core.units import UnitError, format_quantity, parse_quantity
+from microrad.lab.live_fit import extremes
 from microrad.studio.control_model import PID, PID_INVERSE, WITH, WITHOUT, Answers, Ask, Controller, Curve
-from microrad.studio.parse_process import extremes
 from microrad.studio.plots import BLACK, BLUE, GREEN, GREY, VERMILION, Plot, decades, empty, marker_line, plot
 
 Floats = NDArray[np.float64]

@@ -17,12 +17,12 @@ from importlib import resources
 from pathlib import Path
 from typing import Literal
 
-from microrad.core.folder import write_whole
+from microrad.core.folder import read_bytes, write_whole
 from microrad.mission.file import LinkFile, MissionFile, load_link, load_mission
 from microrad.mission.model import Source
 from microrad.mission.origins import written_for
-from microrad.mission.toml import MAX_BYTES, Fault, MissionError, Statement, clipped, scan
-from microrad.studio.draft_keys import Key, key_of, keys_in, loose_toml, typed_from, value_of
+from microrad.mission.toml import MAX_BYTES, Fault, MissionError, Statement, clipped, scan, value_of
+from microrad.studio.draft_keys import Key, key_of, keys_in, loose_toml, typed_from
 
 _MARK = "\ufeff"
 _HEADERS = ("table", "tables", "broken")
@@ -101,7 +101,7 @@ class Draft:
         try:
             if not self.path.exists():
                 return "gone" if self.disk_sha256 else ""
-            content = self.path.read_bytes() if self.path.is_file() and self.path.stat().st_size <= MAX_BYTES else b""
+            content = read_bytes(self.path, MAX_BYTES + 1) if self.path.is_file() else b""
         except OSError:
             return "changed"
         return "" if hashlib.sha256(content).hexdigest() in (self.disk_sha256, self.sha256) else "changed"
@@ -190,7 +190,7 @@ class Draft:
     def _check(self, target: Path) -> None:
         """Raise `DraftError` where what is on disk is not what this draft comes from."""
         try:
-            now = hashlib.sha256(target.read_bytes()).hexdigest()
+            now = hashlib.sha256(read_bytes(target, MAX_BYTES + 1)).hexdigest()
         except FileNotFoundError:
             return
         except OSError as error:
@@ -259,7 +259,7 @@ def _content(path: Path) -> bytes:
     """The bytes of a file of text; MissionError, with the command line's words, for what is none."""
     with suppress(OSError, ValueError):
         if path.is_file() and path.stat().st_size <= MAX_BYTES:
-            content = path.read_bytes()
+            content = read_bytes(path, MAX_BYTES)
             content.decode("utf-8")
             if b"\0" not in content:
                 return content

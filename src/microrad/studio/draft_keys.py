@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import tomllib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
@@ -13,7 +12,7 @@ from pydantic.fields import FieldInfo
 
 from microrad.mission.fields import Quantity, Several, Table
 from microrad.mission.model import Mission
-from microrad.mission.toml import scan
+from microrad.mission.toml import scan, value_of
 
 Kind = Literal["quantity", "number", "whole number", "switch", "choice", "text", "list"]
 
@@ -81,14 +80,6 @@ def keys_in(dotted: str) -> tuple[Key, ...]:
     names = (info.alias or name for name, info in table.model_fields.items())
     found = (key_of(f"{dotted}.{name}" if dotted else name) for name in names)
     return tuple(key for key in found if key is not None)
-
-
-def value_of(raw: str, parse_float: Any = float) -> object:
-    """A raw value of TOML as data, or None when it is none."""
-    try:
-        return tomllib.loads(f"x = {raw}", parse_float=parse_float)["x"]
-    except (ValueError, RecursionError):
-        return None
 
 
 def typed_from(raw: str) -> str:

@@ -63,16 +63,17 @@ class Frame:
 
 @dataclass(frozen=True, slots=True)
 class Margin:
-    """The margin of one link and what it needs; a link is met from its need upwards."""
+    """The margin of one link and what it needs; a link is met from its need upwards, where it is ``possible``."""
 
     name: str
     margin_db: float
     required_db: float
+    possible: bool = True
 
     @property
     def met(self) -> bool:
         """Whether the margin is at least what is needed, but for rounding: a rate may be solved for that margin."""
-        return self.margin_db >= self.required_db - ROUNDING_DB
+        return self.possible and self.margin_db >= self.required_db - ROUNDING_DB
 
     @property
     def words(self) -> str:
@@ -82,6 +83,8 @@ class Margin:
     @property
     def needs(self) -> str:
         """What is needed, and whether it is there."""
+        if not self.possible:
+            return "MISSED: more light arrives than was sent"
         return f"needs {self.required_db:g} dB: {'met' if self.met else 'MISSED'}"
 
 
@@ -103,7 +106,8 @@ class LinkView:
     def margins(self) -> tuple[Margin, ...]:
         """Each link against what it needs: the communication link its required margin, the others 0 dB."""
         needed = (self.file.mission.requirement.margin_db, *[0.0] * len(self.budgets))
-        return tuple(Margin(b.name, b.margin_db, need) for b, need in zip(self.budgets, needed, strict=False))
+        pairs = zip(self.budgets, needed, strict=False)
+        return tuple(Margin(b.name, b.margin_db, need, b.possible) for b, need in pairs)
 
 
 # ---------------------------------------------------------------------------------------------------------- computing

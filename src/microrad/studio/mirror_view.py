@@ -8,8 +8,9 @@ from itertools import pairwise
 from typing import Any
 
 from microrad.core.units import format_quantity
+from microrad.lab.live_fit import LiveFit, Loop
 from microrad.studio.jobs import Job
-from microrad.studio.live_fit import LiveFit, Loop, leader
+from microrad.studio.live_fit import leader
 from microrad.studio.mirror_form import Setting, written
 from microrad.studio.plots import BLACK, BLUE, GREY, SKY, VERMILION, Plot, axis, empty, plain, plot
 from microrad.studio.reading import View

@@ -11,7 +11,6 @@ import json
 import math
 import os
 import sys
-from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -19,7 +18,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from microrad.lab.recording.sources import Source
+    from microrad.lab.recording.formats.source import Source
 
 _TEXT = 200
 _UNUSABLE = 50
@@ -105,7 +104,7 @@ def opened(path: Path, request: dict[str, Any]) -> Source:
 def channels(path: Path, request: dict[str, Any]) -> dict[str, Any]:
     """Names, units and lengths; see `reading.Listing`."""
     from microrad.lab.recording.files import file_format
-    from microrad.lab.recording.sources import is_time_name
+    from microrad.lab.recording.formats.source import is_time_name
 
     source = opened(path, request)
     most = request["limits"]["channels"]
@@ -125,6 +124,7 @@ def channels(path: Path, request: dict[str, Any]) -> dict[str, Any]:
 
 def view(path: Path, request: dict[str, Any]) -> dict[str, Any]:
     """The recording, checked and thinned; see `reading.View`."""
+    from microrad.lab.live_fit import extremes
     from microrad.lab.recording import read_recording
 
     opened(path, request)
@@ -157,25 +157,6 @@ def view(path: Path, request: dict[str, Any]) -> dict[str, Any]:
 
 def _digits(values: NDArray[np.float64]) -> list[float]:
     return [float(f"{value:.7g}") for value in values]
-
-
-def extremes(columns: list[NDArray[np.float64]], points: int) -> NDArray[np.intp]:
-    """Rows, in order, that hold the smallest and largest value of every column in each of `points`/2 stretches.
-
-    A recording of at most `points` samples is kept whole.
-    """
-    import numpy as np
-
-    samples = len(columns[0])
-    if samples <= points:
-        return np.arange(samples)
-    edges = np.linspace(0, samples, points // 2 + 1).astype(int)
-    found = {0, samples - 1}
-    for begin, end in pairwise(edges):
-        for column in columns:
-            stretch = column[begin:end]
-            found |= {int(begin + stretch.argmin()), int(begin + stretch.argmax())}
-    return np.array(sorted(found))
 
 
 if __name__ == "__main__":

@@ -11,7 +11,7 @@ from functools import lru_cache
 from importlib import resources
 from pathlib import Path
 
-from microrad.core.folder import write_whole
+from microrad.core.folder import read_bytes, write_whole
 from microrad.mission.toml import MAX_BYTES, scan
 from microrad.studio.commands import Action
 from microrad.studio.commands_pieces import path_argument
@@ -105,7 +105,8 @@ def _names_a_mission(path: Path) -> bool:
 def _of_campaign(path: Path, changed_ns: int, size: int) -> bool:
     """Whether a file, as it was changed last, names a mission. It is not parsed: a parser may take minutes for it."""
     with suppress(OSError, ValueError):
-        return any(s.key == "mission" and s.value[:1] in ("'", '"') for s in scan(path.read_text("utf-8")))
+        text = read_bytes(path, MAX_BYTES).decode("utf-8").replace("\r\n", "\n")
+        return any(s.key == "mission" and s.value[:1] in ("'", '"') for s in scan(text))
     return False
 
 

@@ -7,8 +7,9 @@ from typing import Any, get_args
 
 import numpy as np
 
-from microrad import link
-from microrad.loop import paper_cases as tracking
+from microrad import link, mirror
+from microrad.loop import paper_cases
+from microrad.mirror import Variant
 from microrad.mission.model import Conventions, Mission, Requirement
 from microrad.mission.tables.link import UNUSED
 from microrad.mission.tables.mirror import Mirror
@@ -50,7 +51,7 @@ class Reading:
         return self.residual_rad <= q.pointing_error_rad and self.margin_db >= q.margin_db
 
 
-def others(m: Mission, residual: tracking.Run) -> tuple[Reading, ...]:
+def others(m: Mission, residual: paper_cases.Run) -> tuple[Reading, ...]:
     """Every other reading that fits the mission; ``residual`` is the run that the verdict rests on.
 
     Those of the loop are simulated (PID + inverse at the mission's frequencies); the others read the same run anew.
@@ -72,12 +73,14 @@ def _given(m: Mission, key: str) -> str:
     return str(getattr(getattr(m, table), name))
 
 
-def _reading(m: Mission, key: str, other: str, residual: tracking.Run) -> Reading:
+def _reading(m: Mission, key: str, other: str, residual: paper_cases.Run) -> Reading:
     as_read, run = m.with_value(key, other), residual
     try:
         if key in _SIMULATED:
-            run = tracking.worst(as_read, tracking.tracking_runs(as_read, ("given",)))
-        left = tracking.residual_rad(as_read, run.trace)
+            cases = paper_cases.of(as_read, mirror.of(as_read))
+            runs = paper_cases.tracking_runs(cases, (Variant.GIVEN,))
+            run = paper_cases.worst(runs, as_read.requirement.residual_statistic)
+        left = paper_cases.residual_rad(as_read, run.trace)
         margin_db = float(link.margin_of_error(as_read, np.array([left]))[0])
     except ValueError as error:  # an unstable loop, a mirror without an inverse
         return Reading(key, _given(m, key), other, math.nan, math.nan, str(error))

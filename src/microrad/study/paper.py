@@ -15,14 +15,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from microrad import mirror
 from microrad.core.threads import in_threads
-from microrad.loop import control
-from microrad.loop import sine_run as simulate
-from microrad.loop.paper_cases import mirror_model
-from microrad.mirror import hysteresis
-from microrad.mirror import model as mirror
-from microrad.mission import model as mission
+from microrad.loop import control, sine_run
+from microrad.loop.paper_cases import PaperCases
+from microrad.mirror import Mirror, MirrorParts, Variant, hysteresis
 from microrad.mission.file import LinkFile, load_link
+from microrad.mission.model import Mission
 from microrad.mission.presets import PAPER, preset_text
 
 Floats = NDArray[np.float64]
@@ -115,49 +114,58 @@ def links() -> LinkFile:
     return load_link(Path(f"{PAPER}.toml"), text=preset_text(PAPER))
 
 
-def applies(m: mission.Mission) -> bool:
+def applies(m: Mission) -> bool:
     """Whether the mission's mirror is of the paper's kind, a linear part and a Bouc-Wen model: else nothing to scan."""
     return m.mirror.linear is not None and m.mirror.bouc_wen is not None
 
 
-def scan(m: mission.Mission, on_progress: Progress | None = None) -> Scan:
+def scan(cases: PaperCases, on_progress: Progress | None = None) -> Scan:
     """Errors over both compositions and the grid of gains, for the claims of Fig. 6 and 8.
 
     The plant takes one step a control period here: the errors compared are tens of µrad.
     """
-    model = mirror_model(m, m.mirror)
-    timing = control.timing_from_mission(m.control)
+    timing = cases.setup.timing
     delay = math.ceil(timing.delay_steps / timing.steps_per_sample)
     coarse = replace(timing, steps_per_sample=1, delay_steps=delay)
+    straight = _composed(cases.mirrors, Variant.STRAIGHT, "cascade")
+    plants = {composition: _composed(cases.mirrors, Variant.GIVEN, composition) for composition in COMPOSITIONS}
     grid = product(COMPOSITIONS, PROPORTIONAL_V_MRAD, INTEGRAL_V_MRAD_S)
-    jobs = [partial(_point, m, model, coarse, *at) for at in grid]
+    jobs = [partial(_point, cases, coarse, straight, plants[at[0]], *at) for at in grid]
     said = on_progress or (lambda done, total, what: None)
     points = in_threads(jobs, lambda done, total: said(done, total, "scan of gains and compositions"))
     return Scan(tuple(points))
 
 
+def _composed(mirrors: MirrorParts, variant: Variant, composition: str) -> Mirror:
+    """A variant at the line of sight in this composition, which may be another than the mission's."""
+    axis = mirrors.line_of_sight[variant]
+    if composition == mirrors.table.composition:
+        return axis.plant
+    return mirror.from_mission(mirrors.table, axis.model, composition, mirrors.line_of_sight_per_own)
+
+
 def _point(
-    m: mission.Mission,
-    model: hysteresis.BoucWen | hysteresis.Play,
+    cases: PaperCases,
     timing: control.Timing,
+    straight: Mirror,
+    hysteretic: Mirror,
     composition: str,
     proportional_v_mrad: float,
     integral_v_mrad_s: float,
 ) -> Point:
-    printed = control.Gains(proportional_v_mrad * 1e3, integral_v_mrad_s * 1e3, 0.0, m.control.derivative_filter_s)
-    scale = GAINS_FOR_RAD_V / hysteresis.slow_gain(model)  # the same loop gain for a mirror of another gain
+    printed = control.Gains(proportional_v_mrad * 1e3, integral_v_mrad_s * 1e3, 0.0, cases.control.derivative_filter_s)
+    scale = GAINS_FOR_RAD_V / hysteresis.slow_gain(cases.mirrors.line_of_sight[Variant.GIVEN].model)
     gains = replace(printed, proportional=printed.proportional * scale, integral=printed.integral * scale)
-    setup = simulate.Setup(control.drive_from_mission(m), timing, control.pid(gains, timing.period_s))
-    loop = simulate.sampled_loop(mirror.from_mission(m.mirror, hysteresis.gain_only(model), "cascade"), setup)
+    setup = sine_run.Setup(cases.setup.drive, timing, control.pid(gains, timing.period_s))
+    loop = sine_run.sampled_loop(straight, setup)
     blank = Point(composition, printed.proportional, printed.integral, False, {}, {}, {}, {}, {})
     if control.slowest_pole(loop) >= 1.0:
         return blank
-    hysteretic = mirror.from_mission(m.mirror, model, composition)
     feedback, inverse = control.no_feedforward(hysteretic), control.inverse(hysteretic)
-    amplitude = m.scenario.amplitude_rad
+    amplitude = cases.scenario.amplitude_rad
 
-    def run(feedforward: control.Inverse, freq_hz: float) -> simulate.Trace:
-        return simulate.track_sine("", hysteretic, setup, feedforward, amplitude, freq_hz)
+    def run(feedforward: control.Inverse, freq_hz: float) -> sine_run.Trace:
+        return sine_run.track_sine("", hysteretic, setup, feedforward, amplitude, freq_hz)
 
     frequencies = sorted({*FIG6_HZ, *CLAIMED_DROP_RAD})
     pid = {f: run(feedback, f) for f in frequencies}
@@ -173,7 +181,7 @@ def _point(
     )
 
 
-def _added_rms(trace: simulate.Trace, freq_hz: float, linear_error: complex) -> float:
+def _added_rms(trace: sine_run.Trace, freq_hz: float, linear_error: complex) -> float:
     """Rms of the error beyond the linear loop's, whose steady error is the phasor ``linear_error`` of a sine."""
     turn = np.exp(2j * np.pi * freq_hz * trace.time_s[trace.steady])
     added = trace.error_rad[trace.steady, 0] - (linear_error * turn).imag

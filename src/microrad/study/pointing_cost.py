@@ -9,12 +9,10 @@ from numpy.typing import NDArray
 from microrad import link
 from microrad.link import pointing
 from microrad.link.under_jitter import Performance, Spread, performance
-from microrad.loop import fine_pointing
-from microrad.loop import paper_cases as tracking
+from microrad.loop import fine_pointing, paper_cases
 from microrad.loop.fine_loop.ensemble import bin_edges_rad, histogram_quantile
+from microrad.mirror import Variant
 from microrad.mission.model import Mission
-
-NO_HYSTERESIS = "no hysteresis"
 
 _PARTS = 32  # of a bin of the histogram, which is 3 % wide in the square of the error
 
@@ -67,7 +65,7 @@ class LinkPerformance:
 FINE = "vibration and noise"
 
 
-def run(m: Mission, runs: tuple[tracking.Run, ...], fine: fine_pointing.FinePointingStudy | None) -> LinkPerformance:
+def run(m: Mission, runs: tuple[paper_cases.Run, ...], fine: fine_pointing.FinePointingStudy | None) -> LinkPerformance:
     """The communication link under the residuals of the clean sines and of the fine-pointing loop."""
     cases = [_sine(m, run) for run in runs]
     if fine is not None:
@@ -79,18 +77,18 @@ def run(m: Mission, runs: tuple[tracking.Run, ...], fine: fine_pointing.FinePoin
 
 def costs(cases: tuple[Performance, ...]) -> tuple[Cost, ...]:
     """Each case with hysteresis against the same one without."""
-    straight = {(c.source, c.controller): c for c in cases if c.mirror == NO_HYSTERESIS}
+    straight = {(c.source, c.controller): c for c in cases if c.mirror == Variant.STRAIGHT}
     found = []
     for c in cases:
         without = straight.get((c.source, c.controller))
-        if without is None or c.mirror == NO_HYSTERESIS:
+        if without is None or c.mirror == Variant.STRAIGHT:
             continue
         rate = c.data_rate_bit_s - without.data_rate_bit_s
         found.append(Cost(c.source, c.controller, c.mirror, c.margin_db - without.margin_db, rate))
     return tuple(found)
 
 
-def _sine(m: Mission, run: tracking.Run) -> Performance:
+def _sine(m: Mission, run: paper_cases.Run) -> Performance:
     """A tracked sine in its steady state; two equal axes where the mission reads the residual as radial."""
     error = run.trace.error_rad[run.trace.steady, 0]
     radial = m.conventions.residual == "radial"
@@ -112,7 +110,7 @@ def _fine(
     rms = tuple(math.sqrt(max(s**2 - b**2, 0.0)) for s, b in zip(square, mean, strict=True))
     jitter = pointing.Jitter((mean[0], mean[1]), (rms[0], rms[1]))
     motion = None
-    if mirror == "given":
+    if mirror == Variant.GIVEN:
         psd = verified.spectrum_rad2_hz.T
         both = psd if psd.shape[0] == 2 else np.vstack([psd, np.zeros_like(psd)])
         motion = pointing.motion_of_spectrum(fine.freq_hz, both)

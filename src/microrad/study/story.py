@@ -7,23 +7,21 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from microrad import link, orbit
+from microrad import link, mirror, orbit
 from microrad.core import kept
 from microrad.core.threads import both
 from microrad.link import pointing, requirement
 from microrad.link import study as link_study
 from microrad.link import under_jitter as link_performance
-from microrad.loop import control, fine_pointing
-from microrad.loop import paper_cases as tracking
-from microrad.loop import sine_run as simulate
+from microrad.link.tracking_light import tracking_light_w
+from microrad.loop import control, fine_pointing, paper_cases, sine_run
+from microrad.mirror import Variant
 from microrad.mirror import summary as mirror_summary
-from microrad.mission.file import LinkFile, MissionFile
-from microrad.mission.model import Mission
+from microrad.mission.file import LinkFile, MissionFile, with_contents
+from microrad.mission.model import LinkMission, Mission
 from microrad.orbit import constellation
 from microrad.orbit import day as day_study
-from microrad.study import alternatives as readings
-from microrad.study import contact_run, paper, verdict
-from microrad.study import pointing_cost as performance
+from microrad.study import alternatives, contact_run, paper, pointing_cost, verdict
 
 Floats = NDArray[np.float64]
 Progress = Callable[[int, int, str], None]
@@ -51,7 +49,7 @@ class MarginMap:
 class Comparison:
     """The largest residual on the mission's comparison model, and the margin of the communication link at it."""
 
-    residual: tracking.Run
+    residual: paper_cases.Run
     margin_db: float
 
 
@@ -63,6 +61,7 @@ class Study:
     is then judged in ``papers_loop``, which is empty else. ``other_readings`` are its numbers by other readings of what
     the paper leaves open.
     ``links`` holds what follows from the links' tables alone, ``performance`` what the simulated residuals cost them.
+    ``tornado`` is what moves the judged margin, at the error that its loop leaves.
     ``day`` is what the link delivers under the best of those residuals, ``contact`` one of its contacts in time, and
     ``plan`` that of a constellation; each is None where the mission lacks a table for it.
     """
@@ -72,15 +71,16 @@ class Study:
     achieved: link.LinkBudget
     margin_map: MarginMap
     summary: mirror_summary.Summary
-    loops: tuple[simulate.HysteresisLoop, ...]
+    loops: tuple[sine_run.HysteresisLoop, ...]
     margins: control.Margins
-    runs: tuple[tracking.Run, ...]
-    residual: tracking.Run
+    runs: tuple[paper_cases.Run, ...]
+    residual: paper_cases.Run
     comparison: Comparison | None
-    other_readings: tuple[readings.Reading, ...]
+    other_readings: tuple[alternatives.Reading, ...]
     scan: paper.Scan | None
     fine_pointing: fine_pointing.FinePointingStudy | None
-    performance: performance.LinkPerformance
+    performance: pointing_cost.LinkPerformance
+    tornado: link.Tornado
     day: day_study.DayStudy | None
     contact: contact_run.ContactRun | None
     plan: constellation.ConstellationPlan | None
@@ -97,8 +97,13 @@ class Study:
 
     @property
     def communication(self) -> link.LinkBudget:
-        """The communication link as budgeted."""
+        """The communication link as budgeted: under a table `[jitter]` but for the outage."""
         return self.links.communication
+
+    @property
+    def static(self) -> link.LinkBudget:
+        """The communication link at its static pointing error, whatever jitter there is."""
+        return link.communication_budget(self.file.mission, self.file.sources)
 
     @property
     def beacon(self) -> link.LinkBudget:
@@ -113,7 +118,8 @@ class Study:
     @property
     def closes(self) -> bool:
         """Whether each of the three links has a margin of at least 0 dB, communication under the judged loop."""
-        return self.beacon.closes and self.answer.closes and self.achieved.possible and self.margin_db >= 0.0
+        possible = self.achieved.possible if self.fine_case is None else self.fine_case.possible
+        return self.beacon.closes and self.answer.closes and possible and self.margin_db >= -requirement.ROUNDING
 
     @property
     def met(self) -> bool:
@@ -147,30 +153,38 @@ def run(
     Raises ValueError with the reason when the loop is unstable, the mirror has no inverse or the receiver does not take
     the data rate.
     """
-    file = solve_rate(file)
+    file = with_contents(solve_rate(file))
+    if any(each.content is None for each in file.contents):  # it may be there when it is read
+        parts = kept.NOTHING
     m, sources = file.mission, file.sources
-    on_progress(0, 3, "budgets, acquisition, mirror and tracking (the first run compiles for half a minute)")
+    mirrors = mirror.of(m)
+    cases = paper_cases.of(m, mirrors)
+    on_progress(0, 3, "budgets, acquisition, mirror and tracking")
     (summary, loops, margins, runs), (links, fig2) = both(
         lambda: (
             mirror_summary.summarise(m.mirror),
-            tracking.hysteresis_loops(m),
-            tracking.loop_margins(m),
-            tracking.tracking_runs(m),
+            paper_cases.hysteresis_loops(cases),
+            paper_cases.loop_margins(cases),
+            paper_cases.tracking_runs(cases),
         ),
         lambda: (link_study.run(_links_of(file), parts), margin_map(file)),
     )
-    residual = tracking.worst(m, runs)
-    left_rad = tracking.residual_rad(m, residual.trace)
+    residual = paper_cases.worst(runs, m.requirement.residual_statistic)
+    left_rad = paper_cases.residual_rad(m, residual.trace)
     simulated = f"simulated: {residual.trace.name}, {m.requirement.residual_statistic} ({m.conventions.residual})"
     achieved = link.communication_budget(m, sources, pointing_error_rad=left_rad, given_source=simulated)
-    as_read = readings.others(m, residual)
+    as_read = alternatives.others(m, residual)
 
     on_progress(1, 3, "claims of the paper")
-    scan = parts.part(paper.scan, m, on_progress=on_progress) if paper.applies(m) else None
-    fine = None if m.fine_pointing is None else parts.part(fine_pointing.run, file, on_progress=on_progress)
+    scan = parts.part(paper.scan, cases, on_progress=on_progress) if paper.applies(m) else None
+    fine = None
+    if m.fine_pointing is not None:
+        scene = fine_pointing.scene(file, mirrors, tracking_light_w(file))
+        fine = parts.part(fine_pointing.run, scene, on_progress=on_progress)
     on_progress(2, 3, "the day")
-    found = performance.run(m, runs, fine)
-    by_paper = verdict.of_residual(m, sources, achieved, residual, runs)
+    found = pointing_cost.run(m, runs, fine)
+    case = best_case(found, fine)
+    by_paper = verdict.of_residual(m, mirrors, sources, achieved, residual, runs)
     requirements, papers_loop = judged(file, links, by_paper, fine, found)
     day, contact, plan = delivered(file, links, found, fine, residual, achieved, parts)
 
@@ -191,6 +205,7 @@ def run(
         scan=scan,
         fine_pointing=fine,
         performance=found,
+        tornado=tornado(file, left_rad if case is None else case.error_rad),
         day=day,
         contact=contact,
         plan=plan,
@@ -208,7 +223,7 @@ def solve_rate(file: MissionFile) -> MissionFile:
 
 
 def _links_of(file: MissionFile) -> LinkFile:
-    return LinkFile(file.mission, file.path, file.text, file.sha256, file.sources)
+    return LinkFile(file.mission, file.path, file.text, file.sha256, file.sources, file.contents)
 
 
 def judged(
@@ -216,28 +231,38 @@ def judged(
     links: link_study.LinkStudy,
     by_paper: Requirements,
     fine: fine_pointing.FinePointingStudy | None,
-    found: performance.LinkPerformance,
+    found: pointing_cost.LinkPerformance,
 ) -> tuple[Requirements, Requirements]:
     """What the verdict judges, and what the paper's loop is held against beside it where it is not that."""
     case, beams = best_case(found, fine), requirement.of_beams(links)
     if fine is None or case is None:
         return (*beams, *by_paper), ()
-    return (*beams, *verdict.of_fine_pointing(file.mission, file.sources, fine, case.margin_db)), by_paper
+    return (*beams, *verdict.of_fine_pointing(file.mission, file.sources, fine, case)), by_paper
 
 
 def best_case(
-    found: performance.LinkPerformance, fine: fine_pointing.FinePointingStudy | None
+    found: pointing_cost.LinkPerformance, fine: fine_pointing.FinePointingStudy | None
 ) -> link_performance.Performance | None:
     """The link under the fine-pointing loop's best controller on the mission's mirror, or None without that loop."""
-    return None if fine is None else found.case(performance.FINE, fine.best.design.name, "given")
+    return None if fine is None else found.case(pointing_cost.FINE, fine.best.design.name, Variant.GIVEN)
+
+
+def tornado(file: MissionFile, error_rad: float) -> link.Tornado:
+    """What moves the margin of the communication link at a pointing error that stays as it is."""
+
+    def margin_db(m: LinkMission) -> float:
+        return float(link.margin_of_error(m, np.array([error_rad]))[0])
+
+    m = file.mission
+    return link.Tornado("Communication", margin_db(m), link.swings(m, file.sources, link.LINK_TABLES, margin_db))
 
 
 def delivered(
     file: MissionFile,
     links: link_study.LinkStudy,
-    found: performance.LinkPerformance,
+    found: pointing_cost.LinkPerformance,
     fine: fine_pointing.FinePointingStudy | None,
-    residual: tracking.Run,
+    residual: paper_cases.Run,
     achieved: link.LinkBudget,
     parts: kept.Kept = kept.NOTHING,
 ) -> tuple[day_study.DayStudy | None, contact_run.ContactRun | None, constellation.ConstellationPlan | None]:
@@ -265,13 +290,13 @@ def delivered(
     return day, contact, plan
 
 
-def compare(file: MissionFile, runs: tuple[tracking.Run, ...]) -> Comparison | None:
+def compare(file: MissionFile, runs: tuple[paper_cases.Run, ...]) -> Comparison | None:
     """The link on the comparison model, when the mission has one."""
     m = file.mission
     if m.mirror.comparison is None:
         return None
-    run = tracking.worst(m, runs, "comparison")
-    return Comparison(run, float(link.margin_of_error(m, np.array([tracking.residual_rad(m, run.trace)]))[0]))
+    run = paper_cases.worst(runs, m.requirement.residual_statistic, Variant.COMPARISON)
+    return Comparison(run, float(link.margin_of_error(m, np.array([paper_cases.residual_rad(m, run.trace)]))[0]))
 
 
 def largest_error(m: Mission, margin_db: float) -> float:

@@ -9,11 +9,12 @@ from numpy.typing import NDArray
 
 from microrad import link
 from microrad.link import pointing
-from microrad.link.requirement import Requirement, Subject, derived_from, outage_words
-from microrad.loop import sine_run as simulate
+from microrad.link.requirement import IMPOSSIBLE, Requirement, Subject, derived_from, outage_words
+from microrad.link.under_jitter import Performance
+from microrad.loop import sine_run
 from microrad.loop.fine_pointing import FinePointingStudy
-from microrad.loop.paper_cases import Run, mirror_model, residual_rad
-from microrad.mirror import hysteresis
+from microrad.loop.paper_cases import Run, residual_rad
+from microrad.mirror import MirrorParts, Variant, hysteresis
 from microrad.mirror import summary as mirror_summary
 from microrad.mission.file import LinkFile
 from microrad.mission.model import Mission, Source
@@ -28,30 +29,38 @@ PAPER_RATE_BIT_S = 300e6  # section 2.2
 
 # ------------------------------------------------------------------------------------------------------- requirements
 def of_residual(
-    m: Mission, sources: Mapping[str, Source], achieved: link.LinkBudget, worst: Run, runs: tuple[Run, ...]
+    m: Mission,
+    mirrors: MirrorParts,
+    sources: Mapping[str, Source],
+    achieved: link.LinkBudget,
+    worst: Run,
+    runs: tuple[Run, ...],
 ) -> tuple[Requirement, Requirement]:
     """The error of the paper's loop in the worst of its sines, and the margin that it leaves communication."""
-    q, left, cause = m.requirement, residual_rad(m, worst.trace), residual_cause(m, worst, runs)
+    q, left, cause = m.requirement, residual_rad(m, worst.trace), residual_cause(m, mirrors, worst, runs)
     spare, derived = achieved.margin_db - q.margin_db, derived_from(sources, "communication.")
-    because, name = "the residual: " + cause, "communication margin"
+    because, name, doubt = "the residual: " + cause, "communication margin", _doubt(m, achieved.possible)
     return (
         _error("residual", "residual pointing error", m, left, cause),
-        Requirement("communication", name, "dB", q.margin_db, achieved.margin_db, spare, because, unknown(m), derived),
+        Requirement("communication", name, "dB", q.margin_db, achieved.margin_db, spare, because, doubt, derived),
     )
 
 
 def of_fine_pointing(
-    m: Mission, sources: Mapping[str, Source], fine: FinePointingStudy, margin_db: float
+    m: Mission, sources: Mapping[str, Source], fine: FinePointingStudy, case: Performance
 ) -> tuple[Requirement, ...]:
-    """The mirror's stroke; the best controller's error for its share of the time, and the margin but for the outage."""
+    """The mirror's stroke; the best controller's error for its share of the time, and the margin but for the outage.
+
+    ``case`` is the link under that controller.
+    """
     q, controller, cause = m.requirement, fine.best.design.name, fine.budget.dominant
-    left = fine.best.simulated["given"].quantile_rad
+    left = fine.best.simulated[Variant.GIVEN].quantile_rad
     name, derived = f"link margin but for {outage_words(m)} ({controller})", derived_from(sources, "communication.")
-    spare = margin_db - q.margin_db
+    spare, doubt = case.margin_db - q.margin_db, _doubt(m, case.possible)
     return (
-        _stroke(m, sources, fine),
+        _stroke(sources, fine),
         _error("fine pointing", f"fine pointing at {100 * fine.quantile:g} % ({controller})", m, left, cause),
-        Requirement("communication", name, "dB", q.margin_db, margin_db, spare, cause, unknown(m), derived),
+        Requirement("communication", name, "dB", q.margin_db, case.margin_db, spare, cause, doubt, derived),
     )
 
 
@@ -61,8 +70,13 @@ def unknown(m: Mission) -> str:
     return "dynamics of the mirror, which its model does not have" if lacking else ""
 
 
-def _stroke(m: Mission, sources: Mapping[str, Source], fine: FinePointingStudy) -> Requirement:
-    axis = min(fine.scene.own_stroke(m), key=lambda each: each.margin_rad)
+def _doubt(m: Mission, possible: bool) -> str:
+    """Why a margin of the simulated link may not be relied on, or nothing; it is ``possible`` by its power."""
+    return unknown(m) if possible else IMPOSSIBLE
+
+
+def _stroke(sources: Mapping[str, Source], fine: FinePointingStudy) -> Requirement:
+    axis = min(fine.scene.own_stroke, key=lambda each: each.margin_rad)
     largest = max(axis.lines, key=lambda line: line.value).name
     name, derived = f"stroke for the worst case ({axis.label})", derived_from(sources, "pointing.")
     needed, given = axis.needed_rad, axis.available_rad
@@ -74,17 +88,17 @@ def _error(subject: Subject, name: str, m: Mission, left_rad: float, cause: str)
     return Requirement(subject, name, "rad", allowed, left_rad, allowed - left_rad, cause, unknown(m))
 
 
-def residual_cause(m: Mission, worst: Run, runs: tuple[Run, ...]) -> str:
+def residual_cause(m: Mission, mirrors: MirrorParts, worst: Run, runs: tuple[Run, ...]) -> str:
     """What the residual is made of: an amplifier at its limits, else the lag of the loop, else hysteresis."""
     if worst.at_limits:
         return f"{worst.at_limits} at {worst.freq_hz:g} Hz"
     linear = next(
-        r for r in runs if (r.mirror, r.controller, r.freq_hz) == ("no hysteresis", worst.controller, worst.freq_hz)
+        r for r in runs if (r.mirror, r.controller, r.freq_hz) == (Variant.STRAIGHT, worst.controller, worst.freq_hz)
     )
     share = 1.0 - residual_rad(m, linear.trace) / residual_rad(m, worst.trace)
     if share < 0.5:
         return f"lag of the loop at {worst.freq_hz:g} Hz"
-    model = mirror_model(m, m.mirror)
+    model = mirrors.own[Variant.GIVEN].model
     wrong_way = isinstance(model, hysteresis.BoucWen) and model.reversal_slope_rad_v() < 0.0
     return f"hysteresis {'at the non-physical reversals ' if wrong_way else ''}at {worst.freq_hz:g} Hz"
 
@@ -109,7 +123,7 @@ class Evidence:
     """What the claims are judged on."""
 
     mission: Mission
-    loops: tuple[simulate.HysteresisLoop, ...]
+    loops: tuple[sine_run.HysteresisLoop, ...]
     summary: mirror_summary.Summary
     runs: tuple[Run, ...]
     scan: paper.Scan | None
@@ -236,7 +250,7 @@ def _linear_claim(s: mirror_summary.Summary) -> Claim:
     return Claim("Eq. 2", "linear dynamics of the mirror", ours, "partly" if outside else "yes", why)
 
 
-def _loops_claim(loops: tuple[simulate.HysteresisLoop, ...]) -> Claim:
+def _loops_claim(loops: tuple[sine_run.HysteresisLoop, ...]) -> Claim:
     ours = ", ".join(f"{100 * loop.width:.2f} % at {loop.freq_hz:g} Hz" for loop in loops)
     grows = len(loops) > 1 and all(a.width < 0.99 * b.width for a, b in pairwise(loops))
     why = "width of h over the output's peak-to-peak; some of it at 100 Hz is linear phase lag that Eq. 2 holds too"
@@ -246,8 +260,8 @@ def _loops_claim(loops: tuple[simulate.HysteresisLoop, ...]) -> Claim:
 
 def _pairs(e: Evidence, controller: str) -> list[tuple[Run, Run]]:
     """Runs on the printed mirror with the same run without hysteresis."""
-    linear = {r.freq_hz: r for r in e.runs if (r.mirror, r.controller) == ("no hysteresis", controller)}
-    printed = (r for r in e.runs if (r.mirror, r.controller) == ("given", controller))
+    linear = {r.freq_hz: r for r in e.runs if (r.mirror, r.controller) == (Variant.STRAIGHT, controller)}
+    printed = (r for r in e.runs if (r.mirror, r.controller) == (Variant.GIVEN, controller))
     return [(r, linear[r.freq_hz]) for r in printed if r.freq_hz in linear]
 
 
@@ -278,7 +292,7 @@ def _rms(values: Floats) -> float:
 
 
 def _drop_claims(e: Evidence) -> list[Claim]:
-    given = {(r.controller, r.freq_hz): r for r in e.runs if r.mirror == "given"}
+    given = {(r.controller, r.freq_hz): r for r in e.runs if r.mirror == Variant.GIVEN}
     claims = []
     for f, claimed in paper.CLAIMED_DROP_RAD.items():
         if ("PID + inverse", f) not in given or ("PID", f) not in given:

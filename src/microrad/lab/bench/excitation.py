@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from microrad.core.units import format_quantity
+from microrad.lab.recording.records import frozen
 from microrad.mission.fields import Problem, ProblemsError
 
 Floats = NDArray[np.float64]
@@ -73,13 +74,6 @@ class Excitation:
     def samples(self) -> int:
         """Number of samples."""
         return int(self.drive.shape[0])
-
-    @property
-    def crest_factor(self) -> tuple[float, ...]:
-        """Peak over rms of each input about its rest; nan for an input that rests throughout."""
-        moved = self.drive - self.rest_v
-        rms = np.sqrt(np.mean(moved**2, axis=0))
-        return tuple(float(p / r) if r > 0.0 else math.nan for p, r in zip(np.abs(moved).max(axis=0), rms, strict=True))
 
 
 @dataclass(frozen=True, slots=True)
@@ -165,7 +159,7 @@ def multisine(
     return tuple(
         Excitation(
             each,
-            _frozen(np.tile(drives[:, part], (periods, 1))),
+            frozen(np.tile(drives[:, part], (periods, 1))),
             limits.rate_hz,
             offset_v,
             length,
@@ -235,19 +229,7 @@ def staircase(
     return Excitation(name, _on_axis(limits, name, drive, rest, axis), limits.rate_hz, rest, step_samples=steps)
 
 
-def log_spaced(samples: int, per_decade: int) -> NDArray[np.int64]:
-    """Distinct sample numbers from 0 to `samples` - 1, about `per_decade` in each decade: where creep is observed."""
-    count = max(2, math.ceil(per_decade * math.log10(max(samples, 2))) + 1)
-    return np.unique(np.round(np.geomspace(1, samples, count)).astype(np.int64) - 1)
-
-
 # --------------------------------------------------------------------------------------------------------------- limits
-def _frozen(values: Floats) -> Floats:
-    values = np.ascontiguousarray(values)
-    values.flags.writeable = False
-    return values
-
-
 def _samples(limits: Limits, name: str, key: str, seconds: float) -> int:
     """Number of samples in a time, refused before anything of that size is allocated."""
     most = MOST_SAMPLES / limits.inputs / limits.rate_hz
@@ -327,7 +309,7 @@ def _on_axis(limits: Limits, name: str, column: Floats, rest_v: float, axis: int
         raise DesignError(name, Problem("axis", reason, f"1 to {limits.inputs}"))
     drive = np.full((column.shape[0], limits.inputs), rest_v)
     drive[:, axis] = column[:, 0]
-    return _frozen(drive)
+    return frozen(drive)
 
 
 # -------------------------------------------------------------------------------------------------------- whole periods

@@ -4,9 +4,11 @@ Every quantity is text with a unit in the file (`duration = "10 s"`) and an SI f
 `planfile` reads the file and reports the faults.
 """
 
+import difflib
 import zlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -15,6 +17,7 @@ from pydantic_core import CoreSchema, core_schema
 
 from microrad.core.units import UnitError, format_quantity
 from microrad.lab.bench.excitation import (
+    DesignError,
     Excitation,
     Limits,
     Lines,
@@ -24,17 +27,15 @@ from microrad.lab.bench.excitation import (
     staircase,
 )
 from microrad.mission.fields import Problem, Quantity, Several, Table, Whole
+from microrad.mission.file import check_table
 from microrad.mission.model import Amplifier as AmplifierTable
 from microrad.mission.model import AngleOrZero, Duration, Frequencies
 from microrad.mission.tables.mirror import Frequency, Name, Rate, Voltage
+from microrad.mission.toml import Document, Fault, MissionError, UnreadableError, clipped, shown
 
 FORMATS = ("csv", "lvm", "tdms", "mat", "mat73", "npz", "hdf5")
 """File formats that the bench writes; mat is MATLAB's version 5, mat73 its version 7.3."""
 
-TRUTHS = ("bench", "linear", "bouc-wen")
-"""Mirrors that the bench can play: its own, Eq. 2 and Eq. 3 of SPIE 11852, 118523B."""
-
-Truth = Literal["bench", "linear", "bouc-wen"]
 
 MOST_AXES = 4
 """Axes of a bench; a mirror has two."""
@@ -124,10 +125,11 @@ class SensorTable(Table):
 class BenchTable(Table):
     """The virtual bench: which mirror is played, its drives and axes, and what stands before and behind it.
 
-    Axis i moves with drive i, and with `crosstalk` times every other one.
+    `truth` is the bench's own mirror, or Eq. 2 ("linear") or Eq. 3 ("bouc-wen") of SPIE 11852, 118523B. Axis i
+    moves with drive i, and with `crosstalk` times every other one.
     """
 
-    truth: Truth
+    truth: Literal["bench", "linear", "bouc-wen"]
     axes: Annotated[int, Whole("", least=1, most=MOST_AXES)] = 1
     crosstalk: Annotated[float, Quantity("", least=-0.5, most=0.5)] = 0.0
     amplifier: AmplifierTable
@@ -150,6 +152,14 @@ class ExcitationTable(Table):
         """The records of this excitation; raises `DesignError`."""
         raise NotImplementedError
 
+    def parameters(self) -> dict[str, Any]:
+        """What the kind has of its own, as the function that designs it takes it; axes count from 0 there."""
+        own = {
+            name: getattr(self, name) for name in type(self).model_fields if name not in ExcitationTable.model_fields
+        }
+        del own["kind"]
+        return {**own, "axis": own["axis"] - 1} if "axis" in own else own
+
 
 class ChirpTable(ExcitationTable):
     """Logarithmic chirp of one drive."""
@@ -164,18 +174,7 @@ class ChirpTable(ExcitationTable):
 
     def design(self, name: str, limits: Limits) -> tuple[Excitation, ...]:
         """One record."""
-        return (
-            logarithmic_chirp(
-                limits,
-                start_hz=self.start_hz,
-                stop_hz=self.stop_hz,
-                duration_s=self.duration_s,
-                amplitude_v=self.amplitude_v,
-                offset_v=self.offset_v,
-                axis=self.axis - 1,
-                name=name,
-            ),
-        )
+        return (logarithmic_chirp(limits, **self.parameters(), name=name),)
 
 
 class MultisineTable(ExcitationTable):
@@ -194,16 +193,9 @@ class MultisineTable(ExcitationTable):
 
     def design(self, name: str, limits: Limits) -> tuple[Excitation, ...]:
         """One record for each realisation."""
-        return multisine(
-            limits,
-            Lines(self.period_s, self.start_hz, self.stop_hz, self.lines),
-            rms_v=self.rms_v,
-            offset_v=self.offset_v,
-            periods=self.periods,
-            realisations=self.realisations,
-            seed=self.seed,
-            name=name,
-        )
+        parameters = self.parameters()
+        lines = Lines(*(parameters.pop(key) for key in ("period_s", "start_hz", "stop_hz", "lines")))
+        return multisine(limits, lines, **parameters, name=name)
 
 
 class SinesTable(ExcitationTable):
@@ -218,18 +210,12 @@ class SinesTable(ExcitationTable):
 
     def design(self, name: str, limits: Limits) -> tuple[Excitation, ...]:
         """One record for each frequency, named with it where there are several."""
-        several = len(self.frequencies_hz) > 1
+        parameters = self.parameters()
+        frequencies_hz = parameters.pop("frequencies_hz")
+        names = [f"{name}-{f:g}hz" for f in frequencies_hz] if len(frequencies_hz) > 1 else [name]
         return tuple(
-            growing_sines(
-                limits,
-                freq_hz=freq_hz,
-                amplitudes_v=self.amplitudes_v,
-                periods=self.periods,
-                offset_v=self.offset_v,
-                axis=self.axis - 1,
-                name=f"{name}-{freq_hz:g}hz" if several else name,
-            )
-            for freq_hz in self.frequencies_hz
+            growing_sines(limits, **parameters, freq_hz=freq_hz, name=each)
+            for freq_hz, each in zip(frequencies_hz, names, strict=True)
         )
 
 
@@ -244,16 +230,7 @@ class StaircaseTable(ExcitationTable):
 
     def design(self, name: str, limits: Limits) -> tuple[Excitation, ...]:
         """One record."""
-        return (
-            staircase(
-                limits,
-                levels_v=self.levels_v,
-                dwell_s=self.dwell_s,
-                rise_s=self.rise_s,
-                axis=self.axis - 1,
-                name=name,
-            ),
-        )
+        return (staircase(limits, **self.parameters(), name=name),)
 
 
 KINDS: dict[str, type[ExcitationTable]] = {
@@ -327,23 +304,6 @@ class Plan:
     sha256: str
 
 
-def limits_of(limits: LimitsTable, axes: int, rate_hz: float | None = None) -> Limits:
-    """The limits as the designs take them, for each of the bench's axes, at the plan's rate or another."""
-    return Limits(
-        rate_hz=rate_hz or limits.rate_hz,
-        drive_min_v=limits.drive_min_v,
-        drive_max_v=limits.drive_max_v,
-        slew_v_s=limits.slew_v_s,
-        samples_per_period=limits.samples_per_period,
-        inputs=axes,
-    )
-
-
-def with_truth(plan: Plan, truth: Truth) -> Plan:
-    """The same plan played by one mirror throughout."""
-    return replace(plan, records=tuple(replace(record, truth=truth) for record in plan.records))
-
-
 def only(plan: Plan, names: Sequence[str]) -> Plan:
     """The plan cut down to some of its records, by name; their noise stays the same.
 
@@ -354,3 +314,132 @@ def only(plan: Plan, names: Sequence[str]) -> Plan:
         if name not in known:
             raise ValueError(f"{plan.path}: no record is named '{name}'; the plan has {', '.join(known)}.")
     return replace(plan, records=tuple(r for r in plan.records if r.excitation.name in names))
+
+
+_NAME = set("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789-_")
+_MOST_EXCITATIONS = 200
+
+
+class PlanError(MissionError):
+    """A plan file that cannot be used: `path`, and every fault found in `faults`, by line."""
+
+
+def packaged_plans() -> tuple[str, ...]:
+    """Names of the plans that come with the package; `load_plan` takes them."""
+    files = resources.files("microrad.lab").joinpath("plans").iterdir()
+    return tuple(sorted(Path(file.name).stem for file in files if file.name.endswith(".toml")))
+
+
+def load_plan(path: str | Path) -> Plan:
+    """Read a plan file, or a packaged plan by its name where no such file exists, and design its excitations.
+
+    Raises `PlanError` with every fault: what is no TOML, no key, no quantity, and each excitation that leaves a limit.
+    """
+    if not Path(path).exists() and str(path) in packaged_plans():
+        with resources.as_file(resources.files("microrad.lab") / "plans" / f"{path}.toml") as packaged:
+            return _load(packaged)
+    return _load(Path(path))
+
+
+def _load(path: Path) -> Plan:
+    try:
+        document = Document.read(path, "plan file")
+    except UnreadableError as error:
+        expected = error.expected if path.exists() else f"a plan file, or one of {', '.join(packaged_plans())}"
+        fault = Fault("", "", 0, f"the plan file {error.reason}", expected, file=clipped(str(path)))
+        raise PlanError(path, [fault]) from None
+    except MissionError as error:
+        raise PlanError(path, error.faults) from None
+    tables = _excitation_tables(document)
+    root = check_table(document, PlanTable, document.data)
+    excitations = {name: _excitation(document, name, table) for name, table in tables.items()}
+    truth = "" if root is None else root.bench.truth
+    records = _records(document, excitations, _frame(document, root), truth)
+    if root is None or document.faults:
+        raise PlanError(path, document.faults)
+    return Plan(root.name, root.formats, root.limits, root.bench, records, path, document.text, document.sha256)
+
+
+def _excitation_tables(document: Document) -> dict[str, object]:
+    """The tables [excitation.NAME]; anything else under that name is noted, and what is left can be checked."""
+    found = document.data.get("excitation")
+    expected = "a table [excitation.NAME] for each, NAME of letters, digits, - and _"
+    if not isinstance(found, dict) or not found:
+        if "excitation" not in document.damaged and not any(d.startswith("excitation.") for d in document.damaged):
+            reason = "is missing" if found is None else "is not a group of named tables"
+            document.fault("excitation", "", reason, expected)
+        document.data["excitation"] = {}
+        return {}
+    if len(found) > _MOST_EXCITATIONS:
+        document.fault("excitation", "", f"has {len(found)} tables", f"at most {_MOST_EXCITATIONS}")
+        return {}
+    for name in [name for name in found if not name or not set(name) <= _NAME or len(name) > 60]:
+        document.fault(f"excitation.{name}", "", "is no name that a file can have", expected)
+    return dict(found)
+
+
+def _excitation(document: Document, name: str, table: object) -> ExcitationTable | None:
+    """One excitation, or None with every fault in it noted."""
+    key = f"excitation.{name}"
+    if not isinstance(table, dict):
+        document.fault(key, shown(table), "is no table", f"[{key}] with a kind and its parameters")
+        return None
+    kind = table.get("kind")
+    if not isinstance(kind, str) or kind not in KINDS:
+        if f"{key}.kind" not in document.damaged:
+            choices = " or ".join(f'kind = "{each}"' for each in KINDS)
+            near = next(iter(difflib.get_close_matches(str(kind)[:60], KINDS, n=1)), "")
+            reason = "is missing" if kind is None else "is none of the choices"
+            value = "" if kind is None else shown(kind)
+            document.fault(f"{key}.kind", value, reason, choices, nearest=near and f'"{near}"')
+        return None
+    return check_table(replace(document, prefix=key), KINDS[kind], table)
+
+
+def _frame(document: Document, root: PlanTable | None) -> tuple[LimitsTable, int] | None:
+    """Limits and number of axes where they are in order, also when something else in the file is not."""
+    if root is not None:
+        return root.limits, root.bench.axes
+    silent = replace(document, faults=[], prefix="limits")  # what is wrong with them has been said
+    limits = check_table(silent, LimitsTable, document.data.get("limits", {}))
+    bench = document.data.get("bench", {})
+    axes = bench.get("axes", 1) if isinstance(bench, dict) else 1
+    return (limits, axes) if limits is not None and axes in range(1, MOST_AXES + 1) else None
+
+
+def _records(
+    document: Document, tables: dict[str, ExcitationTable | None], frame: tuple[LimitsTable, int] | None, truth: str
+) -> tuple[Record, ...]:
+    """Every record of every excitation that can be designed; the others are noted. `truth` is that of the bench."""
+    if frame is None:
+        return ()
+    records: list[Record] = []
+    for name, table in tables.items():
+        if table is None:
+            continue
+        try:
+            rate_hz = table.rate_hz or frame[0].rate_hz
+            designs = table.design(name, Limits(**{**dict(frame[0]), "rate_hz": rate_hz}, inputs=frame[1]))
+        except DesignError as error:
+            _note(document, name, error)
+            continue
+        kind = document.data["excitation"][name]["kind"]
+        played = truth if table.truth == "plan" else table.truth
+        records += [Record(design, kind, table.use, played, table.noise_share) for design in designs]
+    _note_same_names(document, [record.excitation.name for record in records])
+    return tuple(records)
+
+
+def _note(document: Document, name: str, error: DesignError) -> None:
+    for problem in error.problems:
+        key = f"excitation.{name}.{problem.key}"
+        found = document.statements.get(key)
+        document.fault(key, clipped(found.value) if found else "", problem.reason, problem.expected)
+
+
+def _note_same_names(document: Document, names: Iterable[str]) -> None:
+    seen: set[str] = set()
+    for name in names:
+        if name.lower() in seen:
+            document.fault("excitation", "", f'makes two records named "{name}"', "names that stay different")
+        seen.add(name.lower())

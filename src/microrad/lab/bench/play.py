@@ -1,6 +1,5 @@
 """Playing a plan: converter, mirror, sensor and converter again, for each record of it."""
 
-import hashlib
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -11,7 +10,7 @@ from numpy.typing import NDArray
 from microrad.core.units import format_quantity
 from microrad.lab.bench.plan import ConvertersTable, Plan, Record
 from microrad.lab.bench.truth import Amplifier, bench_output, bouc_wen_output, linear_output
-from microrad.lab.recording import Recording
+from microrad.lab.recording.records import Recording, digest_of, frozen
 
 Floats = NDArray[np.float64]
 Progress = Callable[[int, int, str], None]
@@ -60,12 +59,11 @@ def played(plan: Plan, seed: int, on_progress: Progress | None = None) -> Iterat
     """Each record with its recording, one after the other, see `play`."""
     if seed < 0:
         raise BenchError(f"the seed is {seed}; give a whole number of at least 0")
+    report = on_progress or (lambda *_: None)
     for done, record in enumerate(plan.records):
-        if on_progress:
-            on_progress(done, len(plan.records), record.excitation.name)
+        report(done, len(plan.records), record.excitation.name)
         yield record, _recorded(plan, record, seed)
-    if on_progress:
-        on_progress(len(plan.records), len(plan.records), plan.name)
+    report(len(plan.records), len(plan.records), plan.name)
 
 
 def true_output(plan: Plan, record: Record) -> tuple[Floats, Floats]:
@@ -87,30 +85,24 @@ def true_output(plan: Plan, record: Record) -> tuple[Floats, Floats]:
 
 
 def _recorded(plan: Plan, record: Record, seed: int) -> Recording:
+    axes = plan.bench.axes
+    numbers = [""] if axes == 1 else [str(i + 1) for i in range(axes)]
     drive, angle = true_output(plan, record)
     measured = angle + _sensor_error(plan, record, angle, seed)
     _check_range(plan, record, measured)
-    output = converters(plan.bench.converters)[1].convert(measured)
-    drive, output = (np.ascontiguousarray(values) for values in (drive, output))
-    for values in (drive, output):
-        values.flags.writeable = False
+    drive, output = frozen(drive), frozen(converters(plan.bench.converters)[1].convert(measured))
     return Recording(
         path=record.excitation.name,
-        sha256=hashlib.sha256(drive.tobytes() + output.tobytes()).hexdigest(),
+        sha256=digest_of(drive, output),
         drive=drive,
         output=output,
         rate_hz=record.excitation.rate_hz,
-        input_names=channel_names("drive", plan.bench.axes),
-        output_names=channel_names("angle", plan.bench.axes),
+        input_names=tuple(f"drive{n}" for n in numbers),
+        output_names=tuple(f"angle{n}" for n in numbers),
         period_samples=record.excitation.period_samples,
-        input_units=("V",) * plan.bench.axes,
-        output_units=("mrad",) * plan.bench.axes,
+        input_units=("V",) * axes,
+        output_units=("mrad",) * axes,
     )
-
-
-def channel_names(word: str, count: int) -> tuple[str, ...]:
-    """The name of the channels: the word, numbered from 1 where there are several."""
-    return (word,) if count == 1 else tuple(f"{word}{i + 1}" for i in range(count))
 
 
 def _sensor_error(plan: Plan, record: Record, angle: Floats, seed: int) -> Floats:

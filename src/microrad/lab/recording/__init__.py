@@ -5,8 +5,16 @@ The values keep the units of the file; `identify` is told what they are.
 """
 
 from microrad.lab.recording.reader import multisine_recordings, read_recording, recording_from_arrays
-from microrad.lab.recording.records import ACCEPTABLE, MIN_SAMPLES, Finding, FloatArray, Recording, RecordingError
-from microrad.lab.recording.stated import read_in, stated_units
+from microrad.lab.recording.records import (
+    ACCEPTABLE,
+    MIN_SAMPLES,
+    Finding,
+    FloatArray,
+    Recording,
+    RecordingError,
+    read_in,
+    stated_units,
+)
 
 __all__ = [
     "ACCEPTABLE",

@@ -1,19 +1,16 @@
 """The file before its numbers: does it exist, how big is it, and what is it in truth?"""
 
-from __future__ import annotations
-
 import difflib
 import hashlib
 import math
 from collections.abc import Sequence
 from pathlib import Path
 
+from microrad.core.folder import read_bytes
 from microrad.lab.recording.records import RecordingError
 
 MAX_BYTES = 2_000_000_000
 _UNPACKED_BYTES, _UNPACKED_TIMES = 256_000_000, 20
-_HEAD_BYTES = 1024
-
 _HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
 _FORMAT_NAMES = {
     "tdms": "a LabVIEW TDMS file",
@@ -80,8 +77,7 @@ def _nearest_file(path: Path) -> str:
 def read_head(path: Path, size: int) -> bytes:
     """The first bytes of the file."""
     try:
-        with path.open("rb") as file:
-            return file.read(size)
+        return read_bytes(path, size)
     except OSError as error:
         raise RecordingError(f"{path}: the file cannot be read ({error}); check its permissions.") from None
 
@@ -115,7 +111,7 @@ def file_format(path: Path) -> str:
     Raises `RecordingError` where the content and the suffix of the name contradict each other, and for an index file,
     an old or a compressed one.
     """
-    head = read_head(path, _HEAD_BYTES)
+    head = read_head(path, 1024)
     found = _content(path, head)
     suffix = path.suffix.lower()
     expected = _SUFFIXES.get(suffix)

@@ -1,16 +1,15 @@
 """From a file, or from arrays, to a checked `Recording`."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from microrad.lab.recording.checks import Signals, check_signals
+from microrad.lab.recording.checks.sample_rate import agreed_rate, check_rate, rate_of_time
+from microrad.lab.recording.checks.signals import Signals, check_signals
 from microrad.lab.recording.files import check_file, file_format
-from microrad.lab.recording.rates import agreed_rate, check_rate, rate_of_time
+from microrad.lab.recording.formats.source import SECONDS, Source, StatedRate, time_unit
 from microrad.lab.recording.records import (
     ACCEPTABLE,
     MIN_SAMPLES,
@@ -21,7 +20,6 @@ from microrad.lab.recording.records import (
     digest_of,
     frozen,
 )
-from microrad.lab.recording.sources import SECONDS, Source, StatedRate, time_unit
 
 Column = int | str
 
@@ -155,26 +153,26 @@ def open_source(path: Path) -> Source:
     # One import per format: each pulls a library that the others do not need.
     kind = file_format(path)
     if kind == "tdms":
-        from microrad.lab.recording.tdms import TdmsSource
+        from microrad.lab.recording.formats.tdms import TdmsSource
 
         return TdmsSource(path)
     if kind == "lvm":
-        from microrad.lab.recording.lvm import LvmSource
+        from microrad.lab.recording.formats.lvm import LvmSource
 
         return LvmSource(path)
     if kind == "mat":
-        from microrad.lab.recording.matlab import MatlabSource
+        from microrad.lab.recording.formats.matlab import MatlabSource
 
         return MatlabSource(path)
     if kind in ("hdf5", "mat73"):
-        from microrad.lab.recording.hdf5 import Hdf5Source
+        from microrad.lab.recording.formats.hdf5 import Hdf5Source
 
         return Hdf5Source(path, matlab=kind == "mat73")
     if kind in ("npy", "npz"):
-        from microrad.lab.recording.numpyfiles import NumpySource
+        from microrad.lab.recording.formats.numpy_files import NumpySource
 
         return NumpySource(path, archive=kind == "npz")
-    from microrad.lab.recording.text import TextSource
+    from microrad.lab.recording.formats.text import TextSource
 
     return TextSource(path)
 

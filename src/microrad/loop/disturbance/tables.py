@@ -9,6 +9,8 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from microrad.core.folder import read_bytes
+
 Floats = NDArray[np.float64]
 Unit = Literal["rad^2/Hz", "mrad^2/Hz", "urad^2/Hz", "nrad^2/Hz"]
 
@@ -18,15 +20,16 @@ _WRONG_FREQUENCY = re.compile(r"\b[kmg]hz\b|(?<!m)(?<!u)(?<!n)rad\s*/\s*s\b", re
 _MAX_BYTES = 100_000_000
 
 
-def read_table(path: str | Path, unit: Unit | None = None) -> tuple[Floats, Floats]:
+def read_table(path: str | Path, unit: Unit | None = None, data: bytes | None = None) -> tuple[Floats, Floats]:
     """Frequencies (Hz) and one-sided densities (rad^2/Hz) from a text of two columns.
 
     Columns are separated by comma, semicolon, tab or white space; lines that begin with # and blank lines are skipped.
-    The unit of the density stands in a heading line ("Hz, urad^2/Hz"), commented or not, or in ``unit``. Raises
-    ValueError for a file that cannot be read, no unit or two that differ, a line without exactly two numbers, and rows
-    that `checked` refuses, each with its line.
+    The unit of the density stands in a heading line ("Hz, urad^2/Hz"), commented or not, or in ``unit``. With
+    ``data``, these are the bytes of the file, which is not read again. Raises ValueError for a file that cannot be
+    read, no unit or two that differ, a line without exactly two numbers, and rows that `checked` refuses, each with its
+    line.
     """
-    lines = _lines(Path(path))
+    lines = _lines(Path(path), data)
     heading = [text for _, text in lines[: _first_numbers(lines)]]
     rows = [(number, text) for number, text in lines[_first_numbers(lines) :] if not text.startswith("#")]
     scale = _SCALES[_unit(path, heading, unit)]
@@ -34,16 +37,17 @@ def read_table(path: str | Path, unit: Unit | None = None) -> tuple[Floats, Floa
     return checked(values[:, 0], scale * values[:, 1], str(path), [number for number, _ in rows])
 
 
-def _lines(path: Path) -> list[tuple[int, str]]:
+def _lines(path: Path, data: bytes | None) -> list[tuple[int, str]]:
     """Line number and text of each line that is not blank."""
-    if not path.is_file():
+    if data is None and not path.is_file():
         raise ValueError(f"{path}: there is no such file; check the path of the table")
-    if path.stat().st_size > _MAX_BYTES:
+    if (path.stat().st_size if data is None else len(data)) > _MAX_BYTES:
         raise ValueError(f"{path}: more than {_MAX_BYTES // 10**6} MB; average the spectrum to fewer rows")
     try:
-        text = path.read_text(encoding="utf-8-sig")
+        text = (read_bytes(path, _MAX_BYTES) if data is None else data).decode("utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
-        raise ValueError(f"{path}: the table cannot be read as text ({error}); save it as CSV in UTF-8") from None
+        reason = getattr(error, "strerror", error)
+        raise ValueError(f"{path}: the table cannot be read as text ({reason}); save it as CSV in UTF-8") from None
     return [(i, line.strip()) for i, line in enumerate(text.splitlines(), 1) if line.strip()]
 
 

@@ -35,14 +35,12 @@ from microrad.loop.fine_pointing.results import (
     sines,
     verify,
 )
-from microrad.loop.fine_pointing.scenario import VARIANTS, Scene, scene, table
-from microrad.mission.file import MissionFile
+from microrad.loop.fine_pointing.scenario import Scene, scene, table
 
 __all__ = [
     "BASELINE",
     "COUNTERS",
     "PROMISE",
-    "VARIANTS",
     "Design",
     "Difference",
     "ErrorBudget",
@@ -95,35 +93,33 @@ class FinePointingStudy:
     optimum_rad: float
 
 
-def run(file: MissionFile, on_progress: Progress = lambda done, total, what: None) -> FinePointingStudy:
-    """Design, tune and simulate the mission's fine-pointing loop; seeded by the mission.
+def run(scene: Scene, on_progress: Progress = lambda done, total, what: None) -> FinePointingStudy:
+    """Design, tune and simulate controllers for a fine-pointing loop; seeded by its table.
 
-    Raises ValueError with the reason for a loop that cannot be built and a controller that cannot meet its margin.
+    Raises ValueError with the reason for a controller that cannot meet its margin.
     """
-    m, built = file.mission, scene(file)
-    verified = verify(built, m, design(built, m, on_progress), on_progress)
+    verified = verify(scene, design(scene, on_progress), on_progress)
     chosen, designs = best(verified), [v.design for v in verified]
     segment = 2 * (verified[0].spectrum_rad2_hz.shape[0] - 1)
-    freq = np.asarray(np.fft.rfftfreq(segment, built.loop.timing.period_s), dtype=float)
-    before = np.sum([disturbance.psd(each, freq) for each in built.loop.disturbances[0]], axis=0)
+    freq = np.asarray(np.fft.rfftfreq(segment, scene.loop.timing.period_s), dtype=float)
+    before = np.sum([disturbance.psd(each, freq) for each in scene.loop.disturbances[0]], axis=0)
     return FinePointingStudy(
-        built,
+        scene,
         verified,
         chosen,
-        error_budget(built, m, chosen, on_progress),
-        sines(built, m, designs, on_progress),
+        error_budget(scene, chosen, on_progress),
+        sines(scene, designs, on_progress),
         freq,
         before,
-        table(m).quantile,
-        math.sqrt(built.loop.axes) * optimum_rms_rad(built.axis),
+        scene.table.quantile,
+        math.sqrt(scene.loop.axes) * optimum_rms_rad(scene.axis),
     )
 
 
-def run_one(file: MissionFile, name: str) -> Verified:
-    """One controller of the mission, tuned and simulated as `run` does it, without the others; `names` lists them.
+def run_one(scene: Scene, name: str) -> Verified:
+    """One controller of the loop, tuned and simulated as `run` does it, without the others; `names` lists them.
 
     Raises ValueError for another name, and as `run`.
     """
-    m, built = file.mission, scene(file)
-    (found,) = verify(built, m, design(built, m, only=(name,)))
+    (found,) = verify(scene, design(scene, only=(name,)))
     return found

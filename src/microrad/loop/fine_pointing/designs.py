@@ -12,10 +12,9 @@ from microrad.loop import control
 from microrad.loop.control import DesignPlant, Family, Specification, Tuned
 from microrad.loop.fine_loop.design import behind_filter, design_plant
 from microrad.loop.fine_loop.loop import LoopController, PointingLoop, ReferenceFilter, assemble, with_inverse
-from microrad.loop.fine_pointing.scenario import Scene, one_mirror, table
-from microrad.mirror import model as mirror
-from microrad.mirror import spread as mirror_spread
-from microrad.mission.model import Mission
+from microrad.loop.fine_pointing.scenario import Scene
+from microrad.mirror import from_table, spread
+from microrad.mission.tables.fine_pointing import FinePointing
 
 Progress = Callable[[int, int, str], None]
 
@@ -40,9 +39,8 @@ class Design:
     inverse: str = ""
 
 
-def families(m: Mission) -> tuple[Family, ...]:
-    """Kinds of controller that fit the mission: peak filters where it has wheels, damping where it has a gauge."""
-    f = table(m)
+def families(f: FinePointing) -> tuple[Family, ...]:
+    """Kinds of controller that fit the loop: peak filters where it has wheels, damping where it has a gauge."""
     lines = () if f.wheels is None else tuple(h * f.wheels.speed_hz for h in f.wheels.harmonics)
     below = tuple(line for line in lines if line < 0.4 * f.rate_hz)
     found = [control.PI, control.PI_NOTCH]
@@ -51,28 +49,24 @@ def families(m: Mission) -> tuple[Family, ...]:
     return (*found, *([control.peak_family(below)] if below else []))
 
 
-def plants(scene: Scene, m: Mission, seed: int) -> tuple[DesignPlant, ...]:
+def plants(scene: Scene, seed: int) -> tuple[DesignPlant, ...]:
     """The nominal plant of an axis, then one for each mirror drawn from the identification's covariance."""
-    drawn = mirror_spread.draws(m.mirror, DRAWS, seed) if m.mirror.uncertainty is not None else ()
-    loops = [scene.axis, *(replace(scene.axis, mirror=_drawn(m, t)) for t in drawn)]
+    of = scene.mirrors.table
+    drawn = spread.draws(of, DRAWS, seed) if of.uncertainty is not None else ()
+    loops = [scene.axis, *(replace(scene.axis, mirror=from_table(t)) for t in drawn)]
     return tuple(design_plant(loop) for loop in loops)
 
 
-def _drawn(m: Mission, of: object) -> mirror.Mirror:
-    return one_mirror(m.model_copy(update={"mirror": of}), "given")
-
-
-def names(m: Mission) -> tuple[str, ...]:
+def names(f: FinePointing) -> tuple[str, ...]:
     """The controllers that the study of a mission designs, the baseline first."""
     found = [BASELINE]
-    for family in families(m):
+    for family in families(f):
         found += [family.name, WITH_INVERSE] if family is control.PI else [family.name]
     return (*found, IN_SERIES)
 
 
 def design(
     scene: Scene,
-    m: Mission,
     on_progress: Progress = lambda done, total, what: None,
     only: Sequence[str] = (),
 ) -> tuple[Design, ...]:
@@ -80,11 +74,11 @@ def design(
 
     Raises ValueError for a name that `names` does not list, and with the reason when a modulus margin cannot be met.
     """
-    straight, wanted = plants(scene, m, table(m).seed), tuple(only) or names(m)
+    of, wanted = plants(scene, scene.table.seed), tuple(only) or names(scene.table)
     first = [name for name in wanted if name in {control.PI.name, WITH_INVERSE}]  # others begin with it
-    pi = _tuning(first[0], m, straight)() if first else None
+    pi = _tuning(first[0], scene.table, of)() if first else None
     others = [name for name in wanted if name not in first]
-    jobs = [_tuning(name, m, straight, pi) for name in others]
+    jobs = [_tuning(name, scene.table, of, pi) for name in others]
     told = len(wanted) - len(others)
     with shared_out(jobs, lambda turn: on_progress(told + turn, len(wanted), f"tuning {others[turn]}")) as results:
         tuned = dict(zip(others, results(), strict=True))
@@ -92,22 +86,21 @@ def design(
     if pi is not None:
         tuned |= dict.fromkeys(first, pi)
     return tuple(
-        Design(name, tuned[name], build(name, scene, m, tuned[name].controller), _INVERSE_USED.get(name, ""))
+        Design(name, tuned[name], build(name, scene, tuned[name].controller), _INVERSE_USED.get(name, ""))
         for name in wanted
     )
 
 
-def tune(name: str, m: Mission, of: Sequence[DesignPlant]) -> Tuned:
+def tune(name: str, f: FinePointing, of: Sequence[DesignPlant]) -> Tuned:
     """One of the controllers that `names` lists, tuned for these plants of an axis (see `plants`).
 
     Raises ValueError for another name, and with the reason when it cannot meet the modulus margin.
     """
-    return _tuning(name, m, of)()
+    return _tuning(name, f, of)()
 
 
-def _tuning(name: str, m: Mission, of: Sequence[DesignPlant], known: Tuned | None = None) -> Callable[[], Tuned]:
-    """What tunes one: it reads no mission. Families that contain the PI begin with the ``known`` one."""
-    f = table(m)
+def _tuning(name: str, f: FinePointing, of: Sequence[DesignPlant], known: Tuned | None = None) -> Callable[[], Tuned]:
+    """What tunes one, and reads no table: it may run in another process. Families with the PI begin with ``known``."""
     wanted = Specification(f.modulus_margin)
     if name == BASELINE:
         return partial(grid_baseline, of, wanted)
@@ -116,17 +109,17 @@ def _tuning(name: str, m: Mission, of: Sequence[DesignPlant], known: Tuned | Non
         filtered = tuple(behind_filter(p, path.discrete(p.period_s)) for p in of)
         return partial(control.tune, control.PI, filtered, wanted, seed=f.seed)
     wanted_family = control.PI.name if name == WITH_INVERSE else name
-    for family in families(m):
+    for family in families(f):
         if family.name == wanted_family:
             return partial(control.tune, family, of, wanted, seed=f.seed, base=known)
-    raise ValueError(f"{name!r} is no controller of this mission; it has {', '.join(names(m))}")
+    raise ValueError(f"{name!r} is no controller of this mission; it has {', '.join(names(f))}")
 
 
-def build(name: str, scene: Scene, m: Mission, axis: control.AxisController) -> LoopController:
+def build(name: str, scene: Scene, axis: control.AxisController) -> LoopController:
     """A tuned axis controller on all axes of the scene, with its inverse where its name says so."""
     if name not in _INVERSE_USED:
         return assemble(name, scene.loop, axis)
-    path, inverse = ReferenceFilter(table(m).reference_filter_hz), control.inverse(scene.loop.mirror)
+    path, inverse = ReferenceFilter(scene.table.reference_filter_hz), control.inverse(scene.loop.mirror)
     return with_inverse(name, scene.loop, axis, inverse, path, name == IN_SERIES)
 
 

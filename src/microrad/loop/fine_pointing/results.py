@@ -17,8 +17,9 @@ from microrad.loop.fine_loop.linear import Stationary, close, stationary
 from microrad.loop.fine_loop.loop import LoopController, PointingLoop
 from microrad.loop.fine_pointing import parts
 from microrad.loop.fine_pointing.designs import BASELINE, Design
-from microrad.loop.fine_pointing.scenario import BODY_POINTING, Scene, table, variants, with_mirror
-from microrad.mission.model import Mission
+from microrad.loop.fine_pointing.scenario import BODY_POINTING, Scene, with_mirror
+from microrad.mirror import Variant
+from microrad.mission.tables.fine_pointing import FinePointing
 
 Floats = NDArray[np.float64]
 Progress = Callable[[int, int, str], None]
@@ -47,9 +48,18 @@ class Outlook:
     simulated_rad: float
 
     @property
+    def times(self) -> float:
+        """How many times the linear rms is left when it is simulated."""
+        return self.simulated_rad / self.linear_rad
+
+    @property
     def holds(self) -> bool:
         """Whether the linear figure is a promise."""
-        return self.simulated_rad <= PROMISE * self.linear_rad
+        return self.times <= PROMISE
+
+    def mark(self, accept: bool) -> str:
+        """Refused where the linear figure is no promise, or accepted where the user says so; else nothing."""
+        return "" if self.holds else "accepted" if accept else "refused"
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,7 +96,7 @@ class Verified:
     spectrum_rad2_hz: Floats
     predicted_rad2_hz: Floats
 
-    def meets(self, required_rad: float, variant: str = "given") -> bool:
+    def meets(self, required_rad: float, variant: Variant = Variant.GIVEN) -> bool:
         """Whether the quantile stays within the requirement."""
         return self.simulated[variant].quantile_rad <= required_rad
 
@@ -152,33 +162,32 @@ class Sine:
     """Fig. 6 and 8 under vibration and noise: axis error while tracking a sine on x, on one variant of the mirror."""
 
     controller: str
-    variant: str
+    variant: Variant
     freq_hz: float
     rms_rad: float
     quantile_rad: float
 
 
-def span(m: Mission) -> ensemble.Span:
+def span(f: FinePointing) -> ensemble.Span:
     """How long the mission's runs are."""
-    f = table(m)
     return ensemble.Span(f.duration_s, f.settle_s, f.seed)
 
 
 def verify(
-    scene: Scene, m: Mission, designs: Sequence[Design], on_progress: Progress = lambda done, total, what: None
+    scene: Scene, designs: Sequence[Design], on_progress: Progress = lambda done, total, what: None
 ) -> tuple[Verified, ...]:
     """Simulate each design on each variant of the mirror, beside its linear theory."""
-    names = variants(m)
-    jobs = [_run(on_variant(scene.loop, m, variant), d.controller, m) for d in designs for variant in names]
+    loops = {variant: on_variant(scene, variant) for variant in scene.mirrors.own}
+    jobs = [_run(loop, d.controller, scene.table) for d in designs for loop in loops.values()]
     runs = iter(_several(jobs, on_progress, "simulating controllers"))
-    return tuple(_verified(scene, m, d, {variant: next(runs) for variant in names}) for d in designs)
+    return tuple(_verified(scene, d, {variant: next(runs) for variant in loops}) for d in designs)
 
 
 def outlook(
-    scene: Scene, m: Mission, designs: Sequence[Design], on_progress: Progress = lambda done, total, what: None
+    scene: Scene, designs: Sequence[Design], on_progress: Progress = lambda done, total, what: None
 ) -> tuple[Outlook, ...]:
     """Each design beside its linear figure, simulated in one batch of the mission's runs with its hysteresis."""
-    whole, runs = span(m), min(table(m).runs, ensemble.LANES)
+    whole, runs = span(scene.table), min(scene.table.runs, ensemble.LANES)
     few = replace(whole, duration_s=min(whole.duration_s, whole.settle_s + FEW_SAMPLES * scene.loop.timing.period_s))
     jobs = [partial(ensemble.run, scene.loop, d.controller, few, runs, threads=1) for d in designs]
     found = _several(jobs, on_progress, "simulating controllers")
@@ -188,15 +197,15 @@ def outlook(
     )
 
 
-def on_variant(loop: PointingLoop, m: Mission, variant: str) -> PointingLoop:
-    """The loop on one of `scenario.VARIANTS` of its mirror."""
-    straight = variant == "no hysteresis"  # each element its slow gain, as in theory and in the error budget
-    return parts.without(loop, parts.HYSTERESIS) if straight else with_mirror(loop, m, variant)
+def on_variant(scene: Scene, variant: Variant) -> PointingLoop:
+    """The loop on one variant of its mirror: without hysteresis each element is its slow gain, as in theory."""
+    straight = variant == Variant.STRAIGHT
+    return parts.without(scene.loop, parts.HYSTERESIS) if straight else with_mirror(scene.loop, scene.mirrors, variant)
 
 
-def _run(loop: PointingLoop, controller: LoopController, m: Mission) -> Callable[[], ensemble.Ensemble]:
+def _run(loop: PointingLoop, controller: LoopController, f: FinePointing) -> Callable[[], ensemble.Ensemble]:
     controller = for_mirror(controller, loop)
-    return lambda: ensemble.run(loop, controller, span(m), table(m).runs, threads=1)
+    return lambda: ensemble.run(loop, controller, span(f), f.runs, threads=1)
 
 
 def for_mirror(controller: LoopController, loop: PointingLoop) -> LoopController:
@@ -210,9 +219,9 @@ def _several(
     return in_threads(jobs, lambda done, total: on_progress(done, total, what))
 
 
-def _verified(scene: Scene, m: Mission, design: Design, runs: dict[str, ensemble.Ensemble]) -> Verified:
+def _verified(scene: Scene, design: Design, runs: dict[Variant, ensemble.Ensemble]) -> Verified:
     closed = close(scene.loop, design.controller)
-    given = runs["given"]
+    given = runs[Variant.GIVEN]
     inner = given.freq_hz[1:-1]
     predicted = np.full((given.freq_hz.size, scene.loop.axes), np.nan)
     if scene.loop.optical.every == 1:
@@ -220,7 +229,7 @@ def _verified(scene: Scene, m: Mission, design: Design, runs: dict[str, ensemble
     return Verified(
         design,
         stationary(closed),
-        {name: residual(run, table(m).quantile) for name, run in runs.items()},
+        {name: residual(run, scene.table.quantile) for name, run in runs.items()},
         given.psd_rad2_hz,
         predicted,
     )
@@ -244,12 +253,10 @@ def residual(run: ensemble.Ensemble, quantile: float) -> Residual:
 def best(verified: Sequence[Verified]) -> Verified:
     """The design that leaves the smallest quantile on the mission's mirror, the baseline aside."""
     tuned = [v for v in verified if v.design.name != BASELINE]
-    return min(tuned, key=lambda v: v.simulated["given"].quantile_rad)
+    return min(tuned, key=lambda v: v.simulated[Variant.GIVEN].quantile_rad)
 
 
-def error_budget(
-    scene: Scene, m: Mission, of: Verified, on_progress: Progress = lambda done, total, what: None
-) -> ErrorBudget:
+def error_budget(scene: Scene, of: Verified, on_progress: Progress = lambda done, total, what: None) -> ErrorBudget:
     """Each source of error alone, together, and what is not a source left out of the whole; all with the same seeds.
 
     The whole, with hysteresis and without, is what `verify` has simulated.
@@ -259,14 +266,16 @@ def error_budget(
     left_out = (parts.LIMITS, parts.QUANTISATION, parts.DELAY)
     alone = [parts.without(fine, *(other for other in names if other != name)) for name in names]
     fewer = [parts.without(scene.loop, name) for name in left_out]
-    runs = _several([_run(loop, of.design.controller, m) for loop in (*alone, *fewer)], on_progress, "error budget")
+    runs = _several(
+        [_run(loop, of.design.controller, scene.table) for loop in (*alone, *fewer)], on_progress, "error budget"
+    )
     rms = [run.radial_rms_rad for run in runs]
     theory = of.theory.error_by_source
     lines = tuple(
         Part(name, value, math.sqrt(float(np.sum(theory[name]))) if name in theory else math.nan)
         for name, value in zip(names, rms[: len(names)], strict=True)
     )
-    full, together = of.simulated["given"].rms_rad, of.simulated["no hysteresis"].rms_rad
+    full, together = of.simulated[Variant.GIVEN].rms_rad, of.simulated[Variant.STRAIGHT].rms_rad
     without = {parts.HYSTERESIS: together, **dict(zip(left_out, rms[len(names) :], strict=True))}
     differences = tuple(Difference(name, full, value) for name, value in without.items())
     return ErrorBudget(of.design.name, lines, together, full, differences)
@@ -283,20 +292,19 @@ SINE_S, SINE_SETTLE_S = 1.4, 0.4
 
 
 def sines(
-    scene: Scene, m: Mission, designs: Sequence[Design], on_progress: Progress = lambda done, total, what: None
+    scene: Scene, designs: Sequence[Design], on_progress: Progress = lambda done, total, what: None
 ) -> tuple[Sine, ...]:
     """The paper's sines (Fig. 6 and 8) on axis x, with vibration and sensor noise, for all controllers.
 
     Body pointing and point-ahead are left out: with them the sine would not fit into the stroke.
     """
-    freqs = sorted({*m.scenario.pid_frequencies_hz, *m.scenario.inverse_frequencies_hz})
-    f = table(m)
+    f = scene.table
     jobs, what = [], []
-    for variant in ("given", "comparison") if "comparison" in variants(m) else ("given",):
-        loop = with_mirror(scene.loop, m, variant)
+    for variant in (each for each in scene.mirrors.own if each != Variant.STRAIGHT):
+        loop = with_mirror(scene.loop, scene.mirrors, variant)
         for design in designs:
-            for freq in freqs:
-                tracking = _tracking(loop, m.scenario.amplitude_rad, freq)
+            for freq in scene.sine_frequencies_hz:
+                tracking = _tracking(loop, scene.sine_amplitude_rad, freq)
                 short = ensemble.Span(SINE_S, SINE_SETTLE_S, f.seed)
                 controller = for_mirror(design.controller, tracking)
                 jobs.append(lambda a=tracking, c=controller, s=short: ensemble.run(a, c, s, ensemble.LANES, threads=1))

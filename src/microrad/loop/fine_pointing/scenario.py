@@ -1,56 +1,44 @@
 """From the mission to the fine-pointing loop: mirror, optics, sensors, disturbances, reference, and its stroke."""
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
-from microrad import link
+from microrad import mirror
 from microrad.loop import control, disturbance, sensor
 from microrad.loop.fine_loop import loop as fine
-from microrad.mirror import geometry, hysteresis
-from microrad.mirror import model as mirror
-from microrad.mission.file import MissionFile
-from microrad.mission.model import Mission, source_text
-from microrad.mission.tables.fine_pointing import FinePointing
+from microrad.mirror import MirrorParts, Variant, geometry, hysteresis
+from microrad.mission.file import MissionFile, NamedFile, content_of
+from microrad.mission.model import Mission, Source, source_text
+from microrad.mission.tables.fine_pointing import FinePointing, OpticalSensorTable, VibrationTable
+from microrad.mission.tables.pointing import Pointing
 
 BODY_POINTING = "body pointing"
-VARIANTS = ("given", "comparison", "no hysteresis")
-"""The mission's mirror, its comparison model where it has one, and the mirror with its hysteresis left out."""
 
 
 @dataclass(frozen=True, slots=True)
 class Scene:
-    """The loop of all axes, the same of one axis for designs, and what they came from."""
+    """The fine-pointing loop of a mission: of all axes, of one axis for designs, and what they came from.
 
+    ``sine_amplitude_rad`` and ``sine_frequencies_hz`` are those of the paper's sines, which it has to track as well.
+    """
+
+    table: FinePointing
+    mirrors: MirrorParts
     loop: fine.PointingLoop
     axis: fine.PointingLoop
     stroke: tuple[geometry.StrokeBudget, ...]
     stroke_without_point_ahead: tuple[geometry.StrokeBudget, ...]
+    sine_amplitude_rad: float
+    sine_frequencies_hz: tuple[float, ...]
 
-    def own_stroke(self, m: Mission) -> tuple[geometry.StrokeBudget, ...]:
+    @property
+    def own_stroke(self) -> tuple[geometry.StrokeBudget, ...]:
         """The stroke budgets of the mission as it is: with the point-ahead on the mirror or not."""
-        return self.stroke if table(m).reference.point_ahead_on_mirror else self.stroke_without_point_ahead
-
-
-def scene(file: MissionFile) -> Scene:
-    """The fine-pointing loop of a mission that has one. Raises ValueError for what cannot be built, with the reason."""
-    m = file.mission
-    chain = optics(m)
-    one = one_mirror(m, "given")
-    both = mirror.combine(*[one] * chain.outputs)
-    loop = around(file, both, geometry.line_of_sight_matrix(chain))
-    gain = fine.nominal_axis_gain(loop)
-    scale = gain / abs(float(fine.in_band_gain(one)[0, 0]))
-    axis = replace(
-        loop,
-        mirror=one,
-        optics=np.array([[scale]]),
-        disturbances=loop.disturbances[:1],
-        references=loop.references[:1],
-    )
-    with_it, without = (stroke(file, chain, on_mirror) for on_mirror in (True, False))
-    return Scene(loop, axis, with_it, without)
+        return self.stroke if self.table.reference.point_ahead_on_mirror else self.stroke_without_point_ahead
 
 
 def table(m: Mission) -> FinePointing:
@@ -60,16 +48,58 @@ def table(m: Mission) -> FinePointing:
     return m.fine_pointing
 
 
-def optics(m: Mission) -> geometry.Geometry:
-    """The chain from the mirror's own angle to the line of sight."""
-    g = table(m).geometry
-    if m.conventions.mirror_angle == "line-of-sight" and g.magnification != 1.0:
+def scene(file: MissionFile, mirrors: MirrorParts, received_power_w: float | None) -> Scene:
+    """The fine-pointing loop of a mission, assembled once.
+
+    Args:
+        file: The mission, with the folder that a file of its vibration is looked for in.
+        mirrors: The mission's mirror, `mirror.of`.
+        received_power_w: Light on the tracking sensor (W), `link.tracking_light.tracking_light_w`; None where the table
+            gives the sensor's noise.
+
+    Raises:
+        ValueError: The mission has no such loop, or it cannot be built; says why.
+    """
+    m, f = file.mission, table(file.mission)
+    chain = optics(f, m.conventions.mirror_angle)
+    one = mirrors.own[Variant.GIVEN].plant
+    base, period = control.drive_from_mission(m), 1.0 / f.rate_hz
+    each_axis = disturbances(f, file.path.parent, file.contents)
+    gauge = f.strain_gauge
+    loop = fine.PointingLoop(
+        mirror=mirror.combine(*[one] * chain.outputs),
+        optics=geometry.line_of_sight_matrix(chain),
+        drive=replace(base, bandwidth_hz=f.amplifier_bandwidth_hz, drive_resolution_v=f.drive_resolution_v),
+        timing=control.Timing(period, round(period / f.plant_step_s), round(f.delay_s / f.plant_step_s)),
+        disturbances=(each_axis, each_axis),
+        optical=optical_sensor(f, received_power_w, m.answer.wavelength_m, m.terminals.leo_aperture_m),
+        gauge=None if gauge is None else sensor.StrainGauge(gauge.noise_rad, gauge.resolution_rad),
+        references=references(f),
+        drive_range_v=mirrors.drive_range_v,
+    )
+    scale = fine.nominal_axis_gain(loop) / abs(float(fine.in_band_gain(one)[0, 0]))
+    axis = replace(
+        loop,
+        mirror=one,
+        optics=np.array([[scale]]),
+        disturbances=loop.disturbances[:1],
+        references=loop.references[:1],
+    )
+    with_it, without = (stroke(f, mirrors, chain, m.pointing, file.sources, on_mirror) for on_mirror in (True, False))
+    freqs = sorted({*m.scenario.pid_frequencies_hz, *m.scenario.inverse_frequencies_hz})
+    return Scene(f, mirrors, loop, axis, with_it, without, m.scenario.amplitude_rad, tuple(freqs))
+
+
+def optics(f: FinePointing, mirror_angle: str) -> geometry.Geometry:
+    """The chain from the mirror's own angle, counted as conventions.mirror_angle says, to the line of sight."""
+    g = f.geometry
+    if mirror_angle == "line-of-sight" and g.magnification != 1.0:
         raise ValueError(
             f"fine_pointing.geometry.magnification = {g.magnification:g}, but conventions.mirror_angle = "
             '"line-of-sight" says that the output is the line of sight already: say "optical" or "mechanical" there'
         )
     return geometry.Geometry(
-        angle="mechanical" if m.conventions.mirror_angle == "mechanical" else "optical",
+        angle="mechanical" if mirror_angle == "mechanical" else "optical",
         incidence_rad=g.incidence_rad,
         magnification=g.magnification,
         rotation_rad=g.rotation_rad,
@@ -79,50 +109,18 @@ def optics(m: Mission) -> geometry.Geometry:
     )
 
 
-def one_mirror(m: Mission, variant: str) -> mirror.Mirror:
-    """One axis of the mission's mirror in its own angle, in one of `VARIANTS`."""
-    of = m.mirror.comparison if variant == "comparison" and m.mirror.comparison is not None else m.mirror
-    model = mirror.hysteresis_model(of, m.mirror.rate_limit_v_s, m.mirror.bias_v)
-    return mirror.from_mission(m.mirror, hysteresis.gain_only(model) if variant == "no hysteresis" else model)
+def with_mirror(loop: fine.PointingLoop, mirrors: MirrorParts, variant: Variant) -> fine.PointingLoop:
+    """The loop with another variant of its mirror on each actuator."""
+    return replace(loop, mirror=mirror.combine(*[mirrors.own[variant].plant] * loop.mirror.actuators))
 
 
-def variants(m: Mission) -> tuple[str, ...]:
-    """Those of `VARIANTS` that the mission has."""
-    return tuple(v for v in VARIANTS if v != "comparison" or m.mirror.comparison is not None)
+def disturbances(f: FinePointing, folder: Path, contents: tuple[NamedFile, ...]) -> tuple[disturbance.Disturbance, ...]:
+    """Vibration, wheels and body pointing of one axis; a file of the vibration is named as seen from the folder.
 
-
-def with_mirror(loop: fine.PointingLoop, m: Mission, variant: str) -> fine.PointingLoop:
-    """The loop with another variant of its mirror."""
-    return replace(loop, mirror=mirror.combine(*[one_mirror(m, variant)] * loop.mirror.actuators))
-
-
-def around(file: MissionFile, mirrors: mirror.Mirror, line_of_sight: fine.Floats) -> fine.PointingLoop:
-    """The mission's amplifier, clock, disturbances, sensors and reference around its mirrors."""
-    m, f = file.mission, table(file.mission)
-    base = control.drive_from_mission(m)
-    drive = replace(base, bandwidth_hz=f.amplifier_bandwidth_hz, drive_resolution_v=f.drive_resolution_v)
-    period = 1.0 / f.rate_hz
-    timing = control.Timing(period, round(period / f.plant_step_s), round(f.delay_s / f.plant_step_s))
-    each_axis = disturbances(file)
-    gauge = f.strain_gauge
-    return fine.PointingLoop(
-        mirror=mirrors,
-        optics=line_of_sight,
-        drive=drive,
-        timing=timing,
-        disturbances=(each_axis, each_axis),
-        optical=optical_sensor(file),
-        gauge=None if gauge is None else sensor.StrainGauge(gauge.noise_rad, gauge.resolution_rad),
-        references=references(m),
-        drive_range_v=(m.mirror.drive_min_v - m.mirror.bias_v, m.mirror.drive_max_v - m.mirror.bias_v),
-    )
-
-
-def disturbances(file: MissionFile) -> tuple[disturbance.Disturbance, ...]:
-    """Vibration, wheels and body pointing of one axis, as the mission's table names them."""
-    f = table(file.mission)
+    What is held already of that file in ``contents`` is not read again.
+    """
     body = f.body
-    found = [vibration(file)]
+    found = [vibration(f.vibration, folder, contents)]
     if f.wheels is not None:
         w = f.wheels
         found.append(disturbance.wheels(w.speed_hz, w.harmonics, w.coefficients_rad_hz2, convention=w.convention))
@@ -131,9 +129,8 @@ def disturbances(file: MissionFile) -> tuple[disturbance.Disturbance, ...]:
     return tuple(found)
 
 
-def vibration(file: MissionFile) -> disturbance.Disturbance:
+def vibration(v: VibrationTable, folder: Path, contents: tuple[NamedFile, ...]) -> disturbance.Disturbance:
     """The platform's vibration of one axis."""
-    v = table(file.mission).vibration
     if v.spectrum == "olympus":
         return disturbance.olympus(convention=v.convention)
     if v.spectrum == "first-order":
@@ -143,23 +140,21 @@ def vibration(file: MissionFile) -> disturbance.Disturbance:
         assert v.edges_hz is not None and v.rms_rad is not None
         return disturbance.bands(v.edges_hz, v.rms_rad, convention=v.convention, name="vibration")
     assert v.file is not None
-    freq_hz, density = disturbance.read_table(file.path.parent / v.file)
+    freq_hz, density = disturbance.read_table(folder / v.file, data=content_of(v.file, contents))
     return disturbance.table(freq_hz, density, convention=v.convention, name="vibration")
 
 
-def optical_sensor(file: MissionFile) -> sensor.OpticalSensor:
-    """The tracking sensor, its noise as given or from the light that it receives."""
-    m, f = file.mission, table(file.mission)
+def optical_sensor(
+    f: FinePointing, received_power_w: float | None, wavelength_m: float, aperture_m: float
+) -> sensor.OpticalSensor:
+    """The tracking sensor, its noise as given or from the light that it receives through the aperture.
+
+    Raises ValueError where the noise follows from light and none is given.
+    """
     o = f.optical_sensor
     noise = o.noise_rad
     if noise is None:
-        assert o.quad_cell is not None  # the table's own check
-        cell, spot = quad_cell(m)
-        power = o.quad_cell.received_power_w
-        if power is None:
-            power = link.answer_budget(m, file.sources).received_power_w
-        ratio = cell.signal_to_noise(power, sensor.noise_bandwidth_hz(o.rate_hz))
-        noise = sensor.noise_equivalent_angle_rad(spot, ratio)
+        noise = _noise_of_light(o, received_power_w, wavelength_m, aperture_m)
     return sensor.optical_sensor(
         noise,
         o.field_of_view_rad,
@@ -171,17 +166,20 @@ def optical_sensor(file: MissionFile) -> sensor.OpticalSensor:
     )
 
 
-def quad_cell(m: Mission) -> tuple[sensor.QuadCell, sensor.AirySpot]:
-    """The quad cell of the mission's table and its spot, from the LEO terminal's aperture."""
-    q = table(m).optical_sensor.quad_cell
-    assert q is not None
+def _noise_of_light(
+    o: OpticalSensorTable, received_power_w: float | None, wavelength_m: float, aperture_m: float
+) -> float:
+    q = o.quad_cell
+    assert q is not None  # the table's own check
+    if received_power_w is None:
+        raise ValueError("the noise of the tracking sensor follows from its light: give the received power in W")
     cell = sensor.QuadCell(q.responsivity_a_w, q.background_power_w, q.dark_current_a, q.thermal_noise_a_sqrt_hz)
-    return cell, sensor.AirySpot(m.answer.wavelength_m, m.terminals.leo_aperture_m)
+    ratio = cell.signal_to_noise(received_power_w, sensor.noise_bandwidth_hz(o.rate_hz))
+    return sensor.noise_equivalent_angle_rad(sensor.AirySpot(wavelength_m, aperture_m), ratio)
 
 
-def references(m: Mission) -> tuple[disturbance.Reference, ...]:
+def references(f: FinePointing) -> tuple[disturbance.Reference, ...]:
     """By axis: the point-ahead (x) where the mirror carries it, and what the body leaves of the orbital rate."""
-    f = table(m)
     r = f.reference
     ahead = r.point_ahead_rad if r.point_ahead_on_mirror else 0.0
     rate = r.line_of_sight_rate_rad_s * (1.0 - r.rate_feedforward)
@@ -191,36 +189,42 @@ def references(m: Mission) -> tuple[disturbance.Reference, ...]:
     )
 
 
-def stroke(file: MissionFile, chain: geometry.Geometry, on_mirror: bool) -> tuple[geometry.StrokeBudget, ...]:
+def stroke(
+    f: FinePointing,
+    mirrors: MirrorParts,
+    chain: geometry.Geometry,
+    pointing: Pointing,
+    sources: Mapping[str, Source],
+    on_mirror: bool,
+) -> tuple[geometry.StrokeBudget, ...]:
     """What the mirror has to cover, by axis, with the point-ahead on it or not."""
-    m, f = file.mission, table(file.mission)
-    r = f.reference
+    r, of = f.reference, mirrors.table
     lag = r.line_of_sight_rate_rad_s * (1.0 - r.rate_feedforward) / (2.0 * math.pi * f.body.bandwidth_hz)
     body = f.body.error_rad / (math.sqrt(2.0) if f.body.convention == "radial" else 1.0)
     demand = geometry.StrokeDemand(
         body_pointing_rad=(body, body),
         point_ahead_rad=(r.point_ahead_rad, 0.0),
-        bias_rad=(m.pointing.bias_rad, m.pointing.bias_rad),
+        bias_rad=(pointing.bias_rad, pointing.bias_rad),
         rate_lag_rad=(lag, 0.0),
         point_ahead_on_mirror=on_mirror,
     )
-    model = mirror.hysteresis_model(m.mirror, m.mirror.rate_limit_v_s, m.mirror.bias_v)
-    swing = min(m.mirror.drive_max_v - m.mirror.bias_v, m.mirror.bias_v - m.mirror.drive_min_v)
+    lowest_v, highest_v = mirrors.drive_range_v
+    gain = abs(hysteresis.slow_gain(mirrors.own[Variant.GIVEN].model))
     own = {"optical": 1.0, "mechanical": 2.0}
-    usable = 2.0 * abs(hysteresis.slow_gain(model)) * swing * own[chain.angle] / own[f.geometry.travel_angle]
+    usable = 2.0 * gain * min(highest_v, -lowest_v) * own[chain.angle] / own[f.geometry.travel_angle]
     named = {
         "body_pointing_rad": ("fine_pointing.body.error",),
         "point_ahead_rad": ("fine_pointing.reference.point_ahead",),
         "bias_rad": tuple(
-            f"pointing.lines.{name}.error" for name, line in m.pointing.lines.items() if line.kind == "bias"
+            f"pointing.lines.{name}.error" for name, line in pointing.lines.items() if line.kind == "bias"
         ),
         "rate_lag_rad": ("fine_pointing.reference.line_of_sight_rate", "fine_pointing.reference.rate_feedforward"),
     }
     return geometry.stroke_budget(
         chain,
         demand,
-        travel_rad=m.mirror.travel_rad,
+        travel_rad=of.travel_rad,
         travel_angle=f.geometry.travel_angle,
-        usable_travel_rad=min(usable, m.mirror.travel_rad),
-        sources={key: source_text(file.sources, *keys) for key, keys in named.items()},
+        usable_travel_rad=min(usable, of.travel_rad),
+        sources={key: source_text(sources, *keys) for key, keys in named.items()},
     )

@@ -44,7 +44,7 @@ class Pointing(Table):
     """Open-loop pointing: the errors that the beacon has to cover."""
 
     confidence: Annotated[float, Share("")] = Field(
-        description="share of the time, of the worst-case satellite, that is met"
+        description="share of the time, of the worst-case satellite, that totals hold for and a beacon covers"
     )
     lines: dict[str, PointingLine] = Field(description="one table for each error, [pointing.lines.NAME]")
 

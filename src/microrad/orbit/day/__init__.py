@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 from microrad import link, orbit
 from microrad.core.units import format_quantity
@@ -88,10 +89,15 @@ def acquired(links: LinkStudy) -> Found | None:
     return finding.wide if o.acquisition == "wide beacon" else finding.scan
 
 
+def _pair(links: LinkStudy, m: LinkMission) -> orbit.Pair:
+    """The terminals of a mission whose files are those of the links'."""
+    return orbit.pair(m, links.file.path.parent, links.file.contents)
+
+
 def relay(links: LinkStudy, loss: PointingLoss) -> Way:
     """The way by the relay alone: what `run` finds of it, without the rest of the day."""
     m = links.file.mission
-    seen = view(orbit.pair(m, links.file.path.parent), m.communication.wavelength_m)
+    seen = view(_pair(links, m), m.communication.wavelength_m)
     rates = flow.rate_table(flow.closings(m, loss))
     return flow.relay(flow.table(m), seen, rates, loss.outage, acquired(links), 1.0)
 
@@ -105,9 +111,9 @@ def run(
     `operations.OperationsError` for tables that are missing, orbits that do not hold and a contact that is asked for
     beyond those of the span.
     """
-    m, folder = links.file.mission, links.file.path.parent
+    m = links.file.mission
     loss = given_loss(links) if loss is None else loss
-    seen, o = view(orbit.pair(m, folder), m.communication.wavelength_m), flow.table(m)
+    seen, o = view(_pair(links, m), m.communication.wavelength_m), flow.table(m)
     if o.contact is not None and seen.encounters and o.contact.number > len(seen.encounters):
         raise operations.OperationsError(
             f"operations.contact.number is {o.contact.number}, and the span has {len(seen.encounters)} contacts: give "
@@ -125,6 +131,6 @@ def run(
         encounters=tuple(encounter(seen.pair, contact, m.communication.wavelength_m) for contact in relay.contacts),
         relay=relay,
         direct=flow.direct(o, seen, heard),
-        swings=swings(m, folder, seen, heard, loss, found, on_progress),
+        swings=swings(m, partial(_pair, links), seen, heard, loss, found, on_progress),
         warnings=(*beyond_the_mission(m, seen), *short_tail(seen.pair)),
     )

@@ -3,7 +3,6 @@
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 from microrad import link, orbit
 from microrad.core.units import format_quantity
@@ -73,7 +72,7 @@ class _Known:
     """What holds for every mission with the same orbits and stations as this one: contacts, passes, acquisition."""
 
     mission: LinkMission
-    folder: Path
+    pair_of: Callable[[LinkMission], orbit.Pair]
     seen: geometry.View
     heard: tuple[flow.Heard, ...]
     found: Found | None
@@ -86,7 +85,7 @@ def numbers(case: _Case, known: _Known) -> Numbers:
     seen, heard = known.seen, known.heard
     moved = m.orbit is not known.mission.orbit
     if moved:
-        seen = geometry.view(orbit.pair(m, known.folder), m.communication.wavelength_m)
+        seen = geometry.view(known.pair_of(m), m.communication.wavelength_m)
     if moved or (o.downlink and own.downlink and o.downlink.stations is not own.downlink.stations):
         heard = flow.heard(o.downlink, seen.pair)
     rates = flow.rate_table(flow.closings(m, case.loss))
@@ -99,7 +98,7 @@ def numbers(case: _Case, known: _Known) -> Numbers:
 
 def swings(
     m: LinkMission,
-    folder: Path,
+    pair_of: Callable[[LinkMission], orbit.Pair],
     seen: geometry.View,
     heard: tuple[flow.Heard, ...],
     loss: flow.PointingLoss,
@@ -114,7 +113,7 @@ def swings(
     one that has decayed, or lies below the surface that lines of sight must clear.
     """
     m = m.with_value("operations.runs", min(flow.table(m).runs, _RUNS))
-    known, own = _Known(m, folder, seen, heard, found), _Case(m, loss)
+    known, own = _Known(m, pair_of, seen, heard, found), _Case(m, loss)
     here = numbers(own, known)
 
     def end(side: _Side) -> tuple[str, Numbers]:

@@ -20,13 +20,15 @@ from microrad.orbit.files.messages import Field, add_field, finite, kvn_field, r
 from microrad.orbit.mean_elements import REVOLUTION_RAD, ElementSet, check_theory, checked
 
 
-def read_elements(path: Path, name: str | None = None) -> tuple[ElementSet, ...]:
+def read_elements(path: Path, name: str | None = None, data: bytes | None = None) -> tuple[ElementSet, ...]:
     """All element sets of a file, in its order; with `name`, those of the satellite with that name or number.
+
+    With `data`, these are the bytes of the file, which is not read again.
 
     Raises `OrbitError` for a file that is not one of the formats, for the first fault in it with its line, and for a
     name that is not in it.
     """
-    text = read_text(path)
+    text = read_text(path, data)
     found = list(_parsed(path, text))
     if not found:
         raise OrbitError(f"{path}: no element set is in the file; give a TLE or an OMM")

@@ -46,11 +46,16 @@ class Field(NamedTuple):
         return OrbitError(f"{path}, {self.place}: {self.key} is {self.shown}{why}")
 
 
-def read_text(path: Path) -> str:
-    """Text of a file in UTF-8, lines ending in a newline; raises `OrbitError` for one that is none, or too large."""
+def read_text(path: Path, data: bytes | None = None) -> str:
+    """Text of a file in UTF-8, lines ending in a newline; raises `OrbitError` for one that is none, or too large.
+
+    With ``data``, these are the bytes of the file, which is not read again.
+    """
     try:
-        _check_file(path)
-        data = read_bytes(path, MOST_BYTES + 1)
+        if data is None:
+            _check_file(path)
+            data = read_bytes(path, MOST_BYTES + 1)
+        _check_size(path, len(data))
     except OrbitError:
         raise
     except (FileNotFoundError, NotADirectoryError, ValueError):  # the last for a name that holds a NUL
@@ -79,11 +84,15 @@ def _check_file(path: Path) -> None:
         raise OrbitError(f"{path}: this is a folder; name the file in it")
     if not stat.S_ISREG(found.st_mode):
         raise OrbitError(f"{path}: this is a device or a pipe; give a file with an orbit")
-    if found.st_size == 0:
+    _check_size(path, found.st_size)
+
+
+def _check_size(path: Path, size: int) -> None:
+    if size == 0:
         raise OrbitError(f"{path}: the file is empty; download or export it again")
-    if found.st_size > MOST_BYTES:
+    if size > MOST_BYTES:
         raise OrbitError(
-            f"{path}: {found.st_size / 1e6:.0f} MB, more than the {MOST_BYTES / 1e6:.0f} MB that are read; keep only "
+            f"{path}: {size / 1e6:.0f} MB, more than the {MOST_BYTES / 1e6:.0f} MB that are read; keep only "
             "the satellites and the days that the mission needs"
         )
 

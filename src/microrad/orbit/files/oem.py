@@ -69,8 +69,10 @@ class _Draft:
         self.values.append(numbers)
 
 
-def read_oem(path: Path, epoch: Epoch, name: str | None = None) -> EphemerisOrbit:
+def read_oem(path: Path, epoch: Epoch, name: str | None = None, data: bytes | None = None) -> EphemerisOrbit:
     """The orbit of an object from a CCSDS OEM, KVN or XML; `name` (or its identifier) chooses among several.
+
+    With `data`, these are the bytes of the file, which is not read again.
 
     Time systems: UTC, TAI, TT, GPS. Frames: TEME, TOD, EME2000 (J2000), GCRF, ICRF, and ITRF without polar motion;
     velocities of ITRF gain the Earth's rotation. Interpolation: LAGRANGE (degree + 1 state vectors) or HERMITE
@@ -78,7 +80,7 @@ def read_oem(path: Path, epoch: Epoch, name: str | None = None) -> EphemerisOrbi
     passed over. Raises `OrbitError` with file, line and value for all else, for a hole within the usable times of a
     segment (a step of more than `MOST_STEPS` median ones), and for velocities that are not those of the positions.
     """
-    text = read_text(path)
+    text = read_text(path, data)
     drafts = list(_xml_drafts(path, text) if text.lstrip().startswith("<") else _kvn_drafts(path, text))
     if not drafts:
         raise OrbitError(

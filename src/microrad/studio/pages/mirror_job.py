@@ -7,9 +7,9 @@ from typing import Any
 
 from nicegui import ui
 
+from microrad.lab.live_fit import LiveFit
 from microrad.studio import live_fit, mirror_view
 from microrad.studio.jobs import Job
-from microrad.studio.live_fit import LiveFit
 from microrad.studio.mirror_use import with_mirror_file
 from microrad.studio.pages import layout
 from microrad.studio.pages.aside import aside

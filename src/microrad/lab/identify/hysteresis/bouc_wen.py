@@ -1,0 +1,470 @@
+"""The rate-dependent Bouc-Wen mirror of Eq. 3 (SPIE 11852, 118523B) from recordings, with its uncertainty.
+
+    y = d1 exp(-d2 u') u + h + offset
+    h' = epsilon exp(delta |u'|) u' - beta u' |h| - alpha |u'| h
+
+h is homogeneous in epsilon, so y is linear in d1, epsilon and one offset per record; they are solved exactly at every
+trial (variable projection) and four numbers are searched: d2, delta and the two decay constants
+
+    k_settled = alpha + sign(epsilon) beta        k_reversal = alpha - sign(epsilon) beta        (1/V)
+
+Both positive is alpha > |beta|, hence a bounded h, whatever the signs. At a rate |u'| a settled loop has
+|h| = |epsilon| exp(delta |u'|) / k_settled, and just after a reversal
+
+    dh/du = epsilon exp(delta |u'|) + sign(epsilon) k_reversal |h| = epsilon exp(delta |u'|) 2 alpha / k_settled
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from microrad.core.kernels import bouc_wen_response
+from microrad.lab.identify.prepared import (
+    DEFAULT_UNITS,
+    FloatArray,
+    IdentificationError,
+    Prepared,
+    Progress,
+    Units,
+    centred,
+    colour_inflation,
+    correlation,
+    fastest_rate,
+    one_rate_only,
+    percent,
+    prepare,
+    span,
+    split_by_record,
+    unheard,
+)
+from microrad.lab.recording import Recording
+from microrad.mirror.hysteresis import BoucWen
+
+SLOPE_TOLERANCE = 1e-3
+_LOWER = np.array([-1.0, -3.0, math.log(0.05), math.log(0.05)])
+_UPPER = np.array([1.0, 10.0, math.log(1e5), math.log(1e5)])
+
+
+class Problem:
+    """The projected residual of a set of records as a function of the four searched numbers, scaled to order one."""
+
+    def __init__(
+        self, records: tuple[Prepared, ...], share: float, free_offset: bool = True, rate_limit: float | None = None
+    ) -> None:
+        """`share` is the largest part of d1 that epsilon may take back after a slow reversal; inf leaves it free."""
+        self.records = records
+        self.free_offset = free_offset
+        self.share = share
+        self.rate_limit = rate_limit or fastest_rate(records)
+        self.drive_span_v = max(float(np.ptp(r.drive_v)) for r in records)
+        self.output_span_rad = span(records)
+        self.measured = np.concatenate([r.output_rad[r.start :] for r in records])
+        self.target = self.centred(self.measured)
+        self.scale = 1.0 / (self.output_span_rad * math.sqrt(self.target.size))
+
+    def centred(self, columns: FloatArray) -> FloatArray:
+        """Columns less their mean in each record, which marginalises the offsets; unchanged where there is none."""
+        return centred(columns, self.records) if self.free_offset else columns
+
+    def physical(self, theta: FloatArray) -> tuple[float, float, float, float]:
+        """d2, delta (s/V), k_settled and k_reversal (1/V)."""
+        return (
+            float(theta[0]) / self.rate_limit,
+            float(theta[1]) / self.rate_limit,
+            math.exp(theta[2]) / self.drive_span_v,
+            math.exp(theta[3]) / self.drive_span_v,
+        )
+
+    def columns(self, theta: FloatArray) -> FloatArray:
+        """Responses to unit d1 and to unit epsilon over the used samples, less their mean in each record."""
+        d2, delta, settled, reversal = self.physical(theta)
+        alpha, beta = (settled + reversal) / 2, (settled - reversal) / 2
+        row = np.array([1.0, d2, 1.0, delta, alpha, beta, self.rate_limit, 0.0])
+        parts = []
+        for record in self.records:
+            output, h, _ = bouc_wen_response(record.drive_v, record.step_s, row, 0.0)
+            parts.append(np.column_stack((output - h, h))[record.start :])
+        return self.centred(np.concatenate(parts))
+
+    def linear(self, columns: FloatArray, theta: FloatArray) -> FloatArray:
+        """The best d1 and epsilon; where epsilon takes back more of d1 than allowed, the best on that bound."""
+        size = np.sqrt(np.einsum("ij,ij->j", columns, columns)) + 1e-300
+        gram = (columns.T @ columns) / np.outer(size, size) + 1e-13 * np.eye(2)
+        best = np.linalg.solve(gram, (columns.T @ self.target) / size) / size
+        bound = self.bound(theta)
+        if best[1] / best[0] >= -bound:
+            return np.asarray(best)
+        joint = columns[:, 0] - bound * columns[:, 1]
+        d1 = float(joint @ self.target) / float(joint @ joint)
+        return np.array([d1, -bound * d1])
+
+    def bound(self, theta: FloatArray) -> float:
+        """Largest -epsilon / d1: after a slow reversal dy/du = d1 + epsilon 2 alpha / k_settled >= (1 - share) d1."""
+        _, _, settled, reversal = self.physical(theta)
+        return self.share * settled / (settled + reversal)
+
+    def residual(self, theta: FloatArray) -> FloatArray:
+        """Measured less modelled, scaled so that half the squared norm is half the squared relative rms."""
+        columns = self.columns(theta)
+        return np.asarray((self.target - columns @ self.linear(columns, theta)) * self.scale)
+
+    def solve(self, theta: FloatArray) -> FloatArray:
+        """The six parameters at a point: the signs of epsilon and beta follow from the linear part."""
+        d2, delta, settled, reversal = self.physical(theta)
+        d1, epsilon = self.linear(self.columns(theta), theta)
+        beta = math.copysign(1.0, epsilon) * (settled - reversal) / 2
+        return np.array([d1, d2, epsilon, delta, (settled + reversal) / 2, beta])
+
+
+def _thinned(problem: Problem) -> Problem:
+    """The same problem on at most about 12 000 samples: the kernel is exact for a drive linear between any samples."""
+    stride = math.ceil(sum(r.drive_v.size for r in problem.records) / 12_000)
+    if stride == 1:
+        return problem
+    records = tuple(
+        Prepared(r.name, r.sha256, r.drive_v[::stride].copy(), r.output_rad[::stride].copy(), r.step_s * stride, start)
+        for r in problem.records
+        for start in (-(-r.start // stride),)
+    )
+    return Problem(records, problem.share, problem.free_offset, problem.rate_limit)
+
+
+# ----------------------------------------------------------------------------------------------------------- search
+def multi_start(problem: Problem, starts: int, seed: int, on_progress: Progress) -> tuple[FloatArray, FloatArray]:
+    """Cost reached from each start, and the best point polished on all samples."""
+    screen = _thinned(problem)
+    points, costs = [], []
+    for done, start in enumerate(_starts(screen, starts, seed), start=1):
+        solution = _search(screen, start)
+        points.append(solution.x)
+        costs.append(float(solution.cost))
+        on_progress(done, starts, "Bouc-Wen starts")
+    return np.array(costs), _search(problem, points[int(np.argmin(costs))]).x
+
+
+def _starts(problem: Problem, starts: int, seed: int) -> list[FloatArray]:
+    """The four best points of a coarse grid in turn, the first as it is and the rest scattered by a factor e^0.4."""
+    grid = [
+        np.array([0.0, delta, math.log(settled), math.log(settled * ratio)])
+        for delta in (0.0, 1.0, 2.0, 4.0)
+        for settled in (2.0, 8.0, 30.0, 120.0)
+        for ratio in (0.3, 1.0, 4.0, 20.0)
+    ]
+    centres = sorted(grid, key=lambda theta: float(np.sum(problem.residual(theta) ** 2)))[:4]
+    rng = np.random.Generator(np.random.Philox(seed))
+    scatter = 0.4 * rng.standard_normal((starts, 4))
+    scatter[0] = 0.0
+    scatter[:, 0] *= 0.1
+    return [np.clip(_scattered(centres[i % 4], scatter[i]), _LOWER + 1e-6, _UPPER - 1e-6) for i in range(starts)]
+
+
+def _scattered(centre: FloatArray, scatter: FloatArray) -> FloatArray:
+    """Log-normal in delta and in the two decay constants, normal in d2, whose sign is open."""
+    point = centre + scatter
+    point[1] = max(centre[1], 0.2) * math.exp(scatter[1])
+    return np.asarray(point)
+
+
+def _search(problem: Problem, start: FloatArray) -> Any:
+    from scipy.optimize import least_squares  # here, to keep start-up cheap
+
+    return least_squares(
+        problem.residual,
+        start,
+        method="trf",
+        bounds=(_LOWER, _UPPER),
+        diff_step=1e-6,
+        ftol=1e-10,
+        xtol=1e-8,
+        gtol=1e-12,
+        max_nfev=100,
+    )
+
+
+def tightened(problem: Problem, best: FloatArray) -> tuple[Problem, FloatArray]:
+    """Lower the share of d1 that epsilon may take back until no slope along the recordings is negative.
+
+    The bound holds for slow reversals; at a fast one h is larger than its slow settled value by exp(delta |u'|).
+    """
+    for _ in range(12):
+        values = problem.solve(best)
+        lowest = lowest_slope(problem, values) / abs(values[0])
+        if lowest >= -SLOPE_TOLERANCE / 2:
+            break
+        problem.share *= max(0.3, 0.995 / (1.0 - lowest))
+        best = _search(problem, best).x
+    return problem, best
+
+
+# ---------------------------------------------------------------------------------------------------------- values
+def stacked(problem: Problem, values: FloatArray) -> FloatArray:
+    """Model output of the used samples of all records, without offset."""
+    row = np.array([*values, problem.rate_limit, 0.0])
+    return np.concatenate([bouc_wen_response(r.drive_v, r.step_s, row, 0.0)[0][r.start :] for r in problem.records])
+
+
+def k_settled(values: FloatArray) -> float:
+    """Decay (1/V) towards the settled loop, alpha + sign(epsilon) beta."""
+    return float(values[4] + math.copysign(1.0, values[2]) * values[5])
+
+
+def turned_over(model: BoucWen) -> BoucWen:
+    """The model of a sensor turned over: -h has the terms of h with the signs of epsilon, beta and gamma changed."""
+    return replace(
+        model,
+        d1_rad_v=-model.d1_rad_v,
+        epsilon_rad_v=-model.epsilon_rad_v,
+        beta_1_v=-model.beta_1_v,
+        gamma_1_v=-model.gamma_1_v,
+    )
+
+
+def rising(model: BoucWen) -> BoucWen:
+    """The model, turned over where its d1 is negative."""
+    return model if model.d1_rad_v > 0.0 else turned_over(model)
+
+
+def lowest_slope(problem: Problem, values: FloatArray) -> float:
+    """Lowest dy/du along the used samples, at the begin of each step, positive in the direction of d1."""
+    d1, d2, epsilon, delta, alpha, beta = values
+    row = np.array([*values, problem.rate_limit, 0.0])
+    lowest = math.inf
+    for record in problem.records:
+        _, h, _ = bouc_wen_response(record.drive_v, record.step_s, row, 0.0)
+        rate = np.diff(record.drive_v)[record.start :] / record.step_s
+        before = h[record.start : -1]
+        limited = np.clip(rate, -problem.rate_limit, problem.rate_limit)
+        slope = d1 * np.exp(-d2 * limited) + epsilon * np.exp(delta * np.abs(limited))
+        slope -= beta * np.abs(before) + alpha * np.sign(rate) * before
+        lowest = min(lowest, float(np.min(np.sign(d1) * slope[rate != 0.0])))
+    return lowest
+
+
+PARAMETERS = ("d1", "d2", "epsilon", "delta", "alpha", "beta")
+PARAMETER_UNITS = ("rad/V", "s/V", "rad/V", "s/V", "1/V", "1/V")
+
+_SAME_COST = 0.5e-12  # a residual of one millionth of the peak-to-peak is no residual
+
+
+class NotIdentified(NamedTuple):
+    """A parameter that the recordings do not fix, and why."""
+
+    name: str
+    reason: str
+
+
+@dataclass(frozen=True, eq=False)
+class BoucWenFit:
+    """A model of Eq. 3 in SI units, with what is known about the uncertainty of its six parameters.
+
+    The signs follow the recordings: d1 is negative where the output falls with the drive. `covariance` (6 x 6, order
+    of `PARAMETERS`) is estimated from the residuals and inflated by `colour_inflation`, because residuals of
+    neighbouring samples are alike. `start_rms_percent` is the residual reached from each start, `agreeing_starts` how
+    many came to the cost of the best one within 0.1 %. `slope_after_reversal_rad_per_v` is dy/du just after a slow
+    reversal of a settled loop and `lowest_slope_rad_per_v` the lowest along the recordings, both counted positive in
+    the direction of d1: a negative value is a mirror that first moves the wrong way, so `admissible` is false. (The
+    small lag or lead that d2 gives is none of it: both slopes are taken at constant rate.)
+    """
+
+    model: BoucWen
+    offsets_rad: tuple[float, ...]
+    units: Units
+    covariance: FloatArray
+    colour_inflation: float
+    condition_number: float
+    not_identified: tuple[NotIdentified, ...]
+    residual_rms_rad: float
+    residual_rms_percent: float
+    start_rms_percent: tuple[float, ...]
+    agreeing_starts: int
+    slope_after_reversal_rad_per_v: float
+    lowest_slope_rad_per_v: float
+    admissible: bool
+    constrained: bool
+    free_offset: bool
+    samples_used: int
+
+    name = "bouc_wen"
+
+    @property
+    def values(self) -> FloatArray:
+        """The six parameters in the order of `PARAMETERS`, SI units."""
+        return np.array(self.model.row[:6])
+
+    @property
+    def rate_limit_v_per_s(self) -> float:
+        """Fastest rate of the drive that the fit has seen."""
+        return self.model.rate_limit_v_s
+
+    @property
+    def standard_errors(self) -> FloatArray:
+        """Standard errors in the order of `PARAMETERS`, SI units."""
+        return np.asarray(np.sqrt(np.diag(self.covariance)))
+
+    @property
+    def correlation(self) -> FloatArray:
+        """Correlation matrix of the parameters."""
+        return correlation(self.covariance)
+
+    @property
+    def settled_hysteresis_rad(self) -> tuple[float, float]:
+        """|h| of a slow settled loop, |epsilon| / k_settled, and its standard error; better fixed than its parts."""
+        settled = k_settled(self.values)
+        value = abs(self.model.epsilon_rad_v) / settled
+        sign = math.copysign(1.0, self.model.epsilon_rad_v)
+        gradient = np.array([0, 0, sign / settled, 0, -value / settled, -sign * value / settled])
+        return value, float(math.sqrt(max(0.0, gradient @ self.covariance @ gradient)))
+
+    def response(self, drive_v: FloatArray, step_s: float) -> tuple[FloatArray, int]:
+        """Output (rad) without offset for a drive (V) from h = 0, and the number of rate-clamped samples."""
+        output, _, clamped = bouc_wen_response(drive_v, step_s, np.array(self.model.row[:8]), 0.0)
+        return output, int(clamped)
+
+
+def fit_bouc_wen(
+    recordings: Sequence[Recording],
+    *,
+    starts: int = 12,
+    seed: int = 0,
+    admissible: bool = False,
+    free_offset: bool = True,
+    on_progress: Progress | None = None,
+    units: Units = DEFAULT_UNITS,
+) -> BoucWenFit:
+    """Fit Eq. 3 with one offset per record to all recordings at once, every sample with equal weight.
+
+    Trust-region-reflective least squares from `starts` starts: the best points of a coarse grid, scattered log-normally
+    by the Philox stream of `seed`. h starts at zero and the residuals before the drive has swept its range once are
+    left out. `admissible` keeps the local slope after reversals from turning against d1. The rate in the exponents is
+    clamped at the fastest rate of the recordings, as it is in simulation. `free_offset=False` says that the sensor
+    reads zero at zero drive, as in Eq. 3: on the paper's 100 Hz record that fixes d1 seven times better.
+    `on_progress(done, total, what)` is called after each start. Raises `IdentificationError`.
+    """
+    if starts < 1:
+        raise IdentificationError(f"{starts} starts were asked for; give at least 1, better 10 or more.")
+    problem = Problem(prepare(recordings, units), 1.0 if admissible else math.inf, free_offset)
+    costs, best = multi_start(problem, starts, seed, on_progress or unheard)
+    if admissible:
+        problem, best = tightened(problem, best)
+    return _report(problem, problem.solve(best), units, costs, admissible)
+
+
+# ---------------------------------------------------------------------------------------------------------- report
+def _report(problem: Problem, values: FloatArray, units: Units, costs: FloatArray, constrained: bool) -> BoucWenFit:
+    residual = problem.measured - stacked(problem, values)
+    offsets = tuple(problem.free_offset * float(part.mean()) for part in split_by_record(residual, problem.records))
+    residual = problem.centred(residual)
+    colour = colour_inflation(split_by_record(residual, problem.records))
+    variance = (
+        colour
+        * float(residual @ residual)
+        / max(1, residual.size - values.size - len(problem.records) * problem.free_offset)
+    )
+    share = -float(values[2] * 2 * values[4] / values[0]) / k_settled(values)
+    at_bound = constrained and share > 0.999 * problem.share
+    sizes = _sizes(problem, values)
+    jacobian = _jacobian(problem, values, sizes)
+    covariance = _covariance(jacobian, sizes, variance, values if at_bound else None)
+    rms, _ = percent(residual, problem.output_span_rad)
+    d1, d2, epsilon, delta, alpha, beta = values.tolist()
+    model = BoucWen(d1, d2, epsilon, delta, alpha, beta, problem.rate_limit)
+    slope, lowest = rising(model).reversal_slope_rad_v(), lowest_slope(problem, values)
+    return BoucWenFit(
+        model=model,
+        offsets_rad=offsets,
+        units=units,
+        covariance=covariance,
+        colour_inflation=colour,
+        condition_number=float(np.linalg.cond(jacobian * sizes)),
+        not_identified=_not_identified(values, covariance, one_rate_only(problem.records), at_bound),
+        residual_rms_rad=rms * problem.output_span_rad / 100,
+        residual_rms_percent=rms,
+        start_rms_percent=tuple(100 * math.sqrt(2 * cost) for cost in costs),
+        agreeing_starts=int(np.sum(costs <= costs.min() * (1 + 1e-3) + _SAME_COST)),
+        slope_after_reversal_rad_per_v=slope,
+        lowest_slope_rad_per_v=lowest,
+        admissible=bool(min(slope, lowest) >= -SLOPE_TOLERANCE * abs(values[0])),
+        constrained=constrained,
+        free_offset=problem.free_offset,
+        samples_used=residual.size,
+    )
+
+
+def _sizes(problem: Problem, values: FloatArray) -> FloatArray:
+    """A step of order one for each parameter: its own size, or what matters at the fastest rate."""
+    least = np.array(
+        [0, 1e-3 / problem.rate_limit, 1e-9 * abs(values[0]), 1e-2 / problem.rate_limit, 0, 1e-3 * values[4]]
+    )
+    return np.asarray(np.maximum(np.abs(values), least))
+
+
+def _jacobian(problem: Problem, values: FloatArray, sizes: FloatArray) -> FloatArray:
+    """d output / d parameter by central differences, less the mean in each record (the offsets are marginalised)."""
+    columns = []
+    for i, size in enumerate(1e-4 * sizes):
+        step = np.zeros(6)
+        step[i] = size
+        columns.append((stacked(problem, values + step) - stacked(problem, values - step)) / (2 * size))
+    return problem.centred(np.column_stack(columns))
+
+
+def _covariance(jacobian: FloatArray, sizes: FloatArray, variance: float, bounded: FloatArray | None) -> FloatArray:
+    """variance (J^T J)^-1, on the plane of the active slope bound where there is one."""
+    free = np.eye(6)
+    if bounded is not None:
+        normal = _bound_gradient(bounded) * sizes
+        free = np.linalg.svd(normal[None, :])[2][1:].T
+    _, singular, vectors = np.linalg.svd(jacobian * sizes @ free, full_matrices=False)
+    singular = np.maximum(singular, 1e-14 * singular[0])
+    root = sizes[:, None] * (free @ vectors.T / singular)
+    return np.asarray(variance * root @ root.T)
+
+
+def _bound_gradient(values: FloatArray) -> FloatArray:
+    """Gradient of epsilon 2 alpha / (k_settled d1), which the active bound holds constant, over the six parameters."""
+    d1, _, epsilon, _, alpha, _ = values
+    settled = k_settled(values)
+    share = epsilon * 2 * alpha / (settled * d1)
+    sign = math.copysign(1.0, epsilon)
+    return np.array([-share / d1, 0, share / epsilon, 0, share / alpha - share / settled, -sign * share / settled])
+
+
+def _not_identified(
+    values: FloatArray, covariance: FloatArray, one_rate: bool, at_bound: bool
+) -> tuple[NotIdentified, ...]:
+    """Parameters with a relative standard error above 0.5 or a correlation above 0.95, each with its reason."""
+    error = np.sqrt(np.diag(covariance)) / np.maximum(np.abs(values), 1e-300)
+    between = np.abs(correlation(covariance)) - np.eye(6)
+    found = []
+    for i, name in enumerate(PARAMETERS):
+        partner = int(np.argmax(between[i]))
+        if error[i] > 0.5:
+            fact = f"relative standard error {100 * error[i]:.0f} %"
+        elif between[i, partner] > 0.95:
+            fact = f"correlation {between[i, partner]:.3f} with {PARAMETERS[partner]}"
+        else:
+            continue
+        found.append(NotIdentified(name, f"{fact}: {_reason(name, one_rate, at_bound)}"))
+    return tuple(found)
+
+
+def _reason(name: str, one_rate: bool, at_bound: bool) -> str:
+    if name in ("d2", "delta") and one_rate:
+        return "the recordings hold loops of one rate only; record the same loop at two more frequencies"
+    if name == "d2":
+        return "its effect on the output is below the noise; faster loops would show it"
+    if name == "delta":
+        return "the loops widen too little with rate to tell; record faster loops"
+    if name in ("epsilon", "alpha", "beta"):
+        bound = " (on the bound of the admissible slope)" if at_bound else ""
+        return (
+            "loops fix the settled hysteresis |epsilon| / (alpha + sign(epsilon) beta), and only the few samples "
+            f"behind each reversal separate its parts{bound}; record small loops with many reversals"
+        )
+    return (
+        "a large hysteresis that settles soon after each reversal looks like part of the linear slope; larger loops "
+        "tell them apart"
+    )

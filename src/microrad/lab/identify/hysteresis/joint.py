@@ -1,0 +1,361 @@
+"""Hysteresis, linear part and creep of one axis, fitted together to all recordings of it.
+
+The start comes from fits that are linear in most of their numbers; `plant_fit` then moves everything at once. Each
+recording counts alike, whatever its length and size: its residual is divided by its rms output.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from microrad.core import kernels
+from microrad.lab.identify.hysteresis.axis import AxisStructure, LinearPoles, one_axis
+from microrad.lab.identify.hysteresis.bouc_wen import BoucWenFit, fit_bouc_wen, rising
+from microrad.lab.identify.hysteresis.plant_fit import PlantFit, Run, fit_plant, without
+from microrad.lab.identify.hysteresis.prandtl_ishlinskii import non_negative, threshold_grid
+from microrad.lab.identify.prepared import FloatArray, Prepared, Progress, Units, fastest_rate, prepare, span
+from microrad.lab.recording import Recording
+from microrad.mirror import model as mirror
+from microrad.mirror.hysteresis import NO_CREEP, BoucWen, Creep, Play, slow_gain
+from microrad.mirror.model import Mirror
+
+OPERATORS = 15
+_MOST_SAMPLES = 20_000
+_EVALUATIONS = 200
+_POLISHING = 60  # each is long: the broadband recordings belong to it
+
+
+@dataclass(frozen=True, slots=True)
+class Form:
+    """What a joint fit may contain: a family, its free extras, and creep."""
+
+    family: str  # "bouc_wen", "prandtl_ishlinskii" or "linear", which is one play without threshold
+    free: tuple[str, ...] = ()
+    creep: bool = False
+    needs_linear: bool = False  # without a linear part another model says the same
+
+
+FORMS = {
+    "linear": Form("linear", needs_linear=True),
+    "bouc_wen_classical": Form("bouc_wen", ("exponent",)),
+    "bouc_wen_joint": Form("bouc_wen", ("d2", "delta"), needs_linear=True),
+    "bouc_wen_asymmetric": Form("bouc_wen", ("d2", "delta", "gamma", "eta")),
+    "bouc_wen_creep": Form("bouc_wen", ("d2", "delta"), creep=True),
+    "prandtl_ishlinskii_joint": Form("prandtl_ishlinskii", needs_linear=True),
+    "prandtl_ishlinskii_rate": Form("prandtl_ishlinskii", ("widening",)),
+    "prandtl_ishlinskii_creep": Form("prandtl_ishlinskii", creep=True),
+    "prandtl_ishlinskii_rate_creep": Form("prandtl_ishlinskii", ("widening",), creep=True),
+}
+"""The joint forms by name; each has the linear part in cascade where there is one."""
+
+
+@dataclass(frozen=True, eq=False)
+class JointFit:
+    """A joint fit of one axis in volts and radians.
+
+    `model`, `creep` and `linear` are what the mirror consists of; `fit` holds the parameters of `structure` with their
+    covariance.
+    `time_constants_s` of the creep are chosen (decades that the recordings cover), not fitted.
+    """
+
+    name: str
+    form: Form
+    structure: AxisStructure
+    fit: PlantFit
+    mirror: Mirror
+    model: BoucWen | Play
+    creep: Creep
+    linear: LinearPoles | None
+    rate_limit_v_per_s: float
+    units: Units
+    residual_rms_rad: float
+    residual_rms_percent: float
+    samples_used: int
+    free_offset: bool = True
+
+    @property
+    def admissible(self) -> bool:
+        """Whether the modelled mirror never moves against its drive just after a slow reversal."""
+        if isinstance(self.model, Play):
+            return all(w * slow_gain(self.model) >= 0.0 for w in self.model.weights_rad_v)
+        turned = rising(self.model)
+        return turned.reversal_slope_rad_v() >= -1e-3 * turned.d1_rad_v
+
+    @property
+    def not_identified(self) -> tuple[tuple[str, str], ...]:
+        """Parameters that the recordings do not fix: name, and the number that says so with what would help."""
+        return tuple((name, f"{fact}; {_why(name)}") for name, fact in self.fit.not_identified)
+
+    def response(self, drive_v: FloatArray, step_s: float) -> tuple[FloatArray, int]:
+        """Output (rad) without offset for a drive (V), at rest at the first drive value, and the clamped samples."""
+        plant = mirror.discretise(self.mirror, step_s)
+        state = mirror.at_rest(plant)
+        output = np.empty((drive_v.size, 1))
+        drive = (drive_v - drive_v[0])[:, None].copy()
+        kernels.open_loop(plant, state, drive, output, np.empty((drive_v.size, 0)))
+        return output[:, 0], int(state.clamped.sum())
+
+    def nuisance(self, samples: int, step_s: float) -> FloatArray:
+        """What a record may add by itself (samples, columns): an offset, and the tail of a creep begun before it."""
+        return _nuisance(samples, step_s, self.creep.time_constants_s)
+
+
+_WHY = {
+    "weight": "neighbouring thresholds do nearly the same; loops of more amplitudes tell them apart",
+    "widening": "the loops widen too little with the rate to tell; record faster loops",
+    "creep": "over a short record creep looks like gain; record a staircase with long dwells",
+    "d1": "a large hysteresis or creep looks like gain; larger loops or longer records tell them apart",
+    "d2": "its effect on the output is below what is left; faster loops would show it",
+    "delta": "the loops widen too little with the rate to tell; record faster loops",
+    "exponent": "only the shape of the branches fixes it; record loops of several amplitudes",
+    "pole": "a pole and a zero side by side nearly cancel, and one beyond the band is a flank only",
+    "zero": "a pole and a zero side by side nearly cancel, and one beyond the band is a flank only",
+}
+
+
+def _why(name: str) -> str:
+    reversals = "loops fix the settled hysteresis, only the samples behind a reversal its parts; record small loops"
+    return _WHY.get(name.partition(" ")[0], reversals)
+
+
+def fit_joint(  # noqa: PLR0913  all but the first three are named options
+    recordings: Sequence[Recording],
+    name: str,
+    units: Units,
+    *,
+    linear: LinearPoles | None = None,
+    free_linear: bool = False,
+    admissible: bool = False,
+    broadband: Sequence[Recording] = (),
+    static: BoucWenFit | None = None,
+    starts: int = 2,
+    seed: int = 0,
+    on_progress: Progress | None = None,
+) -> JointFit:
+    """Fit one of `FORMS` to all recordings at once, in cascade with a linear part where one is given.
+
+    `linear` is that part, whose poles and zeros are moved with the rest where `free_linear` says so; the `broadband`
+    recordings then belong to the fit, so that they keep hold of the poles. `admissible` bounds epsilon so that the
+    slope behind a slow reversal never turns. A Bouc-Wen form begins at its `static` fit (`static_fit`, made where it is
+    not given) and at `starts` - 1 points scattered about it (Philox stream of `seed`). Raises `IdentificationError`.
+    """
+    form = FORMS[name]
+    records = tuple(thinned(record) for record in prepare(recordings, units))
+    creep_times = time_constants(records) if form.creep else ()
+    start = _Start(name, form, linear, free_linear, admissible, creep_times)
+    run_list = tuple(_run(record, creep_times) for record in records)
+    scattered: list[FloatArray] = []
+    if form.family != "bouc_wen":
+        structure = start.plays(records, run_list)
+    else:
+        structure, scattered = start.bouc_wen(records, static or static_fit(recordings, units, seed), starts, seed)
+    both = (
+        [*run_list, *(_run(record, creep_times) for record in prepare([_shortened(r) for r in broadband], units))]
+        if broadband
+        else run_list
+    )
+    tolerance = 1e-12 if free_linear else 1e-9  # a candidate is only compared
+    fit = fit_plant(
+        structure,
+        both,
+        starts=scattered,
+        tolerance=tolerance,
+        most_evaluations=_POLISHING if free_linear else _EVALUATIONS,
+        on_progress=on_progress,
+    )
+    return _joint_fit(structure, form, fit, records, units)
+
+
+# ---------------------------------------------------------------------------------------------------------- starts
+def static_fit(recordings: Sequence[Recording], units: Units, seed: int) -> BoucWenFit:
+    """The fit of Eq. 3 at which all Bouc-Wen forms begin."""
+    return fit_bouc_wen(recordings, starts=6, seed=seed, units=units)
+
+
+def time_constants(records: Sequence[Prepared]) -> tuple[float, ...]:
+    """Decades of creep that the records can show: from ten samples or 10 ms to three times the longest record."""
+    longest = max(r.drive_v.size * r.step_s for r in records)
+    shortest = max(10 * min(r.step_s for r in records), 1e-2)
+    last = math.floor(math.log10(3 * longest))
+    first = min(math.ceil(math.log10(shortest)), last)
+    return tuple(10.0**k for k in range(first, last + 1))
+
+
+def _shortened(recording: Recording) -> Recording:
+    """A broadband recording without the periods that only repeat what two of them say."""
+    keep = recording.samples if recording.period_samples is None else 2 * recording.period_samples
+    return replace(recording, drive=recording.drive[:keep], output=recording.output[:keep])
+
+
+def thinned(record: Prepared) -> Prepared:
+    """Every n-th sample of a long record, as long as straight lines between them still make the drive.
+
+    The kernel is exact for such a drive at any step, so only samples are lost, and neighbouring ones say the same.
+    Straight enough is an rms distance of 0.2 % of the drive's own rms.
+    """
+    size = record.drive_v.size
+    stride = -(-size // _MOST_SAMPLES)
+    spread = float(np.std(record.drive_v))
+    while stride > 1:
+        kept = np.arange(0, size, stride)
+        bent = np.interp(np.arange(kept[-1] + 1), kept, record.drive_v[kept]) - record.drive_v[: kept[-1] + 1]
+        if float(np.sqrt(np.mean(bent**2))) <= 2e-3 * spread:
+            break
+        stride //= 2
+    return replace(
+        record,
+        drive_v=record.drive_v[::stride].copy(),
+        output_rad=record.output_rad[::stride].copy(),
+        step_s=record.step_s * stride,
+        start=-(-record.start // stride),
+    )
+
+
+def _nuisance(samples: int, step_s: float, creep_times: Sequence[float]) -> FloatArray:
+    """Orthonormal columns: an offset and, with creep, the tail that a level before the record leaves in all lags."""
+    columns = [np.ones(samples)]
+    if creep_times:
+        time = np.arange(samples) * step_s
+        columns.append(np.sum([np.exp(-time / tau) for tau in creep_times], axis=0))
+    return np.asarray(np.linalg.qr(np.column_stack(columns))[0])
+
+
+def _run(record: Prepared, creep_times: Sequence[float]) -> Run:
+    """A record about its first drive value; its weight makes it count as every other does."""
+    used = record.output_rad[record.start :]
+    nuisance = _nuisance(record.drive_v.size, record.step_s, creep_times)[record.start :]
+    weight = 1.0 / (float(np.std(used)) * math.sqrt(used.size))
+    return Run(
+        record.name,
+        (record.drive_v - record.drive_v[0])[:, None].copy(),
+        record.output_rad[:, None],
+        record.step_s,
+        1,
+        record.start,
+        np.asarray(np.linalg.qr(nuisance)[0]),
+        weight,
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class _Start:
+    """Where a form begins."""
+
+    name: str
+    form: Form
+    linear: LinearPoles | None
+    free_linear: bool
+    admissible: bool
+    creep_times: tuple[float, ...]
+
+    def structure(self, model: BoucWen | Play, creep_rad_v: float) -> AxisStructure:
+        creep = Creep((creep_rad_v,) * len(self.creep_times), self.creep_times) if self.creep_times else NO_CREEP
+        return one_axis(
+            self.name,
+            model,
+            linear=self.linear,
+            creep=creep,
+            free=self.form.free,
+            free_linear=self.free_linear,
+            admissible=self.admissible,
+        )
+
+    def plays(self, records: tuple[Prepared, ...], run_list: Sequence[Run]) -> AxisStructure:
+        """Weights and creep by non-negative least squares."""
+        operators = 1 if self.form.family == "linear" else OPERATORS
+        return self.structure(*_play_start(records, run_list, self.linear, self.creep_times, operators))
+
+    def bouc_wen(
+        self, records: tuple[Prepared, ...], static: BoucWenFit, starts: int, seed: int
+    ) -> tuple[AxisStructure, list[FloatArray]]:
+        """The static fit of Eq. 3, and the values of starts scattered about it."""
+        bias = float(np.mean([r.drive_v[0] for r in records]))
+        model = replace(static.model, bias_v=bias)
+        if "delta" not in self.form.free:
+            model = replace(model, d2_s_v=0.0, delta_s_v=0.0)
+        structure = self.structure(model, 1e-3 * model.d1_rad_v)
+        own = np.array([p.start for p in structure.parameters])
+        rng = np.random.Generator(np.random.Philox(seed))
+        shaken = np.array([p.name in ("epsilon", "alpha", "epsilon over its limit") for p in structure.parameters])
+        return structure, [own * np.exp(0.3 * shaken * rng.standard_normal(own.size)) for _ in range(starts - 1)]
+
+
+def _play_start(
+    records: tuple[Prepared, ...],
+    run_list: Sequence[Run],
+    linear: LinearPoles | None,
+    creep_times: Sequence[float],
+    operators: int,
+) -> tuple[Play, float]:
+    """Weights >= 0 of plays and creep by non-negative least squares, the linear part held; idle plays are dropped."""
+    thresholds = threshold_grid(max(float(np.ptp(r.drive_v)) for r in records), operators)
+    columns, targets = [], []
+    for record, run in zip(records, run_list, strict=True):
+        drive = run.drive[:, 0]
+        plays = filtered(kernels.play_response(drive, thresholds, np.zeros(operators)), linear, record.step_s)
+        lags = kernels.lag_response(drive, record.step_s, np.array(creep_times), np.zeros(len(creep_times)))
+        both = np.column_stack([plays, lags.sum(axis=1)] if creep_times else [plays])
+        columns.append(run.weight * without(run.nuisance, both[run.first :]))
+        targets.append(run.weight * run.target[:, 0])
+    matrix, target = np.concatenate(columns), np.concatenate(targets)
+    sign = 1.0 if float(matrix[:, 0] @ target) >= 0.0 else -1.0
+    weights = sign * non_negative(matrix, sign * target)
+    kept = np.abs(weights[:operators]) > 0.0
+    kept[0] = True
+    limit = fastest_rate(records)
+    model = Play(tuple(thresholds[kept].tolist()), tuple(weights[:operators][kept].tolist()), 0.0, limit)
+    return model, float(weights[-1]) if creep_times else 0.0
+
+
+def filtered(columns: FloatArray, linear: LinearPoles | None, step_s: float) -> FloatArray:
+    """Columns (samples, any) behind the linear part, each from rest and straight between its samples."""
+    if linear is None:
+        return columns
+    system = linear.system
+    no_bank = Mirror(
+        name="linear",
+        A=system.A,
+        B=system.B,
+        E=np.zeros((system.order, 0)),
+        F=np.zeros((0, system.order)),
+        G=np.zeros((0, 1)),
+        C=system.C,
+        D=system.D,
+        K=np.zeros((1, 0)),
+        bouc_wen=(),
+        plays=(),
+        inverse=(),
+    )
+    plant = mirror.discretise(no_bank, step_s)
+    behind = np.empty_like(columns)
+    output, bank = np.empty((columns.shape[0], 1)), np.empty((columns.shape[0], 0))
+    for j, column in enumerate(columns.T):
+        kernels.open_loop(plant, mirror.at_rest(plant), column[:, None].copy(), output, bank)
+        behind[:, j] = output[:, 0]
+    return behind
+
+
+# ---------------------------------------------------------------------------------------------------------- result
+def _joint_fit(
+    structure: AxisStructure, form: Form, fit: PlantFit, records: tuple[Prepared, ...], units: Units
+) -> JointFit:
+    axis = structure.parts(fit.values)
+    residual = np.concatenate([r[:, 0] for r in fit.residuals[: len(records)]])  # the broadband ones come behind
+    rms = float(np.sqrt(np.mean(residual**2)))
+    return JointFit(
+        name=structure.name,
+        form=form,
+        structure=structure,
+        fit=fit,
+        mirror=fit.mirror,
+        model=axis.model,
+        creep=axis.creep,
+        linear=axis.linear,
+        rate_limit_v_per_s=axis.model.rate_limit_v_s,
+        units=units,
+        residual_rms_rad=rms,
+        residual_rms_percent=100 * rms / span(records),
+        samples_used=residual.size,
+    )

@@ -1,0 +1,409 @@
+"""Joint fit of everything in a mirror, linear part, hysteresis and its place in the loop, by simulating the plant form.
+
+A `Structure` turns a list of parameters into a mirror in the plant form (`microrad.mirror.model`); the fit runs that
+mirror over the recordings with the kernel that every simulation uses and minimises measured less modelled by
+trust-region least squares. So phase lag is counted once, and a hysteretic stiffness (q = F x) is fitted like any other
+element.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache, partial
+from typing import Any, Literal
+
+import numpy as np
+
+from microrad.core import kernels
+from microrad.core.threads import in_threads
+from microrad.lab.identify.prepared import (
+    FloatArray,
+    IdentificationError,
+    Progress,
+    colour_inflation,
+    correlation,
+    unheard,
+)
+from microrad.lab.recording import Recording
+from microrad.mirror import model as mirror
+from microrad.mirror.model import Mirror
+
+Hold = Literal["linear", "band-limited"]
+
+_ROUGH = 1e-8  # relative change of cost or place from which a search goes on by central differences
+_DIFFERENCE = 1e-5
+_SLICE = 2_000_000
+_FAR = 1e3  # times the largest output: a model further off is as good as none
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """A number to be fitted: name, unit, where the search begins, its bounds, and a change of it that is of order one.
+
+    `size` is the size of the start where it is left at 0.
+    """
+
+    name: str
+    unit: str
+    start: float
+    lower: float = -math.inf
+    upper: float = math.inf
+    size: float = 0.0
+
+    @property
+    def scale(self) -> float:
+        """The change of order one."""
+        return self.size or abs(self.start) or 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class Structure:
+    """Parameters, and how they make a mirror: `build` takes their values, in their order, and raises nothing."""
+
+    name: str
+    parameters: tuple[Parameter, ...]
+    build: Callable[[FloatArray], Mirror]
+
+    def at(self, values: Sequence[float] | FloatArray) -> "Structure":
+        """The same structure with the search beginning elsewhere."""
+        pairs = zip(self.parameters, values, strict=True)
+        return replace(self, parameters=tuple(replace(p, start=float(v), size=p.scale) for p, v in pairs))
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """One record as the fit sees it.
+
+    `drive` (steps of `step_s`, actuators) goes to the plant, about its rest; every `stride`-th output, from the first,
+    belongs to a row of `output` (samples, outputs). Rows before `first` are the transient. `nuisance` (used samples,
+    columns) is what every output may add to itself freely: an offset, the tail of an older creep. `weight` is what one
+    unit of residual counts.
+    """
+
+    name: str
+    drive: FloatArray
+    output: FloatArray
+    step_s: float
+    stride: int
+    first: int
+    nuisance: FloatArray
+    weight: float = 1.0
+
+    @property
+    def target(self) -> FloatArray:
+        """The used part of the output without its nuisance."""
+        return without(self.nuisance, self.output[self.first :])
+
+
+def without(nuisance: FloatArray, signal: FloatArray) -> FloatArray:
+    """A signal (samples, outputs) less its projection onto orthonormal columns (samples, columns)."""
+    return np.asarray(signal - nuisance @ (nuisance.T @ signal)) if nuisance.size else signal
+
+
+def upsampled(drive: FloatArray, factor: int, hold: Hold) -> FloatArray:
+    """A drive (samples, inputs) at `factor` times the rate; row factor * k belongs to sample k.
+
+    "linear": straight between samples. "band-limited": trigonometric, for a drive of whole periods.
+    """
+    samples = drive.shape[0]
+    if factor == 1:
+        return drive
+    if hold == "linear":
+        fine = np.arange(factor * (samples - 1) + 1) / factor
+        return np.column_stack([np.interp(fine, np.arange(samples), column) for column in drive.T])
+    spectrum = np.fft.rfft(drive, axis=0)
+    return np.asarray(np.fft.irfft(spectrum, factor * samples, axis=0) * factor)
+
+
+def runs(
+    recordings: Sequence[Recording], *, factor: int = 1, hold: Hold = "linear", drop: int = 0, offset: bool = True
+) -> tuple[Run, ...]:
+    """Recordings as runs of the plant, `factor` plant steps a sample, the first `drop` samples left out of the fit.
+
+    A periodic recording (period_samples) whose periods share their drive is reduced to one period, the mean of its
+    periods from the second on, behind a run-in of one period of the same drive. Others start at rest at their first
+    drive value. Without `offset` no output has a free zero. Raises `IdentificationError` where nothing is left.
+    """
+    made = []
+    for recording in recordings:
+        if _repeats(recording):
+            drive, output, first = _one_period(recording, factor, hold)
+        elif drop >= recording.samples - 1:
+            raise IdentificationError(
+                f"{recording.path}: {recording.samples} samples, of which the first {drop} are left out: nothing is "
+                "left to fit; leave out fewer or record longer."
+            )
+        else:
+            drive, output, first = (
+                upsampled(recording.drive - recording.drive[:1], factor, hold),
+                recording.output,
+                drop,
+            )
+        used = len(output) - first
+        nuisance = np.full((used, 1), 1.0 / math.sqrt(used)) if offset else np.zeros((used, 0))
+        made.append(Run(recording.path, drive.copy(), output, recording.step_s / factor, factor, first, nuisance))
+    return tuple(made)
+
+
+def _repeats(recording: Recording) -> bool:
+    period = recording.period_samples
+    if period is None or recording.samples < 2 * period:
+        return False
+    spread = np.abs(recording.drive[period : 2 * period] - recording.drive[:period]).max()
+    return bool(spread <= 1e-6 * np.abs(recording.drive).max())
+
+
+def _one_period(recording: Recording, factor: int, hold: Hold) -> tuple[FloatArray, FloatArray, int]:
+    """Two periods of the drive, the output with its mean period as the second one, and the first sample of that."""
+    period = recording.period_samples or recording.samples
+    whole = recording.samples // period
+    if hold == "linear":
+        wrapped = np.concatenate([recording.drive[:period], recording.drive[:1]])
+        one = upsampled(wrapped, factor, hold)[: period * factor]
+    else:
+        one = upsampled(recording.drive[:period], factor, hold)
+    mean = recording.output[period : whole * period].reshape(whole - 1, period, -1).mean(axis=0)
+    return np.concatenate([one, one]), np.concatenate([np.zeros((period, mean.shape[1])), mean]), period
+
+
+def simulate(plant: kernels.Plant, run: Run) -> FloatArray:
+    """Output (samples, outputs) of the plant over a run, from rest."""
+    state = mirror.at_rest(plant)
+    output = np.empty((run.drive.shape[0], len(plant.outputs)))
+    bank = np.empty((run.drive.shape[0], 0))
+    for begin in range(0, run.drive.shape[0], _SLICE):  # the kernel is not to be away from the interpreter for long
+        part = slice(begin, begin + _SLICE)
+        kernels.open_loop(plant, state, run.drive[part], output[part], bank[part])
+    return output[:: run.stride]
+
+
+@dataclass(frozen=True, eq=False)
+class PlantFit:
+    """What came out: the mirror, its parameters with their covariance, and how well it follows the records.
+
+    `covariance`, over the parameters in their order, comes from the residuals of each run by themselves (the sandwich
+    (J'J)^-1 J'VJ (J'J)^-1), inflated by their colour (`records.colour_inflation`, the largest one is kept).
+    `residual_rms` has the shape (runs, outputs), in the units of the recordings, without the weights. `start_costs` are
+    the costs reached from each start, `agreeing_starts` how many came to within 0.1 % of the best. `not_identified`
+    names each parameter that the records do not fix, with the reason. Where the search was not `converged` it stopped
+    at its last evaluation on the way down, and the standard errors are those of a point that is no minimum.
+    """
+
+    structure: Structure
+    values: FloatArray
+    covariance: FloatArray
+    colour_inflation: float
+    condition_number: float
+    not_identified: tuple[tuple[str, str], ...]
+    residual_rms: FloatArray
+    residuals: tuple[FloatArray, ...]
+    start_costs: tuple[float, ...]
+    agreeing_starts: int
+    evaluations: int
+    converged: bool
+
+    @property
+    def mirror(self) -> Mirror:
+        """The fitted mirror."""
+        return self.structure.build(self.values)
+
+    @property
+    def standard_errors(self) -> FloatArray:
+        """Standard errors of the parameters."""
+        return np.asarray(np.sqrt(np.diag(self.covariance)))
+
+    @property
+    def correlation(self) -> FloatArray:
+        """Correlation matrix of the parameters."""
+        return correlation(self.covariance)
+
+
+class Problem:
+    """The weighted residual of a structure on its runs, and its Jacobian by differences, as functions of the values."""
+
+    def __init__(self, structure: Structure, run_list: Sequence[Run]) -> None:
+        """The parameters are searched in units of their scale."""
+        self.structure, self.runs = structure, tuple(run_list)
+        self.scale = np.array([p.scale for p in structure.parameters])
+        self.lower = np.array([p.lower for p in structure.parameters]) / self.scale
+        self.upper = np.array([p.upper for p in structure.parameters]) / self.scale
+        self.targets = [run.target for run in self.runs]
+        self.size = sum(target.size for target in self.targets)
+        largest = [run.weight * float(np.max(np.abs(t))) for run, t in zip(self.runs, self.targets, strict=True)]
+        self.far = _FAR * max(largest)
+        self.measured = np.concatenate([r.weight * t.ravel() for r, t in zip(self.runs, self.targets, strict=True)])
+        # A point is asked for up to three times: by the search, by the derivatives there and by the report.
+        self.simulated = lru_cache(maxsize=2 * self.scale.size + 2)(self._simulate)
+
+    def outputs(self, values: FloatArray) -> list[FloatArray]:
+        """Used outputs of each run without their nuisance, weighted."""
+        model = self.structure.build(values)
+        plants = {step: mirror.discretise(model, step) for step in {run.step_s for run in self.runs}}
+        return [run.weight * without(run.nuisance, simulate(plants[run.step_s], run)[run.first :]) for run in self.runs]
+
+    def modelled(self, point: FloatArray) -> FloatArray:
+        """All used outputs as one vector, at a scaled point; far off where the plant cannot be stepped or runs away."""
+        return self.simulated(point.tobytes())
+
+    def _simulate(self, point: bytes) -> FloatArray:
+        try:
+            parts = self.outputs(np.frombuffer(point) * self.scale)
+        except ValueError:
+            return np.full(self.size, self.far)
+        whole = np.concatenate([part.ravel() for part in parts])
+        return np.where(np.abs(whole) < self.far, whole, self.far)  # nan and inf too
+
+    def residual(self, point: FloatArray) -> FloatArray:
+        """Modelled less measured, weighted."""
+        return np.asarray(self.modelled(point) - self.measured)
+
+    def slopes(self, point: FloatArray) -> FloatArray:
+        """Derivative of the residual by differences to one side, for the way to an optimum: half the simulations."""
+        here = self.modelled(point)
+
+        def column(i: int) -> FloatArray:
+            step = np.zeros(point.size)
+            step[i] = _DIFFERENCE if point[i] + _DIFFERENCE <= self.upper[i] else -_DIFFERENCE
+            return np.asarray((self.modelled(point + step) - here) / step[i])
+
+        return _columns(column, point.size)
+
+    def jacobian(self, point: FloatArray) -> FloatArray:
+        """Derivative of the residual by central differences."""
+
+        def column(i: int) -> FloatArray:
+            step = np.zeros(point.size)
+            up = min(point[i] + _DIFFERENCE, self.upper[i]) - point[i]
+            down = point[i] - max(point[i] - _DIFFERENCE, self.lower[i])
+            step[i] = up + down
+            above, below = point + (up / step[i]) * step, point - (down / step[i]) * step
+            return np.asarray((self.modelled(above) - self.modelled(below)) / step[i])
+
+        return _columns(column, point.size)
+
+
+def _columns(column: Callable[[int], FloatArray], count: int) -> FloatArray:
+    """Columns side by side, made on all cores."""
+    return np.column_stack(in_threads([partial(column, i) for i in range(count)]))
+
+
+def fit_plant(
+    structure: Structure,
+    run_list: Sequence[Run],
+    *,
+    starts: Sequence[FloatArray] = (),
+    tolerance: float = 1e-9,
+    most_evaluations: int = 60,
+    on_progress: Progress | None = None,
+) -> PlantFit:
+    """Fit all parameters of a structure to all runs at once.
+
+    The search begins at the parameters' own starts and at each of `starts` (values in their order); trust-region
+    reflective least squares within their bounds. Raises `IdentificationError` when no start can be simulated.
+    """
+    problem = Problem(structure, run_list)
+    own = np.array([p.start for p in structure.parameters])
+    solutions = []
+    for done, start in enumerate([own, *starts], 1):
+        solutions.append(_search(problem, start / problem.scale, tolerance, most_evaluations))
+        (on_progress or unheard)(done, 1 + len(starts), structure.name)
+    best = min(solutions, key=lambda s: float(s.cost))
+    if best.cost >= 0.4 * problem.size * problem.far**2:
+        raise IdentificationError(
+            f"{structure.name}: the mirror cannot be simulated from any start at a step of "
+            f"{max(run.step_s for run in run_list):g} s; begin nearer, or take more steps a sample."
+        )
+    return _report(problem, best, [float(s.cost) for s in solutions])
+
+
+def _search(problem: Problem, start: FloatArray, tolerance: float, most_evaluations: int) -> Any:
+    from scipy.optimize import least_squares  # here, to keep start-up cheap
+
+    def search(begin: FloatArray, jacobian: Callable[[FloatArray], FloatArray], ending: float, most: int) -> Any:
+        return least_squares(
+            problem.residual,
+            begin,
+            jac=jacobian,
+            bounds=(problem.lower, problem.upper),
+            method="trf",
+            x_scale="jac",
+            ftol=ending,
+            xtol=ending,
+            gtol=1e-12,
+            max_nfev=most,
+        )
+
+    near = search(np.clip(start, problem.lower, problem.upper), problem.slopes, _ROUGH, most_evaluations)
+    found = search(near.x, problem.jacobian, tolerance, max(most_evaluations - near.nfev, 1))
+    found.nfev += near.nfev
+    return found
+
+
+# ---------------------------------------------------------------------------------------------------------- report
+def _report(problem: Problem, best: Any, costs: list[float]) -> PlantFit:
+    values = best.x * problem.scale
+    edges = np.cumsum([target.size for target in problem.targets])[:-1]
+    residuals = tuple(
+        target - out.reshape(target.shape) / run.weight
+        for run, target, out in zip(
+            problem.runs, problem.targets, np.split(problem.modelled(best.x), edges), strict=True
+        )
+    )
+    colours = [colour_inflation(list(residual.T)) for residual in residuals]
+    lost = best.fun.size / max(1, best.fun.size - values.size - sum(r.nuisance.shape[1] for r in problem.runs))
+    variances = [
+        np.full(r.size, lost * colour * run.weight**2 * float(np.mean(r**2)))
+        for r, colour, run in zip(residuals, colours, problem.runs, strict=True)
+    ]
+    covariance, condition = _covariance(best.jac, np.concatenate(variances), problem)
+    problem.simulated.cache_clear()
+    return PlantFit(
+        structure=problem.structure,
+        values=values,
+        covariance=covariance,
+        colour_inflation=max(colours),
+        condition_number=condition,
+        not_identified=tuple(_not_identified(problem.structure, values, covariance)),
+        residual_rms=np.array([np.sqrt(np.mean(r**2, axis=0)) for r in residuals]),
+        residuals=residuals,
+        start_costs=tuple(costs),
+        agreeing_starts=int(np.sum(np.array(costs) <= min(costs) * (1 + 1e-3))),
+        evaluations=int(best.nfev),
+        converged=best.status > 0,
+    )
+
+
+def _covariance(jacobian: FloatArray, variance: FloatArray, problem: Problem) -> tuple[FloatArray, float]:
+    """The sandwich in the parameters' units, and the condition number of J with columns of length 1."""
+    length = np.sqrt(np.einsum("ij,ij->j", jacobian, jacobian)) + 1e-300
+    if not np.isfinite(length).all():
+        raise IdentificationError(
+            f"{problem.structure.name}: a small change of the best parameters leads to a mirror that cannot be "
+            "simulated, so nothing can be said of their errors; record loops over the whole range of the drive as well."
+        )
+    gram = (jacobian.T @ jacobian) / np.outer(length, length)
+    values, vectors = np.linalg.eigh(gram)
+    values = np.maximum(values, 1e-15)
+    bread = (vectors / values) @ vectors.T
+    half = bread @ (jacobian / length * np.sqrt(variance)[:, None]).T  # a square cannot come out negative
+    size = problem.scale / length
+    return np.asarray(size[:, None] * (half @ half.T) * size), float(math.sqrt(values[-1] / values[0]))
+
+
+def _not_identified(structure: Structure, values: FloatArray, covariance: FloatArray) -> list[tuple[str, str]]:
+    """Parameters with a relative standard error above 0.5, or a correlation above 0.95 with another, and why."""
+    errors = np.sqrt(np.diag(covariance))
+    between = np.abs(correlation(covariance)) - np.eye(values.size)
+    found = []
+    for i, p in enumerate(structure.parameters):
+        partner = int(np.argmax(between[i])) if values.size > 1 else i
+        if values[i] <= p.lower or values[i] >= p.upper:
+            found.append((p.name, f"at its bound, {values[i]:g} {p.unit}".rstrip()))
+        elif errors[i] > abs(values[i]):
+            found.append((p.name, f"not told from 0: standard error {errors[i]:.2g} {p.unit}".rstrip()))
+        elif errors[i] > 0.5 * abs(values[i]):
+            found.append((p.name, f"relative standard error {100 * errors[i] / abs(values[i]):.0f} %"))
+        elif between[i, partner] > 0.95:
+            other = structure.parameters[partner].name
+            found.append((p.name, f"correlation {between[i, partner]:.3f} with {other}"))
+    return found

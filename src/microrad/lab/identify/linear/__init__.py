@@ -1,0 +1,1 @@
+"""The linear part of a mirror from recordings: frequency response, order, poles and their standard errors."""

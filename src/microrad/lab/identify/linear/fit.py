@@ -1,0 +1,425 @@
+"""Linear mirror model from recordings: frequency response, order, polish in frequency and in time, and its uncertainty.
+
+`fit_linear` does it all. Several inputs and outputs share their poles. The continuous system it returns gives the
+fitted samples exactly behind the hold that was named.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from microrad.core.lti import StateSpace
+from microrad.lab.identify.linear.modal import Complexes, Floats, Hold, ModalModel, simulate, simulate_periodic
+from microrad.lab.identify.linear.order import fit_order
+from microrad.lab.identify.linear.polish import Polished, TimeEquations, pack, polish, unpack
+from microrad.lab.identify.linear.response import FrequencyResponse, response_from_periods, response_from_records
+from microrad.lab.identify.linear.vector_fitting import check_order
+from microrad.lab.identify.prepared import IdentificationError, Progress, colour_inflation, unheard
+from microrad.lab.recording import Recording
+
+_STEP = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class Uncertainty:
+    """Poles, zeros and gains with standard errors of the complex value.
+
+    `poles_rad_s` and `zeros_rad_s` (transmission zeros below half the sample rate, square systems only) are arrays
+    (poles,) and (zeros,); `dc_gain` and `edge_gain` (outputs, inputs) are the gains at zero frequency and at the lowest
+    excited one.
+    """
+
+    poles_rad_s: Complexes
+    poles_error_rad_s: Floats
+    zeros_rad_s: Complexes
+    zeros_error_rad_s: Floats
+    dc_gain: Floats
+    dc_gain_error: Floats
+    edge_gain: Floats
+    edge_gain_error: Floats
+
+
+def uncertainty(polished: Polished, response: FrequencyResponse, direct: bool, inflation: float) -> Uncertainty:
+    """Values and standard errors; `inflation` is the factor by which colour raises the variance (1 for white)."""
+    model = polished.model
+    covariance = parameter_covariance(polished) * inflation
+    m, n = model.real_poles, model.poles_rad_s.size
+    variance = np.diag(covariance)[: 2 * n - m]
+    spread = variance[:n].copy()
+    spread[m:] += variance[n:]
+    spread = np.sqrt(np.maximum(np.concatenate([spread, spread[m:]]), 0.0))
+    zeros = transmission_zeros(model, np.pi * response.rate_hz)
+    points = np.concatenate([[0.0, 2j * np.pi * response.excited_hz[0]], zeros])
+    slopes = _slopes(model, points, direct)
+    values = at(model, points[:2])
+    errors = [np.sqrt(np.maximum(_variance(slopes[k], covariance), 0.0)) for k in (0, 1)]
+    # A gain is real in phase: only the change along the value moves its magnitude.
+    direction = values[1].conj() / np.maximum(np.abs(values[1]), 1e-300)
+    along = np.real(direction[:, :, None] * slopes[1])
+    errors[1] = np.sqrt(np.maximum(_variance(along, covariance), 0.0))
+    return Uncertainty(
+        model.all_poles_rad_s,
+        spread,
+        zeros,
+        _zero_errors(model, zeros, slopes[2:], covariance),
+        values[0].real,
+        errors[0],
+        np.abs(values[1]),
+        errors[1],
+    )
+
+
+def parameter_covariance(polished: Polished) -> Floats:
+    """Covariance of the parameters of `pack`."""
+    size = np.sqrt(np.maximum(np.diag(polished.normal), 1e-300))
+    values, vectors = np.linalg.eigh(polished.normal / np.outer(size, size))
+    kept = values > 1e-11 * values[-1]
+    inverse = (vectors[:, kept] / values[kept]) @ vectors[:, kept].T / np.outer(size, size)
+    freedom = max(polished.rows - int(np.count_nonzero(kept)), 1)
+    return np.asarray(inverse * polished.cost / freedom)
+
+
+def at(model: ModalModel, points: Complexes) -> Complexes:
+    """Transfer matrix at any complex frequencies (rad/s), shape (points, outputs, inputs)."""
+    return model.combined(1.0 / (np.asarray(points)[:, None] - model.all_poles_rad_s))
+
+
+def transmission_zeros(model: ModalModel, below_rad_s: float) -> Complexes:
+    """Complex frequencies at which the square transfer matrix loses rank, up to `below_rad_s`; none where not
+    square.
+    """
+    from scipy.linalg import eig  # here, to keep start-up cheap
+
+    outputs, inputs = model.direct.shape
+    if outputs != inputs:
+        return np.zeros(0, dtype=complex)
+    system, n = model.state_space(), model.order
+    # Balance channels against states, or the pencil mixes volts with rad/s.
+    rate = float(np.max(np.abs(model.poles_rad_s)))
+    reach, seen = float(np.linalg.norm(system.B)), float(np.linalg.norm(system.C))
+    B, C = system.B / reach, system.C / seen
+    pencil = np.block([[system.A / rate, B], [C, system.D * rate / (reach * seen)]])
+    mass = np.zeros_like(pencil)
+    mass[:n, :n] = np.eye(n)
+    top, bottom = eig(pencil, mass, right=False, homogeneous_eigvals=True)
+    finite = np.abs(bottom) > 1e-9 * np.maximum(np.abs(top), 1e-300)
+    zeros = rate * top[finite] / bottom[finite]
+    return np.asarray(np.sort_complex(zeros[np.abs(zeros) <= below_rad_s]).astype(complex))
+
+
+def _slopes(model: ModalModel, points: Complexes, direct: bool) -> Complexes:
+    """Derivative of the transfer matrix at the points by each parameter: (points, outputs, inputs, parameters)."""
+    theta = pack(model, direct)
+    slopes = np.empty((points.size, *model.direct.shape, theta.size), dtype=complex)
+    for k, value in enumerate(theta):
+        step = _STEP * max(abs(value), 1e-9)
+        ends = []
+        for sign in (1.0, -1.0):
+            moved = theta.copy()
+            moved[k] += sign * step
+            ends.append(at(unpack(moved, model), points))
+        slopes[..., k] = (ends[0] - ends[1]) / (2 * step)
+    return slopes
+
+
+def _variance(slopes: Complexes, covariance: Floats) -> Floats:
+    """Variance of the real part plus that of the imaginary part, over the last axis of the slopes."""
+    return np.asarray(np.einsum("...i,ij,...j->...", slopes, covariance, slopes.conj(), optimize=True).real)
+
+
+def _zero_errors(model: ModalModel, zeros: Complexes, slopes: Complexes, covariance: Floats) -> Floats:
+    """At a zero w^H G v = 0, so dz = -(w^H dG v) / (w^H G' v)."""
+    errors = np.empty(zeros.size)
+    for k, zero in enumerate(zeros):
+        left, _, right = np.linalg.svd(at(model, np.array([zero]))[0])
+        w, v = left[:, -1].conj(), right[-1].conj()
+        step = 1e-6 * max(abs(zero), 1e-6)
+        ends = at(model, np.array([zero + step, zero - step]))
+        slope = w @ ((ends[0] - ends[1]) / (2 * step)) @ v
+        moved = np.einsum("o,oip,i->p", w, slopes[k], v) / slope
+        errors[k] = np.sqrt(max(float(_variance(moved, covariance)), 0.0))
+    return errors
+
+
+# and both decay in ten times the recording or more. A true resonance, however sharp, was fitted by at most twice.
+_RINGS, _CYCLES, _TONE = 5.0, 3.0, 0.25
+_STEADY = "most likely a steady tone that the drive has not made (mains, a wheel)"
+_SPARE = "most likely noise, which a spare pole was fitted to"
+
+
+@dataclass(frozen=True)
+class OrderScore:
+    """One order of the scan.
+
+    `chi_square` is the squared distance of the response to the model over its variance; `freedom` the number of real
+    values less that of parameters; `criterion` is chi_square + parameters ln(values), the Bayesian information
+    criterion (G. Schwarz, Annals of Statistics 6 (1978) 461). `output_error_rms` is the rms output error that the
+    distance stands for, in units of the output, over all outputs.
+    """
+
+    order: int
+    parameters: int
+    chi_square: float
+    freedom: int
+    criterion: float
+    output_error_rms: float
+
+
+@dataclass(frozen=True, eq=False)
+class LinearFit(Uncertainty):
+    """A linear model with its evidence, and with its poles, zeros and gains (see `Uncertainty`).
+
+    `system` is continuous, real and block-diagonal; `modes` the same as poles and vectors. `fit_percent` (outputs,) is
+    100 (1 - |y - yhat| / |y - mean y|) over the recordings, offsets removed: from rest, or in steady state where the
+    recordings are periodic. `residual` (frequencies, outputs, inputs) is measured less
+    modelled response. `scan` is empty where the order was given; `reason` says in words why this order.
+    """
+
+    system: StateSpace
+    modes: ModalModel
+    order: int
+    hold: Hold
+    rate_hz: float
+    excited_hz: tuple[float, float]
+    fit_percent: Floats
+    residual_rms: Floats
+    scan: tuple[OrderScore, ...]
+    reason: str
+    warnings: tuple[str, ...]
+    response: FrequencyResponse
+    residual: Complexes
+
+
+def fit_linear(
+    records: Sequence[Recording],
+    orders: int | Sequence[int] | None = None,
+    *,
+    response: FrequencyResponse | None = None,
+    hold: Hold = "zero-order",
+    strictly_proper: bool = False,
+    drop: int = 0,
+    exchanges: int = 12,
+    on_progress: Progress | None = None,
+) -> LinearFit:
+    """Fit a stable continuous model with common poles to recordings of any number of inputs and outputs.
+
+    `orders` is a number of states, or several to compare; by default 1 to 8, or 4, 8, ... 28 with several channels.
+    Periodic recordings are fitted in frequency, where the error at the excited lines is the output error of the steady
+    state; others first in frequency and then as output error in time from rest, the first `drop` samples not counted.
+    `strictly_proper` leaves out the direct term. `response` replaces the response computed here. `exchanges` is the
+    largest number of weak modes exchanged for better ones (several channels only; see `structure`).
+
+    Raises `IdentificationError` for what `response_from_records` and `response_from_periods` refuse, and for an order
+    below 1 or beyond what the response can fix.
+    """
+    periodic = bool(records) and all(r.period_samples is not None for r in records)
+    if response is None:
+        response = response_from_periods(records, hold=hold) if periodic else response_from_records(records, hold=hold)
+    hold, direct = response.hold, not strictly_proper
+    several = response.response[0].size > 1
+    candidates = _candidates(response, orders)
+    tried = candidates if several else range(1, candidates[-1] + 1)  # each sets out from the one before, too
+    total, report = len(tried) + 2, on_progress or unheard
+    fits: dict[int, Polished] = {}
+    for done, order in enumerate(tried, start=1):
+        smaller = None if several or order == 1 else fits[order - 1].model
+        if len(tried) > 1 or not several:
+            fits[order] = fit_order(response, order, direct=direct, exchanges=0, fine=not several, smaller=smaller)
+        report(done, total, f"order {order}")
+    scan = [_score(response, fits[order], direct) for order in candidates] if len(candidates) > 1 else []
+    chosen, reason = _choose(scan) if scan else (candidates[0], f"order {candidates[0]} was given")
+    polished = fit_order(response, chosen, direct=direct, exchanges=exchanges) if several else fits[chosen]
+    report(total - 1, total, "polish in frequency")
+    if not periodic and hold != "band-limited":
+        polished = polish(TimeEquations(records, hold, drop, direct=direct), polished.model, iterations=30)
+    report(total, total, "polish in time")
+    return _finish(records, response, polished, scan, reason, drop, direct)
+
+
+# ---------------------------------------------------------------------------------------------------------------- order
+def _candidates(response: FrequencyResponse, orders: int | Sequence[int] | None) -> list[int]:
+    if isinstance(orders, int):
+        orders = [orders]
+    if orders is not None:
+        if not orders:
+            raise IdentificationError("no order was given to choose from; name at least one number of states.")
+        for order in (min(orders), max(orders)):
+            check_order(response.freq_hz, order)
+        return sorted(set(orders))
+    most = response.freq_hz.size - 1
+    usual = range(1, 9) if response.response[0].size == 1 else range(4, 29, 4)
+    return [order for order in usual if order <= most] or [1]
+
+
+def _score(response: FrequencyResponse, fit: Polished, direct: bool) -> OrderScore:
+    model = fit.model
+    error = response.response - model.response(response.freq_hz, response.hold, response.rate_hz)
+    outputs, inputs = error.shape[1:]
+    # The mean over the records of the output's variance at a line, recovered from the standard error of one element.
+    inverse = np.linalg.inv(response.drive_power)[:, 0, 0].real
+    variance = np.maximum(response.standard_error[:, :, 0] ** 2 / inverse[:, None], 1e-300)
+    distance = np.einsum("foi,fij,foj->fo", error, response.drive_power, error.conj(), optimize=True).real
+    # Each squared complex distance over its variance has the mean 1 per input: two real values of variance 1/2 each.
+    chi_square = 2 * float(np.sum(distance / variance))
+    parameters = model.order * (outputs + inputs) + outputs * inputs * direct
+    values = 2 * error.size
+    return OrderScore(
+        model.order,
+        parameters,
+        chi_square,
+        values - parameters,
+        chi_square + parameters * math.log(values),
+        math.sqrt(float(np.sum(distance)) / outputs),
+    )
+
+
+def _choose(scan: Sequence[OrderScore]) -> tuple[int, str]:
+    """The order of least criterion, and the reason in words."""
+    best = min(scan, key=lambda score: score.criterion)
+    per = [f"{s.order}: {s.chi_square / max(s.freedom, 1):.3g}" for s in scan]
+    reason = (
+        f"order {best.order} has the least criterion, {best.criterion:.4g} (chi-square + parameters x ln values); "
+        f"squared distance over its variance, per degree of freedom, by order: {', '.join(per)} "
+        "(1 is what a true model leaves)"
+    )
+    smaller = [s for s in scan if s.order < best.order]
+    larger = [s for s in scan if s.order > best.order]
+    if smaller:
+        reason += f"; order {smaller[-1].order} is worse by {smaller[-1].criterion - best.criterion:.3g}"
+    if larger:
+        reason += (
+            f"; order {larger[0].order} gains {max(best.chi_square - larger[0].chi_square, 0.0):.1f} in chi-square for "
+        )
+        reason += f"{larger[0].parameters - best.parameters} parameters more, which is worth less than it costs"
+    else:
+        reason += "; a larger order was not tried"
+    return best.order, reason
+
+
+# --------------------------------------------------------------------------------------------------------------- result
+def output_error(
+    modes: ModalModel, record: Recording, hold: Hold = "zero-order", *, steady: bool = False, drop: int = 0
+) -> Floats:
+    """Measured less modelled output (samples, outputs) of a record, without its mean, the first `drop` samples left
+    out.
+
+    From rest at the first sample's drive; with `steady`, each period in the steady state of its own drive
+    (`period_samples`).
+    """
+    modelled = _modelled(modes, record, hold, steady)
+    error = (record.output[: len(modelled)] - modelled)[drop:]
+    return np.asarray(error - error.mean(axis=0))
+
+
+def _modelled(modes: ModalModel, record: Recording, hold: Hold, steady: bool) -> Floats:
+    """What the model makes of the drive of a record; with `steady`, of its whole periods alone."""
+    if not steady:
+        return simulate(modes, record.drive - record.drive[:1], record.rate_hz, hold)
+    period = record.period_samples or record.samples
+    begins = range(0, record.samples - period + 1, period)
+    parts = [simulate_periodic(modes, record.drive[k : k + period], record.rate_hz, hold) for k in begins]
+    return np.concatenate(parts)
+
+
+def fit_percent(measured: Floats, error: Floats) -> Floats:
+    """100 (1 - |y - yhat| / |y - mean y|) of each output; arrays (samples, outputs)."""
+    spread = np.linalg.norm(measured - measured.mean(axis=0), axis=0)
+    return np.asarray(100.0 * (1.0 - np.linalg.norm(error, axis=0) / spread))
+
+
+def _finish(
+    records: Sequence[Recording],
+    response: FrequencyResponse,
+    polished: Polished,
+    scan: Sequence[OrderScore],
+    reason: str,
+    drop: int,
+    direct: bool,
+) -> LinearFit:
+    model = polished.model
+    steady = all(r.period_samples is not None for r in records)
+    errors = (
+        [output_error(model, r, response.hold, steady=steady, drop=drop) for r in records]
+        if (steady or response.hold != "band-limited")
+        else []
+    )
+    inflation = colour_inflation([column for error in errors for column in error.T]) if errors else 1.0
+    known = uncertainty(polished, response, direct, inflation)
+    residual = response.response - model.response(response.freq_hz, response.hold, response.rate_hz)
+    outputs = response.response.shape[1]
+    percent, rms = np.full(outputs, np.nan), np.full(outputs, np.nan)
+    if errors:
+        error = np.concatenate(errors)
+        measured = [
+            r.output[-len(e) :] - r.output[-len(e) :].mean(axis=0) for r, e in zip(records, errors, strict=True)
+        ]
+        percent, rms = fit_percent(np.concatenate(measured), error), np.sqrt(np.mean(error**2, axis=0))
+    return LinearFit(
+        system=model.state_space(),
+        modes=model,
+        order=model.order,
+        hold=response.hold,
+        rate_hz=response.rate_hz,
+        excited_hz=response.excited_hz,
+        fit_percent=percent,
+        residual_rms=rms,
+        scan=tuple(scan),
+        reason=reason,
+        **vars(known),
+        warnings=(*(_tones(model, records, rms, response.hold) if errors else ()), *_warnings(known, response)),
+        response=response,
+        residual=residual,
+    )
+
+
+def _tones(model: ModalModel, records: Sequence[Recording], residual_rms: Floats, hold: Hold) -> list[str]:
+    """Modes that ring for much longer than the recording lasts: it holds a steady tone, or a pole was to spare."""
+    longest_s, found = max(r.samples / r.rate_hz for r in records), []
+    for k, pole in enumerate(model.poles_rad_s):
+        hz, decay_s = abs(pole) / (2 * np.pi), -1.0 / pole.real
+        if decay_s > _RINGS * longest_s and hz * longest_s > _CYCLES:
+            tone = _share(model, k, records, hold, residual_rms) > _TONE
+            found.append(
+                f"pole at {hz:.4g} Hz rings for {decay_s:.3g} s, the recording lasts {longest_s:.3g} s and cannot show "
+                f"that: {_STEADY if tone else _SPARE}; do not design a controller for it."
+            )
+    return found
+
+
+def _share(model: ModalModel, k: int, records: Sequence[Recording], hold: Hold, residual_rms: Floats) -> float:
+    """Largest rms output of a mode by itself, in that of the residual of the whole model."""
+    alone = ModalModel(
+        model.poles_rad_s[k : k + 1],
+        model.input_vectors[k : k + 1],
+        model.output_vectors[:, k : k + 1],
+        np.zeros_like(model.direct),
+    )
+    steady = all(r.period_samples is not None for r in records)
+    own = np.concatenate([_modelled(alone, r, hold, steady) for r in records])
+    return float(np.max(own.std(axis=0) / residual_rms))
+
+
+def _warnings(known: Uncertainty, response: FrequencyResponse) -> tuple[str, ...]:
+    low, high = response.excited_hz
+    found = []
+    for name, values in (("pole", known.poles_rad_s), ("zero", known.zeros_rad_s)):
+        freq = np.abs(values) / (2 * np.pi)
+        outside = sorted({float(f"{f:.3g}") for f in freq[(freq < low) | (freq > high)]})
+        if outside:
+            many, them = ("s", "them") if len(outside) > 1 else ("", "it")
+            found.append(
+                f"{name}{many} at {', '.join(f'{f:g}' for f in outside)} Hz outside the excited band, {low:.3g} to "
+                f"{high:.4g} Hz: the recording shows only the flank, so take {them} as a fit of that flank (drift, "
+                "delay), not as dynamics of the mirror."
+            )
+    q, i = np.unravel_index(int(np.argmax(np.abs(known.edge_gain))), known.edge_gain.shape)
+    dc, edge = float(known.dc_gain[q, i]), float(known.edge_gain[q, i])
+    if abs(abs(dc) / edge - 1) > 0.05:
+        found.append(
+            f"the gain at zero frequency, {dc:.4g} ± {known.dc_gain_error[q, i]:.2g}, is extrapolated: at "
+            f"{low:.3g} Hz, the lowest excited frequency, it is {edge:.4g} ± {known.edge_gain_error[q, i]:.2g}; use "
+            "the latter."
+        )
+    return tuple(found)

@@ -1,0 +1,219 @@
+"""Relaxed vector fitting: common poles for every element of a frequency response.
+
+Relaxed non-triviality: B. Gustavsen, IEEE Trans. Power Delivery 21 (2006) 1587, eq. 8. One QR factorisation per element
+instead of one large system: D. Deschrijver et al., IEEE Microwave and Wireless Components Letters 18 (2008) 383. Both
+start from B. Gustavsen and A. Semlyen, IEEE Trans. Power Delivery 14 (1999) 1052.
+
+A sampled response behind a hold is rational in z, not in s. Its poles are moved in w = (z - 1) rate, whose poles are
+(e^{p/rate} - 1) rate, so that slow poles keep their digits; the residues are then solved with the exact sampled
+response of 1/(s - p). The result is the continuous system, exact for the hold.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from microrad.lab.identify.linear.modal import (
+    Complexes,
+    Floats,
+    Hold,
+    ModalModel,
+    hold_basis,
+    rank_one_modes,
+    real_columns,
+)
+from microrad.lab.identify.prepared import IdentificationError
+
+_REAL = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class VectorFit:
+    """Continuous partial fractions D + sum of residue / (s - pole), conjugates included.
+
+    `poles_rad_s` has the shape (poles,), `residues` (poles, outputs, inputs) and `direct` (outputs, inputs).
+    `rms_error` is the root mean square of the weighted error over frequencies and elements. `converged` is False where
+    the error still moved when the iterations ended.
+    """
+
+    poles_rad_s: Complexes
+    residues: Complexes
+    direct: Floats
+    rms_error: float
+    hold: Hold
+    rate_hz: float | None
+    iterations: int
+    converged: bool
+
+    def response(self, freq_hz: Floats) -> Complexes:
+        """Sampled response behind the hold of the fit, shape (frequencies, outputs, inputs)."""
+        basis = hold_basis(self.poles_rad_s, freq_hz, self.hold, self.rate_hz)[0]
+        return np.asarray(np.einsum("fk,koi->foi", basis, self.residues) + self.direct)
+
+    def modes(self) -> ModalModel:
+        """The same system as rank-one modes: singular vectors of each residue, as many as its rank."""
+        upper = self.poles_rad_s.imag >= 0
+        return rank_one_modes(self.poles_rad_s[upper], self.residues[upper], self.direct)
+
+
+def vector_fit(
+    freq_hz: Floats,
+    response: Complexes,
+    order: int,
+    *,
+    weight: Floats | None = None,
+    hold: Hold = "band-limited",
+    rate_hz: float | None = None,
+    strictly_proper: bool = False,
+    iterations: int = 30,
+) -> VectorFit:
+    """Fit `order` common stable poles to a response of shape (frequencies, outputs, inputs) or (frequencies,).
+
+    `weight` multiplies the error, shape (frequencies,) or that of the response; one over the standard error is the
+    maximum-likelihood choice. Poles that a step makes unstable are mirrored. The best of all iterations is returned.
+    Raises `IdentificationError` for too few frequencies, or frequencies at or above half of `rate_hz`.
+    """
+    freq = np.asarray(freq_hz, dtype=float)
+    data = np.asarray(response, dtype=complex).reshape(freq.size, -1)
+    outputs, inputs = (*np.shape(response), 1, 1)[1:3]
+    _check(freq, order, data, hold, rate_hz)
+    scale = np.ones(data.shape) if weight is None else _weights(weight, data.shape)
+    plane_hz = None if hold == "band-limited" else rate_hz
+    points = _to_plane(2j * np.pi * freq, plane_hz)
+    size = float(np.linalg.norm(scale * data)) / np.sqrt(data.size)
+    poles = starting_poles(freq, order)
+    best, last, done, converged = None, np.inf, 0, False
+    while done < iterations and not converged:
+        done += 1
+        moved = _to_pole(_relocate(points, data, scale, _to_plane(poles, plane_hz)), plane_hz)
+        poles = _symmetric(np.where(moved.real > 0, -moved.real + 1j * moved.imag, moved))
+        residues, direct, error = _residues(freq, data, scale, poles, (hold, rate_hz, strictly_proper))
+        if best is None or error < best[3]:
+            best = (poles, residues, direct, error)
+        converged = abs(last - error) <= 1e-6 * error or error <= 1e-12 * size
+        last = error
+    assert best is not None
+    poles, residues, direct, error = best
+    shape = (outputs, inputs)
+    return VectorFit(
+        poles, residues.reshape(-1, *shape), direct.reshape(shape), error, hold, rate_hz, done, bool(converged)
+    )
+
+
+def check_order(freq: Floats, order: int) -> None:
+    """Raise `IdentificationError` for a number of poles below 1 or beyond what so many frequencies can fix."""
+    if order < 1:
+        raise IdentificationError(f"the order is {order}; give at least one pole.")
+    if freq.size < order + 1:
+        raise IdentificationError(
+            f"{freq.size} frequencies cannot fix {order} poles; give at least {order + 1} frequencies or a lower order."
+        )
+
+
+def _check(freq: Floats, order: int, data: Complexes, hold: Hold, rate_hz: float | None) -> None:
+    check_order(freq, order)
+    if not np.isfinite(data).all():
+        raise IdentificationError(
+            f"the response at {freq[int(np.argmin(np.isfinite(data).all(axis=1)))]:g} Hz is not finite; leave it out."
+        )
+    if hold == "band-limited":
+        return
+    if rate_hz is None:
+        raise IdentificationError(f"a {hold} hold needs the sample rate; give rate_hz.")
+    if freq.max() >= rate_hz / 2:
+        raise IdentificationError(
+            f"the response reaches {freq.max():g} Hz, half the sample rate of {rate_hz:g} Hz or more; leave that out."
+        )
+
+
+def _weights(weight: Floats, shape: tuple[int, ...]) -> Floats:
+    values = np.asarray(weight, dtype=float)
+    return np.broadcast_to(values[:, None], shape) if values.ndim == 1 else values.reshape(shape)
+
+
+def starting_poles(freq_hz: Floats, order: int) -> Complexes:
+    """Lightly damped pairs spread over the given frequencies as these lie, and for an odd order one real pole."""
+    at = np.quantile(np.sort(freq_hz), (np.arange(order // 2) + 0.5) / max(order // 2, 1))
+    pairs = 2 * np.pi * at * (-0.01 + 1j)
+    real = [-2 * np.pi * float(np.median(freq_hz))] if order % 2 else []
+    return np.concatenate([np.array(real, dtype=complex), pairs, pairs.conj()])
+
+
+def _to_plane(s: Complexes, rate_hz: float | None) -> Complexes:
+    """From s to the variable in which the response is rational; without a rate that is s."""
+    return s if rate_hz is None else np.asarray(np.expm1(s / rate_hz) * rate_hz)
+
+
+def _to_pole(w: Complexes, rate_hz: float | None) -> Complexes:
+    if rate_hz is None:
+        return w
+    z = 1.0 + w / rate_hz
+    # A negative real z has no real continuous pole: keep its decay.
+    z = np.where((z.real < 0) & (np.abs(z.imag) <= _REAL * np.abs(z)), np.abs(z), z)
+    return np.asarray(np.log(np.where(z == 0, 1e-12, z)) * rate_hz)
+
+
+def _symmetric(poles: Complexes) -> Complexes:
+    """Real poles, then the upper half of each pair, then the lower halves, exactly conjugate."""
+    real = poles[np.abs(poles.imag) <= _REAL * np.abs(poles)].real
+    upper = poles[poles.imag > _REAL * np.abs(poles)]
+    return np.concatenate([np.sort(real).astype(complex), upper, upper.conj()])
+
+
+def _halves(poles: Complexes) -> tuple[Floats, Complexes]:
+    return poles[poles.imag == 0].real, poles[poles.imag > 0]
+
+
+def _stacked(values: Complexes) -> Floats:
+    return np.concatenate([values.real, values.imag], axis=-2)
+
+
+def _relocate(points: Complexes, data: Complexes, scale: Floats, poles: Complexes) -> Complexes:
+    """One relaxed step: zeros of the fitted scaling function sigma, the new poles."""
+    real, upper = _halves(poles)
+    ordered = np.concatenate([real.astype(complex), upper, upper.conj()])
+    columns = real_columns(1.0 / (points[:, None] - ordered), real.size)
+    columns = np.concatenate([columns, np.ones((points.size, 1))], axis=1)
+    size = columns.shape[1]
+    weighted = scale.T[:, :, None]
+    blocks = np.concatenate([weighted * columns, -(weighted * data.T[:, :, None]) * columns], axis=2)
+    corners = np.asarray(np.linalg.qr(_stacked(blocks), mode="r"))[:, size:, size:]
+    heaviness = float(np.linalg.norm(scale * data)) / points.size
+    system = np.vstack([corners.reshape(-1, size), heaviness * columns.real.sum(axis=0)])
+    target = np.zeros(len(system))
+    target[-1] = heaviness * points.size
+    sizes = np.linalg.norm(system, axis=0)
+    sigma = np.linalg.lstsq(system / sizes, target, rcond=None)[0] / sizes
+    A, b = _sigma_realisation(real, upper)
+    last = sigma[-1] if abs(sigma[-1]) > 1e-8 else np.copysign(1e-8, sigma[-1])
+    return np.linalg.eigvals(A - np.outer(b, sigma[:-1]) / last).astype(complex)
+
+
+def _sigma_realisation(real: Floats, upper: Complexes) -> tuple[Floats, Floats]:
+    n, m = real.size, upper.size
+    A = np.diag(np.concatenate([real, upper.real, upper.real]))
+    first, second = np.arange(n, n + m), np.arange(n + m, n + 2 * m)
+    A[first, second], A[second, first] = upper.imag, -upper.imag
+    return A, np.concatenate([np.ones(n), np.full(m, 2.0), np.zeros(m)])
+
+
+def _residues(
+    freq: Floats, data: Complexes, scale: Floats, poles: Complexes, form: tuple[Hold, float | None, bool]
+) -> tuple[Complexes, Floats, float]:
+    """Least-squares residues (poles, elements) and direct term for fixed poles, and the weighted rms error."""
+    hold, rate_hz, strictly_proper = form
+    real, upper = _halves(poles)
+    columns = real_columns(hold_basis(poles, freq, hold, rate_hz)[0], real.size)
+    if not strictly_proper:
+        columns = np.concatenate([columns, np.ones((freq.size, 1))], axis=1)
+    blocks = _stacked(scale.T[:, :, None] * columns)
+    target = _stacked((scale * data).T[:, :, None])
+    sizes = np.linalg.norm(blocks, axis=1, keepdims=True)
+    q, r = np.linalg.qr(blocks / sizes)
+    solved = (np.linalg.pinv(r) @ (q.transpose(0, 2, 1) @ target) / sizes.transpose(0, 2, 1))[:, :, 0]
+    error = np.linalg.norm(blocks @ solved[:, :, None] - target) / np.sqrt(data.size)
+    n, m = real.size, upper.size
+    pair = (solved[:, n : n + m] + 1j * solved[:, n + m : n + 2 * m]).T
+    residues = np.concatenate([solved[:, :n].T.astype(complex), pair, pair.conj()])
+    direct = np.zeros(data.shape[1]) if strictly_proper else solved[:, -1]
+    return residues, direct, float(error)

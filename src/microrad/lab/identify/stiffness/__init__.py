@@ -1,0 +1,1 @@
+"""One mirror for all amplitudes: linear modes in feedback with hysteresis, fitted to multisines."""

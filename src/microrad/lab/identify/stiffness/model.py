@@ -1,0 +1,206 @@
+"""The numbers of a mirror with hysteretic stiffness, the mirror they make, and where a fit of them begins.
+
+    x' = A x + B u(t - delay) + E z      q = F x + G u(t - delay)      z = P[q]      y = C x + D u(t - delay) + K z
+
+A is block-diagonal, a block [[s, -w], [w, s]] for each pair of poles and then the real poles; P is a bank of
+Prandtl-Ishlinskii operators with fixed thresholds. All entries of B, E, F, G, C, D, K and the weights are free: plays
+of small strain and of the drive that act on every mode, which is hysteresis in the stiffness with its channels mixed.
+Two scales are not: that of each mode (its state) and that of each operator (z). `balanced` fixes them.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import product
+from typing import Literal
+
+import numpy as np
+
+from microrad.lab.identify.hysteresis.plant_fit import upsampled
+from microrad.lab.identify.linear.modal import Complexes, Floats, ModalModel
+from microrad.lab.identify.linear.order import fit_order
+from microrad.lab.identify.linear.response import FrequencyResponse
+from microrad.mirror.hysteresis import Play
+from microrad.mirror.model import Mirror
+
+Source = Literal["strain", "drive"]
+
+FIELDS = ("decay", "frequency", "B", "E", "F", "G", "weights", "C", "D", "K")
+_MOST_COMBINED = 6
+
+
+@dataclass(frozen=True, eq=False)
+class Numbers:
+    """The free numbers of a model, with the thresholds and the delay.
+
+    ``decay`` holds s of all pairs and then of the real poles, ``frequency`` w of the pairs (rad/s); ``weights`` and
+    ``thresholds`` have the shape (operators, plays).
+    """
+
+    decay: Floats
+    frequency: Floats
+    B: Floats
+    E: Floats
+    F: Floats
+    G: Floats
+    weights: Floats
+    C: Floats
+    D: Floats
+    K: Floats
+    thresholds: Floats
+    delay_s: float
+
+    @property
+    def poles(self) -> Complexes:
+        """Pole of each pair with positive frequency, then the real poles (rad/s)."""
+        pole = self.decay.astype(complex)
+        pole[: self.frequency.size] += 1j * self.frequency
+        return pole
+
+    @property
+    def rows(self) -> list[int]:
+        """First state of each mode."""
+        pairs = self.frequency.size
+        return [2 * i for i in range(pairs)] + [pairs + i for i in range(pairs, self.decay.size)]
+
+    @property
+    def redundant(self) -> int:
+        """Numbers that change nothing: scale and phase of the state of each pair, scale of the others, scale of z."""
+        return int(self.frequency.size + self.decay.size + self.weights.shape[0])
+
+    def vector(self) -> Floats:
+        """All free numbers in the order of `FIELDS`, and the delay."""
+        return np.concatenate([*(getattr(self, name).ravel() for name in FIELDS), [self.delay_s]])
+
+    def at(self, vector: Floats) -> "Numbers":
+        """The same model with other numbers."""
+        parts, start = {}, 0
+        for name in FIELDS:
+            shape, size = getattr(self, name).shape, getattr(self, name).size
+            parts[name] = vector[start : start + size].reshape(shape).copy()
+            start += size
+        return replace(self, **parts, delay_s=float(vector[start]))
+
+    @property
+    def growth_1_s(self) -> float:
+        """Largest real part of a pole, the plays of each operator all stuck or all sliding.
+
+        Plays that slide follow q, so that z = W q with W the sum of their weights and x' = (A + E W F) x. Above 0 a
+        large drive starts what no drive stops. All combinations are tried for up to `_MOST_COMBINED` operators, and
+        all stuck and all sliding beyond.
+        """
+        sums, A = self.weights.sum(axis=1), self.mirror("").A
+        each = product((0.0, 1.0), repeat=sums.size)
+        cases = list(each) if sums.size <= _MOST_COMBINED else [(0.0,) * sums.size, (1.0,) * sums.size]
+        sliding = A + (self.E * (np.array(cases) * sums)[:, None, :]) @ self.F
+        return float(np.linalg.eigvals(sliding).real.max())
+
+    def mirror(self, name: str) -> Mirror:
+        """The mirror in the plant form, without its delay."""
+        pairs, order = self.frequency.size, self.B.shape[0]
+        A = np.zeros((order, order))
+        for row, s in zip(self.rows, self.decay, strict=True):
+            A[row, row] = s
+        for i, w in enumerate(self.frequency):
+            A[2 * i + 1, 2 * i + 1] = self.decay[i]
+            A[2 * i, 2 * i + 1], A[2 * i + 1, 2 * i] = -w, w
+        assert order == pairs + self.decay.size
+        plays = tuple(
+            Play(tuple(r.tolist()), tuple(w.tolist())) for r, w in zip(self.thresholds, self.weights, strict=True)
+        )
+        return Mirror(name, A, self.B, self.E, self.F, self.G, self.C, self.D, self.K, (), plays, ())
+
+
+def scaled(numbers: Numbers, drive: float, output: float) -> Numbers:
+    """The same model for a drive counted in units ``drive`` times as small, and an output ``output`` times as small.
+
+    A model of u / U and y / Y becomes one of u and y with drive = U and output = Y; q and z are then counted as u is.
+    """
+    return replace(
+        numbers,
+        B=numbers.B / drive,
+        E=numbers.E / drive,
+        F=numbers.F * drive,
+        thresholds=numbers.thresholds * drive,
+        C=numbers.C * output,
+        D=numbers.D * output / drive,
+        K=numbers.K * output / drive,
+    )
+
+
+def balanced(numbers: Numbers) -> Numbers:
+    """The same model with the state of each mode, and z of each operator, at a scale that suits both of its sides."""
+    state = np.ones(numbers.B.shape[0])
+    for i, row in enumerate(numbers.rows):
+        wide = slice(row, row + (2 if i < numbers.frequency.size else 1))
+        size = np.linalg.norm(numbers.B[wide])
+        state[wide] = np.sqrt(np.linalg.norm(numbers.C[:, wide]) / size) if size > 0 else 1.0
+    B, E = numbers.B * state[:, None], numbers.E * state[:, None]
+    C, F = numbers.C / state, numbers.F / state
+    weight = np.linalg.norm(numbers.weights, axis=1)
+    z = np.sqrt(np.linalg.norm(E, axis=0) / np.where(weight > 0, weight, 1.0))
+    z = np.where(z > 0, z, 1.0)
+    return replace(numbers, B=B, C=C, F=F, E=E / z, K=numbers.K / z, weights=numbers.weights * z[:, None])
+
+
+def delayed(drive: Floats, rate_hz: float, delay_s: float, factor: int) -> Floats:
+    """Whole periods of a drive (samples, inputs), ``delay_s`` later and at ``factor`` times the rate, band-limited."""
+    spectrum = np.fft.rfft(drive, axis=0)
+    turn = np.exp(-2j * np.pi * np.fft.rfftfreq(drive.shape[0], 1 / rate_hz) * delay_s)
+    late = np.fft.irfft(spectrum * turn[:, None], drive.shape[0], axis=0)
+    return np.ascontiguousarray(upsampled(late, factor, "band-limited"))
+
+
+# ---------------------------------------------------------------------------------------------------------- the start
+def linear_start(
+    response: FrequencyResponse, order: int, sub_steps: int, delay_s: float | None, exchanges: int
+) -> tuple[ModalModel, float]:
+    """Linear model behind a pure delay, for a drive that is straight over each of ``sub_steps`` steps a sample.
+
+    Without a delay given, it is the best on a grid of a quarter of a sample up to two samples.
+    """
+
+    def behind(late_s: float) -> FrequencyResponse:
+        ahead = np.exp(2j * np.pi * response.freq_hz * late_s)[:, None, None]
+        values = np.asarray(response.response * ahead)
+        return replace(response, response=values, hold="first-order", rate_hz=sub_steps * response.rate_hz)
+
+    if delay_s is None:
+        tried = [late / response.rate_hz for late in np.arange(0.0, 2.01, 0.25)]
+        costs = [fit_order(behind(late), order, exchanges=0, fine=False).cost for late in tried]
+        delay_s = tried[int(np.argmin(costs))]
+    return fit_order(behind(delay_s), order, exchanges=exchanges).model, delay_s
+
+
+def first_numbers(
+    model: ModalModel, delay_s: float, sources: Sequence[Source], lowest_hz: float, plays: int
+) -> Numbers:
+    """A linear model with an operator of next to no weight per actuator and source, which acts as its drive does.
+
+    The strain of the actuators is what, at low frequency, the drive makes of them: q = M y with M the (pseudo-)inverse
+    of the quasi-static gain. Thresholds are left at zero.
+    """
+    pairs = np.flatnonzero(model.poles_rad_s.imag != 0)
+    real = np.flatnonzero(model.poles_rad_s.imag == 0)
+    b, c, poles = model.input_vectors, model.output_vectors, model.poles_rad_s
+    B = np.concatenate([np.stack([b[pairs].real, b[pairs].imag], axis=1).reshape(-1, b.shape[1]), b[real].real])
+    twice = np.stack([2 * c[:, pairs].real, -2 * c[:, pairs].imag], axis=2).reshape(c.shape[0], -1)
+    C = np.concatenate([twice, c[:, real].real], axis=1)
+    highest_hz = max(0.1 * float(np.abs(poles).min()) / (2 * np.pi), 2 * lowest_hz)
+    static = model.response(np.linspace(lowest_hz, highest_hz, 16)).real.mean(axis=0)
+    strain, inputs = np.linalg.pinv(static), b.shape[1]
+    blocks = {"strain": (strain @ C, strain @ model.direct), "drive": (np.zeros((inputs, C.shape[1])), np.eye(inputs))}
+    count = len(sources)
+    return Numbers(
+        decay=np.concatenate([poles[pairs].real, poles[real].real]),
+        frequency=poles[pairs].imag.copy(),
+        B=B,
+        E=np.hstack([B] * count),
+        F=np.vstack([blocks[s][0] for s in sources]),
+        G=np.vstack([blocks[s][1] for s in sources]),
+        weights=np.full((count * inputs, plays), 1e-3),
+        C=C,
+        D=model.direct.copy(),
+        K=np.hstack([model.direct] * count),
+        thresholds=np.zeros((count * inputs, plays)),
+        delay_s=delay_s,
+    )

@@ -1,0 +1,240 @@
+"""Simulation of a mirror with hysteretic stiffness over a periodic record, and the derivatives of its output.
+
+The path comes from the kernel's own step, the derivatives by the modes, the operators and their weights from forward
+sensitivities along it, those by C, D and K from what the path holds, and that by the delay from a second path.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from microrad.core import kernels
+from microrad.lab.identify.linear.modal import Floats, hold_step
+from microrad.lab.identify.stiffness.model import Numbers, delayed
+from microrad.mirror import model as mirror
+
+_CHUNK = 128
+_STATE, _DRIVE, _BANK = range(3)  # where a parameter enters: the order of a chunk's columns
+_LATER = 1e-5
+
+
+@dataclass(frozen=True, eq=False)
+class Steady:
+    """One period of a record, the mean over its periods: drive and output without its mean; rate; steps a sample."""
+
+    name: str
+    drive: Floats
+    output: Floats
+    rate_hz: float
+    sub_steps: int
+
+    @property
+    def step_s(self) -> float:
+        """Step of the plant."""
+        return 1.0 / (self.rate_hz * self.sub_steps)
+
+
+class Normal(NamedTuple):
+    """Sums over the samples and outputs of a record: squared error, J'J, J'error."""
+
+    cost: float
+    matrix: Floats
+    gradient: Floats
+
+
+def play_plant(numbers: Numbers, step_s: float) -> kernels.PlayPlant:
+    """The discrete plant of a model; raises ValueError where its loop through the plays is no contraction."""
+    plant = mirror.discretise(numbers.mirror("trial"), step_s)
+    values = {name: getattr(plant, name) for name in kernels.PlayPlant._fields}
+    return kernels.PlayPlant(**values | {"play_start": plant.play_start.astype(np.int64)})
+
+
+def run(plant: kernels.PlayPlant, drive: Floats) -> kernels.Path:
+    """The path of a plant from rest."""
+    steps, operators = drive.shape[0], plant.K.shape[1]
+    path = kernels.Path(
+        np.empty((steps, plant.C.shape[0])),
+        np.empty((steps, plant.diagonal.size)),
+        np.empty((steps, plant.diagonal.size)),
+        np.empty((steps, operators)),
+        np.empty((steps, plant.play_threshold.size)),
+        np.empty((steps, operators), dtype=np.int64),
+    )
+    kernels.play_path(plant, drive, path)
+    return path
+
+
+def two_periods(record: Steady, delay_s: float) -> Floats:
+    """The drive of the plant for a record in its steady state: two periods, of which the second counts."""
+    one = delayed(record.drive, record.rate_hz, delay_s, record.sub_steps)
+    return np.concatenate([one, one])
+
+
+def error_of(plant: kernels.PlayPlant, record: Steady, delay_s: float) -> tuple[Floats, kernels.Path, Floats]:
+    """Modelled less measured output (samples, outputs), without its mean; the path, and the drive."""
+    drive = two_periods(record, delay_s)
+    path = run(plant, drive)
+    error = path.output[drive.shape[0] // 2 :: record.sub_steps] - record.output
+    return error - error.mean(axis=0), path, drive
+
+
+def squared_error(plant: kernels.PlayPlant, record: Steady, delay_s: float) -> float:
+    """Sum of the squared error; infinite where the model runs away."""
+    with np.errstate(all="ignore"):
+        cost = float(np.sum(error_of(plant, record, delay_s)[0] ** 2))
+    return cost if math.isfinite(cost) else math.inf
+
+
+def normal(plant: kernels.PlayPlant, numbers: Numbers, record: Steady) -> Normal:
+    """Normal equations of a record in the order of `Numbers.vector`, in single precision, summed in double."""
+    error, path, drive = error_of(plant, record, numbers.delay_s)
+    J = jacobian(plant, numbers, record, (path, drive), np.float32)
+    J -= J.mean(axis=0)
+    J = J.reshape(-1, J.shape[2])
+    flat = error.reshape(-1).astype(np.float32)
+    return Normal(float(np.sum(error**2)), (J.T @ J).astype(float), (J.T @ flat).astype(float))
+
+
+def jacobian(
+    plant: kernels.PlayPlant,
+    numbers: Numbers,
+    record: Steady,
+    way: tuple[kernels.Path, Floats],
+    kind: type,
+    lead: int = -1,
+) -> Floats:
+    """Derivative of the second period's output (samples, outputs, numbers), in the precision ``kind``.
+
+    Tangents begin ``lead`` samples before the period: by default seven time constants of the slowest mode, at most one
+    period.
+    """
+    path, drive = way
+    period = drive.shape[0] // 2
+    if lead < 0:
+        lead = math.ceil(7.0 / -float(numbers.decay.max()) * record.rate_hz)
+    lead = min(lead * record.sub_steps, period - 1)
+    cut = slice(period - lead - 1, None)  # one step more: what enters needs the step before
+    part = kernels.Path(path.output[cut], path.x[cut], path.state[cut], path.z[cut], path.play[cut], path.moved[cut])
+    rows, outputs = record.output.shape[0], record.output.shape[1]
+    J: Floats = np.empty((rows, outputs, numbers.vector().size), dtype=kind)
+    _state_columns(J, (plant, numbers, record.step_s), (part, drive[cut]), (lead + 1, record.sub_steps))
+    _output_columns(J, numbers, (path, drive), (period, record.sub_steps))
+    later = run(plant, two_periods(record, numbers.delay_s + _LATER * record.step_s)).output
+    J[:, :, -1] = (later - path.output)[period :: record.sub_steps] / (_LATER * record.step_s)
+    return J
+
+
+def _state_columns(
+    J: Floats,
+    model: tuple[kernels.PlayPlant, Numbers, float],
+    way: tuple[kernels.Path, Floats],
+    rows: tuple[int, int],
+) -> None:
+    """Columns of what acts through the state, the drives of the operators or their weights."""
+    (path, drive), (plant, numbers, step_s) = way, model
+    places, columns = _places(numbers)
+    before, after = _sources(numbers, path, drive, step_s, J.dtype)
+    signal = np.hstack([path.x[:, : numbers.B.shape[0]], drive]).astype(J.dtype)
+    plays = path.play.astype(J.dtype)
+    for begin in range(0, columns.size, _CHUNK):
+        chunk = slice(begin, begin + _CHUNK)
+        tangents = _tangents(plant, places[:, chunk], (before, after, signal, plays), J.dtype)
+        part = np.empty((*J.shape[:2], tangents.row.size), dtype=J.dtype)
+        kernels.tangent_kernel(tangents, path.moved, 1, rows[0], rows[1], part)
+        J[:, :, columns[chunk]] = part
+
+
+def _tangents(
+    plant: kernels.PlayPlant, places: np.ndarray, signals: tuple[Floats, ...], kind: np.dtype
+) -> kernels.Tangents:
+    states, operators, count = plant.diagonal.size, plant.K.shape[1], places.shape[1]
+    place, row, source, turned = np.ascontiguousarray(places)
+    ends = np.array([np.count_nonzero(place == _STATE), np.count_nonzero(place != _BANK)])
+
+    def zeros(rows: int) -> Floats:
+        return np.zeros((rows, count), dtype=kind)
+
+    before, after, signal, plays = signals
+
+    return kernels.Tangents(
+        plant=kernels.PlayPlant(*(v.astype(kind) if v.dtype == np.float64 else v for v in plant)),
+        places=ends,
+        row=row,
+        source=source,
+        turned=turned,
+        before=before,
+        after=after,
+        signal=signal,
+        plays=plays,
+        x=zeros(states),
+        q=zeros(operators),
+        q_before=zeros(operators),
+        z=zeros(operators),
+        change=zeros(operators),
+        play=zeros(plant.play_threshold.size),
+        still=zeros(operators),
+        slope=np.zeros(operators, dtype=kind),
+        moved=np.zeros(operators, dtype=np.int64),
+    )
+
+
+def _places(numbers: Numbers) -> tuple[np.ndarray, np.ndarray]:
+    """Place, row, source and turn of each parameter that is not of the output, and its column in the Jacobian."""
+    modes, pairs, first = numbers.decay.size, numbers.frequency.size, numbers.rows
+    inputs, operators, order = numbers.B.shape[1], numbers.E.shape[1], numbers.B.shape[0]
+    found = [(_STATE, first[i], i, 0) for i in range(modes)]
+    found += [(_STATE, first[i], i, 1) for i in range(pairs)]
+    states = [(i, turn) for i in range(modes) for turn in range(2 if i < pairs else 1)]
+    for width, offset in ((inputs, modes), (operators, modes * (1 + inputs))):
+        found += [(_STATE, first[i], offset + i * width + j, turn) for i, turn in states for j in range(width)]
+    found += [(_DRIVE, e, i, 0) for e in range(operators) for i in range(order)]
+    found += [(_DRIVE, e, order + j, 0) for e in range(operators) for j in range(inputs)]
+    plays = numbers.weights.shape[1]
+    found += [(_BANK, e, e * plays + j, 0) for e in range(operators) for j in range(plays)]
+    return np.array(found, dtype=np.int64).T.copy(), np.arange(len(found))
+
+
+def _sources(
+    numbers: Numbers, path: kernels.Path, drive: Floats, step_s: float, kind: np.dtype
+) -> tuple[Floats, Floats]:
+    """What the poles, B and E add to the state of each mode: to the predicted state, and once the bank has moved."""
+    steps, modes = drive.shape[0], numbers.decay.size
+    step = hold_step(numbers.poles, "first-order", 1.0 / step_s)
+    first, wide = numbers.rows, numbers.frequency.size
+
+    def modal(states: Floats) -> np.ndarray:
+        """States (..., order) as one complex number for each mode."""
+        value = states[..., first].astype(complex)
+        value[..., :wide] += 1j * states[..., 1 : 2 * wide : 2]
+        return value
+
+    change = np.diff(path.z, axis=0, prepend=path.z[:1])
+    u0, u1, z0 = np.roll(drive, 1, axis=0), drive, np.roll(path.z, 1, axis=0)
+    b, e = modal(numbers.B.T).T, modal(numbers.E.T).T
+    forced, held, moved = u0 @ b.T, z0 @ e.T, change @ e.T
+    state = np.roll(modal(path.state[:, : numbers.B.shape[0]]), 1, axis=0)
+    pole = step.keep_rate * state + step.begin_rate * forced + step.end_rate * (u1 @ b.T)
+    pole += (step.begin_rate + step.end_rate) * held
+    inputs, width = modes * (1 + drive.shape[1]), modes * (1 + drive.shape[1] + path.z.shape[1])
+    before, after = np.zeros((2, steps, width), dtype=np.complex64 if kind == np.float32 else np.complex128)
+    begin, end, fine = (v.astype(before.dtype)[None, :, None] for v in (step.begin, step.end, step.begin + step.end))
+    u0, u1, z0, change = (v.astype(kind)[:, None, :] for v in (u0, u1, z0, change))
+    before[:, :modes], after[:, :modes] = pole, step.end_rate * moved
+    before[:, modes:inputs] = (begin * u0 + end * u1).reshape(steps, -1)
+    before[:, inputs:], after[:, inputs:] = (fine * z0).reshape(steps, -1), (end * change).reshape(steps, -1)
+    return before.view(kind).reshape(steps, width, 2), after.view(kind).reshape(steps, width, 2)
+
+
+def _output_columns(J: Floats, numbers: Numbers, way: tuple[kernels.Path, Floats], rows: tuple[int, int]) -> None:
+    """Columns of C, D and K: what they multiply, for each output alone."""
+    path, drive = way
+    used = slice(rows[0], None, rows[1])
+    state = path.state[used, : numbers.B.shape[0]]
+    column = J.shape[2] - 1 - numbers.C.size - numbers.D.size - numbers.K.size
+    J[:, :, column:-1] = 0.0
+    for factor in (state, drive[used], path.z[used]):
+        for o in range(J.shape[1]):
+            J[:, o, column : column + factor.shape[1]] = factor
+            column += factor.shape[1]

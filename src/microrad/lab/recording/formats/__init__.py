@@ -1,0 +1,1 @@
+"""The file formats of a laboratory, each as named channels (`source.Source`)."""

@@ -1,0 +1,176 @@
+"""LabVIEW TDMS files: the chain of segments is walked before any number is believed.
+
+The lead-in of a segment is described in National Instruments' "TDMS File Format Internal Structure".
+"""
+
+import logging
+import struct
+import threading
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from microrad.lab.recording.files import sha256_of
+from microrad.lab.recording.formats.source import Channel, Container, StatedRate, damaged, missing_library
+from microrad.lab.recording.records import FloatArray, RecordingError
+
+_LEAD_IN = 28
+_INCOMPLETE = 0xFFFF_FFFF_FFFF_FFFF
+_VERSIONS = (4712, 4713)
+_BIG_ENDIAN = 1 << 6
+_OF_NUMBERS = ("Cropping data", "Unsupported scale type")
+
+
+class TdmsSource(Container):
+    """A TDMS file; channels are named `group/channel`, and time follows from their increments."""
+
+    def __init__(self, path: Path) -> None:
+        """Check the structure, then read the metadata."""
+        check_structure(path)
+        try:
+            import nptdms  # noqa: F401
+        except ImportError:
+            raise missing_library(path, "a TDMS file", "npTDMS") from None
+        unusable: dict[str, str] = {}
+        try:
+            with _opened(path) as tdms:
+                raw = dict(_channels(tdms, unusable))
+                channels = tuple(_channel(path, name, channel) for name, channel in raw.items())
+                self._starts = {name: _start(channel) for name, channel in raw.items()}
+        except RecordingError:
+            raise
+        except Exception as error:  # the library raises whatever its parser stumbles over
+            raise damaged(path, "a TDMS file", error) from None
+        super().__init__(path, "TDMS", channels, sha256_of(path), unusable)
+
+    def load(self, indices: Sequence[int]) -> list[FloatArray]:
+        """Scaled values of the channels; refuses channels that were not sampled together."""
+        self._check_together(indices)
+        return super().load(indices)
+
+    def _check_together(self, indices: Sequence[int]) -> None:
+        steps = [1 / rate.rate_hz for i in indices if (rate := self.channels[i].rate)]
+        starts = {self.names[i]: start for i in indices if (start := self._starts[self.names[i]])}
+        if len(starts) < 2 or not steps:
+            return
+        first, (begin, offset) = next(iter(starts.items()))
+        for name, (other, other_offset) in starts.items():
+            apart = abs(float((other - begin) / np.timedelta64(1, "ns")) * 1e-9 + other_offset - offset)
+            # Times are kept to a microsecond.
+            if apart > 0.5 * min(steps) + 1e-6:
+                raise RecordingError(
+                    f"{self.path}: '{name}' starts {apart:.6g} s apart from '{first}' (wf_start_time, "
+                    f"wf_start_offset; one step is {min(steps):.6g} s); record both in one task, or cut them to "
+                    "their common time."
+                )
+
+
+class _Listener(logging.Handler):
+    """Keeps what the library warns of in this thread, where it says that numbers are not as they were recorded."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.thread = threading.get_ident()
+        self.heard: list[str] = []
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Take in a warning; those of names and versions change no number."""
+        if record.thread == self.thread and str(record.msg).startswith(_OF_NUMBERS):
+            self.heard.append(record.getMessage())
+
+
+@contextmanager
+def _opened(path: Path) -> Iterator[Any]:
+    """The file, opened: given its path, the library would believe an old .tdms_index beside it.
+
+    Its warnings are not printed. Raises `RecordingError` at the end where one says that numbers are in doubt.
+    """
+    from nptdms import TdmsFile
+    from nptdms.log import log_manager
+
+    log_manager.console_handler.setLevel(logging.CRITICAL)
+    library, listener = logging.getLogger("nptdms"), _Listener()
+    library.addHandler(listener)
+    try:
+        with path.open("rb") as file, TdmsFile.open(file) as tdms, np.errstate(all="ignore"):
+            yield tdms
+    finally:
+        library.removeHandler(listener)
+    if listener.heard:
+        raise RecordingError(
+            f"{path}: the numbers of the TDMS file are not as they were recorded ({listener.heard[0]}); save it again "
+            "from LabVIEW with scaled numbers, or export it as text."
+        )
+
+
+def _start(channel: Any) -> tuple[np.datetime64, float] | None:
+    start = channel.properties.get("wf_start_time")
+    offset = float(channel.properties.get("wf_start_offset", 0.0))
+    return (start, offset) if isinstance(start, np.datetime64) else None
+
+
+def _channels(tdms: Any, unusable: dict[str, str]) -> Iterator[tuple[str, Any]]:
+    for group in tdms.groups():
+        for channel in group.channels():
+            name = f"{group.name}/{channel.name}"
+            dtype = channel.dtype
+            if len(channel) == 0:
+                unusable[name] = "holds no samples; record again, or name another"
+            elif dtype.kind not in "iuf":
+                unusable[name] = f"holds {dtype}, not real numbers; save numbers, or name another"
+            else:
+                yield name, channel
+
+
+def _channel(path: Path, name: str, channel: Any) -> Channel:
+    group_name, channel_name = channel.group_name, channel.name
+
+    def load() -> FloatArray:
+        with _opened(path) as tdms:
+            return np.ascontiguousarray(tdms[group_name][channel_name][:], dtype=np.float64)
+
+    properties = channel.properties
+    step = properties.get("wf_increment")
+    rate = None
+    if isinstance(step, (int, float)) and step > 0:
+        rate = StatedRate(1 / float(step), f"wf_increment = {float(step):g} s of '{name}'")
+    return Channel(name, len(channel), load, str(properties.get("unit_string", "")), rate)
+
+
+def check_structure(path: Path) -> None:
+    """Follow the lead-ins from segment to segment; raises `RecordingError` where the chain breaks."""
+    size = path.stat().st_size
+    position, number = 0, 0
+    with path.open("rb") as file:
+        while position < size:
+            file.seek(position)
+            lead = file.read(_LEAD_IN)
+            _check_lead_in(path, lead, number, position, size)
+            order = ">" if struct.unpack("<l", lead[4:8])[0] & _BIG_ENDIAN else "<"
+            position += _LEAD_IN + struct.unpack(f"{order}Q", lead[12:20])[0]
+            number += 1
+
+
+def _check_lead_in(path: Path, lead: bytes, number: int, position: int, size: int) -> None:
+    where = f"{path}: segment {number} of the TDMS file, at byte {position},"
+    again = "copy the file again from its source, or open and save it in LabVIEW"
+    if len(lead) >= 4 and lead[:4] != b"TDSm":
+        raise RecordingError(f"{where} should begin with 'TDSm' and begins with {lead[:4]!r}; {again}.")
+    if len(lead) < _LEAD_IN:
+        raise RecordingError(f"{where} has {len(lead)} of the {_LEAD_IN} bytes of its lead-in; {again}.")
+    mask = struct.unpack("<l", lead[4:8])[0]
+    version, following, raw = struct.unpack(f"{'>' if mask & _BIG_ENDIAN else '<'}lQQ", lead[8:])
+    if version not in _VERSIONS:
+        raise RecordingError(f"{where} states version {version}; versions {_VERSIONS} are known; {again}.")
+    if following == _INCOMPLETE:
+        raise RecordingError(
+            f"{where} was never completed: the program that wrote it stopped while recording; {again}, or record again."
+        )
+    missing = position + _LEAD_IN + following - size
+    if missing > 0:
+        raise RecordingError(f"{where} is truncated: {missing} of its {following} bytes are missing; {again}.")
+    if raw > following:
+        raise RecordingError(f"{where} places its data at byte {raw} of {following}; {again}.")

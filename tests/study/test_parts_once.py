@@ -1,0 +1,31 @@
+"""One study assembles each variant of the mission's mirror once, and every loop of it takes that one."""
+
+from collections import Counter
+
+from microrad.loop import fine_pointing
+from microrad.loop.fine_pointing import designs
+from microrad.mirror import model, variants
+from microrad.study import story
+from shipped import edited_file
+
+
+def test_one_study_assembles_each_variant_of_its_mirror_once(tmp_path, monkeypatch):
+    changes = ("runs = 64 ", "runs = 1 "), ('duration = "2 s" ', 'duration = "0.1 s" '), ('= "0.5 s" ', '= "0.05 s" ')
+    file = edited_file(tmp_path, *changes, whole=True, day=False)
+    made, entered, whole = Counter(), [], model.assemble
+
+    def counted(name, composition, system, hysteresis, creep=model.NO_CREEP):
+        made[composition, hysteresis, creep] += 1
+        return whole(name, composition, system, hysteresis, creep)
+
+    monkeypatch.setattr(model, "assemble", counted)
+    monkeypatch.setattr(story.mirror, "of", lambda m: entered.append(m) or variants.of(m))
+    monkeypatch.setattr(story.alternatives, "others", lambda *args: ())  # they read the mission in another way
+    monkeypatch.setattr(fine_pointing, "design", lambda scene, told: designs.design(scene, told, only=("PI",)))
+    found = story.run(file)
+    assert entered == [file.mission]
+    own = found.fine_pointing.scene.mirrors.own
+    composition = file.mission.mirror.composition
+    assert [made[composition, axis.model, model.NO_CREEP] for axis in own.values()] == [1, 1, 1]
+    assert set(found.fine_pointing.best.simulated) == set(own) == {run.mirror for run in found.runs}
+    assert set(made.values()) == {1}

@@ -1,0 +1,78 @@
+"""The house: its rooms as drawn, as they are and as the contract has them; no circle of files; what a room may take."""
+
+import importlib.machinery
+import importlib.util
+import re
+import sys
+import tomllib
+
+import pytest
+
+import microrad
+from places import ROOT
+
+PACKAGE = ROOT / "src" / "microrad"
+ROOMS = next(
+    contract["layers"]
+    for contract in tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["importlinter"][
+        "contracts"
+    ]
+    if contract["type"] == "layers"
+)[1:]
+
+
+@pytest.fixture(scope="module")
+def house():
+    loader = importlib.machinery.SourceFileLoader("house_script", str(ROOT / "scripts" / "house"))
+    made = importlib.util.module_from_spec(importlib.util.spec_from_loader(loader.name, loader))
+    sys.modules[loader.name] = made  # where its records look for their names
+    loader.exec_module(made)
+    return made
+
+
+def test_the_rooms_are_those_of_the_contract_and_nothing_else_stands_beside_them():
+    beside = {"__init__.py", "__init__.pyi", "__main__.py", "py.typed", "__pycache__"}
+    assert {path.name for path in PACKAGE.iterdir()} - beside == set(ROOMS)
+    assert len(ROOMS) == 13
+
+
+def test_tests_stand_in_folders_of_the_same_names():
+    folders = {path.name for path in (ROOT / "tests").iterdir() if any(path.glob("test_*.py"))}
+    assert folders == set(ROOMS)
+
+
+def test_the_house_is_drawn_with_the_rooms_of_the_contract_and_listed_in_its_order():
+    text = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    picture = text.partition("```text\n")[2].partition("```")[0]
+    assert sorted(word for word in re.findall(r"\w+", picture) if word in ROOMS) == sorted(ROOMS)
+    assert [line.split("`")[1] for line in text.splitlines() if line.startswith("| `")][: len(ROOMS)] == ROOMS
+
+
+def test_the_public_names_are_known_to_type_checkers(house):
+    stub = (PACKAGE / "__init__.pyi").read_text(encoding="utf-8")
+    assert stub == house.stub(microrad._PUBLIC), "run scripts/house stub"
+
+
+def test_circles_are_found(house):
+    assert house.circles({"a": {"b"}, "b": {"c"}, "c": {"b"}, "d": {"a"}}) == [["b", "c"]]
+    assert house.circles({"a": {"b"}, "b": set()}) == []
+
+
+def test_places_that_take_a_mission_are_found(house, tmp_path, monkeypatch):
+    package = tmp_path / house.PACKAGE
+    package.mkdir()
+    (package / "a.py").write_text(
+        "class Study:\n    file: MissionFile\n\n\ndef one(m: Mission, x: float, of: 'LinkFile | None') -> Study: ...\n"
+        "def two(study: Study) -> Mission: ...\n",
+        encoding="utf-8",
+    )
+    monkeypatch.setattr(house, "ROOT", tmp_path)
+    found = house.modules()
+    assert [text.split(":")[0] for _, _, text in house.places(found, house.MISSIONS)] == ["m", "of"]
+    assert house.holders(found) == house.MISSIONS | {"Study"}
+    assert len(house.places(found, house.holders(found))) == 3
+
+
+def test_lines_of_code_are_counted_without_prose(house):
+    text = '"""Prose."""\n\n# more\nx = 1  # said\n\n\ndef f():\n    """Prose."""\n    return [\n        x,\n    ]\n'
+    assert house.code_lines(text) == 5
