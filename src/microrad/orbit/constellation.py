@@ -94,8 +94,15 @@ def run(
     """The constellation of a mission: contacts, sessions by the rule of `operations.schedule`, and their volumes.
 
     A session takes place where the link closes at the lowest of its rates at least; its rate is the highest that closes
-    at its largest range. Volumes leave out the share of time in outage. Raises `operations.OperationsError` without the
-    tables `constellation` and `operations`, and `orbit.OrbitError` for orbits that do not hold.
+    at its largest range. Volumes leave out the share of time in outage.
+
+    Args:
+        file: the mission, with the files that it names.
+        loss: what pointing costs the laser link.
+        on_progress: told how many of how many satellites are searched.
+
+    Raises `operations.OperationsError` without the tables `constellation` and `operations`, and `orbit.OrbitError` for
+    orbits that do not hold.
     """
     m, folder, contents = file.mission, file.path.parent, file.contents
     c, rates = table(m), rate_table(closings(m, loss))

@@ -126,8 +126,15 @@ def contacts(first: Terminal, second: Terminal, earth: Earth, epoch: Epoch, span
     The same to the last bit when the two are swapped. Light time (0.15 s over 44 000 km) is left out; the ends may move
     by as much.
 
-    Raises `OrbitError` for two terminals of one name, a span that is none, two orbits that meet, a terminal below the
-    surface that the line of sight must clear, and what the orbits raise.
+    Args:
+        first: a terminal on its orbit.
+        second: the other one, of another name.
+        earth: what hides one from the other.
+        epoch: from which all times count.
+        span_s: start and end of the search, s.
+
+    Raises `OrbitError` for two terminals of one name, a span that holds no time, two orbits that meet, a terminal below
+    the surface that the line of sight must clear, and what the orbits raise.
     """
     return contacts_with_each(first, (second,), earth, epoch, span_s)[0]
 
@@ -143,9 +150,18 @@ def contacts_with_each(
 ) -> tuple[tuple[Contact, ...], ...]:
     """`contacts` of a satellite with each of the relays, solved together, up to a range of `furthest_m`.
 
-    `sampled`, one for each relay, saves to compute their states anew for every satellite:
-    ``Sampled.over(relay.orbit, span_s, coarse_step_s(satellite.orbit, span_s[0]))``; samples in another step are left
-    aside. Limits that are not set cost nothing.
+    Limits that are not set cost nothing.
+
+    Args:
+        satellite: one terminal on its orbit.
+        relays: the others, none of them of the satellite's name.
+        earth: what hides one from the other.
+        epoch: from which all times count.
+        span_s: start and end of the search, s.
+        sampled: states of each relay, which several satellites may share:
+            ``Sampled.over(relay.orbit, span_s, coarse_step_s(satellite.orbit, span_s[0]))``. Those in another step are
+            left aside.
+        furthest_m: largest range of a contact, m; infinite without a limit.
 
     Raises `OrbitError` as `contacts`.
     """
@@ -230,7 +246,13 @@ def _combined(kept: Sequence[Condition], span_s: Span) -> tuple[Contact, ...]:
 def passes(orbit: Orbit, station: Station, epoch: Epoch, span_s: Span) -> tuple[Pass, ...]:
     """The passes of a satellite over a ground station in the span: its elevation, geometric, is above the mask.
 
-    Raises `OrbitError` for a span that is none, and what the orbit raises.
+    Args:
+        orbit: of the satellite.
+        station: place and elevation mask.
+        epoch: from which all times count.
+        span_s: start and end of the search, s.
+
+    Raises `OrbitError` for a span that holds no time, and what the orbit raises.
     """
     step = coarse_step_s(orbit, span_s[0])
     time_s = coarse_times(span_s, step)

@@ -95,7 +95,7 @@ class Earth:
         return np.asarray(horizons - np.arctan2(cross, dot))
 
     def _scaled(self, position_m: Floats, which: str) -> Floats:
-        """The position in units of the raised semi-axes, refused below the surface."""
+        """The position in units of the raised semi-axes; raises `OrbitError` below the surface."""
         scaled = to_unit_sphere(position_m, *semi_axes_m(self.shape, self.grazing_height_m))
         square = np.atleast_1d(_square(scaled))
         worst = int(np.argmin(square)) if square.size else 0

@@ -113,7 +113,7 @@ class Epoch:
         return (np.asarray(time_s, dtype=np.float64) + since_noon_s) / _CENTURY_S
 
     def _check(self, time: Floats) -> None:
-        """Refuse times that are not numbers or leave the tables."""
+        """Raise `OrbitError` for times that are not numbers or leave the tables."""
         if not time.size:
             return
         for extreme in (float(time.min()), float(time.max())):
@@ -151,7 +151,7 @@ def _normal(text: str) -> str:
 
 
 def _check_clock(text: str, day: int, hour: int, minute: int, second: float) -> None:
-    """Refuse a time of day that does not exist; second 60 only where a leap second was inserted."""
+    """Raise `OrbitError` for a time of day that does not exist; second 60 does where a leap second was inserted."""
     if hour <= 23 and minute <= 59 and second < 60.0:
         return
     if (hour, minute) == (23, 59) and 60.0 <= second < 61.0:

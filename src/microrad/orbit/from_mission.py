@@ -1,4 +1,4 @@
-"""From the mission's tables to orbits, terminals and stations."""
+"""The door: from the mission's tables to orbits, terminals and stations, which all else takes."""
 
 import math
 from collections import Counter
@@ -47,6 +47,11 @@ class Pair:
 
 def pair(m: LinkMission, folder: Path, contents: Contents = ()) -> Pair:
     """The terminals of a mission with a table `orbit`; files are looked for in ``contents``, and then in ``folder``.
+
+    Args:
+        m: the mission.
+        folder: the folder of its file.
+        contents: the files that it names, where they were read with it.
 
     Raises `OrbitError` for an orbit that is none, or that does not hold over the mission's span.
     """

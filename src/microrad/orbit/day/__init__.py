@@ -76,7 +76,13 @@ def given_loss(links: LinkStudy) -> PointingLoss:
 
 
 def loss_at(m: LinkMission, margin_db: float, source: str) -> PointingLoss:
-    """The pointing loss, an uncorrected point-ahead in it, that leaves a margin at the budgeted rate and distance."""
+    """The pointing loss, an uncorrected point-ahead in it, that leaves a margin at the budgeted rate and distance.
+
+    Args:
+        m: the mission.
+        margin_db: of its communication link, dB.
+        source: where the margin comes from, in words.
+    """
     needed = float(link.required_dbm(m, m.communication.data_rate_bit_s))
     return PointingLoss(link.received_on_axis_dbm(m) - needed - margin_db, 0.0, source)
 
@@ -107,9 +113,13 @@ def run(
 ) -> DayStudy:
     """The day of a mission that has the tables `orbit` and `operations`.
 
-    ``loss`` is what pointing costs the laser link, by default what the mission states. Raises `orbit.OrbitError` and
-    `operations.OperationsError` for tables that are missing, orbits that do not hold and a contact that is asked for
-    beyond those of the span.
+    Args:
+        links: the links of the mission, with their acquisition.
+        loss: what pointing costs the laser link; by default what the mission states.
+        on_progress: told how many of how many assumptions are changed.
+
+    Raises `orbit.OrbitError` and `operations.OperationsError` for tables that are missing, orbits that do not hold and
+    a contact that is asked for beyond those of the span.
     """
     m = links.file.mission
     loss = given_loss(links) if loss is None else loss

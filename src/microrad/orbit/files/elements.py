@@ -120,7 +120,7 @@ def _two_lines(path: Path, text: str) -> Iterator[ElementSet]:
 
 
 def _check_line(path: Path, number: int, line: str, kind: str) -> None:
-    """Refuse a line that is not line 1 or 2 (`kind`) of an element set, as long and as summed as it must be."""
+    """Raise `OrbitError` unless this is line 1 or 2 (`kind`) of an element set, with its length and its checksum."""
     where = f"{path}, line {number}"
     if not line.startswith(f"{kind} "):
         raise OrbitError(

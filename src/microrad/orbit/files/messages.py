@@ -78,7 +78,7 @@ def read_text(path: Path, data: bytes | None = None) -> str:
 
 
 def _check_file(path: Path) -> None:
-    """Refuse what is no file, an empty one and one too large; raises what asking the system for it raises."""
+    """Raise `OrbitError` for a folder, a device, an empty file and one too large, `OSError` for one not found."""
     found = path.stat()
     if stat.S_ISDIR(found.st_mode):
         raise OrbitError(f"{path}: this is a folder; name the file in it")

@@ -179,7 +179,7 @@ def _xml_row(path: Path, draft: _Draft, row: dict[str, Field], place: str) -> No
 
 
 def _check_metadata(path: Path, draft: _Draft) -> None:
-    """Refuse a segment whose keys are missing, or whose centre, time system or frame is not read."""
+    """Raise `OrbitError` for a segment whose keys are missing, or whose centre, time system or frame is not read."""
     given = draft.metadata
     for key in _REQUIRED:
         if not given.get(key, Field(key, "", "", "")).value:
@@ -236,7 +236,7 @@ def _segment(path: Path, draft: _Draft, epoch: Epoch) -> Segment:
 
 
 def _check_rows(path: Path, draft: _Draft, time: Floats) -> None:
-    """Refuse numbers that are not finite, times that do not rise and distances that no satellite has."""
+    """Raise `OrbitError` for numbers that are not finite, times that do not rise, distances that no satellite has."""
     values = np.array(draft.values)
     bad = np.flatnonzero(~np.all(np.isfinite(values), axis=1))
     if bad.size:
@@ -261,7 +261,7 @@ def _check_rows(path: Path, draft: _Draft, time: Floats) -> None:
 
 
 def _check_velocities(path: Path, draft: _Draft, time: Floats, states: States) -> None:
-    """Refuse velocities that are not those of the positions, and positions that no satellite passes one by one.
+    """Raise `OrbitError` for velocities that are not those of the positions, and steps that no satellite can make.
 
     On a circle of which a step covers the angle 2 x, half the sum of the velocities at its ends is the mean velocity
     between them times x / tan x. Three times what that leaves, at the largest rate that a satellite has at this
@@ -299,7 +299,7 @@ def _check_velocities(path: Path, draft: _Draft, time: Floats, states: States) -
 
 
 def _check_holes(path: Path, draft: _Draft, time: Floats, usable: tuple[float, float]) -> None:
-    """Refuse a segment that would be interpolated over a hole between its state vectors."""
+    """Raise `OrbitError` for a segment that would be interpolated over a hole between its state vectors."""
     step = np.diff(time)
     median = float(np.median(step))
     used = (time[1:] > usable[0] + SLACK_S) & (time[:-1] < usable[1] - SLACK_S)
