@@ -71,7 +71,7 @@ def many() -> None:
     print(f"{'satellites':>10} {'contacts':>9} {'Earth alone':>12} {'all limits':>11} {'planned':>11} {'memory':>9}")
     for count in (125, 250, 500, 1000):
         table = m.constellation.model_copy(update={"satellites": count, "planes": 25, "phasing": 1})
-        own = list(orbit.satellites(table, m, pair.epoch, FILE.path.parent))
+        own = list(orbit.satellites(table, m.orbit, pair.epoch, FILE.path.parent))
         free = [orbit.Terminal(each.orbit, orbit.UNLIMITED, each.name) for each in own]
         began = time.perf_counter()
         found = constellation.opportunities(free, bare, pair.earth, pair.epoch, (0.0, DAY_S))

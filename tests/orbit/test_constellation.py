@@ -26,8 +26,8 @@ def made(folder, *changes):
     file = day_file(folder, *changes)
     m = file.mission
     pair = orbit.pair(m, folder)
-    c = constellation.table(m)
-    return pair, tuple(orbit.satellites(c, m, pair.epoch, folder)), orbit.relays(c, m, pair.epoch)
+    c = m.constellation
+    return pair, tuple(orbit.satellites(c, m.orbit, pair.epoch, folder)), orbit.relays(c, m.orbit, pair.epoch)
 
 
 def planned(folder, *changes):
@@ -226,10 +226,10 @@ def test_a_file_of_elements_is_a_constellation(tmp_path):
     plan = with_elements(tmp_path, text)
     assert plan.satellites == ("EXAMPLE 1", "EXAMPLE 2", "EXAMPLE 3")
     assert {one.satellite for one in plan.planned} == set(plan.satellites)
-    sets = orbit.model.read_elements(tmp_path / "a.tle")
+    sets = orbit.read_elements(tmp_path / "a.tle")
     pair, own, relays = made(tmp_path, SIX_HOURS, FILED)
     for elements, satellite in zip(sets, own, strict=True):
-        alone = orbit.model.sgp4_orbit(elements, pair.epoch)
+        alone = orbit.sgp4_orbit(elements, pair.epoch)
         time_s = np.array([0.0, 7000.0])
         np.testing.assert_array_equal(satellite.orbit.states(time_s).position_m, alone.states(time_s).position_m)
         assert satellite.limits == pair.leo.limits
@@ -267,7 +267,7 @@ def test_the_csv_has_every_session(plan):
 
 
 def test_the_contact_plan_has_every_session_with_data_in_whole_seconds(plan):
-    lines = operations.contact_plan(plan.planned, plan.epoch.utc).splitlines()
+    lines = plan.contact_plan().splitlines()
     contacts = [line.split() for line in lines if line.startswith("a contact")]
     ranges = [line.split() for line in lines if line.startswith("a range")]
     assert len(contacts) == len(ranges) == len(plan.planned)

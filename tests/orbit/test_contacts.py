@@ -12,21 +12,28 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from microrad.mission.tables.pointing import point_ahead_rad
-from microrad.orbit import attitude, events
+from microrad.orbit import events, limits
 from microrad.orbit.analytic import GeostationarySlot, KeplerOrbit, circular
 from microrad.orbit.base import OrbitError, States
-from microrad.orbit.closed_form import coplanar_contact
 from microrad.orbit.contacts import (
     Sampled,
     coarse_step_s,
     coarse_times,
     contacts,
     contacts_with_each,
+    coplanar_contact,
     passes,
 )
-from microrad.orbit.earth import EARTH_RADIUS_M, FLATTENING, GEOSTATIONARY_RADIUS_M, Earth, gravity
+from microrad.orbit.earth import (
+    EARTH_RADIUS_M,
+    FLATTENING,
+    GEOSTATIONARY_RADIUS_M,
+    Earth,
+    Station,
+    elevation_rad,
+    gravity,
+)
 from microrad.orbit.epoch import Epoch
-from microrad.orbit.ground import Station, elevation_rad
 from microrad.orbit.limits import UNLIMITED, Limits, Terminal
 from microrad.orbit.line_of_sight import sight
 from microrad.orbit.sun import shadow_rad, sun_direction
@@ -482,9 +489,9 @@ def test_a_limit_broken_for_seconds_between_two_samples_is_found():
 def test_the_rate_of_a_body_is_that_of_its_axes(held, orbit):
     time_s, by = np.arange(100.0, 86400.0, 500.0), 0.5
     states, sun = orbit.states(time_s), sun_direction(EPOCH, time_s)
-    rate = attitude.body_rate_rad_s(held, states, sun)
-    before, after = (attitude.body_axes(held, orbit.states(t), sun) for t in (time_s - by, time_s + by))
-    now = attitude.body_axes(held, states, sun)
+    rate = limits.body_rate_rad_s(held, states, sun)
+    before, after = (limits.body_axes(held, orbit.states(t), sun) for t in (time_s - by, time_s + by))
+    now = limits.body_axes(held, states, sun)
     np.testing.assert_allclose(now, np.moveaxis(plain_axes(held, states, sun), 0, -1), atol=1e-14)
     for axis in range(3):
         turned = np.cross(rate, now[axis], axis=0)
@@ -513,10 +520,10 @@ def test_gravity_turns_the_normal_of_an_orbit_and_with_it_the_body():
     time_s = np.arange(100.0, 5900.0, 100.0)
     sun = np.tile([[1.0], [0.0], [0.0]], time_s.size)
     states = orbit.states(time_s)
-    rate = attitude.body_rate_rad_s("nadir", states, sun)
+    rate = limits.body_rate_rad_s("nadir", states, sun)
     lift = np.abs(np.sum(rate * states.position_m, axis=0)) / np.linalg.norm(states.position_m, axis=0)
     assert lift.max() > 3e-7
-    before, now, after = (attitude.body_axes("nadir", orbit.states(time_s + h), sun)[1] for h in (-by, 0.0, by))
+    before, now, after = (limits.body_axes("nadir", orbit.states(time_s + h), sun)[1] for h in (-by, 0.0, by))
     slope = (after - before) / (2.0 * by)  # of the orbit normal, which nothing else turns
     np.testing.assert_allclose(np.cross(rate, now, axis=0), slope, rtol=0, atol=1e-4 * lift.max())
 

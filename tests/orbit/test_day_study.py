@@ -483,7 +483,7 @@ CHANGED = {
 def test_each_side_changes_just_its_own_key(links, day, monkeypatch):
     cases = {}
 
-    def noted(case, pair_of, found):
+    def noted(case, known):
         mark = Numbers(float(len(cases) + 1), 1.0, 1.0, 1.0)
         cases[mark.relay_bit] = case
         return mark
@@ -656,7 +656,7 @@ def test_nothing_about_a_day_is_asked_of_a_mission_without_its_tables(tmp_path):
     links = link_study.run(day_file(tmp_path, ALONE, {"operations": None}))
     with pytest.raises(ValueError, match=r"no table \[operations\]: microrad init writes one"):
         day_study.run(links)
-    assert geometry.view(links.file.mission, orbit.pair(links.file.mission, tmp_path)).encounters
+    assert geometry.view(orbit.pair(links.file.mission, tmp_path), 1.55e-6).encounters
 
 
 def test_an_uncorrected_point_ahead_is_in_the_loss_and_so_in_the_reach(tmp_path):

@@ -14,9 +14,9 @@ from microrad.loop import control, fine_pointing
 from microrad.loop.fine_loop.loop import assemble
 from microrad.loop.fine_pointing import designs
 from microrad.mission import file as missionfile
-from microrad.orbit import constellation, operations
+from microrad.orbit import constellation
 from microrad.orbit import day as day_study
-from microrad.orbit.day import flow
+from microrad.orbit.day import flow, geometry
 from microrad.study import contact_run
 from places import ROOT
 from scenes import scene_of
@@ -92,7 +92,7 @@ def replaced(folder):
 def view(replaced, folder):
     def seen(*tables):
         m = replaced(*tables).mission
-        return day_study.view(m, orbit.pair(m, folder))
+        return geometry.view(orbit.pair(m, folder), m.communication.wavelength_m)
 
     return seen
 
@@ -199,9 +199,12 @@ def test_limits_and_the_sun(view, day):
 def test_rates_share_and_store(replaced, links, day):
     def of(*change):
         m = replaced(OPERATIONS.replace(*change) if change else OPERATIONS).mission
+        o, seen = m.operations, day.view
         found = flow.closings(m, day.loss)
-        relay = flow.relay(m, day.view, flow.rate_table(found), day.loss.outage, day_study.acquired(links), 1.0)
-        return SimpleNamespace(closings=found, relay=relay, direct=flow.direct(m, day.view, flow.heard(m, day.view)))
+        relay = flow.relay(o, seen, flow.rate_table(found), day.loss.outage, day_study.acquired(links), 1.0)
+        return SimpleNamespace(
+            closings=found, relay=relay, direct=flow.direct(o, seen, flow.heard(o.downlink, seen.pair))
+        )
 
     stepped = of()
     reach = [f"{c.largest_range_m / 1e3:.0f}" for c in stepped.closings]
@@ -212,7 +215,7 @@ def test_rates_share_and_store(replaced, links, day):
     told(f"in place of {day.relay.capacity_bit / 8e12:.2f} TB at 300 Mbit/s alone")
     told(f"within {stepped.relay.slow_s / 60:.1f} min in place of {day.relay.slow_s / 60:.1f} min")
     told("Without `[acquisition]` lock is there at once")
-    at_once = flow.relay(day.mission, day.view, flow.rate_table(day.closings), 0.0, None, 1.0)
+    at_once = flow.relay(day.mission.operations, day.view, flow.rate_table(day.closings), 0.0, None, 1.0)
     assert np.ptp(at_once.capacity_spread_bit) == 0.0 and at_once.capacity_bit > day.relay.capacity_bit
     half = of("relay_share = 1.0", "relay_share = 0.5")
     told(f"`relay_share = 0.5` {half.relay.capacity_bit / 8e12:.2f} TB are left", f"{half.relay.slow_s / 60:.1f} min")
@@ -285,7 +288,7 @@ def test_the_constellation(links):
         f"`microrad constellation leo-geo.toml` has {len(plan.planned)} of them, in {reach:.0f} h of contacts in reach"
     )
     assert all(one.rate_bit_s > 0.0 for one in plan.planned)
-    text = operations.contact_plan(plan.planned, plan.epoch.utc)
+    text = plan.contact_plan()
     assert "# left out" not in text
     lights = {line.split()[-1] for line in text.splitlines() if line.startswith("a range")}
     assert lights == {"1"}
@@ -299,11 +302,11 @@ def test_a_pattern_repeats_elements_and_a_file_goes_with_every_kind(folder):
     path.write_text(TEXT.replace(shipped("orbit.leo"), ORBITS[2] + "\n\n"), encoding="utf-8")
     m = missionfile.load_link(path).mission
     with pytest.raises(orbit.OrbitError, match='of kind "elements" has nothing to repeat: give pattern = "file"'):
-        tuple(orbit.satellites(m.constellation, m, orbit.Epoch.from_text(m.orbit.epoch), folder))
+        tuple(orbit.satellites(m.constellation, m.orbit, orbit.Epoch.from_text(m.orbit.epoch), folder))
     text = re.sub(r"(?m)^(satellites|planes|phasing) = .*\n", "", path.read_text(encoding="utf-8"))
     path.write_text(text.replace('pattern = "delta"', 'pattern = "file"\nfile = "satellite.tle"'), encoding="utf-8")
     m = missionfile.load_link(path).mission
-    (only,) = orbit.satellites(m.constellation, m, orbit.Epoch.from_text(m.orbit.epoch), folder)
+    (only,) = orbit.satellites(m.constellation, m.orbit, orbit.Epoch.from_text(m.orbit.epoch), folder)
     assert only.name == "DEMO"
 
 
@@ -312,7 +315,7 @@ def test_walkers_patterns_are_as_told(links, pattern, round_deg):
     told('`"delta"` spreads the nodes over 360 deg, `"star"` over 180 deg', "360 deg F / `satellites` apart in phase")
     m, c = links.file.mission, links.file.mission.constellation.model_copy(update={"pattern": pattern})
     epoch = orbit.Epoch.from_text(m.orbit.epoch)
-    first, *_, later = list(orbit.satellites(c, m, epoch, ROOT))[: c.satellites // c.planes + 1]
+    first, *_, later = list(orbit.satellites(c, m.orbit, epoch, ROOT))[: c.satellites // c.planes + 1]
     assert math.degrees(later.orbit.node_rad - first.orbit.node_rad) == pytest.approx(round_deg / c.planes)
     apart = math.degrees(later.orbit.mean_anomaly_rad - first.orbit.mean_anomaly_rad)
     assert apart == pytest.approx(360.0 * c.phasing / c.satellites)

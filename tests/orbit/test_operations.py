@@ -18,7 +18,6 @@ from microrad.orbit.operations import (
     Latency,
     OperationsError,
     PlannedSession,
-    Production,
     RateTable,
     Service,
     Step,
@@ -55,7 +54,7 @@ def test_the_rate_table_takes_the_highest_rate_that_closes():
 
 
 def test_the_rate_follows_the_range_with_its_crossings_to_a_millisecond():
-    got = service(TABLE, (0.0, 7200.0), 100.0, swing, 1.0)
+    got = service(TABLE, (0.0, 7200.0), swing, 1.0)
     third = 7200.0 / 6.0  # cos is 1/2 there
     inner = [third, 2.0 * third, 4.0 * third, 5.0 * third]
     np.testing.assert_allclose(got.edges_s, [0.0, *inner, 7200.0], atol=one_millisecond)
@@ -64,7 +63,7 @@ def test_the_rate_follows_the_range_with_its_crossings_to_a_millisecond():
 
 
 def test_before_lock_the_rate_is_zero_and_lock_cuts_a_step():
-    got = service(TABLE, (0.0, 7200.0), 3000.0, swing, 0.5)
+    got = service(TABLE, (0.0, 7200.0), swing, 0.5).locked_at(3000.0)
     np.testing.assert_allclose(got.edges_s, [0.0, 3000.0, 4800.0, 6000.0, 7200.0], atol=one_millisecond)
     assert got.rate_bit_s.tolist() == [0.0, 2 * GBIT, 1 * GBIT, 0.0]
     assert got.mean_rate_bit_s.tolist() == [0.0, 1 * GBIT, 0.5 * GBIT, 0.0]
@@ -73,16 +72,16 @@ def test_before_lock_the_rate_is_zero_and_lock_cuts_a_step():
 
 @pytest.mark.parametrize("lock_s", [7200.0, 8000.0, INF])
 def test_a_contact_that_never_locks_carries_nothing(lock_s):
-    got = service(TABLE, (0.0, 7200.0), lock_s, swing, 1.0)
+    got = service(TABLE, (0.0, 7200.0), swing, 1.0).locked_at(lock_s)
     assert (got.edges_s.tolist(), got.rate_bit_s.tolist(), got.capacity_bit) == ([0.0, 7200.0], [0.0], 0.0)
 
 
 def test_one_rate_is_one_step():
-    everywhere = service(RateTable((Step(3 * GBIT, INF),)), (10.0, 20.0), 10.0, swing, 1.0)
+    everywhere = service(RateTable((Step(3 * GBIT, INF),)), (10.0, 20.0), swing, 1.0)
     assert (everywhere.edges_s.tolist(), everywhere.rate_bit_s.tolist()) == ([10.0, 20.0], [3 * GBIT])
-    near = service(RateTable((Step(3 * GBIT, 40_000 * KM),)), (0.0, 7200.0), 0.0, swing, 1.0)
+    near = service(RateTable((Step(3 * GBIT, 40_000 * KM),)), (0.0, 7200.0), swing, 1.0)
     np.testing.assert_allclose(near.edges_s, [0.0, 1800.0, 5400.0, 7200.0], atol=one_millisecond)
-    never = service(RateTable((Step(3 * GBIT, 0.0),)), (0.0, 7200.0), 0.0, swing, 1.0)
+    never = service(RateTable((Step(3 * GBIT, 0.0),)), (0.0, 7200.0), swing, 1.0)
     assert never.capacity_bit == 0.0
 
 
@@ -93,7 +92,7 @@ def test_a_turn_across_a_limit_between_two_samples_is_found(bottom_s, sign):
         return 40_000 * KM - sign * 4_000 * KM * np.cos(2.0 * np.pi * (time_s - bottom_s) / 20_000.0)
 
     table = RateTable((Step(2 * GBIT, float(turning(bottom_s + 1.0))), Step(1 * GBIT, INF)))
-    got = service(table, (0.0, 7200.0), 0.0, turning, 1.0)
+    got = service(table, (0.0, 7200.0), turning, 1.0)
     np.testing.assert_allclose(got.edges_s, [0.0, bottom_s - 1.0, bottom_s + 1.0, 7200.0], atol=one_millisecond)
     inside, outside = (2 * GBIT, 1 * GBIT) if sign > 0.0 else (1 * GBIT, 2 * GBIT)
     assert got.rate_bit_s.tolist() == [outside, inside, outside]
@@ -108,7 +107,7 @@ def test_a_turn_across_a_limit_between_two_samples_is_found(bottom_s, sign):
 def test_the_service_agrees_with_the_table_second_by_second(limits_km, start_s, duration_s):
     steps = tuple(Step((9 - k) * GBIT, x * KM) for k, x in enumerate(sorted(limits_km)))
     table = RateTable(steps)
-    got = service(table, (start_s, start_s + duration_s), start_s, swing, 1.0)
+    got = service(table, (start_s, start_s + duration_s), swing, 1.0)
     time = np.arange(start_s, start_s + duration_s, 1.0) + 0.5
     time = time[time < start_s + duration_s]
     away = np.all(np.abs(time[:, None] - got.edges_s) > 2 * one_millisecond, axis=1)
@@ -117,61 +116,17 @@ def test_the_service_agrees_with_the_table_second_by_second(limits_km, start_s, 
     assert np.all(np.diff(got.rate_bit_s) != 0.0)
 
 
-@pytest.mark.parametrize(
-    ("steps", "words"),
-    [
-        ((), "no step"),
-        (((-1.0, 5.0),), "data rate of step 0 is -1"),
-        (((0.0, 5.0),), "data rate of step 0 is 0"),
-        (((math.nan, 5.0),), "data rate of step 0 is nan"),
-        (((INF, 5.0),), "data rate of step 0 is inf"),
-        (((1.0, -5.0),), "largest range of step 0 is -5"),
-        (((1.0, math.nan),), "largest range of step 0 is nan"),
-        (((1.0, 5.0), (2.0, 6.0)), "does not fall from step 0"),
-        (((1.0, 5.0), (1.0, 6.0)), "does not fall from step 0"),
-        (((2.0, 5.0), (1.0, 4.0)), "would never serve"),
-    ],
-)
-def test_a_table_that_makes_no_sense_is_refused(steps, words):
+@pytest.mark.parametrize("largest", [-5.0, math.nan])
+def test_a_rate_without_a_range_is_refused(largest):
+    words = f"the largest range of step 1 is {largest:g} m; give at least 0 m, inf allowed"
     with pytest.raises(OperationsError, match=words):
-        RateTable(tuple(Step(*s) for s in steps))
+        RateTable((Step(2.0, 4.0), Step(1.0, largest)))
 
 
-@pytest.mark.parametrize(
-    ("contact", "lock_s", "range_m", "availability", "words"),
-    [
-        ((10.0, 10.0), 10.0, swing, 1.0, "ends at 10 s, not after its start"),
-        ((10.0, 5.0), 10.0, swing, 1.0, "ends at 5 s, not after its start"),
-        ((10.0, math.nan), 10.0, swing, 1.0, "give finite times"),
-        ((10.0, 20.0), 9.0, swing, 1.0, "lock is 9 s, before"),
-        ((10.0, 20.0), math.nan, swing, 1.0, "lock is nan"),
-        ((10.0, 20.0), 10.0, swing, 1.1, "availability is 1.1"),
-        ((10.0, 20.0), 10.0, swing, math.nan, "availability is nan"),
-        ((10.0, 20.0), 10.0, lambda t: t - 10.0, 1.0, "range at 10 s is 0 m"),
-        ((10.0, 20.0), 10.0, lambda t: np.full_like(t, np.nan), 1.0, "range at 10 s is nan m"),
-        ((10.0, 20.0), 10.0, lambda t: 5.0, 1.0, "shape"),
-    ],
-)
-def test_a_contact_that_makes_no_sense_is_refused(contact, lock_s, range_m, availability, words):
-    with pytest.raises(OperationsError, match=words):
-        service(TABLE, contact, lock_s, range_m, availability)
-
-
-@pytest.mark.parametrize(
-    ("edges", "rates", "availability", "words"),
-    [
-        ([0.0, 1.0], [1.0, 2.0], 1.0, "2 edges and 2 rates"),
-        ([0.0], [], 1.0, "1 edges and 0 rates"),
-        ([0.0, 1.0, 1.0], [1.0, 2.0], 1.0, "do not rise"),
-        ([0.0, 1.0], [-2.0], 1.0, "data rate -2"),
-        ([0.0, 1.0], [math.nan], 1.0, "number 0 is nan"),
-        ([0.0, INF], [1.0], 1.0, "number 1 is inf"),
-        ([0.0, 1.0], [1.0], -0.1, "availability is -0.1"),
-    ],
-)
-def test_a_service_that_makes_no_sense_is_refused(edges, rates, availability, words):
-    with pytest.raises(OperationsError, match=words):
-        Service(np.array(edges), np.array(rates), availability)
+@pytest.mark.parametrize("availability", [-0.1, 1.1, math.nan])
+def test_an_availability_that_is_no_share_is_refused(availability):
+    with pytest.raises(OperationsError, match=f"the availability is {availability:g}; give a share of time from 0 to"):
+        Service(np.array([0.0, 1.0]), np.array([1.0]), availability)
 
 
 # ---------------------------------------------------------------------------------------------------------------- store
@@ -186,17 +141,16 @@ def served(*pieces):
 
 def test_a_store_by_hand():
     # 10 bit/s for 100 s; the link takes 30 bit/s from 50 s to 100 s
-    got = deliver(Production(10.0, 0.0, 100.0), INF, served((50.0, (50.0, 30.0))), (0.0, 100.0), 0.25)
+    got = deliver(10.0, (0.0, 100.0), INF, served((50.0, (50.0, 30.0))), (0.0, 100.0), 0.25)
     assert got.time_s.tolist() == [0.0, 50.0, 75.0, 100.0]
     assert got.stored_bit.tolist() == [0.0, 500.0, 0.0, 0.0]
     assert got.delivered_bit.tolist() == [0.0, 0.0, 750.0, 1000.0]
     assert got.generated_bit.tolist() == [0.0, 500.0, 750.0, 1000.0]
-    assert (got.largest_stored_bit, np.sum(got.contact_capacity_bit), got.not_delivered_bit) == (500.0, 1500.0, 0.0)
-    assert (got.contact_bit.tolist(), got.contact_capacity_bit.tolist()) == ([1000.0], [1500.0])
-    assert got.delivered_share == 1.0
+    assert (got.largest_stored_bit, got.stored_bit[-1]) == (500.0, 0.0)
+    assert got.latency.delivered_share == 1.0
     # the first bit waits 50 s, the bit of 75 s none, linear between; a quarter does not wait at all
     latency = got.latency
-    assert latency.mean_s == pytest.approx(0.75 * 25.0 + 0.25, rel=rounding)
+    assert mean_s(latency) == pytest.approx(0.75 * 25.0 + 0.25, rel=rounding)
     np.testing.assert_allclose(latency.cdf([0.2, 0.25, 25.25, 50.25]), [0.0, 0.25, 0.625, 1.0], rtol=rounding)
     wanted = [(0.1, 0.25), (0.25, 0.25), (0.625, 25.25), (1.0, 50.25)]
     assert all(latency.quantile(p) == pytest.approx(x, rel=rounding) for p, x in wanted)
@@ -204,11 +158,11 @@ def test_a_store_by_hand():
 
 def test_a_full_store_loses_the_newest_and_takes_in_what_the_link_takes_out():
     # full at 20 s; the link takes 4 bit/s from 40 s to 60 s, then 40 bit/s to 70 s
-    got = deliver(Production(10.0, 0.0, 60.0), 200.0, served((40.0, (20.0, 4.0), (10.0, 40.0))), (0.0, 70.0), 0.0)
+    got = deliver(10.0, (0.0, 60.0), 200.0, served((40.0, (20.0, 4.0), (10.0, 40.0))), (0.0, 70.0), 0.0)
     assert got.time_s.tolist() == [0.0, 20.0, 40.0, 60.0, 65.0, 70.0]
     assert got.stored_bit.tolist() == [0.0, 200.0, 200.0, 200.0, 0.0, 0.0]
     assert got.lost_bit.tolist() == [0.0, 0.0, 200.0, 320.0, 320.0, 320.0]
-    assert got.total_delivered_bit == 280.0
+    assert got.delivered_bit[-1] == 280.0
     # bit 0 of 0 s leaves at 40 s; bit 80, of 8 s, at 60 s; bit 200, of 20 s, at 63 s; then data of 40 s to 60 s
     latency = got.latency
     assert latency.quantile(1.0) == pytest.approx(52.0)
@@ -218,8 +172,8 @@ def test_a_full_store_loses_the_newest_and_takes_in_what_the_link_takes_out():
 
 
 def test_data_left_on_board_is_later_than_any_latency():
-    got = deliver(Production(10.0, 0.0, 100.0), INF, served((100.0, (10.0, 60.0))), (0.0, 200.0), 1.0)
-    assert (got.total_delivered_bit, got.not_delivered_bit, got.delivered_share) == (600.0, 400.0, 0.6)
+    got = deliver(10.0, (0.0, 100.0), INF, served((100.0, (10.0, 60.0))), (0.0, 200.0), 1.0)
+    assert (got.delivered_bit[-1], got.stored_bit[-1], got.latency.delivered_share) == (600.0, 400.0, 0.6)
     latency = got.latency
     assert latency.missing_bit == 400.0
     assert latency.delivered_share == 0.6
@@ -230,37 +184,42 @@ def test_data_left_on_board_is_later_than_any_latency():
 
 def test_a_longer_span_than_the_observed_one_delivers_the_rest():
     more = served((100.0, (10.0, 60.0)), (150.0, (10.0, 60.0)))
-    got = deliver(Production(10.0, 0.0, 100.0), INF, more, (-50.0, 200.0), 0.0)
-    assert got.contact_bit.tolist() == [600.0, 400.0]
-    assert got.not_delivered_bit == 0.0
+    got = deliver(10.0, (0.0, 100.0), INF, more, (-50.0, 200.0), 0.0)
+    assert np.interp([110.0, 150.0, 160.0], got.time_s, got.delivered_bit).tolist() == [600.0, 600.0, 1000.0]
+    assert got.stored_bit[-1] == 0.0
     assert got.latency.quantile(1.0) == pytest.approx(100.0)
 
 
 def test_without_production_or_without_a_contact_there_is_nothing_to_be_late():
-    nothing = deliver(Production(0.0, 0.0, 100.0), 5.0, served((10.0, (10.0, 60.0))), (0.0, 100.0), 0.0)
-    assert (nothing.total_generated_bit, nothing.total_delivered_bit) == (0.0, 0.0)
-    numbers = (nothing.delivered_share, nothing.latency.quantile(0.5), nothing.latency.mean_s, nothing.latency.cdf(9.0))
+    nothing = deliver(0.0, (0.0, 100.0), 5.0, served((10.0, (10.0, 60.0))), (0.0, 100.0), 0.0)
+    assert (nothing.generated_bit[-1], nothing.delivered_bit[-1]) == (0.0, 0.0)
+    numbers = (
+        nothing.latency.delivered_share,
+        nothing.latency.quantile(0.5),
+        mean_s(nothing.latency),
+        nothing.latency.cdf(9.0),
+    )
     assert all(math.isnan(x) for x in numbers)
-    dark = deliver(Production(1.0, 0.0, 100.0), INF, [], (0.0, 100.0), 0.0)
-    assert (dark.not_delivered_bit, np.sum(dark.contact_capacity_bit), dark.latency.quantile(0.01)) == (100.0, 0.0, INF)
-    assert math.isnan(dark.latency.mean_s)
-    assert dark.contact_bit.shape == (0,)
+    dark = deliver(1.0, (0.0, 100.0), INF, [], (0.0, 100.0), 0.0)
+    assert (dark.stored_bit[-1], dark.latency.quantile(0.01)) == (100.0, INF)
+    assert math.isnan(mean_s(dark.latency))
 
 
 def test_outages_take_their_share_of_the_volume():
     half = Service(np.array([0.0, 100.0]), np.array([20.0]), 0.25)
-    got = deliver(Production(10.0, 0.0, 100.0), INF, [half], (0.0, 100.0), 0.0)
-    assert got.total_delivered_bit == pytest.approx(500.0)
-    assert np.sum(got.contact_capacity_bit) == 500.0
+    got = deliver(10.0, (0.0, 100.0), INF, [half], (0.0, 100.0), 0.0)
+    assert got.delivered_bit[-1] == pytest.approx(500.0)
+    assert half.capacity_bit == 500.0
 
 
 # ---- packets of one second of data, second by second
 def packets(production, capacity, services, span):
     """Delivered and lost bits, and (latency, bits) of what was delivered, in steps of 1 s."""
+    rate_bit_s, observed_s = production
     queue, stored, delivered, lost, waits = deque(), 0.0, 0.0, 0.0, []
     for second in range(int(span[0]), int(span[1])):
         middle = second + 0.5
-        new = production.rate_bit_s if production.start_s < middle < production.end_s else 0.0
+        new = rate_bit_s if observed_s[0] < middle < observed_s[1] else 0.0
         room = sum(
             s.mean_rate_bit_s[np.searchsorted(s.edges_s, middle) - 1] for s in services if s.start_s < middle < s.end_s
         )
@@ -289,7 +248,7 @@ def days(draw):
     """Production and contacts with whole seconds and whole rates; some stores overflow, some end with data on board."""
     span = (0.0, 600.0)
     first = draw(st.integers(0, 200))
-    production = Production(float(draw(st.integers(0, 9))), float(first), float(draw(st.integers(first + 1, 600))))
+    production = float(draw(st.integers(0, 9))), (float(first), float(draw(st.integers(first + 1, 600))))
     edges = sorted(draw(st.sets(st.integers(0, 600), max_size=8)))
     services = []
     for start, end in zip(edges[::2], edges[1::2], strict=False):
@@ -304,16 +263,16 @@ def days(draw):
 @given(days())
 def test_the_store_agrees_with_packets_second_by_second(day):
     production, capacity, services, span = day
-    got = deliver(production, capacity, services, span, 0.0)
+    got = deliver(*production, capacity, services, span, 0.0)
     delivered, lost, waits = packets(production, capacity, services, span)
     # the packets know no part of a second: each change of rate may shift a second of data
     changes = 2 + 2 * sum(s.rate_bit_s.size + 1 for s in services)
-    second = production.rate_bit_s * changes + 1e-6
-    assert got.total_delivered_bit == pytest.approx(delivered, abs=second)
-    assert got.total_lost_bit == pytest.approx(lost, abs=second)
+    second = production[0] * changes + 1e-6
+    assert got.delivered_bit[-1] == pytest.approx(delivered, abs=second)
+    assert got.lost_bit[-1] == pytest.approx(lost, abs=second)
     for latency in (0.0, 5.0, 60.0, 300.0):
         within, share = 2.0, sum(bits for wait, bits in waits if wait <= latency)
-        total = got.total_delivered_bit + got.not_delivered_bit
+        total = got.delivered_bit[-1] + got.stored_bit[-1]
         if total > 0.0:
             low, high = got.latency.cdf([latency - within, latency + within]) * total
             assert low - second <= share <= high + second
@@ -323,19 +282,21 @@ def test_the_store_agrees_with_packets_second_by_second(day):
 @given(days(), st.floats(0.0, 3.0))
 def test_data_is_conserved_and_the_latencies_hold_together(day, delay_s):
     production, capacity, services, span = day
-    got = deliver(production, capacity, services, span, delay_s)
-    produced = production.rate_bit_s * (production.end_s - production.start_s)
-    assert got.total_generated_bit == pytest.approx(produced, rel=rounding)
+    got = deliver(*production, capacity, services, span, delay_s)
+    rate_bit_s, (start_s, end_s) = production
+    produced = rate_bit_s * (end_s - start_s)
+    assert got.generated_bit[-1] == pytest.approx(produced, rel=rounding)
     balance = got.delivered_bit + got.lost_bit + got.stored_bit
     np.testing.assert_allclose(got.generated_bit, balance, rtol=rounding, atol=1e-6)
     for curve in (got.generated_bit, got.lost_bit, got.delivered_bit):
         assert np.all(np.diff(curve) >= -1e-9)
     assert np.all(np.diff(got.time_s) > 0.0)
     assert np.all((got.stored_bit >= 0.0) & (got.stored_bit <= capacity))
-    assert np.all(got.contact_bit <= got.contact_capacity_bit * (1.0 + rounding) + 1e-6)
-    assert got.contact_bit.sum() == pytest.approx(got.total_delivered_bit, rel=rounding, abs=1e-6)
+    sent = [float(np.diff(np.interp((s.start_s, s.end_s), got.time_s, got.delivered_bit))[0]) for s in services]
+    assert all(bit <= s.capacity_bit * (1.0 + rounding) + 1e-6 for bit, s in zip(sent, services, strict=True))
+    assert sum(sent) == pytest.approx(got.delivered_bit[-1], rel=rounding, abs=1e-6)
     latency = got.latency
-    assert latency.delivered_bit == pytest.approx(got.total_delivered_bit, rel=rounding, abs=1e-6)
+    assert latency.delivered_bit == pytest.approx(got.delivered_bit[-1], rel=rounding, abs=1e-6)
     assert np.all(latency.first_s >= delay_s)
     for share in (0.01, 0.5, 0.9, 0.99, 1.0):
         time = latency.quantile(share)
@@ -352,53 +313,20 @@ def test_the_mean_latency_is_what_was_stored_over_what_was_made(day):
     """Little's law: with all data delivered, the mean latency is the integral of the store over the data."""
     production, _, services, span = day
     rest = Service(np.array([span[1], span[1] + 1e4]), np.array([50.0]), 1.0)
-    got = deliver(production, INF, [*services, rest], (span[0], span[1] + 1e4), 0.0)
-    if production.rate_bit_s > 0.0:
+    got = deliver(*production, INF, [*services, rest], (span[0], span[1] + 1e4), 0.0)
+    if production[0] > 0.0:
         area = np.trapezoid(got.stored_bit, got.time_s)
-        assert got.not_delivered_bit == 0.0
-        assert got.latency.mean_s == pytest.approx(area / got.total_generated_bit, rel=1e-6, abs=1e-6)
-
-
-@pytest.mark.parametrize(
-    ("change", "words"),
-    [
-        ({"capacity_bit": 0.0}, "capacity of the store is 0"),
-        ({"capacity_bit": -1.0}, "capacity of the store is -1"),
-        ({"capacity_bit": math.nan}, "capacity of the store is nan"),
-        ({"span": (0.0, 0.0)}, "span ends at 0 s, not after"),
-        ({"span": (0.0, math.nan)}, "give finite times"),
-        ({"span": (0.0, 50.0)}, "data is produced from 0 s to 100 s, outside the span"),
-        ({"span": (1.0, 100.0)}, "data is produced from 0 s to 100 s, outside the span"),
-        ({"delay_s": -0.1}, "delay is -0.1"),
-        ({"delay_s": math.nan}, "delay is nan"),
-        ({"delay_s": INF}, "delay is inf"),
-        ({"services": served((90.0, (20.0, 1.0)))}, "contact 0 runs from 90 s to 110 s, outside the span"),
-        ({"services": served((10.0, (20.0, 1.0)), (29.0, (5.0, 1.0)))}, "contact 1 starts at 29 s, before contact 0"),
-        ({"services": served((40.0, (20.0, 1.0)), (5.0, (5.0, 1.0)))}, "contact 1 starts at 5 s, before contact 0"),
-    ],
-)
-def test_a_store_that_makes_no_sense_is_refused(change, words):
-    good = {"capacity_bit": INF, "services": (), "span": (0.0, 100.0), "delay_s": 0.0}
-    with pytest.raises(OperationsError, match=words):
-        deliver(Production(1.0, 0.0, 100.0), **(good | change))
-
-
-@pytest.mark.parametrize(
-    ("values", "words"),
-    [
-        ((-1.0, 0.0, 9.0), "rate of production is -1"),
-        ((math.nan, 0.0, 9.0), "rate of production is nan"),
-        ((INF, 0.0, 9.0), "rate of production is inf"),
-        ((1.0, 9.0, 0.0), "observed span ends at 0 s, not after"),
-        ((1.0, 0.0, INF), "give finite times"),
-    ],
-)
-def test_a_production_that_makes_no_sense_is_refused(values, words):
-    with pytest.raises(OperationsError, match=words):
-        Production(*values)
+        assert got.stored_bit[-1] == 0.0
+        assert mean_s(got.latency) == pytest.approx(area / got.generated_bit[-1], rel=1e-6, abs=1e-6)
 
 
 # -------------------------------------------------------------------------------------------------------------- latency
+def mean_s(latency):
+    """Mean latency of what arrived; nan where nothing did."""
+    weight = float(np.sum(latency.volume_bit))
+    return float(np.dot(latency.volume_bit, 0.5 * (latency.first_s + latency.last_s))) / weight if weight else math.nan
+
+
 def slabs(*rows, missing=0.0):
     first, last, volume = (np.array(c, dtype=float) for c in zip(*rows, strict=True))
     return Latency(first, last, volume, missing)
@@ -411,13 +339,7 @@ def test_quantiles_of_a_jump_a_gap_and_a_slope():
         assert latency.quantile(share) == pytest.approx(time, rel=rounding)
     np.testing.assert_allclose(latency.cdf([0.9, 1.0, 3.0, 4.5, 6.0, 99.0]), [0.0, 0.5, 0.5, 0.575, 0.8, 0.8])
     assert latency.cdf(1.0).shape == ()
-    assert latency.mean_s == pytest.approx((50.0 * 1.0 + 30.0 * 5.0) / 80.0)
-
-
-@pytest.mark.parametrize("share", [0.0, -0.1, 1.1, math.nan])
-def test_a_quantile_of_no_share_is_refused(share):
-    with pytest.raises(OperationsError, match="asked for the share"):
-        slabs((1.0, 1.0, 50.0)).quantile(share)
+    assert mean_s(latency) == pytest.approx((50.0 * 1.0 + 30.0 * 5.0) / 80.0)
 
 
 def test_pooled_runs_are_the_mixture_by_data():
@@ -441,8 +363,6 @@ def test_pooled_runs_are_the_mixture_by_data():
     for share in (0.1, 0.5, 0.9):
         drawn = draws[order][np.searchsorted(reached, share)]
         assert both.quantile(share) == pytest.approx(drawn, abs=0.05)
-    with pytest.raises(OperationsError, match="no latencies"):
-        pool([])
 
 
 # ----------------------------------------------------------------------------------------------------------------- plan
@@ -452,6 +372,12 @@ NAMES = ("LEO 1", 'a "quoted", name', "=1+1", "+x", "-x", "@x", "'=x", "line\nbr
 
 def utc(time_s):
     return (NOON + timedelta(seconds=time_s)).isoformat(timespec="milliseconds").replace("+00:00", "Z")
+
+
+def plan_of(sessions, at=utc):
+    """The contact plan of sessions whose satellites and relays count in the order in which they appear."""
+    satellites, relays = (tuple(dict.fromkeys(getattr(s, who) for s in sessions)) for who in ("satellite", "relay"))
+    return contact_plan(sessions, at, satellites, relays)
 
 
 def planned(satellite="LEO 1", relay="GEO 1", start_s=10.0, locked_s=12.25, end_s=99.75, rate_bit_s=1.8e9, **more):
@@ -467,11 +393,6 @@ def test_the_csv_has_a_header_with_units_and_every_digit():
     assert [float(x) for x in first[5:]] == [10.0, 12.25, 99.75, 36e6, 42e6, 1e9 / 3.0, 1.5e11]
     assert second[5:8] == ["100.0", "101.0", "200.0"]
     assert not text.endswith("\n")
-
-
-def test_ranges_that_are_not_known_are_empty():
-    text = csv_text([planned(range_min_m=None, range_max_m=None)], utc)
-    assert next(iter(csv.DictReader(io.StringIO(text))))["largest range (m)"] == ""
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -512,7 +433,7 @@ def test_the_contact_plan_is_read_back():
         planned("A", "GEO", 10.0, 12.25, 99.75, 1.8e9 + 7.0),
         planned("B", "MOON RELAY", 300.0, 300.0, 400.0, 8e3, range_min_m=1e6, range_max_m=4.1e8),
     ]
-    text = contact_plan(sessions, utc)
+    text = plan_of(sessions)
     reference, contacts, ranges = read_plan(text)
     assert reference == NOON
     assert contacts == [(13, 99, 2, 3, 225_000_000), (101, 200, 1, 3, 100_000_000), (300, 400, 1, 4, 1000)]
@@ -524,88 +445,41 @@ def test_the_numbers_of_nodes_do_not_depend_on_who_is_served():
     own, partners = ("C", "A", "B"), ("GEO 2", "GEO 1")
     everyone = [
         planned(a, r, 100.0 * k + 10, 100.0 * k + 10, 100.0 * k + 90)
-        for k, (a, r) in enumerate([("A", "GEO 1"), ("B", "GEO 2"), ("X", "MOON"), ("C", "GEO 1")])
+        for k, (a, r) in enumerate([("A", "GEO 1"), ("B", "GEO 2"), ("C", "GEO 1")])
     ]
     numbers = {"C": 1, "A": 2, "B": 3, "GEO 2": 4, "GEO 1": 5}
-    for sessions in (everyone[:2], everyone[1:2], everyone[3:], everyone[::-1][:1] + everyone[:1], []):
+    for sessions in (everyone[:2], everyone[1:2], everyone[2:], everyone[::-1][:1] + everyone[:1], []):
         text = contact_plan(sessions, utc, satellites=own, relays=partners)
         named = re.findall(r'# node (\d+) is "(.+)"', text)
         assert named == [(str(number), name) for name, number in numbers.items()]
         found = [(one[2], one[3]) for one in read_plan(text)[1]]
         ordered = sorted(sessions, key=lambda s: s.start_s)
         assert found == [(numbers[s.satellite], numbers[s.relay]) for s in ordered]
-    text = contact_plan(everyone, utc, satellites=own, relays=partners)
-    assert '# node 5 is "GEO 1"\n# node 6 is "X"\n# node 7 is "MOON"\n@' in text
-    with pytest.raises(OperationsError, match="'GEO 1' is named as a satellite and as a relay; give it one role"):
-        contact_plan(everyone, utc, satellites=("GEO 1",))
-    with pytest.raises(OperationsError, match="'A' is named as a satellite and as a relay"):
-        contact_plan(everyone, utc, relays=("A",))
-    with pytest.raises(OperationsError, match="'Y' is named as a satellite and as a relay"):
-        contact_plan([], utc, satellites=("Y",), relays=("Y",))
 
 
 def test_an_epoch_within_a_second_is_kept():
-    _, contacts, _ = read_plan(contact_plan([planned(locked_s=12.25, end_s=99.25)], lambda t: utc(t + 0.8)))
+    _, contacts, _ = read_plan(plan_of([planned(locked_s=12.25, end_s=99.25)], lambda t: utc(t + 0.8)))
     assert contacts[0][:2] == (14, 100)  # 12.25 + 0.8 s up, 99.25 + 0.8 s down
-    assert read_plan(contact_plan([planned()], lambda t: utc(t + 0.8)))[0] == NOON
+    assert read_plan(plan_of([planned()], lambda t: utc(t + 0.8)))[0] == NOON
 
 
 def test_what_is_left_out_of_the_contact_plan_is_said():
     sessions = [planned(locked_s=12.2, end_s=12.9), planned(start_s=20.0, locked_s=20.0, end_s=40.0, rate_bit_s=7.0)]
-    text = contact_plan(sessions, utc)
+    text = plan_of(sessions)
     assert read_plan(text)[1:] == ([], [])
     assert "left out, no whole second with data: 1 2 from 12.200 s to 12.900 s" in text
     assert "left out, no whole byte a second: 1 2 from 20.000 s" in text
-    assert read_plan(contact_plan([], utc))[1:] == ([], [])
+    assert read_plan(plan_of([]))[1:] == ([], [])
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_no_name_breaks_a_line_of_the_contact_plan(name):
-    text = contact_plan([planned(satellite=name, relay=name + "!")], utc)
+    text = plan_of([planned(satellite=name, relay=name + "!")])
     assert text.isascii()
     assert len(read_plan(text)[1]) == 1
 
 
-@pytest.mark.parametrize(
-    ("change", "words"),
-    [
-        ({"satellite": ""}, "has no name"),
-        ({"relay": ""}, "has no name"),
-        ({"end_s": 5.0}, "not after its start"),
-        ({"start_s": math.nan}, "give finite times"),
-        ({"locked_s": 9.0}, "locks at 9 s"),
-        ({"locked_s": 100.0}, "locks at 100 s"),
-        ({"locked_s": math.nan}, "locks at nan s"),
-        ({"rate_bit_s": -1.0}, "data rate of the session of 'LEO 1' with 'GEO 1' is -1"),
-        ({"volume_bit": math.nan}, "volume of the session of 'LEO 1' with 'GEO 1' is nan"),
-        ({"range_min_m": None}, "one of its two ranges"),
-        ({"range_max_m": None}, "one of its two ranges"),
-        ({"range_min_m": 0.0}, "smallest range of the session of 'LEO 1' with 'GEO 1' is 0"),
-        ({"range_max_m": INF}, "largest range of the session of 'LEO 1' with 'GEO 1' is inf"),
-        ({"range_max_m": 1e6}, "more than the largest"),
-    ],
-)
-def test_a_planned_session_that_makes_no_sense_is_refused(change, words):
+def test_a_rate_that_ion_cannot_keep_is_refused():
+    words = r"the session of 'LEO 1' with 'GEO 1' has 4e\+10 bit/s; ION takes at most 3.43597e\+10 bit/s"
     with pytest.raises(OperationsError, match=words):
-        planned(**change)
-
-
-@pytest.mark.parametrize(
-    ("sessions", "words"),
-    [
-        ([planned(range_min_m=None, range_max_m=None)], "has no range"),
-        ([planned(start_s=-1.0)], "starts 1 s before the epoch"),
-        ([planned(rate_bit_s=4e10)], "4e\\+10 bit/s; ION takes at most"),
-        ([planned(), planned(start_s=99.0, locked_s=99.5)], "overlap: one starts at 99 s, the other ends at 99.75 s"),
-        ([planned(), planned("GEO 1", "X")], "'GEO 1' is named as a satellite and as a relay"),
-    ],
-)
-def test_sessions_that_are_no_contact_plan_are_refused(sessions, words):
-    with pytest.raises(OperationsError, match=words):
-        contact_plan(sessions, utc)
-
-
-@pytest.mark.parametrize("text", ["2026-03-20T12:00:00", "2026-03-20 12:00:00Z", "noon", "2026-03-20T12:00:00+00:00"])
-def test_an_epoch_that_is_not_utc_is_refused(text):
-    with pytest.raises(OperationsError, match="the epoch reads"):
-        contact_plan([planned()], lambda _: text)
+        plan_of([planned(rate_bit_s=4e10)])

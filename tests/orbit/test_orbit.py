@@ -20,7 +20,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from microrad.core.units import SPEED_OF_LIGHT_M_S
-from microrad.orbit import analytic, earth, ground, sun
+from microrad.orbit import analytic, earth, sun
 from microrad.orbit.base import OrbitError
 from microrad.orbit.epoch import Epoch
 
@@ -120,7 +120,6 @@ def test_elapsed_seconds_and_julian_dates_are_those_of_astropy(one, other):
     whole, fraction = first.julian_date
     assert whole % 1.0 == 0.5
     assert ((whole - a.jd1) + (fraction - a.jd2)) * DAY_S == pytest.approx(0.0, abs=1.0)  # ERFA stretches leap days
-    assert Epoch.from_julian_date(whole, fraction).seconds_to(first) == pytest.approx(0.0, abs=2e-9)
     written = Epoch(first.utc(first.seconds_to(second)))
     assert written.seconds_to(second) == pytest.approx(0.0, abs=5.01e-4)  # half a millisecond
 
@@ -136,13 +135,6 @@ def test_seconds_through_a_leap_second_are_counted_and_written():
     inside = Epoch("2016-12-31T23:59:60.5Z")
     assert inside.utc(0.5) == "2017-01-01T00:00:00.000Z"
     assert inside.utc(0.0) == "2016-12-31T23:59:60.500Z"
-
-
-def test_a_julian_date_outside_the_tables_is_refused():
-    with pytest.raises(OrbitError, match=r"Julian date 2400000\.5 is outside"):
-        Epoch.from_julian_date(2400000.5)
-    with pytest.raises(OrbitError, match="is not a number"):
-        Epoch.from_julian_date(math.nan)
 
 
 @pytest.mark.parametrize("time_s", [math.nan, math.inf])
@@ -199,7 +191,7 @@ def test_the_angle_is_the_same_seen_from_an_instant_decades_before():
 
 def test_the_tables_of_time_are_read_only_when_an_instant_needs_them():
     code = (
-        "import sys; from microrad.orbit import analytic, ground, sun; from microrad.orbit.epoch import Epoch;"
+        "import sys; from microrad.orbit import analytic, sun; from microrad.orbit.epoch import Epoch;"
         "Epoch('2026-03-20T12:00:00Z'); assert 'skyfield' not in sys.modules and 'sgp4' not in sys.modules"
     )
     subprocess.run([sys.executable, "-c", code], check=True)
@@ -482,7 +474,6 @@ def test_two_bodies_move_as_integration_says(name):
     assert np.max(length(states.position_m - position)) < 0.05
     assert np.max(length(states.velocity_m_s - velocity)) < one_millimetre
     assert length(states.position_m[:, 0]) >= orbit.semi_major_axis_m * (1.0 - orbit.eccentricity) * (1.0 - 1e-12)
-    assert orbit.period_s == pytest.approx(2.0 * math.pi / orbit.mean_motion_rad_s)
 
 
 def elements(r, v):
@@ -694,9 +685,7 @@ STATIONS = [
 
 
 def station(latitude_deg, longitude_deg, height_m, mask_deg=5.0):
-    return ground.Station(
-        "G", math.radians(latitude_deg), math.radians(longitude_deg), height_m, math.radians(mask_deg)
-    )
+    return earth.Station("G", math.radians(latitude_deg), math.radians(longitude_deg), height_m, math.radians(mask_deg))
 
 
 @pytest.mark.parametrize("site", STATIONS)
@@ -727,7 +716,7 @@ def test_elevation_is_that_of_skyfield(site):
     inertial = np.einsum("jin,jn->in", TEME.rotation_at(moment), position_m / 1000.0 / 149_597_870.7)
     place = wgs84.latlon(site[0], site[1], elevation_m=site[2])
     wanted, _, _ = (Geocentric(inertial, t=moment, center=399) - place.at(moment)).altaz()
-    found = ground.elevation_rad(station(*site), START, time_s, position_m)
+    found = earth.elevation_rad(station(*site), START, time_s, position_m)
     np.testing.assert_allclose(found, wanted.radians, rtol=0.0, atol=1e-9)
     assert found.min() < -0.5
 
@@ -738,9 +727,9 @@ def test_overhead_is_ninety_degrees_and_the_horizon_nought():
     up = g.vertical(START, time_s)
     r = g.position(START, time_s).position_m
     np.testing.assert_allclose(length(up), 1.0, rtol=1e-15)
-    np.testing.assert_allclose(ground.elevation_rad(g, START, time_s, r + 5e5 * up), math.pi / 2, rtol=0.0, atol=1e-7)
+    np.testing.assert_allclose(earth.elevation_rad(g, START, time_s, r + 5e5 * up), math.pi / 2, rtol=0.0, atol=1e-7)
     east = np.cross(np.array([[0.0], [0.0], [1.0]]), up, axis=0)
-    np.testing.assert_allclose(ground.elevation_rad(g, START, time_s, r + 1e6 * east), 0.0, rtol=0.0, atol=1e-14)
+    np.testing.assert_allclose(earth.elevation_rad(g, START, time_s, r + 1e6 * east), 0.0, rtol=0.0, atol=1e-14)
 
 
 @pytest.mark.parametrize(

@@ -20,13 +20,11 @@ from skyfield.api import EarthSatellite, load
 from skyfield.framelib import ICRS_to_J2000, itrs, true_equator_and_equinox_of_date
 from skyfield.sgp4lib import TEME
 
-from microrad.orbit import frames, messages, oem, omm
 from microrad.orbit.base import OrbitError, States
-from microrad.orbit.element_files import read_elements
-from microrad.orbit.elements import closest_elements, sgp4_orbit
 from microrad.orbit.epoch import Epoch
-from microrad.orbit.oem import read_oem
-from microrad.orbit.tle import checksum
+from microrad.orbit.files import frames, messages, oem, read_elements, read_oem
+from microrad.orbit.files.elements import _EXPECTED, checksum
+from microrad.orbit.mean_elements import closest_elements, sgp4_orbit
 
 EPOCH = Epoch("2026-03-20T12:00:00Z")
 SCALE = load.timescale(builtin=True)
@@ -310,7 +308,7 @@ def test_what_is_no_file_of_text_is_refused_with_its_own_reason(tmp_path, monkey
     def locked(*_):
         raise PermissionError(13, "Permission denied")
 
-    monkeypatch.setattr("microrad.orbit.messages.read_bytes", locked)  # permissions do not stop every user
+    monkeypatch.setattr("microrad.orbit.files.messages.read_bytes", locked)  # permissions do not stop every user
     refused(tmp_path, NAMED, "cannot be read (Permission denied); check the permissions of the file and of its folders")
 
 
@@ -424,7 +422,7 @@ def xml(fields):
 def comma(fields):
     """As the public catalogues write it, without the metadata."""
     out = io.StringIO()
-    kept = {key: value for key, value in fields.items() if key not in omm._EXPECTED}
+    kept = {key: value for key, value in fields.items() if key not in _EXPECTED}
     writer = csv.DictWriter(out, kept)
     writer.writeheader()
     writer.writerow(kept)

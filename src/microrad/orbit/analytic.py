@@ -14,8 +14,9 @@ LOWEST_PERIGEE_M = 120e3
 TROPICAL_YEAR_S = 365.24219 * DAY_S
 """Time in which the mean Sun goes once round the equator from equinox to equinox."""
 
-_NEWTON_STEP_RAD = 1e-14
-_NEWTON_ROUNDS = 100
+_ELEMENTS = (
+    "semi_major_axis_m", "eccentricity", "inclination_rad", "node_rad", "argument_of_perigee_rad", "mean_anomaly_rad",
+)  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,17 +42,20 @@ class KeplerOrbit:
     j2: bool
 
     def __post_init__(self) -> None:
-        """Refuse what is no orbit."""
-        for what in ("semi_major_axis_m", "eccentricity", "inclination_rad", "node_rad"):
-            self._require_number(what)
-        self._require_number("argument_of_perigee_rad")
-        self._require_number("mean_anomaly_rad")
+        """Check the elements."""
+        for what in _ELEMENTS:
+            if not math.isfinite(value := getattr(self, what)):
+                raise OrbitError(f"orbit {self.name}: {what} is {value}, not a number; give it a finite value")
         if not 0.0 <= self.eccentricity < 1.0:
             raise OrbitError(
                 f"orbit {self.name}: the eccentricity {self.eccentricity:.6g} is not from 0 to below 1, so the orbit "
                 "is not closed; check the elements"
             )
-        _require_inclination(self.name, self.inclination_rad)
+        if not 0.0 <= self.inclination_rad <= math.pi:
+            raise OrbitError(
+                f"orbit {self.name}: the inclination of {math.degrees(self.inclination_rad):.6g} deg is not from 0 to "
+                "180 deg; an orbit against the rotation of the Earth has more than 90 deg"
+            )
         height_m = self.semi_major_axis_m * (1.0 - self.eccentricity) - EARTH_RADIUS_M
         if height_m < LOWEST_PERIGEE_M:
             raise OrbitError(
@@ -64,11 +68,6 @@ class KeplerOrbit:
     def mean_motion_rad_s(self) -> float:
         """Mean motion of the two-body orbit, sqrt(mu / a^3)."""
         return math.sqrt(MU_M3_S2 / self.semi_major_axis_m**3)
-
-    @property
-    def period_s(self) -> float:
-        """Time of one turn of the two-body orbit."""
-        return 2.0 * math.pi / self.mean_motion_rad_s
 
     def secular_rates_rad_s(self) -> tuple[float, float, float]:
         """Rates of node, argument of perigee and mean anomaly (its mean motion included).
@@ -90,7 +89,9 @@ class KeplerOrbit:
 
         Raises `OrbitError` for a time that is not a number.
         """
-        time = _finite(self.name, time_s)
+        time = np.asarray(time_s, dtype=np.float64)
+        if not np.all(np.isfinite(time)):
+            raise OrbitError(f"orbit {self.name}: a time is not a finite number of seconds; check the span")
         node_rate, perigee_rate, anomaly_rate = self.secular_rates_rad_s()
         anomaly = self.mean_anomaly_rad + anomaly_rate * time
         (x, y), (vx, vy) = self._in_plane(anomaly, anomaly_rate)
@@ -111,12 +112,6 @@ class KeplerOrbit:
         turn = rate / (1.0 - self.eccentricity * cosine)
         return (major * (cosine - self.eccentricity), minor * sine), (-major * sine * turn, minor * cosine * turn)
 
-    def _require_number(self, what: str) -> None:
-        """Refuse an element that is not finite."""
-        value = getattr(self, what)
-        if not math.isfinite(value):
-            raise OrbitError(f"orbit {self.name}: {what} is {value}, not a number; give it a finite value")
-
 
 def eccentric_anomaly_rad(mean_anomaly_rad: Floats, eccentricity: float) -> Floats:
     """Eccentric anomaly E that solves Kepler's equation E - e sin E = M, for any M and 0 <= e < 1.
@@ -130,13 +125,12 @@ def eccentric_anomaly_rad(mean_anomaly_rad: Floats, eccentricity: float) -> Floa
     signed = mean_anomaly_rad - turns
     mean = np.abs(signed)
     guess = np.minimum(np.minimum(mean + eccentricity, mean / (1.0 - eccentricity)), np.pi)
-    for _ in range(_NEWTON_ROUNDS):
+    for _ in range(100):
         step = (guess - eccentricity * np.sin(guess) - mean) / (1.0 - eccentricity * np.cos(guess))
         guess = guess - step
-        if np.max(np.abs(step), initial=0.0) <= _NEWTON_STEP_RAD:
+        if np.max(np.abs(step), initial=0.0) <= 1e-14:
             break
-    solved: Floats = turns + np.copysign(guess, signed)
-    return solved
+    return turns + np.copysign(guess, signed)
 
 
 def circular(
@@ -194,7 +188,7 @@ class GeostationarySlot:
     longitude_rad: float
 
     def __post_init__(self) -> None:
-        """Refuse what is no longitude."""
+        """Check the longitude."""
         if not abs(self.longitude_rad) <= 2.0 * math.pi:
             raise OrbitError(
                 f"slot {self.name}: its longitude of {math.degrees(self.longitude_rad):.6g} deg is not from -360 to "
@@ -219,20 +213,3 @@ def _turned(
     if not rate:
         return new_x, new_y, new_vx, new_vy
     return new_x, new_y, new_vx - rate * new_y, new_vy + rate * new_x
-
-
-def _finite(name: str, time_s: Floats) -> Floats:
-    """The times, refused where one is not a number."""
-    time = np.asarray(time_s, dtype=np.float64)
-    if not np.all(np.isfinite(time)):
-        raise OrbitError(f"orbit {name}: a time is not a finite number of seconds; check the span")
-    return time
-
-
-def _require_inclination(name: str, inclination_rad: float) -> None:
-    """Refuse an inclination that is none."""
-    if not 0.0 <= inclination_rad <= math.pi:
-        raise OrbitError(
-            f"orbit {name}: the inclination of {math.degrees(inclination_rad):.6g} deg is not from 0 to 180 deg; an "
-            "orbit against the rotation of the Earth has more than 90 deg"
-        )

@@ -1,4 +1,4 @@
-"""What every orbit gives, and the refusal shared by the package.
+"""What every orbit gives, and the refusals of the room.
 
 The inertial frame is TEME (true equator, mean equinox of date), the frame of SGP4. The frame fixed in the Earth is TEME
 turned about z by Greenwich mean sidereal time (IAU 1982) at UT1; polar motion (at most 0.6 arcsec) is neglected.
@@ -15,6 +15,10 @@ Floats = NDArray[np.float64]
 
 class OrbitError(ValueError):
     """An orbit, an instant or a place that is refused: what it is, why, and what to do."""
+
+
+class OperationsError(ValueError):
+    """A table, a rate or a plan of the day that is refused: which value it is, and what to give."""
 
 
 class States(NamedTuple):

@@ -5,16 +5,17 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from microrad import orbit
 from microrad.mission.file import LinkFile
 from microrad.mission.model import LinkMission
 from microrad.mission.tables.operations import Constellation
 from microrad.orbit import operations
+from microrad.orbit.base import Floats
+from microrad.orbit.contacts import Sampled, coarse_step_s, contacts_with_each
 from microrad.orbit.day.flow import PointingLoss, closings, rate_table
+from microrad.orbit.from_mission import orbits_table
 
-Floats = NDArray[np.float64]
 Progress = Callable[[int, int, str], None]
 Span = tuple[float, float]
 
@@ -73,17 +74,18 @@ def opportunities(
     `orbit.contacts`.
     """
     rows: list[tuple[int, int, float, float]] = []
-    sampled: dict[float, list[orbit.Sampled]] = {}
+    sampled: dict[float, list[Sampled]] = {}
     for place, satellite in enumerate(satellites):
-        step = orbit.coarse_step_s(satellite.orbit, span_s[0])
+        step = coarse_step_s(satellite.orbit, span_s[0])
         if step not in sampled:
-            sampled[step] = [orbit.Sampled.over(relay.orbit, span_s, step) for relay in relays]
-        each = orbit.contacts_with_each(satellite, relays, earth, epoch, span_s, sampled[step], furthest_m)
+            sampled[step] = [Sampled.over(relay.orbit, span_s, step) for relay in relays]
+        each = contacts_with_each(satellite, relays, earth, epoch, span_s, sampled[step], furthest_m)
         rows += [(place, which, c.start_s, c.end_s) for which, found in enumerate(each) for c in found]
         on_progress(place + 1)
     table = np.array(rows, dtype=np.float64).reshape(-1, 4)
     order = np.lexsort((table[:, 1], table[:, 0], table[:, 2]))
-    return operations.Opportunities(*(table[order, column] for column in range(4)))
+    who, when = table[order, :2].astype(np.int64), table[order, 2:]
+    return operations.Opportunities(who[:, 0], who[:, 1], when[:, 0], when[:, 1])
 
 
 def run(
@@ -92,14 +94,21 @@ def run(
     """The constellation of a mission: contacts, sessions by the rule of `operations.schedule`, and their volumes.
 
     A session takes place where the link closes at the lowest of its rates at least; its rate is the highest that closes
-    at its largest range. Volumes leave out the share of time in outage. Raises `operations.OperationsError` without the
-    tables `constellation` and `operations`, and `orbit.OrbitError` for orbits that do not hold.
+    at its largest range. Volumes leave out the share of time in outage.
+
+    Args:
+        file: the mission, with the files that it names.
+        loss: what pointing costs the laser link.
+        on_progress: told how many of how many satellites are searched.
+
+    Raises `operations.OperationsError` without the tables `constellation` and `operations`, and `orbit.OrbitError` for
+    orbits that do not hold.
     """
     m, folder, contents = file.mission, file.path.parent, file.contents
     c, rates = table(m), rate_table(closings(m, loss))
-    pair = orbit.pair(m, folder, contents)
-    own = tuple(orbit.satellites(c, m, pair.epoch, folder, contents))
-    relays = orbit.relays(c, m, pair.epoch)
+    orbits, pair = orbits_table(m), orbit.pair(m, folder, contents)
+    own = tuple(orbit.satellites(c, orbits, pair.epoch, folder, contents))
+    relays = orbit.relays(c, orbits, pair.epoch)
     furthest = 0.0 if rates is None else rates.steps[-1].largest_range_m
     found = opportunities(
         own,

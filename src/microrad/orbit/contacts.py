@@ -1,16 +1,26 @@
 """When two terminals can see each other, and a ground station a satellite; and what begins and ends each contact."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
+from microrad.core.units import format_quantity
 from microrad.orbit.base import Floats, Orbit, OrbitError, States
-from microrad.orbit.earth import MU_M3_S2, Earth
+from microrad.orbit.earth import (
+    EARTH_RADIUS_M,
+    GEOSTATIONARY_RADIUS_M,
+    MU_M3_S2,
+    ROTATION_RAD_S,
+    Earth,
+    Station,
+    elevation_rad,
+)
 from microrad.orbit.epoch import Epoch
 from microrad.orbit.events import Intervals, Rows, intersection, largest, positive, positive_rows
-from microrad.orbit.ground import Station, elevation_rad
 from microrad.orbit.limits import Condition, Side, Terminal, conditions
 from microrad.orbit.line_of_sight import dot
 
@@ -116,8 +126,15 @@ def contacts(first: Terminal, second: Terminal, earth: Earth, epoch: Epoch, span
     The same to the last bit when the two are swapped. Light time (0.15 s over 44 000 km) is left out; the ends may move
     by as much.
 
-    Raises `OrbitError` for two terminals of one name, a span that is none, two orbits that meet, a terminal below the
-    surface that the line of sight must clear, and what the orbits raise.
+    Args:
+        first: a terminal on its orbit.
+        second: the other one, of another name.
+        earth: what hides one from the other.
+        epoch: from which all times count.
+        span_s: start and end of the search, s.
+
+    Raises `OrbitError` for two terminals of one name, a span that holds no time, two orbits that meet, a terminal below
+    the surface that the line of sight must clear, and what the orbits raise.
     """
     return contacts_with_each(first, (second,), earth, epoch, span_s)[0]
 
@@ -133,119 +150,109 @@ def contacts_with_each(
 ) -> tuple[tuple[Contact, ...], ...]:
     """`contacts` of a satellite with each of the relays, solved together, up to a range of `furthest_m`.
 
-    `sampled`, one for each relay, saves to compute their states anew for every satellite:
-    ``Sampled.over(relay.orbit, span_s, coarse_step_s(satellite.orbit, span_s[0]))``; samples in another step are left
-    aside. Limits that are not set cost nothing.
+    Limits that are not set cost nothing.
+
+    Args:
+        satellite: one terminal on its orbit.
+        relays: the others, none of them of the satellite's name.
+        earth: what hides one from the other.
+        epoch: from which all times count.
+        span_s: start and end of the search, s.
+        sampled: states of each relay, which several satellites may share:
+            ``Sampled.over(relay.orbit, span_s, coarse_step_s(satellite.orbit, span_s[0]))``. Those in another step are
+            left aside.
+        furthest_m: largest range of a contact, m; infinite without a limit.
 
     Raises `OrbitError` as `contacts`.
     """
-    _check_names(satellite, relays)
+    for relay in relays:
+        if relay.name == satellite.name:
+            raise OrbitError(f'two terminals are called "{relay.name}"; give each a name of its own')
     own = coarse_step_s(satellite.orbit, span_s[0])
     others = tuple(sampled) or tuple(Sampled.over(relay.orbit, span_s, own) for relay in relays)
     time_s = coarse_times(span_s, min(own, *(other.step_s for other in others), math.inf))
-    clear = _clear_of_earth((satellite, *relays), others, earth, time_s)
-    near = _in_reach(satellite.orbit, others, furthest_m, time_s)
+    if not relays:
+        return ()
+    both = partial(_when, satellite.orbit, others, time_s)
+    shared = [(EARTH, both(partial(_clearance_rad, (satellite, *relays), earth)))]
+    if furthest_m < math.inf:
+        shared.append((RANGE, both(partial(_spare, furthest_m))))
     found = []
     for place, relay in enumerate(relays):
-        kept = [(EARTH, clear[place]), *((RANGE, each[place]) for each in near)]
+        kept = [(cause, intervals[place]) for cause, intervals in shared]
         for one, other in ((satellite, relay), (relay, satellite)):
             kept.extend(conditions(Side(one, other, earth, epoch), time_s))
         found.append(_combined(kept, span_s))
     return tuple(found)
 
 
-def _check_names(satellite: Terminal, relays: Sequence[Terminal]) -> None:
-    for relay in relays:
-        if relay.name == satellite.name:
-            raise OrbitError(f'two terminals are called "{relay.name}"; give each a name of its own')
+def _clearance_rad(
+    terminals: Sequence[Terminal], earth: Earth, time_s: Floats, row: Rows, first_m: Floats, second_m: Floats
+) -> Floats:
+    """By how much the line from the first terminal to that of each row clears the Earth; raises `OrbitError`."""
+    try:
+        return earth.clearance_rad(first_m, second_m)
+    except OrbitError:
+        heights = np.stack((earth.height_m(first_m), earth.height_m(second_m)))
+        which, worst = np.unravel_index(np.argmin(heights), heights.shape)  # argmin finds nan first
+        name = terminals[0 if which == 0 else row[worst] + 1].name
+        height_m, when_s = float(heights[which, worst]), float(time_s[worst])
+        if math.isnan(height_m):
+            raise OrbitError(f"the position of {name} at {when_s:.9g} s is not a number; check its orbit") from None
+        raise OrbitError(
+            f"{name} is {height_m / 1e3:.3f} km over the Earth at {when_s:.9g} s, not above the "
+            f"{earth.grazing_height_m / 1e3:.6g} km that lines of sight must clear; lower orbit.grazing_height, or "
+            "raise the orbit"
+        ) from None
 
 
-def _clear_of_earth(
-    terminals: Sequence[Terminal], others: Sequence[Sampled], earth: Earth, time_s: Floats
+def _spare(furthest_m: float, _time_s: Floats, _row: Rows, first_m: Floats, second_m: Floats) -> Floats:
+    """One less the square of the range in units of the largest."""
+    apart = second_m - first_m
+    return np.asarray(1.0 - dot(apart, apart) / furthest_m**2)
+
+
+def _when(
+    orbit: Orbit, others: Sequence[Sampled], time_s: Floats, function: Callable[[Floats, Rows, Floats, Floats], Floats]
 ) -> tuple[Intervals, ...]:
-    """When the Earth is not in the way from the first of the terminals to each of the others."""
-    if not others:
-        return ()
-    orbit = terminals[0].orbit
+    """When a function of time, row, and the places of an orbit and of that row's other is positive: for each row."""
 
-    def checked(time: Floats, row: Rows, first: Floats, second: Floats) -> Floats:
-        try:
-            return earth.clearance_rad(first, second)
-        except OrbitError:
-            heights = np.stack((earth.height_m(first), earth.height_m(second)))
-            which, worst = np.unravel_index(np.argmin(heights), heights.shape)  # argmin finds nan first
-            low = terminals[0 if which == 0 else row[worst] + 1]
-            raise _too_low(low.name, float(time[worst]), float(heights[which, worst]), earth) from None
+    def along(time: Floats, row: Rows) -> Floats:
+        second = np.empty((3, time.size))
+        for index in np.unique(row):
+            chosen = row == index
+            second[:, chosen] = others[index].orbit.states(time[chosen]).position_m
+        return function(time, row, orbit.states(time).position_m, second)
 
-    def clearance(time: Floats, row: Rows) -> Floats:
-        return checked(time, row, *_places(orbit, others, time, row))
-
-    first = orbit.states(time_s).position_m
-    values = np.empty((len(others), time_s.size))
+    first, values = orbit.states(time_s).position_m, np.empty((len(others), time_s.size))
     for index, other in enumerate(others):
-        values[index] = checked(time_s, np.full(time_s.size, index), first, other.at(time_s).position_m)
-    return positive_rows(clearance, time_s, values)
-
-
-def _places(orbit: Orbit, others: Sequence[Sampled], time: Floats, row: Rows) -> tuple[Floats, Floats]:
-    """Where an orbit is at each time, and where the other of that row is."""
-    first = orbit.states(time).position_m
-    second = np.empty_like(first)
-    for index in np.unique(row):
-        chosen = row == index
-        second[:, chosen] = others[index].orbit.states(time[chosen]).position_m
-    return first, second
-
-
-def _in_reach(
-    orbit: Orbit, others: Sequence[Sampled], furthest_m: float, time_s: Floats
-) -> tuple[tuple[Intervals, ...], ...]:
-    """When each of the others is nearer than the limit: one set of intervals for each, or none without a limit."""
-    if furthest_m == math.inf or not others:
-        return ()
-
-    def spare(first: Floats, second: Floats) -> Floats:
-        apart = second - first
-        return np.asarray(1.0 - dot(apart, apart) / furthest_m**2)
-
-    first = orbit.states(time_s).position_m
-    values = np.stack([spare(first, other.at(time_s).position_m) for other in others])
-    return (positive_rows(lambda time, row: spare(*_places(orbit, others, time, row)), time_s, values),)
-
-
-def _too_low(name: str, time_s: float, height_m: float, earth: Earth) -> OrbitError:
-    if math.isnan(height_m):
-        return OrbitError(f"the position of {name} at {time_s:.9g} s is not a number; check its orbit")
-    return OrbitError(
-        f"{name} is {height_m / 1e3:.3f} km over the Earth at {time_s:.9g} s, not above the "
-        f"{earth.grazing_height_m / 1e3:.6g} km that lines of sight must clear; lower orbit.grazing_height, or raise "
-        "the orbit"
-    )
+        values[index] = function(time_s, np.full(time_s.size, index), first, other.at(time_s).position_m)
+    return positive_rows(along, time_s, values)
 
 
 def _combined(kept: Sequence[Condition], span_s: Span) -> tuple[Contact, ...]:
     """The contacts in which all conditions hold."""
-    both = intersection(*(intervals for _, intervals in kept))
-    return tuple(
-        Contact(
-            float(start),
-            float(end),
-            START if start == span_s[0] else _causes(kept, start, 0),
-            END if end == span_s[1] else _causes(kept, end, 1),
-        )
-        for start, end in both
-    )
 
+    def cause(time_s: float, edge: int) -> str:
+        if time_s == span_s[edge]:
+            return (START, END)[edge]
+        return " and ".join(sorted(each for each, intervals in kept if np.any(intervals[:, edge] == time_s)))
 
-def _causes(kept: Sequence[Condition], time_s: float, edge: int) -> str:
-    return " and ".join(sorted(cause for cause, intervals in kept if np.any(intervals[:, edge] == time_s)))
+    both = intersection(*(intervals for _, intervals in kept)).tolist()
+    return tuple(Contact(start, end, cause(start, 0), cause(end, 1)) for start, end in both)
 
 
 # --------------------------------------------------------------------------------------------------------------- passes
 def passes(orbit: Orbit, station: Station, epoch: Epoch, span_s: Span) -> tuple[Pass, ...]:
     """The passes of a satellite over a ground station in the span: its elevation, geometric, is above the mask.
 
-    Raises `OrbitError` for a span that is none, and what the orbit raises.
+    Args:
+        orbit: of the satellite.
+        station: place and elevation mask.
+        epoch: from which all times count.
+        span_s: start and end of the search, s.
+
+    Raises `OrbitError` for a span that holds no time, and what the orbit raises.
     """
     step = coarse_step_s(orbit, span_s[0])
     time_s = coarse_times(span_s, step)
@@ -255,14 +262,49 @@ def passes(orbit: Orbit, station: Station, epoch: Epoch, span_s: Span) -> tuple[
         return elevation_rad(station, epoch, time, orbit.states(time).position_m)
 
     windows = positive(lambda time: elevation(time) - station.mask_rad, time_s)
-    return tuple(
-        Pass(
-            float(start),
-            float(end),
-            START if start == span_s[0] else mask,
-            END if end == span_s[1] else mask,
-            float(highest),
-            float(when),
+    found = []
+    for (start, end), when, highest in zip(windows.tolist(), *largest(elevation, windows, step), strict=True):
+        begins, ends = START if start == span_s[0] else mask, END if end == span_s[1] else mask
+        found.append(Pass(start, end, begins, ends, float(highest), float(when)))
+    return tuple(found)
+
+
+# -------------------------------------------------------------------------------------------------------------- by hand
+class CoplanarContact(NamedTuple):
+    """One contact, the time from the start of one to the start of the next, and the ranges while in contact."""
+
+    duration_s: float
+    repeat_s: float
+    shortest_range_m: float
+    longest_range_m: float
+
+    @property
+    def visible_share(self) -> float:
+        """Share of the time in contact."""
+        return self.duration_s / self.repeat_s
+
+
+def coplanar_contact(radius_m: float, grazing_height_m: float) -> CoplanarContact:
+    """A satellite on a circular orbit over the equator, eastward, and one fixed in the rotating Earth.
+
+    `radius_m` is the radius of the lower orbit a, R = `EARTH_RADIUS_M` + `grazing_height_m` what the line of sight must
+    clear, b = `GEOSTATIONARY_RADIUS_M`. The angle between the two as seen from the Earth's centre is at most
+    acos(R/a) + acos(R/b) either way and grows by the difference of the two rates, n - w: the contact takes
+
+        T (acos(R/a) + acos(R/b)) / pi,   T = 2 pi / (n - w),   n = sqrt(mu / a^3),
+
+    the range goes from b - a to sqrt(a^2 - R^2) + sqrt(b^2 - R^2), where the line grazes the surface. Two bodies, no
+    flattening: on the equator the oblate Earth hides what the sphere hides.
+
+    Raises `OrbitError` unless R < a < b.
+    """
+    high, least = GEOSTATIONARY_RADIUS_M, EARTH_RADIUS_M + grazing_height_m
+    if not (math.isfinite(radius_m) and 0.0 < least < radius_m < high):
+        raise OrbitError(
+            f"an orbit of radius {format_quantity(radius_m, 'm')} is not between the surface to clear, "
+            f"{format_quantity(least, 'm')}, and the geostationary {format_quantity(high, 'm')}; give a radius between"
         )
-        for (start, end), when, highest in zip(windows, *largest(elevation, windows, step), strict=True)
-    )
+    half = math.acos(least / radius_m) + math.acos(least / high)
+    repeat = 2.0 * math.pi / (math.sqrt(MU_M3_S2 / radius_m**3) - ROTATION_RAD_S)
+    longest = math.sqrt(radius_m**2 - least**2) + math.sqrt(high**2 - least**2)
+    return CoplanarContact(repeat * half / math.pi, repeat, high - radius_m, longest)

@@ -1,4 +1,4 @@
-"""The Earth: its figure (WGS84), its gravity, and what stands in the way of a line of sight."""
+"""The Earth: its figure (WGS84), its gravity, what stands in the way of a line of sight, and stations on the ground."""
 
 import math
 from dataclasses import dataclass
@@ -6,7 +6,8 @@ from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 
-from microrad.orbit.base import Floats, OrbitError
+from microrad.orbit.base import Floats, OrbitError, States
+from microrad.orbit.epoch import Epoch
 
 EARTH_RADIUS_M = 6378137.0
 """Equatorial radius (WGS84)."""
@@ -59,7 +60,7 @@ class Earth:
     grazing_height_m: float
 
     def __post_init__(self) -> None:
-        """Refuse what is no surface."""
+        """Check shape and height."""
         semi_axes_m(self.shape)
         if not 0.0 <= self.grazing_height_m <= 1e6:
             raise OrbitError(
@@ -71,7 +72,7 @@ class Earth:
         """Height of positions of shape (3, n) over the figure itself: geodetic over the oblate Earth."""
         if self.shape == "oblate":
             return subpoint(position_m, np.zeros(())).height_m
-        return np.asarray(np.sqrt(_square(np.asarray(position_m, dtype=np.float64))) - EARTH_RADIUS_M)
+        return np.sqrt(_square(np.asarray(position_m, dtype=np.float64))) - EARTH_RADIUS_M
 
     def clearance_rad(self, first_m: Floats, second_m: Floats) -> Floats:
         """Angle by which the line of sight between two terminals clears the surface: above 0 it is free.
@@ -91,11 +92,10 @@ class Earth:
         # products and sums written out: a library's dot product may round differently when the two are swapped
         dot = (first[0] * second[0] + first[1] * second[1]) + first[2] * second[2]
         horizons = _horizon_rad(first) + _horizon_rad(second)
-        clearance: Floats = horizons - np.arctan2(cross, dot)
-        return clearance
+        return np.asarray(horizons - np.arctan2(cross, dot))
 
     def _scaled(self, position_m: Floats, which: str) -> Floats:
-        """The position in units of the raised semi-axes, refused below the surface."""
+        """The position in units of the raised semi-axes; raises `OrbitError` below the surface."""
         scaled = to_unit_sphere(position_m, *semi_axes_m(self.shape, self.grazing_height_m))
         square = np.atleast_1d(_square(scaled))
         worst = int(np.argmin(square)) if square.size else 0
@@ -117,8 +117,7 @@ def to_unit_sphere(position_m: Floats, equatorial_m: float, polar_m: float) -> F
 
 def _square(vector: Floats) -> Floats:
     """Square of the length of each vector."""
-    square: Floats = (vector[0] * vector[0] + vector[1] * vector[1]) + vector[2] * vector[2]
-    return square
+    return np.asarray((vector[0] * vector[0] + vector[1] * vector[1]) + vector[2] * vector[2])
 
 
 def _horizon_rad(scaled: Floats) -> Floats:
@@ -140,8 +139,7 @@ def gravity(position_m: Floats, j2: bool) -> Floats:
     sine_square = position[2] * position[2] / square
     equatorial = 1.0 + oblate * (1.0 - 5.0 * sine_square)
     factor = np.stack((equatorial, equatorial, equatorial + 2.0 * oblate))
-    acceleration: Floats = central * factor * position
-    return acceleration
+    return np.asarray(central * factor * position)
 
 
 def subpoint(position_m: Floats, rotation_rad: Floats) -> Subpoint:
@@ -166,3 +164,68 @@ def subpoint(position_m: Floats, rotation_rad: Floats) -> Subpoint:
     sine = np.sin(latitude)
     height = radius * np.cos(latitude) + z * sine - EARTH_RADIUS_M * np.sqrt(1.0 - square * sine * sine)
     return Subpoint(latitude, np.where(longitude >= math.pi, -math.pi, longitude), height)
+
+
+# --------------------------------------------------------------------------------------------------------------- ground
+@dataclass(frozen=True, slots=True)
+class Station:
+    """A place fixed to the Earth: geodetic latitude (north positive), longitude (east positive), height (WGS84).
+
+    `mask_rad` is the elevation below which nothing is received. Raises `OrbitError` for a latitude beyond the poles, a
+    longitude beyond a full turn, a height outside -1 to 50 km, a mask outside [0, 90) deg.
+    """
+
+    name: str
+    latitude_rad: float
+    longitude_rad: float
+    height_m: float
+    mask_rad: float
+
+    def __post_init__(self) -> None:
+        """Check the place."""
+        for what, angle_rad, holds, wanted in (
+            ("latitude", self.latitude_rad, abs(self.latitude_rad) <= math.pi / 2, "from -90 to 90 deg"),
+            ("longitude", self.longitude_rad, abs(self.longitude_rad) <= 2 * math.pi, "from -360 to 360 deg"),
+            ("elevation mask", self.mask_rad, 0.0 <= self.mask_rad < math.pi / 2, "from 0 to below 90 deg"),
+        ):
+            if not holds:
+                raise OrbitError(
+                    f"station {self.name}: its {what} of {math.degrees(angle_rad):.6g} deg is not {wanted}; check its "
+                    "sign and its unit"
+                )
+        if not -1e3 <= self.height_m <= 5e4:
+            raise OrbitError(
+                f"station {self.name}: its height of {self.height_m:.6g} m is not from -1 to 50 km; give the height "
+                "over the ellipsoid in metres"
+            )
+
+    def position(self, epoch: Epoch, time_s: Floats) -> States:
+        """Position and velocity of the station in TEME, `time_s` after `epoch`; it turns with the Earth."""
+        square = FLATTENING * (2.0 - FLATTENING)
+        sine = math.sin(self.latitude_rad)
+        normal = EARTH_RADIUS_M / math.sqrt(1.0 - square * sine * sine)
+        across = (normal + self.height_m) * math.cos(self.latitude_rad)
+        z = (normal * (1.0 - square) + self.height_m) * sine
+        angle = epoch.earth_rotation_rad(time_s) + self.longitude_rad
+        x, y = across * np.cos(angle), across * np.sin(angle)
+        velocity = np.stack((-ROTATION_RAD_S * y, ROTATION_RAD_S * x, np.zeros_like(x)))
+        return States(np.stack((x, y, np.full_like(x, z))), velocity)
+
+    def vertical(self, epoch: Epoch, time_s: Floats) -> Floats:
+        """Unit vectors in TEME upwards from the station, along the normal of the ellipsoid, of shape (3, n)."""
+        angle = epoch.earth_rotation_rad(time_s) + self.longitude_rad
+        level, rise = math.cos(self.latitude_rad), math.sin(self.latitude_rad)
+        return np.stack((level * np.cos(angle), level * np.sin(angle), np.full_like(angle, rise)))
+
+
+def elevation_rad(station: Station, epoch: Epoch, time_s: Floats, position_m: Floats) -> Floats:
+    """Elevation in rad over the station's horizon of positions (3, n) in TEME at `time_s` after `epoch`.
+
+    Geometric: the angle over the plane normal to the ellipsoid's normal, without refraction (which lifts a satellite by
+    0.5 deg at the horizon, 0.1 deg at an elevation of 9 deg).
+    """
+    line = np.asarray(position_m, dtype=np.float64) - station.position(epoch, time_s).position_m
+    up = station.vertical(epoch, time_s)
+    rise = np.sum(line * up, axis=0)
+    level = line - rise * up
+    return np.asarray(np.arctan2(rise, np.sqrt(np.sum(level * level, axis=0))))

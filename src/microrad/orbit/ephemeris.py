@@ -41,8 +41,10 @@ class Segment:
             window = first + np.arange(self.points)[:, np.newaxis]
             weights = weigh(self.time_s[window], time_s[part])
             x, v = self.position_m[:, window], self.velocity_m_s[:, window]
-            position[:, part] = _sum(weights[0], x) + _sum(weights[1], v)
-            velocity[:, part] = _sum(weights[2], x) + _sum(weights[3], v)
+            for k, of in enumerate((position, velocity)):
+                of[:, part] = np.einsum("pn,kpn->kn", weights[2 * k], x) + np.einsum(
+                    "pn,kpn->kn", weights[2 * k + 1], v
+                )
         return States(position, velocity)
 
 
@@ -80,12 +82,6 @@ def _hermite(node: Floats, time: Floats) -> tuple[Floats, Floats, Floats, Floats
     return tilt * square, since * square, tilt * square_rate - 2.0 * own * square, square + since * square_rate
 
 
-def _sum(weight: Floats, vectors: Floats) -> Floats:
-    """Weighted sum over the points of each time's window, of shape (3, n)."""
-    total: Floats = np.einsum("pn,kpn->kn", weight, vectors)
-    return total
-
-
 # --------------------------------------------------------------------------------------------------------------- orbit
 @dataclass(frozen=True, slots=True, eq=False)
 class EphemerisOrbit:
@@ -108,12 +104,6 @@ class EphemerisOrbit:
         """States in TEME at `time_s`, of shape (3, n); raises `OrbitError` outside the usable times."""
         time = np.atleast_1d(np.asarray(time_s, dtype=np.float64))
         self._check_finite(time)
-        states = self._interpolated(time)
-        if np.ndim(time_s) == 0:
-            return States(states.position_m[:, 0], states.velocity_m_s[:, 0])
-        return states
-
-    def _interpolated(self, time: Floats) -> States:
         starts = np.array([segment.start_s for segment in self.segments])
         stops = np.array([segment.stop_s for segment in self.segments])
         index = np.searchsorted(starts, time + SLACK_S, side="right") - 1
@@ -122,11 +112,12 @@ class EphemerisOrbit:
             worst = float(time[missed][0])
             raise self._outside(worst, worst)
         position, velocity = np.empty((3, time.size)), np.empty((3, time.size))
-        for k, segment in enumerate(self.segments):
-            chosen = index == k
-            if np.any(chosen):
-                states = segment.states(np.clip(time[chosen], segment.start_s, segment.stop_s))
-                position[:, chosen], velocity[:, chosen] = states
+        for k in np.unique(index):
+            segment, chosen = self.segments[k], index == k
+            own = segment.states(np.clip(time[chosen], segment.start_s, segment.stop_s))
+            position[:, chosen], velocity[:, chosen] = own
+        if np.ndim(time_s) == 0:
+            return States(position[:, 0], velocity[:, 0])
         return States(position, velocity)
 
     def require(self, start_s: float, end_s: float) -> None:

@@ -69,15 +69,6 @@ class Epoch:
         """The instant that `text` names; raises `OrbitError` as the class does."""
         return cls(text)
 
-    @classmethod
-    def from_julian_date(cls, whole: float, fraction: float = 0.0) -> "Epoch":
-        """The instant at the Julian date `whole` + `fraction` (UTC), to the nanosecond; raises `OrbitError`."""
-        if not (math.isfinite(whole) and math.isfinite(fraction)):
-            raise OrbitError(f"the Julian date {whole} + {fraction} is not a number; {_EXAMPLE}")
-        exact = Fraction(whole) + Fraction(fraction) - Fraction(_JULIAN_OF_ORDINAL)
-        day, nanosecond = divmod(round(exact * 86400 * 10**9), 86400 * 10**9)
-        return cls(_text(_checked_day(day, f"the Julian date {whole + fraction:.1f}"), nanosecond, 9))
-
     @property
     def julian_date(self) -> tuple[float, float]:
         """Julian date in UTC: that of 0h (it ends in .5), and the fraction of the day (above 1 in a leap second)."""
@@ -113,8 +104,7 @@ class Epoch:
         tai_s = time + (second + _tai_minus_utc_s(day))
         ut1_s = tai_s + _ut1_minus_tai_s(day, tai_s)
         zero, first, second_order, third = _sidereal_polynomial(day)
-        angle: Floats = zero + ut1_s * (first + ut1_s * (second_order + ut1_s * third))
-        return angle
+        return zero + ut1_s * (first + ut1_s * (second_order + ut1_s * third))
 
     def terrestrial_centuries(self, time_s: Floats) -> Floats:
         """Julian centuries of Terrestrial Time from J2000, `time_s` after this instant."""
@@ -123,24 +113,23 @@ class Epoch:
         return (np.asarray(time_s, dtype=np.float64) + since_noon_s) / _CENTURY_S
 
     def _check(self, time: Floats) -> None:
-        """Refuse times that are not numbers or leave the tables."""
+        """Raise `OrbitError` for times that are not numbers or leave the tables."""
         if not time.size:
             return
         for extreme in (float(time.min()), float(time.max())):
             if not math.isfinite(extreme):
                 raise OrbitError(f"a time of {extreme} s after {self.text} is not a number; give finite seconds")
             day = _instant(self.text).day + math.floor(extreme / DAY_S)
-            _checked_day(day, f"{extreme:.6g} s after {self.text}")
+            _check_day(day, f"{extreme:.6g} s after {self.text}")
 
 
-def _checked_day(day: int, what: str) -> int:
-    """`day` when the tables cover it."""
+def _check_day(day: int, what: str) -> None:
+    """Raise `OrbitError` for a day that the tables do not cover."""
     if not FIRST_DAY.toordinal() <= day <= LAST_DAY.toordinal():
         raise OrbitError(
             f"{what} is outside {FIRST_DAY} to {LAST_DAY}, the days for which the rotation of the Earth (UT1) is "
             "tabulated or can be extrapolated; take an instant between them"
         )
-    return day
 
 
 # --------------------------------------------------------------------------------------------------------------- text
@@ -155,14 +144,14 @@ def _normal(text: str) -> str:
         day = date(int(match[1]), int(match[2]), int(match[3])).toordinal()
     except ValueError as error:
         raise OrbitError(f"{text!r} names no day of the calendar ({error}); {_EXAMPLE}") from None
-    _checked_day(day, repr(text))
+    _check_day(day, repr(text))
     second = (match[6] or "00").rstrip("0").rstrip(".") if "." in (match[6] or "") else match[6] or "00"
     _check_clock(text, day, int(match[4]), int(match[5]), float(second))
     return f"{match[1]}-{match[2]}-{match[3]}T{match[4]}:{match[5]}:{second}Z"
 
 
 def _check_clock(text: str, day: int, hour: int, minute: int, second: float) -> None:
-    """Refuse a time of day that does not exist; second 60 only where a leap second was inserted."""
+    """Raise `OrbitError` for a time of day that does not exist; second 60 does where a leap second was inserted."""
     if hour <= 23 and minute <= 59 and second < 60.0:
         return
     if (hour, minute) == (23, 59) and 60.0 <= second < 61.0:
@@ -190,17 +179,9 @@ def _utc_of_tai(tai_ms: int) -> str:
     day, ms = divmod(tai_ms - int(tables.tai_minus_utc_s[index]) * 1000, 86_400_000)
     if index < len(new_day_ms) and tai_ms >= new_day_ms[index] - 1000:
         day, ms = day - 1, ms + 86_400_000  # the leap second belongs to the day that it lengthens
-    return _text(day, ms, 3, keep=True)
-
-
-def _text(day: int, ticks: int, decimals: int, *, keep: bool = False) -> str:
-    """ISO text of `ticks` of 10^-decimals s in a day; trailing zeros of the second go unless `keep`."""
-    seconds, rest = divmod(ticks, 10**decimals)
-    minutes = min(seconds // 60, 1439)  # second 60 of a leap second
-    decimal = f"{rest:0{decimals}d}" if keep else f"{rest:0{decimals}d}".rstrip("0")
-    point = "." if decimal else ""
-    clock = f"{minutes // 60:02d}:{minutes % 60:02d}:{seconds - 60 * minutes:02d}"
-    return f"{date.fromordinal(day).isoformat()}T{clock}{point}{decimal}Z"
+    minutes = min(ms // 60_000, 1439)  # second 60 of a leap second
+    second = (ms - 60_000 * minutes) / 1000.0
+    return f"{date.fromordinal(day).isoformat()}T{minutes // 60:02d}:{minutes % 60:02d}:{second:06.3f}Z"
 
 
 # ------------------------------------------------------------------------------------------------------------- tables

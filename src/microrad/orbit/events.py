@@ -3,15 +3,14 @@
 A set of intervals is an array of shape (k, 2), start and end of each, sorted and disjoint; (0, 2) is the empty set.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from microrad.orbit.base import OrbitError
+from microrad.orbit.base import Floats, OrbitError
 
-Floats = NDArray[np.float64]
 Rows = NDArray[np.intp]
 Intervals = NDArray[np.float64]
 Function = Callable[[Floats], Floats]
@@ -50,31 +49,23 @@ def positive_rows(function: RowFunction, time_s: Floats, values: Floats) -> tupl
 
     Raises `OrbitError` as `positive`.
     """
-    _check(time_s, values)
-    points = _hidden(function, time_s, values)
-    rows, times, levels = _merged(time_s, values, points)
-    change = np.flatnonzero((rows[1:] == rows[:-1]) & ((levels[1:] > 0.0) != (levels[:-1] > 0.0)))
-    edges = crossings(function, _Brackets.between(rows, times, levels, change))
-    return tuple(
-        _paired(time_s, int(row[0] > 0.0), edges[rows[change] == index], int(row[-1] > 0.0))
-        for index, row in enumerate(values)
-    )
-
-
-def _check(time_s: Floats, values: Floats) -> None:
     if time_s.size < 3 or values.shape[1:] != time_s.shape:
         raise OrbitError(f"{values.shape} values at {time_s.size} times; give as many values as times, at least 3")
     if not np.all(np.diff(time_s) > 0.0):
         raise OrbitError("the times of the samples do not rise; sort them, each once")
-    wrong = ~np.isfinite(values)
-    if np.any(wrong):
-        first = time_s[np.flatnonzero(np.any(wrong, axis=0))[0]]
-        raise OrbitError(f"a function whose sign is asked for is not finite at {first:g} s; check the orbits there")
-
-
-def _paired(time_s: Floats, begins: int, edges: Floats, lasts: int) -> Intervals:
-    ends = np.concatenate((time_s[:1][:begins], edges, time_s[-1:][:lasts]))
-    return union(ends.reshape(-1, 2))
+    if np.any(wrong := np.any(~np.isfinite(values), axis=0)):
+        first_s = time_s[np.argmax(wrong)]
+        raise OrbitError(f"a function whose sign is asked for is not finite at {first_s:g} s; check the orbits there")
+    points = _hidden(function, time_s, values)
+    rows, times, levels = _merged(time_s, values, points)
+    change = np.flatnonzero((rows[1:] == rows[:-1]) & ((levels[1:] > 0.0) != (levels[:-1] > 0.0)))
+    low, high = change, change + 1
+    edges = crossings(function, _Brackets(rows[low], times[low], times[high], levels[low], levels[high]))
+    found = []
+    for index, row in enumerate(values):
+        first, last = time_s[:1][: int(row[0] > 0.0)], time_s[-1:][: int(row[-1] > 0.0)]
+        found.append(union(np.concatenate((first, edges[rows[change] == index], last)).reshape(-1, 2)))
+    return tuple(found)
 
 
 # ------------------------------------------------------------------------------------------ extrema between the samples
@@ -97,7 +88,7 @@ class _Triples(NamedTuple):
         return _Triples._make(part[..., which] for part in self)
 
 
-def _drop(times: Floats, heights: Floats) -> Floats:
+def _drop(times: Sequence[Floats], heights: Sequence[Floats]) -> Floats:
     """Eight times what the parabola through three points can dip below the lowest of them when that is the middle one.
 
     Its second divided difference c, on steps h, lets it dip by c h^2 / 4.
@@ -110,17 +101,15 @@ def _drop(times: Floats, heights: Floats) -> Floats:
 def _hidden(function: RowFunction, time_s: Floats, values: Floats) -> _Points:
     """Times between the samples at which the function is on the other side of 0 than at the samples about them."""
     triples = _suspects(time_s, values)
-    found: list[tuple[Rows, Floats, Floats]] = []
+    found = [_Points(np.empty(0, np.intp), np.empty(0), np.empty(0))]
     while triples.rows.size:
         triples = _narrowed(function, triples)
         crossed = triples.heights[1] < 0.0
         if np.any(crossed):
             hit = triples.chosen(crossed)
-            found.append((hit.rows, hit.times[1], hit.side * hit.heights[1]))
+            found.append(_Points(hit.rows, hit.times[1], hit.side * hit.heights[1]))
         wide = triples.times[2] - triples.times[0] > 0.5 * SHORTEST_S
         triples = triples.chosen(~crossed & wide & triples.near)
-    if not found:
-        return _Points(np.empty(0, np.intp), np.empty(0), np.empty(0))
     return _Points._make(np.concatenate(parts) for parts in zip(*found, strict=True))
 
 
@@ -130,8 +119,7 @@ def _suspects(time_s: Floats, values: Floats) -> _Triples:
     left, middle, right = values[:, :-2], values[:, 1:-1], values[:, 2:]
     sign = side[:, 1:-1]
     height = sign * middle
-    step = np.diff(time_s)
-    bound = 0.5 * np.abs((right - middle) / step[1:] - (middle - left) / step[:-1]) * (step[1:] + step[:-1])
+    bound = _drop((time_s[:-2], time_s[1:-1], time_s[2:]), (left, middle, right))
     inner = (height <= sign * left) & (height <= sign * right) & (height <= bound)
     rows, at = np.nonzero(inner)
     at += 1
@@ -157,7 +145,7 @@ def _narrowed(function: RowFunction, triples: _Triples) -> _Triples:
     each = np.arange(rows.size)
     lowest = np.argmin(heights, axis=0)
     about = np.clip(lowest, 1, _CUT) + np.array([-1, 0, 1])[:, None]
-    near = heights[lowest, each] <= _drop(times[about, each], heights[about, each])
+    near = heights[lowest, each] <= _drop(tuple(times[about, each]), tuple(heights[about, each]))
     index = np.stack((np.maximum(lowest - 1, 0), lowest, np.minimum(lowest + 1, _CUT + 1)))
     return _Triples(rows, times[index, each], heights[index, each], triples.side, near)
 
@@ -180,10 +168,6 @@ class _Brackets(NamedTuple):
     high: Floats
     at_low: Floats
     at_high: Floats
-
-    @classmethod
-    def between(cls, rows: Rows, times: Floats, levels: Floats, first: Rows) -> "_Brackets":
-        return cls(rows[first], times[first], times[first + 1], levels[first], levels[first + 1])
 
 
 def crossings(function: RowFunction, brackets: _Brackets) -> Floats:

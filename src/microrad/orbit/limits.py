@@ -1,20 +1,27 @@
-"""What a terminal can point at beside what the Earth hides: field of regard, slew limit, Sun, eclipse."""
+"""What a terminal can point at beside what the Earth hides: attitude, field of regard, slew limit, Sun, eclipse."""
 
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import NamedTuple, get_args
+from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 
 from microrad.core.units import format_quantity
-from microrad.orbit.attitude import Attitude, body_axes, body_rate_rad_s, in_body
 from microrad.orbit.base import Floats, Orbit, OrbitError, States
-from microrad.orbit.earth import Earth
+from microrad.orbit.earth import Earth, gravity
 from microrad.orbit.epoch import Epoch
 from microrad.orbit.events import Function, Intervals, complement, positive, refined, union
 from microrad.orbit.line_of_sight import cross, dot
 from microrad.orbit.sun import shadow_rad, sun_direction
+
+Attitude = Literal["nadir", "sun", "free"]
+"""nadir: z to the centre of the Earth, y opposite to the orbit normal, x completing them, along the flight.
+
+sun: x towards the Sun, z as near to nadir as that allows. free: the body turns its boresight onto the partner.
+"""
+
+_TINY = 1e-300  # keeps a division finite in the instant in which Sun and nadir are in one line
 
 Condition = tuple[str, Intervals]
 """What can stand in the way, and when it does not."""
@@ -37,34 +44,34 @@ class Limits:
     """
 
     attitude: Attitude
-    boresight: tuple[float, float, float]
+    boresight: tuple[float, ...]
     field_of_regard_rad: float
     slew_limit_rad_s: float
     sun_exclusion_rad: float
     in_eclipse: bool
 
     def __post_init__(self) -> None:
-        """Refuse limits that mean nothing."""
+        """Check the limits."""
         if self.attitude not in get_args(Attitude):
             raise OrbitError(f"the attitude {self.attitude!r} is not known; write nadir, sun or free")
         size = math.hypot(*self.boresight)
         if len(self.boresight) != 3 or not (math.isfinite(size) and size > 0.0):
             raise OrbitError(f"the boresight {self.boresight} has no direction; give three numbers, such as (0, 0, 1)")
-        self._require("field of regard", self.field_of_regard_rad, "rad", 0.0 < self.field_of_regard_rad <= math.pi)
-        self._require("slew limit", self.slew_limit_rad_s, "rad/s", self.slew_limit_rad_s > 0.0)
-        self._require("Sun exclusion", self.sun_exclusion_rad, "rad", 0.0 <= self.sun_exclusion_rad < math.pi)
+        field, slew, sun = self.field_of_regard_rad, self.slew_limit_rad_s, self.sun_exclusion_rad
+        for what, value, unit, holds in (
+            ("field of regard", field, "rad", 0.0 < field <= math.pi),
+            ("slew limit", slew, "rad/s", slew > 0.0),
+            ("Sun exclusion", sun, "rad", 0.0 <= sun < math.pi),
+        ):
+            if not holds:
+                raise OrbitError(
+                    f"a {what} of {format_quantity(value, unit)} is out of range; give the half angle of a field of "
+                    "regard above 0 to pi, a slew limit above 0, a Sun exclusion from 0 to below pi"
+                )
         if self.attitude == "free" and self.field_of_regard_rad < math.pi:
             raise OrbitError(
                 'a field of regard means nothing with the attitude "free": the body turns its boresight onto the '
                 'partner; leave it out, or hold the body "nadir" or "sun"'
-            )
-
-    @staticmethod
-    def _require(what: str, value: float, unit: str, holds: bool) -> None:
-        if not holds:
-            raise OrbitError(
-                f"a {what} of {format_quantity(value, unit)} is out of range; give the half angle of a field of regard "
-                "above 0 to pi, a slew limit above 0, a Sun exclusion from 0 to below pi"
             )
 
 
@@ -119,7 +126,7 @@ class Side:
         look, attitude = self.look(time_s), self.terminal.limits.attitude
         if attitude == "free":
             return look.direction
-        return in_body(body_axes(attitude, look.own, look.sun), look.direction)
+        return np.stack([dot(axis, look.direction) for axis in body_axes(attitude, look.own, look.sun)])
 
     def field_of_regard(self, time_s: Floats) -> Floats:
         """Cosine of the angle off the boresight, above that of the half angle."""
@@ -164,3 +171,53 @@ def conditions(side: Side, time_s: Floats) -> Iterator[Condition]:
         yield f"Sun near the line of sight of {name}", union(positive(side.off_sun, time_s), night)
     if not limits.in_eclipse:
         yield f"eclipse of {name}", complement(night, (time_s[0], time_s[-1]))
+
+
+# ------------------------------------------------------------------------------------------------------------- attitude
+def body_axes(attitude: Literal["nadir", "sun"], states: States, sun: Floats) -> Floats:
+    """The axes x, y and z of the body as unit vectors in TEME: shape (3 axes, 3 components, n).
+
+    `sun` holds the unit vectors towards the Sun, (3, n).
+    """
+    if attitude == "nadir":
+        y, z = -_unit(_momentum(states)), -_unit(states.position_m)
+        return np.stack((cross(y, z), y, z))
+    z, _ = _towards_nadir(states, sun)
+    return np.stack((sun, cross(z, sun), z))
+
+
+def body_rate_rad_s(attitude: Attitude, states: States, sun: Floats) -> Floats:
+    """Angular velocity of the body against the stars, (3, n) in TEME; 0 for "free", whose turning is the pointing.
+
+    nadir: h / r^2 about the orbit normal, and r a_n / h about the radius, a_n the part of gravity (with J2) along the
+    normal. sun: about the Sun's direction, which is taken to stand still (it moves by 0.2 urad/s).
+    """
+    position, velocity = states
+    if attitude == "free":
+        return np.zeros_like(position)
+    if attitude == "nadir":
+        momentum = _momentum(states)
+        size, square = np.sqrt(dot(momentum, momentum)), dot(position, position)
+        normal = momentum / size
+        lift = dot(gravity(position, True), normal)
+        return np.asarray(size / square * normal + lift / size * position)
+    z, share = _towards_nadir(states, sun)
+    up = _unit(position)
+    sink = -(velocity - dot(up, velocity) * up) / np.sqrt(dot(position, position))
+    return np.asarray(-dot(sink, cross(z, sun)) / share * sun)
+
+
+def _towards_nadir(states: States, sun: Floats) -> tuple[Floats, Floats]:
+    """The unit vector nearest to nadir across the Sun's direction, and the sine of the angle between those two."""
+    down = -_unit(states.position_m)
+    across = down - dot(down, sun) * sun
+    size = np.maximum(np.sqrt(dot(across, across)), _TINY)
+    return across / size, size
+
+
+def _momentum(states: States) -> Floats:
+    return cross(states.position_m, states.velocity_m_s)
+
+
+def _unit(vector: Floats) -> Floats:
+    return np.asarray(vector / np.sqrt(dot(vector, vector)))

@@ -49,6 +49,11 @@ def sight(first: Orbit, second: Orbit, time_s: ArrayLike) -> LineOfSight:
     Sun and Moon, together below a ten-thousandth of it, are left out. An orbit without the
     periodic terms of J2 (two bodies, or mean elements) has an acceleration of its own, up to 0.3 % off.
 
+    Args:
+        first: the orbit from which the line is seen.
+        second: the orbit that it leads to.
+        time_s: times since the epoch of both, s, shape (n,).
+
     Raises `OrbitError` where both are at the same place, and what the orbits raise.
     """
     time = np.atleast_1d(np.asarray(time_s, dtype=np.float64))

@@ -56,5 +56,4 @@ def shadow_rad(position_m: Floats, sun_direction: Floats, shape: Shape) -> Float
     sun = np.arcsin(SUN_RADIUS_M / np.sqrt(np.sum(to_sun * to_sun, axis=0)))
     across = np.cross(place, light, axis=0)
     apart = np.arctan2(np.sqrt(np.sum(across * across, axis=0)), -np.sum(place * light, axis=0))
-    depth: Floats = earth - sun - apart
-    return depth
+    return np.asarray(earth - sun - apart)

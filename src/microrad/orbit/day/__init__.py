@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 from microrad import link, orbit
 from microrad.core.units import format_quantity
@@ -75,19 +76,15 @@ def given_loss(links: LinkStudy) -> PointingLoss:
 
 
 def loss_at(m: LinkMission, margin_db: float, source: str) -> PointingLoss:
-    """The pointing loss, an uncorrected point-ahead in it, that leaves a margin at the budgeted rate and distance."""
+    """The pointing loss, an uncorrected point-ahead in it, that leaves a margin at the budgeted rate and distance.
+
+    Args:
+        m: the mission.
+        margin_db: of its communication link, dB.
+        source: where the margin comes from, in words.
+    """
     needed = float(link.required_dbm(m, m.communication.data_rate_bit_s))
     return PointingLoss(link.received_on_axis_dbm(m) - needed - margin_db, 0.0, source)
-
-
-def _check_contact(m: LinkMission, seen: View) -> None:
-    """Refuse a contact beyond those of the span."""
-    asked = None if m.operations is None else m.operations.contact
-    if asked is not None and seen.encounters and asked.number > len(seen.encounters):
-        raise operations.OperationsError(
-            f"operations.contact.number is {asked.number}, and the span has {len(seen.encounters)} contacts: give a "
-            "number up to that, or a longer orbit.duration"
-        )
 
 
 def acquired(links: LinkStudy) -> Found | None:
@@ -106,8 +103,9 @@ def _pair(links: LinkStudy, m: LinkMission) -> orbit.Pair:
 def relay(links: LinkStudy, loss: PointingLoss) -> Way:
     """The way by the relay alone: what `run` finds of it, without the rest of the day."""
     m = links.file.mission
-    seen, rates = view(m, _pair(links, m)), flow.rate_table(flow.closings(m, loss))
-    return flow.relay(m, seen, rates, loss.outage, acquired(links), 1.0)
+    seen = view(_pair(links, m), m.communication.wavelength_m)
+    rates = flow.rate_table(flow.closings(m, loss))
+    return flow.relay(flow.table(m), seen, rates, loss.outage, acquired(links), 1.0)
 
 
 def run(
@@ -115,26 +113,34 @@ def run(
 ) -> DayStudy:
     """The day of a mission that has the tables `orbit` and `operations`.
 
-    ``loss`` is what pointing costs the laser link, by default what the mission states. Raises `orbit.OrbitError` and
-    `operations.OperationsError` for tables that are missing and orbits that do not hold.
+    Args:
+        links: the links of the mission, with their acquisition.
+        loss: what pointing costs the laser link; by default what the mission states.
+        on_progress: told how many of how many assumptions are changed.
+
+    Raises `orbit.OrbitError` and `operations.OperationsError` for tables that are missing, orbits that do not hold and
+    a contact that is asked for beyond those of the span.
     """
     m = links.file.mission
     loss = given_loss(links) if loss is None else loss
-    seen = view(m, _pair(links, m))
-    _check_contact(m, seen)
-    found = acquired(links)
-    closing = flow.closings(m, loss)
-    rates, heard = flow.rate_table(closing), flow.heard(m, seen)
-    relay = flow.relay(m, seen, rates, loss.outage, found, 1.0)
+    seen, o = view(_pair(links, m), m.communication.wavelength_m), flow.table(m)
+    if o.contact is not None and seen.encounters and o.contact.number > len(seen.encounters):
+        raise operations.OperationsError(
+            f"operations.contact.number is {o.contact.number}, and the span has {len(seen.encounters)} contacts: give "
+            "a number up to that, or a longer orbit.duration"
+        )
+    found, closing = acquired(links), flow.closings(m, loss)
+    heard = flow.heard(o.downlink, seen.pair)
+    relay = flow.relay(o, seen, flow.rate_table(closing), loss.outage, found, 1.0)
     return DayStudy(
         mission=m,
         view=seen,
         loss=loss,
         closings=closing,
         derived=derived_from(links.file.sources, "communication."),
-        encounters=tuple(encounter(m, seen.pair, contact) for contact in relay.contacts),
+        encounters=tuple(encounter(seen.pair, contact, m.communication.wavelength_m) for contact in relay.contacts),
         relay=relay,
-        direct=flow.direct(m, seen, heard),
-        swings=swings(m, lambda other: _pair(links, other), seen, heard, loss, found, on_progress),
+        direct=flow.direct(o, seen, heard),
+        swings=swings(m, partial(_pair, links), seen, heard, loss, found, on_progress),
         warnings=(*beyond_the_mission(m, seen), *short_tail(seen.pair)),
     )

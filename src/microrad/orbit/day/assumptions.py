@@ -7,15 +7,13 @@ from dataclasses import dataclass, replace
 from microrad import link, orbit
 from microrad.core.units import format_quantity
 from microrad.link.partner_search import Found
-from microrad.mission.fields import Table
 from microrad.mission.model import LinkMission
 from microrad.mission.tables.orbit import HIGHEST_MASK_RAD, VisibilityLimits
 from microrad.orbit.day import flow, geometry
+from microrad.orbit.from_mission import orbits_table
 
 _RUNS = 4  # of each case: what an acquisition takes is little beside what is varied
 NOTHING = "as it is"
-
-PairOf = Callable[[LinkMission], orbit.Pair]
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,55 +60,45 @@ class Swing:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Case:
-    """A mission that differs in one thing; ``slower`` stretches acquisition.
-
-    ``known`` are contacts and passes of a mission, which one with the same orbits and stations shares.
-    """
+    """A mission that differs in one thing; ``slower`` stretches acquisition."""
 
     mission: LinkMission
     loss: flow.PointingLoss
-    known: "_Known"
     slower: float = 1.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Known:
-    """Contacts and passes, and the mission that they are of."""
+    """What holds for every mission with the same orbits and stations as this one: contacts, passes, acquisition."""
 
     mission: LinkMission
+    pair_of: Callable[[LinkMission], orbit.Pair]
     seen: geometry.View
     heard: tuple[flow.Heard, ...]
-
-    def view(self, m: LinkMission, pair_of: PairOf) -> geometry.View:
-        """The contacts of a mission."""
-        return self.seen if m.orbit is self.mission.orbit else geometry.view(m, pair_of(m))
-
-    def passes(self, m: LinkMission, seen: geometry.View) -> tuple[flow.Heard, ...]:
-        """The passes of a mission."""
-        own, other = flow.table(self.mission).downlink, flow.table(m).downlink
-        same = own is None or (other is not None and other.stations is own.stations)
-        return self.heard if same and seen is self.seen else flow.heard(m, seen)
+    found: Found | None
 
 
-def numbers(case: _Case, pair_of: PairOf, found: Found | None) -> Numbers:
+def numbers(case: _Case, known: _Known) -> Numbers:
     """Volumes and latencies of one case."""
     m = case.mission
-    seen = case.known.view(m, pair_of)
+    o, own = flow.table(m), flow.table(known.mission)
+    seen, heard = known.seen, known.heard
+    moved = m.orbit is not known.mission.orbit
+    if moved:
+        seen = geometry.view(known.pair_of(m), m.communication.wavelength_m)
+    if moved or (o.downlink and own.downlink and o.downlink.stations is not own.downlink.stations):
+        heard = flow.heard(o.downlink, seen.pair)
     rates = flow.rate_table(flow.closings(m, case.loss))
-    relay = flow.relay(m, seen, rates, case.loss.outage, found, case.slower)
-    direct = flow.direct(m, seen, case.known.passes(m, seen))
-    none = math.nan
-    return Numbers(
-        relay.capacity_bit,
-        none if direct is None else direct.capacity_bit,
-        relay.slow_s,
-        none if direct is None else direct.slow_s,
-    )
+    relay = flow.relay(o, seen, rates, case.loss.outage, known.found, case.slower)
+    direct = flow.direct(o, seen, heard)
+    if direct is None:
+        return Numbers(relay.capacity_bit, math.nan, relay.slow_s, math.nan)
+    return Numbers(relay.capacity_bit, direct.capacity_bit, relay.slow_s, direct.slow_s)
 
 
 def swings(
     m: LinkMission,
-    pair_of: PairOf,
+    pair_of: Callable[[LinkMission], orbit.Pair],
     seen: geometry.View,
     heard: tuple[flow.Heard, ...],
     loss: flow.PointingLoss,
@@ -121,134 +109,94 @@ def swings(
 
     Data rates and the time of acquisition are halved and doubled, the margin, the grazing height and the masks go to 0
     and to twice, the pointing loss to 0 and 3 dB up, the altitude by a fifth; attitude, eclipse, local time, stations
-    and what the relay grants are replaced. An orbit from a file stays as it is, and
-    so does what would leave no orbit: one that has decayed, or lies below the surface that lines of sight must clear.
+    and what the relay grants are replaced. An orbit from a file stays as it is, and so does what would leave no orbit:
+    one that has decayed, or lies below the surface that lines of sight must clear.
     """
     m = m.with_value("operations.runs", min(flow.table(m).runs, _RUNS))
-    own = _Case(m, loss, _Known(m, seen, heard))
-    here = numbers(own, pair_of, found)
+    known, own = _Known(m, pair_of, seen, heard, found), _Case(m, loss)
+    here = numbers(own, known)
+
+    def end(side: _Side) -> tuple[str, Numbers]:
+        try:
+            return (NOTHING, here) if side is None else (side[0], numbers(side[1], known))
+        except orbit.OrbitError:  # the changed orbit is none
+            return NOTHING, here
+
     made = []
     cases = list(_changes(own, found))
-    for done, (name, low, high) in enumerate(cases):
+    for done, (name, *sides) in enumerate(cases):
         on_progress(done, len(cases), "each assumption changed alone")
-        ends = [_end(side, here, pair_of, found) for side in (low, high)]
-        made.append(Swing(name, ends[0][0], ends[1][0], ends[0][1], ends[1][1], here))
+        (low, at_low), (high, at_high) = map(end, sides)
+        made.append(Swing(name, low, high, at_low, at_high, here))
     return tuple(sorted(made, key=lambda swing: -swing.factor))
 
 
 _Side = tuple[str, _Case] | None
 
 
-def _end(side: _Side, here: Numbers, pair_of: PairOf, found: Found | None) -> tuple[str, Numbers]:
-    if side is None:
-        return NOTHING, here
-    try:
-        return side[0], numbers(side[1], pair_of, found)
-    except orbit.OrbitError:  # the changed orbit is none
-        return NOTHING, here
-
-
 def _changes(own: _Case, found: Found | None) -> Iterator[tuple[str, _Side, _Side]]:
     """Name, low side and high side of each assumption that the mission has."""
     m = own.mission
-    o, orbits = flow.table(m), m.orbit
-    assert orbits is not None
+    o, orbits, leo, rate = flow.table(m), orbits_table(m), orbits_table(m).leo, m.communication.data_rate_bit_s
 
-    def scaled(name: str, key: str, unit: str, factors: tuple[float, float] = (0.5, 2.0)) -> tuple[str, _Side, _Side]:
-        value = value_of(m, key)
-        low, high = (
-            (format_quantity(f * value, unit, 3), replace(own, mission=m.with_value(key, f * value))) for f in factors
-        )
+    def edited(text: str, key: str, value: object) -> tuple[str, _Case]:
+        return text, replace(own, mission=m.with_value(key, value))
+
+    def scaled(
+        name: str, key: str, value: float, unit: str, factors: tuple[float, float] = (0.5, 2.0)
+    ) -> tuple[str, _Side, _Side]:
+        low, high = (edited(format_quantity(f * value, unit, 3), key, f * value) for f in factors)
         return name, low, high
 
-    def other(name: str, text: str, mission: LinkMission) -> tuple[str, _Side, _Side]:
-        return name, (text, replace(own, mission=mission)), None
-
     if o.rates_bit_s is None:
-        yield _laser_rate(own, scaled("laser data rate", "communication.data_rate_bit_s", "bit/s"))
-    yield _margin(own)
+        built = link.receiver(m)
+        name, slow, fast = scaled("laser data rate", "communication.data_rate_bit_s", rate, "bit/s")
+        yield name, slow, fast if built is None or 2.0 * rate <= built.highest_data_rate_bit_s else None
+    asked = 2.0 * o.margin_db or 3.0  # every rate that just closes, and twice what is demanded
+    low, high = (edited(format_quantity(end, "dB"), "operations.margin_db", end) for end in (0.0, asked))
+    yield "margin demanded of the laser link", low if o.margin_db else None, high
     none, more = replace(own.loss, loss_db=0.0), replace(own.loss, loss_db=own.loss.loss_db + 3.0)
     yield "pointing loss", ("0 dB", replace(own, loss=none)), ("3 dB more", replace(own, loss=more))
     if found is not None:
         yield "time of acquisition", ("half", replace(own, slower=0.5)), ("twice", replace(own, slower=2.0))
     if o.relay_share == 1.0:
-        yield other("share of each contact that the relay grants", "half", m.with_value("operations.relay_share", 0.5))
+        yield "share of each contact that the relay grants", edited("half", "operations.relay_share", 0.5), None
     if orbits.grazing_height_m > 0.0:
-        yield scaled("grazing height", "orbit.grazing_height_m", "m", (0.0, 2.0))
-    if orbits.leo.limits is None or orbits.leo.limits.attitude == "free":
-        held = m.with_value("orbit.leo.limits", _held(orbits.leo.limits))
-        yield other("attitude of the satellite", "nadir, 60 deg about zenith", held)
-    if orbits.leo.limits is not None and orbits.leo.limits.in_eclipse:
-        yield other("eclipse", "terminal off in it", m.with_value("orbit.leo.limits.in_eclipse", False))
-    if orbits.leo.kind == "circular":
-        yield scaled("orbit altitude", "orbit.leo.altitude_m", "m", (0.8, 1.2))
-        if orbits.leo.local_time_s is not None:
-            later = m.with_value("orbit.leo.local_time_s", (orbits.leo.local_time_s + 21600.0) % 86400.0)
-            yield other("local time of the node", "6 h later", later)
-    yield scaled("instrument data rate", "operations.instrument_rate_bit_s", "bit/s")
-    if o.downlink is not None:
-        yield scaled("radio data rate", "operations.downlink.data_rate_bit_s", "bit/s")
-        yield from _stations(own)
+        yield scaled("grazing height", "orbit.grazing_height_m", orbits.grazing_height_m, "m", (0.0, 2.0))
+    if leo.limits is None or leo.limits.attitude == "free":
+        held = edited("nadir, 60 deg about zenith", "orbit.leo.limits", _held(leo.limits))
+        yield "attitude of the satellite", held, None
+    if leo.limits is not None and leo.limits.in_eclipse:
+        yield "eclipse", edited("terminal off in it", "orbit.leo.limits.in_eclipse", False), None
+    if leo.kind == "circular" and leo.altitude_m is not None:
+        yield scaled("orbit altitude", "orbit.leo.altitude_m", leo.altitude_m, "m", (0.8, 1.2))
+        if leo.local_time_s is not None:
+            later = edited("6 h later", "orbit.leo.local_time_s", (leo.local_time_s + 21600.0) % 86400.0)
+            yield "local time of the node", later, None
+    yield scaled("instrument data rate", "operations.instrument_rate_bit_s", o.instrument_rate_bit_s, "bit/s")
+    if o.downlink is None:
+        return
+    yield scaled("radio data rate", "operations.downlink.data_rate_bit_s", o.downlink.data_rate_bit_s, "bit/s")
+    given, key = o.downlink.stations, "operations.downlink.stations"
+    name, first = next(iter(given.items()))
+    across = first.longitude_rad - math.copysign(math.pi, first.longitude_rad)
+    opposite = first.model_copy(update={"latitude_rad": -first.latitude_rad, "longitude_rad": across})
+    fewer = edited(f"without {name}", key, {n: s for n, s in given.items() if n != name}) if len(given) > 1 else None
+    added = edited(f"one more, opposite {name}", key, {**given, f"opposite {name}": opposite})
+    yield "ground stations", fewer, added
+    masks = [
+        {n: s.with_value("mask_rad", min(factor * s.mask_rad, HIGHEST_MASK_RAD)) for n, s in given.items()}
+        for factor in (0.0, 2.0)
+    ]
+    yield "elevation mask", edited("0 deg", key, masks[0]), edited("twice", key, masks[1])
 
 
 def _held(own: VisibilityLimits | None) -> VisibilityLimits:
     """The limits of a body that does not turn to its partner, with a terminal on top of it."""
     given = {"attitude": "nadir", "boresight": [0.0, 0.0, -1.0], "field_of_regard": "60 deg", "in_eclipse": True}
-    given |= {"slew_limit": "10 deg/s", "sun_exclusion": "0 deg"}
-    held = VisibilityLimits.model_validate(given)
+    held = VisibilityLimits.model_validate(given | {"slew_limit": "10 deg/s", "sun_exclusion": "0 deg"})
     if own is None:
         return held
-    kept = {name: getattr(own, name) for name in ("slew_limit_rad_s", "sun_exclusion_rad", "in_eclipse")}
-    return held.model_copy(update=kept)
-
-
-def _laser_rate(own: _Case, both: tuple[str, _Side, _Side]) -> tuple[str, _Side, _Side]:
-    """The laser's rates, without one that its receiver does not take."""
-    built = link.receiver(own.mission)
-    name, low, _ = both
-    twice = 2.0 * own.mission.communication.data_rate_bit_s
-    return (name, low, None) if built is not None and twice > built.highest_data_rate_bit_s else both
-
-
-def _margin(own: _Case) -> tuple[str, _Side, _Side]:
-    """Every rate that just closes, and twice what is demanded, or 3 dB where that is nothing."""
-    asked = flow.table(own.mission).margin_db
-    ends = (0.0, 2.0 * asked) if asked else (0.0, 3.0)
-    low, high = (
-        (format_quantity(end, "dB"), replace(own, mission=own.mission.with_value("operations.margin_db", end)))
-        for end in ends
+    return own.model_copy(
+        update={name: getattr(held, name) for name in ("attitude", "boresight", "field_of_regard_rad")}
     )
-    return "margin demanded of the laser link", low if asked else None, high
-
-
-def _stations(own: _Case) -> Iterator[tuple[str, _Side, _Side]]:
-    """More or fewer stations, and another mask for all of them."""
-    m = own.mission
-    assert m.operations is not None and m.operations.downlink is not None
-    given = m.operations.downlink.stations
-    key = "operations.downlink.stations"
-    first, name = next(iter(given.values())), next(iter(given))
-    across = first.longitude_rad - math.copysign(math.pi, first.longitude_rad)
-    opposite = first.model_copy(update={"latitude_rad": -first.latitude_rad, "longitude_rad": across})
-    fewer: _Side = None
-    if len(given) > 1:
-        kept = {n: s for n, s in given.items() if n != name}
-        fewer = f"without {name}", replace(own, mission=m.with_value(key, kept))
-    more = replace(own, mission=m.with_value(key, {**given, f"opposite {name}": opposite}))
-    yield "ground stations", fewer, (f"one more, opposite {name}", more)
-    masks = []
-    for factor, text in ((0.0, "0 deg"), (2.0, "twice")):
-        moved = {
-            n: s.model_copy(update={"mask_rad": min(factor * s.mask_rad, HIGHEST_MASK_RAD)}) for n, s in given.items()
-        }
-        masks.append((text, replace(own, mission=m.with_value(key, moved))))
-    yield "elevation mask", masks[0], masks[1]
-
-
-def value_of(table: Table, key: str) -> float:
-    """Value of a dotted attribute."""
-    found: object = table
-    for part in key.split("."):
-        found = getattr(found, part)
-    assert isinstance(found, float)
-    return found

@@ -5,16 +5,14 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from microrad import link, orbit
 from microrad.link.partner_search import Found
 from microrad.mission.model import LinkMission
 from microrad.mission.tables.operations import Downlink, Operations
 from microrad.orbit import operations
+from microrad.orbit.base import Floats
 from microrad.orbit.day.geometry import View, cut_at, longest_gap_s
-
-Floats = NDArray[np.float64]
 
 RELAY, DIRECT = "relay", "direct downlink"
 
@@ -125,15 +123,27 @@ def ratio(relay_bit: float, direct_bit: float) -> float:
 
 # --------------------------------------------------------------------------------------------------------------- relay
 def relay(
-    m: LinkMission, seen: View, rates: operations.RateTable | None, outage: float, found: Found | None, slower: float
+    o: Operations, seen: View, rates: operations.RateTable | None, outage: float, found: Found | None, slower: float
 ) -> Way:
-    """The way by the relay: each run draws an acquisition for each contact; ``slower`` stretches their times."""
-    o = table(m)
+    """The way by the relay: each run draws an acquisition for each contact.
+
+    Args:
+        o: the mission's table of operations.
+        seen: the contacts of the two terminals.
+        rates: the rates of the laser link by range; None where the receiver takes none.
+        outage: share of the time in which the link is out, from 0 to 1.
+        found: the acquisition whose simulated times are drawn from; None where lock is there at once.
+        slower: factor on the times of acquisition.
+    """
     granted = _granted(seen, o.relay_share)
     whole = tuple(contact for contact, _ in granted)
-    bases = [_whole_service(contact, range_m, rates, 1.0 - outage) for contact, range_m in granted]
+    bases = []
+    for contact, range_m in granted:
+        span = contact.start_s, contact.end_s
+        dark = operations.Service(np.array(span), np.zeros(1), 1.0 - outage)
+        bases.append(dark if rates is None else operations.service(rates, span, range_m, 1.0 - outage))
     locks = np.array([_locks(found, len(whole), o.seed, run, slower) for run in range(o.runs)])
-    runs = [[delayed(base, base.start_s + lock) for base, lock in zip(bases, row, strict=True)] for row in locks]
+    runs = [[base.locked_at(base.start_s + lock) for base, lock in zip(bases, row, strict=True)] for row in locks]
     failed = float(np.mean(np.isinf(locks[:, : _of_span(whole, seen)]).sum(axis=1)))
     return _way(RELAY, whole, (), runs, o, seen, o.relay_delay_s, failed)
 
@@ -142,10 +152,7 @@ def _of_span(contacts: tuple[orbit.Contact, ...], seen: View) -> int:
     return sum(c.start_s < seen.duration_s for c in contacts)
 
 
-_Range = Callable[[Floats], Floats]
-
-
-def _granted(seen: View, share: float) -> list[tuple[orbit.Contact, _Range]]:
+def _granted(seen: View, share: float) -> list[tuple[orbit.Contact, Callable[[Floats], Floats]]]:
     """The part of each contact that the relay grants, with its range over time.
 
     A contact that goes on behind the span is granted in two parts: what it has in the span counts by itself.
@@ -162,19 +169,6 @@ def _granted(seen: View, share: float) -> list[tuple[orbit.Contact, _Range]]:
     return found
 
 
-def _whole_service(
-    contact: orbit.Contact,
-    range_m: _Range,
-    rates: operations.RateTable | None,
-    availability: float,
-) -> operations.Service:
-    """What a contact would carry if it were locked from its beginning."""
-    span = contact.start_s, contact.end_s
-    if rates is None:
-        return operations.Service(np.array(span), np.zeros(1), availability)
-    return operations.service(rates, span, contact.start_s, range_m, availability)
-
-
 def _locks(found: Found | None, contacts: int, seed: int, run: int, slower: float) -> Floats:
     """Seconds from the beginning of each contact to lock, infinite where acquisition is given up; drawn from its runs.
 
@@ -187,56 +181,35 @@ def _locks(found: Found | None, contacts: int, seed: int, run: int, slower: floa
     return np.where(found.simulated.locked[chosen], slower * found.simulated.time_s[chosen], math.inf)
 
 
-def delayed(service: operations.Service, lock_s: float) -> operations.Service:
-    """The same contact without data before lock."""
-    if lock_s <= service.start_s:
-        return service
-    if lock_s >= service.end_s:
-        return operations.Service(np.array([service.start_s, service.end_s]), np.zeros(1), service.availability)
-    after = service.edges_s > lock_s
-    first = int(np.argmax(after))
-    edges = np.concatenate(([service.start_s, lock_s], service.edges_s[after]))
-    return operations.Service(edges, np.concatenate(([0.0], service.rate_bit_s[first - 1 :])), service.availability)
-
-
 # -------------------------------------------------------------------------------------------------------------- direct
 Heard = tuple[orbit.Pass, str]
 """A pass and the station that hears it."""
 
 
-def heard(m: LinkMission, seen: View) -> tuple[Heard, ...]:
+def heard(down: Downlink | None, pair: orbit.Pair) -> tuple[Heard, ...]:
     """Every pass over every station of the direct downlink; none without one."""
-    down, pair = table(m).downlink, seen.pair
-    if down is None:
-        return ()
     return tuple(
         (each, station.name)
-        for station in orbit.stations(down)
+        for station in (() if down is None else orbit.stations(down))
         for each in orbit.passes(pair.leo.orbit, station, pair.epoch, pair.whole_s)
     )
 
 
-def direct(m: LinkMission, seen: View, passes: tuple[Heard, ...]) -> Way | None:
+def direct(o: Operations, seen: View, passes: tuple[Heard, ...]) -> Way | None:
     """The radio downlink, or None without one. The station that rises first is kept until the satellite sets there."""
-    o = table(m)
-    if o.downlink is None:
+    down = o.downlink
+    if down is None:
         return None
-    kept, names = [], []
-    until = -math.inf
+    kept, names, services, until = [], [], [], -math.inf
     for each, name in sorted(passes, key=lambda item: (item[0].start_s, item[0].end_s)):
         start, begins = max(each.start_s, until), each.begins if each.start_s >= until else "station free"
         if each.end_s > start:
             kept.append(replace(each, start_s=start, begins=begins))
             names.append(name)
+            whole = operations.Service(np.array([start, each.end_s]), np.array([down.data_rate_bit_s]), 1.0)
+            services.append(whole.locked_at(start + down.setup_s))
             until = each.end_s
-    down = o.downlink
-    services = [_radio(contact, down) for contact in kept]
     return _way(DIRECT, tuple(kept), tuple(names), [services], o, seen, down.delay_s, 0.0)
-
-
-def _radio(contact: orbit.Contact, down: Downlink) -> operations.Service:
-    span = np.array([contact.start_s, contact.end_s])
-    return delayed(operations.Service(span, np.array([down.data_rate_bit_s]), 1.0), contact.start_s + down.setup_s)
 
 
 # ----------------------------------------------------------------------------------------------------------------- way
@@ -251,8 +224,9 @@ def _way(
     failed: float,
 ) -> Way:
     span, whole = seen.pair.span_s, seen.pair.whole_s
-    made = operations.Production(o.instrument_rate_bit_s, *span)
-    histories = [operations.deliver(made, o.store_bit, services, whole, delay_s) for services in runs]
+    histories = [
+        operations.deliver(o.instrument_rate_bit_s, span, o.store_bit, services, whole, delay_s) for services in runs
+    ]
     inside = _of_span(contacts, seen)
     carried = np.array([[_until(s, span[1]) for s in services[:inside]] for services in runs]).reshape(len(runs), -1)
     total, shown = carried.sum(axis=1), tuple(cut_at(c, span[1]) for c in contacts[:inside])
@@ -265,9 +239,9 @@ def _way(
         carried_bit=carried.mean(axis=0),
         capacity_bit=float(total.mean()),
         capacity_spread_bit=(float(total.min()), float(total.max())),
-        generated_bit=histories[0].total_generated_bit,
-        lost_bit=float(np.mean([h.total_lost_bit for h in histories])),
-        on_board_bit=float(np.mean([h.not_delivered_bit for h in histories])),
+        generated_bit=float(histories[0].generated_bit[-1]),
+        lost_bit=float(np.mean([h.lost_bit[-1] for h in histories])),
+        on_board_bit=float(np.mean([h.stored_bit[-1] for h in histories])),
         failed_contacts=failed,
         history=histories[0],
         latency=operations.pool([h.latency for h in histories]),

@@ -6,13 +6,16 @@ from dataclasses import dataclass, replace
 from typing import TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from microrad import orbit
 from microrad.core.units import SPEED_OF_LIGHT_M_S, format_quantity
 from microrad.mission.model import LinkMission
+from microrad.orbit.base import Floats
+from microrad.orbit.contacts import EARTH, END, START, coarse_step_s, coarse_times
+from microrad.orbit.events import positive
+from microrad.orbit.from_mission import TAIL_S
+from microrad.orbit.sun import shadow_rad
 
-Floats = NDArray[np.float64]
 _C = TypeVar("_C", bound=orbit.Contact)
 
 SAMPLE_S = 10.0
@@ -44,9 +47,9 @@ class View:
     """The contacts of the mission's two terminals.
 
     ``encounters`` are those of the span of ``pair``, cut at its end. ``contacts`` are all of them whole, those behind
-    the span too, in which its data may still be sent, and ``range_m`` has the range over time for each. ``umbra_s``
-    (n, 2) are the eclipses of the lower satellite in the span, and ``closed_form`` is the contact of an orbit of the
-    same radius over the equator, where that orbit and no field of regard decide.
+    the span too, in which its data may still be sent. ``range_m`` has the range over time for each, a spline that is
+    exact to a millimetre. ``umbra_s`` (n, 2) are the eclipses of the lower satellite in the span. ``closed_form`` is
+    the contact of an orbit of the same radius over the equator, where that orbit and no field of regard decide.
     """
 
     pair: orbit.Pair
@@ -87,12 +90,13 @@ class View:
 
         A contact that the Sun or a limit cuts in two counts once.
         """
-        return sum(orbit.EARTH in e.contact.begins or orbit.START in e.contact.begins for e in self.encounters)
+        return sum(EARTH in e.contact.begins or START in e.contact.begins for e in self.encounters)
 
     @property
     def median_s(self) -> float:
         """Median duration of the contacts that neither end of what is looked at cuts; nan without one."""
-        whole = [e.contact.duration_s for e in self.encounters if not _cut(e.contact)]
+        inside = (e.contact for e in self.encounters if START not in e.contact.begins and END not in e.contact.ends)
+        whole = [contact.duration_s for contact in inside]
         return float(np.median(whole)) if whole else math.nan
 
     def largest(self, name: str) -> float:
@@ -112,26 +116,28 @@ def longest_gap_s(contacts: Sequence[orbit.Contact], pair: orbit.Pair) -> float:
     return max(b - a for a, b in zip(edges[::2], edges[1::2], strict=True) if a < end_s)
 
 
-def _cut(contact: orbit.Contact) -> bool:
-    return orbit.START in contact.begins or orbit.END in contact.ends
-
-
 def cut_at(contact: _C, end_s: float) -> _C:
     """The contact up to the end of the span."""
-    return contact if contact.end_s <= end_s else replace(contact, end_s=end_s, ends=orbit.END)
+    return contact if contact.end_s <= end_s else replace(contact, end_s=end_s, ends=END)
 
 
-def view(m: LinkMission, pair: orbit.Pair) -> View:
-    """The contacts of the mission's pair of terminals; raises `orbit.OrbitError`."""
+def view(pair: orbit.Pair, wavelength_m: float) -> View:
+    """The contacts of a pair of terminals, with the Doppler shift at a wavelength; raises `orbit.OrbitError`."""
+    from scipy.interpolate import CubicHermiteSpline  # late: it loads slowly
+
     found = orbit.contacts(pair.leo, pair.geo, pair.earth, pair.epoch, pair.whole_s)
-    end = pair.span_s[1]
-    sights = [_sight(pair, c) for c in found]
+    sights, own, end = [_sight(pair, c) for c in found], pair.leo.orbit, pair.span_s[1]
+
+    def depth_rad(time_s: Floats) -> Floats:
+        sun = orbit.sun_direction(pair.epoch, time_s)
+        return shadow_rad(own.states(time_s).position_m, sun, pair.earth.shape)
+
     return View(
         pair=pair,
-        encounters=tuple(encounter(m, pair, cut_at(c, end)) for c in found if c.start_s < end),
+        encounters=tuple(encounter(pair, cut_at(c, end), wavelength_m) for c in found if c.start_s < end),
         contacts=found,
-        range_m=tuple(_range(s) for s in sights),
-        umbra_s=_umbra(pair),
+        range_m=tuple(CubicHermiteSpline(s.time_s, s.range_m, s.range_rate_m_s) for s in sights),
+        umbra_s=positive(depth_rad, coarse_times(pair.span_s, coarse_step_s(own, pair.span_s[0]))),
         closed_form=_closed_form(pair),
     )
 
@@ -141,19 +147,11 @@ def times(contact: orbit.Contact) -> Floats:
     return np.linspace(contact.start_s, contact.end_s, max(math.ceil(contact.duration_s / SAMPLE_S), 20) + 1)
 
 
-def _range(seen: orbit.LineOfSight) -> Callable[[Floats], Floats]:
-    """Range over time between samples, by its rate at each: exact to a millimetre at 10 s, and quick to ask for."""
-    from scipy.interpolate import CubicHermiteSpline
-
-    spline: Callable[[Floats], Floats] = CubicHermiteSpline(seen.time_s, seen.range_m, seen.range_rate_m_s)
-    return spline
-
-
 def _sight(pair: orbit.Pair, contact: orbit.Contact) -> orbit.LineOfSight:
     return orbit.sight(pair.leo.orbit, pair.geo.orbit, times(contact))
 
 
-def encounter(m: LinkMission, pair: orbit.Pair, contact: orbit.Contact) -> Encounter:
+def encounter(pair: orbit.Pair, contact: orbit.Contact, wavelength_m: float) -> Encounter:
     """A contact with what its line of sight reaches."""
     seen = _sight(pair, contact)
     return Encounter(
@@ -165,19 +163,8 @@ def encounter(m: LinkMission, pair: orbit.Pair, contact: orbit.Contact) -> Encou
         float(np.max(seen.rate_rad_s)),
         float(np.max(seen.acceleration_rad_s2)),
         float(np.max(np.abs(seen.range_rate_m_s))),
-        float(np.max(np.abs(seen.doppler_hz(m.communication.wavelength_m)))),
+        float(np.max(np.abs(seen.doppler_hz(wavelength_m)))),
     )
-
-
-def _umbra(pair: orbit.Pair) -> Floats:
-    own = pair.leo.orbit
-    step = orbit.coarse_step_s(own, pair.span_s[0])
-
-    def depth(time_s: Floats) -> Floats:
-        sun = orbit.sun_direction(pair.epoch, time_s)
-        return orbit.shadow_rad(own.states(time_s).position_m, sun, pair.earth.shape)
-
-    return orbit.positive(depth, orbit.coarse_times(pair.span_s, step))
 
 
 def _closed_form(pair: orbit.Pair) -> orbit.CoplanarContact | None:
@@ -195,7 +182,7 @@ def _closed_form(pair: orbit.Pair) -> orbit.CoplanarContact | None:
 
 def short_tail(pair: orbit.Pair) -> tuple[str, ...]:
     """That the orbits do not hold for long enough behind the span to deliver all of its data."""
-    if pair.tail_s >= orbit.TAIL_S:
+    if pair.tail_s >= TAIL_S:
         return ()
     held = format_quantity(pair.tail_s, "s")
     return (f"the orbits hold for {held} behind the span: data still on board then count as never arrived",)

@@ -8,10 +8,9 @@ from numpy.typing import NDArray
 
 from microrad import orbit
 from microrad.mission.tables.operations import Downlink
+from microrad.orbit.base import Floats
 from microrad.orbit.day.flow import Way
 from microrad.orbit.day.geometry import View
-
-Floats = NDArray[np.float64]
 
 STEP_S = 30.0
 LONGEST_S = 86400.0
@@ -60,29 +59,21 @@ def ground_track(seen: View, ways: tuple[Way, ...], downlink: Downlink | None) -
     time_s = np.arange(0.0, min(seen.duration_s, LONGEST_S), STEP_S)
     turned = pair.epoch.earth_rotation_rad(time_s)
     own = orbit.subpoint(pair.leo.orbit.states(time_s).position_m, turned)
-    height_m = _height_m(own.height_m)
-    stations = () if downlink is None else tuple(_station(s, height_m) for s in orbit.stations(downlink))
+    mean_m = float(np.mean(own.height_m))  # or None, where the height varies too much for one to stand for all
+    height_m = mean_m if np.ptp(own.height_m) < SAME_HEIGHT * (orbit.EARTH_RADIUS_M + mean_m) else None
+    found = {}
+    for way in ways:
+        found[way.name] = np.zeros(time_s.size, dtype=bool)
+        for contact in way.contacts:
+            found[way.name] |= (contact.start_s <= time_s) & (time_s <= contact.end_s)
     return GroundTrack(
         time_s=time_s,
         latitude_rad=own.latitude_rad,
         longitude_rad=own.longitude_rad,
-        open={way.name: _during(time_s, way.contacts) for way in ways},
+        open=found,
         relay=_relay(pair, time_s, turned, height_m),
-        stations=stations,
+        stations=tuple(_station(s, height_m) for s in (() if downlink is None else orbit.stations(downlink))),
     )
-
-
-def _during(time_s: Floats, contacts: tuple[orbit.Contact, ...]) -> NDArray[np.bool_]:
-    found = np.zeros(time_s.size, dtype=bool)
-    for contact in contacts:
-        found |= (contact.start_s <= time_s) & (time_s <= contact.end_s)
-    return found
-
-
-def _height_m(heights_m: Floats) -> float | None:
-    """The mean height, or None where the height varies too much for one to stand for all."""
-    mean = float(np.mean(heights_m))
-    return mean if np.ptp(heights_m) < SAME_HEIGHT * (orbit.EARTH_RADIUS_M + mean) else None
 
 
 def _relay(pair: orbit.Pair, time_s: Floats, turned_rad: Floats, height_m: float | None) -> Outline:

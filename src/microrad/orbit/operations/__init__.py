@@ -1,12 +1,18 @@
-"""The day: contacts and locks become data rates, volumes and latencies; terminals are shared; plans are written."""
+"""From contacts to data: rates, the store and its latencies, terminals that are shared, plans that are written."""
 
-from microrad.orbit.operations.base import OperationsError
-from microrad.orbit.operations.latency import Latency, pool
+from microrad.orbit.base import OperationsError
 from microrad.orbit.operations.plan import COLUMNS, PlannedSession, contact_plan, csv_text, spreadsheet_text
 from microrad.orbit.operations.rates import RateTable, Service, Step, service
-from microrad.orbit.operations.schedule import Opportunities, Rules, Sessions, schedule
-from microrad.orbit.operations.store import Production, StoreHistory, deliver
-from microrad.orbit.operations.totals import Totals, totals_by_relay, totals_by_satellite
+from microrad.orbit.operations.schedule import (
+    Opportunities,
+    Rules,
+    Sessions,
+    Totals,
+    schedule,
+    totals_by_relay,
+    totals_by_satellite,
+)
+from microrad.orbit.operations.store import Latency, StoreHistory, deliver, pool
 
 __all__ = [
     "COLUMNS",
@@ -14,7 +20,6 @@ __all__ = [
     "OperationsError",
     "Opportunities",
     "PlannedSession",
-    "Production",
     "RateTable",
     "Rules",
     "Service",

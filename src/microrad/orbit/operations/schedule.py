@@ -1,78 +1,28 @@
 """A constellation shares the terminals of its relays: who is served when, and how evenly."""
 
 import heapq
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import NDArray
 
-from microrad.orbit.operations.base import (
-    Floats,
-    Integers,
-    OperationsError,
-    check_number,
-    check_positive,
-    vector,
-)
+from microrad.orbit.base import Floats
+
+Integers = NDArray[np.int64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Opportunities:
     """Spans in which a satellite could use a relay, all of shape (n,), in order of `start_s`; indices count from 0.
 
-    Raises `OperationsError` for rows of different lengths, indices that are negative or not whole, times that are not
-    finite, an end that is not after its start, starts out of order, and two that overlap for one satellite and relay.
+    Two spans of one satellite and relay do not overlap.
     """
 
     satellite: Integers
     relay: Integers
     start_s: Floats
     end_s: Floats
-
-    def __post_init__(self) -> None:
-        """Refuse what is not a sorted list of spans."""
-        satellite, relay = _indices(self.satellite, "satellite"), _indices(self.relay, "relay")
-        start, end = vector(self.start_s, "the starts"), vector(self.end_s, "the ends")
-        if len({satellite.size, relay.size, start.size, end.size}) > 1:
-            raise OperationsError(
-                f"{satellite.size} satellites, {relay.size} relays, {start.size} starts and {end.size} ends do not "
-                "fit; give one of each for every opportunity"
-            )
-        _check_order(satellite, relay, start, end)
-        for name, values in (("satellite", satellite), ("relay", relay), ("start_s", start), ("end_s", end)):
-            object.__setattr__(self, name, values)
-
-
-def _indices(values: ArrayLike, what: str) -> Integers:
-    found = vector(values, f"the {what} indices")
-    bad = np.flatnonzero((found < 0.0) | (found != np.floor(found)))
-    if bad.size:
-        raise OperationsError(f"{what} index {bad[0]} is {found[bad[0]]:g}; give whole numbers from 0")
-    return found.astype(np.int64)
-
-
-def _check_order(satellite: Integers, relay: Integers, start: Floats, end: Floats) -> None:
-    bad = np.flatnonzero(end <= start)
-    if bad.size:
-        raise OperationsError(
-            f"opportunity {bad[0]} ends at {end[bad[0]]:.9g} s, not after its start at {start[bad[0]]:.9g} s; "
-            "give the start first"
-        )
-    bad = np.flatnonzero(np.diff(start) < 0.0)
-    if bad.size:
-        raise OperationsError(
-            f"opportunity {bad[0] + 1} starts at {start[bad[0] + 1]:.9g} s, before the one ahead of it "
-            f"({start[bad[0]]:.9g} s); sort them by their start"
-        )
-    order = np.lexsort((start, relay, satellite))
-    pair = (np.diff(satellite[order]) == 0) & (np.diff(relay[order]) == 0)
-    bad = np.flatnonzero(pair & (start[order][1:] < end[order][:-1]))
-    if bad.size:
-        first, second = order[bad[0]], order[bad[0] + 1]
-        raise OperationsError(
-            f"opportunities {first} and {second} of satellite {satellite[first]} and relay {relay[first]} overlap: one "
-            f"starts at {start[second]:.9g} s, the other ends at {end[first]:.9g} s; join them"
-        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,31 +31,12 @@ class Rules:
 
     `overhead_s` is slew and acquisition: the terminal is busy and no data flows. After `longest_s` a session ends if
     another satellite waits for that relay then, else it goes on for as long again. A session that the geometry would
-    end before `shortest_s` is not begun.
-
-    Raises `OperationsError` for values that are not finite (`longest_s` may be inf), a negative overhead, a shortest
-    session that is not longer than the overhead, and a longest one shorter than the shortest.
+    end before `shortest_s` is not begun. `overhead_s` < `shortest_s` <= `longest_s`, which may be inf.
     """
 
     overhead_s: float
     shortest_s: float
     longest_s: float
-
-    def __post_init__(self) -> None:
-        """Refuse durations that leave no time for data."""
-        check_number(self.overhead_s, "the overhead of a session", "s")
-        check_positive(self.shortest_s, "the shortest session", "s")
-        check_positive(self.longest_s, "the longest session", "s", infinite=True)
-        if self.shortest_s <= self.overhead_s:
-            raise OperationsError(
-                f"the shortest session, {self.shortest_s:g} s, is not longer than its overhead of "
-                f"{self.overhead_s:g} s: it would carry no data; lengthen it"
-            )
-        if self.longest_s < self.shortest_s:
-            raise OperationsError(
-                f"the longest session, {self.longest_s:g} s, is shorter than the shortest, {self.shortest_s:g} s; "
-                "exchange them or lengthen it"
-            )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -250,14 +181,7 @@ def schedule(
     schedule; the effort grows as the number of opportunities and sessions.
 
     This is a rule that is fair and simple to announce, not the schedule of the most data.
-
-    Raises `OperationsError` for counts that are not above 0, an index beyond its count, and a start that is not finite
-    or after the first opportunity.
     """
-    for count, what in ((satellites, "satellites"), (relays, "relays"), (terminals, "terminals on each relay")):
-        if count < 1:
-            raise OperationsError(f"the number of {what} is {count}; give at least 1")
-    _check_counts(opportunities, satellites, relays, start_s)
     plan = _Plan(opportunities, (satellites, relays, terminals), rules, start_s)
     starts, place = opportunities.start_s.tolist(), 0
     while place < len(starts) or plan.events:
@@ -270,17 +194,57 @@ def schedule(
     return Sessions(satellite, relay, terminal, rows[:, 3].copy(), rows[:, 3] + rules.overhead_s, rows[:, 4].copy())
 
 
-def _check_counts(opportunities: Opportunities, satellites: int, relays: int, start_s: float) -> None:
-    for index, count, what in (
-        (opportunities.satellite, satellites, "satellite"),
-        (opportunities.relay, relays, "relay"),
-    ):
-        if index.size and index.max() >= count:
-            raise OperationsError(
-                f"an opportunity names {what} {index.max()}, but there are {count}, counted from 0; correct the "
-                f"index or the number of {what}s"
-            )
-    if (opportunities.start_s.size and not start_s <= opportunities.start_s[0]) or not np.isfinite(start_s):
-        raise OperationsError(
-            f"the schedule starts at {start_s:.9g} s; give a finite time not after the first opportunity"
-        )
+# -------------------------------------------------------------------------------------------------------------- totals
+@dataclass(frozen=True, slots=True, eq=False)
+class Totals:
+    """Per satellite or per relay, all of shape (count,): sessions, busy time with overhead, time with data, its volume.
+
+    `longest_gap_s` is the longest time within the span without data, its start and end counted as data: the whole span
+    where there was none. A relay has data while one of its terminals has.
+    """
+
+    sessions: Integers
+    busy_s: Floats
+    served_s: Floats
+    volume_bit: Floats
+    longest_gap_s: Floats
+
+
+def totals_by_satellite(
+    sessions: Sessions, satellites: int, volume_bit: Sequence[float] | Floats, span: tuple[float, float]
+) -> Totals:
+    """What each satellite got over the span (start_s, end_s); `volume_bit` (n,) is the data of each session."""
+    return _totals(sessions, sessions.satellite, satellites, volume_bit, span)
+
+
+def totals_by_relay(
+    sessions: Sessions, relays: int, volume_bit: Sequence[float] | Floats, span: tuple[float, float]
+) -> Totals:
+    """What each relay carried over all its terminals; arguments as `totals_by_satellite`."""
+    return _totals(sessions, sessions.relay, relays, volume_bit, span)
+
+
+def _totals(
+    sessions: Sessions, index: Integers, count: int, volume_bit: Sequence[float] | Floats, span: tuple[float, float]
+) -> Totals:
+    def add(each: Sequence[float] | Floats) -> Floats:
+        return np.bincount(index, each, minlength=count).astype(np.float64)
+
+    return Totals(
+        sessions=np.bincount(index, minlength=count).astype(np.int64),
+        busy_s=add(sessions.end_s - sessions.start_s),
+        served_s=add(sessions.end_s - sessions.locked_s),
+        volume_bit=add(volume_bit),
+        longest_gap_s=_longest_gaps(sessions, index, count, span),
+    )
+
+
+def _longest_gaps(sessions: Sessions, index: Integers, count: int, span: tuple[float, float]) -> Floats:
+    order = np.lexsort((sessions.locked_s, index))
+    edges = np.searchsorted(index[order], np.arange(count + 1))
+    gaps = np.empty(count)
+    for one in range(count):
+        mine = order[edges[one] : edges[one + 1]]
+        data_until = np.maximum.accumulate(np.concatenate(([span[0]], sessions.end_s[mine])))
+        gaps[one] = np.max(np.concatenate((sessions.locked_s[mine], [span[1]])) - data_until)
+    return gaps

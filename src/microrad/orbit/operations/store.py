@@ -1,37 +1,86 @@
-"""On-board store between an instrument and the link: volumes, what is stored when, and the latency of the data."""
+"""The store on board between an instrument and the link: what is on board when, and how late the data arrives."""
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from microrad.orbit.operations.base import (
-    Floats,
-    OperationsError,
-    check_number,
-    check_span,
-)
-from microrad.orbit.operations.latency import Latency, latency_of
+from microrad.orbit.base import Floats
 from microrad.orbit.operations.rates import Service
 
+_ROUNDING = 1e-12  # of a share that is a sum of many
 
-@dataclass(frozen=True, slots=True)
-class Production:
-    """Data produced at a constant rate over the observed span.
 
-    Raises `OperationsError` for a rate that is negative or not finite, and a span that does not end after it starts.
+@dataclass(frozen=True, slots=True, eq=False)
+class Latency:
+    """Latency of the data that was kept: slabs of data, in each of which it changes linearly, and what never arrived.
+
+    `first_s` and `last_s` are the latencies of the first and the last bit of each slab and `volume_bit` the slab's
+    data, each of shape (m,). `missing_bit` was still on board at the end: it counts as later than any latency. Data
+    lost for want of room is not in the distribution.
     """
 
-    rate_bit_s: float
-    start_s: float
-    end_s: float
+    first_s: Floats
+    last_s: Floats
+    volume_bit: Floats
+    missing_bit: float
 
-    def __post_init__(self) -> None:
-        """Refuse a negative rate or a span that ends before it starts."""
-        check_number(self.rate_bit_s, "the rate of production", "bit/s")
-        check_span((self.start_s, self.end_s), "the observed span")
+    @property
+    def delivered_bit(self) -> float:
+        """Data that arrived."""
+        return float(np.sum(self.volume_bit))
+
+    @property
+    def delivered_share(self) -> float:
+        """Share of the data kept that arrived; nan where no data was kept."""
+        total = self.delivered_bit + self.missing_bit
+        return self.delivered_bit / total if total > 0.0 else math.nan
+
+    def cdf(self, latency_s: ArrayLike) -> Floats:
+        """Share of the data kept that arrived within each latency, of the shape of `latency_s`; nan without data."""
+        wanted = np.asarray(latency_s, dtype=np.float64)
+        shares = [self._share(value, at=True) for value in wanted.ravel()]
+        return np.array(shares, dtype=np.float64).reshape(wanted.shape)
+
+    def quantile(self, share: float) -> float:
+        """Least latency within which `share` of the data kept has arrived, in s.
+
+        It is inf where more than 1 - `share` was still on board at the end, nan where no data was kept.
+        """
+        if math.isnan(self.delivered_share):
+            return math.nan
+        wanted = share * (1.0 - _ROUNDING)
+        if self.delivered_share < wanted:
+            return math.inf
+        knots = np.unique(np.concatenate((self.first_s, self.last_s)))
+        low, high = -1, knots.size - 1  # at `high` the share is reached, at `low` it is not
+        while high - low > 1:
+            middle = (low + high) // 2
+            low, high = (low, middle) if self._share(knots[middle], at=True) >= wanted else (middle, high)
+        return self._between(knots, high, wanted)
+
+    def _between(self, knots: Floats, place: int, wanted: float) -> float:
+        """Latency up to knot `place` where the share is reached: the distribution is linear from knot to knot."""
+        high = float(knots[place])
+        if place == 0:
+            return high
+        low = float(knots[place - 1])
+        below, above = self._share(low, at=True), self._share(high, at=False)
+        if wanted >= above:
+            return high  # reached by the jump at the knot
+        return low + (high - low) * (wanted - below) / (above - below)
+
+    def _share(self, latency_s: float, *, at: bool) -> float:
+        """Share of the data kept that arrived within a latency; `at` counts the data that has exactly this latency."""
+        total = self.delivered_bit + self.missing_bit
+        if total <= 0.0:
+            return math.nan
+        low, high = np.minimum(self.first_s, self.last_s), np.maximum(self.first_s, self.last_s)
+        reached = (low <= latency_s) if at else (low < latency_s)
+        inside = np.divide(latency_s - low, high - low, out=np.ones(low.size), where=high > low)
+        return float(np.dot(self.volume_bit, np.where(reached, np.clip(inside, 0.0, 1.0), 0.0))) / total
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -39,8 +88,7 @@ class StoreHistory:
     """The store over the span: cumulative data at the moments where a rate changes, linear in between.
 
     `time_s`, `generated_bit`, `lost_bit`, `delivered_bit` and `stored_bit` have the shape (n,); at each moment
-    generated = delivered + lost + stored. `contact_bit` is what each contact delivered and `contact_capacity_bit` what
-    it could have sent, both of shape (contacts,).
+    generated = delivered + lost + stored.
     """
 
     time_s: Floats
@@ -48,103 +96,50 @@ class StoreHistory:
     lost_bit: Floats
     delivered_bit: Floats
     stored_bit: Floats
-    contact_bit: Floats
-    contact_capacity_bit: Floats
     latency: Latency
-
-    @property
-    def total_generated_bit(self) -> float:
-        """Data produced in the observed span."""
-        return float(self.generated_bit[-1])
-
-    @property
-    def total_delivered_bit(self) -> float:
-        """Data sent by the end of the span."""
-        return float(self.delivered_bit[-1])
-
-    @property
-    def total_lost_bit(self) -> float:
-        """Data that found the store full."""
-        return float(self.lost_bit[-1])
-
-    @property
-    def not_delivered_bit(self) -> float:
-        """Data still on board at the end of the span."""
-        return float(self.stored_bit[-1])
 
     @property
     def largest_stored_bit(self) -> float:
         """Most data on board at any moment."""
         return float(np.max(self.stored_bit))
 
-    @property
-    def delivered_share(self) -> float:
-        """Share of the data produced that was sent by the end of the span; nan where none was produced."""
-        total = self.total_generated_bit
-        return self.total_delivered_bit / total if total > 0.0 else math.nan
-
 
 def deliver(
-    production: Production,
+    rate_bit_s: float,
+    observed_s: tuple[float, float],
     capacity_bit: float,
     services: Sequence[Service],
-    span: tuple[float, float],
+    span_s: tuple[float, float],
     delay_s: float,
 ) -> StoreHistory:
-    """Run a store that is empty at the start of `span` (start_s, end_s) through its contacts.
+    """Run a store that is empty at the start of `span_s` through its contacts.
 
-    The store is a fluid queue, first in, first out, of `capacity_bit` (inf allowed). What does not fit is lost, the
-    newest: a full store still takes in what the link takes out. Between two changes of rate the stored data is linear
-    in time until it meets 0 or the capacity, so the result is exact and there is no time step. The span may begin
-    before and end after the observed one; what is on board at its end counts as not delivered. `delay_s` is added to
-    every latency: from the satellite to where the data is wanted. Mean rates count, outages spread evenly.
+    The store is a fluid queue, first in, first out. What does not fit is lost, the newest: a full store still takes in
+    what the link takes out. Between two changes of rate the stored data is linear in time until it meets 0 or the
+    capacity, so the result is exact and there is no time step. Mean rates count, outages spread evenly.
 
-    Raises `OperationsError` for a capacity that is not above 0, contacts that overlap, are unsorted or leave the span,
-    an observed span that leaves the span, a negative delay, and nan anywhere.
+    Args:
+        rate_bit_s: data produced over the observed time, at least 0.
+        observed_s: start and end of the production, within the span.
+        capacity_bit: room of the store, above 0; inf allowed.
+        services: the contacts, in order, which do not overlap and lie within the span.
+        span_s: start and end. What is on board at its end counts as not delivered.
+        delay_s: added to every latency: from the satellite to where the data is wanted.
     """
-    if not capacity_bit > 0.0:
-        raise OperationsError(f"the capacity of the store is {capacity_bit:g} bit; give more than 0 bit, inf allowed")
-    check_span(span, "the span")
-    check_number(delay_s, "the delay", "s")
-    _check_inside(production, services, span)
-    grid = np.unique(np.concatenate([span, (production.start_s, production.end_s), *(s.edges_s for s in services)]))
+    grid = np.unique(np.concatenate([span_s, observed_s, *(s.edges_s for s in services)]))
     middle = 0.5 * (grid[1:] + grid[:-1])
-    made = np.where((production.start_s < middle) & (middle < production.end_s), production.rate_bit_s, 0.0)
+    made = np.where((observed_s[0] < middle) & (middle < observed_s[1]), rate_bit_s, 0.0)
     time, stored, kept, lost = _march(grid, made, _sent_bit_s(services, middle), capacity_bit)
     # kept less stored, not a sum of its own: an empty store has then delivered all, to the last bit
     delivered = np.maximum.accumulate(np.minimum(kept - stored, kept))
-    at_edges = [np.interp((s.start_s, s.end_s), time, delivered) for s in services]
     return StoreHistory(
         time_s=time,
         generated_bit=kept + lost,
         lost_bit=lost,
         delivered_bit=delivered,
         stored_bit=stored,
-        contact_bit=np.array([after - before for before, after in at_edges], dtype=np.float64),
-        contact_capacity_bit=np.array([s.capacity_bit for s in services], dtype=np.float64),
-        latency=latency_of(time, kept, delivered, delay_s),
+        latency=_latency(time, kept, delivered, delay_s),
     )
-
-
-def _check_inside(production: Production, services: Sequence[Service], span: tuple[float, float]) -> None:
-    start, end = span
-    if not (start <= production.start_s and production.end_s <= end):
-        raise OperationsError(
-            f"data is produced from {production.start_s:.9g} s to {production.end_s:.9g} s, outside the span from "
-            f"{start:.9g} s to {end:.9g} s; lengthen the span"
-        )
-    for number, one in enumerate(services):
-        if one.start_s < start or one.end_s > end:
-            raise OperationsError(
-                f"contact {number} runs from {one.start_s:.9g} s to {one.end_s:.9g} s, outside the span from "
-                f"{start:.9g} s to {end:.9g} s; cut it at the span or lengthen the span"
-            )
-    for number, (first, second) in enumerate(pairwise(services)):
-        if second.start_s < first.end_s:
-            raise OperationsError(
-                f"contact {number + 1} starts at {second.start_s:.9g} s, before contact {number} ends at "
-                f"{first.end_s:.9g} s; give contacts in order that do not overlap"
-            )
 
 
 def _sent_bit_s(services: Sequence[Service], middle: Floats) -> Floats:
@@ -186,3 +181,40 @@ def _piece(row: _Row, end: float, rate_in: float, rate_out: float, capacity: flo
         return until, bound, kept + rate_in * (until - time), lost
     within = min(max(stored + net * (end - time), 0.0), capacity)
     return end, within, kept + rate_in * (end - time), lost
+
+
+# ------------------------------------------------------------------------------------------------------------- latency
+def _latency(time_s: Floats, kept_bit: Floats, delivered_bit: Floats, delay_s: float) -> Latency:
+    """Latency from the piecewise-linear cumulative data kept and delivered at the times `time_s`, all (n,), rising.
+
+    First in, first out: the bit number b is made when the kept data reach b and delivered when the delivered data do;
+    it arrives `delay_s` later. Between two levels at which either curve bends both moments are linear in b.
+    """
+    end = delivered_bit[-1]
+    levels = np.unique(np.concatenate((kept_bit, delivered_bit)))
+    levels = levels[levels <= end]
+    low, high = levels[:-1], levels[1:]
+    waits = [
+        _moment(delivered_bit, time_s, low, high, level) - _moment(kept_bit, time_s, low, high, level)
+        for level in (low, high)
+    ]
+    first, last = (np.maximum(wait, 0.0) + delay_s for wait in waits)
+    return Latency(first, last, high - low, float(kept_bit[-1] - end))
+
+
+def _moment(curve: Floats, time_s: Floats, low: Floats, high: Floats, level: Floats) -> Floats:
+    """Moment at which a curve that does not fall is at `level`, by its piece that spans `low` to `high`."""
+    piece = np.clip(np.searchsorted(curve, 0.5 * (low + high), side="right") - 1, 0, curve.size - 2)
+    rise = curve[piece + 1] - curve[piece]
+    part = np.divide(level - curve[piece], rise, out=np.zeros(level.size), where=rise > 0.0)
+    return np.asarray(time_s[piece] + np.clip(part, 0.0, 1.0) * (time_s[piece + 1] - time_s[piece]))
+
+
+def pool(latencies: Sequence[Latency]) -> Latency:
+    """Latency over the data of several runs together: each run counts by its data."""
+    return Latency(
+        np.concatenate([x.first_s for x in latencies]),
+        np.concatenate([x.last_s for x in latencies]),
+        np.concatenate([x.volume_bit for x in latencies]),
+        math.fsum(x.missing_bit for x in latencies),
+    )

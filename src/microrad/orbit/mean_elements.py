@@ -168,7 +168,7 @@ class Sgp4Orbit:
             )
 
     def _check_perigee(self, time_s: float) -> None:
-        """Refuse a mean perigee that is too low at a time; also what SGP4 itself refuses there."""
+        """Raise `OrbitError` for a mean perigee that is too low at a time, and where SGP4 itself stops there."""
         satellite = self._satellite
         days = (time_s + self.elements_age_s) / DAY_S + satellite.jdsatepochF
         error, _, _ = satellite.sgp4(satellite.jdsatepoch, days)

@@ -1,9 +1,9 @@
-"""From the mission's tables to orbits, terminals and stations."""
+"""The door: from the mission's tables to orbits, terminals and stations, which all else takes."""
 
 import math
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from microrad.mission.file import NamedFile, content_of
@@ -12,19 +12,20 @@ from microrad.mission.tables.operations import Constellation, Downlink
 from microrad.mission.tables.orbit import Orbits, OrbitTable, VisibilityLimits
 from microrad.orbit.analytic import GeostationarySlot, KeplerOrbit, node_of_local_time, sun_synchronous_inclination_rad
 from microrad.orbit.base import Orbit, OrbitError
-from microrad.orbit.earth import EARTH_RADIUS_M, Earth
-from microrad.orbit.element_files import read_elements
-from microrad.orbit.elements import MOST_ELEMENTS_AGE_S, ElementSet, Sgp4Orbit, closest_elements, sgp4_orbit
+from microrad.orbit.earth import EARTH_RADIUS_M, Earth, Station
 from microrad.orbit.ephemeris import EphemerisOrbit
 from microrad.orbit.epoch import Epoch
-from microrad.orbit.ground import Station
+from microrad.orbit.files import read_elements, read_oem
 from microrad.orbit.limits import UNLIMITED, Limits, Terminal
-from microrad.orbit.oem import read_oem
+from microrad.orbit.mean_elements import MOST_ELEMENTS_AGE_S, ElementSet, Sgp4Orbit, closest_elements, sgp4_orbit
 
 Contents = tuple[NamedFile, ...]
+"""The files that a mission names, read once with it."""
 
 TAIL_S = 86400.0
 """Time behind the span in which data of the span may still arrive."""
+REPEATED = ("circular", "keplerian")
+"""Kinds of orbits that the pattern of a constellation can repeat."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,116 +48,94 @@ class Pair:
 def pair(m: LinkMission, folder: Path, contents: Contents = ()) -> Pair:
     """The terminals of a mission with a table `orbit`; files are looked for in ``contents``, and then in ``folder``.
 
+    Args:
+        m: the mission.
+        folder: the folder of its file.
+        contents: the files that it names, where they were read with it.
+
     Raises `OrbitError` for an orbit that is none, or that does not hold over the mission's span.
     """
-    orbits = table(m)
-    epoch = _epoch(orbits)
+    orbits = orbits_table(m)
+    try:
+        epoch = Epoch(orbits.epoch)
+    except OrbitError as error:
+        raise OrbitError(f"orbit.epoch: {error}") from None
     names = m.terminals.called("leo"), m.terminals.called("geo")
     if names[0] == names[1]:  # two terminals of one make
         names = f"{names[0]} (own)", f"{names[1]} (partner)"
     found, tail = [], TAIL_S
     for end, name in zip(("leo", "geo"), names, strict=True):
+        given = getattr(orbits, end)
         try:
-            one = terminal(getattr(orbits, end), name, epoch, folder, contents)
-            tail = min(tail, _tail(one.orbit, epoch, orbits.duration_s))
+            own = _orbit(given, name, epoch, folder, contents)
+            tail = min(tail, _tail(own, epoch, orbits.duration_s))
         except OrbitError as error:
             raise OrbitError(f"orbit.{end}: {error}") from None
-        found.append(one)
-    return Pair(epoch, earth(orbits), found[0], found[1], (0.0, orbits.duration_s), tail)
+        found.append(Terminal(own, _limits(given.limits), name))
+    earth = Earth(orbits.earth, orbits.grazing_height_m)
+    return Pair(epoch, earth, found[0], found[1], (0.0, orbits.duration_s), tail)
 
 
-def table(m: LinkMission) -> Orbits:
+def orbits_table(m: LinkMission) -> Orbits:
     """The mission's table of orbits; `OrbitError` without one."""
     if m.orbit is None:
         raise OrbitError("the mission has no table [orbit]: microrad init writes one")
     return m.orbit
 
 
-def _epoch(orbits: Orbits) -> Epoch:
-    try:
-        return Epoch.from_text(orbits.epoch)
-    except OrbitError as error:
-        raise OrbitError(f"orbit.epoch: {error}") from None
-
-
-def earth(orbits: Orbits) -> Earth:
-    """What hides a partner."""
-    return Earth(orbits.earth, orbits.grazing_height_m)
-
-
 def _tail(orbit: Orbit, epoch: Epoch, duration_s: float) -> float:
     """How far behind the span an orbit holds; raises `OrbitError` where it does not hold over it."""
-    if not isinstance(orbit, Sgp4Orbit | EphemerisOrbit):
-        return TAIL_S if _tabulated(epoch, duration_s + TAIL_S) else 0.0
-    orbit.require(0.0, duration_s)
+    if isinstance(orbit, EphemerisOrbit):
+        orbit.require(0.0, duration_s)
+        return min(TAIL_S, max(orbit.span_s[1] - duration_s, 0.0))
+    tail = TAIL_S
     if isinstance(orbit, Sgp4Orbit):
+        orbit.require(0.0, duration_s)
         tail = min(TAIL_S, max(MOST_ELEMENTS_AGE_S - orbit.elements_age_s - duration_s, 0.0))
-        try:
-            orbit.require(0.0, duration_s + tail)
-        except OrbitError:  # it decays behind the span
-            return 0.0
-        return tail
-    return min(TAIL_S, max(orbit.span_s[1] - duration_s, 0.0))
-
-
-def _tabulated(epoch: Epoch, time_s: float) -> bool:
-    """Whether the rotation of the Earth is known at that time."""
     try:
-        epoch.utc(time_s)
-    except OrbitError:
-        return False
-    return True
+        if isinstance(orbit, Sgp4Orbit):
+            orbit.require(0.0, duration_s + tail)
+        else:
+            epoch.utc(duration_s + tail)
+    except OrbitError:  # it decays behind the span, or the rotation of the Earth is not known there
+        return 0.0
+    return tail
 
 
-def terminal(t: OrbitTable, name: str, epoch: Epoch, folder: Path, contents: Contents = ()) -> Terminal:
-    """A terminal on its orbit, with what it can point at."""
-    return Terminal(orbit_of(t, name, epoch, folder, contents), limits(t.limits), name)
-
-
-def orbit_of(t: OrbitTable, name: str, epoch: Epoch, folder: Path, contents: Contents = ()) -> Orbit:
-    """The orbit that a table describes; its own checks have seen to the keys."""
-    if t.kind == "geostationary":
-        assert t.longitude_rad is not None
+def _orbit(t: OrbitTable, name: str, epoch: Epoch, folder: Path, contents: Contents) -> Orbit:
+    """The orbit that a table describes, whose own checks have seen to the keys of each kind."""
+    if t.longitude_rad is not None:
         return GeostationarySlot(name, epoch, t.longitude_rad)
+    if t.file is None:
+        return _kepler(t, name, epoch)
+    path, data = folder / t.file, content_of(t.file, contents)
     if t.kind == "ephemeris":
-        assert t.file is not None
-        return read_oem(folder / t.file, epoch, t.object, content_of(t.file, contents))
-    if t.kind == "elements":
-        assert t.file is not None
-        sets = read_elements(folder / t.file, t.object, content_of(t.file, contents))
-        return sgp4_orbit(closest_elements(sets, epoch), epoch)
-    return _kepler(t, name, epoch)
+        return read_oem(path, epoch, t.object, data)
+    return sgp4_orbit(closest_elements(read_elements(path, t.object, data), epoch), epoch)
 
 
 def _kepler(t: OrbitTable, name: str, epoch: Epoch) -> KeplerOrbit:
+    """The orbit of a table with elements; a circular one has an altitude and a phase, and not what is 0 then."""
     assert t.inclination_rad is not None
-    if t.kind == "circular":
-        assert t.altitude_m is not None and t.phase_rad is not None
-        axis, eccentricity, perigee, anomaly = EARTH_RADIUS_M + t.altitude_m, 0.0, 0.0, t.phase_rad
-    else:
-        assert t.semi_major_axis_m is not None and t.eccentricity is not None
-        assert t.argument_of_perigee_rad is not None and t.mean_anomaly_rad is not None
-        axis, eccentricity, perigee = t.semi_major_axis_m, t.eccentricity, t.argument_of_perigee_rad
-        anomaly = t.mean_anomaly_rad
-    inclination = t.inclination_rad
+    axis = t.semi_major_axis_m or EARTH_RADIUS_M + (t.altitude_m or 0.0)
+    eccentricity, perigee = t.eccentricity or 0.0, t.argument_of_perigee_rad or 0.0
+    inclination, node = t.inclination_rad, t.node_rad
     if isinstance(inclination, str):
         inclination = sun_synchronous_inclination_rad(axis - EARTH_RADIUS_M, eccentricity)
-    node = t.node_rad
     if node is None:
-        assert t.local_time_s is not None
-        node = node_of_local_time(epoch, t.local_time_s / 3600.0 % 24.0)
+        node = node_of_local_time(epoch, (t.local_time_s or 0.0) / 3600.0 % 24.0)
+    anomaly = t.phase_rad or t.mean_anomaly_rad or 0.0
     return KeplerOrbit(name, epoch, axis, eccentricity, inclination, node, perigee, anomaly, t.gravity == "j2")
 
 
-def limits(t: VisibilityLimits | None) -> Limits:
+def _limits(t: VisibilityLimits | None) -> Limits:
     """What a terminal can point at; anything without the table."""
     if t is None:
         return UNLIMITED
-    boresight = UNLIMITED.boresight if t.boresight is None else (t.boresight[0], t.boresight[1], t.boresight[2])
     return Limits(
         attitude=t.attitude,
-        boresight=boresight,
-        field_of_regard_rad=math.pi if t.field_of_regard_rad is None else t.field_of_regard_rad,
+        boresight=t.boresight or UNLIMITED.boresight,
+        field_of_regard_rad=t.field_of_regard_rad or math.pi,
         slew_limit_rad_s=t.slew_limit_rad_s,
         sun_exclusion_rad=t.sun_exclusion_rad,
         in_eclipse=t.in_eclipse,
@@ -170,9 +149,9 @@ def stations(downlink: Downlink) -> tuple[Station, ...]:
     )
 
 
-def relays(c: Constellation, m: LinkMission, epoch: Epoch) -> tuple[Terminal, ...]:
+def relays(c: Constellation, orbits: Orbits, epoch: Epoch) -> tuple[Terminal, ...]:
     """The relays of a constellation, each limited as the mission's own partner is."""
-    shared = limits(table(m).geo.limits)
+    shared = _limits(orbits.geo.limits)
     return tuple(
         Terminal(GeostationarySlot(name, epoch, relay.longitude_rad), shared, name) for name, relay in c.relays.items()
     )
@@ -190,47 +169,45 @@ def _names(sets: Sequence[ElementSet], path: Path) -> list[str]:
 
 def repeats(c: Constellation, m: LinkMission) -> bool:
     """Whether the constellation has satellites: from a file, or from elements that its pattern can repeat."""
-    return c.pattern == "file" or table(m).leo.kind in ("circular", "keplerian")
+    return c.pattern == "file" or orbits_table(m).leo.kind in REPEATED
 
 
 def satellites(
-    c: Constellation, m: LinkMission, epoch: Epoch, folder: Path, contents: Contents = ()
+    c: Constellation, orbits: Orbits, epoch: Epoch, folder: Path, contents: Contents = ()
 ) -> Iterator[Terminal]:
     """The satellites of a constellation, one after the other, each limited as the mission's own is.
 
     Walker's patterns i: t/p/f: plane k of p has its node 2 pi k / p further ("star": pi k / p), and satellite j of it
     its phase 2 pi (j p / t + f k / t) further (J. G. Walker, J. Br. Interplanet. Soc. 37, 1984).
+
+    Args:
+        c: the mission's table of its constellation.
+        orbits: the mission's table of orbits, whose own satellite the pattern repeats.
+        epoch: from which times count.
+        folder: where files are looked for that are not among the contents.
+        contents: the files that the mission names.
+
+    Raises `OrbitError` for a file that is refused, and an orbit that no pattern can repeat.
     """
-    shared = limits(table(m).leo.limits)
-    if c.pattern == "file":
-        assert c.file is not None
+    shared = _limits(orbits.leo.limits)
+    if c.file is not None:
         sets = read_elements(folder / c.file, data=content_of(c.file, contents))
         for elements, name in zip(sets, _names(sets, folder / c.file), strict=True):
             own = sgp4_orbit(elements, epoch)
-            own.require(0.0, table(m).duration_s)
+            own.require(0.0, orbits.duration_s)
             yield Terminal(own, shared, name)
         return
     assert c.satellites is not None and c.planes is not None and c.phasing is not None
-    if not repeats(c, m):
+    if orbits.leo.kind not in REPEATED:
         raise OrbitError(
-            f'constellation.pattern is "{c.pattern}", and orbit.leo of kind "{table(m).leo.kind}" has nothing to '
-            'repeat: give pattern = "file", or an orbit.leo of kind "circular" or "keplerian"'
+            f'constellation.pattern is "{c.pattern}", and orbit.leo of kind "{orbits.leo.kind}" has nothing to repeat: '
+            'give pattern = "file", or an orbit.leo of kind "circular" or "keplerian"'
         )
-    base, turn = _kepler(table(m).leo, "", epoch), 2.0 * math.pi
+    base, turn = _kepler(orbits.leo, "", epoch), 2.0 * math.pi
     each, round_rad = c.satellites // c.planes, turn if c.pattern == "delta" else turn / 2.0
     for plane in range(c.planes):
+        node = base.node_rad + round_rad * plane / c.planes
         for place in range(each):
             phase = turn * (place * c.planes + c.phasing * plane) / c.satellites
-            name = f"{plane + 1}-{place + 1}"
-            orbit = KeplerOrbit(
-                name,
-                epoch,
-                base.semi_major_axis_m,
-                base.eccentricity,
-                base.inclination_rad,
-                base.node_rad + round_rad * plane / c.planes,
-                base.argument_of_perigee_rad,
-                base.mean_anomaly_rad + phase,
-                base.j2,
-            )
-            yield Terminal(orbit, shared, name)
+            name, anomaly = f"{plane + 1}-{place + 1}", base.mean_anomaly_rad + phase
+            yield Terminal(replace(base, name=name, node_rad=node, mean_anomaly_rad=anomaly), shared, name)

@@ -15,9 +15,19 @@ from microrad.orbit.base import Floats, OrbitError, States
 from microrad.orbit.earth import MU_M3_S2
 from microrad.orbit.ephemeris import SLACK_S, EphemerisOrbit, Segment
 from microrad.orbit.epoch import Epoch
-from microrad.orbit.frames import FRAMES, frame_name, to_teme
-from microrad.orbit.instants import TIME_SYSTEMS, elapsed_s, instant, plain_instant
-from microrad.orbit.messages import Field, add_field, finite, kvn_field, read_text, xml_fields
+from microrad.orbit.files.frames import FRAMES, frame_name, to_teme
+from microrad.orbit.files.messages import (
+    TIME_SYSTEMS,
+    Field,
+    add_field,
+    elapsed_s,
+    finite,
+    instant,
+    kvn_field,
+    plain_instant,
+    read_text,
+    xml_fields,
+)
 
 DEFAULT_DEGREE = 7
 """Degree of the Hermite interpolation of a file that names no method: four state vectors around each time."""
@@ -43,7 +53,13 @@ class _Draft:
     values: list[list[float]] = field(default_factory=list)
 
     def add(self, path: Path, place: str, time: str, words: list[str]) -> None:
-        """Take a state vector; raises `OrbitError` for what is not a number."""
+        """Take a state vector; raises `OrbitError` for too many or too few words, and what is not a number."""
+        if len(words) not in (6, 9):
+            raise OrbitError(
+                f"{path}, {place}: {len(words) + 1} columns; a state vector has a time, three of position in km and "
+                "three of velocity in km/s, and may have three of acceleration"
+            )
+        words = words[:6]
         try:
             numbers = list(map(float, words))
         except ValueError:
@@ -106,36 +122,22 @@ def _kvn_drafts(path: Path, text: str) -> Iterator[_Draft]:
                 draft = _Draft(f"line {number}")
         elif block == "head":
             add_field(header, kvn_field(path, number, line), path)
-            _check_version(path, header)
+            first = next(iter(header.values()))
+            if first.key != "CCSDS_OEM_VERS" or first.value.partition(".")[0] not in ("1", "2", "3"):
+                raise OrbitError(
+                    f"{path}, {first.place}: the file begins with {first.key} = {first.shown}, not with CCSDS_OEM_VERS "
+                    "= 1, 2 or 3; give a CCSDS Orbit Ephemeris Message"
+                )
         elif block == "meta":
             add_field(draft.metadata, kvn_field(path, number, line), path)
         elif block == "data":
-            _kvn_row(path, draft, number, words)
+            draft.add(path, f"line {number}", words[0], words[1:])
     if block in ("meta", "covariance"):
         raise OrbitError(
             f"{path}: the file ends before {block.upper()}_STOP; it is cut off: download or export it again"
         )
     if draft.place:
         yield draft
-
-
-def _kvn_row(path: Path, draft: _Draft, number: int, words: list[str]) -> None:
-    if len(words) not in (7, 10):
-        raise OrbitError(
-            f"{path}, line {number}: {len(words)} columns; a state vector has a time, three of position in km and "
-            "three of velocity in km/s, and may have three of acceleration"
-        )
-    draft.add(path, f"line {number}", words[0], words[1:7])
-
-
-def _check_version(path: Path, header: dict[str, Field]) -> None:
-    """Refuse what does not begin as an OEM of a version that is read."""
-    first = next(iter(header.values()))
-    if first.key != "CCSDS_OEM_VERS" or first.value.partition(".")[0] not in ("1", "2", "3"):
-        raise OrbitError(
-            f"{path}, {first.place}: the file begins with {first.key} = {first.shown}, not with CCSDS_OEM_VERS = 1, 2 "
-            "or 3; give a CCSDS Orbit Ephemeris Message"
-        )
 
 
 def _xml_drafts(path: Path, text: str) -> Iterator[_Draft]:
@@ -177,26 +179,23 @@ def _xml_row(path: Path, draft: _Draft, row: dict[str, Field], place: str) -> No
 
 
 def _check_metadata(path: Path, draft: _Draft) -> None:
-    """Refuse a segment whose keys are missing, or whose centre, time system or frame is not read."""
+    """Raise `OrbitError` for a segment whose keys are missing, or whose centre, time system or frame is not read."""
     given = draft.metadata
     for key in _REQUIRED:
         if not given.get(key, Field(key, "", "", "")).value:
             raise OrbitError(f"{path}, {draft.place}: {key} is missing in this segment's metadata; add it")
-    if given["CENTER_NAME"].value.upper() != "EARTH":
-        raise _unread(path, given["CENTER_NAME"], "EARTH")
-    if _system(given) not in TIME_SYSTEMS:
-        raise _unread(path, given["TIME_SYSTEM"], "UTC, TAI, TT, GPS")
-    if not FRAMES.fullmatch(_frame(given)):
-        raise _unread(path, given["REF_FRAME"], "TEME, TOD, EME2000, GCRF, ICRF, ITRF")
+    for key, read, allowed in (
+        ("CENTER_NAME", given["CENTER_NAME"].value.upper() == "EARTH", "EARTH"),
+        ("TIME_SYSTEM", _system(given) in TIME_SYSTEMS, "UTC, TAI, TT, GPS"),
+        ("REF_FRAME", FRAMES.fullmatch(_frame(given)), "TEME, TOD, EME2000, GCRF, ICRF, ITRF"),
+    ):
+        if not read:
+            raise given[key].refused(path, f"; read are {allowed}: export one of these")
     if "REF_FRAME_EPOCH" in given and _frame(given) in ("TEME", "TOD"):
         raise OrbitError(
             f"{path}, {given['REF_FRAME_EPOCH'].place}: REF_FRAME_EPOCH holds {_frame(given)} still at "
             f"{given['REF_FRAME_EPOCH'].value}, and only the frame of date is read; export in EME2000 or GCRF"
         )
-
-
-def _unread(path: Path, given: Field, allowed: str) -> OrbitError:
-    return OrbitError(f"{path}, {given.place}: {given.key} is {given.shown}; read are {allowed}: export one of these")
 
 
 def _system(metadata: dict[str, Field]) -> str:
@@ -237,7 +236,7 @@ def _segment(path: Path, draft: _Draft, epoch: Epoch) -> Segment:
 
 
 def _check_rows(path: Path, draft: _Draft, time: Floats) -> None:
-    """Refuse numbers that are not finite, times that do not rise and distances that no satellite has."""
+    """Raise `OrbitError` for numbers that are not finite, times that do not rise, distances that no satellite has."""
     values = np.array(draft.values)
     bad = np.flatnonzero(~np.all(np.isfinite(values), axis=1))
     if bad.size:
@@ -262,7 +261,7 @@ def _check_rows(path: Path, draft: _Draft, time: Floats) -> None:
 
 
 def _check_velocities(path: Path, draft: _Draft, time: Floats, states: States) -> None:
-    """Refuse velocities that are not those of the positions, and positions that no satellite passes one by one.
+    """Raise `OrbitError` for velocities that are not those of the positions, and steps that no satellite can make.
 
     On a circle of which a step covers the angle 2 x, half the sum of the velocities at its ends is the mean velocity
     between them times x / tan x. Three times what that leaves, at the largest rate that a satellite has at this
@@ -300,7 +299,7 @@ def _check_velocities(path: Path, draft: _Draft, time: Floats, states: States) -
 
 
 def _check_holes(path: Path, draft: _Draft, time: Floats, usable: tuple[float, float]) -> None:
-    """Refuse a segment that would be interpolated over a hole between its state vectors."""
+    """Raise `OrbitError` for a segment that would be interpolated over a hole between its state vectors."""
     step = np.diff(time)
     median = float(np.median(step))
     used = (time[1:] > usable[0] + SLACK_S) & (time[:-1] < usable[1] - SLACK_S)
@@ -323,16 +322,11 @@ def _method(path: Path, draft: _Draft) -> tuple[str, int]:
         raise OrbitError(f"{path}, {method.place}: INTERPOLATION stands without INTERPOLATION_DEGREE; add the degree")
     kind = method.value.upper()
     if kind not in ("HERMITE", "LAGRANGE"):
-        raise OrbitError(
-            f"{path}, {method.place}: INTERPOLATION is {method.shown}; an orbit is read with HERMITE or LAGRANGE, "
-            "because other curves miss it by kilometres or jump in velocity: export with one of these"
-        )
+        why = "other curves miss it by kilometres or jump in velocity: export with one of these"
+        raise method.refused(path, f"; an orbit is read with HERMITE or LAGRANGE, because {why}")
     number = DEFAULT_DEGREE if degree is None else finite(path, degree)
     if degree is not None and not (number == int(number) and DEGREES[0] <= number <= DEGREES[1]):
-        raise OrbitError(
-            f"{path}, {degree.place}: INTERPOLATION_DEGREE is {degree.shown}; take a whole number from {DEGREES[0]} "
-            f"to {DEGREES[1]}"
-        )
+        raise degree.refused(path, f"; take a whole number from {DEGREES[0]} to {DEGREES[1]}")
     points = int(number) + 1 if kind == "LAGRANGE" else (int(number) + 2) // 2
     if len(draft.times) < points:
         raise OrbitError(
