@@ -27,7 +27,5 @@ def test_noise_follows_from_the_light_and_is_refused_without():
     file, given = load_mission(DEFAULT), load_mission(SHIPPED)
     assert noise_rad(file, 4e-9) < noise_rad(file, 1e-9)
     assert noise_rad(given, None) == noise_rad(given, 1.0) == 1e-6
-    with pytest.raises(
-        ValueError, match="noise of the tracking sensor follows from its light: give"
-    ):
+    with pytest.raises(ValueError, match="noise of the tracking sensor follows from its light: give"):
         noise_rad(file, None)
