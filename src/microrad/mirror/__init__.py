@@ -5,14 +5,10 @@ from microrad.mirror.model import (
     assemble,
     at_rest,
     combine,
-    contraction,
-    creep_model,
     discretise,
     from_mission,
     from_table,
     hysteresis_model,
-    linear_part,
-    plant_arrays,
 )
 from microrad.mirror.variants import MirrorAxis, MirrorParts, Variant, of
 
@@ -24,13 +20,9 @@ __all__ = [
     "assemble",
     "at_rest",
     "combine",
-    "contraction",
-    "creep_model",
     "discretise",
     "from_mission",
     "from_table",
     "hysteresis_model",
-    "linear_part",
     "of",
-    "plant_arrays",
 ]
