@@ -7,8 +7,9 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy import stats
 
-from microrad.campaign.records import Floats, Sensitivity
+from microrad.campaign.records import Sensitivity
 from microrad.campaign.sensitivity import MOST_ROWS, sensitivity
+from microrad.core.arrays import Floats
 from truths import philox
 
 G_FACTORS = np.array([0.0, 1.0, 4.5, 9.0, 99.0, 99.0])

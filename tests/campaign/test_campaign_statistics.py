@@ -8,7 +8,6 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy import stats
 
-from microrad.campaign.records import Floats
 from microrad.campaign.sketch import LARGEST, RELATIVE_ERROR, SMALLEST, Sketch
 from microrad.campaign.statistics import (
     Fold,
@@ -19,6 +18,7 @@ from microrad.campaign.statistics import (
     quantile_interval,
     share_interval,
 )
+from microrad.core.arrays import Floats
 from truths import philox
 
 SHARES = (0.0, 1e-3, 0.01, 0.3, 0.5, 0.9, 0.997, 0.9999, 1.0)

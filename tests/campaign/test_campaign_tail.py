@@ -18,11 +18,12 @@ from microrad.campaign.definition import CampaignFile
 from microrad.campaign.file import load_campaign
 from microrad.campaign.inputs import Builder
 from microrad.campaign.ledger import Ledger
-from microrad.campaign.records import Chunk, Floats, Interval
+from microrad.campaign.records import Chunk, Interval
 from microrad.campaign.statistics import proportion_interval
 from microrad.campaign.summary import summarise
 from microrad.campaign.tails import tail_of_time, tail_weighted
 from microrad.campaign.work import Evaluator
+from microrad.core.arrays import Floats
 from microrad.core.threads import in_threads
 from microrad.link import under_jitter as link_performance
 from microrad.loop.fine_loop import linear

@@ -12,12 +12,13 @@ import pytest
 
 import designs
 from microrad.core import lti
+from microrad.core.arrays import Floats
 from microrad.export.flight import c_code, fixed, operations
 from microrad.export.flight.fixed_form import FixedForm
 from microrad.export.flight.operations import FixedOperations, Operations
 from microrad.export.flight.rounding import RoundingBound
 from microrad.export.linear_part.sections import sections
-from microrad.export.records import FlightController, Floats, InverseLaw, Origin, Signal, Vectors
+from microrad.export.records import FlightController, InverseLaw, Origin, Signal, Vectors
 from waiting import HANG_S
 
 KINDS = tuple(each.name for each in fields(Operations))

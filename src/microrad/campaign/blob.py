@@ -17,7 +17,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from microrad.campaign.records import CampaignError, Chunk, Failed, Floats, WorstTrace
+from microrad.campaign.records import CampaignError, Chunk, Failed, WorstTrace
+from microrad.core.arrays import Floats
 
 VERSION = 1
 _MAGIC = b"microrad"

@@ -9,8 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from microrad.campaign.outputs import OUTPUTS
-from microrad.campaign.records import CampaignError, Floats, Interval, Limit
+from microrad.campaign.records import CampaignError, Interval, Limit
 from microrad.campaign.statistics import moments, share_interval
+from microrad.core.arrays import Floats
 from microrad.core.units import format_quantity
 
 INTERVAL_CONFIDENCE = 0.95

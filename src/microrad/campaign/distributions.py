@@ -7,10 +7,9 @@ from typing import Any, Literal, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from microrad.core.arrays import Floats
 from microrad.core.units import format_quantity
 from microrad.mission.fields import Table
-
-Floats = NDArray[np.float64]
 
 
 class NormalTable(Table):

@@ -6,11 +6,11 @@ from functools import cache, lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from microrad import link
 from microrad.campaign.outputs import OUTPUTS
 from microrad.core import kernels
+from microrad.core.arrays import Floats
 from microrad.link.requirement import IMPOSSIBLE
 from microrad.link.under_jitter import Exposure, stated_outage
 from microrad.loop import fine_pointing
@@ -20,8 +20,6 @@ from microrad.mission.model import LinkMission, Mission
 
 if TYPE_CHECKING:
     from microrad.orbit import day as day_study
-
-Floats = NDArray[np.float64]
 
 
 def outputs(file: LinkFile, runs: ensemble.Ensemble | None, keep: Collection[str]) -> dict[str, float]:

@@ -26,11 +26,12 @@ import numpy as np
 
 from microrad.campaign.candidates import Candidate, Problem, judged, percent, quantity_text
 from microrad.campaign.outputs import OUTPUTS
-from microrad.campaign.records import CampaignError, Floats, Limit
+from microrad.campaign.records import CampaignError, Limit
+from microrad.core.arrays import Floats
+from microrad.core.progress import Progress
 from microrad.loop import control
 
 Evaluate = Callable[[Floats], dict[str, Floats]]
-Progress = Callable[[int, int, str], None]
 
 FIRST_LOOK = 0.25
 """Share of the evaluations that is spread over the whole range before the searches set out."""

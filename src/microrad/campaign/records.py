@@ -5,9 +5,8 @@ from dataclasses import dataclass, field
 from typing import Literal, NamedTuple, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from microrad.core.arrays import Floats
 
 
 class CampaignError(ValueError):

@@ -21,10 +21,9 @@ from microrad.campaign.ledger import Ledger, check_same
 from microrad.campaign.ledger_file import argument, refuse_existing
 from microrad.campaign.records import CampaignError, Chunk, Engine, Failed, Job, Outcome, joined
 from microrad.campaign.sketch import Sketch
+from microrad.core.progress import Progress
 from microrad.core.units import format_quantity
 from microrad.loop.control import AxisController
-
-Progress = Callable[[int, int, str], None]
 
 TARGET = "microrad.campaign.work:open_work"
 _TIMED_S = 0.2  # of rows, before a campaign of links alone begins

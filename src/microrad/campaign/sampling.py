@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from microrad.campaign.distributions import standard_normal
+from microrad.core.arrays import Floats
 from microrad.mirror import spread as mirror_spread
 
 if TYPE_CHECKING:  # only for its name
     from microrad.campaign.definition import CampaignFile
 
-Floats = NDArray[np.float64]
 
 INPUTS, AGAIN = 1, 2
 """Purposes of a Philox stream: second word of its key, behind the seed."""

@@ -1,12 +1,10 @@
 """The optimisation of a campaign file: its candidates' rows, evaluated on the threads of this machine."""
 
-from collections.abc import Callable
 from functools import partial
 from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from microrad.campaign import loops, plan, work
 from microrad.campaign.candidates import Problem, Variable
@@ -16,11 +14,10 @@ from microrad.campaign.inputs import Builder
 from microrad.campaign.keys import touches_loop
 from microrad.campaign.optimise import Optimum, optimise
 from microrad.campaign.records import CampaignError
+from microrad.core.arrays import Floats
+from microrad.core.progress import Progress
 from microrad.core.threads import in_threads
 from microrad.loop.control import AxisController
-
-Floats = NDArray[np.float64]
-Progress = Callable[[int, int, str], None]
 
 _PARTS = 8  # that the rows of a candidate are shared out in, at most
 

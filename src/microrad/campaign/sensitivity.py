@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from microrad.campaign.records import Floats, Interval, Sensitivity
+from microrad.campaign.records import Interval, Sensitivity
+from microrad.core.arrays import Floats
 
 MOST_ROWS = 20_000
 SURROGATE_ROWS = 4_096

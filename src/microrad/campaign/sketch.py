@@ -5,7 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from microrad.campaign.records import Floats
+from microrad.core.arrays import Floats
 
 RELATIVE_ERROR = 5e-4
 """Width of a bin over its smaller end, so that no quantile is further off than this share of itself."""

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from microrad.campaign.records import Floats, Interval, OutputSummary
+from microrad.campaign.records import Interval, OutputSummary
 from microrad.campaign.sketch import Sketch
+from microrad.core.arrays import Floats
 
 PICTURE_BINS = 40
 

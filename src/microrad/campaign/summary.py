@@ -19,7 +19,6 @@ from microrad.campaign.records import (
     CellSummary,
     Chunk,
     Failed,
-    Floats,
     Interval,
     Job,
     Limit,
@@ -32,6 +31,7 @@ from microrad.campaign.records import (
 )
 from microrad.campaign.statistics import Fold, Moments
 from microrad.core import kernels
+from microrad.core.arrays import Floats
 from microrad.core.units import format_quantity
 from microrad.loop.fine_loop.ensemble import bin_edges_rad
 

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from microrad.campaign.records import Floats, Interval, Tail
+from microrad.campaign.records import Interval, Tail
 from microrad.campaign.statistics import binomial_band, student
+from microrad.core.arrays import Floats
 
 TAIL_POINTS = 200
 _MOST = 1e12  # independent errors, where rows hardly differ

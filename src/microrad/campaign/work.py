@@ -9,7 +9,6 @@ from functools import lru_cache
 from itertools import groupby
 
 import numpy as np
-from numpy.typing import NDArray
 
 from microrad.campaign import blob, bundle, evaluate, loops, plan, sampling, tilt
 from microrad.campaign.bundle import code_sha256
@@ -17,6 +16,7 @@ from microrad.campaign.definition import CampaignFile
 from microrad.campaign.inputs import Builder
 from microrad.campaign.records import CampaignError, Chunk, Failed, Job, WorstTrace
 from microrad.core import kernels
+from microrad.core.arrays import Floats
 from microrad.loop import fine_pointing
 from microrad.loop.control import AxisController
 from microrad.loop.fine_loop import ensemble
@@ -25,7 +25,6 @@ from microrad.mission.file import LinkFile
 
 __all__ = ["Work", "code_sha256", "open_work"]
 
-Floats = NDArray[np.float64]
 Beat = Callable[[], None]
 
 ATTEMPTS = 2

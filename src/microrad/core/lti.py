@@ -3,9 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from microrad.core.arrays import Complexes, Floats
 
 EXACT_BITS = 32
 """Significant bits (2e-10) of what a simulated loop is made of. Where its converters and reversals decide, a difference
@@ -13,7 +12,6 @@ in the last bit of a matrix grows to one in a hundred thousand; so far before th
 
 DESIGN_BITS = 44
 """Significant bits (6e-14) of the plant of a design: what a controller cancels in it has to stay cancelled."""
-Complexes = NDArray[np.complex128]
 
 
 @dataclass(frozen=True, slots=True)

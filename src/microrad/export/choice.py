@@ -12,6 +12,8 @@ import numpy as np
 
 from microrad import mirror
 from microrad.core import kernels, lti
+from microrad.core.arrays import Floats
+from microrad.core.progress import Progress
 from microrad.core.units import format_quantity
 from microrad.export.linear_part.modes import minimal
 from microrad.export.records import (
@@ -21,12 +23,10 @@ from microrad.export.records import (
     REFERENCE,
     ExportError,
     FlightController,
-    Floats,
     InverseLaw,
     LoopUnit,
     Origin,
     PlantUnit,
-    Progress,
     Signal,
     Vectors,
 )

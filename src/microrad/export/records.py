@@ -1,16 +1,14 @@
 """What an export is made of: controllers and mirrors as numbers with names and units, and recorded vectors."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from microrad.core import kernels, lti
+from microrad.core.arrays import Floats
 
-Floats = NDArray[np.float64]
 Indices = NDArray[np.integer]
-Progress = Callable[[int, int, str], None]
 
 OPTICAL_ERROR, GAUGE, READING, REFERENCE = "optical_error_rad", "gauge_rad", "reading_rad", "reference_rad"
 """Names of the inputs of a controller."""

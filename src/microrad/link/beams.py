@@ -6,12 +6,11 @@ from functools import lru_cache
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from microrad.core.arrays import Floats
 from microrad.link.gains import DB_PER_NEPER, aperture_gain_db
 from microrad.mission.tables.link import narrowest_radius
-
-Floats = NDArray[np.float64]
 
 BEST_TRUNCATION = 1.1209
 """Aperture radius over 1/e2 beam radius with the most gain on the axis, 0.81453 of the uniform one (Klein and Degnan

@@ -3,11 +3,10 @@
 import math
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from microrad.core.arrays import Floats
 from microrad.core.units import PLANCK_J_S, SPEED_OF_LIGHT_M_S, format_quantity
-
-Floats = NDArray[np.float64]
 
 DB_PER_NEPER = 10.0 / math.log(10.0)
 

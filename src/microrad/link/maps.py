@@ -5,8 +5,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from microrad.core.arrays import Floats
 from microrad.core.units import format_quantity
 from microrad.link import gains
 from microrad.link.budget import CHOSEN, given_or
@@ -22,8 +23,6 @@ from microrad.link.model import (
 )
 from microrad.link.receivers import BpskHomodyne, DpskPreamplified, OokCounting
 from microrad.mission.model import LinkMission, Source, source_text
-
-Floats = NDArray[np.float64]
 
 BIT_ERROR_RATIO = 1e-9
 """Bit error ratio at which ideal receivers are compared."""

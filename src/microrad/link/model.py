@@ -5,16 +5,15 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from microrad.core.arrays import Floats
 from microrad.link import gains, receivers
 from microrad.link.beams import GaussianFall, LitAperture, OffAxis
 from microrad.mission.model import LinkMission
 from microrad.mission.tables import pointing as pointing_table
 from microrad.mission.tables.link import Beam, Communication
 from microrad.mission.tables.link import Receiver as ReceiverTable
-
-Floats = NDArray[np.float64]
 
 
 class LinkError(ValueError):

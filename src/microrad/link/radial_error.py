@@ -7,11 +7,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from microrad.core.arrays import Floats
 from microrad.core.units import format_quantity
-
-Floats = NDArray[np.float64]
 
 SMALLEST_PROBABILITY = 1e-20
 """Below it the quadrature of the tails is no longer relied on."""

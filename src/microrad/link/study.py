@@ -6,7 +6,6 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from microrad import link
 from microrad.core import kept
@@ -17,8 +16,6 @@ from microrad.link.partner_search import Finding, Tracking, finding, tracking
 from microrad.link.under_jitter import Performance, error_rad, margin_db, of_jitter, required_error_rad, stated_outage
 from microrad.mission.file import LinkFile
 from microrad.mission.model import LinkMission, Source, source_text
-
-Floats = NDArray[np.float64]
 
 STATIC_MARGIN = "Static margin"
 """What the margin at the static pointing error is called where the margin is the one under a jitter."""

@@ -6,14 +6,12 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from microrad import link
+from microrad.core.arrays import Floats
 from microrad.link import pointing
 from microrad.mission.model import LinkMission
 from microrad.mission.tables.pointing import JitterTable
-
-Floats = NDArray[np.float64]
 
 _STEPS = 4000  # of the radial error, for a distribution that is known and not sampled
 _RAREST = 1e-16

@@ -4,15 +4,13 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from microrad import mirror
 from microrad.core import kernels, lti
+from microrad.core.arrays import Floats
 from microrad.loop import control
 from microrad.loop.control import Drive, Inverse, Timing, amplifier_factor, anti_windup
 from microrad.mirror import Mirror, hysteresis
-
-Floats = NDArray[np.float64]
 
 # Plant steps between two returns from the kernel, about 0.1 s, so that an interrupt is answered promptly.
 SLICE_STEPS = 1_000_000

@@ -11,12 +11,10 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from microrad.core.arrays import Floats
 from microrad.core.budget import Line, root_sum_square
 from microrad.core.units import format_quantity
-
-Floats = NDArray[np.float64]
 
 WORST_CONDITION = 1e4
 """Ratio of the largest to the smallest gain from drives to line of sight beyond which a geometry is singular."""

@@ -9,13 +9,11 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from microrad.core import kernels, lti
+from microrad.core.arrays import Floats
 from microrad.mirror.hysteresis import NO_CREEP, BoucWen, Creep, Play, slow_gain, steepest_slope
 from microrad.mission.tables import mirror as mirror_table
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,15 +5,13 @@ from collections.abc import Callable, Iterator
 from itertools import chain, islice
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic.fields import FieldInfo
 
 from microrad.core import lti
+from microrad.core.arrays import Floats
 from microrad.core.units import UnitError
 from microrad.mission.fields import ProblemsError, Quantity, Several, Table
 from microrad.mission.tables.mirror import Mirror, Place, Uncertainty, place
-
-Floats = NDArray[np.float64]
 
 TRIES = 10_000
 """Times that one mirror is drawn again before its uncertainty is taken for one that no mirror has."""

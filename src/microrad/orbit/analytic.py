@@ -5,7 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from microrad.orbit.base import Floats, OrbitError, States
+from microrad.core.arrays import Floats
+from microrad.orbit.base import OrbitError, States
 from microrad.orbit.earth import EARTH_RADIUS_M, GEOSTATIONARY_RADIUS_M, J2, MU_M3_S2, ROTATION_RAD_S
 from microrad.orbit.epoch import DAY_S, Epoch
 

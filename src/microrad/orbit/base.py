@@ -7,10 +7,7 @@ Times are elapsed seconds since the epoch of the mission. Vectors are axis first
 
 from typing import NamedTuple, Protocol
 
-import numpy as np
-from numpy.typing import NDArray
-
-Floats = NDArray[np.float64]
+from microrad.core.arrays import Floats
 
 
 class OrbitError(ValueError):

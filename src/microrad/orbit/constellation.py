@@ -7,16 +7,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from microrad import orbit
+from microrad.core.arrays import Floats
+from microrad.core.progress import Progress
 from microrad.mission.file import LinkFile
 from microrad.mission.model import LinkMission
 from microrad.mission.tables.operations import Constellation
 from microrad.orbit import operations
-from microrad.orbit.base import Floats
 from microrad.orbit.contacts import Sampled, coarse_step_s, contacts_with_each
 from microrad.orbit.day.flow import PointingLoss, closings, rate_table
 from microrad.orbit.from_mission import orbits_table
 
-Progress = Callable[[int, int, str], None]
 Span = tuple[float, float]
 
 _EDGE = 1e-9  # part of a range by which a session that ends at a limit may seem to exceed it

@@ -8,8 +8,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from microrad.core.arrays import Floats
 from microrad.core.units import format_quantity
-from microrad.orbit.base import Floats, Orbit, OrbitError, States
+from microrad.orbit.base import Orbit, OrbitError, States
 from microrad.orbit.earth import (
     EARTH_RADIUS_M,
     GEOSTATIONARY_RADIUS_M,

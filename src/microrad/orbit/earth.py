@@ -6,7 +6,8 @@ from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 
-from microrad.orbit.base import Floats, OrbitError, States
+from microrad.core.arrays import Floats
+from microrad.orbit.base import OrbitError, States
 from microrad.orbit.epoch import Epoch
 
 EARTH_RADIUS_M = 6378137.0

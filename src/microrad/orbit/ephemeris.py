@@ -5,7 +5,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from microrad.orbit.base import Floats, OrbitError, States
+from microrad.core.arrays import Floats
+from microrad.orbit.base import OrbitError, States
 from microrad.orbit.epoch import Epoch
 
 SLACK_S = 1e-6

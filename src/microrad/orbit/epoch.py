@@ -17,7 +17,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from microrad.orbit.base import Floats, OrbitError
+from microrad.core.arrays import Floats
+from microrad.orbit.base import OrbitError
 
 DAY_S = 86400.0
 FIRST_DAY = date(1973, 1, 2)

@@ -9,7 +9,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from microrad.orbit.base import Floats, OrbitError
+from microrad.core.arrays import Floats
+from microrad.orbit.base import OrbitError
 
 Rows = NDArray[np.intp]
 Intervals = NDArray[np.float64]

@@ -7,8 +7,9 @@ from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 
+from microrad.core.arrays import Floats
 from microrad.core.units import format_quantity
-from microrad.orbit.base import Floats, Orbit, OrbitError, States
+from microrad.orbit.base import Orbit, OrbitError, States
 from microrad.orbit.earth import Earth, gravity
 from microrad.orbit.epoch import Epoch
 from microrad.orbit.events import Function, Intervals, complement, positive, refined, union

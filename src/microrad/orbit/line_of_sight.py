@@ -5,8 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from microrad.core.arrays import Floats
 from microrad.core.units import SPEED_OF_LIGHT_M_S, format_quantity
-from microrad.orbit.base import Floats, Orbit, OrbitError
+from microrad.orbit.base import Orbit, OrbitError
 from microrad.orbit.earth import gravity
 
 

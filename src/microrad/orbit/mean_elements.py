@@ -10,7 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from microrad.orbit.base import Floats, OrbitError, States
+from microrad.core.arrays import Floats
+from microrad.orbit.base import OrbitError, States
 from microrad.orbit.epoch import DAY_S, Epoch
 
 MOST_ELEMENTS_AGE_S = 14.0 * DAY_S

@@ -4,7 +4,8 @@ import math
 
 import numpy as np
 
-from microrad.orbit.base import Floats, OrbitError
+from microrad.core.arrays import Floats
+from microrad.orbit.base import OrbitError
 from microrad.orbit.earth import Shape, semi_axes_m, to_unit_sphere
 from microrad.orbit.epoch import Epoch
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from microrad.core.folder import MANIFEST, FolderError, check_folder, whole_folder
 from microrad.core.kept import NOTHING, Kept
+from microrad.core.progress import Progress
 from microrad.core.threads import shared_out
 from microrad.report.tables import Column, rows_of
 
@@ -45,8 +46,6 @@ _LAZY = {
     "summary": "words",
     "verdict_text": "words",
 }
-
-Progress = Callable[[int, int, str], None]
 
 
 def __getattr__(name: str) -> Any:

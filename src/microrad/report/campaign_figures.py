@@ -22,13 +22,14 @@ from microrad.campaign.records import (
     Tail,
     WorstTrace,
 )
+from microrad.core.arrays import Floats
 from microrad.report import campaign_numbers as numbers
 from microrad.report import campaign_tables as tables
 from microrad.report import campaign_words as words
 from microrad.report.campaign_axes import label_of, logarithm, svg_of
 from microrad.report.campaign_scale import Scale, scale_of
 from microrad.report.day_figures import GREY, PLAIN, WIDTH, short
-from microrad.report.figures import BLACK, BLUE, GREEN, ORANGE, SKY, VERMILION, Figure, Floats, thin
+from microrad.report.figures import BLACK, BLUE, GREEN, ORANGE, SKY, VERMILION, Figure, thin
 
 MOST_INPUTS, MOST_CELLS, MOST_POINTS = 14, 40, 1500
 _ACROSS = 3  # panels beside each other

@@ -9,7 +9,8 @@ from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Canvas
 
-from microrad.report.figures import BLACK, BLUE, GREEN, ORANGE, SKY, STYLE, VERMILION, Figure, Floats, svg_of, thin
+from microrad.core.arrays import Floats
+from microrad.report.figures import BLACK, BLUE, GREEN, ORANGE, SKY, STYLE, VERMILION, Figure, svg_of, thin
 
 Curves = Mapping[str, tuple[Floats, Floats]]  # name: abscissa (n,), ordinate (n,)
 

@@ -15,8 +15,9 @@ from matplotlib.patches import Patch, PathPatch
 from matplotlib.path import Path
 from numpy.typing import NDArray
 
+from microrad.core.arrays import Floats
 from microrad.report.day_figures import PLAIN, duration, short
-from microrad.report.figures import BLACK, BLUE, GREEN, ORANGE, SKY, VERMILION, Figure, Floats, svg_of
+from microrad.report.figures import BLACK, BLUE, GREEN, ORANGE, SKY, VERMILION, Figure, svg_of
 
 LAND, COAST, SHADE = "#e9e6df", "#b5b0a5", "#0072B21F"
 _HALF_TURN = 180.0

@@ -5,12 +5,13 @@ from itertools import pairwise
 import numpy as np
 
 from microrad import orbit
+from microrad.core.arrays import Floats
 from microrad.core.kept import NOTHING as NOTHING_KEPT
 from microrad.core.kept import Kept
 from microrad.orbit.day import NOTHING, DayStudy, Swing, Way, times
 from microrad.orbit.day.ground_track import LONGEST_S, Outline, ground_track
 from microrad.report import day_assumptions, day_figures, day_map
-from microrad.report.figures import Figure, Floats
+from microrad.report.figures import Figure
 from microrad.study.contact_run import ContactRun
 
 _SHARES = 400  # points of a distribution

@@ -3,15 +3,13 @@
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from microrad.core.arrays import Floats
 from microrad.orbit import Contact
 from microrad.orbit.constellation import ConstellationPlan
 from microrad.orbit.day import DayStudy, Way
 from microrad.report.variables import Group, Variable, coordinate, variable
 from microrad.study.contact_run import ContactRun
-
-Floats = NDArray[np.float64]
 
 
 def groups(day: DayStudy, run: ContactRun | None, plan: ConstellationPlan | None) -> dict[str, Group]:

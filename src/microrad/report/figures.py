@@ -10,8 +10,8 @@ import numpy as np
 from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Canvas
-from numpy.typing import NDArray
 
+from microrad.core.arrays import Floats
 from microrad.core.kept import NOTHING, Kept
 from microrad.link.under_jitter import required_error_rad
 from microrad.loop import sine_run as simulate
@@ -23,8 +23,6 @@ from microrad.report.svg_text import svg_text
 from microrad.report.tables import Column, rows_of
 from microrad.study import paper
 from microrad.study.story import Study
-
-Floats = NDArray[np.float64]
 
 # Okabe and Ito's palette: told apart by colour-blind readers. Line styles differ too, for print in grey.
 BLACK, ORANGE, SKY, GREEN, BLUE, VERMILION = "#000000", "#E69F00", "#56B4E9", "#009E73", "#0072B2", "#D55E00"

@@ -9,11 +9,12 @@ from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Canvas
 
+from microrad.core.arrays import Floats
 from microrad.core.kept import NOTHING, Kept
 from microrad.loop.fine_loop.linear import close, sensitivity
 from microrad.loop.fine_pointing import ErrorBudget, FinePointingStudy, Verified
 from microrad.mission.model import Mission
-from microrad.report.figures import BLACK, BLUE, GREEN, ORANGE, SKY, STYLE, VERMILION, Figure, Floats, svg_of
+from microrad.report.figures import BLACK, BLUE, GREEN, ORANGE, SKY, STYLE, VERMILION, Figure, svg_of
 from microrad.report.fine_pointing_words import micro, share_of_time, source_name
 from microrad.study.story import Study
 

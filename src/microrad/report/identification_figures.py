@@ -19,6 +19,7 @@ from matplotlib.figure import Figure as Canvas
 from matplotlib.ticker import LogFormatter
 from numpy.typing import NDArray
 
+from microrad.core.arrays import Floats
 from microrad.core.threads import shared_out
 from microrad.lab.identify import Identification
 from microrad.lab.identify.ladder.predictions import Prediction
@@ -26,7 +27,7 @@ from microrad.lab.identify.ladder.roles import roles
 from microrad.lab.identify.linear.fit import LinearFit, fit_percent, output_error
 from microrad.lab.recording import Recording
 from microrad.report import identification_words as words
-from microrad.report.figures import BLACK, BLUE, GREEN, ORANGE, SKY, STYLE, VERMILION, Figure, Floats, svg_of, thin
+from microrad.report.figures import BLACK, BLUE, GREEN, ORANGE, SKY, STYLE, VERMILION, Figure, svg_of, thin
 
 MOST_RECORDINGS = 12  # drawn, a row each
 VIRTUAL = "virtual bench"

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from microrad.core.arrays import Floats
 from microrad.core.units import format_quantity
 from microrad.lab.identify import Identification, PrandtlIshlinskiiFit, Score
 from microrad.lab.identify.hysteresis.joint import JointFit
@@ -28,8 +28,6 @@ from microrad.report.identification_parameters import (
     starts_text,
     two_digits,
 )
-
-Floats = NDArray[np.float64]
 
 PAPER_MODEL = "bouc_wen"  # Eq. 3 of SPIE 11852, 118523B
 _SINE_POWER = 0.8  # in the strongest line of a drive and its neighbours

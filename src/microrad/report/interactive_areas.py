@@ -12,11 +12,11 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Rectangle
 from matplotlib.path import Path
 
+from microrad.core.arrays import Floats
 from microrad.report import interactive_bars
 from microrad.report.interactive_axes import spoken
 from microrad.report.interactive_sheet import Coloured, Grid, Look, Pen, kept_values, label_of, look_of
 from microrad.report.interactive_style import (
-    Floats,
     StaticOnlyError,
     colour,
     dash,

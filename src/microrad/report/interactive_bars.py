@@ -8,9 +8,10 @@ from matplotlib.container import BarContainer
 from matplotlib.patches import Rectangle, StepPatch
 from matplotlib.path import Path
 
+from microrad.core.arrays import Floats
 from microrad.report.interactive_axes import Side, spoken
 from microrad.report.interactive_sheet import Look, Pen, label_of, look_of
-from microrad.report.interactive_style import Floats, StaticOnlyError, colour, joined, numbers, pixels, words
+from microrad.report.interactive_style import StaticOnlyError, colour, joined, numbers, pixels, words
 
 _VALUE = "%{@:.5~g}"
 

@@ -9,9 +9,9 @@ from matplotlib.collections import LineCollection, PathCollection
 from matplotlib.container import ErrorbarContainer
 from matplotlib.lines import Line2D
 
+from microrad.core.arrays import Floats
 from microrad.report.interactive_sheet import Look, Pen, label_of, look_of
 from microrad.report.interactive_style import (
-    Floats,
     StaticOnlyError,
     colour,
     dash,

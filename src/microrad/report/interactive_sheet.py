@@ -9,8 +9,9 @@ from matplotlib.contour import ContourSet
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
+from microrad.core.arrays import Floats
 from microrad.report.interactive_axes import Panel
-from microrad.report.interactive_style import Floats, colour, dash, joined, numbers, symbol, words
+from microrad.report.interactive_style import colour, dash, joined, numbers, symbol, words
 
 _GRID = "_microrad_grid"
 

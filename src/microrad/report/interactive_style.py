@@ -14,7 +14,8 @@ from matplotlib.markers import MarkerStyle
 from matplotlib.path import Path
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from microrad.core.arrays import Floats
+
 MOST_POINTS = 1200  # of a curve; extremes are kept
 DIGITS = 6
 _PER_POINT = 96.0 / 72.0  # CSS pixels

@@ -12,13 +12,12 @@ from matplotlib import rc_context
 from matplotlib.figure import Figure as Canvas
 from numpy.typing import NDArray
 
+from microrad.core.arrays import Floats
 from microrad.core.kept import NOTHING, Kept
 from microrad.lab import bench, identify
 from microrad.lab.recording import Recording
 from microrad.report.figures import BLACK, BLUE, GREEN, STYLE, VERMILION, Figure, svg_of, thin
 from microrad.study.story import Study
-
-Floats = NDArray[np.float64]
 
 PLAN = "paper-experiment"
 SEED = 1

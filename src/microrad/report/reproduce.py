@@ -13,13 +13,12 @@ from markupsafe import escape
 
 from microrad.core.folder import MANIFEST, scratch
 from microrad.core.machine import ARCHITECTURE, as_stated
+from microrad.core.progress import Progress
 from microrad.report import compared, tolerances
 from microrad.report.carried import Carried, ReproduceError, altered, held, read, shown_part, unpack
 from microrad.report.compared import Comparison, Difference, clipped
 from microrad.report.scale import Scale, scale_of
 from microrad.study import story as study
-
-Progress = Callable[[int, int, str], None]
 
 MOST_SHOWN = 40
 """Differences that the text lists."""

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from microrad.core.arrays import Floats
 from microrad.core.machine import machine, versions
 from microrad.loop.fine_pointing import COUNTERS, FinePointingStudy, Residual
 from microrad.loop.paper_cases import Run
@@ -21,9 +21,6 @@ from microrad.report.fine_pointing_data import margins, rms_by_source, sources
 from microrad.report.paper_bench import PLAN, SEED
 from microrad.report.variables import Group, Variable, coordinate, variable
 from microrad.study.story import Study
-
-Floats = NDArray[np.float64]
-
 
 MOST_INPUT_BYTES = 1_000_000
 """Length up to which a file that the mission names is carried in the manifest."""

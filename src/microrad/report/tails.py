@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from matplotlib import rc_context
 from matplotlib.figure import Figure as Canvas
-from numpy.typing import NDArray
 
+from microrad.core.arrays import Floats
 from microrad.core.kept import NOTHING, Kept
 from microrad.loop.fine_loop.ensemble import bin_edges_rad, histogram_beyond, histogram_quantile
 from microrad.loop.fine_pointing import FinePointingStudy, Residual
@@ -17,8 +17,6 @@ from microrad.mission.model import Mission
 from microrad.report import fine_pointing_words as words
 from microrad.report.figures import BLACK, BLUE, GREEN, ORANGE, STYLE, Figure, svg_of
 from microrad.study.story import Study
-
-Floats = NDArray[np.float64]
 
 SIGMAS = 2.576  # 99 %, as of the interval of the rms
 SHARES = (0.5, 0.9, 0.99, 0.999, 0.9999, 0.99999)

@@ -13,10 +13,10 @@ from dataclasses import dataclass, replace
 from functools import lru_cache, partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from microrad import mirror
 from microrad.core import lti
+from microrad.core.arrays import Floats
 from microrad.link.tracking_light import tracking_light_w
 from microrad.loop import control, fine_pointing, paper_cases
 from microrad.loop import sine_run as simulate
@@ -29,8 +29,6 @@ from microrad.loop.fine_pointing.results import for_mirror
 from microrad.loop.fine_pointing.scenario import BODY_POINTING, with_mirror
 from microrad.mirror import Variant
 from microrad.mission.file import MissionFile
-
-Floats = NDArray[np.float64]
 
 PID, PID_INVERSE = "PID of [control]", "PID of [control] + inverse"
 WITH, WITHOUT = "with hysteresis", "without hysteresis"

@@ -7,14 +7,12 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from microrad.core.arrays import Floats
 from microrad.core.units import UnitError, format_quantity, parse_quantity
 from microrad.lab.live_fit import extremes
 from microrad.studio.control_model import PID, PID_INVERSE, WITH, WITHOUT, Answers, Ask, Controller, Curve
 from microrad.studio.plots import BLACK, BLUE, GREEN, GREY, VERMILION, Plot, decades, empty, marker_line, plot
-
-Floats = NDArray[np.float64]
 
 SHOWN = {"both": (WITH, WITHOUT), "with": (WITH,), "without": (WITHOUT,)}
 """What the switch of the hysteresis shows."""

@@ -9,8 +9,9 @@ from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from microrad.core.arrays import Floats
+from microrad.core.progress import Progress
 from microrad.link import study as link_study
 from microrad.mission.file import LinkFile
 from microrad.orbit import Contact
@@ -18,9 +19,7 @@ from microrad.orbit import day as day_study
 from microrad.orbit.day import DayStudy, Way
 from microrad.report import day_tables, day_words
 from microrad.studio import plots
-from microrad.studio.latest import Progress
 
-Floats = NDArray[np.float64]
 Row = dict[str, Any]
 
 MOST_POINTS = 1500

@@ -8,8 +8,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any, Generic, TypeVar
 
+from microrad.core.progress import Progress
+
 T = TypeVar("T")
-Progress = Callable[[int, int, str], None]
 
 
 class SupersededError(Exception):

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from microrad import link
+from microrad.core.arrays import Floats
 from microrad.core.budget import Line
 from microrad.core.units import format_quantity
 from microrad.link import study as link_study
@@ -24,7 +24,6 @@ from microrad.studio import plots
 from microrad.studio.dials import Dial, dial
 from microrad.studio.draft import Draft
 
-Floats = NDArray[np.float64]
 Row = dict[str, Any]
 
 TABLES = {

@@ -13,9 +13,9 @@ from itertools import product
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from microrad import mirror
+from microrad.core.progress import Progress
 from microrad.core.threads import in_threads
 from microrad.loop import control, sine_run
 from microrad.loop.paper_cases import PaperCases
@@ -23,9 +23,6 @@ from microrad.mirror import Mirror, MirrorParts, Variant, hysteresis
 from microrad.mission.file import LinkFile, load_link
 from microrad.mission.model import Mission
 from microrad.mission.presets import PAPER, preset_text
-
-Floats = NDArray[np.float64]
-Progress = Callable[[int, int, str], None]
 
 FIG6_HZ = (1.0, 15.0)
 CLAIMED_DROP_RAD = {15.0: 10e-6, 25.0: 25e-6}  # Fig. 8, by frequency in Hz

@@ -1,14 +1,14 @@
 """One study: from a mission file to a verdict. The story, and the only place where the parts meet."""
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from microrad import link, mirror, orbit
 from microrad.core import kept
+from microrad.core.arrays import Floats
+from microrad.core.progress import Progress
 from microrad.core.threads import both
 from microrad.link import pointing, requirement
 from microrad.link import study as link_study
@@ -23,8 +23,6 @@ from microrad.orbit import constellation
 from microrad.orbit import day as day_study
 from microrad.study import alternatives, contact_run, paper, pointing_cost, verdict
 
-Floats = NDArray[np.float64]
-Progress = Callable[[int, int, str], None]
 Requirements = tuple[requirement.Requirement, ...]
 
 

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from microrad import link
+from microrad.core.arrays import Floats
 from microrad.link import pointing
 from microrad.link.requirement import IMPOSSIBLE, Requirement, Subject, derived_from, outage_words
 from microrad.link.under_jitter import Performance
@@ -20,8 +20,6 @@ from microrad.mission.file import LinkFile
 from microrad.mission.model import Mission, Source
 from microrad.orbit import day as day_study
 from microrad.study import paper
-
-Floats = NDArray[np.float64]
 
 CLAIMED_TRAVEL_RAD = 2.5e-3  # section 3.2
 PAPER_RATE_BIT_S = 300e6  # section 2.2

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from microrad.core import kernels
+from microrad.core.arrays import Floats
 from microrad.export.linear_part.sections import Sections
-from microrad.export.records import FlightController, Floats, InverseLaw
+from microrad.export.records import FlightController, InverseLaw
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from microrad.core import lti
+from microrad.core.arrays import Floats
 from microrad.export.flight.c_code import flight_code
 from microrad.export.flight.double_run import Run, run
 from microrad.export.flight.fixed_form import (
@@ -25,7 +26,7 @@ from microrad.export.flight.fixed_form import (
 from microrad.export.flight.rounding import RoundingBound, behind_converter, errors_of_inverse, responses
 from microrad.export.identifiers import identifier
 from microrad.export.linear_part.sections import Sections
-from microrad.export.records import ExportError, FlightController, Floats, Signal, Vectors
+from microrad.export.records import ExportError, FlightController, Signal, Vectors
 from microrad.export.templating import entries, render
 
 LEAST_BITS, MOST_BITS = 8, 32

@@ -18,10 +18,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from microrad.core.arrays import Floats
 from microrad.export.flight.double_run import Inverse, Run
 from microrad.export.flight.rounding import responses
 from microrad.export.linear_part.sections import Sections
-from microrad.export.records import FlightController, Floats
+from microrad.export.records import FlightController
 
 Whole = NDArray[np.int64]
 Poles = tuple[tuple[complex, complex], ...]

@@ -14,9 +14,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from microrad.core import kernels
+from microrad.core.arrays import Floats
 from microrad.export.flight.double_run import InverseRun, Run, run, widened
 from microrad.export.linear_part.sections import Sections, compensated_states
-from microrad.export.records import FlightController, Floats, InverseLaw, Vectors
+from microrad.export.records import FlightController, InverseLaw, Vectors
 
 UNIT = 2.0**-24
 """Largest relative error of rounding to single precision."""

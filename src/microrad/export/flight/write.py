@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from microrad.core.folder import MANIFEST, check_folder, whole_folder
+from microrad.core.progress import Progress
 from microrad.core.units import format_quantity
 from microrad.export.choice import Choice, Source, flight_controller, promised, rms_text, vectors
 from microrad.export.flight.build import BenchResult, compile_and_run, compiler
@@ -19,7 +20,7 @@ from microrad.export.flight.operations import FixedOperations, Operations, fixed
 from microrad.export.flight.rounding import RoundingBound, rounding_bound
 from microrad.export.identifiers import identifier, suggested
 from microrad.export.linear_part.sections import Sections, sections
-from microrad.export.records import FlightController, Progress, Vectors
+from microrad.export.records import FlightController, Vectors
 from microrad.loop.fine_pointing import Outlook
 
 Precision = Literal["double", "single", "fixed"]

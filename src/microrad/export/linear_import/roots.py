@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 
 from microrad.core import lti
-from microrad.core.lti import Complexes
+from microrad.core.arrays import Complexes, Floats
 from microrad.export.linear_import.matlab import form_of, numbers
 from microrad.export.matrices.files import python_control
 from microrad.export.matrices.forms import factored, factors, polynomials, roots
 from microrad.export.matrices.structure import entry_of, pole_text, refuse_hidden
-from microrad.export.records import ExportError, Floats
+from microrad.export.records import ExportError
 
 MOST_ORDER = 60
 """States of a mirror's linear part beyond which it is taken for a mistake."""

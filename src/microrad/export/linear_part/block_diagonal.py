@@ -25,7 +25,7 @@ from scipy.linalg import schur, solve_sylvester
 from scipy.linalg.lapack import dtrexc, dtrsyl
 from scipy.sparse.csgraph import connected_components
 
-from microrad.export.records import Floats
+from microrad.core.arrays import Floats
 
 Wide = NDArray[np.longdouble]
 Mask = NDArray[np.bool_]

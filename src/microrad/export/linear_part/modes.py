@@ -7,9 +7,9 @@ from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
 from microrad.core import lti
-from microrad.core.lti import Complexes
+from microrad.core.arrays import Complexes, Floats
 from microrad.export.linear_part.block_diagonal import BlockDiagonal, Wide, block_diagonal
-from microrad.export.records import ExportError, FlightController, Floats
+from microrad.export.records import ExportError, FlightController
 
 BOUNDS = (100.0, 10.0, 1.0, 0.0)
 """How far a basis may lean to part two blocks, from the finest form to the coarsest one."""

@@ -10,10 +10,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from microrad.core import lti
-from microrad.core.lti import Complexes
+from microrad.core.arrays import Complexes, Floats
 from microrad.export.linear_part.block_diagonal import BlockDiagonal
 from microrad.export.linear_part.modes import NEAR, Modes, hidden, modes, sizes
-from microrad.export.records import ExportError, FlightController, Floats
+from microrad.export.records import ExportError, FlightController
 
 MODAL, TRIANGULAR = "modal", "triangular"
 """Forms: blocks of one and two states alone; or some larger upper quasi-triangular ones beside them."""

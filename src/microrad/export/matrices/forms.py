@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from microrad.core import lti
-from microrad.core.lti import Complexes
+from microrad.core.arrays import Complexes, Floats
 from microrad.export.matrices.structure import entry_of, refuse_hidden, refuse_unstable
-from microrad.export.records import ExportError, Floats, Origin
+from microrad.export.records import ExportError, Origin
 
 _PROBES = 300
 MOST_STATES = 100

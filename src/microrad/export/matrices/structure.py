@@ -6,7 +6,8 @@ import numpy as np
 from scipy.linalg import matrix_balance
 
 from microrad.core import lti
-from microrad.export.records import ExportError, Floats
+from microrad.core.arrays import Floats
+from microrad.export.records import ExportError
 from microrad.loop.control.analysis import reachable
 
 LARGEST = 1e100

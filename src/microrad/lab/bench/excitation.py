@@ -12,11 +12,10 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from microrad.core.arrays import Floats
 from microrad.core.units import format_quantity
 from microrad.lab.recording.records import frozen
 from microrad.mission.fields import Problem, ProblemsError
-
-Floats = NDArray[np.float64]
 
 MOST_SAMPLES = 20_000_000
 """Samples of one record, all drives together, beyond which a duration is taken for a slip of the pen."""

@@ -10,16 +10,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from microrad.core.arrays import Floats
 from microrad.core.folder import MANIFEST, read_bytes, whole_folder
 from microrad.core.folder import check_folder as check
 from microrad.core.installing import advice
+from microrad.core.progress import Progress
 from microrad.lab.bench.plan import Plan, Record
-from microrad.lab.bench.play import BenchError, Progress, played
+from microrad.lab.bench.play import BenchError, played
 from microrad.lab.recording import Recording, read_recording
-
-Floats = NDArray[np.float64]
 
 _ROWS = 1 << 16  # of text written at once
 _NO_CLOCK = ("1904/01/01", "00:00:00")  # the virtual bench has none: LabVIEW's own epoch

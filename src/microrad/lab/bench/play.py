@@ -1,19 +1,17 @@
 """Playing a plan: converter, mirror, sensor and converter again, for each record of it."""
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from microrad.core.arrays import Floats
+from microrad.core.progress import Progress
 from microrad.core.units import format_quantity
 from microrad.lab.bench.plan import ConvertersTable, Plan, Record
 from microrad.lab.bench.truth import Amplifier, bench_output, bouc_wen_output, linear_output
 from microrad.lab.recording.records import Recording, digest_of, frozen
-
-Floats = NDArray[np.float64]
-Progress = Callable[[int, int, str], None]
 
 _MRAD = 1e3  # recordings are in volts and mrad
 

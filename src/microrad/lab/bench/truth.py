@@ -20,10 +20,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from microrad.core.arrays import Complexes, Floats
 from microrad.core.kernels import bouc_wen_response, play_response
-
-Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
 
 EQ2_NUMERATOR = (1.979e11, 7.051e13, 2.973e13)
 EQ2_DENOMINATOR = (1.0, 2.15e4, 3.737e8, 2.615e12, 8.489e14, 1.829e14)

@@ -1,7 +1,7 @@
 """What every identification shares: units, prepared records, the initial transient, the fastest rate, noise colour."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from microrad.lab.recording import Recording
 
 FloatArray = NDArray[np.float64]
-Progress = Callable[[int, int, str], None]
 
 
 def unheard(done: int, total: int, what: str) -> None:

@@ -3,9 +3,9 @@
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from microrad.core.arrays import Floats
 from microrad.core.budget import Line, root_sum_square
 from microrad.link.pointing.allocation import Allocation, allocate
 from microrad.link.pointing.classes import ErrorTerm, Interpretation, StatedError, basis, error_term
@@ -20,8 +20,6 @@ from microrad.link.pointing.summation import (
 from microrad.link.radial_error import Jitter, radial_cdf
 from microrad.mission.model import LinkMission, Source, source_text
 from microrad.mission.tables.link import half_angle_rad
-
-Floats = NDArray[np.float64]
 
 INTERPRETATIONS: dict[Interpretation, str] = {
     "temporal": "share of the time of the worst-case satellite, at 3 sigma of all satellites or at the stated bound",

@@ -8,12 +8,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from microrad.core.arrays import Floats
 from microrad.core.units import format_quantity
 from microrad.link.radial_error import Jitter, at_least_zero, radial_quantile, radial_survival
-
-Floats = NDArray[np.float64]
 
 _DB_PER_SQUARE = 20.0 / math.log(10.0)  # loss in dB is 8.686 (r / theta)^2
 

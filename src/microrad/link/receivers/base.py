@@ -8,8 +8,9 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from microrad.core.arrays import Floats
 from microrad.core.budget import Line
 from microrad.link.gains import photon_energy_j
 from microrad.link.receivers.checks import (
@@ -20,8 +21,6 @@ from microrad.link.receivers.checks import (
     require_zero_or_more,
     shown,
 )
-
-Floats = NDArray[np.float64]
 
 
 class RateError(ValueError):

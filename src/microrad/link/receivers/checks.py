@@ -4,11 +4,10 @@ import math
 from statistics import NormalDist
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from microrad.core.arrays import Floats
 from microrad.core.units import format_quantity
-
-Floats = NDArray[np.float64]
 
 SOURCE = "receiver and power as given"
 LEAST_RATIO = 1e-18  # sums over Poisson counts are cut at about 1e-22

@@ -4,8 +4,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from microrad.core.arrays import Floats
 from microrad.core.budget import Line
 from microrad.link.receivers.base import Receiver
 from microrad.link.receivers.checks import (
@@ -16,8 +16,6 @@ from microrad.link.receivers.checks import (
     require_zero_or_more,
     spontaneous_photons,
 )
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

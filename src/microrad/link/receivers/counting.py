@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from microrad.core.arrays import Floats
 from microrad.core.budget import Line
 from microrad.link.receivers.base import Receiver
 from microrad.link.receivers.checks import (
@@ -19,8 +20,6 @@ from microrad.link.receivers.checks import (
     require_extinction,
     require_zero_or_more,
 )
-
-Floats = NDArray[np.float64]
 
 _MANY = 1e5  # counts from which asymptotic series are exact to 1e-11
 _ROUNDING = 4.0 * float(np.finfo(np.float64).eps)

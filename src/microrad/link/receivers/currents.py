@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from microrad.core.arrays import Floats
 from microrad.core.budget import Line
 from microrad.core.units import ELEMENTARY_CHARGE_C
 from microrad.link.receivers.base import Receiver
@@ -24,8 +24,6 @@ from microrad.link.receivers.checks import (
     spontaneous_photons,
 )
 from microrad.link.receivers.light import apd_excess_noise_factor
-
-Floats = NDArray[np.float64]
 
 _BANDWIDTH_PER_SYMBOL = 0.5  # one-sided noise bandwidth over the symbol rate of a filter matched to rectangular symbols
 

@@ -8,10 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from microrad.core import lti
+from microrad.core.arrays import Complexes, Floats
 from microrad.loop.control.problem import GAUGE, OPTICAL, AxisController, DesignPlant
 
-Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
 Flags = NDArray[np.bool_]
 Response = Callable[[Floats], Complexes]
 Distance = Callable[[Complexes], Floats]

@@ -11,16 +11,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from microrad.core import lti
+from microrad.core.arrays import Complexes, Floats
 from microrad.loop.control import filters
 from microrad.loop.control.analysis import reachable
 from microrad.loop.control.problem import OPTICAL, AxisController, DesignPlant, Family, Parameter, once_per_plant
 from microrad.loop.control.sampled import Gains, pid
-
-Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
 
 LIGHT_DAMPING = 0.3
 """Damping ratio below which a pole pair counts as a resonance."""

@@ -6,11 +6,9 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from microrad.core.arrays import Floats
 from microrad.loop.control.search import Search, Trial
-
-Floats = NDArray[np.float64]
 
 STEP = 1e-4
 """Step of the rough search's differences, to one side, over a parameter's range: it ends half a step off an optimum."""

@@ -8,11 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from microrad.core import lti
+from microrad.core.arrays import Complexes, Floats
 from microrad.loop.control.analysis import around_poles, bandwidth_hz, cut, moved, uses_both
 from microrad.loop.control.problem import OPTICAL, RESIDUAL, AxisController, DesignPlant
-
-Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
 
 CUTS = ("command", "optical")
 """Where a loop is cut for its margins; the second only where the controller uses both sensors."""

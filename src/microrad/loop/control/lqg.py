@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from microrad.core import lti
+from microrad.core.arrays import Floats
 from microrad.loop.control.analysis import reachable
 from microrad.loop.control.problem import (
     GAUGE,
@@ -24,8 +25,6 @@ from microrad.loop.control.problem import (
     Parameter,
     once_per_plant,
 )
-
-Floats = NDArray[np.float64]
 
 WALK_CORNER = 1e-4
 """Frequency, over the control rate, below which the random walk exceeds the plant's own disturbance and noise."""

@@ -5,12 +5,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TypeVar
 
-import numpy as np
-from numpy.typing import NDArray
-
 from microrad.core import lti
+from microrad.core.arrays import Floats
 
-Floats = NDArray[np.float64]
 _Answer = TypeVar("_Answer")
 
 RESIDUAL, OPTICAL, GAUGE = range(3)

@@ -8,15 +8,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from microrad.core import kernels, lti
+from microrad.core.arrays import Floats
 from microrad.loop.control.analysis import crossings, gain_margins
 from microrad.mirror.hysteresis import LINE_OF_SIGHT, BoucWen, Creep, Play, slow_gain
 from microrad.mirror.model import Mirror
 from microrad.mission.model import Control, Mission
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)

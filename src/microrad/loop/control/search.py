@@ -5,13 +5,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from microrad.core.arrays import Floats
 from microrad.loop.control.analysis import LoopMargins, loop_margins, refuse_misfit
 from microrad.loop.control.judge import Judge, Verdict
 from microrad.loop.control.problem import DesignPlant, Family, Parameter, Specification
-
-Floats = NDArray[np.float64]
 
 HEADROOM = 1e-3
 """Relative excess over what is asked for that a search aims at: rounding what it finds takes a little of it."""

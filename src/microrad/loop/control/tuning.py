@@ -1,20 +1,18 @@
 """Tuning: the parameters of a family of controllers that leave the least residual, under a margin, on every plant."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
+from microrad.core.arrays import Floats
+from microrad.core.progress import Progress
 from microrad.loop.control.analysis import LoopMargins, close, h2, loop_margins
 from microrad.loop.control.descent import descend, settle
 from microrad.loop.control.problem import RESIDUAL, AxisController, DesignPlant, Family, Specification
 from microrad.loop.control.search import HEADROOM, Search, Trial, apart, rounded
-
-Floats = NDArray[np.float64]
-Progress = Callable[[int, int, str], None]
 
 MARGIN, BANDWIDTH = "modulus margin", "bandwidth"
 """What a tuned design can be bound by, beside the bounds of its parameters."""

@@ -4,12 +4,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from microrad.core import lti
+from microrad.core.arrays import Floats
 from microrad.loop.disturbance.records import Disturbance, above_zero, covariance
-
-Floats = NDArray[np.float64]
 
 _DROPPED = 1e-6  # of the output's variance from one white input: directions of noise below it are left out
 

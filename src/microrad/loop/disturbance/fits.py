@@ -4,15 +4,14 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from microrad.core.arrays import Floats
 from microrad.core.units import format_quantity
 from microrad.loop.disturbance.records import Convention, Disturbance, above_zero, band_rms, one_input, rising, share
 from microrad.loop.disturbance.sources import from_terms
 from microrad.loop.disturbance.tables import checked
 from microrad.loop.disturbance.terms import Samples, Term, band_samples, fit_terms, table_samples
-
-Floats = NDArray[np.float64]
 
 _BAND = 0.05  # allowed error of the rms in a band
 _TABLE_DB = 3.0  # allowed error of a density

@@ -10,11 +10,10 @@ from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
 from microrad.core import lti
+from microrad.core.arrays import Floats
 
-Floats = NDArray[np.float64]
 Convention = Literal["radial", "per-axis"]
 """What given numbers are: of both axes together (power shared equally) or of each axis."""
 

@@ -4,11 +4,9 @@ import math
 from dataclasses import dataclass, fields
 
 import numpy as np
-from numpy.typing import NDArray
 
+from microrad.core.arrays import Floats
 from microrad.loop.disturbance.records import above_zero, at_least_zero
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,11 +7,10 @@ from pathlib import Path
 from typing import Literal, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
+from microrad.core.arrays import Floats
 from microrad.core.folder import read_bytes
 
-Floats = NDArray[np.float64]
 Unit = Literal["rad^2/Hz", "mrad^2/Hz", "urad^2/Hz", "nrad^2/Hz"]
 
 _SCALES = dict(zip(get_args(Unit), (1.0, 1e-6, 1e-12, 1e-18), strict=True))

@@ -13,7 +13,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from microrad.core.arrays import Floats
+
 Kind = Literal["first-order", "low-pass", "band-pass"]
 
 _MAX_TERMS = 12

@@ -11,15 +11,15 @@ from numpy.typing import NDArray
 
 from microrad import mirror
 from microrad.core import kernels, lti
+from microrad.core.arrays import Floats
+from microrad.core.progress import Progress
 from microrad.core.threads import in_threads
 from microrad.loop import disturbance
 from microrad.loop.control import amplifier_factor, inverse_arrays, no_feedforward
 from microrad.loop.fine_loop.loop import LoopController, PointingLoop
 from microrad.loop.sensor import StrainGauge
 
-Floats = NDArray[np.float64]
 References = tuple[disturbance.Reference, ...]
-Progress = Callable[[int, int, str], None]
 
 SLICE_SAMPLES = 2048  # control samples between two returns from the kernel, and at most in a segment of the spectrum
 LANES = kernels.LANES

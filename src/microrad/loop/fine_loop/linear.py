@@ -12,12 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from microrad.core import lti
+from microrad.core.arrays import Complexes, Floats
 from microrad.loop import disturbance
 from microrad.loop.control import amplifier_factor
 from microrad.loop.fine_loop.loop import LoopController, PointingLoop, in_band_gain
-
-Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
 
 
 @dataclass(frozen=True, slots=True)

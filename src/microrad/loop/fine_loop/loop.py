@@ -4,16 +4,14 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from microrad.core import lti
+from microrad.core.arrays import Floats
 from microrad.loop.control import AxisController, Drive, Inverse, Timing
 from microrad.loop.disturbance import Disturbance, Reference
 from microrad.loop.sensor import OpticalSensor, StrainGauge
 from microrad.mirror.hysteresis import BoucWen, Play, gain_only, slow_gain
 from microrad.mirror.model import Mirror
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,13 +3,11 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from microrad.core import kernels
+from microrad.core.arrays import Floats
 from microrad.loop.fine_loop import ensemble
 from microrad.loop.fine_loop.loop import LoopController, PointingLoop
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,12 +1,12 @@
 """The fine-pointing study of a mission: its loop, controllers tuned for it, and what they leave under disturbances."""
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from microrad.core.arrays import Floats
+from microrad.core.progress import Progress
 from microrad.loop import disturbance
 from microrad.loop.fine_pointing.designs import (
     BASELINE,
@@ -68,9 +68,6 @@ __all__ = [
     "tune",
     "verify",
 ]
-
-Floats = NDArray[np.float64]
-Progress = Callable[[int, int, str], None]
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,6 +7,7 @@ from functools import partial
 
 import numpy as np
 
+from microrad.core.progress import Progress
 from microrad.core.threads import shared_out
 from microrad.loop import control
 from microrad.loop.control import DesignPlant, Family, Specification, Tuned
@@ -15,8 +16,6 @@ from microrad.loop.fine_loop.loop import LoopController, PointingLoop, Reference
 from microrad.loop.fine_pointing.scenario import Scene
 from microrad.mirror import from_table, spread
 from microrad.mission.tables.fine_pointing import FinePointing
-
-Progress = Callable[[int, int, str], None]
 
 BASELINE = "PI, best of a gain grid"
 WITH_INVERSE = f"{control.PI.name} + inverse"

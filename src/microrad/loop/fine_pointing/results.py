@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from microrad.core import kernels
+from microrad.core.arrays import Floats
+from microrad.core.progress import Progress
 from microrad.core.threads import in_threads
 from microrad.loop.control import inverse
 from microrad.loop.fine_loop import ensemble
@@ -20,9 +22,6 @@ from microrad.loop.fine_pointing.designs import BASELINE, Design
 from microrad.loop.fine_pointing.scenario import BODY_POINTING, Scene, with_mirror
 from microrad.mirror import Variant
 from microrad.mission.tables.fine_pointing import FinePointing
-
-Floats = NDArray[np.float64]
-Progress = Callable[[int, int, str], None]
 
 COUNTERS = {
     "saturated samples": kernels.COUNT_SATURATED,

@@ -1,10 +1,10 @@
 """What a link delivers in a day: contacts, acquisition, rates, volume and latency, by relay and by direct downlink."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 
 from microrad import link, orbit
+from microrad.core.progress import Progress
 from microrad.core.units import format_quantity
 from microrad.link.partner_search import Found
 from microrad.link.requirement import derived_from
@@ -15,8 +15,6 @@ from microrad.orbit.day import flow
 from microrad.orbit.day.assumptions import NOTHING, Numbers, Swing, swings
 from microrad.orbit.day.flow import DIRECT, RELAY, Closing, PointingLoss, Way
 from microrad.orbit.day.geometry import Encounter, View, beyond_the_mission, encounter, short_tail, times, view
-
-Progress = Callable[[int, int, str], None]
 
 __all__ = [
     "DIRECT",

@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from microrad import link, orbit
+from microrad.core.arrays import Floats
 from microrad.link.partner_search import Found
 from microrad.mission.model import LinkMission
 from microrad.mission.tables.operations import Downlink, Operations
 from microrad.orbit import operations
-from microrad.orbit.base import Floats
 from microrad.orbit.day.geometry import View, cut_at, longest_gap_s
 
 RELAY, DIRECT = "relay", "direct downlink"

@@ -8,9 +8,9 @@ from typing import TypeVar
 import numpy as np
 
 from microrad import orbit
+from microrad.core.arrays import Floats
 from microrad.core.units import SPEED_OF_LIGHT_M_S, format_quantity
 from microrad.mission.model import LinkMission
-from microrad.orbit.base import Floats
 from microrad.orbit.contacts import EARTH, END, START, coarse_step_s, coarse_times
 from microrad.orbit.events import positive
 from microrad.orbit.from_mission import TAIL_S

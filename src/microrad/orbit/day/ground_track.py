@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from microrad import orbit
+from microrad.core.arrays import Floats
 from microrad.mission.tables.operations import Downlink
-from microrad.orbit.base import Floats
 from microrad.orbit.day.flow import Way
 from microrad.orbit.day.geometry import View
 

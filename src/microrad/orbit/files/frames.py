@@ -8,7 +8,8 @@ import re
 
 import numpy as np
 
-from microrad.orbit.base import Floats, States
+from microrad.core.arrays import Floats
+from microrad.orbit.base import States
 from microrad.orbit.earth import ROTATION_RAD_S
 from microrad.orbit.epoch import Epoch
 

@@ -16,8 +16,9 @@ from xml.parsers import expat
 
 import numpy as np
 
+from microrad.core.arrays import Floats
 from microrad.core.folder import read_bytes
-from microrad.orbit.base import Floats, OrbitError
+from microrad.orbit.base import OrbitError
 from microrad.orbit.epoch import DAY_S, Epoch
 
 MOST_BYTES = 50_000_000

@@ -11,7 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
-from microrad.orbit.base import Floats, OrbitError, States
+from microrad.core.arrays import Floats
+from microrad.orbit.base import OrbitError, States
 from microrad.orbit.earth import MU_M3_S2
 from microrad.orbit.ephemeris import SLACK_S, EphemerisOrbit, Segment
 from microrad.orbit.epoch import Epoch

@@ -8,7 +8,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from microrad.orbit.base import Floats, OperationsError
+from microrad.core.arrays import Floats
+from microrad.orbit.base import OperationsError
 
 Range = Callable[[Floats], Floats]
 """Range in m over time in s, both of shape (n,); smooth."""

@@ -5,11 +5,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from microrad.orbit.base import Floats
-
-Integers = NDArray[np.int64]
+from microrad.core.arrays import Floats, Integers
 
 
 @dataclass(frozen=True, slots=True, eq=False)

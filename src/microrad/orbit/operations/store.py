@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from microrad.orbit.base import Floats
+from microrad.core.arrays import Floats
 from microrad.orbit.operations.rates import Service
 
 _ROUNDING = 1e-12  # of a share that is a sum of many

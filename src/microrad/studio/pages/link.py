@@ -8,6 +8,7 @@ from functools import partial
 
 from nicegui import ui
 
+from microrad.core.progress import Progress
 from microrad.link import study as link_study
 from microrad.link.study import LinkStudy
 from microrad.mission.file import LinkFile
@@ -15,7 +16,7 @@ from microrad.studio import link_view
 from microrad.studio.commands import Budget
 from microrad.studio.dials import Dial
 from microrad.studio.draft import Draft
-from microrad.studio.latest import Latest, Progress, shared
+from microrad.studio.latest import Latest, shared
 from microrad.studio.link_view import LinkView
 from microrad.studio.pages import layout
 from microrad.studio.pages.aside import aside

@@ -5,11 +5,12 @@ from functools import partial
 import numpy as np
 
 from microrad import orbit
+from microrad.core.arrays import Floats
 from microrad.link.partner_search import Finding
 from microrad.loop.fine_pointing import FinePointingStudy
 from microrad.mission.model import Mission
 from microrad.orbit.day import DayStudy
-from microrad.study.contact_run.records import Contact, ContactRun, Floats, Settings, Sight
+from microrad.study.contact_run.records import Contact, ContactRun, Settings, Sight
 from microrad.study.contact_run.sequence import run
 
 

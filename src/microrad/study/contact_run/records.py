@@ -7,11 +7,9 @@ from itertools import pairwise
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from microrad.core.arrays import Floats
 from microrad.core.units import format_quantity
-
-Floats = NDArray[np.float64]
 
 IDLE, SLEW, BEACON, DETECT, ANSWER, LOCK = "idle", "slew", "beacon", "detect", "answer", "lock"
 DATA, LOSS, REACQUIRE, END = "data", "loss", "re-acquire", "end"

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from microrad import link
+from microrad.core.arrays import Floats
 from microrad.core.units import SPEED_OF_LIGHT_M_S, format_quantity
 from microrad.loop.disturbance import Reference
 from microrad.loop.fine_loop import ensemble
@@ -15,8 +16,6 @@ from microrad.loop.fine_loop.loop import LoopController, PointingLoop
 from microrad.loop.fine_pointing.scenario import table
 from microrad.mission.model import Mission
 from microrad.study.contact_run.records import Contact, Loss, Settings, Sight, Window
-
-Floats = NDArray[np.float64]
 
 MOST_SAMPLES = 5_000_000
 """Control samples in the windows of a contact beyond which they would not fit into memory."""

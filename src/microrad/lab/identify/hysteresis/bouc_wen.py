@@ -22,12 +22,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from microrad.core.kernels import bouc_wen_response
+from microrad.core.progress import Progress
 from microrad.lab.identify.prepared import (
     DEFAULT_UNITS,
     FloatArray,
     IdentificationError,
     Prepared,
-    Progress,
     Units,
     centred,
     colour_inflation,

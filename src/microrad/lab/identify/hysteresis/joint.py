@@ -11,11 +11,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from microrad.core import kernels
+from microrad.core.progress import Progress
 from microrad.lab.identify.hysteresis.axis import AxisStructure, LinearPoles, one_axis
 from microrad.lab.identify.hysteresis.bouc_wen import BoucWenFit, fit_bouc_wen, rising
 from microrad.lab.identify.hysteresis.plant_fit import PlantFit, Run, fit_plant, without
 from microrad.lab.identify.hysteresis.prandtl_ishlinskii import non_negative, threshold_grid
-from microrad.lab.identify.prepared import FloatArray, Prepared, Progress, Units, fastest_rate, prepare, span
+from microrad.lab.identify.prepared import FloatArray, Prepared, Units, fastest_rate, prepare, span
 from microrad.lab.recording import Recording
 from microrad.mirror import model as mirror
 from microrad.mirror.hysteresis import NO_CREEP, BoucWen, Creep, Play, slow_gain

@@ -15,15 +15,9 @@ from typing import Any, Literal
 import numpy as np
 
 from microrad.core import kernels
+from microrad.core.progress import Progress
 from microrad.core.threads import in_threads
-from microrad.lab.identify.prepared import (
-    FloatArray,
-    IdentificationError,
-    Progress,
-    colour_inflation,
-    correlation,
-    unheard,
-)
+from microrad.lab.identify.prepared import FloatArray, IdentificationError, colour_inflation, correlation, unheard
 from microrad.lab.recording import Recording
 from microrad.mirror import model as mirror
 from microrad.mirror.model import Mirror

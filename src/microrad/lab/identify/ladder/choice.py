@@ -7,6 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
+from microrad.core.progress import Progress
 from microrad.lab.identify.hysteresis.axis import LinearPoles, poles_of
 from microrad.lab.identify.hysteresis.bouc_wen import BoucWenFit, fit_bouc_wen
 from microrad.lab.identify.hysteresis.joint import FORMS, JointFit, fit_joint, static_fit, time_constants
@@ -30,7 +31,6 @@ from microrad.lab.identify.prepared import (
     FloatArray,
     IdentificationError,
     Prepared,
-    Progress,
     Units,
     colour_inflation,
     percent,

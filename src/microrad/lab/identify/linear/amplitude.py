@@ -5,8 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from microrad.core.arrays import Floats
 from microrad.lab.identify.linear.fit import LinearFit
-from microrad.lab.identify.linear.modal import Floats, ModalModel
+from microrad.lab.identify.linear.modal import ModalModel
 from microrad.lab.identify.prepared import IdentificationError
 
 _LOW = 0.1

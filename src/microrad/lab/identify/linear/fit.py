@@ -10,13 +10,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from microrad.core.arrays import Complexes, Floats
 from microrad.core.lti import StateSpace
-from microrad.lab.identify.linear.modal import Complexes, Floats, Hold, ModalModel, simulate, simulate_periodic
+from microrad.core.progress import Progress
+from microrad.lab.identify.linear.modal import Hold, ModalModel, simulate, simulate_periodic
 from microrad.lab.identify.linear.order import fit_order
 from microrad.lab.identify.linear.polish import Polished, TimeEquations, pack, polish, unpack
 from microrad.lab.identify.linear.response import FrequencyResponse, response_from_periods, response_from_records
 from microrad.lab.identify.linear.vector_fitting import check_order
-from microrad.lab.identify.prepared import IdentificationError, Progress, colour_inflation, unheard
+from microrad.lab.identify.prepared import IdentificationError, colour_inflation, unheard
 from microrad.lab.recording import Recording
 
 _STEP = 1e-6

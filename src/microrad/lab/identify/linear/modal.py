@@ -18,13 +18,11 @@ from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from microrad.core.arrays import Complexes, Floats
 from microrad.core.lti import StateSpace
 from microrad.lab.identify.prepared import IdentificationError
 
-Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
 Hold = Literal["zero-order", "first-order", "band-limited"]
 
 

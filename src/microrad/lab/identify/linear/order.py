@@ -11,7 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from microrad.lab.identify.linear.modal import Complexes, Floats, ModalModel, order_modes, rank_one_modes
+from microrad.core.arrays import Complexes, Floats
+from microrad.lab.identify.linear.modal import ModalModel, order_modes, rank_one_modes
 from microrad.lab.identify.linear.polish import (
     Equations,
     FrequencyEquations,

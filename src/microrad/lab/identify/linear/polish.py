@@ -15,16 +15,8 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from microrad.lab.identify.linear.modal import (
-    Complexes,
-    Floats,
-    Hold,
-    ModalModel,
-    filtered,
-    hold_basis,
-    order_modes,
-    real_columns,
-)
+from microrad.core.arrays import Complexes, Floats
+from microrad.lab.identify.linear.modal import Hold, ModalModel, filtered, hold_basis, order_modes, real_columns
 from microrad.lab.recording import Recording
 
 _LOWEST_DECAY = 0.01  # of the lowest frequency that the data resolve

@@ -16,7 +16,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from microrad.lab.identify.linear.modal import Complexes, Floats, Hold
+from microrad.core.arrays import Complexes, Floats
+from microrad.lab.identify.linear.modal import Hold
 from microrad.lab.identify.prepared import IdentificationError
 from microrad.lab.recording import Recording
 

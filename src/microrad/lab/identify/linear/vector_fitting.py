@@ -13,15 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from microrad.lab.identify.linear.modal import (
-    Complexes,
-    Floats,
-    Hold,
-    ModalModel,
-    hold_basis,
-    rank_one_modes,
-    real_columns,
-)
+from microrad.core.arrays import Complexes, Floats
+from microrad.lab.identify.linear.modal import Hold, ModalModel, hold_basis, rank_one_modes, real_columns
 from microrad.lab.identify.prepared import IdentificationError
 
 _REAL = 1e-9

@@ -15,8 +15,9 @@ from typing import Literal
 
 import numpy as np
 
+from microrad.core.arrays import Complexes, Floats
 from microrad.lab.identify.hysteresis.plant_fit import upsampled
-from microrad.lab.identify.linear.modal import Complexes, Floats, ModalModel
+from microrad.lab.identify.linear.modal import ModalModel
 from microrad.lab.identify.linear.order import fit_order
 from microrad.lab.identify.linear.response import FrequencyResponse
 from microrad.mirror.hysteresis import Play

@@ -11,7 +11,8 @@ from typing import NamedTuple
 import numpy as np
 
 from microrad.core import kernels
-from microrad.lab.identify.linear.modal import Floats, hold_step
+from microrad.core.arrays import Floats
+from microrad.lab.identify.linear.modal import hold_step
 from microrad.lab.identify.stiffness.model import Numbers, delayed
 from microrad.mirror import model as mirror
 
