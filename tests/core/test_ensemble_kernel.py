@@ -891,7 +891,10 @@ def test_the_kernel_runs_as_it_is_without_the_compiler(tmp_path):
         "np.savez(sys.argv[1], **test.battery())\n"
     )
     path = tmp_path / "uncompiled.npz"
-    environment = os.environ | {"NUMBA_DISABLE_JIT": "1", "PYTHONPATH": str(TESTS)}
+    environment = os.environ | {
+        "NUMBA_DISABLE_JIT": "1",
+        "PYTHONPATH": os.pathsep.join([str(TESTS), str(TESTS / "core")]),
+    }
     done = subprocess.run(
         [sys.executable, "-c", script, str(path)], env=environment, capture_output=True, text=True, check=False
     )

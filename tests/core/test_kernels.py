@@ -1049,7 +1049,10 @@ def test_the_kernels_run_as_they_are_without_the_compiler(tmp_path):
         "print('every loop is its twin')\n"
     )
     path = tmp_path / "uncompiled.npz"
-    environment = os.environ | {"NUMBA_DISABLE_JIT": "1", "PYTHONPATH": str(TESTS)}
+    environment = os.environ | {
+        "NUMBA_DISABLE_JIT": "1",
+        "PYTHONPATH": os.pathsep.join([str(TESTS), str(TESTS / "core")]),
+    }
     done = subprocess.run(
         [sys.executable, "-c", script, str(path)], env=environment, capture_output=True, text=True, check=False
     )

@@ -153,7 +153,7 @@ def test_sampled_plant_of_the_pointing_loop_is_what_its_controller_was_designed_
     plant = design_plant(chosen.scene.axis)
     wanted = lti.frequency_response(plant.system, freq, plant.period_s)[:, :, 0]
     if which == "pointing":
-        path = chosen.table.reference_filter_hz
+        path = chosen.scene.table.reference_filter_hz
         w, T = 2.0 * np.pi * path, plant.period_s
         Ad, Bd = lti.zero_order_hold(np.array([[0.0, 1.0], [-w * w, -2.0 * w]]), np.array([[0.0], [w * w]]), T)
         filtered = lti.StateSpace(Ad, Bd, Ad[:1], Bd[:1])

@@ -16,6 +16,7 @@ from microrad.loop import paper_cases
 from microrad.mission.file import load_link, load_mission
 from microrad.report.quantities import quantity, signed
 from microrad.study import story
+from scenes import cases_of
 from shipped import DEFAULT, without_day, without_fine_pointing
 
 NO_BEAMS = dict.fromkeys(("beacon", "answer", "acquisition"))
@@ -161,7 +162,8 @@ def test_budget_and_a_campaign_of_one_row_end_alike(call, tmp_path, monkeypatch,
 @cache
 def _left_rad():
     m = load_mission(DEFAULT).mission
-    return paper_cases.residual_rad(m, paper_cases.worst(m, paper_cases.tracking_runs(m)).trace)
+    runs = paper_cases.tracking_runs(cases_of(m))
+    return paper_cases.residual_rad(m, paper_cases.worst(runs, m.requirement.residual_statistic).trace)
 
 
 def shaken_by_its_own_loop(rng, **communication):

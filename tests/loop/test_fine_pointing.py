@@ -361,7 +361,7 @@ def test_designs_are_plain_data_for_other_tools(scene, tuned):
     from microrad.cli.pointing import _data
 
     for d in tuned[0]:
-        again = json.loads(json.dumps(_data(d, fine_pointing.Outlook(1e-6, 2e-6))))
+        again = json.loads(json.dumps(_data(d, fine_pointing.Outlook(1e-6, 2e-6), "refused")))
         assert_allclose(again["matrices"]["A"], d.controller.system.A)
         assert again["margins"]["modulus"] >= 0.5
     assert tuple(scene.mirrors.own) == ("given", "comparison", "no hysteresis")
