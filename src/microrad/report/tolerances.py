@@ -109,7 +109,7 @@ SUMMARY: Mapping[str, tuple[str, ...]] = {
         "fine_pointing.sines[].frequency_hz",
     ),
     "formula": (
-        "margin_db.{beacon,answer,communication_as_budgeted}",
+        "margin_db.{beacon,answer,communication_as_budgeted,communication_static}",
         "{largest_data_rate_bit_s,largest_pointing_error_rad}",
         "implied_sensitivity_photon_bit[]",
         "links.budgets[].{margin_db,received_power_w,required_power_w,irradiance_w_m2,irradiance_on_axis_w_m2}",
