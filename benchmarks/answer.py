@@ -30,7 +30,7 @@ CLONED = ("demo", "suite", "gate")
 
 CHANGES = (
     ("relay's aperture", "geo_aperture = ", '"16 cm"'),
-    ("aperture, which the loop's sensor looks through", "leo_aperture = ", '"6 cm"'),
+    ("aperture (of the loop's sensor, too)", "leo_aperture = ", '"6 cm"'),
     ("data rate", "data_rate = ", '"200 Mbit/s"'),
     ("orbit", "altitude = ", '"520 km"'),
 )

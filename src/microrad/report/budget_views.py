@@ -108,9 +108,7 @@ def short(study: LinkStudy) -> list[str]:
     which = "Nearest to its limit is" if r.met else "What limits it is"
     said.append(f"{which} the {r.name}, by {r.because}{advice.of_links(study, r)}.")
     said.append(requirements.derived_words(found))
-    if warned := study.warnings:
-        more = f" ({len(warned) - 1} more by --verbose)" if len(warned) > 1 else ""
-        said.append(f"Warning: {warned[0]}{more}.")
+    said.append(requirements.warned(study.warnings))
     return list(filter(None, said))
 
 

@@ -12,7 +12,7 @@ from microrad.report.tables import Table
 def table(found: Sequence[Requirement]) -> Table:
     """Requirements for a terminal."""
     cells = [(r.name, *reversed(apart(r.actual, r.required, r.unit)), signed(r), r.mark) for r in found]
-    return Table("", ("requirement", "required", "achieved", "margin", ""), cells, (0,))
+    return Table("", ("requirement", "required", "achieved", "to spare", ""), cells, (0,))
 
 
 def paragraph(found: Sequence[Requirement]) -> str:
@@ -78,3 +78,11 @@ def data(r: Requirement) -> dict[str, Any]:
         "derived": list(r.derived),
         "limited_by": r.because,
     }
+
+
+def warned(warnings: Sequence[str]) -> str:
+    """The first warning in short, with how many there are; nothing without one."""
+    if not warnings:
+        return ""
+    which = f"Warning 1 of {len(warnings)} (all by --verbose)" if len(warnings) > 1 else "Warning"
+    return f"{which}: {warnings[0]}."

@@ -86,8 +86,7 @@ def _largest_warning(study: Study) -> str:
     if beyond := _judged_beyond(study):
         return f"Not to be relied on: {beyond}."
     found = warnings(study)
-    more = f" ({len(found) - 1} more by --verbose)" if len(found) > 1 else ""
-    return f"Warning: {found[0]}{more}." if found else ""
+    return requirements.warned(found)
 
 
 def _papers_loop(study: Study) -> str:
@@ -96,11 +95,13 @@ def _papers_loop(study: Study) -> str:
     if not study.papers_loop:
         return ""
     m, run = study.file.mission, study.residual
-    left = format_quantity(residual_rad(m, run.trace), "rad", 3)
-    judged = f"misses {' and '.join(failed)}" if failed else "meets what is required"
+    q, found_rad = m.requirement, residual_rad(m, run.trace)
+    left, most = (format_quantity(rad, "rad", 3) for rad in (found_rad, q.pointing_error_rad))
+    judged = f"would miss {' and '.join(failed)}" if failed else "would meet what is required"
     return (
-        f"The paper's loop, judged by itself ({run.controller}, sine of {run.freq_hz:g} Hz), {judged}: it leaves "
-        f"{left} ({m.requirement.residual_statistic}) and {signed(study.achieved.margin_db, 'dB')}."
+        f"For comparison alone: the paper's loop ({run.controller}, sine of {run.freq_hz:g} Hz) {judged}; it leaves "
+        f"{left} ({q.residual_statistic}) of {most}, and {signed(study.achieved.margin_db, 'dB')} where "
+        f"{q.margin_db:.2f} dB are required."
     )
 
 
