@@ -203,6 +203,8 @@ def _in_reach(
     """When each of the others is nearer than the limit: one set of intervals for each, or none without a limit."""
     if furthest_m == math.inf or not others:
         return ()
+    if furthest_m <= 0.0:  # the link closes nowhere
+        return ((np.empty((0, 2)),) * len(others),)
 
     def spare(first: Floats, second: Floats) -> Floats:
         apart = second - first
