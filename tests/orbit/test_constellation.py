@@ -121,6 +121,11 @@ def test_opportunities_of_a_plan_are_the_seconds_in_which_the_link_closes(tmp_pa
         np.testing.assert_allclose(np.ravel(mine), edge, rtol=0, atol=1.5)
 
 
+def test_a_link_that_closes_nowhere_has_no_opportunity(tmp_path):
+    found, _ = planned(tmp_path, SIX_HOURS, {"operations.margin": "60 dB"})
+    assert (as_rows(found.opportunities), found.planned, found.volume_bit) == ([], (), 0)
+
+
 def test_twice_the_satellites_have_the_opportunities_of_both_halves(tmp_path):
     big = {"constellation.satellites": 40, "constellation.planes": 4, **SIX_HOURS}
     pair, own, relays = made(tmp_path, big)

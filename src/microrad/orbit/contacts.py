@@ -172,6 +172,8 @@ def contacts_with_each(
     own = coarse_step_s(satellite.orbit, span_s[0])
     others = tuple(sampled) or tuple(Sampled.over(relay.orbit, span_s, own) for relay in relays)
     time_s = coarse_times(span_s, min(own, *(other.step_s for other in others), math.inf))
+    if furthest_m <= 0.0:  # the link closes nowhere
+        return ((),) * len(relays)
     if not relays:
         return ()
     both = partial(_when, satellite.orbit, others, time_s)
