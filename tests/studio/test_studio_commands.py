@@ -6,7 +6,6 @@ import json
 import re
 import shlex
 import shutil
-import zipfile
 from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
@@ -28,9 +27,6 @@ from microrad.studio.commands import (
     CampaignRun,
     Contacts,
     Design,
-    ExportCode,
-    ExportMatrices,
-    ExportUnit,
     Identify,
     Run,
     command,
@@ -219,39 +215,6 @@ def rows(text):
     return [line for line in text.splitlines() if line.strip() and "ledger" not in line and " s" not in line]
 
 
-@pytest.mark.parametrize(
-    "action",
-    [
-        ExportCode(MISSION, "PID + inverse", Path("code"), precision="single"),
-        ExportUnit(MISSION, Path("unit.fmu"), name="my_mirror", fmi="3.0"),
-        ExportUnit(MISSION, Path("loop.fmu"), name="my_loop", controller="PID"),
-        ExportMatrices(MISSION, Path("m.mat")),
-        ExportMatrices(MISSION, Path("m.mat"), controller="PID"),
-    ],
-)
-def test_an_export_writes_the_same_files(home, capsys, action):
-    _, code, err = typed(command(action), capsys)
-    assert code == 0, err
-    (target,) = map(Path, action.results)
-    before = content(target)
-    assert before
-    with pytest.raises((FileExistsError, FolderError)):
-        executed(action.python)
-    executed(replace(action, overwrite=True).python)
-    assert content(target) == before
-    assert typed(command(replace(action, overwrite=True)), capsys)[1] == 0
-
-
-def content(target):
-    """The files that tell a design: no compiled library, nothing with a time in it, and so not the head of MATLAB's."""
-    if target.is_dir():
-        return {path.name: path.read_bytes() for path in target.iterdir() if path.suffix in (".c", ".h", ".csv")}
-    if target.suffix == ".mat":
-        return target.read_bytes()[128:]
-    with zipfile.ZipFile(target) as unit:
-        return {name: unit.read(name) for name in unit.namelist() if name.endswith((".c", ".h", ".xml"))}
-
-
 # ------------------------------------------------------------------------------------------------------ as it is typed
 @pytest.mark.parametrize(
     ("action", "line"),
@@ -262,10 +225,6 @@ def content(target):
         (Contacts(Path("a b.toml")), "microrad contacts 'a b.toml'"),
         (Design(Path("a.toml"), Path("$(rm).toml")), "microrad design a.toml --mirror '$(rm).toml'"),
         (CampaignResume(Path("c.ledger"), threads=2), "microrad campaign resume c.ledger --threads 2"),
-        (
-            ExportUnit(Path("a.toml"), Path("u.fmu")),
-            "microrad export fmu a.toml --loop control --fmi 2.0 --name mirror --output u.fmu",
-        ),
         (
             Identify((Path("l.csv"),), "0", "-1", Path("m.toml"), accept=("a", "b")),
             "microrad identify l.csv --input 0 --output=-1 --accept a --accept b --input-unit V --output-unit mrad "

@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
-from microrad.studio.commands_export import ExportCode, ExportMatrices, ExportUnit
 from microrad.studio.commands_identify import Identify
 from microrad.studio.commands_pieces import WIDTH, as_path, flag, joined, mission_call, option, path_argument, path_text
 
@@ -23,9 +22,6 @@ __all__ = [
     "CampaignRun",
     "Contacts",
     "Design",
-    "ExportCode",
-    "ExportMatrices",
-    "ExportUnit",
     "Identify",
     "Run",
     "command",

@@ -27,11 +27,6 @@ def flag(name: str, on: bool) -> tuple[str, ...]:
     return (name,) if on else ()
 
 
-def target_options(output: Path, mirror: Path | None, overwrite: bool) -> tuple[str, ...]:
-    """The options that all exports have."""
-    return (*option("--mirror", mirror), *option("--output", output), *flag("--overwrite", overwrite))
-
-
 def path_text(path: Path) -> str:
     """A path as text in Python."""
     return repr(str(path))
