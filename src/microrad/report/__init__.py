@@ -1,9 +1,8 @@
 """Reports of a study and of an identification: a page that opens offline, the verdict in words, plain data."""
 
-import contextlib
 import csv
 import io
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Mapping
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,12 +10,10 @@ from typing import TYPE_CHECKING, Any
 from microrad.core.folder import MANIFEST, FolderError, check_folder, whole_folder
 from microrad.core.kept import NOTHING, Kept
 from microrad.core.progress import Progress
-from microrad.core.threads import shared_out
 from microrad.report.tables import Column, rows_of
 
 if TYPE_CHECKING:
     from microrad.orbit.constellation import ConstellationPlan
-    from microrad.report.figures import Figure
     from microrad.report.identification import ReportError, check_identification, write_identification
     from microrad.report.identification_words import identification_data, identification_text
     from microrad.report.page import Drawn
@@ -73,9 +70,7 @@ def write(
 
     with whole_folder(folder, overwrite) as draft:
         on_progress(0, 3, "figures")
-        with drawing(study, parts) as figures:
-            numbers = parts.part(results.netcdf, study)
-            drawn = figures()
+        drawn, numbers = draw(study, parts), parts.part(results.netcdf, study)
         (draft / "figures").mkdir()
         for figure in drawn.every:
             (draft / "figures" / f"{figure.name}.svg").write_text(figure.svg, encoding="utf-8")
@@ -95,31 +90,16 @@ def write(
 
 def draw(study: "Study", parts: Kept = NOTHING) -> "Drawn":
     """The figures of a study's page, by its parts."""
-    with drawing(study, parts) as figures:
-        return figures()
-
-
-@contextlib.contextmanager
-def drawing(study: "Study", parts: Kept) -> "Iterator[Callable[[], Drawn]]":
-    """The same, begun beside what the caller does: the callable returns the figures."""
     from microrad.report import day_plots, figures, fine_pointing_figures, link_figures, page, paper_bench, tails
 
-    each: list[Callable[[], tuple[Figure, ...]]] = [
-        lambda: figures.draw(study, parts),
-        lambda: paper_bench.draw(study, parts),
-        lambda: fine_pointing_figures.draw(study, parts),
-        lambda: tails.draw(study, parts),
-        lambda: link_figures.draw(study.links, parts),
-        lambda: () if study.day is None else day_plots.draw(study.day, study.contact, parts),
-    ]
-
-    def drawn() -> page.Drawn:
-        found, troubles = zip(*shared(), strict=True)
-        parts.trouble = next(filter(None, (parts.trouble, *troubles)), "")
-        return page.Drawn(*found)
-
-    with shared_out([lambda draw=draw: (draw(), parts.trouble) for draw in each]) as shared:  # type: ignore[misc]
-        yield drawn
+    return page.Drawn(
+        figures.draw(study),
+        paper_bench.draw(study, parts),
+        fine_pointing_figures.draw(study),
+        tails.draw(study),
+        link_figures.draw(study.links),
+        () if study.day is None else day_plots.draw(study.day, study.contact),
+    )
 
 
 def write_plan(plan: "ConstellationPlan", folder: Path) -> None:

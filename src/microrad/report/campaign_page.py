@@ -5,10 +5,10 @@ from typing import Any
 import numpy as np
 
 from microrad.campaign.records import CampaignSummary, CellSummary, Limit, OutputSummary
-from microrad.report import campaign_figures, interactive, page
+from microrad.report import campaign_figures, page, scripts
 from microrad.report import campaign_tables as tables
 from microrad.report import campaign_words as words
-from microrad.report.figures import Figure
+from microrad.report.plotting.figure import Figure
 
 MOST_FAILED, MOST_TRACES = 40, 6
 _MOST_QUANTILES = 5
@@ -17,7 +17,7 @@ _MOST_QUANTILES = 5
 def html(summary: CampaignSummary) -> str:
     """The page; every text of the campaign is escaped, and nothing is loaded from anywhere."""
     text = page.pages().get_template("campaign.html").render(context(summary, draw(summary)))
-    return interactive.with_scripts(text)
+    return scripts.with_scripts(text)
 
 
 def context(summary: CampaignSummary, figures: dict[str, Any]) -> dict[str, Any]:

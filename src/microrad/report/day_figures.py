@@ -2,26 +2,37 @@
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from matplotlib import rc_context
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure as Canvas
 
 from microrad.core.arrays import Floats
-from microrad.report.figures import BLACK, BLUE, GREEN, ORANGE, SKY, STYLE, VERMILION, Figure, svg_of, thin
+from microrad.report.plotting.figure import Figure
+from microrad.report.plotting.sheet import (
+    BLACK,
+    BLUE,
+    GREEN,
+    GREY,
+    ORANGE,
+    SKY,
+    VERMILION,
+    Bars,
+    Dash,
+    Legend,
+    Line,
+    Panel,
+    Rule,
+    Sheet,
+    Words,
+    grid,
+)
 
 Curves = Mapping[str, tuple[Floats, Floats]]  # name: abscissa (n,), ordinate (n,)
 
-# Names come from the mission file: a dollar sign in one is no mathematics.
-PLAIN: dict[Any, Any] = {**STYLE, "text.parse_math": False}
-GREY = "#777777"
 _COLOURS = (BLUE, ORANGE, GREEN, SKY, VERMILION, GREY)
 _DASHES = ("-", "--", "-.", ":")
 WIDTH = 7.6
 _NONE = np.empty(0)
-_IN_GREY: dict[str, Any] = {"ha": "center", "va": "center", "color": GREY}
 _STATES = {"data": BLUE, "loss": VERMILION}  # the other states take the colours that are left
 _UNITS_S = {"ms": 1e-3, "s": 1.0, "min": 60.0, "h": 3600.0, "d": 86400.0}
 _WIDE = {"ms": (1, 10), "s": (0.1, 1, 10), "min": (1, 10), "h": (1, 6), "d": (1, 7, 30)}
@@ -52,23 +63,20 @@ def duration(time_s: float) -> str:
     return f"{time_s:.3g} s"
 
 
-def empty(words: str) -> str:
-    """A picture that says why there is nothing to see, as SVG text."""
-    canvas = Canvas(figsize=(WIDTH, 0.9))
-    canvas.text(0.5, 0.5, words, **_IN_GREY)
-    return svg_of(canvas)
+def empty(words: str) -> Sheet:
+    """A picture that says why there is nothing to see."""
+    return Sheet(WIDTH, 0.9, heading=words, heading_colour=GREY)
 
 
 # ------------------------------------------------------------------------------------------------ bars over time
 
 
-@rc_context(PLAIN)
 def timeline(rows: Sequence[tuple[str, Floats]], span_s: tuple[float, float], epoch_label: str) -> Figure:
     """Intervals, one row for each name: an array (n, 2) of begins and ends in seconds since the epoch.
 
     Rows whose names agree up to a colon ("direct: Kiruna") have one colour. Beside each row: how many, and their sum.
     """
-    svg = _timeline(rows, span_s, epoch_label) if rows else empty("no contacts and no eclipses to show")
+    sheet = _timeline(rows, span_s, epoch_label) if rows else empty("no contacts and no eclipses to show")
     caption = (
         f"From {span_s[0] / 3600.0:g} h to {span_s[1] / 3600.0:g} h after {epoch_label}. "
         "At the right of each row: how many intervals, and how long they are together."
@@ -76,32 +84,29 @@ def timeline(rows: Sequence[tuple[str, Floats]], span_s: tuple[float, float], ep
     columns = {} if rows else {"start (s)": _NONE, "end (s)": _NONE}
     for name, intervals in rows:
         columns[f"{name}, start (s)"], columns[f"{name}, end (s)"] = np.reshape(intervals, (-1, 2)).T
-    return Figure("day-timeline", "Contacts over time", caption, svg, columns)
+    return Figure("day-timeline", "Contacts over time", caption, sheet, columns)
 
 
-def _timeline(rows: Sequence[tuple[str, Floats]], span_s: tuple[float, float], epoch_label: str) -> str:
-    canvas = Canvas(figsize=(WIDTH, 0.8 + 0.27 * len(rows)), layout="constrained")
-    axes = canvas.subplots()
+def _timeline(rows: Sequence[tuple[str, Floats]], span_s: tuple[float, float], epoch_label: str) -> Sheet:
+    sheet, (panel,) = grid(WIDTH, 0.8 + 0.27 * len(rows))
     kinds = [*dict.fromkeys(name.split(":")[0] for name, _ in rows)]
-    _bars(axes, rows, [_COLOURS[kinds.index(name.split(":")[0]) % len(_COLOURS)] for name, _ in rows], 3600.0)
-    axes.set_xticks(_hours(*span_s))
-    axes.set_xlim(span_s[0] / 3600.0, span_s[1] / 3600.0)
-    axes.set_xlabel(f"hours since {epoch_label}")
-    return svg_of(canvas)
+    _bars(panel, rows, [_COLOURS[kinds.index(name.split(":")[0]) % len(_COLOURS)] for name, _ in rows], 3600.0)
+    panel.x.ticks, panel.x.title = _hours(*span_s).tolist(), f"hours since {epoch_label}"
+    panel.x.low, panel.x.high = span_s[0] / 3600.0, span_s[1] / 3600.0
+    return sheet
 
 
-def _bars(axes: Axes, rows: Sequence[tuple[str, Floats]], colours: Sequence[str], unit_s: float) -> None:
+def _bars(panel: Panel, rows: Sequence[tuple[str, Floats]], colours: Sequence[str], unit_s: float) -> None:
     """A row of bars for each name, the first on top; a bar too short to see keeps the width of its edge."""
     for row, ((_, intervals), colour) in enumerate(zip(rows, colours, strict=True)):
         start_s, end_s = np.reshape(intervals, (-1, 2)).T
-        bars = [*zip(start_s / unit_s, (end_s - start_s) / unit_s, strict=True)]
-        axes.broken_barh(bars, (row - 0.34, 0.68), facecolor=colour, edgecolor=colour, linewidth=0.5)
-        words = f"{len(bars)} · {duration(float(np.sum(end_s - start_s)))}" if bars else "none"
-        style: dict[str, Any] = {"textcoords": "offset points", "va": "center", "color": BLACK if bars else GREY}
-        axes.annotate(words, (1, row), (5, 0), axes.get_yaxis_transform(), **style)
-    axes.set_yticks(range(len(rows)), [short(name) for name, _ in rows])
-    axes.set_ylim(len(rows) - 0.4, -0.6)
-    axes.grid(visible=False, axis="y")
+        at, breadth = np.full(start_s.shape, float(row)), np.full(start_s.shape, 0.68)
+        panel.add(Bars(at, start_s / unit_s, end_s / unit_s, breadth, colour, edge=colour))
+        words = f"{start_s.size} · {duration(float(np.sum(end_s - start_s)))}" if start_s.size else "none"
+        ink = BLACK if start_s.size else GREY
+        panel.add(Words(words, 1.0, row, ink, 9.0, shift=(5.0, 0.0), of_panel="x"))
+    panel.y.ticks, panel.y.grid = {row: short(name) for row, (name, _) in enumerate(rows)}, False
+    panel.y.low, panel.y.high = len(rows) - 0.4, -0.6
 
 
 def _hours(start_s: float, end_s: float) -> Floats:
@@ -111,14 +116,13 @@ def _hours(start_s: float, end_s: float) -> Floats:
     return np.arange(math.ceil(first / step - 1e-9), math.floor(last / step + 1e-9) + 1).astype(np.float64) * step
 
 
-@rc_context(PLAIN)
 def contact_run(
     states: Sequence[tuple[str, float, float]], windows: Windows, required_rad: float | None = None
 ) -> Figure:
     """States of a simulated contact as (name, begin, end) in seconds, above the pointing error in sampled windows."""
     names = [*dict.fromkeys(name for name, _, _ in states)]
     rows = [(name, np.array([[a, b] for which, a, b in states if which == name])) for name in names]
-    svg = _contact_run(rows, windows, required_rad) if rows else empty("no contact was run")
+    sheet = _contact_run(rows, windows, required_rad) if rows else empty("no contact was run")
     caption = (
         "States of the terminal, one row each; at the right how often and how long in all. "
         "Below: radial pointing error in the windows that were simulated in full."
@@ -127,50 +131,49 @@ def contact_run(
         f"{name}, end (s)": at[:, 1] for name, at in rows
     }
     columns |= {"window (s)": windows.time_s, "rms (rad)": windows.rms_rad, "largest (rad)": windows.largest_rad}
-    return Figure("contact-run", "A contact, simulated", caption, svg, columns)
+    return Figure("contact-run", "A contact, simulated", caption, sheet, columns)
 
 
-def _contact_run(rows: Sequence[tuple[str, Floats]], windows: Windows, required_rad: float | None) -> str:
+def _contact_run(rows: Sequence[tuple[str, Floats]], windows: Windows, required_rad: float | None) -> Sheet:
     high, low = 0.24 * len(rows), 1.7 if windows.time_s.size else 0.5
-    canvas = Canvas(figsize=(WIDTH, 1.3 + high + low), layout="constrained")
-    above, below = canvas.subplots(2, 1, sharex=True, height_ratios=(high, low))
+    sheet = Sheet(WIDTH, 1.3 + high + low, heights=(high, low), share_x=True, legend=Legend("below", 3))
+    above, below = sheet.panel(0), sheet.panel(1)
     spare = [colour for colour in _COLOURS if colour not in _STATES.values()]
     others = [name for name, _ in rows if name not in _STATES]
     colours = [_STATES[name] if name in _STATES else spare[others.index(name) % len(spare)] for name, _ in rows]
     _bars(above, rows, colours, 60.0)
     everything = np.concatenate([at for _, at in rows]) / 60.0
-    above.set_xlim(everything.min(), everything.max())
+    for panel in (above, below):
+        panel.x.low, panel.x.high = float(everything.min()), float(everything.max())
     if windows.time_s.size:
         _errors(below, windows, required_rad)
-        canvas.legend(*below.get_legend_handles_labels(), loc="outside lower center", ncols=3, fontsize=8)
     else:
-        below.set(yticks=[])
-        below.text(0.5, 0.5, "no window was simulated in full", transform=below.transAxes, **_IN_GREY)
-    below.set_xlabel("time since the start of the contact (min)")
-    return svg_of(canvas)
+        below.y.ticks = ()
+        words = "no window was simulated in full"
+        below.add(Words(words, 0.5, 0.5, GREY, 9.0, anchor="middle", of_panel="xy"))
+    below.x.title = "time since the start of the contact (min)"
+    return sheet
 
 
-def _errors(axes: Axes, windows: Windows, required_rad: float | None) -> None:
+def _errors(panel: Panel, windows: Windows, required_rad: float | None) -> None:
     minutes = windows.time_s / 60.0
-    axes.plot(minutes, windows.largest_rad * 1e6, "^", color=VERMILION, markersize=4.5, label="largest", clip_on=False)
-    axes.plot(minutes, windows.rms_rad * 1e6, "o", color=BLUE, markersize=4.5, label="rms", clip_on=False)
+    for values, colour, marker, label in (
+        (windows.largest_rad, VERMILION, "^", "largest"),
+        (windows.rms_rad, BLUE, "o", "rms"),
+    ):
+        panel.add(Line(minutes, values * 1e6, colour, "", label=label, marker=marker, size=4.5, clip=False))
     if required_rad is not None:
-        label = f"required: {required_rad * 1e6:g} µrad"
-        axes.axhline(required_rad * 1e6, color=BLACK, linestyle="--", linewidth=1.0, label=label)
+        panel.add(Rule(required_rad * 1e6, False, BLACK, "--", label=f"required: {required_rad * 1e6:g} µrad"))
     found = np.concatenate([windows.largest_rad, windows.rms_rad])
     positive = found[np.isfinite(found) & (found > 0.0)]
-    if positive.size and positive.max() > 50.0 * np.median(positive):
-        axes.set_yscale("log")
-        axes.yaxis.set_major_formatter("{x:g}")
-    else:
-        axes.set_ylim(bottom=0.0)
-    axes.set_ylabel("radial error (µrad)")
+    panel.y.log = bool(positive.size and positive.max() > 50.0 * np.median(positive))
+    panel.y.low = None if panel.y.log else 0.0
+    panel.y.title = "radial error (µrad)"
 
 
 # ------------------------------------------------------------------------------------------------ along a contact
 
 
-@rc_context(PLAIN)
 def along_contact(
     time_s: Floats,
     range_m: Floats,
@@ -188,34 +191,31 @@ def along_contact(
         "line-of-sight rate (rad/s)": ("line-of-sight rate (µrad/s)", rate_rad_s, 1e6),
         "Doppler (Hz)": ("Doppler shift (GHz)", doppler_hz, 1e-9),
     }
-    svg = _along_contact(time_s / 60.0, [*panels.values()]) if time_s.size else empty("no contact in this span")
+    sheet = _along_contact(time_s / 60.0, [*panels.values()]) if time_s.size else empty("no contact in this span")
     columns = {"time since rise (s)": time_s} | {heading: values for heading, (_, values, _) in panels.items()}
     caption = (
         f"Range, point-ahead angle, inertial rate of the line of sight and Doppler shift over contact {number}, "
         f"which rises at {rise_utc} UTC."
     )
-    return Figure("along-contact", f"Along contact {number}", caption, svg, columns)
+    return Figure("along-contact", f"Along contact {number}", caption, sheet, columns)
 
 
-def _along_contact(minutes: Floats, panels: Sequence[tuple[str, Floats, float]]) -> str:
-    canvas = Canvas(figsize=(WIDTH, 4.4), layout="constrained")
-    grid = canvas.subplots(2, 2, sharex=True)
-    for axes, (label, values, factor) in zip(grid.ravel(), panels, strict=True):
-        axes.plot(*thin(minutes, values * factor), color=BLUE)
-        axes.ticklabel_format(useOffset=False, style="plain")
-        axes.set_ylabel(label)
+def _along_contact(minutes: Floats, panels: Sequence[tuple[str, Floats, float]]) -> Sheet:
+    sheet, drawn = grid(WIDTH, 4.4, 2, 2, share_x=True)
+    for panel, (title, values, factor) in zip(drawn, panels, strict=True):
+        panel.add(Line(minutes, values * factor, BLUE))
+        panel.y.title = title
         if values.min() < 0.0 < values.max():
-            axes.axhline(0.0, color=GREY, linewidth=0.8)
-    grid[0, 0].set_xlim(0.0, max(float(minutes[-1]), 1e-3))
-    for axes in grid[1]:
-        axes.set_xlabel("time since rise (min)")
-    return svg_of(canvas)
+            panel.add(Rule(0.0, False, GREY, width=0.8))
+        panel.x.low, panel.x.high = 0.0, max(float(minutes[-1]), 1e-3)
+    for panel in drawn[2:]:
+        panel.x.title = "time since rise (min)"
+    return sheet
 
 
 # ------------------------------------------------------------------------------------------------ data and delay
 
 
-@rc_context(PLAIN)
 def volume(cumulative: Curves, stored: Curves) -> Figure:
     """Data over time: generated and delivered since the start above, stored on board below; a name has one colour.
 
@@ -223,40 +223,38 @@ def volume(cumulative: Curves, stored: Curves) -> Figure:
     """
     both = {"since the start": cumulative, "stored": stored}
     some = any(time_s.size for curves in both.values() for time_s, _ in curves.values())
-    svg = _volume(cumulative, stored) if some else empty("no data were generated")
+    sheet = _volume(cumulative, stored) if some else empty("no data were generated")
     columns: dict[str, Floats] = {} if cumulative or stored else {"time (s)": _NONE, "volume (bit)": _NONE}
     for what, curves in both.items():
         for name, (time_s, bits) in curves.items():
             columns |= {f"{name}, {what}, time (s)": time_s, f"{name}, {what} (bit)": bits}
     caption = "Above: data generated and delivered since the start. Below: what waits on board for its way down."
     caption += " Behind the mission's span nothing more is generated, and what waits is still delivered."
-    return Figure("data-volume", "Data generated, delivered and stored", caption, svg, columns)
+    return Figure("data-volume", "Data generated, delivered and stored", caption, sheet, columns)
 
 
-def _volume(cumulative: Curves, stored: Curves) -> str:
-    canvas = Canvas(figsize=(WIDTH, 4.8), layout="constrained")
-    panels = canvas.subplots(2, 1, sharex=True, height_ratios=(1.4, 1))
+def _volume(cumulative: Curves, stored: Curves) -> Sheet:
+    sheet = Sheet(WIDTH, 4.8, heights=(1.4, 1.0), share_x=True, legend=Legend("above", 4))
     names = [*dict.fromkeys([*cumulative, *stored])]
-    for axes, curves, what in zip(panels, (cumulative, stored), ("since the start", "stored on board"), strict=True):
+    panels = sheet.panel(0), sheet.panel(1)
+    ends = [time_s[place] for time_s, _ in (*cumulative.values(), *stored.values()) if time_s.size for place in (0, -1)]
+    for panel, curves, what in zip(panels, (cumulative, stored), ("since the start", "stored on board"), strict=True):
         factor, unit = _bytes(bits for _, bits in curves.values())
         for name, (time_s, bits) in curves.items():
-            drawn = thin(time_s / 3600.0, bits / 8.0 * factor)
-            axes.plot(*drawn, label=short(name), **_line_style(names.index(name)))
-        axes.set_ylabel(f"{what} ({unit})")
-        axes.set_ylim(bottom=-0.02 * axes.get_ylim()[1])  # a curve that stays at zero can be seen
-    ends = [time_s[place] for time_s, _ in (*cumulative.values(), *stored.values()) if time_s.size for place in (0, -1)]
-    panels[1].set_xticks(_hours(min(ends), max(ends)))
-    panels[1].set_xlim(min(ends) / 3600.0, max(ends) / 3600.0)
-    panels[1].set_xlabel("time (h)")
-    entries = {label: h for axes in panels for h, label in zip(*axes.get_legend_handles_labels(), strict=True)}
-    canvas.legend(entries.values(), entries.keys(), loc="outside upper center", ncols=4, fontsize=8)
-    return svg_of(canvas)
+            drawn = time_s / 3600.0, bits / 8.0 * factor
+            panel.add(Line(*drawn, *_look(names.index(name)), width=1.5, label=short(name)))
+        most = max((float(np.max(bits, initial=0.0)) / 8.0 * factor for _, bits in curves.values()), default=1.0) or 1.0
+        panel.y.title, panel.y.low = f"{what} ({unit})", -0.02 * most  # a curve that stays at zero can be seen
+        panel.x.low, panel.x.high = min(ends) / 3600.0, max(ends) / 3600.0
+        panel.x.ticks = _hours(min(ends), max(ends)).tolist()
+    panels[1].x.title = "time (h)"
+    return sheet
 
 
-def _line_style(place: int) -> dict[str, Any]:
+def _look(place: int) -> tuple[str, Dash]:
     """Black for the first curve, then the palette; the dashes differ too."""
     colours = (BLACK, *_COLOURS)
-    return {"color": colours[place % len(colours)], "linestyle": _DASHES[place % 4], "linewidth": 1.5}
+    return colours[place % len(colours)], _DASHES[place % 4]
 
 
 def _bytes(several: Iterable[Floats]) -> tuple[float, str]:
@@ -273,7 +271,6 @@ def reached_s(latency_s: Floats, share: Floats, wanted: float) -> float:
     return float(np.interp(wanted, share, latency_s))
 
 
-@rc_context(PLAIN)
 def latency(curves: Curves) -> Figure:
     """Share of the data delivered within a latency: pairs of (n,), seconds and shares of one, both rising.
 
@@ -283,39 +280,33 @@ def latency(curves: Curves) -> Figure:
     for name, (latency_s, share) in curves.items():
         columns |= {f"{name}, latency (s)": latency_s, f"{name}, share": share}
     some = any(np.any((latency_s > 0.0) & (share > 0.0)) for latency_s, share in curves.values())
-    svg = _latency(curves) if some else empty("nothing was delivered")
+    sheet = _latency(curves) if some else empty("nothing was delivered")
     caption = "Share of the data that has arrived within a time after it was recorded. Circle: median. Diamond: 99 %."
-    return Figure("latency", "From recording to delivery", caption, svg, columns)
+    return Figure("latency", "From recording to delivery", caption, sheet, columns)
 
 
-def _latency(curves: Curves) -> str:
-    canvas = Canvas(figsize=(WIDTH, 3.6), layout="constrained")
-    axes = canvas.subplots()
+def _latency(curves: Curves) -> Sheet:
+    sheet, (panel,) = grid(WIDTH, 3.6)
+    sheet.legend = Legend("above")
+    for level in (50.0, 99.0):
+        panel.add(Rule(level, False, GREY, ":", 0.7))
     for place, (name, (latency_s, share)) in enumerate(curves.items()):
         median_s, most_s = (reached_s(latency_s, share, wanted) for wanted in (0.5, 0.99))
         words = ", ".join(f"{q} {duration(s)}" for q, s in (("median", median_s), ("99 %", most_s)) if s < math.inf)
         if most_s == math.inf:
             words += f"{', ' if words else ''}{100.0 * float(np.max(share, initial=0.0)):.3g} % arrive"
-        style = _line_style(place + 1)
-        axes.plot(latency_s, 100.0 * share, label=f"{short(name)}: {words}", **style)
-        axes.plot([median_s], [50.0], "o", [most_s], [99.0], "D", color=style["color"], clip_on=False, zorder=3)
+        colour, dash = _look(place + 1)
+        panel.add(Line(latency_s, 100.0 * share, colour, dash, 1.5, f"{short(name)}: {words}"))
+        for at_s, level, marker in ((median_s, 50.0, "o"), (most_s, 99.0, "D")):
+            if at_s < math.inf:
+                panel.add(Line(np.array([at_s]), np.array([level]), colour, "", marker=marker, clip=False))
     shown = np.concatenate([each[(share > 0.0) & (each > 0.0)] for each, share in curves.values()])
-    _latency_axes(axes, float(shown.min()), float(shown.max()))
-    canvas.legend(loc="outside upper center", ncols=1, fontsize=8)
-    return svg_of(canvas)
-
-
-def _latency_axes(axes: Axes, least_s: float, most_s: float) -> None:
-    for level in (50.0, 99.0):
-        axes.axhline(level, color=GREY, linewidth=0.7, linestyle=":")
-    axes.set(xscale="log", xlabel="time from recording to delivery", ylabel="share of the data (%)", ylim=(0.0, 101.0))
-    begin, end = _round_below(max(least_s / 2.0, most_s * 1e-7)), most_s * 1.2
+    begin, end = _round_below(max(float(shown.min()) / 2.0, float(shown.max()) * 1e-7)), float(shown.max()) * 1.2
     ticks = _durations(_WIDE, begin, end)
-    ticks = ticks if len(ticks) > 3 else _durations(_DENSE, begin, end)
-    axes.set_xticks([*ticks])  # widens the limits to its ticks
-    axes.xaxis.set_major_formatter(lambda time_s, _: ticks.get(time_s) or duration(time_s))
-    axes.set_xlim(begin, end)
-    axes.minorticks_off()
+    panel.x.ticks = ticks if len(ticks) > 3 else _durations(_DENSE, begin, end)
+    panel.x.log, panel.x.low, panel.x.high, panel.x.title = True, begin, end, "time from recording to delivery"
+    panel.y.title, panel.y.low, panel.y.high = "share of the data (%)", 0.0, 101.0
+    return sheet
 
 
 def _round_below(value: float) -> float:

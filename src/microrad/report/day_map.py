@@ -4,22 +4,32 @@ import json
 import math
 from collections.abc import Mapping, Sequence
 from importlib import resources
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from matplotlib import rc_context
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure as Canvas
-from matplotlib.lines import Line2D
-from matplotlib.patches import Patch, PathPatch
-from matplotlib.path import Path
 from numpy.typing import NDArray
 
 from microrad.core.arrays import Floats
-from microrad.report.day_figures import PLAIN, duration, short
-from microrad.report.figures import BLACK, BLUE, GREEN, ORANGE, SKY, VERMILION, Figure, svg_of
+from microrad.report.day_figures import WIDTH, duration, short
+from microrad.report.plotting.figure import Figure
+from microrad.report.plotting.sheet import (
+    BLACK,
+    BLUE,
+    GREEN,
+    ORANGE,
+    SKY,
+    VERMILION,
+    WHITE,
+    Area,
+    Dash,
+    Legend,
+    Line,
+    Panel,
+    Words,
+    grid,
+)
 
-LAND, COAST, SHADE = "#e9e6df", "#b5b0a5", "#0072B21F"
+LAND, COAST, SHADE = "#e9e6df", "#b5b0a5", 0.12  # the last an opacity
 _HALF_TURN = 180.0
 _TURN = 360.0
 _OVER_A_POLE = 60.0  # degrees: beyond this latitude, so wide a step in longitude goes over the pole
@@ -62,7 +72,6 @@ class Marked(NamedTuple):
         return self.place.latitude_rad.size > 1
 
 
-@rc_context(PLAIN)
 def world_map(
     track: Places,
     contact: Mapping[str, NDArray[np.bool_]],
@@ -74,27 +83,23 @@ def world_map(
 
     ``first_s`` is the time that the track takes, where it is the beginning of a longer span only.
     """
-    canvas = Canvas(figsize=(7.6, 4.6), layout="constrained")
-    axes = canvas.subplots()
-    _earth(axes)
+    sheet, (panel,) = grid(WIDTH, 4.6)
+    _earth(panel)
     for relay in relays.values():
-        _hidden(axes, relay)
-    _track(axes, track, contact)
+        if relay.outlined:
+            panel.add(Area(other_side(relay), BLUE, SHADE))
+    _track(panel, track, contact)
     for name, relay in relays.items():
-        _marked(axes, name, relay, BLUE, "D")
+        _marked(panel, name, relay, BLUE, "D")
     for name, station in stations.items():
-        _marked(axes, name, station, VERMILION, "^")
-    canvas.legend(
-        handles=_entries(axes, [*relays.values()], [*stations.values()]),
-        loc="outside lower center",
-        ncols=3,
-        fontsize=8,
-    )
+        _marked(panel, name, station, VERMILION, "^")
+    entries = _entries(panel, [*relays.values()], [*stations.values()])
+    sheet.legend = Legend("below", 3, only=tuple(entries))
     columns = _columns("track", track) | {f"in contact: {name}": flags.astype(float) for name, flags in contact.items()}
     for name, each in (*relays.items(), *stations.items()):
         columns |= _columns(name, each.place) | _columns(f"{name}, outline", each.outline)
     caption = _caption([*relays.values()], [*stations.values()], first_s)
-    return Figure("world-map", "Ground track, relays and stations", caption, svg_of(canvas), columns)
+    return Figure("world-map", "Ground track, relays and stations", caption, sheet, columns)
 
 
 def _caption(relays: Sequence[Marked], stations: Sequence[Marked], first_s: float | None) -> str:
@@ -110,25 +115,25 @@ def _caption(relays: Sequence[Marked], stations: Sequence[Marked], first_s: floa
     return " ".join([*said, "Land: Natural Earth."])
 
 
-def _entries(axes: Axes, relays: Sequence[Marked], stations: Sequence[Marked]) -> list[Any]:
+def _entries(panel: Panel, relays: Sequence[Marked], stations: Sequence[Marked]) -> list[Line | Area]:
     """What the legend explains: the track and its parts, then what a relay's and a station's marks mean."""
-    handles, _ = axes.get_legend_handles_labels()
+    entries: list[Line | Area] = [line for line in panel.all_of(Line) if line.label]
 
-    def mark(label: str, **style: Any) -> Line2D:
-        return Line2D([], [], label=label, markeredgecolor="white", markersize=7, **style)
+    def mark(label: str, colour: str, marker: str, dash: Dash = "", width: float = 1.0) -> Line:
+        return Line(np.empty(0), np.empty(0), colour, dash, width, label, marker=marker, size=7.0, edge=WHITE)
 
     if any(r.outlined for r in relays):
-        handles.append(Patch(color=SHADE, label="hidden from a relay"))
-        handles.append(mark("relay, limit of its view", color=BLUE, marker="D", linewidth=1.0, linestyle="--"))
+        entries.append(Area((), BLUE, SHADE, "hidden from a relay"))
+        entries.append(mark("relay, limit of its view", BLUE, "D", "--"))
     if any(r.moves for r in relays):
-        handles.append(mark("relay at the start, its track", color=BLUE, marker="D", linewidth=_THIN))
+        entries.append(mark("relay at the start, its track", BLUE, "D", "-", _THIN))
     if any(not r.outlined and not r.moves for r in relays):
-        handles.append(mark("relay", color=BLUE, marker="D", linestyle=""))
+        entries.append(mark("relay", BLUE, "D"))
     if any(s.outlined for s in stations):
-        handles.append(mark("station, its horizon", color=VERMILION, marker="^", linewidth=1.0))
+        entries.append(mark("station, its horizon", VERMILION, "^", "-"))
     if any(not s.outlined for s in stations):
-        handles.append(mark("station", color=VERMILION, marker="^", linestyle=""))
-    return handles
+        entries.append(mark("station", VERMILION, "^"))
+    return entries
 
 
 def land() -> tuple[Floats, ...]:
@@ -137,16 +142,12 @@ def land() -> tuple[Floats, ...]:
     return tuple(np.reshape(ring, (-1, 2)) for ring in json.loads(text)["rings"])
 
 
-def _earth(axes: Axes) -> None:
-    path = Path.make_compound_path(*(Path(ring, closed=True) for ring in land()))
-    axes.add_patch(PathPatch(path, facecolor=LAND, edgecolor=COAST, linewidth=0.4, zorder=0.5))
-    axes.set(xlim=(-180, 180), ylim=(-90, 90), aspect="equal")
-    axes.set_xticks(range(-180, 181, 60))
-    axes.xaxis.set_major_formatter(lambda degrees, _: _degrees(degrees, "WE"))
-    axes.set_yticks(range(-90, 91, 30))
-    axes.yaxis.set_major_formatter(lambda degrees, _: _degrees(degrees, "SN"))
-    for side in ("top", "right"):
-        axes.spines[side].set_visible(True)
+def _earth(panel: Panel) -> None:
+    panel.add(Area(land(), LAND, edge=COAST))
+    panel.x.low, panel.x.high, panel.y.low, panel.y.high = -180.0, 180.0, -90.0, 90.0
+    panel.x.ticks = {degrees: _degrees(degrees, "WE") for degrees in range(-180, 181, 60)}
+    panel.y.ticks = {degrees: _degrees(degrees, "SN") for degrees in range(-90, 91, 30)}
+    panel.framed = panel.equal = True
 
 
 def _degrees(value: float, sides: str) -> str:
@@ -155,22 +156,18 @@ def _degrees(value: float, sides: str) -> str:
     return f"{size}°" if size in ("0", "180") else f"{size}° {sides[int(value > 0.0)]}"
 
 
-def _track(axes: Axes, track: Places, contact: Mapping[str, NDArray[np.bool_]]) -> None:
+def _track(panel: Panel, track: Places, contact: Mapping[str, NDArray[np.bool_]]) -> None:
     """The track, and over it the parts in contact; a part runs from its first point with contact to its last."""
     longitude, latitude = track.degrees
     if not longitude.size:
-        axes.text(0, 0, "no ground track", ha="center", va="center")
+        panel.add(Words("no ground track", 0.0, 0.0, size=9.0, anchor="middle"))
         return
     for place, (name, flags) in enumerate(contact.items()):
-        style: dict[str, Any] = {
-            "color": _CONTACT[place % 3],
-            "linewidth": 3.4 - 1.0 * min(place, 2),
-            "solid_capstyle": "butt",
-        }
         x, y = broken(np.where(flags, longitude, np.nan), latitude)
-        axes.plot(x, y, label=short(name) + ("" if flags.any() else ": none"), zorder=2.0 + 0.1 * place, **style)
-    axes.plot(*broken(longitude, latitude), color=BLACK, linewidth=0.5, label="ground track", zorder=2.5)
-    axes.plot(longitude[:1], latitude[:1], "o", color=BLACK, markersize=4, label="start", zorder=3)
+        label = short(name) + ("" if flags.any() else ": none")
+        panel.add(Line(x, y, _CONTACT[place % 3], width=3.4 - 1.0 * min(place, 2), label=label))
+    panel.add(Line(*broken(longitude, latitude), BLACK, width=0.5, label="ground track"))
+    panel.add(Line(longitude[:1], latitude[:1], BLACK, "", label="start", marker="o", size=4.0))
 
 
 def broken(longitude: Floats, latitude: Floats) -> tuple[Floats, Floats]:
@@ -199,70 +196,55 @@ def _pairs(values: Floats) -> list[tuple[float, float]]:
     return [*zip(values[:-1].tolist(), values[1:].tolist(), strict=True)]
 
 
-def _marked(axes: Axes, name: str, each: Marked, colour: str, marker: str) -> None:
+def _marked(panel: Panel, name: str, each: Marked, colour: str, marker: str) -> None:
     """Marker, name, outline, and the way of a sub-satellite point that moves."""
     x, y = each.place.degrees
-    axes.plot(*broken(*each.outline.degrees), color=colour, linewidth=1.0, linestyle="-" if marker == "^" else "--")
-    axes.plot(*broken(x, y), color=colour, linewidth=_THIN)
-    axes.plot(x[:1], y[:1], marker, color=colour, markeredgecolor="white", markersize=7, zorder=4, clip_on=False)
-    side = -1 if x[0] > 120.0 else 1
-    box = {"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 0.8}
-    axes.annotate(
-        short(name, 24),
-        (float(x[0]), float(y[0])),
-        (6 * side, 0),
-        textcoords="offset points",
-        ha="left" if side > 0 else "right",
-        va="center",
-        fontsize=8,
-        bbox=box,
-        zorder=5,
-    )
+    panel.add(Line(*broken(*each.outline.degrees), colour, "-" if marker == "^" else "--", 1.0))
+    panel.add(Line(*broken(x, y), colour, width=_THIN))
+    panel.add(Line(x[:1], y[:1], colour, "", marker=marker, size=7.0, edge=WHITE, clip=False))
+    east = x[0] > 120.0
+    shift, anchor = (-6.0 if east else 6.0, 0.0), "end" if east else "start"
+    panel.add(Words(short(name, 24), float(x[0]), float(y[0]), shift=shift, anchor=anchor, box=True))  # type: ignore[arg-type]
 
 
 # ------------------------------------------------------------------------------------------------ hidden region
+def other_side(each: Marked) -> tuple[Floats, ...]:
+    """Rings (degrees) of the region of the map that a closed outline parts from the marked place.
 
-
-def _hidden(axes: Axes, relay: Marked) -> None:
-    """Shade the side of the outline on which the relay's sub-satellite point is not."""
-    if relay.outlined:
-        axes.add_patch(PathPatch(other_side(relay), color=SHADE, linewidth=0.0, zorder=1.0))
-
-
-def other_side(each: Marked) -> Path:
-    """The region of the map (degrees) that a closed outline parts from the marked place."""
+    A place is in the region where an odd number of rings is around it.
+    """
     x, y = each.outline.degrees
     x = np.unwrap(x, period=_TURN)
     here = (float(each.place.degrees[0][0]), float(each.place.degrees[1][0]))
     turns = round((x[-1] - x[0]) / _TURN)
     if turns == 0:
         inside = _shifted(np.stack([x, y], axis=1))
-        return _complement(inside) if _holds(inside, here) else Path.make_compound_path(*inside)
+        return (np.array(_FRAME), *inside) if odd(inside, here) else inside
     # About a pole: the outline runs once around the map, and the region's other edge is that of the map.
     northern, southern = (_shifted(_to_the_pole(x, y, pole)) for pole in (90.0, -90.0))
-    return Path.make_compound_path(*(southern if _holds(northern, here) else northern))
+    return southern if odd(northern, here) else northern
 
 
 def _to_the_pole(x: Floats, y: Floats, pole: float) -> Floats:
     return np.stack([np.r_[x, x[-1], x[0]], np.r_[y, pole, pole]], axis=1)
 
 
-def _shifted(ring: Floats) -> list[Path]:
-    """The ring anticlockwise, here and a turn to either side: what leaves the map at one edge enters at the other."""
-    x, y = ring.T
-    doubled_area = float(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y))
-    ring = (ring if doubled_area > 0.0 else ring[::-1]) - [_TURN * round(float(np.mean(x)) / _TURN), 0.0]
+def _shifted(ring: Floats) -> tuple[Floats, ...]:
+    """The ring here and a turn to either side: what leaves the map at one edge enters at the other."""
+    ring = ring - [_TURN * round(float(np.mean(ring[:, 0])) / _TURN), 0.0]
     closed = np.vstack([ring, ring[:1]])
-    return [Path(closed + np.array([k * _TURN, 0.0]), closed=True) for k in (-1, 0, 1)]
+    return tuple(closed + np.array([k * _TURN, 0.0]) for k in (-1, 0, 1))
 
 
-def _holds(paths: list[Path], point: tuple[float, float]) -> bool:
-    return any(path.contains_point(point) for path in paths)
-
-
-def _complement(paths: list[Path]) -> Path:
-    """The map but for the paths: its frame runs clockwise, they run anticlockwise."""
-    return Path.make_compound_path(Path(np.array(_FRAME), closed=True), *paths)
+def odd(rings: Sequence[Floats], point: tuple[float, float]) -> bool:
+    """Whether an odd number of closed rings is around a point."""
+    crossings = 0
+    for ring in rings:
+        (x, y), (ahead_x, ahead_y) = ring[:-1].T, ring[1:].T
+        over = (y > point[1]) != (ahead_y > point[1])
+        at = x[over] + (point[1] - y[over]) * (ahead_x[over] - x[over]) / (ahead_y[over] - y[over])
+        crossings += int(np.sum(at > point[0]))
+    return crossings % 2 == 1
 
 
 def _columns(name: str, places: Places) -> dict[str, Floats]:

@@ -6,24 +6,20 @@ import numpy as np
 
 from microrad import orbit
 from microrad.core.arrays import Floats
-from microrad.core.kept import NOTHING as NOTHING_KEPT
-from microrad.core.kept import Kept
 from microrad.orbit.day import NOTHING, DayStudy, Swing, Way, times
 from microrad.orbit.day.ground_track import LONGEST_S, Outline, ground_track
 from microrad.report import day_assumptions, day_figures, day_map
-from microrad.report.figures import Figure
+from microrad.report.plotting.figure import Figure
 from microrad.study.contact_run import ContactRun
 
 _SHARES = 400  # points of a distribution
 _BEFORE = 1e-9  # part of a latency by which a jump of the distribution is looked at before it
 
 
-def draw(day: DayStudy, run: ContactRun | None = None, parts: Kept = NOTHING_KEPT) -> tuple[Figure, ...]:
+def draw(day: DayStudy, run: ContactRun | None = None) -> tuple[Figure, ...]:
     """Every figure of a day; ``run`` is one of its contacts, simulated."""
-    along = parts.part(_along, day)
-    first, *others = [parts.part(drawer, day) for drawer in (_timeline, _volume, _latency, ground_map, _assumptions)]
-    found = [first, *along, *others]
-    return tuple(found if run is None else [*found, parts.part(_run, day, run)])
+    found = [_timeline(day), *_along(day), _volume(day), _latency(day), ground_map(day), _assumptions(day)]
+    return tuple(found if run is None else [*found, _run(day, run)])
 
 
 def _ways(day: DayStudy) -> tuple[Way, ...]:

@@ -11,7 +11,7 @@ from microrad.report import day_tables, day_words
 from microrad.report.tables import Table, tables_text
 
 if TYPE_CHECKING:  # drawing takes longer to load than a table needs
-    from microrad.report.figures import Figure
+    from microrad.report.plotting.figure import Figure
 
 Row = tuple[str, ...]
 WIDE = 136

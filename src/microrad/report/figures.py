@@ -1,154 +1,80 @@
-"""The figures of a study: each an SVG, with the data it shows as a table of columns."""
+"""The figures of a study, each with the data it shows as a table of columns."""
 
-import contextlib
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
-from matplotlib import rc_context
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure as Canvas
 
 from microrad.core.arrays import Floats
-from microrad.core.kept import NOTHING, Kept
 from microrad.link.under_jitter import required_error_rad
 from microrad.loop import sine_run as simulate
 from microrad.loop.paper_cases import Run, residual_rad
 from microrad.mission.model import Mission
-from microrad.report import interactive
-from microrad.report.inlined import inlined
-from microrad.report.svg_text import svg_text
-from microrad.report.tables import Column, rows_of
+from microrad.report.plotting.figure import Figure
+from microrad.report.plotting.sheet import (
+    BLACK,
+    BLUE,
+    GREEN,
+    ORANGE,
+    SKY,
+    VERMILION,
+    WHITE,
+    Area,
+    Dash,
+    Field,
+    Legend,
+    Line,
+    Panel,
+    Rule,
+    Sheet,
+    Words,
+    contour,
+    grid,
+    region,
+)
 from microrad.study import paper
 from microrad.study.story import Study
 
-# Okabe and Ito's palette: told apart by colour-blind readers. Line styles differ too, for print in grey.
-BLACK, ORANGE, SKY, GREEN, BLUE, VERMILION = "#000000", "#E69F00", "#56B4E9", "#009E73", "#0072B2", "#D55E00"
-STYLE: dict[Any, Any] = {
-    "svg.fonttype": "none",
-    "svg.hashsalt": "microrad",
-    "font.family": "sans-serif",
-    "font.size": 9.0,
-    "axes.grid": True,
-    "grid.color": "#dddddd",
-    "grid.linewidth": 0.6,
-    "axes.axisbelow": True,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "legend.frameon": False,
-    "lines.linewidth": 1.3,
-}
-MOST_POINTS = 1200  # of a drawn line; peaks are kept
+_LOOKS: tuple[tuple[str, Dash], ...] = ((VERMILION, "--"), (BLUE, "-"))
 
 
-class Picture(str):
-    """The text of an <svg> element; ``plot`` is the same picture for the page's script, "" where it is static only."""
-
-    plot: str = ""
-
-
-@dataclass(frozen=True, slots=True)
-class Figure:
-    """One figure: file name without ending, title, caption, SVG text, and columns of data by heading with unit."""
-
-    name: str
-    title: str
-    caption: str
-    svg: str
-    columns: Mapping[str, Column]
-
-    @property
-    def plot(self) -> str:
-        """The JSON that the page draws the interactive figure from; "" where the SVG stands alone."""
-        return self.svg.plot if isinstance(self.svg, Picture) else ""
-
-    @property
-    def labelled(self) -> str:
-        """The SVG with its text alternative and ids of its own, for the page."""
-        return inlined(self.svg, self.name, self.title)
-
-    @property
-    def static(self) -> "Figure":
-        """The figure without its interactive form."""
-        return replace(self, svg=str(self.svg))
-
-    def rows(self, digits: int) -> list[tuple[str, ...]]:
-        """The data as rows of text, numbers to so many digits."""
-        return rows_of(self.columns, digits)
-
-
-def draw(study: Study, parts: Kept = NOTHING) -> tuple[Figure, ...]:
+def draw(study: Study) -> tuple[Figure, ...]:
     """All figures of the study, in the order of the report."""
     drawers = [margin_map, hysteresis_loops, tracking_errors, inverse]
     drawers += [comparison] if any(r.mirror == "comparison" for r in study.runs) else []
-    with rc_context(STYLE):
-        figures = [parts.part(drawer, study) for drawer in drawers]
-        if study.scan is not None:
-            figures.append(parts.part(scan, study.scan))
-    return tuple(figures)
-
-
-def svg_of(canvas: Canvas) -> Picture:
-    """The canvas as the text of an <svg> element, its coordinates to a hundredth of a point, with its plot."""
-    picture = Picture(svg_text(canvas))
-    with contextlib.suppress(interactive.StaticOnlyError):
-        picture.plot = interactive.text_of(interactive.plot_of(canvas))
-    return picture
-
-
-def thin(x: Floats, y: Floats, most: int = MOST_POINTS) -> tuple[Floats, Floats]:
-    """Fewer points for drawing: the lowest and highest of each stretch, so that no peak is lost."""
-    stretch = 2 * y.size // most
-    if stretch < 4:
-        return x, y
-    whole = y.size // stretch * stretch
-    blocks = y[:whole].reshape(-1, stretch)
-    first = np.arange(blocks.shape[0]) * stretch
-    picks = np.sort(np.stack([first + blocks.argmin(axis=1), first + blocks.argmax(axis=1)], axis=1), axis=1).ravel()
-    return x[picks], y[picks]
+    figures = [drawer(study) for drawer in drawers]
+    return tuple(figures if study.scan is None else [*figures, scan(study.scan)])
 
 
 def margin_map(study: Study) -> Figure:
     """Fig. 2: link margin over data rate and pointing error."""
     f, m = study.margin_map, study.file.mission
-    canvas = Canvas(figsize=(6.4, 4.2), layout="constrained")
-    axes = canvas.subplots()
+    sheet, (panel,) = grid(6.4, 4.2)
     rate, error = f.data_rate_bit_s * 1e-6, f.pointing_error_rad * 1e6
+    required_db = m.requirement.margin_db
     levels = np.arange(-12.0, 19.0, 3.0)
-    filled = axes.contourf(rate, error, f.margin_db.T, levels=levels, cmap="cividis", extend="both")
-    interactive.keep_values(filled, rate, error, f.margin_db.T)
-    _band(axes, rate, error, np.stack(list(f.by_reading.values())), m.requirement.margin_db)
-    lines = axes.contour(rate, error, f.margin_db.T, levels=[0.0, m.requirement.margin_db], colors="white")
-    axes.clabel(lines, fmt=lambda level: f"{level:g} dB", fontsize=8)
+    panel.add(Field(rate, error, f.margin_db.T, levels[0], levels[-1], "link margin (dB)", levels))
+    _band(panel, rate, error, np.stack(list(f.by_reading.values())), required_db)
+    for level in (0.0, required_db):
+        x, y = contour(rate, error, f.margin_db.T, level)
+        panel.add(Line(x, y, WHITE, name=f"{level:g} dB"))
+        if (at := np.flatnonzero(np.isfinite(x) & (y > 0.02 * error[-1]))).size:
+            place = at[at.size // 2]
+            panel.add(Words(f"{level:g} dB", x[place], y[place], WHITE, anchor="end", shift=(-3.0, -4.0)))
     rate_mbit = m.communication.data_rate_bit_s * 1e-6
-    budgeted = "budget" if m.jitter is None else "static error"
     under = "" if m.jitter is None else " (exceeded by the jitter for the outage)"
-    axes.plot(
-        [rate_mbit],
-        [m.communication.pointing_error_rad * 1e6],
-        "o",
-        color=VERMILION,
-        markeredgecolor="white",
-        markersize=8,
-        label=f"{budgeted}: {rate_mbit:g} Mbit/s at {m.communication.pointing_error_rad * 1e6:g} µrad",
-    )
+    budgeted, allowed = "budget" if m.jitter is None else "static error", m.communication.pointing_error_rad * 1e6
     left = residual_urad(study)
-    axes.plot(
-        [rate_mbit],
-        [min(left, error[-1])],
-        "D",
-        color=SKY,
-        markeredgecolor="white",
-        markersize=7,
-        label=f"simulated residual: {left:.1f} µrad ({m.requirement.residual_statistic})"
-        + (", beyond the map" if left > error[-1] else ""),
-    )
-    axes.set(xscale="log", xlabel="data rate (Mbit/s)", ylabel="pointing error (µrad)")
-    axes.grid(visible=False)
-    axes.legend(loc="upper right", labelcolor="white", fontsize=8)
-    canvas.colorbar(filled, ax=axes, label="link margin (dB)")
+    beyond = ", beyond the map" if left > error[-1] else ""
+    for at_urad, colour, marker, size, label in (
+        (allowed, VERMILION, "o", 8.0, f"{budgeted}: {rate_mbit:g} Mbit/s at {allowed:g} µrad"),
+        (left, SKY, "D", 7.0, f"simulated residual: {left:.1f} µrad ({m.requirement.residual_statistic}){beyond}"),
+    ):
+        place_at = np.array([rate_mbit]), np.array([min(at_urad, error[-1])])
+        panel.add(Line(*place_at, colour, "", label=label, marker=marker, size=size, edge=WHITE, clip=False))
+    panel.x.title, panel.x.log, panel.x.grid = "data rate (Mbit/s)", True, False
+    panel.y.title, panel.y.grid = "pointing error (µrad)", False
+    panel.legend = Legend("upper right", colour=WHITE)
     counts = [r.photons_per_bit for r in f.readings]
     convention = f"{m.conventions.pointing_loss} pointing loss, Strehl as {m.conventions.strehl}"
     largest = f"at most {f.largest_error_rad * 1e6:.2f} µrad" if f.largest_error_rad > 0 else "not even on axis"
@@ -161,23 +87,23 @@ def margin_map(study: Study) -> Figure:
         f"receiver of {min(counts):.0f} to {max(counts):.0f} photons per bit over them, "
         f"{10 * np.log10(max(counts) / min(counts)):.1f} dB apart."
     )
-    grid = np.meshgrid(f.data_rate_bit_s, f.pointing_error_rad, indexing="ij")
-    columns = {"data_rate (bit/s)": grid[0].ravel(), "pointing_error (rad)": grid[1].ravel()}
+    mesh = np.meshgrid(f.data_rate_bit_s, f.pointing_error_rad, indexing="ij")
+    columns = {"data_rate (bit/s)": mesh[0].ravel(), "pointing_error (rad)": mesh[1].ravel()}
     columns["margin (dB)"] = f.margin_db.ravel()
     for (loss, strehl), values in f.by_reading.items():
         columns[f"margin, {loss} pointing loss, Strehl as {strehl} (dB)"] = values.ravel()
-    return Figure("fig2-margin-map", "Fig. 2  Link margin", caption, svg_of(canvas), columns)
+    return Figure("fig2-margin-map", "Fig. 2  Link margin", caption, sheet, columns)
 
 
-def _band(axes: Axes, rate: Floats, error: Floats, maps: Floats, required_db: float) -> None:
+def _band(panel: Panel, rate: Floats, error: Floats, maps: Floats, required_db: float) -> None:
     """Hatch where some readings of the conventions have the required margin and others have not."""
     lowest, highest = maps.min(axis=0), maps.max(axis=0)
     between = ((lowest < required_db) & (highest >= required_db)).astype(float).T
     if between.any() and not between.all():
-        axes.contourf(rate, error, between, levels=[0.5, 1.5], colors="none", hatches=["////"], zorder=1.5)
+        panel.add(Area(region(rate, error, between, 0.5, 1.5), BLACK, hatched=True))
+    label = f"{required_db:g} dB by other readings of the conventions"
     for edge in (lowest, highest):
-        axes.contour(rate, error, edge.T, levels=[required_db], colors="white", linestyles=":", linewidths=1.0)
-    axes.plot([], [], ":", color="white", label=f"{required_db:g} dB by other readings of the conventions")
+        panel.add(Line(*contour(rate, error, edge.T, required_db), WHITE, ":", 1.0, label))
 
 
 def residual_urad(study: Study) -> float:
@@ -187,31 +113,27 @@ def residual_urad(study: Study) -> float:
 
 def hysteresis_loops(study: Study) -> Figure:
     """Fig. 5: output and hysteresis over drive, settled, by frequency."""
-    canvas = Canvas(figsize=(7.4, 3.6), layout="constrained")
-    left, right = canvas.subplots(1, 2)
-    styles = ["-", "--", "-.", ":"]
+    sheet, (left, right) = grid(7.4, 3.6, 1, 2)
+    dashes = ["-", "--", "-.", ":"]
     colours = [BLACK, BLUE, GREEN, VERMILION, ORANGE, SKY]
     columns: dict[str, Floats] = {}
     bias = study.file.mission.mirror.bias_v
     for i, loop in enumerate(study.loops):
-        style: dict[str, Any] = {"color": colours[i % 6], "linestyle": styles[i % 4]}
+        drive, look = loop.drive_v + bias, (colours[i % 6], dashes[i % 4])
         label = f"{loop.freq_hz:g} Hz: {100 * loop.width:.2f} %"
-        x, y = thin(loop.drive_v + bias, loop.output_rad)
-        left.plot(x, y * 1e3, label=f"{loop.freq_hz:g} Hz", **style)
-        x, y = thin(loop.drive_v + bias, loop.hysteresis_rad)
-        right.plot(x, y * 1e6, label=label, **style)
-        columns[f"drive at {loop.freq_hz:g} Hz (V)"] = loop.drive_v + bias
+        left.add(Line(drive, loop.output_rad * 1e3, *look, label=f"{loop.freq_hz:g} Hz"))
+        right.add(Line(drive, loop.hysteresis_rad * 1e6, *look, label=label))
+        columns[f"drive at {loop.freq_hz:g} Hz (V)"] = drive
         columns[f"output at {loop.freq_hz:g} Hz (rad)"] = loop.output_rad
         columns[f"hysteresis at {loop.freq_hz:g} Hz (rad)"] = loop.hysteresis_rad
-    left.set(xlabel="drive (V)", ylabel="output about the bias (mrad)")
-    right.set(xlabel="drive (V)", ylabel="hysteresis h (µrad)")
-    left.legend(title="drive", fontsize=8)
-    right.legend(title="loop width", fontsize=8, loc="upper left", bbox_to_anchor=(0.0, -0.18), ncols=2)
+    left.x.title = right.x.title = "drive (V)"
+    left.y.title, right.y.title = "output about the bias (mrad)", "hysteresis h (µrad)"
+    left.legend, right.legend = Legend(title="drive"), Legend("below", 2, "loop width")
     caption = (
         "Settled loops of the hysteresis model alone, without the linear part. Width: peak-to-peak of h over "
         "peak-to-peak of the output. The paper's figure sets its model against measurements that it does not publish."
     )
-    return Figure("fig5-hysteresis-loops", "Fig. 5  Rate-dependent hysteresis", caption, svg_of(canvas), columns)
+    return Figure("fig5-hysteresis-loops", "Fig. 5  Rate-dependent hysteresis", caption, sheet, columns)
 
 
 @dataclass(frozen=True, slots=True)
@@ -225,33 +147,29 @@ class Curve:
 
 def _tracking(
     study: Study, frequencies: tuple[float, ...], curves: tuple[Curve, Curve], limit: bool
-) -> tuple[str, dict[str, Floats]]:
-    """SVG and data of the steady error of two runs, a panel a frequency, with peak and rms in the legend."""
-    canvas = Canvas(figsize=(3.9 * len(frequencies), 3.5), layout="constrained")
+) -> tuple[Sheet, dict[str, Floats]]:
+    """The steady error of two runs, a panel a frequency, with peak and rms in the legend."""
+    sheet, panels = grid(3.9 * len(frequencies), 3.5, 1, len(frequencies))
     columns: dict[str, Floats] = {}
-    styles: tuple[dict[str, Any], ...] = (
-        {"color": VERMILION, "linestyle": "--", "linewidth": 1.6},
-        {"color": BLUE, "linestyle": "-"},
-    )
-    for axes, f in zip(canvas.subplots(1, len(frequencies), squeeze=False)[0], frequencies, strict=True):
-        for curve, style in zip(curves, styles, strict=True):
-            _error_line(axes, curve.label, _pick(study, curve.mirror, curve.controller, f), style, columns)
+    for panel, f in zip(panels, frequencies, strict=True):
+        for curve, look, width in zip(curves, _LOOKS, (1.6, 1.3), strict=True):
+            panel.add(_error_line(curve.label, _pick(study, curve.mirror, curve.controller, f), look, width, columns))
         if limit:
-            _limit(axes, study.file.mission)
-        axes.set_title(f"{f:g} Hz", fontsize=9, loc="left")
-        axes.set(xlabel="time, steady state (ms)", ylabel="pointing error (µrad)")
-        axes.legend(fontsize=7.5, loc="lower center", bbox_to_anchor=(0.5, 1.08))
-    return svg_of(canvas), columns
+            _limit(panel, study.file.mission)
+        panel.title = f"{f:g} Hz"
+        panel.x.title, panel.y.title = "time, steady state (ms)", "pointing error (µrad)"
+        panel.legend = Legend("above", size=7.5)
+    return sheet, columns
 
 
-def _error_line(axes: Axes, label: str, run: Run, style: dict[str, Any], columns: dict[str, Floats]) -> None:
+def _error_line(label: str, run: Run, look: tuple[str, Dash], width: float, columns: dict[str, Floats]) -> Line:
     steady = run.trace.steady
     time = run.trace.time_s[steady] - run.trace.time_s[steady.start]
     error = run.trace.error_rad[steady, 0]
     peak, rms = run.trace.peak_rad * 1e6, run.trace.rms_rad * 1e6
-    axes.plot(*thin(time * 1e3, error * 1e6), label=f"{label}: peak {peak:.1f}, rms {rms:.1f} µrad", **style)
     columns[f"time, {label}, {run.freq_hz:g} Hz (s)"] = time
     columns[f"error, {label}, {run.freq_hz:g} Hz (rad)"] = error
+    return Line(time * 1e3, error * 1e6, *look, width, f"{label}: peak {peak:.1f}, rms {rms:.1f} µrad")
 
 
 def _pick(study: Study, mirror: str, controller: str, freq_hz: float) -> Run:
@@ -262,26 +180,26 @@ def tracking_errors(study: Study) -> Figure:
     """Fig. 6: PID with and without hysteresis."""
     m = study.file.mission
     curves = (Curve("with hysteresis", "given", "PID"), Curve("without", "no hysteresis", "PID"))
-    svg, columns = _tracking(study, m.scenario.pid_frequencies_hz, curves, limit=False)
+    sheet, columns = _tracking(study, m.scenario.pid_frequencies_hz, curves, limit=False)
     caption = (
         f"Tracking error of a {_amplitude(m)} sine under PID, on the mirror and on one of the same gain without "
         "hysteresis."
     )
-    return Figure("fig6-pid", "Fig. 6  PID with and without hysteresis", caption, svg, columns)
+    return Figure("fig6-pid", "Fig. 6  PID with and without hysteresis", caption, sheet, columns)
 
 
 def inverse(study: Study) -> Figure:
     """Fig. 8: PID against PID with inverse feedforward."""
     m = study.file.mission
     curves = (Curve("PID", "given", "PID"), Curve("PID + inverse", "given", "PID + inverse"))
-    svg, columns = _tracking(study, m.scenario.inverse_frequencies_hz, curves, limit=True)
+    sheet, columns = _tracking(study, m.scenario.inverse_frequencies_hz, curves, limit=True)
     counts = "; ".join(_counts(r) for r in study.runs if (r.mirror, r.controller) == ("given", "PID + inverse"))
     caption = (
         f"Tracking error of a {_amplitude(m)} sine. The feedforward inverts the hysteresis model, driven by the "
         f"reference and its rate. Dotted: the required {m.requirement.pointing_error_rad * 1e6:g} µrad. "
         f"Counts of PID + inverse: {counts}."
     )
-    return Figure("fig8-inverse", "Fig. 8  PID against PID + inverse", caption, svg, columns)
+    return Figure("fig8-inverse", "Fig. 8  PID against PID + inverse", caption, sheet, columns)
 
 
 def comparison(study: Study) -> Figure:
@@ -290,20 +208,19 @@ def comparison(study: Study) -> Figure:
         Curve("mirror's model", "given", "PID + inverse"),
         Curve("comparison model", "comparison", "PID + inverse"),
     )
-    svg, columns = _tracking(study, study.file.mission.scenario.inverse_frequencies_hz, curves, limit=True)
+    sheet, columns = _tracking(study, study.file.mission.scenario.inverse_frequencies_hz, curves, limit=True)
     caption = "PID + inverse on the mirror as given and on the mission's comparison model, each with its own inverse."
-    return Figure("comparison", "Hysteresis models compared", caption, svg, columns)
+    return Figure("comparison", "Hysteresis models compared", caption, sheet, columns)
 
 
 def _amplitude(m: Mission) -> str:
     return f"{m.scenario.amplitude_rad * 1e6:g} µrad"
 
 
-def _limit(axes: Axes, m: Mission) -> None:
+def _limit(panel: Panel, m: Mission) -> None:
     axes_in_error = math.sqrt(2.0) if m.conventions.residual == "radial" else 1.0
     allowed = m.requirement.pointing_error_rad / axes_in_error
-    for sign in (-1.0, 1.0):
-        axes.axhline(sign * allowed * 1e6, color=BLACK, linestyle=":", linewidth=0.9)
+    panel.add(*(Rule(sign * allowed * 1e6, False, BLACK, ":", 0.9) for sign in (-1.0, 1.0)))
 
 
 def _counts(run: Run) -> str:
@@ -316,27 +233,26 @@ def _counts(run: Run) -> str:
 
 def scan(found: paper.Scan) -> Figure:
     """Which of the paper's closed-loop claims hold over gains and compositions."""
-    canvas = Canvas(figsize=(7.6, 3.3), layout="constrained")
-    panels = canvas.subplots(1, len(paper.COMPOSITIONS), sharey=True)
+    sheet, panels = grid(7.6, 3.3, 1, len(paper.COMPOSITIONS), share_y=True)
     most = len(paper.CLAIMS)
-    for axes, composition in zip(panels, paper.COMPOSITIONS, strict=True):
+    for panel, composition in zip(panels, paper.COMPOSITIONS, strict=True):
         here = [p for p in found.points if p.composition == composition]
         ki = sorted({p.integral_v_rad_s * 1e-6 for p in here})
         kp = sorted({p.proportional_v_rad * 1e-3 for p in here})
         held = np.zeros((len(kp), len(ki)))
         for p in here:
             held[kp.index(p.proportional_v_rad * 1e-3), ki.index(p.integral_v_rad_s * 1e-6)] = sum(p.holds().values())
-        image = axes.imshow(held, cmap="cividis", vmin=0, vmax=most, aspect="auto", origin="lower")
+        said = f"claims that hold (of {most})"
+        bar = said if composition == paper.COMPOSITIONS[-1] else ""
+        places = np.arange(len(ki)), np.arange(len(kp))
+        panel.add(Field(*places, held, 0.0, most, bar, ticks=range(most + 1), spoken=said))
         for (row, column), value in np.ndenumerate(held):
-            colour = "white" if value < most / 2 else "black"
-            axes.text(column, row, f"{value:.0f}", ha="center", va="center", color=colour, fontsize=8)
-        axes.set_xticks(range(len(ki)), [f"{v:g}" for v in ki])
-        axes.set_yticks(range(len(kp)), [f"{v:g}" for v in kp])
-        axes.set_title(composition, fontsize=9, loc="left")
-        axes.set_xlabel("integral gain (1000 V/(mrad s))")
-        axes.grid(visible=False)
-    panels[0].set_ylabel("proportional gain (V/mrad)")
-    canvas.colorbar(image, ax=panels, label=f"claims that hold (of {most})", ticks=range(most + 1))
+            panel.add(Words(f"{value:.0f}", column, row, WHITE if value < most / 2 else BLACK, anchor="middle"))
+        panel.x.ticks = {k: f"{v:g}" for k, v in enumerate(ki)}
+        panel.y.ticks = {k: f"{v:g}" for k, v in enumerate(kp)}
+        panel.title, panel.x.title = composition, "integral gain (1000 V/(mrad s))"
+        panel.x.grid = panel.y.grid = False
+    panels[0].y.title = "proportional gain (V/mrad)"
     points = found.points
     columns = {
         "additive (1) or cascade (0)": np.array([float(p.composition == "additive") for p in points]),
@@ -346,4 +262,4 @@ def scan(found: paper.Scan) -> Figure:
     for name in paper.CLAIMS:
         columns[name] = np.array([float(p.holds()[name]) for p in points])
     caption = "How many of these hold at each pair of gains: " + "; ".join(paper.CLAIMS) + "."
-    return Figure("claims-scan", "Where the paper's closed-loop claims hold", caption, svg_of(canvas), columns)
+    return Figure("claims-scan", "Where the paper's closed-loop claims hold", caption, sheet, columns)

@@ -12,8 +12,8 @@ from microrad.mirror.geometry import StrokeBudget
 from microrad.mirror.summary import unknown_dynamics
 from microrad.mission.model import Mission
 from microrad.report import fine_pointing_words as words
-from microrad.report.figures import Figure
 from microrad.report.fine_pointing_data import parameter_units, rms_by_source, sources
+from microrad.report.plotting.figure import Figure
 
 HEADINGS = {"given": "mission's mirror", "comparison": "comparison model", "no hysteresis": "no hysteresis"}
 """Variants of the mirror as headings."""

@@ -2,28 +2,41 @@
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from matplotlib import rc_context
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure as Canvas
 
 from microrad.core.arrays import Floats
-from microrad.core.kept import NOTHING, Kept
 from microrad.loop.fine_loop.linear import close, sensitivity
 from microrad.loop.fine_pointing import ErrorBudget, FinePointingStudy, Verified
 from microrad.mission.model import Mission
-from microrad.report.figures import BLACK, BLUE, GREEN, ORANGE, SKY, STYLE, VERMILION, Figure, svg_of
 from microrad.report.fine_pointing_words import micro, share_of_time, source_name
+from microrad.report.plotting.figure import Figure
+from microrad.report.plotting.sheet import (
+    BLACK,
+    BLUE,
+    GREEN,
+    GREY,
+    ORANGE,
+    SKY,
+    VERMILION,
+    WHITE,
+    Bars,
+    Dash,
+    Legend,
+    Line,
+    Panel,
+    Rule,
+    Sheet,
+    Words,
+    grid,
+)
 from microrad.study.story import Study
 
 _COLOURS = (VERMILION, BLUE, GREEN)
 _SHAPES = ("o", "s", "^")  # beside the colours, for print in grey
-_GREY = "#777777"
-_MARKERS = {"given": ("o", BLUE), "comparison": ("s", ORANGE), "no hysteresis": ("D", "white")}
+_MARKERS = {"given": ("o", BLUE), "comparison": ("s", ORANGE), "no hysteresis": ("D", WHITE)}
 _VARIANTS = {"given": "mission's mirror", "comparison": "comparison model", "no hysteresis": "no hysteresis"}
-_PREDICTED: dict[str, Any] = {"linewidth": 0.9, "linestyle": (0, (4, 3))}
+_PREDICTED: tuple[Dash, float] = ((4.0, 3.0), 0.9)
 _SENSITIVITY_POINTS = 400
 _MARKS = 9
 
@@ -41,27 +54,22 @@ class Shown:
         """Of the design."""
         return self.of.design.name
 
-    def style(self, freq_hz: Floats, place: int) -> dict[str, Any]:
-        """Keywords of its line: markers at even distances on a logarithmic axis, elsewhere for each place."""
+    def line(self, freq_hz: Floats, values: Floats, place: int) -> Line:
+        """Its line, with markers at even distances on a logarithmic axis, elsewhere for each place."""
         at = np.geomspace(freq_hz[0], freq_hz[-1], 3 * _MARKS + 1)[1 + place :: 3]
         marks = [int(i) for i in np.unique(np.searchsorted(freq_hz, at[at <= freq_hz[-1]]))]
-        return {"color": self.colour, "marker": self.marker, "markevery": marks, "markersize": 5}
+        return Line(freq_hz, values, self.colour, label=self.name, marker=self.marker, size=5.0, every=marks)
 
 
-def draw(study: Study, parts: Kept = NOTHING) -> tuple[Figure, ...]:
+def draw(study: Study) -> tuple[Figure, ...]:
     """The figures of the study's fine-pointing loop; none without one."""
     fine, m = study.fine_pointing, study.file.mission
     if fine is None:
         return ()
     controllers = shown(fine)
-    with rc_context(STYLE):
-        figures = [
-            parts.part(spectra, fine, controllers),
-            parts.part(errors, fine, m),
-            parts.part(error_budget, fine.budget),
-        ]
-        if fine.scene.loop.optical.every == 1:
-            figures.append(parts.part(sensitivities, fine, m, controllers))
+    figures = [spectra(fine, controllers), errors(fine, m), error_budget(fine.budget)]
+    if fine.scene.loop.optical.every == 1:
+        figures.append(sensitivities(fine, m, controllers))
     return tuple(figures)
 
 
@@ -88,32 +96,29 @@ def spectra(fine: FinePointingStudy, controllers: tuple[Shown, ...]) -> Figure:
     """Spectrum of axis x before and after the loop, and the rms that gathers below each frequency."""
     inner = slice(1, -1)  # neither the mean nor half the control rate
     freq = fine.freq_hz[inner]
-    canvas = Canvas(figsize=(7.6, 4.3), layout="constrained")
-    left, right = canvas.subplots(1, 2, width_ratios=(1.45, 1))
+    sheet = Sheet(7.6, 4.3, widths=(1.45, 1.0), legend=Legend("above", 3))
+    left, right = sheet.panel(0, 0), sheet.panel(0, 1)
     before = fine.disturbed_rad2_hz[inner]
     columns = {"frequency (Hz)": freq, "before the loop (rad^2/Hz)": before}
-    left.plot(freq, before * 1e12, color=BLACK, label="before the loop")
+    left.add(Line(freq, before * 1e12, label="before the loop"))
     noise = _noise_density(fine)
     if noise > 0.0:
-        left.axhline(noise * 1e12, color=_GREY, linestyle=":", linewidth=1.2, label="sensor noise")
+        left.add(Rule(noise * 1e12, False, GREY, ":", 1.2, "sensor noise"))
     for place, each in enumerate(controllers):
         after, predicted = each.of.spectrum_rad2_hz[inner, 0], each.of.predicted_rad2_hz[inner, 0]
-        style = each.style(freq, place)
-        left.plot(freq, after * 1e12, label=each.name, **style)
-        name = f"_{each.name}, predicted, linear"
-        left.plot(freq, predicted * 1e12, label=name, color=each.colour, **_PREDICTED)
-        right.plot(freq, cumulative_rms(freq, after) * 1e6, **style)
-        right.plot(freq, cumulative_rms(freq, predicted) * 1e6, label=name, color=each.colour, **_PREDICTED)
+        for panel, found, linear in (
+            (left, after * 1e12, predicted * 1e12),
+            (right, cumulative_rms(freq, after) * 1e6, cumulative_rms(freq, predicted) * 1e6),
+        ):
+            panel.add(each.line(freq, found, place))
+            panel.add(Line(freq, linear, each.colour, *_PREDICTED, name=f"{each.name}, predicted, linear"))
         columns[f"{each.name}, simulated (rad^2/Hz)"] = after
         columns[f"{each.name}, predicted (rad^2/Hz)"] = predicted
-    left.plot([], [], color=_GREY, label="dashed: predicted, linear", **_PREDICTED)
-    left.set(xscale="log", yscale="log", xlabel="frequency (Hz)", ylabel="spectrum of one axis (µrad²/Hz)")
-    left.set_ylim(bottom=_floor(controllers, inner))
-    right.set(xscale="log", xlabel="frequency (Hz)", ylabel="rms below that frequency, one axis (µrad)")
-    right.set_ylim(bottom=0.0)
-    for axes in (left, right):
-        axes.set_xlim(freq[0], freq[-1])
-    canvas.legend(*left.get_legend_handles_labels(), loc="outside upper center", ncols=3, fontsize=8)
+    left.add(Line(freq[:0], freq[:0], GREY, *_PREDICTED, label="dashed: predicted, linear"))
+    left.y.title, left.y.log, left.y.low = "spectrum of one axis (µrad²/Hz)", True, _floor(controllers, inner)
+    right.y.title, right.y.low = "rms below that frequency, one axis (µrad)", 0.0
+    for panel in (left, right):
+        panel.x.title, panel.x.log, panel.x.low, panel.x.high = "frequency (Hz)", True, freq[0], freq[-1]
     caption = (
         "One-sided spectrum of the line of sight about axis x, on the mission's mirror: the disturbances before the "
         "loop, what is left behind it (simulated, with hysteresis), and what linear theory predicts without. "
@@ -121,7 +126,7 @@ def spectra(fine: FinePointingStudy, controllers: tuple[Shown, ...]) -> Figure:
     )
     caption += " Lines of the reaction wheel are not in the spectrum before the loop." if _lines(fine) else ""
     title = "Spectrum of the line of sight before and behind the loop"
-    return Figure("fine-pointing-spectrum", title, caption, svg_of(canvas), columns)
+    return Figure("fine-pointing-spectrum", title, caption, sheet, columns)
 
 
 def _noise_density(fine: FinePointingStudy) -> float:
@@ -147,8 +152,8 @@ def errors(fine: FinePointingStudy, m: Mission) -> Figure:
     """Radial error at the mission's share of the time, by controller and variant of the mirror."""
     names = [v.design.name for v in fine.verified]
     rows = np.arange(len(names))[::-1]
-    canvas = Canvas(figsize=(7.6, 1.3 + 0.36 * len(names)), layout="constrained")
-    axes = canvas.subplots()
+    sheet, (panel,) = grid(7.6, 1.3 + 0.36 * len(names))
+    sheet.legend = Legend("above", 4)
     columns: dict[str, Floats] = {}
     required = m.requirement.pointing_error_rad
     for i, (variant, (marker, colour)) in enumerate(_MARKERS.items()):
@@ -158,21 +163,19 @@ def errors(fine: FinePointingStudy, m: Mission) -> Figure:
             if variant in v.simulated
         }
         at, values = np.array([*found.values()]).reshape(-1, 2).T
+        edge = BLACK if colour == WHITE else colour
         if values.size:
-            edge = BLACK if colour == "white" else colour
-            axes.plot(values * 1e6, at, marker, label=_VARIANTS[variant], color=colour, markeredgecolor=edge)
+            panel.add(Line(values * 1e6, at, colour, "", label=_VARIANTS[variant], marker=marker, edge=edge))
         columns |= {f"{name}, {_VARIANTS[variant]} (rad)": np.array([value]) for name, (_, value) in found.items()}
-    axes.axvline(required * 1e6, color=BLACK, linestyle="--", linewidth=1.2, label=f"required: {required * 1e6:g} µrad")
-    axes.set_yticks(rows, names)
-    axes.set_ylim(-0.6, len(names) - 0.4)
-    axes.set_xlim(left=0.0)
-    axes.set_xlabel(f"radial error at {share_of_time(fine.quantile)} of the time (µrad)")
-    canvas.legend(loc="outside upper center", ncols=4, fontsize=8)
+    panel.add(Rule(required * 1e6, True, BLACK, "--", 1.2, f"required: {required * 1e6:g} µrad"))
+    panel.y.ticks = {int(row): name for row, name in zip(rows, names, strict=True)}
+    panel.y.low, panel.y.high, panel.x.low = -0.6, len(names) - 0.4, 0.0
+    panel.x.title = f"radial error at {share_of_time(fine.quantile)} of the time (µrad)"
     caption = (
         f"Simulated radial error that is not exceeded for {share_of_time(fine.quantile)} of the time, by controller "
         "and variant of the mirror."
     )
-    return Figure("fine-pointing-errors", "Radial error by controller", caption, svg_of(canvas), columns)
+    return Figure("fine-pointing-errors", "Radial error by controller", caption, sheet, columns)
 
 
 # ------------------------------------------------------------------------------------------------ error budget
@@ -208,22 +211,21 @@ def error_budget(b: ErrorBudget) -> Figure:
     parts, totals, changes = bars_of(b)
     bars = [*parts, *totals, *changes]
     rows = np.arange(len(bars))[::-1]
-    canvas = Canvas(figsize=(7.6, 0.9 + 0.28 * len(bars)), layout="constrained")
-    axes = canvas.subplots()
+    sheet, (panel,) = grid(7.6, 0.9 + 0.28 * len(bars))
+    sheet.legend = Legend("above")
     values, theory = (1e6 * np.array([getattr(bar, key) for bar in bars]) for key in ("rms_rad", "theory_rad"))
-    axes.barh(rows, values, color=[bar.colour for bar in bars], height=0.65)
-    axes.plot(theory, rows, "|", color=BLACK, markersize=13, markeredgewidth=1.8, label="theory (linear)")
+    for colour in dict.fromkeys(bar.colour for bar in bars):
+        of = np.array([bar.colour == colour for bar in bars])
+        panel.add(Bars(rows[of], 0.0 * values[of], values[of], np.full(int(of.sum()), 0.65), colour))
+    mark = Line(theory, rows, BLACK, "", label="theory (linear)", marker="|", size=13.0, edge_width=1.8)
+    panel.add(mark)
     for row, value, expected in zip(rows, values, theory, strict=True):
-        end = np.nanmax([value, expected])
-        axes.annotate(micro(value * 1e-6), (end, row), (5, 0), textcoords="offset points", va="center", fontsize=8)
+        panel.add(Words(micro(value * 1e-6), np.nanmax([value, expected]), row, shift=(5.0, 0.0)))
     for edge in (len(bars) - len(parts), len(changes)):
-        axes.axhline(edge - 0.5, color=_GREY, linewidth=0.8)
-    axes.set_yticks(rows, [bar.name for bar in bars])
-    axes.set_ylim(-0.6, len(bars) - 0.4)
-    axes.set_xlim(0.0, 1.12 * float(np.nanmax([*values, *theory])))
-    axes.set_xlabel("radial rms (µrad)")
-    axes.grid(visible=False, axis="y")
-    canvas.legend(loc="outside upper right", fontsize=8)
+        panel.add(Rule(edge - 0.5, False, GREY, width=0.8))
+    panel.y.ticks, panel.y.grid = {int(row): bar.name for row, bar in zip(rows, bars, strict=True)}, False
+    panel.y.low, panel.y.high = -0.6, len(bars) - 0.4
+    panel.x.low, panel.x.high, panel.x.title = 0.0, 1.12 * float(np.nanmax([*values, *theory])), "radial rms (µrad)"
     caption = (
         f"Error budget of {b.controller}. Above: each part by itself, simulated without hysteresis. Middle: combined. "
         "Below: what a part changes when it alone is left out of the full loop, as a root of the difference of squares."
@@ -231,7 +233,7 @@ def error_budget(b: ErrorBudget) -> Figure:
     columns = {f"{bar.name} (rad)": np.array([bar.rms_rad]) for bar in bars}
     columns |= {f"{p.name}, theory (rad)": np.array([p.theory_rad]) for p in parts if not math.isnan(p.theory_rad)}
     title = "What the residual is made of"
-    return Figure("fine-pointing-budget", title, caption, svg_of(canvas), columns)
+    return Figure("fine-pointing-budget", title, caption, sheet, columns)
 
 
 # ------------------------------------------------------------------------------------------------ sensitivity
@@ -241,32 +243,29 @@ def sensitivities(fine: FinePointingStudy, m: Mission, controllers: tuple[Shown,
     """|S| of the same controllers, with the ceiling that the modulus margin asked for puts on it."""
     half = 0.5 / fine.scene.loop.timing.period_s
     freq = np.geomspace(half * 1e-4, half * 0.999, _SENSITIVITY_POINTS)
-    canvas = Canvas(figsize=(7.6, 3.7), layout="constrained")
-    whole, peak = canvas.subplots(1, 2)
+    sheet, (whole, peak) = grid(7.6, 3.7, 1, 2)
+    sheet.legend = Legend("above", 2)
     columns: dict[str, Floats] = {"frequency (Hz)": freq}
-    for axes in (whole, peak):
-        axes.set(xscale="log", xlabel="frequency (Hz)", ylabel="|S|, error over disturbance")
     for place, each in enumerate(controllers):
         size = np.abs(sensitivity(close(fine.scene.loop, each.of.design.controller), freq)[:, 0, 0])
-        for axes in (whole, peak):
-            axes.plot(freq, size, label=each.name, **each.style(freq, place))
+        for panel in (whole, peak):
+            panel.add(each.line(freq, size, place))
         columns[each.name] = size
-    for axes in (whole, peak):
-        _ceiling(axes, m)
-    whole.set(yscale="log", xlim=(freq[0], half))
-    peak.set(xlim=(0.02 * half, half), ylim=(0.0, None))
-    canvas.legend(*whole.get_legend_handles_labels(), loc="outside upper center", ncols=2, fontsize=8)
+    for panel in (whole, peak):
+        panel.x.title, panel.x.log, panel.y.title = "frequency (Hz)", True, "|S|, error over disturbance"
+        _ceiling(panel, m)
+    whole.y.log, whole.x.low, whole.x.high = True, freq[0], half
+    peak.x.low, peak.x.high, peak.y.low = 0.02 * half, half, 0.0
     caption = (
         "Sensitivity of axis x at the control samples, linear, with delay: what the loop leaves of a disturbance at "
         "each frequency. Below 1 it rejects, above 1 it amplifies; the inverse of the modulus margin is its ceiling. "
         "Right: the same about its peak."
     )
-    return Figure("fine-pointing-sensitivity", "Sensitivity", caption, svg_of(canvas), columns)
+    return Figure("fine-pointing-sensitivity", "Sensitivity", caption, sheet, columns)
 
 
-def _ceiling(axes: Axes, m: Mission) -> None:
-    axes.axhline(1.0, color=_GREY, linewidth=0.8)
+def _ceiling(panel: Panel, m: Mission) -> None:
+    panel.add(Rule(1.0, False, GREY, width=0.8))
     if m.fine_pointing is not None:
         margin = m.fine_pointing.modulus_margin
-        label = f"1 / modulus margin asked for ({margin:g})"
-        axes.axhline(1.0 / margin, color=BLACK, linestyle="--", linewidth=1.2, label=label)
+        panel.add(Rule(1.0 / margin, False, BLACK, "--", 1.2, f"1 / modulus margin asked for ({margin:g})"))

@@ -92,8 +92,8 @@ def render(
     # Drawing libraries load here, not with the package: they take longer than help should.
     from microrad.core.machine import versions
     from microrad.report import identification_figures as figures
-    from microrad.report.interactive import with_scripts
     from microrad.report.page import pages
+    from microrad.report.scripts import with_scripts
 
     everything = [*found.recordings, *words.shown_recordings(found, recordings)]
     context: dict[str, Any] = {

@@ -4,12 +4,7 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from matplotlib import rc_context
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure as Canvas
-from matplotlib.patches import Patch
 
-from microrad.core.kept import NOTHING, Kept
 from microrad.core.units import format_quantity
 from microrad.link import Swing, Tornado
 from microrad.link.acquisition import Trade
@@ -17,7 +12,9 @@ from microrad.link.partner_search import Finding
 from microrad.link.requirement import outage_words
 from microrad.link.study import LinkStudy
 from microrad.report.day_assumptions import swing_bars
-from microrad.report.figures import BLUE, ORANGE, STYLE, VERMILION, Figure, svg_of
+from microrad.report.plotting.figure import Figure
+from microrad.report.plotting.scales import limits
+from microrad.report.plotting.sheet import BLACK, BLUE, ORANGE, VERMILION, WHITE, Area, Legend, Line, Rule, Words, grid
 from microrad.report.tables import Column
 
 MOST_BARS = 14
@@ -28,37 +25,36 @@ _TITLES = {
 }
 
 
-def draw(study: LinkStudy, parts: Kept = NOTHING) -> tuple[Figure, ...]:
+def draw(study: LinkStudy) -> tuple[Figure, ...]:
     """The figures of the links, in the order of the page."""
-    with rc_context(STYLE):
-        figures = [parts.part(tornado, study, t) for t in study.tornados if t.swings]
-        if study.finding is not None and study.finding.trade is not None:
-            figures.append(parts.part(trade, study, study.finding, study.finding.trade))
+    figures = [tornado(study, t) for t in study.tornados if t.swings]
+    if study.finding is not None and study.finding.trade is not None:
+        figures.append(trade(study, study.finding, study.finding.trade))
     return tuple(figures)
 
 
 def tornado(study: LinkStudy, of: Tornado) -> Figure:
     """One margin over each of its inputs, one at a time."""
     shown, margin = of.swings[:MOST_BARS], of.margin_db
-    canvas = Canvas(figsize=(6.4, 0.9 + 0.27 * len(shown)), layout="constrained")
-    axes = canvas.subplots()
+    sheet, (panel,) = grid(6.4, 0.9 + 0.27 * len(shown))
     lost_db = _lost(shown, margin)
     ends = [(max(swing.margin_low_db, lost_db), max(swing.margin_high_db, lost_db)) for swing in shown]
-    swing_bars(axes, [_label(swing) for swing in shown], ends, margin)
+    swing_bars(panel, [_label(swing) for swing in shown], ends, margin)
     for row, swing in enumerate(shown):
         if not math.isfinite(swing.swing_db):
-            ink = "white" if math.isinf(swing.margin_high_db) else "black"
-            _say(axes, (lost_db, row), "< no margin: receiver too slow", ink, "center")
+            ink = WHITE if math.isinf(swing.margin_high_db) else BLACK
+            panel.add(Words("< no margin: receiver too slow", lost_db, row, ink, shift=(3.0, 0.0)))
     m, data = study.file.mission, of.of == study.communication.name
     required = m.requirement.margin_db
-    low, high = axes.get_xlim()
+    low, high = limits(panel.x, "x", [panel])
     if data and low < required < high:
-        axes.axvline(required, color=VERMILION, linestyle="--", linewidth=1.0)
-        _say(axes, (required, -0.55), "required", VERMILION, "bottom")
+        panel.add(Rule(required, True, VERMILION, "--"))
+        panel.add(Words("required", required, -0.55, VERMILION, base="bottom", shift=(3.0, 0.0)))
     judged = f", all but {outage_words(m)}" if data and m.jitter is not None else ""
-    axes.set(xlabel=f"margin of the {'communication link' if data else of.of.lower()}{judged} (dB)")
-    keys = [Patch(color=ORANGE, label="input lower"), Patch(color=BLUE, label="input higher")]
-    axes.legend(handles=keys, loc="lower right", fontsize=8)
+    panel.x.title = f"margin of the {'communication link' if data else of.of.lower()}{judged} (dB)"
+    panel.legend = Legend(
+        "lower right", only=(Area((), ORANGE, label="input lower"), Area((), BLUE, label="input higher"))
+    )
     assumed = [s.key for s in shown if s.kind == "assumption"]
     caption = (
         "Margin with one input at a time 10 % lower and higher (0.5 dB for those in decibels, a factor of ten for a "
@@ -76,12 +72,7 @@ def tornado(study: LinkStudy, of: Tornado) -> Figure:
         "higher (SI)": np.array([s.high for s in of.swings]),
     }
     name, title = _TITLES[of.of]
-    return Figure(name, title, caption, svg_of(canvas), columns)
-
-
-def _say(axes: Axes, place: tuple[float, float], words: str, color: str, va: str) -> None:
-    """Words just right of a place."""
-    axes.annotate(words, place, (3, 0), textcoords="offset points", color=color, fontsize=8, va=va)
+    return Figure(name, title, caption, sheet, columns)
 
 
 def _lost(shown: Sequence[Swing], margin_db: float) -> float:
@@ -98,19 +89,19 @@ def _label(swing: Swing) -> str:
 
 def trade(study: LinkStudy, found: Finding, t: Trade) -> Figure:
     """Section 2.1 of the paper as a picture: a wide beacon, or a scan with a narrow beam."""
-    canvas = Canvas(figsize=(6.4, 3.6), layout="constrained")
-    axes = canvas.subplots()
+    sheet, (panel,) = grid(6.4, 3.6)
     sigma = t.sigma_rad * 1e6
-    axes.loglog(sigma, t.wide_time_s, color=BLUE, label="wide beacon: detection at the edge of its cone")
-    axes.loglog(sigma, t.scan_time_s, color=ORANGE, linestyle="--", label="spiral scan: whole area")
-    axes.loglog(sigma, t.scan_mean_time_s, color=ORANGE, linestyle=":", label="spiral scan: mean until found")
-    axes.axvline(found.sigma_rad * 1e6, color=VERMILION, linewidth=1.0)
-    _say(axes, (found.sigma_rad * 1e6, t.scan_time_s[-1]), "this mission", VERMILION, "top")
-    axes.set(xlabel="pointing uncertainty, rms per axis (µrad)", ylabel="time (s)")
-    axes.grid(visible=True, which="both", linewidth=0.3)
-    axes.set_xticks([30, 100, 300, 1000], ["30", "100", "300", "1000"])
-    axes.minorticks_off()
-    axes.legend(loc="upper left", fontsize=8)
+    panel.add(Line(sigma, t.wide_time_s, BLUE, label="wide beacon: detection at the edge of its cone"))
+    panel.add(Line(sigma, t.scan_time_s, ORANGE, "--", label="spiral scan: whole area"))
+    panel.add(Line(sigma, t.scan_mean_time_s, ORANGE, ":", label="spiral scan: mean until found"))
+    panel.add(Rule(found.sigma_rad * 1e6, True, VERMILION))
+    panel.add(Words("this mission", found.sigma_rad * 1e6, t.scan_time_s[-1], VERMILION, base="top", shift=(3.0, 0.0)))
+    panel.x.title, panel.x.log, panel.x.ticks = (
+        "pointing uncertainty, rms per axis (µrad)",
+        True,
+        (30.0, 100.0, 300.0, 1000.0),
+    )
+    panel.y.title, panel.y.log, panel.legend = "time (s)", True, Legend("upper left")
     m = study.file.mission
     assert m.acquisition is not None
     assert m.acquisition.scan is not None
@@ -133,4 +124,4 @@ def trade(study: LinkStudy, found: Finding, t: Trade) -> Figure:
         "scan, mean time (s)": t.scan_mean_time_s,
         "scan, probability": t.scan_probability,
     }
-    return Figure("wide-beam-or-scan", "Wide beacon or scan", caption, svg_of(canvas), columns)
+    return Figure("wide-beam-or-scan", "Wide beacon or scan", caption, sheet, columns)

@@ -10,7 +10,7 @@ from microrad.link.pointing import OpenLoopPointing
 from microrad.link.study import LinkStudy
 from microrad.link.under_jitter import Performance, stated_outage
 from microrad.report import budget_views
-from microrad.report.figures import Figure
+from microrad.report.plotting.figure import Figure
 from microrad.report.quantities import quantity
 from microrad.study.pointing_cost import FINE, Cost, LinkPerformance
 

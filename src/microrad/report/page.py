@@ -21,15 +21,15 @@ from microrad.report import (
     contact_run_words,
     day_views,
     fine_pointing,
-    interactive,
     links,
     paper_views,
     requirement_views,
     requirements,
+    scripts,
     tails,
     words,
 )
-from microrad.report.figures import Figure
+from microrad.report.plotting.figure import Figure
 from microrad.report.quantities import quantity
 from microrad.study.pointing_cost import FINE
 from microrad.study.story import Study
@@ -121,7 +121,7 @@ def render(study: Study, drawn: Drawn, manifest: Mapping[str, Any]) -> str:
         "versions": versions(),
         "origin": _origin(manifest),
     }
-    text = interactive.with_scripts(template.render(context))
+    text = scripts.with_scripts(template.render(context))
     return carried.with_manifest(text, embedded({**manifest, "page_sha256": carried.hash_of_page(text)}))
 
 

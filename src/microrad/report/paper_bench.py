@@ -8,22 +8,21 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-from matplotlib import rc_context
-from matplotlib.figure import Figure as Canvas
 from numpy.typing import NDArray
 
 from microrad.core.arrays import Floats
 from microrad.core.kept import NOTHING, Kept
 from microrad.lab import bench, identify
 from microrad.lab.recording import Recording
-from microrad.report.figures import BLACK, BLUE, GREEN, STYLE, VERMILION, Figure, svg_of, thin
+from microrad.report.plotting.figure import Figure
+from microrad.report.plotting.sheet import BLACK, BLUE, GREEN, VERMILION, Legend, Line, grid
 from microrad.study.story import Study
 
 PLAN = "paper-experiment"
 SEED = 1
 ORDER = 5  # of Eq. 1
 CLAIMED_FIT_PERCENT = 97.0  # section 3.3
-_COLOURS, _STYLES = (BLUE, GREEN, VERMILION), ("-", "--", "-.")
+_COLOURS = (BLUE, GREEN, VERMILION)
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,36 +114,26 @@ def draw(study: Study, parts: Kept = NOTHING) -> tuple[Figure, ...]:
     """Both figures for a mission with a mirror of the paper's kind; none for others."""
     if study.scan is None:
         return ()
-    with rc_context(STYLE):
-        return parts.part(_both)
-
-
-def _both() -> tuple[Figure, Figure]:
-    return draw_chirp(chirp()), draw_loops(loops())
+    return draw_chirp(parts.part(chirp)), draw_loops(parts.part(loops))
 
 
 def draw_chirp(found: Chirp) -> Figure:
     """Fig. 4: measured and modelled output over time, and the response that the model was fitted to."""
-    canvas = Canvas(figsize=(7.6, 5.4), layout="constrained")
-    grid = canvas.add_gridspec(2, 2)
-    whole, close, size, phase = (canvas.add_subplot(grid[at]) for at in ((0, 0), (0, 1), (1, 0), (1, 1)))
-    far = found.freq_hz[-1]
-    zoom = close_up(found)
-    for axes, part in ((whole, slice(None)), (close, zoom)):
-        x = found.time_s[part]
-        for y, colour, style, label in (
-            (found.measured_rad, VERMILION, "-", "measured (virtual bench)"),
-            (found.modelled_rad, BLUE, "--", "model"),
-        ):
-            axes.plot(*thin(x, y[part] * 1e6), color=colour, linestyle=style, label=label, linewidth=1.1)
-        axes.set(xlabel="time (s)", ylabel="output about its mean (µrad)")
-    gains = (found.response, VERMILION, ".", "measured (virtual bench)"), (found.model, BLUE, "--", "model")
-    for values, colour, style, _ in gains:
-        size.plot(found.freq_hz, np.abs(values) * 1e6, style, color=colour, markersize=3)
-        phase.plot(found.freq_hz, np.degrees(np.unwrap(np.angle(values))), style, color=colour, markersize=3)
-    size.set(xscale="log", ylim=(0.0, None), xlabel="frequency (Hz)", ylabel="gain (µrad/V)", xlim=(None, far))
-    phase.set(xscale="log", xlabel="frequency (Hz)", ylabel="phase (°)", xlim=(None, far))
-    canvas.legend(*whole.get_legend_handles_labels(), loc="outside upper center", ncols=2, fontsize=8)
+    sheet, (whole, close, size, phase) = grid(7.6, 5.4, 2, 2)
+    sheet.legend = Legend("above", 2)
+    far, zoom = found.freq_hz[-1], close_up(found)
+    looks = ((VERMILION, "-", "measured (virtual bench)"), (BLUE, "--", "model"))
+    for panel, part in ((whole, slice(None)), (close, zoom)):
+        for y, (colour, dash, label) in zip((found.measured_rad, found.modelled_rad), looks, strict=True):
+            panel.add(Line(found.time_s[part], y[part] * 1e6, colour, dash, 1.1, label))
+        panel.x.title, panel.y.title = "time (s)", "output about its mean (µrad)"
+    for values, colour, dash, marker in ((found.response, VERMILION, "", "."), (found.model, BLUE, "--", "")):
+        turn = np.degrees(np.unwrap(np.angle(values)))
+        for panel, y in ((size, np.abs(values) * 1e6), (phase, turn)):
+            panel.add(Line(found.freq_hz, y, colour, dash, marker=marker, size=3.0))
+    for panel in (size, phase):
+        panel.x.title, panel.x.log, panel.x.high = "frequency (Hz)", True, far
+    size.y.title, phase.y.title, size.y.low = "gain (µrad/V)", "phase (°)", 0.0
     caption = (
         f"Virtual bench, no laboratory: a chirp of {found.freq_hz[0]:.3g} Hz to {far:.4g} Hz played into Eq. 2 as "
         f"printed, with sensor noise of 3 % and 16-bit converters; a model with {ORDER} poles fitted to the record "
@@ -163,7 +152,7 @@ def draw_chirp(found: Chirp) -> Figure:
         "phase, model (rad)": np.unwrap(np.angle(found.model)),
     }
     title = "Fig. 4  Identified linear dynamics (virtual bench)"
-    return Figure("fig4-chirp", title, caption, svg_of(canvas), columns)
+    return Figure("fig4-chirp", title, caption, sheet, columns)
 
 
 def close_up(found: Chirp) -> slice:
@@ -174,22 +163,19 @@ def close_up(found: Chirp) -> slice:
 
 def draw_loops(found: tuple[Loop, ...]) -> Figure:
     """Fig. 5: measured loops with the model that was fitted to the fastest alone."""
-    canvas = Canvas(figsize=(7.6, 3.2), layout="constrained")
+    sheet, panels = grid(7.6, 3.2, 1, len(found), share_y=True)
     columns: dict[str, Floats] = {}
-    panels = canvas.subplots(1, len(found), sharey=True, squeeze=False)[0]
-    for axes, loop, colour in zip(panels, found, _COLOURS, strict=False):
-        shown = _points(loop.drive_v, loop.measured_rad)
-        axes.plot(*shown, "o", color=colour, markersize=4.5, markerfacecolor="none", label="measured (virtual bench)")
-        axes.plot(loop.drive_v, loop.modelled_rad * 1e3, "-", color=BLACK, linewidth=0.9, label="model")
+    for panel, loop, colour in zip(panels, found, _COLOURS, strict=False):
+        x, y = _points(loop.drive_v, loop.measured_rad)
+        panel.add(Line(x, y, colour, "", label="measured (virtual bench)", marker="o", size=4.5, face=""))
+        panel.add(Line(loop.drive_v, loop.modelled_rad * 1e3, BLACK, width=0.9, label="model"))
         role = "fitted" if loop.freq_hz == loop.fitted_hz else "predicted"
-        axes.set_title(f"{loop.freq_hz:g} Hz, {role}: {loop.error_percent:.2f} % rms", fontsize=8.5, loc="left")
-        axes.set_xlabel("drive (V)")
-        axes.locator_params(axis="x", nbins=4)  # more would run into those of the next panel
+        panel.title = f"{loop.freq_hz:g} Hz, {role}: {loop.error_percent:.2f} % rms"
+        panel.title_size, panel.x.title, panel.x.most = 8.5, "drive (V)", 4
         columns[f"drive at {loop.freq_hz:g} Hz (V)"] = loop.drive_v
         columns[f"measured at {loop.freq_hz:g} Hz (rad)"] = loop.measured_rad
         columns[f"model at {loop.freq_hz:g} Hz (rad)"] = loop.modelled_rad
-    panels[0].set_ylabel("output (mrad)")
-    panels[0].legend(fontsize=8, loc="upper left")
+    panels[0].y.title, panels[0].legend = "output (mrad)", Legend("upper left")
     fitted = found[0].fitted_hz
     caption = (
         "Virtual bench, no laboratory: the paper's sines played into Eq. 3 as printed, with 1 µrad of sensor noise. "
@@ -197,7 +183,7 @@ def draw_loops(found: tuple[Loop, ...]) -> Figure:
         "% of the peak-to-peak output, most of it sensor noise."
     )
     title = "Fig. 5  Hysteresis measured and modelled (virtual bench)"
-    return Figure("fig5-bench-loops", title, caption, svg_of(canvas), columns)
+    return Figure("fig5-bench-loops", title, caption, sheet, columns)
 
 
 def _points(drive_v: Floats, output_rad: Floats, most: int = 60) -> tuple[Floats, Floats]:

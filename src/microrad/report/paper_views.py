@@ -5,7 +5,7 @@ from typing import Any
 
 from microrad.core.units import format_quantity
 from microrad.report import drawings
-from microrad.report.figures import Figure
+from microrad.report.plotting.figure import Figure
 from microrad.report.quantities import quantity
 from microrad.study.story import Study
 

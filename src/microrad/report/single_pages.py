@@ -3,7 +3,7 @@
 from microrad.link.requirement import met, of_links
 from microrad.link.study import LinkStudy, Solution
 from microrad.orbit.day import DayStudy
-from microrad.report import budget_views, day_plots, day_views, interactive, link_figures, links, page, requirements
+from microrad.report import budget_views, day_plots, day_views, link_figures, links, page, requirements, scripts
 from microrad.report.quantities import quantity
 
 
@@ -27,7 +27,7 @@ def budget(study: LinkStudy, solution: Solution | None = None) -> str:
         "angle": page.angle,
         "inputs": list(study.file.sources.items()),
     }
-    return interactive.with_scripts(page.pages().get_template("budget.html").render(context))
+    return scripts.with_scripts(page.pages().get_template("budget.html").render(context))
 
 
 def day(of: DayStudy, links: LinkStudy) -> str:
@@ -43,4 +43,4 @@ def day(of: DayStudy, links: LinkStudy) -> str:
             inputs=list(links.file.sources.items()),
         )
     )
-    return interactive.with_scripts(text)
+    return scripts.with_scripts(text)

@@ -6,16 +6,14 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from matplotlib import rc_context
-from matplotlib.figure import Figure as Canvas
 
 from microrad.core.arrays import Floats
-from microrad.core.kept import NOTHING, Kept
 from microrad.loop.fine_loop.ensemble import bin_edges_rad, histogram_beyond, histogram_quantile
 from microrad.loop.fine_pointing import FinePointingStudy, Residual
 from microrad.mission.model import Mission
 from microrad.report import fine_pointing_words as words
-from microrad.report.figures import BLACK, BLUE, GREEN, ORANGE, STYLE, Figure, svg_of
+from microrad.report.plotting.figure import Figure
+from microrad.report.plotting.sheet import BLACK, BLUE, GREEN, ORANGE, Legend, Line, Rule, Words, grid
 from microrad.study.story import Study
 
 SIGMAS = 2.576  # 99 %, as of the interval of the rms
@@ -147,49 +145,39 @@ def sentences(fine: FinePointingStudy, m: Mission, samples: int) -> list[str]:
 
 
 # ------------------------------------------------------------------------------------------------------------- figure
-def draw(study: Study, parts: Kept = NOTHING) -> tuple[Figure, ...]:
+def draw(study: Study) -> tuple[Figure, ...]:
     """The figure of the tail; none for a mission without a fine-pointing loop."""
-    if study.fine_pointing is None:
-        return ()
-    with rc_context(STYLE):
-        return (parts.part(tail, study.fine_pointing, study.file.mission),)
+    return () if study.fine_pointing is None else (tail(study.fine_pointing, study.file.mission),)
 
 
 def tail(fine: FinePointingStudy, m: Mission) -> Figure:
     """Share of the time beyond each radius, on a logarithmic axis, beside a Rayleigh distribution of the same rms."""
-    canvas = Canvas(figsize=(7.4, 3.8), layout="constrained")
-    axes = canvas.subplots()
+    sheet, (panel,) = grid(7.4, 3.8)
+    sheet.legend = Legend("above", 3)
     columns: dict[str, Floats] = {}
     for variant, left in fine.best.simulated.items():
-        colour, style = _STYLES.get(variant, (BLACK, ":"))
+        colour, dash = _STYLES.get(variant, (BLACK, ":"))
         radius, share = survival(left)
         label = _NAMES.get(variant, variant)
-        axes.plot(radius * 1e6, share, color=colour, linestyle=style, label=label)
+        panel.add(Line(radius * 1e6, share, colour, dash, label=label))
         columns |= {f"radial error, {label} (rad)": radius, f"share of the time beyond, {label}": share}
     given = fine.best.simulated["given"]
     radius, share = survival(given)
     rayleigh = np.exp(-((radius / given.rms_rad) ** 2))
-    axes.plot(radius * 1e6, rayleigh, color=BLACK, linewidth=0.9, linestyle=(0, (1, 2)), label="Rayleigh, same rms")
+    panel.add(Line(radius * 1e6, rayleigh, BLACK, (1.0, 2.0), 0.9, "Rayleigh, same rms"))
     columns["Rayleigh of the same rms, mission's mirror"] = rayleigh
     required, floor = m.requirement.pointing_error_rad * 1e6, 0.5 / float(given.radial_counts.sum())
-    axes.axvline(required, color=BLACK, linestyle="--", linewidth=1.2, label=f"required: {required:g} µrad")
-    axes.axhline(1.0 - fine.quantile, color="#777777", linewidth=0.8)
-    axes.annotate(
-        f"beyond for {words.percent(1.0 - fine.quantile)} of the time",
-        (axes.get_xlim()[1] * 0.02, 1.0 - fine.quantile),
-        (4, 3),
-        textcoords="offset points",
-        fontsize=8,
-        color="#555555",
-    )
-    axes.set(yscale="log", ylim=(floor, 1.5), xlabel="radial error (µrad)", ylabel="share of the time beyond it")
-    axes.set_xlim(left=0.0)
-    canvas.legend(loc="outside upper center", ncols=3, fontsize=8)
+    panel.add(Rule(required, True, BLACK, "--", 1.2, f"required: {required:g} µrad"))
+    panel.add(Rule(1.0 - fine.quantile, False, "#777777", width=0.8))
+    beyond_words = f"beyond for {words.percent(1.0 - fine.quantile)} of the time"
+    panel.add(Words(beyond_words, 0.02, 1.0 - fine.quantile, "#555555", base="bottom", shift=(4.0, 2.0), of_panel="x"))
+    panel.x.title, panel.x.low, panel.y.title = "radial error (µrad)", 0.0, "share of the time beyond it"
+    panel.y.log, panel.y.low, panel.y.high = True, floor, 1.5
     caption = (
         f"Share of the time that the radial error of {fine.best.design.name} is larger, over all runs. A Gaussian "
         "error about both axes with equal rms would follow the dotted line; the scale ends at half a sample."
     )
-    return Figure("monte-carlo-tail", "Tail of the radial error", caption, svg_of(canvas), columns)
+    return Figure("monte-carlo-tail", "Tail of the radial error", caption, sheet, columns)
 
 
 def survival(left: Residual) -> tuple[Floats, Floats]:

@@ -223,8 +223,8 @@ class Sheet:
     """Panels on a grid of rows and columns, on a sheet of a width and a height in inches.
 
     ``heights`` and ``widths`` are the shares of rows and columns. Panels that share an axis have its limits in common,
-    and its ticks at the outer ones only. ``heading`` stands above all of them at the right, in a colour, or at the left;
-    on a sheet without panels in the middle.
+    and its ticks at the outer ones only. ``heading`` stands above all of them at the right or at the left, and in the
+    middle of a sheet without panels.
     """
 
     width: float

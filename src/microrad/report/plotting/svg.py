@@ -70,8 +70,7 @@ def _heading(found: Layout) -> Iterator[str]:
 
 # ------------------------------------------------------------------------------------------------ a panel
 def _panel(of: Placed) -> Iterator[str]:
-    left, top, right, bottom = of.inner
-    panel = of.panel
+    panel, (left, top, *_) = of.panel, of.inner
     if panel.face:
         yield f'<rect {_rect(of.inner)} fill="{panel.face}"/>'
     yield from _grid(of)
