@@ -375,7 +375,7 @@ def _rule(pen: Pen, rule: Rule) -> None:
 def _span(pen: Pen, span: Span) -> None:
     fill = {"fillcolor": clear(span.colour, span.opacity), "line": {"width": 0}}
     pen.shape(
-        {**pen.across("rect", [span.low, span.high], span.upright), **fill}, span.label, Look(fill["fillcolor"], "area")
+        {**pen.across("rect", pen.of.within(span), span.upright), **fill}, span.label, Look(fill["fillcolor"], "area")
     )  # type: ignore[arg-type]
 
 

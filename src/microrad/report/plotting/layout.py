@@ -1,7 +1,8 @@
 """Where everything of a sheet stands, in points from its top left corner: boxes of data, ticks, titles, legends."""
 
+import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -28,6 +29,7 @@ TITLE = 9.0  # size of titles of axes
 SWATCH, SWATCH_GAP, ENTRY_GAP = 20.0, 5.0, 14.0
 BAR, BAR_GAP = 11.0, 9.0  # a colour bar, and what is free before it
 _LEAST = 30.0  # of a panel
+_LEAST_MARKER = 3.5  # in a legend
 Box = tuple[float, float, float, float]  # left, top, right, bottom
 Entry = Line | Rule | Span | Area | Bars
 
@@ -75,6 +77,11 @@ class Placed:
         """The field that the colour bar is of."""
         return next((each for each in self.panel.all_of(Field) if each.title), None)
 
+    def within(self, span: Span) -> Ends:
+        """The ends of a span; those of the panel in place of infinite ones."""
+        low, high = sorted(self.x_ends if span.upright else self.y_ends)
+        return low if math.isinf(span.low) else span.low, high if math.isinf(span.high) else span.high
+
 
 @dataclass(slots=True)
 class Layout:
@@ -99,7 +106,7 @@ def layout(sheet: Sheet) -> Layout:
     if whole is not None:
         top, right, bottom = _outside(whole, left, top, right, bottom)
         keys.append(whole)
-    for _ in range(2):  # ticks need a length, which needs the room that ticks take
+    for _ in range(3):  # ticks need a length, which needs the room that ticks take
         sides = [_sides(each, [key for key in keys if key.panel == number]) for number, each in enumerate(placed)]
         grown = _share(sheet, placed, sides, (left, top, right, bottom))
         _ticks(placed)
@@ -131,7 +138,7 @@ def _key(legend: Legend | None, *panels_and_number: object) -> Key | None:
         return None
     panels = [each for each in panels_and_number if isinstance(each, Panel)]
     number = next((each for each in panels_and_number if isinstance(each, int)), None)
-    entries: list[Entry] = list(legend.only) or list(labelled([mark for each in panels for mark in each.marks]))
+    entries = [_seen(each) for each in legend.only or labelled([mark for panel in panels for mark in panel.marks])]
     if not entries:
         return None
     rows = -(-len(entries) // legend.columns)
@@ -141,6 +148,13 @@ def _key(legend: Legend | None, *panels_and_number: object) -> Key | None:
     height = LINE * 1.15 * legend.size * (sum(lines) + (1 if legend.title else 0))
     width = max(sum(columns) + ENTRY_GAP * (len(columns) - 1), width_of(legend.title, legend.size))
     return Key(legend, entries, width, height, columns, rows, number)
+
+
+def _seen(entry: Entry) -> Entry:
+    """The entry with a marker large enough to be seen."""
+    if not isinstance(entry, Line) or not entry.marker:
+        return entry
+    return replace(entry, size=max(entry.size, 2.0 * _LEAST_MARKER if entry.marker == "." else _LEAST_MARKER))
 
 
 def _outside(key: Key, left: float, top: float, right: float, bottom: float) -> tuple[float, float, float]:

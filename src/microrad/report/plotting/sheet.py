@@ -77,7 +77,10 @@ class Rule:
 
 @dataclass(frozen=True, slots=True)
 class Span:
-    """A shade across the panel: an upright one between two values of x, else one between two of y."""
+    """A shade across the panel: an upright one between two values of x, else one between two of y.
+
+    An infinite end is that of the panel.
+    """
 
     low: float
     high: float

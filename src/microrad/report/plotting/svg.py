@@ -255,7 +255,7 @@ def _rule(of: Placed, rule: Rule) -> list[str]:
 
 def _span(of: Placed, span: Span) -> list[str]:
     left, top, right, bottom = of.inner
-    a, b = sorted(_along(of, [span.low, span.high], span.upright))
+    a, b = sorted(_along(of, of.within(span), span.upright))
     box = (a, top, b, bottom) if span.upright else (left, a, right, b)
     return [f'<rect {_rect(box)} fill="{span.colour}" fill-opacity="{span.opacity:g}"/>']
 
