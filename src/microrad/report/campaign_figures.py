@@ -3,14 +3,11 @@
 import math
 import textwrap
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from itertools import cycle
 from typing import Any, NamedTuple
 
 import numpy as np
-from matplotlib import rc_context
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure as Canvas
-from numpy.typing import NDArray
 
 from microrad.campaign.records import (
     CampaignSummary,
@@ -26,16 +23,60 @@ from microrad.core.arrays import Floats
 from microrad.report import campaign_numbers as numbers
 from microrad.report import campaign_tables as tables
 from microrad.report import campaign_words as words
-from microrad.report.campaign_axes import label_of, logarithm, svg_of
 from microrad.report.campaign_scale import Scale, scale_of
-from microrad.report.day_figures import GREY, PLAIN, WIDTH, short
-from microrad.report.figures import BLACK, BLUE, GREEN, ORANGE, SKY, VERMILION, Figure, thin
+from microrad.report.day_figures import WIDTH, short
+from microrad.report.plotting import scales
+from microrad.report.plotting import sheet as sheets
+from microrad.report.plotting.figure import Figure
+from microrad.report.plotting.sheet import (
+    BLACK,
+    BLUE,
+    GREEN,
+    GREY,
+    ORANGE,
+    SKY,
+    VERMILION,
+    WHITE,
+    Axis,
+    Bars,
+    Dash,
+    Field,
+    Legend,
+    Line,
+    Panel,
+    Rule,
+    Sheet,
+    Span,
+    Words,
+    between,
+    stairs,
+)
 
 MOST_INPUTS, MOST_CELLS, MOST_POINTS = 14, 40, 1500
 _ACROSS = 3  # panels beside each other
-_SMALL: dict[str, Any] = {"fontsize": 8}
-_LIMIT: dict[str, Any] = {"color": VERMILION, "linestyle": (0, (5, 2)), "linewidth": 1.4}
-_MARKED = ((BLACK, "-"), (GREEN, "--"), (ORANGE, "-."), (BLACK, ":"), (GREY, (0, (8, 2, 2, 2))))
+_LABEL = 30  # characters
+_NONE = np.empty(0)
+_LIMIT: dict[str, Any] = {"colour": VERMILION, "dash": (5.0, 2.0), "width": 1.4}
+_MARKED: tuple[tuple[str, Dash], ...] = (
+    (BLACK, "-"),
+    (GREEN, "--"),
+    (ORANGE, "-."),
+    (BLACK, ":"),
+    (GREY, (8.0, 2.0, 2.0, 2.0)),
+)
+
+
+def label_of(key: str, keys: Sequence[str]) -> str:
+    """The end of a dotted key that tells it from the others, two parts at least, on lines that leave room for data."""
+    parts = key.split(".")
+    for count in range(2, len(parts)):
+        tail_ = ".".join(parts[-count:])
+        if sum(other == tail_ or other.endswith(f".{tail_}") for other in keys) == 1:
+            break
+    else:
+        count = len(parts)
+    whole = short(".".join(parts[-count:]), 90)
+    return textwrap.fill(whole.replace(".", ". "), _LABEL, max_lines=2, placeholder="…").replace(". ", ".")
 
 
 def limit_of(summary: CampaignSummary, output: str) -> Limit | None:
@@ -51,28 +92,22 @@ def _bounds(limit: Limit | None) -> list[tuple[str, float]]:
 
 
 # ------------------------------------------------------------------------------------------------------- distributions
-@rc_context(PLAIN)
 def distribution(output: OutputSummary, limit: Limit | None) -> Figure:
     """How an output is spread over the rows, with its limit and some quantiles."""
     scale = scale_of(np.array([output.least, output.most]), output.unit, output.name)
-    canvas = Canvas(figsize=(WIDTH, 2.3), layout="constrained")
-    axes = canvas.subplots()
+    sheet, (panel,) = sheets.grid(WIDTH, 2.3)
+    sheet.legend = Legend("upper right")
     shares = 100.0 * output.counts / output.counts.sum()
-    edges = output.edges * scale.factor
-    axes.stairs(shares, edges, fill=True, color=SKY)
-    axes.stairs(shares, edges, color=BLUE, linewidth=0.8)
+    panel.x, panel.y = Axis(scale.title(numbers.label(output.name))), Axis("rows (%)", low=0.0)
+    panel.add(*stairs(output.edges * scale.factor, shares, SKY, BLUE))
     chosen = tables.chosen_quantiles([output], len(_MARKED))
     styles = dict(zip(sorted(chosen, key=lambda p: abs(p - 0.5)), _MARKED, strict=False))
     for p in chosen:
-        found, (colour, line) = output.quantiles[p], styles[p]
+        found, (colour, dash) = output.quantiles[p], styles[p]
         if tables.is_known(found):
             label = f"{100.0 * p:.6g} %: {numbers.value(found.value, output.unit, output.name)}"
-            axes.axvline(found.value * scale.factor, color=colour, linestyle=line, linewidth=1.1, label=label)
-    _mark_limits(axes, limit, output, scale)
-    axes.set(xlabel=scale.title(numbers.label(output.name)), ylabel="rows (%)")
-    axes.set_ylim(bottom=0.0)
-    if axes.get_legend_handles_labels()[0]:  # few rows know no quantile
-        canvas.legend(loc="outside right upper", **_SMALL)
+            panel.add(Rule(found.value * scale.factor, True, colour, dash, 1.1, label))
+    _mark_limits(panel, limit, output, scale)
     columns = {
         f"{output.name}, lower edge ({output.unit})": output.edges[:-1],
         f"{output.name}, upper edge ({output.unit})": output.edges[1:],
@@ -81,51 +116,49 @@ def distribution(output: OutputSummary, limit: Limit | None) -> Figure:
     caption = (
         f"{output.meaning[:1].upper()}{output.meaning[1:]}: share of the rows in each bin, and quantiles over them."
     )
-    return Figure(
-        f"campaign-{output.name}", f"Distribution of {numbers.label(output.name)}", caption, svg_of(canvas), columns
-    )
+    return Figure(f"campaign-{output.name}", f"Distribution of {numbers.label(output.name)}", caption, sheet, columns)
 
 
-def _mark_limits(axes: Axes, limit: Limit | None, output: OutputSummary, scale: Scale) -> None:
+def _mark_limits(panel: Panel, limit: Limit | None, output: OutputSummary, scale: Scale) -> None:
     """The limit as a line with the side that misses it shaded; in words alone where it is far from all rows."""
     reach = output.edges[-1] - output.edges[0]
     for side, bound in _bounds(limit):
-        label = f"limit {numbers.SYMBOL[side]} {numbers.bound(bound, output.unit, output.name)}"
+        label, at = _limit_label(side, bound, output.unit, output.name), bound * scale.factor
         if output.edges[0] - reach <= bound <= output.edges[-1] + reach:
-            axes.axvline(bound * scale.factor, label=label, **_LIMIT)
-            low, high = axes.get_xlim()
-            span = (low, bound * scale.factor) if side == "least" else (bound * scale.factor, high)
-            axes.axvspan(*span, color=VERMILION, alpha=0.1, linewidth=0.0)
-            axes.set_xlim(low, high)
+            span = (-math.inf, at) if side == "least" else (at, math.inf)
+            panel.add(Rule(at, True, label=label, **_LIMIT), Span(*span, True, VERMILION, 0.1))
         else:
-            axes.plot([], [], label=f"{label},\nfar from here", **_LIMIT)
+            panel.add(_far(label))
+
+
+def _limit_label(side: str, bound: float, unit: str, name: str) -> str:
+    return f"limit {numbers.SYMBOL[side]} {numbers.bound(bound, unit, name)}"
+
+
+def _far(label: str) -> Line:
+    """A limit in the legend alone."""
+    return Line(_NONE, _NONE, label=f"{label},\nfar from here", **_LIMIT)
 
 
 # ---------------------------------------------------------------------------------------------------------------- tail
-@rc_context(PLAIN)
 def tail(summary: CampaignSummary, cell: CellSummary) -> tuple[Figure, ...]:
     """How likely a radial error is exceeded: with its band in the cell shown, beside it the other cells."""
     if cell.tail is None or not np.any(cell.tail.survival > 0.0):
         return ()
-    canvas = Canvas(figsize=(WIDTH, 3.8), layout="constrained")
-    axes = canvas.subplots()
+    sheet, (panel,) = sheets.grid(WIDTH, 3.8)
+    sheet.legend = Legend("upper right")
+    panel.x = Axis("radial error (µrad)", low=0.0)
+    panel.y = Axis("probability of a larger one", log=True, low=_floor(cell.tail), high=1.0)
     others = [each.tail for each in summary.cells if each is not cell and each.tail is not None]
-    for k, other in enumerate(others):
-        x, y = _shown(other, other.survival)
-        axes.plot(x, y, color=GREY, linewidth=0.7, label="other combinations" if k == 0 else None)
-    columns = _tail_band(axes, cell)
-    _tail_marks(axes, summary, cell.tail)
-    logarithm(axes, "y")
-    axes.set(xlabel="radial error (µrad)", ylabel="probability of a larger one")
-    axes.set_xlim(left=0.0)
-    axes.set_ylim(_floor(cell.tail), 1.0)
-    canvas.legend(loc="outside right upper", **_SMALL)
+    panel.add(*(Line(*_shown(t, t.survival), GREY, width=0.7, label="other combinations") for t in others))
+    columns = _tail_band(panel, cell)
+    _tail_marks(panel, summary, cell.tail)
     of = f" of {cell.label}" if cell.values else ""
     caption = (
         f"Probability that the radial error{of} exceeds a radius. {words.tail_method(cell.tail)} Shaded: its "
         f"interval at {100.0 * cell.tail.confidence:g} %."
     )
-    return (Figure("campaign-tail", "Tail of the radial error", caption, svg_of(canvas), columns),)
+    return (Figure("campaign-tail", "Tail of the radial error", caption, sheet, columns),)
 
 
 def _shown(tail: Tail, curve: Floats) -> tuple[Floats, Floats]:
@@ -134,32 +167,32 @@ def _shown(tail: Tail, curve: Floats) -> tuple[Floats, Floats]:
     return tail.radius_rad[seen] * 1e6, curve[seen]
 
 
-def _tail_band(axes: Axes, cell: CellSummary) -> dict[str, Floats]:
+def _tail_band(panel: Panel, cell: CellSummary) -> dict[str, Floats]:
     found = cell.tail
     assert found is not None
     x, y = _shown(found, found.survival)
     low, high = (_shown(found, curve)[1] for curve in (found.low, found.high))
-    axes.fill_between(x, np.maximum(low, 1e-300), np.minimum(high, 1.0), color=SKY, alpha=0.5, linewidth=0.0)
-    axes.plot(x, y, color=BLUE, label=textwrap.fill(cell.label, 24) or "all rows")
+    panel.add(between(x, np.maximum(low, 1e-300), np.minimum(high, 1.0), SKY, 0.5))
+    panel.add(Line(x, y, BLUE, label=textwrap.fill(cell.label, 24) or "all rows"))
     names = ("radius (rad)", "probability", "lower end", "upper end")
     return dict(zip(names, (found.radius_rad, found.survival, found.low, found.high), strict=True))
 
 
-def _tail_marks(axes: Axes, summary: CampaignSummary, found: Tail) -> None:
+def _tail_marks(panel: Panel, summary: CampaignSummary, found: Tail) -> None:
     """The radii that were asked for, each with its interval, and the limit of the residual."""
     for (p, radius), (colour, marker) in zip(
         found.wanted.items(), zip(cycle((VERMILION, GREEN, BLACK)), cycle("osD")), strict=False
     ):
         if math.isfinite(radius.value):
-            span = None if not numbers.ends(radius, "rad") else _arms([radius], 1e6)
+            at = np.array([radius.value * 1e6]), np.array([p])
+            arms = _arms([radius], 1e6) if numbers.ends(radius, "rad") else None
             label = f"{numbers.share(p)}: {numbers.value(radius.value, 'rad')}"
-            axes.errorbar(radius.value * 1e6, p, xerr=span, fmt=marker, color=colour, capsize=3, label=label, zorder=4)
+            panel.add(Line(*at, colour, "", label=label, marker=marker, x_arms=arms))
     limits = [limit for limit in summary.limits if limit.most is not None and limit.output.startswith("residual")]
     for bound in sorted({limit.most for limit in limits if limit.most is not None})[:1]:
-        if bound <= 2.0 * float(found.radius_rad[found.survival > 0.0].max()):
-            axes.axvline(bound * 1e6, label=f"limit ≤ {numbers.bound(bound, 'rad')}", **_LIMIT)
-        else:
-            axes.plot([], [], label=f"limit ≤ {numbers.bound(bound, 'rad')},\nfar from here", **_LIMIT)
+        label = _limit_label("most", bound, "rad", "")
+        near = bound <= 2.0 * float(found.radius_rad[found.survival > 0.0].max())
+        panel.add(Rule(bound * 1e6, True, label=label, **_LIMIT) if near else _far(label))
 
 
 def _floor(found: Tail) -> float:
@@ -168,7 +201,7 @@ def _floor(found: Tail) -> float:
     return float(10.0 ** max(math.floor(math.log10(least)) - 0.3, -15.0))
 
 
-def _arms(found: Sequence[Interval], factor: float = 1.0) -> NDArray[np.float64]:
+def _arms(found: Sequence[Interval], factor: float = 1.0) -> Floats:
     """Lengths of error bars (2, n) downwards and upwards; none where an interval is not known."""
     arms = np.array([(i.value - i.low, i.high - i.value) for i in found]).reshape(-1, 2).T
     return np.asarray(np.where(np.isfinite(arms), np.maximum(arms, 0.0), 0.0) * factor)
@@ -180,30 +213,24 @@ def sensitivity(summary: CampaignSummary) -> tuple[Figure, ...]:
     found = [s for s in summary.sensitivities if tables.ranked(s)]
     if not found:
         return ()
-    size = {key: max(dict(tables.ranked(s)).get(key, _NONE).value for s in found) for s in found for key in s.first}
+    size = {key: max(dict(tables.ranked(s)).get(key, _UNRANKED).value for s in found) for s in found for key in s.first}
     keys = sorted(size, key=lambda key: -size[key])
     groups = [found[k : k + _ACROSS] for k in range(0, len(found), _ACROSS)]
-    return tuple(_sensitivity(group, keys, size, k + 1, summary) for k, group in enumerate(groups))
+    return tuple(_sensitivity(group, keys, k + 1, summary) for k, group in enumerate(groups))
 
 
-_NONE = Interval(-math.inf, math.nan, math.nan, 0.0)
+_UNRANKED = Interval(-math.inf, math.nan, math.nan, 0.0)
 
 
-@rc_context(PLAIN)
-def _sensitivity(
-    group: Sequence[Sensitivity], keys: Sequence[str], size: dict[str, float], number: int, summary: CampaignSummary
-) -> Figure:
+def _sensitivity(group: Sequence[Sensitivity], keys: Sequence[str], number: int, summary: CampaignSummary) -> Figure:
     shown = keys[:MOST_INPUTS]
-    canvas = Canvas(figsize=(WIDTH, 1.2 + 0.36 * len(shown)), layout="constrained")
-    panels = canvas.subplots(1, len(group), sharey=True, squeeze=False)[0]
-    for axes, each in zip(panels, group, strict=True):
-        _index_bars(axes, each, shown)
-    panels[0].set_yticks(range(len(shown)), [label_of(key, keys) for key in shown], **_SMALL)
-    panels[0].set_ylim(len(shown) - 0.4, -0.6)
-    handles = {
-        label: handle for axes in panels for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)
-    }
-    canvas.legend(handles.values(), handles.keys(), loc="outside upper right", ncols=2, **_SMALL)
+    sheet, panels = sheets.grid(WIDTH, 1.2 + 0.36 * len(shown), 1, len(group), share_y=True)
+    sheet.legend = Legend("above", 2)
+    for panel, each in zip(panels, group, strict=True):
+        panel.title = short(each.output, 30)
+        panel.x = Axis("index", low=0.0, high=1.05, ticks=(0.0, 0.5, 1.0))
+        panel.y = _rows([label_of(key, keys) for key in shown])
+        panel.add(*_index_bars(each, shown))
     columns = {
         f"{each.output}, {key}, {kind} index": np.array([i.value, i.low, i.high])
         for each in group
@@ -223,30 +250,25 @@ def _sensitivity(
         )
     )
     names = ", ".join(each.output for each in group)
-    return Figure(f"campaign-sensitivity-{number}", f"What matters to {names}", caption, svg_of(canvas), columns)
+    return Figure(f"campaign-sensitivity-{number}", f"What matters to {names}", caption, sheet, columns)
 
 
-def _index_bars(axes: Axes, each: Sensitivity, shown: Sequence[str]) -> None:
+def _rows(texts: Sequence[str]) -> Axis:
+    """An axis with a text at each row, the first on top."""
+    return Axis(low=len(texts) - 0.4, high=-0.6, ticks=dict(enumerate(texts)), grid=False, size=8.0)
+
+
+def _index_bars(each: Sensitivity, shown: Sequence[str]) -> Iterator[Bars | Line]:
     both = (("first order", each.first, BLUE), ("total", each.total, ORANGE))
     drawn = [kind for kind in both if kind[1]]
     high = 0.76 / len(drawn)
     for k, (label, indices, colour) in enumerate(drawn):
         rows = [(row, indices[key]) for row, key in enumerate(shown) if key in indices and _known(indices[key])]
         at = np.array([row for row, _ in rows]) - 0.38 + high * (k + 0.5)
-        values = [max(i.value, 0.0) for _, i in rows]
-        arms = _arms(
-            [
-                Interval(v, max(i.low, 0.0), max(i.high, 0.0), i.confidence)
-                for v, (_, i) in zip(values, rows, strict=True)
-            ]
-        )
-        axes.barh(at, values, height=high, color=colour, label=label)
-        axes.errorbar(values, at, xerr=arms, fmt="none", ecolor=BLACK, elinewidth=0.9, capsize=1.5)
-    axes.set_title(short(each.output, 30), fontsize=9, loc="left")
-    axes.set_xlabel("index")
-    axes.set_xlim(0.0, 1.05)
-    axes.set_xticks([0.0, 0.5, 1.0])
-    axes.grid(visible=False, axis="y")
+        values, low, highest = np.maximum([(i.value, i.low, i.high) for _, i in rows], 0.0).reshape(-1, 3).T
+        yield Bars(at, np.zeros(at.size), values, np.full(at.size, high), colour, label=label)
+        arms = _arms([Interval(*ends, 0.0) for ends in zip(values, low, highest, strict=True)])
+        yield Line(values, at, dash="", label=label, marker=".", size=1.0, x_arms=arms)
 
 
 def _known(interval: Interval) -> bool:
@@ -254,7 +276,6 @@ def _known(interval: Interval) -> bool:
 
 
 # ------------------------------------------------------------------------------------------------------ failure region
-@rc_context(PLAIN)
 def region(summary: CampaignSummary, limit: Limit, number: int, inputs: Sequence[str], note: str = "") -> Figure:
     """Rows of a cell that keep and that miss a limit, over two inputs, or over one with the output beside it.
 
@@ -268,14 +289,14 @@ def region(summary: CampaignSummary, limit: Limit, number: int, inputs: Sequence
     axes_of = [(label_of(key, list(units)), columns[key], units.get(key, "")) for key in inputs]
     if len(inputs) == 1:
         axes_of.append((numbers.label(limit.output), columns[limit.output], output.unit))
-    svg = _scatter(axes_of, limit, columns[limit.output], output, second=len(inputs) == 1)
+    sheet = _scatter(axes_of, limit, columns[limit.output], output, second=len(inputs) == 1)
     of = f" of {cell.label}" if cell.values else ""
     caption = (
         f"{rows.size} rows{of}: those that keep {numbers.limit_text(limit, output.unit)} and those that miss it, over "
         f"{' and '.join(inputs)}{_mattering(summary, limit.output, inputs)}. Of all rows "
         f"{numbers.share(cell.missed_by[limit.output].value)} miss it.{note}"
     )
-    return Figure("campaign-region", f"Where {numbers.label(limit.output)} misses its limit", caption, svg, columns)
+    return Figure("campaign-region", f"Where {numbers.label(limit.output)} misses its limit", caption, sheet, columns)
 
 
 def _mattering(summary: CampaignSummary, output: str, inputs: Sequence[str]) -> str:
@@ -287,31 +308,29 @@ def _mattering(summary: CampaignSummary, output: str, inputs: Sequence[str]) -> 
 
 def _scatter(
     axes_of: Sequence[tuple[str, Floats, str]], limit: Limit, values: Floats, output: OutputSummary, *, second: bool
-) -> str:
-    canvas = Canvas(figsize=(WIDTH, 4.0), layout="constrained")
-    axes = canvas.subplots()
-    scales = [
+) -> Sheet:
+    sheet, (panel,) = sheets.grid(WIDTH, 4.0)
+    sheet.legend = Legend("upper right")
+    scales_ = [
         scale_of(column, unit, limit.output if second and k else "") for k, (_, column, unit) in enumerate(axes_of)
     ]
-    x, y = (column * scale.factor for (_, column, _), scale in zip(axes_of, scales, strict=True))
+    x, y = (column * scale.factor for (_, column, _), scale in zip(axes_of, scales_, strict=True))
     low = -math.inf if limit.least is None else limit.least
     high = math.inf if limit.most is None else limit.most
     failed, missed = np.isnan(values), (values < low) | (values > high)
-    kinds = (("kept", ~(failed | missed), "o", BLUE, 9), ("missed", missed, "x", VERMILION, 22))
-    for label, which, marker, colour, size in (*kinds, ("no results", failed & np.isfinite(y), "^", GREY, 22)):
+    kinds = (("kept", ~(failed | missed), "o", BLUE, 3.0), ("missed", missed, "x", VERMILION, 4.7))
+    for label, which, marker, colour, size in (*kinds, ("no results", failed & np.isfinite(y), "^", GREY, 4.7)):
         if which.any():
-            axes.scatter(x[which], y[which], size, colour, marker=marker, label=label, linewidths=1.0)
+            panel.add(Line(x[which], y[which], colour, "", label=label, marker=marker, size=size))
     if second:
         for side, bound in _bounds(limit):
-            label = f"limit {numbers.SYMBOL[side]} {numbers.bound(bound, output.unit, output.name)}"
-            axes.axhline(bound * scales[1].factor, label=label, **_LIMIT)
-    titles = [scale.title(name.replace("\n", "")) for (name, _, _), scale in zip(axes_of, scales, strict=True)]
-    axes.set(xlabel=titles[0], ylabel=titles[1])
-    for which_axis, (_, column, _) in zip("xy", axes_of, strict=True):
-        if _wide(column):
-            logarithm(axes, which_axis)
-    canvas.legend(loc="outside right upper", **_SMALL)
-    return svg_of(canvas)
+            label = _limit_label(side, bound, output.unit, output.name)
+            panel.add(Rule(bound * scales_[1].factor, False, label=label, **_LIMIT))
+    panel.x, panel.y = (
+        Axis(scale.title(name.replace("\n", "")), log=_wide(column))
+        for (name, column, _), scale in zip(axes_of, scales_, strict=True)
+    )
+    return sheet
 
 
 def _wide(column: Floats) -> bool:
@@ -324,7 +343,7 @@ def _wide(column: Floats) -> bool:
 _WHAT = ("value", "low", "high")
 
 
-class Panel(NamedTuple):
+class Shown(NamedTuple):
     """A number of each cell: its title, the scale, and by cell the interval drawn (nan where there is none)."""
 
     name: str
@@ -332,40 +351,39 @@ class Panel(NamedTuple):
     of: Sequence[Interval]
 
 
-@rc_context(PLAIN)
 def grid(summary: CampaignSummary) -> tuple[Figure, ...]:
     """What the rows come to over the values of the grid: maps for two keys, else a row for each combination."""
     keys = list(dict.fromkeys(key for cell in summary.cells for key in cell.values))
     if not keys or len(summary.cells) < 2:
         return ()
-    panels = list(_panels(summary, summary.cells))
+    shown = list(_shown_cells(summary, summary.cells))
     levels = [list(dict.fromkeys(cell.values[key] for cell in summary.cells)) for key in keys]
     maps = len(keys) == 2 and min(map(len, levels)) > 1 and max(map(len, levels)) <= 12 and min(map(len, levels)) <= 8
-    svg = _maps(summary, keys, levels, panels[:2]) if maps else _dots(summary, keys, panels)
-    columns = {f"{p.name}, {what}": np.array([getattr(i, what) for i in p.of]) for p in panels for what in _WHAT}
-    shown = (
+    sheet = _maps(summary, keys, levels, shown[:2]) if maps else _dots(summary, keys, shown)
+    columns = {f"{p.name}, {what}": np.array([getattr(i, what) for i in p.of]) for p in shown for what in _WHAT}
+    drawn = (
         "a number in each field"
         if maps
         else "bars: intervals of a share, else from the known quantiles nearest to 1 % and 99 %, or of all values"
     )
-    caption = f"Over {' and '.join(keys)}: {', '.join(p.name for p in panels[: 2 if maps else None])}; {shown}."
+    caption = f"Over {' and '.join(keys)}: {', '.join(p.name for p in shown[: 2 if maps else None])}; {drawn}."
     if not maps and len(summary.cells) > MOST_CELLS:
         caption += f" The first {MOST_CELLS} of {len(summary.cells)} combinations."
-    return (Figure("campaign-grid", "Over the grid", caption, svg, columns),)
+    return (Figure("campaign-grid", "Over the grid", caption, sheet, columns),)
 
 
-def _panels(summary: CampaignSummary, cells: Sequence[CellSummary]) -> Iterator[Panel]:
+def _shown_cells(summary: CampaignSummary, cells: Sequence[CellSummary]) -> Iterator[Shown]:
     """The share of rows that miss a limit, and medians of the outputs that have one, of two others where none has."""
     limited = [limit.output for limit in summary.limits]
     unknown = Interval(math.nan, math.nan, math.nan, 0.0)
     if limited:
         missed = [cell.missed if tables.good(cell) else unknown for cell in cells]
-        yield Panel("rows that miss a limit", Scale(100.0, "%"), missed)
+        yield Shown("rows that miss a limit", Scale(100.0, "%"), missed)
     names = [name for name in dict.fromkeys(limited) if any(name in cell.outputs for cell in cells)]
     for name in (names or list(dict.fromkeys(o for cell in cells for o in cell.outputs)))[: _ACROSS - bool(limited)]:
         spans = [_span(cell.outputs[name]) if name in cell.outputs else unknown for cell in cells]
         every = np.array([[getattr(span, what) for what in _WHAT] for span in spans])
-        yield Panel(f"median {numbers.label(name)}", scale_of(every, tables.unit_of(summary, name), name), spans)
+        yield Shown(f"median {numbers.label(name)}", scale_of(every, tables.unit_of(summary, name), name), spans)
 
 
 def _span(output: OutputSummary) -> Interval:
@@ -383,92 +401,88 @@ def _span(output: OutputSummary) -> Interval:
     return Interval(output.quantiles[0.5].value, first, last, 0.98)
 
 
-def _dots(summary: CampaignSummary, keys: Sequence[str], panels: Sequence[Panel]) -> str:
+def _dots(summary: CampaignSummary, keys: Sequence[str], shown: Sequence[Shown]) -> Sheet:
     cells = summary.cells[:MOST_CELLS]
-    rows = np.arange(len(cells))
-    canvas = Canvas(figsize=(WIDTH, 1.0 + 0.24 * len(cells)), layout="constrained")
-    for axes, panel in zip(canvas.subplots(1, len(panels), sharey=True, squeeze=False)[0], panels, strict=True):
-        found = panel.of[: len(cells)]
-        values = np.array([i.value for i in found]) * panel.scale.factor
-        arms = _arms(found, panel.scale.factor)
-        axes.errorbar(values, rows, xerr=arms, fmt="o", color=BLUE, capsize=2, markersize=4.5)
-        _limit_line(axes, summary, panel)
-        axes.set_xlabel("\n".join(textwrap.wrap(panel.scale.title(panel.name), 28)))
-        axes.grid(visible=True, axis="x")
-        axes.set_yticks(rows, [short(", ".join(cell.values.values()), 34) for cell in cells])
-        axes.set_ylim(len(cells) - 0.4, -0.6)
-    canvas.suptitle(short(", ".join(label_of(key, keys) for key in keys), 90), x=0.01, ha="left", fontsize=9)
-    return svg_of(canvas)
+    rows = np.arange(len(cells), dtype=np.float64)
+    sheet, panels = sheets.grid(WIDTH, 1.0 + 0.24 * len(cells), 1, len(shown), share_y=True)
+    sheet.heading, sheet.heading_at_left = short(", ".join(label_of(key, keys) for key in keys), 90), True
+    for panel, each in zip(panels, shown, strict=True):
+        found = each.of[: len(cells)]
+        values = np.array([i.value for i in found]) * each.scale.factor
+        arms = _arms(found, each.scale.factor)
+        panel.x = Axis("\n".join(textwrap.wrap(each.scale.title(each.name), 28)))
+        panel.y = _rows([short(", ".join(cell.values.values()), 34) for cell in cells])
+        panel.add(Line(values, rows, BLUE, "", marker="o", size=4.5, x_arms=arms))
+        panel.add(*_limit_lines(panel, summary, each))
+    return sheet
 
 
-def _limit_line(axes: Axes, summary: CampaignSummary, panel: Panel) -> None:
-    """The limit of the output of a panel, where it is near what is drawn."""
-    low, high = axes.get_xlim()
+def _limit_lines(panel: Panel, summary: CampaignSummary, each: Shown) -> list[Rule]:
+    """The limits of the output of a panel that are near what is drawn."""
+    low, high = scales.limits(panel.x, "x", [panel])
     named = {f"median {numbers.label(limit.output)}": limit for limit in summary.limits}
-    limit = named.get(panel.name)
-    for _, bound in _bounds(limit):
-        if low - (high - low) <= bound * panel.scale.factor <= high + (high - low):
-            axes.axvline(bound * panel.scale.factor, **_LIMIT)
+    bounds = [bound * each.scale.factor for _, bound in _bounds(named.get(each.name))]
+    return [Rule(at, True, **_LIMIT) for at in bounds if 2.0 * low - high <= at <= 2.0 * high - low]
 
 
 def _maps(
-    summary: CampaignSummary, keys: Sequence[str], levels: Sequence[Sequence[str]], panels: Sequence[Panel]
-) -> str:
+    summary: CampaignSummary, keys: Sequence[str], levels: Sequence[Sequence[str]], shown: Sequence[Shown]
+) -> Sheet:
     across = 0 if len(levels[0]) < len(levels[1]) else 1
     down = 1 - across
-    canvas = Canvas(figsize=(WIDTH, 1.2 + 0.32 * max(len(levels[down]), 3)), layout="constrained")
-    for number, (axes, panel) in enumerate(
-        zip(canvas.subplots(1, len(panels), sharey=True, squeeze=False)[0], panels, strict=True)
-    ):
-        field = np.full((len(levels[down]), len(levels[across])), np.nan)
-        for cell, found in zip(summary.cells, panel.of, strict=True):
+    sheet, panels = sheets.grid(WIDTH, 1.2 + 0.32 * max(len(levels[down]), 3), 1, len(shown), share_y=True)
+    for panel, each in zip(panels, shown, strict=True):
+        values = np.full((len(levels[down]), len(levels[across])), np.nan)
+        for cell, found in zip(summary.cells, each.of, strict=True):
             at = levels[down].index(cell.values[keys[down]]), levels[across].index(cell.values[keys[across]])
-            field[at] = found.value * panel.scale.factor
-        _field(axes, field)
-        axes.set_title(panel.scale.title(panel.name), fontsize=9, loc="left")
-        axes.set_xticks(range(len(levels[across])), [short(text, 12) for text in levels[across]], **_SMALL)
-        axes.set_xlabel(label_of(keys[across], keys).replace("\n", ""))
-        if number == 0:
-            axes.set_yticks(range(len(levels[down])), [short(text, 24) for text in levels[down]], **_SMALL)
-            axes.set_ylabel(label_of(keys[down], keys))
-    return svg_of(canvas)
+            values[at] = found.value * each.scale.factor
+        panel.title, panel.face = each.scale.title(each.name), "#dddddd"
+        panel.x = _steps(label_of(keys[across], keys).replace("\n", ""), levels[across], 12)
+        panel.y = _steps(label_of(keys[down], keys), levels[down], 24)
+        panel.y.low, panel.y.high = len(levels[down]) - 0.5, -0.5  # the first on top
+        panel.add(*_numbered(values))
+    return sheet
 
 
-def _field(axes: Axes, field: Floats) -> None:
-    """Coloured fields with their number in each; hatched grey where there is none."""
-    known = field[np.isfinite(field)]
+def _steps(title: str, levels: Sequence[str], most: int) -> Axis:
+    """An axis with a text at each step."""
+    return Axis(title, ticks={k: short(text, most) for k, text in enumerate(levels)}, grid=False, size=8.0)
+
+
+def _numbered(values: Floats) -> Iterator[Field | Words]:
+    """Coloured fields with their number in each; grey where there is none."""
+    known = values[np.isfinite(values)]
     low, high = (float(known.min()), float(known.max())) if known.size else (0.0, 1.0)
-    axes.set_facecolor("#dddddd")
-    axes.imshow(field, cmap="cividis", aspect="auto", vmin=low, vmax=high if high > low else low + 1.0)
-    for (row, column), number in np.ndenumerate(field):
-        dark = math.isfinite(number) and number < 0.5 * (low + high if high > low else 2.0 * low + 1.0)
-        shown = f"{number:.3g}" if math.isfinite(number) else "none"
-        axes.text(column, row, shown, ha="center", va="center", color="white" if dark else "black", fontsize=8)
-    axes.grid(visible=False)
+    high = high if high > low else low + 1.0
+    y, x = (np.arange(n, dtype=np.float64) for n in values.shape)
+    yield Field(x, y, values, low, high)
+    for (row, column), number in np.ndenumerate(values):
+        known_ = math.isfinite(number)
+        tint = WHITE if known_ and number < 0.5 * (low + high) else BLACK
+        yield Words(f"{number:.3g}" if known_ else "none", column, row, tint, anchor="middle")
 
 
 # --------------------------------------------------------------------------------------------------------------- worst
-@rc_context(PLAIN)
 def worst(summary: CampaignSummary, trace: WorstTrace, number: int) -> Figure:
     """The ``number``-th worst row, from 1: radial error and drive over time."""
-    canvas = Canvas(figsize=(WIDTH, 3.4), layout="constrained")
-    above, below = canvas.subplots(2, 1, sharex=True, height_ratios=(1.3, 1))
+    sheet, (above, below) = sheets.grid(WIDTH, 3.4, 2, share_x=True)
+    sheet.heights = (1.3, 1.0)
     error = np.reshape(trace.error_rad, (trace.time_s.size, -1))
     radial = np.hypot.reduce(error, axis=1) if error.shape[1] > 1 else np.abs(error[:, 0])
     rest = float(radial[radial.size // 20 :].max())
     cut = radial.max() > 3.0 * rest > 0.0  # where the loop only closes, nothing else could be seen
     scale = scale_of(np.array([rest if cut else radial.max()]), "rad")
-    above.plot(*thin(trace.time_s, radial * scale.factor), color=BLUE, linewidth=0.8)
-    above.set(ylabel=scale.title("radial error"), xlim=(trace.time_s[0], trace.time_s[-1]))
-    above.set_ylim(0.0, 1.1 * rest * scale.factor if cut else None)
+    below.x = Axis("time (s)", low=float(trace.time_s[0]), high=float(trace.time_s[-1]))
+    above.x = replace(below.x, title="")
+    above.y = Axis(scale.title("radial error"), low=0.0, high=1.1 * rest * scale.factor if cut else None)
+    above.add(Line(trace.time_s, radial * scale.factor, BLUE, width=0.8))
     columns = {"time (s)": trace.time_s, "radial error (rad)": radial}
     drive = np.reshape(trace.drive_v, (trace.time_s.size, -1))
     for k, (column, colour) in enumerate(zip(drive.T, (BLUE, ORANGE, GREEN, SKY), strict=False)):
-        below.plot(*thin(trace.time_s, column), color=colour, linewidth=0.8, label=f"drive {k + 1}")
+        below.add(Line(trace.time_s, column, colour, width=0.8, label=f"drive {k + 1}"))
         columns[f"drive {k + 1} (V)"] = column
-    below.set(xlabel="time (s)", ylabel="drive (V)")
-    if drive.shape[1] > 1:
-        canvas.legend(*below.get_legend_handles_labels(), loc="outside right lower", **_SMALL)
+    below.y = Axis("drive (V)")
+    sheet.legend = Legend("lower right") if drive.shape[1] > 1 else None
     cell, unit = summary.cells[trace.cell], tables.unit_of(summary, trace.output)
     of = f" of {cell.label}" if cell.values else ""
     found = numbers.value(trace.value, unit, trace.output)
@@ -479,7 +493,7 @@ def worst(summary: CampaignSummary, trace: WorstTrace, number: int) -> Figure:
         f"campaign-worst-{trace.cell + 1}-{number}",
         f"{_rank(number).capitalize()}row in time",
         caption,
-        svg_of(canvas),
+        sheet,
         columns,
     )
 

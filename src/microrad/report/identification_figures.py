@@ -1,57 +1,59 @@
-"""The figures of an identification: excitation, response, poles, loops, time responses and residuals, each an SVG.
+"""The figures of an identification: excitation, response, poles, loops, time responses and residuals, as data.
 
 Measured is blue (light where the fit saw it), modelled is vermilion and dashed, everywhere.
 """
 
 import itertools
 import math
-import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib import rc_context
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure as Canvas
-from matplotlib.ticker import LogFormatter
-from numpy.typing import NDArray
 
 from microrad.core.arrays import Floats
-from microrad.core.threads import shared_out
 from microrad.lab.identify import Identification
 from microrad.lab.identify.ladder.predictions import Prediction
 from microrad.lab.identify.ladder.roles import roles
 from microrad.lab.identify.linear.fit import LinearFit, fit_percent, output_error
 from microrad.lab.recording import Recording
 from microrad.report import identification_words as words
-from microrad.report.figures import BLACK, BLUE, GREEN, ORANGE, SKY, STYLE, VERMILION, Figure, svg_of, thin
+from microrad.report.plotting.figure import Figure
+from microrad.report.plotting.sheet import (
+    BLACK,
+    BLUE,
+    GREEN,
+    ORANGE,
+    SKY,
+    VERMILION,
+    Axis,
+    Legend,
+    Line,
+    Panel,
+    Rule,
+    Sheet,
+    Span,
+    between,
+    grid,
+    segments,
+)
 
 MOST_RECORDINGS = 12  # drawn, a row each
 VIRTUAL = "virtual bench"
-_SPECTRUM_POINTS = 500
+_WIDTH = 8.2
+_SPECTRUM_POINTS = 400  # strokes of three points, all of which are drawn
 _SPECTRUM_FLOOR = 1e-5  # of the strongest line
 _PAPER_LOOPS_HZ = {60, 80, 100}
 _ZOOM_SAMPLES = 300
 _MOST_RESPONSES = 3
 _MOST_CROSSINGS = 40
-_LOOP_POINTS = 1800
 _LEVEL_BANDS = 60
 
-_FITTED: dict[str, Any] = {"color": SKY, "linewidth": 2.0}
-_UNSEEN: dict[str, Any] = {"color": BLUE, "linewidth": 2.0}
-_MODEL: dict[str, Any] = {"color": VERMILION, "linestyle": "--", "linewidth": 1.0}
-
-
-@dataclass(frozen=True, slots=True)
-class Drawing:
-    """A figure before it becomes text."""
-
-    canvas: Canvas
-    title: str
-    caption: str
+_FITTED: dict[str, Any] = {"colour": SKY, "width": 2.0, "label": "measured, fitted"}
+_UNSEEN: dict[str, Any] = {"colour": BLUE, "width": 2.0, "label": "measured, unseen by the fit"}
+_MODEL: dict[str, Any] = {"colour": VERMILION, "dash": "--", "width": 1.0, "label": "modelled"}
+_DOTS: dict[str, Any] = {"colour": BLUE, "dash": "", "marker": ".", "size": 4.5}
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,30 +77,18 @@ class Shown:
 def draw(found: Identification, recordings: Sequence[Recording], *, virtual: bool = False) -> dict[str, Figure]:
     """All figures by name. `recordings` are those given to `identify`, of which `found` keeps no broadband ones."""
     everything = shown(found, recordings)
-    makers: dict[str, Callable[[], Drawing | None]] = {
-        "excitation": lambda: excitation(everything, found),
-        "response": lambda: response(found.linear) if found.linear else None,
-        "poles": lambda: poles(found.linear) if found.linear else None,
-        "loops": lambda: loops(everything, found),
-        "time": lambda: time_response(found, recordings) if found.linear else None,
-        "residuals": lambda: residuals(everything),
-        "tests": lambda: residual_tests(found),
-    }
-    with rc_context({**STYLE, "path.simplify_threshold": 0.2}), warnings.catch_warnings():
-        warnings.filterwarnings("ignore", message="Glyph")  # of a file name: the page's reader has the glyph
-        with shared_out([partial(_figure, name, maker, virtual) for name, maker in makers.items()]) as figures:
-            return {figure.name: figure for figure in figures() if figure is not None}
+    figures = [excitation(everything, found)]
+    if found.linear is not None:
+        figures += [response(found.linear), poles(found.linear)]
+    timed = time_response(found, recordings)
+    figures += [loops(everything, found), *([timed] if timed else []), residuals(everything), residual_tests(found)]
+    return {figure.name: _virtual(figure) if virtual else figure for figure in figures}
 
 
-def _figure(name: str, maker: Callable[[], Drawing | None], virtual: bool) -> Figure | None:
-    """The finished figure; of the virtual bench it says so in the picture too, which may be copied by itself."""
-    drawing = maker()
-    if drawing is None:
-        return None
-    if virtual:
-        drawing.canvas.suptitle(VIRTUAL, x=0.995, horizontalalignment="right", fontsize=8, color=VERMILION)
-    title = f"{drawing.title} ({VIRTUAL})" if virtual else drawing.title
-    return Figure(name, title, drawing.caption, svg_of(drawing.canvas), {})
+def _virtual(figure: Figure) -> Figure:
+    """The figure that says where it comes from in the picture too, which may be copied by itself."""
+    sheet = replace(figure.sheet, heading=VIRTUAL, heading_colour=VERMILION)
+    return replace(figure, title=f"{figure.title} ({VIRTUAL})", sheet=sheet)
 
 
 def shown(found: Identification, recordings: Sequence[Recording]) -> list[Shown]:
@@ -128,49 +118,38 @@ def _short(path: str) -> str:
     return name if len(name) <= 36 else f"{name[:20]}…{name[-15:]}"
 
 
-def _title(axes: Axes, text: str) -> None:
-    axes.set_title(text, fontsize=9, loc="left", parse_math=False)  # a name may hold a dollar sign
-
-
-def _panels(rows: int, columns: int, height: float) -> tuple[Canvas, Any]:
-    canvas = Canvas(figsize=(8.2, 0.5 + height * rows), layout="constrained")
-    return canvas, canvas.subplots(rows, columns, squeeze=False)
-
-
 def _not_drawn(everything: Sequence[Shown]) -> str:
     left = len(everything) - MOST_RECORDINGS
     return f" {left} more recordings are not drawn." if left > 0 else ""
 
 
 # ------------------------------------------------------------------------------------------------------- excitation
-def excitation(everything: Sequence[Shown], found: Identification) -> Drawing:
+def excitation(everything: Sequence[Shown], found: Identification) -> Figure:
     """Drive against time, and its spectrum, a row for each recording."""
     drawn = everything[:MOST_RECORDINGS]
-    canvas, axes = _panels(len(drawn), 2, 1.7)
-    for (left, right), one in zip(axes, drawn, strict=True):
-        left.plot(*thin(one.time_s, one.drive_v), color=BLACK, linewidth=0.7)
-        left.set(xlabel="time (s)", ylabel="drive (V)")
-        _title(left, f"{one.name} ({one.role})")
+    sheet, panels = grid(_WIDTH, 0.5 + 1.7 * len(drawn), len(drawn), 2)
+    for left, right, one in zip(panels[::2], panels[1::2], drawn, strict=True):
+        left.x, left.y, left.title = Axis("time (s)", most=7), Axis("drive (V)"), f"{one.name} ({one.role})"
+        left.add(Line(one.time_s, one.drive_v, width=0.7))
         freq, amplitude = amplitude_spectrum(one.drive_v, one.rate_hz)
-        shown_lines = amplitude > _SPECTRUM_FLOOR * amplitude.max()
-        right.vlines(freq[shown_lines], _SPECTRUM_FLOOR * amplitude.max(), amplitude[shown_lines], BLACK, linewidth=0.8)
-        right.set(xscale="log", yscale="log", xlabel="frequency (Hz)", ylabel="amplitude (V)")
-        right.set_ylim(bottom=_SPECTRUM_FLOOR * amplitude.max())
-        right.set_xlim(freq[0], freq[-1])
-        left.locator_params(axis="x", nbins=7)
+        floor = _SPECTRUM_FLOOR * float(amplitude.max())
+        seen = amplitude > floor
+        right.x = Axis("frequency (Hz)", log=True, low=float(freq[0]), high=float(freq[-1]))
+        right.y = Axis("amplitude (V)", log=True, low=floor)
         if one.role == "broadband" and found.linear is not None:
-            right.axvspan(*found.linear.excited_hz, color=SKY, alpha=0.3, linewidth=0)
+            right.add(Span(*found.linear.excited_hz, True, SKY))
         elif one.sine is not None:
-            _title(right, f"{one.sine.freq_hz:.4g} Hz")
+            right.title = f"{one.sine.freq_hz:.4g} Hz"
+        right.add(segments(freq[seen], floor, amplitude[seen], BLACK, 0.8))
     caption = (
         "Drive of each recording, and the amplitude of its spectral lines (the strongest of those that fall on one "
         "point). Shaded: the band that counts as excited for the linear part." + _not_drawn(everything)
     )
-    return Drawing(canvas, "Excitation", caption)
+    return Figure("excitation", "Excitation", caption, sheet, {})
 
 
 def amplitude_spectrum(signal: Floats, rate_hz: float) -> tuple[Floats, Floats]:
-    """Amplitude of the lines of a signal about its mean, the largest of each of at most 500 logarithmic bins."""
+    """Amplitude of the lines of a signal about its mean, the largest of each of at most 400 logarithmic bins."""
     size = 2 * np.abs(np.fft.rfft(signal - signal.mean()))[1:] / signal.size
     freq = np.arange(1, size.size + 1) * (rate_hz / signal.size)
     edges = np.unique(np.geomspace(1, size.size, _SPECTRUM_POINTS).astype(int)) - 1
@@ -179,7 +158,7 @@ def amplitude_spectrum(signal: Floats, rate_hz: float) -> tuple[Floats, Floats]:
 
 
 # --------------------------------------------------------------------------------------------------------- response
-def response(linear: LinearFit) -> Drawing:
+def response(linear: LinearFit) -> Figure:
     """Measured response with its confidence, the linear model on top, levels of what disturbs it, coherence."""
     found = linear.response
     freq = found.freq_hz
@@ -187,52 +166,58 @@ def response(linear: LinearFit) -> Drawing:
     model = measured - linear.residual[:, 0, 0] * 1e6
     # 95 % of one component of a complex value whose mean squared distance is the square of the error.
     half = 1.96 / math.sqrt(2.0) * error
-    canvas = Canvas(figsize=(8.2, 8.4), layout="constrained")
-    size, phase, levels, coherence = canvas.subplots(4, 1, sharex=True, height_ratios=(3, 2, 2.4, 1.2))
+    sheet, panels = grid(_WIDTH, 8.4, 4, share_x=True)
+    sheet.heights = (3.0, 2.0, 2.4, 1.2)
+    size, phase, levels, coherence = panels
+    for panel in panels:
+        panel.x.log = True
     magnitude = np.abs(measured)
-    size.fill_between(freq, np.maximum(magnitude - half, 1e-3 * magnitude), magnitude + half, color=SKY, alpha=0.6,
-                      linewidth=0, label="95 % confidence")  # fmt: skip
-    size.plot(freq, magnitude, ".", color=BLUE, markersize=2.5, label="measured")
-    size.plot(freq, np.abs(model), label=f"linear model, order {linear.order}", **{**_MODEL, "linewidth": 1.4})
-    size.set(xscale="log", yscale="log", ylabel="gain (µrad/V)")
-    for axis_format in (size.yaxis.set_major_formatter, size.yaxis.set_minor_formatter):
-        axis_format(LogFormatter(minor_thresholds=(2.0, 0.5)))  # 60, not 6 × 10¹
+    low = np.maximum(magnitude - half, 1e-3 * magnitude)
+    modelled = {**_MODEL, "width": 1.4, "label": f"linear model, order {linear.order}"}
+    size.add(
+        between(freq, low, magnitude + half, SKY, 0.6, "95 % confidence"),
+        Line(freq, magnitude, label="measured", **_DOTS),
+        Line(freq, np.abs(model), **modelled),
+    )
+    size.y = Axis("gain (µrad/V)", log=True)
     turn = np.degrees(np.unwrap(np.angle(model)))
-    off = np.degrees(np.angle(measured / np.where(model == 0, 1.0, model)))
+    off = turn + np.degrees(np.angle(measured / np.where(model == 0, 1.0, model)))
     spread = np.degrees(np.arcsin(np.minimum(half / np.maximum(magnitude, 1e-300), 1.0)))
-    phase.fill_between(freq, turn + off - spread, turn + off + spread, color=SKY, alpha=0.6, linewidth=0)
-    phase.plot(freq, turn + off, ".", color=BLUE, markersize=2.5)
-    phase.plot(freq, turn, **{**_MODEL, "linewidth": 1.4})
-    phase.set(ylabel="phase (°)")
-    low, high = float(np.min(turn + off)), float(np.max(turn + off))
-    phase.set_ylim(min(low, float(turn.min())) - 20, max(high, float(turn.max())) + 20)
-    _levels(levels, linear)
-    coherence.plot(freq, found.coherence[:, 0], ".", color=BLUE, markersize=2.5)
-    coherence.set(ylim=(min(0.9, float(np.min(found.coherence)) - 0.02), 1.01), ylabel="coherence (1)")
-    coherence.set_xlabel("frequency (Hz)")
-    for axes in (size, levels):
-        axes.legend(fontsize=8, loc="best", markerscale=3)
+    phase.add(between(freq, off - spread, off + spread, SKY, 0.6))
+    phase.add(Line(freq, off, **_DOTS), Line(freq, turn, **{**modelled, "label": ""}))
+    both = np.concatenate([turn, off])
+    phase.y = Axis("phase (°)", low=float(both.min()) - 20.0, high=float(both.max()) + 20.0)
+    levels.add(*_levels(linear))
+    levels.y = Axis("level (µrad/V)", log=True)
+    coherence.add(Line(freq, found.coherence[:, 0], **_DOTS))
+    coherence.y = Axis("coherence (1)", low=min(0.9, float(np.min(found.coherence)) - 0.02), high=1.01)
+    coherence.x.title = "frequency (Hz)"
+    size.legend = levels.legend = Legend("best")
     caption = (
         f"Frequency response without a model ({found.method}) and the linear model behind the same {linear.hold} hold. "
         "Below: what the model leaves at each frequency, and as rms over bands one standard error of the response with "
         "the parts of it that are noise and nonlinear distortion, where the recordings tell them apart."
     )
-    return Drawing(canvas, "Frequency response of the linear part", caption)
+    return Figure("response", "Frequency response of the linear part", caption, sheet, {})
 
 
-def _levels(axes: Axes, linear: LinearFit) -> None:
+def _levels(linear: LinearFit) -> list[Line]:
+    """What the model leaves, and the errors of the response as rms over bands."""
     found = linear.response
-    lines: list[tuple[str, Floats | None, dict[str, Any]]] = [
-        ("standard error", found.standard_error, {"color": BLACK}),
-        ("noise", found.noise_standard_error, {"color": GREEN, "linestyle": "-."}),
-        ("nonlinear distortion", found.distortion_standard_error, {"color": BLUE, "linestyle": ":"}),
-    ]
+    errors = (
+        ("standard error", found.standard_error, BLACK, "-"),
+        ("noise", found.noise_standard_error, GREEN, "-."),
+        ("nonlinear distortion", found.distortion_standard_error, BLUE, ":"),
+    )
     left = np.abs(linear.residual[:, 0, 0]) * 1e6
-    axes.plot(found.freq_hz, left, ".", color=ORANGE, markersize=2.0, label="measured less modelled")
-    for label, values, style in lines:
-        if values is not None:
-            axes.plot(*banded_rms(found.freq_hz, values[:, 0, 0] * 1e6), label=label, linewidth=1.6, **style)
-    axes.set(yscale="log", ylabel="level (µrad/V)")
+    return [
+        Line(found.freq_hz, left, ORANGE, "", label="measured less modelled", marker=".", size=4.0),
+        *(
+            Line(*banded_rms(found.freq_hz, values[:, 0, 0] * 1e6), colour, dash, 1.6, label)
+            for label, values, colour, dash in errors
+            if values is not None
+        ),
+    ]
 
 
 def banded_rms(freq_hz: Floats, level: Floats) -> tuple[Floats, Floats]:
@@ -247,54 +232,41 @@ def banded_rms(freq_hz: Floats, level: Floats) -> tuple[Floats, Floats]:
 
 
 # ------------------------------------------------------------------------------------------------------------ poles
-def poles(linear: LinearFit) -> Drawing:
+def poles(linear: LinearFit) -> Figure:
     """Poles and zeros with their standard errors: damping against natural frequency."""
-    canvas = Canvas(figsize=(8.2, 3.4), layout="constrained")
-    axes = canvas.subplots()
+    sheet, (panel,) = grid(_WIDTH, 3.4)
     low, high = linear.excited_hz
-    axes.axvspan(low, high, color=SKY, alpha=0.2, linewidth=0, label="excited band")
-    found = words.roots(linear)
-    freq = np.array([root.freq_hz for root in found if root.freq_hz > 0.0])
+    panel.add(Span(low, high, True, SKY, 0.2, "excited band"))
+    found = [root for root in words.roots(linear) if root.freq_hz > 0.0]
+    freq = [root.freq_hz for root in found]
     for kind, mark, colour in (("pole", "x", VERMILION), ("zero", "o", BLUE)):
-        here = [root for root in found if root.kind == kind and root.freq_hz > 0.0]
+        here = [root for root in found if root.kind == kind]
         if not here:
             continue
-        x = np.array([root.freq_hz for root in here])
-        wide = np.array([root.freq_error_hz for root in here])
-        errors = np.stack([np.minimum(wide, 0.9 * x), wide])
-        axes.errorbar(
-            x,
-            [root.damping for root in here],
-            yerr=[root.damping_error for root in here],
-            xerr=errors,
-            label=f"{kind}s",
-            capsize=3,
-            markersize=8,
-            markerfacecolor="none",
-            fmt=mark,
-            color=colour,
-        )
-    axes.axhline(0.0, color=BLACK, linewidth=0.7)
-    axes.set(xscale="log", xlabel="natural frequency (Hz)", ylabel="damping ratio (1)")
-    axes.set_xlim(0.3 * min(low, *freq), 3.0 * max(high, *freq))
-    axes.legend(fontsize=8, loc="best")
+        rows = [(root.freq_hz, root.damping, root.freq_error_hz, root.damping_error) for root in here]
+        x, y, wide, tall = np.array(rows).T
+        arms = {"x_arms": np.stack([np.minimum(wide, 0.9 * x), wide]), "y_arms": np.stack([tall, tall])}
+        panel.add(Line(x, y, colour, "", label=f"{kind}s", marker=mark, size=8.0, face="", **arms))
+    panel.add(Rule(0.0, False, width=0.7))
+    panel.x = Axis("natural frequency (Hz)", log=True, low=0.3 * min(low, *freq), high=3.0 * max(high, *freq))
+    panel.y, panel.legend = Axis("damping ratio (1)"), Legend("above", 3)
     caption = (
         "Poles and zeros with one standard error. A damping of 1 is a real one; zeros below 0 lie in the right half "
         "plane. What lies outside the shaded band is extrapolated."
     )
-    return Drawing(canvas, "Poles and zeros of the linear part", caption)
+    return Figure("poles", "Poles and zeros of the linear part", caption, sheet, {})
 
 
 # ------------------------------------------------------------------------------------------------------------ loops
-def loops(everything: Sequence[Shown], found: Identification) -> Drawing:
+def loops(everything: Sequence[Shown], found: Identification) -> Figure:
     """Output over drive, measured and modelled, and what a straight line leaves of both, a row for each recording."""
     judged = [one for one in everything if one.prediction is not None]
     drawn = judged[:MOST_RECORDINGS]
-    canvas, axes = _panels(len(drawn), 2, 2.5)
-    for (left, right), one in zip(axes, drawn, strict=True):
+    sheet, panels = grid(_WIDTH, 0.5 + 2.5 * len(drawn), len(drawn), 2)
+    sheet.legend = Legend("above", 3)
+    for left, right, one in zip(panels[::2], panels[1::2], drawn, strict=True):
         assert one.prediction is not None
         _loop(left, right, one, one.prediction)
-    _legend(canvas, any(one.prediction.split < one.drive_v.size for one in drawn if one.prediction))
     caption = (
         f"Measured against modelled by {found.chosen}. Right: the same less the straight line that fits the measured "
         "output of that recording best, which leaves the hysteresis, and at high frequency the phase lag with it. Of a "
@@ -305,28 +277,27 @@ def loops(everything: Sequence[Shown], found: Identification) -> Drawing:
     rounded = {round(one.sine.freq_hz) for one in judged if one.sine is not None}
     if rounded >= _PAPER_LOOPS_HZ:
         title = "Fig. 5  Rate-dependent hysteresis, measured against modelled"
-    return Drawing(canvas, title, caption)
+    return Figure("loops", title, caption, sheet, {})
 
 
-def _loop(left: Axes, right: Axes, one: Shown, prediction: Prediction) -> None:
+def _loop(left: Panel, right: Panel, one: Shown, prediction: Prediction) -> None:
     used = slice(prediction.start, None)
     slope, offset = np.polyfit(one.drive_v[used], prediction.measured_rad[used], 1)
     line = slope * one.drive_v + offset
     measured, model = prediction.measured_rad - line, prediction.model_rad - line
     parts = (slice(prediction.start, prediction.split), slice(prediction.split, one.drive_v.size))
-    picks = [_picks(_stretch(one, part), (one.drive_v, measured, model)) for part in parts]
-    for axes, level, scale in ((left, line - offset, 1e3), (right, 0.0 * line, 1e6)):
-        for pick, style in zip(picks, (_FITTED, _UNSEEN), strict=True):
-            _curve(axes, one.drive_v[pick], scale * (measured + level)[pick], style)
-        for pick in picks:
-            _curve(axes, one.drive_v[pick], scale * (model + level)[pick], _MODEL)
-    left.set(xlabel="drive (V)", ylabel="output (mrad)")
-    right.set(xlabel="drive (V)", ylabel="output less line (µrad)")
-    _title(left, one.name + ("" if one.role == "loops" else f" ({one.role})"))
+    drawn = [(_stretch(one, part), style) for part, style in zip(parts, (_FITTED, _UNSEEN), strict=True)]
+    drawn = [(part, style) for part, style in drawn if part.stop > part.start]
+    for panel, level, scale in ((left, line - offset, 1e3), (right, 0.0 * line, 1e6)):
+        panel.add(*(Line(one.drive_v[part], scale * (measured + level)[part], **style) for part, style in drawn))
+        panel.add(*(Line(one.drive_v[part], scale * (model + level)[part], **_MODEL) for part, _ in drawn))
+    left.x, left.y = Axis("drive (V)"), Axis("output (mrad)")
+    right.x, right.y = Axis("drive (V)"), Axis("output less line (µrad)")
+    left.title = one.name + ("" if one.role == "loops" else f" ({one.role})")
     fitted, unseen = words.split_errors(prediction)
     driven = "many frequencies" if one.sine is None else f"{one.sine.freq_hz:.3g} Hz, ± {one.sine.amplitude_v:.3g} V"
     error = f"unseen {1e6 * unseen:.3g} µrad rms" if math.isfinite(unseen) else f"fitted {1e6 * fitted:.3g} µrad rms"
-    _title(right, f"{driven}: {error}")
+    right.title = f"{driven}: {error}"
 
 
 def _stretch(one: Shown, part: slice) -> slice:
@@ -346,34 +317,8 @@ def _stretch(one: Shown, part: slice) -> slice:
     return slice(part.stop - kept, part.stop)
 
 
-def _picks(part: slice, curves: Sequence[Floats]) -> NDArray[np.intp]:
-    """Samples to draw of curves over each other: the same of all, with the extremes of each in every stretch."""
-    size = part.stop - part.start
-    stretch = size // (_LOOP_POINTS // (2 * len(curves)))
-    if stretch < 2 * len(curves):
-        return np.arange(part.start, part.stop)
-    first = np.arange(part.start, part.stop - stretch + 1, stretch)
-    blocks = [curve[part][: first.size * stretch].reshape(-1, stretch) for curve in curves]
-    kept = [first + pick for block in blocks for pick in (block.argmin(axis=1), block.argmax(axis=1))]
-    return np.unique(np.concatenate([*kept, [part.start, part.stop - 1]]))
-
-
-def _curve(axes: Axes, x: Floats, y: Floats, style: dict[str, Any]) -> None:
-    if x.size:
-        axes.plot(x, y, **style)
-
-
-def _legend(canvas: Canvas, held_out: bool) -> None:
-    from matplotlib.lines import Line2D
-
-    handles = [Line2D([], [], label="measured, fitted", **_FITTED)]
-    handles += [Line2D([], [], label="measured, unseen by the fit", **_UNSEEN)] if held_out else []
-    handles += [Line2D([], [], label="modelled", **_MODEL)]
-    canvas.legend(handles=handles, loc="outside upper center", ncols=3, fontsize=8)
-
-
 # ---------------------------------------------------------------------------------------------------- time response
-def time_response(found: Identification, recordings: Sequence[Recording]) -> Drawing | None:
+def time_response(found: Identification, recordings: Sequence[Recording]) -> Figure | None:
     """Output of the broadband recordings against time, measured and by the linear model; None without any."""
     linear = found.linear
     judged = {(s.path, s.sha256) for s in found.sources if s.role == "validation"}
@@ -382,10 +327,11 @@ def time_response(found: Identification, recordings: Sequence[Recording]) -> Dra
         return None
     fitted, drawn, _ = roles(given)
     drawn = drawn[:_MOST_RESPONSES]
-    canvas = Canvas(figsize=(8.2, 0.5 + 4.0 * len(drawn)), layout="constrained")
+    rows = 2 * len(drawn)
+    sheet = Sheet(_WIDTH, 0.5 + 2.0 * rows, (1.0,) * rows, (1.0, 1.0))
     percents = []
-    for figure, recording in zip(np.atleast_1d(np.asarray(canvas.subfigures(len(drawn), 1))), drawn, strict=True):
-        panels = figure.subplot_mosaic([["whole", "whole"], ["early", "late"]])
+    for row, recording in zip(range(0, rows, 2), drawn, strict=True):
+        panels = sheet.panel(row, columns=2), sheet.panel(row + 1), sheet.panel(row + 1, 1)
         seen = "fitted" if any(recording is one for one in fitted) else "unseen by the linear model"
         percents.append(_response_panels(panels, recording, found, linear, seen))
     chirps = [i for i, recording in enumerate(drawn) if is_chirp(recording)]
@@ -395,11 +341,11 @@ def time_response(found: Identification, recordings: Sequence[Recording]) -> Dra
         "100 (1 − |y − ŷ| / |y − mean y|), the MATLAB-style percentage, offsets removed. Above the whole record, below "
         "two stretches of it; the mirror rests at the first value of its drive, or a periodic drive has settled."
     )
-    return Drawing(canvas, f"{title}, fit {percents[chirps[0] if chirps else 0]:.2f} %", caption)
+    return Figure("time", f"{title}, fit {percents[chirps[0] if chirps else 0]:.2f} %", caption, sheet, {})
 
 
 def _response_panels(
-    panels: dict[str, Axes], recording: Recording, found: Identification, linear: LinearFit, seen: str
+    panels: Sequence[Panel], recording: Recording, found: Identification, linear: LinearFit, seen: str
 ) -> float:
     """Draw one recording; returns its fit percentage."""
     # The mirror rests at the first drive value, not at 0 V.
@@ -410,19 +356,18 @@ def _response_panels(
     percent = float(fit_percent(measured, error)[0])
     time = np.arange(len(error)) / recording.rate_hz
     y, e = 1e6 * measured[:, 0], 1e6 * error[:, 0]
-    whole = panels["whole"]
-    whole.plot(*thin(time, y), color=BLUE, linewidth=0.8, label="measured")
-    whole.plot(*thin(time, e), color=ORANGE, linewidth=0.8, label="measured less modelled")
-    whole.legend(fontsize=8, loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2)
-    _title(whole, f"{_short(recording.path)}: fit {percent:.2f} % ({seen})")
+    whole, *parts = panels
+    whole.add(Line(time, y, BLUE, width=0.8, label="measured"))
+    whole.add(Line(time, e, ORANGE, width=0.8, label="measured less modelled"))
+    whole.title = f"{_short(recording.path)}: fit {percent:.2f} % ({seen})"
     late = int(0.8 * e.size)
     early = max(_ZOOM_SAMPLES, e.size // 4 if is_chirp(recording) else 0)
-    for name, part in (("early", slice(0, early)), ("late", slice(late, late + _ZOOM_SAMPLES))):
-        panels[name].plot(*thin(time[part], y[part]), label="measured", **{**_UNSEEN, "linewidth": 1.6})
-        panels[name].plot(*thin(time[part], (y - e)[part]), label="linear model", **_MODEL)
-    panels["early"].legend(fontsize=8, loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2)
-    for axes in panels.values():
-        axes.set(xlabel="time (s)", ylabel="output (µrad)")
+    for panel, part in zip(parts, (slice(0, early), slice(late, late + _ZOOM_SAMPLES)), strict=True):
+        panel.add(Line(time[part], y[part], **{**_UNSEEN, "width": 1.6, "label": "measured"}))
+        panel.add(Line(time[part], (y - e)[part], **{**_MODEL, "label": "linear model"}))
+    whole.legend = parts[0].legend = Legend("above", 2)
+    for panel in panels:
+        panel.x, panel.y = Axis("time (s)"), Axis("output (µrad)")
     return percent
 
 
@@ -437,62 +382,56 @@ def is_chirp(recording: Recording) -> bool:
 
 
 # -------------------------------------------------------------------------------------------------------- residuals
-def residuals(everything: Sequence[Shown]) -> Drawing:
+def residuals(everything: Sequence[Shown]) -> Figure:
     """Measured less modelled against time, a panel for each recording."""
     judged = [one for one in everything if one.prediction is not None]
     drawn = judged[:MOST_RECORDINGS]
     columns = 1 if len(drawn) == 1 else 2
-    canvas, axes = _panels(-(-len(drawn) // columns), columns, 1.9)
-    for panel in axes.flat[len(drawn) :]:
-        panel.remove()
-    for panel, one in zip(axes.flat, drawn, strict=False):
-        p = one.prediction
+    rows = -(-len(drawn) // columns)
+    sheet = Sheet(_WIDTH, 0.5 + 1.9 * rows, (1.0,) * rows, (1.0,) * columns)
+    for number, one in enumerate(drawn):
+        panel, p = sheet.panel(*divmod(number, columns)), one.prediction
         assert p is not None
-        for part, colour in ((slice(p.start, p.split), SKY), (slice(p.split, None), BLUE)):
-            if p.residual_rad[part].size:
-                panel.plot(*thin(one.time_s[part], 1e6 * p.residual_rad[part]), color=colour, linewidth=0.7)
-        panel.axhline(0.0, color=BLACK, linewidth=0.7)
-        panel.locator_params(axis="x", nbins=7)
-        panel.set(xlabel="time (s)", ylabel="residual (µrad)")
-        _title(panel, f"{one.name}" + ("" if one.role == "loops" else f" ({one.role})"))
+        for part, colour, name in ((slice(p.start, p.split), SKY, "fitted"), (slice(p.split, None), BLUE, "unseen")):
+            panel.add(Line(one.time_s[part], 1e6 * p.residual_rad[part], colour, width=0.7, name=name))
+        panel.add(Rule(0.0, False, width=0.7))
+        panel.x, panel.y = Axis("time (s)", most=7), Axis("residual (µrad)")
+        panel.title = one.name + ("" if one.role == "loops" else f" ({one.role})")
     caption = (
         "Measured less modelled. Light: samples that the model was fitted to; dark: samples that no fit has seen. The "
         "initial transient is left out." + _not_drawn(judged)
     )
-    return Drawing(canvas, "Residuals", caption)
+    return Figure("residuals", "Residuals", caption, sheet, {})
 
 
-def residual_tests(found: Identification) -> Drawing:
+def residual_tests(found: Identification) -> Figure:
     """Autocorrelation, cross-correlation with the drive, and spectrum of the longest unseen residual."""
     from scipy.signal import welch  # here, to keep start-up cheap
 
     test = found.residual
-    canvas = Canvas(figsize=(8.2, 2.9), layout="constrained")
-    auto, cross, spectrum = canvas.subplots(1, 3)
-    for axes, values, first, label in (
-        (auto, test.autocorrelation, 1, "autocorrelation (1)"),
-        (cross, test.cross_correlation, 0, "correlation with drive (1)"),
+    sheet, (auto, cross, spectrum) = grid(_WIDTH, 2.9, 1, 3)
+    for panel, values, first, label in (
+        (auto, test.autocorrelation, 1.0, "autocorrelation (1)"),
+        (cross, test.cross_correlation, 0.0, "correlation with drive (1)"),
     ):
-        axes.axhspan(-test.bound, test.bound, color=SKY, alpha=0.4, linewidth=0)
-        lags = np.arange(first, first + values.size)
-        axes.vlines(lags, 0.0, values, color=BLUE, linewidth=1.2)
-        axes.axhline(0.0, color=BLACK, linewidth=0.7)
-        axes.set(xlabel="lag (samples)", ylabel=label)
-        largest = max(float(np.max(np.abs(values))), 2.0 * test.bound)
-        axes.set_ylim(-1.1 * largest, 1.1 * largest)
+        panel.add(Span(-test.bound, test.bound, False, SKY, 0.4))
+        panel.add(segments(first + np.arange(values.size), 0.0, values, BLUE, 1.2), Rule(0.0, False, width=0.7))
+        largest = 1.1 * max(float(np.max(np.abs(values))), 2.0 * test.bound)
+        panel.x, panel.y = Axis("lag (samples)"), Axis(label, low=-largest, high=largest)
     best = words.chosen_predictions(found)
     pairs = zip(found.recordings, best, strict=True)
     recording, p = max(pairs, key=lambda pair: pair[1].residual_rad.size - pair[1].split)
-    for values, style, label in (
-        (p.measured_rad[p.split :], {"color": BLACK, "linestyle": "--"}, "output"),
-        (p.residual_rad[p.split :], {"color": BLUE}, "residual"),
+    for values, colour, dash, label in (
+        (p.measured_rad[p.split :], BLACK, "--", "output"),
+        (p.residual_rad[p.split :], BLUE, "-", "residual"),
     ):
         freq, power = welch(values, recording.rate_hz, nperseg=min(values.size, 2048))
-        spectrum.plot(freq[1:], np.sqrt(np.maximum(power[1:], 1e-300)) * 1e6, label=label, linewidth=1.0, **style)
-    spectrum.set(xscale="log", yscale="log", xlabel="frequency (Hz)", ylabel="density (µrad/√Hz)")
-    spectrum.legend(fontsize=8)
+        density = np.sqrt(np.maximum(power[1:], 1e-300)) * 1e6
+        spectrum.add(Line(freq[1:], density, colour, dash, 1.0, label))
+    spectrum.x, spectrum.y = Axis("frequency (Hz)", log=True), Axis("density (µrad/√Hz)", log=True)
+    spectrum.legend = Legend("best")
     caption = (
         f"Of the longest unseen part, {_short(recording.path)}: of a residual that is noise 95 % of the lines lie "
         f"within the shaded ± {test.bound:.2g}. For the correlation with the drive both are whitened first."
     )
-    return Drawing(canvas, "Tests of the residual", caption)
+    return Figure("tests", "Tests of the residual", caption, sheet, {})
