@@ -4,13 +4,13 @@ import re
 from collections import Counter
 from html.parser import HTMLParser
 
-from microrad.report import interactive
+from microrad.report import scripts
 
 
 def without_scripts(page):
     """The page without the data of its figures, none of which holds a tag, and without the drawing library."""
-    data = re.escape(interactive.MARK) + "[^<]*</script>\n?"
-    return re.sub(data, "", page.replace(interactive.library(), "").replace(interactive.keyboard(), ""))
+    data = re.escape(scripts.MARK) + "[^<]*</script>\n?"
+    return re.sub(data, "", page.replace(scripts.library(), "").replace(scripts.keyboard(), ""))
 
 
 class _Ids(HTMLParser):

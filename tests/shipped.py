@@ -1,7 +1,5 @@
 """The paper's mission as the package ships it, as it is and with pieces of its text replaced, and its study."""
 
-import contextlib
-from dataclasses import replace
 from functools import cache
 
 import pytest
@@ -63,23 +61,6 @@ def whole_drawn():
 def plain_drawn():
     """The figures of that study as its page holds them; once for all tests."""
     return once("plain drawn", lambda: report.draw(plain_study()))
-
-
-def write_like_plain(of, folder):
-    """Write the report of the plain study with another loop or contact in it; only what shows these is drawn anew."""
-    from microrad.report import day_plots, fine_pointing_figures, tails  # not for every file of tests
-
-    plain = plain_drawn()
-
-    @contextlib.contextmanager
-    def drawing(study, parts):
-        day = plain.day if study.contact is None else day_plots.draw(study.day, study.contact)
-        fine = fine_pointing_figures.draw(study)
-        yield lambda: replace(plain, fine=fine, tails=tails.draw(study), day=day)
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(report, "drawing", drawing)
-        return report.write(of, folder)
 
 
 def edited_file(folder, *changes, whole=False, day=True):

@@ -4,7 +4,6 @@ import hashlib
 import json
 import os
 import re
-from contextlib import nullcontext
 
 import pytest
 
@@ -65,7 +64,7 @@ def quick():
         patch.setattr(scenario.disturbance, "table", lambda freq_hz, density, **_: density.tolist())
         patch.setattr(study.paper, "applies", lambda mission: False)
         patch.setattr(day, "swings", lambda *args: ())
-        patch.setattr(report, "drawing", lambda *args: nullcontext(Drawn))
+        patch.setattr(report, "draw", lambda *args: Drawn())
         yield
 
 

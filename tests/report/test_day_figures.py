@@ -7,7 +7,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from microrad.report import day_assumptions, day_figures, day_map, write_columns
+from microrad.report import write_columns
 from microrad.report.day_assumptions import MOST_BARS, Assumed, assumptions, in_lines
 from microrad.report.day_figures import (
     Windows,
@@ -20,8 +20,9 @@ from microrad.report.day_figures import (
     timeline,
     volume,
 )
-from microrad.report.day_map import Marked, Places, broken, land, other_side, world_map
-from microrad.report.figures import svg_of
+from microrad.report.day_map import Marked, Places, broken, land, odd, other_side, world_map
+from microrad.report.plotting import scales
+from microrad.report.plotting.sheet import Area, Bars, Line
 
 NAME = 'Kiruna <b>"A&B"</b> $x$ $\\nonsense$'
 NOTHING = np.empty(0)
@@ -35,7 +36,7 @@ THIRD = {"number": 3, "rise_utc": "2026-03-20 15:28:04"}
 def texts(figure):
     """Every text in the picture, as a reader of the SVG gets it."""
     root = ElementTree.fromstring(figure.svg)
-    return ["".join(e.itertext()).strip() for e in root.iter("{http://www.w3.org/2000/svg}text")]
+    return [line.strip() for e in root.iter("{http://www.w3.org/2000/svg}text") for line in e.itertext()]
 
 
 def intervals(count, long_s):
@@ -249,59 +250,49 @@ def test_the_tables_of_states_assumptions_and_the_map():
 # ------------------------------------------------------------------------------------------------ what is drawn
 
 
-@pytest.fixture
-def canvases(monkeypatch):
-    """The canvases that are drawn, to look at the data in them."""
-    seen = []
-    for module in (day_figures, day_map, day_assumptions):
-        monkeypatch.setattr(module, "svg_of", lambda canvas: seen.append(canvas) or svg_of(canvas))
-    return seen
+def panels(figure):
+    return figure.sheet.panels
 
 
-def lines(axes):
-    return {line.get_label(): line.get_xydata().T for line in axes.get_lines()}
+def lines(panel):
+    return {line.label: np.stack([line.x, line.y]) for line in panel.all_of(Line)}
 
 
 @pytest.mark.parametrize("count", [1, 15, 200])
-def test_each_interval_is_a_bar_where_it_belongs(count, canvases):
+def test_each_interval_is_a_bar_where_it_belongs(count):
     given = intervals(count, 60.0)
-    timeline([("relay", given)], SPAN_S, EPOCH)
-    (bars,) = canvases[0].axes[0].collections
-    drawn = np.array([[path.vertices[:, 0].min(), path.vertices[:, 0].max()] for path in bars.get_paths()])
-    assert drawn == pytest.approx(given / 3600.0)
+    (bars,) = panels(timeline([("relay", given)], SPAN_S, EPOCH))[0].all_of(Bars)
+    assert np.stack([bars.start, bars.end], axis=1) == pytest.approx(given / 3600.0)
+    assert set(bars.at) == {0.0}
 
 
-def test_curves_are_drawn_in_the_unit_of_their_axis(canvases):
-    a_contact()
-    ends = [axes.get_lines()[0].get_ydata()[-1] for axes in canvases[0].axes]
-    assert ends == pytest.approx([40002.4, 50.0 - 2.4, 102.4, 4.0 - 7.2])
-    assert canvases[0].axes[0].get_lines()[0].get_xdata()[-1] == pytest.approx(40.0)
-    a_volume()
-    above, below = canvases[1].axes
+def test_curves_are_drawn_in_the_unit_of_their_axis():
+    along = panels(a_contact())
+    assert [panel.all_of(Line)[0].y[-1] for panel in along] == pytest.approx([40002.4, 50.0 - 2.4, 102.4, 4.0 - 7.2])
+    assert along[0].all_of(Line)[0].x[-1] == pytest.approx(40.0)
+    above, below = panels(a_volume())
     assert lines(above)["generated"][:, -1] == pytest.approx([24.0, 8.64])
     assert lines(below)[short(NAME)][:, -1] == pytest.approx([24.0, 4.32])
-    assert above.get_lines()[1].get_color() == below.get_lines()[0].get_color()
-    a_run()
-    errors = lines(canvases[2].axes[1])
+    assert above.all_of(Line)[1].colour == below.all_of(Line)[0].colour
+    errors = lines(panels(a_run())[1])
     assert (set(errors["rms"][1]), set(errors["largest"][1])) == ({1.5}, {5.0})
 
 
-def test_bars_reach_from_the_value_to_what_it_becomes(canvases):
-    some_assumptions()
-    bars = {(bar.get_y() + 0.35, *bar.get_facecolor()[:2]): bar for bar in canvases[0].axes[0].patches}
-    ends = sorted((round(row), bar.get_x(), bar.get_x() + bar.get_width()) for (row, *_), bar in bars.items())
+def test_bars_reach_from_the_value_to_what_it_becomes():
+    bars = panels(some_assumptions())[0].all_of(Bars)
+    ends = sorted((float(bar.at[0]), float(bar.start[0]), float(bar.end[0])) for bar in bars)
     assert ends == [(0, 7.0, 5.0), (0, 7.0, 12.0), (1, 7.0, 6.0), (1, 7.0, 9.0), (2, 7.0, 7.0), (2, 7.0, 7.0)]
 
 
-def test_the_track_is_thick_only_in_contact_and_one_region_is_shaded_for_each_relay(canvases):
+def test_the_track_is_thick_only_in_contact_and_one_region_is_shaded_for_each_relay():
     track = a_track(28.0)
     flags = np.cos(track.longitude_rad) > 0.0
-    world_map(track, {"relay": flags}, {n: marked(0.0, at, 103.0) for n, at in (("A", 0.0), ("B", 120.0))}, {})
-    axes = canvases[0].axes[0]
-    x = lines(axes)["relay"][0]
+    relays = {n: marked(0.0, at, 103.0) for n, at in (("A", 0.0), ("B", 120.0))}
+    (panel,) = panels(world_map(track, {"relay": flags}, relays, {}))
+    x = lines(panel)["relay"][0]
     assert np.array_equal(x[np.isfinite(x)], track.degrees[0][flags])
-    assert np.sum(np.isfinite(lines(axes)["ground track"][0])) >= flags.size
-    assert len(axes.patches) == 1 + 2  # the land first
+    assert np.sum(np.isfinite(lines(panel)["ground track"][0])) >= flags.size
+    assert len(panel.all_of(Area)) == 1 + 2  # the land first
 
 
 SHADED, CIRCLE = "has no line of sight to the relay", "above the lowest elevation"
@@ -309,14 +300,14 @@ LEGEND = {"hidden from a relay", "relay, limit of its view", "relay at the start
 LEGEND |= {"station, its horizon", "station"}
 
 
-def test_a_relay_that_moves_has_its_track_and_no_shade(canvases):
+def test_a_relay_that_moves_has_its_track_and_no_shade():
     way = a_track(5.0)
     figure = world_map(a_track(), {}, {"MEO": Marked(way, NO_PLACES)}, {})
-    axes = canvases[0].axes[0]
-    assert len(axes.patches) == 1  # the land
+    (panel,) = panels(figure)
+    assert len(panel.all_of(Area)) == 1  # the land
     longitude, _ = way.degrees
-    drawn = [line for line in axes.get_lines() if {*longitude.tolist()} <= {*line.get_xdata().tolist()}]
-    assert [(line.get_linewidth(), line.get_linestyle()) for line in drawn] == [(0.7, "-")]
+    drawn = [line for line in panel.all_of(Line) if {*longitude.tolist()} <= {*line.x.tolist()}]
+    assert [(line.width, line.dash) for line in drawn] == [(0.7, "-")]
     assert LEGEND & set(texts(figure)) == {"relay at the start, its track"}
     assert "its own ground track as a thin line" in figure.caption
     assert SHADED not in figure.caption
@@ -375,12 +366,12 @@ def test_median_and_99_percent_are_those_of_the_sample():
         (1e-9, 86400.0, 5e-3, ["10 ms", "0.1 s", "1 s", "10 s", "1 min", "10 min", "1 h", "6 h", "1 d"]),
     ],
 )
-def test_the_axis_of_latencies_ends_where_they_do(least_s, most_s, begin_s, ticks, canvases):
-    latency({"relay": (np.array([least_s, most_s]), np.array([0.1, 1.0]))})
-    axes = canvases[0].axes[0]
-    assert axes.get_xlim() == pytest.approx((begin_s, 1.2 * most_s))
-    assert [label.get_text() for label in axes.get_xticklabels()] == ticks
-    assert all(begin_s <= tick <= 1.2 * most_s for tick in axes.get_xticks())
+def test_the_axis_of_latencies_ends_where_they_do(least_s, most_s, begin_s, ticks):
+    (panel,) = panels(latency({"relay": (np.array([least_s, most_s]), np.array([0.1, 1.0]))}))
+    assert (panel.x.low, panel.x.high) == pytest.approx((begin_s, 1.2 * most_s))
+    shown = scales.ticks(panel.x, "x", (panel.x.low, panel.x.high), 400.0)
+    assert [*shown.values()] == ticks
+    assert all(begin_s <= tick <= 1.2 * most_s for tick in shown)
 
 
 def test_a_long_label_is_broken_and_not_cut():
@@ -504,7 +495,7 @@ def test_a_break_is_where_the_line_crosses_the_edge():
 )
 def test_the_hidden_region_is_what_lies_beyond_the_outline(latitude, longitude, radius):
     each = marked(latitude, longitude, radius)
-    rings = [np.asarray(ring) for ring in other_side(each).to_polygons(closed_only=True)]
+    rings = other_side(each)
     here = np.radians([latitude, longitude])
     compared = 0
     for y in np.arange(-88.5, 89.0, 11.0):
@@ -513,6 +504,6 @@ def test_the_hidden_region_is_what_lies_beyond_the_outline(latitude, longitude, 
             cosine = np.sin(here[0]) * np.sin(lat) + np.cos(here[0]) * np.cos(lat) * np.cos(lon - here[1])
             away = math.degrees(math.acos(min(max(cosine, -1.0), 1.0))) - radius
             if abs(away) > 1.0:
-                assert (winding(rings, x, y) != 0) == (away > 0.0), (x, y)
+                assert odd(rings, (x, y)) == (winding(rings, x, y) % 2 == 1) == (away > 0.0), (x, y)
                 compared += 1
     assert compared > 400

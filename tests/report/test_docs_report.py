@@ -12,7 +12,8 @@ from microrad import cli, report
 from microrad.core import machine
 from microrad.mission import toml as document
 from microrad.mission.file import load_mission
-from microrad.report import compared, interactive_style, page, results, tolerances
+from microrad.report import compared, page, results, tolerances
+from microrad.report.plotting import palette
 from microrad.studio import address, guard, jobs_process, reading, server, uploads, workshop
 from microrad.study import story as study
 from places import ROOT
@@ -78,9 +79,7 @@ def test_each_requirement_stands_in_the_table():
 
 
 def test_the_numbers_of_the_report_are_those_of_the_code():
-    told(
-        REPORT, f"in words to {100 * compared.WORDS_SHARE:g} %", f"at most {interactive_style.MOST_POINTS} points there"
-    )
+    told(REPORT, f"in words to {100 * compared.WORDS_SHARE:g} %", f"at most {palette.MOST_POINTS} points there")
     assert set(re.findall(r"`([A-Z0-9_]+)`", REPORT)) == set(machine.VARIABLES)
     told(REPORT, f"up to {results.MOST_INPUT_BYTES / 1e6:g} MB each")
 

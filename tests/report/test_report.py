@@ -32,7 +32,7 @@ from microrad.report import (
 from microrad.study import story as study
 from microrad.study.pointing_cost import Cost
 from report_pages import assert_sound
-from shipped import SHIPPED, edited_file, plain_drawn, plain_study, write_like_plain
+from shipped import SHIPPED, edited_file, plain_drawn, plain_study
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -57,7 +57,7 @@ def small(tmp_path_factory):
 @pytest.fixture(scope="module")
 def written(paper, tmp_path_factory):
     target = tmp_path_factory.mktemp("report") / "study"
-    assert write_like_plain(paper, target) == target / "report.html"
+    assert report.write(paper, target) == target / "report.html"
     return target
 
 
@@ -534,17 +534,6 @@ def test_a_drive_beyond_the_identified_rate_is_the_first_thing_said(paper, tmp_p
     assert "Not to be relied on" in text
     assert any("(identified up to 100 V/s)" in w for w in report.summary(slow)["warnings"])
     assert "Not to be relied on" not in report.verdict_text(paper)
-
-
-def test_thinning_keeps_every_peak():
-    y = np.zeros(100_001)
-    y[[5, 77_777, 100_000]] = 3.0, -2.0, 1.0
-    x = np.arange(y.size, dtype=float)
-    thin_x, thin_y = figures.thin(x, y)
-    assert thin_x.size <= 2 * figures.MOST_POINTS
-    assert set(thin_y) >= {3.0, -2.0}
-    np.testing.assert_array_equal(thin_y, y[thin_x.astype(int)])
-    assert np.all(np.diff(thin_x) >= 0)
 
 
 @pytest.fixture

@@ -6,12 +6,13 @@ from pathlib import Path
 import pytest
 
 from browser import violations
+from microrad import report
 from microrad.lab.identify import identify
 from microrad.report import campaign_page, single_pages
 from report import test_identification_report as identified
 from report import test_report_campaign as campaigns
 from report import test_report_fine_pointing as fine_loops
-from shipped import plain_study, write_like_plain
+from shipped import plain_study
 from waiting import HANG_MS
 
 A4_PX = 680  # between the margins
@@ -36,7 +37,7 @@ def files(found, tmp_path_factory):
     """Every kind of page that there is; the fine-pointing loop of the report is made up."""
     folder = tmp_path_factory.mktemp("browser")
     fine = fine_loops.made_up(found.file)
-    written = {"report": write_like_plain(fine_loops.with_fine(found, fine), folder / "study")}
+    written = {"report": report.write(fine_loops.with_fine(found, fine), folder / "study")}
     recordings = [identified.loop(60.0, 1, "60.csv"), identified.loop(100.0, 3, "100.csv"), identified.chirp()]
     mirror = identify(recordings, 0.5, models=("prandtl_ishlinskii", "linear"))
     written["identification"] = identified.write(mirror, folder / "identification.html", recordings=recordings)

@@ -5,7 +5,6 @@ import hashlib
 import html
 import io
 import json
-from contextlib import nullcontext
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -21,11 +20,10 @@ from microrad.mission.file import load_mission, with_contents
 from microrad.orbit import day as day_study
 from microrad.orbit.operations import OperationsError
 from microrad.report import contact_run_words, day_plots, day_words, results
-from microrad.report.page import Drawn
 from microrad.study import contact_run
 from microrad.study import story as study
 from scenes import scene_of
-from shipped import SHIPPED, edited_file, plain_study, write_like_plain
+from shipped import SHIPPED, edited_file, plain_study
 
 FIGURES = ["day-timeline", "along-contact", "data-volume", "latency", "world-map", "assumptions"]
 
@@ -55,7 +53,7 @@ def found(file, fine):
 @pytest.fixture(scope="module")
 def written(found, tmp_path_factory):
     target = tmp_path_factory.mktemp("day") / "study"
-    write_like_plain(found, target)
+    report.write(found, target)
     return target
 
 
@@ -229,7 +227,6 @@ def test_a_mission_without_orbits_has_no_day(tmp_path, monkeypatch):
     result = study.run(load_mission(mission))
     assert (result.day, result.contact, result.plan) == (None, None, None)
     assert not any("orbits a day" in c.claim for c in result.claims)
-    monkeypatch.setattr(report, "drawing", lambda *args: nullcontext(Drawn))
     page = report.write(result, tmp_path / "out").read_text(encoding="utf-8")
     assert "What the link delivers" not in page
 

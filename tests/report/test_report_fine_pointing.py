@@ -30,7 +30,7 @@ from microrad.report import page as report_page
 from microrad.study import pointing_cost as performance
 from microrad.study import story as study
 from scenes import scene_of
-from shipped import plain_study, write_like_plain
+from shipped import plain_study
 
 HEADING = "Fine pointing under vibration and noise"
 HEADINGS = ("h2", "h3", "h4")
@@ -146,7 +146,7 @@ def with_residual(fine, name, variant="given", **to):
 @pytest.fixture(scope="module")
 def written(plain, fine, tmp_path_factory):
     target = tmp_path_factory.mktemp("report") / "study"
-    write_like_plain(with_fine(plain, fine), target)
+    report.write(with_fine(plain, fine), target)
     return target
 
 

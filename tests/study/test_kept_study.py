@@ -13,7 +13,7 @@ from microrad.loop.fine_pointing import designs
 from microrad.loop.fine_pointing import results as fine_results
 from microrad.mission.file import MissionError, load_mission
 from microrad.orbit.day import assumptions
-from microrad.report import figures, results, words
+from microrad.report import results, words
 from microrad.studio.draft import Draft
 from microrad.studio.draft_keys import value_of
 from microrad.study import story as study
@@ -141,11 +141,7 @@ def refused(draft):
 # --------------------------------------------------------------------------------------------------- what is compared
 @pytest.fixture(scope="module", autouse=True)
 def quick():
-    """The baseline and one more controller, short sines, and figures whose data is computed and which are not drawn."""
-
-    def undrawn(canvas):
-        raise figures.interactive.StaticOnlyError
-
+    """The baseline and one more controller, and short sines."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(designs, "families", lambda m: (PI,))
         patch.setattr(designs, "names", lambda m: (designs.BASELINE, PI.name))
@@ -158,8 +154,6 @@ def quick():
         every = assumptions._changes
         patch.setattr(assumptions, "_changes", lambda *args: list(every(*args))[::5])
         patch.setattr(threads, "_may_fork", lambda: False)
-        patch.setattr(figures, "svg_text", lambda canvas: "")
-        patch.setattr(figures.interactive, "plot_of", undrawn)
         yield
 
 

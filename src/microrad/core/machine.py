@@ -37,7 +37,6 @@ LIBRARIES = (
     "xarray",
     "h5netcdf",
     "h5py",
-    "matplotlib",
     "contourpy",
     "pydantic",
     "sgp4",

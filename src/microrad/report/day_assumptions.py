@@ -89,8 +89,8 @@ def swing_bars(panel: Panel, labels: Sequence[str], ends: Sequence[tuple[float, 
         for end, colour in sorted(bars, key=lambda bar: -abs(bar[0] - value)):
             bounded = math.isfinite(end)
             shown = end if bounded else value + math.copysign(1.4 * reach, end)
-            box = (np.array([each]) for each in (float(row), value, shown, 0.7))
-            panel.add(Bars(*box, colour, opacity=1.0 if bounded else 0.5))
+            at, start, end_, breadth = (np.array([each]) for each in (float(row), value, shown, 0.7))
+            panel.add(Bars(at, start, end_, breadth, colour, opacity=1.0 if bounded else 0.5))
         panel.add(Words(_remark(both, value), 1.0, row, GREY, shift=(5.0, 0.0), of_panel="x"))
     panel.add(Rule(value, True, width=0.8))
     panel.y.ticks, panel.y.size, panel.y.grid = dict(enumerate(labels)), 8.0, False

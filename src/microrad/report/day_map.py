@@ -33,6 +33,7 @@ LAND, COAST, SHADE = "#e9e6df", "#b5b0a5", 0.12  # the last an opacity
 _HALF_TURN = 180.0
 _TURN = 360.0
 _OVER_A_POLE = 60.0  # degrees: beyond this latitude, so wide a step in longitude goes over the pole
+_NEAR_A_POLE = 90.0 - 1e-9  # degrees: the edge of the map is in no region
 _THIN = 0.7  # line of a relay that moves
 _CONTACT = (SKY, ORANGE, GREEN)
 _FRAME = ((-180.0, -90.0), (-180.0, 90.0), (180.0, 90.0), (180.0, -90.0), (-180.0, -90.0))
@@ -215,7 +216,8 @@ def other_side(each: Marked) -> tuple[Floats, ...]:
     """
     x, y = each.outline.degrees
     x = np.unwrap(x, period=_TURN)
-    here = (float(each.place.degrees[0][0]), float(each.place.degrees[1][0]))
+    (longitude, *_), (latitude, *_) = each.place.degrees
+    here = (float(longitude), min(max(float(latitude), -_NEAR_A_POLE), _NEAR_A_POLE))
     turns = round((x[-1] - x[0]) / _TURN)
     if turns == 0:
         inside = _shifted(np.stack([x, y], axis=1))

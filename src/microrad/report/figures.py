@@ -244,7 +244,7 @@ def scan(found: paper.Scan) -> Figure:
             held[kp.index(p.proportional_v_rad * 1e-3), ki.index(p.integral_v_rad_s * 1e-6)] = sum(p.holds().values())
         said = f"claims that hold (of {most})"
         bar = said if composition == paper.COMPOSITIONS[-1] else ""
-        places = np.arange(len(ki)), np.arange(len(kp))
+        places = np.arange(1.0 * len(ki)), np.arange(1.0 * len(kp))
         panel.add(Field(*places, held, 0.0, most, bar, ticks=range(most + 1), spoken=said))
         for (row, column), value in np.ndenumerate(held):
             panel.add(Words(f"{value:.0f}", column, row, WHITE if value < most / 2 else BLACK, anchor="middle"))

@@ -210,15 +210,14 @@ def error_budget(b: ErrorBudget) -> Figure:
     """Each part alone beside theory, the parts together, and what hysteresis and the rest change."""
     parts, totals, changes = bars_of(b)
     bars = [*parts, *totals, *changes]
-    rows = np.arange(len(bars))[::-1]
+    rows = np.arange(len(bars), dtype=np.float64)[::-1]
     sheet, (panel,) = grid(7.6, 0.9 + 0.28 * len(bars))
     sheet.legend = Legend("above")
     values, theory = (1e6 * np.array([getattr(bar, key) for bar in bars]) for key in ("rms_rad", "theory_rad"))
     for colour in dict.fromkeys(bar.colour for bar in bars):
         of = np.array([bar.colour == colour for bar in bars])
         panel.add(Bars(rows[of], 0.0 * values[of], values[of], np.full(int(of.sum()), 0.65), colour))
-    mark = Line(theory, rows, BLACK, "", label="theory (linear)", marker="|", size=13.0, edge_width=1.8)
-    panel.add(mark)
+    panel.add(Line(theory, rows, BLACK, "", label="theory (linear)", marker="|", size=13.0, edge_width=1.8))
     for row, value, expected in zip(rows, values, theory, strict=True):
         panel.add(Words(micro(value * 1e-6), np.nanmax([value, expected]), row, shift=(5.0, 0.0)))
     for edge in (len(bars) - len(parts), len(changes)):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import base64
 import math
-import threading
 from collections.abc import Iterable
 from typing import Any
 
@@ -25,7 +24,6 @@ Row = dict[str, Any]
 MOST_POINTS = 1500
 """Of a drawn curve."""
 
-_DRAWING = threading.Lock()  # matplotlib's settings are those of the whole process
 _COLOURS = {0: plots.BLUE, 1: plots.ORANGE, 2: plots.GREEN}
 _HOUR_S = 3600.0
 
@@ -150,8 +148,7 @@ def ground_map(day: DayStudy) -> tuple[str, str]:
     """The report's map of the day as the address of an image, and what it shows in words."""
     from microrad.report import day_plots  # drawing takes longer to load than a page may
 
-    with _DRAWING:
-        figure = day_plots.ground_map(day)
+    figure = day_plots.ground_map(day)
     return f"data:image/svg+xml;base64,{base64.b64encode(figure.svg.encode()).decode()}", figure.caption
 
 

@@ -139,7 +139,7 @@ _COMMON: dict[str, Any] = {
 
 def _axes(found: Layout) -> dict[str, Any]:
     """Plotly's axes of all panels."""
-    made = {}
+    made: dict[str, Any] = {}
     for number, each in enumerate(found.placed):
         other = _name("y", number), _name("x", number)
         x = _axis(each, each.panel.x, each.x_ends, each.x_shown, other[0])
@@ -373,10 +373,9 @@ def _rule(pen: Pen, rule: Rule) -> None:
 
 
 def _span(pen: Pen, span: Span) -> None:
-    fill = {"fillcolor": clear(span.colour, span.opacity), "line": {"width": 0}}
-    pen.shape(
-        {**pen.across("rect", pen.of.within(span), span.upright), **fill}, span.label, Look(fill["fillcolor"], "area")
-    )  # type: ignore[arg-type]
+    tint = clear(span.colour, span.opacity)
+    shape = pen.across("rect", pen.of.within(span), span.upright) | {"fillcolor": tint, "line": {"width": 0}}
+    pen.shape(shape, span.label, Look(tint, "area"))
 
 
 def _area(pen: Pen, area: Area) -> None:

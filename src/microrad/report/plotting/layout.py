@@ -237,16 +237,18 @@ def _sides(of: Placed, keys: Sequence[Key]) -> Box:
 def _share(sheet: Sheet, placed: Sequence[Placed], sides: Sequence[Box], room: Box) -> float:
     """Give each panel its box; returns by how much the sheet grows for it."""
     columns, rows = range(len(sheet.widths)), range(len(sheet.heights))
+    panels = [each.panel for each in placed]
 
-    def most(which: int, of: str, number: int) -> float:
-        ends = {0: lambda p: p.column, 2: lambda p: p.column + p.columns - 1}.get(which, lambda p: p.row)
-        assert of
-        return max(
-            (side[which] for each, side in zip(placed, sides, strict=True) if ends(each.panel) == number), default=0.0
-        )
+    def most(side: int, at: Sequence[int], numbers: range) -> list[float]:
+        """The room at a side of the panels in each column or row, which ``at`` has by panel."""
+        return [
+            max((each[side] for each, place in zip(sides, at, strict=True) if place == number), default=0.0)
+            for number in numbers
+        ]
 
-    left, right = [most(0, "column", c) for c in columns], [most(2, "column", c) for c in columns]
-    top, bottom = [most(1, "row", r) for r in rows], [most(3, "row", r) for r in rows]
+    left = most(0, [panel.column for panel in panels], columns)
+    right = most(2, [panel.column + panel.columns - 1 for panel in panels], columns)
+    top, bottom = (most(side, [panel.row for panel in panels], rows) for side in (1, 3))
     across = room[2] - room[0] - sum(left) - sum(right)
     down = room[3] - room[1] - sum(top) - sum(bottom)
     wide = [max(across * share / sum(sheet.widths), _LEAST) for share in sheet.widths]

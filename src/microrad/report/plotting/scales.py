@@ -96,7 +96,7 @@ def edges_of(of: Field, which: str) -> Floats:
     if of.levels is not None or middle.size < 2:
         return middle if middle.size > 1 else np.array([middle[0] - 0.5, middle[0] + 0.5])
     half = (middle[1] - middle[0]) / 2.0
-    return np.r_[middle - half, middle[-1] + half]
+    return np.append(middle - half, middle[-1] + half)
 
 
 def _margins(marks: Sequence[Mark], which: str, low: float, high: float) -> tuple[float, float]:

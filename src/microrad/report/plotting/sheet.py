@@ -8,7 +8,7 @@ widths of the line.
 import itertools
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Literal, TypeVar
+from typing import Any, Literal, TypeVar
 
 import numpy as np
 
@@ -295,7 +295,8 @@ def region(x: Floats, y: Floats, z: Floats, least: float, most: float) -> tuple[
     """Rings around where the values lie between two levels."""
     import contourpy  # here, to keep start-up cheap
 
-    parts, offsets = contourpy.contour_generator(x, y, z, fill_type="OuterOffset").filled(least, most)
+    filled: Any = contourpy.contour_generator(x, y, z, fill_type="OuterOffset").filled(least, most)
+    parts, offsets = filled
     return tuple(
         np.asarray(points[first:last])
         for points, offset in zip(parts, offsets, strict=True)
