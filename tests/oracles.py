@@ -530,13 +530,10 @@ def build_plant(mirror, step_s):
             coupling[i] = Ad[i, j]
         else:
             rest[i, j] = Ad[i, j]
+    sizes = {"states": n, "actuators": nu, "outputs": ny, "elements": nb, "operators": len(mirror.operators)}
     plant = kernels.Plant(
         step_s=float(step_s),
-        states=(0,) * n,
-        actuators=(0,) * nu,
-        outputs=(0,) * ny,
-        elements=(0,) * nb,
-        operators=(0,) * len(mirror.operators),
+        **kernels.counts(sizes == kernels.UNROLLED, **sizes),
         feedback=bool(np.any(mirror.F)),
         direct=bool(np.any(mirror.B) or np.any(mirror.D)),
         diagonal=diagonal,
@@ -571,17 +568,14 @@ def build_plant(mirror, step_s):
     return plant, state
 
 
-def build_loop(loop, step_s):
+def build_loop(loop, step_s, unrolled=False):
     """The kernels' loop, and its state at rest."""
     actuators, axes = loop.allocation.shape
     controllers, elements = len(loop.Ac), len(loop.inverse_bouc_wen)
     feedforward = elements > 0 or len(loop.inverse_play_threshold) > 0 or bool(np.any(loop.inverse_direct))
     columns = (loop.command_min, loop.command_max, loop.drive_resolution, loop.amplifier_factor, loop.slew_step)
     record = kernels.Loop(
-        actuators=(0,) * actuators,
-        axes=(0,) * axes,
-        states=(0,) * controllers,
-        inverse_elements=(0,) * elements,
+        **kernels.counts(unrolled, actuators=actuators, axes=axes, states=controllers),
         feedforward=feedforward,
         steps_per_sample=loop.steps_per_sample,
         delay_steps=loop.delay_steps,
@@ -635,7 +629,7 @@ def run_open_loop(mirror, step_s, drive, state=None):
 def run_closed_loop(mirror, step_s, loop, reference, states=(None, None)):
     """The compiled ``closed_loop`` from rest or from ``states``: the run, and both states."""
     plant, plant_rest = build_plant(mirror, step_s)
-    record, loop_rest = build_loop(loop, step_s)
+    record, loop_rest = build_loop(loop, step_s, isinstance(plant.states, tuple))
     plant_state, loop_state = states if states[0] is not None else (plant_rest, loop_rest)
     reference = np.ascontiguousarray(reference, dtype=float)
     actuators, axes = loop.allocation.shape

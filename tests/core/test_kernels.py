@@ -7,6 +7,7 @@ from decimal import Decimal, localcontext
 from math import exp, log
 
 import control
+import numba
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -569,6 +570,10 @@ def make_mirrors():
             states=3, A=block_diag(one, [[-40.0]]), B=np.vstack([0.0 * unit, [[40.0]]]), E=np.vstack([unit, [[0.0]]]),
             G=1.0, C=[[1.0, 0.0, 0.004]], bouc_wen=(ASYMMETRIC._replace(rate_limit=2500.0),),
         ),
+        "five states, unrolled": compose(
+            states=5, A=block_diag(two, [[-900.0]]), E=np.vstack([unit, unit, [[90.0]]]), G=1.0,
+            C=[[1.0, 0.1, 0.2, 0.0, 0.3]], bouc_wen=rows(),
+        ),
         "empty bank": compose(**several, B=into_three, C=full(2, 7), D=full(2, 3, scale=0.01)),
     }  # fmt: skip
 
@@ -759,17 +764,10 @@ LOOP_MEMORY = (
 )  # fmt: skip
 
 
-# A new pair of counts compiles for seconds: loops without an inverse are compiled on two mirrors, and run uncompiled on
-# all of them.
-COMPILED = [
-    pytest.param(mirror, kind, id=f"{name}-{kind}")
-    for name, mirror in MIRRORS.items()
-    for kind in KINDS
-    if kind == "everything" or name in ("oscillator, q = F x", "three actuators, mixed bank fed back")
-]
+CASES = [pytest.param(m, kind, id=f"{name}-{kind}") for name, m in MIRRORS.items() for kind in KINDS]
 
 
-@pytest.mark.parametrize(("mirror", "kind"), COMPILED)
+@pytest.mark.parametrize(("mirror", "kind"), CASES)
 def test_closed_loop_is_its_twin(mirror, kind):
     check_closed_loop(mirror, kind)
 
@@ -786,7 +784,7 @@ def check_closed_loop(mirror, kind):
     assert 0.1 < np.max(np.abs(run.drive)) < 30  # volts: the comparison means nothing on a loop that ran away
 
 
-@pytest.mark.parametrize(("mirror", "kind"), COMPILED)
+@pytest.mark.parametrize(("mirror", "kind"), CASES)
 def test_closed_loop_in_slices_is_one_run_bit_for_bit(mirror, kind):
     loop = make_loop(mirror, kind)
     reference = make_reference(mirror, 120, STEP * loop.steps_per_sample)
@@ -800,6 +798,13 @@ def test_closed_loop_in_slices_is_one_run_bit_for_bit(mirror, kind):
     for state, whole_state, memory in zip(states, whole_states, (PLANT_MEMORY, LOOP_MEMORY), strict=True):
         for name in memory:
             assert_array_equal(getattr(state, name), getattr(whole_state, name), err_msg=name)
+
+
+def test_one_compiled_loop_serves_all_sizes_but_the_unrolled_one():
+    """Of any other type the loops would be compiled for seconds."""
+    plants = {name: numba.typeof(oracles.build_plant(mirror, STEP)[0]) for name, mirror in MIRRORS.items()}
+    unrolled = plants.pop("five states, unrolled")
+    assert set(plants.values()) == {plants["static"]} != {unrolled}
 
 
 def test_the_loop_cases_reach_every_limit():

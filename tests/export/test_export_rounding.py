@@ -328,12 +328,12 @@ def test_the_run_in_double_is_the_kernels(name):
 
 
 def kernel_inverse(of, reference):
-    empty, n = np.zeros((0, 0)), of.bouc_wen.shape[0]
+    empty, one, n = np.zeros((0, 0)), np.zeros(1), of.bouc_wen.shape[0]
     loop = kernels.Loop(
-        (0,), 1, (), (0,) * n, True, 1, 0, empty, empty, empty, empty, empty, empty, np.zeros(1), np.eye(1),
+        one, one, np.zeros(0), True, 1, 0, empty, empty, empty, empty, empty, empty, np.zeros(1), np.eye(1),
         of.direct, of.bouc_wen, of.bouc_wen_actuator, of.play_threshold, of.play_weight, of.play_actuator, of.widening,
         of.lag_keep, of.lag_weight, of.lag_actuator,
-    )._replace(axes=(0,))  # fmt: skip
+    )  # fmt: skip
     zero = np.zeros(1)
     state = kernels.LoopState(
         zero, zero, zero, zero, zero, np.zeros((1, 2)), np.zeros(n), np.zeros(of.play_weight.size),

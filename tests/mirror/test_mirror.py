@@ -4,6 +4,7 @@ import re
 from dataclasses import astuple, replace
 from math import exp, inf, pi
 
+import numba
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
@@ -258,6 +259,16 @@ def test_mirrors_side_by_side_run_as_they_run_apart():
     assert_array_equal(clamped, np.concatenate(bouc_wen_first + then_plays))
     assert then_plays[0] > 0
     assert clamped.sum() > 0
+
+
+def test_the_order_of_a_matrix_in_memory_compiles_no_other_loop():
+    """A loop takes seconds to compile, and once more for each type of its arrays."""
+    plays, printed = (mirror.assemble("", "cascade", RESONANT[0], model) for model in (PLAYS, PRINTED))
+    m = mirror.combine(plays, printed)
+    turned = replace(m, **{key: np.asfortranarray(getattr(m, key)) for key in "ABCDEFGK"})
+    assert not turned.K.flags.c_contiguous
+    plants = [mirror.discretise(each, STEP) for each in (m, turned)]
+    assert numba.typeof(plants[0]) == numba.typeof(plants[1]) != numba.typeof(plants[0]._replace(K=turned.K))
 
 
 def test_two_axes_track_in_one_loop_as_in_two():

@@ -10,7 +10,7 @@ All quantities are deviations from the operating point (drive bias, output at re
 from collections.abc import Callable, Sequence
 from hashlib import sha256
 from math import exp, expm1, log1p
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import numba
 import numpy as np
@@ -35,6 +35,7 @@ _OPTIONS: dict[str, Any] = {
     "error_model": "numpy",
     "fastmath": {"contract"},
     "_nrt": False,
+    "no_cfunc_wrapper": True,
 }
 _inline: Callable[[Any], Any] = numba.njit(inline="always", **_OPTIONS)
 
@@ -95,13 +96,33 @@ BEFORE, NOW = range(2)  # of an actuator's target
 
 
 def _merge(function: Callable[..., Any]) -> Any:
-    """Compiled by itself, and merged into its caller by the machine-code compiler: quick to compile and to call."""
-    return _compile(function, forceinline=True)
+    """Compiled by itself, and merged into its caller by the machine-code compiler: quick to compile and to call.
+
+    Not for a function of two whole records that is called at one place: their hundreds of numbers are arguments.
+    """
+    return _compile(function, forceinline=True, no_cpython_wrapper=True)
 
 
-# A tuple whose length is a count: the length is part of the compiled type, so that short loops over it are unrolled.
-# (Their overhead took half the time of a one-axis step.) Its items mean nothing. A new set of counts compiles once.
-Count = tuple[int, ...]
+# What has as many items as there are of something; the items mean nothing. The length of a tuple is part of the type that
+# is compiled for, so that short loops over it are unrolled; but each new set of them compiles again, for seconds. The
+# length of an array is a number like any other: one compiled loop serves all sizes, at half the speed of small ones.
+Count = tuple[int, ...] | Floats
+
+UNROLLED = {"states": 5, "actuators": 1, "outputs": 1, "elements": 1, "operators": 0}  # the paper's mirror, on one axis
+UNROLLED_CONTROLLER = 2  # states of a PID
+
+
+def counts(unrolled: bool, **sizes: int) -> dict[str, Any]:
+    """The counts of a `Plant` or a `Loop`, by field."""
+    return {name: (0,) * size if unrolled else np.zeros(size) for name, size in sizes.items()}
+
+
+_Record = TypeVar("_Record", bound=tuple[Any, ...])
+
+
+def by_rows(record: _Record) -> _Record:
+    """The named tuple with its arrays row by row in memory: any other order would compile the loops once more."""
+    return type(record)(*(np.ascontiguousarray(v) if isinstance(v, np.ndarray) else v for v in record))
 
 
 class Rows(NamedTuple):
@@ -192,7 +213,6 @@ class Loop(NamedTuple):
     actuators: Count
     axes: Count
     states: Count
-    inverse_elements: Count  # Bouc-Wen only
     feedforward: bool
     steps_per_sample: int
     delay_steps: int
@@ -856,7 +876,7 @@ def _inverse(loop, state, reference, sample_s, feedforward):  # type: ignore[no-
             state.target[a, BEFORE] = state.target[a, NOW]
             state.target[a, NOW] = target
             feedforward[k, a] = loop.inverse_direct[a] * target
-        for e in range(len(loop.inverse_elements)):
+        for e in range(loop.inverse_bouc_wen.shape[0]):
             row, a = loop.inverse_bouc_wen, loop.inverse_bouc_wen_actuator[e]
             travel = (state.target[a, NOW] - state.target[a, BEFORE]) / row[e, D1]
             rate = travel / sample_s
@@ -872,7 +892,7 @@ def _inverse(loop, state, reference, sample_s, feedforward):  # type: ignore[no-
             if loop.inverse_widening[a, WIDENING] != 0.0:
                 rate = abs(state.target[a, NOW] - state.target[a, BEFORE]) / sample_s
                 if rate > loop.inverse_widening[a, WIDENING_LIMIT]:
-                    state.inverse_clamped[len(loop.inverse_elements) + a] += 1
+                    state.inverse_clamped[loop.inverse_bouc_wen.shape[0] + a] += 1
                     rate = loop.inverse_widening[a, WIDENING_LIMIT]
                 widening = loop.inverse_widening[a, WIDENING] * rate
             for e in range(loop.inverse_play_actuator.size):
@@ -1148,6 +1168,8 @@ _ROOT_HALF_BITS = np.int64(0x3FE6A09E667F3BCD)
 _ROUND_BITS = np.int64(0x4338000000000000)
 _MANTISSA = np.int64(52)
 
+_ROW = np.uint64(LANES)  # unsigned, as every place in a row of runs: no test for a negative index in the loops
+
 if _numba.DISABLE_JIT:  # set when numba is loaded
 
     def _bits(x: Any) -> Any:
@@ -1155,6 +1177,9 @@ if _numba.DISABLE_JIT:  # set when numba is loaded
 
     def _number(bits: Any) -> Any:
         return np.int64(bits).view(np.float64)
+
+    def _at(row: Any) -> Any:
+        return np.uint64(row) * _ROW
 
 else:
 
@@ -1175,6 +1200,15 @@ else:
             return builder.bitcast(arguments[0], context.get_value_type(signature.return_type))
 
         return types.float64(types.int64), generate
+
+    @intrinsic
+    def _at(typingctx: Any, row: Any) -> Any:
+        """Where a row of runs begins. As an instruction, for it stands at hundreds of places."""
+
+        def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+            return builder.mul(arguments[0], context.get_constant(types.uint64, LANES))
+
+        return types.uint64(types.uint64), generate
 
 
 @_inline
@@ -1224,15 +1258,6 @@ def _row_log(x):  # type: ignore[no-untyped-def]
     odd = 0.6666666666666735130 + w * (0.2857142874366239149 + w * (0.1818357216161805012 + w * 0.1479819860511658591))
     half = 0.5 * f * f
     return n * _LN2_HIGH - ((half - (s * (half + even + z * odd) + n * _LN2_LOW)) - f)
-
-
-_ROW = np.uint64(LANES)  # unsigned, as every place in a row of runs: no test for a negative index in the loops
-
-
-@_inline
-def _at(row):  # type: ignore[no-untyped-def]
-    """Where a row of runs begins."""
-    return np.uint64(row) * _ROW
 
 
 @_compile
@@ -1333,7 +1358,7 @@ def gaussian_kernel(seed, first_run, purpose, first_block, numbers):  # type: ig
         _gaussians(seed, first_run[0], purpose, first_block + block, numbers, _at(4 * block))
 
 
-@_inline
+@_merge
 def _clear(rows, at):  # type: ignore[no-untyped-def]
     for r in range(_ROW):
         rows[at + r] = 0.0
@@ -1341,18 +1366,20 @@ def _clear(rows, at):  # type: ignore[no-untyped-def]
 
 @_merge
 def _weigh(weights, rows, first, stride, total, at, fresh):  # type: ignore[no-untyped-def]
-    """total row = (or, if it is not fresh, +=) sum of weights[j] x row first + stride j; a weight of 0 costs nothing.
+    """total[at:] = (or, if it is not fresh, +=) sum of weights[j] x rows[first + stride j:], a row of runs each.
+
+    A weight of 0 costs nothing. Places are unsigned, as `_at` gives them: so all callers share one compiled function.
 
     Returns whether the total is still to be written. The total must lie in another array than the rows.
     """
     j = 0
     while j < weights.size:
-        gain, source = weights[j], _at(first + stride * j)
+        gain, source = weights[j], first + stride * np.uint64(j)
         j += 1
         if gain == 0.0:
             continue
         if j < weights.size and weights[j] != 0.0:  # two at a time
-            other, second = weights[j], _at(first + stride * j)
+            other, second = weights[j], first + stride * np.uint64(j)
             j += 1
             if fresh:
                 for r in range(_ROW):
@@ -1370,7 +1397,7 @@ def _weigh(weights, rows, first, stride, total, at, fresh):  # type: ignore[no-u
     return fresh
 
 
-@_inline
+@_merge
 def _weigh_some(weights, rows, first, stride, total, at, fresh):  # type: ignore[no-untyped-def]
     """As `_weigh`, without the call where all weights are 0, as most are."""
     some = False
@@ -1390,7 +1417,7 @@ def _sum_rows(weights, rows, first, stride, total, row):  # type: ignore[no-unty
 def _shift_rows(weights, size, rows, first, stride):  # type: ignore[no-untyped-def]
     """row first + stride i += weights[i] @ size, in a function by itself as few calls of the loop need it."""
     for i in range(weights.shape[0]):
-        _weigh_some(weights[i], size, 0, 1, rows, _at(first + stride * i), False)
+        _weigh_some(weights[i], size, _at(0), _at(1), rows, first + stride * np.uint64(i), False)
 
 
 @_compile
@@ -1524,9 +1551,9 @@ def _advance_bank(p, s):  # type: ignore[no-untyped-def]
     first_operator = p.bouc_wen.shape[0]
     for e in range(p.G.shape[0]):
         at, row = _at(e * BANK_FIELDS), e * BANK_FIELDS + BANK_Q_NEXT
-        _sum_rows(p.G[e], s.drive, DRIVE_NOW, DRIVE_FIELDS, s.bank, row)
+        _sum_rows(p.G[e], s.drive, _at(DRIVE_NOW), _at(DRIVE_FIELDS), s.bank, row)
         if p.feedback:
-            _weigh(p.F[e], s.x, 0, 1, s.bank, _at(row), False)
+            _weigh(p.F[e], s.x, _at(0), _at(1), s.bank, _at(row), False)
         if e < first_operator:
             _advance_bouc_wen(p.bouc_wen, e, s.bank, at, 1.0 / p.step_s, s.counts)
         else:
@@ -1553,21 +1580,21 @@ def _ensemble_plant(p, s):  # type: ignore[no-untyped-def]
     else:
         _modal_step(p.diagonal, p.coupling, s.x)
     for i in range(states):
-        _weigh_some(p.B0[i], s.drive, DRIVE_BEFORE, DRIVE_FIELDS, s.x, _at(i), False)
-        _weigh_some(p.B1[i], s.drive, DRIVE_NOW, DRIVE_FIELDS, s.x, _at(i), False)
+        _weigh_some(p.B0[i], s.drive, _at(DRIVE_BEFORE), _at(DRIVE_FIELDS), s.x, _at(i), False)
+        _weigh_some(p.B1[i], s.drive, _at(DRIVE_NOW), _at(DRIVE_FIELDS), s.x, _at(i), False)
         if several:
             for r in range(_ROW):
                 s.x[_at(i) + r] += s.x_next[_at(i) + r]
     if p.feedback:
         for i in range(states):
-            _weigh_some(p.E_held[i], s.bank, BANK_Z, BANK_FIELDS, s.x, _at(i), False)
+            _weigh_some(p.E_held[i], s.bank, _at(BANK_Z), _at(BANK_FIELDS), s.x, _at(i), False)
         _advance_bank(p, s)
         for e in range(elements):
             _add_element(p.E_back, p.E1, s.bank, e, s.x)
     for o in range(p.Cy.shape[0]):
-        fresh = _weigh(p.Cy[o], s.x, 0, 1, s.y, _at(o), True)
-        fresh = _weigh_some(p.Dy[o], s.drive, DRIVE_NOW, DRIVE_FIELDS, s.y, _at(o), fresh)
-        if _weigh_some(p.Ky[o], s.bank, BANK_Z, BANK_FIELDS, s.y, _at(o), fresh):
+        fresh = _weigh(p.Cy[o], s.x, _at(0), _at(1), s.y, _at(o), True)
+        fresh = _weigh_some(p.Dy[o], s.drive, _at(DRIVE_NOW), _at(DRIVE_FIELDS), s.y, _at(o), fresh)
+        if _weigh_some(p.Ky[o], s.bank, _at(BANK_Z), _at(BANK_FIELDS), s.y, _at(o), fresh):
             _clear(s.y, _at(o))
 
 
@@ -1600,12 +1627,12 @@ def _ensemble_disturbance(p, s, shift):  # type: ignore[no-untyped-def]
             _gaussians(p.seed, s.first_run[0], p.purpose[w], step // 4, s.gauss, _at(4 * w))
     k = step - shift.first_sample * p.steps_per_sample
     if 0 <= k < shift.step.shape[0]:
-        _shift_rows(shift.step[k], shift.size, s.gauss, step % 4, 4)
+        _shift_rows(shift.step[k], shift.size, s.gauss, _at(step % 4), _at(4))
     _modal_step(p.shaping_diagonal, p.shaping_coupling, s.shaping)
     for i in range(p.shaping_diagonal.size):
-        _weigh_some(p.shaping_noise[i], s.gauss, step % 4, 4, s.shaping, _at(i), False)
+        _weigh_some(p.shaping_noise[i], s.gauss, _at(step % 4), _at(4), s.shaping, _at(i), False)
     for i in range(p.shaping_output.shape[0]):
-        _sum_rows(p.shaping_output[i], s.shaping, 0, 1, s.disturbance, i)
+        _sum_rows(p.shaping_output[i], s.shaping, _at(0), _at(1), s.disturbance, i)
 
 
 @_inline
@@ -1651,7 +1678,7 @@ def _count_radial(error, axes, work, total, histogram):  # type: ignore[no-untyp
         histogram[r, min(max(place, 0), BINS - 1)] += np.int32(1)
 
 
-@_inline
+@_merge
 def _measure(p, s, reference, shift):  # type: ignore[no-untyped-def]
     """The readings m of a control sample: optical, gauge, reference."""
     axes, outputs, sample = p.optics.shape[0], p.optics.shape[1], s.place[SAMPLE]
@@ -1663,7 +1690,7 @@ def _measure(p, s, reference, shift):  # type: ignore[no-untyped-def]
         _gaussians(p.seed, s.first_run[0], purpose, sample, s.sensor_gauss, _at(word))
     k = sample - shift.first_sample
     if noisy and 0 <= k < shift.sample.shape[0]:
-        _shift_rows(shift.sample[k], shift.size, s.sensor_gauss, 0, 1)
+        _shift_rows(shift.sample[k], shift.size, s.sensor_gauss, _at(0), _at(1))
     if sample % p.sensor_every == 0:
         _measure_optical(p, s)
     for o in range(outputs):
@@ -1685,7 +1712,7 @@ def _measure_optical(p, s):  # type: ignore[no-untyped-def]
     axes, measured, work, ring, gauss = p.optics.shape[0], s.measured, s.work, s.error_ring, s.sensor_gauss
     length = p.sensor_delay_steps + 1
     due = _at((s.place[STEP] + 1) % length * axes)
-    _clear(work, 0)
+    _clear(work, _at(0))
     for i in range(axes):
         for r in range(_ROW):
             e = ring[due + _at(i) + r]
@@ -1703,7 +1730,7 @@ def _measure_optical(p, s):  # type: ignore[no-untyped-def]
         s.counts[_at(COUNT_LOST) + r] += 0.0 if work[r] <= seen else 1.0
 
 
-@_inline
+@_merge
 def _ensemble_inverse(p, s):  # type: ignore[no-untyped-def]
     """Adds to each actuator's output what the inverse makes of its target: as `_inverse`, with the rate as given."""
     actuators, output, target = p.actuator.shape[0], s.output, s.target
@@ -1769,14 +1796,14 @@ def _control(p, s, length):  # type: ignore[no-untyped-def]
     """One sample of the controller: readings to commands, with inverse, clip and anti-windup."""
     states, actuators = p.A.shape[0], p.actuator.shape[0]
     for i in range(p.C.shape[0]):
-        fresh = _weigh(p.C[i], s.xc, 0, 1, s.output, _at(i), True)
-        if _weigh(p.D[i], s.measured, 0, 1, s.output, _at(i), fresh):
+        fresh = _weigh(p.C[i], s.xc, _at(0), _at(1), s.output, _at(i), True)
+        if _weigh(p.D[i], s.measured, _at(0), _at(1), s.output, _at(i), fresh):
             _clear(s.output, _at(i))
     if p.feedforward:
         _ensemble_inverse(p, s)
     for i in range(states):
-        fresh = _weigh(p.A[i], s.xc, 0, 1, s.xc_next, _at(i), True)
-        if _weigh(p.B[i], s.measured, 0, 1, s.xc_next, _at(i), fresh):
+        fresh = _weigh(p.A[i], s.xc, _at(0), _at(1), s.xc_next, _at(i), True)
+        if _weigh(p.B[i], s.measured, _at(0), _at(1), s.xc_next, _at(i), fresh):
             _clear(s.xc_next, _at(i))
     row = s.place[SAMPLE] % length
     for a in range(actuators):
@@ -1793,7 +1820,7 @@ def _control(p, s, length):  # type: ignore[no-untyped-def]
             for r in range(_ROW):
                 command[at + r] = _quantised(command[at + r], resolution)
     for i in range(states):
-        _weigh(p.L[i], s.output, 0, 1, s.xc_next, _at(i), False)
+        _weigh(p.L[i], s.output, _at(0), _at(1), s.xc_next, _at(i), False)
     _copy(s.xc_next, s.xc, 0, states)
 
 

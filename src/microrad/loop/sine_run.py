@@ -96,11 +96,9 @@ def assemble(m: Mirror, setup: Setup, inverse: Inverse) -> kernels.Loop:
 
     follow, slew = amplifier_factor(drive, timing.step_s), drive.slew_v_s * timing.step_s
     row = np.array([drive.minimum_v, drive.maximum_v, drive.drive_resolution_v, follow, slew])
-    return kernels.Loop(
-        actuators=(0,) * actuators,
-        axes=(0,) * m.axes,
-        states=(0,) * controller.order,
-        inverse_elements=(0,) * len(inverse.bouc_wen),
+    unrolled = mirror.unrolled(m) and controller.order <= kernels.UNROLLED_CONTROLLER
+    loop = kernels.Loop(
+        **kernels.counts(unrolled, actuators=actuators, axes=m.axes, states=controller.order),
         feedforward=bool(any(inverse.direct) or inverse.bouc_wen),
         steps_per_sample=timing.steps_per_sample,
         delay_steps=timing.delay_steps,
@@ -114,6 +112,7 @@ def assemble(m: Mirror, setup: Setup, inverse: Inverse) -> kernels.Loop:
         allocation=np.eye(actuators, m.axes),
         **control.inverse_arrays(inverse, timing.period_s),
     )
+    return kernels.by_rows(loop)
 
 
 def at_rest(loop: kernels.Loop) -> kernels.LoopState:

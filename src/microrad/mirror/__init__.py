@@ -9,6 +9,7 @@ from microrad.mirror.model import (
     from_mission,
     from_table,
     hysteresis_model,
+    unrolled,
 )
 from microrad.mirror.variants import MirrorAxis, MirrorParts, Variant, of
 
@@ -25,4 +26,5 @@ __all__ = [
     "from_table",
     "hysteresis_model",
     "of",
+    "unrolled",
 ]

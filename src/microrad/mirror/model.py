@@ -227,6 +227,21 @@ def discretise(mirror: Mirror, step_s: float) -> kernels.Plant:
     return plant_arrays(step_s, (Ad, B0, B1, E0, E1), mirror)
 
 
+def unrolled(mirror: Mirror) -> bool:
+    """Whether the kernels' loops over this mirror are unrolled: see `kernels.Count`."""
+    return _sizes(mirror) == kernels.UNROLLED
+
+
+def _sizes(mirror: Mirror) -> dict[str, int]:
+    return {
+        "states": mirror.A.shape[0],
+        "actuators": mirror.actuators,
+        "outputs": mirror.axes,
+        "elements": len(mirror.bouc_wen),
+        "operators": len(mirror.plays),
+    }
+
+
 def plant_arrays(step_s: float, discrete: tuple[Floats, ...], mirror: Mirror) -> kernels.Plant:
     """The kernel's arrays from the discrete matrices Ad, B0, B1, E0, E1 and the mirror's F, G, C, D, K and bank."""
     Ad, B0, B1, E0, E1 = discrete
@@ -235,22 +250,15 @@ def plant_arrays(step_s: float, discrete: tuple[Floats, ...], mirror: Mirror) ->
     neighbour = np.arange(n + odd) ^ 1
     near = np.eye(n + odd, dtype=bool) | (np.arange(n + odd)[:, None] == neighbour)
 
-    def count(size: int) -> kernels.Count:
-        return (0,) * size
-
     def below(matrix: Floats) -> Floats:
         return np.pad(matrix.astype(float), ((0, odd), (0, 0)))
 
     def beside(matrix: Floats) -> Floats:
         return np.pad(matrix.astype(float), ((0, 0), (0, odd)))
 
-    return kernels.Plant(
+    plant = kernels.Plant(
         step_s=float(step_s),
-        states=count(n),
-        actuators=count(mirror.actuators),
-        outputs=count(mirror.axes),
-        elements=count(len(mirror.bouc_wen)),
-        operators=count(len(mirror.plays)),
+        **kernels.counts(unrolled(mirror), **_sizes(mirror)),
         feedback=bool(np.any(mirror.F)),
         direct=bool(np.any(mirror.B) or np.any(mirror.D)),
         diagonal=np.diag(Ad).copy(),
@@ -272,6 +280,7 @@ def plant_arrays(step_s: float, discrete: tuple[Floats, ...], mirror: Mirror) ->
         play_threshold=np.array([r for p in mirror.plays for r in p.thresholds_v], dtype=float),
         play_weight=np.array([w for p in mirror.plays for w in p.weights_rad_v], dtype=float),
     )
+    return kernels.by_rows(plant)
 
 
 def contraction(mirror: Mirror, step_s: float) -> float:

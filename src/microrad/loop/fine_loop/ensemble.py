@@ -137,7 +137,7 @@ def arrays(loop: PointingLoop, controller: LoopController, seed: int) -> kernels
     row += [drive.slew_v_s * timing.step_s, *loop.drive_range_v]
     actuators = loop.mirror.actuators
     gauge = loop.gauge or StrainGauge(0.0, 0.0)
-    return kernels.Ensemble(
+    found = kernels.Ensemble(
         step_s=timing.step_s,
         feedback=plant.feedback,
         diagonal=lti.decay_to_bits(plant.diagonal, lti.EXACT_BITS),
@@ -159,7 +159,7 @@ def arrays(loop: PointingLoop, controller: LoopController, seed: int) -> kernels
         play_start=plant.play_start,
         play_threshold=plant.play_threshold,
         play_weight=plant.play_weight,
-        optics=np.ascontiguousarray(exact(loop.optics), dtype=float),
+        optics=np.asarray(exact(loop.optics), dtype=float),
         shaping_diagonal=shaping.diagonal,
         shaping_coupling=shaping.coupling,
         shaping_noise=exact(shaping.noise),
@@ -176,14 +176,15 @@ def arrays(loop: PointingLoop, controller: LoopController, seed: int) -> kernels
         gauge_noise=gauge.noise_rad,
         gauge_resolution=gauge.resolution_rad,
         feedforward=controller.inverse is not None,
-        A=np.ascontiguousarray(controller.system.A, dtype=float),
-        B=np.ascontiguousarray(controller.system.B, dtype=float),
-        C=np.ascontiguousarray(controller.system.C, dtype=float),
-        D=np.ascontiguousarray(controller.system.D, dtype=float),
-        L=np.ascontiguousarray(controller.anti_windup, dtype=float),
+        A=np.asarray(controller.system.A, dtype=float),
+        B=np.asarray(controller.system.B, dtype=float),
+        C=np.asarray(controller.system.C, dtype=float),
+        D=np.asarray(controller.system.D, dtype=float),
+        L=np.asarray(controller.anti_windup, dtype=float),
         actuator=np.tile(np.array(row), (actuators, 1)),
         **inverse_arrays(inverse, timing.period_s),
     )
+    return kernels.by_rows(found)
 
 
 def check_controller(loop: PointingLoop, controller: LoopController) -> None:
