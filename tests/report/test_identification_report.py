@@ -19,7 +19,6 @@ from microrad.lab.identify import Refused, identify, mirror_file_text
 from microrad.lab.recording import Finding, recording_from_arrays
 from microrad.report import identification_figures as figures
 from microrad.report import identification_words as words
-from microrad.report.figures import MOST_POINTS
 from microrad.report.identification import BEGINS
 from microrad.report.identification_parameters import (
     ParameterRow,
@@ -28,6 +27,9 @@ from microrad.report.identification_parameters import (
     starts_text,
     two_digits,
 )
+from microrad.report.plotting.interactive import plot_of
+from microrad.report.plotting.palette import MOST_POINTS
+from microrad.report.plotting.sheet import BLUE, SKY, VERMILION, Line
 from report_pages import assert_sound, without_scripts
 
 RATE_HZ = 2000.0
@@ -265,41 +267,36 @@ def test_a_page_without_linear_part_says_why(static, tmp_path):
 
 # ------------------------------------------------------------------------------------------------------ the figures
 def test_every_axis_has_a_label_with_its_unit(full, recordings):
-    shown = figures.shown(full, recordings)
-    drawings = [
-        figures.excitation(shown, full),
-        figures.response(full.linear),
-        figures.poles(full.linear),
-        figures.loops(shown, full),
-        figures.time_response(full, recordings),
-        figures.residuals(shown),
-        figures.residual_tests(full),
-    ]
-    for drawing in drawings:
-        shared = drawing.title.startswith("Frequency response")
-        for axes in drawing.canvas.axes:
-            assert re.fullmatch(r"[a-z ]+ \([^()]+\)", axes.get_ylabel()), (drawing.title, axes.get_ylabel())
-            if not shared or axes is drawing.canvas.axes[-1]:
-                assert re.fullmatch(r"[a-z ]+ \([^()]+\)", axes.get_xlabel()), drawing.title
-            assert axes.lines or axes.collections, drawing.title
-    assert len(drawings[0].canvas.axes) == 2 * len(shown) == 10
+    drawn = figures.draw(full, recordings)
+    for figure in drawn.values():
+        for panel in figure.sheet.panels:
+            assert re.fullmatch(r"[a-z ]+ \([^()]+\)", panel.y.title), (figure.title, panel.y.title)
+            if not figure.sheet.share_x or panel is figure.sheet.panels[-1]:
+                assert re.fullmatch(r"[a-z ]+ \([^()]+\)", panel.x.title), figure.title
+            assert any(line.x.size for line in panel.all_of(Line)), figure.title
+    assert len(drawn["excitation"].sheet.panels) == 2 * len(figures.shown(full, recordings)) == 10
 
 
 def test_loops_show_measured_and_modelled_output_and_the_hysteresis(full, recordings):
-    shown = figures.shown(full, recordings)
-    drawing = figures.loops(shown, full)
-    left, right = drawing.canvas.axes[:2]
+    drawing = figures.loops(figures.shown(full, recordings), full)
+    left, right = drawing.sheet.panels[:2]
     p = words.chosen_predictions(full)[0]
-    measured, unseen, model = left.lines[0], left.lines[1], left.lines[-1]
-    assert [line.get_color() for line in (measured, unseen, model)] == [figures.SKY, figures.BLUE, figures.VERMILION]
+    lines = left.all_of(Line)
+    measured, unseen, model = lines[0], lines[1], lines[-1]
+    assert [line.colour for line in (measured, unseen, model)] == [SKY, BLUE, VERMILION]
+    assert [line.label for line in (measured, unseen, model)] == [
+        "measured, fitted",
+        "measured, unseen by the fit",
+        "modelled",
+    ]
     period = math.ceil(RATE_HZ / 60.0) + 1
-    assert unseen.get_xdata().size == pytest.approx(period, abs=1)
-    np.testing.assert_array_equal(unseen.get_xdata(), full.recordings[0].drive[-unseen.get_xdata().size :, 0])
+    assert unseen.x.size == pytest.approx(period, abs=1)
+    np.testing.assert_array_equal(unseen.x, full.recordings[0].drive[-unseen.x.size :, 0])
     moved = 1e3 * (p.measured_rad - p.model_rad)[-period:]
-    np.testing.assert_allclose(unseen.get_ydata() - model.get_ydata(), moved, atol=1e-12)
-    assert np.ptp(right.lines[1].get_ydata()) / 1e3 < 0.5 * np.ptp(unseen.get_ydata())
-    assert "60 Hz, ± 6 V" in right.get_title(loc="left")
-    assert "unseen" in right.get_title(loc="left")
+    np.testing.assert_allclose(unseen.y - model.y, moved, atol=1e-12)
+    assert np.ptp(right.all_of(Line)[1].y) / 1e3 < 0.5 * np.ptp(unseen.y)
+    assert "60 Hz, ± 6 V" in right.title
+    assert "unseen" in right.title
 
 
 def test_the_papers_figures_are_named_only_where_they_are_shown(full, recordings):
@@ -331,18 +328,21 @@ def test_long_records_are_drawn_small_and_keep_their_peaks(static):
     residual[123_457] = 5e-6
     prediction = replace(shown.prediction, measured_rad=residual, model_rad=np.zeros(n), start=10, split=n // 2)
     drawing = figures.residuals([replace(shown, drive_v=np.arange(n) / n, prediction=prediction)])
-    lines = drawing.canvas.axes[0].lines[:2]
-    assert all(0 < line.get_xdata().size <= 2 * MOST_POINTS for line in lines)
-    assert np.max(lines[0].get_ydata()) == pytest.approx(5.0)
-    assert np.max(lines[1].get_ydata()) == 0.0
+    curves = [trace for trace in plot_of(drawing.sheet)["data"] if trace["mode"] == "lines"]
+    assert [trace["name"] for trace in curves] == ["fitted", "unseen"]
+    assert all(0 < len(trace["x"]) <= MOST_POINTS for trace in curves)
+    assert [max(trace["y"]) for trace in curves] == [pytest.approx(5.0), 0.0]
+    assert len(drawing.svg) < 60_000
 
 
 def test_only_some_of_many_recordings_are_drawn_and_the_caption_says_so(static):
     shown = figures.shown(static, [])[0]
     many = figures.residuals([shown] * (figures.MOST_RECORDINGS + 3))
-    assert len(many.canvas.axes) == figures.MOST_RECORDINGS
+    assert len(many.sheet.panels) == figures.MOST_RECORDINGS
     assert "3 more recordings are not drawn" in many.caption
-    assert "not drawn" not in figures.residuals([shown] * 3).caption
+    three = figures.residuals([shown] * 3)
+    assert "not drawn" not in three.caption
+    assert len(three.sheet.panels) == 3  # the fourth place stays empty
 
 
 def test_the_spectrum_shows_amplitudes_and_a_chirp_is_told_from_noise():
@@ -350,6 +350,8 @@ def test_the_spectrum_shows_amplitudes_and_a_chirp_is_told_from_noise():
     freq, amplitude = figures.amplitude_spectrum(3 + 2 * np.sin(2 * np.pi * 50 * t), 1000.0)
     assert freq[np.argmax(amplitude)] == pytest.approx(50.0)
     assert amplitude.max() == pytest.approx(2.0, rel=1e-9)
+    long = figures.amplitude_spectrum(philox(1).standard_normal(600_000), 1000.0)[0]
+    assert 300 < long.size <= MOST_POINTS // 3  # each stroke has three points, and none is left out
     assert figures.is_chirp(chirp())
     noise = philox(0).standard_normal(4000)
     assert not figures.is_chirp(recording_from_arrays(noise, noise, RATE_HZ, "noise"))

@@ -246,6 +246,17 @@ def test_lines_and_spans_over_the_panel_go_on_when_one_zooms_out():
     assert across["line"]["dash"] == "dot"
 
 
+def test_a_span_without_an_end_goes_to_that_of_the_panel():
+    sheet = one(Line(X, Y), Span(-math.inf, 1.0, True, SKY), Span(1.5, math.inf, True, SKY), x={"low": -1.0})
+    (placed,) = layout(sheet).placed
+    shapes = turned(sheet)["layout"]["shapes"]
+    assert [(each["x0"], each["x1"]) for each in shapes] == [(-1, 1), (1.5, placed.x_ends[1])]
+    assert placed.x_ends[1] == pytest.approx(2.1)  # it asks for no room
+    rects = [each for each in parts(sheet, "rect") if each.get("fill") == SKY]
+    ends = [(float(each.get("x")), float(each.get("x")) + float(each.get("width"))) for each in rects]
+    assert (ends[0][0], ends[1][1]) == pytest.approx((placed.inner[0], placed.inner[2]), abs=0.02)
+
+
 def test_texts_stand_where_they_stand():
     inside = Words("here", 1.0, 4.0, GREY, anchor="middle", base="bottom", shift=(3.0, 1.5), box=True)
     sheet = one(Line(X, Y), inside, Words("beside", 1.0, 4.0, of_panel="x", shift=(5.0, 0.0)), x={"log": True})
@@ -269,6 +280,16 @@ def test_axes_keep_scale_limits_order_and_words():
     assert (x["type"], x["range"], x["title"]["text"]) == ("log", [0, 3], "frequency (Hz)")
     assert (y["range"], y["tickvals"], y["ticktext"]) == ([5, 2], [3, 4.5], ["three", "x"])
     assert {"1", "10", "100", "1000", "three", "x"} <= set(texts(sheet))
+
+
+@pytest.mark.parametrize(("low", "plain"), [(0.1, True), (1e-6, False)])
+def test_a_logarithmic_axis_has_plain_numbers_or_powers_of_ten_in_both_forms(low, plain):
+    sheet = one(Line(X, Y), y={"log": True, "low": low, "high": 100.0})
+    axis = turned(sheet)["layout"]["yaxis"]
+    assert (axis.get("tickformat"), axis.get("exponentformat")) == (("~g", None) if plain else (None, "power"))
+    assert ("0.1" in texts(sheet)) == plain
+    assert ("10⁻⁴" in texts(sheet)) != plain
+    assert axis["tickfont"]["size"] == (12 if plain else 9.6)  # plotly sets powers larger by a quarter
 
 
 @pytest.mark.parametrize(
@@ -328,6 +349,17 @@ def test_texts_below_an_axis_stand_apart_and_nothing_leaves_the_sheet():
     assert placed.outer[3] <= 4.0 * 72.0
 
 
+@pytest.mark.parametrize("height", np.linspace(1.8, 3.0, 25).tolist())
+def test_ticks_have_the_room_that_they_need_whatever_the_height(height):
+    sheet, (panel,) = grid(7.6, height)
+    panel.add(Line(X, np.array([0.0, 5.0, 9.7])))
+    panel.x.title, panel.y.title, panel.y.low = "error (µrad)", "rows (%)", 0.0
+    (placed,) = layout(sheet).placed
+    widest = max(scales.width_of(text, panel.y.size) for text in placed.y_ticks.values())
+    assert placed.inner[0] >= widest + scales.height_of("rows (%)", 9.0)
+    assert placed.inner[0] <= widest + scales.height_of("rows (%)", 9.0) + 20.0
+
+
 def test_panels_that_share_limits_follow_each_other_and_stand_at_their_places():
     sheet = Sheet(6.0, 4.0, heights=(2.0, 1.0), share_x=True)
     above, below = sheet.panel(0), sheet.panel(1)
@@ -384,6 +416,19 @@ def test_legends_of_panels_switch_their_own_curves_only():
     assert [(key["title"], key["entries"][0]["data"]) for key in keys] == [("15 Hz", [0]), ("25 Hz", [1])]
 
 
+def test_a_small_marker_is_seen_in_the_legend():
+    for marker, size in ((".", 7.0), ("o", 3.5)):
+        sheet = one(Line(X, Y, BLUE, "", label="measured", marker=marker, size=1.0))
+        sheet.legend = Legend("above")
+        (key,) = layout(sheet).keys
+        assert key.entries[0].size == size
+        assert turned(sheet)["keys"][0]["entries"][0]["marker"]["size"] == pytest.approx(3.5 * 96.0 / 72.0, abs=0.01)
+        assert only(turned(sheet))["marker"]["size"] < 1.5
+    large = one(Line(X, Y, BLUE, "", label="measured", marker="o", size=8.0))
+    large.legend = Legend("above")
+    assert layout(large).keys[0].entries[0].size == 8.0
+
+
 def test_a_legend_without_a_place_keeps_clear_of_the_curves():
     falling = one(Line(np.linspace(0.0, 1.0, 500), np.linspace(1.0, 0.0, 500), label="falls"))
     falling.panels[0].legend = Legend()
@@ -403,6 +448,15 @@ def test_decimation_keeps_ends_peaks_and_gaps():
     assert {0, 777, 99_999} <= set(kept.tolist())
     assert np.isnan(y[kept]).any()
     assert len(only(turned(one(Line(x, y))))["x"]) == kept.size
+
+
+def test_a_curve_over_time_has_as_many_swings_as_there_are_points_for():
+    time = np.arange(20_000.0)
+    high, low = thinned(time, np.sin(time)), thinned(np.sin(time / 3e3), np.sin(time))
+    assert MOST_POINTS * 0.95 < high.size <= MOST_POINTS
+    swings = [np.abs(np.diff(np.sin(time)[kept])) > 1.9 for kept in (high, low)]
+    assert swings[0].sum() > 550  # of 599 stretches
+    assert swings[1].sum() < 450  # where x says something too
 
 
 def test_a_closed_curve_keeps_the_extremes_of_both_coordinates():

@@ -230,6 +230,7 @@ def _sensitivity(group: Sequence[Sensitivity], keys: Sequence[str], number: int,
         panel.title = short(each.output, 30)
         panel.x = Axis("index", low=0.0, high=1.05, ticks=(0.0, 0.5, 1.0))
         panel.y = _rows([label_of(key, keys) for key in shown])
+        panel.y.grid = False
         panel.add(*_index_bars(each, shown))
     columns = {
         f"{each.output}, {key}, {kind} index": np.array([i.value, i.low, i.high])
@@ -255,7 +256,7 @@ def _sensitivity(group: Sequence[Sensitivity], keys: Sequence[str], number: int,
 
 def _rows(texts: Sequence[str]) -> Axis:
     """An axis with a text at each row, the first on top."""
-    return Axis(low=len(texts) - 0.4, high=-0.6, ticks=dict(enumerate(texts)), grid=False, size=8.0)
+    return Axis(low=len(texts) - 0.4, high=-0.6, ticks=dict(enumerate(texts)), size=8.0)
 
 
 def _index_bars(each: Sensitivity, shown: Sequence[str]) -> Iterator[Bars | Line]:
@@ -438,7 +439,7 @@ def _maps(
             values[at] = found.value * each.scale.factor
         panel.title, panel.face = each.scale.title(each.name), "#dddddd"
         panel.x = _steps(label_of(keys[across], keys).replace("\n", ""), levels[across], 12)
-        panel.y = _steps(label_of(keys[down], keys), levels[down], 24)
+        panel.y = _steps("" if panel.column else label_of(keys[down], keys), levels[down], 24)
         panel.y.low, panel.y.high = len(levels[down]) - 0.5, -0.5  # the first on top
         panel.add(*_numbered(values))
     return sheet

@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from microrad.core.arrays import Floats
+from microrad.report.plotting import scales
 from microrad.report.plotting.layout import INCH, Box, Entry, Key, Layout, Placed, layout
 from microrad.report.plotting.palette import CIVIDIS, clear, thinned
 from microrad.report.plotting.sheet import (
@@ -34,6 +35,7 @@ from microrad.report.plotting.sheet import (
 )
 
 DIGITS = 6
+_POWERS = 1.25  # by so much plotly sets powers of ten larger than other texts
 _PER_POINT = 96.0 / INCH  # CSS pixels
 _WITH_UNIT = re.compile(r"(?P<name>.*\S)\s*\((?P<unit>[^()]+)\)", re.DOTALL)
 _DASHES = {"-": "solid", "--": "dash", "-.": "dashdot", ":": "dot"}
@@ -184,7 +186,10 @@ def _axis(of: Placed, axis: Axis, ends: tuple[float, float], shown: bool, other:
         return made | {"showticklabels": False, "ticks": ""}
     if axis.log:
         low, high = sorted(math.log10(end) for end in ends)
-        return made | {"exponentformat": "power", "nticks": max(math.ceil(high - low) + 1, 5)}
+        made["nticks"] = max(math.ceil(high - low) + 1, 5)
+        if scales.plain(ends):
+            return made | {"tickformat": "~g"}
+        return made | {"exponentformat": "power", "tickfont": {"size": _pixels(axis.size / _POWERS)}}
     return made | {"exponentformat": "power", "minexponent": 5}
 
 

@@ -192,9 +192,14 @@ def texts(at: Sequence[float]) -> list[str]:
 
 def powers(at: Sequence[float]) -> list[str]:
     """Ticks of a logarithmic axis: plain numbers where none is very small or large, else powers of ten."""
-    if all(1e-3 <= each <= 1e4 for each in at):
+    if plain(at):
         return [f"{each:g}" for each in at]
     return [power_text(each) for each in at]
+
+
+def plain(numbers: Sequence[float]) -> bool:
+    """Whether numbers on a logarithmic axis are read best without powers of ten."""
+    return all(1e-3 <= each <= 1e4 for each in numbers)
 
 
 def power_text(number: float) -> str:
