@@ -137,5 +137,5 @@ def test_a_job_aside_is_done_in_another_process_that_says_nothing_of_its_end(tmp
 def test_no_job_is_done_aside_while_other_threads_run():
     done = []
     with ThreadPoolExecutor(1) as pool:
-        pool.submit(lambda: aside(lambda: done.append(1))()).result()
+        pool.submit(aside, lambda: done.append(1)).result()()
     assert done == []
