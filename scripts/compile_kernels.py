@@ -1,11 +1,17 @@
-"""Compile the ensemble of loops, which takes half a minute: each process of a first test run would do it for itself."""
+"""Compile the loops that most tests run: each process of a first test run would take half a minute for it."""
 
 from pathlib import Path
 
 from microrad import load_mission, mirror
 from microrad.link.tracking_light import tracking_light_w
-from microrad.loop import fine_pointing
+from microrad.loop import fine_pointing, paper_cases
+from microrad.study import alternatives
 
 file = load_mission(Path(__file__).parent.parent / "missions" / "leo-geo.toml")
-scene = fine_pointing.scene(file, mirror.of(file.mission), tracking_light_w(file))
+mirrors = mirror.of(file.mission)
+scene = fine_pointing.scene(file, mirrors, tracking_light_w(file))
 fine_pointing.run_one(scene, "PI")
+cases = paper_cases.of(file.mission, mirrors)
+paper_cases.hysteresis_loops(cases)
+runs = paper_cases.tracking_runs(cases)
+alternatives.others(file.mission, paper_cases.worst(runs, file.mission.requirement.residual_statistic))

@@ -10,7 +10,7 @@ from functools import partial
 import pytest
 
 from microrad.core import threads
-from microrad.core.threads import both, in_threads, shared_out
+from microrad.core.threads import aside, both, in_threads, shared_out
 from waiting import HANG_S
 
 
@@ -110,3 +110,32 @@ end.set()
 """
     ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert (ran.returncode, ran.stderr) == (0, "")
+
+
+ASIDE = """
+import os, sys
+from microrad.core.threads import aside
+
+def job():
+    with open(sys.argv[1], "a") as file:
+        file.write(str(os.getpid()))
+    raise KeyboardInterrupt  # as Ctrl-C does in all processes of a terminal
+
+aside(job)()
+assert open(sys.argv[1]).read() != str(os.getpid())
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux" or os.cpu_count() == 1, reason="nothing is forked")
+def test_a_job_aside_is_done_in_another_process_that_says_nothing_of_its_end(tmp_path):
+    ran = subprocess.run(
+        [sys.executable, "-c", ASIDE, str(tmp_path / "by")], capture_output=True, text=True, check=False
+    )
+    assert (ran.returncode, ran.stderr) == (0, "")
+
+
+def test_no_job_is_done_aside_while_other_threads_run():
+    done = []
+    with ThreadPoolExecutor(1) as pool:
+        pool.submit(aside, lambda: done.append(1)).result()()
+    assert done == []

@@ -1259,3 +1259,20 @@ def test_a_lost_spot_is_counted_its_last_reading_held_and_the_loop_recovers():
     assert_array_equal(traced.measured_rad[~lost], traced.error_rad[~lost])
     assert np.max(np.abs(traced.error_rad[2100:])) < 0.05 * URAD
     assert ensemble.run(*excursion(0.6), Span(0.6, 0.0, 1), 1).counts[0, kernels.COUNT_LOST] == 0
+
+
+# --------------------------------------------------------------------------------------------------- compiled ahead
+
+
+def test_the_kernels_are_compiled_aside_for_loops_of_any_kind_where_the_cache_lacks_them(monkeypatch):
+    heard = []
+    monkeypatch.setattr(ensemble, "aside", lambda job: heard.append(job) or "wait")
+    monkeypatch.setattr(kernels, "is_compiled", lambda loop: loop is kernels.ensemble_loop)
+    assert ensemble.compile_aside(coupled)() is None
+    assert heard == []
+    monkeypatch.setattr(kernels, "is_compiled", lambda loop: loop is not kernels.ensemble_loop)
+    assert ensemble.compile_aside(coupled) == "wait"
+    heard[0]()
+    compiled = list(kernels.ensemble_loop.signatures)
+    ensemble.run(scenario(), pi_for(scenario()), Span(0.01, 0.0, 1), 1)
+    assert kernels.ensemble_loop.signatures == compiled != []

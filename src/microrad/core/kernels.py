@@ -81,6 +81,15 @@ def _compile(function: Callable[..., Any], **options: Any) -> Any:
     return compiled
 
 
+def is_compiled(loop: Any) -> bool:
+    """Whether the cache holds machine code of this loop for this processor."""
+    cache = getattr(loop, "_cache", None)
+    if cache is None:  # under NUMBA_DISABLE_JIT
+        return True
+    _, *ours = cache._index_key((), loop.targetctx.codegen())  # signature, processor, code
+    return any([*key[1:]] == ours for key in cache._cache_file._load_index())
+
+
 # Columns of a Bouc-Wen parameter row: Eq. 3 of SPIE 11852, 118523B, then the asymmetry between the signs of h and
 # between rising and falling drive, the exponent less 1, and 1 / size of h at which the exponent has no effect.
 D1, D2, EPSILON, DELTA, ALPHA, BETA, RATE_LIMIT, BIAS, GAMMA, ETA, POWER, PER_SIZE = range(12)
@@ -103,9 +112,9 @@ def _merge(function: Callable[..., Any]) -> Any:
     return _compile(function, forceinline=True, no_cpython_wrapper=True)
 
 
-# What has as many items as there are of something; the items mean nothing. The length of a tuple is part of the type that
-# is compiled for, so that short loops over it are unrolled; but each new set of them compiles again, for seconds. The
-# length of an array is a number like any other: one compiled loop serves all sizes, at half the speed of small ones.
+# What has as many items as there are of something; the items mean nothing. The length of a tuple is part of its type:
+# short loops over it are unrolled, but each new set of lengths is compiled again, for seconds. The length of an array
+# is a number like any other: one compiled loop serves all sizes, at half the speed where they are small.
 Count = tuple[int, ...] | Floats
 
 UNROLLED = {"states": 5, "actuators": 1, "outputs": 1, "elements": 1, "operators": 0}  # the paper's mirror, on one axis
@@ -396,7 +405,7 @@ def bouc_wen_kernel(drive, step_s, rows, hysteresis0, output, hysteresis):  # ty
     Returns the number of rate-clamped samples. The rate is the backward difference, zero at the first sample.
     """
     h = hysteresis0
-    clamped = 0
+    clamped, row = 0, np.int64(0)  # no literal: it would compile what it calls once more
     previous = drive[0]
     for k in range(drive.size):
         travel = drive[k] - previous
@@ -404,7 +413,7 @@ def bouc_wen_kernel(drive, step_s, rows, hysteresis0, output, hysteresis):  # ty
         if abs(rate) > rows[0, RATE_LIMIT]:
             clamped += 1
             rate = _clamp(rate, rows[0, RATE_LIMIT])
-        h = _bouc_wen_advance(h, travel, rate, rows, 0)
+        h = _bouc_wen_advance(h, travel, rate, rows, row)
         linear = rows[0, D1] * _near_exp(-rows[0, D2] * rate) * (drive[k] + rows[0, BIAS])
         output[k] = linear - rows[0, D1] * rows[0, BIAS] + h
         hysteresis[k] = h

@@ -86,6 +86,25 @@ def both(first: Callable[[], _First], second: Callable[[], _Second]) -> tuple[_F
     return of_first, of_second
 
 
+def aside(job: Callable[[], object]) -> Callable[[], None]:
+    """Begin a job in a forked process beside this one; the callable waits for its end.
+
+    What it returns, and its errors, are dropped. Where there is a single core, or no process can be forked (see
+    `shared_out`), it is not done at all.
+    """
+    if not _may_fork() or (os.cpu_count() or 1) < 2:
+        return lambda: None
+    context: Any = multiprocessing.get_context("fork")
+    process = context.Process(target=_quietly, args=(job,), daemon=True)
+    process.start()
+    return process.join  # type: ignore[no-any-return]
+
+
+def _quietly(job: Callable[[], object]) -> None:
+    with contextlib.suppress(BaseException):
+        job()
+
+
 def _may_fork() -> bool:
     return sys.platform == "linux" and len(list(Path("/proc/self/task").iterdir())) == 1
 

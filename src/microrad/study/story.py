@@ -15,6 +15,7 @@ from microrad.link import study as link_study
 from microrad.link import under_jitter as link_performance
 from microrad.link.tracking_light import tracking_light_w
 from microrad.loop import control, fine_pointing, paper_cases, sine_run
+from microrad.loop.fine_loop import ensemble
 from microrad.mirror import Variant
 from microrad.mirror import summary as mirror_summary
 from microrad.mission.file import LinkFile, MissionFile, with_contents
@@ -157,6 +158,7 @@ def run(
     m, sources = file.mission, file.sources
     mirrors = mirror.of(m)
     cases = paper_cases.of(m, mirrors)
+    compiled = ensemble.compile_aside(lambda: _scene(file, mirrors).loop) if m.fine_pointing else lambda: None
     on_progress(0, 3, "budgets, acquisition, mirror and tracking")
     (summary, loops, margins, runs), (links, fig2) = both(
         lambda: (
@@ -177,8 +179,8 @@ def run(
     scan = parts.part(paper.scan, cases, on_progress=on_progress) if paper.applies(m) else None
     fine = None
     if m.fine_pointing is not None:
-        scene = fine_pointing.scene(file, mirrors, tracking_light_w(file))
-        fine = parts.part(fine_pointing.run, scene, on_progress=on_progress)
+        compiled()
+        fine = parts.part(fine_pointing.run, _scene(file, mirrors), on_progress=on_progress)
     on_progress(2, 3, "the day")
     found = pointing_cost.run(m, runs, fine)
     case = best_case(found, fine)
@@ -211,6 +213,10 @@ def run(
         papers_loop=papers_loop,
         claims=verdict.against_paper(evidence),
     )
+
+
+def _scene(file: MissionFile, mirrors: mirror.MirrorParts) -> fine_pointing.Scene:
+    return fine_pointing.scene(file, mirrors, tracking_light_w(file))
 
 
 def solve_rate(file: MissionFile) -> MissionFile:

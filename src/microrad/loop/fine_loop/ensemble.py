@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from microrad import mirror
-from microrad.core import kernels, lti
+from microrad.core import compiling, kernels, lti
 from microrad.core.arrays import Floats
 from microrad.core.progress import Progress
-from microrad.core.threads import in_threads
+from microrad.core.threads import aside, in_threads
 from microrad.loop import disturbance
 from microrad.loop.control import amplifier_factor, inverse_arrays, no_feedforward
 from microrad.loop.fine_loop.loop import LoopController, PointingLoop
@@ -348,6 +348,26 @@ def uniform(gaussians: Floats) -> Floats:
     from scipy.special import ndtr  # slow to import, not needed to show help
 
     return np.asarray(2.0 * math.pi * ndtr(gaussians))
+
+
+def compile_aside(of: Callable[[], PointingLoop]) -> Callable[[], None]:
+    """Begin to compile the kernels of an ensemble in a process beside this one, if the cache lacks them.
+
+    They do not depend on the loop, ``of``: it is an example to compile them by. The callable waits for the end.
+    """
+    if kernels.is_compiled(kernels.ensemble_loop):
+        return lambda: None
+    compiling.begins()
+    return aside(lambda: _one_sample(of()))
+
+
+def _one_sample(loop: PointingLoop) -> None:
+    """A sample of an ensemble with a controller that does nothing."""
+    inputs, m = loop.axes + loop.mirror.axes + loop.axes, loop.mirror.actuators
+    nothing = lti.StateSpace(np.zeros((0, 0)), np.zeros((0, inputs)), np.zeros((m, 0)), np.zeros((m, inputs)))
+    p = arrays(loop, LoopController("nothing", nothing, np.zeros((0, m))), 0)
+    kept = np.empty((0, 0, 0))
+    kernels.ensemble_loop(p, start(loop, p, 0), reference(loop, 0, 1), kept, kept, kernels.UNSHIFTED)
 
 
 @dataclass(frozen=True, slots=True)
