@@ -1086,6 +1086,9 @@ class EnsembleState(NamedTuple):
     ``place``: control sample, plant step, and 1 where statistics are taken. Rows too: ``sum_square`` (axes) and
     ``largest`` (radial error squared) of every plant step, ``sum`` (axes) of the control samples, ``counts`` (COUNT_*).
     ``histogram`` (LANES, BINS) counts the radial error at the end of each control sample.
+
+    ``drawn`` is empty where the runs draw their random numbers themselves. Else it is what `draw_loop` has drawn for
+    the control samples of the next call: runs of other controllers and on other mirrors share it.
     """
 
     first_run: Indices
@@ -1117,6 +1120,7 @@ class EnsembleState(NamedTuple):
     largest: Floats
     counts: Floats
     histogram: NDArray[np.int32]
+    drawn: Floats
 
 
 SAMPLE, STEP, COUNTING = range(3)  # of ``place``
@@ -1241,6 +1245,14 @@ def _copy(source, target, first, count):  # type: ignore[no-untyped-def]
     at = _at(first)
     for r in range(_at(count)):
         target[at + r] = source[r]
+
+
+@_compile
+def _take(source, first, target, count):  # type: ignore[no-untyped-def]
+    """The rows from ``first`` on of one array to the first rows of another."""
+    at = _at(first)
+    for r in range(_at(count)):
+        target[r] = source[at + r]
 
 
 # Philox 4x32 with ten rounds (Salmon et al., SC11): numbers by counter and key, so that no run waits for another.
@@ -1595,12 +1607,26 @@ def _ensemble_amplifier(p, s, due):  # type: ignore[no-untyped-def]
 def _ensemble_disturbance(p, s, shift):  # type: ignore[no-untyped-def]
     """The disturbance one plant step on, from four steps' worth of random numbers at a time."""
     step = s.place[STEP]
-    if step % 4 == 0:
-        for w in range(p.purpose.size):
-            _gaussians(p.seed, s.first_run[0], p.purpose[w], step // 4, s.gauss, _at(4 * w))
+    _draw_sources(p, s)
     k = step - shift.first_sample * p.steps_per_sample
     if 0 <= k < shift.step.shape[0]:
         _shift_rows(shift.step[k], shift.size, s.gauss, step % 4, 4)
+    _shape(p, s)
+
+
+@_inline
+def _draw_sources(p, s):  # type: ignore[no-untyped-def]
+    """The random numbers of the disturbances' sources, where those of the last four steps are used up."""
+    step = s.place[STEP]
+    if step % 4 == 0:
+        for w in range(p.purpose.size):
+            _gaussians(p.seed, s.first_run[0], p.purpose[w], step // 4, s.gauss, _at(4 * w))
+
+
+@_inline
+def _shape(p, s):  # type: ignore[no-untyped-def]
+    """The disturbance one plant step on, from the random numbers at hand."""
+    step = s.place[STEP]
     _modal_step(p.shaping_diagonal, p.shaping_coupling, s.shaping)
     for i in range(p.shaping_diagonal.size):
         _weigh_some(p.shaping_noise[i], s.gauss, step % 4, 4, s.shaping, _at(i), False)
@@ -1652,15 +1678,24 @@ def _count_radial(error, axes, work, total, histogram):  # type: ignore[no-untyp
 
 
 @_inline
-def _measure(p, s, reference, shift):  # type: ignore[no-untyped-def]
-    """The readings m of a control sample: optical, gauge, reference."""
+def _draw_sensors(p, s):  # type: ignore[no-untyped-def]
+    """The random numbers of a control sample's readings."""
+    for word in range(0, p.optics.shape[0] + p.optics.shape[1], 4):
+        purpose = np.uint64(SENSOR_PURPOSE + word // 4)
+        _gaussians(p.seed, s.first_run[0], purpose, s.place[SAMPLE], s.sensor_gauss, _at(word))
+
+
+@_inline
+def _measure(p, s, reference, shift, drawn):  # type: ignore[no-untyped-def]
+    """The readings m of a control sample: optical, gauge, reference. ``drawn`` is its first row of what is drawn."""
     axes, outputs, sample = p.optics.shape[0], p.optics.shape[1], s.place[SAMPLE]
     noisy = p.gauge_noise > 0.0
     for i in range(axes):
         noisy = noisy or p.optical_noise[i] > 0.0
-    for word in range(0, axes + outputs if noisy else 0, 4):
-        purpose = np.uint64(SENSOR_PURPOSE + word // 4)
-        _gaussians(p.seed, s.first_run[0], purpose, sample, s.sensor_gauss, _at(word))
+    if noisy and s.drawn.size > 0:
+        _take(s.drawn, drawn, s.sensor_gauss, axes + outputs)
+    elif noisy:
+        _draw_sensors(p, s)
     k = sample - shift.first_sample
     if noisy and 0 <= k < shift.sample.shape[0]:
         _shift_rows(shift.sample[k], shift.size, s.sensor_gauss, 0, 1)
@@ -1807,6 +1842,30 @@ def _record(k, rows, width, trace, channel):  # type: ignore[no-untyped-def]
 
 
 @_compile
+def draw_loop(p, s, samples, drawn):  # type: ignore[no-untyped-def]
+    """What LANES runs draw over some control samples, into the rows of ``drawn``, flat, sample by sample.
+
+    For each: a random number for every reading (optical by axis, then gauge by output), then at every plant step's end
+    the disturbance by axis. Loops alike in their disturbances, clock, axes and outputs draw the same. Of the state the
+    disturbance goes on, and nothing else.
+    """
+    axes, steps, words = p.optics.shape[0], p.steps_per_sample, p.optics.shape[0] + p.optics.shape[1]
+    row = 0
+    for _ in range(samples):
+        _draw_sensors(p, s)
+        _copy(s.sensor_gauss, drawn, row, words)
+        row += words
+        for _ in range(steps):
+            if p.shaping_diagonal.size > 0:
+                _draw_sources(p, s)
+                _shape(p, s)
+            _copy(s.disturbance, drawn, row, axes)
+            row += axes
+            s.place[STEP] += 1
+        s.place[SAMPLE] += 1
+
+
+@_compile
 def ensemble_loop(p, s, reference, residual, trace, shift):  # type: ignore[no-untyped-def]
     """Advance LANES runs over the control samples of ``reference``, linear between them.
 
@@ -1821,8 +1880,10 @@ def ensemble_loop(p, s, reference, residual, trace, shift):  # type: ignore[no-u
     axes, steps, actuators = p.optics.shape[0], p.steps_per_sample, p.actuator.shape[0]
     length = s.command.size // (actuators * LANES)
     ring_length = p.sensor_delay_steps + 1
+    words = axes + p.optics.shape[1]
     for k in range(reference.shape[0] - 1):
-        _measure(p, s, reference[k], shift)
+        drawn = k * (words + steps * axes)
+        _measure(p, s, reference[k], shift, drawn)
         _control(p, s, length)
         if residual.shape[0] > 0:
             _record(k, s.error, axes, residual, 0)
@@ -1835,7 +1896,9 @@ def ensemble_loop(p, s, reference, residual, trace, shift):  # type: ignore[no-u
             due = (s.place[SAMPLE] + length + (j - p.delay_steps) // steps) % length
             _ensemble_amplifier(p, s, due)
             _ensemble_plant(p, s)
-            if p.shaping_diagonal.size > 0:
+            if s.drawn.size > 0:
+                _take(s.drawn, drawn + words + j * axes, s.disturbance, axes)
+            elif p.shaping_diagonal.size > 0:
                 _ensemble_disturbance(p, s, shift)
             s.place[STEP] += 1
             share = (j + 1) / steps
