@@ -1363,10 +1363,22 @@ def _weigh(weights, rows, first, stride, total, at, fresh):  # type: ignore[no-u
         j += 1
         if gain == 0.0:
             continue
-        if j < weights.size and weights[j] != 0.0:  # two at a time
+        if j < weights.size and weights[j] != 0.0:  # two at a time, or two and two with the total in hand
             other, second = weights[j], _at(first + stride * j)
             j += 1
-            if fresh:
+            if j + 1 < weights.size and (weights[j] != 0.0) & (weights[j + 1] != 0.0):
+                near, third = weights[j], _at(first + stride * j)
+                far, fourth = weights[j + 1], _at(first + stride * (j + 1))
+                j += 2
+                if fresh:
+                    for r in range(_ROW):
+                        begun = gain * rows[source + r] + other * rows[second + r]
+                        total[at + r] = begun + (near * rows[third + r] + far * rows[fourth + r])
+                else:
+                    for r in range(_ROW):
+                        begun = total[at + r] + (gain * rows[source + r] + other * rows[second + r])
+                        total[at + r] = begun + (near * rows[third + r] + far * rows[fourth + r])
+            elif fresh:
                 for r in range(_ROW):
                     total[at + r] = gain * rows[source + r] + other * rows[second + r]
             else:
@@ -1474,6 +1486,15 @@ def _advance_bouc_wen(rows, e, bank, at, rate_gain, counts):  # type: ignore[no-
     limit, delta, d2 = rows[e, RATE_LIMIT], rows[e, DELTA], -rows[e, D2]
     d1, bias, epsilon = rows[e, D1], rows[e, BIAS], rows[e, EPSILON]
     alpha, beta, gamma, eta = rows[e, ALPHA], rows[e, BETA], rows[e, GAMMA], rows[e, ETA]
+    if (epsilon == 0.0) & (d2 == 0.0):  # a slow gain alone, as without hysteresis: h stays 0
+        for r in range(_ROW):
+            q = bank[at + _at(BANK_Q_NEXT) + r]
+            free = (q - bank[at + _at(BANK_Q) + r]) * rate_gain
+            counts[_at(COUNT_CLAMPED) + r] += 0.0 if free == min(max(free, -limit), limit) else 1.0
+            bank[at + _at(BANK_Z_BEFORE) + r] = bank[at + _at(BANK_Z) + r]
+            bank[at + _at(BANK_Z) + r] = d1 * (q + bias) - d1 * bias
+            bank[at + _at(BANK_Q) + r] = q
+        return
     crossing, small = 0, abs(d2) * limit <= 0.02
     # Two loops: their chains of arithmetic are long, and shorter ones overlap better from run to run.
     for r in range(_ROW):
@@ -1551,7 +1572,8 @@ def _ensemble_plant(p, s):  # type: ignore[no-untyped-def]
     states, elements, several = p.diagonal.size, p.G.shape[0], p.rest.value.size > 0
     if several:  # before x moves
         for i in range(states):
-            _clear(s.x_next, _at(i))
+            if p.rest.start[i] < p.rest.start[i + 1]:
+                _clear(s.x_next, _at(i))
             for j in range(p.rest.start[i], p.rest.start[i + 1]):
                 gain, source, target = p.rest.value[j], _at(p.rest.column[j]), _at(i)
                 for r in range(_ROW):
@@ -1567,7 +1589,7 @@ def _ensemble_plant(p, s):  # type: ignore[no-untyped-def]
     for i in range(states):
         _weigh_some(p.B0[i], s.drive, DRIVE_BEFORE, DRIVE_FIELDS, s.x, _at(i), False)
         _weigh_some(p.B1[i], s.drive, DRIVE_NOW, DRIVE_FIELDS, s.x, _at(i), False)
-        if several:
+        if several and p.rest.start[i] < p.rest.start[i + 1]:
             for r in range(_ROW):
                 s.x[_at(i) + r] += s.x_next[_at(i) + r]
     if p.feedback:
