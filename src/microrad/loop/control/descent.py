@@ -44,24 +44,35 @@ class _Local:
     def __init__(self, search: Search) -> None:
         self._search = search
         self._known: dict[bytes, Trial] = {}
-        self._slopes: dict[bytes, Floats] = {}
+        self._near: dict[bytes, list[Trial]] = {}
+        self._asked = False
 
     def at(self, place: Floats) -> Trial:
+        """The trial at a place; what its slopes take is judged along with it where those of the last one were asked."""
         key = place.tobytes()
         if key not in self._known:
-            self._known[key] = self._search.at(place)
+            beside = self._beside(place) if self._asked else []
+            self._known[key], *self._near[key] = self._search.at_all([place, *beside])
+            self._asked = False
         return self._known[key]
 
     def slopes(self, place: Floats) -> Floats:
         """Gradients of cost and constraints (rows), by a step towards the middle of the bounds."""
-        key = place.tobytes()
-        if key not in self._slopes:
-            inside = np.clip(place, 0.0, 1.0)  # a line search may look beyond
-            steps = np.where(inside < 0.5, STEP, -STEP)
-            beside = self._search.at_all([_with(inside, i, inside[i] + step) for i, step in enumerate(steps)])
-            here = _numbers(self.at(place))
-            self._slopes[key] = np.array([(_numbers(t) - here) / step for t, step in zip(beside, steps, strict=True)]).T
-        return self._slopes[key]
+        here, key = self.at(place), place.tobytes()
+        self._asked = True
+        self._near[key] = self._near[key] or self._search.at_all(self._beside(place))
+        steps = _steps(place)
+        return np.array(
+            [(_numbers(t) - _numbers(here)) / step for t, step in zip(self._near[key], steps, strict=True)]
+        ).T
+
+    def _beside(self, place: Floats) -> list[Floats]:
+        inside = np.clip(place, 0.0, 1.0)  # a line search may look beyond
+        return [_with(inside, i, inside[i] + step) for i, step in enumerate(_steps(place))]
+
+
+def _steps(place: Floats) -> Floats:
+    return np.where(place < 0.5, STEP, -STEP)
 
 
 def _with(place: Floats, i: int, x: float) -> Floats:
