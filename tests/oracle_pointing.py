@@ -413,6 +413,7 @@ def build_state(case, p, first_run, shaping, reference):
         first_run=np.array([first_run], dtype=np.uint64),
         place=np.array([0, 0, 1], dtype=np.int64),
         histogram=np.zeros((kernels.LANES, kernels.BINS), dtype=np.int32),
+        drawn=np.zeros(0),
         **{name: np.zeros(max(count, 1) * kernels.LANES) for name, count in lines.items()},
     )
     state.shaping[: shaping.size] = shaping.ravel()

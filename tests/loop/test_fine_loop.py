@@ -929,6 +929,27 @@ def test_results_are_those_of_the_run_whatever_the_threads_and_the_number_of_run
     assert np.unique(many.rms_rad).size == many.rms_rad.size
 
 
+def test_cases_that_share_what_they_draw_are_the_runs_that_each_would_be_alone():
+    """Other controllers, mirrors, noises and references share; another disturbance or clock does not, among them."""
+    loop, controller = noisy()
+    straight, slow = fine.without_hysteresis(loop), pi_for(loop, 30.0)
+    silent = replace(loop, optical=replace(loop.optical, noise_rad=0.0), gauge=None)
+    moved = replace(loop, references=(Reference(-50 * URAD, 0.0, 0.1),) * 2)
+    calm = replace(loop, disturbances=tuple(several[:1] for several in loop.disturbances))
+    quick = replace(loop, timing=Timing(2e-4, 4, 4))
+    loops = (loop, straight, silent, moved, calm, quick)
+    cases = [ensemble.Case(each, with_it) for each in loops for with_it in (controller, slow)]
+    cases[3] = replace(cases[3], spectrum=False)
+    span = Span(0.2, 0.05, 7)
+    for case, found in zip(cases, ensemble.several(cases, span, 70), strict=True):
+        alone = ensemble.run(case.loop, case.controller, span, 70)
+        for field in FIELDS:
+            if field == "psd_rad2_hz" and not case.spectrum:
+                assert np.all(np.isnan(found.psd_rad2_hz)) and not np.any(np.isnan(alone.psd_rad2_hz))
+            else:
+                assert_array_equal(getattr(found, field), getattr(alone, field))
+
+
 def test_another_seed_gives_other_numbers_and_the_same_seed_the_same():
     loop, controller = noisy()
     first, again, other, high = (

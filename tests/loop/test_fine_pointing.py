@@ -227,19 +227,19 @@ def test_the_parts_of_the_error_budget_combine_where_the_loop_is_linear(scene, f
 def test_the_budget_takes_the_whole_from_what_is_simulated_already(scene, file, tuned, monkeypatch, name):
     """To the bit the rms that the whole loop and the one without hysteresis leave when they are simulated again."""
     (verified,) = fine_pointing.verify(scene, [by_name(tuned[0])[name]])
-    simulate, simulated = ensemble.run, []
+    simulate, simulated = ensemble.several, []
 
-    def counted(loop, *rest, **options):
-        simulated.append(loop)
-        return simulate(loop, *rest, **options)
+    def counted(cases, *rest):
+        simulated.extend(cases)
+        return simulate(cases, *rest)
 
-    monkeypatch.setattr(ensemble, "run", counted)
+    monkeypatch.setattr(ensemble, "several", counted)
     budget = fine_pointing.error_budget(scene, verified)
     assert len(simulated) == len(budget.parts) + len(budget.differences) - 1
     span, runs = results.span(file.mission.fine_pointing), file.mission.fine_pointing.runs
     straight = parts.without(scene.loop, parts.HYSTERESIS)
     full, together = (
-        simulate(loop, results.for_mirror(verified.design.controller, loop), span, runs).radial_rms_rad
+        ensemble.run(loop, results.for_mirror(verified.design.controller, loop), span, runs).radial_rms_rad
         for loop in (scene.loop, straight)
     )
     assert (budget.full_rad, budget.together_rad) == (full, together)

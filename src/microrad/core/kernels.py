@@ -1002,6 +1002,126 @@ def closed_loop(plant, plant_state, loop, loop_state, reference, output, command
     loop_state.position[0] = position
 
 
+# ------------------------------------------------------------------------------------------- equations by doubling
+@_merge
+def _product(left, right, out):  # type: ignore[no-untyped-def]
+    """out = left right, row by row; out is another array than both."""
+    for i in range(left.shape[0]):
+        for j in range(out.shape[1]):
+            out[i, j] = 0.0
+        for k in range(left.shape[1]):
+            weight = left[i, k]
+            for j in range(out.shape[1]):
+                out[i, j] += weight * right[k, j]
+
+
+@_compile
+def _transpose(matrix, out):  # type: ignore[no-untyped-def]
+    for i in range(matrix.shape[0]):
+        for j in range(matrix.shape[1]):
+            out[j, i] = matrix[i, j]
+
+
+@_compile
+def _eliminate(matrix, right):  # type: ignore[no-untyped-def]
+    """right = matrix^-1 right by Gauss with the largest pivot of each column; nothing is left in matrix."""
+    n, columns = matrix.shape[0], right.shape[1]
+    for k in range(n):
+        best = k
+        for i in range(k + 1, n):
+            if abs(matrix[i, k]) > abs(matrix[best, k]):
+                best = i
+        if best != k:
+            for j in range(k, n):
+                matrix[k, j], matrix[best, j] = matrix[best, j], matrix[k, j]
+            for j in range(columns):
+                right[k, j], right[best, j] = right[best, j], right[k, j]
+        for i in range(k + 1, n):
+            share = matrix[i, k] / matrix[k, k]
+            if share != 0.0:
+                for j in range(k + 1, n):
+                    matrix[i, j] -= share * matrix[k, j]
+                for j in range(columns):
+                    right[i, j] -= share * right[k, j]
+    for k in range(n - 1, -1, -1):
+        pivot = matrix[k, k]
+        for j in range(columns):
+            right[k, j] /= pivot
+        for i in range(k):
+            share = matrix[i, k]
+            if share != 0.0:
+                for j in range(columns):
+                    right[i, j] -= share * right[k, j]
+
+
+@_compile
+def riccati_kernel(power, G, X, work, wide):  # type: ignore[no-untyped-def]
+    """Doubles A, B R^-1 B' and Q into the solution X = A' X (I + G X)^-1 A + Q; whether it has settled.
+
+    Structure-preserving doubling: Chu, Fan, Lin and Wang, International Journal of Control 77 (2004) 767. The first
+    three (n, n) are written over; ``work`` (4, n, n) and ``wide`` (n, 2 n) are room.
+    """
+    n = X.shape[0]
+    first, second, other, more = work[0], work[1], work[2], work[3]
+    for _ in range(60):
+        _product(G, X, other)
+        for i in range(n):
+            other[i, i] += 1.0
+            for j in range(n):
+                wide[i, j], wide[i, n + j] = power[i, j], G[i, j]
+        _eliminate(other, wide)
+        for i in range(n):
+            for j in range(n):
+                first[i, j], second[i, j] = wide[i, j], wide[i, n + j]
+        _transpose(power, other)
+        _product(second, other, more)  # G += power second power'
+        _product(power, more, second)
+        _product(X, first, more)  # X += power' X first
+        _product(other, more, wide[:, :n])
+        _product(power, first, other)
+        largest, moving = 0.0, False
+        for i in range(n):
+            for j in range(n):
+                power[i, j] = other[i, j]
+                X[i, j] += 0.5 * (wide[i, j] + wide[j, i])
+                more[i, j] = G[i, j] + second[i, j]
+                largest = max(largest, abs(X[i, j]))
+        for i in range(n):
+            moving = moving or abs(wide[i, i]) > 1e-14 * X[i, i]
+            for j in range(n):
+                G[i, j] = 0.5 * (more[i, j] + more[j, i])
+        if not largest < 1e150:
+            return False
+        if not moving:
+            return True
+    return False
+
+
+@_compile
+def gramian_kernel(power, X, work):  # type: ignore[no-untyped-def]
+    """Doubles A and Q into the solution X = A' X A + Q, as `lti.gramian`; both (n, n) are written over.
+
+    ``work`` (3, n, n) is room.
+    """
+    n = X.shape[0]
+    turned, half, more = work[0], work[1], work[2]
+    for _ in range(64):
+        _transpose(power, turned)
+        _product(X, power, half)
+        _product(turned, half, more)
+        moving = False
+        for i in range(n):
+            for j in range(n):
+                X[i, j] += more[i, j]
+            moving = moving or more[i, i] > 1e-15 * abs(X[i, i])
+        if not moving:
+            return
+        _product(power, power, half)
+        for i in range(n):
+            for j in range(n):
+                power[i, j] = half[i, j]
+
+
 # ------------------------------------------------------------------------------------------- many runs side by side
 # Runs in a row of memory: a count that the compiler knows, so that it works on several of them with one instruction.
 LANES = 64
@@ -1115,6 +1235,9 @@ class EnsembleState(NamedTuple):
     ``place``: control sample, plant step, and 1 where statistics are taken. Rows too: ``sum_square`` (axes) and
     ``largest`` (radial error squared) of every plant step, ``sum`` (axes) of the control samples, ``counts`` (COUNT_*).
     ``histogram`` (LANES, BINS) counts the radial error at the end of each control sample.
+
+    ``drawn`` is empty where the runs draw their random numbers themselves. Else it is what `draw_loop` has drawn for
+    the control samples of the next call: runs of other controllers and on other mirrors share it.
     """
 
     first_run: Indices
@@ -1146,6 +1269,7 @@ class EnsembleState(NamedTuple):
     largest: Floats
     counts: Floats
     histogram: NDArray[np.int32]
+    drawn: Floats
 
 
 SAMPLE, STEP, COUNTING = range(3)  # of ``place``
@@ -1277,6 +1401,14 @@ def _copy(source, target, first, count):  # type: ignore[no-untyped-def]
         target[at + r] = source[r]
 
 
+@_compile
+def _take(source, first, target, count):  # type: ignore[no-untyped-def]
+    """The rows from ``first`` on of one array to the first rows of another."""
+    at = _at(first)
+    for r in range(_at(count)):
+        target[r] = source[at + r]
+
+
 # Philox 4x32 with ten rounds (Salmon et al., SC11): numbers by counter and key, so that no run waits for another.
 _LOW32 = np.uint64(0xFFFFFFFF)
 _HALF_WORD = np.uint64(32)
@@ -1387,10 +1519,22 @@ def _weigh(weights, rows, first, stride, total, at, fresh):  # type: ignore[no-u
         j += 1
         if gain == 0.0:
             continue
-        if j < weights.size and weights[j] != 0.0:  # two at a time
+        if j < weights.size and weights[j] != 0.0:  # two at a time, or two and two with the total in hand
             other, second = weights[j], first + stride * np.uint64(j)
             j += 1
-            if fresh:
+            if j + 1 < weights.size and (weights[j] != 0.0) & (weights[j + 1] != 0.0):
+                near, third = weights[j], first + stride * np.uint64(j)
+                far, fourth = weights[j + 1], first + stride * np.uint64(j + 1)
+                j += 2
+                if fresh:
+                    for r in range(_ROW):
+                        begun = gain * rows[source + r] + other * rows[second + r]
+                        total[at + r] = begun + (near * rows[third + r] + far * rows[fourth + r])
+                else:
+                    for r in range(_ROW):
+                        begun = total[at + r] + (gain * rows[source + r] + other * rows[second + r])
+                        total[at + r] = begun + (near * rows[third + r] + far * rows[fourth + r])
+            elif fresh:
                 for r in range(_ROW):
                     total[at + r] = gain * rows[source + r] + other * rows[second + r]
             else:
@@ -1498,6 +1642,15 @@ def _advance_bouc_wen(rows, e, bank, at, rate_gain, counts):  # type: ignore[no-
     limit, delta, d2 = rows[e, RATE_LIMIT], rows[e, DELTA], -rows[e, D2]
     d1, bias, epsilon = rows[e, D1], rows[e, BIAS], rows[e, EPSILON]
     alpha, beta, gamma, eta = rows[e, ALPHA], rows[e, BETA], rows[e, GAMMA], rows[e, ETA]
+    if (epsilon == 0.0) & (d2 == 0.0):  # a slow gain alone, as without hysteresis: h stays 0
+        for r in range(_ROW):
+            q = bank[at + _at(BANK_Q_NEXT) + r]
+            free = (q - bank[at + _at(BANK_Q) + r]) * rate_gain
+            counts[_at(COUNT_CLAMPED) + r] += 0.0 if free == min(max(free, -limit), limit) else 1.0
+            bank[at + _at(BANK_Z_BEFORE) + r] = bank[at + _at(BANK_Z) + r]
+            bank[at + _at(BANK_Z) + r] = d1 * (q + bias) - d1 * bias
+            bank[at + _at(BANK_Q) + r] = q
+        return
     crossing, small = 0, abs(d2) * limit <= 0.02
     # Two loops: their chains of arithmetic are long, and shorter ones overlap better from run to run.
     for r in range(_ROW):
@@ -1575,7 +1728,8 @@ def _ensemble_plant(p, s):  # type: ignore[no-untyped-def]
     states, elements, several = p.diagonal.size, p.G.shape[0], p.rest.value.size > 0
     if several:  # before x moves
         for i in range(states):
-            _clear(s.x_next, _at(i))
+            if p.rest.start[i] < p.rest.start[i + 1]:
+                _clear(s.x_next, _at(i))
             for j in range(p.rest.start[i], p.rest.start[i + 1]):
                 gain, source, target = p.rest.value[j], _at(p.rest.column[j]), _at(i)
                 for r in range(_ROW):
@@ -1591,7 +1745,7 @@ def _ensemble_plant(p, s):  # type: ignore[no-untyped-def]
     for i in range(states):
         _weigh_some(p.B0[i], s.drive, _at(DRIVE_BEFORE), _at(DRIVE_FIELDS), s.x, _at(i), False)
         _weigh_some(p.B1[i], s.drive, _at(DRIVE_NOW), _at(DRIVE_FIELDS), s.x, _at(i), False)
-        if several:
+        if several and p.rest.start[i] < p.rest.start[i + 1]:
             for r in range(_ROW):
                 s.x[_at(i) + r] += s.x_next[_at(i) + r]
     if p.feedback:
@@ -1631,12 +1785,26 @@ def _ensemble_amplifier(p, s, due):  # type: ignore[no-untyped-def]
 def _ensemble_disturbance(p, s, shift):  # type: ignore[no-untyped-def]
     """The disturbance one plant step on, from four steps' worth of random numbers at a time."""
     step = s.place[STEP]
-    if step % 4 == 0:
-        for w in range(p.purpose.size):
-            _gaussians(p.seed, s.first_run[0], p.purpose[w], step // 4, s.gauss, _at(4 * w))
+    _draw_sources(p, s)
     k = step - shift.first_sample * p.steps_per_sample
     if 0 <= k < shift.step.shape[0]:
         _shift_rows(shift.step[k], shift.size, s.gauss, _at(step % 4), _at(4))
+    _shape(p, s)
+
+
+@_inline
+def _draw_sources(p, s):  # type: ignore[no-untyped-def]
+    """The random numbers of the disturbances' sources, where those of the last four steps are used up."""
+    step = s.place[STEP]
+    if step % 4 == 0:
+        for w in range(p.purpose.size):
+            _gaussians(p.seed, s.first_run[0], p.purpose[w], step // 4, s.gauss, _at(4 * w))
+
+
+@_inline
+def _shape(p, s):  # type: ignore[no-untyped-def]
+    """The disturbance one plant step on, from the random numbers at hand."""
+    step = s.place[STEP]
     _modal_step(p.shaping_diagonal, p.shaping_coupling, s.shaping)
     for i in range(p.shaping_diagonal.size):
         _weigh_some(p.shaping_noise[i], s.gauss, _at(step % 4), _at(4), s.shaping, _at(i), False)
@@ -1687,16 +1855,25 @@ def _count_radial(error, axes, work, total, histogram):  # type: ignore[no-untyp
         histogram[r, min(max(place, 0), BINS - 1)] += np.int32(1)
 
 
+@_inline
+def _draw_sensors(p, s):  # type: ignore[no-untyped-def]
+    """The random numbers of a control sample's readings."""
+    for word in range(0, p.optics.shape[0] + p.optics.shape[1], 4):
+        purpose = np.uint64(SENSOR_PURPOSE + word // 4)
+        _gaussians(p.seed, s.first_run[0], purpose, s.place[SAMPLE], s.sensor_gauss, _at(word))
+
+
 @_merge
-def _measure(p, s, reference, shift):  # type: ignore[no-untyped-def]
-    """The readings m of a control sample: optical, gauge, reference."""
+def _measure(p, s, reference, shift, drawn):  # type: ignore[no-untyped-def]
+    """The readings m of a control sample: optical, gauge, reference. ``drawn`` is its first row of what is drawn."""
     axes, outputs, sample = p.optics.shape[0], p.optics.shape[1], s.place[SAMPLE]
     noisy = p.gauge_noise > 0.0
     for i in range(axes):
         noisy = noisy or p.optical_noise[i] > 0.0
-    for word in range(0, axes + outputs if noisy else 0, 4):
-        purpose = np.uint64(SENSOR_PURPOSE + word // 4)
-        _gaussians(p.seed, s.first_run[0], purpose, sample, s.sensor_gauss, _at(word))
+    if noisy and s.drawn.size > 0:
+        _take(s.drawn, drawn, s.sensor_gauss, axes + outputs)
+    elif noisy:
+        _draw_sensors(p, s)
     k = sample - shift.first_sample
     if noisy and 0 <= k < shift.sample.shape[0]:
         _shift_rows(shift.sample[k], shift.size, s.sensor_gauss, _at(0), _at(1))
@@ -1843,6 +2020,30 @@ def _record(k, rows, width, trace, channel):  # type: ignore[no-untyped-def]
 
 
 @_compile
+def draw_loop(p, s, samples, drawn):  # type: ignore[no-untyped-def]
+    """What LANES runs draw over some control samples, into the rows of ``drawn``, flat, sample by sample.
+
+    For each: a random number for every reading (optical by axis, then gauge by output), then at every plant step's end
+    the disturbance by axis. Loops alike in their disturbances, clock, axes and outputs draw the same. Of the state the
+    disturbance goes on, and nothing else.
+    """
+    axes, steps, words = p.optics.shape[0], p.steps_per_sample, p.optics.shape[0] + p.optics.shape[1]
+    row = 0
+    for _ in range(samples):
+        _draw_sensors(p, s)
+        _copy(s.sensor_gauss, drawn, row, words)
+        row += words
+        for _ in range(steps):
+            if p.shaping_diagonal.size > 0:
+                _draw_sources(p, s)
+                _shape(p, s)
+            _copy(s.disturbance, drawn, row, axes)
+            row += axes
+            s.place[STEP] += 1
+        s.place[SAMPLE] += 1
+
+
+@_compile
 def ensemble_loop(p, s, reference, residual, trace, shift):  # type: ignore[no-untyped-def]
     """Advance LANES runs over the control samples of ``reference``, linear between them.
 
@@ -1857,8 +2058,10 @@ def ensemble_loop(p, s, reference, residual, trace, shift):  # type: ignore[no-u
     axes, steps, actuators = p.optics.shape[0], p.steps_per_sample, p.actuator.shape[0]
     length = s.command.size // (actuators * LANES)
     ring_length = p.sensor_delay_steps + 1
+    words = axes + p.optics.shape[1]
     for k in range(reference.shape[0] - 1):
-        _measure(p, s, reference[k], shift)
+        drawn = k * (words + steps * axes)
+        _measure(p, s, reference[k], shift, drawn)
         _control(p, s, length)
         if residual.shape[0] > 0:
             _record(k, s.error, axes, residual, 0)
@@ -1871,7 +2074,9 @@ def ensemble_loop(p, s, reference, residual, trace, shift):  # type: ignore[no-u
             due = (s.place[SAMPLE] + length + (j - p.delay_steps) // steps) % length
             _ensemble_amplifier(p, s, due)
             _ensemble_plant(p, s)
-            if p.shaping_diagonal.size > 0:
+            if s.drawn.size > 0:
+                _take(s.drawn, drawn + words + j * axes, s.disturbance, axes)
+            elif p.shaping_diagonal.size > 0:
                 _ensemble_disturbance(p, s, shift)
             s.place[STEP] += 1
             share = (j + 1) / steps

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from itertools import combinations
+from itertools import combinations, product
 
 import numpy as np
 
@@ -44,25 +44,35 @@ class _Local:
     def __init__(self, search: Search) -> None:
         self._search = search
         self._known: dict[bytes, Trial] = {}
-        self._slopes: dict[bytes, Floats] = {}
+        self._near: dict[bytes, list[Trial]] = {}
+        self._asked = False
 
     def at(self, place: Floats) -> Trial:
+        """The trial at a place; what its slopes take is judged along with it where those of the last one were asked."""
         key = place.tobytes()
         if key not in self._known:
-            self._known[key] = self._search.at(place)
+            beside = self._beside(place) if self._asked else []
+            self._known[key], *self._near[key] = self._search.at_all([place, *beside])
+            self._asked = False
         return self._known[key]
 
     def slopes(self, place: Floats) -> Floats:
         """Gradients of cost and constraints (rows), by a step towards the middle of the bounds."""
-        key = place.tobytes()
-        if key not in self._slopes:
-            columns, inside = [], np.clip(place, 0.0, 1.0)  # a line search may look beyond
-            for i in range(place.size):
-                step = STEP if inside[i] < 0.5 else -STEP
-                there = _numbers(self.at(_with(inside, i, inside[i] + step)))
-                columns.append((there - _numbers(self.at(place))) / step)
-            self._slopes[key] = np.array(columns).T
-        return self._slopes[key]
+        here, key = self.at(place), place.tobytes()
+        self._asked = True
+        self._near[key] = self._near[key] or self._search.at_all(self._beside(place))
+        steps = _steps(place)
+        return np.array(
+            [(_numbers(t) - _numbers(here)) / step for t, step in zip(self._near[key], steps, strict=True)]
+        ).T
+
+    def _beside(self, place: Floats) -> list[Floats]:
+        inside = np.clip(place, 0.0, 1.0)  # a line search may look beyond
+        return [_with(inside, i, inside[i] + step) for i, step in enumerate(_steps(place))]
+
+
+def _steps(place: Floats) -> Floats:
+    return np.where(place < 0.5, STEP, -STEP)
 
 
 def _with(place: Floats, i: int, x: float) -> Floats:
@@ -174,21 +184,28 @@ def _model(search: Search, here: Trial, node: float) -> _Quadratic | None:
     value = _numbers(here)[near]
     slope, bend = np.zeros((value.size, d)), np.zeros((value.size, d, d))
 
-    def numbers(*moves: tuple[int, float]) -> Floats:
+    def moved(*moves: tuple[int, float]) -> Floats:
         there = place.copy()
         for i, offset in moves:
             there[i] += node * offset
-        trial = search.at(there)
+        return there
+
+    pairs = list(combinations(range(d), 2))
+    lines = [moved((i, offset)) for i in range(d) for offset in offsets[i] if offset != 0.0]
+    corners = [moved((i, offsets[i][m]), (j, offsets[j][n])) for i, j in pairs for m, n in product((1, 3), (1, 3))]
+    judged = iter(search.at_all([*lines, *corners]))
+
+    def numbers() -> Floats:
+        trial = next(judged)
         return _numbers(trial)[near] if trial.verdict.pole < 1.0 else np.full(value.size, np.nan)
 
     for i in range(d):
-        points = np.array([value if offset == 0.0 else numbers((i, offset)) for offset in offsets[i]])
+        points = np.array([value if offset == 0.0 else numbers() for offset in offsets[i]])
         slope[:, i], bend[:, i, i] = (_weights(offsets[i], order) @ points / node**order for order in (1, 2))
-    for i, j in combinations(range(d), 2):
-        (low, high), (left, right) = offsets[i][[1, 3]], offsets[j][[1, 3]]
-        rising = numbers((i, low), (j, left)) + numbers((i, high), (j, right))
-        falling = numbers((i, low), (j, right)) + numbers((i, high), (j, left))
-        bend[:, i, j] = bend[:, j, i] = (rising - falling) / (node**2 * (high - low) * (right - left))
+    for i, j in pairs:
+        low_left, low_right, high_left, high_right = (numbers() for _ in range(4))
+        area = node**2 * (offsets[i][3] - offsets[i][1]) * (offsets[j][3] - offsets[j][1])
+        bend[:, i, j] = bend[:, j, i] = ((low_left + high_right) - (high_left + low_right)) / area
     return _Quadratic(value, slope, bend) if np.all(np.isfinite(bend)) else None
 
 

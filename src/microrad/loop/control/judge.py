@@ -1,7 +1,7 @@
 """Residual and margins of many controllers on the same plants: what a search asks for a thousand times."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from microrad.core import lti
 from microrad.core.arrays import Complexes, Floats
-from microrad.loop.control.analysis import around_poles, bandwidth_hz, cut, moved, uses_both
+from microrad.loop.control.analysis import around_poles, bandwidth_hz, cut, moved
 from microrad.loop.control.problem import OPTICAL, RESIDUAL, AxisController, DesignPlant
 
 CUTS = ("command", "optical")
@@ -23,6 +23,9 @@ NEAR_LEAST = 1.3
 
 CLOSER = (0.05, 0.0025)
 """Half widths, over the grid's step, of the three points through which the parabola is laid again and again."""
+
+AT_ONCE = 8192
+"""Frequencies, of all controllers together, whose responses are worked out at once: what a processor keeps near."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -59,83 +62,128 @@ class Judge:
         whole = np.concatenate(
             [lti.frequency_response(p.system, f, self._period) for p, f in zip(plants, grids, strict=True)]
         )
-        self._to_residual, self._to_sensors = whole[:, RESIDUAL, 0], whole[:, OPTICAL:, 0]
-        self._white, self._seen = whole[:, RESIDUAL, 1:], whole[:, OPTICAL:, 1:]
+        self._to_sensors = whole[:, OPTICAL:, 0]
+        white, seen = whole[:, RESIDUAL, 1:], whole[:, OPTICAL:, 1:]
+        # The residual is white + to_residual (k0 seen0 + k1 seen1), k what of the sensors the command takes. As three
+        # columns at each frequency, its size is that of their triangular factor: three numbers in place of all.
+        taken = whole[:, RESIDUAL, 0, None, None] * seen
+        self._parts = np.linalg.qr(np.stack([white, taken[:, 0], taken[:, 1]], axis=2), "r")
         self._points = np.exp(2j * math.pi * self._freq * self._period)
-        self.open_rad2 = self._mean(self._white)
+        self.open_rad2 = float(self._mean(white[None])[0])
         if self.open_rad2 <= 0.0:
             raise ValueError("the plant has no disturbance: without a loop its residual is 0; give it one to reject")
 
     def __call__(self, controller: AxisController) -> Verdict:
         """Judge one controller; its margins are those of the worst place to cut its loop, on the worst plant."""
-        pole = self._spectral_radius(controller)
-        if not pole < 1.0 - 1e-9:  # nearer than rounding can tell
-            return self.unstable(pole)
-        K = response(controller.system, self._points)
+        (found,) = self.several([controller])
+        return found
+
+    def several(self, controllers: Sequence[AxisController]) -> list[Verdict]:
+        """Judge many controllers at once: each as it is judged alone, but for rounding."""
+        found: list[Verdict] = [self.unstable(math.inf)] * len(controllers)
+        alike: dict[int, list[int]] = {}
+        for number, controller in enumerate(controllers):
+            alike.setdefault(controller.system.order, []).append(number)
+        share = max(1, AT_ONCE // self._freq.size)
+        for numbers in alike.values():
+            for first in range(0, len(numbers), share):
+                some = numbers[first : first + share]
+                for number, verdict in zip(some, self._judged([controllers[n].system for n in some]), strict=True):
+                    found[number] = verdict
+        return found
+
+    def _judged(self, systems: Sequence[lti.StateSpace]) -> list[Verdict]:
+        """Verdicts on controllers of one order."""
+        stack = _Stack.of(systems)
+        poles = self._spectral_radii(stack)
+        found = [self.unstable(float(pole)) for pole in poles]
+        sure = np.flatnonzero(poles < 1.0 - 1e-9)  # nearer than rounding can tell
+        both = np.all(np.any(stack.B[sure] != 0.0, axis=1) | np.any(stack.D[sure] != 0.0, axis=1), axis=1)
+        for numbers, cuts in ((sure[~both], CUTS[:1]), (sure[both], CUTS)):
+            if numbers.size:
+                for i, reached in zip(numbers, self._reached(stack.some(numbers), cuts), strict=True):
+                    found[i] = Verdict(float(poles[i]), *reached)
+        return found
+
+    def _reached(self, stack: "_Stack", cuts: Sequence[str]) -> Iterator[tuple[float, Floats, Floats]]:
+        """Mean variance, moduli and bandwidths of stable loops."""
+        K = responses(stack, self._points)
         whole = 1.0 + cut(K, self._to_sensors, "command")
-        cuts = {"command": np.abs(whole)}
-        if uses_both(controller):
-            cuts["optical"] = np.abs(1.0 + cut(K, self._to_sensors, "optical"))
-        command = K[:, :1] * self._seen[:, 0] + K[:, 1:] * self._seen[:, 1]
-        command /= whole[:, None]
-        residual = self._white + self._to_residual[:, None] * command
-        moduli = np.full((len(CUTS), self._bands.size), BEYOND)
-        for row, dips in zip(moduli, self._dips(controller, cuts), strict=False):
-            row[:] = np.minimum.reduceat(dips, self._bands)
-        bandwidths = self._bandwidths(cuts.get("optical", cuts["command"]))
-        return Verdict(pole, self._mean(residual), moduli.ravel(), bandwidths)
+        distances = [np.abs(whole)] + [np.abs(1.0 + cut(K, self._to_sensors, each)) for each in cuts[1:]]
+        means = self._mean(self._residual(K / whole[..., None]))
+        moduli = np.full((len(K), len(CUTS), self._bands.size), BEYOND)
+        for i, dips in enumerate(self._dips(stack, cuts, distances)):
+            moduli[:, i] = np.minimum.reduceat(dips, self._bands, axis=1)
+        for mean, least, distance in zip(means, moduli, distances[-1], strict=True):
+            yield float(mean), least.ravel(), self._bandwidths(distance)
+
+    def _residual(self, taken: Complexes) -> Complexes:
+        """Numbers (controllers, frequencies, 3) of the size of the residual, by what the command takes of sensors."""
+        rows = self._parts[:, :, 0] + taken[..., :1] * self._parts[:, :, 1]
+        return rows + taken[..., 1:] * self._parts[:, :, 2] if np.any(taken[..., 1]) else rows
 
     def unstable(self, pole: float) -> Verdict:
         """What is said of a candidate that is unstable, or that could not be built."""
         return Verdict(pole, math.inf, np.zeros(len(CUTS) * self._bands.size), np.zeros(len(self._A)))
 
-    def _spectral_radius(self, controller: AxisController) -> float:
-        """That of the closed loop on the worst plant."""
-        c, n = controller.system, self._A.shape[1]
-        whole = np.empty((len(self._A), n + c.order, n + c.order))
-        whole[:, :n, :n], whole[:, :n, n:] = self._A + self._B @ c.D @ self._C, self._B @ c.C
-        whole[:, n:, :n], whole[:, n:, n:] = c.B @ self._C, c.A
-        return float(np.max(np.abs(np.linalg.eigvals(whole)))) if np.all(np.isfinite(whole)) else math.inf
+    def _spectral_radii(self, c: "_Stack") -> Floats:
+        """Those of the closed loops on the worst plant; infinite where a number is not finite."""
+        several, n, order = len(c.A), self._A.shape[1], c.A.shape[1]
+        A, B, C, D = (each[:, None] for each in (c.A, c.B, c.C, c.D))
+        whole = np.empty((several, len(self._A), n + order, n + order))
+        whole[..., :n, :n], whole[..., :n, n:] = self._A + self._B @ D @ self._C, self._B @ C
+        whole[..., n:, :n], whole[..., n:, n:] = B @ self._C, A
+        finite = np.all(np.isfinite(whole), axis=(1, 2, 3))
+        radii = np.full(several, math.inf)
+        radii[finite] = np.max(np.abs(np.linalg.eigvals(whole[finite])), axis=(1, 2))
+        return radii
 
-    def _mean(self, white: Complexes) -> float:
-        """Mean over the plants of the variance that these responses to the white sequences leave."""
-        spectrum = np.sum(white.real**2 + white.imag**2, axis=1)
-        return float(np.mean(np.add.reduceat(self._weights * spectrum, self._edges[:-1])))
+    def _mean(self, white: Complexes) -> Floats:
+        """Mean over the plants of the variance that responses (controllers, frequencies, white sequences) leave."""
+        spectrum = np.sum(white.real**2 + white.imag**2, axis=2)
+        return np.asarray(np.mean(np.add.reduceat(self._weights * spectrum, self._edges[:-1], axis=1), axis=1))
 
-    def _dips(self, controller: AxisController, cuts: dict[str, Floats]) -> list[Floats]:
+    def _dips(self, stack: "_Stack", cuts: Sequence[str], distances: Sequence[Floats]) -> list[Floats]:
         """The distances by cut, each local minimum on the grid replaced by the least between its points.
 
         A parabola through a minimum and its neighbours tells where it is; what is near the least of all is looked at
         again there, more closely each time, so that the least moves smoothly with the controller.
         """
         by_cut = []
-        deepest = NEAR_LEAST * min(float(np.min(distance)) for distance in cuts.values())
-        for broken_at, distance in cuts.items():
+        deepest = NEAR_LEAST * np.min([np.min(distance, axis=1) for distance in distances], axis=0)
+        for broken_at, distance in zip(cuts, distances, strict=True):
             found = distance.copy()
-            at, where, squared = self._minima(distance)
-            found[at] = np.sqrt(np.maximum(squared, 0.0))
-            near = found[at] < deepest
-            found[at[near]] = self._closer(controller, broken_at, at[near], where[near])
+            of, at, where, squared = self._minima(distance)
+            found[of, at] = np.sqrt(np.maximum(squared, 0.0))
+            near = found[of, at] < deepest[of]
+            of, at = of[near], at[near]
+            found[of, at] = self._closer(stack.some(of), broken_at, at, where[near])
             by_cut.append(found)
         return by_cut
 
-    def _minima(self, distance: Floats) -> tuple[NDArray[np.intp], Floats, Floats]:
-        """Places on the grid, frequencies and squares of the local minima, by parabolas through three points each."""
-        squared, before, after = distance**2, self._steps[:-1], self._steps[1:]
-        left, right = np.diff(squared)[:-1] / before, np.diff(squared)[1:] / after
-        slope, curvature = (left * after + right * before) / (before + after), (right - left) / (before + after)
-        at = np.flatnonzero((left < 0.0) & (right > 0.0) & (before > 0.0) & (after > 0.0))
-        where = self._freq[at + 1] - slope[at] / (2.0 * curvature[at])
-        return at + 1, where, squared[at + 1] - slope[at] ** 2 / (4.0 * curvature[at])
+    def _minima(self, distance: Floats) -> tuple[NDArray[np.intp], NDArray[np.intp], Floats, Floats]:
+        """Controllers, places on the grid, frequencies and squares of the local minima, by parabolas through 3 points.
 
-    def _closer(self, controller: AxisController, broken_at: str, at: NDArray[np.intp], freq_hz: Floats) -> Floats:
-        """Minima of the distance near some frequencies, beside the places ``at`` of the grid."""
+        ``distance`` is (controllers, frequencies).
+        """
+        squared, before, after = distance**2, self._steps[:-1], self._steps[1:]
+        change = squared[:, 1:] - squared[:, :-1]
+        within = (before > 0.0) & (after > 0.0)
+        of, at = np.nonzero((change[:, :-1] * before < 0.0) & (change[:, 1:] * after > 0.0) & within)
+        before, after = before[at], after[at]
+        left, right = change[of, at] / before, change[of, at + 1] / after
+        slope, curvature = (left * after + right * before) / (before + after), (right - left) / (before + after)
+        where = self._freq[at + 1] - slope / (2.0 * curvature)
+        return of, at + 1, where, squared[of, at + 1] - slope**2 / (4.0 * curvature)
+
+    def _closer(self, stack: "_Stack", broken_at: str, at: NDArray[np.intp], freq_hz: Floats) -> Floats:
+        """Minima of the distance near some frequencies, beside the places ``at`` of the grid; one controller each."""
         plant = np.searchsorted(self._edges, at, side="right") - 1
         width, least = np.minimum(self._steps[at - 1], self._steps[at]), np.zeros(at.size)
         for share in CLOSER:
             step = share * width
             near = freq_hz[:, None] + step[:, None] * np.array([-1.0, 0.0, 1.0])
-            squared = self._distance(controller, broken_at, plant, near) ** 2
+            squared = self._distance(stack, broken_at, plant, near) ** 2
             slope = 0.5 * (squared[:, 2] - squared[:, 0])
             curvature = squared[:, 2] - 2.0 * squared[:, 1] + squared[:, 0]
             moved = np.where(curvature > 0.0, -slope / np.where(curvature > 0.0, curvature, 1.0), 0.0)
@@ -144,14 +192,12 @@ class Judge:
             least = squared[:, 1] + moved * (slope + 0.5 * moved * curvature)
         return np.sqrt(np.maximum(least, 0.0))
 
-    def _distance(self, controller: AxisController, broken_at: str, plant: NDArray[np.intp], freq_hz: Floats) -> Floats:
-        """|1 + L| of these plants (one for each row) at any frequencies."""
-        K = lti.frequency_response(controller.system, freq_hz.ravel(), self._period).reshape(*freq_hz.shape, 2)
+    def _distance(self, stack: "_Stack", broken_at: str, plant: NDArray[np.intp], freq_hz: Floats) -> Floats:
+        """|1 + L| of controllers on plants, one of each for each row of frequencies."""
         points = np.exp(2j * math.pi * self._period * freq_hz)[..., None, None]
-        resolvent = points * np.eye(self._A.shape[1]) - self._A[plant, None]
-        driven = np.broadcast_to(self._B[plant, None], (*freq_hz.shape, *self._B.shape[1:]))
-        G = self._C[plant, None] @ np.linalg.solve(resolvent, driven) + self._D[plant, None]
-        return np.abs(1.0 + cut(K, np.asarray(G[..., 0], dtype=complex), broken_at))
+        K = _solved(points, stack.A, stack.B, stack.C, stack.D)[..., 0, :]
+        G = _solved(points, self._A[plant], self._B[plant], self._C[plant], self._D[plant])[..., 0]
+        return np.abs(1.0 + cut(K, G, broken_at))
 
     def _bandwidths(self, distance: Floats) -> Floats:
         parts = (slice(*edge) for edge in zip(self._edges[:-1], self._edges[1:], strict=True))
@@ -212,29 +258,74 @@ def _stacked(systems: Sequence[lti.StateSpace]) -> tuple[Floats, Floats, Floats,
     return A, B, C, np.array([s.D for s in systems])
 
 
+def _solved(points: Complexes, A: Floats, B: Floats, C: Floats, D: Floats) -> Complexes:
+    """Responses C (z - A)^-1 B + D of systems (first index) at points z of their own, shape (systems, points, 1, 1)."""
+    resolvent = points * np.eye(A.shape[1]) - A[:, None]
+    driven = np.broadcast_to(B[:, None], (*points.shape[:2], *B.shape[1:]))
+    return np.asarray(C[:, None] @ np.linalg.solve(resolvent, driven) + D[:, None])
+
+
+@dataclass(frozen=True, slots=True)
+class _Stack:
+    """Matrices of controllers of one order, each with a first index by controller."""
+
+    A: Floats
+    B: Floats
+    C: Floats
+    D: Floats
+
+    @classmethod
+    def of(cls, systems: Sequence[lti.StateSpace]) -> "_Stack":
+        return cls(*(np.array([getattr(s, key) for s in systems]) for key in "ABCD"))
+
+    def some(self, numbers: NDArray[np.intp]) -> "_Stack":
+        return _Stack(self.A[numbers], self.B[numbers], self.C[numbers], self.D[numbers])
+
+
 def response(system: lti.StateSpace, points: Complexes) -> Complexes:
-    """Response of a controller (one output) at points z, shape (points, inputs).
+    """Response of a controller (one output) at points z, shape (points, inputs)."""
+    return responses(_Stack.of([system]), points)[0]
 
-    By forward substitution in its Schur form A = U T U', all points at once: the row r (z - T) = C U, then r U' B + D.
-    States in volts beside states in radians cost Schur's rotations the digits of the small ones: they are scaled first,
-    by powers of 2 that make rows and columns of A alike, and the rows are corrected once by what they leave of C.
+
+def responses(stack: _Stack, points: Complexes) -> Complexes:
+    """Responses of controllers (one output) at points z, shape (controllers, points, inputs).
+
+    By forward substitution in their Schur forms A = U T U', all points at once: the row r (z - T) = C U, then
+    r U' B + D. States in volts beside states in radians cost Schur's rotations the digits of the small ones: they are
+    scaled first, by powers of 2 that make rows and columns of A alike, and the rows are corrected once by what they
+    leave of C.
     """
-    from scipy.linalg import matrix_balance, schur  # slow to import, not needed to show help
-
-    if not system.order:
-        return np.broadcast_to(system.D[0].astype(complex), (points.size, system.D.shape[1]))
-    A, (scale, _) = matrix_balance(system.A, permute=False, separate=True)
-    T, U = schur(A.astype(complex))
-    near = 1.0 / (points - np.diag(T)[:, None])
+    several, order = stack.A.shape[:2]
+    if not order:
+        return np.broadcast_to(stack.D.astype(complex), (several, points.size, stack.D.shape[2]))
+    if order == 1:
+        return np.asarray(stack.C * stack.B / (points - stack.A[:, 0])[..., None] + stack.D)
+    A, T, U, scale = _schur(stack.A)
+    near = 1.0 / (points - np.diagonal(T, axis1=1, axis2=2)[..., None])
+    conjugate, transposed = U.conj(), np.swapaxes(U, 1, 2)
 
     def rows(right: Complexes) -> Complexes:
-        start = U.T @ right
+        start = transposed @ right
         found = np.empty(near.shape, dtype=complex)
-        for j in range(T.shape[0]):
-            found[j] = (start[j] + T[:j, j] @ found[:j]) * near[j]
-        return np.asarray(U.conj() @ found)
+        for j in range(order):
+            found[:, j] = (start[:, j] + (T[:, None, :j, j] @ found[:, :j])[:, 0]) * near[:, j]
+        return np.asarray(conjugate @ found)
 
-    C = (system.C * scale).T
+    C = (stack.C * scale[:, None]).swapaxes(1, 2)
     first = rows(C.astype(complex))
-    second = first + rows(C - (first * points - A.T @ first))
-    return np.asarray(second.T @ (system.B / scale[:, None]) + system.D[0])
+    second = first + rows(C - (first * points - np.swapaxes(A, 1, 2) @ first))
+    return np.asarray(second.swapaxes(1, 2) @ (stack.B / scale[..., None]) + stack.D)
+
+
+def _schur(matrices: Floats) -> tuple[Floats, Complexes, Complexes, Floats]:
+    """Each matrix balanced by a diagonal of powers of 2, its Schur form and rotations, and the diagonal."""
+    from scipy.linalg.lapack import dgebal, zgees  # slow to import, not needed to show help
+
+    balanced, scale = np.empty_like(matrices), np.empty(matrices.shape[:2])
+    T, U = np.empty(matrices.shape, dtype=complex), np.empty(matrices.shape, dtype=complex)
+    for i, matrix in enumerate(matrices):
+        balanced[i], _, _, scale[i], _ = dgebal(matrix, scale=1, permute=0)
+        T[i], _, _, U[i], _, failed = zgees(lambda value: None, balanced[i])
+        if failed:
+            raise ValueError("a controller has no Schur form: its numbers differ too much in size")
+    return balanced, T, U, scale

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from microrad.core import lti
+from microrad.core import kernels, lti
 from microrad.core.arrays import Floats
 from microrad.loop.control.analysis import reachable
 from microrad.loop.control.problem import (
@@ -61,10 +61,16 @@ def lqg_controller(plant: DesignPlant, weights: Weights, *, coarse: bool = False
     observer's gain and the matrices to what processors agree in (`OBSERVER_BITS`, `lti.EXACT_BITS`). Raises ValueError
     without an optical sensor, and where a Riccati equation has no solution.
     """
-    model = observed(in_own_units(plant), weights)
-    K = filter_gain(model.A, model.noise, model.seen, model.seen_noise)
+    known, seen_by = _solved(plant), (weights.sensor_noise, weights.command_noise_v, weights.walk)
+    if seen_by not in known:
+        model = observed(in_own_units(plant), weights)
+        known[seen_by] = model, filter_gain(model.A, model.noise, model.seen, model.seen_noise)
+    model, K = known[seen_by]
+    moved_by = (weights.command, len(model.A))
+    if moved_by not in known:
+        known[moved_by] = model, regulator_gain(model, weights.command * plant.gain_rad_v**2)
+    _, G = known[moved_by]
     K = lti.to_bits(K, OBSERVER_BITS) if coarse else K
-    G = regulator_gain(model, weights.command * plant.gain_rad_v**2)
     n, sensors = model.A.shape[0], model.sensors
     driven = np.vstack([model.command, [[1.0]]])  # observer and last command follow the command that is given
     free = np.zeros((n + 1, n + 1))
@@ -76,6 +82,16 @@ def lqg_controller(plant: DesignPlant, weights: Weights, *, coarse: bool = False
     D = -G @ correction
     system = lti.StateSpace(free + driven @ C, correction + driven @ D, C, D)
     return AxisController("LQG", lti.system_to_bits(system, lti.EXACT_BITS) if coarse else system, driven)
+
+
+@once_per_plant
+def _solved(plant: DesignPlant) -> dict[tuple[float, ...], tuple["Model", Floats]]:
+    """Gains that are known, to be added to: observers by what they see, regulators by the weight and the states.
+
+    A search moves one of its three weights at a time, of which either gain needs but one or two.
+    """
+    del plant
+    return {}
 
 
 @dataclass(frozen=True, slots=True)
@@ -190,7 +206,7 @@ def filter_gain(A: Floats, noise: Floats, seen: Floats, seen_noise: Floats) -> F
     )
     K = np.linalg.solve(seen @ P @ seen.T + R, seen @ P @ A.T + N.T).T
     for _ in range(REFINED):
-        P = lti.gramian((A - K @ seen).T, (noise - K @ seen_noise) @ (noise - K @ seen_noise).T)
+        P = _gramian((A - K @ seen).T, (noise - K @ seen_noise) @ (noise - K @ seen_noise).T)
         K = np.linalg.solve(seen @ P @ seen.T + R, seen @ P @ A.T + N.T).T
     return np.asarray(K)
 
@@ -221,20 +237,19 @@ def riccati(A: Floats, B: Floats, Q: Floats, R: Floats, otherwise: str) -> Float
     Structure-preserving doubling: Chu, Fan, Lin and Wang, International Journal of Control 77 (2004) 767. Raises
     ValueError, saying ``otherwise``, where it does not settle.
     """
-    power, G, X = A, B @ np.linalg.solve(R, B.T), Q
-    identity = np.eye(A.shape[0])
-    for _ in range(60):
-        middle = np.linalg.solve(identity + G @ X, np.hstack([power, G]))
-        first, second = middle[:, : A.shape[0]], middle[:, A.shape[0] :]
-        more = power.T @ X @ first
-        G = G + power @ second @ power.T
-        X, power = X + 0.5 * (more + more.T), power @ first
-        G = 0.5 * (G + G.T)
-        if not np.max(np.abs(X)) < 1e150:
-            break
-        if not np.any(np.abs(np.diagonal(more)) > 1e-14 * np.diagonal(X)):
-            return X
+    n = A.shape[0]
+    X = np.array(Q, dtype=float)
+    power, G = np.array(A, dtype=float), np.ascontiguousarray(B @ np.linalg.solve(R, B.T))
+    if kernels.riccati_kernel(power, G, X, np.empty((4, n, n)), np.empty((n, 2 * n))):
+        return X
     raise ValueError(f"LQG: the Riccati equation has no stabilising solution: {otherwise}; add damping or a sensor")
+
+
+def _gramian(A: Floats, Q: Floats) -> Floats:
+    """`lti.gramian` for one Q, compiled: a search asks for it a thousand times."""
+    X, power = np.array(Q), np.array(A)
+    kernels.gramian_kernel(power, X, np.empty((3, *A.shape)))
+    return X
 
 
 def stein(left: Floats, right: Floats, Q: Floats) -> Floats:

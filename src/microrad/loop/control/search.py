@@ -9,7 +9,7 @@ import numpy as np
 from microrad.core.arrays import Floats
 from microrad.loop.control.analysis import LoopMargins, loop_margins, refuse_misfit
 from microrad.loop.control.judge import Judge, Verdict
-from microrad.loop.control.problem import DesignPlant, Family, Parameter, Specification
+from microrad.loop.control.problem import AxisController, DesignPlant, Family, Parameter, Specification
 
 HEADROOM = 1e-3
 """Relative excess over what is asked for that a search aims at: rounding what it finds takes a little of it."""
@@ -73,26 +73,44 @@ class Search:
 
     def at(self, place: Floats) -> Trial:
         """Judge the candidate at a place, its coordinates clipped to the bounds."""
-        place = np.clip(place, 0.0, 1.0)
-        return self.of(np.array([value(p, x) for p, x in zip(self.parameters, place, strict=True)]), place)
+        (found,) = self.at_all([place])
+        return found
+
+    def at_all(self, places: Sequence[Floats]) -> list[Trial]:
+        """Judge the candidates at many places at once, as `at` does."""
+        within = [np.clip(place, 0.0, 1.0) for place in places]
+        values = [np.array([value(p, x) for p, x in zip(self.parameters, place, strict=True)]) for place in within]
+        return self.of_all(values, within)
 
     def of(self, values: Floats, place: Floats | None = None) -> Trial:
         """Judge the candidate of these values; one that cannot be built counts as unstable."""
-        if place is None:
-            place = np.array([place_of(p, v) for p, v in zip(self.parameters, values, strict=True)])
+        (found,) = self.of_all([values], None if place is None else [place])
+        return found
+
+    def of_all(self, values: Sequence[Floats], places: Sequence[Floats] | None = None) -> list[Trial]:
+        """Judge the candidates of many values at once, as `of` does."""
+        if places is None:
+            own = [zip(self.parameters, each, strict=True) for each in values]
+            places = [np.array([place_of(p, v) for p, v in pairs]) for pairs in own]
+        built = [self._built(each) for each in values]
+        verdicts = iter(self.judge.several([controller for controller in built if controller is not None]))
+        trials = [
+            self._trial(place, each, self.judge.unstable(math.inf) if controller is None else next(verdicts))
+            for place, each, controller in zip(places, values, built, strict=True)
+        ]
+        self.trials += [trial for trial in trials if math.isfinite(trial.verdict.pole)]
+        self.count += len(trials)
+        return trials
+
+    def _built(self, values: Floats) -> AxisController | None:
+        """The controller of these values; None, and the first reason kept, where it cannot be built."""
         try:
             controller = self.family.build(self.plants[0], values)
             refuse_misfit(self.plants[0], controller)
         except ValueError as error:
             self.reason = self.reason or error
-            verdict = self.judge.unstable(math.inf)
-        else:
-            verdict = self.judge(controller)
-        trial = self._trial(place, values, verdict)
-        if math.isfinite(verdict.pole):
-            self.trials.append(trial)
-        self.count += 1
-        return trial
+            return None
+        return controller
 
     def margins(self, trial: Trial) -> list[LoopMargins]:
         """Margins of a stable trial on all plants, looked at closely; once for each."""

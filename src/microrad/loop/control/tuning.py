@@ -90,10 +90,8 @@ def tune(
     total, what = survey + STARTS + FINALISTS, f"tune {family.name}"
     search = Search(family, plants, specification)
     contained = _contained(search, seed, survey, base)
-    surveyed = []
-    for place in _places(search, contained, survey, seed):
-        surveyed.append(search.at(place))
-        on_progress(len(surveyed), total, what)
+    surveyed = search.at_all(_places(search, contained, survey, seed))
+    on_progress(survey, total, what)
     if not search.trials:
         raise ValueError(_no_stable(search))
     rough = []
@@ -166,8 +164,7 @@ def grid_best(
         raise ValueError(
             f"{len(grid)} rows of values for the parameters of {family.name} ({names}): give each one its row"
         )
-    for values in product(*grid):
-        search.of(np.array(values, dtype=float))
+    search.of_all([np.array(values, dtype=float) for values in product(*grid)])
     return _chosen(search)
 
 

@@ -1,10 +1,12 @@
 """Many runs of a fine-pointing loop, or one with its trace: assembles the kernel's arrays and keeps its statistics."""
 
 import math
+import os
 import zlib
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -126,12 +128,18 @@ def histogram_beyond(counts: NDArray[np.integer], radius_rad: float) -> float:
     return 1.0 - float(np.interp(max(radius_rad, 0.0) ** 2, edges, below)) / total
 
 
-def arrays(loop: PointingLoop, controller: LoopController, seed: int) -> kernels.Ensemble:
-    """The loop and its controller as the kernel's arrays. Raises ValueError for a controller that does not fit."""
+def arrays(
+    loop: PointingLoop, controller: LoopController, seed: int, shaping: "Shaping | None" = None
+) -> kernels.Ensemble:
+    """The loop and its controller as the kernel's arrays. Raises ValueError for a controller that does not fit.
+
+    ``shaping`` is the loop's `combined_shaping` where it is at hand.
+    """
     check_controller(loop, controller)
     drive, timing = loop.drive, loop.timing
     plant = mirror.discretise(loop.mirror, timing.step_s)
-    shaping, exact = combined_shaping(loop), partial(lti.to_bits, bits=lti.EXACT_BITS)
+    shaping = shaping or combined_shaping(loop)
+    exact = partial(lti.to_bits, bits=lti.EXACT_BITS)
     inverse = controller.inverse or no_feedforward(loop.mirror)
     row = [drive.minimum_v, drive.maximum_v, drive.drive_resolution_v, amplifier_factor(drive, timing.step_s)]
     row += [drive.slew_v_s * timing.step_s, *loop.drive_range_v]
@@ -278,11 +286,16 @@ def combined_shaping(loop: PointingLoop) -> Shaping:
 
 
 def start(
-    loop: PointingLoop, p: kernels.Ensemble, first_run: int, references: Sequence[References] = ()
+    loop: PointingLoop,
+    p: kernels.Ensemble,
+    first_run: int,
+    references: Sequence[References] = (),
+    shaping: "Shaping | None" = None,
 ) -> kernels.EnsembleState:
     """Mirror and controller at rest, the disturbance drawn from its stationary distribution in the runs' streams.
 
-    ``references`` are those of each run where they are not the loop's.
+    ``references`` are those of each run where they are not the loop's, ``shaping`` its `combined_shaping` where it is
+    at hand.
     """
     n, m, outputs, axes = p.diagonal.size, p.actuator.shape[0], p.Cy.shape[0], loop.axes
     runs = np.array([first_run], dtype=np.uint64)
@@ -301,7 +314,7 @@ def start(
         bank=rows(kernels.BANK_FIELDS * p.G.shape[0]),
         play=rows(p.play_threshold.size),
         y=rows(outputs),
-        shaping=start_disturbance(loop, p, runs),
+        shaping=start_disturbance(shaping or combined_shaping(loop), p, runs),
         disturbance=rows(axes),
         gauss=rows(4 * p.purpose.size),
         sensor_gauss=rows(words),
@@ -322,6 +335,7 @@ def start(
         largest=rows(1),
         counts=rows(kernels.COUNT_FIELDS),
         histogram=np.zeros((LANES, kernels.BINS), dtype=np.int32),
+        drawn=np.zeros(0),
     )
     shaped = lti.to_bits(p.shaping_output @ state.shaping.reshape(-1, LANES)[: p.shaping_diagonal.size], lti.EXACT_BITS)
     state.disturbance[:] = shaped.ravel()
@@ -330,10 +344,10 @@ def start(
     return state
 
 
-def start_disturbance(loop: PointingLoop, p: kernels.Ensemble, runs: NDArray[np.uint64]) -> Floats:
+def start_disturbance(shaping: Shaping, p: kernels.Ensemble, runs: NDArray[np.uint64]) -> Floats:
     """States of all disturbances at the begin, (states, LANES) in a row: stationary, and lines with random phases."""
     states = np.zeros((max(p.shaping_diagonal.size, 1), LANES))
-    for at, model, purpose in combined_shaping(loop).parts:
+    for at, model, purpose in shaping.parts:
         n = model.Ad.shape[0]
         numbers = np.zeros(4 * (-(-2 * n // 4)) * LANES)
         kernels.gaussian_kernel(p.seed, runs, np.uint64(kernels.START_PURPOSE + purpose), 0, numbers)
@@ -399,12 +413,64 @@ def run(
     Memory does not grow with the length of the runs, and by 5 kB a run. Raises ValueError for what does not fit and for
     less than one run.
     """
+    case = Case(loop, controller)
+    _refuse_none(runs)
+    jobs = [partial(_together, [case], span, first, beat) for first in range(first_run, first_run + runs, LANES)]
+    parts = in_threads(jobs, lambda done, _: on_progress(min(done * LANES, runs), runs, controller.name), threads)
+    return _joined(case, span, [batch for (batch,) in parts], runs)
+
+
+@dataclass(frozen=True, slots=True)
+class Case:
+    """A loop under a controller; without ``spectrum`` that of its residual is left out, as nan."""
+
+    loop: PointingLoop
+    controller: LoopController
+    spectrum: bool = True
+
+
+TOGETHER = 12
+"""Cases, at most, that share what one of them has drawn."""
+
+DRAWN_SAMPLES = 256
+"""Control samples for which it is drawn at a time: a megabyte or two, which a processor keeps near."""
+
+
+def several(
+    cases: Sequence[Case], span: Span, runs: int, on_done: Callable[[int, int], None] = lambda done, total: None
+) -> list[Ensemble]:
+    """`run` for each of the cases, to the last bit, on all cores: cases with the same disturbances draw them once.
+
+    ``on_done`` hears how many parts of the work are done, and of how many.
+    """
+    _refuse_none(runs)
+    alike: dict[Any, list[int]] = {}
+    for number, case in enumerate(cases):
+        alike.setdefault(_drawn_alike(case.loop), []).append(number)
+    firsts, jobs, numbers = range(0, runs, LANES), [], []
+    share = max(1, min(TOGETHER, -(-len(cases) * len(firsts) // (os.cpu_count() or 1))))
+    for group in sorted(alike.values(), key=len, reverse=True):
+        parts = -(-len(group) // share)
+        for own in (group[part::parts] for part in range(parts)):
+            for first in firsts:
+                jobs.append(partial(_together, [cases[number] for number in own], span, first))
+                numbers.append(own)
+    found: dict[int, list[_Batch]] = {number: [] for number in range(len(cases))}
+    for own, batches in zip(numbers, in_threads(jobs, on_done), strict=True):
+        for number, batch in zip(own, batches, strict=True):
+            found[number].append(batch)
+    return [_joined(case, span, found[number], runs) for number, case in enumerate(cases)]
+
+
+def _refuse_none(runs: int) -> None:
     if runs < 1:
         raise ValueError(f"an ensemble of {runs} runs has no statistics: ask for 1 run or more")
-    p = arrays(loop, controller, span.seed)
-    jobs = [partial(_batch, loop, p, span, first, beat) for first in range(first_run, first_run + runs, LANES)]
-    parts = in_threads(jobs, lambda done, _: on_progress(min(done * LANES, runs), runs, controller.name), threads)
-    return _joined(controller.name, loop, span, parts, runs)
+
+
+def _drawn_alike(loop: PointingLoop) -> tuple[Any, ...]:
+    """What loops have in common that draw the same random numbers: the very same disturbances, clock and readings."""
+    same = tuple(tuple(id(each) for each in several) for several in loop.disturbances)
+    return (same, loop.timing.step_s, loop.timing.steps_per_sample, loop.axes, loop.mirror.axes)
 
 
 @dataclass(frozen=True, slots=True)
@@ -442,29 +508,87 @@ def reference(loop: PointingLoop, begin: int, end: int, references: Sequence[Ref
     return np.ascontiguousarray(np.stack(each, axis=2))
 
 
-def _batch(loop: PointingLoop, p: kernels.Ensemble, span: Span, first_run: int, beat: Callable[[], None]) -> _Batch:
-    state = start(loop, p, first_run)
-    total, settle = control_samples(loop, span)
-    nothing = np.empty((0, 0, 0))
-    segment = _segment(loop, span)
-    spectrum, segments = np.zeros((segment // 2 + 1, loop.axes)), 0
-    residual = np.empty((segment, loop.axes, LANES)) if first_run == 0 else nothing
-    at = 0
+def _together(
+    cases: Sequence[Case], span: Span, first_run: int, beat: Callable[[], None] = lambda: None
+) -> list[_Batch]:
+    """LANES runs of cases that draw alike, all of them over one slice of time and then over the next."""
+    shaping = combined_shaping(cases[0].loop)
+    advancing = [_Advancing(case, span, first_run, shaping) for case in cases]
+    lead, total, settle = advancing[0], *control_samples(cases[0].loop, span)
+    segment, at = _segment(cases[0].loop, span), 0
+    drawing = _Drawing(lead.p, start(cases[0].loop, lead.p, first_run, shaping=shaping)) if len(cases) > 1 else None
     while at < total:
         beat()
-        counting = at >= settle
-        end = min(at + segment, total if counting else settle)
-        if counting and not state.place[kernels.COUNTING]:
-            state.place[kernels.COUNTING] = 1
-            state.counts[:] = 0.0
-        whole = counting and residual.size > 0 and end - at == segment
-        kept = residual if whole else nothing
-        kernels.ensemble_loop(p, state, reference(loop, at, end), kept, nothing, kernels.UNSHIFTED)
-        if whole:
-            spectrum += _periodogram(residual, loop.timing.period_s)
-            segments += 1
+        end = min(at + segment, total if at >= settle else settle)
+        for each in advancing:
+            each.begin(at, end, counting=at >= settle)
+        some = DRAWN_SAMPLES if drawing else segment
+        for first in range(at, end, some):
+            last = min(first + some, end)
+            drawn = drawing.next(last - first) if drawing else None
+            for each in advancing:
+                each.advance(first - at, last - at, drawn)
+        for each in advancing:
+            each.end()
         at = end
-    return _Batch(state, spectrum / segments if segments else np.full_like(spectrum, math.nan))
+    return [each.batch for each in advancing]
+
+
+class _Drawing:
+    """What several cases share: the random numbers and disturbances of the samples to come."""
+
+    def __init__(self, p: kernels.Ensemble, state: kernels.EnsembleState) -> None:
+        axes, outputs = p.optics.shape
+        self._p, self._state = p, state
+        self._width = (axes + outputs + p.steps_per_sample * axes) * LANES
+        self._drawn = np.empty(DRAWN_SAMPLES * self._width)
+
+    def next(self, samples: int) -> Floats:
+        """Those of so many samples, until it is called again."""
+        kernels.draw_loop(self._p, self._state, samples, self._drawn)
+        return self._drawn[: samples * self._width]
+
+
+_NOTHING = np.empty((0, 0, 0))
+
+
+class _Advancing:
+    """LANES runs of a case on their way, segment by segment."""
+
+    def __init__(self, case: Case, span: Span, first_run: int, shaping: "Shaping") -> None:
+        self.loop, self.p = case.loop, arrays(case.loop, case.controller, span.seed, shaping)
+        self.state = start(case.loop, self.p, first_run, shaping=shaping)
+        segment = _segment(case.loop, span)
+        self._spectrum, self._segments = np.zeros((segment // 2 + 1, case.loop.axes)), 0
+        wanted = case.spectrum and first_run == 0
+        self._residual = np.empty((segment, case.loop.axes, LANES)) if wanted else _NOTHING
+        self._reference, self._whole = _NOTHING, False
+
+    def begin(self, at: int, end: int, *, counting: bool) -> None:
+        """A segment from one control sample to another is to come."""
+        if counting and not self.state.place[kernels.COUNTING]:
+            self.state.place[kernels.COUNTING] = 1
+            self.state.counts[:] = 0.0
+        self._reference = reference(self.loop, at, end)
+        self._whole = counting and self._residual.size > 0 and end - at == len(self._residual)
+
+    def advance(self, first: int, last: int, drawn: Floats | None) -> None:
+        """Some samples of the segment, with what is drawn for them."""
+        state = self.state if drawn is None else self.state._replace(drawn=drawn)
+        kept = self._residual[first:last] if self._whole else _NOTHING
+        kernels.ensemble_loop(self.p, state, self._reference[first : last + 1], kept, _NOTHING, kernels.UNSHIFTED)
+
+    def end(self) -> None:
+        """The segment is over."""
+        if self._whole:
+            self._spectrum += _periodogram(self._residual, self.loop.timing.period_s)
+            self._segments += 1
+
+    @property
+    def batch(self) -> _Batch:
+        """What came out."""
+        found = self._spectrum / self._segments if self._segments else np.full_like(self._spectrum, math.nan)
+        return _Batch(self.state, found)
 
 
 def _periodogram(residual: Floats, period_s: float) -> Floats:
@@ -479,7 +603,8 @@ def _periodogram(residual: Floats, period_s: float) -> Floats:
     return found
 
 
-def _joined(name: str, loop: PointingLoop, span: Span, parts: list[_Batch], runs: int) -> Ensemble:
+def _joined(case: Case, span: Span, parts: list[_Batch], runs: int) -> Ensemble:
+    loop = case.loop
     total, settle = control_samples(loop, span)
     samples = total - settle
     steps = samples * loop.timing.steps_per_sample
@@ -488,7 +613,7 @@ def _joined(name: str, loop: PointingLoop, span: Span, parts: list[_Batch], runs
         return np.concatenate([getattr(b.state, field).reshape(-1, LANES).T for b in parts])[:runs]
 
     return Ensemble(
-        name=name,
+        name=case.controller.name,
         seconds=samples * loop.timing.period_s,
         rms_rad=np.sqrt(by_run("sum_square")[:, : loop.axes] / steps),
         mean_rad=by_run("sum")[:, : loop.axes] / samples,

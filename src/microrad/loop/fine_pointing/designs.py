@@ -1,6 +1,7 @@
 """The controllers of the study: each tuned for one axis of the mission's loop, then put on all axes."""
 
 import math
+from collections import ChainMap
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -74,20 +75,36 @@ def design(
     Raises ValueError for a name that `names` does not list, and with the reason when a modulus margin cannot be met.
     """
     of, wanted = plants(scene, scene.table.seed), tuple(only) or names(scene.table)
-    first = [name for name in wanted if name in {control.PI.name, WITH_INVERSE}]  # others begin with it
-    pi = _tuning(first[0], scene.table, of)() if first else None
-    others = [name for name in wanted if name not in first]
-    jobs = [_tuning(name, scene.table, of, pi) for name in others]
-    told = len(wanted) - len(others)
-    with shared_out(jobs, lambda turn: on_progress(told + turn, len(wanted), f"tuning {others[turn]}")) as results:
-        tuned = dict(zip(others, results(), strict=True))
+    groups = _groups(wanted, scene.table)
+    jobs = [partial(_tuned_in_turn, group, scene.table, of) for group in groups]
+
+    def told(turn: int) -> None:
+        on_progress(sum(map(len, groups[:turn])), len(wanted), f"tuning {groups[turn][0]}")
+
+    with shared_out(jobs, told) as results:
+        tuned = dict(ChainMap(*results()))
     on_progress(len(wanted), len(wanted), "controllers tuned")
-    if pi is not None:
-        tuned |= dict.fromkeys(first, pi)
     return tuple(
         Design(name, tuned[name], build(name, scene, tuned[name].controller), _INVERSE_USED.get(name, ""))
         for name in wanted
     )
+
+
+def _groups(wanted: Sequence[str], f: FinePointing) -> list[list[str]]:
+    """Names of what one process tunes: those that begin with the PI in one group, behind what takes longest."""
+    with_pi = [family.name for family in families(f) if family.base is control.PI]
+    together = [name for first in ([control.PI.name, WITH_INVERSE], with_pi) for name in wanted if name in first]
+    alone = [[name] for name in wanted if name not in together]
+    return sorted([group for group in (together, *alone) if group], key=lambda group: group != [control.LQG.name])
+
+
+def _tuned_in_turn(group: Sequence[str], f: FinePointing, of: Sequence[DesignPlant]) -> dict[str, Tuned]:
+    """The controllers of a group, by name; the PI, where it is one of them, is tuned once and stands first."""
+    found: dict[str, Tuned] = {}
+    for name in group:
+        pi = found.get(group[0]) if group[0] in {control.PI.name, WITH_INVERSE} else None
+        found[name] = pi if pi is not None and name == WITH_INVERSE else _tuning(name, f, of, pi)()
+    return found
 
 
 def tune(name: str, f: FinePointing, of: Sequence[DesignPlant]) -> Tuned:

@@ -3,7 +3,6 @@
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +10,6 @@ from numpy.typing import NDArray
 from microrad.core import kernels
 from microrad.core.arrays import Floats
 from microrad.core.progress import Progress
-from microrad.core.threads import in_threads
 from microrad.loop.control import inverse
 from microrad.loop.fine_loop import ensemble
 from microrad.loop.fine_loop.design import residual_spectrum
@@ -177,8 +175,11 @@ def verify(
 ) -> tuple[Verified, ...]:
     """Simulate each design on each variant of the mirror, beside its linear theory."""
     loops = {variant: on_variant(scene, variant) for variant in scene.mirrors.own}
-    jobs = [_run(loop, d.controller, scene.table) for d in designs for loop in loops.values()]
-    runs = iter(_several(jobs, on_progress, "simulating controllers"))
+    cases = [
+        _case(loop, d.controller, spectrum=variant == Variant.GIVEN) for d in designs for variant, loop in loops.items()
+    ]
+    f = scene.table
+    runs = iter(ensemble.several(cases, span(f), f.runs, _telling(on_progress, "simulating controllers")))
     return tuple(_verified(scene, d, {variant: next(runs) for variant in loops}) for d in designs)
 
 
@@ -188,8 +189,8 @@ def outlook(
     """Each design beside its linear figure, simulated in one batch of the mission's runs with its hysteresis."""
     whole, runs = span(scene.table), min(scene.table.runs, ensemble.LANES)
     few = replace(whole, duration_s=min(whole.duration_s, whole.settle_s + FEW_SAMPLES * scene.loop.timing.period_s))
-    jobs = [partial(ensemble.run, scene.loop, d.controller, few, runs, threads=1) for d in designs]
-    found = _several(jobs, on_progress, "simulating controllers")
+    cases = [_case(scene.loop, d.controller) for d in designs]
+    found = ensemble.several(cases, few, runs, _telling(on_progress, "simulating controllers"))
     return tuple(
         Outlook(d.tuned.residual_rms_rad, each.radial_rms_rad / math.sqrt(scene.loop.axes))
         for d, each in zip(designs, found, strict=True)
@@ -202,9 +203,8 @@ def on_variant(scene: Scene, variant: Variant) -> PointingLoop:
     return parts.without(scene.loop, parts.HYSTERESIS) if straight else with_mirror(scene.loop, scene.mirrors, variant)
 
 
-def _run(loop: PointingLoop, controller: LoopController, f: FinePointing) -> Callable[[], ensemble.Ensemble]:
-    controller = for_mirror(controller, loop)
-    return lambda: ensemble.run(loop, controller, span(f), f.runs, threads=1)
+def _case(loop: PointingLoop, controller: LoopController, *, spectrum: bool = False) -> ensemble.Case:
+    return ensemble.Case(loop, for_mirror(controller, loop), spectrum)
 
 
 def for_mirror(controller: LoopController, loop: PointingLoop) -> LoopController:
@@ -212,10 +212,8 @@ def for_mirror(controller: LoopController, loop: PointingLoop) -> LoopController
     return controller if controller.inverse is None else replace(controller, inverse=inverse(loop.mirror))
 
 
-def _several(
-    jobs: Sequence[Callable[[], ensemble.Ensemble]], on_progress: Progress, what: str
-) -> list[ensemble.Ensemble]:
-    return in_threads(jobs, lambda done, total: on_progress(done, total, what))
+def _telling(on_progress: Progress, what: str) -> Callable[[int, int], None]:
+    return lambda done, total: on_progress(done, total, what)
 
 
 def _verified(scene: Scene, design: Design, runs: dict[Variant, ensemble.Ensemble]) -> Verified:
@@ -265,9 +263,8 @@ def error_budget(scene: Scene, of: Verified, on_progress: Progress = lambda done
     left_out = (parts.LIMITS, parts.QUANTISATION, parts.DELAY)
     alone = [parts.without(fine, *(other for other in names if other != name)) for name in names]
     fewer = [parts.without(scene.loop, name) for name in left_out]
-    runs = _several(
-        [_run(loop, of.design.controller, scene.table) for loop in (*alone, *fewer)], on_progress, "error budget"
-    )
+    cases = [_case(loop, of.design.controller) for loop in (*alone, *fewer)]
+    runs = ensemble.several(cases, span(scene.table), scene.table.runs, _telling(on_progress, "error budget"))
     rms = [run.radial_rms_rad for run in runs]
     theory = of.theory.error_by_source
     lines = tuple(
@@ -298,17 +295,16 @@ def sines(
     Body pointing and point-ahead are left out: with them the sine would not fit into the stroke.
     """
     f = scene.table
-    jobs, what = [], []
+    cases, what = [], []
     for variant in (each for each in scene.mirrors.own if each != Variant.STRAIGHT):
         loop = with_mirror(scene.loop, scene.mirrors, variant)
         for design in designs:
             for freq in scene.sine_frequencies_hz:
                 tracking = _tracking(loop, scene.sine_amplitude_rad, freq)
-                short = ensemble.Span(SINE_S, SINE_SETTLE_S, f.seed)
-                controller = for_mirror(design.controller, tracking)
-                jobs.append(lambda a=tracking, c=controller, s=short: ensemble.run(a, c, s, ensemble.LANES, threads=1))
+                cases.append(_case(tracking, design.controller))
                 what.append((design.name, variant, freq))
-    runs = _several(jobs, on_progress, "sines under vibration and noise")
+    short = ensemble.Span(SINE_S, SINE_SETTLE_S, f.seed)
+    runs = ensemble.several(cases, short, ensemble.LANES, _telling(on_progress, "sines under vibration and noise"))
     return tuple(
         Sine(name, variant, freq, run.radial_rms_rad, run.quantile_rad(f.quantile))
         for (name, variant, freq), run in zip(what, runs, strict=True)
