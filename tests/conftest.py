@@ -1,6 +1,7 @@
 """Fixtures that run commands in this process, for the tests of the command line."""
 
 import contextlib
+import gc
 import importlib
 import os
 
@@ -66,6 +67,13 @@ def pytest_collection_modifyitems(config, items):
 def pytest_configure(config):
     shared.begin(config)
     waiting.told = os.dup(2)  # before what tests write is taken in
+    gc.disable()  # while modules and tests are read: none of that is garbage
+
+
+def pytest_collection_finish():
+    """What has been read stays to the end: each look for garbage would go through thousands of tests again."""
+    gc.freeze()
+    gc.enable()
 
 
 @pytest.fixture(scope="session", autouse=True)
