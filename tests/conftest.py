@@ -94,11 +94,18 @@ def folder(tmp_path, monkeypatch):
 
 @pytest.fixture
 def undrawn(monkeypatch):
-    """Reports without figures, which `test_init_then_run` draws."""
-    from microrad.report import day_plots, figures, link_figures, paper_bench  # not for every file of tests
+    """Reports without figures; `test_init_then_run` and `test_identify_prints_both_models…` draw them."""
+    from microrad.report import (  # not for every file of tests
+        day_plots,
+        figures,
+        identification_figures,
+        link_figures,
+        paper_bench,
+    )
 
     for module in (day_plots, figures, link_figures, paper_bench):
         monkeypatch.setattr(module, "draw", lambda *args: ())
+    monkeypatch.setattr(identification_figures, "draw", lambda *args, **more: {})
 
 
 @pytest.fixture
