@@ -15,6 +15,7 @@ import shared
 import waiting
 from command_line import Result, listing
 from microrad import cli
+from small_campaign import without_worker
 
 pytest_plugins = ("browser",)
 
@@ -106,6 +107,12 @@ def undrawn(monkeypatch):
     for module in (day_plots, figures, link_figures, paper_bench):
         monkeypatch.setattr(module, "draw", lambda *args: ())
     monkeypatch.setattr(identification_figures, "draw", lambda *args, **more: {})
+
+
+@pytest.fixture
+def rows_here(monkeypatch):
+    """Campaigns without a worker process, for tests of what is made of their rows."""
+    without_worker(monkeypatch)
 
 
 @pytest.fixture

@@ -51,7 +51,7 @@ def once(monkeypatch):
     monkeypatch.setattr(study, "run", STUDY)
 
 
-@pytest.mark.usefixtures("once", "undrawn")
+@pytest.mark.usefixtures("once", "undrawn", "rows_here")
 @pytest.mark.parametrize(
     "path", [path for path in FILES if path.name not in BESIDE], ids=lambda path: str(path.relative_to(CORPUS))
 )

@@ -413,6 +413,7 @@ at_most = {most}
 """
 
 
+@pytest.mark.usefixtures("rows_here")
 def test_it_stops_when_the_wanted_quantile_is_known_well_enough(tmp_path):
     path = campaign_file(tmp_path, runs=64, more=PRECISION.format(width="0.02 dB", most=20_000))
     found = summarise(begun(tmp_path, path))
@@ -439,6 +440,7 @@ at_most = 1024
 """
 
 
+@pytest.mark.usefixtures("rows_here")
 @pytest.mark.parametrize(("width", "rounds_done"), [("1 mrad", 1), ("0.0001 nrad", 0)])
 def test_a_precision_of_the_radial_error_counts_the_time_of_all_rows(tmp_path, width, rounds_done):
     path = campaign_file(tmp_path, runs=256, more=RADIUS.format(width=width))

@@ -147,6 +147,7 @@ high = "{high!r} W"
 """
 
 
+@pytest.mark.usefixtures("rows_here")
 @pytest.mark.parametrize(
     ("seed", "code"),
     [(0, 1), (41, 0), *(pytest.param(seed, 1, marks=pytest.mark.endurance) for seed in range(1, 6))],
@@ -183,6 +184,7 @@ def shaken_by_its_own_loop(rng, **communication):
     return data
 
 
+@pytest.mark.usefixtures("rows_here")
 def test_budget_run_and_a_campaign_of_one_row_end_alike(call, tmp_path, monkeypatch):
     """Random whole missions, and one at 1 m, whose budget has more light arrive than was sent."""
     monkeypatch.chdir(tmp_path)
