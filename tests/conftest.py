@@ -1,6 +1,7 @@
 """Fixtures that run commands in this process, for the tests of the command line."""
 
 import contextlib
+import gc
 import importlib
 import os
 
@@ -14,6 +15,7 @@ import shared
 import waiting
 from command_line import Result, listing
 from microrad import cli
+from small_campaign import without_worker
 
 pytest_plugins = ("browser",)
 
@@ -66,6 +68,13 @@ def pytest_collection_modifyitems(config, items):
 def pytest_configure(config):
     shared.begin(config)
     waiting.told = os.dup(2)  # before what tests write is taken in
+    gc.disable()  # while modules and tests are read: none of that is garbage
+
+
+def pytest_collection_finish():
+    """What has been read stays to the end: each look for garbage would go through thousands of tests again."""
+    gc.freeze()
+    gc.enable()
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -86,11 +95,24 @@ def folder(tmp_path, monkeypatch):
 
 @pytest.fixture
 def undrawn(monkeypatch):
-    """Reports without figures, which `test_init_then_run` draws."""
-    from microrad.report import day_plots, figures, link_figures, paper_bench  # not for every file of tests
+    """Reports without figures; `test_init_then_run` and `test_identify_prints_both_models…` draw them."""
+    from microrad.report import (  # not for every file of tests
+        day_plots,
+        figures,
+        identification_figures,
+        link_figures,
+        paper_bench,
+    )
 
     for module in (day_plots, figures, link_figures, paper_bench):
         monkeypatch.setattr(module, "draw", lambda *args: ())
+    monkeypatch.setattr(identification_figures, "draw", lambda *args, **more: {})
+
+
+@pytest.fixture
+def rows_here(monkeypatch):
+    """Campaigns without a worker process, for tests of what is made of their rows."""
+    without_worker(monkeypatch)
 
 
 @pytest.fixture

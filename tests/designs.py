@@ -1,4 +1,4 @@
-"""Controllers of the shipped mission, tuned once a session for all tests of exports: LQG alone takes ten seconds."""
+"""Controllers of the shipped mission, tuned once for all tests of exports and all processes of a run."""
 
 from dataclasses import replace
 from functools import cache
@@ -6,6 +6,7 @@ from functools import cache
 from microrad.export import choice
 from microrad.export.records import FlightController, Vectors
 from microrad.mission.file import MissionFile, load_mission
+from shared import once
 from shipped import SHIPPED
 
 
@@ -16,7 +17,7 @@ def mission() -> MissionFile:
 
 @cache
 def chosen(name: str) -> choice.Choice:
-    return choice.choose(mission(), name)
+    return once(f"chosen {name}", lambda: choice.choose(mission(), name))
 
 
 @cache

@@ -28,3 +28,22 @@ def once(name, make):
             part.write_bytes(pickle.dumps(make(), protocol=5))
             part.replace(path)
     return pickle.loads(path.read_bytes())
+
+
+def found_once(run, of=lambda first: first):
+    """A function from a mission's file to what is found of it, which finds it once for each text of a mission.
+
+    For tests of what is said of it, where the same mission is asked for in several forms. ``of`` gives the file of the
+    first argument. A mission that names other files is found each time: they may have changed.
+    """
+    found = {}
+
+    def known(first, *args, **more):
+        text = of(first).text
+        if "file = " in text:
+            return run(first, *args, **more)
+        if text not in found:
+            found[text] = run(first, *args, **more)
+        return found[text]
+
+    return known

@@ -12,6 +12,8 @@ from pathlib import Path
 
 import psutil
 
+from microrad.campaign import run, worker
+from microrad.campaign.records import Outcome
 from shipped import SHIPPED
 from waiting import HANG_S, any_moment, beside, until
 
@@ -51,6 +53,35 @@ def campaign_file(
         encoding="utf-8",
     )
     return path
+
+
+class Here:
+    """An engine without a worker: it does one job after the other in the process of the test."""
+
+    def __init__(self, spec):
+        self.work = worker.open_target(run.TARGET, spec)
+
+    def outcomes(self, jobs):
+        for job in jobs:
+            try:
+                outcome = Outcome(job, "done", self.work.do(job, lambda: None))
+            except Exception as error:
+                outcome = Outcome(job, "raised", reason=worker.words(error))
+            yield outcome
+
+    def close(self):
+        pass
+
+
+def without_worker(patch):
+    """Campaigns of this process that ask for no cluster are computed in it: a worker takes a second to start."""
+    engine = run.Means.engine
+
+    def chosen(means, spec, late_s):
+        local = means.workers is None and means.scheduler is None
+        return Here(spec) if local else engine(means, spec, late_s)
+
+    patch.setattr(run.Means, "engine", chosen)
 
 
 def import_path(folder="."):

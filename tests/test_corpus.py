@@ -8,7 +8,9 @@ import shutil
 
 import pytest
 
+from microrad.study import story as study
 from places import TESTS
+from shared import found_once
 from shipped import SHIPPED
 
 CORPUS = TESTS / "corpus"
@@ -26,6 +28,7 @@ READS = {
     "reports": ("reproduce", "{file}", "--json"),
 }
 """The public command that reads each kind."""
+STUDY = found_once(study.run)
 
 
 def read(path, folder, call):
@@ -42,6 +45,13 @@ def reads_or_says_how_to_migrate(done):
     return done.code in {0, 1} or (done.code == 2 and "migrate" in done.err)
 
 
+@pytest.fixture
+def once(monkeypatch):
+    """A mission is studied once, whatever carries it."""
+    monkeypatch.setattr(study, "run", STUDY)
+
+
+@pytest.mark.usefixtures("once", "undrawn", "rows_here")
 @pytest.mark.parametrize(
     "path", [path for path in FILES if path.name not in BESIDE], ids=lambda path: str(path.relative_to(CORPUS))
 )

@@ -24,6 +24,7 @@ from microrad.mission.toml import MissionError
 from preset_files import NAMES as PRESETS
 from preset_files import completed
 from shipped import SHIPPED
+from small_campaign import without_worker
 
 CROSSLINK = SHIPPED.parent.parent / "docs" / "gallery" / "crosslink.toml"
 HEAD = 'mission = "{name}.toml"\nseed = 1\nruns = 4\nsampling = "random"\n'
@@ -260,12 +261,15 @@ def test_a_row_costs_the_mean_of_some_without_the_first(tmp_path):
 
 def test_results_are_the_same_bits_whatever_a_row_costs(tmp_path, monkeypatch):
     mission(tmp_path, "gallery")
-    whole = content(begun(tmp_path, "whole.ledger", monkeypatch, 1e-6))
+    with monkeypatch.context() as patch:
+        without_worker(patch)
+        whole = content(begun(tmp_path, "whole.ledger", monkeypatch, 1e-6))
     parts = content(begun(tmp_path, "parts.ledger", monkeypatch, 0.2, threads=2))
     assert whole[0] == [64] and parts[0] == [8] * 8
     assert parts[1:] == whole[1:]
 
 
+@pytest.mark.usefixtures("rows_here")
 def test_a_campaign_that_is_resumed_keeps_its_chunks(tmp_path, monkeypatch):
     mission(tmp_path, "gallery")
 

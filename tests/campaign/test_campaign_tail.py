@@ -314,6 +314,7 @@ def test_importance_sampling_needs_a_twentieth_of_the_runs(slow: Slow) -> None:
     assert 20 * runs * 1000 * relative**2 > 2 * 20 * runs
 
 
+@pytest.mark.usefixtures("rows_here")
 def test_a_campaign_says_how_likely_its_error_is(slow: Slow) -> None:
     """From the command's own ledger: text, data and page."""
     exact = rayleigh(1e-6, slow.sigma)

@@ -20,6 +20,7 @@ from microrad import cli
 from microrad.campaign import bundle, cluster, run, sampling, sensitivity, sketch, tables
 from microrad.campaign.file import load_campaign
 from places import ROOT
+from small_campaign import without_worker
 from waiting import HANG_S
 
 for _extra in ("distributed", "pyarrow", "h5netcdf"):
@@ -71,6 +72,8 @@ def folder(tmp_path_factory):
     path = tmp_path_factory.mktemp("campaigns")
     before = Path.cwd()
     os.chdir(path)
+    patch = pytest.MonkeyPatch()
+    without_worker(patch)
     try:
         assert command("microrad", "campaign", "init").code == 0
         assert command("microrad", "init", "--preset", "paper").code == 0
@@ -81,6 +84,7 @@ def folder(tmp_path_factory):
         assert command("microrad", "campaign", "export", "links.ledger", "rows.csv").code == 0
         yield path, ran.out
     finally:
+        patch.undo()
         os.chdir(before)
 
 

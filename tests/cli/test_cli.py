@@ -24,8 +24,9 @@ from command_line import listing
 from microrad import cli, report
 from microrad.cli import frame, installation, lab
 from microrad.lab import identify
-from microrad.loop import control
+from microrad.loop import control, fine_pointing
 from microrad.loop.fine_pointing import designs
+from microrad.report import identification_figures
 from microrad.study import story as study
 from places import ROOT
 from shipped import plain_study, without_day, without_fine_pointing
@@ -72,7 +73,8 @@ def loop_mirror(tmp_path_factory):
     """A recording, and the mirror file that `identify` made of it."""
     home = tmp_path_factory.mktemp("identified")
     recording, mirror = write_recording(home / "loop.csv"), home / "loop-mirror.toml"
-    with pytest.raises(SystemExit) as stop:
+    with pytest.raises(SystemExit) as stop, pytest.MonkeyPatch.context() as patch:
+        patch.setattr(identification_figures, "draw", lambda *args, **more: {})
         cli.app(args=["identify", str(recording), *COLUMNS, "--mirror-file", str(mirror)], prog_name="microrad")
     assert not stop.value.code
     return mirror
@@ -240,7 +242,19 @@ def few_controllers(monkeypatch):
     monkeypatch.setattr(designs, "families", lambda m: (control.PI, control.LQG))
 
 
-@pytest.mark.usefixtures("few_controllers")
+@pytest.fixture
+def designed_once(monkeypatch):
+    """Controllers of the one mission of a test, designed once for all that is printed of them."""
+    made, design = [], fine_pointing.design
+
+    def known(scene, on_progress):
+        made[:] = made or [design(scene, on_progress)]
+        return made[0]
+
+    monkeypatch.setattr(fine_pointing, "design", known)
+
+
+@pytest.mark.usefixtures("few_controllers", "designed_once")
 def test_design_prints_each_controller_with_its_margins(call, folder):
     call("init")
     result = call("design", "leo-geo.toml")
@@ -509,6 +523,7 @@ def test_identify_prints_both_models_and_writes_the_mirror(call, folder):
     assert sorted(p.name for p in folder.iterdir()) == ["loop-mirror.html", "loop-mirror.toml", "loop.csv"]
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_identify_json_names_and_models(call, folder):
     path = write_recording(folder / "loop.csv", reverse=True)
     options = (
@@ -616,6 +631,7 @@ def test_identify_refuses_files_that_are_no_recordings(refused, folder):
     assert "line 10" in refused("identify", path, *COLUMNS)
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_identify_replaces_only_mirror_files_and_only_when_told(call, refused, folder):
     path = write_recording(folder / "loop.csv")
     mine = folder / "loop-mirror.toml"
@@ -644,6 +660,7 @@ def test_identify_looks_at_the_mirror_file_before_and_after_fitting(call, refuse
     assert (folder / "loop-mirror.toml").read_text() == "mine"
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_progress_goes_to_a_terminal_and_never_to_stdout(call, folder, monkeypatch):
     monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
     monkeypatch.setenv("TERM", "xterm")
@@ -653,6 +670,7 @@ def test_progress_goes_to_a_terminal_and_never_to_stdout(call, folder, monkeypat
     assert "Bouc-Wen starts" in result.err
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_progress_goes_to_a_file_that_the_environment_names(call, folder, monkeypatch):
     monkeypatch.setenv(frame.PROGRESS_FILE, str(folder / "progress"))
     monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
@@ -836,6 +854,7 @@ offset = "6 V"
 """
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_bench_writes_recordings_that_identify_takes_as_a_folder(call, folder):
     (folder / "plan.toml").write_text(PLAN)
     made = call("bench", "plan.toml", "--seed", "3")
@@ -879,6 +898,7 @@ def with_units(folder, header):
     return path
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_units_in_the_header_are_taken_and_said(call, folder):
     path = with_units(folder, "time,Drive (mV),Tilt (urad)")
     result = call("identify", path, "--input", 1, "--output", 2, "--rate", 1000, "--static")
@@ -887,6 +907,7 @@ def test_units_in_the_header_are_taken_and_said(call, folder):
     assert 'drive_max = "0.012 V"' in (folder / "units-mirror.toml").read_text(encoding="utf-8")
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_units_that_nobody_states_are_assumed_and_said(call, folder):
     result = call("identify", write_recording(folder / "loop.csv"), *COLUMNS)
     assert "drive in V (assumed, --input-unit says otherwise)" in result.out

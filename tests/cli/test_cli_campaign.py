@@ -14,6 +14,7 @@ from command_line import listing
 from microrad.campaign import mending, run
 from microrad.campaign.ledger import Ledger
 from microrad.cli.campaign import campaigns
+from small_campaign import without_worker
 
 LIMIT = '[limits.margin]\nleast = "1 dB"\n'
 LINKS = HEAD.replace("256", "64") + POWER + LIMIT  # without a loop: a worker has its rows in milliseconds
@@ -49,7 +50,9 @@ def parsed(text):
 def done(tmp_path_factory):
     """A folder with a campaign that has been run."""
     folder = tmp_path_factory.mktemp("a done one")
-    run.begin(written(folder, LINKS, whole=False), folder / "campaign.ledger", run.Means(threads=1))
+    with pytest.MonkeyPatch.context() as patch:
+        without_worker(patch)
+        run.begin(written(folder, LINKS, whole=False), folder / "campaign.ledger", run.Means(threads=1))
     (folder / "campaign.ledger.lock").unlink()
     return folder
 
@@ -116,6 +119,7 @@ def test_a_run_prints_and_keeps_what_status_shows(call, folder):
     assert mending.verify(book, [(0, 0)]).missing == ()
 
 
+@pytest.mark.usefixtures("rows_here")
 def test_rows_that_miss_a_limit_are_an_exit_code(call, folder):
     file = written(folder, LINKS.replace('"1 dB"', '"30 dB"'), whole=False)
     shown = call("campaign", "run", file, "--ledger", "tails.ledger", "--json")
@@ -224,6 +228,7 @@ def test_status_of_what_is_complete_and_of_what_is_not(there, call):
     assert parsed(data.out) and "Complete" not in shown.out
 
 
+@pytest.mark.usefixtures("rows_here")
 def test_resume_comes_to_what_was_there(there, call):
     before = call("campaign", "export", "campaign.ledger", "before.csv")
     shortened(there)
@@ -233,6 +238,7 @@ def test_resume_comes_to_what_was_there(there, call):
     assert (there / "after.csv").read_bytes() == (there / "before.csv").read_bytes()
 
 
+@pytest.mark.usefixtures("rows_here")
 def test_an_interrupt_says_how_to_go_on(there, call, monkeypatch):
     def interrupt(*args):
         raise KeyboardInterrupt
@@ -275,6 +281,7 @@ def test_a_ledger_that_cannot_be_written_is_read_all_the_same(there, call, tmp_p
 
 
 # -------------------------------------------------------------------------------------------------------------- verify
+@pytest.mark.usefixtures("rows_here")
 def test_verify_finds_a_flipped_bit_and_resume_mends_it(there, call):
     sound, data = call("campaign", "verify", "campaign.ledger"), call("campaign", "verify", "campaign.ledger", "--json")
     assert (sound.code, data.code) == (0, 0) and parsed(data.out)["sound"] is True

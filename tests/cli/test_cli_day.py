@@ -12,8 +12,11 @@ from day_files import ALONE, BY_FILE, HELD, LIMITS, day_data, day_path, element_
 from link_files import written
 from microrad.link import study as link_study
 from microrad.mission.file import load_link
+from microrad.orbit import constellation as plans
+from microrad.orbit import day as day_study
 from microrad.orbit.operations import COLUMNS
 from report_pages import assert_sound, without_scripts
+from shared import found_once
 
 QUICK = {"orbit.duration": "6 h", "operations.runs": 3}
 BLIND = {LIMITS: {**HELD, "boresight": [0.0, 0.0, 1.0], "field_of_regard": "5 deg"}}  # at the Earth
@@ -31,6 +34,18 @@ MISSIONS = {
     "always in view": ALWAYS,
     "a share": {"operations.relay_share": 0.5},
 }
+ONCE = (
+    (link_study, found_once(link_study.run)),
+    (day_study, found_once(day_study.run, lambda links: links.file)),
+    (plans, found_once(plans.run)),
+)
+
+
+@pytest.fixture(autouse=True)
+def once(monkeypatch):
+    """Each mission is studied once: these tests read what is said of it, in several forms."""
+    for module, run in ONCE:
+        monkeypatch.setattr(module, "run", run)
 
 
 def path_of(folder, *changes):

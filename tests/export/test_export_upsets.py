@@ -90,14 +90,21 @@ def turned(folder, of, files, name, counter, values, limits):
     return map(int, done.stdout.split())
 
 
+FLOWN = [("PI + inverse", "double"), ("LQG", "single"), *zip(PAIRS, ("single", "double", "single"), strict=True)]
+FLOWN += [
+    pytest.param(name, "double" if precision == "single" else "single", marks=pytest.mark.endurance)
+    for name, precision in FLOWN
+]
+"""Each code in one precision, and in the other one where there is time."""
+
+
 def flown(name):
     """A controller by its name, or with the inverse of a pair of models, and a recorded run."""
     return pair(designs.chosen("PI + inverse in series"), PAIRS[name]) if name in PAIRS else designs.flown(name, 300)
 
 
 @pytest.mark.skipif(shutil.which("gcc") is None, reason="no gcc")
-@pytest.mark.parametrize("precision", ["double", "single"])
-@pytest.mark.parametrize("name", ["PI + inverse", "LQG", *PAIRS])
+@pytest.mark.parametrize(("name", "precision"), FLOWN)
 def test_no_bit_of_the_state_takes_a_command_beyond_the_limits(tmp_path, name, precision):
     of, run = flown(name)
     files = c_code.flight_code(of, sections(of), "flown", precision, BOUND)

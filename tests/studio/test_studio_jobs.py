@@ -331,18 +331,20 @@ def test_a_job_whose_process_is_killed_is_lost_ends_with_it_and_lets_the_next_on
 
 @pytest.mark.parametrize("text", ['{"kind": "study", "ti', "", "[]", "{}", None])
 def test_a_damaged_description_is_told_and_breaks_no_list(studio, tmp_path, text):
-    good = ended(studio.submit(order(tmp_path, "presets")).folder)
-    bad = studio.submit(order(tmp_path, "presets"))
-    ended(bad.folder)
-    (bad.folder / "job.json").unlink()
+    good, bad = (written(studio.folder, number, cwd=str(tmp_path)) for number in (1, 2))
+    for folder in (good, bad):
+        for name in ("started.json", "exit.json"):
+            (folder / name).write_text('{"at": "", "code": 0}', "utf-8")
+    assert [job.state for job in studio.listed()] == ["done", "done"]
+    (bad / "job.json").unlink()
     if text is not None:
-        (bad.folder / "job.json").write_text(text)
+        (bad / "job.json").write_text(text)
     second, first = studio.listed()
-    assert (first.number, first.state) == (good.number, "done")
+    assert (first.number, first.state) == (1, "done")
     assert second.state == "unreadable"
-    assert f"{bad.folder / 'job.json'} is not taken: " in second.words
+    assert f"{bad / 'job.json'} is not taken: " in second.words
     studio.remove(second.number)
-    assert [job.number for job in studio.listed()] == [good.number]
+    assert [job.number for job in studio.listed()] == [1]
 
 
 def test_a_working_folder_that_is_gone_is_told(studio, tmp_path):
