@@ -14,11 +14,17 @@ from microrad.loop.fine_loop import ensemble
 from microrad.loop.fine_loop.loop import LoopController, PointingLoop
 from microrad.mirror import Variant
 from microrad.mission.file import LinkFile, MissionFile
+from microrad.mission.tables.fine_pointing import FinePointing
 
 Beat = Callable[[], None]
 
 
-def whole(file: LinkFile) -> MissionFile:
+def settings(file: LinkFile) -> FinePointing:
+    """The fine-pointing table of a mission that has a loop."""
+    return fine_pointing.table(_whole(file).mission.fine_pointing)
+
+
+def _whole(file: LinkFile) -> MissionFile:
     """The file of a mission that has a loop: the campaign file's own check has seen to it."""
     assert isinstance(file, MissionFile)
     return file
@@ -26,7 +32,7 @@ def whole(file: LinkFile) -> MissionFile:
 
 def scene(file: LinkFile, table: LoopTable) -> fine_pointing.Scene:
     """The scene of a mission with the axes that the campaign simulates."""
-    mission = whole(file)
+    mission = _whole(file)
     built = fine_pointing.scene(mission, mirror.of(mission.mission), tracking_light_w(mission))
     return replace(built, loop=built.axis) if table.axes == "one" else built
 
@@ -36,7 +42,7 @@ def tuned(file: LinkFile, table: LoopTable) -> AxisController:
 
     Raises `CampaignError` for a name that the mission has no controller of, and with the reason when none can be tuned.
     """
-    f = fine_pointing.table(whole(file).mission)
+    f = settings(file)
     if table.controller not in fine_pointing.names(f):
         names = ", ".join(f'"{name}"' for name in fine_pointing.names(f))
         raise CampaignError(f'loop.controller = "{table.controller}" is no controller of the mission; it has {names}')
@@ -61,7 +67,7 @@ def row_loop(file: LinkFile, table: LoopTable) -> PointingLoop:
 
 def span(campaign: CampaignFile, file: LinkFile) -> ensemble.Span:
     """How long the runs of a campaign are: as its table `loop` says, else the mission; seeded by the campaign."""
-    f, table = fine_pointing.table(whole(file).mission), campaign.table.loop
+    f, table = settings(file), campaign.table.loop
     assert table is not None
     duration = f.duration_s if table.duration_s is None else table.duration_s
     settle = f.settle_s if table.settle_s is None else table.settle_s

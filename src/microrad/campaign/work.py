@@ -17,7 +17,6 @@ from microrad.campaign.inputs import Builder
 from microrad.campaign.records import CampaignError, Chunk, Failed, Job, WorstTrace
 from microrad.core import kernels
 from microrad.core.arrays import Floats
-from microrad.loop import fine_pointing
 from microrad.loop.control import AxisController
 from microrad.loop.fine_loop import ensemble
 from microrad.loop.fine_loop.loop import LoopController, PointingLoop
@@ -248,7 +247,7 @@ class Work:
     def _warm_up(self) -> None:
         table = self.campaign.table.loop
         assert table is not None
-        period = 1.0 / fine_pointing.table(loops.whole(self.campaign.mission).mission).rate_hz
+        period = 1.0 / loops.settings(self.campaign.mission).rate_hz
         loop, controller = loops.row_loop(self.campaign.mission, table), self.evaluator.controller(0)
         ensemble.trace(loop, controller, ensemble.Span(2.0 * period, 0.0, 0))
 

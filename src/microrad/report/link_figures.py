@@ -55,7 +55,7 @@ def tornado(study: LinkStudy, of: Tornado) -> Figure:
     if data and low < required < high:
         axes.axvline(required, color=VERMILION, linestyle="--", linewidth=1.0)
         _say(axes, (required, -0.55), "required", VERMILION, "bottom")
-    judged = f", all but {outage_words(m)}" if data and m.jitter is not None else ""
+    judged = f", all but {outage_words(m.requirement)}" if data and m.jitter is not None else ""
     axes.set(xlabel=f"margin of the {'communication link' if data else of.of.lower()}{judged} (dB)")
     keys = [Patch(color=ORANGE, label="input lower"), Patch(color=BLUE, label="input higher")]
     axes.legend(handles=keys, loc="lower right", fontsize=8)

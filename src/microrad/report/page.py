@@ -9,7 +9,6 @@ from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
-from microrad import link
 from microrad.core.machine import versions
 from microrad.core.units import format_quantity
 from microrad.mission.file import assumptions, changed_from_shipped
@@ -193,7 +192,7 @@ def _left_out(study: Study) -> list[str]:
     ahead = study.file.mission.point_ahead
     if ahead is None or not ahead.corrected or not ahead.error_rad:
         return []
-    lost = link.communication_beam(study.file.mission).fall
+    lost = study.links.data.beam.fall
     at = study.performance.case(FINE, study.fine_pointing.best.design.name, "given") if study.fine_pointing else None
     cost = ""
     if at is not None:

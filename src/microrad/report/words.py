@@ -6,7 +6,7 @@ from typing import Any
 from microrad.core.units import format_quantity
 from microrad.link.budget import DEEPEST_DB, POINT_AHEAD_LOSS, POINTING_LOSS
 from microrad.link.requirement import IMPOSSIBLE, outage_words
-from microrad.loop.paper_cases import Run, residual_rad
+from microrad.loop.paper_cases import Run
 from microrad.mission.file import changed_from_shipped
 from microrad.mission.model import Mission
 from microrad.report import (
@@ -46,8 +46,8 @@ def _judged_at(study: Study) -> str:
     m, case = study.file.mission, study.fine_case
     rate = format_quantity(m.communication.data_rate_bit_s, "bit/s")
     if case is not None:
-        return f"{rate} but for {outage_words(m)}"
-    left = format_quantity(residual_rad(m, study.residual.trace), "rad", 3)
+        return f"{rate} but for {outage_words(m.requirement)}"
+    left = format_quantity(study.left_rad(study.residual), "rad", 3)
     return f"{rate} and a simulated residual of {left} ({m.requirement.residual_statistic})"
 
 
@@ -95,7 +95,7 @@ def _papers_loop(study: Study) -> str:
     if not study.papers_loop:
         return ""
     m, run = study.file.mission, study.residual
-    q, found_rad = m.requirement, residual_rad(m, run.trace)
+    q, found_rad = m.requirement, study.left_rad(run)
     left, most = (format_quantity(rad, "rad", 3) for rad in (found_rad, q.pointing_error_rad))
     judged = f"would miss {' and '.join(failed)}" if failed else "would meet what is required"
     return (
@@ -136,7 +136,7 @@ def papers_loop(study: Study) -> list[str]:
     if extrapolated := beyond_identified(study, run):
         sentences.append(f"Not to be relied on: {extrapolated}.")
     if study.comparison is not None:
-        left = residual_rad(m, study.comparison.residual.trace)
+        left = study.left_rad(study.comparison.residual)
         sentences.append(
             f"On the mission's comparison model of the mirror the residual is {format_quantity(left, 'rad', 3)} and "
             f"the margin {signed(study.comparison.margin_db, 'dB')}."
@@ -279,7 +279,7 @@ def _of_verdict(study: Study) -> list[str]:
         found.append(
             "[jitter] is not in this verdict, which judges the pointing error that the simulated loop leaves: the two "
             f"are not summed. Under [jitter] alone the margin is {signed(study.communication.margin_db, 'dB')} but for "
-            f"{outage_words(m)}, as microrad budget judges it"
+            f"{outage_words(m.requirement)}, as microrad budget judges it"
         )
     lost = study.achieved.loss_db(POINTING_LOSS, POINT_AHEAD_LOSS) if case is None else case.outage_loss_db
     if lost > DEEPEST_DB:
@@ -325,7 +325,7 @@ def summary(study: Study) -> dict[str, Any]:
             "rms_rad": study.residual.trace.rms_rad,
             "statistic": m.requirement.residual_statistic,
             "convention": m.conventions.residual,
-            "used_rad": residual_rad(m, study.residual.trace),
+            "used_rad": study.left_rad(study.residual),
         },
         "largest_data_rate_bit_s": study.margin_map.largest_rate_bit_s,
         "largest_pointing_error_rad": study.margin_map.largest_error_rad,
