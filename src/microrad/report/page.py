@@ -84,6 +84,7 @@ def render(study: Study, drawn: Drawn, manifest: Mapping[str, Any]) -> str:
     """
     template = pages().get_template("page.html")
     m, fine = study.file.mission, study.fine_pointing
+    required = m.requirement.pointing_error_rad
     titles = [(id, title) for id, title in PARTS if fine is not None or id != "tails"]
     boxes = chain.stages(study)
     context: dict[str, Any] = {
@@ -115,8 +116,8 @@ def render(study: Study, drawn: Drawn, manifest: Mapping[str, Any]) -> str:
         "assumptions": assumptions(study.file),
         "inputs": _inputs(study.file.sources),
         "day": _day(study, drawn.day),
-        "fine": None if fine is None else fine_pointing.context(fine, m, drawn.fine),
-        "tails": None if fine is None else tails.context(fine, m, drawn.tails),
+        "fine": None if fine is None else fine_pointing.context(fine, required, drawn.fine),
+        "tails": None if fine is None else tails.context(fine, required, drawn.tails),
         "versions": versions(),
         "origin": _origin(manifest),
     }

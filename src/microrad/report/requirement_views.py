@@ -83,7 +83,7 @@ def advice(study: Study, r: Requirement) -> str:
     if r.unknown:
         return ""
     if r.subject == "communication":
-        return advise.of_power(m, r, study.tornado)
+        return advise.of_power(m.communication, r, study.tornado)
     if r.subject == "stroke":
         return _of_stroke(study, r)
     if r.subject == "fine pointing":

@@ -13,7 +13,6 @@ from microrad.core.arrays import Floats
 from microrad.core.kept import NOTHING, Kept
 from microrad.loop.fine_loop.ensemble import bin_edges_rad, histogram_beyond, histogram_quantile
 from microrad.loop.fine_pointing import FinePointingStudy, Residual
-from microrad.mission.model import Mission
 from microrad.report import fine_pointing_words as words
 from microrad.report.figures import BLACK, BLUE, GREEN, ORANGE, STYLE, Figure, svg_of
 from microrad.study.story import Study
@@ -80,22 +79,22 @@ def beyond(left: Residual, radius_rad: float) -> tuple[float, float, float]:
 
 
 # --------------------------------------------------------------------------------------------------------------- page
-def context(fine: FinePointingStudy, m: Mission, figures: Sequence[Figure]) -> dict[str, Any]:
+def context(fine: FinePointingStudy, required_rad: float, figures: Sequence[Figure]) -> dict[str, Any]:
     """What the template needs: the best controller's tail on each variant of the mirror, beside the baseline's."""
     shares = sorted({*SHARES, fine.quantile})
     shown = shown_of(fine)
     samples = int(shown[0][1].radial_counts.sum())
     return {
         "figures": figures,
-        "sentences": sentences(fine, m, samples),
+        "sentences": sentences(fine, samples),
         "headings": [words.share_of_time(s) for s in shares],
-        "required": words.given(m.requirement.pointing_error_rad),
+        "required": words.given(required_rad),
         "rows": [
             {
                 "name": name,
                 "cells": [cell(quantile(left, share), share == fine.quantile) for share in shares],
                 "largest": words.micro(left.largest_rad),
-                "beyond": _share(beyond(left, m.requirement.pointing_error_rad)),
+                "beyond": _share(beyond(left, required_rad)),
                 "independent": _count(independent_samples(left)),
             }
             for name, left in shown
@@ -134,12 +133,12 @@ def _count(value: float) -> str:
     return "unknown" if math.isnan(value) else f"{float(f'{value:.2g}'):.0f}"
 
 
-def sentences(fine: FinePointingStudy, m: Mission, samples: int) -> list[str]:
+def sentences(fine: FinePointingStudy, samples: int) -> list[str]:
     """What was drawn, and how the intervals come about."""
-    table = m.fine_pointing
-    runs = "" if table is None else f"{table.runs} runs with the seed {table.seed}, "
+    table = fine.scene.table
     return [
-        f"Radial error of the line of sight at the control samples of the ensemble: {runs}{samples} samples in all.",
+        "Radial error of the line of sight at the control samples of the ensemble: "
+        f"{table.runs} runs with the seed {table.seed}, {samples} samples in all.",
         "Samples that follow each other are not independent. How many independent ones they are worth is taken from "
         "the scatter of the mean square from run to run; intervals are of 99 %, and none is given where fewer than "
         f"{LEAST_BEYOND:g} of those would lie beyond.",
@@ -152,10 +151,10 @@ def draw(study: Study, parts: Kept = NOTHING) -> tuple[Figure, ...]:
     if study.fine_pointing is None:
         return ()
     with rc_context(STYLE):
-        return (parts.part(tail, study.fine_pointing, study.file.mission),)
+        return (parts.part(tail, study.fine_pointing, study.file.mission.requirement.pointing_error_rad),)
 
 
-def tail(fine: FinePointingStudy, m: Mission) -> Figure:
+def tail(fine: FinePointingStudy, required_rad: float) -> Figure:
     """Share of the time beyond each radius, on a logarithmic axis, beside a Rayleigh distribution of the same rms."""
     canvas = Canvas(figsize=(7.4, 3.8), layout="constrained")
     axes = canvas.subplots()
@@ -171,7 +170,7 @@ def tail(fine: FinePointingStudy, m: Mission) -> Figure:
     rayleigh = np.exp(-((radius / given.rms_rad) ** 2))
     axes.plot(radius * 1e6, rayleigh, color=BLACK, linewidth=0.9, linestyle=(0, (1, 2)), label="Rayleigh, same rms")
     columns["Rayleigh of the same rms, mission's mirror"] = rayleigh
-    required, floor = m.requirement.pointing_error_rad * 1e6, 0.5 / float(given.radial_counts.sum())
+    required, floor = required_rad * 1e6, 0.5 / float(given.radial_counts.sum())
     axes.axvline(required, color=BLACK, linestyle="--", linewidth=1.2, label=f"required: {required:g} µrad")
     axes.axhline(1.0 - fine.quantile, color="#777777", linewidth=0.8)
     axes.annotate(

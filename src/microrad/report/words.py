@@ -8,7 +8,6 @@ from microrad.link.budget import DEEPEST_DB, POINT_AHEAD_LOSS, POINTING_LOSS
 from microrad.link.requirement import IMPOSSIBLE, outage_words
 from microrad.loop.paper_cases import Run
 from microrad.mission.file import changed_from_shipped
-from microrad.mission.model import Mission
 from microrad.report import (
     budget_views,
     constellation_views,
@@ -114,7 +113,7 @@ def explanation(study: Study) -> list[str]:
         causes = dict.fromkeys(r.because.removeprefix("the residual: ") for r in failed)
         sentences.append(f"What limits it: {'; '.join(causes)}.")
     if study.fine_pointing is not None:
-        sentences += fine_pointing_words.short(study.fine_pointing, m)
+        sentences += fine_pointing_words.short(study.fine_pointing, m.requirement.pointing_error_rad)
     sentences += filter(None, (hysteresis_cost(study), found(study)))
     if study.day is not None:
         day = study.day
@@ -126,11 +125,12 @@ def papers_loop(study: Study) -> list[str]:
     """What the paper's loop leaves in the worst of its sines, a sentence each."""
     m, run = study.file.mission, study.residual
     trace, q, kind = run.trace, m.requirement, "margin" if m.jitter is None else "static margin"
+    two_axes = ", times √2 for two equal axes" if m.conventions.residual == "radial" else ""
     sentences = [
         f"As budgeted, at {format_quantity(m.communication.pointing_error_rad, 'rad', 3)}, the {kind} is "
         f"{signed(study.static.margin_db, 'dB')}; {m.requirement.margin_db:g} dB is required.",
         f"The loop ({run.controller}, {run.freq_hz:g} Hz) leaves {format_quantity(trace.peak_rad, 'rad', 3)} at its "
-        f"peaks and {format_quantity(trace.rms_rad, 'rad', 3)} rms on its axis{_two_axes(m)}; "
+        f"peaks and {format_quantity(trace.rms_rad, 'rad', 3)} rms on its axis{two_axes}; "
         f"{format_quantity(q.pointing_error_rad, 'rad', 3)} ({q.residual_statistic}) is allowed.",
     ]
     if extrapolated := beyond_identified(study, run):
@@ -194,10 +194,6 @@ def found(study: Study) -> str:
         f"Acquisition, with its retries: {said} (mean). The beacon's cone at 1/e2 covers its partner with a "
         f"probability of {p.coverage:.2f}, biases at their bounds about both axes."
     )
-
-
-def _two_axes(m: Mission) -> str:
-    return ", times √2 for two equal axes" if m.conventions.residual == "radial" else ""
 
 
 def verdict_text(study: Study, width: int = 80, verbose: bool = False) -> str:
@@ -268,7 +264,7 @@ def warnings(study: Study) -> list[str]:
         if loop.clamped
     ]
     if study.fine_pointing is not None:
-        found += fine_pointing_words.warnings(study.fine_pointing, m)
+        found += fine_pointing_words.warnings(study.fine_pointing, m.control, m.amplifier)
     return found
 
 
@@ -375,6 +371,6 @@ def summary(study: Study) -> dict[str, Any]:
         "day": None if study.day is None else day_tables.data(study.day),
         "contact": None if study.contact is None else contact_run_words.data(study.contact),
         "constellation": None if study.plan is None else constellation_views.data(study.plan),
-        "fine_pointing": None if fine is None else fine_pointing_data(fine, m),
+        "fine_pointing": None if fine is None else fine_pointing_data(fine, m.requirement.pointing_error_rad),
         "warnings": warnings(study),
     }
