@@ -242,7 +242,7 @@ class Slow:
         campaign = self.campaign("1 s")
         self.axis = loops.tuned(campaign.mission, campaign.table.loop)
         loop = loops.row_loop(campaign.mission, campaign.table.loop)
-        held = loops.held(campaign.mission, campaign.table.loop, self.axis)
+        held = loops.held(loops.scene(campaign.mission, campaign.table.loop), campaign.table.loop, self.axis)
         covariance = tilt.end_covariance(linear.close(loop, held), 5000)
         assert covariance == pytest.approx(covariance[0, 0] * np.eye(2), abs=1e-9 * covariance[0, 0])
         self.sigma = math.sqrt(covariance[0, 0])

@@ -176,7 +176,7 @@ class Evaluator:
         if self.memory is not None and key in self.memory:
             return self.memory[key]
         loop, controller = loops.row_loop(file, table), self.controller(drawn.cell)
-        span = loops.span(self.campaign, file)
+        span = loops.span(self.campaign, loops.settings(file))
         if self.campaign.table.tail is not None:
             return _Tilted.run(self._tilt(drawn.cell), loop, controller, span, rows, watch)
         found = loops.simulate(loop, controller, span, rows, self.campaign.realisations, watch)
@@ -202,7 +202,7 @@ class Evaluator:
             table = self.campaign.table.loop
             assert table is not None
             file = self.builder.mission(cell, self.fixed)
-            self._held[cell] = loops.held(file, table, self.controllers[cell])
+            self._held[cell] = loops.held(loops.scene(file, table), table, self.controllers[cell])
         return self._held[cell]
 
     def _tilt(self, cell: int) -> tilt.Tilt:
@@ -210,7 +210,7 @@ class Evaluator:
             table, wanted = self.campaign.table.loop, self.campaign.table.tail
             assert table is not None and wanted is not None
             file = self.builder.mission(cell, self.fixed)
-            loop, span = loops.row_loop(file, table), loops.span(self.campaign, file)
+            loop, span = loops.row_loop(file, table), loops.span(self.campaign, loops.settings(file))
             self._tilts[cell] = tilt.tilt(loop, self.controller(cell), span, wanted.error_rad)
         return self._tilts[cell]
 
@@ -221,7 +221,7 @@ class Evaluator:
         if isinstance(file, str):
             raise CampaignError(file)
         beat()
-        loop, span = loops.row_loop(file, table), loops.span(self.campaign, file)
+        loop, span = loops.row_loop(file, table), loops.span(self.campaign, loops.settings(file))
         found = ensemble.trace(loop, self.controller(cell), span, row * self.campaign.realisations)
         settled = found.time_s >= span.settle_s
         return WorstTrace(

@@ -231,7 +231,7 @@ def warnings(study: Study) -> list[str]:
     """What a reader must not overlook: the mirror's own warnings, and runs outside their range."""
     found = [
         f"{key} = {value} names the paper as its source, but the paper's mission has {shipped}"
-        for key, value, shipped in changed_from_shipped(study.file)
+        for key, value, shipped in changed_from_shipped(study.file.sources)
     ]
     found = [*_of_verdict(study), *found, *study.summary.warnings, *study.links.warnings]
     if study.day is not None:
