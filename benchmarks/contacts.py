@@ -45,7 +45,7 @@ def megabytes() -> float:
 
 
 def one_pair() -> None:
-    pair = orbit.pair(FILE.mission, FILE.path.parent)
+    pair = orbit.pair(FILE.mission.orbit, FILE.mission.terminals, FILE.path.parent)
     time_s = np.arange(0.0, DAY_S)
 
     def day_at_1_s() -> None:
@@ -62,7 +62,7 @@ def one_pair() -> None:
 
 def many() -> None:
     m = FILE.mission
-    pair = orbit.pair(m, FILE.path.parent)
+    pair = orbit.pair(m.orbit, m.terminals, FILE.path.parent)
     slots = [
         orbit.Terminal(orbit.GeostationarySlot(f"slot {k}", pair.epoch, 0.5 * np.pi * k), pair.geo.limits, f"slot {k}")
         for k in range(4)

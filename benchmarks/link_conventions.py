@@ -188,7 +188,7 @@ def lines_of(budget: link.LinkBudget) -> dict[str, float]:
 
 
 def margin(mission: Mission) -> float:
-    return link.communication_budget(mission, FILE.sources).margin_db
+    return link.communication_budget(link.of(mission), FILE.sources).margin_db
 
 
 # ---------------------------------------------------------------------------------------------------------- the tables
@@ -212,7 +212,7 @@ def mathworks_rows() -> list[Row]:
         ('Margin, microrad with "pattern"', lit(ours, 0.0), "even light, exact: a quarter of the example's decibels"),
         ("Margin, best Gaussian cut", lit(ours, BEST), "0.81 of the gain that the others take (Klein, Degnan)"),
     )
-    budget = lines_of(link.communication_budget(ours, FILE.sources))
+    budget = lines_of(link.communication_budget(link.of(ours), FILE.sources))
     rows = [Row(name, margin(each), peer["Margin"], reason) for name, each, reason in readings]
     return [*compared(budget, peer, why), *rows]
 
@@ -224,7 +224,8 @@ def liang_rows() -> list[Row]:
         "Receive pointing": RECEIVE_SIDE,
         "Margin": "the three terms above",
     }
-    budget = lines_of(link.beacon_budget(mission_of(LIANG), FILE.sources))
+    m = mission_of(LIANG)
+    budget = lines_of(link.beam_budget("beacon", link.Shared.of(m), m.beacon, FILE.sources))
     return compared(budget, liang(LIANG, LIANG_FULL_ANGLE_RAD), why)
 
 
@@ -233,7 +234,7 @@ def paper_chain() -> Chain:
     beam, terminals = PAPER.communication, PAPER.terminals
     return Chain(
         transmit_dbm=dbm(beam.transmit_power_w),
-        required_dbm=float(link.required_dbm(PAPER, beam.data_rate_bit_s)),
+        required_dbm=float(link.required_dbm(link.of(PAPER), beam.data_rate_bit_s)),
         wavelength_m=beam.wavelength_m,
         transmit_aperture_m=terminals.leo_aperture_m,
         receive_aperture_m=terminals.geo_aperture_m,
@@ -331,7 +332,7 @@ def package_rows() -> list[Row]:
     config.link.link_type, config.weather.use_live = "inter-satellite", False
     ours = mission_of(MATHWORKS)
     snapshot = run_snapshot(config)
-    space = lines_of(link.communication_budget(ours, FILE.sources))["Free space"]
+    space = lines_of(link.communication_budget(link.of(ours), FILE.sources))["Free space"]
     c = paper_chain()
     d, wavelength = c.transmit_aperture_m, c.wavelength_m
     loss = pointing_loss_db(aperture_gain_linear(d, wavelength), ERROR_RAD)
@@ -438,7 +439,7 @@ def in_a_loop(mission: Mission, rows: int) -> np.ndarray:
 
 def rate_by_rate(mission: Mission, rows: int) -> np.ndarray:
     """The first rows of the map of any mission, each in a call of its own."""
-    return np.concatenate([link.margin_map(mission, rate, ERRORS_RAD) for rate in RATES_BIT_S[:rows]])
+    return np.concatenate([link.margin_map(link.of(mission), rate, ERRORS_RAD) for rate in RATES_BIT_S[:rows]])
 
 
 def terminals_m(terminals: Terminals) -> tuple[float, float]:

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from microrad import link
 from microrad.campaign import bundle, plan, run, work
 from microrad.campaign.export import export
 from microrad.campaign.file import load_campaign
@@ -70,7 +71,7 @@ def test_a_campaign_takes_what_a_budget_takes(tmp_path, name):
     columns = rows(campaign)
     assert ("beacon_margin" in columns, "answer_margin" in columns) == (own.beacon is not None, own.answer is not None)
     gained = 10.0 * np.log10(columns["communication.transmit_power"] / own.communication.transmit_power_w)
-    np.testing.assert_allclose(columns["margin"] - gained, Exposure.stated(own).margin_db, atol=1e-9)
+    np.testing.assert_allclose(columns["margin"] - gained, Exposure.stated(link.of(own)).margin_db, atol=1e-9)
 
 
 def test_what_links_alone_have_not_is_refused_once(tmp_path):
@@ -189,7 +190,7 @@ def test_a_list_is_drawn_as_one_number_which_its_items_follow_in_proportion(tmp_
     for drawn_rad, margin_db in zip(found["jitter.rms"], found["margin"], strict=True):
         m = Builder(campaign).mission(0, {"jitter.rms": float(drawn_rad)}).mission
         assert m.jitter.rms_rad == (drawn_rad, drawn_rad / 2)
-        assert margin_db == pytest.approx(under_jitter.margin_db(m), abs=1e-12)
+        assert margin_db == pytest.approx(under_jitter.margin_db(link.of(m)), abs=1e-12)
     (wrong,) = faults(tmp_path, "gallery", both.replace('"9 urad"', '"9 W"'))
     assert wrong.key == "inputs.jitter.rms.high"
     (signed,) = faults(tmp_path, "gallery", both.replace("rms", "bias"))

@@ -8,6 +8,7 @@ import pytest
 from scipy.optimize import NonlinearConstraint, brentq, differential_evolution
 from scipy.stats import beta, norm
 
+import budgets
 from microrad import link
 from microrad.campaign.candidates import Problem, Variable
 from microrad.campaign.optimise import optimise
@@ -80,7 +81,7 @@ def test_smallest_aperture_is_that_of_the_normal_quantile(mission):
     noise = spread * gaussian(rows, 3)
 
     def margin(aperture):
-        return float(link.margin_of_error(with_values(mission, aperture), 5e-6))
+        return float(link.margin_of_error(link.of(with_values(mission, aperture)), 5e-6))
 
     def evaluate(x):
         return {"margin": margin(x[0]) + noise}
@@ -113,7 +114,7 @@ def test_aperture_and_divergence_of_the_answer(mission):
     rows, sigma = 400, 8e-6
     error = sigma * np.sqrt(-2.0 * np.log(np.random.default_rng(5).uniform(size=rows)))
     clear = with_values(mission, 0.05, 40e-6, 0.0)
-    base_db = link.answer_budget(clear, mission.sources).margin_db
+    base_db = budgets.answer(clear, mission.sources).margin_db
 
     def margin_db(aperture, divergence, r):
         """Relative to the real budget at 5 cm, 40 urad and no error."""
@@ -122,7 +123,7 @@ def test_aperture_and_divergence_of_the_answer(mission):
         return base_db + gain + received - link.gains.gaussian_pointing_loss_db(r, divergence / 2)
 
     for trial in ((0.05, 40e-6, 0.0), (0.03, 70e-6, 15e-6), (0.12, 25e-6, 30e-6)):
-        budget = link.answer_budget(with_values(mission, *trial), mission.sources)
+        budget = budgets.answer(with_values(mission, *trial), mission.sources)
         assert margin_db(*trial) == pytest.approx(budget.margin_db, abs=1e-9)
     wanted = base_db - 4.0
     variables = (Variable(APERTURE, "m", 0.01, 0.3), Variable(DIVERGENCE, "rad", 20e-6, 200e-6))

@@ -12,6 +12,7 @@ import pytest
 from scipy.signal import lfilter
 from scipy.special import i0e
 
+import budgets
 from microrad import link
 from microrad.campaign import evaluate, loops, run, tails, tilt
 from microrad.campaign.definition import CampaignFile
@@ -25,7 +26,6 @@ from microrad.campaign.tails import tail_of_time, tail_weighted
 from microrad.campaign.work import Evaluator
 from microrad.core.arrays import Floats
 from microrad.core.threads import in_threads
-from microrad.link import under_jitter as link_performance
 from microrad.loop.fine_loop import linear
 from microrad.loop.fine_loop.ensemble import LANES, bin_edges_rad, histogram_quantile
 from microrad.mission.file import load_mission
@@ -242,7 +242,7 @@ class Slow:
         campaign = self.campaign("1 s")
         self.axis = loops.tuned(campaign.mission, campaign.table.loop)
         loop = loops.row_loop(campaign.mission, campaign.table.loop)
-        held = loops.held(campaign.mission, campaign.table.loop, self.axis)
+        held = loops.held(loops.scene(campaign.mission, campaign.table.loop), campaign.table.loop, self.axis)
         covariance = tilt.end_covariance(linear.close(loop, held), 5000)
         assert covariance == pytest.approx(covariance[0, 0] * np.eye(2), abs=1e-9 * covariance[0, 0])
         self.sigma = math.sqrt(covariance[0, 0])
@@ -356,10 +356,10 @@ def test_the_variance_of_a_weighted_share_is_that_of_its_mean() -> None:
 def test_an_uncorrected_point_ahead_takes_its_part_of_what_the_link_bears(monkeypatch: pytest.MonkeyPatch) -> None:
     """Short is what errs beyond the error that the margin bears, less the point-ahead that stands beside it."""
     m, ahead = load_mission(SHIPPED).mission, 3e-6
-    monkeypatch.setattr(link_performance.link, "point_ahead_rad", lambda m: ahead)
+    monkeypatch.setattr(link.Shared, "point_ahead_rad", ahead)
     runs = SimpleNamespace(quantile_rad=lambda share: 4e-6, beyond=lambda radius_rad: radius_rad)
-    found = evaluate._simulated(m, runs)  # type: ignore[arg-type]
-    fall, on_axis = link.communication_beam(m).fall, link.communication_budget(m, {}, 0.0).margin_db
+    found = evaluate._exposure(link.of(m), runs)  # type: ignore[arg-type]
+    fall, on_axis = link.of(m).beam.fall, budgets.communication(m, {}, 0.0).margin_db
     assert found.outage_loss_db == pytest.approx(float(fall.loss_db(7e-6)), rel=1e-12)
     assert found.short_of(0.0) == pytest.approx(fall.error_rad(on_axis) - ahead, rel=1e-9)
     assert found.short_of(3.0) == pytest.approx(fall.error_rad(on_axis - 3.0) - ahead, rel=1e-9)

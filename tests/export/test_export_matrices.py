@@ -25,7 +25,7 @@ from microrad.loop import sine_run as simulate
 from microrad.loop.control.analysis import loop_response
 from microrad.loop.fine_loop.design import design_plant
 from microrad.mirror import model as mirror
-from microrad.mission.file import load_mission
+from microrad.mission.file import MissionFile, load_mission
 from shipped import SHIPPED
 
 NINE_DIGITS = 1e-9
@@ -70,7 +70,7 @@ MODELS = {}  # what takes seconds is made once
 
 def models(chosen):
     if id(chosen) not in MODELS:
-        MODELS[id(chosen)] = matrices.models(chosen)
+        MODELS[id(chosen)] = matrices.models(choice.source(chosen) if isinstance(chosen, MissionFile) else chosen)
     return MODELS[id(chosen)]
 
 
@@ -119,7 +119,7 @@ def rounding(system, freq_hz, period_s):
 
 # ---------------------------------------------------------------------------------------------------------- the models
 def test_mirror_and_its_linear_part_are_those_of_the_mission(file):
-    part, whole = matrices.models(file)
+    part, whole = matrices.models(choice.source(file))
     m = file.mission.mirror
     assert (part.name, whole.name) == (LINEAR_PART, MIRROR)
     assert (part.period_s, whole.period_s) == (0.0, 0.0)
@@ -216,7 +216,7 @@ def test_static_mirror_has_no_linear_part(tmp_path):
     path = tmp_path / "static.toml"
     path.write_text(STATIC, encoding="utf-8")
     file = load_mission(SHIPPED, path)
-    (m,) = matrices.models(file)
+    (m,) = matrices.models(choice.source(file))
     assert m.name == MIRROR
     assert m.system.order == 0 and m.system.D.item() == pytest.approx(89e-6, rel=1e-15)
     matrices.write_mat([m], tmp_path / "static.mat")
@@ -360,7 +360,7 @@ def test_orders_beyond_floats_are_refused():
 @pytest.fixture(scope="module")
 def written(file, tracking, pointing, gauged, tmp_path_factory):
     """The models of the mission and of three controllers under names of their own, and their file."""
-    found = list(matrices.models(file))
+    found = list(matrices.models(choice.source(file)))
     for name, chosen in (("tracking", tracking), ("pointing", pointing), ("gauged", gauged)):
         several = models(chosen)[2:]
         found += [replace(m, name=f"{name}_{m.name}") for m in several]

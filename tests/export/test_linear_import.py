@@ -15,7 +15,7 @@ from scipy.io import loadmat, savemat
 from scipy.sparse import csc_array
 
 from microrad.core import lti
-from microrad.export import matrices
+from microrad.export import choice, matrices
 from microrad.export.linear_import import Given, import_control, import_mat, mirror_file
 from microrad.export.records import ExportError
 from microrad.mirror import model as mirror
@@ -31,7 +31,7 @@ GAIN = 2e-5
 
 @pytest.fixture(scope="module")
 def models():
-    return matrices.models(load_mission(SHIPPED))
+    return matrices.models(choice.source(load_mission(SHIPPED)))
 
 
 def answer(folder, text, freq_hz):

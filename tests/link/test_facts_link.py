@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+import budgets
 from microrad import link
 from microrad.link import acquisition, pointing
 from microrad.link import study as link_study
@@ -27,7 +28,7 @@ from shipped import SHIPPED
 FILE = load_mission(SHIPPED)
 MISSION, SOURCES = FILE.mission, FILE.sources
 WAVE_M, LEO_M, GEO_M, URAD = 1.55e-6, 0.05, 0.15, 1e-6
-BEAM_HALF_RAD = link.communication_beam(MISSION).fall.half_angle_rad
+BEAM_HALF_RAD = link.of(MISSION).beam.fall.half_angle_rad
 
 
 def printed(value, text):
@@ -54,9 +55,7 @@ def show(cases):
 def lossless_dbm():
     """5 W from 5 cm to 15 cm over 42 000 km, nothing lost but in space."""
     mission = changed(communication={"strehl": 0.0, "pointing_error_rad": 0.0})
-    return next(
-        line.value for line in link.communication_budget(mission, SOURCES).totals if line.name == "Received power"
-    )
+    return next(line.value for line in budgets.communication(mission, SOURCES).totals if line.name == "Received power")
 
 
 @show(
@@ -71,15 +70,15 @@ def lossless_dbm():
         (link.strehl_loss_db(0.4, "ratio"), "3.98", "checked: Strehl 0.4 as a ratio"),
         (link.strehl_loss_db(0.4, "decibel"), "0.4", "paper, Table 2: Strehl 0.4 dB"),
         (float(link.gaussian_pointing_loss_db(BEAM_HALF_RAD, BEAM_HALF_RAD)), "8.686", "checked: loss at 1/e2"),
-        (link.communication_budget(MISSION, SOURCES).margin_db, "3.0", "paper, section 2.2: 300 Mbit/s, 10 urad"),
+        (budgets.communication(MISSION, SOURCES).margin_db, "3.0", "paper, section 2.2: 300 Mbit/s, 10 urad"),
     ]
 )
 def test_gains_and_losses_are_those_of_the_papers_link(value, text):
     assert printed(value, text)
 
 
-IMPLIED = sorted(reading.photons_per_bit for reading in link.implied_sensitivity(MISSION))
-IDEAL = {each.name: each.photons_per_bit for each in link.ideal_receivers(MISSION, SOURCES)}
+IMPLIED = sorted(reading.photons_per_bit for reading in link.implied_sensitivity(link.of(MISSION)))
+IDEAL = {each.name: each.photons_per_bit for each in link.ideal_receivers(link.of(MISSION), SOURCES)}
 
 
 @show(
@@ -98,10 +97,10 @@ def test_photons_per_bit_are_those_implied_and_those_of_ideal_receivers(value, t
 
 def test_the_margin_of_the_paper_is_a_band_over_the_four_readings():
     # checked: Fig. 2 stands for any of them, as far apart as the sensitivities that they imply
-    at = [float(each[0, 0]) for each in link.convention_maps(MISSION, 300e6, 10 * URAD).values()]
+    at = [float(each[0, 0]) for each in link.convention_maps(link.of(MISSION), 300e6, 10 * URAD).values()]
     assert len(at) == 4
     assert max(at) - min(at) == pytest.approx(10 * math.log10(IMPLIED[3] / IMPLIED[0]), abs=1e-9)
-    assert max(at) == pytest.approx(link.communication_budget(MISSION, SOURCES).margin_db, abs=1e-9)
+    assert max(at) == pytest.approx(budgets.communication(MISSION, SOURCES).margin_db, abs=1e-9)
 
 
 @pytest.mark.parametrize("order", [2, 16, 256])
@@ -125,7 +124,7 @@ def test_words_of_pulse_position_are_erased_as_no_photon_comes(order, counts):
 
 def beacon(divergence):
     """Irradiance of the beacon at GEO in nW/m2, 300 urad off its axis and on it."""
-    budget = link.beacon_budget(changed(conventions={"divergence": divergence}), SOURCES)
+    budget = budgets.beacon(changed(conventions={"divergence": divergence}), SOURCES)
     return 1e9 * budget.irradiance_w_m2, 1e9 * budget.irradiance_on_axis_w_m2
 
 
@@ -310,7 +309,7 @@ def test_wheels_shake_with_the_square_of_their_speed():
 # -------------------------------------------------------------------------------------------- open-loop pointing
 def test_the_papers_sum_stands_next_to_those_of_the_standard_and_is_not_authorised():
     # paper, section 2.1: root sum square, which 780 urad cover; ECSS-E-ST-60-10C: means linearly, deviations in squares
-    budget = pointing.open_loop_budget(MISSION, SOURCES)
+    budget = budgets.open_loop(MISSION, SOURCES)
     named = {each.rule: each for each in budget.summations}
     assert printed(2 * budget.rss_rad / URAD, "780")
     assert named["rss"].total_rad == budget.rss_rad
@@ -358,7 +357,11 @@ def test_the_papers_beacon_and_the_papers_distances_stand_in_the_shipped_mission
         (sensor.AirySpot(1.0, 1.0, 2.0).per_noise_rad / math.pi, "0.3125", "Tyler and Fried 1982: 5/16 at n = 2"),
         (1.0 / sensor.GaussianSpot(1.0, 1.0).per_noise_rad, "1.596", "checked: Gaussian spot, f SNR NEA / W"),
         (pointing.point_ahead_rad(10_650.0) / URAD, "71", "checked: 500 km sun-synchronous to GEO, urad"),
-        (link_study.point_ahead(MISSION).beam_half_angles, "3.6", "checked: the same in half angles of the beam"),
+        (
+            link_study.point_ahead(link.of(MISSION)).beam_half_angles,
+            "3.6",
+            "checked: the same in half angles of the beam",
+        ),
     ]
 )
 def test_sensor_and_point_ahead_have_their_published_numbers(value, text):

@@ -183,18 +183,18 @@ def test_the_installed_package_agrees_with_the_formulas_written_out(capsys):
 
 # ---- what the margin map is timed against computes the same map
 def test_the_timed_maps_are_the_same_map():
-    whole = link.margin_map(peers.PAPER, peers.RATES_BIT_S, peers.ERRORS_RAD)
+    whole = link.margin_map(link.of(peers.PAPER), peers.RATES_BIT_S, peers.ERRORS_RAD)
     assert np.max(np.abs(peers.in_numpy(peers.PAPER) - whole)) < 1e-11
     assert np.max(np.abs(peers.in_a_loop(peers.PAPER, 2) - whole[:2])) < 1e-11
 
 
 def test_the_receiver_of_the_timed_map_has_to_search_for_its_power():
     mission = peers.ppm_mission()
-    built = link.receiver(mission)
+    built = link.of(mission).receiver
     assert built.background_power_w > 0.0
     rates = peers.RATES_BIT_S[::250]
-    together = link.margin_map(mission, rates, peers.ERRORS_RAD[:3])
-    one_by_one = [link.margin_map(mission, rate, peers.ERRORS_RAD[:3])[0] for rate in rates]
+    together = link.margin_map(link.of(mission), rates, peers.ERRORS_RAD[:3])
+    one_by_one = [link.margin_map(link.of(mission), rate, peers.ERRORS_RAD[:3])[0] for rate in rates]
     assert together == pytest.approx(np.array(one_by_one), abs=1e-9)
     power = built.required_power_w(rates)
     # at each rate the power found has the bit error ratio asked for

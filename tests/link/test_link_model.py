@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 from scipy.special import j0
 
+import budgets
 from link_files import GAUSSIAN, PATTERN, RECEIVERS, SKY, link_file, received_with
 from microrad import link
 from microrad.core.units import PLANCK_J_S, SPEED_OF_LIGHT_M_S
@@ -63,21 +64,23 @@ def line_of(budget, name):
 
 
 def budget_of(file, *point):
-    return link.communication_budget(file.mission, file.sources, *point)
+    return budgets.communication(file.mission, file.sources, *point)
 
 
 # ---- receivers
 @pytest.mark.parametrize("name", RECEIVERS)
 def test_each_receiver_of_a_file_is_the_record_of_its_values(read, name):
     file = read(received_with(name))
-    built = link.receiver(file.mission)
+    built = link.of(file.mission).receiver
     assert type(built) is type(BUILT[name])
     for key in built.__slots__:
         assert getattr(built, key) == pytest.approx(getattr(BUILT[name], key), rel=1e-12, abs=0.0), key
     expected = float(BUILT[name].required_power_w(RATE))
     budget = budget_of(file)
     assert budget.required_power_w == pytest.approx(expected, rel=1e-9, abs=0.0)
-    assert float(link.required_dbm(file.mission, RATE)) == pytest.approx(10 * math.log10(expected * 1e3), abs=1e-9)
+    assert float(link.required_dbm(link.of(file.mission), RATE)) == pytest.approx(
+        10 * math.log10(expected * 1e3), abs=1e-9
+    )
     line = line_of(budget, "Required power")
     assert f"{RECEIVERS[name]['modulation'].upper()}, {RECEIVERS[name]['detector']}" in line.basis
     assert f"{expected / PHOTON_J / RATE:.4g} photon/bit at a bit error ratio of 1e-06, code gain 5 dB" in line.basis
@@ -90,7 +93,7 @@ def test_every_pair_of_the_table_is_built():
 
 def test_a_measured_sensitivity_is_no_receiver(read):
     file = read()
-    assert link.receiver(file.mission) is None
+    assert link.of(file.mission).receiver is None
     assert budget_of(file).required_power_w == pytest.approx(291.2 * PHOTON_J * RATE, rel=1e-9, abs=0.0)
 
 
@@ -102,20 +105,20 @@ def test_a_sky_comes_through_aperture_field_filter_and_optics(read, name):
     solid_angle = math.pi * (50e-6) ** 2
     # 10 W/(m^2 sr um) over 1 nm
     expected = 10e6 * 1e-9 * area * solid_angle * 10**-0.3
-    assert link.receiver(file.mission).background_power_w == pytest.approx(expected, rel=1e-6, abs=0.0)
+    assert link.of(file.mission).receiver.background_power_w == pytest.approx(expected, rel=1e-6, abs=0.0)
 
 
 @pytest.mark.parametrize("name", ["homodyne bpsk", "preamplified dpsk", "preamplified ook"])
 def test_a_sky_is_photons_in_a_mode_behind_the_optics(read, name):
     file = read(received_with(name, background=SKY), {"communication.receive_optics_loss": "3 dB"})
     expected = 10e6 * WAVELENGTH**5 / (2 * PLANCK_J_S * SPEED_OF_LIGHT_M_S**2) * 10**-0.3
-    assert link.receiver(file.mission).background_photons_per_mode == pytest.approx(expected, rel=1e-9, abs=0.0)
+    assert link.of(file.mission).receiver.background_photons_per_mode == pytest.approx(expected, rel=1e-9, abs=0.0)
 
 
 @pytest.mark.parametrize("name", RECEIVERS)
 def test_a_rate_above_the_bandwidth_is_refused_with_the_highest(read, name):
     file = read(received_with(name))
-    highest = link.receiver(file.mission).highest_data_rate_bit_s
+    highest = link.of(file.mission).receiver.highest_data_rate_bit_s
     limit = {"counting ppm": 4e9 * 0.8 / 4}.get(name, 4e9 * 0.8)
     assert highest == pytest.approx(limit, rel=1e-12)
     assert math.isfinite(budget_of(file, 1e-5, highest).margin_db)
@@ -123,7 +126,7 @@ def test_a_rate_above_the_bandwidth_is_refused_with_the_highest(read, name):
     with pytest.raises(ValueError, match=said):
         budget_of(file, 1e-5, highest * 1.001)
     with pytest.raises(ValueError, match=said):
-        link.margin_map(file.mission, [RATE, highest * 1.001], [0.0])
+        link.margin_map(link.of(file.mission), [RATE, highest * 1.001], [0.0])
 
 
 # ---- lines and map: the same formula, written twice
@@ -164,7 +167,7 @@ def test_the_lines_add_up_to_the_margin_of_the_map(folder, drawn):
     changes, error, rate = drawn
     file = link_file(folder, *changes)
     budget = budget_of(file, error, rate)
-    assert budget.margin_db == pytest.approx(float(link.margin_map(file.mission, rate, error)[0, 0]), abs=1e-8)
+    assert budget.margin_db == pytest.approx(float(link.margin_map(link.of(file.mission), rate, error)[0, 0]), abs=1e-8)
     received = math.fsum(line.value for line in budget.lines)
     assert budget.received_power_w == pytest.approx(10 ** (received / 10 - 3), rel=1e-8, abs=1e-300)
     assert 0.0 <= budget.required_irradiance_w_m2 < math.inf
@@ -181,7 +184,7 @@ def test_the_lines_add_up_to_the_margin_of_the_map(folder, drawn):
 def test_a_whole_map_is_the_budget_at_any_of_its_points(read, change):
     file = read(change, CHANNEL, UNCORRECTED, {"point_ahead.transverse_velocity": "1 km/s"})
     rates, errors = np.geomspace(1e6, 7e8, 1000), np.linspace(0.0, 50e-6, 1000)
-    margins = link.margin_map(file.mission, rates, errors)
+    margins = link.margin_map(link.of(file.mission), rates, errors)
     assert margins.shape == (1000, 1000)
     for i, j in ((0, 0), (0, 999), (999, 0), (999, 999), (317, 211), (640, 873)):
         assert margins[i, j] == pytest.approx(budget_of(file, errors[j], rates[i]).margin_db, abs=1e-6)
@@ -246,10 +249,10 @@ def test_a_link_through_everything_is_what_the_formulas_say(read):
 
 def test_obscurations_are_lines_of_the_terminal_that_receives(read):
     file = read(HOLES, {"terminals.leo_name": "Cubesat", "terminals.geo_name": "Relay"})
-    assert line_of(link.beacon_budget(file.mission, file.sources), "Relay obscuration loss").value == pytest.approx(
+    assert line_of(budgets.beacon(file.mission, file.sources), "Relay obscuration loss").value == pytest.approx(
         10 * math.log10(1 - 0.3**2)
     )
-    assert line_of(link.answer_budget(file.mission, file.sources), "Cubesat obscuration loss").value == pytest.approx(
+    assert line_of(budgets.answer(file.mission, file.sources), "Cubesat obscuration loss").value == pytest.approx(
         10 * math.log10(1 - 0.2**2)
     )
     assert not any("obscuration" in line.name for line in budget_of(read()).lines)
@@ -265,15 +268,15 @@ def test_an_even_light_behind_an_obscuration_has_its_open_area(read):
 def test_point_ahead_left_in_the_error_costs_what_it_adds_there(read):
     corrected, left = read(), read(UNCORRECTED)
     angle = 2 * 10.65e3 / SPEED_OF_LIGHT_M_S
-    assert link.point_ahead_rad(corrected.mission) == 0.0
-    assert link.point_ahead_rad(left.mission) == pytest.approx(angle, rel=1e-12)
-    assert link.point_ahead_rad(read({"point_ahead": None}).mission) == 0.0
+    assert link.of(corrected.mission).shared.point_ahead_rad == 0.0
+    assert link.of(left.mission).shared.point_ahead_rad == pytest.approx(angle, rel=1e-12)
+    assert link.of(read({"point_ahead": None}).mission).shared.point_ahead_rad == 0.0
     half = 2 * WAVELENGTH / (math.pi * 0.05)
     cost = 8.685889638 * (((10e-6 + angle) / half) ** 2 - (10e-6 / half) ** 2)
     assert line_of(budget_of(left), "Point-ahead loss").value == pytest.approx(-cost, rel=1e-9)
     assert line_of(budget_of(corrected), "Point-ahead loss").value == 0.0
     assert budget_of(corrected).margin_db - budget_of(left).margin_db == pytest.approx(cost, rel=1e-9)
-    both = [link.answer_budget(f.mission, f.sources).margin_db for f in (corrected, left)]
+    both = [budgets.answer(f.mission, f.sources).margin_db for f in (corrected, left)]
     theta = 20e-6
     assert both[0] - both[1] == pytest.approx(
         8.685889638 * (((10e-6 + angle) / theta) ** 2 - (10e-6 / theta) ** 2), rel=1e-9
@@ -283,9 +286,9 @@ def test_point_ahead_left_in_the_error_costs_what_it_adds_there(read):
 def test_a_mission_without_beacon_or_answer_says_so(read):
     file = read({"beacon": None, "answer": None, "acquisition": None})
     with pytest.raises(ValueError, match=r"the mission has no table \[beacon\]"):
-        link.beacon_budget(file.mission, file.sources)
+        budgets.beacon(file.mission, file.sources)
     with pytest.raises(ValueError, match=r"the mission has no table \[answer\]"):
-        link.answer_budget(file.mission, file.sources)
+        budgets.answer(file.mission, file.sources)
     study = link_study.run(file)
     assert (study.beacon, study.answer, study.finding, study.tracking) == (None, None, None, None)
     assert study.budgets == (study.communication,)
@@ -321,7 +324,7 @@ def test_a_link_nearer_than_the_far_field_is_warned_of(read):
 def test_a_beam_wider_than_its_aperture_is_warned_of(read, link_name, diameter):
     # (1 - exp(-a^2))^2 is 0.1 dB at a truncation of 2.116
     full = 2 * 2.116 * WAVELENGTH / (math.pi * diameter / 2)
-    budget = {"beacon": link.beacon_budget, "answer": link.answer_budget}[link_name]
+    budget = {"beacon": budgets.beacon, "answer": budgets.answer}[link_name]
     for share, wide in ((0.99, True), (1.01, False)):
         file = read(
             {f"{link_name}.divergence": f"{full * share * 1e6:.6f} urad", f"{link_name}.pointing_error": "1 urad"}
@@ -360,7 +363,7 @@ def test_an_obscuration_that_a_reading_leaves_out_is_warned_of(read):
 
 @pytest.mark.parametrize(("name", "end", "other"), [("beacon", "leo", "geo"), ("answer", "geo", "leo")])
 def test_an_obscuration_of_the_terminal_that_sends_a_gaussian_beam_is_warned_of(read, name, end, other):
-    budget = {"beacon": link.beacon_budget, "answer": link.answer_budget}[name]
+    budget = {"beacon": budgets.beacon, "answer": budgets.answer}[name]
 
     def found(*changes):
         file = read(*changes)
@@ -377,14 +380,14 @@ def test_an_obscuration_of_the_terminal_that_sends_a_gaussian_beam_is_warned_of(
 def test_a_beam_that_is_cut_and_obscured_is_warned_of_both(read):
     narrow = {"answer.divergence": "25 urad", "answer.pointing_error": "1 urad", "terminals.geo_obscuration": 0.3}
     file = read(narrow)
-    (said,) = warned(link.answer_budget(file.mission, file.sources), "Beam gain")
+    (said,) = warned(budgets.answer(file.mission, file.sources), "Beam gain")
     assert "cuts it: 0." in said
     assert "wider core; the obscuration of 0.3 is not in it" in said
 
 
 @pytest.mark.parametrize("name", ["beacon", "answer"])
 def test_a_beam_and_an_error_that_are_no_small_angles_are_warned_of(read, name):
-    budget = {"beacon": link.beacon_budget, "answer": link.answer_budget}[name]
+    budget = {"beacon": budgets.beacon, "answer": budgets.answer}[name]
     for milliradians, wide in ((100.1, True), (99.9, False)):
         file = read({f"{name}.divergence": f"{2 * milliradians} mrad", f"{name}.pointing_error": "1 mrad"})
         found = warned(budget(file.mission, file.sources), "Beam gain: the half angle of")
@@ -405,7 +408,7 @@ def test_an_error_of_the_data_link_that_is_no_small_angle_is_warned_of_beside_it
 @pytest.mark.parametrize("lit", [{}, {**PATTERN, "communication.beam": {"profile": "uniform"}}], ids=["w", "pattern"])
 def test_an_aperture_so_small_that_its_beam_is_no_small_angle_is_warned_of(read, lit):
     alone = dict.fromkeys(("beacon", "answer", "acquisition"))
-    half = link.communication_beam(read(alone, lit, {"terminals.leo_aperture": "1 cm"}).mission).fall.half_angle_rad
+    half = link.of(read(alone, lit, {"terminals.leo_aperture": "1 cm"}).mission).beam.fall.half_angle_rad
     for share, wide in ((0.99, True), (1.01, False)):
         aperture = {"terminals.leo_aperture": f"{share * half / 0.1 * 1e4:.6f} um"}
         found = warned(budget_of(read(alone, lit, aperture)), "LEO aperture gain: the half angle of")
@@ -425,9 +428,9 @@ def test_the_largest_rate_leaves_the_margin_or_is_the_receivers_highest(read, na
     for changes in ({}, {**PATTERN, **CHANNEL}):
         file = read(kind(name), changes)
         for margin, error in ((3.0, 10e-6), (6.0, 0.0), (20.0, 15e-6)):
-            rate = link.largest_data_rate(file.mission, margin, error)
+            rate = link.largest_data_rate(link.of(file.mission), margin, error)
             left = budget_of(file, error, rate).margin_db
-            built = link.receiver(file.mission)
+            built = link.of(file.mission).receiver
             if built is not None and rate == built.highest_data_rate_bit_s:
                 assert left >= margin
             else:
@@ -438,41 +441,41 @@ def test_the_largest_rate_leaves_the_margin_or_is_the_receivers_highest(read, na
 def test_the_largest_error_leaves_the_margin(read, name):
     for changes in ({}, PATTERN, {**UNCORRECTED, "point_ahead.transverse_velocity": "1 km/s", **PATTERN}):
         file = read(kind(name), changes, {"communication.distance": "20000 km"})
-        on_axis = float(link.margin_map(file.mission, 1e8, 0.0)[0, 0])
+        on_axis = float(link.margin_map(link.of(file.mission), 1e8, 0.0)[0, 0])
         for margin in (on_axis - 0.01, on_axis - 3.0, on_axis - 15.0):
-            error = link.largest_pointing_error(file.mission, margin, 1e8)
+            error = link.largest_pointing_error(link.of(file.mission), margin, 1e8)
             assert budget_of(file, error, 1e8).margin_db == pytest.approx(margin, abs=1e-5)
             assert 0.0 < error < 60e-6
-        assert link.largest_pointing_error(file.mission, on_axis, 1e8) == pytest.approx(0.0, abs=1e-12)
+        assert link.largest_pointing_error(link.of(file.mission), on_axis, 1e8) == pytest.approx(0.0, abs=1e-12)
 
 
 def test_a_margin_far_above_the_need_ends_before_the_first_null(read):
     file = read({**PATTERN, "communication.beam": {"profile": "uniform"}}, {"communication.transmit_power": "500 kW"})
-    excess = float(link.margin_map(file.mission, 1e6, 0.0)[0, 0])
+    excess = float(link.margin_map(link.of(file.mission), 1e6, 0.0)[0, 0])
     assert excess > 60.0
-    error = link.largest_pointing_error(file.mission, 0.0, 1e6)
+    error = link.largest_pointing_error(link.of(file.mission), 0.0, 1e6)
     assert error == pytest.approx(1.21967 * WAVELENGTH / 0.05, rel=0.01)
 
 
 def test_a_point_ahead_beyond_the_main_lobe_is_refused(read):
     file = read(PATTERN, UNCORRECTED, {"communication.transmit_power": "500 kW"})
     with pytest.raises(link.LinkError, match="lies beyond the main lobe of the beam, which has fallen as far at"):
-        link.largest_pointing_error(file.mission, 0.0, 1e3)
+        link.largest_pointing_error(link.of(file.mission), 0.0, 1e3)
 
 
 @pytest.mark.parametrize("name", ["counting ook", "pin ook", "apd ook", "preamplified ook", "counting ppm"])
 def test_noise_that_does_not_fall_with_the_rate_leaves_no_rate_at_all(read, name):
     file = read(received_with(name), {"communication.transmit_power": "1 pW"})
     with pytest.raises(link.LinkError, match=r"not even 1 bit/s leaves a margin of 3 dB: [0-9.]+ dB are missing"):
-        link.largest_data_rate(file.mission, 3.0, 10e-6)
+        link.largest_data_rate(link.of(file.mission), 3.0, 10e-6)
 
 
 def test_a_receiver_slower_than_one_bit_in_a_second_has_its_own_highest(read):
     file = read(received_with("pin ook", bandwidth="0.5 Hz"))
-    assert link.largest_data_rate(file.mission, 3.0, 10e-6) == pytest.approx(0.4)
+    assert link.largest_data_rate(link.of(file.mission), 3.0, 10e-6) == pytest.approx(0.4)
     weak = read(received_with("pin ook", bandwidth="0.5 Hz"), {"communication.transmit_power": "1 pW"})
     with pytest.raises(link.LinkError, match=r"not even 0\.4 bit/s leaves"):
-        link.largest_data_rate(weak.mission, 3.0, 10e-6)
+        link.largest_data_rate(link.of(weak.mission), 3.0, 10e-6)
 
 
 @pytest.mark.parametrize("name", [None, "apd ook"])
@@ -505,30 +508,30 @@ def test_a_rate_of_largest_without_any_is_refused(read):
 def test_points_without_end_are_refused(read, rate, error, what):
     for change in ({}, PATTERN):
         with pytest.raises(ValueError, match=what):
-            link.margin_map(read(change).mission, [rate], [error])
+            link.margin_map(link.of(read(change).mission), [rate], [error])
 
 
 # ---- readings
 def test_each_reading_has_its_map(read):
     file = read()
-    maps = link.convention_maps(file.mission, [1e8, 3e8], [0.0, 10e-6, 20e-6])
+    maps = link.convention_maps(link.of(file.mission), [1e8, 3e8], [0.0, 10e-6, 20e-6])
     assert set(maps) == {(loss, strehl) for loss in ("gaussian", "gain") for strehl in ("decibel", "ratio")}
     for (loss, strehl), margins in maps.items():
         conventions = {"conventions.pointing_loss": loss, "conventions.strehl": strehl}
-        own = link.margin_map(read(conventions).mission, [1e8, 3e8], [0.0, 10e-6, 20e-6])
+        own = link.margin_map(link.of(read(conventions).mission), [1e8, 3e8], [0.0, 10e-6, 20e-6])
         np.testing.assert_allclose(margins, own, rtol=0, atol=1e-9)
 
 
 def test_a_wavefront_error_has_one_reading_and_a_pattern_is_read_as_even_light(read):
     quality = {"communication.strehl": None, "communication.wavefront_error": "100 nm"}
-    maps = link.convention_maps(read(PATTERN, quality).mission, RATE, 10e-6)
+    maps = link.convention_maps(link.of(read(PATTERN, quality).mission), RATE, 10e-6)
     assert set(maps) == {("gaussian", "wavefront error"), ("gain", "wavefront error")}
-    expected = link.margin_map(read(quality).mission, RATE, 10e-6)
+    expected = link.margin_map(link.of(read(quality).mission), RATE, 10e-6)
     np.testing.assert_allclose(maps["gaussian", "wavefront error"], expected, rtol=0, atol=1e-9)
 
 
 def test_a_pattern_needs_to_know_how_its_aperture_is_lit(read):
-    assert link.lit_aperture(read(PATTERN).mission) == link.LitAperture(0.05, WAVELENGTH, 1.25, 0.0, 1.2)
+    assert link.of(read(PATTERN).mission).beam.fall == link.LitAperture(0.05, WAVELENGTH, 1.25, 0.0, 1.2)
     with pytest.raises(ValueError, match=r"needs the table \[communication.beam\]: how the aperture is lit"):
-        link.lit_aperture(read().mission)
+        link.of(read().mission.with_value("conventions.pointing_loss", "pattern"))
     assert GAUSSIAN["radius"] == "2 cm"

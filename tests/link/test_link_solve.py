@@ -7,6 +7,7 @@ import math
 
 import pytest
 
+import budgets
 from link_files import GAUSSIAN, PATTERN, data_with, link_file, received_with, written
 from microrad import link
 from microrad.link import study as link_study
@@ -27,7 +28,7 @@ def only(solution):
 
 
 def test_power_rate_and_distance_are_those_of_the_formulas(tmp_path):
-    margin = link_performance.margin_db(link_file(tmp_path).mission)
+    margin = link_performance.margin_db(link.of(link_file(tmp_path).mission))
     spare = 10.0 ** ((margin - 3.0) / 10.0)
     power = only(solved(tmp_path, "communication.transmit_power"))
     assert power.low == pytest.approx(5.0 / spare, rel=1e-9) and (power.low_open, power.high_open) == (False, True)
@@ -38,7 +39,7 @@ def test_power_rate_and_distance_are_those_of_the_formulas(tmp_path):
 
 def test_a_loss_in_decibels_is_what_is_to_spare(tmp_path):
     less = {"communication.data_rate": "100 Mbit/s"}
-    margin = link_performance.margin_db(link_file(tmp_path, less).mission)
+    margin = link_performance.margin_db(link.of(link_file(tmp_path, less).mission))
     loss = only(solved(tmp_path, "communication.transmit_optics_loss", less))
     assert loss.low_open and loss.high == pytest.approx(margin - 3.0, abs=1e-9)
 
@@ -49,7 +50,7 @@ def test_an_aperture_has_a_least_and_a_most(tmp_path):
     found = only(solution)
     assert not (found.low_open or found.high_open)
     half = 2.0 * 1.55e-6 / math.pi
-    margin = link_performance.margin_db(link_file(tmp_path).mission)
+    margin = link_performance.margin_db(link.of(link_file(tmp_path).mission))
     for d in (found.low, found.high):
         gain, lost = 20.0 * math.log10(d / 0.05), 20.0 * math.log10(math.e) * (1e-5 / half) ** 2 * (d**2 - 0.05**2)
         assert margin + gain - lost == pytest.approx(3.0, abs=1e-9)
@@ -61,7 +62,7 @@ def test_an_aperture_has_a_least_and_a_most(tmp_path):
 def test_a_jitter_of_equal_axes_is_that_of_rayleigh(tmp_path):
     file = link_file(tmp_path, NO_BEAMS, JITTER)
     m = file.mission
-    on_axis = link.communication_budget(m, {}, pointing_error_rad=0.0).margin_db
+    on_axis = budgets.communication(m, {}, pointing_error_rad=0.0).margin_db
     half = 2.0 * 1.55e-6 / (math.pi * 0.05)
     allowed = half * math.sqrt((on_axis - 3.0) / (20.0 * math.log10(math.e)))
     found = only(link_study.solve(file, "jitter.rms"))
@@ -82,7 +83,7 @@ def test_a_beam_is_looked_for_at_its_own_margin_and_above_diffraction(tmp_path):
     found = only(solution)
     assert (solution.of, solution.required_db) == ("answer", 0.0)
     m = solution.file.mission
-    assert link.answer_budget(m.with_value("answer.divergence_rad", found.high), {}).margin_db == pytest.approx(
+    assert budgets.answer(m.with_value("answer.divergence_rad", found.high), {}).margin_db == pytest.approx(
         0.0, abs=1e-9
     )
     assert link.fits("answer")(m) and not link.fits("answer")(m.with_value("answer.divergence_rad", found.low * 0.999))
@@ -110,10 +111,10 @@ def test_every_key_has_its_margin_inside_and_not_beyond_its_ends(tmp_path, chang
                 (interval.high, 1.0 + 1e-6, interval.high_open),
             ):
                 there = link.moved(m, found, end)
-                assert link_performance.margin_db(there) >= 3.0, key
+                assert link_performance.margin_db(link.of(there)) >= 3.0, key
                 beyond = link.moved(m, found, end * outside)
                 if not is_open and beyond is not None and link.lit(beyond):
-                    assert link.margin_or_none(beyond, link_performance.margin_db) < 3.0, key
+                    assert link.margin_or_none(link.of(beyond), link_performance.margin_db) < 3.0, key
 
 
 def test_what_no_value_leaves_is_said_with_the_most(call, tmp_path):

@@ -2,13 +2,14 @@
 
 import math
 import re
-from dataclasses import fields, replace
+from dataclasses import fields
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from scipy.stats import ncx2, norm
 
+import budgets
 from link_files import PATTERN, RECEIVERS, link_file, received_with
 from microrad import link
 from microrad.core.units import parse_quantity
@@ -129,9 +130,9 @@ def test_all_three_budgets_are_there_and_communication_is_the_first(plain):
     assert [each.name for each in plain.budgets] == ["Communication", "Beacon", "Answer"]
     m, sources = plain.file.mission, plain.file.sources
     assert plain.budgets == (
-        link.communication_budget(m, sources),
-        link.beacon_budget(m, sources),
-        link.answer_budget(m, sources),
+        budgets.communication(m, sources),
+        budgets.beacon(m, sources),
+        budgets.answer(m, sources),
     )
 
 
@@ -553,8 +554,8 @@ def test_no_beam_of_a_scan_is_brighter_than_its_aperture_makes_it(tmp_path, used
     changes = {"acquisition.scan.beam_radius": f"{used_urad} urad", "beacon.required_power": "10 nW"}
     file = link_file(tmp_path, FEW, changes)
     m, scan = file.mission, file.mission.acquisition.scan
-    beacon = link.beacon_budget(m, file.sources)
-    beams, receiver = link_acquisition._sender(m, m.beacon, beacon, m.acquisition, scan)
+    beacon = link_acquisition.Sent(m.beacon, budgets.beacon(m, file.sources))
+    beams, receiver = link_acquisition._sender(link.Shared.of(m), beacon, m.acquisition, scan)
     most = 4.0 * 10**-0.04 * math.pi / 4 * 0.05**2 / (1.55e-6 * 44e6) ** 2  # P A / (lambda R)^2
     on_axis = float(beams.irradiance_w_m2(beams.narrow_half_angle_rad, 0.0))
     assert on_axis == pytest.approx(most if used_urad < 27.9 else most * (27.9098 / used_urad) ** 2, rel=1e-4)
@@ -675,9 +676,9 @@ def test_the_uncertainty_of_a_search_is_that_of_the_worse_axis(tmp_path):
     """With its bias, and whichever axis that is."""
     study = link_study.run(link_file(tmp_path, {"acquisition.runs": 2000}))
     for bias, rms in (((30e-6, 0.0), (40e-6, 20e-6)), ((0.0, 30e-6), (20e-6, 40e-6))):
-        off = replace(study.open_loop, error=Jitter(bias, rms))
         m = study.file.mission
-        found = link_acquisition.finding(m, off, study.beacon, study.answer, study.tracking)
+        beams = (link_acquisition.Sent(*each) for each in ((m.beacon, study.beacon), (m.answer, study.answer)))
+        found = link_acquisition.finding(m.acquisition, study.data, Jitter(bias, rms), *beams, study.tracking)
         assert found.sigma_rad == pytest.approx(50e-6, rel=1e-12)
 
 

@@ -8,8 +8,9 @@ from functools import cache
 import numpy as np
 import pytest
 
+import budgets
 from link_files import PATTERN, data_with, link_file, written
-from microrad import link, report
+from microrad import report
 from microrad.link import study as link_study
 from microrad.link.requirement import IMPOSSIBLE
 from microrad.loop import paper_cases
@@ -49,7 +50,7 @@ def test_the_margin_of_the_budget_is_the_one_under_the_jitter(tmp_path, changes)
     jitter = {"jitter": {"bias": ["1 urad", "2 urad"], "rms": ["3 urad", "4 urad"], "bandwidth": "50 Hz"}}
     found = link_study.run(link_file(tmp_path, NO_BEAMS, jitter, *changes))
     assert found.communication.margin_db == pytest.approx(found.under_jitter.margin_db, abs=1e-9)
-    static = link.communication_budget(found.file.mission, {}).margin_db
+    static = budgets.communication(found.file.mission, {}).margin_db
     assert found.communication.totals[-1].name == "Static margin"
     assert found.communication.totals[-1].value == static
     assert "10 µrad" in found.communication.totals[-1].basis
@@ -121,7 +122,7 @@ def test_a_link_that_closes_keeps_its_margin_by_simulation(tmp_path, seed):
     ahead = 0.0 if m.point_ahead.corrected else 2.0 * m.point_ahead.transverse_velocity_m_s / 299792458.0
     half = 2.0 * m.communication.wavelength_m / (math.pi * m.terminals.leo_aperture_m)
     loss_db = 20.0 * math.log10(math.e) * (np.hypot(*errors.T) + ahead) ** 2 / half**2
-    on_axis_db = link.communication_budget(m, {}, pointing_error_rad=0.0).margin_db
+    on_axis_db = budgets.communication(m, {}, pointing_error_rad=0.0).margin_db
     if ahead:  # the budget counts it from the axis on
         on_axis_db += 20.0 * math.log10(math.e) * (ahead / half) ** 2
     q = m.requirement.outage
@@ -167,7 +168,9 @@ def test_budget_and_a_campaign_of_one_row_end_alike(call, tmp_path, monkeypatch,
 def _left_rad():
     m = load_mission(DEFAULT).mission
     runs = paper_cases.tracking_runs(cases_of(m))
-    return paper_cases.residual_rad(m, paper_cases.worst(runs, m.requirement.residual_statistic).trace)
+    return paper_cases.residual_rad(
+        m.requirement, m.conventions, paper_cases.worst(runs, m.requirement.residual_statistic).trace
+    )
 
 
 def shaken_by_its_own_loop(rng, **communication):

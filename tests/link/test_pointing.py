@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import budgets
 from microrad.core.budget import Line, root_sum_square, total_db
 from microrad.link import pointing
 from microrad.mission.file import load_mission
@@ -53,7 +54,7 @@ def without_beacon():
 
 # ---- the paper's reading
 def test_the_papers_beacon_just_covers_the_root_sum_square():
-    budget = pointing.open_loop_budget(MISSION, SOURCES)
+    budget = budgets.open_loop(MISSION, SOURCES)
     # paper, section 2.1: a 780 µrad beacon covers the root sum square of the three terms
     assert budget.required_divergence_rad == pytest.approx(780e-6, rel=1e-3)
     assert budget.rss_rad == pytest.approx(math.sqrt(300**2 + 24**2 + 248**2 + 1**2) * URAD, rel=1e-12)
@@ -64,7 +65,7 @@ def test_the_papers_beacon_just_covers_the_root_sum_square():
 
 
 def test_read_as_a_half_angle_the_same_beacon_has_twice_the_room():
-    other = pointing.open_loop_budget(MISSION, SOURCES).other_reading
+    other = budgets.open_loop(MISSION, SOURCES).other_reading
     assert other.convention == "half-1/e2"
     assert other.half_angle_rad == pytest.approx(780e-6, rel=1e-12)
     assert other.required_divergence_rad == pytest.approx(390e-6, rel=1e-3)
@@ -75,7 +76,7 @@ def test_read_as_a_half_angle_the_same_beacon_has_twice_the_room():
     ("body", "covers", "covers_as_half"), [(299e-6, True, True), (301e-6, False, True), (1e-3, False, False)]
 )
 def test_the_root_sum_square_is_no_longer_covered_beyond_the_half_angle(body, covers, covers_as_half):
-    budget = pointing.open_loop_budget(with_pointing(24e-6, body, 248e-6), SOURCES)
+    budget = budgets.open_loop(with_pointing(24e-6, body, 248e-6), SOURCES)
     assert budget.covers is covers
     assert budget.other_reading.covers is covers_as_half
 
@@ -83,24 +84,24 @@ def test_the_root_sum_square_is_no_longer_covered_beyond_the_half_angle(body, co
 @settings(deadline=None)  # the machine may be busy
 @given(angles, angles, angles, st.floats(1e-6, 1e-1), st.sampled_from(["full-1/e2", "half-1/e2"]))
 def test_the_required_divergence_is_the_one_that_just_covers(orbit, body, misalignment, divergence, convention):
-    budget = pointing.open_loop_budget(with_pointing(orbit, body, misalignment, divergence, convention), SOURCES)
+    budget = budgets.open_loop(with_pointing(orbit, body, misalignment, divergence, convention), SOURCES)
     largest = max(orbit, body, misalignment)
     assert largest <= budget.rss_rad * (1 + 1e-12) <= math.sqrt(3) * largest * (1 + 1e-9)
     if budget.rss_rad > 1e-9:
         assert math.fsum(budget.variance_shares) == pytest.approx(1.0, rel=1e-9)
         required = budget.required_divergence_rad
         enough = with_pointing(orbit, body, misalignment, required * 1.001, convention)
-        assert pointing.open_loop_budget(enough, SOURCES).covers
+        assert budgets.open_loop(enough, SOURCES).covers
         short = with_pointing(orbit, body, misalignment, required * 0.999, convention)
-        assert not pointing.open_loop_budget(short, SOURCES).covers
+        assert not budgets.open_loop(short, SOURCES).covers
 
 
 @settings(deadline=None, max_examples=30)
 @given(angles, st.floats(1e-6, 1e-2), angles, st.sampled_from(["full-1/e2", "half-1/e2"]))
 def test_the_confident_divergence_is_covered_with_just_the_confidence(orbit, body, misalignment, convention):
-    needed = pointing.open_loop_budget(with_pointing(orbit, body, misalignment, 1e-3, convention), SOURCES)
+    needed = budgets.open_loop(with_pointing(orbit, body, misalignment, 1e-3, convention), SOURCES)
     mission = with_pointing(orbit, body, misalignment, needed.confident_divergence_rad, convention)
-    budget = pointing.open_loop_budget(mission, SOURCES)
+    budget = budgets.open_loop(mission, SOURCES)
     assert budget.reading.coverage == pytest.approx(0.997, abs=1e-6)
     assert budget.reading.confident_divergence_rad == needed.confident_divergence_rad
     assert budget.total_rad("exact") == pytest.approx(budget.beacon_half_angle_rad, rel=1e-12)
@@ -108,7 +109,7 @@ def test_the_confident_divergence_is_covered_with_just_the_confidence(orbit, bod
 
 # ---- lines
 def test_each_line_says_where_it_comes_from_and_what_it_means():
-    lines = {line.name: line for line in pointing.open_loop_budget(MISSION, SOURCES).lines}
+    lines = {line.name: line for line in budgets.open_loop(MISSION, SOURCES).lines}
     assert list(lines) == ["Body pointing", "Orbit knowledge", "Misalignment", "Point-ahead"]
     assert lines["Body pointing"].source.startswith("paper: section 2.1")
     assert lines["Orbit knowledge"].source.startswith("assumption: 1 km")
@@ -120,11 +121,11 @@ def test_each_line_says_where_it_comes_from_and_what_it_means():
     assert "our own formula" in lines["Orbit knowledge"].regime
     assert "our own" not in lines["Misalignment"].regime
     assert "worst-case satellite (temporal)" in lines["Misalignment"].basis
-    assert pointing.open_loop_budget(MISSION, {}).lines[0].source == "not stated"
+    assert budgets.open_loop(MISSION, {}).lines[0].source == "not stated"
 
 
 def test_the_papers_lines_have_the_means_and_deviations_of_their_classes():
-    budget = pointing.open_loop_budget(MISSION, SOURCES)
+    budget = budgets.open_loop(MISSION, SOURCES)
     body, orbit, misalignment, ahead = budget.terms
     assert (body.mean_rad, body.sigma_rad) == ((0.0, 0.0), pytest.approx((100 * URAD, 100 * URAD)))
     assert orbit.mean_rad == pytest.approx((12 * URAD, 12 * URAD))
@@ -139,16 +140,16 @@ def test_the_papers_lines_have_the_means_and_deviations_of_their_classes():
 
 
 def test_over_all_satellites_a_constant_error_spreads():
-    budget = pointing.open_loop_budget(MISSION, SOURCES, interpretation="mixed")
+    budget = budgets.open_loop(MISSION, SOURCES, interpretation="mixed")
     assert budget.error.bias_rad == (0.0, 0.0)
     assert budget.error.rms_rad[0] == pytest.approx(math.sqrt(100**2 + 64 / 3 + 248**2 / 3 + 0.25) * URAD, rel=1e-12)
-    assert budget.total_rad("exact") < pointing.open_loop_budget(MISSION, SOURCES).total_rad("exact")
+    assert budget.total_rad("exact") < budgets.open_loop(MISSION, SOURCES).total_rad("exact")
     assert budget.interpretation in pointing.INTERPRETATIONS
-    assert budget.rss_rad == pointing.open_loop_budget(MISSION, SOURCES).rss_rad
+    assert budget.rss_rad == budgets.open_loop(MISSION, SOURCES).rss_rad
 
 
 def test_shares_without_any_error_are_zero():
-    budget = pointing.open_loop_budget(with_pointing(0.0, 0.0, 0.0), SOURCES)
+    budget = budgets.open_loop(with_pointing(0.0, 0.0, 0.0), SOURCES)
     assert budget.variance_shares == (0.0, 0.0, 0.0)
     assert budget.reading.coverage == 1.0
     assert budget.confident_divergence_rad == 0.0
@@ -156,7 +157,7 @@ def test_shares_without_any_error_are_zero():
 
 # ---- coverage
 def test_the_beacon_covers_as_often_as_drawn_errors_lie_in_its_cone():
-    budget = pointing.open_loop_budget(MISSION, SOURCES)
+    budget = budgets.open_loop(MISSION, SOURCES)
     draw, count = np.random.Generator(np.random.Philox(key=5)), 400_000
     # Gaussian body, orbit knowledge along its ramp, and what is constant
     x, y = (100 * draw.standard_normal(count) + 24 * draw.random(count) + 248 + math.sqrt(0.5) for axis in ("x", "y"))
@@ -171,7 +172,7 @@ def test_the_beacon_covers_as_often_as_drawn_errors_lie_in_its_cone():
 
 
 def test_without_a_beacon_the_errors_still_add_up_but_nothing_is_covered():
-    budget, whole = pointing.open_loop_budget(without_beacon(), SOURCES), pointing.open_loop_budget(MISSION, SOURCES)
+    budget, whole = budgets.open_loop(without_beacon(), SOURCES), budgets.open_loop(MISSION, SOURCES)
     assert budget.reading is None and budget.counter_reading is None
     assert budget.summations == whole.summations
     assert budget.required_divergence_rad == whole.required_divergence_rad
@@ -183,7 +184,7 @@ def test_without_a_beacon_the_errors_still_add_up_but_nothing_is_covered():
 
 # ---- point-ahead
 def test_point_ahead_left_alone_is_a_bias_of_71_microradians_about_one_axis():
-    budget = pointing.open_loop_budget(with_point_ahead("10.65 km/s", False), SOURCES)
+    budget = budgets.open_loop(with_point_ahead("10.65 km/s", False), SOURCES)
     line, term = budget.lines[-1], budget.terms[-1]
     assert line.name == "Point-ahead"
     assert line.value == budget.point_ahead.angle_rad == pytest.approx(71e-6, abs=0.5e-6)
@@ -191,18 +192,18 @@ def test_point_ahead_left_alone_is_a_bias_of_71_microradians_about_one_axis():
     assert line.source.startswith("assumption: most from a 500 km")
     assert (term.mean_rad, term.sigma_rad) == ((line.value, 0.0), (0.0, 0.0))
     assert not budget.covers  # the paper's beacon has no room for it
-    assert budget.reading.coverage < pointing.open_loop_budget(MISSION, SOURCES).reading.coverage
+    assert budget.reading.coverage < budgets.open_loop(MISSION, SOURCES).reading.coverage
 
 
 def test_a_corrected_point_ahead_leaves_its_error():
-    budget = pointing.open_loop_budget(with_point_ahead("10.65 km/s", True, "7 urad"), SOURCES)
+    budget = budgets.open_loop(with_point_ahead("10.65 km/s", True, "7 urad"), SOURCES)
     assert budget.point_ahead.corrected is True
     assert budget.lines[-1].value == budget.point_ahead.error_rad == pytest.approx(7e-6)
     assert math.hypot(*budget.terms[-1].mean_rad) == pytest.approx(7e-6)
 
 
 def test_a_mission_without_point_ahead_has_no_such_line():
-    budget = pointing.open_loop_budget(MISSION.model_copy(update={"point_ahead": None}), SOURCES)
+    budget = budgets.open_loop(MISSION.model_copy(update={"point_ahead": None}), SOURCES)
     assert budget.point_ahead is None
     assert [line.name for line in budget.lines] == ["Body pointing", "Orbit knowledge", "Misalignment"]
 
@@ -210,17 +211,17 @@ def test_a_mission_without_point_ahead_has_no_such_line():
 @pytest.mark.parametrize("key", ["point_ahead", "Point-Ahead"])
 def test_point_ahead_is_not_counted_twice(key):
     mission = with_lines(**{key: ("71 urad", "bias", "bound", "radial")})
-    assert pointing.open_loop_budget(mission, SOURCES).lines[0].name == "Point ahead"
+    assert budgets.open_loop(mission, SOURCES).lines[0].name == "Point ahead"
     both = mission.model_copy(update={"point_ahead": MISSION.point_ahead})
     with pytest.raises(ValueError, match=f"pointing.lines.{key} stands beside the table point_ahead.*remove one"):
-        pointing.open_loop_budget(both, SOURCES)
+        budgets.open_loop(both, SOURCES)
 
 
 # ---- allocation
 @pytest.mark.parametrize("rule", ["rss", "esa-1993", "ecss-axis", "ecss-radial", "exact"])
 def test_what_is_left_for_a_line_brings_the_mission_to_the_total(rule):
     total = 900e-6
-    for each in pointing.open_loop_budget(MISSION, SOURCES).allocation(total, rule):
+    for each in budgets.open_loop(MISSION, SOURCES).allocation(total, rule):
         if each.name == "Point-ahead":
             mission = with_point_ahead("10.65 km/s", True, f"{each.largest_rad / URAD!r} urad")
         else:
@@ -228,13 +229,13 @@ def test_what_is_left_for_a_line_brings_the_mission_to_the_total(rule):
             key = each.name.lower().replace(" ", "_")
             lines[key] = lines[key].model_copy(update={"error_rad": each.largest_rad})
             mission = MISSION.model_copy(update={"pointing": MISSION.pointing.model_copy(update={"lines": lines})})
-        assert pointing.open_loop_budget(mission, SOURCES).total_rad(rule) == pytest.approx(total, rel=1e-6)
+        assert budgets.open_loop(mission, SOURCES).total_rad(rule) == pytest.approx(total, rel=1e-6)
         assert each.note == "" and each.missing_rad == 0.0
 
 
 def test_a_total_by_an_unknown_rule_is_refused():
     with pytest.raises(ValueError, match=r'no rule "mean"; give one of rss, esa-1993, ecss-axis.*exact'):
-        pointing.open_loop_budget(MISSION, SOURCES).total_rad("mean")
+        budgets.open_loop(MISSION, SOURCES).total_rad("mean")
 
 
 # ---- lines of a budget

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import pytest
 
+import budgets
 from link_files import GAUSSIAN, PATTERN, RECEIVERS, SKY, link_file, received_with
 from microrad import link
 from microrad.link import study as link_study
@@ -25,7 +26,8 @@ WAVEFRONT = {"communication.strehl": None, "communication.wavefront_error": "100
 
 def of_communication(file):
     """The tornado of the communication budget."""
-    return link_study.tornados(file, link_study.communication_budget(file.mission, file.sources), None, None)[0]
+    communication = link_study.communication_budget(link.of(file.mission), file.sources)
+    return link_study.tornados(file.mission, file.sources, (communication,))[0]
 
 
 def swings(folder, *changes):
@@ -64,7 +66,7 @@ def up_and_down(factor, share=RELATIVE):
 
 def test_the_swings_are_those_of_the_formulas(tmp_path):
     found = swings(tmp_path)
-    margin = link.communication_budget(link_file(tmp_path).mission, {}).margin_db
+    margin = budgets.communication(link_file(tmp_path).mission, {}).margin_db
     lost = 8.685889638 * (10e-6 / HALF) ** 2
     apertures = [up_and_down(2)[i] + lost * (1 - (1 + s * RELATIVE) ** 2) for i, s in ((0, -1), (1, 1))]
     expected = {
@@ -109,7 +111,7 @@ def test_every_swing_is_the_budget_with_one_key_changed(tmp_path, name):
         for value, margin in ((each.low, each.margin_low_db), (each.high, each.margin_high_db)):
             assert math.isfinite(margin), each
             mission = changed(file.mission, field, value)
-            assert link.communication_budget(mission, file.sources).margin_db == pytest.approx(margin, abs=1e-9)
+            assert budgets.communication(mission, file.sources).margin_db == pytest.approx(margin, abs=1e-9)
         assert each.swing_db > 1e-9
         assert each.source
 
@@ -129,9 +131,11 @@ def test_equal_swings_stand_as_the_mission_has_their_keys(tmp_path, seed):
     file, draw = link_file(tmp_path, NO_BEAMS), random.Random(seed)
 
     def as_a_processor_leaves_it(m):
-        return link_performance.margin_db(m) + draw.uniform(-1e-12, 1e-12)
+        return link_performance.margin_db(link.of(m)) + draw.uniform(-1e-12, 1e-12)
 
-    found = link.swings(file.mission, file.sources, ("terminals", "communication"), as_a_processor_leaves_it)
+    found = link.swings(
+        file.mission, file.sources, ("terminals", "communication"), "decibel", as_a_processor_leaves_it, link.lit
+    )
     aperture, distance = (
         next(s for s in found if s.key == k) for k in ("terminals.geo_aperture", "communication.distance")
     )
@@ -153,7 +157,7 @@ def test_what_does_not_move_the_margin_is_left_out(tmp_path):
 @pytest.mark.parametrize(("name", "end", "other"), [("beacon", "leo", "geo"), ("answer", "geo", "leo")])
 def test_the_margin_of_the_other_beams_over_their_own_inputs(tmp_path, name, end, other):
     file = link_file(tmp_path, CHANNEL, LEFT, {f"terminals.{other}_obscuration": 0.3})
-    m, budget = file.mission, {"beacon": link.beacon_budget, "answer": link.answer_budget}[name]
+    m, budget = file.mission, {"beacon": budgets.beacon, "answer": budgets.answer}[name]
     found = {each.key: each for each in link.beam_tornado(m, file.sources, name)}
     keys = {f"{name}.{key}" for key in ("transmit_power", "divergence", "pointing_error", "distance", "strehl")}
     keys |= {f"{name}.{key}" for key in ("required_power", "transmit_optics_loss", "receive_optics_loss")}
@@ -191,7 +195,7 @@ def test_the_margin_under_jitter_over_its_inputs(tmp_path, changes):
     m = file.mission
     under = of_communication(file)
     assert under.of == "Communication"
-    assert under.margin_db == pytest.approx(link_performance.of_jitter(m).margin_db, abs=1e-9)
+    assert under.margin_db == pytest.approx(link_performance.of_jitter(link.of(m)).margin_db, abs=1e-9)
     found = {each.key: each for each in under.swings}
     assert {"jitter.bias.1", "jitter.rms.1", "jitter.rms.2", "requirement.outage"} <= found.keys()
     assert {"communication.transmit_power", "terminals.leo_aperture"} <= found.keys()
@@ -215,7 +219,7 @@ def test_the_margin_under_jitter_over_its_inputs(tmp_path, changes):
             both = list(getattr(m.jitter, place))
             both[item] = value
             moved = changed(m, f"jitter.{place}", tuple(both))
-            assert link_performance.of_jitter(moved).margin_db == pytest.approx(margin, abs=1e-9)
+            assert link_performance.of_jitter(link.of(moved)).margin_db == pytest.approx(margin, abs=1e-9)
         assert each.margin_low_db > under.margin_db > each.margin_high_db
 
 
@@ -223,17 +227,20 @@ def test_the_margin_under_a_jitter_of_equal_axes_is_at_a_quantile_of_rayleigh(tm
     equal = {"jitter": {"bias": ["0 urad", "0 urad"], "rms": ["3 urad", "3 urad"], "bandwidth": "50 Hz"}}
     m = link_file(tmp_path, equal).mission
     loss = 8.685889638 * (3e-6 / HALF) ** 2 * 2 * math.log(1 / 0.003)
-    on_axis = link.communication_budget(m, {}, pointing_error_rad=0.0).margin_db
-    assert link_performance.margin_db(m) == pytest.approx(on_axis - loss, abs=1e-8)
+    on_axis = budgets.communication(m, {}, pointing_error_rad=0.0).margin_db
+    assert link_performance.margin_db(link.of(m)) == pytest.approx(on_axis - loss, abs=1e-8)
     plain = link_file(tmp_path).mission
-    assert link_performance.margin_db(plain) == pytest.approx(link.communication_budget(plain, {}).margin_db, abs=1e-9)
+    assert link_performance.margin_db(link.of(plain)) == pytest.approx(
+        budgets.communication(plain, {}).margin_db, abs=1e-9
+    )
 
 
 def test_a_study_holds_a_tornado_for_each_margin_that_there_is(tmp_path):
     file = link_file(tmp_path, {"acquisition": None}, JITTER)
-    m, budgets = file.mission, (link.beacon_budget, link.answer_budget)
-    all_three = [link_study.communication_budget(m, file.sources), *(each(m, file.sources) for each in budgets)]
-    found = link_study.tornados(file, *all_three)
+    m, sources = file.mission, file.sources
+    communication = link_study.communication_budget(link.of(m), sources)
+    all_three = communication, budgets.beacon(m, sources), budgets.answer(m, sources)
+    found = link_study.tornados(m, sources, all_three)
     assert [each.of for each in found] == ["Communication", "Beacon", "Answer"]
     assert [each.margin_db for each in found] == [each.margin_db for each in all_three]
     assert found[1].swings == link.beam_tornado(m, file.sources, "beacon")
@@ -333,7 +340,7 @@ def test_only_a_receiver_too_slow_is_left_without_a_margin(tmp_path):
 
     file = link_file(tmp_path)
     with pytest.raises(ValueError, match="a value without meaning"):
-        link.swings(file.mission, file.sources, link.LINK_TABLES, refused)
+        link.swings(file.mission, file.sources, link.LINK_TABLES, "decibel", refused, link.lit)
 
 
 def test_a_beam_moves_no_further_than_the_obscuration_lets_some_of_it_pass(tmp_path):

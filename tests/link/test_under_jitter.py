@@ -29,6 +29,11 @@ ON_AXIS_DB = 3.000394037846604 + DB_PER_SQUARE * (10e-6 / HALF_RAD) ** 2  # the 
 RATE_BIT_S = 300e6
 
 
+def costs_of(m, runs, fine):
+    """What the residuals of the loops cost a mission's link."""
+    return performance.run(link.of(m), m.conventions.residual, runs, fine)
+
+
 def loss_db(radius_rad):
     return DB_PER_SQUARE * (radius_rad / HALF_RAD) ** 2
 
@@ -42,7 +47,7 @@ def jittery(bias_urad, rms_urad, bandwidth_hz=40):
 def under(folder, *changes):
     """The link under the jitter that the changes give, and its mission."""
     mission = link_file(folder, {"acquisition": None}, *changes).mission
-    return link_performance.of_jitter(mission), mission
+    return link_performance.of_jitter(link.of(mission)), mission
 
 
 def record(bias_urad, rms_urad):
@@ -117,7 +122,7 @@ def test_the_best_divergence_for_equal_axes_is_two_rms_times_a_root_and_no_narro
 @pytest.mark.parametrize("bias_urad", [0.0, 5.0, 1000.0])
 def test_an_error_that_stands_still_costs_what_the_budget_says_at_it(tmp_path, bias_urad):
     found, mission = under(tmp_path, jittery((bias_urad, 0), (0, 0)))
-    margin = float(link.margin_of_error(mission, bias_urad * URAD))
+    margin = float(link.margin_of_error(link.of(mission), bias_urad * URAD))
     assert found.mean_loss_db == pytest.approx(loss_db(bias_urad * URAD), rel=1e-9)
     assert found.outage_loss_db == pytest.approx(loss_db(bias_urad * URAD), rel=1e-9)
     assert found.margin_db == pytest.approx(margin, rel=1e-9)
@@ -163,7 +168,7 @@ def test_fades_are_known_while_the_required_margin_is_there_on_axis(tmp_path, ma
 
 def test_an_apertures_pattern_is_taken_as_it_is(tmp_path):
     found, mission = under(tmp_path, jittery((0, 0), (6, 6)), PATTERN, {"communication.transmit_power": "50 W"})
-    fall, rms = link.communication_beam(mission).fall, 6 * URAD
+    fall, rms = link.of(mission).beam.fall, 6 * URAD
 
     def at(radius):
         return radius / rms**2 * math.exp(-(radius**2) / (2 * rms**2)) * 10 ** (-float(fall.loss_db(radius)) / 10)
@@ -184,7 +189,7 @@ def test_an_apertures_pattern_is_taken_as_it_is(tmp_path):
 @pytest.mark.parametrize("name", ["counting ook", "preamplified dpsk"])
 def test_the_uncoded_penalty_brings_the_mean_bit_error_ratio_back(tmp_path, name):
     found, mission = under(tmp_path, jittery((0, 0), (2, 2)), received_with(name))
-    receiver, rms = link.receiver(mission), 2 * URAD
+    receiver, rms = link.of(mission).receiver, 2 * URAD
     power = float(receiver.required_power_w(RATE_BIT_S)) * 10 ** (found.uncoded_penalty_db / 10)
     radius = np.linspace(0.0, 8 * rms, 20_001)
     density = radius / rms**2 * np.exp(-(radius**2) / (2 * rms**2))
@@ -236,14 +241,16 @@ def test_an_uncorrected_point_ahead_is_added_to_every_error_and_counted_once(tmp
     assert found.margin_db == pytest.approx(ON_AXIS_DB - found.outage_loss_db, abs=1e-6)
     # the rate at which this margin would be the required one, which the budget confirms
     exact = HALF_RAD * math.sqrt(found.outage_loss_db / DB_PER_SQUARE) - AHEAD_RAD
-    assert float(link.margin_map(mission, found.data_rate_bit_s, exact)[0, 0]) == pytest.approx(REQUIRED_DB, abs=1e-6)
+    assert float(link.margin_map(link.of(mission), found.data_rate_bit_s, exact)[0, 0]) == pytest.approx(
+        REQUIRED_DB, abs=1e-6
+    )
     assert found.best.wanted_half_angle_rad == pytest.approx(math.sqrt(2) * (quantile + AHEAD_RAD), rel=5e-3)
     assert found.jitter == corrected.jitter
 
 
 def test_a_link_that_stands_still_with_an_uncorrected_point_ahead_is_that_of_the_budget(tmp_path):
     found, mission = under(tmp_path, jittery((3, 4), (0, 0)), SLOW)
-    assert found.margin_db == pytest.approx(float(link.margin_of_error(mission, 5 * URAD)), abs=1e-9)
+    assert found.margin_db == pytest.approx(float(link.margin_of_error(link.of(mission), 5 * URAD)), abs=1e-9)
     assert found.mean_loss_db == pytest.approx(loss_db(5 * URAD + AHEAD_RAD), rel=1e-9)
 
 
@@ -269,7 +276,7 @@ def test_fades_and_penalty_have_the_uncorrected_point_ahead_as_bias(tmp_path, bi
     )
     share = pointing.outage_probability(shifted, HALF_RAD, on_axis - REQUIRED_DB)
     assert found.fades_per_s * found.fade_s == pytest.approx(float(share), rel=1e-9)
-    receiver = link.receiver(mission)
+    receiver = link.of(mission).receiver
     needed = float(receiver.required_power_w(RATE_BIT_S))
     penalty = pointing.uncoded_penalty_db(
         shifted, HALF_RAD, lambda power: receiver.bit_error_ratio_at(needed * power, RATE_BIT_S)
@@ -323,7 +330,7 @@ def sine(amplitude_rad, samples=4000):
 def test_a_tracked_sine_costs_the_mean_over_its_course(mission, residual):
     conventions = mission.conventions.model_copy(update={"residual": residual})
     read = mission.model_copy(update={"conventions": conventions})
-    (case,) = performance.run(read, (tracked(sine(10 * URAD)),), None).cases
+    (case,) = costs_of(read, (tracked(sine(10 * URAD)),), None).cases
     amplitude = 10 * URAD * (math.sqrt(2) if residual == "radial" else 1)
     # the mean of exp(-2 (a sin / theta)^2) over a period is exp(-x) I0(x), x = (a / theta)^2
     assert case.mean_loss_db == pytest.approx(-10 * math.log10(ive(0, (amplitude / HALF_RAD) ** 2)), rel=1e-6)
@@ -338,14 +345,14 @@ def test_a_tracked_sine_costs_the_mean_over_its_course(mission, residual):
 
 
 def test_the_share_of_a_sine_beyond_the_margin_is_an_outage(mission):
-    (case,) = performance.run(mission, (tracked(sine(30 * URAD)),), None).cases
+    (case,) = costs_of(mission, (tracked(sine(30 * URAD)),), None).cases
     for share, margin in ((case.outage, ON_AXIS_DB), (case.short, ON_AXIS_DB - REQUIRED_DB)):
         radius = HALF_RAD * math.sqrt(margin / DB_PER_SQUARE)
         assert share == pytest.approx(1 - 2 / math.pi * math.asin(radius / (30 * URAD)), abs=1e-3)
 
 
 def test_a_standing_part_of_a_tracked_error_is_its_bias(mission):
-    (case,) = performance.run(mission, (tracked(sine(2 * URAD) - 5 * URAD),), None).cases
+    (case,) = costs_of(mission, (tracked(sine(2 * URAD) - 5 * URAD),), None).cases
     assert case.jitter.bias_rad == pytest.approx((-5 * URAD, 0.0), rel=1e-9)
     assert case.jitter.rms_rad == pytest.approx((math.sqrt(2) * URAD, 0.0), rel=1e-9)
     assert case.outage_loss_db == pytest.approx(loss_db(7 * URAD), rel=1e-3)
@@ -356,7 +363,7 @@ def test_hysteresis_costs_the_difference_between_the_same_controller_with_it_and
     left = {("PID", "given"): 12, ("PID", "comparison"): 11, ("PID", "no hysteresis"): 9, ("other", "given"): 5}
     runs = [tracked(sine(size * URAD), *names) for names, size in left.items()]
     runs.append(tracked(sine(20 * URAD), "PID", "given", freq_hz=25.0))  # without its counterpart at 25 Hz
-    found = performance.run(mission, tuple(runs), None)
+    found = costs_of(mission, tuple(runs), None)
     assert [(c.source, c.controller, c.mirror) for c in found.costs] == [
         ("sine of 15 Hz", "PID", "given"),
         ("sine of 15 Hz", "PID", "comparison"),
@@ -373,7 +380,7 @@ def test_hysteresis_costs_the_difference_between_the_same_controller_with_it_and
 
 def test_a_case_is_looked_up_by_its_three_names(mission):
     runs = (tracked(sine(9 * URAD)), tracked(sine(9 * URAD), freq_hz=25.0), tracked(sine(9 * URAD), "PID + inverse"))
-    found = performance.run(mission, runs, None)
+    found = costs_of(mission, runs, None)
     assert len(found.cases) == 3
     assert (found.outage, found.half_angle_rad) == (OUTAGE, pytest.approx(HALF_RAD))
     for case in found.cases:
@@ -384,7 +391,7 @@ def test_a_case_is_looked_up_by_its_three_names(mission):
 
 
 def test_nothing_simulated_has_no_cases(mission):
-    assert (performance.run(mission, (), None).cases, performance.run(mission, (), None).costs) == ((), ())
+    assert (costs_of(mission, (), None).cases, costs_of(mission, (), None).costs) == ((), ())
 
 
 # -------------------------------------------------------------------------------------------------- fine pointing
@@ -418,7 +425,7 @@ def falling(rms_rad, corner_hz=50.0):
 def test_the_residual_of_the_loop_costs_what_a_jitter_of_its_moments_does(mission):
     values = ((1, -2), (2, 3))
     spectrum = np.column_stack([falling(2 * URAD), falling(3 * URAD)])
-    (case,) = performance.run(mission, (), fine_study(spectrum, given=residual(*values))).cases
+    (case,) = costs_of(mission, (), fine_study(spectrum, given=residual(*values))).cases
     jitter = record(*values)
     assert (case.source, case.controller, case.mirror) == (performance.FINE, "PI", "given")
     assert_allclose([case.jitter.bias_rad, case.jitter.rms_rad], [jitter.bias_rad, jitter.rms_rad], rtol=1e-9)
@@ -433,7 +440,7 @@ def test_the_residual_of_the_loop_costs_what_a_jitter_of_its_moments_does(missio
 def test_fades_are_known_on_the_mirror_whose_spectrum_is_known(mission):
     spectrum = np.column_stack([falling(2 * URAD), falling(3 * URAD)])
     same = residual((0, 0), (2, 3))
-    found = performance.run(mission, (), fine_study(spectrum, given=same, comparison=same, none=same))
+    found = costs_of(mission, (), fine_study(spectrum, given=same, comparison=same, none=same))
     known = {case.mirror: math.isfinite(case.fades_per_s) for case in found.cases}
     assert known == {"given": True, "comparison": False, "no hysteresis": False}
     case = found.case(performance.FINE, "PI", "given")
@@ -451,13 +458,13 @@ def test_fades_are_known_on_the_mirror_whose_spectrum_is_known(mission):
 
 def test_a_spectrum_that_ends_too_early_is_doubted(mission):
     flat = np.full((FREQ_HZ.size, 2), (2 * URAD) ** 2 / FREQ_HZ[-1])
-    (case,) = performance.run(mission, (), fine_study(flat, given=residual((0, 0), (2, 2)))).cases
+    (case,) = costs_of(mission, (), fine_study(flat, given=residual((0, 0), (2, 2)))).cases
     assert "of the velocity variance" in case.fade_warning
 
 
 def test_a_loop_of_one_axis_stands_still_about_the_other(mission):
     study = fine_study(falling(3 * URAD)[:, None], given=residual((1, 0), (3, 0), axes=1))
-    (case,) = performance.run(mission, (), study).cases
+    (case,) = costs_of(mission, (), study).cases
     assert case.jitter.bias_rad == pytest.approx((URAD, 0.0))
     assert case.jitter.rms_rad == pytest.approx((3 * URAD, 0.0))
     jitter = record((1, 0), (3, 0))
@@ -469,7 +476,7 @@ def test_a_loop_of_one_axis_stands_still_about_the_other(mission):
 def test_hysteresis_costs_the_loop_under_vibration_what_it_adds_to_its_quantile(mission, rms_urad):
     spectrum = np.column_stack([falling(rms_urad * URAD)] * 2)
     study = fine_study(spectrum, given=residual((0, 0), (rms_urad, rms_urad)), none=residual((0, 0), (2, 2)))
-    (cost,) = performance.run(mission, (tracked(sine(9 * URAD)),), study).costs
+    (cost,) = costs_of(mission, (tracked(sine(9 * URAD)),), study).costs
     quantiles = [rms * URAD * math.sqrt(-2 * math.log(OUTAGE)) for rms in (2, rms_urad)]
     assert (cost.source, cost.controller, cost.mirror) == (performance.FINE, "PI", "given")
     # bins are 0.03 dB wide here: costs of less are still seen

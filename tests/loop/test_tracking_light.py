@@ -2,7 +2,8 @@
 
 import pytest
 
-from microrad import link, mirror
+import budgets
+from microrad import mirror
 from microrad.link.tracking_light import tracking_light_w
 from microrad.loop import fine_pointing
 from microrad.mission.file import load_mission
@@ -15,7 +16,7 @@ def noise_rad(file, power_w):
 
 def test_the_light_is_the_answers_unless_the_cell_states_it_or_the_noise_is_given(tmp_path):
     file, given = load_mission(DEFAULT), load_mission(SHIPPED)
-    assert tracking_light_w(file) == link.answer_budget(file.mission, file.sources).received_power_w > 0.0
+    assert tracking_light_w(file) == budgets.answer(file.mission, file.sources).received_power_w > 0.0
     assert tracking_light_w(given) is None
     line = "[fine_pointing.optical_sensor.quad_cell]\n"
     text = DEFAULT.read_text(encoding="utf-8").replace(line, f'{line}received_power = "3 nW"\n')

@@ -275,7 +275,7 @@ def test_a_date_without_its_zone_is_refused_quoted_or_not(tmp_path, text, shown,
 def refused_orbit(folder, *changes):
     file = day_file(folder, *changes)
     with pytest.raises(orbit.OrbitError) as refused:
-        orbit.pair(file.mission, folder)
+        orbit.pair(file.mission.orbit, file.mission.terminals, folder)
     return str(refused.value)
 
 
@@ -351,7 +351,7 @@ def test_an_ephemeris_that_just_covers_the_span_leaves_no_tail(tmp_path):
     for last, tail in ((86400.0, 0.0), (90000.0, 3600.0), (260000.0, 86400.0)):
         (tmp_path / "a.oem").write_text(ephemeris(LOW, np.arange(0.0, last + 1.0, 100.0)), encoding="utf-8")
         file = day_file(tmp_path, BY_EPHEMERIS)
-        assert orbit.pair(file.mission, tmp_path).tail_s == pytest.approx(tail, abs=1e-3)
+        assert orbit.pair(file.mission.orbit, file.mission.terminals, tmp_path).tail_s == pytest.approx(tail, abs=1e-3)
 
 
 def test_the_tail_of_elements_ends_with_their_life(tmp_path):
@@ -360,7 +360,9 @@ def test_the_tail_of_elements_ends_with_their_life(tmp_path):
         file = day_file(tmp_path, BY_ELEMENTS, {"orbit.duration": "1 h"})
         age_s = (79.5 - day) * 86400.0
         left = 14 * 86400.0 - age_s - 3600.0
-        assert orbit.pair(file.mission, tmp_path).tail_s == pytest.approx(min(tail, left), abs=1e-3)
+        assert orbit.pair(file.mission.orbit, file.mission.terminals, tmp_path).tail_s == pytest.approx(
+            min(tail, left), abs=1e-3
+        )
 
 
 # -------------------------------------------------------------------------------------------------------- what is taken
@@ -379,7 +381,7 @@ def test_the_shipped_file_is_read_whole_and_edited(tmp_path):
 
 def test_tables_become_orbits_with_their_numbers(tmp_path):
     own = day_file(tmp_path, {"orbit.leo": {**KEPLERIAN, LIMITS.rpartition(".")[2]: HELD}}, ALONE)
-    pair = orbit.pair(own.mission, tmp_path)
+    pair = orbit.pair(own.mission.orbit, own.mission.terminals, tmp_path)
     ellipse = pair.leo.orbit
     assert (ellipse.semi_major_axis_m, ellipse.eccentricity, ellipse.j2) == (7e6, 0.001, True)
     assert ellipse.argument_of_perigee_rad == pytest.approx(math.pi / 2)
@@ -393,7 +395,7 @@ def test_tables_become_orbits_with_their_numbers(tmp_path):
 
 
 def test_sun_synchronous_is_the_inclination_whose_node_follows_the_sun(tmp_path):
-    own = orbit.pair(day_file(tmp_path).mission, tmp_path).leo.orbit
+    own = orbit.pair(day_file(tmp_path).mission.orbit, day_file(tmp_path).mission.terminals, tmp_path).leo.orbit
     assert math.degrees(own.inclination_rad) == pytest.approx(97.4, abs=0.05)
     a_year = 2.0 * math.pi / (365.2422 * 86400.0)
     assert own.secular_rates_rad_s()[0] == pytest.approx(a_year, rel=1e-6)
@@ -411,16 +413,16 @@ def test_a_mission_read_twice_is_the_same(tmp_path):
 
 def test_two_terminals_of_one_make_are_told_apart(tmp_path):
     file = day_file(tmp_path, {"terminals.leo_name": "T", "terminals.geo_name": "T"})
-    pair = orbit.pair(file.mission, tmp_path)
+    pair = orbit.pair(file.mission.orbit, file.mission.terminals, tmp_path)
     assert (pair.leo.name, pair.geo.name) == ("T (own)", "T (partner)")
 
 
 def test_without_tables_the_refusal_names_the_table(tmp_path):
     file = day_file(tmp_path, {"orbit": None, "operations": None, "constellation": None})
     with pytest.raises(orbit.OrbitError, match=r"no table \[orbit\]: microrad init writes one"):
-        orbit.pair(file.mission, tmp_path)
+        orbit.pair(file.mission.orbit, file.mission.terminals, tmp_path)
     with pytest.raises(ValueError, match=r"no table \[constellation\]: microrad init writes one"):
-        constellation.table(file.mission)
+        constellation.table(file.mission.constellation)
 
 
 def test_tables_with_stations_and_relays_are_hashed_by_what_is_in_them(tmp_path):

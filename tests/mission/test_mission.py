@@ -123,7 +123,7 @@ def test_every_value_has_a_source_with_its_line():
 
 
 def test_assumptions_are_exactly_the_lines_marked_so():
-    listed = assumptions(load_mission(PAPER))
+    listed = assumptions(load_mission(PAPER).sources)
     assert len(listed) == sum("# assumption:" in line or "# derived:" in line for line in TEXT.split("\n"))
     assert ("beacon.required_power", '"10 pW"') in [entry[:2] for entry in listed]
     assert all(comment.startswith(("assumption:", "derived:")) for _, _, comment in listed)

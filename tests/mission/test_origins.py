@@ -2,7 +2,7 @@
 
 import pytest
 
-from microrad.link import communication_budget
+import budgets
 from microrad.mission import origins
 from microrad.mission.file import assumptions, changed_from_shipped, load_link, load_mission
 from microrad.mission.presets import preset_text, presets
@@ -70,7 +70,7 @@ def test_a_budget_says_what_was_changed_and_from_what(tmp_path):
     path = tmp_path / "mission.toml"
     path.write_text(TEXT.replace('leo_aperture = "5 cm"', 'leo_aperture = "6 cm"'), "utf-8")
     file = load_link(path)
-    rows = {term.name: term.source for term in communication_budget(file.mission, file.sources).lines}
+    rows = {term.name: term.source for term in budgets.communication(file.mission, file.sources).lines}
     changed = f"mission file, line {line}, in place of 5 cm ({TABLE_2})"
     assert rows["LEO aperture gain"] == f"{changed}; {TABLE_2}"
     assert rows["GEO aperture gain"].split("; ")[0] == TABLE_2
@@ -79,7 +79,7 @@ def test_a_budget_says_what_was_changed_and_from_what(tmp_path):
 def test_an_assumption_of_another_value_stays_one_and_is_told(tmp_path):
     path = tmp_path / "mission.toml"
     path.write_text(TEXT.replace('error = "24 urad"', 'error = "30 urad"'), "utf-8")
-    found = {key: (value, told) for key, value, told in assumptions(load_mission(path))}
+    found = {key: (value, told) for key, value, told in assumptions(load_mission(path).sources)}
     value, told = found["pointing.lines.orbit_knowledge.error"]
     assert value == '"30 urad"'
     assert told.startswith("mission file, line ") and "in place of 24 urad (assumption: 1 km" in told
@@ -106,9 +106,9 @@ def test_what_names_the_paper_is_held_against_the_papers_mission_by_its_key_alon
     for comment in ("paper: Fig. 3", "paper:  Table 2"):
         line = f'leo_aperture = "6 cm" # {comment}\n'
         path.write_text(TEXT.replace(TEXT[TEXT.index("leo_aperture = ") :].partition("\n")[0] + "\n", line), "utf-8")
-        assert changed_from_shipped(load_mission(path)) == (("terminals.leo_aperture", '"6 cm"', '"5 cm"'),)
+        assert changed_from_shipped(load_mission(path).sources) == (("terminals.leo_aperture", '"6 cm"', '"5 cm"'),)
         path.write_text(path.read_text("utf-8").replace('"6 cm"', '"50 mm"'), "utf-8")
-        assert changed_from_shipped(load_mission(path)) == ()
+        assert changed_from_shipped(load_mission(path).sources) == ()
 
 
 def test_a_comment_that_is_shipped_with_several_values_speaks_of_none():

@@ -5,8 +5,8 @@ from importlib import resources
 
 import pytest
 
+import budgets
 from microrad.core.units import UnitError
-from microrad.link.budget import communication_budget
 from microrad.mission.fields import NOT_PUBLISHED, UNKNOWN, ProblemsError, Quantity, Several, Share, Switch, Whole
 from microrad.mission.file import load_link, load_mission
 from microrad.mission.presets import PAPER, preset_text, presets
@@ -80,7 +80,7 @@ def test_a_preset_with_its_unknown_values_given_is_a_link(tmp_path, name):
     preset = next(each for each in presets() if each.name == name)
     assert set(EXAMPLES[name]) == set(preset.unknown)
     file = completed(tmp_path, name)
-    assert math.isfinite(communication_budget(file.mission, file.sources).margin_db)
+    assert math.isfinite(budgets.communication(file.mission, file.sources).margin_db)
     kinds = {key: source.kind for key, source in file.sources.items() if key not in preset.unknown}
     assert set(kinds.values()) <= {"literature", "paper", "assumption", "derived", ""}
     assert [key for key, kind in kinds.items() if not kind] == (["name", "mirror.name"] if preset.whole else ["name"])
@@ -120,7 +120,7 @@ def test_luce_has_its_power_and_the_on_axis_intensity_that_was_measured(tmp_path
     beam = file.mission.communication
     half_rad = beam.wavelength_m / (math.pi * beam.beam.radius_m)
     assert 2 * half_rad == pytest.approx(9.4e-6, rel=1e-3)
-    budget = communication_budget(file.mission, file.sources)
+    budget = budgets.communication(file.mission, file.sources)
     assert budget.irradiance_w_m2 * 4e7**2 == pytest.approx(560e6, rel=5e-3)
     assert budget.radiant_intensity_w_sr == pytest.approx(560e6, rel=5e-3)
     assert budget.irradiance_w_m2 == pytest.approx(350e-9, rel=5e-3)
@@ -146,7 +146,7 @@ def test_what_is_published_of_a_flown_link_stands_in_its_preset(name, key, value
 @pytest.mark.parametrize(("name", "width_rad"), [("tbird", 380e-6), ("click", math.radians(14.6 / 3600))])
 def test_beams_published_at_half_of_their_maximum_have_half_of_it_there(tmp_path, name, width_rad):
     loss = [
-        communication_budget(file.mission, file.sources, pointing_error_rad=angle).margin_db
+        budgets.communication(file.mission, file.sources, pointing_error_rad=angle).margin_db
         for file in [completed(tmp_path, name)]
         for angle in (0.0, width_rad / 2)
     ]
@@ -162,8 +162,8 @@ def test_the_paper_is_a_whole_mission_whose_links_are_read_alone_too(tmp_path):
     assert [preset.name for preset in presets() if preset.whole] == [PAPER]
     link = load_link(as_file(tmp_path, PAPER, preset_text(PAPER)))
     whole = load_mission(SHIPPED)
-    margin = communication_budget(link.mission, link.sources).margin_db
-    assert margin == communication_budget(whole.mission, whole.sources).margin_db
+    margin = budgets.communication(link.mission, link.sources).margin_db
+    assert margin == budgets.communication(whole.mission, whole.sources).margin_db
     assert margin == pytest.approx(3.0, abs=0.01)
 
 

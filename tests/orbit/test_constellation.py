@@ -25,7 +25,7 @@ def made(folder, *changes):
     """The terminals of a mission's constellation and what they share."""
     file = day_file(folder, *changes)
     m = file.mission
-    pair = orbit.pair(m, folder)
+    pair = orbit.pair(m.orbit, m.terminals, folder)
     c = m.constellation
     return pair, tuple(orbit.satellites(c, m.orbit, pair.epoch, folder)), orbit.relays(c, m.orbit, pair.epoch)
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from day_files import ALONE, HELD, LIMITS, day_file, ephemeris
-from microrad import orbit
+from microrad import link, orbit
 from microrad.link import study as link_study
 from microrad.orbit import EARTH_RADIUS_M
 from microrad.orbit import day as day_study
@@ -656,16 +656,18 @@ def test_nothing_about_a_day_is_asked_of_a_mission_without_its_tables(tmp_path):
     links = link_study.run(day_file(tmp_path, ALONE, {"operations": None}))
     with pytest.raises(ValueError, match=r"no table \[operations\]: microrad init writes one"):
         day_study.run(links)
-    assert geometry.view(orbit.pair(links.file.mission, tmp_path), 1.55e-6).encounters
+    assert geometry.view(
+        orbit.pair(links.file.mission.orbit, links.file.mission.terminals, tmp_path), 1.55e-6
+    ).encounters
 
 
 def test_an_uncorrected_point_ahead_is_in_the_loss_and_so_in_the_reach(tmp_path):
     links = link_study.run(day_file(tmp_path, SIX_HOURS, {"point_ahead.corrected": False}))
     loss = day_study.given_loss(links)
     assert loss.loss_db > 100.0
-    (closing,) = flow.closings(links.file.mission, loss)
+    (closing,) = flow.closings(links.file.mission.operations, link.of(links.file.mission), loss)
     assert closing.margin_db == pytest.approx(links.communication.margin_db, abs=1e-9)
-    again = day_study.loss_at(links.file.mission, links.communication.margin_db, "")
+    again = day_study.loss_at(link.of(links.file.mission), links.communication.margin_db, "")
     assert again.loss_db == loss.loss_db
 
 

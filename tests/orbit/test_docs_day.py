@@ -92,7 +92,7 @@ def replaced(folder):
 def view(replaced, folder):
     def seen(*tables):
         m = replaced(*tables).mission
-        return geometry.view(orbit.pair(m, folder), m.communication.wavelength_m)
+        return geometry.view(orbit.pair(m.orbit, m.terminals, folder), m.communication.wavelength_m)
 
     return seen
 
@@ -173,7 +173,7 @@ def test_what_the_page_says_is_refused_is_refused(replaced, folder, table, chang
     (folder / "other.tle").write_text("\n".join([lines[0], *sums]), encoding="utf-8")
     with pytest.raises(ValueError) as refused:
         m = replaced(table.replace(*change).replace("satellite.tle", "other.tle")).mission
-        orbit.pair(m, folder)
+        orbit.pair(m.orbit, m.terminals, folder)
     assert reason in str(refused.value)
 
 
@@ -181,7 +181,7 @@ def test_an_ephemeris_is_used_within_its_span(replaced, folder):
     told("Elements are used up to 14 days from their epoch, an ephemeris within its usable span.")
     m = replaced(ORBITS[3], shipped("orbit").replace('"24 h"', '"72 h"')).mission
     with pytest.raises(orbit.OrbitError, match="2026-03-22T12:00:00"):
-        orbit.pair(m, folder)
+        orbit.pair(m.orbit, m.terminals, folder)
 
 
 def test_limits_and_the_sun(view, day):
@@ -200,7 +200,7 @@ def test_rates_share_and_store(replaced, links, day):
     def of(*change):
         m = replaced(OPERATIONS.replace(*change) if change else OPERATIONS).mission
         o, seen = m.operations, day.view
-        found = flow.closings(m, day.loss)
+        found = flow.closings(m.operations, link.of(m), day.loss)
         relay = flow.relay(o, seen, flow.rate_table(found), day.loss.outage, day_study.acquired(links), 1.0)
         return SimpleNamespace(
             closings=found, relay=relay, direct=flow.direct(o, seen, flow.heard(o.downlink, seen.pair))
@@ -262,7 +262,7 @@ def test_what_the_simulated_loop_leaves(lqg, links, day):
     m, scene, design = lqg
     (verified,) = fine_pointing.verify(scene, (design,))
     left = verified.simulated["given"].quantile_rad
-    loss = float(link.communication_beam(links.file.mission).fall.loss_db(left))
+    loss = float(link.of(links.file.mission).beam.fall.loss_db(left))
     told(f"{left * 1e6:.2f} µrad at 99.7 %, a pointing loss of {loss:.2f} dB in place of {day.loss.loss_db:.2f} dB")
     assert m.fine_pointing.quantile == 0.997 and f"loss_db={loss:.2f}" in PAGE
 
@@ -270,7 +270,7 @@ def test_what_the_simulated_loop_leaves(lqg, links, day):
 def test_one_contact_in_time(lqg, links, day):
     m, scene, design = lqg
     study = SimpleNamespace(scene=scene, best=SimpleNamespace(design=design))
-    run = contact_run.of_mission(m, day, links.finding, study)
+    run = contact_run.of_mission(m.operations, m.acquisition, links.data, day, links.finding, study)
     begins = run.contact.start_s - run.log[0].time_s
     told(f"the slew begins {begins:.0f} s before the rise, data {run.first_data_s - run.contact.start_s:.1f} s after")
     told(f"flow for {run.data_s / 60:.1f} min, {100 * run.data_share:.1f} % of the contact,")

@@ -39,7 +39,7 @@ def track_of(tmp_path):
 
     def made(*changes):
         m = day_file(tmp_path, ALONE, *changes).mission
-        pair = orbit.pair(m, tmp_path)
+        pair = orbit.pair(m.orbit, m.terminals, tmp_path)
         seen = SimpleNamespace(pair=pair, duration_s=pair.span_s[1])
         return ground_track(seen, (), m.operations.downlink), pair
 

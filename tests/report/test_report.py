@@ -559,9 +559,9 @@ def test_an_amplifier_at_its_limits_is_named_as_the_cause_and_claims_are_not_jud
 
 @pytest.mark.usefixtures("no_scan", "no_bench")
 def test_a_changed_value_does_not_keep_the_papers_name(paper, tmp_path):
-    assert missionfile.changed_from_shipped(paper.file) == ()
+    assert missionfile.changed_from_shipped(paper.file.sources) == ()
     file = edited_file(tmp_path, ('leo_aperture = "5 cm"', 'leo_aperture = "6 cm"'), day=False)
-    assert missionfile.changed_from_shipped(file) == (("terminals.leo_aperture", '"6 cm"', '"5 cm"'),)
+    assert missionfile.changed_from_shipped(file.sources) == (("terminals.leo_aperture", '"6 cm"', '"5 cm"'),)
     changed = study.run(file)
     assert any("names the paper as its source" in w for w in report.summary(changed)["warnings"])
     text = report.write(changed, tmp_path / "out").read_text(encoding="utf-8")

@@ -46,7 +46,8 @@ def fine(file):
 def found(file, fine):
     """The study of the shipped mission without its fine-pointing loop, and one contact in time under a PI."""
     whole = plain_study()
-    run = contact_run.of_mission(file.mission, whole.day, whole.links.finding, fine)
+    m = file.mission
+    run = contact_run.of_mission(m.operations, m.acquisition, whole.links.data, whole.day, whole.links.finding, fine)
     return replace(whole, contact=run)
 
 
@@ -62,7 +63,9 @@ def test_the_study_has_a_day_and_a_plan_but_no_contact_in_time_without_a_fine_lo
     assert found.plan is not None
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(study.fine_pointing, "run", lambda *args, **more: None)
-        assert contact_run.of_mission(found.file.mission, found.day, found.links.finding, None) is None
+        m = found.file.mission
+        links = found.links
+        assert contact_run.of_mission(m.operations, m.acquisition, links.data, found.day, links.finding, None) is None
 
 
 def test_the_page_answers_with_contacts_volumes_latencies_and_the_assumption(written, found):
@@ -178,7 +181,7 @@ def test_the_contact_of_the_mission_has_its_geometry(found):
 
 def test_a_later_contact_is_free_from_the_end_of_the_one_before(found, fine, tmp_path):
     m = edited_file(tmp_path, ("number = 1 ", "number = 3 "), whole=True).mission
-    run = contact_run.of_mission(m, found.day, found.links.finding, fine)
+    run = contact_run.of_mission(m.operations, m.acquisition, found.links.data, found.day, found.links.finding, fine)
     before = found.day.view.encounters[1].contact
     assert run.contact.free_from_s == before.end_s
     assert run.contact.start_s == found.day.view.encounters[2].contact.start_s

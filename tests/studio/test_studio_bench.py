@@ -450,10 +450,9 @@ def answers(pi):
 
 
 def test_the_controllers_are_those_of_the_study_and_of_control(mission):
-    names = control_model.names(mission)
+    names = control_model.names(mission.mission.fine_pointing)
     assert names == (*fine_pointing.names(mission.mission.fine_pointing), PID, PID_INVERSE)
-    bare = replace(mission, mission=mission.mission.model_copy(update={"fine_pointing": None}))
-    assert control_model.names(bare) == (PID, PID_INVERSE)
+    assert control_model.names(None) == (PID, PID_INVERSE)
     with pytest.raises(ValueError, match="'none' is no controller of this mission"):
         control_model.controller(mission, "none")
 
@@ -540,14 +539,14 @@ def test_the_warnings_of_the_mirror_s_file_stand_beside_the_margins(mission, pi,
     text = "# Mirror identified.\n# Warning: Not valid above 18.85 V/s.\n# Warning: b.\n" + MIRROR
     (tmp_path / "stage.toml").write_text(text)
     draft = with_mirror_file(Draft.shipped(tmp_path / "m.toml"), tmp_path / "stage.toml")
-    warned = control_model.mirror_warnings(draft.file())
+    warned = control_model.mirror_warnings(False, draft.file().mirror_file.text)
     assert warned == (
         "The mirror has no linear part: its dynamics are not known, and margins and answers are those of one without "
         "any.",
         "Warning of the mirror's file: Not valid above 18.85 V/s.",
         "Warning of the mirror's file: b.",
     )
-    assert control_model.mirror_warnings(mission) == pi.warnings == ()
+    assert control_model.mirror_warnings(True, "") == pi.warnings == ()
     assert control_view.notes(replace(pi, warnings=warned)) == warned
 
 

@@ -144,52 +144,54 @@ def test_an_attempt_with_a_fault_has_no_view_and_one_that_cannot_be_budgeted_say
 
 # --------------------------------------------------------------------------------------------------------------- links
 def test_the_map_is_the_margin_of_the_link_and_its_contour_has_the_margin_that_it_names(view):
-    m, frame = view.file.mission, view.frame
-    assert np.array_equal(view.margin_db, link.margin_map(m, frame.data_rate_bit_s, frame.pointing_error_rad))
+    frame = view.frame
+    assert np.array_equal(view.margin_db, link.margin_map(view.data, frame.data_rate_bit_s, frame.pointing_error_rad))
     for level, rates in view.contours.items():
         there = np.isfinite(rates)
         assert there.any()
         errors = frame.pointing_error_rad[there]
-        found = [link.margin_map(m, rate, error)[0, 0] for rate, error in zip(rates[there], errors, strict=True)]
+        found = [
+            link.margin_map(view.data, rate, error)[0, 0] for rate, error in zip(rates[there], errors, strict=True)
+        ]
         assert np.allclose(found, level, atol=1e-6)
-        outside = link.margin_map(m, frame.data_rate_bit_s[[0, -1]], frame.pointing_error_rad[~there])
+        outside = link.margin_map(view.data, frame.data_rate_bit_s[[0, -1]], frame.pointing_error_rad[~there])
         assert np.all((outside[0] < level) | (outside[1] > level))
 
 
 def test_the_required_contour_goes_through_the_largest_rate(view):
-    m = view.file.mission
-    rates = view.contours[m.requirement.margin_db]
-    at = np.interp(m.requirement.pointing_error_rad, view.frame.pointing_error_rad, np.log(rates))
-    assert np.exp(at) == pytest.approx(link_study.largest_rate(m), rel=2e-3)
+    required = view.data.requirement
+    rates = view.contours[required.margin_db]
+    at = np.interp(required.pointing_error_rad, view.frame.pointing_error_rad, np.log(rates))
+    assert np.exp(at) == pytest.approx(link_study.largest_rate(view.data), rel=2e-3)
 
 
 @pytest.mark.parametrize("name", sorted(RECEIVERS))
 def test_the_contour_of_a_built_receiver_has_its_margin(tmp_path, name):
     found = link_view.view(link_file(tmp_path, received_with(name)))
-    m, frame = found.file.mission, found.frame
+    frame = found.frame
     for level, rates in found.contours.items():
         for place in np.flatnonzero(np.isfinite(rates))[:3]:
-            margin = link.margin_map(m, rates[place], frame.pointing_error_rad[place])[0, 0]
+            margin = link.margin_map(found.data, rates[place], frame.pointing_error_rad[place])[0, 0]
             assert margin == pytest.approx(level, abs=2e-3)
-    assert frame.data_rate_bit_s[-1] <= link.receiver(m).highest_data_rate_bit_s
+    assert frame.data_rate_bit_s[-1] <= found.data.receiver.highest_data_rate_bit_s
 
 
 def test_under_a_jitter_the_page_has_the_margin_of_the_outage(tmp_path):
     """As the budget of the command line, whatever the static pointing error is."""
     shaken = {"jitter": {"bias": ["0 urad", "0 urad"], "rms": ["4 urad", "4 urad"], "bandwidth": "50 Hz"}}
-    still, found = (link_view.view(link_file(tmp_path, *each)) for each in ((), (shaken,)))
-    m = found.file.mission
-    error = 4e-6 * math.sqrt(-2.0 * math.log(m.requirement.outage))  # Rayleigh
-    there = link.communication_budget(still.file.mission, {}, pointing_error_rad=error).margin_db
+    file = link_file(tmp_path, shaken)
+    still, found = (link_view.view(each) for each in (link_file(tmp_path), file))
+    error = 4e-6 * math.sqrt(-2.0 * math.log(found.data.requirement.outage))  # Rayleigh
+    there = link.communication_budget(still.data, {}, pointing_error_rad=error).margin_db
     margin, needed = found.margins[0].margin_db, found.margins[0].required_db
-    assert margin == found.budgets[0].margin_db == pytest.approx(under_jitter.margin_db(m), abs=1e-12)
+    assert margin == found.budgets[0].margin_db == pytest.approx(under_jitter.margin_db(found.data), abs=1e-12)
     assert margin == pytest.approx(there, abs=1e-6)
     assert (still.margins[0].met, found.margins[0].met) == (True, False)
     assert still.margins[0].margin_db == pytest.approx(needed, abs=1e-3) and margin < needed - 0.5
     assert f"{error * 1e6:.2f}" in link_view.map_words(found) and "10 \u00b5rad" in link_view.map_words(still)
-    assert link.margin_map(m, m.communication.data_rate_bit_s, error)[0, 0] == pytest.approx(margin, abs=1e-6)
+    assert link.margin_map(found.data, found.data.table.data_rate_bit_s, error)[0, 0] == pytest.approx(margin, abs=1e-6)
     assert found.frame.pointing_error_rad[-1] > error
-    shown = {row["line"] for row in link_view.tables(link_study.run(found.file))["Under jitter"]}
+    shown = {row["line"] for row in link_view.tables(link_study.run(file))["Under jitter"]}
     assert {"Mean pointing loss", "Outage", "Below required margin"} <= {name.removesuffix(" !") for name in shown}
 
 

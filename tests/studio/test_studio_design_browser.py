@@ -4,9 +4,9 @@ import json
 
 import pytest
 
+import budgets
 from browser import check_quiet, until
 from microrad import link
-from microrad.link import pointing
 from microrad.link.study import largest_rate
 from microrad.report.quantities import signed
 from microrad.studio import link_view
@@ -62,7 +62,7 @@ def mission_at(file, **changes):
 
 
 def margin_at(file, **changes):
-    return signed(link.communication_budget(*mission_at(file, **changes)).margin_db, "dB")
+    return signed(budgets.communication(*mission_at(file, **changes)).margin_db, "dB")
 
 
 def written(studio):
@@ -81,7 +81,7 @@ def test_the_margin_and_the_map_follow_a_typed_aperture(studio, links):
     typed(links, APERTURE).press("Enter")
     links.get_by_text("not saved", exact=True).wait_for()
     assert written(studio) == text.replace('leo_aperture = "5 cm"', 'leo_aperture = "6 cm"') != text
-    rate = largest_rate(mission_at(studio.file, terminals__leo_aperture="6 cm")[0])
+    rate = largest_rate(link.of(mission_at(studio.file, terminals__leo_aperture="6 cm")[0]))
     links.get_by_text(f"At most {rate / 1e6:.3g} Mbit/s at 10 µrad").wait_for()
     links.get_by_text(
         f"Largest data rate with the required 3 dB at the required 10 µrad: {rate / 1e6:.3g} Mbit/s."
@@ -175,7 +175,7 @@ def test_a_page_that_is_opened_on_a_faulty_mission_promises_nothing_in_grey(stud
 def test_the_budget_of_another_link_is_chosen_and_the_page_copied_as_a_command(studio, links):
     links.get_by_text("The links close, and ").wait_for()
     links.get_by_role("button", name="Beacon", exact=True).click()
-    beacon = link.beacon_budget(*mission_at(studio.file))
+    beacon = budgets.beacon(*mission_at(studio.file))
     row = links.locator("tr.total").filter(has_text="Margin")
     row.get_by_text(f"{beacon.margin_db:.2f} dB").wait_for()
     links.get_by_role("button", name="Copy as command").click()
@@ -188,7 +188,7 @@ def test_the_coverage_follows_the_beacon_s_divergence(studio, opened):
     page = opened("pointing")
     page.get_by_text("with a probability of 0.53").wait_for()
     typed(page, "Divergence").fill("1310 urad")
-    wide = pointing.open_loop_budget(*mission_at(studio.file, beacon__divergence="1310 urad"))
+    wide = budgets.open_loop(*mission_at(studio.file, beacon__divergence="1310 urad"))
     page.get_by_text(f"with a probability of {wide.reading.coverage:.4f}").wait_for()
     page.get_by_role("cell", name="off the line of sight").first.wait_for()
     assert page.get_by_role("row").filter(has_text="radial distribution").get_by_text("covered").count() == 1

@@ -46,9 +46,9 @@ def test_every_reading_that_fits_is_there_once(found):
 def test_a_reading_is_the_mission_written_so(tmp_path, found, key, change):
     m = edited(tmp_path, change)
     run = tracking.worst(tracking.tracking_runs(cases_of(m), ("given",)), m.requirement.residual_statistic)
-    left = tracking.residual_rad(m, run.trace)
+    left = tracking.residual_rad(m.requirement, m.conventions, run.trace)
     assert found[key].residual_rad == pytest.approx(left, rel=1e-12)
-    assert found[key].margin_db == pytest.approx(float(link.margin_of_error(m, np.array([left]))[0]), abs=1e-9)
+    assert found[key].margin_db == pytest.approx(float(link.margin_of_error(link.of(m), np.array([left]))[0]), abs=1e-9)
 
 
 def test_the_page_and_the_verdict_say_which_of_them_turn_it(found):

@@ -149,10 +149,12 @@ def test_together_names_the_largest_set():
 
 
 def test_the_scan_applies_to_a_linear_part_with_bouc_wen(tmp_path, mission):
-    assert paper.applies(mission)
+    assert paper.applies(mission.mirror)
     text = SHIPPED.read_text()
     linear = text[text.index("[mirror.linear]") : text.index("[mirror.bouc_wen]")]
-    assert not paper.applies(edited(tmp_path, (linear, ""), ('composition = "cascade"', 'composition = "static"')))
+    assert not paper.applies(
+        edited(tmp_path, (linear, ""), ('composition = "cascade"', 'composition = "static"')).mirror
+    )
 
 
 def test_the_scan_keeps_its_loop_gain_on_a_mirror_of_another_gain(monkeypatch, tmp_path, mission):

@@ -1,6 +1,7 @@
 """The whole study: requirements, claims and margins of the shipped mission, and of missions that differ from it."""
 
 import re
+from dataclasses import replace
 from math import log10, pi
 from types import SimpleNamespace
 
@@ -401,7 +402,8 @@ def test_what_to_change_for_the_stroke_just_meets_it(tmp_path, shipped):
                 design=SimpleNamespace(name=""), simulated={"given": SimpleNamespace(quantile_rad=1e-6)}
             ),
         )
-        row = verdict.of_fine_pointing(file.mission, {}, fine, SimpleNamespace(margin_db=5.0, possible=True))[0]
+        case = SimpleNamespace(margin_db=5.0, possible=True)
+        row = verdict.of_fine_pointing(file.mission.requirement, {}, fine, case)[0]
         return row, requirement_views.advice(SimpleNamespace(file=file, fine_pointing=fine), row)
 
     row, said = stroke()
@@ -455,16 +457,17 @@ def test_nothing_that_a_loop_must_do_is_met_by_a_mirror_without_dynamics():
         best = SimpleNamespace(
             design=SimpleNamespace(name="PI"), simulated={"given": SimpleNamespace(quantile_rad=left_rad)}
         )
-        fine = SimpleNamespace(best=best, quantile=0.997, budget=SimpleNamespace(dominant="Gauge"), scene=scene)
+        of = replace(scene, mirrors=replace(scene.mirrors, table=m.mirror))
+        fine = SimpleNamespace(best=best, quantile=0.997, budget=SimpleNamespace(dominant="Gauge"), scene=of)
         case = SimpleNamespace(margin_db=5.0, possible=possible)
-        return verdict.of_fine_pointing(m, {}, fine, case)[1:]
+        return verdict.of_fine_pointing(m.requirement, {}, fine, case)[1:]
 
     for m, met in ((known, True), (bare, False)):
         for each in judged(m, 5e-6):
             assert (each.margin > 0, each.met) == (True, met)
             assert each.because == ("Gauge" if met else "dynamics of the mirror, which its model does not have")
         assert not judged(m, 11e-6)[0].met
-        assert not_reliable(m) == ([] if met else [f"Not to be relied on: {unknown_dynamics(m.mirror)}."])
+        assert not_reliable(m.mirror) == ([] if met else [f"Not to be relied on: {unknown_dynamics(m.mirror)}."])
     assert [each.because for each in judged(known, 5e-6, possible=False)] == ["Gauge", IMPOSSIBLE]
     assert "resonances and its lag are not known" in unknown_dynamics(bare.mirror)
     assert unknown_dynamics(bare.mirror) in summarise(bare.mirror).warnings

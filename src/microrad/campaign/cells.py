@@ -129,10 +129,10 @@ def _with_rate(document: Document, file: LinkFile) -> LinkFile:
     from microrad.link import study as link_study
 
     try:
-        solved = link_study.solve_rate(LinkFile(file.mission, file.path, file.text, file.sha256, file.sources))
+        solved = link_study.solve_rate(file)
     except link.LinkError as error:
         document.fault(_RATE, file.sources[_RATE].value, str(error), "a data rate, or a link with that much more")
         raise MissionError(document.path, document.faults) from None
     rate = solved.mission.communication.data_rate_bit_s
     document.data = put(document.data, _RATE, f"{rate!r} bit/s")  # read back to the same bits
-    return replace(file, mission=solved.mission, sources=solved.sources)
+    return solved

@@ -1,6 +1,6 @@
 """The outputs of one row: from its runs to the residual, the links under it, and the day."""
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
 from functools import cache, lru_cache
 from typing import TYPE_CHECKING
@@ -16,7 +16,9 @@ from microrad.link.under_jitter import Exposure, stated_outage
 from microrad.loop import fine_pointing
 from microrad.loop.fine_loop import ensemble
 from microrad.mission.file import LinkFile
-from microrad.mission.model import LinkMission, Mission
+from microrad.mission.model import Mission, Source
+from microrad.mission.tables.fine_pointing import FinePointing
+from microrad.mission.tables.link import Beacon, LinkRequirement
 
 if TYPE_CHECKING:
     from microrad.orbit import day as day_study
@@ -32,11 +34,20 @@ def outputs(file: LinkFile, runs: ensemble.Ensemble | None, keep: Collection[str
     known: dict[str, Callable[[], float]] = {}
     if runs is not None:
         assert isinstance(m, Mission)  # it has the loop
-        known = _residual(m, runs)
-    under = cache(lambda: _possible(Exposure.stated(m) if runs is None else _simulated(m, runs)))
+        known = _residual(m.requirement, m.fine_pointing, runs)
+    data = cache(lambda: link.of(m))
+    under = cache(lambda: _exposure(data(), runs))
     day = cache(lambda: _day(file, under()))
-    known |= _links(file, under)
-    known |= {"volume": lambda: day().capacity_bit, "contact_time": lambda: day().contact_s}
+    known |= {
+        "margin": lambda: under().margin_db,
+        "outage": lambda: under().short_of(0.0),
+        "short": lambda: under().short_of(m.requirement.margin_db),
+        "data_rate": lambda: _rate(data(), under().outage_loss_db),
+        "beacon_margin": lambda: _beam_margin(_Beam.of("beacon", link.Shared.of(m), m.beacon, file.sources)),
+        "answer_margin": lambda: _beam_margin(_Beam.of("answer", link.Shared.of(m), m.answer, file.sources)),
+        "volume": lambda: day().capacity_bit,
+        "contact_time": lambda: day().contact_s,
+    }
     return {name: known[name]() for name in OUTPUTS if name in keep}
 
 
@@ -47,12 +58,14 @@ def exceeded(runs: ensemble.Ensemble) -> Floats:
 
 
 # ------------------------------------------------------------------------------------------------------------ residual
-def _residual(m: Mission, runs: ensemble.Ensemble) -> dict[str, Callable[[], float]]:
+def _residual(
+    required: LinkRequirement, table: FinePointing | None, runs: ensemble.Ensemble
+) -> dict[str, Callable[[], float]]:
     return {
         "residual_rms": lambda: runs.radial_rms_rad,
-        "residual_quantile": lambda: runs.quantile_rad(fine_pointing.table(m).quantile),
+        "residual_quantile": lambda: runs.quantile_rad(fine_pointing.table(table).quantile),
         "residual_largest": lambda: float(np.max(runs.largest_rad)),
-        "beyond_share": lambda: runs.beyond(m.requirement.pointing_error_rad),
+        "beyond_share": lambda: runs.beyond(required.pointing_error_rad),
         "lost_share": lambda: runs.share(kernels.COUNT_LOST),
         "saturated_share": lambda: runs.share(kernels.COUNT_SATURATED),
         "beyond_rate_share": lambda: runs.share(kernels.COUNT_CLAMPED),
@@ -61,51 +74,45 @@ def _residual(m: Mission, runs: ensemble.Ensemble) -> dict[str, Callable[[], flo
 
 
 # --------------------------------------------------------------------------------------------------------------- links
-def _simulated(m: LinkMission, runs: ensemble.Ensemble) -> Exposure:
-    """From the histogram of the radial error alone."""
-    return Exposure.of(m, runs.quantile_rad(1.0 - stated_outage(m)), runs.beyond)
-
-
-def _possible(under: Exposure) -> Exposure:
+def _exposure(data: link.DataLink, runs: ensemble.Ensemble | None) -> Exposure:
+    """The link under its own errors, or under those of runs, from the histogram of the radial error alone."""
+    if runs is None:
+        under = Exposure.stated(data)
+    else:
+        under = Exposure.of(data, runs.quantile_rad(1.0 - stated_outage(data.requirement)), runs.beyond)
     if not under.possible:
         raise link.LinkError(f"not known is {IMPOSSIBLE}")
     return under
 
 
-def _links(file: LinkFile, under: Callable[[], Exposure]) -> dict[str, Callable[[], float]]:
-    m = file.mission
-    path = m.terminals, m.conventions, m.channel
-    return {
-        "margin": lambda: under().margin_db,
-        "outage": lambda: under().short_of(0.0),
-        "short": lambda: under().short_of(m.requirement.margin_db),
-        "data_rate": lambda: _rate(m, under().outage_loss_db),
-        "beacon_margin": lambda: _beam_margin(_Beam("beacon", (m.beacon, link.point_ahead_rad(m), *path), file)),
-        "answer_margin": lambda: _beam_margin(_Beam("answer", (m.answer, link.point_ahead_rad(m), *path), file)),
-    }
-
-
 @dataclass(frozen=True, slots=True)
 class _Beam:
-    """A mission for its beacon or answer, equal to another with the same tables: most rows draw something else."""
+    """A beacon or answer with what its budget reads, equal to another with the same tables: most rows draw others."""
 
     name: str
     tables: tuple[object, ...]
-    file: LinkFile = field(compare=False)
+    shared: link.Shared = field(compare=False)
+    beam: Beacon | None = field(compare=False)
+    sources: Mapping[str, Source] = field(compare=False)
+
+    @classmethod
+    def of(cls, name: str, shared: link.Shared, beam: Beacon | None, sources: Mapping[str, Source]) -> "_Beam":
+        """The beam; of point-ahead it is told by the angle that is left alone."""
+        tables = beam, shared.point_ahead_rad, shared.terminals, shared.conventions, shared.channel
+        return cls(name, tables, shared, beam, sources)
 
 
 @lru_cache(maxsize=256)
 def _beam_margin(of: _Beam) -> float:
-    budget = link.beacon_budget if of.name == "beacon" else link.answer_budget
-    found = budget(of.file.mission, of.file.sources)
+    found = link.beam_budget(of.name, of.shared, of.beam, of.sources)
     if not found.possible:
         raise link.LinkError(f"{of.name}: not known is {IMPOSSIBLE}")
     return found.margin_db
 
 
-def _rate(m: LinkMission, loss_db: float) -> float:
+def _rate(data: link.DataLink, loss_db: float) -> float:
     try:
-        return link.rate_at_loss(m, m.requirement.margin_db, loss_db)
+        return link.rate_at_loss(data, data.requirement.margin_db, loss_db)
     except link.LinkError:
         return 0.0
 
@@ -116,6 +123,6 @@ def _day(file: LinkFile, under: Exposure) -> "day_study.Way":
     from microrad.link import study as link_study
     from microrad.orbit import day as day_study  # orbits: slow to load, and few campaigns ask for them
 
-    links = link_study.run(LinkFile(file.mission, file.path, file.text, file.sha256, file.sources))
+    links = link_study.run(file)
     loss = day_study.PointingLoss(under.outage_loss_db, under.short_of(0.0), "campaign")
     return day_study.relay(links, loss)

@@ -18,6 +18,7 @@ from microrad.campaign.records import CampaignError, Limit
 from microrad.campaign.sampling import block_rows
 from microrad.campaign.tables import CampaignTable, VariableTable
 from microrad.mission.file import LinkFile, MissionFile, check_table, named_files, open_mission
+from microrad.mission.tables.link import LinkRequirement
 from microrad.mission.toml import Document, Fault, MissionError, UnreadableError, clipped
 
 LANES = 64
@@ -125,18 +126,18 @@ class _Reader:
         found = [reader.draw(key, raw) for key, raw in self.inputs.items()]
         return tuple(draw for draw in found if draw is not None)
 
-    def _limits(self, table: CampaignTable, keep: tuple[str, ...], nominal: LinkFile) -> tuple[Limit, ...]:
+    def _limits(self, table: CampaignTable, keep: tuple[str, ...], required: LinkRequirement) -> tuple[Limit, ...]:
         if table.tail is not None:
             return ()
         if "limits" not in self.document.data:
             varied = {"grid": self.grid, "inputs": self.inputs}
-            return fits.default_limits(self.on, keep, nominal.mission, varied)
+            return fits.default_limits(self.on, keep, required, varied)
         found = [fits.limit(self.on, name, raw, keep) for name, raw in self.limits.items()]
         return tuple(limit for limit in found if limit is not None)
 
-    def _unchecked(self, table: CampaignTable, keep: tuple[str, ...], nominal: LinkFile) -> Iterator[str]:
+    def _unchecked(self, table: CampaignTable, keep: tuple[str, ...], required: LinkRequirement) -> Iterator[str]:
         if table.tail is None and "limits" in self.document.data:
-            yield from fits.unchecked(self.limits, keep, nominal.mission, {*self.grid, *self.inputs})
+            yield from fits.unchecked(self.limits, keep, required, {*self.grid, *self.inputs})
 
     def _campaign(
         self,
@@ -156,7 +157,7 @@ class _Reader:
         fits.check_day(self.on, keep, bases)
         fits.check_tail(self.on, table, varying, self.document.data)
         fits.check_minimise(self.on, table)
-        limits, width = self._limits(table, keep, nominal), fits.half_width(self.on, table, keep)
+        limits, width = self._limits(table, keep, nominal.mission.requirement), fits.half_width(self.on, table, keep)
         block = block_rows(table.runs)
         rows = _whole_blocks(table.runs, block, table.sampling)
         most = rows if table.precision is None else _whole_blocks(table.precision.at_most, block, table.sampling)
@@ -195,7 +196,7 @@ class _Reader:
             warnings=(
                 *_warnings(table, rows, loop_varies),
                 *drawing.failing(draws, bases[0].data, most),
-                *self._unchecked(table, keep, nominal),
+                *self._unchecked(table, keep, nominal.mission.requirement),
             ),
         )
         self._check_read(found)

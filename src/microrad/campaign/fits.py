@@ -14,7 +14,9 @@ from microrad.campaign.tables import MOST_RUNS, CampaignTable, LimitTable, LoopT
 from microrad.core.units import format_quantity
 from microrad.mission.fields import Quantity
 from microrad.mission.file import check_table
-from microrad.mission.model import LinkMission, Mission
+from microrad.mission.model import Mission
+from microrad.mission.tables.fine_pointing import FinePointing
+from microrad.mission.tables.link import LinkRequirement
 
 
 def check_loop(on: Reading, table: LoopTable, bases: Sequence[Base]) -> None:
@@ -25,7 +27,7 @@ def check_loop(on: Reading, table: LoopTable, bases: Sequence[Base]) -> None:
             expected = "a mission with [fine_pointing], which microrad init writes, or [loop] removed"
             on.fault("loop", None, "needs a mission with the table [fine_pointing]", expected)
             return
-        if not _has_controller(on, table, m):
+        if not _has_controller(on, table.controller, m.fine_pointing):
             return
         if table.mirror == "comparison" and m.mirror.comparison is None:
             reason = f'needs a comparison model, which the mirror "{m.mirror.name}" has not'
@@ -39,15 +41,15 @@ def check_loop(on: Reading, table: LoopTable, bases: Sequence[Base]) -> None:
             return
 
 
-def _has_controller(on: Reading, table: LoopTable, m: Mission) -> bool:
+def _has_controller(on: Reading, controller: str, of: FinePointing) -> bool:
     from microrad.loop import fine_pointing  # here, to keep the start quick
 
-    names = fine_pointing.names(fine_pointing.table(m))
-    if table.controller in names:
+    names = fine_pointing.names(of)
+    if controller in names:
         return True
     expected = " or ".join(f'"{name}"' for name in names)
-    near = quoted_near(table.controller, names)
-    on.fault("loop.controller", table.controller, "is no controller of the fine-pointing study", expected, near)
+    near = quoted_near(controller, names)
+    on.fault("loop.controller", controller, "is no controller of the fine-pointing study", expected, near)
     return False
 
 
@@ -88,10 +90,10 @@ def check_day(on: Reading, keep: Sequence[str], bases: Sequence[Base]) -> None:
 
 # -------------------------------------------------------------------------------------------------------------- limits
 def default_limits(
-    on: Reading, keep: Sequence[str], m: LinkMission, varied: Mapping[str, Mapping[str, Any]]
+    on: Reading, keep: Sequence[str], r: LinkRequirement, varied: Mapping[str, Mapping[str, Any]]
 ) -> tuple[Limit, ...]:
     """The limits that the mission requires of the kept outputs; ``varied`` are keys that vary, by their table."""
-    limits = _required(keep, m)
+    limits = _required(keep, r)
     for limit in limits:
         for name in (name for name, keys in varied.items() if limit.source in keys):
             reason = f"is the limit of {limit.output} as well, which is the same in all rows"
@@ -99,8 +101,7 @@ def default_limits(
     return limits
 
 
-def _required(keep: Sequence[str], m: LinkMission) -> tuple[Limit, ...]:
-    r = m.requirement
+def _required(keep: Sequence[str], r: LinkRequirement) -> tuple[Limit, ...]:
     wanted = (
         Limit("margin", r.margin_db, None, "requirement.margin"),
         Limit("residual_quantile", None, r.pointing_error_rad, "requirement.pointing_error"),
@@ -108,9 +109,11 @@ def _required(keep: Sequence[str], m: LinkMission) -> tuple[Limit, ...]:
     return tuple(limit for limit in wanted if limit.output in keep)
 
 
-def unchecked(given: Collection[str], keep: Sequence[str], m: LinkMission, varied: Collection[str]) -> Iterator[str]:
+def unchecked(
+    given: Collection[str], keep: Sequence[str], r: LinkRequirement, varied: Collection[str]
+) -> Iterator[str]:
     """Of limits that the mission requires and [limits] leaves out: that nothing checks them; ``varied`` are keys."""
-    for limit in _required(keep, m):
+    for limit in _required(keep, r):
         if limit.output in given or limit.source in varied:
             continue
         word, bound = ("least", limit.least) if limit.most is None else ("most", limit.most)

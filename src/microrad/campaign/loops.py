@@ -14,20 +14,23 @@ from microrad.loop.fine_loop import ensemble
 from microrad.loop.fine_loop.loop import LoopController, PointingLoop
 from microrad.mirror import Variant
 from microrad.mission.file import LinkFile, MissionFile
+from microrad.mission.model import Mission
+from microrad.mission.tables.fine_pointing import FinePointing
 
 Beat = Callable[[], None]
 
 
-def whole(file: LinkFile) -> MissionFile:
-    """The file of a mission that has a loop: the campaign file's own check has seen to it."""
-    assert isinstance(file, MissionFile)
-    return file
+def settings(file: LinkFile) -> FinePointing:
+    """The fine-pointing table of a mission that has a loop: the campaign file's own check has seen to it."""
+    m = file.mission
+    assert isinstance(m, Mission)
+    return fine_pointing.table(m.fine_pointing)
 
 
 def scene(file: LinkFile, table: LoopTable) -> fine_pointing.Scene:
-    """The scene of a mission with the axes that the campaign simulates."""
-    mission = whole(file)
-    built = fine_pointing.scene(mission, mirror.of(mission.mission), tracking_light_w(mission))
+    """The scene of a mission that has a loop, with the axes that the campaign simulates."""
+    assert isinstance(file, MissionFile)
+    built = fine_pointing.scene(file, mirror.of(file.mission), tracking_light_w(file))
     return replace(built, loop=built.axis) if table.axes == "one" else built
 
 
@@ -36,7 +39,7 @@ def tuned(file: LinkFile, table: LoopTable) -> AxisController:
 
     Raises `CampaignError` for a name that the mission has no controller of, and with the reason when none can be tuned.
     """
-    f = fine_pointing.table(whole(file).mission)
+    f = settings(file)
     if table.controller not in fine_pointing.names(f):
         names = ", ".join(f'"{name}"' for name in fine_pointing.names(f))
         raise CampaignError(f'loop.controller = "{table.controller}" is no controller of the mission; it has {names}')
@@ -47,10 +50,9 @@ def tuned(file: LinkFile, table: LoopTable) -> AxisController:
         raise CampaignError(f"the controller {table.controller!r} cannot be tuned: {error}") from error
 
 
-def held(file: LinkFile, table: LoopTable, axis: AxisController) -> LoopController:
+def held(of: fine_pointing.Scene, table: LoopTable, axis: AxisController) -> LoopController:
     """The tuned controller on the axes of a cell's own mission: what all its rows are flown with."""
-    built = scene(file, table)
-    built = replace(built, loop=fine_pointing.on_variant(built, Variant(table.mirror)))
+    built = replace(of, loop=fine_pointing.on_variant(of, Variant(table.mirror)))
     return fine_pointing.build(table.controller, built, axis)
 
 
@@ -59,9 +61,9 @@ def row_loop(file: LinkFile, table: LoopTable) -> PointingLoop:
     return fine_pointing.on_variant(scene(file, table), Variant(table.mirror))
 
 
-def span(campaign: CampaignFile, file: LinkFile) -> ensemble.Span:
-    """How long the runs of a campaign are: as its table `loop` says, else the mission; seeded by the campaign."""
-    f, table = fine_pointing.table(whole(file).mission), campaign.table.loop
+def span(campaign: CampaignFile, f: FinePointing) -> ensemble.Span:
+    """How long the runs of a campaign are: as its table `loop` says, else the mission's; seeded by the campaign."""
+    table = campaign.table.loop
     assert table is not None
     duration = f.duration_s if table.duration_s is None else table.duration_s
     settle = f.settle_s if table.settle_s is None else table.settle_s

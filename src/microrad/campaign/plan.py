@@ -50,10 +50,9 @@ def largest_chunk(campaign: CampaignFile) -> int:
         return min(_DAY_ROWS, few)
     if campaign.table.loop is None:
         return min(_CHUNK_ROWS, few)
-    fine, own = loops.whole(campaign.mission).mission.fine_pointing, campaign.realisations
-    assert fine is not None  # the campaign file's own check
+    fine, own = loops.settings(campaign.mission), campaign.realisations
     lanes = kernels.LANES * math.ceil(own / kernels.LANES) if campaign.loop_varies else own
-    steps = loops.span(campaign, campaign.mission).duration_s / fine.plant_step_s * lanes
+    steps = loops.span(campaign, fine).duration_s / fine.plant_step_s * lanes
     full = 1 if campaign.loop_varies else math.ceil(kernels.LANES / own)  # rows that fill the lanes of a batch
     wanted = max(_CHUNK_STEPS / steps, 1.0)
     return max(min(1 << int(math.log2(wanted)), _CHUNK_ROWS, few), 1 << math.ceil(math.log2(full)))

@@ -12,7 +12,6 @@ from microrad.core import reads
 from microrad.loop.fine_loop import ensemble
 from microrad.mission.fields import Table
 from microrad.mission.file import LinkFile
-from microrad.mission.model import LinkMission
 
 
 def unread(campaign: CampaignFile, rows: Iterable[LinkFile]) -> Iterator[str]:
@@ -39,7 +38,7 @@ def _of_loop(campaign: CampaignFile, file: LinkFile) -> reads.Reads:
     table = campaign.table.loop
     if table is None:
         return reads.Reads()
-    return reads.watched_call(lambda f: (loops.row_loop(f, table), loops.span(campaign, f)), file)[1]
+    return reads.watched_call(lambda f: (loops.row_loop(f, table), loops.span(campaign, loops.settings(f))), file)[1]
 
 
 def _of_outputs(campaign: CampaignFile, file: LinkFile) -> reads.Reads:
@@ -75,7 +74,7 @@ def _is_read(seen: reads.Reads, path: reads.Path) -> bool:
     return any((*path[:end], reads.WHOLE) in seen.digests for end in range(len(path)))
 
 
-def _path(m: LinkMission, key: str) -> reads.Path:
+def _path(m: Table, key: str) -> reads.Path:
     """Where `reads` has a key of the mission of the file that it watches."""
     path: tuple[Any, ...] = (0, "mission")
     inside: object = m

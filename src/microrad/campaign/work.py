@@ -17,7 +17,6 @@ from microrad.campaign.inputs import Builder
 from microrad.campaign.records import CampaignError, Chunk, Failed, Job, WorstTrace
 from microrad.core import kernels
 from microrad.core.arrays import Floats
-from microrad.loop import fine_pointing
 from microrad.loop.control import AxisController
 from microrad.loop.fine_loop import ensemble
 from microrad.loop.fine_loop.loop import LoopController, PointingLoop
@@ -177,7 +176,7 @@ class Evaluator:
         if self.memory is not None and key in self.memory:
             return self.memory[key]
         loop, controller = loops.row_loop(file, table), self.controller(drawn.cell)
-        span = loops.span(self.campaign, file)
+        span = loops.span(self.campaign, loops.settings(file))
         if self.campaign.table.tail is not None:
             return _Tilted.run(self._tilt(drawn.cell), loop, controller, span, rows, watch)
         found = loops.simulate(loop, controller, span, rows, self.campaign.realisations, watch)
@@ -203,7 +202,7 @@ class Evaluator:
             table = self.campaign.table.loop
             assert table is not None
             file = self.builder.mission(cell, self.fixed)
-            self._held[cell] = loops.held(file, table, self.controllers[cell])
+            self._held[cell] = loops.held(loops.scene(file, table), table, self.controllers[cell])
         return self._held[cell]
 
     def _tilt(self, cell: int) -> tilt.Tilt:
@@ -211,7 +210,7 @@ class Evaluator:
             table, wanted = self.campaign.table.loop, self.campaign.table.tail
             assert table is not None and wanted is not None
             file = self.builder.mission(cell, self.fixed)
-            loop, span = loops.row_loop(file, table), loops.span(self.campaign, file)
+            loop, span = loops.row_loop(file, table), loops.span(self.campaign, loops.settings(file))
             self._tilts[cell] = tilt.tilt(loop, self.controller(cell), span, wanted.error_rad)
         return self._tilts[cell]
 
@@ -222,7 +221,7 @@ class Evaluator:
         if isinstance(file, str):
             raise CampaignError(file)
         beat()
-        loop, span = loops.row_loop(file, table), loops.span(self.campaign, file)
+        loop, span = loops.row_loop(file, table), loops.span(self.campaign, loops.settings(file))
         found = ensemble.trace(loop, self.controller(cell), span, row * self.campaign.realisations)
         settled = found.time_s >= span.settle_s
         return WorstTrace(
@@ -248,7 +247,7 @@ class Work:
     def _warm_up(self) -> None:
         table = self.campaign.table.loop
         assert table is not None
-        period = 1.0 / fine_pointing.table(loops.whole(self.campaign.mission).mission).rate_hz
+        period = 1.0 / loops.settings(self.campaign.mission).rate_hz
         loop, controller = loops.row_loop(self.campaign.mission, table), self.evaluator.controller(0)
         ensemble.trace(loop, controller, ensemble.Span(2.0 * period, 0.0, 0))
 

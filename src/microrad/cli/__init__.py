@@ -3,7 +3,7 @@
 import shlex
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
@@ -13,7 +13,6 @@ from microrad.cli.frame import (
     ExitOn,
     Json,
     Judged,
-    OnProgress,
     Outcome,
     Overwrite,
     Refusal,
@@ -32,10 +31,6 @@ from microrad.cli.frame import (
 from microrad.core.folder import write_whole
 
 # Everything else is imported inside the commands: numpy, numba and pydantic take longer to load than help may take.
-if TYPE_CHECKING:
-    from microrad.core.kept import Kept
-    from microrad.mission.file import MissionFile
-    from microrad.study.story import Study
 
 __all__ = ["app", "main"]
 
@@ -113,13 +108,17 @@ def run(
     from microrad import report
     from microrad.core import kept
     from microrad.mission.file import load_mission
+    from microrad.study import story
 
     mission = load_mission(file, mirror)
     folder = output or Path(f"{file.stem}-study")
     report.check_folder(folder, overwrite)
     parts = kept.NOTHING if fresh else kept.of_user()
     with progress_bar() as progress:
-        study = _study(mission, progress, parts)
+        try:
+            study = story.run(mission, progress, parts)
+        except ValueError as error:  # an unstable loop, or a mirror without inverse
+            raise Refusal(f"{mission.path}: {error}") from error
 
     def write() -> str:
         with progress_bar() as progress:
@@ -133,15 +132,6 @@ def run(
         write()
         return Outcome(json_text({**report.summary(study), "folder": str(folder)}), code)
     return Outcome(f"{report.verdict_text(study, width(), verbose=verbose)}\n", code, afterwards=write)
-
-
-def _study(mission: "MissionFile", progress: OnProgress, parts: "Kept") -> "Study":
-    from microrad.study import story as study
-
-    try:
-        return study.run(mission, progress, parts)
-    except ValueError as error:  # an unstable loop, or a mirror without inverse
-        raise Refusal(f"{mission.path}: {error}") from error
 
 
 @app.command(

@@ -90,9 +90,9 @@ def _mission(file: Path, mirror: Path | None) -> "MissionFile":
     return load_mission(file, mirror)
 
 
-def _default_controller(mission: "MissionFile") -> str:
+def _default_controller(has_fine_loop: bool) -> str:
     """Feedback with the inverse of the hysteresis ahead of it: the paper's choice, in the loop that the mission has."""
-    return DEFAULT_CONTROLLER if mission.mission.fine_pointing is not None else "PID + inverse"
+    return DEFAULT_CONTROLLER if has_fine_loop else "PID + inverse"
 
 
 @exports.command(
@@ -124,7 +124,7 @@ def c(  # noqa: PLR0913, PLR0917  each is an option
     from microrad.export.identifiers import identifier, suggested
 
     mission = _mission(file, mirror)
-    wanted = controller if controller is not None else _default_controller(mission)
+    wanted = controller if controller is not None else _default_controller(mission.mission.fine_pointing is not None)
     name = identifier(name) if name is not None else suggested(wanted)
     folder = output or Path(f"{file.stem}-{name}")
     write.check_output(folder, overwrite)
@@ -217,6 +217,7 @@ def matrices(
     sampled, the controller and the loop. --json prints them instead; in Python, microrad.export.matrices.to_control
     makes objects of python-control.
     """
+    from microrad.export import choice
     from microrad.export import matrices as linear
 
     mission = _mission(file, mirror)
@@ -224,7 +225,8 @@ def matrices(
     if not as_json:
         _check_file(path, overwrite, b"MATLAB 5.0")
     with progress_bar() as progress:
-        found = linear.models(mission if controller is None else _promised(mission, controller, accept, progress))
+        of = choice.source(mission) if controller is None else _promised(mission, controller, accept, progress)
+        found = linear.models(of)
     if as_json:
         return Outcome(linear.json_text(found))
     linear.write_mat(found, path)

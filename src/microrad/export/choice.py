@@ -37,6 +37,7 @@ from microrad.loop.fine_loop.replay import replay
 from microrad.mirror import Variant, model
 from microrad.mission.file import MissionFile
 from microrad.mission.model import Scenario
+from microrad.mission.tables.fine_pointing import FinePointing
 from microrad.mission.tables.mirror import Mirror as MirrorTable
 
 PID, PID_WITH_INVERSE = "PID", "PID + inverse"
@@ -83,10 +84,9 @@ class TrackingChoice:
 Choice = PointingChoice | TrackingChoice
 
 
-def names(file: MissionFile) -> tuple[str, ...]:
-    """The controllers that a mission has."""
-    pointing = fine_pointing.names(f) if (f := file.mission.fine_pointing) is not None else ()
-    return (*pointing, PID, PID_WITH_INVERSE)
+def names(table: FinePointing | None) -> tuple[str, ...]:
+    """The controllers of a mission with this table of its fine-pointing loop, or without one."""
+    return (*(() if table is None else fine_pointing.names(table)), PID, PID_WITH_INVERSE)
 
 
 def source(file: MissionFile) -> Source:
@@ -106,24 +106,20 @@ def choose(file: MissionFile, name: str, on_progress: Progress = lambda done, to
     Raises:
         ExportError: the mission has no such controller, or it cannot be built on the mission's mirror.
     """
-    if name not in names(file):
-        raise ExportError(f"{file.path} has no controller {name!r}; it has: {'; '.join(names(file))}")
+    m, has = file.mission, names(file.mission.fine_pointing)
+    if name not in has:
+        raise ExportError(f"{file.path} has no controller {name!r}; it has: {'; '.join(has)}")
     try:
-        return _tracking(file, name) if name in (PID, PID_WITH_INVERSE) else _pointing(file, name, on_progress)
+        mirrors = mirror.of(m)
+        if name in (PID, PID_WITH_INVERSE):
+            return _tracking(source(file), paper_cases.of(m, mirrors), name)
+        on_progress(0, 2, f"tuning {name}")
+        scene = fine_pointing.scene(file, mirrors, tracking_light_w(file))
+        tuned = fine_pointing.tune(name, scene.table, fine_pointing.plants(scene, scene.table.seed))
+        on_progress(1, 2, f"{name} tuned")
+        return PointingChoice(source(file), scene, tuned, fine_pointing.build(name, scene, tuned.controller))
     except ValueError as error:
         raise ExportError(f"{file.path}: {error}") from error
-
-
-def _pointing(file: MissionFile, name: str, on_progress: Progress) -> PointingChoice:
-    on_progress(0, 2, f"tuning {name}")
-    scene = _scene(file)
-    tuned = fine_pointing.tune(name, scene.table, fine_pointing.plants(scene, scene.table.seed))
-    on_progress(1, 2, f"{name} tuned")
-    return PointingChoice(source(file), scene, tuned, fine_pointing.build(name, scene, tuned.controller))
-
-
-def _scene(file: MissionFile) -> fine_pointing.Scene:
-    return fine_pointing.scene(file, mirror.of(file.mission), tracking_light_w(file))
 
 
 def outlook(choice: Choice) -> fine_pointing.Outlook | None:
@@ -158,11 +154,10 @@ def rms_text(rad: float) -> str:
     return f"{format_quantity(rad, 'rad', 4)} rms an axis"
 
 
-def _tracking(file: MissionFile, name: str) -> TrackingChoice:
-    cases = paper_cases.of(file.mission, mirror.of(file.mission))
+def _tracking(of: Source, cases: paper_cases.PaperCases, name: str) -> TrackingChoice:
     plant = cases.mirrors.line_of_sight[Variant.GIVEN].plant
     inverse = control.inverse(plant) if name == PID_WITH_INVERSE else control.no_feedforward(plant)
-    return TrackingChoice(source(file), file.mission.scenario, name, plant, cases.setup, inverse)
+    return TrackingChoice(of, cases.scenario, name, plant, cases.setup, inverse)
 
 
 # ------------------------------------------------------------------------------------------------------ the controller
@@ -290,10 +285,11 @@ def plant_unit(file: MissionFile, loop: str) -> PlantUnit:
     if loop not in LOOPS or (loop == LOOPS[0] and file.mission.fine_pointing is None):
         raise ExportError(f"{file.path} has no loop {loop!r}: one of {', '.join(LOOPS)} that is a table of the mission")
     try:
+        mirrors = mirror.of(file.mission)
         if loop == LOOPS[0]:
-            made = _scene(file).loop
+            made = fine_pointing.scene(file, mirrors, tracking_light_w(file)).loop
             return _plant_unit(source(file), made.mirror, made.optics, made.drive, made.timing)
-        one = _tracking(file, PID)
+        one = _tracking(source(file), paper_cases.of(file.mission, mirrors), PID)
         return _plant_unit(one.source, one.mirror, np.eye(one.mirror.axes), one.setup.drive, one.setup.timing)
     except ValueError as error:
         raise ExportError(f"{file.path}: {error}") from error

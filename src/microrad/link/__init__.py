@@ -5,8 +5,7 @@ from microrad.link.budget import (
     DEEPEST_DB,
     LEFT_AT_ZERO,
     LinkBudget,
-    answer_budget,
-    beacon_budget,
+    beam_budget,
     communication_budget,
 )
 from microrad.link.gains import (
@@ -41,19 +40,9 @@ from microrad.link.maps import (
     rate_at_loss,
     received_on_axis_dbm,
 )
-from microrad.link.model import (
-    LinkError,
-    TransmittedBeam,
-    communication_beam,
-    lit_aperture,
-    point_ahead_left_rad,
-    point_ahead_rad,
-    receiver,
-    required_dbm,
-    strehl_db,
-)
+from microrad.link.model import DataLink, LinkError, Shared, TransmittedBeam, assembled, of, required_dbm, strehl_db
 from microrad.link.solve import Interval, Solved, solve
-from microrad.link.tornado import Swing, Tornado, beam_tornado, swings
+from microrad.link.tornado import Swing, Tornado, beam_margin, beam_tornado, swings
 
 __all__ = [
     "BEST_TRUNCATION",
@@ -61,6 +50,7 @@ __all__ = [
     "DEEPEST_DB",
     "LEFT_AT_ZERO",
     "LINK_TABLES",
+    "DataLink",
     "GaussianFall",
     "IdealReceiver",
     "Input",
@@ -70,17 +60,18 @@ __all__ = [
     "LitAperture",
     "OffAxis",
     "SensitivityReading",
+    "Shared",
     "Solved",
     "Swing",
     "Tornado",
     "TransmittedBeam",
     "air_mass",
-    "answer_budget",
     "aperture_gain_db",
-    "beacon_budget",
+    "assembled",
+    "beam_budget",
+    "beam_margin",
     "beam_tornado",
     "clear_sky_loss_db",
-    "communication_beam",
     "communication_budget",
     "convention_maps",
     "dbm",
@@ -96,20 +87,17 @@ __all__ = [
     "largest_data_rate",
     "largest_pointing_error",
     "lit",
-    "lit_aperture",
     "margin_map",
     "margin_of_error",
     "margin_or_none",
     "moved",
     "obscuration_loss_db",
+    "of",
     "peak_radiant_intensity_w_sr",
     "photon_energy_j",
-    "point_ahead_left_rad",
-    "point_ahead_rad",
     "pointing_loss_db",
     "rate_at_loss",
     "received_on_axis_dbm",
-    "receiver",
     "required_dbm",
     "solve",
     "strehl_db",

@@ -12,15 +12,8 @@ import numpy as np
 from microrad.core.budget import Line, total_db
 from microrad.core.units import format_input, format_quantity
 from microrad.link import gains
-from microrad.link.model import (
-    check_grid,
-    clear_sky_db,
-    communication_beam,
-    point_ahead_rad,
-    required_dbm,
-    strehl_db,
-)
-from microrad.mission.model import LinkMission, Source, source_text
+from microrad.link.model import DataLink, Shared, check_grid, required_dbm, strehl_db
+from microrad.mission.model import Source, source_text
 from microrad.mission.tables.link import Beacon, Communication, half_angle_rad
 
 _GIVEN = "whatever the pointing error and the data rate"
@@ -104,65 +97,56 @@ class LinkBudget:
 
 
 def communication_budget(
-    mission: LinkMission,
+    data: DataLink,
     sources: Mapping[str, Source],
     pointing_error_rad: float | None = None,
     data_rate_bit_s: float | None = None,
     given_source: str = CHOSEN,
 ) -> LinkBudget:
-    """Budget of the data link from LEO to GEO, at the mission's pointing error and data rate or at those given.
+    """Budget of the data link from LEO to GEO, at its own pointing error and data rate or at those given.
 
     ``given_source`` says where a given value comes from, and stands as the source of its line.
 
     Raises `ValueError` for a negative pointing error, a data rate that is not above zero, and one that the receiver
     does not take.
     """
-    beam = mission.communication
-    write = Writer("communication", beam, mission, sources, "leo")
+    beam = data.table
+    write = Writer("communication", beam, data.shared, sources, "leo")
     error, error_source = given_or(
         beam.pointing_error_rad, pointing_error_rad, write.source("pointing_error"), given_source
     )
     rate, rate_source = given_or(beam.data_rate_bit_s, data_rate_bit_s, write.source("data_rate"), given_source)
     check_grid(np.asarray(rate), np.asarray(error))
-    with_ahead = float(communication_beam(mission).fall.loss_db(error + point_ahead_rad(mission)))
-    transmit = write.transmit(write.lit_gain(), _pointing_line(mission, error, error_source), with_ahead)
+    with_ahead = float(data.beam.fall.loss_db(error + data.shared.point_ahead_rad))
+    transmit = write.transmit(_lit_gain(write, data), _pointing_line(data, error, error_source), with_ahead)
     receive = (
         *write.receive("geo"),
         write.loss("Tracking split loss", "tracking_split_loss"),
         write.loss("Implementation loss", "implementation_loss"),
     )
-    return _budget("Communication", transmit, receive, _required_line(mission, rate, write, rate_source), beam, rate)
+    return _budget("Communication", transmit, receive, _required_line(data, rate, write, rate_source), beam, rate)
 
 
-def beacon_budget(mission: LinkMission, sources: Mapping[str, Source]) -> LinkBudget:
-    """Budget of the wide beacon from LEO to GEO: a Gaussian beam with the mission's divergence convention.
+def beam_budget(name: str, shared: Shared, beam: Beacon | None, sources: Mapping[str, Source]) -> LinkBudget:
+    """Budget of the wide "beacon" from LEO to GEO, or of the narrow beam with which GEO gives its "answer".
 
-    Raises `ValueError` when the mission has no beacon.
+    A Gaussian beam with the mission's divergence convention. Raises `ValueError` when the mission has no such beam.
     """
-    if mission.beacon is None:
-        raise ValueError("the mission has no table [beacon]")
-    return _gaussian_budget(Writer("beacon", mission.beacon, mission, sources, "leo"), mission.beacon, "geo")
-
-
-def answer_budget(mission: LinkMission, sources: Mapping[str, Source]) -> LinkBudget:
-    """Budget of the narrow beam with which GEO answers the beacon: a Gaussian beam, received by the LEO aperture.
-
-    Raises `ValueError` when the mission has no answer.
-    """
-    if mission.answer is None:
-        raise ValueError("the mission has no table [answer]")
-    return _gaussian_budget(Writer("answer", mission.answer, mission, sources, "geo"), mission.answer, "leo")
+    if beam is None:
+        raise ValueError(f"the mission has no table [{name}]")
+    ends = ("leo", "geo") if name == "beacon" else ("geo", "leo")
+    return _gaussian_budget(Writer(name, beam, shared, sources, ends[0]), beam, ends[1])
 
 
 def _gaussian_budget(write: "Writer", beam: Beacon, receiver: str) -> LinkBudget:
-    half, error = half_angle_rad(beam.divergence_rad, write.mission.conventions.divergence), beam.pointing_error_rad
+    half, error = half_angle_rad(beam.divergence_rad, write.shared.conventions.divergence), beam.pointing_error_rad
     theta = f"theta = {format_quantity(half, 'rad')} half angle at 1/e2"
     far = "Gaussian beam, far field, not cut by its aperture"
     shape = source_text(write.sources, f"{write.table}.divergence", "conventions.divergence")
     doubts = _both(
         _wide("the half angle", half),
         _cut_by_aperture(half, write.aperture_m(write.end), beam.wavelength_m),
-        _blocked(getattr(write.mission.terminals, f"{write.end}_obscuration") or 0.0),
+        _blocked(getattr(write.shared.terminals, f"{write.end}_obscuration") or 0.0),
     )
     gain = Line("Beam gain", gains.gaussian_beam_gain_db(half), "dB", f"8 / theta^2, {theta}", shape, far, doubts)
     basis = f"exp(-2 (error / theta)^2), error = {format_input(error, 'rad')}, {theta}"
@@ -170,7 +154,7 @@ def _gaussian_budget(write: "Writer", beam: Beacon, receiver: str) -> LinkBudget
     doubts = _both(_wide("the error", error), _deep(loss))
     source, regime = write.source("pointing_error"), f"{far}; static error"
     pointing = Line(POINTING_LOSS, loss, "dB", basis, source, regime, doubts)
-    with_ahead = float(gains.gaussian_pointing_loss_db(error + point_ahead_rad(write.mission), half))
+    with_ahead = float(gains.gaussian_pointing_loss_db(error + write.shared.point_ahead_rad, half))
     level = gains.dbm(beam.required_power_w)
     required = Line("Required power", level, "dBm", "as given", write.source("required_power"), _GIVEN)
     transmit = write.transmit((gain,), pointing, with_ahead)
@@ -228,7 +212,7 @@ class Writer:
 
     table: str
     beam: Beacon | Communication
-    mission: LinkMission
+    shared: Shared
     sources: Mapping[str, Source]
     end: str
 
@@ -238,7 +222,7 @@ class Writer:
 
     def aperture_m(self, end: str) -> float:
         """Diameter of the terminal "leo" or "geo"."""
-        return float(getattr(self.mission.terminals, f"{end}_aperture_m"))
+        return float(getattr(self.shared.terminals, f"{end}_aperture_m"))
 
     def loss(self, name: str, key: str) -> Line:
         """A loss that the mission gives in dB; 0 dB is a line like any other."""
@@ -250,40 +234,17 @@ class Writer:
         diameter, wavelength = self.aperture_m(end), self.beam.wavelength_m
         shown = f"D = {format_input(diameter, 'm')}, lambda = {format_input(wavelength, 'm')}"
         source = source_text(self.sources, f"terminals.{end}_aperture", f"{self.table}.wavelength")
-        name = f"{self.mission.terminals.called(end)} aperture gain"
+        name = f"{self.shared.terminals.called(end)} aperture gain"
         return Line(
             name, gains.aperture_gain_db(diameter, wavelength), "dB", f"(pi D / lambda)^2, {shown}", source, regime
         )
 
-    def lit_gain(self) -> tuple[Line, ...]:
-        """Gain of the transmitting aperture and, where the mission says how it is lit, what that changes."""
-        beam, lit = self.mission.communication, communication_beam(self.mission)
-        wide = _wide("the half angle", lit.fall.half_angle_rad)
-        if beam.beam is None:
-            hole = self.mission.terminals.leo_obscuration or 0.0
-            left_out = f'the obscuration of {hole:g} is not in it: only pointing_loss = "pattern" takes it into account'
-            doubts = _both(wide, left_out if hole else "")
-            return (replace(self.gain("leo", _TRANSMITTING), warning=doubts),)
-        whole = replace(self.gain("leo", "evenly lit and unobscured; how it is lit stands below"), warning=wide)
-        shape, hole = beam.beam, self.mission.terminals.leo_obscuration or 0.0
-        keys = ["communication.beam.profile"]
-        if shape.radius_m is None:
-            basis, regime = "1 - e^2, lit evenly over the open area", "power counted behind the aperture"
-        else:
-            truncation = self.aperture_m("leo") / 2.0 / shape.radius_m
-            basis = f"2/a^2 (exp(-a^2) - exp(-a^2 e^2))^2, a = {truncation:.4g}, M^2 = {shape.m_squared:g}"
-            regime = "Gaussian beam, light cut off included (Klein and Degnan 1974); M^2 widens the far field"
-            keys += ["communication.beam.radius", "communication.beam.m_squared"]
-        basis += f", e = {hole:g}"
-        source = source_text(self.sources, *keys)
-        return (whole, Line("Illumination", lit.gain_db - whole.value, "dB", basis, source, regime))
-
     def receive(self, end: str) -> tuple[Line, ...]:
         """From the receiving aperture on: its gain, its obscuration where the mission gives one, and its optics."""
-        hole = getattr(self.mission.terminals, f"{end}_obscuration")
+        hole = getattr(self.shared.terminals, f"{end}_obscuration")
         lines = [self.gain(end, _RECEIVING)]
         if hole is not None:
-            name = f"{self.mission.terminals.called(end)} obscuration loss"
+            name = f"{self.shared.terminals.called(end)} obscuration loss"
             source = source_text(self.sources, f"terminals.{end}_obscuration")
             value, basis = 0.0 - gains.obscuration_loss_db(hole), f"1 - e^2, e = {hole:g}"
             lines.append(Line(name, value, "dB", basis, source, _RECEIVING))
@@ -296,7 +257,7 @@ class Writer:
         """
         beam = self.beam
         power = f"P = {format_input(beam.transmit_power_w, 'W')}"
-        channel = [] if self.mission.channel is None else [self._channel()]
+        channel = [] if self.shared.channel is None else [self._channel()]
         return (
             Line(
                 "Transmit power", gains.dbm(beam.transmit_power_w), "dBm", power, self.source("transmit_power"), _GIVEN
@@ -314,7 +275,7 @@ class Writer:
         beam = self.beam
         basis = f"(lambda / (4 pi R))^2, R = {format_input(beam.distance_m, 'm')}"
         value = -gains.free_space_loss_db(beam.distance_m, beam.wavelength_m)
-        largest = max(self.mission.terminals.leo_aperture_m, self.mission.terminals.geo_aperture_m)
+        largest = max(self.shared.terminals.leo_aperture_m, self.shared.terminals.geo_aperture_m)
         far = gains.far_field_m(largest, beam.wavelength_m)
         near = (
             "" if beam.distance_m >= far else f"nearer than the far field, which begins at {format_quantity(far, 'm')}"
@@ -322,7 +283,7 @@ class Writer:
         return Line(FREE_SPACE_LOSS, value, "dB", basis, self.source("distance"), "vacuum, far field", near)
 
     def _channel(self) -> Line:
-        channel = self.mission.channel
+        channel = self.shared.channel
         assert channel is not None
         mass = gains.air_mass(channel.elevation_rad)
         basis = (
@@ -331,10 +292,10 @@ class Writer:
         source = source_text(self.sources, "channel.zenith_transmission", "channel.elevation")
         regime = "clear sky, from 10 degrees of elevation; no turbulence, no clouds"
         doubt = "turbulence is not in this budget: scintillation and beam wander come on top"
-        return Line(CLEAR_SKY_LOSS, 0.0 - clear_sky_db(self.mission), "dB", basis, source, regime, doubt)
+        return Line(CLEAR_SKY_LOSS, 0.0 - self.shared.clear_sky_db, "dB", basis, source, regime, doubt)
 
     def _ahead(self, with_ahead_db: float, pointing_db: float) -> Line:
-        ahead = self.mission.point_ahead
+        ahead = self.shared.point_ahead
         regime = "added to the pointing error in its worst direction"
         if ahead is None:
             return Line(POINT_AHEAD_LOSS, 0.0, "dB", "taken as corrected", _NOT_GIVEN, regime, LEFT_AT_ZERO)
@@ -348,11 +309,11 @@ class Writer:
                 source,
                 regime,
             )
-        basis = f"not corrected: 2 v / c = {format_quantity(point_ahead_rad(self.mission), 'rad')}"
+        basis = f"not corrected: 2 v / c = {format_quantity(self.shared.point_ahead_rad, 'rad')}"
         return Line(POINT_AHEAD_LOSS, -with_ahead_db - pointing_db, "dB", basis, source, regime, _deep(with_ahead_db))
 
     def _strehl(self) -> Line:
-        beam, convention = self.beam, self.mission.conventions.strehl
+        beam, convention = self.beam, self.shared.conventions.strehl
         loss = strehl_db(beam, convention)
         regime = "on axis, small wavefront error (Marechal)"
         doubt = "" if loss <= _WORST_STREHL_DB else f"beyond {_WORST_STREHL_DB:g} dB a beam has no core to speak of"
@@ -365,16 +326,40 @@ class Writer:
         return Line(STREHL_LOSS, 0.0 - loss, "dB", basis, source, regime, doubt if loss else LEFT_AT_ZERO)
 
 
-def _pointing_line(mission: LinkMission, error_rad: float, source: str) -> Line:
-    loss = 0.0 - float(communication_beam(mission).fall.loss_db(error_rad))
-    formula, regime = _POINTING_BASIS[mission.conventions.pointing_loss]
+def _lit_gain(write: Writer, data: DataLink) -> tuple[Line, ...]:
+    """Gain of the transmitting aperture and, where the mission says how it is lit, what that changes."""
+    beam, lit = data.table, data.beam
+    wide = _wide("the half angle", lit.fall.half_angle_rad)
+    if beam.beam is None:
+        hole = data.shared.terminals.leo_obscuration or 0.0
+        left_out = f'the obscuration of {hole:g} is not in it: only pointing_loss = "pattern" takes it into account'
+        doubts = _both(wide, left_out if hole else "")
+        return (replace(write.gain("leo", _TRANSMITTING), warning=doubts),)
+    whole = replace(write.gain("leo", "evenly lit and unobscured; how it is lit stands below"), warning=wide)
+    shape, hole = beam.beam, data.shared.terminals.leo_obscuration or 0.0
+    keys = ["communication.beam.profile"]
+    if shape.radius_m is None:
+        basis, regime = "1 - e^2, lit evenly over the open area", "power counted behind the aperture"
+    else:
+        truncation = write.aperture_m("leo") / 2.0 / shape.radius_m
+        basis = f"2/a^2 (exp(-a^2) - exp(-a^2 e^2))^2, a = {truncation:.4g}, M^2 = {shape.m_squared:g}"
+        regime = "Gaussian beam, light cut off included (Klein and Degnan 1974); M^2 widens the far field"
+        keys += ["communication.beam.radius", "communication.beam.m_squared"]
+    basis += f", e = {hole:g}"
+    source = source_text(write.sources, *keys)
+    return (whole, Line("Illumination", lit.gain_db - whole.value, "dB", basis, source, regime))
+
+
+def _pointing_line(data: DataLink, error_rad: float, source: str) -> Line:
+    loss = 0.0 - float(data.beam.fall.loss_db(error_rad))
+    formula, regime = _POINTING_BASIS[data.shared.conventions.pointing_loss]
     basis = f"{formula}, error = {format_input(error_rad, 'rad')}"
     doubts = _both(_wide("the error", error_rad), _deep(loss))
     return Line(POINTING_LOSS, loss, "dB", basis, source, f"{regime}; static error", doubts)
 
 
-def _required_line(mission: LinkMission, rate_bit_s: float, write: Writer, rate_source: str) -> Line:
-    beam, level = mission.communication, float(required_dbm(mission, rate_bit_s))
+def _required_line(data: DataLink, rate_bit_s: float, write: Writer, rate_source: str) -> Line:
+    beam, level = data.table, float(required_dbm(data, rate_bit_s))
     rate = f"R = {format_input(rate_bit_s, 'bit/s')}"
     if beam.receiver is None:
         sensitivity = format_input(beam.receiver_sensitivity_photon_bit or math.nan, "photon/bit")

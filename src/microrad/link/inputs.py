@@ -3,11 +3,11 @@
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, TypeVar
 
 from pydantic.fields import FieldInfo
 
-from microrad.link.model import lit_aperture
+from microrad.link.model import communication_beam
 from microrad.link.receivers import RateError
 from microrad.mission.fields import Quantity, Several, Share, Table
 from microrad.mission.model import LinkMission
@@ -24,7 +24,9 @@ LINK_TABLES = (
 )
 """The tables with the inputs of the communication link."""
 
-Beam = Literal["beacon", "answer"]
+_Link = TypeVar("_Link")
+Tables = TypeVar("Tables", bound=Table)
+"""A table of tables, such as a mission, of which one number after the other is moved."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,18 +45,18 @@ class Input:
         """The key, of an item with its place from 1 behind it, as campaigns name it."""
         return self.key if self.item is None else f"{self.key}.{self.item + 1}"
 
-    def moved(self, mission: LinkMission, value: float) -> LinkMission:
-        """The mission with this number replaced."""
+    def moved(self, tables: Tables, value: float) -> Tables:
+        """The tables with this number replaced."""
         if self.item is None:
-            return mission.with_value(f"{self.table}.{self.field}", value)
-        items = list(getattr(_table(mission, self.table), self.field))
+            return tables.with_value(f"{self.table}.{self.field}", value)
+        items = list(getattr(_table(tables, self.table), self.field))
         items[self.item] = value
-        return mission.with_value(f"{self.table}.{self.field}", tuple(items))
+        return tables.with_value(f"{self.table}.{self.field}", tuple(items))
 
 
-def inputs(mission: LinkMission, name: str) -> Iterator[Input]:
-    """Every quantity of a table that has a value."""
-    table = _table(mission, name)
+def inputs(tables: Table, name: str) -> Iterator[Input]:
+    """Every quantity of one of the tables that has a value."""
+    table = _table(tables, name)
     if table is None:
         return
     for field, info in type(table).model_fields.items():
@@ -67,15 +69,15 @@ def inputs(mission: LinkMission, name: str) -> Iterator[Input]:
                 yield Input(key, name, field, item, number, rule.each)
 
 
-def moved(mission: LinkMission, found: tuple[Input, ...], value: float) -> LinkMission | None:
-    """The mission with the input at a value, its axes in proportion, or None where their rule does not allow it."""
+def moved(tables: Tables, found: tuple[Input, ...], value: float) -> Tables | None:
+    """The tables with the input at a value, its axes in proportion, or None where their rule does not allow it."""
     largest = max(each.value for each in found)
     for each in found:
         own = value if each.value == largest else value * each.value / largest
         if each.rule.out_of_bounds(own) or (isinstance(each.rule, Share) and not 0.0 < own < each.rule.below):
             return None
-        mission = each.moved(mission, own)
-    return mission
+        tables = each.moved(tables, own)
+    return tables
 
 
 def _rules(info: FieldInfo) -> list[Quantity]:
@@ -85,37 +87,36 @@ def _rules(info: FieldInfo) -> list[Quantity]:
     return [rule for rule in (*info.metadata, *inner) if isinstance(rule, Quantity)]
 
 
-def unit_of(mission: LinkMission, field: str, rule: Quantity) -> str:
-    """Unit of a field; a Strehl has one of its own where it is read as a loss."""
-    return "dB" if field == "strehl" and mission.conventions.strehl == "decibel" else rule.unit
+def unit_of(each: Input, strehl: str) -> str:
+    """Unit of an input; a Strehl has one of its own where the convention reads it as a loss."""
+    return "dB" if (each.field, strehl) == ("strehl", "decibel") else each.rule.unit
 
 
-def _table(mission: LinkMission, name: str) -> Table | None:
-    table: Table | None = mission
+def _table(tables: Table, name: str) -> Table | None:
+    table: Table | None = tables
     for part in name.split("."):
         table = None if table is None else getattr(table, part)
     return table
 
 
-def lit(mission: LinkMission) -> bool:
+def lit(m: LinkMission) -> bool:
     """Whether the obscuration lets some of the data's beam pass."""
-    if mission.conventions.pointing_loss == "pattern":
-        try:
-            lit_aperture(mission)
-        except ValueError:
-            return False
+    try:
+        communication_beam(m.terminals, m.communication, m.conventions.pointing_loss)
+    except ValueError:
+        return False
     return True
 
 
-def margin_or_none(mission: LinkMission, margin_db: Callable[[LinkMission], float]) -> float:
-    """The margin; a receiver too slow for the rate has none."""
+def margin_or_none(of: _Link, margin_db: Callable[[_Link], float]) -> float:
+    """The margin of a link; a receiver too slow for the rate has none."""
     try:
-        return margin_db(mission)
+        return margin_db(of)
     except RateError:
         return -math.inf
 
 
-def fits(name: Beam) -> Callable[[LinkMission], bool]:
-    """Whether the aperture of the beacon, or of the answer, can make its divergence."""
+def fits(name: str) -> Callable[[Any], bool]:
+    """Whether the aperture of the beacon, or of the answer, can make its divergence; asked of a mission."""
     too_narrow = divergence_fits(name, "geo" if name == "answer" else "leo")
     return lambda m: not any(too_narrow(m.conventions, m.terminals, getattr(m, name)))

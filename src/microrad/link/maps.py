@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -11,18 +11,10 @@ from microrad.core.arrays import Floats
 from microrad.core.units import format_quantity
 from microrad.link import gains
 from microrad.link.budget import CHOSEN, given_or
-from microrad.link.model import (
-    LinkError,
-    check_grid,
-    clear_sky_db,
-    communication_beam,
-    point_ahead_rad,
-    receiver,
-    required_dbm,
-    strehl_db,
-)
+from microrad.link.model import DataLink, LinkError, assembled, check_grid, required_dbm, strehl_db
 from microrad.link.receivers import BpskHomodyne, DpskPreamplified, OokCounting
-from microrad.mission.model import LinkMission, Source, source_text
+from microrad.mission.model import Source, source_text
+from microrad.mission.tables.link import Communication
 
 BIT_ERROR_RATIO = 1e-9
 """Bit error ratio at which ideal receivers are compared."""
@@ -33,30 +25,30 @@ QUANTUM_LIMIT_DB = 10.0 * math.log10(2.0)
 _SLOWEST_BIT_S = 1.0
 
 
-def received_on_axis_dbm(mission: LinkMission, strehl_loss_db: float | None = None) -> float:
+def received_on_axis_dbm(data: DataLink, strehl_loss_db: float | None = None) -> float:
     """Received power of the communication link pointed without error; the budget's lines say the same one by one."""
-    beam, terminals = mission.communication, mission.terminals
+    beam, terminals = data.table, data.shared.terminals
     losses = (
         beam.transmit_optics_loss_db
         + beam.receive_optics_loss_db
         + beam.tracking_split_loss_db
         + beam.implementation_loss_db
-        + (strehl_db(beam, mission.conventions.strehl) if strehl_loss_db is None else strehl_loss_db)
+        + (strehl_db(beam, data.shared.conventions.strehl) if strehl_loss_db is None else strehl_loss_db)
         + gains.free_space_loss_db(beam.distance_m, beam.wavelength_m)
-        + clear_sky_db(mission)
+        + data.shared.clear_sky_db
         + gains.obscuration_loss_db(terminals.geo_obscuration or 0.0)
     )
     receiving = gains.aperture_gain_db(terminals.geo_aperture_m, beam.wavelength_m)
-    return gains.dbm(beam.transmit_power_w) + communication_beam(mission).gain_db + receiving - losses
+    return gains.dbm(beam.transmit_power_w) + data.beam.gain_db + receiving - losses
 
 
-def pointing_loss_db(mission: LinkMission, pointing_error_rad: ArrayLike) -> Floats:
+def pointing_loss_db(data: DataLink, pointing_error_rad: ArrayLike) -> Floats:
     """Loss of the communication link at each pointing error, an uncorrected point-ahead on top of it included."""
     error = np.asarray(pointing_error_rad, dtype=np.float64)
-    return communication_beam(mission).fall.loss_db(error + point_ahead_rad(mission))
+    return data.beam.fall.loss_db(error + data.shared.point_ahead_rad)
 
 
-def margin_map(mission: LinkMission, data_rate_bit_s: ArrayLike, pointing_error_rad: ArrayLike) -> Floats:
+def margin_map(data: DataLink, data_rate_bit_s: ArrayLike, pointing_error_rad: ArrayLike) -> Floats:
     """Margin of the communication link in dB over data rate (rows) and pointing error (columns); paper, Fig. 2.
 
     Raises `ValueError` for a negative pointing error, a data rate that is not above zero and one that the receiver
@@ -65,37 +57,37 @@ def margin_map(mission: LinkMission, data_rate_bit_s: ArrayLike, pointing_error_
     rate = np.atleast_1d(np.asarray(data_rate_bit_s, dtype=np.float64))
     error = np.atleast_1d(np.asarray(pointing_error_rad, dtype=np.float64))
     check_grid(rate, error)
-    on_axis = received_on_axis_dbm(mission) - required_dbm(mission, rate)
-    margin: Floats = on_axis[:, None] - pointing_loss_db(mission, error)[None, :]
+    on_axis = received_on_axis_dbm(data) - required_dbm(data, rate)
+    margin: Floats = on_axis[:, None] - pointing_loss_db(data, error)[None, :]
     return margin
 
 
-def margin_of_error(mission: LinkMission, pointing_error_rad: ArrayLike) -> Floats:
+def margin_of_error(data: DataLink, pointing_error_rad: ArrayLike) -> Floats:
     """Margin of the communication link in dB at the mission's data rate, for each of the pointing errors."""
     error = np.asarray(pointing_error_rad, dtype=np.float64)
-    row: Floats = margin_map(mission, mission.communication.data_rate_bit_s, error.ravel())[0]
+    row: Floats = margin_map(data, data.table.data_rate_bit_s, error.ravel())[0]
     return row.reshape(error.shape)
 
 
-def largest_data_rate(mission: LinkMission, margin_db: float, pointing_error_rad: float) -> float:
+def largest_data_rate(data: DataLink, margin_db: float, pointing_error_rad: float) -> float:
     """Data rate in bit/s that leaves `margin_db` at a pointing error, or the highest that the receiver takes.
 
     Raises `LinkError` when not even the slowest rate does.
     """
     check_grid(np.ones(1), np.asarray(pointing_error_rad))
-    lost = float(pointing_loss_db(mission, pointing_error_rad))
-    return rate_at_loss(mission, margin_db, lost)
+    lost = float(pointing_loss_db(data, pointing_error_rad))
+    return rate_at_loss(data, margin_db, lost)
 
 
-def rate_at_loss(mission: LinkMission, margin_db: float, loss_db: float) -> float:
+def rate_at_loss(data: DataLink, margin_db: float, loss_db: float) -> float:
     """Data rate in bit/s that leaves `margin_db` when pointing costs `loss_db`, or the highest that is taken.
 
     Raises `LinkError` when not even the slowest rate does.
     """
-    available = received_on_axis_dbm(mission) - loss_db - margin_db
-    built = receiver(mission)
+    available = received_on_axis_dbm(data) - loss_db - margin_db
+    built = data.receiver
     if built is None:
-        spare_db = available - float(required_dbm(mission, _SLOWEST_BIT_S))
+        spare_db = available - float(required_dbm(data, _SLOWEST_BIT_S))
         if spare_db < 0.0:
             raise LinkError(
                 f"not even {format_quantity(_SLOWEST_BIT_S, 'bit/s')} leaves a margin of {margin_db:g} dB: "
@@ -103,10 +95,10 @@ def rate_at_loss(mission: LinkMission, margin_db: float, loss_db: float) -> floa
             )
         return _SLOWEST_BIT_S * float(10.0 ** (spare_db / 10.0))
     highest = built.highest_data_rate_bit_s
-    if float(required_dbm(mission, highest)) <= available:
+    if float(required_dbm(data, highest)) <= available:
         return highest
     slowest = min(_SLOWEST_BIT_S, highest)
-    missing = float(required_dbm(mission, slowest)) - available
+    missing = float(required_dbm(data, slowest)) - available
     if missing > 0.0:
         raise LinkError(
             f"not even {format_quantity(slowest, 'bit/s')} leaves a margin of {margin_db:g} dB: "
@@ -115,26 +107,26 @@ def rate_at_loss(mission: LinkMission, margin_db: float, loss_db: float) -> floa
     from scipy.optimize import brentq
 
     def excess(lg_rate: float) -> float:
-        return float(required_dbm(mission, 10.0**lg_rate)) - available
+        return float(required_dbm(data, 10.0**lg_rate)) - available
 
     return float(10.0 ** brentq(excess, math.log10(slowest), math.log10(highest), xtol=1e-10))
 
 
-def largest_pointing_error(mission: LinkMission, margin_db: float, data_rate_bit_s: float) -> float:
+def largest_pointing_error(data: DataLink, margin_db: float, data_rate_bit_s: float) -> float:
     """Radial pointing error in rad that leaves `margin_db` at a data rate: the loss grows with the error.
 
     Raises `LinkError` when the margin is not there even on axis, and when an uncorrected point-ahead lies beyond the
     main lobe of the beam, where the loss does not grow with the error.
     """
-    excess_db = float(margin_map(mission, data_rate_bit_s, 0.0)[0, 0]) - margin_db
+    excess_db = float(margin_map(data, data_rate_bit_s, 0.0)[0, 0]) - margin_db
     if excess_db < 0.0:
         raise LinkError(
             f"at {format_quantity(data_rate_bit_s, 'bit/s')} a margin of {margin_db:g} dB is missed by "
-            f"{-excess_db:.2f} dB even without pointing error; {_instead(mission, margin_db)}"
+            f"{-excess_db:.2f} dB even without pointing error; {_instead(data, margin_db)}"
             "with that much more power or gain"
         )
-    ahead = point_ahead_rad(mission)
-    fall = communication_beam(mission).fall
+    ahead = data.shared.point_ahead_rad
+    fall = data.beam.fall
     reached = fall.error_rad(excess_db + float(fall.loss_db(ahead)))
     if reached < ahead * (1.0 - 1e-6):
         raise LinkError(
@@ -144,10 +136,10 @@ def largest_pointing_error(mission: LinkMission, margin_db: float, data_rate_bit
     return max(reached - ahead, 0.0)
 
 
-def _instead(mission: LinkMission, margin_db: float) -> str:
+def _instead(data: DataLink, margin_db: float) -> str:
     """The data rate that would have the margin on axis, where there is one."""
     try:
-        possible = largest_data_rate(mission, margin_db, 0.0)
+        possible = largest_data_rate(data, margin_db, 0.0)
     except LinkError:
         return "it would be there "
     return f"up to {format_quantity(possible, 'bit/s')} it would be there, or "
@@ -162,29 +154,28 @@ class SensitivityReading:
     photons_per_bit: float
 
 
-def implied_sensitivity(mission: LinkMission) -> tuple[SensitivityReading, ...]:
+def implied_sensitivity(data: DataLink) -> tuple[SensitivityReading, ...]:
     """Sensitivity implied by the required margin at the mission's data rate and required pointing error.
 
     One record for each reading of pointing loss and Strehl. A `strehl` that is no ratio (0, or above 1) leaves out the
     readings that take it for one; a wavefront error has one reading.
     """
-    beam, requirement = mission.communication, mission.requirement
+    beam, requirement = data.table, data.requirement
     rate_dbm = gains.dbm(gains.photon_energy_j(beam.wavelength_m) * beam.data_rate_bit_s)
-    aperture, wavelength = mission.terminals.leo_aperture_m, beam.wavelength_m
+    aperture, wavelength = data.shared.terminals.leo_aperture_m, beam.wavelength_m
     uniform = gains.aperture_gain_db(aperture, wavelength)
     readings = []
-    for strehl, loss_db in _strehl_readings(mission).items():
-        on_axis = received_on_axis_dbm(mission, loss_db) - communication_beam(mission).gain_db + uniform
+    for strehl, loss_db in _strehl_readings(beam).items():
+        on_axis = received_on_axis_dbm(data, loss_db) - data.beam.gain_db + uniform
         for loss in ("gaussian", "gain"):
-            error = requirement.pointing_error_rad + point_ahead_rad(mission)
+            error = requirement.pointing_error_rad + data.shared.point_ahead_rad
             lost = float(gains.pointing_loss_db(error, aperture, wavelength, loss))
             level = on_axis - lost - requirement.margin_db - rate_dbm
             readings.append(SensitivityReading(loss, strehl, float(10.0 ** (level / 10.0))))
     return tuple(readings)
 
 
-def _strehl_readings(mission: LinkMission) -> dict[str, float]:
-    beam = mission.communication
+def _strehl_readings(beam: Communication) -> dict[str, float]:
     if beam.strehl is None:
         return {"wavefront error": strehl_db(beam, "ratio")}
     names = ("decibel", "ratio") if 0.0 < beam.strehl <= 1.0 else ("decibel",)
@@ -192,19 +183,19 @@ def _strehl_readings(mission: LinkMission) -> dict[str, float]:
 
 
 def convention_maps(
-    mission: LinkMission, data_rate_bit_s: ArrayLike, pointing_error_rad: ArrayLike
+    data: DataLink, data_rate_bit_s: ArrayLike, pointing_error_rad: ArrayLike
 ) -> dict[tuple[str, str], Floats]:
     """Margin maps under each reading of pointing loss and Strehl, as `margin_map` gives them.
 
     The paper leaves both open: what the readings differ by is the width of the band that its Fig. 2 stands for.
     """
     maps = {}
-    update = {} if mission.conventions.pointing_loss != "pattern" else {"beam": None}
-    for strehl, loss_db in _strehl_readings(mission).items():
+    update = {} if data.shared.conventions.pointing_loss != "pattern" else {"beam": None}
+    for strehl, loss_db in _strehl_readings(data.table).items():
         for loss in ("gaussian", "gain"):
-            beam = mission.communication.model_copy(update={**update, "strehl": loss_db, "wavefront_error_m": None})
-            conventions = mission.conventions.model_copy(update={"pointing_loss": loss, "strehl": "decibel"})
-            read = mission.model_copy(update={"communication": beam, "conventions": conventions})
+            beam = data.table.model_copy(update={**update, "strehl": loss_db, "wavefront_error_m": None})
+            conventions = data.shared.conventions.model_copy(update={"pointing_loss": loss, "strehl": "decibel"})
+            read = assembled(replace(data.shared, conventions=conventions), beam, data.requirement, data.jitter)
             maps[loss, strehl] = margin_map(read, data_rate_bit_s, pointing_error_rad)
     return maps
 
@@ -221,17 +212,17 @@ class IdealReceiver:
 
 
 def ideal_receivers(
-    mission: LinkMission, sources: Mapping[str, Source], pointing_error_rad: float | None = None
+    data: DataLink, sources: Mapping[str, Source], pointing_error_rad: float | None = None
 ) -> tuple[IdealReceiver, ...]:
     """The link's margin with three ideal receivers, at the mission's data rate; losses stay as in the mission.
 
     The formulas are the textbook ones (Agrawal, Fiber-Optic Communication Systems): n photons per bit, for on-off
     keying averaged over marks and spaces.
     """
-    beam = mission.communication
+    beam = data.table
     own_source = source_text(sources, "communication.pointing_error")
     error, error_source = given_or(beam.pointing_error_rad, pointing_error_rad, own_source, CHOSEN)
-    received = received_on_axis_dbm(mission) - float(pointing_loss_db(mission, error))
+    received = received_on_axis_dbm(data) - float(pointing_loss_db(data, error))
     source = f"{source_text(sources, 'communication.data_rate')}; {error_source}"
     rate = beam.data_rate_bit_s
     common = {"wavelength_m": beam.wavelength_m, "bit_error_ratio": BIT_ERROR_RATIO, "bandwidth_hz": 2.0 * rate}

@@ -12,8 +12,9 @@ from microrad.link import gains, receivers
 from microrad.link.beams import GaussianFall, LitAperture, OffAxis
 from microrad.mission.model import LinkMission
 from microrad.mission.tables import pointing as pointing_table
-from microrad.mission.tables.link import Beam, Communication
+from microrad.mission.tables.link import Beam, Channel, Communication, LinkConventions, LinkRequirement, Terminals
 from microrad.mission.tables.link import Receiver as ReceiverTable
+from microrad.mission.tables.pointing import JitterTable, PointAhead
 
 
 class LinkError(ValueError):
@@ -28,24 +29,86 @@ class TransmittedBeam:
     fall: OffAxis
 
 
-def communication_beam(mission: LinkMission) -> TransmittedBeam:
-    """The beam of the communication link, by the mission's convention for its pointing loss."""
-    aperture, beam = mission.terminals.leo_aperture_m, mission.communication
-    convention = mission.conventions.pointing_loss
-    if convention == "pattern":
-        lit = lit_aperture(mission)
-        return TransmittedBeam(lit.gain_db, lit)
-    per_rad2 = gains.pointing_db_per_rad2(aperture, beam.wavelength_m, convention)
-    half = math.sqrt(2.0 * gains.DB_PER_NEPER / per_rad2)
-    return TransmittedBeam(gains.aperture_gain_db(aperture, beam.wavelength_m), GaussianFall(half))
+@dataclass(frozen=True, slots=True)
+class Shared:
+    """What a mission's links share: the terminals at their ends, the air between them, point-ahead, conventions."""
+
+    terminals: Terminals
+    conventions: LinkConventions
+    channel: Channel | None
+    point_ahead: PointAhead | None
+
+    @classmethod
+    def of(cls, m: LinkMission) -> "Shared":
+        """What the links of this mission share."""
+        return cls(m.terminals, m.conventions, m.channel, m.point_ahead)
+
+    @property
+    def clear_sky_db(self) -> float:
+        """Loss of a clear atmosphere on the path; 0 in vacuum."""
+        air = self.channel
+        return 0.0 if air is None else gains.clear_sky_loss_db(air.zenith_transmission, air.elevation_rad)
+
+    @property
+    def point_ahead_rad(self) -> float:
+        """Point-ahead angle 2 v / c that is left in the pointing error: 0 when it is corrected or not given."""
+        ahead = self.point_ahead
+        if ahead is None or ahead.corrected:
+            return 0.0
+        return pointing_table.point_ahead_rad(ahead.transverse_velocity_m_s)
+
+    @property
+    def point_ahead_left_rad(self) -> float:
+        """What point-ahead adds to a residual that does not hold it: all of it, or what its correction leaves."""
+        ahead = self.point_ahead
+        return 0.0 if ahead is None else ahead.error_rad if ahead.corrected else self.point_ahead_rad
 
 
-def lit_aperture(mission: LinkMission) -> LitAperture:
-    """The aperture of the communication link as the mission says that it is lit.
+@dataclass(frozen=True, slots=True)
+class DataLink:
+    """The communication link, assembled from its table: its beam, its receiver, and what is required of it.
 
-    Raises ValueError when the mission does not say it.
+    ``receiver`` is None where its sensitivity is given as measured.
     """
-    beam, terminals = mission.communication, mission.terminals
+
+    shared: Shared
+    table: Communication
+    requirement: LinkRequirement
+    jitter: JitterTable | None
+    beam: TransmittedBeam
+    receiver: receivers.Receiver | None
+
+
+def of(m: LinkMission) -> DataLink:
+    """Assemble the communication link of a mission.
+
+    Raises ValueError where the mission does not say how its aperture is lit, or its obscuration stops the beam.
+    """
+    return assembled(Shared.of(m), m.communication, m.requirement, m.jitter)
+
+
+def assembled(
+    shared: Shared, table: Communication, requirement: LinkRequirement, jitter: JitterTable | None
+) -> DataLink:
+    """The communication link of these tables; raises ValueError as `of` does."""
+    beam = communication_beam(shared.terminals, table, shared.conventions.pointing_loss)
+    return DataLink(shared, table, requirement, jitter, beam, _receiver(shared.terminals, table))
+
+
+def communication_beam(terminals: Terminals, beam: Communication, convention: str) -> TransmittedBeam:
+    """The beam of the communication link, by a convention for its pointing loss.
+
+    Raises ValueError as `of` does.
+    """
+    if convention == "pattern":
+        lit = _lit_aperture(terminals, beam)
+        return TransmittedBeam(lit.gain_db, lit)
+    per_rad2 = gains.pointing_db_per_rad2(terminals.leo_aperture_m, beam.wavelength_m, convention)
+    half = math.sqrt(2.0 * gains.DB_PER_NEPER / per_rad2)
+    return TransmittedBeam(gains.aperture_gain_db(terminals.leo_aperture_m, beam.wavelength_m), GaussianFall(half))
+
+
+def _lit_aperture(terminals: Terminals, beam: Communication) -> LitAperture:
     if beam.beam is None:
         raise ValueError('pointing loss "pattern" needs the table [communication.beam]: how the aperture is lit')
     radius = beam.beam.radius_m
@@ -62,82 +125,59 @@ def strehl_db(beam: Beam, convention: str) -> float:
     return gains.strehl_loss_db(ratio, "ratio")
 
 
-def point_ahead_rad(mission: LinkMission) -> float:
-    """Point-ahead angle 2 v / c that is left in the pointing error: 0 when it is corrected or not given."""
-    ahead = mission.point_ahead
-    if ahead is None or ahead.corrected:
-        return 0.0
-    return pointing_table.point_ahead_rad(ahead.transverse_velocity_m_s)
-
-
-def point_ahead_left_rad(mission: LinkMission) -> float:
-    """What point-ahead adds to a residual that does not hold it: all of it, or what its correction leaves."""
-    ahead = mission.point_ahead
-    return 0.0 if ahead is None else ahead.error_rad if ahead.corrected else point_ahead_rad(mission)
-
-
-def clear_sky_db(mission: LinkMission) -> float:
-    """Loss of a clear atmosphere on the path; 0 in vacuum."""
-    channel = mission.channel
-    return 0.0 if channel is None else gains.clear_sky_loss_db(channel.zenith_transmission, channel.elevation_rad)
-
-
-def receiver(mission: LinkMission) -> receivers.Receiver | None:
-    """The receiver of the communication link, or None where its sensitivity is given as measured."""
-    table = mission.communication.receiver
+def _receiver(terminals: Terminals, link: Communication) -> receivers.Receiver | None:
+    table = link.receiver
     if table is None:
         return None
     common: dict[str, Any] = {
-        "wavelength_m": mission.communication.wavelength_m,
+        "wavelength_m": link.wavelength_m,
         "bit_error_ratio": table.bit_error_ratio,
         "bandwidth_hz": table.bandwidth_hz,
         "code_gain_db": table.code_gain_db,
         "code_rate": table.code_rate,
     }
     if table.detector == "homodyne":
-        per_mode = _per_mode(mission)
+        per_mode = _per_mode(link)
         return receivers.BpskHomodyne(
             **common, quantum_efficiency=table.efficiency or 1.0, background_photons_per_mode=per_mode
         )
     if table.detector == "preamplified":
-        return _preamplified(mission, table, common)
+        return _preamplified(table, common, _per_mode(link))
+    background_w = _background_w(terminals, link, table)
     if table.detector == "photon-counting":
-        return _counting(mission, table, common)
-    return _photodiode(mission, table, common)
+        return _counting(table, common, background_w)
+    return _photodiode(table, common, background_w)
 
 
 def _extinction(table: ReceiverTable) -> float:
     return math.inf if table.extinction_ratio_db is None else float(10.0 ** (table.extinction_ratio_db / 10.0))
 
 
-def _preamplified(mission: LinkMission, table: ReceiverTable, common: dict[str, Any]) -> receivers.Receiver:
-    amplified: dict[str, Any] = {
-        "noise_figure_db": table.noise_figure_db,
-        "background_photons_per_mode": _per_mode(mission),
-    }
+def _preamplified(table: ReceiverTable, common: dict[str, Any], per_mode: float) -> receivers.Receiver:
+    amplified: dict[str, Any] = {"noise_figure_db": table.noise_figure_db, "background_photons_per_mode": per_mode}
     if table.modulation == "dpsk":
         return receivers.DpskPreamplified(**common, **amplified)
     filtered: dict[str, Any] = {"gain_db": table.amplifier_gain_db, "optical_bandwidth_hz": table.optical_bandwidth_hz}
     return receivers.OokPreamplified(**common, **amplified, **filtered, extinction_ratio=_extinction(table))
 
 
-def _counting(mission: LinkMission, table: ReceiverTable, common: dict[str, Any]) -> receivers.Receiver:
+def _counting(table: ReceiverTable, common: dict[str, Any], background_w: float) -> receivers.Receiver:
     counting: dict[str, Any] = {
         "detection_efficiency": table.efficiency,
         "dark_count_rate_hz": table.dark_count_rate_1_s,
-        "background_power_w": _background_w(mission),
+        "background_power_w": background_w,
     }
     if table.modulation == "ppm":
         return receivers.PpmCounting(**common, **counting, order=table.order or 2)
     return receivers.OokCounting(**common, **counting, extinction_ratio=_extinction(table))
 
 
-def _photodiode(mission: LinkMission, table: ReceiverTable, common: dict[str, Any]) -> receivers.Receiver:
+def _photodiode(table: ReceiverTable, common: dict[str, Any], background_w: float) -> receivers.Receiver:
     diode: dict[str, Any] = {
         "quantum_efficiency": table.efficiency,
         "thermal_noise_a_sqrt_hz": table.thermal_noise_a_sqrt_hz,
         "dark_current_a": table.dark_current_a,
-        "background_power_w": _background_w(mission),
+        "background_power_w": background_w,
         "extinction_ratio": _extinction(table),
     }
     if table.detector == "pin":
@@ -147,51 +187,44 @@ def _photodiode(mission: LinkMission, table: ReceiverTable, common: dict[str, An
     )
 
 
-def _per_mode(mission: LinkMission) -> float:
-    table = mission.communication.receiver
+def _per_mode(link: Communication) -> float:
+    table = link.receiver
     if table is None or table.background is None:
         return 0.0
     radiance = table.background.spectral_radiance_w_m3_sr
-    sky = receivers.background_photons_per_mode(radiance, mission.communication.wavelength_m)
-    return sky * _receiving_transmission(mission)
+    sky = receivers.background_photons_per_mode(radiance, link.wavelength_m)
+    return sky * _receiving_transmission(link)
 
 
-def _receiving_transmission(mission: LinkMission) -> float:
+def _receiving_transmission(link: Communication) -> float:
     """What the receiving optics leave, of signal and background alike."""
-    lost = mission.communication.receive_optics_loss_db + mission.communication.tracking_split_loss_db
+    lost = link.receive_optics_loss_db + link.tracking_split_loss_db
     return float(10.0 ** (-lost / 10.0))
 
 
-def _background_w(mission: LinkMission) -> float:
+def _background_w(terminals: Terminals, link: Communication, table: ReceiverTable) -> float:
     """Background on the detector, behind the losses of the receiving optics."""
-    table, terminals = mission.communication.receiver, mission.terminals
-    assert table is not None
     if table.background is None:
         return table.background_power_w or 0.0
     b = table.background
     area = math.pi / 4.0 * terminals.geo_aperture_m**2 * (1.0 - (terminals.geo_obscuration or 0.0) ** 2)
     sky = receivers.background_power_w(b.spectral_radiance_w_m3_sr, area, b.field_of_view_rad, b.filter_bandwidth_m)
-    return sky * _receiving_transmission(mission)
+    return sky * _receiving_transmission(link)
 
 
-def required_dbm(mission: LinkMission, data_rate_bit_s: ArrayLike) -> Floats:
+def required_dbm(data: DataLink, data_rate_bit_s: ArrayLike) -> Floats:
     """Power at the receiver that each data rate needs, in dBm.
 
     Raises ValueError for a rate that the receiver does not take, with the highest that it does.
     """
     rate = np.asarray(data_rate_bit_s, dtype=np.float64)
-    beam, built = mission.communication, receiver(mission)
-    if built is not None:
-        level: Floats = 10.0 * np.log10(built.required_power_w(rate)) + 30.0
+    if data.receiver is not None:
+        level: Floats = 10.0 * np.log10(data.receiver.required_power_w(rate)) + 30.0
         return level
-    return _measured_dbm(beam, rate)
-
-
-def _measured_dbm(beam: Communication, rate: Floats) -> Floats:
-    photons = beam.receiver_sensitivity_photon_bit
+    photons = data.table.receiver_sensitivity_photon_bit
     assert photons is not None
-    level: Floats = 10.0 * np.log10(photons * gains.photon_energy_j(beam.wavelength_m) * rate) + 30.0
-    return level
+    measured: Floats = 10.0 * np.log10(photons * gains.photon_energy_j(data.table.wavelength_m) * rate) + 30.0
+    return measured
 
 
 def check_grid(data_rate_bit_s: Floats, pointing_error_rad: Floats) -> None:

@@ -1,6 +1,7 @@
 """How the partner is found: the light on the tracking sensor, the sequence of the paper, and a scan instead."""
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,11 +11,10 @@ from microrad.core.budget import Line, total_db
 from microrad.link import acquisition, pointing
 from microrad.link.budget import POINT_AHEAD_LOSS, POINTING_LOSS
 from microrad.loop import sensor
-from microrad.mission.file import LinkFile
-from microrad.mission.model import LinkMission, source_text
+from microrad.mission.model import Source, source_text
 from microrad.mission.tables.acquisition import LEAST_OVERLAP, Acquisition
 from microrad.mission.tables.acquisition import Scan as ScanTable
-from microrad.mission.tables.link import Beacon, half_angle_rad, narrowest_half_angle_rad
+from microrad.mission.tables.link import Beacon, Terminals, half_angle_rad, narrowest_half_angle_rad
 
 THRESHOLD = 5.0
 """Threshold of the quad cell over its rms noise: a false alarm in 3.5 million readings."""
@@ -28,6 +28,14 @@ LONGEST_LOOK_S = 1e6
 """Time on the partner beyond which a scan does not detect: the longest that a mission may state."""
 _NEVER = 1e-12  # what a process is built with that cannot happen
 _DEEPEST_MARGIN_DB = 200.0  # either way; beyond it a sensor detects at once, or not at all
+
+
+@dataclass(frozen=True, slots=True)
+class Sent:
+    """The beacon or its answer: the table that describes it, and its budget."""
+
+    table: Beacon
+    budget: link.LinkBudget
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,59 +135,53 @@ class Finding:
         return (self.wide,) if self.scanned is None else (self.wide, self.scanned.found)
 
 
-def tracking(file: LinkFile, answer: link.LinkBudget | None) -> Tracking | None:
-    """The answer on the quad cell of `[acquisition.sensor]`, or None without either."""
-    m = file.mission
-    if answer is None or m.answer is None or m.acquisition is None or m.acquisition.sensor is None:
+def tracking(
+    a: Acquisition | None, aperture_m: float, answer: Sent | None, sources: Mapping[str, Source]
+) -> Tracking | None:
+    """The answer on the quad cell of `[acquisition.sensor]` behind an aperture, or None without either."""
+    if answer is None or a is None or a.sensor is None:
         return None
-    s = m.acquisition.sensor
+    s = a.sensor
     cell = sensor.QuadCell(s.responsivity_a_w, s.background_power_w, s.dark_current_a, s.thermal_noise_a_sqrt_hz)
-    spot = sensor.AirySpot(m.answer.wavelength_m, m.terminals.leo_aperture_m)
-    source = f"answer budget; {source_text(file.sources, 'acquisition.sensor.rate')}"
-    bandwidth, power = sensor.noise_bandwidth_hz(s.rate_hz), answer.received_power_w
+    spot = sensor.AirySpot(answer.table.wavelength_m, aperture_m)
+    source = f"answer budget; {source_text(sources, 'acquisition.sensor.rate')}"
+    bandwidth, power = sensor.noise_bandwidth_hz(s.rate_hz), answer.budget.received_power_w
     ratio = cell.signal_to_noise(power, bandwidth)
     angle = None if ratio < DARK else sensor.noise_equivalent_angle_line(cell, spot, power, s.rate_hz, source)
     return Tracking(power, ratio, cell.noise_lines(power, bandwidth, source), angle)
 
 
 def finding(
-    m: LinkMission,
-    open_loop: pointing.OpenLoopPointing | None,
-    beacon: link.LinkBudget | None,
-    answer: link.LinkBudget | None,
-    light: Tracking | None,
-) -> Finding | None:
-    """Acquisition as the mission's table times it, or None without that table or without both beams.
+    a: Acquisition, data: link.DataLink, error: pointing.Jitter, beacon: Sent, answer: Sent, light: Tracking | None
+) -> Finding:
+    """Acquisition as the mission's table times it; ``error`` is that of the predicted direction.
 
     Raises ValueError for a scan of a direction that is known without error.
     """
-    a = m.acquisition
-    if a is None or m.beacon is None or m.answer is None or beacon is None or answer is None:
-        return None
-    assert open_loop is not None  # the relations of the mission
-    radii = (_reach(m, m.beacon, beacon), _reach(m, m.answer, answer), _return_reach(m))
+    shared = data.shared
+    radii = (_reach(beacon, shared), _reach(answer, shared), _return_reach(data))
     chances = acquisition.Chances(
-        beacon_coverage=_coverage(open_loop.error, radii[0]),
+        beacon_coverage=_coverage(error, radii[0]),
         frame_detection=a.detection_probability,
         answer_coverage=_coverage(
-            _aside(link.point_ahead_rad(m), m.answer.pointing_error_rad / a.pointing_sigmas), radii[1]
+            _aside(shared.point_ahead_rad, answer.table.pointing_error_rad / a.pointing_sigmas), radii[1]
         ),
         answer_detection=_possible(_answer_detection(a, light)),
-        return_coverage=_possible(_return_coverage(m, light, radii[2])),
+        return_coverage=_possible(_return_coverage(shared, light, radii[2])),
         lock=a.lock_probability,
     )
-    timing, error = _timing(m, a, m.beacon.distance_m), open_loop.error
+    timing = _timing(shared.terminals, a, beacon.table.distance_m)
     sigma = max(math.hypot(b, s) for b, s in zip(error.bias_rad, error.rms_rad, strict=True))
     wide = _found("wide beacon", acquisition.paper_sequence(timing, chances), a)
     scanned = None
     if a.scan is not None:
         answering = acquisition.answer_stages(timing, chances)
-        scanned = _scanned(a, a.scan, _sender(m, m.beacon, beacon, a, a.scan), sigma, timing, answering)
+        scanned = _scanned(a, a.scan, _sender(shared, beacon, a, a.scan), sigma, timing, answering)
     return Finding(chances, sigma, *radii, wide, scanned)
 
 
-def _timing(m: LinkMission, a: Acquisition, range_m: float) -> acquisition.Timing:
-    own, partner = m.terminals.called("leo"), m.terminals.called("geo")
+def _timing(terminals: Terminals, a: Acquisition, range_m: float) -> acquisition.Timing:
+    own, partner = terminals.called("leo"), terminals.called("geo")
     if own == partner:  # two terminals of one make
         own, partner = f"{own} (own)", f"{partner} (partner)"
     return acquisition.Timing(
@@ -196,10 +198,10 @@ def _timing(m: LinkMission, a: Acquisition, range_m: float) -> acquisition.Timin
     )
 
 
-def _reach(m: LinkMission, beam: Beacon, budget: link.LinkBudget) -> float:
+def _reach(sent: Sent, shared: link.Shared) -> float:
     """How far off its axis a Gaussian beam still brings the power that is needed, and is counted on."""
-    fall = link.GaussianFall(half_angle_rad(beam.divergence_rad, m.conventions.divergence))
-    return fall.error_rad(min(_on_axis_margin_db(budget), link.DEEPEST_DB))
+    fall = link.GaussianFall(half_angle_rad(sent.table.divergence_rad, shared.conventions.divergence))
+    return fall.error_rad(min(_on_axis_margin_db(sent.budget), link.DEEPEST_DB))
 
 
 def _on_axis_margin_db(budget: link.LinkBudget) -> float:
@@ -208,14 +210,14 @@ def _on_axis_margin_db(budget: link.LinkBudget) -> float:
     return total_db(aimed) - (10.0 * math.log10(budget.required_power_w) + 30.0)
 
 
-def _return_reach(m: LinkMission) -> float:
+def _return_reach(data: link.DataLink) -> float:
     """How far off its axis the narrow beam back suffices: out to 1/e2 at most, and as far as its margin goes."""
-    fall = link.communication_beam(m).fall
-    margin_db = link.received_on_axis_dbm(m) - float(link.required_dbm(m, m.communication.data_rate_bit_s))
+    fall = data.beam.fall
+    margin_db = link.received_on_axis_dbm(data) - float(link.required_dbm(data, data.table.data_rate_bit_s))
     return 0.0 if margin_db <= 0.0 else min(fall.half_angle_rad, fall.error_rad(margin_db))
 
 
-def _return_coverage(m: LinkMission, light: Tracking | None, radius_rad: float) -> float:
+def _return_coverage(shared: link.Shared, light: Tracking | None, radius_rad: float) -> float:
     """Probability that the narrow beam back lands; it goes where the tracking sensor says, if that has an angle."""
     if light is None:
         noise_rad = 0.0
@@ -223,7 +225,7 @@ def _return_coverage(m: LinkMission, light: Tracking | None, radius_rad: float) 
         return 0.0
     else:
         noise_rad = light.noise_equivalent_angle.value
-    return float(pointing.radial_cdf(_aside(link.point_ahead_left_rad(m), noise_rad), radius_rad))
+    return float(pointing.radial_cdf(_aside(shared.point_ahead_left_rad, noise_rad), radius_rad))
 
 
 def _aside(bias_rad: float, rms_rad: float) -> pointing.Jitter:
@@ -310,7 +312,7 @@ def _found(name: str, stages: tuple[acquisition.Stage, ...], a: Acquisition) -> 
 
 
 def _sender(
-    m: LinkMission, beam: Beacon, budget: link.LinkBudget, a: Acquisition, s: ScanTable
+    shared: link.Shared, beacon: Sent, a: Acquisition, s: ScanTable
 ) -> tuple[acquisition.Beams, acquisition.Receiver]:
     """The beacon's power in the scan's narrow beam, and the partner's sensor.
 
@@ -318,10 +320,11 @@ def _sender(
     the power, as noise that does not depend on the light has it. Every loss but those off the axis is in the power.
     The beam is as narrow as the radius out to which it is used, but no narrower than diffraction at its aperture.
     """
-    half = half_angle_rad(beam.divergence_rad, m.conventions.divergence)
-    least = narrowest_half_angle_rad(m.terminals.leo_aperture_m, beam.wavelength_m)
-    area = math.pi / 4.0 * m.terminals.geo_aperture_m**2
-    margin_db = min(max(_on_axis_margin_db(budget), -_DEEPEST_MARGIN_DB), _DEEPEST_MARGIN_DB)
+    beam = beacon.table
+    half = half_angle_rad(beam.divergence_rad, shared.conventions.divergence)
+    least = narrowest_half_angle_rad(shared.terminals.leo_aperture_m, beam.wavelength_m)
+    area = math.pi / 4.0 * shared.terminals.geo_aperture_m**2
+    margin_db = min(max(_on_axis_margin_db(beacon.budget), -_DEEPEST_MARGIN_DB), _DEEPEST_MARGIN_DB)
     on_axis = beam.required_power_w * 10.0 ** (margin_db / 10.0) / area
     beams = acquisition.Beams(
         power_w=on_axis * math.pi * (half * beam.distance_m) ** 2 / 2.0,

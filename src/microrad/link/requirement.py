@@ -8,7 +8,8 @@ from microrad import link
 from microrad.link.budget import FREE_SPACE_LOSS
 from microrad.link.study import LinkStudy
 from microrad.link.under_jitter import stated_outage
-from microrad.mission.model import LinkMission, Source
+from microrad.mission.model import Source
+from microrad.mission.tables.link import LinkRequirement
 
 Subject = Literal["cone", "beacon", "answer", "communication", "residual", "stroke", "fine pointing"]
 """What a requirement is about: the beacon's cone, a margin, the error that a loop leaves, or the mirror's stroke."""
@@ -61,7 +62,7 @@ class Requirement:
 def of_links(study: LinkStudy) -> tuple[Requirement, ...]:
     """What the budgets alone are held against: what is required of the beacon, the answer and communication."""
     m = study.file.mission
-    name = "communication margin" + ("" if m.jitter is None else f" but for {outage_words(m)}")
+    name = "communication margin" + ("" if m.jitter is None else f" but for {outage_words(m.requirement)}")
     return (*of_beams(study), _of_budget(study, "communication", study.communication, m.requirement.margin_db, name))
 
 
@@ -77,9 +78,9 @@ def of_beams(study: LinkStudy) -> tuple[Requirement, ...]:
     return tuple(found)
 
 
-def outage_words(m: LinkMission) -> str:
+def outage_words(required: LinkRequirement) -> str:
     """The share of the time that the required margin may be missed."""
-    return f"{100 * stated_outage(m):g} % of the time"
+    return f"{100 * stated_outage(required):g} % of the time"
 
 
 def derived_from(sources: Mapping[str, Source], *keys: str) -> tuple[str, ...]:

@@ -4,8 +4,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from microrad.link.inputs import Input, margin_or_none, moved, unit_of
-from microrad.mission.model import LinkMission
+from microrad.link.inputs import Input, Tables, margin_or_none, moved
 
 DECADES = 6
 """How far from its own value an input is looked for, up and down."""
@@ -45,19 +44,21 @@ class Solved:
 
 
 def solve(
-    mission: LinkMission,
+    mission: Tables,
     found: tuple[Input, ...],
-    margin_db: Callable[[LinkMission], float],
+    unit: str,
+    margin_db: Callable[[Tables], float],
     required_db: float,
-    possible: Callable[[LinkMission], bool],
+    possible: Callable[[Tables], bool],
 ) -> Solved:
     """Where an input leaves a margin, looked for in steps and then found to the last digits.
 
-    ``found`` is the input, or its axes, which keep their proportion. A value that its rule or ``possible`` does not
-    allow leaves none. Raises ValueError for an input that is 0 and no decibels, which no factor moves.
+    ``found`` is the input in its ``unit``, or its axes, which keep their proportion. A value that its rule or
+    ``possible`` does not allow leaves none. Raises ValueError for an input that is 0 and no decibels, which no factor
+    moves.
     """
     value, count = max(each.value for each in found), DECADES * STEPS
-    linear = unit_of(mission, found[0].field, found[0].rule).startswith("dB")
+    linear = unit.startswith("dB")
     if not linear and value == 0.0:
         raise ValueError(f"{found[0].key} is 0, which no factor moves: give it a value to begin with")
 

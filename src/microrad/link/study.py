@@ -4,6 +4,7 @@ import difflib
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 
@@ -12,10 +13,12 @@ from microrad.core import kept
 from microrad.core.budget import Line
 from microrad.core.units import format_quantity
 from microrad.link import pointing
-from microrad.link.partner_search import Finding, Tracking, finding, tracking
+from microrad.link.partner_search import Finding, Sent, Tracking, finding, tracking
 from microrad.link.under_jitter import Performance, error_rad, margin_db, of_jitter, required_error_rad, stated_outage
 from microrad.mission.file import LinkFile
 from microrad.mission.model import LinkMission, Source, source_text
+
+_File = TypeVar("_File", bound=LinkFile)
 
 STATIC_MARGIN = "Static margin"
 """What the margin at the static pointing error is called where the margin is the one under a jitter."""
@@ -54,10 +57,12 @@ class LinkStudy:
     The communication budget is made at the error of `under_jitter.error_rad`: under a jitter its margin is the one
     that is kept but for the outage, and the margin at the static pointing error stands below it. ``receiver_noise`` are
     the noise terms of the communication receiver at the received power, where it is given by what it is made of.
-    ``tornados`` has one of each budget, in the same order. ``beam_radius`` is None unless the mission has one.
+    ``data`` is the communication link assembled. ``tornados`` has one of each budget, in the same order.
+    ``beam_radius`` is None unless the mission has one.
     """
 
     file: LinkFile
+    data: link.DataLink
     open_loop: pointing.OpenLoopPointing | None
     communication: link.LinkBudget
     beacon: link.LinkBudget | None
@@ -87,7 +92,7 @@ class LinkStudy:
         return tuple(warning for budget in self.budgets for warning in budget.warnings)
 
 
-def solve_rate(file: LinkFile) -> LinkFile:
+def solve_rate(file: _File) -> _File:
     """The file with a data rate of "largest" replaced by the rate that it stands for.
 
     Raises `LinkError` when no rate has the required margin.
@@ -95,8 +100,9 @@ def solve_rate(file: LinkFile) -> LinkFile:
     m = file.mission
     if not math.isnan(m.communication.data_rate_bit_s):
         return file
-    q, own, error = m.requirement, file.sources["communication.data_rate"], required_error_rad(m)
-    rate = link.largest_data_rate(m, q.margin_db, error)
+    data, q, own = link.of(m), m.requirement, file.sources["communication.data_rate"]
+    error = required_error_rad(data)
+    rate = link.largest_data_rate(data, q.margin_db, error)
     beam = m.communication.model_copy(update={"data_rate_bit_s": rate})
     at = f"{q.margin_db:g} dB at {format_quantity(error, 'rad')}"
     solved = replace(own, value=format_quantity(rate, "bit/s"), comment=f"solved for: the largest with {at}")
@@ -134,16 +140,12 @@ def solve(file: LinkFile, key: str) -> Solution:
     found = tuple(each for each in every if key in (each.key, each.shown))
     if not found:
         raise ValueError(_no_such_key(key, dict.fromkeys(each.key for each in every)))
-    of, required = "communication", m.requirement.margin_db
-    if found[0].table == "beacon":
-        of, required = "beacon", 0.0
-        solved = link.solve(m, found, lambda n: link.beacon_budget(n, sources).margin_db, required, link.fits("beacon"))
-    elif found[0].table == "answer":
-        of, required = "answer", 0.0
-        solved = link.solve(m, found, lambda n: link.answer_budget(n, sources).margin_db, required, link.fits("answer"))
+    of, unit = found[0].table, link.unit_of(found[0], m.conventions.strehl)
+    if of in ("beacon", "answer"):
+        required, margin, possible = 0.0, link.beam_margin(of, sources), link.fits(of)
     else:
-        solved = link.solve(m, found, margin_db, required, link.lit)
-    unit = link.unit_of(m, found[0].field, found[0].rule)
+        of, required, margin, possible = "communication", m.requirement.margin_db, _margin_db, link.lit
+    solved = link.solve(m, found, unit, margin, required, possible)
     if not solved.intervals:
         return Solution(key, unit, of, required, solved, max(each.value for each in found), file)
     first, last = solved.intervals[0], solved.intervals[-1]
@@ -171,93 +173,106 @@ def run(file: LinkFile, parts: kept.Kept = kept.NOTHING) -> LinkStudy:
     Raises ValueError with the reason when a receiver does not take the data rate, or a scan has no time to detect.
     """
     file = solve_rate(file)
-    m, sources = file.mission, file.sources
-    beacon = None if m.beacon is None else link.beacon_budget(m, sources)
-    answer = None if m.answer is None else link.answer_budget(m, sources)
-    open_loop = None if m.pointing is None else pointing.open_loop_budget(m, sources)
-    light = tracking(file, answer)
-    communication, receiver = communication_budget(m, sources), link.receiver(m)
-    rate = m.communication.data_rate_bit_s
-    noise = () if receiver is None else receiver.noise_lines(communication.received_power_w, rate)
+    m, sources, shared = file.mission, file.sources, link.Shared.of(file.mission)
+    beacon, answer = (
+        None if table is None else Sent(table, link.beam_budget(name, shared, table, sources))
+        for name, table in (("beacon", m.beacon), ("answer", m.answer))
+    )
+    open_loop = None if m.pointing is None else pointing.open_loop_budget(m.pointing, shared, m.beacon, sources)
+    light = tracking(m.acquisition, m.terminals.leo_aperture_m, answer, sources)
+    data = link.of(m)
+    communication, rate = communication_budget(data, sources), m.communication.data_rate_bit_s
+    noise = () if data.receiver is None else data.receiver.noise_lines(communication.received_power_w, rate)
+    found = None
+    if m.acquisition is not None and beacon is not None and answer is not None:
+        assert open_loop is not None  # the relations of the mission
+        found = parts.part(finding, m.acquisition, data, open_loop.error, beacon, answer, light)
+    budgets = (communication, *(each.budget for each in (beacon, answer) if each is not None))
     return LinkStudy(
         file=file,
+        data=data,
         open_loop=open_loop,
         communication=communication,
-        beacon=beacon,
-        answer=answer,
+        beacon=None if beacon is None else beacon.budget,
+        answer=None if answer is None else answer.budget,
         receiver_noise=noise,
-        largest_rate_bit_s=largest_rate(m),
-        tornados=tornados(file, communication, beacon, answer),
-        under_jitter=of_jitter(m),
+        largest_rate_bit_s=largest_rate(data),
+        tornados=tornados(m, sources, budgets),
+        under_jitter=of_jitter(data),
         tracking=light,
-        point_ahead=point_ahead(m),
-        beam_radius=beam_radius(m),
-        finding=parts.part(finding, m, open_loop, beacon, answer, light),
+        point_ahead=point_ahead(data),
+        beam_radius=beam_radius(data),
+        finding=found,
     )
 
 
-def communication_budget(m: LinkMission, sources: Mapping[str, Source]) -> link.LinkBudget:
+def communication_budget(data: link.DataLink, sources: Mapping[str, Source]) -> link.LinkBudget:
     """The budget of the communication link at `under_jitter.error_rad`, with the static margin under a jitter.
 
     Raises `ValueError` for a data rate that the receiver does not take.
     """
-    if m.jitter is None:
-        return link.communication_budget(m, sources)
+    static = link.communication_budget(data, sources)
+    if data.jitter is None:
+        return static
     stated = source_text(sources, "jitter.bias", "jitter.rms", "requirement.outage")
-    given = f"error that the jitter exceeds for {100 * stated_outage(m):g} % of the time: {stated}"
-    found = link.communication_budget(m, sources, pointing_error_rad=error_rad(m), given_source=given)
-    static = link.communication_budget(m, sources)
-    basis = f"at {format_quantity(m.communication.pointing_error_rad, 'rad')} of pointing error, without the jitter"
+    given = f"error that the jitter exceeds for {100 * stated_outage(data.requirement):g} % of the time: {stated}"
+    found = link.communication_budget(data, sources, pointing_error_rad=error_rad(data), given_source=given)
+    basis = f"at {format_quantity(data.table.pointing_error_rad, 'rad')} of pointing error, without the jitter"
     line = replace(static.totals[-1], name=STATIC_MARGIN, basis=basis)
     return replace(found, totals=(*found.totals, line))
 
 
 def tornados(
-    file: LinkFile, communication: link.LinkBudget, beacon: link.LinkBudget | None, answer: link.LinkBudget | None
+    m: LinkMission, sources: Mapping[str, Source], budgets: tuple[link.LinkBudget, ...]
 ) -> tuple[link.Tornado, ...]:
-    """What moves the margin of each budget."""
-    m, sources = file.mission, file.sources
-    swings = link.swings(m, sources, ("jitter", "requirement", *link.LINK_TABLES), margin_db)
-    found = [link.Tornado(communication.name, communication.margin_db, swings)]
-    for budget in (beacon, answer):
-        if budget is not None:
-            swings = link.beam_tornado(m, sources, "beacon" if budget is beacon else "answer")
-            found.append(link.Tornado(budget.name, budget.margin_db, swings))
-    return tuple(found)
+    """What moves the margin of each budget, communication first."""
+    tables = ("jitter", "requirement", *link.LINK_TABLES)
+    swings = [link.swings(m, sources, tables, m.conventions.strehl, _margin_db, link.lit)]
+    swings += [link.beam_tornado(m, sources, each.name.lower()) for each in budgets[1:]]
+    return tuple(link.Tornado(each.name, each.margin_db, own) for each, own in zip(budgets, swings, strict=True))
 
 
-def beam_radius(m: LinkMission) -> BeamRadius | None:
+def _margin_db(m: LinkMission) -> float:
+    return margin_db(link.of(m))
+
+
+def beam_radius(data: link.DataLink) -> BeamRadius | None:
     """What another radius of the data's beam would bring, or None where the mission gives none.
 
     An aperture that grows while the radius stays gives no more light: the radius has to grow with it.
     """
-    beam = m.communication.beam
+    beam = data.table.beam
     if beam is None or beam.radius_m is None:
         return None
-    radii = [*(m.terminals.leo_aperture_m / 2.0 * _OF_APERTURE), beam.radius_m]
+    radii = [*(data.shared.terminals.leo_aperture_m / 2.0 * _OF_APERTURE), beam.radius_m]
 
     def at(radius_m: float) -> float:
-        changed = m.with_value("communication.beam.radius_m", radius_m)
-        return link.margin_or_none(changed, margin_db) if link.lit(changed) else -math.inf
+        table = data.table.with_value("beam.radius_m", radius_m)
+        try:
+            changed = link.assembled(data.shared, table, data.requirement, data.jitter)
+        except ValueError:  # the obscuration stops it
+            return -math.inf
+        return link.margin_or_none(changed, margin_db)
 
     margins = [at(float(each)) for each in radii]
     best = max(range(len(radii)), key=margins.__getitem__)
     return BeamRadius(float(radii[best]), margins[best] - margins[-1])
 
 
-def largest_rate(m: LinkMission) -> float:
+def largest_rate(data: link.DataLink) -> float:
     """Data rate with the required margin at `under_jitter.required_error_rad`, or nan when there is none."""
     try:
-        return link.largest_data_rate(m, m.requirement.margin_db, required_error_rad(m))
+        return link.largest_data_rate(data, data.requirement.margin_db, required_error_rad(data))
     except link.LinkError:
         return math.nan
 
 
-def point_ahead(m: LinkMission) -> PointAheadEffect | None:
+def point_ahead(data: link.DataLink) -> PointAheadEffect | None:
     """What the mission's point-ahead is to its beam and its mirror, or None where it is not given."""
-    if m.point_ahead is None:
+    ahead = data.shared.point_ahead
+    if ahead is None:
         return None
-    angle = pointing.point_ahead_rad(m.point_ahead.transverse_velocity_m_s)
-    fall, error = link.communication_beam(m).fall, m.communication.pointing_error_rad
+    angle = pointing.point_ahead_rad(ahead.transverse_velocity_m_s)
+    fall, error = data.beam.fall, data.table.pointing_error_rad
     loss = float(fall.loss_db(error + angle) - fall.loss_db(error))
-    return PointAheadEffect(angle, m.point_ahead.corrected, angle / fall.half_angle_rad, loss, 2.0 * angle)
+    return PointAheadEffect(angle, ahead.corrected, angle / fall.half_angle_rad, loss, 2.0 * angle)

@@ -3,10 +3,10 @@
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Literal
 
-from microrad.link.budget import answer_budget, beacon_budget
-from microrad.link.inputs import Input, fits, inputs, lit, margin_or_none, unit_of
+from microrad.link.budget import beam_budget
+from microrad.link.inputs import Input, Tables, fits, inputs, margin_or_none, unit_of
+from microrad.link.model import Shared
 from microrad.mission.fields import Quantity, Share
 from microrad.mission.model import LinkMission, Source, source_text
 
@@ -16,8 +16,6 @@ STEP_DB = 0.5
 """How far a quantity in decibels is moved."""
 _BY_TEN = ("bit_error_ratio", "outage")  # shares that are judged by their order of magnitude
 _TIE_DIGITS = 6  # of decibels: equal swings stand as the mission has their keys, not as a processor rounds them
-
-Margin = Callable[[LinkMission], float]
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,55 +51,53 @@ class Tornado:
     swings: tuple[Swing, ...]
 
 
-def beam_tornado(
-    mission: LinkMission, sources: Mapping[str, Source], name: Literal["beacon", "answer"]
-) -> tuple[Swing, ...]:
-    """The margin of the beacon or of its answer over each of its inputs, as `swings` moves them.
+def beam_margin(name: str, sources: Mapping[str, Source]) -> Callable[[LinkMission], float]:
+    """The margin of the "beacon" or of the "answer", asked of a mission, which has that beam."""
+    return lambda m: beam_budget(name, Shared.of(m), getattr(m, name), sources).margin_db
+
+
+def beam_tornado(m: LinkMission, sources: Mapping[str, Source], name: str) -> tuple[Swing, ...]:
+    """The margin of the "beacon" or of the "answer" over each of its inputs, as `swings` moves them.
 
     Raises `ValueError` for a beam that the mission has not.
     """
-    budget = beacon_budget if name == "beacon" else answer_budget
     tables = ("terminals", name, "channel", "point_ahead")
-    return swings(mission, sources, tables, lambda m: budget(m, sources).margin_db, fits(name))
+    return swings(m, sources, tables, m.conventions.strehl, beam_margin(name, sources), fits(name))
 
 
 def swings(
-    mission: LinkMission,
+    mission: Tables,
     sources: Mapping[str, Source],
     tables: tuple[str, ...],
-    margin_db: Margin,
-    possible: Callable[[LinkMission], bool] = lit,
+    strehl: str,
+    margin_db: Callable[[Tables], float],
+    possible: Callable[[Tables], bool],
 ) -> tuple[Swing, ...]:
     """A margin over each input of these tables, one at a time, the largest swing first.
 
     Every quantity is moved by 10 % both ways, one in decibels by 0.5 dB, a bit error ratio and an outage by a factor of
-    ten; none beyond the bounds that its key has, nor to a mission that is not ``possible``, by default one whose
-    obscuration stops the beam. Inputs that do not move the margin are left out.
+    ten; none beyond the bounds that its key has, nor to a mission that is not ``possible``, such as one whose
+    obscuration stops the beam. ``strehl`` is the convention by which a Strehl is read. Inputs that do not move the
+    margin are left out.
     """
-    found = [_swing(mission, sources, each, margin_db, possible) for name in tables for each in inputs(mission, name)]
+
+    def swing(each: Input) -> Swing:
+        ends = _ends(each.field, each.value, each.rule, strehl)
+        low, high = (_nearest(mission, each, end, possible) for end in ends)
+        return Swing(
+            key=each.shown,
+            unit=unit_of(each, strehl),
+            value=each.value,
+            low=low,
+            high=high,
+            margin_low_db=margin_or_none(each.moved(mission, low), margin_db),
+            margin_high_db=margin_or_none(each.moved(mission, high), margin_db),
+            kind=sources[each.key].kind if each.key in sources else "",
+            source=source_text(sources, each.key),
+        )
+
+    found = [swing(each) for name in tables for each in inputs(mission, name)]
     return tuple(sorted((s for s in found if s.swing_db > 1e-9), key=lambda swing: -round(swing.swing_db, _TIE_DIGITS)))
-
-
-def _swing(
-    mission: LinkMission,
-    sources: Mapping[str, Source],
-    each: Input,
-    margin_db: Margin,
-    possible: Callable[[LinkMission], bool],
-) -> Swing:
-    ends = _ends(each.field, each.value, each.rule, mission.conventions.strehl)
-    low, high = (_nearest(mission, each, end, possible) for end in ends)
-    return Swing(
-        key=each.shown,
-        unit=unit_of(mission, each.field, each.rule),
-        value=each.value,
-        low=low,
-        high=high,
-        margin_low_db=margin_or_none(each.moved(mission, low), margin_db),
-        margin_high_db=margin_or_none(each.moved(mission, high), margin_db),
-        kind=sources[each.key].kind if each.key in sources else "",
-        source=source_text(sources, each.key),
-    )
 
 
 def _ends(field: str, value: float, rule: Quantity, strehl: str) -> tuple[float, float]:
@@ -118,7 +114,7 @@ def _ends(field: str, value: float, rule: Quantity, strehl: str) -> tuple[float,
     return max(low, least), min(high, most)
 
 
-def _nearest(mission: LinkMission, each: Input, end: float, possible: Callable[[LinkMission], bool]) -> float:
+def _nearest(mission: Tables, each: Input, end: float, possible: Callable[[Tables], bool]) -> float:
     """The end of a swing, its step halved until there is such a mission."""
     while end != each.value and not possible(each.moved(mission, end)):
         end = (each.value + end) / 2.0

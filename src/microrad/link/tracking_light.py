@@ -1,6 +1,7 @@
 """The light on the sensor of the fine-pointing loop."""
 
-from microrad.link.budget import answer_budget
+from microrad.link.budget import beam_budget
+from microrad.link.model import Shared
 from microrad.mission.file import MissionFile
 
 
@@ -15,4 +16,4 @@ def tracking_light_w(file: MissionFile) -> float | None:
         return None
     if cell.received_power_w is not None:
         return cell.received_power_w
-    return answer_budget(file.mission, file.sources).received_power_w
+    return beam_budget("answer", Shared.of(file.mission), file.mission.answer, file.sources).received_power_w

@@ -10,7 +10,7 @@ import numpy as np
 from microrad import link
 from microrad.core.arrays import Floats
 from microrad.link import pointing
-from microrad.mission.model import LinkMission
+from microrad.mission.tables.link import LinkRequirement
 from microrad.mission.tables.pointing import JitterTable
 
 _STEPS = 4000  # of the radial error, for a distribution that is known and not sampled
@@ -34,25 +34,24 @@ class Exposure:
     beyond: Callable[[float], float]
 
     @classmethod
-    def of(cls, m: LinkMission, quantile_rad: float, beyond: Callable[[float], float]) -> "Exposure":
-        """The mission's link under errors of which these two are known.
+    def of(cls, data: link.DataLink, quantile_rad: float, beyond: Callable[[float], float]) -> "Exposure":
+        """The link under errors of which these two are known.
 
         Raises `ValueError` for a data rate that the receiver does not take.
         """
-        received_dbm = link.received_on_axis_dbm(m)
-        on_axis_db = received_dbm - float(link.required_dbm(m, m.communication.data_rate_bit_s))
-        lost_db = link.dbm(m.communication.transmit_power_w) - received_dbm
-        fall, ahead_rad = link.communication_beam(m).fall, link.point_ahead_rad(m)
-        return cls(fall, on_axis_db, lost_db, ahead_rad, quantile_rad, beyond)
+        received_dbm = link.received_on_axis_dbm(data)
+        on_axis_db = received_dbm - float(link.required_dbm(data, data.table.data_rate_bit_s))
+        lost_db = link.dbm(data.table.transmit_power_w) - received_dbm
+        return cls(data.beam.fall, on_axis_db, lost_db, data.shared.point_ahead_rad, quantile_rad, beyond)
 
     @classmethod
-    def stated(cls, m: LinkMission) -> "Exposure":
-        """That of a mission whose loop is not simulated: under its jitter, or at its static error all the time."""
-        error = error_rad(m)
-        if m.jitter is None:
-            return cls.of(m, error, lambda reach_rad: float(error > reach_rad))
-        jitter = _given(m.jitter)
-        return cls.of(m, error, lambda reach_rad: float(pointing.radial_survival(jitter, reach_rad)))
+    def stated(cls, data: link.DataLink) -> "Exposure":
+        """That of a link whose loop is not simulated: under its jitter, or at its static error all the time."""
+        error = error_rad(data)
+        if data.jitter is None:
+            return cls.of(data, error, lambda reach_rad: float(error > reach_rad))
+        jitter = _given(data.jitter)
+        return cls.of(data, error, lambda reach_rad: float(pointing.radial_survival(jitter, reach_rad)))
 
     @property
     def outage_loss_db(self) -> float:
@@ -168,48 +167,50 @@ class Performance:
     fade_warning: str
 
 
-def of_jitter(m: LinkMission) -> Performance | None:
+def of_jitter(data: link.DataLink) -> Performance | None:
     """The link under the mission's own jitter, or None where it gives none."""
-    if m.jitter is None:
+    if data.jitter is None:
         return None
-    jitter, speed = _given(m.jitter), 2.0 * math.pi * m.jitter.bandwidth_hz
+    jitter, speed = _given(data.jitter), 2.0 * math.pi * data.jitter.bandwidth_hz
     rms_x, rms_y = jitter.rms_rad
-    motion = pointing.SpectralMotion((rms_x, rms_y), (speed * rms_x, speed * rms_y), (0.0, 0.0), m.jitter.bandwidth_hz)
-    return performance(m, "jitter as given", "", "", Known.of(jitter), jitter, motion)
+    motion = pointing.SpectralMotion(
+        (rms_x, rms_y), (speed * rms_x, speed * rms_y), (0.0, 0.0), data.jitter.bandwidth_hz
+    )
+    return performance(data, "jitter as given", "", "", Known.of(jitter), jitter, motion)
 
 
-def error_rad(m: LinkMission) -> float:
+def error_rad(data: link.DataLink) -> float:
     """Radial pointing error (rad) at which the communication link is judged where no loop is simulated.
 
     Under a table `[jitter]` the one that is exceeded for the share `requirement.outage` of the time; the static
     `communication.pointing_error` without.
     """
-    if m.jitter is None:
-        return m.communication.pointing_error_rad
-    return _exact_quantile_rad(_given(m.jitter), stated_outage(m))
+    if data.jitter is None:
+        return data.table.pointing_error_rad
+    return _exact_quantile_rad(_given(data.jitter), stated_outage(data.requirement))
 
 
-def stated_outage(m: LinkMission) -> float:
+def stated_outage(requirement: LinkRequirement) -> float:
     """Share of the time that the required margin may be missed, in a mission that has a jitter or a loop."""
-    share = m.requirement.outage
+    share = requirement.outage
     assert share is not None  # such a mission has to state it
     return share
 
 
-def required_error_rad(m: LinkMission) -> float:
+def required_error_rad(data: link.DataLink) -> float:
     """Radial pointing error (rad) at which the required margin is wanted where a data rate is solved for.
 
     That of `error_rad` under a table `[jitter]`, `requirement.pointing_error` without.
     """
-    return m.requirement.pointing_error_rad if m.jitter is None else error_rad(m)
+    return data.requirement.pointing_error_rad if data.jitter is None else error_rad(data)
 
 
-def margin_db(m: LinkMission) -> float:
+def margin_db(data: link.DataLink) -> float:
     """Margin (dB) of the communication link at `error_rad`: the one of its budget.
 
     Raises `ValueError` for a data rate that the receiver does not take.
     """
-    return Exposure.stated(m).margin_db
+    return Exposure.stated(data).margin_db
 
 
 def _given(table: JitterTable) -> pointing.Jitter:
@@ -218,7 +219,7 @@ def _given(table: JitterTable) -> pointing.Jitter:
 
 
 def performance(
-    m: LinkMission,
+    data: link.DataLink,
     source: str,
     controller: str,
     mirror: str,
@@ -227,8 +228,8 @@ def performance(
     motion: pointing.SpectralMotion | None,
 ) -> Performance:
     """The link under these errors; ``motion`` is what their spectrum says, None where it is not known."""
-    q, kept = m.requirement, 1.0 - stated_outage(m)
-    under = Exposure.of(m, spread.quantile_rad(kept), spread.beyond)
+    q, kept = data.requirement, 1.0 - stated_outage(data.requirement)
+    under = Exposure.of(data, spread.quantile_rad(kept), spread.beyond)
     fall, ahead = under.fall, under.ahead_rad
     half, shifted = fall.half_angle_rad, with_point_ahead(jitter, ahead)
     fades_per_s, fade_s, warning = _fades(shifted, motion, fall, under.on_axis_db - q.margin_db)
@@ -244,9 +245,9 @@ def performance(
         possible=under.possible,
         outage=under.short_of(0.0),
         short=under.short_of(q.margin_db),
-        data_rate_bit_s=_rate(m, under.outage_loss_db),
+        data_rate_bit_s=_rate(data, under.outage_loss_db),
         best=_best(spread, kept, half, ahead),
-        uncoded_penalty_db=_uncoded(m, shifted, half),
+        uncoded_penalty_db=_uncoded(data, shifted, half),
         fades_per_s=fades_per_s,
         fade_s=fade_s,
         fade_warning=warning,
@@ -283,9 +284,9 @@ def _best(spread: Spread, probability: float, half_angle_rad: float, ahead_rad: 
     )
 
 
-def _rate(m: LinkMission, loss_db: float) -> float:
+def _rate(data: link.DataLink, loss_db: float) -> float:
     try:
-        return link.rate_at_loss(m, m.requirement.margin_db, loss_db)
+        return link.rate_at_loss(data, data.requirement.margin_db, loss_db)
     except link.LinkError:
         return math.nan
 
@@ -303,15 +304,15 @@ def _fades(
     return float(found.per_second), float(found.mean_duration_s), motion.warning
 
 
-def _uncoded(m: LinkMission, jitter: pointing.Jitter, half_angle_rad: float) -> float:
+def _uncoded(data: link.DataLink, jitter: pointing.Jitter, half_angle_rad: float) -> float:
     """Extra power that brings the mean bit error ratio back to the target, with the curve of the mission's receiver.
 
     nan for a receiver of which only the measured sensitivity is known, infinite where no power makes up for it.
     """
-    receiver = link.receiver(m)
+    receiver = data.receiver
     if receiver is None:
         return math.nan
-    rate = m.communication.data_rate_bit_s
+    rate = data.table.data_rate_bit_s
     needed = float(receiver.required_power_w(rate))
     try:
         return pointing.uncoded_penalty_db(

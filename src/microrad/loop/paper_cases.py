@@ -10,7 +10,7 @@ from microrad.loop import control
 from microrad.loop.sine_run import HysteresisLoop, Setup, Trace, hysteresis_loop, margins, track_sine
 from microrad.mirror import MirrorParts, Variant
 from microrad.mirror.hysteresis import secant_gain
-from microrad.mission.model import Control, Mission, Scenario
+from microrad.mission.model import Control, Conventions, Mission, Requirement, Scenario
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,7 +102,7 @@ def worst(runs: tuple[Run, ...], statistic: str, variant: Variant = Variant.GIVE
     return max(candidates, key=lambda r: r.trace.left_rad(statistic))
 
 
-def residual_rad(m: Mission, trace: Trace) -> float:
+def residual_rad(required: Requirement, conventions: Conventions, trace: Trace) -> float:
     """The residual that the link sees, in the mission's statistic and convention (per axis, or radial)."""
-    one_axis = trace.left_rad(m.requirement.residual_statistic)
-    return one_axis * math.sqrt(2.0) if m.conventions.residual == "radial" else one_axis
+    one_axis = trace.left_rad(required.residual_statistic)
+    return one_axis * math.sqrt(2.0) if conventions.residual == "radial" else one_axis

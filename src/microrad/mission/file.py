@@ -191,8 +191,7 @@ def load_link(path: str | Path, *, text: str | None = None) -> LinkFile:
 
     With `text`, the mission is that text, as if it stood at `path`. Raises `MissionError` with every fault of it.
     """
-    file = either_file(open_mission(path, text=text))
-    return LinkFile(file.mission, file.path, file.text, file.sha256, file.sources)
+    return either_file(open_mission(path, text=text))
 
 
 def load_mirror(path: str | Path) -> MirrorFile:
@@ -207,10 +206,10 @@ def load_mirror(path: str | Path) -> MirrorFile:
     return _mirror_file(document, mirror)
 
 
-def assumptions(mission_file: LinkFile) -> tuple[tuple[str, str, str], ...]:
+def assumptions(sources: Mapping[str, Source]) -> tuple[tuple[str, str, str], ...]:
     """Key, raw value and source of every value whose comment calls it an assumption, or derived from others."""
-    items = mission_file.sources.items()
-    return tuple((key, source.value, source.text) for key, source in items if source.kind in ("assumption", "derived"))
+    chosen = ("assumption", "derived")
+    return tuple((key, source.value, source.text) for key, source in sources.items() if source.kind in chosen)
 
 
 # --------------------------------------------------------------------------------------------------------------- files
@@ -504,7 +503,7 @@ def _dotted(table: str, location: Iterable[object]) -> str:
     return ".".join(str(part) for part in (table, *location) if part != "")
 
 
-def changed_from_shipped(file: MissionFile) -> tuple[tuple[str, str, str], ...]:
+def changed_from_shipped(sources: Mapping[str, Source]) -> tuple[tuple[str, str, str], ...]:
     """Keys that name the paper as their source but differ from the paper's mission: (key, value, value there)."""
-    named = {key: source.value for key, source in file.sources.items() if source.kind == "paper"}
+    named = {key: source.value for key, source in sources.items() if source.kind == "paper"}
     return tuple((key, value, there) for key, value in named.items() if (there := of_paper(key, value)))

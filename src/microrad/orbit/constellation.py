@@ -6,15 +6,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from microrad import orbit
+from microrad import link, orbit
 from microrad.core.arrays import Floats
 from microrad.core.progress import Progress
 from microrad.mission.file import LinkFile
-from microrad.mission.model import LinkMission
 from microrad.mission.tables.operations import Constellation
 from microrad.orbit import operations
 from microrad.orbit.contacts import Sampled, coarse_step_s, contacts_with_each
 from microrad.orbit.day.flow import PointingLoss, closings, rate_table
+from microrad.orbit.day.flow import table as operations_table
 from microrad.orbit.from_mission import orbits_table
 
 Span = tuple[float, float]
@@ -105,8 +105,9 @@ def run(
     orbits that do not hold.
     """
     m, folder, contents = file.mission, file.path.parent, file.contents
-    c, rates = table(m), rate_table(closings(m, loss))
-    orbits, pair = orbits_table(m), orbit.pair(m, folder, contents)
+    c = table(m.constellation)
+    rates = rate_table(closings(operations_table(m.operations), link.of(m), loss))
+    orbits, pair = orbits_table(m.orbit), orbit.pair(m.orbit, m.terminals, folder, contents)
     own = tuple(orbit.satellites(c, orbits, pair.epoch, folder, contents))
     relays = orbit.relays(c, orbits, pair.epoch)
     furthest = 0.0 if rates is None else rates.steps[-1].largest_range_m
@@ -138,11 +139,11 @@ def run(
     )
 
 
-def table(m: LinkMission) -> Constellation:
+def table(given: Constellation | None) -> Constellation:
     """The mission's table of its constellation; `operations.OperationsError` without one."""
-    if m.constellation is None:
+    if given is None:
         raise operations.OperationsError("the mission has no table [constellation]: microrad init writes one")
-    return m.constellation
+    return given
 
 
 def _planned(

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from microrad.mission.file import NamedFile, content_of
-from microrad.mission.model import LinkMission
+from microrad.mission.tables.link import Terminals
 from microrad.mission.tables.operations import Constellation, Downlink
 from microrad.mission.tables.orbit import Orbits, OrbitTable, VisibilityLimits
 from microrad.orbit.analytic import GeostationarySlot, KeplerOrbit, node_of_local_time, sun_synchronous_inclination_rad
@@ -45,22 +45,23 @@ class Pair:
         return self.span_s[0], self.span_s[1] + self.tail_s
 
 
-def pair(m: LinkMission, folder: Path, contents: Contents = ()) -> Pair:
-    """The terminals of a mission with a table `orbit`; files are looked for in ``contents``, and then in ``folder``.
+def pair(orbits: Orbits | None, ends: Terminals, folder: Path, contents: Contents = ()) -> Pair:
+    """The terminals of a mission on their orbits; files are looked for in ``contents``, and then in ``folder``.
 
     Args:
-        m: the mission.
+        orbits: the mission's table `orbit`.
+        ends: its table `terminals`, with their names.
         folder: the folder of its file.
         contents: the files that it names, where they were read with it.
 
     Raises `OrbitError` for an orbit that is none, or that does not hold over the mission's span.
     """
-    orbits = orbits_table(m)
+    orbits = orbits_table(orbits)
     try:
         epoch = Epoch(orbits.epoch)
     except OrbitError as error:
         raise OrbitError(f"orbit.epoch: {error}") from None
-    names = m.terminals.called("leo"), m.terminals.called("geo")
+    names = ends.called("leo"), ends.called("geo")
     if names[0] == names[1]:  # two terminals of one make
         names = f"{names[0]} (own)", f"{names[1]} (partner)"
     found, tail = [], TAIL_S
@@ -76,11 +77,11 @@ def pair(m: LinkMission, folder: Path, contents: Contents = ()) -> Pair:
     return Pair(epoch, earth, found[0], found[1], (0.0, orbits.duration_s), tail)
 
 
-def orbits_table(m: LinkMission) -> Orbits:
+def orbits_table(given: Orbits | None) -> Orbits:
     """The mission's table of orbits; `OrbitError` without one."""
-    if m.orbit is None:
+    if given is None:
         raise OrbitError("the mission has no table [orbit]: microrad init writes one")
-    return m.orbit
+    return given
 
 
 def _tail(orbit: Orbit, epoch: Epoch, duration_s: float) -> float:
@@ -167,9 +168,9 @@ def _names(sets: Sequence[ElementSet], path: Path) -> list[str]:
     return names
 
 
-def repeats(c: Constellation, m: LinkMission) -> bool:
+def repeats(c: Constellation, orbits: Orbits) -> bool:
     """Whether the constellation has satellites: from a file, or from elements that its pattern can repeat."""
-    return c.pattern == "file" or orbits_table(m).leo.kind in REPEATED
+    return c.pattern == "file" or orbits.leo.kind in REPEATED
 
 
 def satellites(

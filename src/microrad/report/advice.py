@@ -7,7 +7,7 @@ from microrad.core.units import format_quantity
 from microrad.link import study as link_study
 from microrad.link.requirement import Requirement
 from microrad.link.study import LinkStudy
-from microrad.mission.model import LinkMission
+from microrad.mission.tables.link import Beam
 
 _MOST = 10.0  # times the power that there is: more of it is no advice
 
@@ -21,7 +21,7 @@ def of_links(study: LinkStudy, r: Requirement) -> str:
         return of_cone(study, r)
     if r.subject == "communication" and m.jitter is not None and _factor(r) > _MOST and max(m.jitter.rms_rad) > 0.0:
         return _of_jitter(study, r)
-    return of_power(m, r, next(t for t in study.tornados if t.of.lower() == r.subject))
+    return of_power(getattr(m, r.subject), r, next(t for t in study.tornados if t.of.lower() == r.subject))
 
 
 def of_cone(study: LinkStudy, r: Requirement) -> str:
@@ -32,12 +32,11 @@ def of_cone(study: LinkStudy, r: Requirement) -> str:
     return at_least(r, "beacon.divergence", needed, "rad")
 
 
-def of_power(m: LinkMission, r: Requirement, tornado: link.Tornado) -> str:
+def of_power(beam: Beam, r: Requirement, tornado: link.Tornado) -> str:
     """What to change for a margin: the transmit power, or what moves it most where that would be far too much."""
     factor = _factor(r)
     if factor <= _MOST:
-        power_w: float = getattr(m, r.subject).transmit_power_w
-        return at_least(r, f"{r.subject}.transmit_power", factor * power_w, "W")
+        return at_least(r, f"{r.subject}.transmit_power", factor * beam.transmit_power_w, "W")
     known = [s for s in tornado.swings if math.isfinite(s.swing_db) and not s.key.startswith("requirement.")]
     return change(r, known[0].key) if known else ""
 

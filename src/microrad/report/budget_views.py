@@ -102,7 +102,8 @@ def short(study: LinkStudy) -> list[str]:
     m, found = study.file.mission, of_links(study)
     at = f"at {quantity(m.communication.pointing_error_rad, 'rad')} of pointing error"
     if m.jitter is not None:
-        at = f"but for {outage_words(m)} under the jitter, an error of {quantity(error_rad(m), 'rad')}"
+        error = quantity(error_rad(study.data), "rad")
+        at = f"but for {outage_words(m.requirement)} under the jitter, an error of {error}"
     said = [f"The margin is received over required power, for communication {at}.", *consequences(study)[:2]]
     r = requirements.nearest(found)
     which = "Nearest to its limit is" if r.met else "What limits it is"
@@ -155,7 +156,7 @@ def sentences(study: LinkStudy) -> list[str]:
 def consequences(study: LinkStudy) -> list[str]:
     """What follows from the budgets that stands in no table: rates, swings, intensities, light, point-ahead."""
     m, found = study.file.mission, []
-    error = quantity(required_error_rad(m), "rad")
+    error = quantity(required_error_rad(study.data), "rad")
     at = f"the required {error}" if m.jitter is None else f"{error} under the jitter"
     wanted = f"the required {m.requirement.margin_db:g} dB at {at}"
     if math.isnan(study.largest_rate_bit_s):
@@ -197,7 +198,7 @@ def _radius(study: LinkStudy, other: BeamRadius) -> str:
 
 def _rate_limit(study: LinkStudy) -> str:
     """In words, that the receiver and not the link ends the data rate, or nothing."""
-    receiver = link.receiver(study.file.mission)
+    receiver = study.data.receiver
     limited = receiver is not None and study.largest_rate_bit_s >= receiver.highest_data_rate_bit_s * (1.0 - 1e-9)
     return ", the most that the receiver takes" if limited else ""
 
@@ -260,8 +261,8 @@ def performance(p: Performance, study: LinkStudy) -> str:
     narrowest = ", the narrowest of the aperture" if p.best.at_limit else ""
     return (
         f"Under the jitter: mean pointing loss {p.mean_loss_db:.2f} dB; {p.outage_loss_db:.2f} dB but for "
-        f"{outage_words(study.file.mission)}, which leaves a margin of {signed(p.margin_db, 'dB')}; below 0 dB for a "
-        f"share of {quantity(p.outage, '')} of the time; best half angle "
+        f"{outage_words(study.data.requirement)}, which leaves a margin of {signed(p.margin_db, 'dB')}; below 0 dB "
+        f"for a share of {quantity(p.outage, '')} of the time; best half angle "
         f"{quantity(p.best.half_angle_rad, 'rad')}{narrowest}. "
         f"Power that it costs: with a code {p.mean_loss_db:.2f} dB where its interleaver spans many fades, "
         f"{p.outage_loss_db:.2f} dB where it spans none; without a code {_uncoded(p)}."

@@ -9,10 +9,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
-from microrad import link
 from microrad.core.units import format_quantity
 from microrad.link import pointing
-from microrad.loop.paper_cases import residual_rad
 from microrad.mirror.hysteresis import output_amplitude
 from microrad.report.fine_pointing_words import micro, share_of_time
 from microrad.report.quantities import quantity, signed
@@ -96,7 +94,7 @@ def _orbit(study: Study) -> Stage:
 def _link(study: Study) -> Stage:
     m = study.file.mission
     c, kind = m.communication, "margin" if m.jitter is None else "static margin"
-    beam = link.communication_beam(m).fall.half_angle_rad
+    beam = study.links.data.beam.fall.half_angle_rad
     return Stage(
         "Link",
         (
@@ -159,7 +157,7 @@ def _loop(study: Study) -> Stage:
 
 def _residual(study: Study) -> Stage:
     m, run, fine = study.file.mission, study.residual, study.fine_pointing
-    left = residual_rad(m, run.trace)
+    left = study.left_rad(run)
     lines = [f"{_angle(left)} {m.requirement.residual_statistic}, {run.freq_hz:g} Hz sine"]
     if fine is not None:
         quantile_rad = fine.best.simulated["given"].quantile_rad

@@ -8,7 +8,7 @@ import numpy as np
 from microrad.core.arrays import Floats
 from microrad.link.under_jitter import required_error_rad
 from microrad.loop import sine_run as simulate
-from microrad.loop.paper_cases import Run, residual_rad
+from microrad.loop.paper_cases import Run
 from microrad.mission.model import Mission
 from microrad.report.plotting.figure import Figure
 from microrad.report.plotting.sheet import (
@@ -78,9 +78,10 @@ def margin_map(study: Study) -> Figure:
     counts = [r.photons_per_bit for r in f.readings]
     convention = f"{m.conventions.pointing_loss} pointing loss, Strehl as {m.conventions.strehl}"
     largest = f"at most {f.largest_error_rad * 1e6:.2f} µrad" if f.largest_error_rad > 0 else "not even on axis"
+    required = required_error_rad(study.links.data)
     caption = (
         f"Margin of the communication link ({convention}). For {m.requirement.margin_db:g} dB: at most "
-        f"{f.largest_rate_bit_s * 1e-6:.1f} Mbit/s at {required_error_rad(m) * 1e6:.4g} µrad{under}, or {largest} "
+        f"{f.largest_rate_bit_s * 1e-6:.1f} Mbit/s at {required * 1e6:.4g} µrad{under}, or {largest} "
         f"at {m.communication.data_rate_bit_s * 1e-6:g} Mbit/s (both solved). "
         f"Hatched between dotted lines: the band in which the {m.requirement.margin_db:g} dB contour lies over the "
         f"{len(counts)} readings of pointing loss and Strehl, the receiver unchanged. The same point implies a "
@@ -108,7 +109,7 @@ def _band(panel: Panel, rate: Floats, error: Floats, maps: Floats, required_db: 
 
 def residual_urad(study: Study) -> float:
     """The residual in the mission's statistic, in µrad."""
-    return residual_rad(study.file.mission, study.residual.trace) * 1e6
+    return study.left_rad(study.residual) * 1e6
 
 
 def hysteresis_loops(study: Study) -> Figure:

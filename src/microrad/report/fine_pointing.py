@@ -10,7 +10,6 @@ from microrad.loop.fine_pointing import FinePointingStudy, Residual, Sine
 from microrad.loop.fine_pointing.parts import DELAY
 from microrad.mirror.geometry import StrokeBudget
 from microrad.mirror.summary import unknown_dynamics
-from microrad.mission.model import Mission
 from microrad.report import fine_pointing_words as words
 from microrad.report.fine_pointing_data import parameter_units, rms_by_source, sources
 from microrad.report.plotting.figure import Figure
@@ -21,49 +20,43 @@ HEADINGS = {"given": "mission's mirror", "comparison": "comparison model", "no h
 Row = dict[str, Any]
 
 
-def context(fine: FinePointingStudy, m: Mission, figures: Sequence[Figure]) -> dict[str, Any]:
-    """What the template needs; angles in its tables are in microradians, as their headings say."""
-    required = m.requirement.pointing_error_rad
+def context(fine: FinePointingStudy, required: float, figures: Sequence[Figure]) -> dict[str, Any]:
+    """What the template needs at a required pointing error (rad); its tables have microradians, as they say."""
     variants = [v for v in HEADINGS if any(v in each.simulated for each in fine.verified)]
     return {
-        "met": fine.best.meets(required) and not unknown_dynamics(m.mirror),
-        "verdict": words.result(fine, m),
+        "met": fine.best.meets(required) and not unknown_dynamics(fine.scene.mirrors.table),
+        "verdict": words.result(fine, required),
         "theory": words.theory(fine),
-        "setting": setting(fine, m),
+        "setting": setting(fine),
         "quantile": words.share_of_time(fine.quantile),
         "required": words.given(required),
         "variants": [(v, HEADINGS[v]) for v in variants],
         "residuals": residual_rows(fine, variants, required),
         "limits": limits(fine),
-        "designs": design_rows(fine, m),
+        "designs": design_rows(fine),
         "sources": [words.source_name(name) for name in sources(fine.verified)],
         "by_source": source_rows(fine),
         "budget": budget(fine),
-        "stroke_verdict": words.stroke(fine, m),
-        "stroke": stroke(fine, m),
+        "stroke_verdict": words.stroke(fine),
+        "stroke": stroke(fine),
         "sines": sines(fine, required),
-        "amplitude": words.given(m.scenario.amplitude_rad),
+        "amplitude": words.given(fine.scene.sine_amplitude_rad),
         "figures": figures,
     }
 
 
-def setting(fine: FinePointingStudy, m: Mission) -> str:
+def setting(fine: FinePointingStudy) -> str:
     """What was simulated, in a sentence."""
-    loop, table = fine.scene.loop, m.fine_pointing
+    loop, table = fine.scene.loop, fine.scene.table
     rate = format_quantity(1.0 / loop.timing.period_s, "Hz")
     delay = format_quantity(loop.timing.delay_steps * loop.timing.step_s, "s")
     noise = words.given(loop.optical.noise_rad)
     disturbances = words.listed([f"{each.name} {words.angle(each.rms_rad)}" for each in loop.disturbances[0]])
-    text = (
-        f"Control at {rate} with {delay} of delay, sensor noise {noise} rms per axis and reading; disturbances, rms "
-        f"per axis before the loop: {disturbances}."
-    )
-    if table is None:
-        return text
     return (
-        f"{text} Simulated: {table.runs} runs of {format_quantity(table.duration_s, 's')} each, the first "
-        f"{format_quantity(table.settle_s, 's')} left out, seed {table.seed}. A design has to keep a modulus margin of "
-        f"{table.modulus_margin:g}."
+        f"Control at {rate} with {delay} of delay, sensor noise {noise} rms per axis and reading; disturbances, rms "
+        f"per axis before the loop: {disturbances}. Simulated: {table.runs} runs of "
+        f"{format_quantity(table.duration_s, 's')} each, the first {format_quantity(table.settle_s, 's')} left out, "
+        f"seed {table.seed}. A design has to keep a modulus margin of {table.modulus_margin:g}."
     )
 
 
@@ -116,7 +109,7 @@ def limits(fine: FinePointingStudy) -> list[str]:
     ]
 
 
-def design_rows(fine: FinePointingStudy, m: Mission) -> list[Row]:
+def design_rows(fine: FinePointingStudy) -> list[Row]:
     """What each controller was tuned to, its margins and what it is bound by."""
     units = parameter_units(fine)
     return [
@@ -236,7 +229,7 @@ def budget_sentences(fine: FinePointingStudy) -> list[str]:
 # ------------------------------------------------------------------------------------------------ stroke
 
 
-def stroke(fine: FinePointingStudy, m: Mission) -> Row:
+def stroke(fine: FinePointingStudy) -> Row:
     """The stroke budgets side by side, a column for each output of the mirror with and without the point-ahead."""
     ours = fine.scene.own_stroke
     groups = (

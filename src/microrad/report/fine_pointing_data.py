@@ -11,21 +11,19 @@ from microrad.loop.fine_loop.design import design_plant
 from microrad.loop.fine_pointing import Design, ErrorBudget, FinePointingStudy, Residual, Verified
 from microrad.mirror.geometry import StrokeBudget
 from microrad.mirror.summary import unknown_dynamics
-from microrad.mission.model import Mission
 from microrad.report.fine_pointing_words import room
 
 
-def data(fine: FinePointingStudy, m: Mission) -> dict[str, Any]:
+def data(fine: FinePointingStudy, required: float) -> dict[str, Any]:
     """Everything that the page shows of the study, but its spectra, which results.nc holds."""
-    required, r = m.requirement.pointing_error_rad, room(fine)
-    units = parameter_units(fine)
+    r, units = room(fine), parameter_units(fine)
     stroke = {"point_ahead_on_mirror": fine.scene.stroke, "without_point_ahead": fine.scene.stroke_without_point_ahead}
     found: dict[str, Any] = {
         "quantile": fine.quantile,
         "required_rad": required,
         "best": fine.best.design.name,
         "baseline": r.baseline.design.name,
-        "met": fine.best.meets(required) and not unknown_dynamics(m.mirror),
+        "met": fine.best.meets(required) and not unknown_dynamics(fine.scene.mirrors.table),
         "linear_bound_rms_rad": fine.optimum_rad,
         "linear_bound_holds": r.holds,
         "rms_gained_over_baseline": r.gained,

@@ -9,7 +9,9 @@ from microrad.loop.control.tuning import MARGIN
 from microrad.loop.fine_pointing import FinePointingStudy, Verified
 from microrad.mirror.geometry import StrokeBudget
 from microrad.mirror.summary import unknown_dynamics
-from microrad.mission.model import Mission
+from microrad.mission.model import Amplifier, Control
+from microrad.mission.tables.fine_pointing import FinePointing
+from microrad.mission.tables.mirror import Mirror
 
 VARIANTS = {
     "given": "on the mission's mirror",
@@ -123,14 +125,14 @@ def _sentence(text: str) -> str:
 # ------------------------------------------------------------------------------------------------ verdict
 
 
-def result(fine: FinePointingStudy, m: Mission) -> list[str]:
+def result(fine: FinePointingStudy, required: float) -> list[str]:
     """What the best controller leaves, what makes it up, and how it stands against the baseline."""
-    required, best = m.requirement.pointing_error_rad, fine.best
-    left, baseline = best.simulated["given"], fine.verified[0]
+    best, baseline = fine.best, fine.verified[0]
+    left = best.simulated["given"]
     time = share_of_time(fine.quantile)
     met = "met" if best.meets(required) else "missed"
     sentences = [
-        *not_reliable(m),
+        *not_reliable(fine.scene.mirrors.table),
         f"{best.design.name} is the best of {len(fine.verified)} controllers: on the mission's mirror the radial error "
         f"stays within {angle(left.quantile_rad)} for {time} of the time ({angle(left.rms_rad)} rms, "
         f"{angle(left.largest_rad)} at most). The {given(required)} required are {met}.",
@@ -194,20 +196,20 @@ def theory(fine: FinePointingStudy) -> list[str]:
     return sentences
 
 
-def not_reliable(m: Mission) -> list[str]:
+def not_reliable(mirror: Mirror) -> list[str]:
     """That no number of the loop may be relied on, and why, where that is so."""
-    unknown = unknown_dynamics(m.mirror)
+    unknown = unknown_dynamics(mirror)
     return [f"Not to be relied on: {unknown}."] if unknown else []
 
 
-def short(fine: FinePointingStudy, m: Mission) -> list[str]:
+def short(fine: FinePointingStudy, required: float) -> list[str]:
     """The verdict in a line each: what is left, on a sine too, what theory leaves to gain, whether the stroke does."""
-    required, left, r = m.requirement.pointing_error_rad, fine.best.simulated["given"], room(fine)
+    left, r = fine.best.simulated["given"], room(fine)
     lines = [
         f"Fine pointing under vibration and noise: {fine.best.design.name} leaves {angle(left.quantile_rad)} radial at "
         f"{share_of_time(fine.quantile)} ({angle(left.rms_rad)} rms); {given(required)} is allowed."
     ]
-    lines += [*not_reliable(m), *filter(None, [tracked(fine, required)])]
+    lines += [*not_reliable(fine.scene.mirrors.table), *filter(None, [tracked(fine, required)])]
     if r.holds:
         lines.append(
             f"Without hysteresis no linear controller can be more than {percent(r.at_baseline)} better (rms) than the "
@@ -241,7 +243,7 @@ def tracked(fine: FinePointingStudy, required_rad: float) -> str:
 # ------------------------------------------------------------------------------------------------ stroke
 
 
-def stroke(fine: FinePointingStudy, m: Mission) -> list[str]:
+def stroke(fine: FinePointingStudy) -> list[str]:
     """Whether the travel covers what the mirror has to follow, by itself and as far as the drive reaches."""
     pairs = (
         ("with the point-ahead on the mirror", fine.scene.stroke),
@@ -262,9 +264,10 @@ def stroke(fine: FinePointingStudy, m: Mission) -> list[str]:
         f"either side; the worst case needs {needed}: the travel {covers}."
     ]
     if one.usable_share < 1.0:
+        mirror = fine.scene.mirrors.table
         sentences.append(
-            f"The drive of {m.mirror.drive_min_v:g} to {m.mirror.drive_max_v:g} V about its bias of "
-            f"{m.mirror.bias_v:g} V reaches {percent(one.usable_share)} of the travel, {angle(one.available_rad)} to "
+            f"The drive of {mirror.drive_min_v:g} to {mirror.drive_max_v:g} V about its bias of "
+            f"{mirror.bias_v:g} V reaches {percent(one.usable_share)} of the travel, {angle(one.available_rad)} to "
             "either side."
         )
     sentences += [_fit(where, several) for where, several in pairs]
@@ -289,22 +292,25 @@ def _fit(where: str, several: tuple[StrokeBudget, ...]) -> str:
 # ------------------------------------------------------------------------------------------------ warnings
 
 
-def warnings(fine: FinePointingStudy, m: Mission) -> list[str]:
-    """What a reader must not overlook: limits met, stroke, designs at a bound, a loop that is not linear."""
+def warnings(fine: FinePointingStudy, paper: Control, amplifier: Amplifier) -> list[str]:
+    """What a reader must not overlook: limits met, stroke, designs at a bound, a loop that is not linear.
+
+    ``paper`` is the table of the loop that tracks the paper's sines, with its ``amplifier``.
+    """
     found = [
         f"{v.design.name} {VARIANTS.get(variant, variant)}: {limits_met(residual.shares)}"
         for v in fine.verified
         for variant, residual in v.simulated.items()
         if residual.shares
     ]
-    found += _stroke_warnings(fine, m)
+    found += _stroke_warnings(fine)
     found += _bound_warnings(fine)
-    found += _hardware_warnings(m)
+    found += _hardware_warnings(fine.scene.table, paper, amplifier)
     found += _theory_warnings(fine)
     return [f"fine pointing: {text}" for text in found]
 
 
-def _stroke_warnings(fine: FinePointingStudy, m: Mission) -> list[str]:
+def _stroke_warnings(fine: FinePointingStudy) -> list[str]:
     return [
         f"the stroke does not cover the worst case on {axis.label}: {angle(axis.needed_rad)} needed to either side, "
         f"{angle(axis.available_rad)} available (root sum square {angle(axis.needed_rss_rad)}); no simulated run has "
@@ -314,16 +320,13 @@ def _stroke_warnings(fine: FinePointingStudy, m: Mission) -> list[str]:
     ]
 
 
-def _hardware_warnings(m: Mission) -> list[str]:
+def _hardware_warnings(f: FinePointing, c: Control, amplifier: Amplifier) -> list[str]:
     """Where the paper's sines are tracked by other hardware than that of the fine-pointing loop."""
-    f, c = m.fine_pointing, m.control
-    if f is None:
-        return []
     loops = [
         tuple(format_quantity(value, unit, 3) for value, unit in ((rate, "Hz"), (delay, "s"), (bandwidth, "Hz")))
         for rate, delay, bandwidth in (
             (f.rate_hz, f.delay_s, f.amplifier_bandwidth_hz),
-            (c.rate_hz, c.delay_s, m.amplifier.bandwidth_hz),
+            (c.rate_hz, c.delay_s, amplifier.bandwidth_hz),
         )
     ]
     if loops[0] == loops[1]:

@@ -50,7 +50,7 @@ def tornado(study: LinkStudy, of: Tornado) -> Figure:
     if data and low < required < high:
         panel.add(Rule(required, True, VERMILION, "--"))
         panel.add(Words("required", required, -0.55, VERMILION, base="bottom", shift=(3.0, 0.0)))
-    judged = f", all but {outage_words(m)}" if data and m.jitter is not None else ""
+    judged = f", all but {outage_words(m.requirement)}" if data and m.jitter is not None else ""
     panel.x.title = f"margin of the {'communication link' if data else of.of.lower()}{judged} (dB)"
     panel.legend = Legend(
         "lower right", only=(Area((), ORANGE, label="input lower"), Area((), BLUE, label="input higher"))

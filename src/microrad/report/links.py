@@ -40,7 +40,7 @@ def context(
         "performance": performance_rows(cases, ""),
         "performance_words": [budget_views.performance(each, links) for each in cases],
         "performance_note": note(costs=False),
-        "outage": "" if under is None else f"{100 * stated_outage(links.file.mission):g} %",
+        "outage": "" if under is None else f"{100 * stated_outage(links.data.requirement):g} %",
         "costs": [],
         "fades": fades(cases),
         "acquisition": None if links.finding is None else acquisition(links.finding),

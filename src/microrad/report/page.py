@@ -9,7 +9,6 @@ from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
-from microrad import link
 from microrad.core.machine import versions
 from microrad.core.units import format_quantity
 from microrad.mission.file import assumptions, changed_from_shipped
@@ -85,6 +84,7 @@ def render(study: Study, drawn: Drawn, manifest: Mapping[str, Any]) -> str:
     """
     template = pages().get_template("page.html")
     m, fine = study.file.mission, study.fine_pointing
+    required = m.requirement.pointing_error_rad
     titles = [(id, title) for id, title in PARTS if fine is not None or id != "tails"]
     boxes = chain.stages(study)
     context: dict[str, Any] = {
@@ -111,13 +111,13 @@ def render(study: Study, drawn: Drawn, manifest: Mapping[str, Any]) -> str:
         "angle": angle,
         "mirror_lines": [line for line in str(study.summary).splitlines() if not line.startswith("  warning")],
         "sound": study.met and (study.fine_case is not None or not words.beyond_identified(study, study.residual)),
-        "changed": changed_from_shipped(study.file),
+        "changed": changed_from_shipped(study.file.sources),
         "margins": _margins(study),
-        "assumptions": assumptions(study.file),
+        "assumptions": assumptions(study.file.sources),
         "inputs": _inputs(study.file.sources),
         "day": _day(study, drawn.day),
-        "fine": None if fine is None else fine_pointing.context(fine, m, drawn.fine),
-        "tails": None if fine is None else tails.context(fine, m, drawn.tails),
+        "fine": None if fine is None else fine_pointing.context(fine, required, drawn.fine),
+        "tails": None if fine is None else tails.context(fine, required, drawn.tails),
         "versions": versions(),
         "origin": _origin(manifest),
     }
@@ -193,7 +193,7 @@ def _left_out(study: Study) -> list[str]:
     ahead = study.file.mission.point_ahead
     if ahead is None or not ahead.corrected or not ahead.error_rad:
         return []
-    lost = link.communication_beam(study.file.mission).fall
+    lost = study.links.data.beam.fall
     at = study.performance.case(FINE, study.fine_pointing.best.design.name, "given") if study.fine_pointing else None
     cost = ""
     if at is not None:

@@ -8,7 +8,6 @@ from microrad import link
 from microrad.link.budget import FREE_SPACE_LOSS, POINTING_LOSS
 from microrad.link.requirement import Requirement, Subject
 from microrad.loop.fine_pointing.parts import GAUGE_NOISE, OPTICAL_NOISE
-from microrad.loop.paper_cases import residual_rad
 from microrad.mirror import Variant
 from microrad.mirror.geometry import StrokeBudget
 from microrad.report import advice as advise
@@ -43,7 +42,7 @@ def _row(r: Requirement, text: str) -> Row:
 def readings(study: Study) -> list[Row]:
     """The numbers that rest on the residual by each other reading, as text; first as the mission has them."""
     m = study.file.mission
-    left, margin = residual_rad(m, study.residual.trace), study.achieved.margin_db
+    left, margin = study.left_rad(study.residual), study.achieved.margin_db
     own = Reading("as it stands", "", "", left, margin)
     return [
         {
@@ -53,7 +52,7 @@ def readings(study: Study) -> list[Row]:
             "residual": r.failure or quantity(r.residual_rad, "rad"),
             "margin": "" if r.failure else quantity(r.margin_db, "dB"),
             "closes": "" if r.failure else "yes" if r.closes else "no",
-            "mark": "" if r.failure else "PASS" if r.meets(m) and not unknown(m) else "FAIL",
+            "mark": "" if r.failure else "PASS" if r.meets(m.requirement) and not unknown(m.mirror) else "FAIL",
         }
         for r in (own, *study.other_readings)
     ]
@@ -84,7 +83,7 @@ def advice(study: Study, r: Requirement) -> str:
     if r.unknown:
         return ""
     if r.subject == "communication":
-        return advise.of_power(m, r, study.tornado)
+        return advise.of_power(m.communication, r, study.tornado)
     if r.subject == "stroke":
         return _of_stroke(study, r)
     if r.subject == "fine pointing":
@@ -149,11 +148,11 @@ def _stroke(study: Study, cause: str) -> str:
 
 
 def _residual(study: Study, cause: str) -> str:
-    m, run = study.file.mission, study.residual
+    run = study.residual
     straight = next(
         r for r in study.runs if (r.mirror, r.controller, r.freq_hz) == (Variant.STRAIGHT, run.controller, run.freq_hz)
     )
-    with_it, without = (quantity(residual_rad(m, r.trace), "rad") for r in (run, straight))
+    with_it, without = (quantity(study.left_rad(r), "rad") for r in (run, straight))
     return f"{cause}: {with_it} with hysteresis, {without} without"
 
 

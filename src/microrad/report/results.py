@@ -14,7 +14,6 @@ from microrad.core.arrays import Floats
 from microrad.core.machine import machine, versions
 from microrad.loop.fine_pointing import COUNTERS, FinePointingStudy, Residual
 from microrad.loop.paper_cases import Run
-from microrad.mission.file import MirrorFile, MissionFile
 from microrad.report import day_results, variables, words
 from microrad.report.carried import hash_of_summary
 from microrad.report.fine_pointing_data import margins, rms_by_source, sources
@@ -274,10 +273,10 @@ def manifest(study: Study, folder: Path) -> dict[str, Any]:
     named = {each.name: each.content for each in study.file.contents if each.content is not None}
     drawn += [f"seed {SEED} of the virtual bench, {PLAN}"] if study.scan is not None else []
     return {
-        "mission": _text_file(study.file),
+        "mission": _text_file(study.file.path, study.file.sha256, study.file.text),
         "inputs_sha256": {name: hashlib.sha256(content).hexdigest() for name, content in named.items()},
         "inputs": _input_texts(named),
-        "mirror": None if mirror is None else _text_file(mirror),
+        "mirror": None if mirror is None else _text_file(mirror.path, mirror.sha256, mirror.text),
         "versions": versions(),
         "machine": machine(),
         "randomness": "; ".join(drawn) or "none",
@@ -287,10 +286,10 @@ def manifest(study: Study, folder: Path) -> dict[str, Any]:
     }
 
 
-def _text_file(file: MissionFile | MirrorFile) -> dict[str, str]:
+def _text_file(path: Path, sha256: str, text: str) -> dict[str, str]:
     """Name, text and hashes of a file: its bytes', and its text's, whose line ends and mark at the begin may differ."""
-    text_sha256 = hashlib.sha256(file.text.encode()).hexdigest()
-    return {"file": file.path.name, "sha256": file.sha256, "text_sha256": text_sha256, "text": file.text}
+    text_sha256 = hashlib.sha256(text.encode()).hexdigest()
+    return {"file": path.name, "sha256": sha256, "text_sha256": text_sha256, "text": text}
 
 
 def _input_texts(named: Mapping[str, bytes]) -> dict[str, str]:

@@ -3,7 +3,6 @@
 import math
 from dataclasses import dataclass
 
-from microrad import link
 from microrad.mirror.hysteresis import slow_gain
 from microrad.study.story import Study
 
@@ -77,5 +76,5 @@ def _step_rad(study: Study) -> float:
 
 def _lost_db(study: Study, more_rad: float) -> float:
     m = study.file.mission
-    at, loss = m.requirement.pointing_error_rad, link.communication_beam(m).fall.loss_db
+    at, loss = m.requirement.pointing_error_rad, study.links.data.beam.fall.loss_db
     return float(loss(at + more_rad)) - float(loss(at))

@@ -10,7 +10,6 @@ import numpy as np
 from microrad.core.arrays import Floats
 from microrad.loop.fine_loop.ensemble import bin_edges_rad, histogram_beyond, histogram_quantile
 from microrad.loop.fine_pointing import FinePointingStudy, Residual
-from microrad.mission.model import Mission
 from microrad.report import fine_pointing_words as words
 from microrad.report.plotting.figure import Figure
 from microrad.report.plotting.sheet import BLACK, BLUE, GREEN, ORANGE, Legend, Line, Rule, Words, grid
@@ -78,22 +77,22 @@ def beyond(left: Residual, radius_rad: float) -> tuple[float, float, float]:
 
 
 # --------------------------------------------------------------------------------------------------------------- page
-def context(fine: FinePointingStudy, m: Mission, figures: Sequence[Figure]) -> dict[str, Any]:
+def context(fine: FinePointingStudy, required_rad: float, figures: Sequence[Figure]) -> dict[str, Any]:
     """What the template needs: the best controller's tail on each variant of the mirror, beside the baseline's."""
     shares = sorted({*SHARES, fine.quantile})
     shown = shown_of(fine)
     samples = int(shown[0][1].radial_counts.sum())
     return {
         "figures": figures,
-        "sentences": sentences(fine, m, samples),
+        "sentences": sentences(fine, samples),
         "headings": [words.share_of_time(s) for s in shares],
-        "required": words.given(m.requirement.pointing_error_rad),
+        "required": words.given(required_rad),
         "rows": [
             {
                 "name": name,
                 "cells": [cell(quantile(left, share), share == fine.quantile) for share in shares],
                 "largest": words.micro(left.largest_rad),
-                "beyond": _share(beyond(left, m.requirement.pointing_error_rad)),
+                "beyond": _share(beyond(left, required_rad)),
                 "independent": _count(independent_samples(left)),
             }
             for name, left in shown
@@ -132,12 +131,12 @@ def _count(value: float) -> str:
     return "unknown" if math.isnan(value) else f"{float(f'{value:.2g}'):.0f}"
 
 
-def sentences(fine: FinePointingStudy, m: Mission, samples: int) -> list[str]:
+def sentences(fine: FinePointingStudy, samples: int) -> list[str]:
     """What was drawn, and how the intervals come about."""
-    table = m.fine_pointing
-    runs = "" if table is None else f"{table.runs} runs with the seed {table.seed}, "
+    table = fine.scene.table
     return [
-        f"Radial error of the line of sight at the control samples of the ensemble: {runs}{samples} samples in all.",
+        "Radial error of the line of sight at the control samples of the ensemble: "
+        f"{table.runs} runs with the seed {table.seed}, {samples} samples in all.",
         "Samples that follow each other are not independent. How many independent ones they are worth is taken from "
         "the scatter of the mean square from run to run; intervals are of 99 %, and none is given where fewer than "
         f"{LEAST_BEYOND:g} of those would lie beyond.",
@@ -147,10 +146,12 @@ def sentences(fine: FinePointingStudy, m: Mission, samples: int) -> list[str]:
 # ------------------------------------------------------------------------------------------------------------- figure
 def draw(study: Study) -> tuple[Figure, ...]:
     """The figure of the tail; none for a mission without a fine-pointing loop."""
-    return () if study.fine_pointing is None else (tail(study.fine_pointing, study.file.mission),)
+    if study.fine_pointing is None:
+        return ()
+    return (tail(study.fine_pointing, study.file.mission.requirement.pointing_error_rad),)
 
 
-def tail(fine: FinePointingStudy, m: Mission) -> Figure:
+def tail(fine: FinePointingStudy, required_rad: float) -> Figure:
     """Share of the time beyond each radius, on a logarithmic axis, beside a Rayleigh distribution of the same rms."""
     sheet, (panel,) = grid(7.4, 3.8)
     sheet.legend = Legend("above", 3)
@@ -166,7 +167,7 @@ def tail(fine: FinePointingStudy, m: Mission) -> Figure:
     rayleigh = np.exp(-((radius / given.rms_rad) ** 2))
     panel.add(Line(radius * 1e6, rayleigh, BLACK, (1.0, 2.0), 0.9, "Rayleigh, same rms"))
     columns["Rayleigh of the same rms, mission's mirror"] = rayleigh
-    required, floor = m.requirement.pointing_error_rad * 1e6, 0.5 / float(given.radial_counts.sum())
+    required, floor = required_rad * 1e6, 0.5 / float(given.radial_counts.sum())
     panel.add(Rule(required, True, BLACK, "--", 1.2, f"required: {required:g} µrad"))
     panel.add(Rule(1.0 - fine.quantile, False, "#777777", width=0.8))
     beyond_words = f"beyond for {words.percent(1.0 - fine.quantile)} of the time"

@@ -6,9 +6,8 @@ from typing import Any
 from microrad.core.units import format_quantity
 from microrad.link.budget import DEEPEST_DB, POINT_AHEAD_LOSS, POINTING_LOSS
 from microrad.link.requirement import IMPOSSIBLE, outage_words
-from microrad.loop.paper_cases import Run, residual_rad
+from microrad.loop.paper_cases import Run
 from microrad.mission.file import changed_from_shipped
-from microrad.mission.model import Mission
 from microrad.report import (
     budget_views,
     constellation_views,
@@ -46,8 +45,8 @@ def _judged_at(study: Study) -> str:
     m, case = study.file.mission, study.fine_case
     rate = format_quantity(m.communication.data_rate_bit_s, "bit/s")
     if case is not None:
-        return f"{rate} but for {outage_words(m)}"
-    left = format_quantity(residual_rad(m, study.residual.trace), "rad", 3)
+        return f"{rate} but for {outage_words(m.requirement)}"
+    left = format_quantity(study.left_rad(study.residual), "rad", 3)
     return f"{rate} and a simulated residual of {left} ({m.requirement.residual_statistic})"
 
 
@@ -95,7 +94,7 @@ def _papers_loop(study: Study) -> str:
     if not study.papers_loop:
         return ""
     m, run = study.file.mission, study.residual
-    q, found_rad = m.requirement, residual_rad(m, run.trace)
+    q, found_rad = m.requirement, study.left_rad(run)
     left, most = (format_quantity(rad, "rad", 3) for rad in (found_rad, q.pointing_error_rad))
     judged = f"would miss {' and '.join(failed)}" if failed else "would meet what is required"
     return (
@@ -114,7 +113,7 @@ def explanation(study: Study) -> list[str]:
         causes = dict.fromkeys(r.because.removeprefix("the residual: ") for r in failed)
         sentences.append(f"What limits it: {'; '.join(causes)}.")
     if study.fine_pointing is not None:
-        sentences += fine_pointing_words.short(study.fine_pointing, m)
+        sentences += fine_pointing_words.short(study.fine_pointing, m.requirement.pointing_error_rad)
     sentences += filter(None, (hysteresis_cost(study), found(study)))
     if study.day is not None:
         day = study.day
@@ -126,17 +125,18 @@ def papers_loop(study: Study) -> list[str]:
     """What the paper's loop leaves in the worst of its sines, a sentence each."""
     m, run = study.file.mission, study.residual
     trace, q, kind = run.trace, m.requirement, "margin" if m.jitter is None else "static margin"
+    two_axes = ", times √2 for two equal axes" if m.conventions.residual == "radial" else ""
     sentences = [
         f"As budgeted, at {format_quantity(m.communication.pointing_error_rad, 'rad', 3)}, the {kind} is "
         f"{signed(study.static.margin_db, 'dB')}; {m.requirement.margin_db:g} dB is required.",
         f"The loop ({run.controller}, {run.freq_hz:g} Hz) leaves {format_quantity(trace.peak_rad, 'rad', 3)} at its "
-        f"peaks and {format_quantity(trace.rms_rad, 'rad', 3)} rms on its axis{_two_axes(m)}; "
+        f"peaks and {format_quantity(trace.rms_rad, 'rad', 3)} rms on its axis{two_axes}; "
         f"{format_quantity(q.pointing_error_rad, 'rad', 3)} ({q.residual_statistic}) is allowed.",
     ]
     if extrapolated := beyond_identified(study, run):
         sentences.append(f"Not to be relied on: {extrapolated}.")
     if study.comparison is not None:
-        left = residual_rad(m, study.comparison.residual.trace)
+        left = study.left_rad(study.comparison.residual)
         sentences.append(
             f"On the mission's comparison model of the mirror the residual is {format_quantity(left, 'rad', 3)} and "
             f"the margin {signed(study.comparison.margin_db, 'dB')}."
@@ -196,10 +196,6 @@ def found(study: Study) -> str:
     )
 
 
-def _two_axes(m: Mission) -> str:
-    return ", times √2 for two equal axes" if m.conventions.residual == "radial" else ""
-
-
 def verdict_text(study: Study, width: int = 80, verbose: bool = False) -> str:
     """The verdict as plain text: headline, a line for each requirement, and what limits them.
 
@@ -235,7 +231,7 @@ def warnings(study: Study) -> list[str]:
     """What a reader must not overlook: the mirror's own warnings, and runs outside their range."""
     found = [
         f"{key} = {value} names the paper as its source, but the paper's mission has {shipped}"
-        for key, value, shipped in changed_from_shipped(study.file)
+        for key, value, shipped in changed_from_shipped(study.file.sources)
     ]
     found = [*_of_verdict(study), *found, *study.summary.warnings, *study.links.warnings]
     if study.day is not None:
@@ -268,7 +264,7 @@ def warnings(study: Study) -> list[str]:
         if loop.clamped
     ]
     if study.fine_pointing is not None:
-        found += fine_pointing_words.warnings(study.fine_pointing, m)
+        found += fine_pointing_words.warnings(study.fine_pointing, m.control, m.amplifier)
     return found
 
 
@@ -279,7 +275,7 @@ def _of_verdict(study: Study) -> list[str]:
         found.append(
             "[jitter] is not in this verdict, which judges the pointing error that the simulated loop leaves: the two "
             f"are not summed. Under [jitter] alone the margin is {signed(study.communication.margin_db, 'dB')} but for "
-            f"{outage_words(m)}, as microrad budget judges it"
+            f"{outage_words(m.requirement)}, as microrad budget judges it"
         )
     lost = study.achieved.loss_db(POINTING_LOSS, POINT_AHEAD_LOSS) if case is None else case.outage_loss_db
     if lost > DEEPEST_DB:
@@ -325,7 +321,7 @@ def summary(study: Study) -> dict[str, Any]:
             "rms_rad": study.residual.trace.rms_rad,
             "statistic": m.requirement.residual_statistic,
             "convention": m.conventions.residual,
-            "used_rad": residual_rad(m, study.residual.trace),
+            "used_rad": study.left_rad(study.residual),
         },
         "largest_data_rate_bit_s": study.margin_map.largest_rate_bit_s,
         "largest_pointing_error_rad": study.margin_map.largest_error_rad,
@@ -375,6 +371,6 @@ def summary(study: Study) -> dict[str, Any]:
         "day": None if study.day is None else day_tables.data(study.day),
         "contact": None if study.contact is None else contact_run_words.data(study.contact),
         "constellation": None if study.plan is None else constellation_views.data(study.plan),
-        "fine_pointing": None if fine is None else fine_pointing_data(fine, m),
+        "fine_pointing": None if fine is None else fine_pointing_data(fine, m.requirement.pointing_error_rad),
         "warnings": warnings(study),
     }

@@ -29,6 +29,7 @@ from microrad.loop.fine_pointing.results import for_mirror
 from microrad.loop.fine_pointing.scenario import BODY_POINTING, with_mirror
 from microrad.mirror import Variant
 from microrad.mission.file import MissionFile
+from microrad.mission.tables.fine_pointing import FinePointing
 
 PID, PID_INVERSE = "PID of [control]", "PID of [control] + inverse"
 WITH, WITHOUT = "with hysteresis", "without hysteresis"
@@ -114,10 +115,9 @@ class Controller:
     ask: Callable[[Ask, tuple[str, ...]], Answers]
 
 
-def names(file: MissionFile) -> tuple[str, ...]:
+def names(table: FinePointing | None) -> tuple[str, ...]:
     """The controllers that a mission has: of its fine-pointing loop, where it has one, and of [control]."""
-    fine = fine_pointing.names(f) if (f := file.mission.fine_pointing) is not None else ()
-    return (*fine, PID, PID_INVERSE)
+    return (*(() if table is None else fine_pointing.names(table)), PID, PID_INVERSE)
 
 
 _tuning = threading.Lock()  # two pages that want the same controller tune it once
@@ -149,12 +149,17 @@ class _Keyed:
 
 @lru_cache(maxsize=32)
 def _controller(of: _Keyed, name: str) -> Controller:
-    return _pid(of.file, name) if name in (PID, PID_INVERSE) else _fine(of.file, name)
+    file, mirrors = of.file, mirror.of(of.file.mission)
+    if name in (PID, PID_INVERSE):
+        made = _pid(paper_cases.of(file.mission, mirrors), name)
+    else:
+        made = _fine(fine_pointing.scene(file, mirrors, tracking_light_w(file)), name)
+    text = "" if file.mirror_file is None else file.mirror_file.text
+    return replace(made, warnings=mirror_warnings(mirrors.table.linear is not None, text))
 
 
 # ------------------------------------------------------------------------------------------- the fine-pointing loop
-def _fine(file: MissionFile, name: str) -> Controller:
-    scene = fine_pointing.scene(file, mirror.of(file.mission), tracking_light_w(file))
+def _fine(scene: fine_pointing.Scene, name: str) -> Controller:
     table = scene.table
     plants = fine_pointing.plants(scene, table.seed)
     tuned = fine_pointing.tune(name, table, plants)
@@ -178,16 +183,15 @@ def _fine(file: MissionFile, name: str) -> Controller:
         scene.loop.drive_range_v,
         1.0 / scene.loop.timing.period_s,
         scene.loop.optical.field_of_view_rad,
-        mirror_warnings(file),
+        (),
         partial(_fine_answers, scene, built, tuned.margins.bandwidth_hz),
     )
 
 
-def mirror_warnings(file: MissionFile) -> tuple[str, ...]:
-    """What the mirror leaves out, in sentences: its linear part, and what the head of its own file warns of."""
-    text = "" if file.mirror_file is None else file.mirror_file.text
+def mirror_warnings(has_linear_part: bool, text: str) -> tuple[str, ...]:
+    """What the mirror leaves out, in sentences: its linear part, and what the head of its own file's text warns of."""
     own = [line.removeprefix(_WARNING) for line in text.splitlines() if line.startswith(_WARNING)]
-    told = [] if file.mission.mirror.linear is not None else [_NO_LINEAR_PART]
+    told = [] if has_linear_part else [_NO_LINEAR_PART]
     return (*told, *(f"Warning of the mirror's file: {warning}" for warning in own))
 
 
@@ -263,9 +267,7 @@ def _curve(loop: PointingLoop, of: LoopController, span: ensemble.Span, from_s: 
 
 
 # ------------------------------------------------------------------------------------------- the loop of [control]
-def _pid(file: MissionFile, name: str) -> Controller:
-    m = file.mission
-    cases = paper_cases.of(m, mirror.of(m))
+def _pid(cases: paper_cases.PaperCases, name: str) -> Controller:
     setup, turned = cases.setup, cases.mirrors.line_of_sight
     plants = {WITH: turned[Variant.GIVEN].plant, WITHOUT: turned[Variant.STRAIGHT].plant}
     found, period = simulate.margins(plants[WITH], setup), setup.timing.period_s
@@ -294,7 +296,7 @@ def _pid(file: MissionFile, name: str) -> Controller:
         cases.mirrors.drive_range_v,
         1.0 / period,
         math.inf,
-        mirror_warnings(file),
+        (),
         partial(_pid_answers, name, plants, setup, found.crossover_hz),
     )
 

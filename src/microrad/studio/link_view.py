@@ -17,7 +17,6 @@ from microrad.link import study as link_study
 from microrad.link.study import LinkStudy
 from microrad.link.under_jitter import error_rad, required_error_rad
 from microrad.mission.file import LinkFile
-from microrad.mission.model import LinkMission
 from microrad.report.budget_views import jitter_lines, sentences
 from microrad.report.quantities import quantity, signed
 from microrad.studio import plots
@@ -53,11 +52,11 @@ class Frame:
     data_rate_bit_s: Floats
     pointing_error_rad: Floats
 
-    def holds(self, m: LinkMission) -> bool:
-        """Whether the mission's working point and its required pointing error lie within."""
-        rate, error = m.communication.data_rate_bit_s, error_rad(m)
+    def holds(self, data: link.DataLink) -> bool:
+        """Whether the working point and the required pointing error lie within."""
+        rate, error = data.table.data_rate_bit_s, error_rad(data)
         within = self.data_rate_bit_s[0] <= rate <= self.data_rate_bit_s[-1]
-        return bool(within and max(error, m.requirement.pointing_error_rad) <= self.pointing_error_rad[-1])
+        return bool(within and max(error, data.requirement.pointing_error_rad) <= self.pointing_error_rad[-1])
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,7 +94,7 @@ class LinkView:
     rate at each pointing error, nan where the frame has none.
     """
 
-    file: LinkFile
+    data: link.DataLink
     frame: Frame
     budgets: tuple[link.LinkBudget, ...]
     margin_db: Floats
@@ -104,7 +103,7 @@ class LinkView:
     @property
     def margins(self) -> tuple[Margin, ...]:
         """Each link against what it needs: the communication link its required margin, the others 0 dB."""
-        needed = (self.file.mission.requirement.margin_db, *[0.0] * len(self.budgets))
+        needed = (self.data.requirement.margin_db, *[0.0] * len(self.budgets))
         pairs = zip(self.budgets, needed, strict=False)
         return tuple(Margin(b.name, b.margin_db, need, b.possible) for b, need in pairs)
 
@@ -117,34 +116,34 @@ def view(file: LinkFile, frame: Frame | None = None) -> LinkView:
     margin where one is to be solved for.
     """
     file = link_study.solve_rate(file)
-    m, sources = file.mission, file.sources
-    frame = frame if frame is not None and frame.holds(m) else frame_of(m)
-    budgets = [link_study.communication_budget(m, sources)]
-    budgets += [link.beacon_budget(m, sources)] if m.beacon is not None else []
-    budgets += [link.answer_budget(m, sources)] if m.answer is not None else []
-    margin = link.margin_map(m, frame.data_rate_bit_s, frame.pointing_error_rad)
-    levels = dict.fromkeys((0.0, m.requirement.margin_db))
-    return LinkView(file, frame, tuple(budgets), margin, {level: contour(m, frame, level) for level in levels})
+    m, sources, data = file.mission, file.sources, link.of(file.mission)
+    frame = frame if frame is not None and frame.holds(data) else frame_of(data)
+    budgets = [link_study.communication_budget(data, sources)]
+    beams = (("beacon", m.beacon), ("answer", m.answer))
+    budgets += [link.beam_budget(name, data.shared, beam, sources) for name, beam in beams if beam is not None]
+    margin = link.margin_map(data, frame.data_rate_bit_s, frame.pointing_error_rad)
+    levels = dict.fromkeys((0.0, data.requirement.margin_db))
+    return LinkView(data, frame, tuple(budgets), margin, {level: contour(data, frame, level) for level in levels})
 
 
-def frame_of(m: LinkMission) -> Frame:
+def frame_of(data: link.DataLink) -> Frame:
     """Axes about the working point, at round places, so that a small step outside does not move them all the time."""
-    built, rate = link.receiver(m), m.communication.data_rate_bit_s
+    built, rate = data.receiver, data.table.data_rate_bit_s
     highest = math.inf if built is None else built.highest_data_rate_bit_s
     low, high = 10.0 ** math.floor(math.log10(rate) - 1.0), min(10.0 ** math.ceil(math.log10(rate) + 1.0), highest)
-    most = 3.0 * max(m.requirement.pointing_error_rad, error_rad(m))
+    most = 3.0 * max(data.requirement.pointing_error_rad, error_rad(data))
     return Frame(np.geomspace(low, high, RATES), np.linspace(0.0, most, ERRORS))
 
 
-def contour(m: LinkMission, frame: Frame, level_db: float) -> Floats:
+def contour(data: link.DataLink, frame: Frame, level_db: float) -> Floats:
     """Largest data rate (bit/s) with a margin of `level_db` at each pointing error of the frame, nan where none is.
 
     Rate and error move the margin apart from each other, so that one row and one column of the map hold it; it falls
     with the rate.
     """
     rates = np.geomspace(frame.data_rate_bit_s[0], frame.data_rate_bit_s[-1], EDGES)
-    on_axis = link.margin_map(m, rates, 0.0)[:, 0]
-    lost = on_axis[0] - link.margin_map(m, rates[0], frame.pointing_error_rad)[0]
+    on_axis = link.margin_map(data, rates, 0.0)[:, 0]
+    lost = on_axis[0] - link.margin_map(data, rates[0], frame.pointing_error_rad)[0]
     found = np.interp(-(level_db + lost), -on_axis, np.log(rates), left=np.nan, right=np.nan)
     largest: Floats = np.exp(found)
     return largest
@@ -170,11 +169,11 @@ def second(key: str) -> bool:
 # ------------------------------------------------------------------------------------------------------------ showing
 def map_plot(v: LinkView) -> plots.Plot:
     """The margin map with its contours and the working point; data rate on a logarithmic axis, as log10 of bit/s."""
-    m, frame = v.file.mission, v.frame
+    frame = v.frame
     urad, lg_rate = frame.pointing_error_rad * 1e6, np.log10(frame.data_rate_bit_s)
     ticks, words = plots.decades(frame.data_rate_bit_s[0], frame.data_rate_bit_s[-1], "bit/s")
     return plots.plot(
-        [_filled(v, lg_rate, urad), *_contours(v, urad), _point(m)],
+        [_filled(v, lg_rate, urad), *_contours(v, urad), _point(v.data)],
         {
             "title": "data rate",
             "tickvals": ticks,
@@ -217,7 +216,7 @@ def _filled(v: LinkView, lg_rate: Floats, urad: Floats) -> plots.Trace:
 
 def _contours(v: LinkView, urad: Floats) -> list[plots.Trace]:
     """The contours of no margin and of the required margin; nothing is drawn where the frame has none."""
-    required = v.file.mission.requirement.margin_db
+    required = v.data.requirement.margin_db
     return [
         {
             "type": "scatter",
@@ -236,15 +235,14 @@ def _dash(level_db: float, required_db: float) -> str:
     return "solid" if level_db == required_db else "dash"
 
 
-def map_key(m: LinkMission) -> str:
-    """What the lines and the dot of the map are."""
-    required = m.requirement.margin_db
+def map_key(required: float) -> str:
+    """What the lines and the dot of the map are, at a required margin (dB)."""
     none = "" if required == 0.0 else " Dashed line: 0 dB."
     return f"Solid line: the required {required:g} dB.{none} Dot: the working point."
 
 
-def _point(m: LinkMission) -> plots.Trace:
-    rate, error = m.communication.data_rate_bit_s, error_rad(m)
+def _point(data: link.DataLink) -> plots.Trace:
+    rate, error = data.table.data_rate_bit_s, error_rad(data)
     said = f"{format_quantity(rate, 'bit/s')} at {format_quantity(error, 'rad')}"
     return {
         "type": "scatter",
@@ -284,23 +282,22 @@ def rows_of(budget: link.LinkBudget) -> list[Row]:
 
 def map_words(v: LinkView) -> str:
     """What the map says, in words, for a reader who does not see it."""
-    m = v.file.mission
-    q, c = m.requirement, m.communication
-    there = _largest(m)
+    q, c = v.data.requirement, v.data.table
+    there = _largest(v.data)
     return (
-        f"At {format_quantity(c.data_rate_bit_s, 'bit/s')} and {format_quantity(error_rad(m), 'rad')} the "
+        f"At {format_quantity(c.data_rate_bit_s, 'bit/s')} and {format_quantity(error_rad(v.data), 'rad')} the "
         f"communication link has {signed(v.budgets[0].margin_db, 'dB')}. {there} for the required {q.margin_db:g} dB."
     )
 
 
-def _largest(m: LinkMission) -> str:
+def _largest(data: link.DataLink) -> str:
     """The requirement solved in both directions, in words."""
-    q, rate = m.requirement, m.communication.data_rate_bit_s
-    fastest = link_study.largest_rate(m)
-    at = f"at {format_quantity(required_error_rad(m), 'rad')}"
+    q, rate = data.requirement, data.table.data_rate_bit_s
+    fastest = link_study.largest_rate(data)
+    at = f"at {format_quantity(required_error_rad(data), 'rad')}"
     most = f"No data rate will do {at}" if math.isnan(fastest) else f"At most {quantity(fastest, 'bit/s')} {at}"
     try:
-        error = link.largest_pointing_error(m, q.margin_db, rate)
+        error = link.largest_pointing_error(data, q.margin_db, rate)
     except link.LinkError:
         return f"{most}, and no pointing error at {format_quantity(rate, 'bit/s')},"
     return f"{most}, or {quantity(error, 'rad')} at {format_quantity(rate, 'bit/s')},"

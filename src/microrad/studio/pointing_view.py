@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from microrad import link
 from microrad.core.units import format_quantity
 from microrad.link import DEEPEST_DB, pointing
 from microrad.link import study as link_study
@@ -51,13 +52,13 @@ class PointingView:
 
 def view(file: LinkFile) -> PointingView:
     """The pointing budget of a mission; raises ValueError as `pointing.open_loop_budget` does."""
-    m = file.mission
-    p = pointing.open_loop_budget(m, file.sources)
+    m, data = file.mission, link.of(file.mission)
+    p = pointing.open_loop_budget(m.pointing, data.shared, m.beacon, file.sources)
     left: tuple[tuple[pointing.Allocation, pointing.Allocation], ...] = ()
     if p.reading is not None and p.reading.half_angle_rad > 0.0:
         half = p.reading.half_angle_rad
         left = tuple(zip(p.allocation(half, "rss"), p.allocation(half, "ecss-radial"), strict=True))
-    return PointingView(file, p, left, link_study.point_ahead(m))
+    return PointingView(file, p, left, link_study.point_ahead(data))
 
 
 def dials(draft: Draft) -> dict[str, tuple[Dial, ...]]:

@@ -1,7 +1,6 @@
 """What the verdict would be by other readings of what the paper leaves open, each changed alone."""
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, get_args
 
@@ -45,9 +44,8 @@ class Reading:
         """Whether the communication link has a margin of 0 dB at least."""
         return self.margin_db >= 0.0
 
-    def meets(self, m: Mission) -> bool:
+    def meets(self, q: Requirement) -> bool:
         """Whether both requirements that rest on the residual are met."""
-        q = m.requirement
         return self.residual_rad <= q.pointing_error_rad and self.margin_db >= q.margin_db
 
 
@@ -56,32 +54,24 @@ def others(m: Mission, residual: paper_cases.Run) -> tuple[Reading, ...]:
 
     Those of the loop are simulated (PID + inverse at the mission's frequencies); the others read the same run anew.
     """
-    return tuple(_reading(m, key, other, residual) for key, other in _choices(m))
-
-
-def _choices(m: Mission) -> Iterator[tuple[str, str]]:
-    """Keys with what else they could be, where that fits the other tables."""
+    found = []
     for key, table in _OPEN:
-        for other in get_args(table.model_fields[key.partition(".")[2]].annotation):
+        name, _, field = key.partition(".")
+        given = str(getattr(getattr(m, name), field))
+        for other in get_args(table.model_fields[field].annotation):
             as_read = m.with_value(key, other)
-            if other not in (_given(m, key), UNUSED) and not [*as_read.problems(), *as_read.mirror.problems()]:
-                yield key, other
-
-
-def _given(m: Mission, key: str) -> str:
-    table, _, name = key.partition(".")
-    return str(getattr(getattr(m, table), name))
-
-
-def _reading(m: Mission, key: str, other: str, residual: paper_cases.Run) -> Reading:
-    as_read, run = m.with_value(key, other), residual
-    try:
-        if key in _SIMULATED:
-            cases = paper_cases.of(as_read, mirror.of(as_read))
-            runs = paper_cases.tracking_runs(cases, (Variant.GIVEN,))
-            run = paper_cases.worst(runs, as_read.requirement.residual_statistic)
-        left = paper_cases.residual_rad(as_read, run.trace)
-        margin_db = float(link.margin_of_error(as_read, np.array([left]))[0])
-    except ValueError as error:  # an unstable loop, a mirror without an inverse
-        return Reading(key, _given(m, key), other, math.nan, math.nan, str(error))
-    return Reading(key, _given(m, key), other, left, margin_db)
+            if other in (given, UNUSED) or [*as_read.problems(), *as_read.mirror.problems()]:
+                continue
+            q, run = as_read.requirement, residual
+            try:
+                if key in _SIMULATED:
+                    cases = paper_cases.of(as_read, mirror.of(as_read))
+                    runs = paper_cases.tracking_runs(cases, (Variant.GIVEN,))
+                    run = paper_cases.worst(runs, q.residual_statistic)
+                left = paper_cases.residual_rad(q, as_read.conventions, run.trace)
+                margin_db = float(link.margin_of_error(link.of(as_read), np.array([left]))[0])
+            except ValueError as error:  # an unstable loop, a mirror without an inverse
+                found.append(Reading(key, given, other, math.nan, math.nan, str(error)))
+            else:
+                found.append(Reading(key, given, other, left, margin_db))
+    return tuple(found)

@@ -21,8 +21,8 @@ from microrad.loop import control, sine_run
 from microrad.loop.paper_cases import PaperCases
 from microrad.mirror import Mirror, MirrorParts, Variant, hysteresis
 from microrad.mission.file import LinkFile, load_link
-from microrad.mission.model import Mission
 from microrad.mission.presets import PAPER, preset_text
+from microrad.mission.tables import mirror as mirror_table
 
 FIG6_HZ = (1.0, 15.0)
 CLAIMED_DROP_RAD = {15.0: 10e-6, 25.0: 25e-6}  # Fig. 8, by frequency in Hz
@@ -111,9 +111,9 @@ def links() -> LinkFile:
     return load_link(Path(f"{PAPER}.toml"), text=preset_text(PAPER))
 
 
-def applies(m: Mission) -> bool:
+def applies(given: mirror_table.Mirror) -> bool:
     """Whether the mission's mirror is of the paper's kind, a linear part and a Bouc-Wen model: else nothing to scan."""
-    return m.mirror.linear is not None and m.mirror.bouc_wen is not None
+    return given.linear is not None and given.bouc_wen is not None
 
 
 def scan(cases: PaperCases, on_progress: Progress | None = None) -> Scan:

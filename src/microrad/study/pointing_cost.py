@@ -8,11 +8,10 @@ from numpy.typing import NDArray
 
 from microrad import link
 from microrad.link import pointing
-from microrad.link.under_jitter import Performance, Spread, performance
+from microrad.link.under_jitter import Performance, Spread, performance, stated_outage
 from microrad.loop import fine_pointing, paper_cases
 from microrad.loop.fine_loop.ensemble import bin_edges_rad, histogram_quantile
 from microrad.mirror import Variant
-from microrad.mission.model import Mission
 
 _PARTS = 32  # of a bin of the histogram, which is 3 % wide in the square of the error
 
@@ -65,14 +64,21 @@ class LinkPerformance:
 FINE = "vibration and noise"
 
 
-def run(m: Mission, runs: tuple[paper_cases.Run, ...], fine: fine_pointing.FinePointingStudy | None) -> LinkPerformance:
-    """The communication link under the residuals of the clean sines and of the fine-pointing loop."""
-    cases = [_sine(m, run) for run in runs]
+def run(
+    data: link.DataLink,
+    residual: str,
+    runs: tuple[paper_cases.Run, ...],
+    fine: fine_pointing.FinePointingStudy | None,
+) -> LinkPerformance:
+    """The communication link under the residuals of the clean sines and of the fine-pointing loop.
+
+    ``residual`` is the convention by which the residual of a sine is read: "radial" for two equal axes.
+    """
+    cases = [_sine(data, residual == "radial", run) for run in runs]
     if fine is not None:
-        cases += [_fine(m, fine, v, mirror) for v in fine.verified for mirror in v.simulated]
+        cases += [_fine(data, fine, v, mirror) for v in fine.verified for mirror in v.simulated]
     found = tuple(cases)
-    half = link.communication_beam(m).fall.half_angle_rad
-    return LinkPerformance(m.requirement.outage, half, found, costs(found))
+    return LinkPerformance(stated_outage(data.requirement), data.beam.fall.half_angle_rad, found, costs(found))
 
 
 def costs(cases: tuple[Performance, ...]) -> tuple[Cost, ...]:
@@ -88,20 +94,19 @@ def costs(cases: tuple[Performance, ...]) -> tuple[Cost, ...]:
     return tuple(found)
 
 
-def _sine(m: Mission, run: paper_cases.Run) -> Performance:
-    """A tracked sine in its steady state; two equal axes where the mission reads the residual as radial."""
+def _sine(data: link.DataLink, radial: bool, run: paper_cases.Run) -> Performance:
+    """A tracked sine in its steady state."""
     error = run.trace.error_rad[run.trace.steady, 0]
-    radial = m.conventions.residual == "radial"
     radius = np.abs(error) * (math.sqrt(2.0) if radial else 1.0)
     bias, rms = float(np.mean(error)), float(np.std(error))
     jitter = pointing.Jitter((bias, bias if radial else 0.0), (rms, rms if radial else 0.0))
     spread = Spread(radius, np.full(radius.size, 1.0 / radius.size))
     source = f"sine of {run.freq_hz:g} Hz"
-    return performance(m, source, run.controller, run.mirror, spread, jitter, None)
+    return performance(data, source, run.controller, run.mirror, spread, jitter, None)
 
 
 def _fine(
-    m: Mission, fine: fine_pointing.FinePointingStudy, verified: fine_pointing.Verified, mirror: str
+    data: link.DataLink, fine: fine_pointing.FinePointingStudy, verified: fine_pointing.Verified, mirror: str
 ) -> Performance:
     """One controller of the fine-pointing loop; the spectrum is known on the mission's own mirror."""
     left = verified.simulated[mirror]
@@ -114,4 +119,4 @@ def _fine(
         psd = verified.spectrum_rad2_hz.T
         both = psd if psd.shape[0] == 2 else np.vstack([psd, np.zeros_like(psd)])
         motion = pointing.motion_of_spectrum(fine.freq_hz, both)
-    return performance(m, FINE, verified.design.name, mirror, Binned.of(left.radial_counts), jitter, motion)
+    return performance(data, FINE, verified.design.name, mirror, Binned.of(left.radial_counts), jitter, motion)

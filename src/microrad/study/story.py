@@ -1,7 +1,8 @@
 """One study: from a mission file to a verdict. The story, and the only place where the parts meet."""
 
 import math
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -18,8 +19,8 @@ from microrad.loop import control, fine_pointing, paper_cases, sine_run
 from microrad.loop.fine_loop import ensemble
 from microrad.mirror import Variant
 from microrad.mirror import summary as mirror_summary
-from microrad.mission.file import LinkFile, MissionFile, with_contents
-from microrad.mission.model import LinkMission, Mission
+from microrad.mission.file import MissionFile, with_contents
+from microrad.mission.model import LinkMission, Mission, Source
 from microrad.orbit import constellation
 from microrad.orbit import day as day_study
 from microrad.study import alternatives, contact_run, paper, pointing_cost, verdict
@@ -102,7 +103,7 @@ class Study:
     @property
     def static(self) -> link.LinkBudget:
         """The communication link at its static pointing error, whatever jitter there is."""
-        return link.communication_budget(self.file.mission, self.file.sources)
+        return link.communication_budget(self.links.data, self.file.sources)
 
     @property
     def beacon(self) -> link.LinkBudget:
@@ -130,6 +131,11 @@ class Study:
         """The link under the best controller of the fine-pointing loop, or None in a mission without that loop."""
         return best_case(self.performance, self.fine_pointing)
 
+    def left_rad(self, run: paper_cases.Run) -> float:
+        """What a tracked sine leaves as the link sees it (rad), in the mission's statistic and convention."""
+        m = self.file.mission
+        return paper_cases.residual_rad(m.requirement, m.conventions, run.trace)
+
     @property
     def margin_db(self) -> float:
         """Margin of communication under the loop that is judged: but for the outage, or at the paper's residual."""
@@ -152,11 +158,11 @@ def run(
     Raises ValueError with the reason when the loop is unstable, the mirror has no inverse or the receiver does not take
     the data rate.
     """
-    file = with_contents(solve_rate(file))
+    file = with_contents(link_study.solve_rate(file))
     if any(each.content is None for each in file.contents):  # it may be there when it is read
         parts = kept.NOTHING
-    m, sources = file.mission, file.sources
-    mirrors = mirror.of(m)
+    m, q, sources = file.mission, file.mission.requirement, file.sources
+    data, mirrors = link.of(m), mirror.of(m)
     cases = paper_cases.of(m, mirrors)
     compiled = ensemble.compile_aside(lambda: _scene(file, mirrors).loop) if m.fine_pointing else lambda: None
     on_progress(0, 3, "budgets, acquisition, mirror and tracking")
@@ -167,29 +173,34 @@ def run(
             paper_cases.loop_margins(cases),
             paper_cases.tracking_runs(cases),
         ),
-        lambda: (link_study.run(_links_of(file), parts), margin_map(file)),
+        lambda: (link_study.run(file, parts), margin_map(data, sources)),
     )
-    residual = paper_cases.worst(runs, m.requirement.residual_statistic)
-    left_rad = paper_cases.residual_rad(m, residual.trace)
-    simulated = f"simulated: {residual.trace.name}, {m.requirement.residual_statistic} ({m.conventions.residual})"
-    achieved = link.communication_budget(m, sources, pointing_error_rad=left_rad, given_source=simulated)
+    residual = paper_cases.worst(runs, q.residual_statistic)
+    left_rad = paper_cases.residual_rad(q, m.conventions, residual.trace)
+    simulated = f"simulated: {residual.trace.name}, {q.residual_statistic} ({m.conventions.residual})"
+    achieved = link.communication_budget(data, sources, pointing_error_rad=left_rad, given_source=simulated)
     as_read = alternatives.others(m, residual)
 
     on_progress(1, 3, "claims of the paper")
-    scan = parts.part(paper.scan, cases, on_progress=on_progress) if paper.applies(m) else None
+    scan = parts.part(paper.scan, cases, on_progress=on_progress) if paper.applies(m.mirror) else None
     fine = None
     if m.fine_pointing is not None:
         compiled()
         fine = parts.part(fine_pointing.run, _scene(file, mirrors), on_progress=on_progress)
     on_progress(2, 3, "the day")
-    found = pointing_cost.run(m, runs, fine)
+    found = pointing_cost.run(data, m.conventions.residual, runs, fine)
     case = best_case(found, fine)
-    by_paper = verdict.of_residual(m, mirrors, sources, achieved, residual, runs)
-    requirements, papers_loop = judged(file, links, by_paper, fine, found)
-    day, contact, plan = delivered(file, links, found, fine, residual, achieved, parts)
+    cause = verdict.residual_cause(mirrors, q.residual_statistic, residual, runs)
+    by_paper = verdict.of_residual(q, mirrors, sources, achieved, left_rad, cause)
+    requirements, papers_loop = judged(links, by_paper, fine, case)
+    if case is not None:
+        loss = day_study.PointingLoss(case.outage_loss_db, case.outage, f"{case.controller}, {case.source}")
+    else:
+        loss = day_study.loss_at(data, achieved.margin_db, f"simulated: {residual.trace.name}")
+    day, contact, plan = delivered(links, loss, fine, parts)
 
     on_progress(3, 3, "verdict")
-    evidence = verdict.Evidence(m, loops, summary, runs, scan, day)
+    evidence = verdict.Evidence(m.amplifier, cases, loops, summary, runs, scan, day)
     return Study(
         file=file,
         links=links,
@@ -200,7 +211,7 @@ def run(
         margins=margins,
         runs=runs,
         residual=residual,
-        comparison=compare(file, runs),
+        comparison=compare(m, data, runs),
         other_readings=as_read,
         scan=scan,
         fine_pointing=fine,
@@ -219,29 +230,20 @@ def _scene(file: MissionFile, mirrors: mirror.MirrorParts) -> fine_pointing.Scen
     return fine_pointing.scene(file, mirrors, tracking_light_w(file))
 
 
-def solve_rate(file: MissionFile) -> MissionFile:
-    """The file with a data rate of "largest" replaced by what it stands for; raises `LinkError` without one."""
-    solved = link_study.solve_rate(_links_of(file))
-    mission = file.mission.model_copy(update={"communication": solved.mission.communication})
-    return replace(file, mission=mission, sources=solved.sources)
-
-
-def _links_of(file: MissionFile) -> LinkFile:
-    return LinkFile(file.mission, file.path, file.text, file.sha256, file.sources, file.contents)
-
-
 def judged(
-    file: MissionFile,
     links: link_study.LinkStudy,
     by_paper: Requirements,
     fine: fine_pointing.FinePointingStudy | None,
-    found: pointing_cost.LinkPerformance,
+    case: link_performance.Performance | None,
 ) -> tuple[Requirements, Requirements]:
-    """What the verdict judges, and what the paper's loop is held against beside it where it is not that."""
-    case, beams = best_case(found, fine), requirement.of_beams(links)
+    """What the verdict judges, and what the paper's loop is held against beside it where it is not that.
+
+    ``case`` is the link under the best controller of the fine-pointing loop.
+    """
+    beams = requirement.of_beams(links)
     if fine is None or case is None:
         return (*beams, *by_paper), ()
-    return (*beams, *verdict.of_fine_pointing(file.mission, file.sources, fine, case)), by_paper
+    return (*beams, *verdict.of_fine_pointing(links.data.requirement, links.file.sources, fine, case)), by_paper
 
 
 def best_case(
@@ -255,77 +257,66 @@ def tornado(file: MissionFile, error_rad: float) -> link.Tornado:
     """What moves the margin of the communication link at a pointing error that stays as it is."""
 
     def margin_db(m: LinkMission) -> float:
-        return float(link.margin_of_error(m, np.array([error_rad]))[0])
+        return float(link.margin_of_error(link.of(m), np.array([error_rad]))[0])
 
-    m = file.mission
-    return link.Tornado("Communication", margin_db(m), link.swings(m, file.sources, link.LINK_TABLES, margin_db))
+    m, tables = file.mission, link.LINK_TABLES
+    swings = link.swings(m, file.sources, tables, m.conventions.strehl, margin_db, link.lit)
+    return link.Tornado("Communication", margin_db(m), swings)
 
 
 def delivered(
-    file: MissionFile,
     links: link_study.LinkStudy,
-    found: pointing_cost.LinkPerformance,
+    loss: day_study.PointingLoss,
     fine: fine_pointing.FinePointingStudy | None,
-    residual: paper_cases.Run,
-    achieved: link.LinkBudget,
     parts: kept.Kept = kept.NOTHING,
 ) -> tuple[day_study.DayStudy | None, contact_run.ContactRun | None, constellation.ConstellationPlan | None]:
-    """The day under the best controller of the fine-pointing loop, or under the worst of the sines without one.
+    """The day at a pointing loss, its contact in time under the best controller, and the plan of a constellation.
 
     Raises ValueError for orbits that do not hold over the mission's span.
     """
-    m = file.mission
-    if m.orbit is None or m.operations is None:
+    m, operations = links.file.mission, links.file.mission.operations
+    if m.orbit is None or operations is None:
         return None, None, None
-    case = best_case(found, fine)
-    if case is not None:
-        loss = day_study.PointingLoss(case.outage_loss_db, case.outage, f"{case.controller}, {case.source}")
-    else:
-        loss = day_study.loss_at(m, achieved.margin_db, f"simulated: {residual.trace.name}")
-    planned = m.constellation is not None and orbit.repeats(m.constellation, m)
+    planned = m.constellation is not None and orbit.repeats(m.constellation, m.orbit)
 
     def in_time() -> tuple[day_study.DayStudy, contact_run.ContactRun | None]:
         day = parts.part(day_study.run, links, loss)
-        return day, parts.part(contact_run.of_mission, m, day, links.finding, fine)
+        of = operations, m.acquisition, links.data, day, links.finding, fine
+        return day, parts.part(contact_run.of_mission, *of)
 
-    (day, contact), plan = both(
-        in_time, lambda: parts.part(constellation.run, _links_of(file), loss) if planned else None
-    )
+    (day, contact), plan = both(in_time, lambda: parts.part(constellation.run, links.file, loss) if planned else None)
     return day, contact, plan
 
 
-def compare(file: MissionFile, runs: tuple[paper_cases.Run, ...]) -> Comparison | None:
+def compare(m: Mission, data: link.DataLink, runs: tuple[paper_cases.Run, ...]) -> Comparison | None:
     """The link on the comparison model, when the mission has one."""
-    m = file.mission
     if m.mirror.comparison is None:
         return None
     run = paper_cases.worst(runs, m.requirement.residual_statistic, Variant.COMPARISON)
-    return Comparison(run, float(link.margin_of_error(m, np.array([paper_cases.residual_rad(m, run.trace)]))[0]))
+    left_rad = paper_cases.residual_rad(m.requirement, m.conventions, run.trace)
+    return Comparison(run, float(link.margin_of_error(data, np.array([left_rad]))[0]))
 
 
-def largest_error(m: Mission, margin_db: float) -> float:
-    """Largest pointing error (rad) for a margin at the mission's rate; nan when the link has not even that on axis."""
-    try:
-        return link.largest_pointing_error(m, margin_db, m.communication.data_rate_bit_s)
-    except link.LinkError:
-        return math.nan
+def margin_map(data: link.DataLink, sources: Mapping[str, Source]) -> MarginMap:
+    """Margin over data rate and pointing error around the requirement, with the receivers that it implies.
 
-
-def margin_map(file: MissionFile) -> MarginMap:
-    """Margin over data rate and pointing error around the requirement, with the receivers that it implies."""
-    m, q = file.mission, file.mission.requirement
-    built = link.receiver(m)
-    highest = math.inf if built is None else built.highest_data_rate_bit_s
-    rate = m.communication.data_rate_bit_s
+    The largest pointing error is nan where the link has not even on axis the required margin.
+    """
+    q, rate = data.requirement, data.table.data_rate_bit_s
+    highest = math.inf if data.receiver is None else data.receiver.highest_data_rate_bit_s
     rates = rate * np.geomspace(1 / 30, min(30.0, highest / rate), 181)
-    errors = 3.0 * max(q.pointing_error_rad, m.communication.pointing_error_rad) * np.linspace(0.0, 1.0, 121)
+    errors = 3.0 * max(q.pointing_error_rad, data.table.pointing_error_rad) * np.linspace(0.0, 1.0, 121)
+    try:
+        largest_error = link.largest_pointing_error(data, q.margin_db, rate)
+    except link.LinkError:
+        largest_error = math.nan
     return MarginMap(
         rates,
         errors,
-        link.margin_map(m, rates, errors),
-        link.convention_maps(m, rates, errors),
-        link_study.largest_rate(m),
-        largest_error(m, q.margin_db),
-        link.implied_sensitivity(m),
-        link.ideal_receivers(m, file.sources),
+        link.margin_map(data, rates, errors),
+        link.convention_maps(data, rates, errors),
+        link_study.largest_rate(data),
+        largest_error,
+        link.implied_sensitivity(data),
+        link.ideal_receivers(data, sources),
     )

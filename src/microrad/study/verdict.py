@@ -13,11 +13,13 @@ from microrad.link.requirement import IMPOSSIBLE, Requirement, Subject, derived_
 from microrad.link.under_jitter import Performance
 from microrad.loop import sine_run
 from microrad.loop.fine_pointing import FinePointingStudy
-from microrad.loop.paper_cases import Run, residual_rad
+from microrad.loop.paper_cases import PaperCases, Run
 from microrad.mirror import MirrorParts, Variant, hysteresis
 from microrad.mirror import summary as mirror_summary
 from microrad.mission.file import LinkFile
-from microrad.mission.model import Mission, Source
+from microrad.mission.model import Amplifier, Source
+from microrad.mission.tables import mirror as mirror_table
+from microrad.mission.tables.link import LinkRequirement
 from microrad.orbit import day as day_study
 from microrad.study import paper
 
@@ -27,50 +29,45 @@ PAPER_RATE_BIT_S = 300e6  # section 2.2
 
 # ------------------------------------------------------------------------------------------------------- requirements
 def of_residual(
-    m: Mission,
+    q: LinkRequirement,
     mirrors: MirrorParts,
     sources: Mapping[str, Source],
     achieved: link.LinkBudget,
-    worst: Run,
-    runs: tuple[Run, ...],
+    left_rad: float,
+    cause: str,
 ) -> tuple[Requirement, Requirement]:
-    """The error of the paper's loop in the worst of its sines, and the margin that it leaves communication."""
-    q, left, cause = m.requirement, residual_rad(m, worst.trace), residual_cause(m, mirrors, worst, runs)
+    """The error of the paper's loop in the worst of its sines, with its cause, and the margin that it leaves."""
     spare, derived = achieved.margin_db - q.margin_db, derived_from(sources, "communication.")
-    because, name, doubt = "the residual: " + cause, "communication margin", _doubt(m, achieved.possible)
+    because, name, lacking = "the residual: " + cause, "communication margin", unknown(mirrors.table)
+    doubt = lacking if achieved.possible else IMPOSSIBLE
     return (
-        _error("residual", "residual pointing error", m, left, cause),
+        _error("residual", "residual pointing error", q, left_rad, cause, lacking),
         Requirement("communication", name, "dB", q.margin_db, achieved.margin_db, spare, because, doubt, derived),
     )
 
 
 def of_fine_pointing(
-    m: Mission, sources: Mapping[str, Source], fine: FinePointingStudy, case: Performance
+    q: LinkRequirement, sources: Mapping[str, Source], fine: FinePointingStudy, case: Performance
 ) -> tuple[Requirement, ...]:
     """The mirror's stroke; the best controller's error for its share of the time, and the margin but for the outage.
 
     ``case`` is the link under that controller.
     """
-    q, controller, cause = m.requirement, fine.best.design.name, fine.budget.dominant
-    left = fine.best.simulated[Variant.GIVEN].quantile_rad
-    name, derived = f"link margin but for {outage_words(m)} ({controller})", derived_from(sources, "communication.")
-    spare, doubt = case.margin_db - q.margin_db, _doubt(m, case.possible)
+    controller, cause, lacking = fine.best.design.name, fine.budget.dominant, unknown(fine.scene.mirrors.table)
+    left, title = fine.best.simulated[Variant.GIVEN].quantile_rad, f"fine pointing at {100 * fine.quantile:g} %"
+    name, derived = f"link margin but for {outage_words(q)} ({controller})", derived_from(sources, "communication.")
+    spare, doubt = case.margin_db - q.margin_db, lacking if case.possible else IMPOSSIBLE
     return (
         _stroke(sources, fine),
-        _error("fine pointing", f"fine pointing at {100 * fine.quantile:g} % ({controller})", m, left, cause),
+        _error("fine pointing", f"{title} ({controller})", q, left, cause, lacking),
         Requirement("communication", name, "dB", q.margin_db, case.margin_db, spare, cause, doubt, derived),
     )
 
 
-def unknown(m: Mission) -> str:
+def unknown(mirror: mirror_table.Mirror) -> str:
     """What would have to be known of the mission's mirror before a loop around it may be relied on, or nothing."""
-    lacking = mirror_summary.unknown_dynamics(m.mirror)
+    lacking = mirror_summary.unknown_dynamics(mirror)
     return "dynamics of the mirror, which its model does not have" if lacking else ""
-
-
-def _doubt(m: Mission, possible: bool) -> str:
-    """Why a margin of the simulated link may not be relied on, or nothing; it is ``possible`` by its power."""
-    return unknown(m) if possible else IMPOSSIBLE
 
 
 def _stroke(sources: Mapping[str, Source], fine: FinePointingStudy) -> Requirement:
@@ -81,19 +78,19 @@ def _stroke(sources: Mapping[str, Source], fine: FinePointingStudy) -> Requireme
     return Requirement("stroke", name, "rad", needed, given, axis.margin_rad, largest, derived=derived)
 
 
-def _error(subject: Subject, name: str, m: Mission, left_rad: float, cause: str) -> Requirement:
-    allowed = m.requirement.pointing_error_rad
-    return Requirement(subject, name, "rad", allowed, left_rad, allowed - left_rad, cause, unknown(m))
+def _error(subject: Subject, name: str, q: LinkRequirement, left_rad: float, cause: str, doubt: str) -> Requirement:
+    allowed = q.pointing_error_rad
+    return Requirement(subject, name, "rad", allowed, left_rad, allowed - left_rad, cause, doubt)
 
 
-def residual_cause(m: Mission, mirrors: MirrorParts, worst: Run, runs: tuple[Run, ...]) -> str:
+def residual_cause(mirrors: MirrorParts, statistic: str, worst: Run, runs: tuple[Run, ...]) -> str:
     """What the residual is made of: an amplifier at its limits, else the lag of the loop, else hysteresis."""
     if worst.at_limits:
         return f"{worst.at_limits} at {worst.freq_hz:g} Hz"
     linear = next(
         r for r in runs if (r.mirror, r.controller, r.freq_hz) == (Variant.STRAIGHT, worst.controller, worst.freq_hz)
     )
-    share = 1.0 - residual_rad(m, linear.trace) / residual_rad(m, worst.trace)
+    share = 1.0 - linear.trace.left_rad(statistic) / worst.trace.left_rad(statistic)
     if share < 0.5:
         return f"lag of the loop at {worst.freq_hz:g} Hz"
     model = mirrors.own[Variant.GIVEN].model
@@ -120,7 +117,8 @@ class Claim:
 class Evidence:
     """What the claims are judged on."""
 
-    mission: Mission
+    amplifier: Amplifier
+    cases: PaperCases
     loops: tuple[sine_run.HysteresisLoop, ...]
     summary: mirror_summary.Summary
     runs: tuple[Run, ...]
@@ -130,9 +128,8 @@ class Evidence:
 
 def against_paper(e: Evidence) -> tuple[Claim, ...]:
     """Each printed claim in the order of the paper: those of its links on its own numbers, the others on this run."""
-    links = paper.links()
-    claims = [_beacon_claim(links), _sign_claim(links), _margin_claim(links), _travel_claim(e)]
-    if e.mission.mirror.linear is not None:
+    claims = [*_link_claims(paper.links()), _travel_claim(e)]
+    if e.cases.mirrors.table.linear is not None:
         claims.append(_linear_claim(e.summary))
     claims.append(_loops_claim(e.loops))
     claims += [_worse_claim(e), *_drop_claims(e)]
@@ -186,8 +183,15 @@ def _minutes(time_s: float) -> str:
     return "never" if np.isinf(time_s) else f"{time_s / 60.0:.2g} min" if time_s >= 60.0 else f"{time_s:.2g} s"
 
 
-def _beacon_claim(links: LinkFile) -> Claim:
-    p = pointing.open_loop_budget(links.mission, links.sources)
+def _link_claims(links: LinkFile) -> tuple[Claim, ...]:
+    m, sources, data = links.mission, links.sources, link.of(links.mission)
+    open_loop = pointing.open_loop_budget(m.pointing, data.shared, m.beacon, sources)
+    beacon = link.beam_budget("beacon", data.shared, m.beacon, sources).margin_db
+    communication = link.communication_budget(data, sources).margin_db
+    return _beacon_claim(open_loop), _sign_claim(beacon, communication), _margin_claim(data, sources)
+
+
+def _beacon_claim(p: pointing.OpenLoopPointing) -> Claim:
     claim = "a 780 µrad beacon covers the root sum square of three errors"
     why = "two of the three errors are not printed; ours are chosen so that 780 µrad follows, read as the full angle"
     other = p.other_reading
@@ -203,33 +207,30 @@ def _beacon_claim(links: LinkFile) -> Claim:
     return Claim("section 2.1", claim, ours, "inferred" if p.covers else "no", why)
 
 
-def _sign_claim(links: LinkFile) -> Claim:
-    beacon = link.beacon_budget(links.mission, links.sources).margin_db
-    communication = link.communication_budget(links.mission, links.sources).margin_db
+def _sign_claim(beacon: float, communication: float) -> Claim:
     ours = f"beacon {beacon:+.1f} dB, communication {communication:+.1f} dB"
     why = "the sensitivities of both receivers are assumptions: the paper prints neither"
     agrees = "inferred" if min(beacon, communication) > 0.0 else "no"
     return Claim("Table 2", "both margins are positive", ours, agrees, why)
 
 
-def _margin_claim(links: LinkFile) -> Claim:
-    m = links.mission
-    c, q, counts = m.communication, m.requirement, [r.photons_per_bit for r in link.implied_sensitivity(m)]
-    ideal = ", ".join(f"{r.name} {r.margin_db:.1f} dB" for r in link.ideal_receivers(m, links.sources))
+def _margin_claim(data: link.DataLink, sources: Mapping[str, Source]) -> Claim:
+    c, q, counts = data.table, data.requirement, [r.photons_per_bit for r in link.implied_sensitivity(data)]
+    ideal = ", ".join(f"{r.name} {r.margin_db:.1f} dB" for r in link.ideal_receivers(data, sources))
     why = (
         f"inferred, hence circular: {q.margin_db:g} dB at {c.data_rate_bit_s / 1e6:g} Mbit/s and "
         f"{q.pointing_error_rad * 1e6:g} µrad imply a receiver of {min(counts):.0f} to {max(counts):.0f} photons per "
         f"bit over the {len(counts)} readings of Table 2. With ideal receivers (1e-9) the margin would be: {ideal}"
     )
-    margin = float(link.margin_map(m, [PAPER_RATE_BIT_S], [10e-6])[0, 0])
+    margin = float(link.margin_map(data, [PAPER_RATE_BIT_S], [10e-6])[0, 0])
     ours = f"{margin:.2f} dB at 300 Mbit/s and 10 µrad"
     agrees = "inferred" if abs(margin - 3.0) <= 0.05 else "no"
     return Claim("section 2.2, Fig. 2", "3 dB at 300 Mbit/s and 10 µrad", ours, agrees, why)
 
 
 def _travel_claim(e: Evidence) -> Claim:
-    m = e.mission
-    span = (m.amplifier.output_max_v - m.amplifier.output_min_v) / m.amplifier.gain
+    a = e.amplifier
+    span = (a.output_max_v - a.output_min_v) / a.gain
     reach = 2.0 * hysteresis.output_amplitude(e.summary.model, span / 2.0)
     why = f"what the hysteresis model gives over a drive range of {span:.4g} V; the rest is drive or gain not printed"
     agrees = "yes" if reach >= CLAIMED_TRAVEL_RAD else "no"
@@ -264,7 +265,7 @@ def _pairs(e: Evidence, controller: str) -> list[tuple[Run, Run]]:
 
 
 def _worse_claim(e: Evidence) -> Claim:
-    pairs = [p for p in _pairs(e, "PID") if p[0].freq_hz in e.mission.scenario.pid_frequencies_hz]
+    pairs = [p for p in _pairs(e, "PID") if p[0].freq_hz in e.cases.scenario.pid_frequencies_hz]
     added = [_rms(a.trace.error_rad[a.trace.steady] - b.trace.error_rad[b.trace.steady]) for a, b in pairs]
     ours = "; ".join(
         f"{a.freq_hz:g} Hz: peak {b.trace.peak_rad * 1e6:.1f} → {a.trace.peak_rad * 1e6:.1f} µrad, "

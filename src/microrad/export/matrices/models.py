@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from microrad.core import lti
-from microrad.export.choice import Choice, PointingChoice, Source, TrackingChoice, flight_controller, source
+from microrad.export.choice import Choice, PointingChoice, Source, TrackingChoice, flight_controller
 from microrad.export.matrices.forms import LinearModel, Port
 from microrad.export.matrices.structure import without_copies, without_state
 from microrad.export.records import ExportError, FlightController
@@ -17,23 +17,22 @@ from microrad.loop.fine_loop.loop import ReferenceFilter
 from microrad.loop.fine_pointing.designs import IN_SERIES
 from microrad.loop.sensor import StrainGauge
 from microrad.mirror import model as mirror
-from microrad.mission.file import MissionFile
 
 LINEAR_PART, MIRROR, SAMPLED_PLANT, CONTROLLER, LOOP = "linear_part", "mirror", "sampled_plant", "controller", "loop"
 """Names of the models, valid as names of variables in MATLAB."""
 
 
-def models(of: MissionFile | Choice) -> tuple[LinearModel, ...]:
-    """The linear models of a mission, or of a chosen controller (see `choice.choose`) and its loop.
+def models(of: Source | Choice) -> tuple[LinearModel, ...]:
+    """The linear models of a mission's mirror (see `choice.source`), or of a controller (`choice.choose`) and its loop.
 
     Angles are line-of-sight angles in the sampled plant, the controller and the loop, and the mirror file's own in the
     first two. Raises ExportError if the mission's loop cannot be built.
     """
-    start = source(of) if isinstance(of, MissionFile) else of.source
-    controller = None if isinstance(of, MissionFile) else _controller(start, flight_controller(of))
+    start = of if isinstance(of, Source) else of.source
+    controller = None if isinstance(of, Source) else _controller(start, flight_controller(of))
     try:
         found = _mirror_models(start)
-        if isinstance(of, MissionFile) or controller is None:
+        if isinstance(of, Source) or controller is None:
             return tuple(found)
         plant, loop = _pointing_models(of) if isinstance(of, PointingChoice) else _tracking_models(of)
         return (*found, plant, controller, loop)

@@ -7,6 +7,7 @@ from numpy.typing import ArrayLike
 
 from microrad.core.arrays import Floats
 from microrad.core.budget import Line, root_sum_square
+from microrad.link.model import Shared
 from microrad.link.pointing.allocation import Allocation, allocate
 from microrad.link.pointing.classes import ErrorTerm, Interpretation, StatedError, basis, error_term
 from microrad.link.pointing.point_ahead import NAME, PointAheadAngle, point_ahead
@@ -18,8 +19,9 @@ from microrad.link.pointing.summation import (
     summations,
 )
 from microrad.link.radial_error import Jitter, radial_cdf
-from microrad.mission.model import LinkMission, Source, source_text
-from microrad.mission.tables.link import half_angle_rad
+from microrad.mission.model import Source, source_text
+from microrad.mission.tables.link import Beacon, half_angle_rad
+from microrad.mission.tables.pointing import Pointing
 
 INTERPRETATIONS: dict[Interpretation, str] = {
     "temporal": "share of the time of the worst-case satellite, at 3 sigma of all satellites or at the stated bound",
@@ -119,7 +121,12 @@ class OpenLoopPointing:
 
 
 def open_loop_budget(
-    mission: LinkMission, sources: Mapping[str, Source], *, interpretation: Interpretation = "temporal"
+    pointing: Pointing | None,
+    shared: Shared,
+    beacon: Beacon | None,
+    sources: Mapping[str, Source],
+    *,
+    interpretation: Interpretation = "temporal",
 ) -> OpenLoopPointing:
     """Open-loop errors by every rule against the beacon (paper, section 2.1: 780 µrad cover their root sum square).
 
@@ -128,21 +135,21 @@ def open_loop_budget(
     where the mission has it. Raises `ValueError` for a mission without pointing errors, and for a line that stands for
     point-ahead as well.
     """
-    if mission.pointing is None:
+    if pointing is None:
         raise ValueError("the mission states no pointing errors; give it the table [pointing]")
-    ahead = None if mission.point_ahead is None else point_ahead(mission.point_ahead)
-    entries = tuple(_entries(mission, ahead, sources, interpretation))
+    ahead = None if shared.point_ahead is None else point_ahead(shared.point_ahead)
+    entries = tuple(_entries(pointing, ahead, sources, interpretation))
     lines, stated = tuple(line for line, _ in entries), tuple(error for _, error in entries)
     terms = tuple(error_term(error, interpretation) for error in stated)
-    confidence, rss, error = mission.pointing.confidence, root_sum_square(lines), mean_and_sigma(terms)
+    confidence, rss, error = pointing.confidence, root_sum_square(lines), mean_and_sigma(terms)
     confident = exact_total_rad(terms, confidence)
-    own = mission.conventions.divergence
+    own = shared.conventions.divergence
     other = next(convention for convention in _CONVENTIONS if convention != own)
 
     def reading(convention: str) -> DivergenceReading | None:
-        if mission.beacon is None:
+        if beacon is None:
             return None
-        half = half_angle_rad(mission.beacon.divergence_rad, convention)
+        half = half_angle_rad(beacon.divergence_rad, convention)
         needed = _divergence_rad(rss, convention), _divergence_rad(confident, convention)
         inside = float(radial_cdf(error, half))
         return DivergenceReading(convention, half, needed[0], half >= rss, inside, needed[1])
@@ -167,10 +174,9 @@ def open_loop_budget(
 
 
 def _entries(
-    mission: LinkMission, ahead: PointAheadAngle | None, sources: Mapping[str, Source], interpretation: Interpretation
+    pointing: Pointing, ahead: PointAheadAngle | None, sources: Mapping[str, Source], interpretation: Interpretation
 ) -> Iterator[tuple[Line, StatedError]]:
-    assert mission.pointing is not None
-    for key, line in mission.pointing.lines.items():
+    for key, line in pointing.lines.items():
         name = key.replace("_", " ").replace("-", " ").strip().capitalize()
         if ahead is not None and name.lower() == NAME.lower().replace("-", " "):
             raise ValueError(

@@ -12,7 +12,7 @@ from microrad.loop import control, disturbance, sensor
 from microrad.loop.fine_loop import loop as fine
 from microrad.mirror import MirrorParts, Variant, geometry, hysteresis
 from microrad.mission.file import MissionFile, NamedFile, content_of
-from microrad.mission.model import Mission, Source, source_text
+from microrad.mission.model import Source, source_text
 from microrad.mission.tables.fine_pointing import FinePointing, OpticalSensorTable, VibrationTable
 from microrad.mission.tables.pointing import Pointing
 
@@ -41,11 +41,11 @@ class Scene:
         return self.stroke if self.table.reference.point_ahead_on_mirror else self.stroke_without_point_ahead
 
 
-def table(m: Mission) -> FinePointing:
+def table(given: FinePointing | None) -> FinePointing:
     """The mission's fine-pointing table; ValueError without one."""
-    if m.fine_pointing is None:
+    if given is None:
         raise ValueError("the mission has no table [fine_pointing]: microrad init writes one")
-    return m.fine_pointing
+    return given
 
 
 def scene(file: MissionFile, mirrors: MirrorParts, received_power_w: float | None) -> Scene:
@@ -60,7 +60,7 @@ def scene(file: MissionFile, mirrors: MirrorParts, received_power_w: float | Non
     Raises:
         ValueError: The mission has no such loop, or it cannot be built; says why.
     """
-    m, f = file.mission, table(file.mission)
+    m, f = file.mission, table(file.mission.fine_pointing)
     chain = optics(f, m.conventions.mirror_angle)
     one = mirrors.own[Variant.GIVEN].plant
     base, period = control.drive_from_mission(m), 1.0 / f.rate_hz

@@ -66,23 +66,22 @@ class DayStudy:
 
 def given_loss(links: LinkStudy) -> PointingLoss:
     """The pointing loss of a mission whose loop is not simulated: that of its jitter, else of its pointing error."""
-    m = links.file.mission
     if links.under_jitter is not None:
         return PointingLoss(links.under_jitter.outage_loss_db, links.under_jitter.outage, "jitter as given")
-    error = format_quantity(m.communication.pointing_error_rad, "rad")
-    return loss_at(m, links.communication.margin_db, f"communication.pointing_error, {error}")
+    error = format_quantity(links.data.table.pointing_error_rad, "rad")
+    return loss_at(links.data, links.communication.margin_db, f"communication.pointing_error, {error}")
 
 
-def loss_at(m: LinkMission, margin_db: float, source: str) -> PointingLoss:
+def loss_at(data: link.DataLink, margin_db: float, source: str) -> PointingLoss:
     """The pointing loss, an uncorrected point-ahead in it, that leaves a margin at the budgeted rate and distance.
 
     Args:
-        m: the mission.
-        margin_db: of its communication link, dB.
+        data: the communication link.
+        margin_db: its margin, dB.
         source: where the margin comes from, in words.
     """
-    needed = float(link.required_dbm(m, m.communication.data_rate_bit_s))
-    return PointingLoss(link.received_on_axis_dbm(m) - needed - margin_db, 0.0, source)
+    needed = float(link.required_dbm(data, data.table.data_rate_bit_s))
+    return PointingLoss(link.received_on_axis_dbm(data) - needed - margin_db, 0.0, source)
 
 
 def acquired(links: LinkStudy) -> Found | None:
@@ -95,15 +94,16 @@ def acquired(links: LinkStudy) -> Found | None:
 
 def _pair(links: LinkStudy, m: LinkMission) -> orbit.Pair:
     """The terminals of a mission whose files are those of the links'."""
-    return orbit.pair(m, links.file.path.parent, links.file.contents)
+    return orbit.pair(m.orbit, m.terminals, links.file.path.parent, links.file.contents)
 
 
 def relay(links: LinkStudy, loss: PointingLoss) -> Way:
     """The way by the relay alone: what `run` finds of it, without the rest of the day."""
     m = links.file.mission
     seen = view(_pair(links, m), m.communication.wavelength_m)
-    rates = flow.rate_table(flow.closings(m, loss))
-    return flow.relay(flow.table(m), seen, rates, loss.outage, acquired(links), 1.0)
+    o = flow.table(m.operations)
+    rates = flow.rate_table(flow.closings(o, links.data, loss))
+    return flow.relay(o, seen, rates, loss.outage, acquired(links), 1.0)
 
 
 def run(
@@ -121,13 +121,13 @@ def run(
     """
     m = links.file.mission
     loss = given_loss(links) if loss is None else loss
-    seen, o = view(_pair(links, m), m.communication.wavelength_m), flow.table(m)
+    seen, o = view(_pair(links, m), m.communication.wavelength_m), flow.table(m.operations)
     if o.contact is not None and seen.encounters and o.contact.number > len(seen.encounters):
         raise operations.OperationsError(
             f"operations.contact.number is {o.contact.number}, and the span has {len(seen.encounters)} contacts: give "
             "a number up to that, or a longer orbit.duration"
         )
-    found, closing = acquired(links), flow.closings(m, loss)
+    found, closing = acquired(links), flow.closings(o, links.data, loss)
     heard = flow.heard(o.downlink, seen.pair)
     relay = flow.relay(o, seen, flow.rate_table(closing), loss.outage, found, 1.0)
     return DayStudy(

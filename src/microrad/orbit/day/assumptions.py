@@ -81,14 +81,14 @@ class _Known:
 def numbers(case: _Case, known: _Known) -> Numbers:
     """Volumes and latencies of one case."""
     m = case.mission
-    o, own = flow.table(m), flow.table(known.mission)
+    o, own = flow.table(m.operations), flow.table(known.mission.operations)
     seen, heard = known.seen, known.heard
     moved = m.orbit is not known.mission.orbit
     if moved:
         seen = geometry.view(known.pair_of(m), m.communication.wavelength_m)
     if moved or (o.downlink and own.downlink and o.downlink.stations is not own.downlink.stations):
         heard = flow.heard(o.downlink, seen.pair)
-    rates = flow.rate_table(flow.closings(m, case.loss))
+    rates = flow.rate_table(flow.closings(o, link.of(m), case.loss))
     relay = flow.relay(o, seen, rates, case.loss.outage, known.found, case.slower)
     direct = flow.direct(o, seen, heard)
     if direct is None:
@@ -112,7 +112,7 @@ def swings(
     and what the relay grants are replaced. An orbit from a file stays as it is, and so does what would leave no orbit:
     one that has decayed, or lies below the surface that lines of sight must clear.
     """
-    m = m.with_value("operations.runs", min(flow.table(m).runs, _RUNS))
+    m = m.with_value("operations.runs", min(flow.table(m.operations).runs, _RUNS))
     known, own = _Known(m, pair_of, seen, heard, found), _Case(m, loss)
     here = numbers(own, known)
 
@@ -137,7 +137,8 @@ _Side = tuple[str, _Case] | None
 def _changes(own: _Case, found: Found | None) -> Iterator[tuple[str, _Side, _Side]]:
     """Name, low side and high side of each assumption that the mission has."""
     m = own.mission
-    o, orbits, leo, rate = flow.table(m), orbits_table(m), orbits_table(m).leo, m.communication.data_rate_bit_s
+    o, orbits, rate = flow.table(m.operations), orbits_table(m.orbit), m.communication.data_rate_bit_s
+    leo = orbits.leo
 
     def edited(text: str, key: str, value: object) -> tuple[str, _Case]:
         return text, replace(own, mission=m.with_value(key, value))
@@ -149,7 +150,7 @@ def _changes(own: _Case, found: Found | None) -> Iterator[tuple[str, _Side, _Sid
         return name, low, high
 
     if o.rates_bit_s is None:
-        built = link.receiver(m)
+        built = link.of(m).receiver
         name, slow, fast = scaled("laser data rate", "communication.data_rate_bit_s", rate, "bit/s")
         yield name, slow, fast if built is None or 2.0 * rate <= built.highest_data_rate_bit_s else None
     asked = 2.0 * o.margin_db or 3.0  # every rate that just closes, and twice what is demanded

@@ -9,7 +9,6 @@ import numpy as np
 from microrad import link, orbit
 from microrad.core.arrays import Floats
 from microrad.link.partner_search import Found
-from microrad.mission.model import LinkMission
 from microrad.mission.tables.operations import Downlink, Operations
 from microrad.orbit import operations
 from microrad.orbit.day.geometry import View, cut_at, longest_gap_s
@@ -80,29 +79,28 @@ class Way:
         return self.latency.quantile(0.99)
 
 
-def closings(m: LinkMission, loss: PointingLoss) -> tuple[Closing, ...]:
-    """The rates of the mission, highest first, each with how far it reaches; what the receiver refuses is left out.
+def closings(o: Operations, data: link.DataLink, loss: PointingLoss) -> tuple[Closing, ...]:
+    """The rates of the link, highest first, each with how far it reaches; what the receiver refuses is left out.
 
     It closes with a margin of `operations.margin`; the margin falls by 20 log10 of the range.
     """
-    o = table(m)
-    rates = (m.communication.data_rate_bit_s,) if o.rates_bit_s is None else o.rates_bit_s
-    built, found = link.receiver(m), []
-    available = link.received_on_axis_dbm(m) - loss.loss_db
+    rates = (data.table.data_rate_bit_s,) if o.rates_bit_s is None else o.rates_bit_s
+    built, found = data.receiver, []
+    available = link.received_on_axis_dbm(data) - loss.loss_db
     for rate in sorted(rates, reverse=True):
         if built is not None and rate > built.highest_data_rate_bit_s:
             continue
-        margin = available - float(link.required_dbm(m, rate))
+        margin = available - float(link.required_dbm(data, rate))
         spare = margin - o.margin_db
-        found.append(Closing(rate, margin, m.communication.distance_m * 10.0 ** (spare / 20.0)))
+        found.append(Closing(rate, margin, data.table.distance_m * 10.0 ** (spare / 20.0)))
     return tuple(found)
 
 
-def table(m: LinkMission) -> Operations:
+def table(given: Operations | None) -> Operations:
     """The mission's table of operations; `operations.OperationsError` without one."""
-    if m.operations is None:
+    if given is None:
         raise operations.OperationsError("the mission has no table [operations]: microrad init writes one")
-    return m.operations
+    return given
 
 
 def rate_table(found: tuple[Closing, ...]) -> operations.RateTable | None:

@@ -9,6 +9,7 @@ from typing import Any
 from nicegui import background_tasks, ui
 
 from microrad.mission.file import MissionFile
+from microrad.mission.tables.fine_pointing import FinePointing
 from microrad.studio.commands import Design
 from microrad.studio.pages import layout
 from microrad.studio.pages.aside import aside, stay
@@ -135,13 +136,13 @@ class ControlPage:
             return
         from microrad.studio import control_view
 
-        names = await aside(self.table, _names, file)
+        names = await aside(self.table, _names, file.mission.fine_pointing)
         self.file, self.round = file, self.round + 1
         self.rows = {name: control_view.waiting_row(name) for name in names}
         self._table()
         self.filling = True
         if not self.name.value:
-            self.amplitude.value = _amplitude(file)
+            self.amplitude.value = f"{1e6 * file.mission.scenario.amplitude_rad:g} urad"
             self.frequency.value = f"{file.mission.scenario.pid_frequencies_hz[-1]:g} Hz"
         self.name.set_options(list(names), value=self.name.value if self.name.value in names else _first(names))
         self.filling = False
@@ -171,20 +172,20 @@ class ControlPage:
         """A controller, and its row; None where it cannot be built, which its row says."""
         from microrad.studio import control_view
 
+        def told(row: dict[str, Any]) -> None:
+            if file is self.file:
+                self.rows[row["name"]] = row
+                self._table()
+
         if not self.rows[name]["modulus"]:
-            self._row(file, control_view.waiting_row(name, "being tuned ..."))
+            told(control_view.waiting_row(name, "being tuned ..."))
         try:
             found = await aside(self.table, _controller, file, name)
         except ValueError as error:
-            self._row(file, control_view.waiting_row(name, str(error)))
+            told(control_view.waiting_row(name, str(error)))
             return None
-        self._row(file, control_view.table_row(found))
+        told(control_view.table_row(found))
         return found
-
-    def _row(self, file: MissionFile, row: dict[str, Any]) -> None:
-        if file is self.file:
-            self.rows[row["name"]] = row
-            self._table()
 
     def _table(self) -> None:
         self.table.rows = list(self.rows.values())
@@ -266,10 +267,10 @@ class ControlPage:
             self.plots[name].update_figure(figure)
 
 
-def _names(file: MissionFile) -> tuple[str, ...]:
+def _names(table: FinePointing | None) -> tuple[str, ...]:
     from microrad.studio import control_model  # loads the kernels, in a thread
 
-    return control_model.names(file)
+    return control_model.names(table)
 
 
 def _controller(file: MissionFile, name: str) -> Any:
@@ -281,7 +282,3 @@ def _controller(file: MissionFile, name: str) -> Any:
 def _first(names: tuple[str, ...]) -> str:
     """The controller that is shown first: the tuned PI rather than the baseline."""
     return names[1] if len(names) > 3 else names[0]
-
-
-def _amplitude(file: MissionFile) -> str:
-    return f"{1e6 * file.mission.scenario.amplitude_rad:g} urad"

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from nicegui import ui
 
-from microrad.mission.file import LinkFile
 from microrad.orbit.day import DayStudy
 from microrad.studio import day_view, plots
 from microrad.studio.commands import Contacts
@@ -101,7 +100,7 @@ class DayPage:
         self.faults.text = draft.report if file is None else lacking
         self.faults.visible = file is None or bool(lacking)
         if file is not None and not lacking:
-            self.latest.ask(draft.sha256, partial(_day, file))
+            self.latest.ask(draft.sha256, partial(day_view.run, file))
 
     async def look(self) -> None:
         """Show how far it is, and the day once it is there."""
@@ -138,10 +137,6 @@ class DayPage:
         self.ways.rows, self.contacts.rows = day_view.way_rows(day), day_view.contact_rows(day)
         self.swings.rows = day_view.swing_rows(day)
         self.results.visible = True
-
-
-def _day(file: LinkFile, progress: Any) -> DayStudy:
-    return day_view.run(file, progress)
 
 
 def _drawn(day: DayStudy) -> Drawn:

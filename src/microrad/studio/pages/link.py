@@ -98,7 +98,7 @@ class LinkPage(DialPage[LinkView]):
 
     def show_rest(self, view: LinkView) -> None:
         """The map in words, and the budgets."""
-        self.key.text = link_view.map_key(view.file.mission)
+        self.key.text = link_view.map_key(view.data.requirement.margin_db)
         self.words.text = link_view.map_words(view)
         self._tabs()
 

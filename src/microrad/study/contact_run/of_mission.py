@@ -4,34 +4,41 @@ from functools import partial
 
 import numpy as np
 
-from microrad import orbit
+from microrad import link, orbit
 from microrad.core.arrays import Floats
 from microrad.link.partner_search import Finding
 from microrad.loop.fine_pointing import FinePointingStudy
-from microrad.mission.model import Mission
+from microrad.mission.tables.acquisition import Acquisition
+from microrad.mission.tables.operations import Operations
 from microrad.orbit.day import DayStudy
 from microrad.study.contact_run.records import Contact, ContactRun, Settings, Sight
 from microrad.study.contact_run.sequence import run
 
 
-def of_mission(m: Mission, day: DayStudy, finding: Finding | None, fine: FinePointingStudy | None) -> ContactRun | None:
+def of_mission(
+    o: Operations,
+    a: Acquisition | None,
+    data: link.DataLink,
+    day: DayStudy,
+    finding: Finding | None,
+    fine: FinePointingStudy | None,
+) -> ContactRun | None:
     """The run of `operations.contact` under the best controller; None without that table or what it needs."""
-    asked = None if m.operations is None else m.operations.contact
-    if asked is None or finding is None or fine is None or m.fine_pointing is None or m.operations is None:
-        return None
-    if not day.relay.contacts:
+    asked = o.contact
+    if asked is None or a is None or finding is None or fine is None or not day.relay.contacts:
         return None
     settings = Settings(
         slew_angle_rad=asked.slew_angle_rad,
         slew_rate_rad_s=asked.slew_rate_rad_s,
         windows=asked.windows,
         window_s=asked.window_s,
-        settle_s=m.fine_pointing.settle_s,
+        settle_s=fine.scene.table.settle_s,
         hold_s=asked.hold_s,
-        seed=m.operations.seed,
-        way=m.operations.acquisition,
+        seed=o.seed,
+        attempts=a.attempts,
+        way=o.acquisition,
     )
-    return run(m, finding, fine.scene, fine.best.design, _contact(day, asked.number - 1), settings)
+    return run(data, finding, fine.scene, fine.best.design, _contact(day, asked.number - 1), settings)
 
 
 def _contact(day: DayStudy, place: int) -> Contact:

@@ -88,7 +88,8 @@ class Settings:
     The body turns by ``slew_angle_rad`` before the contact, at ``slew_rate_rad_s``. The fine loop is simulated in
     ``windows`` windows of ``window_s`` each, the first right behind lock and the last right before the end, settled for
     ``settle_s`` before it. Lock is lost where the received power stays below the receiver's threshold for longer than
-    ``hold_s``. ``way`` is how the partner is found.
+    ``hold_s``. ``way`` is how the partner is found, and ``attempts`` are the acquisitions, or losses in windows that
+    follow each other, behind which it is given up.
 
     Raises ValueError for a value without meaning.
     """
@@ -100,6 +101,7 @@ class Settings:
     settle_s: float
     hold_s: float
     seed: int
+    attempts: int
     way: Literal["wide beacon", "scan"] = "wide beacon"
 
     def __post_init__(self) -> None:

@@ -1,10 +1,10 @@
 """The order of a contact: slew, acquisition, data, and what follows a loss of lock; each step with its cause."""
 
+from microrad import link
 from microrad.core.units import format_quantity
 from microrad.link import acquisition
 from microrad.link.partner_search import Finding, Found
 from microrad.loop.fine_pointing import Design, Scene
-from microrad.mission.model import Mission
 from microrad.study.contact_run.records import (
     ANSWER,
     BEACON,
@@ -29,7 +29,9 @@ _STATE_OF_STAGE = (BEACON, BEACON, DETECT, ANSWER, ANSWER, ANSWER, LOCK, LOCK, L
 """Of the stages of an acquisition, wide or scanned: three to the detection, eight from the answer on."""
 
 
-def run(m: Mission, finding: Finding, scene: Scene, design: Design, contact: Contact, settings: Settings) -> ContactRun:
+def run(
+    data: link.DataLink, finding: Finding, scene: Scene, design: Design, contact: Contact, settings: Settings
+) -> ContactRun:
     """One contact from the slew to its end, under one controller of the mission's fine-pointing loop; seeded.
 
     The slew ends when the contact begins, or later where the body is not free early enough. Lock is lost where the
@@ -38,23 +40,17 @@ def run(m: Mission, finding: Finding, scene: Scene, design: Design, contact: Con
     beacon on, in the state "re-acquire". The contact is over when an acquisition is given up after as many failures as
     the mission has attempts, or the data after as many losses in windows that follow each other.
 
-    Raises ValueError for a mission without `[acquisition]` or `[fine_pointing]`, a scan that it does not have, a data
-    rate that is still to be solved for, and a geometry that gives no numbers.
+    Raises ValueError for a scan that the mission does not have, a data rate that is still to be solved for, and a
+    geometry that gives no numbers.
     """
-    sampler = Sampler(m, scene.loop, design.controller, contact, settings)
+    sampler = Sampler(data, scene.table, scene.loop, design.controller, contact, settings)
     log = Log(contact)
-    acquire = _Acquisitions(log, _way(finding, settings), _attempts(m), settings.seed)
+    acquire = _Acquisitions(log, _way(finding, settings), settings.attempts, settings.seed)
     windows: list[Window] = []
     if _turn(log, settings) and acquire():
         windows = _data(log, acquire, sampler)
     log.finish()
     return ContactRun(contact, tuple(log.entries), tuple(windows))
-
-
-def _attempts(m: Mission) -> int:
-    if m.acquisition is None:
-        raise ValueError("the mission has no table [acquisition]: a contact has to begin with one")
-    return m.acquisition.attempts
 
 
 def _way(finding: Finding, settings: Settings) -> Found:

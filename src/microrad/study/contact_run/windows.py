@@ -13,8 +13,7 @@ from microrad.core.units import SPEED_OF_LIGHT_M_S, format_quantity
 from microrad.loop.disturbance import Reference
 from microrad.loop.fine_loop import ensemble
 from microrad.loop.fine_loop.loop import LoopController, PointingLoop
-from microrad.loop.fine_pointing.scenario import table
-from microrad.mission.model import Mission
+from microrad.mission.tables.fine_pointing import FinePointing
 from microrad.study.contact_run.records import Contact, Loss, Settings, Sight, Window
 
 MOST_SAMPLES = 5_000_000
@@ -58,18 +57,18 @@ def plan(start_s: float, end_s: float, settings: Settings) -> tuple[tuple[float,
 class Sampler:
     """Runs the windows of one contact under one controller on the mission's loop.
 
-    Raises ValueError for a mission without a fine-pointing loop, or whose data rate is still to be solved for.
+    Raises ValueError where the data rate of the link is still to be solved for.
     """
 
-    mission: Mission
+    data: link.DataLink
+    table: FinePointing
     loop: PointingLoop
     controller: LoopController
     contact: Contact
     settings: Settings
 
     def __post_init__(self) -> None:
-        """Refuse a mission without a loop, a window without a control sample, and more of them than memory holds."""
-        table(self.mission)
+        """Refuse a window without a control sample, and more of them than memory holds."""
         period = self.loop.timing.period_s
         if round(self.settings.window_s / period) < 1:
             raise ValueError(
@@ -128,7 +127,7 @@ class Sampler:
             point_ahead_rad=float(ends.point_ahead_rad[0]),
             rate_rad_s=float(ends.rate_rad_s[0]),
             rms_rad=float(np.sqrt(np.mean(radial**2))),
-            quantile_rad=float(np.quantile(radial, table(self.mission).quantile)),
+            quantile_rad=float(np.quantile(radial, self.table.quantile)),
             largest_rad=float(np.max(radial)),
             lowest_margin_db=float(np.min(margin)),
             share_below=float(np.mean(margin < 0.0)),
@@ -141,14 +140,14 @@ class Sampler:
 
     def _moving(self, ends: Sight, length_s: float, settling_s: float) -> tuple[Reference, ...]:
         """The loop's references with those of the moment on axis x, time 0 at the begin of the settling."""
-        r = table(self.mission).reference
+        r = self.table.reference
         left, carried = 1.0 - r.rate_feedforward, 1.0 if r.point_ahead_on_mirror else 0.0
         turning = float(np.diff(ends.rate_rad_s)[0]) / length_s * left
         ahead_rate = float(np.diff(ends.point_ahead_rad)[0]) / length_s * carried
         moving = MovingReference(
             point_ahead_rad=carried * float(ends.point_ahead_rad[0]) - ahead_rate * settling_s,
             line_of_sight_rate_rad_s=left * float(ends.rate_rad_s[0]) - turning * settling_s,
-            body_bandwidth_hz=table(self.mission).body.bandwidth_hz,
+            body_bandwidth_hz=self.table.body.bandwidth_hz,
             point_ahead_rate_rad_s=ahead_rate,
             acceleration_rad_s2=turning,
         )
@@ -160,11 +159,10 @@ class Sampler:
         Free-space loss goes with the square of the range. A point-ahead that the mission does not correct adds to the
         length of every error, as it does in the mission's budget, and is that of the geometry here.
         """
-        m = self.mission
-        fall, distance = link.communication_beam(m).fall, m.communication.distance_m
-        on_axis = float(link.margin_of_error(m, 0.0)) + float(fall.loss_db(link.point_ahead_rad(m)))
-        missed = sight.point_ahead_rad if m.point_ahead is not None and not m.point_ahead.corrected else 0.0
-        farther = 20.0 * np.log10(sight.range_m / distance)
+        fall, ahead = self.data.beam.fall, self.data.shared.point_ahead
+        on_axis = float(link.margin_of_error(self.data, 0.0)) + float(fall.loss_db(self.data.shared.point_ahead_rad))
+        missed = sight.point_ahead_rad if ahead is not None and not ahead.corrected else 0.0
+        farther = 20.0 * np.log10(sight.range_m / self.data.table.distance_m)
         return np.asarray(on_axis - farther - fall.loss_db(radial_rad + missed))
 
     def _loss(
