@@ -282,7 +282,7 @@ def test_axes_keep_scale_limits_order_and_words():
     assert {"1", "10", "100", "1000", "three", "x"} <= set(texts(sheet))
 
 
-@pytest.mark.parametrize(("low", "plain"), [(0.1, True), (1e-6, False)])
+@pytest.mark.parametrize(("low", "plain"), [(0.1, True), (8e-4, True), (1e-6, False)])
 def test_a_logarithmic_axis_has_plain_numbers_or_powers_of_ten_in_both_forms(low, plain):
     sheet = one(Line(X, Y), y={"log": True, "low": low, "high": 100.0})
     axis = turned(sheet)["layout"]["yaxis"]
