@@ -207,7 +207,7 @@ def test_a_field_keeps_every_value_at_its_place_with_its_words():
     assert "margin: %{z:.5~g} dB" in trace["hovertemplate"]
     assert trace["colorbar"]["title"]["text"] == "margin (dB)"
     assert plot["scales"][0]["trace"] == 0
-    cells = [each for each in parts(sheet, "rect") if each.get("stroke-width") == "0.3"]
+    cells = [each for each in parts(sheet, "rect") if each.get("stroke") == each.get("fill")]
     assert len(cells) == 5
     assert {"margin (dB)", "low", "high"} <= set(texts(sheet))
     assert layout(sheet).placed[0].x_ends == (-0.5, 2.5)
