@@ -135,7 +135,7 @@ def excitation(everything: Sequence[Shown], found: Identification) -> Figure:
         floor = _SPECTRUM_FLOOR * float(amplitude.max())
         seen = amplitude > floor
         right.x = Axis("frequency (Hz)", log=True, low=float(freq[0]), high=float(freq[-1]))
-        right.y = Axis("amplitude (V)", log=True, low=floor)
+        right.y = Axis("amplitude (V)", log=True, low=floor or None)  # a drive at rest has no lines
         if one.role == "broadband" and found.linear is not None:
             right.add(Span(*found.linear.excited_hz, True, SKY))
         elif one.sine is not None:
