@@ -345,6 +345,15 @@ def test_only_some_of_many_recordings_are_drawn_and_the_caption_says_so(static):
     assert len(three.sheet.panels) == 3  # the fourth place stays empty
 
 
+def test_a_drive_at_rest_has_a_spectrum_without_lines(static):
+    moving = figures.shown(static, [])[0]
+    for one, lines in ((moving, True), (replace(moving, drive_v=np.full(500, 3.0)), False)):
+        drawn = figures.excitation([one], static)
+        assert bool(drawn.sheet.panels[1].all_of(Line)[0].x.size) == lines
+        assert "amplitude (V)" in drawn.svg
+        assert "amplitude" in drawn.plot
+
+
 def test_the_spectrum_shows_amplitudes_and_a_chirp_is_told_from_noise():
     t = np.arange(2000) / 1000.0
     freq, amplitude = figures.amplitude_spectrum(3 + 2 * np.sin(2 * np.pi * 50 * t), 1000.0)

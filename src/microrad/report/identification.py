@@ -89,7 +89,7 @@ def render(
     virtual: bool = False,
 ) -> str:
     """The page's HTML; every text that is not ours is escaped, and nothing is loaded from anywhere."""
-    # Drawing libraries load here, not with the package: they take longer than help should.
+    # What draws and fills the page loads here, not with the package: it takes longer than help should.
     from microrad.core.machine import versions
     from microrad.report import identification_figures as figures
     from microrad.report.page import pages

@@ -135,7 +135,7 @@ def excitation(everything: Sequence[Shown], found: Identification) -> Figure:
         floor = _SPECTRUM_FLOOR * float(amplitude.max())
         seen = amplitude > floor
         right.x = Axis("frequency (Hz)", log=True, low=float(freq[0]), high=float(freq[-1]))
-        right.y = Axis("amplitude (V)", log=True, low=floor)
+        right.y = Axis("amplitude (V)", log=True, low=floor or None)  # a drive at rest has no lines
         if one.role == "broadband" and found.linear is not None:
             right.add(Span(*found.linear.excited_hz, True, SKY))
         elif one.sine is not None:
@@ -245,8 +245,9 @@ def poles(linear: LinearFit) -> Figure:
             continue
         rows = [(root.freq_hz, root.damping, root.freq_error_hz, root.damping_error) for root in here]
         x, y, wide, tall = np.array(rows).T
-        arms = {"x_arms": np.stack([np.minimum(wide, 0.9 * x), wide]), "y_arms": np.stack([tall, tall])}
-        panel.add(Line(x, y, colour, "", label=f"{kind}s", marker=mark, size=8.0, face="", **arms))
+        marks = Line(x, y, colour, "", label=f"{kind}s", marker=mark, size=8.0, face="")
+        arms = np.stack([np.minimum(wide, 0.9 * x), wide]), np.stack([tall, tall])
+        panel.add(replace(marks, x_arms=arms[0], y_arms=arms[1]))
     panel.add(Rule(0.0, False, width=0.7))
     panel.x = Axis("natural frequency (Hz)", log=True, low=0.3 * min(low, *freq), high=3.0 * max(high, *freq))
     panel.y, panel.legend = Axis("damping ratio (1)"), Legend("above", 3)
@@ -411,11 +412,12 @@ def residual_tests(found: Identification) -> Figure:
     test = found.residual
     sheet, (auto, cross, spectrum) = grid(_WIDTH, 2.9, 1, 3)
     for panel, values, first, label in (
-        (auto, test.autocorrelation, 1.0, "autocorrelation (1)"),
-        (cross, test.cross_correlation, 0.0, "correlation with drive (1)"),
+        (auto, test.autocorrelation, 1, "autocorrelation (1)"),
+        (cross, test.cross_correlation, 0, "correlation with drive (1)"),
     ):
         panel.add(Span(-test.bound, test.bound, False, SKY, 0.4))
-        panel.add(segments(first + np.arange(values.size), 0.0, values, BLUE, 1.2), Rule(0.0, False, width=0.7))
+        lags = np.arange(first, first + values.size, dtype=np.float64)
+        panel.add(segments(lags, 0.0, values, BLUE, 1.2), Rule(0.0, False, width=0.7))
         largest = 1.1 * max(float(np.max(np.abs(values))), 2.0 * test.bound)
         panel.x, panel.y = Axis("lag (samples)"), Axis(label, low=-largest, high=largest)
     best = words.chosen_predictions(found)

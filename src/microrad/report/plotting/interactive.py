@@ -187,7 +187,7 @@ def _axis(of: Placed, axis: Axis, ends: tuple[float, float], shown: bool, other:
     if axis.log:
         low, high = sorted(math.log10(end) for end in ends)
         made["nticks"] = max(math.ceil(high - low) + 1, 5)
-        if scales.plain(ends):
+        if scales.plain([*(of.x_ticks if axis is of.panel.x else of.y_ticks)]):
             return made | {"tickformat": "~g"}
         return made | {"exponentformat": "power", "tickfont": {"size": _pixels(axis.size / _POWERS)}}
     return made | {"exponentformat": "power", "minexponent": 5}

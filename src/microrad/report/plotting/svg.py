@@ -301,7 +301,7 @@ def _field(of: Placed, field: Field) -> list[str]:
             if np.isfinite(value):
                 (a, b), (c, d) = sorted(across[column : column + 2]), sorted(down[row : row + 2])
                 tint = colour_at((value - field.low) / (field.high - field.low))
-                made.append(f'<rect {_rect((a, c, b, d))} fill="{tint}" stroke="{tint}" stroke-width="0.3"/>')
+                made.append(f'<rect {_rect((a, c, b, d))} fill="{tint}" stroke="{tint}" stroke-width="0.6"/>')
     return made
 
 
