@@ -13,13 +13,11 @@ from microrad.mission.model import LinkMission
 from microrad.orbit import operations
 from microrad.orbit.day import flow
 from microrad.orbit.day.assumptions import NOTHING, Numbers, Swing, swings
-from microrad.orbit.day.flow import DIRECT, RELAY, Closing, PointingLoss, Way
+from microrad.orbit.day.flow import Closing, PointingLoss, Way
 from microrad.orbit.day.geometry import Encounter, View, beyond_the_mission, encounter, short_tail, times, view
 
 __all__ = [
-    "DIRECT",
     "NOTHING",
-    "RELAY",
     "Closing",
     "DayStudy",
     "Encounter",
