@@ -6,7 +6,6 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from scipy.integrate import quad
-from scipy.optimize import minimize_scalar
 from scipy.special import erfc, gammainc
 from scipy.stats import norm
 from scipy.stats import t as student
@@ -121,52 +120,6 @@ def test_the_mean_agrees_with_quadrature_per_axis(ratio):
 
 
 # ---- best divergence
-def mean_gain_db(jitter, theta):
-    return 10.0 * np.log10(8.0 / theta**2) - ps.mean_loss_db(jitter, theta)
-
-
-def test_equal_axes_have_a_best_mean_only_with_a_bias_above_root_two_rms():
-    rms = 1.0 * URAD
-    best = ps.best_divergence_for_mean(Jitter((3.0 * rms, 0.0), (rms, rms)))
-    assert best.half_angle_rad == pytest.approx(math.sqrt(2.0 * 9.0 - 4.0) * rms, rel=1e-9)
-    assert ps.best_divergence_for_mean(Jitter((1.4143 * rms, 0.0), (rms, rms))).half_angle_rad < 0.05 * rms
-    with pytest.raises(ValueError, match="give the smallest half angle"):
-        ps.best_divergence_for_mean(Jitter((1.4142 * rms, 0.0), (rms, rms)))
-
-
-@pytest.mark.parametrize(
-    "jitter",
-    [
-        Jitter((6 * URAD, 4 * URAD), (1 * URAD, 0.0)),
-        Jitter((9 * URAD, 0.0), (2 * URAD, 0.1 * URAD)),
-        Jitter((20 * URAD, 0.3 * URAD), (8 * URAD, 0.0)),  # maxima at 0.6 and 17 urad, the narrow one higher
-        Jitter((9 * URAD, 0.0), (6 * URAD, 0.0)),
-        UNEQUAL,
-        STILL,
-    ],
-)
-@pytest.mark.parametrize("limit", [0.05 * URAD, 3 * URAD, 10 * URAD])
-def test_the_best_mean_is_the_best_of_a_fine_sweep(jitter, limit):
-    best = ps.best_divergence_for_mean(jitter, smallest_half_angle_rad=limit, current_half_angle_rad=50 * URAD)
-    sweep = limit * np.geomspace(1.0, 1e4, 20_001)
-    gain = mean_gain_db(jitter, sweep)
-    peak = int(np.argmax(gain))
-    low, high = np.log(sweep[max(peak - 1, 0)]), np.log(sweep[peak + 1])
-    found = minimize_scalar(lambda x: -float(mean_gain_db(jitter, np.exp(x))), bounds=(low, high), method="bounded")
-    assert best.gain_db == pytest.approx(max(gain[peak], -found.fun), abs=1e-9)
-    assert best.at_limit == (peak == 0)
-    assert best.half_angle_rad == (limit if peak == 0 else pytest.approx(math.exp(found.x), rel=1e-4))
-    assert best.loss_db == pytest.approx(float(ps.mean_loss_db(jitter, best.half_angle_rad)))
-    assert best.current_excess_db == pytest.approx(best.gain_db - float(mean_gain_db(jitter, 50 * URAD)), abs=1e-12)
-
-
-@pytest.mark.parametrize("bias", [(3 * URAD, 4 * URAD), (5 * URAD, 0.0), (0.0, -5 * URAD)])
-def test_without_jitter_the_best_mean_is_the_best_for_the_static_error(bias):
-    best = ps.best_divergence_for_mean(Jitter(bias, (0.0, 0.0)))
-    assert best.half_angle_rad == pytest.approx(math.sqrt(50.0) * URAD, rel=1e-9)
-    assert best.loss_db == pytest.approx(db_per_square / 2)
-
-
 def test_the_best_divergence_for_an_outage_of_biased_axes_is_the_best_of_a_sweep():
     best = ps.best_divergence_for_outage(BIASED, 1e-3, current_half_angle_rad=THETA)
     sweep = np.geomspace(1.0, 100.0, 2001) * URAD
@@ -184,7 +137,9 @@ def test_a_smallest_half_angle_binds_only_from_above_the_best():
     assert wide.loss_db == pytest.approx(db_per_square * (5 / 7.1) ** 2)
     free = ps.best_divergence_for_static_error(5 * URAD, smallest_half_angle_rad=7.0 * URAD)
     assert (free.at_limit, free.half_angle_rad) == (False, pytest.approx(math.sqrt(50.0) * URAD))
-    at_it = ps.best_divergence_for_mean(EQUAL, smallest_half_angle_rad=7 * URAD, current_half_angle_rad=7 * URAD)
+    at_it = ps.best_divergence_for_static_error(
+        3 * URAD, smallest_half_angle_rad=7 * URAD, current_half_angle_rad=7 * URAD
+    )
     assert (at_it.at_limit, at_it.current_excess_db) == (True, 0.0)
 
 
@@ -194,20 +149,6 @@ def test_what_a_larger_aperture_would_allow_is_kept_beside_the_limit():
             best = ps.best_divergence_for_static_error(error, smallest_half_angle_rad=limit)
             assert best.wanted_half_angle_rad == pytest.approx(math.sqrt(2.0) * error, abs=0.0)
             assert best.half_angle_rad == max(limit, best.wanted_half_angle_rad)
-    biased = Jitter((9 * URAD, 0.0), (2 * URAD, 0.1 * URAD))
-    free = ps.best_divergence_for_mean(biased).half_angle_rad
-    for limit in (0.5 * free, 2.0 * free):
-        best = ps.best_divergence_for_mean(biased, smallest_half_angle_rad=limit)
-        assert best.wanted_half_angle_rad == pytest.approx(free, rel=1e-12)
-        assert best.half_angle_rad == pytest.approx(max(limit, free), rel=1e-12)
-    assert ps.best_divergence_for_mean(EQUAL, smallest_half_angle_rad=limit).wanted_half_angle_rad == 0.0
-
-
-def test_of_two_best_means_a_limit_may_leave_the_wider():
-    two = Jitter((20 * URAD, 0.3 * URAD), (8 * URAD, 0.0))
-    best = ps.best_divergence_for_mean(two, smallest_half_angle_rad=8 * URAD)
-    assert (best.at_limit, best.half_angle_rad > 15 * URAD) == (False, True)
-    assert best.wanted_half_angle_rad == ps.best_divergence_for_mean(two).half_angle_rad < 1 * URAD
 
 
 # ---- what the fluctuation costs
@@ -404,9 +345,11 @@ def test_simulated_motion_fades_as_often_and_as_long_within_its_99_percent_inter
         (lambda: ps.best_divergence_for_static_error(-1e-6), "a radial error of -1 µrad is not possible"),
         (lambda: ps.best_divergence_for_static_error(0.0), "give the smallest half angle"),
         (lambda: ps.best_divergence_for_outage(EQUAL, 0.0), "a probability of 0 is out of range"),
-        (lambda: ps.best_divergence_for_mean(EQUAL), "give the smallest half angle"),
-        (lambda: ps.best_divergence_for_mean(Jitter((0.0, 0.0), (0.0, 0.0))), "give the smallest half angle"),
-        (lambda: ps.best_divergence_for_mean(EQUAL, smallest_half_angle_rad=-1e-6), "smallest half angle of -1 µrad"),
+        (lambda: ps.best_divergence_for_static_error(0.0), "give the smallest half angle"),
+        (
+            lambda: ps.best_divergence_for_static_error(0.0, smallest_half_angle_rad=-1e-6),
+            "smallest half angle of -1 µrad",
+        ),
         (
             lambda: ps.best_divergence_for_static_error(
                 1e-6, smallest_half_angle_rad=5e-6, current_half_angle_rad=4.9e-6

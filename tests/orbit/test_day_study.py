@@ -480,6 +480,14 @@ CHANGED = {
 }
 
 
+def tables_of(case):
+    return {
+        "operations": case.operations.model_dump(),
+        "orbit": case.orbits.model_dump(),
+        "communication": case.data.table.model_dump(),
+    }
+
+
 def test_each_side_changes_just_its_own_key(links, day, monkeypatch):
     cases = {}
 
@@ -490,15 +498,15 @@ def test_each_side_changes_just_its_own_key(links, day, monkeypatch):
 
     monkeypatch.setattr(assumptions, "numbers", noted)
     m = links.file.mission
-    found = assumptions.swings(
-        m, lambda other: day.view.pair, day.view, (), day.loss, links.finding.wide, lambda *said: None
-    )
+    own = assumptions.Case(m.operations, m.orbit, links.data, day.loss)
+    known = assumptions.Known(own, lambda other: day.view.pair, day.view, (), links.finding.wide)
+    found = assumptions.swings(known, lambda *said: None)
     assert {s.name for s in found} == CHANGED.keys()
-    before = flat(m.model_dump()) | {"operations.runs": 4}
+    before = flat(tables_of(own)) | {"operations.runs": 4}
     for s in found:
         for text, mark in ((s.low, s.at_low), (s.high, s.at_high)):
             case = cases[mark.relay_bit]
-            after = flat(case.mission.model_dump())
+            after = flat(tables_of(case))
             differs = {k for k in before.keys() | after.keys() if before.get(k, "") != after.get(k, "")}
             if text == NOTHING:
                 assert (differs, case.slower) == (set(), 1.0)

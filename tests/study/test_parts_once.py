@@ -1,7 +1,9 @@
-"""One study assembles each variant of the mission's mirror once, and every loop of it takes that one."""
+"""One study assembles its link once, and each variant of its mirror, and everything that it does takes that one."""
 
 from collections import Counter
 
+from microrad import link
+from microrad.core import threads
 from microrad.loop import fine_pointing
 from microrad.loop.fine_pointing import designs
 from microrad.mirror import model, variants
@@ -9,10 +11,10 @@ from microrad.study import story
 from shipped import edited_file
 
 
-def test_one_study_assembles_each_variant_of_its_mirror_once(tmp_path, monkeypatch):
+def test_one_study_assembles_its_link_and_each_variant_of_its_mirror_once(tmp_path, monkeypatch):
     changes = ("runs = 64 ", "runs = 1 "), ('duration = "2 s" ', 'duration = "0.1 s" '), ('= "0.5 s" ', '= "0.05 s" ')
     file = edited_file(tmp_path, *changes, whole=True, day=False)
-    made, entered, whole = Counter(), [], model.assemble
+    made, entered, linked, whole, of = Counter(), [], [], model.assemble, link.of
 
     def counted(name, composition, system, hysteresis, creep=model.NO_CREEP):
         made[composition, hysteresis, creep] += 1
@@ -20,10 +22,13 @@ def test_one_study_assembles_each_variant_of_its_mirror_once(tmp_path, monkeypat
 
     monkeypatch.setattr(model, "assemble", counted)
     monkeypatch.setattr(story.mirror, "of", lambda m: entered.append(m) or variants.of(m))
+    monkeypatch.setattr(link, "of", lambda m: linked.append(m) or of(m))
+    monkeypatch.setattr(threads, "_may_fork", lambda: False)
     monkeypatch.setattr(story.alternatives, "others", lambda *args: ())  # they read the mission in another way
     monkeypatch.setattr(fine_pointing, "design", lambda scene, told: designs.design(scene, told, only=("PI",)))
     found = story.run(file)
     assert entered == [file.mission]
+    assert sum(m is file.mission for m in linked) == 1
     own = found.fine_pointing.scene.mirrors.own
     composition = file.mission.mirror.composition
     assert [made[composition, axis.model, model.NO_CREEP] for axis in own.values()] == [1, 1, 1]

@@ -25,9 +25,8 @@ from microrad.link.gains import (
     strehl_loss_db,
     strehl_ratio,
 )
-from microrad.link.inputs import LINK_TABLES, Input, fits, inputs, lit, margin_or_none, moved, unit_of
+from microrad.link.inputs import LINK_TABLES, fits, inputs, lit, margin_or_none, moved, unit_of
 from microrad.link.maps import (
-    BIT_ERROR_RATIO,
     IdealReceiver,
     SensitivityReading,
     convention_maps,
@@ -40,20 +39,18 @@ from microrad.link.maps import (
     rate_at_loss,
     received_on_axis_dbm,
 )
-from microrad.link.model import DataLink, LinkError, Shared, TransmittedBeam, assembled, of, required_dbm, strehl_db
+from microrad.link.model import DataLink, LinkError, Shared, assembled, of, required_dbm, strehl_db
 from microrad.link.solve import Interval, Solved, solve
 from microrad.link.tornado import Swing, Tornado, beam_margin, beam_tornado, swings
 
 __all__ = [
     "BEST_TRUNCATION",
-    "BIT_ERROR_RATIO",
     "DEEPEST_DB",
     "LEFT_AT_ZERO",
     "LINK_TABLES",
     "DataLink",
     "GaussianFall",
     "IdealReceiver",
-    "Input",
     "Interval",
     "LinkBudget",
     "LinkError",
@@ -64,7 +61,6 @@ __all__ = [
     "Solved",
     "Swing",
     "Tornado",
-    "TransmittedBeam",
     "air_mass",
     "aperture_gain_db",
     "assembled",

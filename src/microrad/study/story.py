@@ -20,7 +20,7 @@ from microrad.loop.fine_loop import ensemble
 from microrad.mirror import Variant
 from microrad.mirror import summary as mirror_summary
 from microrad.mission.file import MissionFile, with_contents
-from microrad.mission.model import LinkMission, Mission, Source
+from microrad.mission.model import Mission, Source
 from microrad.orbit import constellation
 from microrad.orbit import day as day_study
 from microrad.study import alternatives, contact_run, paper, pointing_cost, verdict
@@ -162,7 +162,7 @@ def run(
     if any(each.content is None for each in file.contents):  # it may be there when it is read
         parts = kept.NOTHING
     m, q, sources = file.mission, file.mission.requirement, file.sources
-    data, mirrors = link.of(m), mirror.of(m)
+    mirrors = mirror.of(m)
     cases = paper_cases.of(m, mirrors)
     compiled = ensemble.compile_aside(lambda: _scene(file, mirrors).loop) if m.fine_pointing else lambda: None
     on_progress(0, 3, "budgets, acquisition, mirror and tracking")
@@ -173,8 +173,9 @@ def run(
             paper_cases.loop_margins(cases),
             paper_cases.tracking_runs(cases),
         ),
-        lambda: (link_study.run(file, parts), margin_map(data, sources)),
+        lambda: linked(file, parts),
     )
+    data = links.data
     residual = paper_cases.worst(runs, q.residual_statistic)
     left_rad = paper_cases.residual_rad(q, m.conventions, residual.trace)
     simulated = f"simulated: {residual.trace.name}, {q.residual_statistic} ({m.conventions.residual})"
@@ -216,7 +217,7 @@ def run(
         scan=scan,
         fine_pointing=fine,
         performance=found,
-        tornado=tornado(file, left_rad if case is None else case.error_rad),
+        tornado=tornado(links, left_rad if case is None else case.error_rad),
         day=day,
         contact=contact,
         plan=plan,
@@ -228,6 +229,12 @@ def run(
 
 def _scene(file: MissionFile, mirrors: mirror.MirrorParts) -> fine_pointing.Scene:
     return fine_pointing.scene(file, mirrors, tracking_light_w(file))
+
+
+def linked(file: MissionFile, parts: kept.Kept) -> tuple[link_study.LinkStudy, MarginMap]:
+    """What follows from the tables of the links alone."""
+    links = link_study.run(file, parts)
+    return links, margin_map(links.data, file.sources)
 
 
 def judged(
@@ -253,15 +260,17 @@ def best_case(
     return None if fine is None else found.case(pointing_cost.FINE, fine.best.design.name, Variant.GIVEN)
 
 
-def tornado(file: MissionFile, error_rad: float) -> link.Tornado:
+def tornado(links: link_study.LinkStudy, error_rad: float) -> link.Tornado:
     """What moves the margin of the communication link at a pointing error that stays as it is."""
+    m, sources = links.file.mission, links.file.sources
 
-    def margin_db(m: LinkMission) -> float:
-        return float(link.margin_of_error(link.of(m), np.array([error_rad]))[0])
+    def margin_db(data: link.DataLink) -> float:
+        return float(link.margin_of_error(data, np.array([error_rad]))[0])
 
-    m, tables = file.mission, link.LINK_TABLES
-    swings = link.swings(m, file.sources, tables, m.conventions.strehl, margin_db, link.lit)
-    return link.Tornado("Communication", margin_db(m), swings)
+    swings = link.swings(
+        m, sources, link.LINK_TABLES, m.conventions.strehl, lambda moved: margin_db(link.of(moved)), link.lit
+    )
+    return link.Tornado("Communication", margin_db(links.data), swings)
 
 
 def delivered(

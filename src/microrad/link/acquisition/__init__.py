@@ -28,7 +28,6 @@ from microrad.link.acquisition.sequence import (
     solve,
 )
 from microrad.link.acquisition.simulate import (
-    ScanRuns,
     SequenceRuns,
     Transition,
     Vibration,
@@ -49,7 +48,6 @@ __all__ = [
     "Raster",
     "Receiver",
     "Scan",
-    "ScanRuns",
     "Search",
     "SequenceRuns",
     "Spiral",

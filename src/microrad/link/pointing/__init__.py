@@ -1,35 +1,28 @@
 """Pointing: the budget of the open-loop errors, by every rule that a reviewer asks for; what jitter does to a link."""
 
 from microrad.link.pointing.allocation import Allocation, allocate
-from microrad.link.pointing.classes import Axes, ErrorTerm, Interpretation, StatedError, basis, error_term
+from microrad.link.pointing.classes import ErrorTerm, StatedError, basis, error_term
 from microrad.link.pointing.fading import (
-    Fades,
     NoPowerError,
     SpectralMotion,
     fades,
     level_crossing_rate_hz,
-    mean_error_ratio,
     motion_of_spectrum,
     uncoded_penalty_db,
 )
-from microrad.link.pointing.open_loop import INTERPRETATIONS, DivergenceReading, OpenLoopPointing, open_loop_budget
-from microrad.link.pointing.point_ahead import PointAheadAngle, point_ahead
+from microrad.link.pointing.open_loop import INTERPRETATIONS, OpenLoopPointing, open_loop_budget
+from microrad.link.pointing.point_ahead import point_ahead
 from microrad.link.pointing.statistics import (
     BestDivergence,
-    best_divergence_for_mean,
     best_divergence_for_outage,
     best_divergence_for_static_error,
     mean_loss_db,
     mean_transmission,
     outage_loss_db,
     outage_probability,
-    radius_of_loss_rad,
-    transmission,
 )
 from microrad.link.pointing.summation import (
     TOTALS,
-    Rule,
-    Summation,
     axis_totals_rad,
     esa_1993_rad,
     exact_total_rad,
@@ -50,24 +43,16 @@ __all__ = [
     "INTERPRETATIONS",
     "TOTALS",
     "Allocation",
-    "Axes",
     "BestDivergence",
-    "DivergenceReading",
     "ErrorTerm",
-    "Fades",
-    "Interpretation",
     "Jitter",
     "NoPowerError",
     "OpenLoopPointing",
-    "PointAheadAngle",
-    "Rule",
     "SpectralMotion",
     "StatedError",
-    "Summation",
     "allocate",
     "axis_totals_rad",
     "basis",
-    "best_divergence_for_mean",
     "best_divergence_for_outage",
     "best_divergence_for_static_error",
     "error_term",
@@ -76,7 +61,6 @@ __all__ = [
     "fades",
     "level_crossing_rate_hz",
     "mean_and_sigma",
-    "mean_error_ratio",
     "mean_loss_db",
     "mean_transmission",
     "motion_of_spectrum",
@@ -89,7 +73,6 @@ __all__ = [
     "radial_quantile",
     "radial_survival",
     "radial_total_rad",
-    "radius_of_loss_rad",
     "rayleigh_caveat",
     "rayleigh_total_rad",
     "rss_caveat",
@@ -97,6 +80,5 @@ __all__ = [
     "shape_caveat",
     "sigma_multiple",
     "summations",
-    "transmission",
     "uncoded_penalty_db",
 ]

@@ -4,7 +4,6 @@ Transmission h = exp(-2 r^2 / theta^2), theta the half angle at 1/e^2 of the int
 """
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -125,66 +124,7 @@ def best_divergence_for_static_error(
     error = float(at_least_zero(error_rad, "radial error", "rad"))
     limit = float(at_least_zero(smallest_half_angle_rad, "smallest half angle", "rad"))
     wanted = math.sqrt(2.0) * error
-
-    def loss_db(half_angle: float) -> float:
-        return _DB_PER_SQUARE * (error / half_angle) ** 2
-
-    return _best(max(wanted, limit), wanted, loss_db, limit, current_half_angle_rad)
-
-
-def best_divergence_for_mean(
-    jitter: Jitter, *, smallest_half_angle_rad: float = 0.0, current_half_angle_rad: float | None = None
-) -> BestDivergence:
-    """Half angle with the most mean power, the largest 8/theta^2 E[h].
-
-    Without bias the mean power grows as the beam narrows, down to the smallest half angle: jitter alone has no best
-    divergence by this criterion. Equal axes s have one for a radial bias b above sqrt(2) s, at
-    theta^2 = 2 b^2 - 4 s^2. Raises `ValueError` when there is none and no limit, or the current half angle is below it.
-    """
-    limit = float(at_least_zero(smallest_half_angle_rad, "smallest half angle", "rad"))
-    squares = _stationary_squares(jitter)
-
-    def best_from(smallest: float) -> float:
-        candidates = [smallest**2, *(square for square in squares if square > smallest**2)]
-        return math.sqrt(max(candidates, key=lambda square: _log_mean_gain(jitter, square)))
-
-    def loss_db(half_angle: float) -> float:
-        return float(mean_loss_db(jitter, half_angle))
-
-    return _best(max(best_from(limit), limit), best_from(0.0), loss_db, limit, current_half_angle_rad)
-
-
-def _stationary_squares(jitter: Jitter) -> list[float]:
-    """theta^2 > 0 where the mean gain is stationary: the sum of (2 b^2 - T / 2) / T^2 over the axes is 0.
-
-    T = theta^2 + 4 s^2, so it is a cubic in theta^2. It is solved in units of the largest angle.
-    """
-    unit = max(*(abs(bias) for bias in jitter.bias_rad), *jitter.rms_rad)
-    if unit == 0.0:
-        return []
-    polynomial = np.polynomial.Polynomial
-    t_x, t_y = (polynomial([4.0 * (rms / unit) ** 2, 1.0]) for rms in jitter.rms_rad)
-    b_x, b_y = (polynomial([2.0 * (bias / unit) ** 2]) for bias in jitter.bias_rad)
-    cubic = (b_x - 0.5 * t_x) * t_y**2 + (b_y - 0.5 * t_y) * t_x**2
-    roots = [complex(root) for root in cubic.roots()]
-    # real parts will do: a candidate that is no maximum is outdone by one that is
-    return [root.real * unit**2 for root in roots if root.real > 0.0]
-
-
-def _log_mean_gain(jitter: Jitter, square: float) -> float:
-    """ln of E[h] / theta^2 at theta^2 = `square`, its limit where that is 0 and an axis does not jitter."""
-    total = 0.0
-    for bias, rms in zip(jitter.bias_rad, jitter.rms_rad, strict=True):
-        width = square + 4.0 * rms**2
-        if width == 0.0 and bias != 0.0:
-            return -math.inf
-        total += math.inf if width == 0.0 else -0.5 * math.log(width) - 2.0 * bias**2 / width
-    return total
-
-
-def _best(
-    best: float, wanted: float, loss_db: Callable[[float], float], limit: float, current: float | None
-) -> BestDivergence:
+    best, current = max(wanted, limit), current_half_angle_rad
     if best == 0.0:
         raise ValueError(
             "the received power grows without end as the beam narrows (half angle 0 rad); "
@@ -195,6 +135,9 @@ def _best(
             f"the current half angle of {format_quantity(current, 'rad')} is below the smallest, "
             f"{format_quantity(limit, 'rad')}; correct one of them"
         )
+
+    def loss_db(half_angle: float) -> float:
+        return _DB_PER_SQUARE * (error / half_angle) ** 2
 
     def gain_db(half_angle: float) -> float:
         return 10.0 * math.log10(8.0 / half_angle**2) - loss_db(half_angle)

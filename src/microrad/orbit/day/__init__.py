@@ -10,16 +10,15 @@ from microrad.link.partner_search import Found
 from microrad.link.requirement import derived_from
 from microrad.link.study import LinkStudy
 from microrad.mission.model import LinkMission
+from microrad.mission.tables.orbit import Orbits
 from microrad.orbit import operations
 from microrad.orbit.day import flow
-from microrad.orbit.day.assumptions import NOTHING, Numbers, Swing, swings
-from microrad.orbit.day.flow import DIRECT, RELAY, Closing, PointingLoss, Way
+from microrad.orbit.day.assumptions import NOTHING, Case, Known, Numbers, Swing, swings
+from microrad.orbit.day.flow import Closing, PointingLoss, Way
 from microrad.orbit.day.geometry import Encounter, View, beyond_the_mission, encounter, short_tail, times, view
 
 __all__ = [
-    "DIRECT",
     "NOTHING",
-    "RELAY",
     "Closing",
     "DayStudy",
     "Encounter",
@@ -92,15 +91,15 @@ def acquired(links: LinkStudy) -> Found | None:
     return finding.wide if o.acquisition == "wide beacon" else finding.scan
 
 
-def _pair(links: LinkStudy, m: LinkMission) -> orbit.Pair:
-    """The terminals of a mission whose files are those of the links'."""
-    return orbit.pair(m.orbit, m.terminals, links.file.path.parent, links.file.contents)
+def _pair(links: LinkStudy, orbits: Orbits | None) -> orbit.Pair:
+    """The terminals of the links on orbits whose files are those of the links'."""
+    return orbit.pair(orbits, links.data.shared.terminals, links.file.path.parent, links.file.contents)
 
 
 def relay(links: LinkStudy, loss: PointingLoss) -> Way:
     """The way by the relay alone: what `run` finds of it, without the rest of the day."""
     m = links.file.mission
-    seen = view(_pair(links, m), m.communication.wavelength_m)
+    seen = view(_pair(links, m.orbit), m.communication.wavelength_m)
     o = flow.table(m.operations)
     rates = flow.rate_table(flow.closings(o, links.data, loss))
     return flow.relay(o, seen, rates, loss.outage, acquired(links), 1.0)
@@ -121,7 +120,7 @@ def run(
     """
     m = links.file.mission
     loss = given_loss(links) if loss is None else loss
-    seen, o = view(_pair(links, m), m.communication.wavelength_m), flow.table(m.operations)
+    seen, o = view(_pair(links, m.orbit), m.communication.wavelength_m), flow.table(m.operations)
     if o.contact is not None and seen.encounters and o.contact.number > len(seen.encounters):
         raise operations.OperationsError(
             f"operations.contact.number is {o.contact.number}, and the span has {len(seen.encounters)} contacts: give "
@@ -130,6 +129,8 @@ def run(
     found, closing = acquired(links), flow.closings(o, links.data, loss)
     heard = flow.heard(o.downlink, seen.pair)
     relay = flow.relay(o, seen, flow.rate_table(closing), loss.outage, found, 1.0)
+    assert m.orbit is not None  # else there are no terminals
+    known = Known(Case(o, m.orbit, links.data, loss), partial(_pair, links), seen, heard, found)
     return DayStudy(
         mission=m,
         view=seen,
@@ -139,6 +140,6 @@ def run(
         encounters=tuple(encounter(seen.pair, contact, m.communication.wavelength_m) for contact in relay.contacts),
         relay=relay,
         direct=flow.direct(o, seen, heard),
-        swings=swings(m, partial(_pair, links), seen, heard, loss, found, on_progress),
+        swings=swings(known, on_progress),
         warnings=(*beyond_the_mission(m, seen), *short_tail(seen.pair)),
     )

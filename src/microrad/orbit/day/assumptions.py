@@ -7,10 +7,9 @@ from dataclasses import dataclass, replace
 from microrad import link, orbit
 from microrad.core.units import format_quantity
 from microrad.link.partner_search import Found
-from microrad.mission.model import LinkMission
-from microrad.mission.tables.orbit import HIGHEST_MASK_RAD, VisibilityLimits
+from microrad.mission.tables.operations import Operations
+from microrad.mission.tables.orbit import HIGHEST_MASK_RAD, Orbits, VisibilityLimits
 from microrad.orbit.day import flow, geometry
-from microrad.orbit.from_mission import orbits_table
 
 _RUNS = 4  # of each case: what an acquisition takes is little beside what is varied
 NOTHING = "as it is"
@@ -59,36 +58,36 @@ class Swing:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Case:
-    """A mission that differs in one thing; ``slower`` stretches acquisition."""
+class Case:
+    """What the day rests on; the cases differ in one thing each. ``slower`` stretches acquisition."""
 
-    mission: LinkMission
+    operations: Operations
+    orbits: Orbits
+    data: link.DataLink
     loss: flow.PointingLoss
     slower: float = 1.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Known:
-    """What holds for every mission with the same orbits and stations as this one: contacts, passes, acquisition."""
+class Known:
+    """What holds for every case with the same orbits and stations as the ``own`` one: contacts, passes, acquisition."""
 
-    mission: LinkMission
-    pair_of: Callable[[LinkMission], orbit.Pair]
+    own: Case
+    pair_of: Callable[[Orbits], orbit.Pair]
     seen: geometry.View
     heard: tuple[flow.Heard, ...]
     found: Found | None
 
 
-def numbers(case: _Case, known: _Known) -> Numbers:
+def numbers(case: Case, known: Known) -> Numbers:
     """Volumes and latencies of one case."""
-    m = case.mission
-    o, own = flow.table(m.operations), flow.table(known.mission.operations)
-    seen, heard = known.seen, known.heard
-    moved = m.orbit is not known.mission.orbit
+    o, own, seen, heard = case.operations, known.own.operations, known.seen, known.heard
+    moved = case.orbits is not known.own.orbits
     if moved:
-        seen = geometry.view(known.pair_of(m), m.communication.wavelength_m)
+        seen = geometry.view(known.pair_of(case.orbits), case.data.table.wavelength_m)
     if moved or (o.downlink and own.downlink and o.downlink.stations is not own.downlink.stations):
         heard = flow.heard(o.downlink, seen.pair)
-    rates = flow.rate_table(flow.closings(o, link.of(m), case.loss))
+    rates = flow.rate_table(flow.closings(o, case.data, case.loss))
     relay = flow.relay(o, seen, rates, case.loss.outage, known.found, case.slower)
     direct = flow.direct(o, seen, heard)
     if direct is None:
@@ -96,15 +95,7 @@ def numbers(case: _Case, known: _Known) -> Numbers:
     return Numbers(relay.capacity_bit, direct.capacity_bit, relay.slow_s, direct.slow_s)
 
 
-def swings(
-    m: LinkMission,
-    pair_of: Callable[[LinkMission], orbit.Pair],
-    seen: geometry.View,
-    heard: tuple[flow.Heard, ...],
-    loss: flow.PointingLoss,
-    found: Found | None,
-    on_progress: Callable[[int, int, str], None],
-) -> tuple[Swing, ...]:
+def swings(known: Known, on_progress: Callable[[int, int, str], None]) -> tuple[Swing, ...]:
     """Assumptions of the day, the one that moves the ratio most first; those that move nothing stay in.
 
     Data rates and the time of acquisition are halved and doubled, the margin, the grazing height and the masks go to 0
@@ -112,8 +103,9 @@ def swings(
     and what the relay grants are replaced. An orbit from a file stays as it is, and so does what would leave no orbit:
     one that has decayed, or lies below the surface that lines of sight must clear.
     """
-    m = m.with_value("operations.runs", min(flow.table(m.operations).runs, _RUNS))
-    known, own = _Known(m, pair_of, seen, heard, found), _Case(m, loss)
+    o = known.own.operations
+    own = replace(known.own, operations=o.with_value("runs", min(o.runs, _RUNS)))
+    known = replace(known, own=own)
     here = numbers(own, known)
 
     def end(side: _Side) -> tuple[str, Numbers]:
@@ -123,7 +115,7 @@ def swings(
             return NOTHING, here
 
     made = []
-    cases = list(_changes(own, found))
+    cases = list(_changes(own, known.found))
     for done, (name, *sides) in enumerate(cases):
         on_progress(done, len(cases), "each assumption changed alone")
         (low, at_low), (high, at_high) = map(end, sides)
@@ -131,65 +123,70 @@ def swings(
     return tuple(sorted(made, key=lambda swing: -swing.factor))
 
 
-_Side = tuple[str, _Case] | None
+_Side = tuple[str, Case] | None
+_Edit = Callable[[str, str, object], tuple[str, Case]]
 
 
-def _changes(own: _Case, found: Found | None) -> Iterator[tuple[str, _Side, _Side]]:
+def _changes(own: Case, found: Found | None) -> Iterator[tuple[str, _Side, _Side]]:
     """Name, low side and high side of each assumption that the mission has."""
-    m = own.mission
-    o, orbits, rate = flow.table(m.operations), orbits_table(m.orbit), m.communication.data_rate_bit_s
-    leo = orbits.leo
+    o, orbits, leo, link_table = own.operations, own.orbits, own.orbits.leo, own.data.table
 
-    def edited(text: str, key: str, value: object) -> tuple[str, _Case]:
-        return text, replace(own, mission=m.with_value(key, value))
+    def operated(text: str, key: str, value: object) -> tuple[str, Case]:
+        return text, replace(own, operations=o.with_value(key, value))
+
+    def orbiting(text: str, key: str, value: object) -> tuple[str, Case]:
+        return text, replace(own, orbits=orbits.with_value(key, value))
+
+    def sending(text: str, key: str, value: object) -> tuple[str, Case]:
+        return text, replace(own, data=replace(own.data, table=link_table.with_value(key, value)))
 
     def scaled(
-        name: str, key: str, value: float, unit: str, factors: tuple[float, float] = (0.5, 2.0)
+        name: str, edited: _Edit, key: str, value: float, unit: str, factors: tuple[float, float] = (0.5, 2.0)
     ) -> tuple[str, _Side, _Side]:
         low, high = (edited(format_quantity(f * value, unit, 3), key, f * value) for f in factors)
         return name, low, high
 
     if o.rates_bit_s is None:
-        built = link.of(m).receiver
-        name, slow, fast = scaled("laser data rate", "communication.data_rate_bit_s", rate, "bit/s")
+        built, rate = own.data.receiver, link_table.data_rate_bit_s
+        name, slow, fast = scaled("laser data rate", sending, "data_rate_bit_s", rate, "bit/s")
         yield name, slow, fast if built is None or 2.0 * rate <= built.highest_data_rate_bit_s else None
     asked = 2.0 * o.margin_db or 3.0  # every rate that just closes, and twice what is demanded
-    low, high = (edited(format_quantity(end, "dB"), "operations.margin_db", end) for end in (0.0, asked))
+    low, high = (operated(format_quantity(end, "dB"), "margin_db", end) for end in (0.0, asked))
     yield "margin demanded of the laser link", low if o.margin_db else None, high
     none, more = replace(own.loss, loss_db=0.0), replace(own.loss, loss_db=own.loss.loss_db + 3.0)
     yield "pointing loss", ("0 dB", replace(own, loss=none)), ("3 dB more", replace(own, loss=more))
     if found is not None:
         yield "time of acquisition", ("half", replace(own, slower=0.5)), ("twice", replace(own, slower=2.0))
     if o.relay_share == 1.0:
-        yield "share of each contact that the relay grants", edited("half", "operations.relay_share", 0.5), None
+        yield "share of each contact that the relay grants", operated("half", "relay_share", 0.5), None
     if orbits.grazing_height_m > 0.0:
-        yield scaled("grazing height", "orbit.grazing_height_m", orbits.grazing_height_m, "m", (0.0, 2.0))
+        yield scaled("grazing height", orbiting, "grazing_height_m", orbits.grazing_height_m, "m", (0.0, 2.0))
     if leo.limits is None or leo.limits.attitude == "free":
-        held = edited("nadir, 60 deg about zenith", "orbit.leo.limits", _held(leo.limits))
+        held = orbiting("nadir, 60 deg about zenith", "leo.limits", _held(leo.limits))
         yield "attitude of the satellite", held, None
     if leo.limits is not None and leo.limits.in_eclipse:
-        yield "eclipse", edited("terminal off in it", "orbit.leo.limits.in_eclipse", False), None
+        yield "eclipse", orbiting("terminal off in it", "leo.limits.in_eclipse", False), None
     if leo.kind == "circular" and leo.altitude_m is not None:
-        yield scaled("orbit altitude", "orbit.leo.altitude_m", leo.altitude_m, "m", (0.8, 1.2))
+        yield scaled("orbit altitude", orbiting, "leo.altitude_m", leo.altitude_m, "m", (0.8, 1.2))
         if leo.local_time_s is not None:
-            later = edited("6 h later", "orbit.leo.local_time_s", (leo.local_time_s + 21600.0) % 86400.0)
+            later = orbiting("6 h later", "leo.local_time_s", (leo.local_time_s + 21600.0) % 86400.0)
             yield "local time of the node", later, None
-    yield scaled("instrument data rate", "operations.instrument_rate_bit_s", o.instrument_rate_bit_s, "bit/s")
+    yield scaled("instrument data rate", operated, "instrument_rate_bit_s", o.instrument_rate_bit_s, "bit/s")
     if o.downlink is None:
         return
-    yield scaled("radio data rate", "operations.downlink.data_rate_bit_s", o.downlink.data_rate_bit_s, "bit/s")
-    given, key = o.downlink.stations, "operations.downlink.stations"
+    yield scaled("radio data rate", operated, "downlink.data_rate_bit_s", o.downlink.data_rate_bit_s, "bit/s")
+    given, key = o.downlink.stations, "downlink.stations"
     name, first = next(iter(given.items()))
     across = first.longitude_rad - math.copysign(math.pi, first.longitude_rad)
     opposite = first.model_copy(update={"latitude_rad": -first.latitude_rad, "longitude_rad": across})
-    fewer = edited(f"without {name}", key, {n: s for n, s in given.items() if n != name}) if len(given) > 1 else None
-    added = edited(f"one more, opposite {name}", key, {**given, f"opposite {name}": opposite})
+    fewer = operated(f"without {name}", key, {n: s for n, s in given.items() if n != name}) if len(given) > 1 else None
+    added = operated(f"one more, opposite {name}", key, {**given, f"opposite {name}": opposite})
     yield "ground stations", fewer, added
     masks = [
         {n: s.with_value("mask_rad", min(factor * s.mask_rad, HIGHEST_MASK_RAD)) for n, s in given.items()}
         for factor in (0.0, 2.0)
     ]
-    yield "elevation mask", edited("0 deg", key, masks[0]), edited("twice", key, masks[1])
+    yield "elevation mask", operated("0 deg", key, masks[0]), operated("twice", key, masks[1])
 
 
 def _held(own: VisibilityLimits | None) -> VisibilityLimits:
