@@ -8,6 +8,7 @@ from typing import Any, get_args
 import numpy as np
 
 from microrad import link, mirror
+from microrad.core import kept
 from microrad.loop import paper_cases
 from microrad.mirror import Variant
 from microrad.mission.model import Conventions, Mission, Requirement
@@ -51,12 +52,12 @@ class Reading:
         return self.residual_rad <= q.pointing_error_rad and self.margin_db >= q.margin_db
 
 
-def others(m: Mission, residual: paper_cases.Run) -> tuple[Reading, ...]:
+def others(m: Mission, residual: paper_cases.Run, parts: kept.Kept = kept.NOTHING) -> tuple[Reading, ...]:
     """Every other reading that fits the mission; ``residual`` is the run that the verdict rests on.
 
     Those of the loop are simulated (PID + inverse at the mission's frequencies); the others read the same run anew.
     """
-    return tuple(_reading(m, key, other, residual) for key, other in _choices(m))
+    return tuple(_reading(m, key, other, residual, parts) for key, other in _choices(m))
 
 
 def _choices(m: Mission) -> Iterator[tuple[str, str]]:
@@ -73,15 +74,19 @@ def _given(m: Mission, key: str) -> str:
     return str(getattr(getattr(m, table), name))
 
 
-def _reading(m: Mission, key: str, other: str, residual: paper_cases.Run) -> Reading:
+def _reading(m: Mission, key: str, other: str, residual: paper_cases.Run, parts: kept.Kept) -> Reading:
     as_read, run = m.with_value(key, other), residual
     try:
         if key in _SIMULATED:
             cases = paper_cases.of(as_read, mirror.of(as_read))
-            runs = paper_cases.tracking_runs(cases, (Variant.GIVEN,))
-            run = paper_cases.worst(runs, as_read.requirement.residual_statistic)
+            run = parts.part(_largest, cases, as_read.requirement.residual_statistic)
         left = paper_cases.residual_rad(as_read, run.trace)
         margin_db = float(link.margin_of_error(as_read, np.array([left]))[0])
     except ValueError as error:  # an unstable loop, a mirror without an inverse
         return Reading(key, _given(m, key), other, math.nan, math.nan, str(error))
     return Reading(key, _given(m, key), other, left, margin_db)
+
+
+def _largest(cases: paper_cases.PaperCases, statistic: str) -> paper_cases.Run:
+    """The run on the mission's mirror that leaves the largest error."""
+    return paper_cases.worst(paper_cases.tracking_runs(cases, (Variant.GIVEN,)), statistic)

@@ -159,19 +159,14 @@ def run(
     cases = paper_cases.of(m, mirrors)
     on_progress(0, 3, "budgets, acquisition, mirror and tracking")
     (summary, loops, margins, runs), (links, fig2) = both(
-        lambda: (
-            mirror_summary.summarise(m.mirror),
-            paper_cases.hysteresis_loops(cases),
-            paper_cases.loop_margins(cases),
-            paper_cases.tracking_runs(cases),
-        ),
+        lambda: (mirror_summary.summarise(m.mirror), *parts.part(paper_cases.results, cases)),
         lambda: (link_study.run(_links_of(file), parts), margin_map(file)),
     )
     residual = paper_cases.worst(runs, m.requirement.residual_statistic)
     left_rad = paper_cases.residual_rad(m, residual.trace)
     simulated = f"simulated: {residual.trace.name}, {m.requirement.residual_statistic} ({m.conventions.residual})"
     achieved = link.communication_budget(m, sources, pointing_error_rad=left_rad, given_source=simulated)
-    as_read = alternatives.others(m, residual)
+    as_read = alternatives.others(m, residual, parts)
 
     on_progress(1, 3, "claims of the paper")
     scan = parts.part(paper.scan, cases, on_progress=on_progress) if paper.applies(m) else None
