@@ -113,6 +113,26 @@ def test_the_judge_knows_the_residual_without_a_loop(plant):
     assert judge.Judge([plant]).open_rad2 == near(rms(plant, silent) ** 2, rel=0.01)
 
 
+def test_many_controllers_are_judged_as_each_alone():
+    """Of several orders, with one sensor and with both, and an unstable one among them."""
+    of = judge.Judge([RESONANT, axis_plant(resonance=(800.0, 0.05))])
+    several = [
+        *(pi(RESONANT, [gain, 0.1]) for gain in (50.0, 300.0, 5e4)),
+        dual(RESONANT, [500.0, 0.1]),
+        CASES["LQG"][1],
+        pi(RESONANT, [100.0, 0.0]),
+    ]
+    for together, controller in zip(of.several(several), several, strict=True):
+        alone = of(controller)
+        assert together.pole == near(alone.pole, rel=1e-12)
+        assert together.mean_rad2 == near(alone.mean_rad2, rel=1e-12)
+        np.testing.assert_allclose(together.moduli, alone.moduli, rtol=1e-12)
+        np.testing.assert_allclose(together.bandwidths_hz, alone.bandwidths_hz, rtol=1e-12)
+    found = of.several(several)
+    assert found[2].pole > 1.0 and found[2].mean_rad2 == math.inf
+    assert len({v.mean_rad2 for v in found}) == len(found)
+
+
 def test_the_judge_means_variances_and_takes_the_worst_margins_of_all_plants():
     plants = [PLAIN, axis_plant(gauge=False, gain=0.11e-3, resonance=(1200.0, 0.1))]
     controller = pi(PLAIN, [400.0, 0.1])

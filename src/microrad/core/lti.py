@@ -111,6 +111,39 @@ def frequency_response(system: StateSpace, freq_hz: Floats, step_s: float | None
     )
 
 
+def resolvent_rows(A: Floats, C: Floats, points: Complexes) -> Complexes:
+    """C (z - A)^-1 of several systems of one order at points z, shape (systems, rows of C, states, points).
+
+    By forward substitution in their Schur forms A = U T U', all points at once: the rows r (z - T) = C U, then r U'.
+    States in volts beside states in radians cost Schur's rotations the digits of the small ones: they are scaled first,
+    by powers of 2 that make rows and columns of A alike, and the rows are corrected once by what they leave of C.
+    """
+    from scipy.linalg.lapack import dgebal, zgees  # slow to import, not needed to show help
+
+    (several, order), outputs = A.shape[:2], C.shape[1]
+    balanced, scale = np.empty_like(A), np.empty((several, order))
+    T, U = np.empty(A.shape, dtype=complex), np.empty(A.shape, dtype=complex)
+    for i, matrix in enumerate(A):
+        balanced[i], _, _, scale[i], _ = dgebal(matrix, scale=1, permute=0)
+        T[i], _, _, U[i], _, _ = zgees(lambda value: None, balanced[i])
+    wide = np.tile(points, outputs)  # one row of C behind the other
+    near = 1.0 / (points - np.diagonal(T, axis1=1, axis2=2)[..., None])
+    near = np.tile(near, outputs)
+    forward, back, across = np.swapaxes(U, 1, 2), U.conj(), np.swapaxes(balanced, 1, 2)
+
+    def rows(right: Complexes) -> Complexes:
+        start = forward @ right
+        found = np.empty(near.shape, dtype=complex)
+        for j in range(order):
+            found[:, j] = (start[:, j] + (T[:, None, :j, j] @ found[:, :j])[:, 0]) * near[:, j]
+        return np.asarray(back @ found)
+
+    whole = np.repeat(np.swapaxes(C * scale[:, None], 1, 2), points.size, axis=2)
+    first = rows(whole.astype(complex))
+    second = (first + rows(whole - (first * wide - across @ first))) / scale[..., None]
+    return second.reshape(several, order, outputs, points.size).swapaxes(1, 2)
+
+
 def zeros(system: StateSpace) -> Complexes:
     """Finite invariant zeros of a square system: where [[A - s, B], [C, D]] loses rank."""
     from scipy.linalg import eig  # slow to import, not needed to show help

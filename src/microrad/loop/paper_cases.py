@@ -63,6 +63,11 @@ class Run:
         return float(np.max(np.abs(np.diff(self.trace.drive_v, axis=0))) / period)
 
 
+def results(cases: PaperCases) -> tuple[tuple[HysteresisLoop, ...], control.Margins, tuple[Run, ...]]:
+    """The settled loops, the margins and the tracked sines. Raises ValueError as `loop_margins` and `tracking_runs`."""
+    return hysteresis_loops(cases), loop_margins(cases), tracking_runs(cases)
+
+
 def hysteresis_loops(cases: PaperCases) -> tuple[HysteresisLoop, ...]:
     """Fig. 5: settled loops of the static model at the mission's frequencies, in the mirror's own angle."""
     model, s = cases.mirrors.own[Variant.GIVEN].model, cases.scenario

@@ -7,6 +7,7 @@ from typing import Any, get_args
 import numpy as np
 
 from microrad import link, mirror
+from microrad.core import kept
 from microrad.loop import paper_cases
 from microrad.mirror import Variant
 from microrad.mission.model import Conventions, Mission, Requirement
@@ -49,29 +50,41 @@ class Reading:
         return self.residual_rad <= q.pointing_error_rad and self.margin_db >= q.margin_db
 
 
-def others(m: Mission, residual: paper_cases.Run) -> tuple[Reading, ...]:
+def others(m: Mission, residual: paper_cases.Run, parts: kept.Kept = kept.NOTHING) -> tuple[Reading, ...]:
     """Every other reading that fits the mission; ``residual`` is the run that the verdict rests on.
 
     Those of the loop are simulated (PID + inverse at the mission's frequencies); the others read the same run anew.
     """
-    found = []
+    return tuple(_reading(m, key, other, residual, parts) for key, other in _choices(m))
+
+
+def _choices(m: Mission) -> Iterator[tuple[str, str]]:
+    """Keys with what else they could be, where that fits the other tables."""
     for key, table in _OPEN:
-        name, _, field = key.partition(".")
-        given = str(getattr(getattr(m, name), field))
-        for other in get_args(table.model_fields[field].annotation):
+        for other in get_args(table.model_fields[key.partition(".")[2]].annotation):
             as_read = m.with_value(key, other)
-            if other in (given, UNUSED) or [*as_read.problems(), *as_read.mirror.problems()]:
-                continue
-            q, run = as_read.requirement, residual
-            try:
-                if key in _SIMULATED:
-                    cases = paper_cases.of(as_read, mirror.of(as_read))
-                    runs = paper_cases.tracking_runs(cases, (Variant.GIVEN,))
-                    run = paper_cases.worst(runs, q.residual_statistic)
-                left = paper_cases.residual_rad(q, as_read.conventions, run.trace)
-                margin_db = float(link.margin_of_error(link.of(as_read), np.array([left]))[0])
-            except ValueError as error:  # an unstable loop, a mirror without an inverse
-                found.append(Reading(key, given, other, math.nan, math.nan, str(error)))
-            else:
-                found.append(Reading(key, given, other, left, margin_db))
-    return tuple(found)
+            if other not in (_given(m, key), UNUSED) and not [*as_read.problems(), *as_read.mirror.problems()]:
+                yield key, other
+
+
+def _given(m: Mission, key: str) -> str:
+    table, _, name = key.partition(".")
+    return str(getattr(getattr(m, table), name))
+
+
+def _reading(m: Mission, key: str, other: str, residual: paper_cases.Run, parts: kept.Kept) -> Reading:
+    as_read, run = m.with_value(key, other), residual
+    try:
+        if key in _SIMULATED:
+            cases = paper_cases.of(as_read, mirror.of(as_read))
+            run = parts.part(_largest, cases, as_read.requirement.residual_statistic)
+        left = paper_cases.residual_rad(as_read.requirement, as_read.conventions, run.trace)
+        margin_db = float(link.margin_of_error(link.of(as_read), np.array([left]))[0])
+    except ValueError as error:  # an unstable loop, a mirror without an inverse
+        return Reading(key, _given(m, key), other, math.nan, math.nan, str(error))
+    return Reading(key, _given(m, key), other, left, margin_db)
+
+
+def _largest(cases: paper_cases.PaperCases, statistic: str) -> paper_cases.Run:
+    """The run on the mission's mirror that leaves the largest error."""
+    return paper_cases.worst(paper_cases.tracking_runs(cases, (Variant.GIVEN,)), statistic)

@@ -167,12 +167,7 @@ def run(
     compiled = ensemble.compile_aside(lambda: _scene(file, mirrors).loop) if m.fine_pointing else lambda: None
     on_progress(0, 3, "budgets, acquisition, mirror and tracking")
     (summary, loops, margins, runs), (links, fig2) = both(
-        lambda: (
-            mirror_summary.summarise(m.mirror),
-            paper_cases.hysteresis_loops(cases),
-            paper_cases.loop_margins(cases),
-            paper_cases.tracking_runs(cases),
-        ),
+        lambda: (mirror_summary.summarise(m.mirror), *parts.part(paper_cases.results, cases)),
         lambda: linked(file, parts),
     )
     data = links.data
@@ -180,7 +175,7 @@ def run(
     left_rad = paper_cases.residual_rad(q, m.conventions, residual.trace)
     simulated = f"simulated: {residual.trace.name}, {q.residual_statistic} ({m.conventions.residual})"
     achieved = link.communication_budget(data, sources, pointing_error_rad=left_rad, given_source=simulated)
-    as_read = alternatives.others(m, residual)
+    as_read = alternatives.others(m, residual, parts)
 
     on_progress(1, 3, "claims of the paper")
     scan = parts.part(paper.scan, cases, on_progress=on_progress) if paper.applies(m.mirror) else None

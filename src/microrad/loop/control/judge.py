@@ -288,44 +288,11 @@ def response(system: lti.StateSpace, points: Complexes) -> Complexes:
 
 
 def responses(stack: _Stack, points: Complexes) -> Complexes:
-    """Responses of controllers (one output) at points z, shape (controllers, points, inputs).
-
-    By forward substitution in their Schur forms A = U T U', all points at once: the row r (z - T) = C U, then
-    r U' B + D. States in volts beside states in radians cost Schur's rotations the digits of the small ones: they are
-    scaled first, by powers of 2 that make rows and columns of A alike, and the rows are corrected once by what they
-    leave of C.
-    """
+    """Responses of controllers (one output) at points z, shape (controllers, points, inputs)."""
     several, order = stack.A.shape[:2]
     if not order:
         return np.broadcast_to(stack.D.astype(complex), (several, points.size, stack.D.shape[2]))
     if order == 1:
         return np.asarray(stack.C * stack.B / (points - stack.A[:, 0])[..., None] + stack.D)
-    A, T, U, scale = _schur(stack.A)
-    near = 1.0 / (points - np.diagonal(T, axis1=1, axis2=2)[..., None])
-    conjugate, transposed = U.conj(), np.swapaxes(U, 1, 2)
-
-    def rows(right: Complexes) -> Complexes:
-        start = transposed @ right
-        found = np.empty(near.shape, dtype=complex)
-        for j in range(order):
-            found[:, j] = (start[:, j] + (T[:, None, :j, j] @ found[:, :j])[:, 0]) * near[:, j]
-        return np.asarray(conjugate @ found)
-
-    C = (stack.C * scale[:, None]).swapaxes(1, 2)
-    first = rows(C.astype(complex))
-    second = first + rows(C - (first * points - np.swapaxes(A, 1, 2) @ first))
-    return np.asarray(second.swapaxes(1, 2) @ (stack.B / scale[..., None]) + stack.D)
-
-
-def _schur(matrices: Floats) -> tuple[Floats, Complexes, Complexes, Floats]:
-    """Each matrix balanced by a diagonal of powers of 2, its Schur form and rotations, and the diagonal."""
-    from scipy.linalg.lapack import dgebal, zgees  # slow to import, not needed to show help
-
-    balanced, scale = np.empty_like(matrices), np.empty(matrices.shape[:2])
-    T, U = np.empty(matrices.shape, dtype=complex), np.empty(matrices.shape, dtype=complex)
-    for i, matrix in enumerate(matrices):
-        balanced[i], _, _, scale[i], _ = dgebal(matrix, scale=1, permute=0)
-        T[i], _, _, U[i], _, failed = zgees(lambda value: None, balanced[i])
-        if failed:
-            raise ValueError("a controller has no Schur form: its numbers differ too much in size")
-    return balanced, T, U, scale
+    rows = lti.resolvent_rows(stack.A, stack.C, points)[:, 0]
+    return np.asarray(rows.swapaxes(1, 2) @ stack.B + stack.D)

@@ -25,14 +25,10 @@ def residual_spectrum(closed: ClosedLoop, freq_hz: Floats) -> Floats:
     for line in o.lines:
         keep[line.states] = False
     # From every state to the error, then the covariance: its factor would lose what is small in other units.
-    # By the dual system, with a right-hand side for each axis in place of one for each state.
-    every = np.eye(int(keep.sum()))
-    dual = lti.StateSpace(
-        monodromy[np.ix_(keep, keep)].T, reading[:, keep].T, every, np.zeros((every.shape[0], loop.axes))
-    )
-    response = lti.frequency_response(dual, freq_hz, loop.timing.period_s)
+    points = np.exp(2j * np.pi * np.asarray(freq_hz) * loop.timing.period_s)
+    rows = lti.resolvent_rows(monodromy[None][:, keep][:, :, keep], reading[None][:, :, keep], points)[0]
     added = _added_in_a_period(closed)[np.ix_(keep, keep)]
-    power = np.einsum("fia,ij,fja->fa", response, added, response.conj()).real
+    power = np.sum((rows * (added @ rows.conj())).real, axis=1).T
     return np.asarray(2.0 * loop.timing.period_s * power)
 
 
