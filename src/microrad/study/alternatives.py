@@ -1,6 +1,7 @@
 """What the verdict would be by other readings of what the paper leaves open, each changed alone."""
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, get_args
 
