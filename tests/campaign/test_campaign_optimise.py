@@ -197,7 +197,7 @@ def as_rows(function, rows=128):
         (two_wells, 2, 1, (0.8, 0.6), 1.0, None),
     ],
 )
-@pytest.mark.parametrize("seed", [0, 1, 2])
+@pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.endurance) for seed in (1, 2))])
 def test_known_optima_are_found_in_200_evaluations(function, size, limits, optimum, scale, known, seed):
     known = function(optimum)[0] if known is None else known
     asked = problem(
