@@ -25,7 +25,7 @@ LINK_TABLES = (
 """The tables with the inputs of the communication link."""
 
 _Link = TypeVar("_Link")
-Tables = TypeVar("Tables", bound=Table)
+Varied = TypeVar("Varied", bound=Table)
 """A table of tables, such as a mission, of which one number after the other is moved."""
 
 
@@ -45,7 +45,7 @@ class Input:
         """The key, of an item with its place from 1 behind it, as campaigns name it."""
         return self.key if self.item is None else f"{self.key}.{self.item + 1}"
 
-    def moved(self, tables: Tables, value: float) -> Tables:
+    def moved(self, tables: Varied, value: float) -> Varied:
         """The tables with this number replaced."""
         if self.item is None:
             return tables.with_value(f"{self.table}.{self.field}", value)
@@ -69,7 +69,7 @@ def inputs(tables: Table, name: str) -> Iterator[Input]:
                 yield Input(key, name, field, item, number, rule.each)
 
 
-def moved(tables: Tables, found: tuple[Input, ...], value: float) -> Tables | None:
+def moved(tables: Varied, found: tuple[Input, ...], value: float) -> Varied | None:
     """The tables with the input at a value, its axes in proportion, or None where their rule does not allow it."""
     largest = max(each.value for each in found)
     for each in found:

@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from microrad.link.inputs import Input, Tables, margin_or_none, moved
+from microrad.link.inputs import Input, Varied, margin_or_none, moved
 
 DECADES = 6
 """How far from its own value an input is looked for, up and down."""
@@ -44,12 +44,12 @@ class Solved:
 
 
 def solve(
-    mission: Tables,
+    mission: Varied,
     found: tuple[Input, ...],
     unit: str,
-    margin_db: Callable[[Tables], float],
+    margin_db: Callable[[Varied], float],
     required_db: float,
-    possible: Callable[[Tables], bool],
+    possible: Callable[[Varied], bool],
 ) -> Solved:
     """Where an input leaves a margin, looked for in steps and then found to the last digits.
 

@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from microrad.link.budget import beam_budget
-from microrad.link.inputs import Input, Tables, fits, inputs, margin_or_none, unit_of
+from microrad.link.inputs import Input, Varied, fits, inputs, margin_or_none, unit_of
 from microrad.link.model import Shared
 from microrad.mission.fields import Quantity, Share
 from microrad.mission.model import LinkMission, Source, source_text
@@ -66,12 +66,12 @@ def beam_tornado(m: LinkMission, sources: Mapping[str, Source], name: str) -> tu
 
 
 def swings(
-    mission: Tables,
+    mission: Varied,
     sources: Mapping[str, Source],
     tables: tuple[str, ...],
     strehl: str,
-    margin_db: Callable[[Tables], float],
-    possible: Callable[[Tables], bool],
+    margin_db: Callable[[Varied], float],
+    possible: Callable[[Varied], bool],
 ) -> tuple[Swing, ...]:
     """A margin over each input of these tables, one at a time, the largest swing first.
 
@@ -114,7 +114,7 @@ def _ends(field: str, value: float, rule: Quantity, strehl: str) -> tuple[float,
     return max(low, least), min(high, most)
 
 
-def _nearest(mission: Tables, each: Input, end: float, possible: Callable[[Tables], bool]) -> float:
+def _nearest(mission: Varied, each: Input, end: float, possible: Callable[[Varied], bool]) -> float:
     """The end of a swing, its step halved until there is such a mission."""
     while end != each.value and not possible(each.moved(mission, end)):
         end = (each.value + end) / 2.0
