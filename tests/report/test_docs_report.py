@@ -79,7 +79,7 @@ def test_each_requirement_stands_in_the_table():
 
 
 def test_the_numbers_of_the_report_are_those_of_the_code():
-    told(REPORT, f"in words to {100 * compared.WORDS_SHARE:g} %", f"at most {palette.MOST_POINTS} points there")
+    told(REPORT, f"in words to {100 * compared.WORDS_SHARE:g} %", f"at most {palette.MOST_POINTS} points")
     assert set(re.findall(r"`([A-Z0-9_]+)`", REPORT)) == set(machine.VARIABLES)
     told(REPORT, f"up to {results.MOST_INPUT_BYTES / 1e6:g} MB each")
 
