@@ -74,6 +74,7 @@ def pytest_configure(config):
 def pytest_collection_finish():
     """What has been read stays to the end: each look for garbage would go through thousands of tests again."""
     gc.freeze()
+    gc.set_threshold(50_000, 20, 50)  # as the command line
     gc.enable()
 
 
