@@ -1,4 +1,7 @@
-"""Compile the ensemble of loops, which takes half a minute: each process of a first test run would do it for itself."""
+"""Compile the ensemble of loops and the equations of LQG: each process of a first test run would do it for itself.
+
+It takes half a minute.
+"""
 
 from pathlib import Path
 
@@ -8,4 +11,5 @@ from microrad.loop import fine_pointing
 
 file = load_mission(Path(__file__).parent.parent / "missions" / "leo-geo.toml")
 scene = fine_pointing.scene(file, mirror.of(file.mission), tracking_light_w(file))
-fine_pointing.run_one(scene, "PI")
+for name in ("PI", "LQG"):
+    fine_pointing.run_one(scene, name)
