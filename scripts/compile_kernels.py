@@ -10,7 +10,8 @@ from microrad.study import alternatives
 file = load_mission(Path(__file__).parent.parent / "missions" / "leo-geo.toml")
 mirrors = mirror.of(file.mission)
 scene = fine_pointing.scene(file, mirrors, tracking_light_w(file))
-fine_pointing.run_one(scene, "PI")
+for name in ("PI", "LQG"):
+    fine_pointing.run_one(scene, name)
 cases = paper_cases.of(file.mission, mirrors)
 paper_cases.hysteresis_loops(cases)
 runs = paper_cases.tracking_runs(cases)

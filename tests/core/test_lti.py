@@ -292,6 +292,22 @@ def test_zeros_of_a_system_are_where_python_control_finds_them():
     assert lti.zeros(square).size == 4
 
 
+def test_rows_of_a_resolvent_are_those_of_a_solution_at_each_point():
+    """Several systems, one of them with states of sizes that differ by nine decades, one with modes that coincide."""
+    rng = np.random.default_rng(8)
+    A = 0.4 * rng.standard_normal((3, 4, 4))
+    size = np.array([1.0, 1e-9, 1e3, 1.0])
+    A[1] = A[1] * size[:, None] / size
+    A[2] = 0.5 * np.eye(4) + np.diag(np.ones(3), 1)
+    C, points = rng.standard_normal((3, 2, 4)), np.exp(1j * np.array([0.01, 0.3, 1.5, np.pi]))
+    C[1] = C[1] / size
+    found = lti.resolvent_rows(A, C, points)
+    assert found.shape == (3, 2, 4, 4)
+    for i, k in np.ndindex(3, 4):
+        expected = C[i] @ np.linalg.inv(points[k] * np.eye(4) - A[i])
+        assert_allclose(found[i, :, :, k], expected, rtol=1e-10, atol=1e-14 * np.max(np.abs(expected)))
+
+
 # ------------------------------------------------------------------------------------------------- covariances
 def test_a_gramian_sees_what_is_observed_only_after_many_samples():
     n = 20

@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 from scipy.linalg import block_diag, solve_discrete_are, solve_discrete_lyapunov
 
 from design_plants import axis_plant
-from microrad.core import lti
+from microrad.core import kernels, lti
 from microrad.loop.control import analysis, lqg
 from microrad.loop.control.lqg import LQG, Weights
 from microrad.loop.control.problem import GAUGE, OPTICAL, RESIDUAL, AxisController
@@ -166,6 +166,38 @@ def test_riccati_solutions_are_those_of_scipy():
         R = np.diag(rng.uniform(0.01, 2.0, m))
         expected = solve_discrete_are(A, B, C.T @ C, R)
         assert_allclose(lqg.riccati(A, B, C.T @ C, R, ""), expected, rtol=1e-7, atol=1e-8 * np.max(expected))
+
+
+def test_doubling_runs_as_it_is_without_the_compiler_and_the_compiled_gramian_is_that_of_arrays():
+    rng = np.random.Generator(np.random.Philox(5))
+    A, b, c = rng.normal(size=(5, 5)), rng.normal(size=(5, 1)), rng.normal(size=(2, 5))
+    solved = []
+    for kernel in (kernels.riccati_kernel, kernels.riccati_kernel.py_func):
+        X = c.T @ c
+        assert kernel(A.copy(), b @ b.T, X, np.empty((4, 5, 5)), np.empty((5, 10)))
+        solved.append(X)
+    assert_allclose(solved[0], solved[1], rtol=1e-9)
+    assert not kernels.riccati_kernel(2.0 * A, 0.0 * (b @ b.T), c.T @ c, np.empty((4, 5, 5)), np.empty((5, 10)))
+    stable, Q = 0.1 * A, c.T @ c
+    expected = lti.gramian(stable, Q)
+    for kernel in (kernels.gramian_kernel, kernels.gramian_kernel.py_func):
+        X = Q.copy()
+        kernel(stable.copy(), X, np.empty((3, 5, 5)))
+        assert_allclose(X, expected, rtol=1e-12)
+    assert np.max(np.abs(expected - Q)) > 0.01 * np.max(Q)
+
+
+def test_a_gain_that_is_known_already_is_the_one_that_is_solved_for():
+    """Weights that share an observer or a regulator with earlier ones; another plant shares nothing."""
+    first = Weights(0.1, 1.0, 1e-3)
+    several = [first, replace(first, command=0.3), replace(first, sensor_noise=2.0), replace(first, walk=0.0), first]
+    found = [lqg.lqg_controller(FULL, weights).system for weights in several]
+    for weights, system in zip(several, found, strict=True):
+        alone = lqg.lqg_controller(replace(FULL), weights).system
+        assert all(np.array_equal(getattr(system, key), getattr(alone, key)) for key in "ABCD")
+    assert not any(np.array_equal(found[0].C, other.C) for other in found[1:4])
+    louder = replace(FULL, system=replace(FULL.system, B=2.0 * FULL.system.B))
+    assert not np.array_equal(lqg.lqg_controller(louder, first).system.C, found[0].C)
 
 
 def test_the_filter_gain_takes_noise_that_sensor_and_states_share():

@@ -180,9 +180,11 @@ def zero_order_hold(A: Floats, B: Floats, step_s: float) -> tuple[Floats, Floats
 def series(first: StateSpace, second: StateSpace) -> StateSpace:
     """The two systems one behind the other, the first one nearest the input."""
     n1, n2 = first.order, second.order
-    A = np.block([[first.A, np.zeros((n1, n2))], [second.B @ first.C, second.A]])
-    B = np.vstack([first.B, second.B @ first.D])
-    C = np.hstack([second.D @ first.C, second.C])
+    A, B = np.zeros((n1 + n2, n1 + n2)), np.empty((n1 + n2, first.B.shape[1]))
+    C = np.empty((second.C.shape[0], n1 + n2))
+    A[:n1, :n1], A[n1:, :n1], A[n1:, n1:] = first.A, second.B @ first.C, second.A
+    B[:n1], B[n1:] = first.B, second.B @ first.D
+    C[:, :n1], C[:, n1:] = second.D @ first.C, second.C
     return StateSpace(A, B, C, second.D @ first.D)
 
 

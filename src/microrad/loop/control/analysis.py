@@ -43,11 +43,11 @@ def refuse_misfit(plant: DesignPlant, controller: AxisController, period_s: floa
                 f"controller {name!r}: {key} has shape {found[key].shape}, not {shape}: a controller of one axis has "
                 "the inputs optical and gauge, one output, and one row and column for a state"
             )
-        if not np.all(np.isfinite(found[key])):
+        if not np.isfinite(found[key]).all():
             raise ValueError(
                 f"controller {name!r}: {key} holds a number that is not finite; look for a gain that is nan or infinite"
             )
-    if np.any(plant.system.D[:, 0] != 0.0):
+    if plant.system.D[:, 0].any():
         raise ValueError("the plant answers the command of its own sample: give it its delay before a loop is closed")
     if period_s is not None and not math.isclose(period_s, plant.period_s, rel_tol=1e-9):
         raise ValueError(

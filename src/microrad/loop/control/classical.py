@@ -135,6 +135,7 @@ def _family(
 
     ``neutral`` are the values behind those of the ``base`` with which its controller is that of the base, or nearly so.
     """
+    parameters = once_per_plant(parameters)
 
     def build(plant: DesignPlant, values: Floats) -> AxisController:
         return AxisController(name, *design(plant, *_checked(name, parameters(plant), values)))
@@ -184,9 +185,9 @@ def _pi(plant: DesignPlant, integral_hz: float, zero_hz: float) -> lti.StateSpac
 
 def _on_error(system: lti.StateSpace) -> lti.StateSpace:
     """The controller with a second input, the gauge, that it does not use."""
-    return lti.StateSpace(
-        system.A, np.hstack([system.B, np.zeros((system.order, 1))]), system.C, np.hstack([system.D, np.zeros((1, 1))])
-    )
+    B, D = np.zeros((system.order, 2)), np.zeros((1, 2))
+    B[:, :1], D[:, :1] = system.B, system.D
+    return lti.StateSpace(system.A, B, system.C, D)
 
 
 # ------------------------------------------------------------------------------------------------ PI, PID, notch

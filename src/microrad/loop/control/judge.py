@@ -67,7 +67,8 @@ class Judge:
         # The residual is white + to_residual (k0 seen0 + k1 seen1), k what of the sensors the command takes. As three
         # columns at each frequency, its size is that of their triangular factor: three numbers in place of all.
         taken = whole[:, RESIDUAL, 0, None, None] * seen
-        self._parts = np.linalg.qr(np.stack([white, taken[:, 0], taken[:, 1]], axis=2), "r")
+        columns = np.stack([white, taken[:, 0], taken[:, 1]], axis=2)
+        self._parts: Complexes = np.asarray(np.linalg.qr(columns, "r"))
         self._points = np.exp(2j * math.pi * self._freq * self._period)
         self.open_rad2 = float(self._mean(white[None])[0])
         if self.open_rad2 <= 0.0:
@@ -120,7 +121,7 @@ class Judge:
     def _residual(self, taken: Complexes) -> Complexes:
         """Numbers (controllers, frequencies, 3) of the size of the residual, by what the command takes of sensors."""
         rows = self._parts[:, :, 0] + taken[..., :1] * self._parts[:, :, 1]
-        return rows + taken[..., 1:] * self._parts[:, :, 2] if np.any(taken[..., 1]) else rows
+        return np.asarray(rows + taken[..., 1:] * self._parts[:, :, 2] if np.any(taken[..., 1]) else rows)
 
     def unstable(self, pole: float) -> Verdict:
         """What is said of a candidate that is unstable, or that could not be built."""
@@ -284,7 +285,7 @@ class _Stack:
 
 def response(system: lti.StateSpace, points: Complexes) -> Complexes:
     """Response of a controller (one output) at points z, shape (points, inputs)."""
-    return responses(_Stack.of([system]), points)[0]
+    return np.asarray(responses(_Stack.of([system]), points)[0])
 
 
 def responses(stack: _Stack, points: Complexes) -> Complexes:

@@ -95,9 +95,9 @@ def pid(gains: Gains, period_s: float) -> lti.StateSpace:
     step = gains.integral * period_s
     keep = gains.derivative_filter_s / (gains.derivative_filter_s + period_s)
     edge = gains.derivative / (gains.derivative_filter_s + period_s)
-    used = np.array([step != 0.0, edge != 0.0])
+    used = [step != 0.0, edge != 0.0]
     return lti.StateSpace(
-        A=np.diag([1.0, keep])[np.ix_(used, used)],
+        A=np.array([[1.0, 0.0], [0.0, keep]])[used][:, used],
         B=np.array([[step], [1.0 - keep]])[used],
         C=np.array([[1.0, -edge]])[:, used],
         D=np.array([[gains.proportional + step + edge]]),

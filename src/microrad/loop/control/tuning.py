@@ -90,7 +90,7 @@ def tune(
     total, what = survey + STARTS + FINALISTS, f"tune {family.name}"
     search = Search(family, plants, specification)
     contained = _contained(search, seed, survey, base)
-    surveyed = search.at_all(_places(search, contained, survey, seed))
+    surveyed = search.at_all(list(_places(search, contained, survey, seed)))
     on_progress(survey, total, what)
     if not search.trials:
         raise ValueError(_no_stable(search))
