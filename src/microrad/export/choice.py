@@ -34,14 +34,12 @@ from microrad.link.tracking_light import tracking_light_w
 from microrad.loop import control, fine_pointing, paper_cases, sine_run
 from microrad.loop.fine_loop.loop import LoopController
 from microrad.loop.fine_loop.replay import replay
+from microrad.loop.paper_cases import PID, PID_WITH_INVERSE
 from microrad.mirror import Variant, model
 from microrad.mission.file import MissionFile
 from microrad.mission.model import Scenario
 from microrad.mission.tables.fine_pointing import FinePointing
 from microrad.mission.tables.mirror import Mirror as MirrorTable
-
-PID, PID_WITH_INVERSE = "PID", "PID + inverse"
-"""The controllers of the table [control], as the study names them."""
 
 LOOPS = ("fine_pointing", "control")
 """Tables of a mission that describe a loop."""

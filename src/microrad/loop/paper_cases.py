@@ -12,6 +12,9 @@ from microrad.mirror import MirrorParts, Variant
 from microrad.mirror.hysteresis import secant_gain
 from microrad.mission.model import Control, Conventions, Mission, Requirement, Scenario
 
+PID, PID_WITH_INVERSE = "PID", "PID + inverse"
+"""Controllers of the paper's loop, by name."""
+
 
 @dataclass(frozen=True, slots=True)
 class PaperCases:
@@ -36,10 +39,10 @@ def of(m: Mission, mirrors: MirrorParts) -> PaperCases:
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """One tracked sine: which mirror, which controller, and what came out, at the line of sight."""
+    """One tracked sine: which mirror, which of the two controllers, and what came out, at the line of sight."""
 
     mirror: Variant
-    controller: str  # "PID" or "PID + inverse"
+    controller: str
     freq_hz: float
     trace: Trace
 
@@ -88,12 +91,12 @@ def tracking_runs(cases: PaperCases, variants: Collection[Variant] = tuple(Varia
     """
     s, runs = cases.scenario, []
     both = sorted({*s.pid_frequencies_hz, *s.inverse_frequencies_hz})
-    tracked = [("PID", f) for f in both] + [("PID + inverse", f) for f in s.inverse_frequencies_hz]
+    tracked = [(PID, f) for f in both] + [(PID_WITH_INVERSE, f) for f in s.inverse_frequencies_hz]
     for variant in (Variant.GIVEN, Variant.STRAIGHT, Variant.COMPARISON):
         if variant not in variants or variant not in cases.mirrors.line_of_sight:
             continue
         plant = cases.mirrors.line_of_sight[variant].plant
-        controllers = {"PID": control.no_feedforward(plant), "PID + inverse": control.inverse(plant)}
+        controllers = {PID: control.no_feedforward(plant), PID_WITH_INVERSE: control.inverse(plant)}
         for controller, f in tracked:
             name = f"{variant}, {controller}, {f:g} Hz"
             trace = track_sine(name, plant, cases.setup, controllers[controller], s.amplitude_rad, f)
@@ -103,7 +106,7 @@ def tracking_runs(cases: PaperCases, variants: Collection[Variant] = tuple(Varia
 
 def worst(runs: tuple[Run, ...], statistic: str, variant: Variant = Variant.GIVEN) -> Run:
     """The run of PID + inverse on one variant of the mirror that leaves the largest error, by "peak" or "rms"."""
-    candidates = [r for r in runs if (r.mirror, r.controller) == (variant, "PID + inverse")]
+    candidates = [r for r in runs if (r.mirror, r.controller) == (variant, PID_WITH_INVERSE)]
     return max(candidates, key=lambda r: r.trace.left_rad(statistic))
 
 

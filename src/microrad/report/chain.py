@@ -11,6 +11,7 @@ from itertools import pairwise
 
 from microrad.core.units import format_quantity
 from microrad.link import pointing
+from microrad.mirror import Variant
 from microrad.mirror.hysteresis import output_amplitude
 from microrad.report.fine_pointing_words import micro, share_of_time
 from microrad.report.quantities import quantity, signed
@@ -160,7 +161,7 @@ def _residual(study: Study) -> Stage:
     left = study.left_rad(run)
     lines = [f"{_angle(left)} {m.requirement.residual_statistic}, {run.freq_hz:g} Hz sine"]
     if fine is not None:
-        quantile_rad = fine.best.simulated["given"].quantile_rad
+        quantile_rad = fine.best.simulated[Variant.GIVEN].quantile_rad
         lines = [f"{micro(quantile_rad)} µrad at {share_of_time(fine.quantile)}, vibration", f"({lines[0]})"]
     met = all(r.met for r in study.requirements if r.subject in ("residual", "fine pointing"))
     lines.append(f"allowed {_angle(m.requirement.pointing_error_rad)}")

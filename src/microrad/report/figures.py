@@ -8,7 +8,8 @@ import numpy as np
 from microrad.core.arrays import Floats
 from microrad.link.under_jitter import required_error_rad
 from microrad.loop import sine_run as simulate
-from microrad.loop.paper_cases import Run
+from microrad.loop.paper_cases import PID, PID_WITH_INVERSE, Run
+from microrad.mirror import Variant
 from microrad.mission.model import Mission
 from microrad.report.plotting.figure import Figure
 from microrad.report.plotting.sheet import (
@@ -41,7 +42,7 @@ _LOOKS: tuple[tuple[str, Dash], ...] = ((VERMILION, "--"), (BLUE, "-"))
 def draw(study: Study) -> tuple[Figure, ...]:
     """All figures of the study, in the order of the report."""
     drawers = [margin_map, hysteresis_loops, tracking_errors, inverse]
-    drawers += [comparison] if any(r.mirror == "comparison" for r in study.runs) else []
+    drawers += [comparison] if any(r.mirror == Variant.COMPARISON for r in study.runs) else []
     figures = [drawer(study) for drawer in drawers]
     return tuple(figures if study.scan is None else [*figures, scan(study.scan)])
 
@@ -180,7 +181,7 @@ def _pick(study: Study, mirror: str, controller: str, freq_hz: float) -> Run:
 def tracking_errors(study: Study) -> Figure:
     """Fig. 6: PID with and without hysteresis."""
     m = study.file.mission
-    curves = (Curve("with hysteresis", "given", "PID"), Curve("without", "no hysteresis", "PID"))
+    curves = (Curve("with hysteresis", Variant.GIVEN, PID), Curve("without", Variant.STRAIGHT, PID))
     sheet, columns = _tracking(study, m.scenario.pid_frequencies_hz, curves, limit=False)
     caption = (
         f"Tracking error of a {_amplitude(m)} sine under PID, on the mirror and on one of the same gain without "
@@ -192,9 +193,9 @@ def tracking_errors(study: Study) -> Figure:
 def inverse(study: Study) -> Figure:
     """Fig. 8: PID against PID with inverse feedforward."""
     m = study.file.mission
-    curves = (Curve("PID", "given", "PID"), Curve("PID + inverse", "given", "PID + inverse"))
+    curves = (Curve(PID, Variant.GIVEN, PID), Curve(PID_WITH_INVERSE, Variant.GIVEN, PID_WITH_INVERSE))
     sheet, columns = _tracking(study, m.scenario.inverse_frequencies_hz, curves, limit=True)
-    counts = "; ".join(_counts(r) for r in study.runs if (r.mirror, r.controller) == ("given", "PID + inverse"))
+    counts = "; ".join(_counts(r) for r in study.runs if (r.mirror, r.controller) == (Variant.GIVEN, PID_WITH_INVERSE))
     caption = (
         f"Tracking error of a {_amplitude(m)} sine. The feedforward inverts the hysteresis model, driven by the "
         f"reference and its rate. Dotted: the required {m.requirement.pointing_error_rad * 1e6:g} µrad. "
@@ -206,8 +207,8 @@ def inverse(study: Study) -> Figure:
 def comparison(study: Study) -> Figure:
     """PID + inverse on the mission's hysteresis model and on its comparison model."""
     curves = (
-        Curve("mirror's model", "given", "PID + inverse"),
-        Curve("comparison model", "comparison", "PID + inverse"),
+        Curve("mirror's model", Variant.GIVEN, PID_WITH_INVERSE),
+        Curve("comparison model", Variant.COMPARISON, PID_WITH_INVERSE),
     )
     sheet, columns = _tracking(study, study.file.mission.scenario.inverse_frequencies_hz, curves, limit=True)
     caption = "PID + inverse on the mirror as given and on the mission's comparison model, each with its own inverse."

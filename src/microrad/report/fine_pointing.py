@@ -14,7 +14,6 @@ from microrad.report import fine_pointing_words as words
 from microrad.report.fine_pointing_data import parameter_units, rms_by_source, sources
 from microrad.report.plotting.figure import Figure
 
-HEADINGS = {"given": "mission's mirror", "comparison": "comparison model", "no hysteresis": "no hysteresis"}
 """Variants of the mirror as headings."""
 
 Row = dict[str, Any]
@@ -22,7 +21,7 @@ Row = dict[str, Any]
 
 def context(fine: FinePointingStudy, required: float, figures: Sequence[Figure]) -> dict[str, Any]:
     """What the template needs at a required pointing error (rad); its tables have microradians, as they say."""
-    variants = [v for v in HEADINGS if any(v in each.simulated for each in fine.verified)]
+    variants = [v for v in words.NAMES if any(v in each.simulated for each in fine.verified)]
     return {
         "met": fine.best.meets(required) and not unknown_dynamics(fine.scene.mirrors.table),
         "verdict": words.result(fine, required),
@@ -30,7 +29,7 @@ def context(fine: FinePointingStudy, required: float, figures: Sequence[Figure])
         "setting": setting(fine),
         "quantile": words.share_of_time(fine.quantile),
         "required": words.given(required),
-        "variants": [(v, HEADINGS[v]) for v in variants],
+        "variants": [(v, words.NAMES[v]) for v in variants],
         "residuals": residual_rows(fine, variants, required),
         "limits": limits(fine),
         "designs": design_rows(fine),
@@ -102,7 +101,7 @@ def _simulated(residual: Residual | None, required_rad: float) -> Row:
 def limits(fine: FinePointingStudy) -> list[str]:
     """Limits met by controller and variant of the mirror, a line each."""
     return [
-        f"{v.design.name}, {HEADINGS.get(variant, variant)}: {words.limits_met(residual.shares)}"
+        f"{v.design.name}, {words.NAMES[variant]}: {words.limits_met(residual.shares)}"
         for v in fine.verified
         for variant, residual in v.simulated.items()
         if residual.shares
@@ -288,7 +287,7 @@ def sines(fine: FinePointingStudy, required_rad: float) -> Row:
     columns = list(dict.fromkeys((s.variant, s.freq_hz) for s in fine.sines))
     variants = list(dict.fromkeys(variant for variant, _ in columns))
     return {
-        "groups": [(HEADINGS.get(v, v), sum(variant == v for variant, _ in columns)) for v in variants],
+        "groups": [(words.NAMES[v], sum(variant == v for variant, _ in columns)) for v in variants],
         "frequencies": [f"{freq:g} Hz" for _, freq in columns],
         "rows": [
             {

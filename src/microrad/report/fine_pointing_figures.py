@@ -8,8 +8,9 @@ import numpy as np
 from microrad.core.arrays import Floats
 from microrad.loop.fine_loop.linear import close, sensitivity
 from microrad.loop.fine_pointing import ErrorBudget, FinePointingStudy, Verified
+from microrad.mirror import Variant
 from microrad.mission.model import Mission
-from microrad.report.fine_pointing_words import micro, share_of_time, source_name
+from microrad.report.fine_pointing_words import NAMES, micro, share_of_time, source_name
 from microrad.report.plotting.figure import Figure
 from microrad.report.plotting.sheet import (
     BLACK,
@@ -34,8 +35,7 @@ from microrad.study.story import Study
 
 _COLOURS = (VERMILION, BLUE, GREEN)
 _SHAPES = ("o", "s", "^")  # beside the colours, for print in grey
-_MARKERS = {"given": ("o", BLUE), "comparison": ("s", ORANGE), "no hysteresis": ("D", WHITE)}
-_VARIANTS = {"given": "mission's mirror", "comparison": "comparison model", "no hysteresis": "no hysteresis"}
+_MARKERS = {Variant.GIVEN: ("o", BLUE), Variant.COMPARISON: ("s", ORANGE), Variant.STRAIGHT: ("D", WHITE)}
 _PREDICTED: tuple[Dash, float] = ((4.0, 3.0), 0.9)
 _SENSITIVITY_POINTS = 400
 _MARKS = 9
@@ -165,8 +165,8 @@ def errors(fine: FinePointingStudy, m: Mission) -> Figure:
         at, values = np.array([*found.values()]).reshape(-1, 2).T
         edge = BLACK if colour == WHITE else colour
         if values.size:
-            panel.add(Line(values * 1e6, at, colour, "", label=_VARIANTS[variant], marker=marker, edge=edge))
-        columns |= {f"{name}, {_VARIANTS[variant]} (rad)": np.array([value]) for name, (_, value) in found.items()}
+            panel.add(Line(values * 1e6, at, colour, "", label=NAMES[variant], marker=marker, edge=edge))
+        columns |= {f"{name}, {NAMES[variant]} (rad)": np.array([value]) for name, (_, value) in found.items()}
     panel.add(Rule(required * 1e6, True, BLACK, "--", 1.2, f"required: {required * 1e6:g} µrad"))
     panel.y.ticks = {int(row): name for row, name in zip(rows, names, strict=True)}
     panel.y.low, panel.y.high, panel.x.low = -0.6, len(names) - 0.4, 0.0

@@ -7,16 +7,24 @@ from dataclasses import dataclass
 from microrad.core.units import format_quantity
 from microrad.loop.control.tuning import MARGIN
 from microrad.loop.fine_pointing import FinePointingStudy, Verified
+from microrad.mirror import Variant
 from microrad.mirror.geometry import StrokeBudget
 from microrad.mirror.summary import unknown_dynamics
 from microrad.mission.model import Amplifier, Control
 from microrad.mission.tables.fine_pointing import FinePointing
 from microrad.mission.tables.mirror import Mirror
 
-VARIANTS = {
-    "given": "on the mission's mirror",
-    "comparison": "on the comparison model",
-    "no hysteresis": "without hysteresis",
+NAMES: dict[str, str] = {
+    Variant.GIVEN: "mission's mirror",
+    Variant.COMPARISON: "comparison model",
+    Variant.STRAIGHT: "no hysteresis",
+}
+"""Variants of the mirror as they stand in headings, legends and rows."""
+
+VARIANTS: dict[str, str] = {
+    Variant.GIVEN: "on the mission's mirror",
+    Variant.COMPARISON: "on the comparison model",
+    Variant.STRAIGHT: "without hysteresis",
 }
 """Variants of the mirror as they stand behind "it leaves"."""
 
@@ -52,14 +60,14 @@ def room(fine: FinePointingStudy) -> Room:
     """The distance of baseline and designs from the linear bound."""
     bound, baseline = fine.optimum_rad, fine.verified[0]
     nearest = min(fine.verified, key=lambda v: v.theory.radial_rms_rad)
-    lowest, given = nearest.theory.radial_rms_rad, baseline.simulated["given"].rms_rad
+    lowest, given = nearest.theory.radial_rms_rad, baseline.simulated[Variant.GIVEN].rms_rad
     return Room(
         baseline,
         nearest,
         at_baseline=max(0.0, 1.0 - bound / baseline.theory.radial_rms_rad),
         at_nearest=max(0.0, 1.0 - bound / lowest),
         with_hysteresis=max(0.0, 1.0 - bound / given),
-        gained=1.0 - fine.best.simulated["given"].rms_rad / given,
+        gained=1.0 - fine.best.simulated[Variant.GIVEN].rms_rad / given,
         holds=bound <= 1.01 * lowest,
     )
 
@@ -128,7 +136,7 @@ def _sentence(text: str) -> str:
 def result(fine: FinePointingStudy, required: float) -> list[str]:
     """What the best controller leaves, what makes it up, and how it stands against the baseline."""
     best, baseline = fine.best, fine.verified[0]
-    left = best.simulated["given"]
+    left = best.simulated[Variant.GIVEN]
     time = share_of_time(fine.quantile)
     met = "met" if best.meets(required) else "missed"
     sentences = [
@@ -142,7 +150,7 @@ def result(fine: FinePointingStudy, required: float) -> list[str]:
     failing = [v.design.name for v in fine.verified if not v.meets(required)]
     if failing and failing != [best.design.name]:
         sentences.append(f"The requirement is missed by {listed(failing)}.")
-    reference = baseline.simulated["given"]
+    reference = baseline.simulated[Variant.GIVEN]
     sentences.append(
         f"Against the best PI of the gain grid ({angle(reference.rms_rad)} rms, {angle(reference.quantile_rad)} at "
         f"{time}) the rms of {best.design.name} is {_lower(room(fine).gained)}."
@@ -162,7 +170,7 @@ def _dominant(fine: FinePointingStudy) -> str:
 
 
 def _other_variants(fine: FinePointingStudy, required_rad: float) -> list[str]:
-    others = {v: r for v, r in fine.best.simulated.items() if v != "given"}
+    others = {v: r for v, r in fine.best.simulated.items() if v != Variant.GIVEN}
     if not others:
         return []
     parts = [
@@ -188,7 +196,7 @@ def theory(fine: FinePointingStudy) -> list[str]:
         sentences.append(f"Theory does not allow {percent(WORTHWHILE)} there.")
     sentences += [settled] if r.at_nearest < SETTLED else []
     if r.with_hysteresis > r.at_baseline + 0.01:
-        simulated, gained = angle(r.baseline.simulated["given"].rms_rad), percent(max(r.gained, 0.0))
+        simulated, gained = angle(r.baseline.simulated[Variant.GIVEN].rms_rad), percent(max(r.gained, 0.0))
         sentences.append(
             f"On the mission's mirror hysteresis brings the baseline to {simulated}: undone entirely, it would "
             f"leave at most {percent(r.with_hysteresis)} to gain, of which {fine.best.design.name} takes {gained}."
@@ -204,7 +212,7 @@ def not_reliable(mirror: Mirror) -> list[str]:
 
 def short(fine: FinePointingStudy, required: float) -> list[str]:
     """The verdict in a line each: what is left, on a sine too, what theory leaves to gain, whether the stroke does."""
-    left, r = fine.best.simulated["given"], room(fine)
+    left, r = fine.best.simulated[Variant.GIVEN], room(fine)
     lines = [
         f"Fine pointing under vibration and noise: {fine.best.design.name} leaves {angle(left.quantile_rad)} radial at "
         f"{share_of_time(fine.quantile)} ({angle(left.rms_rad)} rms); {given(required)} is allowed."
@@ -230,7 +238,7 @@ def tracked(fine: FinePointingStudy, required_rad: float) -> str:
     """At which of the paper's sines the requirement is met on the mission's mirror, and by whom."""
     parts = []
     for freq in dict.fromkeys(s.freq_hz for s in fine.sines):
-        here = [s for s in fine.sines if s.variant == "given" and s.freq_hz == freq]
+        here = [s for s in fine.sines if s.variant == Variant.GIVEN and s.freq_hz == freq]
         met = [s.controller for s in here if s.quantile_rad <= required_rad]
         who = "by all controllers" if len(met) == len(here) else f"by {listed(met)}" if met else "by none"
         least = min(here, key=lambda s: s.quantile_rad)
@@ -356,7 +364,7 @@ def _theory_warnings(fine: FinePointingStudy) -> list[str]:
             f"{angle(budget.combined_rad)}, the whole is {angle(budget.full_rad)} rms"
         )
     for v in fine.verified:
-        straight, linear = v.simulated.get("no hysteresis"), v.theory.radial_rms_rad
+        straight, linear = v.simulated.get(Variant.STRAIGHT), v.theory.radial_rms_rad
         if straight is not None and abs(straight.rms_rad / linear - 1.0) > 0.1:
             found.append(
                 f"{v.design.name} leaves {angle(straight.rms_rad)} rms without hysteresis, {angle(linear)} in theory: "

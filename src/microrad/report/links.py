@@ -9,6 +9,7 @@ from microrad.link.partner_search import LONGEST_LOOK_S, Finding, Found, Scanned
 from microrad.link.pointing import OpenLoopPointing
 from microrad.link.study import LinkStudy
 from microrad.link.under_jitter import Performance, stated_outage
+from microrad.mirror import Variant
 from microrad.report import budget_views
 from microrad.report.plotting.figure import Figure
 from microrad.report.quantities import quantity
@@ -108,7 +109,7 @@ def performance_rows(cases: Sequence[Performance], best: str, costs: Sequence[Co
             "source": c.source,
             "controller": c.controller,
             "mirror": c.mirror,
-            "best": bool(best) and c.controller == best and c.mirror == "given",
+            "best": bool(best) and c.controller == best and c.mirror == Variant.GIVEN,
             "cells": cells(c) + of.get((c.source, c.controller, c.mirror), none),
         }
         for c in cases
@@ -152,7 +153,7 @@ def note(*, costs: bool) -> str:
 
 def performance(found: LinkPerformance, best: str, given: Performance | None) -> dict[str, Any]:
     """What the template needs of the link under the simulated residuals, and under the jitter of a mission's own."""
-    shown = [c for c in found.cases if c.mirror != "no hysteresis"]
+    shown = [c for c in found.cases if c.mirror != Variant.STRAIGHT]
     shown = shown if given is None else [given, *shown]
     return {
         "performance": performance_rows(shown, best, found.costs),

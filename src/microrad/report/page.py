@@ -11,6 +11,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from microrad.core.machine import versions
 from microrad.core.units import format_quantity
+from microrad.mirror import Variant
 from microrad.mission.file import assumptions, changed_from_shipped
 from microrad.mission.model import Source
 from microrad.report import (
@@ -194,7 +195,11 @@ def _left_out(study: Study) -> list[str]:
     if ahead is None or not ahead.corrected or not ahead.error_rad:
         return []
     lost = study.links.data.beam.fall
-    at = study.performance.case(FINE, study.fine_pointing.best.design.name, "given") if study.fine_pointing else None
+    at = (
+        study.performance.case(FINE, study.fine_pointing.best.design.name, Variant.GIVEN)
+        if study.fine_pointing
+        else None
+    )
     cost = ""
     if at is not None:
         error = lost.error_rad(at.outage_loss_db)

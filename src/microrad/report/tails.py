@@ -10,6 +10,7 @@ import numpy as np
 from microrad.core.arrays import Floats
 from microrad.loop.fine_loop.ensemble import bin_edges_rad, histogram_beyond, histogram_quantile
 from microrad.loop.fine_pointing import FinePointingStudy, Residual
+from microrad.mirror import Variant
 from microrad.report import fine_pointing_words as words
 from microrad.report.plotting.figure import Figure
 from microrad.report.plotting.sheet import BLACK, BLUE, GREEN, ORANGE, Legend, Line, Rule, Words, grid
@@ -18,8 +19,11 @@ from microrad.study.story import Study
 SIGMAS = 2.576  # 99 %, as of the interval of the rms
 SHARES = (0.5, 0.9, 0.99, 0.999, 0.9999, 0.99999)
 LEAST_BEYOND = 10.0  # independent samples that have to lie beyond a quantile for its interval to mean anything
-_STYLES = {"given": (BLUE, "-"), "comparison": (ORANGE, "--"), "no hysteresis": (GREEN, "-.")}
-_NAMES = {"given": "mission's mirror", "comparison": "comparison model", "no hysteresis": "no hysteresis"}
+_STYLES: dict[str, tuple[str, str]] = {
+    Variant.GIVEN: (BLUE, "-"),
+    Variant.COMPARISON: (ORANGE, "--"),
+    Variant.STRAIGHT: (GREEN, "-."),
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,9 +107,9 @@ def context(fine: FinePointingStudy, required_rad: float, figures: Sequence[Figu
 def shown_of(fine: FinePointingStudy) -> list[tuple[str, Residual]]:
     """The best controller on each variant of the mirror, and the baseline on the mission's."""
     best, baseline = fine.best, fine.verified[0]
-    rows = [(f"{best.design.name}, {_NAMES.get(v, v)}", left) for v, left in best.simulated.items()]
+    rows = [(f"{best.design.name}, {words.NAMES[v]}", left) for v, left in best.simulated.items()]
     if baseline.design.name != best.design.name:
-        rows.append((f"{baseline.design.name}, {_NAMES['given']}", baseline.simulated["given"]))
+        rows.append((f"{baseline.design.name}, {words.NAMES[Variant.GIVEN]}", baseline.simulated[Variant.GIVEN]))
     return rows
 
 
@@ -157,12 +161,12 @@ def tail(fine: FinePointingStudy, required_rad: float) -> Figure:
     sheet.legend = Legend("above", 3)
     columns: dict[str, Floats] = {}
     for variant, left in fine.best.simulated.items():
-        colour, dash = _STYLES.get(variant, (BLACK, ":"))
+        colour, dash = _STYLES[variant]
         radius, share = survival(left)
-        label = _NAMES.get(variant, variant)
+        label = words.NAMES[variant]
         panel.add(Line(radius * 1e6, share, colour, dash, label=label))
         columns |= {f"radial error, {label} (rad)": radius, f"share of the time beyond, {label}": share}
-    given = fine.best.simulated["given"]
+    given = fine.best.simulated[Variant.GIVEN]
     radius, share = survival(given)
     rayleigh = np.exp(-((radius / given.rms_rad) ** 2))
     panel.add(Line(radius * 1e6, rayleigh, BLACK, (1.0, 2.0), 0.9, "Rayleigh, same rms"))

@@ -7,6 +7,7 @@ from microrad.core.units import format_quantity
 from microrad.link.budget import DEEPEST_DB, POINT_AHEAD_LOSS, POINTING_LOSS
 from microrad.link.requirement import IMPOSSIBLE, outage_words
 from microrad.loop.paper_cases import Run
+from microrad.mirror import Variant
 from microrad.mission.file import changed_from_shipped
 from microrad.report import (
     budget_views,
@@ -222,7 +223,7 @@ def beyond_identified(study: Study, run: Run) -> str:
     if low + table.bias_v < table.drive_min_v or high + table.bias_v > table.drive_max_v:
         known = f"identified from {table.drive_min_v:.3g} to {table.drive_max_v:.3g} V"
         beyond.append(f"{low + table.bias_v:.3g} to {high + table.bias_v:.3g} V ({known})")
-    if run.mirror == "no hysteresis" or not beyond:
+    if run.mirror == Variant.STRAIGHT or not beyond:
         return ""
     return f"{run.trace.name}: the mirror model is extrapolated to a drive of {' and of '.join(beyond)}"
 

@@ -13,7 +13,7 @@ from microrad.link.requirement import IMPOSSIBLE, Requirement, Subject, derived_
 from microrad.link.under_jitter import Performance
 from microrad.loop import sine_run
 from microrad.loop.fine_pointing import FinePointingStudy
-from microrad.loop.paper_cases import PaperCases, Run
+from microrad.loop.paper_cases import PID, PID_WITH_INVERSE, PaperCases, Run
 from microrad.mirror import MirrorParts, Variant, hysteresis
 from microrad.mirror import summary as mirror_summary
 from microrad.mission.file import LinkFile
@@ -265,7 +265,7 @@ def _pairs(e: Evidence, controller: str) -> list[tuple[Run, Run]]:
 
 
 def _worse_claim(e: Evidence) -> Claim:
-    pairs = [p for p in _pairs(e, "PID") if p[0].freq_hz in e.cases.scenario.pid_frequencies_hz]
+    pairs = [p for p in _pairs(e, PID) if p[0].freq_hz in e.cases.scenario.pid_frequencies_hz]
     added = [_rms(a.trace.error_rad[a.trace.steady] - b.trace.error_rad[b.trace.steady]) for a, b in pairs]
     ours = "; ".join(
         f"{a.freq_hz:g} Hz: peak {b.trace.peak_rad * 1e6:.1f} → {a.trace.peak_rad * 1e6:.1f} µrad, "
@@ -294,9 +294,9 @@ def _drop_claims(e: Evidence) -> list[Claim]:
     given = {(r.controller, r.freq_hz): r for r in e.runs if r.mirror == Variant.GIVEN}
     claims = []
     for f, claimed in paper.CLAIMED_DROP_RAD.items():
-        if ("PID + inverse", f) not in given or ("PID", f) not in given:
+        if (PID_WITH_INVERSE, f) not in given or (PID, f) not in given:
             continue
-        before_run, after_run = given["PID", f], given["PID + inverse", f]
+        before_run, after_run = given[PID, f], given[PID_WITH_INVERSE, f]
         before, after = before_run.trace, after_run.trace
         drop = before.peak_rad - after.peak_rad
         ours = (
