@@ -620,6 +620,215 @@ def open_loop(plant, state, drive, output, bank):  # type: ignore[no-untyped-def
             bank[k, i] = state.bank[i, Z]
 
 
+# ------------------------------------------------------------------------------------------- many plants side by side
+# Plants in a row of memory, for the derivatives of a fit: they differ in their numbers alone, and share the drive.
+SIDE = 16
+
+
+class Plants(NamedTuple):
+    """SIDE plants of the same sizes as a `Plant` without rest: a last index by plant, but a first one for ``bouc_wen``.
+
+    ``used`` of them are wanted; Bouc-Wen elements of the others are not advanced.
+    """
+
+    step_s: float
+    used: int
+    feedback: bool
+    direct: bool
+    diagonal: Floats
+    coupling: Floats
+    B0: Floats
+    B1: Floats
+    E_held: Floats
+    E1: Floats
+    F: Floats
+    G: Floats
+    C: Floats
+    D: Floats
+    CE1: Floats
+    K: Floats
+    bouc_wen: Floats
+    operator: Floats
+    play_start: Indices
+    play_threshold: Floats
+    play_weight: Floats
+
+
+class PlantsState(NamedTuple):
+    """The memory of `Plants`, as that of `PlantState`; ``q``, ``now`` and ``widening`` are of the element at hand."""
+
+    x: Floats
+    x_next: Floats
+    u: Floats
+    y: Floats
+    bank: Floats
+    play: Floats
+    q: Floats
+    now: Floats
+    widening: Floats
+
+
+def plants(each: Sequence[Plant]) -> Plants:
+    """At most SIDE plants side by side, the last one repeated."""
+    filled = [*each, *[each[-1]] * (SIDE - len(each))]
+    shared = {"step_s", "used", "feedback", "direct", "bouc_wen", "play_start"}
+    values = {
+        name: np.stack([getattr(plant, name) for plant in filled], axis=-1)
+        for name in Plants._fields
+        if name not in shared
+    }
+    found = Plants(
+        step_s=each[0].step_s,
+        used=len(each),
+        feedback=any(plant.feedback for plant in each),
+        direct=any(plant.direct for plant in each),
+        bouc_wen=np.stack([plant.bouc_wen for plant in filled]),
+        play_start=each[0].play_start,
+        **values,
+    )
+    return by_rows(found)
+
+
+def plants_at_rest(p: Plants) -> PlantsState:
+    """A fresh state: everything zero."""
+    states, elements, actuators = len(p.diagonal), *p.G.shape[:2]
+    row = np.zeros(SIDE)
+    return PlantsState(
+        np.zeros((states, SIDE)),
+        np.zeros((states, SIDE)),
+        np.zeros(actuators),
+        np.zeros((len(p.C), SIDE)),
+        np.zeros((elements, 4, SIDE)),
+        np.zeros((len(p.play_threshold), SIDE)),
+        row,
+        row.copy(),
+        row.copy(),
+    )
+
+
+@_merge
+def _add_products(total, gain, row):  # type: ignore[no-untyped-def]
+    for r in range(SIDE):
+        total[r] += gain[r] * row[r]
+
+
+@_merge
+def _add_input(total, gain, value):  # type: ignore[no-untyped-def]
+    for r in range(SIDE):
+        total[r] += gain[r] * value
+
+
+@_merge
+def _set_pair(total, keep, x, cross, neighbour):  # type: ignore[no-untyped-def]
+    for r in range(SIDE):
+        total[r] = keep[r] * x[r] + cross[r] * neighbour[r]
+
+
+@_merge
+def _set_rows(target, source):  # type: ignore[no-untyped-def]
+    for r in range(SIDE):
+        target[r] = source[r]
+
+
+@_merge
+def _zero(row):  # type: ignore[no-untyped-def]
+    for r in range(SIDE):
+        row[r] = 0.0
+
+
+@_merge
+def _add_both(total, gain, row, other, second):  # type: ignore[no-untyped-def]
+    for r in range(SIDE):
+        total[r] += gain[r] * row[r] + other[r] * second[r]
+
+
+@_merge
+def _widen(widening, q, before, step_s, growth, limit):  # type: ignore[no-untyped-def]
+    for r in range(SIDE):
+        rate = min(abs(q[r] - before[r]) / step_s, limit[r])
+        widening[r] = growth[r] * rate if growth[r] != 0.0 else 0.0
+
+
+@_merge
+def _advance_play(total, play, q, threshold, weight, widening):  # type: ignore[no-untyped-def]
+    for r in range(SIDE):
+        half = threshold[r] + (widening[r] if threshold[r] > 0.0 else 0.0)
+        value = max(q[r] - half, min(q[r] + half, play[r]))
+        play[r] = value
+        total[r] += weight[r] * value
+
+
+@_inline
+def _elements_side_by_side(p, s, e):  # type: ignore[no-untyped-def]
+    """Output ``now`` of Bouc-Wen element e at the drive ``q``: as `_bouc_wen_element`, without a count."""
+    bank, q = s.bank, s.q
+    for r in range(p.used):
+        row = p.bouc_wen[r]
+        travel = q[r] - bank[e, Q, r]
+        rate = _clamp(travel / p.step_s, row[e, RATE_LIMIT])
+        h = _bouc_wen_advance(bank[e, H, r], travel, rate, row, e)
+        bank[e, H, r] = h
+        s.now[r] = row[e, D1] * (_near_exp(-row[e, D2] * rate) * (q[r] + row[e, BIAS]) - row[e, BIAS]) + h
+
+
+@_compile
+def open_loops(p, s, drive, output):  # type: ignore[no-untyped-def]
+    """`open_loop` for plants side by side: the same arithmetic, so that a search does not see which one it was.
+
+    Fills ``output`` (samples, outputs, SIDE) and leaves the state at the last sample.
+    """
+    states, outputs, actuators = p.E1.shape[0], p.C.shape[0], drive.shape[1]
+    elements, bank = p.bouc_wen.shape[1], s.bank
+    for k in range(drive.shape[0]):
+        for i in range(states):
+            x = s.x_next[i]
+            _set_pair(x, p.diagonal[i], s.x[i], p.coupling[i], s.x[i ^ 1])
+            if p.direct:
+                for a in range(actuators):
+                    _add_input(x, p.B0[i, a], s.u[a])
+            for e in range(bank.shape[0]):
+                _add_products(x, p.E_held[i, e], bank[e, Z])
+            if p.direct:
+                for a in range(actuators):
+                    _add_input(x, p.B1[i, a], drive[k, a])
+        for o in range(outputs):
+            _zero(s.y[o])
+            for i in range(states):
+                _add_products(s.y[o], p.C[o, i], s.x_next[i])
+            if p.direct:
+                for a in range(actuators):
+                    _add_input(s.y[o], p.D[o, a], drive[k, a])
+        for e in range(bank.shape[0]):
+            _zero(s.q)
+            for a in range(actuators):
+                _add_input(s.q, p.G[e, a], drive[k, a])
+            if p.feedback:
+                for i in range(states):
+                    _add_products(s.q, p.F[e, i], s.x_next[i])
+            if e < elements:
+                _elements_side_by_side(p, s, e)
+            else:
+                operator = p.operator[e - elements]
+                _widen(s.widening, s.q, bank[e, Q], p.step_s, operator[WIDENING], operator[WIDENING_LIMIT])
+                _zero(s.now)
+                for j in range(p.play_start[e - elements], p.play_start[e - elements + 1]):
+                    _advance_play(s.now, s.play[j], s.q, p.play_threshold[j], p.play_weight[j], s.widening)
+            _set_rows(bank[e, Q], s.q)
+            for r in range(SIDE):
+                bank[e, CHANGE, r] = s.now[r] - bank[e, Z, r]
+            _set_rows(bank[e, Z], s.now)
+        for i in range(states):
+            _set_rows(s.x[i], s.x_next[i])
+            for e in range(bank.shape[0]):
+                _add_products(s.x[i], p.E1[i, e], bank[e, CHANGE])
+        for o in range(outputs):
+            for e in range(bank.shape[0]):
+                _add_both(s.y[o], p.CE1[o, e], bank[e, CHANGE], p.K[o, e], bank[e, Z])
+            _set_rows(output[k, o], s.y[o])
+        for a in range(actuators):
+            s.u[a] = drive[k, a]
+
+
 class PlayPlant(NamedTuple):
     """The arrays of a `Plant` with Prandtl-Ishlinskii operators only and an Ad without rest.
 
