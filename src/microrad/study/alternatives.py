@@ -4,8 +4,6 @@ import math
 from dataclasses import dataclass
 from typing import Any, get_args
 
-import numpy as np
-
 from microrad import link, mirror
 from microrad.loop import paper_cases
 from microrad.mirror import Variant
@@ -69,7 +67,7 @@ def others(m: Mission, residual: paper_cases.Run) -> tuple[Reading, ...]:
                     runs = paper_cases.tracking_runs(cases, (Variant.GIVEN,))
                     run = paper_cases.worst(runs, q.residual_statistic)
                 left = paper_cases.residual_rad(q, as_read.conventions, run.trace)
-                margin_db = float(link.margin_of_error(link.of(as_read), np.array([left]))[0])
+                margin_db = float(link.margin_of_error(link.of(as_read), left))
             except ValueError as error:  # an unstable loop, a mirror without an inverse
                 found.append(Reading(key, given, other, math.nan, math.nan, str(error)))
             else:
