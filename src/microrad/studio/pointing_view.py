@@ -39,7 +39,6 @@ class PointingView:
     axes; empty for a mission without a beacon.
     """
 
-    file: LinkFile
     budget: OpenLoopPointing
     left: tuple[tuple[pointing.Allocation, pointing.Allocation], ...]
     ahead: PointAheadEffect | None
@@ -58,7 +57,7 @@ def view(file: LinkFile) -> PointingView:
     if p.reading is not None and p.reading.half_angle_rad > 0.0:
         half = p.reading.half_angle_rad
         left = tuple(zip(p.allocation(half, "rss"), p.allocation(half, "ecss-radial"), strict=True))
-    return PointingView(file, p, left, link_study.point_ahead(data))
+    return PointingView(p, left, link_study.point_ahead(data))
 
 
 def dials(draft: Draft) -> dict[str, tuple[Dial, ...]]:

@@ -5,8 +5,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, get_args
 
-import numpy as np
-
 from microrad import link, mirror
 from microrad.core import kept
 from microrad.loop import paper_cases
@@ -80,7 +78,7 @@ def _reading(m: Mission, key: str, other: str, residual: paper_cases.Run, parts:
             cases = paper_cases.of(as_read, mirror.of(as_read))
             run = parts.part(_largest, cases, as_read.requirement.residual_statistic)
         left = paper_cases.residual_rad(as_read.requirement, as_read.conventions, run.trace)
-        margin_db = float(link.margin_of_error(link.of(as_read), np.array([left]))[0])
+        margin_db = float(link.margin_of_error(link.of(as_read), left))
     except ValueError as error:  # an unstable loop, a mirror without an inverse
         return Reading(key, _given(m, key), other, math.nan, math.nan, str(error))
     return Reading(key, _given(m, key), other, left, margin_db)

@@ -20,7 +20,7 @@ from microrad.loop.fine_loop import ensemble
 from microrad.mirror import Variant
 from microrad.mirror import summary as mirror_summary
 from microrad.mission.file import MissionFile, with_contents
-from microrad.mission.model import Mission, Source
+from microrad.mission.model import Source
 from microrad.orbit import constellation
 from microrad.orbit import day as day_study
 from microrad.study import alternatives, contact_run, paper, pointing_cost, verdict
@@ -175,7 +175,11 @@ def run(
     left_rad = paper_cases.residual_rad(q, m.conventions, residual.trace)
     simulated = f"simulated: {residual.trace.name}, {q.residual_statistic} ({m.conventions.residual})"
     achieved = link.communication_budget(data, sources, pointing_error_rad=left_rad, given_source=simulated)
-    as_read = alternatives.others(m, residual, parts)
+    as_read, compared = alternatives.others(m, residual, parts), None
+    if m.mirror.comparison is not None:
+        other = paper_cases.worst(runs, q.residual_statistic, Variant.COMPARISON)
+        at_rad = paper_cases.residual_rad(q, m.conventions, other.trace)
+        compared = Comparison(other, float(link.margin_of_error(data, at_rad)))
 
     on_progress(1, 3, "claims of the paper")
     scan = parts.part(paper.scan, cases, on_progress=on_progress) if paper.applies(m.mirror) else None
@@ -207,7 +211,7 @@ def run(
         margins=margins,
         runs=runs,
         residual=residual,
-        comparison=compare(m, data, runs),
+        comparison=compared,
         other_readings=as_read,
         scan=scan,
         fine_pointing=fine,
@@ -260,7 +264,7 @@ def tornado(links: link_study.LinkStudy, error_rad: float) -> link.Tornado:
     m, sources = links.file.mission, links.file.sources
 
     def margin_db(data: link.DataLink) -> float:
-        return float(link.margin_of_error(data, np.array([error_rad]))[0])
+        return float(link.margin_of_error(data, error_rad))
 
     swings = link.swings(
         m, sources, link.LINK_TABLES, m.conventions.strehl, lambda moved: margin_db(link.of(moved)), link.lit
@@ -290,15 +294,6 @@ def delivered(
 
     (day, contact), plan = both(in_time, lambda: parts.part(constellation.run, links.file, loss) if planned else None)
     return day, contact, plan
-
-
-def compare(m: Mission, data: link.DataLink, runs: tuple[paper_cases.Run, ...]) -> Comparison | None:
-    """The link on the comparison model, when the mission has one."""
-    if m.mirror.comparison is None:
-        return None
-    run = paper_cases.worst(runs, m.requirement.residual_statistic, Variant.COMPARISON)
-    left_rad = paper_cases.residual_rad(m.requirement, m.conventions, run.trace)
-    return Comparison(run, float(link.margin_of_error(data, np.array([left_rad]))[0]))
 
 
 def margin_map(data: link.DataLink, sources: Mapping[str, Source]) -> MarginMap:
