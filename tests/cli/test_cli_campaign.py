@@ -12,6 +12,7 @@ import pytest
 from campaign_files import HEAD, POWER, written
 from command_line import listing
 from microrad.campaign import mending, run
+from microrad.campaign.file import load_campaign
 from microrad.campaign.ledger import Ledger
 from microrad.cli.campaign import campaigns
 from small_campaign import without_worker
@@ -94,6 +95,7 @@ def test_init_writes_a_campaign_and_its_mission_and_never_overwrites(call, folde
     shown = call("campaign", "init")
     assert (shown.code, sorted(listing(folder))) == (0, ["campaign.toml", "leo-geo.toml"])
     assert shown.out.endswith("Next: microrad campaign run campaign.toml\n")
+    assert len(load_campaign(folder / "campaign.toml").dimensions) == 4  # it can run
     assert "campaign.toml exists and is left as it is" in refused("campaign", "init")
 
 
