@@ -370,7 +370,10 @@ def running(folder, *args, browser=None):
         process.communicate()
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, getattr(signal, "SIGHUP", 1)])
+HANGUP = pytest.param(getattr(signal, "SIGHUP", 1), marks=pytest.mark.endurance)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, HANGUP])
 def test_the_address_opens_the_studio_and_a_signal_ends_it(file, number):
     before = listing(file.parent)
     with running(file.parent, "leo-geo.toml") as (process, url):
