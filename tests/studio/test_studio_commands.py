@@ -6,7 +6,6 @@ import json
 import re
 import shlex
 import shutil
-from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 
@@ -105,7 +104,7 @@ def test_a_change_of_the_budget_is_in_both(home, capsys):
 def test_a_study_gives_the_same_verdict_and_the_same_files(home, capsys, monkeypatch):
     monkeypatch.setattr(study, "run", once(study.run))
     monkeypatch.setattr(microrad, "run_study", study.run, raising=False)
-    monkeypatch.setattr(report, "drawing", lambda *args: nullcontext(Drawn))
+    monkeypatch.setattr(report, "draw", lambda *args: Drawn())
     action, again = Run(MISSION, Path("out")), Run(MISSION, Path("out again"), overwrite=True)
     out, _, _ = typed(command(action), capsys)
     assert executed(again.python).strip() == out[: out.index("\n\nout/report.html")]
