@@ -7,8 +7,9 @@ import pytest
 from scipy import integrate, optimize, stats
 
 from link_files import RECEIVERS, link_file, received_with
+from microrad import link
 from microrad.core.capacity import Code
-from microrad.link import model, receivers
+from microrad.link import receivers
 from microrad.mission.toml import MissionError
 
 RATE = 1e6
@@ -115,7 +116,7 @@ def test_a_mission_takes_the_gain_that_a_code_can_have_and_no_more(tmp_path, nam
     limit = 10.0 * math.log10(table.receiver.most_code_gain(table.data_rate_bit_s, table.wavelength_m))
     below = math.floor(limit * 100.0) / 100.0
     taken = link_file(tmp_path, received_with(name, code_gain=f"{below:.2f} dB")).mission
-    assert np.isfinite(model.receiver(taken).required_power_w(1e8))
+    assert np.isfinite(link.of(taken).receiver.required_power_w(1e8))
     with pytest.raises(MissionError) as refused:
         link_file(tmp_path, received_with(name, code_gain=f"{below + 0.01:.2f} dB"))
     (fault,) = refused.value.faults

@@ -107,7 +107,8 @@ BEFORE, NOW = range(2)  # of an actuator's target
 def _merge(function: Callable[..., Any]) -> Any:
     """Compiled by itself, and merged into its caller by the machine-code compiler: quick to compile and to call.
 
-    Not for a function of two whole records that is called at one place: their hundreds of numbers are arguments.
+    Not for a function of two whole records that is called at one place: their hundreds of numbers are arguments. Only
+    compiled functions may call it: from Python the process would end.
     """
     return _compile(function, forceinline=True, no_cpython_wrapper=True)
 
@@ -1212,7 +1213,7 @@ def closed_loop(plant, plant_state, loop, loop_state, reference, output, command
 
 
 # ------------------------------------------------------------------------------------------- equations by doubling
-@_merge
+@_compile
 def _product(left, right, out):  # type: ignore[no-untyped-def]
     """out = left right, row by row; out is another array than both."""
     for i in range(left.shape[0]):
