@@ -77,9 +77,7 @@ def pytest_configure(config):
 
 
 def pytest_collection_finish():
-    """What has been read stays to the end: each look for garbage would go through thousands of tests again."""
-    gc.freeze()
-    gc.set_threshold(50_000, 20, 50)  # as the command line
+    """From here on there may be garbage, which clusters need to have found: it ends what closed workers still hold."""
     gc.enable()
 
 
