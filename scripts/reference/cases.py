@@ -357,7 +357,12 @@ def campaign(rows: int, controller: str) -> Callable[[Place], Any]:
         place.run("campaign", "init", "campaign.toml")
         text = (place.folder / "campaign.toml").read_text(encoding="utf-8")
         loop = ('controller = "LQG"', f'controller = "{controller}"')
-        place.write("campaign.toml", changed(text, ("\nruns = 128 ", f"\nruns = {rows} "), loop))
+        sensor = (  # the paper's mission states its noise, that of `init` what its quad cell is made of
+            ("optical_sensor.quad_cell.thermal_noise", "optical_sensor.noise"),
+            ("0.02 pA/sqrt(Hz)", "0.5 urad"),
+            ("0.2 pA/sqrt(Hz)", "2 urad"),
+        )
+        place.write("campaign.toml", changed(text, ("\nruns = 128 ", f"\nruns = {rows} "), loop, *sensor))
         summary = place.json("campaign", "run", "campaign.toml")
         for cell in summary["cells"]:
             cell["tail"] = cell["tail"]["wanted"]  # its curve has a point for each level that a run has reached
