@@ -190,6 +190,8 @@ def test_bars_of_one_colour_are_one_trace_and_name_their_rows():
 def test_segments_and_histograms():
     strokes = segments(X, 0.0, Y, BLACK, 1.0)
     assert np.array_equal(strokes.y[:6], [0.0, 3.0, math.nan, 0.0, 4.0, math.nan], equal_nan=True)
+    many = segments(np.arange(999.0), 0.0, np.ones(999), BLACK, 1.0)
+    assert only(turned(one(many)))["x"][::3] == [*range(999)]  # none is left out: two of them would make a diagonal
     bars, outline = stairs(np.array([0.0, 1.0, 3.0]), np.array([2.0, 4.0]), SKY, BLUE)
     trace = turned(one(bars, outline, x={"title": "error (µrad)"}, y={"title": "rows (%)"}))["data"][0]
     assert (trace["y"], trace["x"], trace["width"]) == ([2, 4], [0.5, 2], [1, 2])

@@ -32,6 +32,7 @@ class Line:
     colour inside of a marker, ``edge`` that around it, both as the line unless given; "" is none. ``x_arms`` and
     ``y_arms`` are lengths (2, n) of error bars downwards and upwards. ``label`` stands in the legend, ``name`` is what
     a curve without a label is called when it is pointed at. A curve without points is an entry of the legend alone.
+    Of one that is ``whole``, or runs in ``steps``, no point is left out where it has many.
     """
 
     x: Floats
@@ -50,6 +51,7 @@ class Line:
     x_arms: Floats | None = None
     y_arms: Floats | None = None
     steps: bool = False
+    whole: bool = False
     clip: bool = True
 
     @property
@@ -270,7 +272,7 @@ def segments(x: Floats, low: Floats | float, high: Floats, colour: str, width: f
     """Upright strokes from low to high at each x, as one curve with gaps."""
     low = np.broadcast_to(low, x.shape)
     gaps = np.full(x.shape, np.nan)
-    return Line(np.repeat(x, 3), np.stack([low, high, gaps], axis=1).ravel(), colour, width=width)
+    return Line(np.repeat(x, 3), np.stack([low, high, gaps], axis=1).ravel(), colour, width=width, whole=True)
 
 
 def stairs(edges: Floats, values: Floats, colour: str, edge: str) -> tuple[Bars, Line]:
