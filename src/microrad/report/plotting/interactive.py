@@ -317,7 +317,7 @@ def _line(pen: Pen, line: Line) -> None:
     label, look = line.label, Look(line.colour, line.dash, line.marker)
     name = {"name": words(line.name)} if line.name and not label else {}
     outside = {} if line.clip else {"cliponaxis": False}
-    kept = np.arange(line.x.size) if line.steps or line.whole else thinned(line.x, line.y)
+    kept = line.kept
     if line.dash:
         style = {
             **_pen(line.colour, line.width, line.dash),

@@ -98,8 +98,8 @@ def layout(sheet: Sheet) -> Layout:
     """Places of everything; where panels leave no room for their data the sheet grows."""
     placed = [_panel(sheet, panel) for panel in sheet.panels]
     width, height = sheet.width * INCH, sheet.height * INCH
-    keys = [key for number, each in enumerate(placed) if (key := _key(each.panel.legend, each.panel, number))]
-    whole = _key(sheet.legend, *sheet.panels)
+    keys = [key for number, each in enumerate(placed) if (key := _key(each.panel.legend, [each.panel], number))]
+    whole = _key(sheet.legend, sheet.panels)
     left, top, right, bottom = PAD, PAD, width - PAD, height - PAD
     if sheet.heading:
         top += height_of(sheet.heading, TITLE) + PAD
@@ -127,17 +127,16 @@ def _panel(sheet: Sheet, panel: Panel) -> Placed:
         scales.limits(panel.y, "y", y_like),
         panel.x.labelled and (not sheet.share_x or panel.row == last),
         panel.y.labelled and (not sheet.share_y or panel.column == 0),
-        next((each.x.title for each in x_like[::-1] if each.x.title), "") if not panel.x.title else panel.x.title,
-        next((each.y.title for each in y_like if each.y.title), "") if not panel.y.title else panel.y.title,
+        panel.x.title or next((each.x.title for each in x_like[::-1] if each.x.title), ""),
+        panel.y.title or next((each.y.title for each in y_like if each.y.title), ""),
     )
 
 
 # ------------------------------------------------------------------------------------------------ legends
-def _key(legend: Legend | None, *panels_and_number: object) -> Key | None:
+def _key(legend: Legend | None, panels: Sequence[Panel], number: int | None = None) -> Key | None:
+    """The legend of panels with the size that it needs, of the one with a ``number`` or of a whole sheet."""
     if legend is None:
         return None
-    panels = [each for each in panels_and_number if isinstance(each, Panel)]
-    number = next((each for each in panels_and_number if isinstance(each, int)), None)
     entries = [_seen(each) for each in legend.only or labelled([mark for panel in panels for mark in panel.marks])]
     if not entries:
         return None

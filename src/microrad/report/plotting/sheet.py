@@ -11,8 +11,10 @@ from dataclasses import dataclass, field
 from typing import Any, Literal, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from microrad.core.arrays import Floats
+from microrad.report.plotting.palette import thinned
 
 # Okabe and Ito's palette: told apart by colour-blind readers. Line styles differ too, for print in grey.
 BLACK, ORANGE, SKY, GREEN, BLUE, VERMILION = "#000000", "#E69F00", "#56B4E9", "#009E73", "#0072B2", "#D55E00"
@@ -53,6 +55,11 @@ class Line:
     steps: bool = False
     whole: bool = False
     clip: bool = True
+
+    @property
+    def kept(self) -> NDArray[np.int64]:
+        """Places of the points that are drawn."""
+        return np.arange(self.x.size) if self.steps or self.whole else thinned(self.x, self.y)
 
     @property
     def inside(self) -> str:

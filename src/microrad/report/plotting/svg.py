@@ -171,7 +171,7 @@ def _bar(of: Placed) -> Iterator[str]:
 def _line(of: Placed, line: Line) -> list[str]:
     if not line.x.size:
         return []
-    kept = np.arange(line.x.size) if line.steps or line.whole else thinned(line.x, line.y)
+    kept = line.kept
     x, y = at(of, line.x, line.y)
     made = []
     if line.dash:
