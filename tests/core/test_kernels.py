@@ -1035,12 +1035,6 @@ def battery():
     for name, mirror in MIRRORS.items():
         actuators = mirror.B.shape[1]
         results[f"open loop: {name}"] = oracles.run_open_loop(mirror, STEP, make_drive(actuators, 40))[0]
-        p, output = (
-            kernels.plants([kernels.by_rows(oracles.build_plant(mirror, STEP)[0])]),
-            np.empty((40, len(mirror.C), kernels.SIDE)),
-        )
-        kernels.open_loops(p, kernels.plants_at_rest(p), make_drive(actuators, 40), output)
-        results[f"side by side: {name}"] = output[:, :, 0]
         loop = make_loop(mirror, "everything")
         run, _ = oracles.run_closed_loop(mirror, STEP, loop, make_reference(mirror, 20, STEP * 3))
         results[f"closed loop: {name}"] = np.hstack([run.output, run.command, run.drive])
@@ -1114,7 +1108,7 @@ def test_machine_code_of_two_processes_never_shares_a_file(tmp_path, monkeypatch
 # ------------------------------------------------------------------------------------------------ plants side by side
 
 
-@by_mirror
+@pytest.mark.parametrize("mirror", [m for m in MIRRORS.values() if m is not MIRRORS["static"]])
 def test_plants_side_by_side_run_as_each_by_itself(mirror):
     """Five that differ, in two pieces; the lanes behind them are filled with the last one."""
     drive = make_drive(mirror.B.shape[1], 300)
