@@ -1103,21 +1103,3 @@ def test_machine_code_of_two_processes_never_shares_a_file(tmp_path, monkeypatch
     assert second.load("another signature") == "code of another"
     assert first.load("one signature") is None  # lost from the index, so it is compiled again
     assert len(list(tmp_path.glob("*.nbc"))) == 2
-
-
-# ------------------------------------------------------------------------------------------------ plants side by side
-
-
-@pytest.mark.parametrize("mirror", [m for m in MIRRORS.values() if m is not MIRRORS["static"]])
-def test_plants_side_by_side_run_as_each_by_itself(mirror):
-    """Five that differ, in two pieces; the lanes behind them are filled with the last one."""
-    drive = make_drive(mirror.B.shape[1], 300)
-    scaled = [mirror._replace(C=mirror.C * k, E=mirror.E * (1 - k / 10), D=mirror.D / k) for k in (1, 2, 3, 4, 5)]
-    each = [oracles.build_plant(m, STEP)[0] for m in scaled]
-    p = kernels.plants([kernels.by_rows(plant) for plant in each])
-    state, output = kernels.plants_at_rest(p), np.full((300, len(mirror.C), kernels.SIDE), np.nan)
-    for part in (slice(0, 70), slice(70, 300)):
-        kernels.open_loops(p, state, drive[part], output[part])
-    for j, one in enumerate(scaled):
-        close(output[:, :, j], oracles.run_open_loop(one, STEP, drive)[0], 1e-13)
-    assert np.ptp(output[-1, 0, :5]) > 0.01 * np.max(np.abs(output[-1]))

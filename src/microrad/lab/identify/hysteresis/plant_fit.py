@@ -27,7 +27,6 @@ Hold = Literal["linear", "band-limited"]
 _ROUGH = 1e-8  # relative change of cost or place from which a search goes on by central differences
 _DIFFERENCE = 1e-5
 _SLICE = 2_000_000
-_WORTHWHILE = 6  # plants from which on they are quicker side by side, filled up with idle ones, than one by one
 _FAR = 1e3  # times the largest output: a model further off is as good as none
 
 
@@ -228,11 +227,12 @@ class Problem:
         self.far = _FAR * max(largest)
         self.measured = np.concatenate([r.weight * t.ravel() for r, t in zip(self.runs, self.targets, strict=True)])
         # A point is asked for up to three times: by the search, by the derivatives there and by the report.
-        self.simulated = lru_cache(maxsize=4)(self._simulate)
+        self.simulated = lru_cache(maxsize=2 * self.scale.size + 2)(self._simulate)
 
     def outputs(self, values: FloatArray) -> list[FloatArray]:
         """Used outputs of each run without their nuisance, weighted."""
-        plants = self._discrete(values)
+        model = self.structure.build(values)
+        plants = {step: mirror.discretise(model, step) for step in {run.step_s for run in self.runs}}
         return [run.weight * without(run.nuisance, simulate(plants[run.step_s], run)[run.first :]) for run in self.runs]
 
     def modelled(self, point: FloatArray) -> FloatArray:
@@ -244,21 +244,8 @@ class Problem:
             parts = self.outputs(np.frombuffer(point) * self.scale)
         except ValueError:
             return np.full(self.size, self.far)
-        return self._within(np.concatenate([part.ravel() for part in parts]))
-
-    def _within(self, whole: FloatArray) -> FloatArray:
+        whole = np.concatenate([part.ravel() for part in parts])
         return np.where(np.abs(whole) < self.far, whole, self.far)  # nan and inf too
-
-    def _discrete(self, values: FloatArray) -> dict[float, kernels.Plant]:
-        model = self.structure.build(values)
-        return {step: mirror.discretise(model, step) for step in {run.step_s for run in self.runs}}
-
-    def _plants(self, point: FloatArray) -> dict[float, kernels.Plant]:
-        """The plant by step at a scaled point; none where it cannot be stepped."""
-        try:
-            return self._discrete(point * self.scale)
-        except ValueError:
-            return {}
 
     def residual(self, point: FloatArray) -> FloatArray:
         """Modelled less measured, weighted."""
@@ -266,47 +253,32 @@ class Problem:
 
     def slopes(self, point: FloatArray) -> FloatArray:
         """Derivative of the residual by differences to one side, for the way to an optimum: half the simulations."""
-        steps = np.where(point + _DIFFERENCE <= self.upper, _DIFFERENCE, -_DIFFERENCE)
-        beside = self.several(list(point + np.diag(steps)))
-        return np.asarray((np.column_stack(beside) - self.modelled(point)[:, None]) / steps)
+        here = self.modelled(point)
+
+        def column(i: int) -> FloatArray:
+            step = np.zeros(point.size)
+            step[i] = _DIFFERENCE if point[i] + _DIFFERENCE <= self.upper[i] else -_DIFFERENCE
+            return np.asarray((self.modelled(point + step) - here) / step[i])
+
+        return _columns(column, point.size)
 
     def jacobian(self, point: FloatArray) -> FloatArray:
         """Derivative of the residual by central differences."""
-        up = np.minimum(point + _DIFFERENCE, self.upper) - point
-        down = point - np.maximum(point - _DIFFERENCE, self.lower)
-        found = self.several([*(point + np.diag(up)), *(point - np.diag(down))])
-        above, below = np.column_stack(found[: point.size]), np.column_stack(found[point.size :])
-        return np.asarray((above - below) / (up + down))
 
-    def several(self, points: Sequence[FloatArray]) -> list[FloatArray]:
-        """`modelled` at each of many points, on all cores and several plants at a time."""
-        models = [self._plants(point) for point in points]
-        together = [i for i, of in enumerate(models) if of and all(p.rest.value.size == 0 for p in of.values())]
-        parts = [together[at : at + kernels.SIDE] for at in range(0, len(together), kernels.SIDE)]
-        parts = [part for part in parts if len(part) >= _WORTHWHILE]
-        jobs = [
-            partial(simulate_several, [models[i][run.step_s] for i in part], run) for part in parts for run in self.runs
-        ]
-        found = iter(in_threads(jobs))
-        whole: dict[int, FloatArray] = {}
-        for part in parts:
-            outputs = [next(found) for _ in self.runs]
-            whole |= {i: self._within(np.concatenate([o[j] for o in outputs])) for j, i in enumerate(part)}
-        alone = [i for i in range(len(points)) if i not in whole]
-        others = in_threads([partial(self.modelled, points[i]) for i in alone])
-        whole |= dict(zip(alone, others, strict=True))
-        return [whole[i] for i in range(len(points))]
+        def column(i: int) -> FloatArray:
+            step = np.zeros(point.size)
+            up = min(point[i] + _DIFFERENCE, self.upper[i]) - point[i]
+            down = point[i] - max(point[i] - _DIFFERENCE, self.lower[i])
+            step[i] = up + down
+            above, below = point + (up / step[i]) * step, point - (down / step[i]) * step
+            return np.asarray((self.modelled(above) - self.modelled(below)) / step[i])
+
+        return _columns(column, point.size)
 
 
-def simulate_several(plants: Sequence[kernels.Plant], run: Run) -> list[FloatArray]:
-    """Used output of each plant over a run, from rest, without its nuisance, weighted and in one row."""
-    p, width = kernels.plants(plants), len(plants[0].outputs)
-    state, output = kernels.plants_at_rest(p), np.empty((run.drive.shape[0], width, kernels.SIDE))
-    for begin in range(0, run.drive.shape[0], _SLICE // kernels.SIDE):
-        part = slice(begin, begin + _SLICE // kernels.SIDE)
-        kernels.open_loops(p, state, run.drive[part], output[part])
-    used = output[:: run.stride][run.first :]
-    return [run.weight * without(run.nuisance, used[:, :, j].copy()).ravel() for j in range(len(plants))]
+def _columns(column: Callable[[int], FloatArray], count: int) -> FloatArray:
+    """Columns side by side, made on all cores."""
+    return np.column_stack(in_threads([partial(column, i) for i in range(count)]))
 
 
 def fit_plant(
