@@ -18,7 +18,9 @@ from scipy.linalg import block_diag, expm
 from scipy.signal import StateSpace, lsim
 
 import oracles
-from microrad.core import kernels
+from microrad.core import kernels, lti
+from microrad.mirror import model
+from microrad.mirror.hysteresis import Play
 from oracles import BoucWen, Operator, compose
 from places import TESTS
 
@@ -805,6 +807,23 @@ def test_one_compiled_loop_serves_all_sizes_but_the_unrolled_one():
     plants = {name: numba.typeof(oracles.build_plant(mirror, STEP)[0]) for name, mirror in MIRRORS.items()}
     unrolled = plants.pop("five states, unrolled")
     assert set(plants.values()) == {plants["static"]} != {unrolled}
+
+
+def test_a_mirror_that_is_simulated_often_is_unrolled_on_one_axis_and_answers_the_same():
+    """Loops of any size take twice as long; those of several axes are not compiled for each fit."""
+    system = lti.StateSpace(np.diag([-900.0, -4000.0]), np.ones((2, 1)), np.ones((1, 2)), np.zeros((1, 1)))
+    mirror = model.assemble("two states", "cascade", system, Play((0.0, 0.4), (5e-5, 2e-5)))
+    once, often = (model.discretise(mirror, STEP, often=often) for often in (False, True))
+    assert (type(once.outputs), type(often.outputs)) == (np.ndarray, tuple)
+    drive, answers = make_drive(1, 60), []
+    for plant in (once, often):
+        output = np.empty((60, 1))
+        kernels.open_loop(plant, model.at_rest(plant), drive, output, np.empty((60, 0)))
+        answers.append(output)
+    assert_allclose(answers[1], answers[0], rtol=1e-13, atol=1e-13 * np.max(np.abs(answers[0])))
+    assert np.ptp(answers[0]) > 0.0
+    several = model.discretise(model.combine(mirror, mirror), STEP, often=True)
+    assert isinstance(several.outputs, np.ndarray)
 
 
 def test_the_loop_cases_reach_every_limit():

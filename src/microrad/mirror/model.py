@@ -207,8 +207,11 @@ def combine(*mirrors: Mirror) -> Mirror:
     )
 
 
-def discretise(mirror: Mirror, step_s: float) -> kernels.Plant:
+def discretise(mirror: Mirror, step_s: float, *, often: bool = False) -> kernels.Plant:
     """The mirror for a fixed step with u and z linear over it.
+
+    One that is simulated ``often``, as in a fit, has unrolled loops on one axis, whatever its size: they are compiled
+    once for it, in a second or two, and take half of the time.
 
     Raises ValueError, naming a step that would do, when q = F x closes a loop through one step that is no contraction.
     """
@@ -224,7 +227,8 @@ def discretise(mirror: Mirror, step_s: float) -> kernels.Plant:
             f"use a step of at most {usable:.3g} s, or move the mean slope of the hysteresis into A"
         )
     B0, E0, B1, E1 = start[:, :m], start[:, m:], end[:, :m], end[:, m:]
-    return plant_arrays(step_s, (Ad, B0, B1, E0, E1), mirror)
+    one_axis = mirror.actuators == mirror.axes == 1
+    return plant_arrays(step_s, (Ad, B0, B1, E0, E1), mirror, unroll=unrolled(mirror) or (often and one_axis))
 
 
 def unrolled(mirror: Mirror) -> bool:
@@ -242,7 +246,7 @@ def _sizes(mirror: Mirror) -> dict[str, int]:
     }
 
 
-def plant_arrays(step_s: float, discrete: tuple[Floats, ...], mirror: Mirror) -> kernels.Plant:
+def plant_arrays(step_s: float, discrete: tuple[Floats, ...], mirror: Mirror, *, unroll: bool) -> kernels.Plant:
     """The kernel's arrays from the discrete matrices Ad, B0, B1, E0, E1 and the mirror's F, G, C, D, K and bank."""
     Ad, B0, B1, E0, E1 = discrete
     n, odd = Ad.shape[0], Ad.shape[0] % 2  # the kernel pairs the states: an odd one gets an idle partner
@@ -258,7 +262,7 @@ def plant_arrays(step_s: float, discrete: tuple[Floats, ...], mirror: Mirror) ->
 
     plant = kernels.Plant(
         step_s=float(step_s),
-        **kernels.counts(unrolled(mirror), **_sizes(mirror)),
+        **kernels.counts(unroll, **_sizes(mirror)),
         feedback=bool(np.any(mirror.F)),
         direct=bool(np.any(mirror.B) or np.any(mirror.D)),
         diagonal=np.diag(Ad).copy(),

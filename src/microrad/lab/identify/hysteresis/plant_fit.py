@@ -232,7 +232,7 @@ class Problem:
     def outputs(self, values: FloatArray) -> list[FloatArray]:
         """Used outputs of each run without their nuisance, weighted."""
         model = self.structure.build(values)
-        plants = {step: mirror.discretise(model, step) for step in {run.step_s for run in self.runs}}
+        plants = {step: mirror.discretise(model, step, often=True) for step in {run.step_s for run in self.runs}}
         return [run.weight * without(run.nuisance, simulate(plants[run.step_s], run)[run.first :]) for run in self.runs]
 
     def modelled(self, point: FloatArray) -> FloatArray:
