@@ -30,8 +30,6 @@ from microrad.cli.frame import (
 )
 from microrad.core.folder import write_whole
 
-# Everything else is imported inside the commands: numpy, numba and pydantic take longer to load than help may take.
-
 __all__ = ["app", "main"]
 
 

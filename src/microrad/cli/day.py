@@ -19,7 +19,6 @@ from microrad.cli.frame import (
     width,
 )
 
-# Everything else is imported inside the commands: it takes longer to load than help may take.
 if TYPE_CHECKING:
     from microrad.link.study import LinkStudy
 
@@ -78,7 +77,7 @@ def contacts(
     if as_csv:
         return Outcome(day_views.csv_text(day), code)
     if as_html:
-        from microrad.report import single_pages  # drawing takes longer to load than a table needs
+        from microrad.report import single_pages
 
         return Outcome(single_pages.day(day, links), code)
     return Outcome(day_views.text(day, width()), code)

@@ -24,7 +24,6 @@ from microrad.cli.frame import (
 )
 from microrad.core.folder import read_bytes, write_whole
 
-# Everything else is imported inside the commands: it takes longer to load than help may take.
 if TYPE_CHECKING:
     from microrad.export.choice import Choice
     from microrad.mission.file import MissionFile

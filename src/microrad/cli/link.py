@@ -21,7 +21,6 @@ from microrad.cli.frame import (
     width,
 )
 
-# Everything else is imported inside the commands: it takes longer to load than help may take.
 if TYPE_CHECKING:
     from microrad.mission.file import LinkFile
 
@@ -80,7 +79,7 @@ def budget(  # noqa: PLR0913, PLR0917  each is an option
     if as_csv:
         return Outcome(budget_views.csv_text(study, solution), code)
     if as_html:
-        from microrad.report import single_pages  # drawing takes longer to load than a table needs
+        from microrad.report import single_pages
 
         return Outcome(single_pages.budget(study, solution), code)
     return Outcome(budget_views.text(study, width(), verbose=verbose, solution=solution), code)

@@ -21,7 +21,6 @@ from microrad.cli.frame import (
     width,
 )
 
-# Everything else is imported inside the commands: it takes longer to load than help may take.
 if TYPE_CHECKING:
     from microrad.loop.fine_pointing import Design, Outlook, Scene
 
