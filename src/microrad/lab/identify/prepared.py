@@ -198,6 +198,17 @@ def _inflation(residual: FloatArray) -> float:
     return max(1.0, float(2 * pairs[:last].sum() - 1))
 
 
+def rounded_to_error(value: float, standard_error: float) -> str:
+    """A fitted value as it is printed: no digits beyond the two of its standard error, and five at most.
+
+    Further digits would tell nothing and differ between processors. A value without error (nan or 0) has five digits.
+    """
+    if 0.0 < standard_error < math.inf:
+        decimals = 1 - math.floor(math.log10(float(f"{standard_error:.2g}")))
+        value = round(value, decimals) + 0.0  # no -0
+    return f"{value:.5g}"
+
+
 def correlation(covariance: FloatArray) -> FloatArray:
     """Correlation matrix of a covariance."""
     deviation = np.sqrt(np.diag(covariance)) + 1e-300
