@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from microrad.core import lti
+from microrad.core.arrays import Floats
 from microrad.lab.identify.hysteresis.plant_fit import Parameter, Structure
-from microrad.lab.identify.prepared import FloatArray
 from microrad.mirror import model as mirror
 from microrad.mirror.hysteresis import NO_CREEP, BoucWen, Creep, Play, slow_gain
 from microrad.mirror.model import Mirror
@@ -86,7 +86,7 @@ def hysteretic_oscillator(
     the search begins (kg, N s/m, N/m, N/m, 1/m, 1/m); drive in N, output in m.
     """
 
-    def build(values: FloatArray) -> Mirror:
+    def build(values: Floats) -> Mirror:
         m, c, k, epsilon, alpha, beta = (float(v) for v in values)
         return Mirror(
             name="hysteretic oscillator",
@@ -127,7 +127,7 @@ class Axis(NamedTuple):
 class AxisStructure(Structure):
     """A `Structure` of one axis, whose parts can be had by themselves."""
 
-    parts: Callable[[FloatArray], Axis]
+    parts: Callable[[Floats], Axis]
 
 
 def one_axis(
@@ -156,10 +156,10 @@ def one_axis(
     first, second = len(hysteresis), len(hysteresis) + len(lags)
     composition = "static" if linear is None else "cascade"
 
-    def parts(values: FloatArray) -> Axis:
+    def parts(values: Floats) -> Axis:
         return Axis(make_model(values[:first]), make_creep(values[first:second]), make_linear(values[second:]))
 
-    def build(values: FloatArray) -> Mirror:
+    def build(values: Floats) -> Mirror:
         axis = parts(values)
         system = None if axis.linear is None else axis.linear.system
         return mirror.assemble(name, composition, system, axis.model, axis.creep)
@@ -169,7 +169,7 @@ def one_axis(
 
 def _bouc_wen_part(
     model: BoucWen, free: Sequence[str], admissible: bool
-) -> tuple[tuple[Parameter, ...], Callable[[FloatArray], BoucWen]]:
+) -> tuple[tuple[Parameter, ...], Callable[[Floats], BoucWen]]:
     fastest = model.rate_limit_v_s if math.isfinite(model.rate_limit_v_s) else 1.0
     all_of_them = (
         Parameter("d1", "rad/V", model.d1_rad_v),
@@ -189,7 +189,7 @@ def _bouc_wen_part(
         share = min(-model.epsilon_rad_v * model.reversal_swing / model.d1_rad_v, 0.95)
         used[1] = Parameter("epsilon over its limit", "", share, -10.0, 1.0, 0.1)
 
-    def make(values: FloatArray) -> BoucWen:
+    def make(values: Floats) -> BoucWen:
         at = {p.name.split()[0]: float(v) for p, v in zip(used, values, strict=True)}
         alpha = at["alpha"]
         found = replace(
@@ -211,7 +211,7 @@ def _bouc_wen_part(
     return tuple(used), make
 
 
-def _play_part(model: Play, free: Sequence[str]) -> tuple[tuple[Parameter, ...], Callable[[FloatArray], Play]]:
+def _play_part(model: Play, free: Sequence[str]) -> tuple[tuple[Parameter, ...], Callable[[Floats], Play]]:
     total = abs(slow_gain(model)) or 1.0
     count = len(model.thresholds_v)
     rising = math.copysign(1.0, slow_gain(model))
@@ -225,21 +225,21 @@ def _play_part(model: Play, free: Sequence[str]) -> tuple[tuple[Parameter, ...],
         most = travel / (model.rate_limit_v_s if math.isfinite(model.rate_limit_v_s) else 1.0)
         parameters.append(Parameter("widening", "s", max(model.widening_s, 0.01 * most), 0.0, 3 * most, 0.1 * most))
 
-    def make(values: FloatArray) -> Play:
+    def make(values: Floats) -> Play:
         widening = float(values[count]) if len(values) > count else model.widening_s
         return replace(model, weights_rad_v=tuple(float(w) for w in values[:count]), widening_s=widening)
 
     return tuple(parameters), make
 
 
-def _creep_part(creep: Creep, gain: float) -> tuple[tuple[Parameter, ...], Callable[[FloatArray], Creep]]:
+def _creep_part(creep: Creep, gain: float) -> tuple[tuple[Parameter, ...], Callable[[Floats], Creep]]:
     if not creep.weights_rad_v:
         return (), lambda _: creep
     parameter = Parameter(
         "creep", "rad/V", creep.weights_rad_v[0], size=max(abs(creep.weights_rad_v[0]), 1e-3 * abs(gain))
     )
 
-    def make(values: FloatArray) -> Creep:
+    def make(values: Floats) -> Creep:
         return replace(creep, weights_rad_v=(float(values[0]),) * len(creep.time_constants_s))
 
     return (parameter,), make
@@ -247,7 +247,7 @@ def _creep_part(creep: Creep, gain: float) -> tuple[tuple[Parameter, ...], Calla
 
 def _linear_part(
     linear: LinearPoles | None, free: bool
-) -> tuple[tuple[Parameter, ...], Callable[[FloatArray], LinearPoles | None]]:
+) -> tuple[tuple[Parameter, ...], Callable[[Floats], LinearPoles | None]]:
     if linear is None or not free:
         return (), lambda _: linear
     parameters: list[Parameter] = []
@@ -258,7 +258,7 @@ def _linear_part(
                 low, high = _DAMPING if kind == "pole" else (-_DAMPING[1], _DAMPING[1])
                 parameters.append(Parameter(f"{kind} {number} damping", "", damping, low, high, 0.1 * abs(damping)))
 
-    def make(values: FloatArray) -> LinearPoles:
+    def make(values: Floats) -> LinearPoles:
         at = iter(values)
 
         def moved(roots: Roots) -> Roots:
@@ -270,7 +270,7 @@ def _linear_part(
     return tuple(parameters), make
 
 
-def propagated(quantity: Callable[[FloatArray], FloatArray], values: FloatArray, covariance: FloatArray) -> FloatArray:
+def propagated(quantity: Callable[[Floats], Floats], values: Floats, covariance: Floats) -> Floats:
     """Standard errors of what is computed from parameters with this covariance, to first order."""
     deviation = np.sqrt(np.diag(covariance))
     columns = []

@@ -6,19 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from microrad.core.arrays import Floats
 from microrad.lab.identify.hysteresis.bouc_wen import BoucWenFit, rising
 from microrad.lab.identify.hysteresis.joint import JointFit
 from microrad.lab.identify.hysteresis.prandtl_ishlinskii import PrandtlIshlinskiiFit
-from microrad.lab.identify.ladder.predictions import Fit, Prediction, Score
-from microrad.lab.identify.prepared import (
-    FloatArray,
-    Prepared,
-    Units,
-    colour_inflation,
-    loop_rates,
-    noisiness,
-    one_rate_only,
-)
+from microrad.lab.identify.records import Prepared, Units, colour_inflation, loop_rates, noisiness, one_rate_only
+from microrad.lab.identify.selection.predictions import Fit, Prediction, Score
 from microrad.lab.recording import Recording
 from microrad.mirror.hysteresis import BoucWen, slow_gain
 
@@ -179,8 +172,8 @@ class ResidualTest:
 
     samples: int
     bound: float
-    autocorrelation: FloatArray
-    cross_correlation: FloatArray
+    autocorrelation: Floats
+    cross_correlation: Floats
 
     @property
     def outside(self) -> tuple[float, float]:
@@ -201,7 +194,7 @@ class ResidualTest:
         return self.outside[1] <= 0.1
 
 
-def residual_test(residual: FloatArray, drive: FloatArray) -> ResidualTest:
+def residual_test(residual: Floats, drive: Floats) -> ResidualTest:
     """Whiteness of a residual and its correlation with the drive (Ljung, System Identification, 1999, sec. 16.6).
 
     For the cross-correlation both are whitened by an autoregression (order 20) of the residual, so that the bound
@@ -216,14 +209,14 @@ def residual_test(residual: FloatArray, drive: FloatArray) -> ResidualTest:
     return ResidualTest(n, bound, auto, _correlations(white, input_, _LAGS))
 
 
-def _correlations(a: FloatArray, b: FloatArray, lags: int) -> FloatArray:
+def _correlations(a: Floats, b: Floats, lags: int) -> Floats:
     """Correlation coefficients of a with b, k samples earlier, for k from 0."""
     size = math.sqrt(float(a @ a) * float(b @ b)) + 1e-300
     last = min(lags, a.size - 1)
     return np.array([float(a[k:] @ b[: b.size - k]) / size for k in range(last + 1)])
 
 
-def _autoregression(x: FloatArray, order: int) -> FloatArray:
+def _autoregression(x: Floats, order: int) -> Floats:
     """Coefficients (1, a1, ...) that whiten x, by Yule and Walker."""
     from scipy.linalg import solve_toeplitz  # here, to keep start-up cheap
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from microrad.core import lti
-from microrad.lab.bench.truth import (
+from microrad.lab.bench.mirrors import (
     EQ2_DENOMINATOR,
     EQ2_NUMERATOR,
     EQ3,

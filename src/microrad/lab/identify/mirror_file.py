@@ -12,14 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from microrad.core import kernels
-from microrad.lab.identify.hysteresis.axis import LinearPoles, propagated
+from microrad.core.arrays import Floats
 from microrad.lab.identify.hysteresis.bouc_wen import PARAMETERS, BoucWenFit, turned_over
 from microrad.lab.identify.hysteresis.joint import JointFit
 from microrad.lab.identify.hysteresis.prandtl_ishlinskii import PrandtlIshlinskiiFit
-from microrad.lab.identify.ladder.choice import Identification
-from microrad.lab.identify.ladder.doubts import falling, fit_warnings
-from microrad.lab.identify.ladder.predictions import Fit
-from microrad.lab.identify.prepared import FloatArray, IdentificationError, centred, correlation, prepare
+from microrad.lab.identify.hysteresis.structures import LinearPoles, propagated
+from microrad.lab.identify.records import IdentificationError, centred, correlation, prepare
+from microrad.lab.identify.selection.choice import Identification
+from microrad.lab.identify.selection.predictions import Fit
+from microrad.lab.identify.selection.warnings import falling, fit_warnings
 from microrad.mirror.hysteresis import BoucWen, Play, scaled, slow_gain
 
 _LOST = 100.0  # relative standard error of a value that is as good as held
@@ -118,7 +119,7 @@ def _joint(fit: JointFit, identification: Identification, source: str) -> list[s
     turned = -1.0 if falling(fit) else 1.0
     if isinstance(fit.model, BoucWen):
 
-        def values(at: FloatArray) -> FloatArray:
+        def values(at: Floats) -> Floats:
             return np.asarray(_SCALES * _bouc_wen_numbers(_upright(fit, fit.structure.parts(at).model)))
 
         errors = propagated(values, fit.fit.values, fit.fit.covariance)
@@ -146,7 +147,7 @@ _UNITS = ("mrad/V", "s/V", "mrad/V", "s/V", "1/V", "1/V", "1/V", "1/V", "")
 _SCALES = np.array([1e3, 1.0, 1e3, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0])
 
 
-def _bouc_wen(values: FloatArray, errors: FloatArray, free: Sequence[str], source: str) -> list[str]:
+def _bouc_wen(values: Floats, errors: Floats, free: Sequence[str], source: str) -> list[str]:
     """The table of the numbers and errors as the file counts them; gamma, eta and exponent only where they are free."""
     lines = ["[bouc_wen]"]
     for key, unit, value, error in zip(_BOUC_WEN_KEYS, _UNITS, values, errors, strict=True):
@@ -158,7 +159,7 @@ def _bouc_wen(values: FloatArray, errors: FloatArray, free: Sequence[str], sourc
     return lines
 
 
-def _bouc_wen_numbers(m: BoucWen | Play) -> FloatArray:
+def _bouc_wen_numbers(m: BoucWen | Play) -> Floats:
     assert isinstance(m, BoucWen)
     return np.array([*m.row[:6], m.gamma_1_v, m.eta_1_v, m.exponent])
 
@@ -260,14 +261,14 @@ def _uncertainty(fit: Fit, identification: Identification, source: str) -> list[
     ]
 
 
-def _joint_covariance(fit: JointFit) -> tuple[dict[str, float], FloatArray]:
+def _joint_covariance(fit: JointFit) -> tuple[dict[str, float], Floats]:
     """Numbers of the mirror file (SI) by their keys, and their covariance, parameters at a bound being held."""
     parameters, at = fit.structure.parameters, fit.fit.values
     bounds = [(p.lower, p.upper) for p in parameters]
     distance = np.abs(np.array(bounds) - at[:, None]).min(axis=1)
     scale = np.array([p.scale for p in parameters])
 
-    def values(where: FloatArray) -> FloatArray:
+    def values(where: Floats) -> Floats:
         return np.array(list(_numbers(fit, where).values()))
 
     steps = np.diag(1e-6 * scale)
@@ -276,7 +277,7 @@ def _joint_covariance(fit: JointFit) -> tuple[dict[str, float], FloatArray]:
     return _numbers(fit, at), np.asarray(jacobian @ covariance @ jacobian.T)
 
 
-def _numbers(fit: JointFit, at: FloatArray) -> dict[str, float]:
+def _numbers(fit: JointFit, at: Floats) -> dict[str, float]:
     axis = fit.structure.parts(at)
     model = _upright(fit, axis.model)
     found: dict[str, float] = {}
@@ -294,7 +295,7 @@ def _numbers(fit: JointFit, at: FloatArray) -> dict[str, float]:
     return found
 
 
-def _play_covariance(fit: PrandtlIshlinskiiFit, identification: Identification) -> tuple[dict[str, float], FloatArray]:
+def _play_covariance(fit: PrandtlIshlinskiiFit, identification: Identification) -> tuple[dict[str, float], Floats]:
     """The standard errors with the correlation that the play states have over the fitted samples."""
     pairs = zip(identification.recordings, identification.predictions[0], strict=True)
     heads = [replace(r, drive=r.drive[: p.split], output=r.output[: p.split]) for r, p in pairs if p.split > p.start]
@@ -311,7 +312,7 @@ def _play_covariance(fit: PrandtlIshlinskiiFit, identification: Identification) 
     return dict(zip(keys, fit.weights_rad_per_v[used].tolist(), strict=True)), np.asarray(covariance)
 
 
-def _holding(covariance: FloatArray, held: NDArray[np.bool_]) -> FloatArray:
+def _holding(covariance: Floats, held: NDArray[np.bool_]) -> Floats:
     """The covariance of the other parameters where some are held."""
     size = _deviation(covariance)
     size[size == 0.0] = 1.0
@@ -321,12 +322,12 @@ def _holding(covariance: FloatArray, held: NDArray[np.bool_]) -> FloatArray:
     return np.where(held[:, None] | held, 0.0, left)
 
 
-def _deviation(covariance: FloatArray) -> FloatArray:
+def _deviation(covariance: Floats) -> Floats:
     """Standard errors; rounding may leave a variance of 0 below it."""
     return np.asarray(np.sqrt(np.maximum(np.diag(covariance), 0.0)))
 
 
-def _relative(numbers: dict[str, float], covariance: FloatArray) -> tuple[list[str], FloatArray]:
+def _relative(numbers: dict[str, float], covariance: Floats) -> tuple[list[str], Floats]:
     """Keys of the numbers that are known but for an error, and the covariance relative to their sizes.
 
     A number that is lost in its error is held. Combinations that the recordings leave open (eigenvectors) are cut off
@@ -342,7 +343,7 @@ def _relative(numbers: dict[str, float], covariance: FloatArray) -> tuple[list[s
     return [key for key, keep in zip(numbers, kept, strict=True) if keep], np.asarray(cut)
 
 
-def _rounded(covariance: FloatArray) -> tuple[list[str], list[list[str]]]:
+def _rounded(covariance: Floats) -> tuple[list[str], list[list[str]]]:
     """Standard errors and correlation as text, with digits enough for the variance of each combination to a tenth."""
     variances, directions = np.linalg.eigh(covariance)
     whiten = directions / np.sqrt(np.maximum(variances, _STIFFEST**2))

@@ -5,11 +5,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from microrad.core.arrays import Floats
 from microrad.lab.recording import Recording
-
-FloatArray = NDArray[np.float64]
 
 
 def unheard(done: int, total: int, what: str) -> None:
@@ -77,8 +75,8 @@ class Prepared:
 
     name: str
     sha256: str
-    drive_v: FloatArray
-    output_rad: FloatArray
+    drive_v: Floats
+    output_rad: Floats
     step_s: float
     start: int
 
@@ -113,7 +111,7 @@ def _prepare(recording: Recording, units: Units) -> Prepared:
     return Prepared(recording.path, recording.sha256, drive, output, recording.step_s, transient(drive))
 
 
-def transient(drive: FloatArray) -> int:
+def transient(drive: Floats) -> int:
     """Number of first samples to set aside: until the drive has swept 99 % of its range once, at most half of them.
 
     The state before the first sample is unknown. A play operator forgets it when the drive has swept its full range;
@@ -125,7 +123,7 @@ def transient(drive: FloatArray) -> int:
     return min(swept + 1, drive.size // 2)
 
 
-def smoothed_rate(drive: FloatArray, step_s: float) -> FloatArray:
+def smoothed_rate(drive: Floats, step_s: float) -> Floats:
     """Rate of the drive over a hundredth of the period of its highest strong line, so that noise does not count."""
     spectrum = np.abs(np.fft.rfft(drive - drive.mean()))
     highest = int(np.flatnonzero(spectrum >= 0.05 * spectrum.max())[-1])
@@ -153,7 +151,7 @@ def noisiness(records: Sequence[Prepared]) -> float:
     return scatter / fastest_rate(records)
 
 
-def _sweeps(drive: FloatArray, step_s: float) -> FloatArray:
+def _sweeps(drive: Floats, step_s: float) -> Floats:
     """Peak rate (V/s) of each sweep between two reversals; sweeps of less than a fifth of the longest are left out."""
     rate = smoothed_rate(drive, step_s)
     moving = rate[np.abs(rate) > 0.05 * np.abs(rate).max()]
@@ -177,7 +175,7 @@ def one_rate_only(records: Sequence[Prepared]) -> bool:
     return fastest < 1.25 * slowest
 
 
-def colour_inflation(residuals: Sequence[FloatArray]) -> float:
+def colour_inflation(residuals: Sequence[Floats]) -> float:
     """Factor (1 for white noise) by which correlation between samples inflates the variance of an estimate.
 
     1 + 2 sum of autocorrelations, summed over pairs of lags until a pair turns negative (Geyer's initial positive
@@ -186,7 +184,7 @@ def colour_inflation(residuals: Sequence[FloatArray]) -> float:
     return max(_inflation(residual) for residual in residuals)
 
 
-def _inflation(residual: FloatArray) -> float:
+def _inflation(residual: Floats) -> float:
     n = residual.size
     spectrum = np.abs(np.fft.rfft(residual - residual.mean(), 2 * n)) ** 2
     correlation = np.fft.irfft(spectrum)[: 2 * (n // 4)]
@@ -198,13 +196,24 @@ def _inflation(residual: FloatArray) -> float:
     return max(1.0, float(2 * pairs[:last].sum() - 1))
 
 
-def correlation(covariance: FloatArray) -> FloatArray:
+def rounded_to_error(value: float, standard_error: float) -> str:
+    """A fitted value as it is printed: no digits beyond the two of its standard error, and five at most.
+
+    Further digits would tell nothing and differ between processors. A value without error (nan or 0) has five digits.
+    """
+    if 0.0 < standard_error < math.inf:
+        decimals = 1 - math.floor(math.log10(float(f"{standard_error:.2g}")))
+        value = round(value, decimals) + 0.0  # no -0
+    return f"{value:.5g}"
+
+
+def correlation(covariance: Floats) -> Floats:
     """Correlation matrix of a covariance."""
     deviation = np.sqrt(np.diag(covariance)) + 1e-300
     return np.asarray(covariance / np.outer(deviation, deviation))
 
 
-def percent(residual: FloatArray, span_rad: float) -> tuple[float, float]:
+def percent(residual: Floats, span_rad: float) -> tuple[float, float]:
     """Rms and peak of a residual in per cent of a peak-to-peak span."""
     return 100 * float(np.sqrt(np.mean(residual**2))) / span_rad, 100 * float(np.max(np.abs(residual))) / span_rad
 
@@ -214,11 +223,11 @@ def span(records: Sequence[Prepared]) -> float:
     return max(float(np.ptp(r.output_rad)) for r in records)
 
 
-def centred(columns: FloatArray, records: Sequence[Prepared]) -> FloatArray:
+def centred(columns: Floats, records: Sequence[Prepared]) -> Floats:
     """Stacked columns less their mean in each record: solving without them is solving with one offset per record."""
     return np.concatenate([part - part.mean(axis=0) for part in split_by_record(columns, records)])
 
 
-def split_by_record(values: FloatArray, records: Sequence[Prepared]) -> list[FloatArray]:
+def split_by_record(values: Floats, records: Sequence[Prepared]) -> list[Floats]:
     """Stacked values of the used samples, one array per record."""
     return np.split(values, np.cumsum([r.used for r in records])[:-1])

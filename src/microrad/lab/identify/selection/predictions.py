@@ -5,10 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from microrad.core.arrays import Floats
 from microrad.lab.identify.hysteresis.bouc_wen import BoucWenFit
 from microrad.lab.identify.hysteresis.joint import JointFit
 from microrad.lab.identify.hysteresis.prandtl_ishlinskii import PrandtlIshlinskiiFit
-from microrad.lab.identify.prepared import FloatArray, IdentificationError, Prepared, Units, transient
+from microrad.lab.identify.records import IdentificationError, Prepared, Units, transient
 from microrad.lab.recording import Recording
 
 Fit = BoucWenFit | PrandtlIshlinskiiFit | JointFit
@@ -22,14 +23,14 @@ class Prediction:
     before it) is fitted over the samples from `start` to `split`, or over all where the whole record is unseen.
     """
 
-    model_rad: FloatArray
-    measured_rad: FloatArray
+    model_rad: Floats
+    measured_rad: Floats
     start: int
     split: int
     clamped: int
 
     @property
-    def residual_rad(self) -> FloatArray:
+    def residual_rad(self) -> Floats:
         """Measured less modelled."""
         return self.measured_rad - self.model_rad
 
@@ -83,7 +84,7 @@ def predict(fit: Fit, recording: Recording, split: int | None = None) -> Predict
     return Prediction(model + added, measured, start, start if split == 0 else end, clamped)
 
 
-def _added(fit: Fit, difference: FloatArray, step_s: float, known: slice) -> FloatArray | float:
+def _added(fit: Fit, difference: Floats, step_s: float, known: slice) -> Floats | float:
     if isinstance(fit, JointFit):
         columns = fit.nuisance(difference.size, step_s)
         share = np.linalg.lstsq(columns[known], difference[known], rcond=None)[0]

@@ -25,9 +25,9 @@ from microrad.lab.identify import (
     mirror_file_text,
     predict,
 )
-from microrad.lab.identify.hysteresis.axis import LinearPoles, Roots, propagated
-from microrad.lab.identify.ladder import choice
-from microrad.lab.identify.ladder.choice import _best, _polished
+from microrad.lab.identify.hysteresis.structures import LinearPoles, Roots, propagated
+from microrad.lab.identify.selection import choice
+from microrad.lab.identify.selection.choice import _best, _polished
 from microrad.mirror import model as mirror
 from microrad.mirror.hysteresis import Play
 from microrad.mission.file import load_mirror

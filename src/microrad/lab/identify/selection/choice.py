@@ -7,12 +7,26 @@ from functools import cached_property
 
 import numpy as np
 
+from microrad.core.arrays import Floats
 from microrad.core.progress import Progress
-from microrad.lab.identify.hysteresis.axis import LinearPoles, poles_of
 from microrad.lab.identify.hysteresis.bouc_wen import BoucWenFit, fit_bouc_wen
 from microrad.lab.identify.hysteresis.joint import FORMS, JointFit, fit_joint, static_fit, time_constants
 from microrad.lab.identify.hysteresis.prandtl_ishlinskii import PrandtlIshlinskiiFit, fit_prandtl_ishlinskii
-from microrad.lab.identify.ladder.doubts import (
+from microrad.lab.identify.hysteresis.structures import LinearPoles, poles_of
+from microrad.lab.identify.linear.fit import LinearFit, fit_linear
+from microrad.lab.identify.records import (
+    IdentificationError,
+    Prepared,
+    Units,
+    colour_inflation,
+    percent,
+    prepare,
+    span,
+    unheard,
+)
+from microrad.lab.identify.selection.predictions import Fit, Judged, Prediction, Score, predict, straight_line
+from microrad.lab.identify.selection.roles import roles, whole_periods
+from microrad.lab.identify.selection.warnings import (
     ResidualTest,
     drift,
     fit_warnings,
@@ -23,20 +37,6 @@ from microrad.lab.identify.ladder.doubts import (
     residual_warnings,
     score_warnings,
     set_aside_warnings,
-)
-from microrad.lab.identify.ladder.predictions import Fit, Judged, Prediction, Score, predict, straight_line
-from microrad.lab.identify.ladder.roles import roles, whole_periods
-from microrad.lab.identify.linear.fit import LinearFit, fit_linear
-from microrad.lab.identify.prepared import (
-    FloatArray,
-    IdentificationError,
-    Prepared,
-    Units,
-    colour_inflation,
-    percent,
-    prepare,
-    span,
-    unheard,
 )
 from microrad.lab.recording import Recording
 
@@ -485,7 +485,7 @@ def _unsupported(score: Score, line: Score, predictions: Sequence[Prediction]) -
     return f"{text} {_OTHER_MOTION}" if text else ""
 
 
-def _unexplained(score: Score, parts: Sequence[tuple[FloatArray, FloatArray]], where: str) -> str:
+def _unexplained(score: Score, parts: Sequence[tuple[Floats, Floats]], where: str) -> str:
     filled = [(measured, residual) for measured, residual in parts if measured.size]
     spread = math.sqrt(float(np.mean(np.concatenate([m - m.mean() for m, _ in filled]) ** 2)))
     left = math.sqrt(float(np.mean(np.concatenate([r for _, r in filled]) ** 2)))
@@ -497,7 +497,7 @@ def _unexplained(score: Score, parts: Sequence[tuple[FloatArray, FloatArray]], w
     )
 
 
-def _best(fits: Sequence[Fit], residuals: Sequence[Sequence[FloatArray]]) -> int:
+def _best(fits: Sequence[Fit], residuals: Sequence[Sequence[Floats]]) -> int:
     """Lowest residual on the held-out samples.
 
     Where the difference may be chance an admissible model goes first, then the one with fewer parameters.
@@ -509,7 +509,7 @@ def _best(fits: Sequence[Fit], residuals: Sequence[Sequence[FloatArray]]) -> int
     return min(ties, key=lambda i: (not _admissible(fits[i]), _parameters(fits[i]), sums[i]))
 
 
-def _may_be_chance(losses: Sequence[FloatArray], best: Sequence[FloatArray]) -> bool:
+def _may_be_chance(losses: Sequence[Floats], best: Sequence[Floats]) -> bool:
     """Whether the mean difference of squared residuals is below two of its standard errors, noise colour counted.
 
     F. X. Diebold and R. S. Mariano, Comparing predictive accuracy, J. Business & Economic Statistics 13 (1995) 253.

@@ -10,10 +10,10 @@ from scipy.signal import lfilter
 
 import truths
 from microrad.lab.identify import identify
-from microrad.lab.identify.ladder import doubts
-from microrad.lab.identify.ladder.doubts import ResidualTest, residual_test, residual_warnings
-from microrad.lab.identify.ladder.predictions import Prediction, Score
-from microrad.lab.identify.ladder.roles import is_broadband, roles, whole_periods
+from microrad.lab.identify.selection import warnings
+from microrad.lab.identify.selection.predictions import Prediction, Score
+from microrad.lab.identify.selection.roles import is_broadband, roles, whole_periods
+from microrad.lab.identify.selection.warnings import ResidualTest, residual_test, residual_warnings
 from microrad.lab.recording import Recording, recording_from_arrays
 from truths import philox
 
@@ -168,21 +168,21 @@ def test_drift_of_a_record_and_its_error():
     trend = np.linspace(0.0, 2e-5, 2000)
     quiet, moving = (Prediction(np.zeros(2000), noise + extra, 0, 1000, 0) for extra in (0.0, trend))
     record = recording(SINE[:2000])
-    largest, found = doubts.drift([quiet, moving], [record, record], 1e-3)
+    largest, found = warnings.drift([quiet, moving], [record, record], 1e-3)
     assert largest == pytest.approx(2e-5, rel=0.05)
     assert len(found) == 1
     assert "drifts by 20" in found[0]
     assert "2 % of the peak-to-peak output) in 1 s" in found[0]
-    assert doubts.drift([quiet], [record], 1e-3)[1] == []
-    assert doubts.drift([moving], [record], 1.0)[1] == []  # significant, and of no consequence
+    assert warnings.drift([quiet], [record], 1e-3)[1] == []
+    assert warnings.drift([moving], [record], 1.0)[1] == []  # significant, and of no consequence
 
 
 def test_scores_that_speak_against_a_model():
     line, good = Score("straight line", 2.0, 5.0, 2.0, 5.0), Score("m", 1.0, 3.0, 1.1, 3.0)
-    assert doubts.score_warnings(good, line) == []
-    (worse,) = doubts.score_warnings(replace(good, held_out_rms_percent=1.6), line)
+    assert warnings.score_warnings(good, line) == []
+    (worse,) = warnings.score_warnings(replace(good, held_out_rms_percent=1.6), line)
     assert "grows from 1.00 % on the fitted samples to 1.60 %" in worse
-    assert "No model is better than a straight line" in doubts.score_warnings(Score("m", 1.9, 3.0, 2.1, 3.0), line)[0]
+    assert "No model is better than a straight line" in warnings.score_warnings(Score("m", 1.9, 3.0, 2.1, 3.0), line)[0]
 
 
 def test_held_out_samples_beyond_the_fitted_drives_are_counted():
@@ -190,9 +190,9 @@ def test_held_out_samples_beyond_the_fitted_drives_are_counted():
     seen = Prediction(np.zeros(200), np.zeros(200), 0, 100, 0)
     from microrad.lab.identify import Units
 
-    (text,) = doubts.held_out_warnings([record], Units(), (0.0, 10.0), [seen])
+    (text,) = warnings.held_out_warnings([record], Units(), (0.0, 10.0), [seen])
     assert text.startswith("2 held-out samples")  # 10.1 is within the margin of 2 %
-    assert doubts.held_out_warnings([record], Units(), (-1.0, 11.0), [seen]) == []
+    assert warnings.held_out_warnings([record], Units(), (-1.0, 11.0), [seen]) == []
 
 
 def test_a_search_that_did_not_settle_is_told():
@@ -204,8 +204,8 @@ def test_a_search_that_did_not_settle_is_told():
     assert fit.fit.converged
     assert not any("stopped after" in text for text in result.warnings)
     cut = replace(fit, fit=replace(fit.fit, converged=False, evaluations=60))
-    assert "stopped after 60 evaluations" in doubts.fit_warnings(cut)[0]
-    assert_array_equal(doubts.fit_warnings(fit), [])
+    assert "stopped after 60 evaluations" in warnings.fit_warnings(cut)[0]
+    assert_array_equal(warnings.fit_warnings(fit), [])
 
 
 def test_a_record_that_begins_with_small_loops_is_told_how_much_is_set_aside():
