@@ -24,8 +24,8 @@ from microrad import mirror
 from microrad.core import kernels, lti
 from microrad.loop import control, disturbance
 from microrad.loop import sine_run as simulate
-from microrad.loop.fine_loop import ensemble
-from microrad.loop.fine_loop import loop as fine
+from microrad.loop.pointing_loop import ensemble
+from microrad.loop.pointing_loop import loop as fine
 from microrad.loop.sensor import OpticalSensor
 from microrad.mission import file as missionfile
 

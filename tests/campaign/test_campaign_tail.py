@@ -26,8 +26,8 @@ from microrad.campaign.tails import tail_of_time, tail_weighted
 from microrad.campaign.work import Evaluator
 from microrad.core.arrays import Floats
 from microrad.core.threads import in_threads
-from microrad.loop.fine_loop import linear
-from microrad.loop.fine_loop.ensemble import LANES, bin_edges_rad, histogram_quantile
+from microrad.loop.pointing_loop import linear
+from microrad.loop.pointing_loop.ensemble import LANES, bin_edges_rad, histogram_quantile
 from microrad.mission.file import load_mission
 from microrad.report import campaign_words
 from microrad.report.quantities import quantity

@@ -10,10 +10,10 @@ from scipy import stats
 
 from microrad.campaign.tilt import PLAIN, Tilt, drawn, end_covariance, level_of, radius_of, tilt, tilted
 from microrad.loop import disturbance
-from microrad.loop.fine_loop import ensemble, linear
-from microrad.loop.fine_loop.ensemble import LANES, Span
-from microrad.loop.fine_loop.loop import assemble
-from microrad.loop.fine_pointing import designs, parts, scenario
+from microrad.loop.controller_study import designs, parts, scenario
+from microrad.loop.pointing_loop import ensemble, linear
+from microrad.loop.pointing_loop.ensemble import LANES, Span
+from microrad.loop.pointing_loop.loop import assemble
 from microrad.mission.file import load_mission
 from scenes import scene_of
 from shipped import SHIPPED

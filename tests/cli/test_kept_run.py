@@ -9,7 +9,7 @@ import pytest
 
 from microrad import report
 from microrad.core.kept import Kept
-from microrad.loop.fine_pointing import scenario
+from microrad.loop.controller_study import scenario
 from microrad.mission import file as missionfile
 from microrad.mission.file import NamedFile, load_mission, with_contents
 from microrad.orbit import day

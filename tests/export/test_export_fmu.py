@@ -29,8 +29,8 @@ from microrad.export.fmi.description import variables
 from microrad.export.records import ExportError, Origin, PlantUnit, Signal
 from microrad.loop import control
 from microrad.loop import sine_run as simulate
-from microrad.loop.fine_loop import ensemble
-from microrad.loop.fine_loop.loop import LoopController, PointingLoop
+from microrad.loop.pointing_loop import ensemble
+from microrad.loop.pointing_loop.loop import LoopController, PointingLoop
 from microrad.mirror import hysteresis
 from microrad.mirror import model as mirror
 

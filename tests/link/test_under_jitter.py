@@ -16,8 +16,8 @@ from microrad.link import under_jitter as link_performance
 from microrad.link.under_jitter import Spread
 from microrad.loop import paper_cases as tracking
 from microrad.loop import sine_run as simulate
-from microrad.loop.fine_loop.ensemble import bin_edges_rad
-from microrad.loop.fine_pointing import FinePointingStudy, Residual, Verified
+from microrad.loop.controller_study import FinePointingStudy, Residual, Verified
+from microrad.loop.pointing_loop.ensemble import bin_edges_rad
 from microrad.study import pointing_cost as performance
 from shipped import edited
 

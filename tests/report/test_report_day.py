@@ -13,9 +13,9 @@ import pytest
 import xarray as xr
 
 from microrad import report
-from microrad.loop import control, fine_pointing
-from microrad.loop.fine_loop.loop import assemble
-from microrad.loop.fine_pointing import designs
+from microrad.loop import control, controller_study
+from microrad.loop.controller_study import designs
+from microrad.loop.pointing_loop.loop import assemble
 from microrad.mission.file import load_mission, with_contents
 from microrad.orbit import day as day_study
 from microrad.orbit.operations import OperationsError
@@ -38,7 +38,7 @@ def fine(file):
     """A fine-pointing study as far as a contact asks for it: the PI of the grid, made in half a second."""
     scene = scene_of(file)
     tuned = designs.grid_baseline(designs.plants(scene, 1)[:1], control.Specification(0.5))
-    design = fine_pointing.Design("PI", tuned, assemble("PI", scene.loop, tuned.controller))
+    design = controller_study.Design("PI", tuned, assemble("PI", scene.loop, tuned.controller))
     return SimpleNamespace(scene=scene, best=SimpleNamespace(design=design), quantile=0.997)
 
 

@@ -7,7 +7,7 @@ import re
 
 import pytest
 
-from microrad.loop.fine_pointing import COUNTERS
+from microrad.loop.controller_study import COUNTERS
 from microrad.report import budget_views, compared, reproduce, results, scale, tolerances, words
 from shipped import whole_drawn, whole_study
 

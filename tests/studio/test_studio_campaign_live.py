@@ -14,7 +14,7 @@ from microrad.campaign.interim import Interim
 from microrad.campaign.ledger import Ledger
 from microrad.campaign.records import CampaignError, Chunk, Failed
 from microrad.campaign.summary import summarise
-from microrad.loop.fine_loop.ensemble import bin_edges_rad
+from microrad.loop.pointing_loop.ensemble import bin_edges_rad
 from microrad.report import campaign_words
 from microrad.studio.jobs import ledgers as campaign_live
 from microrad.studio.jobs.ledgers import Live, LiveCampaigns

@@ -14,11 +14,11 @@ from microrad import link
 from microrad.core import kernels
 from microrad.link import acquisition
 from microrad.link import study as link_study
-from microrad.loop import control, fine_pointing
+from microrad.loop import control, controller_study
+from microrad.loop.controller_study import designs
 from microrad.loop.disturbance import Reference
-from microrad.loop.fine_loop import ensemble
-from microrad.loop.fine_loop.loop import assemble
-from microrad.loop.fine_pointing import designs
+from microrad.loop.pointing_loop import ensemble
+from microrad.loop.pointing_loop.loop import assemble
 from microrad.mission.file import LinkFile, load_mission
 from microrad.study import contact_run
 from microrad.study.contact_run import Contact, MovingReference, Sampler, Settings, Sight, plan
@@ -84,7 +84,7 @@ def scene(file):
 def design(file, scene):
     """The PI controller of the grid, for the nominal mirror alone: made in half a second."""
     tuned = designs.grid_baseline(designs.plants(scene, 1)[:1], control.Specification(0.5))
-    return fine_pointing.Design("PI", tuned, assemble("PI", scene.loop, tuned.controller))
+    return controller_study.Design("PI", tuned, assemble("PI", scene.loop, tuned.controller))
 
 
 @pytest.fixture(scope="module")

@@ -42,9 +42,9 @@ def check_loop(on: Reading, table: LoopTable, bases: Sequence[Base]) -> None:
 
 
 def _has_controller(on: Reading, controller: str, of: FinePointing) -> bool:
-    from microrad.loop import fine_pointing  # here, to keep the start quick
+    from microrad.loop import controller_study  # here, to keep the start quick
 
-    names = fine_pointing.names(of)
+    names = controller_study.names(of)
     if controller in names:
         return True
     expected = " or ".join(f'"{name}"' for name in names)

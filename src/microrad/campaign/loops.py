@@ -8,10 +8,10 @@ from microrad.campaign.definition import CampaignFile
 from microrad.campaign.records import CampaignError
 from microrad.campaign.tables import LoopTable
 from microrad.link.tracking_light import tracking_light_w
-from microrad.loop import fine_pointing
+from microrad.loop import controller_study
 from microrad.loop.control import AxisController
-from microrad.loop.fine_loop import ensemble
-from microrad.loop.fine_loop.loop import LoopController, PointingLoop
+from microrad.loop.pointing_loop import ensemble
+from microrad.loop.pointing_loop.loop import LoopController, PointingLoop
 from microrad.mirror import Variant
 from microrad.mission.file import LinkFile, MissionFile
 from microrad.mission.model import Mission
@@ -24,13 +24,13 @@ def settings(file: LinkFile) -> FinePointing:
     """The fine-pointing table of a mission that has a loop: the campaign file's own check has seen to it."""
     m = file.mission
     assert isinstance(m, Mission)
-    return fine_pointing.table(m.fine_pointing)
+    return controller_study.table(m.fine_pointing)
 
 
-def scene(file: LinkFile, table: LoopTable) -> fine_pointing.Scene:
+def scene(file: LinkFile, table: LoopTable) -> controller_study.Scene:
     """The scene of a mission that has a loop, with the axes that the campaign simulates."""
     assert isinstance(file, MissionFile)
-    built = fine_pointing.scene(file, mirror.of(file.mission), tracking_light_w(file))
+    built = controller_study.scene(file, mirror.of(file.mission), tracking_light_w(file))
     return replace(built, loop=built.axis) if table.axes == "one" else built
 
 
@@ -40,25 +40,25 @@ def tuned(file: LinkFile, table: LoopTable) -> AxisController:
     Raises `CampaignError` for a name that the mission has no controller of, and with the reason when none can be tuned.
     """
     f = settings(file)
-    if table.controller not in fine_pointing.names(f):
-        names = ", ".join(f'"{name}"' for name in fine_pointing.names(f))
+    if table.controller not in controller_study.names(f):
+        names = ", ".join(f'"{name}"' for name in controller_study.names(f))
         raise CampaignError(f'loop.controller = "{table.controller}" is no controller of the mission; it has {names}')
     try:
-        of = fine_pointing.plants(scene(file, table), f.seed)
-        return fine_pointing.tune(table.controller, f, of).controller
+        of = controller_study.plants(scene(file, table), f.seed)
+        return controller_study.tune(table.controller, f, of).controller
     except ValueError as error:
         raise CampaignError(f"the controller {table.controller!r} cannot be tuned: {error}") from error
 
 
-def held(of: fine_pointing.Scene, table: LoopTable, axis: AxisController) -> LoopController:
+def held(of: controller_study.Scene, table: LoopTable, axis: AxisController) -> LoopController:
     """The tuned controller on the axes of a cell's own mission: what all its rows are flown with."""
-    built = replace(of, loop=fine_pointing.on_variant(of, Variant(table.mirror)))
-    return fine_pointing.build(table.controller, built, axis)
+    built = replace(of, loop=controller_study.on_variant(of, Variant(table.mirror)))
+    return controller_study.build(table.controller, built, axis)
 
 
 def row_loop(file: LinkFile, table: LoopTable) -> PointingLoop:
     """The loop of a row's mission."""
-    return fine_pointing.on_variant(scene(file, table), Variant(table.mirror))
+    return controller_study.on_variant(scene(file, table), Variant(table.mirror))
 
 
 def span(campaign: CampaignFile, f: FinePointing) -> ensemble.Span:

@@ -24,10 +24,10 @@ from numpy.typing import NDArray
 
 from microrad.core import kernels, lti
 from microrad.core.arrays import Floats
-from microrad.loop.fine_loop import ensemble, linear
-from microrad.loop.fine_loop.ensemble import LANES, SLICE_SAMPLES, Span
-from microrad.loop.fine_loop.loop import LoopController, PointingLoop
-from microrad.loop.fine_pointing import parts
+from microrad.loop.controller_study import parts
+from microrad.loop.pointing_loop import ensemble, linear
+from microrad.loop.pointing_loop.ensemble import LANES, SLICE_SAMPLES, Span
+from microrad.loop.pointing_loop.loop import LoopController, PointingLoop
 
 STREAM = 0x54494C54
 """Second word of the key of the Philox streams that levels and directions are drawn from, behind the seed."""

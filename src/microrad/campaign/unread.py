@@ -9,7 +9,7 @@ from microrad.campaign import evaluate, loops, plan
 from microrad.campaign.definition import CampaignFile
 from microrad.campaign.keys import MIRROR, touches_loop
 from microrad.core import reads
-from microrad.loop.fine_loop import ensemble
+from microrad.loop.pointing_loop import ensemble
 from microrad.mission.fields import Table
 from microrad.mission.file import LinkFile
 

@@ -18,8 +18,8 @@ from microrad.campaign.records import CampaignError, Chunk, Failed, Job, WorstTr
 from microrad.core import kernels
 from microrad.core.arrays import Floats
 from microrad.loop.control import AxisController
-from microrad.loop.fine_loop import ensemble
-from microrad.loop.fine_loop.loop import LoopController, PointingLoop
+from microrad.loop.pointing_loop import ensemble
+from microrad.loop.pointing_loop.loop import LoopController, PointingLoop
 from microrad.mission.file import LinkFile
 
 __all__ = ["Work", "code_sha256", "open_work"]

@@ -31,10 +31,10 @@ from microrad.export.records import (
     Vectors,
 )
 from microrad.link.tracking_light import tracking_light_w
-from microrad.loop import control, fine_pointing, paper_cases, sine_run
-from microrad.loop.fine_loop.loop import LoopController
-from microrad.loop.fine_loop.replay import replay
+from microrad.loop import control, controller_study, paper_cases, sine_run
 from microrad.loop.paper_cases import PID, PID_WITH_INVERSE
+from microrad.loop.pointing_loop.loop import LoopController
+from microrad.loop.pointing_loop.replay import replay
 from microrad.mirror import Variant, model
 from microrad.mission.file import MissionFile
 from microrad.mission.model import Scenario
@@ -62,7 +62,7 @@ class PointingChoice:
     """A controller of the fine-pointing loop."""
 
     source: Source
-    scene: fine_pointing.Scene
+    scene: controller_study.Scene
     tuned: control.Tuned
     controller: LoopController
 
@@ -84,7 +84,7 @@ Choice = PointingChoice | TrackingChoice
 
 def names(table: FinePointing | None) -> tuple[str, ...]:
     """The controllers of a mission with this table of its fine-pointing loop, or without one."""
-    return (*(() if table is None else fine_pointing.names(table)), PID, PID_WITH_INVERSE)
+    return (*(() if table is None else controller_study.names(table)), PID, PID_WITH_INVERSE)
 
 
 def source(file: MissionFile) -> Source:
@@ -112,24 +112,24 @@ def choose(file: MissionFile, name: str, on_progress: Progress = lambda done, to
         if name in (PID, PID_WITH_INVERSE):
             return _tracking(source(file), paper_cases.of(m, mirrors), name)
         on_progress(0, 2, f"tuning {name}")
-        scene = fine_pointing.scene(file, mirrors, tracking_light_w(file))
-        tuned = fine_pointing.tune(name, scene.table, fine_pointing.plants(scene, scene.table.seed))
+        scene = controller_study.scene(file, mirrors, tracking_light_w(file))
+        tuned = controller_study.tune(name, scene.table, controller_study.plants(scene, scene.table.seed))
         on_progress(1, 2, f"{name} tuned")
-        return PointingChoice(source(file), scene, tuned, fine_pointing.build(name, scene, tuned.controller))
+        return PointingChoice(source(file), scene, tuned, controller_study.build(name, scene, tuned.controller))
     except ValueError as error:
         raise ExportError(f"{file.path}: {error}") from error
 
 
-def outlook(choice: Choice) -> fine_pointing.Outlook | None:
+def outlook(choice: Choice) -> controller_study.Outlook | None:
     """What a controller of the fine-pointing loop leaves, linear and simulated; the loop of [control] has no theory."""
     if isinstance(choice, TrackingChoice):
         return None
-    design = fine_pointing.Design(choice.controller.name, choice.tuned, choice.controller)
-    (found,) = fine_pointing.outlook(choice.scene, [design])
+    design = controller_study.Design(choice.controller.name, choice.tuned, choice.controller)
+    (found,) = controller_study.outlook(choice.scene, [design])
     return found
 
 
-def promised(choice: Choice, accept: bool = False) -> fine_pointing.Outlook | None:
+def promised(choice: Choice, accept: bool = False) -> controller_study.Outlook | None:
     """What a controller leaves; raises ExportError, but for ``accept``, where its linear figure is no promise."""
     left = outlook(choice)
     if isinstance(choice, PointingChoice) and left is not None and not (left.holds or accept):
@@ -137,12 +137,12 @@ def promised(choice: Choice, accept: bool = False) -> fine_pointing.Outlook | No
     return left
 
 
-def _broken(choice: PointingChoice, left: fine_pointing.Outlook) -> str:
+def _broken(choice: PointingChoice, left: controller_study.Outlook) -> str:
     found, said = rms_text(left.simulated_rad), rms_text(left.linear_rad)
     return (
-        f"{choice.source.path}: {choice.controller.name} leaves {found} on the mission's mirror, simulated with its "
-        f"hysteresis: {left.times:.2f} times the {said} of linear theory, where {fine_pointing.PROMISE:g} times is the "
-        "most. Choose another controller by the simulated figures of microrad design, or write this one all the same "
+        f"{choice.source.path}: {choice.controller.name} leaves {found} on the mission's mirror, simulated with "
+        f"its hysteresis: {left.times:.2f} times the {said} of linear theory, where {controller_study.PROMISE:g} times is "
+        "the most. Choose another controller by the simulated figures of microrad design, or write this one all the same "
         "with --accept."
     )
 
@@ -285,7 +285,7 @@ def plant_unit(file: MissionFile, loop: str) -> PlantUnit:
     try:
         mirrors = mirror.of(file.mission)
         if loop == LOOPS[0]:
-            made = fine_pointing.scene(file, mirrors, tracking_light_w(file)).loop
+            made = controller_study.scene(file, mirrors, tracking_light_w(file)).loop
             return _plant_unit(source(file), made.mirror, made.optics, made.drive, made.timing)
         one = _tracking(source(file), paper_cases.of(file.mission, mirrors), PID)
         return _plant_unit(one.source, one.mirror, np.eye(one.mirror.axes), one.setup.drive, one.setup.timing)

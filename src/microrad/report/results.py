@@ -12,7 +12,7 @@ import numpy as np
 
 from microrad.core.arrays import Floats
 from microrad.core.machine import machine, versions
-from microrad.loop.fine_pointing import COUNTERS, FinePointingStudy, Residual
+from microrad.loop.controller_study import COUNTERS, FinePointingStudy, Residual
 from microrad.loop.paper_cases import Run
 from microrad.report import day_results, variables, words
 from microrad.report.carried import hash_of_summary

@@ -15,8 +15,8 @@ from microrad.link import pointing, requirement
 from microrad.link import study as link_study
 from microrad.link import under_jitter as link_performance
 from microrad.link.tracking_light import tracking_light_w
-from microrad.loop import control, fine_pointing, paper_cases, sine_run
-from microrad.loop.fine_loop import ensemble
+from microrad.loop import control, controller_study, paper_cases, sine_run
+from microrad.loop.pointing_loop import ensemble
 from microrad.mirror import Variant
 from microrad.mirror import summary as mirror_summary
 from microrad.mission.file import MissionFile, with_contents
@@ -78,7 +78,7 @@ class Study:
     comparison: Comparison | None
     other_readings: tuple[alternatives.Reading, ...]
     scan: paper.Scan | None
-    fine_pointing: fine_pointing.FinePointingStudy | None
+    fine_pointing: controller_study.FinePointingStudy | None
     performance: pointing_cost.LinkPerformance
     tornado: link.Tornado
     day: day_study.DayStudy | None
@@ -186,7 +186,7 @@ def run(
     fine = None
     if m.fine_pointing is not None:
         compiled()
-        fine = parts.part(fine_pointing.run, _scene(file, mirrors), on_progress=on_progress)
+        fine = parts.part(controller_study.run, _scene(file, mirrors), on_progress=on_progress)
     on_progress(2, 3, "the day")
     found = pointing_cost.run(data, m.conventions.residual, runs, fine)
     case = best_case(found, fine)
@@ -226,8 +226,8 @@ def run(
     )
 
 
-def _scene(file: MissionFile, mirrors: mirror.MirrorParts) -> fine_pointing.Scene:
-    return fine_pointing.scene(file, mirrors, tracking_light_w(file))
+def _scene(file: MissionFile, mirrors: mirror.MirrorParts) -> controller_study.Scene:
+    return controller_study.scene(file, mirrors, tracking_light_w(file))
 
 
 def linked(file: MissionFile, parts: kept.Kept) -> tuple[link_study.LinkStudy, MarginMap]:
@@ -239,7 +239,7 @@ def linked(file: MissionFile, parts: kept.Kept) -> tuple[link_study.LinkStudy, M
 def judged(
     links: link_study.LinkStudy,
     by_paper: Requirements,
-    fine: fine_pointing.FinePointingStudy | None,
+    fine: controller_study.FinePointingStudy | None,
     case: link_performance.Performance | None,
 ) -> tuple[Requirements, Requirements]:
     """What the verdict judges, and what the paper's loop is held against beside it where it is not that.
@@ -253,7 +253,7 @@ def judged(
 
 
 def best_case(
-    found: pointing_cost.LinkPerformance, fine: fine_pointing.FinePointingStudy | None
+    found: pointing_cost.LinkPerformance, fine: controller_study.FinePointingStudy | None
 ) -> link_performance.Performance | None:
     """The link under the fine-pointing loop's best controller on the mission's mirror, or None without that loop."""
     return None if fine is None else found.case(pointing_cost.FINE, fine.best.design.name, Variant.GIVEN)
@@ -275,7 +275,7 @@ def tornado(links: link_study.LinkStudy, error_rad: float) -> link.Tornado:
 def delivered(
     links: link_study.LinkStudy,
     loss: day_study.PointingLoss,
-    fine: fine_pointing.FinePointingStudy | None,
+    fine: controller_study.FinePointingStudy | None,
     parts: kept.Kept = kept.NOTHING,
 ) -> tuple[day_study.DayStudy | None, contact_run.ContactRun | None, constellation.ConstellationPlan | None]:
     """The day at a pointing loss, its contact in time under the best controller, and the plan of a constellation.

@@ -21,7 +21,7 @@ from microrad.export.flight.rounding import RoundingBound, rounding_bound
 from microrad.export.identifiers import identifier, suggested
 from microrad.export.linear_part.sections import Sections, sections
 from microrad.export.records import FlightController, Vectors
-from microrad.loop.fine_pointing import Outlook
+from microrad.loop.controller_study import Outlook
 
 Precision = Literal["double", "single", "fixed"]
 PRECISIONS: dict[Precision, str] = {"double": "double precision", "single": "single precision", "fixed": "fixed point"}

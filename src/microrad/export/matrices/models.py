@@ -12,9 +12,9 @@ from microrad.export.records import ExportError, FlightController
 from microrad.loop import control, sine_run
 from microrad.loop.control import GAUGE, OPTICAL, RESIDUAL
 from microrad.loop.control.analysis import moved
-from microrad.loop.fine_loop.design import behind_filter, design_plant
-from microrad.loop.fine_loop.loop import ReferenceFilter
-from microrad.loop.fine_pointing.designs import IN_SERIES
+from microrad.loop.controller_study.designs import IN_SERIES
+from microrad.loop.pointing_loop.design import behind_filter, design_plant
+from microrad.loop.pointing_loop.loop import ReferenceFilter
 from microrad.loop.sensor import StrainGauge
 from microrad.mirror import model as mirror
 

@@ -7,7 +7,7 @@ import numpy as np
 from microrad import link, orbit
 from microrad.core.arrays import Floats
 from microrad.link.partner_search import Finding
-from microrad.loop.fine_pointing import FinePointingStudy
+from microrad.loop.controller_study import FinePointingStudy
 from microrad.mission.tables.acquisition import Acquisition
 from microrad.mission.tables.operations import Operations
 from microrad.orbit.day import DayStudy

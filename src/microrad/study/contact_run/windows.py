@@ -11,8 +11,8 @@ from microrad import link
 from microrad.core.arrays import Floats
 from microrad.core.units import SPEED_OF_LIGHT_M_S, format_quantity
 from microrad.loop.disturbance import Reference
-from microrad.loop.fine_loop import ensemble
-from microrad.loop.fine_loop.loop import LoopController, PointingLoop
+from microrad.loop.pointing_loop import ensemble
+from microrad.loop.pointing_loop.loop import LoopController, PointingLoop
 from microrad.mission.tables.fine_pointing import FinePointing
 from microrad.study.contact_run.records import Contact, Loss, Settings, Sight, Window
 

@@ -6,8 +6,8 @@ import numpy as np
 
 from microrad.core import kernels
 from microrad.core.arrays import Floats
-from microrad.loop.fine_loop import ensemble
-from microrad.loop.fine_loop.loop import LoopController, PointingLoop
+from microrad.loop.pointing_loop import ensemble
+from microrad.loop.pointing_loop.loop import LoopController, PointingLoop
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,7 +18,7 @@ from microrad.core.progress import Progress
 from microrad.core.threads import aside, in_threads
 from microrad.loop import disturbance
 from microrad.loop.control import amplifier_factor, inverse_arrays, no_feedforward
-from microrad.loop.fine_loop.loop import LoopController, PointingLoop
+from microrad.loop.pointing_loop.loop import LoopController, PointingLoop
 from microrad.loop.sensor import StrainGauge
 
 References = tuple[disturbance.Reference, ...]

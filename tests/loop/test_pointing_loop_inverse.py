@@ -12,10 +12,10 @@ from microrad.core import kernels, lti
 from microrad.loop import control, disturbance
 from microrad.loop.control import AxisController, Drive, Inverse, Timing
 from microrad.loop.disturbance import Reference
-from microrad.loop.fine_loop import ensemble, linear
-from microrad.loop.fine_loop import loop as fine
-from microrad.loop.fine_loop.ensemble import Span
-from microrad.loop.fine_loop.loop import PointingLoop, ReferenceFilter, with_inverse
+from microrad.loop.pointing_loop import ensemble, linear
+from microrad.loop.pointing_loop import loop as fine
+from microrad.loop.pointing_loop.ensemble import Span
+from microrad.loop.pointing_loop.loop import PointingLoop, ReferenceFilter, with_inverse
 from microrad.loop.sensor import OpticalSensor
 from microrad.mirror import model as mirror
 from microrad.mirror.geometry import Geometry, line_of_sight_matrix

@@ -8,8 +8,8 @@ from microrad.core import lti
 from microrad.core.arrays import Floats
 from microrad.loop.control import AxisController, DesignPlant
 from microrad.loop.disturbance import Disturbance
-from microrad.loop.fine_loop.linear import ClosedLoop, close, gauge_noise_rad, open_loop
-from microrad.loop.fine_loop.loop import PointingLoop, assemble, decoupling, nominal_axis_gain
+from microrad.loop.pointing_loop.linear import ClosedLoop, close, gauge_noise_rad, open_loop
+from microrad.loop.pointing_loop.loop import PointingLoop, assemble, decoupling, nominal_axis_gain
 
 
 def residual_spectrum(closed: ClosedLoop, freq_hz: Floats) -> Floats:

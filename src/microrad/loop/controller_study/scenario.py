@@ -9,7 +9,7 @@ import numpy as np
 
 from microrad import mirror
 from microrad.loop import control, disturbance, sensor
-from microrad.loop.fine_loop import loop as fine
+from microrad.loop.pointing_loop import loop as fine
 from microrad.mirror import MirrorParts, Variant, geometry, hysteresis
 from microrad.mission.file import MissionFile, NamedFile, content_of
 from microrad.mission.model import Source, source_text

@@ -15,7 +15,7 @@ from microrad.core import lti
 from microrad.core.arrays import Complexes, Floats
 from microrad.loop import disturbance
 from microrad.loop.control import amplifier_factor
-from microrad.loop.fine_loop.loop import LoopController, PointingLoop, in_band_gain
+from microrad.loop.pointing_loop.loop import LoopController, PointingLoop, in_band_gain
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,9 +15,9 @@ from microrad.core import kernels, lti
 from microrad.loop import control, disturbance
 from microrad.loop.control import AxisController, Drive, Timing
 from microrad.loop.disturbance import Disturbance, Reference
-from microrad.loop.fine_loop import ensemble, linear
-from microrad.loop.fine_loop import loop as fine
-from microrad.loop.fine_loop.design import (
+from microrad.loop.pointing_loop import ensemble, linear
+from microrad.loop.pointing_loop import loop as fine
+from microrad.loop.pointing_loop.design import (
     LINE_DAMPING,
     behind_filter,
     close_axis,
@@ -25,8 +25,8 @@ from microrad.loop.fine_loop.design import (
     narrow_band,
     residual_spectrum,
 )
-from microrad.loop.fine_loop.ensemble import Span
-from microrad.loop.fine_loop.loop import LoopController, PointingLoop
+from microrad.loop.pointing_loop.ensemble import Span
+from microrad.loop.pointing_loop.loop import LoopController, PointingLoop
 from microrad.loop.sensor import OpticalSensor, StrainGauge
 from microrad.mirror import model as mirror
 from microrad.mirror.geometry import Geometry, line_of_sight_matrix

@@ -11,13 +11,13 @@ from microrad.core import kernels
 from microrad.core.arrays import Floats
 from microrad.core.progress import Progress
 from microrad.loop.control import inverse
-from microrad.loop.fine_loop import ensemble
-from microrad.loop.fine_loop.design import residual_spectrum
-from microrad.loop.fine_loop.linear import Stationary, close, stationary
-from microrad.loop.fine_loop.loop import LoopController, PointingLoop
-from microrad.loop.fine_pointing import parts
-from microrad.loop.fine_pointing.designs import BASELINE, Design
-from microrad.loop.fine_pointing.scenario import BODY_POINTING, Scene, with_mirror
+from microrad.loop.controller_study import parts
+from microrad.loop.controller_study.designs import BASELINE, Design
+from microrad.loop.controller_study.scenario import BODY_POINTING, Scene, with_mirror
+from microrad.loop.pointing_loop import ensemble
+from microrad.loop.pointing_loop.design import residual_spectrum
+from microrad.loop.pointing_loop.linear import Stationary, close, stationary
+from microrad.loop.pointing_loop.loop import LoopController, PointingLoop
 from microrad.mirror import Variant
 from microrad.mission.tables.fine_pointing import FinePointing
 
@@ -66,7 +66,7 @@ class Residual:
     ``rms_interval_rad`` is the half width of the 99 % interval over the runs, infinite where there is but one.
     ``quantile_rad`` is the error that the mission's share of the time stays below; ``shares`` say how often each limit
     was met, by name, where it was. ``axis_rms_rad`` is about zero; ``radial_counts`` counts the control samples by
-    radial error, in the bins of `fine_loop.ensemble.bin_edges_rad`.
+    radial error, in the bins of `pointing_loop.ensemble.bin_edges_rad`.
     """
 
     rms_rad: float

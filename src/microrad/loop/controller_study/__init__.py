@@ -8,7 +8,7 @@ import numpy as np
 from microrad.core.arrays import Floats
 from microrad.core.progress import Progress
 from microrad.loop import disturbance
-from microrad.loop.fine_pointing.designs import (
+from microrad.loop.controller_study.designs import (
     BASELINE,
     Design,
     build,
@@ -18,7 +18,7 @@ from microrad.loop.fine_pointing.designs import (
     plants,
     tune,
 )
-from microrad.loop.fine_pointing.results import (
+from microrad.loop.controller_study.results import (
     COUNTERS,
     PROMISE,
     Difference,
@@ -35,7 +35,7 @@ from microrad.loop.fine_pointing.results import (
     sines,
     verify,
 )
-from microrad.loop.fine_pointing.scenario import Scene, scene, table
+from microrad.loop.controller_study.scenario import Scene, scene, table
 
 __all__ = [
     "BASELINE",
