@@ -140,10 +140,10 @@ def promised(choice: Choice, accept: bool = False) -> controller_study.Outlook |
 def _broken(choice: PointingChoice, left: controller_study.Outlook) -> str:
     found, said = rms_text(left.simulated_rad), rms_text(left.linear_rad)
     return (
-        f"{choice.source.path}: {choice.controller.name} leaves {found} on the mission's mirror, simulated with "
-        f"its hysteresis: {left.times:.2f} times the {said} of linear theory, where {controller_study.PROMISE:g} times is "
-        "the most. Choose another controller by the simulated figures of microrad design, or write this one all the same "
-        "with --accept."
+        f"{choice.source.path}: {choice.controller.name} leaves {found} on the mission's mirror, simulated with its "
+        f"hysteresis: {left.times:.2f} times the {said} of linear theory, where {controller_study.PROMISE:g} times "
+        "is the most. Choose another controller by the simulated figures of microrad design, or write this one all "
+        "the same with --accept."
     )
 
 
