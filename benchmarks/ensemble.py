@@ -24,7 +24,7 @@ from microrad import mirror
 from microrad.core import kernels, lti
 from microrad.loop import control, disturbance
 from microrad.loop import sine_run as simulate
-from microrad.loop.pointing_loop import ensemble
+from microrad.loop.pointing_loop import ensemble, kernel_arrays, traces
 from microrad.loop.pointing_loop import loop as fine
 from microrad.loop.sensor import OpticalSensor
 from microrad.mission import file as missionfile
@@ -66,8 +66,8 @@ def ratio() -> None:
         return np.ascontiguousarray(p.references[0].at(np.arange(samples + 1) * PERIOD_S)[:, None])
 
     def side_by_side(loop: fine.PointingLoop) -> Callable[[], None]:
-        arrays = ensemble.arrays(loop, c, 1)
-        state, reference = ensemble.start(loop, arrays, 0), reference_of(PIECE)
+        arrays = kernel_arrays.arrays(loop, c, 1)
+        state, reference = kernel_arrays.start(loop, arrays, 0), reference_of(PIECE)
         state.place[kernels.COUNTING] = 1
         return lambda: kernels.ensemble_loop(arrays, state, reference[:, :, None], nothing, nothing, kernels.UNSHIFTED)
 
@@ -89,7 +89,7 @@ def ratio() -> None:
         times = {name: min(each[name] for each in rounds) for name in pieces}
         run_twin, theirs = c_twin(10_000)
         run_twin()
-    traced = ensemble.trace(p, c, ensemble.Span(10_000 * PERIOD_S, 0.0, 1))
+    traced = traces.trace(p, c, ensemble.Span(10_000 * PERIOD_S, 0.0, 1))
     np.testing.assert_allclose(traced.mirror_rad[:, 0], theirs[:, 0], rtol=0.0, atol=1e-9 * np.abs(theirs).max())
     steps = PIECE * STEPS * runs
     kernel, noise, c_step = (times[name] / steps * 1e9 for name in ("kernel", "noisy", "twin"))

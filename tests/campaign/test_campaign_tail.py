@@ -27,7 +27,8 @@ from microrad.campaign.work import Evaluator
 from microrad.core.arrays import Floats
 from microrad.core.threads import in_threads
 from microrad.loop.pointing_loop import linear
-from microrad.loop.pointing_loop.ensemble import LANES, bin_edges_rad, histogram_quantile
+from microrad.loop.pointing_loop.ensemble import bin_edges_rad, histogram_quantile
+from microrad.loop.pointing_loop.kernel_arrays import LANES
 from microrad.mission.file import load_mission
 from microrad.report import campaign_words
 from microrad.report.quantities import quantity

@@ -11,8 +11,9 @@ from scipy import stats
 from microrad.campaign.tilt import PLAIN, Tilt, drawn, end_covariance, level_of, radius_of, tilt, tilted
 from microrad.loop import disturbance
 from microrad.loop.controller_study import designs, parts, scenario
-from microrad.loop.pointing_loop import ensemble, linear
-from microrad.loop.pointing_loop.ensemble import LANES, Span
+from microrad.loop.pointing_loop import ensemble, linear, traces
+from microrad.loop.pointing_loop.ensemble import Span
+from microrad.loop.pointing_loop.kernel_arrays import LANES
 from microrad.loop.pointing_loop.loop import assemble
 from microrad.mission.file import load_mission
 from scenes import scene_of
@@ -282,7 +283,7 @@ def test_towards_no_error_the_runs_are_plain_bit_for_bit(scene, controller):
     longer = replace(SPAN, duration_s=SPAN.duration_s + scene.loop.timing.period_s)
     aimed, _ = tilted(scene.loop, controller, SPAN, tilt(scene.loop, controller, SPAN, 5e-6), 0)
     for run in (0, 41):
-        error = ensemble.trace(scene.loop, controller, longer, run).error_rad[-1]
+        error = traces.trace(scene.loop, controller, longer, run).error_rad[-1]
         assert math.sqrt(np.sum(error**2)) == radius[run]
         assert aimed[run] != radius[run]
 

@@ -14,7 +14,7 @@ from numpy.testing import assert_allclose
 from microrad import mirror
 from microrad.loop import control, controller_study
 from microrad.loop.controller_study import designs, parts, results, scenario
-from microrad.loop.pointing_loop import ensemble
+from microrad.loop.pointing_loop import ensemble, traces
 from microrad.loop.pointing_loop.design import design_plant
 from microrad.loop.pointing_loop.linear import close, stationary
 from microrad.loop.pointing_loop.loop import assemble
@@ -338,11 +338,11 @@ def test_a_part_that_is_left_out_leaves_the_others_as_they_were(scene, tuned):
     loop = parts.without(scene.loop, parts.HYSTERESIS, parts.QUANTISATION, parts.LIMITS)
     design, span = by_name(tuned[0])["PI"], ensemble.Span(0.05, 0.0, 3)
     names = parts.sources(loop)
-    whole = ensemble.trace(loop, design.controller, span).error_rad
+    whole = traces.trace(loop, design.controller, span).error_rad
     total = np.zeros_like(whole)
     for name in names:
         alone = parts.without(loop, *(n for n in names if n != name))
-        total += ensemble.trace(alone, design.controller, span).error_rad
+        total += traces.trace(alone, design.controller, span).error_rad
     assert_allclose(total, whole, atol=1e-9 * np.abs(whole).max())
     assert np.abs(whole).max() > 1e-6
 

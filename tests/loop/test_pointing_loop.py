@@ -15,7 +15,7 @@ from microrad.core import kernels, lti
 from microrad.loop import control, disturbance
 from microrad.loop.control import AxisController, Drive, Timing
 from microrad.loop.disturbance import Disturbance, Reference
-from microrad.loop.pointing_loop import ensemble, linear
+from microrad.loop.pointing_loop import ensemble, kernel_arrays, linear, traces
 from microrad.loop.pointing_loop import loop as fine
 from microrad.loop.pointing_loop.design import (
     LINE_DAMPING,
@@ -416,7 +416,7 @@ def measured_sensitivity(loop, controller, freqs_hz=LINES_HZ, settle_s=3.0, ampl
     for axis in range(loop.axes):
         given = [STILL] * loop.axes
         given[axis] = Multisine(freqs_hz, amplitude_rad)
-        found = ensemble.trace(
+        found = traces.trace(
             replace(loop, references=tuple(given)), controller, Span(settle_s + 5 * per_line * period, 0.0, 1)
         )
         last = slice(-4 * per_line, None)
@@ -520,7 +520,7 @@ def test_a_line_leaves_in_theory_what_it_leaves_simulated_whatever_the_rate_of_t
 @pytest.mark.parametrize("every", [1, 2])
 def test_a_line_drives_the_mirror_in_theory_as_it_does_simulated(every):
     loop, controller = on_a_line(300.0, every, timing=Timing(2e-4, 1, 1))
-    traced = ensemble.trace(loop, controller, Span(2.0, 0.0, 1))
+    traced = traces.trace(loop, controller, Span(2.0, 0.0, 1))
     theory = linear.stationary(linear.close(loop, controller))
     assert_allclose(np.mean(traced.drive_v[5000:] ** 2, axis=0), theory.drive, rtol=1e-4)
     assert_allclose(np.mean(traced.error_rad[5000:] ** 2, axis=0), theory.error, rtol=1e-4)
@@ -780,7 +780,7 @@ def test_a_controller_with_a_number_that_is_not_finite_is_refused_by_the_matrix(
     else:
         matrix = with_one(getattr(controller.system, key), bad)
         spoiled = replace(controller, system=replace(controller.system, **{key: matrix}))
-    ensemble.check_controller(loop, controller)
+    kernel_arrays.check_controller(loop, controller)
     with pytest.raises(ValueError, match=f"controller 'PI': matrix {key} holds a number that is not finite"):
         ensemble.run(loop, spoiled, Span(0.1, 0.0, 1), 1)
 
@@ -794,14 +794,14 @@ def with_one(matrix, value):
 def test_a_controller_of_the_wrong_size_is_refused_by_the_matrix_and_the_size_that_would_do():
     loop, one = scenario(2), scenario(1)
     with pytest.raises(ValueError) as refused:
-        ensemble.trace(loop, pi_for(one), Span(0.1, 0.0, 1))
+        traces.trace(loop, pi_for(one), Span(0.1, 0.0, 1))
     words = "controller 'PI': matrix B has the shape (1, 3), the loop needs (1, 6)"
     assert words + " (2 optical, 2 gauge and 2 reference inputs; 2 outputs)" in str(refused.value)
     s = pi_for(loop).system
     for key, wrong in (("C", s.C[:1]), ("D", s.D[:, :5])):
         shaped = replace(pi_for(loop), system=replace(s, **{key: wrong}))
         with pytest.raises(ValueError, match=rf"matrix {key} has the shape \({wrong.shape[0]}, {wrong.shape[1]}\)"):
-            ensemble.check_controller(loop, shaped)
+            kernel_arrays.check_controller(loop, shaped)
 
 
 @pytest.mark.parametrize(("key", "shape"), [("A", "(2, 3)"), ("L", "(1, 2)"), ("L", "(2, 1)"), ("L", "(2, 3)")])
@@ -811,7 +811,7 @@ def test_a_controller_whose_state_matrix_or_anti_windup_does_not_fit_is_refused(
     wrong = np.zeros(tuple(int(n) for n in shape[1:-1].split(", ")))
     given = {"anti_windup": wrong} if key == "L" else {"system": replace(good.system, A=wrong)}
     with pytest.raises(ValueError, match=rf"matrix {key} has the shape \({shape[1:-1]}\), the loop needs \(2, 2\)"):
-        ensemble.check_controller(loop, replace(good, **given))
+        kernel_arrays.check_controller(loop, replace(good, **given))
 
 
 def test_a_controller_that_reads_a_gauge_that_is_not_there_is_refused():
@@ -829,7 +829,7 @@ def test_a_run_without_anything_behind_its_settling_time_is_refused():
     with pytest.raises(ValueError, match=message):
         ensemble.run(loop, controller, Span(0.5, 0.5, 1), 1)
     with pytest.raises(ValueError, match="make the run longer"):
-        ensemble.trace(loop, controller, Span(0.1, -0.1, 1))
+        traces.trace(loop, controller, Span(0.1, -0.1, 1))
 
 
 @pytest.mark.parametrize("runs", [0, -3])
@@ -854,18 +854,18 @@ def test_two_disturbances_of_one_name_on_an_axis_are_refused():
     with pytest.raises(ValueError, match="share a name: OLYMPUS, OLYMPUS; give each its own"):
         ensemble.run(twice, controller, Span(0.1, 0.0, 1), 1)
     with pytest.raises(ValueError, match="share a name"):
-        ensemble.trace(twice, controller, Span(0.1, 0.0, 1))
+        traces.trace(twice, controller, Span(0.1, 0.0, 1))
 
 
 def test_two_disturbances_whose_names_come_to_the_same_random_numbers_are_refused():
     loop, controller = VARIANTS["one axis"]()
     one, other = (replace(disturbance.olympus(), name=name) for name in ("drive x", "gyro x"))
-    assert ensemble.purpose_of(one.name, 0) == ensemble.purpose_of(other.name, 0)
+    assert kernel_arrays.purpose_of(one.name, 0) == kernel_arrays.purpose_of(other.name, 0)
     message = "'drive x' and 'gyro x' of one axis would take the same random numbers.*change one of the names"
     with pytest.raises(ValueError, match=message):
         ensemble.run(replace(loop, disturbances=((one, other),)), controller, Span(0.1, 0.0, 1), 1)
     two = replace(scenario(2), disturbances=((one,), (other,)))  # an axis has its own
-    assert np.unique(ensemble.combined_shaping(two).purpose).size == 2
+    assert np.unique(kernel_arrays.combined_shaping(two).purpose).size == 2
 
 
 def test_a_disturbance_out_of_modal_form_is_refused():
@@ -967,7 +967,7 @@ def test_a_trace_is_the_run_of_its_number(run):
     loop, controller = noisy()
     loop = replace(loop, timing=Timing(2e-4, 1, 1))
     found = ensemble.run(loop, controller, Span(0.4, 0.1, 3), 70)
-    traced = ensemble.trace(loop, controller, Span(0.4002, 0.1, 3), run)
+    traced = traces.trace(loop, controller, Span(0.4002, 0.1, 3), run)
     errors = traced.error_rad[501:2001]
     radial = np.hypot(*errors.T)
     assert_allclose(found.rms_rad[run], np.sqrt(np.mean(errors**2, axis=0)), rtol=1e-12)
@@ -980,7 +980,7 @@ def test_a_trace_is_the_run_of_its_number(run):
 def test_the_mean_is_that_of_the_control_samples_and_the_rms_that_of_all_plant_steps():
     loop, controller = noisy(1)
     found = ensemble.run(loop, controller, Span(0.2, 0.1, 1), 1)
-    errors = ensemble.trace(loop, controller, Span(0.2002, 0.1, 1)).error_rad[501:]
+    errors = traces.trace(loop, controller, Span(0.2002, 0.1, 1)).error_rad[501:]
     assert_allclose(found.mean_rad[0], np.mean(errors, axis=0), rtol=1e-9)
     assert_allclose(found.rms_rad[0], np.sqrt(np.mean(errors**2, axis=0)), rtol=0.01)
     assert not np.allclose(found.rms_rad[0], np.sqrt(np.mean(errors**2, axis=0)), rtol=1e-9, atol=0)
@@ -996,9 +996,9 @@ def test_runs_side_by_side_have_references_of_their_own():
         (Reference(k * 3 * URAD, k * URAD, 1.0 + k), Reference(-k * URAD, 0.0, 1.0)) for k in range(kernels.LANES + 2)
     ]
     span = Span(0.02, 0.0, 5)
-    errors, turned = ensemble.side_by_side(loop, controller, span, each, first_run=7)
+    errors, turned = traces.side_by_side(loop, controller, span, each, first_run=7)
     for k in (0, 1, kernels.LANES - 1, kernels.LANES, kernels.LANES + 1):
-        alone = ensemble.trace(replace(loop, references=each[k]), controller, span, 7 + k)
+        alone = traces.trace(replace(loop, references=each[k]), controller, span, 7 + k)
         assert_array_equal(errors[k], alone.error_rad)
         assert_array_equal(turned[k], alone.mirror_rad)
     assert not np.allclose(errors[0], errors[1], rtol=0.0, atol=URAD)
@@ -1008,7 +1008,7 @@ def test_a_trace_adds_up():
     """Reference and disturbance less the mirror is the error; the sensor reads it with its noise, one sample late."""
     loop, controller = VARIANTS["two coupled axes"]()
     loop = replace(loop, optical=OpticalSensor(URAD, inf, 0.0, 1, 10), references=(Reference(7 * URAD, 0, 1), STILL))
-    traced = ensemble.trace(loop, controller, Span(1.0, 0.0, 1), 3)
+    traced = traces.trace(loop, controller, Span(1.0, 0.0, 1), 3)
     assert_allclose(traced.time_s, np.arange(5000) * 2e-4, rtol=1e-12)
     assert_allclose(traced.reference_rad, np.tile([7 * URAD, 0.0], (5000, 1)), rtol=1e-12)
     line_of_sight = traced.mirror_rad @ loop.optics.T
@@ -1023,17 +1023,17 @@ def test_a_trace_adds_up():
 def test_disturbances_of_the_two_axes_and_of_two_runs_are_independent():
     loop, controller = noisy()
     loop = replace(loop, disturbances=((disturbance.first_order(1e-12, 200.0, convention="per-axis"),),) * 2)
-    one, other = (ensemble.trace(loop, controller, Span(2.0, 0.0, 1), run).disturbance_rad for run in (0, 1))
+    one, other = (traces.trace(loop, controller, Span(2.0, 0.0, 1), run).disturbance_rad for run in (0, 1))
     for a, b in ((one[:, 0], one[:, 1]), (one[:, 0], other[:, 0])):
         assert abs(np.corrcoef(a, b)[0, 1]) < 0.1  # 10 000 samples of 0.8 ms correlation: 4 standard deviations
-    assert_array_equal(one, ensemble.trace(loop, controller, Span(2.0, 0.0, 1), 0).disturbance_rad)
+    assert_array_equal(one, traces.trace(loop, controller, Span(2.0, 0.0, 1), 0).disturbance_rad)
 
 
 def test_a_disturbance_of_many_inputs_shares_no_random_numbers_with_the_next_axis():
     several = [disturbance.first_order(1e-12, 3.0 * 1.3**i, convention="per-axis", name=f"{i}") for i in range(20)]
     broad = replace(disturbance.combine(*several), name="broad")
     loop = scenario(2, disturbances=((broad,), (broad,)))
-    purposes = ensemble.combined_shaping(loop).purpose
+    purposes = kernel_arrays.combined_shaping(loop).purpose
     assert np.unique(purposes).size == purposes.size
 
 
@@ -1041,7 +1041,7 @@ def test_a_disturbance_line_starts_at_another_phase_in_each_run_and_axis():
     line = disturbance.wheels(250.0, (1.0,), (URAD / 250.0**2,), convention="per-axis")
     loop = quiet(scenario(2))
     loop = replace(loop, disturbances=((line,), (line,)))
-    runs = [ensemble.trace(loop, pi_for(loop), Span(0.004, 0.0, 1), run).disturbance_rad for run in range(40)]
+    runs = [traces.trace(loop, pi_for(loop), Span(0.004, 0.0, 1), run).disturbance_rad for run in range(40)]
     turned = np.mean(np.array(runs) * np.exp(-0.1j * pi * np.arange(20))[:, None], axis=1)  # 250 Hz: one turn
     assert_allclose(np.abs(turned), 0.5 * URAD, rtol=1e-9)
     phases = np.angle(turned).ravel() / (2 * pi) + 0.5
@@ -1051,7 +1051,7 @@ def test_a_disturbance_line_starts_at_another_phase_in_each_run_and_axis():
 
 def test_a_late_sensor_reads_the_error_at_the_begin_until_it_has_others():
     loop = replace(scenario(optical=OpticalSensor(0.0, inf, 0.0, 1, 23)), references=(Reference(7 * URAD, 0, 1),))
-    traced = ensemble.trace(loop, pi_for(loop, 60.0), Span(0.01, 0.0, 1))
+    traced = traces.trace(loop, pi_for(loop, 60.0), Span(0.01, 0.0, 1))
     assert_array_equal(traced.measured_rad[:3], np.broadcast_to(traced.error_rad[0], (3, 1)))
     assert abs(traced.error_rad[0, 0] - 7 * URAD) > URAD  # OLYMPUS is in it
     assert traced.measured_rad[4, 0] != traced.error_rad[0, 0]
@@ -1077,7 +1077,7 @@ def test_leaving_a_disturbance_out_changes_nothing_of_the_others():
     controller = pi_for(loop)
 
     def traced(loop):
-        found = ensemble.trace(loop, controller, Span(0.3, 0.0, 11), 2)
+        found = traces.trace(loop, controller, Span(0.3, 0.0, 11), 2)
         return np.hstack([found.error_rad, found.disturbance_rad, found.drive_v])
 
     silent = quiet(replace(loop, references=(STILL, STILL)))
@@ -1093,7 +1093,7 @@ def test_leaving_a_disturbance_out_changes_nothing_of_the_others():
 def test_quantiles_from_the_histogram_are_those_of_the_trace_within_1_percent():
     loop, controller = noisy()
     found = ensemble.run(loop, controller, Span(4.1, 0.1, 3), 1)
-    traced = ensemble.trace(loop, controller, Span(4.1002, 0.1, 3), 0)
+    traced = traces.trace(loop, controller, Span(4.1002, 0.1, 3), 0)
     radial = np.hypot(*traced.error_rad[501:].T)
     assert radial.size == found.samples == found.histogram.sum()
     for share in (0.01, 0.1, 0.5, 0.9, 0.99, 0.997):
@@ -1205,7 +1205,7 @@ def test_beyond_its_stroke_the_loop_counts_stays_bounded_and_recovers(size):
     """20 ms behind an excursion beyond the stroke the error is that of one that stays within; windup would not end."""
     loop, controller = excursion(size)
     span = Span(0.6, 0.0, 1)
-    found, traced = ensemble.run(loop, controller, span, 1), ensemble.trace(loop, controller, span)
+    found, traced = ensemble.run(loop, controller, span, 1), traces.trace(loop, controller, span)
     out = slice(600, 2000)
     assert_allclose(traced.drive_v[out], 6.0 * np.sign(size), rtol=1e-9)
     assert np.max(np.abs(traced.drive_v)) <= 6.0
@@ -1214,19 +1214,19 @@ def test_beyond_its_stroke_the_loop_counts_stays_bounded_and_recovers(size):
     assert_allclose(found.share(kernels.COUNT_OUTSIDE), 0.5, atol=0.01)  # beyond 3 V either way
     assert found.counts[0, kernels.COUNT_SLEW] > 0
     assert np.max(np.abs(traced.drive_v[1:] - traced.drive_v[:-1])) <= 2e4 * 2e-4 * (1 + 1e-12)
-    within = ensemble.trace(excursion(0.9 * np.sign(size))[0], controller, span)
+    within = traces.trace(excursion(0.9 * np.sign(size))[0], controller, span)
     late = slice(2100, None)
     assert np.max(np.abs(traced.error_rad[late] - within.error_rad[late])) < 0.05 * URAD
     assert np.max(np.abs(traced.error_rad[late])) < 0.05 * URAD
     winding = replace(controller, anti_windup=np.zeros_like(controller.anti_windup))
-    assert np.min(np.abs(ensemble.trace(loop, winding, span).error_rad[late])) > 400 * URAD
+    assert np.min(np.abs(traces.trace(loop, winding, span).error_rad[late])) > 400 * URAD
 
 
 def test_within_its_stroke_nothing_is_counted():
     loop, controller = excursion(0.3, drive=Drive(-6.0, 6.0, 1e3, 1e6, 0.0, 0.0))
     found = ensemble.run(loop, controller, Span(0.6, 0.0, 1), 1)
     assert_array_equal(found.counts, 0.0)
-    assert np.all(np.abs(ensemble.trace(loop, controller, Span(0.4, 0.0, 1)).error_rad[1600:]) < 0.05 * URAD)
+    assert np.all(np.abs(traces.trace(loop, controller, Span(0.4, 0.0, 1)).error_rad[1600:]) < 0.05 * URAD)
 
 
 def test_what_happens_while_the_loop_settles_is_not_counted():
@@ -1261,7 +1261,7 @@ def test_an_axis_beyond_its_stroke_leaves_the_other_as_it_is():
     loop = scenario(2, drive=Drive(-6.0, 6.0, 1e3, 2e4, 0.0, 0.0))
     away = replace(loop, references=(Excursion(2e-3, 0.01, 0.05), STILL))
     controller = pi_for(loop)
-    near, far = (ensemble.trace(each, controller, Span(0.1, 0.0, 1)) for each in (loop, away))
+    near, far = (traces.trace(each, controller, Span(0.1, 0.0, 1)) for each in (loop, away))
     assert np.max(np.abs(far.drive_v[:, 0])) > 5.999
     assert np.max(np.abs(near.drive_v[:, 0])) < 1.0
     for field in ("error_rad", "drive_v", "measured_rad"):
@@ -1272,7 +1272,7 @@ def test_a_lost_spot_is_counted_its_last_reading_held_and_the_loop_recovers():
     """The reading from before the excursion stays for its 0.3 s; the loop integrates that, and is back 20 ms after."""
     seen = 200 * URAD
     loop, controller = excursion(0.6, optical=OpticalSensor(0.0, seen, 0.0, 1, 0))
-    traced = ensemble.trace(loop, controller, Span(0.6, 0.0, 1))
+    traced = traces.trace(loop, controller, Span(0.6, 0.0, 1))
     found = ensemble.run(loop, controller, Span(0.6, 0.0, 1), 1)
     lost = np.abs(traced.error_rad[:, 0]) > seen
     assert found.counts[0, kernels.COUNT_LOST] == np.sum(lost) > 1400

@@ -17,7 +17,7 @@ from microrad.link import study as link_study
 from microrad.loop import control, controller_study
 from microrad.loop.controller_study import designs
 from microrad.loop.disturbance import Reference
-from microrad.loop.pointing_loop import ensemble
+from microrad.loop.pointing_loop import ensemble, traces
 from microrad.loop.pointing_loop.loop import assemble
 from microrad.mission.file import LinkFile, load_mission
 from microrad.study import contact_run
@@ -221,7 +221,7 @@ def test_the_residual_of_a_window_is_the_ensembles_with_the_same_references(file
     loop = replace(scene.loop, references=(Reference(30e-6 + lag, 0.0, 0.1), scene.loop.references[1]))
     span = ensemble.Span(2.0, 0.5, 7)
     for number in (0, 3):
-        error = ensemble.trace(loop, design.controller, span, number).error_rad[2500:]
+        error = traces.trace(loop, design.controller, span, number).error_rad[2500:]
         assert_allclose(windows[number].radial_rad, np.hypot(error[:, 0], error[:, 1]), rtol=1e-9, atol=1e-15)
     together = ensemble.run(loop, design.controller, span, 64)
     single = np.sqrt(np.sum(together.rms_rad**2, axis=1))[:4]

@@ -18,7 +18,7 @@ from microrad.campaign.records import CampaignError, Chunk, Failed, Job, WorstTr
 from microrad.core import kernels
 from microrad.core.arrays import Floats
 from microrad.loop.control import AxisController
-from microrad.loop.pointing_loop import ensemble
+from microrad.loop.pointing_loop import ensemble, traces
 from microrad.loop.pointing_loop.loop import LoopController, PointingLoop
 from microrad.mission.file import LinkFile
 
@@ -222,7 +222,7 @@ class Evaluator:
             raise CampaignError(file)
         beat()
         loop, span = loops.row_loop(file, table), loops.span(self.campaign, loops.settings(file))
-        found = ensemble.trace(loop, self.controller(cell), span, row * self.campaign.realisations)
+        found = traces.trace(loop, self.controller(cell), span, row * self.campaign.realisations)
         settled = found.time_s >= span.settle_s
         return WorstTrace(
             cell, row, "", math.nan, found.time_s[settled], found.error_rad[settled], found.drive_v[settled]
@@ -249,7 +249,7 @@ class Work:
         assert table is not None
         period = 1.0 / loops.settings(self.campaign.mission).rate_hz
         loop, controller = loops.row_loop(self.campaign.mission, table), self.evaluator.controller(0)
-        ensemble.trace(loop, controller, ensemble.Span(2.0 * period, 0.0, 0))
+        traces.trace(loop, controller, ensemble.Span(2.0 * period, 0.0, 0))
 
     def do(self, job: Job, beat: Beat) -> bytes:
         """A chunk (`blob.pack_chunk`), a chunk of one row, or a trace (`blob.pack_trace`), as the job asks."""

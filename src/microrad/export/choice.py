@@ -34,7 +34,7 @@ from microrad.link.tracking_light import tracking_light_w
 from microrad.loop import control, controller_study, paper_cases, sine_run
 from microrad.loop.paper_cases import PID, PID_WITH_INVERSE
 from microrad.loop.pointing_loop.loop import LoopController
-from microrad.loop.pointing_loop.replay import replay
+from microrad.loop.pointing_loop.traces import replay
 from microrad.mirror import Variant, model
 from microrad.mission.file import MissionFile
 from microrad.mission.model import Scenario

@@ -14,9 +14,8 @@ from microrad.loop.control import inverse
 from microrad.loop.controller_study import parts
 from microrad.loop.controller_study.designs import BASELINE, Design
 from microrad.loop.controller_study.scenario import BODY_POINTING, Scene, with_mirror
-from microrad.loop.pointing_loop import ensemble
-from microrad.loop.pointing_loop.design import residual_spectrum
-from microrad.loop.pointing_loop.linear import Stationary, close, stationary
+from microrad.loop.pointing_loop import ensemble, kernel_arrays
+from microrad.loop.pointing_loop.linear import Stationary, close, residual_spectrum, stationary
 from microrad.loop.pointing_loop.loop import LoopController, PointingLoop
 from microrad.mirror import Variant
 from microrad.mission.tables.fine_pointing import FinePointing
@@ -187,7 +186,7 @@ def outlook(
     scene: Scene, designs: Sequence[Design], on_progress: Progress = lambda done, total, what: None
 ) -> tuple[Outlook, ...]:
     """Each design beside its linear figure, simulated in one batch of the mission's runs with its hysteresis."""
-    whole, runs = span(scene.table), min(scene.table.runs, ensemble.LANES)
+    whole, runs = span(scene.table), min(scene.table.runs, kernel_arrays.LANES)
     few = replace(whole, duration_s=min(whole.duration_s, whole.settle_s + FEW_SAMPLES * scene.loop.timing.period_s))
     cases = [_case(scene.loop, d.controller) for d in designs]
     found = ensemble.several(cases, few, runs, _telling(on_progress, "simulating controllers"))
@@ -304,7 +303,7 @@ def sines(
                 cases.append(_case(tracking, design.controller))
                 what.append((design.name, variant, freq))
     short = ensemble.Span(SINE_S, SINE_SETTLE_S, f.seed)
-    runs = ensemble.several(cases, short, ensemble.LANES, _telling(on_progress, "sines under vibration and noise"))
+    runs = ensemble.several(cases, short, kernel_arrays.LANES, _telling(on_progress, "sines under vibration and noise"))
     return tuple(
         Sine(name, variant, freq, run.radial_rms_rad, run.quantile_rad(f.quantile))
         for (name, variant, freq), run in zip(what, runs, strict=True)

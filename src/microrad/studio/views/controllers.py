@@ -25,7 +25,7 @@ from microrad.loop.controller_study.designs import families
 from microrad.loop.controller_study.results import for_mirror
 from microrad.loop.controller_study.scenario import BODY_POINTING, with_mirror
 from microrad.loop.disturbance import Reference
-from microrad.loop.pointing_loop import ensemble, linear
+from microrad.loop.pointing_loop import ensemble, linear, traces
 from microrad.loop.pointing_loop.loop import LoopController, PointingLoop
 from microrad.mirror import Variant
 from microrad.mission.file import MissionFile
@@ -257,7 +257,7 @@ def _first_reference(loop: PointingLoop, first: Reference) -> PointingLoop:
 
 
 def _curve(loop: PointingLoop, of: LoopController, span: ensemble.Span, from_s: float) -> Curve:
-    run = ensemble.trace(loop, of, span)
+    run = traces.trace(loop, of, span)
     shown = run.time_s >= from_s - 1e-12
     wanted = run.reference_rad[shown]
     error = run.error_rad[shown]
