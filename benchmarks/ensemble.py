@@ -103,16 +103,16 @@ def many_runs(runs: int = 1000, seconds: float = 10.0) -> None:
     p, c, _ = scene()
     p = replace(p, disturbances=((disturbance.olympus(),),), optical=replace(p.optical, noise_rad=1e-6))
     span = ensemble.Span(seconds, 1.0, 1)
-    ensemble.run(p, c, replace(span, duration_s=1.1), 1)
+    ensemble.simulate(p, c, replace(span, duration_s=1.1), 1)
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     began = time.perf_counter()
-    two = ensemble.run(p, c, span, runs, threads=2)
+    two = ensemble.simulate(p, c, span, runs, threads=2)
     took = time.perf_counter() - began
     grown = (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / 1024
     print(f"\n{runs} runs of {seconds:g} s at 50 kHz with disturbance and noise: {took:.1f} s on two threads")
     print(f"  {runs * seconds / took:.0f} times real time; memory grew by {grown:.0f} MB above one run")
     print(f"  rms {two.axis_rms_rad[0] * 1e6:.3f} µrad, 99.7 % {two.quantile_rad(0.997) * 1e6:.3f} µrad")
-    one = ensemble.run(p, c, span, 128, threads=1)
+    one = ensemble.simulate(p, c, span, 128, threads=1)
     same = np.array_equal(one.rms_rad, two.rms_rad[:128]) and np.array_equal(one.histogram, two.histogram[:128])
     print(f"  the first 128 runs on one thread: {'identical' if same else 'DIFFERENT'}")
 

@@ -254,7 +254,7 @@ def test_the_tail_with_a_line(gaussian, controller):
 
 def test_with_hysteresis_and_limits_the_tail_is_that_of_plain_runs(scene, mission, controller):
     loop = scenario.with_mirror(scene.loop, scene.mirrors, "comparison")
-    plain = ensemble.run(loop, controller, Span(1.6, 0.5, 8), 3 * LANES)
+    plain = ensemble.simulate(loop, controller, Span(1.6, 0.5, 8), 3 * LANES)
     counts = plain.histogram.astype(float)
     span = Span(1.0, 0.5, 3)
     edges = ensemble.bin_edges_rad()

@@ -16,7 +16,7 @@ from microrad.loop import controller_study
 
 file = load_mission({path!r})
 scene = controller_study.scene(file, mirror.of(file.mission), tracking_light_w(file))
-found = controller_study.run_one(scene, {name!r})
+found = controller_study.design_and_simulate_one(scene, {name!r})
 print(found.design.tuned.values)
 for variant, of in sorted(found.simulated.items()):
     print(variant, of.rms_rad, of.quantile_rad, of.largest_rad)

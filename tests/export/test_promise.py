@@ -41,7 +41,7 @@ def test_the_simulated_figure_is_that_of_the_missions_runs(light):
     scene = scene_of(file)
     (made,) = controller_study.design(scene, only=(controller_study.BASELINE,))
     (left,) = controller_study.outlook(scene, [made])
-    run = ensemble.run(scene.loop, made.controller, ensemble.Span(0.4, 0.1, file.mission.fine_pointing.seed), 4)
+    run = ensemble.simulate(scene.loop, made.controller, ensemble.Span(0.4, 0.1, file.mission.fine_pointing.seed), 4)
     assert left.simulated_rad == pytest.approx(math.sqrt((run.axis_rms_rad**2).mean()), rel=1e-12)
     assert left.linear_rad == made.tuned.residual_rms_rad
     assert controller_study.Outlook(1.0, 1.5).holds

@@ -192,7 +192,7 @@ def test_with_wheel_lines_the_tuned_loop_beats_the_best_pi_by_20_percent(tmp_pat
     }.items():
         assert found.margins.modulus >= 0.5
         controller = assemble(name, straight, found.controller)
-        run = ensemble.run(straight, controller, results.span(m.fine_pointing), 64)
+        run = ensemble.simulate(straight, controller, results.span(m.fine_pointing), 64)
         theory = stationary(close(straight, controller)).radial_rms_rad
         assert_allclose(run.radial_rms_rad, theory, rtol=0.02)
         rms[name] = run.radial_rms_rad
@@ -239,7 +239,7 @@ def test_halving_the_plant_step_moves_no_residual_by_one_percent(scene, file, tu
     design = by_name(tuned[0])["PI"]
     fine = replace(scene.loop, timing=control.Timing(2e-4, 10, 10))
     span = ensemble.Span(1.5, 0.5, 1)
-    coarse, halved = (ensemble.run(loop, design.controller, span, 64) for loop in (scene.loop, fine))
+    coarse, halved = (ensemble.simulate(loop, design.controller, span, 64) for loop in (scene.loop, fine))
     assert_allclose(halved.radial_rms_rad, coarse.radial_rms_rad, rtol=0.01)
     assert_allclose(halved.quantile_rad(0.997), coarse.quantile_rad(0.997), rtol=0.02)
 
@@ -263,7 +263,7 @@ def test_the_parts_of_the_error_budget_combine_where_the_loop_is_linear(scene, f
 def test_the_budget_takes_the_whole_from_what_is_simulated_already(scene, file, tuned, monkeypatch, name):
     """To the bit the rms that the whole loop and the one without hysteresis leave when they are simulated again."""
     (verified,) = controller_study.verify(scene, [by_name(tuned[0])[name]])
-    simulate, simulated = ensemble.several, []
+    simulate, simulated = ensemble.simulate_cases, []
 
     def counted(cases, *rest):
         simulated.extend(cases)
@@ -275,7 +275,7 @@ def test_the_budget_takes_the_whole_from_what_is_simulated_already(scene, file, 
     span, runs = results.span(file.mission.fine_pointing), file.mission.fine_pointing.runs
     straight = parts.without(scene.loop, parts.HYSTERESIS)
     full, together = (
-        ensemble.run(loop, results.for_mirror(verified.design.controller, loop), span, runs).radial_rms_rad
+        ensemble.simulate(loop, results.for_mirror(verified.design.controller, loop), span, runs).radial_rms_rad
         for loop in (scene.loop, straight)
     )
     assert (budget.full_rad, budget.together_rad) == (full, together)
@@ -328,7 +328,9 @@ def test_without_hysteresis_each_play_of_an_additive_mirror_keeps_its_own_route(
     tuned = designs.grid_baseline([design_plant(scene.axis)], control.Specification(0.5))
     controller = assemble("PI", scene.loop, tuned.controller)
     (found,) = controller_study.verify(scene, [designs.Design("PI", tuned, controller)])
-    straight = ensemble.run(parts.without(scene.loop, parts.HYSTERESIS), controller, results.span(m.fine_pointing), 64)
+    straight = ensemble.simulate(
+        parts.without(scene.loop, parts.HYSTERESIS), controller, results.span(m.fine_pointing), 64
+    )
     assert found.simulated["no hysteresis"].rms_rad == straight.radial_rms_rad
     assert_allclose(straight.radial_rms_rad, found.theory.radial_rms_rad, rtol=0.01)
 

@@ -23,9 +23,9 @@ from microrad.loop.pointing_loop.design import (
     close_axis,
     design_plant,
     narrow_band,
-    residual_spectrum,
 )
 from microrad.loop.pointing_loop.ensemble import Span
+from microrad.loop.pointing_loop.linear import residual_spectrum
 from microrad.loop.pointing_loop.loop import LoopController, PointingLoop
 from microrad.loop.sensor import OpticalSensor, StrainGauge
 from microrad.mirror import model as mirror
@@ -146,7 +146,7 @@ def test_a_first_order_loop_on_olympus_leaves_80_pi_over_1_plus_bandwidth(bandwi
     assert_allclose(2 * first_order_rad2(bandwidth_hz, period), theory, rtol=1.1e-3)
     loop, controller = first_order_loop(bandwidth_hz, period)
     settle = 5 / (2 * pi * bandwidth_hz)
-    found = ensemble.run(loop, controller, Span(settle + 2.5e5 * period, settle, 1), 64)
+    found = ensemble.simulate(loop, controller, Span(settle + 2.5e5 * period, settle, 1), 64)
     half = found.radial_rms_interval_rad()
     print(f"{bandwidth_hz:g} Hz: {found.radial_rms_rad / URAD:.4f} +- {half / URAD:.4f} urad radial")
     assert abs(found.radial_rms_rad - sqrt(theory)) < half
@@ -164,7 +164,7 @@ def test_at_50_khz_the_simulated_loop_is_the_sampled_one_and_not_the_continuous_
     """At 500 Hz and 50 kHz sampling adds 6 % to the variance: the ensemble tells the two closed forms apart."""
     sampled, continuous = sqrt(2 * first_order_rad2(500.0, 20e-6)), sqrt(80 * pi / 501) * URAD
     loop, controller = first_order_loop(500.0, 20e-6)
-    found = ensemble.run(loop, controller, Span(2.0, 0.01, 2), 64)
+    found = ensemble.simulate(loop, controller, Span(2.0, 0.01, 2), 64)
     assert abs(found.radial_rms_rad - sampled) < found.radial_rms_interval_rad()
     assert found.radial_rms_rad - continuous > 3 * found.radial_rms_interval_rad()
 
@@ -378,7 +378,7 @@ def test_white_sensor_noise_simulated_leaves_the_lyapunov_value_within_1_percent
     """Noise alone in the shipped loop; the 99 % interval of the variance is below 1 %."""
     loop = replace(scenario(2), disturbances=((), ()))
     controller = pi_for(loop)
-    found = ensemble.run(loop, controller, Span(2.0, 0.5, 3), 64)
+    found = ensemble.simulate(loop, controller, Span(2.0, 0.5, 3), 64)
     theory = linear.stationary(linear.close(loop, controller))
     assert 2 * found.radial_rms_interval_rad() < 0.01 * found.radial_rms_rad
     assert_allclose(found.radial_rms_rad**2, np.sum(theory.error), rtol=0.01)
@@ -443,7 +443,7 @@ def test_the_sensitivity_measured_by_multisine_is_the_designed_one_up_to_0_45_of
 @variants
 def test_without_hysteresis_the_simulated_residual_is_the_lyapunov_value(variant):
     loop, controller = VARIANTS[variant]()
-    found = ensemble.run(loop, controller, Span(1.3, 0.3, 4), 64)
+    found = ensemble.simulate(loop, controller, Span(1.3, 0.3, 4), 64)
     theory = linear.stationary(linear.close(loop, controller))
     assert_allclose(found.axis_rms_rad, np.sqrt(theory.error), rtol=0.01)
     assert abs(found.radial_rms_rad - theory.radial_rms_rad) < found.radial_rms_interval_rad()
@@ -512,7 +512,7 @@ def test_a_line_leaves_in_theory_what_it_leaves_simulated_whatever_the_rate_of_t
     """Also above half the sensor's rate, where the loop answers at other frequencies than the line's."""
     loop, controller = on_a_line(freq_hz, every)
     theory = linear.stationary(linear.close(loop, controller))
-    found = ensemble.run(loop, controller, Span(2.0, 1.0, 1), 64)
+    found = ensemble.simulate(loop, controller, Span(2.0, 1.0, 1), 64)
     assert_allclose(found.radial_rms_rad, theory.radial_rms_rad, rtol=1e-4)
     assert found.radial_rms_rad > 0.2 * URAD
 
@@ -533,7 +533,7 @@ def test_lines_and_noise_of_several_disturbances_add_up_on_two_axes_behind_a_slo
     loop = coupled(disturbances=(shaking, shaking), optical=OpticalSensor(URAD, inf, 0.0, 2, 0))
     controller = pi_for(loop, 100.0)
     theory = linear.stationary(linear.close(loop, controller))
-    found = ensemble.run(loop, controller, Span(1.3, 0.3, 4), 64)
+    found = ensemble.simulate(loop, controller, Span(1.3, 0.3, 4), 64)
     assert_allclose(found.axis_rms_rad, np.sqrt(theory.error), rtol=0.01)
     alone = linear.stationary(linear.close(replace(quiet(loop), disturbances=((lines,), (lines,))), controller))
     assert_allclose(theory.error_by_source["reaction wheel"], alone.error, rtol=1e-9)
@@ -548,7 +548,7 @@ def test_the_residual_spectrum_is_that_of_the_ensemble_within_its_interval(varia
     """Averaged over bands of 8 bins and more, each of which has 320 periodograms of 64 runs."""
     loop, controller = VARIANTS[variant]()
     segments = 5
-    found = ensemble.run(loop, controller, Span(0.3 + segments * 2048 * loop.timing.period_s, 0.3, 5), 64)
+    found = ensemble.simulate(loop, controller, Span(0.3 + segments * 2048 * loop.timing.period_s, 0.3, 5), 64)
     assert found.freq_hz.size == 1025
     predicted = residual_spectrum(linear.close(loop, controller), found.freq_hz)
     ratio = (found.psd_rad2_hz / predicted)[4:-1]  # the window takes in neighbours at the lowest frequencies
@@ -782,7 +782,7 @@ def test_a_controller_with_a_number_that_is_not_finite_is_refused_by_the_matrix(
         spoiled = replace(controller, system=replace(controller.system, **{key: matrix}))
     kernel_arrays.check_controller(loop, controller)
     with pytest.raises(ValueError, match=f"controller 'PI': matrix {key} holds a number that is not finite"):
-        ensemble.run(loop, spoiled, Span(0.1, 0.0, 1), 1)
+        ensemble.simulate(loop, spoiled, Span(0.1, 0.0, 1), 1)
 
 
 def with_one(matrix, value):
@@ -827,7 +827,7 @@ def test_a_run_without_anything_behind_its_settling_time_is_refused():
     loop, controller = VARIANTS["one axis"]()
     message = "a run of 0.5 s has nothing left behind a settling time of 0.5 s: make the run longer"
     with pytest.raises(ValueError, match=message):
-        ensemble.run(loop, controller, Span(0.5, 0.5, 1), 1)
+        ensemble.simulate(loop, controller, Span(0.5, 0.5, 1), 1)
     with pytest.raises(ValueError, match="make the run longer"):
         traces.trace(loop, controller, Span(0.1, -0.1, 1))
 
@@ -836,13 +836,13 @@ def test_a_run_without_anything_behind_its_settling_time_is_refused():
 def test_an_ensemble_without_a_run_is_refused(runs):
     loop, controller = VARIANTS["one axis"]()
     with pytest.raises(ValueError, match=f"an ensemble of {runs} runs has no statistics: ask for 1 run or more"):
-        ensemble.run(loop, controller, Span(0.1, 0.0, 1), runs)
+        ensemble.simulate(loop, controller, Span(0.1, 0.0, 1), runs)
 
 
 @pytest.mark.parametrize("samples", [1, 2, 3])
 def test_a_run_of_a_few_samples_has_finite_statistics(samples):
     loop, controller = VARIANTS["one axis"]()
-    found = ensemble.run(loop, controller, Span(0.1 + samples * 2e-4, 0.1, 1), 2)
+    found = ensemble.simulate(loop, controller, Span(0.1 + samples * 2e-4, 0.1, 1), 2)
     assert found.samples == found.histogram.sum(axis=1)[0] == samples
     assert np.all(np.isfinite(found.psd_rad2_hz))
     assert found.psd_rad2_hz.shape[0] == found.freq_hz.size
@@ -852,7 +852,7 @@ def test_two_disturbances_of_one_name_on_an_axis_are_refused():
     loop, controller = VARIANTS["one axis"]()
     twice = replace(loop, disturbances=((disturbance.olympus(), disturbance.olympus()),))
     with pytest.raises(ValueError, match="share a name: OLYMPUS, OLYMPUS; give each its own"):
-        ensemble.run(twice, controller, Span(0.1, 0.0, 1), 1)
+        ensemble.simulate(twice, controller, Span(0.1, 0.0, 1), 1)
     with pytest.raises(ValueError, match="share a name"):
         traces.trace(twice, controller, Span(0.1, 0.0, 1))
 
@@ -863,7 +863,7 @@ def test_two_disturbances_whose_names_come_to_the_same_random_numbers_are_refuse
     assert kernel_arrays.purpose_of(one.name, 0) == kernel_arrays.purpose_of(other.name, 0)
     message = "'drive x' and 'gyro x' of one axis would take the same random numbers.*change one of the names"
     with pytest.raises(ValueError, match=message):
-        ensemble.run(replace(loop, disturbances=((one, other),)), controller, Span(0.1, 0.0, 1), 1)
+        ensemble.simulate(replace(loop, disturbances=((one, other),)), controller, Span(0.1, 0.0, 1), 1)
     two = replace(scenario(2), disturbances=((one,), (other,)))  # an axis has its own
     assert np.unique(kernel_arrays.combined_shaping(two).purpose).size == 2
 
@@ -880,7 +880,7 @@ def test_a_disturbance_out_of_modal_form_is_refused():
     )
     loop, controller = VARIANTS["one axis"]()
     with pytest.raises(ValueError, match="states do not come in pairs: give its filter in modal form"):
-        ensemble.run(replace(loop, disturbances=((dense,),)), controller, Span(0.1, 0.0, 1), 1)
+        ensemble.simulate(replace(loop, disturbances=((dense,),)), controller, Span(0.1, 0.0, 1), 1)
 
 
 def test_a_response_by_frequency_of_a_slow_sensor_is_refused():
@@ -917,12 +917,12 @@ FIELDS = ("rms_rad", "mean_rad", "largest_rad", "histogram", "counts", "psd_rad2
 def test_results_are_those_of_the_run_whatever_the_threads_and_the_number_of_runs():
     loop, controller = noisy()
     span, told = Span(0.2, 0.05, 7), []
-    many = ensemble.run(loop, controller, span, 150, threads=1, on_progress=lambda *a: told.append(a))
+    many = ensemble.simulate(loop, controller, span, 150, threads=1, on_progress=lambda *a: told.append(a))
     assert told == [(64, 150, "PI"), (128, 150, "PI"), (150, 150, "PI")]
     assert many.rms_rad.shape == (150, 2)
     assert (many.samples, many.steps) == (750, 1500)
     for runs, threads in ((150, 2), (70, 2), (3, 1)):
-        other = ensemble.run(loop, controller, span, runs, threads=threads)
+        other = ensemble.simulate(loop, controller, span, runs, threads=threads)
         for field in FIELDS:
             mine, theirs = getattr(many, field), getattr(other, field)
             assert_array_equal(mine if field == "psd_rad2_hz" else mine[:runs], theirs)
@@ -941,8 +941,8 @@ def test_cases_that_share_what_they_draw_are_the_runs_that_each_would_be_alone()
     cases = [ensemble.Case(each, with_it) for each in loops for with_it in (controller, slow)]
     cases[3] = replace(cases[3], spectrum=False)
     span = Span(0.2, 0.05, 7)
-    for case, found in zip(cases, ensemble.several(cases, span, 70), strict=True):
-        alone = ensemble.run(case.loop, case.controller, span, 70)
+    for case, found in zip(cases, ensemble.simulate_cases(cases, span, 70), strict=True):
+        alone = ensemble.simulate(case.loop, case.controller, span, 70)
         for field in FIELDS:
             if field == "psd_rad2_hz" and not case.spectrum:
                 assert np.all(np.isnan(found.psd_rad2_hz)) and not np.any(np.isnan(alone.psd_rad2_hz))
@@ -953,7 +953,7 @@ def test_cases_that_share_what_they_draw_are_the_runs_that_each_would_be_alone()
 def test_another_seed_gives_other_numbers_and_the_same_seed_the_same():
     loop, controller = noisy()
     first, again, other, high = (
-        ensemble.run(loop, controller, Span(0.1, 0.0, seed), 64).rms_rad for seed in (1, 1, 2, 1 + (1 << 32))
+        ensemble.simulate(loop, controller, Span(0.1, 0.0, seed), 64).rms_rad for seed in (1, 1, 2, 1 + (1 << 32))
     )
     assert_array_equal(first, again)
     for another in (other, high):
@@ -966,7 +966,7 @@ def test_a_trace_is_the_run_of_its_number(run):
     """One plant step a sample: rms, mean and largest are those of the samples behind the settling time."""
     loop, controller = noisy()
     loop = replace(loop, timing=Timing(2e-4, 1, 1))
-    found = ensemble.run(loop, controller, Span(0.4, 0.1, 3), 70)
+    found = ensemble.simulate(loop, controller, Span(0.4, 0.1, 3), 70)
     traced = traces.trace(loop, controller, Span(0.4002, 0.1, 3), run)
     errors = traced.error_rad[501:2001]
     radial = np.hypot(*errors.T)
@@ -979,7 +979,7 @@ def test_a_trace_is_the_run_of_its_number(run):
 
 def test_the_mean_is_that_of_the_control_samples_and_the_rms_that_of_all_plant_steps():
     loop, controller = noisy(1)
-    found = ensemble.run(loop, controller, Span(0.2, 0.1, 1), 1)
+    found = ensemble.simulate(loop, controller, Span(0.2, 0.1, 1), 1)
     errors = traces.trace(loop, controller, Span(0.2002, 0.1, 1)).error_rad[501:]
     assert_allclose(found.mean_rad[0], np.mean(errors, axis=0), rtol=1e-9)
     assert_allclose(found.rms_rad[0], np.sqrt(np.mean(errors**2, axis=0)), rtol=0.01)
@@ -1092,7 +1092,7 @@ def test_leaving_a_disturbance_out_changes_nothing_of_the_others():
 
 def test_quantiles_from_the_histogram_are_those_of_the_trace_within_1_percent():
     loop, controller = noisy()
-    found = ensemble.run(loop, controller, Span(4.1, 0.1, 3), 1)
+    found = ensemble.simulate(loop, controller, Span(4.1, 0.1, 3), 1)
     traced = traces.trace(loop, controller, Span(4.1002, 0.1, 3), 0)
     radial = np.hypot(*traced.error_rad[501:].T)
     assert radial.size == found.samples == found.histogram.sum()
@@ -1122,7 +1122,7 @@ def test_the_ends_of_a_histogram_have_quantiles_too():
 
 def test_one_run_has_an_infinite_interval_and_two_have_a_finite_one():
     loop, controller = VARIANTS["one axis"]()
-    one, two = (ensemble.run(loop, controller, Span(0.1, 0.05, 1), runs) for runs in (1, 2))
+    one, two = (ensemble.simulate(loop, controller, Span(0.1, 0.05, 1), runs) for runs in (1, 2))
     assert one.radial_rms_interval_rad() == inf
     assert 0.0 < two.radial_rms_interval_rad() < inf
 
@@ -1131,7 +1131,7 @@ def test_the_interval_of_the_rms_is_the_spread_of_other_ensembles():
     """99 % intervals of 20 seeds cover the Lyapunov value as they should, and are as wide as the seeds differ."""
     loop, controller = VARIANTS["two and a half samples of delay"]()
     theory = linear.stationary(linear.close(loop, controller)).radial_rms_rad
-    found = [ensemble.run(loop, controller, Span(0.15, 0.1, seed), 64) for seed in range(20)]
+    found = [ensemble.simulate(loop, controller, Span(0.15, 0.1, seed), 64) for seed in range(20)]
     away = np.array([each.radial_rms_rad - theory for each in found])
     half = np.array([each.radial_rms_interval_rad(1.0) for each in found])
     assert 0.7 < np.std(away) / np.mean(half) < 1.4
@@ -1182,7 +1182,7 @@ def test_a_spectrum_holds_the_power_of_its_window(samples):
 def test_the_interval_of_the_rms_is_that_of_the_scatter_of_its_square():
     """Two runs with squares of 1 and 9: their mean is known to 4, the root of it to 4 / (2 sqrt 5)."""
     loop, controller = excursion(1.0)
-    found = ensemble.run(loop, controller, Span(0.01, 0.0, 1), 2)
+    found = ensemble.simulate(loop, controller, Span(0.01, 0.0, 1), 2)
     rms = np.zeros_like(found.rms_rad)
     rms[:, 0] = 1.0, 3.0
     assert replace(found, rms_rad=rms).radial_rms_interval_rad(1.0) == pytest.approx(2.0 / np.sqrt(5.0), rel=1e-12)
@@ -1192,7 +1192,7 @@ def test_the_interval_of_the_rms_is_that_of_the_scatter_of_its_square():
 def test_each_counter_is_a_share_of_what_it_counts():
     """Saturation and the inverse's rate by control sample, lost spots by reading, the rest by plant step."""
     loop, controller = excursion(1.0)
-    found = ensemble.run(loop, controller, Span(0.01, 0.0, 1), 2)
+    found = ensemble.simulate(loop, controller, Span(0.01, 0.0, 1), 2)
     found = replace(found, counts=np.full_like(found.counts, 60.0), samples=100, steps=500, readings=20)
     of = {kernels.COUNT_SATURATED: 100, kernels.COUNT_INVERSE_CLAMPED: 100, kernels.COUNT_LOST: 20}
     steps = (kernels.COUNT_SLEW, kernels.COUNT_CLAMPED, kernels.COUNT_OUTSIDE)
@@ -1205,7 +1205,7 @@ def test_beyond_its_stroke_the_loop_counts_stays_bounded_and_recovers(size):
     """20 ms behind an excursion beyond the stroke the error is that of one that stays within; windup would not end."""
     loop, controller = excursion(size)
     span = Span(0.6, 0.0, 1)
-    found, traced = ensemble.run(loop, controller, span, 1), traces.trace(loop, controller, span)
+    found, traced = ensemble.simulate(loop, controller, span, 1), traces.trace(loop, controller, span)
     out = slice(600, 2000)
     assert_allclose(traced.drive_v[out], 6.0 * np.sign(size), rtol=1e-9)
     assert np.max(np.abs(traced.drive_v)) <= 6.0
@@ -1224,14 +1224,14 @@ def test_beyond_its_stroke_the_loop_counts_stays_bounded_and_recovers(size):
 
 def test_within_its_stroke_nothing_is_counted():
     loop, controller = excursion(0.3, drive=Drive(-6.0, 6.0, 1e3, 1e6, 0.0, 0.0))
-    found = ensemble.run(loop, controller, Span(0.6, 0.0, 1), 1)
+    found = ensemble.simulate(loop, controller, Span(0.6, 0.0, 1), 1)
     assert_array_equal(found.counts, 0.0)
     assert np.all(np.abs(traces.trace(loop, controller, Span(0.4, 0.0, 1)).error_rad[1600:]) < 0.05 * URAD)
 
 
 def test_what_happens_while_the_loop_settles_is_not_counted():
     loop, controller = excursion(3.0)
-    found = ensemble.run(loop, controller, Span(0.6, 0.45, 1), 1)
+    found = ensemble.simulate(loop, controller, Span(0.6, 0.45, 1), 1)
     assert_array_equal(found.counts, 0.0)
     assert found.largest_rad[0] < URAD
     assert found.histogram.sum() == found.samples == 750
@@ -1251,7 +1251,7 @@ def test_what_happens_while_the_loop_settles_is_not_counted():
 def test_a_sensor_that_never_sees_its_spot_loses_each_of_its_readings(every, settle, samples, readings):
     """Readings fall on multiples of the sensor's period, wherever the settling ends."""
     loop = scenario(optical=OpticalSensor(URAD, 1e-12, 0.0, every, 0))
-    found = ensemble.run(loop, pi_for(loop, 50.0), Span((settle + samples) * 2e-4, settle * 2e-4, 1), 2)
+    found = ensemble.simulate(loop, pi_for(loop, 50.0), Span((settle + samples) * 2e-4, settle * 2e-4, 1), 2)
     assert found.readings == readings
     assert_array_equal(found.counts[:, kernels.COUNT_LOST], readings)
     assert found.share(kernels.COUNT_LOST) == (1.0 if readings else 0.0)
@@ -1273,13 +1273,13 @@ def test_a_lost_spot_is_counted_its_last_reading_held_and_the_loop_recovers():
     seen = 200 * URAD
     loop, controller = excursion(0.6, optical=OpticalSensor(0.0, seen, 0.0, 1, 0))
     traced = traces.trace(loop, controller, Span(0.6, 0.0, 1))
-    found = ensemble.run(loop, controller, Span(0.6, 0.0, 1), 1)
+    found = ensemble.simulate(loop, controller, Span(0.6, 0.0, 1), 1)
     lost = np.abs(traced.error_rad[:, 0]) > seen
     assert found.counts[0, kernels.COUNT_LOST] == np.sum(lost) > 1400
     assert_array_equal(traced.measured_rad[lost], traced.measured_rad[np.flatnonzero(lost) - 1])
     assert_array_equal(traced.measured_rad[~lost], traced.error_rad[~lost])
     assert np.max(np.abs(traced.error_rad[2100:])) < 0.05 * URAD
-    assert ensemble.run(*excursion(0.6), Span(0.6, 0.0, 1), 1).counts[0, kernels.COUNT_LOST] == 0
+    assert ensemble.simulate(*excursion(0.6), Span(0.6, 0.0, 1), 1).counts[0, kernels.COUNT_LOST] == 0
 
 
 # --------------------------------------------------------------------------------------------------- compiled ahead
@@ -1295,5 +1295,5 @@ def test_the_kernels_are_compiled_aside_for_loops_of_any_kind_where_the_cache_la
     assert ensemble.compile_aside(coupled) == "wait"
     heard[0]()
     compiled = list(kernels.ensemble_loop.signatures)
-    ensemble.run(scenario(), pi_for(scenario()), Span(0.01, 0.0, 1), 1)
+    ensemble.simulate(scenario(), pi_for(scenario()), Span(0.01, 0.0, 1), 1)
     assert kernels.ensemble_loop.signatures == compiled != []

@@ -234,7 +234,7 @@ def test_without_feedback_the_mirror_follows_the_filtered_reference_with_the_inv
     assert np.max(np.abs(with_gain)) / np.max(np.abs(with_it)) > peak
     stroke = np.ptp(traced.mirror_rad)
     assert np.sqrt(np.mean(with_it**2)) < (0.001 if "Prandtl" in model else 0.015) * stroke
-    assert_array_equal(ensemble.run(loop, exact, SPAN, 1).counts[0, kernels.COUNT_INVERSE_CLAMPED], 0.0)
+    assert_array_equal(ensemble.simulate(loop, exact, SPAN, 1).counts[0, kernels.COUNT_INVERSE_CLAMPED], 0.0)
 
 
 @pytest.mark.parametrize("model", [m for m in MODELS if "creep" in m])
@@ -283,7 +283,7 @@ def test_with_feedback_and_noise_the_drive_chatters_no_more_than_under_feedback_
     still, driven = traces.trace(loop, alone, span), traces.trace(swept, both, span)
     chatter, base = (np.std(np.diff(each.drive_v[:, 0], 2)) for each in (driven, still))
     assert 0.9 < chatter / base < 1.1
-    assert ensemble.run(swept, both, span, 1).counts[0, kernels.COUNT_INVERSE_CLAMPED] == 0
+    assert ensemble.simulate(swept, both, span, 1).counts[0, kernels.COUNT_INVERSE_CLAMPED] == 0
     series = with_inverse("series", swept, pi_axis(loop), control.inverse(loop.mirror), FILTER, in_series=True)
     assert not np.array_equal(traces.trace(swept, series, span).drive_v, driven.drive_v)
 
@@ -310,7 +310,7 @@ def test_a_reference_faster_than_the_identified_rate_is_counted_and_the_drive_st
     gain = slow_gain(loop.mirror.inverse[0])
     rate = filtered(reference, np.append(traced.time_s, 0.1))[1:, 1] / gain
     beyond = np.sum(np.abs(rate) > RATE_LIMIT_V_S)
-    found = ensemble.run(loop, controller, span, 1)
+    found = ensemble.simulate(loop, controller, span, 1)
     assert 50 < beyond < found.samples
     assert found.counts[0, kernels.COUNT_INVERSE_CLAMPED] == beyond
     assert_allclose(found.share(kernels.COUNT_INVERSE_CLAMPED), beyond / traced.time_s.size, rtol=1e-12)
@@ -339,7 +339,7 @@ def test_a_step_of_the_reference_is_bounded_and_ends_where_it_should(model):
     traced = traces.trace(loop, controller, Span(0.11, 0.0, 1))
     assert np.max(np.abs(traced.drive_v)) < 1.2e-3 / slow_gain(loop.mirror.inverse[0])
     assert_allclose(traced.mirror_rad[-1], 1e-3, rtol=0.05)
-    counted = ensemble.run(loop, controller, Span(0.11, 0.0, 1), 1).counts[0, kernels.COUNT_INVERSE_CLAMPED]
+    counted = ensemble.simulate(loop, controller, Span(0.11, 0.0, 1), 1).counts[0, kernels.COUNT_INVERSE_CLAMPED]
     assert (counted > 0) == (not model.startswith("Prandtl"))
 
 
@@ -347,12 +347,12 @@ def test_a_drive_beyond_the_identified_range_is_counted_at_each_plant_step():
     loop = loop_of("Prandtl-Ishlinskii", drive_range_v=(-0.5, 2.0))
     controller, span = ahead(loop, control.inverse(loop.mirror)), Span(0.2, 0.0, 1)
     drive = traces.trace(loop, controller, span).drive_v
-    found = ensemble.run(loop, controller, span, 1)
+    found = ensemble.simulate(loop, controller, span, 1)
     share = np.mean((drive < -0.5) | (drive > 2.0))
     assert 0.1 < share < 0.9
     assert_allclose(found.share(kernels.COUNT_OUTSIDE), share, atol=2e-3)
     wide = replace(loop, drive_range_v=(-20.0, 20.0))
-    assert ensemble.run(wide, controller, span, 1).counts[0, kernels.COUNT_OUTSIDE] == 0
+    assert ensemble.simulate(wide, controller, span, 1).counts[0, kernels.COUNT_OUTSIDE] == 0
 
 
 # ------------------------------------------------------------------------------------------------ in series
@@ -409,7 +409,7 @@ def test_a_series_inverse_of_a_mirror_without_hysteresis_leaves_the_lyapunov_val
     shaken = {"disturbances": ((disturbance.olympus(),),), "optical": OpticalSensor(URAD, inf, 0.0, 1, 0)}
     loop = fine.without_hysteresis(sampled("Bouc-Wen", **shaken))
     controller = in_series(loop, control.inverse(loop.mirror))
-    found = ensemble.run(loop, controller, Span(1.3, 0.3, 1), 64)
+    found = ensemble.simulate(loop, controller, Span(1.3, 0.3, 1), 64)
     theory = linear.stationary(linear.close(loop, controller)).radial_rms_rad
     assert_allclose(found.radial_rms_rad, theory, rtol=0.01)
     plain = linear.stationary(linear.close(loop, fine.assemble("PI", loop, pi_axis(loop)))).radial_rms_rad
@@ -421,7 +421,7 @@ def test_a_series_inverse_at_its_stroke_is_counted_and_recovers():
         "Prandtl-Ishlinskii", drive=Drive(-6.0, 6.0, 5e3, inf, 0.0, 0.0), references=(Step(2e-3, 0.05, 0.2),)
     )
     controller, span = in_series(loop, control.inverse(loop.mirror)), Span(0.4, 0.0, 1)
-    traced, found = traces.trace(loop, controller, span), ensemble.run(loop, controller, span, 1)
+    traced, found = traces.trace(loop, controller, span), ensemble.simulate(loop, controller, span, 1)
     assert_allclose(traced.drive_v[260:1000], 6.0, rtol=1e-6)
     assert_allclose(found.counts[0, kernels.COUNT_SATURATED], 750, atol=20)
     assert np.max(np.abs(traced.error_rad[1100:])) < 0.1 * URAD

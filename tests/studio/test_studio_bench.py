@@ -519,7 +519,7 @@ def test_the_paper_s_loop_has_the_numbers_of_the_study(mission, name):
     assert found.margins["crossover"] == margins.crossover_hz
     assert found.margins["bandwidth"] == pytest.approx(358, rel=0.02)
     asked = found.ask(control_view.ask_of("100 urad", "300 urad", "15 Hz", 5000.0), (WITH, WITHOUT))
-    runs = tracking.tracking_runs(cases_of(mission.mission))
+    runs = tracking.sine_runs(cases_of(mission.mission))
     kind = "PID" if name == PID else "PID + inverse"
     for variant, which in ((WITH, "given"), (WITHOUT, "no hysteresis")):
         run = next(r for r in runs if (r.mirror, r.controller, r.freq_hz) == (which, kind, 15.0))

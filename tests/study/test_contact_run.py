@@ -223,7 +223,7 @@ def test_the_residual_of_a_window_is_the_ensembles_with_the_same_references(file
     for number in (0, 3):
         error = traces.trace(loop, design.controller, span, number).error_rad[2500:]
         assert_allclose(windows[number].radial_rad, np.hypot(error[:, 0], error[:, 1]), rtol=1e-9, atol=1e-15)
-    together = ensemble.run(loop, design.controller, span, 64)
+    together = ensemble.simulate(loop, design.controller, span, 64)
     single = np.sqrt(np.sum(together.rms_rad**2, axis=1))[:4]
     assert_allclose([w.rms_rad for w in windows], single, rtol=0.02)  # control samples against plant steps
     mean = math.sqrt(np.mean([w.rms_rad**2 for w in windows]))
@@ -626,7 +626,7 @@ def test_a_spot_beyond_the_field_of_view_is_lost_at_once(run, shaken, design):
     (first, *_) = [e for e in found.log if e.state == "loss"]
     assert (first.time_s, first.cause) == (lost.time_s, "seen by its own sensor")
     span = ensemble.Span(0.6, 0.2, 1)
-    assert ensemble.run(scene.loop, design.controller, span, 1).counts[0, kernels.COUNT_LOST] > 0
+    assert ensemble.simulate(scene.loop, design.controller, span, 1).counts[0, kernels.COUNT_LOST] > 0
 
 
 def test_a_slow_sensor_loses_the_spot_only_where_it_looks(sampler, scene):

@@ -93,5 +93,5 @@ def simulate(
 ) -> Simulated:
     """All runs of these rows, one batch after the other on this thread; the numbers of the runs follow the rows'."""
     numbers = range(rows.start * realisations, rows.stop * realisations)
-    found = ensemble.run(loop, controller, span, len(numbers), first_run=numbers.start, threads=1, beat=beat)
+    found = ensemble.simulate(loop, controller, span, len(numbers), first_run=numbers.start, threads=1, beat=beat)
     return Simulated(rows.start, realisations, found)

@@ -68,7 +68,7 @@ class PointingChoice:
 
 
 @dataclass(frozen=True, slots=True)
-class TrackingChoice:
+class PaperLoopChoice:
     """A controller of the table [control]: one axis that tracks the scenario's sines, the paper's Fig. 6 and 8."""
 
     source: Source
@@ -79,7 +79,7 @@ class TrackingChoice:
     inverse: control.Inverse
 
 
-Choice = PointingChoice | TrackingChoice
+Choice = PointingChoice | PaperLoopChoice
 
 
 def names(table: FinePointing | None) -> tuple[str, ...]:
@@ -110,7 +110,7 @@ def choose(file: MissionFile, name: str, on_progress: Progress = lambda done, to
     try:
         mirrors = mirror.of(m)
         if name in (PID, PID_WITH_INVERSE):
-            return _tracking(source(file), paper_cases.of(m, mirrors), name)
+            return _paper_loop(source(file), paper_cases.of(m, mirrors), name)
         on_progress(0, 2, f"tuning {name}")
         scene = controller_study.scene(file, mirrors, tracking_light_w(file))
         tuned = controller_study.tune(name, scene.table, controller_study.plants(scene, scene.table.seed))
@@ -122,7 +122,7 @@ def choose(file: MissionFile, name: str, on_progress: Progress = lambda done, to
 
 def outlook(choice: Choice) -> controller_study.Outlook | None:
     """What a controller of the fine-pointing loop leaves, linear and simulated; the loop of [control] has no theory."""
-    if isinstance(choice, TrackingChoice):
+    if isinstance(choice, PaperLoopChoice):
         return None
     design = controller_study.Design(choice.controller.name, choice.tuned, choice.controller)
     (found,) = controller_study.outlook(choice.scene, [design])
@@ -152,10 +152,10 @@ def rms_text(rad: float) -> str:
     return f"{format_quantity(rad, 'rad', 4)} rms an axis"
 
 
-def _tracking(of: Source, cases: paper_cases.PaperCases, name: str) -> TrackingChoice:
+def _paper_loop(of: Source, cases: paper_cases.PaperCases, name: str) -> PaperLoopChoice:
     plant = cases.mirrors.line_of_sight[Variant.GIVEN].plant
     inverse = control.inverse(plant) if name == PID_WITH_INVERSE else control.no_feedforward(plant)
-    return TrackingChoice(of, cases.scenario, name, plant, cases.setup, inverse)
+    return PaperLoopChoice(of, cases.scenario, name, plant, cases.setup, inverse)
 
 
 # ------------------------------------------------------------------------------------------------------ the controller
@@ -171,7 +171,7 @@ def flight_controller(choice: Choice) -> FlightController:
 
 
 def _whole_controller(choice: Choice) -> FlightController:
-    return _pointing_controller(choice) if isinstance(choice, PointingChoice) else _tracking_controller(choice)
+    return _pointing_controller(choice) if isinstance(choice, PointingChoice) else _paper_controller(choice)
 
 
 def columns(inputs: tuple[Signal, ...]) -> dict[str, slice]:
@@ -234,7 +234,7 @@ def _pointing_controller(choice: PointingChoice) -> FlightController:
     )
 
 
-def _tracking_controller(choice: TrackingChoice) -> FlightController:
+def _paper_controller(choice: PaperLoopChoice) -> FlightController:
     setup, s, axes = choice.setup, choice.setup.controller, choice.mirror.axes
     margins = sine_run.margins(choice.mirror, setup)
     inverse = None
@@ -287,7 +287,7 @@ def plant_unit(file: MissionFile, loop: str) -> PlantUnit:
         if loop == LOOPS[0]:
             made = controller_study.scene(file, mirrors, tracking_light_w(file)).loop
             return _plant_unit(source(file), made.mirror, made.optics, made.drive, made.timing)
-        one = _tracking(source(file), paper_cases.of(file.mission, mirrors), PID)
+        one = _paper_loop(source(file), paper_cases.of(file.mission, mirrors), PID)
         return _plant_unit(one.source, one.mirror, np.eye(one.mirror.axes), one.setup.drive, one.setup.timing)
     except ValueError as error:
         raise ExportError(f"{file.path}: {error}") from error
@@ -339,12 +339,12 @@ def vectors(choice: Choice, samples: int) -> Vectors:
         saturated, clamped = (int(run.counts[c]) for c in (kernels.COUNT_SATURATED, kernels.COUNT_INVERSE_CLAMPED))
         found = Vectors(run.inputs, run.commands, saturated, clamped)
     else:
-        found = _tracking_vectors(choice, samples)
+        found = _paper_vectors(choice, samples)
     kept = _looked_at(_whole_controller(choice)).values()
     return replace(found, inputs=np.hstack([found.inputs[:, at] for at in kept]))
 
 
-def _tracking_vectors(choice: TrackingChoice, samples: int) -> Vectors:
+def _paper_vectors(choice: PaperLoopChoice, samples: int) -> Vectors:
     scenario, setup = choice.scenario, choice.setup
     time: Floats = np.arange(samples, dtype=float) * setup.timing.period_s
     reference = scenario.amplitude_rad * np.sin(2.0 * np.pi * max(scenario.inverse_frequencies_hz) * time)[:, None]

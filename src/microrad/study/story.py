@@ -167,7 +167,7 @@ def run(
     compiled = ensemble.compile_aside(lambda: _scene(file, mirrors).loop) if m.fine_pointing else lambda: None
     on_progress(0, 3, "budgets, acquisition, mirror and tracking")
     (summary, loops, margins, runs), (links, fig2) = both(
-        lambda: (mirror_summary.summarise(m.mirror), *parts.part(paper_cases.results, cases)),
+        lambda: (mirror_summary.summarise(m.mirror), *parts.part(paper_cases.simulate, cases)),
         lambda: linked(file, parts),
     )
     data = links.data
@@ -186,7 +186,7 @@ def run(
     fine = None
     if m.fine_pointing is not None:
         compiled()
-        fine = parts.part(controller_study.run, _scene(file, mirrors), on_progress=on_progress)
+        fine = parts.part(controller_study.design_and_simulate, _scene(file, mirrors), on_progress=on_progress)
     on_progress(2, 3, "the day")
     found = pointing_cost.run(data, m.conventions.residual, runs, fine)
     case = best_case(found, fine)

@@ -173,8 +173,8 @@ def _measured(b: BenchResult | None) -> list[tuple[str, str]]:
     ]
 
 
-def data(of: FlightExport) -> dict[str, Any]:
-    """The same for machines."""
+def export_data(of: FlightExport) -> dict[str, Any]:
+    """The numbers of the report, for JSON."""
     c = of.controller
     return {
         "name": of.name,

@@ -149,7 +149,7 @@ class Span:
     seed: int
 
 
-def run(
+def simulate(
     loop: PointingLoop,
     controller: LoopController,
     span: Span,
@@ -192,10 +192,10 @@ DRAWN_SAMPLES = 256
 """Control samples for which it is drawn at a time: a megabyte or two, which a processor keeps near."""
 
 
-def several(
+def simulate_cases(
     cases: Sequence[Case], span: Span, runs: int, on_done: Callable[[int, int], None] = lambda done, total: None
 ) -> list[Ensemble]:
-    """`run` for each of the cases, to the last bit, on all cores: cases with the same disturbances draw them once.
+    """`simulate` for each of the cases, to the last bit, on all cores: cases with the same disturbances draw them once.
 
     ``on_done`` hears how many parts of the work are done, and of how many.
     """
