@@ -18,9 +18,9 @@ from microrad import report
 from microrad.loop import control, controller_study
 from microrad.loop.control.tuning import MARGIN
 from microrad.loop.controller_study import Difference, ErrorBudget, FinePointingStudy, Part, Residual, Sine, Verified
-from microrad.loop.pointing_loop.design import design_plant, residual_spectrum
+from microrad.loop.pointing_loop.design import design_plant
 from microrad.loop.pointing_loop.ensemble import bin_edges_rad
-from microrad.loop.pointing_loop.linear import close, stationary
+from microrad.loop.pointing_loop.linear import close, residual_spectrum, stationary
 from microrad.loop.pointing_loop.loop import ReferenceFilter, assemble, with_inverse
 from microrad.report import chain, requirement_views, requirements, results
 from microrad.report import fine_pointing as section
