@@ -60,7 +60,7 @@ def shaken(scene, on_progress):
 def quick():
     """Without what takes long and reads no file; a page has no figures."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(study.fine_pointing, "run", shaken)
+        patch.setattr(study.controller_study, "design_and_simulate", shaken)
         patch.setattr(scenario.disturbance, "table", lambda freq_hz, density, **_: density.tolist())
         patch.setattr(study.paper, "applies", lambda mission: False)
         patch.setattr(day, "swings", lambda *args: ())

@@ -269,7 +269,7 @@ def test_the_budget_takes_the_whole_from_what_is_simulated_already(scene, file, 
         simulated.extend(cases)
         return simulate(cases, *rest)
 
-    monkeypatch.setattr(ensemble, "several", counted)
+    monkeypatch.setattr(ensemble, "simulate_cases", counted)
     budget = controller_study.error_budget(scene, verified)
     assert len(simulated) == len(budget.parts) + len(budget.differences) - 1
     span, runs = results.span(file.mission.fine_pointing), file.mission.fine_pointing.runs

@@ -62,7 +62,7 @@ def test_the_study_has_a_day_and_a_plan_but_no_contact_in_time_without_a_fine_lo
     assert found.day is not None
     assert found.plan is not None
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(study.fine_pointing, "run", lambda *args, **more: None)
+        patch.setattr(study.controller_study, "design_and_simulate", lambda *args, **more: None)
         m = found.file.mission
         links = found.links
         assert contact_run.of_mission(m.operations, m.acquisition, links.data, found.day, links.finding, None) is None
