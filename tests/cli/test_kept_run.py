@@ -4,6 +4,7 @@ import hashlib
 import json
 import os
 import re
+from types import SimpleNamespace
 
 import pytest
 
@@ -61,7 +62,11 @@ def quick():
     """Without what takes long and reads no file; a page has no figures."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(study.controller_study, "design_and_simulate", shaken)
-        patch.setattr(scenario.disturbance, "table", lambda freq_hz, density, **_: density.tolist())
+        patch.setattr(
+            scenario.disturbance,
+            "fit_table",
+            lambda freq_hz, density, **_: SimpleNamespace(disturbance=density.tolist()),
+        )
         patch.setattr(study.paper, "applies", lambda mission: False)
         patch.setattr(day, "swings", lambda *args: ())
         patch.setattr(report, "draw", lambda *args: Drawn())

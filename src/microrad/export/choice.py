@@ -202,6 +202,15 @@ def inverse_law(of: control.Inverse, period_s: float, by_difference: bool) -> In
     return InverseLaw(**arrays, by_difference=by_difference)
 
 
+def _margins(of: control.LoopMargins) -> tuple[tuple[str, float, str], ...]:
+    return (
+        ("modulus margin", of.modulus, ""),
+        ("gain margin", 20.0 * math.log10(of.gain_up), "dB"),
+        ("phase margin", math.degrees(of.phase_rad), "deg"),
+        ("delay margin", of.delay_s, "s"),
+    )
+
+
 def _pointing_controller(choice: PointingChoice) -> FlightController:
     loop, made, margins = choice.scene.loop, choice.controller, choice.tuned.margins
     period = loop.timing.period_s
@@ -224,19 +233,12 @@ def _pointing_controller(choice: PointingChoice) -> FlightController:
         maximum_v=loop.drive.maximum_v,
         resolution_v=loop.drive.drive_resolution_v,
         bias_v=choice.source.mirror.bias_v,
-        margins=(
-            ("modulus margin", margins.modulus, ""),
-            ("gain margin", 20.0 * math.log10(margins.gain_up), "dB"),
-            ("phase margin", math.degrees(margins.phase_rad), "deg"),
-            ("delay margin", margins.delay_s, "s"),
-            ("bandwidth", margins.bandwidth_hz, "Hz"),
-        ),
+        margins=(*_margins(margins), ("bandwidth", margins.bandwidth_hz, "Hz")),
     )
 
 
 def _paper_controller(choice: PaperLoopChoice) -> FlightController:
     setup, s, axes = choice.setup, choice.setup.controller, choice.mirror.axes
-    margins = sine_run.margins(choice.mirror, setup)
     inverse = None
     D = np.hstack([-s.D, s.D])
     C = s.C
@@ -260,12 +262,7 @@ def _paper_controller(choice: PaperLoopChoice) -> FlightController:
         maximum_v=setup.drive.maximum_v,
         resolution_v=setup.drive.drive_resolution_v,
         bias_v=choice.source.mirror.bias_v,
-        margins=(
-            ("modulus margin", margins.modulus, ""),
-            ("gain margin", 20.0 * math.log10(margins.gain_up), "dB"),
-            ("phase margin", math.degrees(margins.phase_rad), "deg"),
-            ("delay margin", margins.delay_s, "s"),
-        ),
+        margins=_margins(sine_run.margins(choice.mirror, setup)),
     )
 
 
