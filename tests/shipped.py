@@ -6,7 +6,7 @@ import pytest
 
 from microrad import report
 from microrad.mission.file import load_mission
-from microrad.study import story as study
+from microrad.study import study
 from places import ROOT
 from shared import once
 

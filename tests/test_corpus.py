@@ -8,7 +8,7 @@ import shutil
 
 import pytest
 
-from microrad.study import story as study
+from microrad.study import study
 from places import TESTS
 from shared import found_once
 from shipped import SHIPPED

@@ -38,8 +38,8 @@ from microrad.orbit.operations import OperationsError
 from microrad.report import summary
 from microrad.report import verdict_text
 from microrad.report import write as write_report
-from microrad.study.story import Study
-from microrad.study.story import run as run_study
+from microrad.study.study import Study
+from microrad.study.study import run as run_study
 
 __all__ = [
     "load_mission",

@@ -27,7 +27,7 @@ from microrad.lab import identify
 from microrad.loop import control, fine_pointing
 from microrad.loop.fine_pointing import designs
 from microrad.report import identification_figures
-from microrad.study import story as study
+from microrad.study import study
 from places import ROOT
 from shipped import plain_study, without_day, without_fine_pointing
 from waiting import HANG_S, lines_of, until
@@ -435,7 +435,7 @@ def interruptible():
 @pytest.mark.usefixtures("interruptible")
 @pytest.mark.parametrize(
     ("name", "package", "module", "function"),
-    [("SIGINT", "microrad.study", "story", "run"), ("SIGTERM", "microrad", "report", "write_columns")],
+    [("SIGINT", "microrad.study", "study", "run"), ("SIGTERM", "microrad", "report", "write_columns")],
 )
 def test_an_interrupt_during_run_leaves_nothing(
     folder, loop_mirror, plain, name, package, module, function, tmp_path_factory
@@ -447,7 +447,7 @@ def test_an_interrupt_during_run_leaves_nothing(
     environment = os.environ | {frame.PROGRESS_FILE: str(progress)}
     process = subprocess.Popen(args, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     assert process.stderr.readline() == "here\n"
-    lines_of(progress, 2 if module == "story" else 0)  # the study is in its second step
+    lines_of(progress, 2 if module == "study" else 0)  # the study is in its second step
     process.send_signal(getattr(signal, name))
     out, err = process.communicate(timeout=HANG_S)
     assert (process.returncode, out.startswith("Not every requirement is met: ")) == (130, module == "report"), out

@@ -14,7 +14,7 @@ from microrad.core.units import parse_quantity
 from microrad.loop import fine_pointing
 from microrad.mission import presets
 from microrad.report import identification_figures
-from microrad.study import story as study
+from microrad.study import study
 from places import ROOT
 from scenes import scene_of
 from shipped import whole_drawn, whole_study

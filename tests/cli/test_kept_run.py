@@ -14,7 +14,7 @@ from microrad.mission import file as missionfile
 from microrad.mission.file import NamedFile, load_mission, with_contents
 from microrad.orbit import day
 from microrad.report.page import Drawn
-from microrad.study import story as study
+from microrad.study import study
 from shipped import SHIPPED
 
 ELEMENTS = """EXAMPLE 1

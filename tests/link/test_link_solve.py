@@ -11,7 +11,7 @@ import budgets
 from link_files import GAUSSIAN, PATTERN, data_with, link_file, received_with, written
 from microrad import link
 from microrad.link import study as link_study
-from microrad.link import under_jitter as link_performance
+from microrad.link.pointing import outage as link_performance
 
 NO_BEAMS = dict.fromkeys(("beacon", "answer", "acquisition"))
 JITTER = {"jitter": {"bias": ["0 urad", "0 urad"], "rms": ["3 urad", "3 urad"], "bandwidth": "50 Hz"}}

@@ -14,9 +14,9 @@ from link_files import PATTERN, RECEIVERS, link_file, received_with
 from microrad import link
 from microrad.core.units import parse_quantity
 from microrad.link import acquisition, requirement
-from microrad.link import partner_search as link_acquisition
 from microrad.link import study as link_study
-from microrad.link.radial_error import Jitter
+from microrad.link.acquisition import partner_search as link_acquisition
+from microrad.link.pointing.radial_error import Jitter
 from microrad.loop import sensor
 from microrad.mission.file import LinkFile
 from microrad.report import budget_views, links, requirements

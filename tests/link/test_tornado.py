@@ -10,8 +10,8 @@ import budgets
 from link_files import GAUSSIAN, PATTERN, RECEIVERS, SKY, link_file, received_with
 from microrad import link
 from microrad.link import study as link_study
-from microrad.link import under_jitter as link_performance
-from microrad.link.tornado import RELATIVE, STEP_DB
+from microrad.link.pointing import outage as link_performance
+from microrad.link.variation import RELATIVE, STEP_DB
 from microrad.mission.fields import Quantity
 from microrad.mission.file import load_link
 from shipped import SHIPPED

@@ -12,19 +12,9 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from microrad.mission.tables.pointing import point_ahead_rad
-from microrad.orbit import events, limits
-from microrad.orbit.analytic import GeostationarySlot, KeplerOrbit, circular
 from microrad.orbit.base import OrbitError, States
-from microrad.orbit.contacts import (
-    Sampled,
-    coarse_step_s,
-    coarse_times,
-    contacts,
-    contacts_with_each,
-    coplanar_contact,
-    passes,
-)
-from microrad.orbit.earth import (
+from microrad.orbit.earth.epoch import Epoch
+from microrad.orbit.earth.figure import (
     EARTH_RADIUS_M,
     FLATTENING,
     GEOSTATIONARY_RADIUS_M,
@@ -33,10 +23,20 @@ from microrad.orbit.earth import (
     elevation_rad,
     gravity,
 )
-from microrad.orbit.epoch import Epoch
-from microrad.orbit.limits import UNLIMITED, Limits, Terminal
-from microrad.orbit.line_of_sight import sight
-from microrad.orbit.sun import shadow_rad, sun_direction
+from microrad.orbit.earth.sun import shadow_rad, sun_direction
+from microrad.orbit.propagation.analytic import GeostationarySlot, KeplerOrbit, circular
+from microrad.orbit.visibility import events, limits
+from microrad.orbit.visibility.contacts import (
+    Sampled,
+    coarse_step_s,
+    coarse_times,
+    contacts,
+    contacts_with_each,
+    coplanar_contact,
+    passes,
+)
+from microrad.orbit.visibility.limits import UNLIMITED, Limits, Terminal
+from microrad.orbit.visibility.line_of_sight import sight
 
 DAY = (0.0, 86400.0)
 WEEK = (0.0, 7.0 * 86400.0)

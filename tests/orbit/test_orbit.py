@@ -20,9 +20,11 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from microrad.core.units import SPEED_OF_LIGHT_M_S
-from microrad.orbit import analytic, earth, sun
 from microrad.orbit.base import OrbitError
-from microrad.orbit.epoch import Epoch
+from microrad.orbit.earth import sun
+from microrad.orbit.earth.epoch import Epoch
+from microrad.orbit.earth import figure as earth
+from microrad.orbit.propagation import analytic
 
 START = Epoch.from_text("2026-03-20T12:00:00Z")
 DAY_S = 86400.0
@@ -191,7 +193,8 @@ def test_the_angle_is_the_same_seen_from_an_instant_decades_before():
 
 def test_the_tables_of_time_are_read_only_when_an_instant_needs_them():
     code = (
-        "import sys; from microrad.orbit import analytic, sun; from microrad.orbit.epoch import Epoch;"
+        "import sys; from microrad.orbit.earth import sun; from microrad.orbit.earth.epoch import Epoch;"
+        "from microrad.orbit.propagation import analytic;"
         "Epoch('2026-03-20T12:00:00Z'); assert 'skyfield' not in sys.modules and 'sgp4' not in sys.modules"
     )
     subprocess.run([sys.executable, "-c", code], check=True)

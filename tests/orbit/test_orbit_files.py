@@ -21,10 +21,10 @@ from skyfield.framelib import ICRS_to_J2000, itrs, true_equator_and_equinox_of_d
 from skyfield.sgp4lib import TEME
 
 from microrad.orbit.base import OrbitError, States
-from microrad.orbit.epoch import Epoch
+from microrad.orbit.earth.epoch import Epoch
 from microrad.orbit.files import frames, messages, oem, read_elements, read_oem
 from microrad.orbit.files.elements import _EXPECTED, checksum
-from microrad.orbit.mean_elements import closest_elements, sgp4_orbit
+from microrad.orbit.propagation.mean_elements import closest_elements, sgp4_orbit
 
 EPOCH = Epoch("2026-03-20T12:00:00Z")
 SCALE = load.timescale(builtin=True)

@@ -15,7 +15,7 @@ from microrad.mission.file import load_mission
 from microrad.report import compared, page, results, tolerances
 from microrad.report.plotting import palette
 from microrad.studio import address, guard, jobs_process, reading, server, uploads, workshop
-from microrad.study import story as study
+from microrad.study import study
 from places import ROOT
 from shipped import DEFAULT
 

@@ -29,8 +29,8 @@ from microrad.report import (
     requirements,
     words,
 )
-from microrad.study import story as study
-from microrad.study.pointing_cost import Cost
+from microrad.study import study
+from microrad.study.pointing_penalty import Cost
 from report_pages import assert_sound
 from shipped import SHIPPED, edited_file, plain_drawn, plain_study
 

@@ -20,8 +20,7 @@ from microrad.mission.file import load_mission, with_contents
 from microrad.orbit import day as day_study
 from microrad.orbit.operations import OperationsError
 from microrad.report import contact_run_words, day_plots, day_words, results
-from microrad.study import contact_run
-from microrad.study import story as study
+from microrad.study import contact_run, study
 from scenes import scene_of
 from shipped import SHIPPED, edited_file, plain_study
 

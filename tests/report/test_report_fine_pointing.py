@@ -27,8 +27,8 @@ from microrad.report import fine_pointing as section
 from microrad.report import fine_pointing_figures as figures
 from microrad.report import fine_pointing_words as words
 from microrad.report import page as report_page
-from microrad.study import pointing_cost as performance
-from microrad.study import story as study
+from microrad.study import pointing_penalty as performance
+from microrad.study import study
 from scenes import scene_of
 from shipped import plain_study
 

@@ -16,7 +16,7 @@ from microrad.link import study as link_study
 from microrad.mission.file import load_link
 from microrad.report import budget_views, link_figures, links, single_pages
 from microrad.report.quantities import apart, quantity
-from microrad.study.pointing_cost import FINE, Cost, LinkPerformance
+from microrad.study.pointing_penalty import FINE, Cost, LinkPerformance
 from report_pages import without_scripts
 
 FEW = {"acquisition.runs": 100}

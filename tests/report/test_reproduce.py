@@ -13,7 +13,7 @@ from microrad import cli, report
 from microrad.core import machine
 from microrad.mission import file as missionfile
 from microrad.report import carried, compared, page, reproduce, tolerances
-from microrad.study import story as study
+from microrad.study import study
 from shipped import SHIPPED, edited_file, without_fine_pointing
 
 

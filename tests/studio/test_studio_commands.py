@@ -31,7 +31,7 @@ from microrad.studio.commands import (
     Run,
     command,
 )
-from microrad.study import story as study
+from microrad.study import study
 from shipped import SHIPPED, without_day, without_fine_pointing
 from small_campaign import campaign_file
 

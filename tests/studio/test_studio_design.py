@@ -13,7 +13,7 @@ import pytest
 from link_files import RECEIVERS, data_with, link_file, received_with
 from microrad import link
 from microrad.link import study as link_study
-from microrad.link import under_jitter
+from microrad.link.pointing import outage as under_jitter
 from microrad.orbit import day as day_study
 from microrad.report import day_plots, figures
 from microrad.studio import attempts, day_view, dials, link_view, plots, pointing_view

@@ -16,7 +16,7 @@ from microrad.orbit.day import assumptions
 from microrad.report import results, words
 from microrad.studio.draft import Draft
 from microrad.studio.draft_keys import value_of
-from microrad.study import story as study
+from microrad.study import study
 from shipped import DEFAULT, SHIPPED
 
 SHORTER = {

@@ -7,7 +7,7 @@ from microrad.core import threads
 from microrad.loop import fine_pointing
 from microrad.loop.fine_pointing import designs
 from microrad.mirror import model, variants
-from microrad.study import story
+from microrad.study import study as story
 from shipped import edited_file
 
 

@@ -16,8 +16,7 @@ from microrad.mission.file import load_mission
 from microrad.report import chain, figures, links, requirement_views, words
 from microrad.report.fine_pointing_words import not_reliable
 from microrad.report.words import headline
-from microrad.study import paper, verdict
-from microrad.study import story as study
+from microrad.study import paper, study, verdict
 from scenes import scene_of
 from shipped import DEFAULT, SHIPPED, edited_file, whole_study
 

@@ -11,8 +11,8 @@ from microrad import link
 from microrad.campaign.outputs import OUTPUTS
 from microrad.core import kernels
 from microrad.core.arrays import Floats
+from microrad.link.pointing.outage import Exposure, stated_outage
 from microrad.link.requirement import IMPOSSIBLE
-from microrad.link.under_jitter import Exposure, stated_outage
 from microrad.loop import fine_pointing
 from microrad.loop.fine_loop import ensemble
 from microrad.mission.file import LinkFile

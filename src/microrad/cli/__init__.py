@@ -108,7 +108,7 @@ def run(
     from microrad import report
     from microrad.core import kept
     from microrad.mission.file import load_mission
-    from microrad.study import story
+    from microrad.study import study as story
 
     mission = load_mission(file, mirror)
     folder = output or Path(f"{file.stem}-study")

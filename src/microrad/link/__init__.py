@@ -1,12 +1,26 @@
 """Link budgets: of the beacon, its answer and the communication link, and what follows from them."""
 
 from microrad.link.beams import BEST_TRUNCATION, GaussianFall, LitAperture, OffAxis
-from microrad.link.budget import (
+from microrad.link.budget.assembly import DataLink, LinkError, Shared, assembled, of, required_dbm, strehl_db
+from microrad.link.budget.lines import (
     DEEPEST_DB,
     LEFT_AT_ZERO,
     LinkBudget,
     beam_budget,
     communication_budget,
+)
+from microrad.link.budget.maps import (
+    IdealReceiver,
+    SensitivityReading,
+    convention_maps,
+    ideal_receivers,
+    implied_sensitivity,
+    largest_data_rate,
+    largest_pointing_error,
+    margin_map,
+    margin_of_error,
+    rate_at_loss,
+    received_on_axis_dbm,
 )
 from microrad.link.gains import (
     air_mass,
@@ -26,22 +40,8 @@ from microrad.link.gains import (
     strehl_ratio,
 )
 from microrad.link.inputs import LINK_TABLES, fits, inputs, lit, margin_or_none, moved, unit_of
-from microrad.link.maps import (
-    IdealReceiver,
-    SensitivityReading,
-    convention_maps,
-    ideal_receivers,
-    implied_sensitivity,
-    largest_data_rate,
-    largest_pointing_error,
-    margin_map,
-    margin_of_error,
-    rate_at_loss,
-    received_on_axis_dbm,
-)
-from microrad.link.model import DataLink, LinkError, Shared, assembled, of, required_dbm, strehl_db
 from microrad.link.solve import Interval, Solved, solve
-from microrad.link.tornado import Swing, Tornado, beam_margin, beam_tornado, swings
+from microrad.link.variation import Swing, Tornado, beam_margin, beam_tornado, swings
 
 __all__ = [
     "BEST_TRUNCATION",

@@ -7,7 +7,7 @@ from typing import Any, TypeVar
 
 from pydantic.fields import FieldInfo
 
-from microrad.link.model import communication_beam
+from microrad.link.budget.assembly import communication_beam
 from microrad.link.receivers import RateError
 from microrad.mission.fields import Quantity, Several, Share, Table
 from microrad.mission.model import LinkMission

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 from typing import Literal
 
 from microrad import link
-from microrad.link.budget import FREE_SPACE_LOSS
+from microrad.link.budget.lines import FREE_SPACE_LOSS
+from microrad.link.pointing.outage import stated_outage
 from microrad.link.study import LinkStudy
-from microrad.link.under_jitter import stated_outage
 from microrad.mission.model import Source
 from microrad.mission.tables.link import LinkRequirement
 

@@ -13,8 +13,15 @@ from microrad.core import kept
 from microrad.core.budget import Line
 from microrad.core.units import format_quantity
 from microrad.link import pointing
-from microrad.link.partner_search import Finding, Sent, Tracking, finding, tracking
-from microrad.link.under_jitter import Performance, error_rad, margin_db, of_jitter, required_error_rad, stated_outage
+from microrad.link.acquisition.partner_search import Finding, Sent, Tracking, finding, tracking
+from microrad.link.pointing.outage import (
+    Performance,
+    error_rad,
+    margin_db,
+    of_jitter,
+    required_error_rad,
+    stated_outage,
+)
 from microrad.mission.file import LinkFile
 from microrad.mission.model import LinkMission, Source, source_text
 

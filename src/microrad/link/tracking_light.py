@@ -1,7 +1,7 @@
 """The light on the sensor of the fine-pointing loop."""
 
-from microrad.link.budget import beam_budget
-from microrad.link.model import Shared
+from microrad.link.budget.assembly import Shared
+from microrad.link.budget.lines import beam_budget
 from microrad.mission.file import MissionFile
 
 

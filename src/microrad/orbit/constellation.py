@@ -12,10 +12,10 @@ from microrad.core.progress import Progress
 from microrad.mission.file import LinkFile
 from microrad.mission.tables.operations import Constellation
 from microrad.orbit import operations
-from microrad.orbit.contacts import Sampled, coarse_step_s, contacts_with_each
 from microrad.orbit.day.flow import PointingLoss, closings, rate_table
 from microrad.orbit.day.flow import table as operations_table
 from microrad.orbit.from_mission import orbits_table
+from microrad.orbit.visibility.contacts import Sampled, coarse_step_s, contacts_with_each
 
 Span = tuple[float, float]
 

@@ -10,14 +10,25 @@ from microrad.mission.file import NamedFile, content_of
 from microrad.mission.tables.link import Terminals
 from microrad.mission.tables.operations import Constellation, Downlink
 from microrad.mission.tables.orbit import Orbits, OrbitTable, VisibilityLimits
-from microrad.orbit.analytic import GeostationarySlot, KeplerOrbit, node_of_local_time, sun_synchronous_inclination_rad
 from microrad.orbit.base import Orbit, OrbitError
-from microrad.orbit.earth import EARTH_RADIUS_M, Earth, Station
-from microrad.orbit.ephemeris import EphemerisOrbit
-from microrad.orbit.epoch import Epoch
+from microrad.orbit.earth.epoch import Epoch
+from microrad.orbit.earth.figure import EARTH_RADIUS_M, Earth, Station
 from microrad.orbit.files import read_elements, read_oem
-from microrad.orbit.limits import UNLIMITED, Limits, Terminal
-from microrad.orbit.mean_elements import MOST_ELEMENTS_AGE_S, ElementSet, Sgp4Orbit, closest_elements, sgp4_orbit
+from microrad.orbit.propagation.analytic import (
+    GeostationarySlot,
+    KeplerOrbit,
+    node_of_local_time,
+    sun_synchronous_inclination_rad,
+)
+from microrad.orbit.propagation.ephemeris import EphemerisOrbit
+from microrad.orbit.propagation.mean_elements import (
+    MOST_ELEMENTS_AGE_S,
+    ElementSet,
+    Sgp4Orbit,
+    closest_elements,
+    sgp4_orbit,
+)
+from microrad.orbit.visibility.limits import UNLIMITED, Limits, Terminal
 
 Contents = tuple[NamedFile, ...]
 """The files that a mission names, read once with it."""

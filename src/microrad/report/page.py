@@ -31,8 +31,8 @@ from microrad.report import (
 )
 from microrad.report.plotting.figure import Figure
 from microrad.report.quantities import quantity
-from microrad.study.pointing_cost import FINE
-from microrad.study.story import Study
+from microrad.study.pointing_penalty import FINE
+from microrad.study.study import Study
 
 PARTS = (
     ("verdict", "Verdict"),

@@ -18,7 +18,7 @@ from microrad.report import compared, tolerances
 from microrad.report.carried import Carried, ReproduceError, altered, held, read, shown_part, unpack
 from microrad.report.compared import Comparison, Difference, clipped
 from microrad.report.scale import Scale, scale_of
-from microrad.study import story as study
+from microrad.study import study
 
 MOST_SHOWN = 40
 """Differences that the text lists."""

@@ -9,8 +9,8 @@ import numpy as np
 from microrad import link
 from microrad.core.arrays import Floats
 from microrad.link import pointing
+from microrad.link.pointing.outage import Performance
 from microrad.link.requirement import IMPOSSIBLE, Requirement, Subject, derived_from, outage_words
-from microrad.link.under_jitter import Performance
 from microrad.loop import sine_run
 from microrad.loop.fine_pointing import FinePointingStudy
 from microrad.loop.paper_cases import PID, PID_WITH_INVERSE, PaperCases, Run

@@ -11,7 +11,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from microrad.link.acquisition.limits import require_not_negative
+from microrad.link.acquisition.checks import require_not_negative
 from microrad.link.acquisition.scan import Raster, Scan, Spiral, StepStare
 from microrad.link.acquisition.times import TimeDistribution, merged
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from microrad.core.units import format_quantity
-from microrad.link.acquisition.limits import (
+from microrad.link.acquisition.checks import (
     require_angle,
     require_inside,
     require_not_negative,

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from microrad.core.units import SPEED_OF_LIGHT_M_S, format_quantity
-from microrad.link.acquisition.limits import require_count, require_not_negative, require_positive, require_probability
+from microrad.link.acquisition.checks import require_count, require_not_negative, require_positive, require_probability
 from microrad.link.acquisition.times import TimeDistribution, fixed_time, joined
 
 LOCKED = "locked"

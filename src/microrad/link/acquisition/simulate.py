@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from microrad.link.acquisition.limits import require_count, require_not_negative, require_positive
+from microrad.link.acquisition.checks import require_count, require_not_negative, require_positive
 from microrad.link.acquisition.scan import Scan
 from microrad.link.acquisition.sequence import LOCKED, LOST, Stage, check_sequence
 from microrad.link.acquisition.times import TimeDistribution

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from microrad.link.acquisition.checks import require_angle, require_not_negative, require_positive
 from microrad.link.acquisition.detection import detection_times
-from microrad.link.acquisition.limits import require_angle, require_not_negative, require_positive
 from microrad.link.acquisition.scan import Detector, Search, Spiral, highest_speed
 
 _Array = NDArray[np.float64]

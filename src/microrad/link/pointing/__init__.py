@@ -1,7 +1,7 @@
 """Pointing: the budget of the open-loop errors, by every rule that a reviewer asks for; what jitter does to a link."""
 
 from microrad.link.pointing.allocation import Allocation, allocate
-from microrad.link.pointing.classes import ErrorTerm, StatedError, basis, error_term
+from microrad.link.pointing.error_classes import ErrorTerm, StatedError, basis, error_term
 from microrad.link.pointing.fading import (
     NoPowerError,
     SpectralMotion,
@@ -12,6 +12,7 @@ from microrad.link.pointing.fading import (
 )
 from microrad.link.pointing.open_loop import INTERPRETATIONS, OpenLoopPointing, open_loop_budget
 from microrad.link.pointing.point_ahead import point_ahead
+from microrad.link.pointing.radial_error import Jitter, radial_cdf, radial_quantile, radial_survival
 from microrad.link.pointing.statistics import (
     BestDivergence,
     best_divergence_for_outage,
@@ -36,7 +37,6 @@ from microrad.link.pointing.summation import (
     sigma_multiple,
     summations,
 )
-from microrad.link.radial_error import Jitter, radial_cdf, radial_quantile, radial_survival
 from microrad.mission.tables.pointing import point_ahead_rad
 
 __all__ = [

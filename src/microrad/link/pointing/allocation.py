@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from microrad.core.units import format_quantity
-from microrad.link.pointing.classes import Interpretation, StatedError, error_term
+from microrad.link.pointing.error_classes import Interpretation, StatedError, error_term
 from microrad.link.pointing.summation import TOTALS, Rule
 
 

@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike
 
 from microrad.core.arrays import Floats
 from microrad.core.units import format_quantity
+from microrad.link.pointing.radial_error import Jitter, density_on_circle, radial_survival
 from microrad.link.pointing.statistics import outage_probability, radius_of_loss_rad, transmission
-from microrad.link.radial_error import Jitter, density_on_circle, radial_survival
 
 ErrorRatio = Callable[[Floats], Floats]
 """Bit error ratio over received power; the power 1 is what the target needs without pointing error."""

@@ -7,10 +7,11 @@ from numpy.typing import ArrayLike
 
 from microrad.core.arrays import Floats
 from microrad.core.budget import Line, root_sum_square
-from microrad.link.model import Shared
+from microrad.link.budget.assembly import Shared
 from microrad.link.pointing.allocation import Allocation, allocate
-from microrad.link.pointing.classes import ErrorTerm, Interpretation, StatedError, basis, error_term
+from microrad.link.pointing.error_classes import ErrorTerm, Interpretation, StatedError, basis, error_term
 from microrad.link.pointing.point_ahead import NAME, PointAheadAngle, point_ahead
+from microrad.link.pointing.radial_error import Jitter, radial_cdf
 from microrad.link.pointing.summation import (
     Rule,
     Summation,
@@ -18,7 +19,6 @@ from microrad.link.pointing.summation import (
     mean_and_sigma,
     summations,
 )
-from microrad.link.radial_error import Jitter, radial_cdf
 from microrad.mission.model import Source, source_text
 from microrad.mission.tables.link import Beacon, half_angle_rad
 from microrad.mission.tables.pointing import Pointing

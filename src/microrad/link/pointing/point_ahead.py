@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from microrad.core.units import format_quantity
-from microrad.link.pointing.classes import StatedError
+from microrad.link.pointing.error_classes import StatedError
 from microrad.mission.tables.pointing import PointAhead, point_ahead_rad
 
 NAME = "Point-ahead"

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from microrad.core.arrays import Floats
 from microrad.core.units import format_quantity
-from microrad.link.radial_error import Jitter, at_least_zero, radial_quantile, radial_survival
+from microrad.link.pointing.radial_error import Jitter, at_least_zero, radial_quantile, radial_survival
 
 _DB_PER_SQUARE = 20.0 / math.log(10.0)  # loss in dB is 8.686 (r / theta)^2
 

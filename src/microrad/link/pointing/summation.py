@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from statistics import NormalDist
 from typing import Literal
 
-from microrad.link.pointing.classes import ErrorTerm
-from microrad.link.radial_error import Jitter, radial_quantile
+from microrad.link.pointing.error_classes import ErrorTerm
+from microrad.link.pointing.radial_error import Jitter, radial_quantile
 
 Rule = Literal["rss", "esa-1993", "ecss-axis", "ecss-radial", "exact"]
 """The rules that count every term; the Rayleigh rule of ECSS leaves out the means."""

@@ -6,7 +6,7 @@ from functools import partial
 from microrad import link, orbit
 from microrad.core.progress import Progress
 from microrad.core.units import format_quantity
-from microrad.link.partner_search import Found
+from microrad.link.acquisition.partner_search import Found
 from microrad.link.requirement import derived_from
 from microrad.link.study import LinkStudy
 from microrad.mission.model import LinkMission

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 from microrad import link, orbit
 from microrad.core.units import format_quantity
-from microrad.link.partner_search import Found
+from microrad.link.acquisition.partner_search import Found
 from microrad.mission.tables.operations import Operations
 from microrad.mission.tables.orbit import HIGHEST_MASK_RAD, Orbits, VisibilityLimits
 from microrad.orbit.day import flow, geometry

@@ -8,7 +8,7 @@ import numpy as np
 
 from microrad import link, orbit
 from microrad.core.arrays import Floats
-from microrad.link.partner_search import Found
+from microrad.link.acquisition.partner_search import Found
 from microrad.mission.tables.operations import Downlink, Operations
 from microrad.orbit import operations
 from microrad.orbit.day.geometry import View, cut_at, longest_gap_s

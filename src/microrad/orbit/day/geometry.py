@@ -11,10 +11,10 @@ from microrad import orbit
 from microrad.core.arrays import Floats
 from microrad.core.units import SPEED_OF_LIGHT_M_S, format_quantity
 from microrad.mission.model import LinkMission
-from microrad.orbit.contacts import EARTH, END, START, coarse_step_s, coarse_times
-from microrad.orbit.events import positive
+from microrad.orbit.earth.sun import shadow_rad
 from microrad.orbit.from_mission import TAIL_S
-from microrad.orbit.sun import shadow_rad
+from microrad.orbit.visibility.contacts import EARTH, END, START, coarse_step_s, coarse_times
+from microrad.orbit.visibility.events import positive
 
 _C = TypeVar("_C", bound=orbit.Contact)
 

@@ -15,9 +15,9 @@ from decimal import Decimal
 from pathlib import Path
 
 from microrad.orbit.base import OrbitError
-from microrad.orbit.epoch import DAY_S, Epoch
+from microrad.orbit.earth.epoch import DAY_S, Epoch
 from microrad.orbit.files.messages import Field, add_field, finite, kvn_field, read_text, utc_epoch, xml_fields
-from microrad.orbit.mean_elements import REVOLUTION_RAD, ElementSet, check_theory, checked
+from microrad.orbit.propagation.mean_elements import REVOLUTION_RAD, ElementSet, check_theory, checked
 
 
 def read_elements(path: Path, name: str | None = None, data: bytes | None = None) -> tuple[ElementSet, ...]:

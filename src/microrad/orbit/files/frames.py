@@ -10,8 +10,8 @@ import numpy as np
 
 from microrad.core.arrays import Floats
 from microrad.orbit.base import States
-from microrad.orbit.earth import ROTATION_RAD_S
-from microrad.orbit.epoch import Epoch
+from microrad.orbit.earth.epoch import Epoch
+from microrad.orbit.earth.figure import ROTATION_RAD_S
 
 FRAMES = re.compile(r"TEME|TOD|EME2000|GCRF\d*|ICRF\d*|ITRF-?\d*")
 """Names of the frames that are read, as `frame_name` gives them."""

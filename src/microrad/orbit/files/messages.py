@@ -19,7 +19,7 @@ import numpy as np
 from microrad.core.arrays import Floats
 from microrad.core.folder import read_bytes
 from microrad.orbit.base import OrbitError
-from microrad.orbit.epoch import DAY_S, Epoch
+from microrad.orbit.earth.epoch import DAY_S, Epoch
 
 MOST_BYTES = 50_000_000
 """Largest file that is read: a state vector each second for four days, or each minute for most of a year."""

@@ -13,9 +13,8 @@ import numpy as np
 
 from microrad.core.arrays import Floats
 from microrad.orbit.base import OrbitError, States
-from microrad.orbit.earth import MU_M3_S2
-from microrad.orbit.ephemeris import SLACK_S, EphemerisOrbit, Segment
-from microrad.orbit.epoch import Epoch
+from microrad.orbit.earth.epoch import Epoch
+from microrad.orbit.earth.figure import MU_M3_S2
 from microrad.orbit.files.frames import FRAMES, frame_name, to_teme
 from microrad.orbit.files.messages import (
     TIME_SYSTEMS,
@@ -29,6 +28,7 @@ from microrad.orbit.files.messages import (
     read_text,
     xml_fields,
 )
+from microrad.orbit.propagation.ephemeris import SLACK_S, EphemerisOrbit, Segment
 
 DEFAULT_DEGREE = 7
 """Degree of the Hermite interpolation of a file that names no method: four state vectors around each time."""

@@ -6,7 +6,7 @@ import numpy as np
 
 from microrad import link, orbit
 from microrad.core.arrays import Floats
-from microrad.link.partner_search import Finding
+from microrad.link.acquisition.partner_search import Finding
 from microrad.loop.fine_pointing import FinePointingStudy
 from microrad.mission.tables.acquisition import Acquisition
 from microrad.mission.tables.operations import Operations

@@ -3,7 +3,7 @@
 from microrad import link
 from microrad.core.units import format_quantity
 from microrad.link import acquisition
-from microrad.link.partner_search import Finding, Found
+from microrad.link.acquisition.partner_search import Finding, Found
 from microrad.loop.fine_pointing import Design, Scene
 from microrad.study.contact_run.records import (
     ANSWER,

@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike
 from microrad.core.arrays import Floats
 from microrad.core.units import format_quantity
 from microrad.link import gains
-from microrad.link.budget import CHOSEN, given_or
-from microrad.link.model import DataLink, LinkError, assembled, check_grid, required_dbm, strehl_db
+from microrad.link.budget.assembly import DataLink, LinkError, assembled, check_grid, required_dbm, strehl_db
+from microrad.link.budget.lines import CHOSEN, given_or
 from microrad.link.receivers import BpskHomodyne, DpskPreamplified, OokCounting
 from microrad.mission.model import Source, source_text
 from microrad.mission.tables.link import Communication

@@ -6,8 +6,8 @@ import numpy as np
 
 from microrad.core.arrays import Floats
 from microrad.orbit.base import OrbitError
-from microrad.orbit.earth import Shape, semi_axes_m, to_unit_sphere
-from microrad.orbit.epoch import Epoch
+from microrad.orbit.earth.epoch import Epoch
+from microrad.orbit.earth.figure import Shape, semi_axes_m, to_unit_sphere
 
 ASTRONOMICAL_UNIT_M = 149_597_870_700.0
 """Mean distance of the Sun, exact by definition (IAU 2012 B2)."""

@@ -9,7 +9,7 @@ import numpy as np
 from microrad import link
 from microrad.core.budget import Line, total_db
 from microrad.link import acquisition, pointing
-from microrad.link.budget import POINT_AHEAD_LOSS, POINTING_LOSS
+from microrad.link.budget.lines import POINT_AHEAD_LOSS, POINTING_LOSS
 from microrad.loop import sensor
 from microrad.mission.model import Source, source_text
 from microrad.mission.tables.acquisition import LEAST_OVERLAP, Acquisition

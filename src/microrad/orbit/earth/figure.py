@@ -8,7 +8,7 @@ import numpy as np
 
 from microrad.core.arrays import Floats
 from microrad.orbit.base import OrbitError, States
-from microrad.orbit.epoch import Epoch
+from microrad.orbit.earth.epoch import Epoch
 
 EARTH_RADIUS_M = 6378137.0
 """Equatorial radius (WGS84)."""

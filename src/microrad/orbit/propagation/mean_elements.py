@@ -12,7 +12,7 @@ import numpy as np
 
 from microrad.core.arrays import Floats
 from microrad.orbit.base import OrbitError, States
-from microrad.orbit.epoch import DAY_S, Epoch
+from microrad.orbit.earth.epoch import DAY_S, Epoch
 
 MOST_ELEMENTS_AGE_S = 14.0 * DAY_S
 """From the epoch of the elements to the time of a state, either way; further off SGP4 errs by tens of kilometres."""

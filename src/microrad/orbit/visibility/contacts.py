@@ -11,7 +11,8 @@ import numpy as np
 from microrad.core.arrays import Floats
 from microrad.core.units import format_quantity
 from microrad.orbit.base import Orbit, OrbitError, States
-from microrad.orbit.earth import (
+from microrad.orbit.earth.epoch import Epoch
+from microrad.orbit.earth.figure import (
     EARTH_RADIUS_M,
     GEOSTATIONARY_RADIUS_M,
     MU_M3_S2,
@@ -20,10 +21,9 @@ from microrad.orbit.earth import (
     Station,
     elevation_rad,
 )
-from microrad.orbit.epoch import Epoch
-from microrad.orbit.events import Intervals, Rows, intersection, largest, positive, positive_rows
-from microrad.orbit.limits import Condition, Side, Terminal, conditions
-from microrad.orbit.line_of_sight import dot
+from microrad.orbit.visibility.events import Intervals, Rows, intersection, largest, positive, positive_rows
+from microrad.orbit.visibility.limits import Condition, Side, Terminal, conditions
+from microrad.orbit.visibility.line_of_sight import dot
 
 Span = tuple[float, float]
 

@@ -7,8 +7,8 @@ import numpy as np
 
 from microrad.core.arrays import Floats
 from microrad.orbit.base import OrbitError, States
-from microrad.orbit.earth import EARTH_RADIUS_M, GEOSTATIONARY_RADIUS_M, J2, MU_M3_S2, ROTATION_RAD_S
-from microrad.orbit.epoch import DAY_S, Epoch
+from microrad.orbit.earth.epoch import DAY_S, Epoch
+from microrad.orbit.earth.figure import EARTH_RADIUS_M, GEOSTATIONARY_RADIUS_M, J2, MU_M3_S2, ROTATION_RAD_S
 
 LOWEST_PERIGEE_M = 120e3
 """Height over the equatorial radius below which the air ends an orbit within about one turn."""

@@ -7,7 +7,7 @@ import numpy as np
 
 from microrad.core.arrays import Floats
 from microrad.orbit.base import OrbitError, States
-from microrad.orbit.epoch import Epoch
+from microrad.orbit.earth.epoch import Epoch
 
 SLACK_S = 1e-6
 """Rounding of times at the ends of a span."""

@@ -4,9 +4,9 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from microrad.link.budget import beam_budget
+from microrad.link.budget.assembly import Shared
+from microrad.link.budget.lines import beam_budget
 from microrad.link.inputs import Input, Varied, fits, inputs, margin_or_none, unit_of
-from microrad.link.model import Shared
 from microrad.mission.fields import Quantity, Share
 from microrad.mission.model import LinkMission, Source, source_text
 

@@ -12,7 +12,7 @@ import numpy as np
 from microrad.core.budget import Line, total_db
 from microrad.core.units import format_input, format_quantity
 from microrad.link import gains
-from microrad.link.model import DataLink, Shared, check_grid, required_dbm, strehl_db
+from microrad.link.budget.assembly import DataLink, Shared, check_grid, required_dbm, strehl_db
 from microrad.mission.model import Source, source_text
 from microrad.mission.tables.link import Beacon, Communication, half_angle_rad
 

@@ -13,7 +13,7 @@ from microrad.core.progress import Progress
 from microrad.core.threads import both
 from microrad.link import pointing, requirement
 from microrad.link import study as link_study
-from microrad.link import under_jitter as link_performance
+from microrad.link.pointing import outage as link_performance
 from microrad.link.tracking_light import tracking_light_w
 from microrad.loop import control, fine_pointing, paper_cases, sine_run
 from microrad.loop.fine_loop import ensemble
@@ -23,7 +23,8 @@ from microrad.mission.file import MissionFile, with_contents
 from microrad.mission.model import Source
 from microrad.orbit import constellation
 from microrad.orbit import day as day_study
-from microrad.study import alternatives, contact_run, paper, pointing_cost, verdict
+from microrad.study import alternatives, contact_run, paper, verdict
+from microrad.study import pointing_penalty as pointing_cost
 
 Requirements = tuple[requirement.Requirement, ...]
 

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from microrad import link
 from microrad.link import pointing
-from microrad.link.under_jitter import Performance, Spread, performance, stated_outage
+from microrad.link.pointing.outage import Performance, Spread, performance, stated_outage
 from microrad.loop import fine_pointing, paper_cases
 from microrad.loop.fine_loop.ensemble import bin_edges_rad, histogram_quantile
 from microrad.mirror import Variant

@@ -12,13 +12,13 @@ from scipy.special import ive
 from link_files import PATTERN, RECEIVERS, link_file, received_with
 from microrad import link
 from microrad.link import pointing
-from microrad.link import under_jitter as link_performance
-from microrad.link.under_jitter import Spread
+from microrad.link.pointing import outage as link_performance
+from microrad.link.pointing.outage import Spread
 from microrad.loop import paper_cases as tracking
 from microrad.loop import sine_run as simulate
 from microrad.loop.fine_loop.ensemble import bin_edges_rad
 from microrad.loop.fine_pointing import FinePointingStudy, Residual, Verified
-from microrad.study import pointing_cost as performance
+from microrad.study import pointing_penalty as performance
 from shipped import edited
 
 URAD = 1e-6

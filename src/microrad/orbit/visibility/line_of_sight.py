@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 from microrad.core.arrays import Floats
 from microrad.core.units import SPEED_OF_LIGHT_M_S, format_quantity
 from microrad.orbit.base import Orbit, OrbitError
-from microrad.orbit.earth import gravity
+from microrad.orbit.earth.figure import gravity
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -10,6 +10,7 @@ import numpy as np
 from microrad.core.arrays import Floats
 from microrad.core.budget import Line
 from microrad.core.units import ELEMENTARY_CHARGE_C
+from microrad.link.receivers.background import apd_excess_noise_factor
 from microrad.link.receivers.base import Receiver
 from microrad.link.receivers.checks import (
     SOURCE,
@@ -23,7 +24,6 @@ from microrad.link.receivers.checks import (
     require_zero_or_more,
     spontaneous_photons,
 )
-from microrad.link.receivers.light import apd_excess_noise_factor
 
 _BANDWIDTH_PER_SYMBOL = 0.5  # one-sided noise bandwidth over the symbol rate of a filter matched to rectangular symbols
 

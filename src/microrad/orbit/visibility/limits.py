@@ -10,11 +10,11 @@ import numpy as np
 from microrad.core.arrays import Floats
 from microrad.core.units import format_quantity
 from microrad.orbit.base import Orbit, OrbitError, States
-from microrad.orbit.earth import Earth, gravity
-from microrad.orbit.epoch import Epoch
-from microrad.orbit.events import Function, Intervals, complement, positive, refined, union
-from microrad.orbit.line_of_sight import cross, dot
-from microrad.orbit.sun import shadow_rad, sun_direction
+from microrad.orbit.earth.epoch import Epoch
+from microrad.orbit.earth.figure import Earth, gravity
+from microrad.orbit.earth.sun import shadow_rad, sun_direction
+from microrad.orbit.visibility.events import Function, Intervals, complement, positive, refined, union
+from microrad.orbit.visibility.line_of_sight import cross, dot
 
 Attitude = Literal["nadir", "sun", "free"]
 """nadir: z to the centre of the Earth, y opposite to the orbit normal, x completing them, along the flight.
