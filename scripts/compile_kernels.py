@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from microrad import load_mission, mirror
-from microrad.link.tracking_light import tracking_light_w
+from microrad.link import tracking_light_w
 from microrad.loop import fine_pointing, paper_cases
 from microrad.study import alternatives
 

@@ -16,11 +16,11 @@ from microrad.campaign.ledger import Ledger
 from microrad.campaign.records import CampaignError
 from microrad.campaign.summary import summarise
 from microrad.core import reads
-from microrad.link import LitAperture
-from microrad.link.inputs import LINK_TABLES
+from microrad.link.beams import LitAperture
 from microrad.link.pointing import outage as under_jitter
 from microrad.link.pointing import radial_error
 from microrad.link.pointing.outage import Exposure
+from microrad.link.variation import LINK_TABLES
 from microrad.mission.fields import Several
 from microrad.mission.file import load_link, open_mission
 from microrad.mission.toml import MissionError

@@ -18,13 +18,10 @@ from microrad.link.acquisition import (
     Search,
     Spiral,
     Stage,
-    TimeDistribution,
     Timing,
     answer_stages,
-    beacon_stages,
     detection_times,
     frame_detection_probability,
-    frames_detection_probability,
     paper_sequence,
     scan_stages,
     simulate,
@@ -32,6 +29,8 @@ from microrad.link.acquisition import (
     solve,
     wide_against_scan,
 )
+from microrad.link.acquisition.sequence import beacon_stages, frames_detection_probability
+from microrad.link.acquisition.times import TimeDistribution
 
 URAD = 1e-6
 NORMAL_99 = 2.5758  # one seed in a hundred misses it; larger studies of each pair show no bias

@@ -13,12 +13,11 @@ from microrad.link.acquisition import (
     StepStare,
     Vibration,
     detection_times,
-    dwells_along_track,
     gap_probability,
     highest_speed,
-    scan_detection_probability,
     simulate_scan,
 )
+from microrad.link.acquisition.scan import dwells_along_track, scan_detection_probability
 
 URAD = 1e-6
 SEARCH = Search(300 * URAD, 20 * URAD, 0.25, 0.995)

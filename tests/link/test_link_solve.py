@@ -11,6 +11,7 @@ import budgets
 from link_files import GAUSSIAN, PATTERN, data_with, link_file, received_with, written
 from microrad import link
 from microrad.link import study as link_study
+from microrad.link import variation
 from microrad.link.pointing import outage as link_performance
 
 NO_BEAMS = dict.fromkeys(("beacon", "answer", "acquisition"))
@@ -86,7 +87,9 @@ def test_a_beam_is_looked_for_at_its_own_margin_and_above_diffraction(tmp_path):
     assert budgets.answer(m.with_value("answer.divergence_rad", found.high), {}).margin_db == pytest.approx(
         0.0, abs=1e-9
     )
-    assert link.fits("answer")(m) and not link.fits("answer")(m.with_value("answer.divergence_rad", found.low * 0.999))
+    assert variation.fits("answer")(m) and not variation.fits("answer")(
+        m.with_value("answer.divergence_rad", found.low * 0.999)
+    )
 
 
 @pytest.mark.parametrize(
@@ -96,7 +99,7 @@ def test_every_key_has_its_margin_inside_and_not_beyond_its_ends(tmp_path, chang
     file = link_file(tmp_path, changes, UNLIKE, {"communication.data_rate": "100 Mbit/s"})
     m = file.mission
     tables = ("terminals", "communication", "communication.receiver", "communication.beam", "jitter")
-    keys = [each.shown for table in tables for each in link.inputs(m, table) if each.value != 0.0]
+    keys = [each.shown for table in tables for each in variation.inputs(m, table) if each.value != 0.0]
     assert len(keys) > 10
     for key in keys:
         try:
@@ -104,17 +107,17 @@ def test_every_key_has_its_margin_inside_and_not_beyond_its_ends(tmp_path, chang
         except ValueError as error:
             assert "moves this margin by nothing" in str(error), key
             continue
-        found = tuple(each for table in tables for each in link.inputs(m, table) if each.shown == key)
+        found = tuple(each for table in tables for each in variation.inputs(m, table) if each.shown == key)
         for interval in solution.solved.intervals:
             for end, outside, is_open in (
                 (interval.low, 1.0 - 1e-6, interval.low_open),
                 (interval.high, 1.0 + 1e-6, interval.high_open),
             ):
-                there = link.moved(m, found, end)
+                there = variation.moved(m, found, end)
                 assert link_performance.margin_db(link.of(there)) >= 3.0, key
-                beyond = link.moved(m, found, end * outside)
+                beyond = variation.moved(m, found, end * outside)
                 if not is_open and beyond is not None and link.lit(beyond):
-                    assert link.margin_or_none(link.of(beyond), link_performance.margin_db) < 3.0, key
+                    assert variation.margin_or_none(link.of(beyond), link_performance.margin_db) < 3.0, key
 
 
 def test_what_no_value_leaves_is_said_with_the_most(call, tmp_path):

@@ -16,6 +16,7 @@ from microrad.core.units import parse_quantity
 from microrad.link import acquisition, requirement
 from microrad.link import study as link_study
 from microrad.link.acquisition import partner_search as link_acquisition
+from microrad.link.budget.lines import LEFT_AT_ZERO
 from microrad.link.pointing.radial_error import Jitter
 from microrad.loop import sensor
 from microrad.mission.file import LinkFile
@@ -165,7 +166,7 @@ def test_links_close_when_each_of_them_does(tmp_path, plain):
 
 def test_warnings_are_those_of_every_budget_and_none_where_all_is_given(tmp_path, plain):
     assert len(plain.warnings) == 3
-    assert all(link.LEFT_AT_ZERO in warning for warning in plain.warnings)
+    assert all(LEFT_AT_ZERO in warning for warning in plain.warnings)
     assert [warning.partition(" ")[0] for warning in plain.warnings] == ["Communication", "Beacon", "Answer"]
     assert "Transmit optics loss, Receive optics loss, Tracking split loss" in plain.warnings[0]
     losses = {

@@ -11,7 +11,8 @@ from scipy.special import ive
 
 from link_files import PATTERN, RECEIVERS, link_file, received_with
 from microrad import link
-from microrad.link import pointing
+from microrad.link import beams, pointing
+from microrad.link.pointing import fading, statistics
 from microrad.link.pointing import outage as link_performance
 from microrad.link.pointing.outage import Spread
 from microrad.loop import paper_cases as tracking
@@ -94,7 +95,7 @@ def test_a_known_jitter_costs_what_its_closed_forms_say(tmp_path, values):
     assert found.margin_db == pytest.approx(ON_AXIS_DB - found.outage_loss_db, abs=1e-6)
     assert found.data_rate_bit_s == pytest.approx(RATE_BIT_S * 10 ** ((found.margin_db - REQUIRED_DB) / 10), rel=1e-6)
     for share, margin in ((found.outage, ON_AXIS_DB), (found.short, ON_AXIS_DB - REQUIRED_DB)):
-        exact = float(pointing.outage_probability(jitter, HALF_RAD, margin))
+        exact = float(statistics.outage_probability(jitter, HALF_RAD, margin))
         assert share == pytest.approx(exact, rel=1e-6, abs=1e-15)
     best = pointing.best_divergence_for_outage(
         jitter, OUTAGE, smallest_half_angle_rad=HALF_RAD, current_half_angle_rad=HALF_RAD
@@ -179,9 +180,9 @@ def test_an_apertures_pattern_is_taken_as_it_is(tmp_path):
     assert found.outage_loss_db == pytest.approx(float(fall.loss_db(quantile)), rel=5e-3)
     margin = found.margin_db + found.outage_loss_db - REQUIRED_DB
     speed = 2 * math.pi * 40 * rms
-    rate = pointing.level_crossing_rate_hz(record((0, 0), (6, 6)), (speed, speed), fall.error_rad(margin))
+    rate = fading.level_crossing_rate_hz(record((0, 0), (6, 6)), (speed, speed), fall.error_rad(margin))
     assert found.fades_per_s == pytest.approx(float(rate), rel=1e-9)
-    gaussian = link.GaussianFall(fall.half_angle_rad).error_rad(margin)
+    gaussian = beams.GaussianFall(fall.half_angle_rad).error_rad(margin)
     assert fall.error_rad(margin) != pytest.approx(gaussian, rel=1e-3)  # or the line above would not tell them apart
 
 
@@ -274,7 +275,7 @@ def test_fades_and_penalty_have_the_uncorrected_point_ahead_as_bias(tmp_path, bi
     assert (found.fades_per_s, found.fade_s) == pytest.approx(
         (float(fades.per_second), float(fades.mean_duration_s)), rel=1e-9
     )
-    share = pointing.outage_probability(shifted, HALF_RAD, on_axis - REQUIRED_DB)
+    share = statistics.outage_probability(shifted, HALF_RAD, on_axis - REQUIRED_DB)
     assert found.fades_per_s * found.fade_s == pytest.approx(float(share), rel=1e-9)
     receiver = link.of(mission).receiver
     needed = float(receiver.required_power_w(RATE_BIT_S))
@@ -432,7 +433,7 @@ def test_the_residual_of_the_loop_costs_what_a_jitter_of_its_moments_does(missio
     assert case.mean_loss_db == pytest.approx(float(pointing.mean_loss_db(jitter, HALF_RAD)), rel=1e-3)
     # bins are 3 % wide in the square, and read between their edges
     assert case.outage_loss_db == pytest.approx(float(pointing.outage_loss_db(jitter, HALF_RAD, OUTAGE)), rel=1e-3)
-    short = float(pointing.outage_probability(jitter, HALF_RAD, ON_AXIS_DB - REQUIRED_DB))
+    short = float(statistics.outage_probability(jitter, HALF_RAD, ON_AXIS_DB - REQUIRED_DB))
     assert case.short == pytest.approx(short, rel=0.02)
     assert case.margin_db == pytest.approx(ON_AXIS_DB - case.outage_loss_db, abs=1e-6)
 
@@ -446,7 +447,7 @@ def test_fades_are_known_on_the_mirror_whose_spectrum_is_known(mission):
     case = found.case(performance.FINE, "PI", "given")
     speed = [math.sqrt(np.trapezoid((2 * np.pi * FREQ_HZ) ** 2 * axis, FREQ_HZ)) for axis in spectrum.T]
     radius = HALF_RAD * math.sqrt((ON_AXIS_DB - REQUIRED_DB) / DB_PER_SQUARE)
-    rate = float(pointing.level_crossing_rate_hz(record((0, 0), (2, 3)), tuple(speed), radius))
+    rate = float(fading.level_crossing_rate_hz(record((0, 0), (2, 3)), tuple(speed), radius))
     assert case.fades_per_s == pytest.approx(rate, rel=1e-5)
     assert case.fade_s == pytest.approx(
         float(pointing.radial_survival(record((0, 0), (2, 3)), radius)) / rate, rel=1e-5

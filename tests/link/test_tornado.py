@@ -10,6 +10,7 @@ import budgets
 from link_files import GAUSSIAN, PATTERN, RECEIVERS, SKY, link_file, received_with
 from microrad import link
 from microrad.link import study as link_study
+from microrad.link import variation
 from microrad.link.pointing import outage as link_performance
 from microrad.link.variation import RELATIVE, STEP_DB
 from microrad.mission.fields import Quantity
@@ -158,7 +159,7 @@ def test_what_does_not_move_the_margin_is_left_out(tmp_path):
 def test_the_margin_of_the_other_beams_over_their_own_inputs(tmp_path, name, end, other):
     file = link_file(tmp_path, CHANNEL, LEFT, {f"terminals.{other}_obscuration": 0.3})
     m, budget = file.mission, {"beacon": budgets.beacon, "answer": budgets.answer}[name]
-    found = {each.key: each for each in link.beam_tornado(m, file.sources, name)}
+    found = {each.key: each for each in variation.beam_tornado(m, file.sources, name)}
     keys = {f"{name}.{key}" for key in ("transmit_power", "divergence", "pointing_error", "distance", "strehl")}
     keys |= {f"{name}.{key}" for key in ("required_power", "transmit_optics_loss", "receive_optics_loss")}
     keys |= {f"terminals.{other}_{key}" for key in ("aperture", "obscuration")}
@@ -180,7 +181,7 @@ def test_the_margin_of_the_other_beams_over_their_own_inputs(tmp_path, name, end
 def test_no_beam_is_moved_below_diffraction(tmp_path, name, diameter):
     least = 2 * math.sqrt(8) * 1.55e-6 / (math.pi * diameter)
     file = link_file(tmp_path, {f"{name}.divergence": f"{1.05 * least * 1e6} urad", f"{name}.pointing_error": "9 urad"})
-    found = {each.key: each for each in link.beam_tornado(file.mission, file.sources, name)}
+    found = {each.key: each for each in variation.beam_tornado(file.mission, file.sources, name)}
     moved = found[f"{name}.divergence"]
     assert least <= moved.low < moved.value
     assert moved.low == pytest.approx(1.05 * least * (1 - RELATIVE / 4), rel=1e-9)  # halved twice from 10 %
@@ -243,8 +244,8 @@ def test_a_study_holds_a_tornado_for_each_margin_that_there_is(tmp_path):
     found = link_study.tornados(m, sources, all_three)
     assert [each.of for each in found] == ["Communication", "Beacon", "Answer"]
     assert [each.margin_db for each in found] == [each.margin_db for each in all_three]
-    assert found[1].swings == link.beam_tornado(m, file.sources, "beacon")
-    assert found[2].swings == link.beam_tornado(m, file.sources, "answer")
+    assert found[1].swings == variation.beam_tornado(m, file.sources, "beacon")
+    assert found[2].swings == variation.beam_tornado(m, file.sources, "answer")
 
 
 @pytest.mark.parametrize("name", RECEIVERS)

@@ -11,9 +11,10 @@ import pytest
 from day_files import BY_FILE, day_file, element_set
 from microrad import orbit
 from microrad.link import study as link_study
-from microrad.orbit import constellation, operations
+from microrad.orbit import constellation, files, operations
 from microrad.orbit import day as day_study
 from microrad.orbit.constellation import opportunities
+from microrad.orbit.propagation import mean_elements
 from microrad.report import constellation_views
 
 SIX_HOURS = {"orbit.duration": "6 h"}
@@ -231,10 +232,10 @@ def test_a_file_of_elements_is_a_constellation(tmp_path):
     plan = with_elements(tmp_path, text)
     assert plan.satellites == ("EXAMPLE 1", "EXAMPLE 2", "EXAMPLE 3")
     assert {one.satellite for one in plan.planned} == set(plan.satellites)
-    sets = orbit.read_elements(tmp_path / "a.tle")
+    sets = files.read_elements(tmp_path / "a.tle")
     pair, own, relays = made(tmp_path, SIX_HOURS, FILED)
     for elements, satellite in zip(sets, own, strict=True):
-        alone = orbit.sgp4_orbit(elements, pair.epoch)
+        alone = mean_elements.sgp4_orbit(elements, pair.epoch)
         time_s = np.array([0.0, 7000.0])
         np.testing.assert_array_equal(satellite.orbit.states(time_s).position_m, alone.states(time_s).position_m)
         assert satellite.limits == pair.leo.limits

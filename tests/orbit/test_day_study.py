@@ -13,6 +13,8 @@ from microrad.link import study as link_study
 from microrad.orbit import EARTH_RADIUS_M
 from microrad.orbit import day as day_study
 from microrad.orbit.day import NOTHING, Numbers, PointingLoss, Swing, assumptions, flow, geometry, given_loss
+from microrad.orbit.earth import figure
+from microrad.orbit.propagation.ephemeris import EphemerisOrbit
 
 C_M_S = 299_792_458.0
 EARTH_POLAR_M = EARTH_RADIUS_M * (1.0 - 1.0 / 298.257223563)
@@ -319,7 +321,7 @@ def stations_by_second(day, setup_s):
     down, pair = day.mission.operations.downlink, day.view.pair
     time_s = np.arange(0.0, pair.whole_s[1]) + 0.5
     own = pair.leo.orbit.states(time_s).position_m
-    seen = {s.name: orbit.elevation_rad(s, pair.epoch, time_s, own) > s.mask_rad for s in orbit.stations(down)}
+    seen = {s.name: figure.elevation_rad(s, pair.epoch, time_s, own) > s.mask_rad for s in orbit.stations(down)}
     rose: dict[str, int] = {}
     serving, since, rate, log = "", 0, np.zeros(time_s.size), []
     for second in range(time_s.size):
@@ -421,7 +423,7 @@ def test_an_ephemeris_of_the_same_orbit_has_the_same_contacts(quick, day, tmp_pa
     (tmp_path / "a.oem").write_text(ephemeris(own, np.arange(0.0, 172801.0, 60.0)), encoding="utf-8")
     limits = {"attitude": "free", "slew_limit": "0.5 deg/s", "sun_exclusion": "5 deg", "in_eclipse": True}
     found = quick({"orbit.leo": {"kind": "ephemeris", "file": "a.oem", "limits": limits}})
-    assert isinstance(found.view.pair.leo.orbit, orbit.EphemerisOrbit)
+    assert isinstance(found.view.pair.leo.orbit, EphemerisOrbit)
     assert len(found.view.contacts) == len(day.view.contacts)
     for one, other in zip(found.view.contacts, day.view.contacts, strict=True):
         assert (one.begins, one.ends) == (other.begins, other.ends)

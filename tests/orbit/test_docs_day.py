@@ -14,9 +14,10 @@ from microrad.loop import control, fine_pointing
 from microrad.loop.fine_loop.loop import assemble
 from microrad.loop.fine_pointing import designs
 from microrad.mission import file as missionfile
-from microrad.orbit import constellation
+from microrad.orbit import constellation, files
 from microrad.orbit import day as day_study
 from microrad.orbit.day import flow, geometry
+from microrad.orbit.propagation import analytic, mean_elements
 from microrad.study import contact_run
 from places import ROOT
 from scenes import scene_of
@@ -64,7 +65,9 @@ def folder(tmp_path_factory):
     (path / "satellite.tle").write_text(ELEMENTS, encoding="utf-8")
     epoch = orbit.Epoch.from_text("2026-03-20T12:00:00Z")
     time_s = np.arange(0.0, 172801.0, 60.0)
-    rows = 1e-3 * np.vstack(orbit.sgp4_orbit(orbit.read_elements(path / "satellite.tle")[0], epoch).states(time_s))
+    rows = 1e-3 * np.vstack(
+        mean_elements.sgp4_orbit(files.read_elements(path / "satellite.tle")[0], epoch).states(time_s)
+    )
     lines = [epoch.utc(t)[:-1] + "".join(f" {x:.9f}" for x in row) for t, row in zip(time_s, rows.T, strict=True)]
     (path / "satellite.oem").write_text(EPHEMERIS + "\n".join(lines) + "\n", encoding="utf-8")
     return path
@@ -141,7 +144,7 @@ def test_the_commands_of_the_page_run(call, tmp_path):
 # --------------------------------------------------------------------------------------------------------- the words
 def test_what_moves_the_ends_of_contacts(view, day):
     own = day.view
-    inclination = f'inclination = "{math.degrees(orbit.sun_synchronous_inclination_rad(500e3))!r} deg"'
+    inclination = f'inclination = "{math.degrees(analytic.sun_synchronous_inclination_rad(500e3))!r} deg"'
     still = ORBITS[0].replace('gravity = "j2"', 'gravity = "two-body"')
     still = still.replace('inclination = "sun-synchronous"', inclination)
     j2 = np.abs(ends(view(still)) - ends(own)).max()

@@ -21,9 +21,9 @@ from scipy.optimize import brentq
 
 from microrad.core.units import SPEED_OF_LIGHT_M_S
 from microrad.orbit.base import OrbitError
+from microrad.orbit.earth import figure as earth
 from microrad.orbit.earth import sun
 from microrad.orbit.earth.epoch import Epoch
-from microrad.orbit.earth import figure as earth
 from microrad.orbit.propagation import analytic
 
 START = Epoch.from_text("2026-03-20T12:00:00Z")

@@ -7,7 +7,7 @@ from microrad import mirror
 from microrad.campaign.definition import CampaignFile
 from microrad.campaign.records import CampaignError
 from microrad.campaign.tables import LoopTable
-from microrad.link.tracking_light import tracking_light_w
+from microrad.link import tracking_light_w
 from microrad.loop import fine_pointing
 from microrad.loop.control import AxisController
 from microrad.loop.fine_loop import ensemble

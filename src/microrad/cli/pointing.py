@@ -54,7 +54,7 @@ def design(
     with progress_bar() as progress:
         try:
             from microrad import mirror as mirror_room
-            from microrad.link.tracking_light import tracking_light_w
+            from microrad.link import tracking_light_w
             from microrad.loop import fine_pointing
 
             scene = fine_pointing.scene(mission, mirror_room.of(mission.mission), tracking_light_w(mission))

@@ -12,8 +12,9 @@ from microrad import link
 from microrad.core import kept
 from microrad.core.budget import Line
 from microrad.core.units import format_quantity
-from microrad.link import pointing
+from microrad.link import pointing, variation
 from microrad.link.acquisition.partner_search import Finding, Sent, Tracking, finding, tracking
+from microrad.link.budget import assembly
 from microrad.link.pointing.outage import (
     Performance,
     error_rad,
@@ -129,7 +130,7 @@ class Solution:
     unit: str
     of: str
     required_db: float
-    solved: link.Solved
+    solved: variation.Solved
     value: float
     file: LinkFile
 
@@ -143,21 +144,21 @@ def solve(file: LinkFile, key: str) -> Solution:
     file = solve_rate(file)
     m, sources = file.mission, file.sources
     tables = ("jitter", *link.LINK_TABLES, *(name for name in ("beacon", "answer") if getattr(m, name) is not None))
-    every = [each for table in tables for each in link.inputs(m, table)]
+    every = [each for table in tables for each in variation.inputs(m, table)]
     found = tuple(each for each in every if key in (each.key, each.shown))
     if not found:
         raise ValueError(_no_such_key(key, dict.fromkeys(each.key for each in every)))
-    of, unit = found[0].table, link.unit_of(found[0], m.conventions.strehl)
+    of, unit = found[0].table, variation.unit_of(found[0], m.conventions.strehl)
     if of in ("beacon", "answer"):
-        required, margin, possible = 0.0, link.beam_margin(of, sources), link.fits(of)
+        required, margin, possible = 0.0, variation.beam_margin(of, sources), variation.fits(of)
     else:
         of, required, margin, possible = "communication", m.requirement.margin_db, _margin_db, link.lit
-    solved = link.solve(m, found, unit, margin, required, possible)
+    solved = variation.solve(m, found, unit, margin, required, possible)
     if not solved.intervals:
         return Solution(key, unit, of, required, solved, max(each.value for each in found), file)
     first, last = solved.intervals[0], solved.intervals[-1]
     value = last.high if first.low_open else first.low
-    mission = link.moved(m, found, value)
+    mission = variation.moved(m, found, value)
     assert mission is not None  # it leaves the margin
     was = sources.get(found[0].key)
     shown = format_quantity(value, unit) if unit else f"{value:.4g}"
@@ -235,7 +236,7 @@ def tornados(
     """What moves the margin of each budget, communication first."""
     tables = ("jitter", "requirement", *link.LINK_TABLES)
     swings = [link.swings(m, sources, tables, m.conventions.strehl, _margin_db, link.lit)]
-    swings += [link.beam_tornado(m, sources, each.name.lower()) for each in budgets[1:]]
+    swings += [variation.beam_tornado(m, sources, each.name.lower()) for each in budgets[1:]]
     return tuple(link.Tornado(each.name, each.margin_db, own) for each, own in zip(budgets, swings, strict=True))
 
 
@@ -256,10 +257,10 @@ def beam_radius(data: link.DataLink) -> BeamRadius | None:
     def at(radius_m: float) -> float:
         table = data.table.with_value("beam.radius_m", radius_m)
         try:
-            changed = link.assembled(data.shared, table, data.requirement, data.jitter)
+            changed = assembly.assembled(data.shared, table, data.requirement, data.jitter)
         except ValueError:  # the obscuration stops it
             return -math.inf
-        return link.margin_or_none(changed, margin_db)
+        return variation.margin_or_none(changed, margin_db)
 
     margins = [at(float(each)) for each in radii]
     best = max(range(len(radii)), key=margins.__getitem__)

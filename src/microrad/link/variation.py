@@ -1,14 +1,127 @@
 """Which input moves a margin most: each one alone, a little down and up."""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from typing import Any, TypeVar
 
-from microrad.link.budget.assembly import Shared
+from pydantic.fields import FieldInfo
+
+from microrad.link.budget.assembly import Shared, communication_beam
 from microrad.link.budget.lines import beam_budget
-from microrad.link.inputs import Input, Varied, fits, inputs, margin_or_none, unit_of
-from microrad.mission.fields import Quantity, Share
+from microrad.link.receivers import RateError
+from microrad.mission.fields import Quantity, Several, Share, Table
 from microrad.mission.model import LinkMission, Source, source_text
+from microrad.mission.tables.link import divergence_fits
+
+LINK_TABLES = (
+    "terminals",
+    "communication",
+    "communication.receiver",
+    "communication.receiver.background",
+    "communication.beam",
+    "channel",
+    "point_ahead",
+)
+"""The tables with the inputs of the communication link."""
+
+_Link = TypeVar("_Link")
+Varied = TypeVar("Varied", bound=Table)
+"""A table of tables, such as a mission, of which one number after the other is moved."""
+
+
+@dataclass(frozen=True, slots=True)
+class Input:
+    """One number of a mission: a field of a table, or an item of one that holds a list."""
+
+    key: str
+    table: str
+    field: str
+    item: int | None
+    value: float
+    rule: Quantity
+
+    @property
+    def shown(self) -> str:
+        """The key, of an item with its place from 1 behind it, as campaigns name it."""
+        return self.key if self.item is None else f"{self.key}.{self.item + 1}"
+
+    def moved(self, tables: Varied, value: float) -> Varied:
+        """The tables with this number replaced."""
+        if self.item is None:
+            return tables.with_value(f"{self.table}.{self.field}", value)
+        items = list(getattr(_table(tables, self.table), self.field))
+        items[self.item] = value
+        return tables.with_value(f"{self.table}.{self.field}", tuple(items))
+
+
+def inputs(tables: Table, name: str) -> Iterator[Input]:
+    """Every quantity of one of the tables that has a value."""
+    table = _table(tables, name)
+    if table is None:
+        return
+    for field, info in type(table).model_fields.items():
+        value, key = getattr(table, field), f"{name}.{info.alias or field}"
+        rules = _rules(info)
+        if rules and isinstance(value, float):
+            yield Input(key, name, field, None, value, rules[0])
+        for rule in (each for each in info.metadata if isinstance(each, Several)):
+            for item, number in enumerate(value):
+                yield Input(key, name, field, item, number, rule.each)
+
+
+def moved(tables: Varied, found: tuple[Input, ...], value: float) -> Varied | None:
+    """The tables with the input at a value, its axes in proportion, or None where their rule does not allow it."""
+    largest = max(each.value for each in found)
+    for each in found:
+        own = value if each.value == largest else value * each.value / largest
+        if each.rule.out_of_bounds(own) or (isinstance(each.rule, Share) and not 0.0 < own < each.rule.below):
+            return None
+        tables = each.moved(tables, own)
+    return tables
+
+
+def _rules(info: FieldInfo) -> list[Quantity]:
+    """The rule of a quantity; that of one that may be left out stands inside the union."""
+    kinds = getattr(info.annotation, "__args__", ())
+    inner = [rule for kind in kinds for rule in getattr(kind, "__metadata__", ())]
+    return [rule for rule in (*info.metadata, *inner) if isinstance(rule, Quantity)]
+
+
+def unit_of(each: Input, strehl: str) -> str:
+    """Unit of an input; a Strehl has one of its own where the convention reads it as a loss."""
+    return "dB" if (each.field, strehl) == ("strehl", "decibel") else each.rule.unit
+
+
+def _table(tables: Table, name: str) -> Table | None:
+    table: Table | None = tables
+    for part in name.split("."):
+        table = None if table is None else getattr(table, part)
+    return table
+
+
+def lit(m: LinkMission) -> bool:
+    """Whether the obscuration lets some of the data's beam pass."""
+    try:
+        communication_beam(m.terminals, m.communication, m.conventions.pointing_loss)
+    except ValueError:
+        return False
+    return True
+
+
+def margin_or_none(of: _Link, margin_db: Callable[[_Link], float]) -> float:
+    """The margin of a link; a receiver too slow for the rate has none."""
+    try:
+        return margin_db(of)
+    except RateError:
+        return -math.inf
+
+
+def fits(name: str) -> Callable[[Any], bool]:
+    """Whether the aperture of the beacon, or of the answer, can make its divergence; asked of a mission."""
+    too_narrow = divergence_fits(name, "geo" if name == "answer" else "leo")
+    return lambda m: not any(too_narrow(m.conventions, m.terminals, getattr(m, name)))
+
 
 RELATIVE = 0.1
 """How far a quantity is moved, as a share of itself."""
@@ -119,3 +232,107 @@ def _nearest(mission: Varied, each: Input, end: float, possible: Callable[[Varie
     while end != each.value and not possible(each.moved(mission, end)):
         end = (each.value + end) / 2.0
     return end
+
+
+DECADES = 6
+"""How far from its own value an input is looked for, up and down."""
+STEPS = 16
+"""Of a decade, or of ten decibels: an interval that is narrower than one step may be missed."""
+
+_BISECTIONS = 60
+_MOVES_DB = 1e-9
+_BESIDE = 1e-6  # of a step: just outside of an interval
+
+
+@dataclass(frozen=True, slots=True)
+class Interval:
+    """Values from ``low`` to ``high`` that leave the margin.
+
+    An end is open where they go on as far as was looked, or as the rule of the input allows.
+    """
+
+    low: float
+    high: float
+    low_open: bool
+    high_open: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Solved:
+    """The intervals of an input that leave a margin, and the value with the largest one, with that margin.
+
+    ``searched`` are the least and the most value that was looked at: `DECADES` from its own, or as far as its rule
+    allows. Values of an input of two axes are those of the larger one.
+    """
+
+    intervals: tuple[Interval, ...]
+    searched: tuple[float, float]
+    best: float
+    best_db: float
+
+
+def solve(
+    mission: Varied,
+    found: tuple[Input, ...],
+    unit: str,
+    margin_db: Callable[[Varied], float],
+    required_db: float,
+    possible: Callable[[Varied], bool],
+) -> Solved:
+    """Where an input leaves a margin, looked for in steps and then found to the last digits.
+
+    ``found`` is the input in its ``unit``, or its axes, which keep their proportion. A value that its rule or
+    ``possible`` does not allow leaves none. Raises ValueError for an input that is 0 and no decibels, which no factor
+    moves.
+    """
+    value, count = max(each.value for each in found), DECADES * STEPS
+    linear = unit.startswith("dB")
+    if not linear and value == 0.0:
+        raise ValueError(f"{found[0].key} is 0, which no factor moves: give it a value to begin with")
+
+    def at(step: float) -> float:
+        return value + 10.0 * step / STEPS if linear else value * 10.0 ** (step / STEPS)
+
+    def margin(step: float) -> float:
+        m = moved(mission, found, at(step))
+        return -math.inf if m is None or not possible(m) else margin_or_none(m, margin_db)
+
+    def enough(step: float) -> bool:
+        return margin(step) >= required_db
+
+    def allowed(step: float) -> bool:
+        return moved(mission, found, at(step)) is not None
+
+    margins = [margin(float(step)) for step in range(-count, count + 1)]
+    known = [each for each in margins if each > -math.inf]
+    if known and max(known) - min(known) < _MOVES_DB:
+        raise ValueError(f"{found[0].key} moves this margin by nothing")
+    intervals, begin = [], None
+    for place, here in enumerate(margins):
+        step = float(place - count)
+        if here >= required_db and begin is None:
+            begin = step if place == 0 else _edge(step, step - 1.0, enough)
+        last = place == len(margins) - 1
+        if begin is not None and (here < required_db or last):
+            end = step if here >= required_db else _edge(step - 1.0, step, enough)
+            beyond = begin - _BESIDE, end + _BESIDE
+            low_open, high_open = (not allowed(each) or abs(each) >= count for each in beyond)
+            intervals.append(Interval(at(begin), at(end), low_open, high_open))
+            begin = None
+    best = max(range(len(margins)), key=margins.__getitem__)
+    searched = at(_farthest(-count, allowed)), at(_farthest(count, allowed))
+    return Solved(tuple(intervals), searched, at(float(best - count)), margins[best])
+
+
+def _farthest(last: int, allowed: Callable[[float], bool]) -> float:
+    """The step farthest from 0 that is allowed, between 0 and the last one."""
+    outward = 1 if last > 0 else -1
+    step = next((each for each in range(0, last, outward) if not allowed(float(each + outward))), last)
+    return float(step) if step == last else _edge(float(step), float(step + outward), allowed)
+
+
+def _edge(inside: float, outside: float, enough: Callable[[float], bool]) -> float:
+    for _ in range(_BISECTIONS):
+        middle = 0.5 * (inside + outside)
+        inside, outside = (middle, outside) if enough(middle) else (inside, middle)
+    return inside

@@ -149,7 +149,7 @@ class Design:
         """Lines of Python that do the same."""
         return joined(
             "from microrad import load_mission, mirror",
-            "from microrad.link.tracking_light import tracking_light_w",
+            "from microrad.link import tracking_light_w",
             "from microrad.loop import fine_pointing",
             "",
             f"mission = {mission_call(self.file, self.mirror)}",

@@ -11,10 +11,9 @@ from microrad.core import kept
 from microrad.core.arrays import Floats
 from microrad.core.progress import Progress
 from microrad.core.threads import both
-from microrad.link import pointing, requirement
+from microrad.link import pointing, requirement, tracking_light_w
 from microrad.link import study as link_study
 from microrad.link.pointing import outage as link_performance
-from microrad.link.tracking_light import tracking_light_w
 from microrad.loop import control, fine_pointing, paper_cases, sine_run
 from microrad.loop.fine_loop import ensemble
 from microrad.mirror import Variant

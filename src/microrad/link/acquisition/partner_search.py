@@ -9,6 +9,7 @@ import numpy as np
 from microrad import link
 from microrad.core.budget import Line, total_db
 from microrad.link import acquisition, pointing
+from microrad.link.beams import GaussianFall
 from microrad.link.budget.lines import POINT_AHEAD_LOSS, POINTING_LOSS
 from microrad.loop import sensor
 from microrad.mission.model import Source, source_text
@@ -200,7 +201,7 @@ def _timing(terminals: Terminals, a: Acquisition, range_m: float) -> acquisition
 
 def _reach(sent: Sent, shared: link.Shared) -> float:
     """How far off its axis a Gaussian beam still brings the power that is needed, and is counted on."""
-    fall = link.GaussianFall(half_angle_rad(sent.table.divergence_rad, shared.conventions.divergence))
+    fall = GaussianFall(half_angle_rad(sent.table.divergence_rad, shared.conventions.divergence))
     return fall.error_rad(min(_on_axis_margin_db(sent.budget), link.DEEPEST_DB))
 
 

@@ -7,6 +7,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from microrad.core.arrays import Floats
 from microrad.core.units import format_quantity
 from microrad.link.acquisition.checks import (
     require_angle,
@@ -15,8 +16,6 @@ from microrad.link.acquisition.checks import (
     require_positive,
     require_probability,
 )
-
-_Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,11 +70,11 @@ class Detector:
         require_positive("the detection time", self.detection_time_s, "s")
         require_probability("the probability of detection in one look", self.probability)
 
-    def looks(self, duration_s: _Array) -> _Array:
+    def looks(self, duration_s: Floats) -> Floats:
         """Whole looks in a crossing of each duration."""
         return np.floor(duration_s / self.detection_time_s * (1.0 + 1e-9))
 
-    def crossing_probability(self, duration_s: _Array) -> _Array:
+    def crossing_probability(self, duration_s: Floats) -> Floats:
         """Probability of detection in a crossing of each duration."""
         return np.asarray(1.0 - (1.0 - self.probability) ** self.looks(duration_s), dtype=np.float64)
 
@@ -97,21 +96,21 @@ class Spiral:
         """Time of one scan, pi R^2 / (pitch speed)."""
         return math.pi * self.search.radius_rad**2 / (self.search.pitch_rad * self.speed_rad_s)
 
-    def track_radius(self, time_s: _Array) -> _Array:
+    def track_radius(self, time_s: Floats) -> Floats:
         """Distance of the beam from the middle at each time."""
         return np.sqrt(self.search.pitch_rad * self.speed_rad_s * time_s / math.pi)
 
-    def time_at(self, track_radius_rad: _Array) -> _Array:
+    def time_at(self, track_radius_rad: Floats) -> Floats:
         """Time at which the track has each radius; zero for a negative one."""
         return math.pi * np.maximum(track_radius_rad, 0.0) ** 2 / (self.search.pitch_rad * self.speed_rad_s)
 
-    def beam_at(self, time_s: _Array, within_s: _Array) -> tuple[_Array, _Array]:
+    def beam_at(self, time_s: Floats, within_s: Floats) -> tuple[Floats, Floats]:
         """Beam's centre at each time; `within_s` is not needed here."""
         radius = self.track_radius(time_s)
         angle = 2.0 * math.pi * radius / self.search.pitch_rad
         return radius * np.cos(angle), radius * np.sin(angle)
 
-    def windows(self, x_rad: _Array, y_rad: _Array, reach_rad: float) -> tuple[_Array, _Array]:
+    def windows(self, x_rad: Floats, y_rad: Floats, reach_rad: float) -> tuple[Floats, Floats]:
         """Start and end of the times when the beam may be within `reach_rad` of each target, (targets, windows)."""
         pitch = self.search.pitch_rad
         radius, azimuth = np.hypot(x_rad, y_rad), np.arctan2(y_rad, x_rad) % (2.0 * math.pi)
@@ -129,7 +128,7 @@ class Spiral:
         end = np.where(near[:, None], last * slots[1:], end)
         return np.minimum(start, self.duration_s), np.minimum(end, self.duration_s)
 
-    def crossings(self, x_rad: float, y_rad: float) -> tuple[_Array, _Array]:
+    def crossings(self, x_rad: float, y_rad: float) -> tuple[Floats, Floats]:
         """Middle time and duration of each crossing of the beam over a target, in the order they come.
 
         Each turn counts as a circle whose radius is that of the track at the target's azimuth; a target within a
@@ -178,18 +177,18 @@ class Raster:
         return self.rows * self.row_time_s + (self.rows - 1) * self.turn_around_s
 
     @property
-    def row_rad(self) -> _Array:
+    def row_rad(self) -> Floats:
         """Offset of each row from the middle, ascending: the order in which they are scanned."""
         return np.asarray((np.arange(self.rows) - (self.rows - 1) / 2.0) * self.search.pitch_rad, dtype=np.float64)
 
-    def beam_at(self, time_s: _Array, within_s: _Array) -> tuple[_Array, _Array]:
+    def beam_at(self, time_s: Floats, within_s: Floats) -> tuple[Floats, Floats]:
         """Beam's centre at each time, on the row that is scanned at `within_s`."""
         period = self.row_time_s + self.turn_around_s
         row = np.clip(np.floor(within_s / period), 0, self.rows - 1)
         along = np.clip(time_s - row * period, 0.0, self.row_time_s) * self.speed_rad_s - self.search.radius_rad
         return np.where(row % 2 == 0, along, -along), (row - (self.rows - 1) / 2.0) * self.search.pitch_rad
 
-    def windows(self, x_rad: _Array, y_rad: _Array, reach_rad: float) -> tuple[_Array, _Array]:
+    def windows(self, x_rad: Floats, y_rad: Floats, reach_rad: float) -> tuple[Floats, Floats]:
         """Start and end of the times when the beam may be within `reach_rad` of each target, (targets, windows)."""
         count = min(math.ceil(2.0 * reach_rad / self.search.pitch_rad) + 1, self.rows)
         nearest = y_rad / self.search.pitch_rad + (self.rows - 1) / 2.0
@@ -201,7 +200,7 @@ class Raster:
         high = np.clip((along + reach_rad) / self.speed_rad_s, 0.0, self.row_time_s)
         return begin + low, begin + high
 
-    def crossings(self, x_rad: float, y_rad: float) -> tuple[_Array, _Array]:
+    def crossings(self, x_rad: float, y_rad: float) -> tuple[Floats, Floats]:
         """Middle time and duration of each crossing of the beam over a target, in the order they come."""
         beam, radius = self.search.beam_radius_rad, self.search.radius_rad
         row = np.flatnonzero(np.abs(self.row_rad - y_rad) < beam)
@@ -237,7 +236,7 @@ class StepStare:
             )
 
     @property
-    def basis_rad(self) -> _Array:
+    def basis_rad(self) -> Floats:
         """The two steps of the grid as rows, (2, 2)."""
         pitch = self.search.pitch_rad
         return np.array([(pitch, 0.0), (pitch / 2.0, pitch * math.sqrt(3.0) / 2.0)])
@@ -251,7 +250,7 @@ class StepStare:
         return np.where(inside, table[clipped[..., 0], clipped[..., 1]], size)
 
     @property
-    def centres_rad(self) -> _Array:
+    def centres_rad(self) -> Floats:
         """Centre of each dwell in the order they come, (dwells, 2)."""
         return _dwell_indices(self) @ self.basis_rad
 
@@ -272,13 +271,13 @@ class StepStare:
         length = np.hypot(*(steps @ self.basis_rad).T)
         return np.asarray(steps[length <= reach_rad + self.search.pitch_rad], dtype=np.int64)
 
-    def beam_at(self, time_s: _Array, within_s: _Array) -> tuple[_Array, _Array]:
+    def beam_at(self, time_s: Floats, within_s: Floats) -> tuple[Floats, Floats]:
         """Beam's centre in the dwell that is under way at `within_s`."""
         dwell = np.clip(np.floor(within_s / (self.dwell_s + self.settle_s)), 0, self.dwells - 1).astype(np.int64)
         place = _dwell_indices(self)[dwell] @ self.basis_rad
         return place[..., 0], place[..., 1]
 
-    def windows(self, x_rad: _Array, y_rad: _Array, reach_rad: float) -> tuple[_Array, _Array]:
+    def windows(self, x_rad: Floats, y_rad: Floats, reach_rad: float) -> tuple[Floats, Floats]:
         """Start and end of the dwells within reach of each target, (targets, windows); empty ones at the end."""
         place = np.stack([x_rad, y_rad], axis=-1) @ np.linalg.inv(self.basis_rad)
         nearest = np.round(place).astype(np.int64)
@@ -287,7 +286,7 @@ class StepStare:
         end = np.where(number < self.dwells, start + self.dwell_s, self.duration_s)
         return np.minimum(start, self.duration_s), end
 
-    def crossings(self, x_rad: float, y_rad: float) -> tuple[_Array, _Array]:
+    def crossings(self, x_rad: float, y_rad: float) -> tuple[Floats, Floats]:
         """Middle time and duration of each dwell that sees a target, in the order they come."""
         away = np.hypot(*(self.centres_rad - (x_rad, y_rad)).T)
         seen = np.flatnonzero(away < self.search.beam_radius_rad)

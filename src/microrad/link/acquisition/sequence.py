@@ -4,6 +4,10 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import NDArray
+
+from microrad.core.arrays import Floats
 from microrad.core.units import SPEED_OF_LIGHT_M_S, format_quantity
 from microrad.link.acquisition.checks import require_count, require_not_negative, require_positive, require_probability
 from microrad.link.acquisition.times import TimeDistribution, fixed_time, joined
@@ -259,3 +263,66 @@ def check_sequence(stages: Sequence[Stage], attempts: int) -> tuple[int, ...]:
                 f" one of {', '.join(names[: index + 1])}"
             )
     return tuple(names.index(s.on_failure) if s.on_failure else i for i, s in enumerate(stages))
+
+
+# ------------------------------------------------------------------------------------------------------------ simulated
+@dataclass(frozen=True, slots=True)
+class Transition:
+    """One entry of a log: at `time_s` the chain leaves `stage` for `to`, and why."""
+
+    time_s: float
+    stage: str
+    to: str
+    cause: str
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SequenceRuns:
+    """Simulated sequences: whether each locked, and when it locked or was given up; (runs,) arrays."""
+
+    locked: NDArray[np.bool_]
+    time_s: Floats
+
+
+def simulate(stages: Sequence[Stage], attempts: int, runs: int, seed: int) -> SequenceRuns:
+    """Draw the sequence event by event; `attempts` as in `solve`. Raises `ValueError` as it does, and for no run."""
+    require_count("the number of runs", runs)
+    back = check_sequence(stages, attempts)
+    draw = np.random.Generator(np.random.Philox(key=seed))
+    logs = [_run(stages, back, attempts, draw) for _ in range(runs)]
+    return SequenceRuns(np.array([log[-1].to == LOCKED for log in logs]), np.array([log[-1].time_s for log in logs]))
+
+
+def simulate_log(stages: Sequence[Stage], attempts: int, seed: int) -> tuple[Transition, ...]:
+    """Log of one run: that of the first run of `simulate` with the same seed."""
+    back = check_sequence(stages, attempts)
+    return tuple(_run(stages, back, attempts, np.random.Generator(np.random.Philox(key=seed))))
+
+
+_DONE = "done"
+
+
+def _run(stages: Sequence[Stage], back: Sequence[int], attempts: int, draw: np.random.Generator) -> list[Transition]:
+    time_s, index, failures = 0.0, 0, 0
+    log: list[Transition] = []
+    while index < len(stages) and failures < attempts:
+        stage = stages[index]
+        if draw.random() < stage.success_probability:
+            time_s += _duration(stage, draw)
+            following, cause = index + 1, _DONE
+        else:
+            time_s += stage.failure_s
+            failures += 1
+            following, cause = back[index], f"time-out, failure {failures} of {attempts}"
+        name = stages[following].name if following < len(stages) else LOCKED
+        log.append(Transition(time_s, stage.name, LOST if failures == attempts else name, cause))
+        index = following
+    return log
+
+
+def _duration(stage: Stage, draw: np.random.Generator) -> float:
+    if not isinstance(stage.duration_s, TimeDistribution):
+        return stage.duration_s
+    cumulative = np.cumsum(stage.duration_s.weight)
+    index = int(np.searchsorted(cumulative, draw.random() * cumulative[-1], side="right"))
+    return float(stage.duration_s.time_s[min(index, cumulative.size - 1)])

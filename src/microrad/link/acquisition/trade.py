@@ -4,14 +4,12 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from microrad.core.arrays import Floats
 from microrad.link.acquisition.checks import require_angle, require_not_negative, require_positive
 from microrad.link.acquisition.detection import detection_times
 from microrad.link.acquisition.scan import Detector, Search, Spiral, highest_speed
-
-_Array = NDArray[np.float64]
-
 
 _WIDE_PER_RADIUS = math.sqrt(2.0)
 """Half angle at 1/e2 of the beam with the most irradiance at a radius that it has to cover, over that radius."""
@@ -37,7 +35,7 @@ class Receiver:
         require_positive("the time in which it does", self.time_s, "s")
         require_not_negative("the shortest detection time", self.shortest_s, "s")
 
-    def detection_time_s(self, power_w: ArrayLike) -> _Array:
+    def detection_time_s(self, power_w: ArrayLike) -> Floats:
         """Time to detection at each received power, at least `shortest_s`."""
         less = self.power_w / np.asarray(power_w, dtype=np.float64)
         return np.asarray(np.maximum(self.time_s * less**2, self.shortest_s))
@@ -74,7 +72,7 @@ class Beams:
         """Irradiance at the partner where the narrow beam is just used."""
         return float(self.irradiance_w_m2(self.narrow_half_angle_rad, self.beam_radius_rad))
 
-    def irradiance_w_m2(self, half_angle_rad: ArrayLike, off_axis_rad: ArrayLike) -> _Array:
+    def irradiance_w_m2(self, half_angle_rad: ArrayLike, off_axis_rad: ArrayLike) -> Floats:
         """Irradiance of a Gaussian beam at the partner: 2 P / (pi w^2 L^2) exp(-2 (angle / w)^2), w at 1/e2."""
         half = np.asarray(half_angle_rad, dtype=np.float64)
         off = np.asarray(off_axis_rad, dtype=np.float64)
@@ -90,14 +88,14 @@ class Trade:
     `scan_time_s`, detects with `scan_probability` and then takes `scan_mean_time_s` in the mean, at `speed_rad_s`.
     """
 
-    sigma_rad: _Array
-    radius_rad: _Array
-    wide_full_angle_rad: _Array
-    wide_time_s: _Array
-    wide_probability: _Array
-    scan_time_s: _Array
-    scan_mean_time_s: _Array
-    scan_probability: _Array
+    sigma_rad: Floats
+    radius_rad: Floats
+    wide_full_angle_rad: Floats
+    wide_time_s: Floats
+    wide_probability: Floats
+    scan_time_s: Floats
+    scan_mean_time_s: Floats
+    scan_probability: Floats
     speed_rad_s: float
 
 

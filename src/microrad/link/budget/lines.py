@@ -13,6 +13,7 @@ from microrad.core.budget import Line, total_db
 from microrad.core.units import format_input, format_quantity
 from microrad.link import gains
 from microrad.link.budget.assembly import DataLink, Shared, check_grid, required_dbm, strehl_db
+from microrad.mission.file import MissionFile
 from microrad.mission.model import Source, source_text
 from microrad.mission.tables.link import Beacon, Communication, half_angle_rad
 
@@ -416,3 +417,17 @@ def _budget(
 def _irradiance(isotropic_dbm: float, wavelength_m: float) -> float:
     """Irradiance from the power that an isotropic antenna, of effective area lambda^2 / (4 pi), would receive."""
     return gains.watt(isotropic_dbm) * 4.0 * math.pi / wavelength_m**2
+
+
+def tracking_light_w(file: MissionFile) -> float | None:
+    """Power (W) on the tracking sensor of `[fine_pointing]`, of which its noise follows.
+
+    As its quad cell states it, else that of the answer's budget. None where the noise is given or there is no loop.
+    """
+    f = file.mission.fine_pointing
+    cell = None if f is None else f.optical_sensor.quad_cell
+    if cell is None:
+        return None
+    if cell.received_power_w is not None:
+        return cell.received_power_w
+    return beam_budget("answer", Shared.of(file.mission), file.mission.answer, file.sources).received_power_w

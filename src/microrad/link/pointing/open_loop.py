@@ -7,21 +7,55 @@ from numpy.typing import ArrayLike
 
 from microrad.core.arrays import Floats
 from microrad.core.budget import Line, root_sum_square
+from microrad.core.units import format_quantity
 from microrad.link.budget.assembly import Shared
-from microrad.link.pointing.allocation import Allocation, allocate
 from microrad.link.pointing.error_classes import ErrorTerm, Interpretation, StatedError, basis, error_term
-from microrad.link.pointing.point_ahead import NAME, PointAheadAngle, point_ahead
 from microrad.link.pointing.radial_error import Jitter, radial_cdf
 from microrad.link.pointing.summation import (
+    Allocation,
     Rule,
     Summation,
+    allocate,
     exact_total_rad,
     mean_and_sigma,
     summations,
 )
 from microrad.mission.model import Source, source_text
 from microrad.mission.tables.link import Beacon, half_angle_rad
-from microrad.mission.tables.pointing import Pointing
+from microrad.mission.tables.pointing import PointAhead, Pointing, point_ahead_rad
+
+NAME = "Point-ahead"
+"""What the budget calls its line."""
+
+
+@dataclass(frozen=True, slots=True)
+class PointAheadAngle:
+    """The point-ahead angle of a mission, and what the budget has to carry of it.
+
+    `error_rad` is what the correction leaves, radial, or the whole angle about one axis when `corrected` is false.
+    """
+
+    angle_rad: float
+    corrected: bool
+    error_rad: float
+
+    @property
+    def stated(self) -> StatedError:
+        """The line of the budget: a constant error, and its largest value."""
+        return StatedError(NAME, self.error_rad, "bias", "bound", "radial" if self.corrected else "x")
+
+    @property
+    def basis(self) -> str:
+        """How the line comes about."""
+        shown = format_quantity(self.angle_rad, "rad", 3)
+        return f"what correcting {shown} leaves" if self.corrected else f"2 v / c = {shown}, not corrected"
+
+
+def point_ahead(table: PointAhead) -> PointAheadAngle:
+    """The angle of a mission and what is left of it."""
+    angle = point_ahead_rad(table.transverse_velocity_m_s)
+    return PointAheadAngle(angle, table.corrected, table.error_rad if table.corrected else angle)
+
 
 INTERPRETATIONS: dict[Interpretation, str] = {
     "temporal": "share of the time of the worst-case satellite, at 3 sigma of all satellites or at the stated bound",

@@ -9,7 +9,7 @@ import numpy as np
 
 from microrad import link
 from microrad.core.arrays import Floats
-from microrad.link import pointing
+from microrad.link import beams, gains, pointing
 from microrad.mission.tables.link import LinkRequirement
 from microrad.mission.tables.pointing import JitterTable
 
@@ -26,7 +26,7 @@ class Exposure:
     share of the time with a larger error than one in rad. ``lost_db`` is sent over received power without any error.
     """
 
-    fall: link.OffAxis
+    fall: beams.OffAxis
     on_axis_db: float
     lost_db: float
     ahead_rad: float
@@ -41,7 +41,7 @@ class Exposure:
         """
         received_dbm = link.received_on_axis_dbm(data)
         on_axis_db = received_dbm - float(link.required_dbm(data, data.table.data_rate_bit_s))
-        lost_db = link.dbm(data.table.transmit_power_w) - received_dbm
+        lost_db = gains.dbm(data.table.transmit_power_w) - received_dbm
         return cls(data.beam.fall, on_axis_db, lost_db, data.shared.point_ahead_rad, quantile_rad, beyond)
 
     @classmethod
@@ -292,14 +292,14 @@ def _rate(data: link.DataLink, loss_db: float) -> float:
 
 
 def _fades(
-    jitter: pointing.Jitter, motion: pointing.SpectralMotion | None, fall: link.OffAxis, margin_db: float
+    jitter: pointing.Jitter, motion: pointing.SpectralMotion | None, fall: beams.OffAxis, margin_db: float
 ) -> tuple[float, float, str]:
     """How often the loss exceeds the margin, for how long, and what to doubt of it."""
     if motion is None or margin_db < 0.0:
         return math.nan, math.nan, ""
     half = fall.half_angle_rad
     # the margin that a Gaussian beam has where this one has its own
-    like = link.GaussianFall(half).loss_db(fall.error_rad(margin_db))
+    like = beams.GaussianFall(half).loss_db(fall.error_rad(margin_db))
     found = pointing.fades(jitter, motion.velocity_rms_rad_s, half, like)
     return float(found.per_second), float(found.mean_duration_s), motion.warning
 

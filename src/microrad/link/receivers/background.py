@@ -4,7 +4,7 @@ import math
 
 from microrad.core import capacity
 from microrad.core.units import PLANCK_J_S, SPEED_OF_LIGHT_M_S
-from microrad.link.receivers.checks import require, require_zero_or_more
+from microrad.link.receivers.base import require, require_zero_or_more
 
 
 def background_power_w(

@@ -7,9 +7,9 @@ import numpy as np
 
 from microrad.core.arrays import Floats
 from microrad.core.budget import Line
-from microrad.link.receivers.base import Receiver
-from microrad.link.receivers.checks import (
+from microrad.link.receivers.base import (
     SOURCE,
+    Receiver,
     normal_deviate,
     require_efficiency,
     require_noise_figure,

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from microrad.core.arrays import Floats
 from microrad.core.budget import Line
-from microrad.link.receivers.base import Receiver
-from microrad.link.receivers.checks import (
+from microrad.link.receivers.base import (
     LEAST_COUNT,
     SOURCE,
+    Receiver,
     mark_and_space,
     require,
     require_efficiency,

@@ -11,9 +11,9 @@ from microrad.core.arrays import Floats
 from microrad.core.budget import Line
 from microrad.core.units import ELEMENTARY_CHARGE_C
 from microrad.link.receivers.background import apd_excess_noise_factor
-from microrad.link.receivers.base import Receiver
-from microrad.link.receivers.checks import (
+from microrad.link.receivers.base import (
     SOURCE,
+    Receiver,
     mark_and_space,
     normal_deviate,
     require,

@@ -12,7 +12,6 @@ What is taken for granted:
 - The receiver's power is that of the moment of sending. What a correction of the point-ahead leaves is not in it.
 """
 
-from microrad.study.contact_run.of_mission import of_mission
 from microrad.study.contact_run.records import (
     DATA,
     LOCK,
@@ -23,7 +22,7 @@ from microrad.study.contact_run.records import (
     Settings,
     Sight,
 )
-from microrad.study.contact_run.sequence import run
+from microrad.study.contact_run.sequence import of_mission, run
 from microrad.study.contact_run.windows import MovingReference, Sampler, plan
 
 __all__ = [
