@@ -198,13 +198,13 @@ def test_photons_received_for_each_bit_stand_in_the_budget():
 
 def test_more_light_received_than_sent_is_no_margin(tmp_path):
     near = link_file(tmp_path, {"communication.distance": "1 m"})
-    study = link_study.run(near)
+    study = link_study.run_link_study(near)
     assert study.communication.margin_db > 100.0
     assert not study.communication.possible and not study.closes
     (row,) = [r for r in requirement.of_links(study) if r.subject == "communication"]
     assert (row.met, row.mark, row.because) == (False, "FAIL", requirement.IMPOSSIBLE)
     assert "The links do not close" in budget_views.verdict(study)
-    assert link_study.run(link_file(tmp_path)).communication.possible
+    assert link_study.run_link_study(link_file(tmp_path)).communication.possible
 
 
 def test_a_term_at_zero_decibel_is_a_line():

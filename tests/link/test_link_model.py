@@ -290,7 +290,7 @@ def test_a_mission_without_beacon_or_answer_says_so(read):
         budgets.beacon(file.mission, file.sources)
     with pytest.raises(ValueError, match=r"the mission has no table \[answer\]"):
         budgets.answer(file.mission, file.sources)
-    study = link_study.run(file)
+    study = link_study.run_link_study(file)
     assert (study.beacon, study.answer, study.finding, study.tracking) == (None, None, None, None)
     assert study.budgets == (study.communication,)
 

@@ -32,7 +32,7 @@ RATE_BIT_S = 300e6
 
 def costs_of(m, runs, fine):
     """What the residuals of the loops cost a mission's link."""
-    return performance.run(link.of(m), m.conventions.residual, runs, fine)
+    return performance.performance_of_loops(link.of(m), m.conventions.residual, runs, fine)
 
 
 def loss_db(radius_rad):

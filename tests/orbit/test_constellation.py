@@ -32,8 +32,8 @@ def made(folder, *changes):
 
 
 def planned(folder, *changes):
-    links = link_study.run(day_file(folder, *changes))
-    return constellation.run(links.file, day_study.given_loss(links)), links
+    links = link_study.run_link_study(day_file(folder, *changes))
+    return constellation.run_constellation(links.file, day_study.given_loss(links)), links
 
 
 @pytest.fixture(scope="module")
@@ -215,9 +215,9 @@ def test_a_session_over_several_rates_has_the_one_that_closes_throughout(tmp_pat
 
 
 def test_an_outage_takes_its_share_of_the_volume(tmp_path, plan):
-    links = link_study.run(day_file(tmp_path, SIX_HOURS))
+    links = link_study.run_link_study(day_file(tmp_path, SIX_HOURS))
     loss = day_study.given_loss(links)
-    worse = constellation.run(links.file, day_study.PointingLoss(loss.loss_db, 0.2, "test"))
+    worse = constellation.run_constellation(links.file, day_study.PointingLoss(loss.loss_db, 0.2, "test"))
     assert worse.volume_bit == pytest.approx(0.8 * plan.volume_bit)
 
 
@@ -307,6 +307,6 @@ def test_a_long_table_is_cut_and_says_so(tmp_path):
 
 def test_the_tables_that_a_plan_needs(tmp_path):
     loss = day_study.PointingLoss(1.0, 0.0, "test")
-    links = link_study.run(day_file(tmp_path, {"constellation": None}))
+    links = link_study.run_link_study(day_file(tmp_path, {"constellation": None}))
     with pytest.raises(operations.OperationsError, match=r"no table \[constellation\]"):
-        constellation.run(links.file, loss)
+        constellation.run_constellation(links.file, loss)

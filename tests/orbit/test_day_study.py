@@ -29,12 +29,12 @@ RATES = {"operations.rates": ["50 Mbit/s", "280 Mbit/s", "320 Mbit/s", "400 Mbit
 @pytest.fixture(scope="module")
 def links(tmp_path_factory):
     """The links of the shipped mission, its acquisition simulated a hundred times."""
-    return link_study.run(day_file(tmp_path_factory.mktemp("shipped"), ALONE))
+    return link_study.run_link_study(day_file(tmp_path_factory.mktemp("shipped"), ALONE))
 
 
 @pytest.fixture(scope="module")
 def day(links):
-    return day_study.run(links)
+    return day_study.run_day_study(links)
 
 
 @pytest.fixture
@@ -43,7 +43,7 @@ def quick(tmp_path, monkeypatch):
     monkeypatch.setattr(day_study, "swings", lambda *given: ())
 
     def run(*changes, loss=None):
-        return day_study.run(link_study.run(day_file(tmp_path, ALONE, *changes)), loss)
+        return day_study.run_day_study(link_study.run_link_study(day_file(tmp_path, ALONE, *changes)), loss)
 
     return run
 
@@ -254,7 +254,7 @@ def test_the_time_to_lock_is_drawn_from_the_acquisitions(day, links, seconds):
 def test_acquisitions_that_fail_are_counted_and_carry_nothing(quick, tmp_path):
     hard = {"acquisition.lock_probability": 0.5, "acquisition.attempts": 1, "operations.runs": 200}
     found, easy = quick(SIX_HOURS, hard), quick(SIX_HOURS, NO_SEARCH)
-    found_share = link_study.run(day_file(tmp_path, SIX_HOURS, hard)).finding.wide.simulated_probability
+    found_share = link_study.run_link_study(day_file(tmp_path, SIX_HOURS, hard)).finding.wide.simulated_probability
     share = found.relay.failed_contacts / len(found.relay.contacts)
     assert 0.3 < share < 0.9
     assert share == pytest.approx(1.0 - found_share, abs=0.06)
@@ -572,7 +572,7 @@ def test_each_side_is_the_day_of_a_mission_edited_so(quick, tmp_path, monkeypatc
     ],
 )
 def test_an_assumption_that_leaves_no_orbit_is_left_as_it_is(tmp_path, changes, name, sides):
-    found = day_study.run(link_study.run(day_file(tmp_path, SIX_HOURS, NO_SEARCH, changes)))
+    found = day_study.run_day_study(link_study.run_link_study(day_file(tmp_path, SIX_HOURS, NO_SEARCH, changes)))
     (swing,) = [s for s in found.swings if s.name == name]
     assert (swing.low, swing.high) == sides
     unchanged = swing.at_low if sides[0] == NOTHING else swing.at_high
@@ -663,16 +663,16 @@ def test_the_track_is_open_where_the_contacts_are(day, seconds):
 
 
 def test_nothing_about_a_day_is_asked_of_a_mission_without_its_tables(tmp_path):
-    links = link_study.run(day_file(tmp_path, ALONE, {"operations": None}))
+    links = link_study.run_link_study(day_file(tmp_path, ALONE, {"operations": None}))
     with pytest.raises(ValueError, match=r"no table \[operations\]: microrad init writes one"):
-        day_study.run(links)
+        day_study.run_day_study(links)
     assert geometry.view(
         orbit.pair(links.file.mission.orbit, links.file.mission.terminals, tmp_path), 1.55e-6
     ).encounters
 
 
 def test_an_uncorrected_point_ahead_is_in_the_loss_and_so_in_the_reach(tmp_path):
-    links = link_study.run(day_file(tmp_path, SIX_HOURS, {"point_ahead.corrected": False}))
+    links = link_study.run_link_study(day_file(tmp_path, SIX_HOURS, {"point_ahead.corrected": False}))
     loss = day_study.given_loss(links)
     assert loss.loss_db > 100.0
     (closing,) = flow.closings(links.file.mission.operations, link.of(links.file.mission), loss)

@@ -102,12 +102,12 @@ def view(replaced, folder):
 
 @pytest.fixture(scope="module")
 def links():
-    return link_study.run(missionfile.load_link(ROOT / "missions" / "paper.toml"))
+    return link_study.run_link_study(missionfile.load_link(ROOT / "missions" / "paper.toml"))
 
 
 @pytest.fixture(scope="module")
 def day(links):
-    return day_study.run(links)
+    return day_study.run_day_study(links)
 
 
 def ends(seen):
@@ -285,7 +285,7 @@ def test_one_contact_in_time(lqg, links, day):
 
 # ---------------------------------------------------------------------------------------------------- constellation
 def test_the_constellation(links):
-    plan = constellation.run(links.file, day_study.given_loss(links))
+    plan = constellation.run_constellation(links.file, day_study.given_loss(links))
     reach = np.sum(plan.opportunities.end_s - plan.opportunities.start_s) / 3600.0
     told(
         f"`microrad constellation leo-geo.toml` has {len(plan.planned)} of them, in {reach:.0f} h of contacts in reach"

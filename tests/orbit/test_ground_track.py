@@ -152,7 +152,9 @@ def drawn(tmp_path, monkeypatch):
     monkeypatch.setattr(day_study, "swings", lambda *given: tuple(swings))
 
     def draw(*changes):
-        day = day_study.run(link_study.run(day_file(tmp_path, SIX_HOURS, {"operations.runs": 1}, *changes)))
+        day = day_study.run_day_study(
+            link_study.run_link_study(day_file(tmp_path, SIX_HOURS, {"operations.runs": 1}, *changes))
+        )
         return day, {figure.name: figure for figure in day_plots.draw(day)}
 
     return draw

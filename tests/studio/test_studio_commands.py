@@ -102,8 +102,8 @@ def test_a_change_of_the_budget_is_in_both(home, capsys):
 
 
 def test_a_study_gives_the_same_verdict_and_the_same_files(home, capsys, monkeypatch):
-    monkeypatch.setattr(study, "run", once(study.run))
-    monkeypatch.setattr(microrad, "run_study", study.run, raising=False)
+    monkeypatch.setattr(study, "run_study", once(study.run_study))
+    monkeypatch.setattr(microrad, "run_study", study.run_study, raising=False)
     monkeypatch.setattr(report, "draw", lambda *args: Drawn())
     action, again = Run(MISSION, Path("out")), Run(MISSION, Path("out again"), overwrite=True)
     out, _, _ = typed(command(action), capsys)

@@ -67,7 +67,7 @@ def settings(**changes):
 
 
 def links(file):
-    return link_study.run(LinkFile(file.mission, file.path, file.text, file.sha256, file.sources))
+    return link_study.run_link_study(LinkFile(file.mission, file.path, file.text, file.sha256, file.sources))
 
 
 @pytest.fixture(scope="module")
@@ -97,7 +97,7 @@ def run(file, scene, design, finding):
     """A contact of the shipped mission, or of another scene or way to find the partner."""
 
     def made(of, how, *, scene=scene, finding=finding, mission=file.mission):
-        return contact_run.run(link.of(mission), finding, scene, design, of, how)
+        return contact_run.run_contact(link.of(mission), finding, scene, design, of, how)
 
     return made
 

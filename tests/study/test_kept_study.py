@@ -162,7 +162,7 @@ def numbers(text, folder, parts):
     path = folder / "mission.toml"
     path.write_text(text, encoding="utf-8")
     try:
-        found = study.run(load_mission(path), parts=parts)
+        found = study.run_study(load_mission(path), parts=parts)
     except (MissionError, ValueError) as error:
         return {"refused": str(error)}
     drawn = {each.name: (each.title, each.caption, digest(each.columns)) for each in report.draw(found, parts).every}

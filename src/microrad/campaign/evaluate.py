@@ -123,6 +123,6 @@ def _day(file: LinkFile, under: Exposure) -> "day_study.Way":
     from microrad.link import study as link_study
     from microrad.orbit import day as day_study  # orbits: slow to load, and few campaigns ask for them
 
-    links = link_study.run(file)
+    links = link_study.run_link_study(file)
     loss = day_study.PointingLoss(under.outage_loss_db, under.short_of(0.0), "campaign")
     return day_study.relay(links, loss)

@@ -108,7 +108,7 @@ def run(
     from microrad import report
     from microrad.core import kept
     from microrad.mission.file import load_mission
-    from microrad.study import study as story
+    from microrad.study.study import run_study
 
     mission = load_mission(file, mirror)
     folder = output or Path(f"{file.stem}-study")
@@ -116,7 +116,7 @@ def run(
     parts = kept.NOTHING if fresh else kept.of_user()
     with progress_bar() as progress:
         try:
-            study = story.run(mission, progress, parts)
+            study = run_study(mission, progress, parts)
         except ValueError as error:  # an unstable loop, or a mirror without inverse
             raise Refusal(f"{mission.path}: {error}") from error
 

@@ -35,7 +35,7 @@ def _links(file: Path) -> "LinkStudy":
 
     given = load_link(file)
     try:
-        return link_study.run(given)
+        return link_study.run_link_study(given)
     except ValueError as error:  # a rate that the receiver does not take, a scan without time to detect
         raise Refusal(f"{file}: {error}") from error
 
@@ -69,7 +69,7 @@ def contacts(
     links = _links(file)
     try:
         with progress_bar() as progress:
-            day = day_study.run(links, on_progress=progress)
+            day = day_study.run_day_study(links, on_progress=progress)
     except ValueError as error:  # a table that is missing, an orbit that does not hold
         raise Refusal(f"{file}: {error}") from error
     code = MET if day.relay.capacity_bit > 0.0 else UNMET
@@ -115,7 +115,7 @@ def constellation(
     links = _links(file)
     try:
         with progress_bar() as progress:
-            plan = plans.run(links.file, day_study.given_loss(links), progress)
+            plan = plans.run_constellation(links.file, day_study.given_loss(links), progress)
         code = MET if plan.volume_bit > 0.0 else UNMET
         if as_csv:
             return Outcome(operations.csv_text(plan.planned, plan.epoch.utc), code)

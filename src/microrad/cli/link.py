@@ -70,8 +70,8 @@ def budget(  # noqa: PLR0913, PLR0917  each is an option
         )
     given = _changed(loaded, data_rate, pointing_error)
     try:
-        solution = None if solve is None else link_study.solve(given, solve)
-        study = link_study.run(given if solution is None else solution.file)
+        solution = None if solve is None else link_study.solve_key(given, solve)
+        study = link_study.run_link_study(given if solution is None else solution.file)
     except ValueError as error:  # a rate that the receiver does not take, a scan without time to detect
         raise Refusal(f"{file}: {error}") from error
     code = exit_on.code(met=met(study), closes=study.closes)

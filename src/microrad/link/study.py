@@ -135,7 +135,7 @@ class Solution:
     file: LinkFile
 
 
-def solve(file: LinkFile, key: str) -> Solution:
+def solve_key(file: LinkFile, key: str) -> Solution:
     """The values of a key of the links' tables that leave the required margin: of communication, but for the outage.
 
     A key of the beacon's table is looked for at 0 dB of the beacon, one of the answer's at 0 dB of the answer. Raises
@@ -175,7 +175,7 @@ def _no_such_key(key: str, keys: Iterable[str]) -> str:
     return f'no table of the links has a quantity "{key[:60]}"; {hint}'
 
 
-def run(file: LinkFile, parts: kept.Kept = kept.NOTHING) -> LinkStudy:
+def run_link_study(file: LinkFile, parts: kept.Kept = kept.NOTHING) -> LinkStudy:
     """Budgets of every link of a mission and what follows from them.
 
     Raises ValueError with the reason when a receiver does not take the data rate, or a scan has no time to detect.

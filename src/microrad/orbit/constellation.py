@@ -88,7 +88,7 @@ def opportunities(
     return operations.Opportunities(who[:, 0], who[:, 1], when[:, 0], when[:, 1])
 
 
-def run(
+def run_constellation(
     file: LinkFile, loss: PointingLoss, on_progress: Progress = lambda done, total, what: None
 ) -> ConstellationPlan:
     """The constellation of a mission: contacts, sessions by the rule of `operations.schedule`, and their volumes.

@@ -64,7 +64,7 @@ class LinkPerformance:
 FINE = "vibration and noise"
 
 
-def run(
+def performance_of_loops(
     data: link.DataLink,
     residual: str,
     runs: tuple[paper_cases.Run, ...],

@@ -148,7 +148,7 @@ def _present(budget: link.LinkBudget | None) -> link.LinkBudget:
     return budget
 
 
-def run(
+def run_study(
     file: MissionFile, on_progress: Progress = lambda done, total, what: None, parts: kept.Kept = kept.NOTHING
 ) -> Study:
     """The whole study of a mission: budgets, mirror, loops, and the link at the residual that the loop leaves.
@@ -188,7 +188,7 @@ def run(
         compiled()
         fine = parts.part(fine_pointing.run, _scene(file, mirrors), on_progress=on_progress)
     on_progress(2, 3, "the day")
-    found = pointing_cost.run(data, m.conventions.residual, runs, fine)
+    found = pointing_cost.performance_of_loops(data, m.conventions.residual, runs, fine)
     case = best_case(found, fine)
     cause = verdict.residual_cause(mirrors, q.residual_statistic, residual, runs)
     by_paper = verdict.of_residual(q, mirrors, sources, achieved, left_rad, cause)
@@ -232,7 +232,7 @@ def _scene(file: MissionFile, mirrors: mirror.MirrorParts) -> fine_pointing.Scen
 
 def linked(file: MissionFile, parts: kept.Kept) -> tuple[link_study.LinkStudy, MarginMap]:
     """What follows from the tables of the links alone."""
-    links = link_study.run(file, parts)
+    links = link_study.run_link_study(file, parts)
     return links, margin_map(links.data, file.sources)
 
 
@@ -288,11 +288,13 @@ def delivered(
     planned = m.constellation is not None and orbit.repeats(m.constellation, m.orbit)
 
     def in_time() -> tuple[day_study.DayStudy, contact_run.ContactRun | None]:
-        day = parts.part(day_study.run, links, loss)
+        day = parts.part(day_study.run_day_study, links, loss)
         of = operations, m.acquisition, links.data, day, links.finding, fine
         return day, parts.part(contact_run.of_mission, *of)
 
-    (day, contact), plan = both(in_time, lambda: parts.part(constellation.run, links.file, loss) if planned else None)
+    (day, contact), plan = both(
+        in_time, lambda: parts.part(constellation.run_constellation, links.file, loss) if planned else None
+    )
     return day, contact, plan
 
 

@@ -17,7 +17,7 @@ from microrad.link.acquisition.sequence import (
     scan_stages,
     simulate,
     simulate_log,
-    solve,
+    solve_sequence,
 )
 from microrad.link.acquisition.trade import Beams, Receiver, Trade, wide_against_scan
 
@@ -50,6 +50,6 @@ __all__ = [
     "simulate",
     "simulate_log",
     "simulate_scan",
-    "solve",
+    "solve_sequence",
     "wide_against_scan",
 ]

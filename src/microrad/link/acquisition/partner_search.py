@@ -306,7 +306,7 @@ def _found(name: str, stages: tuple[acquisition.Stage, ...], a: Acquisition) -> 
     return Found(
         name,
         stages,
-        acquisition.solve(stages, a.attempts),
+        acquisition.solve_sequence(stages, a.attempts),
         acquisition.simulate(stages, a.attempts, a.runs, a.seed),
         acquisition.simulate_log(stages, a.attempts, a.seed),
     )

@@ -221,7 +221,7 @@ def paper_sequence(timing: Timing, chances: Chances) -> tuple[Stage, ...]:
     return (*beacon_stages(timing, chances), *answer_stages(timing, chances))
 
 
-def solve(stages: Sequence[Stage], attempts: int) -> Outcome:
+def solve_sequence(stages: Sequence[Stage], attempts: int) -> Outcome:
     """Distribution of the time until lock when every failure takes one of `attempts`; the last one gives up.
 
     Exact: all orders of failures are summed; times that are distributions are convolved. Raises `ValueError` for no
@@ -249,7 +249,7 @@ def solve(stages: Sequence[Stage], attempts: int) -> Outcome:
 
 
 def check_sequence(stages: Sequence[Stage], attempts: int) -> tuple[int, ...]:
-    """Index of the stage to which each stage goes back; raises `ValueError` as `solve` does."""
+    """Index of the stage to which each stage goes back; raises `ValueError` as `solve_sequence` does."""
     require_count("the number of attempts", attempts)
     names = [stage.name for stage in stages]
     if not names:
@@ -285,7 +285,10 @@ class SequenceRuns:
 
 
 def simulate(stages: Sequence[Stage], attempts: int, runs: int, seed: int) -> SequenceRuns:
-    """Draw the sequence event by event; `attempts` as in `solve`. Raises `ValueError` as it does, and for no run."""
+    """Draw the sequence event by event; `attempts` as in `solve_sequence`.
+
+    Raises ValueError as it does, and for no run.
+    """
     require_count("the number of runs", runs)
     back = check_sequence(stages, attempts)
     draw = np.random.Generator(np.random.Philox(key=seed))

@@ -31,7 +31,7 @@ __all__ = [
     "given_loss",
     "loss_at",
     "relay",
-    "run",
+    "run_day_study",
     "times",
     "view",
 ]
@@ -97,7 +97,7 @@ def _pair(links: LinkStudy, orbits: Orbits | None) -> orbit.Pair:
 
 
 def relay(links: LinkStudy, loss: PointingLoss) -> Way:
-    """The way by the relay alone: what `run` finds of it, without the rest of the day."""
+    """The way by the relay alone: what `run_day_study` finds of it, without the rest of the day."""
     m = links.file.mission
     seen = view(_pair(links, m.orbit), m.communication.wavelength_m)
     o = flow.table(m.operations)
@@ -105,7 +105,7 @@ def relay(links: LinkStudy, loss: PointingLoss) -> Way:
     return flow.relay(o, seen, rates, loss.outage, acquired(links), 1.0)
 
 
-def run(
+def run_day_study(
     links: LinkStudy, loss: PointingLoss | None = None, on_progress: Progress = lambda done, total, what: None
 ) -> DayStudy:
     """The day of a mission that has the tables `orbit` and `operations`.

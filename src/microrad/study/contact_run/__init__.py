@@ -22,7 +22,7 @@ from microrad.study.contact_run.records import (
     Settings,
     Sight,
 )
-from microrad.study.contact_run.sequence import of_mission, run
+from microrad.study.contact_run.sequence import of_mission, run_contact
 from microrad.study.contact_run.windows import MovingReference, Sampler, plan
 
 __all__ = [
@@ -38,5 +38,5 @@ __all__ = [
     "Sight",
     "of_mission",
     "plan",
-    "run",
+    "run_contact",
 ]

@@ -38,7 +38,7 @@ _STATE_OF_STAGE = (BEACON, BEACON, DETECT, ANSWER, ANSWER, ANSWER, LOCK, LOCK, L
 """Of the stages of an acquisition, wide or scanned: three to the detection, eight from the answer on."""
 
 
-def run(
+def run_contact(
     data: link.DataLink, finding: Finding, scene: Scene, design: Design, contact: Contact, settings: Settings
 ) -> ContactRun:
     """One contact from the slew to its end, under one controller of the mission's fine-pointing loop; seeded.
@@ -213,7 +213,7 @@ def of_mission(
         attempts=a.attempts,
         way=o.acquisition,
     )
-    return run(data, finding, fine.scene, fine.best.design, _contact(day, asked.number - 1), settings)
+    return run_contact(data, finding, fine.scene, fine.best.design, _contact(day, asked.number - 1), settings)
 
 
 def _contact(day: DayStudy, place: int) -> Contact:
