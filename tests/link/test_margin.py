@@ -16,6 +16,7 @@ from microrad.link.requirement import IMPOSSIBLE
 from microrad.loop import paper_cases
 from microrad.mission.file import load_link, load_mission
 from microrad.report.quantities import quantity, signed
+from microrad.study import study
 from scenes import cases_of
 from shipped import DEFAULT, without_day, without_fine_pointing
 

@@ -1,4 +1,4 @@
-"""One study: from a mission file to a verdict. The story, and the only place where the parts meet."""
+"""The whole study, from a mission file to a verdict: calls the other rooms one after the other."""
 
 import math
 from collections.abc import Mapping
@@ -11,9 +11,9 @@ from microrad.core import kept
 from microrad.core.arrays import Floats
 from microrad.core.progress import Progress
 from microrad.core.threads import both
-from microrad.link import pointing, requirement, tracking_light_w
+from microrad.link import pointing, requirement
 from microrad.link import study as link_study
-from microrad.link.pointing import outage as link_performance
+from microrad.link.pointing.outage import Performance
 from microrad.loop import control, fine_pointing, paper_cases, sine_run
 from microrad.loop.fine_loop import ensemble
 from microrad.mirror import Variant
@@ -22,8 +22,7 @@ from microrad.mission.file import MissionFile, with_contents
 from microrad.mission.model import Source
 from microrad.orbit import constellation
 from microrad.orbit import day as day_study
-from microrad.study import alternatives, contact_run, paper, verdict
-from microrad.study import pointing_penalty as pointing_cost
+from microrad.study import alternatives, contact_run, paper, pointing_penalty, verdict
 
 Requirements = tuple[requirement.Requirement, ...]
 
@@ -79,7 +78,7 @@ class Study:
     other_readings: tuple[alternatives.Reading, ...]
     scan: paper.Scan | None
     fine_pointing: fine_pointing.FinePointingStudy | None
-    performance: pointing_cost.LinkPerformance
+    performance: pointing_penalty.LinkPerformance
     tornado: link.Tornado
     day: day_study.DayStudy | None
     contact: contact_run.ContactRun | None
@@ -127,7 +126,7 @@ class Study:
         return all(r.met for r in self.requirements)
 
     @property
-    def fine_case(self) -> link_performance.Performance | None:
+    def fine_case(self) -> Performance | None:
         """The link under the best controller of the fine-pointing loop, or None in a mission without that loop."""
         return best_case(self.performance, self.fine_pointing)
 
@@ -153,7 +152,10 @@ def run_study(
 ) -> Study:
     """The whole study of a mission: budgets, mirror, loops, and the link at the residual that the loop leaves.
 
-    ``parts`` are those of earlier runs that are kept: none by default.
+    Args:
+        file: the mission.
+        on_progress: told how many of the three steps are done, and which one begins.
+        parts: the results of earlier runs that are kept; none by default.
 
     Raises ValueError with the reason when the loop is unstable, the mirror has no inverse or the receiver does not take
     the data rate.
@@ -164,11 +166,18 @@ def run_study(
     m, q, sources = file.mission, file.mission.requirement, file.sources
     mirrors = mirror.of(m)
     cases = paper_cases.of(m, mirrors)
-    compiled = ensemble.compile_aside(lambda: _scene(file, mirrors).loop) if m.fine_pointing else lambda: None
+
+    def scene() -> fine_pointing.Scene:
+        return fine_pointing.scene(file, mirrors, link.tracking_light_w(file))
+
+    def linked() -> tuple[link_study.LinkStudy, MarginMap]:
+        found = link_study.run_link_study(file, parts)
+        return found, margin_map(found.data, sources)
+
+    compiled = ensemble.compile_aside(lambda: scene().loop) if m.fine_pointing else lambda: None
     on_progress(0, 3, "budgets, acquisition, mirror and tracking")
     (summary, loops, margins, runs), (links, fig2) = both(
-        lambda: (mirror_summary.summarise(m.mirror), *parts.part(paper_cases.results, cases)),
-        lambda: linked(file, parts),
+        lambda: (mirror_summary.summarise(m.mirror), *parts.part(paper_cases.results, cases)), linked
     )
     data = links.data
     residual = paper_cases.worst(runs, q.residual_statistic)
@@ -186,9 +195,9 @@ def run_study(
     fine = None
     if m.fine_pointing is not None:
         compiled()
-        fine = parts.part(fine_pointing.run, _scene(file, mirrors), on_progress=on_progress)
+        fine = parts.part(fine_pointing.run, scene(), on_progress=on_progress)
     on_progress(2, 3, "the day")
-    found = pointing_cost.performance_of_loops(data, m.conventions.residual, runs, fine)
+    found = pointing_penalty.performance_of_loops(data, m.conventions.residual, runs, fine)
     case = best_case(found, fine)
     cause = verdict.residual_cause(mirrors, q.residual_statistic, residual, runs)
     by_paper = verdict.of_residual(q, mirrors, sources, achieved, left_rad, cause)
@@ -226,21 +235,11 @@ def run_study(
     )
 
 
-def _scene(file: MissionFile, mirrors: mirror.MirrorParts) -> fine_pointing.Scene:
-    return fine_pointing.scene(file, mirrors, tracking_light_w(file))
-
-
-def linked(file: MissionFile, parts: kept.Kept) -> tuple[link_study.LinkStudy, MarginMap]:
-    """What follows from the tables of the links alone."""
-    links = link_study.run_link_study(file, parts)
-    return links, margin_map(links.data, file.sources)
-
-
 def judged(
     links: link_study.LinkStudy,
     by_paper: Requirements,
     fine: fine_pointing.FinePointingStudy | None,
-    case: link_performance.Performance | None,
+    case: Performance | None,
 ) -> tuple[Requirements, Requirements]:
     """What the verdict judges, and what the paper's loop is held against beside it where it is not that.
 
@@ -253,10 +252,10 @@ def judged(
 
 
 def best_case(
-    found: pointing_cost.LinkPerformance, fine: fine_pointing.FinePointingStudy | None
-) -> link_performance.Performance | None:
+    found: pointing_penalty.LinkPerformance, fine: fine_pointing.FinePointingStudy | None
+) -> Performance | None:
     """The link under the fine-pointing loop's best controller on the mission's mirror, or None without that loop."""
-    return None if fine is None else found.case(pointing_cost.FINE, fine.best.design.name, Variant.GIVEN)
+    return None if fine is None else found.case(pointing_penalty.FINE, fine.best.design.name, Variant.GIVEN)
 
 
 def tornado(links: link_study.LinkStudy, error_rad: float) -> link.Tornado:
