@@ -235,7 +235,7 @@ def test_a_file_of_elements_is_a_constellation(tmp_path):
     sets = files.read_elements(tmp_path / "a.tle")
     pair, own, relays = made(tmp_path, SIX_HOURS, FILED)
     for elements, satellite in zip(sets, own, strict=True):
-        alone = mean_elements.sgp4_orbit(elements, pair.epoch)
+        alone = mean_elements.Sgp4Orbit(elements, pair.epoch)
         time_s = np.array([0.0, 7000.0])
         np.testing.assert_array_equal(satellite.orbit.states(time_s).position_m, alone.states(time_s).position_m)
         assert satellite.limits == pair.leo.limits

@@ -53,14 +53,14 @@ class Seconds:
     """Each second of a day and its tail, looked at in its middle; nothing here knows of contacts."""
 
     def __init__(self, day):
-        pair, m = day.view.pair, day.mission
+        pair = day.view.pair
         self.span_s = pair.span_s[1]
         self.time_s = np.arange(0.0, pair.whole_s[1]) + 0.5
         self.own, self.far = (t.orbit.states(self.time_s).position_m for t in (pair.leo, pair.geo))
         self.range_m = np.sqrt(np.sum((self.far - self.own) ** 2, axis=0))
-        self.epoch, self.operations, self.day = pair.epoch, m.operations, day
+        self.epoch, self.operations, self.day = pair.epoch, day.operations, day
         self.inside = self.time_s < self.span_s
-        grazing = m.orbit.grazing_height_m
+        grazing = pair.earth.grazing_height_m
         self.seen = self.clear(grazing) & self.off_sun(5.0) & self.below_geo(10.5)
 
     def clear(self, height_m):
@@ -192,7 +192,7 @@ def test_the_range_between_samples_is_the_orbits(day, seconds):
 
 def test_without_acquisition_volume_and_latency_are_those_of_packets(quick, seconds, links):
     found = quick(NO_SEARCH)
-    o, way = found.mission.operations, found.relay
+    o, way = found.operations, found.relay
     rate = seconds.rate_bit_s(links, [300e6], 3.0)
     inside = rate[seconds.inside]
     assert way.capacity_bit == pytest.approx(np.sum(inside), rel=1e-3)
@@ -235,7 +235,7 @@ def test_delays_add_to_every_latency(quick):
 
 def test_the_time_to_lock_is_drawn_from_the_acquisitions(day, links, seconds):
     rate = seconds.rate_bit_s(links, [300e6], 3.0)
-    o, simulated = day.mission.operations, links.finding.wide.simulated
+    o, simulated = day.operations, links.finding.wide.simulated
     volumes = []
     for run in range(o.runs):
         draw = np.random.Generator(np.random.Philox(key=[o.seed, run]))
@@ -264,7 +264,7 @@ def test_acquisitions_that_fail_are_counted_and_carry_nothing(quick, tmp_path):
 
 def test_rates_stepped_with_range(quick, seconds, links):
     found = quick(NO_SEARCH, RATES)
-    rates = found.mission.operations.rates_bit_s
+    rates = found.operations.rates_bit_s
     rate = seconds.rate_bit_s(links, rates, 3.0)
     assert set(np.unique(rate)) == {0.0, 50e6, 280e6, 320e6, 400e6}
     assert found.relay.capacity_bit == pytest.approx(np.sum(rate[seconds.inside]), rel=1e-3)
@@ -305,7 +305,7 @@ def test_the_relays_share_is_granted_from_the_beginning(quick, seconds, links):
 
 def test_a_full_store_loses_the_newest(quick, seconds, links):
     found = quick(NO_SEARCH, {"operations.store": "0.6 GB"})
-    o, rate = found.mission.operations, seconds.rate_bit_s(links, [300e6], 3.0)
+    o, rate = found.operations, seconds.rate_bit_s(links, [300e6], 3.0)
     made = np.where(seconds.inside, o.instrument_rate_bit_s, 0.0)
     sent, lost, left = packets(rate, made, o.store_bit, o.relay_delay_s)
     assert lost > 1e9
@@ -318,7 +318,7 @@ def test_a_full_store_loses_the_newest(quick, seconds, links):
 # ------------------------------------------------------------------------------------------------------ direct downlink
 def stations_by_second(day, setup_s):
     """Rate of the radio in each second: the station that rose first is kept until the satellite sets there."""
-    down, pair = day.mission.operations.downlink, day.view.pair
+    down, pair = day.operations.downlink, day.view.pair
     time_s = np.arange(0.0, pair.whole_s[1]) + 0.5
     own = pair.leo.orbit.states(time_s).position_m
     seen = {s.name: figure.elevation_rad(s, pair.epoch, time_s, own) > s.mask_rad for s in orbit.stations(down)}
@@ -343,7 +343,7 @@ def stations_by_second(day, setup_s):
 @pytest.mark.parametrize("stations", [{}, {"operations.downlink.stations.tromso": TROMSO}])
 def test_the_direct_downlink_has_one_station_at_a_time(quick, seconds, stations):
     found = quick(NO_SEARCH, stations)
-    way, o = found.direct, found.mission.operations
+    way, o = found.direct, found.operations
     rate, log = stations_by_second(found, 20.0)
     log = [(name, at) for name, at in log if at < 86400]
     assert list(way.stations) == [name for name, _ in log]
@@ -634,7 +634,7 @@ def test_the_longest_time_without_contact_is_followed_beyond_the_span(day):
     passes, span, whole = day.direct.contacts, day.view.pair.span_s, day.view.pair.whole_s
     later = min(
         each.start_s
-        for station in orbit.stations(day.mission.operations.downlink)
+        for station in orbit.stations(day.operations.downlink)
         for each in orbit.passes(day.view.pair.leo.orbit, station, day.view.pair.epoch, whole)
         if each.start_s > passes[-1].end_s
     )
@@ -648,7 +648,7 @@ def test_the_longest_time_without_contact_is_followed_beyond_the_span(day):
 def test_the_track_is_open_where_the_contacts_are(day, seconds):
     from microrad.orbit.day.ground_track import ground_track
 
-    track = ground_track(day.view, (day.relay, day.direct), day.mission.operations.downlink)
+    track = ground_track(day.view, (day.relay, day.direct), day.operations.downlink)
     at = track.time_s.astype(int)
     near_edge = np.array([np.any(np.diff(seconds.seen[max(k - 3, 0) : k + 3].astype(int))) for k in at])
     np.testing.assert_array_equal(track.open["relay"][~near_edge], seconds.seen[at][~near_edge])
@@ -658,7 +658,7 @@ def test_the_track_is_open_where_the_contacts_are(day, seconds):
     assert track.relay.latitude_rad == pytest.approx(0.0, abs=1e-9)
     (kiruna,) = track.stations
     # the outline is where a satellite at the mean height stands at the mask
-    station = orbit.stations(day.mission.operations.downlink)[0]
+    station = orbit.stations(day.operations.downlink)[0]
     assert (kiruna.latitude_rad, kiruna.longitude_rad) == (station.latitude_rad, station.longitude_rad)
 
 

@@ -109,7 +109,7 @@ def test_a_relay_stands_still_within_a_degree(track_of, inclination_deg, stands)
 
 
 def test_a_relay_from_a_file_stands_still_too(track_of, tmp_path):
-    slot = orbit.GeostationarySlot("EXAMPLE 1", orbit.Epoch.from_text(EPOCH), math.radians(100.0))
+    slot = orbit.GeostationarySlot("EXAMPLE 1", orbit.Epoch(EPOCH), math.radians(100.0))
     (tmp_path / "relay.oem").write_text(ephemeris(slot, np.arange(0.0, 21601.0, 600.0)), encoding="utf-8")
     track, _ = track_of(SIX_HOURS, {"orbit.geo": {"kind": "ephemeris", "file": "relay.oem"}})
     assert np.degrees(track.relay.longitude_rad) == pytest.approx([100.0], abs=1e-3)

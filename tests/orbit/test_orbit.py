@@ -26,7 +26,7 @@ from microrad.orbit.earth import sun
 from microrad.orbit.earth.epoch import Epoch
 from microrad.orbit.propagation import analytic
 
-START = Epoch.from_text("2026-03-20T12:00:00Z")
+START = Epoch("2026-03-20T12:00:00Z")
 DAY_S = 86400.0
 MINUTE_S = 60.0
 RE = earth.EARTH_RADIUS_M
@@ -78,7 +78,7 @@ def wrapped(angle):
     ],
 )
 def test_an_instant_is_brought_to_one_form(text, normal):
-    epoch = Epoch.from_text(text)
+    epoch = Epoch(text)
     assert epoch.text == normal
     assert epoch == Epoch(normal)
 
@@ -104,7 +104,7 @@ def test_an_instant_is_brought_to_one_form(text, normal):
 )
 def test_a_text_that_is_no_instant_is_refused_in_words(text, words):
     with pytest.raises(OrbitError, match=words) as refused:
-        Epoch.from_text(text)
+        Epoch(text)
     assert repr(text) in str(refused.value)
     assert "2026-03-20T12:00:00Z" in str(refused.value) or "take an instant" in str(refused.value)
 

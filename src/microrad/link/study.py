@@ -103,7 +103,7 @@ class LinkStudy:
 def solve_rate(file: _File) -> _File:
     """The file with a data rate of "largest" replaced by the rate that it stands for.
 
-    Raises `LinkError` when no rate has the required margin.
+    Raises LinkError when no rate has the required margin.
     """
     m = file.mission
     if not math.isnan(m.communication.data_rate_bit_s):
@@ -217,7 +217,7 @@ def run_link_study(file: LinkFile, parts: kept.Kept = kept.NOTHING) -> LinkStudy
 def communication_budget(data: link.DataLink, sources: Mapping[str, Source]) -> link.LinkBudget:
     """The budget of the communication link at `under_jitter.error_rad`, with the static margin under a jitter.
 
-    Raises `ValueError` for a data rate that the receiver does not take.
+    Raises ValueError for a data rate that the receiver does not take.
     """
     static = link.communication_budget(data, sources)
     if data.jitter is None:

@@ -72,7 +72,7 @@ def _track_probability(scan: Spiral | Raster, offset: Floats, jitter_rms_rad: fl
     total = np.zeros_like(offset)
     for half, weight in zip(*_levels(scan), strict=True):
         if jitter_rms_rad > 0.0:
-            from scipy.special import ndtr  # slow to load
+            from scipy.special import ndtr
 
             inside = ndtr((half - offset) / jitter_rms_rad) - ndtr((-half - offset) / jitter_rms_rad)
         else:
@@ -128,7 +128,7 @@ def _spiral_times(scan: Spiral, jitter_rms_rad: float) -> TimeDistribution:
 
 
 def _raster_times(scan: Raster, jitter_rms_rad: float) -> TimeDistribution:
-    from scipy.special import ndtr  # slow to load
+    from scipy.special import ndtr
 
     search, row = scan.search, scan.row_rad
     offset, weight = _offsets(scan, jitter_rms_rad)
@@ -171,7 +171,7 @@ def _landing(away_rad: Floats, beam_radius_rad: float, jitter_rms_rad: float) ->
     """Probability that the beam, shifted by the vibration, reaches a target at each distance."""
     if jitter_rms_rad == 0.0:
         return np.asarray(away_rad < beam_radius_rad, dtype=np.float64)
-    from scipy.stats import ncx2  # slow to load
+    from scipy.stats import ncx2
 
     distance = np.linspace(0.0, float(np.max(away_rad)), _DISTANCES)  # a table: each value is slow
     inside = ncx2.cdf((beam_radius_rad / jitter_rms_rad) ** 2, 2, (distance / jitter_rms_rad) ** 2)
@@ -179,7 +179,7 @@ def _landing(away_rad: Floats, beam_radius_rad: float, jitter_rms_rad: float) ->
 
 
 def _dwell_times(scan: StepStare, jitter_rms_rad: float) -> TimeDistribution:
-    from scipy.special import ndtr  # slow to load
+    from scipy.special import ndtr
 
     search = scan.search
     sigma = search.sigma_rad
@@ -222,7 +222,7 @@ class Vibration:
     correlation_time_s: float
 
     def __post_init__(self) -> None:
-        """Refuse a negative rms and a correlation time that is not positive."""
+        """Raises ValueError if the rms is negative or the correlation time not above 0."""
         require_not_negative("the vibration's rms", self.rms_rad, "rad")
         require_positive("the vibration's correlation time", self.correlation_time_s, "s")
 
@@ -242,7 +242,7 @@ def simulate_scan(scan: Scan, runs: int, seed: int, vibration: Vibration | None 
 
     The beam follows its real path, `samples` points of it near the target in each pass, shifted by one continuous
     vibration of the whole scan. Every whole detection time that the beam stays on the target is one look.
-    Raises `ValueError` for no run and for less than 2 samples.
+    Raises ValueError for no run and for less than 2 samples.
     """
     require_count("the number of runs", runs)
     if samples < 2:

@@ -130,6 +130,10 @@ class Finding:
         """The wide beacon against a scan."""
         return None if self.scanned is None else self.scanned.trade
 
+    def way(self, name: str) -> Found | None:
+        """The way of this name, "wide beacon" or "scan"; None for a scan that the mission has not."""
+        return self.wide if name == "wide beacon" else self.scan
+
     @property
     def ways(self) -> tuple[Found, ...]:
         """Each way to find the partner."""

@@ -34,7 +34,7 @@ class Search:
     coverage: float
 
     def __post_init__(self) -> None:
-        """Refuse values that no search has."""
+        """Raises ValueError if an angle, the overlap or the coverage is out of its range."""
         require_angle("the beam's radius", self.beam_radius_rad)
         if not 0.0 <= self.overlap < 1.0:
             raise ValueError(
@@ -66,7 +66,7 @@ class Detector:
     probability: float = 1.0
 
     def __post_init__(self) -> None:
-        """Refuse a time that is not positive and a probability outside (0, 1]."""
+        """Raises ValueError if the time is not above 0 or the probability not in (0, 1]."""
         require_positive("the detection time", self.detection_time_s, "s")
         require_probability("the probability of detection in one look", self.probability)
 
@@ -88,7 +88,7 @@ class Spiral:
     speed_rad_s: float
 
     def __post_init__(self) -> None:
-        """Refuse a speed at which the beam leaves the target before it is detected."""
+        """Raises ValueError if the beam leaves the target before it is detected."""
         _require_speed(self.search, self.detector, self.speed_rad_s)
 
     @property
@@ -157,7 +157,7 @@ class Raster:
     turn_around_s: float = 0.0
 
     def __post_init__(self) -> None:
-        """Refuse a negative time and a speed at which the beam leaves the target before it is detected."""
+        """Raises ValueError if a time is negative, or the beam leaves the target before it is detected."""
         require_not_negative("the turn-around time", self.turn_around_s, "s")
         _require_speed(self.search, self.detector, self.speed_rad_s)
 
@@ -226,7 +226,7 @@ class StepStare:
     settle_s: float = 0.0
 
     def __post_init__(self) -> None:
-        """Refuse a negative time and a dwell that is shorter than the detection time."""
+        """Raises ValueError if a time is negative or the dwell shorter than the detection time."""
         require_not_negative("the settling time", self.settle_s, "s")
         require_positive("the dwell time", self.dwell_s, "s")
         if self.dwell_s < self.detector.detection_time_s * (1.0 - 1e-9):

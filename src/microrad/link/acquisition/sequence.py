@@ -31,7 +31,7 @@ class Stage:
     on_failure: str = ""
 
     def __post_init__(self) -> None:
-        """Refuse a probability outside (0, 1], a negative time and a time-out shorter than the stage."""
+        """Raises ValueError if the probability is not in (0, 1], a time negative, or the time-out too short."""
         require_probability(f'the probability of success of the stage "{self.name}"', self.success_probability)
         require_not_negative(f'the duration of the stage "{self.name}"', self.longest_s, "s")
         require_not_negative(f'the time-out of the stage "{self.name}"', self.failure_s, "s")
@@ -105,7 +105,7 @@ class Timing:
     partner_name: str = "GEO"
 
     def __post_init__(self) -> None:
-        """Refuse negative times, a range that is not positive and less than one frame."""
+        """Raises ValueError if a time is negative, the range not above 0, or there is less than one frame."""
         require_positive("the range", self.range_m, "m")
         require_positive("the time of a frame", self.frame_time_s, "s")
         require_count("the number of frames", self.frames)
@@ -136,7 +136,7 @@ class Chances:
     lock: float = 1.0
 
     def __post_init__(self) -> None:
-        """Refuse a probability outside (0, 1]."""
+        """Raises ValueError if a probability is not in (0, 1]."""
         for name in self.__slots__:
             require_probability(name, getattr(self, name))
 
@@ -224,7 +224,7 @@ def paper_sequence(timing: Timing, chances: Chances) -> tuple[Stage, ...]:
 def solve_sequence(stages: Sequence[Stage], attempts: int) -> Outcome:
     """Distribution of the time until lock when every failure takes one of `attempts`; the last one gives up.
 
-    Exact: all orders of failures are summed; times that are distributions are convolved. Raises `ValueError` for no
+    Exact: all orders of failures are summed; times that are distributions are convolved. Raises ValueError for no
     attempt, no stage, two stages of one name and a failure that goes back to a stage that is not there or comes later.
     """
     back = check_sequence(stages, attempts)
@@ -249,7 +249,7 @@ def solve_sequence(stages: Sequence[Stage], attempts: int) -> Outcome:
 
 
 def check_sequence(stages: Sequence[Stage], attempts: int) -> tuple[int, ...]:
-    """Index of the stage to which each stage goes back; raises `ValueError` as `solve_sequence` does."""
+    """Index of the stage to which each stage goes back; raises ValueError as `solve_sequence` does."""
     require_count("the number of attempts", attempts)
     names = [stage.name for stage in stages]
     if not names:

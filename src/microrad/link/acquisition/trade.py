@@ -29,7 +29,7 @@ class Receiver:
     shortest_s: float = 0.0
 
     def __post_init__(self) -> None:
-        """Refuse values that are not positive."""
+        """Raises ValueError if a value is not above 0, or the shortest time below 0."""
         require_positive("the receiver's aperture area", self.aperture_area_m2, "m^2")
         require_positive("the power that the receiver needs", self.power_w, "W")
         require_positive("the time in which it does", self.time_s, "s")
@@ -57,7 +57,7 @@ class Beams:
     overlap: float
 
     def __post_init__(self) -> None:
-        """Refuse values that are not positive, and an overlap that is no share."""
+        """Raises ValueError if a value is not above 0, or the overlap not from 0 to below 1."""
         require_positive("the transmitted power", self.power_w, "W")
         require_positive("the range", self.range_m, "m")
         require_angle("the narrow beam's half angle", self.narrow_half_angle_rad)
@@ -111,7 +111,7 @@ def wide_against_scan(
     Both are dimensioned at the edge: the wide beacon integrates until a target on the radius of `coverage` is
     detected, the scan is as slow as a target half way between two tracks and `beam_radius_rad` off the axis needs. The
     wide beam's half angle at 1/e2 is sqrt(2) times the radius: no other is brighter there. It sees no `jitter_rms_rad`,
-    which is small against it. Raises `ValueError` for tracks that do not overlap.
+    which is small against it. Raises ValueError for tracks that do not overlap.
     """
     sigma = np.atleast_1d(np.asarray(sigma_rad, dtype=np.float64))
     if beams.overlap == 0.0:

@@ -228,7 +228,7 @@ def required_dbm(data: DataLink, data_rate_bit_s: ArrayLike) -> Floats:
 
 
 def check_grid(data_rate_bit_s: Floats, pointing_error_rad: Floats) -> None:
-    """Refuse data rates that are not above zero, pointing errors below it, and either without end."""
+    """Raises ValueError if a data rate is not above 0, a pointing error below 0, or either not finite."""
     if not np.all((data_rate_bit_s > 0.0) & (data_rate_bit_s < np.inf)):
         raise ValueError('data rates must be finite and above 0 bit/s; "largest" has to be solved for first')
     if not np.all((pointing_error_rad >= 0.0) & (pointing_error_rad < np.inf)):

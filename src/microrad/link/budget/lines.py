@@ -108,7 +108,7 @@ def communication_budget(
 
     ``given_source`` says where a given value comes from, and stands as the source of its line.
 
-    Raises `ValueError` for a negative pointing error, a data rate that is not above zero, and one that the receiver
+    Raises ValueError for a negative pointing error, a data rate that is not above zero, and one that the receiver
     does not take.
     """
     beam = data.table
@@ -131,7 +131,7 @@ def communication_budget(
 def beam_budget(name: str, shared: Shared, beam: Beacon | None, sources: Mapping[str, Source]) -> LinkBudget:
     """Budget of the wide "beacon" from LEO to GEO, or of the narrow beam with which GEO gives its "answer".
 
-    A Gaussian beam with the mission's divergence convention. Raises `ValueError` when the mission has no such beam.
+    A Gaussian beam with the mission's divergence convention. Raises ValueError when the mission has no such beam.
     """
     if beam is None:
         raise ValueError(f"the mission has no table [{name}]")

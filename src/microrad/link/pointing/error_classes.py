@@ -29,7 +29,7 @@ class StatedError:
 
     `error_rad` is a half width about the line of sight. `statistic` says how many standard deviations it is, "bound"
     that it is never exceeded. With `axes` "radial" the k-sigma value is k times the radial rms, sqrt(2) of one axis.
-    Raises `ValueError` for a negative error or one that is not finite, and for an unknown class, statistic or axes.
+    Raises ValueError for a negative error or one that is not finite, and for an unknown class, statistic or axes.
     """
 
     name: str
@@ -39,7 +39,7 @@ class StatedError:
     axes: Axes
 
     def __post_init__(self) -> None:
-        """Refuse what is no half width, and words of no meaning."""
+        """Raises ValueError if the error is negative or not finite, or a word is unknown."""
         if not (math.isfinite(self.error_rad) and self.error_rad >= 0.0):
             shown = format_quantity(self.error_rad, "rad")
             raise ValueError(f"{self.name}: an error of {shown} is no half width; give at least 0 rad")
@@ -57,7 +57,7 @@ class ErrorTerm:
     """A pointing error as the summation takes it: mean and standard deviation about axis x and axis y.
 
     `stated_rad` is the half width that it was stated with. `gaussian` is false for a spread of another shape. No term
-    is correlated with another. Raises `ValueError` for values that are not finite and for a negative deviation.
+    is correlated with another. Raises ValueError for values that are not finite and for a negative deviation.
     """
 
     name: str
@@ -68,7 +68,7 @@ class ErrorTerm:
     gaussian: bool = True
 
     def __post_init__(self) -> None:
-        """Refuse what is no mean and no standard deviation."""
+        """Raises ValueError if a value is not finite or a standard deviation negative."""
         for what, pair in (("mean", self.mean_rad), ("standard deviation", self.sigma_rad)):
             if len(pair) != 2 or not all(math.isfinite(value) for value in pair):
                 raise ValueError(f"{self.name}: a {what} of {pair} rad; give two finite values, for axis x and axis y")

@@ -118,7 +118,7 @@ class OpenLoopPointing:
     def total_rad(self, rule: str) -> float:
         """The total by a rule: "rss", "esa-1993", "ecss-axis", "ecss-radial", "rayleigh" or "exact".
 
-        Raises `ValueError` for another.
+        Raises ValueError for another.
         """
         for each in self.summations:
             if each.rule == rule:
@@ -128,19 +128,19 @@ class OpenLoopPointing:
     def coverage(self, radius_rad: ArrayLike) -> Floats:
         """Probability that the radial error is below each radius, for instance where the beacon's power suffices.
 
-        Exact for the Gaussian of `error`. Raises `ValueError` for a negative radius.
+        Exact for the Gaussian of `error`. Raises ValueError for a negative radius.
         """
         return radial_cdf(self.error, radius_rad)
 
     def allocation(self, total_rad: float, rule: Rule = "ecss-radial") -> tuple[Allocation, ...]:
-        """What a total leaves for each line, the others unchanged; raises `ValueError` as `allocate`."""
+        """What a total leaves for each line, the others unchanged; raises ValueError as `allocate`."""
         return allocate(
             self.stated, total_rad, rule=rule, confidence=self.confidence, interpretation=self.interpretation
         )
 
     @property
     def beacon_half_angle_rad(self) -> float:
-        """Half angle of the beacon at 1/e2; raises `ValueError` for a mission without one, as the two below."""
+        """Half angle of the beacon at 1/e2; raises ValueError for a mission without one, as the two below."""
         return _of_beacon(self.reading).half_angle_rad
 
     @property
@@ -166,7 +166,7 @@ def open_loop_budget(
 
     One statistical interpretation holds for all lines. "temporal" asks for the mission's confidence as a share of the
     time of the worst-case satellite, "mixed" over the times of all satellites: see `error_term`. Point-ahead is a line
-    where the mission has it. Raises `ValueError` for a mission without pointing errors, and for a line that stands for
+    where the mission has it. Raises ValueError for a mission without pointing errors, and for a line that stands for
     point-ahead as well.
     """
     if pointing is None:

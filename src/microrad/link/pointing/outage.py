@@ -37,7 +37,7 @@ class Exposure:
     def of(cls, data: link.DataLink, quantile_rad: float, beyond: Callable[[float], float]) -> "Exposure":
         """The link under errors of which these two are known.
 
-        Raises `ValueError` for a data rate that the receiver does not take.
+        Raises ValueError for a data rate that the receiver does not take.
         """
         received_dbm = link.received_on_axis_dbm(data)
         on_axis_db = received_dbm - float(link.required_dbm(data, data.table.data_rate_bit_s))
@@ -208,7 +208,7 @@ def required_error_rad(data: link.DataLink) -> float:
 def margin_db(data: link.DataLink) -> float:
     """Margin (dB) of the communication link at `error_rad`: the one of its budget.
 
-    Raises `ValueError` for a data rate that the receiver does not take.
+    Raises ValueError for a data rate that the receiver does not take.
     """
     return Exposure.stated(data).margin_db
 

@@ -25,7 +25,7 @@ class Jitter:
     """Pointing error of two axes, x and y, at the line of sight: independent Gaussians about a static bias.
 
     `rms_rad` is the standard deviation per axis about `bias_rad`, not the radial one. The axes may differ, and either
-    rms may be 0. Errors that are correlated need the axes in which they are not. Raises `ValueError` for a value that
+    rms may be 0. Errors that are correlated need the axes in which they are not. Raises ValueError for a value that
     is not finite, or a negative rms.
     """
 
@@ -33,7 +33,7 @@ class Jitter:
     rms_rad: tuple[float, float]
 
     def __post_init__(self) -> None:
-        """Refuse what is no bias and no rms."""
+        """Raises ValueError if a value is not finite or an rms negative."""
         for name, values in (("bias", self.bias_rad), ("jitter rms", self.rms_rad)):
             if len(values) != 2 or not all(math.isfinite(value) for value in values):
                 raise ValueError(f"the {name} is {values} rad; give two finite values, for axis x and axis y")
@@ -49,7 +49,7 @@ class Jitter:
 
 # --------------------------------------------------------------------------------------------------------------- checks
 def at_least_zero(values: ArrayLike, name: str, unit: str) -> Floats:
-    """`values` as an array; raises `ValueError`, which names them, for one that is negative or not finite."""
+    """`values` as an array; raises ValueError, which names them, for one that is negative or not finite."""
     array = np.asarray(values, dtype=np.float64)
     wrong = array[~(np.isfinite(array) & (array >= 0.0))]
     if wrong.size:
@@ -68,13 +68,13 @@ def _probability(values: ArrayLike) -> Floats:
 # --------------------------------------------------------------------------------------------------------- distribution
 def _outside(limit: Floats, bias: float, rms: float) -> Floats:
     """P(|v| > limit) of one axis; without digits lost in the tail."""
-    from scipy.special import ndtr  # here: slow to load
+    from scipy.special import ndtr
 
     return np.asarray(ndtr((abs(bias) - limit) / rms) + ndtr((-abs(bias) - limit) / rms))
 
 
 def _inside(limit: Floats, bias: float, rms: float) -> Floats:
-    from scipy.special import ndtr  # here: slow to load
+    from scipy.special import ndtr
 
     return np.asarray(ndtr((limit - abs(bias)) / rms) - ndtr((-limit - abs(bias)) / rms))
 
@@ -146,7 +146,7 @@ def radial_survival(jitter: Jitter, radius_rad: ArrayLike) -> Floats:
     """P(r > R) of the radial pointing error, for each radius R.
 
     Exact for unequal and biased axes, by 96-point Gauss-Legendre quadrature over one axis. Equal axes s without bias
-    have the Rayleigh distribution, exp(-R^2 / (2 s^2)). Raises `ValueError` for a negative radius.
+    have the Rayleigh distribution, exp(-R^2 / (2 s^2)). Raises ValueError for a negative radius.
     """
     return _probability_of(jitter, at_least_zero(radius_rad, "radial error", "rad"), beyond=True)
 
@@ -178,7 +178,7 @@ def density_on_circle(jitter: Jitter, radius: Floats) -> tuple[Floats, Floats, F
 def radial_quantile(jitter: Jitter, probability: ArrayLike) -> Floats:
     """Radial error (rad) that is exceeded with `probability`: the root R of P(r > R) = p.
 
-    Raises `ValueError` unless p is from `SMALLEST_PROBABILITY` to below 1.
+    Raises ValueError unless p is from `SMALLEST_PROBABILITY` to below 1.
     """
     p = _probability(probability)
     widest = max(jitter.rms_rad)
@@ -186,7 +186,7 @@ def radial_quantile(jitter: Jitter, probability: ArrayLike) -> Floats:
         return np.full(p.shape, jitter.static_rad)
     if _is_rayleigh(jitter):
         return np.asarray(widest * np.sqrt(-2.0 * np.log(p)))
-    from scipy.optimize import brentq  # here: slow to load
+    from scipy.optimize import brentq
 
     def missed(radius: float, p: float) -> float:
         return math.log(max(float(_probability_of(jitter, np.asarray(radius), beyond=True)), 1e-300) / p)

@@ -48,7 +48,7 @@ class Summation:
 def sigma_multiple(confidence: float) -> float:
     """n_p, the number of standard deviations about its mean within which a Gaussian lies with the confidence.
 
-    ECSS-E-ST-60-10C 4.2.4.1: 1, 2 and 3 for 68.27, 95.45 and 99.73 %. Raises `ValueError` unless 0 < confidence < 1.
+    ECSS-E-ST-60-10C 4.2.4.1: 1, 2 and 3 for 68.27, 95.45 and 99.73 %. Raises ValueError unless 0 < confidence < 1.
     """
     if not 0.0 < confidence < 1.0:
         raise ValueError(f"a confidence of {confidence:g} is not possible; give a share above 0 and below 1")
@@ -128,7 +128,7 @@ TOTALS: dict[Rule, Callable[[Terms, float], float]] = {
 
 # ------------------------------------------------------------------------------------------------------- side by side
 def summations(terms: Terms, confidence: float) -> tuple[Summation, ...]:
-    """The total by each rule, each said to hold or not. Raises `ValueError` for no term, and for no confidence."""
+    """The total by each rule, each said to hold or not. Raises ValueError for no term, and for no confidence."""
     if not terms:
         raise ValueError("the pointing budget has 0 terms; give at least 1")
     totals = {rule: total(terms, confidence) for rule, total in TOTALS.items()}
@@ -253,7 +253,7 @@ def allocate(
     """For each line, the largest half width with which the total by `rule` just meets `total_rad`.
 
     Totals grow with each line, so that there is one. `confidence` does not matter to the rules of stated half widths.
-    Raises `ValueError` for a total not above 0, an unknown rule, and as `error_term` and the rule do.
+    Raises ValueError for a total not above 0, an unknown rule, and as `error_term` and the rule do.
     """
     if not (math.isfinite(total_rad) and total_rad > 0.0):
         shown = format_quantity(total_rad, "rad")
@@ -274,7 +274,7 @@ def allocate(
             return Allocation(line.name, line.error_rad, 0.0, missing, note)
         # alone it would reach the total here; totals are in proportion to a line that is alone
         highest = total_rad / total_with(index, 1.0, alone=True)
-        from scipy.optimize import brentq  # here: slow to load
+        from scipy.optimize import brentq
 
         low, high = 0.0, highest * (1.0 + 1e-6)
         largest = brentq(lambda error: total_with(index, error) - total_rad, low, high, xtol=1e-9 * highest)

@@ -38,7 +38,7 @@ def spontaneous_photons(noise_figure_db: float) -> float:
 
 
 def checked_powers(power_w: ArrayLike) -> Floats:
-    """The powers as an array; refuses one that is negative or not finite."""
+    """The powers as an array; raises ValueError if one is negative or not finite."""
     powers = np.asarray(power_w, dtype=np.float64)
     for power in powers[~((powers >= 0.0) & (powers < math.inf))].flat[:1]:
         require_zero_or_more("the received power", float(power), "W")
@@ -51,35 +51,35 @@ def shown(value: float, unit: str) -> str:
 
 
 def require(holds: bool, what: str, value: float, unit: str, limit: str) -> None:
-    """Refuse a value that does not hold: what it is, and its limit."""
+    """Raises ValueError, which names the value and its limit, unless it holds."""
     if not holds:
         raise ValueError(f"{what} is {shown(value, unit)}: {limit}")
 
 
 def require_zero_or_more(what: str, value: float, unit: str, advice: str = "") -> None:
-    """Refuse a value below zero or not finite."""
+    """Raises ValueError if the value is below zero or not finite."""
     zero = f"0 {unit}".rstrip()
     require(0.0 <= value < math.inf, what, value, unit, f"it must be finite and not below {zero}{advice}")
 
 
 def require_above_zero(what: str, value: float, unit: str) -> None:
-    """Refuse a value that is not above zero, or not finite."""
+    """Raises ValueError if the value is not above zero, or not finite."""
     require(0.0 < value < math.inf, what, value, unit, f"it must be finite and above 0 {unit}")
 
 
 def require_efficiency(what: str, value: float) -> None:
-    """Refuse an efficiency outside 0 to 1."""
+    """Raises ValueError if the efficiency is not above 0 and at most 1."""
     require(0.0 < value <= 1.0, what, value, "", "it must lie above 0, up to 1 (one count or electron for each photon)")
 
 
 def require_extinction(ratio: float) -> None:
-    """Refuse a mark that is no brighter than a space."""
+    """Raises ValueError if a mark is no brighter than a space."""
     limit = "it is the power of a mark over that of a space, as a ratio and above 1 (inf: dark spaces)"
     require(ratio > 1.0, "the extinction ratio", ratio, "", limit)
 
 
 def require_noise_figure(noise_figure_db: float) -> None:
-    """Refuse an amplifier below the quantum limit."""
+    """Raises ValueError if the noise figure is below the quantum limit."""
     limit = "it must be at least 3 dB, the quantum limit of an amplifier of both quadratures at high gain"
     require(3.0 <= noise_figure_db < math.inf, "the noise figure", noise_figure_db, "dB", limit)
 
@@ -101,7 +101,7 @@ class Receiver(ABC):
     (20 log10 Q) counts half in optical power for a receiver limited by thermal noise. The gain is one number: at
     another ratio than the target, `bit_error_ratio_at` takes it as unchanged.
 
-    Raises `ValueError` for a value without meaning.
+    Raises ValueError for a value without meaning.
     """
 
     wavelength_m: float
@@ -111,7 +111,7 @@ class Receiver(ABC):
     code_rate: float = 1.0
 
     def __post_init__(self) -> None:
-        """Refuse what is no receiver."""
+        """Raises ValueError if a value is outside the limits that the class names."""
         require_above_zero("the wavelength", self.wavelength_m, "m")
         require(
             LEAST_RATIO <= self.bit_error_ratio < 0.5,
@@ -129,7 +129,7 @@ class Receiver(ABC):
     def bit_error_ratio_at(self, power_w: ArrayLike, data_rate_bit_s: ArrayLike) -> Floats:
         """Bit error ratio (after the decoder) at the average power `power_w` and the data rate; the two broadcast.
 
-        Raises `ValueError` for a negative power and a rate that is not positive, `RateError` for a rate above the
+        Raises ValueError for a negative power and a rate that is not positive, `RateError` for a rate above the
         bandwidth.
         """
         powers = checked_powers(power_w)
@@ -139,7 +139,7 @@ class Receiver(ABC):
     def required_power_w(self, data_rate_bit_s: ArrayLike) -> Floats:
         """Average power that reaches the target bit error ratio at each data rate.
 
-        Raises `ValueError` for a rate that is not positive, `RateError` for one above the bandwidth.
+        Raises ValueError for a rate that is not positive, `RateError` for one above the bandwidth.
         """
         rate = self._rates(data_rate_bit_s)
         return np.asarray(self._power_w(rate) / self._code_gain, dtype=np.float64)

@@ -70,7 +70,7 @@ class OokCounting(_Counter):
     extinction_ratio: float = math.inf
 
     def __post_init__(self) -> None:
-        """Refuse what is no counter."""
+        """Raises ValueError if a mark is no brighter than a space."""
         _Counter.__post_init__(self)
         require_extinction(self.extinction_ratio)
 
@@ -120,7 +120,7 @@ class PpmCounting(_Counter):
     order: int
 
     def __post_init__(self) -> None:
-        """Refuse what is no modulation."""
+        """Raises ValueError if the order is no power of two."""
         _Counter.__post_init__(self)
         whole = self.order >= 2 and math.log2(self.order).is_integer()
         require(whole, "the order of the pulse-position modulation", self.order, "", "it is a power of two, at least 2")

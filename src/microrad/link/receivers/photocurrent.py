@@ -110,7 +110,7 @@ class OokPin(_OnOffCurrent):
     background_power_w: float = 0.0
 
     def __post_init__(self) -> None:
-        """Refuse what is no photodiode."""
+        """Raises ValueError if the efficiency is not in (0, 1], or noise, dark current or background are negative."""
         _OnOffCurrent.__post_init__(self)
         require_efficiency("the quantum efficiency", self.quantum_efficiency)
         require_zero_or_more("the thermal noise", self.thermal_noise_a_sqrt_hz, "A/sqrt(Hz)")
@@ -153,7 +153,7 @@ class OokApd(OokPin):
     ionisation_ratio: float
 
     def __post_init__(self) -> None:
-        """Refuse what is no avalanche photodiode."""
+        """Raises ValueError if the gain is below 1 or the ionisation ratio not from 0 to 1."""
         OokPin.__post_init__(self)
         apd_excess_noise_factor(self.gain, self.ionisation_ratio)
 
@@ -184,7 +184,7 @@ class OokPreamplified(_OnOffCurrent):
     polarisations: int = 2
 
     def __post_init__(self) -> None:
-        """Refuse what is no preamplifier."""
+        """Raises ValueError if noise figure, gain, bandwidth, background or polarisations are out of range."""
         _OnOffCurrent.__post_init__(self)
         require_noise_figure(self.noise_figure_db)
         require(10.0 <= self.gain_db < math.inf, "the gain", self.gain_db, "dB", "high gain is meant, at least 10 dB")

@@ -123,7 +123,7 @@ def cut_at(contact: _C, end_s: float) -> _C:
 
 def view(pair: orbit.Pair, wavelength_m: float) -> View:
     """The contacts of a pair of terminals, with the Doppler shift at a wavelength; raises `orbit.OrbitError`."""
-    from scipy.interpolate import CubicHermiteSpline  # late: it loads slowly
+    from scipy.interpolate import CubicHermiteSpline
 
     found = orbit.contacts(pair.leo, pair.geo, pair.earth, pair.epoch, pair.whole_s)
     sights, own, end = [_sight(pair, c) for c in found], pair.leo.orbit, pair.span_s[1]

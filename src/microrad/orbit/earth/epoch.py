@@ -65,11 +65,6 @@ class Epoch:
         """Check the text and bring it to its normal form."""
         object.__setattr__(self, "text", _normal(self.text))
 
-    @classmethod
-    def from_text(cls, text: str) -> "Epoch":
-        """The instant that `text` names; raises `OrbitError` as the class does."""
-        return cls(text)
-
     @property
     def julian_date(self) -> tuple[float, float]:
         """Julian date in UTC: that of 0h (it ends in .5), and the fraction of the day (above 1 in a leap second)."""
@@ -85,7 +80,7 @@ class Epoch:
     def utc(self, time_s: float) -> str:
         """UTC at `time_s` after this instant, in ISO 8601 to the millisecond with Z; a leap second reads :60.
 
-        Raises `OrbitError` for a time outside the tables.
+        Raises OrbitError for a time outside the tables.
         """
         self._check(np.asarray(time_s, dtype=np.float64))
         day, second = _instant(self.text)
@@ -96,7 +91,7 @@ class Epoch:
         """Greenwich mean sidereal time (IAU 1982) at UT1, `time_s` after this instant, in rad.
 
         In [0, 2 pi) at 0h of the first day and continuous from there: it is not wrapped. UT1 - TAI is taken as linear
-        over each day. Raises `OrbitError` for a time outside the tables.
+        over each day. Raises OrbitError for a time outside the tables.
         Source: Aoki et al. 1982 (AIAA 2006-6753, appendix C).
         """
         time = np.asarray(time_s, dtype=np.float64)
@@ -114,7 +109,7 @@ class Epoch:
         return (np.asarray(time_s, dtype=np.float64) + since_noon_s) / _CENTURY_S
 
     def _check(self, time: Floats) -> None:
-        """Raise `OrbitError` for times that are not numbers or leave the tables."""
+        """Raises OrbitError for times that are not numbers or leave the tables."""
         if not time.size:
             return
         for extreme in (float(time.min()), float(time.max())):
@@ -125,7 +120,7 @@ class Epoch:
 
 
 def _check_day(day: int, what: str) -> None:
-    """Raise `OrbitError` for a day that the tables do not cover."""
+    """Raises OrbitError for a day that the tables do not cover."""
     if not FIRST_DAY.toordinal() <= day <= LAST_DAY.toordinal():
         raise OrbitError(
             f"{what} is outside {FIRST_DAY} to {LAST_DAY}, the days for which the rotation of the Earth (UT1) is "
@@ -152,7 +147,7 @@ def _normal(text: str) -> str:
 
 
 def _check_clock(text: str, day: int, hour: int, minute: int, second: float) -> None:
-    """Raise `OrbitError` for a time of day that does not exist; second 60 does where a leap second was inserted."""
+    """Raises OrbitError for a time of day that does not exist; second 60 does where a leap second was inserted."""
     if hour <= 23 and minute <= 59 and second < 60.0:
         return
     if (hour, minute) == (23, 59) and 60.0 <= second < 61.0:
@@ -189,7 +184,7 @@ def _utc_of_tai(tai_ms: int) -> str:
 @cache
 def _tables() -> _Tables:
     """Leap seconds, and UT1 - TAI at the start of each day; a tenth of a second on first use."""
-    from skyfield.api import load  # a sixth of a second, so only when an instant needs it
+    from skyfield.api import load
 
     scale = load.timescale(builtin=True)
     first, last = FIRST_DAY.toordinal(), LAST_DAY.toordinal() + 2

@@ -38,7 +38,7 @@ class Subpoint(NamedTuple):
 def semi_axes_m(shape: Shape, height_m: float = 0.0) -> tuple[float, float]:
     """Equatorial and polar semi-axis of the figure `shape`, both made longer by `height_m`.
 
-    Raises `OrbitError` for another shape.
+    Raises OrbitError for another shape.
     """
     if shape not in get_args(Shape):
         raise OrbitError(f"the shape of the Earth {shape!r} is not known; write oblate or sphere")
@@ -54,14 +54,14 @@ class Earth:
     height. For the oblate Earth it lies below the surface of this geodetic height, by at most 1.4 millionths of the
     grazing height (14 cm for 100 km).
 
-    Raises `OrbitError` for another shape, and for a grazing height below 0 or above 1000 km.
+    Raises OrbitError for another shape, and for a grazing height below 0 or above 1000 km.
     """
 
     shape: Shape
     grazing_height_m: float
 
     def __post_init__(self) -> None:
-        """Check shape and height."""
+        """Raises OrbitError if the shape is unknown or the height out of range."""
         semi_axes_m(self.shape)
         if not 0.0 <= self.grazing_height_m <= 1e6:
             raise OrbitError(
@@ -83,7 +83,7 @@ class Earth:
         such in those coordinates. Positions have shape (3, n); the result (n,) is smooth in them and is the same to the
         last bit when the two are swapped.
 
-        Raises `OrbitError` for a terminal below the surface, or a position that is not a number.
+        Raises OrbitError for a terminal below the surface, or a position that is not a number.
         """
         first, second = self._scaled(first_m, "first"), self._scaled(second_m, "second")
         cross_x = first[1] * second[2] - first[2] * second[1]
@@ -96,7 +96,7 @@ class Earth:
         return np.asarray(horizons - np.arctan2(cross, dot))
 
     def _scaled(self, position_m: Floats, which: str) -> Floats:
-        """The position in units of the raised semi-axes; raises `OrbitError` below the surface."""
+        """The position in units of the raised semi-axes; raises OrbitError below the surface."""
         scaled = to_unit_sphere(position_m, *semi_axes_m(self.shape, self.grazing_height_m))
         square = np.atleast_1d(_square(scaled))
         worst = int(np.argmin(square)) if square.size else 0
@@ -172,7 +172,7 @@ def subpoint(position_m: Floats, rotation_rad: Floats) -> Subpoint:
 class Station:
     """A place fixed to the Earth: geodetic latitude (north positive), longitude (east positive), height (WGS84).
 
-    `mask_rad` is the elevation below which nothing is received. Raises `OrbitError` for a latitude beyond the poles, a
+    `mask_rad` is the elevation below which nothing is received. Raises OrbitError for a latitude beyond the poles, a
     longitude beyond a full turn, a height outside -1 to 50 km, a mask outside [0, 90) deg.
     """
 
@@ -183,7 +183,7 @@ class Station:
     mask_rad: float
 
     def __post_init__(self) -> None:
-        """Check the place."""
+        """Raises OrbitError if an angle or the height is out of range."""
         for what, angle_rad, holds, wanted in (
             ("latitude", self.latitude_rad, abs(self.latitude_rad) <= math.pi / 2, "from -90 to 90 deg"),
             ("longitude", self.longitude_rad, abs(self.longitude_rad) <= 2 * math.pi, "from -360 to 360 deg"),

@@ -40,7 +40,7 @@ def shadow_rad(position_m: Floats, sun_direction: Floats, shape: Shape) -> Float
     0.1 s of the limits of an eclipse in a low orbit and 1.3 s in the geostationary one. Light bent by the air is left
     out.
 
-    Raises `OrbitError` for a position inside the Earth.
+    Raises OrbitError for a position inside the Earth.
     """
     position = np.asarray(position_m, dtype=np.float64)
     to_sun = ASTRONOMICAL_UNIT_M * sun_direction - position

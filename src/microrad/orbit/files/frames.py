@@ -52,7 +52,7 @@ def _from_earth_fixed(angle: Floats, position: Floats, velocity: Floats) -> Stat
 
 def _rotations(frame: str, epoch: Epoch, time: Floats) -> tuple[Floats, Floats]:
     """Matrices from `frame` to TEME and their rates, each of shape (n, 3, 3), by splines between knots."""
-    from scipy.interpolate import CubicSpline  # heavy, and only files in such frames need them
+    from scipy.interpolate import CubicSpline
     from skyfield.api import load
 
     first, last = float(time[0]), float(time[-1])

@@ -28,7 +28,7 @@ class KeplerOrbit:
     node, perigee and mean anomaly move at the constant rates that the flattening gives them in first order, and the
     periodic terms (up to about 10 km in a low orbit) are left out.
 
-    Raises `OrbitError` for an orbit that is no ellipse, a perigee below 120 km over the equatorial radius, an
+    Raises OrbitError for an orbit that is no ellipse, a perigee below 120 km over the equatorial radius, an
     inclination outside [0, 180] deg, an element that is not a number.
     """
 
@@ -43,7 +43,7 @@ class KeplerOrbit:
     j2: bool
 
     def __post_init__(self) -> None:
-        """Check the elements."""
+        """Raises OrbitError if an element is out of range."""
         for what in _ELEMENTS:
             if not math.isfinite(value := getattr(self, what)):
                 raise OrbitError(f"orbit {self.name}: {what} is {value}, not a number; give it a finite value")
@@ -88,7 +88,7 @@ class KeplerOrbit:
     def states(self, time_s: Floats) -> States:
         """States at `time_s` after the epoch; the velocity is the derivative of the position, drifts included.
 
-        Raises `OrbitError` for a time that is not a number.
+        Raises OrbitError for a time that is not a number.
         """
         time = np.asarray(time_s, dtype=np.float64)
         if not np.all(np.isfinite(time)):
@@ -139,7 +139,7 @@ def circular(
 ) -> KeplerOrbit:
     """A circular orbit `altitude_m` over the equatorial radius, `phase_rad` past its ascending node at `epoch`.
 
-    Raises `OrbitError` as `KeplerOrbit` does.
+    Raises OrbitError as `KeplerOrbit` does.
     """
     return KeplerOrbit(name, epoch, EARTH_RADIUS_M + altitude_m, 0.0, inclination_rad, node_rad, 0.0, phase_rad, j2)
 
@@ -147,7 +147,7 @@ def circular(
 def sun_synchronous_inclination_rad(altitude_m: float, eccentricity: float = 0.0) -> float:
     """Inclination at which the flattening turns the node with the mean Sun, once in a tropical year.
 
-    `altitude_m` is the semi-major axis less the equatorial radius. Raises `OrbitError` where no inclination does it
+    `altitude_m` is the semi-major axis less the equatorial radius. Raises OrbitError where no inclination does it
     (above 5974 km for a circular orbit) and for an eccentricity outside [0, 1).
     """
     if not 0.0 <= eccentricity < 1.0:
@@ -168,7 +168,7 @@ def sun_synchronous_inclination_rad(altitude_m: float, eccentricity: float = 0.0
 def node_of_local_time(epoch: Epoch, local_time_h: float) -> float:
     """Right ascension in [0, 2 pi) of the ascending node that has this mean local time at `epoch`.
 
-    The mean local time of a place is UTC plus one hour for every 15 deg of its east longitude. Raises `OrbitError` for
+    The mean local time of a place is UTC plus one hour for every 15 deg of its east longitude. Raises OrbitError for
     hours outside [0, 24).
     """
     if not 0.0 <= local_time_h < 24.0:
@@ -181,7 +181,7 @@ def node_of_local_time(epoch: Epoch, local_time_h: float) -> float:
 class GeostationarySlot:
     """A satellite that stands over the equator at a longitude (east positive), fixed in the turning Earth.
 
-    Times count from `epoch`. Raises `OrbitError` for a longitude beyond a full turn.
+    Times count from `epoch`. Raises OrbitError for a longitude beyond a full turn.
     """
 
     name: str
@@ -189,7 +189,7 @@ class GeostationarySlot:
     longitude_rad: float
 
     def __post_init__(self) -> None:
-        """Check the longitude."""
+        """Raises OrbitError if the longitude is beyond a full turn."""
         if not abs(self.longitude_rad) <= 2.0 * math.pi:
             raise OrbitError(
                 f"slot {self.name}: its longitude of {math.degrees(self.longitude_rad):.6g} deg is not from -360 to "
@@ -197,7 +197,7 @@ class GeostationarySlot:
             )
 
     def states(self, time_s: Floats) -> States:
-        """States at `time_s` after the epoch; raises `OrbitError` for a time outside the tables of `Epoch`."""
+        """States at `time_s` after the epoch; raises OrbitError for a time outside the tables of `Epoch`."""
         angle = self.epoch.earth_rotation_rad(time_s) + self.longitude_rad
         x, y = GEOSTATIONARY_RADIUS_M * np.cos(angle), GEOSTATIONARY_RADIUS_M * np.sin(angle)
         zero = np.zeros_like(x)

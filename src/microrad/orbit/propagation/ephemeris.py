@@ -102,7 +102,7 @@ class EphemerisOrbit:
         return self.segments[0].start_s, self.segments[-1].stop_s
 
     def states(self, time_s: Floats) -> States:
-        """States in TEME at `time_s`, of shape (3, n); raises `OrbitError` outside the usable times."""
+        """States in TEME at `time_s`, of shape (3, n); raises OrbitError outside the usable times."""
         time = np.atleast_1d(np.asarray(time_s, dtype=np.float64))
         self._check_finite(time)
         starts = np.array([segment.start_s for segment in self.segments])
@@ -122,7 +122,7 @@ class EphemerisOrbit:
         return States(position, velocity)
 
     def require(self, start_s: float, end_s: float) -> None:
-        """Raise `OrbitError` when a part of the mission from `start_s` to `end_s` has no usable state vectors."""
+        """Raises OrbitError when a part of the mission from `start_s` to `end_s` has no usable state vectors."""
         self._check_finite(np.array([start_s, end_s]))
         first, last = self.span_s
         if start_s < first - SLACK_S or end_s > last + SLACK_S:

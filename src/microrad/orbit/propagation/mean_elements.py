@@ -58,7 +58,7 @@ class ElementSet:
 
 
 def check_theory(where: str, kind: str) -> None:
-    """Raise `OrbitError` for a type of elements that is not of SGP4 (0, 2 or blank; 3 for its deep-space part)."""
+    """Raises OrbitError for a type of elements that is not of SGP4 (0, 2 or blank; 3 for its deep-space part)."""
     if kind not in ("", "0", "2", "3"):
         raise OrbitError(
             f"{where}: the type of the ephemeris is {kind}, elements of another theory than SGP4 (4 is SGP4-XP), which "
@@ -67,7 +67,7 @@ def check_theory(where: str, kind: str) -> None:
 
 
 def checked(elements: ElementSet) -> ElementSet:
-    """The elements when they are those of a closed orbit; raises `OrbitError` for others."""
+    """The elements when they are those of a closed orbit; raises OrbitError for others."""
     revolutions_per_day = elements.mean_motion_rad_s * DAY_S / REVOLUTION_RAD
     ranges = (
         ("eccentricity", elements.eccentricity, 0.0, 1.0, "at least 0 and below 1"),
@@ -85,7 +85,7 @@ def checked(elements: ElementSet) -> ElementSet:
 
 
 def closest_elements(sets: tuple[ElementSet, ...], epoch: Epoch) -> ElementSet:
-    """The set whose epoch is nearest to `epoch` among sets of one satellite; raises `OrbitError` for several."""
+    """The set whose epoch is nearest to `epoch` among sets of one satellite; raises OrbitError for several."""
     if len({e.catalogue_number for e in sets}) > 1:
         listed = ", ".join(f"{e.name} ({e.catalogue_number})" for e in sets[:8])
         raise OrbitError(
@@ -99,7 +99,7 @@ def closest_elements(sets: tuple[ElementSet, ...], epoch: Epoch) -> ElementSet:
 class Sgp4Orbit:
     """The orbit that SGP4 computes from an element set, in seconds since `epoch`; satisfies `Orbit`.
 
-    Raises `OrbitError` for elements that SGP4 refuses, and for a perigee below `LEAST_PERIGEE_HEIGHT_M`.
+    Raises OrbitError for elements that SGP4 refuses, and for a perigee below `LEAST_PERIGEE_HEIGHT_M`.
     """
 
     elements: ElementSet
@@ -126,7 +126,7 @@ class Sgp4Orbit:
     def states(self, time_s: Floats) -> States:
         """States in TEME at `time_s`, of shape (3, n).
 
-        Raises `OrbitError` where SGP4 reports an error, and further than `MOST_ELEMENTS_AGE_S` from the elements.
+        Raises OrbitError where SGP4 reports an error, and further than `MOST_ELEMENTS_AGE_S` from the elements.
         """
         time = np.atleast_1d(np.asarray(time_s, dtype=np.float64))
         self._check_times(time)
@@ -144,7 +144,7 @@ class Sgp4Orbit:
         return States(position, velocity)
 
     def require(self, start_s: float, end_s: float) -> None:
-        """Raise `OrbitError` unless the elements hold from `start_s` to `end_s`: their age, and the height of perigee.
+        """Raises OrbitError unless the elements hold from `start_s` to `end_s`: their age, and the height of perigee.
 
         The mean perigee is looked at each day and at both ends.
         """
@@ -169,7 +169,7 @@ class Sgp4Orbit:
             )
 
     def _check_perigee(self, time_s: float) -> None:
-        """Raise `OrbitError` for a mean perigee that is too low at a time, and where SGP4 itself stops there."""
+        """Raises OrbitError for a mean perigee that is too low at a time, and where SGP4 itself stops there."""
         satellite = self._satellite
         days = (time_s + self.elements_age_s) / DAY_S + satellite.jdsatepochF
         error, _, _ = satellite.sgp4(satellite.jdsatepoch, days)
@@ -192,11 +192,6 @@ class Sgp4Orbit:
 
     def _where(self) -> str:
         return f"{self.elements.place} ({self.name})"
-
-
-def sgp4_orbit(elements: ElementSet, epoch: Epoch) -> Sgp4Orbit:
-    """The orbit of an element set for a mission that begins at `epoch`; raises `OrbitError` as `Sgp4Orbit` does."""
-    return Sgp4Orbit(elements, epoch)
 
 
 def _satellite(elements: ElementSet) -> Any:

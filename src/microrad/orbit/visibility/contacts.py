@@ -66,7 +66,7 @@ def coarse_step_s(orbit: Orbit, time_s: float) -> float:
     The perigee is that of the ellipse through the state at `time_s`: with the angular momentum h its radius is
     h^2 / (mu (1 + e)), and its rate h over that squared. Every low orbit has 60 s, so that samples can be shared.
 
-    Raises `OrbitError` for a state that falls straight to the Earth's centre.
+    Raises OrbitError for a state that falls straight to the Earth's centre.
     """
     position, velocity = (vector[:, 0] for vector in orbit.states(np.array([time_s])))
     with np.errstate(over="ignore", invalid="ignore"):  # of a state that is none
@@ -86,7 +86,7 @@ def coarse_step_s(orbit: Orbit, time_s: float) -> float:
 def coarse_times(span_s: Span, step_s: float) -> Floats:
     """Samples over the span, both ends among them, evenly, at most `step_s` apart and at least five.
 
-    Raises `OrbitError` for a span that does not end after its start, and for one of more than 5 million steps.
+    Raises OrbitError for a span that does not end after its start, and for one of more than 5 million steps.
     """
     start, end = span_s
     if not (math.isfinite(start) and math.isfinite(end) and start < end):
@@ -134,7 +134,7 @@ def contacts(first: Terminal, second: Terminal, earth: Earth, epoch: Epoch, span
         epoch: from which all times count.
         span_s: start and end of the search, s.
 
-    Raises `OrbitError` for two terminals of one name, a span that holds no time, two orbits that meet, a terminal below
+    Raises OrbitError for two terminals of one name, a span that holds no time, two orbits that meet, a terminal below
     the surface that the line of sight must clear, and what the orbits raise.
     """
     return contacts_with_each(first, (second,), earth, epoch, span_s)[0]
@@ -164,7 +164,7 @@ def contacts_with_each(
             left aside.
         furthest_m: largest range of a contact, m; infinite without a limit.
 
-    Raises `OrbitError` as `contacts`.
+    Raises OrbitError as `contacts`.
     """
     for relay in relays:
         if relay.name == satellite.name:
@@ -192,7 +192,7 @@ def contacts_with_each(
 def _clearance_rad(
     terminals: Sequence[Terminal], earth: Earth, time_s: Floats, row: Rows, first_m: Floats, second_m: Floats
 ) -> Floats:
-    """By how much the line from the first terminal to that of each row clears the Earth; raises `OrbitError`."""
+    """By how much the line from the first terminal to that of each row clears the Earth; raises OrbitError."""
     try:
         return earth.clearance_rad(first_m, second_m)
     except OrbitError:
@@ -255,7 +255,7 @@ def passes(orbit: Orbit, station: Station, epoch: Epoch, span_s: Span) -> tuple[
         epoch: from which all times count.
         span_s: start and end of the search, s.
 
-    Raises `OrbitError` for a span that holds no time, and what the orbit raises.
+    Raises OrbitError for a span that holds no time, and what the orbit raises.
     """
     step = coarse_step_s(orbit, span_s[0])
     time_s = coarse_times(span_s, step)
@@ -299,7 +299,7 @@ def coplanar_contact(radius_m: float, grazing_height_m: float) -> CoplanarContac
     the range goes from b - a to sqrt(a^2 - R^2) + sqrt(b^2 - R^2), where the line grazes the surface. Two bodies, no
     flattening: on the equator the oblate Earth hides what the sphere hides.
 
-    Raises `OrbitError` unless R < a < b.
+    Raises OrbitError unless R < a < b.
     """
     high, least = GEOSTATIONARY_RADIUS_M, EARTH_RADIUS_M + grazing_height_m
     if not (math.isfinite(radius_m) and 0.0 < least < radius_m < high):

@@ -35,7 +35,7 @@ def positive(function: Function, time_s: Floats) -> Intervals:
     Their ends are within `TOLERANCE_S`. A boundary at the first or last sample is that sample exactly. The samples
     have to be so dense that the function has at most one extremum between two; see `positive_rows`.
 
-    Raises `OrbitError` for fewer than three samples, samples that do not rise and values that are not finite.
+    Raises OrbitError for fewer than three samples, samples that do not rise and values that are not finite.
     """
     time_s = np.asarray(time_s, dtype=np.float64)
     return positive_rows(lambda time, _: function(time), time_s, np.asarray(function(time_s))[None, :])[0]
@@ -48,7 +48,7 @@ def positive_rows(function: RowFunction, time_s: Floats, values: Floats) -> tupl
     where a parabola through the three comes close to 0 (eight times its own height above the samples), the extremum is
     searched for and, on the other side of 0, split at. Events of `SHORTEST_S` and longer are found so.
 
-    Raises `OrbitError` as `positive`.
+    Raises OrbitError as `positive`.
     """
     if time_s.size < 3 or values.shape[1:] != time_s.shape:
         raise OrbitError(f"{values.shape} values at {time_s.size} times; give as many values as times, at least 3")

@@ -40,7 +40,7 @@ class Limits:
     Sun nothing is received, unless the Sun is behind the Earth. `in_eclipse` is whether the terminal works in the
     umbra.
 
-    Raises `OrbitError` for an unknown attitude, a boresight without direction, an angle or rate out of range, and a
+    Raises OrbitError for an unknown attitude, a boresight without direction, an angle or rate out of range, and a
     field of regard with the attitude "free", where the body turns and it means nothing.
     """
 
@@ -52,7 +52,7 @@ class Limits:
     in_eclipse: bool
 
     def __post_init__(self) -> None:
-        """Check the limits."""
+        """Raises OrbitError if a limit is out of range or means nothing."""
         if self.attitude not in get_args(Attitude):
             raise OrbitError(f"the attitude {self.attitude!r} is not known; write nadir, sun or free")
         size = math.hypot(*self.boresight)

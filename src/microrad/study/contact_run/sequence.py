@@ -52,23 +52,19 @@ def run_contact(
     Raises ValueError for a scan that the mission does not have, a data rate that is still to be solved for, and a
     geometry that gives no numbers.
     """
+    found = finding.way(settings.way)
+    if found is None:
+        raise ValueError(
+            'the mission has no table [acquisition.scan]: give it one, or run the contact by "wide beacon"'
+        )
     sampler = Sampler(data, scene.table, scene.loop, design.controller, contact, settings)
     log = Log(contact)
-    acquire = _Acquisitions(log, _way(finding, settings), settings.attempts, settings.seed)
+    acquire = _Acquisitions(log, found, settings.attempts, settings.seed)
     windows: list[Window] = []
     if _turn(log, settings) and acquire():
         windows = _data(log, acquire, sampler)
     log.finish()
     return ContactRun(contact, tuple(log.entries), tuple(windows))
-
-
-def _way(finding: Finding, settings: Settings) -> Found:
-    found = finding.wide if settings.way == "wide beacon" else finding.scan
-    if found is None:
-        raise ValueError(
-            'the mission has no table [acquisition.scan]: give it one, or run the contact by "wide beacon"'
-        )
-    return found
 
 
 class Log:
