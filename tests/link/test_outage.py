@@ -48,7 +48,7 @@ def jittery(bias_urad, rms_urad, bandwidth_hz=40):
 def under(folder, *changes):
     """The link under the jitter that the changes give, and its mission."""
     mission = link_file(folder, {"acquisition": None}, *changes).mission
-    return link_performance.of_jitter(link.of(mission)), mission
+    return link_performance.performance_under_jitter(link.of(mission)), mission
 
 
 def record(bias_urad, rms_urad):

@@ -19,7 +19,7 @@ from microrad.link.pointing.outage import (
     Performance,
     error_rad,
     margin_db,
-    of_jitter,
+    performance_under_jitter,
     required_error_rad,
     stated_outage,
 )
@@ -206,7 +206,7 @@ def run_link_study(file: LinkFile, parts: kept.Kept = kept.NOTHING) -> LinkStudy
         receiver_noise=noise,
         largest_rate_bit_s=largest_rate(data),
         tornados=tornados(m, sources, budgets),
-        under_jitter=of_jitter(data),
+        under_jitter=performance_under_jitter(data),
         tracking=light,
         point_ahead=point_ahead(data),
         beam_radius=beam_radius(data),

@@ -13,6 +13,7 @@ from microrad.link.acquisition.checks import (
     require_angle,
     require_inside,
     require_not_negative,
+    require_overlap,
     require_positive,
     require_probability,
 )
@@ -36,10 +37,7 @@ class Search:
     def __post_init__(self) -> None:
         """Raises ValueError if an angle, the overlap or the coverage is out of its range."""
         require_angle("the beam's radius", self.beam_radius_rad)
-        if not 0.0 <= self.overlap < 1.0:
-            raise ValueError(
-                f"the overlap is {self.overlap:g}: it must be 0 or more and below 1, a share of a diameter"
-            )
+        require_overlap(self.overlap)
         require_positive("the standard deviation of the pointing error", self.sigma_rad, "rad")
         require_inside("the coverage probability", self.coverage)
         require_angle("the radius that covers the pointing error", self.radius_rad)
@@ -128,21 +126,6 @@ class Spiral:
         end = np.where(near[:, None], last * slots[1:], end)
         return np.minimum(start, self.duration_s), np.minimum(end, self.duration_s)
 
-    def crossings(self, x_rad: float, y_rad: float) -> tuple[Floats, Floats]:
-        """Middle time and duration of each crossing of the beam over a target, in the order they come.
-
-        Each turn counts as a circle whose radius is that of the track at the target's azimuth; a target within a
-        beam's radius of the middle sees the first turns as one crossing, which are several here.
-        """
-        pitch, beam = self.search.pitch_rad, self.search.beam_radius_rad
-        radius, azimuth = math.hypot(x_rad, y_rad), math.atan2(y_rad, x_rad) % (2.0 * math.pi)
-        last = int(self.search.radius_rad / pitch - azimuth / (2.0 * math.pi))
-        track = pitch * (azimuth / (2.0 * math.pi) + np.arange(last + 1))
-        track = track[np.abs(track - radius) < beam]
-        product = np.maximum(2.0 * track * radius, 1e-300)
-        half_turn = np.arccos(np.clip((track**2 + radius**2 - beam**2) / product, -1.0, 1.0))
-        return self.time_at(track), 2.0 * track * half_turn / self.speed_rad_s
-
 
 @dataclass(frozen=True, slots=True)
 class Raster:
@@ -199,18 +182,6 @@ class Raster:
         low = np.clip((along - reach_rad) / self.speed_rad_s, 0.0, self.row_time_s)
         high = np.clip((along + reach_rad) / self.speed_rad_s, 0.0, self.row_time_s)
         return begin + low, begin + high
-
-    def crossings(self, x_rad: float, y_rad: float) -> tuple[Floats, Floats]:
-        """Middle time and duration of each crossing of the beam over a target, in the order they come."""
-        beam, radius = self.search.beam_radius_rad, self.search.radius_rad
-        row = np.flatnonzero(np.abs(self.row_rad - y_rad) < beam)
-        half = np.sqrt(beam**2 - (self.row_rad[row] - y_rad) ** 2)
-        along = np.where(row % 2 == 0, x_rad, -x_rad)
-        low, high = np.maximum(along - half, -radius), np.minimum(along + half, radius)
-        begin = row * (self.row_time_s + self.turn_around_s)
-        seen = high > low
-        middle = begin + ((low + high) / 2.0 + radius) / self.speed_rad_s
-        return middle[seen], ((high - low) / self.speed_rad_s)[seen]
 
 
 @dataclass(frozen=True, slots=True)
@@ -286,13 +257,6 @@ class StepStare:
         end = np.where(number < self.dwells, start + self.dwell_s, self.duration_s)
         return np.minimum(start, self.duration_s), end
 
-    def crossings(self, x_rad: float, y_rad: float) -> tuple[Floats, Floats]:
-        """Middle time and duration of each dwell that sees a target, in the order they come."""
-        away = np.hypot(*(self.centres_rad - (x_rad, y_rad)).T)
-        seen = np.flatnonzero(away < self.search.beam_radius_rad)
-        middle = np.asarray(seen * (self.dwell_s + self.settle_s) + self.dwell_s / 2.0, dtype=np.float64)
-        return middle, np.full(seen.size, self.dwell_s)
-
 
 Scan = Spiral | Raster | StepStare
 
@@ -306,21 +270,6 @@ def highest_speed(search: Search, detection_time_s: float) -> float:
     require_positive("the detection time", detection_time_s, "s")
     chord = 2.0 * search.beam_radius_rad * math.sqrt(1.0 - (1.0 - search.overlap) ** 2)
     return chord / detection_time_s
-
-
-def dwells_along_track(search: Search, step_rad: float) -> int:
-    """Beam positions a step apart along tracks a pitch apart, pi R^2 / (pitch step), rounded down.
-
-    It is no count of independent looks: neighbouring positions see the same target.
-    """
-    require_angle("the step along the track", step_rad)
-    return int(math.pi * search.radius_rad**2 / (search.pitch_rad * step_rad))
-
-
-def scan_detection_probability(scan: Scan, x_rad: float, y_rad: float) -> float:
-    """Probability that one scan without vibration detects a target at this place: 1 - prod(1 - p) over crossings."""
-    _, duration = scan.crossings(x_rad, y_rad)
-    return float(1.0 - np.prod(1.0 - scan.detector.crossing_probability(duration)))
 
 
 def _require_speed(search: Search, detector: Detector, speed_rad_s: float) -> None:

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from microrad.core.arrays import Floats
-from microrad.link.acquisition.checks import require_angle, require_not_negative, require_positive
+from microrad.link.acquisition.checks import require_angle, require_not_negative, require_overlap, require_positive
 from microrad.link.acquisition.detection import detection_times
 from microrad.link.acquisition.scan import Detector, Search, Spiral, highest_speed
 
@@ -62,10 +62,7 @@ class Beams:
         require_positive("the range", self.range_m, "m")
         require_angle("the narrow beam's half angle", self.narrow_half_angle_rad)
         require_angle("the beam's radius", self.beam_radius_rad)
-        if not 0.0 <= self.overlap < 1.0:
-            raise ValueError(
-                f"the overlap is {self.overlap:g}: it must be 0 or more and below 1, a share of a diameter"
-            )
+        require_overlap(self.overlap)
 
     @property
     def edge_irradiance_w_m2(self) -> float:

@@ -1,6 +1,7 @@
 """From the tables of a mission to the physics of its links: beams, receivers, losses by convention."""
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -136,55 +137,37 @@ def _receiver(terminals: Terminals, link: Communication) -> receivers.Receiver |
         "code_gain_db": table.code_gain_db,
         "code_rate": table.code_rate,
     }
-    if table.detector == "homodyne":
-        per_mode = _per_mode(link)
-        return receivers.BpskHomodyne(
-            **common, quantum_efficiency=table.efficiency or 1.0, background_photons_per_mode=per_mode
-        )
-    if table.detector == "preamplified":
-        return _preamplified(table, common, _per_mode(link))
-    background_w = _background_w(terminals, link, table)
-    if table.detector == "photon-counting":
-        return _counting(table, common, background_w)
-    return _photodiode(table, common, background_w)
-
-
-def _extinction(table: ReceiverTable) -> float:
-    return math.inf if table.extinction_ratio_db is None else float(10.0 ** (table.extinction_ratio_db / 10.0))
-
-
-def _preamplified(table: ReceiverTable, common: dict[str, Any], per_mode: float) -> receivers.Receiver:
-    amplified: dict[str, Any] = {"noise_figure_db": table.noise_figure_db, "background_photons_per_mode": per_mode}
-    if table.modulation == "dpsk":
-        return receivers.DpskPreamplified(**common, **amplified)
-    filtered: dict[str, Any] = {"gain_db": table.amplifier_gain_db, "optical_bandwidth_hz": table.optical_bandwidth_hz}
-    return receivers.OokPreamplified(**common, **amplified, **filtered, extinction_ratio=_extinction(table))
-
-
-def _counting(table: ReceiverTable, common: dict[str, Any], background_w: float) -> receivers.Receiver:
-    counting: dict[str, Any] = {
-        "detection_efficiency": table.efficiency,
-        "dark_count_rate_hz": table.dark_count_rate_1_s,
-        "background_power_w": background_w,
-    }
-    if table.modulation == "ppm":
-        return receivers.PpmCounting(**common, **counting, order=table.order or 2)
-    return receivers.OokCounting(**common, **counting, extinction_ratio=_extinction(table))
-
-
-def _photodiode(table: ReceiverTable, common: dict[str, Any], background_w: float) -> receivers.Receiver:
-    diode: dict[str, Any] = {
+    extinction = math.inf if table.extinction_ratio_db is None else float(10.0 ** (table.extinction_ratio_db / 10.0))
+    diode = {
         "quantum_efficiency": table.efficiency,
         "thermal_noise_a_sqrt_hz": table.thermal_noise_a_sqrt_hz,
         "dark_current_a": table.dark_current_a,
-        "background_power_w": background_w,
-        "extinction_ratio": _extinction(table),
+        "extinction_ratio": extinction,
     }
-    if table.detector == "pin":
-        return receivers.OokPin(**common, **diode)
-    return receivers.OokApd(
-        **common, **diode, gain=table.avalanche_gain or 1.0, ionisation_ratio=table.ionisation_ratio or 0.0
-    )
+    counter = {"detection_efficiency": table.efficiency, "dark_count_rate_hz": table.dark_count_rate_1_s}
+    filtered = {"gain_db": table.amplifier_gain_db, "optical_bandwidth_hz": table.optical_bandwidth_hz}
+    avalanche = {"gain": table.avalanche_gain or 1.0, "ionisation_ratio": table.ionisation_ratio or 0.0}
+    kind: Callable[..., receivers.Receiver]
+    own: dict[str, Any]
+    match table.detector, table.modulation:
+        case "homodyne", _:
+            kind, own = receivers.BpskHomodyne, {"quantum_efficiency": table.efficiency or 1.0}
+        case "preamplified", "dpsk":
+            kind, own = receivers.DpskPreamplified, {"noise_figure_db": table.noise_figure_db}
+        case "preamplified", _:
+            kind, own = receivers.OokPreamplified, {"noise_figure_db": table.noise_figure_db, **filtered}
+            own["extinction_ratio"] = extinction
+        case "photon-counting", "ppm":
+            kind, own = receivers.PpmCounting, {**counter, "order": table.order or 2}
+        case "photon-counting", _:
+            kind, own = receivers.OokCounting, {**counter, "extinction_ratio": extinction}
+        case "pin", _:
+            kind, own = receivers.OokPin, diode
+        case _:
+            kind, own = receivers.OokApd, {**diode, **avalanche}
+    if table.detector in ("homodyne", "preamplified"):
+        return kind(**common, **own, background_photons_per_mode=_per_mode(link))
+    return kind(**common, **own, background_power_w=_background_w(terminals, link, table))
 
 
 def _per_mode(link: Communication) -> float:

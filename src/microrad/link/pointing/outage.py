@@ -167,7 +167,7 @@ class Performance:
     fade_warning: str
 
 
-def of_jitter(data: link.DataLink) -> Performance | None:
+def performance_under_jitter(data: link.DataLink) -> Performance | None:
     """The link under the mission's own jitter, or None where it gives none."""
     if data.jitter is None:
         return None
@@ -246,7 +246,9 @@ def performance(
         outage=under.short_of(0.0),
         short=under.short_of(q.margin_db),
         data_rate_bit_s=_rate(data, under.outage_loss_db),
-        best=_best(spread, kept, half, ahead),
+        best=pointing.best_divergence_for_static_error(
+            spread.quantile_rad(kept) + ahead, smallest_half_angle_rad=half, current_half_angle_rad=half
+        ),
         uncoded_penalty_db=_uncoded(data, shifted, half),
         fades_per_s=fades_per_s,
         fade_s=fade_s,
@@ -273,15 +275,6 @@ def _mean_loss_db(spread: Spread, loss_db: Floats) -> float:
     share, loss = spread.share[there], loss_db[there]
     least = float(np.min(loss))
     return least - 10.0 * math.log10(float(np.sum(share * 10.0 ** ((least - loss) / 10.0))))
-
-
-def _best(spread: Spread, probability: float, half_angle_rad: float, ahead_rad: float) -> pointing.BestDivergence:
-    """The best half angle that the present optics give: none narrower than theirs."""
-    return pointing.best_divergence_for_static_error(
-        spread.quantile_rad(probability) + ahead_rad,
-        smallest_half_angle_rad=half_angle_rad,
-        current_half_angle_rad=half_angle_rad,
-    )
 
 
 def _rate(data: link.DataLink, loss_db: float) -> float:
