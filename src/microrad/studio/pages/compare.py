@@ -12,7 +12,7 @@ from nicegui import ui
 from microrad.mission import presets
 from microrad.studio import commands
 from microrad.studio.draft.draft import Draft
-from microrad.studio.pages import layout, pieces
+from microrad.studio.pages import layout
 from microrad.studio.pages.in_thread import in_thread
 from microrad.studio.session import Session
 from microrad.studio.views import compare as compare_view
@@ -102,7 +102,7 @@ class _Page:
         if not draft.path.exists():
             layout.refuse(f"{self.session.name_of(draft.path)} is not a file of this folder yet; save it there first.")
             return None
-        return commands.Budget(Path(self.session.name_of(draft.path)) if other else pieces.file_of(self.session))
+        return commands.Budget(Path(self.session.name_of(draft.path)) if other else layout.file_of(self.session))
 
     # ------------------------------------------------------------------------------------------------------- the tables
     def _look(self) -> None:

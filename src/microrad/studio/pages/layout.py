@@ -6,6 +6,7 @@ import json
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from importlib import resources
+from pathlib import Path
 from typing import Any
 
 from nicegui import ui
@@ -126,6 +127,13 @@ def words(tag: str, text: str = "") -> TextElement:
 def heading(text: str, level: int = 2) -> TextElement:
     """A heading of the page's outline: 1 is the page's own, and there already."""
     return words(f"h{level}", text)
+
+
+def file_of(session: Session) -> Path:
+    """The mission's file, seen from the working folder, for a command to be copied; says so where it is not saved."""
+    if session.draft.changed:
+        ui.notify("The command reads the file: save the mission first, for the same numbers.", type="warning")
+    return Path(session.name_of(session.draft.path))
 
 
 def copy_buttons(action: Callable[[], Action | None]) -> None:

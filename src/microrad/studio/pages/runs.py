@@ -10,7 +10,7 @@ from nicegui import ui
 
 from microrad.studio import commands
 from microrad.studio.guard.names import NameRefusedError, safe_name, typed_words
-from microrad.studio.pages import layout, pieces
+from microrad.studio.pages import layout
 from microrad.studio.pages.in_thread import in_thread
 from microrad.studio.pages.runs_jobs import JobList, submit
 from microrad.studio.session import Session
@@ -69,7 +69,7 @@ class _Study:
 
     def _copied(self) -> commands.Run | None:
         action = self._action()
-        return None if action is None else replace(action, file=pieces.file_of(self.session))
+        return None if action is None else replace(action, file=layout.file_of(self.session))
 
     def _action(self) -> commands.Run | None:
         try:
