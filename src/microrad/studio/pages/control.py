@@ -10,7 +10,7 @@ from nicegui import background_tasks, ui
 
 from microrad.mission.file import MissionFile
 from microrad.mission.tables.fine_pointing import FinePointing
-from microrad.studio.commands import Design
+from microrad.studio import commands
 from microrad.studio.pages import layout
 from microrad.studio.pages.elements import Figure, numbers
 from microrad.studio.pages.in_thread import in_thread, stay
@@ -57,7 +57,7 @@ class ControlPage:
         self.question, self.round, self.filling = 0, 0, False
         self.rows: dict[str, dict[str, Any]] = {}
         self.plots: dict[str, Any] = {}
-        layout.copy_buttons(lambda: Design(Path(session.name_of(session.draft.path))))
+        layout.copy_buttons(lambda: commands.design(Path(session.name_of(session.draft.path))))
         self.words = ui.label().classes("no kept").props('role="alert"')
         self._all()
         self._one()

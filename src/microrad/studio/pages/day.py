@@ -8,7 +8,7 @@ from typing import NamedTuple
 from nicegui import ui
 
 from microrad.orbit.day import DayStudy
-from microrad.studio.commands import Contacts
+from microrad.studio import commands
 from microrad.studio.pages import layout
 from microrad.studio.pages.elements import Column, Figure, columns, table
 from microrad.studio.pages.in_thread import in_thread
@@ -52,7 +52,7 @@ class DayPage:
         """Build the body, and have it follow the session."""
         self.session, self.shown = session, ""
         self.latest: Latest[DayStudy] = shared(session, "day")
-        layout.copy_buttons(lambda: Contacts(layout.file_of(session)))
+        layout.copy_buttons(lambda: commands.contacts(layout.file_of(session)))
         self._progress()
         with ui.column().classes("w-full") as self.results:
             self._results()

@@ -16,7 +16,7 @@ from nicegui.element import Element
 from microrad.studio.pages import layout
 from microrad.studio.pages.in_thread import stay
 from microrad.studio.views.link import Margin
-from microrad.studio.views.plots import Plot
+from microrad.studio.views.plots import Plot, empty
 
 _DRAWN_S = 5.0
 """For how long a browser may draw before it is asked for more."""
@@ -29,7 +29,7 @@ class Figure(Element, component="figure.js"):
         """Build it in the present container."""
         super().__init__()
         self.classes("w-full js-plotly-plot").props["role"] = "figure"
-        self.props["aria-label"], self.props["begin"] = label, begin
+        self.props["aria-label"], self.props["begin"] = label, begin or empty("")
 
     def show(self, figure: Plot) -> None:
         """Have a figure drawn."""

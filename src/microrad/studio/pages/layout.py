@@ -12,7 +12,7 @@ from typing import Any
 from nicegui import ui
 from nicegui.elements.mixins.text_element import TextElement
 
-from microrad.studio.commands import Action, command
+from microrad.studio.commands import Action
 from microrad.studio.draft.draft import Draft, OnDisk
 from microrad.studio.session import Session
 
@@ -147,7 +147,7 @@ async def _copy(action: Action | None, python: bool) -> None:
     """Say "Copied" once the browser has done it: a page that is not from this machine may not, nor an idle tab."""
     if action is None:
         return
-    text = action.python if python else command(action)
+    text = action.python if python else action.command
     refused = await ui.run_javascript(_COPY.replace("TEXT", json.dumps(text)), timeout=COPY_S)
     if refused:
         ui.notify(f"Not copied, {refused}: {text}", type="negative", multi_line=True)

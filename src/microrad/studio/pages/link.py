@@ -12,7 +12,7 @@ from microrad.core.progress import Progress
 from microrad.link import study as link_study
 from microrad.link.study import LinkStudy
 from microrad.mission.file import LinkFile
-from microrad.studio.commands import Budget
+from microrad.studio import commands
 from microrad.studio.draft.draft import Draft
 from microrad.studio.pages import layout
 from microrad.studio.pages.elements import Column, Figure, MarginCards, table
@@ -50,7 +50,7 @@ class LinkPage(SliderPage[LinkView]):
         self.study: Latest[LinkStudy] = shared(session, "links")
         self.shown, self.rested = "", ("", 0.0)
         self.slow: dict[str, list[link_view.Row]] = {}
-        layout.copy_buttons(lambda: Budget(layout.file_of(session)))
+        layout.copy_buttons(lambda: commands.budget(layout.file_of(session)))
         super().__init__(session, link_view.second)
         ui.timer(_LOOK_S, self._look)
 

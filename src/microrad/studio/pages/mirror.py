@@ -11,7 +11,7 @@ from typing import Any
 from nicegui import ui
 
 from microrad.lab.recording import ACCEPTABLE
-from microrad.studio.commands import Identify
+from microrad.studio.commands import Action
 from microrad.studio.jobs.queue import JobError
 from microrad.studio.pages import layout
 from microrad.studio.pages.drop import Drop
@@ -258,7 +258,7 @@ class MirrorPage:
         self.fields["lever_arm"].enabled = setting.output_unit in mirror_form.LENGTHS
         self.filling = False
 
-    def action(self) -> Identify | None:
+    def action(self) -> Action | None:
         """The identification that the form asks for; None where it says why there is none."""
         self.words.text = ""
         try:

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from nicegui import background_tasks, ui
 
 from microrad.mission.file import LinkFile
-from microrad.studio.commands import Budget
+from microrad.studio import commands
 from microrad.studio.draft.draft import Draft
 from microrad.studio.pages import layout
 from microrad.studio.pages.elements import Column, Figure, table
@@ -49,7 +49,7 @@ class PointingPage(SliderPage[PointingView]):
 
     def __init__(self, session: Session) -> None:
         """Build the body, and have it follow the session."""
-        layout.copy_buttons(lambda: Budget(layout.file_of(session)))
+        layout.copy_buttons(lambda: commands.budget(layout.file_of(session)))
         super().__init__(session)
 
     def build(self) -> None:

@@ -188,8 +188,8 @@ def jitter_plot(answers: Answers) -> Plot:
 
 def motion_plot(answers: Answers) -> Plot:
     """What the mirror has to follow on axis x, and what it does: the closed loop's trace."""
-    shaken = [c for c in answers.jitter.values() if c.disturbance_rad is not None][:1]
-    followed = [Line(_s(c), 1e6 * c.disturbance_rad[:, 0], GREY, "-", 3.0, "to be followed") for c in shaken]
+    shaken = [(_s(c), c.disturbance_rad) for c in answers.jitter.values() if c.disturbance_rad is not None]
+    followed = [Line(time_s, 1e6 * angle[:, 0], GREY, "-", 3.0, "to be followed") for time_s, angle in shaken[:1]]
     return _over_time(SECONDS, "angle, axis x (µrad)", *followed, *_lines(answers.jitter, _s, _found))
 
 

@@ -173,11 +173,19 @@ def second(key: str) -> bool:
 def map_plot(v: LinkView) -> Plot:
     """The margin map with its contours and the working point, over data rate and pointing error."""
     rate_mbit, urad = v.frame.data_rate_bit_s * 1e-6, v.frame.pointing_error_rad * 1e6
+    margin_db: Floats = np.round(np.clip(v.margin_db.T, -999.0, 999.0), 2).astype(np.float64)
     here = np.array([v.data.table.data_rate_bit_s * 1e-6]), np.array([error_rad(v.data) * 1e6])
     made = plot(
         Axis("data rate (Mbit/s)", log=True, low=rate_mbit[0], high=rate_mbit[-1], grid=False),
         Axis("pointing error (µrad)", low=0.0, high=urad[-1], grid=False),
-        Field(rate_mbit, urad, np.round(np.clip(v.margin_db.T, -999.0, 999.0), 2), *LEVELS_DB, "margin (dB)", ticks=_TICKS_DB),
+        Field(
+            rate_mbit,
+            urad,
+            margin_db,
+            *LEVELS_DB,
+            "margin (dB)",
+            ticks=_TICKS_DB,
+        ),
         *(_contour(level, rates * 1e-6, urad, v.data.requirement.margin_db) for level, rates in v.contours.items()),
         Line(*here, VERMILION, "", name="working point", marker="o", size=10.0, edge=WHITE, edge_width=1.5),
         height=4.5,

@@ -178,7 +178,7 @@ def lines_plot(v: PointingView) -> Plot:
     if not math.isnan(v.half_angle_rad):
         name = f"beacon's half angle: {quantity(v.half_angle_rad, 'rad')}"
         marks.append(Rule(v.half_angle_rad * 1e6, True, VERMILION, "--", 1.5, name))
-    names = rows([short(each.name, 40) for each in (*v.budget.lines, *totals)])
+    names = rows([short(name, 40) for name in (*(e.name for e in lines), *(e.name for e in totals))])
     return plot(Axis("angle (µrad)", low=0.0), names, *marks, height=1.0 + 0.27 * len(errors))
 
 
