@@ -33,12 +33,15 @@ export default {
       }
       await nextFrame();
     },
-    // A legend that needs more lines in a narrow place makes the figure higher, not its data smaller.
+    // A legend that needs more lines in a narrow place makes the figure higher, not its data smaller. A higher figure may
+    // have more of its legend shown, so this takes a few steps.
     async keepRows(Plotly) {
-      const missing = this.rows ? Math.round(this.rows - this.$el._fullLayout._size.h) : 0;
-      if (Math.abs(missing) < 8) return;
-      this.$el.style.height = `${this.$el.clientHeight + missing}px`;
-      await Plotly.Plots.resize(this.$el);
+      for (let step = 0; step < 4; step++) {
+        const missing = this.rows ? Math.round(this.rows - this.$el._fullLayout._size.h) : 0;
+        if (Math.abs(missing) < 8 || !this.$el.clientHeight) return;
+        this.$el.style.height = `${this.$el.clientHeight + missing}px`;
+        await Plotly.Plots.resize(this.$el);
+      }
     },
   },
 };

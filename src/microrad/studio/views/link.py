@@ -192,6 +192,7 @@ def map_plot(v: LinkView) -> Plot:
     )
     made["data"][0]["zsmooth"] = "best"
     made["layout"]["uirevision"] = "map"  # what is zoomed into stays while a slider moves
+    made["layout"]["yaxis"]["automargin"] = False  # measuring the margins anew takes as long as drawing
     return made
 
 

@@ -27,7 +27,7 @@ _WHITE = {"paper_bgcolor": "white", "plot_bgcolor": "white"}
 def plot(x: Axis, y: Axis, *marks: Mark, height: float = 3.6) -> Plot:
     """Marks on one pair of axes as a figure; `height` is that of the sheet in inches."""
     sheet, (panel,) = grid(WIDTH, height)
-    panel.x, panel.y, panel.legend = x, y, Legend("above")
+    panel.x, panel.y, sheet.legend = x, y, Legend("above")
     panel.add(*marks)
     return figure(sheet)
 
@@ -56,9 +56,11 @@ def figure(sheet: Sheet) -> Plot:
         x0, y0, x1, y1 = panel["inner"]
         layout[panel["x"]]["domain"] = [(x0 - left) / (right - left), (x1 - left) / (right - left)]
         layout[panel["y"]]["domain"] = [(bottom - y1) / (bottom - top), (bottom - y0) / (bottom - top)]
+        layout[panel["y"]]["automargin"] = True
     around = [max(abs(p["outer"][k] - p["inner"][k]) for p in panels) for k in range(4)]
     layout |= {**_WHITE, "margin": dict(zip("ltrb", around, strict=True)), "legend": _LEGEND, "showlegend": True}
-    layout["height"] = round(bottom - top + around[1] + around[3] + _KEYS_PX * bool(made["keys"]))
+    rows_px = round(bottom - top)  # which the page keeps free for the data, however long the legend is
+    layout["height"] = round(rows_px + around[1] + around[3] + _KEYS_PX * bool(made["keys"]))
     for trace in data:
         trace["showlegend"] = False
     for entry in (entry for key in made["keys"] for entry in key["entries"]):
@@ -68,4 +70,4 @@ def figure(sheet: Sheet) -> Plot:
             data += named
         for place, each in enumerate(named):
             each |= {"name": words(entry["label"]), "legendgroup": words(entry["label"]), "showlegend": not place}
-    return {"data": data, "layout": layout, "config": CONFIG}
+    return {"data": data, "layout": layout, "config": CONFIG, "rows": rows_px}
