@@ -24,7 +24,7 @@ from microrad.lab.identify import (
 )
 from microrad.lab.identify.hysteresis.bouc_wen import _bound_gradient
 from microrad.lab.identify.records import colour_inflation, fastest_rate, prepare, transient
-from microrad.lab.identify.selection.choice import _best
+from microrad.lab.identify.selection.choice import choose_best
 from microrad.lab.recording import read_recording, recording_from_arrays
 from microrad.mission.file import load_mirror
 from places import DATA
@@ -506,9 +506,9 @@ def test_a_tie_goes_to_the_admissible_model(fit_100hz, extra, best):
     noise, other = philox(1).standard_normal((2, 1000))
     good, near, bad = [noise], [noise + extra * other], [noise + 2 * other]
     assert np.sum(good[0] ** 2) < np.sum(near[0] ** 2)
-    assert _best([fit_100hz, admissible, admissible], [good, near, bad]) == best
-    assert _best([admissible, fit_100hz, admissible], [good, near, bad]) == 0
-    assert _best([fit_100hz, fit_100hz], [near, good]) == 1
+    assert choose_best([fit_100hz, admissible, admissible], [good, near, bad]) == best
+    assert choose_best([admissible, fit_100hz, admissible], [good, near, bad]) == 0
+    assert choose_best([fit_100hz, fit_100hz], [near, good]) == 1
 
 
 def test_progress_of_the_whole():

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from microrad.core.arrays import Floats
 
 if TYPE_CHECKING:
-    from microrad.lab.identify.selection.predictions import Judged, Prediction
+    from microrad.lab.identify.selection.predictions import Prediction, ScoredModel
     from microrad.lab.recording import Recording
 
 FITS = "fits"
@@ -54,7 +54,7 @@ class LiveFit:
     loops: tuple[Loop, ...]
 
 
-def looker_on(progress: str | None) -> Callable[[Judged], None]:
+def looker_on(progress: str | None) -> Callable[[ScoredModel], None]:
     """What `identify` gives its models to: a file beside that of the progress, or nothing where there is none.
 
     A disk that is full costs the picture, not the identification.
@@ -63,7 +63,7 @@ def looker_on(progress: str | None) -> Callable[[Judged], None]:
         return lambda judged: None
     path = Path(progress).with_name(FITS)
 
-    def write(judged: Judged) -> None:
+    def write(judged: ScoredModel) -> None:
         line = json.dumps(asdict(thinned(judged)), allow_nan=False)
         with suppress(OSError), path.open("a", encoding="ascii") as file:
             file.write(f"{line}\n")
@@ -71,7 +71,7 @@ def looker_on(progress: str | None) -> Callable[[Judged], None]:
     return write
 
 
-def thinned(judged: Judged) -> LiveFit:
+def thinned(judged: ScoredModel) -> LiveFit:
     """A model with its curves, thinned for drawing."""
     pairs = zip(judged.recordings[:_LOOPS], judged.predictions[:_LOOPS], strict=True)
     loops = tuple(_loop(recording, prediction) for recording, prediction in pairs)

@@ -20,7 +20,7 @@ from microrad.lab.identify.hysteresis.structures import LinearPoles, propagated
 from microrad.lab.identify.records import IdentificationError, centred, correlation, prepare
 from microrad.lab.identify.selection.choice import Identification
 from microrad.lab.identify.selection.predictions import Fit
-from microrad.lab.identify.selection.warnings import falling, fit_warnings
+from microrad.lab.identify.selection.warnings import fit_warnings
 from microrad.mirror.hysteresis import BoucWen, Play, scaled, slow_gain
 
 _LOST = 100.0  # relative standard error of a value that is as good as held
@@ -87,8 +87,7 @@ def _header(identification: Identification, fit: Fit, model: str) -> list[str]:
     of_chosen = fit_warnings(identification.fit())
     general = [warning for warning in identification.warnings if warning not in of_chosen]
     lines += [f"Warning: {warning}" for warning in (*general, *fit_warnings(fit))]
-    if not isinstance(fit, PrandtlIshlinskiiFit):
-        lines += [f"Not identified: {parameter}, {why}" for parameter, why in fit.not_identified]
+    lines += [f"Not identified: {parameter}, {why}" for parameter, why in fit.not_identified]
     return [f"# {_one_line(text)}" for text in lines]
 
 
@@ -116,7 +115,7 @@ def _tables(fit: Fit, identification: Identification, source: str) -> list[str]:
 
 # ----------------------------------------------------------------------------------------------------- joint models
 def _joint(fit: JointFit, identification: Identification, source: str) -> list[str]:
-    turned = -1.0 if falling(fit) else 1.0
+    turned = -1.0 if fit.falling else 1.0
     if isinstance(fit.model, BoucWen):
 
         def values(at: Floats) -> Floats:
@@ -166,7 +165,7 @@ def _bouc_wen_numbers(m: BoucWen | Play) -> Floats:
 
 def _upright(fit: Fit, model: BoucWen | Play) -> BoucWen | Play:
     """The model with its output counted as the mirror file counts it: rising with the drive."""
-    if not falling(fit):
+    if not fit.falling:
         return model
     return turned_over(model) if isinstance(model, BoucWen) else scaled(model, -1.0)
 
@@ -239,7 +238,7 @@ def _uncertainty(fit: Fit, identification: Identification, source: str) -> list[
     if isinstance(fit, JointFit):
         numbers, covariance = _joint_covariance(fit)
     elif isinstance(fit, BoucWenFit):
-        signs = np.array([-1.0, 1.0, -1.0, 1.0, 1.0, -1.0]) if falling(fit) else np.ones(6)
+        signs = np.array([-1.0, 1.0, -1.0, 1.0, 1.0, -1.0]) if fit.falling else np.ones(6)
         numbers = dict(zip([f"bouc_wen.{key}" for key in PARAMETERS], (signs * fit.values).tolist(), strict=True))
         covariance = signs[:, None] * fit.covariance * signs
     else:
@@ -287,7 +286,7 @@ def _numbers(fit: JointFit, at: Floats) -> dict[str, float]:
         found |= {f"prandtl_ishlinskii.weights.{i}": w for i, w in enumerate(model.weights_rad_v, 1)}
         found["prandtl_ishlinskii.widening"] = model.widening_s
     if axis.creep.weights_rad_v:
-        found["creep.weights"] = (-1.0 if falling(fit) else 1.0) * axis.creep.weights_rad_v[0]
+        found["creep.weights"] = (-1.0 if fit.falling else 1.0) * axis.creep.weights_rad_v[0]
     if axis.linear is not None:
         for kind, roots in (("pole", axis.linear.poles), ("zero", axis.linear.zeros)):
             found |= {f"linear.{kind}s.{i}": f for i, f in enumerate(roots.frequencies_hz, 1)}

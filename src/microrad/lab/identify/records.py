@@ -10,8 +10,8 @@ from microrad.core.arrays import Floats
 from microrad.lab.recording import Recording
 
 
-def unheard(done: int, total: int, what: str) -> None:
-    """The progress that nobody listens to."""
+def no_progress(done: int, total: int, what: str) -> None:
+    """What is called with the progress where nobody asked for it."""
 
 
 _VOLTS = {"V": 1.0, "mV": 1e-3}

@@ -10,7 +10,12 @@ from microrad.core.arrays import Floats
 from microrad.lab.recording.checks.sample_rate import agreed_rate, check_rate, rate_of_time
 from microrad.lab.recording.checks.signals import check_signals
 from microrad.lab.recording.files import check_file, file_format
+from microrad.lab.recording.formats.lvm import LvmSource
+from microrad.lab.recording.formats.matlab import MatlabSource
+from microrad.lab.recording.formats.numpy_files import NumpySource
 from microrad.lab.recording.formats.source import SECONDS, Source, StatedRate, time_unit
+from microrad.lab.recording.formats.tdms import TdmsSource
+from microrad.lab.recording.formats.text import TextSource
 from microrad.lab.recording.records import (
     ACCEPTABLE,
     MIN_SAMPLES,
@@ -163,32 +168,16 @@ def multisine_recordings(
 
 # ---------------------------------------------------------------------------------------------------------- opening
 def open_source(path: Path) -> Source:
-    """The file as named channels; libraries are imported only for the format at hand."""
-    # One import per format: each pulls a library that the others do not need.
+    """The file as named channels. Raises RecordingError for a file of no known format, or a damaged one."""
     kind = file_format(path)
-    if kind == "tdms":
-        from microrad.lab.recording.formats.tdms import TdmsSource
-
-        return TdmsSource(path)
-    if kind == "lvm":
-        from microrad.lab.recording.formats.lvm import LvmSource
-
-        return LvmSource(path)
-    if kind == "mat":
-        from microrad.lab.recording.formats.matlab import MatlabSource
-
-        return MatlabSource(path)
     if kind in ("hdf5", "mat73"):
         from microrad.lab.recording.formats.hdf5 import Hdf5Source
 
         return Hdf5Source(path, matlab=kind == "mat73")
     if kind in ("npy", "npz"):
-        from microrad.lab.recording.formats.numpy_files import NumpySource
-
         return NumpySource(path, archive=kind == "npz")
-    from microrad.lab.recording.formats.text import TextSource
-
-    return TextSource(path)
+    sources = {"tdms": TdmsSource, "lvm": LvmSource, "mat": MatlabSource, "text": TextSource}
+    return sources[kind](path)
 
 
 def _columns(source: Source, wanted: Column | Sequence[Column], role: str) -> list[int]:

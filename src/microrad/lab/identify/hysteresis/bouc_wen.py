@@ -33,12 +33,12 @@ from microrad.lab.identify.records import (
     colour_inflation,
     correlation,
     fastest_rate,
+    no_progress,
     one_rate_only,
     percent,
     prepare,
     span,
     split_by_record,
-    unheard,
 )
 from microrad.lab.recording import Recording
 from microrad.mirror.hysteresis import BoucWen
@@ -278,7 +278,17 @@ class BoucWenFit:
     constrained: bool
     samples_used: int
 
-    name = "bouc_wen"
+    parameter_count = 6
+
+    @property
+    def name(self) -> str:
+        """The name of the model, as in `MODELS`."""
+        return "bouc_wen_admissible" if self.constrained else "bouc_wen"
+
+    @property
+    def falling(self) -> bool:
+        """Whether the output falls with the drive."""
+        return self.model.d1_rad_v < 0
 
     @property
     def values(self) -> Floats:
@@ -344,7 +354,7 @@ def fit_bouc_wen(
     if starts < 1:
         raise IdentificationError(f"{starts} starts were asked for; give at least 1, better 10 or more.")
     problem = Problem(prepare(recordings, units), 1.0 if admissible else math.inf)
-    costs, best = multi_start(problem, starts, seed, on_progress or unheard)
+    costs, best = multi_start(problem, starts, seed, on_progress or no_progress)
     if admissible:
         problem, best = tightened(problem, best)
     return _report(problem, problem.solve(best), units, costs, admissible)

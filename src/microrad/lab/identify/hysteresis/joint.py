@@ -77,6 +77,16 @@ class JointFit:
     samples_used: int
 
     @property
+    def falling(self) -> bool:
+        """Whether the output falls with the drive."""
+        return slow_gain(self.model) < 0
+
+    @property
+    def parameter_count(self) -> int:
+        """Number of parameters that were fitted."""
+        return len(self.structure.parameters)
+
+    @property
     def admissible(self) -> bool:
         """Whether the modelled mirror never moves against its drive just after a slow reversal."""
         if isinstance(self.model, Play):

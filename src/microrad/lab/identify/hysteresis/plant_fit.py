@@ -18,7 +18,7 @@ from microrad.core import kernels
 from microrad.core.arrays import Floats
 from microrad.core.progress import Progress
 from microrad.core.threads import in_threads
-from microrad.lab.identify.records import IdentificationError, colour_inflation, correlation, unheard
+from microrad.lab.identify.records import IdentificationError, colour_inflation, correlation, no_progress
 from microrad.lab.recording import Recording
 from microrad.mirror import model as mirror
 from microrad.mirror.model import Mirror
@@ -301,7 +301,7 @@ def fit_plant(
     solutions = []
     for done, start in enumerate([own, *starts], 1):
         solutions.append(_search(problem, start / problem.scale, tolerance, most_evaluations))
-        (on_progress or unheard)(done, 1 + len(starts), structure.name)
+        (on_progress or no_progress)(done, 1 + len(starts), structure.name)
     best = min(solutions, key=lambda s: float(s.cost))
     if best.cost >= 0.4 * problem.size * problem.far**2:
         raise IdentificationError(

@@ -52,6 +52,19 @@ class PrandtlIshlinskiiFit:
     samples_used: int
 
     name = "prandtl_ishlinskii"
+    admissible = True
+    """Play operators with weights of 0 or more never turn against the drive."""
+    not_identified: tuple[tuple[str, str], ...] = ()
+
+    @property
+    def falling(self) -> bool:
+        """Whether the output falls with the drive."""
+        return self.sign < 0
+
+    @property
+    def parameter_count(self) -> int:
+        """Number of parameters: the weights in use."""
+        return int(np.sum(self.weights_rad_per_v > 0))
 
     def response(self, drive_v: Floats, step_s: float) -> tuple[Floats, int]:
         """Output (rad) without offset for a drive (V), every operator starting at the first drive value; 0 clamped."""

@@ -18,7 +18,7 @@ from microrad.lab.identify.linear.order import fit_order
 from microrad.lab.identify.linear.polish import Polished, TimeEquations, pack, polish, unpack
 from microrad.lab.identify.linear.response import FrequencyResponse, response_from_periods, response_from_records
 from microrad.lab.identify.linear.vector_fitting import check_order
-from microrad.lab.identify.records import IdentificationError, colour_inflation, rounded_to_error, unheard
+from microrad.lab.identify.records import IdentificationError, colour_inflation, no_progress, rounded_to_error
 from microrad.lab.recording import Recording
 
 _STEP = 1e-6
@@ -221,7 +221,7 @@ def fit_linear(
     several = response.response[0].size > 1
     candidates = _candidates(response, orders)
     tried = candidates if several else range(1, candidates[-1] + 1)  # each sets out from the one before, too
-    total, report = len(tried) + 2, on_progress or unheard
+    total, report = len(tried) + 2, on_progress or no_progress
     fits: dict[int, Polished] = {}
     for done, order in enumerate(tried, start=1):
         smaller = None if several or order == 1 else fits[order - 1].model

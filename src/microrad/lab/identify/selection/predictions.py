@@ -47,7 +47,7 @@ class Score:
 
 
 @dataclass(frozen=True, eq=False)
-class Judged:
+class ScoredModel:
     """A model as soon as it is fitted: its score, and its predictions in the order of the recordings judged on."""
 
     model: str

@@ -13,7 +13,7 @@ from microrad.lab.identify.hysteresis.prandtl_ishlinskii import PrandtlIshlinski
 from microrad.lab.identify.records import Prepared, Units, colour_inflation, loop_rates, noisiness, one_rate_only
 from microrad.lab.identify.selection.predictions import Fit, Prediction, Score
 from microrad.lab.recording import Recording
-from microrad.mirror.hysteresis import BoucWen, slow_gain
+from microrad.mirror.hysteresis import BoucWen
 
 _LAGS = 50
 _FLIPPED = (
@@ -111,14 +111,7 @@ def fit_warnings(fit: Fit) -> list[str]:
         )
     if not (isinstance(fit, PrandtlIshlinskiiFit) or fit.admissible):
         found.append(_wrong_way(fit))
-    return [*found, *([_FLIPPED] if falling(fit) else [])]
-
-
-def falling(fit: Fit) -> bool:
-    """Whether the output falls with the drive."""
-    if isinstance(fit, JointFit):
-        return slow_gain(fit.model) < 0
-    return fit.model.d1_rad_v < 0 if isinstance(fit, BoucWenFit) else fit.sign < 0
+    return [*found, _FLIPPED] if fit.falling else found
 
 
 def _wrong_way(fit: BoucWenFit | JointFit) -> str:
@@ -218,7 +211,7 @@ def _correlations(a: Floats, b: Floats, lags: int) -> Floats:
 
 def _autoregression(x: Floats, order: int) -> Floats:
     """Coefficients (1, a1, ...) that whiten x, by Yule and Walker."""
-    from scipy.linalg import solve_toeplitz  # here, to keep start-up cheap
+    from scipy.linalg import solve_toeplitz
 
     r = np.array([float(x[k:] @ x[: x.size - k]) for k in range(order + 1)])
     if r[0] <= 0.0:

@@ -19,7 +19,7 @@ from microrad.core import kernels
 from microrad.core.arrays import Floats
 from microrad.core.progress import Progress
 from microrad.lab.identify.linear.response import check_alike, response_from_periods
-from microrad.lab.identify.records import IdentificationError, unheard
+from microrad.lab.identify.records import IdentificationError, no_progress
 from microrad.lab.identify.stiffness import tangents
 from microrad.lab.identify.stiffness.model import (
     FIELDS,
@@ -171,7 +171,7 @@ def fit_hysteretic_stiffness(
     levels = _levels(groups, outputs, units[1], skip_periods)
     search = _Search(steady, classes, levels, fixed_delay=options.delay_s is not None)
     with ThreadPoolExecutor(min(len(steady), os.cpu_count() or 1)) as pool:
-        search.run(balanced(start), pool, iterations, options.tolerance, on_progress or unheard)
+        search.run(balanced(start), pool, iterations, options.tolerance, on_progress or no_progress)
     if (growth := search.numbers.growth_1_s) >= 0.0:
         raise IdentificationError(
             f"the fitted mirror runs away: where its plays slide it grows by {growth:.3g} 1/s, whatever the drive; fit "
