@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 import truths
 from microrad.core import kernels
 from microrad.lab import bench
-from microrad.lab.bench.play import played, true_output
+from microrad.lab.bench.play import play_records, true_output
 from microrad.lab.identify import (
     FORMS,
     MODELS,
@@ -483,7 +483,7 @@ def test_the_benchs_own_mirror_is_predicted_with_half_the_error_of_the_papers_mo
     """A reduced plan; the truth is none of the models. Held out are a frequency and amplitude, and a multisine."""
     plan = bench.load_plan("mirror-characterisation")
     names = ["small-multisine-1", "loops-40hz", "loops-100hz", "held-out-sine", "held-out-multisine"]
-    pairs = list(played(bench.only(plan, names), seed=1))
+    pairs = list(play_records(bench.select_records(plan, names), seed=1))
     known = [recording for record, recording in pairs if record.use == "identification"]
     unseen = [recording for record, recording in pairs if record.use == "validation"]
     assert (len(known), len(unseen)) == (3, 2)

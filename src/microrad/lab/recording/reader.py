@@ -68,7 +68,7 @@ def read_recording(
     _check_distinct(source, ins, outs)
     clock = _clock(source, [*ins, *outs], time)
     optional = time is None and rate_hz is not None
-    columns, rates, findings = _load(source, [*ins, *outs], clock, optional)
+    columns, rates, findings = _load_columns(source, [*ins, *outs], clock, optional)
     rate = agreed_rate(str(path), rate_hz, [*source.rates([*ins, *outs]), *rates])
     _check_lengths(source, [*ins, *outs], columns)
     drives = {f"the input, {source.label(i)}": column for i, column in zip(ins, columns, strict=False)}
@@ -86,7 +86,7 @@ def read_recording(
         _checked_period(str(path), period_samples, drive.shape[0]),
         tuple(source.units[i] for i in ins),
         tuple(source.units[i] for i in outs),
-        _judged(str(path), findings, accept),
+        _carried(str(path), findings, accept),
     )
 
 
@@ -139,7 +139,7 @@ def recording_from_arrays(
         input_names,
         output_names,
         _checked_period(name, period_samples, len(u)),
-        findings=_judged(name, findings, accept),
+        findings=_carried(name, findings, accept),
     )
 
 
@@ -210,7 +210,7 @@ def _clock(source: Source, used: Sequence[int], time: Column | None) -> int | No
     return index
 
 
-def _load(
+def _load_columns(
     source: Source, used: list[int], clock: int | None, optional: bool
 ) -> tuple[list[Floats], list[StatedRate], list[Finding]]:
     """Columns of the channels, and what the time column says; `optional` lets one pass that is not made of numbers."""
@@ -258,7 +258,7 @@ def _check_accept(where: str, accept: Sequence[str]) -> None:
         )
 
 
-def _judged(where: str, findings: Sequence[Finding], accept: Sequence[str]) -> tuple[Finding, ...]:
+def _carried(where: str, findings: Sequence[Finding], accept: Sequence[str]) -> tuple[Finding, ...]:
     refused = [f for f in findings if f.refused and f.kind not in accept]
     if refused:
         kinds = list(dict.fromkeys(f.kind for f in refused))

@@ -11,11 +11,11 @@ import numpy as np
 
 from microrad.core.progress import Progress
 from microrad.lab.identify.hysteresis.bouc_wen import BoucWenFit, fit_bouc_wen
-from microrad.lab.identify.hysteresis.joint import FORMS, JointFit, fit_joint, static_fit, time_constants
+from microrad.lab.identify.hysteresis.joint import FORMS, JointFit, fit_joint, fit_static_start, time_constants
 from microrad.lab.identify.hysteresis.prandtl_ishlinskii import fit_prandtl_ishlinskii
 from microrad.lab.identify.hysteresis.structures import LinearPoles, poles_of
 from microrad.lab.identify.linear.fit import LinearFit, fit_linear
-from microrad.lab.identify.records import IdentificationError, Prepared, Units, percent
+from microrad.lab.identify.records import IdentificationError, SiRecord, Units, percent
 from microrad.lab.identify.selection.predictions import Fit, Prediction, Score, ScoredModel, predict
 from microrad.lab.recording import Recording
 
@@ -54,7 +54,7 @@ def fit_linear_part(
 
 
 def supported_models(
-    models: Sequence[str], records: Sequence[Prepared], has_linear: bool
+    models: Sequence[str], records: Sequence[SiRecord], has_linear: bool
 ) -> tuple[list[str], list[Refused]]:
     """Models that the recordings can support, and the others with the number that speaks against each.
 
@@ -183,7 +183,7 @@ class Candidates:
     @cached_property
     def _static_start(self) -> BoucWenFit:
         """Where all Bouc-Wen forms begin; fitted once."""
-        return static_fit(self.heads, self.units, self.seed)
+        return fit_static_start(self.heads, self.units, self.seed)
 
     @property
     def recordings(self) -> tuple[Recording, ...]:

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -11,11 +11,11 @@ from microrad.core.progress import Progress
 from microrad.lab.identify.linear.fit import LinearFit
 from microrad.lab.identify.records import (
     IdentificationError,
-    Prepared,
+    SiRecord,
     Units,
     colour_inflation,
     no_progress,
-    prepare,
+    si_records,
     span,
 )
 from microrad.lab.identify.selection.candidates import (
@@ -172,8 +172,8 @@ def identify(  # noqa: PLR0913  all but the first are named options in practice
     _check_distinct(recordings, validation)
     response, broadband, loops = roles(recordings)
     splits = _splits(loops, hold_out, bool(validation))
-    heads = [replace(r, drive=r.drive[:k], output=r.output[:k]) for r, k in zip(loops, splits, strict=True)]
-    prepared = prepare(heads, units)
+    heads = [r.first(k) for r, k in zip(loops, splits, strict=True)]
+    prepared = si_records(heads, units)
     seen = {id(r): head for r, head in zip(loops, heads, strict=True)}
     response = [whole_periods(seen[id(r)]) if id(r) in seen else r for r in response]
     linear = fit_linear_part(response, units, models, on_progress)
@@ -238,7 +238,7 @@ def _check_distinct(recordings: Sequence[Recording], validation: Sequence[Record
 
 def _identification(
     candidates: Candidates,
-    prepared: tuple[Prepared, ...],
+    prepared: tuple[SiRecord, ...],
     fits: Sequence[Fit],
     predictions: Sequence[tuple[Prediction, ...]],
     best: int,

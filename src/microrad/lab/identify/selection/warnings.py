@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from microrad.core.arrays import Floats
-from microrad.lab.identify.hysteresis.bouc_wen import BoucWenFit, rising
+from microrad.lab.identify.hysteresis.bouc_wen import BoucWenFit, made_rising
 from microrad.lab.identify.hysteresis.joint import JointFit
 from microrad.lab.identify.hysteresis.prandtl_ishlinskii import PrandtlIshlinskiiFit
-from microrad.lab.identify.records import Prepared, Units, colour_inflation, loop_rates, noisiness, one_rate_only
+from microrad.lab.identify.records import SiRecord, Units, colour_inflation, loop_rates, noisiness, one_rate_only
 from microrad.lab.identify.selection.predictions import Fit, Prediction, Score
 from microrad.lab.recording import Recording
 from microrad.mirror.hysteresis import BoucWen
@@ -50,7 +50,7 @@ def depends_on_rate(fit: JointFit) -> bool:
     return bool({"delta", "widening"} & set(fit.form.free)) or fit.linear is not None
 
 
-def rate_warnings(records: Sequence[Prepared], fit: Fit) -> list[str]:
+def rate_warnings(records: Sequence[SiRecord], fit: Fit) -> list[str]:
     """What the rates of the loops do not show, and a drive too noisy to have a rate."""
     warnings = []
     slowest, fastest = loop_rates(records)
@@ -116,7 +116,7 @@ def fit_warnings(fit: Fit) -> list[str]:
 
 def _wrong_way(fit: BoucWenFit | JointFit) -> str:
     assert isinstance(fit.model, BoucWen)
-    turned = rising(fit.model)
+    turned = made_rising(fit.model)
     if isinstance(fit, JointFit):
         slope, slow, advice = turned.reversal_slope_rad_v(), "slow ", "a Prandtl-Ishlinskii model never does."
     else:
