@@ -10,8 +10,8 @@ from scipy.stats import beta, norm
 
 import budgets
 from microrad import link
-from microrad.campaign.candidates import Problem, Variable
-from microrad.campaign.optimise import optimise
+from microrad.campaign.optimisation.candidates import Problem, Variable
+from microrad.campaign.optimisation.search import optimise
 from microrad.campaign.records import CampaignError, Limit
 from microrad.mission.file import load_link
 from microrad.mission.presets import preset_text

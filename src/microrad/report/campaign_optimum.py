@@ -4,9 +4,10 @@ from dataclasses import asdict
 from math import isnan
 from typing import Any
 
-from microrad.campaign.candidates import INTERVAL_CONFIDENCE, Candidate, Kept, Variable
-from microrad.campaign.optimise import Optimum
-from microrad.campaign.outputs import OUTPUTS
+from microrad.campaign.definition.outputs import OUTPUTS
+from microrad.campaign.definition.records import Variable
+from microrad.campaign.optimisation.candidates import INTERVAL_CONFIDENCE, Candidate, Kept
+from microrad.campaign.optimisation.search import Optimum
 from microrad.report.quantities import quantity
 
 _SLACK = "for slack draw more rows (optimise.rows) or ask for a larger share (optimise.confidence)"
