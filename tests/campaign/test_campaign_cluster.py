@@ -15,7 +15,7 @@ import pytest
 
 from microrad.campaign.engines import cluster
 from microrad.campaign.engines.cluster import DaskEngine
-from microrad.campaign.engines.threads import Flight, Waiting, late_flights
+from microrad.campaign.engines.threads import Flight, JobQueue, late_flights
 from microrad.campaign.records import CampaignError, Job
 from small_campaign import import_path, killing
 from small_campaign import kill as kill_process
@@ -141,7 +141,7 @@ def test_a_job_whose_worker_ended_has_died_and_is_not_late_however_slowly_that_i
         engine._look()
     assert list(engine._stop_the_late()) == []
     last = SimpleNamespace(address=ended)
-    (outcome,) = engine._failed(0, KilledWorker("job", last, 0), Waiting(iter(())))
+    (outcome,) = engine._failed(0, KilledWorker("job", last, 0), JobQueue(iter(())))
     assert (outcome.kind, outcome.reason) == ("died", f"its worker at {ended} ended")
     engine._kill(ended)  # as where it ends between the look and this
 

@@ -126,8 +126,8 @@ def test_a_growing_ledger_says_at_each_time_what_its_rows_say(growing):
 
 def test_each_chunk_is_read_once(growing, monkeypatch):
     taken = []
-    take = interim.summary.take
-    monkeypatch.setattr(interim.summary, "take", lambda *all: (taken.append(all[2].number), take(*all)))
+    take = interim.CellFold.take
+    monkeypatch.setattr(interim.CellFold, "take", lambda fold, chunk: (taken.append(chunk.number), take(fold, chunk)))
     reader = Interim(growing.path)
     for number in (0, 2, 1):
         growing.put(number)

@@ -79,7 +79,7 @@ def packed(campaign: CampaignFile, controllers: Sequence[AxisController]) -> byt
 
 
 def opened(spec: bytes, any_code: bool = False) -> Opened:
-    """What `packed` put together. Raises `CampaignError` when it was packed by other code, if that is not allowed."""
+    """What `packed` put together. Raises `CampaignError` if it was packed by other code, if that is not allowed."""
     content = _unpacked(spec)
     if content.code != code_sha256() and not any_code:
         raise CampaignError(
@@ -127,7 +127,7 @@ def _unpacked(spec: bytes) -> _Content:
 
 
 def _inside(folder: Path, name: str) -> Path:
-    """The path of a file of a bundle. Raises `CampaignError` where it leaves the folder: anyone may make a ledger."""
+    """The path of a file of a bundle. Raises `CampaignError` if it leaves the folder: anyone may make a ledger."""
     path = Path(os.path.abspath(folder.joinpath(*PurePosixPath(name).parts)))  # noqa: PTH100  nothing is there yet
     if not path.is_relative_to(folder) or path == folder or "\0" in name:
         raise CampaignError(f"the ledger holds a file {name!r}, which microrad never puts there: leave it alone")

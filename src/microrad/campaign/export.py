@@ -39,10 +39,14 @@ _Block = dict[str, NDArray[Any]]
 
 
 def export_rows(ledger: Ledger, path: Path) -> int:
-    """Write the rows that are done to a file of the kind that its suffix says; how many they are.
+    """Write the rows that are done to a table; how many they are.
 
-    What was in ``path`` is replaced once the new table is whole. Raises `CampaignError` for another suffix, a missing
-    library, a damaged chunk, no rows, and a file that cannot be written.
+    Args:
+        ledger: an open ledger.
+        path: the file, .nc, .parquet or .csv; what was in it is replaced once the new table is whole.
+
+    Raises `CampaignError` for another suffix, a missing library, a damaged chunk, no rows, and a file that cannot be
+    written.
     """
     writers: dict[str, Callable[[Ledger, Path], int]] = {".nc": _netcdf, ".parquet": _parquet, ".csv": _csv}
     writer = writers.get(path.suffix.lower())

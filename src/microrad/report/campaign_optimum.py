@@ -82,14 +82,11 @@ def _costs(optimum: Optimum, best: Candidate) -> list[str]:
 
 
 def _cost_name(optimum: Optimum) -> str:
-    """The cost, and for an output which statistic of the rows it is."""
+    """The cost, and for an output that it is the mean."""
     problem = optimum.problem
     if problem.cost_name in {variable.key for variable in problem.variables}:
         return problem.cost_name
-    statistic = (
-        "mean over the rows" if problem.quantile is None else f"{_percent(problem.quantile)} quantile of the rows"
-    )
-    return f"{problem.cost_name} ({statistic})"
+    return f"{problem.cost_name} (mean over the rows)"
 
 
 def _limits(optimum: Optimum) -> list[tuple[str, ...]]:

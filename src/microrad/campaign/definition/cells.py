@@ -3,12 +3,13 @@
 import itertools
 import math
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any
 
 from microrad.campaign.definition.keys import MIRROR, put
 from microrad.campaign.definition.records import Cell
-from microrad.campaign.definition.values import FILE_WORD, ValueReader, text_of
+from microrad.campaign.definition.values import FILE_WORD, NotedError, ValueReader, text_of
 from microrad.link import LinkError
 from microrad.mission.file import LinkFile, either_file, with_values
 from microrad.mission.model import Source
@@ -34,9 +35,9 @@ class CellReader:
             if key == MIRROR:
                 self._is_path(f"set.{MIRROR}", value)
                 continue
-            found = self.reader.key("set", key, value, data)
-            if found is not None and self.reader.fits(f"set.{key}", found, value):
-                data = put(data, key, value)
+            with suppress(NotedError):
+                if self.reader.fits(f"set.{key}", self.reader.key("set", key, value, data), value):
+                    data = put(data, key, value)
         return dict(data)
 
     def _is_path(self, at: str, value: object) -> bool:
@@ -47,7 +48,10 @@ class CellReader:
 
     def axes(self, data: Mapping[str, Any]) -> dict[str, list[Any]]:
         """Values of the grid by key; those that do not fit are noted and left out."""
-        axes = {key: self._axis(key, values, data) for key, values in self.grid.items()}
+        axes: dict[str, list[Any]] = {key: [] for key in self.grid}
+        for key, values in self.grid.items():
+            with suppress(NotedError):
+                axes[key] = self._axis(key, values, data)
         cells = math.prod(len(values) for values in axes.values())
         if cells > MOST_CELLS:
             self.reader.fault("grid", None, f"has {cells} cells", f"at most {MOST_CELLS}")
@@ -56,13 +60,9 @@ class CellReader:
     def _axis(self, key: str, values: object, data: Mapping[str, Any]) -> list[Any]:
         at = f"grid.{key}"
         found = None if key == MIRROR else self.reader.key("grid", key, values, data)
-        if found is None and key != MIRROR:
-            return []
         if not isinstance(values, list) or not values:
-            self.reader.fault(
-                at, values, "is not a list with something in it", "the values of the grid: [first, second]"
-            )
-            return []
+            expected = "the values of the grid: [first, second]"
+            raise self.reader.noted(at, values, "is not a list with something in it", expected)
         fitting = [v for v in values if (self.reader.fits(at, found, v) if found else self._is_path(at, v))]
         texts = [text_of(v) for v in fitting]
         for text in dict.fromkeys(t for t in texts if texts.count(t) > 1):

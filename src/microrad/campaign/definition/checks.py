@@ -1,20 +1,18 @@
 """What has to fit between the tables of a campaign file, and between them and the missions; faults are noted."""
 
-import difflib
 import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import replace
 from typing import Any
 
+from microrad.campaign.definition.keys import nearest
 from microrad.campaign.definition.outputs import OUTPUTS, RADIUS
 from microrad.campaign.definition.tables import MOST_RUNS, CampaignTable, LimitTable, LoopTable
-from microrad.campaign.definition.values import FILE_WORD, ValueReader, quoted_near
+from microrad.campaign.definition.values import FILE_WORD, NotedError, ValueReader, quoted_near
 from microrad.campaign.records import Limit
 from microrad.core.units import format_quantity
 from microrad.loop import fine_pointing
 from microrad.mirror import Variant
 from microrad.mission.fields import Quantity
-from microrad.mission.file import check_table
 from microrad.mission.model import LinkMission, Mission
 from microrad.mission.tables.fine_pointing import FinePointing
 from microrad.mission.tables.link import LinkRequirement
@@ -97,9 +95,8 @@ def default_limits(
     for limit in limits:
         for name in (name for name, keys in varied.items() if limit.source in keys):
             reason = f"is the limit of {limit.output} as well, which is the same in all rows"
-            reader.fault(
-                f"{name}.{limit.source}", None, reason, f"a table [limits.{limit.output}] with a value of its own"
-            )
+            expected = f"a table [limits.{limit.output}] with a value of its own"
+            reader.fault(f"{name}.{limit.source}", None, reason, expected)
     return limits
 
 
@@ -127,43 +124,36 @@ def unchecked(
         )
 
 
-def limit(reader: ValueReader, name: str, raw: object, keep: Sequence[str]) -> Limit | None:
-    """One limit, or None with what is wrong noted."""
+def limit(reader: ValueReader, name: str, raw: object, keep: Sequence[str]) -> Limit:
+    """One limit. Raises `NotedError` with what is wrong noted."""
     at = f"limits.{name}"
     if not reader.is_output(at, name):
-        return None
+        raise NotedError
     if name not in keep:
-        reader.fault(at, None, "is a limit of an output that is not kept", f'"{name}" in keep, or this table removed')
-        return None
+        reason = "is a limit of an output that is not kept"
+        raise reader.noted(at, None, reason, f'"{name}" in keep, or this table removed')
     if not isinstance(raw, dict) or not raw:
-        reader.fault(at, None, "has neither least nor most", f"[{at}] with least or most")
-        return None
-    table = check_table(replace(reader.document, prefix=at), LimitTable, raw)
-    if table is None:
-        return None
-    rule = Quantity(OUTPUTS[name].unit, OUTPUTS[name].typical)
-    least = None if table.least is None else reader.number(f"{at}.least", rule, table.least)
-    most = None if table.most is None else reader.number(f"{at}.most", rule, table.most)
-    if least is not None and most is not None and least >= most:
-        reader.fault(f"{at}.most", table.most, "is not above least", "a range that goes up")
-    return Limit(name, least, most, FILE_WORD)
+        raise reader.noted(at, None, "has neither least nor most", f"[{at}] with least or most")
+    table, rule = reader.table(at, LimitTable, raw), Quantity(OUTPUTS[name].unit, OUTPUTS[name].typical)
+    given = {side: value for side, value in (("least", table.least), ("most", table.most)) if value is not None}
+    bounds = dict(zip(given, reader.numbers(at, {side: (rule, value) for side, value in given.items()}), strict=True))
+    if len(bounds) == 2 and bounds["least"] >= bounds["most"]:
+        raise reader.noted(f"{at}.most", table.most, "is not above least", "a range that goes up")
+    return Limit(name, bounds.get("least"), bounds.get("most"), FILE_WORD)
 
 
 def half_width(reader: ValueReader, table: CampaignTable, keep: Sequence[str]) -> float:
     """The half width that a precision wants, in its output's SI unit; nan without one."""
-    wanted = table.precision
-    if wanted is not None and wanted.output == RADIUS:
-        if table.loop is None:
-            reader.fault(
-                "precision.output", RADIUS, "needs the fine-pointing loop", "a table [loop], or another output"
-            )
-    elif wanted is None or not reader.is_output("precision.output", wanted.output, RADIUS):
+    wanted, at = table.precision, "precision.output"
+    if wanted is None or not reader.is_output(at, wanted.output, RADIUS):
         return math.nan
-    elif wanted.output not in keep:
-        reader.fault("precision.output", wanted.output, "is not kept", f'"{wanted.output}" in keep, or another output')
+    if wanted.output == RADIUS and table.loop is None:
+        reader.fault(at, RADIUS, "needs the fine-pointing loop", "a table [loop], or another output")
+    if wanted.output != RADIUS and wanted.output not in keep:
+        reader.fault(at, wanted.output, "is not kept", f'"{wanted.output}" in keep, or another output')
     rule, example = _width_of(wanted.output)
-    found = reader.number("precision.half_width", rule, wanted.half_width, example)
-    return math.nan if found is None else found
+    (found,) = reader.each(reader.number, [("precision.half_width", rule, wanted.half_width, example)]) or (math.nan,)
+    return found
 
 
 def tell_half_width(reader: ValueReader, output: object) -> None:
@@ -213,7 +203,7 @@ def check_minimise(reader: ValueReader, table: CampaignTable) -> None:
     name = wanted.removeprefix("-")
     if name in names:
         return
-    near = next(iter(difflib.get_close_matches(name[:60], names, n=1)), "")
+    near = nearest(name, names)
     sign = "-" if wanted.startswith("-") else ""
     expected = f"one of {', '.join(names)}"
     reason = "is neither a variable of the optimisation nor an output"

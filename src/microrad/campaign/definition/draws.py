@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from microrad.campaign.definition import distributions
@@ -10,11 +10,10 @@ from microrad.campaign.definition.distributions import AnyTable, Distribution
 from microrad.campaign.definition.keys import MIRROR, Key, as_one, find, item_keys, within
 from microrad.campaign.definition.records import Draw, Variable
 from microrad.campaign.definition.tables import VariableTable
-from microrad.campaign.definition.values import ValueReader, is_number, quoted_near
+from microrad.campaign.definition.values import NotedError, ValueReader, is_number, quoted_near
 from microrad.campaign.records import InputText
 from microrad.mirror.spread import parameter_units
 from microrad.mission.fields import MOST_ITEMS, Quantity, Several, Share
-from microrad.mission.file import check_table
 from microrad.mission.tables.mirror import Mirror
 from microrad.mission.toml import shown
 
@@ -31,46 +30,37 @@ class DrawReader:
     mirrors: tuple[Mirror | None, ...]
     given: frozenset[str]
 
-    def draw(self, key: str, raw: object) -> Draw | None:
-        """One input, or None with what is wrong noted."""
+    def draw(self, key: str, raw: object) -> Draw:
+        """One input. Raises `NotedError` with what is wrong noted."""
         at = f"inputs.{key}"
         table = self._distribution_table(at, raw)
-        if table is None:
-            return None
         if key == MIRROR or isinstance(table, distributions.IdentifiedTable):
             return self._identified(at, key, table)
         found = self.reader.key("inputs", key, None, self.data)
-        if found is not None and not isinstance(table, distributions.ListTable):
+        if not isinstance(table, distributions.ListTable):
             found = as_one(found, within(self.data, key))
-        distribution = None if found is None else self._mostly_inside(at, found, table)
-        if found is None or distribution is None:
-            return None
-        if table.drawn_as is None:
-            return Draw(key, found.unit, distribution, None)
-        drawn_as = self._drawn_as(f"{at}.drawn_as", found, table.drawn_as, distribution)
-        return Draw(key, found.unit, distribution, drawn_as)
+        wanted = self._mostly_inside(at, found, table)
+        drawn_as = None if table.drawn_as is None else self._drawn_as(f"{at}.drawn_as", found, table.drawn_as, wanted)
+        return Draw(key, found.unit, wanted, drawn_as)
 
-    def _distribution_table(self, at: str, raw: object) -> AnyTable | None:
+    def _distribution_table(self, at: str, raw: object) -> AnyTable:
         kinds = list(distributions.TABLES)
         choices = " or ".join(f'distribution = "{kind}"' for kind in kinds)
         if not isinstance(raw, dict):
-            self.reader.fault(at, raw, "is no table", f"[{at}] with {choices}")
-            return None
+            raise self.reader.noted(at, raw, "is no table", f"[{at}] with {choices}")
         kind = raw.get("distribution")
+        if kind is None:
+            raise self.reader.noted(f"{at}.distribution", None, "is missing", choices)
         if not isinstance(kind, str) or kind not in kinds:
-            reason = "is missing" if kind is None else "is none of the choices"
-            self.reader.fault(
-                f"{at}.distribution", kind, reason, choices, "" if kind is None else quoted_near(kind, kinds)
-            )
-            return None
-        return check_table(replace(self.reader.document, prefix=at), distributions.TABLES[kind], raw)  # type: ignore[return-value]
+            near = quoted_near(kind, kinds)
+            raise self.reader.noted(f"{at}.distribution", kind, "is none of the choices", choices, near)
+        return self.reader.table(at, distributions.TABLES[kind], raw)  # type: ignore[return-value]
 
-    def _identified(self, at: str, key: str, table: AnyTable) -> Draw | None:
+    def _identified(self, at: str, key: str, table: AnyTable) -> Draw:
         """The mirrors that the identification leaves possible, in every cell."""
         if key != MIRROR or not isinstance(table, distributions.IdentifiedTable):
             expected = f'[inputs.{MIRROR}] with distribution = "identified", or the key of a single value'
-            self.reader.fault(at, None, "does not go together with its distribution", expected)
-            return None
+            raise self.reader.noted(at, None, "does not go together with its distribution", expected)
         for m in self.mirrors:
             if m is None or m.uncertainty is None:
                 reason = "is to be identified, but the mission has no mirror, only its links"
@@ -80,36 +70,32 @@ class DrawReader:
                     f'[set] with {MIRROR} = "FILE", or [grid] with {MIRROR} = ["FILE"]: a mirror file as microrad '
                     "identify writes it, seen from the campaign file"
                 )
-                self.reader.fault(at, None, reason, expected)
-                return None
-            twice = next((f"{MIRROR}.{p}" for p in m.uncertainty.parameters if f"{MIRROR}.{p}" in self.given), "")
-            if twice:
-                self.reader.fault(at, None, f"draws {twice}, which the campaign gives too", "one of the two removed")
-                return None
+                raise self.reader.noted(at, None, reason, expected)
+            for parameter in m.uncertainty.parameters:
+                if f"{MIRROR}.{parameter}" in self.given:
+                    reason = f"draws {MIRROR}.{parameter}, which the campaign gives too"
+                    raise self.reader.noted(at, None, reason, "one of the two removed")
         return Draw(MIRROR, "", None, None)
 
-    def _drawn_as(self, at: str, key: Key, raw: object, wanted: Distribution) -> Distribution | None:
+    def _drawn_as(self, at: str, key: Key, raw: object, wanted: Distribution) -> Distribution:
         table = self._distribution_table(at, raw)
-        if table is None:
-            return None
         if isinstance(table, distributions.IdentifiedTable) or table.drawn_as is not None:
-            self.reader.fault(at, None, "is no distribution that an input can be drawn as", "a normal one, for example")
-            return None
+            reason = "is no distribution that an input can be drawn as"
+            raise self.reader.noted(at, None, reason, "a normal one, for example")
         found = self._mostly_inside(at, key, table)
-        if found is not None and (reason := distributions.uncovered(wanted, found)):
-            self.reader.fault(at, None, reason, "a distribution that reaches as far as the input's own")
-            return None
+        if reason := distributions.uncovered(wanted, found):
+            raise self.reader.noted(at, None, reason, "a distribution that reaches as far as the input's own")
         return found
 
-    def _mostly_inside(self, at: str, key: Key, table: AnyTable) -> Distribution | None:
+    def _mostly_inside(self, at: str, key: Key, table: AnyTable) -> Distribution:
         """The distribution of a table, unless most of its draws are none that the key takes."""
         found = self._distribution(at, key, table)
-        if found is None or (outside := outside_of(key, found)).share <= 0.5:
-            return found
-        self.reader.fault(at, None, f"has {_percent(outside.share)} of its draws {outside.where}", _INSIDE)
-        return None
+        share, where = outside_of(key, found)
+        if share > 0.5:
+            raise self.reader.noted(at, None, f"has {_percent(share)} of its draws {where}", _INSIDE)
+        return found
 
-    def _distribution(self, at: str, key: Key, table: AnyTable) -> Distribution | None:
+    def _distribution(self, at: str, key: Key, table: AnyTable) -> Distribution:
         """The distribution of a table, its quantities read by the rule of the key."""
         if isinstance(table, distributions.ListTable):
             return self._one_of(at, key, table)
@@ -117,56 +103,46 @@ class DrawReader:
         if isinstance(key.rule, Several):
             own = within(self.data, key.text)
             items = " and ".join(item_keys(key.text, len(own))) if isinstance(own, list) else ""
-            advice = f"{items or 'a list that the mission has'}, each with its distribution"
-            self.reader.fault(at, None, "is a list, whose items are drawn each by its own key", advice)
-            return None
+            expected = f"{items or 'a list that the mission has'}, each with its distribution"
+            raise self.reader.noted(at, None, "is a list, whose items are drawn each by its own key", expected)
         if rule is None:
-            advice = 'distribution = "table" with its values, or a grid of them'
-            self.reader.fault(at, None, "is not a quantity that takes any value in a range", advice)
-            return None
+            expected = 'distribution = "table" with its values, or a grid of them'
+            raise self.reader.noted(at, None, "is not a quantity that takes any value in a range", expected)
         if isinstance(table, distributions.NormalTable):
-            mean = self.reader.number(f"{at}.mean", rule, table.mean)
-            spread = self.reader.number(
-                f"{at}.deviation", Quantity(rule.unit, rule.typical, above=0.0), table.deviation
-            )
-            return None if mean is None or spread is None else distributions.Normal(mean, spread)
+            positive = Quantity(rule.unit, rule.typical, above=0.0)
+            values = {"mean": (rule, table.mean), "deviation": (positive, table.deviation)}
+            return distributions.Normal(*self.reader.numbers(at, values))
         assert not isinstance(table, distributions.IdentifiedTable)
         is_log = isinstance(table, distributions.LogUniformTable)
-        bounds = bounds_of(self.reader, at, rule, (table.low, table.high), is_log)
         kind = distributions.LogUniform if is_log else distributions.Uniform
-        return None if bounds is None else kind(*bounds)
+        return kind(*bounds_of(self.reader, at, rule, table.low, table.high, is_log))
 
-    def _one_of(self, at: str, key: Key, table: distributions.ListTable) -> Distribution | None:
-        values = table.values
+    def _one_of(self, at: str, key: Key, table: distributions.ListTable) -> Distribution:
+        at, values, weights = f"{at}.values", table.values, f"{at}.weights"
         if not isinstance(values, list) or not 0 < len(values) <= MOST_ITEMS:
-            self.reader.fault(f"{at}.values", values, "is not a list with something in it", f"1 to {MOST_ITEMS} values")
-            return None
-        fitting = [value for value in values if self.reader.fits(f"{at}.values", key, value)]
+            raise self.reader.noted(at, values, "is not a list with something in it", f"1 to {MOST_ITEMS} values")
+        fitting = [value for value in values if self.reader.fits(at, key, value)]
         if len(fitting) < len(values):
-            return None
+            raise NotedError
         read: list[Any] = [value if key.rule is None else key.rule.read(value) for value in values]
         if any(isinstance(value, float) and math.isnan(value) for value in read):
-            self.reader.fault(
-                f"{at}.values", values, "has a word that is solved for", "values, or this word in the mission"
-            )
-            return None
+            expected = "values, or this word in the mission"
+            raise self.reader.noted(at, values, "has a word that is solved for", expected)
         if any(read.count(value) > 1 for value in read):
-            self.reader.fault(f"{at}.values", values, "has a value twice", "each value once, with its weight")
-            return None
+            raise self.reader.noted(at, values, "has a value twice", "each value once, with its weight")
         is_words = not all(is_number(value) for value in read)
         numbers = tuple(float(i) for i in range(1, len(read) + 1)) if is_words else tuple(float(v) for v in read)
-        weights = self._weights(f"{at}.weights", table.weights, len(read))
-        return None if weights is None else distributions.OneOf(numbers, weights, tuple(values), is_words)
+        shares = self._shares(weights, table.weights, len(read))
+        return distributions.OneOf(numbers, shares, tuple(values), is_words)
 
-    def _weights(self, at: str, raw: object, count: int) -> tuple[float, ...] | None:
-        if raw is None:
+    def _shares(self, at: str, weights: object, count: int) -> tuple[float, ...]:
+        if weights is None:
             return (1.0 / count,) * count
-        expected = f"{count} plain numbers above 0, one for each value"
-        if not isinstance(raw, list) or len(raw) != count or not all(is_number(v) and v > 0 for v in raw):
-            self.reader.fault(at, raw, "does not give each value its weight", expected)
-            return None
-        total = math.fsum(raw)
-        return tuple(float(v) / total for v in raw)
+        if not isinstance(weights, list) or len(weights) != count or not all(is_number(v) and v > 0 for v in weights):
+            expected = f"{count} plain numbers above 0, one for each value"
+            raise self.reader.noted(at, weights, "does not give each value its weight", expected)
+        total = math.fsum(weights)
+        return tuple(float(v) / total for v in weights)
 
 
 _INSIDE = 'a smaller deviation, or distribution = "uniform" or "log-uniform" between bounds'
@@ -225,33 +201,25 @@ def _percent(share: float) -> str:
 
 
 def bounds_of(
-    reader: ValueReader, at: str, rule: Quantity, raw: tuple[object, object], is_log: bool = False
-) -> tuple[float, float] | None:
-    """The keys low and high of a table in SI units, or None with what is wrong noted."""
-    low, high = (reader.number(f"{at}.{name}", rule, value) for name, value in zip(("low", "high"), raw, strict=True))
-    if low is None or high is None:
-        return None
+    reader: ValueReader, at: str, rule: Quantity, raw_low: object, raw_high: object, is_log: bool = False
+) -> tuple[float, float]:
+    """The keys low and high of a table in SI units. Raises `NotedError` with what is wrong noted."""
+    low, high = reader.numbers(at, {"low": (rule, raw_low), "high": (rule, raw_high)})
     if low >= high:
-        reader.fault(f"{at}.high", raw[1], f"is not above low ({shown(raw[0])})", "a range that goes up")
-        return None
+        raise reader.noted(f"{at}.high", raw_high, f"is not above low ({shown(raw_low)})", "a range that goes up")
     if is_log and low <= 0.0:
-        advice = 'a value above 0, or distribution = "uniform"'
-        reader.fault(f"{at}.low", raw[0], "is not above 0, so that it has no logarithm", advice)
-        return None
+        expected = 'a value above 0, or distribution = "uniform"'
+        raise reader.noted(f"{at}.low", raw_low, "is not above 0, so that it has no logarithm", expected)
     return low, high
 
 
-def variable(reader: ValueReader, key: str, table: VariableTable, data: Mapping[str, Any]) -> Variable | None:
-    """One design variable, or None with what is wrong noted."""
-    found = reader.key("optimise.variables", key, None, data)
-    if found is None:
-        return None
-    at = f"optimise.variables.{key}"
+def variable(reader: ValueReader, key: str, table: VariableTable, data: Mapping[str, Any]) -> Variable:
+    """One design variable. Raises `NotedError` with what is wrong noted."""
+    at, found = f"optimise.variables.{key}", reader.key("optimise.variables", key, None, data)
     if found.numeric is None:
-        reader.fault(at, None, "is not a quantity that takes any value in a range", "the key of a quantity")
-        return None
-    bounds = bounds_of(reader, at, found.numeric, (table.low, table.high))
-    return None if bounds is None else Variable(key, found.unit, *bounds)
+        reason = "is not a quantity that takes any value in a range"
+        raise reader.noted(at, None, reason, "the key of a quantity")
+    return Variable(key, found.unit, *bounds_of(reader, at, found.numeric, table.low, table.high))
 
 
 def input_texts(draws: tuple[Draw, ...], mirrors: Sequence[Mirror | None]) -> tuple[InputText, ...]:

@@ -1,7 +1,7 @@
 """Keys of a mission as a campaign names them, "communication.transmit_power": what each may hold and where it is."""
 
 import difflib
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, get_args, get_origin
 
@@ -150,6 +150,11 @@ def item_keys(key: str, count: int) -> list[str]:
     return [f"{key}.{place}" for place in places]
 
 
+def nearest(word: object, words: Iterable[str]) -> str:
+    """The one of some words that a word resembles, or ""."""
+    return next(iter(difflib.get_close_matches(str(word)[:60], list(words), n=1)), "")
+
+
 def _at(data: object, name: str) -> object:
     return data.get(name) if isinstance(data, Mapping) else None
 
@@ -161,7 +166,7 @@ def _unknown(parts: tuple[str, ...], at: int, names: list[str]) -> UnknownKeyErr
     expected = f"one of {', '.join(names)}" if names else "a table that the mission has"
     if at == len(parts):
         return UnknownKeyError("is a group of named tables and no value", expected)
-    near = next(iter(difflib.get_close_matches(parts[at][:60], names, n=1)), "")
+    near = nearest(parts[at], names)
     return UnknownKeyError(f"is no key of {where}", expected, near and ".".join((*parts[:at], near, *parts[at + 1 :])))
 
 

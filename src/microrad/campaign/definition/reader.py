@@ -89,8 +89,8 @@ class _DefinitionReader:
         axes = cell_reader.axes(data)
         cells = () if self.document.faults else cell_reader.cells(data, axes)
         draws = self._draws(data, cells)
-        found = [drawing.variable(self.reader, key, table, data) for key, table in self._variables.items()]
-        variables = tuple(each for each in found if each is not None)
+        items = ((self.reader, key, table, data) for key, table in self._variables.items())
+        variables = self.reader.each(drawing.variable, items)
         if self.table is None or not cells:
             return None
         try:
@@ -130,15 +130,13 @@ class _DefinitionReader:
     def _draws(self, data: Mapping[str, Any], cells: tuple[Cell, ...]) -> tuple[Draw, ...]:
         given = frozenset((*self.fixed, *self.grid, *self.inputs, *self._variables))
         draw_reader = DrawReader(self.reader, data, tuple(cell.mirror for cell in cells), given)
-        found = [draw_reader.draw(key, raw) for key, raw in self.inputs.items()]
-        return tuple(draw for draw in found if draw is not None)
+        return self.reader.each(draw_reader.draw, self.inputs.items())
 
     def _limits(self, keep: tuple[str, ...], required: LinkRequirement) -> tuple[Limit, ...]:
         if "limits" not in self.document.data:
             varied = {"grid": self.grid, "inputs": self.inputs}
             return checks.default_limits(self.reader, keep, required, varied)
-        found = [checks.limit(self.reader, name, raw, keep) for name, raw in self.limits.items()]
-        return tuple(limit for limit in found if limit is not None)
+        return self.reader.each(checks.limit, ((self.reader, name, raw, keep) for name, raw in self.limits.items()))
 
     def _campaign(
         self,

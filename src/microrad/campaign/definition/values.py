@@ -1,20 +1,27 @@
 """How the values of a campaign file are read, whichever table they stand in, and how a fault is said of them."""
 
-import difflib
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, TypeVar
 
-from microrad.campaign.definition.keys import Key, UnknownKeyError, find
+from microrad.campaign.definition.keys import Key, UnknownKeyError, find, nearest
 from microrad.campaign.definition.outputs import OUTPUTS
 from microrad.core.units import UnitError
-from microrad.mission.fields import Quantity
-from microrad.mission.file import check_value
+from microrad.mission.fields import Quantity, Table
+from microrad.mission.file import check_table, check_value
 from microrad.mission.toml import Document, shown
+
+T = TypeVar("T")
+TableT = TypeVar("TableT", bound=Table)
 
 FILE_WORD = "campaign file"
 """What messages call it."""
+
+
+class NotedError(Exception):
+    """A value is wrong, which has been noted."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,19 +34,38 @@ class ValueReader:
         """Note a fault on the line of a key."""
         self.document.fault(key, "" if value is None else shown(value), reason, expected, nearest=nearest)
 
-    def key(self, at: str, key: str, value: object, data: Mapping[str, Any]) -> Key | None:
-        """A key of the mission, or None with what is wrong noted."""
+    def noted(self, key: str, value: object, reason: str, expected: str, nearest: str = "") -> NotedError:
+        """Note a fault; returns what to raise."""
+        self.fault(key, value, reason, expected, nearest)
+        return NotedError()
+
+    def each(self, read: Callable[..., T], items: Iterable[tuple[Any, ...]]) -> tuple[T, ...]:
+        """What is read of each of some items; those with a fault, which is noted, are left out."""
+        found = []
+        for item in items:
+            with suppress(NotedError):
+                found.append(read(*item))
+        return tuple(found)
+
+    def table(self, at: str, model: type[TableT], raw: Mapping[str, Any]) -> TableT:
+        """A table that stands at a key. Raises `NotedError`."""
+        found = check_table(replace(self.document, prefix=at), model, raw)
+        if found is None:
+            raise NotedError
+        return found
+
+    def key(self, at: str, key: str, value: object, data: Mapping[str, Any]) -> Key:
+        """A key of the mission. Raises `NotedError`."""
         try:
             return find(key, data)
         except UnknownKeyError as error:
-            self.fault(f"{at}.{key}", value, error.reason, error.expected, error.nearest)
-            return None
+            raise self.noted(f"{at}.{key}", value, error.reason, error.expected, error.nearest) from None
 
     def fits(self, at: str, key: Key, value: object) -> bool:
         """Whether a value fits a key by itself; what is wrong with it is noted at a key of the campaign."""
         if key.item is not None:
             assert isinstance(key.rule, Quantity)
-            return self.number(at, key.rule, value) is not None
+            return bool(self.each(self.number, [(at, key.rule, value)]))
         scratch = replace(self.document, faults=[], prefix=key.text.rpartition(".")[0])
         if check_value(scratch, key.table, key.name, value):
             return True
@@ -47,15 +73,21 @@ class ValueReader:
             self.fault(at, value, fault.reason, fault.expected, fault.nearest)
         return False
 
-    def number(self, at: str, rule: Quantity, raw: object, example: str = "") -> float | None:
-        """The SI value of a quantity, or None with what is wrong noted, with ``example`` or the rule's own."""
+    def numbers(self, at: str, raw: Mapping[str, tuple[Quantity, object]]) -> tuple[float, ...]:
+        """The SI values of keys of a table by their rules. Raises `NotedError` with all that is wrong noted."""
+        found = self.each(self.number, [(f"{at}.{name}", rule, value) for name, (rule, value) in raw.items()])
+        if len(found) < len(raw):
+            raise NotedError
+        return found
+
+    def number(self, at: str, rule: Quantity, raw: object, example: str = "") -> float:
+        """The SI value of a quantity. Raises `NotedError` with what would do noted: ``example`` or the rule's own."""
         try:
             return float(rule.read(raw))
         except UnitError as error:
             example = example or (f'"{error.example}"' if " " in error.example else error.example)
             name = at.rpartition(".")[2]
-            self.fault(at, raw, error.reason, f"{error.expected}; for example {name} = {example}")
-            return None
+            raise self.noted(at, raw, error.reason, f"{error.expected}; for example {name} = {example}") from None
 
     def tell_missing(self, key: str, expected: str) -> None:
         """Say of a key that was noted as missing what would do in its place."""
@@ -86,5 +118,5 @@ def is_number(value: object) -> bool:
 
 def quoted_near(word: object, words: Iterable[str]) -> str:
     """The choice that a word resembles, in quotes, or ""."""
-    near = next(iter(difflib.get_close_matches(str(word)[:60], list(words), n=1)), "")
+    near = nearest(word, words)
     return near and f'"{near}"'

@@ -19,7 +19,7 @@ from hashlib import sha256
 from queue import Empty, SimpleQueue
 from typing import Any
 
-from microrad.campaign.engines.threads import SLICE_S, Clock, Flight, Waiting, late_flights, late_reason
+from microrad.campaign.engines.threads import SLICE_S, Clock, Flight, JobQueue, late_flights, late_reason
 from microrad.campaign.engines.worker import (
     Beat,
     Kind,
@@ -215,7 +215,7 @@ class DaskEngine:
         self._flights: dict[int, Flight] = {}
         self._futures: dict[int, Any] = {}
         self._forgiven: set[int] = set()
-        self._landed: SimpleQueue[int] = SimpleQueue()
+        self._ended: SimpleQueue[int] = SimpleQueue()
         self._serial = 0
         self._threads: dict[str, int] = {}
         self._installed: set[str] = set()
@@ -247,14 +247,14 @@ class DaskEngine:
 
         Raises CampaignError when the scheduler is gone, no worker is there, or one is not fit.
         """
-        waiting = Waiting(jobs)
+        queue = JobQueue(jobs)
         try:
             while True:
                 self._look()
-                self._feed(waiting)
-                if not self._flights and not self._expects(waiting):
+                self._feed(queue)
+                if not self._flights and not self._expects(queue):
                     return
-                yield from self._wait(waiting)
+                yield from self._wait(queue)
         finally:
             for serial in list(self._flights):
                 self._drop(serial)
@@ -358,20 +358,20 @@ class DaskEngine:
             self._installed.add(address)
 
     # ---------------------------------------------------------------------------------------------------------- jobs
-    def _expects(self, waiting: Waiting) -> bool:
+    def _expects(self, queue: JobQueue) -> bool:
         """Whether there are jobs, and no worker for them yet."""
-        job = None if self._threads else waiting.next()
+        job = None if self._threads else queue.next()
         if job is not None:
-            waiting.put_back(job)
+            queue.put_back(job)
         return job is not None
 
-    def _feed(self, waiting: Waiting) -> None:
+    def _feed(self, queue: JobQueue) -> None:
         """Hand out jobs: one a thread of the workers, and one that it finds when it has done its own.
 
         A worker of others gets none before it was looked at: one without microrad would end of it, and never be told.
         """
         while len(self._flights) < _AHEAD * (sum(self._threads.values()) or (1 if self._cluster else 0)):
-            job = waiting.next()
+            job = queue.next()
             if job is None:
                 return
             self._serial += 1
@@ -383,7 +383,7 @@ class DaskEngine:
         arguments = (self._name, self._topic, serial, tuple(job), beat_every_s(self._late_s))
         future = self._client.submit(do, *arguments, key=key, pure=False, priority=-serial)
         self._futures[serial] = future
-        future.add_done_callback(lambda _: self._landed.put(serial))
+        future.add_done_callback(lambda _: self._ended.put(serial))
 
     def _drop(self, serial: int) -> Flight:
         """Have nothing more to do with a job under way."""
@@ -394,36 +394,36 @@ class DaskEngine:
         self._forgiven.discard(serial)
         return self._flights.pop(serial)
 
-    def _again(self, serial: int, waiting: Waiting) -> None:
-        waiting.put_back(self._drop(serial).job)
+    def _again(self, serial: int, queue: JobQueue) -> None:
+        queue.put_back(self._drop(serial).job)
 
-    def _wait(self, waiting: Waiting) -> Iterator[Outcome]:
+    def _wait(self, queue: JobQueue) -> Iterator[Outcome]:
         """What happens within a slice."""
         with suppress(Empty):
-            serial = self._landed.get(timeout=SLICE_S)
+            serial = self._ended.get(timeout=SLICE_S)
             if serial in self._flights:
-                yield from self._land(serial, waiting)
+                yield from self._task_ended(serial, queue)
         yield from self._stop_the_late()
 
-    def _land(self, serial: int, waiting: Waiting) -> Iterator[Outcome]:
+    def _task_ended(self, serial: int, queue: JobQueue) -> Iterator[Outcome]:
         """What became of a task."""
         future = self._futures[serial]
         if future.status == "finished":
-            yield from self._finished(serial, waiting)
+            yield from self._finished(serial, queue)
         elif future.status == "error":
-            yield from self._failed(serial, future.exception(timeout=_ANSWER_S), waiting)
+            yield from self._failed(serial, future.exception(timeout=_ANSWER_S), queue)
         elif future.status in ("cancelled", "lost"):  # as where the connection was lost for a while
             self._wait_for_scheduler()
-            self._again(serial, waiting)
+            self._again(serial, queue)
 
-    def _finished(self, serial: int, waiting: Waiting) -> Iterator[Outcome]:
+    def _finished(self, serial: int, queue: JobQueue) -> Iterator[Outcome]:
         from concurrent.futures import CancelledError
 
         try:
             body = self._futures[serial].result(timeout=_ANSWER_S)
         except (CancelledError, OSError, TimeoutError):  # its worker died before the result was fetched
             self._wait_for_scheduler()
-            self._again(serial, waiting)
+            self._again(serial, queue)
             return
         kind, text = Kind(body[0]), body[1:]
         if kind is Kind.REFUSED:
@@ -431,13 +431,13 @@ class DaskEngine:
         if kind is Kind.OPEN:
             self._installed.discard(text.decode())
             self._looked_s = float("-inf")
-            self._again(serial, waiting)
+            self._again(serial, queue)
             return
         job = self._drop(serial).job
         done = kind is Kind.DONE
         yield Outcome(job, "done", text) if done else Outcome(job, "raised", reason=text.decode())
 
-    def _failed(self, serial: int, error: BaseException, waiting: Waiting) -> Iterator[Outcome]:
+    def _failed(self, serial: int, error: BaseException, queue: JobQueue) -> Iterator[Outcome]:
         """A task that gave no answer: its worker died, with it or while it waited there."""
         from distributed.scheduler import KilledWorker
 
@@ -448,7 +448,7 @@ class DaskEngine:
             return
         flight, address = self._flights[serial], error.last_worker.address
         if serial in self._forgiven or flight.where != address:  # it had not begun there
-            self._again(serial, waiting)
+            self._again(serial, queue)
             return
         times = error.allowed_failures + 1
         many = "" if times == 1 else f", the last of {times} that it was tried on"

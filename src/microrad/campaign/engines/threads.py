@@ -85,7 +85,7 @@ def late_reason(late_s: float) -> str:
     return f"gave no sign of life for {late_s:g} s and was stopped"
 
 
-class Waiting:
+class JobQueue:
     """The jobs to come: those to be started again first, then the caller's, asked for one at a time.
 
     The caller's iterator is asked again after it had none, so that it may have more once outcomes are known.
@@ -105,7 +105,7 @@ class Waiting:
         self._again.appendleft(job)
 
 
-class _Child:
+class _WorkerProcess:
     """A worker process: its messages in ``inbox`` (None at its end), when each job was heard of, what it said."""
 
     def __init__(self, spec: bytes, target: str, threads: int, late_s: float, clock: Clock) -> None:
@@ -200,7 +200,7 @@ class LocalEngine:
         """The process starts with the first jobs."""
         self._spec, self._target, self._threads, self._late_s = spec, target, threads, late_s
         self._clock = Clock()
-        self._child: _Child | None = None
+        self._worker: _WorkerProcess | None = None
         self._flights: dict[int, Flight] = {}
         self._serial = 0
         self._code = ""
@@ -212,126 +212,124 @@ class LocalEngine:
 
         Raises CampaignError when the work cannot be opened or its process dies again and again.
         """
-        waiting = Waiting(jobs)
+        queue = JobQueue(jobs)
         try:
             while True:
-                child = self._living_child()
-                self._feed(child, waiting)
-                if child.ready and not self._flights:
+                worker = self._living_worker()
+                self._feed(worker, queue)
+                if worker.ready and not self._flights:
                     return
-                yield from self._wait(child, waiting)
+                yield from self._wait(worker, queue)
         finally:
             if self._flights:
-                self._stop_child()
+                self._stop_worker()
 
     def close(self) -> None:
         """Stop at once."""
         if not self._closed:
             self._closed = True
-            self._stop_child()
+            self._stop_worker()
             self._clock.close()
 
-    def _living_child(self) -> _Child:
+    def _living_worker(self) -> _WorkerProcess:
         if self._closed:
             raise CampaignError("the workers were stopped while jobs were running")
-        if self._child is None:
-            self._child = _Child(self._spec, self._target, self._threads, self._late_s, self._clock)
-        return self._child
+        if self._worker is None:
+            self._worker = _WorkerProcess(self._spec, self._target, self._threads, self._late_s, self._clock)
+        return self._worker
 
-    def _stop_child(self) -> None:
-        child, self._child = self._child, None
+    def _stop_worker(self) -> None:
+        worker, self._worker = self._worker, None
         self._flights.clear()
-        if child is not None:
-            child.kill()
+        if worker is not None:
+            worker.kill()
 
-    def _feed(self, child: _Child, waiting: Waiting) -> None:
+    def _feed(self, worker: _WorkerProcess, queue: JobQueue) -> None:
         """Hand out jobs: one a thread, and one that a thread finds when it has done its own."""
-        while child.ready and len(self._flights) <= self._threads:
-            job = waiting.next()
+        while worker.ready and len(self._flights) <= self._threads:
+            job = queue.next()
             if job is None:
                 return
             if self._flights and (job.kind == "row" or any(f.job.kind == "row" for f in self._flights.values())):
-                waiting.put_back(job)
+                queue.put_back(job)
                 return
             if not self._flights:
-                child.last_heard_s = self._clock.now()
+                worker.last_heard_s = self._clock.now()
             self._serial += 1
             self._flights[self._serial] = Flight(job)
-            child.send(Message(Kind.JOB, self._serial, pack_job(job)))
+            worker.send(Message(Kind.JOB, self._serial, pack_job(job)))
 
-    def _wait(self, child: _Child, waiting: Waiting) -> Iterator[Outcome]:
+    def _wait(self, worker: _WorkerProcess, queue: JobQueue) -> Iterator[Outcome]:
         """What happens within a slice."""
         with suppress(Empty):
-            yield from self._take(child, child.inbox.get(timeout=SLICE_S), waiting)
-        if child is self._child:
-            yield from self._stop_the_late(child, waiting)
+            yield from self._take(worker, worker.inbox.get(timeout=SLICE_S), queue)
+        if worker is self._worker:
+            yield from self._stop_the_late(worker, queue)
 
-    def _take(self, child: _Child, message: Message | None, waiting: Waiting) -> Iterator[Outcome]:
-        """What a message, or the end of the child, means."""
+    def _take(self, worker: _WorkerProcess, message: Message | None, queue: JobQueue) -> Iterator[Outcome]:
+        """What a message, or the end of the worker, means."""
         if message is None:
-            yield from self._bury(child, waiting)
+            yield from self._worker_died(worker, queue)
         elif message.kind is Kind.READY:
-            self._greet(child, message.body.decode())
+            self._worker_ready(worker, message.body.decode())
         elif message.kind is Kind.REFUSED:
-            self._stop_child()
+            self._stop_worker()
             raise CampaignError(message.body.decode())
         else:
             self._deaths = self._false_starts = 0
             yield _outcome(self._flights.pop(message.serial).job, message)
 
-    def _greet(self, child: _Child, code: str) -> None:
-        """A child is ready; one that runs other code than the first is refused."""
+    def _worker_ready(self, worker: _WorkerProcess, code: str) -> None:
+        """A worker is ready; one that runs other code than the first is refused."""
         if self._code and code != self._code:
-            self._stop_child()
+            self._stop_worker()
             raise CampaignError(
                 f"the code of microrad changed while the campaign ran: it began with {self._code}, now it is {code}; "
                 "go back to the first, or begin the campaign anew"
             )
-        self._code, child.ready = code, True
+        self._code, worker.ready = code, True
 
-    def _hear(self, child: _Child) -> None:
+    def _note_signs_of_life(self, worker: _WorkerProcess) -> None:
         for serial, flight in self._flights.items():
-            flight.heard_s = child.heard.get(serial, flight.heard_s)
+            flight.heard_s = worker.heard.get(serial, flight.heard_s)
 
-    def _bury(self, child: _Child, waiting: Waiting) -> Iterator[Outcome]:
-        """The child has ended by itself: what it had begun has died, the rest starts again."""
-        self._hear(child)
+    def _worker_died(self, worker: _WorkerProcess, queue: JobQueue) -> Iterator[Outcome]:
+        """The worker has ended by itself: what it had begun has died, the rest starts again."""
+        self._note_signs_of_life(worker)
+        begun = [serial for serial, flight in self._flights.items() if flight.begun]
+        for job in self._lose(worker, begun, queue):
+            yield Outcome(job, "died", reason=f"its worker process {worker.ending()}")
+
+    def _lose(self, worker: _WorkerProcess, lost: list[int], queue: JobQueue) -> list[Job]:
+        """Stop the worker and return the jobs that are lost with it; all others start again."""
         flights = dict(self._flights)
-        self._stop_child()
-        for flight in reversed(flights.values()):
-            if not flight.begun:
-                waiting.put_back(flight.job)
-        self._count_death(child)
-        for flight in flights.values():
-            if flight.begun:
-                yield Outcome(flight.job, "died", reason=f"its worker process {child.ending()}")
+        self._stop_worker()
+        for serial, flight in reversed(flights.items()):
+            if serial not in lost:
+                queue.put_back(flight.job)
+        self._count_death(worker)
+        return [flights[serial].job for serial in lost]
 
-    def _count_death(self, child: _Child) -> None:
+    def _count_death(self, worker: _WorkerProcess) -> None:
         """Give up after many deaths in a row; after few where the process ends by itself before it can work."""
         self._deaths += 1
-        self._false_starts += not child.ready and child.process.returncode >= 0
+        self._false_starts += not worker.ready and worker.process.returncode >= 0
         if self._deaths >= _DEATHS or self._false_starts >= _FALSE_STARTS:
             raise CampaignError(
-                f"the worker process ended {self._deaths} times without a job done between; the last {child.ending()}"
+                f"the worker process ended {self._deaths} times without a job done between; the last {worker.ending()}"
             )
 
-    def _stop_the_late(self, child: _Child, waiting: Waiting) -> Iterator[Outcome]:
-        """Stop the child where a job of it is late: the others start again."""
-        self._hear(child)
+    def _stop_the_late(self, worker: _WorkerProcess, queue: JobQueue) -> Iterator[Outcome]:
+        """Stop the worker if a job of it is late: the others start again."""
+        self._note_signs_of_life(worker)
         now = self._clock.now()
         late = late_flights(self._flights, now, self._late_s)
         none_begun = not any(f.begun for f in self._flights.values())
-        limit_s = self._late_s if child.ready else _START_S
-        if not late and not (none_begun and now - child.last_heard_s > limit_s):
+        limit_s = self._late_s if worker.ready else _START_S
+        if not late and not (none_begun and now - worker.last_heard_s > limit_s):
             return
-        flights = dict(self._flights)
-        self._stop_child()
-        for serial, flight in reversed(flights.items()):
-            if serial not in late:
-                waiting.put_back(flight.job)
-        self._count_death(child)
-        for serial in late:
-            yield Outcome(flights[serial].job, "late", reason=late_reason(self._late_s))
+        for job in self._lose(worker, late, queue):
+            yield Outcome(job, "late", reason=late_reason(self._late_s))
 
 
 def _outcome(job: Job, message: Message) -> Outcome:

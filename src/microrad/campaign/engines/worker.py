@@ -130,7 +130,7 @@ def end_when_stuck(stuck_s: float) -> None:
     threading.Thread(target=wind, daemon=True, name="alarm").start()
 
 
-class _Port:
+class _ToParent:
     """The way to the parent, shared by threads; without a parent the process ends."""
 
     def __init__(self, stream: IO[bytes]) -> None:
@@ -167,7 +167,7 @@ def beat_every_s(late_s: float) -> float:
     return min(1.0, late_s / 10.0)
 
 
-def _do_jobs(work: Work, jobs: "SimpleQueue[Message]", port: _Port, late_s: float) -> None:
+def _do_jobs(work: Work, jobs: "SimpleQueue[Message]", port: _ToParent, late_s: float) -> None:
     """One thread: job after job."""
     while True:
         asked = jobs.get()
@@ -180,23 +180,18 @@ def _do_jobs(work: Work, jobs: "SimpleQueue[Message]", port: _Port, late_s: floa
         port.send(answer)
 
 
-def _open(target: str, spec: bytes, port: _Port) -> Work | None:
-    """The work, or None; the parent hears of which code it is, or why it cannot be opened."""
+def _serve(target: str, threads: int, late_s: float, jobs: "SimpleQueue[Message]", port: _ToParent) -> None:
+    """Open the work with the first message, then do jobs in ``threads`` threads.
+
+    The parent is told of which code the work is, or why it cannot be opened.
+    """
     try:
-        work = open_target(target, spec)
+        work = open_target(target, jobs.get().body)
         code = code_sha256(target)
     except BaseException as error:
         port.send(Message(Kind.REFUSED, 0, words(error).encode()))
-        return None
-    port.send(Message(Kind.READY, 0, code.encode()))
-    return work
-
-
-def _serve(target: str, threads: int, late_s: float, jobs: "SimpleQueue[Message]", port: _Port) -> None:
-    """Open the work with the first message, then do jobs in ``threads`` threads."""
-    work = _open(target, jobs.get().body, port)
-    if work is None:
         return
+    port.send(Message(Kind.READY, 0, code.encode()))
     for k in range(threads):
         threading.Thread(target=_do_jobs, args=(work, jobs, port, late_s), daemon=True, name=f"jobs {k}").start()
 
@@ -222,7 +217,7 @@ def main() -> None:
     incoming, outgoing = _take_pipes()
     jobs: SimpleQueue[Message] = SimpleQueue()
     threading.Thread(
-        target=_serve, args=(target, threads, late_s, jobs, _Port(outgoing)), daemon=True, name="open"
+        target=_serve, args=(target, threads, late_s, jobs, _ToParent(outgoing)), daemon=True, name="open"
     ).start()
     while (message := read_message(incoming)) is not None:
         jobs.put(message)

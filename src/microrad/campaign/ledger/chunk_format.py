@@ -174,7 +174,7 @@ def _ours(kind: str) -> Iterator[None]:
 
 
 def _check_sizes(table: list[tuple[str, list[int], int, int]]) -> None:
-    """Raise `ValueError` for more values than a record has: runs of equal ones cost nothing where they are stored."""
+    """Raises `ValueError` if there are more values than a record has: runs of equal ones take no room in the bytes."""
     left = _MOST_VALUES
     for _, shape, lead, trail in table:
         size = math.prod(shape)
@@ -185,7 +185,7 @@ def _check_sizes(table: list[tuple[str, list[int], int, int]]) -> None:
 
 
 def _check(kind: str, data: bytes) -> None:
-    """Raise unless these are bytes (a damaged ledger may give text), whole, of this version and of this kind."""
+    """Raises `CampaignError` if these are not whole bytes of this version and kind; a damaged ledger may give text."""
     if not isinstance(data, bytes) or len(data) < _PREFIX.size + _DIGEST or not data.startswith(_MAGIC):
         raise CampaignError(f"this is no {kind} of microrad: do its chunk again")
     if hashlib.sha256(memoryview(data)[:-_DIGEST]).digest() != data[-_DIGEST:]:

@@ -85,7 +85,7 @@ def argument(path: Path) -> str:
 
 
 def refuse_existing(path: Path) -> None:
-    """Raise `CampaignError` where no new ledger can be."""
+    """Raises `CampaignError` if no new ledger can be made here."""
     if not path.parent.is_dir():
         raise CampaignError(f"there is no folder {path.parent} for {path.name}: make it, or choose another")
     if is_ledger(path):
@@ -98,7 +98,7 @@ def refuse_existing(path: Path) -> None:
 
 
 def is_ledger(path: Path) -> bool:
-    """Whether a file is one of SQLite's. Raises `CampaignError` where its log is damaged."""
+    """Whether a file is one of SQLite's. Raises `CampaignError` if its log is damaged."""
     if not path.is_file() or not path.stat().st_size:
         return False
     refuse_damaged_log(path)
@@ -109,7 +109,7 @@ def is_ledger(path: Path) -> bool:
 
 
 def refuse_foreign(path: Path) -> None:
-    """Raise `CampaignError` for what cannot have been a ledger, however damaged: no file, an empty one, or text.
+    """Raises `CampaignError` if this cannot have been a ledger, however damaged: no file, an empty one, or text.
 
     A file of SQLite's is never opened but by SQLite: to close it again would drop the locks that other connections of
     this process hold on it, and with them what they know of its log (SQLite, How To Corrupt, 2.2).
@@ -131,7 +131,7 @@ def refuse_foreign(path: Path) -> None:
 
 
 def refuse_damaged_log(path: Path) -> None:
-    """Raise `CampaignError` where a killed writer's log is damaged, before SQLite opens it and deletes what is left."""
+    """Raises `CampaignError` if a killed writer's log is damaged, before SQLite opens it and deletes what is left."""
     if not path.is_file() or is_written(path) or not (damage := log.damage(files(path)[1])):
         return
     if not is_written(path):  # else it was begun anew while it was read
@@ -175,7 +175,7 @@ def _opened(path: Path, mode: str, write: bool) -> sqlite3.Connection:
 
 
 def _check_format(path: Path, connection: sqlite3.Connection) -> None:
-    """Raise unless this is a ledger of this format."""
+    """Raises `CampaignError` if this is no ledger of this format."""
     application, version = (
         connection.execute(f"PRAGMA {name}").fetchone()[0] for name in ("application_id", "user_version")
     )
@@ -201,7 +201,7 @@ def _schema() -> tuple[tuple[str, ...], ...]:
 
 
 def _check_schema(path: Path, connection: sqlite3.Connection) -> None:
-    """Raise unless the file defines the tables of a ledger and nothing else: a view may compute without an end."""
+    """Raises `CampaignError` if the file defines anything but the tables of a ledger: a view may compute for ever."""
     found = connection.execute(_SCHEMA).fetchmany(len(_schema()) + 1)
     if tuple(found) != _schema():
         odd = next((row for row in found if row not in _schema()), None)
@@ -224,13 +224,13 @@ def digest(*parts: int | str | bytes) -> bytes:
 
 
 def head_in(connection: sqlite3.Connection, table: str) -> Head:
-    """The head in one of the tables `HEADS`. Raises `CampaignError` where it is damaged."""
+    """The head in one of the tables `HEADS`. Raises `CampaignError` if it is damaged."""
     row = connection.execute(f"SELECT payload FROM {table}").fetchone()
     return chunk_format.unpack_head(b"" if row is None else row[0])
 
 
 def whole_head(path: Path, connection: sqlite3.Connection) -> Head:
-    """The head of a ledger. Raises `CampaignError` when neither of its two copies is whole."""
+    """The head of a ledger. Raises `CampaignError` if neither of its two copies is whole."""
     for table in HEADS:
         with suppress(CampaignError, sqlite3.Error):
             return head_in(connection, table)
@@ -299,7 +299,7 @@ def code_of(error: BaseException | None) -> int:
 
 
 @contextmanager
-def told(path: Path, what: str) -> Iterator[None]:
+def errors_in_words(path: Path, what: str) -> Iterator[None]:
     """Turn the errors of SQLite and of the file system into words: what failed, what is in, what to do."""
     try:
         yield

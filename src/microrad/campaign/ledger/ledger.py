@@ -22,6 +22,7 @@ from microrad.campaign.ledger.file import (
     argument,
     connected,
     digest,
+    errors_in_words,
     install,
     locked,
     make_empty,
@@ -30,7 +31,6 @@ from microrad.campaign.ledger.file import (
     refuse_existing,
     refuse_foreign,
     this_process,
-    told,
     whole_head,
 )
 from microrad.campaign.records import CampaignError, Chunk, WorstTrace
@@ -48,8 +48,8 @@ class Ledger:
 
     @classmethod
     def create(cls, path: Path, head: Head) -> Self:
-        """A new ledger, open for writing. Raises `CampaignError` where there is already a file or none can be."""
-        with told(path, "create the ledger"):
+        """A new ledger, open for writing. Raises `CampaignError` if there is already a file or none can be."""
+        with errors_in_words(path, "create the ledger"):
             refuse_existing(path)
             with closing(locked(path)):
                 draft = path.with_name(f".{path.name}.part")  # the lock is ours: what is there is a dead process's
@@ -61,8 +61,15 @@ class Ledger:
 
     @classmethod
     def open(cls, path: Path, *, write: bool) -> Self:
-        """The ledger in a file. Raises `CampaignError` where it is none, or where another process already writes."""
-        with told(path, "open the ledger"):
+        """The ledger in a file.
+
+        Args:
+            path: the file.
+            write: whether to write to it, which one process at a time may.
+
+        Raises `CampaignError` if it is no ledger, or if another process already writes to it.
+        """
+        with errors_in_words(path, "open the ledger"):
             refuse_foreign(path)
             lock = locked(path) if write else None
             try:
@@ -114,20 +121,20 @@ class Ledger:
                 )
 
     def get(self, cell: int, number: int) -> bytes | None:
-        """The bytes of a chunk, None where it is not done. Raises `CampaignError` where they are damaged."""
-        with told(self.path, f"read chunk {number} of cell {cell}"):
+        """The bytes of a chunk, None where it is not done. Raises `CampaignError` if they are damaged."""
+        with errors_in_words(self.path, f"read chunk {number} of cell {cell}"):
             wanted = "SELECT sha256, payload FROM chunks WHERE cell = ? AND number = ?"
             row = self._connection.execute(wanted, (cell, number)).fetchone()
         return None if row is None else self._sound(cell, number, *row)
 
     def done(self) -> set[tuple[int, int]]:
         """Cell and number of every chunk that is in."""
-        with told(self.path, "read what is done"):
+        with errors_in_words(self.path, "read what is done"):
             return set(self._connection.execute("SELECT cell, number FROM chunks"))
 
     def chunks(self, cell: int) -> Iterator[Chunk]:
         """The chunks of a cell in the order of their numbers, one at a time. Raises `CampaignError` if damaged."""
-        with told(self.path, f"read the chunks of cell {cell}"):
+        with errors_in_words(self.path, f"read the chunks of cell {cell}"):
             wanted = "SELECT number, sha256, payload FROM chunks WHERE cell = ? ORDER BY number"
             for number, sha256, payload in self._connection.execute(wanted, (cell,)):
                 yield chunk_format.unpack_chunk(self._sound(cell, number, sha256, payload))
@@ -137,14 +144,14 @@ class Ledger:
 
         Raises `CampaignError` if damaged.
         """
-        with told(self.path, "read what was added"):
+        with errors_in_words(self.path, "read what was added"):
             wanted = "SELECT rowid, cell, number, sha256, payload FROM chunks WHERE rowid > ? ORDER BY rowid"
             for at, cell, number, sha256, payload in self._connection.execute(wanted, (mark,)):
                 yield at, chunk_format.unpack_chunk(self._sound(cell, number, sha256, payload))
 
     def count(self) -> int:
         """How many chunks are in."""
-        with told(self.path, "count what is done"):
+        with errors_in_words(self.path, "count what is done"):
             return int(self._connection.execute("SELECT count(*) FROM chunks").fetchone()[0])
 
     def drop(self, cell: int, number: int) -> None:
@@ -164,7 +171,7 @@ class Ledger:
     # ------------------------------------------------------------------------------------------------ all that is small
     @property
     def head(self) -> Head:
-        """What the ledger is of. Raises `CampaignError` when neither of its two copies is whole."""
+        """What the ledger is of. Raises `CampaignError` if neither of its two copies is whole."""
         return whole_head(self.path, self._connection)
 
     def put_trace(self, trace: WorstTrace) -> None:
@@ -175,7 +182,7 @@ class Ledger:
 
     def traces(self) -> tuple[WorstTrace, ...]:
         """All traces by cell, output and row."""
-        with told(self.path, "read the traces"):
+        with errors_in_words(self.path, "read the traces"):
             wanted = "SELECT payload FROM traces ORDER BY cell, output, row"
             return tuple(chunk_format.unpack_trace(row[0]) for row in self._connection.execute(wanted))
 
@@ -195,7 +202,7 @@ class Ledger:
 
     def notes(self) -> dict[str, Any]:
         """All noted values by name; a damaged one is left out, as if it had not been noted."""
-        with told(self.path, "read the notes"):
+        with errors_in_words(self.path, "read the notes"):
             return notes_in(self._connection)
 
     def _sound(self, cell: int, number: int, sha256: bytes, payload: bytes) -> bytes:
@@ -223,7 +230,7 @@ class Ledger:
         """One transaction: all of it is kept, or nothing."""
         if self._lock is None:
             raise CampaignError(f"{self.path} is open for reading, so microrad cannot {what}")
-        with told(self.path, what):
+        with errors_in_words(self.path, what):
             self._connection.execute("BEGIN IMMEDIATE")
             try:
                 yield
@@ -235,7 +242,13 @@ class Ledger:
 
 
 def check_same(kept: Mapping[str, str], now: Mapping[str, str], path: Path) -> None:
-    """Raise `CampaignError` with both hashes of all that differs between a ledger's head and the present."""
+    """Raises `CampaignError`, with both hashes of all that differs, if a ledger is of something else than is there now.
+
+    Args:
+        kept: the hashes in the ledger's head, by what they are of.
+        now: those of what is there now.
+        path: the ledger.
+    """
     differing = [name for name in sorted({*kept, *now}) if kept.get(name) != now.get(name)]
     if differing:
         lines = [f"  {name}: {kept.get(name)} in the ledger, {now.get(name)} now" for name in differing]

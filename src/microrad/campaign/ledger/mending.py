@@ -14,6 +14,7 @@ from microrad.campaign.ledger.file import (
     code_of,
     connected,
     digest,
+    errors_in_words,
     files,
     head_in,
     install,
@@ -22,7 +23,6 @@ from microrad.campaign.ledger.file import (
     put_head,
     refuse_damaged_log,
     refuse_foreign,
-    told,
     whole_head,
 )
 from microrad.campaign.ledger.ledger import Ledger
@@ -58,19 +58,21 @@ class Verified:
 def verify(path: Path, expected: Iterable[tuple[int, int]] = ()) -> Verified:
     """Compute every checksum anew and have SQLite check its own structure; damage is found, not raised.
 
-    What keeps the file from being opened is a fault, too; ``expected`` are the chunks that should be there.
+    Args:
+        path: the ledger. What keeps it from being opened is a fault, too.
+        expected: cell and number of the chunks that should be there.
 
-    Raises `CampaignError` where there is no file or what never was a ledger, and where the file cannot be read for
-    another reason than damage.
+    Raises `CampaignError` if there is no file or what never was a ledger, or if the file cannot be read for another
+    reason than damage.
     """
-    with told(path, "open the ledger"):
+    with errors_in_words(path, "open the ledger"):
         try:
             refuse_damaged_log(path)
         except CampaignError as error:
             return Verified(0, (), (), (str(error),))
         refuse_foreign(path)
     try:
-        with told(path, "open the ledger"), closing(connected(path, write=False)) as connection:
+        with errors_in_words(path, "open the ledger"), closing(connected(path, write=False)) as connection:
             whole_head(path, connection)
             return _checked(connection, expected)
     except CampaignError as error:
@@ -85,10 +87,11 @@ def _checked(connection: sqlite3.Connection, expected: Iterable[tuple[int, int]]
     checked, damaged = 0, []
     try:
         wanted = "SELECT cell, number, sha256, payload FROM chunks ORDER BY cell, number"
-        for cell, number, sha256, payload in connection.execute(wanted):
-            right = sha256 == digest(cell, number, payload)
-            checked += right
-            damaged += [] if right else [(cell, number)]
+        for row in connection.execute(wanted):
+            if _sound_chunk(row):
+                checked += 1
+            else:
+                damaged.append(row[:2])
         there = set(connection.execute("SELECT cell, number FROM chunks"))
     except sqlite3.Error as error:
         return Verified(checked, tuple(damaged), (), (*faults, f"the table of chunks cannot be read: {error}"))
@@ -127,14 +130,6 @@ def _sound_chunk(row: tuple[Any, ...]) -> bool:
     return bool(sha256 == digest(cell, number, payload))
 
 
-def _is_head(payload: Any) -> bool:
-    try:
-        chunk_format.unpack_head(payload)
-    except CampaignError:
-        return False
-    return True
-
-
 def _sound_trace(row: tuple[Any, ...]) -> bool:
     try:
         trace = chunk_format.unpack_trace(row[-1])
@@ -164,7 +159,7 @@ def mend(path: Path) -> int:
     """
     found = verify(path)
     if found.faults:
-        with told(path, "mend the ledger"), closing(locked(path)):
+        with errors_in_words(path, "mend the ledger"), closing(locked(path)):
             _rebuild(path)
     with Ledger.open(path, write=True) as ledger:
         for cell, number in found.damaged:
@@ -185,10 +180,12 @@ def _rebuild(path: Path) -> None:
                 damaged.execute(f"PRAGMA {pragma}")
             leaves = _leaves(copy)
             payloads = [row[0] for table in HEADS for row in _rows(damaged, table, "payload", leaves)]
-            heads = [chunk_format.unpack_head(payload) for payload in payloads if _is_head(payload)]
-            if not heads:
+            for payload in payloads:
+                with suppress(CampaignError):
+                    put_head(draft, chunk_format.unpack_head(payload))
+                    break
+            else:
                 raise CampaignError(f"{path}: no copy of its head is whole; begin the campaign anew in another file")
-            put_head(draft, heads[0])
             _salvage(damaged, draft, leaves)
         install(draft, path)
 

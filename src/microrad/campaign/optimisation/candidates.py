@@ -24,7 +24,7 @@ class Problem:
     """What to minimise over which variables, and what each row has to keep.
 
     ``minimise`` is the key of a variable or an output, with a minus in front to maximise it; an output counts by its
-    mean over the rows, or by its quantile at ``quantile``. Each of ``limits`` is to be kept by the share ``confidence``
+    mean over the rows. Each of ``limits`` is to be kept by the share ``confidence``
     of the rows. ``evaluations`` is the most candidates that may be looked at.
     """
 
@@ -34,7 +34,6 @@ class Problem:
     confidence: float
     evaluations: int
     seed: int
-    quantile: float | None = None
 
     @property
     def cost_name(self) -> str:
@@ -110,7 +109,7 @@ def judged(problem: Problem, values: dict[str, float], columns: dict[str, Floats
     _check_rows(problem, weight.size)
     kept = tuple(_kept(limit, _column(columns, limit.output), weight, problem.confidence) for limit in problem.limits)
     name = problem.cost_name
-    cost = values[name] if name in values else _typical(_column(columns, name), weight, problem.quantile)
+    cost = values[name] if name in values else moments(_column(columns, name), weight).mean
     return Candidate(values, cost, kept, "" if not np.isnan(cost) else f"no row has a {name}")
 
 
@@ -140,16 +139,8 @@ def _at(values: Floats, weight: Floats, probability: float) -> int:
     return int(order[min(first, order.size - 1)])
 
 
-def _typical(output: Floats, weight: Floats, probability: float | None) -> float:
-    """Mean of the good rows or their quantile; nan without any."""
-    good = ~np.isnan(output)
-    if probability is None or not np.any(good):
-        return moments(output, weight).mean
-    return float(output[good][_at(output[good], weight[good], probability)])
-
-
 def _check_rows(problem: Problem, rows: int) -> None:
-    """Raise `CampaignError` where one missing row already is more than may miss a limit."""
+    """Raises `CampaignError` if one row that misses a limit is already too many."""
     if problem.limits and rows * (1.0 - problem.confidence) < 1.0 - 1e-9:
         raise CampaignError(
             f"optimise.rows: {rows} rows cannot tell whether {percent(problem.confidence)} of them keep a limit; "

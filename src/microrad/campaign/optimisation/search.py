@@ -24,7 +24,6 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from microrad.campaign.definition.outputs import OUTPUTS
 from microrad.campaign.optimisation.candidates import Candidate, Problem, judged, percent, quantity_text
 from microrad.campaign.records import CampaignError, Limit
 from microrad.core.arrays import Floats
@@ -334,16 +333,10 @@ def _reason(problem: Problem, best: Candidate | None, refused: list[Candidate]) 
 
 
 def _check(problem: Problem) -> None:
-    """Raise `CampaignError` where there is nothing to search or too little to search with."""
-    if not problem.variables:
-        raise CampaignError("optimise.variables: there is none; name at least one with its low and high")
+    """Raises `CampaignError` if there are too few evaluations to search with."""
     least = 8 * (len(problem.variables) + 1)
     if problem.evaluations < least:
         raise CampaignError(
             f"optimise.evaluations: {problem.evaluations} are too few for {len(problem.variables)} variables; "
             f"give at least {least}"
         )
-    if problem.cost_name not in OUTPUTS and problem.cost_name not in {v.key for v in problem.variables}:
-        raise CampaignError(f"optimise.minimise: {problem.cost_name!r} is neither one of the variables nor an output")
-    if not 0.0 < problem.confidence < 1.0:
-        raise CampaignError(f"optimise.confidence: {problem.confidence:g} is no share of rows between 0 and 1")

@@ -39,7 +39,7 @@ class Interim:
 
         Without sensitivities, sample and traces; outputs and tail are those of the cell that misses its limits least
         alone. ``progress.rows_done`` are the rows in the ledger: more than those of the cells while some are to be
-        read. The same object again where nothing is new. Raises `CampaignError` where there is no ledger, and for a
+        read. The same object again where nothing is new. Raises `CampaignError` if there is no ledger, and for a
         damaged one.
         """
         end = time.monotonic() + patience_s
