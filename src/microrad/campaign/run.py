@@ -16,6 +16,8 @@ import numpy as np
 from microrad.campaign import bundle
 from microrad.campaign.definition.outputs import OUTPUTS
 from microrad.campaign.definition.records import CampaignFile
+from microrad.campaign.engines.cluster import DaskEngine
+from microrad.campaign.engines.threads import LocalEngine
 from microrad.campaign.file import load_campaign
 from microrad.campaign.ledger import (
     Column,
@@ -57,11 +59,7 @@ class Means:
     def engine(self, spec: bytes, late_s: float) -> Engine:
         """The engine, started."""
         if self.workers is None and self.scheduler is None:
-            from microrad.campaign.engines.threads import LocalEngine
-
             return LocalEngine(spec, TARGET, self.threads or os.cpu_count() or 1, late_s)
-        from microrad.campaign.engines.cluster import DaskEngine  # dask is an extra
-
         return DaskEngine(spec, TARGET, address=self.scheduler, workers=self.workers, late_s=late_s)
 
 

@@ -13,6 +13,7 @@ import threading
 import time
 import uuid
 from collections.abc import Callable, Iterator
+from concurrent.futures import CancelledError
 from contextlib import suppress
 from dataclasses import dataclass, field
 from hashlib import sha256
@@ -225,7 +226,7 @@ class DaskEngine:
         self._cluster = None if address else _Cluster(workers or os.cpu_count() or 1)
         self.address = address or (self._cluster.address if self._cluster else "")
         self._client = self._connect(distributed)
-        self._workers_seen_s = self._lost_s = self._clock.now()
+        self._workers_seen_s = self._clock.now()
 
     def _connect(self, distributed: Any) -> Any:
         try:
@@ -417,8 +418,6 @@ class DaskEngine:
             self._again(serial, queue)
 
     def _finished(self, serial: int, queue: JobQueue) -> Iterator[Outcome]:
-        from concurrent.futures import CancelledError
-
         try:
             body = self._futures[serial].result(timeout=_ANSWER_S)
         except (CancelledError, OSError, TimeoutError):  # its worker died before the result was fetched

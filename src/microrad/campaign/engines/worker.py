@@ -4,6 +4,7 @@ Started by `threads.LocalEngine` as ``python -m microrad.campaign.engines.worker
 ends when its parent does, in whatever way that ends.
 """
 
+import ctypes
 import faulthandler
 import importlib
 import json
@@ -105,8 +106,6 @@ def die_with_parent(parent: int) -> bool:
     """Be killed when the parent (its process number) ends, even with all threads stuck; False where only Linux can."""
     if sys.platform != "linux":
         return False
-    import ctypes
-
     set_parent_death_signal = 1
     ctypes.CDLL(None).prctl(set_parent_death_signal, signal.SIGKILL)
     if os.getppid() != parent:  # it ended before the call

@@ -121,7 +121,7 @@ def _rate(data: link.DataLink, loss_db: float) -> float:
 def _day(file: LinkFile, under: Exposure) -> "day_study.Way":
     """What the relay takes under this pointing; nothing where the link has no contact."""
     from microrad.link import study as link_study
-    from microrad.orbit import day as day_study  # orbits: slow to load, and few campaigns ask for them
+    from microrad.orbit import day as day_study
 
     links = link_study.run(file)
     loss = day_study.PointingLoss(under.outage_loss_db, under.short_of(0.0), "campaign")

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from microrad.campaign.records import Interval, Sensitivity
+from microrad.campaign.statistics.intervals import student
 from microrad.core.arrays import Floats
 
 MOST_ROWS = 20_000
@@ -123,11 +124,9 @@ def _groups(rows: int) -> NDArray[np.intp]:
 
 def _jackknifed(value: float, left_out: Floats, confidence: float) -> Interval:
     """An index with its interval from what it is without each of the groups (delete-a-group jackknife), in 0 to 1."""
-    from scipy.special import stdtrit
-
     groups = left_out.size
     error = math.sqrt((groups - 1) / groups * float(np.sum((left_out - np.mean(left_out)) ** 2)))
-    half = float(stdtrit(groups - 1, 0.5 + confidence / 2.0)) * error
+    half = student(confidence, groups - 1) * error
     low, value, high = (min(max(v, 0.0), 1.0) for v in (value - half, value, value + half))
     return Interval(value, low, high, confidence)
 
@@ -149,12 +148,10 @@ def _correlation(a: Floats, b: Floats) -> float:
 
 def _rank_correlation(x: Floats, y: Floats, confidence: float) -> Interval:
     """Spearman's correlation; interval after D. G. Bonett and T. A. Wright, Psychometrika 65 (2000) 23."""
-    from scipy.special import ndtri
-
     value = _correlation(x, y)
     if math.isnan(value):
         return Interval(value, math.nan, math.nan, confidence)
-    half = float(ndtri(0.5 + confidence / 2.0)) * math.sqrt((1.0 + value**2 / 2.0) / (x.size - 3))
+    half = student(confidence, math.inf) * math.sqrt((1.0 + value**2 / 2.0) / (x.size - 3))
     middle = math.atanh(min(max(value, -1.0 + 1e-12), 1.0 - 1e-12))
     return Interval(value, math.tanh(middle - half), math.tanh(middle + half), confidence)
 

@@ -23,6 +23,7 @@ from microrad.campaign.records import (
 )
 from microrad.campaign.rows.plan import Plan, planned
 from microrad.campaign.statistics.cell import MOST_FAILED, CellFold
+from microrad.campaign.statistics.sensitivity import sensitivity
 from microrad.core.arrays import Floats
 from microrad.mirror import Variant
 
@@ -154,8 +155,6 @@ def _by_column(parts: Sequence[Mapping[str, Floats]]) -> dict[str, Floats]:
 
 def _sensitivities(campaign: CampaignFile, plan: Plan, book: Ledger) -> tuple[Sensitivity, ...]:
     """How the inputs act on the limited outputs, from the rows of the first cell."""
-    from microrad.campaign.statistics.sensitivity import sensitivity
-
     drawn = [each.key for each in campaign.inputs]
     names = list(dict.fromkeys(limit.output for limit in campaign.limits))
     if not drawn or not names:
