@@ -25,8 +25,8 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import OptimizeResult, least_squares
 
 from microrad.core.kernels import bouc_wen_response
-from microrad.lab.identify.hysteresis.axis import hysteretic_oscillator
 from microrad.lab.identify.hysteresis.plant_fit import Run, simulate, upsampled
+from microrad.lab.identify.hysteresis.structures import hysteretic_oscillator
 from microrad.mirror import model as mirror
 
 Model = Callable[[np.ndarray], np.ndarray]

@@ -54,7 +54,7 @@ _PUBLIC = {
 def __getattr__(name: str) -> Any:
     """A public name, from its module; the version, from the installed package."""
     if name == "__version__":
-        from importlib.metadata import version  # slow to load, and rarely asked for
+        from importlib.metadata import version
 
         return version("microrad")
     if name == "__all__":

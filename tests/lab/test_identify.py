@@ -23,8 +23,8 @@ from microrad.lab.identify import (
     predict,
 )
 from microrad.lab.identify.hysteresis.bouc_wen import _bound_gradient
-from microrad.lab.identify.ladder.choice import _best
-from microrad.lab.identify.prepared import colour_inflation, fastest_rate, prepare, transient
+from microrad.lab.identify.records import colour_inflation, fastest_rate, prepare, transient
+from microrad.lab.identify.selection.choice import _best
 from microrad.lab.recording import read_recording, recording_from_arrays
 from microrad.mission.file import load_mirror
 from places import DATA

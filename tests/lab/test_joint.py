@@ -18,11 +18,11 @@ from microrad.lab.identify import (
     predict,
 )
 from microrad.lab.identify.hysteresis import joint
-from microrad.lab.identify.hysteresis.axis import LinearPoles, Roots, poles_of, propagated
 from microrad.lab.identify.hysteresis.joint import thinned, time_constants
 from microrad.lab.identify.hysteresis.plant_fit import fit_plant, runs
 from microrad.lab.identify.hysteresis.prandtl_ishlinskii import threshold_grid
-from microrad.lab.identify.prepared import prepare
+from microrad.lab.identify.hysteresis.structures import LinearPoles, Roots, poles_of, propagated
+from microrad.lab.identify.records import prepare
 from microrad.lab.recording import read_recording
 from microrad.mirror import model as mirror
 from places import DATA

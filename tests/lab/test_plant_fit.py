@@ -7,7 +7,6 @@ import pytest
 from numpy.testing import assert_allclose
 
 from microrad.lab.identify import IdentificationError
-from microrad.lab.identify.hysteresis.axis import hysteretic_oscillator
 from microrad.lab.identify.hysteresis.plant_fit import (
     Parameter,
     Problem,
@@ -19,6 +18,7 @@ from microrad.lab.identify.hysteresis.plant_fit import (
     simulate,
     upsampled,
 )
+from microrad.lab.identify.hysteresis.structures import hysteretic_oscillator
 from microrad.lab.recording import read_recording, recording_from_arrays
 from microrad.mirror import model as mirror
 from places import DATA

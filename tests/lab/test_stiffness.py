@@ -8,7 +8,7 @@ import pytest
 
 from microrad.core import kernels
 from microrad.lab.identify import fit_hysteretic_stiffness, fit_linear, output_error, predicted_error
-from microrad.lab.identify.prepared import IdentificationError
+from microrad.lab.identify.records import IdentificationError
 from microrad.lab.identify.stiffness import fit as stiffness_fit
 from microrad.lab.identify.stiffness import tangents
 from microrad.lab.identify.stiffness.fit import StiffnessOptions, simulate_hysteretic_stiffness

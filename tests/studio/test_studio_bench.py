@@ -15,13 +15,16 @@ from microrad.loop import fine_pointing
 from microrad.loop import paper_cases as tracking
 from microrad.loop.fine_loop import linear
 from microrad.mission.file import load_mission
-from microrad.studio import control_model, control_view, live_fit, mirror_form, mirror_view
-from microrad.studio.control_model import PID, PID_INVERSE, WITH, WITHOUT
-from microrad.studio.draft import Draft
-from microrad.studio.jobs_files import Job, Progress
-from microrad.studio.mirror_form import Dropped, Form, Setting, SettingError
-from microrad.studio.mirror_use import with_mirror_file
-from microrad.studio.reading import ChannelInfo, Listing, Note, View
+from microrad.studio.draft.draft import Draft
+from microrad.studio.draft.mirror_file import with_mirror_file
+from microrad.studio.jobs.files import Job, Progress
+from microrad.studio.recordings.reading import ChannelInfo, Listing, Note, View
+from microrad.studio.views import control as control_view
+from microrad.studio.views import controllers as control_model
+from microrad.studio.views import live_fit, mirror_form
+from microrad.studio.views import mirror as mirror_view
+from microrad.studio.views.controllers import PID, PID_INVERSE, WITH, WITHOUT
+from microrad.studio.views.mirror_form import Dropped, Form, Setting, SettingError
 from scenes import cases_of, scene_of
 from shipped import SHIPPED
 

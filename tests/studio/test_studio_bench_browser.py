@@ -14,8 +14,8 @@ import pytest
 from browser import until
 from cli.test_cli import write_recording
 from microrad.lab import bench
-from microrad.studio.live_fit import read_fits
-from microrad.studio.mirror_form import kept_form
+from microrad.studio.views.live_fit import read_fits
+from microrad.studio.views.mirror_form import kept_form
 from places import DATA
 
 api = pytest.importorskip("playwright.sync_api", reason="Playwright is not installed")

@@ -18,8 +18,9 @@ from microrad.campaign.statistics.interim import Interim
 from microrad.campaign.statistics.summary import summarise_campaign
 from microrad.loop.fine_loop.ensemble import bin_edges_rad
 from microrad.report import campaign_words
-from microrad.studio import campaign_live, campaign_view
-from microrad.studio.campaign_live import Live, LiveCampaigns
+from microrad.studio.jobs import ledgers as campaign_live
+from microrad.studio.jobs.ledgers import Live, LiveCampaigns
+from microrad.studio.views import campaign as campaign_view
 from small_campaign import campaign_file
 from waiting import HANG_S
 

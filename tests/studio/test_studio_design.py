@@ -16,9 +16,12 @@ from microrad.link import study as link_study
 from microrad.link import under_jitter
 from microrad.orbit import day as day_study
 from microrad.report import day_plots, figures
-from microrad.studio import attempts, day_view, dials, link_view, plots, pointing_view
-from microrad.studio.draft import Draft
-from microrad.studio.latest import Latest, shared
+from microrad.studio.draft.draft import Draft
+from microrad.studio.views import attempts, plots, sliders
+from microrad.studio.views import day as day_view
+from microrad.studio.views import link as link_view
+from microrad.studio.views import pointing as pointing_view
+from microrad.studio.views.latest import Latest, shared
 from waiting import HANG_S
 
 
@@ -37,13 +40,13 @@ def day(draft):
     return day_view.run(draft.set("operations.runs", "2").link(), lambda done, total, what: None)
 
 
-def dial_of(draft, key):
-    return dials.dial(draft.values[key])
+def slider_of(draft, key):
+    return sliders.slider(draft.values[key])
 
 
-# --------------------------------------------------------------------------------------------------------------- dials
-def test_a_dial_stands_at_its_value_and_writes_its_unit(draft):
-    aperture = dial_of(draft, "terminals.leo_aperture")
+# ------------------------------------------------------------------------------------------------------------ sliders
+def test_a_slider_stands_at_its_value_and_writes_its_unit(draft):
+    aperture = slider_of(draft, "terminals.leo_aperture")
     assert (aperture.label, aperture.typed, aperture.unit) == ("LEO aperture", "5 cm", "cm")
     assert aperture.at(aperture.position) == "5 cm"
     assert (aperture.at(0), aperture.at(aperture.steps)) == ("1 cm", "20 cm")
@@ -68,27 +71,27 @@ def test_a_link_with_more_light_received_than_sent_is_missed(draft):
     assert [each.met for each in close[1:]] == [each.met for each in far[1:]] == [True, True]
 
 
-def test_every_position_of_every_dial_is_a_value_that_the_mission_takes(draft):
-    groups = link_view.dials(draft) | pointing_view.dials(draft)
-    every = [dial for group in groups.values() for dial in group]
+def test_every_position_of_every_slider_is_a_value_that_the_mission_takes(draft):
+    groups = link_view.sliders(draft) | pointing_view.sliders(draft)
+    every = [slider for group in groups.values() for slider in group]
     assert len(every) > 30
-    for dial in every:
-        about = draft.values[dial.key].about
-        for position in (0, dial.steps // 3, dial.position, dial.steps) if dial.scale != "none" else ():
-            typed = dial.at(position)
+    for slider in every:
+        about = draft.values[slider.key].about
+        for position in (0, slider.steps // 3, slider.position, slider.steps) if slider.scale != "none" else ():
+            typed = slider.at(position)
             value = about.quantity.read(typed if about.unit else float(typed))  # raises where it is refused
-            assert math.isfinite(value), (dial.key, typed)
+            assert math.isfinite(value), (slider.key, typed)
 
 
-def test_a_dial_in_decibels_is_linear_and_ends_at_the_bound_of_the_mission(draft):
-    loss = dial_of(draft.set("communication.transmit_optics_loss", "0 dB"), "communication.transmit_optics_loss")
+def test_a_slider_in_decibels_is_linear_and_ends_at_the_bound_of_the_mission(draft):
+    loss = slider_of(draft.set("communication.transmit_optics_loss", "0 dB"), "communication.transmit_optics_loss")
     assert (loss.scale, loss.low, loss.high, loss.at(0), loss.at(5)) == ("linear", 0.0, 10.0, "0 dB", "0.5 dB")
-    level = dial_of(draft.set("beacon.required_power", "-80 dBm"), "beacon.required_power")
+    level = slider_of(draft.set("beacon.required_power", "-80 dBm"), "beacon.required_power")
     assert (level.scale, level.at(0), level.at(level.steps)) == ("linear", "-90 dBm", "-70 dBm")
 
 
-def test_a_dial_grows_for_a_value_outside_and_keeps_its_range_for_one_inside(draft):
-    aperture = dial_of(draft, "terminals.leo_aperture")
+def test_a_slider_grows_for_a_value_outside_and_keeps_its_range_for_one_inside(draft):
+    aperture = slider_of(draft, "terminals.leo_aperture")
     inside, outside = aperture.holding("7 cm"), aperture.holding("90 cm")
     assert (inside.low, inside.high, inside.value) == (aperture.low, aperture.high, 7.0)
     assert (outside.low, outside.high, outside.position) == (aperture.low, 90.0, outside.steps)
@@ -98,26 +101,26 @@ def test_a_dial_grows_for_a_value_outside_and_keeps_its_range_for_one_inside(dra
 
 @pytest.mark.parametrize("typed", ["largest", "", "5,2 cm", "5"])
 def test_what_is_no_quantity_has_no_slider(draft, typed):
-    rate = dial_of(draft, "communication.data_rate")
+    rate = slider_of(draft, "communication.data_rate")
     assert rate.scale == "logarithmic"
     assert rate.holding(typed).scale == "none"
 
 
 def test_a_share_near_one_has_no_slider_and_a_small_one_does_not_reach_one(draft):
-    assert dial_of(draft, "pointing.confidence").scale == "none"
-    outage = dial_of(draft, "requirement.outage")
+    assert slider_of(draft, "pointing.confidence").scale == "none"
+    outage = slider_of(draft, "requirement.outage")
     assert outage.scale == "logarithmic"
     assert float(outage.at(outage.steps)) < 1.0
 
 
-def test_a_fault_is_told_beside_its_dial_in_the_words_of_the_command_line(draft):
+def test_a_fault_is_told_beside_its_slider_in_the_words_of_the_command_line(draft):
     wrong = draft.set("terminals.leo_aperture", "5")
-    told = dials.faulty(wrong, ["terminals.leo_aperture", "terminals.geo_aperture"])
+    told = sliders.faulty(wrong, ["terminals.leo_aperture", "terminals.geo_aperture"])
     assert [*told] == ["terminals.leo_aperture"]
     assert "without a unit" in told["terminals.leo_aperture"]
     assert "a length with its unit" in told["terminals.leo_aperture"]
     assert wrong.problems[0].reason in told["terminals.leo_aperture"]
-    assert dials.faulty(draft, ["terminals.leo_aperture"]) == {}
+    assert sliders.faulty(draft, ["terminals.leo_aperture"]) == {}
 
 
 # ------------------------------------------------------------------------------------------------------------ attempts
@@ -246,10 +249,10 @@ def test_the_words_of_the_map_name_both_ways_out_and_that_there_is_none(draft, v
     assert "no pointing error at 300 Mbit/s" in link_view.map_words(dark)
 
 
-def test_dials_are_those_of_the_links_and_the_seldom_moved_stand_behind(draft):
-    found = link_view.dials(draft)
+def test_sliders_are_those_of_the_links_and_the_seldom_moved_stand_behind(draft):
+    found = link_view.sliders(draft)
     assert [*found] == ["Telescopes", "Communication", "Beacon", "Answer", "Required"]
-    keys = [dial.key for group in found.values() for dial in group]
+    keys = [slider.key for group in found.values() for slider in group]
     assert "fine_pointing.body.error" not in keys
     assert next(key for key in keys if link_view.second(key)) == "communication.wavelength"
     assert not link_view.second("terminals.leo_aperture")
@@ -460,7 +463,7 @@ def test_what_pages_share_belongs_to_its_owner():
 
 def test_nothing_of_this_needs_a_browser():
     folder = Path(link_view.__file__).parent
-    names = ("link_view", "pointing_view", "day_view", "dials", "plots", "latest", "attempts")
+    names = ("link_view", "pointing_view", "day_view", "sliders", "plots", "latest", "attempts")
     texts = [(folder / f"{name}.py").read_text("utf-8") for name in names]
     assert len(texts) == 7
     assert not any("nicegui" in text for text in texts)

@@ -28,7 +28,6 @@ from microrad.cli.frame import (
 )
 from microrad.core.folder import read_bytes, write_whole
 
-# Everything else is imported inside the commands: it takes longer to load than help may take.
 if TYPE_CHECKING:
     from microrad.campaign.run import Means
 

@@ -16,8 +16,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from microrad.core.arrays import Floats
+
 if TYPE_CHECKING:
-    from microrad.lab.identify.ladder.predictions import Judged, Prediction
+    from microrad.lab.identify.selection.predictions import Judged, Prediction
     from microrad.lab.recording import Recording
 
 FITS = "fits"
@@ -98,7 +100,7 @@ def _digits(values: object) -> tuple[float, ...]:
     return tuple(float(f"{value:.7g}") for value in np.asarray(values, dtype=float))
 
 
-def extremes(columns: list[NDArray[np.float64]], points: int) -> NDArray[np.intp]:
+def extremes(columns: list[Floats], points: int) -> NDArray[np.intp]:
     """Rows, in order, that hold the smallest and largest value of every column in each of `points`/2 stretches.
 
     A recording of at most `points` samples is kept whole.

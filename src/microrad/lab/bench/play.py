@@ -9,8 +9,8 @@ import numpy as np
 from microrad.core.arrays import Floats
 from microrad.core.progress import Progress
 from microrad.core.units import format_quantity
+from microrad.lab.bench.mirrors import Amplifier, bench_output, bouc_wen_output, linear_output
 from microrad.lab.bench.plan import ConvertersTable, Plan, Record
-from microrad.lab.bench.truth import Amplifier, bench_output, bouc_wen_output, linear_output
 from microrad.lab.recording.records import Recording, digest_of, frozen
 
 _MRAD = 1e3  # recordings are in volts and mrad

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
+from microrad.core.arrays import Floats
 from microrad.lab.recording.checks.sample_rate import agreed_rate, check_rate, rate_of_time
 from microrad.lab.recording.checks.signals import check_signals
 from microrad.lab.recording.files import check_file, file_format
@@ -14,7 +15,6 @@ from microrad.lab.recording.records import (
     ACCEPTABLE,
     MIN_SAMPLES,
     Finding,
-    FloatArray,
     Recording,
     RecordingError,
     digest_of,
@@ -223,7 +223,7 @@ def _clock(source: Source, used: Sequence[int], time: Column | None) -> int | No
 
 def _load(
     source: Source, used: list[int], clock: int | None, optional: bool
-) -> tuple[list[FloatArray], list[StatedRate], list[Finding]]:
+) -> tuple[list[Floats], list[StatedRate], list[Finding]]:
     """Columns of the channels, and what the time column says; `optional` lets one pass that is not made of numbers."""
     if clock is None:
         return source.load(used), [], []
@@ -249,7 +249,7 @@ def _load(
     return columns, [rate], findings
 
 
-def _check_lengths(source: Source, indices: Sequence[int], columns: Sequence[FloatArray]) -> None:
+def _check_lengths(source: Source, indices: Sequence[int], columns: Sequence[Floats]) -> None:
     for index, column in zip(indices, columns, strict=True):
         if column.size != columns[0].size:
             raise RecordingError(
@@ -294,5 +294,5 @@ def _checked_period(where: str, period_samples: int | None, samples: int) -> int
     return int(period_samples)
 
 
-def _table(columns: Sequence[FloatArray]) -> FloatArray:
+def _table(columns: Sequence[Floats]) -> Floats:
     return frozen(columns[0][:, None] if len(columns) == 1 else np.column_stack(columns))

@@ -12,8 +12,8 @@ from microrad.mission.file import MissionFile
 from microrad.mission.tables.fine_pointing import FinePointing
 from microrad.studio.commands import Design
 from microrad.studio.pages import layout
-from microrad.studio.pages.aside import aside, stay
-from microrad.studio.workshop import Workshop
+from microrad.studio.pages.in_thread import in_thread, stay
+from microrad.studio.session import Session
 
 TITLE = "Control"
 PATH = "/control"
@@ -52,27 +52,27 @@ _CSS = """
 """
 
 
-def page(workshop: Workshop) -> None:
+def page(session: Session) -> None:
     """A table of all controllers, and below it one of them."""
     ui.add_head_html(f"<style>{_CSS}</style>")
-    ControlPage(workshop)
+    ControlPage(session)
 
 
 class ControlPage:
     """The page of one tab; what is tuned is kept for all tabs by `control_model`."""
 
-    def __init__(self, workshop: Workshop) -> None:
-        """Build the body, and have it follow the workshop."""
-        self.workshop = workshop
+    def __init__(self, session: Session) -> None:
+        """Build the body, and have it follow the session."""
+        self.session = session
         self.file: MissionFile | None = None
         self.question, self.round, self.filling = 0, 0, False
         self.rows: dict[str, dict[str, Any]] = {}
         self.plots: dict[str, Any] = {}
-        layout.copy_buttons(lambda: Design(Path(workshop.name_of(workshop.draft.path))))
+        layout.copy_buttons(lambda: Design(Path(session.name_of(session.draft.path))))
         self.words = ui.label().classes("control-words").props('role="alert"')
         self._all()
         self._one()
-        layout.follow(workshop, lambda: background_tasks.create(self.reload()))
+        layout.follow(session, lambda: background_tasks.create(self.reload()))
 
     def _all(self) -> None:
         layout.heading("Controllers of the mission")
@@ -118,7 +118,7 @@ class ControlPage:
         return ui.label().props('role="status"')
 
     def _plots(self, *names: str) -> None:
-        from microrad.studio.plots import empty
+        from microrad.studio.views.plots import empty
 
         with ui.element("div").classes("control-plots"):
             for name in names:
@@ -130,13 +130,13 @@ class ControlPage:
     async def reload(self) -> None:
         """Take over the mission as it is now; while it has faults, the last one stays."""
         stay(self.table)
-        file = self.workshop.mission()
-        self.words.text = self.workshop.faults()
+        file = self.session.mission()
+        self.words.text = self.session.faults()
         if file is None or (self.file is not None and file.sha256 == self.file.sha256 and file == self.file):
             return
-        from microrad.studio import control_view
+        from microrad.studio.views import control as control_view
 
-        names = await aside(self.table, _names, file.mission.fine_pointing)
+        names = await in_thread(self.table, _names, file.mission.fine_pointing)
         self.file, self.round = file, self.round + 1
         self.rows = {name: control_view.waiting_row(name) for name in names}
         self._table()
@@ -170,7 +170,7 @@ class ControlPage:
 
     async def _tuned(self, file: MissionFile, name: str) -> Any:
         """A controller, and its row; None where it cannot be built, which its row says."""
-        from microrad.studio import control_view
+        from microrad.studio.views import control as control_view
 
         def told(row: dict[str, Any]) -> None:
             if file is self.file:
@@ -180,7 +180,7 @@ class ControlPage:
         if not self.rows[name]["modulus"]:
             told(control_view.waiting_row(name, "being tuned ..."))
         try:
-            found = await aside(self.table, _controller, file, name)
+            found = await in_thread(self.table, _controller, file, name)
         except ValueError as error:
             told(control_view.waiting_row(name, str(error)))
             return None
@@ -193,7 +193,7 @@ class ControlPage:
     # -------------------------------------------------------------------------------------------------------------- one
     async def show(self) -> None:
         """Show the chosen controller; a late answer to an older question is dropped."""
-        from microrad.studio import control_view
+        from microrad.studio.views import control as control_view
 
         file, name = self.file, self.name.value
         if self.filling or file is None or not name:
@@ -213,7 +213,7 @@ class ControlPage:
         try:
             ask = control_view.ask_of(self.step.value, self.amplitude.value, self.frequency.value, found.rate_hz)
             self.state.text = "Simulating ..."
-            answers = await aside(self.table, found.ask, ask, control_view.SHOWN[self.variants.value])
+            answers = await in_thread(self.table, found.ask, ask, control_view.SHOWN[self.variants.value])
         except ValueError as error:
             self.fault.text, self.state.text = str(error), ""
             self._dim([name for name in self.plots if name not in _OWN])
@@ -232,7 +232,7 @@ class ControlPage:
             layout.grey(each, each in grey)
 
     def _controller(self, found: Any) -> None:
-        from microrad.studio import control_view
+        from microrad.studio.views import control as control_view
 
         self.notes.clear()
         with self.notes:
@@ -248,7 +248,7 @@ class ControlPage:
         self.plots["gain"].update_figure(control_view.gain_plot(found))
 
     def _answers(self, found: Any, answers: Any) -> None:
-        from microrad.studio import control_view as view
+        from microrad.studio.views import control as view
 
         self.shaken.visible = bool(answers.jitter)
         self.told_step.text = view.answer_words(answers.step, "Error", found.field_of_view_rad)
@@ -268,13 +268,13 @@ class ControlPage:
 
 
 def _names(table: FinePointing | None) -> tuple[str, ...]:
-    from microrad.studio import control_model  # loads the kernels, in a thread
+    from microrad.studio.views import controllers as control_model  # loads the kernels, in a thread
 
     return control_model.names(table)
 
 
 def _controller(file: MissionFile, name: str) -> Any:
-    from microrad.studio import control_model
+    from microrad.studio.views import controllers as control_model
 
     return control_model.controller(file, name)
 

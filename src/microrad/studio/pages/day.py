@@ -8,14 +8,15 @@ from typing import NamedTuple
 from nicegui import ui
 
 from microrad.orbit.day import DayStudy
-from microrad.studio import day_view, plots
 from microrad.studio.commands import Contacts
-from microrad.studio.latest import Latest, State, shared
 from microrad.studio.pages import layout
-from microrad.studio.pages.aside import aside
-from microrad.studio.pages.dial_rows import add_style
+from microrad.studio.pages.in_thread import in_thread
 from microrad.studio.pages.pieces import Column, columns, file_of, plot, table
-from microrad.studio.workshop import Workshop
+from microrad.studio.pages.sliders import add_style
+from microrad.studio.session import Session
+from microrad.studio.views import day as day_view
+from microrad.studio.views import plots
+from microrad.studio.views.latest import Latest, State, shared
 
 TITLE = "Day"
 PATH = "/day"
@@ -40,25 +41,25 @@ class Drawn(NamedTuple):
     words: str
 
 
-def page(workshop: Workshop) -> None:
+def page(session: Session) -> None:
     """Progress, then timeline, volumes, latencies and tables."""
     add_style()
-    DayPage(workshop)
+    DayPage(session)
 
 
 class DayPage:
     """The page of one tab; the day is computed once for all tabs."""
 
-    def __init__(self, workshop: Workshop) -> None:
-        """Build the body, and have it follow the workshop."""
-        self.workshop, self.shown = workshop, ""
-        self.latest: Latest[DayStudy] = shared(workshop, "day")
-        layout.copy_buttons(lambda: Contacts(file_of(workshop)))
+    def __init__(self, session: Session) -> None:
+        """Build the body, and have it follow the session."""
+        self.session, self.shown = session, ""
+        self.latest: Latest[DayStudy] = shared(session, "day")
+        layout.copy_buttons(lambda: Contacts(file_of(session)))
         self._progress()
         with ui.column().classes("w-full") as self.results:
             self._results()
         self.results.visible = False
-        layout.follow(workshop, self.reload)
+        layout.follow(session, self.reload)
         ui.timer(_LOOK_S, self.look)
 
     def _progress(self) -> None:
@@ -95,7 +96,7 @@ class DayPage:
 
     def reload(self) -> None:
         """Have the day of the draft computed, if it can be."""
-        draft, file = self.workshop.draft, self.workshop.link()
+        draft, file = self.session.draft, self.session.link()
         lacking = "" if file is None else day_view.missing(file)
         self.faults.text = draft.report if file is None else lacking
         self.faults.visible = file is None or bool(lacking)
@@ -110,11 +111,11 @@ class DayPage:
         if state.result is None or key == self.shown:
             return
         self.shown = key
-        self._show(state.result, await aside(self.results, _drawn, state.result))
+        self._show(state.result, await in_thread(self.results, _drawn, state.result))
 
     def _show_progress(self, state: State[DayStudy]) -> None:
         step = f": {state.done} of {state.total}" if state.total else ""
-        now = state.key == self.workshop.draft.sha256
+        now = state.key == self.session.draft.sha256
         known = "The day of the mission as it stands." if now else "The day of the mission before this."
         words = known if state.result else "Not computed."
         self.state.text = f"Computing, {state.what or 'links'}{step}" if state.running else state.error or words

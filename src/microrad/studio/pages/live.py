@@ -10,9 +10,9 @@ from contextlib import suppress
 
 from nicegui.element import Element
 
-from microrad.studio.link_view import Margin
-from microrad.studio.pages.aside import stay
-from microrad.studio.plots import Plot
+from microrad.studio.pages.in_thread import stay
+from microrad.studio.views.link import Margin
+from microrad.studio.views.plots import Plot
 
 _DRAWN_S = 5.0
 """For how long a browser may draw before it is asked for more."""

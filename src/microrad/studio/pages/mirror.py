@@ -11,17 +11,19 @@ from typing import Any
 from nicegui import ui
 
 from microrad.lab.recording import ACCEPTABLE
-from microrad.studio import mirror_form, mirror_view, reading
 from microrad.studio.commands import Identify
-from microrad.studio.jobs import JobError
-from microrad.studio.mirror_form import Dropped, Form, Setting, SettingError
+from microrad.studio.jobs.queue import JobError
 from microrad.studio.pages import layout
-from microrad.studio.pages.aside import aside, stay
 from microrad.studio.pages.drop import Drop
+from microrad.studio.pages.in_thread import in_thread, stay
 from microrad.studio.pages.mirror_job import JobView
-from microrad.studio.plots import CONFIG
-from microrad.studio.uploads import Upload, UploadError, Uploads
-from microrad.studio.workshop import Workshop
+from microrad.studio.recordings import reading
+from microrad.studio.recordings.uploads import Upload, UploadError, Uploads
+from microrad.studio.session import Session
+from microrad.studio.views import mirror as mirror_view
+from microrad.studio.views import mirror_form
+from microrad.studio.views.mirror_form import Dropped, Form, Setting, SettingError
+from microrad.studio.views.plots import CONFIG
 
 TITLE = "Mirror"
 PATH = "/mirror"
@@ -47,20 +49,20 @@ _CSS = """
 """
 
 
-def page(workshop: Workshop) -> None:
+def page(session: Session) -> None:
     """The form at the left; the recording and the identification at the right."""
     ui.add_head_html(f"<style>{_CSS}</style>")
-    MirrorPage(workshop)
+    MirrorPage(session)
 
 
 class MirrorPage:
     """The page of one tab; recordings and form lie in the studio's folder, the identification in its job's."""
 
-    def __init__(self, workshop: Workshop) -> None:
+    def __init__(self, session: Session) -> None:
         """Build the body, and look at the folder and the job from time to time."""
-        self.workshop = workshop
-        self.uploads = Uploads(workshop.studio / "uploads")
-        self.path = workshop.studio / "mirror-form.json"
+        self.session = session
+        self.uploads = Uploads(session.studio / "uploads")
+        self.path = session.studio / "mirror-form.json"
         self.form = mirror_form.kept_form(self.path)
         self.shown, self.question, self.filling, self.kept = "", 0, False, True
         self.listings: dict[str, reading.Listing | str] = {}  # by key: a recording stays as it is
@@ -73,7 +75,7 @@ class MirrorPage:
                 self._inputs()
             with ui.element("div").classes("mirror-seen"):
                 self._plots()
-                self.job = JobView(workshop)
+                self.job = JobView(session)
         ui.timer(_LOOK_S, self.look)
         ui.timer(_LOOK_S, self.check)
 
@@ -127,7 +129,7 @@ class MirrorPage:
     async def take(self, upload: Upload) -> None:
         """Look into a file that was dropped; one that is no recording is thrown away, in the reader's words."""
         async with self.listing_turn:
-            found = await aside(self.list, self._read_in, upload.key)
+            found = await in_thread(self.list, self._read_in, upload.key)
         if isinstance(found, str):
             self.refuse(found)
             return
@@ -139,7 +141,7 @@ class MirrorPage:
         """The channels of a recording, or why there are none."""
         async with self.listing_turn:
             if key not in self.listings:
-                self.listings[key] = await aside(self.list, self._channels, key)
+                self.listings[key] = await in_thread(self.list, self._channels, key)
         stay(self.list)  # the turn may have come after the page was closed
         return self.listings[key]
 
@@ -213,7 +215,7 @@ class MirrorPage:
 
     async def _checked(self, each: Dropped, columns: reading.Columns) -> None:
         await self._listing(each.key)
-        self.faults[each.key, columns] = (await aside(self.list, self._view, each.key, columns))[1]
+        self.faults[each.key, columns] = (await in_thread(self.list, self._view, each.key, columns))[1]
 
     async def see(self, key: str) -> None:
         """Show another recording, with the form as it is for its channels."""
@@ -282,7 +284,7 @@ class MirrorPage:
         """The identification that the form asks for; None where it says why there is none."""
         self.words.text = ""
         try:
-            return mirror_form.identification(self.workshop.folder, self.dropped(), self.form.setting)
+            return mirror_form.identification(self.session.folder, self.dropped(), self.form.setting)
         except SettingError as error:
             self.words.text = str(error)
             return None
@@ -293,7 +295,7 @@ class MirrorPage:
         if action is None:
             return
         try:
-            job = await aside(self.list, self.workshop.jobs.submit, mirror_form.order(self.workshop.folder, action))
+            job = await in_thread(self.list, self.session.jobs.submit, mirror_form.order(self.session.folder, action))
         except JobError as error:
             self.words.text = str(error)
             return
@@ -333,7 +335,7 @@ class MirrorPage:
             columns = mirror_form.columns(setting)
         except SettingError as error:
             return None, str(error)
-        found = await aside(self.list, self._view, key, columns)
+        found = await in_thread(self.list, self._view, key, columns)
         self.faults[key, columns] = found[1]
         return found
 

@@ -8,13 +8,14 @@ from typing import Any
 from nicegui import ui
 
 from microrad.lab.live_fit import LiveFit
-from microrad.studio import live_fit, mirror_view
-from microrad.studio.jobs import Job
-from microrad.studio.mirror_use import with_mirror_file
+from microrad.studio.draft.mirror_file import with_mirror_file
+from microrad.studio.jobs.queue import Job
 from microrad.studio.pages import layout
-from microrad.studio.pages.aside import aside
-from microrad.studio.plots import CONFIG
-from microrad.studio.workshop import Workshop
+from microrad.studio.pages.in_thread import in_thread
+from microrad.studio.session import Session
+from microrad.studio.views import live_fit
+from microrad.studio.views import mirror as mirror_view
+from microrad.studio.views.plots import CONFIG
 
 _LOOK_S = 0.5
 _BEST = -1
@@ -29,9 +30,9 @@ _COLUMNS = [
 class JobView:
     """The newest identification, or the one that was chosen; everything is read from its job's folder."""
 
-    def __init__(self, workshop: Workshop) -> None:
+    def __init__(self, session: Session) -> None:
         """Build the panel, and look at the job from time to time."""
-        self.workshop, self.number = workshop, 0
+        self.session, self.number = session, 0
         self.fits: tuple[LiveFit, ...] = ()
         self.drive_unit, self.chosen = "V", ""
         self.found: mirror_view.Outcome | None = None
@@ -77,11 +78,11 @@ class JobView:
 
     def stop(self) -> None:
         """Cancel the identification."""
-        layout.attempt(lambda: self.workshop.jobs.cancel(self.number))
+        layout.attempt(lambda: self.session.jobs.cancel(self.number))
 
     async def look(self) -> None:
         """Read the jobs, and show what has changed."""
-        jobs, fits = await aside(self.end, self._read)
+        jobs, fits = await in_thread(self.end, self._read)
         if not jobs:
             return
         found = next((job for job in jobs if job.number == self.number), jobs[0])
@@ -96,14 +97,14 @@ class JobView:
             self._show(found)
 
     def _read(self) -> tuple[list[Job], tuple[LiveFit, ...]]:
-        jobs = [job for job in self.workshop.jobs.listed() if job.kind == "identification"]
+        jobs = [job for job in self.session.jobs.listed() if job.kind == "identification"]
         found = next((job for job in jobs if job.number == self.number), jobs[0] if jobs else None)
         return jobs, () if found is None else live_fit.read_fits(found.folder)
 
     # --------------------------------------------------------------------------------------------------------- showing
     def _show(self, job: Job) -> None:
         self.drive_unit = mirror_view.argument(job, "--input-unit", "V")
-        self.found = mirror_view.outcome(self.workshop.jobs.output(job.number)) if job.state == "done" else None
+        self.found = mirror_view.outcome(self.session.jobs.output(job.number)) if job.state == "done" else None
         self.chosen = "" if self.found is None else self.found.model
         self.words.text = mirror_view.state_words(job, live_fit.leader(self.fits, self.chosen))
         self.bar.visible = self.cancel.visible = not job.finished
@@ -143,7 +144,7 @@ class JobView:
         found = self.found
         if found is None:
             return
-        mirror = self.workshop.folder / job.results[0]
+        mirror = self.session.folder / job.results[0]
         with self.end:
             with ui.row().classes("items-center"):
                 ui.button("Use this mirror in the mission", on_click=lambda: self.use(mirror)).props("no-caps")
@@ -159,7 +160,7 @@ class JobView:
 
     def use(self, mirror: Path) -> None:
         """Put the mirror into the mission that is being edited."""
-        if layout.attempt(lambda: self.workshop.edit(lambda draft: with_mirror_file(draft, mirror))):
+        if layout.attempt(lambda: self.session.edit(lambda draft: with_mirror_file(draft, mirror))):
             ui.notify(f"[mirror] of the mission names {mirror.name} now; save the mission to keep it.", type="positive")
 
 

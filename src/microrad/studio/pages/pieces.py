@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 
 from nicegui import ui
 
-from microrad.studio.plots import CONFIG
-from microrad.studio.workshop import Workshop
+from microrad.studio.session import Session
+from microrad.studio.views.plots import CONFIG
 
 
 class Column(NamedTuple):
@@ -47,8 +47,8 @@ def columns(of: Sequence[Column]) -> list[dict[str, Any]]:
     ]
 
 
-def file_of(workshop: Workshop) -> Path:
+def file_of(session: Session) -> Path:
     """The mission's file, seen from the working folder, for a command to be copied; says so where it is not saved."""
-    if workshop.draft.changed:
+    if session.draft.changed:
         ui.notify("The command reads the file: save the mission first, for the same numbers.", type="warning")
-    return Path(workshop.name_of(workshop.draft.path))
+    return Path(session.name_of(session.draft.path))

@@ -7,11 +7,11 @@ from pathlib import Path
 from nicegui import ui
 from nicegui.elements.mixins.text_element import TextElement
 
-from microrad.studio.campaign_live import Live
-from microrad.studio.campaign_view import Figures, Table, figures
+from microrad.studio.jobs.ledgers import Live
 from microrad.studio.pages import layout
-from microrad.studio.pages.aside import aside
-from microrad.studio.workshop import Workshop
+from microrad.studio.pages.in_thread import in_thread
+from microrad.studio.session import Session
+from microrad.studio.views.campaign import Figures, Table, figures
 
 _LOOK_S = 1.0
 _LONG = 60  # characters that may not stand on one line
@@ -20,9 +20,9 @@ _LONG = 60  # characters that may not stand on one line
 class CampaignPanel:
     """What the rows of a ledger say; it looks by itself while it is open."""
 
-    def __init__(self, workshop: Workshop, ledger: Path) -> None:
+    def __init__(self, session: Session, ledger: Path) -> None:
         """Closed, with nothing read."""
-        self.workshop, self.ledger = workshop, ledger
+        self.session, self.ledger = session, ledger
         self._last: Live | None = None
         self._found: Figures | None = None
         self._tables: list[_Table] = []
@@ -53,11 +53,11 @@ class CampaignPanel:
 
     async def _look(self) -> None:
         """Read what is new, and show it."""
-        live = await aside(self.place, self.workshop.campaigns.look, self.ledger)
+        live = await in_thread(self.place, self.session.campaigns.look, self.ledger)
         if live is self._last:  # nothing is new
             return
         self._last = live
-        found = await aside(self.place, figures, live)
+        found = await in_thread(self.place, figures, live)
         self._fault.text = live.fault
         self._fault.visible = bool(live.fault)
         if found is None:

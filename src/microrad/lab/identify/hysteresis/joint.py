@@ -11,12 +11,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from microrad.core import kernels
+from microrad.core.arrays import Floats
 from microrad.core.progress import Progress
-from microrad.lab.identify.hysteresis.axis import AxisStructure, LinearPoles, one_axis
 from microrad.lab.identify.hysteresis.bouc_wen import BoucWenFit, fit_bouc_wen, rising
 from microrad.lab.identify.hysteresis.plant_fit import PlantFit, Run, fit_plant, without
 from microrad.lab.identify.hysteresis.prandtl_ishlinskii import non_negative, threshold_grid
-from microrad.lab.identify.prepared import FloatArray, Prepared, Units, fastest_rate, prepare, span
+from microrad.lab.identify.hysteresis.structures import AxisStructure, LinearPoles, one_axis
+from microrad.lab.identify.records import Prepared, Units, fastest_rate, prepare, span
 from microrad.lab.recording import Recording
 from microrad.mirror import model as mirror
 from microrad.mirror.hysteresis import NO_CREEP, BoucWen, Creep, Play, slow_gain
@@ -90,7 +91,7 @@ class JointFit:
         found = self.fit.not_identified
         return tuple((name, f"{fact}; {_WHY.get(name.partition(' ')[0], reversals)}") for name, fact in found)
 
-    def response(self, drive_v: FloatArray, step_s: float) -> tuple[FloatArray, int]:
+    def response(self, drive_v: Floats, step_s: float) -> tuple[Floats, int]:
         """Output (rad) without offset for a drive (V), at rest at the first drive value, and the clamped samples."""
         plant = mirror.discretise(self.mirror, step_s)
         state = mirror.at_rest(plant)
@@ -99,7 +100,7 @@ class JointFit:
         kernels.open_loop(plant, state, drive, output, np.empty((drive_v.size, 0)))
         return output[:, 0], int(state.clamped.sum())
 
-    def nuisance(self, samples: int, step_s: float) -> FloatArray:
+    def nuisance(self, samples: int, step_s: float) -> Floats:
         """What a record may add by itself (samples, columns): an offset, and the tail of a creep begun before it."""
         return _nuisance(samples, step_s, self.creep.time_constants_s)
 
@@ -232,7 +233,7 @@ def thinned(record: Prepared) -> Prepared:
     )
 
 
-def _nuisance(samples: int, step_s: float, creep_times: Sequence[float]) -> FloatArray:
+def _nuisance(samples: int, step_s: float, creep_times: Sequence[float]) -> Floats:
     """Orthonormal columns: an offset and, with creep, the tail that a level before the record leaves in all lags."""
     columns = [np.ones(samples)]
     if creep_times:
@@ -264,7 +265,7 @@ def _bouc_wen_start(form: Form, records: tuple[Prepared, ...], static: BoucWenFi
     return model if "delta" in form.free else replace(model, d2_s_v=0.0, delta_s_v=0.0)
 
 
-def _scattered(structure: AxisStructure, starts: int, seed: int) -> list[FloatArray]:
+def _scattered(structure: AxisStructure, starts: int, seed: int) -> list[Floats]:
     """Values of `starts` - 1 more starts, epsilon and alpha scattered about those of the structure."""
     own = np.array([p.start for p in structure.parameters])
     rng = np.random.Generator(np.random.Philox(seed))
@@ -300,7 +301,7 @@ def _play_start(
     return model, float(weights[-1]) if creep_times else 0.0
 
 
-def filtered(columns: FloatArray, linear: LinearPoles | None, step_s: float) -> FloatArray:
+def filtered(columns: Floats, linear: LinearPoles | None, step_s: float) -> Floats:
     """Columns (samples, any) behind the linear part, each from rest and straight between its samples."""
     if linear is None:
         return columns

@@ -11,10 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from microrad.core.arrays import Floats
 from microrad.core.kernels import play_response
-from microrad.lab.identify.prepared import (
+from microrad.lab.identify.records import (
     DEFAULT_UNITS,
-    FloatArray,
     IdentificationError,
     Prepared,
     Units,
@@ -39,9 +39,9 @@ class PrandtlIshlinskiiFit:
     `rate_limit_v_per_s` is the fastest rate at which it was seen.
     """
 
-    thresholds_v: FloatArray
-    weights_rad_per_v: FloatArray
-    standard_errors_rad_per_v: FloatArray
+    thresholds_v: Floats
+    weights_rad_per_v: Floats
+    standard_errors_rad_per_v: Floats
     sign: int
     offsets_rad: tuple[float, ...]
     rate_limit_v_per_s: float
@@ -53,7 +53,7 @@ class PrandtlIshlinskiiFit:
 
     name = "prandtl_ishlinskii"
 
-    def response(self, drive_v: FloatArray, step_s: float) -> tuple[FloatArray, int]:
+    def response(self, drive_v: Floats, step_s: float) -> tuple[Floats, int]:
         """Output (rad) without offset for a drive (V), every operator starting at the first drive value; 0 clamped."""
         active = self.weights_rad_per_v > 0
         states = _states(drive_v, self.thresholds_v[active])
@@ -102,16 +102,16 @@ def fit_prandtl_ishlinskii(
     )
 
 
-def _states(drive_v: FloatArray, thresholds_v: FloatArray) -> FloatArray:
+def _states(drive_v: Floats, thresholds_v: Floats) -> Floats:
     return np.asarray(play_response(drive_v, thresholds_v, np.full(thresholds_v.size, drive_v[0])))
 
 
-def threshold_grid(drive_span: float, operators: int) -> FloatArray:
+def threshold_grid(drive_span: float, operators: int) -> Floats:
     """Thresholds spread evenly from 0 to 0.47 of the peak-to-peak drive."""
     return np.linspace(0.0, 0.47 * drive_span, operators)
 
 
-def _thresholds(records: Sequence[Prepared], given: ArrayLike | None, operators: int) -> FloatArray:
+def _thresholds(records: Sequence[Prepared], given: ArrayLike | None, operators: int) -> Floats:
     drive_span = max(float(np.ptp(r.drive_v)) for r in records)
     if given is None:
         if operators < 1:
@@ -127,7 +127,7 @@ def _thresholds(records: Sequence[Prepared], given: ArrayLike | None, operators:
     return thresholds
 
 
-def non_negative(states: FloatArray, output: FloatArray) -> FloatArray:
+def non_negative(states: Floats, output: Floats) -> Floats:
     """Weights >= 0 by least squares; the triangle of a QR decomposition holds the same problem in a few rows."""
     from scipy.optimize import nnls  # here, to keep start-up cheap
 
@@ -136,7 +136,7 @@ def non_negative(states: FloatArray, output: FloatArray) -> FloatArray:
     return np.asarray(nnls(triangle[:, :-1] / size, triangle[:, -1] / size)[0])
 
 
-def _errors(states: FloatArray, weights: FloatArray, variance: float) -> tuple[FloatArray, float]:
+def _errors(states: Floats, weights: Floats, variance: float) -> tuple[Floats, float]:
     """Standard errors of the positive weights (nan for the others) and the condition number of their columns."""
     active = weights > 0
     errors = np.full(weights.size, np.nan)

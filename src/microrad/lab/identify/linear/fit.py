@@ -18,7 +18,7 @@ from microrad.lab.identify.linear.order import fit_order
 from microrad.lab.identify.linear.polish import Polished, TimeEquations, pack, polish, unpack
 from microrad.lab.identify.linear.response import FrequencyResponse, response_from_periods, response_from_records
 from microrad.lab.identify.linear.vector_fitting import check_order
-from microrad.lab.identify.prepared import IdentificationError, colour_inflation, unheard
+from microrad.lab.identify.records import IdentificationError, colour_inflation, rounded_to_error, unheard
 from microrad.lab.recording import Recording
 
 _STEP = 1e-6
@@ -406,11 +406,13 @@ def _warnings(known: Uncertainty, response: FrequencyResponse) -> tuple[str, ...
                 "delay), not as dynamics of the mirror."
             )
     q, i = np.unravel_index(int(np.argmax(np.abs(known.edge_gain))), known.edge_gain.shape)
-    dc, edge = float(known.dc_gain[q, i]), float(known.edge_gain[q, i])
+    dc, dc_error = float(known.dc_gain[q, i]), float(known.dc_gain_error[q, i])
+    edge, edge_error = float(known.edge_gain[q, i]), float(known.edge_gain_error[q, i])
     if abs(abs(dc) / edge - 1) > 0.05:
+        extrapolated = f"{rounded_to_error(dc, dc_error)} ± {dc_error:.2g}"
+        seen = f"{rounded_to_error(edge, edge_error)} ± {edge_error:.2g}"
         found.append(
-            f"the gain at zero frequency, {dc:.4g} ± {known.dc_gain_error[q, i]:.2g}, is extrapolated: at "
-            f"{low:.3g} Hz, the lowest excited frequency, it is {edge:.4g} ± {known.edge_gain_error[q, i]:.2g}; use "
-            "the latter."
+            f"the gain at zero frequency, {extrapolated}, is extrapolated: at {low:.3g} Hz, the lowest excited "
+            f"frequency, it is {seen}; use the latter."
         )
     return tuple(found)

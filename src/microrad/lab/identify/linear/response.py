@@ -14,11 +14,10 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from microrad.core.arrays import Complexes, Floats
+from microrad.core.arrays import Complexes, Floats, Integers
 from microrad.lab.identify.linear.modal import Hold
-from microrad.lab.identify.prepared import IdentificationError
+from microrad.lab.identify.records import IdentificationError
 from microrad.lab.recording import Recording
 
 BANDS = 300
@@ -341,7 +340,7 @@ def _periods(records: Sequence[Recording], name: str, period: int, skip: int) ->
     return np.asarray(np.fft.rfft(np.stack(parts), axis=2) * (np.sqrt(2.0) / period))
 
 
-def _excited_lines(drive: Complexes) -> NDArray[np.int64]:
+def _excited_lines(drive: Complexes) -> Integers:
     """Lines, without zero and half the rate, whose drive power is above a thousandth of the strongest line's."""
     power = np.mean(np.abs(drive) ** 2, axis=(0, 1)).max(axis=1)
     power[0] = 0.0
@@ -351,7 +350,7 @@ def _excited_lines(drive: Complexes) -> NDArray[np.int64]:
     return np.flatnonzero(power > _EXCITED * power.max())
 
 
-def _noise_variance(drive: Complexes, output: Complexes, response: Complexes, lines: NDArray[np.int64]) -> Floats:
+def _noise_variance(drive: Complexes, output: Complexes, response: Complexes, lines: Integers) -> Floats:
     """Variance of the mean over periods of what the response leaves, mean over realisations; (lines, outputs)."""
     left = output[:, :, lines] - np.einsum("foi,mpfi->mpfo", response, drive[:, :, lines], optimize=True)
     periods = left.shape[1]

@@ -19,7 +19,7 @@ from microrad.core import kernels
 from microrad.core.arrays import Floats
 from microrad.core.progress import Progress
 from microrad.lab.identify.linear.response import check_alike, response_from_periods
-from microrad.lab.identify.prepared import IdentificationError, unheard
+from microrad.lab.identify.records import IdentificationError, unheard
 from microrad.lab.identify.stiffness import tangents
 from microrad.lab.identify.stiffness.model import (
     FIELDS,
