@@ -166,8 +166,10 @@ def _receiver(terminals: Terminals, link: Communication) -> receivers.Receiver |
         case _:
             kind, own = receivers.OokApd, {**diode, **avalanche}
     if table.detector in ("homodyne", "preamplified"):
-        return kind(**common, **own, background_photons_per_mode=_per_mode(link))
-    return kind(**common, **own, background_power_w=_background_w(terminals, link, table))
+        own["background_photons_per_mode"] = _per_mode(link)
+    else:
+        own["background_power_w"] = _background_w(terminals, link, table)
+    return kind(**common, **own)
 
 
 def _per_mode(link: Communication) -> float:
