@@ -189,9 +189,15 @@ def swings(
     """A margin over each input of these tables, one at a time, the largest swing first.
 
     Every quantity is moved by 10 % both ways, one in decibels by 0.5 dB, a bit error ratio and an outage by a factor of
-    ten; none beyond the bounds that its key has, nor to a mission that is not ``possible``, such as one whose
-    obscuration stops the beam. ``strehl`` is the convention by which a Strehl is read. Inputs that do not move the
-    margin are left out.
+    ten; none beyond the bounds of its key. Inputs that do not move the margin are left out.
+
+    Args:
+        mission: the tables as they are.
+        sources: where each value comes from, by key.
+        tables: names of the tables whose inputs are moved.
+        strehl: the convention by which a Strehl is read, "ratio" or "decibel".
+        margin_db: the margin (dB) of the tables.
+        possible: whether such tables can be, so that no obscuration stops the whole beam, for instance.
     """
 
     def swing(each: Input) -> Swing:
@@ -281,9 +287,15 @@ def solve(
 ) -> Solved:
     """Where an input leaves a margin, looked for in steps and then found to the last digits.
 
-    ``found`` is the input in its ``unit``, or its axes, which keep their proportion. A value that its rule or
-    ``possible`` does not allow leaves none. Raises ValueError for an input that is 0 and no decibels, which no factor
-    moves.
+    Args:
+        mission: the tables as they are.
+        found: the input, or its axes, which keep their proportion.
+        unit: its unit; decibels are moved by steps, all else by factors.
+        margin_db: the margin (dB) of the tables; none where their rule or ``possible`` does not allow the value.
+        required_db: the margin that has to be left, dB.
+        possible: whether such tables can be.
+
+    Raises ValueError if the input is 0 and no decibels, which no factor moves, or does not move the margin.
     """
     value, count = max(each.value for each in found), DECADES * STEPS
     linear = unit.startswith("dB")

@@ -279,7 +279,13 @@ def delivered(
 ) -> tuple[day_study.DayStudy | None, contact_run.ContactRun | None, constellation.ConstellationPlan | None]:
     """The day at a pointing loss, its contact in time under the best controller, and the plan of a constellation.
 
-    Raises ValueError for orbits that do not hold over the mission's span.
+    Args:
+        links: the links of the mission, with their acquisition.
+        loss: what pointing costs the laser link.
+        fine: the fine-pointing loop; None in a mission without one, which then has no contact in time.
+        parts: the results of earlier runs that are kept.
+
+    Raises ValueError if an orbit does not hold over the mission's span.
     """
     m, operations = links.file.mission, links.file.mission.operations
     if m.orbit is None or operations is None:

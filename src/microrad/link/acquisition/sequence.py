@@ -222,10 +222,16 @@ def paper_sequence(timing: Timing, chances: Chances) -> tuple[Stage, ...]:
 
 
 def solve_sequence(stages: Sequence[Stage], attempts: int) -> Outcome:
-    """Distribution of the time until lock when every failure takes one of `attempts`; the last one gives up.
+    """Distribution of the time until lock when every failure takes one attempt; the last one gives up.
 
-    Exact: all orders of failures are summed; times that are distributions are convolved. Raises ValueError for no
-    attempt, no stage, two stages of one name and a failure that goes back to a stage that is not there or comes later.
+    Exact: all orders of failures are summed; times that are distributions are convolved.
+
+    Args:
+        stages: in order, each of another name.
+        attempts: failures until the sequence is given up, at least 1.
+
+    Raises ValueError if there is no attempt or no stage, if two stages have one name, or a failure goes back to a stage
+    that is not there or comes later.
     """
     back = check_sequence(stages, attempts)
     locked: list[TimeDistribution] = []

@@ -106,10 +106,14 @@ def communication_budget(
 ) -> LinkBudget:
     """Budget of the data link from LEO to GEO, at its own pointing error and data rate or at those given.
 
-    ``given_source`` says where a given value comes from, and stands as the source of its line.
+    Args:
+        data: the communication link.
+        sources: where each value of the mission comes from, by key.
+        pointing_error_rad: static radial error, rad; by default the mission's.
+        data_rate_bit_s: information rate, bit/s; by default the mission's.
+        given_source: where a given value comes from: the source of its line.
 
-    Raises ValueError for a negative pointing error, a data rate that is not above zero, and one that the receiver
-    does not take.
+    Raises ValueError if the pointing error is negative, the data rate not above zero, or the receiver does not take it.
     """
     beam = data.table
     write = Writer("communication", beam, data.shared, sources, "leo")
@@ -131,7 +135,15 @@ def communication_budget(
 def beam_budget(name: str, shared: Shared, beam: Beacon | None, sources: Mapping[str, Source]) -> LinkBudget:
     """Budget of the wide "beacon" from LEO to GEO, or of the narrow beam with which GEO gives its "answer".
 
-    A Gaussian beam with the mission's divergence convention. Raises ValueError when the mission has no such beam.
+    It is a Gaussian beam, its divergence read by the mission's convention.
+
+    Args:
+        name: "beacon" or "answer", the name of its table.
+        shared: terminals, conventions, air and point-ahead of the mission.
+        beam: the table itself; None where the mission has none.
+        sources: where each value of the mission comes from, by key.
+
+    Raises ValueError if the mission has no such beam.
     """
     if beam is None:
         raise ValueError(f"the mission has no table [{name}]")

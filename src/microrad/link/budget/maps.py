@@ -49,10 +49,14 @@ def pointing_loss_db(data: DataLink, pointing_error_rad: ArrayLike) -> Floats:
 
 
 def margin_map(data: DataLink, data_rate_bit_s: ArrayLike, pointing_error_rad: ArrayLike) -> Floats:
-    """Margin of the communication link in dB over data rate (rows) and pointing error (columns); paper, Fig. 2.
+    """Margin of the communication link in dB, shape (rates, errors); paper, Fig. 2.
 
-    Raises ValueError for a negative pointing error, a data rate that is not above zero and one that the receiver
-    does not take.
+    Args:
+        data: the communication link.
+        data_rate_bit_s: information rates, bit/s, shape (rates,).
+        pointing_error_rad: static radial errors, rad, shape (errors,).
+
+    Raises ValueError if an error is negative, a rate not above zero, or the receiver does not take it.
     """
     rate = np.atleast_1d(np.asarray(data_rate_bit_s, dtype=np.float64))
     error = np.atleast_1d(np.asarray(pointing_error_rad, dtype=np.float64))
@@ -70,9 +74,14 @@ def margin_of_error(data: DataLink, pointing_error_rad: ArrayLike) -> Floats:
 
 
 def largest_data_rate(data: DataLink, margin_db: float, pointing_error_rad: float) -> float:
-    """Data rate in bit/s that leaves `margin_db` at a pointing error, or the highest that the receiver takes.
+    """Largest data rate (bit/s) with a margin at a pointing error, or the highest that the receiver takes.
 
-    Raises LinkError when not even the slowest rate does.
+    Args:
+        data: the communication link.
+        margin_db: the margin that is left, dB.
+        pointing_error_rad: static radial error, rad, at least 0.
+
+    Raises LinkError if not even the slowest rate leaves the margin.
     """
     check_grid(np.ones(1), np.asarray(pointing_error_rad))
     lost = float(pointing_loss_db(data, pointing_error_rad))
@@ -80,9 +89,14 @@ def largest_data_rate(data: DataLink, margin_db: float, pointing_error_rad: floa
 
 
 def rate_at_loss(data: DataLink, margin_db: float, loss_db: float) -> float:
-    """Data rate in bit/s that leaves `margin_db` when pointing costs `loss_db`, or the highest that is taken.
+    """Largest data rate (bit/s) with a margin at a pointing loss, or the highest that the receiver takes.
 
-    Raises LinkError when not even the slowest rate does.
+    Args:
+        data: the communication link.
+        margin_db: the margin that is left, dB.
+        loss_db: the pointing loss, dB, positive.
+
+    Raises LinkError if not even the slowest rate leaves the margin.
     """
     available = received_on_axis_dbm(data) - loss_db - margin_db
     built = data.receiver
@@ -113,10 +127,15 @@ def rate_at_loss(data: DataLink, margin_db: float, loss_db: float) -> float:
 
 
 def largest_pointing_error(data: DataLink, margin_db: float, data_rate_bit_s: float) -> float:
-    """Radial pointing error in rad that leaves `margin_db` at a data rate: the loss grows with the error.
+    """Largest radial pointing error (rad) with a margin at a data rate: the loss grows with the error.
 
-    Raises LinkError when the margin is not there even on axis, and when an uncorrected point-ahead lies beyond the
-    main lobe of the beam, where the loss does not grow with the error.
+    Args:
+        data: the communication link.
+        margin_db: the margin that is left, dB.
+        data_rate_bit_s: information rate, bit/s.
+
+    Raises LinkError if the margin is not there even on axis, or an uncorrected point-ahead lies beyond the main lobe
+    of the beam, where the loss does not grow with the error.
     """
     excess_db = float(margin_map(data, data_rate_bit_s, 0.0)[0, 0]) - margin_db
     if excess_db < 0.0:

@@ -164,10 +164,17 @@ def open_loop_budget(
 ) -> OpenLoopPointing:
     """Open-loop errors by every rule against the beacon (paper, section 2.1: 780 µrad cover their root sum square).
 
-    One statistical interpretation holds for all lines. "temporal" asks for the mission's confidence as a share of the
-    time of the worst-case satellite, "mixed" over the times of all satellites: see `error_term`. Point-ahead is a line
-    where the mission has it. Raises ValueError for a mission without pointing errors, and for a line that stands for
-    point-ahead as well.
+    Point-ahead is a line where the mission has it.
+
+    Args:
+        pointing: the mission's table of errors and confidence.
+        shared: terminals, conventions and point-ahead of the mission.
+        beacon: the beam that has to cover the errors; None where the mission has none.
+        sources: where each value of the mission comes from, by key.
+        interpretation: of all lines. "temporal": the confidence is a share of the time of the worst-case satellite,
+            "mixed": of the times of all satellites; see `error_term`.
+
+    Raises ValueError if the mission states no pointing errors, or a line stands for point-ahead as well.
     """
     if pointing is None:
         raise ValueError("the mission states no pointing errors; give it the table [pointing]")

@@ -227,7 +227,17 @@ def performance(
     jitter: pointing.Jitter,
     motion: pointing.SpectralMotion | None,
 ) -> Performance:
-    """The link under these errors; ``motion`` is what their spectrum says, None where it is not known."""
+    """The communication link under a distribution of pointing errors.
+
+    Args:
+        data: the communication link.
+        source: where the errors come from, in words.
+        controller: the controller that leaves them; "" without one.
+        mirror: the variant of the mirror under it; "" without one.
+        spread: the radial errors and their shares of the time.
+        jitter: bias and rms of each axis, for the fades and the penalty of an uncoded link.
+        motion: what the spectrum says of each axis; None where it is not known, and the fades are then nan.
+    """
     q, kept = data.requirement, 1.0 - stated_outage(data.requirement)
     under = Exposure.of(data, spread.quantile_rad(kept), spread.beyond)
     fall, ahead = under.fall, under.ahead_rad

@@ -143,7 +143,7 @@ def _probability_of(jitter: Jitter, radius: Floats, beyond: bool) -> Floats:
 
 
 def radial_survival(jitter: Jitter, radius_rad: ArrayLike) -> Floats:
-    """P(r > R) of the radial pointing error, for each radius R.
+    """P(r > R) of the radial pointing error, for each radius R (rad, any shape).
 
     Exact for unequal and biased axes, by 96-point Gauss-Legendre quadrature over one axis. Equal axes s without bias
     have the Rayleigh distribution, exp(-R^2 / (2 s^2)). Raises ValueError for a negative radius.

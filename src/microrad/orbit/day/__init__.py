@@ -93,7 +93,12 @@ def _begin(links: LinkStudy) -> tuple[Operations, partial[orbit.Pair], View, Fou
 
 
 def relay(links: LinkStudy, loss: PointingLoss) -> Way:
-    """The way by the relay alone: what `run_day_study` finds of it, without the rest of the day."""
+    """The way by the relay alone: what `run_day_study` finds of it, without the rest of the day.
+
+    Args:
+        links: the links of the mission, with their acquisition.
+        loss: what pointing costs the laser link.
+    """
     o, _, seen, found = _begin(links)
     return flow.relay(o, seen, flow.rate_table(flow.closings(o, links.data, loss)), loss.outage, found, 1.0)
 
