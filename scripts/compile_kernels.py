@@ -15,4 +15,4 @@ for name in ("PI", "LQG"):
 cases = paper_cases.of(file.mission, mirrors)
 paper_cases.hysteresis_loops(cases)
 runs = paper_cases.tracking_runs(cases)
-alternatives.others(file.mission, paper_cases.worst(runs, file.mission.requirement.residual_statistic))
+alternatives.other_readings(file.mission, paper_cases.worst(runs, file.mission.requirement.residual_statistic))

@@ -89,7 +89,7 @@ def test_a_beam_is_looked_for_at_its_own_margin_and_above_diffraction(tmp_path):
     assert budgets.answer(m.with_value("answer.divergence_rad", found.high), {}).margin_db == pytest.approx(
         0.0, abs=1e-9
     )
-    assert variation.fits("answer")(m) and not variation.fits("answer")(
+    assert variation.divergence_possible("answer")(m) and not variation.divergence_possible("answer")(
         m.with_value("answer.divergence_rad", found.low * 0.999)
     )
 
@@ -118,7 +118,7 @@ def test_every_key_has_its_margin_inside_and_not_beyond_its_ends(tmp_path, chang
                 there = variation.moved(m, found, end)
                 assert link_performance.margin_db(link.of(there)) >= 3.0, key
                 beyond = variation.moved(m, found, end * outside)
-                if not is_open and beyond is not None and link.lit(beyond):
+                if not is_open and beyond is not None and link.beam_passes(beyond):
                     assert variation.margin_or_none(link.of(beyond), link_performance.margin_db) < 3.0, key
 
 

@@ -683,7 +683,7 @@ def test_the_uncertainty_of_a_search_is_that_of_the_worse_axis(tmp_path):
     for bias, rms in (((30e-6, 0.0), (40e-6, 20e-6)), ((0.0, 30e-6), (20e-6, 40e-6))):
         m = study.file.mission
         beams = (link_acquisition.Sent(*each) for each in ((m.beacon, study.beacon), (m.answer, study.answer)))
-        found = link_acquisition.finding(m.acquisition, study.data, Jitter(bias, rms), *beams, study.tracking)
+        found = link_acquisition.find_partner(m.acquisition, study.data, Jitter(bias, rms), *beams, study.tracking)
         assert found.sigma_rad == pytest.approx(50e-6, rel=1e-12)
 
 

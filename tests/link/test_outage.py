@@ -14,7 +14,7 @@ from microrad import link
 from microrad.link import beams, pointing
 from microrad.link.pointing import fading, statistics
 from microrad.link.pointing import outage as link_performance
-from microrad.link.pointing.outage import Spread
+from microrad.link.pointing.outage import ErrorDistribution
 from microrad.loop import paper_cases as tracking
 from microrad.loop import sine_run as simulate
 from microrad.loop.fine_loop.ensemble import bin_edges_rad
@@ -57,7 +57,7 @@ def record(bias_urad, rms_urad):
 
 # ------------------------------------------------------------------------------------------------------ a spread
 def test_a_quantile_is_the_least_error_that_the_share_of_the_time_stays_within():
-    spread = Spread(np.array([3.0, 1.0, 2.0]), np.array([0.25, 0.5, 0.25]))
+    spread = ErrorDistribution(np.array([3.0, 1.0, 2.0]), np.array([0.25, 0.5, 0.25]))
     wanted = {0.0: 1.0, 0.5: 1.0, 0.501: 2.0, 0.75: 2.0, 0.751: 3.0, 1.0: 3.0}
     assert {p: spread.quantile_rad(p) for p in wanted} == wanted
 
@@ -65,7 +65,7 @@ def test_a_quantile_is_the_least_error_that_the_share_of_the_time_stays_within()
 def test_quantiles_are_those_of_weighted_draws():
     draw = np.random.Generator(np.random.Philox(key=3))
     radius, weight = draw.rayleigh(size=501), draw.random(501)
-    spread = Spread(radius, weight / np.sum(weight))
+    spread = ErrorDistribution(radius, weight / np.sum(weight))
     for p in (0.01, 0.3, 0.9, 0.997):
         assert spread.quantile_rad(p) == np.quantile(radius, p, weights=weight, method="inverted_cdf")
 

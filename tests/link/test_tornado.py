@@ -135,7 +135,12 @@ def test_equal_swings_stand_as_the_mission_has_their_keys(tmp_path, seed):
         return link_performance.margin_db(link.of(m)) + draw.uniform(-1e-12, 1e-12)
 
     found = link.swings(
-        file.mission, file.sources, ("terminals", "communication"), "decibel", as_a_processor_leaves_it, link.lit
+        file.mission,
+        file.sources,
+        ("terminals", "communication"),
+        "decibel",
+        as_a_processor_leaves_it,
+        link.beam_passes,
     )
     aperture, distance = (
         next(s for s in found if s.key == k) for k in ("terminals.geo_aperture", "communication.distance")
@@ -342,7 +347,7 @@ def test_only_a_receiver_too_slow_is_left_without_a_margin(tmp_path):
 
     file = link_file(tmp_path)
     with pytest.raises(ValueError, match="a value without meaning"):
-        link.swings(file.mission, file.sources, link.LINK_TABLES, "decibel", refused, link.lit)
+        link.swings(file.mission, file.sources, link.LINK_TABLES, "decibel", refused, link.beam_passes)
 
 
 def test_a_beam_moves_no_further_than_the_obscuration_lets_some_of_it_pass(tmp_path):

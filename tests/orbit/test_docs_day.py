@@ -207,7 +207,7 @@ def test_rates_share_and_store(replaced, links, day):
         way = links.finding.way(day.operations.acquisition)
         relay = flow.relay(o, seen, flow.rate_table(found), day.loss.outage, way, 1.0)
         return SimpleNamespace(
-            closings=found, relay=relay, direct=flow.direct(o, seen, flow.heard(o.downlink, seen.pair))
+            closings=found, relay=relay, direct=flow.direct(o, seen, flow.station_passes(o.downlink, seen.pair))
         )
 
     stepped = of()

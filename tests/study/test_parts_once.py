@@ -24,7 +24,7 @@ def test_one_study_assembles_its_link_and_each_variant_of_its_mirror_once(tmp_pa
     monkeypatch.setattr(study.mirror, "of", lambda m: entered.append(m) or variants.of(m))
     monkeypatch.setattr(link, "of", lambda m: linked.append(m) or of(m))
     monkeypatch.setattr(threads, "_may_fork", lambda: False)
-    monkeypatch.setattr(study.alternatives, "others", lambda *args: ())  # they read the mission in another way
+    monkeypatch.setattr(study.alternatives, "other_readings", lambda *args: ())  # they read the mission in another way
     monkeypatch.setattr(fine_pointing, "design", lambda scene, told: designs.design(scene, told, only=("PI",)))
     found = study.run_study(file)
     assert entered == [file.mission]

@@ -15,7 +15,7 @@ from microrad.link.budget.maps import (
     rate_at_loss,
     received_on_axis_dbm,
 )
-from microrad.link.variation import LINK_TABLES, Interval, Swing, Tornado, lit, swings
+from microrad.link.variation import LINK_TABLES, Interval, Swing, Tornado, beam_passes, swings
 
 __all__ = [
     "DEEPEST_DB",
@@ -30,13 +30,13 @@ __all__ = [
     "Swing",
     "Tornado",
     "beam_budget",
+    "beam_passes",
     "communication_budget",
     "convention_maps",
     "ideal_receivers",
     "implied_sensitivity",
     "largest_data_rate",
     "largest_pointing_error",
-    "lit",
     "margin_map",
     "margin_of_error",
     "of",

@@ -13,7 +13,7 @@ from microrad.core import kept
 from microrad.core.budget import Line
 from microrad.core.units import format_quantity
 from microrad.link import pointing, variation
-from microrad.link.acquisition.partner_search import Finding, Sent, Tracking, finding, tracking
+from microrad.link.acquisition.partner_search import Finding, Sent, Tracking, answer_on_sensor, find_partner
 from microrad.link.budget import assembly
 from microrad.link.pointing.outage import (
     Performance,
@@ -150,9 +150,9 @@ def solve_key(file: LinkFile, key: str) -> Solution:
         raise ValueError(_no_such_key(key, dict.fromkeys(each.key for each in every)))
     of, unit = found[0].table, variation.unit_of(found[0], m.conventions.strehl)
     if of in ("beacon", "answer"):
-        required, margin, possible = 0.0, variation.beam_margin(of, sources), variation.fits(of)
+        required, margin, possible = 0.0, variation.beam_margin(of, sources), variation.divergence_possible(of)
     else:
-        of, required, margin, possible = "communication", m.requirement.margin_db, _margin_db, link.lit
+        of, required, margin, possible = "communication", m.requirement.margin_db, _margin_db, link.beam_passes
     solved = variation.solve(m, found, unit, margin, required, possible)
     if not solved.intervals:
         return Solution(key, unit, of, required, solved, max(each.value for each in found), file)
@@ -187,14 +187,14 @@ def run_link_study(file: LinkFile, parts: kept.Kept = kept.NOTHING) -> LinkStudy
         for name, table in (("beacon", m.beacon), ("answer", m.answer))
     )
     open_loop = None if m.pointing is None else pointing.open_loop_budget(m.pointing, shared, m.beacon, sources)
-    light = tracking(m.acquisition, m.terminals.leo_aperture_m, answer, sources)
+    light = answer_on_sensor(m.acquisition, m.terminals.leo_aperture_m, answer, sources)
     data = link.of(m)
     communication, rate = communication_budget(data, sources), m.communication.data_rate_bit_s
     noise = () if data.receiver is None else data.receiver.noise_lines(communication.received_power_w, rate)
     found = None
     if m.acquisition is not None and beacon is not None and answer is not None:
         assert open_loop is not None  # the relations of the mission
-        found = parts.part(finding, m.acquisition, data, open_loop.error, beacon, answer, light)
+        found = parts.part(find_partner, m.acquisition, data, open_loop.error, beacon, answer, light)
     budgets = (communication, *(each.budget for each in (beacon, answer) if each is not None))
     return LinkStudy(
         file=file,
@@ -235,7 +235,7 @@ def tornados(
 ) -> tuple[link.Tornado, ...]:
     """What moves the margin of each budget, communication first."""
     tables = ("jitter", "requirement", *link.LINK_TABLES)
-    swings = [link.swings(m, sources, tables, m.conventions.strehl, _margin_db, link.lit)]
+    swings = [link.swings(m, sources, tables, m.conventions.strehl, _margin_db, link.beam_passes)]
     swings += [variation.beam_tornado(m, sources, each.name.lower()) for each in budgets[1:]]
     return tuple(link.Tornado(each.name, each.margin_db, own) for each, own in zip(budgets, swings, strict=True))
 

@@ -100,7 +100,7 @@ def _table(tables: Table, name: str) -> Table | None:
     return table
 
 
-def lit(m: LinkMission) -> bool:
+def beam_passes(m: LinkMission) -> bool:
     """Whether the obscuration lets some of the data's beam pass."""
     try:
         communication_beam(m.terminals, m.communication, m.conventions.pointing_loss)
@@ -117,7 +117,7 @@ def margin_or_none(of: _Link, margin_db: Callable[[_Link], float]) -> float:
         return -math.inf
 
 
-def fits(name: str) -> Callable[[Any], bool]:
+def divergence_possible(name: str) -> Callable[[Any], bool]:
     """Whether the aperture of the beacon, or of the answer, can make its divergence; asked of a mission."""
     too_narrow = divergence_fits(name, "geo" if name == "answer" else "leo")
     return lambda m: not any(too_narrow(m.conventions, m.terminals, getattr(m, name)))
@@ -175,7 +175,7 @@ def beam_tornado(m: LinkMission, sources: Mapping[str, Source], name: str) -> tu
     Raises ValueError for a beam that the mission has not.
     """
     tables = ("terminals", name, "channel", "point_ahead")
-    return swings(m, sources, tables, m.conventions.strehl, beam_margin(name, sources), fits(name))
+    return swings(m, sources, tables, m.conventions.strehl, beam_margin(name, sources), divergence_possible(name))
 
 
 def swings(

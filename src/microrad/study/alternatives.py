@@ -48,7 +48,7 @@ class Reading:
         return self.residual_rad <= q.pointing_error_rad and self.margin_db >= q.margin_db
 
 
-def others(m: Mission, residual: paper_cases.Run, parts: kept.Kept = kept.NOTHING) -> tuple[Reading, ...]:
+def other_readings(m: Mission, residual: paper_cases.Run, parts: kept.Kept = kept.NOTHING) -> tuple[Reading, ...]:
     """Every other reading that fits the mission's other tables.
 
     Readings of the loop are simulated (PID + inverse at the mission's frequencies); the others read one run anew.

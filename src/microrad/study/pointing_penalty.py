@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from microrad import link
 from microrad.link import pointing
-from microrad.link.pointing.outage import Performance, Spread, performance, stated_outage
+from microrad.link.pointing.outage import ErrorDistribution, Performance, performance, stated_outage
 from microrad.loop import fine_pointing, paper_cases
 from microrad.loop.fine_loop.ensemble import bin_edges_rad, histogram_quantile
 from microrad.mirror import Variant
@@ -17,7 +17,7 @@ _PARTS = 32  # of a bin of the histogram, which is 3 % wide in the square of the
 
 
 @dataclass(frozen=True, slots=True)
-class Binned(Spread):
+class Binned(ErrorDistribution):
     """Radial errors from a histogram, evenly in the square inside each bin; ``counts`` are the bins'."""
 
     counts: NDArray[np.int64]
@@ -104,7 +104,7 @@ def _sine(data: link.DataLink, radial: bool, run: paper_cases.Run) -> Performanc
     radius = np.abs(error) * (math.sqrt(2.0) if radial else 1.0)
     bias, rms = float(np.mean(error)), float(np.std(error))
     jitter = pointing.Jitter((bias, bias if radial else 0.0), (rms, rms if radial else 0.0))
-    spread = Spread(radius, np.full(radius.size, 1.0 / radius.size))
+    spread = ErrorDistribution(radius, np.full(radius.size, 1.0 / radius.size))
     source = f"sine of {run.freq_hz:g} Hz"
     return performance(data, source, run.controller, run.mirror, spread, jitter, None)
 

@@ -184,7 +184,7 @@ def run_study(
     left_rad = paper_cases.residual_rad(q, m.conventions, residual.trace)
     simulated = f"simulated: {residual.trace.name}, {q.residual_statistic} ({m.conventions.residual})"
     achieved = link.communication_budget(data, sources, pointing_error_rad=left_rad, given_source=simulated)
-    as_read, compared = alternatives.others(m, residual, parts), None
+    as_read, compared = alternatives.other_readings(m, residual, parts), None
     if m.mirror.comparison is not None:
         other = paper_cases.worst(runs, q.residual_statistic, Variant.COMPARISON)
         at_rad = paper_cases.residual_rad(q, m.conventions, other.trace)
@@ -266,7 +266,7 @@ def tornado(links: link_study.LinkStudy, error_rad: float) -> link.Tornado:
         return float(link.margin_of_error(data, error_rad))
 
     swings = link.swings(
-        m, sources, link.LINK_TABLES, m.conventions.strehl, lambda moved: margin_db(link.of(moved)), link.lit
+        m, sources, link.LINK_TABLES, m.conventions.strehl, lambda moved: margin_db(link.of(moved)), link.beam_passes
     )
     return link.Tornado("Communication", margin_db(links.data), swings)
 

@@ -140,7 +140,7 @@ class Finding:
         return (self.wide,) if self.scanned is None else (self.wide, self.scanned.found)
 
 
-def tracking(
+def answer_on_sensor(
     a: Acquisition | None, aperture_m: float, answer: Sent | None, sources: Mapping[str, Source]
 ) -> Tracking | None:
     """The answer on the quad cell of `[acquisition.sensor]` behind an aperture, or None without either."""
@@ -156,7 +156,7 @@ def tracking(
     return Tracking(power, ratio, cell.noise_lines(power, bandwidth, source), angle)
 
 
-def finding(
+def find_partner(
     a: Acquisition, data: link.DataLink, error: pointing.Jitter, beacon: Sent, answer: Sent, light: Tracking | None
 ) -> Finding:
     """Acquisition as the mission's table times it; ``error`` is that of the predicted direction.
@@ -169,7 +169,7 @@ def finding(
         beacon_coverage=_coverage(error, radii[0]),
         frame_detection=a.detection_probability,
         answer_coverage=_coverage(
-            _aside(shared.point_ahead_rad, answer.table.pointing_error_rad / a.pointing_sigmas), radii[1]
+            _equal_axes(shared.point_ahead_rad, answer.table.pointing_error_rad / a.pointing_sigmas), radii[1]
         ),
         answer_detection=_possible(_answer_detection(a, light)),
         return_coverage=_possible(_return_coverage(shared, light, radii[2])),
@@ -177,7 +177,7 @@ def finding(
     )
     timing = _timing(shared.terminals, a, beacon.table.distance_m)
     sigma = max(math.hypot(b, s) for b, s in zip(error.bias_rad, error.rms_rad, strict=True))
-    wide = _found("wide beacon", acquisition.paper_sequence(timing, chances), a)
+    wide = _solved("wide beacon", acquisition.paper_sequence(timing, chances), a)
     scanned = None
     if a.scan is not None:
         answering = acquisition.answer_stages(timing, chances)
@@ -230,10 +230,10 @@ def _return_coverage(shared: link.Shared, light: Tracking | None, radius_rad: fl
         return 0.0
     else:
         noise_rad = light.noise_equivalent_angle.value
-    return float(pointing.radial_cdf(_aside(shared.point_ahead_left_rad, noise_rad), radius_rad))
+    return float(pointing.radial_cdf(_equal_axes(shared.point_ahead_left_rad, noise_rad), radius_rad))
 
 
-def _aside(bias_rad: float, rms_rad: float) -> pointing.Jitter:
+def _equal_axes(bias_rad: float, rms_rad: float) -> pointing.Jitter:
     """A direction with the same spread about both axes, and a bias about one of them."""
     return pointing.Jitter((bias_rad, 0.0), (rms_rad, rms_rad))
 
@@ -293,7 +293,7 @@ def _scanned(
     # nor is a look of the trade shorter than any that the mission states
     least = replace(receiver, shortest_s=min(a.detection_s, s.detection_s))
     return Scanned(
-        found=_found(f"{s.pattern} scan", stages, a),
+        found=_solved(f"{s.pattern} scan", stages, a),
         duration_s=pattern.duration_s,
         radius_rad=pattern.search.radius_rad,
         half_angle_rad=beams.narrow_half_angle_rad,
@@ -306,7 +306,7 @@ def _scanned(
     )
 
 
-def _found(name: str, stages: tuple[acquisition.Stage, ...], a: Acquisition) -> Found:
+def _solved(name: str, stages: tuple[acquisition.Stage, ...], a: Acquisition) -> Found:
     return Found(
         name,
         stages,

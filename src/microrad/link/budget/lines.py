@@ -117,10 +117,10 @@ def communication_budget(
     """
     beam = data.table
     write = Writer("communication", beam, data.shared, sources, "leo")
-    error, error_source = given_or(
+    error, error_source = given_or_own(
         beam.pointing_error_rad, pointing_error_rad, write.source("pointing_error"), given_source
     )
-    rate, rate_source = given_or(beam.data_rate_bit_s, data_rate_bit_s, write.source("data_rate"), given_source)
+    rate, rate_source = given_or_own(beam.data_rate_bit_s, data_rate_bit_s, write.source("data_rate"), given_source)
     check_grid(np.asarray(rate), np.asarray(error))
     with_ahead = float(data.beam.fall.loss_db(error + data.shared.point_ahead_rad))
     transmit = write.transmit(_lit_gain(write, data), _pointing_line(data, error, error_source), with_ahead)
@@ -214,7 +214,7 @@ def _deep(loss_db: float) -> str:
     return f"beyond {DEEPEST_DB:g} dB the wings and the scatter of a real beam decide, not this formula"
 
 
-def given_or(own: float, given: float | None, source: str, given_source: str) -> tuple[float, str]:
+def given_or_own(own: float, given: float | None, source: str, given_source: str) -> tuple[float, str]:
     """The value in force and its source: the one given, else the mission's own."""
     return (own, source) if given is None else (float(given), given_source)
 

@@ -11,7 +11,7 @@ from microrad.core.arrays import Floats
 from microrad.core.units import format_quantity
 from microrad.link import gains
 from microrad.link.budget.assembly import DataLink, LinkError, assembled, check_grid, required_dbm, strehl_db
-from microrad.link.budget.lines import CHOSEN, given_or
+from microrad.link.budget.lines import CHOSEN, given_or_own
 from microrad.link.receivers import BpskHomodyne, DpskPreamplified, OokCounting
 from microrad.mission.model import Source, source_text
 from microrad.mission.tables.link import Communication
@@ -240,7 +240,7 @@ def ideal_receivers(
     """
     beam = data.table
     own_source = source_text(sources, "communication.pointing_error")
-    error, error_source = given_or(beam.pointing_error_rad, pointing_error_rad, own_source, CHOSEN)
+    error, error_source = given_or_own(beam.pointing_error_rad, pointing_error_rad, own_source, CHOSEN)
     received = received_on_axis_dbm(data) - float(pointing_loss_db(data, error))
     source = f"{source_text(sources, 'communication.data_rate')}; {error_source}"
     rate = beam.data_rate_bit_s

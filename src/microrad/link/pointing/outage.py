@@ -50,7 +50,7 @@ class Exposure:
         error = error_rad(data)
         if data.jitter is None:
             return cls.of(data, error, lambda reach_rad: float(error > reach_rad))
-        jitter = _given(data.jitter)
+        jitter = _jitter(data.jitter)
         return cls.of(data, error, lambda reach_rad: float(pointing.radial_survival(jitter, reach_rad)))
 
     @property
@@ -76,7 +76,7 @@ class Exposure:
 
 
 @dataclass(frozen=True, slots=True)
-class Spread:
+class ErrorDistribution:
     """Radial pointing errors with the share of the time that each stands for; together 1."""
 
     radius_rad: Floats
@@ -95,13 +95,13 @@ class Spread:
 
 
 @dataclass(frozen=True, slots=True)
-class Known(Spread):
+class GaussianErrors(ErrorDistribution):
     """The errors of a known distribution, in radial steps that are small against it; quantiles and shares are exact."""
 
     jitter: pointing.Jitter
 
     @classmethod
-    def of(cls, jitter: pointing.Jitter) -> "Known":
+    def of(cls, jitter: pointing.Jitter) -> "GaussianErrors":
         """The errors of this jitter."""
         reach = jitter.static_rad + 12.0 * max(jitter.rms_rad)
         if reach == jitter.static_rad:
@@ -171,12 +171,12 @@ def performance_under_jitter(data: link.DataLink) -> Performance | None:
     """The link under the mission's own jitter, or None where it gives none."""
     if data.jitter is None:
         return None
-    jitter, speed = _given(data.jitter), 2.0 * math.pi * data.jitter.bandwidth_hz
+    jitter, speed = _jitter(data.jitter), 2.0 * math.pi * data.jitter.bandwidth_hz
     rms_x, rms_y = jitter.rms_rad
     motion = pointing.SpectralMotion(
         (rms_x, rms_y), (speed * rms_x, speed * rms_y), (0.0, 0.0), data.jitter.bandwidth_hz
     )
-    return performance(data, "jitter as given", "", "", Known.of(jitter), jitter, motion)
+    return performance(data, "jitter as given", "", "", GaussianErrors.of(jitter), jitter, motion)
 
 
 def error_rad(data: link.DataLink) -> float:
@@ -187,7 +187,7 @@ def error_rad(data: link.DataLink) -> float:
     """
     if data.jitter is None:
         return data.table.pointing_error_rad
-    return _exact_quantile_rad(_given(data.jitter), stated_outage(data.requirement))
+    return _exact_quantile_rad(_jitter(data.jitter), stated_outage(data.requirement))
 
 
 def stated_outage(requirement: LinkRequirement) -> float:
@@ -213,7 +213,7 @@ def margin_db(data: link.DataLink) -> float:
     return Exposure.stated(data).margin_db
 
 
-def _given(table: JitterTable) -> pointing.Jitter:
+def _jitter(table: JitterTable) -> pointing.Jitter:
     (bias_x, bias_y), (rms_x, rms_y) = table.bias_rad, table.rms_rad
     return pointing.Jitter((bias_x, bias_y), (rms_x, rms_y))
 
@@ -223,7 +223,7 @@ def performance(
     source: str,
     controller: str,
     mirror: str,
-    spread: Spread,
+    errors: ErrorDistribution,
     jitter: pointing.Jitter,
     motion: pointing.SpectralMotion | None,
 ) -> Performance:
@@ -234,12 +234,12 @@ def performance(
         source: where the errors come from, in words.
         controller: the controller that leaves them; "" without one.
         mirror: the variant of the mirror under it; "" without one.
-        spread: the radial errors and their shares of the time.
+        errors: the radial errors and their shares of the time.
         jitter: bias and rms of each axis, for the fades and the penalty of an uncoded link.
         motion: what the spectrum says of each axis; None where it is not known, and the fades are then nan.
     """
     q, kept = data.requirement, 1.0 - stated_outage(data.requirement)
-    under = Exposure.of(data, spread.quantile_rad(kept), spread.beyond)
+    under = Exposure.of(data, errors.quantile_rad(kept), errors.beyond)
     fall, ahead = under.fall, under.ahead_rad
     half, shifted = fall.half_angle_rad, with_point_ahead(jitter, ahead)
     fades_per_s, fade_s, warning = _fades(shifted, motion, fall, under.on_axis_db - q.margin_db)
@@ -249,7 +249,7 @@ def performance(
         mirror=mirror,
         jitter=jitter,
         error_rad=under.quantile_rad,
-        mean_loss_db=_mean_loss_db(spread, fall.loss_db(spread.radius_rad + ahead)),
+        mean_loss_db=_mean_loss_db(errors, fall.loss_db(errors.radius_rad + ahead)),
         outage_loss_db=under.outage_loss_db,
         margin_db=under.margin_db,
         possible=under.possible,
@@ -257,7 +257,7 @@ def performance(
         short=under.short_of(q.margin_db),
         data_rate_bit_s=_rate(data, under.outage_loss_db),
         best=pointing.best_divergence_for_static_error(
-            spread.quantile_rad(kept) + ahead, smallest_half_angle_rad=half, current_half_angle_rad=half
+            errors.quantile_rad(kept) + ahead, smallest_half_angle_rad=half, current_half_angle_rad=half
         ),
         uncoded_penalty_db=_uncoded(data, shifted, half),
         fades_per_s=fades_per_s,
@@ -279,10 +279,10 @@ def with_point_ahead(jitter: pointing.Jitter, ahead_rad: float) -> pointing.Jitt
     return pointing.Jitter((x + along[0] * ahead_rad, y + along[1] * ahead_rad), jitter.rms_rad)
 
 
-def _mean_loss_db(spread: Spread, loss_db: Floats) -> float:
+def _mean_loss_db(errors: ErrorDistribution, loss_db: Floats) -> float:
     """Loss of the mean power, counted from the least loss so that no power is too small for a number."""
-    there = spread.share > 0.0
-    share, loss = spread.share[there], loss_db[there]
+    there = errors.share > 0.0
+    share, loss = errors.share[there], loss_db[there]
     least = float(np.min(loss))
     return least - 10.0 * math.log10(float(np.sum(share * 10.0 ** ((least - loss) / 10.0))))
 

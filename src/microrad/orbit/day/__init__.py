@@ -125,7 +125,7 @@ def run_day_study(
             "a number up to that, or a longer orbit.duration"
         )
     closing = flow.closings(o, links.data, loss)
-    heard = flow.heard(o.downlink, seen.pair)
+    heard = flow.station_passes(o.downlink, seen.pair)
     relay = flow.relay(o, seen, flow.rate_table(closing), loss.outage, found, 1.0)
     assert m.orbit is not None  # else there are no terminals
     known = Known(Case(o, m.orbit, links.data, loss), pair_of, seen, heard, found)

@@ -174,11 +174,11 @@ def _locks(found: Found | None, contacts: int, seed: int, run: int, slower: floa
 
 
 # -------------------------------------------------------------------------------------------------------------- direct
-Heard = tuple[orbit.Pass, str]
+StationPass = tuple[orbit.Pass, str]
 """A pass and the station that hears it."""
 
 
-def heard(down: Downlink | None, pair: orbit.Pair) -> tuple[Heard, ...]:
+def station_passes(down: Downlink | None, pair: orbit.Pair) -> tuple[StationPass, ...]:
     """Every pass over every station of the direct downlink; none without one."""
     return tuple(
         (each, station.name)
@@ -187,7 +187,7 @@ def heard(down: Downlink | None, pair: orbit.Pair) -> tuple[Heard, ...]:
     )
 
 
-def direct(o: Operations, seen: View, passes: tuple[Heard, ...]) -> Way | None:
+def direct(o: Operations, seen: View, passes: tuple[StationPass, ...]) -> Way | None:
     """The radio downlink, or None without one. The station that rises first is kept until the satellite sets there."""
     down = o.downlink
     if down is None:

@@ -2,7 +2,7 @@
 
 What is taken for granted:
 
-- The stages of an acquisition are those of `link.acquisition.partner_search`, with the light time of the beacon's distance.
+- The stages of an acquisition are those of `link.acquisition`, with the light time of the beacon's distance.
 - The fine loop is simulated in sampled windows of the data phase. Between them the state holds: a contact that has
   lock at the end of a window keeps it up to the next one. A window follows each re-acquisition, so that what is lost at
   once is not counted as data; what is lost once in minutes is seen only by chance (`ContactRun.losses_per_s`).
