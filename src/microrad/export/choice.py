@@ -30,7 +30,7 @@ from microrad.export.records import (
     Signal,
     Vectors,
 )
-from microrad.link.tracking_light import tracking_light_w
+from microrad.link import tracking_light_w
 from microrad.loop import control, controller_study, paper_cases, sine_run
 from microrad.loop.paper_cases import PID, PID_WITH_INVERSE
 from microrad.loop.pointing_loop.loop import LoopController
