@@ -105,7 +105,7 @@ def rising(values: Floats, what: str) -> Floats:
 
 def covariance(A: Floats, B: Floats) -> Floats:
     """Stationary covariance P of x' = A x + B w: A P + P A' + B B' = 0."""
-    from scipy.linalg import solve_continuous_lyapunov  # slow to import, not needed to show help
+    from scipy.linalg import solve_continuous_lyapunov
 
     return np.zeros((0, 0)) if A.size == 0 else np.asarray(solve_continuous_lyapunov(A, -B @ B.T))
 

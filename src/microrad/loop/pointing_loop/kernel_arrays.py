@@ -254,7 +254,7 @@ def start_disturbance(shaping: Shaping, p: kernels.Ensemble, runs: NDArray[np.ui
 
 def uniform(gaussians: Floats) -> Floats:
     """Phases, uniform from 0 to 2 pi, from standard normal numbers."""
-    from scipy.special import ndtr  # slow to import, not needed to show help
+    from scipy.special import ndtr
 
     return np.asarray(2.0 * math.pi * ndtr(gaussians))
 
