@@ -17,7 +17,7 @@ from microrad.lab.bench.play import BenchError
 from microrad.loop import disturbance
 from microrad.mission import file as mission_file
 from microrad.mission.file import MissionError
-from microrad.report import carried
+from microrad.report.results import manifest_reader as carried
 from microrad.studio import compare_view, runs_view
 from microrad.studio.draft import Draft, DraftError
 from microrad.studio.workshop import Workshop

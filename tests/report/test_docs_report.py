@@ -12,8 +12,11 @@ from microrad import cli, report
 from microrad.core import machine
 from microrad.mission import toml as document
 from microrad.mission.file import load_mission
-from microrad.report import compared, page, results, tolerances
 from microrad.report.plotting import palette
+from microrad.report.results import comparison as compared
+from microrad.report.results import tolerances
+from microrad.report.results.manifest import MOST_INPUT_BYTES
+from microrad.report.study import page
 from microrad.studio import address, guard, jobs_process, reading, server, uploads, workshop
 from microrad.study import story as study
 from places import ROOT
@@ -81,7 +84,7 @@ def test_each_requirement_stands_in_the_table():
 def test_the_numbers_of_the_report_are_those_of_the_code():
     told(REPORT, f"in words to {100 * compared.WORDS_SHARE:g} %", f"at most {palette.MOST_POINTS} points")
     assert set(re.findall(r"`([A-Z0-9_]+)`", REPORT)) == set(machine.VARIABLES)
-    told(REPORT, f"up to {results.MOST_INPUT_BYTES / 1e6:g} MB each")
+    told(REPORT, f"up to {MOST_INPUT_BYTES / 1e6:g} MB each")
 
 
 def test_each_kind_of_tolerance_has_its_row():

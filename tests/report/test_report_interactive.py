@@ -9,22 +9,26 @@ import xml.etree.ElementTree as ET
 import numpy as np
 import pytest
 
-from microrad.report import scripts
-from microrad.report.day_assumptions import Assumed, assumptions
-from microrad.report.day_figures import empty
-from microrad.report.page import pages
+from microrad.report.day.figures import Assumed, assumptions, empty
+from microrad.report.page import templates as scripts
+from microrad.report.page.templates import templates
 from microrad.report.plotting import scales
 from microrad.report.plotting.figure import Figure
 from microrad.report.plotting.interactive import numbers, plot_of, text_of, words
 from microrad.report.plotting.layout import layout
-from microrad.report.plotting.palette import CIVIDIS, MOST_POINTS, colour_at, thinned
-from microrad.report.plotting.sheet import (
+from microrad.report.plotting.palette import (
     BLACK,
     BLUE,
+    CIVIDIS,
     GREY,
+    MOST_POINTS,
     SKY,
     VERMILION,
     WHITE,
+    colour_at,
+    thinned,
+)
+from microrad.report.plotting.sheet import (
     Area,
     Axis,
     Bars,
@@ -497,8 +501,10 @@ def test_hostile_names_are_words_and_end_nothing():
 
 
 def page_of(*drawn, files=False):
-    env = pages()
-    source = '{% from "figure.html" import drawn %}<!DOCTYPE html><html><body>{{ drawn(figures, files) }}</body></html>'
+    env = templates()
+    source = (
+        '{% from "page/figure.html" import drawn %}<!DOCTYPE html><html><body>{{ drawn(figures, files) }}</body></html>'
+    )
     return scripts.with_scripts(env.from_string(source).render(figures=drawn, files=files))
 
 
@@ -529,8 +535,8 @@ def test_numbers_stand_below_a_picture_where_they_are_wanted():
     figure = a_figure(columns={"input <b>": ("x&y",), "value (m)": np.array([0.25])})
     assert figure.static.plot == ""
     assert figure.static.svg == figure.svg
-    source = '{% from "figure.html" import drawn %}{{ drawn(figures, false, true) }}'
-    page = pages().from_string(source).render(figures=[figure.static])
+    source = '{% from "page/figure.html" import drawn %}{{ drawn(figures, false, true) }}'
+    page = templates().from_string(source).render(figures=[figure.static])
     assert "<script" not in page
     assert '<th>input &lt;b&gt;</th><th class="number">value (m)</th>' in page
     assert '<td>x&amp;y</td><td class="number">0.25</td>' in page
@@ -557,7 +563,7 @@ def test_the_library_is_whole_licensed_and_ends_no_element():
     assert "plotly.js (cartesian - minified) v4" in found[0]
     assert "Licensed under the MIT license" in found[0]
     assert len(scripts.library().encode()) < 1.6e6
-    folder = scripts.resources.files("microrad.report")
+    folder = scripts.resources.files("microrad.report.page")
     assert "MIT License" in folder.joinpath("vendor/plotly-LICENSE.txt").read_text(encoding="utf-8")
 
 

@@ -12,7 +12,12 @@ import pytest
 from microrad import cli, report
 from microrad.core import machine
 from microrad.mission import file as missionfile
-from microrad.report import carried, compared, page, reproduce, tolerances
+from microrad.report.results import comparison as compared
+from microrad.report.results import manifest_reader as carried
+from microrad.report.results import reproduce, tolerances
+from microrad.report.results.manifest import with_manifest
+from microrad.report.results.reproduce import reproduction_data
+from microrad.report.study import page
 from microrad.study import story as study
 from shipped import SHIPPED, edited_file, without_fine_pointing
 
@@ -64,7 +69,7 @@ def changed(written, tmp_path):
         if restated and isinstance(data["summary"], dict):
             data["summary_sha256"] = carried.hash_of_summary(data["summary"])
         path = tmp_path / "changed.html"
-        path.write_text(carried.with_manifest(found.page, page.embedded(data)), encoding="utf-8")
+        path.write_text(with_manifest(found.page, page.embedded(data)), encoding="utf-8")
         return path
 
     return edit
@@ -272,7 +277,7 @@ def test_another_layout_and_other_words_of_the_page_leave_the_numbers_agreeing(n
     def of_another_version(old, new):
         text = found.page.replace(old, new)
         assert text != found.page
-        text = carried.with_manifest(text, page.embedded({**found.data, "page_sha256": carried.hash_of_page(text)}))
+        text = with_manifest(text, page.embedded({**found.data, "page_sha256": carried.hash_of_page(text)}))
         path = tmp_path / "report.html"
         path.write_text(text, encoding="utf-8")
         return call(capsys, path)[:2]
@@ -623,4 +628,4 @@ def test_a_number_of_thousands_of_digits_is_no_way_to_stop_it(changed, not_run):
     found = reproduce.reproduce(path)
     assert [d.place for d in found.differences] == ["margin_db.beacon"]
     assert found.largest == float("inf")
-    json.loads(json.dumps(reproduce.data(found), allow_nan=True))
+    json.loads(json.dumps(reproduction_data(found), allow_nan=True))

@@ -8,7 +8,10 @@ import re
 import pytest
 
 from microrad.loop.fine_pointing import COUNTERS
-from microrad.report import budget_views, compared, reproduce, results, scale, tolerances, words
+from microrad.report.data import finite
+from microrad.report.links.data import performance_data
+from microrad.report.results import comparison as compared
+from microrad.report.results import reproduce, tolerances
 from shipped import whole_drawn, whole_study
 
 STEP_RAD = 0.305e-3 * 0.089e-3  # of the drive, through the mirror: 0.0271 µrad
@@ -21,12 +24,12 @@ def ran():
 
 @pytest.fixture(scope="module")
 def summary(ran):
-    return results.finite(words.summary(ran))
+    return finite(summary(ran))
 
 
 @pytest.fixture(scope="module")
 def of_ran(ran):
-    return scale.scale_of(ran)
+    return tolerances.converter_steps(ran)
 
 
 def numbers(summary):
@@ -61,7 +64,7 @@ def test_every_figure_has_a_stated_tolerance(of_ran):
 
 
 def test_every_number_that_only_some_missions_have_has_a_stated_tolerance():
-    one = re.findall(r'"(\w+)": (?:list\()?p\.', inspect.getsource(budget_views.performance_data))
+    one = re.findall(r'"(\w+)": (?:list\()?p\.', inspect.getsource(performance_data))
     keys = [f"{key}[0]" if key in ("bias_rad", "rms_rad") else key for key in one]
     keys = [key for key in keys if key not in ("source", "controller", "mirror")]
     assert len(keys) > 15

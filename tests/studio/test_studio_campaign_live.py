@@ -15,7 +15,7 @@ from microrad.campaign.ledger import Ledger
 from microrad.campaign.records import CampaignError, Chunk, Failed
 from microrad.campaign.summary import summarise
 from microrad.loop.fine_loop.ensemble import bin_edges_rad
-from microrad.report import campaign_words
+from microrad.report.campaign import words as campaign_words
 from microrad.studio import campaign_live, campaign_view
 from microrad.studio.campaign_live import Live, LiveCampaigns
 from small_campaign import campaign_file

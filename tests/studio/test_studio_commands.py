@@ -20,7 +20,7 @@ from microrad.loop import control, fine_pointing
 from microrad.loop.fine_pointing import designs
 from microrad.mission.toml import MissionError
 from microrad.orbit.day import assumptions
-from microrad.report.page import Drawn
+from microrad.report.study.page import StudyFigures
 from microrad.studio.commands import (
     Budget,
     CampaignResume,
@@ -104,7 +104,7 @@ def test_a_change_of_the_budget_is_in_both(home, capsys):
 def test_a_study_gives_the_same_verdict_and_the_same_files(home, capsys, monkeypatch):
     monkeypatch.setattr(study, "run", once(study.run))
     monkeypatch.setattr(microrad, "run_study", study.run, raising=False)
-    monkeypatch.setattr(report, "draw", lambda *args: Drawn())
+    monkeypatch.setattr(report, "study_figures", lambda *args: StudyFigures())
     action, again = Run(MISSION, Path("out")), Run(MISSION, Path("out again"), overwrite=True)
     out, _, _ = typed(command(action), capsys)
     assert executed(again.python).strip() == out[: out.index("\n\nout/report.html")]

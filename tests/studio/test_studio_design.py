@@ -15,7 +15,8 @@ from microrad import link
 from microrad.link import study as link_study
 from microrad.link import under_jitter
 from microrad.orbit import day as day_study
-from microrad.report import day_plots, figures
+from microrad.report.day.figures import ground_map
+from microrad.report.paper import figures
 from microrad.studio import attempts, day_view, dials, link_view, plots, pointing_view
 from microrad.studio.draft import Draft
 from microrad.studio.latest import Latest, shared
@@ -333,7 +334,7 @@ def test_the_map_is_that_of_the_report_and_loads_nothing(day):
     kind, _, data = address.partition(",")
     drawn = base64.b64decode(data, validate=True).decode()
     assert kind == "data:image/svg+xml;base64"
-    assert drawn == day_plots.ground_map(day).svg
+    assert drawn == ground_map(day).svg
     assert drawn.startswith("<svg ")
     assert 'xmlns="http://www.w3.org/2000/svg"' in drawn
     assert not re.search(r'(?:href="|url\()(?!#)', drawn)

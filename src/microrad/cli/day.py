@@ -64,7 +64,8 @@ def contacts(
     if sum((as_csv, as_html, as_json)) > 1:
         raise Refusal("--csv, --html and --json exclude each other; give one of them.")
     from microrad.orbit import day as day_study
-    from microrad.report import day_tables, day_views
+    from microrad.report.day.data import day_data
+    from microrad.report.day.text import day_csv, day_text
 
     links = _links(file)
     try:
@@ -74,14 +75,14 @@ def contacts(
         raise Refusal(f"{file}: {error}") from error
     code = MET if day.relay.capacity_bit > 0.0 else UNMET
     if as_json:
-        return Outcome(json_text({"mission": links.file.mission.name, **day_tables.data(day)}), code)
+        return Outcome(json_text({"mission": links.file.mission.name, **day_data(day)}), code)
     if as_csv:
-        return Outcome(day_views.csv_text(day), code)
+        return Outcome(day_csv(day), code)
     if as_html:
-        from microrad.report import single_pages  # drawing takes longer to load than a table needs
+        from microrad.report.day.page import day_page
 
-        return Outcome(single_pages.day(day, links), code)
-    return Outcome(day_views.text(day, width()), code)
+        return Outcome(day_page(day, links), code)
+    return Outcome(day_text(day, width()), code)
 
 
 @app.command(
@@ -110,7 +111,7 @@ def constellation(
     from microrad.orbit import constellation as plans
     from microrad.orbit import day as day_study
     from microrad.orbit import operations
-    from microrad.report import constellation_views
+    from microrad.report.day.constellation import plan_data, plan_text
 
     links = _links(file)
     try:
@@ -124,5 +125,5 @@ def constellation(
     except ValueError as error:  # a table that is missing, an orbit that does not hold
         raise Refusal(f"{file}: {error}") from error
     if as_json:
-        return Outcome(json_text({"mission": links.file.mission.name, **constellation_views.data(plan)}), code)
-    return Outcome(constellation_views.text(plan, width()), code)
+        return Outcome(json_text({"mission": links.file.mission.name, **plan_data(plan)}), code)
+    return Outcome(plan_text(plan, width()), code)

@@ -14,7 +14,7 @@ from microrad.studio.plots import BLUE, GREY, VERMILION, Plot, empty, marker_lin
 
 if TYPE_CHECKING:
     from microrad.campaign.records import CampaignSummary, CellSummary, Interval, Limit, OutputSummary, Tail
-    from microrad.report.campaign_scale import Scale
+    from microrad.report.campaign.numbers import Scale
 
 # The report's own words and tables load numpy, and with the package that they are in far more.
 
@@ -46,7 +46,7 @@ class Figures:
 
 def figures(live: Live) -> Figures | None:
     """The figures of a ledger, None where it has no rows yet. It takes a while the first time."""
-    from microrad.report import campaign_words
+    from microrad.report.campaign import words as campaign_words
 
     summary = live.summary
     if summary is None or not live.rows:
@@ -82,10 +82,10 @@ def _rows(live: Live, summary: CampaignSummary) -> str:
 
 # --------------------------------------------------------------------------------------------------------------- tables
 def _tables(summary: CampaignSummary, cell: CellSummary | None) -> list[Table]:
-    from microrad.report import campaign_tables
+    from microrad.report.campaign import tables as campaign_tables
 
-    failed = tuple(campaign_tables.failed_rows(summary, _FAILED))
-    told = Table("Failed rows", campaign_tables.FAILED_HEADINGS, failed, wide=True)
+    headings, failed = campaign_tables.failed_table(summary, _FAILED)
+    told = Table("Failed rows", headings, tuple(failed), wide=True)
     if cell is None:
         return [told]
     of = f" where {cell.label}" if cell.values else ""
@@ -103,7 +103,8 @@ def _tables(summary: CampaignSummary, cell: CellSummary | None) -> list[Table]:
 
 def _limits(summary: CampaignSummary, cell: CellSummary, of: str) -> Table:
     """Each limit with the share of the rows that keep it, and of those that keep all."""
-    from microrad.report import campaign_numbers, campaign_tables
+    from microrad.report.campaign import numbers as campaign_numbers
+    from microrad.report.campaign import tables as campaign_tables
 
     named = [
         (campaign_numbers.limit_text(limit, campaign_tables.unit_of(summary, limit.output)), missed)
@@ -127,7 +128,7 @@ def _short(rows: Iterable[tuple[str, ...]]) -> tuple[tuple[str, ...], ...]:
 # ---------------------------------------------------------------------------------------------------------------- plots
 def _plots(summary: CampaignSummary, cell: CellSummary) -> dict[str, Plot]:
     """How each output that varies is spread, those whose limit is missed most first, and the tail of the error."""
-    from microrad.report.campaign_numbers import label
+    from microrad.report.campaign.numbers import label
 
     limits = {limit.output: limit for limit in summary.limits}
     varied = [output for output in cell.outputs.values() if output.rows and output.most > output.least]
@@ -147,8 +148,7 @@ def distribution_plot(output: OutputSummary, limit: Limit | None) -> Plot:
     """How many rows have at most a value of an output, with its quantiles, their intervals and its limit."""
     import numpy as np
 
-    from microrad.report.campaign_numbers import label
-    from microrad.report.campaign_scale import scale_of
+    from microrad.report.campaign.numbers import label, scale_of
 
     if not output.counts.size:
         return empty(f"{label(output.name)} is infinite in every row")
@@ -174,7 +174,7 @@ _HEIGHT = 340
 
 def _quantiles(output: OutputSummary, scale: Scale) -> list[dict[str, Any]]:
     """The quantiles that the rows know, each with its interval as a bar."""
-    from microrad.report.campaign_tables import is_known
+    from microrad.report.campaign.tables import is_known
 
     known = [(100.0 * p, each) for p, each in sorted(output.quantiles.items()) if is_known(each)]
     if not known:
@@ -201,7 +201,7 @@ def _arms(found: Any) -> tuple[float, float]:
 
 def _limit_lines(output: OutputSummary, limit: Limit | None, scale: Scale) -> list[dict[str, Any]]:
     """The limit as a line; in the legend alone where it is far from all rows."""
-    from microrad.report.campaign_numbers import SYMBOL, bound
+    from microrad.report.campaign.numbers import SYMBOL, bound
 
     sides = [] if limit is None else [("least", limit.least), ("most", limit.most)]
     reach, found = output.most - output.least, []

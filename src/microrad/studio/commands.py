@@ -75,23 +75,23 @@ class Budget:
         if self.data_rate is None and self.pointing_error is None:
             return joined(
                 "from microrad import load_link, run_link_study",
-                "from microrad.report import budget_views",
+                "from microrad.report.links.budgets import links_text",
                 "",
                 f"study = run_link_study(load_link({path_text(self.file)}))",
-                f"print(budget_views.text(study, {WIDTH}))",
+                f"print(links_text(study, {WIDTH}))",
             )
         return joined(
             "from dataclasses import replace",
             "",
             "from microrad import load_link, parse_quantity, run_link_study",
             "from microrad.mission.model import Source",
-            "from microrad.report import budget_views",
+            "from microrad.report.links.budgets import links_text",
             "",
             f"file = load_link({path_text(self.file)})",
             "tables, sources = {}, dict(file.sources)",
             *self._changes(),
             "file = replace(file, mission=file.mission.model_copy(update=tables), sources=sources)",
-            f"print(budget_views.text(run_link_study(file), {WIDTH}))",
+            f"print(links_text(run_link_study(file), {WIDTH}))",
         )
 
     def _changes(self) -> Iterable[str]:
@@ -124,10 +124,10 @@ class Contacts:
         """Lines of Python that do the same."""
         return joined(
             "from microrad import load_link, run_day_study, run_link_study",
-            "from microrad.report import day_views",
+            "from microrad.report.day.text import day_text",
             "",
             f"day = run_day_study(run_link_study(load_link({path_text(self.file)})))",
-            f"print(day_views.text(day, {WIDTH}))",
+            f"print(day_text(day, {WIDTH}))",
         )
 
 
@@ -253,9 +253,9 @@ def _campaign(ledger: Path, name: str, call: str) -> str:
         "from pathlib import Path",
         "",
         f"from microrad import CampaignMeans, {name}, summarise_campaign",
-        "from microrad.report import campaign_words",
+        "from microrad.report.campaign.text import campaign_text",
         "",
         f"ledger = {as_path(ledger)}",
         call,
-        f"print(campaign_words.text(summarise_campaign(ledger), {WIDTH}))",
+        f"print(campaign_text(summarise_campaign(ledger), {WIDTH}))",
     )

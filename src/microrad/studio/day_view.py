@@ -16,7 +16,9 @@ from microrad.mission.file import LinkFile
 from microrad.orbit import Contact
 from microrad.orbit import day as day_study
 from microrad.orbit.day import DayStudy, Way
-from microrad.report import day_tables, day_words
+from microrad.report.day import words as day_words
+from microrad.report.day.tables import CONTACT_COLUMNS, assumptions_table, contacts_table, ways_table
+from microrad.report.quantities import duration
 from microrad.studio import plots
 
 Row = dict[str, Any]
@@ -52,7 +54,7 @@ def ways(day: DayStudy) -> tuple[Way, ...]:
 
 def way_rows(day: DayStudy) -> list[Row]:
     """Relay and direct downlink side by side."""
-    return [{"id": place, "what": row[0], **_cells(row[1:])} for place, row in enumerate(day_tables.way_rows(day))]
+    return [{"id": place, "what": row[0], **_cells(row[1:])} for place, row in enumerate(ways_table(day).rows)]
 
 
 def _cells(cells: Iterable[str]) -> Row:
@@ -61,19 +63,21 @@ def _cells(cells: Iterable[str]) -> Row:
 
 def contact_headings() -> tuple[str, ...]:
     """Headings of the contacts, on one line each."""
-    return tuple(heading.replace("\n", " ") for heading in day_tables.CONTACT_COLUMNS)
+    return tuple(heading.replace("\n", " ") for heading in CONTACT_COLUMNS)
 
 
 def contact_rows(day: DayStudy) -> list[Row]:
     """Each contact by both ways, in the order of their rise; cells by the number of their column."""
-    rows = day_tables.contact_rows(day)
+    rows = contacts_table(day).rows
     return [{"id": place, **{f"c{k}": cell for k, cell in enumerate(row)}} for place, row in enumerate(rows)]
 
 
 def swing_rows(day: DayStudy) -> list[Row]:
     """What each assumption changes, alone."""
     names = ("assumption", "changed", "relay", "direct", "ratio", "slow_relay", "slow_direct")
-    return [{"id": place, **dict(zip(names, row, strict=True))} for place, row in enumerate(day_tables.swing_rows(day))]
+    return [
+        {"id": place, **dict(zip(names, row, strict=True))} for place, row in enumerate(assumptions_table(day).rows)
+    ]
 
 
 def words(day: DayStudy) -> list[str]:
@@ -107,7 +111,7 @@ def timeline_plot(day: DayStudy) -> plots.Plot:
     for name, colour, intervals in timeline_rows(day):
         row = f"{plots.plain(name, 26)}: {_how_much(intervals)}"
         names.append(row)
-        said = [f"{_clock(utc(a))} to {_clock(utc(b))}, {day_words.duration(b - a)}" for a, b in intervals.tolist()]
+        said = [f"{_clock(utc(a))} to {_clock(utc(b))}, {duration(b - a)}" for a, b in intervals.tolist()]
         data.append(
             {
                 "type": "bar",
@@ -137,7 +141,7 @@ def _how_much(intervals: Floats) -> str:
     """How many there are, and how long in all."""
     if not len(intervals):
         return "none"
-    return f"{len(intervals)}, {day_words.duration(float(np.sum(intervals[:, 1] - intervals[:, 0])))}"
+    return f"{len(intervals)}, {duration(float(np.sum(intervals[:, 1] - intervals[:, 0])))}"
 
 
 def _clock(utc: str) -> str:
@@ -146,9 +150,9 @@ def _clock(utc: str) -> str:
 
 def ground_map(day: DayStudy) -> tuple[str, str]:
     """The report's map of the day as the address of an image, and what it shows in words."""
-    from microrad.report import day_plots  # drawing takes longer to load than a page may
+    from microrad.report.day.figures import ground_map
 
-    figure = day_plots.ground_map(day)
+    figure = ground_map(day)
     return f"data:image/svg+xml;base64,{base64.b64encode(figure.svg.encode()).decode()}", figure.caption
 
 
@@ -181,7 +185,7 @@ def latency_plot(day: DayStudy) -> plots.Plot:
         time_s, share = distribution(way)
         some = (share > 0.0) & (time_s > 0.0)
         if some.any():
-            said = f"{way.name}: median {day_words.duration(way.median_s)}, 99 % {day_words.duration(way.slow_s)}"
+            said = f"{way.name}: median {duration(way.median_s)}, 99 % {duration(way.slow_s)}"
             data.append(
                 _curve(said, time_s[some], 100.0 * share[some], _COLOURS[place], plots.DASHES[place], "%{y:.3g} %")
             )

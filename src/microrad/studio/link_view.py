@@ -17,7 +17,8 @@ from microrad.link import study as link_study
 from microrad.link.study import LinkStudy
 from microrad.link.under_jitter import error_rad, required_error_rad
 from microrad.mission.file import LinkFile
-from microrad.report.budget_views import jitter_lines, sentences
+from microrad.report.links.budgets import jitter_lines
+from microrad.report.links.words import sentences
 from microrad.report.quantities import quantity, signed
 from microrad.studio import plots
 from microrad.studio.dials import Dial, dial

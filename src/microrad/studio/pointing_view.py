@@ -150,7 +150,7 @@ def ahead_rows(v: PointingView) -> list[Row]:
 
 def words(v: PointingView) -> list[str]:
     """What the beacon covers, in sentences; that there is none, where there is none."""
-    from microrad.report.links import coverage  # loads the drawing library
+    from microrad.report.links.page import coverage
 
     return coverage(v.budget) or ["The mission has no beacon, so nothing is to be covered."]
 

@@ -52,8 +52,8 @@ class CampaignReport:
         return (
             "from pathlib import Path\n\n"
             "from microrad import summarise_campaign\n"
-            "from microrad.report import campaign_page\n\n"
-            f"text = campaign_page.html(summarise_campaign(Path({str(self.ledger)!r})))\n"
+            "from microrad.report.campaign.page import campaign_page\n\n"
+            f"text = campaign_page(summarise_campaign(Path({str(self.ledger)!r})))\n"
             f'Path({str(self.page)!r}).write_text(text, encoding="utf-8")\n'
         )
 

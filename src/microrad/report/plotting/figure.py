@@ -4,8 +4,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 
-from microrad.report.inlined import inlined
 from microrad.report.plotting import interactive
+from microrad.report.plotting.inlined import inlined
 from microrad.report.plotting.sheet import Sheet
 from microrad.report.plotting.svg import svg_of
 from microrad.report.tables import Column, rows_of

@@ -14,15 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from microrad.core.arrays import Floats
-from microrad.report.plotting.palette import thinned
-
-# Okabe and Ito's palette: told apart by colour-blind readers. Line styles differ too, for print in grey.
-BLACK, ORANGE, SKY, GREEN, BLUE, VERMILION = "#000000", "#E69F00", "#56B4E9", "#009E73", "#0072B2", "#D55E00"
-WHITE, GREY = "#ffffff", "#777777"
+from microrad.report.plotting.palette import BLACK, GREY, thinned
 
 Dash = str | tuple[float, ...]
 Ends = tuple[float, float]
 Place = Literal["above", "below", "right", "upper left", "upper right", "lower left", "lower right", "best"]
+WIDTH = 7.6
+"""Of most sheets, in inches."""
 _Mark = TypeVar("_Mark", bound="Mark")
 
 
@@ -320,3 +318,14 @@ def labelled(marks: Sequence[Mark]) -> Iterator[Line | Rule | Span | Area | Bars
         if not isinstance(mark, Field | Words) and mark.label and mark.label not in seen:
             seen.add(mark.label)
             yield mark
+
+
+def shortened(name: str, most: int = 34) -> str:
+    """The name as it stands in a figure: on one line, and cut where it would leave no room for the data."""
+    plain = " ".join("".join(c if c.isprintable() else " " for c in name).split())
+    return plain if len(plain) <= most else plain[: most - 1] + "…"
+
+
+def empty(words: str) -> Sheet:
+    """A picture that says why there is nothing to see."""
+    return Sheet(WIDTH, 0.9, heading=words, heading_colour=GREY)

@@ -25,9 +25,9 @@ from microrad.report.plotting.layout import (
     at,
     layout,
 )
-from microrad.report.plotting.palette import colour_at, thinned
+from microrad.report.plotting.palette import BLACK, WHITE, colour_at, thinned
 from microrad.report.plotting.scales import LINE
-from microrad.report.plotting.sheet import BLACK, WHITE, Area, Bars, Dash, Field, Line, Rule, Sheet, Span, Words
+from microrad.report.plotting.sheet import Area, Bars, Dash, Field, Line, Rule, Sheet, Span, Words
 
 _GRID, _FRAME = "#dddddd", "#1b1f24"
 _DASHES: dict[str, tuple[float, ...]] = {"-": (), "--": (3.7, 1.6), "-.": (6.4, 1.6, 1.0, 1.6), ":": (1.0, 1.65)}
