@@ -330,7 +330,7 @@ def test_a_campaign_says_how_likely_its_error_is(slow: Slow) -> None:
     assert error == pytest.approx(exact, rel=1e-6)
     assert past.low <= 1e-6 <= past.high < 20.0 * past.low
     radius, likely = campaign_words.tail_sentences(found, cell)
-    assert radius.startswith("The radial error exceeds ") and "with probability 1e-5 (" in radius
+    assert radius.startswith("The radial error exceeds ") and "with probability 10⁻⁵ (" in radius
     said = campaign_words.share(past.value)
     assert likely.startswith(f"The radial error is beyond {quantity(error, 'rad')} with probability {said} (")
     assert "at 99 % confidence" in likely and likely in campaign_text(found, 10_000)

@@ -9,7 +9,7 @@ import pytest
 from browser import violations
 from microrad import report
 from microrad.lab.identify import identify
-from microrad.report.campaign import page as campaign_page
+from microrad.report.campaign.page import campaign_page
 from microrad.report.day.page import day_page
 from microrad.report.links.page import links_page
 from report import test_identification_report as identified

@@ -415,7 +415,7 @@ def test_the_data_is_json_without_arrays_and_says_the_same(case):
         ("not begun", "No row has been simulated yet.", "open"),
         (
             "tail alone",
-            "The radial error exceeds 10.5 µrad with probability 1e-6 (at least 10.3 µrad at 99 % confidence).",
+            "The radial error exceeds 10.5 µrad with probability 10⁻⁶ (at least 10.3 µrad at 99 % confidence).",
             "open",
         ),
     ],
@@ -459,8 +459,8 @@ def test_a_cell_without_results_is_never_the_best():
         (0.0123, "1.23 %"),
         (0.99987, "99.987 %"),
         (0.999999, "99.99990 %"),
-        (1e-6, "1e-6"),
-        (3.14e-4, "3.1e-4"),
+        (1e-6, "10⁻⁶"),
+        (3.14e-4, "3.1×10⁻⁴"),
         (math.nan, "not known"),
     ],
 )
@@ -524,14 +524,14 @@ def test_the_tail_says_the_least_probability_that_is_known():
     cell = summary.cells[0]
     known = {**cell.tail.wanted, 1e-7: Interval(math.nan, math.nan, math.nan, CONFIDENCE)}
     said = campaign_words.tail_sentences(summary, replace(cell, tail=replace(cell.tail, wanted=known)))
-    assert said[0].startswith("The radial error exceeds 10.5 µrad with probability 1e-6 (at least 10.3 µrad")
-    assert said[1].startswith("The radial error is beyond 10 µrad with probability 3.7e-6 (")
+    assert said[0].startswith("The radial error exceeds 10.5 µrad with probability 10⁻⁶ (at least 10.3 µrad")
+    assert said[1].startswith("The radial error is beyond 10 µrad with probability 3.7×10⁻⁶ (")
     assert campaign_words.tail_sentences(summary, replace(cell, tail=None)) == []
     far = replace(summary, limits=(replace(LIMITS[1], most=20e-6),))
     unseen = campaign_words.tail_sentences(far, cell)[1]
     assert unseen.startswith("No radial error beyond 20 µrad was seen (0 to ")
     _, rows = campaign_tables.tail_table(replace(cell.tail, wanted=known))
-    assert rows[-1] == ("1e-7", "not known", "")
+    assert rows[-1] == ("10⁻⁷", "not known", "")
     assert rows[0][:2] == ("10 %", "4.29 µrad")
 
 
@@ -644,7 +644,7 @@ def test_the_tail_marks_what_was_wanted_and_the_limit():
     summary = summary_of(2, grid=APERTURES, rows=64)
     (figure,) = drawing.tail(summary, summary.cells[0])
     seen = texts(figure)
-    assert {"1e-4: 8.58 µrad", "1e-6: 10.5 µrad", "limit ≤ 10 µrad", "other combinations"} <= set(seen)
+    assert {"10⁻⁴: 8.58 µrad", "10⁻⁶: 10.5 µrad", "limit ≤ 10 µrad", "other combinations"} <= set(seen)
     assert "10⁻⁵" in seen  # a decade of the axis
     single = summary_of(2, limits=LIMITS[:1], rows=64)
     (alone,) = drawing.tail(single, single.cells[0])
@@ -677,7 +677,7 @@ def test_a_key_is_cut_to_what_tells_it_from_the_others():
 
 def test_the_failure_region_is_of_the_limit_most_often_missed_over_what_matters_to_it():
     summary = summary_of(6, rows=400, shift_db=0.3)
-    (figure,) = campaign_page.region(summary)
+    (figure,) = campaign_module.region(summary)
     worst = max(summary.cells[0].missed_by, key=lambda name: summary.cells[0].missed_by[name].value)
     assert figure.title == f"Where {worst} misses its limit"
     assert list(figure.columns)[-1] == worst
@@ -687,12 +687,12 @@ def test_the_failure_region_is_of_the_limit_most_often_missed_over_what_matters_
     assert list(figure.columns)[:2] == leading
     assert {"kept", "missed"} <= set(texts(figure))
     assert "no results" not in texts(figure)
-    (failing,) = campaign_page.region(summary_of(2, failed=5))
+    (failing,) = campaign_module.region(summary_of(2, failed=5))
     assert "no results" in texts(failing)
 
 
 def test_with_one_input_the_region_has_the_output_beside_it():
-    (figure,) = campaign_page.region(summary_of(1, shift_db=-0.6))
+    (figure,) = campaign_module.region(summary_of(1, shift_db=-0.6))
     assert {"communication.transmit_power (W)", "margin (dB)", "limit ≥ 3.00 dB"} <= set(texts(figure))
     assert "the input that matters most" in figure.caption
 
@@ -700,13 +700,13 @@ def test_with_one_input_the_region_has_the_output_beside_it():
 def test_the_region_is_of_the_combination_shown_in_detail_unless_it_misses_nothing():
     summary = summary_of(2, grid=APERTURES, rows=256, shift_db=-1.5)
     best = campaign_words.best(summary)
-    (figure,) = campaign_page.region(summary)
+    (figure,) = campaign_module.region(summary)
     assert 0.0 < best.missed.value < 1.0
     assert f"256 rows of {best.label}" in figure.caption
     assert "on both of its sides" not in figure.caption
     kept = summary_of(2, grid=APERTURES, rows=256)
     best = campaign_words.best(kept)
-    (figure,) = campaign_page.region(kept)
+    (figure,) = campaign_module.region(kept)
     assert best.missed.value == 0.0
     assert f"256 rows of {best.label}" not in figure.caption
     assert figure.caption.endswith(f"No limit has rows of {best.label} on both of its sides.")
@@ -835,8 +835,8 @@ def test_where_it_is_not_known_what_matters_nothing_matters_most():
     blind = replace(summary, sensitivities=few)
     said = campaign_words.matters(blind)
     assert said == ["What matters to margin and residual_quantile is not known: 32 good rows are too few."]
-    assert "matter" not in campaign_page.region(blind)[0].caption
-    assert "the inputs that matter most" in campaign_page.region(summary_of(6, rows=400, shift_db=0.3))[0].caption
+    assert "matter" not in campaign_module.region(blind)[0].caption
+    assert "the inputs that matter most" in campaign_module.region(summary_of(6, rows=400, shift_db=0.3))[0].caption
 
 
 def test_each_output_is_explained_and_the_rate_that_is_possible_is_not_the_grids():
@@ -854,8 +854,8 @@ def test_each_output_is_explained_and_the_rate_that_is_possible_is_not_the_grids
 
 def test_a_low_end_that_is_as_good_as_nothing_reads_0():
     ends = campaign_numbers.ends
-    assert ends(Interval(3.5e-7, 7.5e-39, 2.6e-5, 0.99), "", "outage") == "0 to 2.6e-5"
-    assert ends(Interval(3.5e-7, 7.5e-11, 2.6e-5, 0.99), "", "outage") == "7.5e-11 to 2.6e-5"
+    assert ends(Interval(3.5e-7, 7.5e-39, 2.6e-5, 0.99), "", "outage") == "0 to 2.6×10⁻⁵"
+    assert ends(Interval(3.5e-7, 7.5e-11, 2.6e-5, 0.99), "", "outage") == "7.5×10⁻¹¹ to 2.6×10⁻⁵"
     assert ends(Interval(0.01, 0.0, 0.02, 0.99), "", "outage") == "0 % to 2 %"
 
 
@@ -863,7 +863,7 @@ def test_the_tails_worth_stands_in_plain_english():
     tail = replace(rayleigh_tail(2e-6), effective_runs=2.44e7)
     said = campaign_words.tail_method(tail)
     assert said.startswith("It comes from the share of the time of 64 rows")
-    assert said.endswith("24 million independent samples of the error would tell as much of 1e-6.")
+    assert said.endswith("24 million independent samples of the error would tell as much of 10⁻⁶.")
     assert "samples" not in campaign_words.tail_method(replace(tail, effective_runs=math.nan))
     for count, words in ((1.3e5, "130000 "), (3.21e9, "3.2 billion ")):
         assert f" {words}independent" in campaign_words.tail_method(replace(tail, effective_runs=count))

@@ -526,6 +526,18 @@ def test_two_pictures_of_a_page_share_no_id_and_keep_what_theirs_refer_to():
         assert "<style" not in picture  # it would hold for the whole page
 
 
+@pytest.mark.parametrize(("low", "high"), [(0.0, None), (0.0, 100.0), (-1.0, None), (None, 0.0)])
+def test_a_logarithmic_axis_takes_no_end_that_is_not_positive(low, high):
+    sheet, (panel,) = grid(4.0, 3.0)
+    panel.y = Axis("time (s)", log=True, low=low, high=high)
+    panel.add(Line(np.array([0.0, 1.0]), np.array([2.0, 50.0])))
+    ends = scales.limits(panel.y, "y", [panel])
+    assert 1.0 < ends[0] < 2.0
+    assert ends[1] == 100.0 if high else 50.0 < ends[1] < 100.0
+    assert "<path" in svg_of(sheet)
+    assert plot_of(sheet)["layout"]["yaxis"]["range"] == pytest.approx(np.log10(ends), abs=1e-5)
+
+
 def test_columns_become_rows_of_text_with_gaps_left_empty():
     columns = {"input": ("a", "b", "c"), "value (m)": np.array([1.0 / 3.0, math.nan]), "n": np.array([1e9])}
     assert rows_of(columns, 3) == [("a", "0.333", "1e+09"), ("b", "", ""), ("c", "", "")]

@@ -15,11 +15,12 @@ from microrad.link import Swing
 from microrad.link import study as link_study
 from microrad.mission.file import load_link
 from microrad.report.links import budgets as budget_views
-from microrad.report.links import figures as link_figures
+from microrad.report.links import figures as link_module
 from microrad.report.links import page as links
 from microrad.report.links import words as links_words
 from microrad.report.links.budgets import links_csv, links_text
 from microrad.report.links.data import performance_data
+from microrad.report.links.figures import link_figures
 from microrad.report.links.page import (
     acquisition_paragraphs,
     acquisition_section,
@@ -439,7 +440,7 @@ def test_a_tornado_shows_its_longest_bars_and_names_assumptions(plain):
     own, *others = plain.tornados
     figure = link_figures(replace(plain, tornados=(replace(own, swings=tuple(many)), *others)))[0]
     labels = [text for text in texts(figure) if text and text.startswith("k")]
-    assert len(labels) == link_figures.MOST_BARS
+    assert len(labels) == link_module.MOST_BARS
     assert labels[0] == "k0 = 300 Mbit/s"
     assert figure.caption.endswith("Assumptions among them: communication.k1.")
     assert {len(column) for column in figure.columns.values()} == {30}

@@ -10,6 +10,7 @@ from microrad.link import study as link_study
 from microrad.link.requirement import DERIVED, Requirement
 from microrad.link.study import LinkStudy
 from microrad.mission.tables.link import Beam
+from microrad.report.data import fields
 from microrad.report.quantities import apart, signed
 from microrad.report.tables import Table
 
@@ -72,17 +73,8 @@ def margin_text(r: Requirement) -> str:
 
 def requirement_data(r: Requirement) -> dict[str, Any]:
     """A requirement as plain data, in its own unit."""
-    return {
-        "name": r.name,
-        "unit": r.unit,
-        "required": r.required,
-        "actual": r.actual,
-        "margin": r.margin,
-        "met": r.met,
-        "mark": r.mark,
-        "derived": list(r.derived),
-        "limited_by": r.because,
-    }
+    found = fields(r, "name", "unit", "required", "actual", "margin", "met", "mark")
+    return {**found, "derived": list(r.derived), "limited_by": r.because}
 
 
 def first_warning(warnings: Sequence[str]) -> str:

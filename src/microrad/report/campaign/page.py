@@ -23,9 +23,11 @@ def campaign_page(summary: CampaignSummary) -> str:
 def campaign_section(summary: CampaignSummary, drawn: Mapping[str, Any]) -> dict[str, Any]:
     """What the template needs; ``drawn`` are its figures by section."""
     cell = words.best(summary)
-    failed = tables.failed_table(summary, MOST_FAILED)
+    failed, several = tables.failed_table(summary, MOST_FAILED), len(summary.cells) > 1
     return {
-        **_head(summary),
+        "mission": {"name": summary.name.removesuffix(".toml")},
+        "mission_name": summary.mission_name,
+        "study": {"file": {"path": {"name": summary.name}, "sha256": summary.hashes.get("campaign", "")}},
         **_of_cell(summary, cell),
         "verdict": words.verdict(summary),
         "headline": words.headline(summary),
@@ -33,7 +35,8 @@ def campaign_section(summary: CampaignSummary, drawn: Mapping[str, Any]) -> dict
         "answers": words.answers(summary, cell),
         "progress": words.progress_words(summary),
         "warnings": summary.warnings,
-        **_combinations(summary),
+        "combinations": tables.cell_table(summary, summary.cells) if several else None,
+        "limited": tables.limited_table(summary, summary.cells) if several and summary.limits else None,
         "keys": len(summary.cells[0].values) if summary.cells else 0,
         "indices": tables.index_table(summary.sensitivities),
         "figures": drawn,
@@ -43,21 +46,6 @@ def campaign_section(summary: CampaignSummary, drawn: Mapping[str, Any]) -> dict
         "inputs": Rows(("input", "distribution"), [(each.key, each.distribution) for each in summary.inputs]),
         "hashes": Rows(("of", "SHA-256"), list(summary.hashes.items())),
     }
-
-
-def _head(summary: CampaignSummary) -> dict[str, Any]:
-    """The campaign as the page's title, its file, and the mission under it."""
-    file = {"path": {"name": summary.name}, "sha256": summary.hashes.get("campaign", "")}
-    title = summary.name.removesuffix(".toml")
-    return {"mission": {"name": title}, "mission_name": summary.mission_name, "study": {"file": file}}
-
-
-def _combinations(summary: CampaignSummary) -> dict[str, Any]:
-    """The tables of the grid; nothing without one."""
-    if len(summary.cells) < 2:
-        return {"combinations": None, "limited": None}
-    limited = tables.limited_table(summary, summary.cells) if summary.limits else None
-    return {"combinations": tables.cell_table(summary, summary.cells), "limited": limited}
 
 
 def _of_cell(summary: CampaignSummary, cell: CellSummary | None) -> dict[str, Any]:

@@ -1,14 +1,9 @@
 """A day of the link in words and as plain data."""
 
-from __future__ import annotations
-
 import math
-from typing import TYPE_CHECKING
 
+from microrad.orbit.day import Closing, DayStudy, Numbers, Swing, Way
 from microrad.report.quantities import duration, quantity, volume
-
-if TYPE_CHECKING:  # slow to load, and others take a length of time from here
-    from microrad.orbit.day import Closing, DayStudy, Numbers, Swing, Way
 
 MATTERS = 1.1
 """Factor by which an assumption has to change the comparison to be named."""

@@ -9,7 +9,7 @@ from microrad.lab.identify.hysteresis.joint import JointFit
 from microrad.lab.identify.ladder.predictions import Fit
 from microrad.lab.identify.linear.fit import LinearFit
 from microrad.mirror.hysteresis import Play
-from microrad.report.data import finite
+from microrad.report.data import fields, finite
 from microrad.report.identification import words
 from microrad.report.identification.parameters import (
     admissible,
@@ -53,11 +53,8 @@ def identification_data(
 
 
 def _score_data(score: Score, span_rad: float) -> dict[str, Any]:
-    share = span_rad / 100
-    return asdict(score) | {
-        "fit_rms_rad": share * score.fit_rms_percent,
-        "held_out_rms_rad": share * score.held_out_rms_percent,
-    }
+    share, rms = span_rad / 100, ("fit_rms", "held_out_rms")
+    return asdict(score) | {f"{key}_rad": share * getattr(score, f"{key}_percent") for key in rms}
 
 
 def _parameter_data(fit: Fit) -> dict[str, Any]:
@@ -77,18 +74,14 @@ def _parameter_data(fit: Fit) -> dict[str, Any]:
             "standard_errors_rad_v": fit.standard_errors_rad_per_v.tolist(),
             "sign": fit.sign,
         }
-    values = {
-        row.name: {"value": row.value, "standard_error": row.standard_error, "unit": row.unit}
-        for row in parameter_rows(fit)
-    }
+    values = {row.name: fields(row, "value", "standard_error", "unit") for row in parameter_rows(fit)}
     plays = isinstance(fit, JointFit) and isinstance(fit.model, Play)
     return common | values | ({"thresholds_v": list(fit.model.thresholds_v)} if plays else {})  # type: ignore[union-attr]
 
 
 def _linear_data(linear: LinearFit) -> dict[str, Any]:
     return {
-        "order": linear.order,
-        "reason": linear.reason,
+        **fields(linear, "order", "reason"),
         "fit_percent": float(linear.fit_percent[0]),
         "residual_rms_rad": float(linear.residual_rms[0]),
         "excited_hz": list(linear.excited_hz),
@@ -105,9 +98,7 @@ def _linear_data(linear: LinearFit) -> dict[str, Any]:
 def _residual_data(found: Identification) -> dict[str, Any]:
     test = found.residual
     return {
-        "samples": test.samples,
-        "bound": test.bound,
-        "white": test.white,
+        **fields(test, "samples", "bound", "white"),
         "independent_of_drive": test.independent,
         "share_of_autocorrelations_outside": test.outside[0],
         "share_of_cross_correlations_outside": test.outside[1],

@@ -393,7 +393,7 @@ def residuals(everything: Sequence[Shown]) -> Figure:
 
 def residual_tests(found: Identification) -> Figure:
     """Autocorrelation, cross-correlation with the drive, and spectrum of the longest unseen residual."""
-    from scipy.signal import welch  # here, to keep start-up cheap
+    from scipy.signal import welch
 
     test = found.residual
     sheet, (auto, cross, spectrum) = grid(_WIDTH, 2.9, 1, 3)

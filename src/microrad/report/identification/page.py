@@ -8,12 +8,14 @@ from pathlib import Path
 from typing import Any
 
 from microrad.core.folder import write_whole
+from microrad.core.machine import versions
 from microrad.core.units import format_quantity
 from microrad.lab.identify import Identification
 from microrad.lab.identify.ladder.predictions import Fit
 from microrad.lab.recording import Finding, Recording
 from microrad.report.identification import parameters, words
 from microrad.report.identification.figures import identification_figures
+from microrad.report.page.templates import render
 
 BEGINS = '<!DOCTYPE html>\n<html lang="en" data-made-by="microrad identify">'
 
@@ -89,9 +91,6 @@ def identification_page(
     virtual: bool = False,
 ) -> str:
     """The page's HTML; every text that is not ours is escaped, and nothing is loaded from anywhere."""
-    # What draws and fills the page loads here, not with the package: it takes longer than help should.
-    from microrad.core.machine import versions
-    from microrad.report.page.templates import render
 
     everything = [*found.recordings, *words.shown_recordings(found, recordings)]
     context: dict[str, Any] = {

@@ -11,11 +11,12 @@ from microrad.link.requirement import met, of_links
 from microrad.link.study import LinkStudy, Solution
 from microrad.link.under_jitter import Performance, stated_outage
 from microrad.mirror import Variant
+from microrad.report.data import fields
 from microrad.report.links import words
 from microrad.report.links.figures import link_figures
 from microrad.report.page.templates import render
 from microrad.report.plotting.figure import Figure
-from microrad.report.quantities import quantity
+from microrad.report.quantities import minus, quantity
 from microrad.report.requirements import requirements_paragraph
 from microrad.study.pointing_cost import FINE, Cost, LinkPerformance
 
@@ -63,12 +64,8 @@ def links_section(
         "ideal": (),
         "noise": links.receiver_noise,
         "light": _light(links),
-        "performance": performance_rows(cases, ""),
         "performance_words": [words.under_jitter_sentence(each, links) for each in cases],
-        "performance_note": performance_note(costs=False),
-        "outage": "" if under is None else f"{100 * stated_outage(links.data.requirement):g} %",
-        "costs": [],
-        "fades": fade_sentences(cases),
+        **_performance(cases, stated_outage(links.data.requirement) if cases else 0.0),
         "acquisition": None if links.finding is None else acquisition_section(links.finding),
         "figures": figures,
         "files": files,
@@ -131,9 +128,7 @@ def performance_rows(cases: Sequence[Performance], best: str, costs: Sequence[Co
     none = ["", ""] if costs else []
     return [
         {
-            "source": c.source,
-            "controller": c.controller,
-            "mirror": c.mirror,
+            **fields(c, "source", "controller", "mirror"),
             "best": bool(best) and c.controller == best and c.mirror == Variant.GIVEN,
             "cells": cells(c) + of.get((c.source, c.controller, c.mirror), none),
         }
@@ -148,7 +143,7 @@ def cells(c: Performance) -> list[str]:
         f"{c.mean_loss_db:.2f}",
         f"{c.outage_loss_db:.2f}",
         words.without_code(c),
-        f"{c.margin_db:+.2f}".replace("-", "\u2212"),
+        minus(f"{c.margin_db:+.2f}"),
         share(c.outage),
         share(c.short),
         f"{c.best.half_angle_rad * 1e6:.1f}{'*' if c.best.at_limit else ''}",
@@ -177,16 +172,24 @@ def performance_note(*, costs: bool) -> str:
 
 
 def performance_section(found: LinkPerformance, best: str, given: Performance | None) -> dict[str, Any]:
-    """What the template needs of the link under the simulated residuals, and under the jitter of a mission's own."""
-    shown = [c for c in found.cases if c.mirror != Variant.STRAIGHT]
-    shown = shown if given is None else [given, *shown]
+    """What the template needs of the link under the simulated residuals.
+
+    ``best`` names the controller to mark, and ``given`` is the link under the jitter of a mission's own, if it has one.
+    """
+    shown = [*filter(None, [given]), *(c for c in found.cases if c.mirror != Variant.STRAIGHT)]
+    section = _performance(shown, found.outage, best, found.costs)
+    return {**section, "performance_words": [residuals_sentence(found)], "fades": fade_sentences(found.cases)}
+
+
+def _performance(
+    cases: Sequence[Performance], outage: float, best: str = "", costs: Sequence[Cost] = ()
+) -> dict[str, Any]:
     return {
-        "performance": performance_rows(shown, best, found.costs),
-        "performance_words": [residuals_sentence(found)],
-        "performance_note": performance_note(costs=bool(found.costs)),
-        "outage": f"{100 * found.outage:g} %",
-        "costs": found.costs,
-        "fades": fade_sentences(found.cases),
+        "performance": performance_rows(cases, best, costs),
+        "performance_note": performance_note(costs=bool(costs)),
+        "outage": f"{100 * outage:g} %",
+        "costs": costs,
+        "fades": fade_sentences(cases),
     }
 
 
@@ -210,7 +213,7 @@ def cost_cells(c: Cost) -> list[str]:
 
 def signed(value: float, decimals: int) -> str:
     """A number that has no sign when it is shown as zero, and a minus sign, not a hyphen, when it is negative."""
-    return f"{round(value, decimals) + 0.0:.{decimals}f}".replace("-", "\u2212")
+    return minus(f"{round(value, decimals) + 0.0:.{decimals}f}")
 
 
 def fade_sentences(cases: Sequence[Performance]) -> list[str]:

@@ -45,9 +45,13 @@ def _hundredths(character: str) -> int:
 
 # ------------------------------------------------------------------------------------------------ limits
 def limits(axis: Axis, which: str, panels: Sequence[Panel]) -> tuple[float, float]:
-    """Those that the axis sets, and else those of the data of the panels that share it, with a margin."""
-    if axis.low is not None and axis.high is not None:
-        return axis.low, axis.high
+    """Those that the axis sets, and else those of the data of the panels that share it, with a margin.
+
+    ``which`` is "x" or "y". A logarithmic axis has no place for an end that is not positive: it follows from the data.
+    """
+    given_low, given_high = (None if end is None or (axis.log and end <= 0.0) else end for end in (axis.low, axis.high))
+    if given_low is not None and given_high is not None:
+        return given_low, given_high
     marks = [mark for panel in panels for mark in panel.marks]
     known = [np.ravel(values) for mark in marks for values in _extent(mark, which)]
     values = np.concatenate([np.empty(0), *known])
@@ -64,7 +68,7 @@ def limits(axis: Axis, which: str, panels: Sequence[Panel]) -> tuple[float, floa
             low - (below * wide if high > low else 0.5 * wide),
             high + (above * wide if high > low else 0.5 * wide),
         )
-    return low if axis.low is None else axis.low, high if axis.high is None else axis.high
+    return low if given_low is None else given_low, high if given_high is None else given_high
 
 
 def _extent(mark: Mark, which: str) -> Iterator[Floats]:

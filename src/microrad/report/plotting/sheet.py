@@ -290,7 +290,7 @@ def stairs(edges: Floats, values: Floats, colour: str, edge: str) -> tuple[Bars,
 
 def contour(x: Floats, y: Floats, z: Floats, level: float) -> tuple[Floats, Floats]:
     """Where the values (m, n) over x (n,) and y (m,) have a level, as one curve with gaps."""
-    import contourpy  # here, to keep start-up cheap
+    import contourpy
 
     lines = [line for line in contourpy.contour_generator(x, y, z).lines(level) if len(line)]
     gap = np.full((1, 2), np.nan)
@@ -300,7 +300,7 @@ def contour(x: Floats, y: Floats, z: Floats, level: float) -> tuple[Floats, Floa
 
 def region(x: Floats, y: Floats, z: Floats, least: float, most: float) -> tuple[Floats, ...]:
     """Rings around where the values lie between two levels."""
-    import contourpy  # here, to keep start-up cheap
+    import contourpy
 
     filled: Any = contourpy.contour_generator(x, y, z, fill_type="OuterOffset").filled(least, most)
     parts, offsets = filled

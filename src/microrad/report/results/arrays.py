@@ -6,6 +6,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+import h5netcdf
+import h5py
 import numpy as np
 from numpy.typing import NDArray
 
@@ -68,9 +70,6 @@ def study_netcdf(study: Study) -> bytes:
 
 def _netcdf_bytes(groups: Mapping[str, Group], attributes: Mapping[str, str]) -> bytes:
     """The content of a netCDF file of these groups; where a number is missing it is nan."""
-    import h5netcdf
-    import h5py
-
     content = io.BytesIO()
     with h5netcdf.File(content, "w") as file:
         file.attrs.update(attributes)

@@ -9,6 +9,8 @@ from dataclasses import dataclass
 from itertools import zip_longest
 from typing import Any
 
+from microrad.report.data import fields
+
 SMALLEST = 1e-15
 """Two numbers closer than this are the same within any tolerance: in SI units nothing of a study is that small."""
 WORDS_SHARE = 0.05
@@ -46,13 +48,7 @@ class Difference:
     def data(self) -> dict[str, Any]:
         """The difference as plain data."""
         share = self.relative if math.isfinite(self.relative) else None
-        return {
-            "place": self.place,
-            "was": self.was,
-            "now": self.now,
-            "relative_difference": share,
-            "allowed_distance": self.allowed,
-        }
+        return {**fields(self, "place", "was", "now"), "relative_difference": share, "allowed_distance": self.allowed}
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,6 +11,7 @@ from typing import Any
 
 from markupsafe import escape
 
+from microrad import report
 from microrad.core.folder import MANIFEST, scratch
 from microrad.core.machine import ARCHITECTURE, as_stated
 from microrad.core.progress import Progress
@@ -70,8 +71,6 @@ def reproduce(path: Path, on_progress: Progress = lambda done, total, what: None
     Raises ReproduceError for a file that is no whole report, lacks a file that its mission names, or has a mission that
     does not run, and MissionError for one that this version does not read.
     """
-    from microrad import report  # this package draws: it takes longer to load than reading takes
-
     carried = read(path)
     with scratch("reproduce") as folder:
         file, moved = unpack(carried, folder / "study")

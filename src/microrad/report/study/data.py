@@ -2,6 +2,8 @@
 
 from typing import Any
 
+from microrad.loop.paper_cases import Run
+from microrad.report.data import fields
 from microrad.report.day.constellation import plan_data
 from microrad.report.day.contact_run import contact_run_data
 from microrad.report.day.data import day_data
@@ -43,41 +45,16 @@ def summary(study: Study) -> dict[str, Any]:
         "implied_sensitivity_photon_bit": [r.photons_per_bit for r in study.margin_map.readings],
         "requirements": [requirement_data(r) for r in study.requirements],
         "papers_loop": [requirement_data(r) for r in study.papers_loop],
-        "runs": [
-            {
-                "mirror": r.mirror,
-                "controller": r.controller,
-                "frequency_hz": r.freq_hz,
-                "peak_rad": r.trace.peak_rad,
-                "rms_rad": r.trace.rms_rad,
-                "rate_clamped": r.trace.counts.clamped + r.trace.counts.inverse_clamped,
-                "saturated": r.trace.counts.saturated,
-                "slew_limited": r.trace.counts.slew_limited,
-                "alternating": r.trace.counts.alternating,
-            }
-            for r in study.runs
-        ],
-        "paper": [
-            {"where": c.where, "claim": c.claim, "ours": c.ours, "agrees": c.agrees, "why": c.why} for c in study.claims
-        ],
+        "runs": [_run_data(r) for r in study.runs],
+        "paper": [fields(c, "where", "claim", "ours", "agrees", "why") for c in study.claims],
         "other_readings": [
-            {
-                "key": r.key,
-                "given": r.given,
-                "other": r.other,
-                "residual_rad": r.residual_rad,
-                "margin_db": r.margin_db,
-                "failure": r.failure,
-            }
-            for r in study.other_readings
+            fields(r, "key", "given", "other", "residual_rad", "margin_db", "failure") for r in study.other_readings
         ],
         "links": budgets_data(study.links),
         "performance": [performance_data(each) for each in study.performance.cases],
         "hysteresis_costs": [
             {
-                "source": c.source,
-                "controller": c.controller,
-                "mirror": c.mirror,
+                **fields(c, "source", "controller", "mirror"),
                 "margin_change_db": c.margin_db,
                 "data_rate_change_bit_s": c.data_rate_bit_s,
             }
@@ -88,4 +65,15 @@ def summary(study: Study) -> dict[str, Any]:
         "constellation": None if study.plan is None else plan_data(study.plan),
         "fine_pointing": None if fine is None else fine_pointing_data(fine, m.requirement.pointing_error_rad),
         "warnings": words.warnings(study),
+    }
+
+
+def _run_data(run: Run) -> dict[str, Any]:
+    counts = run.trace.counts
+    return {
+        **fields(run, "mirror", "controller"),
+        "frequency_hz": run.freq_hz,
+        **fields(run.trace, "peak_rad", "rms_rad"),
+        "rate_clamped": counts.clamped + counts.inverse_clamped,
+        **fields(counts, "saturated", "slew_limited", "alternating"),
     }

@@ -150,10 +150,7 @@ def _day(study: Study, figures: Sequence[Figure]) -> dict[str, Any] | None:
         }
     context = {**day_section(day, figures, files=True), "run": shown}
     if plan is not None:
-        context["constellation"] = {
-            "sentences": plan_sentences(plan),
-            "table": satellites_table(plan),
-        }
+        context["constellation"] = {"sentences": plan_sentences(plan), "table": satellites_table(plan)}
     return context
 
 
@@ -163,13 +160,8 @@ def _left_out(study: Study) -> list[str]:
     if ahead is None or not ahead.corrected or not ahead.error_rad:
         return []
     lost = study.links.data.beam.fall
-    at = (
-        study.performance.case(FINE, study.fine_pointing.best.design.name, Variant.GIVEN)
-        if study.fine_pointing
-        else None
-    )
-    cost = ""
-    if at is not None:
+    cost, fine = "", study.fine_pointing
+    if fine is not None and (at := study.performance.case(FINE, fine.best.design.name, Variant.GIVEN)) is not None:
         error = lost.error_rad(at.outage_loss_db)
         more = float(lost.loss_db(error + ahead.error_rad)) - at.outage_loss_db
         cost = f": at most {more:.2f} dB more for the best loop"
