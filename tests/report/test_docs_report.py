@@ -16,8 +16,12 @@ from microrad.report.plotting import palette
 from microrad.report.results import comparison as compared
 from microrad.report.results import tolerances
 from microrad.report.results.manifest import MOST_INPUT_BYTES
-from microrad.report.study import page
-from microrad.studio import address, guard, jobs_process, reading, server, uploads, workshop
+from microrad.report.study.page import PARTS
+from microrad.studio import server, session
+from microrad.studio.guard import address
+from microrad.studio.guard import middleware as guard
+from microrad.studio.jobs import process as jobs_process
+from microrad.studio.recordings import reading, uploads
 from microrad.study import story as study
 from places import ROOT
 from shipped import DEFAULT
@@ -66,7 +70,7 @@ def test_pages_that_are_linked_exist(text):
 # -------------------------------------------------------------------------------------------------------------- report
 def test_the_parts_of_the_report_are_those_of_the_page():
     parts = re.findall(r"(?m)^\| (\d) (.+?) \|", REPORT)
-    assert parts == [(str(number), title) for number, (_, title) in enumerate(page.PARTS, start=1)]
+    assert parts == [(str(number), title) for number, (_, title) in enumerate(PARTS, start=1)]
 
 
 def test_each_requirement_stands_in_the_table():
@@ -105,7 +109,7 @@ def test_the_limits_of_the_studio_are_those_of_the_code():
     )
     assert rows["reading one: samples of a channel"] == f"{read.samples / 1e6:g} million"
     assert document.MAX_BYTES == 1_000_000
-    told(STUDIO, "A file of more than 1 MB is no mission.", f"Its own things stand in `{workshop.STUDIO}` there")
+    told(STUDIO, "A file of more than 1 MB is no mission.", f"Its own things stand in `{session.STUDIO}` there")
     first, second = jobs_process.WAITS_S
     told(STUDIO, f"gets SIGTERM {first:g} s later, and SIGKILL {second:g} s behind that")
 

@@ -15,8 +15,8 @@ from microrad.mission.file import MissionError, load_mission
 from microrad.orbit.day import assumptions
 from microrad.report.results.arrays import study_netcdf
 from microrad.report.study.data import summary
-from microrad.studio.draft import Draft
-from microrad.studio.draft_keys import value_of
+from microrad.studio.draft.draft import Draft
+from microrad.studio.draft.keys import value_of
 from microrad.study import story as study
 from shipped import DEFAULT, SHIPPED
 

@@ -16,10 +16,10 @@ from microrad.cli.frame import (
     examples,
     json_text,
     progress_bar,
+    refusal_of,
     width,
 )
 
-# Everything else is imported inside the commands: it takes longer to load than help may take.
 if TYPE_CHECKING:
     from microrad.link.study import LinkStudy
 
@@ -34,10 +34,8 @@ def _links(file: Path) -> "LinkStudy":
     from microrad.mission.file import load_link
 
     given = load_link(file)
-    try:
+    with refusal_of(file):
         return link_study.run(given)
-    except ValueError as error:  # a rate that the receiver does not take, a scan without time to detect
-        raise Refusal(f"{file}: {error}") from error
 
 
 @app.command(
@@ -68,11 +66,8 @@ def contacts(
     from microrad.report.day.text import day_csv, day_text
 
     links = _links(file)
-    try:
-        with progress_bar() as progress:
-            day = day_study.run(links, on_progress=progress)
-    except ValueError as error:  # a table that is missing, an orbit that does not hold
-        raise Refusal(f"{file}: {error}") from error
+    with refusal_of(file), progress_bar() as progress:
+        day = day_study.run(links, on_progress=progress)
     code = MET if day.relay.capacity_bit > 0.0 else UNMET
     if as_json:
         return Outcome(json_text({"mission": links.file.mission.name, **day_data(day)}), code)
@@ -114,7 +109,7 @@ def constellation(
     from microrad.report.day.constellation import plan_data, plan_text
 
     links = _links(file)
-    try:
+    with refusal_of(file):
         with progress_bar() as progress:
             plan = plans.run(links.file, day_study.given_loss(links), progress)
         code = MET if plan.volume_bit > 0.0 else UNMET
@@ -122,8 +117,6 @@ def constellation(
             return Outcome(operations.csv_text(plan.planned, plan.epoch.utc), code)
         if as_plan:
             return Outcome(plan.contact_plan(), code)
-    except ValueError as error:  # a table that is missing, an orbit that does not hold
-        raise Refusal(f"{file}: {error}") from error
     if as_json:
         return Outcome(json_text({"mission": links.file.mission.name, **plan_data(plan)}), code)
     return Outcome(plan_text(plan, width()), code)

@@ -18,10 +18,10 @@ from microrad.cli.frame import (
     examples,
     json_text,
     option,
+    refusal_of,
     width,
 )
 
-# Everything else is imported inside the commands: it takes longer to load than help may take.
 if TYPE_CHECKING:
     from microrad.mission.file import LinkFile
 
@@ -70,11 +70,9 @@ def budget(  # noqa: PLR0913, PLR0917  each is an option
             "requirement.outage. Change jitter.bias and jitter.rms, or take the table out."
         )
     given = _changed(loaded, data_rate, pointing_error)
-    try:
+    with refusal_of(file):
         solution = None if solve is None else link_study.solve(given, solve)
         study = link_study.run(given if solution is None else solution.file)
-    except ValueError as error:  # a rate that the receiver does not take, a scan without time to detect
-        raise Refusal(f"{file}: {error}") from error
     code = exit_on.code(met=met(study), closes=study.closes)
     if as_json:
         return Outcome(json_text(links_data(study, solution)), code)

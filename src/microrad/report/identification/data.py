@@ -6,8 +6,8 @@ from typing import Any
 
 from microrad.lab.identify import Identification, PrandtlIshlinskiiFit, Score
 from microrad.lab.identify.hysteresis.joint import JointFit
-from microrad.lab.identify.ladder.predictions import Fit
 from microrad.lab.identify.linear.fit import LinearFit
+from microrad.lab.identify.selection.predictions import Fit
 from microrad.mirror.hysteresis import Play
 from microrad.report.data import fields, finite
 from microrad.report.identification import words
@@ -74,9 +74,10 @@ def _parameter_data(fit: Fit) -> dict[str, Any]:
             "standard_errors_rad_v": fit.standard_errors_rad_per_v.tolist(),
             "sign": fit.sign,
         }
-    values = {row.name: fields(row, "value", "standard_error", "unit") for row in parameter_rows(fit)}
-    plays = isinstance(fit, JointFit) and isinstance(fit.model, Play)
-    return common | values | ({"thresholds_v": list(fit.model.thresholds_v)} if plays else {})  # type: ignore[union-attr]
+    values: dict[str, Any] = {row.name: fields(row, "value", "standard_error", "unit") for row in parameter_rows(fit)}
+    if isinstance(fit, JointFit) and isinstance(fit.model, Play):
+        values["thresholds_v"] = list(fit.model.thresholds_v)
+    return common | values
 
 
 def _linear_data(linear: LinearFit) -> dict[str, Any]:

@@ -11,7 +11,8 @@ from microrad.core.folder import write_whole
 from microrad.core.machine import versions
 from microrad.core.units import format_quantity
 from microrad.lab.identify import Identification
-from microrad.lab.identify.ladder.predictions import Fit
+from microrad.lab.identify.records import rounded_to_error
+from microrad.lab.identify.selection.predictions import Fit
 from microrad.lab.recording import Finding, Recording
 from microrad.report.identification import parameters, words
 from microrad.report.identification.figures import identification_figures
@@ -116,6 +117,7 @@ def identification_page(
         "ranking": _ranking(found),
         "span": format_quantity(found.span_rad, "rad", 4),
         "two_digits": parameters.two_digits,
+        "rounded_to_error": rounded_to_error,
         "figures": identification_figures(found, recordings, virtual=virtual),
         "versions": versions(),
     }
@@ -170,8 +172,8 @@ def _model(name: str, fit: Fit) -> dict[str, Any]:
     for row in parameters.parameter_rows(fit):
         value, error, unit = row.shown
         note = row.note or (f"not identified: {unknown[row.name]}" if row.name in unknown else "")
-        error_text = parameters.two_digits(error)
-        rows.append({"name": row.name, "value": f"{value:.5g}", "error": error_text, "unit": unit, "note": note})
+        shown = {"value": rounded_to_error(value, error), "error": parameters.two_digits(error)}
+        rows.append({"name": row.name, **shown, "unit": unit, "note": note})
     return {"name": name, "rows": rows, "notes": parameters.notes(fit)}
 
 

@@ -6,8 +6,9 @@ from pathlib import Path
 from typing import Any
 
 from microrad.lab.identify import Identification, Score
-from microrad.lab.identify.ladder.predictions import Fit
 from microrad.lab.identify.linear.fit import LinearFit
+from microrad.lab.identify.records import rounded_to_error
+from microrad.lab.identify.selection.predictions import Fit
 from microrad.report.identification import words
 from microrad.report.identification.parameters import (
     not_identified,
@@ -62,11 +63,13 @@ def _linear_lines(linear: LinearFit) -> list[str]:
         f"  {linear.reason}",
     ]
     lines += [
-        f"  {r.kind} {r.freq_hz:10.5g} ± {two_digits(r.freq_error_hz)} Hz  damping {r.damping:.4g}"
+        f"  {r.kind} {rounded_to_error(r.freq_hz, r.freq_error_hz):>10} ± {two_digits(r.freq_error_hz)} Hz  "
+        f"damping {rounded_to_error(r.damping, r.damping_error)}"
         for r in words.roots(linear)
     ]
     return lines + [
-        f"  gain at {name}: {1e3 * g:.5g} ± {two_digits(1e3 * e)} mrad/V" for name, g, e in words.gains(linear)
+        f"  gain at {name}: {rounded_to_error(1e3 * g, 1e3 * e)} ± {two_digits(1e3 * e)} mrad/V"
+        for name, g, e in words.gains(linear)
     ]
 
 
@@ -77,7 +80,7 @@ def _parameter_lines(fit: Fit) -> list[str]:
     for row in rows:
         value, error, unit = row.shown
         given = f"± {two_digits(error)} {unit}".rstrip() if math.isfinite(error) else f"{unit} ({row.note})".strip()
-        lines.append(f"  {row.name:{width}}{value:12.5g} {given}")
+        lines.append(f"  {row.name:{width}}{rounded_to_error(value, error):>12} {given}")
     unknown = not_identified(fit)
     if len(unknown) > _MOST_REASONS:
         lines.append(f"  not identified: {len(unknown)} of {len(rows)}, {', '.join(name for name, _ in unknown)}")

@@ -10,9 +10,9 @@ from microrad.core.arrays import Floats
 from microrad.core.units import format_quantity
 from microrad.lab.identify import Identification, Score
 from microrad.lab.identify.hysteresis.joint import JointFit
-from microrad.lab.identify.ladder.doubts import fit_warnings
-from microrad.lab.identify.ladder.predictions import Fit, Prediction
 from microrad.lab.identify.linear.fit import LinearFit
+from microrad.lab.identify.selection.predictions import Fit, Prediction
+from microrad.lab.identify.selection.warnings import fit_warnings
 from microrad.lab.recording import Recording
 from microrad.report.identification.parameters import (
     admissible,
