@@ -66,7 +66,7 @@ def write(
 
     ``parts`` are those of earlier runs that are kept: none by default.
 
-    Raises FolderError when the folder holds something that must not be replaced. Returns the page's path.
+    Raises FolderError if the folder holds something that must not be replaced. Returns the page's path.
     """
     from microrad.report.results.arrays import study_netcdf
     from microrad.report.results.manifest import manifest_of, write_manifest

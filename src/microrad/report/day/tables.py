@@ -21,8 +21,6 @@ CONTACT_COLUMNS = (
     "could\ncarry",
     "begins and ends by",
 )
-NARROW = (0, 1, 2, 3, 9, 10)
-"""Columns that are left where there is little room."""
 
 
 def contacts_table(day: DayStudy) -> Table:

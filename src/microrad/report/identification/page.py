@@ -26,7 +26,7 @@ class ReportError(ValueError):
 
 
 def check_identification(target: Path, overwrite: bool) -> None:
-    """Raise ReportError when ``target`` must not be written: no folder for it, or a file that must not be replaced."""
+    """Raises ReportError if ``target`` must not be written: no folder for it, or a file that must not be replaced."""
     if not target.parent.is_dir():
         raise ReportError(f"{target}: there is no folder {target.parent}; create it first.")
     if not os.path.lexists(target):
@@ -63,7 +63,7 @@ def write_identification(  # noqa: PLR0913  all but the first two are named opti
     `mirror_file` and `mirror_text` are the mirror file that goes with it, of the model `written` (default: the chosen
     one). `recordings` are those that `identify` was given to fit: `found` does not keep the broadband ones, and without
     them their excitation and time response are not drawn. `virtual` says that they come from the virtual bench, and the
-    page and each figure say so too. The file appears whole or not at all. Raises ReportError when ``target`` holds
+    page and each figure say so too. The file appears whole or not at all. Raises ReportError if ``target`` holds
     something that must not be replaced.
     """
     check_identification(target, overwrite)

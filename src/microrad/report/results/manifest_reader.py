@@ -33,7 +33,7 @@ class ReproduceError(ValueError):
 
 
 @dataclass(frozen=True, slots=True)
-class Carried:
+class ReadManifest:
     """A manifest as it was read from ``path``: ``data`` of which the keys are checked.
 
     ``page`` is the page that it stood in, or "" where it is a file of its own.
@@ -50,7 +50,7 @@ class Carried:
 
 
 # ------------------------------------------------------------------------------------------------------------- reading
-def read(path: Path) -> Carried:
+def read_manifest(path: Path) -> ReadManifest:
     """The manifest of a report, of a manifest.json or of a folder of results.
 
     Raises ReproduceError for anything else.
@@ -59,7 +59,7 @@ def read(path: Path) -> Carried:
     text, is_page = _text_of(path), path.suffix.lower() != ".json"
     data = _parsed(path, _embedded(path, text) if is_page else text)
     _check(path, data)
-    return Carried(path, data, text if is_page else "")
+    return ReadManifest(path, data, text if is_page else "")
 
 
 def _text_of(path: Path) -> str:
@@ -121,7 +121,7 @@ def _whole(digits: str) -> float:
 
 
 def _check(path: Path, data: Any) -> None:
-    """Refuse a manifest without what a run takes, or with values of another kind."""
+    """Raises ReproduceError for a manifest without what a run takes, or with values of another kind."""
     found = data if isinstance(data, dict) else {}
     faults = [
         *_file_faults("mission", found.get("mission")),
@@ -154,20 +154,20 @@ def _texts_faults(name: str, value: Any) -> Iterator[str]:
         yield f"more {name} than a mission names"
 
 
-def altered(carried: Carried) -> tuple[str, ...]:
+def altered_parts(manifest: ReadManifest) -> tuple[str, ...]:
     """What of the report, and of the files beside it, no longer has the hash that it was written with."""
-    data = carried.data
+    data = manifest.data
     files = [("the mission's text", data["mission"])]
     files += [("the mirror file's text", data["mirror"])] if data.get("mirror") else []
     parts = [(what, each["text_sha256"], text_sha256(each["text"])) for what, each in files]
     hashes = data.get("inputs_sha256") or {}
-    named = carried.named.items()
+    named = manifest.named.items()
     parts += [(f"the text of {clipped(name)}", hashes.get(name, ""), text_sha256(text)) for name, text in named]
     if "summary_sha256" in data:
         parts.append(("its summary", str(data["summary_sha256"]), hash_of_summary(data["summary"])))
-    if carried.page and "page_sha256" in data:
-        parts.append(("its page", str(data["page_sha256"]), hash_of_page(carried.page)))
-    parts += [(f"{clipped(name)} beside it", *hashes) for name, hashes in _beside(carried)]
+    if manifest.page and "page_sha256" in data:
+        parts.append(("its page", str(data["page_sha256"]), hash_of_page(manifest.page)))
+    parts += [(f"{clipped(name)} beside it", *hashes) for name, hashes in _beside(manifest)]
     return tuple(
         f"{what} was changed after the report was written: its SHA-256 is {own[:16]}…, and "
         f"{clipped(stated[:16])}… is stated"
@@ -176,39 +176,39 @@ def altered(carried: Carried) -> tuple[str, ...]:
     )
 
 
-def _beside(carried: Carried) -> Iterator[tuple[str, tuple[str, str]]]:
+def _beside(manifest: ReadManifest) -> Iterator[tuple[str, tuple[str, str]]]:
     """Each file beside the report that the manifest states a hash for: its name, the hash stated and its own."""
-    for name, stated in (carried.data.get("files_sha256") or {}).items():
-        if (content := held(carried, name)) is not None:
+    for name, stated in (manifest.data.get("files_sha256") or {}).items():
+        if (content := content_beside(manifest, name)) is not None:
             yield name, (stated, hashlib.sha256(content).hexdigest())
 
 
-def held(carried: Carried, name: str) -> bytes | None:
+def content_beside(manifest: ReadManifest, name: str) -> bytes | None:
     """What stands in a file beside the report, as the manifest names it; None without such a file."""
-    path = carried.path.parent / name
+    path = manifest.path.parent / name
     fits = plain(name) and path.is_file() and path.stat().st_size <= MOST_BYTES
     return read_bytes(path, MOST_BYTES) if fits else None
 
 
 # ----------------------------------------------------------------------------------------------------------- unpacking
-def unpack(carried: Carried, folder: Path) -> tuple[missionfile.MissionFile, dict[str, str]]:
+def unpack_mission(manifest: ReadManifest, folder: Path) -> tuple[missionfile.MissionFile, dict[str, str]]:
     """Write mission, mirror and the files that the mission names into ``folder``, and read the mission there.
 
     A name that could lead out of the folder, or is not plain on every system, is replaced, in the mission's data too;
-    which ones comes second. Raises ReproduceError where a file that the mission names is not carried.
+    which ones comes second. Raises ReproduceError if a file that the mission names is not in it.
     """
-    stated, mirror = carried.data["mission"], carried.data.get("mirror")
+    stated, mirror = manifest.data["mission"], manifest.data.get("mirror")
     place = _written(folder, plain(stated["file"]) or "mission.toml", stated["text"])
     mirror_place = None
     if mirror is not None:
         mirror_place = _written(folder / "mirror-file", plain(mirror["file"]) or "mirror.toml", mirror["text"])
-    _refuse_mirror_elsewhere(carried, place, mirror_place)
+    _check_mirror(manifest, place, mirror_place)
     found = missionfile.load_mission(place, mirror_place)
     found = replace(found, sha256=_hash_of_file(stated))
     if found.mirror_file is not None:
         found = replace(found, mirror_file=replace(found.mirror_file, sha256=_hash_of_file(mirror)))
     names = missionfile.named_files(found.mission)
-    moved = {name: _place(folder, number, name, carried) for number, name in enumerate(names)}
+    moved = {name: _place(folder, number, name, manifest) for number, name in enumerate(names)}
     moved = {name: own for name, own in moved.items() if name != own}
     return replace(found, mission=renamed(found.mission, moved)), moved
 
@@ -219,28 +219,28 @@ def _hash_of_file(stated: Any) -> str:
     return str(stated["sha256"]) if own == stated["text_sha256"] else own
 
 
-def _refuse_mirror_elsewhere(carried: Carried, place: Path, mirror_place: Path | None) -> None:
-    """Refuse a mission whose mirror stands in a file that is not carried: no other file is read for it."""
+def _check_mirror(manifest: ReadManifest, place: Path, mirror_place: Path | None) -> None:
+    """Raises ReproduceError if the mirror stands in a file that is not in the manifest: no other is read for it."""
     with contextlib.suppress(UnreadableError):  # reading the mission says what is wrong
         mirror = Document.read(place, "mission file").data.get("mirror")
         if mirror_place is None and isinstance(mirror, dict) and "file" in mirror:
             raise ReproduceError(
-                f"{carried.path}: the mission names the mirror file {clipped(str(mirror['file']))}, which the report "
+                f"{manifest.path}: the mission names the mirror file {clipped(str(mirror['file']))}, which the report "
                 f"does not carry; {_ELSE}"
             )
 
 
-def _place(folder: Path, number: int, name: str, carried: Carried) -> str:
+def _place(folder: Path, number: int, name: str, manifest: ReadManifest) -> str:
     """Write a file that the mission names; returns its name there."""
-    if name not in carried.named:
+    if name not in manifest.named:
         raise ReproduceError(
-            f"{carried.path}: the mission names {clipped(name)}, which the report does not carry (too long, or no "
+            f"{manifest.path}: the mission names {clipped(name)}, which the report does not carry (too long, or no "
             f"text); {_ELSE}"
         )
     own = plain(name)
     if not own or (folder / own).exists():
         own = f"named-file-{number}{_ending(name)}"
-    _written((folder / own).parent, Path(own).name, carried.named[name])
+    _written((folder / own).parent, Path(own).name, manifest.named[name])
     return own
 
 

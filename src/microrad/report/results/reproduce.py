@@ -18,7 +18,14 @@ from microrad.core.progress import Progress
 from microrad.report.results import comparison, tolerances
 from microrad.report.results.comparison import Comparison, Difference, clipped
 from microrad.report.results.manifest import shown_part
-from microrad.report.results.manifest_reader import Carried, ReproduceError, altered, held, read, unpack
+from microrad.report.results.manifest_reader import (
+    ReadManifest,
+    ReproduceError,
+    altered_parts,
+    content_beside,
+    read_manifest,
+    unpack_mission,
+)
 from microrad.report.results.tolerances import ConverterSteps, converter_steps
 from microrad.study import story as study
 
@@ -71,9 +78,9 @@ def reproduce(path: Path, on_progress: Progress = lambda done, total, what: None
     Raises ReproduceError for a file that is no whole report, lacks a file that its mission names, or has a mission that
     does not run, and MissionError for one that this version does not read.
     """
-    carried = read(path)
+    manifest = read_manifest(path)
     with scratch("reproduce") as folder:
-        file, moved = unpack(carried, folder / "study")
+        file, moved = unpack_mission(manifest, folder / "study")
         try:
             ran = study.run(file, on_progress)
         except ValueError as error:  # an unstable loop, a mirror without inverse, a table that is none
@@ -81,7 +88,7 @@ def reproduce(path: Path, on_progress: Progress = lambda done, total, what: None
         page = report.write(ran, folder / "again", on_progress=on_progress)
         now = json.loads(restored((page.parent / MANIFEST).read_text(encoding="utf-8"), moved, _in_json))
         text = restored(page.read_text(encoding="utf-8"), moved, lambda name: str(escape(name)))
-        return _compared(carried, Again(now, text, page.parent, converter_steps(ran)))
+        return _compared(manifest, Again(now, text, page.parent, converter_steps(ran)))
 
 
 def restored(text: str, moved: Mapping[str, str], written: Callable[[str], str]) -> str:
@@ -98,7 +105,7 @@ def _in_json(name: str) -> str:
 # ----------------------------------------------------------------------------------------------------------- comparing
 @dataclass(frozen=True, slots=True)
 class Again:
-    """What the run gave now: its manifest, the text of its page, its folder, and the scale of its results."""
+    """What the run gave now: its manifest, the text of its page, its folder, and the steps of its converters."""
 
     manifest: Mapping[str, Any]
     page: str
@@ -106,8 +113,8 @@ class Again:
     steps: ConverterSteps
 
 
-def _compared(carried: Carried, again: Again) -> Reproduction:
-    was, now = carried.data, again.manifest
+def _compared(manifest: ReadManifest, again: Again) -> Reproduction:
+    was, now = manifest.data, again.manifest
     machine = as_stated(was.get("machine"))
     then, today = {**was["versions"], **machine}, {**now["versions"], **now["machine"]}
     unlike = {
@@ -115,38 +122,38 @@ def _compared(carried: Carried, again: Again) -> Reproduction:
         for name in dict.fromkeys([*then, *today])
         if then.get(name) != today.get(name)
     }
-    files = _other_files(carried, now)
-    read = tuple(name for name in files if _comparable(carried, again, name, bool(unlike)))
+    files = _other_files(manifest, now)
+    read = tuple(name for name in files if _comparable(manifest, again, name, bool(unlike)))
     found = comparison.compare(was["summary"], now["summary"], of_summary(again.steps) if unlike else None)
     for name in read:
-        found += _of_tables(carried, again, name, bool(unlike))
+        found += _of_tables(manifest, again, name, bool(unlike))
     return Reproduction(
-        path=carried.path,
+        path=manifest.path,
         numbers=found.numbers,
         largest=found.largest,
         differences=found.differences,
-        altered=altered(carried),
+        altered=altered_parts(manifest),
         unlike=unlike,
         undetailed=clipped(machine[ARCHITECTURE]) if list(machine) == [ARCHITECTURE] else "",
         files=tuple(clipped(name) for name in files),
         read=tuple(clipped(name) for name in read),
-        layout=bool(carried.page) and shown_part(carried.page).splitlines() != shown_part(again.page).splitlines(),
-        page=_lines(carried.page, again.page) if carried.page else (),
+        layout=bool(manifest.page) and shown_part(manifest.page).splitlines() != shown_part(again.page).splitlines(),
+        page=_lines(manifest.page, again.page) if manifest.page else (),
     )
 
 
-def _other_files(carried: Carried, now: Mapping[str, Any]) -> list[str]:
+def _other_files(manifest: ReadManifest, now: Mapping[str, Any]) -> list[str]:
     """Which figures' data are not byte for byte those of the report."""
-    stated = carried.data.get("files_sha256") or {}
+    stated = manifest.data.get("files_sha256") or {}
     every = sorted({*stated, *now["files_sha256"]})
     data = [name for name in every if name.startswith("figures/") and name.endswith(".csv")]
     return [name for name in data if stated and stated.get(name) != now["files_sha256"].get(name)]
 
 
-def _comparable(carried: Carried, again: Again, name: str, elsewhere: bool) -> bool:
+def _comparable(manifest: ReadManifest, again: Again, name: str, elsewhere: bool) -> bool:
     """Whether both have a figure's data at hand, in rows that belong together."""
     curve = tolerances.stated_for_figure(Path(name).stem) == "curve"
-    return (again.folder / name).is_file() and held(carried, name) is not None and not (curve and elsewhere)
+    return (again.folder / name).is_file() and content_beside(manifest, name) is not None and not (curve and elsewhere)
 
 
 def of_summary(steps: ConverterSteps) -> comparison.Allowed:
@@ -160,14 +167,14 @@ def of_summary(steps: ConverterSteps) -> comparison.Allowed:
     return allowed
 
 
-def _of_tables(carried: Carried, again: Again, name: str, elsewhere: bool) -> Comparison:
+def _of_tables(manifest: ReadManifest, again: Again, name: str, elsewhere: bool) -> Comparison:
     """The numbers of a figure's data, which stand beside the report, held against those of now."""
     found = tolerances.tolerances(again.steps)[tolerances.stated_for_figure(Path(name).stem) or "exact"]
 
     def allowed(place: str, unit: str, was: float, now: float) -> float:
         return found.allowed(was, now, unit) + comparison.DIGITS_SHARE * max(abs(was), abs(now))
 
-    was = (held(carried, name) or b"").decode("utf-8", "replace")
+    was = (content_beside(manifest, name) or b"").decode("utf-8", "replace")
     now = (again.folder / name).read_text(encoding="utf-8")
     return comparison.compare_tables(name, was, now, allowed if elsewhere else None)
 

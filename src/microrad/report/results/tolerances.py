@@ -55,7 +55,7 @@ class ConverterSteps:
 
 
 def converter_steps(study: Study) -> ConverterSteps:
-    """The scale of a study's mission."""
+    """The steps of the converters of a study's mission, and what they do to its results."""
     m, fine = study.file.mission, study.fine_pointing
     step, runs = _step_rad(study), 1 if m.fine_pointing is None else m.fine_pointing.runs
     allowed = m.requirement.pointing_error_rad
@@ -107,7 +107,7 @@ SMOOTH = 1e-6
 
 
 def tolerances(s: ConverterSteps) -> dict[str, Tolerance]:
-    """The tolerance of each kind of quantity, for a mission of this scale."""
+    """The tolerance of each kind of quantity, for a mission with converters of these steps."""
     return {
         # Counts, and numbers of the mission. Gains are tuned to four digits, and agree in them.
         "exact": Tolerance(),
