@@ -104,6 +104,10 @@ def extremes(columns: list[Floats], points: int) -> NDArray[np.intp]:
     """Rows, in order, that hold the smallest and largest value of every column in each of `points`/2 stretches.
 
     A recording of at most `points` samples is kept whole.
+
+    Args:
+        columns: Columns of equal length.
+        points: Number of points to draw.
     """
     samples = len(columns[0])
     if samples <= points:

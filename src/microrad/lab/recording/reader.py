@@ -146,11 +146,17 @@ def recording_from_arrays(
 def multisine_recordings(
     drive: ArrayLike, output: ArrayLike, rate_hz: float, name: str = "multisine", *, accept: Sequence[str] = ()
 ) -> tuple[Recording, ...]:
-    """One recording per realisation of a periodic multisine experiment.
+    """One recording per realisation of a periodic multisine experiment, its periods joined in time.
 
-    `drive` has the shape (samples of one period, inputs, realisations, periods) and `output` (samples of one period,
-    outputs, realisations, periods). The periods are joined in time and `period_samples` is set. Raises
-    `RecordingError`.
+    Args:
+        drive: Shape (samples of one period, inputs, realisations, periods).
+        output: Shape (samples of one period, outputs, realisations, periods).
+        rate_hz: Samples per second.
+        name: Stands where the path of a file would, before the number of the realisation.
+        accept: Findings of degree to take on, see `read_recording`.
+
+    Raises:
+        RecordingError: If the shapes do not agree, or for anything that cannot be relied upon.
     """
     u, y = (np.asarray(a) for a in (drive, output))
     if u.ndim != 4 or y.ndim != 4 or (u.shape[0], *u.shape[2:]) != (y.shape[0], *y.shape[2:]):

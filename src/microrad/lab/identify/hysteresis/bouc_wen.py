@@ -139,7 +139,10 @@ def search_from_starts(problem: Problem, starts: int, seed: int, on_progress: Pr
 
 
 def _starts(problem: Problem, starts: int, seed: int) -> list[Floats]:
-    """The four best points of a coarse grid in turn, the first as it is and the rest scattered by a factor e^0.4."""
+    """The four best points of a coarse grid in turn, the first as it is and the rest scattered.
+
+    The scatter is log-normal (e^0.4) in delta and in the two decay constants, and normal in d2, whose sign is open.
+    """
     grid = [
         np.array([0.0, delta, math.log(settled), math.log(settled * ratio)])
         for delta in (0.0, 1.0, 2.0, 4.0)
@@ -151,14 +154,12 @@ def _starts(problem: Problem, starts: int, seed: int) -> list[Floats]:
     scatter = 0.4 * rng.standard_normal((starts, 4))
     scatter[0] = 0.0
     scatter[:, 0] *= 0.1
-    return [np.clip(_scattered(centres[i % 4], scatter[i]), _LOWER + 1e-6, _UPPER - 1e-6) for i in range(starts)]
-
-
-def _scattered(centre: Floats, scatter: Floats) -> Floats:
-    """Log-normal in delta and in the two decay constants, normal in d2, whose sign is open."""
-    point = centre + scatter
-    point[1] = max(centre[1], 0.2) * math.exp(scatter[1])
-    return np.asarray(point)
+    found = []
+    for i in range(starts):
+        point = centres[i % 4] + scatter[i]
+        point[1] = max(centres[i % 4][1], 0.2) * math.exp(scatter[i, 1])
+        found.append(np.clip(point, _LOWER + 1e-6, _UPPER - 1e-6))
+    return found
 
 
 def _search(problem: Problem, start: Floats) -> Any:

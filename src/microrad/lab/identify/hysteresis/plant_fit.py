@@ -91,9 +91,12 @@ def without_nuisance(nuisance: Floats, signal: Floats) -> Floats:
 
 
 def upsampled(drive: Floats, factor: int, hold: Hold) -> Floats:
-    """A drive (samples, inputs) at `factor` times the rate; row factor * k belongs to sample k.
+    """A drive at a multiple of its rate; row factor * k belongs to sample k.
 
-    "linear": straight between samples. "band-limited": trigonometric, for a drive of whole periods.
+    Args:
+        drive: The drive, shape (samples, inputs).
+        factor: The multiple.
+        hold: "linear": straight between samples; "band-limited": trigonometric, for a drive of whole periods.
     """
     samples = drive.shape[0]
     if factor == 1:
@@ -108,11 +111,21 @@ def upsampled(drive: Floats, factor: int, hold: Hold) -> Floats:
 def fit_records(
     recordings: Sequence[Recording], *, factor: int = 1, hold: Hold = "linear", drop: int = 0, offset: bool = True
 ) -> tuple[FitRecord, ...]:
-    """Recordings as runs of the plant, `factor` plant steps a sample, the first `drop` samples left out of the fit.
+    """Recordings as the records of a fit.
 
     A periodic recording (period_samples) whose periods share their drive is reduced to one period, the mean of its
     periods from the second on, behind a run-in of one period of the same drive. Others start at rest at their first
-    drive value. Without `offset` no output has a free zero. Raises `IdentificationError` where nothing is left.
+    drive value.
+
+    Args:
+        recordings: The recordings.
+        factor: Plant steps a sample.
+        hold: How the drive is interpolated, see `upsampled`.
+        drop: First samples that are left out of the fit, where a recording is not periodic.
+        offset: Whether each output has a free zero.
+
+    Raises:
+        IdentificationError: If nothing is left to fit.
     """
     made = []
     for recording in recordings:
@@ -288,10 +301,18 @@ def fit_plant(
     most_evaluations: int = 60,
     on_progress: Progress | None = None,
 ) -> PlantFit:
-    """Fit all parameters of a structure to all runs at once.
+    """Fit all parameters of a structure to all records at once, by trust-region least squares within their bounds.
 
-    The search begins at the parameters' own starts and at each of `starts` (values in their order); trust-region
-    reflective least squares within their bounds. Raises `IdentificationError` when no start can be simulated.
+    Args:
+        structure: The parameters, with the point where the search begins, and the mirror that they make.
+        records: What is fitted to.
+        starts: Further points where a search begins, values in the order of the parameters.
+        tolerance: Relative change of cost or place at which a search ends.
+        most_evaluations: Largest number of simulations of all records in a search, without those for derivatives.
+        on_progress: Called with the searches done, their number and the name of the structure.
+
+    Raises:
+        IdentificationError: If no start can be simulated.
     """
     problem = Problem(structure, records)
     own = np.array([p.start for p in structure.parameters])

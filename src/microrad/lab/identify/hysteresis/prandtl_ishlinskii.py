@@ -82,9 +82,17 @@ def fit_prandtl_ishlinskii(
 ) -> PrandtlIshlinskiiFit:
     """Fit the weights of play operators to all recordings at once, every sample with equal weight.
 
-    Without `thresholds_v` (strictly increasing from 0), `operators` thresholds are spread evenly from 0 to 0.47 of the
-    largest peak-to-peak drive: an operator of half of it would never move both ways. States are carried through each
-    record; samples before the drive has swept its range once are left out. Raises `IdentificationError`.
+    States are carried through each record; samples before the drive has swept its range once are left out.
+
+    Args:
+        recordings: Loops of one drive and one output each.
+        thresholds_v: Thresholds (V), strictly increasing from 0.
+        operators: Number of thresholds where none are given: spread evenly from 0 to 0.47 of the largest peak-to-peak
+            drive. (An operator of half of it would never move both ways.)
+        units: Units of the recordings.
+
+    Raises:
+        IdentificationError: If a recording or the thresholds cannot be used.
     """
     records = si_records(recordings, units)
     thresholds = _thresholds(records, thresholds_v, operators)
