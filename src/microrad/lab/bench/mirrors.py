@@ -139,7 +139,7 @@ def bench_output(
         mirror: The mirror; by default that of the bench.
         fine_step_s: Longest step while the drive moves.
     """
-    from scipy.signal import lfilter  # slow to import, not needed to show help
+    from scipy.signal import lfilter
 
     mirror = mirror or BenchMirror()
     run = _MirrorState(mirror, amplifier, rest_v, 1.0 / rate_hz)

@@ -1,4 +1,4 @@
-"""What every identification shares: units, prepared records, the initial transient, the fastest rate, noise colour."""
+"""Recordings in volts and radians, and the statistics that every identification shares."""
 
 import math
 from collections.abc import Sequence
@@ -211,6 +211,22 @@ def correlation(covariance: Floats) -> Floats:
     """Correlation matrix of a covariance."""
     deviation = np.sqrt(np.diag(covariance)) + 1e-300
     return np.asarray(covariance / np.outer(deviation, deviation))
+
+
+class Estimate:
+    """Something that was estimated, with the covariance of its parameters."""
+
+    covariance: Floats
+
+    @property
+    def standard_errors(self) -> Floats:
+        """Standard errors of the parameters, in their order."""
+        return np.asarray(np.sqrt(np.diag(self.covariance)))
+
+    @property
+    def correlation(self) -> Floats:
+        """Correlation matrix of the parameters."""
+        return correlation(self.covariance)
 
 
 def percent(residual: Floats, span_rad: float) -> tuple[float, float]:

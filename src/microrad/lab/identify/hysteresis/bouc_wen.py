@@ -26,6 +26,7 @@ from microrad.core.kernels import bouc_wen_response
 from microrad.core.progress import Progress
 from microrad.lab.identify.records import (
     DEFAULT_UNITS,
+    Estimate,
     IdentificationError,
     SiRecord,
     Units,
@@ -163,7 +164,7 @@ def _starts(problem: Problem, starts: int, seed: int) -> list[Floats]:
 
 
 def _search(problem: Problem, start: Floats) -> Any:
-    from scipy.optimize import least_squares  # here, to keep start-up cheap
+    from scipy.optimize import least_squares
 
     return least_squares(
         problem.residual,
@@ -251,7 +252,7 @@ class NotIdentified(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class BoucWenFit:
+class BoucWenFit(Estimate):
     """A model of Eq. 3 in SI units, with what is known about the uncertainty of its six parameters.
 
     The signs follow the recordings: d1 is negative where the output falls with the drive. `covariance` (6 x 6, order
@@ -300,16 +301,6 @@ class BoucWenFit:
     def rate_limit_v_per_s(self) -> float:
         """Fastest rate of the drive that the fit has seen."""
         return self.model.rate_limit_v_s
-
-    @property
-    def standard_errors(self) -> Floats:
-        """Standard errors in the order of `PARAMETERS`, SI units."""
-        return np.asarray(np.sqrt(np.diag(self.covariance)))
-
-    @property
-    def correlation(self) -> Floats:
-        """Correlation matrix of the parameters."""
-        return correlation(self.covariance)
 
     @property
     def settled_hysteresis_rad(self) -> tuple[float, float]:

@@ -18,7 +18,7 @@ from microrad.core import kernels
 from microrad.core.arrays import Floats
 from microrad.core.progress import Progress
 from microrad.core.threads import in_threads
-from microrad.lab.identify.records import IdentificationError, colour_inflation, correlation, no_progress
+from microrad.lab.identify.records import Estimate, IdentificationError, colour_inflation, correlation, no_progress
 from microrad.lab.recording import Recording
 from microrad.mirror import model as mirror
 from microrad.mirror.model import Mirror
@@ -181,7 +181,7 @@ def simulate_record(plant: kernels.Plant, run: FitRecord) -> Floats:
 
 
 @dataclass(frozen=True, eq=False)
-class PlantFit:
+class PlantFit(Estimate):
     """What came out: the mirror, its parameters with their covariance, and how well it follows the records.
 
     `covariance`, over the parameters in their order, comes from the residuals of each run by themselves (the sandwich
@@ -209,16 +209,6 @@ class PlantFit:
     def mirror(self) -> Mirror:
         """The fitted mirror."""
         return self.structure.build(self.values)
-
-    @property
-    def standard_errors(self) -> Floats:
-        """Standard errors of the parameters."""
-        return np.asarray(np.sqrt(np.diag(self.covariance)))
-
-    @property
-    def correlation(self) -> Floats:
-        """Correlation matrix of the parameters."""
-        return correlation(self.covariance)
 
 
 class Problem:
@@ -330,7 +320,7 @@ def fit_plant(
 
 
 def _search(problem: Problem, start: Floats, tolerance: float, most_evaluations: int) -> Any:
-    from scipy.optimize import least_squares  # here, to keep start-up cheap
+    from scipy.optimize import least_squares
 
     def search(begin: Floats, jacobian: Callable[[Floats], Floats], ending: float, most: int) -> Any:
         return least_squares(

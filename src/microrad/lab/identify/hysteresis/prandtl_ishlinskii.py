@@ -150,7 +150,7 @@ def _thresholds(records: Sequence[SiRecord], given: ArrayLike | None, operators:
 
 def non_negative_weights(states: Floats, output: Floats) -> Floats:
     """Weights >= 0 by least squares; the triangle of a QR decomposition holds the same problem in a few rows."""
-    from scipy.optimize import nnls  # here, to keep start-up cheap
+    from scipy.optimize import nnls
 
     triangle = np.asarray(np.linalg.qr(np.column_stack((states, output)), mode="r"))
     size = float(np.abs(triangle).max())

@@ -99,7 +99,7 @@ def transmission_zeros(model: ModalModel, below_rad_s: float) -> Complexes:
     """Complex frequencies at which the square transfer matrix loses rank, up to `below_rad_s`; none where not
     square.
     """
-    from scipy.linalg import eig  # here, to keep start-up cheap
+    from scipy.linalg import eig
 
     outputs, inputs = model.direct.shape
     if outputs != inputs:
