@@ -49,7 +49,7 @@ _LOWER = np.array([-1.0, -3.0, math.log(0.05), math.log(0.05)])
 _UPPER = np.array([1.0, 10.0, math.log(1e5), math.log(1e5)])
 
 
-class Problem:
+class BoucWenProblem:
     """The projected residual of a set of records as a function of the four searched numbers, scaled to order one."""
 
     def __init__(self, records: tuple[SiRecord, ...], share: float, rate_limit: float | None = None) -> None:
@@ -113,7 +113,7 @@ class Problem:
         return np.array([d1, d2, epsilon, delta, (settled + reversal) / 2, beta])
 
 
-def _thin_problem(problem: Problem) -> Problem:
+def _thin_problem(problem: BoucWenProblem) -> BoucWenProblem:
     """The same problem on at most about 12 000 samples: the kernel is exact for a drive linear between any samples."""
     stride = math.ceil(sum(r.drive_v.size for r in problem.records) / 12_000)
     if stride == 1:
@@ -123,11 +123,11 @@ def _thin_problem(problem: Problem) -> Problem:
         for r in problem.records
         for start in (-(-r.start // stride),)
     )
-    return Problem(records, problem.share, problem.rate_limit)
+    return BoucWenProblem(records, problem.share, problem.rate_limit)
 
 
 # ----------------------------------------------------------------------------------------------------------- search
-def search_from_starts(problem: Problem, starts: int, seed: int, on_progress: Progress) -> tuple[Floats, Floats]:
+def search_from_starts(problem: BoucWenProblem, starts: int, seed: int, on_progress: Progress) -> tuple[Floats, Floats]:
     """Cost reached from each start, and the best point polished on all samples."""
     screen = _thin_problem(problem)
     points, costs = [], []
@@ -139,7 +139,7 @@ def search_from_starts(problem: Problem, starts: int, seed: int, on_progress: Pr
     return np.array(costs), _search(problem, points[int(np.argmin(costs))]).x
 
 
-def _starts(problem: Problem, starts: int, seed: int) -> list[Floats]:
+def _starts(problem: BoucWenProblem, starts: int, seed: int) -> list[Floats]:
     """The four best points of a coarse grid in turn, the first as it is and the rest scattered.
 
     The scatter is log-normal (e^0.4) in delta and in the two decay constants, and normal in d2, whose sign is open.
@@ -163,7 +163,7 @@ def _starts(problem: Problem, starts: int, seed: int) -> list[Floats]:
     return found
 
 
-def _search(problem: Problem, start: Floats) -> Any:
+def _search(problem: BoucWenProblem, start: Floats) -> Any:
     from scipy.optimize import least_squares
 
     return least_squares(
@@ -179,7 +179,7 @@ def _search(problem: Problem, start: Floats) -> Any:
     )
 
 
-def with_tightened_bound(problem: Problem, best: Floats) -> tuple[Problem, Floats]:
+def with_tightened_bound(problem: BoucWenProblem, best: Floats) -> tuple[BoucWenProblem, Floats]:
     """Lower the share of d1 that epsilon may take back until no slope along the recordings is negative.
 
     The bound holds for slow reversals; at a fast one h is larger than its slow settled value by exp(delta |u'|).
@@ -195,7 +195,7 @@ def with_tightened_bound(problem: Problem, best: Floats) -> tuple[Problem, Float
 
 
 # ---------------------------------------------------------------------------------------------------------- values
-def stacked_output(problem: Problem, values: Floats) -> Floats:
+def stacked_output(problem: BoucWenProblem, values: Floats) -> Floats:
     """Model output of the used samples of all records, without offset."""
     row = np.array([*values, problem.rate_limit, 0.0])
     return np.concatenate([bouc_wen_response(r.drive_v, r.step_s, row, 0.0)[0][r.start :] for r in problem.records])
@@ -222,7 +222,7 @@ def made_rising(model: BoucWen) -> BoucWen:
     return model if model.d1_rad_v > 0.0 else sign_reversed(model)
 
 
-def lowest_slope(problem: Problem, values: Floats) -> float:
+def lowest_slope(problem: BoucWenProblem, values: Floats) -> float:
     """Lowest dy/du along the used samples, at the begin of each step, positive in the direction of d1."""
     d1, d2, epsilon, delta, alpha, beta = values
     row = np.array([*values, problem.rate_limit, 0.0])
@@ -345,7 +345,7 @@ def fit_bouc_wen(
     """
     if starts < 1:
         raise IdentificationError(f"{starts} starts were asked for; give at least 1, better 10 or more.")
-    problem = Problem(si_records(recordings, units), 1.0 if admissible else math.inf)
+    problem = BoucWenProblem(si_records(recordings, units), 1.0 if admissible else math.inf)
     costs, best = search_from_starts(problem, starts, seed, on_progress or no_progress)
     if admissible:
         problem, best = with_tightened_bound(problem, best)
@@ -353,7 +353,7 @@ def fit_bouc_wen(
 
 
 # ---------------------------------------------------------------------------------------------------------- report
-def _report(problem: Problem, values: Floats, units: Units, costs: Floats, constrained: bool) -> BoucWenFit:
+def _report(problem: BoucWenProblem, values: Floats, units: Units, costs: Floats, constrained: bool) -> BoucWenFit:
     residual = problem.measured - stacked_output(problem, values)
     offsets = tuple(float(part.mean()) for part in split_by_record(residual, problem.records))
     residual = centred(residual, problem.records)
@@ -387,7 +387,7 @@ def _report(problem: Problem, values: Floats, units: Units, costs: Floats, const
     )
 
 
-def _sizes(problem: Problem, values: Floats) -> Floats:
+def _sizes(problem: BoucWenProblem, values: Floats) -> Floats:
     """A step of order one for each parameter: its own size, or what matters at the fastest rate."""
     least = np.array(
         [0, 1e-3 / problem.rate_limit, 1e-9 * abs(values[0]), 1e-2 / problem.rate_limit, 0, 1e-3 * values[4]]
@@ -395,7 +395,7 @@ def _sizes(problem: Problem, values: Floats) -> Floats:
     return np.asarray(np.maximum(np.abs(values), least))
 
 
-def _jacobian(problem: Problem, values: Floats, sizes: Floats) -> Floats:
+def _jacobian(problem: BoucWenProblem, values: Floats, sizes: Floats) -> Floats:
     """d output / d parameter by central differences, less the mean in each record (the offsets are marginalised)."""
     columns = []
     for i, size in enumerate(1e-4 * sizes):

@@ -23,7 +23,7 @@ from microrad.lab.recording import Recording
 from microrad.mirror import model as mirror
 from microrad.mirror.model import Mirror
 
-Hold = Literal["linear", "band-limited"]
+Interpolation = Literal["linear", "band-limited"]
 
 _ROUGH = 1e-8  # relative change of cost or place from which a search goes on by central differences
 _DIFFERENCE = 1e-5
@@ -90,7 +90,7 @@ def without_nuisance(nuisance: Floats, signal: Floats) -> Floats:
     return np.asarray(signal - nuisance @ (nuisance.T @ signal)) if nuisance.size else signal
 
 
-def upsampled(drive: Floats, factor: int, hold: Hold) -> Floats:
+def upsampled(drive: Floats, factor: int, hold: Interpolation) -> Floats:
     """A drive at a multiple of its rate; row factor * k belongs to sample k.
 
     Args:
@@ -109,7 +109,12 @@ def upsampled(drive: Floats, factor: int, hold: Hold) -> Floats:
 
 
 def fit_records(
-    recordings: Sequence[Recording], *, factor: int = 1, hold: Hold = "linear", drop: int = 0, offset: bool = True
+    recordings: Sequence[Recording],
+    *,
+    factor: int = 1,
+    hold: Interpolation = "linear",
+    drop: int = 0,
+    offset: bool = True,
 ) -> tuple[FitRecord, ...]:
     """Recordings as the records of a fit.
 
@@ -156,7 +161,7 @@ def _repeats(recording: Recording) -> bool:
     return bool(spread <= 1e-6 * np.abs(recording.drive).max())
 
 
-def _one_period(recording: Recording, factor: int, hold: Hold) -> tuple[Floats, Floats, int]:
+def _one_period(recording: Recording, factor: int, hold: Interpolation) -> tuple[Floats, Floats, int]:
     """Two periods of the drive, the output with its mean period as the second one, and the first sample of that."""
     period = recording.period_samples or recording.samples
     whole = recording.samples // period
@@ -211,7 +216,7 @@ class PlantFit(Estimate):
         return self.structure.build(self.values)
 
 
-class Problem:
+class PlantProblem:
     """The weighted residual of a structure on its runs, and its Jacobian by differences, as functions of the values."""
 
     def __init__(self, structure: Structure, records: Sequence[FitRecord]) -> None:
@@ -304,7 +309,7 @@ def fit_plant(
     Raises:
         IdentificationError: If no start can be simulated.
     """
-    problem = Problem(structure, records)
+    problem = PlantProblem(structure, records)
     own = np.array([p.start for p in structure.parameters])
     solutions = []
     for done, start in enumerate([own, *starts], 1):
@@ -319,7 +324,7 @@ def fit_plant(
     return _report(problem, best, [float(s.cost) for s in solutions])
 
 
-def _search(problem: Problem, start: Floats, tolerance: float, most_evaluations: int) -> Any:
+def _search(problem: PlantProblem, start: Floats, tolerance: float, most_evaluations: int) -> Any:
     from scipy.optimize import least_squares
 
     def search(begin: Floats, jacobian: Callable[[Floats], Floats], ending: float, most: int) -> Any:
@@ -343,7 +348,7 @@ def _search(problem: Problem, start: Floats, tolerance: float, most_evaluations:
 
 
 # ---------------------------------------------------------------------------------------------------------- report
-def _report(problem: Problem, best: Any, costs: list[float]) -> PlantFit:
+def _report(problem: PlantProblem, best: Any, costs: list[float]) -> PlantFit:
     values = best.x * problem.scale
     edges = np.cumsum([target.size for target in problem.targets])[:-1]
     residuals = tuple(
@@ -376,7 +381,7 @@ def _report(problem: Problem, best: Any, costs: list[float]) -> PlantFit:
     )
 
 
-def _covariance(jacobian: Floats, variance: Floats, problem: Problem) -> tuple[Floats, float]:
+def _covariance(jacobian: Floats, variance: Floats, problem: PlantProblem) -> tuple[Floats, float]:
     """The sandwich in the parameters' units, and the condition number of J with columns of length 1."""
     length = np.sqrt(np.einsum("ij,ij->j", jacobian, jacobian)) + 1e-300
     if not np.isfinite(length).all():

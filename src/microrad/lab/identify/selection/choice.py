@@ -57,7 +57,7 @@ _OTHER_MOTION = (
 
 
 @dataclass(frozen=True)
-class Source:
+class RecordingUse:
     """One recording: path, digest of the file, samples fitted and held out, and what it served for.
 
     `role` is "loops", "broadband" (for the linear part) or "validation" (for the scores alone).
@@ -91,7 +91,7 @@ class Identification:
     warnings: tuple[str, ...]
     refused: tuple[Refused, ...]
     unsupported: str
-    sources: tuple[Source, ...]
+    sources: tuple[RecordingUse, ...]
     recordings: tuple[Recording, ...]
     predictions: tuple[tuple[Prediction, ...], ...]
     linear: LinearFit | None
@@ -243,7 +243,7 @@ def _identification(
     predictions: Sequence[tuple[Prediction, ...]],
     best: int,
     refused: Sequence[Refused],
-    sources: tuple[Source, ...],
+    sources: tuple[RecordingUse, ...],
 ) -> Identification:
     scores = tuple(candidates.score(f.name, p) for f, p in zip(fits, predictions, strict=True))
     straight = straight_line(prepared, candidates.recordings, candidates.all_splits, candidates.units)
@@ -296,15 +296,14 @@ def _identification(
 
 def _sources(
     candidates: Candidates, broadband: Sequence[Recording], response: Sequence[Recording]
-) -> tuple[Source, ...]:
+) -> tuple[RecordingUse, ...]:
     """What each recording served for; a broadband one counts where the linear part was fitted to it."""
-    loops = [
-        Source(r.path, r.sha256, k, r.samples - k) for r, k in zip(candidates.loops, candidates.splits, strict=True)
-    ]
+    pairs = zip(candidates.loops, candidates.splits, strict=True)
+    loops = [RecordingUse(r.path, r.sha256, k, r.samples - k) for r, k in pairs]
     both, used = {id(r) for r in candidates.loops}, {id(r) for r in response}
     others = [r for r in broadband if id(r) not in both]
-    wide = [Source(r.path, r.sha256, r.samples * (id(r) in used), 0, "broadband") for r in others]
-    return (*loops, *wide, *(Source(r.path, r.sha256, 0, r.samples, "validation") for r in candidates.validation))
+    wide = [RecordingUse(r.path, r.sha256, r.samples * (id(r) in used), 0, "broadband") for r in others]
+    return (*loops, *wide, *(RecordingUse(r.path, r.sha256, 0, r.samples, "validation") for r in candidates.validation))
 
 
 def _unsupported(score: Score, line: Score, predictions: Sequence[Prediction]) -> str:

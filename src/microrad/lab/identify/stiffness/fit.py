@@ -23,8 +23,8 @@ from microrad.lab.identify.records import IdentificationError, no_progress
 from microrad.lab.identify.stiffness import tangents
 from microrad.lab.identify.stiffness.model import (
     FIELDS,
+    HysteresisSource,
     Numbers,
-    Source,
     balanced,
     delayed,
     linear_start,
@@ -36,7 +36,7 @@ from microrad.lab.recording import Recording
 from microrad.mirror import model as mirror
 from microrad.mirror.model import Mirror
 
-SOURCES: tuple[Source, ...] = ("strain", "drive")
+SOURCES: tuple[HysteresisSource, ...] = ("strain", "drive")
 THRESHOLDS = tuple(np.geomspace(0.006, 0.6, 6).tolist())
 
 _DAMPING = 1e-2
@@ -55,7 +55,7 @@ class StiffnessOptions:
     The search ends when three iterations in a row gain less than ``tolerance`` of the error.
     """
 
-    sources: tuple[Source, ...] = SOURCES
+    sources: tuple[HysteresisSource, ...] = SOURCES
     thresholds: tuple[float, ...] = THRESHOLDS
     sub_steps: int = 2
     delay_s: float | None = None
