@@ -21,8 +21,9 @@ from microrad.lab.identify.hysteresis import joint
 from microrad.lab.identify.hysteresis.joint import thin_record, time_constants
 from microrad.lab.identify.hysteresis.plant_fit import fit_plant, fit_records
 from microrad.lab.identify.hysteresis.prandtl_ishlinskii import threshold_grid
-from microrad.lab.identify.hysteresis.structures import LinearPoles, Roots, poles_of, propagated
+from microrad.lab.identify.hysteresis.structures import LinearPoles, Roots, poles_of
 from microrad.lab.identify.records import si_records
+from microrad.lab.identify.statistics import propagated
 from microrad.lab.recording import read_recording
 from microrad.mirror import model as mirror
 from places import DATA

@@ -10,8 +10,8 @@ from typing import Any
 from microrad.core.folder import write_whole
 from microrad.core.units import format_quantity
 from microrad.lab.identify import Identification
-from microrad.lab.identify.records import rounded_to_error
 from microrad.lab.identify.selection.predictions import Fit
+from microrad.lab.identify.statistics import rounded_to_error
 from microrad.lab.recording import Finding, Recording
 from microrad.report import identification_parameters as parameters
 from microrad.report import identification_words as words

@@ -14,9 +14,9 @@ from microrad.core.units import format_quantity
 from microrad.lab.identify import Identification, PrandtlIshlinskiiFit, Score
 from microrad.lab.identify.hysteresis.joint import JointFit
 from microrad.lab.identify.linear.fit import LinearFit
-from microrad.lab.identify.records import rounded_to_error
 from microrad.lab.identify.selection.predictions import Fit, Prediction
 from microrad.lab.identify.selection.warnings import fit_warnings
+from microrad.lab.identify.statistics import rounded_to_error
 from microrad.lab.recording import Recording
 from microrad.mirror.hysteresis import Play
 from microrad.report.identification_parameters import (

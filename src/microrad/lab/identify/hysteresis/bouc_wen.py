@@ -17,6 +17,7 @@ Both positive is alpha > |beta|, hence a bounded h, whatever the signs. At a rat
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -26,21 +27,18 @@ from microrad.core.kernels import bouc_wen_response
 from microrad.core.progress import Progress
 from microrad.lab.identify.records import (
     DEFAULT_UNITS,
-    Estimate,
     IdentificationError,
     SiRecord,
     Units,
     centred,
-    colour_inflation,
-    correlation,
     fastest_rate,
     no_progress,
     one_rate_only,
-    percent,
     si_records,
     span,
     split_by_record,
 )
+from microrad.lab.identify.statistics import Estimate, central_differences, colour_inflation, correlation, percent
 from microrad.lab.recording import Recording
 from microrad.mirror.hysteresis import BoucWen
 
@@ -118,12 +116,7 @@ def _thin_problem(problem: BoucWenProblem) -> BoucWenProblem:
     stride = math.ceil(sum(r.drive_v.size for r in problem.records) / 12_000)
     if stride == 1:
         return problem
-    records = tuple(
-        SiRecord(r.name, r.sha256, r.drive_v[::stride].copy(), r.output_rad[::stride].copy(), r.step_s * stride, start)
-        for r in problem.records
-        for start in (-(-r.start // stride),)
-    )
-    return BoucWenProblem(records, problem.share, problem.rate_limit)
+    return BoucWenProblem(tuple(r.every(stride) for r in problem.records), problem.share, problem.rate_limit)
 
 
 # ----------------------------------------------------------------------------------------------------------- search
@@ -397,12 +390,7 @@ def _sizes(problem: BoucWenProblem, values: Floats) -> Floats:
 
 def _jacobian(problem: BoucWenProblem, values: Floats, sizes: Floats) -> Floats:
     """d output / d parameter by central differences, less the mean in each record (the offsets are marginalised)."""
-    columns = []
-    for i, size in enumerate(1e-4 * sizes):
-        step = np.zeros(6)
-        step[i] = size
-        columns.append((stacked_output(problem, values + step) - stacked_output(problem, values - step)) / (2 * size))
-    return centred(np.column_stack(columns), problem.records)
+    return centred(central_differences(partial(stacked_output, problem), values, 1e-4 * sizes), problem.records)
 
 
 def _covariance(jacobian: Floats, sizes: Floats, variance: float, bounded: Floats | None) -> Floats:

@@ -244,13 +244,7 @@ def thin_record(record: SiRecord) -> SiRecord:
         if float(np.sqrt(np.mean(bent**2))) <= 2e-3 * spread:
             break
         stride //= 2
-    return replace(
-        record,
-        drive_v=record.drive_v[::stride].copy(),
-        output_rad=record.output_rad[::stride].copy(),
-        step_s=record.step_s * stride,
-        start=-(-record.start // stride),
-    )
+    return record.every(stride)
 
 
 def _nuisance(samples: int, step_s: float, creep_times: Sequence[float]) -> Floats:

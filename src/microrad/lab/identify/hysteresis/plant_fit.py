@@ -18,7 +18,8 @@ from microrad.core import kernels
 from microrad.core.arrays import Floats
 from microrad.core.progress import Progress
 from microrad.core.threads import in_threads
-from microrad.lab.identify.records import Estimate, IdentificationError, colour_inflation, correlation, no_progress
+from microrad.lab.identify.records import IdentificationError, no_progress
+from microrad.lab.identify.statistics import Estimate, colour_inflation, correlation
 from microrad.lab.recording import Recording
 from microrad.mirror import model as mirror
 from microrad.mirror.model import Mirror
@@ -190,7 +191,7 @@ class PlantFit(Estimate):
     """What came out: the mirror, its parameters with their covariance, and how well it follows the records.
 
     `covariance`, over the parameters in their order, comes from the residuals of each run by themselves (the sandwich
-    (J'J)^-1 J'VJ (J'J)^-1), inflated by their colour (`records.colour_inflation`, the largest one is kept).
+    (J'J)^-1 J'VJ (J'J)^-1), inflated by their colour (`statistics.colour_inflation`, the largest one is kept).
     `residual_rms` has the shape (runs, outputs), in the units of the recordings, without the weights. `start_costs` are
     the costs reached from each start, `agreeing_starts` how many came to within 0.1 % of the best. `not_identified`
     names each parameter that the records do not fix, with the reason. Where the search was not `converged` it stopped

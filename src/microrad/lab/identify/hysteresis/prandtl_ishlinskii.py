@@ -19,13 +19,12 @@ from microrad.lab.identify.records import (
     SiRecord,
     Units,
     centred,
-    colour_inflation,
     fastest_rate,
-    percent,
     si_records,
     span,
     split_by_record,
 )
+from microrad.lab.identify.statistics import colour_inflation, percent
 from microrad.lab.recording import Recording
 
 

@@ -289,15 +289,3 @@ def _linear_part(
         return replace(linear, poles=moved(linear.poles), zeros=moved(linear.zeros))
 
     return tuple(parameters), make
-
-
-def propagated(quantity: Callable[[Floats], Floats], values: Floats, covariance: Floats) -> Floats:
-    """Standard errors of what is computed from parameters with this covariance, to first order."""
-    deviation = np.sqrt(np.diag(covariance))
-    columns = []
-    for i, step in enumerate(np.maximum(1e-4 * deviation, 1e-9 * np.abs(values))):
-        move = np.zeros(values.size)
-        move[i] = step or 1e-12
-        columns.append((quantity(values + move) - quantity(values - move)) / (2 * move[i]))
-    jacobian = np.column_stack(columns)
-    return np.asarray(np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", jacobian, covariance, jacobian), 0.0)))

@@ -18,7 +18,8 @@ from microrad.lab.identify.linear.order import fit_order
 from microrad.lab.identify.linear.polish import Polished, TimeEquations, pack, polish, unpack
 from microrad.lab.identify.linear.response import FrequencyResponse, response_from_periods, response_from_records
 from microrad.lab.identify.linear.vector_fitting import check_order
-from microrad.lab.identify.records import IdentificationError, colour_inflation, no_progress, rounded_to_error
+from microrad.lab.identify.records import IdentificationError, no_progress
+from microrad.lab.identify.statistics import central_differences, colour_inflation, rounded_to_error
 from microrad.lab.recording import Recording
 
 _STEP = 1e-6
@@ -121,16 +122,8 @@ def transmission_zeros(model: ModalModel, below_rad_s: float) -> Complexes:
 def _slopes(model: ModalModel, points: Complexes, direct: bool) -> Complexes:
     """Derivative of the transfer matrix at the points by each parameter: (points, outputs, inputs, parameters)."""
     theta = pack(model, direct)
-    slopes = np.empty((points.size, *model.direct.shape, theta.size), dtype=complex)
-    for k, value in enumerate(theta):
-        step = _STEP * max(abs(value), 1e-9)
-        ends = []
-        for sign in (1.0, -1.0):
-            moved = theta.copy()
-            moved[k] += sign * step
-            ends.append(transfer_matrix(unpack(moved, model), points))
-        slopes[..., k] = (ends[0] - ends[1]) / (2 * step)
-    return slopes
+    steps = _STEP * np.maximum(np.abs(theta), 1e-9)
+    return central_differences(lambda moved: transfer_matrix(unpack(moved, model), points), theta, steps)
 
 
 def _variance(slopes: Complexes, covariance: Floats) -> Floats:

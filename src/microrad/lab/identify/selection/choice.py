@@ -9,15 +9,7 @@ import numpy as np
 from microrad.core.arrays import Floats
 from microrad.core.progress import Progress
 from microrad.lab.identify.linear.fit import LinearFit
-from microrad.lab.identify.records import (
-    IdentificationError,
-    SiRecord,
-    Units,
-    colour_inflation,
-    no_progress,
-    si_records,
-    span,
-)
+from microrad.lab.identify.records import IdentificationError, SiRecord, Units, no_progress, si_records, span
 from microrad.lab.identify.selection.candidates import (
     MODELS,
     STATIC,
@@ -41,6 +33,7 @@ from microrad.lab.identify.selection.warnings import (
     score_warnings,
     set_aside_warnings,
 )
+from microrad.lab.identify.statistics import colour_inflation
 from microrad.lab.recording import Recording
 
 _MIN_PART = 100

@@ -10,8 +10,9 @@ from microrad.core.arrays import Floats
 from microrad.lab.identify.hysteresis.bouc_wen import BoucWenFit, made_rising
 from microrad.lab.identify.hysteresis.joint import JointFit
 from microrad.lab.identify.hysteresis.prandtl_ishlinskii import PrandtlIshlinskiiFit
-from microrad.lab.identify.records import SiRecord, Units, colour_inflation, loop_rates, noisiness, one_rate_only
+from microrad.lab.identify.records import SiRecord, Units, loop_rates, noisiness, one_rate_only
 from microrad.lab.identify.selection.predictions import Fit, Prediction, Score
+from microrad.lab.identify.statistics import colour_inflation
 from microrad.lab.recording import Recording
 from microrad.mirror.hysteresis import BoucWen
 
