@@ -17,7 +17,7 @@ from microrad.lab.recording.records import frozen
 from microrad.mission.fields import Problem, ProblemsError
 
 MOST_SAMPLES = 20_000_000
-"""Samples of one record, all drives together, beyond which a duration is taken for a slip of the pen."""
+"""Samples of one record, all drives together, beyond which a duration is taken for a mistake."""
 
 _WHOLE = 1e-6  # how far, in samples, a whole number of them may be off
 _ROUNDING = 1e-9  # how far, relatively, a limit may be passed by rounding

@@ -32,7 +32,7 @@ class Units:
     lever_arm_m: float | None = None
 
     def __post_init__(self) -> None:
-        """Raises `IdentificationError` for unknown units, a length without lever arm and an angle with one."""
+        """Raises IdentificationError if a unit is unknown, a length has no lever arm or an angle has one."""
         if self.drive not in _VOLTS:
             raise IdentificationError(f"input unit '{self.drive}' is not known; use one of {', '.join(_VOLTS)}.")
         if self.output not in _RADIANS | _METRES:
@@ -97,7 +97,16 @@ class SiRecord:
 
 
 def si_records(recordings: Sequence[Recording], units: Units) -> tuple[SiRecord, ...]:
-    """Recordings in volts and radians; raises `IdentificationError` where a drive never reverses."""
+    """Recordings in volts and radians.
+
+    Args:
+        recordings: One drive and one output each.
+        units: Their units.
+
+    Raises:
+        IdentificationError: If there is no recording, one has several channels, or its drive is constant or never
+            reverses.
+    """
     if not recordings:
         raise IdentificationError("no recording was given; name at least one.")
     return tuple(_si_record(recording, units) for recording in recordings)

@@ -1,4 +1,4 @@
-"""The file before its numbers: does it exist, how big is it, and what is it in truth?"""
+"""Whether a file can be read at all, and which format it has by its content."""
 
 import difflib
 import hashlib
@@ -39,7 +39,7 @@ _BY_NAME = {each.name: each for each in _FORMATS}
 
 
 def check_file(path: Path) -> None:
-    """Raises `RecordingError` for what is not a readable file, is empty, or has more than `MAX_BYTES`."""
+    """Raises RecordingError if the path is no readable file, or the file is empty or has more than `MAX_BYTES`."""
     try:
         if path.is_dir():
             raise RecordingError(f"{path}: this is a directory; name one file in it.")
@@ -79,12 +79,18 @@ def read_head(path: Path, size: int) -> bytes:
 
 
 def most_unpacked(path: Path) -> int:
-    """Bytes that an array of a file may unpack to: no recording packs better, and a few kB could fill the memory."""
+    """Bytes that an array of a file may unpack to: a few kB that claim more could fill the memory."""
     return min(max(_UNPACKED_BYTES, _UNPACKED_TIMES * path.stat().st_size), MAX_BYTES)
 
 
 def too_large(path: Path, shape: Sequence[int], itemsize: int) -> str:
-    """Words for an array that states more than its file may unpack to; empty for any other."""
+    """Why an array cannot be read that states more than its file may unpack to; empty where it can.
+
+    Args:
+        path: The file.
+        shape: Shape that the array states.
+        itemsize: Bytes of one number.
+    """
     size, most = math.prod(shape) * itemsize, most_unpacked(path)
     if size <= most:
         return ""
@@ -104,8 +110,7 @@ def sha256_of(path: Path) -> str:
 def file_format(path: Path) -> str:
     """The format by content: tdms, lvm, mat, mat73, npy, npz, hdf5 or text.
 
-    Raises `RecordingError` where the content and the suffix of the name contradict each other, and for an index file,
-    an old or a compressed one.
+    Raises RecordingError if content and suffix contradict each other, or if the file is an index, old or compressed.
     """
     head = read_head(path, 1024)
     found = _BY_NAME[_content(path, head)]

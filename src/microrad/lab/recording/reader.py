@@ -1,6 +1,7 @@
 """From a file, or from arrays, to a checked `Recording`."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -175,15 +176,25 @@ def multisine_recordings(
 # ---------------------------------------------------------------------------------------------------------- opening
 def open_source(path: Path) -> Source:
     """The file as named channels. Raises RecordingError for a file of no known format, or a damaged one."""
-    kind = file_format(path)
-    if kind in ("hdf5", "mat73"):
-        from microrad.lab.recording.formats.hdf5 import Hdf5Source
+    return _SOURCES[file_format(path)](path)
 
-        return Hdf5Source(path, matlab=kind == "mat73")
-    if kind in ("npy", "npz"):
-        return NumpySource(path, archive=kind == "npz")
-    sources = {"tdms": TdmsSource, "lvm": LvmSource, "mat": MatlabSource, "text": TextSource}
-    return sources[kind](path)
+
+def _open_hdf5(path: Path, matlab: bool) -> Source:
+    from microrad.lab.recording.formats.hdf5 import Hdf5Source
+
+    return Hdf5Source(path, matlab)
+
+
+_SOURCES: dict[str, Callable[[Path], Source]] = {
+    "tdms": TdmsSource,
+    "lvm": LvmSource,
+    "mat": MatlabSource,
+    "mat73": partial(_open_hdf5, matlab=True),
+    "npy": partial(NumpySource, archive=False),
+    "npz": partial(NumpySource, archive=True),
+    "hdf5": partial(_open_hdf5, matlab=False),
+    "text": TextSource,
+}
 
 
 def _columns(source: Source, wanted: Column | Sequence[Column], role: str) -> list[int]:

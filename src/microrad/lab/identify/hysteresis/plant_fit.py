@@ -180,7 +180,7 @@ def simulate_record(plant: kernels.Plant, run: FitRecord) -> Floats:
     state = mirror.at_rest(plant)
     output = np.empty((run.drive.shape[0], len(plant.outputs)))
     bank = np.empty((run.drive.shape[0], 0))
-    for begin in range(0, run.drive.shape[0], _SLICE):  # the kernel is not to be away from the interpreter for long
+    for begin in range(0, run.drive.shape[0], _SLICE):  # the interpreter answers Ctrl-C between two of them
         part = slice(begin, begin + _SLICE)
         kernels.open_loop(plant, state, run.drive[part], output[part], bank[part])
     return output[:: run.stride]

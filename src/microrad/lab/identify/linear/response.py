@@ -116,7 +116,7 @@ def _check(records: Sequence[Recording]) -> None:
 
 
 def check_alike(records: Sequence[Recording], done: str) -> None:
-    """Raises `IdentificationError` for records of different rates or channels; `done` is what is done to them."""
+    """Raises IdentificationError if records differ in rate or channels; `done` says what is done to them."""
     first = records[0]
     for other in records[1:]:
         if other.rate_hz != first.rate_hz:
@@ -221,7 +221,9 @@ def _banded(records: Sequence[Recording], spectra: _Spectra, edges: list[tuple[i
 
 
 def _independent(auto: Complexes, freq_hz: Floats) -> Complexes:
-    """Inverse of the drives' cross-power at each frequency; refuses drives that are not independent at most of them.
+    """Inverse of the drives' cross-power at each frequency.
+
+    Raises IdentificationError if the drives are not independent at most frequencies.
 
     A single line at which random phases happen to agree is kept: its standard error says what it is worth.
     """

@@ -108,7 +108,7 @@ def vector_fit(
 
 
 def check_order(freq: Floats, order: int) -> None:
-    """Raise `IdentificationError` for a number of poles below 1 or beyond what so many frequencies can fix."""
+    """Raises IdentificationError if the number of poles is below 1 or beyond what so many frequencies can fix."""
     if order < 1:
         raise IdentificationError(f"the order is {order}; give at least one pole.")
     if freq.size < order + 1:

@@ -217,7 +217,7 @@ def _splits(recordings: Sequence[Recording], hold_out: float | None, validated: 
 
 
 def _check_distinct(recordings: Sequence[Recording], validation: Sequence[Recording]) -> None:
-    """Raises `IdentificationError` for a recording that is given twice, or to fit and for validation."""
+    """Raises IdentificationError if a recording is given twice, or both to fit and for validation."""
     seen: dict[str, str] = {}
     for recording in (*recordings, *validation):
         key = f"{recording.sha256} {recording.rate_hz}"

@@ -82,7 +82,7 @@ def _check_varies(where: str, role: str, label: str, values: Floats) -> None:
 
 
 def _check_separable(where: str, inputs: Sequence[Floats], labels: Sequence[str]) -> None:
-    """Raises `RecordingError` for an input that is a linear combination of those before it."""
+    """Raises RecordingError if an input is a linear combination of those before it."""
     if len(inputs) < 2:
         return
     centred = [column - column.mean() for column in inputs]
