@@ -27,7 +27,6 @@ from microrad.cli.frame import (
 )
 from microrad.core.folder import write_whole
 
-# Everything else is imported inside the commands: it takes longer to load than help may take.
 if TYPE_CHECKING:
     from microrad.lab.identify import Identification
     from microrad.lab.recording import Recording
