@@ -146,8 +146,9 @@ def drift(
         if abs(trend) > abs(largest):
             largest = trend
         if abs(trend) > max(3 * error, 0.2 / 100 * span_rad):
+            shown = rounded_to_error(1e6 * trend, 1e6 * error)
             warnings.append(
-                f"{recording.path}: the residual drifts by {rounded_to_error(1e6 * trend, 1e6 * error)} ± {1e6 * error:.2g} urad "
+                f"{recording.path}: the residual drifts by {shown} ± {1e6 * error:.2g} urad "
                 f"({100 * trend / span_rad:.2g} % of the peak-to-peak output) in "
                 f"{residual.size * recording.step_s:.3g} s: creep beyond what the model holds, or a warming sensor."
             )
