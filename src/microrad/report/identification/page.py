@@ -11,8 +11,8 @@ from microrad.core.folder import write_whole
 from microrad.core.machine import versions
 from microrad.core.units import format_quantity
 from microrad.lab.identify import Identification
-from microrad.lab.identify.records import rounded_to_error
 from microrad.lab.identify.selection.predictions import Fit
+from microrad.lab.identify.statistics import rounded_to_error
 from microrad.lab.recording import Finding, Recording
 from microrad.report.identification import parameters, words
 from microrad.report.identification.figures import identification_figures
