@@ -293,7 +293,6 @@ def test_a_caller_that_goes_away_leaves_nothing_running(engine):
 # ------------------------------------------------------------------------------------------- the parent's own end
 PARENT = """
 import sys
-from microrad.campaign.engines import flights
 from microrad.campaign.engines.threads import LocalEngine
 from microrad.campaign.records import Job
 engine = LocalEngine(sys.argv[1].encode(), "campaign_target:open_work", 2, float(sys.argv[2]))

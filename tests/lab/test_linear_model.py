@@ -11,11 +11,11 @@ from microrad.core import lti
 from microrad.lab.identify.linear import order
 from microrad.lab.identify.linear.amplitude import amplitude_dependence
 from microrad.lab.identify.linear.fit import (
-    at,
     fit_linear,
     fit_percent,
     output_error,
     parameter_covariance,
+    transfer_matrix,
     transmission_zeros,
 )
 from microrad.lab.identify.linear.modal import ModalModel, order_modes, simulate, simulate_periodic
@@ -359,9 +359,9 @@ def test_transmission_zeros():
     zeros = transmission_zeros(truth, 1e5)
     assert zeros.size > 0
     for zero in zeros:
-        size = np.linalg.svd(at(truth, np.array([zero]))[0], compute_uv=False)
+        size = np.linalg.svd(transfer_matrix(truth, np.array([zero]))[0], compute_uv=False)
         assert size[-1] < 1e-6 * size[0]
-    off = np.linalg.svd(at(truth, zeros[:1] * 1.1)[0], compute_uv=False)
+    off = np.linalg.svd(transfer_matrix(truth, zeros[:1] * 1.1)[0], compute_uv=False)
     assert off[-1] > 1e-4 * off[0]
     wide = ModalModel(truth.poles_rad_s, truth.input_vectors[:, :1], truth.output_vectors, truth.direct[:, :1])
     assert transmission_zeros(wide, 1e5).size == 0

@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 import truths
 from microrad.core import kernels
 from microrad.lab import bench
-from microrad.lab.bench.play import played, true_output
+from microrad.lab.bench.play import play_records, true_output
 from microrad.lab.identify import (
     FORMS,
     MODELS,
@@ -26,8 +26,9 @@ from microrad.lab.identify import (
     predict,
 )
 from microrad.lab.identify.hysteresis.structures import LinearPoles, Roots, propagated
-from microrad.lab.identify.selection import choice
-from microrad.lab.identify.selection.choice import _best, _polished
+from microrad.lab.identify.selection import candidates, choice
+from microrad.lab.identify.selection.candidates import refit_winner
+from microrad.lab.identify.selection.choice import choose_best
 from microrad.mirror import model as mirror
 from microrad.mirror.hysteresis import Play
 from microrad.mission.file import load_mirror
@@ -109,7 +110,7 @@ def test_a_broadband_record_that_no_fit_used_is_said_to_be_unused(loops, wide):
 def test_the_winner_is_polished_with_everything_free(loops, monkeypatch):
     """From poles that are off, to those of the truth; the broadband record belongs to that fit."""
     off = LinearPoles(Roots((153.0,), (0.33,)), Roots((), ()), 3.0)
-    monkeypatch.setattr(choice, "poles_of", lambda *_: off)
+    monkeypatch.setattr(candidates, "poles_of", lambda *_: off)
     drive = small_multisine(RATE, 4000, 2)
     wide = recorded(drive, truth(drive), RATE, noise=3e-3, name="wide", period=4000)
     result = identify([wide, *loops], models=("linear", "prandtl_ishlinskii_joint"))
@@ -125,7 +126,7 @@ def test_the_winner_is_polished_with_everything_free(loops, monkeypatch):
 
 
 def test_the_polish_is_kept_only_where_it_is_no_worse(loops, wide, monkeypatch):
-    real = choice.fit_joint
+    real = candidates.fit_joint
 
     def spoiled(*args, free_linear=False, **words):
         fit = real(*args, free_linear=False, **{**words, "broadband": ()})
@@ -133,12 +134,12 @@ def test_the_polish_is_kept_only_where_it_is_no_worse(loops, wide, monkeypatch):
             return fit
         return replace(fit, mirror=replace(fit.mirror, E=1.5 * fit.mirror.E), samples_used=-1)
 
-    monkeypatch.setattr(choice, "fit_joint", spoiled)
+    monkeypatch.setattr(candidates, "fit_joint", spoiled)
     result = identify([wide, *loops], models=("prandtl_ishlinskii_joint",))
     assert result.fit().samples_used > 0
     assert "pole 1" not in [p.name for p in result.fit().structure.parameters]
     static = fit_bouc_wen(loops, starts=1)
-    assert _polished(None, static, (), None) == (static, ())  # nothing to be freed
+    assert refit_winner(None, static, (), None) == (static, ())  # nothing to be freed
 
 
 @pytest.mark.parametrize("extra", [0.0, 1e-3, 0.5])
@@ -146,8 +147,8 @@ def test_a_tie_goes_to_fewer_parameters(found, extra):
     few, many = found.fit("linear"), found.fit("prandtl_ishlinskii_joint")
     assert len(few.structure.parameters) < len(many.structure.parameters)
     noise, other = philox(1).standard_normal((2, 1000))
-    assert _best([many, few], [[noise], [noise + extra * other]]) == (0 if extra == 0.5 else 1)
-    assert _best([few, many], [[noise + extra * other], [noise]]) == (1 if extra == 0.5 else 0)
+    assert choose_best([many, few], [[noise], [noise + extra * other]]) == (0 if extra == 0.5 else 1)
+    assert choose_best([few, many], [[noise + extra * other], [noise]]) == (1 if extra == 0.5 else 0)
 
 
 # ----------------------------------------------------------------------------------------------------- what no fit sees
@@ -240,7 +241,7 @@ def test_a_joint_fit_that_fails_is_refused_with_its_reason(loops, monkeypatch):
     def failing(*_, **__):
         raise IdentificationError("the mirror cannot be simulated at a step of 0.00025 s")
 
-    monkeypatch.setattr(choice, "fit_joint", failing)
+    monkeypatch.setattr(candidates, "fit_joint", failing)
     result = identify(loops, models=("prandtl_ishlinskii", "prandtl_ishlinskii_rate"))
     assert [(r.model, r.reason) for r in result.refused] == [
         ("prandtl_ishlinskii_rate", "the mirror cannot be simulated at a step of 0.00025 s")
@@ -449,7 +450,7 @@ def paper():
 @pytest.fixture
 def unpolished(monkeypatch):
     """The winner stays as it is found: tests/cli/test_docs_gallery.py polishes that of a whole plan."""
-    monkeypatch.setattr(choice, "_polished", lambda ladder, winner, predictions, *rest: (winner, predictions))
+    monkeypatch.setattr(choice, "refit_winner", lambda candidates, winner, predictions, *rest: (winner, predictions))
 
 
 @pytest.mark.usefixtures("unpolished")
@@ -482,7 +483,7 @@ def test_the_benchs_own_mirror_is_predicted_with_half_the_error_of_the_papers_mo
     """A reduced plan; the truth is none of the models. Held out are a frequency and amplitude, and a multisine."""
     plan = bench.load_plan("mirror-characterisation")
     names = ["small-multisine-1", "loops-40hz", "loops-100hz", "held-out-sine", "held-out-multisine"]
-    pairs = list(played(bench.only(plan, names), seed=1))
+    pairs = list(play_records(bench.select_records(plan, names), seed=1))
     known = [recording for record, recording in pairs if record.use == "identification"]
     unseen = [recording for record, recording in pairs if record.use == "validation"]
     assert (len(known), len(unseen)) == (3, 2)

@@ -314,7 +314,7 @@ def test_the_plot_shows_the_share_below_its_quantiles_and_the_limit(growing, at_
     found = campaign_view.figures(LiveCampaigns().look(growing.path))
     assert next(iter(found.plots)) == "residual_rms"  # the one with a limit comes first
     plot = found.plots["residual_rms"]
-    rows, quantiles, limit = plot["data"]
+    (rows, quantiles), (limit,) = plot["data"], plot["layout"]["shapes"]
     output = summarise_campaign(growing.path).cells[0].outputs["residual_rms"]
     assert (rows["y"][0], rows["y"][-1]) == (0.0, pytest.approx(100.0))
     assert all(a <= b for a, b in zip(rows["y"][:-1], rows["y"][1:], strict=True))
@@ -322,12 +322,12 @@ def test_the_plot_shows_the_share_below_its_quantiles_and_the_limit(growing, at_
     assert at[50.0] == pytest.approx(1e6 * output.quantiles[0.5].value, rel=1e-5)
     assert np.interp(at[50.0], rows["x"], rows["y"]) == pytest.approx(50.0, abs=1.0)
     assert min(quantiles["error_x"]["array"] + quantiles["error_x"]["arrayminus"]) >= 0.0
-    assert limit["x"] == [pytest.approx(5.0)] * 2
+    assert limit["x0"] == limit["x1"] == pytest.approx(5.0)
     assert limit["name"] == "limit ≤ 5 µrad"
     assert plot["layout"]["xaxis"]["title"]["text"] == "residual_rms (µrad)"
     assert plot["layout"]["yaxis"]["title"]["text"] == "rows at or below (%)"
     unlimited = found.plots[next(name for name in found.plots if name != "residual_rms")]
-    assert not any("limit" in trace["name"] for trace in unlimited["data"])
+    assert not any("limit" in each["name"] for each in (*unlimited["data"], *unlimited["layout"]["shapes"]))
 
 
 def test_a_limit_far_from_all_rows_is_named_and_not_drawn(growing):
@@ -336,6 +336,7 @@ def test_a_limit_far_from_all_rows_is_named_and_not_drawn(growing):
     (limit,) = growing.campaign.limits
     far = campaign_view.distribution_plot(output, replace(limit, most=1e-3))["data"][-1]
     assert (far["name"], far["x"]) == ("limit ≤ 1 mrad, right of here", [None])
-    both = campaign_view.distribution_plot(output, replace(limit, least=-1e-3, most=4e-6))["data"][-2:]
-    assert [each["name"] for each in both] == ["limit ≥ −1 mrad, left of here", "limit ≤ 4 µrad"]
-    assert both[1]["x"] == [pytest.approx(4.0)] * 2
+    both = campaign_view.distribution_plot(output, replace(limit, least=-1e-3, most=4e-6))
+    assert both["data"][-1]["name"] == "limit ≥ −1 mrad, left of here"
+    assert [each["name"] for each in both["layout"]["shapes"]] == ["limit ≤ 4 µrad"]
+    assert both["layout"]["shapes"][0]["x0"] == pytest.approx(4.0)

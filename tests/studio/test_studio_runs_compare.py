@@ -12,7 +12,7 @@ import pytest
 from microrad.link import study as link_study
 from microrad.mission.file import load_link
 from microrad.mission.presets import preset_text
-from microrad.studio.commands import CampaignRun, command
+from microrad.studio import commands
 from microrad.studio.draft.draft import Draft, DraftError
 from microrad.studio.draft.optional_tables import offered, with_table
 from microrad.studio.jobs.queue import Job, JobError, Progress
@@ -141,14 +141,15 @@ def test_an_example_campaign_names_the_mission_that_is_edited(session):
 
 
 def test_an_action_becomes_a_job_in_the_working_folder(session):
-    action = CampaignRun(Path("campaign.toml"), Path("x.ledger"))
-    order = runs_view.order(session, "campaign", "Campaign", action)
-    assert (order.cwd, order.arguments, order.results) == (session.folder, action.arguments, ("x.ledger",))
+    action = commands.campaign(Path("campaign.toml"), Path("x.ledger"))
+    order = runs_view.order(session, "campaign", action)
+    assert (order.title, order.cwd, order.results) == ("Campaign campaign.toml", session.folder, ("x.ledger",))
+    assert order.arguments == action.arguments
 
 
 def test_the_report_of_a_ledger_as_a_command():
-    action = runs_view.CampaignReport(Path("x.ledger"), Path("x.html"))
-    assert command(action) == "microrad campaign report x.ledger x.html --overwrite"
+    action = commands.campaign_report(Path("x.ledger"), Path("x.html"))
+    assert action.command == "microrad campaign report x.ledger x.html --overwrite"
     compile(action.python, "copied", "exec")
     assert action.results == ("x.html",)
 
@@ -209,7 +210,7 @@ def campaign(folder, number, state="done", ledger="x.ledger"):
 
 
 def report(folder, number, state="done", ledger="x.ledger"):
-    action = runs_view.CampaignReport(Path(ledger), Path("x.html"))
+    action = commands.campaign_report(Path(ledger), Path("x.html"))
     return Job(number, folder, state, "export", arguments=action.arguments, cwd=folder, results=action.results)
 
 
@@ -259,7 +260,7 @@ def test_the_ledger_of_a_campaign_lies_in_the_folder(session, tmp_path_factory):
 
 
 def test_a_ledger_that_is_named_like_an_option_is_none():
-    action = runs_view.CampaignReport(Path("-x.ledger"), Path("--help"))
+    action = commands.campaign_report(Path("-x.ledger"), Path("--help"))
     assert action.arguments == ("campaign", "report", "./-x.ledger", "./--help", "--overwrite")
 
 
@@ -312,7 +313,7 @@ def test_a_table_of_one_mission_alone_is_one_difference(draft):
 
 def test_the_numbers_are_those_of_the_link_study(session, draft):
     found = {each.name: each for each in compare_view.link_numbers(draft)}
-    study = link_study.run(load_link(session.folder / "leo-geo.toml"))
+    study = link_study.run_link_study(load_link(session.folder / "leo-geo.toml"))
     for budget in study.budgets:
         assert found[f"{budget.name}: margin"].value == budget.margin_db
         assert found[f"{budget.name}: received power"].value == budget.received_power_w

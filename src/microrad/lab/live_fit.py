@@ -19,10 +19,10 @@ from numpy.typing import NDArray
 from microrad.core.arrays import Floats
 
 if TYPE_CHECKING:
-    from microrad.lab.identify.selection.predictions import Judged, Prediction
+    from microrad.lab.identify.selection.predictions import Prediction, ScoredModel
     from microrad.lab.recording import Recording
 
-FITS = "fits"
+LIVE_FITS = "fits"
 """Name of the file, beside that of the progress."""
 
 _LOOPS = 6  # recordings that are kept; a bench writes a dozen
@@ -54,24 +54,24 @@ class LiveFit:
     loops: tuple[Loop, ...]
 
 
-def looker_on(progress: str | None) -> Callable[[Judged], None]:
+def live_fit_writer(progress: str | None) -> Callable[[ScoredModel], None]:
     """What `identify` gives its models to: a file beside that of the progress, or nothing where there is none.
 
     A disk that is full costs the picture, not the identification.
     """
     if not progress:
         return lambda judged: None
-    path = Path(progress).with_name(FITS)
+    path = Path(progress).with_name(LIVE_FITS)
 
-    def write(judged: Judged) -> None:
-        line = json.dumps(asdict(thinned(judged)), allow_nan=False)
+    def write(judged: ScoredModel) -> None:
+        line = json.dumps(asdict(thin_fit(judged)), allow_nan=False)
         with suppress(OSError), path.open("a", encoding="ascii") as file:
             file.write(f"{line}\n")
 
     return write
 
 
-def thinned(judged: Judged) -> LiveFit:
+def thin_fit(judged: ScoredModel) -> LiveFit:
     """A model with its curves, thinned for drawing."""
     pairs = zip(judged.recordings[:_LOOPS], judged.predictions[:_LOOPS], strict=True)
     loops = tuple(_loop(recording, prediction) for recording, prediction in pairs)

@@ -135,7 +135,7 @@ def bench_output(
     from scipy.signal import lfilter  # slow to import, not needed to show help
 
     mirror = mirror or BenchMirror()
-    run = _Run(mirror, amplifier, rest_v, 1.0 / rate_hz)
+    run = _MirrorState(mirror, amplifier, rest_v, 1.0 / rate_hz)
     volts = run.amplified(drive)
     fine = max(1, math.ceil(run.sample_s / fine_step_s - 1e-9))
     fast, strain = np.empty(drive.size), np.empty(drive.size)
@@ -153,7 +153,7 @@ def bench_output(
     return np.asarray(fast + settled + mirror.creep_share_decade / mirror.lags_per_decade * creep)
 
 
-class _Run:
+class _MirrorState:
     """The state of the bench's own mirror on its way through a record."""
 
     def __init__(self, mirror: BenchMirror, amplifier: Amplifier, rest_v: float, sample_s: float) -> None:
@@ -218,7 +218,7 @@ def _approach(
     return np.asarray(np.where(time_s < ramp_s, value + side * slew * time_s, command - side * left))
 
 
-def _moving(drive: Floats, rest_v: float, run: _Run) -> NDArray[np.bool_]:
+def _moving(drive: Floats, rest_v: float, run: _MirrorState) -> NDArray[np.bool_]:
     """Samples in which the drive moves, or has moved so lately that amplifier and smoothing have not settled."""
     changed = np.flatnonzero(np.diff(drive, prepend=rest_v) != 0.0)
     longest = max(run.amplifier.time_constant_s, run.mirror.viscous_smoothing_s)

@@ -57,10 +57,10 @@ def play(plan: Plan, seed: int, on_progress: Progress | None = None) -> tuple[Re
     Raises:
         BenchError: When an output leaves the range of its converter.
     """
-    return tuple(recording for _, recording in played(plan, seed, on_progress))
+    return tuple(recording for _, recording in play_records(plan, seed, on_progress))
 
 
-def played(plan: Plan, seed: int, on_progress: Progress | None = None) -> Iterator[tuple[Record, Recording]]:
+def play_records(plan: Plan, seed: int, on_progress: Progress | None = None) -> Iterator[tuple[Record, Recording]]:
     """Each record with its recording, one after the other, see `play`."""
     if seed < 0:
         raise BenchError(f"the seed is {seed}; give a whole number of at least 0")

@@ -14,7 +14,8 @@ from microrad.lab.identify.linear.response import response_from_records
 from microrad.lab.identify.linear.vector_fitting import vector_fit
 from microrad.lab.identify.mirror_file import mirror_file_text
 from microrad.lab.identify.records import IdentificationError, Units
-from microrad.lab.identify.selection.choice import MODELS, STATIC, Identification, Refused, identify
+from microrad.lab.identify.selection.candidates import MODELS, STATIC, Refused
+from microrad.lab.identify.selection.choice import Identification, identify
 from microrad.lab.identify.selection.predictions import Score, predict
 from microrad.lab.identify.stiffness.fit import fit_hysteretic_stiffness, predicted_error
 

@@ -4,23 +4,22 @@ Behind the values stands the table `uncertainty`, their covariance in a form tha
 """
 
 import json
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from microrad.core import kernels
 from microrad.core.arrays import Floats
-from microrad.lab.identify.hysteresis.bouc_wen import PARAMETERS, BoucWenFit, turned_over
+from microrad.lab.identify.hysteresis.bouc_wen import PARAMETERS, BoucWenFit, sign_reversed
 from microrad.lab.identify.hysteresis.joint import JointFit
 from microrad.lab.identify.hysteresis.prandtl_ishlinskii import PrandtlIshlinskiiFit
 from microrad.lab.identify.hysteresis.structures import LinearPoles, propagated
-from microrad.lab.identify.records import IdentificationError, centred, correlation, prepare
+from microrad.lab.identify.records import IdentificationError, centred, correlation, si_records
 from microrad.lab.identify.selection.choice import Identification
 from microrad.lab.identify.selection.predictions import Fit
-from microrad.lab.identify.selection.warnings import falling, fit_warnings
+from microrad.lab.identify.selection.warnings import fit_warnings
 from microrad.mirror.hysteresis import BoucWen, Play, scaled, slow_gain
 
 _LOST = 100.0  # relative standard error of a value that is as good as held
@@ -87,8 +86,7 @@ def _header(identification: Identification, fit: Fit, model: str) -> list[str]:
     of_chosen = fit_warnings(identification.fit())
     general = [warning for warning in identification.warnings if warning not in of_chosen]
     lines += [f"Warning: {warning}" for warning in (*general, *fit_warnings(fit))]
-    if not isinstance(fit, PrandtlIshlinskiiFit):
-        lines += [f"Not identified: {parameter}, {why}" for parameter, why in fit.not_identified]
+    lines += [f"Not identified: {parameter}, {why}" for parameter, why in fit.not_identified]
     return [f"# {_one_line(text)}" for text in lines]
 
 
@@ -107,20 +105,22 @@ def _composition(fit: Fit, identification: Identification) -> str:
 
 def _tables(fit: Fit, identification: Identification, source: str) -> list[str]:
     if isinstance(fit, BoucWenFit):
-        numbers = _bouc_wen_numbers(_upright(fit, fit.model))
+        numbers = _bouc_wen_numbers(_rising(fit, fit.model))
         return _bouc_wen(_SCALES * numbers, np.append(_SCALES[:6] * fit.standard_errors, [0.0] * 3), (), source)
     if isinstance(fit, PrandtlIshlinskiiFit):
-        return _prandtl_ishlinskii(fit, source)
+        # Operators without weight are left out, but the threshold 0 stays first, as a mirror file wants it.
+        keep = _kept(fit)
+        return _plays(fit.thresholds_v[keep], fit.weights_rad_per_v[keep], fit.standard_errors_rad_per_v[keep], source)
     return _joint(fit, identification, source)
 
 
 # ----------------------------------------------------------------------------------------------------- joint models
 def _joint(fit: JointFit, identification: Identification, source: str) -> list[str]:
-    turned = -1.0 if falling(fit) else 1.0
+    turned = -1.0 if fit.falling else 1.0
     if isinstance(fit.model, BoucWen):
 
         def values(at: Floats) -> Floats:
-            return np.asarray(_SCALES * _bouc_wen_numbers(_upright(fit, fit.structure.parts(at).model)))
+            return np.asarray(_SCALES * _bouc_wen_numbers(_rising(fit, fit.structure.parts(at).model)))
 
         errors = propagated(values, fit.fit.values, fit.fit.covariance)
         lines = _bouc_wen(values(fit.fit.values), errors, fit.form.free, source)
@@ -128,14 +128,13 @@ def _joint(fit: JointFit, identification: Identification, source: str) -> list[s
         lines = _joint_plays(fit, source)
     if fit.creep.weights_rad_v:
         error = fit.fit.standard_errors[[p.name for p in fit.structure.parameters].index("creep")]
-        weights = [_quoted(_text(turned * 1e3 * w, "mrad/V")) for w in fit.creep.weights_rad_v]
-        times = [_quoted(_text(t, "s")) for t in fit.creep.time_constants_s]
+        times = _list(fit.creep.time_constants_s, "s")
+        weights = _list([turned * 1e3 * w for w in fit.creep.weights_rad_v], "mrad/V")
         lines += [
             "",
             "[creep]",
-            f"time_constants = [{', '.join(times)}] # identified: decades that the recordings cover; from {source}",
-            f"weights = [{', '.join(weights)}] # identified: one weight, ± standard error {1e3 * error:.2g} mrad/V, "
-            f"from {source}",
+            f"time_constants = {times} # identified: decades that the recordings cover; from {source}",
+            f"weights = {weights} # identified: one weight, ± standard error {1e3 * error:.2g} mrad/V, from {source}",
         ]
     if fit.linear is not None:
         lines += ["", *_linear(fit, fit.linear, identification)]
@@ -164,26 +163,30 @@ def _bouc_wen_numbers(m: BoucWen | Play) -> Floats:
     return np.array([*m.row[:6], m.gamma_1_v, m.eta_1_v, m.exponent])
 
 
-def _upright(fit: Fit, model: BoucWen | Play) -> BoucWen | Play:
+def _rising(fit: Fit, model: BoucWen | Play) -> BoucWen | Play:
     """The model with its output counted as the mirror file counts it: rising with the drive."""
-    if not falling(fit):
+    if not fit.falling:
         return model
-    return turned_over(model) if isinstance(model, BoucWen) else scaled(model, -1.0)
+    return sign_reversed(model) if isinstance(model, BoucWen) else scaled(model, -1.0)
+
+
+def _plays(thresholds_v: ArrayLike, weights_rad_v: ArrayLike, errors_rad_v: Floats, source: str) -> list[str]:
+    """The table of play operators; an error that is not finite belongs to a weight at its bound 0."""
+    errors = ", ".join(f"{1e3 * e:.2g}" if np.isfinite(e) else "at 0" for e in errors_rad_v)
+    weights = _list(1e3 * np.asarray(weights_rad_v), "mrad/V")
+    return [
+        "[prandtl_ishlinskii]",
+        f"thresholds = {_list(np.asarray(thresholds_v), 'V')} # identified: chosen, not fitted; from {source}",
+        f"weights = {weights} # identified: ± standard error {errors} mrad/V, from {source}",
+    ]
 
 
 def _joint_plays(fit: JointFit, source: str) -> list[str]:
-    model = _upright(fit, fit.model)
+    model = _rising(fit, fit.model)
     assert isinstance(model, Play)
-    errors = fit.fit.standard_errors[: len(model.thresholds_v)]
-    thresholds = [_quoted(_text(r, "V")) for r in model.thresholds_v]
     least = 1e-9 * slow_gain(model)  # what the search leaves of a weight at its bound
-    weights = [_quoted(_text(1e3 * w if w > least else 0.0, "mrad/V")) for w in model.weights_rad_v]
-    shown = ", ".join(f"{1e3 * e:.2g}" for e in errors)
-    lines = [
-        "[prandtl_ishlinskii]",
-        f"thresholds = [{', '.join(thresholds)}] # identified: chosen, not fitted; from {source}",
-        f"weights = [{', '.join(weights)}] # identified: ± standard error {shown} mrad/V, from {source}",
-    ]
+    weights = [w if w > least else 0.0 for w in model.weights_rad_v]
+    lines = _plays(model.thresholds_v, weights, fit.fit.standard_errors[: len(weights)], source)
     if model.widening_s:
         names = [p.name for p in fit.structure.parameters]
         error = fit.fit.standard_errors[names.index("widening")]
@@ -201,10 +204,9 @@ def _linear(fit: JointFit, linear: LinearPoles, identification: Identification) 
         if not roots.frequencies_hz:
             continue
         numbers = range(1, len(roots.frequencies_hz) + 1)
-        frequencies = ", ".join(_quoted(_text(f, "Hz")) for f in roots.frequencies_hz)
         errors = ", ".join(f"{of[f'{kind} {i}']:.2g}" for i in numbers if f"{kind} {i}" in of)
         given = f"± standard error {errors} Hz" if errors else "from the frequency response, held in the joint fit"
-        lines.append(f"{kind}s = [{frequencies}] # identified: {given}, from {wide}")
+        lines.append(f"{kind}s = {_list(roots.frequencies_hz, 'Hz')} # identified: {given}, from {wide}")
         dampings = ", ".join(repr(float(d)) for d in roots.dampings)
         lines.append(f"{kind}_dampings = [{dampings}] # identified: 1 is a real {kind}; from {wide}")
     low, high = identification.linear.excited_hz if identification.linear is not None else (0.0, 0.0)
@@ -213,19 +215,6 @@ def _linear(fit: JointFit, linear: LinearPoles, identification: Identification) 
         _line("normalise_at", _text(linear.normalise_at_hz, "Hz"), "where the linear part has the magnitude 1"),
         _line("excited_from", _text(low, "Hz"), f"lowest frequency with a drive in it, from {wide}"),
         _line("excited_to", _text(high, "Hz"), f"highest frequency with a drive in it, from {wide}"),
-    ]
-
-
-def _prandtl_ishlinskii(fit: PrandtlIshlinskiiFit, source: str) -> list[str]:
-    """Operators without weight are left out, but the threshold 0 stays first, as a mirror file wants it."""
-    keep = _kept(fit)
-    thresholds = [_quoted(_text(float(v), "V")) for v in fit.thresholds_v[keep]]
-    weights = [_quoted(_text(1e3 * float(w), "mrad/V")) for w in fit.weights_rad_per_v[keep]]
-    errors = ", ".join(f"{1e3 * e:.2g}" if np.isfinite(e) else "at 0" for e in fit.standard_errors_rad_per_v[keep])
-    return [
-        "[prandtl_ishlinskii]",
-        f"thresholds = [{', '.join(thresholds)}] # identified: chosen, not fitted; from {source}",
-        f"weights = [{', '.join(weights)}] # identified: ± standard error {errors} mrad/V, from {source}",
     ]
 
 
@@ -239,7 +228,7 @@ def _uncertainty(fit: Fit, identification: Identification, source: str) -> list[
     if isinstance(fit, JointFit):
         numbers, covariance = _joint_covariance(fit)
     elif isinstance(fit, BoucWenFit):
-        signs = np.array([-1.0, 1.0, -1.0, 1.0, 1.0, -1.0]) if falling(fit) else np.ones(6)
+        signs = np.array([-1.0, 1.0, -1.0, 1.0, 1.0, -1.0]) if fit.falling else np.ones(6)
         numbers = dict(zip([f"bouc_wen.{key}" for key in PARAMETERS], (signs * fit.values).tolist(), strict=True))
         covariance = signs[:, None] * fit.covariance * signs
     else:
@@ -279,7 +268,7 @@ def _joint_covariance(fit: JointFit) -> tuple[dict[str, float], Floats]:
 
 def _numbers(fit: JointFit, at: Floats) -> dict[str, float]:
     axis = fit.structure.parts(at)
-    model = _upright(fit, axis.model)
+    model = _rising(fit, axis.model)
     found: dict[str, float] = {}
     if isinstance(model, BoucWen):
         found |= {f"bouc_wen.{k}": v for k, v in zip(_BOUC_WEN_KEYS, _bouc_wen_numbers(model).tolist(), strict=True)}
@@ -287,7 +276,7 @@ def _numbers(fit: JointFit, at: Floats) -> dict[str, float]:
         found |= {f"prandtl_ishlinskii.weights.{i}": w for i, w in enumerate(model.weights_rad_v, 1)}
         found["prandtl_ishlinskii.widening"] = model.widening_s
     if axis.creep.weights_rad_v:
-        found["creep.weights"] = (-1.0 if falling(fit) else 1.0) * axis.creep.weights_rad_v[0]
+        found["creep.weights"] = (-1.0 if fit.falling else 1.0) * axis.creep.weights_rad_v[0]
     if axis.linear is not None:
         for kind, roots in (("pole", axis.linear.poles), ("zero", axis.linear.zeros)):
             found |= {f"linear.{kind}s.{i}": f for i, f in enumerate(roots.frequencies_hz, 1)}
@@ -298,8 +287,8 @@ def _numbers(fit: JointFit, at: Floats) -> dict[str, float]:
 def _play_covariance(fit: PrandtlIshlinskiiFit, identification: Identification) -> tuple[dict[str, float], Floats]:
     """The standard errors with the correlation that the play states have over the fitted samples."""
     pairs = zip(identification.recordings, identification.predictions[0], strict=True)
-    heads = [replace(r, drive=r.drive[: p.split], output=r.output[: p.split]) for r, p in pairs if p.split > p.start]
-    records = prepare(heads, fit.units)
+    heads = [r.first(p.split) for r, p in pairs if p.split > p.start]
+    records = si_records(heads, fit.units)
     used = np.isfinite(fit.standard_errors_rad_per_v) & (fit.weights_rad_per_v > 0)
     thresholds = fit.thresholds_v[used]
     states = [kernels.play_response(r.drive_v, thresholds, np.full(thresholds.size, r.drive_v[0])) for r in records]
@@ -360,6 +349,11 @@ def _rounded(covariance: Floats) -> tuple[list[str], list[list[str]]]:
 
 def _line(key: str, text: str, comment: str) -> str:
     return f"{key} = {_quoted(text)}".ljust(44) + f" # identified: {comment}"
+
+
+def _list(values: Iterable[float], unit: str) -> str:
+    """A list of quantities."""
+    return f"[{', '.join(_quoted(_text(value, unit)) for value in values)}]"
 
 
 def _text(value: float, unit: str) -> str:

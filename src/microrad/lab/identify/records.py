@@ -10,8 +10,8 @@ from microrad.core.arrays import Floats
 from microrad.lab.recording import Recording
 
 
-def unheard(done: int, total: int, what: str) -> None:
-    """The progress that nobody listens to."""
+def no_progress(done: int, total: int, what: str) -> None:
+    """What is called with the progress where nobody asked for it."""
 
 
 _VOLTS = {"V": 1.0, "mV": 1e-3}
@@ -70,7 +70,7 @@ DEFAULT_UNITS = Units()
 
 
 @dataclass(frozen=True, eq=False)
-class Prepared:
+class SiRecord:
     """A recording in volts and radians, with the samples before `start` set aside as the initial transient."""
 
     name: str
@@ -86,14 +86,14 @@ class Prepared:
         return self.drive_v.size - self.start
 
 
-def prepare(recordings: Sequence[Recording], units: Units) -> tuple[Prepared, ...]:
+def si_records(recordings: Sequence[Recording], units: Units) -> tuple[SiRecord, ...]:
     """Recordings in volts and radians; raises `IdentificationError` where a drive never reverses."""
     if not recordings:
         raise IdentificationError("no recording was given; name at least one.")
-    return tuple(_prepare(recording, units) for recording in recordings)
+    return tuple(_si_record(recording, units) for recording in recordings)
 
 
-def _prepare(recording: Recording, units: Units) -> Prepared:
+def _si_record(recording: Recording, units: Units) -> SiRecord:
     if recording.drive.shape[1] != 1 or recording.output.shape[1] != 1:
         raise IdentificationError(
             f"{recording.path}: {recording.drive.shape[1]} drives and {recording.output.shape[1]} outputs; a mirror "
@@ -108,7 +108,7 @@ def _prepare(recording: Recording, units: Units) -> Prepared:
             "behind a reversal; record at least one full period of the drive."
         )
     output = recording.output[:, 0] * units.radians
-    return Prepared(recording.path, recording.sha256, drive, output, recording.step_s, transient(drive))
+    return SiRecord(recording.path, recording.sha256, drive, output, recording.step_s, transient(drive))
 
 
 def transient(drive: Floats) -> int:
@@ -131,7 +131,7 @@ def smoothed_rate(drive: Floats, step_s: float) -> Floats:
     return (drive[span:] - drive[:-span]) / (span * step_s)
 
 
-def fastest_rate(records: Sequence[Prepared]) -> float:
+def fastest_rate(records: Sequence[SiRecord]) -> float:
     """Fastest rate of the drive (V/s) over all records: 99.5 % of the smoothed rate, so that a spike does not count.
 
     Samples at rest do not count either: a drive of steps moves in few of them.
@@ -140,7 +140,7 @@ def fastest_rate(records: Sequence[Prepared]) -> float:
     return max(float(np.quantile(rate[rate > 0], 0.995)) for rate in rates)
 
 
-def noisiness(records: Sequence[Prepared]) -> float:
+def noisiness(records: Sequence[SiRecord]) -> float:
     """Rms scatter of the sample-to-sample rate about the smoothed rate, over the fastest rate."""
     scatter = 0.0
     for record in records:
@@ -161,7 +161,7 @@ def _sweeps(drive: Floats, step_s: float) -> Floats:
     return np.asarray(peaks[travel >= 0.2 * travel.max()])
 
 
-def loop_rates(records: Sequence[Prepared]) -> tuple[float, float]:
+def loop_rates(records: Sequence[SiRecord]) -> tuple[float, float]:
     """Slowest and fastest peak rate (V/s) among the loops of all records, without the outermost twentieths."""
     peaks = np.concatenate([_sweeps(r.drive_v, r.step_s) for r in records])
     medians = [float(np.median(_sweeps(r.drive_v, r.step_s))) for r in records]
@@ -169,7 +169,7 @@ def loop_rates(records: Sequence[Prepared]) -> tuple[float, float]:
     return min(float(low), *medians), max(float(high), *medians)
 
 
-def one_rate_only(records: Sequence[Prepared]) -> bool:
+def one_rate_only(records: Sequence[SiRecord]) -> bool:
     """True where all loops have the same peak rate within a quarter, so that rate dependence rests on one rate."""
     slowest, fastest = loop_rates(records)
     return fastest < 1.25 * slowest
@@ -218,16 +218,16 @@ def percent(residual: Floats, span_rad: float) -> tuple[float, float]:
     return 100 * float(np.sqrt(np.mean(residual**2))) / span_rad, 100 * float(np.max(np.abs(residual))) / span_rad
 
 
-def span(records: Sequence[Prepared]) -> float:
+def span(records: Sequence[SiRecord]) -> float:
     """Largest peak-to-peak output (rad) of the records: the measure for every percentage."""
     return max(float(np.ptp(r.output_rad)) for r in records)
 
 
-def centred(columns: Floats, records: Sequence[Prepared]) -> Floats:
+def centred(columns: Floats, records: Sequence[SiRecord]) -> Floats:
     """Stacked columns less their mean in each record: solving without them is solving with one offset per record."""
     return np.concatenate([part - part.mean(axis=0) for part in split_by_record(columns, records)])
 
 
-def split_by_record(values: Floats, records: Sequence[Prepared]) -> list[Floats]:
+def split_by_record(values: Floats, records: Sequence[SiRecord]) -> list[Floats]:
     """Stacked values of the used samples, one array per record."""
     return np.split(values, np.cumsum([r.used for r in records])[:-1])

@@ -3,7 +3,7 @@
 import hashlib
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -73,6 +73,10 @@ class Recording:
     def samples(self) -> int:
         """Number of samples."""
         return int(self.drive.shape[0])
+
+    def first(self, samples: int) -> "Recording":
+        """The first `samples` of it, or all where there are fewer."""
+        return replace(self, drive=self.drive[:samples], output=self.output[:samples])
 
 
 def frozen(values: Floats) -> Floats:

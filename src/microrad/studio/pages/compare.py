@@ -11,8 +11,9 @@ from nicegui import ui
 
 from microrad.mission import presets
 from microrad.studio import commands
+from microrad.studio.commands import Action
 from microrad.studio.draft.draft import Draft
-from microrad.studio.pages import layout, pieces
+from microrad.studio.pages import layout
 from microrad.studio.pages.in_thread import in_thread
 from microrad.studio.session import Session
 from microrad.studio.views import compare as compare_view
@@ -94,7 +95,7 @@ class _Page:
         shipped = Draft.shipped(self.session.folder / name)
         return shipped if name == _SHIPPED else shipped.with_text(presets.preset_text(name.removeprefix(_PRESET)))
 
-    def _action(self, other: bool) -> commands.Budget | None:
+    def _action(self, other: bool) -> Action | None:
         draft = self.session.other if other else self.session.draft
         if draft is None:
             layout.refuse("There is no other mission yet; choose one.")
@@ -102,7 +103,7 @@ class _Page:
         if not draft.path.exists():
             layout.refuse(f"{self.session.name_of(draft.path)} is not a file of this folder yet; save it there first.")
             return None
-        return commands.Budget(Path(self.session.name_of(draft.path)) if other else pieces.file_of(self.session))
+        return commands.budget(Path(self.session.name_of(draft.path)) if other else layout.file_of(self.session))
 
     # ------------------------------------------------------------------------------------------------------- the tables
     def _look(self) -> None:

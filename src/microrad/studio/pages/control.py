@@ -10,10 +10,12 @@ from nicegui import background_tasks, ui
 
 from microrad.mission.file import MissionFile
 from microrad.mission.tables.fine_pointing import FinePointing
-from microrad.studio.commands import Design
+from microrad.studio import commands
 from microrad.studio.pages import layout
+from microrad.studio.pages.elements import Figure, numbers
 from microrad.studio.pages.in_thread import in_thread, stay
 from microrad.studio.session import Session
+from microrad.studio.views.plots import empty
 
 TITLE = "Control"
 PATH = "/control"
@@ -38,23 +40,10 @@ _PLOTS = {
     "jitter_drive": "Drive under disturbance",
 }
 _OWN = ("sensitivity", "gain")  # of the controller, whatever is asked
-_CSS = """
-.control-asked { display: grid; grid-template-columns: 19rem repeat(3, minmax(8rem, 12rem)) auto; gap: .75rem;
-                 align-items: center; }
-.control-words { color: var(--fail); white-space: pre-wrap; overflow-wrap: anywhere; }
-.control-numbers { display: grid; grid-template-columns: repeat(auto-fit, minmax(20rem, 1fr)); gap: 0 2rem; margin: 0;
-                   width: 100%; }
-.control-numbers div { display: flex; justify-content: space-between; gap: 1rem; border-bottom: 1px solid var(--line); }
-.control-numbers dd { margin: 0; font-variant-numeric: tabular-nums; text-align: right; }
-.control-plots { display: grid; grid-template-columns: repeat(2, minmax(0, 1fr)); gap: .5rem; width: 100%; }
-.control-plots > * { height: 21rem; min-width: 0; }
-@media (max-width: 1150px) { .control-asked { grid-template-columns: repeat(3, minmax(0, 1fr)); } }
-"""
 
 
 def page(session: Session) -> None:
     """A table of all controllers, and below it one of them."""
-    ui.add_head_html(f"<style>{_CSS}</style>")
     ControlPage(session)
 
 
@@ -68,8 +57,8 @@ class ControlPage:
         self.question, self.round, self.filling = 0, 0, False
         self.rows: dict[str, dict[str, Any]] = {}
         self.plots: dict[str, Any] = {}
-        layout.copy_buttons(lambda: Design(Path(session.name_of(session.draft.path))))
-        self.words = ui.label().classes("control-words").props('role="alert"')
+        layout.copy_buttons(lambda: commands.design(Path(session.name_of(session.draft.path))))
+        self.words = ui.label().classes("no kept").props('role="alert"')
         self._all()
         self._one()
         layout.follow(session, lambda: background_tasks.create(self.reload()))
@@ -95,9 +84,9 @@ class ControlPage:
             self.variants = ui.toggle(names, value="both", on_change=self.show)
             self.variants.props('dense no-caps aria-label="Hysteresis of the mirror"')
         self.state = ui.label().classes("soft").props('role="status"')
-        self.fault = ui.label().classes("control-words").props('role="alert"')
+        self.fault = ui.label().classes("no kept").props('role="alert"')
         self.notes = ui.column().classes("gap-0")
-        self.numbers = ui.element("dl").classes("control-numbers")
+        self.numbers = ui.element("dl").classes("numbers")
         layout.heading("By frequency", 3)
         self._plots("sensitivity", "gain")
         layout.heading("A step of the reference on axis x", 3)
@@ -118,13 +107,9 @@ class ControlPage:
         return ui.label().props('role="status"')
 
     def _plots(self, *names: str) -> None:
-        from microrad.studio.views.plots import empty
-
-        with ui.element("div").classes("control-plots"):
+        with ui.element("div").classes("plots"):
             for name in names:
-                self.plots[name] = ui.plotly(empty("Nothing simulated yet.")).props(
-                    f'role="figure" aria-label="{_PLOTS[name]}"'
-                )
+                self.plots[name] = Figure(_PLOTS[name], empty("Nothing simulated yet."))
 
     # ------------------------------------------------------------------------------------------------------ the mission
     async def reload(self) -> None:
@@ -240,12 +225,9 @@ class ControlPage:
                 ui.label(note).classes("soft")
         self.numbers.clear()
         with self.numbers:
-            for name, value in (*control_view.margin_rows(found), *control_view.value_rows(found)):
-                with ui.element("div"):
-                    layout.words("dt", name)
-                    layout.words("dd", value)
-        self.plots["sensitivity"].update_figure(control_view.sensitivity_plot(found))
-        self.plots["gain"].update_figure(control_view.gain_plot(found))
+            numbers((*control_view.margin_rows(found), *control_view.value_rows(found)))
+        self.plots["sensitivity"].show(control_view.sensitivity_plot(found))
+        self.plots["gain"].show(control_view.gain_plot(found))
 
     def _answers(self, found: Any, answers: Any) -> None:
         from microrad.studio.views import control as view
@@ -261,10 +243,10 @@ class ControlPage:
             "sine_drive": view.drive_plot(found, answers.sine),
             "jitter": view.jitter_plot(answers),
             "motion": view.motion_plot(answers),
-            "jitter_drive": view.drive_plot(found, answers.jitter, "s"),
+            "jitter_drive": view.drive_plot(found, answers.jitter, view.SECONDS),
         }
         for name, figure in drawn.items():
-            self.plots[name].update_figure(figure)
+            self.plots[name].show(figure)
 
 
 def _names(table: FinePointing | None) -> tuple[str, ...]:

@@ -6,12 +6,13 @@ import json
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from importlib import resources
+from pathlib import Path
 from typing import Any
 
 from nicegui import ui
 from nicegui.elements.mixins.text_element import TextElement
 
-from microrad.studio.commands import Action, command
+from microrad.studio.commands import Action
 from microrad.studio.draft.draft import Draft, OnDisk
 from microrad.studio.session import Session
 
@@ -128,6 +129,13 @@ def heading(text: str, level: int = 2) -> TextElement:
     return words(f"h{level}", text)
 
 
+def file_of(session: Session) -> Path:
+    """The mission's file, seen from the working folder, for a command to be copied; says so where it is not saved."""
+    if session.draft.changed:
+        ui.notify("The command reads the file: save the mission first, for the same numbers.", type="warning")
+    return Path(session.name_of(session.draft.path))
+
+
 def copy_buttons(action: Callable[[], Action | None]) -> None:
     """Buttons that copy what `action` returns as a command and as Python; None says why by a notice of its own."""
     with ui.row().classes("studio-copy"):
@@ -139,7 +147,7 @@ async def _copy(action: Action | None, python: bool) -> None:
     """Say "Copied" once the browser has done it: a page that is not from this machine may not, nor an idle tab."""
     if action is None:
         return
-    text = action.python if python else command(action)
+    text = action.python if python else action.command
     refused = await ui.run_javascript(_COPY.replace("TEXT", json.dumps(text)), timeout=COPY_S)
     if refused:
         ui.notify(f"Not copied, {refused}: {text}", type="negative", multi_line=True)

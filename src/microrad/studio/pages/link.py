@@ -12,14 +12,12 @@ from microrad.core.progress import Progress
 from microrad.link import study as link_study
 from microrad.link.study import LinkStudy
 from microrad.mission.file import LinkFile
-from microrad.studio.commands import Budget
+from microrad.studio import commands
 from microrad.studio.draft.draft import Draft
 from microrad.studio.pages import layout
+from microrad.studio.pages.elements import Column, Figure, MarginCards, table
 from microrad.studio.pages.in_thread import in_thread
-from microrad.studio.pages.live import LivePlot, MarginCards
-from microrad.studio.pages.pieces import Column, file_of, plot, table
 from microrad.studio.pages.slider_page import SliderPage
-from microrad.studio.pages.sliders import add_style
 from microrad.studio.session import Session
 from microrad.studio.views import link as link_view
 from microrad.studio.views.latest import Latest, shared
@@ -37,17 +35,10 @@ _COLUMNS = (
     Column("source", "Source"),
 )
 _LOOK_S, _REST_S = 0.25, 0.8
-_CSS = """
-.margins { display: grid; grid-template-columns: repeat(auto-fit, minmax(11rem, 1fr)); gap: .75rem; width: 100%; }
-.margin-card { border: 1px solid var(--line); border-radius: 4px; padding: .4rem .7rem; }
-.margin-card .value { font-size: 1.5rem; font-weight: 600; font-variant-numeric: tabular-nums; line-height: 1.3; }
-.margin-map { width: 100%; height: 27rem; }
-"""
 
 
 def page(session: Session) -> None:
     """Sliders at the left; margins, map and tables at the right."""
-    add_style(_CSS)
     LinkPage(session)
 
 
@@ -59,7 +50,7 @@ class LinkPage(SliderPage[LinkView]):
         self.study: Latest[LinkStudy] = shared(session, "links")
         self.shown, self.rested = "", ("", 0.0)
         self.slow: dict[str, list[link_view.Row]] = {}
-        layout.copy_buttons(lambda: Budget(file_of(session)))
+        layout.copy_buttons(lambda: commands.budget(layout.file_of(session)))
         super().__init__(session, link_view.second)
         ui.timer(_LOOK_S, self._look)
 
@@ -68,7 +59,7 @@ class LinkPage(SliderPage[LinkView]):
         layout.heading("Margins")
         self.cards = MarginCards()
         layout.heading("Margin map")
-        self.map = LivePlot("Link margin over data rate and pointing error; in words below").classes("margin-map")
+        self.map = Figure("Link margin over data rate and pointing error; in words below").classes("margin-map")
         self.key = ui.label().classes("soft")
         self.words = ui.label().props('role="status"')
         layout.heading("Budgets")
@@ -80,7 +71,7 @@ class LinkPage(SliderPage[LinkView]):
         self.sentences = ui.column()
         layout.heading("What moves the margin of the communication link")
         ui.label("Each input alone, 10 % lower and higher (0.5 dB; an outage by a factor of ten).").classes("soft")
-        self.tornado = plot("What moves the margin; in words above")
+        self.tornado = Figure("What moves the margin; in words above")
         self.dimmed = (self.cards, self.map, self.key, self.words, self.table)
 
     def sliders(self, draft: Draft) -> Mapping[str, tuple[Slider, ...]]:
@@ -135,7 +126,7 @@ class LinkPage(SliderPage[LinkView]):
         with self.sentences:
             for sentence in words:
                 ui.label(sentence)
-        self.tornado.update_figure(tornado)
+        self.tornado.show(tornado)
         self._tabs()
 
     def _ask_study(self) -> None:
@@ -156,4 +147,4 @@ def _told(study: LinkStudy) -> tuple[list[str], dict[str, list[link_view.Row]], 
 
 def _study(file: LinkFile, progress: Progress) -> LinkStudy:
     progress(0, 0, "links")
-    return link_study.run(file)
+    return link_study.run_link_study(file)

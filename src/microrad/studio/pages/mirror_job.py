@@ -11,11 +11,11 @@ from microrad.lab.live_fit import LiveFit
 from microrad.studio.draft.mirror_file import with_mirror_file
 from microrad.studio.jobs.queue import Job
 from microrad.studio.pages import layout
+from microrad.studio.pages.elements import Figure, numbers
 from microrad.studio.pages.in_thread import in_thread
 from microrad.studio.session import Session
 from microrad.studio.views import live_fit
 from microrad.studio.views import mirror as mirror_view
-from microrad.studio.views.plots import CONFIG
 
 _LOOK_S = 0.5
 _BEST = -1
@@ -58,9 +58,8 @@ class JobView:
                 for each in (self.model, self.recording):
                     each.props("dense outlined options-dense").style("min-width: 14rem")
             with ui.element("div").classes("plots"):
-                self.loop, self.residual = (ui.plotly({"data": [], "layout": {}, "config": CONFIG}) for _ in range(2))
-            self.loop.props('role="figure" aria-label="Measured loop and that of the model"')
-            self.residual.props('role="figure" aria-label="Residual over time"')
+                self.loop = Figure("Measured loop and that of the model")
+                self.residual = Figure("Residual over time")
             ui.label("Residuals in per cent of the peak-to-peak output.").classes("soft small")
             self.table = ui.table(rows=[], columns=_COLUMNS, row_key="id").props("flat dense hide-bottom")
             self.table.props(":pagination='{rowsPerPage: 0}'").classes("w-full")
@@ -135,8 +134,8 @@ class JobView:
         if fit is None or number >= len(fit.loops) or (id(fit), number) == self.drawn:
             return
         self.drawn = (id(fit), number)
-        self.loop.update_figure(mirror_view.loop_plot(fit, number, self.drive_unit))
-        self.residual.update_figure(mirror_view.residual_plot(fit, number))
+        self.loop.show(mirror_view.loop_plot(fit, number, self.drive_unit))
+        self.residual.show(mirror_view.residual_plot(fit, number))
 
     def _end(self, job: Job) -> None:
         """What has come of it: verdict, warnings, the files, and the way into the mission."""
@@ -150,7 +149,8 @@ class JobView:
                 ui.button("Use this mirror in the mission", on_click=lambda: self.use(mirror)).props("no-caps")
                 ui.link("Open the report", f"/results/{job.number}/1", new_tab=True)
                 ui.link(f"Mirror file {mirror.name}", f"/results/{job.number}/0", new_tab=True)
-            _numbers(found)
+            with ui.element("dl").classes("numbers"):
+                numbers(found.numbers)
             for sentence in found.verdict:
                 ui.label(sentence)
             for warning in found.warnings:
@@ -162,11 +162,3 @@ class JobView:
         """Put the mirror into the mission that is being edited."""
         if layout.attempt(lambda: self.session.edit(lambda draft: with_mirror_file(draft, mirror))):
             ui.notify(f"[mirror] of the mission names {mirror.name} now; save the mission to keep it.", type="positive")
-
-
-def _numbers(found: mirror_view.Outcome) -> None:
-    with ui.element("dl").classes("numbers"):
-        for name, value in found.numbers:
-            with ui.element("div"):
-                layout.words("dt", name)
-                layout.words("dd", value)

@@ -55,7 +55,7 @@ class _Page:
         self.session = session
         with ui.row().classes("mission-tools"):
             file_buttons(session, self._other)
-            layout.copy_buttons(lambda: commands.Budget(Path(session.name_of(session.draft.path))))
+            layout.copy_buttons(lambda: commands.budget(Path(session.name_of(session.draft.path))))
         with ui.element("div").classes("mission-columns"):
             with ui.element("nav").classes("mission-tables").props('aria-label="Tables"'):
                 self.search = ui.input("Find a key", on_change=self._search).props(

@@ -7,14 +7,12 @@ from collections.abc import Mapping
 from nicegui import background_tasks, ui
 
 from microrad.mission.file import LinkFile
-from microrad.studio.commands import Budget
+from microrad.studio import commands
 from microrad.studio.draft.draft import Draft
 from microrad.studio.pages import layout
+from microrad.studio.pages.elements import Column, Figure, table
 from microrad.studio.pages.in_thread import in_thread
-from microrad.studio.pages.live import LivePlot
-from microrad.studio.pages.pieces import Column, file_of, table
 from microrad.studio.pages.slider_page import SliderPage
-from microrad.studio.pages.sliders import add_style
 from microrad.studio.session import Session
 from microrad.studio.views import pointing as pointing_view
 from microrad.studio.views.pointing import PointingView
@@ -43,7 +41,6 @@ _AHEAD = (Column("what", "Point-ahead"), Column("value", "Value", number=True))
 
 def page(session: Session) -> None:
     """Sliders at the left; plots and tables at the right."""
-    add_style()
     PointingPage(session)
 
 
@@ -52,17 +49,16 @@ class PointingPage(SliderPage[PointingView]):
 
     def __init__(self, session: Session) -> None:
         """Build the body, and have it follow the session."""
-        layout.copy_buttons(lambda: Budget(file_of(session)))
+        layout.copy_buttons(lambda: commands.budget(layout.file_of(session)))
         super().__init__(session)
 
     def build(self) -> None:
         """Coverage, lines and totals, point-ahead."""
         layout.heading("What the beacon covers")
         self.words = ui.label().props('role="status"')
-        self.coverage = LivePlot("Probability that the pointing error is below an angle; totals in the table below")
-        self.coverage.style("height: 24rem")
+        self.coverage = Figure("Probability that the pointing error is below an angle; totals in the table below")
         layout.heading("Lines and totals")
-        self.bars = LivePlot("Half widths of the lines and totals of the rules; in numbers in the tables below")
+        self.bars = Figure("Half widths of the lines and totals of the rules; in numbers in the tables below")
         self.lines = table(_LINES)
         ui.label(
             "Left for it: the largest half width, all others as they are, with which the total equals the beacon's "

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
 from nicegui import ui
 
 from microrad.studio import commands
+from microrad.studio.commands import Action
 from microrad.studio.guard.names import NameRefusedError, safe_name, typed_words
-from microrad.studio.pages import layout, pieces
+from microrad.studio.pages import layout
 from microrad.studio.pages.in_thread import in_thread
 from microrad.studio.pages.runs_jobs import JobList, submit
 from microrad.studio.session import Session
@@ -67,25 +67,24 @@ class _Study:
         if self.folder.value == before:
             self.folder.value = name
 
-    def _copied(self) -> commands.Run | None:
-        action = self._action()
-        return None if action is None else replace(action, file=pieces.file_of(self.session))
+    def _copied(self) -> Action | None:
+        layout.file_of(self.session)
+        return self._action()
 
-    def _action(self) -> commands.Run | None:
+    def _action(self) -> Action | None:
         try:
             name = safe_name(self.folder.value or "")
         except NameRefusedError as error:
             self.fault.text = typed_words(error)
             return None
         self.fault.text = self._faults()
-        return commands.Run(Path(self.session.name_of(self.session.draft.path)), Path(name))
+        return commands.study(Path(self.session.name_of(self.session.draft.path)), Path(name))
 
     async def _run(self) -> None:
         action = self._action()
         if action is None or self._faults() or (self.session.draft.changed and not layout.save_draft(self.session)):
             return
-        make = partial(order, self.session, "study", f"Study of {action.file}", action)
-        if await submit(self.folder, self.session, make):
+        if await submit(self.folder, self.session, partial(order, self.session, "study", action)):
             await self._name()
 
 
@@ -129,7 +128,7 @@ class _Campaign:
         elif stem:
             self.ledger.value = await in_thread(self.file, free_name, self.session, stem, ".ledger")
 
-    def _action(self) -> commands.CampaignRun | commands.CampaignResume | None:
+    def _action(self) -> Action | None:
         chosen = self.file.value or ""
         try:
             ledger = safe_name(self.ledger.value or "")
@@ -141,17 +140,15 @@ class _Campaign:
             self.fault.text = "There is no campaign file in this folder yet; write an example, and change it."
             return None
         if chosen.endswith(" (go on)"):
-            return commands.CampaignResume(Path(ledger))
-        return commands.CampaignRun(Path(chosen), Path(ledger))
+            return commands.resume(Path(ledger))
+        return commands.campaign(Path(chosen), Path(ledger))
 
     async def _run(self) -> None:
         self.fault.text = ""
         action = self._action()
         if action is None:
             return
-        what = action.file if isinstance(action, commands.CampaignRun) else f"{action.ledger}, going on"
-        make = partial(order, self.session, "campaign", f"Campaign {what}", action)
-        if await submit(self.file, self.session, make):
+        if await submit(self.file, self.session, partial(order, self.session, "campaign", action)):
             await self._name()
 
     async def _example(self) -> None:

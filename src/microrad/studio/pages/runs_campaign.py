@@ -9,6 +9,7 @@ from nicegui.elements.mixins.text_element import TextElement
 
 from microrad.studio.jobs.ledgers import Live
 from microrad.studio.pages import layout
+from microrad.studio.pages.elements import Figure
 from microrad.studio.pages.in_thread import in_thread
 from microrad.studio.session import Session
 from microrad.studio.views.campaign import Figures, Table, figures
@@ -35,7 +36,7 @@ class CampaignPanel:
                 self._left = ui.element("div").classes("runs-tables")
                 with ui.element("div").classes("runs-plot") as self._right:
                     self._chosen = ui.select({}, label="Shown", on_change=self._draw).props("dense outlined")
-                    self._plot = ui.plotly({"data": [], "layout": {}}).props('role="figure"')
+                    self._plot = Figure("Distribution over the rows")
             self._below = ui.element("div").classes("runs-tables")
             self._notes = ui.label().classes("small kept soft")
             self._fault = ui.label().classes("no kept")
@@ -99,7 +100,7 @@ class CampaignPanel:
         plot = None if self._found is None else self._found.plots.get(self._chosen.value or "")
         if plot is not None:
             self._plot.props["aria-label"] = f"Distribution over the rows: {self._chosen.value}"
-            self._plot.update_figure(plot)
+            self._plot.show(plot)
 
 
 def _form(table: Table) -> tuple[str, tuple[str, ...], int]:

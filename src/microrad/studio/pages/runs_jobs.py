@@ -95,7 +95,7 @@ class _Card:
             if job.kind not in ("campaign", "identification"):  # figures and the page of the mirror say the same
                 self.details.props("open")
             if job.arguments:
-                layout.words("code", commands.command(_Done(job))).classes("mono runs-command")
+                layout.words("code", commands.Action(job.arguments).command).classes("mono runs-command")
 
     async def show(self, job: Job, beside: Others) -> None:
         """Show the job as it is now, beside the others."""
@@ -187,22 +187,14 @@ class _Card:
         job = self._last
         ledger = None if job is None else ledger_of(job)
         if ledger is not None:
-            action = commands.CampaignResume(Path(ledger))
-            title = f"Campaign {ledger}, going on"
-            await submit(self.element, self.session, partial(order, self.session, "campaign", title, action))
+            action = commands.resume(Path(ledger))
+            await submit(self.element, self.session, partial(order, self.session, "campaign", action))
 
     async def _write_page(self) -> None:
         job = self._last
         ledger = None if job is None else ledger_of(job)
         if ledger is not None:
             await submit(self.element, self.session, partial(report_order, self.session, Path(ledger)))
-
-
-class _Done:
-    """A job as an action, for its command."""
-
-    def __init__(self, job: Job) -> None:
-        self.arguments, self.results, self.python = job.arguments, job.results, ""
 
 
 def _class(job: Job) -> str:

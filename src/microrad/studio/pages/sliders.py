@@ -10,32 +10,6 @@ from nicegui.element import Element
 
 from microrad.studio.views.sliders import Slider
 
-CSS = """
-.sliders { width: 100%; gap: 0; flex-wrap: nowrap; }
-.slider { position: relative; display: grid; grid-template-columns: 9.5rem minmax(0, 1fr); column-gap: .9rem;
-        align-items: end; width: 100%; padding-right: .6rem; min-height: 3.1rem; }
-.slider-fault { position: absolute; top: 100%; left: 0; right: 0; z-index: 3; background: #fff4ee; color: #7a2c00;
-              border: 1px solid #a63c00; border-radius: 3px; padding: .2rem .45rem; font-size: .82rem;
-              line-height: 1.3; }
-.slider .q-field__label { font-size: .85rem; color: var(--soft); }
-.beside { display: grid; grid-template-columns: minmax(17.5rem, 23rem) minmax(0, 1fr); column-gap: 1.5rem;
-          align-items: start; width: 100%; }
-.beside > * { min-width: 0; width: 100%; }
-.slider-column { position: sticky; top: 6.2rem; max-height: calc(100vh - 7rem); overflow-y: auto;
-               padding-bottom: 3.5rem; }
-@media (max-width: 1000px) { .beside { grid-template-columns: 17.5rem minmax(0, 1fr); } }
-.faults { background: #fff4ee; border-left: 4px solid #a63c00; padding: .4rem .7rem; width: 100%; color: #7a2c00; }
-.wide-table { width: 100%; } .wide-table td { white-space: normal !important; vertical-align: top; }
-.wide-table td.text-no-wrap { white-space: nowrap !important; } .wide-table tr.total td { font-weight: 600; }
-.wide-table th { font-weight: 600; white-space: normal !important; vertical-align: bottom; }
-"""
-
-
-def add_style(more: str = "") -> None:
-    """Add the style of sliders, and some more, to the page; `ui.add_css` would add a script, which the guard stops."""
-    ui.add_head_html(f"<style>{CSS}{more}</style>")
-
-
 Told = Callable[[str, str], Any]
 
 

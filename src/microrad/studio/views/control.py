@@ -3,22 +3,23 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 
 from microrad.core.arrays import Floats
 from microrad.core.units import UnitError, format_quantity, parse_quantity
-from microrad.lab.live_fit import extremes
+from microrad.report.plotting.sheet import BLACK, BLUE, GREEN, GREY, VERMILION, Axis, Line, Mark, Rule
 from microrad.studio.views.controllers import PID, PID_INVERSE, WITH, WITHOUT, Answers, Ask, Controller, Curve
-from microrad.studio.views.plots import BLACK, BLUE, GREEN, GREY, VERMILION, Plot, decades, empty, marker_line, plot
+from microrad.studio.views.plots import Plot, empty, plot
 
 SHOWN = {"both": (WITH, WITHOUT), "with": (WITH,), "without": (WITHOUT,)}
 """What the switch of the hysteresis shows."""
 
-_STYLES = {WITH: (VERMILION, "solid"), WITHOUT: (BLUE, "dash")}
-_POINTS = 1200
+_STYLES = {WITH: (VERMILION, "-"), WITHOUT: (BLUE, "--")}
+MILLISECONDS, SECONDS = "time (ms)", "time (s)"
+_NOTHING = "Nothing disturbs this loop, or nothing was asked."
 _LEAST = 1e-4  # of what is drawn on a logarithmic axis
 
 
@@ -143,124 +144,84 @@ def sensitivity_plot(of: Controller) -> Plot:
     """|S|: what the loop leaves of a disturbance at each frequency, below the inverse of the margin asked for."""
     if of.sensitivity is None:
         return empty("No response by frequency.")
-    traces = [_line(of.freq_hz, of.sensitivity, "|S|", VERMILION)]
+    marks: list[Mark] = [Line(of.freq_hz, of.sensitivity, VERMILION, label="|S|")]
     if math.isfinite(of.asked_modulus):
-        ends = of.freq_hz[[0, -1]]
-        ceiling = np.full(2, 1.0 / of.asked_modulus)
-        traces.append(_line(ends, ceiling, f"1 / modulus margin asked for ({of.asked_modulus:g})", BLACK, "dash"))
-    return _by_frequency(of, traces, "|S|, error over disturbance", "bandwidth")
+        name = f"1 / modulus margin asked for ({of.asked_modulus:g})"
+        marks.append(Rule(1.0 / of.asked_modulus, False, BLACK, "--", 1.3, name))
+    return _by_frequency(of, of.sensitivity, "|S|, error over disturbance", "bandwidth", marks)
 
 
 def gain_plot(of: Controller) -> Plot:
     """|L|: the loop gain."""
     if of.loop_gain is None:
         return empty("No response by frequency.")
-    return _by_frequency(of, [_line(of.freq_hz, of.loop_gain, "|L|", BLUE)], "|L|, loop gain", "crossover")
+    line = Line(of.freq_hz, of.loop_gain, BLUE, label="|L|")
+    return _by_frequency(of, of.loop_gain, "|L|, loop gain", "crossover", [line])
 
 
-def _by_frequency(of: Controller, traces: list[dict[str, Any]], title: str, mark: str) -> Plot:
-    values = np.concatenate([np.asarray(each["y"], dtype=float) for each in traces])
-    low, high = max(float(np.min(values)), _LEAST), float(np.max(values))
-    at = of.margins[mark]
-    traces.append(_line(of.freq_hz[[0, -1]], np.ones(2), "1", GREY, "dot"))
+def _by_frequency(of: Controller, values: Floats, title: str, mark: str, marks: Sequence[Mark]) -> Plot:
+    """Curves over the frequency, both axes logarithmic, with the frequency of a margin."""
+    low, high, at = max(float(np.min(values)), _LEAST), float(np.max(values)), of.margins[mark]
+    shown: list[Mark] = [*marks, Rule(1.0, False, GREY, ":")]
     if math.isfinite(at) and at > 0.0:
-        traces.append(marker_line(at, f"{mark} {_told(at, 'Hz')}", GREEN, "dashdot", (low, high)))
-    places, words = decades(float(of.freq_hz[0]), float(of.freq_hz[-1]), "Hz")
-    tens = {10.0**p: word for p, word in zip(places, words, strict=True) if abs(p - round(p)) < 1e-9}
-    ticks = {"tickmode": "array", "tickvals": [*tens], "ticktext": [*tens.values()], "tickangle": 0}
-    x = {"title": "frequency", "type": "log", **ticks}
-    y = {
-        "title": title,
-        "type": "log",
-        "range": [math.log10(low), math.log10(high) + 0.1],
-        "dtick": 1,
-        "exponentformat": "power",
-    }
-    return plot(traces, x, y)
+        shown.append(Rule(at, True, GREEN, "-.", 1.3, f"{mark} {_told(at, 'Hz')}"))
+    x = Axis("frequency (Hz)", log=True, low=of.freq_hz[0], high=of.freq_hz[-1])
+    return plot(x, Axis(title, log=True, low=low, high=1.3 * high), *shown)
 
 
 # ---------------------------------------------------------------------------------------------------- plots over time
 def step_plot(answers: Answers) -> Plot:
     """The line of sight behind a step of the reference."""
-    if not answers.step:
-        return empty("Nothing was asked.")
-    first = next(iter(answers.step.values()))
-    traces = [_line(_ms(first), 1e6 * first.wanted_rad, "wanted", GREY, "dot")]
-    traces += [_styled(_ms(c), 1e6 * c.found_rad, v) for v, c in answers.step.items()]
-    return plot(traces, {"title": "time (ms)"}, _micro("line of sight, axis x"))
+    wanted = [Line(_ms(c), 1e6 * c.wanted_rad, GREY, ":", label="wanted") for c in [*answers.step.values()][:1]]
+    return _over_time(MILLISECONDS, "line of sight, axis x (µrad)", *wanted, *_lines(answers.step, _ms, _found))
 
 
 def sine_plot(answers: Answers) -> Plot:
     """The error of axis x while the loop follows a sine, settled; the time is that since it has settled."""
-    traces = [_styled(_ms(c), 1e6 * c.error_rad[:, 0], v) for v, c in answers.sine.items()]
-    return plot(traces, {"title": "time (ms)"}, _micro("error, axis x"))
+    return _over_time(MILLISECONDS, "error, axis x (µrad)", *_lines(answers.sine, _ms, _error))
 
 
 def jitter_plot(answers: Answers) -> Plot:
     """The error of axis x under everything that disturbs the loop."""
-    if not answers.jitter:
-        return empty("Nothing disturbs this loop.")
-    traces = [_styled(_s(c), 1e6 * c.error_rad[:, 0], v, 0.8) for v, c in answers.jitter.items()]
-    return plot(traces, {"title": "time (s)"}, _micro("error, axis x"))
+    return _over_time(SECONDS, "error, axis x (µrad)", *_lines(answers.jitter, _s, _error, 0.7))
 
 
 def motion_plot(answers: Answers) -> Plot:
     """What the mirror has to follow on axis x, and what it does: the closed loop's trace."""
-    if not answers.jitter:
-        return empty("Nothing disturbs this loop.")
-    first = next(iter(answers.jitter.values()))
-    assert first.disturbance_rad is not None  # a loop that is shaken says by what
-    traces = [_line(_s(first), 1e6 * first.disturbance_rad[:, 0], "to be followed", GREY, width=4.0)]
-    traces += [_styled(_s(c), 1e6 * c.found_rad, v) for v, c in answers.jitter.items()]
-    return plot(traces, {"title": "time (s)"}, _micro("angle, axis x"))
+    shaken = [(_s(c), c.disturbance_rad) for c in answers.jitter.values() if c.disturbance_rad is not None]
+    followed = [Line(time_s, 1e6 * angle[:, 0], GREY, "-", 3.0, "to be followed") for time_s, angle in shaken[:1]]
+    return _over_time(SECONDS, "angle, axis x (µrad)", *followed, *_lines(answers.jitter, _s, _found))
 
 
-def drive_plot(of: Controller, curves: dict[str, Curve], over: str = "ms") -> Plot:
+def drive_plot(of: Controller, curves: dict[str, Curve], over: str = MILLISECONDS) -> Plot:
     """The drive of the first actuator from the bias, with the amplifier's limits and the identified range."""
     if not curves:
-        return empty("Nothing was asked.")
-    time = _ms if over == "ms" else _s
-    traces = [_styled(time(c), c.drive_v[:, 0], v) for v, c in curves.items()]
-    ends = time(next(iter(curves.values())))[[0, -1]]
+        return empty(_NOTHING)
+    lines = _lines(curves, _ms if over == MILLISECONDS else _s, lambda c: c.drive_v[:, 0])
+    sides = [("amplifier's limits", "--", BLACK, each) for each in of.limits_v]
     if of.identified_v != of.limits_v:
-        traces += _pair(ends, of.identified_v, "range of the identification", GREY, "dot")
-    traces += _pair(ends, of.limits_v, "amplifier's limits", BLACK, "dash")
-    return plot(traces, {"title": f"time ({over})"}, {"title": "drive from the bias (V)"})
+        sides = [("range of the identification", ":", GREY, each) for each in of.identified_v] + sides
+    limits = [Rule(at, False, colour, dash, 1.3, name) for name, dash, colour, at in sides if math.isfinite(at)]
+    return _over_time(over, "drive from the bias (V)", *lines, *limits)
 
 
-def _pair(ends: Floats, limits: tuple[float, float], name: str, colour: str, dash: str) -> list[dict[str, Any]]:
-    found = [each for each in limits if math.isfinite(each)]
-    lines = [_line(ends, np.full(2, each), name, colour, dash) for each in found]
-    for each in lines[1:]:
-        each["showlegend"] = False
-    return [{**each, "legendgroup": name} for each in lines]
+def _over_time(over: str, title: str, *marks: Mark) -> Plot:
+    return plot(Axis(over), Axis(title), *marks) if marks else empty(_NOTHING)
 
 
-def _micro(title: str) -> dict[str, Any]:
-    """An axis of angles; its ticks are numbers, and not "100k" of a unit that has a prefix already."""
-    return {"title": f"{title} (µrad)", "exponentformat": "none"}
+def _lines(
+    curves: dict[str, Curve], time: Callable[[Curve], Floats], value: Callable[[Curve], Floats], width: float = 1.3
+) -> list[Line]:
+    """A line for each variant of the mirror."""
+    return [Line(time(c), value(c), *_STYLES[variant], width, variant) for variant, c in curves.items()]
 
 
-def _styled(x: Floats, y: Floats, variant: str, width: float = 1.6) -> dict[str, Any]:
-    colour, dash = _STYLES[variant]
-    return _line(x, y, variant, colour, dash, width)
+def _found(curve: Curve) -> Floats:
+    return 1e6 * curve.found_rad
 
 
-def _line(x: Floats, y: Floats, name: str, colour: str, dash: str = "solid", width: float = 1.6) -> dict[str, Any]:
-    rows = extremes([y], _POINTS)
-    line = {"color": colour, "dash": dash, "width": width}
-    return {
-        "type": "scatter",
-        "mode": "lines",
-        "x": _short(x[rows]),
-        "y": _short(y[rows]),
-        "name": name,
-        "line": line,
-    }
-
-
-def _short(values: Sequence[float] | Floats) -> list[float]:
-    return [float(f"{value:.6g}") for value in values]
+def _error(curve: Curve) -> Floats:
+    return 1e6 * curve.error_rad[:, 0]
 
 
 def _ms(curve: Curve) -> Floats:
@@ -268,4 +229,4 @@ def _ms(curve: Curve) -> Floats:
 
 
 def _s(curve: Curve) -> Floats:
-    return np.asarray(curve.time_s)
+    return curve.time_s

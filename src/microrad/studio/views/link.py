@@ -11,16 +11,18 @@ import numpy as np
 
 from microrad import link
 from microrad.core.arrays import Floats
-from microrad.core.budget import Line
+from microrad.core.budget import Line as BudgetLine
 from microrad.core.units import format_quantity
 from microrad.link import study as link_study
+from microrad.link.pointing.outage import error_rad, required_error_rad
 from microrad.link.study import LinkStudy
-from microrad.link.under_jitter import error_rad, required_error_rad
 from microrad.mission.file import LinkFile
+from microrad.report import link_figures
 from microrad.report.budget_views import jitter_lines, sentences
+from microrad.report.plotting.sheet import VERMILION, WHITE, Axis, Field, Line
 from microrad.report.quantities import quantity, signed
 from microrad.studio.draft.draft import Draft
-from microrad.studio.views import plots
+from microrad.studio.views.plots import Plot, empty, figure, plot
 from microrad.studio.views.sliders import Slider, slider
 
 Row = dict[str, Any]
@@ -41,6 +43,7 @@ ROUNDING_DB = 1e-9
 """By which a margin may miss what is needed: a rate that was solved for that margin does."""
 LEVELS_DB = (-12.0, 18.0)
 """Between which margins the map's colours change."""
+_TICKS_DB = range(-12, 19, 6)
 
 _SECOND = ("_loss", "wavelength", "strehl", "wavefront_error", "obscuration", "outage")
 
@@ -167,72 +170,36 @@ def second(key: str) -> bool:
 
 
 # ------------------------------------------------------------------------------------------------------------ showing
-def map_plot(v: LinkView) -> plots.Plot:
-    """The margin map with its contours and the working point; data rate on a logarithmic axis, as log10 of bit/s."""
-    frame = v.frame
-    urad, lg_rate = frame.pointing_error_rad * 1e6, np.log10(frame.data_rate_bit_s)
-    ticks, words = plots.decades(frame.data_rate_bit_s[0], frame.data_rate_bit_s[-1], "bit/s")
-    return plots.plot(
-        [_filled(v, lg_rate, urad), *_contours(v, urad), _point(v.data)],
-        {
-            "title": "data rate",
-            "tickvals": ticks,
-            "ticktext": words,
-            "range": [float(lg_rate[0]), float(lg_rate[-1])],
-            "showgrid": False,
-            "automargin": False,  # measuring the margins anew takes as long as drawing
-        },
-        {
-            "title": "pointing error (µrad)",
-            "range": [0.0, float(urad[-1])],
-            "showgrid": False,
-            "automargin": False,
-        },
-        uirevision="map",
-        showlegend=False,
-        margin={"l": 60, "r": 20, "t": 12, "b": 75},
+def map_plot(v: LinkView) -> Plot:
+    """The margin map with its contours and the working point, over data rate and pointing error."""
+    rate_mbit, urad = v.frame.data_rate_bit_s * 1e-6, v.frame.pointing_error_rad * 1e6
+    margin_db: Floats = np.round(np.clip(v.margin_db.T, -999.0, 999.0), 2).astype(np.float64)
+    here = np.array([v.data.table.data_rate_bit_s * 1e-6]), np.array([error_rad(v.data) * 1e6])
+    made = plot(
+        Axis("data rate (Mbit/s)", log=True, low=rate_mbit[0], high=rate_mbit[-1], grid=False),
+        Axis("pointing error (µrad)", low=0.0, high=urad[-1], grid=False),
+        Field(
+            rate_mbit,
+            urad,
+            margin_db,
+            *LEVELS_DB,
+            "margin (dB)",
+            ticks=_TICKS_DB,
+        ),
+        *(_contour(level, rates * 1e-6, urad, v.data.requirement.margin_db) for level, rates in v.contours.items()),
+        Line(*here, VERMILION, "", name="working point", marker="o", size=10.0, edge=WHITE, edge_width=1.5),
+        height=4.5,
     )
+    made["data"][0]["zsmooth"] = "best"
+    made["layout"]["uirevision"] = "map"  # what is zoomed into stays while a slider moves
+    made["layout"]["yaxis"]["automargin"] = False  # measuring the margins anew takes as long as drawing
+    return made
 
 
-def _filled(v: LinkView, lg_rate: Floats, urad: Floats) -> plots.Trace:
-    return {
-        "type": "heatmap",
-        "zsmooth": "fast",
-        "x": np.round(lg_rate, 5).tolist(),
-        "y": np.round(urad, 5).tolist(),
-        "z": np.round(np.clip(v.margin_db.T, -999.0, 999.0), 2).tolist(),
-        "zmin": LEVELS_DB[0],
-        "zmax": LEVELS_DB[1],
-        "colorscale": "Cividis",
-        "colorbar": {
-            "title": {"text": "margin<br>(dB)", "side": "top"},
-            "thickness": 14,
-            "outlinewidth": 0,
-            "dtick": 3,
-        },
-        "hovertemplate": "10^%{x:.2f} bit/s, %{y:.2f} µrad: %{z:.2f} dB<extra></extra>",
-    }
-
-
-def _contours(v: LinkView, urad: Floats) -> list[plots.Trace]:
-    """The contours of no margin and of the required margin; nothing is drawn where the frame has none."""
-    required = v.data.requirement.margin_db
-    return [
-        {
-            "type": "scatter",
-            "mode": "lines",
-            "x": _listed(np.log10(rates)),
-            "y": np.round(urad, 5).tolist(),
-            "name": f"{level:g} dB",
-            "line": {"color": "white", "width": 3 if level == required else 2, "dash": _dash(level, required)},
-            "hoverinfo": "skip",
-        }
-        for level, rates in v.contours.items()
-    ]
-
-
-def _dash(level_db: float, required_db: float) -> str:
-    return "solid" if level_db == required_db else "dash"
+def _contour(level_db: float, rate_mbit: Floats, urad: Floats, required_db: float) -> Line:
+    """A contour, nan where the frame has none; that of the required margin is solid."""
+    dash, width = ("-", 2.2) if level_db == required_db else ("--", 1.5)
+    return Line(rate_mbit, urad, WHITE, dash, width, name=f"{level_db:g} dB")
 
 
 def map_key(required: float) -> str:
@@ -241,26 +208,7 @@ def map_key(required: float) -> str:
     return f"Solid line: the required {required:g} dB.{none} Dot: the working point."
 
 
-def _point(data: link.DataLink) -> plots.Trace:
-    rate, error = data.table.data_rate_bit_s, error_rad(data)
-    said = f"{format_quantity(rate, 'bit/s')} at {format_quantity(error, 'rad')}"
-    return {
-        "type": "scatter",
-        "mode": "markers",
-        "x": [math.log10(rate)],
-        "y": [error * 1e6],
-        "name": "working point",
-        "marker": {"color": plots.VERMILION, "size": 13, "line": {"color": "white", "width": 2}},
-        "hovertemplate": f"{said}<extra>working point</extra>",
-    }
-
-
-def _listed(values: Floats) -> list[float | None]:
-    """Numbers as JSON has them: what is none becomes null."""
-    return [round(float(value), 6) if math.isfinite(value) else None for value in values]
-
-
-def budget_rows(lines: Sequence[Line], totals: int = 0) -> list[Row]:
+def budget_rows(lines: Sequence[BudgetLine], totals: int = 0) -> list[Row]:
     """Lines of a budget as rows of text; the last `totals` are sums."""
     return [
         {
@@ -323,36 +271,7 @@ def consequences(study: LinkStudy) -> list[str]:
     return [*sentences(study), *(f"Warning: {warning}" for warning in study.warnings)]
 
 
-def tornado_plot(study: LinkStudy, most: int = 12) -> plots.Plot:
+def tornado_plot(study: LinkStudy) -> Plot:
     """What moves the margin of the communication link: one input at a time, the weightiest on top."""
-    shown, margin = study.tornados[0].swings[:most], study.communication.margin_db
-    if not shown:
-        return plots.empty("no input moves the margin")
-    names = [plots.plain(f"{s.key} = {format_quantity(s.value, s.unit, 3)}".rstrip(), 60) for s in shown]
-    bars = [
-        _bars("input lower", plots.ORANGE, names, [s.margin_low_db for s in shown], margin),
-        _bars("input higher", plots.BLUE, names, [s.margin_high_db for s in shown], margin),
-    ]
-    return plots.plot(
-        bars,
-        {"title": "margin of the communication link (dB)"},
-        {"title": "", "autorange": "reversed", "tickfont": {"size": 11}},
-        barmode="overlay",
-        height=120 + 26 * len(shown),
-    )
-
-
-def _bars(name: str, color: str, names: list[str], ends_db: list[float], margin_db: float) -> plots.Trace:
-    """Bars from the margin to what it becomes; none where the link is lost."""
-    there = [end if math.isfinite(end) else None for end in ends_db]
-    return {
-        "type": "bar",
-        "orientation": "h",
-        "name": name,
-        "y": names,
-        "base": margin_db,
-        "x": [None if end is None else end - margin_db for end in there],
-        "customdata": [None if end is None else round(end, 3) for end in there],
-        "marker": {"color": color},
-        "hovertemplate": "%{customdata} dB<extra>" + name + "</extra>",
-    }
+    of = study.tornados[0]
+    return figure(link_figures.tornado(study, of).sheet) if of.swings else empty("no input moves the margin")

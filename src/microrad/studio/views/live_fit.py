@@ -5,7 +5,7 @@ from __future__ import annotations
 from contextlib import suppress
 from pathlib import Path
 
-from microrad.lab.live_fit import FITS, LiveFit
+from microrad.lab.live_fit import LIVE_FITS, LiveFit
 from microrad.studio.guard import plain_files
 
 _MOST_BYTES = 20_000_000
@@ -16,7 +16,7 @@ def read_fits(folder: Path) -> tuple[LiveFit, ...]:
     from pydantic import TypeAdapter
 
     try:
-        with plain_files.opened(folder / FITS) as file:
+        with plain_files.opened(folder / LIVE_FITS) as file:
             lines = file.read(_MOST_BYTES).splitlines()
     except OSError:
         return ()

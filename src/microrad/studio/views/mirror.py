@@ -7,86 +7,58 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
+import numpy as np
+
 from microrad.core.units import format_quantity
-from microrad.lab.live_fit import LiveFit, Loop
+from microrad.lab.live_fit import LiveFit
+from microrad.report.plotting.sheet import BLACK, BLUE, GREY, SKY, VERMILION, Axis, Line, Span, grid
 from microrad.studio.jobs.queue import Job
 from microrad.studio.recordings.reading import View
 from microrad.studio.views.live_fit import leader
 from microrad.studio.views.mirror_form import Setting, written
-from microrad.studio.views.plots import BLACK, BLUE, GREY, SKY, VERMILION, Plot, axis, empty, plain, plot
+from microrad.studio.views.plots import WIDTH, Plot, empty, figure, plot
 
 
 # ----------------------------------------------------------------------------------------------------------- the plots
 def recording_plot(view: View, setting: Setting) -> Plot:
     """The measured loop: output over drive, each sample that is shown a point."""
-    drive, output = view.drive[0], view.output[0]
-    points = _trace(drive, output, "measured", BLUE, mode="markers", marker={"size": 3, "color": BLUE})
-    return plot([points], {"title": _drive_title(setting)}, {"title": _output_title(setting)})
+    points = Line(np.array(view.drive[0]), np.array(view.output[0]), BLUE, "", marker=".", size=5.0, label="measured")
+    return plot(Axis(_drive_title(setting)), Axis(_output_title(setting)), points)
 
 
 def time_plot(view: View, setting: Setting) -> Plot:
     """Drive and output over time, one above the other."""
-    time = [row / view.rate_hz for row in view.rows]
-    drive = _trace(time, view.drive[0], "drive", BLACK)
-    output = {**_trace(time, view.output[0], "output", BLUE), "yaxis": "y2"}
-    titles = _drive_title(setting), _output_title(setting)
-    return plot(
-        [drive, output],
-        {"title": "time (s)", "anchor": "y2"},
-        {"title": titles[0], "domain": [0.55, 1.0]},
-        yaxis2=axis(titles[1], domain=[0.0, 0.45]),
-        showlegend=False,
-    )
+    sheet, (above, below) = grid(WIDTH, 3.6, 2, share_x=True)
+    time_s = np.array(view.rows) / view.rate_hz
+    above.add(Line(time_s, np.array(view.drive[0]), BLACK, name="drive", whole=True))
+    below.add(Line(time_s, np.array(view.output[0]), BLUE, name="output", whole=True))
+    above.y.title, below.y.title, below.x.title = _drive_title(setting), _output_title(setting), "time (s)"
+    return figure(sheet)
 
 
 def _drive_title(setting: Setting) -> str:
-    return f"drive ({plain(setting.drive_unit)})"
+    return f"drive ({setting.drive_unit})"
 
 
 def _output_title(setting: Setting) -> str:
-    return f"output ({plain(written(setting.output_unit))})"
+    return f"output ({written(setting.output_unit)})"
 
 
 def loop_plot(fit: LiveFit, number: int, drive_unit: str) -> Plot:
     """The last periods of a recording: what was measured, and what the model makes of the same drive."""
     loop = fit.loops[number]
-    measured = _trace(loop.drive, _micro(loop.measured_rad), "measured", GREY, width=4.0)
-    model = _trace(loop.drive, _micro(loop.model_rad), plain(fit.model), VERMILION, dash="dash")
-    return plot(
-        [measured, model],
-        {"title": f"drive ({plain(drive_unit)})"},
-        {"title": "angle (µrad)", "exponentformat": "none"},
-    )
+    drive = np.array(loop.drive)
+    measured = Line(drive, 1e6 * np.array(loop.measured_rad), GREY, "-", 3.0, "measured")
+    model = Line(drive, 1e6 * np.array(loop.model_rad), VERMILION, "--", label=fit.model)
+    return plot(Axis(f"drive ({drive_unit})"), Axis("angle (µrad)"), measured, model)
 
 
 def residual_plot(fit: LiveFit, number: int) -> Plot:
     """What the model leaves of a recording over time, with the part that no fit has seen shaded."""
     loop = fit.loops[number]
-    residual = _trace(loop.time_s, _micro(loop.residual_rad), "measured less model", BLUE)
-    shown = plot(
-        [residual], {"title": "time (s)"}, {"title": "residual (µrad)", "exponentformat": "none"}, showlegend=False
-    )
-    shown["layout"] |= {"shapes": [_unseen(loop)], "annotations": [_told_unseen(loop)]}
-    return shown
-
-
-def _unseen(loop: Loop) -> dict[str, Any]:
-    span = {"type": "rect", "xref": "x", "yref": "paper", "y0": 0.0, "y1": 1.0, "layer": "below"}
-    return {**span, "x0": loop.split_s, "x1": loop.time_s[-1], "fillcolor": SKY, "opacity": 0.2, "line": {"width": 0}}
-
-
-def _told_unseen(loop: Loop) -> dict[str, Any]:
-    place = {"xref": "x", "yref": "paper", "x": loop.time_s[-1], "y": 1.0, "xanchor": "right", "yanchor": "bottom"}
-    return {**place, "text": "shaded: seen by no fit", "showarrow": False}
-
-
-def _trace(x: Sequence[float], y: Sequence[float], name: str, colour: str, **more: Any) -> dict[str, Any]:
-    line = {"color": colour, "width": more.pop("width", 1.6), "dash": more.pop("dash", "solid")}
-    return {"type": "scatter", "mode": "lines", "x": [*x], "y": [*y], "name": name, "line": line, **more}
-
-
-def _micro(values: Sequence[float]) -> list[float]:
-    return [float(f"{1e6 * value:.6g}") for value in values]
+    residual = Line(np.array(loop.time_s), 1e6 * np.array(loop.residual_rad), BLUE, label="measured less model")
+    unseen = Span(loop.split_s, loop.time_s[-1], True, SKY, 0.2, "seen by no fit")
+    return plot(Axis("time (s)"), Axis("residual (µrad)"), unseen, residual)
 
 
 def nothing() -> Plot:

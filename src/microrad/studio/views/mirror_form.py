@@ -13,7 +13,7 @@ from pathlib import Path
 from microrad.core.folder import write_whole
 from microrad.core.units import UnitError, parse_quantity
 from microrad.lab.recording import ACCEPTABLE, stated_units
-from microrad.studio.commands import Identify
+from microrad.studio.commands import Action, identify
 from microrad.studio.guard import plain_files
 from microrad.studio.guard.names import NameRefusedError, safe_name, typed_words
 from microrad.studio.jobs.queue import Order
@@ -290,7 +290,7 @@ def written(unit: str) -> str:
     return _WRITTEN.get(unit, unit)
 
 
-def identification(folder: Path, recordings: Sequence[Dropped], setting: Setting) -> Identify:
+def identification(folder: Path, recordings: Sequence[Dropped], setting: Setting) -> Action:
     """The identification that the form asks for, seen from the working folder.
 
     Raises `SettingError` for what is missing in it, for units that a recording denies, and for a mirror file that is
@@ -303,13 +303,12 @@ def identification(folder: Path, recordings: Sequence[Dropped], setting: Setting
     fitted = tuple(each.path.relative_to(folder) for each in recordings if each.use == "fit")
     if not fitted:
         raise SettingError("recordings: none is to be fitted; drop one, or set its use to fit")
-    return Identify(
-        files=fitted,
-        input=str(chosen.inputs[0]),
-        output=str(chosen.outputs[0]),
-        mirror_file=_new_file(folder, setting.name),
-        input_unit=setting.drive_unit,
-        output_unit=setting.output_unit,
+    return identify(
+        fitted,
+        str(chosen.inputs[0]),
+        str(chosen.outputs[0]),
+        _new_file(folder, setting.name),
+        units=(setting.drive_unit, setting.output_unit),
         rate_hz=chosen.rate_hz,
         accept=setting.accept,
         validate=tuple(each.path.relative_to(folder) for each in recordings if each.use == "check"),
@@ -348,6 +347,6 @@ def _new_file(folder: Path, name: str) -> Path:
     return path
 
 
-def order(folder: Path, action: Identify) -> Order:
+def order(folder: Path, action: Action) -> Order:
     """The job of an identification."""
-    return Order("identification", f"identify {action.name}", (*action.arguments, "--json"), folder, action.results)
+    return Order("identification", action.title, (*action.arguments, "--json"), folder, action.results)

@@ -1,20 +1,16 @@
-"""Plots of the studio as plain data for plotly: one look, axes with units, colours told apart by the colour-blind."""
+"""Sheets of the report as figures for a page, which plotly draws as wide as their place is."""
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
-from microrad.core.units import format_quantity
+from microrad.report.plotting.interactive import plot_of, words
+from microrad.report.plotting.sheet import Axis, Legend, Mark, Sheet, grid
 
 Plot = dict[str, Any]
-Trace = dict[str, Any]
 
-# Okabe and Ito's palette, as in the report.
-BLACK, ORANGE, SKY, GREEN, BLUE, VERMILION = "#000000", "#E69F00", "#56B4E9", "#009E73", "#0072B2", "#D55E00"
-GREY, GRID = "#777777", "#dddddd"
-DASHES = ("solid", "dash", "dashdot", "dot")
-_MOST_TICKS = 8
+WIDTH = 6.4
+"""Of a sheet, in inches; in its place on a page it is stretched."""
 
 CONFIG: dict[str, Any] = {
     "displaylogo": False,
@@ -23,65 +19,55 @@ CONFIG: dict[str, Any] = {
 }
 """Plotly's own controls: no logo, nothing that sends a plot anywhere."""
 
-
-def plot(data: list[Trace], x: dict[str, Any], y: dict[str, Any], **layout: Any) -> Plot:
-    """Traces on one pair of axes, whose titles carry their units."""
-    common: dict[str, Any] = {
-        "margin": {"l": 70, "r": 20, "t": 30, "b": 55},
-        "font": {"family": "sans-serif", "size": 13, "color": BLACK},
-        "paper_bgcolor": "white",
-        "plot_bgcolor": "white",
-        "hovermode": "closest",
-        "legend": {"orientation": "h", "y": 1.02, "yanchor": "bottom", "x": 0.0},
-        "xaxis": axis(**x),
-        "yaxis": axis(**y),
-    }
-    return {"data": data, "layout": {**common, **layout}, "config": CONFIG}
+_KEYS_PX = 30  # for a line of the legend
+_LEGEND = {"orientation": "h", "y": 1.02, "yanchor": "bottom", "x": 0.0, "font": {"size": 12}}
+_WHITE = {"paper_bgcolor": "white", "plot_bgcolor": "white"}
 
 
-def axis(title: str, **more: Any) -> dict[str, Any]:
-    """An axis with its title."""
-    return {"title": {"text": title}, "gridcolor": GRID, "zeroline": False, "automargin": True, **more}
+def plot(x: Axis, y: Axis, *marks: Mark, height: float = 3.6) -> Plot:
+    """Marks on one pair of axes as a figure; `height` is that of the sheet in inches."""
+    sheet, (panel,) = grid(WIDTH, height)
+    panel.x, panel.y, sheet.legend = x, y, Legend("above")
+    panel.add(*marks)
+    return figure(sheet)
 
 
-def empty(words: str) -> Plot:
-    """A plot that says why there is nothing to see."""
-    hidden = {"title": "", "visible": False}
-    note = {"text": plain(words), "xref": "paper", "yref": "paper", "x": 0.5, "y": 0.5, "showarrow": False}
-    return plot([], hidden, hidden, annotations=[note])
+def rows(names: list[str]) -> Axis:
+    """An axis with a name at each row, the first on top."""
+    return Axis(low=len(names) - 0.4, high=-0.6, ticks=dict(enumerate(names)), grid=False)
 
 
-def plain(text: str, most: int = 40) -> str:
-    """A name from a mission or recording as it stands in a plot: on one line, cut, and never taken for markup."""
-    line = " ".join("".join(c if c.isprintable() else " " for c in text).split())
-    line = line if len(line) <= most else line[: most - 1] + "…"
-    return line.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
+def empty(text: str) -> Plot:
+    """A figure that says why there is nothing to see."""
+    note = {"text": words(text), "xref": "paper", "yref": "paper", "x": 0.5, "y": 0.5, "showarrow": False}
+    hidden = {"visible": False}
+    layout = {**_WHITE, "margin": dict.fromkeys("lrtb", 10), "xaxis": hidden, "yaxis": hidden, "annotations": [note]}
+    return {"data": [], "layout": layout, "config": CONFIG}
 
 
-def decades(low: float, high: float, unit: str) -> tuple[list[float], list[str]]:
-    """Ticks at 1, 2 and 5 times the powers of ten between two values of the SI unit, as log10 and in words.
-
-    At 1 and 3 times them, or at them alone, where these would be more than eight, whose words turn.
-    """
-    first, last = math.floor(math.log10(low)), math.ceil(math.log10(high))
-    for steps in ((1.0, 2.0, 5.0), (1.0, 3.0), (1.0,)):
-        values = [step * 10.0**power for power in range(first, last + 1) for step in steps]
-        shown = [value for value in values if low * (1 - 1e-9) <= value <= high * (1 + 1e-9)]
-        if len(shown) <= _MOST_TICKS:
-            break
-    return [math.log10(value) for value in shown], [format_quantity(value, unit) for value in shown]
-
-
-def marker_line(
-    x: float, name: str, color: str, dash: str, y: tuple[float, float] | tuple[str, str] = (0.0, 1.0)
-) -> Trace:
-    """A vertical line over the plot as a trace of its own, so that the legend names it and switches it."""
-    return {
-        "type": "scatter",
-        "mode": "lines",
-        "x": [x, x],
-        "y": [*y],
-        "name": name,
-        "line": {"color": color, "width": 2, "dash": dash},
-        "hovertemplate": f"{name}<extra></extra>",
-    }
+def figure(sheet: Sheet) -> Plot:
+    """A sheet as a figure: its height stays, its width is that of its place, and its legend is plotly's."""
+    made = plot_of(sheet)
+    if not made["panels"]:
+        return empty(sheet.heading)
+    data, layout, panels = made["data"], made["layout"], made["panels"]
+    left, top, right, bottom = (end(p["inner"][k] for p in panels) for k, end in enumerate((min, min, max, max)))
+    for panel in panels:
+        x0, y0, x1, y1 = panel["inner"]
+        layout[panel["x"]]["domain"] = [(x0 - left) / (right - left), (x1 - left) / (right - left)]
+        layout[panel["y"]]["domain"] = [(bottom - y1) / (bottom - top), (bottom - y0) / (bottom - top)]
+        layout[panel["y"]]["automargin"] = True
+    around = [max(abs(p["outer"][k] - p["inner"][k]) for p in panels) for k in range(4)]
+    layout |= {**_WHITE, "margin": dict(zip("ltrb", around, strict=True)), "legend": _LEGEND, "showlegend": True}
+    rows_px = round(bottom - top)  # which the page keeps free for the data, however long the legend is
+    layout["height"] = round(rows_px + around[1] + around[3] + _KEYS_PX * bool(made["keys"]))
+    for trace in data:
+        trace["showlegend"] = False
+    for entry in (entry for key in made["keys"] for entry in key["entries"]):
+        named = [data[k] for k in entry["data"]] + [layout["shapes"][k] for k in entry["shapes"]]
+        if not named:  # it stands in the legend alone
+            named = [{"type": "scatter", "mode": "lines", "x": [None], "y": [None], "line": entry["line"]}]
+            data += named
+        for place, each in enumerate(named):
+            each |= {"name": words(entry["label"]), "legendgroup": words(entry["label"]), "showlegend": not place}
+    return {"data": data, "layout": layout, "config": CONFIG, "rows": rows_px}

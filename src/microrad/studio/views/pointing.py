@@ -15,9 +15,24 @@ from microrad.link import study as link_study
 from microrad.link.pointing import OpenLoopPointing
 from microrad.link.study import PointAheadEffect
 from microrad.mission.file import LinkFile
+from microrad.report.day_figures import short
+from microrad.report.plotting.sheet import (
+    BLACK,
+    BLUE,
+    GREEN,
+    GREY,
+    ORANGE,
+    SKY,
+    VERMILION,
+    Axis,
+    Bars,
+    Line,
+    Mark,
+    Rule,
+)
 from microrad.report.quantities import quantity
 from microrad.studio.draft.draft import Draft
-from microrad.studio.views import plots
+from microrad.studio.views.plots import Plot, plot, rows
 from microrad.studio.views.sliders import Slider, slider
 
 Row = dict[str, Any]
@@ -25,8 +40,7 @@ Row = dict[str, Any]
 POINTS = 241
 """Of the curve of coverage."""
 
-_CLASSES = {"bias": plots.BLUE, "random": plots.ORANGE, "drift": plots.GREEN, "transient": plots.SKY}
-_HATCHES = {"bias": "", "random": "/", "drift": ".", "transient": "x"}
+_CLASSES = {"bias": BLUE, "random": ORANGE, "drift": GREEN, "transient": SKY, "total": GREY}
 _LINES, _AHEAD = "pointing.lines.", ("point_ahead.transverse_velocity", "point_ahead.error")
 _BEACON = "beacon.divergence"
 
@@ -156,72 +170,40 @@ def words(v: PointingView) -> list[str]:
 
 
 # -------------------------------------------------------------------------------------------------------------- plots
-def lines_plot(v: PointingView) -> plots.Plot:
+def lines_plot(v: PointingView) -> Plot:
     """The half widths of the lines as bars by their class, the totals below them, against the beacon's half angle."""
-    data = []
-    for kind in dict.fromkeys(each.kind for each in v.budget.stated):
-        own = [each for each in v.budget.stated if each.kind == kind]
-        data.append(_bars(kind, [(each.name, each.error_rad) for each in own], _CLASSES[kind], _HATCHES[kind]))
-    data.append(_bars("total", [(each.name, each.total_rad) for each in v.budget.summations], plots.GREY, ""))
-    names = [plots.plain(name) for name in (*(e.name for e in v.budget.lines), *(e.name for e in v.budget.summations))]
+    lines, totals = v.budget.stated, v.budget.summations
+    errors = [(each.kind, each.error_rad) for each in lines] + [("total", each.total_rad) for each in totals]
+    marks: list[Mark] = [_bars(kind, errors) for kind in dict.fromkeys(kind for kind, _ in errors)]
     if not math.isnan(v.half_angle_rad):
-        half = v.half_angle_rad * 1e6
         name = f"beacon's half angle: {quantity(v.half_angle_rad, 'rad')}"
-        data.append(plots.marker_line(half, name, plots.VERMILION, "dash", (names[0], names[-1])))
-    return plots.plot(
-        data,
-        {"title": "angle (µrad)", "rangemode": "tozero"},
-        {"title": "", "categoryorder": "array", "categoryarray": names, "range": [len(names) - 0.5, -0.5]},
-        height=150 + 26 * len(names),
-        barmode="overlay",
-    )
+        marks.append(Rule(v.half_angle_rad * 1e6, True, VERMILION, "--", 1.5, name))
+    names = rows([short(name, 40) for name in (*(e.name for e in lines), *(e.name for e in totals))])
+    return plot(Axis("angle (µrad)", low=0.0), names, *marks, height=1.0 + 0.27 * len(errors))
 
 
-def _bars(name: str, values: list[tuple[str, float]], color: str, hatch: str) -> plots.Trace:
-    return {
-        "type": "bar",
-        "orientation": "h",
-        "name": name,
-        "y": [plots.plain(each) for each, _ in values],
-        "x": [round(value * 1e6, 4) for _, value in values],
-        "marker": {
-            "color": color,
-            "pattern": {"shape": hatch, "fillmode": "overlay", "fgcolor": plots.BLACK, "fgopacity": 0.5},
-        },
-        "hovertemplate": "%{y}: %{x:.4g} µrad<extra>" + name + "</extra>",
-    }
+def _bars(kind: str, errors: list[tuple[str, float]]) -> Bars:
+    """The bars of one class, each in the row that it has among all."""
+    own = np.array([(row, error_rad * 1e6) for row, (of, error_rad) in enumerate(errors) if of == kind])
+    return Bars(own[:, 0], np.zeros(len(own)), own[:, 1], np.full(len(own), 0.7), _CLASSES[kind], label=kind)
 
 
-def coverage_plot(v: PointingView) -> plots.Plot:
+def coverage_plot(v: PointingView) -> Plot:
     """Probability that the radial error is below an angle, with what the beacon covers and what the rules ask for."""
     p = v.budget
     totals = {name: p.total_rad(name) for name in ("rss", "ecss-radial", "exact")}
-    ends = [*totals.values(), v.half_angle_rad]
-    most = 1.25 * max(end for end in ends if math.isfinite(end)) or 1e-6
+    most = 1.25 * max(end for end in (*totals.values(), v.half_angle_rad) if math.isfinite(end)) or 1e-6
     radius = np.linspace(0.0, most, POINTS)
-    curve: plots.Trace = {
-        "type": "scatter",
-        "mode": "lines",
-        "name": "inside this angle",
-        "x": np.round(radius * 1e6, 4).tolist(),
-        "y": np.round(100.0 * p.coverage(radius), 4).tolist(),
-        "line": {"color": plots.BLUE, "width": 2.5},
-        "hovertemplate": "%{x:.1f} µrad: %{y:.3f} %<extra></extra>",
-    }
-    rules = {"rss": "root sum square", "ecss-radial": "ECSS, two axes", "exact": f"{100.0 * p.confidence:g} % inside"}
-    marks = []
+    marks: list[Mark] = [Line(radius * 1e6, 100.0 * p.coverage(radius), BLUE, width=1.9, label="inside this angle")]
     if not math.isnan(v.half_angle_rad):
         half = f"beacon's half angle: {format_quantity(v.half_angle_rad, 'rad', 3)}"
-        marks.append(plots.marker_line(v.half_angle_rad * 1e6, half, plots.VERMILION, "solid", (0.0, 100.0)))
-    marks += [
-        plots.marker_line(totals[rule] * 1e6, f"{name}: {quantity(totals[rule], 'rad')}", color, dash, (0.0, 100.0))
-        for (rule, name), color, dash in zip(
-            rules.items(), (plots.ORANGE, plots.GREEN, plots.BLACK), plots.DASHES[1:], strict=True
-        )
-    ]
-    return plots.plot(
-        [curve, *marks],
-        {"title": "angle off the line of sight (µrad)", "range": [0.0, most * 1e6]},
-        {"title": "probability of an error below it (%)", "range": [0.0, 101.0]},
-        legend={"x": 0.01, "y": 0.97, "xanchor": "left", "yanchor": "top", "bgcolor": "rgba(255,255,255,0.85)"},
-    )
+        marks.append(Rule(v.half_angle_rad * 1e6, True, VERMILION, "-", 1.5, half))
+    named = ("root sum square", ORANGE, "--"), ("ECSS, two axes", GREEN, "-."), (_inside(p), BLACK, ":")
+    for total_rad, (name, colour, dash) in zip(totals.values(), named, strict=True):
+        marks.append(Rule(total_rad * 1e6, True, colour, dash, 1.5, f"{name}: {quantity(total_rad, 'rad')}"))
+    x = Axis("angle off the line of sight (µrad)", low=0.0, high=most * 1e6)
+    return plot(x, Axis("probability of an error below it (%)", low=0.0, high=101.0), *marks)
+
+
+def _inside(p: OpenLoopPointing) -> str:
+    return f"{100.0 * p.confidence:g} % inside"

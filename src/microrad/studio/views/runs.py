@@ -13,8 +13,7 @@ from pathlib import Path
 
 from microrad.core.folder import read_bytes, write_whole
 from microrad.mission.toml import MAX_BYTES, scan
-from microrad.studio.commands import Action
-from microrad.studio.commands_pieces import path_argument
+from microrad.studio.commands import Action, campaign_report, path_argument
 from microrad.studio.jobs.queue import Job, JobError, Kind, Order, Progress
 from microrad.studio.session import Session
 
@@ -34,44 +33,14 @@ _STATES = {
 }
 
 
-@dataclass(frozen=True, slots=True)
-class CampaignReport:
-    """The page with the pictures of a campaign's ledger."""
-
-    ledger: Path
-    page: Path
-
-    @property
-    def arguments(self) -> tuple[str, ...]:
-        """What follows `microrad` on the command line."""
-        return ("campaign", "report", path_argument(self.ledger), path_argument(self.page), "--overwrite")
-
-    @property
-    def python(self) -> str:
-        """Lines of Python that do the same."""
-        return (
-            "from pathlib import Path\n\n"
-            "from microrad import summarise_campaign\n"
-            "from microrad.report import campaign_page\n\n"
-            f"text = campaign_page.html(summarise_campaign(Path({str(self.ledger)!r})))\n"
-            f'Path({str(self.page)!r}).write_text(text, encoding="utf-8")\n'
-        )
-
-    @property
-    def results(self) -> tuple[str, ...]:
-        """The page."""
-        return (str(self.page),)
-
-
-def order(session: Session, kind: Kind, title: str, action: Action) -> Order:
+def order(session: Session, kind: Kind, action: Action) -> Order:
     """An action as a job in the working folder."""
-    return Order(kind, title, action.arguments, session.folder, action.results)
+    return Order(kind, action.title, action.arguments, session.folder, action.results)
 
 
 def report_order(session: Session, ledger: Path) -> Order:
     """The report of a ledger as a job, under a name that is free."""
-    page = free_name(session, ledger.stem, ".html")
-    return order(session, "export", f"Report of {ledger}", CampaignReport(ledger, Path(page)))
+    return order(session, "export", campaign_report(ledger, Path(free_name(session, ledger.stem, ".html"))))
 
 
 # -------------------------------------------------------------------------------------------------- what can be started

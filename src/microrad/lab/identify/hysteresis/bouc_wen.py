@@ -27,18 +27,18 @@ from microrad.core.progress import Progress
 from microrad.lab.identify.records import (
     DEFAULT_UNITS,
     IdentificationError,
-    Prepared,
+    SiRecord,
     Units,
     centred,
     colour_inflation,
     correlation,
     fastest_rate,
+    no_progress,
     one_rate_only,
     percent,
-    prepare,
+    si_records,
     span,
     split_by_record,
-    unheard,
 )
 from microrad.lab.recording import Recording
 from microrad.mirror.hysteresis import BoucWen
@@ -51,7 +51,7 @@ _UPPER = np.array([1.0, 10.0, math.log(1e5), math.log(1e5)])
 class Problem:
     """The projected residual of a set of records as a function of the four searched numbers, scaled to order one."""
 
-    def __init__(self, records: tuple[Prepared, ...], share: float, rate_limit: float | None = None) -> None:
+    def __init__(self, records: tuple[SiRecord, ...], share: float, rate_limit: float | None = None) -> None:
         """`share` is the largest part of d1 that epsilon may take back after a slow reversal; inf leaves it free."""
         self.records = records
         self.share = share
@@ -112,13 +112,13 @@ class Problem:
         return np.array([d1, d2, epsilon, delta, (settled + reversal) / 2, beta])
 
 
-def _thinned(problem: Problem) -> Problem:
+def _thin_problem(problem: Problem) -> Problem:
     """The same problem on at most about 12 000 samples: the kernel is exact for a drive linear between any samples."""
     stride = math.ceil(sum(r.drive_v.size for r in problem.records) / 12_000)
     if stride == 1:
         return problem
     records = tuple(
-        Prepared(r.name, r.sha256, r.drive_v[::stride].copy(), r.output_rad[::stride].copy(), r.step_s * stride, start)
+        SiRecord(r.name, r.sha256, r.drive_v[::stride].copy(), r.output_rad[::stride].copy(), r.step_s * stride, start)
         for r in problem.records
         for start in (-(-r.start // stride),)
     )
@@ -126,9 +126,9 @@ def _thinned(problem: Problem) -> Problem:
 
 
 # ----------------------------------------------------------------------------------------------------------- search
-def multi_start(problem: Problem, starts: int, seed: int, on_progress: Progress) -> tuple[Floats, Floats]:
+def search_from_starts(problem: Problem, starts: int, seed: int, on_progress: Progress) -> tuple[Floats, Floats]:
     """Cost reached from each start, and the best point polished on all samples."""
-    screen = _thinned(problem)
+    screen = _thin_problem(problem)
     points, costs = [], []
     for done, start in enumerate(_starts(screen, starts, seed), start=1):
         solution = _search(screen, start)
@@ -177,7 +177,7 @@ def _search(problem: Problem, start: Floats) -> Any:
     )
 
 
-def tightened(problem: Problem, best: Floats) -> tuple[Problem, Floats]:
+def with_tightened_bound(problem: Problem, best: Floats) -> tuple[Problem, Floats]:
     """Lower the share of d1 that epsilon may take back until no slope along the recordings is negative.
 
     The bound holds for slow reversals; at a fast one h is larger than its slow settled value by exp(delta |u'|).
@@ -193,7 +193,7 @@ def tightened(problem: Problem, best: Floats) -> tuple[Problem, Floats]:
 
 
 # ---------------------------------------------------------------------------------------------------------- values
-def stacked(problem: Problem, values: Floats) -> Floats:
+def stacked_output(problem: Problem, values: Floats) -> Floats:
     """Model output of the used samples of all records, without offset."""
     row = np.array([*values, problem.rate_limit, 0.0])
     return np.concatenate([bouc_wen_response(r.drive_v, r.step_s, row, 0.0)[0][r.start :] for r in problem.records])
@@ -204,7 +204,7 @@ def k_settled(values: Floats) -> float:
     return float(values[4] + math.copysign(1.0, values[2]) * values[5])
 
 
-def turned_over(model: BoucWen) -> BoucWen:
+def sign_reversed(model: BoucWen) -> BoucWen:
     """The model of a sensor turned over: -h has the terms of h with the signs of epsilon, beta and gamma changed."""
     return replace(
         model,
@@ -215,9 +215,9 @@ def turned_over(model: BoucWen) -> BoucWen:
     )
 
 
-def rising(model: BoucWen) -> BoucWen:
+def made_rising(model: BoucWen) -> BoucWen:
     """The model, turned over where its d1 is negative."""
-    return model if model.d1_rad_v > 0.0 else turned_over(model)
+    return model if model.d1_rad_v > 0.0 else sign_reversed(model)
 
 
 def lowest_slope(problem: Problem, values: Floats) -> float:
@@ -278,7 +278,17 @@ class BoucWenFit:
     constrained: bool
     samples_used: int
 
-    name = "bouc_wen"
+    parameter_count = 6
+
+    @property
+    def name(self) -> str:
+        """The name of the model, as in `MODELS`."""
+        return "bouc_wen_admissible" if self.constrained else "bouc_wen"
+
+    @property
+    def falling(self) -> bool:
+        """Whether the output falls with the drive."""
+        return self.model.d1_rad_v < 0
 
     @property
     def values(self) -> Floats:
@@ -343,16 +353,16 @@ def fit_bouc_wen(
     """
     if starts < 1:
         raise IdentificationError(f"{starts} starts were asked for; give at least 1, better 10 or more.")
-    problem = Problem(prepare(recordings, units), 1.0 if admissible else math.inf)
-    costs, best = multi_start(problem, starts, seed, on_progress or unheard)
+    problem = Problem(si_records(recordings, units), 1.0 if admissible else math.inf)
+    costs, best = search_from_starts(problem, starts, seed, on_progress or no_progress)
     if admissible:
-        problem, best = tightened(problem, best)
+        problem, best = with_tightened_bound(problem, best)
     return _report(problem, problem.solve(best), units, costs, admissible)
 
 
 # ---------------------------------------------------------------------------------------------------------- report
 def _report(problem: Problem, values: Floats, units: Units, costs: Floats, constrained: bool) -> BoucWenFit:
-    residual = problem.measured - stacked(problem, values)
+    residual = problem.measured - stacked_output(problem, values)
     offsets = tuple(float(part.mean()) for part in split_by_record(residual, problem.records))
     residual = centred(residual, problem.records)
     colour = colour_inflation(split_by_record(residual, problem.records))
@@ -365,7 +375,7 @@ def _report(problem: Problem, values: Floats, units: Units, costs: Floats, const
     rms, _ = percent(residual, problem.output_span_rad)
     d1, d2, epsilon, delta, alpha, beta = values.tolist()
     model = BoucWen(d1, d2, epsilon, delta, alpha, beta, problem.rate_limit)
-    slope, lowest = rising(model).reversal_slope_rad_v(), lowest_slope(problem, values)
+    slope, lowest = made_rising(model).reversal_slope_rad_v(), lowest_slope(problem, values)
     return BoucWenFit(
         model=model,
         offsets_rad=offsets,
@@ -399,7 +409,7 @@ def _jacobian(problem: Problem, values: Floats, sizes: Floats) -> Floats:
     for i, size in enumerate(1e-4 * sizes):
         step = np.zeros(6)
         step[i] = size
-        columns.append((stacked(problem, values + step) - stacked(problem, values - step)) / (2 * size))
+        columns.append((stacked_output(problem, values + step) - stacked_output(problem, values - step)) / (2 * size))
     return centred(np.column_stack(columns), problem.records)
 
 

@@ -8,7 +8,7 @@ element.
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache, partial
 from typing import Any, Literal
 
@@ -18,7 +18,7 @@ from microrad.core import kernels
 from microrad.core.arrays import Floats
 from microrad.core.progress import Progress
 from microrad.core.threads import in_threads
-from microrad.lab.identify.records import IdentificationError, colour_inflation, correlation, unheard
+from microrad.lab.identify.records import IdentificationError, colour_inflation, correlation, no_progress
 from microrad.lab.recording import Recording
 from microrad.mirror import model as mirror
 from microrad.mirror.model import Mirror
@@ -59,14 +59,9 @@ class Structure:
     parameters: tuple[Parameter, ...]
     build: Callable[[Floats], Mirror]
 
-    def at(self, values: Sequence[float] | Floats) -> "Structure":
-        """The same structure with the search beginning elsewhere."""
-        pairs = zip(self.parameters, values, strict=True)
-        return replace(self, parameters=tuple(replace(p, start=float(v), size=p.scale) for p, v in pairs))
-
 
 @dataclass(frozen=True, eq=False)
-class Run:
+class FitRecord:
     """One record as the fit sees it.
 
     `drive` (steps of `step_s`, actuators) goes to the plant, about its rest; every `stride`-th output, from the first,
@@ -87,10 +82,10 @@ class Run:
     @property
     def target(self) -> Floats:
         """The used part of the output without its nuisance."""
-        return without(self.nuisance, self.output[self.first :])
+        return without_nuisance(self.nuisance, self.output[self.first :])
 
 
-def without(nuisance: Floats, signal: Floats) -> Floats:
+def without_nuisance(nuisance: Floats, signal: Floats) -> Floats:
     """A signal (samples, outputs) less its projection onto orthonormal columns (samples, columns)."""
     return np.asarray(signal - nuisance @ (nuisance.T @ signal)) if nuisance.size else signal
 
@@ -110,9 +105,9 @@ def upsampled(drive: Floats, factor: int, hold: Hold) -> Floats:
     return np.asarray(np.fft.irfft(spectrum, factor * samples, axis=0) * factor)
 
 
-def runs(
+def fit_records(
     recordings: Sequence[Recording], *, factor: int = 1, hold: Hold = "linear", drop: int = 0, offset: bool = True
-) -> tuple[Run, ...]:
+) -> tuple[FitRecord, ...]:
     """Recordings as runs of the plant, `factor` plant steps a sample, the first `drop` samples left out of the fit.
 
     A periodic recording (period_samples) whose periods share their drive is reduced to one period, the mean of its
@@ -136,7 +131,7 @@ def runs(
             )
         used = len(output) - first
         nuisance = np.full((used, 1), 1.0 / math.sqrt(used)) if offset else np.zeros((used, 0))
-        made.append(Run(recording.path, drive.copy(), output, recording.step_s / factor, factor, first, nuisance))
+        made.append(FitRecord(recording.path, drive.copy(), output, recording.step_s / factor, factor, first, nuisance))
     return tuple(made)
 
 
@@ -161,7 +156,7 @@ def _one_period(recording: Recording, factor: int, hold: Hold) -> tuple[Floats, 
     return np.concatenate([one, one]), np.concatenate([np.zeros((period, mean.shape[1])), mean]), period
 
 
-def simulate(plant: kernels.Plant, run: Run) -> Floats:
+def simulate_record(plant: kernels.Plant, run: FitRecord) -> Floats:
     """Output (samples, outputs) of the plant over a run, from rest."""
     state = mirror.at_rest(plant)
     output = np.empty((run.drive.shape[0], len(plant.outputs)))
@@ -216,9 +211,9 @@ class PlantFit:
 class Problem:
     """The weighted residual of a structure on its runs, and its Jacobian by differences, as functions of the values."""
 
-    def __init__(self, structure: Structure, run_list: Sequence[Run]) -> None:
+    def __init__(self, structure: Structure, records: Sequence[FitRecord]) -> None:
         """The parameters are searched in units of their scale."""
-        self.structure, self.runs = structure, tuple(run_list)
+        self.structure, self.runs = structure, tuple(records)
         self.scale = np.array([p.scale for p in structure.parameters])
         self.lower = np.array([p.lower for p in structure.parameters]) / self.scale
         self.upper = np.array([p.upper for p in structure.parameters]) / self.scale
@@ -234,7 +229,9 @@ class Problem:
         """Used outputs of each run without their nuisance, weighted."""
         model = self.structure.build(values)
         plants = {step: mirror.discretise(model, step, often=True) for step in {run.step_s for run in self.runs}}
-        return [run.weight * without(run.nuisance, simulate(plants[run.step_s], run)[run.first :]) for run in self.runs]
+        return [
+            r.weight * without_nuisance(r.nuisance, simulate_record(plants[r.step_s], r)[r.first :]) for r in self.runs
+        ]
 
     def modelled(self, point: Floats) -> Floats:
         """All used outputs as one vector, at a scaled point; far off where the plant cannot be stepped or runs away."""
@@ -284,7 +281,7 @@ def _columns(column: Callable[[int], Floats], count: int) -> Floats:
 
 def fit_plant(
     structure: Structure,
-    run_list: Sequence[Run],
+    records: Sequence[FitRecord],
     *,
     starts: Sequence[Floats] = (),
     tolerance: float = 1e-9,
@@ -296,17 +293,17 @@ def fit_plant(
     The search begins at the parameters' own starts and at each of `starts` (values in their order); trust-region
     reflective least squares within their bounds. Raises `IdentificationError` when no start can be simulated.
     """
-    problem = Problem(structure, run_list)
+    problem = Problem(structure, records)
     own = np.array([p.start for p in structure.parameters])
     solutions = []
     for done, start in enumerate([own, *starts], 1):
         solutions.append(_search(problem, start / problem.scale, tolerance, most_evaluations))
-        (on_progress or unheard)(done, 1 + len(starts), structure.name)
+        (on_progress or no_progress)(done, 1 + len(starts), structure.name)
     best = min(solutions, key=lambda s: float(s.cost))
     if best.cost >= 0.4 * problem.size * problem.far**2:
         raise IdentificationError(
             f"{structure.name}: the mirror cannot be simulated from any start at a step of "
-            f"{max(run.step_s for run in run_list):g} s; begin nearer, or take more steps a sample."
+            f"{max(run.step_s for run in records):g} s; begin nearer, or take more steps a sample."
         )
     return _report(problem, best, [float(s.cost) for s in solutions])
 

@@ -9,7 +9,7 @@ from microrad.core.arrays import Floats
 from microrad.lab.identify.hysteresis.bouc_wen import BoucWenFit
 from microrad.lab.identify.hysteresis.joint import JointFit
 from microrad.lab.identify.hysteresis.prandtl_ishlinskii import PrandtlIshlinskiiFit
-from microrad.lab.identify.records import IdentificationError, Prepared, Units, transient
+from microrad.lab.identify.records import IdentificationError, SiRecord, Units, transient
 from microrad.lab.recording import Recording
 
 Fit = BoucWenFit | PrandtlIshlinskiiFit | JointFit
@@ -47,7 +47,7 @@ class Score:
 
 
 @dataclass(frozen=True, eq=False)
-class Judged:
+class ScoredModel:
     """A model as soon as it is fitted: its score, and its predictions in the order of the recordings judged on."""
 
     model: str
@@ -93,7 +93,7 @@ def _added(fit: Fit, difference: Floats, step_s: float, known: slice) -> Floats 
 
 
 def straight_line(
-    prepared: Sequence[Prepared], recordings: Sequence[Recording], splits: Sequence[int], units: Units
+    prepared: Sequence[SiRecord], recordings: Sequence[Recording], splits: Sequence[int], units: Units
 ) -> list[Prediction]:
     """One slope for all recordings and one offset for each, from the fitted samples; a split of 0 is all unseen."""
     above = [(p.drive_v[p.start :], p.output_rad[p.start :]) for p in prepared]

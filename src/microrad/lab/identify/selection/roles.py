@@ -38,8 +38,7 @@ def whole_periods(head: Recording) -> Recording:
     period = head.period_samples
     if period is None or head.samples < 2 * period:
         return replace(head, period_samples=None)
-    whole = head.samples // period * period
-    return replace(head, drive=head.drive[:whole], output=head.output[:whole])
+    return head.first(head.samples // period * period)
 
 
 def is_broadband(recording: Recording) -> bool:

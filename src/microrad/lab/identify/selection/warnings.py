@@ -7,13 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from microrad.core.arrays import Floats
-from microrad.lab.identify.hysteresis.bouc_wen import BoucWenFit, rising
+from microrad.lab.identify.hysteresis.bouc_wen import BoucWenFit, made_rising
 from microrad.lab.identify.hysteresis.joint import JointFit
 from microrad.lab.identify.hysteresis.prandtl_ishlinskii import PrandtlIshlinskiiFit
-from microrad.lab.identify.records import Prepared, Units, colour_inflation, loop_rates, noisiness, one_rate_only
+from microrad.lab.identify.records import SiRecord, Units, colour_inflation, loop_rates, noisiness, one_rate_only
 from microrad.lab.identify.selection.predictions import Fit, Prediction, Score
 from microrad.lab.recording import Recording
-from microrad.mirror.hysteresis import BoucWen, slow_gain
+from microrad.mirror.hysteresis import BoucWen
 
 _LAGS = 50
 _FLIPPED = (
@@ -50,7 +50,7 @@ def depends_on_rate(fit: JointFit) -> bool:
     return bool({"delta", "widening"} & set(fit.form.free)) or fit.linear is not None
 
 
-def rate_warnings(records: Sequence[Prepared], fit: Fit) -> list[str]:
+def rate_warnings(records: Sequence[SiRecord], fit: Fit) -> list[str]:
     """What the rates of the loops do not show, and a drive too noisy to have a rate."""
     warnings = []
     slowest, fastest = loop_rates(records)
@@ -111,19 +111,12 @@ def fit_warnings(fit: Fit) -> list[str]:
         )
     if not (isinstance(fit, PrandtlIshlinskiiFit) or fit.admissible):
         found.append(_wrong_way(fit))
-    return [*found, *([_FLIPPED] if falling(fit) else [])]
-
-
-def falling(fit: Fit) -> bool:
-    """Whether the output falls with the drive."""
-    if isinstance(fit, JointFit):
-        return slow_gain(fit.model) < 0
-    return fit.model.d1_rad_v < 0 if isinstance(fit, BoucWenFit) else fit.sign < 0
+    return [*found, _FLIPPED] if fit.falling else found
 
 
 def _wrong_way(fit: BoucWenFit | JointFit) -> str:
     assert isinstance(fit.model, BoucWen)
-    turned = rising(fit.model)
+    turned = made_rising(fit.model)
     if isinstance(fit, JointFit):
         slope, slow, advice = turned.reversal_slope_rad_v(), "slow ", "a Prandtl-Ishlinskii model never does."
     else:
@@ -218,7 +211,7 @@ def _correlations(a: Floats, b: Floats, lags: int) -> Floats:
 
 def _autoregression(x: Floats, order: int) -> Floats:
     """Coefficients (1, a1, ...) that whiten x, by Yule and Walker."""
-    from scipy.linalg import solve_toeplitz  # here, to keep start-up cheap
+    from scipy.linalg import solve_toeplitz
 
     r = np.array([float(x[k:] @ x[: x.size - k]) for k in range(order + 1)])
     if r[0] <= 0.0:

@@ -8,7 +8,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from microrad.core.arrays import Floats
-from microrad.core.installing import advice
 from microrad.lab.recording.records import RecordingError
 
 _TIME_NAME = re.compile(
@@ -223,11 +222,4 @@ def damaged(path: Path, kind: str, error: BaseException) -> RecordingError:
     return RecordingError(
         f"{path}: this cannot be read as {kind} ({_first_line(error)}); the file is damaged or truncated: copy it "
         "again from its source."
-    )
-
-
-def missing_library(path: Path, kind: str, library: str) -> RecordingError:
-    """The refusal where an optional library is not installed."""
-    return RecordingError(
-        f"{path}: reading {kind} needs the library {library}, which is not installed; install it {advice('lab')}"
     )

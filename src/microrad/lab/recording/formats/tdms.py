@@ -14,8 +14,9 @@ from typing import Any
 import numpy as np
 
 from microrad.core.arrays import Floats
+from microrad.core.installing import advice
 from microrad.lab.recording.files import sha256_of
-from microrad.lab.recording.formats.source import Channel, Container, StatedRate, damaged, missing_library
+from microrad.lab.recording.formats.source import Channel, Container, StatedRate, damaged
 from microrad.lab.recording.records import RecordingError
 
 _LEAD_IN = 28
@@ -34,7 +35,10 @@ class TdmsSource(Container):
         try:
             import nptdms  # noqa: F401
         except ImportError:
-            raise missing_library(path, "a TDMS file", "npTDMS") from None
+            raise RecordingError(
+                f"{path}: reading a TDMS file needs the library npTDMS, which is not installed; install it "
+                f"{advice('lab')}"
+            ) from None
         unusable: dict[str, str] = {}
         try:
             with _opened(path) as tdms:
