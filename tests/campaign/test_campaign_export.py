@@ -57,7 +57,7 @@ def write(folder, numbers=((0, 2, 1), (1, 0)), cells=None, order=1, rows=ROWS):
 
 def exported(path, target):
     with Ledger.open(path, write=False) as ledger:
-        return export.export(ledger, target)
+        return export.export_rows(ledger, target)
 
 
 def expected():
@@ -281,7 +281,7 @@ FULL = """
     from microrad.campaign.records import CampaignError
     with Ledger.open(Path(sys.argv[1]), write=False) as ledger:
         try:
-            export(ledger, Path(sys.argv[2]))
+            export_rows(ledger, Path(sys.argv[2]))
         except CampaignError as error:
             print(error)
 """
@@ -313,7 +313,7 @@ PEAK = """
     from microrad.campaign.export import export_rows
     from microrad.campaign.ledger import Ledger
     with Ledger.open(Path(sys.argv[1]), write=False) as ledger:
-        export(ledger, Path(sys.argv[2]))
+        export_rows(ledger, Path(sys.argv[2]))
     print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
 """
 
