@@ -3,8 +3,9 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 DEMO := demo
-# Three processes for two cores: some tests wait for a browser, a worker or a child.
-SIDE_BY_SIDE := --numprocesses 3 --dist loadfile --no-loadscope-reorder
+# Three processes for two cores: some tests wait for a browser, a worker or a child. One that crashes ends the run: the
+# files that it has left would be waited for in vain.
+SIDE_BY_SIDE := --numprocesses 3 --dist loadfile --no-loadscope-reorder --max-worker-restart 0
 
 # Without the bytecode of its modules each command of a test begins half a second later.
 unexport PYTHONDONTWRITEBYTECODE

@@ -73,11 +73,17 @@ def pytest_collection_modifyitems(config, items):
 def pytest_configure(config):
     shared.begin(config)
     waiting.told = os.dup(2)  # before what tests write is taken in
+    if not hasattr(config, "workerinput") and config.getoption("numprocesses", None):
+        waiting.end_all_later()  # this process has no tests of its own
     gc.disable()  # while modules and tests are read: none of that is garbage
 
 
 def pytest_collection_finish():
-    """From here on there may be garbage, which clusters need to have found: it ends what closed workers still hold."""
+    """From here on there may be garbage, which clusters need to have found: it ends what closed workers still hold.
+
+    What is there by now stays: nobody looks through it again.
+    """
+    gc.freeze()
     gc.enable()
 
 
