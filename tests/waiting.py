@@ -16,7 +16,7 @@ HANG_S = 300.0
 """What has not happened after this time (s) never will, on a machine with other work to do, too."""
 HANG_MS = 1000.0 * HANG_S
 ALL_S = 2 * 3600.0
-"""What a run of all tests may take (s), on a busy machine, too; one with all repetitions may take four times as long."""
+"""What a run of all tests may take (s), on a busy machine, too; four times as long with all repetitions."""
 _LOOK_S = 0.02
 
 
