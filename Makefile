@@ -16,11 +16,12 @@ unexport PYTHONDONTWRITEBYTECODE
 demo: $(VENV)/.run
 	$(BIN)/microrad run missions/leo-geo.toml --output $(DEMO) --overwrite
 
-# Types are checked on one core; what most tests wait for is compiled on another one. The numbers are compared beside the
-# tests that wait: those are handed out first.
+# What most tests wait for is compiled first. Types are checked and the numbers compared beside the tests that wait: those
+# are handed out first.
 test: contract lint
-	@$(MAKE) --no-print-directory --jobs=2 types compiled
-	@$(MAKE) --no-print-directory --jobs=2 numbers unit
+	@$(MAKE) --no-print-directory --jobs=3 FIRST=compiled types numbers unit
+
+numbers unit: | $(FIRST)
 
 contract: $(VENV)/.test
 	$(BIN)/lint-imports
