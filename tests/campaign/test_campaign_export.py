@@ -314,7 +314,7 @@ PEAK = """
     from microrad.campaign.ledger import Ledger
     for path in sys.argv[2:]:
         with Ledger.open(Path(path), write=False) as ledger:
-            export(ledger, Path(sys.argv[1]))
+            export_rows(ledger, Path(sys.argv[1]))
         print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
 """
 
