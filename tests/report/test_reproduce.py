@@ -13,7 +13,7 @@ from microrad import cli, report
 from microrad.core import machine
 from microrad.mission import file as missionfile
 from microrad.report import carried, compared, page, reproduce, tolerances
-from microrad.study import story as study
+from microrad.study import study
 from shipped import SHIPPED, edited_file, without_fine_pointing
 
 
@@ -27,7 +27,7 @@ def no_scan():
 
 @pytest.fixture(scope="module")
 def ran(tmp_path_factory):
-    return study.run(edited_file(tmp_path_factory.mktemp("mission"), ("runs = 4000 ", "runs = 100 ")))
+    return study.run_study(edited_file(tmp_path_factory.mktemp("mission"), ("runs = 4000 ", "runs = 100 ")))
 
 
 @pytest.fixture(scope="module")
@@ -40,7 +40,7 @@ def written(ran, tmp_path_factory):
 @pytest.fixture
 def not_run(monkeypatch, ran, written):
     """The study and its report as they were, without the time that they take."""
-    monkeypatch.setattr(reproduce.study, "run", lambda file, on_progress: ran)
+    monkeypatch.setattr(reproduce.study, "run_study", lambda file, on_progress: ran)
 
     def copied(found, target, **settings):
         shutil.copytree(written, target)

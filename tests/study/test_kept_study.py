@@ -16,7 +16,7 @@ from microrad.orbit.day import assumptions
 from microrad.report import results, words
 from microrad.studio.draft.draft import Draft
 from microrad.studio.draft.keys import value_of
-from microrad.study import story as study
+from microrad.study import study
 from shipped import DEFAULT, SHIPPED
 
 SHORTER = {
@@ -162,7 +162,7 @@ def numbers(text, folder, parts):
     path = folder / "mission.toml"
     path.write_text(text, encoding="utf-8")
     try:
-        found = study.run(load_mission(path), parts=parts)
+        found = study.run_study(load_mission(path), parts=parts)
     except (MissionError, ValueError) as error:
         return {"refused": str(error)}
     drawn = {each.name: (each.title, each.caption, digest(each.columns)) for each in report.draw(found, parts).every}

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from microrad.report.identification_words import identification_data, identification_text
     from microrad.report.page import Drawn
     from microrad.report.words import summary, verdict_text
-    from microrad.study.story import Study
+    from microrad.study.study import Study
 
 __all__ = [
     "FolderError",

@@ -42,7 +42,7 @@ def of_power(beam: Beam, r: Requirement, tornado: link.Tornado) -> str:
 
 
 def _of_jitter(study: LinkStudy, r: Requirement) -> str:
-    solved = link_study.solve(study.file, "jitter.rms").solved.intervals
+    solved = link_study.solve_key(study.file, "jitter.rms").solved.intervals
     if not solved:
         return change(r, "jitter.rms")
     return at_most(r, "jitter.rms", solved[-1].high, "rad")

@@ -11,11 +11,11 @@ from microrad import link
 from microrad.core.budget import Line
 from microrad.core.units import format_input
 from microrad.link import Swing
-from microrad.link.partner_search import Finding, Found, Tracking
+from microrad.link.acquisition.partner_search import Finding, Found, Tracking
 from microrad.link.pointing import OpenLoopPointing
+from microrad.link.pointing.outage import Performance, error_rad, required_error_rad
 from microrad.link.requirement import met, of_links, outage_words
 from microrad.link.study import BeamRadius, LinkStudy, Solution
-from microrad.link.under_jitter import Performance, error_rad, required_error_rad
 from microrad.mission.model import source_text
 from microrad.orbit.operations import spreadsheet_text
 from microrad.report import advice, requirements

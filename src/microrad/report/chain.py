@@ -15,7 +15,7 @@ from microrad.mirror import Variant
 from microrad.mirror.hysteresis import output_amplitude
 from microrad.report.fine_pointing_words import micro, share_of_time
 from microrad.report.quantities import quantity, signed
-from microrad.study.story import Study
+from microrad.study.study import Study
 
 _TITLE_HEIGHT, _LINE_HEIGHT, _PAD = 30, 18, 12
 _CHARACTER_WIDTH = 6.5  # of the text, in the mean of a line

@@ -62,7 +62,7 @@ def _contacts(day: DayStudy) -> Group:
 def _line_of_sight(day: DayStudy) -> Group:
     """Every contact in time, one after the other."""
     dims, each = ("sample",), day.encounters
-    wavelength = day.mission.communication.wavelength_m
+    wavelength = day.data.table.wavelength_m
     quantities = {
         "time": ("s", "time since the epoch", [e.sight.time_s for e in each]),
         "range": ("m", "range", [e.sight.range_m for e in each]),

@@ -31,7 +31,7 @@ from microrad.report.plotting.sheet import (
     Words,
     grid,
 )
-from microrad.study.story import Study
+from microrad.study.study import Study
 
 _COLOURS = (VERMILION, BLUE, GREEN)
 _SHAPES = ("o", "s", "^")  # beside the colours, for print in grey

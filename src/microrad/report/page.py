@@ -31,8 +31,8 @@ from microrad.report import (
 )
 from microrad.report.plotting.figure import Figure
 from microrad.report.quantities import quantity
-from microrad.study.pointing_cost import FINE
-from microrad.study.story import Study
+from microrad.study.pointing_penalty import FINE
+from microrad.study.study import Study
 
 PARTS = (
     ("verdict", "Verdict"),
@@ -168,10 +168,10 @@ def _day(study: Study, figures: Sequence[Figure]) -> dict[str, Any] | None:
     day, run, plan = study.day, study.contact, study.plan
     if day is None:
         return None
-    o, fine = day.mission.operations, study.fine_pointing
+    o, fine = day.operations, study.fine_pointing
     shown = None
     if run is not None and fine is not None and o is not None and o.contact is not None:
-        rate = day.mission.communication.data_rate_bit_s if o.rates_bit_s is None else None
+        rate = day.data.table.data_rate_bit_s if o.rates_bit_s is None else None
         name = fine.best.design.name
         shown = {
             "sentences": contact_run_words.sentences(run, o.contact.number, name, rate),

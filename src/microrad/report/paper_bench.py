@@ -16,7 +16,7 @@ from microrad.lab import bench, identify
 from microrad.lab.recording import Recording
 from microrad.report.plotting.figure import Figure
 from microrad.report.plotting.sheet import BLACK, BLUE, GREEN, VERMILION, Legend, Line, grid
-from microrad.study.story import Study
+from microrad.study.study import Study
 
 PLAN = "paper-experiment"
 SEED = 1

@@ -1,7 +1,7 @@
 """How a value with its unit stands in tables."""
 
 from microrad.core.units import format_quantity
-from microrad.link.radial_error import SMALLEST_PROBABILITY
+from microrad.link.pointing.radial_error import SMALLEST_PROBABILITY
 
 _NOTHING_DB = 1e-9  # what rounding leaves of a margin that is none
 

@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from microrad import link
-from microrad.link.budget import FREE_SPACE_LOSS, POINTING_LOSS
+from microrad.link.budget.lines import FREE_SPACE_LOSS, POINTING_LOSS
 from microrad.link.requirement import Requirement, Subject
 from microrad.loop.fine_pointing.parts import GAUGE_NOISE, OPTICAL_NOISE
 from microrad.mirror import Variant
@@ -15,7 +15,7 @@ from microrad.report.fine_pointing_words import percent, source_name
 from microrad.report.quantities import apart, quantity
 from microrad.report.requirements import signed
 from microrad.study.alternatives import Reading
-from microrad.study.story import Study
+from microrad.study.study import Study
 from microrad.study.verdict import unknown
 
 Row = dict[str, Any]

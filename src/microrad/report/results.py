@@ -19,7 +19,7 @@ from microrad.report.carried import hash_of_summary
 from microrad.report.fine_pointing_data import margins, rms_by_source, sources
 from microrad.report.paper_bench import PLAN, SEED
 from microrad.report.variables import Group, Variable, coordinate, variable
-from microrad.study.story import Study
+from microrad.study.study import Study
 
 MOST_INPUT_BYTES = 1_000_000
 """Length up to which a file that the mission names is carried in the manifest."""

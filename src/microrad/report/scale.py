@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass
 
 from microrad.mirror.hysteresis import slow_gain
-from microrad.study.story import Study
+from microrad.study.study import Study
 
 APART = 2.0
 """Steps by which a statistic of one run may move: 3.5 standard deviations of what two roundings differ by.

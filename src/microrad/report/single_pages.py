@@ -38,7 +38,7 @@ def day(of: DayStudy, links: LinkStudy) -> str:
         .get_template("day_page.html")
         .render(
             study=links,
-            mission=of.mission,
+            mission=links.file.mission,
             day=day_views.context(of, figures, files=False),
             inputs=list(links.file.sources.items()),
         )

@@ -14,7 +14,7 @@ from microrad.mirror import Variant
 from microrad.report import fine_pointing_words as words
 from microrad.report.plotting.figure import Figure
 from microrad.report.plotting.sheet import BLACK, BLUE, GREEN, ORANGE, Legend, Line, Rule, Words, grid
-from microrad.study.story import Study
+from microrad.study.study import Study
 
 SIGMAS = 2.576  # 99 %, as of the interval of the rms
 SHARES = (0.5, 0.9, 0.99, 0.999, 0.9999, 0.99999)

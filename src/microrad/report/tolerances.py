@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cache
 
-from microrad.orbit.events import TOLERANCE_S
+from microrad.orbit.visibility.events import TOLERANCE_S
 from microrad.report.scale import Scale
 
 

@@ -4,7 +4,7 @@ import math
 from typing import Any
 
 from microrad.core.units import format_quantity
-from microrad.link.budget import DEEPEST_DB, POINT_AHEAD_LOSS, POINTING_LOSS
+from microrad.link.budget.lines import DEEPEST_DB, POINT_AHEAD_LOSS, POINTING_LOSS
 from microrad.link.requirement import IMPOSSIBLE, outage_words
 from microrad.loop.paper_cases import Run
 from microrad.mirror import Variant
@@ -22,8 +22,8 @@ from microrad.report import (
 from microrad.report.fine_pointing_data import data as fine_pointing_data
 from microrad.report.quantities import quantity, signed
 from microrad.report.tables import table_text, tables_text
-from microrad.study.pointing_cost import FINE, Cost
-from microrad.study.story import Study
+from microrad.study.pointing_penalty import FINE, Cost
+from microrad.study.study import Study
 
 
 def headline(study: Study) -> str:
