@@ -200,7 +200,7 @@ def test_a_worker_that_was_given_up_is_started_anew(engine):
     assert nanny not in own.workers.values()
 
 
-@pytest.mark.parametrize("deed", ["endless", "hog"])
+@pytest.mark.parametrize("deed", [pytest.param("endless", marks=pytest.mark.endurance), "hog"])
 def test_close_stops_at_once_whatever_runs_and_leaves_nothing(deed, tmp_path, monkeypatch):
     """At once: its workers are killed before anything is waited for; what they do has no end of its own."""
     table = {"else": f"{deed} {tmp_path}/begun", "0": "work"}

@@ -24,7 +24,7 @@ from microrad.campaign.rows.loops import controllers
 from microrad.campaign.rows.plan import planned
 from microrad.campaign.statistics.summary import is_precise, summarise_campaign
 from microrad.core import kernels
-from small_campaign import campaign_file, children, finished, halted, halting, kill, started
+from small_campaign import campaign_file, children, finished, halted, halting, kill, started, without_worker
 from waiting import HANG_S, any_moment, gone, until
 
 OFTEN = bool(os.environ.get("MICRORAD_ENDURANCE"))
@@ -62,8 +62,11 @@ def long(tmp_path_factory):
     """A campaign of 32 chunks, and the table of an undisturbed run."""
     folder = tmp_path_factory.mktemp("long")
     rates = ", ".join(f'"{100 + 10 * i} Mbit/s"' for i in range(16))
-    path = campaign_file(folder, runs=96, duration="0.3 s", more=f'[grid]\n"communication.data_rate" = [{rates}]\n')
-    book = begun(folder)
+    grid = f'[grid]\n"communication.data_rate" = [{rates}]\n'
+    path = campaign_file(folder, runs=96 if OFTEN else 65, duration="0.3 s", more=grid)  # two chunks of a cell
+    with pytest.MonkeyPatch.context() as patch:
+        without_worker(patch)
+        book = begun(folder)
     return path, load_campaign(path), table(book)
 
 
@@ -119,6 +122,7 @@ def test_kills_of_worker_and_parent_change_nothing(call, long, tmp_path):
     assert gone(*dead)
 
 
+@pytest.mark.usefixtures("rows_here")
 def test_ctrl_c_stops_at_once_and_says_how_to_go_on(call, long, tmp_path):
     """At once: of the chunks that workers finish from then on, no more is taken in than the one that was at hand."""
     path, campaign, undisturbed = long
@@ -157,7 +161,7 @@ def test_a_second_process_on_a_ledger_is_refused_and_a_reader_is_not(long, tmp_p
 def short(tmp_path_factory):
     """A campaign of few chunks whose rows have loops of their own, and its table."""
     folder = tmp_path_factory.mktemp("short")
-    path = campaign_file(folder, runs=16, sampling="sobol", duration="2 s", worst=1, more=NOISE + GRID)
+    path = campaign_file(folder, runs=16, sampling="sobol", duration="1.6 s", worst=1, more=NOISE + GRID)
     return path, load_campaign(path), table(begun(folder))
 
 
@@ -213,6 +217,7 @@ def test_cells_have_the_same_draws_and_differ_by_their_value(short):
 
 
 # -------------------------------------------------------------------------------------------------------------- damage
+@pytest.mark.usefixtures("rows_here")
 def test_a_flipped_bit_is_found_and_only_its_chunk_done_again(call, short, tmp_path):
     path, campaign, undisturbed = short
     book = tmp_path / "campaign.ledger"
@@ -236,6 +241,7 @@ def test_a_flipped_bit_is_found_and_only_its_chunk_done_again(call, short, tmp_p
     assert call("campaign", "verify", book).code == 0
 
 
+@pytest.mark.usefixtures("rows_here")
 def test_a_full_disk_stops_it_in_words_and_it_goes_on_once_there_is_room(call, short, tmp_path):
     path, _, undisturbed = short
     disk = tmp_path / "disk"
