@@ -14,7 +14,7 @@ from microrad.loop.controller_study import scenario
 from microrad.mission import file as missionfile
 from microrad.mission.file import NamedFile, load_mission, with_contents
 from microrad.orbit import day
-from microrad.report.page import Drawn
+from microrad.report.study.page import StudyFigures
 from microrad.study import study
 from shipped import SHIPPED
 
@@ -69,7 +69,7 @@ def quick():
         )
         patch.setattr(study.paper, "applies", lambda mission: False)
         patch.setattr(day, "swings", lambda *args: ())
-        patch.setattr(report, "draw", lambda *args: Drawn())
+        patch.setattr(report, "study_figures", lambda *args: StudyFigures())
         yield
 
 
