@@ -281,7 +281,7 @@ FULL = """
     from microrad.campaign.records import CampaignError
     with Ledger.open(Path(sys.argv[1]), write=False) as ledger:
         try:
-            export(ledger, Path(sys.argv[2]))
+            export_rows(ledger, Path(sys.argv[2]))
         except CampaignError as error:
             print(error)
 """
