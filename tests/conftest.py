@@ -122,17 +122,19 @@ def folder(tmp_path, monkeypatch):
 @pytest.fixture
 def undrawn(monkeypatch):
     """Reports without figures; `test_init_then_run` and `test_identify_prints_both_models…` draw them."""
-    from microrad.report import (  # not for every file of tests
-        day_plots,
-        figures,
-        identification_figures,
-        link_figures,
-        paper_bench,
-    )
+    from microrad.report.day import figures as day
+    from microrad.report.identification import page as identification
+    from microrad.report.links import figures as links
+    from microrad.report.paper import bench, figures
 
-    for module in (day_plots, figures, link_figures, paper_bench):
-        monkeypatch.setattr(module, "draw", lambda *args: ())
-    monkeypatch.setattr(identification_figures, "draw", lambda *args, **more: {})
+    for module, name in (
+        (day, "day_figures"),
+        (figures, "paper_figures"),
+        (links, "link_figures"),
+        (bench, "bench_figures"),
+    ):
+        monkeypatch.setattr(module, name, lambda *args: ())
+    monkeypatch.setattr(identification, "identification_figures", lambda *args, **more: {})
 
 
 @pytest.fixture

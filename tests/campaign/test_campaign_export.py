@@ -57,7 +57,7 @@ def write(folder, numbers=((0, 2, 1), (1, 0)), cells=None, order=1, rows=ROWS):
 
 def exported(path, target):
     with Ledger.open(path, write=False) as ledger:
-        return export.export(ledger, target)
+        return export.export_rows(ledger, target)
 
 
 def expected():

@@ -25,10 +25,11 @@ from microrad.lab.identify import (
     mirror_file_text,
     predict,
 )
-from microrad.lab.identify.hysteresis.structures import LinearPoles, Roots, propagated
+from microrad.lab.identify.hysteresis.structures import LinearPoles, Roots
 from microrad.lab.identify.selection import candidates, choice
 from microrad.lab.identify.selection.candidates import refit_winner
 from microrad.lab.identify.selection.choice import choose_best
+from microrad.lab.identify.statistics import propagated
 from microrad.mirror import model as mirror
 from microrad.mirror.hysteresis import Play
 from microrad.mission.file import load_mirror

@@ -9,7 +9,9 @@ import pytest
 from browser import violations
 from microrad import report
 from microrad.lab.identify import identify
-from microrad.report import campaign_page, single_pages
+from microrad.report.campaign.page import campaign_page
+from microrad.report.day.page import day_page
+from microrad.report.links.page import links_page
 from report import test_identification_report as identified
 from report import test_report_campaign as campaigns
 from report import test_report_fine_pointing as fine_loops
@@ -40,9 +42,9 @@ def files(found, tmp_path_factory):
     fine = fine_loops.made_up(found.file)
     recordings = [identified.loop(60.0, 1, "60.csv"), identified.loop(100.0, 3, "100.csv"), identified.chirp()]
     texts = {
-        "day": lambda: single_pages.day(found.day, found.links),
-        "budget": lambda: single_pages.budget(found.links),
-        "campaign": lambda: campaign_page.html(campaigns.CASES["two inputs"]()),
+        "day": lambda: day_page(found.day, found.links),
+        "budget": lambda: links_page(found.links),
+        "campaign": lambda: campaign_page(campaigns.CASES["two inputs"]()),
     }
 
     @cache

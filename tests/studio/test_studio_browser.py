@@ -15,7 +15,7 @@ import pytest
 from browser import Studio, settled, until, violations
 from microrad.campaign.statistics.interim import Interim
 from microrad.campaign.statistics.summary import summarise_campaign
-from microrad.report import campaign_words
+from microrad.report.campaign import words as campaign_words
 from microrad.studio import server
 from microrad.studio.draft.draft import Draft
 from small_campaign import campaign_file, children, halted
