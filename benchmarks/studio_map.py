@@ -85,12 +85,12 @@ def latencies_ms(moved, drawn, corner_of):
 
 def corners_db(positions):
     """What the corner of the map is at each position of the slider, computed here."""
-    from microrad.studio import link_view
-    from microrad.studio.dials import dial
-    from microrad.studio.draft import Draft
+    from microrad.studio.draft.draft import Draft
+    from microrad.studio.views import link as link_view
+    from microrad.studio.views.sliders import slider
 
     draft = Draft.open(MISSION)
-    frame, slider = link_view.view(draft.link()).frame, dial(draft.values[KEY])
+    frame, slider = link_view.view(draft.link()).frame, slider(draft.values[KEY])
     views = {each: link_view.view(draft.set(KEY, slider.at(each)).link(), frame) for each in positions}
     return {each: float(view.margin_db[0, 0]) for each, view in views.items()}
 

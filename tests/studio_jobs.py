@@ -2,7 +2,7 @@
 
 import json
 
-from microrad.studio import signing
+from microrad.studio.guard import signing
 
 
 def described(jobs, **told):

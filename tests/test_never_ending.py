@@ -18,9 +18,10 @@ from microrad.loop import disturbance
 from microrad.mission import file as mission_file
 from microrad.mission.file import MissionError
 from microrad.report import carried
-from microrad.studio import compare_view, runs_view
-from microrad.studio.draft import Draft, DraftError
-from microrad.studio.workshop import Workshop
+from microrad.studio.draft.draft import Draft, DraftError
+from microrad.studio.session import Session
+from microrad.studio.views import compare as compare_view
+from microrad.studio.views import runs as runs_view
 from shipped import DEFAULT
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs named pipes")
@@ -76,8 +77,8 @@ def test_a_file_that_never_comes_is_refused(never, name, read, refusal, words):
 def test_what_never_comes_is_none_of_what_is_looked_for(never, tmp_path):
     (tmp_path / "leo-geo.toml").write_bytes(DEFAULT.read_bytes())
     never("old/manifest.json")
-    workshop = Workshop(tmp_path)
-    assert compare_view.finished_study(workshop, workshop.draft) is None
+    session = Session(tmp_path)
+    assert compare_view.finished_study(session, session.draft) is None
     assert not runs_view._of_campaign(never("c.toml"), 0, 0)
     assert mission_file._content(never("named.csv")) is None
 

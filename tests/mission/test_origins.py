@@ -7,7 +7,7 @@ from microrad.mission import origins
 from microrad.mission.file import assumptions, changed_from_shipped, load_link, load_mission
 from microrad.mission.presets import preset_text, presets
 from microrad.mission.toml import scan
-from microrad.studio.draft import Draft
+from microrad.studio.draft.draft import Draft
 from shipped import SHIPPED
 
 TEXT = SHIPPED.read_text("utf-8")

@@ -14,7 +14,11 @@ from microrad.mission import toml as document
 from microrad.mission.file import load_mission
 from microrad.report import compared, page, results, tolerances
 from microrad.report.plotting import palette
-from microrad.studio import address, guard, jobs_process, reading, server, uploads, workshop
+from microrad.studio import server, session
+from microrad.studio.guard import address
+from microrad.studio.guard import middleware as guard
+from microrad.studio.jobs import process as jobs_process
+from microrad.studio.recordings import reading, uploads
 from microrad.study import story as study
 from places import ROOT
 from shipped import DEFAULT
@@ -102,7 +106,7 @@ def test_the_limits_of_the_studio_are_those_of_the_code():
     )
     assert rows["reading one: samples of a channel"] == f"{read.samples / 1e6:g} million"
     assert document.MAX_BYTES == 1_000_000
-    told(STUDIO, "A file of more than 1 MB is no mission.", f"Its own things stand in `{workshop.STUDIO}` there")
+    told(STUDIO, "A file of more than 1 MB is no mission.", f"Its own things stand in `{session.STUDIO}` there")
     first, second = jobs_process.WAITS_S
     told(STUDIO, f"gets SIGTERM {first:g} s later, and SIGKILL {second:g} s behind that")
 

@@ -9,19 +9,22 @@ import pytest
 
 from microrad.core.kernels import bouc_wen_response
 from microrad.lab.identify import STATIC, identify
-from microrad.lab.live_fit import FITS, LiveFit, Loop, looker_on, thinned
+from microrad.lab.live_fit import LIVE_FITS, LiveFit, Loop, live_fit_writer, thin_fit
 from microrad.lab.recording import RecordingError, read_recording, recording_from_arrays
 from microrad.loop import fine_pointing
 from microrad.loop import paper_cases as tracking
 from microrad.loop.fine_loop import linear
 from microrad.mission.file import load_mission
-from microrad.studio import control_model, control_view, live_fit, mirror_form, mirror_view
-from microrad.studio.control_model import PID, PID_INVERSE, WITH, WITHOUT
-from microrad.studio.draft import Draft
-from microrad.studio.jobs_files import Job, Progress
-from microrad.studio.mirror_form import Dropped, Form, Setting, SettingError
-from microrad.studio.mirror_use import with_mirror_file
-from microrad.studio.reading import ChannelInfo, Listing, Note, View
+from microrad.studio.draft.draft import Draft
+from microrad.studio.draft.mirror_file import with_mirror_file
+from microrad.studio.jobs.files import Job, Progress
+from microrad.studio.recordings.reading import ChannelInfo, Listing, Note, View
+from microrad.studio.views import control as control_view
+from microrad.studio.views import controllers as control_model
+from microrad.studio.views import live_fit, mirror_form
+from microrad.studio.views import mirror as mirror_view
+from microrad.studio.views.controllers import PID, PID_INVERSE, WITH, WITHOUT
+from microrad.studio.views.mirror_form import Dropped, Form, Setting, SettingError
 from scenes import cases_of, scene_of
 from shipped import SHIPPED
 
@@ -54,13 +57,13 @@ def test_each_model_is_handed_over_as_it_is_scored_in_the_end(identified):
 
 def test_fits_are_read_as_they_were_written(identified, tmp_path):
     _, seen = identified
-    look = looker_on(str(tmp_path / "progress"))
+    look = live_fit_writer(str(tmp_path / "progress"))
     assert live_fit.read_fits(tmp_path) == ()
     for n, each in enumerate(seen, start=1):
         look(each)
         assert len(live_fit.read_fits(tmp_path)) == n
     fits = live_fit.read_fits(tmp_path)
-    assert fits == tuple(thinned(each) for each in seen)
+    assert fits == tuple(thin_fit(each) for each in seen)
     loop = fits[1].loops[0]
     assert loop.name == "50Hz.csv"
     assert len(loop.drive) == len(loop.model_rad) == len(loop.measured_rad) == 200  # two periods of 100 samples
@@ -72,23 +75,23 @@ def test_fits_are_read_as_they_were_written(identified, tmp_path):
 
 
 def test_a_line_that_is_being_written_is_left_out(identified, tmp_path):
-    look = looker_on(str(tmp_path / "progress"))
+    look = live_fit_writer(str(tmp_path / "progress"))
     look(identified[1][0])
-    with (tmp_path / FITS).open("a") as file:
+    with (tmp_path / LIVE_FITS).open("a") as file:
         file.write('{"model": "bouc_w')
     assert [each.model for each in live_fit.read_fits(tmp_path)] == ["prandtl_ishlinskii"]
 
 
 def test_nobody_looks_on_without_a_file_and_a_disk_that_refuses_does_not_end_the_fit(identified, tmp_path):
-    looker_on(None)(identified[1][0])
-    (tmp_path / FITS).mkdir()
-    looker_on(str(tmp_path / "progress"))(identified[1][0])
+    live_fit_writer(None)(identified[1][0])
+    (tmp_path / LIVE_FITS).mkdir()
+    live_fit_writer(str(tmp_path / "progress"))(identified[1][0])
     assert live_fit.read_fits(tmp_path) == ()
-    assert [each.name for each in tmp_path.iterdir()] == [FITS]
+    assert [each.name for each in tmp_path.iterdir()] == [LIVE_FITS]
 
 
 def test_the_command_writes_its_fits_beside_its_progress(call, folder, monkeypatch):
-    """`microrad identify` hands `looker_on` to `identify`: without it the page shows no live fit."""
+    """`microrad identify` hands `live_fit_writer` to `identify`: without it the page shows no live fit."""
     record = recorded()
     np.savetxt(folder / "loop.csv", np.hstack([record.drive, record.output]), delimiter=",", header="drive,angle")
     monkeypatch.setenv("MICRORAD_PROGRESS", str(folder / "progress"))
@@ -223,7 +226,8 @@ def test_units_that_a_recording_denies_are_refused(tmp_path, setting, use, words
         Dropped("b", "b.csv", tmp_path / "b.csv"),
     ]
     if words is None:
-        assert mirror_form.identification(tmp_path, recordings, setting).output_unit == setting.output_unit
+        said = " ".join(mirror_form.identification(tmp_path, recordings, setting).arguments)
+        assert f"--output-unit {setting.output_unit}" in said
         return
     with pytest.raises(SettingError) as refusal:
         mirror_form.identification(tmp_path, recordings, setting)
@@ -262,7 +266,7 @@ def test_the_reader_s_words_name_the_fields_of_the_form(tmp_path):
 def test_what_is_missing_in_the_form_is_said(tmp_path, setting, words):
     (tmp_path / "there.html").touch()
     recordings = [Dropped("k", "a.csv", tmp_path / "up" / "a.csv")]
-    assert mirror_form.identification(tmp_path, recordings, Setting(0, 1, name="new")).mirror_file.name == "new.toml"
+    assert mirror_form.identification(tmp_path, recordings, Setting(0, 1, name="new")).results[0] == "new.toml"
     with pytest.raises(SettingError) as refusal:
         mirror_form.identification(tmp_path, recordings, setting)
     assert words in str(refusal.value)
@@ -289,7 +293,7 @@ def test_the_form_becomes_the_command(tmp_path):
     assert order.arguments == (*action.arguments, "--json")
     assert order.results == ("stage x.toml", "stage x.html")
     angle = mirror_form.identification(tmp_path, recordings, replace(setting, output_unit="mrad"))
-    assert angle.lever_arm_m is None
+    assert "--lever-arm" not in angle.arguments
     with pytest.raises(SettingError, match="recordings: none is to be fitted; drop one, or set its use to fit"):
         mirror_form.identification(tmp_path, recordings[1:], setting)
 
@@ -328,7 +332,13 @@ def viewed():
 
 
 def titles(figure):
-    return [axis["title"]["text"] for key, axis in figure["layout"].items() if key[1:5] == "axis" and "title" in axis]
+    axes = [axis["title"]["text"] for key, axis in figure["layout"].items() if key[1:5] == "axis"]
+    return [title for title in axes if title]
+
+
+def straight(figure, words):
+    """Where the straight lines of this name stand on the vertical axis."""
+    return [shape["y0"] for shape in figure["layout"]["shapes"] if words in shape.get("name", "")]
 
 
 def test_a_recording_is_drawn_with_its_units():
@@ -337,7 +347,7 @@ def test_a_recording_is_drawn_with_its_units():
     assert titles(loop) == ["drive (mV)", "output (µm)"]
     assert (loop["data"][0]["x"], loop["data"][0]["y"]) == ([0.0, 1.0, 2.0], [5.0, 6.0, 7.0])
     over_time = mirror_view.time_plot(viewed(), setting)
-    assert titles(over_time) == ["time (s)", "drive (mV)", "output (µm)"]
+    assert titles(over_time) == ["drive (mV)", "time (s)", "output (µm)"]
     assert over_time["data"][1]["x"] == [0.0, 1.5, 2.99]
     assert mirror_view.about(viewed()) == "300 samples at 100 Hz, 3 s."
     assert mirror_view.findings(viewed()) == ["The output drifts."]
@@ -581,17 +591,15 @@ def test_plots_carry_units_limits_and_both_variants(pi, answers):
     for draw, axes in shown.items():
         figure = draw(answers)
         assert tuple(titles(figure)) == axes
-        assert figure["layout"]["yaxis"]["exponentformat"] == "none"  # no "100k" µrad
+        assert figure["layout"]["yaxis"]["minexponent"] == 5  # no "100k" µrad
         assert [t["name"] for t in figure["data"] if "hysteresis" in t["name"]] == [WITH, WITHOUT]
         assert all(len(t["x"]) == len(t["y"]) <= 2500 for t in figure["data"])
-    drive = control_view.drive_plot(pi, answers.jitter, "s")
-    limits = [t["y"][0] for t in drive["data"] if t["name"] == "amplifier's limits"]
-    assert limits == [*pi.limits_v] == [-6.0, 6.0]
+    drive = control_view.drive_plot(pi, answers.jitter, control_view.SECONDS)
+    assert straight(drive, "amplifier's limits") == [*pi.limits_v] == [-6.0, 6.0]
     apart = control_view.drive_plot(replace(pi, identified_v=(-3.0, 3.0)), answers.step)
-    assert [t["y"][0] for t in apart["data"] if t["name"] == "range of the identification"] == [-3.0, 3.0]
-    ceiling = [t for t in control_view.sensitivity_plot(pi)["data"] if "margin asked for" in t["name"]]
-    assert ceiling[0]["y"] == [2.0, 2.0]
-    assert titles(control_view.gain_plot(pi)) == ["frequency", "|L|, loop gain"]
+    assert straight(apart, "range of the identification") == [-3.0, 3.0]
+    assert straight(control_view.sensitivity_plot(pi), "margin asked for") == [2.0]
+    assert titles(control_view.gain_plot(pi)) == ["frequency (Hz)", "|L|, loop gain"]
     assert control_view.answer_words(answers.step, "Error").startswith(f"Error: {WITH} ")
     assert control_view.answer_words({}, "Error") == ""
 

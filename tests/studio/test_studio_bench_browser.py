@@ -14,8 +14,8 @@ import pytest
 from browser import until
 from cli.test_cli import write_recording
 from microrad.lab import bench
-from microrad.studio.live_fit import read_fits
-from microrad.studio.mirror_form import kept_form
+from microrad.studio.views.live_fit import read_fits
+from microrad.studio.views.mirror_form import kept_form
 from places import DATA
 
 api = pytest.importorskip("playwright.sync_api", reason="Playwright is not installed")
@@ -37,7 +37,7 @@ def recording(tmp_path_factory):
             "arm": "50 mm",
             "said": "type the sample rate",
         }
-    files = bench.write(
+    files = bench.write_folder(
         bench.load_plan("paper-experiment"), folder / "played", 0, False, lambda done, total, what: None
     )
     loop = next(path for path in files if path.stem == "loop-100hz")
@@ -199,7 +199,8 @@ def test_a_controller_is_chosen_and_its_loop_answers(opened, picture):
     assert re.search(r"0\.\d{3}", rows.inner_text())
     both = traces(tab, "Step response")
     assert list(both) == ["wanted", "with hysteresis", "without hysteresis"]
-    assert "amplifier's limits" in traces(tab, "Drive behind a step")
+    drive = tab.get_by_label("Drive behind a step", exact=True)
+    assert "amplifier's limits" in drive.evaluate("plot => plot.layout.shapes.map(each => each.name)")
     tab.get_by_role("button", name="without", exact=True).click()
     tab.wait_for_function("document.querySelector('[aria-label=\"Step response\"]').data.length === 2")
     assert list(traces(tab, "Step response")) == ["wanted", "without hysteresis"]

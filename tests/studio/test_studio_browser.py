@@ -13,11 +13,11 @@ from pathlib import Path
 import pytest
 
 from browser import Studio, settled, until, violations
-from microrad.campaign.interim import Interim
-from microrad.campaign.summary import summarise
+from microrad.campaign.statistics.interim import Interim
+from microrad.campaign.statistics.summary import summarise_campaign
 from microrad.report import campaign_words
 from microrad.studio import server
-from microrad.studio.draft import Draft
+from microrad.studio.draft.draft import Draft
 from small_campaign import campaign_file, children, halted
 
 api = pytest.importorskip("playwright.sync_api", reason="Playwright is not installed")
@@ -121,7 +121,7 @@ def test_a_file_that_another_program_changes_is_told_and_opened_again(studio, ta
         tab.get_by_role("status").get_by_text("saved", exact=True).wait_for()
 
 
-def test_a_dial_that_is_typed_is_in_the_file_that_a_click_on_save_writes_at_once(studio, opened):
+def test_a_slider_that_is_typed_is_in_the_file_that_a_click_on_save_writes_at_once(studio, opened):
     before = studio.file.read_text("utf-8")
     tab = opened("link")
     size = tab.get_by_label("LEO aperture", exact=True)
@@ -343,7 +343,7 @@ def test_a_campaign_shows_its_figures_while_it_runs_goes_on_after_a_cancel_and_h
     again.get_by_text(f"Of all {rows} rows").wait_for()
     assert first.get_by_role("button", name="Go on").count() == 0
     api.expect(there.get_by_text("rows so far")).to_be_hidden()  # the ledger is the newer job's now
-    headline = campaign_words.headline(summarise(studio.folder / "campaign.ledger"))
+    headline = campaign_words.headline(summarise_campaign(studio.folder / "campaign.ledger"))
     api.expect(again.locator(".runs-figures").get_by_text(headline)).to_be_visible()
     again.get_by_role("button", name="Write its report").click()
     again.get_by_role("button", name="Show campaign.html here").click()

@@ -15,10 +15,14 @@ from microrad import link
 from microrad.link import study as link_study
 from microrad.link import under_jitter
 from microrad.orbit import day as day_study
-from microrad.report import day_plots, figures
-from microrad.studio import attempts, day_view, dials, link_view, plots, pointing_view
-from microrad.studio.draft import Draft
-from microrad.studio.latest import Latest, shared
+from microrad.report import day_plots
+from microrad.report.plotting.sheet import Axis, Line, Rule, grid
+from microrad.studio.draft.draft import Draft
+from microrad.studio.views import attempts, plots, sliders
+from microrad.studio.views import day as day_view
+from microrad.studio.views import link as link_view
+from microrad.studio.views import pointing as pointing_view
+from microrad.studio.views.latest import Latest, shared
 from waiting import HANG_S
 
 
@@ -37,13 +41,13 @@ def day(draft):
     return day_view.run(draft.set("operations.runs", "2").link(), lambda done, total, what: None)
 
 
-def dial_of(draft, key):
-    return dials.dial(draft.values[key])
+def slider_of(draft, key):
+    return sliders.slider(draft.values[key])
 
 
-# --------------------------------------------------------------------------------------------------------------- dials
-def test_a_dial_stands_at_its_value_and_writes_its_unit(draft):
-    aperture = dial_of(draft, "terminals.leo_aperture")
+# ------------------------------------------------------------------------------------------------------------ sliders
+def test_a_slider_stands_at_its_value_and_writes_its_unit(draft):
+    aperture = slider_of(draft, "terminals.leo_aperture")
     assert (aperture.label, aperture.typed, aperture.unit) == ("LEO aperture", "5 cm", "cm")
     assert aperture.at(aperture.position) == "5 cm"
     assert (aperture.at(0), aperture.at(aperture.steps)) == ("1 cm", "20 cm")
@@ -68,27 +72,27 @@ def test_a_link_with_more_light_received_than_sent_is_missed(draft):
     assert [each.met for each in close[1:]] == [each.met for each in far[1:]] == [True, True]
 
 
-def test_every_position_of_every_dial_is_a_value_that_the_mission_takes(draft):
-    groups = link_view.dials(draft) | pointing_view.dials(draft)
-    every = [dial for group in groups.values() for dial in group]
+def test_every_position_of_every_slider_is_a_value_that_the_mission_takes(draft):
+    groups = link_view.sliders(draft) | pointing_view.sliders(draft)
+    every = [slider for group in groups.values() for slider in group]
     assert len(every) > 30
-    for dial in every:
-        about = draft.values[dial.key].about
-        for position in (0, dial.steps // 3, dial.position, dial.steps) if dial.scale != "none" else ():
-            typed = dial.at(position)
+    for slider in every:
+        about = draft.values[slider.key].about
+        for position in (0, slider.steps // 3, slider.position, slider.steps) if slider.scale != "none" else ():
+            typed = slider.at(position)
             value = about.quantity.read(typed if about.unit else float(typed))  # raises where it is refused
-            assert math.isfinite(value), (dial.key, typed)
+            assert math.isfinite(value), (slider.key, typed)
 
 
-def test_a_dial_in_decibels_is_linear_and_ends_at_the_bound_of_the_mission(draft):
-    loss = dial_of(draft.set("communication.transmit_optics_loss", "0 dB"), "communication.transmit_optics_loss")
+def test_a_slider_in_decibels_is_linear_and_ends_at_the_bound_of_the_mission(draft):
+    loss = slider_of(draft.set("communication.transmit_optics_loss", "0 dB"), "communication.transmit_optics_loss")
     assert (loss.scale, loss.low, loss.high, loss.at(0), loss.at(5)) == ("linear", 0.0, 10.0, "0 dB", "0.5 dB")
-    level = dial_of(draft.set("beacon.required_power", "-80 dBm"), "beacon.required_power")
+    level = slider_of(draft.set("beacon.required_power", "-80 dBm"), "beacon.required_power")
     assert (level.scale, level.at(0), level.at(level.steps)) == ("linear", "-90 dBm", "-70 dBm")
 
 
-def test_a_dial_grows_for_a_value_outside_and_keeps_its_range_for_one_inside(draft):
-    aperture = dial_of(draft, "terminals.leo_aperture")
+def test_a_slider_grows_for_a_value_outside_and_keeps_its_range_for_one_inside(draft):
+    aperture = slider_of(draft, "terminals.leo_aperture")
     inside, outside = aperture.holding("7 cm"), aperture.holding("90 cm")
     assert (inside.low, inside.high, inside.value) == (aperture.low, aperture.high, 7.0)
     assert (outside.low, outside.high, outside.position) == (aperture.low, 90.0, outside.steps)
@@ -98,26 +102,26 @@ def test_a_dial_grows_for_a_value_outside_and_keeps_its_range_for_one_inside(dra
 
 @pytest.mark.parametrize("typed", ["largest", "", "5,2 cm", "5"])
 def test_what_is_no_quantity_has_no_slider(draft, typed):
-    rate = dial_of(draft, "communication.data_rate")
+    rate = slider_of(draft, "communication.data_rate")
     assert rate.scale == "logarithmic"
     assert rate.holding(typed).scale == "none"
 
 
 def test_a_share_near_one_has_no_slider_and_a_small_one_does_not_reach_one(draft):
-    assert dial_of(draft, "pointing.confidence").scale == "none"
-    outage = dial_of(draft, "requirement.outage")
+    assert slider_of(draft, "pointing.confidence").scale == "none"
+    outage = slider_of(draft, "requirement.outage")
     assert outage.scale == "logarithmic"
     assert float(outage.at(outage.steps)) < 1.0
 
 
-def test_a_fault_is_told_beside_its_dial_in_the_words_of_the_command_line(draft):
+def test_a_fault_is_told_beside_its_slider_in_the_words_of_the_command_line(draft):
     wrong = draft.set("terminals.leo_aperture", "5")
-    told = dials.faulty(wrong, ["terminals.leo_aperture", "terminals.geo_aperture"])
+    told = sliders.faulty(wrong, ["terminals.leo_aperture", "terminals.geo_aperture"])
     assert [*told] == ["terminals.leo_aperture"]
     assert "without a unit" in told["terminals.leo_aperture"]
     assert "a length with its unit" in told["terminals.leo_aperture"]
     assert wrong.problems[0].reason in told["terminals.leo_aperture"]
-    assert dials.faulty(draft, ["terminals.leo_aperture"]) == {}
+    assert sliders.faulty(draft, ["terminals.leo_aperture"]) == {}
 
 
 # ------------------------------------------------------------------------------------------------------------ attempts
@@ -219,14 +223,19 @@ def test_rows_of_a_budget_are_its_lines_and_its_sums(view):
     assert rows[-1]["value"] == f"{budget.margin_db:.2f} dB"
 
 
+def lines(figure):
+    """What the legend of a figure names: curves and straight lines."""
+    return [each for each in (*figure["data"], *figure["layout"]["shapes"]) if each.get("showlegend")]
+
+
 def test_the_plots_are_plain_data_with_units_on_their_axes(view, draft, day):
     pointed = pointing_view.view(draft.link())
     drawn = {
         "map": link_view.map_plot(view),
         "lines": pointing_view.lines_plot(pointed),
         "coverage": pointing_view.coverage_plot(pointed),
-        "timeline": day_view.timeline_plot(day),
-        "volume": day_view.volume_plot(day),
+        "timeline": plots.figure(day_view.figures(day)["day-timeline"].sheet),
+        "volume": plots.figure(day_view.figures(day)["data-volume"].sheet),
     }
     units = {"map": "µrad", "lines": "µrad", "coverage": "µrad", "timeline": "hours", "volume": "GB"}
     for name, figure in drawn.items():
@@ -234,9 +243,8 @@ def test_the_plots_are_plain_data_with_units_on_their_axes(view, draft, day):
         titles = [figure["layout"][axis]["title"]["text"] for axis in ("xaxis", "yaxis")]
         assert any(units[name] in title for title in titles), name
         assert figure["config"]["displaylogo"] is False
-    # the data rates of the map carry their unit at each tick
     assert "300 Mbit/s" in link_view.map_words(view)
-    assert all(text.endswith("bit/s") for text in drawn["map"]["layout"]["xaxis"]["ticktext"])
+    assert drawn["map"]["layout"]["xaxis"]["title"]["text"] == "data rate (Mbit/s)"
     assert drawn["map"]["data"][0]["z"][0][0] == pytest.approx(view.margin_db[0, 0], abs=0.006)
 
 
@@ -246,10 +254,10 @@ def test_the_words_of_the_map_name_both_ways_out_and_that_there_is_none(draft, v
     assert "no pointing error at 300 Mbit/s" in link_view.map_words(dark)
 
 
-def test_dials_are_those_of_the_links_and_the_seldom_moved_stand_behind(draft):
-    found = link_view.dials(draft)
+def test_sliders_are_those_of_the_links_and_the_seldom_moved_stand_behind(draft):
+    found = link_view.sliders(draft)
     assert [*found] == ["Telescopes", "Communication", "Beacon", "Answer", "Required"]
-    keys = [dial.key for group in found.values() for dial in group]
+    keys = [slider.key for group in found.values() for slider in group]
     assert "fine_pointing.body.error" not in keys
     assert next(key for key in keys if link_view.second(key)) == "communication.wavelength"
     assert not link_view.second("terminals.leo_aperture")
@@ -258,11 +266,11 @@ def test_dials_are_those_of_the_links_and_the_seldom_moved_stand_behind(draft):
 def test_the_study_of_the_links_gives_tables_sentences_and_what_moves_the_margin(draft):
     study = link_study.run(draft.link())
     drawn = link_view.tornado_plot(study)
-    low, high = drawn["data"]
     first = study.tornados[0].swings[0]
-    assert low["y"][0].startswith(first.key)
-    assert low["base"] + low["x"][0] == pytest.approx(first.margin_low_db)
-    assert high["base"] + high["x"][0] == pytest.approx(first.margin_high_db)
+    assert drawn["layout"]["yaxis"]["ticktext"][0].startswith(first.key.removeprefix("communication."))
+    bars = [bar for each in drawn["data"] for bar in zip(each["y"], each["base"], each["x"], strict=True)]
+    ends = [base + length for row, base, length in bars if row == 0]
+    assert sorted(ends) == pytest.approx(sorted((first.margin_low_db, first.margin_high_db)), rel=1e-4)
     assert "Tracking sensor" in link_view.tables(study)
     assert any(sentence.startswith("The links close") for sentence in link_view.consequences(study))
     assert not any(sentence.startswith("Warning: ") for sentence in link_view.consequences(study))
@@ -303,7 +311,7 @@ def test_without_beacon_and_point_ahead_the_page_says_so(tmp_path):
     assert pointing_view.words(found) == ["The mission has no beacon, so nothing is to be covered."]
     assert pointing_view.ahead_rows(found) == []
     assert {row["beacon"] for row in pointing_view.total_rows(found)} == {"no beacon"}
-    names = [trace["name"] for trace in pointing_view.coverage_plot(found)["data"]]
+    names = [line["name"] for line in lines(pointing_view.coverage_plot(found))]
     assert names[0] == "inside this angle"
     assert not any("beacon" in name for name in names)
     assert len(link_view.view(bare).margins) == 1
@@ -320,16 +328,18 @@ def test_the_curve_of_coverage_is_the_budget_s(draft):
 
 # ----------------------------------------------------------------------------------------------------------------- day
 def test_the_timeline_has_every_contact_of_either_way(day):
-    rows = day_view.timeline_rows(day)
-    assert [name for name, _, _ in rows] == ["relay", "direct: kiruna", "eclipse of LEO"]
-    assert len(rows[0][2]) == len(day.relay.contacts)
-    assert float(np.sum(rows[0][2][:, 1] - rows[0][2][:, 0])) == pytest.approx(day.relay.contact_s, rel=1e-9)
-    bars = day_view.timeline_plot(day)["data"][1]
-    assert bars["base"][0] == pytest.approx(day.direct.contacts[0].start_s / 3600.0, abs=1e-5)
+    shown = day_view.figures(day)["day-timeline"]
+    begins, ends = shown.columns["relay, start (s)"], shown.columns["relay, end (s)"]
+    assert {name.partition(",")[0] for name in shown.columns} == {"relay", "direct: kiruna", "eclipse of LEO"}
+    assert len(begins) == len(day.relay.contacts)
+    assert float(np.sum(ends - begins)) == pytest.approx(day.relay.contact_s, rel=1e-9)
+    bars = plots.figure(shown.sheet)["data"][1]
+    assert bars["base"][0] == pytest.approx(day.direct.contacts[0].start_s / 3600.0, rel=1e-5)
 
 
 def test_the_map_is_that_of_the_report_and_loads_nothing(day):
-    address, words = day_view.ground_map(day)
+    shown = day_view.figures(day)["world-map"]
+    address, words = day_view.image(shown), shown.caption
     kind, _, data = address.partition(",")
     drawn = base64.b64decode(data, validate=True).decode()
     assert kind == "data:image/svg+xml;base64"
@@ -341,16 +351,16 @@ def test_the_map_is_that_of_the_report_and_loads_nothing(day):
 
 
 def test_volumes_end_where_the_ways_do(day):
-    drawn = {trace["name"]: trace for trace in day_view.volume_plot(day)["data"]}
-    assert [*drawn][:2] == ["made by the instrument", "delivered, relay"]
-    assert drawn["delivered, relay"]["y"][-1] == pytest.approx(day.relay.history.delivered_bit[-1] / 8e9, rel=1e-4)
-    assert max(drawn["on board, direct downlink"]["y"]) == pytest.approx(
-        day.direct.history.largest_stored_bit / 8e9, rel=0.05
-    )
+    drawn = plots.figure(day_view.figures(day)["data-volume"].sheet)["data"]
+    names = "made by the instrument", "relay", "direct downlink"
+    assert tuple(trace["name"] for trace in drawn) == (*names, *names[1:])
+    assert drawn[1]["y"][-1] == pytest.approx(day.relay.history.delivered_bit[-1] / 8e9, rel=1e-4)
+    assert max(drawn[4]["y"]) == pytest.approx(day.direct.history.largest_stored_bit / 8e9, rel=0.05)
 
 
 def test_latencies_rise_to_what_arrives_and_pass_their_median(day):
-    time_s, share = day_view.distribution(day.relay)
+    shown = day_view.figures(day)["latency"].columns
+    time_s, share = shown["relay, latency (s)"], shown["relay, share"]
     assert np.all(np.diff(time_s) > 0.0)
     assert np.all(np.diff(share) >= -1e-12)
     before, behind = np.interp(day.relay.median_s * (1.0 + np.array([-1e-6, 1e-6])), time_s, share)
@@ -377,22 +387,41 @@ def test_a_mission_without_orbits_says_what_is_missing(draft, tmp_path):
 
 
 # --------------------------------------------------------------------------------------------------------------- plots
-def test_the_palette_is_the_report_s():
-    names = ("BLACK", "ORANGE", "SKY", "GREEN", "BLUE", "VERMILION")
-    assert [getattr(plots, name) for name in names] == [getattr(figures, name) for name in names]
-
-
 def test_a_name_in_a_plot_is_no_markup():
-    assert plots.plain("<b>x</b>\n<img src=//evil>") == "&lt;b&gt;x&lt;/b&gt; &lt;img src=//evil&gt;"
-    assert plots.plain("a" * 100) == "a" * 39 + "…"
+    at = np.array([0.0, 1.0])
+    drawn = plots.plot(
+        Axis("<b>x</b>"), Axis("y"), Line(at, at, label="<img src=//evil>"), Rule(0.5, True, label="<i>r")
+    )
+    assert drawn["layout"]["xaxis"]["title"]["text"] == "&lt;b&gt;x&lt;/b&gt;"
+    assert [line["name"] for line in lines(drawn)] == ["&lt;img src=//evil&gt;", "&lt;i&gt;r"]
+    assert plots.empty("<b>")["layout"]["annotations"][0]["text"] == "&lt;b&gt;"
 
 
-def test_ticks_of_data_rates_are_round_and_within():
-    places, words = plots.decades(1e7, 1e10, "bit/s")
-    assert words == ["10 Mbit/s", "30 Mbit/s", "100 Mbit/s", "300 Mbit/s", "1 Gbit/s", "3 Gbit/s", "10 Gbit/s"]
-    assert np.allclose(places[:3], np.log10([1e7, 3e7, 1e8]))
-    assert plots.decades(1e8, 5e8, "bit/s")[1] == ["100 Mbit/s", "200 Mbit/s", "500 Mbit/s"]
-    assert len(plots.decades(1.0, 1e10, "bit/s")[0]) == 11
+def test_panels_of_a_sheet_stand_where_the_sheet_has_them():
+    at = np.array([0.0, 1.0])
+    sheet, (above, below) = grid(6.0, 4.0, 2, share_x=True)
+    above.add(Line(at, at))
+    below.add(Line(at, at))
+    layout = plots.figure(sheet)["layout"]
+    assert layout["yaxis"]["domain"][1] == layout["xaxis"]["domain"][1] == 1.0
+    assert layout["yaxis2"]["domain"][0] == 0.0
+    assert 0.3 < layout["yaxis2"]["domain"][1] < layout["yaxis"]["domain"][0] < 0.7
+    assert layout["xaxis"]["domain"] == layout["xaxis2"]["domain"]
+
+
+def test_the_legend_names_each_curve_once_and_what_is_not_drawn():
+    at = np.array([0.0, 1.0])
+    alike = Line(at, at, label="a"), Line(at, 2.0 * at, label="a")
+    drawn = plots.plot(
+        Axis("x"), Axis("y"), *alike, Line(at[:0], at[:0], "#D55E00", "--", label="far"), Line(at, at, "#0072B2")
+    )
+    assert [(each.get("name"), each["showlegend"]) for each in drawn["data"]] == [
+        ("a", True),
+        ("a", False),
+        ("", False),
+        ("far", True),
+    ]
+    assert drawn["data"][-1]["x"] == [None]
 
 
 # -------------------------------------------------------------------------------------------------------------- latest
@@ -460,7 +489,6 @@ def test_what_pages_share_belongs_to_its_owner():
 
 def test_nothing_of_this_needs_a_browser():
     folder = Path(link_view.__file__).parent
-    names = ("link_view", "pointing_view", "day_view", "dials", "plots", "latest", "attempts")
-    texts = [(folder / f"{name}.py").read_text("utf-8") for name in names]
-    assert len(texts) == 7
+    texts = [path.read_text("utf-8") for path in folder.glob("*.py")]
+    assert len(texts) > 10
     assert not any("nicegui" in text for text in texts)

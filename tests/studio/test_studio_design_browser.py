@@ -1,4 +1,4 @@
-"""The pages of links, pointing and day in a browser: dials are moved and typed, and what they show follows."""
+"""The pages of links, pointing and day in a browser: sliders are moved and typed, and what they show follows."""
 
 import json
 
@@ -9,9 +9,9 @@ from browser import check_quiet, until
 from microrad import link
 from microrad.link.study import largest_rate
 from microrad.report.quantities import signed
-from microrad.studio import link_view
-from microrad.studio.dials import dial
-from microrad.studio.draft import Draft
+from microrad.studio.draft.draft import Draft
+from microrad.studio.views import link as link_view
+from microrad.studio.views.sliders import slider
 
 APERTURE = "LEO aperture"
 KEY = "terminals.leo_aperture"
@@ -118,7 +118,7 @@ def test_a_slider_that_is_moved_shows_its_value_in_the_map_and_writes_it_when_le
 
 
 def test_quick_steps_of_a_slider_never_go_back_and_end_at_the_last_in_map_field_and_mission(studio, links):
-    aperture = dial(Draft.open(studio.file).values[KEY])
+    aperture = slider(Draft.open(studio.file).values[KEY])
     last = aperture.at(aperture.position + 12)
     links.evaluate(DRAWN)
     links.get_by_role("slider", name=f"{APERTURE}, slider").locator("[tabindex='0']").focus()
@@ -141,7 +141,7 @@ def test_quick_steps_of_a_slider_never_go_back_and_end_at_the_last_in_map_field_
 
 def test_a_wrong_unit_is_told_beside_its_field_and_the_last_map_stays(studio, links):
     typed(links, APERTURE).fill("5 W")
-    told = links.locator(".dial", has=typed(links, APERTURE)).get_by_role("alert")
+    told = links.locator(".slider", has=typed(links, APERTURE)).get_by_role("alert")
     told.wait_for()
     (fault,) = Draft.open(studio.file).set("terminals.leo_aperture", "5 W").problems
     assert told.inner_text() == f"{fault.reason}; expected {fault.expected}"

@@ -10,9 +10,9 @@ from microrad.mission.file import MissionError, load_mission
 from microrad.mission.model import Mission
 from microrad.mission.presets import preset_text
 from microrad.mission.toml import value_of
-from microrad.studio import draft as drafts
-from microrad.studio.draft import Draft, DraftError
-from microrad.studio.draft_keys import key_of, keys_in
+from microrad.studio.draft import draft as drafts
+from microrad.studio.draft.draft import Draft, DraftError
+from microrad.studio.draft.keys import key_of, keys_in
 from shipped import DEFAULT, SHIPPED, without_fine_pointing
 
 TEXT = SHIPPED.read_text("utf-8")

@@ -14,8 +14,8 @@ from pathlib import Path
 import pytest
 
 from browser import new_context, watched
-from microrad.studio import address, policy
-from microrad.studio.guard import Guard, Limits
+from microrad.studio.guard import address, policy
+from microrad.studio.guard.middleware import Guard, Limits
 from waiting import HANG_S, until
 
 PORT = 8123
@@ -578,8 +578,8 @@ def test_tokens_cannot_be_guessed_and_short_ones_are_refused():
 SERVER = """
 import sys
 import uvicorn
-from microrad.studio import address
-from microrad.studio.guard import Guard
+from microrad.studio.guard import address
+from microrad.studio.guard.middleware import Guard
 
 async def app(scope, receive, send):
     if scope["type"] == "lifespan":
@@ -810,8 +810,9 @@ import uvicorn
 from fastapi import FastAPI
 from nicegui import ui
 from nicegui.client import templates
-from microrad.studio import address, policy
-from microrad.studio.guard import Guard
+from microrad.studio.guard import address
+from microrad.studio.guard import policy
+from microrad.studio.guard.middleware import Guard
 
 MISSION = "<img src=x onerror='window.slipped = 1'>"
 

@@ -13,9 +13,10 @@ from pathlib import Path
 import pytest
 
 from microrad.core import kept
-from microrad.studio import jobs as jobs_module
-from microrad.studio import jobs_files, jobs_process
-from microrad.studio.jobs import JobError, Jobs, Order
+from microrad.studio.jobs import files as jobs_files
+from microrad.studio.jobs import process as jobs_process
+from microrad.studio.jobs import queue as jobs_module
+from microrad.studio.jobs.queue import JobError, Jobs, Order
 from small_campaign import campaign_file, children, kill
 from studio_jobs import written
 from waiting import HANG_S, gone, lines_of, until
@@ -133,7 +134,7 @@ def test_a_job_goes_on_when_whoever_started_it_is_gone(tmp_path):
     """The page and its server are there to look on: both may be killed."""
     campaign_file(tmp_path, runs=64)
     code = (
-        "from pathlib import Path; from microrad.studio.jobs import Jobs, Order; import os, signal\n"
+        "from pathlib import Path; from microrad.studio.jobs.queue import Jobs, Order; import os, signal\n"
         "jobs = Jobs(Path('studio'))\n"
         "jobs.submit(Order('study', 't', ('presets',), Path('.')))\n"
         "jobs.submit(Order('study', 't', ('init', 'after.toml'), Path('.')))\n"
@@ -276,7 +277,7 @@ def test_the_queue_goes_on_in_order_and_nothing_starts_twice(studio, tmp_path):
     for number in range(1, 5):
         studio.submit(order(tmp_path, "init", f"{number}.toml"))
     place = str(studio.folder.parent)
-    look = f"import pathlib; from microrad.studio.jobs import Jobs; Jobs(pathlib.Path({place!r})).listed()"
+    look = f"import pathlib; from microrad.studio.jobs.queue import Jobs; Jobs(pathlib.Path({place!r})).listed()"
     tabs = [subprocess.Popen([sys.executable, "-c", look]) for _ in range(4)]
     assert [tab.wait(HANG_S) for tab in tabs] == [0] * 4
     found = [ended(studio.folder / str(number)) for number in range(1, 5)]
@@ -500,7 +501,7 @@ def test_a_lock_has_one_holder_and_is_seen_by_any_number(tmp_path):
 def test_a_lock_is_gone_with_its_process(tmp_path):
     path = tmp_path / "alive"
     code = (
-        "import sys, time; from pathlib import Path; from microrad.studio.jobs_files import held\n"
+        "import sys, time; from pathlib import Path; from microrad.studio.jobs.files import held\n"
         "with held(Path(sys.argv[1]), 1.0): print('mine', flush=True); time.sleep(86400)\n"
     )
     other = subprocess.Popen([sys.executable, "-c", code, str(path)], stdout=subprocess.PIPE)

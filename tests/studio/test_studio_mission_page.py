@@ -7,10 +7,10 @@ from types import SimpleNamespace
 
 import pytest
 
-from microrad.studio import draft as drafts
-from microrad.studio.draft import Draft, DraftError
-from microrad.studio.names import NameRefusedError
-from microrad.studio.workshop import Workshop
+from microrad.studio.draft import draft as drafts
+from microrad.studio.draft.draft import Draft, DraftError
+from microrad.studio.guard.names import NameRefusedError
+from microrad.studio.session import Session
 from shipped import SHIPPED
 
 pytest.importorskip("nicegui", reason="the studio is not installed (nicegui)")
@@ -19,7 +19,7 @@ from nicegui.client import Client
 from nicegui.page import page as at
 
 from microrad.studio.pages import layout, mission, mission_files, runs
-from microrad.studio.pages.dial_page import DialPage
+from microrad.studio.pages.slider_page import SliderPage
 from waiting import until
 
 LEO, GEO = "terminals.leo_aperture", "terminals.geo_aperture"
@@ -27,21 +27,21 @@ TEXT = SHIPPED.read_text("utf-8")
 
 
 @pytest.fixture
-def workshop(tmp_path):
+def session(tmp_path):
     """The paper's mission, saved."""
     (tmp_path / "leo-geo.toml").write_text(TEXT, "utf-8")
-    return Workshop(tmp_path)
+    return Session(tmp_path)
 
 
 @pytest.fixture
-def opened(workshop):
+def opened(session):
     """Opens tabs on the mission page, at the table of the terminals."""
     clients = []
 
     def enter():
         clients.append(Client(at("/"), request=None))
         with clients[-1]:
-            found = mission._Page(workshop)
+            found = mission._Page(session)
             found.form.show("terminals")
         return found
 
@@ -61,41 +61,41 @@ def field(page, key):
 
 
 # ------------------------------------------------------------------------------------------------------ lose no work
-def test_the_editor_cannot_undo_its_way_from_one_mission_into_another(workshop, opened):
+def test_the_editor_cannot_undo_its_way_from_one_mission_into_another(session, opened):
     page, other = opened(), opened()
     before, others = page.editor, other.editor
-    workshop.set(LEO, "6 cm")
+    session.set(LEO, "6 cm")
     page._all()
     assert page.editor is before  # the change of another tab can be undone
-    workshop.folder.joinpath("b.toml").write_text(TEXT.replace('"5 cm"', '"7 cm"'), "utf-8")
-    workshop.replace(Draft.open(workshop.inside("b.toml")))
+    session.folder.joinpath("b.toml").write_text(TEXT.replace('"5 cm"', '"7 cm"'), "utf-8")
+    session.replace(Draft.open(session.inside("b.toml")))
     edited(page, page.editor.value + "# of the first mission\n")
-    assert "of the first" not in workshop.draft.text
+    assert "of the first" not in session.draft.text
     assert page.editor is not before
     other._all()
     assert before.is_deleted
     assert others.is_deleted
-    assert page.editor.value == other.editor.value == workshop.draft.text
+    assert page.editor.value == other.editor.value == session.draft.text
     assert '"7 cm"' in page.editor.value
 
 
 def test_a_mission_that_was_never_saved_is_not_dropped_without_a_word(tmp_path):
-    workshop = Workshop(tmp_path)
-    assert mission_files._lost(workshop) == ""  # as it began: it can be begun again
-    workshop.set(LEO, "6 cm")
-    assert mission_files._lost(workshop) == "leo-geo.toml is not on disk and will be lost; save it first to keep it."
-    workshop.save()
-    assert mission_files._lost(workshop) == ""
-    workshop.set(LEO, "7 cm")
-    assert mission_files._lost(workshop) == "Changes that are not saved will be lost."
-    workshop.save()
+    session = Session(tmp_path)
+    assert mission_files._lost(session) == ""  # as it began: it can be begun again
+    session.set(LEO, "6 cm")
+    assert mission_files._lost(session) == "leo-geo.toml is not on disk and will be lost; save it first to keep it."
+    session.save()
+    assert mission_files._lost(session) == ""
+    session.set(LEO, "7 cm")
+    assert mission_files._lost(session) == "Changes that are not saved will be lost."
+    session.save()
     (tmp_path / "leo-geo.toml").unlink()
-    assert "will be lost" in mission_files._lost(workshop)
+    assert "will be lost" in mission_files._lost(session)
 
 
-def test_a_change_of_another_thread_is_not_lost_by_saving(workshop, monkeypatch):
-    workshop.set(LEO, "6 cm")
-    other, real = threading.Thread(target=workshop.set, args=(GEO, "16 cm")), workshop._lock
+def test_a_change_of_another_thread_is_not_lost_by_saving(session, monkeypatch):
+    session.set(LEO, "6 cm")
+    other, real = threading.Thread(target=session.set, args=(GEO, "16 cm")), session._lock
     waits = threading.Event()
 
     class Lock:
@@ -112,56 +112,56 @@ def test_a_change_of_another_thread_is_not_lost_by_saving(workshop, monkeypatch)
         other.start()
         until(lambda: waits.is_set() or not other.is_alive(), "the other thread at the lock")
 
-    monkeypatch.setattr(workshop, "_lock", Lock())
+    monkeypatch.setattr(session, "_lock", Lock())
     monkeypatch.setattr(drafts, "write_whole", slow)
-    workshop.save()
+    session.save()
     other.join()
-    assert workshop.draft.values[GEO].typed == "16 cm"
-    assert workshop.draft.changed
-    assert '"6 cm"' in workshop.draft.path.read_text("utf-8")
-    assert '"16 cm"' not in workshop.draft.path.read_text("utf-8")
+    assert session.draft.values[GEO].typed == "16 cm"
+    assert session.draft.changed
+    assert '"6 cm"' in session.draft.path.read_text("utf-8")
+    assert '"16 cm"' not in session.draft.path.read_text("utf-8")
 
 
-def test_two_tabs_show_what_the_other_sets_also_when_both_set_at_once(workshop, opened):
+def test_two_tabs_show_what_the_other_sets_also_when_both_set_at_once(session, opened):
     one, two = opened(), opened()
     one.form._typed(LEO, "6 cm")
     two.form._typed(GEO, "16 cm ")
     assert (field(two, LEO), two.form._rows[GEO].typed) == ("6 cm", "16 cm ")  # what is typed stays as it is
-    assert two.editor.value == workshop.draft.text
+    assert two.editor.value == session.draft.text
     assert '"6 cm"' in two.editor.value
 
 
-def test_a_text_that_is_behind_takes_nothing_back(workshop, opened):
+def test_a_text_that_is_behind_takes_nothing_back(session, opened):
     one, two = opened(), opened()
     one.form._typed(LEO, "6 cm")
     edited(two, two.editor.value + "# typed\n")
-    assert workshop.draft.values[LEO].typed == field(two, LEO) == "6 cm"
-    assert two.editor.value == workshop.draft.text
+    assert session.draft.values[LEO].typed == field(two, LEO) == "6 cm"
+    assert two.editor.value == session.draft.text
     edited(two, two.editor.value + "# typed\n")
-    assert workshop.draft.text.endswith("# typed\n")
-    assert workshop.draft.values[LEO].typed == "6 cm"
+    assert session.draft.text.endswith("# typed\n")
+    assert session.draft.values[LEO].typed == "6 cm"
 
 
-def test_a_dial_that_is_let_go_is_written_before_anything_else_is_done(workshop):
-    page = DialPage.__new__(DialPage)
-    page.workshop, page._busy = workshop, True  # with the answer to what was tried before
+def test_a_slider_that_is_let_go_is_written_before_anything_else_is_done(session):
+    page = SliderPage.__new__(SliderPage)
+    page.session, page._busy = session, True  # with the answer to what was tried before
     page._faults = SimpleNamespace(is_deleted=False)
 
     async def let_go():
         writing = asyncio.create_task(page._set(LEO, "6 cm"))
-        saving = asyncio.create_task(asyncio.to_thread(workshop.save))  # by the same click
+        saving = asyncio.create_task(asyncio.to_thread(session.save))  # by the same click
         await saving
         writing.cancel()
 
     asyncio.run(let_go())
-    assert '"6 cm"' in workshop.draft.path.read_text("utf-8")
+    assert '"6 cm"' in session.draft.path.read_text("utf-8")
 
 
 # ------------------------------------------------------------------------------------------------------ too many keys
-def test_a_mission_of_thousands_of_keys_has_some_rows_and_says_so(workshop, opened):
+def test_a_mission_of_thousands_of_keys_has_some_rows_and_says_so(session, opened):
     keys = "".join(f"k{n} = 1\n" for n in range(20_000))
     tables = "".join(f"[t{n}]\nx = 1\n" for n in range(900))
-    workshop.change(workshop.draft.with_text(keys + workshop.draft.text + tables))
+    session.change(session.draft.with_text(keys + session.draft.text + tables))
     page = opened()
     with page.section:
         page._show("general")
@@ -178,8 +178,8 @@ def test_a_mission_of_thousands_of_keys_has_some_rows_and_says_so(workshop, open
     assert list(page.form._rows) == ["k19999"]
 
 
-def test_many_faults_are_counted_and_the_first_are_listed(workshop, opened):
-    workshop.change(workshop.draft.with_text(workshop.draft.text + "".join(f"k{n} = 1\n" for n in range(70))))
+def test_many_faults_are_counted_and_the_first_are_listed(session, opened):
+    session.change(session.draft.with_text(session.draft.text + "".join(f"k{n} = 1\n" for n in range(70))))
     listed = [getattr(each, "text", "") for each in opened().faults.descendants()]
     assert "70 faults to correct" in listed
     assert "and 20 more" in listed
@@ -187,65 +187,65 @@ def test_many_faults_are_counted_and_the_first_are_listed(workshop, opened):
 
 
 # ----------------------------------------------------------------------------------------------------- changed on disk
-def test_a_file_that_another_program_changes_is_told(workshop):
-    path, revision = workshop.draft.path, workshop.revision
-    assert (workshop.disk, workshop.disk_words(), layout._words(workshop.draft, workshop.disk)) == ("", "", "saved")
+def test_a_file_that_another_program_changes_is_told(session):
+    path, revision = session.draft.path, session.revision
+    assert (session.disk, session.disk_words(), layout._words(session.draft, session.disk)) == ("", "", "saved")
     path.write_text(TEXT.replace('"5 cm"', '"12 cm"'), "utf-8")
-    assert workshop.disk == "changed"
-    assert workshop.revision == revision + 1  # so every page shows it
-    assert workshop.disk_words() == (
+    assert session.disk == "changed"
+    assert session.revision == revision + 1  # so every page shows it
+    assert session.disk_words() == (
         "leo-geo.toml was changed on disk by another program since it was opened here; open it again "
         '("Back to the saved file" on the page Mission), or save this text under another name'
     )
-    assert layout._words(workshop.draft, "changed") == "changed on disk; open it again"
-    workshop.set(LEO, "x")
-    told = layout._words(workshop.draft, workshop.disk)
+    assert layout._words(session.draft, "changed") == "changed on disk; open it again"
+    session.set(LEO, "x")
+    told = layout._words(session.draft, session.disk)
     assert told == "not saved, 1 fault to correct, changed on disk; open it again"
-    workshop.reopen()
-    assert workshop.draft.values[LEO].typed == "12 cm"
-    assert (workshop.disk, workshop.disk_words()) == ("", "")
-    assert layout._words(workshop.draft, workshop.disk) == "saved"
+    session.reopen()
+    assert session.draft.values[LEO].typed == "12 cm"
+    assert (session.disk, session.disk_words()) == ("", "")
+    assert layout._words(session.draft, session.disk) == "saved"
 
 
-def test_a_file_that_another_program_removes_is_told_and_can_be_saved_again(workshop):
-    workshop.draft.path.unlink()
-    assert (workshop.disk, workshop.disk_words()) == ("gone", "leo-geo.toml is not on disk any more; save it again")
-    assert layout._words(workshop.draft, workshop.disk) == "not saved, gone from disk"
-    workshop.save()
-    assert workshop.disk == ""
-    assert workshop.draft.path.read_text("utf-8") == TEXT
+def test_a_file_that_another_program_removes_is_told_and_can_be_saved_again(session):
+    session.draft.path.unlink()
+    assert (session.disk, session.disk_words()) == ("gone", "leo-geo.toml is not on disk any more; save it again")
+    assert layout._words(session.draft, session.disk) == "not saved, gone from disk"
+    session.save()
+    assert session.disk == ""
+    assert session.draft.path.read_text("utf-8") == TEXT
 
 
-def test_the_same_text_written_again_and_a_draft_that_is_not_saved_are_no_change_on_disk(workshop):
-    workshop.set(LEO, "6 cm")
-    assert workshop.disk == ""
-    workshop.draft.path.write_text(TEXT, "utf-8")
-    assert workshop.disk == ""
-    workshop.draft.path.write_text(workshop.draft.text, "utf-8")
-    assert workshop.disk == ""
-    workshop.save()
-    assert not workshop.draft.changed
+def test_the_same_text_written_again_and_a_draft_that_is_not_saved_are_no_change_on_disk(session):
+    session.set(LEO, "6 cm")
+    assert session.disk == ""
+    session.draft.path.write_text(TEXT, "utf-8")
+    assert session.disk == ""
+    session.draft.path.write_text(session.draft.text, "utf-8")
+    assert session.disk == ""
+    session.save()
+    assert not session.draft.changed
 
 
-def test_what_is_no_file_any_more_is_not_read(workshop):
-    workshop.draft.path.unlink()
-    os.mkfifo(workshop.draft.path)  # reading it would never end
-    assert workshop.disk == "changed"
+def test_what_is_no_file_any_more_is_not_read(session):
+    session.draft.path.unlink()
+    os.mkfifo(session.draft.path)  # reading it would never end
+    assert session.disk == "changed"
 
 
-def test_a_study_of_a_file_that_another_program_has_changed_is_not_run(workshop, monkeypatch):
+def test_a_study_of_a_file_that_another_program_has_changed_is_not_run(session, monkeypatch):
     asked = []
     monkeypatch.setattr(runs, "submit", lambda *order: asked.append(order))
     client = Client(at("/"), request=None)
     with client:
-        study = runs._Study(workshop)
+        study = runs._Study(session)
         study.folder.value = "found"
-        workshop.draft.path.write_text(TEXT.replace('"5 cm"', '"6 cm"', 1), "utf-8")
+        session.draft.path.write_text(TEXT.replace('"5 cm"', '"6 cm"', 1), "utf-8")
         asyncio.run(study._run())
         study._look()
     assert asked == [] and not study.button.enabled
-    assert study.fault.text == workshop.disk_words() != ""
-    workshop.reopen()
+    assert study.fault.text == session.disk_words() != ""
+    session.reopen()
     with client:
         study._look()
     assert study.button.enabled and study.fault.text == ""
@@ -253,17 +253,17 @@ def test_a_study_of_a_file_that_another_program_has_changed_is_not_run(workshop,
 
 
 @pytest.mark.parametrize("content", [TEXT, None])
-def test_nothing_is_saved_through_a_link_that_has_come_in_the_files_place(workshop, tmp_path_factory, content):
+def test_nothing_is_saved_through_a_link_that_has_come_in_the_files_place(session, tmp_path_factory, content):
     outside = tmp_path_factory.mktemp("outside") / "mine.toml"
     if content is not None:
         outside.write_text(content, "utf-8")
-    workshop.draft.path.unlink()
-    workshop.draft.path.symlink_to(outside)
-    workshop.set(LEO, "6 cm")
+    session.draft.path.unlink()
+    session.draft.path.symlink_to(outside)
+    session.set(LEO, "6 cm")
     with pytest.raises(DraftError, match=r"leo-geo\.toml is or lies behind a link to .*mine\.toml now, which it was"):
-        workshop.save()
+        session.save()
     with pytest.raises(NameRefusedError, match="is outside of"):
-        workshop.reopen()
+        session.reopen()
     assert not outside.exists() if content is None else outside.read_text("utf-8") == content
-    workshop.save("other.toml")
-    assert '"6 cm"' in workshop.inside("other.toml").read_text("utf-8")
+    session.save("other.toml")
+    assert '"6 cm"' in session.inside("other.toml").read_text("utf-8")

@@ -11,10 +11,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from microrad.studio import compare_view, latest
-from microrad.studio.jobs import JobError
-from microrad.studio.uploads import Uploads
-from microrad.studio.workshop import Workshop
+from microrad.studio.jobs.queue import JobError
+from microrad.studio.recordings.uploads import Uploads
+from microrad.studio.session import Session
+from microrad.studio.views import compare as compare_view
+from microrad.studio.views import latest
 from shipped import SHIPPED
 from studio_jobs import written
 
@@ -27,7 +28,7 @@ from nicegui.outbox import Outbox
 from nicegui.page import page as at
 
 from microrad.studio import pages
-from microrad.studio.pages import aside, link, mirror, runs
+from microrad.studio.pages import in_thread, link, mirror, runs
 from waiting import HANG_S
 
 FOLDER = Path(pages.__file__).parent
@@ -59,7 +60,7 @@ class Visit:
         patch.setattr(core, "loop", asyncio.get_running_loop())
         patch.setattr(client.helpers, "warn_once", lambda words, **more: self.told.append(words))
         patch.setattr(core.app, "handle_exception", lambda error: self.told.append(repr(error)))
-        patch.setattr(aside.run, "io_bound", self._wait)
+        patch.setattr(in_thread.run, "io_bound", self._wait)
         patch.setattr(ui, "timer", self._timer)
         patch.setattr(Outbox, "loop", _nothing)
         patch.setattr(Client, "run_javascript", lambda *code, **more: Answer(self._closed_in_turn))
@@ -106,11 +107,11 @@ class Visit:
 
 
 @pytest.fixture(scope="module")
-def workshop(tmp_path_factory):
+def session(tmp_path_factory):
     """A folder with a mission, a campaign, a recording and jobs that have ended; its day is computed."""
     folder = tmp_path_factory.mktemp("folder")
     (folder / "leo-geo.toml").write_text(SHIPPED.read_text("utf-8"), "utf-8")
-    found = Workshop(folder)
+    found = Session(folder)
     found.other = found.draft
     runs.write_campaign(found)
     for number, kind in enumerate(("identification", "campaign", "study"), 1):
@@ -129,15 +130,15 @@ def workshop(tmp_path_factory):
     return found
 
 
-def left(patch, workshop, build, leave):
+def left(patch, session, build, leave):
     """A visit of what `build` puts on a page, closed as it waits for this time."""
 
     async def go():
         visit = Visit(patch, leave)
         with visit.tab:
-            handlers = build(workshop, visit)
+            handlers = build(session, visit)
         await visit.over(*handlers)
-        for question in latest._shared.get(workshop, {}).values():
+        for question in latest._shared.get(session, {}).values():
             question.wait(HANG_S)
         await visit.over(*handlers)
         visit.end()
@@ -146,12 +147,12 @@ def left(patch, workshop, build, leave):
     return asyncio.run(go())
 
 
-def every_time(workshop, build):
+def every_time(session, build):
     """How often a page waits, closed in turn as it waits for each time; what is complained of, by the time."""
     told, leave = {}, 0
     while True:
         with pytest.MonkeyPatch.context() as patch:
-            visit = left(patch, workshop, build, leave)
+            visit = left(patch, session, build, leave)
         if visit.told:
             told[leave] = visit.told
         if leave and visit.waits < leave:
@@ -163,16 +164,16 @@ WAITS = {"compare": 2, "control": 4, "day": 1, "link": 3, "mirror": 4, "mission"
 
 
 @pytest.mark.parametrize("name", WAITS)
-def test_a_page_may_be_closed_whenever_it_waits(workshop, name, monkeypatch):
+def test_a_page_may_be_closed_whenever_it_waits(session, name, monkeypatch):
     monkeypatch.setattr(link, "_REST_S", -1.0)  # asks for the study of the links at once
     monkeypatch.setattr(compare_view, "link_numbers", lambda draft: ())  # takes a second of each visit
     module = importlib.import_module(f"microrad.studio.pages.{name}")
 
-    def build(workshop, visit):
-        module.page(workshop)
+    def build(session, visit):
+        module.page(session)
         return visit.looks
 
-    assert every_time(workshop, build) == (WAITS[name], {})
+    assert every_time(session, build) == (WAITS[name], {})
 
 
 def test_every_page_is_closed_here():
@@ -180,8 +181,8 @@ def test_every_page_is_closed_here():
     assert set(WAITS) == {name for name, body in parsed.items() if "page" in {getattr(e, "name", "") for e in body}}
 
 
-def dropped(workshop, visit):
-    page = mirror.MirrorPage(workshop)
+def dropped(session, visit):
+    page = mirror.MirrorPage(session)
     recording = page.uploads.listed()[0]
 
     async def stored(request):
@@ -191,9 +192,9 @@ def dropped(workshop, visit):
     return [lambda: page.drop._take(None), page.start]
 
 
-def started(workshop, visit):
+def started(session, visit):
     """A study that may be queued, and one that may not."""
-    study = runs._Study(workshop)
+    study = runs._Study(session)
     study.folder.value = "found"
     answers = cycle([None, JobError("the disk is full")])
 
@@ -202,28 +203,28 @@ def started(workshop, visit):
         if answer is not None:
             raise answer
 
-    visit.patch.setattr(workshop.jobs, "submit", submit)
+    visit.patch.setattr(session.jobs, "submit", submit)
     return [study._run, study._run]
 
 
-def told_of(workshop, visit):
+def told_of(session, visit):
     """A campaign's example that is refused, as there is one."""
-    return [runs._Campaign(workshop)._example]
+    return [runs._Campaign(session)._example]
 
 
 @pytest.mark.parametrize("build", [dropped, started, told_of])
-def test_a_page_may_be_closed_while_what_was_clicked_is_done(workshop, build):
-    times, told = every_time(workshop, build)
+def test_a_page_may_be_closed_while_what_was_clicked_is_done(session, build):
+    times, told = every_time(session, build)
     assert (times >= 2, told) == (True, {})
 
 
-def test_a_file_that_comes_after_its_page_was_closed_is_answered(workshop, monkeypatch):
+def test_a_file_that_comes_after_its_page_was_closed_is_answered(session, monkeypatch):
     """The browser may be another tab's; its request is answered whether its page is there or not."""
 
     async def send():
         visit = Visit(monkeypatch, leave=1)
         with visit.tab:
-            page = mirror.MirrorPage(workshop)
+            page = mirror.MirrorPage(session)
         recording = page.uploads.listed()[0]
         page.drop._stored = lambda request: asyncio.sleep(0, [recording])
         return visit, (await page.drop._take(None)).body
@@ -262,7 +263,7 @@ def test_a_handler_that_is_cancelled_ends():
         released.wait(HANG_S)
 
     async def cancelled():
-        task = asyncio.create_task(aside.aside(SimpleNamespace(is_deleted=False), work))
+        task = asyncio.create_task(in_thread.in_thread(SimpleNamespace(is_deleted=False), work))
         assert await asyncio.to_thread(begun.wait, HANG_S)
         task.cancel()
         await asyncio.wait([task])
@@ -272,7 +273,7 @@ def test_a_handler_that_is_cancelled_ends():
     assert asyncio.run(cancelled())
 
 
-def test_what_is_done_aside_is_answered_or_ends_whoever_asked(monkeypatch):
+def test_what_is_done_in_a_thread_is_answered_or_ends_whoever_asked(monkeypatch):
     def refuse():
         raise ValueError("a reason")
 
@@ -281,7 +282,7 @@ def test_what_is_done_aside_is_answered_or_ends_whoever_asked(monkeypatch):
         with visit.tab:
             label = ui.label()
         try:
-            return await aside.aside(label, work)
+            return await in_thread.in_thread(label, work)
         except (ValueError, asyncio.CancelledError) as error:
             return type(error), str(error)
         finally:
@@ -303,4 +304,4 @@ def test_pages_wait_by_the_one_way_that_ends_with_them():
         for node in ast.walk(ast.parse(path.read_text("utf-8")))
         if isinstance(node, ast.Attribute) and node.attr in others
     }
-    assert found == {("aside.py", "io_bound"), ("aside.py", "sleep")}
+    assert found == {("in_thread.py", "io_bound"), ("in_thread.py", "sleep")}

@@ -10,10 +10,13 @@ from pathlib import Path
 
 import pytest
 
-from microrad.studio import jobs_files, jobs_process, mirror_form, plain_files, signing
-from microrad.studio.jobs import JobError, Jobs, Order
-from microrad.studio.mirror_form import Form
-from microrad.studio.workshop import Workshop
+from microrad.studio.guard import plain_files, signing
+from microrad.studio.jobs import files as jobs_files
+from microrad.studio.jobs import process as jobs_process
+from microrad.studio.jobs.queue import JobError, Jobs, Order
+from microrad.studio.session import Session
+from microrad.studio.views import mirror_form
+from microrad.studio.views.mirror_form import Form
 from studio_jobs import described, written
 from waiting import HANG_S, alive, gone
 
@@ -115,13 +118,13 @@ def test_a_studio_opened_in_a_strangers_folder_starts_and_believes_nothing(tmp_p
     (place / "7" / "job.json").write_text(described(place, arguments=["init", "planted.toml"]), "utf-8")
     (place / "7" / "stdout").write_text("<b>believe me</b>", "utf-8")
     (place / "last").write_text("9" * 100, "utf-8")
-    workshop = Workshop(tmp_path)
-    (job,) = workshop.jobs.listed()
-    assert (job.state, workshop.jobs.output(7)) == ("unreadable", "")
-    job = workshop.jobs.submit(Order("study", "mine", ("presets",), tmp_path))
+    session = Session(tmp_path)
+    (job,) = session.jobs.listed()
+    assert (job.state, session.jobs.output(7)) == ("unreadable", "")
+    job = session.jobs.submit(Order("study", "mine", ("presets",), tmp_path))
     assert (job.number, [each.name for each in started]) == (1, ["1"])
-    workshop.jobs.remove(7)
-    assert [each.number for each in workshop.jobs.listed()] == [1]
+    session.jobs.remove(7)
+    assert [each.number for each in session.jobs.listed()] == [1]
 
 
 def test_a_number_that_is_taken_by_anything_is_passed_over(jobs, started, tmp_path):
@@ -310,7 +313,7 @@ def test_a_user_without_a_home_is_told(monkeypatch, jobs, tmp_path):
 def test_a_command_without_its_watcher_ends_with_all_that_it_has_started():
     """Where the system does not see to it by itself: the end of the pipe that the watcher holds."""
     code = (
-        "import subprocess, sys, threading, time; from microrad.studio.jobs_command import end_with\n"
+        "import subprocess, sys, threading, time; from microrad.studio.jobs.command import end_with\n"
         "inner = subprocess.Popen([sys.executable, '-c', 'import time; time.sleep(86400)'])\n"
         "threading.Thread(target=end_with, args=(0,), daemon=True).start()\n"
         "print(inner.pid, flush=True); time.sleep(86400)\n"

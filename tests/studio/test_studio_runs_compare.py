@@ -12,25 +12,26 @@ import pytest
 from microrad.link import study as link_study
 from microrad.mission.file import load_link
 from microrad.mission.presets import preset_text
-from microrad.studio import compare_view, runs_view
-from microrad.studio.commands import CampaignRun, command
-from microrad.studio.compare_view import Beside, Number
-from microrad.studio.draft import Draft, DraftError
-from microrad.studio.jobs import Job, JobError, Progress
-from microrad.studio.optional_tables import offered, with_table
-from microrad.studio.workshop import Workshop
+from microrad.studio import commands
+from microrad.studio.draft.draft import Draft, DraftError
+from microrad.studio.draft.optional_tables import offered, with_table
+from microrad.studio.jobs.queue import Job, JobError, Progress
+from microrad.studio.session import Session
+from microrad.studio.views import compare as compare_view
+from microrad.studio.views import runs as runs_view
+from microrad.studio.views.compare import Beside, Number
 from shipped import DEFAULT, SHIPPED, links_alone
 
 
 @pytest.fixture
-def workshop(tmp_path):
+def session(tmp_path):
     (tmp_path / "leo-geo.toml").write_bytes(SHIPPED.read_bytes())
-    return Workshop(tmp_path)
+    return Session(tmp_path)
 
 
 @pytest.fixture
-def draft(workshop):
-    return workshop.draft
+def draft(session):
+    return session.draft
 
 
 # ---------------------------------------------------------------------------------------------------- optional tables
@@ -98,56 +99,57 @@ def test_an_example_above_keys_of_another_table_goes_to_the_end(draft):
 
 
 # --------------------------------------------------------------------------------------------------------------- runs
-def test_a_name_that_nothing_has_yet(workshop):
-    assert runs_view.free_name(workshop, "found") == "found"
-    (workshop.folder / "found").mkdir()
-    assert runs_view.free_name(workshop, "found") == "found-2"
-    (workshop.folder / "found-2").mkdir()
-    assert runs_view.free_name(workshop, "found") == "found-3"
-    assert runs_view.free_name(workshop, "found", ".ledger") == "found.ledger"
+def test_a_name_that_nothing_has_yet(session):
+    assert runs_view.free_name(session, "found") == "found"
+    (session.folder / "found").mkdir()
+    assert runs_view.free_name(session, "found") == "found-2"
+    (session.folder / "found-2").mkdir()
+    assert runs_view.free_name(session, "found") == "found-3"
+    assert runs_view.free_name(session, "found", ".ledger") == "found.ledger"
 
 
-def test_a_name_that_a_waiting_job_will_take_is_taken(workshop, monkeypatch):
-    job = Job(1, workshop.folder, "queued", results=("found/report.html", "found/results.nc"))
-    monkeypatch.setattr(type(workshop.jobs), "listed", lambda self: (job,))
-    assert runs_view.free_name(workshop, "found") == "found-2"
-    monkeypatch.setattr(type(workshop.jobs), "listed", lambda self: (replace(job, state="cancelled"),))
-    assert runs_view.free_name(workshop, "found") == "found"
+def test_a_name_that_a_waiting_job_will_take_is_taken(session, monkeypatch):
+    job = Job(1, session.folder, "queued", results=("found/report.html", "found/results.nc"))
+    monkeypatch.setattr(type(session.jobs), "listed", lambda self: (job,))
+    assert runs_view.free_name(session, "found") == "found-2"
+    monkeypatch.setattr(type(session.jobs), "listed", lambda self: (replace(job, state="cancelled"),))
+    assert runs_view.free_name(session, "found") == "found"
 
 
-def test_campaign_files_are_told_from_missions(workshop):
-    path = runs_view.write_campaign(workshop)
-    (workshop.folder / "broken.toml").write_text("mission = [", "utf-8")
-    (workshop.folder / "binary.toml").write_bytes(b"\xff\x00")
-    (workshop.folder / "deep.toml").write_text("a." * 200_000 + "b = 1", "utf-8")  # minutes for a parser
-    assert runs_view.campaign_files(workshop) == ("campaign.toml",)
+def test_campaign_files_are_told_from_missions(session):
+    path = runs_view.write_campaign(session)
+    (session.folder / "broken.toml").write_text("mission = [", "utf-8")
+    (session.folder / "binary.toml").write_bytes(b"\xff\x00")
+    (session.folder / "deep.toml").write_text("a." * 200_000 + "b = 1", "utf-8")  # minutes for a parser
+    assert runs_view.campaign_files(session) == ("campaign.toml",)
     assert path.name == "campaign.toml"
-    assert runs_view.write_campaign(workshop).name == "campaign-2.toml"
+    assert runs_view.write_campaign(session).name == "campaign-2.toml"
 
 
-def test_an_example_campaign_names_the_mission_that_is_edited(workshop):
-    workshop.change(workshop.draft.save(workshop.inside("mine.toml")))
-    assert tomllib.loads(runs_view.write_campaign(workshop).read_text("utf-8"))["mission"] == "mine.toml"
+def test_an_example_campaign_names_the_mission_that_is_edited(session):
+    session.change(session.draft.save(session.inside("mine.toml")))
+    assert tomllib.loads(runs_view.write_campaign(session).read_text("utf-8"))["mission"] == "mine.toml"
     odd = 'a"b\\c\n.toml'
-    workshop.change(workshop.draft.save(workshop.inside(odd)))
-    path = runs_view.write_campaign(workshop)
+    session.change(session.draft.save(session.inside(odd)))
+    path = runs_view.write_campaign(session)
     assert tomllib.loads(path.read_text("utf-8"))["mission"] == odd
     path.unlink()
-    workshop.change(Draft.shipped(workshop.inside("unsaved.toml")))
+    session.change(Draft.shipped(session.inside("unsaved.toml")))
     with pytest.raises(JobError, match=r"unsaved\.toml is not saved yet, and a campaign reads it from its file"):
-        runs_view.write_campaign(workshop)
-    assert not (workshop.folder / "campaign-2.toml").exists()
+        runs_view.write_campaign(session)
+    assert not (session.folder / "campaign-2.toml").exists()
 
 
-def test_an_action_becomes_a_job_in_the_working_folder(workshop):
-    action = CampaignRun(Path("campaign.toml"), Path("x.ledger"))
-    order = runs_view.order(workshop, "campaign", "Campaign", action)
-    assert (order.cwd, order.arguments, order.results) == (workshop.folder, action.arguments, ("x.ledger",))
+def test_an_action_becomes_a_job_in_the_working_folder(session):
+    action = commands.campaign(Path("campaign.toml"), Path("x.ledger"))
+    order = runs_view.order(session, "campaign", action)
+    assert (order.title, order.cwd, order.results) == ("Campaign campaign.toml", session.folder, ("x.ledger",))
+    assert order.arguments == action.arguments
 
 
 def test_the_report_of_a_ledger_as_a_command():
-    action = runs_view.CampaignReport(Path("x.ledger"), Path("x.html"))
-    assert command(action) == "microrad campaign report x.ledger x.html --overwrite"
+    action = commands.campaign_report(Path("x.ledger"), Path("x.html"))
+    assert action.command == "microrad campaign report x.ledger x.html --overwrite"
     compile(action.python, "copied", "exec")
     assert action.results == ("x.html",)
 
@@ -208,7 +210,7 @@ def campaign(folder, number, state="done", ledger="x.ledger"):
 
 
 def report(folder, number, state="done", ledger="x.ledger"):
-    action = runs_view.CampaignReport(Path(ledger), Path("x.html"))
+    action = commands.campaign_report(Path(ledger), Path("x.html"))
     return Job(number, folder, state, "export", arguments=action.arguments, cwd=folder, results=action.results)
 
 
@@ -247,30 +249,30 @@ def test_a_campaigns_report_is_found_once_it_is_written_of_the_ledger_as_it_is(t
     assert runs_view.others((again, written, done), again).report is None  # it is of the rows before
 
 
-def test_the_ledger_of_a_campaign_lies_in_the_folder(workshop, tmp_path_factory):
-    folder, outside = workshop.folder, tmp_path_factory.mktemp("outside")
-    assert runs_view.ledger_path(workshop, campaign(folder, 1)) == folder / "x.ledger"
-    assert runs_view.ledger_path(workshop, campaign(outside, 1)) is None
-    assert runs_view.ledger_path(workshop, campaign(folder, 1, ledger="../x.ledger")) is None
+def test_the_ledger_of_a_campaign_lies_in_the_folder(session, tmp_path_factory):
+    folder, outside = session.folder, tmp_path_factory.mktemp("outside")
+    assert runs_view.ledger_path(session, campaign(folder, 1)) == folder / "x.ledger"
+    assert runs_view.ledger_path(session, campaign(outside, 1)) is None
+    assert runs_view.ledger_path(session, campaign(folder, 1, ledger="../x.ledger")) is None
     (folder / "x.ledger").symlink_to(outside / "x.ledger")
-    assert runs_view.ledger_path(workshop, campaign(folder, 1)) is None
-    assert runs_view.ledger_path(workshop, Job(1, folder, "done", "study", results=("x.ledger",))) is None
+    assert runs_view.ledger_path(session, campaign(folder, 1)) is None
+    assert runs_view.ledger_path(session, Job(1, folder, "done", "study", results=("x.ledger",))) is None
 
 
 def test_a_ledger_that_is_named_like_an_option_is_none():
-    action = runs_view.CampaignReport(Path("-x.ledger"), Path("--help"))
+    action = commands.campaign_report(Path("-x.ledger"), Path("--help"))
     assert action.arguments == ("campaign", "report", "./-x.ledger", "./--help", "--overwrite")
 
 
-def test_only_results_that_are_there_and_inside_are_offered(workshop, tmp_path_factory):
+def test_only_results_that_are_there_and_inside_are_offered(session, tmp_path_factory):
     outside = tmp_path_factory.mktemp("outside") / "secret.html"
     outside.write_text("secret", "utf-8")
-    (workshop.folder / "page.html").write_text("page", "utf-8")
-    job = Job(1, workshop.folder, "done", cwd=workshop.folder, results=(str(outside), "missing.nc", "page.html"))
-    assert runs_view.result_files(workshop, job) == ((2, "page.html"),)
+    (session.folder / "page.html").write_text("page", "utf-8")
+    job = Job(1, session.folder, "done", cwd=session.folder, results=(str(outside), "missing.nc", "page.html"))
+    assert runs_view.result_files(session, job) == ((2, "page.html"),)
     for state in ("failed", "cancelled"):  # another run has written it
-        assert runs_view.result_files(workshop, replace(job, state=state, kind="identification")) == ()
-        assert runs_view.result_files(workshop, replace(job, state=state, kind="campaign")) == ((2, "page.html"),)
+        assert runs_view.result_files(session, replace(job, state=state, kind="identification")) == ()
+        assert runs_view.result_files(session, replace(job, state=state, kind="campaign")) == ((2, "page.html"),)
 
 
 # ------------------------------------------------------------------------------------------------------------ compare
@@ -309,9 +311,9 @@ def test_a_table_of_one_mission_alone_is_one_difference(draft):
     assert (found.here, found.there) == ("2 keys", "")
 
 
-def test_the_numbers_are_those_of_the_link_study(workshop, draft):
+def test_the_numbers_are_those_of_the_link_study(session, draft):
     found = {each.name: each for each in compare_view.link_numbers(draft)}
-    study = link_study.run(load_link(workshop.folder / "leo-geo.toml"))
+    study = link_study.run(load_link(session.folder / "leo-geo.toml"))
     for budget in study.budgets:
         assert found[f"{budget.name}: margin"].value == budget.margin_db
         assert found[f"{budget.name}: received power"].value == budget.received_power_w
@@ -335,76 +337,76 @@ def test_numbers_beside_each_other_with_their_change():
     assert Beside("x", here[0], here[0]).change == "same"
 
 
-def test_the_study_of_exactly_this_text_is_found(workshop, draft):
+def test_the_study_of_exactly_this_text_is_found(session, draft):
     def put(folder, sha256, verdict):
         requirement = {"name": "margin", "unit": "dB", "required": 3.0, "actual": 2.0, "met": False}
         summary = {"verdict": verdict, "closes": True, "requirements": [requirement, {**requirement, "actual": None}]}
-        (workshop.folder / folder).mkdir()
+        (session.folder / folder).mkdir()
         data = json.dumps({"mission": {"sha256": sha256}, "summary": summary})
-        (workshop.folder / folder / "manifest.json").write_text(data, "utf-8")
+        (session.folder / folder / "manifest.json").write_text(data, "utf-8")
 
-    assert compare_view.finished_study(workshop, draft) is None
+    assert compare_view.finished_study(session, draft) is None
     put("other", "0" * 64, "of another text")
-    (workshop.folder / "broken").mkdir()
-    (workshop.folder / "broken" / "manifest.json").write_text("{", "utf-8")
-    assert compare_view.finished_study(workshop, draft) is None
+    (session.folder / "broken").mkdir()
+    (session.folder / "broken" / "manifest.json").write_text("{", "utf-8")
+    assert compare_view.finished_study(session, draft) is None
     put("mine", draft.sha256, "of this text")
-    found = compare_view.finished_study(workshop, draft)
+    found = compare_view.finished_study(session, draft)
     assert (found.folder, found.verdict, found.met) == ("mine", "of this text", False)
     assert [(each.text, each.required, each.met) for each in found.numbers] == [("2.00 dB", "3.00 dB", False)]
-    assert compare_view.finished_study(workshop, draft.set("terminals.leo_aperture", "6 cm")) is None
+    assert compare_view.finished_study(session, draft.set("terminals.leo_aperture", "6 cm")) is None
 
 
 # ------------------------------------------------------------------------------------------- the other, kept on disk
-def again(workshop):
-    return Workshop(workshop.folder)
+def again(session):
+    return Session(session.folder)
 
 
-def test_the_other_mission_survives_a_restart(workshop, draft):
-    assert again(workshop).other is None
-    paper = Draft.shipped(workshop.inside("leo-geo.toml"))
+def test_the_other_mission_survives_a_restart(session, draft):
+    assert again(session).other is None
+    paper = Draft.shipped(session.inside("leo-geo.toml"))
     for other in (
-        draft.set("terminals.leo_aperture", "6 cm").save(workshop.inside("wide.toml")),
+        draft.set("terminals.leo_aperture", "6 cm").save(session.inside("wide.toml")),
         paper,
         paper.with_text(preset_text("tbird")),
         draft.set("terminals.leo_aperture", "7 parsec"),
     ):
-        workshop.other = other
-        found = again(workshop).other
+        session.other = other
+        found = again(session).other
         assert (found.text, found.path, found.problems) == (other.text, other.path, other.problems)
-        assert again(workshop).draft == draft
-    workshop.other = None
-    assert again(workshop).other is None
+        assert again(session).draft == draft
+    session.other = None
+    assert again(session).other is None
 
 
-def test_a_file_that_the_other_mission_came_from_is_read_anew_after_a_restart(workshop, draft):
+def test_a_file_that_the_other_mission_came_from_is_read_anew_after_a_restart(session, draft):
     """As long as nothing was changed here."""
-    workshop.other = draft.save(workshop.inside("wide.toml"))
+    session.other = draft.save(session.inside("wide.toml"))
     changed = draft.set("terminals.leo_aperture", "6 cm").text
-    workshop.inside("wide.toml").write_text(changed, "utf-8")
-    assert again(workshop).other.text == changed
-    workshop.other = workshop.other.set("terminals.leo_aperture", "7 cm")
-    assert again(workshop).other.values["terminals.leo_aperture"].typed == "7 cm"
+    session.inside("wide.toml").write_text(changed, "utf-8")
+    assert again(session).other.text == changed
+    session.other = session.other.set("terminals.leo_aperture", "7 cm")
+    assert again(session).other.values["terminals.leo_aperture"].typed == "7 cm"
 
 
 @pytest.mark.parametrize("kept", ["", "{", "[]", "[" * 100_000, '{"path": 3, "disk_sha256": "", "text": ""}', "\x00"])
-def test_a_damaged_note_of_the_other_mission_is_passed_over(workshop, draft, kept):
-    workshop.other = draft
-    assert again(workshop).other == draft
-    (workshop.studio / "other.json").write_text(kept, "utf-8")
-    assert again(workshop).other is None
+def test_a_damaged_note_of_the_other_mission_is_passed_over(session, draft, kept):
+    session.other = draft
+    assert again(session).other == draft
+    (session.studio / "other.json").write_text(kept, "utf-8")
+    assert again(session).other is None
 
 
-def test_no_link_in_the_studios_folder_is_followed(workshop, draft, tmp_path_factory):
-    workshop.other = draft
-    note = workshop.studio / "other.json"
+def test_no_link_in_the_studios_folder_is_followed(session, draft, tmp_path_factory):
+    session.other = draft
+    note = session.studio / "other.json"
     elsewhere = tmp_path_factory.mktemp("elsewhere") / "other.json"
     note.rename(elsewhere)
     note.symlink_to(elsewhere)
-    assert again(workshop).other is None
+    assert again(session).other is None
     note.unlink()
     note.write_bytes(elsewhere.read_bytes())
-    assert again(workshop).other == draft
+    assert again(session).other == draft
 
 
 def test_each_table_of_the_form_is_named_as_in_the_text(draft):

@@ -1,4 +1,4 @@
-"""The studio's workshop, its server and its command: what is kept, what is refused, how it begins and ends."""
+"""The studio's session, its server and its command: what is kept, what is refused, how it begins and ends."""
 
 import json
 import os
@@ -19,11 +19,11 @@ from command_line import listing
 from microrad.mission.file import load_mission
 from microrad.mission.toml import MissionError
 from microrad.studio import server
-from microrad.studio.address import ExposureError
-from microrad.studio.draft import Draft, DraftError
-from microrad.studio.jobs import Order
-from microrad.studio.names import NameRefusedError
-from microrad.studio.workshop import STUDIO, Workshop
+from microrad.studio.draft.draft import Draft, DraftError
+from microrad.studio.guard.address import ExposureError
+from microrad.studio.guard.names import NameRefusedError
+from microrad.studio.jobs.queue import Order
+from microrad.studio.session import STUDIO, Session
 from shipped import DEFAULT, SHIPPED, links_alone
 from studio_jobs import written
 from waiting import HANG_S, lines_of, until
@@ -39,26 +39,26 @@ def file(tmp_path):
     return path
 
 
-# ----------------------------------------------------------------------------------------------------------- workshop
-def test_a_workshop_opens_the_file_that_it_is_given(file):
+# ----------------------------------------------------------------------------------------------------------- session
+def test_a_session_opens_the_file_that_it_is_given(file):
     other = file.with_name("other.toml")
     other.write_text(file.read_text("utf-8").replace('leo_aperture = "5 cm"', 'leo_aperture = "7 cm"'), "utf-8")
-    assert Workshop(file.parent, other).draft.values[APERTURE].typed == "7 cm"
-    assert Workshop(file.parent).draft.path == file
-    assert Workshop(file.parent).draft.values[APERTURE].typed == "5 cm"
+    assert Session(file.parent, other).draft.values[APERTURE].typed == "7 cm"
+    assert Session(file.parent).draft.path == file
+    assert Session(file.parent).draft.values[APERTURE].typed == "5 cm"
 
 
 def test_an_empty_folder_gets_the_shipped_mission_unsaved(tmp_path):
-    workshop = Workshop(tmp_path)
-    assert workshop.draft.text == DEFAULT.read_text("utf-8")
-    assert workshop.draft.changed
+    session = Session(tmp_path)
+    assert session.draft.text == DEFAULT.read_text("utf-8")
+    assert session.draft.changed
     assert not (tmp_path / "leo-geo.toml").exists()
 
 
 def test_unsaved_changes_survive_a_restart(file):
     before = file.read_bytes()
-    Workshop(file.parent, file).set(APERTURE, "6 cm")
-    again = Workshop(file.parent)
+    Session(file.parent, file).set(APERTURE, "6 cm")
+    again = Session(file.parent)
     assert again.draft.values[APERTURE].typed == "6 cm"
     assert again.draft.changed
     assert file.read_bytes() == before
@@ -67,109 +67,109 @@ def test_unsaved_changes_survive_a_restart(file):
 def test_unsaved_changes_of_one_file_are_not_put_into_another(file):
     other = file.with_name("other.toml")
     other.write_bytes(file.read_bytes())
-    Workshop(file.parent, file).set(APERTURE, "6 cm")
-    assert Workshop(file.parent, other).draft.values[APERTURE].typed == "5 cm"
-    assert Workshop(file.parent, file).draft.values[APERTURE].typed == "6 cm"
+    Session(file.parent, file).set(APERTURE, "6 cm")
+    assert Session(file.parent, other).draft.values[APERTURE].typed == "5 cm"
+    assert Session(file.parent, file).draft.values[APERTURE].typed == "6 cm"
 
 
 def test_what_was_saved_is_read_from_the_file_after_a_restart(file):
-    workshop = Workshop(file.parent, file)
-    workshop.set(APERTURE, "6 cm")
-    workshop.change(workshop.draft.save())
+    session = Session(file.parent, file)
+    session.set(APERTURE, "6 cm")
+    session.change(session.draft.save())
     file.write_text(file.read_text("utf-8").replace('"6 cm"', '"8 cm"'), "utf-8")
-    again = Workshop(file.parent)
+    again = Session(file.parent)
     assert again.draft.values[APERTURE].typed == "8 cm"
     assert not again.draft.changed
 
 
 def test_a_file_changed_behind_unsaved_changes_is_not_overwritten_after_a_restart(file):
-    Workshop(file.parent, file).set(APERTURE, "6 cm")
+    Session(file.parent, file).set(APERTURE, "6 cm")
     file.write_text(file.read_text("utf-8").replace('"15 cm"', '"16 cm"'), "utf-8")
     kept = file.read_bytes()
     with pytest.raises(DraftError, match="was changed since it was opened here"):
-        Workshop(file.parent).draft.save()
+        Session(file.parent).draft.save()
     assert file.read_bytes() == kept
 
 
 @pytest.mark.parametrize("kept", ["", "{", "[]", "{}", '{"path": 3, "disk_sha256": "", "text": ""}', "\x00"])
 def test_a_damaged_note_of_unsaved_changes_is_passed_over(file, kept):
-    Workshop(file.parent, file).set(APERTURE, "6 cm")
+    Session(file.parent, file).set(APERTURE, "6 cm")
     (file.parent / STUDIO / "draft.json").write_text(kept, "utf-8")
-    assert Workshop(file.parent).draft.values[APERTURE].typed == "5 cm"
+    assert Session(file.parent).draft.values[APERTURE].typed == "5 cm"
 
 
 def test_a_note_of_unsaved_changes_opens_nothing_outside_of_the_folder(file, tmp_path_factory):
     outside = tmp_path_factory.mktemp("outside") / "secret.toml"
     outside.write_text('name = "secret"', "utf-8")
-    Workshop(file.parent)
+    Session(file.parent)
     note = {"path": os.path.relpath(outside, file.parent), "disk_sha256": "", "text": "changed"}
     (file.parent / STUDIO / "draft.json").write_text(json.dumps(note), "utf-8")
-    assert Workshop(file.parent).draft.path == file
+    assert Session(file.parent).draft.path == file
 
 
 def test_nothing_outside_of_the_folder_is_opened(file, tmp_path_factory):
     elsewhere = tmp_path_factory.mktemp("elsewhere")
     with pytest.raises(NameRefusedError, match="is outside of"):
-        Workshop(elsewhere, file)
+        Session(elsewhere, file)
     with pytest.raises(NameRefusedError, match="is outside of"):
-        Workshop(file.parent).inside("../x.toml")
+        Session(file.parent).inside("../x.toml")
     assert not (elsewhere / STUDIO).exists()
 
 
 def test_each_change_is_a_new_revision_and_none_is_none(file):
-    workshop = Workshop(file.parent, file)
-    workshop.set(APERTURE, "6 cm")
-    assert workshop.revision == 1
-    workshop.set(APERTURE, "6 cm")
-    assert workshop.revision == 1
-    workshop.other = Draft.shipped("paper.toml")
-    assert workshop.revision == 2
+    session = Session(file.parent, file)
+    session.set(APERTURE, "6 cm")
+    assert session.revision == 1
+    session.set(APERTURE, "6 cm")
+    assert session.revision == 1
+    session.other = Draft.shipped("paper.toml")
+    assert session.revision == 2
 
 
 def test_a_change_is_kept_where_the_studios_folder_was_removed(file):
-    workshop = Workshop(file.parent, file)
-    shutil.rmtree(workshop.studio)
-    workshop.set(APERTURE, "6 cm")
-    assert Workshop(file.parent).draft.values[APERTURE].typed == "6 cm"
+    session = Session(file.parent, file)
+    shutil.rmtree(session.studio)
+    session.set(APERTURE, "6 cm")
+    assert Session(file.parent).draft.values[APERTURE].typed == "6 cm"
 
 
 def test_changes_of_two_tabs_are_both_kept(file):
-    workshop = Workshop(file.parent, file)
+    session = Session(file.parent, file)
     keys = ("communication.transmit_power", "beacon.transmit_power")
 
     def turn(key):
         for number in range(20):
-            workshop.set(key, f"{number + 1} W")
+            session.set(key, f"{number + 1} W")
 
     threads = [threading.Thread(target=turn, args=(key,)) for key in keys]
     for thread in threads:
         thread.start()
     for thread in threads:
         thread.join()
-    assert [workshop.draft.values[key].typed for key in keys] == ["20 W", "20 W"]
-    assert workshop.revision == 40
+    assert [session.draft.values[key].typed for key in keys] == ["20 W", "20 W"]
+    assert session.revision == 40
 
 
 def test_a_mission_with_faults_is_none_and_says_the_words_of_the_command_line(file):
-    workshop = Workshop(file.parent, file)
-    assert workshop.mission().mission == load_mission(file).mission
-    assert workshop.faults() == ""
-    workshop.set(APERTURE, "5 parsec")
-    assert workshop.mission() is None
-    assert workshop.link() is None
-    workshop.draft.save()
+    session = Session(file.parent, file)
+    assert session.mission().mission == load_mission(file).mission
+    assert session.faults() == ""
+    session.set(APERTURE, "5 parsec")
+    assert session.mission() is None
+    assert session.link() is None
+    session.draft.save()
     with pytest.raises(MissionError) as refused:
         load_mission(file)
-    assert workshop.faults() == str(refused.value)
-    assert 'no unit is called "parsec"' in workshop.faults()
+    assert session.faults() == str(refused.value)
+    assert 'no unit is called "parsec"' in session.faults()
 
 
 def test_a_link_alone_has_a_budget_and_no_mission(file):
-    workshop = Workshop(file.parent, file)
-    workshop.change(workshop.draft.with_text(links_alone(SHIPPED.read_text("utf-8"))))
-    assert workshop.link().mission.terminals.leo_aperture_m == 0.05
-    assert workshop.mission() is None
-    assert "mirror" in workshop.faults()
+    session = Session(file.parent, file)
+    session.change(session.draft.with_text(links_alone(SHIPPED.read_text("utf-8"))))
+    assert session.link().mission.terminals.leo_aperture_m == 0.05
+    assert session.mission() is None
+    assert "mirror" in session.faults()
 
 
 def test_only_the_missions_of_the_folder_itself_are_listed(file):
@@ -177,11 +177,11 @@ def test_only_the_missions_of_the_folder_itself_are_listed(file):
         path = file.parent / name
         path.parent.mkdir(exist_ok=True)
         path.write_text("", "utf-8")
-    assert [path.name for path in Workshop(file.parent).missions()] == ["b.toml", "leo-geo.toml"]
+    assert [path.name for path in Session(file.parent).missions()] == ["b.toml", "leo-geo.toml"]
 
 
 def test_the_studios_own_folder_is_private_and_overlooked_by_git(file):
-    Workshop(file.parent)
+    Session(file.parent)
     folder = file.parent / STUDIO
     assert folder.stat().st_mode & 0o777 == 0o700
     assert (folder / ".gitignore").read_text("utf-8") == "*\n"
@@ -253,7 +253,7 @@ def test_a_name_that_none_can_be_is_refused(address):
 
 
 def test_the_page_that_a_browser_is_started_with_is_its_owners_alone(file, tmp_path_factory):
-    studio = Workshop(file.parent).studio
+    studio = Session(file.parent).studio
     outside = tmp_path_factory.mktemp("outside") / "kept"
     outside.write_text("kept", "utf-8")
     (studio / "open.html").symlink_to(outside)  # came with the folder
@@ -269,7 +269,7 @@ def test_the_page_that_a_browser_is_started_with_is_its_owners_alone(file, tmp_p
 def test_only_results_of_a_job_within_the_folder_are_shown(file, tmp_path_factory):
     outside = tmp_path_factory.mktemp("outside") / "secret.html"
     outside.write_text("secret", "utf-8")
-    workshop = Workshop(file.parent)
+    session = Session(file.parent)
     (file.parent / "page.html").write_text("page", "utf-8")
     (file.parent / "link.html").symlink_to(outside)
     names = (
@@ -281,28 +281,28 @@ def test_only_results_of_a_job_within_the_folder_are_shown(file, tmp_path_factor
         ".",
         "page.html",
     )
-    written(workshop.jobs.folder, cwd=str(file.parent), results=names)
-    found = [server.result(workshop, 1, place) for place in range(-1, 8)]
+    written(session.jobs.folder, cwd=str(file.parent), results=names)
+    found = [server.result(session, 1, place) for place in range(-1, 8)]
     page = file.parent / "page.html"
     assert found == [None, page, *[None] * 5, page, None]  # none is counted from the end
-    assert server.result(workshop, 2, 0) is None
+    assert server.result(session, 2, 0) is None
 
 
 def test_a_number_that_no_job_can_have_shows_nothing(file):
-    assert server.result(Workshop(file.parent), 10**400, 0) is None
+    assert server.result(Session(file.parent), 10**400, 0) is None
 
 
 # ------------------------------------------------------------------------------------------------------------ command
 def test_a_second_studio_in_a_folder_is_refused(refused, folder, monkeypatch):
     monkeypatch.setattr(server, "serve", lambda *_: pytest.fail("there are two of them"))
-    with server.alone(Workshop(folder).studio):
+    with server.alone(Session(folder).studio):
         said = refused("studio", "--no-browser")
     assert said == (
         f"microrad: {folder} is open in another studio, process {os.getpid()}; go on in that one, or end it with "
         "Ctrl-C first: two would not see, and overwrite, each other's unsaved changes\n"
     )
     (folder / STUDIO / "open.json").write_text("{", "utf-8")
-    with server.alone(Workshop(folder).studio):  # the first is gone
+    with server.alone(Session(folder).studio):  # the first is gone
         (folder / STUDIO / "open.json").write_text("[]", "utf-8")
         assert f"microrad: {folder} is open in another studio; go on" in refused("studio", "--no-browser")
 
@@ -446,7 +446,7 @@ def test_a_browser_is_started_without_the_token_on_its_command_line(file, tmp_pa
     still_open.touch()
     for name in ("page.html", "picture.svg"):
         (file.parent / name).write_text("<script>1</script>", "utf-8")
-    job = written(Workshop(file.parent).jobs.folder, cwd=str(file.parent), results=("page.html", "picture.svg"))
+    job = written(Session(file.parent).jobs.folder, cwd=str(file.parent), results=("page.html", "picture.svg"))
     for name in ("started.json", "exit.json"):  # over, so that nobody starts it
         (job / name).write_text('{"at": "", "code": 0}', "utf-8")
     with running(file.parent, "leo-geo.toml", browser=script) as (process, url):
@@ -471,16 +471,16 @@ def test_a_browser_is_started_without_the_token_on_its_command_line(file, tmp_pa
 
 
 def test_a_job_goes_on_when_the_studio_ends(file):
-    workshop = Workshop(file.parent)
+    session = Session(file.parent)
     with running(file.parent) as (process, _):
-        job = workshop.jobs.submit(Order("study", "long", ("run", "leo-geo.toml", "--output", "x"), file.parent))
+        job = session.jobs.submit(Order("study", "long", ("run", "leo-geo.toml", "--output", "x"), file.parent))
         process.send_signal(signal.SIGTERM)
         out, _ = process.communicate(timeout=HANG_S)
     assert out == "the studio is closed; 1 of its jobs goes on, and can be seen by starting it again\n"
-    assert workshop.jobs.get(job.number).state == "running"
-    workshop.jobs.cancel(job.number)
-    until(lambda: workshop.jobs.get(job.number).finished, "the end of the job")
-    assert workshop.jobs.get(job.number).state == "cancelled"
+    assert session.jobs.get(job.number).state == "running"
+    session.jobs.cancel(job.number)
+    until(lambda: session.jobs.get(job.number).finished, "the end of the job")
+    assert session.jobs.get(job.number).state == "cancelled"
 
 
 def test_every_page_is_there():

@@ -25,10 +25,10 @@ from scipy.io import savemat
 from lab import test_recording_formats as formats
 from microrad.lab.live_fit import extremes
 from microrad.lab.recording import read_recording
-from microrad.studio import reading
-from microrad.studio.names import NameRefusedError, safe_name, within
-from microrad.studio.reading import Columns, ReadingError, ReadingLimits, list_channels, view
-from microrad.studio.uploads import UploadError, UploadLimits, Uploads
+from microrad.studio.guard.names import NameRefusedError, safe_name, within
+from microrad.studio.recordings import reading
+from microrad.studio.recordings.reading import Columns, ReadingError, ReadingLimits, list_channels, view
+from microrad.studio.recordings.uploads import UploadError, UploadLimits, Uploads
 from waiting import HANG_S, gone, lines_of
 
 posix = pytest.mark.skipif(os.name != "posix", reason="POSIX keeps modes and limits")
@@ -753,7 +753,8 @@ def test_names_too_long_for_a_request_are_refused(tmp_path, loop):
 def test_the_process_bounds_itself_before_it_reads(tmp_path):
     limits = {"memory_bytes": 3_000_000_000, "cpu_s": 20, "wall_s": 40}
     program = (
-        "import json, resource, sys; from microrad.studio.parse_process import limit; limit(json.loads(sys.argv[1]));"
+        "import json, resource, sys; from microrad.studio.recordings.process import limit;"
+        "limit(json.loads(sys.argv[1]));"
         "names = ['RLIMIT_' + n for n in ('AS', 'CPU', 'FSIZE', 'CORE')];"
         "print(json.dumps([resource.getrlimit(getattr(resource, n)) for n in names]));"
         "sys.stdout.flush(); import os; os.write(os.open('written', os.O_CREAT | os.O_WRONLY), b'x')"

@@ -14,8 +14,8 @@ from microrad.loop.fine_pointing import results as fine_results
 from microrad.mission.file import MissionError, load_mission
 from microrad.orbit.day import assumptions
 from microrad.report import results, words
-from microrad.studio.draft import Draft
-from microrad.studio.draft_keys import value_of
+from microrad.studio.draft.draft import Draft
+from microrad.studio.draft.keys import value_of
 from microrad.study import story as study
 from shipped import DEFAULT, SHIPPED
 

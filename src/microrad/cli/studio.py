@@ -10,9 +10,7 @@ from microrad.cli.frame import MET, Outcome, app, command, examples, option, say
 
 if TYPE_CHECKING:
     from microrad.studio.server import Entrance
-    from microrad.studio.workshop import Workshop
-
-# Everything else is imported inside the command: it takes longer to load than help may take.
+    from microrad.studio.session import Session
 
 
 @app.command(
@@ -44,20 +42,20 @@ def studio(
     Ctrl-C. Studies and campaigns that were started go on.
     """
     from microrad.studio import server
-    from microrad.studio.workshop import Workshop
+    from microrad.studio.session import Session
 
     server.check_installed()
     entrance = server.listen(port, expose)
     with closing(entrance.listener):
-        workshop = Workshop(Path.cwd() if file is None else file.resolve().parent, file)
-        with server.alone(workshop.studio), suppress(KeyboardInterrupt):  # the usual end of a server
-            server.serve(workshop, entrance, lambda: _ready(workshop, entrance, expose, not no_browser))
-    running = sum(not job.finished for job in workshop.jobs.listed())
+        session = Session(Path.cwd() if file is None else file.resolve().parent, file)
+        with server.alone(session.studio), suppress(KeyboardInterrupt):  # the usual end of a server
+            server.serve(session, entrance, lambda: _ready(session, entrance, expose, not no_browser))
+    running = sum(not job.finished for job in session.jobs.listed())
     going_on = f"; {running} of its jobs {'goes' if running == 1 else 'go'} on, and can be seen by starting it again"
     return Outcome(f"the studio is closed{going_on if running else ''}", MET)
 
 
-def _ready(workshop: "Workshop", entrance: "Entrance", exposed: str | None, browser: bool) -> None:
+def _ready(session: "Session", entrance: "Entrance", exposed: str | None, browser: bool) -> None:
     """Say where the studio is, and open it."""
     print(entrance.url, flush=True)
     if exposed is not None:
@@ -69,7 +67,7 @@ def _ready(workshop: "Workshop", entrance: "Entrance", exposed: str | None, brow
         from microrad.studio import server
 
         try:
-            page = server.way_in(workshop.studio, entrance.url)
+            page = server.way_in(session.studio, entrance.url)
         except OSError as error:
             say(f"the browser was not opened ({error.strerror}); open the address yourself.")
             return

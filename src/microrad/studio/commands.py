@@ -1,261 +1,242 @@
-"""What is done in the studio as a command to copy and as lines of Python to copy; both give the same numbers.
-
-Each record is one thing to do. Its `arguments` are those of microrad, for a job, too; `command` joins them to a line
-for a shell. Its `python` runs by itself, in the same folder. `results` are the files that it writes.
-"""
+"""What is done in the studio as a command to copy and as lines of Python to copy; both give the same numbers."""
 
 from __future__ import annotations
 
 import shlex
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
 
-from microrad.studio.commands_identify import Identify
-from microrad.studio.commands_pieces import WIDTH, as_path, flag, joined, mission_call, option, path_argument, path_text
-
-__all__ = [
-    "Action",
-    "Budget",
-    "CampaignResume",
-    "CampaignRun",
-    "Contacts",
-    "Design",
-    "Identify",
-    "Run",
-    "command",
-]
+_WIDTH = 80  # columns of a printed table that goes to a file, as the command line has them
 
 
-class Action(Protocol):
-    """Something done in the studio."""
+@dataclass(frozen=True, slots=True)
+class Action:
+    """Something done in the studio: `arguments` of microrad, and `python` that does the same in the same folder.
+
+    `title` is what a job of it is called, `results` are the files that it writes, seen from the working folder.
+    """
+
+    arguments: tuple[str, ...]
+    python: str = ""
+    title: str = ""
+    results: tuple[str, ...] = ()
 
     @property
-    def arguments(self) -> tuple[str, ...]:
-        """What follows `microrad` on the command line."""
-
-    @property
-    def python(self) -> str:
-        """Lines of Python that do the same."""
-
-    @property
-    def results(self) -> tuple[str, ...]:
-        """Files and folders that it writes, seen from the working folder."""
-
-
-def command(action: Action) -> str:
-    """The line for a shell."""
-    return shlex.join(("microrad", *action.arguments))
+    def command(self) -> str:
+        """The line for a shell."""
+        return shlex.join(("microrad", *self.arguments))
 
 
 # ------------------------------------------------------------------------------------------------------ from a mission
-@dataclass(frozen=True, slots=True)
-class Budget:
-    """The link budgets, as they are or with another data rate or pointing error, or with the rate solved for."""
-
-    file: Path
-    data_rate: str | None = None
-    pointing_error: str | None = None
-    results: tuple[str, ...] = ()
-
-    @property
-    def arguments(self) -> tuple[str, ...]:
-        """What follows `microrad` on the command line."""
-        return (
-            "budget",
-            path_argument(self.file),
-            *option("--data-rate", self.data_rate),
-            *option("--pointing-error", self.pointing_error),
-        )
-
-    @property
-    def python(self) -> str:
-        """Lines of Python that do the same."""
-        if self.data_rate is None and self.pointing_error is None:
-            return joined(
-                "from microrad import load_link, run_link_study",
-                "from microrad.report import budget_views",
-                "",
-                f"study = run_link_study(load_link({path_text(self.file)}))",
-                f"print(budget_views.text(study, {WIDTH}))",
-            )
-        return joined(
-            "from dataclasses import replace",
-            "",
-            "from microrad import load_link, parse_quantity, run_link_study",
-            "from microrad.mission.model import Source",
-            "from microrad.report import budget_views",
-            "",
-            f"file = load_link({path_text(self.file)})",
-            "tables, sources = {}, dict(file.sources)",
-            *self._changes(),
-            "file = replace(file, mission=file.mission.model_copy(update=tables), sources=sources)",
-            f"print(budget_views.text(run_link_study(file), {WIDTH}))",
-        )
-
-    def _changes(self) -> Iterable[str]:
-        """Lines that put what was asked for in place of the mission's values."""
-        rate, values = self.data_rate, []
-        if rate is not None:
-            read = "float('nan')" if rate == "largest" else f"parse_quantity({rate!r}, 'bit/s')"  # nan is solved for
-            values.append(f"'data_rate_bit_s': {read}")
-            yield f"sources['communication.data_rate'] = Source(0, 'command line', {rate!r})"
-        if self.pointing_error is not None:
-            values.append(f"'pointing_error_rad': parse_quantity({self.pointing_error!r}, 'rad')")
-            yield f"sources['communication.pointing_error'] = Source(0, 'command line', {self.pointing_error!r})"
-        yield f"tables['communication'] = file.mission.communication.model_copy(update={{{', '.join(values)}}})"
+def budget(file: Path) -> Action:
+    """The link budgets of a mission's file."""
+    python = _joined(
+        "from microrad import load_link, run_link_study",
+        "from microrad.report import budget_views",
+        "",
+        f"study = run_link_study(load_link({str(file)!r}))",
+        f"print(budget_views.text(study, {_WIDTH}))",
+    )
+    return Action(("budget", path_argument(file)), python)
 
 
-@dataclass(frozen=True, slots=True)
-class Contacts:
+def contacts(file: Path) -> Action:
     """Contacts with the relay and the ground, and what they deliver."""
-
-    file: Path
-    results: tuple[str, ...] = ()
-
-    @property
-    def arguments(self) -> tuple[str, ...]:
-        """What follows `microrad` on the command line."""
-        return ("contacts", path_argument(self.file))
-
-    @property
-    def python(self) -> str:
-        """Lines of Python that do the same."""
-        return joined(
-            "from microrad import load_link, run_day_study, run_link_study",
-            "from microrad.report import day_views",
-            "",
-            f"day = run_day_study(run_link_study(load_link({path_text(self.file)})))",
-            f"print(day_views.text(day, {WIDTH}))",
-        )
+    python = _joined(
+        "from microrad import load_link, run_day_study, run_link_study",
+        "from microrad.report import day_views",
+        "",
+        f"day = run_day_study(run_link_study(load_link({str(file)!r})))",
+        f"print(day_views.text(day, {_WIDTH}))",
+    )
+    return Action(("contacts", path_argument(file)), python)
 
 
-@dataclass(frozen=True, slots=True)
-class Design:
+def design(file: Path) -> Action:
     """The controllers of the fine-pointing loop."""
-
-    file: Path
-    mirror: Path | None = None
-    results: tuple[str, ...] = ()
-
-    @property
-    def arguments(self) -> tuple[str, ...]:
-        """What follows `microrad` on the command line."""
-        return ("design", path_argument(self.file), *option("--mirror", self.mirror))
-
-    @property
-    def python(self) -> str:
-        """Lines of Python that do the same."""
-        return joined(
-            "from microrad import load_mission, mirror",
-            "from microrad.link.tracking_light import tracking_light_w",
-            "from microrad.loop import fine_pointing",
-            "",
-            f"mission = {mission_call(self.file, self.mirror)}",
-            "scene = fine_pointing.scene(mission, mirror.of(mission.mission), tracking_light_w(mission))",
-            "designs = fine_pointing.design(scene)",
-            "for design, left in zip(designs, fine_pointing.outlook(scene, designs)):",
-            "    linear_urad, simulated_urad = left.linear_rad * 1e6, left.simulated_rad * 1e6",
-            "    margins = design.tuned.margins",
-            "    print(f'{design.name:28} {linear_urad:9.3f} {simulated_urad:9.3f} µrad rms, linear and simulated,'",
-            "          f' modulus margin {margins.modulus:.3f}')",
-        )
+    python = _joined(
+        "from microrad import load_mission, mirror",
+        "from microrad.link.tracking_light import tracking_light_w",
+        "from microrad.loop import fine_pointing",
+        "",
+        f"mission = load_mission({str(file)!r})",
+        "scene = fine_pointing.scene(mission, mirror.of(mission.mission), tracking_light_w(mission))",
+        "designs = fine_pointing.design(scene)",
+        "for design, left in zip(designs, fine_pointing.outlook(scene, designs)):",
+        "    linear_urad, simulated_urad = left.linear_rad * 1e6, left.simulated_rad * 1e6",
+        "    margins = design.tuned.margins",
+        "    print(f'{design.name:28} {linear_urad:9.3f} {simulated_urad:9.3f} µrad rms, linear and simulated,'",
+        "          f' modulus margin {margins.modulus:.3f}')",
+    )
+    return Action(("design", path_argument(file)), python)
 
 
-@dataclass(frozen=True, slots=True)
-class Run:
-    """The whole study of a mission, into a folder."""
-
-    file: Path
-    output: Path
-    mirror: Path | None = None
-    overwrite: bool = False
-
-    @property
-    def arguments(self) -> tuple[str, ...]:
-        """What follows `microrad` on the command line."""
-        mirror, overwrite = option("--mirror", self.mirror), flag("--overwrite", self.overwrite)
-        return ("run", path_argument(self.file), *option("--output", self.output), *mirror, *overwrite)
-
-    @property
-    def python(self) -> str:
-        """Lines of Python that do the same."""
-        return joined(
-            "from pathlib import Path",
-            "",
-            "from microrad import load_mission, run_study, verdict_text, write_report",
-            "",
-            f"study = run_study({mission_call(self.file, self.mirror)})",
-            f"write_report(study, {as_path(self.output)}, overwrite={self.overwrite})",
-            "print(verdict_text(study))",
-        )
-
-    @property
-    def results(self) -> tuple[str, ...]:
-        """The report, its data and the manifest."""
-        return tuple(str(self.output / name) for name in ("report.html", "results.nc", "manifest.json"))
+def study(file: Path, folder: Path) -> Action:
+    """The whole study of a mission's file, with its report, its data and the manifest in a new folder."""
+    python = _joined(
+        "from pathlib import Path",
+        "",
+        "from microrad import load_mission, run_study, verdict_text, write_report",
+        "",
+        f"study = run_study(load_mission({str(file)!r}))",
+        f"write_report(study, {_path(folder)})",
+        "print(verdict_text(study))",
+    )
+    results = tuple(str(folder / name) for name in ("report.html", "results.nc", "manifest.json"))
+    return Action(("run", path_argument(file), *_option("--output", folder)), python, f"Study of {file}", results)
 
 
 # ----------------------------------------------------------------------------------------------------------- campaigns
-@dataclass(frozen=True, slots=True)
-class CampaignRun:
-    """A campaign into a new ledger."""
-
-    file: Path
-    ledger: Path
-    threads: int | None = None
-
-    @property
-    def arguments(self) -> tuple[str, ...]:
-        """What follows `microrad` on the command line."""
-        ledger, threads = option("--ledger", self.ledger), option("--threads", self.threads)
-        return ("campaign", "run", path_argument(self.file), *ledger, *threads)
-
-    @property
-    def python(self) -> str:
-        """Lines of Python that do the same."""
-        begin = f"run_campaign({as_path(self.file)}, ledger, CampaignMeans(threads={self.threads}))"
-        return _campaign(self.ledger, "run_campaign", begin)
-
-    @property
-    def results(self) -> tuple[str, ...]:
-        """The ledger."""
-        return (str(self.ledger),)
+def campaign(file: Path, ledger: Path) -> Action:
+    """The campaign of a file into a new ledger."""
+    python = _campaign(ledger, "run_campaign", f"{_path(file)}, ledger")
+    arguments = ("campaign", "run", path_argument(file), *_option("--ledger", ledger))
+    return Action(arguments, python, f"Campaign {file}", (str(ledger),))
 
 
-@dataclass(frozen=True, slots=True)
-class CampaignResume:
+def resume(ledger: Path) -> Action:
     """A campaign that stopped, on to the results that it would have had."""
-
-    ledger: Path
-    threads: int | None = None
-
-    @property
-    def arguments(self) -> tuple[str, ...]:
-        """What follows `microrad` on the command line."""
-        return ("campaign", "resume", path_argument(self.ledger), *option("--threads", self.threads))
-
-    @property
-    def python(self) -> str:
-        """Lines of Python that do the same."""
-        go_on = f"resume_campaign(ledger, CampaignMeans(threads={self.threads}))"
-        return _campaign(self.ledger, "resume_campaign", go_on)
-
-    @property
-    def results(self) -> tuple[str, ...]:
-        """The ledger."""
-        return (str(self.ledger),)
+    python = _campaign(ledger, "resume_campaign", "ledger")
+    arguments = ("campaign", "resume", path_argument(ledger))
+    return Action(arguments, python, f"Campaign {ledger}, going on", (str(ledger),))
 
 
-def _campaign(ledger: Path, name: str, call: str) -> str:
-    return joined(
+def _campaign(ledger: Path, function: str, arguments: str) -> str:
+    return _joined(
         "from pathlib import Path",
         "",
-        f"from microrad import CampaignMeans, {name}, summarise_campaign",
+        f"from microrad import CampaignMeans, {function}, summarise_campaign",
         "from microrad.report import campaign_words",
         "",
-        f"ledger = {as_path(ledger)}",
-        call,
-        f"print(campaign_words.text(summarise_campaign(ledger), {WIDTH}))",
+        f"ledger = {_path(ledger)}",
+        f"{function}({arguments}, CampaignMeans())",
+        f"print(campaign_words.text(summarise_campaign(ledger), {_WIDTH}))",
     )
+
+
+def campaign_report(ledger: Path, page: Path) -> Action:
+    """The page with the pictures of a campaign's ledger."""
+    python = _joined(
+        "from pathlib import Path",
+        "",
+        "from microrad import summarise_campaign",
+        "from microrad.report import campaign_page",
+        "",
+        f"text = campaign_page.html(summarise_campaign({_path(ledger)}))",
+        f'{_path(page)}.write_text(text, encoding="utf-8")',
+    )
+    arguments = ("campaign", "report", path_argument(ledger), path_argument(page), "--overwrite")
+    return Action(arguments, python, f"Report of {ledger}", (str(page),))
+
+
+# -------------------------------------------------------------------------------------------------------- the mirror
+def identify(  # noqa: PLR0913  all but the first four are named options
+    files: Sequence[Path],
+    drive: str,
+    output: str,
+    mirror_file: Path,
+    *,
+    name: str,
+    units: tuple[str, str] = ("V", "mrad"),
+    rate_hz: float | None = None,
+    accept: tuple[str, ...] = (),
+    validate: Sequence[Path] = (),
+    lever_arm_m: float | None = None,
+    static: bool = False,
+    admissible: bool = False,
+) -> Action:
+    """A mirror from recordings, into a mirror file and its report.
+
+    `files` are fitted and those of `validate` checked. `drive` and `output` are names or numbers of their columns,
+    counted from 0, and `units` those of both; `rate_hz` is None where the files say it. `accept` names findings that do
+    not stop it. `lever_arm_m` is that of a displacement. `static` fits the hysteresis alone, `admissible` takes no
+    model that moves the wrong way. `name` is that of the mirror.
+    """
+    options: tuple[tuple[str, object], ...] = (
+        ("--input", drive),
+        ("--output", output),
+        ("--rate", rate_hz),
+        *(("--accept", finding) for finding in accept),
+        *(("--validate", file) for file in validate),
+        ("--input-unit", units[0]),
+        ("--output-unit", units[1]),
+        ("--lever-arm", None if lever_arm_m is None else f"{lever_arm_m!r} m"),
+        ("--name", name),
+        ("--mirror-file", mirror_file),
+    )
+    switches = {"--static": static, "--admissible": admissible}
+    arguments = (
+        "identify",
+        *map(path_argument, files),
+        *(part for key, value in options for part in _option(key, value)),
+        *(switch for switch, on in switches.items() if on),
+    )
+    page = mirror_file.with_suffix(".html")
+    settings = (
+        f"models=identify.{'STATIC[:2]' if static else 'MODELS'}",
+        f"validation=[read(file) for file in {list(map(str, validate))}]",
+        *_named(lever_arm_m=lever_arm_m, admissible=admissible or None, input_unit=units[0], output_unit=units[1]),
+    )
+    python = _joined(
+        "from pathlib import Path",
+        "",
+        "from microrad import read_recording, report",
+        "from microrad.lab import identify, recording",
+        "",
+        f"target, page = {_path(mirror_file)}, {_path(page)}",
+        "if target.exists():",
+        "    raise FileExistsError(target)",
+        "",
+        "",
+        "def read(file):",
+        f"    found = read_recording(file, {drive!r}, {output!r}, {rate_hz!r}, accept={accept!r})",
+        f"    return recording.read_in(found, {units[0]!r}, {units[1]!r})",
+        "",
+        "",
+        f"recordings = [read(file) for file in {list(map(str, files))}]",
+        f"found = identify.identify(recordings, {', '.join(settings)})",
+        "if found.unsupported:",
+        "    raise SystemExit(found.unsupported)",
+        f"text = identify.mirror_file_text(found, {name!r}, model=found.chosen)",
+        "report.write_identification(",
+        "    found,",
+        "    page,",
+        "    mirror_file=target,",
+        "    mirror_text=text,",
+        f"    title={name!r},",
+        "    written=found.chosen,",
+        "    recordings=recordings,",
+        ")",
+        'target.write_text(text, encoding="utf-8")',
+        "print(report.identification_text(found, found.chosen, mirror_file=target, report_file=page))",
+    )
+    return Action(arguments, python, f"identify {name}", (str(mirror_file), str(page)))
+
+
+# -------------------------------------------------------------------------------------------------------------- pieces
+def path_argument(path: Path) -> str:
+    """A path as an argument: one that begins like an option is led by its folder."""
+    return f"./{path}" if str(path).startswith("-") else str(path)
+
+
+def _option(name: str, value: object) -> tuple[str, ...]:
+    """An option with its value, in one word where the value begins like an option; nothing without a value."""
+    if value is None:
+        return ()
+    said = path_argument(value) if isinstance(value, Path) else repr(value) if isinstance(value, float) else str(value)
+    return (f"{name}={said}",) if said.startswith("-") else (name, said)
+
+
+def _path(path: Path) -> str:
+    """A path in Python."""
+    return f"Path({str(path)!r})"
+
+
+def _named(**values: object) -> Iterable[str]:
+    """Named arguments of Python for those values that are given."""
+    return (f"{name}={value!r}" for name, value in values.items() if value is not None)
+
+
+def _joined(*lines: str) -> str:
+    return "\n".join(lines) + "\n"

@@ -18,15 +18,15 @@ from types import FrameType
 from typing import TYPE_CHECKING, Any
 
 from microrad.core.installing import advice
-from microrad.studio import address, plain_files
-from microrad.studio.workshop import Workshop
+from microrad.studio.guard import address, plain_files
+from microrad.studio.session import Session
 
 # NiceGUI and what it stands on take a second to load, and are not there in an installation without the studio.
 if TYPE_CHECKING:
     import uvicorn
     from starlette.responses import Response
 
-    from microrad.studio.guard import Guard
+    from microrad.studio.guard.middleware import Guard
 
 PAGES = ("mission", "link", "pointing", "day", "mirror", "control", "runs", "compare")
 """Modules of `microrad.studio.pages`, in the order of the navigation."""
@@ -141,7 +141,7 @@ def alone(studio: Path) -> Iterator[None]:
 
     Raises `StudioError` where there is one, and `JobError` where that cannot be told.
     """
-    from microrad.studio.jobs_files import held, note
+    from microrad.studio.jobs.files import held, note
 
     with held(studio / _LOCK, 0.0) as mine:
         if not mine:
@@ -160,21 +160,21 @@ def _process(note: Path) -> str:
     return ""
 
 
-def serve(workshop: Workshop, entrance: Entrance, on_ready: Callable[[], None]) -> None:
+def serve(session: Session, entrance: Entrance, on_ready: Callable[[], None]) -> None:
     """Serve the pages until Ctrl-C or a request to terminate; `on_ready` is called when a browser may come.
 
     Jobs go on. One process serves one studio: NiceGUI keeps its state in its modules.
     """
     import uvicorn
 
-    guarded = application(workshop, entrance)
+    guarded = application(session, entrance)
     settings = address.server_settings()
     config = uvicorn.Config(guarded, log_level="warning", timeout_graceful_shutdown=_GRACE_S, **settings)
     logging.getLogger("uvicorn.error").addFilter(_is_news)
     try:
         _server(config, on_ready).run(sockets=[entrance.listener])
     finally:
-        (workshop.studio / _WAY_IN).unlink(missing_ok=True)
+        (session.studio / _WAY_IN).unlink(missing_ok=True)
 
 
 def _is_news(record: logging.LogRecord) -> bool:
@@ -223,23 +223,23 @@ def way_in(studio: Path, url: str) -> str:
     return path.as_uri()
 
 
-def application(workshop: Workshop, entrance: Entrance) -> Guard:
-    """The pages of a workshop behind the guard."""
+def application(session: Session, entrance: Entrance) -> Guard:
+    """The pages of a session behind the guard."""
     # Read when NiceGUI is loaded: nobody can have put a file there, and the studio keeps nothing in it.
     os.environ["NICEGUI_STORAGE_PATH"] = str(Path(tempfile.gettempdir()) / f"microrad-{secrets.token_hex(16)}")
     from fastapi import FastAPI
     from nicegui import ui
     from nicegui.client import templates
 
-    from microrad.studio import policy
-    from microrad.studio.guard import Guard
-    from microrad.studio.uploads import Uploads
+    from microrad.studio.guard import policy
+    from microrad.studio.guard.middleware import Guard
+    from microrad.studio.recordings.uploads import Uploads
 
-    Uploads(workshop.studio / "uploads").hold_temporary_files()
+    Uploads(session.studio / "uploads").hold_temporary_files()
     policy.sign_template(templates.env)
     inner = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
-    inner.add_api_route(DOCUMENTS + "{number}/{place}", _documents(workshop), methods=["GET"])
-    _add_pages(workshop)
+    inner.add_api_route(DOCUMENTS + "{number}/{place}", _documents(session), methods=["GET"])
+    _add_pages(session)
     ui.run_with(
         inner,
         title="microrad studio",
@@ -251,32 +251,32 @@ def application(workshop: Workshop, entrance: Entrance) -> Guard:
     return Guard(inner, entrance.names, address.origins(entrance.names), entrance.token, documents=(DOCUMENTS,))
 
 
-def _add_pages(workshop: Workshop) -> None:
+def _add_pages(session: Session) -> None:
     """Register every page, each within the common frame."""
     from nicegui import ui
 
     modules = [import_module(f"microrad.studio.pages.{name}") for name in PAGES]
     entries = tuple((module.TITLE, module.PATH) for module in modules)
     for module in modules:
-        ui.page(module.PATH, title=f"{module.TITLE} - microrad studio")(_framed(workshop, module, entries))
+        ui.page(module.PATH, title=f"{module.TITLE} - microrad studio")(_framed(session, module, entries))
 
 
-def _framed(workshop: Workshop, module: Any, entries: tuple[tuple[str, str], ...]) -> Callable[[], None]:
+def _framed(session: Session, module: Any, entries: tuple[tuple[str, str], ...]) -> Callable[[], None]:
     from microrad.studio.pages import layout
 
     def build() -> None:
-        with layout.frame(workshop, module.TITLE, entries):
-            module.page(workshop)
+        with layout.frame(session, module.TITLE, entries):
+            module.page(session)
 
     return build
 
 
-def _documents(workshop: Workshop) -> Callable[[int, int], Response]:
+def _documents(session: Session) -> Callable[[int, int], Response]:
     """A handler that shows what a job has written: a page of its own as such, anything else to be saved."""
     from starlette.responses import FileResponse, PlainTextResponse
 
     def show(number: int, place: int) -> Any:
-        path = result(workshop, number, place)
+        path = result(session, number, place)
         if path is None:
             return PlainTextResponse("This result is not there any more.", 404)
         page = path.suffix == ".html"
@@ -285,14 +285,14 @@ def _documents(workshop: Workshop) -> Callable[[int, int], Response]:
     return show
 
 
-def result(workshop: Workshop, number: int, place: int) -> Path | None:
+def result(session: Session, number: int, place: int) -> Path | None:
     """A file that a job has written, where it lies in the working folder; None where there is none."""
-    from microrad.studio.jobs import JobError
-    from microrad.studio.names import NameRefusedError, within
+    from microrad.studio.guard.names import NameRefusedError, within
+    from microrad.studio.jobs.queue import JobError
 
     try:
-        job = workshop.jobs.get(number)
-        path = within(workshop.folder, job.cwd / job.results[place])
+        job = session.jobs.get(number)
+        path = within(session.folder, job.cwd / job.results[place])
     except (JobError, NameRefusedError, IndexError, OSError):
         return None
     return path if place >= 0 and path.is_file() else None

@@ -10,13 +10,15 @@ from typing import Any
 from nicegui import ui
 
 from microrad.mission import presets
-from microrad.studio import commands, compare_view
-from microrad.studio.compare_view import Beside, Found, Number
-from microrad.studio.draft import Draft
-from microrad.studio.pages import layout, pieces
-from microrad.studio.pages.aside import aside
-from microrad.studio.runs_view import campaign_files
-from microrad.studio.workshop import Workshop
+from microrad.studio import commands
+from microrad.studio.commands import Action
+from microrad.studio.draft.draft import Draft
+from microrad.studio.pages import layout
+from microrad.studio.pages.in_thread import in_thread
+from microrad.studio.session import Session
+from microrad.studio.views import compare as compare_view
+from microrad.studio.views.compare import Beside, Found, Number
+from microrad.studio.views.runs import campaign_files
 
 TITLE = "Compare"
 PATH = "/compare"
@@ -26,9 +28,9 @@ _PRESET = "the preset "
 """What missions that are no files of the folder are called in it: by no name that a file could have."""
 
 
-def page(workshop: Workshop) -> None:
+def page(session: Session) -> None:
     """The choice of the other mission, and the tables of both."""
-    _Page(workshop)
+    _Page(session)
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,10 +43,10 @@ class _Both:
 
 
 class _Page:
-    """The page of one tab. The other mission is the workshop's, so every tab compares with the same."""
+    """The page of one tab. The other mission is the session's, so every tab compares with the same."""
 
-    def __init__(self, workshop: Workshop) -> None:
-        self.workshop = workshop
+    def __init__(self, session: Session) -> None:
+        self.session = session
         self.asked = 0
         self.shown: str | None = None
         with ui.row().classes("compare-choice"):
@@ -55,25 +57,25 @@ class _Page:
             layout.copy_buttons(partial(self._action, other=True))
         self.fault = ui.label().classes("no kept").props('role="alert"')
         self.place = ui.column().classes("compare-tables")
-        layout.follow(workshop, self._look)
+        layout.follow(session, self._look)
 
     def _options(self) -> dict[str, str]:
         """The missions that can be chosen, by what they are called inside, with their names."""
-        draft, found = self.workshop.draft, {}
+        draft, found = self.session.draft, {}
         if draft.path.exists() and draft.changed:
-            found[_SAVED] = f"{self.workshop.name_of(draft.path)} as it is saved"
-        campaigns = campaign_files(self.workshop)
-        files = (path.name for path in self.workshop.missions() if path != draft.path and path.name not in campaigns)
+            found[_SAVED] = f"{self.session.name_of(draft.path)} as it is saved"
+        campaigns = campaign_files(self.session)
+        files = (path.name for path in self.session.missions() if path != draft.path and path.name not in campaigns)
         found |= {f"file {name}": name for name in files} | {_SHIPPED: _SHIPPED}
         return found | {_PRESET + each.name: f"{each.name}: {each.title}" for each in presets.presets()}
 
     def _compared(self, options: dict[str, str]) -> str | None:
         """The option that the other mission is."""
-        other = self.workshop.other
+        other = self.session.other
         if other is None:
             return None
-        name = self.workshop.name_of(other.path)
-        own = _SAVED if other.path == self.workshop.draft.path else f"file {name}"
+        name = self.session.name_of(other.path)
+        own = _SAVED if other.path == self.session.draft.path else f"file {name}"
         return next((option for option in (own, name) if option in options), None)
 
     def _chosen(self, event: Any) -> None:
@@ -81,27 +83,27 @@ class _Page:
             return
         self.shown, self.fault.text = event.value, ""
         try:
-            self.workshop.other = self._draft(event.value)
+            self.session.other = self._draft(event.value)
         except (ValueError, OSError) as error:
             self.fault.text = str(error)
 
     def _draft(self, name: str) -> Draft:
         if name == _SAVED:
-            return Draft.open(self.workshop.draft.path)
+            return Draft.open(self.session.draft.path)
         if name.startswith("file "):
-            return Draft.open(self.workshop.inside(name.removeprefix("file ")))
-        shipped = Draft.shipped(self.workshop.folder / name)
+            return Draft.open(self.session.inside(name.removeprefix("file ")))
+        shipped = Draft.shipped(self.session.folder / name)
         return shipped if name == _SHIPPED else shipped.with_text(presets.preset_text(name.removeprefix(_PRESET)))
 
-    def _action(self, other: bool) -> commands.Budget | None:
-        draft = self.workshop.other if other else self.workshop.draft
+    def _action(self, other: bool) -> Action | None:
+        draft = self.session.other if other else self.session.draft
         if draft is None:
             layout.refuse("There is no other mission yet; choose one.")
             return None
         if not draft.path.exists():
-            layout.refuse(f"{self.workshop.name_of(draft.path)} is not a file of this folder yet; save it there first.")
+            layout.refuse(f"{self.session.name_of(draft.path)} is not a file of this folder yet; save it there first.")
             return None
-        return commands.Budget(Path(self.workshop.name_of(draft.path)) if other else pieces.file_of(self.workshop))
+        return commands.budget(Path(self.session.name_of(draft.path)) if other else layout.file_of(self.session))
 
     # ------------------------------------------------------------------------------------------------------- the tables
     def _look(self) -> None:
@@ -117,16 +119,16 @@ class _Page:
 
     async def _show(self, asked: int) -> None:
         """Compute in a thread, and show it if nothing has changed meanwhile."""
-        here, there = self.workshop.draft, self.workshop.other
+        here, there = self.session.draft, self.session.other
         if there is None:
             self.place.clear()
             with self.place:
                 ui.label("Choose the mission that this one is to be compared with.").classes("soft")
             return
-        both = await aside(self.place, _both, self.workshop, here, there)
+        both = await in_thread(self.place, _both, self.session, here, there)
         if asked != self.asked:
             return
-        names = (self.workshop.name_of(here.path), self._name(there))
+        names = (self.session.name_of(here.path), self._name(there))
         self.place.clear()
         with self.place:
             _numbers(both, names)
@@ -134,13 +136,13 @@ class _Page:
             _differences(here, there, names)
 
     def _name(self, draft: Draft) -> str:
-        name = self.workshop.name_of(draft.path)
-        return f"{name} (saved)" if draft.path == self.workshop.draft.path else name
+        name = self.session.name_of(draft.path)
+        return f"{name} (saved)" if draft.path == self.session.draft.path else name
 
 
-def _both(workshop: Workshop, here: Draft, there: Draft) -> _Both:
+def _both(session: Session, here: Draft, there: Draft) -> _Both:
     (ours, why), (theirs, why_not) = _of_links(here), _of_links(there)
-    studies = (compare_view.finished_study(workshop, here), compare_view.finished_study(workshop, there))
+    studies = (compare_view.finished_study(session, here), compare_view.finished_study(session, there))
     return _Both(compare_view.beside(ours, theirs), (why, why_not), studies)
 
 

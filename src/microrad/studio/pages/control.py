@@ -10,10 +10,12 @@ from nicegui import background_tasks, ui
 
 from microrad.mission.file import MissionFile
 from microrad.mission.tables.fine_pointing import FinePointing
-from microrad.studio.commands import Design
+from microrad.studio import commands
 from microrad.studio.pages import layout
-from microrad.studio.pages.aside import aside, stay
-from microrad.studio.workshop import Workshop
+from microrad.studio.pages.elements import Figure, numbers
+from microrad.studio.pages.in_thread import in_thread, stay
+from microrad.studio.session import Session
+from microrad.studio.views.plots import empty
 
 TITLE = "Control"
 PATH = "/control"
@@ -38,41 +40,28 @@ _PLOTS = {
     "jitter_drive": "Drive under disturbance",
 }
 _OWN = ("sensitivity", "gain")  # of the controller, whatever is asked
-_CSS = """
-.control-asked { display: grid; grid-template-columns: 19rem repeat(3, minmax(8rem, 12rem)) auto; gap: .75rem;
-                 align-items: center; }
-.control-words { color: var(--fail); white-space: pre-wrap; overflow-wrap: anywhere; }
-.control-numbers { display: grid; grid-template-columns: repeat(auto-fit, minmax(20rem, 1fr)); gap: 0 2rem; margin: 0;
-                   width: 100%; }
-.control-numbers div { display: flex; justify-content: space-between; gap: 1rem; border-bottom: 1px solid var(--line); }
-.control-numbers dd { margin: 0; font-variant-numeric: tabular-nums; text-align: right; }
-.control-plots { display: grid; grid-template-columns: repeat(2, minmax(0, 1fr)); gap: .5rem; width: 100%; }
-.control-plots > * { height: 21rem; min-width: 0; }
-@media (max-width: 1150px) { .control-asked { grid-template-columns: repeat(3, minmax(0, 1fr)); } }
-"""
 
 
-def page(workshop: Workshop) -> None:
+def page(session: Session) -> None:
     """A table of all controllers, and below it one of them."""
-    ui.add_head_html(f"<style>{_CSS}</style>")
-    ControlPage(workshop)
+    ControlPage(session)
 
 
 class ControlPage:
     """The page of one tab; what is tuned is kept for all tabs by `control_model`."""
 
-    def __init__(self, workshop: Workshop) -> None:
-        """Build the body, and have it follow the workshop."""
-        self.workshop = workshop
+    def __init__(self, session: Session) -> None:
+        """Build the body, and have it follow the session."""
+        self.session = session
         self.file: MissionFile | None = None
         self.question, self.round, self.filling = 0, 0, False
         self.rows: dict[str, dict[str, Any]] = {}
         self.plots: dict[str, Any] = {}
-        layout.copy_buttons(lambda: Design(Path(workshop.name_of(workshop.draft.path))))
-        self.words = ui.label().classes("control-words").props('role="alert"')
+        layout.copy_buttons(lambda: commands.design(Path(session.name_of(session.draft.path))))
+        self.words = ui.label().classes("no kept").props('role="alert"')
         self._all()
         self._one()
-        layout.follow(workshop, lambda: background_tasks.create(self.reload()))
+        layout.follow(session, lambda: background_tasks.create(self.reload()))
 
     def _all(self) -> None:
         layout.heading("Controllers of the mission")
@@ -95,9 +84,9 @@ class ControlPage:
             self.variants = ui.toggle(names, value="both", on_change=self.show)
             self.variants.props('dense no-caps aria-label="Hysteresis of the mirror"')
         self.state = ui.label().classes("soft").props('role="status"')
-        self.fault = ui.label().classes("control-words").props('role="alert"')
+        self.fault = ui.label().classes("no kept").props('role="alert"')
         self.notes = ui.column().classes("gap-0")
-        self.numbers = ui.element("dl").classes("control-numbers")
+        self.numbers = ui.element("dl").classes("numbers")
         layout.heading("By frequency", 3)
         self._plots("sensitivity", "gain")
         layout.heading("A step of the reference on axis x", 3)
@@ -118,25 +107,21 @@ class ControlPage:
         return ui.label().props('role="status"')
 
     def _plots(self, *names: str) -> None:
-        from microrad.studio.plots import empty
-
-        with ui.element("div").classes("control-plots"):
+        with ui.element("div").classes("plots"):
             for name in names:
-                self.plots[name] = ui.plotly(empty("Nothing simulated yet.")).props(
-                    f'role="figure" aria-label="{_PLOTS[name]}"'
-                )
+                self.plots[name] = Figure(_PLOTS[name], empty("Nothing simulated yet."))
 
     # ------------------------------------------------------------------------------------------------------ the mission
     async def reload(self) -> None:
         """Take over the mission as it is now; while it has faults, the last one stays."""
         stay(self.table)
-        file = self.workshop.mission()
-        self.words.text = self.workshop.faults()
+        file = self.session.mission()
+        self.words.text = self.session.faults()
         if file is None or (self.file is not None and file.sha256 == self.file.sha256 and file == self.file):
             return
-        from microrad.studio import control_view
+        from microrad.studio.views import control as control_view
 
-        names = await aside(self.table, _names, file.mission.fine_pointing)
+        names = await in_thread(self.table, _names, file.mission.fine_pointing)
         self.file, self.round = file, self.round + 1
         self.rows = {name: control_view.waiting_row(name) for name in names}
         self._table()
@@ -170,7 +155,7 @@ class ControlPage:
 
     async def _tuned(self, file: MissionFile, name: str) -> Any:
         """A controller, and its row; None where it cannot be built, which its row says."""
-        from microrad.studio import control_view
+        from microrad.studio.views import control as control_view
 
         def told(row: dict[str, Any]) -> None:
             if file is self.file:
@@ -180,7 +165,7 @@ class ControlPage:
         if not self.rows[name]["modulus"]:
             told(control_view.waiting_row(name, "being tuned ..."))
         try:
-            found = await aside(self.table, _controller, file, name)
+            found = await in_thread(self.table, _controller, file, name)
         except ValueError as error:
             told(control_view.waiting_row(name, str(error)))
             return None
@@ -193,7 +178,7 @@ class ControlPage:
     # -------------------------------------------------------------------------------------------------------------- one
     async def show(self) -> None:
         """Show the chosen controller; a late answer to an older question is dropped."""
-        from microrad.studio import control_view
+        from microrad.studio.views import control as control_view
 
         file, name = self.file, self.name.value
         if self.filling or file is None or not name:
@@ -213,7 +198,7 @@ class ControlPage:
         try:
             ask = control_view.ask_of(self.step.value, self.amplitude.value, self.frequency.value, found.rate_hz)
             self.state.text = "Simulating ..."
-            answers = await aside(self.table, found.ask, ask, control_view.SHOWN[self.variants.value])
+            answers = await in_thread(self.table, found.ask, ask, control_view.SHOWN[self.variants.value])
         except ValueError as error:
             self.fault.text, self.state.text = str(error), ""
             self._dim([name for name in self.plots if name not in _OWN])
@@ -232,7 +217,7 @@ class ControlPage:
             layout.grey(each, each in grey)
 
     def _controller(self, found: Any) -> None:
-        from microrad.studio import control_view
+        from microrad.studio.views import control as control_view
 
         self.notes.clear()
         with self.notes:
@@ -240,15 +225,12 @@ class ControlPage:
                 ui.label(note).classes("soft")
         self.numbers.clear()
         with self.numbers:
-            for name, value in (*control_view.margin_rows(found), *control_view.value_rows(found)):
-                with ui.element("div"):
-                    layout.words("dt", name)
-                    layout.words("dd", value)
-        self.plots["sensitivity"].update_figure(control_view.sensitivity_plot(found))
-        self.plots["gain"].update_figure(control_view.gain_plot(found))
+            numbers((*control_view.margin_rows(found), *control_view.value_rows(found)))
+        self.plots["sensitivity"].show(control_view.sensitivity_plot(found))
+        self.plots["gain"].show(control_view.gain_plot(found))
 
     def _answers(self, found: Any, answers: Any) -> None:
-        from microrad.studio import control_view as view
+        from microrad.studio.views import control as view
 
         self.shaken.visible = bool(answers.jitter)
         self.told_step.text = view.answer_words(answers.step, "Error", found.field_of_view_rad)
@@ -261,20 +243,20 @@ class ControlPage:
             "sine_drive": view.drive_plot(found, answers.sine),
             "jitter": view.jitter_plot(answers),
             "motion": view.motion_plot(answers),
-            "jitter_drive": view.drive_plot(found, answers.jitter, "s"),
+            "jitter_drive": view.drive_plot(found, answers.jitter, view.SECONDS),
         }
         for name, figure in drawn.items():
-            self.plots[name].update_figure(figure)
+            self.plots[name].show(figure)
 
 
 def _names(table: FinePointing | None) -> tuple[str, ...]:
-    from microrad.studio import control_model  # loads the kernels, in a thread
+    from microrad.studio.views import controllers as control_model  # loads the kernels, in a thread
 
     return control_model.names(table)
 
 
 def _controller(file: MissionFile, name: str) -> Any:
-    from microrad.studio import control_model
+    from microrad.studio.views import controllers as control_model
 
     return control_model.controller(file, name)
 

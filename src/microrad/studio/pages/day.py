@@ -8,14 +8,14 @@ from typing import NamedTuple
 from nicegui import ui
 
 from microrad.orbit.day import DayStudy
-from microrad.studio import day_view, plots
-from microrad.studio.commands import Contacts
-from microrad.studio.latest import Latest, State, shared
+from microrad.studio import commands
 from microrad.studio.pages import layout
-from microrad.studio.pages.aside import aside
-from microrad.studio.pages.dial_rows import add_style
-from microrad.studio.pages.pieces import Column, columns, file_of, plot, table
-from microrad.studio.workshop import Workshop
+from microrad.studio.pages.elements import Column, Figure, columns, table
+from microrad.studio.pages.in_thread import in_thread
+from microrad.studio.session import Session
+from microrad.studio.views import day as day_view
+from microrad.studio.views.latest import Latest, State, shared
+from microrad.studio.views.plots import Plot, figure
 
 TITLE = "Day"
 PATH = "/day"
@@ -35,30 +35,29 @@ _SWINGS = (
 class Drawn(NamedTuple):
     """Timeline, volumes and latencies; the map as the address of an image, and what it shows."""
 
-    plots: tuple[plots.Plot, plots.Plot, plots.Plot]
+    plots: tuple[Plot, Plot, Plot]
     map: str
     words: str
 
 
-def page(workshop: Workshop) -> None:
+def page(session: Session) -> None:
     """Progress, then timeline, volumes, latencies and tables."""
-    add_style()
-    DayPage(workshop)
+    DayPage(session)
 
 
 class DayPage:
     """The page of one tab; the day is computed once for all tabs."""
 
-    def __init__(self, workshop: Workshop) -> None:
-        """Build the body, and have it follow the workshop."""
-        self.workshop, self.shown = workshop, ""
-        self.latest: Latest[DayStudy] = shared(workshop, "day")
-        layout.copy_buttons(lambda: Contacts(file_of(workshop)))
+    def __init__(self, session: Session) -> None:
+        """Build the body, and have it follow the session."""
+        self.session, self.shown = session, ""
+        self.latest: Latest[DayStudy] = shared(session, "day")
+        layout.copy_buttons(lambda: commands.contacts(layout.file_of(session)))
         self._progress()
         with ui.column().classes("w-full") as self.results:
             self._results()
         self.results.visible = False
-        layout.follow(workshop, self.reload)
+        layout.follow(session, self.reload)
         ui.timer(_LOOK_S, self.look)
 
     def _progress(self) -> None:
@@ -77,14 +76,14 @@ class DayPage:
             "A study of a whole mission takes the pointing loss that its loop leaves in place of this one."
         ).classes("soft")
         layout.heading("Contacts over time")
-        self.timeline = plot("Contacts and eclipses over time; in numbers in the table of contacts")
+        self.timeline = Figure("Contacts and eclipses over time; in numbers in the table of contacts")
         layout.heading("Over the Earth")
         self.map = ui.element("img").style("width: 100%; max-width: 52rem")
         self.map_words = ui.label().classes("soft small")
         layout.heading("Data made, delivered and on board")
-        self.volume = plot("Data made, delivered and on board over time").style("height: 24rem")
+        self.volume = Figure("Data made, delivered and on board over time")
         layout.heading("From recording to delivery")
-        self.latency = plot("Share of the data that has arrived within a time").style("height: 22rem")
+        self.latency = Figure("Share of the data that has arrived within a time")
         layout.heading("Relay and direct downlink")
         self.ways = table(())
         layout.heading("Contacts")
@@ -95,7 +94,7 @@ class DayPage:
 
     def reload(self) -> None:
         """Have the day of the draft computed, if it can be."""
-        draft, file = self.workshop.draft, self.workshop.link()
+        draft, file = self.session.draft, self.session.link()
         lacking = "" if file is None else day_view.missing(file)
         self.faults.text = draft.report if file is None else lacking
         self.faults.visible = file is None or bool(lacking)
@@ -110,11 +109,11 @@ class DayPage:
         if state.result is None or key == self.shown:
             return
         self.shown = key
-        self._show(state.result, await aside(self.results, _drawn, state.result))
+        self._show(state.result, await in_thread(self.results, _drawn, state.result))
 
     def _show_progress(self, state: State[DayStudy]) -> None:
         step = f": {state.done} of {state.total}" if state.total else ""
-        now = state.key == self.workshop.draft.sha256
+        now = state.key == self.session.draft.sha256
         known = "The day of the mission as it stands." if now else "The day of the mission before this."
         words = known if state.result else "Not computed."
         self.state.text = f"Computing, {state.what or 'links'}{step}" if state.running else state.error or words
@@ -128,8 +127,8 @@ class DayPage:
         with self.words:
             for sentence in day_view.words(day):
                 ui.label(sentence)
-        for element, figure in zip((self.timeline, self.volume, self.latency), drawn.plots, strict=True):
-            element.update_figure(figure)
+        for element, made in zip((self.timeline, self.volume, self.latency), drawn.plots, strict=True):
+            element.show(made)
         self.map.props["src"], self.map.props["alt"] = drawn.map, "Map of the world: " + drawn.words
         self.map_words.text = drawn.words
         names = [("what", ""), *zip(("relay", "direct"), (way.name for way in day_view.ways(day)), strict=False)]
@@ -140,5 +139,6 @@ class DayPage:
 
 
 def _drawn(day: DayStudy) -> Drawn:
-    made = day_view.timeline_plot(day), day_view.volume_plot(day), day_view.latency_plot(day)
-    return Drawn(made, *day_view.ground_map(day))
+    found = day_view.figures(day)
+    timeline, volume, latency = (figure(found[name].sheet) for name in ("day-timeline", "data-volume", "latency"))
+    return Drawn((timeline, volume, latency), day_view.image(found["world-map"]), found["world-map"].caption)

@@ -12,8 +12,8 @@ from starlette.datastructures import FormData, UploadFile
 from starlette.requests import ClientDisconnect, Request
 from starlette.responses import PlainTextResponse, Response
 
-from microrad.studio.names import NameRefusedError
-from microrad.studio.uploads import Upload, UploadError, Uploads
+from microrad.studio.guard.names import NameRefusedError
+from microrad.studio.recordings.uploads import Upload, UploadError, Uploads
 
 _BLOCK_BYTES = 1 << 20
 _MOST_S = 600.0

@@ -6,14 +6,15 @@ import json
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from importlib import resources
+from pathlib import Path
 from typing import Any
 
 from nicegui import ui
 from nicegui.elements.mixins.text_element import TextElement
 
-from microrad.studio.commands import Action, command
-from microrad.studio.draft import Draft, OnDisk
-from microrad.studio.workshop import Workshop
+from microrad.studio.commands import Action
+from microrad.studio.draft.draft import Draft, OnDisk
+from microrad.studio.session import Session
 
 POLL_S = 0.5
 """Between two looks at what another tab or a job has changed."""
@@ -31,13 +32,13 @@ _ON_DISK: dict[OnDisk, str] = {"": "", "changed": "changed on disk; open it agai
 
 
 @contextmanager
-def frame(workshop: Workshop, title: str, entries: tuple[tuple[str, str], ...]) -> Iterator[None]:
+def frame(session: Session, title: str, entries: tuple[tuple[str, str], ...]) -> Iterator[None]:
     """Header with state and navigation, a heading, and the body to be filled; `entries` are titles and paths."""
     style = resources.files(__package__).joinpath("style.css").read_text("utf-8")
     ui.add_head_html(f"<style>{style}</style>")  # ui.add_css would add a script, which the guard's policy stops
     ui.colors(primary="#0a4f96", negative="#a63c00", positive="#00664a")
     with ui.header().classes("studio-header"):
-        _state(workshop)
+        _state(session)
         with ui.element("nav").props('aria-label="Pages"').classes("studio-nav"):
             for name, path in entries:
                 here = ' aria-current="page"' if name == title else ""
@@ -47,9 +48,9 @@ def frame(workshop: Workshop, title: str, entries: tuple[tuple[str, str], ...]) 
         yield
 
 
-def _state(workshop: Workshop) -> None:
-    async def late_save() -> None:  # a task, as writing a dial is, and so behind the one that this click has let go
-        save_draft(workshop)
+def _state(session: Session) -> None:
+    async def late_save() -> None:  # a task, as writing a slider is, and so behind the one that this click has let go
+        save_draft(session)
 
     with ui.row().classes("studio-state"):
         ui.label("microrad studio").classes("studio-name")
@@ -58,12 +59,12 @@ def _state(workshop: Workshop) -> None:
         save = ui.button("Save", on_click=late_save).props("dense no-caps outline")
 
     def show() -> None:
-        draft, disk = workshop.draft, workshop.disk
-        mission.text = workshop.name_of(draft.path)
+        draft, disk = session.draft, session.disk
+        mission.text = session.name_of(draft.path)
         state.text = _words(draft, disk)
         save.enabled = draft.changed or disk == "gone"
 
-    follow(workshop, show)
+    follow(session, show)
 
 
 def _words(draft: Draft, disk: OnDisk) -> str:
@@ -73,9 +74,9 @@ def _words(draft: Draft, disk: OnDisk) -> str:
     return ", ".join(filter(None, (saved, count, _ON_DISK[disk])))
 
 
-def save_draft(workshop: Workshop) -> bool:
+def save_draft(session: Session) -> bool:
     """Save the mission to its own file; says what went wrong, and whether it is saved."""
-    return attempt(workshop.save)
+    return attempt(session.save)
 
 
 def attempt(do: Callable[[], object]) -> bool:
@@ -98,20 +99,20 @@ def refuse(words: str) -> None:
     ui.notify(words, type="negative", multi_line=True, timeout=0, close_button="Dismiss", position="top")
 
 
-def follow(workshop: Workshop, show: Callable[[], Any]) -> Callable[[], None]:
-    """Call `show` now and whenever the workshop has changed; what is returned says that this page has shown it."""
+def follow(session: Session, show: Callable[[], Any]) -> Callable[[], None]:
+    """Call `show` now and whenever the session has changed; what is returned says that this page has shown it."""
     seen = -1
 
     def look() -> None:
         nonlocal seen
-        _ = workshop.disk  # looking is what finds out that another program has changed it
-        if seen != workshop.revision:
-            seen = workshop.revision
+        _ = session.disk  # looking is what finds out that another program has changed it
+        if seen != session.revision:
+            seen = session.revision
             show()
 
     def mark() -> None:
         nonlocal seen
-        seen = workshop.revision
+        seen = session.revision
 
     look()
     ui.timer(POLL_S, look)
@@ -128,6 +129,13 @@ def heading(text: str, level: int = 2) -> TextElement:
     return words(f"h{level}", text)
 
 
+def file_of(session: Session) -> Path:
+    """The mission's file, seen from the working folder, for a command to be copied; says so where it is not saved."""
+    if session.draft.changed:
+        ui.notify("The command reads the file: save the mission first, for the same numbers.", type="warning")
+    return Path(session.name_of(session.draft.path))
+
+
 def copy_buttons(action: Callable[[], Action | None]) -> None:
     """Buttons that copy what `action` returns as a command and as Python; None says why by a notice of its own."""
     with ui.row().classes("studio-copy"):
@@ -139,7 +147,7 @@ async def _copy(action: Action | None, python: bool) -> None:
     """Say "Copied" once the browser has done it: a page that is not from this machine may not, nor an idle tab."""
     if action is None:
         return
-    text = action.python if python else command(action)
+    text = action.python if python else action.command
     refused = await ui.run_javascript(_COPY.replace("TEXT", json.dumps(text)), timeout=COPY_S)
     if refused:
         ui.notify(f"Not copied, {refused}: {text}", type="negative", multi_line=True)

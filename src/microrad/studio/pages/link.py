@@ -12,20 +12,18 @@ from microrad.core.progress import Progress
 from microrad.link import study as link_study
 from microrad.link.study import LinkStudy
 from microrad.mission.file import LinkFile
-from microrad.studio import link_view
-from microrad.studio.commands import Budget
-from microrad.studio.dials import Dial
-from microrad.studio.draft import Draft
-from microrad.studio.latest import Latest, shared
-from microrad.studio.link_view import LinkView
+from microrad.studio import commands
+from microrad.studio.draft.draft import Draft
 from microrad.studio.pages import layout
-from microrad.studio.pages.aside import aside
-from microrad.studio.pages.dial_page import DialPage
-from microrad.studio.pages.dial_rows import add_style
-from microrad.studio.pages.live import LivePlot, MarginCards
-from microrad.studio.pages.pieces import Column, file_of, plot, table
-from microrad.studio.plots import Plot
-from microrad.studio.workshop import Workshop
+from microrad.studio.pages.elements import Column, Figure, MarginCards, table
+from microrad.studio.pages.in_thread import in_thread
+from microrad.studio.pages.slider_page import SliderPage
+from microrad.studio.session import Session
+from microrad.studio.views import link as link_view
+from microrad.studio.views.latest import Latest, shared
+from microrad.studio.views.link import LinkView
+from microrad.studio.views.plots import Plot
+from microrad.studio.views.sliders import Slider
 
 TITLE = "Links"
 PATH = "/link"
@@ -37,30 +35,23 @@ _COLUMNS = (
     Column("source", "Source"),
 )
 _LOOK_S, _REST_S = 0.25, 0.8
-_CSS = """
-.margins { display: grid; grid-template-columns: repeat(auto-fit, minmax(11rem, 1fr)); gap: .75rem; width: 100%; }
-.margin-card { border: 1px solid var(--line); border-radius: 4px; padding: .4rem .7rem; }
-.margin-card .value { font-size: 1.5rem; font-weight: 600; font-variant-numeric: tabular-nums; line-height: 1.3; }
-.margin-map { width: 100%; height: 27rem; }
-"""
 
 
-def page(workshop: Workshop) -> None:
+def page(session: Session) -> None:
     """Sliders at the left; margins, map and tables at the right."""
-    add_style(_CSS)
-    LinkPage(workshop)
+    LinkPage(session)
 
 
-class LinkPage(DialPage[LinkView]):
+class LinkPage(SliderPage[LinkView]):
     """The page of one tab."""
 
-    def __init__(self, workshop: Workshop) -> None:
-        """Build the body, and have it follow the workshop."""
-        self.study: Latest[LinkStudy] = shared(workshop, "links")
+    def __init__(self, session: Session) -> None:
+        """Build the body, and have it follow the session."""
+        self.study: Latest[LinkStudy] = shared(session, "links")
         self.shown, self.rested = "", ("", 0.0)
         self.slow: dict[str, list[link_view.Row]] = {}
-        layout.copy_buttons(lambda: Budget(file_of(workshop)))
-        super().__init__(workshop, link_view.second)
+        layout.copy_buttons(lambda: commands.budget(layout.file_of(session)))
+        super().__init__(session, link_view.second)
         ui.timer(_LOOK_S, self._look)
 
     def build(self) -> None:
@@ -68,7 +59,7 @@ class LinkPage(DialPage[LinkView]):
         layout.heading("Margins")
         self.cards = MarginCards()
         layout.heading("Margin map")
-        self.map = LivePlot("Link margin over data rate and pointing error; in words below").classes("margin-map")
+        self.map = Figure("Link margin over data rate and pointing error; in words below").classes("margin-map")
         self.key = ui.label().classes("soft")
         self.words = ui.label().props('role="status"')
         layout.heading("Budgets")
@@ -80,12 +71,12 @@ class LinkPage(DialPage[LinkView]):
         self.sentences = ui.column()
         layout.heading("What moves the margin of the communication link")
         ui.label("Each input alone, 10 % lower and higher (0.5 dB; an outage by a factor of ten).").classes("soft")
-        self.tornado = plot("What moves the margin; in words above")
+        self.tornado = Figure("What moves the margin; in words above")
         self.dimmed = (self.cards, self.map, self.key, self.words, self.table)
 
-    def dials(self, draft: Draft) -> Mapping[str, tuple[Dial, ...]]:
+    def sliders(self, draft: Draft) -> Mapping[str, tuple[Slider, ...]]:
         """The numbers of the links' tables."""
-        return link_view.dials(draft)
+        return link_view.sliders(draft)
 
     def view(self, file: LinkFile) -> LinkView:
         """Budgets and map, on the axes that the map has."""
@@ -120,7 +111,7 @@ class LinkPage(DialPage[LinkView]):
         """Have the study of the links made once a draft rests, and show it once it is there."""
         self._ask_study()
         state = self.study.state
-        now = state.key == self.workshop.draft.sha256 and state.result is not None
+        now = state.key == self.session.draft.sha256 and state.result is not None
         before = "" if now or self.shown == "" else "Of the mission before this:"
         computing = "Computing acquisition and what moves the margins ..." if state.running else ""
         self.state.text = computing or state.error or before
@@ -130,21 +121,21 @@ class LinkPage(DialPage[LinkView]):
         if state.result is None or state.key == self.shown:
             return
         self.shown = state.key
-        words, self.slow, tornado = await aside(self.sentences, _told, state.result)
+        words, self.slow, tornado = await in_thread(self.sentences, _told, state.result)
         self.sentences.clear()
         with self.sentences:
             for sentence in words:
                 ui.label(sentence)
-        self.tornado.update_figure(tornado)
+        self.tornado.show(tornado)
         self._tabs()
 
     def _ask_study(self) -> None:
         """It takes a second of a core: not for every step of a slider."""
-        draft, now = self.workshop.draft, time.monotonic()
+        draft, now = self.session.draft, time.monotonic()
         if self.rested[0] != draft.text:
             self.rested = (draft.text, now)
         elif now - self.rested[1] > _REST_S and self.study.state.key != draft.sha256:
-            file = self.workshop.link()
+            file = self.session.link()
             if file is not None:
                 self.study.ask(draft.sha256, partial(_study, file))
 

@@ -1,4 +1,4 @@
-// The margins of the links side by side; see dial.js for why they keep what they show by themselves.
+// The margins of the links side by side; see slider.js for why they keep what they show by themselves.
 export default {
   template: `
     <div class="margins">

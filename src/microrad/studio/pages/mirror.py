@@ -11,56 +11,39 @@ from typing import Any
 from nicegui import ui
 
 from microrad.lab.recording import ACCEPTABLE
-from microrad.studio import mirror_form, mirror_view, reading
-from microrad.studio.commands import Identify
-from microrad.studio.jobs import JobError
-from microrad.studio.mirror_form import Dropped, Form, Setting, SettingError
+from microrad.studio.commands import Action
+from microrad.studio.jobs.queue import JobError
 from microrad.studio.pages import layout
-from microrad.studio.pages.aside import aside, stay
 from microrad.studio.pages.drop import Drop
+from microrad.studio.pages.elements import Figure
+from microrad.studio.pages.in_thread import in_thread, stay
 from microrad.studio.pages.mirror_job import JobView
-from microrad.studio.plots import CONFIG
-from microrad.studio.uploads import Upload, UploadError, Uploads
-from microrad.studio.workshop import Workshop
+from microrad.studio.recordings import reading
+from microrad.studio.recordings.uploads import Upload, UploadError, Uploads
+from microrad.studio.session import Session
+from microrad.studio.views import mirror as mirror_view
+from microrad.studio.views import mirror_form
+from microrad.studio.views.mirror_form import Dropped, Form, Setting, SettingError
 
 TITLE = "Mirror"
 PATH = "/mirror"
 
 _LOOK_S = 0.5
-_CSS = """
-.mirror-page { display: grid; grid-template-columns: minmax(21rem, 26rem) minmax(0, 1fr); gap: 1.5rem; width: 100%; }
-.mirror-form, .mirror-seen { display: flex; flex-direction: column; gap: .5rem; min-width: 0; }
-.mirror-form .q-field { width: 100%; }
-.drop-zone { width: 100%; padding: 1.75rem .9rem; border: 2px dashed #8c959f; border-radius: 4px; background: #f6f8fa; }
-.drop-zone:hover { border-color: #0a4f96; }
-.mirror-words { color: var(--fail); white-space: pre-wrap; overflow-wrap: anywhere; }
-.mirror-file { display: grid; grid-template-columns: minmax(0, 1fr) 8.5rem auto auto; gap: .4rem; align-items: center; }
-.mirror-file .name { overflow: hidden; text-overflow: ellipsis; white-space: nowrap; }
-.mirror-file .seen { font-weight: 600; }
-.numbers { display: grid; grid-template-columns: repeat(auto-fit, minmax(17rem, 1fr)); gap: 0 2rem;
-           margin: .5rem 0; width: 100%; }
-.numbers div { display: flex; justify-content: space-between; gap: 1rem; border-bottom: 1px solid var(--line); }
-.numbers dd { margin: 0; font-variant-numeric: tabular-nums; white-space: nowrap; }
-.pair { display: grid; grid-template-columns: repeat(2, minmax(0, 1fr)); gap: .5rem; }
-.plots { display: grid; grid-template-columns: repeat(auto-fit, minmax(19rem, 1fr)); gap: .5rem; width: 100%; }
-.plots > * { height: 21rem; min-width: 0; }
-"""
 
 
-def page(workshop: Workshop) -> None:
+def page(session: Session) -> None:
     """The form at the left; the recording and the identification at the right."""
-    ui.add_head_html(f"<style>{_CSS}</style>")
-    MirrorPage(workshop)
+    MirrorPage(session)
 
 
 class MirrorPage:
     """The page of one tab; recordings and form lie in the studio's folder, the identification in its job's."""
 
-    def __init__(self, workshop: Workshop) -> None:
+    def __init__(self, session: Session) -> None:
         """Build the body, and look at the folder and the job from time to time."""
-        self.workshop = workshop
-        self.uploads = Uploads(workshop.studio / "uploads")
-        self.path = workshop.studio / "mirror-form.json"
+        self.session = session
+        self.uploads = Uploads(session.studio / "uploads")
+        self.path = session.studio / "mirror-form.json"
         self.form = mirror_form.kept_form(self.path)
         self.shown, self.question, self.filling, self.kept = "", 0, False, True
         self.listings: dict[str, reading.Listing | str] = {}  # by key: a recording stays as it is
@@ -73,7 +56,7 @@ class MirrorPage:
                 self._inputs()
             with ui.element("div").classes("mirror-seen"):
                 self._plots()
-                self.job = JobView(workshop)
+                self.job = JobView(session)
         ui.timer(_LOOK_S, self.look)
         ui.timer(_LOOK_S, self.check)
 
@@ -84,7 +67,7 @@ class MirrorPage:
         ui.label("Drop files on the field: CSV, text, LVM, TDMS, MAT, NPY, NPZ or HDF5; up to 200 MB each.").classes(
             "soft small"
         )
-        self.refused = ui.label().classes("mirror-words").props('role="alert"')
+        self.refused = ui.label().classes("no kept").props('role="alert"')
         self.list = ui.column().classes("w-full gap-1")
         layout.heading("Channels")
         self.fields: dict[str, Any] = {}
@@ -101,7 +84,7 @@ class MirrorPage:
         self._text("name", "Name of the mirror", "its file has this name and .toml")
         self.fields["static"] = ui.checkbox("Hysteresis alone: two models, in seconds", on_change=self.typed)
         self.fields["admissible"] = ui.checkbox("No model that moves the wrong way", on_change=self.typed)
-        self.words = ui.label().classes("mirror-words").props('role="alert"')
+        self.words = ui.label().classes("no kept").props('role="alert"')
         ui.button("Identify", on_click=self.start).props("no-caps")
 
     def _select(self, key: str, label: str, options: Any, props: str = "") -> None:
@@ -117,17 +100,14 @@ class MirrorPage:
         self.about = ui.label().props('role="status"')
         self.findings = ui.column().classes("gap-1")
         with ui.element("div").classes("plots"):
-            self.loop, self.time = (ui.plotly({"data": [], "layout": {}, "config": CONFIG}) for _ in range(2))
-        self.loop.props('role="figure" aria-label="Measured loop: output over drive"')
-        self.time.props('role="figure" aria-label="Drive and output over time"')
-        self.loop.update_figure(mirror_view.nothing())
-        self.time.update_figure(mirror_view.nothing())
+            self.loop = Figure("Measured loop: output over drive", mirror_view.nothing())
+            self.time = Figure("Drive and output over time", mirror_view.nothing())
 
     # -------------------------------------------------------------------------------------------------- the recordings
     async def take(self, upload: Upload) -> None:
         """Look into a file that was dropped; one that is no recording is thrown away, in the reader's words."""
         async with self.listing_turn:
-            found = await aside(self.list, self._read_in, upload.key)
+            found = await in_thread(self.list, self._read_in, upload.key)
         if isinstance(found, str):
             self.refuse(found)
             return
@@ -139,7 +119,7 @@ class MirrorPage:
         """The channels of a recording, or why there are none."""
         async with self.listing_turn:
             if key not in self.listings:
-                self.listings[key] = await aside(self.list, self._channels, key)
+                self.listings[key] = await in_thread(self.list, self._channels, key)
         stay(self.list)  # the turn may have come after the page was closed
         return self.listings[key]
 
@@ -191,7 +171,7 @@ class MirrorPage:
             ui.button("Show", on_click=lambda: self.see(each.key)).props("dense no-caps flat")
             ui.button("Remove", on_click=lambda: self.remove(each.key)).props("dense no-caps flat")
         if fault and each.use != "leave":
-            ui.label(fault).classes("mirror-words small")
+            ui.label(fault).classes("no kept small")
 
     def _fault(self, each: Dropped) -> str:
         """Why a recording cannot be used with the channels of the form, as far as it is known."""
@@ -213,7 +193,7 @@ class MirrorPage:
 
     async def _checked(self, each: Dropped, columns: reading.Columns) -> None:
         await self._listing(each.key)
-        self.faults[each.key, columns] = (await aside(self.list, self._view, each.key, columns))[1]
+        self.faults[each.key, columns] = (await in_thread(self.list, self._view, each.key, columns))[1]
 
     async def see(self, key: str) -> None:
         """Show another recording, with the form as it is for its channels."""
@@ -278,11 +258,11 @@ class MirrorPage:
         self.fields["lever_arm"].enabled = setting.output_unit in mirror_form.LENGTHS
         self.filling = False
 
-    def action(self) -> Identify | None:
+    def action(self) -> Action | None:
         """The identification that the form asks for; None where it says why there is none."""
         self.words.text = ""
         try:
-            return mirror_form.identification(self.workshop.folder, self.dropped(), self.form.setting)
+            return mirror_form.identification(self.session.folder, self.dropped(), self.form.setting)
         except SettingError as error:
             self.words.text = str(error)
             return None
@@ -293,7 +273,7 @@ class MirrorPage:
         if action is None:
             return
         try:
-            job = await aside(self.list, self.workshop.jobs.submit, mirror_form.order(self.workshop.folder, action))
+            job = await in_thread(self.list, self.session.jobs.submit, mirror_form.order(self.session.folder, action))
         except JobError as error:
             self.words.text = str(error)
             return
@@ -333,7 +313,7 @@ class MirrorPage:
             columns = mirror_form.columns(setting)
         except SettingError as error:
             return None, str(error)
-        found = await aside(self.list, self._view, key, columns)
+        found = await in_thread(self.list, self._view, key, columns)
         self.faults[key, columns] = found[1]
         return found
 
@@ -348,8 +328,8 @@ class MirrorPage:
         self.words.text = words
         setting = self.form.setting
         empty = mirror_view.nothing()
-        self.loop.update_figure(empty if view is None else mirror_view.recording_plot(view, setting))
-        self.time.update_figure(empty if view is None else mirror_view.time_plot(view, setting))
+        self.loop.show(empty if view is None else mirror_view.recording_plot(view, setting))
+        self.time.show(empty if view is None else mirror_view.time_plot(view, setting))
         self.about.text = "" if view is None else mirror_view.about(view)
         self.findings.clear()
         with self.findings:

@@ -8,13 +8,14 @@ from typing import Any
 from nicegui import ui
 
 from microrad.lab.live_fit import LiveFit
-from microrad.studio import live_fit, mirror_view
-from microrad.studio.jobs import Job
-from microrad.studio.mirror_use import with_mirror_file
+from microrad.studio.draft.mirror_file import with_mirror_file
+from microrad.studio.jobs.queue import Job
 from microrad.studio.pages import layout
-from microrad.studio.pages.aside import aside
-from microrad.studio.plots import CONFIG
-from microrad.studio.workshop import Workshop
+from microrad.studio.pages.elements import Figure, numbers
+from microrad.studio.pages.in_thread import in_thread
+from microrad.studio.session import Session
+from microrad.studio.views import live_fit
+from microrad.studio.views import mirror as mirror_view
 
 _LOOK_S = 0.5
 _BEST = -1
@@ -29,9 +30,9 @@ _COLUMNS = [
 class JobView:
     """The newest identification, or the one that was chosen; everything is read from its job's folder."""
 
-    def __init__(self, workshop: Workshop) -> None:
+    def __init__(self, session: Session) -> None:
         """Build the panel, and look at the job from time to time."""
-        self.workshop, self.number = workshop, 0
+        self.session, self.number = session, 0
         self.fits: tuple[LiveFit, ...] = ()
         self.drive_unit, self.chosen = "V", ""
         self.found: mirror_view.Outcome | None = None
@@ -57,9 +58,8 @@ class JobView:
                 for each in (self.model, self.recording):
                     each.props("dense outlined options-dense").style("min-width: 14rem")
             with ui.element("div").classes("plots"):
-                self.loop, self.residual = (ui.plotly({"data": [], "layout": {}, "config": CONFIG}) for _ in range(2))
-            self.loop.props('role="figure" aria-label="Measured loop and that of the model"')
-            self.residual.props('role="figure" aria-label="Residual over time"')
+                self.loop = Figure("Measured loop and that of the model")
+                self.residual = Figure("Residual over time")
             ui.label("Residuals in per cent of the peak-to-peak output.").classes("soft small")
             self.table = ui.table(rows=[], columns=_COLUMNS, row_key="id").props("flat dense hide-bottom")
             self.table.props(":pagination='{rowsPerPage: 0}'").classes("w-full")
@@ -77,11 +77,11 @@ class JobView:
 
     def stop(self) -> None:
         """Cancel the identification."""
-        layout.attempt(lambda: self.workshop.jobs.cancel(self.number))
+        layout.attempt(lambda: self.session.jobs.cancel(self.number))
 
     async def look(self) -> None:
         """Read the jobs, and show what has changed."""
-        jobs, fits = await aside(self.end, self._read)
+        jobs, fits = await in_thread(self.end, self._read)
         if not jobs:
             return
         found = next((job for job in jobs if job.number == self.number), jobs[0])
@@ -96,14 +96,14 @@ class JobView:
             self._show(found)
 
     def _read(self) -> tuple[list[Job], tuple[LiveFit, ...]]:
-        jobs = [job for job in self.workshop.jobs.listed() if job.kind == "identification"]
+        jobs = [job for job in self.session.jobs.listed() if job.kind == "identification"]
         found = next((job for job in jobs if job.number == self.number), jobs[0] if jobs else None)
         return jobs, () if found is None else live_fit.read_fits(found.folder)
 
     # --------------------------------------------------------------------------------------------------------- showing
     def _show(self, job: Job) -> None:
         self.drive_unit = mirror_view.argument(job, "--input-unit", "V")
-        self.found = mirror_view.outcome(self.workshop.jobs.output(job.number)) if job.state == "done" else None
+        self.found = mirror_view.outcome(self.session.jobs.output(job.number)) if job.state == "done" else None
         self.chosen = "" if self.found is None else self.found.model
         self.words.text = mirror_view.state_words(job, live_fit.leader(self.fits, self.chosen))
         self.bar.visible = self.cancel.visible = not job.finished
@@ -134,8 +134,8 @@ class JobView:
         if fit is None or number >= len(fit.loops) or (id(fit), number) == self.drawn:
             return
         self.drawn = (id(fit), number)
-        self.loop.update_figure(mirror_view.loop_plot(fit, number, self.drive_unit))
-        self.residual.update_figure(mirror_view.residual_plot(fit, number))
+        self.loop.show(mirror_view.loop_plot(fit, number, self.drive_unit))
+        self.residual.show(mirror_view.residual_plot(fit, number))
 
     def _end(self, job: Job) -> None:
         """What has come of it: verdict, warnings, the files, and the way into the mission."""
@@ -143,13 +143,14 @@ class JobView:
         found = self.found
         if found is None:
             return
-        mirror = self.workshop.folder / job.results[0]
+        mirror = self.session.folder / job.results[0]
         with self.end:
             with ui.row().classes("items-center"):
                 ui.button("Use this mirror in the mission", on_click=lambda: self.use(mirror)).props("no-caps")
                 ui.link("Open the report", f"/results/{job.number}/1", new_tab=True)
                 ui.link(f"Mirror file {mirror.name}", f"/results/{job.number}/0", new_tab=True)
-            _numbers(found)
+            with ui.element("dl").classes("numbers"):
+                numbers(found.numbers)
             for sentence in found.verdict:
                 ui.label(sentence)
             for warning in found.warnings:
@@ -159,13 +160,5 @@ class JobView:
 
     def use(self, mirror: Path) -> None:
         """Put the mirror into the mission that is being edited."""
-        if layout.attempt(lambda: self.workshop.edit(lambda draft: with_mirror_file(draft, mirror))):
+        if layout.attempt(lambda: self.session.edit(lambda draft: with_mirror_file(draft, mirror))):
             ui.notify(f"[mirror] of the mission names {mirror.name} now; save the mission to keep it.", type="positive")
-
-
-def _numbers(found: mirror_view.Outcome) -> None:
-    with ui.element("dl").classes("numbers"):
-        for name, value in found.numbers:
-            with ui.element("div"):
-                layout.words("dt", name)
-                layout.words("dd", value)

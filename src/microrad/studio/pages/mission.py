@@ -10,11 +10,11 @@ from typing import Any
 from nicegui import ui
 
 from microrad.studio import commands
-from microrad.studio.draft import Draft, DraftError
+from microrad.studio.draft.draft import Draft, DraftError
 from microrad.studio.pages import layout
 from microrad.studio.pages.mission_files import file_buttons
 from microrad.studio.pages.mission_form import Form, fault_words, table_of, tables
-from microrad.studio.workshop import Workshop
+from microrad.studio.session import Session
 
 TITLE = "Mission"
 PATH = "/"
@@ -43,26 +43,26 @@ class _BehindError(ValueError):
     """What was typed belongs to a text that is not the mission's any more."""
 
 
-def page(workshop: Workshop) -> None:
+def page(session: Session) -> None:
     """The form of one table at a time, the text, and what is wrong with it."""
-    _Page(workshop)
+    _Page(session)
 
 
 class _Page:
-    """The page of one tab: which table it shows is its own, everything else is the workshop's."""
+    """The page of one tab: which table it shows is its own, everything else is the session's."""
 
-    def __init__(self, workshop: Workshop) -> None:
-        self.workshop = workshop
+    def __init__(self, session: Session) -> None:
+        self.session = session
         with ui.row().classes("mission-tools"):
-            file_buttons(workshop, self._other)
-            layout.copy_buttons(lambda: commands.Budget(Path(workshop.name_of(workshop.draft.path))))
+            file_buttons(session, self._other)
+            layout.copy_buttons(lambda: commands.budget(Path(session.name_of(session.draft.path))))
         with ui.element("div").classes("mission-columns"):
             with ui.element("nav").classes("mission-tables").props('aria-label="Tables"'):
                 self.search = ui.input("Find a key", on_change=self._search).props(
                     "dense outlined clearable debounce=200"
                 )
                 self.list = ui.column().classes("mission-list")
-            self.form = Form(workshop, self._edited, self._reveal)
+            self.form = Form(session, self._edited, self._reveal)
             with ui.element("section").classes("mission-text").props('aria-label="Text"') as self.section:
                 self.editor = self._editor()
                 self.faults = ui.column().classes("mission-faults")
@@ -70,16 +70,16 @@ class _Page:
             self.section.on(event, self._too_much, js_handler=_TOO_MUCH)
         self.entries: dict[str, tuple[Any, Any]] = {}
         self._list()
-        self.form.show(next(iter(tables(workshop.draft)), ""))
+        self.form.show(next(iter(tables(session.draft)), ""))
         self._choose(self.form.table)
         self._faults()
-        self.mark = layout.follow(workshop, self._all)
+        self.mark = layout.follow(session, self._all)
 
     # ---------------------------------------------------------------------------------------------------- what is shown
     def _all(self) -> None:
         """Everything anew, after a change that was not made in this page's form or text."""
-        if self.form.table not in tables(self.workshop.draft):
-            self.form.show(next(iter(tables(self.workshop.draft)), ""))
+        if self.form.table not in tables(self.session.draft):
+            self.form.show(next(iter(tables(self.session.draft)), ""))
         self.form.refresh()
         self._edited()
 
@@ -91,9 +91,9 @@ class _Page:
 
     def _edited(self) -> None:
         """The text, the faults and the list, after a change in the form."""
-        if self.opened != self.workshop.opened:
+        if self.opened != self.session.opened:
             self._new_editor()
-        self.shown = self.editor.value = _plain(self.workshop.draft)
+        self.shown = self.editor.value = _plain(self.session.draft)
         self._around()
 
     def _around(self) -> None:
@@ -104,7 +104,7 @@ class _Page:
 
     def _list(self) -> None:
         """The tables, each with the number of its faults."""
-        found = dict(islice(tables(self.workshop.draft).items(), _MOST_TABLES))
+        found = dict(islice(tables(self.session.draft).items(), _MOST_TABLES))
         if list(found) != list(self.entries):
             self.list.clear()
             with self.list:
@@ -124,11 +124,11 @@ class _Page:
         self.search.value = ""
         self.form.show(name)
         self._choose(name)
-        self._reveal(next((key for key in self.workshop.draft.values if table_of(key) == name), ""))
+        self._reveal(next((key for key in self.session.draft.values if table_of(key) == name), ""))
 
     def _reveal(self, key: str) -> None:
         """Scroll the text to the line of a key."""
-        value = self.workshop.draft.values.get(key)
+        value = self.session.draft.values.get(key)
         if value is not None:
             self.editor.reveal_line(value.line)
 
@@ -145,7 +145,7 @@ class _Page:
 
     # ------------------------------------------------------------------------------------------------------------- text
     def _editor(self) -> ui.codemirror:
-        self.opened, self.shown = self.workshop.opened, _plain(self.workshop.draft)
+        self.opened, self.shown = self.session.opened, _plain(self.session.draft)
         ui.timer(0.5, lambda: ui.run_javascript(_NAME_EDITOR), once=True)
         return ui.codemirror(self.shown, language="TOML", theme="vscodeLight", on_change=self._text)
 
@@ -159,7 +159,7 @@ class _Page:
         if event.value == self.shown:
             return
         try:
-            self.workshop.edit(lambda draft: self._followed(draft, event.value))
+            self.session.edit(lambda draft: self._followed(draft, event.value))
         except _BehindError as error:
             self._new_editor()
             self._all()
@@ -168,15 +168,15 @@ class _Page:
         except (DraftError, OSError) as error:
             layout.refuse(str(error))
             return
-        self.shown = _plain(self.workshop.draft)
-        if self.form.table not in tables(self.workshop.draft):
-            self.form.show(next(iter(tables(self.workshop.draft)), ""))
+        self.shown = _plain(self.session.draft)
+        if self.form.table not in tables(self.session.draft):
+            self.form.show(next(iter(tables(self.session.draft)), ""))
         self.form.refresh()
         self._around()
 
     def _followed(self, draft: Draft, text: str) -> Draft:
         """The draft with this page's text; `_BehindError` where the page does not show the draft as it is."""
-        if self.opened != self.workshop.opened or self.shown != _plain(draft):
+        if self.opened != self.session.opened or self.shown != _plain(draft):
             raise _BehindError("The mission was changed in another tab just now: the text shows it; type that again.")
         return draft.with_text(text)
 
@@ -185,7 +185,7 @@ class _Page:
 
     def _faults(self) -> None:
         """Every fault with its line, each a way to its key."""
-        problems = self.workshop.draft.problems
+        problems = self.session.draft.problems
         self.faults.clear()
         with self.faults:
             count = f"{len(problems)} fault{'s' if len(problems) > 1 else ''} to correct" if problems else "No faults."
@@ -200,7 +200,7 @@ class _Page:
                 ui.label(f"and {len(problems) - _MOST_FAULTS} more").classes("small")
 
     def _go(self, key: str, line: int) -> None:
-        found = tables(self.workshop.draft)
+        found = tables(self.session.draft)
         name = key.split(".", maxsplit=1)[0]
         self._show(name if name in found else table_of(key))
         if line:

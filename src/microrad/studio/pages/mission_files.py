@@ -7,67 +7,67 @@ from collections.abc import Callable
 from nicegui import ui
 
 from microrad.mission import presets
-from microrad.studio.draft import Draft
-from microrad.studio.names import NameRefusedError, safe_name, typed_words
-from microrad.studio.optional_tables import offered, with_table
+from microrad.studio.draft.draft import Draft
+from microrad.studio.draft.optional_tables import offered, with_table
+from microrad.studio.guard.names import NameRefusedError, safe_name, typed_words
 from microrad.studio.pages import layout
-from microrad.studio.workshop import Workshop
+from microrad.studio.session import Session
 
 _SHIPPED = "shipped mission"
 
 
-def file_buttons(workshop: Workshop, shown: Callable[[str], None]) -> None:
+def file_buttons(session: Session, shown: Callable[[str], None]) -> None:
     """Buttons for everything that is done with files; `shown` is called with the table to look at, "" for any."""
     with ui.row().classes("mission-files"):
-        ui.button("Open ...", on_click=lambda: _open(workshop, shown)).props("no-caps outline dense")
-        ui.button("New ...", on_click=lambda: _new(workshop, shown)).props("no-caps outline dense")
-        ui.button("Save as ...", on_click=lambda: _save_as(workshop, shown)).props("no-caps outline dense")
-        back = ui.button("Back to the saved file", on_click=lambda: _revert(workshop, shown))
+        ui.button("Open ...", on_click=lambda: _open(session, shown)).props("no-caps outline dense")
+        ui.button("New ...", on_click=lambda: _new(session, shown)).props("no-caps outline dense")
+        ui.button("Save as ...", on_click=lambda: _save_as(session, shown)).props("no-caps outline dense")
+        back = ui.button("Back to the saved file", on_click=lambda: _revert(session, shown))
         back.props("no-caps outline dense")
-        ui.button("Add a table ...", on_click=lambda: _add_table(workshop, shown)).props("no-caps outline dense")
+        ui.button("Add a table ...", on_click=lambda: _add_table(session, shown)).props("no-caps outline dense")
 
     def look() -> None:
-        back.enabled = workshop.draft.path.exists() and (workshop.draft.changed or workshop.disk == "changed")
+        back.enabled = session.draft.path.exists() and (session.draft.changed or session.disk == "changed")
 
-    layout.follow(workshop, look)
+    layout.follow(session, look)
 
 
-def _open(workshop: Workshop, shown: Callable[[str], None]) -> None:
-    names = [path.name for path in workshop.missions()]
+def _open(session: Session, shown: Callable[[str], None]) -> None:
+    names = [path.name for path in session.missions()]
     if not names:
-        layout.refuse(f"There is no TOML file in {workshop.folder} yet; save this mission there first.")
+        layout.refuse(f"There is no TOML file in {session.folder} yet; save this mission there first.")
         return
 
     def do(name: str) -> None:
-        workshop.replace(Draft.open(workshop.inside(name)))
+        session.replace(Draft.open(session.inside(name)))
 
-    _ask(f"Open a mission in {workshop.folder}", "File", "Open", names, do, shown, _lost(workshop))
+    _ask(f"Open a mission in {session.folder}", "File", "Open", names, do, shown, _lost(session))
 
 
-def _new(workshop: Workshop, shown: Callable[[str], None]) -> None:
+def _new(session: Session, shown: Callable[[str], None]) -> None:
     texts = {_SHIPPED: "", **{each.name: f"{each.name}: {each.title}" for each in presets.presets()}}
     texts[_SHIPPED] = "the shipped mission, with mirror, loop and orbit"
 
     def do(name: str) -> None:
         file = "leo-geo.toml" if name == _SHIPPED else f"{name}.toml"
-        draft = Draft.shipped(_free(workshop, file))
-        workshop.replace(draft if name == _SHIPPED else draft.with_text(presets.preset_text(name)))
+        draft = Draft.shipped(_free(session, file))
+        session.replace(draft if name == _SHIPPED else draft.with_text(presets.preset_text(name)))
 
-    _ask("Begin a new mission", "From", "Begin", texts, do, shown, _lost(workshop))
+    _ask("Begin a new mission", "From", "Begin", texts, do, shown, _lost(session))
 
 
-def _free(workshop: Workshop, name: str) -> str:
+def _free(session: Session, name: str) -> str:
     """The path of a name that no file has yet."""
-    stem, number, path = name.removesuffix(".toml"), 1, workshop.inside(name)
+    stem, number, path = name.removesuffix(".toml"), 1, session.inside(name)
     while path.exists():
         number += 1
-        path = workshop.inside(f"{stem}-{number}.toml")
+        path = session.inside(f"{stem}-{number}.toml")
     return str(path)
 
 
-def _lost(workshop: Workshop) -> str:
+def _lost(session: Session) -> str:
     """What is lost with the draft, where that is more than one can begin from again."""
-    draft, disk = workshop.draft, workshop.disk
+    draft, disk = session.draft, session.disk
     if disk == "gone" or (draft.changed and not draft.disk_sha256 and draft.text not in _beginnings()):
         return f"{draft.path.name} is not on disk and will be lost; save it first to keep it."
     return "Changes that are not saved will be lost." if draft.changed and draft.disk_sha256 else ""
@@ -78,40 +78,40 @@ def _beginnings() -> set[str]:
     return {Draft.shipped("").text, *(presets.preset_text(each.name) for each in presets.presets())}
 
 
-def _add_table(workshop: Workshop, shown: Callable[[str], None]) -> None:
-    names = [f"[{name}]" for name in offered(workshop.draft)]
+def _add_table(session: Session, shown: Callable[[str], None]) -> None:
+    names = [f"[{name}]" for name in offered(session.draft)]
     if not names:
         layout.refuse("This mission has every table that there is an example of.")
         return
 
     def do(name: str) -> None:
-        workshop.edit(lambda draft: with_table(draft, name.strip("[]")))
+        session.edit(lambda draft: with_table(draft, name.strip("[]")))
 
     _ask("Add a table, with example values to be changed", "Table", "Add", names, do, shown)
 
 
-def _revert(workshop: Workshop, shown: Callable[[str], None]) -> None:
+def _revert(session: Session, shown: Callable[[str], None]) -> None:
     def do() -> None:
-        if layout.attempt(workshop.reopen):
+        if layout.attempt(session.reopen):
             shown("")
         dialog.close()
 
     with ui.dialog() as dialog, ui.card():
-        lost = workshop.draft.changed
+        lost = session.draft.changed
         asked = "and lose the changes?" if lost else "as it is on disk now?"
-        layout.heading(f"Open {workshop.draft.path.name} again {asked}")
+        layout.heading(f"Open {session.draft.path.name} again {asked}")
         with ui.row():
             ui.button("Lose the changes" if lost else "Open again", on_click=do).props("no-caps")
             ui.button("Cancel", on_click=dialog.close).props("no-caps outline")
     dialog.open()
 
 
-def _save_as(workshop: Workshop, shown: Callable[[str], None]) -> None:
+def _save_as(session: Session, shown: Callable[[str], None]) -> None:
     def save() -> None:
         fault.text = ""
         try:
             given = safe_name(name.value or "")
-            workshop.save(given if given.endswith(".toml") else f"{given}.toml")
+            session.save(given if given.endswith(".toml") else f"{given}.toml")
         except NameRefusedError as error:
             fault.text = typed_words(error)
             return
@@ -122,8 +122,8 @@ def _save_as(workshop: Workshop, shown: Callable[[str], None]) -> None:
         shown("")
 
     with ui.dialog() as dialog, ui.card().classes("mission-dialog"):
-        layout.heading(f"Save the mission in {workshop.folder}")
-        name = ui.input("Name of the file", value=workshop.draft.path.name).props("outlined").classes("w-full")
+        layout.heading(f"Save the mission in {session.folder}")
+        name = ui.input("Name of the file", value=session.draft.path.name).props("outlined").classes("w-full")
         name.on("keydown.enter", save)
         fault = ui.label().classes("no kept").props('role="alert"')
         with ui.row():

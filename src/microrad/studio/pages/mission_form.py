@@ -10,10 +10,10 @@ from nicegui import ui
 from nicegui.elements.mixins.text_element import TextElement
 
 from microrad.mission.toml import Fault
-from microrad.studio.draft import Draft, DraftError, Value
-from microrad.studio.draft_keys import Key, typed_from
+from microrad.studio.draft.draft import Draft, DraftError, Value
+from microrad.studio.draft.keys import Key, typed_from
 from microrad.studio.pages import layout
-from microrad.studio.workshop import Workshop
+from microrad.studio.session import Session
 
 ROOT = "general"
 """What the keys outside of every table are called."""
@@ -53,15 +53,15 @@ class _Row:
 
 
 class Form:
-    """The rows of one table of the workshop's draft, or of the keys that hold a text.
+    """The rows of one table of the session's draft, or of the keys that hold a text.
 
     `changed` is called when a row has changed the draft, `entered` with the key whose field is entered. Raises nothing:
     what is wrong stands in the row.
     """
 
-    def __init__(self, workshop: Workshop, changed: Callable[[], None], entered: Callable[[str], None]) -> None:
+    def __init__(self, session: Session, changed: Callable[[], None], entered: Callable[[str], None]) -> None:
         """An empty form in the place where it is made; `show` fills it."""
-        self.workshop, self.table, self.sought = workshop, "", ""
+        self.session, self.table, self.sought = session, "", ""
         self._changed, self._entered = changed, entered
         self._rows: dict[str, _Row] = {}
         self._left = 0
@@ -104,14 +104,14 @@ class Form:
 
     def judge(self) -> None:
         """Show in each row what its key is, or what is wrong with it."""
-        values = self.workshop.draft.values
+        values = self.session.draft.values
         for key, row in self._rows.items():
             if key in values:
                 _judge(row, values[key])
 
     def _chosen(self) -> list[Value]:
         """The values that get a row; notes how many do not."""
-        values = [*self.workshop.draft.values.values()]
+        values = [*self.session.draft.values.values()]
         if self.sought:
             values = [v for v in values if self.sought in f"{v.key} = {v.typed} {v.comment}".lower()]
         else:
@@ -149,7 +149,7 @@ class Form:
             return
         row.typed = typed
         try:
-            self.workshop.set(key, typed)
+            self.session.set(key, typed)
         except (DraftError, OSError) as error:
             _say(row, str(error), wrong=True)
             return
@@ -157,14 +157,14 @@ class Form:
         self._changed()
 
     def _drop(self, key: str) -> None:
-        if layout.attempt(lambda: self.workshop.edit(lambda draft: draft.without(key))):
+        if layout.attempt(lambda: self.session.edit(lambda draft: draft.without(key))):
             self.refresh()
             self._changed()
 
     # ------------------------------------------------------------------------------------------------------- more keys
     def _more(self) -> None:
         """A choice of the keys that this table may have, and does not."""
-        absent = {k.key: k for k in self.workshop.draft.absent if table_of(k.key) == self.table}
+        absent = {k.key: k for k in self.session.draft.absent if table_of(k.key) == self.table}
         if not absent:
             return
         with ui.row().classes("mission-more"):
@@ -178,7 +178,7 @@ class Form:
         if key is None:
             return
         example = key.example or "to be given"
-        if layout.attempt(lambda: self.workshop.set(key.key, example)):
+        if layout.attempt(lambda: self.session.set(key.key, example)):
             self.refresh()
             self._changed()
 

@@ -7,18 +7,16 @@ from collections.abc import Mapping
 from nicegui import background_tasks, ui
 
 from microrad.mission.file import LinkFile
-from microrad.studio import pointing_view
-from microrad.studio.commands import Budget
-from microrad.studio.dials import Dial
-from microrad.studio.draft import Draft
+from microrad.studio import commands
+from microrad.studio.draft.draft import Draft
 from microrad.studio.pages import layout
-from microrad.studio.pages.aside import aside
-from microrad.studio.pages.dial_page import DialPage
-from microrad.studio.pages.dial_rows import add_style
-from microrad.studio.pages.live import LivePlot
-from microrad.studio.pages.pieces import Column, file_of, table
-from microrad.studio.pointing_view import PointingView
-from microrad.studio.workshop import Workshop
+from microrad.studio.pages.elements import Column, Figure, table
+from microrad.studio.pages.in_thread import in_thread
+from microrad.studio.pages.slider_page import SliderPage
+from microrad.studio.session import Session
+from microrad.studio.views import pointing as pointing_view
+from microrad.studio.views.pointing import PointingView
+from microrad.studio.views.sliders import Slider
 
 TITLE = "Pointing"
 PATH = "/pointing"
@@ -41,28 +39,26 @@ _TOTALS = (
 _AHEAD = (Column("what", "Point-ahead"), Column("value", "Value", number=True))
 
 
-def page(workshop: Workshop) -> None:
+def page(session: Session) -> None:
     """Sliders at the left; plots and tables at the right."""
-    add_style()
-    PointingPage(workshop)
+    PointingPage(session)
 
 
-class PointingPage(DialPage[PointingView]):
+class PointingPage(SliderPage[PointingView]):
     """The page of one tab."""
 
-    def __init__(self, workshop: Workshop) -> None:
-        """Build the body, and have it follow the workshop."""
-        layout.copy_buttons(lambda: Budget(file_of(workshop)))
-        super().__init__(workshop)
+    def __init__(self, session: Session) -> None:
+        """Build the body, and have it follow the session."""
+        layout.copy_buttons(lambda: commands.budget(layout.file_of(session)))
+        super().__init__(session)
 
     def build(self) -> None:
         """Coverage, lines and totals, point-ahead."""
         layout.heading("What the beacon covers")
         self.words = ui.label().props('role="status"')
-        self.coverage = LivePlot("Probability that the pointing error is below an angle; totals in the table below")
-        self.coverage.style("height: 24rem")
+        self.coverage = Figure("Probability that the pointing error is below an angle; totals in the table below")
         layout.heading("Lines and totals")
-        self.bars = LivePlot("Half widths of the lines and totals of the rules; in numbers in the tables below")
+        self.bars = Figure("Half widths of the lines and totals of the rules; in numbers in the tables below")
         self.lines = table(_LINES)
         ui.label(
             "Left for it: the largest half width, all others as they are, with which the total equals the beacon's "
@@ -75,9 +71,9 @@ class PointingPage(DialPage[PointingView]):
         self.no_ahead = ui.label("The mission has no table [point_ahead].").classes("soft")
         self.dimmed = (self.words, self.coverage, self.bars, self.lines, self.totals, self.ahead)
 
-    def dials(self, draft: Draft) -> Mapping[str, tuple[Dial, ...]]:
+    def sliders(self, draft: Draft) -> Mapping[str, tuple[Slider, ...]]:
         """The numbers that move the budget."""
-        return pointing_view.dials(draft)
+        return pointing_view.sliders(draft)
 
     def view(self, file: LinkFile) -> PointingView:
         """The budget."""
@@ -99,4 +95,4 @@ class PointingPage(DialPage[PointingView]):
 
     async def _say(self, view: PointingView) -> None:
         """The sentences, apart from the rest: their module takes a second to load the first time."""
-        self.words.text = " ".join(await aside(self.words, pointing_view.words, view))
+        self.words.text = " ".join(await in_thread(self.words, pointing_view.words, view))

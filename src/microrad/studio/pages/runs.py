@@ -2,43 +2,43 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
 from nicegui import ui
 
 from microrad.studio import commands
-from microrad.studio.names import NameRefusedError, safe_name, typed_words
-from microrad.studio.pages import layout, pieces
-from microrad.studio.pages.aside import aside
+from microrad.studio.commands import Action
+from microrad.studio.guard.names import NameRefusedError, safe_name, typed_words
+from microrad.studio.pages import layout
+from microrad.studio.pages.in_thread import in_thread
 from microrad.studio.pages.runs_jobs import JobList, submit
-from microrad.studio.runs_view import campaign_files, free_name, ledgers, order, write_campaign
-from microrad.studio.workshop import Workshop
+from microrad.studio.session import Session
+from microrad.studio.views.runs import campaign_files, free_name, ledgers, order, write_campaign
 
 TITLE = "Runs"
 PATH = "/runs"
 
 
-def page(workshop: Workshop) -> None:
+def page(session: Session) -> None:
     """What can be started, the jobs, and a report in its frame."""
     with ui.element("div").classes("runs-start"):
-        _Study(workshop)
-        _Campaign(workshop)
+        _Study(session)
+        _Campaign(session)
     layout.heading("Jobs")
     ui.label("They run in processes of their own, one after the other, and go on when this page is closed.").classes(
         "soft"
     )
     viewer = _Viewer()
-    JobList(workshop, viewer.show)
+    JobList(session, viewer.show)
     viewer.build()
 
 
 class _Study:
     """The study of the mission, into a folder."""
 
-    def __init__(self, workshop: Workshop) -> None:
-        self.workshop = workshop
+    def __init__(self, session: Session) -> None:
+        self.session = session
         with ui.element("section").classes("runs-card").props('aria-label="Study"'):
             layout.heading("Study of the mission")
             self.about = ui.label().classes("soft")
@@ -47,53 +47,52 @@ class _Study:
                 self.button = ui.button("Run the study", on_click=self._run).props("no-caps")
                 layout.copy_buttons(self._copied)
             self.fault = ui.label().classes("no kept").props('role="alert"')
-        layout.follow(workshop, self._look)
+        layout.follow(session, self._look)
         ui.timer(0.0, self._name, once=True)
 
     def _look(self) -> None:
-        draft, faults = self.workshop.draft, self._faults()
-        self.about.text = f"Everything that follows from {self.workshop.name_of(draft.path)}: verdict, figures, report."
+        draft, faults = self.session.draft, self._faults()
+        self.about.text = f"Everything that follows from {self.session.name_of(draft.path)}: verdict, figures, report."
         self.button.text = "Save and run the study" if draft.changed else "Run the study"
         self.button.enabled = not faults
         self.fault.text = faults
 
     def _faults(self) -> str:
-        return self.workshop.faults() or self.workshop.disk_words()
+        return self.session.faults() or self.session.disk_words()
 
     async def _name(self) -> None:
         """Propose a folder, unless one was typed meanwhile."""
-        before, stem = self.folder.value, f"{self.workshop.draft.path.stem}-study"
-        name = await aside(self.folder, free_name, self.workshop, stem)
+        before, stem = self.folder.value, f"{self.session.draft.path.stem}-study"
+        name = await in_thread(self.folder, free_name, self.session, stem)
         if self.folder.value == before:
             self.folder.value = name
 
-    def _copied(self) -> commands.Run | None:
-        action = self._action()
-        return None if action is None else replace(action, file=pieces.file_of(self.workshop))
+    def _copied(self) -> Action | None:
+        layout.file_of(self.session)
+        return self._action()
 
-    def _action(self) -> commands.Run | None:
+    def _action(self) -> Action | None:
         try:
             name = safe_name(self.folder.value or "")
         except NameRefusedError as error:
             self.fault.text = typed_words(error)
             return None
         self.fault.text = self._faults()
-        return commands.Run(Path(self.workshop.name_of(self.workshop.draft.path)), Path(name))
+        return commands.study(Path(self.session.name_of(self.session.draft.path)), Path(name))
 
     async def _run(self) -> None:
         action = self._action()
-        if action is None or self._faults() or (self.workshop.draft.changed and not layout.save_draft(self.workshop)):
+        if action is None or self._faults() or (self.session.draft.changed and not layout.save_draft(self.session)):
             return
-        make = partial(order, self.workshop, "study", f"Study of {action.file}", action)
-        if await submit(self.folder, self.workshop, make):
+        if await submit(self.folder, self.session, partial(order, self.session, "study", action)):
             await self._name()
 
 
 class _Campaign:
     """Campaigns of the folder: a new one from a file, or one that goes on from its ledger."""
 
-    def __init__(self, workshop: Workshop) -> None:
-        self.workshop = workshop
+    def __init__(self, session: Session) -> None:
+        self.session = session
         with ui.element("section").classes("runs-card").props('aria-label="Campaign"'):
             layout.heading("Campaign")
             ui.label("Many runs of a mission with drawn inputs: tails, sweeps, sensitivity.").classes("soft")
@@ -110,8 +109,8 @@ class _Campaign:
 
     async def _look(self) -> None:
         """The files that there are, which others may write meanwhile."""
-        names = await aside(self.file, campaign_files, self.workshop)
-        going = [f"{name} (go on)" for name in await aside(self.file, ledgers, self.workshop)]
+        names = await in_thread(self.file, campaign_files, self.session)
+        going = [f"{name} (go on)" for name in await in_thread(self.file, ledgers, self.session)]
         options = [*names, *going]
         if options != self.file.options:
             keep = self.file.value if self.file.value in options else next(iter(options), None)
@@ -127,9 +126,9 @@ class _Campaign:
         if chosen.endswith(" (go on)"):
             self.ledger.value = chosen.removesuffix(" (go on)")
         elif stem:
-            self.ledger.value = await aside(self.file, free_name, self.workshop, stem, ".ledger")
+            self.ledger.value = await in_thread(self.file, free_name, self.session, stem, ".ledger")
 
-    def _action(self) -> commands.CampaignRun | commands.CampaignResume | None:
+    def _action(self) -> Action | None:
         chosen = self.file.value or ""
         try:
             ledger = safe_name(self.ledger.value or "")
@@ -141,23 +140,21 @@ class _Campaign:
             self.fault.text = "There is no campaign file in this folder yet; write an example, and change it."
             return None
         if chosen.endswith(" (go on)"):
-            return commands.CampaignResume(Path(ledger))
-        return commands.CampaignRun(Path(chosen), Path(ledger))
+            return commands.resume(Path(ledger))
+        return commands.campaign(Path(chosen), Path(ledger))
 
     async def _run(self) -> None:
         self.fault.text = ""
         action = self._action()
         if action is None:
             return
-        what = action.file if isinstance(action, commands.CampaignRun) else f"{action.ledger}, going on"
-        make = partial(order, self.workshop, "campaign", f"Campaign {what}", action)
-        if await submit(self.file, self.workshop, make):
+        if await submit(self.file, self.session, partial(order, self.session, "campaign", action)):
             await self._name()
 
     async def _example(self) -> None:
         self.fault.text = ""
         try:
-            path = await aside(self.file, write_campaign, self.workshop)
+            path = await in_thread(self.file, write_campaign, self.session)
         except (ValueError, OSError) as error:
             self.fault.text = str(error)
             return

@@ -7,11 +7,12 @@ from pathlib import Path
 from nicegui import ui
 from nicegui.elements.mixins.text_element import TextElement
 
-from microrad.studio.campaign_live import Live
-from microrad.studio.campaign_view import Figures, Table, figures
+from microrad.studio.jobs.ledgers import Live
 from microrad.studio.pages import layout
-from microrad.studio.pages.aside import aside
-from microrad.studio.workshop import Workshop
+from microrad.studio.pages.elements import Figure
+from microrad.studio.pages.in_thread import in_thread
+from microrad.studio.session import Session
+from microrad.studio.views.campaign import Figures, Table, figures
 
 _LOOK_S = 1.0
 _LONG = 60  # characters that may not stand on one line
@@ -20,9 +21,9 @@ _LONG = 60  # characters that may not stand on one line
 class CampaignPanel:
     """What the rows of a ledger say; it looks by itself while it is open."""
 
-    def __init__(self, workshop: Workshop, ledger: Path) -> None:
+    def __init__(self, session: Session, ledger: Path) -> None:
         """Closed, with nothing read."""
-        self.workshop, self.ledger = workshop, ledger
+        self.session, self.ledger = session, ledger
         self._last: Live | None = None
         self._found: Figures | None = None
         self._tables: list[_Table] = []
@@ -35,7 +36,7 @@ class CampaignPanel:
                 self._left = ui.element("div").classes("runs-tables")
                 with ui.element("div").classes("runs-plot") as self._right:
                     self._chosen = ui.select({}, label="Shown", on_change=self._draw).props("dense outlined")
-                    self._plot = ui.plotly({"data": [], "layout": {}}).props('role="figure"')
+                    self._plot = Figure("Distribution over the rows")
             self._below = ui.element("div").classes("runs-tables")
             self._notes = ui.label().classes("small kept soft")
             self._fault = ui.label().classes("no kept")
@@ -53,11 +54,11 @@ class CampaignPanel:
 
     async def _look(self) -> None:
         """Read what is new, and show it."""
-        live = await aside(self.place, self.workshop.campaigns.look, self.ledger)
+        live = await in_thread(self.place, self.session.campaigns.look, self.ledger)
         if live is self._last:  # nothing is new
             return
         self._last = live
-        found = await aside(self.place, figures, live)
+        found = await in_thread(self.place, figures, live)
         self._fault.text = live.fault
         self._fault.visible = bool(live.fault)
         if found is None:
@@ -99,7 +100,7 @@ class CampaignPanel:
         plot = None if self._found is None else self._found.plots.get(self._chosen.value or "")
         if plot is not None:
             self._plot.props["aria-label"] = f"Distribution over the rows: {self._chosen.value}"
-            self._plot.update_figure(plot)
+            self._plot.show(plot)
 
 
 def _form(table: Table) -> tuple[str, tuple[str, ...], int]:

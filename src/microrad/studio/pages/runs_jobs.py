@@ -10,11 +10,12 @@ from pathlib import Path
 from nicegui import ui
 
 from microrad.studio import commands
-from microrad.studio.jobs import Job, JobError, Order
+from microrad.studio.jobs.queue import Job, JobError, Order
 from microrad.studio.pages import layout
-from microrad.studio.pages.aside import aside
+from microrad.studio.pages.in_thread import in_thread
 from microrad.studio.pages.runs_campaign import CampaignPanel
-from microrad.studio.runs_view import (
+from microrad.studio.session import Session
+from microrad.studio.views.runs import (
     Others,
     ledger_of,
     ledger_path,
@@ -26,17 +27,16 @@ from microrad.studio.runs_view import (
     state_words,
     time_words,
 )
-from microrad.studio.workshop import Workshop
 
 RESULTS = "/results"
 
 
 class JobList:
-    """Every job of the workshop, the newest first; `open_page` is called with the address of a page to show."""
+    """Every job of the session, the newest first; `open_page` is called with the address of a page to show."""
 
-    def __init__(self, workshop: Workshop, open_page: Callable[[str, str], None]) -> None:
+    def __init__(self, session: Session, open_page: Callable[[str, str], None]) -> None:
         """An empty list in the place where it is made; it fills and follows by itself."""
-        self.workshop, self.open_page = workshop, open_page
+        self.session, self.open_page = session, open_page
         self._empty = ui.label("Nothing was run in this folder yet.").classes("soft")
         self._place = ui.column().classes("runs-list")
         self._cards: dict[int, _Card] = {}
@@ -48,7 +48,7 @@ class JobList:
         if self._busy.locked():
             return
         async with self._busy:
-            jobs = await aside(self._place, self.workshop.jobs.listed)
+            jobs = await in_thread(self._place, self.session.jobs.listed)
             self._empty.visible = not jobs
             there = {job.number for job in jobs}
             for number in self._cards.keys() - there:
@@ -68,7 +68,7 @@ class _Card:
     """One job. What stays is built once; what changes is set where it does."""
 
     def __init__(self, jobs: JobList, job: Job) -> None:
-        self.jobs, self.workshop, self.number = jobs, jobs.workshop, job.number
+        self.jobs, self.session, self.number = jobs, jobs.session, job.number
         self._last: Job | None = None
         self._beside: Others | None = None
         self._panel: CampaignPanel | None = None
@@ -95,7 +95,7 @@ class _Card:
             if job.kind not in ("campaign", "identification"):  # figures and the page of the mirror say the same
                 self.details.props("open")
             if job.arguments:
-                layout.words("code", commands.command(_Done(job))).classes("mono runs-command")
+                layout.words("code", commands.Action(job.arguments).command).classes("mono runs-command")
 
     async def show(self, job: Job, beside: Others) -> None:
         """Show the job as it is now, beside the others."""
@@ -121,7 +121,7 @@ class _Card:
 
     def _campaign(self, job: Job, beside: Others) -> None:
         """What a campaign has beside other jobs: its figures, the way on, and its report."""
-        path = ledger_path(self.workshop, job) if beside.newest else None
+        path = ledger_path(self.session, job) if beside.newest else None
         there = path is not None and path.is_file()
         self.results.visible = job.kind != "campaign" or beside.newest  # else another job may be writing to it
         self.again.visible = there and job.state in ("cancelled", "failed", "lost")
@@ -132,7 +132,7 @@ class _Card:
                 self._panel.open = False
         elif self._panel is None:
             with self.place:
-                self._panel = CampaignPanel(self.workshop, path)
+                self._panel = CampaignPanel(self.session, path)
             self._panel.open = beside.latest or job.state == "running"
         self._name_figures()
         self._link_report(beside.report)
@@ -158,12 +158,12 @@ class _Card:
 
     async def _ended(self, job: Job) -> None:
         """What a job has said and written, read once it is over."""
-        said = await aside(self.element, self.workshop.jobs.output, job.number)
+        said = await in_thread(self.element, self.session.jobs.output, job.number)
         self.said.text = said.strip()
         self.details.visible = bool(self.said.text)
         self.results.clear()
         with self.results:
-            for place, name in result_files(self.workshop, job):
+            for place, name in result_files(self.session, job):
                 self._open_links(job, place, name)
 
     def _open_links(self, job: Job, place: int, name: str) -> None:
@@ -178,31 +178,23 @@ class _Card:
 
     # --------------------------------------------------------------------------------------------------------- buttons
     def _cancel(self) -> None:
-        layout.attempt(lambda: self.workshop.jobs.cancel(self.number))
+        layout.attempt(lambda: self.session.jobs.cancel(self.number))
 
     def _remove(self) -> None:
-        layout.attempt(lambda: self.workshop.jobs.remove(self.number))
+        layout.attempt(lambda: self.session.jobs.remove(self.number))
 
     async def _go_on(self) -> None:
         job = self._last
         ledger = None if job is None else ledger_of(job)
         if ledger is not None:
-            action = commands.CampaignResume(Path(ledger))
-            title = f"Campaign {ledger}, going on"
-            await submit(self.element, self.workshop, partial(order, self.workshop, "campaign", title, action))
+            action = commands.resume(Path(ledger))
+            await submit(self.element, self.session, partial(order, self.session, "campaign", action))
 
     async def _write_page(self) -> None:
         job = self._last
         ledger = None if job is None else ledger_of(job)
         if ledger is not None:
-            await submit(self.element, self.workshop, partial(report_order, self.workshop, Path(ledger)))
-
-
-class _Done:
-    """A job as an action, for its command."""
-
-    def __init__(self, job: Job) -> None:
-        self.arguments, self.results, self.python = job.arguments, job.results, ""
+            await submit(self.element, self.session, partial(report_order, self.session, Path(ledger)))
 
 
 def _class(job: Job) -> str:
@@ -211,10 +203,10 @@ def _class(job: Job) -> str:
     return "no" if job.state in ("failed", "lost", "unreadable") else "soft"
 
 
-async def submit(page: ui.element, workshop: Workshop, make: Callable[[], Order]) -> bool:
+async def submit(page: ui.element, session: Session, make: Callable[[], Order]) -> bool:
     """Queue what `make` returns; says on the page of this element why it cannot be, and returns whether it is."""
     try:
-        await aside(page, lambda: workshop.jobs.submit(make()))
+        await in_thread(page, lambda: session.jobs.submit(make()))
     except (JobError, OSError) as error:
         layout.refuse(str(error))
         return False

@@ -1,0 +1,1 @@
+"""The mission being edited: its text with its comments, and what is changed in it."""

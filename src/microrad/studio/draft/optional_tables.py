@@ -1,0 +1,125 @@
+"""Tables that a mission may have and does not: from its own commented example, or from one that is shipped."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from functools import cache
+from importlib import resources
+
+from microrad.mission.toml import scan
+from microrad.studio.draft.draft import Draft, DraftError
+from microrad.studio.draft.keys import keys_in
+
+_HEADER = re.compile(r"#[ \t]*\[([A-Za-z0-9_.]+)\][ \t]*")
+_KEY = re.compile(r"#[ \t]*[A-Za-z0-9_]+[ \t]*=.*")
+_MARK = re.compile(r"#[ \t]?")
+_RULE = re.compile(r"#[ \t]*-{20,}.*")
+
+
+def offered(draft: Draft) -> tuple[str, ...]:
+    """Names of the tables that the draft could get, in the order of the shipped mission."""
+    there = _tables(draft.text)
+    names = dict.fromkeys((*_commented(draft.text), *_examples()))
+    return tuple(name for name in names if name not in there and _has_home(name, there))
+
+
+def with_table(draft: Draft, name: str) -> Draft:
+    """The draft with a table more: its commented example comes to life where it stands, else it goes to the end.
+
+    Raises `DraftError` for a table that is there already or is none.
+    """
+    if name not in offered(draft):
+        raise DraftError(f"[{name}] cannot be added: it is there already, or a mission has no such table")
+    text = draft.text.replace("\r\n", "\n")
+    revived = _revived(text, name)
+    if revived is None:
+        revived = f"{text.rstrip()}\n\n{_examples()[name]}\n"
+    return draft.with_text(revived)
+
+
+def _has_home(name: str, there: set[str]) -> bool:
+    """Whether the table belongs to none, or to one that is there: an inner table alone would only bring faults."""
+    outer = name.split(".")[:-1]
+    return not outer or outer[0] in there or any(each.startswith(f"{outer[0]}.") for each in there)
+
+
+def _tables(text: str) -> set[str]:
+    """Tables of a text, those with a line of their own and those that dotted names imply."""
+    found = {each.key for each in scan(text.replace("\r\n", "\n")) if each.kind in ("table", "tables")}
+    return found | {name.rsplit(".", n)[0] for name in found for n in range(1, name.count(".") + 1)}
+
+
+# ------------------------------------------------------------------------------------------------- commented examples
+def _commented(text: str) -> dict[str, tuple[int, int]]:
+    """Tables that stand in a text as comments: the first line and the one behind the last, counted from 0."""
+    lines, found = text.split("\n"), {}
+    for first, line in enumerate(lines):
+        if header := _HEADER.fullmatch(line.rstrip("\r")):
+            behind = first + 1
+            while behind < len(lines) and _KEY.fullmatch(lines[behind].rstrip("\r")):
+                behind += 1
+            if behind > first + 1 and keys_in(header[1]):
+                found[header[1]] = (first, behind)
+    return found
+
+
+def _revived(text: str, name: str) -> str | None:
+    """The text with a commented table made a table; None where there is none, or keys below it would fall into it."""
+    place = _commented(text).get(name)
+    if place is None:
+        return None
+    lines = text.split("\n")
+    first, behind = place
+    rest = scan("\n".join(lines[behind:]))
+    if rest and rest[0].kind == "key":
+        return None
+    lines[first:behind] = [_MARK.sub("", line, count=1) for line in lines[first:behind]]
+    return "\n".join(lines)
+
+
+# ---------------------------------------------------------------------------------------------------- shipped examples
+@cache
+def _examples() -> dict[str, str]:
+    """Each table that there is an example of, with its text; an outermost one with all that it holds."""
+    own = resources.files(__package__).joinpath("optional_tables.toml").read_text("utf-8")
+    shipped = resources.files("microrad.mission").joinpath("missions", "leo-geo.toml").read_text("utf-8")
+    active = dict(_blocks(shipped))
+    found = {name: _whole(name, active) for name in active} | dict(_blocks(own)) | _uncommented(shipped)
+    return {name: found[name] for name in sorted(found, key=lambda name: name.count("."))}
+
+
+def _uncommented(text: str) -> dict[str, str]:
+    """The commented tables of a text as tables."""
+    lines = text.split("\n")
+    return {
+        name: "\n".join(_MARK.sub("", line, count=1) for line in lines[first:behind])
+        for name, (first, behind) in _commented(text).items()
+    }
+
+
+def _whole(name: str, blocks: dict[str, str]) -> str:
+    """A table's block; that of an outermost one with the blocks of its inner tables behind it."""
+    inner = [] if "." in name else [text for each, text in blocks.items() if each.startswith(f"{name}.")]
+    return "\n\n".join((blocks[name], *inner))
+
+
+def _blocks(text: str) -> Iterator[tuple[str, str]]:
+    """Each table of a text: the comment right above its header, the header, its keys."""
+    lines, statements = text.split("\n"), scan(text)
+    for place, header in enumerate(statements):
+        if header.kind != "table":
+            continue
+        last = header.last_line
+        for each in statements[place + 1 :]:
+            if each.kind != "key":
+                break
+            last = each.last_line
+        first = header.line - 1
+        while first > 0 and lines[first - 1].startswith("#") and not _of_an_example(lines[first - 1]):
+            first -= 1
+        yield header.key, "\n".join(lines[first:last])
+
+
+def _of_an_example(line: str) -> bool:
+    return bool(_KEY.fullmatch(line) or _HEADER.fullmatch(line) or _RULE.fullmatch(line))

@@ -1,0 +1,1 @@
+"""Recordings from outside: stored under limits, and read by a process of their own."""

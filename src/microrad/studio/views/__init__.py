@@ -1,0 +1,1 @@
+"""What the pages show: numbers, words and plots, computed without NiceGUI."""

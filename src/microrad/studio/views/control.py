@@ -1,0 +1,232 @@
+"""What the control page shows of a controller: margins as rows, responses by frequency and in time as plots."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from microrad.core.arrays import Floats
+from microrad.core.units import UnitError, format_quantity, parse_quantity
+from microrad.report.plotting.sheet import BLACK, BLUE, GREEN, GREY, VERMILION, Axis, Line, Mark, Rule
+from microrad.studio.views.controllers import PID, PID_INVERSE, WITH, WITHOUT, Answers, Ask, Controller, Curve
+from microrad.studio.views.plots import Plot, empty, plot
+
+SHOWN = {"both": (WITH, WITHOUT), "with": (WITH,), "without": (WITHOUT,)}
+"""What the switch of the hysteresis shows."""
+
+_STYLES = {WITH: (VERMILION, "-"), WITHOUT: (BLUE, "--")}
+MILLISECONDS, SECONDS = "time (ms)", "time (s)"
+_NOTHING = "Nothing disturbs this loop, or nothing was asked."
+_LEAST = 1e-4  # of what is drawn on a logarithmic axis
+
+
+class AskError(ValueError):
+    """Something typed that no loop can be asked; the message names the field."""
+
+
+def ask_of(step: str, amplitude: str, frequency: str, rate_hz: float) -> Ask:
+    """Step, amplitude and frequency as they are typed, for a loop of this rate. Raises `AskError`."""
+    return Ask(_angle("step", step), _angle("amplitude of the sine", amplitude), _frequency(frequency, rate_hz))
+
+
+def _angle(name: str, typed: str) -> float:
+    return _quantity(name, typed, "rad", 1e-9, 0.1)
+
+
+def _frequency(typed: str, rate_hz: float) -> float:
+    """The frequency of a sine that the samples of the loop can tell from a slower one."""
+    found = _quantity("frequency of the sine", typed, "Hz", 0.1, 10_000.0)
+    if found < 0.5 * rate_hz:
+        return found
+    half, rate = format_quantity(0.5 * rate_hz, "Hz"), format_quantity(rate_hz, "Hz")
+    raise AskError(
+        f"frequency of the sine: {typed.strip()} is not below {half}, half the rate of the loop, {rate}, which would "
+        "take it for a slower one; type one below"
+    )
+
+
+def _quantity(name: str, typed: str, unit: str, least: float, most: float) -> float:
+    try:
+        found = parse_quantity(typed.strip(), unit)
+    except UnitError as error:
+        raise AskError(f"{name}: {error}") from None
+    if not least <= found <= most:
+        bounds = f"{format_quantity(least, unit)} to {format_quantity(most, unit)}"
+        raise AskError(f"{name}: {typed.strip()} is outside {bounds}; type one between")
+    return found
+
+
+# --------------------------------------------------------------------------------------------------------------- words
+def margin_rows(of: Controller) -> list[tuple[str, str]]:
+    """The margins in words, the modulus against what is asked for."""
+    m = of.margins
+    asked = "" if math.isnan(of.asked_modulus) else f" (asked for: {of.asked_modulus:g})"
+    rows = [
+        ("Modulus margin, least |1 + L|", f"{m['modulus']:.3f}{asked}"),
+        ("Gain margin", _gain(m["gain"])),
+        ("Phase margin", "none" if math.isinf(m["phase"]) else f"{math.degrees(m['phase']):.1f}°"),
+        ("Delay margin", _told(m["delay"], "s")),
+        ("Crossover, |L| = 1", _told(m["crossover"], "Hz")),
+        ("Bandwidth, |S| = 1", _told(m["bandwidth"], "Hz")),
+        ("Largest |S|", f"{m['peak']:.3f} ({20 * math.log10(m['peak']):.2f} dB)"),
+    ]
+    if math.isfinite(of.residual_rad):
+        rows.append(("Residual of an axis, rms, linear", _told(of.residual_rad, "rad")))
+    return rows
+
+
+def _gain(factor: float) -> str:
+    return "none" if math.isinf(factor) else f"{factor:.3g} ({20 * math.log10(factor):.1f} dB)"
+
+
+def _told(value: float, unit: str) -> str:
+    return "none" if not math.isfinite(value) else format_quantity(float(f"{value:.4g}"), unit)
+
+
+def value_rows(of: Controller) -> list[tuple[str, str]]:
+    """What the controller was tuned to."""
+    return [
+        (f"{name[:1].upper()}{name[1:]}", f"{value:.5g} {unit}".rstrip()) for name, (value, unit) in of.values.items()
+    ]
+
+
+def notes(of: Controller) -> tuple[str, ...]:
+    """What has to be known to read the numbers."""
+    told = []
+    if of.name in (PID, PID_INVERSE):
+        told.append(
+            "The gains of [control] as they stand in the mission: this loop is not tuned, and nothing shakes it."
+        )
+    if of.bound_by:
+        told.append(f"What keeps its residual from being smaller: {', '.join(of.bound_by)}.")
+    if of.sensitivity is None:
+        told.append("The optical sensor is slower than the control: the loop has no response by frequency of its own.")
+    return (*told, *of.warnings)
+
+
+def table_row(of: Controller) -> dict[str, Any]:
+    """The controller as a row of the table of all."""
+    m = of.margins
+    return {
+        "name": of.name,
+        "residual": _told(of.residual_rad, "rad") if math.isfinite(of.residual_rad) else "not computed",
+        "modulus": f"{m['modulus']:.3f}",
+        "gain": _gain(m["gain"]),
+        "phase": f"{math.degrees(m['phase']):.1f}°" if math.isfinite(m["phase"]) else "none",
+        "bandwidth": _told(m["bandwidth"], "Hz"),
+    }
+
+
+def waiting_row(name: str, words: str = "not looked at yet") -> dict[str, Any]:
+    """A row of the table for a controller of which nothing is known."""
+    return {"name": name, "residual": words, "modulus": "", "gain": "", "phase": "", "bandwidth": ""}
+
+
+def answer_words(curves: dict[str, Curve], what: str, field_of_view_rad: float = math.inf) -> str:
+    """Rms and peak of the error of each variant in a sentence, and one on a sensor that has lost sight of it."""
+    told = [
+        f"{variant} {format_quantity(float(f'{c.rms_rad:.3g}'), 'rad')} rms, at most "
+        f"{format_quantity(float(f'{c.peak_rad:.3g}'), 'rad')}"
+        for variant, c in curves.items()
+    ]
+    words = f"{what}: {'; '.join(told)}." if told else ""
+    if not any(c.peak_rad > field_of_view_rad for c in curves.values()):
+        return words
+    view = format_quantity(field_of_view_rad, "rad")
+    return f"{words} The sensor sees errors up to {view}: beyond, it holds its last reading, and the loop does not act."
+
+
+# ------------------------------------------------------------------------------------------------ plots by frequency
+def sensitivity_plot(of: Controller) -> Plot:
+    """|S|: what the loop leaves of a disturbance at each frequency, below the inverse of the margin asked for."""
+    if of.sensitivity is None:
+        return empty("No response by frequency.")
+    marks: list[Mark] = [Line(of.freq_hz, of.sensitivity, VERMILION, label="|S|")]
+    if math.isfinite(of.asked_modulus):
+        name = f"1 / modulus margin asked for ({of.asked_modulus:g})"
+        marks.append(Rule(1.0 / of.asked_modulus, False, BLACK, "--", 1.3, name))
+    return _by_frequency(of, of.sensitivity, "|S|, error over disturbance", "bandwidth", marks)
+
+
+def gain_plot(of: Controller) -> Plot:
+    """|L|: the loop gain."""
+    if of.loop_gain is None:
+        return empty("No response by frequency.")
+    line = Line(of.freq_hz, of.loop_gain, BLUE, label="|L|")
+    return _by_frequency(of, of.loop_gain, "|L|, loop gain", "crossover", [line])
+
+
+def _by_frequency(of: Controller, values: Floats, title: str, mark: str, marks: Sequence[Mark]) -> Plot:
+    """Curves over the frequency, both axes logarithmic, with the frequency of a margin."""
+    low, high, at = max(float(np.min(values)), _LEAST), float(np.max(values)), of.margins[mark]
+    shown: list[Mark] = [*marks, Rule(1.0, False, GREY, ":")]
+    if math.isfinite(at) and at > 0.0:
+        shown.append(Rule(at, True, GREEN, "-.", 1.3, f"{mark} {_told(at, 'Hz')}"))
+    x = Axis("frequency (Hz)", log=True, low=of.freq_hz[0], high=of.freq_hz[-1])
+    return plot(x, Axis(title, log=True, low=low, high=1.3 * high), *shown)
+
+
+# ---------------------------------------------------------------------------------------------------- plots over time
+def step_plot(answers: Answers) -> Plot:
+    """The line of sight behind a step of the reference."""
+    wanted = [Line(_ms(c), 1e6 * c.wanted_rad, GREY, ":", label="wanted") for c in [*answers.step.values()][:1]]
+    return _over_time(MILLISECONDS, "line of sight, axis x (µrad)", *wanted, *_lines(answers.step, _ms, _found))
+
+
+def sine_plot(answers: Answers) -> Plot:
+    """The error of axis x while the loop follows a sine, settled; the time is that since it has settled."""
+    return _over_time(MILLISECONDS, "error, axis x (µrad)", *_lines(answers.sine, _ms, _error))
+
+
+def jitter_plot(answers: Answers) -> Plot:
+    """The error of axis x under everything that disturbs the loop."""
+    return _over_time(SECONDS, "error, axis x (µrad)", *_lines(answers.jitter, _s, _error, 0.7))
+
+
+def motion_plot(answers: Answers) -> Plot:
+    """What the mirror has to follow on axis x, and what it does: the closed loop's trace."""
+    shaken = [(_s(c), c.disturbance_rad) for c in answers.jitter.values() if c.disturbance_rad is not None]
+    followed = [Line(time_s, 1e6 * angle[:, 0], GREY, "-", 3.0, "to be followed") for time_s, angle in shaken[:1]]
+    return _over_time(SECONDS, "angle, axis x (µrad)", *followed, *_lines(answers.jitter, _s, _found))
+
+
+def drive_plot(of: Controller, curves: dict[str, Curve], over: str = MILLISECONDS) -> Plot:
+    """The drive of the first actuator from the bias, with the amplifier's limits and the identified range."""
+    if not curves:
+        return empty(_NOTHING)
+    lines = _lines(curves, _ms if over == MILLISECONDS else _s, lambda c: c.drive_v[:, 0])
+    sides = [("amplifier's limits", "--", BLACK, each) for each in of.limits_v]
+    if of.identified_v != of.limits_v:
+        sides = [("range of the identification", ":", GREY, each) for each in of.identified_v] + sides
+    limits = [Rule(at, False, colour, dash, 1.3, name) for name, dash, colour, at in sides if math.isfinite(at)]
+    return _over_time(over, "drive from the bias (V)", *lines, *limits)
+
+
+def _over_time(over: str, title: str, *marks: Mark) -> Plot:
+    return plot(Axis(over), Axis(title), *marks) if marks else empty(_NOTHING)
+
+
+def _lines(
+    curves: dict[str, Curve], time: Callable[[Curve], Floats], value: Callable[[Curve], Floats], width: float = 1.3
+) -> list[Line]:
+    """A line for each variant of the mirror."""
+    return [Line(time(c), value(c), *_STYLES[variant], width, variant) for variant, c in curves.items()]
+
+
+def _found(curve: Curve) -> Floats:
+    return 1e6 * curve.found_rad
+
+
+def _error(curve: Curve) -> Floats:
+    return 1e6 * curve.error_rad[:, 0]
+
+
+def _ms(curve: Curve) -> Floats:
+    return np.asarray(1e3 * (curve.time_s - curve.time_s[0]))
+
+
+def _s(curve: Curve) -> Floats:
+    return curve.time_s

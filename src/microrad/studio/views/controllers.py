@@ -1,0 +1,331 @@
+"""A controller of the mission as the control page asks for it: tuned, its margins, and what its loop does in time.
+
+Controllers of the fine-pointing loop are tuned as the study tunes them; the two of [control] are the paper's PID, as it
+stands in the mission, alone and with the inverse ahead of it. Times are in s, angles in rad, drives in V from the bias.
+"""
+
+from __future__ import annotations
+
+import math
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import lru_cache, partial
+
+import numpy as np
+
+from microrad import mirror
+from microrad.core import lti
+from microrad.core.arrays import Floats
+from microrad.link.tracking_light import tracking_light_w
+from microrad.loop import control, fine_pointing, paper_cases
+from microrad.loop import sine_run as simulate
+from microrad.loop.disturbance import Reference
+from microrad.loop.fine_loop import ensemble, linear
+from microrad.loop.fine_loop.loop import LoopController, PointingLoop
+from microrad.loop.fine_pointing import parts
+from microrad.loop.fine_pointing.designs import families
+from microrad.loop.fine_pointing.results import for_mirror
+from microrad.loop.fine_pointing.scenario import BODY_POINTING, with_mirror
+from microrad.mirror import Variant
+from microrad.mission.file import MissionFile
+from microrad.mission.tables.fine_pointing import FinePointing
+
+PID, PID_INVERSE = "PID of [control]", "PID of [control] + inverse"
+WITH, WITHOUT = "with hysteresis", "without hysteresis"
+_POINTS = 500
+_STEP_PERIODS = 6.0  # of the bandwidth
+_SHOWN_PERIODS = 2.0
+_WARNING = "# Warning: "
+_NO_LINEAR_PART = (
+    "The mirror has no linear part: its dynamics are not known, and margins and answers are those of one without any."
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Ask:
+    """What a loop is to answer: a step and a sine of the reference on axis x, the sine's frequency in Hz."""
+
+    step_rad: float
+    sine_rad: float
+    sine_hz: float
+    seed: int = 1
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Curve:
+    """One run: time, wanted and found line of sight of axis x, error by axis (samples, axes), drives, disturbance.
+
+    ``disturbance_rad`` is what the loop has to reject, (samples, axes), None where there is nothing.
+    """
+
+    time_s: Floats
+    wanted_rad: Floats
+    found_rad: Floats
+    error_rad: Floats
+    drive_v: Floats
+    disturbance_rad: Floats | None = None
+
+    @property
+    def rms_rad(self) -> float:
+        """Root mean square of the radial error over what is shown."""
+        return float(np.sqrt(np.mean(np.sum(self.error_rad**2, axis=1))))
+
+    @property
+    def peak_rad(self) -> float:
+        """Largest radial error of what is shown."""
+        return float(np.max(np.linalg.norm(self.error_rad, axis=1)))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Answers:
+    """What a loop does, by the variant of its mirror (`WITH` or `WITHOUT`); no jitter where nothing disturbs it."""
+
+    step: dict[str, Curve]
+    sine: dict[str, Curve]
+    jitter: dict[str, Curve]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Controller:
+    """A controller, ready to be asked.
+
+    ``margins`` hold gain (a factor), phase (rad), delay (s), modulus, crossover, bandwidth (Hz) and the peak of |S|;
+    ``values`` are what it was tuned to by name, each with its unit. ``loop_gain`` and ``sensitivity`` are magnitudes at
+    ``freq_hz``, None where a slower sensor folds frequencies. ``limits_v`` are the amplifier's about the bias,
+    ``identified_v`` the range that the mirror was identified in. ``rate_hz`` is that of the control,
+    ``field_of_view_rad`` the radial error beyond which the sensor holds its last reading. ``warnings`` say what
+    the mirror leaves out.
+    """
+
+    name: str
+    margins: dict[str, float]
+    values: dict[str, tuple[float, str]]
+    residual_rad: float
+    bound_by: tuple[str, ...]
+    asked_modulus: float
+    freq_hz: Floats
+    loop_gain: Floats | None
+    sensitivity: Floats | None
+    limits_v: tuple[float, float]
+    identified_v: tuple[float, float]
+    rate_hz: float
+    field_of_view_rad: float
+    warnings: tuple[str, ...]
+    ask: Callable[[Ask, tuple[str, ...]], Answers]
+
+
+def names(table: FinePointing | None) -> tuple[str, ...]:
+    """The controllers that a mission has: of its fine-pointing loop, where it has one, and of [control]."""
+    return (*(() if table is None else fine_pointing.names(table)), PID, PID_INVERSE)
+
+
+_tuning = threading.Lock()  # two pages that want the same controller tune it once
+
+
+def controller(file: MissionFile, name: str) -> Controller:
+    """A controller of the mission, tuned; takes seconds the first time. Raises ValueError with the reason."""
+    with _tuning:
+        return _controller(_Keyed(file), name)
+
+
+@dataclass(frozen=True, slots=True)
+class _Keyed:
+    """A mission that is told from another one by its text and its mirror's."""
+
+    file: MissionFile
+
+    @property
+    def _key(self) -> tuple[str, str]:
+        inner = self.file.mirror_file
+        return self.file.sha256, "" if inner is None else inner.sha256
+
+    def __hash__(self) -> int:
+        return hash(self._key)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Keyed) and self._key == other._key
+
+
+@lru_cache(maxsize=32)
+def _controller(of: _Keyed, name: str) -> Controller:
+    file, mirrors = of.file, mirror.of(of.file.mission)
+    if name in (PID, PID_INVERSE):
+        made = _pid(paper_cases.of(file.mission, mirrors), name)
+    else:
+        made = _fine(fine_pointing.scene(file, mirrors, tracking_light_w(file)), name)
+    text = "" if file.mirror_file is None else file.mirror_file.text
+    return replace(made, warnings=mirror_warnings(mirrors.table.linear is not None, text))
+
+
+# ------------------------------------------------------------------------------------------- the fine-pointing loop
+def _fine(scene: fine_pointing.Scene, name: str) -> Controller:
+    table = scene.table
+    plants = fine_pointing.plants(scene, table.seed)
+    tuned = fine_pointing.tune(name, table, plants)
+    family = next((each for each in families(table) if each.name == name), control.PI)
+    units = {each.name: each.unit for each in family.parameters(plants[0])}
+    built = fine_pointing.build(name, scene, tuned.controller)
+    half = 0.5 / scene.loop.timing.period_s
+    freq = np.geomspace(half * 1e-4, half * 0.999, _POINTS)
+    gain, sensitivity = _responses(scene.loop, built, freq)
+    return Controller(
+        name,
+        _numbers(tuned.margins),
+        {key: (value, units.get(key, "")) for key, value in tuned.values.items()},
+        tuned.residual_rms_rad,
+        tuned.bound_by,
+        table.modulus_margin,
+        freq,
+        gain,
+        sensitivity,
+        (scene.loop.drive.minimum_v, scene.loop.drive.maximum_v),
+        scene.loop.drive_range_v,
+        1.0 / scene.loop.timing.period_s,
+        scene.loop.optical.field_of_view_rad,
+        (),
+        partial(_fine_answers, scene, built, tuned.margins.bandwidth_hz),
+    )
+
+
+def mirror_warnings(has_linear_part: bool, text: str) -> tuple[str, ...]:
+    """What the mirror leaves out, in sentences: its linear part, and what the head of its own file's text warns of."""
+    own = [line.removeprefix(_WARNING) for line in text.splitlines() if line.startswith(_WARNING)]
+    told = [] if has_linear_part else [_NO_LINEAR_PART]
+    return (*told, *(f"Warning of the mirror's file: {warning}" for warning in own))
+
+
+def _numbers(of: control.LoopMargins) -> dict[str, float]:
+    return {
+        "gain": of.gain_up,
+        "phase": of.phase_rad,
+        "delay": of.delay_s,
+        "modulus": of.modulus,
+        "crossover": of.crossover_hz,
+        "bandwidth": of.bandwidth_hz,
+        "peak": of.peak,
+    }
+
+
+def _responses(loop: PointingLoop, of: LoopController, freq: Floats) -> tuple[Floats | None, Floats | None]:
+    """Magnitudes of loop gain and sensitivity of axis x, nothing for a sensor that folds frequencies."""
+    if loop.optical.every != 1:
+        return None, None
+    closed = linear.close(loop, of)
+    gain, sensitivity = linear.loop_response(closed, freq), linear.sensitivity(closed, freq)
+    return np.abs(gain[:, 0, 0]), np.abs(sensitivity[:, 0, 0])
+
+
+def _fine_answers(
+    scene: fine_pointing.Scene, of: LoopController, bandwidth_hz: float, wanted: Ask, variants: tuple[str, ...]
+) -> Answers:
+    table = scene.table
+    loops = {WITH: scene.loop, WITHOUT: with_mirror(scene.loop, scene.mirrors, Variant.STRAIGHT)}
+    chosen = {v: (loops[v], for_mirror(of, loops[v])) for v in variants}
+    return Answers(
+        {v: _step(*each, wanted, bandwidth_hz) for v, each in chosen.items()},
+        {v: _sine(*each, wanted) for v, each in chosen.items()},
+        {v: _jitter(*each, wanted, table.settle_s, table.duration_s) for v, each in chosen.items()},
+    )
+
+
+def _step(loop: PointingLoop, of: LoopController, wanted: Ask, bandwidth_hz: float) -> Curve:
+    """A step of the reference on axis x at time 0, nothing else disturbing."""
+    quiet = parts.without(loop, *parts.sources(loop))
+    stepped = _first_reference(quiet, Reference(wanted.step_rad, 0.0, 1.0))
+    period = loop.timing.period_s
+    samples = max(60, round(_STEP_PERIODS / max(bandwidth_hz, 1.0 / (400.0 * period)) / period))
+    return _curve(stepped, of, ensemble.Span(samples * period, 0.0, wanted.seed), 0.0)
+
+
+def _sine(loop: PointingLoop, of: LoopController, wanted: Ask) -> Curve:
+    """A sine of the reference on axis x under vibration and noise, body pointing and point-ahead left out."""
+    alone = parts.without(loop, parts.REFERENCE, BODY_POINTING)
+    sine = replace(alone.references[0], sine_amplitude_rad=wanted.sine_rad, sine_freq_hz=wanted.sine_hz)
+    shown = _SHOWN_PERIODS / wanted.sine_hz
+    settle = max(0.4, 1.0 / wanted.sine_hz)
+    return _curve(_first_reference(alone, sine), of, ensemble.Span(settle + shown, settle, wanted.seed), settle)
+
+
+def _jitter(loop: PointingLoop, of: LoopController, wanted: Ask, settle_s: float, duration_s: float) -> Curve:
+    """Everything that disturbs the loop, behind the settling time."""
+    return _curve(loop, of, ensemble.Span(duration_s, settle_s, wanted.seed), settle_s)
+
+
+def _first_reference(loop: PointingLoop, first: Reference) -> PointingLoop:
+    return replace(loop, references=(first, *loop.references[1:]))
+
+
+def _curve(loop: PointingLoop, of: LoopController, span: ensemble.Span, from_s: float) -> Curve:
+    run = ensemble.trace(loop, of, span)
+    shown = run.time_s >= from_s - 1e-12
+    wanted = run.reference_rad[shown]
+    error = run.error_rad[shown]
+    before = run.disturbance_rad[shown]
+    found = wanted + before - error
+    return Curve(run.time_s[shown], wanted[:, 0], found[:, 0], error, run.drive_v[shown], wanted + before)
+
+
+# ------------------------------------------------------------------------------------------- the loop of [control]
+def _pid(cases: paper_cases.PaperCases, name: str) -> Controller:
+    setup, turned = cases.setup, cases.mirrors.line_of_sight
+    plants = {WITH: turned[Variant.GIVEN].plant, WITHOUT: turned[Variant.STRAIGHT].plant}
+    found, period = simulate.margins(plants[WITH], setup), setup.timing.period_s
+    freq = np.geomspace(0.5e-5 / period, 0.4995 / period, _POINTS)
+    L = lti.frequency_response(simulate.sampled_loop(plants[WITH], setup), freq, period)[:, 0, 0]
+    sensitivity = np.abs(1.0 / (1.0 + L))
+    return Controller(
+        name,
+        {
+            "gain": found.gain_up,
+            "phase": found.phase_rad,
+            "delay": found.delay_s,
+            "modulus": found.modulus,
+            "crossover": found.crossover_hz,
+            "bandwidth": float(freq[int(np.argmax(sensitivity >= 1.0))]),
+            "peak": 1.0 / found.modulus,
+        },
+        {},
+        math.nan,
+        (),
+        math.nan,
+        freq,
+        np.abs(L),
+        sensitivity,
+        (setup.drive.minimum_v, setup.drive.maximum_v),
+        cases.mirrors.drive_range_v,
+        1.0 / period,
+        math.inf,
+        (),
+        partial(_pid_answers, name, plants, setup, found.crossover_hz),
+    )
+
+
+def _pid_answers(
+    name: str,
+    plants: dict[str, mirror.Mirror],
+    setup: simulate.Setup,
+    crossover_hz: float,
+    wanted: Ask,
+    variants: tuple[str, ...],
+) -> Answers:
+    period = setup.timing.period_s
+    samples = max(60, round(_STEP_PERIODS / max(crossover_hz, 1.0) / period))
+    step = np.full((samples, 1), wanted.step_rad), slice(0, samples)
+    sine, _ = simulate.sine(wanted.sine_rad, wanted.sine_hz, period)
+    shown = slice(max(sine.shape[0] - round(_SHOWN_PERIODS / wanted.sine_hz / period), 0), sine.shape[0])
+
+    def runs(reference: Floats, shown: slice) -> dict[str, Curve]:
+        found = {}
+        for v in variants:
+            inverse = control.inverse(plants[v]) if name == PID_INVERSE else control.no_feedforward(plants[v])
+            found[v] = _tracked(simulate.track(name, plants[v], setup, inverse, reference, shown))
+        return found
+
+    return Answers(runs(*step), runs(sine, shown), {})
+
+
+def _tracked(run: simulate.Trace) -> Curve:
+    shown = run.steady
+    wanted, found = run.reference_rad[shown, 0], run.output_rad[shown, 0]
+    return Curve(run.time_s[shown], wanted, found, run.error_rad[shown], run.drive_v[shown])

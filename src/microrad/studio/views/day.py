@@ -1,0 +1,83 @@
+"""What the page of the day shows: contacts over time, volumes and latencies, and the tables beside them."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Iterable
+from typing import Any
+
+from microrad.core.progress import Progress
+from microrad.link import study as link_study
+from microrad.mission.file import LinkFile
+from microrad.orbit import day as day_study
+from microrad.orbit.day import DayStudy, Way
+from microrad.report import day_tables, day_words
+from microrad.report.plotting.figure import Figure
+
+Row = dict[str, Any]
+
+
+def run(file: LinkFile, on_progress: Progress) -> DayStudy:
+    """The links of a mission, then its day; raises ValueError with the reason where a day cannot be had."""
+    on_progress(0, 0, "links")
+    links = link_study.run(file)
+    on_progress(0, 0, "contacts")
+    return day_study.run(links, on_progress=on_progress)
+
+
+def missing(file: LinkFile) -> str:
+    """Why a mission has no day, or ""."""
+    lacking = [f"[{name}]" for name in ("orbit", "operations") if getattr(file.mission, name) is None]
+    if not lacking:
+        return ""
+    return f"The mission has no {' and no '.join(lacking)}, so it has no day; microrad init writes such tables."
+
+
+# ------------------------------------------------------------------------------------------------------------- tables
+def ways(day: DayStudy) -> tuple[Way, ...]:
+    """The ways down that the mission has."""
+    return (day.relay,) if day.direct is None else (day.relay, day.direct)
+
+
+def way_rows(day: DayStudy) -> list[Row]:
+    """Relay and direct downlink side by side."""
+    return [{"id": place, "what": row[0], **_cells(row[1:])} for place, row in enumerate(day_tables.way_rows(day))]
+
+
+def _cells(cells: Iterable[str]) -> Row:
+    return dict(zip(("relay", "direct"), cells, strict=False))
+
+
+def contact_headings() -> tuple[str, ...]:
+    """Headings of the contacts, on one line each."""
+    return tuple(heading.replace("\n", " ") for heading in day_tables.CONTACT_COLUMNS)
+
+
+def contact_rows(day: DayStudy) -> list[Row]:
+    """Each contact by both ways, in the order of their rise; cells by the number of their column."""
+    rows = day_tables.contact_rows(day)
+    return [{"id": place, **{f"c{k}": cell for k, cell in enumerate(row)}} for place, row in enumerate(rows)]
+
+
+def swing_rows(day: DayStudy) -> list[Row]:
+    """What each assumption changes, alone."""
+    names = ("assumption", "changed", "relay", "direct", "ratio", "slow_relay", "slow_direct")
+    return [{"id": place, **dict(zip(names, row, strict=True))} for place, row in enumerate(day_tables.swing_rows(day))]
+
+
+def words(day: DayStudy) -> list[str]:
+    """The answers of the day, a sentence each, and the warnings."""
+    return [*day_words.sentences(day), *(f"Warning: {warning}." for warning in day.warnings)]
+
+
+# ------------------------------------------------------------------------------------------------------------ figures
+def figures(day: DayStudy) -> dict[str, Figure]:
+    """The report's figures of a day by their names, without that of a simulated contact."""
+    from microrad.report import day_plots
+
+    return {figure.name: figure for figure in day_plots.draw(day)}
+
+
+def image(figure: Figure) -> str:
+    """A figure's picture as the address of an image."""
+    return f"data:image/svg+xml;base64,{base64.b64encode(figure.svg.encode()).decode()}"

@@ -1,0 +1,163 @@
+"""What the mirror page shows of a recording and of an identification: loops and scores as plots and rows."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from microrad.core.units import format_quantity
+from microrad.lab.live_fit import LiveFit
+from microrad.report.plotting.sheet import BLACK, BLUE, GREY, SKY, VERMILION, Axis, Line, Span, grid
+from microrad.studio.jobs.queue import Job
+from microrad.studio.recordings.reading import View
+from microrad.studio.views.live_fit import leader
+from microrad.studio.views.mirror_form import Setting, written
+from microrad.studio.views.plots import WIDTH, Plot, empty, figure, plot
+
+
+# ----------------------------------------------------------------------------------------------------------- the plots
+def recording_plot(view: View, setting: Setting) -> Plot:
+    """The measured loop: output over drive, each sample that is shown a point."""
+    points = Line(np.array(view.drive[0]), np.array(view.output[0]), BLUE, "", marker=".", size=5.0, label="measured")
+    return plot(Axis(_drive_title(setting)), Axis(_output_title(setting)), points)
+
+
+def time_plot(view: View, setting: Setting) -> Plot:
+    """Drive and output over time, one above the other."""
+    sheet, (above, below) = grid(WIDTH, 3.6, 2, share_x=True)
+    time_s = np.array(view.rows) / view.rate_hz
+    above.add(Line(time_s, np.array(view.drive[0]), BLACK, name="drive", whole=True))
+    below.add(Line(time_s, np.array(view.output[0]), BLUE, name="output", whole=True))
+    above.y.title, below.y.title, below.x.title = _drive_title(setting), _output_title(setting), "time (s)"
+    return figure(sheet)
+
+
+def _drive_title(setting: Setting) -> str:
+    return f"drive ({setting.drive_unit})"
+
+
+def _output_title(setting: Setting) -> str:
+    return f"output ({written(setting.output_unit)})"
+
+
+def loop_plot(fit: LiveFit, number: int, drive_unit: str) -> Plot:
+    """The last periods of a recording: what was measured, and what the model makes of the same drive."""
+    loop = fit.loops[number]
+    drive = np.array(loop.drive)
+    measured = Line(drive, 1e6 * np.array(loop.measured_rad), GREY, "-", 3.0, "measured")
+    model = Line(drive, 1e6 * np.array(loop.model_rad), VERMILION, "--", label=fit.model)
+    return plot(Axis(f"drive ({drive_unit})"), Axis("angle (µrad)"), measured, model)
+
+
+def residual_plot(fit: LiveFit, number: int) -> Plot:
+    """What the model leaves of a recording over time, with the part that no fit has seen shaded."""
+    loop = fit.loops[number]
+    residual = Line(np.array(loop.time_s), 1e6 * np.array(loop.residual_rad), BLUE, label="measured less model")
+    unseen = Span(loop.split_s, loop.time_s[-1], True, SKY, 0.2, "seen by no fit")
+    return plot(Axis("time (s)"), Axis("residual (µrad)"), unseen, residual)
+
+
+def nothing() -> Plot:
+    """The plot before there is anything to show."""
+    return empty("Drop a recording to see it here.")
+
+
+# ---------------------------------------------------------------------------------------------------------- the scores
+def score_rows(fits: Sequence[LiveFit], chosen: str = "") -> list[dict[str, Any]]:
+    """A row for each model, the best on the held-out samples first; the one that leads or was chosen is marked."""
+    first, mark = leader(tuple(fits), chosen), "chosen" if chosen else "best so far"
+    ranked = sorted(enumerate(fits), key=lambda pair: pair[1].held_out_rms_percent)
+    return [
+        {
+            "id": k,
+            "model": fit.model,
+            "fit": f"{fit.fit_rms_percent:.3g} %",
+            "held_out": f"{fit.held_out_rms_percent:.3g} %",
+            "note": mark if fit is first else "",
+        }
+        for k, fit in ranked
+    ]
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """What an identification has come to: verdict in sentences, warnings, models that were refused and why."""
+
+    model: str
+    verdict: tuple[str, ...]
+    warnings: tuple[str, ...]
+    refused: tuple[str, ...]
+    numbers: tuple[tuple[str, str], ...]
+
+
+def outcome(said: str) -> Outcome | None:
+    """The end of an identification from what its job has printed; None where it has printed no result."""
+    import json
+
+    try:
+        data = json.loads(said)
+        return Outcome(
+            str(data["model"]),
+            tuple(map(str, data["verdict"])),
+            tuple(map(str, data["warnings"])),
+            tuple(f"{model}: {why}" for model, why in data["refused"].items()),
+            tuple(_numbers(data)),
+        )
+    except (ValueError, KeyError, TypeError, AttributeError):
+        return None
+
+
+def _numbers(data: dict[str, Any]) -> list[tuple[str, str]]:
+    rows = (
+        ("travel over the fitted drive", "travel_rad", "rad"),
+        ("drive, lowest", "drive_min_v", "V"),
+        ("drive, highest", "drive_max_v", "V"),
+        ("fastest drive", "rate_limit_v_s", "V/s"),
+        ("drift over the recording", "drift_rad", "rad"),
+    )
+    return [(name, format_quantity(float(data[key]), unit)) for name, key, unit in rows if data.get(key) is not None]
+
+
+def doing(what: str) -> str:
+    """The phase of an identification in words."""
+    phases = {"play operators": "fitting prandtl_ishlinskii", "Bouc-Wen starts": "fitting bouc_wen, start by start"}
+    return phases.get(what, what)
+
+
+def about(view: View) -> str:
+    """The recording in a sentence."""
+    rate = format_quantity(view.rate_hz, "Hz")
+    return f"{view.samples} samples at {rate}, {format_quantity(view.samples / view.rate_hz, 's')}."
+
+
+def findings(view: View) -> list[str]:
+    """What the checks of a recording have found, a sentence each."""
+    return [f"{note.message[:1].upper()}{note.message[1:].rstrip('.')}." for note in view.findings]
+
+
+def state_words(job: Job, first: LiveFit | None) -> str:
+    """An identification in a sentence: how far it is, which model leads, or how it ended."""
+    told = {
+        "queued": "Waiting for another job to end.",
+        "running": "Begins.",
+        "done": "Done.",
+        "cancelled": "Cancelled; nothing was written.",
+    }
+    words = told.get(job.state, f"{job.state}: {job.words}")
+    if job.state == "running" and job.progress is not None:
+        words = f"{job.progress.done} of {job.progress.total} fits: {doing(job.progress.what)}."
+        words = f"{words[:-1]}, stopping." if job.cancelling else words
+    if first is None:
+        return words
+    lead = "Chosen" if job.state == "done" else "Best so far"
+    return f"{words} {lead}: {first.model}, {first.held_out_rms_percent:.3g} % rms on samples that no fit has seen."
+
+
+def argument(job: Job, flag: str, otherwise: str) -> str:
+    """The value of an option of a job's command."""
+    said = dict(pairwise(job.arguments))
+    return said.get(flag, otherwise)

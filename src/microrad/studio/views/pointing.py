@@ -1,0 +1,209 @@
+"""What the page of the pointing budget shows: lines, totals by each rule, what is left, what the beacon covers."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from microrad import link
+from microrad.core.units import format_quantity
+from microrad.link import DEEPEST_DB, pointing
+from microrad.link import study as link_study
+from microrad.link.pointing import OpenLoopPointing
+from microrad.link.study import PointAheadEffect
+from microrad.mission.file import LinkFile
+from microrad.report.day_figures import short
+from microrad.report.plotting.sheet import (
+    BLACK,
+    BLUE,
+    GREEN,
+    GREY,
+    ORANGE,
+    SKY,
+    VERMILION,
+    Axis,
+    Bars,
+    Line,
+    Mark,
+    Rule,
+)
+from microrad.report.quantities import quantity
+from microrad.studio.draft.draft import Draft
+from microrad.studio.views.plots import Plot, plot, rows
+from microrad.studio.views.sliders import Slider, slider
+
+Row = dict[str, Any]
+
+POINTS = 241
+"""Of the curve of coverage."""
+
+_CLASSES = {"bias": BLUE, "random": ORANGE, "drift": GREEN, "transient": SKY, "total": GREY}
+_LINES, _AHEAD = "pointing.lines.", ("point_ahead.transverse_velocity", "point_ahead.error")
+_BEACON = "beacon.divergence"
+
+
+@dataclass(frozen=True, slots=True)
+class PointingView:
+    """The open-loop pointing budget of a mission, and its point-ahead where it has one.
+
+    `left` is for each line what the beacon's half angle leaves by the root sum square and by the rule of ECSS for two
+    axes; empty for a mission without a beacon.
+    """
+
+    budget: OpenLoopPointing
+    left: tuple[tuple[pointing.Allocation, pointing.Allocation], ...]
+    ahead: PointAheadEffect | None
+
+    @property
+    def half_angle_rad(self) -> float:
+        """Of the beacon at 1/e2; nan without one."""
+        return math.nan if self.budget.reading is None else self.budget.reading.half_angle_rad
+
+
+def view(file: LinkFile) -> PointingView:
+    """The pointing budget of a mission; raises ValueError as `pointing.open_loop_budget` does."""
+    m, data = file.mission, link.of(file.mission)
+    p = pointing.open_loop_budget(m.pointing, data.shared, m.beacon, file.sources)
+    left: tuple[tuple[pointing.Allocation, pointing.Allocation], ...] = ()
+    if p.reading is not None and p.reading.half_angle_rad > 0.0:
+        half = p.reading.half_angle_rad
+        left = tuple(zip(p.allocation(half, "rss"), p.allocation(half, "ecss-radial"), strict=True))
+    return PointingView(p, left, link_study.point_ahead(data))
+
+
+def sliders(draft: Draft) -> dict[str, tuple[Slider, ...]]:
+    """The numbers that move the budget: its lines, the beacon's cone, the confidence, the point-ahead."""
+    found: dict[str, list[Slider]] = {"Errors": [], "Beacon": [], "Point-ahead": [], "Asked for": []}
+    for key, value in draft.values.items():
+        made = slider(value)
+        if made is None:
+            continue
+        if key.startswith(_LINES) and key.endswith(".error"):
+            found["Errors"].append(_named(made, key))
+        elif key == _BEACON:
+            found["Beacon"].append(made)
+        elif key in _AHEAD:
+            found["Point-ahead"].append(made)
+        elif key == "pointing.confidence":
+            found["Asked for"].append(made)
+    return {name: tuple(those) for name, those in found.items() if those}
+
+
+def _named(made: Slider, key: str) -> Slider:
+    """The slider of a line, called by the line."""
+    name = key.removeprefix(_LINES).removesuffix(".error").replace("_", " ").replace("-", " ")
+    return replace(made, label=name[:1].upper() + name[1:])
+
+
+# ------------------------------------------------------------------------------------------------------------- tables
+def line_rows(v: PointingView) -> list[Row]:
+    """Each error with its share of the squares and what is left for it."""
+    rows = []
+    for place, line in enumerate(v.budget.lines):
+        left = [_left(each) for each in v.left[place]] if v.left else ["", ""]
+        rows.append(
+            {
+                "id": place,
+                "line": line.name,
+                "value": quantity(line.value, line.unit),
+                "share": f"{100.0 * v.budget.variance_shares[place]:.1f} %",
+                "left_rss": left[0],
+                "left_ecss": left[1],
+                "basis": f"{line.basis}. From {line.source}",
+            }
+        )
+    return rows
+
+
+def _left(each: pointing.Allocation) -> str:
+    return "nothing" if each.note else quantity(each.largest_rad, "rad")
+
+
+def total_rows(v: PointingView) -> list[Row]:
+    """The total by each rule, beside the beacon's half angle."""
+    of = {"stated": "as stated", "axis": "one axis", "radial": "off the line of sight"}
+    return [
+        {
+            "id": place,
+            "rule": f"{each.name}: {of[each.of]}",
+            "value": quantity(each.total_rad, "rad"),
+            "beacon": _against(v, each.total_rad),
+            "formula": f"{each.formula}; {each.authority}",
+            "caveat": each.caveat,
+        }
+        for place, each in enumerate(v.budget.summations)
+    ]
+
+
+def _against(v: PointingView, total_rad: float) -> str:
+    """Whether the beacon's half angle covers a total, and by how much."""
+    if math.isnan(v.half_angle_rad):
+        return "no beacon"
+    spare = v.half_angle_rad - total_rad
+    return f"covered, {quantity(spare, 'rad')} left" if spare >= 0.0 else f"{quantity(-spare, 'rad')} short"
+
+
+def ahead_rows(v: PointingView) -> list[Row]:
+    """Point-ahead as an angle, in half angles of the beam, as a loss and as a range of the mirror."""
+    a = v.ahead
+    if a is None:
+        return []
+    left_out = "left out, it would cost" if a.corrected else "not corrected, it costs"
+    most = f"more than {DEEPEST_DB:g} dB" if not a.loss_db <= DEEPEST_DB else f"{a.loss_db:.2f} dB"
+    cells = (
+        ("point-ahead angle, largest", quantity(a.angle_rad, "rad")),
+        ("in half angles of the communication beam", f"{a.beam_half_angles:.2f}"),
+        (left_out, most),
+        ("range of a mirror that makes it, at the line of sight", quantity(a.mirror_range_rad, "rad")),
+    )
+    return [{"id": place, "what": what, "value": value} for place, (what, value) in enumerate(cells)]
+
+
+def words(v: PointingView) -> list[str]:
+    """What the beacon covers, in sentences; that there is none, where there is none."""
+    from microrad.report.links import coverage  # loads the drawing library
+
+    return coverage(v.budget) or ["The mission has no beacon, so nothing is to be covered."]
+
+
+# -------------------------------------------------------------------------------------------------------------- plots
+def lines_plot(v: PointingView) -> Plot:
+    """The half widths of the lines as bars by their class, the totals below them, against the beacon's half angle."""
+    lines, totals = v.budget.stated, v.budget.summations
+    errors = [(each.kind, each.error_rad) for each in lines] + [("total", each.total_rad) for each in totals]
+    marks: list[Mark] = [_bars(kind, errors) for kind in dict.fromkeys(kind for kind, _ in errors)]
+    if not math.isnan(v.half_angle_rad):
+        name = f"beacon's half angle: {quantity(v.half_angle_rad, 'rad')}"
+        marks.append(Rule(v.half_angle_rad * 1e6, True, VERMILION, "--", 1.5, name))
+    names = rows([short(name, 40) for name in (*(e.name for e in lines), *(e.name for e in totals))])
+    return plot(Axis("angle (µrad)", low=0.0), names, *marks, height=1.0 + 0.27 * len(errors))
+
+
+def _bars(kind: str, errors: list[tuple[str, float]]) -> Bars:
+    """The bars of one class, each in the row that it has among all."""
+    own = np.array([(row, error_rad * 1e6) for row, (of, error_rad) in enumerate(errors) if of == kind])
+    return Bars(own[:, 0], np.zeros(len(own)), own[:, 1], np.full(len(own), 0.7), _CLASSES[kind], label=kind)
+
+
+def coverage_plot(v: PointingView) -> Plot:
+    """Probability that the radial error is below an angle, with what the beacon covers and what the rules ask for."""
+    p = v.budget
+    totals = {name: p.total_rad(name) for name in ("rss", "ecss-radial", "exact")}
+    most = 1.25 * max(end for end in (*totals.values(), v.half_angle_rad) if math.isfinite(end)) or 1e-6
+    radius = np.linspace(0.0, most, POINTS)
+    marks: list[Mark] = [Line(radius * 1e6, 100.0 * p.coverage(radius), BLUE, width=1.9, label="inside this angle")]
+    if not math.isnan(v.half_angle_rad):
+        half = f"beacon's half angle: {format_quantity(v.half_angle_rad, 'rad', 3)}"
+        marks.append(Rule(v.half_angle_rad * 1e6, True, VERMILION, "-", 1.5, half))
+    named = ("root sum square", ORANGE, "--"), ("ECSS, two axes", GREEN, "-."), (_inside(p), BLACK, ":")
+    for total_rad, (name, colour, dash) in zip(totals.values(), named, strict=True):
+        marks.append(Rule(total_rad * 1e6, True, colour, dash, 1.5, f"{name}: {quantity(total_rad, 'rad')}"))
+    x = Axis("angle off the line of sight (µrad)", low=0.0, high=most * 1e6)
+    return plot(x, Axis("probability of an error below it (%)", low=0.0, high=101.0), *marks)
+
+
+def _inside(p: OpenLoopPointing) -> str:
+    return f"{100.0 * p.confidence:g} % inside"
