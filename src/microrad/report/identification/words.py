@@ -13,7 +13,6 @@ from microrad.lab.identify.hysteresis.joint import JointFit
 from microrad.lab.identify.linear.fit import LinearFit
 from microrad.lab.identify.selection.predictions import Fit, Prediction
 from microrad.lab.identify.selection.warnings import fit_warnings
-from microrad.lab.identify.statistics import rounded_to_error
 from microrad.lab.recording import Recording
 from microrad.report.identification.parameters import (
     admissible,
